@@ -1,0 +1,193 @@
+# psr: `make help` lists the targets. One build folder a configuration: config=release|debug|asan|tsan.
+
+config ?= release
+BUILD  ?= build/$(config)
+PREFIX ?= /usr/local
+DESTDIR ?=
+V ?= 0
+VERSION := 0.1.0
+
+DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
+	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
+DEPS_TEST  := libcmocka-dev
+DEPS_BENCH := gnuplot-nox
+
+CC  ?= cc
+CXX ?= c++
+AR  ?= ar
+
+# Same bits everywhere: no contraction into fused multiply-add, no fast-math, no ISA flags outside of simd/.
+COMMON := -O2 -g -ffp-contract=off -fno-math-errno -fvisibility=hidden -fPIC -pthread
+WARN   := -Wall -Wextra -Wshadow
+LINK   := -pthread
+ifeq ($(config),debug)
+COMMON += -O0
+else ifeq ($(config),asan)
+COMMON += -O1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+LINK   += -fsanitize=address,undefined
+else ifeq ($(config),tsan)
+COMMON += -O1 -fsanitize=thread
+LINK   += -fsanitize=thread
+else ifeq ($(config),release)
+COMMON += -DNDEBUG
+else
+$(error config=$(config): one of release, debug, asan, tsan)
+endif
+
+INC := -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
+CFLAGS_ALL   = -std=gnu11 $(COMMON) $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(INC) $(CFLAGS) -MMD -MP
+CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(INC) $(CXXFLAGS) -MMD -MP
+
+Q := $(if $(filter 1,$(V)),,@)
+say = $(if $(filter 1,$(V)),,@printf '  %-5s %s\n' $(1) $(2))
+
+# --- what is made of what -------------------------------------------------------------------------------------------
+
+objs = $(patsubst %,$(BUILD)/%.o,$(sort $(wildcard $(1))))
+
+LIBPSR_O       := $(call objs,libpsr/base/*.c libpsr/model/*.c libpsr/render/*.c)
+LIBPSR_BUILD_O := $(call objs,libpsr/import/*.c libpsr/import/*.cc libpsr/sample/*.c libpsr/measure/*.c)
+PROTO_O        := $(call objs,proto/*.c)
+CLIENT_LIB_O   := $(call objs,client/lib/*.c)
+PSRD_O         := $(call objs,server/*.c)
+PSR_O          := $(call objs,client/*.c)
+MODEL_O        := $(call objs,models/*.c)
+
+LIB := $(BUILD)/lib
+BIN := $(BUILD)/bin
+A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
+PROGRAMS := $(BIN)/psrd $(BIN)/psr
+ifneq ($(filter release debug,$(config)),)
+PROGRAMS += $(BIN)/psr-model $(LIB)/psr-image-oiio.so
+endif
+
+L_PSR    := -lxxhash -lm
+L_CODEC  := -lturbojpeg -lzstd
+L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
+
+.PHONY: all demo test test-all models bench install help clean deps deps-test deps-bench compile
+all: deps ## all: install what is missing, build everything (the default)
+	$(Q)$(MAKE) --no-print-directory compile
+
+compile: $(PROGRAMS)
+
+$(BUILD)/%.c.o: %.c
+	@mkdir -p $(@D)
+	$(call say,CC,$<)
+	$(Q)$(CC) $(CFLAGS_ALL) -c $< -o $@
+
+$(BUILD)/%.cc.o: %.cc
+	@mkdir -p $(@D)
+	$(call say,CXX,$<)
+	$(Q)$(CXX) $(CXXFLAGS_ALL) -c $< -o $@
+
+# Other people's code, compiled once for all configurations and not held to our warnings.
+$(BUILD)/libpsr/import/third_%.cc.o: build/third/third_%.cc.o
+	@mkdir -p $(@D)
+	@cp $< $@
+build/third/third_%.cc.o: libpsr/import/third_%.cc
+	@mkdir -p $(@D)
+	$(call say,CXX,$<)
+	$(Q)$(CXX) -std=c++17 -O2 -g -fPIC -w $(INC) -c $< -o $@
+
+define archive
+	@mkdir -p $(@D)
+	$(call say,AR,$@)
+	@rm -f $@
+	$(Q)$(AR) rcs $@ $^
+endef
+$(LIB)/libpsr.a: $(LIBPSR_O); $(archive)
+$(LIB)/libpsr-build.a: $(LIBPSR_BUILD_O); $(archive)
+$(LIB)/libpsrproto.a: $(PROTO_O); $(archive)
+$(LIB)/libpsrclient.a: $(CLIENT_LIB_O); $(archive)
+
+define link
+	@mkdir -p $(@D)
+	$(call say,LD,$@)
+	$(Q)$(CC) $(LINK) $(LDFLAGS) -o $@ $(filter %.o,$^) $(filter %.a,$^)
+endef
+$(BIN)/psrd: $(PSRD_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_PSR)
+$(BIN)/psr: $(PSR_O) $(A)
+	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
+$(BIN)/psr-model: $(MODEL_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_BUILD) $(L_PSR)
+$(LIB)/psr-image-oiio.so: $(BUILD)/client/image/oiio.cc.o
+	@mkdir -p $(@D)
+	$(call say,LD,$@)
+	$(Q)$(CXX) $(LINK) $(LDFLAGS) -shared -o $@ $< -lOpenImageIO -lOpenImageIO_Util
+
+# --- tests ----------------------------------------------------------------------------------------------------------
+
+UNIT       := $(sort $(wildcard tests/unit/*.c))
+UNIT_BUILD := $(filter tests/unit/import_% tests/unit/sample_% tests/unit/measure_% tests/unit/models_%,$(UNIT))
+UNIT_LIGHT := $(filter-out $(UNIT_BUILD),$(UNIT))
+unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
+FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
+FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
+TOOLS      := $(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c))
+TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS)
+ifneq ($(filter release debug,$(config)),)
+TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
+endif
+
+SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
+MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
+L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
+
+$(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(A)
+	$(link) $(L_TEST)
+$(call unit_bin,$(filter tests/unit/server_%,$(UNIT))): $(SERVER_PARTS)
+$(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(A)
+	$(link) $(L_TEST) $(L_BUILD)
+$(call unit_bin,$(filter tests/unit/models_%,$(UNIT))): $(MODEL_PARTS)
+$(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
+	$(link) $(L_TEST)
+$(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
+	$(link) $(L_TEST) $(L_BUILD)
+$(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
+	$(link) $(L_TEST)
+
+.PHONY: test-bin check
+test-bin: $(TEST_BIN) $(PROGRAMS)
+check: test-bin ## check: run the tests of this config without looking for missing packages
+	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
+
+test: deps deps-test ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
+	$(Q)$(MAKE) --no-print-directory models
+	$(Q)$(MAKE) --no-print-directory check
+
+test-all: test ## test-all: test, then the address/undefined-behaviour and thread sanitizers on everything that they can build
+	$(Q)$(MAKE) --no-print-directory check config=asan
+	$(Q)$(MAKE) --no-print-directory check config=tsan
+
+models: ## models: fetch the real models (dragon, bunny, engine, ...) into the cache; what cannot be had is skipped by name
+	$(Q)models/fetch.sh
+
+demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/demo.sh
+
+# --- packages -------------------------------------------------------------------------------------------------------
+
+deps:       ; @.ci/deps $(DEPS_BUILD)
+deps-test:  ; @.ci/deps $(DEPS_TEST)
+deps-bench: ; @.ci/deps $(DEPS_BENCH)
+
+install: compile ## install: programs, library, headers, man pages under DESTDIR/PREFIX
+	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
+	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
+	install $(BIN)/* $(DESTDIR)$(PREFIX)/bin
+	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
+	install -m 644 $(LIB)/*.a $(DESTDIR)$(PREFIX)/lib
+	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
+	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	sed 's|@PREFIX@|$(PREFIX)|;s|@VERSION@|$(VERSION)|' docs/psr.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/psr.pc
+
+clean: ## clean: remove everything that was built
+	rm -rf build
+
+help: ## help: this list
+	@sed -n 's/^[a-z][a-z-]*:.*## \([a-z-]*\): /  \1\t/p' $(MAKEFILE_LIST) | expand -t 14
+
+-include $(shell find $(BUILD) -name '*.d' 2>/dev/null)

@@ -1,0 +1,224 @@
+#include <assert.h>
+#include <fenv.h>
+#include <limits.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include "psr/error.h"
+#include "psr/pool.h"
+
+#define MAX_THREADS 256
+
+struct job {
+	struct job *next;
+	void (*fn)(void *userdata);
+	void *userdata;
+};
+
+/* Lives on its caller's stack; helpers touch it only between their count going up and down, both under the mutex. */
+struct loop {
+	struct loop *next, *previous;
+	void (*fn)(int i, void *userdata);
+	void *userdata;
+	int n, n_helpers;
+	atomic_int taken; /* indices given out */
+	pthread_cond_t left;
+};
+
+struct psr_pool {
+	pthread_mutex_t mutex;
+	pthread_cond_t work;
+	struct job *first_job, **last_job;
+	struct loop loops; /* head of a ring */
+	atomic_int n_jobs; /* queued ones */
+	int n_threads, n_workers, with_jobs, stopping;
+	pthread_t worker[MAX_THREADS];
+};
+
+/* Whoever runs it, a function of the pool starts from the default rounding and with denormal numbers: a library that
+ * sets flush-to-zero in one thread must not show in a frame. */
+static void run_indices(struct loop *loop, const atomic_int *n_jobs)
+{
+	fenv_t callers;
+	int i;
+
+	fegetenv(&callers);
+	fesetenv(FE_DFL_ENV);
+	while ((n_jobs == NULL || atomic_load_explicit(n_jobs, memory_order_relaxed) == 0)
+	       && (i = atomic_fetch_add_explicit(&loop->taken, 1, memory_order_relaxed)) < loop->n)
+		loop->fn(i, loop->userdata);
+	fesetenv(&callers);
+}
+
+/* The running loop with indices left and the fewest helpers, the oldest of several; NULL if none. */
+static struct loop *neediest_loop(struct psr_pool *pool)
+{
+	struct loop *best = NULL;
+
+	for (struct loop *loop = pool->loops.next; loop != &pool->loops; loop = loop->next)
+		if (atomic_load_explicit(&loop->taken, memory_order_relaxed) < loop->n
+		    && (best == NULL || loop->n_helpers < best->n_helpers))
+			best = loop;
+	return best;
+}
+
+static void run_job(struct psr_pool *pool)
+{
+	struct job *job = pool->first_job;
+
+	pool->first_job = job->next;
+	if (pool->first_job == NULL)
+		pool->last_job = &pool->first_job;
+	atomic_fetch_sub_explicit(&pool->n_jobs, 1, memory_order_relaxed);
+	pthread_mutex_unlock(&pool->mutex);
+	fesetenv(FE_DFL_ENV);
+	job->fn(job->userdata);
+	free(job);
+	pthread_mutex_lock(&pool->mutex);
+}
+
+static void help(struct psr_pool *pool, struct loop *loop)
+{
+	loop->n_helpers++;
+	pthread_mutex_unlock(&pool->mutex);
+	run_indices(loop, &pool->n_jobs);
+	pthread_mutex_lock(&pool->mutex);
+	if (--loop->n_helpers == 0)
+		pthread_cond_signal(&loop->left);
+}
+
+static void *work(void *userdata)
+{
+	struct psr_pool *pool = userdata;
+	struct loop *loop;
+
+	pthread_mutex_lock(&pool->mutex);
+	for (;;) {
+		if (pool->first_job != NULL)
+			run_job(pool);
+		else if ((loop = neediest_loop(pool)) != NULL)
+			help(pool, loop);
+		else if (pool->stopping)
+			break;
+		else
+			pthread_cond_wait(&pool->work, &pool->mutex);
+	}
+	pthread_mutex_unlock(&pool->mutex);
+	return NULL;
+}
+
+/* Signals belong to the threads of the program; those that tell of a fault stay where it happens. */
+static int start_worker(struct psr_pool *pool)
+{
+	static const int faults[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS };
+	sigset_t blocked, before;
+	int failed;
+
+	sigfillset(&blocked);
+	for (size_t i = 0; i < sizeof faults / sizeof faults[0]; i++)
+		sigdelset(&blocked, faults[i]);
+	pthread_sigmask(SIG_BLOCK, &blocked, &before);
+	failed = pthread_create(&pool->worker[pool->n_workers], NULL, work, pool);
+	pthread_sigmask(SIG_SETMASK, &before, NULL);
+	if (failed)
+		return PSR_ERR_MEMORY;
+	pool->n_workers++;
+	return PSR_OK;
+}
+
+int psr_pool_create(struct psr_pool **out, int n_threads, int with_jobs)
+{
+	struct psr_pool *pool;
+	int n_workers = with_jobs ? n_threads : n_threads - 1;
+
+	if (n_threads < 1 || n_threads > MAX_THREADS)
+		return PSR_ERR_ARG;
+	pool = calloc(1, sizeof *pool);
+	if (pool == NULL)
+		return PSR_ERR_MEMORY;
+	pthread_mutex_init(&pool->mutex, NULL);
+	pthread_cond_init(&pool->work, NULL);
+	pool->last_job = &pool->first_job;
+	pool->loops.next = pool->loops.previous = &pool->loops;
+	pool->n_threads = n_threads;
+	pool->with_jobs = with_jobs != 0;
+	for (int i = 0; i < n_workers; i++) {
+		if (start_worker(pool) != PSR_OK) {
+			psr_pool_destroy(pool);
+			return PSR_ERR_MEMORY;
+		}
+	}
+	*out = pool;
+	return PSR_OK;
+}
+
+void psr_pool_destroy(struct psr_pool *pool)
+{
+	if (pool == NULL)
+		return;
+	pthread_mutex_lock(&pool->mutex);
+	pool->stopping = 1;
+	pthread_cond_broadcast(&pool->work);
+	pthread_mutex_unlock(&pool->mutex);
+	for (int i = 0; i < pool->n_workers; i++)
+		pthread_join(pool->worker[i], NULL);
+	assert(pool->first_job == NULL && pool->loops.next == &pool->loops);
+	pthread_cond_destroy(&pool->work);
+	pthread_mutex_destroy(&pool->mutex);
+	free(pool);
+}
+
+int psr_pool_threads(const struct psr_pool *pool)
+{
+	return pool != NULL ? pool->n_threads : 1;
+}
+
+void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata)
+{
+	struct loop loop = { .fn = fn, .userdata = userdata, .n = n };
+
+	/* Each thread may take one index too many before it sees the end. */
+	assert(n <= INT_MAX - MAX_THREADS - 1);
+	if (n <= 0)
+		return;
+	if (pool == NULL || pool->n_workers == 0 || n == 1) {
+		run_indices(&loop, NULL);
+		return;
+	}
+	pthread_cond_init(&loop.left, NULL);
+	pthread_mutex_lock(&pool->mutex);
+	loop.next = &pool->loops;
+	loop.previous = pool->loops.previous;
+	loop.previous->next = loop.next->previous = &loop;
+	pthread_cond_broadcast(&pool->work);
+	pthread_mutex_unlock(&pool->mutex);
+
+	run_indices(&loop, NULL);
+
+	pthread_mutex_lock(&pool->mutex);
+	loop.previous->next = loop.next;
+	loop.next->previous = loop.previous;
+	while (loop.n_helpers > 0)
+		pthread_cond_wait(&loop.left, &pool->mutex);
+	pthread_mutex_unlock(&pool->mutex);
+	pthread_cond_destroy(&loop.left);
+}
+
+int psr_pool_submit(struct psr_pool *pool, void (*fn)(void *userdata), void *userdata)
+{
+	struct job *job;
+
+	assert(pool->with_jobs);
+	job = malloc(sizeof *job);
+	if (job == NULL)
+		return PSR_ERR_MEMORY;
+	*job = (struct job){ .fn = fn, .userdata = userdata };
+	pthread_mutex_lock(&pool->mutex);
+	*pool->last_job = job;
+	pool->last_job = &job->next;
+	atomic_fetch_add_explicit(&pool->n_jobs, 1, memory_order_relaxed);
+	pthread_cond_signal(&pool->work);
+	pthread_mutex_unlock(&pool->mutex);
+	return PSR_OK;
+}

@@ -1,0 +1,16 @@
+/* The sRGB curve: codes of 8 bits to linear light and back, the same bits on every machine.
+ *
+ * linear = c / 12.92 for c <= 0.04045, else ((c + 0.055) / 1.055)^2.4, with c = code / 255. Both directions are tables
+ * of constants that were computed to 50 digits. */
+#ifndef PSR_BASE_SRGB_H
+#define PSR_BASE_SRGB_H
+
+#include <stdint.h>
+
+extern const float psr_srgb_to_linear[256]; /* correctly rounded; 0 -> 0, 255 -> 1 */
+
+/* The code whose c is nearest to that of `linear`, a half upwards; clamped to 0..255, NaN gives 0. The inverse of the
+ * table above. */
+uint8_t psr_linear_to_srgb(float linear);
+
+#endif

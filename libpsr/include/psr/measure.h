@@ -1,0 +1,42 @@
+/* Accuracy: the ray-traced truth of a mesh, and how a frame's depth differs from it. */
+#ifndef PSR_MEASURE_H
+#define PSR_MEASURE_H
+
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/mesh.h"
+#include "psr/scene.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct psr_truth; /* a mesh behind a ray tracer; visible surfaces are those that the sampler sees: alpha cut-outs and the
+                     backs of one-sided faces let rays through */
+
+int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err);
+void psr_truth_destroy(struct psr_truth *truth);
+
+/* One ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in world
+ * units, +inf where nothing is; normal: unit, towards the eye, world; both width * side by height * side; normal and rgb may be
+ * NULL. rgb: flat diffuse colour, sRGB, 3 bytes. */
+int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height, uint32_t side,
+                   int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err);
+
+/* A frame's depth against the truth, `spacing` being the distance of the samples on the surface in world units. */
+struct psr_accuracy {
+	uint64_t n_truth;        /* pixels whose centre ray meets the object */
+	uint64_t n_inside;       /* pixels whose whole 3x3 neighbourhood meets the object: the silhouette less a pixel */
+	uint64_t n_outside_drawn;/* drawn more than a pixel outside of the silhouette: no ray of the 3x3 neighbourhood meets it */
+	uint64_t n_inside_empty; /* not drawn although inside */
+	uint64_t n_holes;        /* inside, and empty or behind every surface point of the 3x3 neighbourhood by over `tolerance` */
+	uint64_t n_compared;     /* drawn pixels with truth in their 3x3 neighbourhood */
+	double distance_p50, distance_p99, distance_p999, distance_max; /* along the truth's normal, in units of spacing */
+};
+int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,
+                         uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,119 @@
+/* Point-sample models in memory, and the .psr file. The byte table of the file is docs/format.md.
+ *
+ * A model is one object: an origin, a scale, and one or more representations. Inside of it everything is relative to
+ * the origin and scaled so that the object fits the unit sphere ([G] 5): object = origin + scale * inner. A model is
+ * immutable once made, shared by counting references, and may be read by any number of threads. */
+#ifndef PSR_MODEL_H
+#define PSR_MODEL_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PSR_BLOCK_SIDE 8
+#define PSR_BLOCK_SAMPLES 64 /* [G] 5.1: 8x8 */
+
+/* One orthographic projection ([G] 5.1). Rows of `axis` are projection space's x, y, z in the model's inner
+ * coordinates, a right-handed orthonormal frame; z points to the viewer of the projection, and samples' depths grow
+ * along it. Lattice sample (col, row) of level 0 stands at x = (col + (row & 1) / 2) * spacing, y = row * sqrt(3)/2 *
+ * spacing: equilateral ([G] 4.4), with every second row shifted by half a step, so that blocks are nearly square. */
+struct psr_projection {
+	float axis[3][3];
+	float spacing; /* at level 0; level l has spacing * 2^l */
+};
+
+enum psr_block_flag {
+	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else weight 0 ([G] 7.3.2) */
+};
+
+/* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice origin
+ * is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth along z is
+ * depth_bias + depth_step * (float)depth[64 * b + s]; its attributes are attr[attr_first[b] + number of lower set bits].
+ * Blocks of one cluster follow each other. */
+struct psr_blocks {
+	uint32_t n_blocks, n_projections, n_clusters, n_levels;
+	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr */
+	const struct psr_projection *projection;
+	const struct psr_cluster *cluster;
+	const float *sphere_x, *sphere_y, *sphere_z, *sphere_r; /* bounds the samples and reaches half a step beyond */
+	const uint16_t *block_projection;
+	const int16_t *col, *row;               /* in blocks */
+	const uint8_t *level;                   /* 0 is the finest */
+	const uint8_t *flags;                   /* enum psr_block_flag */
+	const float *depth_bias, *depth_step;
+	const uint64_t *mask;                   /* never 0 */
+	const uint32_t *attr_first;
+	const uint16_t *depth;                  /* 64 a block; 0 where invalid */
+	const uint64_t *attr;                   /* see PSR_ATTR_* */
+	/* Optional, NULL if absent ([G] 6.3, 6.4): */
+	const float *cone_x, *cone_y, *cone_z, *cone_cos; /* smallest cap of the geometric normals; all-culling is void at cos -1 */
+	const uint64_t (*visibility)[2];        /* 128 bits, one a triangle of directions */
+};
+
+/* A spatial cluster at one level: blocks first_block .. first_block + n_blocks - 1. Clusters of one `group` are the
+ * same piece of the object at different levels; exactly one of them is drawn. */
+struct psr_cluster {
+	float center[3], radius; /* holds its blocks' spheres */
+	uint32_t first_block, n_blocks;
+	uint32_t group;
+	uint8_t level, zero[3];
+};
+
+/* Attributes of a sample, one word ([G] table 5.1):
+ *   bits  0-14  normal, index of the subdivided sphere (psr/direction.h)
+ *   bit   15    unlit: drawn in its diffuse colour whatever the lights
+ *   bits 16-39  diffuse R, G, B, 8 bits each, sRGB-coded (R lowest)
+ *   bits 40-55  specular 5-6-5, sRGB-coded (R in the lowest five)
+ *   bits 56-63  e: the Phong exponent is 2^(e/16) */
+#define PSR_ATTR_NORMAL(a) ((uint32_t)((a) & 0x7fff))
+#define PSR_ATTR_UNLIT(a) ((uint32_t)((a) >> 15 & 1))
+#define PSR_ATTR_DIFFUSE(a) ((uint32_t)((a) >> 16 & 0xffffff)) /* r | g << 8 | b << 16 */
+#define PSR_ATTR_SPECULAR(a) ((uint32_t)((a) >> 40 & 0xffff))
+#define PSR_ATTR_EXPONENT(a) ((uint32_t)((a) >> 56))
+
+struct psr_model_info {
+	double origin[3]; /* object coordinates of the inner origin */
+	double scale;     /* object units an inner unit; > 0 */
+	double box_min[3], box_max[3]; /* of the samples, object coordinates */
+	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object units */
+	double tolerance; /* angle of [G] 4.4, radians */
+	uint32_t resolution; /* target resolution: pixels across the unit sphere at magnification 1 */
+	char builder[32];    /* name and version of the program that built it */
+};
+
+struct psr_model;
+
+/* Opens a .psr file. `map` keeps the file mapped and reads it in place; `read` copies it into anonymous memory first
+ * (huge pages where the system has them), so that a file that shrinks later does no harm: what a daemon wants. Both
+ * check every count, offset, index and hash before anything is followed. NOT_FOUND, IO, FORMAT, VERSION, MEMORY. */
+int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
+int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
+
+/* The same from memory; `bytes` is copied. For tests and fuzzers. */
+int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
+
+/* Makes a model from arrays of the caller's, which are copied and validated like a file's. */
+int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
+                     struct psr_error *err);
+
+/* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. */
+int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
+
+struct psr_model *psr_model_ref(struct psr_model *model);
+void psr_model_unref(struct psr_model *model); /* NULL is fine */
+
+const struct psr_model_info *psr_model_info(const struct psr_model *model);
+const struct psr_blocks *psr_model_blocks(const struct psr_model *model); /* NULL if it has no such representation */
+
+/* XXH128 of the section table (types, versions, lengths, hashes): the same bytes of content, the same id. */
+void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);
+uint64_t psr_model_bytes(const struct psr_model *model); /* memory that it holds, all overhead included */
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,71 @@
+/* The scene of a request: instances of models, a camera, lights. Plain data, doubles, owned by the caller.
+ *
+ * Object and world space are right-handed, +Y up. Camera space is [G] 7.1: the eye at the origin looking along +z;
+ * with forward = target - eye, the picture's right is forward x up and its down is forward x right. Depth is z' in
+ * world units along the view axis. Pixel centres are at +0.5, (0,0) is the top left pixel. */
+#ifndef PSR_SCENE_H
+#define PSR_SCENE_H
+
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/model.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PSR_MAX_INSTANCES 1024
+#define PSR_MAX_LIGHTS 32
+
+enum psr_camera_kind { PSR_CAMERA_PERSPECTIVE, PSR_CAMERA_ORTHOGRAPHIC };
+
+struct psr_camera {
+	double eye[3], target[3], up[3]; /* target != eye; up not parallel to target - eye; up need not have unit length */
+	enum psr_camera_kind kind;
+	double fov_y;        /* perspective: full vertical angle, radians, 1e-6..3.14159 */
+	double ortho_height; /* orthographic: world units from the top edge of the picture to its bottom, > 0 */
+	double near_z;       /* nothing nearer is drawn; world units; 0: chosen from the scene */
+};
+
+/* world = translation + scale * rotate(rotation, object) */
+struct psr_instance {
+	const struct psr_model *model;
+	double rotation[4];  /* unit quaternion x, y, z, w */
+	double translation[3];
+	double scale;        /* > 0 */
+};
+
+enum psr_light_kind { PSR_LIGHT_DIRECTIONAL, PSR_LIGHT_POINT, PSR_LIGHT_SPOT };
+
+struct psr_light {
+	enum psr_light_kind kind;
+	double position[3];  /* point, spot; world */
+	double direction[3]; /* directional, spot: where the light goes; any length but 0 */
+	double color[3];     /* linear, intensity included, >= 0 */
+	double inner, outer; /* spot: half angles from the axis, radians, 0 <= inner <= outer <= pi, outer > 0: full light inside of
+	                      * inner, none outside of outer */
+	double reference;    /* point, spot: distance at which the intensity holds, falling with the square beyond; 0: does not fall */
+};
+
+struct psr_scene {
+	const struct psr_instance *instance;
+	uint32_t n_instances;
+	const struct psr_light *light;
+	uint32_t n_lights;
+	double ambient[3];    /* linear */
+	double background[3]; /* linear */
+	struct psr_camera camera;
+};
+
+/* Checks all ranges above: PSR_ERR_ARG or LIMIT with a sentence that names the field. */
+int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err);
+
+/* A camera that shows the whole scene from a little to the right and above of the front (+z), at the given vertical
+ * angle (radians; 0: orthographic) and aspect (width / height). */
+void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], double fov_y,
+                      double aspect);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,271 @@
+#include <assert.h>
+#include <string.h>
+#include "base/maths.h"
+#include "base/mem.h"
+#include "render/render.h"
+
+/* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second writes the
+ * bins where the counts say, in canonical order whatever the threads did. */
+
+#define CHUNK_BLOCKS 2048
+
+struct cull_chunk {
+	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
+	uint32_t levels, n_tested, n_clamped;
+	uint64_t n_samples;
+	float depth_error; /* greatest half step of depth, in pixels */
+};
+
+struct cull_hit {
+	uint32_t slot;
+	uint8_t level, tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
+};
+
+struct cull {
+	struct bins *bins;
+	const struct plan *plan;
+	uint32_t n_chunks, n_tiles;
+};
+
+/* A sphere in camera space, and the pixels that it can touch. */
+struct extent {
+	float x0, x1, y0, y1;
+};
+
+static inline float to_camera(const float m[4], float x, float y, float z)
+{
+	return m[0] * x + m[1] * y + m[2] * z + m[3];
+}
+
+/* Interval of c / z for c within c +- r and z within z0..z1, both positive. */
+static inline void interval(float c, float r, float z0, float z1, float *low, float *high)
+{
+	*low = (c - r) / (c - r < 0 ? z0 : z1);
+	*high = (c + r) / (c + r < 0 ? z1 : z0);
+}
+
+/* 0 if nothing of the sphere can be in the picture grown by `guard` pixels. Two more pixels make up for rounding. */
+static int sphere_extent(const struct plan *plan, const float c[3], float r, float guard, struct extent *out)
+{
+	r *= 1.0001f;
+	if (!(c[2] + r > plan->near_z))
+		return 0;
+	float x0 = c[0] - r, x1 = c[0] + r, y0 = c[1] - r, y1 = c[1] + r;
+	if (plan->perspective) {
+		float z0 = c[2] - r > plan->near_z ? c[2] - r : plan->near_z, z1 = c[2] + r;
+		interval(c[0], r, z0, z1, &x0, &x1);
+		interval(c[1], r, z0, z1, &y0, &y1);
+	}
+	float half_w = (float)plan->width / 2, half_h = (float)plan->height / 2;
+	guard += 2;
+	out->x0 = x0 * plan->focal + half_w - guard;
+	out->x1 = x1 * plan->focal + half_w + guard;
+	out->y0 = y0 * plan->focal + half_h - guard;
+	out->y1 = y1 * plan->focal + half_h + guard;
+	return out->x1 >= 0 && out->y1 >= 0 && out->x0 < (float)plan->width && out->y0 < (float)plan->height;
+}
+
+/* Pixels that a length across the surface at the sphere can be stretched to: |d(x'/z')| <= |p| |dp| / z'^2, which is
+ * [G] (7.9) with the true stretch off the axis in the place of the distance alone. */
+static inline float stretch(const struct plan *plan, const float c[3], float r)
+{
+	if (!plan->perspective)
+		return plan->focal;
+	float z = c[2] - r;
+	if (!(z > plan->near_z))
+		z = plan->near_z;
+	float distance = __builtin_sqrtf(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + r;
+	return plan->focal * distance / (z * z);
+}
+
+/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent. */
+static inline uint32_t level_for(float pixels)
+{
+	uint32_t bits = psr_bits_from_float(pixels);
+	if (bits <= psr_bits_from_float(1.0f))
+		return 0;
+	return (bits >> 23) - 127 + ((bits & 0x7fffff) != 0);
+}
+
+static inline uint8_t tile_of(float pixel, uint32_t size, uint32_t n_tiles)
+{
+	uint32_t tile = pixel > 0 ? (uint32_t)(pixel < PSR_MAX_SIDE ? pixel : PSR_MAX_SIDE) / size : 0;
+	return (uint8_t)(tile < n_tiles ? tile : n_tiles - 1);
+}
+
+static int cull_block(const struct plan *plan, const struct plan_instance *in, uint32_t block, struct cull_chunk *chunk,
+                      struct cull_hit *hit)
+{
+	const struct psr_blocks *b = in->blocks;
+	float x = b->sphere_x[block], y = b->sphere_y[block], z = b->sphere_z[block], r = b->sphere_r[block] * in->scale;
+	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
+		           to_camera(in->center_m[2], x, y, z) };
+	float s = stretch(plan, c, r);
+	uint32_t level = level_for(s * in->spacing * (float)(1u << b->level[block]));
+	int clamped = level > PSR_MAX_DEPTH_LEVEL;
+	if (clamped)
+		level = PSR_MAX_DEPTH_LEVEL;
+	struct extent e;
+	if (!sphere_extent(plan, c, r, (float)(1 << level), &e))
+		return 0;
+	hit->slot = in->first_slot + block;
+	hit->level = (uint8_t)level;
+	hit->tile_x0 = tile_of(e.x0, TILE_WIDTH, plan->tiles_x);
+	hit->tile_x1 = tile_of(e.x1, TILE_WIDTH, plan->tiles_x);
+	hit->tile_y0 = tile_of(e.y0, TILE_HEIGHT, plan->tiles_y);
+	hit->tile_y1 = tile_of(e.y1, TILE_HEIGHT, plan->tiles_y);
+	chunk->levels |= 1u << level;
+	chunk->n_clamped += (uint32_t)clamped;
+	chunk->n_samples += (uint64_t)__builtin_popcountll(b->mask[block]);
+	float error = s * b->depth_step[block] * in->scale / 2;
+	if (error > chunk->depth_error)
+		chunk->depth_error = error;
+	return 1;
+}
+
+static void count_chunk(int i, void *userdata)
+{
+	const struct cull *cull = userdata;
+	const struct plan *plan = cull->plan;
+	struct cull_chunk *chunk = &cull->bins->chunk[i];
+	const struct plan_instance *in = &plan->instance[chunk->instance];
+	uint32_t *count = cull->bins->count + (size_t)i * cull->n_tiles;
+	struct cull_hit *hit = cull->bins->hit + chunk->first_hit;
+	/* Whatever level a cluster's blocks get, their guard is at most that of the coarsest. */
+	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
+
+	memset(count, 0, cull->n_tiles * sizeof *count);
+	for (uint32_t k = 0; k < chunk->n_clusters; k++) {
+		const struct psr_cluster *cluster = &in->blocks->cluster[chunk->first_cluster + k];
+		struct extent e;
+		float c[3];
+		for (int a = 0; a < 3; a++)
+			c[a] = to_camera(in->center_m[a], cluster->center[0], cluster->center[1], cluster->center[2]);
+		if (!sphere_extent(plan, c, cluster->radius * in->scale, guard, &e))
+			continue;
+		chunk->n_tested += cluster->n_blocks;
+		for (uint32_t b = 0; b < cluster->n_blocks; b++) {
+			if (!cull_block(plan, in, cluster->first_block + b, chunk, hit))
+				continue;
+			for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
+				for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
+					count[y * plan->tiles_x + x]++;
+			hit++;
+		}
+	}
+	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
+}
+
+static void fill_chunk(int i, void *userdata)
+{
+	const struct cull *cull = userdata;
+	const struct cull_chunk *chunk = &cull->bins->chunk[i];
+	uint32_t *next = cull->bins->count + (size_t)i * cull->n_tiles;
+	for (uint32_t h = 0; h < chunk->n_hits; h++) {
+		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
+		struct bin_entry entry = { hit->slot, (uint16_t)chunk->instance, hit->level };
+		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
+			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
+				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;
+	}
+}
+
+/* Room for n elements; what was there is gone. */
+static void *grow(void *array, size_t *capacity, size_t n, size_t size)
+{
+	if (n <= *capacity && array)
+		return array;
+	psr_free(array);
+	array = psr_alloc_array(n, size);
+	*capacity = array ? n : 0;
+	return array;
+}
+
+static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int store)
+{
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < plan->n_instances; i++) {
+		const struct psr_blocks *blocks = plan->instance[i].blocks;
+		for (uint32_t k = 0; k < blocks->n_clusters; n++) {
+			uint32_t first = k, size = 0;
+			do
+				size += blocks->cluster[k++].n_blocks;
+			while (k < blocks->n_clusters && size + blocks->cluster[k].n_blocks <= CHUNK_BLOCKS);
+			if (store)
+				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = first, .n_clusters = k - first,
+					                                  .first_hit = plan->instance[i].first_slot +
+					                                               blocks->cluster[first].first_block };
+		}
+	}
+	return n;
+}
+
+/* Turns the counts into the places where each chunk writes its entries of each tile. */
+static int place_entries(struct bins *bins, const struct cull *cull)
+{
+	uint64_t total = 0;
+	for (uint32_t t = 0; t < cull->n_tiles; t++) {
+		bins->tile_begin[t] = (uint32_t)total;
+		for (uint32_t i = 0; i < cull->n_chunks; i++) {
+			uint32_t *count = &bins->count[(size_t)i * cull->n_tiles + t], n = *count;
+			*count = (uint32_t)total;
+			total += n;
+		}
+		if (total > UINT32_MAX)
+			return PSR_ERR_LIMIT;
+	}
+	bins->tile_begin[cull->n_tiles] = (uint32_t)total;
+	bins->entry = grow(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
+	return bins->entry ? PSR_OK : PSR_ERR_MEMORY;
+}
+
+int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *pool, struct psr_report *report)
+{
+	struct cull cull = { bins, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
+	assert(plan->tiles_x <= 256 && plan->tiles_y <= 256);
+	bins->chunk = grow(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
+	bins->hit = grow(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
+	bins->count = grow(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
+	bins->tile_begin = grow(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
+	if (!bins->chunk || !bins->hit || !bins->count || !bins->tile_begin)
+		return PSR_ERR_MEMORY;
+	make_chunks(bins, plan, 1);
+	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
+	int rc = place_entries(bins, &cull);
+	if (rc)
+		return rc;
+	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
+
+	float depth_error = 0;
+	report->n_blocks = plan->n_slots;
+	report->n_samples = plan->n_samples;
+	for (uint32_t i = 0; i < cull.n_chunks; i++) {
+		const struct cull_chunk *chunk = &bins->chunk[i];
+		report->count[PSR_STAGE_CULL] += chunk->n_tested;
+		report->n_blocks_drawn += chunk->n_hits;
+		report->n_samples_drawn += chunk->n_samples;
+		report->levels |= chunk->levels;
+		report->n_clamped += chunk->n_clamped;
+		if (chunk->depth_error > depth_error)
+			depth_error = chunk->depth_error;
+	}
+	report->error_bound = 0.5 + (double)depth_error;
+	return PSR_OK;
+}
+
+size_t bins_bytes(const struct bins *bins)
+{
+	return bins->entry_capacity * sizeof *bins->entry + bins->chunk_capacity * sizeof *bins->chunk +
+	       bins->hit_capacity * sizeof *bins->hit + bins->count_capacity * sizeof *bins->count +
+	       bins->tile_capacity * sizeof *bins->tile_begin;
+}
+
+void bins_clear(struct bins *bins)
+{
+	psr_free(bins->entry);
+	psr_free(bins->tile_begin);
+	psr_free(bins->chunk);
+	psr_free(bins->hit);
+	psr_free(bins->count);
+	memset(bins, 0, sizeof *bins);
+}

@@ -1,0 +1,309 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "base/maths.h"
+#include "base/mem.h"
+#include "base/srgb.h"
+#include "render/render.h"
+
+#define BAND_ROWS 16
+
+/* What one band of rows counted on its way through gaps, resolve and shade. */
+struct band {
+	uint64_t ns[PSR_N_STAGES], count[PSR_N_STAGES];
+	uint64_t n_covered;
+	int has_gaps;
+};
+
+struct psr_renderer {
+	struct plan plan;
+	struct bins bins;
+	struct fill fill;
+	struct psr_zstack stack;
+	struct psr_report report; /* of psr_warp, until psr_finish */
+	struct psr_frame *frame;  /* of the call in progress */
+	/* All of a pixel, in one piece of memory: words, levels, linear colours, weights, depths. */
+	void *pixels;
+	size_t pixels_size;
+	uint16_t *rgb, *weight;
+	float *z;
+	uint64_t *tile_inside;
+	struct band *band;
+	void *counters;
+	size_t counters_size;
+	uint8_t srgb[65536];      /* of 16-bit linear light */
+};
+
+static uint64_t now_ns(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
+
+const char *psr_stage_name(enum psr_stage stage)
+{
+	static const char *const names[PSR_N_STAGES] = { "plan", "cull", "warp", "gaps", "resolve", "shade", "fill" };
+	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
+}
+
+void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height)
+{
+	settings->width = width;
+	settings->height = height;
+	settings->gap_threshold = 3;
+}
+
+static int validate(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
+{
+	uint32_t w = settings->width, h = settings->height;
+	if (w < 1 || h < 1)
+		return psr_fail(err, PSR_ERR_ARG, "a picture of %ux%u has no pixels", w, h);
+	if (w > PSR_MAX_SIDE || h > PSR_MAX_SIDE || (uint64_t)w * h > PSR_MAX_PIXELS)
+		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u is too large: at most %d a side and %u pixels", w, h,
+		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
+	if (!(settings->gap_threshold >= 0 && settings->gap_threshold <= 64))
+		return psr_fail(err, PSR_ERR_ARG, "gap threshold %g is not within 0..64 pixels", settings->gap_threshold);
+	return psr_scene_validate(scene, err);
+}
+
+int psr_renderer_create(struct psr_renderer **out)
+{
+	struct psr_renderer *r = calloc(1, sizeof *r);
+	if (!r)
+		return PSR_ERR_MEMORY;
+	for (int i = 0; i < 65536; i++)
+		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
+	*out = r;
+	return PSR_OK;
+}
+
+void psr_renderer_destroy(struct psr_renderer *r)
+{
+	if (!r)
+		return;
+	plan_clear(&r->plan);
+	bins_clear(&r->bins);
+	fill_clear(&r->fill);
+	psr_free(r->pixels);
+	psr_free(r->counters);
+	free(r);
+}
+
+uint64_t psr_renderer_bytes(const struct psr_renderer *r)
+{
+	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->counters_size + bins_bytes(&r->bins);
+}
+
+static void *grow(void *memory, size_t *capacity, size_t size)
+{
+	if (memory && size <= *capacity)
+		return memory;
+	psr_free(memory);
+	memory = psr_alloc_array(size, 1);
+	*capacity = memory ? size : 0;
+	return memory;
+}
+
+static uint32_t n_bands(const struct plan *plan)
+{
+	return (plan->height + BAND_ROWS - 1) / BAND_ROWS;
+}
+
+static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
+{
+	const uint32_t w = r->plan.width, h = r->plan.height;
+	const size_t area = (size_t)w * h;
+	struct psr_zstack *stack = &r->stack;
+	size_t cells = 0;
+
+	stack->width = w;
+	stack->height = h;
+	stack->levels = levels & ~1u;
+	stack->exponent = r->plan.exponent;
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		uint32_t side = 1u << k;
+		stack->level[k].width = (w + side - 1) / side + 2;
+		stack->level[k].height = (h + side - 1) / side + 2;
+		if (stack->levels >> k & 1)
+			cells += (size_t)stack->level[k].width * stack->level[k].height;
+	}
+	r->pixels = grow(r->pixels, &r->pixels_size, area * (8 + 4 + 4 * 2) + cells * 4);
+	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
+	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile_inside + n_bands(&r->plan) * sizeof *r->band);
+	if (!r->pixels || !r->counters)
+		return PSR_ERR_MEMORY;
+	r->tile_inside = r->counters;
+	r->band = (struct band *)(r->tile_inside + n_tiles);
+
+	stack->word = r->pixels;
+	r->z = (float *)(stack->word + area);
+	float *next = r->z + area;
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
+		if (stack->level[k].z)
+			next += (size_t)stack->level[k].width * stack->level[k].height;
+	}
+	r->rgb = (uint16_t *)next;
+	r->weight = r->rgb + 3 * area;
+	return PSR_OK;
+}
+
+static void warp_one(int tile, void *userdata)
+{
+	struct psr_renderer *r = userdata;
+	warp_tile(&r->plan, &r->bins, &r->stack, (uint32_t)tile, &r->tile_inside[tile]);
+}
+
+int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+{
+	int rc = validate(scene, settings, err);
+	if (rc)
+		return rc;
+	memset(report, 0, sizeof *report);
+	uint64_t start = now_ns(), end;
+	rc = plan_make(&r->plan, scene, settings, err);
+	if (rc)
+		return rc;
+	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
+	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
+	start = end;
+
+	rc = cull_blocks(&r->bins, &r->plan, pool, report);
+	if (rc == PSR_ERR_LIMIT)
+		return psr_fail(err, rc, "too many blocks for a picture of this size");
+	if (rc || prepare_buffers(r, report->levels))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
+	report->ns[PSR_STAGE_CULL] = (end = now_ns()) - start;
+	start = end;
+
+	const int n_tiles = (int)(r->plan.tiles_x * r->plan.tiles_y);
+	psr_pool_for(pool, n_tiles, warp_one, r);
+	for (int t = 0; t < n_tiles; t++)
+		report->count[PSR_STAGE_WARP] += r->tile_inside[t];
+	report->ns[PSR_STAGE_WARP] = now_ns() - start;
+	r->report = *report;
+	*stack = &r->stack;
+	return PSR_OK;
+}
+
+/* Resolves and shades what the strip has gathered. */
+static void flush_strip(struct psr_renderer *r, struct strip *strip, struct band *band)
+{
+	if (!strip->n)
+		return;
+	uint64_t start = now_ns();
+	resolve_strip(&r->plan, r->stack.word, strip);
+	uint64_t middle = now_ns();
+	uint32_t n_shaded = shade_strip(&r->plan, strip, r->rgb, r->weight);
+	band->ns[PSR_STAGE_RESOLVE] += middle - start;
+	band->ns[PSR_STAGE_SHADE] += now_ns() - middle;
+	band->count[PSR_STAGE_RESOLVE] += strip->n;
+	band->count[PSR_STAGE_SHADE] += n_shaded;
+	band->n_covered += n_shaded;
+	band->has_gaps |= n_shaded < strip->n;
+	strip->n = 0;
+}
+
+static void shade_band(int i, void *userdata)
+{
+	struct psr_renderer *r = userdata;
+	const struct plan *plan = &r->plan;
+	struct band *band = &r->band[i];
+	struct strip strip;
+	strip.n = strip.instance = 0;
+	memset(band, 0, sizeof *band);
+
+	for (uint32_t y = (uint32_t)i * BAND_ROWS; y < ((uint32_t)i + 1) * BAND_ROWS && y < plan->height; y++) {
+		const size_t row = (size_t)y * plan->width;
+		uint64_t start = now_ns();
+		band->count[PSR_STAGE_GAPS] += gaps_row(plan, &r->stack, y, r->weight + row);
+		band->ns[PSR_STAGE_GAPS] += now_ns() - start;
+		for (size_t at = row; at < row + plan->width; at++) {
+			const uint64_t word = r->stack.word[at];
+			r->z[at] = psr_float_from_bits((uint32_t)(word >> 32));
+			band->has_gaps |= r->weight[at] < WEIGHT_ONE;
+			if (word == PSR_WORD_EMPTY) {
+				memcpy(r->rgb + 3 * at, plan->background, sizeof plan->background);
+				continue;
+			}
+			if (!r->weight[at])
+				continue;
+			const uint32_t slot = (uint32_t)word / PSR_BLOCK_SAMPLES;
+			const struct plan_instance *in = &plan->instance[strip.instance];
+			if (strip.n == STRIP || slot < in->first_slot || slot - in->first_slot >= in->blocks->n_blocks) {
+				flush_strip(r, &strip, band);
+				strip.instance = plan_find_instance(plan, slot);
+			}
+			strip.pixel[strip.n++] = (uint32_t)at;
+		}
+	}
+	flush_strip(r, &strip, band);
+}
+
+static void output_band(int i, void *userdata)
+{
+	struct psr_renderer *r = userdata;
+	const size_t width = r->plan.width, begin = (size_t)i * BAND_ROWS * width;
+	size_t end = begin + BAND_ROWS * width;
+	if (end > width * r->plan.height)
+		end = width * r->plan.height;
+	if (r->frame->rgb)
+		for (size_t at = 3 * begin; at < 3 * end; at++)
+			r->frame->rgb[at] = r->srgb[r->rgb[at]];
+	if (r->frame->depth)
+		for (size_t at = begin; at < end; at++)
+			r->frame->depth[at] = ldexpf(r->z[at], r->stack.exponent);
+}
+
+/* Wall time of the three stages that bands run together, divided as the threads' own clocks say. */
+static int gather_bands(const struct psr_renderer *r, struct psr_report *report, uint64_t wall)
+{
+	uint64_t spent = 0;
+	int has_gaps = 0;
+	for (uint32_t i = 0; i < n_bands(&r->plan); i++) {
+		const struct band *band = &r->band[i];
+		for (int s = PSR_STAGE_GAPS; s <= PSR_STAGE_SHADE; s++) {
+			report->ns[s] += band->ns[s];
+			report->count[s] += band->count[s];
+			spent += band->ns[s];
+		}
+		report->n_covered += band->n_covered;
+		has_gaps |= band->has_gaps;
+	}
+	for (int s = PSR_STAGE_GAPS; s <= PSR_STAGE_SHADE && spent; s++)
+		report->ns[s] = (uint64_t)((double)report->ns[s] / (double)spent * (double)wall);
+	return has_gaps;
+}
+
+int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+               struct psr_error *err)
+{
+	if (stack != &r->stack || frame->width != stack->width || frame->height != stack->height)
+		return psr_fail(err, PSR_ERR_ARG, "the z-stack is not this renderer's, or of another size than the frame");
+	struct psr_report *report = &frame->report;
+	*report = r->report;
+	r->frame = frame;
+
+	uint64_t start = now_ns();
+	psr_pool_for(pool, (int)n_bands(&r->plan), shade_band, r);
+	uint64_t middle = now_ns();
+	if (gather_bands(r, report, middle - start)) {
+		if (fill_prepare(&r->fill, r->plan.width, r->plan.height, r->rgb, r->weight, r->z))
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
+		fill_run(&r->fill, &r->plan, pool, report);
+	}
+	psr_pool_for(pool, (int)n_bands(&r->plan), output_band, r);
+	report->ns[PSR_STAGE_FILL] = now_ns() - middle;
+	return PSR_OK;
+}
+
+int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+               struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
+{
+	struct psr_zstack *stack;
+	int rc = psr_warp(r, scene, settings, pool, &stack, &frame->report, err);
+	return rc ? rc : psr_finish(r, stack, pool, frame, err);
+}

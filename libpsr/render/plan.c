@@ -1,0 +1,254 @@
+#include <math.h>
+#include <string.h>
+#include "base/maths.h"
+#include "base/mem.h"
+#include "base/vec.h"
+#include "render/render.h"
+
+/* z' below this part of the scene's extent is not drawn when the request names no near distance. */
+#define AUTO_NEAR (1.0 / 16384)
+
+/* The camera's frame in the world (rows right, down, forward), and where its eye is. */
+struct view {
+	double axis[3][3], eye[3];
+	double scale; /* 2^-exponent */
+};
+
+static void rotation_matrix(double m[3][3], const double q[4])
+{
+	double n = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+	double x = q[0] / n, y = q[1] / n, z = q[2] / n, w = q[3] / n;
+	v3d_set(m[0], 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w));
+	v3d_set(m[1], 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w));
+	v3d_set(m[2], 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y));
+}
+
+static void view_make(struct view *view, const struct psr_camera *camera)
+{
+	double forward[3], right[3];
+	v3d_sub(forward, camera->target, camera->eye);
+	v3d_normalize(forward, forward);
+	v3d_normalize(right, camera->up);
+	v3d_cross(right, forward, right);
+	v3d_normalize(right, right);
+	v3d_cross(view->axis[1], forward, right);
+	memcpy(view->axis[0], right, sizeof right);
+	memcpy(view->axis[2], forward, sizeof forward);
+	memcpy(view->eye, camera->eye, sizeof view->eye);
+}
+
+/* Centre of an instance's inner coordinates relative to the eye, and inner units in world units. */
+static double instance_center(double center[3], double rotation[3][3], const struct psr_instance *instance,
+                              const double eye[3])
+{
+	const struct psr_model_info *info = psr_model_info(instance->model);
+	double turned[3];
+	rotation_matrix(rotation, instance->rotation);
+	m3d_apply(turned, (const double(*)[3])rotation, info->origin);
+	for (int i = 0; i < 3; i++)
+		center[i] = instance->translation[i] - eye[i] + instance->scale * turned[i];
+	return instance->scale * info->scale;
+}
+
+/* Exponent of the power of two just above the distance of the scene's far end. */
+static int scene_exponent(const struct psr_scene *scene)
+{
+	double far = 0;
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		double center[3], rotation[3][3];
+		double scale = instance_center(center, rotation, &scene->instance[i], scene->camera.eye);
+		far = fmax(far, v3d_length(center) + scale);
+	}
+	int exponent = 0;
+	frexp(far, &exponent);
+	return exponent;
+}
+
+static void light_make(struct plan_light *out, const struct psr_light *light, double rotation[3][3],
+                       const double center[3], double scale, const double eye[3])
+{
+	double v[3], s, c;
+	out->kind = light->kind;
+	for (int i = 0; i < 3; i++)
+		out->color[i] = (float)light->color[i];
+	if (light->kind != PSR_LIGHT_POINT) {
+		v3d_normalize(v, light->direction);
+		m3d_apply_transposed(v, (const double(*)[3])rotation, v);
+		v3f_set(out->axis, (float)v[0], (float)v[1], (float)v[2]);
+		v3f_set(out->to_light, (float)-v[0], (float)-v[1], (float)-v[2]);
+	}
+	if (light->kind != PSR_LIGHT_DIRECTIONAL) {
+		v3d_sub(v, light->position, eye);
+		v3d_sub(v, v, center);
+		m3d_apply_transposed(v, (const double(*)[3])rotation, v);
+		v3f_set(out->position, (float)(v[0] / scale), (float)(v[1] / scale), (float)(v[2] / scale));
+		double r = light->reference / scale;
+		out->reference2 = (float)(r * r);
+	}
+	if (light->kind == PSR_LIGHT_SPOT) {
+		psr_sincos(light->inner, &s, &c);
+		out->cos_inner = (float)c;
+		psr_sincos(light->outer, &s, &c);
+		out->cos_outer = (float)c;
+	}
+}
+
+static void projection_make(struct view_matrix *out, const struct psr_projection *projection, double to_camera[3][3],
+                            const double center[3], const struct plan *plan, double focal)
+{
+	/* Columns of `axis` as rows: projection space to inner coordinates is the transpose of a frame of rows. */
+	double a[3][4];
+	for (int i = 0; i < 3; i++) {
+		for (int k = 0; k < 3; k++)
+			a[i][k] = to_camera[i][0] * projection->axis[k][0] + to_camera[i][1] * projection->axis[k][1] +
+			          to_camera[i][2] * projection->axis[k][2];
+		a[i][3] = center[i];
+	}
+	double half[2] = { plan->width / 2.0, plan->height / 2.0 };
+	for (int k = 0; k < 4; k++) {
+		for (int i = 0; i < 2; i++)
+			out->m[i][k] = focal * a[i][k] + (plan->perspective ? half[i] * a[2][k] : k == 3 ? half[i] : 0);
+		out->m[2][k] = a[2][k];
+	}
+}
+
+static void instance_make(struct plan_instance *out, const struct psr_instance *instance, const struct plan *plan,
+                          const struct view *view, const struct psr_scene *scene, double focal)
+{
+	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
+	double world = instance_center(center, rotation, instance, view->eye), scale = world * view->scale;
+
+	out->blocks = psr_model_blocks(instance->model);
+	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
+	m3d_apply(camera_center, view->axis, center);
+	v3d_scale(camera_center, camera_center, view->scale);
+	for (int i = 0; i < 3; i++) {
+		v3d_scale(to_camera[i], to_camera[i], scale);
+		for (int k = 0; k < 3; k++)
+			out->center_m[i][k] = (float)to_camera[i][k];
+		out->center_m[i][3] = (float)camera_center[i];
+	}
+	out->scale = (float)scale;
+	out->spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale);
+
+	double eye[3];
+	v3d_scale(eye, plan->perspective ? center : view->axis[2], -1);
+	m3d_apply_transposed(eye, (const double(*)[3])rotation, eye);
+	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
+	v3f_set(out->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
+
+	for (uint32_t p = 0; p < out->blocks->n_projections; p++)
+		projection_make(&out->projection[p], &out->blocks->projection[p], to_camera, camera_center, plan, focal);
+	for (uint32_t l = 0; l < plan->n_lights; l++)
+		light_make(&out->light[l], &scene->light[l], rotation, center, world, view->eye);
+}
+
+/* A cell covers a pixel that lies behind it by more than the threshold: `gap_threshold` pixel widths for cells of two
+ * pixels ([G] 7.2), growing with the cell, since a slanted surface falls as far within it. */
+static void threshold_make(struct plan *plan, double gap_threshold)
+{
+	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		float t = (float)(gap_threshold * (1 << k) / 2) / plan->focal;
+		plan->gap_scale[k] = plan->perspective ? 1 + t : 1;
+		plan->gap_offset[k] = plan->perspective ? 0 : t;
+	}
+}
+
+static int storage_make(struct plan *plan, const struct psr_scene *scene)
+{
+	size_t n_projections = 0;
+	for (uint32_t i = 0; i < scene->n_instances; i++)
+		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
+	size_t lights = (size_t)scene->n_instances * scene->n_lights;
+	size_t size = n_projections * sizeof(struct view_matrix) + scene->n_instances * sizeof(struct plan_instance) +
+	              lights * sizeof(struct plan_light);
+	if (size > plan->storage_size) {
+		psr_free(plan->storage);
+		plan->storage = psr_alloc_array(size, 1);
+		plan->storage_size = plan->storage ? size : 0;
+		if (!plan->storage)
+			return PSR_ERR_MEMORY;
+	}
+	struct view_matrix *projection = plan->storage;
+	plan->instance = (struct plan_instance *)(projection + n_projections);
+	struct plan_light *light = (struct plan_light *)(plan->instance + scene->n_instances);
+	plan->n_slots = 0;
+	plan->n_samples = 0;
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		const struct psr_blocks *blocks = psr_model_blocks(scene->instance[i].model);
+		plan->instance[i].first_slot = plan->n_slots;
+		plan->instance[i].projection = projection;
+		plan->instance[i].light = light;
+		plan->n_slots += blocks->n_blocks;
+		plan->n_samples += blocks->n_samples;
+		projection += blocks->n_projections;
+		light += scene->n_lights;
+	}
+	return PSR_OK;
+}
+
+static uint16_t light16(double linear)
+{
+	return (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
+}
+
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
+{
+	const struct psr_camera *camera = &scene->camera;
+	struct view view;
+	int rc = storage_make(plan, scene);
+	if (rc)
+		return psr_fail(err, rc, "no memory for a scene of %u instances", scene->n_instances);
+
+	view_make(&view, camera);
+	plan->width = settings->width;
+	plan->height = settings->height;
+	plan->tiles_x = (plan->width + TILE_WIDTH - 1) / TILE_WIDTH;
+	plan->tiles_y = (plan->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
+	plan->exponent = scene_exponent(scene);
+	view.scale = ldexp(1, -plan->exponent);
+
+	double focal;
+	if (plan->perspective) {
+		double s, c;
+		psr_sincos(camera->fov_y / 2, &s, &c);
+		focal = plan->height / 2.0 * c / s;
+	} else {
+		focal = plan->height / (camera->ortho_height * view.scale);
+	}
+	plan->focal = (float)focal;
+	plan->near_z = (float)(camera->near_z * view.scale);
+	if (!(plan->near_z > 0))
+		plan->near_z = (float)AUTO_NEAR;
+	threshold_make(plan, settings->gap_threshold);
+
+	plan->n_instances = scene->n_instances;
+	plan->n_lights = scene->n_lights;
+	for (int i = 0; i < 3; i++) {
+		plan->ambient[i] = (float)scene->ambient[i];
+		plan->background[i] = light16(scene->background[i]);
+	}
+	for (uint32_t i = 0; i < scene->n_instances; i++)
+		instance_make(&plan->instance[i], &scene->instance[i], plan, &view, scene, focal);
+	return PSR_OK;
+}
+
+void plan_clear(struct plan *plan)
+{
+	psr_free(plan->storage);
+	memset(plan, 0, sizeof *plan);
+}
+
+uint32_t plan_find_instance(const struct plan *plan, uint32_t slot)
+{
+	uint32_t low = 0, high = plan->n_instances;
+	while (high - low > 1) {
+		uint32_t middle = (low + high) / 2;
+		if (plan->instance[middle].first_slot <= slot)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}

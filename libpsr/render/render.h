@@ -1,0 +1,144 @@
+/* What the stages of a frame share. The order of the stages is known to pipeline.c alone. */
+#ifndef PSR_RENDER_RENDER_H
+#define PSR_RENDER_RENDER_H
+
+#include <stdint.h>
+#include "psr/pool.h"
+#include "psr/render.h"
+
+#define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
+#define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
+#define WEIGHT_ONE 256  /* weights are 0..256 */
+#define STRIP 256       /* samples that are resolved and shaded together */
+
+/* ---- plan: a request, made ready ([G] 7.1) ---- */
+
+/* From a projection's space to the picture: u = (m[0] . (x, y, z, 1)) / w, v alike, and z' = m[2] . (x, y, z, 1). w is z'
+ * in perspective and 1 in orthographic pictures; the focal length and the picture's centre are absorbed. */
+struct view_matrix {
+	double m[3][4];
+};
+
+struct plan_light {
+	enum psr_light_kind kind;
+	float position[3], to_light[3]; /* in the instance's inner coordinates; to_light: unit, of directional lights */
+	float axis[3], cos_inner, cos_outer; /* spot; axis: unit, away from the light */
+	float reference2;               /* square of the reference distance, inner units; 0: no fall-off */
+	float color[3];
+};
+
+struct plan_instance {
+	const struct psr_blocks *blocks;
+	uint32_t first_slot;       /* slot of block b is first_slot + b */
+	float center_m[3][4];      /* inner coordinates to camera space */
+	float scale;               /* camera space units an inner unit */
+	float spacing;             /* greatest distance of neighbours at level 0, camera space */
+	float eye[3];              /* inner coordinates; orthographic: unit vector to the viewer instead */
+	struct view_matrix *projection; /* one a projection of the model */
+	struct plan_light *light;  /* n_lights */
+};
+
+struct plan {
+	uint32_t width, height, tiles_x, tiles_y;
+	int perspective;
+	int exponent;              /* everything here is world * 2^-exponent, relative to the eye */
+	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
+	float near_z;
+	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1]; /* z' of a cell's threshold: scale * z' + offset */
+	uint32_t n_instances, n_lights, n_slots;
+	struct plan_instance *instance;
+	float ambient[3];
+	uint16_t background[3];    /* linear, 16 bits */
+	uint64_t n_samples;
+	void *storage;             /* of all arrays */
+	size_t storage_size;
+};
+
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err);
+void plan_clear(struct plan *plan);
+
+/* Instance that a slot belongs to; the slot must be below n_slots. */
+uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
+
+/* ---- cull: blocks in view, sorted into tiles ([G] 6.1) ---- */
+
+struct bin_entry {
+	uint32_t slot;
+	uint16_t instance;
+	uint8_t level; /* of the depth buffer that fits the block */
+};
+
+struct bins {
+	struct bin_entry *entry;
+	size_t entry_capacity;
+	uint32_t *tile_begin;    /* n_tiles + 1 */
+	size_t tile_capacity;
+	struct cull_chunk *chunk;
+	size_t chunk_capacity;
+	struct cull_hit *hit;    /* one a block that is left, by chunk */
+	size_t hit_capacity;
+	uint32_t *count;         /* chunk by tile */
+	size_t count_capacity;
+};
+
+int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+size_t bins_bytes(const struct bins *bins);
+void bins_clear(struct bins *bins);
+
+/* ---- warp: samples to words and cells, by tile ([G] 7.1, 7.2) ---- */
+
+void warp_tile(const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile, uint64_t *n_inside);
+
+/* ---- gaps: weights from the level buffers ([G] 4.6) ---- */
+
+/* Weights of row y: WEIGHT_ONE * (1 - coverage). Returns how many pixels with a sample are below WEIGHT_ONE. */
+uint32_t gaps_row(const struct plan *plan, const struct psr_zstack *stack, uint32_t y, uint16_t *weight);
+
+/* ---- resolve: ids to what shading reads ---- */
+
+/* Samples of one instance; positions and normals in its inner coordinates, colours linear. */
+struct strip {
+	uint32_t n, instance;
+	uint32_t pixel[STRIP];
+	float px[STRIP], py[STRIP], pz[STRIP];
+	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
+	float dr[STRIP], dg[STRIP], db[STRIP];
+	float sr[STRIP], sg[STRIP], sb[STRIP];
+	float exponent[STRIP];
+	uint8_t unlit[STRIP], back[STRIP]; /* back: faces away from the eye */
+};
+
+/* Fills a strip from words whose slots all belong to `instance`. pixel[] is filled by the caller. */
+void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *strip);
+
+/* ---- shade: strips to linear colours ([G] 7.3) ---- */
+
+/* Writes 16-bit linear light into rgb + 3 * pixel; where a sample faces away its weight becomes 0 ([G] 7.3.2).
+ * Returns how many were shaded. */
+uint32_t shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb, uint16_t *weight);
+
+/* ---- fill: pull-push ([G] 4.7, appendix) ---- */
+
+struct fill_level {
+	uint32_t width, height;
+	uint16_t *rgb;    /* premultiplied with the weight */
+	uint16_t *weight;
+	float *z;
+};
+
+#define FILL_LEVELS 15 /* 2^14 is the largest side */
+
+struct fill {
+	struct fill_level level[FILL_LEVELS]; /* level 0 is the picture */
+	int n_levels;
+	void *storage;    /* of levels above 0 */
+	size_t storage_size;
+};
+
+int fill_prepare(struct fill *fill, uint32_t width, uint32_t height, uint16_t *rgb, uint16_t *weight, float *z);
+void fill_clear(struct fill *fill);
+
+/* Gives every pixel of weight below WEIGHT_ONE its colour and z'. */
+void fill_run(struct fill *fill, const struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+
+#endif
