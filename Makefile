@@ -10,7 +10,6 @@ VERSION := 0.1.0
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
 DEPS_TEST  := libcmocka-dev
-DEPS_BENCH := gnuplot-nox
 
 CC  ?= cc
 CXX ?= c++
@@ -34,9 +33,15 @@ else
 $(error config=$(config): one of release, debug, asan, tsan)
 endif
 
-INC := -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
+INC := -I. -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
 CFLAGS_ALL   = -std=gnu11 $(COMMON) $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(INC) $(CFLAGS) -MMD -MP
 CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(INC) $(CXXFLAGS) -MMD -MP
+
+# All cores unless told otherwise: jobs=1, or make -j.
+jobs ?= $(shell nproc)
+ifeq ($(MAKELEVEL),0)
+MAKEFLAGS += -j$(jobs)
+endif
 
 Q := $(if $(filter 1,$(V)),,@)
 say = $(if $(filter 1,$(V)),,@printf '  %-5s %s\n' $(1) $(2))
@@ -52,6 +57,7 @@ CLIENT_LIB_O   := $(call objs,client/lib/*.c)
 PSRD_O         := $(call objs,server/*.c)
 PSR_O          := $(call objs,client/*.c)
 MODEL_O        := $(call objs,models/*.c)
+TEST_LIB_O     := $(call objs,tests/unit/lib/*.c)
 
 LIB := $(BUILD)/lib
 BIN := $(BUILD)/bin
@@ -65,7 +71,7 @@ L_PSR    := -lxxhash -lm
 L_CODEC  := -lturbojpeg -lzstd
 L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
 
-.PHONY: all demo test test-all models bench install help clean deps deps-test deps-bench compile
+.PHONY: all demo test test-all models install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -100,6 +106,7 @@ $(LIB)/libpsr.a: $(LIBPSR_O); $(archive)
 $(LIB)/libpsr-build.a: $(LIBPSR_BUILD_O); $(archive)
 $(LIB)/libpsrproto.a: $(PROTO_O); $(archive)
 $(LIB)/libpsrclient.a: $(CLIENT_LIB_O); $(archive)
+$(LIB)/libpsrtest.a: $(TEST_LIB_O); $(archive)
 
 define link
 	@mkdir -p $(@D)
@@ -135,10 +142,13 @@ SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
 L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
 
-$(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(A)
+# Tests keep their assertions in every configuration.
+$(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
+
+$(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST)
 $(call unit_bin,$(filter tests/unit/server_%,$(UNIT))): $(SERVER_PARTS)
-$(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(A)
+$(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD)
 $(call unit_bin,$(filter tests/unit/models_%,$(UNIT))): $(MODEL_PARTS)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
@@ -153,7 +163,8 @@ test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
 
-test: deps deps-test ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
+test: ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
+	$(Q).ci/deps $(DEPS_BUILD) $(DEPS_TEST)
 	$(Q)$(MAKE) --no-print-directory models
 	$(Q)$(MAKE) --no-print-directory check
 
@@ -170,9 +181,8 @@ demo: deps ## demo: install what is missing, build, draw pictures of several mod
 
 # --- packages -------------------------------------------------------------------------------------------------------
 
-deps:       ; @.ci/deps $(DEPS_BUILD)
-deps-test:  ; @.ci/deps $(DEPS_TEST)
-deps-bench: ; @.ci/deps $(DEPS_BENCH)
+deps:
+	@.ci/deps $(DEPS_BUILD)
 
 install: compile ## install: programs, library, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \

@@ -1,0 +1,127 @@
+/* The .psr file from the inside: constants of docs/format.md, the table of known sections, and what the files of this
+ * folder share. A model in memory is the image of its file, byte for byte, with pointers into it. */
+#ifndef PSR_MODEL_FILE_H
+#define PSR_MODEL_FILE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include "psr/model.h"
+
+_Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
+
+#define FILE_MAGIC "\x89PSR\r\n\x1a\n"
+#define FILE_MAJOR 1
+#define FILE_MINOR 0
+#define FILE_ALIGNMENT 64
+#define FILE_HEADER_BYTES 64
+#define FILE_ENTRY_BYTES 32
+#define FILE_CHUNK_BYTES ((uint64_t)1 << 20)
+#define FILE_MAX_SECTIONS 256
+
+#define MODEL_MAX_BLOCKS ((uint32_t)1 << 26)
+#define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 16)
+#define MODEL_MAX_LEVELS 32
+#define MODEL_MAX_COORDINATE 1024.0f /* magnitude of any length or coordinate inside of a model */
+
+/* Byte offsets in the header, and in an entry of the table. */
+enum { HEADER_MAJOR = 8, HEADER_MINOR = 10, HEADER_N_SECTIONS = 12, HEADER_FILE_SIZE = 16, HEADER_N_CHUNKS = 24,
+       HEADER_CONTENT_ID = 32, HEADER_HASH = 56 };
+enum { ENTRY_TYPE = 0, ENTRY_VERSION = 4, ENTRY_FLAGS = 6, ENTRY_OFFSET = 8, ENTRY_LENGTH = 16, ENTRY_HASH = 24 };
+enum { ENTRY_REQUIRED = 1 };
+
+/* What a section's length is counted in. */
+enum section_count { COUNT_ONE, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_BLOCKS, COUNT_SAMPLES };
+
+enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_FIRST_ARRAY };
+
+struct section_spec {
+	char type[5];
+	uint16_t version, flags;
+	enum section_count count;
+	uint32_t item_bytes;
+	size_t pointer; /* offset of the array's pointer in struct psr_blocks, from SECTION_FIRST_ARRAY on */
+};
+
+#define INFO_BYTES 136
+#define BLOCKS_BYTES 32
+#define N_KNOWN_SECTIONS 24
+
+extern const struct section_spec section_table[N_KNOWN_SECTIONS];
+
+static inline uint64_t file_get(const uint8_t *at, int n_bytes)
+{
+	uint64_t v = 0;
+
+	for (int i = 0; i < n_bytes; i++)
+		v |= (uint64_t)at[i] << 8 * i;
+	return v;
+}
+
+static inline void file_put(uint8_t *at, int n_bytes, uint64_t v)
+{
+	for (int i = 0; i < n_bytes; i++)
+		at[i] = (uint8_t)(v >> 8 * i);
+}
+
+static inline double file_get_double(const uint8_t *at)
+{
+	uint64_t bits = file_get(at, 8);
+	double v;
+
+	memcpy(&v, &bits, sizeof v);
+	return v;
+}
+
+static inline void file_put_double(uint8_t *at, double v)
+{
+	uint64_t bits;
+
+	memcpy(&bits, &v, sizeof bits);
+	file_put(at, 8, bits);
+}
+
+static inline uint64_t file_align(uint64_t offset)
+{
+	return (offset + FILE_ALIGNMENT - 1) / FILE_ALIGNMENT * FILE_ALIGNMENT;
+}
+
+/* Hashes that a section of this length keeps after the table: one a chunk, or none if it is a single chunk. */
+static inline uint64_t file_chunks(uint64_t length)
+{
+	return length > FILE_CHUNK_BYTES ? (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES : 0;
+}
+
+/* Number of items and of bytes that the known section has in this model. */
+uint64_t section_items(const struct section_spec *spec, const struct psr_blocks *blocks);
+const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
+
+/* Lays a model out as a file in memory of psr_alloc_huge(), sealed. The counts must be within the limits and all
+ * pointers but the optional ones set; the rest is left to the reader's checks. NULL if there is no memory. */
+uint8_t *file_image_make(const struct psr_model_info *info, const struct psr_blocks *blocks, uint64_t *n_bytes);
+
+/* Computes every hash of an image anew: chunks, sections, content id, header. What does not lie within the image is
+ * left as it is, so that any bytes may be sealed. */
+void file_seal(uint8_t *bytes, size_t n_bytes);
+
+/* The hash of an entry: of the section, or of the list of its chunks' hashes (at `chunks`, already computed). */
+uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_t *chunks);
+uint64_t file_header_hash(const uint8_t *bytes, uint64_t table_end);
+void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
+
+/* Checks the fixed part of a header; `name` begins the sentence of an error. Needs FILE_HEADER_BYTES bytes. */
+int file_check_header(const uint8_t *header, const char *name, struct psr_error *err);
+
+/* Checks everything and fills info and blocks with what the image says and pointers into it. The image must be aligned
+ * to FILE_ALIGNMENT and outlive them. FORMAT, VERSION, UNSUPPORTED, MEMORY. */
+int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct psr_model_info *info,
+               struct psr_blocks *blocks, struct psr_error *err);
+
+/* Every rule on values that docs/format.md states; the arrays have their lengths and may be read. */
+int model_validate(const struct psr_model_info *info, const struct psr_blocks *blocks, const char *name,
+                   struct psr_error *err);
+
+/* The image of a model, for the writer. */
+const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes);
+
+#endif

@@ -1,0 +1,210 @@
+#include <assert.h>
+#include <xxhash.h>
+#include "base/mem.h"
+#include "file.h"
+
+_Static_assert(sizeof(struct psr_projection) == 40 && offsetof(struct psr_projection, spacing) == 36, "section PROJ");
+_Static_assert(sizeof(struct psr_cluster) == 32 && offsetof(struct psr_cluster, first_block) == 16, "section CLUS");
+_Static_assert(offsetof(struct psr_cluster, group) == 24 && offsetof(struct psr_cluster, level) == 28, "section CLUS");
+
+#define ARRAY(type, flags, count, item, field) \
+	{ type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
+
+const struct section_spec section_table[N_KNOWN_SECTIONS] = {
+	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
+	[SECTION_BLOCKS] = { "BLKS", 1, ENTRY_REQUIRED, COUNT_ONE, BLOCKS_BYTES, 0 },
+	ARRAY("PROJ", ENTRY_REQUIRED, COUNT_PROJECTIONS, 40, projection),
+	ARRAY("CLUS", ENTRY_REQUIRED, COUNT_CLUSTERS, 32, cluster),
+	ARRAY("SPHX", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_x),
+	ARRAY("SPHY", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_y),
+	ARRAY("SPHZ", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_z),
+	ARRAY("SPHR", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_r),
+	ARRAY("BPRJ", ENTRY_REQUIRED, COUNT_BLOCKS, 2, block_projection),
+	ARRAY("BCOL", ENTRY_REQUIRED, COUNT_BLOCKS, 2, col),
+	ARRAY("BROW", ENTRY_REQUIRED, COUNT_BLOCKS, 2, row),
+	ARRAY("BLVL", ENTRY_REQUIRED, COUNT_BLOCKS, 1, level),
+	ARRAY("BFLG", ENTRY_REQUIRED, COUNT_BLOCKS, 1, flags),
+	ARRAY("DBIA", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_bias),
+	ARRAY("DSTP", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_step),
+	ARRAY("MASK", ENTRY_REQUIRED, COUNT_BLOCKS, 8, mask),
+	ARRAY("AFST", ENTRY_REQUIRED, COUNT_BLOCKS, 4, attr_first),
+	ARRAY("CONX", 0, COUNT_BLOCKS, 4, cone_x),
+	ARRAY("CONY", 0, COUNT_BLOCKS, 4, cone_y),
+	ARRAY("CONZ", 0, COUNT_BLOCKS, 4, cone_z),
+	ARRAY("CONC", 0, COUNT_BLOCKS, 4, cone_cos),
+	ARRAY("VISM", 0, COUNT_BLOCKS, 16, visibility),
+	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_BLOCKS, 2 * PSR_BLOCK_SAMPLES, depth),
+	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),
+};
+
+uint64_t section_items(const struct section_spec *spec, const struct psr_blocks *blocks)
+{
+	switch (spec->count) {
+	case COUNT_PROJECTIONS:
+		return blocks->n_projections;
+	case COUNT_CLUSTERS:
+		return blocks->n_clusters;
+	case COUNT_BLOCKS:
+		return blocks->n_blocks;
+	case COUNT_SAMPLES:
+		return blocks->n_samples;
+	case COUNT_ONE:
+		break;
+	}
+	return 1;
+}
+
+const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks)
+{
+	const void *array;
+
+	memcpy(&array, (const char *)blocks + spec->pointer, sizeof array);
+	return array;
+}
+
+uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_t *chunks)
+{
+	uint64_t n_chunks = file_chunks(length);
+
+	return n_chunks == 0 ? XXH64(section, length, 0) : XXH64(chunks, 8 * n_chunks, 0);
+}
+
+uint64_t file_header_hash(const uint8_t *bytes, uint64_t table_end)
+{
+	return XXH64(bytes + FILE_HEADER_BYTES, table_end - FILE_HEADER_BYTES, XXH64(bytes, HEADER_HASH, 0));
+}
+
+void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16])
+{
+	uint8_t list[FILE_MAX_SECTIONS * 24];
+	XXH128_hash_t hash;
+
+	assert(n_sections <= FILE_MAX_SECTIONS);
+	for (uint32_t i = 0; i < n_sections; i++) {
+		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+
+		memcpy(list + 24 * i, entry + ENTRY_TYPE, 6);
+		file_put(list + 24 * i + 6, 2, 0);
+		memcpy(list + 24 * i + 8, entry + ENTRY_LENGTH, 16);
+	}
+	hash = XXH3_128bits(list, 24 * n_sections);
+	file_put(id, 8, hash.low64);
+	file_put(id + 8, 8, hash.high64);
+}
+
+static void hash_chunks(const uint8_t *section, uint64_t length, uint8_t *chunks)
+{
+	uint64_t n_chunks = file_chunks(length);
+
+	for (uint64_t i = 0; i < n_chunks; i++) {
+		uint64_t first = i * FILE_CHUNK_BYTES, left = length - first;
+
+		file_put(chunks + 8 * i, 8, XXH64(section + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0));
+	}
+}
+
+void file_seal(uint8_t *bytes, size_t n_bytes)
+{
+	uint64_t n_sections, n_chunks, table_end, chunks_at;
+
+	if (n_bytes < FILE_HEADER_BYTES)
+		return;
+	n_sections = file_get(bytes + HEADER_N_SECTIONS, 4);
+	n_chunks = file_get(bytes + HEADER_N_CHUNKS, 4);
+	chunks_at = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections;
+	table_end = chunks_at + 8 * n_chunks;
+	if (n_sections > FILE_MAX_SECTIONS || table_end > n_bytes)
+		return;
+	for (uint64_t i = 0; i < n_sections; i++) {
+		uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
+		if (offset < table_end || offset > n_bytes || length > n_bytes - offset
+		    || file_chunks(length) > (table_end - chunks_at) / 8)
+			continue;
+		hash_chunks(bytes + offset, length, bytes + chunks_at);
+		file_put(entry + ENTRY_HASH, 8, file_section_hash(bytes + offset, length, bytes + chunks_at));
+		chunks_at += 8 * file_chunks(length);
+	}
+	file_content_id(bytes, (uint32_t)n_sections, bytes + HEADER_CONTENT_ID);
+	file_put(bytes + HEADER_HASH, 8, file_header_hash(bytes, table_end));
+}
+
+static void put_info(uint8_t *at, const struct psr_model_info *info)
+{
+	for (int k = 0; k < 3; k++) {
+		file_put_double(at + 8 * k, info->origin[k]);
+		file_put_double(at + 32 + 8 * k, info->box_min[k]);
+		file_put_double(at + 56 + 8 * k, info->box_max[k]);
+	}
+	file_put_double(at + 24, info->scale);
+	file_put_double(at + 80, info->spacing);
+	file_put_double(at + 88, info->tolerance);
+	file_put(at + 96, 4, info->resolution);
+	memcpy(at + 104, info->builder, strnlen(info->builder, sizeof info->builder - 1));
+}
+
+static void put_blocks(uint8_t *at, const struct psr_blocks *blocks)
+{
+	file_put(at, 4, blocks->n_blocks);
+	file_put(at + 4, 4, blocks->n_projections);
+	file_put(at + 8, 4, blocks->n_clusters);
+	file_put(at + 12, 4, blocks->n_levels);
+	file_put(at + 16, 8, blocks->n_samples);
+}
+
+static int is_present(int section, const struct psr_blocks *blocks)
+{
+	return section < SECTION_FIRST_ARRAY || section_array(&section_table[section], blocks) != NULL;
+}
+
+uint8_t *file_image_make(const struct psr_model_info *info, const struct psr_blocks *blocks, uint64_t *n_bytes)
+{
+	uint64_t n_sections = 0, n_chunks = 0, at = 0;
+	uint8_t *bytes = NULL, *entry;
+
+	/* Once to add the sizes up, once to write. */
+	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
+		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], blocks);
+
+		if (is_present(i, blocks)) {
+			n_sections++;
+			n_chunks += file_chunks(length);
+			at += file_align(length);
+		}
+	}
+	*n_bytes = at + file_align(FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks);
+	bytes = psr_alloc_huge(*n_bytes);
+	if (bytes == NULL)
+		return NULL;
+	memcpy(bytes, FILE_MAGIC, 8);
+	file_put(bytes + HEADER_MAJOR, 2, FILE_MAJOR);
+	file_put(bytes + HEADER_MINOR, 2, FILE_MINOR);
+	file_put(bytes + HEADER_N_SECTIONS, 4, n_sections);
+	file_put(bytes + HEADER_FILE_SIZE, 8, *n_bytes);
+	file_put(bytes + HEADER_N_CHUNKS, 4, n_chunks);
+	at = *n_bytes - at;
+	entry = bytes + FILE_HEADER_BYTES;
+	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
+		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], blocks);
+
+		if (!is_present(i, blocks))
+			continue;
+		memcpy(entry + ENTRY_TYPE, section_table[i].type, 4);
+		file_put(entry + ENTRY_VERSION, 2, section_table[i].version);
+		file_put(entry + ENTRY_FLAGS, 2, section_table[i].flags);
+		file_put(entry + ENTRY_OFFSET, 8, at);
+		file_put(entry + ENTRY_LENGTH, 8, length);
+		if (i == SECTION_INFO)
+			put_info(bytes + at, info);
+		else if (i == SECTION_BLOCKS)
+			put_blocks(bytes + at, blocks);
+		else
+			memcpy(bytes + at, section_array(&section_table[i], blocks), length);
+		entry += FILE_ENTRY_BYTES;
+		at += file_align(length);
+	}
+	assert(at == *n_bytes);
+	file_seal(bytes, *n_bytes);
+	return bytes;
+}

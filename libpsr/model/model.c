@@ -1,0 +1,242 @@
+#include <assert.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "base/mem.h"
+#include "file.h"
+
+#define MAX_NAME 200 /* of a path in an error, so that the sentence after it has room */
+
+struct psr_model {
+	atomic_uint n_refs;
+	int is_mapped;
+	size_t n_bytes;
+	const uint8_t *bytes; /* the image */
+	struct psr_model_info info;
+	struct psr_blocks blocks;
+};
+
+static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
+{
+	if (is_mapped)
+		munmap((void *)bytes, n_bytes);
+	else
+		psr_free_huge((void *)bytes, n_bytes);
+}
+
+/* Takes the image over, on failure too. */
+static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
+                 struct psr_error *err)
+{
+	struct psr_model *model = calloc(1, sizeof *model);
+	int code;
+
+	if (model == NULL)
+		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
+	else
+		code = file_parse(bytes, n_bytes, name, &model->info, &model->blocks, err);
+	if (code != PSR_OK) {
+		free(model);
+		release_image(bytes, n_bytes, is_mapped);
+		return code;
+	}
+	atomic_init(&model->n_refs, 1);
+	model->is_mapped = is_mapped;
+	model->bytes = bytes;
+	model->n_bytes = n_bytes;
+	*out = model;
+	return PSR_OK;
+}
+
+static const char *short_name(const char *path)
+{
+	size_t length = strlen(path);
+
+	return length > MAX_NAME ? path + length - MAX_NAME : path;
+}
+
+/* Opens a regular file that begins as a .psr file; *n_bytes is its size. */
+static int open_file(int *fd, size_t *n_bytes, const char *path, const char *name, struct psr_error *err)
+{
+	uint8_t header[FILE_HEADER_BYTES] = { 0 };
+	struct stat st;
+	ssize_t got;
+	int code;
+
+	/* Non-blocking, so that a pipe of that name does not hold anyone up. */
+	*fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+	if (*fd < 0)
+		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO,
+		                "%s: cannot open the model: %m", name);
+	if (fstat(*fd, &st) != 0)
+		code = psr_fail(err, PSR_ERR_IO, "%s: cannot look at the file: %m", name);
+	else if (!S_ISREG(st.st_mode))
+		code = psr_fail(err, PSR_ERR_IO, "%s: this is not a regular file", name);
+	else if ((got = pread(*fd, header, sizeof header, 0)) < 0)
+		code = psr_fail(err, PSR_ERR_IO, "%s: cannot read the file: %m", name);
+	else if (got < FILE_HEADER_BYTES)
+		code = psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zd, within its header (bytes 0 to %d); it is no "
+		                ".psr file or was cut short", name, got, FILE_HEADER_BYTES);
+	else
+		code = file_check_header(header, name, err);
+	if (code != PSR_OK) {
+		close(*fd);
+		return code;
+	}
+	*n_bytes = (size_t)st.st_size;
+	return PSR_OK;
+}
+
+int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)
+{
+	const char *name = short_name(path);
+	size_t n_bytes;
+	uint8_t *bytes;
+	int fd, code;
+
+	code = open_file(&fd, &n_bytes, path, name, err);
+	if (code != PSR_OK)
+		return code;
+	bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+	if (bytes == MAP_FAILED)
+		code = psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
+	close(fd);
+	return code == PSR_OK ? adopt(out, bytes, n_bytes, 1, name, err) : code;
+}
+
+static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, struct psr_error *err)
+{
+	size_t at = 0;
+
+	while (at < n_bytes) {
+		ssize_t got = read(fd, bytes + at, n_bytes - at);
+
+		if (got < 0 && errno == EINTR)
+			continue;
+		if (got < 0)
+			return psr_fail(err, PSR_ERR_IO, "%s: cannot read the file from byte %zu on: %m", name, at);
+		if (got == 0)
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: the file shrank to %zu bytes while it was read", name, at);
+		at += (size_t)got;
+	}
+	return PSR_OK;
+}
+
+int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err)
+{
+	const char *name = short_name(path);
+	size_t n_bytes;
+	uint8_t *bytes;
+	int fd, code;
+
+	code = open_file(&fd, &n_bytes, path, name, err);
+	if (code != PSR_OK)
+		return code;
+	bytes = psr_alloc_huge(n_bytes);
+	if (bytes == NULL)
+		code = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
+	else
+		code = read_all(fd, bytes, n_bytes, name, err);
+	close(fd);
+	if (code != PSR_OK) {
+		psr_free_huge(bytes, n_bytes);
+		return code;
+	}
+	return adopt(out, bytes, n_bytes, 0, name, err);
+}
+
+int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)
+{
+	uint8_t *copy;
+
+	if (n_bytes == 0)
+		return psr_fail(err, PSR_ERR_FORMAT, "the model has no bytes");
+	copy = psr_alloc_huge(n_bytes);
+	if (copy == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %zu bytes", n_bytes);
+	memcpy(copy, bytes, n_bytes);
+	return adopt(out, copy, n_bytes, 0, "the model", err);
+}
+
+static int check_arguments(const struct psr_model_info *info, const struct psr_blocks *blocks, struct psr_error *err)
+{
+	int n_cones;
+
+	if (info == NULL || blocks == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "a model needs its info and its blocks");
+	if (memchr(info->builder, 0, sizeof info->builder) == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "the builder's name is longer than %zu bytes", sizeof info->builder - 1);
+	/* The other counts are no larger: the validator says so, once the image stands. */
+	if (blocks->n_blocks > MODEL_MAX_BLOCKS || blocks->n_projections > MODEL_MAX_PROJECTIONS
+	    || blocks->n_clusters > blocks->n_blocks || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
+		return psr_fail(err, PSR_ERR_LIMIT, "a model of %" PRIu32 " blocks, %" PRIu32 " projections, %" PRIu32
+		                " clusters and %" PRIu64 " samples is over the limits", blocks->n_blocks, blocks->n_projections,
+		                blocks->n_clusters, blocks->n_samples);
+	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++)
+		if (section_table[k].flags & ENTRY_REQUIRED && section_array(&section_table[k], blocks) == NULL)
+			return psr_fail(err, PSR_ERR_ARG, "the model's array for section %s is missing", section_table[k].type);
+	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_cos;
+	if (n_cones % 4 != 0)
+		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
+	return PSR_OK;
+}
+
+int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
+                     struct psr_error *err)
+{
+	uint64_t n_bytes;
+	uint8_t *bytes;
+	int code = check_arguments(info, blocks, err);
+
+	if (code != PSR_OK)
+		return code;
+	bytes = file_image_make(info, blocks, &n_bytes);
+	if (bytes == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %" PRIu64 " bytes", n_bytes);
+	return adopt(out, bytes, n_bytes, 0, "the model", err);
+}
+
+struct psr_model *psr_model_ref(struct psr_model *model)
+{
+	atomic_fetch_add_explicit(&model->n_refs, 1, memory_order_relaxed);
+	return model;
+}
+
+void psr_model_unref(struct psr_model *model)
+{
+	if (model == NULL || atomic_fetch_sub_explicit(&model->n_refs, 1, memory_order_acq_rel) != 1)
+		return;
+	release_image(model->bytes, model->n_bytes, model->is_mapped);
+	free(model);
+}
+
+const struct psr_model_info *psr_model_info(const struct psr_model *model)
+{
+	return &model->info;
+}
+
+const struct psr_blocks *psr_model_blocks(const struct psr_model *model)
+{
+	return &model->blocks;
+}
+
+void psr_model_content_id(const struct psr_model *model, uint8_t id[16])
+{
+	memcpy(id, model->bytes + HEADER_CONTENT_ID, 16);
+}
+
+uint64_t psr_model_bytes(const struct psr_model *model)
+{
+	return model->n_bytes + sizeof *model;
+}
+
+const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes)
+{
+	*n_bytes = model->n_bytes;
+	return model->bytes;
+}

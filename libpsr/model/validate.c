@@ -1,0 +1,245 @@
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include "base/mem.h"
+#include "base/vec.h"
+#include "file.h"
+
+/* Unit vectors in single precision: a component that went through eight roundings of 2^-24 on either side of a product
+ * leaves a scalar product of two of them at most 2 * 8 * 2^-24 off. */
+#define UNIT_TOLERANCE 0x1p-20f
+
+struct checker {
+	const struct psr_model_info *info;
+	const struct psr_blocks *blocks;
+	const char *name;
+	struct psr_error *err;
+};
+
+static int fail(const struct checker *c, const char *section, const char *format, ...)
+	__attribute__((format(printf, 3, 4)));
+
+static int fail(const struct checker *c, const char *section, const char *format, ...)
+{
+	char what[256];
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(what, sizeof what, format, args);
+	va_end(args);
+	return psr_fail(c->err, PSR_ERR_FORMAT, "%s: section %s: %s", c->name, section, what);
+}
+
+/* False for NaN too. */
+static int is_length(float v)
+{
+	return v >= 0 && v <= MODEL_MAX_COORDINATE;
+}
+
+static int is_coordinate(float v)
+{
+	return v >= -MODEL_MAX_COORDINATE && v <= MODEL_MAX_COORDINATE;
+}
+
+static int is_unit(const float v[3])
+{
+	return fabsf(v3f_dot(v, v) - 1) <= UNIT_TOLERANCE;
+}
+
+static int check_info(const struct checker *c)
+{
+	const struct psr_model_info *info = c->info;
+	size_t length = strnlen(info->builder, sizeof info->builder);
+
+	for (int k = 0; k < 3; k++) {
+		if (!isfinite(info->origin[k]))
+			return fail(c, "INFO", "the origin is not finite");
+		if (!isfinite(info->box_min[k]) || !isfinite(info->box_max[k]) || info->box_min[k] > info->box_max[k])
+			return fail(c, "INFO", "the box is not finite or inside out");
+	}
+	if (!(info->scale > 0 && isfinite(info->scale)))
+		return fail(c, "INFO", "the scale is %g; it must be positive and finite", info->scale);
+	if (!(info->spacing > 0 && isfinite(info->spacing)))
+		return fail(c, "INFO", "the spacing is %g; it must be positive and finite", info->spacing);
+	if (!(info->tolerance >= 0 && info->tolerance <= 1.5707963267948966))
+		return fail(c, "INFO", "the tolerance is %g; it must be an angle from 0 to half of pi", info->tolerance);
+	if (info->resolution == 0)
+		return fail(c, "INFO", "the resolution is 0");
+	for (size_t i = 0; i < sizeof info->builder; i++)
+		if (i < length ? info->builder[i] < ' ' || info->builder[i] > '~' : info->builder[i] != 0)
+			return fail(c, "INFO", "byte %zu of the builder's name is not text", i);
+	return length < sizeof info->builder ? PSR_OK : fail(c, "INFO", "the builder's name has no end");
+}
+
+static int check_counts(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+
+	if (b->n_blocks == 0 || b->n_blocks > MODEL_MAX_BLOCKS)
+		return fail(c, "BLKS", "%" PRIu32 " blocks; it must be 1 to %" PRIu32, b->n_blocks, MODEL_MAX_BLOCKS);
+	if (b->n_projections == 0 || b->n_projections > MODEL_MAX_PROJECTIONS)
+		return fail(c, "BLKS", "%" PRIu32 " projections; it must be 1 to %" PRIu32, b->n_projections,
+		            MODEL_MAX_PROJECTIONS);
+	if (b->n_clusters == 0 || b->n_clusters > b->n_blocks)
+		return fail(c, "BLKS", "%" PRIu32 " clusters; it must be 1 to the number of blocks", b->n_clusters);
+	if (b->n_levels == 0 || b->n_levels > MODEL_MAX_LEVELS)
+		return fail(c, "BLKS", "%" PRIu32 " levels; it must be 1 to %d", b->n_levels, MODEL_MAX_LEVELS);
+	return PSR_OK;
+}
+
+static int check_projections(const struct checker *c)
+{
+	for (uint32_t i = 0; i < c->blocks->n_projections; i++) {
+		const struct psr_projection *p = &c->blocks->projection[i];
+		float z[3];
+
+		/* Not (... <= ...), so that NaN fails as well. */
+		for (int k = 0; k < 3; k++)
+			if (!is_unit(p->axis[k]) || !(fabsf(v3f_dot(p->axis[k], p->axis[(k + 1) % 3])) <= UNIT_TOLERANCE))
+				return fail(c, "PROJ", "the axes of projection %" PRIu32 " are not orthonormal", i);
+		v3f_cross(z, p->axis[0], p->axis[1]);
+		if (!(v3f_dot(z, p->axis[2]) > 0))
+			return fail(c, "PROJ", "the axes of projection %" PRIu32 " are left-handed", i);
+		if (!is_length(p->spacing) || p->spacing == 0)
+			return fail(c, "PROJ", "the spacing of projection %" PRIu32 " is %g; it must be positive and at most %g", i,
+			            (double)p->spacing, (double)MODEL_MAX_COORDINATE);
+	}
+	return PSR_OK;
+}
+
+static int check_cluster(const struct checker *c, uint32_t i, uint64_t next_block)
+{
+	const struct psr_blocks *b = c->blocks;
+	const struct psr_cluster *k = &b->cluster[i];
+
+	if (k->first_block != next_block || k->n_blocks == 0 || k->n_blocks > b->n_blocks - next_block)
+		return fail(c, "CLUS", "cluster %" PRIu32 " has %" PRIu32 " blocks from %" PRIu32 " on; the next free one is %"
+		            PRIu64 " of %" PRIu32, i, k->n_blocks, k->first_block, next_block, b->n_blocks);
+	if (k->group >= b->n_clusters)
+		return fail(c, "CLUS",
+		            "cluster %" PRIu32 " is of group %" PRIu32 "; groups are below the number of clusters, %" PRIu32, i,
+		            k->group, b->n_clusters);
+	if (k->level >= b->n_levels)
+		return fail(c, "CLUS", "cluster %" PRIu32 " is of level %d of %" PRIu32, i, k->level, b->n_levels);
+	if (!is_coordinate(k->center[0]) || !is_coordinate(k->center[1]) || !is_coordinate(k->center[2])
+	    || !is_length(k->radius))
+		return fail(c, "CLUS", "the sphere of cluster %" PRIu32 " is not one", i);
+	if (k->zero[0] != 0 || k->zero[1] != 0 || k->zero[2] != 0)
+		return fail(c, "CLUS", "reserved bytes of cluster %" PRIu32 " are not zero", i);
+	for (uint32_t j = k->first_block; j < k->first_block + k->n_blocks; j++)
+		if (b->level[j] != k->level)
+			return fail(c, "BLVL", "block %" PRIu32 " is of level %d, and its cluster %" PRIu32 " of level %d", j,
+			            b->level[j], i, k->level);
+	return PSR_OK;
+}
+
+static int check_clusters(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+	uint64_t next_block = 0;
+	uint32_t *levels_of_group;
+	int code = PSR_OK;
+
+	levels_of_group = psr_alloc_array(b->n_clusters, sizeof *levels_of_group);
+	if (levels_of_group == NULL)
+		return psr_fail(c->err, PSR_ERR_MEMORY, "%s: no memory to check %" PRIu32 " clusters", c->name, b->n_clusters);
+	memset(levels_of_group, 0, b->n_clusters * sizeof *levels_of_group);
+	for (uint32_t i = 0; i < b->n_clusters && code == PSR_OK; i++) {
+		const struct psr_cluster *k = &b->cluster[i];
+
+		code = check_cluster(c, i, next_block);
+		if (code != PSR_OK)
+			break;
+		if (levels_of_group[k->group] >> k->level & 1)
+			code = fail(c, "CLUS", "cluster %" PRIu32 " is the second of group %" PRIu32 " at level %d", i, k->group,
+			            k->level);
+		levels_of_group[k->group] |= (uint32_t)1 << k->level;
+		next_block += k->n_blocks;
+	}
+	if (code == PSR_OK && next_block != b->n_blocks)
+		code = fail(c, "CLUS", "blocks %" PRIu64 " to %" PRIu32 " are in no cluster", next_block, b->n_blocks - 1);
+	psr_free(levels_of_group);
+	return code;
+}
+
+static int check_heads(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+	uint64_t n_samples = 0;
+
+	for (uint32_t i = 0; i < b->n_blocks; i++) {
+		if (!is_coordinate(b->sphere_x[i]) || !is_coordinate(b->sphere_y[i]) || !is_coordinate(b->sphere_z[i]))
+			return fail(c, "SPHX, SPHY, SPHZ", "the center of block %" PRIu32 " is not finite or beyond %g", i,
+			            (double)MODEL_MAX_COORDINATE);
+		if (!is_length(b->sphere_r[i]))
+			return fail(c, "SPHR", "the radius of block %" PRIu32 " is %g", i, (double)b->sphere_r[i]);
+		if (b->block_projection[i] >= b->n_projections)
+			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
+			            b->n_projections);
+		if ((b->flags[i] & ~PSR_BLOCK_TWO_SIDED) != 0)
+			return fail(c, "BFLG", "block %" PRIu32 " has unknown flags %#x", i, b->flags[i]);
+		if (!is_coordinate(b->depth_bias[i]))
+			return fail(c, "DBIA", "the depth of block %" PRIu32 " begins at %g", i, (double)b->depth_bias[i]);
+		if (!is_length(b->depth_step[i]))
+			return fail(c, "DSTP", "the depth step of block %" PRIu32 " is %g", i, (double)b->depth_step[i]);
+		if (b->mask[i] == 0)
+			return fail(c, "MASK", "block %" PRIu32 " has no valid sample", i);
+		if (b->attr_first[i] != n_samples)
+			return fail(c, "AFST", "the attributes of block %" PRIu32 " begin at %" PRIu32 " instead of %" PRIu64, i,
+			            b->attr_first[i], n_samples);
+		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);
+	}
+	if (n_samples != b->n_samples)
+		return fail(c, "MASK", "%" PRIu64 " samples are valid, and BLKS counts %" PRIu64, n_samples, b->n_samples);
+	return PSR_OK;
+}
+
+static int check_depths(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+
+	for (uint32_t i = 0; i < b->n_blocks; i++) {
+		const uint16_t *depth = b->depth + (size_t)PSR_BLOCK_SAMPLES * i;
+		uint64_t invalid = ~b->mask[i];
+
+		for (; invalid != 0; invalid &= invalid - 1)
+			if (depth[__builtin_ctzll(invalid)] != 0)
+				return fail(c, "DPTH", "sample %d of block %" PRIu32 " is not valid and has a depth",
+				            __builtin_ctzll(invalid), i);
+	}
+	return PSR_OK;
+}
+
+static int check_cones(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+
+	if (b->cone_x == NULL)
+		return PSR_OK;
+	for (uint32_t i = 0; i < b->n_blocks; i++) {
+		float axis[3] = { b->cone_x[i], b->cone_y[i], b->cone_z[i] };
+
+		if (!(b->cone_cos[i] >= -1 && b->cone_cos[i] <= 1))
+			return fail(c, "CONC", "the cosine of block %" PRIu32 " is %g", i, (double)b->cone_cos[i]);
+		/* A cone of all directions has no axis to speak of, but no NaN either. */
+		if (b->cone_cos[i] > -1 ? !is_unit(axis)
+		                        : !is_coordinate(axis[0]) || !is_coordinate(axis[1]) || !is_coordinate(axis[2]))
+			return fail(c, "CONX, CONY, CONZ", "the axis of block %" PRIu32 " has not unit length", i);
+	}
+	return PSR_OK;
+}
+
+int model_validate(const struct psr_model_info *info, const struct psr_blocks *blocks, const char *name,
+                   struct psr_error *err)
+{
+	static int (*const checks[])(const struct checker *) = {
+		check_info, check_counts, check_projections, check_clusters, check_heads, check_depths, check_cones,
+	};
+	const struct checker c = { info, blocks, name, err };
+	int code = PSR_OK;
+
+	for (size_t i = 0; i < sizeof checks / sizeof checks[0] && code == PSR_OK; i++)
+		code = checks[i](&c);
+	return code;
+}

@@ -1,0 +1,159 @@
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/vec.h"
+#include "psr/direction.h"
+#include "tests/unit/lib/shapes.h"
+
+struct arrays {
+	uint32_t n_blocks, n_samples;
+	float *sphere[4], *bias, *step;
+	uint16_t *projection, *depth;
+	int16_t *col, *row;
+	uint8_t *level, *flags;
+	uint64_t *mask, *attr;
+	uint32_t *first;
+};
+
+struct sample {
+	int valid;
+	double depth, normal[3];
+};
+
+static void *grow(void *p, size_t n, size_t size)
+{
+	p = realloc(p, n * size);
+	if (!p)
+		abort();
+	return p;
+}
+
+/* The shape along the projection's ray through (x, y); only where it faces the projection well. */
+static struct sample trace(const double axis[3][3], double x, double y, double radius)
+{
+	struct sample s = { 0 };
+	if (radius > 0) {
+		double z2 = radius * radius - x * x - y * y;
+		if (z2 <= 0)
+			return s;
+		s.depth = sqrt(z2);
+		for (int k = 0; k < 3; k++)
+			s.normal[k] = (x * axis[0][k] + y * axis[1][k] + s.depth * axis[2][k]) / radius;
+		s.valid = s.depth / radius > 0.8; /* no normal is further than 32.4 degrees from the nearest projection */
+		return s;
+	}
+	if (axis[2][2] < 0.8)
+		return s;
+	s.depth = -(x * axis[0][2] + y * axis[1][2]) / axis[2][2];
+	double p[3];
+	for (int k = 0; k < 3; k++)
+		p[k] = x * axis[0][k] + y * axis[1][k] + s.depth * axis[2][k];
+	s.valid = fabs(p[0]) <= 0.7 && fabs(p[1]) <= 0.7;
+	v3d_set(s.normal, 0, 0, 1);
+	return s;
+}
+
+static void add_block(struct arrays *a, const struct shape_options *o, int p, const double axis[3][3], double dx, int col,
+                      int row, double radius)
+{
+	struct sample s[64];
+	double low = INFINITY, high = -INFINITY;
+	uint64_t mask = 0;
+	for (int i = 0; i < 64; i++) {
+		int r = 8 * row + i / 8, c = 8 * col + i % 8;
+		s[i] = trace(axis, (c + (r & 1) * 0.5) * dx, r * dx * sqrt(0.75), radius);
+		if (!s[i].valid)
+			continue;
+		mask |= UINT64_C(1) << i;
+		low = fmin(low, s[i].depth);
+		high = fmax(high, s[i].depth);
+	}
+	if (!mask)
+		return;
+	uint32_t b = a->n_blocks++;
+	for (int k = 0; k < 4; k++)
+		a->sphere[k] = grow(a->sphere[k], a->n_blocks, sizeof(float));
+	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
+	a->step = grow(a->step, a->n_blocks, sizeof(float));
+	a->projection = grow(a->projection, a->n_blocks, 2);
+	a->depth = grow(a->depth, a->n_blocks, 128);
+	a->col = grow(a->col, a->n_blocks, 2);
+	a->row = grow(a->row, a->n_blocks, 2);
+	a->level = grow(a->level, a->n_blocks, 1);
+	a->flags = grow(a->flags, a->n_blocks, 1);
+	a->mask = grow(a->mask, a->n_blocks, 8);
+	a->first = grow(a->first, a->n_blocks, 4);
+	a->attr = grow(a->attr, a->n_samples + 64, 8);
+
+	double middle[3] = { (8 * col + 3.75) * dx, (8 * row + 3.5) * dx * sqrt(0.75), (low + high) / 2 }, center[3];
+	m3d_apply_transposed(center, axis, middle);
+	for (int k = 0; k < 3; k++)
+		a->sphere[k][b] = (float)center[k];
+	a->sphere[3][b] = (float)(sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx);
+	a->bias[b] = (float)low;
+	a->step[b] = (float)((high - low) / 65535);
+	a->projection[b] = (uint16_t)p;
+	a->col[b] = (int16_t)col;
+	a->row[b] = (int16_t)row;
+	a->level[b] = 0;
+	a->flags[b] = o->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
+	a->mask[b] = mask;
+	a->first[b] = a->n_samples;
+	for (int i = 0; i < 64; i++) {
+		a->depth[64 * b + i] = 0;
+		if (!s[i].valid)
+			continue;
+		if (a->step[b] > 0)
+			a->depth[64 * b + i] = (uint16_t)fmin(65535, (s[i].depth - low) / a->step[b] + 0.5);
+		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
+		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 | (uint64_t)o->diffuse << 16 |
+		                          (uint64_t)o->specular << 40 | (uint64_t)o->exponent << 56;
+	}
+}
+
+struct psr_model *shape_build(const struct shape_options *o, double radius)
+{
+	struct arrays a;
+	struct psr_projection projection[PSR_PROJECTIONS];
+	double ds = 2.0 / o->resolution, dx = ds * cos(25 * 3.14159265358979 / 180);
+	int reach = (int)(1.2 / (8 * dx)) + 2;
+	memset(&a, 0, sizeof a);
+	for (int p = 0; p < PSR_PROJECTIONS; p++) {
+		double dir[3], axis[3][3];
+		psr_direction_center(1, (unsigned)p, dir);
+		psr_direction_frame(dir, axis);
+		for (int i = 0; i < 9; i++)
+			projection[p].axis[i / 3][i % 3] = (float)axis[i / 3][i % 3];
+		projection[p].spacing = (float)dx;
+		for (int row = -reach; row < reach; row++)
+			for (int col = -reach; col < reach; col++)
+				add_block(&a, o, p, (const double(*)[3])axis, dx, col, row, radius);
+	}
+	struct psr_cluster cluster = { .center = { 0, 0, 0 }, .radius = 1.5f, .n_blocks = a.n_blocks };
+	struct psr_blocks blocks = {
+		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
+		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster,
+		.sphere_x = a.sphere[0], .sphere_y = a.sphere[1], .sphere_z = a.sphere[2], .sphere_r = a.sphere[3],
+		.block_projection = a.projection, .col = a.col, .row = a.row, .level = a.level, .flags = a.flags,
+		.depth_bias = a.bias, .depth_step = a.step, .mask = a.mask, .attr_first = a.first, .depth = a.depth, .attr = a.attr,
+	};
+	struct psr_model_info info = { .scale = o->scale, .spacing = ds * o->scale, .tolerance = 25 * 3.14159265358979 / 180,
+		                           .resolution = o->resolution, .builder = "test" };
+	for (int k = 0; k < 3; k++) {
+		info.origin[k] = o->origin[k];
+		info.box_min[k] = o->origin[k] - o->scale;
+		info.box_max[k] = o->origin[k] + o->scale;
+	}
+	struct psr_model *model;
+	struct psr_error err;
+	if (psr_model_create(&model, &info, &blocks, &err)) {
+		fprintf(stderr, "%s\n", err.text);
+		abort();
+	}
+	for (int k = 0; k < 4; k++)
+		free(a.sphere[k]);
+	free(a.bias); free(a.step); free(a.projection); free(a.depth); free(a.col); free(a.row);
+	free(a.level); free(a.flags); free(a.mask); free(a.first); free(a.attr);
+	return model;
+}

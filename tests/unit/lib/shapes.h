@@ -1,0 +1,20 @@
+/* Small analytic models for the renderer's tests: adequately sampled by construction, with known truth. */
+#ifndef TESTS_SHAPES_H
+#define TESTS_SHAPES_H
+
+#include "psr/model.h"
+
+struct shape_options {
+	uint32_t resolution;   /* pixels across the unit sphere */
+	uint32_t diffuse;      /* r | g << 8 | b << 16 */
+	uint32_t specular;     /* 5-6-5 */
+	uint32_t exponent;     /* 0..255 */
+	int two_sided, unlit;
+	double origin[3], scale;
+};
+
+/* A sphere of the given radius (at most 1) about the inner origin, seen from outside; or, with radius 0, the square of
+ * half side 0.7 in the plane z = 0 whose front is +z. Aborts on failure: this is a test's fixture. */
+struct psr_model *shape_build(const struct shape_options *options, double radius);
+
+#endif
