@@ -156,7 +156,7 @@ $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/ma
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
-	$(link) $(L_TEST)
+	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
 
 .PHONY: test-bin check
 test-bin: $(TEST_BIN) $(PROGRAMS)
@@ -176,7 +176,7 @@ models: ## models: fetch the real models (dragon, bunny, engine, ...) into the c
 	$(Q)models/fetch.sh
 
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
-	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
 	$(Q)BUILD=$(BUILD) docs/demo.sh
 
 # --- packages -------------------------------------------------------------------------------------------------------

@@ -80,8 +80,8 @@ static int open_file(int *fd, size_t *n_bytes, const char *path, const char *nam
 	else if ((got = pread(*fd, header, sizeof header, 0)) < 0)
 		code = psr_fail(err, PSR_ERR_IO, "%s: cannot read the file: %m", name);
 	else if (got < FILE_HEADER_BYTES)
-		code = psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zd, within its header (bytes 0 to %d); it is no "
-		                ".psr file or was cut short", name, got, FILE_HEADER_BYTES);
+		code = psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zd, within its header (bytes 0 to %d); it is "
+		                "no .psr file or was cut short", name, got, FILE_HEADER_BYTES);
 	else
 		code = file_check_header(header, name, err);
 	if (code != PSR_OK) {

@@ -33,7 +33,11 @@ enum psr_block_flag {
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice origin
  * is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth along z is
  * depth_bias + depth_step * (float)depth[64 * b + s]; its attributes are attr[attr_first[b] + number of lower set bits].
- * Blocks of one cluster follow each other. */
+ * Blocks of one cluster follow each other, and clusters are in the order of their blocks, without gaps.
+ *
+ * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a model are
+ * finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most 2^26 blocks, 65,536
+ * projections, 32 levels. */
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
 	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr */
@@ -59,8 +63,8 @@ struct psr_blocks {
 struct psr_cluster {
 	float center[3], radius; /* holds its blocks' spheres */
 	uint32_t first_block, n_blocks;
-	uint32_t group;
-	uint8_t level, zero[3];
+	uint32_t group; /* < n_clusters; no two clusters of a group are of one level */
+	uint8_t level, zero[3]; /* that of its blocks */
 };
 
 /* Attributes of a sample, one word ([G] table 5.1):
@@ -81,26 +85,29 @@ struct psr_model_info {
 	double box_min[3], box_max[3]; /* of the samples, object coordinates */
 	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object units */
 	double tolerance; /* angle of [G] 4.4, radians */
-	uint32_t resolution; /* target resolution: pixels across the unit sphere at magnification 1 */
-	char builder[32];    /* name and version of the program that built it */
+	uint32_t resolution; /* >= 1; target resolution: pixels across the unit sphere at magnification 1 */
+	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };
 
 struct psr_model;
 
 /* Opens a .psr file. `map` keeps the file mapped and reads it in place; `read` copies it into anonymous memory first
  * (huge pages where the system has them), so that a file that shrinks later does no harm: what a daemon wants. Both
- * check every count, offset, index and hash before anything is followed. NOT_FOUND, IO, FORMAT, VERSION, MEMORY. */
+ * check every count, offset, index and hash before anything is followed. NOT_FOUND, IO, FORMAT, VERSION, UNSUPPORTED (a
+ * required section that this build does not know, or no representation that it does), MEMORY. */
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
 /* The same from memory; `bytes` is copied. For tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
 
-/* Makes a model from arrays of the caller's, which are copied and validated like a file's. */
+/* Makes a model from arrays of the caller's, which are copied and validated like a file's. ARG for missing arrays, LIMIT for
+ * counts, FORMAT for values that break a rule, MEMORY. */
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                      struct psr_error *err);
 
-/* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. */
+/* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. Only
+ * regular files are replaced. IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
 
 struct psr_model *psr_model_ref(struct psr_model *model);

@@ -26,7 +26,7 @@ int psr_pool_threads(const struct psr_pool *pool); /* 1 for NULL */
  * A NULL pool runs them in the caller, in order. May be called from inside a job; not from inside a loop. */
 void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata);
 
-/* Queues fn(userdata) for one of the workers; never blocks on running work. PSR_ERR_MEMORY. */
+/* Queues fn(userdata) for one of the workers of a pool made with_jobs; never blocks on running work. PSR_ERR_MEMORY. */
 int psr_pool_submit(struct psr_pool *pool, void (*fn)(void *userdata), void *userdata);
 
 #ifdef __cplusplus

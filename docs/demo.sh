@@ -1,0 +1,81 @@
+#!/bin/bash
+# make demo: models, a daemon on a free port, pictures, a load test, one table and one contact sheet. Everything that it
+# writes is in build/demo; everything that it starts, it stops.
+set -eu
+cd "$(dirname "$0")/.."
+BUILD=$(realpath "${BUILD:-build/release}")
+out=build/demo
+models=$out/models
+PATH=$BUILD/bin:$PATH
+seconds=${PSR_DEMO_SECONDS:-3}
+mkdir -p "$models"
+unset PSR_SERVER
+
+pid=
+stop() {
+	[ -z "$pid" ] || { kill -TERM "$pid" && wait "$pid"; } || :
+	pid=
+}
+trap stop EXIT
+
+echo "== models"
+for name in teapot top pencil wheel; do
+	[ "$models/$name.glb" -nt "$BUILD/bin/psr-model" ] || psr-model make "$name" -o "$models/$name.glb"
+	[ "$models/$name.psr" -nt "$models/$name.glb" ] || psr-model build "$models/$name.glb" -r 512 -o "$models/$name.psr"
+done
+models/fetch.sh || echo "(the real models cannot be had now; the demo goes on with its own)"
+cache=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
+real=
+for entry in dragon:dragon.ply bunny:bunny.obj engine:engine.glb clearcoat:clearcoat/ClearCoatTest.gltf; do
+	name=${entry%%:*} source=$cache/${entry#*:}
+	[ -f "$source" ] || continue
+	real="$real $name"
+	[ "$models/$name.psr" -nt "$source" ] && [ "$models/$name.psr" -nt "$BUILD/bin/psr-model" ] ||
+		psr-model build "$source" -r 512 -o "$models/$name.psr"
+done
+
+echo "== psrd"
+psrd --listen 127.0.0.1:0 --models "$models" >"$out/ready" 2>"$out/psrd.log" &
+pid=$!
+for _ in $(seq 200); do
+	grep -q '^READY' "$out/ready" && break
+	kill -0 $pid 2>/dev/null || { cat "$out/psrd.log" >&2; exit 1; }
+	sleep 0.05
+done
+server=$(sed -n 's/^READY //p' "$out/ready")
+echo "serving on $server"
+
+flat() { tr -d '\n\t ' <"$1"; }
+number() { flat "$1" | sed -n "s/.*\"$2\":\([-+0-9.eE]*\).*/\1/p"; }             # file key: the last one of that name
+of_model() { flat "$1" | sed -n "s/.*\"model\":{[^}]*\"$2\":\([-+0-9.eE]*\).*/\1/p"; } # file key
+stage() { flat "$1" | sed -n "s/.*\"$2\":{\"ms\":\([-+0-9.eE]*\).*/\1/p"; }        # file stage: milliseconds
+
+size=640x480
+rule=$(printf '%.0s-' {1..116})
+echo "== frames of $size, JPEG q90, and $seconds s of load by 4 clients each"
+printf '%-10s %9s %6s %7s %7s %7s %7s %7s %7s %7s %7s %8s %8s %8s\n' model samples MB plan cull warp gaps resolve shade \
+	fill encode 'total ms' bytes frames/s
+echo "$rule"
+sheet=
+for name in teapot top pencil wheel $real; do
+	report=$out/$name.json
+	psr shot --server "$server" --model "$name" --size $size --background '#f4f4f0' --codec jpeg:90 --report "$report" \
+		-o "$out/$name.png"
+	psr shot --server "$server" --model "$name" --size 1280x960 --background '#f4f4f0' --codec lossless -o "$out/$name-large.png"
+	psr bench --server "$server" --model "$name" --clients 4 --seconds "$seconds" --size $size --json >"$out/$name-bench.json"
+	printf '%-10s %9.0f %6.1f' "$name" "$(of_model "$report" samples)" \
+		"$(awk "BEGIN { print $(of_model "$report" bytes) / 1e6 }")"
+	for s in plan cull warp gaps resolve shade fill encode total; do printf ' %7.2f' "$(stage "$report" $s)"; done
+	printf '  %8.0f %8.1f\n' "$(flat "$report" | sed -n 's/.*"error_px":[^,]*,"bytes":\([0-9]*\).*/\1/p')" "$(number "$out/$name-bench.json" frames_per_second)"
+	sheet="$sheet $out/$name.png"
+done
+echo "$rule"
+
+# shellcheck disable=SC2086
+"$BUILD/tests/tools/sheet" 4 "$out/contact-sheet.png" $sheet
+check=$(psr shot --server "$server" --model teapot --size 320x240 --codec lossless -o "$out/.again.png" --hash)
+again=$(psr shot --server "$server" --model teapot --size 320x240 --codec lossless -o "$out/.again.png" --hash)
+rm -f "$out/.again.png"
+[ "$check" = "$again" ] && echo "two runs of one request: the same bytes ($check)"
+stop
+echo "pictures: $out/*.png, all of them in $out/contact-sheet.png"

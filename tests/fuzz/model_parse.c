@@ -1,0 +1,79 @@
+/* Any bytes as a .psr file: as they are, and with their hashes put right, since no mutation would come past those.
+ * Properties: what is taken obeys the rules that readers rely on, and the same model made again from its arrays is
+ * taken too and holds the same. */
+#include <stdlib.h>
+#include "../../libpsr/model/file.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
+
+#define REQUIRE(x) ((x) ? (void)0 : abort())
+
+static void check_rules(const struct psr_blocks *b)
+{
+	uint64_t n_samples = 0;
+	uint32_t n_in_clusters = 0;
+
+	for (uint32_t i = 0; i < b->n_clusters; i++) {
+		const struct psr_cluster *c = &b->cluster[i];
+
+		REQUIRE(c->first_block == n_in_clusters && c->n_blocks > 0 && c->n_blocks <= b->n_blocks - n_in_clusters);
+		REQUIRE(c->group < b->n_clusters && c->level < b->n_levels);
+		n_in_clusters += c->n_blocks;
+	}
+	REQUIRE(n_in_clusters == b->n_blocks);
+	for (uint32_t i = 0; i < b->n_blocks; i++) {
+		REQUIRE(b->mask[i] != 0 && b->attr_first[i] == n_samples);
+		REQUIRE(b->block_projection[i] < b->n_projections && b->level[i] < b->n_levels);
+		REQUIRE(b->sphere_r[i] >= 0 && b->depth_step[i] >= 0);
+		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++)
+			REQUIRE((b->mask[i] >> s & 1) != 0 || b->depth[(size_t)PSR_BLOCK_SAMPLES * i + (size_t)s] == 0);
+		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);
+	}
+	REQUIRE(n_samples == b->n_samples);
+}
+
+static void check_again(const struct psr_model_info *info, const struct psr_blocks *blocks)
+{
+	struct psr_model *model = NULL;
+
+	REQUIRE(psr_model_create(&model, info, blocks, NULL) == PSR_OK);
+	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
+		const struct section_spec *spec = &section_table[k];
+		const void *a = section_array(spec, blocks), *b = section_array(spec, psr_model_blocks(model));
+
+		REQUIRE((a == NULL) == (b == NULL));
+		REQUIRE(a == NULL || memcmp(a, b, spec->item_bytes * section_items(spec, blocks)) == 0);
+	}
+	/* Up to its last field: what the compiler pads with is anything. */
+	REQUIRE(memcmp(psr_model_info(model), info, offsetof(struct psr_model_info, builder) + sizeof info->builder) == 0);
+	psr_model_unref(model);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
+{
+	struct psr_model *model = NULL;
+	struct psr_error err = { 0, "" };
+	struct psr_model_info info;
+	struct psr_blocks blocks;
+	void *copy = NULL;
+	int code;
+
+	/* Reading must not depend on what follows: an allocation of just that size. */
+	REQUIRE(posix_memalign(&copy, FILE_ALIGNMENT, n) == 0);
+	if (n > 0)
+		memcpy(copy, data, n);
+	code = psr_model_parse(&model, data, n, &err);
+	REQUIRE((code == PSR_OK) == (model != NULL) && code == err.code && (code == PSR_OK) == (err.text[0] == 0));
+	psr_model_unref(model);
+
+	file_seal(copy, n);
+	err = (struct psr_error){ 0, "" };
+	code = file_parse(copy, n, "input", &info, &blocks, &err);
+	REQUIRE(code == err.code && (code == PSR_OK) == (err.text[0] == 0));
+	if (code == PSR_OK) {
+		check_rules(&blocks);
+		check_again(&info, &blocks);
+	}
+	free(copy);
+	return 0;
+}

@@ -1,0 +1,101 @@
+/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks. */
+#ifndef MODEL_FIXTURE_H
+#define MODEL_FIXTURE_H
+
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include "psr/model.h"
+
+#define FIXTURE_BLOCKS 6
+#define FIXTURE_SAMPLES 143
+
+struct fixture {
+	struct psr_model_info info;
+	struct psr_blocks blocks; /* points to the arrays below */
+	struct psr_projection projection[2];
+	struct psr_cluster cluster[3];
+	float sphere[4][FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS], cone[4][FIXTURE_BLOCKS];
+	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_BLOCKS * PSR_BLOCK_SAMPLES];
+	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS];
+	uint8_t level[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
+	uint64_t mask[FIXTURE_BLOCKS], attr[FIXTURE_SAMPLES], visibility[FIXTURE_BLOCKS][2];
+	uint32_t attr_first[FIXTURE_BLOCKS];
+};
+
+static inline uint64_t fixture_random(uint64_t *state)
+{
+	*state ^= *state << 13;
+	*state ^= *state >> 7;
+	*state ^= *state << 17;
+	return *state;
+}
+
+static inline void fixture_init(struct fixture *f, int with_optional)
+{
+	/* 1 + 64 + 32 + 2 + 8 + 36 samples */
+	static const uint64_t masks[FIXTURE_BLOCKS] = { 0x8000000000000000, UINT64_MAX, 0x00ff00ff00ff00ff, 0x11,
+		                                            0x0101010101010101, 0xfffffffff0000000 };
+	static const struct psr_cluster clusters[3] = {
+		{ { 0.25f, 0, 0 }, 0.5f, 0, 3, 0, 0, { 0 } },
+		{ { -0.25f, 0, 0 }, 0.5f, 3, 2, 1, 0, { 0 } },
+		{ { 0, 0, 0 }, 1, 5, 1, 0, 1, { 0 } },
+	};
+	static const uint8_t levels[FIXTURE_BLOCKS] = { 0, 0, 0, 0, 0, 1 };
+	uint64_t state = 0x243f6a8885a308d3u;
+	uint32_t n = 0;
+
+	memset(f, 0, sizeof *f);
+	f->info = (struct psr_model_info){ .origin = { 500000.25, 5e6, -1e-3 }, .scale = 12.5, .box_min = { 1, 2, 3 },
+		                               .box_max = { 4, 5, 6 }, .spacing = 0.01, .tolerance = 1.2, .resolution = 256,
+		                               .builder = "test 1.0" };
+	for (int i = 0; i < 2; i++) {
+		for (int k = 0; k < 3; k++)
+			f->projection[i].axis[k][(k + i) % 3] = 1;
+		f->projection[i].spacing = 0.0625f / (float)(i + 1);
+	}
+	memcpy(f->cluster, clusters, sizeof clusters);
+	memcpy(f->mask, masks, sizeof masks);
+	memcpy(f->level, levels, sizeof levels);
+	for (int i = 0; i < FIXTURE_BLOCKS; i++) {
+		for (int k = 0; k < 3; k++)
+			f->sphere[k][i] = 0.125f * (float)(i - 2 + k);
+		f->sphere[3][i] = 0.25f;
+		f->cone[i % 3][i] = 1;
+		f->cone[3][i] = i == 4 ? -1.0f : 0.5f;
+		f->depth_bias[i] = -0.5f;
+		f->depth_step[i] = 0.0001f;
+		f->block_projection[i] = (uint16_t)(i % 2);
+		f->col[i] = (int16_t)(i - 3);
+		f->row[i] = (int16_t)(3 - i);
+		f->flags[i] = i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0;
+		f->attr_first[i] = n;
+		f->visibility[i][0] = fixture_random(&state);
+		f->visibility[i][1] = fixture_random(&state);
+		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
+			if (f->mask[i] >> s & 1) {
+				f->depth[PSR_BLOCK_SAMPLES * i + s] = (uint16_t)fixture_random(&state);
+				f->attr[n++] = fixture_random(&state);
+			}
+		}
+	}
+	if (n != FIXTURE_SAMPLES)
+		abort();
+	f->blocks = (struct psr_blocks){
+		.n_blocks = FIXTURE_BLOCKS, .n_projections = 2, .n_clusters = 3, .n_levels = 2, .n_samples = FIXTURE_SAMPLES,
+		.projection = f->projection, .cluster = f->cluster,
+		.sphere_x = f->sphere[0], .sphere_y = f->sphere[1], .sphere_z = f->sphere[2], .sphere_r = f->sphere[3],
+		.block_projection = f->block_projection, .col = f->col, .row = f->row, .level = f->level, .flags = f->flags,
+		.depth_bias = f->depth_bias, .depth_step = f->depth_step, .mask = f->mask, .attr_first = f->attr_first,
+		.depth = f->depth, .attr = f->attr,
+	};
+	if (with_optional) {
+		f->blocks.cone_x = f->cone[0];
+		f->blocks.cone_y = f->cone[1];
+		f->blocks.cone_z = f->cone[2];
+		f->blocks.cone_cos = f->cone[3];
+		f->blocks.visibility = (const uint64_t(*)[2])f->visibility;
+	}
+}
+
+#endif
