@@ -1,11 +1,11 @@
-/* Runs LLVMFuzzerTestOneInput where clang's libFuzzer is not at hand: first every file of the corpus, then seeded mutations
- * of them for a while.
+/* Runs LLVMFuzzerTestOneInput where clang's libFuzzer is not at hand: first every file of the corpus, then seeded
+ * mutations of them for a while.
  *
  *   fuzz_x [-t SECONDS] [-s SEED] [-m BYTES] CORPUS...     folders or files; -t 0: the corpus alone
  *
  * Inputs stand in allocations of exactly their size. One that crashes, or takes over 10 s, is written to
- * crash-NAME-SEED-ROUND in $TMPDIR (or /tmp), and the message names it: give that file as CORPUS with -t 0 to see it
- * again. Exit status: 0 all is well, 2 usage or no corpus, else a crash. */
+ * crash-NAME-SEED-ROUND in the program's own folder, and the message names it: give that file as CORPUS with -t 0 to
+ * see it again. Prints TAP. Exit status: 0 all is well, 2 usage or no corpus, else a crash. */
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -230,7 +230,8 @@ static double number(const char *text)
 int main(int argc, char **argv)
 {
 	static const int signals[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGALRM };
-	const char *folder = getenv("TMPDIR"), *name = strrchr(argv[0], '/') ? strrchr(argv[0], '/') + 1 : argv[0];
+	const char *slash = strrchr(argv[0], '/'), *name = slash ? slash + 1 : argv[0];
+	const int folder = slash ? (int)(slash - argv[0]) + 1 : 0; /* characters of argv[0], the last slash included */
 	double budget = 10, start;
 	unsigned long long seed = 1, round = 0;
 	uint8_t *data;
@@ -264,7 +265,7 @@ int main(int argc, char **argv)
 			signal(signals[i], on_signal);
 
 	for (size_t i = 0; i < n_corpus; i++) {
-		snprintf(crash_path, sizeof crash_path, "%s/crash-%s-corpus-%zu", folder ? folder : "/tmp", name, i);
+		snprintf(crash_path, sizeof crash_path, "%.*scrash-%s-corpus-%zu", folder, argv[0], name, i);
 		run(corpus[i].data, corpus[i].n);
 	}
 	start = seconds();
@@ -278,10 +279,11 @@ int main(int argc, char **argv)
 		memcpy(data, in->data, n);
 		for (size_t k = 1 + below(6); k > 0; k--)
 			n = mutate(data, n);
-		snprintf(crash_path, sizeof crash_path, "%s/crash-%s-%llu-%llu", folder ? folder : "/tmp", name, seed, round);
+		snprintf(crash_path, sizeof crash_path, "%.*scrash-%s-%llu-%llu", folder, argv[0], name, seed, round);
 		run(data, n);
 	}
-	printf("%s: %zu files, %llu mutations in %.1f s, seed %llu\n", name, n_corpus, round, seconds() - start, seed);
+	printf("1..1\nok 1 - %s survives %zu files and %llu mutations in %.1f s, seed %llu\n", name, n_corpus, round,
+	       seconds() - start, seed);
 	for (size_t i = 0; i < n_corpus; i++) {
 		free(corpus[i].name);
 		free(corpus[i].data);

@@ -1,5 +1,5 @@
 /* Everything that reads bytes of a peer. Properties, whatever the bytes are: a stream gives the same messages in any
- * splits; what a decoder takes encodes to the very bytes that it came from; the framer never loses or invents a byte. */
+ * splits; what a decoder takes encodes to the very bytes that it came from. */
 #include <stdlib.h>
 #include <string.h>
 #include "../unit/proto_table.h"

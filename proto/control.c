@@ -1,0 +1,116 @@
+#include "wire.h"
+
+static void layout_superseded(struct wire *w, void *p)
+{
+	struct psr_msg_superseded *m = p;
+
+	wire_u32(w, &m->by);
+}
+
+static int check_superseded(const void *p, struct psr_error *err)
+{
+	const struct psr_msg_superseded *m = p;
+
+	return check_integer("the id that supersedes", m->by, 2, UINT32_MAX, err);
+}
+
+int psr_msg_superseded_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_superseded *msg,
+                              struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_SUPERSEDED, id, view, msg, layout_superseded, check_superseded, err);
+}
+
+int psr_msg_superseded_decode(struct psr_msg_superseded *msg, const uint8_t *payload, size_t n, struct psr_error *err)
+{
+	return wire_decode(msg, PSR_MSG_SUPERSEDED, payload, n, layout_superseded, check_superseded, err);
+}
+
+static void layout_ack(struct wire *w, void *p)
+{
+	struct psr_msg_ack *m = p;
+
+	wire_u16(w, &m->pass);
+	wire_reserved(w, 2);
+}
+
+int psr_msg_ack_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_ack *msg,
+                       struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_ACK, id, view, msg, layout_ack, NULL, err);
+}
+
+int psr_msg_ack_decode(struct psr_msg_ack *msg, const uint8_t *payload, size_t n, struct psr_error *err)
+{
+	return wire_decode(msg, PSR_MSG_ACK, payload, n, layout_ack, NULL, err);
+}
+
+int psr_msg_cancelled_encode(struct psr_buf *out, uint32_t id, uint16_t view, struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_CANCELLED, id, view, NULL, NULL, NULL, err);
+}
+
+int psr_msg_cancel_encode(struct psr_buf *out, uint32_t id, uint16_t view, struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_CANCEL, id, view, NULL, NULL, NULL, err);
+}
+
+int psr_msg_pause_encode(struct psr_buf *out, uint16_t view, struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_PAUSE, 0, view, NULL, NULL, NULL, err);
+}
+
+int psr_msg_resume_encode(struct psr_buf *out, uint16_t view, struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_RESUME, 0, view, NULL, NULL, NULL, err);
+}
+
+int psr_msg_stats_encode(struct psr_buf *out, uint32_t id, struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_STATS, id, 0, NULL, NULL, NULL, err);
+}
+
+static void layout_stats_reply(struct wire *w, void *p)
+{
+	struct psr_msg_stats_reply *m = p;
+
+	wire_u16(w, &m->n_stats);
+	wire_reserved(w, 6);
+	if (m->n_stats > PSR_WIRE_MAX_STATS) {
+		wire_fail(w, PSR_ERR_LIMIT, "statistics have more than 64 entries");
+		return;
+	}
+	for (unsigned i = 0; i < m->n_stats && w->code == PSR_OK; i++) {
+		wire_u16(w, &m->stat[i].id);
+		wire_u64(w, &m->stat[i].value);
+	}
+}
+
+static int check_stats_reply(const void *p, struct psr_error *err)
+{
+	const struct psr_msg_stats_reply *m = p;
+	uint16_t last = 0;
+
+	if (m->n_stats > PSR_WIRE_MAX_STATS)
+		return psr_fail(err, PSR_ERR_LIMIT, "statistics have %u entries, and hold at most %d", m->n_stats,
+		                PSR_WIRE_MAX_STATS);
+	for (unsigned i = 0; i < m->n_stats; last = m->stat[i].id, i++) {
+		if (m->stat[i].id <= last)
+			return psr_fail(err, PSR_ERR_ARG, "entry %u of statistics has id %u after %u: ids rise", i, m->stat[i].id,
+			                last);
+		if (check_integer("a statistic", m->stat[i].value, 0, PSR_WIRE_MAX_INTEGER, err))
+			return PSR_ERR_ARG;
+	}
+	return PSR_OK;
+}
+
+int psr_msg_stats_reply_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_stats_reply *msg,
+                               struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_STATS_REPLY, id, 0, msg, layout_stats_reply, check_stats_reply, err);
+}
+
+int psr_msg_stats_reply_decode(struct psr_msg_stats_reply *msg, const uint8_t *payload, size_t n,
+                               struct psr_error *err)
+{
+	return wire_decode(msg, PSR_MSG_STATS_REPLY, payload, n, layout_stats_reply, check_stats_reply, err);
+}

@@ -1,0 +1,227 @@
+#include <math.h>
+#include "wire.h"
+
+static void layout_camera(struct wire *w, struct psr_msg_camera *m)
+{
+	wire_u8(w, &m->kind);
+	wire_reserved(w, 7);
+	wire_f64(w, m->eye, 3);
+	wire_f64(w, m->target, 3);
+	wire_f64(w, m->up, 3);
+	wire_f64(w, &m->extent, 1);
+	wire_f64(w, &m->near_z, 1);
+}
+
+static double length(const double v[3])
+{
+	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+static int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
+{
+	const double least = 1 / PSR_WIRE_MAX_LENGTH;
+	double f[3], u[3], n_f, n_u;
+
+	if (check_integer("the camera's kind", m->kind, PSR_WIRE_CAMERA_PERSPECTIVE, PSR_WIRE_CAMERA_ORTHOGRAPHIC, err) ||
+	    check_lengths("the camera's eye", m->eye, 3, err) || check_lengths("the camera's target", m->target, 3, err) ||
+	    check_lengths("the camera's up", m->up, 3, err))
+		return PSR_ERR_ARG;
+	for (int i = 0; i < 3; i++)
+		f[i] = m->target[i] - m->eye[i];
+	n_f = length(f);
+	n_u = length(m->up);
+	if (n_f < least)
+		return psr_fail(err, PSR_ERR_ARG, "the camera's eye and target are the same point");
+	if (n_u < least)
+		return psr_fail(err, PSR_ERR_ARG, "the camera's up has no length");
+	for (int i = 0; i < 3; i++) {
+		f[i] /= n_f;
+		u[i] = m->up[i] / n_u;
+	}
+	const double cross[3] = { f[1] * u[2] - f[2] * u[1], f[2] * u[0] - f[0] * u[2], f[0] * u[1] - f[1] * u[0] };
+
+	if (length(cross) < 1e-6)
+		return psr_fail(err, PSR_ERR_ARG, "the camera's up points along its view: turn it aside");
+	if (check_range("the camera's near distance", m->near_z, 0, PSR_WIRE_MAX_LENGTH, err))
+		return PSR_ERR_ARG;
+	if (m->kind == PSR_WIRE_CAMERA_PERSPECTIVE)
+		return check_range("the camera's field of view (radians)", m->extent, 1e-6, 3.14159, err);
+	return check_positive("the height of the camera's picture", m->extent, err);
+}
+
+static void layout_settings(struct wire *w, struct psr_msg_settings *m)
+{
+	wire_u8(w, &m->scale);
+	wire_reserved(w, 7);
+	wire_f64(w, &m->spacing_px, 1);
+}
+
+static int check_settings(const struct psr_msg_settings *m, struct psr_error *err)
+{
+	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
+		return psr_fail(err, PSR_ERR_ARG, "the scale of the settings is %u: it must be 1, 2 or 4", m->scale);
+	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
+}
+
+/* What a request and its FRAME_BEGIN have in common. */
+struct picture {
+	uint32_t width, height, planes;
+	uint8_t color_codec, color_quality, depth_format, depth_codec, data_codec;
+};
+
+static int check_picture(const struct picture *m, struct psr_error *err)
+{
+	const uint32_t data = ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH);
+
+	if (m->width == 0 || m->height == 0)
+		return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides need at least 1", m->width,
+		                m->height);
+	if (m->width > PSR_WIRE_MAX_SIDE || m->height > PSR_WIRE_MAX_SIDE ||
+	    (uint64_t)m->width * m->height > PSR_WIRE_MAX_PIXELS)
+		return psr_fail(err, PSR_ERR_LIMIT, "the picture has %u x %u pixels: a side holds at most %d, all of it %u",
+		                m->width, m->height, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
+	if (m->planes == 0 || m->planes >> PSR_WIRE_PLANES)
+		return psr_fail(err, PSR_ERR_ARG, "the planes are %#x: bits 0 to %d are known, and one is needed", m->planes,
+		                PSR_WIRE_PLANES - 1);
+	if (m->planes & 1u << PSR_WIRE_PLANE_COLOR) {
+		int jpeg = m->color_codec == PSR_CODEC_JPEG;
+
+		if (check_integer("the codec of colour", m->color_codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err) ||
+		    check_integer(jpeg ? "the JPEG quality" : "the quality of a lossless codec", m->color_quality, jpeg,
+		                  jpeg ? 100 : 0, err))
+			return PSR_ERR_ARG;
+	} else if (check_zero("the codec of colour, which is not asked for,", !m->color_codec && !m->color_quality, err)) {
+		return PSR_ERR_ARG;
+	}
+	if (m->planes & 1u << PSR_WIRE_PLANE_DEPTH) {
+		if (check_integer("the format of depth", m->depth_format, PSR_WIRE_DEPTH_F32, PSR_WIRE_DEPTH_U16_HALF, err))
+			return PSR_ERR_ARG;
+	} else if (check_zero("the format of depth, which is not asked for,", !m->depth_format && !m->depth_codec, err)) {
+		return PSR_ERR_ARG;
+	}
+	if (m->depth_codec != PSR_CODEC_RAW && m->depth_codec != PSR_CODEC_ZSTD)
+		return psr_fail(err, PSR_ERR_ARG, "the codec of depth is %u: it must be 0 or 2", m->depth_codec);
+	if (!(m->planes & data) && check_zero("the codec of planes that are not asked for", !m->data_codec, err))
+		return PSR_ERR_ARG;
+	if (m->data_codec != PSR_CODEC_RAW && m->data_codec != PSR_CODEC_ZSTD)
+		return psr_fail(err, PSR_ERR_ARG, "the codec of data planes is %u: it must be 0 or 2", m->data_codec);
+	return PSR_OK;
+}
+
+static void layout_frame(struct wire *w, void *p)
+{
+	struct psr_msg_frame *m = p;
+
+	wire_u16(w, &m->slot);
+	wire_u16(w, &m->pass_limit);
+	wire_u32(w, &m->width);
+	wire_u32(w, &m->height);
+	wire_u32(w, &m->planes);
+	wire_u8(w, &m->color_codec);
+	wire_u8(w, &m->color_quality);
+	wire_u8(w, &m->depth_format);
+	wire_u8(w, &m->depth_codec);
+	wire_u8(w, &m->data_codec);
+	wire_u8(w, &m->budget);
+	wire_reserved(w, 2);
+	wire_u64(w, &m->time_budget_us);
+	wire_f64(w, &m->error_bound_px, 1);
+	layout_settings(w, &m->settings);
+	wire_u32(w, &m->base);
+	wire_reserved(w, 4);
+	layout_camera(w, &m->camera);
+}
+
+static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
+{
+	int no_settings = m->settings.scale == 0 && m->settings.spacing_px == 0;
+
+	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_SETTINGS, err) ||
+	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||
+	    (m->budget != PSR_WIRE_BUDGET_ERROR && check_zero("an error bound", m->error_bound_px == 0, err)) ||
+	    (m->budget != PSR_WIRE_BUDGET_SETTINGS && check_zero("settings", no_settings, err)))
+		return PSR_ERR_ARG;
+	if (m->budget == PSR_WIRE_BUDGET_TIME)
+		return check_integer("the time budget", m->time_budget_us, 1, PSR_WIRE_MAX_INTEGER, err);
+	if (m->budget == PSR_WIRE_BUDGET_ERROR)
+		return check_positive("the error bound (pixels)", m->error_bound_px, err);
+	return m->budget == PSR_WIRE_BUDGET_SETTINGS ? check_settings(&m->settings, err) : PSR_OK;
+}
+
+static int check_frame(const void *p, struct psr_error *err)
+{
+	const struct psr_msg_frame *m = p;
+	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
+		m->depth_format, m->depth_codec, m->data_codec };
+	int result;
+
+	if (check_integer("the slot of the scene", m->slot, 0, PSR_WIRE_MAX_SCENES - 1, err))
+		return PSR_ERR_ARG;
+	result = check_picture(&picture, err);
+	if (result != PSR_OK)
+		return result;
+	return check_budget(m, err) || check_camera(&m->camera, err) ? PSR_ERR_ARG : PSR_OK;
+}
+
+int psr_msg_frame_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame *msg,
+                         struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_FRAME, id, view, msg, layout_frame, check_frame, err);
+}
+
+int psr_msg_frame_decode(struct psr_msg_frame *msg, const uint8_t *payload, size_t n, struct psr_error *err)
+{
+	return wire_decode(msg, PSR_MSG_FRAME, payload, n, layout_frame, check_frame, err);
+}
+
+static void layout_frame_begin(struct wire *w, void *p)
+{
+	struct psr_msg_frame_begin *m = p;
+
+	wire_u16(w, &m->pass);
+	wire_u16(w, &m->base_pass);
+	wire_u32(w, &m->width);
+	wire_u32(w, &m->height);
+	wire_u32(w, &m->planes);
+	wire_u8(w, &m->color_codec);
+	wire_u8(w, &m->color_quality);
+	wire_u8(w, &m->depth_format);
+	wire_u8(w, &m->depth_codec);
+	wire_u8(w, &m->data_codec);
+	wire_bytes(w, m->background, 3);
+	wire_u32(w, &m->base);
+	wire_reserved(w, 4);
+	layout_settings(w, &m->settings);
+	wire_f64(w, &m->depth_min, 1);
+	wire_f64(w, &m->depth_max, 1);
+	layout_camera(w, &m->camera);
+}
+
+static int check_frame_begin(const void *p, struct psr_error *err)
+{
+	const struct psr_msg_frame_begin *m = p;
+	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
+		m->depth_format, m->depth_codec, m->data_codec };
+	int result = check_picture(&picture, err);
+
+	if (result != PSR_OK)
+		return result;
+	if ((m->base == 0 && check_zero("the pass of a base that is none", m->base_pass == 0, err)) ||
+	    check_range("the nearest depth", m->depth_min, 0, PSR_WIRE_MAX_LENGTH, err) ||
+	    check_range("the farthest depth", m->depth_max, m->depth_min, PSR_WIRE_MAX_LENGTH, err) ||
+	    check_settings(&m->settings, err) || check_camera(&m->camera, err))
+		return PSR_ERR_ARG;
+	return PSR_OK;
+}
+
+int psr_msg_frame_begin_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_begin *msg,
+                               struct psr_error *err)
+{
+	return wire_encode(out, PSR_MSG_FRAME_BEGIN, id, view, msg, layout_frame_begin, check_frame_begin, err);
+}
+
+int psr_msg_frame_begin_decode(struct psr_msg_frame_begin *msg, const uint8_t *payload, size_t n,
+                               struct psr_error *err)
+{
+	return wire_decode(msg, PSR_MSG_FRAME_BEGIN, payload, n, layout_frame_begin, check_frame_begin, err);
+}

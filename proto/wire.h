@@ -1,0 +1,55 @@
+/* Private to proto/: one walk over a message's fields, used to write and to read, so that both have one layout. */
+#ifndef PSR_PROTO_WIRE_H
+#define PSR_PROTO_WIRE_H
+
+#include "psr/proto.h"
+
+/* While writing, `at` goes on counting behind `room`, and nothing is written there. While reading, fields behind the
+ * end are 0. The first thing that is wrong stays in code, what and where. */
+struct wire {
+	int writing;
+	uint8_t *out;
+	const uint8_t *in;
+	size_t at, room;
+	int code;
+	const char *what;
+	size_t where;
+};
+
+void wire_u8(struct wire *w, uint8_t *v);
+void wire_u16(struct wire *w, uint16_t *v);
+void wire_u32(struct wire *w, uint32_t *v);
+void wire_u64(struct wire *w, uint64_t *v);
+void wire_f64(struct wire *w, double *v, int n);
+void wire_bytes(struct wire *w, uint8_t *v, size_t n);
+void wire_reserved(struct wire *w, size_t n);
+void wire_string(struct wire *w, char *text, size_t size); /* size of the array, NUL included */
+
+/* The bytes that are left are the field: `data` for writing, the place in the payload for reading. */
+void wire_data(struct wire *w, const uint8_t **data, uint32_t n);
+
+/* Copies text, with '?' for every byte that cannot stand in a string on the wire. */
+void wire_clean(char *out, const char *text, size_t size);
+
+void wire_fail(struct wire *w, int code, const char *what);
+
+typedef void wire_layout(struct wire *w, void *msg);
+typedef int wire_check(const void *msg, struct psr_error *err);
+
+/* check may be NULL; it is called before writing and after reading. */
+int wire_encode(struct psr_buf *out, unsigned type, uint32_t id, uint16_t view, const void *msg, wire_layout *layout,
+                wire_check *check, struct psr_error *err);
+int wire_decode(void *msg, unsigned type, const uint8_t *payload, size_t n, wire_layout *layout, wire_check *check,
+                struct psr_error *err);
+
+/* Rules of values; `what` names the field in the error's sentence. */
+int check_lengths(const char *what, const double *v, int n, struct psr_error *err);
+int check_positive(const char *what, double v, struct psr_error *err);
+int check_range(const char *what, double v, double min, double max, struct psr_error *err);
+int check_integer(const char *what, uint64_t v, uint64_t min, uint64_t max, struct psr_error *err);
+int check_zero(const char *what, int all_zero, struct psr_error *err);
+
+uint32_t wire_get_u32(const uint8_t *p);
+uint16_t wire_get_u16(const uint8_t *p);
+
+#endif
