@@ -1,0 +1,63 @@
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "psr.h"
+
+#define BAR 30
+
+const char *psr_default_server(void)
+{
+	const char *set = getenv("PSR_SERVER");
+
+	return set != NULL && set[0] != '\0' ? set : PSR_CLIENT_DEFAULT_ADDRESS;
+}
+
+void psr_progress_draw(const struct psr_msg_progress *progress, void *userdata)
+{
+	static const char *const stages[] = { "waiting", "import", "sample", "select", "write", "load" };
+	struct psr_progress_line *line = userdata;
+	const char *stage = progress->stage < sizeof stages / sizeof stages[0] ? stages[progress->stage] : "working";
+
+	if (!isatty(STDERR_FILENO))
+		return;
+	line->is_drawn = 1;
+	if (progress->total > 0) {
+		double part = (double)progress->done / (double)progress->total;
+		int full = (int)(part * BAR);
+
+		fprintf(stderr, "\rbuilding: %-8s [%.*s%*s] %3.0f %%\x1b[K", stage, full, "##############################",
+		        BAR - full, "", 100 * part);
+	} else {
+		fprintf(stderr, "\rbuilding: %-8s\x1b[K", stage);
+	}
+	fflush(stderr);
+}
+
+void psr_progress_end(struct psr_progress_line *line)
+{
+	if (line->is_drawn)
+		fprintf(stderr, "\r\x1b[K");
+	line->is_drawn = 0;
+}
+
+int psr_flush_output(struct psr_error *err)
+{
+	errno = 0;
+	if (ferror(stdout) || fflush(stdout) != 0)
+		return psr_fail(err, PSR_ERR_IO, "cannot write to standard output: %s", strerror(errno != 0 ? errno : EIO));
+	return PSR_OK;
+}
+
+int psr_print_json(cJSON *json, struct psr_error *err)
+{
+	char *text = json != NULL ? cJSON_Print(json) : NULL;
+
+	cJSON_Delete(json);
+	if (text == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the JSON text");
+	puts(text);
+	free(text);
+	return psr_flush_output(err);
+}

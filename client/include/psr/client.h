@@ -1,0 +1,130 @@
+/* A connection to psrd: requests out, pictures in. Prints nothing; one thread at a time may use a client.
+ *
+ * All that a server sends is checked against PROTOCOL.md and against what was asked; memory is bounded by the limits of
+ * proto.h and by the size of the pictures that were asked for. A function that finds the connection broken (CONNECTION,
+ * PROTOCOL, VERSION, or the server's own ERROR of id 0) says so again in every later call; the client can only be
+ * closed then. Every call ends by its timeout. */
+#ifndef PSR_CLIENT_H
+#define PSR_CLIENT_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/picture.h"
+#include "psr/proto.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PSR_CLIENT_DEFAULT_ADDRESS "127.0.0.1:7447"
+#define PSR_CLIENT_MAX_ENTRIES 65536 /* of a server's list */
+
+struct psr_client;
+
+/* ---- connecting ---- */
+
+/* HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH. ARG with what is wrong; UNSUPPORTED for tls://. */
+int psr_address_check(const char *address, struct psr_error *err);
+
+/* Connects, says HELLO (with `program`, the name and version of the caller, and the routing key of `model`, which may
+ * be NULL) and waits for WELCOME, timeout_ms for all of it. CONNECTION, PROTOCOL (no psrd answers there), VERSION,
+ * BUSY, MEMORY, and what psr_address_check refuses. */
+int psr_client_connect(struct psr_client **out, const char *address, const char *program, const char *model,
+                       int timeout_ms, struct psr_error *err);
+
+/* Says GOODBYE if the connection is sound, without waiting, and frees all. NULL is fine. */
+void psr_client_close(struct psr_client *client);
+
+const struct psr_msg_welcome *psr_client_welcome(const struct psr_client *client);
+uint64_t psr_client_bytes_received(const struct psr_client *client);
+
+/* ---- short exchanges: no frame may be under way (BUSY) ---- */
+
+/* All models of the server; *entries belongs to the caller (free), NULL if there are none. timeout_ms: the longest
+ * silence. */
+int psr_client_list(struct psr_client *client, struct psr_msg_list_entry **entries, uint32_t *n_entries,
+                    int timeout_ms, struct psr_error *err);
+
+/* Opens a model, which the server may have to build first: that can take minutes, in which on_progress (may be NULL) is
+ * told how far it is. A server that does not even answer PING within timeout_ms is given up (CONNECTION). NOT_FOUND,
+ * FORMAT and so on as the server has it. */
+int psr_client_open(struct psr_client *client, const char *name,
+                    void (*on_progress)(const struct psr_msg_progress *progress, void *userdata), void *userdata,
+                    int timeout_ms, struct psr_msg_opened *opened, struct psr_error *err);
+
+int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stats, int timeout_ms,
+                     struct psr_error *err);
+
+/* ---- scenes and frames: what is sent here is answered by events ---- */
+
+/* Queues a SCENE. Nothing answers it unless it fails: then an event PSR_EVENT_FAILED with this id. *id may be NULL. */
+int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scene, uint32_t *id,
+                     struct psr_error *err);
+
+/* Queues a FRAME in view 0: planes colour, or colour and depth as f32, without budget, refinement or base (else
+ * UNSUPPORTED). BUSY when WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME or FAILED. */
+int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *frame, uint32_t *id,
+                     struct psr_error *err);
+
+enum psr_event_type {
+	PSR_EVENT_FRAME = 1, /* a frame is complete and checked */
+	PSR_EVENT_FAILED,    /* the request `id` failed: `error` says why; the connection goes on */
+};
+
+struct psr_event {
+	enum psr_event_type type;
+	uint32_t id;
+	/* FRAME; pointers are valid until the next call with this client: */
+	const struct psr_picture *picture;
+	const struct psr_msg_frame_begin *begin;
+	const struct psr_msg_frame_end *end;
+	uint64_t bytes;      /* of the frame's messages, headers included */
+	uint64_t latency_ns; /* from psr_client_frame to the decoded picture */
+	unsigned checked;    /* bit of each plane whose pixels have the hash that END gives: all that came losslessly */
+	/* FAILED: */
+	struct psr_error error;
+};
+
+/* Sends and receives for at most timeout_ms (0: only what needs no waiting; -1: no limit). 1: *event is filled; 0: the
+ * time is over; negative: the connection is lost. A frame whose pixels do not have their hash ends in FAILED with
+ * FORMAT; one that cannot be decoded, in PROTOCOL. */
+int psr_client_wait(struct psr_client *client, int timeout_ms, struct psr_event *event, struct psr_error *err);
+
+/* ---- helpers for command lines ---- */
+
+/* One light (what follows --light):
+ *   dir:X,Y,Z[,option...]                the direction in which the light travels
+ *   point:X,Y,Z[,option...]              a position
+ *   spot:X,Y,Z:TX,TY,TZ:ANGLE[,option...] position, a point on the axis, half angle of the cone in degrees (0..90];
+ *                                        full light within 0.9 of it
+ * options: color=#rrggbb (white), intensity=I (1; 0..1e6), shadow, ref=R (point, spot: the distance at which the
+ * intensity holds, falling with the square of the distance; without it the light does not fall). ARG. */
+int psr_light_parse(struct psr_msg_light *light, const char *text, struct psr_error *err);
+
+/* "jpeg:Q" (Q of 1..100), "lossless" or "raw". ARG. */
+int psr_codec_parse(uint8_t *codec, uint8_t *quality, const char *text, struct psr_error *err);
+
+/* What a person said about the camera. */
+struct psr_camera_wish {
+	int has_eye, has_target, has_up;
+	double eye[3], target[3], up[3];
+	double fov_y;        /* radians; 0: orthographic */
+	double ortho_height; /* world units; 0: as tall as the box needs */
+};
+
+/* Completes it: nothing said gives psr_camera_frame's; an eye alone looks at the middle of the box; a target alone is
+ * seen from that camera's side. Without an up it is +Y, or -Z where the view runs along Y. near_z is 1/1000 of the way
+ * to the far end of the box, but half of the way to its near end at most when the eye is outside (orthographic: 0).
+ * ARG: eye and target are the same point, up runs along the view. */
+int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
+                        const double box_max[3], double aspect, struct psr_error *err);
+
+/* The light of pictures for which nobody asked for one: directional, white, from behind the camera, above it and to its
+ * left. */
+void psr_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,170 @@
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <xxhash.h>
+#include "internal.h"
+
+void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked)
+{
+	memset(assembly, 0, sizeof *assembly);
+	assembly->asked = *asked;
+}
+
+void client_assembly_fini(struct client_assembly *assembly)
+{
+	free(assembly->picture.rgb);
+	free(assembly->picture.depth);
+	free(assembly->pieces);
+	memset(assembly, 0, sizeof *assembly);
+}
+
+int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg_frame_begin *begin,
+                          struct psr_error *err)
+{
+	const struct psr_msg_frame *asked = &assembly->asked;
+	struct psr_picture *picture = &assembly->picture;
+	size_t n = (size_t)asked->width * asked->height;
+
+	if (assembly->has_begun)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
+	if (begin->pass != 0 || begin->base != 0 || begin->width != asked->width || begin->height != asked->height
+	    || begin->planes != asked->planes || begin->color_codec != asked->color_codec
+	    || begin->color_quality != asked->color_quality || begin->depth_format != asked->depth_format
+	    || begin->depth_codec != asked->depth_codec || begin->data_codec != asked->data_codec)
+		return psr_fail(err, PSR_ERR_PROTOCOL,
+		                "the server began another frame (%" PRIu32 "x%" PRIu32 ") than the one asked "
+		                "for (%" PRIu32 "x%" PRIu32 ")",
+		                begin->width, begin->height, asked->width, asked->height);
+	assembly->begin = *begin;
+	assembly->has_begun = 1;
+	picture->width = asked->width;
+	picture->height = asked->height;
+	picture->rgb = malloc(n * 3);
+	if (asked->planes & 1 << PSR_WIRE_PLANE_DEPTH)
+		picture->depth = malloc(n * sizeof *picture->depth);
+	if (picture->rgb == NULL || (picture->depth == NULL && asked->planes & 1 << PSR_WIRE_PLANE_DEPTH))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %" PRIu32 "x%" PRIu32 " pixels", asked->width,
+		                asked->height);
+	for (size_t i = 0; i < n; i++)
+		memcpy(picture->rgb + 3 * i, begin->background, 3);
+	for (size_t i = 0; i < n && picture->depth != NULL; i++)
+		picture->depth[i] = INFINITY;
+	return PSR_OK;
+}
+
+/* The rules that need to know the frame; psr_msg_rect_decode has checked those within the message. */
+static int check_rect(const struct client_assembly *assembly, const struct psr_msg_rect *rect, struct psr_error *err)
+{
+	const struct psr_msg_frame *asked = &assembly->asked;
+	unsigned wanted, pixel;
+	uint64_t n;
+
+	if (!assembly->has_begun)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle before the frame's beginning");
+	if (rect->plane > PSR_WIRE_PLANE_DEPTH || !(asked->planes >> rect->plane & 1))
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle of plane %u, which was not asked for",
+		                rect->plane);
+	if (rect->scale != 1 && rect->scale != 2 && rect->scale != 4)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle of scale %u", rect->scale);
+	if (rect->w == 0 || rect->h == 0 || (uint32_t)rect->x + rect->w > asked->width
+	    || (uint32_t)rect->y + rect->h > asked->height)
+		return psr_fail(err, PSR_ERR_PROTOCOL,
+		                "the server sent a rectangle %ux%u at %u,%u: outside of the picture of %" PRIu32 "x%" PRIu32,
+		                rect->w, rect->h, rect->x, rect->y, asked->width, asked->height);
+	wanted = rect->plane == PSR_WIRE_PLANE_COLOR ? asked->color_codec : asked->depth_codec;
+	if (rect->codec != PSR_CODEC_RAW && rect->codec != wanted)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle with codec %u, %u was asked for",
+		                rect->codec, wanted);
+	pixel = psr_plane_pixel_bytes(rect->plane, asked->depth_format);
+	n = (uint64_t)((rect->w + rect->scale - 1u) / rect->scale) * ((rect->h + rect->scale - 1u) / rect->scale);
+	if ((uint64_t)rect->w * rect->h > PSR_WIRE_MAX_RECT_PIXELS || rect->total == 0
+	    || rect->total > psr_rect_total_max(n, pixel) || (rect->codec == PSR_CODEC_RAW && rect->total != n * pixel))
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server claims %" PRIu32 " bytes for a rectangle of %ux%u pixels",
+		                rect->total, rect->w, rect->h);
+	return PSR_OK;
+}
+
+/* Room for n more bytes: twice what has come, never more than what the rectangle claims. */
+static int reserve_pieces(struct client_assembly *assembly, size_t n, struct psr_error *err)
+{
+	size_t need = assembly->n_pieces + n, capacity = 2 * need;
+	uint8_t *grown;
+
+	if (need <= assembly->pieces_capacity)
+		return PSR_OK;
+	if (capacity > assembly->open.total)
+		capacity = assembly->open.total;
+	grown = realloc(assembly->pieces, capacity);
+	if (grown == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a rectangle of %zu bytes", capacity);
+	assembly->pieces = grown;
+	assembly->pieces_capacity = capacity;
+	return PSR_OK;
+}
+
+static int is_same_rect(const struct psr_msg_rect *a, const struct psr_msg_rect *b)
+{
+	return a->plane == b->plane && a->codec == b->codec && a->scale == b->scale && a->x == b->x && a->y == b->y
+	       && a->w == b->w && a->h == b->h && a->total == b->total;
+}
+
+int client_assembly_rect(struct client_assembly *assembly, struct client_decoder *decoder,
+                         const struct psr_msg_rect *rect, struct psr_error *err)
+{
+	int code = check_rect(assembly, rect, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (assembly->open.total == 0 ? rect->offset != 0
+	                              : !is_same_rect(rect, &assembly->open) || rect->offset != assembly->n_pieces)
+		return psr_fail(err, PSR_ERR_PROTOCOL,
+		                "the server sent the piece at byte %" PRIu32 " of a rectangle out of turn", rect->offset);
+	if (rect->bytes == 0 || (uint64_t)rect->offset + rect->bytes > rect->total)
+		return psr_fail(err, PSR_ERR_PROTOCOL,
+		                "the server sent more bytes of a rectangle than the %" PRIu32 " it claimed", rect->total);
+	if (rect->codec == PSR_CODEC_JPEG || rect->scale != 1)
+		assembly->lossy |= 1u << rect->plane;
+	if (rect->bytes == rect->total)
+		return client_decode(decoder, &assembly->picture, rect, rect->data, err);
+	assembly->open = *rect;
+	code = reserve_pieces(assembly, rect->bytes, err);
+	if (code != PSR_OK)
+		return code;
+	memcpy(assembly->pieces + assembly->n_pieces, rect->data, rect->bytes);
+	assembly->n_pieces += rect->bytes;
+	if (assembly->n_pieces < rect->total)
+		return PSR_OK;
+	assembly->open.total = 0;
+	assembly->n_pieces = 0;
+	return client_decode(decoder, &assembly->picture, rect, assembly->pieces, err);
+}
+
+int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
+                        struct psr_error *err)
+{
+	static const char *const names[] = { "colour", "depth" };
+	const struct psr_picture *picture = &assembly->picture;
+	size_t n = (size_t)picture->width * picture->height;
+
+	if (!assembly->has_begun || assembly->open.total != 0)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended a frame %s",
+		                assembly->has_begun ? "within a rectangle" : "that it had not begun");
+	if (end->pass != 0 || !end->is_final || end->planes != assembly->asked.planes)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
+	*checked = 0;
+	for (unsigned plane = 0; plane <= PSR_WIRE_PLANE_DEPTH; plane++) {
+		const void *pixels = plane == PSR_WIRE_PLANE_COLOR ? (void *)picture->rgb : (void *)picture->depth;
+		uint64_t hash;
+
+		if (!(end->planes >> plane & 1) || assembly->lossy >> plane & 1)
+			continue;
+		hash = XXH64(pixels, n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
+		if (hash != end->hash[plane])
+			return psr_fail(err, PSR_ERR_FORMAT,
+			                "the %s of a frame is damaged: its hash is %016" PRIx64 ", the server drew %016" PRIx64,
+			                names[plane], hash, end->hash[plane]);
+		*checked |= 1u << plane;
+	}
+	return PSR_OK;
+}

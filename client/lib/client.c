@@ -1,0 +1,276 @@
+#include <errno.h>
+#include <poll.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+#include "internal.h"
+
+int client_create(struct psr_client **out, int fd, const char *address, struct psr_error *err)
+{
+	struct psr_client *client = calloc(1, sizeof *client);
+
+	if (client == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a connection");
+	client->fd = -1; /* the caller's until this succeeds */
+	client->next_id = 1;
+	snprintf(client->address, sizeof client->address, "%s", address);
+	client->in_storage = malloc(CLIENT_IN_BYTES);
+	client->out.data = malloc(CLIENT_OUT_BYTES);
+	client->out.capacity = CLIENT_OUT_BYTES;
+	if (client->in_storage == NULL || client->out.data == NULL || client_decoder_create(&client->decoder) != PSR_OK) {
+		psr_client_close(client);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a connection");
+	}
+	psr_framer_init(&client->framer, PSR_SERVER, client->in_storage, CLIENT_IN_BYTES);
+	client->fd = fd;
+	*out = client;
+	return PSR_OK;
+}
+
+void psr_client_close(struct psr_client *client)
+{
+	struct psr_msg_goodbye goodbye = { .reason = PSR_GOODBYE_DONE };
+
+	if (client == NULL)
+		return;
+	if (client->fd >= 0 && client->is_open && client->broken.code == PSR_OK && !client->write_failed) {
+		if (psr_msg_goodbye_encode(&client->out, &goodbye, NULL) == PSR_OK
+		    && send(client->fd, client->out.data + client->out_sent, client->out.size - client->out_sent,
+		            MSG_NOSIGNAL | MSG_DONTWAIT)
+		           > 0)
+			shutdown(client->fd, SHUT_WR);
+	}
+	if (client->fd >= 0)
+		close(client->fd);
+	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++)
+		client_assembly_fini(&client->frame[i].assembly);
+	client_assembly_fini(&client->done);
+	client_decoder_destroy(client->decoder);
+	free(client->list.entry);
+	free(client->in_storage);
+	free(client->out.data);
+	free(client);
+}
+
+int client_break(struct psr_client *client, int code, const char *format, ...)
+{
+	char text[PSR_ERROR_TEXT];
+	va_list args;
+
+	va_start(args, format);
+	vsnprintf(text, sizeof text, format, args);
+	va_end(args);
+	return psr_fail(&client->broken, code, "%.200s: %s", client->address, text);
+}
+
+static int fail_broken(const struct psr_client *client, struct psr_error *err)
+{
+	return psr_fail(err, client->broken.code, "%s", client->broken.text);
+}
+
+const struct psr_msg_welcome *psr_client_welcome(const struct psr_client *client)
+{
+	return &client->welcome;
+}
+
+uint64_t psr_client_bytes_received(const struct psr_client *client)
+{
+	return client->n_received;
+}
+
+/* A peer that has closed may have said why: what it sent is still read, so a failed write is no error yet. */
+static void flush_output(struct psr_client *client)
+{
+	struct psr_buf *out = &client->out;
+
+	while (!client->write_failed && client->out_sent < out->size) {
+		ssize_t n = send(client->fd, out->data + client->out_sent, out->size - client->out_sent, MSG_NOSIGNAL);
+
+		if (n >= 0)
+			client->out_sent += (size_t)n;
+		else if (errno == EAGAIN || errno == EWOULDBLOCK)
+			break;
+		else if (errno != EINTR)
+			client->write_failed = 1;
+	}
+	if (client->write_failed || client->out_sent == out->size) {
+		out->size = 0;
+		client->out_sent = 0;
+	} else if (client->out_sent > 0) {
+		memmove(out->data, out->data + client->out_sent, out->size - client->out_sent);
+		out->size -= client->out_sent;
+		client->out_sent = 0;
+	}
+}
+
+/* 1: something came; 0: nothing is there now; negative: broken. */
+static int fill_input(struct psr_client *client)
+{
+	size_t room;
+	uint8_t *to = psr_framer_space(&client->framer, &room);
+	ssize_t n;
+
+	do
+		n = recv(client->fd, to, room, 0);
+	while (n < 0 && errno == EINTR);
+	if (n < 0 && (errno == EAGAIN || errno == EWOULDBLOCK))
+		return 0;
+	if (n < 0)
+		return client_break(client, PSR_ERR_CONNECTION, "the connection is lost: %s", strerror(errno));
+	if (n == 0)
+		return client_break(client, PSR_ERR_CONNECTION,
+		                    client->is_open ? "the server closed the connection"
+		                                    : "the peer closed the connection unanswered; is it a psrd of this "
+		                                      "version?");
+	psr_framer_filled(&client->framer, (size_t)n);
+	client->n_received += (uint64_t)n;
+	return 1;
+}
+
+static int take_messages(struct psr_client *client, struct psr_event *event)
+{
+	struct psr_message message;
+	struct psr_error why;
+
+	for (;;) {
+		int got = psr_framer_next(&client->framer, &message, &why);
+
+		if (got == 0)
+			return 0;
+		if (got < 0)
+			return client_break(
+				client, PSR_ERR_PROTOCOL,
+				client->is_open ? "the server broke the protocol: %.300s" : "no psrd answers there: %.300s", why.text);
+		got = client_dispatch(client, &message, event);
+		if (got != 0)
+			return got;
+	}
+}
+
+int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event *event, struct psr_error *err)
+{
+	client_assembly_fini(&client->done);
+	memset(event, 0, sizeof *event);
+	client->answer = CLIENT_ANSWER_NONE;
+	for (int has_read = 0; client->broken.code == PSR_OK; has_read = 1) {
+		int got = take_messages(client, event);
+
+		if (got > 0)
+			return 1;
+		if (got < 0)
+			break;
+		if (has_read && client_now_ns() >= deadline_ns) /* a server that never stops sending */
+			return 0;
+		flush_output(client);
+		got = fill_input(client);
+		if (got != 0)
+			continue;
+		got = client_poll(client->fd, POLLIN | (client->out.size > 0 ? POLLOUT : 0), deadline_ns, err);
+		if (got <= 0)
+			return got;
+	}
+	return fail_broken(client, err);
+}
+
+int psr_client_wait(struct psr_client *client, int timeout_ms, struct psr_event *event, struct psr_error *err)
+{
+	uint64_t deadline_ns = client_deadline_ns(timeout_ms);
+	int got;
+
+	do
+		got = client_run(client, deadline_ns, event, err);
+	while (got > 0 && event->type == 0); /* a late PONG is nobody's event */
+	return got;
+}
+
+/* Ends a request that was encoded behind `start`. */
+static int finish_request(struct psr_client *client, size_t start, int code, const char *what, struct psr_error *err)
+{
+	if (code == PSR_ERR_MEMORY)
+		return psr_fail(err, PSR_ERR_BUSY, "%s waits for the server to take what was sent before", client->address);
+	if (code != PSR_OK)
+		return code;
+	if (client->out.size - start > client->welcome.max_message) {
+		size_t n = client->out.size - start;
+
+		client->out.size = start;
+		return psr_fail(err, PSR_ERR_LIMIT, "the %s takes %zu bytes, the server takes messages of at most %u", what, n,
+		                client->welcome.max_message);
+	}
+	client->next_id++;
+	flush_output(client);
+	return PSR_OK;
+}
+
+static int start_request(struct psr_client *client, struct psr_error *err)
+{
+	if (client->broken.code != PSR_OK)
+		return fail_broken(client, err);
+	if (client->next_id == UINT32_MAX)
+		return psr_fail(err, PSR_ERR_LIMIT, "%s: the ids of this connection are used up; connect again",
+		                client->address);
+	return PSR_OK;
+}
+
+int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scene, uint32_t *id, struct psr_error *err)
+{
+	size_t start = client->out.size;
+	int code = start_request(client, err);
+
+	for (unsigned i = 0; code == PSR_OK && i < scene->n_lights && i < PSR_WIRE_MAX_LIGHTS; i++)
+		if (scene->light[i].flags & PSR_WIRE_LIGHT_SHADOW && !(client->welcome.capabilities & PSR_CAP_SHADOWS))
+			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no shadows (%s); leave `shadow` out", client->address,
+			                client->welcome.server);
+	if (code != PSR_OK)
+		return code;
+	if (id != NULL)
+		*id = client->next_id;
+	code = psr_msg_scene_encode(&client->out, client->next_id, scene, err);
+	return finish_request(client, start, code, "scene", err);
+}
+
+static struct client_frame *free_frame(struct psr_client *client)
+{
+	struct client_frame *frame = NULL;
+	unsigned n_open = 0;
+
+	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++) {
+		if (client->frame[i].id != 0)
+			n_open++;
+		else if (frame == NULL)
+			frame = &client->frame[i];
+	}
+	return n_open < client->welcome.max_open ? frame : NULL;
+}
+
+int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *asked, uint32_t *id, struct psr_error *err)
+{
+	static const unsigned color = 1 << PSR_WIRE_PLANE_COLOR, depth = 1 << PSR_WIRE_PLANE_DEPTH;
+	struct client_frame *frame = free_frame(client);
+	size_t start = client->out.size;
+	int code = start_request(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (frame == NULL)
+		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address, client->welcome.max_open);
+	if ((asked->planes | depth) != (color | depth) || asked->pass_limit != 0 || asked->base != 0
+	    || asked->budget != PSR_WIRE_BUDGET_NONE || asked->color_codec > PSR_CODEC_ZSTD
+	    || (asked->planes & depth && asked->depth_format != PSR_WIRE_DEPTH_F32))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "this client asks for colour, and depth as float, without budget, "
+		                "refinement or base");
+	code = psr_msg_frame_encode(&client->out, client->next_id, 0, asked, err);
+	*id = client->next_id;
+	code = finish_request(client, start, code, "request", err);
+	if (code != PSR_OK)
+		return code;
+	client_assembly_init(&frame->assembly, asked);
+	frame->id = *id;
+	frame->bytes = 0;
+	frame->sent_ns = client_now_ns();
+	return PSR_OK;
+}

@@ -1,0 +1,47 @@
+#include <stdio.h>
+#include <string.h>
+#include "psr.h"
+
+static const struct {
+	const char *name;
+	int (*run)(int argc, char **argv);
+	const char *help;
+} commands[] = {
+	{ "list", psr_list_main, "the models that a server has" },
+	{ "shot", psr_shot_main, "one picture of a model, into a file" },
+	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
+};
+
+#define N_COMMANDS (sizeof commands / sizeof commands[0])
+
+static void print_help(void)
+{
+	printf("usage: psr COMMAND [options]\n       psr --help | --version\n\n"
+	       "The client of psrd, which draws point-sample models and streams the pictures.\n\ncommands:\n");
+	for (size_t i = 0; i < N_COMMANDS; i++)
+		printf("  %-7s %s\n", commands[i].name, commands[i].help);
+	printf("\n`psr COMMAND --help` shows the options of a command.\n\n" PSR_EXIT_CODES "\n");
+}
+
+int main(int argc, char **argv)
+{
+	struct psr_error err;
+	const char *name = argc > 1 ? argv[1] : NULL;
+
+	if (name != NULL && strcmp(name, "--help") == 0) {
+		print_help();
+		return psr_flush_output(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
+	}
+	if (name != NULL && strcmp(name, "--version") == 0) {
+		printf("%s\n", PSR_PROGRAM);
+		return psr_flush_output(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
+	}
+	for (size_t i = 0; name != NULL && i < N_COMMANDS; i++)
+		if (strcmp(name, commands[i].name) == 0)
+			return commands[i].run(argc - 1, argv + 1);
+	if (name == NULL)
+		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot and bench, and --help");
+	else
+		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot and bench, and --help", name);
+	return psr_cli_fail("psr", &err);
+}

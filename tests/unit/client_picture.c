@@ -1,0 +1,297 @@
+/* Pictures as files. */
+#define _GNU_SOURCE
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <png.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <dirent.h>
+#include <unistd.h>
+#include "psr/picture.h"
+
+#define W 5
+#define H 3
+
+static char folder[256], name[512];
+static uint8_t rgb[3 * W * H];
+static float depth[W * H];
+static const struct psr_picture picture = { W, H, rgb, depth };
+
+static int set_up(void **state)
+{
+	const char *root = getenv("TMPDIR");
+
+	(void)state;
+	for (int i = 0; i < 3 * W * H; i++)
+		rgb[i] = (uint8_t)(i * 37 + 11);
+	for (int i = 0; i < W * H; i++)
+		depth[i] = i % 4 == 3 ? INFINITY : (float)i * 1.25f + 0.1f;
+	snprintf(folder, sizeof folder, "%s/psr-picture-XXXXXX", root != NULL ? root : "/tmp");
+	return mkdtemp(folder) == NULL;
+}
+
+static const char *in_folder(const char *leaf)
+{
+	snprintf(name, sizeof name, "%s/%s", folder, leaf);
+	return name;
+}
+
+static int n_files(void)
+{
+	DIR *dir = opendir(folder);
+	struct dirent *entry;
+	int n = 0;
+
+	while ((entry = readdir(dir)) != NULL)
+		n += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
+	closedir(dir);
+	return n;
+}
+
+static int tear_down(void **state)
+{
+	DIR *dir = opendir(folder);
+	struct dirent *entry;
+
+	(void)state;
+	while ((entry = readdir(dir)) != NULL)
+		if (entry->d_type != DT_DIR)
+			unlink(in_folder(entry->d_name));
+	closedir(dir);
+	return rmdir(folder);
+}
+
+static size_t read_all(const char *path, char *to, size_t size)
+{
+	FILE *file = fopen(path, "rb");
+	size_t n;
+
+	assert_non_null(file);
+	n = fread(to, 1, size, file);
+	fclose(file);
+	return n;
+}
+
+static void write_text(const char *path, const char *text)
+{
+	FILE *file = fopen(path, "wb");
+
+	assert_non_null(file);
+	fputs(text, file);
+	fclose(file);
+}
+
+static void png_has_the_same_pixels_and_says_srgb(void **state)
+{
+	png_image image = { .version = PNG_IMAGE_VERSION };
+	uint8_t back[3 * W * H];
+	char bytes[2048];
+	size_t n;
+
+	(void)state;
+	assert_int_equal(psr_picture_write_color(&picture, in_folder("a.png"), NULL), PSR_OK);
+	assert_true(png_image_begin_read_from_file(&image, name));
+	assert_true(image.width == W && image.height == H);
+	image.format = PNG_FORMAT_RGB;
+	assert_true(png_image_finish_read(&image, NULL, back, 0, NULL));
+	assert_memory_equal(back, rgb, sizeof rgb);
+	n = read_all(name, bytes, sizeof bytes);
+	assert_non_null(memmem(bytes, n, "sRGB", 4));
+}
+
+static void ppm_has_the_same_pixels(void **state)
+{
+	char bytes[256];
+	size_t n;
+
+	(void)state;
+	assert_int_equal(psr_picture_write_color(&picture, in_folder("a.PPM"), NULL), PSR_OK);
+	n = read_all(name, bytes, sizeof bytes);
+	assert_int_equal(n, 11 + sizeof rgb);
+	assert_memory_equal(bytes, "P6\n5 3\n255\n", 11);
+	assert_memory_equal(bytes + 11, rgb, sizeof rgb);
+}
+
+static void pfm_is_bottom_up_little_endian_with_infinity(void **state)
+{
+	char bytes[256];
+	size_t n;
+
+	(void)state;
+	assert_int_equal(psr_picture_write_depth(&picture, in_folder("a.pfm"), NULL), PSR_OK);
+	n = read_all(name, bytes, sizeof bytes);
+	assert_int_equal(n, 12 + sizeof depth);
+	assert_memory_equal(bytes, "Pf\n5 3\n-1.0\n", 12);
+	for (int y = 0; y < H; y++) {
+		for (int x = 0; x < W; x++) {
+			const uint8_t *p = (const uint8_t *)bytes + 12 + 4 * (W * (H - 1 - y) + x);
+			uint32_t bits = p[0] | p[1] << 8 | p[2] << 16 | (uint32_t)p[3] << 24;
+
+			assert_memory_equal(&bits, &depth[W * y + x], 4);
+			if (isinf(depth[W * y + x]))
+				assert_int_equal(bits, 0x7f800000);
+		}
+	}
+}
+
+static void unfit_endings_are_refused(void **state)
+{
+	struct psr_error err;
+
+	(void)state;
+	assert_int_equal(psr_picture_check_color("picture", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_color("a.b/picture", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_color(".png", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_color("a.pfm", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_depth("a.png", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_depth("a.pfm", &err), PSR_OK);
+	assert_int_equal(psr_picture_check_color("a.png", &err), PSR_OK);
+}
+
+static void missing_module_is_a_clear_error(void **state)
+{
+	struct psr_error err;
+
+	(void)state;
+	setenv("PSR_IMAGE_MODULE", "/nowhere/module.so", 1);
+	assert_int_equal(psr_picture_check_color("a.webp", &err), PSR_ERR_UNSUPPORTED);
+	assert_non_null(strstr(err.text, "/nowhere/module.so"));
+	assert_int_equal(psr_picture_write_depth(&picture, in_folder("a.exr"), &err), PSR_ERR_UNSUPPORTED);
+	assert_int_equal(access(name, F_OK), -1);
+	unsetenv("PSR_IMAGE_MODULE");
+}
+
+/* The module of this build, where this configuration has one. */
+static int has_module(void)
+{
+	const char *build = getenv("BUILD");
+	char path[600];
+
+	snprintf(path, sizeof path, "%s/lib/psr-image-oiio.so", build != NULL ? build : ".");
+	return access(path, R_OK) == 0 && setenv("PSR_IMAGE_MODULE", path, 1) == 0;
+}
+
+static void module_writes_what_libpng_does_not(void **state)
+{
+	struct psr_error err;
+	char bytes[4096];
+	size_t n;
+
+	(void)state;
+	if (!has_module())
+		skip();
+	assert_int_equal(psr_picture_write_depth(&picture, in_folder("a.exr"), &err), PSR_OK);
+	n = read_all(name, bytes, sizeof bytes);
+	assert_memory_equal(bytes, "\x76\x2f\x31\x01", 4);
+	/* its one channel: name Z, pixel type 2 (float) */
+	assert_non_null(memmem(bytes, n, "channels\0chlist\0\x13\0\0\0Z\0\2\0\0\0", 26));
+	assert_int_equal(psr_picture_write_color(&picture, in_folder("a.jpg"), &err), PSR_OK);
+	assert_true(read_all(name, bytes, sizeof bytes) > 2);
+	assert_memory_equal(bytes, "\xff\xd8", 2);
+	if (access("/dev/full", W_OK) == 0) { /* libjpeg left to itself would end the process */
+		assert_int_equal(symlink("/dev/full", in_folder("full.jpg")), 0);
+		assert_int_equal(psr_picture_write_color(&picture, name, &err), PSR_ERR_IO);
+		assert_non_null(strstr(err.text, "No space left"));
+	}
+	assert_int_equal(psr_picture_write_depth(&picture, in_folder("b.jpg"), &err), PSR_ERR_UNSUPPORTED);
+	assert_int_equal(access(name, F_OK), -1);
+	assert_int_equal(psr_picture_write_color(&picture, in_folder("b.nonsense"), &err), PSR_ERR_UNSUPPORTED);
+	assert_non_null(strstr(err.text, ".nonsense"));
+	unsetenv("PSR_IMAGE_MODULE");
+}
+
+static void missing_folder_is_not_found(void **state)
+{
+	struct psr_error err;
+
+	(void)state;
+	assert_int_equal(psr_picture_write_color(&picture, in_folder("no/a.png"), &err), PSR_ERR_NOT_FOUND);
+	assert_non_null(strstr(err.text, "no/a.png"));
+}
+
+static void full_device_is_an_error(void **state)
+{
+	static const char *const endings[] = { "full.png", "full.ppm" };
+	struct psr_error err;
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		if (access("/dev/full", W_OK) != 0)
+			skip();
+		assert_int_equal(symlink("/dev/full", in_folder(endings[i])), 0);
+		assert_int_equal(psr_picture_write_color(&picture, name, &err), PSR_ERR_IO);
+		assert_non_null(strstr(err.text, "No space left"));
+	}
+}
+
+static void full_disk_leaves_the_old_file(void **state)
+{
+	static uint8_t noise[3 * 64 * 64];
+	const struct psr_picture large = { 64, 64, noise, NULL };
+	struct rlimit old, small;
+	struct psr_error err;
+	char text[16];
+	int n, before, code[2];
+
+	(void)state;
+	for (size_t i = 0; i < sizeof noise; i++)
+		noise[i] = (uint8_t)(i * i * 2654435761u >> 13);
+	signal(SIGXFSZ, SIG_IGN);
+	getrlimit(RLIMIT_FSIZE, &old);
+	for (int i = 0; i < 2; i++) {
+		write_text(in_folder(i == 0 ? "old.png" : "old.ppm"), "old");
+		before = n_files();
+		small = old;
+		small.rlim_cur = 4096;
+		setrlimit(RLIMIT_FSIZE, &small);
+		code[i] = psr_picture_write_color(&large, name, &err);
+		setrlimit(RLIMIT_FSIZE, &old);
+		assert_int_equal(code[i], PSR_ERR_IO);
+		n = (int)read_all(name, text, sizeof text);
+		assert_int_equal(n, 3);
+		assert_memory_equal(text, "old", 3);
+		assert_int_equal(n_files(), before);
+		assert_int_equal(psr_picture_write_color(&large, name, &err), PSR_OK);
+		assert_int_equal(n_files(), before);
+	}
+}
+
+static void link_to_a_file_stays_a_link(void **state)
+{
+	struct stat status;
+
+	(void)state;
+	write_text(in_folder("real.png"), "old");
+	assert_int_equal(symlink("real.png", in_folder("link.png")), 0);
+	assert_int_equal(psr_picture_write_color(&picture, name, NULL), PSR_OK);
+	assert_int_equal(lstat(name, &status), 0);
+	assert_true(S_ISLNK(status.st_mode));
+	assert_int_equal(stat(in_folder("real.png"), &status), 0);
+	assert_true(status.st_size > 3);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(png_has_the_same_pixels_and_says_srgb),
+		cmocka_unit_test(ppm_has_the_same_pixels),
+		cmocka_unit_test(pfm_is_bottom_up_little_endian_with_infinity),
+		cmocka_unit_test(unfit_endings_are_refused),
+		cmocka_unit_test(missing_module_is_a_clear_error),
+		cmocka_unit_test(module_writes_what_libpng_does_not),
+		cmocka_unit_test(missing_folder_is_not_found),
+		cmocka_unit_test(full_device_is_an_error),
+		cmocka_unit_test(full_disk_leaves_the_old_file),
+		cmocka_unit_test(link_to_a_file_stays_a_link),
+	};
+
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,429 @@
+/* The program psr itself ($BUILD/bin/psr), against a server of the test's own on a TCP port. */
+#define _GNU_SOURCE
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <cjson/cJSON.h>
+#include <fcntl.h>
+#include <math.h>
+#include <netinet/in.h>
+#include <png.h>
+#include <pthread.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <xxhash.h>
+#include "psr/proto.h"
+
+#define MAX_SIDE 64
+
+static char folder[96], program[512], address[64], out[1 << 16], err[1 << 16];
+static int listener;
+
+/* ---- the server: models "cube" (sound), "broken" (frames fail), "flaky" (frames fail after
+ * some), "damaged" (wrong hashes), "slow" (built first) ---- */
+
+struct session {
+	int fd;
+	char model[PSR_WIRE_MAX_NAME + 1];
+	struct psr_framer framer;
+	uint8_t in[2 * PSR_WIRE_MAX_MESSAGE], out[2 * PSR_WIRE_MAX_MESSAGE];
+	struct psr_msg_scene scene;
+	struct psr_buf buf;
+};
+
+static uint8_t color_at(uint32_t x, uint32_t y, int c)
+{
+	return (uint8_t)(x * 3 + y * 5 + (uint32_t)c * 70);
+}
+
+static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame *asked)
+{
+	static const char *const text = "the scene is on fire";
+	uint32_t w = asked->width, h = asked->height, n = w * h;
+	struct psr_msg_frame_begin begin = { .width = w,
+		                                 .height = h,
+		                                 .planes = asked->planes,
+		                                 .color_codec = asked->color_codec,
+		                                 .color_quality = asked->color_quality,
+		                                 .depth_format = asked->depth_format,
+		                                 .depth_codec = asked->depth_codec,
+		                                 .settings = { 1, 1 },
+		                                 .camera = asked->camera };
+	struct psr_msg_frame_end end = { .is_final = 1,
+		                             .planes = asked->planes,
+		                             .error_px = 1.5,
+		                             .n_entries = 2,
+		                             .entry = { { PSR_WIRE_REPORT_WARP, 2000000, 77 },
+		                                        { PSR_WIRE_REPORT_TOTAL, 3000000, 2 } } };
+	uint8_t rgb[3 * MAX_SIDE * MAX_SIDE];
+	float depth[MAX_SIDE * MAX_SIDE];
+	struct psr_msg_rect rect = { 0, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, 3 * n, 0, 3 * n, rgb };
+
+	if (strcmp(s->model, "broken") == 0 || (strcmp(s->model, "flaky") == 0 && id > 10) || w > MAX_SIDE
+	    || h > MAX_SIDE) {
+		struct psr_msg_error msg = { .code = w > MAX_SIDE ? PSR_WIRE_LIMIT : PSR_WIRE_INTERNAL };
+
+		strcpy(msg.text, text);
+		psr_msg_error_encode(&s->buf, id, 0, &msg, NULL);
+		return;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		depth[i] = i % 5 == 0 ? INFINITY : 1 + (float)i;
+		for (int c = 0; c < 3; c++)
+			rgb[3 * i + (uint32_t)c] = color_at(i % w, i / w, c);
+	}
+	end.hash[0] = XXH64(rgb, 3 * n, 0) ^ (strcmp(s->model, "damaged") == 0);
+	end.hash[1] = asked->planes & 2 ? XXH64(depth, 4 * n, 0) : 0;
+	psr_msg_frame_begin_encode(&s->buf, id, 0, &begin, NULL);
+	psr_msg_rect_encode(&s->buf, id, 0, &rect, NULL);
+	rect =
+		(struct psr_msg_rect){ 1, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, 4 * n, 0, 4 * n, (uint8_t *)depth };
+	if (asked->planes & 2)
+		psr_msg_rect_encode(&s->buf, id, 0, &rect, NULL);
+	psr_msg_frame_end_encode(&s->buf, id, 0, &end, NULL);
+}
+
+static void put_list(struct session *s, uint32_t id)
+{
+	const struct psr_msg_list_entry entries[] = { { PSR_ENTRY_LOADED, 2500000, { 0xab }, "cube" },
+		                                          { PSR_ENTRY_SOURCE, 10, { 0 }, "slow" } };
+
+	for (int i = 0; i < 2; i++)
+		psr_msg_list_entry_encode(&s->buf, id, &entries[i], NULL);
+	psr_msg_list_end_encode(&s->buf, id, &(struct psr_msg_list_end){ 2 }, NULL);
+}
+
+static void put_opened(struct session *s, uint32_t id)
+{
+	static const struct psr_msg_opened opened = { .handle = 1,
+		                                          .representations = 2,
+		                                          .box_min = { -1, -1, -1 },
+		                                          .box_max = { 1, 1, 1 },
+		                                          .scale = 1,
+		                                          .spacing = 0.125,
+		                                          .resolution = 256,
+		                                          .n_levels = 1,
+		                                          .n_samples = 1000 };
+	struct psr_msg_error missing = { PSR_WIRE_NOT_FOUND, "no model of this name" };
+
+	if (strcmp(s->model, "nothing") == 0) {
+		psr_msg_error_encode(&s->buf, id, 0, &missing, NULL);
+		return;
+	}
+	if (strcmp(s->model, "slow") == 0)
+		for (uint64_t i = 0; i <= 4; i++)
+			psr_msg_progress_encode(&s->buf, id, &(struct psr_msg_progress){ PSR_PROGRESS_SAMPLE, i, 4 }, NULL);
+	psr_msg_opened_encode(&s->buf, id, &opened, NULL);
+}
+
+/* 0: the client is gone. */
+static int answer(struct session *s, const struct psr_message *message)
+{
+	const struct psr_msg_welcome welcome = { .minor = PSR_PROTO_MINOR,
+		                                     .max_message = 65536,
+		                                     .max_side = 64,
+		                                     .max_pixels = 4096,
+		                                     .max_instances = 1,
+		                                     .max_lights = 4,
+		                                     .max_scenes = 1,
+		                                     .max_open = 8,
+		                                     .max_models = 4,
+		                                     .server = "test 1" };
+	struct psr_msg_frame frame;
+	struct psr_msg_open open;
+
+	switch (message->type) {
+	case PSR_MSG_HELLO:
+		psr_msg_welcome_encode(&s->buf, &welcome, NULL);
+		psr_framer_accept(&s->framer, s->in, sizeof s->in);
+		break;
+	case PSR_MSG_LIST:
+		put_list(s, message->id);
+		break;
+	case PSR_MSG_OPEN:
+		if (psr_msg_open_decode(&open, message->payload, message->n, NULL) != PSR_OK)
+			return 0;
+		memcpy(s->model, open.name, sizeof s->model);
+		put_opened(s, message->id);
+		break;
+	case PSR_MSG_SCENE:
+		if (psr_msg_scene_decode(&s->scene, message->payload, message->n, NULL) != PSR_OK)
+			return 0;
+		break;
+	case PSR_MSG_FRAME:
+		if (psr_msg_frame_decode(&frame, message->payload, message->n, NULL) != PSR_OK)
+			return 0;
+		put_frame(s, message->id, &frame);
+		break;
+	default:
+		return 0;
+	}
+	return send(s->fd, s->buf.data, s->buf.size, MSG_NOSIGNAL) == (ssize_t)s->buf.size;
+}
+
+static void *serve(void *userdata)
+{
+	struct session *s = userdata;
+
+	s->buf.data = s->out;
+	s->buf.capacity = sizeof s->out;
+	psr_framer_init(&s->framer, PSR_CLIENT, s->in, sizeof s->in);
+	for (;;) {
+		struct psr_message message;
+		int got = psr_framer_next(&s->framer, &message, NULL);
+		uint8_t *space;
+		size_t room;
+		ssize_t n;
+
+		s->buf.size = 0;
+		if (got < 0 || (got > 0 && !answer(s, &message)))
+			break;
+		if (got > 0)
+			continue;
+		space = psr_framer_space(&s->framer, &room);
+		n = recv(s->fd, space, room, 0);
+		if (n <= 0)
+			break;
+		psr_framer_filled(&s->framer, (size_t)n);
+	}
+	close(s->fd);
+	free(s);
+	return NULL;
+}
+
+static void *accept_all(void *userdata)
+{
+	(void)userdata;
+	for (;;) {
+		int fd = accept4(listener, NULL, NULL, SOCK_CLOEXEC);
+		struct session *s = fd >= 0 ? calloc(1, sizeof *s) : NULL;
+		pthread_t thread;
+
+		if (s == NULL)
+			return NULL;
+		s->fd = fd;
+		if (pthread_create(&thread, NULL, serve, s) == 0)
+			pthread_detach(thread);
+	}
+}
+
+/* ---- running psr ---- */
+
+static void read_back(const char *leaf, char *to, size_t size)
+{
+	char path[160];
+	FILE *file;
+
+	snprintf(path, sizeof path, "%s/%s", folder, leaf);
+	file = fopen(path, "rb");
+	assert_non_null(file);
+	to[fread(to, 1, size - 1, file)] = '\0';
+	fclose(file);
+}
+
+/* Runs `psr ARGS` through the shell in the folder; its exit status. `out` and `err` get what it printed. */
+static int psr(const char *args)
+{
+	char command[1024];
+	int status;
+
+	snprintf(command, sizeof command, "cd '%s' && PSR_SERVER=%s timeout 60 '%s' %s >out 2>err", folder, address,
+	         program, args);
+	status = system(command);
+	read_back("out", out, sizeof out);
+	read_back("err", err, sizeof err);
+	assert_true(WIFEXITED(status));
+	return WEXITSTATUS(status);
+}
+
+static int set_up(void **state)
+{
+	struct sockaddr_in at = { .sin_family = AF_INET, .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
+	const char *root = getenv("TMPDIR"), *build = getenv("BUILD");
+	socklen_t size = sizeof at;
+	pthread_t thread;
+
+	(void)state;
+	signal(SIGPIPE, SIG_IGN);
+	snprintf(program, sizeof program, "%s/bin/psr", build != NULL ? build : "build/release");
+	snprintf(folder, sizeof folder, "%s/psr-program-XXXXXX", root != NULL && strlen(root) < 60 ? root : "/tmp");
+	listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	if (mkdtemp(folder) == NULL || bind(listener, (struct sockaddr *)&at, sizeof at) != 0 || listen(listener, 16) != 0
+	    || getsockname(listener, (struct sockaddr *)&at, &size) != 0)
+		return 1;
+	snprintf(address, sizeof address, "127.0.0.1:%d", ntohs(at.sin_port));
+	if (pthread_create(&thread, NULL, accept_all, NULL) != 0)
+		return 1;
+	pthread_detach(thread);
+	return access(program, X_OK);
+}
+
+static int tear_down(void **state)
+{
+	char command[160];
+
+	(void)state;
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command);
+}
+
+static void list_prints_a_table_and_json(void **state)
+{
+	cJSON *list;
+
+	(void)state;
+	assert_int_equal(psr("list"), 0);
+	assert_non_null(strstr(out, "name  state           MB\n"));
+	assert_non_null(strstr(out, "cube  loaded        2.50\n"));
+	assert_string_equal(err, "");
+	assert_int_equal(psr("list --json"), 0);
+	list = cJSON_Parse(out);
+	assert_int_equal(cJSON_GetArraySize(list), 2);
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 1), "state")->valuestring, "source");
+	assert_true(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 0), "bytes")->valuedouble == 2500000);
+	cJSON_Delete(list);
+}
+
+static void shot_writes_what_was_asked_for_and_prints_nothing(void **state)
+{
+	png_image image = { .version = PNG_IMAGE_VERSION };
+	uint8_t rgb[3 * 20 * 10];
+	char path[160];
+
+	(void)state;
+	assert_int_equal(psr("shot --model slow --size 20x10 -o a.png --depth a.pfm --report a.json"), 0);
+	assert_string_equal(out, "");
+	assert_string_equal(err, "");
+	snprintf(path, sizeof path, "%s/a.png", folder);
+	assert_true(png_image_begin_read_from_file(&image, path));
+	assert_true(image.width == 20 && image.height == 10);
+	image.format = PNG_FORMAT_RGB;
+	assert_true(png_image_finish_read(&image, NULL, rgb, 0, NULL));
+	for (uint32_t i = 0; i < sizeof rgb; i++)
+		assert_int_equal(rgb[i], color_at(i / 3 % 20, i / 60, (int)(i % 3)));
+}
+
+static void report_has_the_numbers_of_the_frame(void **state)
+{
+	static char text[1 << 16];
+	cJSON *report, *stage;
+
+	(void)state;
+	assert_int_equal(psr("shot --model cube --size 20x10 --ortho 3 --eye 0,0,9 --depth a.pfm --report r.json --hash"),
+	                 0);
+	read_back("r.json", text, sizeof text);
+	report = cJSON_Parse(text);
+	assert_non_null(report);
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(report, "model"), "name")->valuestring, "cube");
+	assert_true(cJSON_GetObjectItem(cJSON_GetObjectItem(report, "model"), "spacing")->valuedouble == 0.125);
+	assert_true(cJSON_GetArrayItem(cJSON_GetObjectItem(report, "size"), 0)->valueint == 20);
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(report, "camera"), "kind")->valuestring, "orthographi"
+	                                                                                                     "c");
+	assert_true(cJSON_GetObjectItem(cJSON_GetObjectItem(report, "camera"), "height")->valuedouble == 3);
+	assert_true(cJSON_GetObjectItem(report, "error_px")->valuedouble == 1.5);
+	stage = cJSON_GetObjectItem(cJSON_GetObjectItem(report, "stages"), "warp");
+	assert_true(cJSON_GetObjectItem(stage, "ms")->valuedouble == 2
+	            && cJSON_GetObjectItem(stage, "count")->valueint == 77);
+	assert_true(cJSON_GetObjectItem(cJSON_GetObjectItem(report, "ms"), "server")->valuedouble == 3);
+	assert_int_equal(cJSON_GetArraySize(cJSON_GetObjectItem(report, "checked")), 2);
+	assert_true(strncmp(out, "color ", 6) == 0 && strlen(out) == 2 * 23 && strncmp(out + 23, "depth ", 6) == 0);
+	assert_memory_equal(out + 6, cJSON_GetObjectItem(cJSON_GetObjectItem(report, "hashes"), "color")->valuestring, 16);
+	cJSON_Delete(report);
+}
+
+static void failures_have_their_exit_status_and_leave_no_file(void **state)
+{
+	static const struct {
+		const char *args;
+		int status;
+		const char *says;
+	} cases[] = {
+		{ "", 2, "list" },
+		{ "paint", 2, "paint" },
+		{ "shot -o x.png", 2, "--model" },
+		{ "shot --model cube", 2, "nothing was asked for" },
+		{ "shot --model cube -o x.png --size 0x10", 2, "0x10" },
+		{ "shot --model cube -o x.png --size 100000x100000", 5, "100000x100000" },
+		{ "shot --model cube -o x.png --eye nan,0,0", 2, "--eye" },
+		{ "shot --model cube -o x.png --eye 0,0,0", 2, "at the target" },
+		{ "shot --model cube -o x.png --light sun", 2, "sun" },
+		{ "shot --model cube -o x.png --codec jpeg:200", 2, "jpeg:200" },
+		{ "shot --model cube -o x.png --fov 30 --ortho 2", 2, "exclude" },
+		{ "shot --model cube -o x --size 8x8", 2, "ending" },
+		{ "shot --model cube -o no/x.png --size 8x8", 3, "no/x.png" },
+		{ "shot --model cube -o x.png --light dir:0,-1,0,shadow", 4, "no shadows" },
+		{ "shot --model nothing -o x.png", 3, "no model of this name" },
+		{ "shot --model broken -o x.png --size 8x8", 7, "on fire" },
+		{ "shot --model cube -o x.png --size 65x8", 5, "on fire" },
+		{ "shot --model damaged -o x.png --size 8x8", 4, "damaged" },
+		{ "shot --server 127.0.0.1:1 --model cube -o x.png", 6, "127.0.0.1:1" },
+		{ "list --server nowhere", 2, "nowhere" },
+	};
+	char path[160];
+
+	(void)state;
+	snprintf(path, sizeof path, "%s/x.png", folder);
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+		int status = psr(cases[i].args);
+
+		if (status != cases[i].status || strstr(err, cases[i].says) == NULL || out[0] != '\0')
+			fail_msg("psr %s: status %d, '%s' '%s'", cases[i].args, status, out, err);
+		assert_true(strchr(err, '\n') == err + strlen(err) - 1); /* one line */
+		assert_int_equal(access(path, F_OK), -1);
+	}
+}
+
+static void bench_counts_frames_and_fails_if_one_failed(void **state)
+{
+	cJSON *json;
+
+	(void)state;
+	assert_int_equal(psr("bench --model cube --clients 3 --inflight 2 --seconds 1 --size 16x16 --codec raw --json"), 0);
+	json = cJSON_Parse(out);
+	assert_non_null(json);
+	assert_true(cJSON_GetObjectItem(json, "frames")->valuedouble > 10);
+	assert_true(cJSON_GetObjectItem(json, "frames_per_s")->valuedouble
+	            == cJSON_GetObjectItem(json, "frames")->valuedouble);
+	assert_true(cJSON_GetObjectItem(json, "failed")->valuedouble == 0);
+	assert_true(cJSON_GetObjectItem(cJSON_GetObjectItem(json, "latency_ms"), "p50")->valuedouble
+	            <= cJSON_GetObjectItem(cJSON_GetObjectItem(json, "latency_ms"), "max")->valuedouble);
+	cJSON_Delete(json);
+	assert_int_equal(psr("bench --model broken --clients 2 --seconds 1 --size 16x16 --codec raw"), 7);
+	assert_int_equal(psr("bench --model flaky --clients 2 --seconds 1 --size 16x16 --codec raw"), 1);
+	assert_non_null(strstr(err, "on fire"));
+	assert_int_equal(psr("bench --model cube --clients 2 --inflight 9 --seconds 1"), 5);
+}
+
+static void help_and_version_work_without_a_server(void **state)
+{
+	static const char *const all[] = { "--help", "list --help", "shot --help", "bench --help", "--version" };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
+		assert_int_equal(psr(all[i]), 0);
+		assert_string_equal(err, "");
+		assert_true(strlen(out) > 5);
+	}
+	assert_true(strncmp(out, "psr 0.", 6) == 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(list_prints_a_table_and_json),
+		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
+		cmocka_unit_test(report_has_the_numbers_of_the_frame),
+		cmocka_unit_test(failures_have_their_exit_status_and_leave_no_file),
+		cmocka_unit_test(bench_counts_frames_and_fails_if_one_failed),
+		cmocka_unit_test(help_and_version_work_without_a_server),
+	};
+
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}

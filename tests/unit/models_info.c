@@ -1,0 +1,147 @@
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <cjson/cJSON.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "model_fixture.h"
+#include "models/commands.h"
+
+struct files {
+	char folder[32], model[64], output[64];
+};
+
+static int write_model(void **state)
+{
+	static struct files files;
+	struct fixture *fixture = malloc(sizeof *fixture);
+	struct psr_model *model = NULL;
+	int code;
+
+	strcpy(files.folder, "/tmp/psr-info-XXXXXX");
+	if (fixture == NULL || mkdtemp(files.folder) == NULL)
+		return 1;
+	snprintf(files.model, sizeof files.model, "%s/small.thing.psr", files.folder);
+	snprintf(files.output, sizeof files.output, "%s/output", files.folder);
+	fixture_init(fixture, 1);
+	code = psr_model_create(&model, &fixture->info, &fixture->blocks, NULL);
+	if (code == PSR_OK)
+		code = psr_model_write(model, files.model, NULL);
+	psr_model_unref(model);
+	free(fixture);
+	*state = &files;
+	return code != PSR_OK;
+}
+
+static int remove_files(void **state)
+{
+	struct files *files = *state;
+
+	unlink(files->model);
+	unlink(files->output);
+	return rmdir(files->folder);
+}
+
+/* Runs `info` with standard output in a file and returns what it printed, to be freed. */
+static char *run_info(const struct files *files, const char *path, const char *option, int *status)
+{
+	char *argv[] = { (char *)"info", (char *)path, (char *)option, NULL };
+	char *text = calloc(1, 8192);
+	FILE *file;
+	int saved;
+
+	assert_non_null(text);
+	fflush(stdout);
+	saved = dup(STDOUT_FILENO);
+	file = fopen(files->output, "w+b");
+	assert_non_null(file);
+	assert_true(dup2(fileno(file), STDOUT_FILENO) >= 0);
+	*status = cmd_info(option == NULL ? 2 : 3, argv);
+	fflush(stdout);
+	assert_true(dup2(saved, STDOUT_FILENO) >= 0);
+	close(saved);
+	rewind(file);
+	assert_true(fread(text, 1, 8191, file) < 8191);
+	fclose(file);
+	return text;
+}
+
+static double number(const cJSON *object, const char *name)
+{
+	const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
+
+	assert_true(cJSON_IsNumber(item));
+	return item->valuedouble;
+}
+
+static void json_tells_what_the_model_holds(void **state)
+{
+	const struct files *files = *state;
+	int status;
+	char *text = run_info(files, files->model, "--json", &status);
+	cJSON *root = cJSON_Parse(text);
+	const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks");
+	const cJSON *levels = cJSON_GetObjectItemCaseSensitive(blocks, "level_blocks");
+
+	assert_int_equal(status, 0);
+	assert_non_null(root);
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(root, "name")->valuestring, "small.thing");
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(root, "builder")->valuestring, "test 1.0");
+	assert_int_equal(strlen(cJSON_GetObjectItemCaseSensitive(root, "content_id")->valuestring), 32);
+	assert_true(number(root, "resolution") == 256 && number(root, "spacing") == 0.01 && number(root, "scale") == 12.5);
+	assert_true(cJSON_GetArrayItem(cJSON_GetObjectItemCaseSensitive(root, "box_max"), 2)->valuedouble == 6);
+	assert_true(number(blocks, "samples") == FIXTURE_SAMPLES && number(blocks, "blocks") == FIXTURE_BLOCKS);
+	assert_true(number(blocks, "projections") == 2 && number(blocks, "clusters") == 3 && number(blocks, "levels") == 2);
+	assert_true(number(blocks, "samples_per_block") == (double)FIXTURE_SAMPLES / FIXTURE_BLOCKS);
+	assert_true(number(blocks, "bytes_per_sample") == number(root, "bytes") / FIXTURE_SAMPLES);
+	assert_int_equal(cJSON_GetArraySize(levels), 2);
+	assert_int_equal(cJSON_GetArrayItem(levels, 0)->valueint, 5);
+	assert_int_equal(cJSON_GetArrayItem(levels, 1)->valueint, 1);
+	cJSON_Delete(root);
+	free(text);
+}
+
+static void text_names_samples_and_content_id(void **state)
+{
+	const struct files *files = *state;
+	int status;
+	char *text = run_info(files, files->model, NULL, &status), *line;
+	unsigned samples = 0;
+
+	assert_int_equal(status, 0);
+	line = strstr(text, "\nsamples ");
+	assert_non_null(line);
+	assert_int_equal(sscanf(line, " samples %u", &samples), 1);
+	assert_int_equal(samples, FIXTURE_SAMPLES);
+	assert_non_null(strstr(text, "\ncontent id "));
+	free(text);
+}
+
+static void broken_and_missing_files_have_their_exit_codes(void **state)
+{
+	const struct files *files = *state;
+	int status;
+
+	assert_int_equal(truncate(files->model, 100), 0);
+	free(run_info(files, files->model, "--json", &status));
+	assert_int_equal(status, 4);
+	free(run_info(files, "/tmp/no/such/file.psr", NULL, &status));
+	assert_int_equal(status, 3);
+	free(run_info(files, files->model, "--jsn", &status));
+	assert_int_equal(status, 2);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(json_tells_what_the_model_holds),
+		cmocka_unit_test(text_names_samples_and_content_id),
+		cmocka_unit_test(broken_and_missing_files_have_their_exit_codes),
+	};
+
+	return cmocka_run_group_tests(tests, write_model, remove_files);
+}
