@@ -1,8 +1,7 @@
 /* A GLB whose BIN chunk holds a unit square in the plane z = 0, counter-clockwise seen from +z, in several encodings:
  * accessors 0 POSITION, 1 indices of a list, 2 NORMAL (+z), 3 TEXCOORD, 4 COLOR (normalized bytes), 5 indices of a
- * strip,
- * 6 indices of a fan, 7 POSITION in normalized shorts, 8 sparse POSITION over 0, 9 TEXCOORD of another set; image 0 of
- * the JSON may be buffer view 9, a BMP of 4 x 2. */
+ * strip, 6 indices of a fan, 7 POSITION in normalized shorts, 8 sparse POSITION over 0, 9 TEXCOORD of another set;
+ * image 0 of the JSON may be buffer view 9, a BMP of 4 x 2. */
 #ifndef TESTS_IMPORT_GLTF_H
 #define TESTS_IMPORT_GLTF_H
 

@@ -1,0 +1,140 @@
+#include <cmath>
+#include "gltf.h"
+
+namespace gltf {
+
+namespace {
+
+transform multiply(const transform &a, const transform &b)
+{
+	transform out;
+
+	for (int col = 0; col < 4; col++)
+		for (int row = 0; row < 4; row++) {
+			double sum = 0.0;
+
+			for (int k = 0; k < 4; k++)
+				sum += a.m[4 * k + row] * b.m[4 * col + k];
+			out.m[4 * col + row] = sum;
+		}
+	return out;
+}
+
+void check_length(const std::vector<double> &v, size_t n, const char *what, int node)
+{
+	if (!v.empty() && v.size() != n)
+		refuse(PSR_ERR_FORMAT, "nodes[%d]: %s has %zu numbers, not %zu", node, what, v.size(), n);
+}
+
+transform local_transform(const tinygltf::Node &node, int index)
+{
+	double s[3] = { 1, 1, 1 }, q[4] = { 0, 0, 0, 1 }, t[3] = { 0, 0, 0 }, norm = 0.0;
+	transform out;
+
+	check_length(node.matrix, 16, "matrix", index);
+	check_length(node.scale, 3, "scale", index);
+	check_length(node.rotation, 4, "rotation", index);
+	check_length(node.translation, 3, "translation", index);
+	if (!node.matrix.empty()) {
+		for (size_t i = 0; i < 16; i++)
+			out.m[i] = node.matrix[i];
+		if (out.m[3] != 0.0 || out.m[7] != 0.0 || out.m[11] != 0.0 || out.m[15] != 1.0)
+			refuse(PSR_ERR_FORMAT, "nodes[%d]: the last row of its matrix is not 0 0 0 1", index);
+		return out;
+	}
+	for (size_t i = 0; i < node.scale.size(); i++)
+		s[i] = node.scale[i];
+	for (size_t i = 0; i < node.translation.size(); i++)
+		t[i] = node.translation[i];
+	for (size_t i = 0; i < node.rotation.size(); i++)
+		q[i] = node.rotation[i];
+	for (double x : q)
+		norm += x * x;
+	if (!(norm > 0.0) || !std::isfinite(norm))
+		refuse(PSR_ERR_FORMAT, "nodes[%d]: its rotation is no quaternion of positive length", index);
+
+	double k = 2.0 / norm, x = q[0], y = q[1], z = q[2], w = q[3];
+	const double r[9] = { 1 - k * (y * y + z * z), k * (x * y + z * w), k * (x * z - y * w),
+		              k * (x * y - z * w), 1 - k * (x * x + z * z), k * (y * z + x * w),
+		              k * (x * z + y * w), k * (y * z - x * w), 1 - k * (x * x + y * y) };
+
+	for (int col = 0; col < 3; col++) {
+		for (int row = 0; row < 3; row++)
+			out.m[4 * col + row] = r[3 * col + row] * s[col];
+		out.m[12 + col] = t[col];
+	}
+	return out;
+}
+
+std::vector<int> root_nodes(const tinygltf::Model &model)
+{
+	std::vector<char> is_child(model.nodes.size(), 0);
+	std::vector<int> roots;
+	int scene = model.defaultScene;
+
+	if (scene >= 0 && (size_t)scene >= model.scenes.size())
+		refuse(PSR_ERR_FORMAT, "scene %d does not exist, there are %zu", scene, model.scenes.size());
+	if (!model.scenes.empty())
+		return model.scenes[(size_t)(scene < 0 ? 0 : scene)].nodes;
+	for (const tinygltf::Node &node : model.nodes)
+		for (int child : node.children)
+			if (child >= 0 && (size_t)child < is_child.size())
+				is_child[(size_t)child] = 1;
+	for (size_t i = 0; i < is_child.size(); i++)
+		if (!is_child[i])
+			roots.push_back((int)i);
+	if (roots.empty() && !model.nodes.empty())
+		refuse(PSR_ERR_FORMAT, "every node is the child of another: the nodes form a cycle");
+	return roots;
+}
+
+} // namespace
+
+/* Nodes form trees: each is reached once, so the walk ends, and its cost is bounded by their number. */
+std::vector<placement> place_meshes(reader &r)
+{
+	struct open_node {
+		int node;
+		transform parent;
+	};
+	const tinygltf::Model &model = r.model;
+	std::vector<char> reached(model.nodes.size(), 0);
+	std::vector<placement> out;
+	std::vector<open_node> stack;
+
+	if (model.nodes.empty())
+		for (size_t i = 0; i < model.meshes.size(); i++)
+			out.push_back({ (int)i, transform() });
+	const std::vector<int> roots = root_nodes(model);
+
+	for (size_t i = roots.size(); i-- > 0;)
+		stack.push_back({ roots[i], transform() });
+	while (!stack.empty()) {
+		open_node at = stack.back();
+
+		stack.pop_back();
+		if (at.node < 0 || (size_t)at.node >= model.nodes.size())
+			refuse(PSR_ERR_FORMAT, "node %d does not exist, there are %zu", at.node, model.nodes.size());
+		if (reached[(size_t)at.node])
+			refuse(PSR_ERR_FORMAT, "nodes[%d] is reached twice: the nodes form a cycle, or it has two parents",
+			       at.node);
+		reached[(size_t)at.node] = 1;
+
+		const tinygltf::Node &node = model.nodes[(size_t)at.node];
+		transform world = multiply(at.parent, local_transform(node, at.node));
+
+		if (node.mesh >= 0) {
+			if ((size_t)node.mesh >= model.meshes.size())
+				refuse(PSR_ERR_FORMAT, "nodes[%d]: mesh %d does not exist, there are %zu", at.node, node.mesh,
+				       model.meshes.size());
+			out.push_back({ node.mesh, world });
+			if (node.skin >= 0)
+				import_mesh_warn(&r.im, "skins are not used: the mesh stands as it was modelled");
+		}
+		for (size_t i = node.children.size(); i-- > 0;)
+			stack.push_back({ node.children[i], world });
+	}
+	return out;
+}
+
+} // namespace gltf

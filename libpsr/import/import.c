@@ -1,0 +1,60 @@
+#define _GNU_SOURCE
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include "import.h"
+
+#define SNIFF_BYTES 65536
+
+static int ends_with(const char *path, const char *ending)
+{
+	size_t n = strlen(path), m = strlen(ending);
+
+	return n >= m && strcasecmp(path + n - m, ending) == 0;
+}
+
+/* A JSON object that speaks of an "asset" early on: glTF lets members stand in any order, but buffers come last in
+ * practice, and the file's ending decides where they do not. */
+static int is_gltf(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	size_t i = 0, n = n_bytes < SNIFF_BYTES ? n_bytes : SNIFF_BYTES;
+
+	if (n >= 4 && memcmp(bytes, "glTF", 4) == 0)
+		return 1;
+	if (ends_with(path, ".gltf") || ends_with(path, ".glb"))
+		return 1;
+	if (n >= 3 && memcmp(bytes, "\xef\xbb\xbf", 3) == 0)
+		i = 3;
+	while (i < n && strchr(" \t\r\n", bytes[i]) != NULL && bytes[i] != '\0')
+		i++;
+	return i < n && bytes[i] == '{' && memmem(bytes + i, n - i, "\"asset\"", 7) != NULL;
+}
+
+int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err)
+{
+	struct import_mesh im;
+	uint8_t *bytes = NULL;
+	size_t n_bytes = 0;
+	int rc;
+
+	if (out == NULL || path == NULL || path[0] == '\0')
+		return psr_fail(err, PSR_ERR_ARG, "no mesh file was named");
+	*out = NULL;
+	rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+	if (rc != PSR_OK)
+		return rc;
+	if (n_bytes == 0) {
+		free(bytes);
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the file is empty", path);
+	}
+	rc = import_mesh_init(&im, path, err);
+	if (rc == PSR_OK && is_gltf(path, bytes, n_bytes))
+		rc = import_gltf(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK)
+		rc = import_assimp(&im, bytes, n_bytes, err);
+	free(bytes);
+	if (rc == PSR_OK)
+		rc = import_mesh_finish(out, &im, err);
+	import_mesh_fini(&im);
+	return rc;
+}

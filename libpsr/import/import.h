@@ -1,0 +1,84 @@
+/* What the files of this folder share: the mesh under construction, files and paths, images, and the two readers.
+ *
+ * Everything that a source file names is looked up by import_path_inside: it lies, symbolic links resolved, in the
+ * folder of the source file or below it. Limits below bound what a small file can make the importer allocate. */
+#ifndef PSR_IMPORT_H
+#define PSR_IMPORT_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/mesh.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define IMPORT_MAX_FILE 0xffffffffull         /* bytes of one file; a .glb cannot say more */
+#define IMPORT_MAX_VERTICES (UINT64_C(1) << 27)
+#define IMPORT_MAX_TRIANGLES (UINT64_C(1) << 28)
+#define IMPORT_MAX_IMAGE_SIDE 16384
+#define IMPORT_MAX_PIXELS (UINT64_C(1) << 28) /* of all images of one mesh */
+#define IMPORT_MAX_MATERIALS 65536
+/* Normals made for files without: smooth where faces meet below 60 degrees. */
+#define IMPORT_CREASE_COSINE 0.5
+
+/* mesh.c: a mesh that grows. `mesh` is owned until import_mesh_finish hands it over. */
+struct import_mesh {
+	struct psr_mesh *mesh;
+	const char *path; /* of the source file, for error texts; the caller's */
+	uint64_t vertex_capacity, triangle_capacity;
+	uint64_t n_pixels;
+};
+
+int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err);
+void import_mesh_fini(struct import_mesh *im);
+
+/* Adds vertices (all 0, color 1,1,1,1) and triangles (all 0) at the end. uv and color exist from the first call that
+ * asks for them. LIMIT, MEMORY. */
+int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, int has_uv, int has_color,
+                     struct psr_error *err);
+
+/* Return the index of what was added, or a negative code. `name` is what error texts call the image. */
+int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err);
+int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, const char *name,
+                          struct psr_error *err);
+
+/* Adds to the mesh's warning, separated by "; "; the same text is said once, and what does not fit is left out. */
+void import_mesh_warn(struct import_mesh *im, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+/* Repairs and checks what psr/mesh.h promises (drops triangles, unit normals, no unused vertex), then hands the mesh
+ * to *out. FORMAT for an index out of range or a mesh without a triangle. */
+int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr_error *err);
+
+/* repair.c: the first half of import_mesh_finish; leaves n_triangles possibly 0. */
+int import_mesh_repair(struct import_mesh *im, struct psr_error *err);
+
+/* weld.c: *first_of[v] is the first vertex at v's position, or with everything the same if `whole`; the caller
+ * frees. */
+int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int whole, struct psr_error *err);
+int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves the others unused */
+
+/* normals.c: smooth vertex normals for the triangles whose vertices have none; each corner has to have its own
+ * vertex. */
+int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
+
+/* path.c. Strings and bytes that are returned belong to the caller (free). */
+int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err);
+int import_path_folder(char **folder, const char *path, struct psr_error *err); /* resolved, no slash at the end */
+
+/* The resolved path of `name`, which is absolute or relative to `folder`. NOT_FOUND; UNSUPPORTED when it leads
+ * outside. */
+int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
+
+/* image.cc: decodes by magic (TGA, which has none, by the ending of `name`). FORMAT, UNSUPPORTED, LIMIT, MEMORY. */
+int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
+                        uint64_t max_pixels, struct psr_error *err);
+
+/* The readers. `bytes` is the source file itself; both leave an unfinished mesh in im. */
+int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

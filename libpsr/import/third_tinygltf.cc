@@ -1,0 +1,4 @@
+#include <fstream>
+#include <sstream>
+#define TINYGLTF_IMPLEMENTATION
+#include "tinygltf.h"

@@ -1,0 +1,180 @@
+#include "commands.h"
+
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "psr/build.h"
+#include "psr/cli.h"
+#include "psr/mesh.h"
+#include "psr/model.h"
+
+#define PROGRAM "psr-model build"
+#define RADIANS (3.14159265358979323846 / 180)
+#define BAR_WIDTH 32
+
+struct progress {
+	int fd;     /* -1: none */
+	int has_bar;
+	int failed; /* the reader of fd is gone */
+};
+
+static void draw_bar(const char *stage, uint64_t done, uint64_t total)
+{
+	char bar[BAR_WIDTH + 1];
+	int n = (int)((double)done / (double)total * BAR_WIDTH);
+
+	memset(bar, ' ', BAR_WIDTH);
+	memset(bar, '#', (size_t)n);
+	bar[BAR_WIDTH] = '\0';
+	fprintf(stderr, "\r%-8s [%s] %3d %%", stage, bar, (int)((double)done / (double)total * 100));
+}
+
+static void clear_bar(void)
+{
+	fprintf(stderr, "\r%*s\r", BAR_WIDTH + 18, "");
+}
+
+static void on_progress(const char *stage, uint64_t done, uint64_t total, void *userdata)
+{
+	struct progress *progress = userdata;
+
+	if (progress->has_bar)
+		draw_bar(stage, done, total);
+	if (progress->fd >= 0 && !progress->failed)
+		progress->failed = dprintf(progress->fd, "%s %" PRIu64 " %" PRIu64 "\n", stage, done, total) < 0;
+}
+
+/* IN's name with .psr for its suffix; the caller frees it. */
+static char *default_output(const char *in)
+{
+	const char *slash = strrchr(in, '/'), *dot = strrchr(slash != NULL ? slash : in, '.');
+	size_t stem = dot != NULL && dot != in && dot[-1] != '/' ? (size_t)(dot - in) : strlen(in);
+	char *out = malloc(stem + sizeof ".psr");
+
+	if (out != NULL) {
+		memcpy(out, in, stem);
+		memcpy(out + stem, ".psr", sizeof ".psr");
+	}
+	return out;
+}
+
+static void warn(const struct psr_mesh *mesh)
+{
+	if (mesh->warning[0] != '\0')
+		fprintf(stderr, PROGRAM ": warning: %s\n", mesh->warning);
+	if (mesh->n_dropped_triangles != 0)
+		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " triangles without an area were left out\n",
+		        mesh->n_dropped_triangles);
+	if (mesh->n_dropped_primitives != 0)
+		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " points and lines were left out\n", mesh->n_dropped_primitives);
+}
+
+static void summarize(const char *out, const struct psr_mesh *mesh, const struct psr_model *model,
+                      const struct psr_build_report *report)
+{
+	const struct psr_blocks *blocks = psr_model_blocks(model);
+
+	printf("%s: %" PRIu64 " samples in %" PRIu32 " blocks, %.1f MB, from %" PRIu32
+	       " triangles in %.1f s (rays %.1f, selection %.1f)\n",
+	       out, blocks->n_samples, blocks->n_blocks, (double)psr_model_bytes(model) / 1e6, mesh->n_triangles,
+	       report->seconds_total, report->seconds_rays, report->seconds_select);
+}
+
+static int build(const char *in, const char *out, struct psr_build_options *options, int quiet, struct psr_error *err)
+{
+	struct progress *progress = options->userdata;
+	struct psr_mesh *mesh = NULL;
+	struct psr_model *model = NULL;
+	struct psr_build_report report;
+	int code;
+
+	on_progress("import", 0, 1, progress);
+	code = psr_mesh_import(&mesh, in, err);
+	if (code == PSR_OK)
+		code = psr_model_build(&model, mesh, options, &report, err);
+	if (code == PSR_OK) {
+		on_progress("write", 0, 1, progress);
+		code = psr_model_write(model, out, err);
+	}
+	if (progress->has_bar)
+		clear_bar();
+	if (code == PSR_OK && !quiet) {
+		warn(mesh);
+		summarize(out, mesh, model, &report);
+	}
+	psr_model_unref(model);
+	psr_mesh_destroy(mesh);
+	return code;
+}
+
+static int check_progress_fd(int64_t fd, struct psr_error *err)
+{
+	if (fd >= 0 && fcntl((int)fd, F_GETFD) < 0)
+		return psr_fail(err, PSR_ERR_ARG, "--progress-fd: descriptor %" PRId64 " is not open", fd);
+	return PSR_OK;
+}
+
+int cmd_build(int argc, char **argv)
+{
+	struct psr_build_options options;
+	struct progress progress = { .fd = -1 };
+	struct psr_error err;
+	const char *out = NULL;
+	char *made = NULL;
+	int quiet = 0, n_operands, code;
+	int64_t resolution, n_threads, fd = -1;
+	double tolerance;
+	const struct psr_opt opts[] = {
+		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &out, .arg = "OUT.psr",
+		  .help = "where the model goes; without it beside IN, with .psr for its suffix" },
+		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "RES",
+		  .help = "pixels across the model at which it is sampled without holes", .min = 8, .max = 8192 },
+		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
+		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
+		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
+		  .help = "threads to use; the result does not depend on it", .min = 1, .max = 256 },
+		{ .name = "progress-fd", .type = PSR_OPT_INT, .value = &fd, .arg = "FD",
+		  .help = "write lines \"STAGE DONE TOTAL\" to this descriptor; -1: nowhere", .min = -1, .max = 1 << 20 },
+		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet, .help = "print errors only" },
+		{ .name = NULL },
+	};
+	const struct psr_cli cli = {
+		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [options]",
+		.summary = "Samples a mesh (glTF, GLB, OBJ, STL, PLY, OFF and what else Assimp reads) into a .psr model.",
+		.opts = opts,
+		.footer = NULL,
+	};
+
+	psr_build_options_default(&options);
+	resolution = options.resolution;
+	tolerance = options.tolerance / RADIANS;
+	n_threads = options.n_threads;
+	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
+	if (code > 0)
+		return 0;
+	if (code == PSR_OK && n_operands != 1)
+		code = psr_fail(&err, PSR_ERR_ARG, "one input file is needed");
+	if (code == PSR_OK)
+		code = check_progress_fd(fd, &err);
+	if (code != PSR_OK)
+		return psr_cli_fail(PROGRAM, &err);
+	options.resolution = (uint32_t)resolution;
+	options.tolerance = tolerance * RADIANS;
+	options.n_threads = (int)n_threads;
+	options.on_progress = on_progress;
+	options.userdata = &progress;
+	progress.fd = (int)fd;
+	progress.has_bar = !quiet && isatty(STDERR_FILENO);
+	made = out == NULL ? default_output(argv[1]) : NULL;
+	if (out == NULL && made == NULL)
+		code = psr_fail(&err, PSR_ERR_MEMORY, "no memory for a file name");
+	else
+		code = build(argv[1], out != NULL ? out : made, &options, quiet, &err);
+	free(made);
+	if (code == PSR_OK && fflush(stdout) != 0)
+		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
+	return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
+}

@@ -1,0 +1,11 @@
+/* The subcommands of psr-model. Each gets argv with its own name in argv[0] and returns the exit status of the program
+ * (psr/error.h has the table); what it has to say about a failure stands on standard error by then. */
+#ifndef MODELS_COMMANDS_H
+#define MODELS_COMMANDS_H
+
+int cmd_build(int argc, char **argv);
+int cmd_info(int argc, char **argv);
+int cmd_make(int argc, char **argv);
+int cmd_accuracy(int argc, char **argv);
+
+#endif

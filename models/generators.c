@@ -1,0 +1,27 @@
+#include "generators.h"
+
+#include <stdio.h>
+#include <string.h>
+
+const struct generator generators[] = {
+	{ "teapot", "Newell's teapot: 32 bicubic Bezier patches, glazed", make_teapot },
+	{ "top", "a spinning top: large smooth surfaces, lacquered bands", make_top },
+	{ "pencil", "a sharpened hexagonal pencil: edges, scallops, a fine point", make_pencil },
+	{ "wheel", "a bicycle wheel: 36 thin spokes, tire, rim, hub", make_wheel },
+};
+const size_t n_generators = sizeof generators / sizeof generators[0];
+
+const struct generator *generator_find(const char *name, struct psr_error *err)
+{
+	char names[256] = "";
+	size_t used = 0;
+
+	for (size_t i = 0; i < n_generators; i++) {
+		if (strcmp(generators[i].name, name) == 0)
+			return &generators[i];
+	}
+	for (size_t i = 0; i < n_generators && used < sizeof names; i++)
+		used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", generators[i].name);
+	psr_fail(err, PSR_ERR_ARG, "there is no generator '%.64s'; there are: %s", name, names);
+	return NULL;
+}

@@ -1,0 +1,18 @@
+/* Binary glTF 2.0 (GLB) of a shape: one node, one mesh, one primitive a material with positions, normals and 32-bit
+ * indices. */
+#ifndef MODELS_GLB_H
+#define MODELS_GLB_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+#include "shape.h"
+
+/* *bytes, to be freed by the caller, holds the whole file. The same shape and name give the same bytes. MEMORY; ARG for
+ * a shape without triangles. */
+int glb_encode(uint8_t **bytes, size_t *n_bytes, const struct shape *shape, const char *name, struct psr_error *err);
+
+/* Writes a temporary file beside `path` and renames it: `path` is either the old file or the whole new one. IO. */
+int glb_write(const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+
+#endif

@@ -1,0 +1,165 @@
+#include "commands.h"
+
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include "psr/cli.h"
+#include "psr/model.h"
+
+#define DEGREES (180 / 3.14159265358979323846)
+#define MAX_LEVELS 256 /* of a level's 8 bits */
+
+/* What both forms of the answer say. */
+struct summary {
+	char name[256];
+	char id[33];
+	const struct psr_model_info *info;
+	const struct psr_blocks *blocks; /* NULL if there are none */
+	uint64_t bytes;
+	uint32_t level_blocks[MAX_LEVELS];
+};
+
+static void take_name(char name[256], const char *path)
+{
+	const char *slash = strrchr(path, '/');
+	char *dot;
+
+	snprintf(name, 256, "%s", slash == NULL ? path : slash + 1);
+	dot = strrchr(name, '.');
+	if (dot != NULL && dot != name && strcmp(dot, ".psr") == 0)
+		*dot = '\0';
+}
+
+static void summarize(struct summary *summary, const struct psr_model *model, const char *path)
+{
+	uint8_t id[16];
+
+	memset(summary, 0, sizeof *summary);
+	take_name(summary->name, path);
+	psr_model_content_id(model, id);
+	for (int i = 0; i < 16; i++)
+		snprintf(summary->id + 2 * i, 3, "%02x", id[i]);
+	summary->info = psr_model_info(model);
+	summary->blocks = psr_model_blocks(model);
+	summary->bytes = psr_model_bytes(model);
+	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++)
+		summary->level_blocks[summary->blocks->level[b]]++;
+}
+
+static double ratio(double a, double b)
+{
+	return b > 0 ? a / b : 0;
+}
+
+static void print_text(const struct summary *s)
+{
+	const struct psr_model_info *info = s->info;
+	const struct psr_blocks *blocks = s->blocks;
+
+	printf("name              %s\n", s->name);
+	printf("content id        %s\n", s->id);
+	printf("builder           %.32s\n", info->builder);
+	printf("resolution        %" PRIu32 " pixels across the unit sphere\n", info->resolution);
+	printf("tolerance         %.4g degrees\n", info->tolerance * DEGREES);
+	printf("spacing           %.6g\n", info->spacing);
+	printf("box               %.6g,%.6g,%.6g to %.6g,%.6g,%.6g\n", info->box_min[0], info->box_min[1], info->box_min[2],
+	       info->box_max[0], info->box_max[1], info->box_max[2]);
+	printf("origin, scale     %.6g,%.6g,%.6g  %.6g\n", info->origin[0], info->origin[1], info->origin[2], info->scale);
+	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
+	if (blocks == NULL)
+		return;
+	printf("samples           %" PRIu64 "\n", blocks->n_samples);
+	printf("blocks            %" PRIu32 " of %" PRIu32 " projections\n", blocks->n_blocks, blocks->n_projections);
+	printf("clusters          %" PRIu32 "\n", blocks->n_clusters);
+	printf("levels            %" PRIu32 "\n", blocks->n_levels);
+	if (blocks->n_levels > 1) {
+		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+			printf("  level %-3" PRIu32 "       %" PRIu32 " blocks\n", l, s->level_blocks[l]);
+	}
+	printf("bytes a sample    %.2f\n", ratio((double)s->bytes, (double)blocks->n_samples));
+	printf("samples a block   %.1f of %d valid\n", ratio((double)blocks->n_samples, blocks->n_blocks),
+	       PSR_BLOCK_SAMPLES);
+}
+
+static void add_vec3(cJSON *root, const char *name, const double v[3])
+{
+	cJSON_AddItemToObject(root, name, cJSON_CreateDoubleArray(v, 3));
+}
+
+static int print_json(const struct summary *s, struct psr_error *err)
+{
+	cJSON *root = cJSON_CreateObject(), *part;
+	const struct psr_blocks *blocks = s->blocks;
+	char builder[33], *text;
+
+	snprintf(builder, sizeof builder, "%.32s", s->info->builder);
+	cJSON_AddStringToObject(root, "name", s->name);
+	cJSON_AddStringToObject(root, "content_id", s->id);
+	cJSON_AddStringToObject(root, "builder", builder);
+	cJSON_AddNumberToObject(root, "resolution", s->info->resolution);
+	cJSON_AddNumberToObject(root, "tolerance_degrees", s->info->tolerance * DEGREES);
+	cJSON_AddNumberToObject(root, "spacing", s->info->spacing);
+	add_vec3(root, "box_min", s->info->box_min);
+	add_vec3(root, "box_max", s->info->box_max);
+	add_vec3(root, "origin", s->info->origin);
+	cJSON_AddNumberToObject(root, "scale", s->info->scale);
+	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
+	if (blocks != NULL) {
+		part = cJSON_AddObjectToObject(root, "blocks");
+		cJSON_AddNumberToObject(part, "samples", (double)blocks->n_samples);
+		cJSON_AddNumberToObject(part, "blocks", blocks->n_blocks);
+		cJSON_AddNumberToObject(part, "projections", blocks->n_projections);
+		cJSON_AddNumberToObject(part, "clusters", blocks->n_clusters);
+		cJSON_AddNumberToObject(part, "levels", blocks->n_levels);
+		cJSON_AddNumberToObject(part, "bytes_per_sample", ratio((double)s->bytes, (double)blocks->n_samples));
+		cJSON_AddNumberToObject(part, "samples_per_block", ratio((double)blocks->n_samples, blocks->n_blocks));
+		part = cJSON_AddArrayToObject(part, "level_blocks");
+		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+			cJSON_AddItemToArray(part, cJSON_CreateNumber(s->level_blocks[l]));
+	}
+	text = cJSON_Print(root);
+	cJSON_Delete(root);
+	if (text == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the answer was written as JSON");
+	puts(text);
+	cJSON_free(text);
+	return PSR_OK;
+}
+
+int cmd_info(int argc, char **argv)
+{
+	int json = 0, n_operands, code;
+	struct psr_model *model = NULL;
+	struct summary summary;
+	struct psr_error err;
+	const struct psr_opt opts[] = {
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object" },
+		{ .name = NULL },
+	};
+	const struct psr_cli cli = {
+		.usage = "psr-model info FILE.psr [--json]",
+		.summary = "Checks a .psr file and says what is in it. Lengths are in the source file's units.",
+		.opts = opts,
+		.footer = NULL,
+	};
+
+	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
+	if (code > 0)
+		return 0;
+	if (code == PSR_OK && n_operands != 1)
+		code = psr_fail(&err, PSR_ERR_ARG, "one FILE.psr is needed");
+	if (code == PSR_OK)
+		code = psr_model_map(&model, argv[1], &err);
+	if (code == PSR_OK) {
+		summarize(&summary, model, argv[1]);
+		if (json)
+			code = print_json(&summary, &err);
+		else
+			print_text(&summary);
+	}
+	psr_model_unref(model);
+	if (code == PSR_OK && fflush(stdout) != 0)
+		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
+	return code == PSR_OK ? 0 : psr_cli_fail("psr-model info", &err);
+}

@@ -1,0 +1,64 @@
+/* Triangle meshes under construction: what the generators fill and glb.c writes.
+ *
+ * Object space is right-handed, +Y up. Triangles are counter-clockwise seen from outside. Everything is computed in
+ * doubles with + - * / and sqrt alone and rounded once, to float, when a vertex is added: the same bytes everywhere.
+ * A failed allocation is remembered in `failed`, and whatever is added later is dropped, so that a generator need not
+ * look at every call; glb_write and shape_check report it. */
+#ifndef MODELS_SHAPE_H
+#define MODELS_SHAPE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+
+/* glTF's metallic-roughness. The name belongs to the generator. Metals of the standard set are only half metallic:
+ * under a few lights, without surroundings to mirror, a full one is black but for its highlights. */
+struct shape_material {
+	const char *name;
+	uint32_t color; /* 0xRRGGBB, sRGB-coded */
+	double metallic, roughness;
+	int two_sided;  /* for sheets; 0 for the surface of a solid */
+};
+
+struct shape_vertex {
+	double p[3], n[3]; /* n of any length but 0 */
+};
+
+struct shape {
+	uint32_t n_vertices, n_triangles, n_materials;
+	float (*position)[3], (*normal)[3]; /* n_vertices; normals are of unit length */
+	uint32_t (*triangle)[3];            /* n_triangles */
+	uint32_t *triangle_material;        /* n_triangles, < n_materials */
+	struct shape_material *material;
+	uint32_t current;                   /* the material that triangles get from now on */
+	uint32_t vertex_room, triangle_room, material_room;
+	int failed;
+};
+
+void shape_init(struct shape *shape);
+void shape_fini(struct shape *shape);
+
+/* PSR_ERR_MEMORY if anything could not be added, PSR_OK otherwise. */
+int shape_check(const struct shape *shape, struct psr_error *err);
+
+/* Returns the index of the new material and makes it current. */
+uint32_t shape_material(struct shape *shape, const struct shape_material *material);
+
+/* Returns the index of the new vertex. */
+uint32_t shape_vertex(struct shape *shape, const struct shape_vertex *vertex);
+
+/* Triangles with two corners at the same place (the poles of a surface) are left out. */
+void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c);
+
+/* A grid of n_rows x n_cols vertices, row after row. Outside is where (next column - this) x (next row - this) points.
+ * `wrap_rows`, `wrap_cols`: the last one is joined to the first. */
+void shape_grid(struct shape *shape, const struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows,
+                int wrap_cols);
+
+/* A fan around `center` whose rim has n vertices, counter-clockwise seen from where `normal` points to. */
+void shape_fan(struct shape *shape, const double center[3], const double normal[3], const double (*rim)[3], uint32_t n);
+
+/* Turns (rows of an orthonormal matrix of determinant 1) and then moves the vertices from `first` on. */
+void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], const double move[3]);
+
+#endif

@@ -1,0 +1,292 @@
+/* Models built on first use: a psrd beside a psr-model of the test's own, a script whose source says what it does. */
+#define _GNU_SOURCE
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "server_fixture.h"
+
+static char folder[PATH_MAX], bin[PATH_MAX];
+static struct daemon psrd;
+static struct peer p, q;
+
+static const char script[] =
+	"#!/bin/sh\n"
+	"# psr-model build SOURCE -o TARGET --progress-fd 3 --quiet --threads N\n"
+	"here=${0%/*}\n"
+	"echo \"$1 $3 $5 $6 $7 $8 $9 $(nice) $(ulimit -v) $(ulimit -t)\" >> $here/log\n"
+	"echo 'import 1 1' >&3\n"
+	"echo 'rays 1 4' >&3\n"
+	"echo 'nonsense' >&3\n"
+	"echo 'import 0 9' >&3\n"
+	"echo 'rays 4 4' >&3\n"
+	"case $(cat \"$2\") in\n"
+	"good*) sleep 0.3; echo 'select 5 9' >&3; cp $here/ready.psr \"$4\";;\n"
+	"bad*) echo 'psr-model: warming up' >&2; echo 'psr-model: vertex 7 is not finite' >&2; exit 4;;\n"
+	"crash*) kill -SEGV $$;;\n"
+	"spin*) while :; do :; done;;\n"
+	"slow*) echo $$ > $here/pid; sleep 60;;\n"
+	"nothing*) exit 0;;\n"
+	"esac\n";
+
+static int set_up(void **state)
+{
+	char path[PATH_MAX], command[3 * PATH_MAX];
+
+	(void)state;
+	folder_make(folder);
+	folder_make(bin);
+	daemon_path(path, "psrd");
+	snprintf(command, sizeof command, "cp '%s' '%s/psrd'", path, bin);
+	assert_int_equal(system(command), 0);
+	file_write(bin, "psr-model", script, sizeof script - 1);
+	snprintf(path, sizeof path, "%.200s/psr-model", bin);
+	assert_int_equal(chmod(path, 0700), 0);
+	plate_write(bin, "ready.psr", 0x2040c0);
+	return 0;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	folder_remove(folder);
+	folder_remove(bin);
+	return 0;
+}
+
+static void start(const char *option, const char *value)
+{
+	char program[PATH_MAX + 16], cache[PATH_MAX + 16];
+	const char *argv[] = { program, "--listen", "127.0.0.1:0", "--models", folder, "--cache", cache, "--threads", "2",
+		                   option, value, NULL };
+
+	snprintf(program, sizeof program, "%s/psrd", bin);
+	snprintf(cache, sizeof cache, "%s/cache/deep", bin);
+	daemon_spawn(&psrd, argv);
+	daemon_wait_ready(&psrd);
+}
+
+/* Lines that the script has left: one a build. */
+static int count_builds(char text[4096])
+{
+	char path[PATH_MAX + 16];
+	FILE *file;
+	size_t n = 0;
+	int lines = 0;
+
+	snprintf(path, sizeof path, "%s/log", bin);
+	file = fopen(path, "r");
+	if (file != NULL) {
+		n = fread(text, 1, 4095, file);
+		fclose(file);
+	}
+	text[n] = '\0';
+	for (size_t i = 0; i < n; i++)
+		lines += text[i] == '\n';
+	return lines;
+}
+
+static void a_source_is_built_once_for_all_and_cached(void **state)
+{
+	struct psr_msg_opened opened;
+	char text[4096];
+	uint32_t id;
+
+	(void)state;
+	file_write(folder, "plate.obj", "good", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_hello(&q, &psrd, NULL);
+	id = peer_ask_open(&p, "plate");
+	peer_expect_opened(&q, peer_ask_open(&q, "plate"), &opened);
+	peer_expect_opened(&p, id, &opened);
+	assert_int_equal(opened.n_samples, PLATE_SAMPLES);
+	peer_close(&p);
+	peer_close(&q);
+	expect_serves(&psrd, "plate");
+	assert_int_equal(count_builds(text), 1);
+	daemon_stop(&psrd);
+	start(NULL, NULL); /* another daemon finds it in the cache */
+	expect_serves(&psrd, "plate");
+	assert_int_equal(count_builds(text), 1);
+	daemon_stop(&psrd);
+	file_write(folder, "plate.obj", "good again", 10); /* another source, another model */
+	start(NULL, NULL);
+	expect_serves(&psrd, "plate");
+	assert_int_equal(count_builds(text), 2);
+	daemon_stop(&psrd);
+}
+
+static void progress_is_passed_on_and_never_goes_back(void **state)
+{
+	static const uint16_t stages[] = { PSR_PROGRESS_WAITING, PSR_PROGRESS_IMPORT, PSR_PROGRESS_IMPORT,
+		                               PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SELECT, PSR_PROGRESS_LOAD };
+	static const uint64_t done[] = { 0, 0, 1, 1, 4, 5, 0 };
+	struct psr_message message;
+	struct psr_msg_progress progress;
+
+	(void)state;
+	file_write(folder, "plate.glb", "good", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_ask_open(&p, "plate");
+	for (size_t i = 0; i < sizeof stages / sizeof stages[0]; i++) {
+		peer_expect(&p, &message, PSR_MSG_PROGRESS, p.id);
+		assert_int_equal(psr_msg_progress_decode(&progress, message.payload, message.n, NULL), PSR_OK);
+		assert_int_equal(progress.stage, stages[i]);
+		assert_int_equal(progress.done, done[i]);
+	}
+	peer_expect(&p, &message, PSR_MSG_OPENED, p.id);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void a_failed_build_says_why_and_is_remembered_until_the_source_changes(void **state)
+{
+	struct psr_msg_opened opened;
+	char text[PSR_ERROR_TEXT], log[4096];
+
+	(void)state;
+	file_write(folder, "plate.ply", "bad", 3);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	for (int i = 0; i < 3; i++) {
+		peer_expect_open_error(&p, peer_ask_open(&p, "plate"), PSR_WIRE_FORMAT, text);
+		assert_non_null(strstr(text, "vertex 7 is not finite"));
+		assert_null(strstr(text, folder));
+	}
+	assert_int_equal(count_builds(log), 1);
+	file_write(folder, "plate.ply", "good", 4);
+	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
+	assert_int_equal(count_builds(log), 2);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void a_crash_costs_only_the_build(void **state)
+{
+	char text[PSR_ERROR_TEXT];
+
+	(void)state;
+	file_write(folder, "crash.off", "crash", 5);
+	file_write(folder, "nothing.off", "nothing", 7);
+	plate_write(folder, "plate.psr", 0x2040c0);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "crash"), PSR_WIRE_FORMAT, text);
+	assert_non_null(strstr(text, "signal 11"));
+	peer_expect_open_error(&p, peer_ask_open(&p, "nothing"), PSR_WIRE_INTERNAL, NULL);
+	peer_close(&p);
+	expect_serves(&psrd, "plate");
+	daemon_stop(&psrd);
+}
+
+static void builds_are_niced_and_limited(void **state)
+{
+	char text[PSR_ERROR_TEXT], log[4096];
+
+	(void)state;
+	file_write(folder, "bad.stl", "bad", 3);
+	start("--build-memory", "1g");
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "bad"), PSR_WIRE_FORMAT, NULL);
+	peer_close(&p);
+	daemon_stop(&psrd);
+	assert_int_equal(count_builds(log), 1);
+	assert_string_equal(log, "build -o --progress-fd 3 --quiet --threads 2 10 1048576 3600\n");
+	file_write(folder, "spin.stl", "spin", 4);
+	start("--build-time", "1");
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "spin"), PSR_WIRE_LIMIT, text);
+	assert_non_null(strstr(text, "--build-time"));
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void frames_go_on_while_a_model_is_built(void **state)
+{
+	struct psr_message message;
+	uint32_t id;
+
+	(void)state;
+	file_write(folder, "slow.obj", "slow", 4);
+	plate_write(folder, "plate.psr", 0x2040c0);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	id = peer_ask_open(&p, "slow");
+	for (int i = 0; i < 5; i++) /* it runs: waiting, import, import, rays, rays */
+		peer_expect(&p, &message, PSR_MSG_PROGRESS, id);
+	expect_serves(&psrd, "plate");
+	psr_msg_cancel_encode(&p.buf, id, 0, NULL);
+	peer_send(&p);
+	peer_expect(&p, &message, PSR_MSG_CANCELLED, id);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void the_end_takes_builds_with_it(void **state)
+{
+	char path[PATH_MAX + 16];
+	struct psr_message message;
+	int pid = 0;
+	FILE *file;
+
+	(void)state;
+	file_write(folder, "slow.obj", "slow", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_ask_open(&p, "slow");
+	snprintf(path, sizeof path, "%s/pid", bin);
+	for (int64_t end = clock_ms() + PATIENCE_MS; pid == 0 && clock_ms() < end; usleep(5000)) {
+		file = fopen(path, "r");
+		if (file != NULL && fscanf(file, "%d", &pid) != 1)
+			pid = 0;
+		if (file != NULL)
+			fclose(file);
+	}
+	assert_true(pid > 0);
+	kill(psrd.pid, SIGTERM);
+	do
+		assert_true(peer_next(&p, &message));
+	while (message.type == PSR_MSG_PROGRESS);
+	assert_int_equal(message.type, PSR_MSG_ERROR); /* the OPEN ends before the goodbye */
+	peer_expect(&p, &message, PSR_MSG_GOODBYE, 0);
+	peer_close(&p);
+	assert_int_equal(daemon_wait(&psrd), 0);
+	assert_int_equal(kill(pid, 0), -1);
+}
+
+static void without_psr_model_the_error_says_what_to_do(void **state)
+{
+	char text[PSR_ERROR_TEXT], path[PATH_MAX + 16];
+
+	(void)state;
+	snprintf(path, sizeof path, "%s/psr-model", bin);
+	assert_int_equal(unlink(path), 0);
+	assert_int_equal(setenv("PATH", "/nonexistent", 1), 0);
+	file_write(folder, "plate.obj", "good", 4);
+	start(NULL, NULL);
+	assert_int_equal(setenv("PATH", "/usr/bin:/bin", 1), 0);
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "plate"), PSR_WIRE_NOT_FOUND, text);
+	assert_non_null(strstr(text, "psr-model"));
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_source_is_built_once_for_all_and_cached, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(progress_is_passed_on_and_never_goes_back, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_failed_build_says_why_and_is_remembered_until_the_source_changes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_crash_costs_only_the_build, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(builds_are_niced_and_limited, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(frames_go_on_while_a_model_is_built, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_end_takes_builds_with_it, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(without_psr_model_the_error_says_what_to_do, set_up, tear_down),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

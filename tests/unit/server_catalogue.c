@@ -1,0 +1,297 @@
+/* The catalogue: names, conflicts, changes of the folder, memory; and the keys of built models. */
+#define _GNU_SOURCE
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "../../server/cachekey.h"
+#include "../../server/catalogue.h"
+#include "server_fixture.h"
+
+static char folder[PATH_MAX];
+static struct catalogue catalogue;
+
+static int set_up(void **state)
+{
+	(void)state;
+	folder_make(folder);
+	catalogue_init(&catalogue, 1 << 30);
+	return 0;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	catalogue_fini(&catalogue);
+	folder_remove(folder);
+	return 0;
+}
+
+static void make(const char *name)
+{
+	file_write(folder, name, "x", 1);
+}
+
+static void make_folder(const char *name)
+{
+	char path[2 * PATH_MAX];
+
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	assert_int_equal(mkdir(path, 0700), 0);
+}
+
+static void scan(void)
+{
+	struct catalogue_listing *listing;
+	struct psr_error error;
+
+	assert_int_equal(catalogue_scan(&listing, folder, &error), PSR_OK);
+	assert_int_equal(catalogue_adopt(&catalogue, listing), PSR_OK);
+}
+
+static void expect_path(const char *name, const char *ending)
+{
+	struct catalogue_entry *entry = catalogue_find(&catalogue, name);
+
+	assert_non_null(entry);
+	assert_string_equal(entry->file.path + strlen(folder) + 1, ending);
+}
+
+/* Puts a model into the catalogue as if it had been read; the caller is its one user. */
+static struct catalogue_model *load(const char *name)
+{
+	struct catalogue_model *model;
+	struct psr_model *plate = plate_create(0);
+	uint64_t bytes = psr_model_bytes(plate);
+
+	assert_int_equal(catalogue_reserve(&catalogue, bytes, name, NULL), PSR_OK);
+	assert_int_equal(catalogue_add(&model, &catalogue, catalogue_find(&catalogue, name), plate, "", bytes), PSR_OK);
+	return model;
+}
+
+static void names_are_stems_and_the_psr_wins(void **state)
+{
+	(void)state;
+	make("dragon.glb");
+	make("dragon.psr");
+	make("bunny.obj");
+	make("bunny.GLB");
+	make("readme.txt");
+	make(".hidden.psr");
+	make("no-ending");
+	make("two.dots.stl");
+	scan();
+	assert_int_equal(catalogue.n, 3);
+	expect_path("dragon", "dragon.psr");
+	expect_path("bunny", "bunny.GLB");
+	expect_path("two.dots", "two.dots.stl");
+	assert_false(catalogue_find(&catalogue, "dragon")->file.is_source);
+	assert_true(catalogue_find(&catalogue, "bunny")->file.is_source);
+	assert_null(catalogue_find(&catalogue, "readme"));
+	assert_null(catalogue_find(&catalogue, "dragon.psr"));
+	assert_null(catalogue_find(&catalogue, "../dragon"));
+	assert_null(catalogue_find(&catalogue, ""));
+}
+
+static void the_list_is_sorted_by_bytes(void **state)
+{
+	static const char *const names[] = { "b.psr", "a.psr", "B.psr", "a-.psr", "\xc3\xa9.psr", "Z.psr" };
+	static const char *const sorted[] = { "B", "Z", "a", "a-", "b", "\xc3\xa9" };
+
+	(void)state;
+	for (size_t i = 0; i < 6; i++)
+		make(names[i]);
+	scan();
+	assert_int_equal(catalogue.n, 6);
+	for (size_t i = 0; i < 6; i++)
+		assert_string_equal(catalogue.entry[i].file.name, sorted[i]);
+}
+
+static void subfolders_with_one_model_count(void **state)
+{
+	(void)state;
+	make_folder("clearcoat");
+	make("clearcoat/ClearCoatTest.gltf");
+	make("clearcoat/ClearCoatTest.bin");
+	make("clearcoat/wood.png");
+	make_folder("many");
+	make("many/one.obj");
+	make("many/two.obj");
+	make_folder("empty");
+	make_folder("deep");
+	make_folder("deep/deeper");
+	make("deep/deeper/hidden.glb");
+	make("top.obj");
+	make_folder("copy");
+	make("copy/top.glb");
+	scan();
+	assert_int_equal(catalogue.n, 2);
+	expect_path("ClearCoatTest", "clearcoat/ClearCoatTest.gltf");
+	expect_path("top", "top.obj");
+}
+
+static void names_that_are_no_text_are_passed_over(void **state)
+{
+	(void)state;
+	make("bad\xff.psr");
+	make("line\nbreak.psr");
+	make("good.psr");
+	scan();
+	assert_int_equal(catalogue.n, 1);
+}
+
+static void a_missing_folder_is_an_error(void **state)
+{
+	struct catalogue_listing *listing;
+	struct psr_error error;
+
+	(void)state;
+	assert_int_equal(catalogue_scan(&listing, "/nonexistent-folder", &error), PSR_ERR_NOT_FOUND);
+	assert_non_null(strstr(error.text, "/nonexistent-folder"));
+}
+
+static void scanning_again_keeps_what_did_not_change(void **state)
+{
+	struct catalogue_model *kept, *changed, *gone;
+
+	(void)state;
+	make("kept.psr");
+	make("changed.psr");
+	make("gone.psr");
+	scan();
+	kept = load("kept");
+	changed = load("changed");
+	gone = load("gone");
+	catalogue_unref(&catalogue, gone);
+	file_write(folder, "changed.psr", "longer", 6);
+	file_write(folder, "new.psr", "x", 1);
+	assert_int_equal(catalogue.n_models, 3);
+	{
+		char path[2 * PATH_MAX];
+
+		snprintf(path, sizeof path, "%s/gone.psr", folder);
+		assert_int_equal(unlink(path), 0);
+	}
+	scan();
+	assert_int_equal(catalogue.n, 3);
+	assert_ptr_equal(catalogue_find(&catalogue, "kept")->model, kept);
+	assert_ptr_equal(kept->entry, catalogue_find(&catalogue, "kept"));
+	assert_null(catalogue_find(&catalogue, "changed")->model);
+	assert_null(changed->entry); /* in use: it stays until its user goes */
+	assert_int_equal(catalogue.n_models, 2);
+	catalogue_unref(&catalogue, changed);
+	assert_int_equal(catalogue.n_models, 1);
+	catalogue_unref(&catalogue, kept);
+	assert_int_equal(catalogue.n_models, 1); /* stays for the next one who asks */
+}
+
+static void the_longest_unused_makes_room_and_the_used_stay(void **state)
+{
+	struct catalogue_model *a, *b, *c;
+	struct psr_error error;
+	uint64_t bytes;
+
+	(void)state;
+	make("a.psr");
+	make("b.psr");
+	make("c.psr");
+	scan();
+	a = load("a");
+	bytes = a->bytes;
+	catalogue.max_bytes = 2 * bytes;
+	b = load("b");
+	assert_int_equal(catalogue_reserve(&catalogue, bytes, "c", &error), PSR_ERR_LIMIT); /* both are in use */
+	assert_non_null(strstr(error.text, "--max-memory"));
+	catalogue_unref(&catalogue, b);
+	catalogue_unref(&catalogue, a);
+	c = load("c"); /* b has been unused for longer than a */
+	assert_null(catalogue_find(&catalogue, "b")->model);
+	assert_ptr_equal(catalogue_find(&catalogue, "a")->model, a);
+	assert_true(catalogue.bytes <= catalogue.max_bytes);
+	assert_int_equal(catalogue_reserve(&catalogue, 2 * bytes + 1, "c", &error), PSR_ERR_LIMIT); /* never fits */
+	assert_ptr_equal(catalogue_find(&catalogue, "a")->model, a);
+	catalogue_unref(&catalogue, c);
+}
+
+/* ---- keys ---- */
+
+static void find_key(char key[CATALOGUE_KEY], const char *source)
+{
+	char path[2 * PATH_MAX], builder[2 * PATH_MAX];
+	struct psr_error error = { 0 };
+
+	snprintf(path, sizeof path, "%s/%s", folder, source);
+	snprintf(builder, sizeof builder, "%s/builder", folder);
+	if (cachekey_find(key, path, builder, &error) != PSR_OK)
+		fail_msg("%s", error.text);
+	assert_int_equal(strlen(key), 32);
+}
+
+static void keys_change_with_what_a_model_is_made_of(void **state)
+{
+	char first[CATALOGUE_KEY], next[CATALOGUE_KEY];
+
+	(void)state;
+	file_write(folder, "builder", "1", 1);
+	make_folder("m");
+	make_folder("m/textures");
+	file_write(folder, "m/m.gltf", "{}", 2);
+	file_write(folder, "m/textures/a.png", "a", 1);
+	find_key(first, "m/m.gltf");
+	find_key(next, "m/m.gltf");
+	assert_string_equal(first, next);
+	file_write(folder, "m/m.gltf", "{ }", 3);
+	find_key(next, "m/m.gltf");
+	assert_string_not_equal(first, next);
+	file_write(folder, "m/m.gltf", "{}", 2);
+	find_key(next, "m/m.gltf");
+	assert_string_equal(first, next);
+	file_write(folder, "m/textures/a.png", "aa", 2); /* a neighbour that it may name */
+	find_key(next, "m/m.gltf");
+	assert_string_not_equal(first, next);
+	find_key(first, "m/m.gltf");
+	file_write(folder, "builder", "2", 1);
+	find_key(next, "m/m.gltf");
+	assert_string_not_equal(first, next);
+}
+
+static void other_models_and_glb_neighbours_do_not_change_keys(void **state)
+{
+	char first[CATALOGUE_KEY], next[CATALOGUE_KEY], glb[CATALOGUE_KEY];
+
+	(void)state;
+	file_write(folder, "builder", "1", 1);
+	make_folder("m");
+	file_write(folder, "m/a.obj", "v", 1);
+	file_write(folder, "m/b.glb", "v", 1);
+	find_key(first, "m/a.obj");
+	find_key(glb, "m/b.glb");
+	assert_string_not_equal(first, glb);
+	file_write(folder, "m/c.psr", "v", 1);
+	file_write(folder, "m/d.stl", "v", 1);
+	find_key(next, "m/a.obj");
+	assert_string_equal(first, next);
+	file_write(folder, "m/a.mtl", "v", 1);
+	find_key(next, "m/a.obj");
+	assert_string_not_equal(first, next);
+	find_key(next, "m/b.glb");
+	assert_string_equal(glb, next);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(names_are_stems_and_the_psr_wins, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_list_is_sorted_by_bytes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(subfolders_with_one_model_count, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(names_that_are_no_text_are_passed_over, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_missing_folder_is_an_error, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(scanning_again_keeps_what_did_not_change, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_longest_unused_makes_room_and_the_used_stay, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(keys_change_with_what_a_model_is_made_of, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(other_models_and_glb_neighbours_do_not_change_keys, set_up, tear_down),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
