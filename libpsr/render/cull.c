@@ -78,13 +78,37 @@ static inline float stretch(const struct plan *plan, const float c[3], float r)
 	return plan->focal * distance / (z * z);
 }
 
-/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent. */
+/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding does not
+ * double the cells of a picture drawn at just the magnification that a level is made for. */
 static inline uint32_t level_for(float pixels)
 {
-	uint32_t bits = psr_bits_from_float(pixels);
+	uint32_t bits = psr_bits_from_float(pixels * (1 - 0x1p-12f));
 	if (bits <= psr_bits_from_float(1.0f))
 		return 0;
 	return (bits >> 23) - 127 + ((bits & 0x7fffff) != 0);
+}
+
+/* Whether all of a one-sided block faces away, so that its samples would get weight 0 ([G] 6.4, 7.3.2). With d from the eye to
+ * the sphere's centre, a normal n within alpha of the cone's axis a, and a sample x within r of the centre,
+ * n . (x - eye) >= |d| cos(angle(a, d) + alpha) - r, which exceeds BACK_SINE |x - eye| when
+ * a . d > |d| (sin alpha + BACK_SINE) + r (1 + BACK_SINE). A thousandth makes up for rounding. */
+static int faces_away(const struct plan *plan, const struct plan_instance *in, uint32_t block)
+{
+	const struct psr_blocks *b = in->blocks;
+	const float cos_alpha = b->cone_cos[block];
+	if ((b->flags[block] & PSR_BLOCK_TWO_SIDED) || cos_alpha <= 0)
+		return 0;
+	const float axis[3] = { b->cone_x[block], b->cone_y[block], b->cone_z[block] };
+	const float center[3] = { b->sphere_x[block], b->sphere_y[block], b->sphere_z[block] };
+	float along = 0, length2 = 0;
+	for (int k = 0; k < 3; k++) {
+		float d = plan->perspective ? center[k] - in->eye[k] : -in->eye[k];
+		along += d * axis[k];
+		length2 += d * d;
+	}
+	const float sin_alpha = __builtin_sqrtf(1 - cos_alpha * cos_alpha);
+	const float r = plan->perspective ? b->sphere_r[block] : 0;
+	return along > (sin_alpha + BACK_SINE + 0.001f) * __builtin_sqrtf(length2) + r * (1 + BACK_SINE);
 }
 
 static inline uint8_t tile_of(float pixel, uint32_t size, uint32_t n_tiles)
@@ -97,6 +121,8 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
                       struct cull_hit *hit)
 {
 	const struct psr_blocks *b = in->blocks;
+	if (b->cone_cos && faces_away(plan, in, block))
+		return 0;
 	float x = b->sphere_x[block], y = b->sphere_y[block], z = b->sphere_z[block], r = b->sphere_r[block] * in->scale;
 	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
 		           to_camera(in->center_m[2], x, y, z) };

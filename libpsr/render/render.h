@@ -11,6 +11,10 @@
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 #define STRIP 256       /* samples that are resolved and shaded together */
 
+/* A sample faces away when its normal is more than this sine (6 degrees) beyond perpendicular: quantisation and interpolation
+ * tilt the normals of grazing samples by as much, and those are seen. */
+#define BACK_SINE 0.1f
+
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
 
 /* From a projection's space to the picture: u = (m[0] . (x, y, z, 1)) / w, v alike, and z' = m[2] . (x, y, z, 1). w is z'

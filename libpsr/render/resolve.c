@@ -32,14 +32,10 @@ static void position(const struct psr_blocks *b, uint32_t block, uint32_t sample
 		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
 }
 
-/* A sample faces away when its normal is more than about 6 degrees beyond perpendicular: quantisation and interpolation
- * tilt the normals of grazing samples by as much, and those are seen. */
-#define BACK_SINE2 0.01f
-
 static int faces_away(float g, const float to_eye[3])
 {
 	float length2 = to_eye[0] * to_eye[0] + to_eye[1] * to_eye[1] + to_eye[2] * to_eye[2];
-	return g < 0 && g * g > BACK_SINE2 * length2;
+	return g < 0 && g * g > BACK_SINE * BACK_SINE * length2;
 }
 
 void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *strip)

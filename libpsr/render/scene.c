@@ -120,30 +120,41 @@ int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], double fov_y,
                       double aspect)
 {
-	static const double from[3] = { 0.35, 0.3, 0.887411967464942 }; /* unit length */
-	double half[3], radius;
+	/* The frame of a camera that looks along `forward` with +y up. */
+	static const double right[3] = { 0.9302605094190634, 0, -0.3668996928526715 };
+	static const double down[3] = { 0.11006990785580148, -0.9539392014169455, 0.2790781528257191 };
+	static const double forward[3] = { -0.35, -0.3, -0.887411967464942 };
+	const double margin = 1.06;
+	/* The box's corners are made to fit, not a sphere about it: most objects are far from round. */
+	double half[3], tangent[2] = { aspect, 1 }, distance = 0, extent = 0, deepest = 0;
+
 	for (int i = 0; i < 3; i++) {
 		camera->target[i] = box_min[i] / 2 + box_max[i] / 2;
 		half[i] = box_max[i] / 2 - box_min[i] / 2;
 	}
-	radius = v3d_length(half);
-	if (!(radius > 0))
-		radius = 1;
-	double narrow = aspect < 1 ? aspect : 1, distance = 2 * radius;
-	v3d_set(camera->up, 0, 1, 0);
 	if (fov_y > 0) {
 		double s, c;
 		psr_sincos(fov_y / 2, &s, &c);
-		double t = s / c * narrow; /* of the narrower half angle */
-		distance = radius * sqrt(1 + t * t) / t;
-		camera->kind = PSR_CAMERA_PERSPECTIVE;
-		camera->fov_y = fov_y;
-		camera->ortho_height = 0;
-	} else {
-		camera->kind = PSR_CAMERA_ORTHOGRAPHIC;
-		camera->fov_y = 0;
-		camera->ortho_height = 2 * radius / narrow;
+		tangent[0] *= s / c;
+		tangent[1] *= s / c;
 	}
-	v3d_add_scaled(camera->eye, camera->target, distance, from);
-	camera->near_z = distance - radius > 0 ? (distance - radius) / 2 : 0;
+	for (int corner = 0; corner < 8; corner++) {
+		double p[3];
+		for (int i = 0; i < 3; i++)
+			p[i] = corner >> i & 1 ? half[i] : -half[i];
+		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1], z = v3d_dot(p, forward);
+		extent = fmax(extent, fmax(x, y));
+		distance = fmax(distance, fmax(x, y) * margin - z);
+		deepest = fmax(deepest, -z);
+	}
+	if (!(extent > 0))
+		extent = distance = 1;
+	v3d_set(camera->up, 0, 1, 0);
+	camera->kind = fov_y > 0 ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = fov_y > 0 ? fov_y : 0;
+	camera->ortho_height = fov_y > 0 ? 0 : 2 * extent * margin;
+	if (!(fov_y > 0))
+		distance = 2 * deepest + extent;
+	v3d_add_scaled(camera->eye, camera->target, -distance, forward);
+	camera->near_z = (distance - deepest) / 2;
 }

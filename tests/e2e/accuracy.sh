@@ -21,8 +21,8 @@ view() { # model source label camera-options...
 		return
 	fi
 	local inside holes stray empty p999
-	inside=$(number "$json" n_inside) holes=$(number "$json" n_holes) stray=$(number "$json" n_outside_drawn)
-	empty=$(number "$json" n_inside_empty) p999=$(number "$json" distance_p999)
+	inside=$(number "$json" inside) holes=$(number "$json" holes) stray=$(number "$json" outside_drawn)
+	empty=$(number "$json" inside_empty) p999=$(number "$json" distance_p999)
 	echo "# $model $label: $inside pixels inside, $holes holes, $empty empty, $stray drawn outside," \
 		"distance p50 $(number "$json" distance_p50) p99 $(number "$json" distance_p99) p99.9 $p999 spacings"
 	check "$model $label: nothing is drawn more than a pixel outside of the silhouette" [ "$stray" -eq 0 ]

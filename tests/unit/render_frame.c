@@ -318,6 +318,55 @@ static void one_sided_squares_have_no_back_and_two_sided_ones_do(void **state)
 	}
 }
 
+static void cones_cull_the_back_of_a_solid_and_nothing_else(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 4; i++) {
+		struct picture without, with;
+		for (int cones = 0; cones < 2; cones++) {
+			struct shape_options o = GREY;
+			o.cones = cones;
+			struct psr_model *model = shape_build(&o, 0.95);
+			struct psr_instance instance = place(model);
+			struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -1, -1 }, .color = { 1, 1, 1 } };
+			struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
+				                       .camera = i % 2 ? orthographic(0, i, 4, 2) : perspective(1, 2 - i, 5, 30) };
+			draw(cones ? &with : &without, &scene, 128, 128, 1);
+			psr_model_unref(model);
+		}
+		/* All that a cone removes would have had weight 0: at the silhouette such a pixel was filled, and is empty now. */
+		for (uint32_t at = 0; at < 128 * 128; at++)
+			if (pixel(&with, at % 128, at / 128) != pixel(&without, at % 128, at / 128))
+				assert_true(isinf(with.frame.depth[at]));
+		assert_true(with.frame.report.n_covered == without.frame.report.n_covered);
+		assert_int_equal(without.frame.report.n_blocks_drawn, without.frame.report.n_blocks);
+		assert_in_range(with.frame.report.n_blocks_drawn, with.frame.report.n_blocks / 2, with.frame.report.n_blocks * 9 / 10);
+		release(&without);
+		release(&with);
+	}
+}
+
+static void one_sided_squares_are_seen_through_from_behind(void **state)
+{
+	(void)state;
+	struct shape_options red = GREY, blue = GREY;
+	red.cones = blue.cones = 1;
+	red.diffuse = 0x0000ff;
+	blue.diffuse = 0xff0000;
+	struct psr_model *square = shape_build(&red, 0), *ball = shape_build(&blue, 0.5);
+	struct psr_instance instance[2] = { place(square), place(ball) };
+	instance[0].translation[2] = -1; /* its back is to the camera, the ball behind it */
+	struct psr_scene scene = { .instance = instance, .n_instances = 2, .ambient = { 1, 1, 1 },
+		                       .camera = perspective(0, 0, -4, 24) };
+	struct picture p;
+	draw(&p, &scene, 128, 128, 1);
+	assert_int_equal(pixel(&p, 64, 64), 0xff0000);
+	assert_int_equal(pixel(&p, 20, 64), 0);
+	release(&p);
+	psr_model_unref(square);
+	psr_model_unref(ball);
+}
+
 /* Diffuse and highlight of the square's middle against the formula in double. */
 static void lights_follow_phong(void **state)
 {
@@ -503,6 +552,8 @@ int main(void)
 		cmocka_unit_test(survey_coordinates_lose_nothing),
 		cmocka_unit_test(nearer_instances_hide_what_is_behind),
 		cmocka_unit_test(one_sided_squares_have_no_back_and_two_sided_ones_do),
+		cmocka_unit_test(cones_cull_the_back_of_a_solid_and_nothing_else),
+		cmocka_unit_test(one_sided_squares_are_seen_through_from_behind),
 		cmocka_unit_test(lights_follow_phong),
 		cmocka_unit_test(hard_cameras_draw_something_or_nothing),
 		cmocka_unit_test(an_empty_scene_is_background),

@@ -384,7 +384,8 @@ static void models_beyond_max_handles_are_refused(void **state)
 
 static void addresses_that_are_not_loopback_are_refused_with_advice(void **state)
 {
-	static const char *const addresses[] = { "0.0.0.0:0", "[::]:0", "192.0.2.1:7447", "tcp://10.0.0.1:0" };
+	static const char *const addresses[] = { "0.0.0.0:0", "[::]:0", "192.0.2.1:7447", "tcp://10.0.0.1:0",
+		                                       "tls://127.0.0.1:0" };
 
 	(void)state;
 	for (size_t i = 0; i < sizeof addresses / sizeof addresses[0]; i++) {

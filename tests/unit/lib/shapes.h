@@ -10,6 +10,7 @@ struct shape_options {
 	uint32_t specular;     /* 5-6-5 */
 	uint32_t exponent;     /* 0..255 */
 	int two_sided, unlit;
+	int cones;             /* with [G] 6.4's visibility cones */
 	double origin[3], scale;
 };
 

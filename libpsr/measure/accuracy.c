@@ -1,0 +1,210 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "psr/pool.h"
+#include "truth.h"
+
+/* Rays a side over the nine pixels of a neighbourhood: 4x4 in each. */
+#define OUTSIDE_SIDE 12
+
+/* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that of
+ * a diagonal neighbour's centre, 1.42 away: on a slope the two may differ by this many pixels times its tangent. */
+#define SLOPE_PIXELS 2.2
+/* Seen flatter than 85 degrees, a surface has no usable slope. */
+#define LEAST_COSINE 0.087
+
+/* [G] 7.2: within three sample spacings two depths are on one surface. */
+#define HOLE_SPACINGS 3
+
+/* In footprints of a pixel on the surface: how far a truth may lie to the side to be that of the point. */
+#define NEAR_FOOTPRINTS 1.5
+
+struct measure {
+	const struct psr_truth *truth;
+	struct view view;
+	double near_z, spacing;
+	uint32_t width, height;
+	const float *depth;      /* of the frame */
+	float *truth_depth;
+	float (*truth_normal)[3];
+	double *distance;        /* a pixel each; -1: not compared */
+	struct psr_accuracy *row; /* counts of each row */
+};
+
+/* Centre rays of the 3x3 neighbourhood that meet the object. */
+struct neighbor {
+	double point[3], normal[3], z;
+	double cosine; /* between normal and ray */
+};
+
+static int find_neighbors(const struct measure *m, uint32_t x, uint32_t y, struct neighbor neighbor[9])
+{
+	int n = 0;
+
+	for (uint32_t j = y == 0 ? 0 : y - 1; j <= y + 1 && j < m->height; j++) {
+		for (uint32_t i = x == 0 ? 0 : x - 1; i <= x + 1 && i < m->width; i++) {
+			size_t at = (size_t)j * m->width + i;
+			double origin[3], direction[3];
+
+			if (!isfinite(m->truth_depth[at]))
+				continue;
+			view_ray(&m->view, i + 0.5, j + 0.5, origin, direction);
+			neighbor[n].z = (double)m->truth_depth[at];
+			v3d_add_scaled(neighbor[n].point, origin, neighbor[n].z, direction);
+			for (int k = 0; k < 3; k++)
+				neighbor[n].normal[k] = (double)m->truth_normal[at][k];
+			v3d_normalize(direction, direction);
+			neighbor[n].cosine = fmax(LEAST_COSINE, -v3d_dot(neighbor[n].normal, direction));
+			n++;
+		}
+	}
+	return n;
+}
+
+static int is_hole(const struct measure *m, double z, const struct neighbor *neighbor, int n)
+{
+	for (int i = 0; i < n; i++) {
+		double cosine = fmin(1, neighbor[i].cosine), slope = sqrt(1 - cosine * cosine) / cosine;
+		double pixel = view_pixel(&m->view, neighbor[i].z);
+
+		if (z <= neighbor[i].z + HOLE_SPACINGS * m->spacing + SLOPE_PIXELS * pixel * slope)
+			return 0;
+	}
+	return 1;
+}
+
+/* Along the truth's normal, to the nearest of the truths beside the point; to the nearest of all if none is. */
+static double distance_to(const struct measure *m, const double point[3], const struct neighbor *neighbor, int n)
+{
+	double nearest[2] = { INFINITY, INFINITY };
+
+	for (int i = 0; i < n; i++) {
+		double d[3], along, aside, footprint = view_pixel(&m->view, neighbor[i].z) / neighbor[i].cosine;
+
+		v3d_sub(d, point, neighbor[i].point);
+		along = fabs(v3d_dot(d, neighbor[i].normal));
+		aside = sqrt(fmax(0, v3d_dot(d, d) - along * along));
+		if (aside <= NEAR_FOOTPRINTS * footprint)
+			nearest[0] = fmin(nearest[0], along);
+		nearest[1] = fmin(nearest[1], along);
+	}
+	return isfinite(nearest[0]) ? nearest[0] : nearest[1];
+}
+
+static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struct psr_accuracy *count)
+{
+	size_t at = (size_t)y * m->width + x;
+	int is_drawn = isfinite(m->depth[at]), n, is_inside;
+	struct neighbor neighbor[9];
+
+	m->distance[at] = -1;
+	n = find_neighbors(m, x, y, neighbor);
+	is_inside = n == 9;
+	count->n_truth += isfinite(m->truth_depth[at]) != 0;
+	count->n_inside += (uint64_t)is_inside;
+	count->n_inside_empty += (uint64_t)(is_inside && !is_drawn);
+	count->n_holes += (uint64_t)(is_inside && (!is_drawn || is_hole(m, (double)m->depth[at], neighbor, n)));
+	if (is_drawn && n == 0)
+		count->n_outside_drawn += (uint64_t)!truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE);
+	if (is_drawn && n != 0) {
+		double origin[3], direction[3], point[3];
+
+		view_ray(&m->view, x + 0.5, y + 0.5, origin, direction);
+		v3d_add_scaled(point, origin, (double)m->depth[at], direction);
+		m->distance[at] = distance_to(m, point, neighbor, n) / m->spacing;
+		count->n_compared++;
+	}
+}
+
+static void measure_row(int y, void *userdata)
+{
+	const struct measure *m = userdata;
+
+	memset(&m->row[y], 0, sizeof m->row[y]);
+	for (uint32_t x = 0; x < m->width; x++)
+		measure_pixel(m, x, (uint32_t)y, &m->row[y]);
+}
+
+static int compare_doubles(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+
+	return (x > y) - (x < y);
+}
+
+/* The smallest distance that at least this part of all does not exceed. */
+static double percentile(const double *sorted, uint64_t n, double part)
+{
+	uint64_t rank = (uint64_t)ceil(part * (double)n);
+
+	return n == 0 ? 0 : sorted[rank > 0 ? rank - 1 : 0];
+}
+
+static void add_up(struct psr_accuracy *out, const struct measure *m)
+{
+	uint64_t n = 0;
+
+	memset(out, 0, sizeof *out);
+	for (uint32_t y = 0; y < m->height; y++) {
+		out->n_truth += m->row[y].n_truth;
+		out->n_inside += m->row[y].n_inside;
+		out->n_outside_drawn += m->row[y].n_outside_drawn;
+		out->n_inside_empty += m->row[y].n_inside_empty;
+		out->n_holes += m->row[y].n_holes;
+		out->n_compared += m->row[y].n_compared;
+	}
+	for (size_t i = 0; i < (size_t)m->width * m->height; i++)
+		if (m->distance[i] >= 0)
+			m->distance[n++] = m->distance[i];
+	qsort(m->distance, n, sizeof *m->distance, compare_doubles);
+	out->distance_p50 = percentile(m->distance, n, 0.5);
+	out->distance_p99 = percentile(m->distance, n, 0.99);
+	out->distance_p999 = percentile(m->distance, n, 0.999);
+	out->distance_max = percentile(m->distance, n, 1);
+}
+
+static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth, const struct psr_camera *camera,
+                   int n_threads, struct psr_error *err)
+{
+	size_t n = (size_t)m->width * m->height;
+	struct psr_pool *pool;
+	int rc;
+
+	m->truth_depth = psr_alloc_array(n, sizeof *m->truth_depth);
+	m->truth_normal = psr_alloc_array(n, sizeof *m->truth_normal);
+	m->distance = psr_alloc_array(n, sizeof *m->distance);
+	m->row = psr_alloc_array(m->height, sizeof *m->row);
+	if (m->truth_depth == NULL || m->truth_normal == NULL || m->distance == NULL || m->row == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", m->width, m->height);
+	rc = psr_truth_draw(truth, camera, m->width, m->height, 1, n_threads, m->truth_depth, m->truth_normal, NULL, err);
+	if (rc != PSR_OK)
+		return rc;
+	rc = psr_pool_create(&pool, n_threads, 0);
+	if (rc != PSR_OK)
+		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+	psr_pool_for(pool, (int)m->height, measure_row, m);
+	psr_pool_destroy(pool);
+	add_up(out, m);
+	return PSR_OK;
+}
+
+int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,
+                         uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err)
+{
+	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
+		                 .depth = depth };
+	int rc = view_init(&m.view, camera, width, height, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	if (!(spacing > 0 && isfinite(spacing)))
+		return psr_fail(err, PSR_ERR_ARG, "a sample spacing of %g is not a positive length", spacing);
+	rc = measure(out, &m, truth, camera, n_threads, err);
+	psr_free(m.truth_depth);
+	psr_free(m.truth_normal);
+	psr_free(m.distance);
+	psr_free(m.row);
+	return rc;
+}

@@ -1,0 +1,159 @@
+#include "truth.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "../sample/door.h"
+#include "../sample/material.h"
+#include "../sample/ray.h"
+#include "../sample/texture.h"
+#include "psr/model.h"
+#include "psr/pool.h"
+
+#define MOST_SIDE 64
+#define RUN 64 /* rays traced together */
+
+struct psr_truth {
+	const struct psr_mesh *mesh;
+	struct ray_scene *scene;
+	double origin[3], scale;
+};
+
+struct job {
+	const struct psr_truth *truth;
+	struct view view;
+	double near_z;
+	uint32_t side, n_columns;
+	float *depth;
+	float (*normal)[3];
+	uint8_t *rgb;
+};
+
+int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err)
+{
+	struct psr_truth *truth;
+	int rc = door_check_mesh(mesh, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	truth = calloc(1, sizeof *truth);
+	if (truth == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the ray tracer");
+	truth->mesh = mesh;
+	rc = door_bound_mesh(mesh, truth->origin, &truth->scale, err);
+	if (rc == PSR_OK)
+		rc = ray_scene_create(&truth->scene, mesh, truth->origin, truth->scale, err);
+	if (rc != PSR_OK) {
+		psr_truth_destroy(truth);
+		return rc;
+	}
+	*out = truth;
+	return PSR_OK;
+}
+
+void psr_truth_destroy(struct psr_truth *truth)
+{
+	if (truth == NULL)
+		return;
+	ray_scene_destroy(truth->scene);
+	free(truth);
+}
+
+/* World to inner coordinates; t becomes z' / scale. */
+static void inner_ray(const struct psr_truth *truth, const struct view *view, double x, double y, struct ray *ray)
+{
+	view_ray(view, x, y, ray->origin, ray->direction);
+	for (int k = 0; k < 3; k++)
+		ray->origin[k] = (ray->origin[k] - truth->origin[k]) / truth->scale;
+}
+
+int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
+                 int side)
+{
+	struct ray ray[MOST_SIDE];
+	struct ray_hit hit[MOST_SIDE];
+
+	for (int j = 0; j < side; j++) {
+		for (int i = 0; i < side; i++)
+			inner_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
+		ray_scene_trace(truth->scene, ray, side, near_z / truth->scale, hit);
+		for (int i = 0; i < side; i++)
+			if (hit[i].prim != RAY_NONE)
+				return 1;
+	}
+	return 0;
+}
+
+static void put_normal(const struct job *job, const struct ray *ray, const struct ray_hit *hit, float normal[3])
+{
+	const float *n = ray_scene_normal(job->truth->scene, hit->prim);
+	double facing = 0;
+
+	for (int k = 0; k < 3; k++)
+		facing += (double)n[k] * ray->direction[k];
+	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
+}
+
+static void put_color(const struct psr_mesh *mesh, const struct ray_hit *hit, uint8_t rgb[3])
+{
+	float rgba[4];
+	uint32_t diffuse;
+
+	texture_base_color(mesh, hit->prim, hit->u, hit->v, rgba);
+	diffuse = PSR_ATTR_DIFFUSE(material_attr(&mesh->material[mesh->triangle_material[hit->prim]], rgba));
+	for (int c = 0; c < 3; c++)
+		rgb[c] = (uint8_t)(diffuse >> 8 * c);
+}
+
+static void draw_row(int row, void *userdata)
+{
+	const struct job *job = userdata;
+	struct ray ray[RUN];
+	struct ray_hit hit[RUN];
+
+	for (uint32_t first = 0; first < job->n_columns; first += RUN) {
+		uint32_t n = job->n_columns - first < RUN ? job->n_columns - first : RUN;
+		size_t at = (size_t)row * job->n_columns + first;
+
+		for (uint32_t i = 0; i < n; i++)
+			inner_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
+		ray_scene_trace(job->truth->scene, ray, (int)n, job->near_z / job->truth->scale, hit);
+		for (uint32_t i = 0; i < n; i++) {
+			int is_met = hit[i].prim != RAY_NONE;
+
+			job->depth[at + i] = is_met ? (float)(hit[i].t * job->truth->scale) : INFINITY;
+			if (job->normal != NULL) {
+				v3f_set(job->normal[at + i], 0, 0, 0);
+				if (is_met)
+					put_normal(job, &ray[i], &hit[i], job->normal[at + i]);
+			}
+			if (job->rgb != NULL) {
+				memset(job->rgb + 3 * (at + i), 0, 3);
+				if (is_met)
+					put_color(job->truth->mesh, &hit[i], job->rgb + 3 * (at + i));
+			}
+		}
+	}
+}
+
+int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height, uint32_t side,
+                   int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
+{
+	struct job job = { .truth = truth, .side = side, .near_z = camera->near_z, .depth = depth, .normal = normal,
+		               .rgb = rgb };
+	struct psr_pool *pool;
+	int rc = view_init(&job.view, camera, width, height, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	if (side < 1 || side > MOST_SIDE)
+		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are outside of 1..%d", side, MOST_SIDE);
+	rc = psr_pool_create(&pool, n_threads, 0);
+	if (rc != PSR_OK)
+		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+	job.n_columns = width * side;
+	psr_pool_for(pool, (int)(height * side), draw_row, &job);
+	psr_pool_destroy(pool);
+	return PSR_OK;
+}

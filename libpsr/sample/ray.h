@@ -1,0 +1,45 @@
+/* Rays against a mesh. Everything here is in the inner coordinates of a model: object = origin + scale * inner.
+ *
+ * Surfaces are seen as glTF asks: rays go on through the backs of one-sided faces, through texels of MASK materials
+ * below the cutoff and through BLEND ones below one half. What a ray meets is found in float by a tree, and where it meets
+ * it is computed in double from the primitive, so that a hit has the same bits wherever the same primitive is found.
+ * The tree is built by one thread and walked by the same instructions on every CPU with AVX2: the same primitive is
+ * found whatever the threads. Of faces that coincide the tree's order chooses one; and a ray that goes through a vertex
+ * to within the rounding of a float may slip between its faces. */
+#ifndef PSR_SAMPLE_RAY_H
+#define PSR_SAMPLE_RAY_H
+
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/mesh.h"
+
+#define RAY_NONE UINT32_MAX
+
+struct ray {
+	double origin[3], direction[3]; /* direction of any length but 0: t counts in it */
+};
+
+struct ray_hit {
+	uint32_t prim; /* RAY_NONE: nothing is met */
+	int is_back;   /* met from the back */
+	double t, u, v; /* position = (1 - u - v) * v0 + u * v1 + v * v2; u, v >= 0, u + v <= 1 */
+};
+
+struct ray_scene;
+
+/* The mesh must outlive the scene. scale > 0. MEMORY, INTERNAL. */
+int ray_scene_create(struct ray_scene **out, const struct psr_mesh *mesh, const double origin[3], double scale,
+                     struct psr_error *err);
+void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
+
+/* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
+void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
+
+/* u and v of the hit of a ray that is known to meet this primitive. */
+void ray_locate(const struct ray_scene *scene, const struct ray *ray, uint32_t prim, double *u, double *v);
+
+/* Corners of a primitive, and its unit normal on the front; 0,0,0 if it has no area. */
+void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corner[3][3]);
+const float *ray_scene_normal(const struct ray_scene *scene, uint32_t prim);
+
+#endif

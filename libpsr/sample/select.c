@@ -1,0 +1,245 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/maths.h"
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "cover.h"
+#include "projection.h"
+#include "sample.h"
+#include "select.h"
+
+#define N_ROTATIONS 4
+#define N_SHIFTS 4
+#define N_TESTS (N_ROTATIONS * N_SHIFTS)
+#define N_SWEEPS 2
+
+/* A sample of the projection under way, as a test wants it. */
+struct candidate {
+	struct cover_seen seen;
+	float least_z; /* a picture with less at this place misses it */
+};
+
+struct select {
+	const struct select_input *input;
+	struct selection *selection;
+	struct cover cover;
+	uint8_t *is_two_sided; /* by primitives */
+
+	/* The projection under way: */
+	unsigned projection;
+	const struct lattice *lattice;
+	float least_cosine;
+	struct candidate (*candidate)[PSR_BLOCK_SAMPLES];
+	uint64_t *eligible, *missed;
+	int failed;
+	size_t first_new; /* of the selection's blocks */
+};
+
+static int note_sides(struct select *select)
+{
+	enum { FRONT = 1, BACK = 2 };
+	uint32_t n = select->input->mesh->n_triangles;
+
+	select->is_two_sided = psr_alloc_array(n, 1);
+	if (select->is_two_sided == NULL)
+		return PSR_ERR_MEMORY;
+	memset(select->is_two_sided, 0, n);
+	for (unsigned p = 0; p < N_PROJECTIONS; p++) {
+		const struct lattice *lattice = &select->input->lattice[p];
+
+		for (uint32_t b = 0; b < lattice->n_blocks; b++) {
+			for (uint64_t left = lattice->mask[b]; left != 0; left &= left - 1) {
+				uint32_t surface = lattice->sample[b][__builtin_ctzll(left)].surface;
+
+				select->is_two_sided[surface & ~LATTICE_BACK] |= (surface & LATTICE_BACK) != 0 ? BACK : FRONT;
+			}
+		}
+	}
+	for (uint32_t i = 0; i < n; i++)
+		select->is_two_sided[i] = select->is_two_sided[i] == (FRONT | BACK);
+	return PSR_OK;
+}
+
+/* A surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
+static float tolerance_of(float cosine, double ds)
+{
+	float c = cosine > 0.03f ? cosine : 0.03f;
+
+	return (float)ds * (1 + 1.5f * sqrtf(1 - c * c) / c);
+}
+
+static void prepare_block(int b, void *userdata)
+{
+	struct select *select = userdata;
+	const struct lattice *lattice = select->lattice;
+
+	select->missed[b] = select->eligible[b] = 0;
+	for (uint64_t left = lattice->mask[b]; left != 0; left &= left - 1) {
+		unsigned s = (unsigned)__builtin_ctzll(left);
+		float cosine = sample_cosine(select->input->scene, &lattice->projection, &lattice->sample[b][s]), position[3];
+		struct candidate *candidate = &select->candidate[b][s];
+
+		if (cosine < select->least_cosine)
+			continue;
+		select->eligible[b] |= UINT64_C(1) << s;
+		sample_position(lattice, (uint32_t)b, s, position);
+		candidate->seen = cover_project(lattice->projection.axis, position);
+		candidate->least_z = candidate->seen.z - tolerance_of(cosine, select->input->ds);
+	}
+}
+
+/* One rotation and one shift of the view: S is drawn and the samples that it lacks are marked. */
+static void test_view(int test, void *userdata)
+{
+	struct select *select = userdata;
+	struct cover_grid grid;
+	float *z;
+
+	cover_grid_init(&grid, test / N_SHIFTS * 0.39269908169872414, test % 2 / 2.0, test / 2 % 2 / 2.0, select->input->ds);
+	z = psr_alloc_array((size_t)grid.side * grid.side, sizeof *z);
+	if (z == NULL) {
+		__atomic_store_n(&select->failed, 1, __ATOMIC_RELAXED);
+		return;
+	}
+	cover_draw(&select->cover, &grid, z);
+	for (uint32_t b = 0; b < select->lattice->n_blocks; b++) {
+		uint64_t missed = 0;
+
+		for (uint64_t left = select->eligible[b]; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+			const struct candidate *candidate = &select->candidate[b][s];
+
+			missed |= (uint64_t)(z[cover_pixel(&grid, &candidate->seen)] < candidate->least_z) << s;
+		}
+		if (missed != 0)
+			__atomic_fetch_or(&select->missed[b], missed, __ATOMIC_RELAXED);
+	}
+	psr_free(z);
+}
+
+static int grow_selection(struct selection *selection, size_t n_blocks, size_t n_samples)
+{
+	if (n_blocks > selection->capacity) {
+		size_t capacity = n_blocks + n_blocks / 2;
+		void *block = realloc(selection->block, capacity * sizeof *selection->block);
+
+		if (block == NULL)
+			return PSR_ERR_MEMORY;
+		selection->block = block;
+		selection->capacity = capacity;
+	}
+	if (n_samples > selection->attr_capacity) {
+		size_t capacity = n_samples + n_samples / 2;
+		void *attr = realloc(selection->attr, capacity * sizeof *selection->attr);
+
+		if (attr == NULL)
+			return PSR_ERR_MEMORY;
+		selection->attr = attr;
+		selection->attr_capacity = capacity;
+	}
+	return PSR_OK;
+}
+
+static void choose_block(struct select *select, uint32_t b)
+{
+	const struct lattice *lattice = select->lattice;
+	struct selection *selection = select->selection;
+	struct selected_block *block = &selection->block[selection->n_blocks++];
+
+	*block = (struct selected_block){ .projection = (uint16_t)select->projection, .block = b, .mask = lattice->mask[b],
+		                              .first = selection->n_samples };
+	for (unsigned s = 0; s < PSR_BLOCK_SAMPLES; s++) {
+		const struct lattice_sample *sample = &lattice->sample[b][s];
+
+		if ((block->mask >> s & 1) != 0)
+			block->two_sided |= select->is_two_sided[sample->surface & ~LATTICE_BACK];
+	}
+	selection->n_samples += (size_t)__builtin_popcountll(block->mask);
+}
+
+/* Makes the attributes of a new block, and its part of S. */
+static void fill_block(int i, void *userdata)
+{
+	struct select *select = userdata;
+	const struct selected_block *block = &select->selection->block[select->first_new + (size_t)i];
+	size_t at = block->first;
+
+	for (uint64_t left = block->mask; left != 0; left &= left - 1, at++) {
+		unsigned s = (unsigned)__builtin_ctzll(left);
+		uint32_t surface = select->lattice->sample[block->block][s].surface;
+		struct cover_point *point = &select->cover.point[at];
+
+		select->selection->attr[at] = sample_attr(select->input->mesh, select->input->scene, select->lattice, block->block, s);
+		sample_position(select->lattice, block->block, s, point->position);
+		point->normal = (uint16_t)PSR_ATTR_NORMAL(select->selection->attr[at]);
+		point->two_sided = select->is_two_sided[surface & ~LATTICE_BACK];
+	}
+}
+
+static int add_missed(struct select *select)
+{
+	struct selection *selection = select->selection;
+	size_t n_new = 0;
+
+	for (uint32_t b = 0; b < select->lattice->n_blocks; b++)
+		n_new += select->missed[b] != 0;
+	if (grow_selection(selection, selection->n_blocks + n_new, selection->n_samples + n_new * PSR_BLOCK_SAMPLES) != PSR_OK
+	    || cover_reserve(&select->cover, selection->n_samples + n_new * PSR_BLOCK_SAMPLES) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	select->first_new = selection->n_blocks;
+	for (uint32_t b = 0; b < select->lattice->n_blocks; b++)
+		if (select->missed[b] != 0)
+			choose_block(select, b);
+	select->cover.n_points = selection->n_samples;
+	psr_pool_for(select->input->pool, (int)n_new, fill_block, select);
+	return PSR_OK;
+}
+
+static int visit_projection(struct select *select, unsigned projection, float least_cosine)
+{
+	const struct lattice *lattice = &select->input->lattice[projection];
+	int rc = PSR_ERR_MEMORY;
+
+	select->projection = projection;
+	select->lattice = lattice;
+	select->least_cosine = least_cosine;
+	select->candidate = psr_alloc_array(lattice->n_blocks, sizeof *select->candidate);
+	select->missed = psr_alloc_array(lattice->n_blocks, sizeof *select->missed);
+	select->eligible = psr_alloc_array(lattice->n_blocks, sizeof *select->eligible);
+	if (select->candidate != NULL && select->missed != NULL && select->eligible != NULL) {
+		cover_look(&select->cover, lattice->projection.axis, select->input->pool);
+		psr_pool_for(select->input->pool, (int)lattice->n_blocks, prepare_block, select);
+		psr_pool_for(select->input->pool, N_TESTS, test_view, select);
+		if (!select->failed)
+			rc = add_missed(select);
+	}
+	psr_free(select->candidate);
+	psr_free(select->missed);
+	psr_free(select->eligible);
+	return rc;
+}
+
+int select_blocks(struct selection *selection, const struct select_input *input)
+{
+	struct select select = { .input = input, .selection = selection };
+	int rc;
+
+	memset(selection, 0, sizeof *selection);
+	rc = note_sides(&select);
+	for (unsigned i = 0; rc == PSR_OK && i < N_SWEEPS * N_PROJECTIONS; i++) {
+		rc = visit_projection(&select, i % N_PROJECTIONS, i < N_PROJECTIONS ? input->cosine : 0);
+		if (input->on_progress != NULL)
+			input->on_progress(i + 1, N_SWEEPS * N_PROJECTIONS, input->userdata);
+	}
+	psr_free(select.is_two_sided);
+	cover_fini(&select.cover);
+	return rc;
+}
+
+void selection_fini(struct selection *selection)
+{
+	free(selection->block);
+	free(selection->attr);
+	memset(selection, 0, sizeof *selection);
+}

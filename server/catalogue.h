@@ -1,0 +1,87 @@
+/* The catalogue: names -> files of the models folder, and the models in memory.
+ *
+ * `dragon.psr` and `dragon.glb` are both the model `dragon`. Of several files with one name the .psr wins, then the one
+ * directly in the folder, then .glb, .gltf, then the path that sorts first. A subfolder whose model files all have one
+ * stem counts with that stem (clearcoat/ClearCoatTest.gltf is `ClearCoatTest`); other subfolders are passed over, and
+ * so are hidden files and names that are not clean UTF-8 of 1 to 255 bytes. Names are looked up, never used as paths.
+ *
+ * Scanning may run on any thread; everything else belongs to the loop's. */
+#ifndef PSRD_CATALOGUE_H
+#define PSRD_CATALOGUE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/model.h"
+#include "psr/proto.h"
+
+#define CATALOGUE_MAX_FILES 65536
+#define CATALOGUE_KEY 33 /* 32 hexadecimal digits and the NUL */
+
+struct catalogue_file {
+	char name[PSR_WIRE_MAX_NAME + 1];
+	char *path;
+	int is_source;           /* has to be built first */
+	int is_nested;           /* in a subfolder */
+	uint64_t bytes, device, inode;
+	int64_t modified_ns;
+};
+
+struct catalogue_listing { /* sorted by the bytes of the names, each name once */
+	struct catalogue_file *file;
+	size_t n;
+};
+
+/* Reads the folder. IO, NOT_FOUND, LIMIT (too many files), MEMORY. */
+int catalogue_scan(struct catalogue_listing **out, const char *folder, struct psr_error *err);
+void catalogue_listing_destroy(struct catalogue_listing *listing); /* NULL is fine */
+
+/* Whether a file of this name is a source that psr-model can read, by its ending. */
+int catalogue_is_source(const char *file_name);
+
+struct catalogue_model { /* a model in memory; users are handles and scenes */
+	struct psr_model *model;
+	struct catalogue_entry *entry; /* NULL: no file leads here any more, gone with its last user */
+	char key[CATALOGUE_KEY];       /* of a built model, else "" */
+	uint64_t bytes, last_use;
+	uint32_t n_users;
+	struct catalogue_model *next;
+};
+
+struct catalogue_entry {
+	struct catalogue_file file;
+	struct catalogue_model *model; /* NULL if not in memory */
+	uint8_t content_id[16];        /* zero while not known */
+	int has_failed;                /* the last attempt to read or build it */
+	int is_stale;                  /* a source that may have changed since its model was loaded */
+};
+
+struct catalogue {
+	struct catalogue_entry *entry;
+	size_t n;
+	struct catalogue_model *models;
+	uint64_t bytes, reserved, max_bytes, clock;
+	uint32_t n_models;
+};
+
+void catalogue_init(struct catalogue *catalogue, uint64_t max_bytes);
+void catalogue_fini(struct catalogue *catalogue);
+
+/* Replaces the entries; models of files that did not change stay. Takes the listing. MEMORY: nothing changed. */
+int catalogue_adopt(struct catalogue *catalogue, struct catalogue_listing *listing);
+
+struct catalogue_entry *catalogue_find(struct catalogue *catalogue, const char *name); /* NULL if there is none */
+
+/* Makes room for a model of so many bytes, dropping the least recently used ones that nobody uses. LIMIT if the rest
+ * leaves too little. Every reservation ends in catalogue_add or catalogue_release. */
+int catalogue_reserve(struct catalogue *catalogue, uint64_t bytes, const char *name, struct psr_error *err);
+void catalogue_release(struct catalogue *catalogue, uint64_t bytes);
+
+/* Takes the model in, in place of its reservation, with one user. entry may be NULL. MEMORY: the model is given up. */
+int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
+                  struct psr_model *model, const char *key, uint64_t reserved);
+
+struct catalogue_model *catalogue_ref(struct catalogue *catalogue, struct catalogue_model *model);
+void catalogue_unref(struct catalogue *catalogue, struct catalogue_model *model);
+
+#endif

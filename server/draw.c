@@ -1,0 +1,194 @@
+#include <stdlib.h>
+#include <string.h>
+#include "base/mem.h"
+#include "draw.h"
+#include "loop.h"
+
+#define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
+
+struct draw_worker {
+	struct psr_renderer *renderer;
+	uint8_t *pixels; /* depth, then colour */
+	uint64_t capacity;
+};
+
+struct draw_worker *draw_worker_create(void)
+{
+	struct draw_worker *worker = calloc(1, sizeof *worker);
+
+	if (worker != NULL && psr_renderer_create(&worker->renderer) != PSR_OK) {
+		free(worker);
+		return NULL;
+	}
+	return worker;
+}
+
+void draw_worker_destroy(struct draw_worker *worker)
+{
+	if (worker == NULL)
+		return;
+	psr_renderer_destroy(worker->renderer);
+	psr_free(worker->pixels);
+	free(worker);
+}
+
+uint64_t draw_worker_bytes(const struct draw_worker *worker)
+{
+	return psr_renderer_bytes(worker->renderer) + worker->capacity;
+}
+
+static void make_camera(struct psr_camera *camera, const struct psr_msg_camera *wire)
+{
+	memcpy(camera->eye, wire->eye, sizeof camera->eye);
+	memcpy(camera->target, wire->target, sizeof camera->target);
+	memcpy(camera->up, wire->up, sizeof camera->up);
+	camera->kind = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = camera->kind == PSR_CAMERA_PERSPECTIVE ? wire->extent : 0;
+	camera->ortho_height = camera->kind == PSR_CAMERA_ORTHOGRAPHIC ? wire->extent : 0;
+	camera->near_z = wire->near_z;
+}
+
+static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
+{
+	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
+}
+
+static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, const struct psr_report *report,
+                        uint64_t encode_ns, uint64_t rect_bytes, uint64_t queue_ns, uint64_t total_ns)
+{
+	static const unsigned stage_id[PSR_N_STAGES] = {
+		[PSR_STAGE_PLAN] = PSR_WIRE_REPORT_PLAN, [PSR_STAGE_CULL] = PSR_WIRE_REPORT_CULL,
+		[PSR_STAGE_WARP] = PSR_WIRE_REPORT_WARP, [PSR_STAGE_GAPS] = PSR_WIRE_REPORT_GAPS,
+		[PSR_STAGE_RESOLVE] = PSR_WIRE_REPORT_RESOLVE, [PSR_STAGE_SHADE] = PSR_WIRE_REPORT_SHADE,
+		[PSR_STAGE_FILL] = PSR_WIRE_REPORT_FILL,
+	};
+
+	for (int i = 0; i < PSR_N_STAGES; i++)
+		add_entry(end, stage_id[i], report->ns[i], report->count[i]);
+	add_entry(end, PSR_WIRE_REPORT_ENCODE, encode_ns, rect_bytes);
+	add_entry(end, PSR_WIRE_REPORT_QUEUE, queue_ns, d->n_waiting);
+	add_entry(end, PSR_WIRE_REPORT_TOTAL, total_ns, (uint64_t)psr_pool_threads(d->pool));
+	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
+	add_entry(end, PSR_WIRE_REPORT_BLOCKS_DRAWN, 0, report->n_blocks_drawn);
+	add_entry(end, PSR_WIRE_REPORT_BLOCKS, 0, report->n_blocks);
+	add_entry(end, PSR_WIRE_REPORT_PIXELS_COVERED, 0, report->n_covered);
+	add_entry(end, PSR_WIRE_REPORT_PIXELS_FILLED, 0, report->n_filled);
+	add_entry(end, PSR_WIRE_REPORT_SAMPLES, 0, report->n_samples);
+	add_entry(end, PSR_WIRE_REPORT_DEPTH_LEVELS, 0, (uint64_t)__builtin_popcount(report->levels));
+	add_entry(end, PSR_WIRE_REPORT_LIGHTS, 0, d->scene->scene.n_lights);
+}
+
+static struct outq_chunk *encode_begin(const struct drawing *d, const struct codec_result *coded)
+{
+	const struct psr_msg_frame *request = &d->request;
+	const struct psr_msg_frame_begin begin = {
+		.width = request->width, .height = request->height, .planes = request->planes,
+		.color_codec = request->color_codec, .color_quality = request->color_quality,
+		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
+		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
+		.settings = { .scale = 1, .spacing_px = 1 },
+		.depth_min = coded->depth_min, .depth_max = coded->depth_max, .camera = request->camera,
+	};
+	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
+	struct psr_buf buf;
+
+	if (chunk == NULL)
+		return NULL;
+	buf = (struct psr_buf){ .data = chunk->data, .capacity = chunk->capacity };
+	if (psr_msg_frame_begin_encode(&buf, d->id, 0, &begin, NULL) != PSR_OK) {
+		outq_chunks_destroy(chunk);
+		return NULL;
+	}
+	chunk->size = buf.size;
+	return chunk;
+}
+
+static struct outq_chunk *encode_end(const struct drawing *d, const struct psr_msg_frame_end *end)
+{
+	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
+	struct psr_buf buf;
+
+	if (chunk == NULL)
+		return NULL;
+	buf = (struct psr_buf){ .data = chunk->data, .capacity = chunk->capacity };
+	if (psr_msg_frame_end_encode(&buf, d->id, 0, end, NULL) != PSR_OK) {
+		outq_chunks_destroy(chunk);
+		return NULL;
+	}
+	chunk->size = buf.size;
+	return chunk;
+}
+
+static int join_answer(struct drawing *d, const struct codec_result *coded, const struct psr_msg_frame_end *end,
+                       struct psr_error *err)
+{
+	struct outq_chunk *first = encode_begin(d, coded), *last = encode_end(d, end), *at = first;
+
+	if (first == NULL || last == NULL) {
+		outq_chunks_destroy(first);
+		outq_chunks_destroy(last);
+		outq_chunks_destroy(coded->first);
+		return psr_fail(err, PSR_ERR_INTERNAL, "the answer to a frame could not be written");
+	}
+	first->next = coded->first;
+	while (at->next != NULL)
+		at = at->next;
+	at->next = last;
+	d->answer = first;
+	return PSR_OK;
+}
+
+static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, struct psr_frame *picture,
+                          struct psr_error *err)
+{
+	uint64_t n = (uint64_t)d->request.width * d->request.height;
+	int has_depth = (d->request.planes >> PSR_WIRE_PLANE_DEPTH & 1) != 0;
+	uint64_t bytes = n * (has_depth ? 7 : 3);
+
+	if (bytes > worker->capacity) {
+		psr_free(worker->pixels);
+		worker->capacity = 0;
+		worker->pixels = psr_alloc_array(bytes, 1);
+		if (worker->pixels == NULL)
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %ux%u pixels", d->request.width,
+			                d->request.height);
+		worker->capacity = bytes;
+	}
+	picture->width = d->request.width;
+	picture->height = d->request.height;
+	picture->depth = has_depth ? (float *)(void *)worker->pixels : NULL;
+	picture->rgb = worker->pixels + (has_depth ? 4 * n : 0);
+	return PSR_OK;
+}
+
+int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
+{
+	struct psr_scene scene = d->scene->scene;
+	struct psr_settings settings;
+	struct psr_frame picture = { 0 };
+	struct codec_result coded;
+	struct psr_msg_frame_end end = { .is_final = 1, .planes = d->request.planes };
+	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
+	int code;
+
+	make_camera(&scene.camera, &d->request.camera);
+	psr_settings_default(&settings, d->request.width, d->request.height);
+	code = reserve_pixels(worker, d, &picture, err);
+	if (code == PSR_OK)
+		code = psr_render(worker->renderer, &scene, &settings, d->pool, &picture, err);
+	if (code != PSR_OK)
+		return code;
+	if (atomic_load(&d->is_abandoned))
+		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
+	drawn_us = loop_clock_us();
+	code = codec_encode(&coded, d->codec, d->pool, d->id, 0, &d->request, &picture,
+	                    d->scene->background, err);
+	if (code != PSR_OK)
+		return code;
+	end_us = loop_clock_us();
+	end.error_px = picture.report.error_bound;
+	memcpy(end.hash, coded.hash, sizeof end.hash);
+	fill_report(&end, d, &picture.report, (end_us - drawn_us) * 1000, coded.rect_bytes,
+	            (start_us - d->arrived_us) * 1000, (end_us - start_us) * 1000);
+	return join_answer(d, &coded, &end, err);
+}

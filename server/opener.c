@@ -1,0 +1,467 @@
+#define _GNU_SOURCE
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "builder.h"
+#include "cachekey.h"
+#include "conn.h"
+#include "log.h"
+#include "opener.h"
+#include "server.h"
+
+#define MAX_WAITING_PROGRESS 65536
+
+struct waiter {
+	struct waiter *next;
+	struct conn *conn;
+	uint32_t id;
+};
+
+struct opening {
+	struct opening *next;
+	struct opener *opener;
+	struct catalogue_file file; /* its path is a copy */
+	struct waiter *waiters;
+	struct psr_msg_progress progress;
+	struct loop_note note;
+	int has_job;
+	/* Belong to the job while one runs: */
+	char program[PATH_MAX], key[CATALOGUE_KEY];
+	char *cached, *temporary;   /* of a source: CACHE/KEY.psr, CACHE/KEY.psr.tmp */
+	int is_cached, was_built;
+	uint64_t bytes, reserved;
+	struct psr_model *model;
+	struct psr_error error;
+	int code;
+};
+
+struct opener {
+	struct server *server;
+	struct opening *first;
+};
+
+int opener_create(struct opener **out, struct server *server)
+{
+	struct opener *opener = calloc(1, sizeof *opener);
+
+	if (opener == NULL)
+		return PSR_ERR_MEMORY;
+	opener->server = server;
+	*out = opener;
+	return PSR_OK;
+}
+
+static void destroy_opening(struct opening *o)
+{
+	while (o->waiters != NULL) {
+		struct waiter *waiter = o->waiters;
+
+		o->waiters = waiter->next;
+		free(waiter);
+	}
+	psr_model_unref(o->model);
+	free(o->file.path);
+	free(o->cached);
+	free(o->temporary);
+	free(o);
+}
+
+void opener_destroy(struct opener *opener)
+{
+	if (opener == NULL)
+		return;
+	while (opener->first != NULL) {
+		struct opening *o = opener->first;
+
+		opener->first = o->next;
+		if (o->reserved > 0)
+			catalogue_release(&opener->server->catalogue, o->reserved);
+		destroy_opening(o);
+	}
+	free(opener);
+}
+
+static void send_progress(const struct opening *o, const struct waiter *waiter)
+{
+	uint8_t bytes[64];
+	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+
+	if (psr_msg_progress_encode(&buf, waiter->id, &o->progress, NULL) == PSR_OK)
+		conn_send(waiter->conn, &buf);
+}
+
+static void set_progress(struct opening *o, const struct psr_msg_progress *progress)
+{
+	if (progress->stage < o->progress.stage)
+		return;
+	o->progress = *progress;
+	for (struct waiter *waiter = o->waiters; waiter != NULL; waiter = waiter->next) {
+		if (waiter->conn->out.size > MAX_WAITING_PROGRESS)
+			continue; /* news for a reader that takes none would only pile up */
+		send_progress(o, waiter);
+		conn_flush(waiter->conn);
+	}
+}
+
+static void unlink_opening(struct opening *o)
+{
+	struct opening **at = &o->opener->first;
+
+	while (*at != o)
+		at = &(*at)->next;
+	*at = o->next;
+}
+
+/* The entry that this opening is about, if the catalogue still has it. */
+static struct catalogue_entry *entry_of(const struct opening *o)
+{
+	struct catalogue_entry *entry = catalogue_find(&o->opener->server->catalogue, o->file.name);
+
+	return entry != NULL && strcmp(entry->file.path, o->file.path) == 0 ? entry : NULL;
+}
+
+static void end(struct opening *o, struct catalogue_model *model, int code, const char *text)
+{
+	unlink_opening(o);
+	if (model == NULL)
+		log_info("model %s: %s", o->file.name, text);
+	while (o->waiters != NULL) {
+		struct waiter *waiter = o->waiters;
+
+		o->waiters = waiter->next;
+		if (model != NULL)
+			session_opened(waiter->conn, waiter->id, model);
+		else
+			session_refuse(waiter->conn, waiter->id, 0, code, text);
+		conn_flush(waiter->conn);
+		free(waiter);
+	}
+	destroy_opening(o);
+}
+
+/* What the system refuses now it may grant later; anything else is the file's fault and shows in the list. */
+static void end_failed(struct opening *o, const struct psr_error *error)
+{
+	struct catalogue_entry *entry = entry_of(o);
+
+	if (entry != NULL && (error->code == PSR_ERR_FORMAT || error->code == PSR_ERR_VERSION
+	                      || error->code == PSR_ERR_UNSUPPORTED || error->code == PSR_ERR_INTERNAL))
+		entry->has_failed = 1;
+	end(o, NULL, error->code, error->text);
+}
+
+static void submit(struct opening *o, void (*job)(void *), void (*then)(void *))
+{
+	o->note = (struct loop_note){ .fn = then, .userdata = o };
+	o->has_job = psr_pool_submit(o->opener->server->io, job, o) == PSR_OK;
+	if (!o->has_job)
+		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
+}
+
+static void post(struct opening *o)
+{
+	loop_post(&o->opener->server->loop, &o->note);
+}
+
+static void load_job(void *userdata)
+{
+	struct opening *o = userdata;
+
+	o->code = PSR_OK;
+	if (o->was_built && rename(o->temporary, o->cached) != 0 && !(errno == ENOENT && access(o->cached, R_OK) == 0))
+		o->code = psr_fail(&o->error, PSR_ERR_IO, "%s: %s", o->cached, strerror(errno));
+	if (o->code == PSR_OK)
+		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
+	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
+		o->code = psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
+	if (o->code != PSR_OK && o->file.is_source && o->code == PSR_ERR_FORMAT)
+		unlink(o->cached); /* damaged: the next OPEN builds it again */
+	post(o);
+}
+
+/* Errors name the model; folders of the server are nobody's business. */
+static void name_error(struct opening *o)
+{
+	const char *path = o->file.is_source ? o->cached : o->file.path;
+	char text[PSR_ERROR_TEXT];
+	const char *rest = o->error.text;
+
+	if (path != NULL && strncmp(rest, path, strlen(path)) == 0)
+		rest += strlen(path) + strspn(rest + strlen(path), ": ");
+	snprintf(text, sizeof text, "model %.200s: %.300s", o->file.name, rest);
+	memcpy(o->error.text, text, sizeof text);
+}
+
+static void on_loaded(void *userdata)
+{
+	struct opening *o = userdata;
+	struct catalogue *catalogue = &o->opener->server->catalogue;
+	struct psr_model *model = o->model;
+	struct catalogue_model *added;
+	uint64_t reserved = o->reserved;
+
+	o->has_job = 0;
+	o->reserved = 0;
+	o->model = NULL;
+	if (o->code != PSR_OK) {
+		catalogue_release(catalogue, reserved);
+		name_error(o);
+		end_failed(o, &o->error);
+		return;
+	}
+	if (catalogue_add(&added, catalogue, entry_of(o), model, o->key, reserved) != PSR_OK) {
+		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
+		return;
+	}
+	log_info("model %s: loaded, %.1f MB", o->file.name, (double)added->bytes * 1e-6);
+	end(o, added, PSR_OK, NULL);
+	catalogue_unref(catalogue, added);
+}
+
+static void load(struct opening *o)
+{
+	int code = catalogue_reserve(&o->opener->server->catalogue, o->bytes, o->file.name, &o->error);
+
+	if (code != PSR_OK) {
+		end_failed(o, &o->error);
+		return;
+	}
+	o->reserved = o->bytes;
+	set_progress(o, &(struct psr_msg_progress){ .stage = PSR_PROGRESS_LOAD });
+	submit(o, load_job, on_loaded);
+}
+
+static void on_build_progress(const struct psr_msg_progress *progress, void *userdata)
+{
+	set_progress(userdata, progress);
+}
+
+static void on_built(const struct psr_error *failure, void *userdata)
+{
+	struct opening *o = userdata;
+	struct stat status;
+
+	if (failure != NULL) {
+		end_failed(o, failure);
+		return;
+	}
+	o->was_built = 1;
+	if (stat(o->temporary, &status) != 0) {
+		psr_fail(&o->error, PSR_ERR_INTERNAL, "%s: psr-model left no file", o->file.name);
+		end_failed(o, &o->error);
+		return;
+	}
+	o->bytes = (uint64_t)status.st_size;
+	load(o);
+}
+
+static int make_folders(const char *path, struct psr_error *err)
+{
+	char *copy = strdup(path);
+
+	if (copy == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
+	for (char *at = copy + 1;; at++) {
+		if (*at == '/' || *at == '\0') {
+			char was = *at;
+
+			*at = '\0';
+			if (mkdir(copy, 0700) != 0 && errno != EEXIST) {
+				int code = psr_fail(err, PSR_ERR_IO, "the cache %s cannot be made: %s", copy, strerror(errno));
+
+				free(copy);
+				return code;
+			}
+			*at = was;
+			if (was == '\0')
+				break;
+		}
+	}
+	free(copy);
+	return PSR_OK;
+}
+
+static int prepare_source(struct opening *o)
+{
+	const char *cache = o->opener->server->options->cache;
+	struct stat status;
+	int code = builder_find_program(o->program, &o->error);
+
+	if (code == PSR_OK)
+		code = cachekey_find(o->key, o->file.path, o->program, &o->error);
+	if (code == PSR_OK)
+		code = make_folders(cache, &o->error);
+	if (code != PSR_OK)
+		return code;
+	if (asprintf(&o->cached, "%s/%s.psr", cache, o->key) < 0)
+		o->cached = NULL;
+	if (asprintf(&o->temporary, "%s/%s.psr.tmp", cache, o->key) < 0)
+		o->temporary = NULL;
+	if (o->cached == NULL || o->temporary == NULL)
+		return psr_fail(&o->error, PSR_ERR_MEMORY, "no memory");
+	o->is_cached = stat(o->cached, &status) == 0;
+	if (o->is_cached)
+		o->bytes = (uint64_t)status.st_size;
+	return PSR_OK;
+}
+
+static void prepare_job(void *userdata)
+{
+	struct opening *o = userdata;
+	struct stat status;
+
+	o->code = PSR_OK;
+	if (o->file.is_source)
+		o->code = prepare_source(o);
+	else if (stat(o->file.path, &status) == 0)
+		o->bytes = (uint64_t)status.st_size;
+	else
+		o->code = psr_fail(&o->error, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s", strerror(errno));
+	post(o);
+}
+
+static void on_prepared(void *userdata)
+{
+	struct opening *o = userdata;
+	struct server *server = o->opener->server;
+	struct catalogue_entry *entry = entry_of(o);
+	const struct psr_error *failure;
+
+	o->has_job = 0;
+	if (server->is_draining) {
+		end(o, NULL, PSR_ERR_CANCELLED, "the server is shutting down");
+		return;
+	}
+	if (o->code != PSR_OK) {
+		name_error(o);
+		end_failed(o, &o->error);
+		return;
+	}
+	if (o->file.is_source && entry != NULL && entry->model != NULL && strcmp(entry->model->key, o->key) == 0) {
+		struct catalogue_model *model = catalogue_ref(&server->catalogue, entry->model);
+
+		entry->is_stale = 0;
+		end(o, model, PSR_OK, NULL);
+		catalogue_unref(&server->catalogue, model);
+		return;
+	}
+	if (!o->file.is_source || o->is_cached) {
+		load(o);
+		return;
+	}
+	failure = builder_failure(server->builder, o->key);
+	if (failure != NULL)
+		end_failed(o, failure);
+	else if (builder_start(server->builder, o->program, o->key, o->file.path, o->temporary, on_build_progress, on_built, o)
+	         != PSR_OK)
+		end(o, NULL, PSR_ERR_MEMORY, "no memory to build a model");
+}
+
+static struct opening *start(struct opener *opener, const struct catalogue_entry *entry)
+{
+	struct opening *o = calloc(1, sizeof *o);
+
+	if (o == NULL)
+		return NULL;
+	o->opener = opener;
+	o->file = entry->file;
+	o->file.path = strdup(entry->file.path);
+	if (o->file.path == NULL) {
+		free(o);
+		return NULL;
+	}
+	o->next = opener->first;
+	opener->first = o;
+	return o;
+}
+
+void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const char *name)
+{
+	struct catalogue_entry *entry = catalogue_find(&opener->server->catalogue, name);
+	struct opening *o = opener->first;
+	struct waiter *waiter;
+	char text[PSR_ERROR_TEXT];
+	int is_new;
+
+	if (entry == NULL) {
+		snprintf(text, sizeof text, "there is no model %.255s; LIST tells the names of all", name);
+		session_refuse(conn, id, 0, PSR_ERR_NOT_FOUND, text);
+		return;
+	}
+	if (entry->model != NULL && !entry->is_stale) {
+		session_opened(conn, id, entry->model);
+		return;
+	}
+	while (o != NULL && strcmp(o->file.path, entry->file.path) != 0)
+		o = o->next;
+	is_new = o == NULL;
+	waiter = calloc(1, sizeof *waiter);
+	if (waiter != NULL && is_new)
+		o = start(opener, entry);
+	if (waiter == NULL || o == NULL) {
+		free(waiter);
+		session_refuse(conn, id, 0, PSR_ERR_MEMORY, "no memory to open a model");
+		return;
+	}
+	*waiter = (struct waiter){ .next = o->waiters, .conn = conn, .id = id };
+	o->waiters = waiter;
+	send_progress(o, waiter);
+	if (is_new)
+		submit(o, prepare_job, on_prepared);
+}
+
+static int remove_waiters(struct opener *opener, const struct conn *conn, uint32_t id, int all)
+{
+	int n = 0;
+
+	for (struct opening *o = opener->first; o != NULL; o = o->next) {
+		struct waiter **at = &o->waiters;
+
+		while (*at != NULL) {
+			struct waiter *waiter = *at;
+
+			if (waiter->conn == conn && (all || waiter->id == id)) {
+				*at = waiter->next;
+				free(waiter);
+				n++;
+			} else {
+				at = &waiter->next;
+			}
+		}
+	}
+	return n;
+}
+
+int opener_cancel(struct opener *opener, struct conn *conn, uint32_t id)
+{
+	return remove_waiters(opener, conn, id, 0);
+}
+
+void opener_forget(struct opener *opener, struct conn *conn)
+{
+	remove_waiters(opener, conn, 0, 1);
+}
+
+void opener_refuse_all(struct opener *opener, int code, const char *text)
+{
+	for (struct opening *o = opener->first; o != NULL; o = o->next) {
+		while (o->waiters != NULL) {
+			struct waiter waiter = *o->waiters;
+
+			free(o->waiters);
+			o->waiters = waiter.next;
+			session_refuse(waiter.conn, waiter.id, 0, code, text);
+		}
+	}
+}
+
+int opener_is_working(const struct opener *opener)
+{
+	for (const struct opening *o = opener->first; o != NULL; o = o->next)
+		if (o->has_job)
+			return 1;
+	return 0;
+}

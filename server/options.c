@@ -1,0 +1,239 @@
+#define _GNU_SOURCE
+#include <ctype.h>
+#include <errno.h>
+#include <sched.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "options.h"
+#include "psr/cli.h"
+
+#define MAX_OPTIONS 32
+#define MAX_CONFIG 65536
+#define MEBI 1048576.0
+
+static int on_listen(const char *text, void *userdata, struct psr_error *err)
+{
+	struct options *options = userdata;
+
+	if (options->n_listen == OPTIONS_MAX_LISTEN)
+		return psr_fail(err, PSR_ERR_LIMIT, "there are at most %d listeners", OPTIONS_MAX_LISTEN);
+	options->listen[options->n_listen++] = text;
+	return PSR_OK;
+}
+
+static int count_cores(void)
+{
+	cpu_set_t set;
+	int n = 1;
+
+	if (sched_getaffinity(0, sizeof set, &set) == 0)
+		n = CPU_COUNT(&set);
+	return n < 1 ? 1 : n > 256 ? 256 : n;
+}
+
+static char *find_cache(void)
+{
+	const char *base = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+	char *path = NULL;
+	int n;
+
+	if (base != NULL && base[0] == '/')
+		n = asprintf(&path, "%s/psr/built", base);
+	else
+		n = asprintf(&path, "%s/.cache/psr/built", home != NULL && home[0] == '/' ? home : "/tmp");
+	return n < 0 ? NULL : path;
+}
+
+static int set_defaults(struct options *options)
+{
+	*options = (struct options){
+		.threads = count_cores(),
+		.max_clients = 64, .max_open = 64, .max_handles = 64, .max_builds = 1,
+		.max_pixels = INT64_C(16) << 20,
+		.max_memory = INT64_C(4) << 30, .max_queue = INT64_C(32) << 20, .build_memory = INT64_C(16) << 30,
+		.handshake_timeout = 10, .idle_timeout = 600, .slow_timeout = 30, .drain_timeout = 5,
+		.build_time = 3600,
+	};
+	options->cache = options->cache_default = find_cache();
+	return options->cache != NULL ? PSR_OK : PSR_ERR_MEMORY;
+}
+
+static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int seen[MAX_OPTIONS])
+{
+	const struct psr_opt opts[] = {
+		{ .name = "listen", .letter = 'l', .type = PSR_OPT_CALL, .value = o, .arg = "ADDR:PORT|unix:PATH", .call = on_listen,
+		  .help = "Where to serve; repeatable. Port 0 is any free one, IPv6 stands in brackets, tcp:// may stand before."
+		          " TCP serves loopback addresses only. [" OPTIONS_LISTEN_DEFAULT "]" },
+		{ .name = "models", .letter = 'm', .type = PSR_OPT_STRING, .value = &o->models, .arg = "DIR",
+		  .help = "Folder of models: .psr files, and sources that are built on first use. Required." },
+		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
+		  .help = "Threads that draw and encode; as many frames are drawn at once." },
+		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
+		  .help = "Where models built from sources are kept." },
+		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
+		  .help = "Reads `name = value` lines, names as here without the dashes; the command line wins." },
+		{ .name = "max-clients", .type = PSR_OPT_INT, .value = &o->max_clients, .arg = "N", .min = 1, .max = 65536,
+		  .help = "Connections at once; further ones are told that the server is full." },
+		{ .name = "max-open", .type = PSR_OPT_INT, .value = &o->max_open, .arg = "N", .min = 1, .max = 64,
+		  .help = "Unanswered requests of a connection; further ones are answered `busy`." },
+		{ .name = "max-handles", .type = PSR_OPT_INT, .value = &o->max_handles, .arg = "N", .min = 1, .max = 65536,
+		  .help = "Open models of a connection." },
+		{ .name = "max-pixels", .type = PSR_OPT_INT, .value = &o->max_pixels, .arg = "N", .min = 1, .max = 64 * MEBI,
+		  .help = "Pixels of a frame." },
+		{ .name = "max-memory", .type = PSR_OPT_INT, .value = &o->max_memory, .arg = "BYTES", .min = MEBI, .max = 1e15,
+		  .help = "Models in memory; those that nobody uses make room for others." },
+		{ .name = "max-queue", .type = PSR_OPT_INT, .value = &o->max_queue, .arg = "BYTES", .min = 65536, .max = 1e12,
+		  .help = "Bytes that wait for a slow reader before its requests wait too; a single frame may exceed it." },
+		{ .name = "handshake-timeout", .type = PSR_OPT_REAL, .value = &o->handshake_timeout, .arg = "SECONDS",
+		  .min = 0.05, .max = 3600, .help = "A connection that has not said HELLO by then is closed." },
+		{ .name = "idle-timeout", .type = PSR_OPT_REAL, .value = &o->idle_timeout, .arg = "SECONDS",
+		  .min = 0, .max = 1e6, .help = "A connection silent for so long, with nothing to be answered, is closed; 0: never." },
+		{ .name = "slow-timeout", .type = PSR_OPT_REAL, .value = &o->slow_timeout, .arg = "SECONDS",
+		  .min = 0.05, .max = 3600, .help = "A reader that takes less than 64 KiB of what waits for it in that time is closed." },
+		{ .name = "drain-timeout", .type = PSR_OPT_REAL, .value = &o->drain_timeout, .arg = "SECONDS",
+		  .min = 0, .max = 3600, .help = "How long the end waits for frames under way and for their readers." },
+		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
+		  .help = "Sources that are built at once; others wait." },
+		{ .name = "build-memory", .type = PSR_OPT_INT, .value = &o->build_memory, .arg = "BYTES", .min = 64 * MEBI,
+		  .max = 1e15, .help = "Address space of one build." },
+		{ .name = "build-time", .type = PSR_OPT_INT, .value = &o->build_time, .arg = "SECONDS", .min = 1, .max = 1e6,
+		  .help = "Processor time of one build, all its threads together." },
+		{ .name = "verbose", .letter = 'v', .type = PSR_OPT_FLAG, .value = &o->verbose,
+		  .help = "Logs connections, models and builds on standard error." },
+		{ .name = "version", .type = PSR_OPT_FLAG, .value = &o->version, .help = "Prints the version and exits." },
+		{ .name = NULL },
+	};
+	size_t n = sizeof opts / sizeof opts[0];
+
+	_Static_assert(sizeof opts / sizeof opts[0] <= MAX_OPTIONS, "the table is too small");
+	memcpy(table, opts, sizeof opts);
+	for (size_t i = 0; i < n; i++)
+		table[i].seen = &seen[i];
+}
+
+static int read_config(char **out, const char *path, struct psr_error *err)
+{
+	FILE *file = fopen(path, "re");
+	char *text;
+	size_t n;
+
+	if (file == NULL)
+		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "--config %s: %s", path, strerror(errno));
+	text = malloc(MAX_CONFIG + 1);
+	if (text == NULL) {
+		fclose(file);
+		return psr_fail(err, PSR_ERR_MEMORY, "--config %s: no memory", path);
+	}
+	n = fread(text, 1, MAX_CONFIG + 1, file);
+	if (ferror(file) || n > MAX_CONFIG || memchr(text, '\0', n) != NULL) {
+		int failed = ferror(file);
+
+		fclose(file);
+		free(text);
+		return failed ? psr_fail(err, PSR_ERR_IO, "--config %s: %s", path, strerror(errno))
+		              : psr_fail(err, PSR_ERR_ARG, "--config %s: not a text file of at most 64 KiB", path);
+	}
+	fclose(file);
+	text[n] = '\0';
+	*out = text;
+	return PSR_OK;
+}
+
+static char *trim(char *text)
+{
+	char *end;
+
+	while (isspace((unsigned char)*text))
+		text++;
+	end = text + strlen(text);
+	while (end > text && isspace((unsigned char)end[-1]))
+		end--;
+	*end = '\0';
+	return text;
+}
+
+static int is_given(const struct psr_opt *table, const int *given, const char *name)
+{
+	for (int i = 0; table[i].name != NULL; i++)
+		if (strcmp(table[i].name, name) == 0)
+			return given[i] > 0;
+	return 0;
+}
+
+/* What the command line gave stays as it is; the rest of the file is set in order. */
+static int apply_config(const struct psr_cli *cli, const int *given, struct options *options, struct psr_error *err)
+{
+	char *next = options->config_text, *line;
+	struct psr_error inner;
+
+	for (int number = 1; (line = strsep(&next, "\n")) != NULL; number++) {
+		char *value, *name = trim(line);
+		int code;
+
+		if (name[0] == '\0' || name[0] == '#')
+			continue;
+		value = strchr(name, '=');
+		if (value == NULL)
+			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: '%.80s' is not `name = value`", options->config, number, name);
+		*value++ = '\0';
+		name = trim(name);
+		value = trim(value);
+		if (strcmp(name, "config") == 0 || strcmp(name, "version") == 0)
+			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: `%s` belongs on the command line", options->config, number, name);
+		if (is_given(cli->opts, given, name))
+			continue;
+		code = psr_cli_set(cli, name, value, &inner);
+		if (code != PSR_OK)
+			return psr_fail(err, code, "%.200s, line %d: %.280s", options->config, number, inner.text);
+	}
+	return PSR_OK;
+}
+
+int options_parse(struct options *options, int argc, char **argv, struct psr_error *err)
+{
+	struct psr_opt table[MAX_OPTIONS];
+	int seen[MAX_OPTIONS] = { 0 }, given[MAX_OPTIONS], n_operands = 0, code;
+	const struct psr_cli cli = {
+		.usage = "psrd --models DIR [--listen ADDR:PORT|unix:PATH]... [options]",
+		.summary = "Holds point-sample models in memory and draws frames of them for thin clients (psr).",
+		.opts = table,
+		.footer = "Once it serves, psrd prints `READY ADDR:PORT` or `READY unix:PATH`, a line a listener, on standard output.\n"
+		          "SIGTERM ends it after the frames under way, SIGHUP reads the models folder again.\n"
+		          "Exit codes: 0 ok, 2 usage, 3 file or system, 5 over a limit, 7 internal. More in psrd(1).",
+	};
+
+	if (set_defaults(options) != PSR_OK)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
+	fill_table(table, options, seen);
+	code = psr_cli_parse(&cli, argc, argv, &n_operands, err);
+	if (code != PSR_OK)
+		return code;
+	if (options->version) {
+		printf("psrd %s\n", PSR_VERSION);
+		return 1;
+	}
+	if (n_operands > 0)
+		return psr_fail(err, PSR_ERR_ARG, "unexpected argument '%.80s'; --help shows the usage", argv[1]);
+	if (options->config != NULL) {
+		memcpy(given, seen, sizeof given);
+		code = read_config(&options->config_text, options->config, err);
+		if (code == PSR_OK)
+			code = apply_config(&cli, given, options, err);
+		if (code != PSR_OK)
+			return code;
+	}
+	if (options->models == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "--models DIR is missing: it names the folder of models");
+	if (options->n_listen == 0)
+		options->listen[options->n_listen++] = OPTIONS_LISTEN_DEFAULT;
+	return PSR_OK;
+}
+
+void options_fini(struct options *options)
+{
+	free(options->cache_default);
+	free(options->config_text);
+	options->cache_default = options->config_text = NULL;
+}

@@ -1,0 +1,116 @@
+#include <assert.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/srgb.h"
+#include "session_scene.h"
+
+#define HALF_PI 1.57079632679489661923
+
+struct scene *scene_ref(struct scene *scene)
+{
+	scene->n_refs++;
+	return scene;
+}
+
+void scene_unref(struct scene *scene)
+{
+	if (scene == NULL)
+		return;
+	assert(scene->n_refs > 0);
+	if (--scene->n_refs > 0)
+		return;
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
+		catalogue_unref(scene->catalogue, scene->model[i]);
+	free(scene->instance);
+	free(scene->model);
+	free(scene);
+}
+
+static int add_instance(struct scene *scene, const struct session *session, const struct psr_msg_instance *msg,
+                        struct psr_error *err)
+{
+	uint32_t number = scene->scene.n_instances, i = 0;
+	struct psr_instance *instance = &scene->instance[number];
+	double norm = 0;
+
+	if (msg->representation != PSR_WIRE_REP_AUTO && msg->representation != PSR_WIRE_REP_BLOCKS)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %" PRIu32 " asks for representation %u; this server draws blocks "
+		                "(1, or 0 for automatic)", number, msg->representation);
+	while (i < session->n_handles && session->handle[i].number != msg->handle)
+		i++;
+	if (i == session->n_handles)
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it",
+		                number, msg->handle);
+	for (int k = 0; k < 4; k++)
+		norm += msg->rotation[k] * msg->rotation[k];
+	norm = sqrt(norm);
+	instance->model = session->handle[i].model->model;
+	for (int k = 0; k < 4; k++)
+		instance->rotation[k] = msg->rotation[k] / norm;
+	memcpy(instance->translation, msg->translation, sizeof instance->translation);
+	instance->scale = msg->scale;
+	scene->model[number] = catalogue_ref(scene->catalogue, session->handle[i].model);
+	scene->scene.n_instances++;
+	return PSR_OK;
+}
+
+static int add_light(struct scene *scene, const struct psr_msg_light *msg, struct psr_error *err)
+{
+	uint32_t number = scene->scene.n_lights++;
+	struct psr_light *light = &scene->light[number];
+
+	if (msg->flags & PSR_WIRE_LIGHT_SHADOW)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 " casts shadows, which this server does not draw", number);
+	if (msg->kind == PSR_WIRE_LIGHT_SPOT && msg->outer > HALF_PI)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 ": a spot's half angle is 90 degrees at most on this server",
+		                number);
+	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
+	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
+	memcpy(light->position, msg->position, sizeof light->position);
+	memcpy(light->direction, msg->direction, sizeof light->direction);
+	for (int k = 0; k < 3; k++)
+		light->color[k] = (double)psr_srgb_to_linear[msg->color[k]] * msg->intensity;
+	light->outer = msg->outer;
+	/* The wire allows a hard edge, the renderer wants inner < outer. */
+	light->inner = msg->inner < msg->outer ? msg->inner : msg->outer * (1 - 1e-6);
+	light->reference = msg->reference;
+	return PSR_OK;
+}
+
+int scene_create(struct scene **out, const struct session *session, struct catalogue *catalogue,
+                 const struct psr_msg_scene *msg, struct psr_error *err)
+{
+	struct scene *scene;
+	int code = PSR_OK;
+
+	if (msg->flags & PSR_WIRE_SCENE_APPEND)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not append to scenes; send the whole scene");
+	scene = calloc(1, sizeof *scene);
+	if (scene == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
+	scene->n_refs = 1;
+	scene->catalogue = catalogue;
+	scene->instance = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->instance);
+	scene->model = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->model);
+	if (scene->instance == NULL || scene->model == NULL)
+		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
+	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
+		code = add_instance(scene, session, &msg->instance[i], err);
+	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
+		code = add_light(scene, &msg->light[i], err);
+	if (code != PSR_OK) {
+		scene_unref(scene);
+		return code;
+	}
+	scene->scene.instance = scene->instance;
+	scene->scene.light = scene->light;
+	for (int k = 0; k < 3; k++) {
+		scene->background[k] = msg->background[k];
+		scene->scene.ambient[k] = msg->ambient;
+		scene->scene.background[k] = (double)psr_srgb_to_linear[msg->background[k]];
+	}
+	*out = scene;
+	return PSR_OK;
+}
