@@ -239,8 +239,8 @@ static int run(struct build *build, struct psr_error *err)
 	struct builder *builder = build->builder;
 	char threads[16];
 	const char *argv[] = {
-		build->program, "build", build->source, "-o", build->target, "--progress-fd", "3", "--quiet", "--threads", threads,
-		NULL,
+		build->program, "build", build->source, "-o", build->target, "--progress-fd", "3", "--quiet",
+		"--threads", threads, NULL,
 	};
 	const struct spawn_limits limits = {
 		.memory_bytes = builder->limits.memory_bytes, .cpu_seconds = builder->limits.cpu_seconds, .nice = 10,

@@ -137,7 +137,8 @@ static int hash_neighbours(XXH3_state_t *state, const char *source, struct psr_e
 	free(list.line);
 	free(folder);
 	if (code == PSR_ERR_LIMIT)
-		return psr_fail(err, code, "%s: more than %d files lie beside it; give it a folder of its own", source, MAX_NEIGHBOURS);
+		return psr_fail(err, code, "%s: more than %d files lie beside it; give it a folder of its own", source,
+		                MAX_NEIGHBOURS);
 	return code == PSR_OK ? PSR_OK : psr_fail(err, code, "%s: its folder cannot be read", source);
 }
 

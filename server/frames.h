@@ -20,8 +20,9 @@ void frames_destroy(struct frames *frames); /* after the pool has ended; NULL is
 /* Queues a checked request; keeps a reference to the scene. Without memory it is refused. */
 void frames_ask(struct frames *frames, struct conn *conn, uint32_t id, const struct psr_msg_frame *request,
                 struct scene *scene);
-int frames_cancel(struct frames *frames, struct conn *conn, uint32_t id); /* 1 if it was open: no answer comes any more */
-void frames_forget(struct frames *frames, struct conn *conn);             /* it closes: all its requests are dropped */
+/* 1 if it was open: no answer comes any more. */
+int frames_cancel(struct frames *frames, struct conn *conn, uint32_t id);
+void frames_forget(struct frames *frames, struct conn *conn); /* it closes: all its requests are dropped */
 void frames_refuse_waiting(struct frames *frames, struct conn *conn, int code, const char *text);
 
 void frames_pump(struct frames *frames); /* starts what can start; after a queue has shrunk */

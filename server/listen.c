@@ -98,8 +98,8 @@ static int open_tcp(struct listener *listeners, int max, int *n, const char *tex
 		if (!is_loopback(info->ai_addr)) {
 			freeaddrinfo(list);
 			return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: not a loopback address, and this psrd has neither encryption "
-			                "nor tokens; listen on 127.0.0.1 and let clients come through `ssh -L 7447:127.0.0.1:7447 HOST`, "
-			                "or on unix:PATH", address);
+			                "nor tokens; listen on 127.0.0.1 and let clients come through "
+			                "`ssh -L 7447:127.0.0.1:7447 HOST`, or on unix:PATH", address);
 		}
 	}
 	*n = 0;

@@ -12,7 +12,7 @@ void log_set_verbose(int verbose)
 	is_verbose = verbose;
 }
 
-/* One write a line, so that lines of several threads do not mix. What comes from outside may hold control characters. */
+/* One write a line, so that lines of several threads do not mix. Control characters may come from outside. */
 static void write_line(const char *format, va_list args)
 {
 	char line[1024];

@@ -1,42 +1,16 @@
 #define _GNU_SOURCE
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include "builder.h"
-#include "cachekey.h"
 #include "conn.h"
 #include "log.h"
 #include "opener.h"
+#include "opening.h"
 #include "server.h"
 
 #define MAX_WAITING_PROGRESS 65536
-
-struct waiter {
-	struct waiter *next;
-	struct conn *conn;
-	uint32_t id;
-};
-
-struct opening {
-	struct opening *next;
-	struct opener *opener;
-	struct catalogue_file file; /* its path is a copy */
-	struct waiter *waiters;
-	struct psr_msg_progress progress;
-	struct loop_note note;
-	int has_job;
-	/* Belong to the job while one runs: */
-	char program[PATH_MAX], key[CATALOGUE_KEY];
-	char *cached, *temporary;   /* of a source: CACHE/KEY.psr, CACHE/KEY.psr.tmp */
-	int is_cached, was_built;
-	uint64_t bytes, reserved;
-	struct psr_model *model;
-	struct psr_error error;
-	int code;
-};
 
 struct opener {
 	struct server *server;
@@ -161,27 +135,6 @@ static void submit(struct opening *o, void (*job)(void *), void (*then)(void *))
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
 }
 
-static void post(struct opening *o)
-{
-	loop_post(&o->opener->server->loop, &o->note);
-}
-
-static void load_job(void *userdata)
-{
-	struct opening *o = userdata;
-
-	o->code = PSR_OK;
-	if (o->was_built && rename(o->temporary, o->cached) != 0 && !(errno == ENOENT && access(o->cached, R_OK) == 0))
-		o->code = psr_fail(&o->error, PSR_ERR_IO, "%s: %s", o->cached, strerror(errno));
-	if (o->code == PSR_OK)
-		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
-	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
-		o->code = psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
-	if (o->code != PSR_OK && o->file.is_source && o->code == PSR_ERR_FORMAT)
-		unlink(o->cached); /* damaged: the next OPEN builds it again */
-	post(o);
-}
-
 /* Errors name the model; folders of the server are nobody's business. */
 static void name_error(struct opening *o)
 {
@@ -194,6 +147,8 @@ static void name_error(struct opening *o)
 	snprintf(text, sizeof text, "model %.200s: %.300s", o->file.name, rest);
 	memcpy(o->error.text, text, sizeof text);
 }
+
+static void build(struct opening *o);
 
 static void on_loaded(void *userdata)
 {
@@ -208,6 +163,13 @@ static void on_loaded(void *userdata)
 	o->model = NULL;
 	if (o->code != PSR_OK) {
 		catalogue_release(catalogue, reserved);
+		if (o->is_cached && (o->code == PSR_ERR_FORMAT || o->code == PSR_ERR_VERSION)
+		    && !o->opener->server->is_draining) {
+			log_warn("%s is damaged, it is built again", o->cached);
+			o->is_cached = 0;
+			build(o);
+			return;
+		}
 		name_error(o);
 		end_failed(o, &o->error);
 		return;
@@ -231,7 +193,7 @@ static void load(struct opening *o)
 	}
 	o->reserved = o->bytes;
 	set_progress(o, &(struct psr_msg_progress){ .stage = PSR_PROGRESS_LOAD });
-	submit(o, load_job, on_loaded);
+	submit(o, opening_load, on_loaded);
 }
 
 static void on_build_progress(const struct psr_msg_progress *progress, void *userdata)
@@ -258,69 +220,16 @@ static void on_built(const struct psr_error *failure, void *userdata)
 	load(o);
 }
 
-static int make_folders(const char *path, struct psr_error *err)
+static void build(struct opening *o)
 {
-	char *copy = strdup(path);
+	struct builder *builder = o->opener->server->builder;
+	const struct psr_error *failure = builder_failure(builder, o->key);
 
-	if (copy == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
-	for (char *at = copy + 1;; at++) {
-		if (*at == '/' || *at == '\0') {
-			char was = *at;
-
-			*at = '\0';
-			if (mkdir(copy, 0700) != 0 && errno != EEXIST) {
-				int code = psr_fail(err, PSR_ERR_IO, "the cache %s cannot be made: %s", copy, strerror(errno));
-
-				free(copy);
-				return code;
-			}
-			*at = was;
-			if (was == '\0')
-				break;
-		}
-	}
-	free(copy);
-	return PSR_OK;
-}
-
-static int prepare_source(struct opening *o)
-{
-	const char *cache = o->opener->server->options->cache;
-	struct stat status;
-	int code = builder_find_program(o->program, &o->error);
-
-	if (code == PSR_OK)
-		code = cachekey_find(o->key, o->file.path, o->program, &o->error);
-	if (code == PSR_OK)
-		code = make_folders(cache, &o->error);
-	if (code != PSR_OK)
-		return code;
-	if (asprintf(&o->cached, "%s/%s.psr", cache, o->key) < 0)
-		o->cached = NULL;
-	if (asprintf(&o->temporary, "%s/%s.psr.tmp", cache, o->key) < 0)
-		o->temporary = NULL;
-	if (o->cached == NULL || o->temporary == NULL)
-		return psr_fail(&o->error, PSR_ERR_MEMORY, "no memory");
-	o->is_cached = stat(o->cached, &status) == 0;
-	if (o->is_cached)
-		o->bytes = (uint64_t)status.st_size;
-	return PSR_OK;
-}
-
-static void prepare_job(void *userdata)
-{
-	struct opening *o = userdata;
-	struct stat status;
-
-	o->code = PSR_OK;
-	if (o->file.is_source)
-		o->code = prepare_source(o);
-	else if (stat(o->file.path, &status) == 0)
-		o->bytes = (uint64_t)status.st_size;
-	else
-		o->code = psr_fail(&o->error, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s", strerror(errno));
-	post(o);
+	if (failure != NULL)
+		end_failed(o, failure);
+	else if (builder_start(builder, o->program, o->key, o->file.path, o->temporary, on_build_progress, on_built, o)
+	         != PSR_OK)
+		end(o, NULL, PSR_ERR_MEMORY, "no memory to build a model");
 }
 
 static void on_prepared(void *userdata)
@@ -328,7 +237,6 @@ static void on_prepared(void *userdata)
 	struct opening *o = userdata;
 	struct server *server = o->opener->server;
 	struct catalogue_entry *entry = entry_of(o);
-	const struct psr_error *failure;
 
 	o->has_job = 0;
 	if (server->is_draining) {
@@ -352,12 +260,7 @@ static void on_prepared(void *userdata)
 		load(o);
 		return;
 	}
-	failure = builder_failure(server->builder, o->key);
-	if (failure != NULL)
-		end_failed(o, failure);
-	else if (builder_start(server->builder, o->program, o->key, o->file.path, o->temporary, on_build_progress, on_built, o)
-	         != PSR_OK)
-		end(o, NULL, PSR_ERR_MEMORY, "no memory to build a model");
+	build(o);
 }
 
 static struct opening *start(struct opener *opener, const struct catalogue_entry *entry)
@@ -367,6 +270,8 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	if (o == NULL)
 		return NULL;
 	o->opener = opener;
+	o->loop = &opener->server->loop;
+	o->cache = opener->server->options->cache;
 	o->file = entry->file;
 	o->file.path = strdup(entry->file.path);
 	if (o->file.path == NULL) {
@@ -410,7 +315,7 @@ void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const ch
 	o->waiters = waiter;
 	send_progress(o, waiter);
 	if (is_new)
-		submit(o, prepare_job, on_prepared);
+		submit(o, opening_prepare, on_prepared);
 }
 
 static int remove_waiters(struct opener *opener, const struct conn *conn, uint32_t id, int all)

@@ -89,9 +89,11 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		{ .name = "handshake-timeout", .type = PSR_OPT_REAL, .value = &o->handshake_timeout, .arg = "SECONDS",
 		  .min = 0.05, .max = 3600, .help = "A connection that has not said HELLO by then is closed." },
 		{ .name = "idle-timeout", .type = PSR_OPT_REAL, .value = &o->idle_timeout, .arg = "SECONDS",
-		  .min = 0, .max = 1e6, .help = "A connection silent for so long, with nothing to be answered, is closed; 0: never." },
+		  .min = 0, .max = 1e6, .help = "A connection silent for so long, with nothing to be answered, is closed;"
+		                               " 0: never." },
 		{ .name = "slow-timeout", .type = PSR_OPT_REAL, .value = &o->slow_timeout, .arg = "SECONDS",
-		  .min = 0.05, .max = 3600, .help = "A reader that takes less than 64 KiB of what waits for it in that time is closed." },
+		  .min = 0.05, .max = 3600, .help = "A reader that takes less than 64 KiB of what waits for it in that time is"
+		                                     " closed." },
 		{ .name = "drain-timeout", .type = PSR_OPT_REAL, .value = &o->drain_timeout, .arg = "SECONDS",
 		  .min = 0, .max = 3600, .help = "How long the end waits for frames under way and for their readers." },
 		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
@@ -176,12 +178,14 @@ static int apply_config(const struct psr_cli *cli, const int *given, struct opti
 			continue;
 		value = strchr(name, '=');
 		if (value == NULL)
-			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: '%.80s' is not `name = value`", options->config, number, name);
+			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: '%.80s' is not `name = value`", options->config, number,
+			                name);
 		*value++ = '\0';
 		name = trim(name);
 		value = trim(value);
 		if (strcmp(name, "config") == 0 || strcmp(name, "version") == 0)
-			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: `%s` belongs on the command line", options->config, number, name);
+			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: `%s` belongs on the command line", options->config,
+			                number, name);
 		if (is_given(cli->opts, given, name))
 			continue;
 		code = psr_cli_set(cli, name, value, &inner);
@@ -199,9 +203,11 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 		.usage = "psrd --models DIR [--listen ADDR:PORT|unix:PATH]... [options]",
 		.summary = "Holds point-sample models in memory and draws frames of them for thin clients (psr).",
 		.opts = table,
-		.footer = "Once it serves, psrd prints `READY ADDR:PORT` or `READY unix:PATH`, a line a listener, on standard output.\n"
+		.footer = "Once it serves, psrd prints `READY ADDR:PORT` or `READY unix:PATH`, a line a listener, on standard\n"
+		          "output. "
 		          "SIGTERM ends it after the frames under way, SIGHUP reads the models folder again.\n"
-		          "Exit codes: 0 ok, 2 usage, 3 file or system, 5 over a limit, 7 internal. More in psrd(1).",
+		          "Exit codes: 0 ok, 2 usage, 3 file or system, 5 over a limit, 6 address in use, 7 internal."
+		          " More in psrd(1).",
 	};
 
 	if (set_defaults(options) != PSR_OK)

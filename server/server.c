@@ -1,22 +1,18 @@
 #define _GNU_SOURCE
-#include <errno.h>
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/resource.h>
-#include <sys/socket.h>
 #include <unistd.h>
+#include "accept.h"
 #include "conn.h"
 #include "frames.h"
 #include "log.h"
 #include "opener.h"
 #include "server.h"
 
-#define ACCEPT_TURN 64
 #define IO_THREADS 2
-#define OTHER_DESCRIPTORS 64 /* beside connections: listeners, pipes, files, the loop's own */
 
 static const char ENDING[] = "the server is shutting down";
 
@@ -31,94 +27,6 @@ struct scan {
 static uint64_t to_us(double seconds)
 {
 	return (uint64_t)(seconds * 1e6);
-}
-
-/* ---- accepting ---- */
-
-static void pause_listeners(struct server *server, int paused)
-{
-	server->are_paused = paused;
-	for (int i = 0; i < server->n_listeners; i++)
-		loop_set(&server->loop, &server->listener[i].source, paused ? 0 : EPOLLIN);
-}
-
-/* Without descriptors or memory the listeners rest until the next tick: epoll would report them without end. */
-static void on_connection(uint32_t events, void *userdata)
-{
-	struct server_listener *l = userdata;
-	struct server *server = l->server;
-
-	(void)events;
-	for (int i = 0; i < ACCEPT_TURN; i++) {
-		int fd = accept4(l->listener.fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-
-		if (fd >= 0) {
-			if (server->n_conns >= (unsigned)server->options->max_clients + SERVER_SPARE_CLIENTS)
-				close(fd);
-			else
-				conn_accept(server, fd);
-		} else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-			log_warn("no connection can be accepted just now: %s", strerror(errno));
-			pause_listeners(server, 1);
-			return;
-		} else if (errno == EAGAIN || errno == EWOULDBLOCK) {
-			return;
-		}
-	}
-}
-
-static void close_listeners(struct server *server)
-{
-	while (server->n_listeners > 0) {
-		struct server_listener *l = &server->listener[--server->n_listeners];
-
-		loop_remove(&server->loop, &l->source);
-		listen_close(&l->listener);
-	}
-}
-
-static int open_listeners(struct server *server, struct psr_error *err)
-{
-	const struct options *options = server->options;
-
-	for (int i = 0; i < options->n_listen; i++) {
-		struct listener opened[4];
-		int n, max = OPTIONS_MAX_LISTEN - server->n_listeners;
-		int code = listen_open(opened, max < 4 ? max : 4, &n, options->listen[i], err);
-
-		if (code != PSR_OK)
-			return code;
-		for (int k = 0; k < n; k++) {
-			struct server_listener *l = &server->listener[server->n_listeners++];
-
-			l->listener = opened[k];
-			l->server = server;
-			l->source = (struct loop_source){ .fd = l->listener.fd, .on_ready = on_connection, .userdata = l };
-			if (code == PSR_OK)
-				code = loop_add(&server->loop, &l->source, EPOLLIN, err);
-		}
-		if (code != PSR_OK)
-			return code;
-	}
-	return PSR_OK;
-}
-
-/* As many descriptors as the system gives; fewer clients if they are too few. */
-static void raise_descriptors(struct options *options)
-{
-	struct rlimit limit;
-	rlim_t wanted = (rlim_t)options->max_clients + SERVER_SPARE_CLIENTS + OTHER_DESCRIPTORS;
-
-	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
-		return;
-	limit.rlim_cur = wanted < limit.rlim_max ? wanted : limit.rlim_max;
-	setrlimit(RLIMIT_NOFILE, &limit);
-	if (limit.rlim_cur >= wanted)
-		return;
-	options->max_clients = limit.rlim_cur > SERVER_SPARE_CLIENTS + OTHER_DESCRIPTORS
-	                       ? (int64_t)(limit.rlim_cur - SERVER_SPARE_CLIENTS - OTHER_DESCRIPTORS) : 1;
-	log_warn("the system allows %" PRIu64 " open files (ulimit -n): --max-clients is %" PRId64 " now",
-	         (uint64_t)limit.rlim_cur, options->max_clients);
 }
 
 /* ---- the models folder ---- */
@@ -186,7 +94,7 @@ static void start_draining(struct server *server)
 	log_info("ending: %u connections, %u frames under way", server->n_conns, frames_running(server->frames));
 	server->is_draining = 1;
 	server->drain_end_us = server->loop.now_us + to_us(server->options->drain_timeout);
-	close_listeners(server);
+	accept_close(server);
 	builder_destroy(server->builder);
 	server->builder = NULL;
 	opener_refuse_all(server->opener, PSR_ERR_CANCELLED, ENDING);
@@ -237,7 +145,7 @@ static void on_tick(void *userdata)
 	struct conn *next;
 
 	if (server->are_paused)
-		pause_listeners(server, 0);
+		accept_pause(server, 0);
 	for (struct conn *conn = server->conns; conn != NULL; conn = next) {
 		next = conn->next;
 		conn_tick(conn, server->loop.now_us);
@@ -277,7 +185,7 @@ static void on_batch_end(void *userdata)
 
 static void destroy(struct server *server)
 {
-	close_listeners(server);
+	accept_close(server);
 	builder_destroy(server->builder);
 	while (server->conns != NULL)
 		conn_close(server->conns);
@@ -335,7 +243,7 @@ int server_start(struct server **out, struct options *options, struct psr_error 
 	sigaddset(&signals, SIGINT);
 	sigaddset(&signals, SIGHUP);
 	sigaddset(&signals, SIGCHLD);
-	raise_descriptors(options);
+	accept_raise_descriptors(options);
 	code = loop_init(&server->loop, &signals, err);
 	server->loop.on_signal = on_signal;
 	server->loop.on_tick = on_tick;
@@ -343,7 +251,7 @@ int server_start(struct server **out, struct options *options, struct psr_error 
 	server->loop.userdata = server;
 	server->stats.start_us = server->loop.now_us;
 	if (code == PSR_OK)
-		code = open_listeners(server, err);
+		code = accept_open(server, err);
 	if (code == PSR_OK)
 		code = start_parts(server, err);
 	if (code != PSR_OK) {
@@ -367,7 +275,7 @@ int server_run(struct server *server, struct psr_error *err)
 		/* Past the time that it had: what still draws or reads cannot be stopped, and nobody waits for it. */
 		log_info("ended in the middle of %u frames", frames_running(server->frames));
 		builder_destroy(server->builder);
-		close_listeners(server);
+		accept_close(server);
 		fflush(NULL);
 		_exit(psr_exit_status(code));
 	}

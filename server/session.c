@@ -51,7 +51,7 @@ void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *mode
 	int code;
 
 	if (session->n_handles >= max || session->last_handle == UINT32_MAX) {
-		snprintf(text, sizeof text, "%" PRIu32 " models are open on this connection, and there are no more; CLOSE some", max);
+		snprintf(text, sizeof text, "%" PRIu32 " models are open on this connection, there are no more; CLOSE some", max);
 		session_refuse(conn, id, 0, PSR_ERR_LIMIT, text);
 		return;
 	}
@@ -154,8 +154,9 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 	if (view != 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server has no views: FRAME takes view 0, not %u", view);
 	if (n_pixels > (uint64_t)server->options->max_pixels)
-		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %" PRIu32 "x%" PRIu32 " has %" PRIu64 " pixels; this server draws %"
-		                PRId64 " at most (--max-pixels)", frame->width, frame->height, n_pixels, server->options->max_pixels);
+		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %" PRIu32 "x%" PRIu32 " has %" PRIu64 " pixels; this server draws "
+		                "%" PRId64 " at most (--max-pixels)", frame->width, frame->height, n_pixels,
+		                server->options->max_pixels);
 	if (frame->planes & ~offered)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "planes 0x%x were asked for; this server sends colour and depth (0x%x)",
 		                frame->planes, offered);
@@ -201,8 +202,8 @@ static int is_request(unsigned type)
 }
 
 /* Bad values cost the request; what breaks the protocol is the caller's to answer. */
-static int refuse_or_break(struct conn *conn, const struct psr_message *message, int code, const struct psr_error *error,
-                           struct psr_error *err)
+static int refuse_or_break(struct conn *conn, const struct psr_message *message, int code,
+                           const struct psr_error *error, struct psr_error *err)
 {
 	if (code == PSR_ERR_PROTOCOL || !is_request(message->type))
 		return psr_fail(err, PSR_ERR_PROTOCOL, "%s", error->text);

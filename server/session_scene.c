@@ -64,8 +64,8 @@ static int add_light(struct scene *scene, const struct psr_msg_light *msg, struc
 	if (msg->flags & PSR_WIRE_LIGHT_SHADOW)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 " casts shadows, which this server does not draw", number);
 	if (msg->kind == PSR_WIRE_LIGHT_SPOT && msg->outer > HALF_PI)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 ": a spot's half angle is 90 degrees at most on this server",
-		                number);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 ": a spot's half angle is 90 degrees at most on this "
+		                "server", number);
 	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
 	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
 	memcpy(light->position, msg->position, sizeof light->position);

@@ -18,7 +18,7 @@ struct cull_chunk {
 
 struct cull_hit {
 	uint32_t slot;
-	uint8_t level, tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
+	uint8_t level, is_mixed, tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
 };
 
 struct cull {
@@ -88,27 +88,33 @@ static inline uint32_t level_for(float pixels)
 	return (bits >> 23) - 127 + ((bits & 0x7fffff) != 0);
 }
 
-/* Whether all of a one-sided block faces away, so that its samples would get weight 0 ([G] 6.4, 7.3.2). With d from the eye to
- * the sphere's centre, a normal n within alpha of the cone's axis a, and a sample x within r of the centre,
- * n . (x - eye) >= |d| cos(angle(a, d) + alpha) - r, which exceeds BACK_SINE |x - eye| when
- * a . d > |d| (sin alpha + BACK_SINE) + r (1 + BACK_SINE). A thousandth makes up for rounding. */
-static int faces_away(const struct plan *plan, const struct plan_instance *in, uint32_t block)
+enum facing { FACES_AWAY, IS_MIXED, FACES_EYE };
+
+/* How a block faces, by its visibility cone ([G] 6.4). With d from the eye to the sphere's centre, g = a . d for the cone's axis a,
+ * a normal n within alpha of it and a sample x within r of the centre, n . (x - eye) is between
+ * |d| cos(angle(a, d) + alpha) - r >= g - |d| (sin alpha + 1 - cos alpha) - r and g + |d| (sin alpha + 1 - cos alpha) + r.
+ * A thousandth makes up for rounding. */
+static enum facing facing_of(const struct plan *plan, const struct plan_instance *in, uint32_t block)
 {
 	const struct psr_blocks *b = in->blocks;
-	const float cos_alpha = b->cone_cos[block];
-	if ((b->flags[block] & PSR_BLOCK_TWO_SIDED) || cos_alpha <= 0)
-		return 0;
+	if (b->flags[block] & PSR_BLOCK_TWO_SIDED)
+		return FACES_EYE;
+	if (!b->cone_cos || b->cone_cos[block] <= 0)
+		return IS_MIXED;
 	const float axis[3] = { b->cone_x[block], b->cone_y[block], b->cone_z[block] };
 	const float center[3] = { b->sphere_x[block], b->sphere_y[block], b->sphere_z[block] };
-	float along = 0, length2 = 0;
+	float g = 0, length2 = 0;
 	for (int k = 0; k < 3; k++) {
 		float d = plan->perspective ? center[k] - in->eye[k] : -in->eye[k];
-		along += d * axis[k];
+		g += d * axis[k];
 		length2 += d * d;
 	}
-	const float sin_alpha = __builtin_sqrtf(1 - cos_alpha * cos_alpha);
+	const float cos_alpha = b->cone_cos[block], length = __builtin_sqrtf(length2);
+	const float spread = __builtin_sqrtf(1 - cos_alpha * cos_alpha) + 0.001f;
 	const float r = plan->perspective ? b->sphere_r[block] : 0;
-	return along > (sin_alpha + BACK_SINE + 0.001f) * __builtin_sqrtf(length2) + r * (1 + BACK_SINE);
+	if (g > (spread + BACK_SINE) * length + r * (1 + BACK_SINE))
+		return FACES_AWAY;
+	return g + (spread + 1 - cos_alpha) * length + r <= BACK_SINE * (length - r) ? FACES_EYE : IS_MIXED;
 }
 
 static inline uint8_t tile_of(float pixel, uint32_t size, uint32_t n_tiles)
@@ -121,7 +127,8 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
                       struct cull_hit *hit)
 {
 	const struct psr_blocks *b = in->blocks;
-	if (b->cone_cos && faces_away(plan, in, block))
+	const enum facing facing = facing_of(plan, in, block);
+	if (facing == FACES_AWAY)
 		return 0;
 	float x = b->sphere_x[block], y = b->sphere_y[block], z = b->sphere_z[block], r = b->sphere_r[block] * in->scale;
 	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
@@ -136,6 +143,7 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 		return 0;
 	hit->slot = in->first_slot + block;
 	hit->level = (uint8_t)level;
+	hit->is_mixed = facing == IS_MIXED;
 	hit->tile_x0 = tile_of(e.x0, TILE_WIDTH, plan->tiles_x);
 	hit->tile_x1 = tile_of(e.x1, TILE_WIDTH, plan->tiles_x);
 	hit->tile_y0 = tile_of(e.y0, TILE_HEIGHT, plan->tiles_y);
@@ -189,7 +197,7 @@ static void fill_chunk(int i, void *userdata)
 	uint32_t *next = cull->bins->count + (size_t)i * cull->n_tiles;
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
-		struct bin_entry entry = { hit->slot, (uint16_t)chunk->instance, hit->level };
+		struct bin_entry entry = { hit->slot, (uint16_t)chunk->instance, hit->level, hit->is_mixed };
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
 				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;

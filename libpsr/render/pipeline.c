@@ -12,7 +12,6 @@
 /* What one band of rows counted on its way through gaps, resolve and shade. */
 struct band {
 	uint64_t ns[PSR_N_STAGES], count[PSR_N_STAGES];
-	uint64_t n_covered;
 	int has_gaps;
 };
 
@@ -197,13 +196,11 @@ static void flush_strip(struct psr_renderer *r, struct strip *strip, struct band
 	uint64_t start = now_ns();
 	resolve_strip(&r->plan, r->stack.word, strip);
 	uint64_t middle = now_ns();
-	uint32_t n_shaded = shade_strip(&r->plan, strip, r->rgb, r->weight);
+	shade_strip(&r->plan, strip, r->rgb);
 	band->ns[PSR_STAGE_RESOLVE] += middle - start;
 	band->ns[PSR_STAGE_SHADE] += now_ns() - middle;
 	band->count[PSR_STAGE_RESOLVE] += strip->n;
-	band->count[PSR_STAGE_SHADE] += n_shaded;
-	band->n_covered += n_shaded;
-	band->has_gaps |= n_shaded < strip->n;
+	band->count[PSR_STAGE_SHADE] += strip->n;
 	strip->n = 0;
 }
 
@@ -270,9 +267,9 @@ static int gather_bands(const struct psr_renderer *r, struct psr_report *report,
 			report->count[s] += band->count[s];
 			spent += band->ns[s];
 		}
-		report->n_covered += band->n_covered;
 		has_gaps |= band->has_gaps;
 	}
+	report->n_covered = report->count[PSR_STAGE_SHADE];
 	for (int s = PSR_STAGE_GAPS; s <= PSR_STAGE_SHADE && spent; s++)
 		report->ns[s] = (uint64_t)((double)report->ns[s] / (double)spent * (double)wall);
 	return has_gaps;

@@ -11,8 +11,10 @@
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 #define STRIP 256       /* samples that are resolved and shaded together */
 
-/* A sample faces away when its normal is more than this sine (6 degrees) beyond perpendicular: quantisation and interpolation
- * tilt the normals of grazing samples by as much, and those are seen. */
+/* A sample of a one-sided block faces away when its normal is more than this sine (6 degrees) beyond perpendicular:
+ * quantisation and interpolation tilt the normals of grazing samples by as much, and those are seen. [G] 7.3.2 gives such
+ * samples weight 0 when they are shaded; here they are left out when they are warped, before they hide what is behind them, so that open
+ * one-sided surfaces are seen through from their backs. */
 #define BACK_SINE 0.1f
 
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
@@ -70,6 +72,7 @@ struct bin_entry {
 	uint32_t slot;
 	uint16_t instance;
 	uint8_t level; /* of the depth buffer that fits the block */
+	uint8_t is_mixed; /* some of its samples may face away */
 };
 
 struct bins {
@@ -109,7 +112,7 @@ struct strip {
 	float dr[STRIP], dg[STRIP], db[STRIP];
 	float sr[STRIP], sg[STRIP], sb[STRIP];
 	float exponent[STRIP];
-	uint8_t unlit[STRIP], back[STRIP]; /* back: faces away from the eye */
+	uint8_t unlit[STRIP];
 };
 
 /* Fills a strip from words whose slots all belong to `instance`. pixel[] is filled by the caller. */
@@ -117,9 +120,8 @@ void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *
 
 /* ---- shade: strips to linear colours ([G] 7.3) ---- */
 
-/* Writes 16-bit linear light into rgb + 3 * pixel; where a sample faces away its weight becomes 0 ([G] 7.3.2).
- * Returns how many were shaded. */
-uint32_t shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb, uint16_t *weight);
+/* Writes 16-bit linear light into rgb + 3 * pixel. */
+void shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb);
 
 /* ---- fill: pull-push ([G] 4.7, appendix) ---- */
 

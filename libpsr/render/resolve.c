@@ -1,6 +1,5 @@
 #include "base/srgb.h"
-#include "psr/direction.h"
-#include "render/render.h"
+#include "render/block.h"
 
 /* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
 static float exponent_of(uint32_t e)
@@ -17,27 +16,8 @@ static float part(uint32_t bits, int shift, uint32_t max)
 	return psr_srgb_to_linear[((bits >> shift & max) * 255 + max / 2) / max];
 }
 
-/* Where block and sample stand in the instance's inner coordinates: the sample's own place, not that of the pixel that it
- * fell into ([G] 7.3 takes the pixel's), so that light depends on the model alone. */
-static void position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
-{
-	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
-	const float dx = projection->spacing * (float)(1u << b->level[block]), dy = dx * 0.866025404f;
-	const uint32_t r = sample >> 3, c = sample & 7;
-	const float x = ((float)(8 * b->col[block] + (int32_t)c) + (float)(r & 1) * 0.5f) * dx;
-	const float y = (float)(8 * b->row[block] + (int32_t)r) * dy;
-	const float z = b->depth_bias[block] +
-	                b->depth_step[block] * (float)b->depth[(size_t)block * PSR_BLOCK_SAMPLES + sample];
-	for (int a = 0; a < 3; a++)
-		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
-}
-
-static int faces_away(float g, const float to_eye[3])
-{
-	float length2 = to_eye[0] * to_eye[0] + to_eye[1] * to_eye[1] + to_eye[2] * to_eye[2];
-	return g < 0 && g * g > BACK_SINE * BACK_SINE * length2;
-}
-
+/* Positions are the samples' own, not those of the pixels that they fell into ([G] 7.3 takes the pixel's), so that light
+ * depends on the model alone. */
 void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *strip)
 {
 	const float(*direction)[3] = psr_direction_table();
@@ -47,19 +27,16 @@ void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const uint32_t id = (uint32_t)word[strip->pixel[i]];
 		const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot, sample = id % PSR_BLOCK_SAMPLES;
-		const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-		const uint64_t a = b->attr[(uint64_t)b->attr_first[block] + (uint64_t)__builtin_popcountll(below)];
+		const uint64_t a = block_attr(b, block, sample);
 		const float *n = direction[PSR_ATTR_NORMAL(a)];
 		const uint32_t diffuse = PSR_ATTR_DIFFUSE(a), specular = PSR_ATTR_SPECULAR(a);
-		float p[3], to_eye[3];
+		float p[3], eye[3];
 
-		position(b, block, sample, p);
-		for (int k = 0; k < 3; k++)
-			to_eye[k] = plan->perspective ? in->eye[k] - p[k] : in->eye[k];
-		const float g = n[0] * to_eye[0] + n[1] * to_eye[1] + n[2] * to_eye[2];
+		block_position(b, block, sample, p);
+		to_eye(plan, in, p, eye);
+		const float g = n[0] * eye[0] + n[1] * eye[1] + n[2] * eye[2];
 		const int two_sided = b->flags[block] & PSR_BLOCK_TWO_SIDED;
 		const float turn = two_sided && g < 0 ? -1 : 1;
-		strip->back[i] = !two_sided && faces_away(g, to_eye);
 		strip->px[i] = p[0];
 		strip->py[i] = p[1];
 		strip->pz[i] = p[2];

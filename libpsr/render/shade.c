@@ -69,22 +69,15 @@ static void shade_sample(const struct plan *plan, const struct plan_instance *in
 	}
 }
 
-uint32_t shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb, uint16_t *weight)
+void shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb)
 {
 	const struct plan_instance *in = &plan->instance[strip->instance];
-	uint32_t n_shaded = 0;
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const uint32_t pixel = strip->pixel[i];
 		float color[3] = { strip->dr[i], strip->dg[i], strip->db[i] };
-		if (strip->back[i]) {
-			weight[pixel] = 0;
-			continue;
-		}
 		if (!strip->unlit[i])
 			shade_sample(plan, in, strip, i, color);
 		for (int k = 0; k < 3; k++)
 			rgb[3 * (size_t)pixel + (size_t)k] = light16(color[k]);
-		n_shaded++;
 	}
-	return n_shaded;
 }

@@ -1,6 +1,6 @@
 #include <math.h>
 #include "base/maths.h"
-#include "render/render.h"
+#include "render/block.h"
 
 /* One tile of the picture, and for each level the cells that belong to it: those of its pixels, and at the picture's
  * border the guard band. Pixels count from the picture's corner, cells from the guard band's. */
@@ -78,6 +78,24 @@ static inline void warp_row(const float base[3], const float step[3], const floa
 	}
 }
 
+/* The samples of a block that do not face away. */
+static uint64_t facing_samples(const struct plan *plan, const struct plan_instance *in, uint32_t block)
+{
+	const float(*direction)[3] = psr_direction_table();
+	const struct psr_blocks *b = in->blocks;
+	uint64_t mask = b->mask[block], kept = 0;
+	for (uint64_t left = mask; left; left &= left - 1) {
+		const uint32_t sample = (uint32_t)__builtin_ctzll(left);
+		const float *n = direction[PSR_ATTR_NORMAL(block_attr(b, block, sample))];
+		float p[3], eye[3];
+		block_position(b, block, sample, p);
+		to_eye(plan, in, p, eye);
+		const float g = n[0] * eye[0] + n[1] * eye[1] + n[2] * eye[2];
+		kept |= (uint64_t)!faces_away(g, eye) << sample;
+	}
+	return kept;
+}
+
 static inline int inside(int32_t u, int32_t v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
 {
 	return u >= x0 && u < x1 && v >= y0 && v < y1;
@@ -94,7 +112,7 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 	const double dy = dx * 0.86602540378443864676;
 	const double x = 8.0 * b->col[block] * dx, y = 8.0 * b->row[block] * dy;
 	const float bias = b->depth_bias[block], depth_step = b->depth_step[block];
-	uint64_t mask = b->mask[block], id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
+	uint64_t mask = entry->is_mixed ? facing_samples(plan, in, block) : b->mask[block], id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
 	uint32_t n_inside = 0;
 	double origin[3], down[3];
 	float step[3], along_z[3];

@@ -23,7 +23,8 @@ struct build {
 	const struct psr_build_options *options;
 	struct psr_pool *pool;
 	struct ray_scene *scene;
-	struct lattice lattice[N_PROJECTIONS];
+	struct psr_projection projection[MOST_PROJECTIONS];
+	struct lattice lattice[MOST_PROJECTIONS];
 	struct selection selection;
 	struct psr_model_info info;
 	struct psr_build_report report;
@@ -77,15 +78,14 @@ static void report_select(uint64_t done, uint64_t total, void *userdata)
 
 static int trace_projections(struct build *build)
 {
-	struct psr_projection projection[N_PROJECTIONS];
 	double started = now();
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)
 		return rc;
-	projection_list(projection, 2.0 / build->options->resolution, build->options->tolerance);
+	projection_list(build->projection, 2.0 / build->options->resolution, build->options->tolerance);
 	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
-		rc = lattice_trace(&build->lattice[i], build->scene, &projection[i], build->pool);
+		rc = lattice_trace(&build->lattice[i], build->scene, &build->projection[i], 1, build->pool);
 		if (rc != PSR_OK)
 			return psr_fail(build->err, rc, "no memory for the samples of projection %u at resolution %u; use a lower one", i,
 			                build->options->resolution);
@@ -101,7 +101,7 @@ static int trace_projections(struct build *build)
 
 static int select_and_pack(struct build *build, struct psr_model **out)
 {
-	struct select_input input = { .mesh = build->mesh, .scene = build->scene, .lattice = build->lattice,
+	struct select_input input = { .mesh = build->mesh, .scene = build->scene, .lattice = build->lattice, .projection = build->projection,
 		                          .ds = 2.0 / build->options->resolution, .pool = build->pool,
 		                          .on_progress = report_select, .userdata = (void *)build->options };
 	double started = now(), sine, cosine;
@@ -114,7 +114,7 @@ static int select_and_pack(struct build *build, struct psr_model **out)
 	if (rc != PSR_OK)
 		return psr_fail(build->err, rc, "no memory to select the blocks at resolution %u; use a lower one",
 		                build->options->resolution);
-	return pack_model(out, &build->info, build->lattice, &build->selection, build->err);
+	return pack_model(out, &build->info, build->scene, build->projection, build->lattice, &build->selection, build->err);
 }
 
 static int prepare(struct build *build)
@@ -157,7 +157,7 @@ int psr_model_build(struct psr_model **out, const struct psr_mesh *mesh, const s
 	build->report.seconds_total = now() - started;
 	if (rc == PSR_OK && report != NULL)
 		*report = build->report;
-	for (unsigned i = 0; i < N_PROJECTIONS; i++)
+	for (unsigned i = 0; i < MOST_PROJECTIONS; i++)
 		lattice_fini(&build->lattice[i]);
 	selection_fini(&build->selection);
 	ray_scene_destroy(build->scene);

@@ -72,6 +72,7 @@ struct job {
 	const struct ray_scene *scene;
 	const struct psr_projection *projection;
 	int reach; /* blocks on each side of the origin, along rows and columns */
+	int stride;
 	struct row *row;
 };
 
@@ -98,7 +99,9 @@ static void trace_row(int i, void *userdata)
 	struct row *row = &job->row[i];
 	uint32_t capacity = 0;
 
-	for (int col = -job->reach; col < job->reach; col++) {
+	if (i % job->stride != 0)
+		return;
+	for (int col = -job->reach; col < job->reach; col += job->stride) {
 		if (row->n_blocks == capacity) {
 			capacity = capacity != 0 ? 2 * capacity : 16;
 			if (grow_row(row, capacity) != PSR_OK) {
@@ -145,9 +148,9 @@ static int join_rows(struct lattice *lattice, const struct job *job)
 }
 
 int lattice_trace(struct lattice *lattice, const struct ray_scene *scene, const struct psr_projection *projection,
-                  struct psr_pool *pool)
+                  int stride, struct psr_pool *pool)
 {
-	struct job job = { .scene = scene, .projection = projection };
+	struct job job = { .scene = scene, .projection = projection, .stride = stride };
 	double row_height = SIDE * sqrt(3.0) / 2 * (double)projection->spacing;
 	int rc;
 

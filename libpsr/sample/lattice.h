@@ -24,9 +24,10 @@ struct lattice {
 	struct lattice_sample (*sample)[PSR_BLOCK_SAMPLES];
 };
 
-/* Traces the whole unit sphere. On failure nothing is kept. MEMORY. */
+/* Traces the whole unit sphere, or of each `stride` rows and columns of blocks only one. On failure nothing is kept.
+ * MEMORY. */
 int lattice_trace(struct lattice *lattice, const struct ray_scene *scene, const struct psr_projection *projection,
-                  struct psr_pool *pool);
+                  int stride, struct psr_pool *pool);
 void lattice_fini(struct lattice *lattice);
 
 /* Projection space x and y of a block's sample. */

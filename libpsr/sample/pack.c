@@ -3,6 +3,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cone.h"
 #include "pack.h"
 #include "projection.h"
 
@@ -17,12 +18,13 @@ struct order {
 };
 
 struct pack {
+	const struct ray_scene *scene;
 	const struct lattice *lattice;
 	const struct selection *selection;
-	struct psr_projection projection[N_PROJECTIONS];
+	const struct psr_projection *projection;
 	struct order *order;
 	struct psr_cluster *cluster;
-	float *sphere[4], *depth_bias, *depth_step; /* sphere: x, y, z, r */
+	float *sphere[4], *cone[4], *depth_bias, *depth_step; /* sphere: x, y, z, r; cone: x, y, z, cosine */
 	uint16_t *block_projection, *depth;
 	int16_t *col, *row;
 	uint8_t *level, *flags;
@@ -163,6 +165,10 @@ static void pack_blocks(struct pack *pack)
 		memcpy(pack->attr + n_samples, pack->selection->attr + block->first, n * sizeof *pack->attr);
 		quantise(pack, i, lattice->sample[block->block], min[2], max[2]);
 		bound_block(pack, i, &lattice->projection, min, max);
+		float axis[3];
+		cone_bound(pack->scene, lattice->sample[block->block], block->mask, axis, &pack->cone[3][i]);
+		for (int k = 0; k < 3; k++)
+			pack->cone[k][i] = axis[k];
 		n_samples += n;
 	}
 }
@@ -213,8 +219,10 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 #define ALLOC(array, n) failed |= ((array) = psr_alloc_array(n, sizeof *(array))) == NULL
 	ALLOC(pack->order, n_blocks);
 	ALLOC(pack->cluster, n_clusters);
-	for (int k = 0; k < 4; k++)
+	for (int k = 0; k < 4; k++) {
 		ALLOC(pack->sphere[k], n_blocks);
+		ALLOC(pack->cone[k], n_blocks);
+	}
 	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->depth_step, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
@@ -234,8 +242,10 @@ static void pack_fini(struct pack *pack)
 {
 	psr_free(pack->order);
 	psr_free(pack->cluster);
-	for (int k = 0; k < 4; k++)
+	for (int k = 0; k < 4; k++) {
 		psr_free(pack->sphere[k]);
+		psr_free(pack->cone[k]);
+	}
 	psr_free(pack->depth_bias);
 	psr_free(pack->depth_step);
 	psr_free(pack->block_projection);
@@ -252,14 +262,12 @@ static void pack_fini(struct pack *pack)
 static int make_model(struct psr_model **out, struct psr_model_info *info, struct pack *pack, struct psr_error *err)
 {
 	uint32_t n_blocks = (uint32_t)pack->selection->n_blocks;
-	struct psr_blocks blocks = { .n_blocks = n_blocks, .n_projections = N_PROJECTIONS,
+	struct psr_blocks blocks = { .n_blocks = n_blocks, .n_projections = MOST_PROJECTIONS,
 		                         .n_clusters = (n_blocks + CLUSTER_BLOCKS - 1) / CLUSTER_BLOCKS, .n_levels = 1,
 		                         .n_samples = pack->selection->n_samples };
 
 	if (pack_alloc(pack, n_blocks, blocks.n_samples, blocks.n_clusters) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %u blocks", n_blocks);
-	for (int i = 0; i < N_PROJECTIONS; i++)
-		pack->projection[i] = pack->lattice[i].projection;
 	sort_blocks(pack);
 	pack_blocks(pack);
 	pack_clusters(pack, blocks.n_clusters);
@@ -269,6 +277,10 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, struc
 	blocks.sphere_y = pack->sphere[1];
 	blocks.sphere_z = pack->sphere[2];
 	blocks.sphere_r = pack->sphere[3];
+	blocks.cone_x = pack->cone[0];
+	blocks.cone_y = pack->cone[1];
+	blocks.cone_z = pack->cone[2];
+	blocks.cone_cos = pack->cone[3];
 	blocks.block_projection = pack->block_projection;
 	blocks.col = pack->col;
 	blocks.row = pack->row;
@@ -287,10 +299,11 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, struc
 	return psr_model_create(out, info, &blocks, err);
 }
 
-int pack_model(struct psr_model **out, struct psr_model_info *info, const struct lattice *lattice,
+int pack_model(struct psr_model **out, struct psr_model_info *info, const struct ray_scene *scene,
+               const struct psr_projection *projection, const struct lattice *lattice,
                const struct selection *selection, struct psr_error *err)
 {
-	struct pack pack = { .lattice = lattice, .selection = selection };
+	struct pack pack = { .scene = scene, .projection = projection, .lattice = lattice, .selection = selection };
 	int rc;
 
 	if (selection->n_samples > UINT32_MAX || selection->n_blocks > UINT32_MAX)

@@ -26,17 +26,17 @@ static int add_corners(double (*direction)[3], int n, int level)
 	return n;
 }
 
-void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, double tolerance)
+void projection_list(struct psr_projection list[MOST_PROJECTIONS], double ds, double tolerance)
 {
-	double direction[N_PROJECTIONS][3], sine, cosine;
+	double direction[MOST_PROJECTIONS][3], sine, cosine;
 	int n = 0;
 
 	psr_sincos(tolerance, &sine, &cosine);
 	for (; n < PSR_PROJECTIONS; n++)
 		psr_direction_center(1, (unsigned)n, direction[n]);
-	for (int level = 0; level < 3; level++)
+	for (int level = 0; level < 4; level++)
 		n = add_corners(direction, n, level);
-	assert(n == N_PROJECTIONS);
+	assert(n == MOST_PROJECTIONS);
 	for (int i = 0; i < n; i++) {
 		double frame[3][3];
 

@@ -10,8 +10,13 @@
 
 #define N_PROJECTIONS 98
 
+/* Further ones, the new corners of the sphere subdivided three times, are taken only where they find what those missed:
+ * the bottoms of deep slots and holes, which are seen from few sides. */
+#define N_SCOUTS 192
+#define MOST_PROJECTIONS (N_PROJECTIONS + N_SCOUTS)
+
 /* ds: a pixel at the target resolution, inner units. Frames and the spacing ds * cos(tolerance) ([G] 4.4) are rounded
  * to the floats that models hold. */
-void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, double tolerance);
+void projection_list(struct psr_projection list[MOST_PROJECTIONS], double ds, double tolerance);
 
 #endif

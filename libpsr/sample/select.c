@@ -13,6 +13,7 @@
 #define N_SHIFTS 4
 #define N_TESTS (N_ROTATIONS * N_SHIFTS)
 #define N_SWEEPS 2
+#define SCOUT_STRIDE 4
 
 /* A sample of the projection under way, as a test wants it. */
 struct candidate {
@@ -30,6 +31,7 @@ struct select {
 	unsigned projection;
 	const struct lattice *lattice;
 	float least_cosine;
+	int is_lenient; /* what S has of the same surface within half a pixel more is not missed */
 	struct candidate (*candidate)[PSR_BLOCK_SAMPLES];
 	uint64_t *eligible, *missed;
 	int failed;
@@ -89,6 +91,27 @@ static void prepare_block(int b, void *userdata)
 	}
 }
 
+/* Whether S has a point as near as this candidate in its pixel; or one of the same surface in those at the corners of a
+ * pixel around it. */
+static int is_there(const float *z, const struct cover_grid *grid, const struct candidate *candidate, int is_lenient)
+{
+	static const float corner[4][2] = { { -0.5f, -0.5f }, { 0.5f, -0.5f }, { -0.5f, 0.5f }, { 0.5f, 0.5f } };
+
+	if (z[cover_pixel(grid, &candidate->seen)] >= candidate->least_z)
+		return 1;
+	for (int i = 0; is_lenient && i < 4; i++) {
+		struct cover_grid moved = *grid;
+		float beside;
+
+		moved.shift[0] += corner[i][0];
+		moved.shift[1] += corner[i][1];
+		beside = z[cover_pixel(&moved, &candidate->seen)];
+		if (beside >= candidate->least_z && beside <= 2 * candidate->seen.z - candidate->least_z)
+			return 1;
+	}
+	return 0;
+}
+
 /* One rotation and one shift of the view: S is drawn and the samples that it lacks are marked. */
 static void test_view(int test, void *userdata)
 {
@@ -110,7 +133,7 @@ static void test_view(int test, void *userdata)
 			unsigned s = (unsigned)__builtin_ctzll(left);
 			const struct candidate *candidate = &select->candidate[b][s];
 
-			missed |= (uint64_t)(z[cover_pixel(&grid, &candidate->seen)] < candidate->least_z) << s;
+			missed |= (uint64_t)!is_there(z, &grid, candidate, select->is_lenient) << s;
 		}
 		if (missed != 0)
 			__atomic_fetch_or(&select->missed[b], missed, __ATOMIC_RELAXED);
@@ -196,41 +219,85 @@ static int add_missed(struct select *select)
 	return PSR_OK;
 }
 
-static int visit_projection(struct select *select, unsigned projection, float least_cosine)
+/* Marks what S misses of a projection's samples that it sees with at least this cosine, in the first n_tests. */
+static int find_missed(struct select *select, const struct lattice *lattice, float least_cosine, int n_tests)
 {
-	const struct lattice *lattice = &select->input->lattice[projection];
-	int rc = PSR_ERR_MEMORY;
-
-	select->projection = projection;
 	select->lattice = lattice;
 	select->least_cosine = least_cosine;
 	select->candidate = psr_alloc_array(lattice->n_blocks, sizeof *select->candidate);
 	select->missed = psr_alloc_array(lattice->n_blocks, sizeof *select->missed);
 	select->eligible = psr_alloc_array(lattice->n_blocks, sizeof *select->eligible);
-	if (select->candidate != NULL && select->missed != NULL && select->eligible != NULL) {
-		cover_look(&select->cover, lattice->projection.axis, select->input->pool);
-		psr_pool_for(select->input->pool, (int)lattice->n_blocks, prepare_block, select);
-		psr_pool_for(select->input->pool, N_TESTS, test_view, select);
-		if (!select->failed)
-			rc = add_missed(select);
-	}
+	if (select->candidate == NULL || select->missed == NULL || select->eligible == NULL)
+		return PSR_ERR_MEMORY;
+	cover_look(&select->cover, lattice->projection.axis, select->input->pool);
+	psr_pool_for(select->input->pool, (int)lattice->n_blocks, prepare_block, select);
+	psr_pool_for(select->input->pool, n_tests, test_view, select);
+	return select->failed ? PSR_ERR_MEMORY : PSR_OK;
+}
+
+static void forget_missed(struct select *select)
+{
 	psr_free(select->candidate);
 	psr_free(select->missed);
 	psr_free(select->eligible);
+	select->candidate = NULL;
+	select->missed = select->eligible = NULL;
+}
+
+static int visit_projection(struct select *select, unsigned projection, float least_cosine)
+{
+	int rc = find_missed(select, &select->input->lattice[projection], least_cosine, N_TESTS);
+
+	select->projection = projection;
+	if (rc == PSR_OK)
+		rc = add_missed(select);
+	forget_missed(select);
 	return rc;
+}
+
+static int is_any_missed(const struct select *select)
+{
+	for (uint32_t b = 0; b < select->lattice->n_blocks; b++)
+		if (select->missed[b] != 0)
+			return 1;
+	return 0;
+}
+
+static int visit_scout(struct select *select, unsigned projection)
+{
+	const struct select_input *input = select->input;
+	struct lattice part;
+	int is_needed, rc = lattice_trace(&part, input->scene, &input->projection[projection], SCOUT_STRIDE, input->pool);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = find_missed(select, &part, 0, 1);
+	is_needed = rc == PSR_OK && is_any_missed(select);
+	forget_missed(select);
+	lattice_fini(&part);
+	if (!is_needed)
+		return rc;
+	rc = lattice_trace(&input->lattice[projection], input->scene, &input->projection[projection], 1, input->pool);
+	return rc == PSR_OK ? visit_projection(select, projection, 0) : rc;
 }
 
 int select_blocks(struct selection *selection, const struct select_input *input)
 {
 	struct select select = { .input = input, .selection = selection };
+	unsigned n_visits = N_SWEEPS * N_PROJECTIONS + N_SCOUTS;
 	int rc;
 
 	memset(selection, 0, sizeof *selection);
 	rc = note_sides(&select);
-	for (unsigned i = 0; rc == PSR_OK && i < N_SWEEPS * N_PROJECTIONS; i++) {
-		rc = visit_projection(&select, i % N_PROJECTIONS, i < N_PROJECTIONS ? input->cosine : 0);
+	for (unsigned i = 0; rc == PSR_OK && i < n_visits; i++) {
+		/* Outlines differ in part of a pixel from every side; only those of a first sweep are worth blocks. */
+		select.is_lenient = i >= N_PROJECTIONS;
+		if (i < N_SWEEPS * N_PROJECTIONS)
+			rc = visit_projection(&select, i % N_PROJECTIONS, i < N_PROJECTIONS ? input->cosine : 0);
+		else
+			rc = visit_scout(&select, i - (N_SWEEPS - 1) * N_PROJECTIONS);
 		if (input->on_progress != NULL)
-			input->on_progress(i + 1, N_SWEEPS * N_PROJECTIONS, input->userdata);
+			input->on_progress(i + 1, n_visits, input->userdata);
 	}
 	psr_free(select.is_two_sided);
 	cover_fini(&select.cover);

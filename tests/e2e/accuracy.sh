@@ -60,7 +60,7 @@ for entry in $available; do
 	target=$(place 0 0 0)
 	view "$model" "$source" "front, orthographic" --eye "$(place 0 0 2)" --target "$target" --up 0,1,0 --ortho "$height"
 	view "$model" "$source" "oblique, orthographic" --eye "$(place 1.1 0.7 -1.3)" --target "$target" --up 0,1,0 --ortho "$height"
-	# The nearest part, half a height in front of the centre, is at magnification 1: 1 / (2 * (2 - 0.5)) = tan(fov / 2).
-	view "$model" "$source" "oblique, perspective" --eye "$(place -1.2 0.9 1.32288)" --target "$target" --up 0,1,0 --fov 36.87
+	# Eight heights away the nearest part is 7.5 from the eye: 1 / (2 * 7.5 * tan(4.15)) = 0.92, so no part is magnified.
+	view "$model" "$source" "oblique, perspective" --eye "$(place -4.8 3.6 5.29152)" --target "$target" --up 0,1,0 --fov 8.3
 done
 check "psrd stops cleanly" stop_psrd

@@ -9,7 +9,7 @@
 #define SIDE 64
 #define SPACING 0.05
 
-/* A square seen from straight ahead, which fills the middle 51x51 pixels of the picture. */
+/* A square seen from straight ahead, which fills the middle 52x52 pixels of the picture. */
 struct fixture {
 	struct psr_mesh *mesh;
 	struct psr_truth *truth;

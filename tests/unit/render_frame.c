@@ -318,7 +318,7 @@ static void one_sided_squares_have_no_back_and_two_sided_ones_do(void **state)
 	}
 }
 
-static void cones_cull_the_back_of_a_solid_and_nothing_else(void **state)
+static void cones_cull_the_back_of_a_solid_and_change_no_pixel(void **state)
 {
 	(void)state;
 	for (int i = 0; i < 4; i++) {
@@ -334,11 +334,7 @@ static void cones_cull_the_back_of_a_solid_and_nothing_else(void **state)
 			draw(cones ? &with : &without, &scene, 128, 128, 1);
 			psr_model_unref(model);
 		}
-		/* All that a cone removes would have had weight 0: at the silhouette such a pixel was filled, and is empty now. */
-		for (uint32_t at = 0; at < 128 * 128; at++)
-			if (pixel(&with, at % 128, at / 128) != pixel(&without, at % 128, at / 128))
-				assert_true(isinf(with.frame.depth[at]));
-		assert_true(with.frame.report.n_covered == without.frame.report.n_covered);
+		assert_true(same(&without, &with));
 		assert_int_equal(without.frame.report.n_blocks_drawn, without.frame.report.n_blocks);
 		assert_in_range(with.frame.report.n_blocks_drawn, with.frame.report.n_blocks / 2, with.frame.report.n_blocks * 9 / 10);
 		release(&without);
@@ -552,7 +548,7 @@ int main(void)
 		cmocka_unit_test(survey_coordinates_lose_nothing),
 		cmocka_unit_test(nearer_instances_hide_what_is_behind),
 		cmocka_unit_test(one_sided_squares_have_no_back_and_two_sided_ones_do),
-		cmocka_unit_test(cones_cull_the_back_of_a_solid_and_nothing_else),
+		cmocka_unit_test(cones_cull_the_back_of_a_solid_and_change_no_pixel),
 		cmocka_unit_test(one_sided_squares_are_seen_through_from_behind),
 		cmocka_unit_test(lights_follow_phong),
 		cmocka_unit_test(hard_cameras_draw_something_or_nothing),

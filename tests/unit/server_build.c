@@ -118,6 +118,23 @@ static void a_source_is_built_once_for_all_and_cached(void **state)
 	daemon_stop(&psrd);
 }
 
+static void a_damaged_cache_is_built_again(void **state)
+{
+	char text[4096], command[2 * PATH_MAX];
+
+	(void)state;
+	file_write(folder, "plate.obj", "good", 4);
+	start(NULL, NULL);
+	expect_serves(&psrd, "plate");
+	daemon_stop(&psrd);
+	snprintf(command, sizeof command, "for f in '%s'/cache/deep/*.psr; do truncate -s 1000 \"$f\"; done", bin);
+	assert_int_equal(system(command), 0);
+	start(NULL, NULL);
+	expect_serves(&psrd, "plate");
+	assert_int_equal(count_builds(text), 2);
+	daemon_stop(&psrd);
+}
+
 static void progress_is_passed_on_and_never_goes_back(void **state)
 {
 	static const uint16_t stages[] = { PSR_PROGRESS_WAITING, PSR_PROGRESS_IMPORT, PSR_PROGRESS_IMPORT,
@@ -142,7 +159,7 @@ static void progress_is_passed_on_and_never_goes_back(void **state)
 	daemon_stop(&psrd);
 }
 
-static void a_failed_build_says_why_and_is_remembered_until_the_source_changes(void **state)
+static void a_failed_build_says_why_and_is_remembered(void **state)
 {
 	struct psr_msg_opened opened;
 	char text[PSR_ERROR_TEXT], log[4096];
@@ -225,6 +242,36 @@ static void frames_go_on_while_a_model_is_built(void **state)
 	daemon_stop(&psrd);
 }
 
+static void builds_beyond_max_builds_wait(void **state)
+{
+	struct psr_message message;
+	struct pollfd waits = { .events = POLLIN };
+	char text[4096];
+
+	(void)state;
+	file_write(folder, "one.obj", "slow", 4);
+	file_write(folder, "two.obj", "slow", 4);
+	for (int max = 1; max <= 2; max++) {
+		start("--max-builds", max == 1 ? "1" : "2");
+		peer_hello(&p, &psrd, NULL);
+		peer_hello(&q, &psrd, NULL);
+		peer_ask_open(&p, "one");
+		for (int i = 0; i < 5; i++)
+			peer_expect(&p, &message, PSR_MSG_PROGRESS, p.id);
+		peer_ask_open(&q, "two");
+		peer_expect(&q, &message, PSR_MSG_PROGRESS, q.id);
+		waits.fd = q.fd;
+		if (max == 1)
+			assert_int_equal(poll(&waits, 1, 300), 0);
+		for (int i = 0; max == 2 && i < 2; i++) /* its start, and the first word of the script, which has logged by then */
+			peer_expect(&q, &message, PSR_MSG_PROGRESS, q.id);
+		peer_close(&p);
+		peer_close(&q);
+		daemon_stop(&psrd);
+	}
+	assert_int_equal(count_builds(text), 3);
+}
+
 static void the_end_takes_builds_with_it(void **state)
 {
 	char path[PATH_MAX + 16];
@@ -279,11 +326,13 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(a_source_is_built_once_for_all_and_cached, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_damaged_cache_is_built_again, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(progress_is_passed_on_and_never_goes_back, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(a_failed_build_says_why_and_is_remembered_until_the_source_changes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_failed_build_says_why_and_is_remembered, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_crash_costs_only_the_build, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(builds_are_niced_and_limited, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(frames_go_on_while_a_model_is_built, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(builds_beyond_max_builds_wait, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_end_takes_builds_with_it, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(without_psr_model_the_error_says_what_to_do, set_up, tear_down),
 	};

@@ -62,7 +62,8 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 {
 	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, .spacing = 1.0f / 64 };
 	static struct psr_cluster cluster = { .radius = 1, .n_blocks = PLATE_BLOCKS };
-	static float x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS], r[PLATE_BLOCKS], bias[PLATE_BLOCKS], step[PLATE_BLOCKS];
+	static float x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS], r[PLATE_BLOCKS];
+	static float bias[PLATE_BLOCKS], step[PLATE_BLOCKS];
 	static uint16_t number[PLATE_BLOCKS], depth[PLATE_SAMPLES];
 	static int16_t col[PLATE_BLOCKS], row[PLATE_BLOCKS];
 	static uint8_t level[PLATE_BLOCKS], flags[PLATE_BLOCKS];
@@ -249,7 +250,8 @@ struct peer {
 
 static inline void peer_connect(struct peer *p, const struct daemon *d)
 {
-	struct sockaddr_in in = { .sin_family = AF_INET, .sin_port = htons(d->port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
+	struct sockaddr_in in = { .sin_family = AF_INET, .sin_port = htons(d->port),
+		                      .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
 	struct sockaddr_un un = { .sun_family = AF_UNIX };
 
 	memset(p, 0, sizeof *p);

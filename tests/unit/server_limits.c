@@ -190,15 +190,16 @@ static void idle_clients_hear_goodbye(void **state)
 
 static uint64_t stat_of(const struct daemon *d, unsigned id)
 {
+	static struct peer asker;
 	struct psr_message message;
 	struct psr_msg_stats_reply reply;
 
-	peer_hello(&q, d, NULL);
-	psr_msg_stats_encode(&q.buf, ++q.id, NULL);
-	peer_send(&q);
-	peer_expect(&q, &message, PSR_MSG_STATS_REPLY, q.id);
+	peer_hello(&asker, d, NULL);
+	psr_msg_stats_encode(&asker.buf, ++asker.id, NULL);
+	peer_send(&asker);
+	peer_expect(&asker, &message, PSR_MSG_STATS_REPLY, asker.id);
 	assert_int_equal(psr_msg_stats_reply_decode(&reply, message.payload, message.n, NULL), PSR_OK);
-	peer_close(&q);
+	peer_close(&asker);
 	for (int i = 0; i < reply.n_stats; i++)
 		if (reply.stat[i].id == id)
 			return reply.stat[i].value;
@@ -257,7 +258,7 @@ static void a_late_reader_gets_all_its_frames(void **state)
 	daemon_stop(&psrd);
 }
 
-/* 40,000 STATS without a look at the answers, of which 64 KiB may wait: the rest stays in the sockets until it reads. */
+/* 40,000 STATS without a look at the answers, of which 64 KiB may wait: the rest stays in the sockets. */
 static void requests_wait_when_answers_are_not_read(void **state)
 {
 	enum { N = 40000 };
@@ -378,6 +379,83 @@ static void models_beyond_max_handles_are_refused(void **state)
 	assert_int_equal(opened.handle, 3);
 	peer_close(&p);
 	daemon_stop(&psrd);
+}
+
+/* With one thread, a client with 40 requests and then one with a single request: taking turns, the second is answered
+ * after the frame under way and at most one more of the first's. */
+static void clients_take_turns(void **state)
+{
+	struct psr_msg_frame large = frame_default(1000, 1000), small = frame_default(32, 32);
+	struct psr_msg_frame_end end;
+	struct psr_message message;
+
+	(void)state;
+	start("--threads", "1", NULL, NULL);
+	peer_begin(&q, &psrd, "plate");
+	peer_begin(&p, &psrd, "plate");
+	for (int i = 0; i < 40; i++)
+		assert_int_equal(psr_msg_frame_encode(&p.buf, ++p.id, 0, &large, NULL), PSR_OK);
+	peer_send(&p);
+	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, p.id - 39); /* all 40 are there, one is drawn */
+	peer_expect_frame(&q, peer_ask_frame(&q, &small), &end);
+	assert_int_equal(end.entry[8].id, PSR_WIRE_REPORT_QUEUE);
+	assert_true(end.entry[8].count > 20); /* so many were waiting before it */
+	assert_true(stat_of(&psrd, PSR_STAT_FRAMES) < 20);
+	peer_close(&p);
+	peer_close(&q);
+	daemon_stop(&psrd);
+}
+
+static void models_beyond_max_memory_are_refused(void **state)
+{
+	struct psr_msg_opened opened;
+	struct psr_msg_close close_handle = { .handle = 1 };
+	char text[PSR_ERROR_TEXT], limit[32], path[2 * PATH_MAX];
+	static const char zeros[1 << 20];
+	FILE *file;
+
+	(void)state;
+	plate_write(folder, "other.psr", 0x112233);
+	snprintf(path, sizeof path, "%s/huge.psr", folder);
+	file = fopen(path, "wb");
+	assert_non_null(file);
+	for (int i = 0; i < 2; i++)
+		assert_int_equal(fwrite(zeros, 1, sizeof zeros, file), sizeof zeros);
+	fclose(file);
+	snprintf(limit, sizeof limit, "%d", 1 << 20);
+	start("--max-memory", limit, NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "huge"), PSR_WIRE_LIMIT, text);
+	assert_non_null(strstr(text, "--max-memory"));
+	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
+	assert_true(opened.bytes < 1 << 20);
+	psr_msg_close_encode(&p.buf, ++p.id, &close_handle, NULL);
+	peer_send(&p);
+	peer_expect_opened(&p, peer_ask_open(&p, "other"), &opened);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+/* A peer that reads nothing cannot hold up the end. */
+static void the_end_does_not_wait_for_readers_that_stopped(void **state)
+{
+	struct psr_msg_frame frame = frame_default(2000, 2000);
+	int64_t began;
+
+	(void)state;
+	start("--drain-timeout", "0.5", NULL, NULL);
+	peer_begin(&p, &psrd, "plate");
+	frame.color_codec = PSR_CODEC_RAW;
+	frame.camera.extent = 0.1;
+	peer_ask_frame(&p, &frame);
+	while (stat_of(&psrd, PSR_STAT_FRAMES) == 0)
+		usleep(5000);
+	began = clock_ms();
+	kill(psrd.pid, SIGTERM);
+	assert_int_equal(daemon_wait(&psrd), 0);
+	assert_true(clock_ms() - began >= 490);
+	assert_true(clock_ms() - began < PATIENCE_MS / 2);
+	peer_close(&p);
 }
 
 /* ---- starting ---- */
@@ -546,6 +624,9 @@ int main(void)
 		cmocka_unit_test_setup_teardown(requests_beyond_max_open_are_busy, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(frames_beyond_max_pixels_are_refused, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(models_beyond_max_handles_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(clients_take_turns, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(models_beyond_max_memory_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_end_does_not_wait_for_readers_that_stopped, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(addresses_that_are_not_loopback_are_refused_with_advice, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(bad_command_lines_exit_with_2_and_missing_folders_with_3, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_port_in_use_is_named, set_up, tear_down),

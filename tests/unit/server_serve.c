@@ -110,8 +110,8 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	assert_true(XXH64(depth, sizeof depth, 0) == end.hash[PSR_WIRE_PLANE_DEPTH]);
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
 		n_plate += rgb[3 * i] == 0xc0 && rgb[3 * i + 1] == 0x40 && rgb[3 * i + 2] == 0x20;
-	/* The plate is wider than the picture, which shows 4 tan(0.3) of its plane in height; 0.866 are covered. At either edge
-	 * a sample's distance, 1/64, may be missing or too much, and a cell of the level that fits it, 4 pixels. */
+	/* The plate is wider than the picture, which shows 4 tan(0.3) of its plane in height; 0.866 are covered. At either
+	 * edge a sample's distance, 1/64, may be missing or too much, and a cell of the level that fits it, 4 pixels. */
 	assert_true(fabs(n_plate - WIDTH * HEIGHT * 0.866 / (4 * tan(0.3)))
 	            < 2 * WIDTH * (HEIGHT / 64.0 / (4 * tan(0.3)) + 4));
 	peer_close(&p);

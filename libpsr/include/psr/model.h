@@ -27,7 +27,7 @@ struct psr_projection {
 };
 
 enum psr_block_flag {
-	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else weight 0 ([G] 7.3.2) */
+	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
 };
 
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice origin

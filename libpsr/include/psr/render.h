@@ -26,10 +26,10 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 enum psr_stage {
 	PSR_STAGE_PLAN,    /* count: instances */
 	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters that are in view */
-	PSR_STAGE_WARP,    /* count: samples that fell into the picture */
+	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
 	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
 	PSR_STAGE_RESOLVE, /* count: pixels resolved: they have a sample and weight above 0 */
-	PSR_STAGE_SHADE,   /* count: pixels shaded: those whose sample does not face away */
+	PSR_STAGE_SHADE,   /* count: pixels shaded */
 	PSR_STAGE_FILL,    /* count: pixels whose colour the fill changed */
 	PSR_N_STAGES
 };

@@ -1,0 +1,41 @@
+/* Samples of blocks, where more than one stage reads them. */
+#ifndef PSR_RENDER_BLOCK_H
+#define PSR_RENDER_BLOCK_H
+
+#include "psr/direction.h"
+#include "render/render.h"
+
+/* Where a sample stands in the instance's inner coordinates. */
+static inline void block_position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
+{
+	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
+	const float dx = projection->spacing * (float)(1u << b->level[block]), dy = dx * 0.866025404f;
+	const uint32_t r = sample >> 3, c = sample & 7;
+	const float x = ((float)(8 * b->col[block] + (int32_t)c) + (float)(r & 1) * 0.5f) * dx;
+	const float y = (float)(8 * b->row[block] + (int32_t)r) * dy;
+	const float z = b->depth_bias[block] +
+	                b->depth_step[block] * (float)b->depth[(size_t)block * PSR_BLOCK_SAMPLES + sample];
+	for (int a = 0; a < 3; a++)
+		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
+}
+
+static inline uint64_t block_attr(const struct psr_blocks *b, uint32_t block, uint32_t sample)
+{
+	const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
+	return b->attr[(uint64_t)b->attr_first[block] + (uint64_t)__builtin_popcountll(below)];
+}
+
+/* From a position to the eye; of any length. */
+static inline void to_eye(const struct plan *plan, const struct plan_instance *in, const float p[3], float v[3])
+{
+	for (int k = 0; k < 3; k++)
+		v[k] = plan->perspective ? in->eye[k] - p[k] : in->eye[k];
+}
+
+/* Whether a normal whose product with the vector v to the eye is g faces away. */
+static inline int faces_away(float g, const float v[3])
+{
+	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+}
+
+#endif

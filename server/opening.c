@@ -1,0 +1,94 @@
+#define _GNU_SOURCE
+#include <errno.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "builder.h"
+#include "cachekey.h"
+#include "opening.h"
+
+static void post(struct opening *o)
+{
+	loop_post(o->loop, &o->note);
+}
+
+void opening_load(void *userdata)
+{
+	struct opening *o = userdata;
+
+	o->code = PSR_OK;
+	if (o->was_built && rename(o->temporary, o->cached) != 0 && !(errno == ENOENT && access(o->cached, R_OK) == 0))
+		o->code = psr_fail(&o->error, PSR_ERR_IO, "%s: %s", o->cached, strerror(errno));
+	if (o->code == PSR_OK)
+		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
+	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
+		o->code = psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
+	post(o);
+}
+
+static int make_folders(const char *path, struct psr_error *err)
+{
+	char *copy = strdup(path);
+
+	if (copy == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
+	for (char *at = copy + 1;; at++) {
+		if (*at == '/' || *at == '\0') {
+			char was = *at;
+
+			*at = '\0';
+			if (mkdir(copy, 0700) != 0 && errno != EEXIST) {
+				int code = psr_fail(err, PSR_ERR_IO, "the cache %s cannot be made: %s", copy, strerror(errno));
+
+				free(copy);
+				return code;
+			}
+			*at = was;
+			if (was == '\0')
+				break;
+		}
+	}
+	free(copy);
+	return PSR_OK;
+}
+
+static int prepare_source(struct opening *o)
+{
+	const char *cache = o->cache;
+	struct stat status;
+	int code = builder_find_program(o->program, &o->error);
+
+	if (code == PSR_OK)
+		code = cachekey_find(o->key, o->file.path, o->program, &o->error);
+	if (code == PSR_OK)
+		code = make_folders(cache, &o->error);
+	if (code != PSR_OK)
+		return code;
+	if (asprintf(&o->cached, "%s/%s.psr", cache, o->key) < 0)
+		o->cached = NULL;
+	if (asprintf(&o->temporary, "%s/%s.psr.tmp", cache, o->key) < 0)
+		o->temporary = NULL;
+	if (o->cached == NULL || o->temporary == NULL)
+		return psr_fail(&o->error, PSR_ERR_MEMORY, "no memory");
+	o->is_cached = stat(o->cached, &status) == 0;
+	if (o->is_cached)
+		o->bytes = (uint64_t)status.st_size;
+	return PSR_OK;
+}
+
+void opening_prepare(void *userdata)
+{
+	struct opening *o = userdata;
+	struct stat status;
+
+	o->code = PSR_OK;
+	if (o->file.is_source)
+		o->code = prepare_source(o);
+	else if (stat(o->file.path, &status) == 0)
+		o->bytes = (uint64_t)status.st_size;
+	else
+		o->code = psr_fail(&o->error, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s", strerror(errno));
+	post(o);
+}
