@@ -68,7 +68,8 @@ static int check_bounds(const struct psr_accuracy *a, const struct bounds *bound
 	int broken = 0;
 
 	if (bounds->has_holes && holes > bounds->holes)
-		broken = fprintf(stderr, PROGRAM ": %.6f of the pixels inside are holes, %.6f are allowed\n", holes, bounds->holes);
+		broken = fprintf(stderr, PROGRAM ": %.6f of the pixels inside are holes, %.6f are allowed\n", holes,
+		                 bounds->holes);
 	if (bounds->has_distance && a->distance_p999 > bounds->distance)
 		broken = fprintf(stderr, PROGRAM ": the distance is %.4f spacings at the 99.9th percentile, %.4f is allowed\n",
 		                 a->distance_p999, bounds->distance);
@@ -131,7 +132,8 @@ int cmd_accuracy(int argc, char **argv)
 	const struct psr_opt opts[] = {
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame, .arg = "FRAME.pfm",
 		  .help = "the frame's depth, as psr shot --depth writes it" },
-		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera.eye, .arg = "X,Y,Z", .help = "the frame's camera", .seen = &eye },
+		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera.eye, .arg = "X,Y,Z", .help = "the frame's camera",
+		  .seen = &eye },
 		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera.target, .arg = "X,Y,Z", .help = "where it looks",
 		  .seen = &target },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = camera.up, .arg = "X,Y,Z", .help = "what is up in the picture",
@@ -144,9 +146,11 @@ int cmd_accuracy(int argc, char **argv)
 		  .help = "distance of the model's samples, which distances are counted in", .min = 1e-30, .max = 1e30,
 		  .seen = &seen_spacing },
 		{ .name = "max-holes", .type = PSR_OPT_REAL, .value = &bounds.holes, .arg = "F",
-		  .help = "fail if a larger fraction of the pixels inside are holes", .min = 0, .max = 1, .seen = &bounds.has_holes },
+		  .help = "fail if a larger fraction of the pixels inside are holes", .min = 0, .max = 1,
+		  .seen = &bounds.has_holes },
 		{ .name = "max-distance", .type = PSR_OPT_REAL, .value = &bounds.distance, .arg = "D",
-		  .help = "fail if the 99.9th percentile is over D spacings", .min = 0, .max = 1e30, .seen = &bounds.has_distance },
+		  .help = "fail if the 99.9th percentile is over D spacings", .min = 0, .max = 1e30,
+		  .seen = &bounds.has_distance },
 		{ .name = "max-outside", .type = PSR_OPT_INT, .value = &bounds.outside, .arg = "N",
 		  .help = "fail if more pixels are drawn over a pixel outside of the silhouette", .min = 0, .max = 1 << 26,
 		  .seen = &bounds.has_outside },
@@ -165,8 +169,8 @@ int cmd_accuracy(int argc, char **argv)
 	if (code > 0)
 		return 0;
 	if (code == PSR_OK)
-		code = check_arguments(frame, n_operands, (eye != 0) | (target != 0) << 1 | (up != 0) << 2, seen_fov, seen_ortho,
-		                       seen_spacing, &err);
+		code = check_arguments(frame, n_operands, (eye != 0) | (target != 0) << 1 | (up != 0) << 2, seen_fov,
+		                       seen_ortho, seen_spacing, &err);
 	if (code == PSR_OK) {
 		camera.kind = seen_ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
 		camera.fov_y = fov * RADIANS;

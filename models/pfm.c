@@ -47,7 +47,8 @@ static int read_rows(FILE *file, float *depth, uint32_t width, uint32_t height, 
 	for (uint32_t y = height; y-- > 0 && code == PSR_OK;) {
 		if (fread(row, 4, width, file) != width)
 			code = ferror(file) ? psr_fail(err, PSR_ERR_IO, "%s: %s", path, strerror(errno))
-			                    : psr_fail(err, PSR_ERR_FORMAT, "%s ends within row %u of %u", path, height - y, height);
+			                    : psr_fail(err, PSR_ERR_FORMAT, "%s ends within row %u of %u", path, height - y,
+			                               height);
 		for (uint32_t x = 0; x < width && code == PSR_OK; x++)
 			depth[(size_t)y * width + x] = get_float(row + 4 * (size_t)x, is_little);
 	}

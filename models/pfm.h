@@ -1,4 +1,5 @@
-/* Depth pictures as PFM: "Pf", width and height, a scale whose sign is the byte order, rows of floats from the bottom. */
+/* Depth pictures as PFM: "Pf", width and height, a scale whose sign is the byte order, rows of floats from the bottom
+ * up. */
 #ifndef MODELS_PFM_H
 #define MODELS_PFM_H
 

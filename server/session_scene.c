@@ -6,7 +6,6 @@
 #include "base/srgb.h"
 #include "session_scene.h"
 
-#define HALF_PI 1.57079632679489661923
 
 struct scene *scene_ref(struct scene *scene)
 {
@@ -63,9 +62,6 @@ static int add_light(struct scene *scene, const struct psr_msg_light *msg, struc
 
 	if (msg->flags & PSR_WIRE_LIGHT_SHADOW)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 " casts shadows, which this server does not draw", number);
-	if (msg->kind == PSR_WIRE_LIGHT_SPOT && msg->outer > HALF_PI)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 ": a spot's half angle is 90 degrees at most on this "
-		                "server", number);
 	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
 	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
 	memcpy(light->position, msg->position, sizeof light->position);
@@ -73,8 +69,7 @@ static int add_light(struct scene *scene, const struct psr_msg_light *msg, struc
 	for (int k = 0; k < 3; k++)
 		light->color[k] = (double)psr_srgb_to_linear[msg->color[k]] * msg->intensity;
 	light->outer = msg->outer;
-	/* The wire allows a hard edge, the renderer wants inner < outer. */
-	light->inner = msg->inner < msg->outer ? msg->inner : msg->outer * (1 - 1e-6);
+	light->inner = msg->inner;
 	light->reference = msg->reference;
 	return PSR_OK;
 }

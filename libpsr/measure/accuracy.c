@@ -9,8 +9,8 @@
 /* Rays a side over the nine pixels of a neighbourhood: 4x4 in each. */
 #define OUTSIDE_SIDE 12
 
-/* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that of
- * a diagonal neighbour's centre, 1.42 away: on a slope the two may differ by this many pixels times its tangent. */
+/* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that
+ * of a diagonal neighbour's centre, 1.42 away: on a slope they may differ by this many pixels times its tangent. */
 #define SLOPE_PIXELS 2.2
 /* Seen flatter than 85 degrees, a surface has no usable slope. */
 #define LEAST_COSINE 0.087
@@ -107,7 +107,8 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 	count->n_inside_empty += (uint64_t)(is_inside && !is_drawn);
 	count->n_holes += (uint64_t)(is_inside && (!is_drawn || is_hole(m, (double)m->depth[at], neighbor, n)));
 	if (is_drawn && n == 0)
-		count->n_outside_drawn += (uint64_t)!truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE);
+		count->n_outside_drawn += (uint64_t)!truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3,
+		                                                  OUTSIDE_SIDE);
 	if (is_drawn && n != 0) {
 		double origin[3], direction[3], point[3];
 
@@ -165,8 +166,8 @@ static void add_up(struct psr_accuracy *out, const struct measure *m)
 	out->distance_max = percentile(m->distance, n, 1);
 }
 
-static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth, const struct psr_camera *camera,
-                   int n_threads, struct psr_error *err)
+static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth,
+                   const struct psr_camera *camera, int n_threads, struct psr_error *err)
 {
 	size_t n = (size_t)m->width * m->height;
 	struct psr_pool *pool;
@@ -190,8 +191,8 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	return PSR_OK;
 }
 
-int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,
-                         uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err)
+int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
+                         uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err)
 {
 	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
 		                 .depth = depth };

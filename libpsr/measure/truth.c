@@ -137,8 +137,8 @@ static void draw_row(int row, void *userdata)
 	}
 }
 
-int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height, uint32_t side,
-                   int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
+int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height,
+                   uint32_t side, int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
 {
 	struct job job = { .truth = truth, .side = side, .near_z = camera->near_z, .depth = depth, .normal = normal,
 		               .rgb = rgb };

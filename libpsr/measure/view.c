@@ -3,7 +3,8 @@
 #include "../base/vec.h"
 #include "psr/render.h"
 
-int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height, struct psr_error *err)
+int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height,
+              struct psr_error *err)
 {
 	const struct psr_scene scene = { .camera = *camera };
 	double sine, cosine;
@@ -14,8 +15,8 @@ int view_init(struct view *view, const struct psr_camera *camera, uint32_t width
 	if (width == 0 || height == 0)
 		return psr_fail(err, PSR_ERR_ARG, "a picture of %ux%u pixels has none", width, height);
 	if (width > PSR_MAX_SIDE || height > PSR_MAX_SIDE || (uint64_t)width * height > PSR_MAX_PIXELS)
-		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u pixels is over the limit of %d a side, %u in all", width,
-		                height, PSR_MAX_SIDE, PSR_MAX_PIXELS);
+		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u pixels is over the limit of %d a side, %u in all",
+		                width, height, PSR_MAX_SIDE, PSR_MAX_PIXELS);
 	v3d_set(view->eye, camera->eye[0], camera->eye[1], camera->eye[2]);
 	v3d_sub(view->forward, camera->target, camera->eye);
 	v3d_normalize(view->forward, view->forward);

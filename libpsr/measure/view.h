@@ -14,7 +14,8 @@ struct view {
 };
 
 /* ARG, LIMIT: as psr_scene_validate. */
-int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height, struct psr_error *err);
+int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height,
+              struct psr_error *err);
 
 /* The ray through a place in the picture, in pixels from its top left corner: world = origin + z' * direction. */
 void view_ray(const struct view *view, double x, double y, double origin[3], double direction[3]);

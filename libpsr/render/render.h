@@ -11,11 +11,10 @@
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 #define STRIP 256       /* samples that are resolved and shaded together */
 
-/* A sample of a one-sided block faces away when its normal is more than this sine (6 degrees) beyond perpendicular:
- * quantisation and interpolation tilt the normals of grazing samples by as much, and those are seen. [G] 7.3.2 gives such
- * samples weight 0 when they are shaded; here they are left out when they are warped, before they hide what is behind them, so that open
- * one-sided surfaces are seen through from their backs. */
-#define BACK_SINE 0.1f
+/* A sample of a one-sided block faces away when its normal is more than this sine beyond perpendicular: what normals are
+ * quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out when they are warped, before
+ * they hide what is behind them, so that open one-sided surfaces are seen through from their backs. */
+#define BACK_SINE 0.0125f
 
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
 

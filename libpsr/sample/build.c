@@ -52,8 +52,8 @@ void psr_build_options_default(struct psr_build_options *options)
 static int check_options(const struct psr_build_options *options, struct psr_error *err)
 {
 	if (options->resolution < LEAST_RESOLUTION || options->resolution > MOST_RESOLUTION)
-		return psr_fail(err, PSR_ERR_ARG, "resolution %u is outside of %d..%d pixels", options->resolution, LEAST_RESOLUTION,
-		                MOST_RESOLUTION);
+		return psr_fail(err, PSR_ERR_ARG, "resolution %u is outside of %d..%d pixels", options->resolution,
+		                LEAST_RESOLUTION, MOST_RESOLUTION);
 	if (!(options->tolerance > 0 && options->tolerance <= MOST_TOLERANCE))
 		return psr_fail(err, PSR_ERR_ARG, "tolerance %g is outside of 0..60 degrees",
 		                options->tolerance * 57.295779513082323);
@@ -87,21 +87,23 @@ static int trace_projections(struct build *build)
 	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
 		rc = lattice_trace(&build->lattice[i], build->scene, &build->projection[i], 1, build->pool);
 		if (rc != PSR_OK)
-			return psr_fail(build->err, rc, "no memory for the samples of projection %u at resolution %u; use a lower one", i,
-			                build->options->resolution);
+			return psr_fail(build->err, rc, "no memory for the samples of projection %u at resolution %u; use a lower one",
+			                i, build->options->resolution);
 		build->report.n_rays += build->lattice[i].n_rays;
 		build->report.n_candidates += build->lattice[i].n_blocks;
 		report_rays(build, i + 1);
 	}
 	build->report.seconds_rays = now() - started;
-	return build->report.n_candidates != 0
-	               ? PSR_OK
-	               : psr_fail(build->err, PSR_ERR_ARG, "no ray meets the mesh: all of it is transparent, turned away or too thin");
+	if (build->report.n_candidates == 0)
+		return psr_fail(build->err, PSR_ERR_ARG,
+		                "no ray meets the mesh: all of it is transparent, turned away or too thin");
+	return PSR_OK;
 }
 
 static int select_and_pack(struct build *build, struct psr_model **out)
 {
-	struct select_input input = { .mesh = build->mesh, .scene = build->scene, .lattice = build->lattice, .projection = build->projection,
+	struct select_input input = { .mesh = build->mesh, .scene = build->scene, .lattice = build->lattice,
+		                          .projection = build->projection,
 		                          .ds = 2.0 / build->options->resolution, .pool = build->pool,
 		                          .on_progress = report_select, .userdata = (void *)build->options };
 	double started = now(), sine, cosine;
@@ -114,7 +116,8 @@ static int select_and_pack(struct build *build, struct psr_model **out)
 	if (rc != PSR_OK)
 		return psr_fail(build->err, rc, "no memory to select the blocks at resolution %u; use a lower one",
 		                build->options->resolution);
-	return pack_model(out, &build->info, build->scene, build->projection, build->lattice, &build->selection, build->err);
+	return pack_model(out, &build->info, build->scene, build->projection, build->lattice, &build->selection,
+	                  build->err);
 }
 
 static int prepare(struct build *build)

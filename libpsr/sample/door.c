@@ -8,7 +8,8 @@ static int check_materials(const struct psr_mesh *mesh, struct psr_error *err)
 	for (uint32_t i = 0; i < mesh->n_materials; i++) {
 		int image = mesh->material[i].base_texture.image;
 
-		if (image >= 0 && ((uint32_t)image >= mesh->n_images || mesh->image[image].width == 0 || mesh->image[image].height == 0))
+		if (image >= 0
+		    && ((uint32_t)image >= mesh->n_images || mesh->image[image].width == 0 || mesh->image[image].height == 0))
 			return psr_fail(err, PSR_ERR_ARG, "material %u uses image %d, which does not exist or is empty", i, image);
 	}
 	return PSR_OK;
@@ -19,7 +20,8 @@ int door_check_mesh(const struct psr_mesh *mesh, struct psr_error *err)
 	if (mesh->n_triangles == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the mesh has no triangles");
 	if (mesh->n_triangles >= LATTICE_BACK)
-		return psr_fail(err, PSR_ERR_LIMIT, "%u triangles are over the limit of %u", mesh->n_triangles, LATTICE_BACK - 1);
+		return psr_fail(err, PSR_ERR_LIMIT, "%u triangles are over the limit of %u", mesh->n_triangles,
+		                LATTICE_BACK - 1);
 	for (uint32_t i = 0; i < mesh->n_triangles; i++) {
 		for (int k = 0; k < 3; k++)
 			if (mesh->triangle[i][k] >= mesh->n_vertices)
@@ -59,7 +61,7 @@ int door_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radiu
 	}
 	*radius = reach * (1 + 0x1p-20);
 	if (!isnormal(*radius) || *radius * *radius == 0 || !isfinite(*radius * *radius))
-		return psr_fail(err, PSR_ERR_ARG, "the mesh has a radius of %g: it must have an extent, and one whose square is a number",
-		                *radius);
+		return psr_fail(err, PSR_ERR_ARG,
+		                "the mesh has a radius of %g: it must have an extent, and one whose square is a number", *radius);
 	return PSR_OK;
 }

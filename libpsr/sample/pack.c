@@ -88,7 +88,8 @@ static void sort_blocks(struct pack *pack)
 		double min[3], max[3], center[3];
 
 		projection_box(lattice, block, min, max);
-		inner_position(&lattice->projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, center);
+		inner_position(&lattice->projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2,
+		               center);
 		pack->order[i].code = morton(center);
 		pack->order[i].block = i;
 	}
@@ -125,11 +126,10 @@ static void bound_block(struct pack *pack, uint32_t i, const struct psr_projecti
 	for (uint64_t left = pack->mask[i]; left != 0; left &= left - 1) {
 		unsigned s = (unsigned)__builtin_ctzll(left);
 		double x, y, position[3], squared = 0;
+		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[PSR_BLOCK_SAMPLES * (size_t)i + s];
 
 		lattice_position(projection, pack->col[i], pack->row[i], s, &x, &y);
-		inner_position(projection, x, y,
-		               (double)(pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[PSR_BLOCK_SAMPLES * (size_t)i + s]),
-		               position);
+		inner_position(projection, x, y, (double)z, position);
 		for (int k = 0; k < 3; k++) {
 			double d = position[k] - (double)rounded[k];
 

@@ -10,6 +10,7 @@
 #include "select.h"
 
 #define N_ROTATIONS 4
+#define TURN 0.39269908169872414 /* 22.5 degrees */
 #define N_SHIFTS 4
 #define N_TESTS (N_ROTATIONS * N_SHIFTS)
 #define N_SWEEPS 2
@@ -18,8 +19,17 @@
 /* A sample of the projection under way, as a test wants it. */
 struct candidate {
 	struct cover_seen seen;
-	float least_z; /* a picture with less at this place misses it */
+	float least_z;  /* a picture with less at this place misses it, */
+	int is_lenient; /* unless, with this, it has the same surface within half a pixel more */
 };
+
+/* Which samples may choose blocks, by the cosine of the angle at which their projection sees them. */
+struct strictness {
+	float least_cosine, lenient_below;
+};
+
+/* Outlines differ in part of a pixel from every side, and each projection sees its own at a steep angle. */
+#define OUTLINE_COSINE 0.5f
 
 struct select {
 	const struct select_input *input;
@@ -30,8 +40,7 @@ struct select {
 	/* The projection under way: */
 	unsigned projection;
 	const struct lattice *lattice;
-	float least_cosine;
-	int is_lenient; /* what S has of the same surface within half a pixel more is not missed */
+	struct strictness strictness;
 	struct candidate (*candidate)[PSR_BLOCK_SAMPLES];
 	uint64_t *eligible, *missed;
 	int failed;
@@ -82,24 +91,25 @@ static void prepare_block(int b, void *userdata)
 		float cosine = sample_cosine(select->input->scene, &lattice->projection, &lattice->sample[b][s]), position[3];
 		struct candidate *candidate = &select->candidate[b][s];
 
-		if (cosine < select->least_cosine)
+		if (cosine < select->strictness.least_cosine)
 			continue;
 		select->eligible[b] |= UINT64_C(1) << s;
 		sample_position(lattice, (uint32_t)b, s, position);
 		candidate->seen = cover_project(lattice->projection.axis, position);
 		candidate->least_z = candidate->seen.z - tolerance_of(cosine, select->input->ds);
+		candidate->is_lenient = cosine < select->strictness.lenient_below;
 	}
 }
 
 /* Whether S has a point as near as this candidate in its pixel; or one of the same surface in those at the corners of a
  * pixel around it. */
-static int is_there(const float *z, const struct cover_grid *grid, const struct candidate *candidate, int is_lenient)
+static int is_there(const float *z, const struct cover_grid *grid, const struct candidate *candidate)
 {
 	static const float corner[4][2] = { { -0.5f, -0.5f }, { 0.5f, -0.5f }, { -0.5f, 0.5f }, { 0.5f, 0.5f } };
 
 	if (z[cover_pixel(grid, &candidate->seen)] >= candidate->least_z)
 		return 1;
-	for (int i = 0; is_lenient && i < 4; i++) {
+	for (int i = 0; candidate->is_lenient && i < 4; i++) {
 		struct cover_grid moved = *grid;
 		float beside;
 
@@ -119,7 +129,7 @@ static void test_view(int test, void *userdata)
 	struct cover_grid grid;
 	float *z;
 
-	cover_grid_init(&grid, test / N_SHIFTS * 0.39269908169872414, test % 2 / 2.0, test / 2 % 2 / 2.0, select->input->ds);
+	cover_grid_init(&grid, test / N_SHIFTS * TURN, test % 2 / 2.0, test / 2 % 2 / 2.0, select->input->ds);
 	z = psr_alloc_array((size_t)grid.side * grid.side, sizeof *z);
 	if (z == NULL) {
 		__atomic_store_n(&select->failed, 1, __ATOMIC_RELAXED);
@@ -133,7 +143,7 @@ static void test_view(int test, void *userdata)
 			unsigned s = (unsigned)__builtin_ctzll(left);
 			const struct candidate *candidate = &select->candidate[b][s];
 
-			missed |= (uint64_t)!is_there(z, &grid, candidate, select->is_lenient) << s;
+			missed |= (uint64_t)!is_there(z, &grid, candidate) << s;
 		}
 		if (missed != 0)
 			__atomic_fetch_or(&select->missed[b], missed, __ATOMIC_RELAXED);
@@ -193,7 +203,8 @@ static void fill_block(int i, void *userdata)
 		uint32_t surface = select->lattice->sample[block->block][s].surface;
 		struct cover_point *point = &select->cover.point[at];
 
-		select->selection->attr[at] = sample_attr(select->input->mesh, select->input->scene, select->lattice, block->block, s);
+		select->selection->attr[at] = sample_attr(select->input->mesh, select->input->scene, select->lattice,
+		                                          block->block, s);
 		sample_position(select->lattice, block->block, s, point->position);
 		point->normal = (uint16_t)PSR_ATTR_NORMAL(select->selection->attr[at]);
 		point->two_sided = select->is_two_sided[surface & ~LATTICE_BACK];
@@ -203,12 +214,13 @@ static void fill_block(int i, void *userdata)
 static int add_missed(struct select *select)
 {
 	struct selection *selection = select->selection;
-	size_t n_new = 0;
+	size_t n_new = 0, most;
 
 	for (uint32_t b = 0; b < select->lattice->n_blocks; b++)
 		n_new += select->missed[b] != 0;
-	if (grow_selection(selection, selection->n_blocks + n_new, selection->n_samples + n_new * PSR_BLOCK_SAMPLES) != PSR_OK
-	    || cover_reserve(&select->cover, selection->n_samples + n_new * PSR_BLOCK_SAMPLES) != PSR_OK)
+	most = selection->n_samples + n_new * PSR_BLOCK_SAMPLES;
+	if (grow_selection(selection, selection->n_blocks + n_new, most) != PSR_OK
+	    || cover_reserve(&select->cover, most) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	select->first_new = selection->n_blocks;
 	for (uint32_t b = 0; b < select->lattice->n_blocks; b++)
@@ -219,11 +231,11 @@ static int add_missed(struct select *select)
 	return PSR_OK;
 }
 
-/* Marks what S misses of a projection's samples that it sees with at least this cosine, in the first n_tests. */
-static int find_missed(struct select *select, const struct lattice *lattice, float least_cosine, int n_tests)
+/* Marks what S misses of a projection's samples in the first n_tests. */
+static int find_missed(struct select *select, const struct lattice *lattice, struct strictness strictness, int n_tests)
 {
 	select->lattice = lattice;
-	select->least_cosine = least_cosine;
+	select->strictness = strictness;
 	select->candidate = psr_alloc_array(lattice->n_blocks, sizeof *select->candidate);
 	select->missed = psr_alloc_array(lattice->n_blocks, sizeof *select->missed);
 	select->eligible = psr_alloc_array(lattice->n_blocks, sizeof *select->eligible);
@@ -244,9 +256,9 @@ static void forget_missed(struct select *select)
 	select->missed = select->eligible = NULL;
 }
 
-static int visit_projection(struct select *select, unsigned projection, float least_cosine)
+static int visit_projection(struct select *select, unsigned projection, struct strictness strictness)
 {
-	int rc = find_missed(select, &select->input->lattice[projection], least_cosine, N_TESTS);
+	int rc = find_missed(select, &select->input->lattice[projection], strictness, N_TESTS);
 
 	select->projection = projection;
 	if (rc == PSR_OK)
@@ -265,35 +277,35 @@ static int is_any_missed(const struct select *select)
 
 static int visit_scout(struct select *select, unsigned projection)
 {
+	const struct strictness lenient = { .least_cosine = 0, .lenient_below = INFINITY };
 	const struct select_input *input = select->input;
 	struct lattice part;
 	int is_needed, rc = lattice_trace(&part, input->scene, &input->projection[projection], SCOUT_STRIDE, input->pool);
 
 	if (rc != PSR_OK)
 		return rc;
-	rc = find_missed(select, &part, 0, 1);
+	rc = find_missed(select, &part, lenient, 1);
 	is_needed = rc == PSR_OK && is_any_missed(select);
 	forget_missed(select);
 	lattice_fini(&part);
 	if (!is_needed)
 		return rc;
 	rc = lattice_trace(&input->lattice[projection], input->scene, &input->projection[projection], 1, input->pool);
-	return rc == PSR_OK ? visit_projection(select, projection, 0) : rc;
+	return rc == PSR_OK ? visit_projection(select, projection, lenient) : rc;
 }
 
 int select_blocks(struct selection *selection, const struct select_input *input)
 {
 	struct select select = { .input = input, .selection = selection };
+	const struct strictness sweep[N_SWEEPS] = { { input->cosine, 0 }, { 0, OUTLINE_COSINE } };
 	unsigned n_visits = N_SWEEPS * N_PROJECTIONS + N_SCOUTS;
 	int rc;
 
 	memset(selection, 0, sizeof *selection);
 	rc = note_sides(&select);
 	for (unsigned i = 0; rc == PSR_OK && i < n_visits; i++) {
-		/* Outlines differ in part of a pixel from every side; only those of a first sweep are worth blocks. */
-		select.is_lenient = i >= N_PROJECTIONS;
 		if (i < N_SWEEPS * N_PROJECTIONS)
-			rc = visit_projection(&select, i % N_PROJECTIONS, i < N_PROJECTIONS ? input->cosine : 0);
+			rc = visit_projection(&select, i % N_PROJECTIONS, sweep[i / N_PROJECTIONS]);
 		else
 			rc = visit_scout(&select, i - (N_SWEEPS - 1) * N_PROJECTIONS);
 		if (input->on_progress != NULL)

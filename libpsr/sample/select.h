@@ -38,9 +38,9 @@ struct select_input {
 
 /* Twice through the projections: in the first sweep only samples that a projection sees within the tolerance angle can
  * choose a block, so that as much as possible comes from where it is sampled best; in the second every sample that is
- * still missed does, if nothing of its surface is there within half a pixel more. Then each of the scouts looks at a
- * part of its view, and is a projection like the others if it finds a sample that is missed. Chosen blocks keep all of
- * their samples. MEMORY; selection_fini() either way. */
+ * still missed does, but if it is seen at over 60 degrees, an outline, only where nothing of its surface is there
+ * within half a pixel more. Then each of the scouts looks at a part of its view, and is a projection like the others if
+ * it finds a sample that is missed. Chosen blocks keep all of their samples. MEMORY; selection_fini() either way. */
 int select_blocks(struct selection *selection, const struct select_input *input);
 void selection_fini(struct selection *selection);
 

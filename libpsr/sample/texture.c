@@ -29,7 +29,8 @@ static void look_up(const struct psr_image *image, const struct psr_texture *tex
 {
 	double x = s * image->width - 0.5, y = t * image->height - 0.5, x0 = floor(x), y0 = floor(y);
 	float fx = (float)(x - x0), fy = (float)(y - y0);
-	uint32_t xs[2] = { wrap_index(x0, image->width, texture->wrap_s), wrap_index(x0 + 1, image->width, texture->wrap_s) };
+	uint32_t xs[2] = { wrap_index(x0, image->width, texture->wrap_s),
+		               wrap_index(x0 + 1, image->width, texture->wrap_s) };
 	uint32_t ys[2] = { wrap_index(y0, image->height, texture->wrap_t),
 		               wrap_index(y0 + 1, image->height, texture->wrap_t) };
 

@@ -82,8 +82,8 @@ static void pictures_are_not_mirrored(void **state)
 	meshes_free(mesh);
 }
 
-/* A finely divided sphere of radius 1 differs from the exact one by (pi / 400)^2 / 2 = 3e-5, times 1 / cos at 60 degrees
- * from the middle. */
+/* A finely divided sphere of radius 1 differs from the exact one by (pi / 400)^2 / 2 = 3e-5, times 1 / cos at
+ * 60 degrees from the middle. */
 static void spheres_have_their_depths_and_normals(void **state)
 {
 	struct psr_mesh *mesh = meshes_sphere(400, zero, 1);

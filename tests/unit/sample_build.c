@@ -32,7 +32,7 @@ static struct psr_mesh *dented_sphere(void)
 	struct psr_mesh *mesh = meshes_sphere(80, zero, 1);
 
 	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
-		double *p = mesh->position[i], r = 1 - 0.2 * exp(-8 * ((p[0] - 0.6) * (p[0] - 0.6) + (p[1] - 0.6) * (p[1] - 0.6)));
+		double *p = mesh->position[i], x = p[0] - 0.6, y = p[1] - 0.6, r = 1 - 0.2 * exp(-8 * (x * x + y * y));
 
 		v3d_scale(p, p, r + 0.02 * p[0] * p[1]);
 		v3f_set(mesh->normal[i], 0, 0, 0);
@@ -238,8 +238,8 @@ static void sheets_are_two_sided_and_closed_things_are_not(void **state)
 	meshes_free(flat);
 }
 
-/* Where a projection samples a face well, others add blocks along its border only. The lattice of one that looks straight
- * at it has cells of ds^2 cos^2 25 sqrt(3) / 2 = 0.711 ds^2. */
+/* Where a projection samples a face well, others add blocks along its border only. The lattice of one that looks
+ * straight at it has cells of ds^2 cos^2 25 sqrt(3) / 2 = 0.711 ds^2. */
 static void flat_faces_are_not_sampled_twice(void **state)
 {
 	struct psr_mesh *mesh = meshes_square(1);
