@@ -51,7 +51,7 @@ of_model() { flat "$1" | sed -n "s/.*\"model\":{[^}]*\"$2\":\([-+0-9.eE]*\).*/\1
 stage() { flat "$1" | sed -n "s/.*\"$2\":{\"ms\":\([-+0-9.eE]*\).*/\1/p"; }        # file stage: milliseconds
 
 size=640x480
-rule=$(printf '%.0s-' {1..116})
+rule=$(printf '%.0s-' {1..125})
 echo "== frames of $size, JPEG q90, and $seconds s of load by 4 clients each"
 printf '%-10s %9s %6s %7s %7s %7s %7s %7s %7s %7s %7s %8s %8s %8s\n' model samples MB plan cull warp gaps resolve shade \
 	fill encode 'total ms' bytes frames/s
@@ -66,7 +66,7 @@ for name in teapot top pencil wheel $real; do
 	printf '%-10s %9.0f %6.1f' "$name" "$(of_model "$report" samples)" \
 		"$(awk "BEGIN { print $(of_model "$report" bytes) / 1e6 }")"
 	for s in plan cull warp gaps resolve shade fill encode total; do printf ' %7.2f' "$(stage "$report" $s)"; done
-	printf '  %8.0f %8.1f\n' "$(flat "$report" | sed -n 's/.*"error_px":[^,]*,"bytes":\([0-9]*\).*/\1/p')" "$(number "$out/$name-bench.json" frames_per_second)"
+	printf '  %8.0f %8.1f\n' "$(flat "$report" | sed -n 's/.*"error_px":[^,]*,"bytes":\([0-9]*\).*/\1/p')" "$(number "$out/$name-bench.json" frames_per_s)"
 	sheet="$sheet $out/$name.png"
 done
 echo "$rule"
