@@ -137,12 +137,32 @@ void set_texture(reader &r, struct psr_material &m, int texture, const std::stri
 	}
 }
 
-/* The texture that gives the base color: of metallic-roughness, or the diffuse one of specular-glossiness. */
+bool emits(const tinygltf::Material &m)
+{
+	const auto &e = m.emissiveFactor;
+
+	return e.size() == 3 && (e[0] > 0.0 || e[1] > 0.0 || e[2] > 0.0);
+}
+
+/* A black surface that shines, as labels do: drawn unlit, in the colour that it emits. */
+bool only_emits(const tinygltf::Material &m)
+{
+	const auto &pbr = m.pbrMetallicRoughness;
+	const auto &base = pbr.baseColorFactor;
+
+	return emits(m) && pbr.baseColorTexture.index < 0 && base.size() == 4 && base[0] == 0.0 && base[1] == 0.0 &&
+	       base[2] == 0.0 && m.extensions.count("KHR_materials_pbrSpecularGlossiness") == 0;
+}
+
+/* The texture that gives the base color: of metallic-roughness, the diffuse one of specular-glossiness, or the emissive one of
+ * what only emits. */
 tinygltf::TextureInfo base_texture(const tinygltf::Material &m)
 {
 	auto it = m.extensions.find("KHR_materials_pbrSpecularGlossiness");
 	tinygltf::TextureInfo info;
 
+	if (only_emits(m))
+		return m.emissiveTexture;
 	if (it == m.extensions.end() || !it->second.IsObject())
 		return m.pbrMetallicRoughness.baseColorTexture;
 	if (!it->second.Has("diffuseTexture"))
@@ -204,10 +224,13 @@ struct psr_material convert(reader &r, const tinygltf::Material &g, const std::s
 	m.unlit = g.extensions.count("KHR_materials_unlit") != 0;
 	if (g.normalTexture.index >= 0)
 		import_mesh_warn(&r.im, "normal maps are not used");
-	if (g.emissiveTexture.index >= 0 || (g.emissiveFactor.size() == 3 && (g.emissiveFactor[0] > 0.0 ||
-	                                                                      g.emissiveFactor[1] > 0.0 ||
-	                                                                      g.emissiveFactor[2] > 0.0)))
-		import_mesh_warn(&r.im, "emission is not used");
+	if (only_emits(g)) {
+		m.unlit = 1;
+		for (size_t c = 0; c < 3; c++)
+			m.base_color[c] = (float)g.emissiveFactor[c];
+	} else if (emits(g)) {
+		import_mesh_warn(&r.im, "emission is used only where nothing else colours a material");
+	}
 	return m;
 }
 

@@ -2,6 +2,10 @@
 #include "../base/srgb.h"
 #include "material.h"
 
+/* A metal has no diffuse colour: it mirrors its surroundings, and here there are none. Half of its colour stands in for
+ * them, or metals would be black but for highlights. */
+#define METAL_LOSS 0.5f
+
 unsigned material_exponent_code(double exponent)
 {
 	double root = sqrt(sqrt(sqrt(sqrt(2.0)))), bound = sqrt(root);
@@ -52,7 +56,7 @@ uint64_t material_attr(const struct psr_material *material, const float rgb[3])
 		float f0 = 0.04f + (rgb[c] - 0.04f) * metallic;
 		float lobe = f0 * (float)((exponent + 2) / 2);
 
-		diffuse[c] = rgb[c] * (1 - metallic);
+		diffuse[c] = rgb[c] * (1 - METAL_LOSS * metallic);
 		specular[c] = lobe < 1 ? lobe : 1;
 	}
 	return code_888(diffuse) << 16 | code_565(specular) << 40 | (uint64_t)material_exponent_code(exponent) << 56;

@@ -224,6 +224,27 @@ static void textures_have_their_first_row_on_top(void **state)
 	psr_mesh_destroy(m);
 }
 
+static void what_only_emits_is_unlit_in_that_color(void **state)
+{
+	(void)state;
+	struct psr_mesh *m = import_glb(TEXTURED("{'emissiveFactor':[1,0.5,0.25],'emissiveTexture':{'index':0,'texCoord':1},"
+	                                         "'pbrMetallicRoughness':{'baseColorFactor':[0,0,0,1]}}", ""));
+	const struct psr_material *material = &m->material[0];
+
+	assert_true(material->unlit);
+	assert_int_equal(material->base_texture.image, 0);
+	assert_true(material->base_color[0] == 1.0f && material->base_color[1] == 0.5f && material->base_color[2] == 0.25f);
+	assert_true(m->uv[m->triangle[0][0]][0] == 0.25f && m->uv[m->triangle[0][0]][1] == 0.5f);
+	assert_string_equal(m->warning, "");
+	psr_mesh_destroy(m);
+	/* Not where there is a colour of its own. */
+	m = import_glb(TEXTURED("{'emissiveFactor':[1,0.5,0.25],'pbrMetallicRoughness':{'baseColorFactor':[0,0.1,0,1]}}", ""));
+	assert_false(m->material[0].unlit);
+	assert_true(m->material[0].base_color[1] == 0.1f);
+	assert_non_null(strstr(m->warning, "emission"));
+	psr_mesh_destroy(m);
+}
+
 static void a_material_chooses_its_set_of_coordinates(void **state)
 {
 	(void)state;
@@ -368,6 +389,7 @@ int main(void)
 		cmocka_unit_test(sparse_values_replace_those_of_the_view),
 		cmocka_unit_test(normalized_bytes_are_linear_colors),
 		cmocka_unit_test(textures_have_their_first_row_on_top),
+		cmocka_unit_test(what_only_emits_is_unlit_in_that_color),
 		cmocka_unit_test(a_material_chooses_its_set_of_coordinates),
 		cmocka_unit_test(texture_transforms_are_applied),
 		cmocka_unit_test(alpha_sides_and_unlit_are_kept),
