@@ -21,6 +21,9 @@
 /* In footprints of a pixel on the surface: how far a truth may lie to the side to be that of the point. */
 #define NEAR_FOOTPRINTS 1.5
 
+/* What is further than this from the planes of its neighbours is compared with all of the mesh. */
+#define WALL_SPACINGS 0.5
+
 struct measure {
 	const struct psr_truth *truth;
 	struct view view;
@@ -115,6 +118,9 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 		view_ray(&m->view, x + 0.5, y + 0.5, origin, direction);
 		v3d_add_scaled(point, origin, (double)m->depth[at], direction);
 		m->distance[at] = distance_to(m, point, neighbor, n) / m->spacing;
+		/* A wall along the line of sight is met by no centre ray, yet its samples are seen at steps in depth. */
+		if (m->distance[at] > WALL_SPACINGS)
+			m->distance[at] = truth_distance(m->truth, point, m->distance[at] * m->spacing) / m->spacing;
 		count->n_compared++;
 	}
 }

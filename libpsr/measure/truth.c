@@ -68,6 +68,15 @@ static void inner_ray(const struct psr_truth *truth, const struct view *view, do
 		ray->origin[k] = (ray->origin[k] - truth->origin[k]) / truth->scale;
 }
 
+double truth_distance(const struct psr_truth *truth, const double point[3], double most)
+{
+	double inner[3];
+
+	for (int k = 0; k < 3; k++)
+		inner[k] = (point[k] - truth->origin[k]) / truth->scale;
+	return fmin(most, truth->scale * ray_scene_distance(truth->scene, inner, most / truth->scale));
+}
+
 int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
                  int side)
 {

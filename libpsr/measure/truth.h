@@ -9,4 +9,7 @@
 int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
                  int side);
 
+/* Distance from a point of the world to the nearest point of the mesh, or `most` if that is less. */
+double truth_distance(const struct psr_truth *truth, const double point[3], double most);
+
 #endif

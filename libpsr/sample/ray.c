@@ -5,6 +5,7 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "ray.h"
+#include "triangle.h"
 #include "texture.h"
 
 #define PACKET 8
@@ -285,4 +286,38 @@ void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n
 {
 	for (int i = 0; i < n; i += PACKET)
 		trace_packet(scene, ray + i, n - i < PACKET ? n - i : PACKET, t_min, hit + i);
+}
+
+struct nearest {
+	const struct ray_scene *scene;
+	const double *point;
+	double distance2;
+};
+
+/* The tree only chooses candidates: distances are computed in double from the primitives. */
+static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
+{
+	struct nearest *nearest = args->userPtr;
+	double corner[3][3], distance2;
+
+	ray_scene_corners(nearest->scene, args->primID, corner);
+	distance2 = triangle_distance2((const double(*)[3])corner, nearest->point);
+	if (!(distance2 < nearest->distance2))
+		return false;
+	nearest->distance2 = distance2;
+	/* A little more than the distance, so that rounding does not lose an equally near one. */
+	args->query->radius = (float)(sqrt(distance2) * (1 + 0x1p-20) + 0x1p-20);
+	return true;
+}
+
+double ray_scene_distance(const struct ray_scene *scene, const double point[3], double most)
+{
+	struct nearest nearest = { scene, point, most * most };
+	struct RTCPointQuery query = { .x = (float)point[0], .y = (float)point[1], .z = (float)point[2], .time = 0,
+		                           .radius = (float)most + 0x1p-20f };
+	struct RTCPointQueryContext context;
+
+	rtcInitPointQueryContext(&context);
+	rtcPointQuery(scene->scene, &query, &context, visit_nearest, &nearest);
+	return nearest.distance2 < most * most ? sqrt(nearest.distance2) : INFINITY;
 }

@@ -35,6 +35,10 @@ void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
 
+/* Distance from a point to the nearest point of the mesh, whatever side it is of and whether it is cut out; INFINITY if
+ * none is within `most`. */
+double ray_scene_distance(const struct ray_scene *scene, const double point[3], double most);
+
 /* u and v of the hit of a ray that is known to meet this primitive. */
 void ray_locate(const struct ray_scene *scene, const struct ray *ray, uint32_t prim, double *u, double *v);
 

@@ -23,8 +23,9 @@ view() { # model source label camera-options...
 	local inside holes stray empty p999
 	inside=$(number "$json" inside) holes=$(number "$json" holes) stray=$(number "$json" outside_drawn)
 	empty=$(number "$json" inside_empty) p999=$(number "$json" distance_p999)
-	echo "# $model $label: $inside pixels inside, $holes holes, $empty empty, $stray drawn outside," \
-		"distance p50 $(number "$json" distance_p50) p99 $(number "$json" distance_p99) p99.9 $p999 spacings"
+	printf '# %-9s %-21s %6d pixels inside, %2d holes, %2d of them empty, %2d drawn outside, distance p50 %.2f p99 %.2f p99.9 %.2f\n' \
+		"$model" "$label" "$inside" "$holes" "$empty" "$stray" \
+		"$(number "$json" distance_p50)" "$(number "$json" distance_p99)" "$p999"
 	check "$model $label: $allowed in 1000 or fewer are drawn more than a pixel outside of the silhouette" \
 		[ $((stray * 1000)) -le $((inside * allowed)) ]
 	check "$model $label: holes are below 0.1 %" awk "BEGIN { exit !($inside > 1000 && $holes < $inside * 0.001) }"

@@ -5,6 +5,7 @@
 #include <cmocka.h>
 #include "sample/door.h"
 #include "sample/ray.h"
+#include "sample/triangle.h"
 #include "sample_meshes.h"
 
 static const double zero[3];
@@ -197,9 +198,67 @@ static void broken_meshes_stop_at_the_door(void **state)
 	meshes_free(mesh);
 }
 
+/* A grid of points on the triangle, n + 1 a side: the nearest of them is at most a grid step further than the nearest of all. */
+static double grid_distance(const double corner[3][3], const double p[3], int n)
+{
+	double nearest = INFINITY;
+
+	for (int i = 0; i <= n; i++)
+		for (int j = 0; i + j <= n; j++) {
+			double d = 0;
+
+			for (int k = 0; k < 3; k++) {
+				double q = (i * corner[0][k] + j * corner[1][k] + (n - i - j) * corner[2][k]) / n - p[k];
+
+				d += q * q;
+			}
+			nearest = fmin(nearest, d);
+		}
+	return sqrt(nearest);
+}
+
+static void distances_to_triangles_are_those_of_brute_force(void **state)
+{
+	struct psr_mesh *mesh = meshes_new(3 * 20, 20);
+	struct ray_scene *scene;
+	uint64_t seed = 3;
+	const int n = 200;
+
+	(void)state;
+	for (uint32_t i = 0; i < 60; i++) {
+		for (int k = 0; k < 3; k++)
+			mesh->position[i][k] = meshes_random(&seed) - 0.5;
+		mesh->triangle[i / 3][i % 3] = i;
+	}
+	memcpy(mesh->position[5], mesh->position[4], sizeof mesh->position[4]); /* a degenerate one */
+	scene = open_scene(mesh, zero, 1);
+	for (int i = 0; i < 40; i++) {
+		double p[3], nearest = INFINITY, got;
+
+		for (int k = 0; k < 3; k++)
+			p[k] = 2 * meshes_random(&seed) - 1;
+		for (uint32_t t = 0; t < 20; t++) {
+			double corner[3][3], own, grid;
+
+			ray_scene_corners(scene, t, corner);
+			own = sqrt(triangle_distance2((const double(*)[3])corner, p));
+			grid = grid_distance((const double(*)[3])corner, p, n);
+			/* Sides are at most sqrt 3 long. */
+			assert_true(own <= grid + 1e-12 && grid <= own + 1.74 / n);
+			nearest = fmin(nearest, own);
+		}
+		got = ray_scene_distance(scene, p, 10);
+		assert_true(fabs(got - nearest) <= 1e-12);
+		assert_true(isinf(ray_scene_distance(scene, p, nearest * 0.999)));
+	}
+	ray_scene_destroy(scene);
+	meshes_free(mesh);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(distances_to_triangles_are_those_of_brute_force),
 		cmocka_unit_test(hits_are_exact_in_double),
 		cmocka_unit_test(no_ray_slips_through_an_edge),
 		cmocka_unit_test(backs_of_one_sided_faces_let_rays_through),

@@ -31,7 +31,10 @@ struct psr_accuracy {
 	uint64_t n_inside_empty; /* not drawn although inside */
 	uint64_t n_holes;        /* inside, and empty or behind every surface point of the 3x3 neighbourhood by over `tolerance` */
 	uint64_t n_compared;     /* drawn pixels with truth in their 3x3 neighbourhood */
-	double distance_p50, distance_p99, distance_p999, distance_max; /* along the truth's normal, in units of spacing */
+	/* In units of spacing, from the point of the pixel's centre ray at the frame's depth: along the normal of the nearest of
+	 * the surfaces that the centre rays of the 3x3 neighbourhood meet, or to the nearest point of the mesh if that is less (walls along the
+	 * line of sight). What shows a surface that another one hides is counted as a hole, however near it is to the mesh. */
+	double distance_p50, distance_p99, distance_p999, distance_max;
 };
 int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,
                          uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err);
