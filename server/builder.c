@@ -210,6 +210,16 @@ const struct psr_error *builder_failure(const struct builder *builder, const cha
 	return NULL;
 }
 
+/* A child that was killed leaves what it was writing, under the name that psr_model_write gives it. */
+static void remove_remains(const struct build *build)
+{
+	char path[PATH_MAX];
+
+	unlink(build->target);
+	if (build->pid != 0 && snprintf(path, sizeof path, "%s.%ld-0.tmp", build->target, (long)build->pid) < PATH_MAX)
+		unlink(path);
+}
+
 static void start_waiting(struct builder *builder);
 
 /* failure NULL: built. */
@@ -225,7 +235,7 @@ static void finish(struct build *build, const struct psr_error *failure)
 	close_pipe(build, &build->error_source);
 	if (failure != NULL) {
 		log_warn("build of %s failed: %s", build->source, failure->text);
-		unlink(build->target);
+		remove_remains(build);
 	} else {
 		log_info("build of %s done", build->source);
 	}
@@ -374,7 +384,7 @@ void builder_destroy(struct builder *builder)
 			kill(build->pid, SIGKILL);
 			while (waitpid(build->pid, NULL, 0) < 0 && errno == EINTR)
 				;
-			unlink(build->target);
+			remove_remains(build);
 		}
 		destroy_build(build);
 	}

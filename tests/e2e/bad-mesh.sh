@@ -7,15 +7,15 @@ in=$work/in
 mkdir "$in"
 cd "$in" || exit 1
 
-# 2 GiB of address space and 20 s are ample for all of these; a file that lies about its size must not get more.
+# 8 GiB of address space (threads reserve much of it) and 20 s are ample; a file that lies about its size must not get more.
 limited() {
 	(
-		ulimit -v $((2 << 20))
+		ulimit -v $((8 << 20))
 		exec timeout 20 psr-model "$@"
 	)
 }
 mesh() { # claim status pattern file
-	refuses "$1" "$2" "^psr-model build: $4: .*$3" limited build "$4" -o out.psr -r 16
+	refuses "$1" "$2" "^psr-model build: $4: .*$3" limited build "$4" -o out.psr -r 16 --threads 2
 }
 
 # --- what is no mesh ---
@@ -87,7 +87,7 @@ mesh "a PLY that says -3 vertices" 4 . made.ply
 ply 3 1 '3 0 1 7'
 mesh "a PLY whose index is out of range" 4 "vertex 7" made.ply
 ply 3 1 '3 0 1 2'
-check "the same PLY without a lie is built" limited build made.ply -o good.psr -r 16
+check "the same PLY without a lie is built" limited build made.ply -o good.psr -r 16 --threads 2
 head -n 7 made.ply >cut.ply
 mesh "a PLY cut within its header" 4 . cut.ply
 printf 'solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n' >cut.stl

@@ -127,6 +127,23 @@ if [ ! -s "$work/out" ]; then
 	check "psrd without psr-model stops cleanly" stop_psrd
 fi
 
+# --- a build that is ended while it writes: a stand-in for psr-model that stays in the middle of it ---
+mkdir "$work/stuck"
+cp "$BUILD/bin/psrd" "$work/stuck"
+printf '#!/bin/sh\necho part >"$4.$$-0.tmp"\necho "write 1 2" >&3\nexec sleep 60\n' >"$work/stuck/psr-model"
+chmod +x "$work/stuck/psr-model"
+search=$PATH PATH=$work/stuck:$PATH
+start
+PATH=$search
+shot --model later --hash >"$work/later" 2>&1 &
+waiting=$!
+has_part() { [ -n "$(find "$cache" -name '*.tmp*')" ]; }
+check "a build is writing" wait_for 20 has_part
+check "SIGTERM while a build writes ends psrd cleanly" stop_psrd
+wait $waiting
+is "who waited for it is told, by exit status 6" 6 $?
+is "what it had written is removed" "" "$(find "$cache" -name '*.tmp*')"
+
 # --- during a build ---
 psr-model make wheel -o "$models/wheel.glb" >"$work/out"
 start --listen "unix:$work/socket"
