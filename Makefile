@@ -189,7 +189,7 @@ install: compile ## install: programs, library, headers, man pages under DESTDIR
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
 	install $(BIN)/* $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
-	install -m 644 $(LIB)/*.a $(DESTDIR)$(PREFIX)/lib
+	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
 	sed 's|@PREFIX@|$(PREFIX)|;s|@VERSION@|$(VERSION)|' docs/psr.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/psr.pc
