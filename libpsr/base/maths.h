@@ -30,12 +30,12 @@ static inline int32_t psr_floor_int(float x)
 	return i - (x < (float)i);
 }
 
-/* x^y for 0 <= x <= 1 and 1 <= y <= 2^16: what a highlight needs. Relative error below 3e-7 * (1 - y ln x), and results
- * below 2^-60 are 0.
+/* x^y for 0 <= x <= 1 and 1 <= y <= 2^16: what a highlight needs. Relative error below 3e-7 * (1 - y ln x), and
+ * results below 2^-60 are 0.
  *
- * log2 x = e + log2 m with m in [sqrt 1/2, sqrt 2), as an odd series in s = (m - 1) / (m + 1): exact at x = 1, where
- * large exponents need it; 2^t by its series on [-1/2, 1/2]. Truncation errors: 2 s^13 / 13 / ln 2 < 2e-11 (s <= 0.172),
- * (ln 2 / 2)^8 / 8! < 6e-9. */
+ * log2 x = e + log2 m with m in [sqrt 1/2, sqrt 2), as an odd series in s = (m - 1) / (m + 1): exact at x = 1,
+ * where large exponents need it; 2^t by its series on [-1/2, 1/2]. Truncation errors: 2 s^13 / 13 / ln 2 < 2e-11
+ * (s <= 0.172), (ln 2 / 2)^8 / 8! < 6e-9. */
 static inline float psr_power(float x, float y)
 {
 	uint32_t bits = psr_bits_from_float(x);

@@ -154,8 +154,8 @@ bool only_emits(const tinygltf::Material &m)
 	       base[2] == 0.0 && m.extensions.count("KHR_materials_pbrSpecularGlossiness") == 0;
 }
 
-/* The texture that gives the base color: of metallic-roughness, the diffuse one of specular-glossiness, or the emissive one of
- * what only emits. */
+/* The texture that gives the base color: of metallic-roughness, the diffuse one of specular-glossiness, or the
+ * emissive one of what only emits. */
 tinygltf::TextureInfo base_texture(const tinygltf::Material &m)
 {
 	auto it = m.extensions.find("KHR_materials_pbrSpecularGlossiness");

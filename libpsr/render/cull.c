@@ -4,8 +4,8 @@
 #include "base/mem.h"
 #include "render/render.h"
 
-/* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second writes the
- * bins where the counts say, in canonical order whatever the threads did. */
+/* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second
+ * writes the bins where the counts say, in canonical order whatever the threads did. */
 
 #define CHUNK_BLOCKS 2048
 
@@ -78,8 +78,8 @@ static inline float stretch(const struct plan *plan, const float c[3], float r)
 	return plan->focal * distance / (z * z);
 }
 
-/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding does not
- * double the cells of a picture drawn at just the magnification that a level is made for. */
+/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding
+ * does not double the cells of a picture drawn at just the magnification that a level is made for. */
 static inline uint32_t level_for(float pixels)
 {
 	uint32_t bits = psr_bits_from_float(pixels * (1 - 0x1p-12f));
@@ -90,10 +90,10 @@ static inline uint32_t level_for(float pixels)
 
 enum facing { FACES_AWAY, IS_MIXED, FACES_EYE };
 
-/* How a block faces, by its visibility cone ([G] 6.4). With d from the eye to the sphere's centre, g = a . d for the cone's axis a,
- * a normal n within alpha of it and a sample x within r of the centre, n . (x - eye) is between
- * |d| cos(angle(a, d) + alpha) - r >= g - |d| (sin alpha + 1 - cos alpha) - r and g + |d| (sin alpha + 1 - cos alpha) + r.
- * A thousandth makes up for rounding. */
+/* How a block faces, by its visibility cone ([G] 6.4). With d from the eye to the sphere's centre, g = a . d for
+ * the cone's axis a, a normal n within alpha of it and a sample x within r of the centre, n . (x - eye) is between
+ * |d| cos(angle(a, d) + alpha) - r >= g - |d| (sin alpha + 1 - cos alpha) - r and g + |d| (sin alpha + 1 - cos
+ * alpha) + r. A thousandth makes up for rounding. */
 static enum facing facing_of(const struct plan *plan, const struct plan_instance *in, uint32_t block)
 {
 	const struct psr_blocks *b = in->blocks;

@@ -77,8 +77,8 @@ static void pull_rows(int i, void *userdata)
 	}
 }
 
-/* The interpolated colour of a finer cell: its parent counts a half, the parent's two neighbours on the cell's own side a
- * quarter each ([G] figure 4.11a). */
+/* The interpolated colour of a finer cell: its parent counts a half, the parent's two neighbours on the cell's own
+ * side a quarter each ([G] figure 4.11a). */
 static float interpolate(const struct pass *pass, uint32_t x, uint32_t y, uint32_t rgb[3])
 {
 	const struct fill_level *from = &pass->fill->level[pass->level + 1];

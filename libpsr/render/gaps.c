@@ -1,8 +1,8 @@
 #include "base/maths.h"
 #include "render/render.h"
 
-/* Coverage of one row by one level: the pixel's centre lies in a square of four cell centres; each that is nearer by more
- * than the threshold covers it, bilinearly ([G] 4.6). In units of 1 / WEIGHT_ONE. */
+/* Coverage of one row by one level: the pixel's centre lies in a square of four cell centres; each that is nearer
+ * by more than the threshold covers it, bilinearly ([G] 4.6). In units of 1 / WEIGHT_ONE. */
 static void cover_row(const struct plan *plan, const struct psr_zstack *stack, uint32_t y, int k, const uint64_t *word,
                       uint16_t *weight)
 {

@@ -11,15 +11,16 @@
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 #define STRIP 256       /* samples that are resolved and shaded together */
 
-/* A sample of a one-sided block faces away when its normal is more than this sine beyond perpendicular: what normals are
- * quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out when they are warped, before
- * they hide what is behind them, so that open one-sided surfaces are seen through from their backs. */
+/* A sample of a one-sided block faces away when its normal is more than this sine beyond perpendicular: what
+ * normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out
+ * when they are warped, before they hide what is behind them, so that open one-sided surfaces are seen through
+ * from their backs. */
 #define BACK_SINE 0.0125f
 
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
 
-/* From a projection's space to the picture: u = (m[0] . (x, y, z, 1)) / w, v alike, and z' = m[2] . (x, y, z, 1). w is z'
- * in perspective and 1 in orthographic pictures; the focal length and the picture's centre are absorbed. */
+/* From a projection's space to the picture: u = (m[0] . (x, y, z, 1)) / w, v alike, and z' = m[2] . (x, y, z, 1).
+ * w is z' in perspective and 1 in orthographic pictures; the focal length and the picture's centre are absorbed. */
 struct view_matrix {
 	double m[3][4];
 };
@@ -49,7 +50,8 @@ struct plan {
 	int exponent;              /* everything here is world * 2^-exponent, relative to the eye */
 	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
 	float near_z;
-	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1]; /* z' of a cell's threshold: scale * z' + offset */
+	/* What a cell covers lies behind scale * z' + offset of it. */
+	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_instances, n_lights, n_slots;
 	struct plan_instance *instance;
 	float ambient[3];

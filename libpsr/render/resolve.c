@@ -16,8 +16,8 @@ static float part(uint32_t bits, int shift, uint32_t max)
 	return psr_srgb_to_linear[((bits >> shift & max) * 255 + max / 2) / max];
 }
 
-/* Positions are the samples' own, not those of the pixels that they fell into ([G] 7.3 takes the pixel's), so that light
- * depends on the model alone. */
+/* Positions are the samples' own, not those of the pixels that they fell into ([G] 7.3 takes the pixel's), so that
+ * light depends on the model alone. */
 void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *strip)
 {
 	const float(*direction)[3] = psr_direction_table();

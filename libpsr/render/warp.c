@@ -61,8 +61,8 @@ static inline float clamp_pixel(float u)
 	return u < far ? u : far;
 }
 
-/* Pixels and depths of one row of a block: [G] (7.3) with the terms of lattice position apart (7.1.1), not accumulated, so
- * that no rounding adds up along the row. */
+/* Pixels and depths of one row of a block: [G] (7.3) with the terms of lattice position apart (7.1.1), not
+ * accumulated, so that no rounding adds up along the row. */
 static inline void warp_row(const float base[3], const float step[3], const float along_z[3], float shift,
                             const float depth[8], int perspective, int32_t u[8], int32_t v[8], float z[8])
 {
@@ -112,7 +112,8 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 	const double dy = dx * 0.86602540378443864676;
 	const double x = 8.0 * b->col[block] * dx, y = 8.0 * b->row[block] * dy;
 	const float bias = b->depth_bias[block], depth_step = b->depth_step[block];
-	uint64_t mask = entry->is_mixed ? facing_samples(plan, in, block) : b->mask[block], id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
+	const uint64_t id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
+	uint64_t mask = entry->is_mixed ? facing_samples(plan, in, block) : b->mask[block];
 	uint32_t n_inside = 0;
 	double origin[3], down[3];
 	float step[3], along_z[3];

@@ -7,7 +7,8 @@
 
 /* Everything of an attribute word (psr/model.h) but its normal, for linear base colour rgb.
  *
- * diffuse = base * (1 - metallic / 2), since there are no surroundings that a metal could mirror; F0 = 0.04 + (base - 0.04) * metallic. Roughness r gives the Blinn-Phong exponent
+ * diffuse = base * (1 - metallic / 2), since there are no surroundings that a metal could mirror;
+ * F0 = 0.04 + (base - 0.04) * metallic. Roughness r gives the Blinn-Phong exponent
  * 2 / r^4 - 2 of the microfacets, and a fourth of it is the exponent n of the reflected ray's cosine, in 1..2^(255/16);
  * specular = min(1, F0 * (n + 2) / 2): a normalised lobe where diffuse is albedo times N.L. Unlit ones shine in their
  * base colour and have neither. */

@@ -1,9 +1,10 @@
 /* The subdivided sphere of directions: quantised normals, triangles of the visibility masks, projections.
  *
- * The sphere is cut into octants, and each spherical triangle into four by the midpoints of its sides ([G] 5.1): six
- * levels give 32,768 triangles, whose centres are the unit vectors that samples can have as normals ([G] table 5.1).
- * The index is nested: 3 bits of octant, then 2 bits a level, and child 0 is the one in the middle, so that dropping low bits
- * gives the index of the enclosing triangle ([B] 4.1) and `index >> 8` is one of the 128 triangles of [G] 6.3.
+ * The sphere is cut into octants, and each spherical triangle into four by the midpoints of its sides ([G] 5.1):
+ * six levels give 32,768 triangles, whose centres are the unit vectors that samples can have as normals ([G] table
+ * 5.1). The index is nested: 3 bits of octant, then 2 bits a level, and child 0 is the one in the middle, so that
+ * dropping low bits gives the index of the enclosing triangle ([B] 4.1) and `index >> 8` is one of the 128
+ * triangles of [G] 6.3.
  *
  *   octant bits: 1 for x < 0, 2 for y < 0, 4 for z < 0 (a zero counts as positive)
  *   corners of an octant's triangle: a = (+-1,0,0), b = (0,+-1,0), c = (0,0,+-1)

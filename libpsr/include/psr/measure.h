@@ -17,9 +17,9 @@ struct psr_truth; /* a mesh behind a ray tracer; visible surfaces are those that
 int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err);
 void psr_truth_destroy(struct psr_truth *truth);
 
-/* One ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in world
- * units, +inf where nothing is; normal: unit, towards the eye, world; both width * side by height * side; normal and rgb may be
- * NULL. rgb: flat diffuse colour, sRGB, 3 bytes. */
+/* One ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in
+ * world units, +inf where nothing is; normal: unit, towards the eye, world; both width * side by height * side;
+ * normal and rgb may be NULL. rgb: flat diffuse colour, sRGB, 3 bytes. */
 int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height, uint32_t side,
                    int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err);
 
@@ -31,9 +31,10 @@ struct psr_accuracy {
 	uint64_t n_inside_empty; /* not drawn although inside */
 	uint64_t n_holes;        /* inside, and empty or behind every surface point of the 3x3 neighbourhood by over `tolerance` */
 	uint64_t n_compared;     /* drawn pixels with truth in their 3x3 neighbourhood */
-	/* In units of spacing, from the point of the pixel's centre ray at the frame's depth: along the normal of the nearest of
-	 * the surfaces that the centre rays of the 3x3 neighbourhood meet, or to the nearest point of the mesh if that is less (walls along the
-	 * line of sight). What shows a surface that another one hides is counted as a hole, however near it is to the mesh. */
+	/* In units of spacing, from the point of the pixel's centre ray at the frame's depth: along the normal of the
+	 * nearest of the surfaces that the centre rays of the 3x3 neighbourhood meet, or to the nearest point of the
+	 * mesh if that is less (walls along the line of sight). What shows a surface that another one hides is counted
+	 * as a hole, however near it is to the mesh. */
 	double distance_p50, distance_p99, distance_p999, distance_max;
 };
 int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,

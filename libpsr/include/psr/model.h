@@ -30,14 +30,15 @@ enum psr_block_flag {
 	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
 };
 
-/* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice origin
- * is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth along z is
- * depth_bias + depth_step * (float)depth[64 * b + s]; its attributes are attr[attr_first[b] + number of lower set bits].
- * Blocks of one cluster follow each other, and clusters are in the order of their blocks, without gaps.
+/* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice
+ * origin is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth
+ * along z is depth_bias + depth_step * (float)depth[64 * b + s]; its attributes are attr[attr_first[b] + number of
+ * lower set bits]. Blocks of one cluster follow each other, and clusters are in the order of their blocks, without
+ * gaps.
  *
- * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a model are
- * finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most 2^26 blocks, 65,536
- * projections, 32 levels. */
+ * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a
+ * model are finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most
+ * 2^26 blocks, 65,536 projections, 32 levels. */
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
 	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr */
@@ -54,7 +55,7 @@ struct psr_blocks {
 	const uint16_t *depth;                  /* 64 a block; 0 where invalid */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
 	/* Optional, NULL if absent ([G] 6.3, 6.4): */
-	const float *cone_x, *cone_y, *cone_z, *cone_cos; /* smallest cap of the geometric normals; all-culling is void at cos -1 */
+	const float *cone_x, *cone_y, *cone_z, *cone_cos; /* cap of the geometric normals; -1: any */
 	const uint64_t (*visibility)[2];        /* 128 bits, one a triangle of directions */
 };
 
@@ -101,8 +102,8 @@ int psr_model_read(struct psr_model **out, const char *path, struct psr_error *e
 /* The same from memory; `bytes` is copied. For tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
 
-/* Makes a model from arrays of the caller's, which are copied and validated like a file's. ARG for missing arrays, LIMIT for
- * counts, FORMAT for values that break a rule, MEMORY. */
+/* Makes a model from arrays of the caller's, which are copied and validated like a file's. ARG for missing arrays,
+ * LIMIT for counts, FORMAT for values that break a rule, MEMORY. */
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                      struct psr_error *err);
 
