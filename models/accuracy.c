@@ -1,9 +1,9 @@
 #include "commands.h"
 
-#include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "json.h"
 #include "pfm.h"
 #include "psr/build.h"
 #include "psr/cli.h"
@@ -39,7 +39,6 @@ static void print_text(const struct psr_accuracy *a)
 static int print_json(const struct psr_accuracy *a, struct psr_error *err)
 {
 	cJSON *root = cJSON_CreateObject();
-	char *text;
 
 	cJSON_AddNumberToObject(root, "truth", (double)a->n_truth);
 	cJSON_AddNumberToObject(root, "inside", (double)a->n_inside);
@@ -52,13 +51,7 @@ static int print_json(const struct psr_accuracy *a, struct psr_error *err)
 	cJSON_AddNumberToObject(root, "distance_p99", a->distance_p99);
 	cJSON_AddNumberToObject(root, "distance_p999", a->distance_p999);
 	cJSON_AddNumberToObject(root, "distance_max", a->distance_max);
-	text = cJSON_Print(root);
-	cJSON_Delete(root);
-	if (text == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the answer was written as JSON");
-	puts(text);
-	cJSON_free(text);
-	return PSR_OK;
+	return json_print(root, err);
 }
 
 /* Says which bounds are broken; 1 if any is. */

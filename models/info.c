@@ -1,9 +1,9 @@
 #include "commands.h"
 
-#include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include "json.h"
 #include "psr/cli.h"
 #include "psr/model.h"
 
@@ -91,7 +91,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 {
 	cJSON *root = cJSON_CreateObject(), *part;
 	const struct psr_blocks *blocks = s->blocks;
-	char builder[33], *text;
+	char builder[33];
 
 	snprintf(builder, sizeof builder, "%.32s", s->info->builder);
 	cJSON_AddStringToObject(root, "name", s->name);
@@ -118,13 +118,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
 			cJSON_AddItemToArray(part, cJSON_CreateNumber(s->level_blocks[l]));
 	}
-	text = cJSON_Print(root);
-	cJSON_Delete(root);
-	if (text == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the answer was written as JSON");
-	puts(text);
-	cJSON_free(text);
-	return PSR_OK;
+	return json_print(root, err);
 }
 
 int cmd_info(int argc, char **argv)
