@@ -14,8 +14,8 @@ struct pass {
 	struct fill *fill;
 	const struct plan *plan;
 	int level; /* the finer one of the two */
-	_Atomic int deepest; /* coarsest level with a cell of weight below one */
-	_Atomic uint64_t n_changed, n_filled;
+	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
+	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
 };
 
 static float limit_of(const struct plan *plan, int level, float nearest)
@@ -64,13 +64,13 @@ static void pull_rows(int i, void *userdata)
 {
 	struct pass *pass = userdata;
 	const struct fill_level *to = &pass->fill->level[pass->level + 1];
-	int partial = 0;
+	int is_moved = 0;
 	for (uint32_t y = (uint32_t)i * ROWS; y < ((uint32_t)i + 1) * ROWS && y < to->height; y++)
 		for (uint32_t x = 0; x < to->width; x++) {
 			pull_cell(pass, x, y);
-			partial |= to->weight[(size_t)y * to->width + x] < WEIGHT_ONE;
+			is_moved |= to->weight[(size_t)y * to->width + x] < WEIGHT_ONE / 2;
 		}
-	if (partial) {
+	if (is_moved) {
 		int seen = atomic_load(&pass->deepest);
 		while (seen < pass->level + 1 && !atomic_compare_exchange_weak(&pass->deepest, &seen, pass->level + 1))
 			;
@@ -115,7 +115,7 @@ static void push_rows(int i, void *userdata)
 {
 	struct pass *pass = userdata;
 	const struct fill_level *to = &pass->fill->level[pass->level];
-	uint64_t n_changed = 0, n_filled = 0;
+	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
 	for (uint32_t y = (uint32_t)i * ROWS; y < ((uint32_t)i + 1) * ROWS && y < to->height; y++)
 		for (uint32_t x = 0; x < to->width; x++) {
 			size_t at = (size_t)y * to->width + x;
@@ -129,14 +129,17 @@ static void push_rows(int i, void *userdata)
 					own = own * w / WEIGHT_ONE;
 				to->rgb[3 * at + (size_t)k] = (uint16_t)(own + rgb[k] * (WEIGHT_ONE - w) / WEIGHT_ONE);
 			}
-			if (w < WEIGHT_ONE / 2)
+			if (w < WEIGHT_ONE / 2) {
 				to->z[at] = z;
+				n_moved++;
+			}
 			n_changed++;
 			n_filled += w == 0 && z < INFINITY;
 		}
 	if (!pass->level) {
 		atomic_fetch_add(&pass->n_changed, n_changed);
 		atomic_fetch_add(&pass->n_filled, n_filled);
+		atomic_fetch_add(&pass->n_moved, n_moved);
 	}
 }
 
@@ -206,5 +209,6 @@ void fill_run(struct fill *fill, const struct plan *plan, struct psr_pool *pool,
 	}
 	report->count[PSR_STAGE_FILL] = pass.n_changed;
 	report->n_filled = pass.n_filled;
-	report->error_bound += (double)(2 << pass.deepest);
+	if (pass.n_moved)
+		report->error_bound += (double)(2 << pass.deepest);
 }

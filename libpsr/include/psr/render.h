@@ -44,7 +44,7 @@ struct psr_report {
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */
 	uint32_t n_clamped;           /* blocks that wanted a level beyond PSR_MAX_DEPTH_LEVEL: holes are possible there */
-	double error_bound;           /* pixels: half a pixel + depth step + largest cell used for filling */
+	double error_bound;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
 };
 
 struct psr_frame {
