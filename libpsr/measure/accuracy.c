@@ -6,8 +6,10 @@
 #include "psr/pool.h"
 #include "truth.h"
 
-/* Rays a side over the nine pixels of a neighbourhood: 4x4 in each. */
+/* Rays a side over the nine pixels of a neighbourhood: 4x4 in each, and where they meet nothing 20x20, since samples find
+ * slivers of a tenth of a pixel (the rim of a cut-out) as well as anything else. */
 #define OUTSIDE_SIDE 12
+#define OUTSIDE_FINE_SIDE 60
 
 /* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that
  * of a diagonal neighbour's centre, 1.42 away: on a slope they may differ by this many pixels times its tangent. */
@@ -96,6 +98,12 @@ static double distance_to(const struct measure *m, const double point[3], const 
 	return isfinite(nearest[0]) ? nearest[0] : nearest[1];
 }
 
+static int is_outside(const struct measure *m, uint32_t x, uint32_t y)
+{
+	return !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE) &&
+	       !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_FINE_SIDE);
+}
+
 static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struct psr_accuracy *count)
 {
 	size_t at = (size_t)y * m->width + x;
@@ -110,8 +118,7 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 	count->n_inside_empty += (uint64_t)(is_inside && !is_drawn);
 	count->n_holes += (uint64_t)(is_inside && (!is_drawn || is_hole(m, (double)m->depth[at], neighbor, n)));
 	if (is_drawn && n == 0)
-		count->n_outside_drawn += (uint64_t)!truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3,
-		                                                  OUTSIDE_SIDE);
+		count->n_outside_drawn += (uint64_t)is_outside(m, x, y);
 	if (is_drawn && n != 0) {
 		double origin[3], direction[3], point[3];
 

@@ -26,8 +26,8 @@ view() { # model source label camera-options...
 	printf '# %-9s %-21s %6d pixels inside, %2d holes, %2d of them empty, %2d drawn outside, distance p50 %.2f p99 %.2f p99.9 %.2f\n' \
 		"$model" "$label" "$inside" "$holes" "$empty" "$stray" \
 		"$(number "$json" distance_p50)" "$(number "$json" distance_p99)" "$p999"
-	check "$model $label: $allowed in 1000 or fewer are drawn more than a pixel outside of the silhouette" \
-		[ $((stray * 1000)) -le $((inside * allowed)) ]
+	check "$model $label: $allowed in 10000 or fewer are drawn more than a pixel outside of the silhouette" \
+		[ $((stray * 10000)) -le $((inside * allowed)) ]
 	check "$model $label: holes are below 0.1 %" awk "BEGIN { exit !($inside > 1000 && $holes < $inside * 0.001) }"
 	check "$model $label: 99.9 % are within the sample spacing" awk "BEGIN { exit !($p999 <= 1) }"
 }
