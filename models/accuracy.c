@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include "json.h"
 #include "pfm.h"
+#include "ppm.h"
 #include "psr/build.h"
 #include "psr/cli.h"
 #include "psr/measure.h"
@@ -36,7 +37,13 @@ static void print_text(const struct psr_accuracy *a)
 	       a->distance_p50, a->distance_p99, a->distance_p999, a->distance_max, a->n_compared);
 }
 
-static int print_json(const struct psr_accuracy *a, struct psr_error *err)
+static void print_color_text(const struct psr_color_accuracy *c)
+{
+	printf("colour: more than %d codes off          %" PRIu64 " (%.4f %%) of %" PRIu64 " pixels; mean %.3f codes\n",
+	       PSR_COLOR_WRONG, c->n_wrong, 100 * fraction(c->n_wrong, c->n_compared), c->n_compared, c->mean);
+}
+
+static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color, struct psr_error *err)
 {
 	cJSON *root = cJSON_CreateObject();
 
@@ -51,6 +58,11 @@ static int print_json(const struct psr_accuracy *a, struct psr_error *err)
 	cJSON_AddNumberToObject(root, "distance_p99", a->distance_p99);
 	cJSON_AddNumberToObject(root, "distance_p999", a->distance_p999);
 	cJSON_AddNumberToObject(root, "distance_max", a->distance_max);
+	if (color != NULL) {
+		cJSON_AddNumberToObject(root, "color_compared", (double)color->n_compared);
+		cJSON_AddNumberToObject(root, "color_wrong", (double)color->n_wrong);
+		cJSON_AddNumberToObject(root, "color_mean", color->mean);
+	}
 	return json_print(root, err);
 }
 
@@ -74,8 +86,22 @@ static int check_bounds(const struct psr_accuracy *a, const struct bounds *bound
 	return broken != 0;
 }
 
-static int measure(struct psr_accuracy *a, const char *source, const char *frame, const struct psr_camera *camera,
-                   double spacing, struct psr_error *err)
+static int measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
+                         const char *path, int n_threads, struct psr_error *err)
+{
+	uint32_t width, height;
+	uint8_t *rgb = NULL;
+	int code = ppm_read(&rgb, &width, &height, path, err);
+
+	if (code == PSR_OK)
+		code = psr_accuracy_measure_color(out, truth, camera, width, height, rgb, n_threads, err);
+	free(rgb);
+	return code;
+}
+
+/* color_path may be NULL. */
+static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, const char *source, const char *frame,
+                   const char *color_path, const struct psr_camera *camera, double spacing, struct psr_error *err)
 {
 	struct psr_build_options options;
 	struct psr_mesh *mesh = NULL;
@@ -91,6 +117,8 @@ static int measure(struct psr_accuracy *a, const char *source, const char *frame
 		code = psr_truth_create(&truth, mesh, err);
 	if (code == PSR_OK)
 		code = psr_accuracy_measure(a, truth, camera, width, height, depth, spacing, options.n_threads, err);
+	if (code == PSR_OK && color_path != NULL)
+		code = measure_color(color, truth, camera, color_path, options.n_threads, err);
 	psr_truth_destroy(truth);
 	psr_mesh_destroy(mesh);
 	free(depth);
@@ -119,12 +147,15 @@ int cmd_accuracy(int argc, char **argv)
 	struct bounds bounds = { 0 };
 	struct psr_accuracy accuracy;
 	struct psr_error err;
-	const char *frame = NULL;
+	struct psr_color_accuracy color_accuracy;
+	const char *frame = NULL, *color = NULL;
 	double fov = 0, spacing = 0;
 	int eye = 0, target = 0, up = 0, seen_fov = 0, seen_spacing = 0, seen_ortho = 0, json = 0, n_operands, code;
 	const struct psr_opt opts[] = {
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame, .arg = "FRAME.pfm",
 		  .help = "the frame's depth, as psr shot --depth writes it" },
+		{ .name = "color", .type = PSR_OPT_STRING, .value = &color, .arg = "FRAME.ppm",
+		  .help = "its colours as well, drawn with --ambient 1 and no light" },
 		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera.eye, .arg = "X,Y,Z", .help = "the frame's camera",
 		  .seen = &eye },
 		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera.target, .arg = "X,Y,Z", .help = "where it looks",
@@ -153,7 +184,7 @@ int cmd_accuracy(int argc, char **argv)
 	const struct psr_cli cli = {
 		.usage = "psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
 		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]",
-		.summary = "Compares the depth of a frame with the ray-traced mesh that its model was built from.",
+		.summary = "Compares the depth (and the colours) of a frame with the ray-traced mesh that its model was built from.",
 		.opts = opts,
 		.footer = "Exit codes: 0 ok, 1 a bound is broken, 2 usage, 3 file or system, 4 bad data, 5 over a limit.",
 	};
@@ -167,12 +198,14 @@ int cmd_accuracy(int argc, char **argv)
 	if (code == PSR_OK) {
 		camera.kind = seen_ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
 		camera.fov_y = fov * RADIANS;
-		code = measure(&accuracy, argv[1], frame, &camera, spacing, &err);
+		code = measure(&accuracy, &color_accuracy, argv[1], frame, color, &camera, spacing, &err);
 	}
 	if (code == PSR_OK && json)
-		code = print_json(&accuracy, &err);
+		code = print_json(&accuracy, color ? &color_accuracy : NULL, &err);
 	else if (code == PSR_OK)
 		print_text(&accuracy);
+	if (code == PSR_OK && !json && color)
+		print_color_text(&color_accuracy);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
 	return code == PSR_OK ? check_bounds(&accuracy, &bounds) : psr_cli_fail(PROGRAM, &err);

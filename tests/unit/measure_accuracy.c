@@ -138,6 +138,25 @@ static void bad_spacings_and_cameras_are_refused(void **state)
 
 #define TEST(f) cmocka_unit_test_setup_teardown(f, open_fixture, close_fixture)
 
+static void colors_are_compared_within_a_pixel(void **state)
+{
+	struct fixture *f = *state;
+	struct psr_color_accuracy color;
+	uint8_t *rgb = malloc(3 * SIDE * SIDE);
+
+	assert_int_equal(psr_truth_draw(f->truth, &f->camera, SIDE, SIDE, 1, 1, f->depth, NULL, rgb, NULL), PSR_OK);
+	assert_int_equal(psr_accuracy_measure_color(&color, f->truth, &f->camera, SIDE, SIDE, rgb, 1, NULL), PSR_OK);
+	assert_true(color.n_compared > 0 && color.n_wrong == 0 && color.mean == 0);
+	/* White is 255: what is as far off as is allowed, what is further, and what is outside and does not count. */
+	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2) + 1] = 255 - PSR_COLOR_WRONG;
+	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2 + 5) + 2] = 255 - PSR_COLOR_WRONG - 1;
+	rgb[0] = 77;
+	assert_int_equal(psr_accuracy_measure_color(&color, f->truth, &f->camera, SIDE, SIDE, rgb, 1, NULL), PSR_OK);
+	assert_int_equal(color.n_wrong, 1);
+	assert_true(fabs(color.mean * (double)color.n_compared - (2 * PSR_COLOR_WRONG + 1)) < 1e-9);
+	free(rgb);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -146,6 +165,7 @@ int main(void)
 		TEST(empty_and_far_pixels_inside_are_holes),
 		TEST(only_what_is_over_a_pixel_away_is_outside),
 		TEST(a_slope_is_no_hole),
+		TEST(colors_are_compared_within_a_pixel),
 		TEST(bad_spacings_and_cameras_are_refused),
 	};
 
