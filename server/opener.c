@@ -292,7 +292,7 @@ void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const ch
 	int is_new;
 
 	if (entry == NULL) {
-		snprintf(text, sizeof text, "there is no model %.255s; LIST tells the names of all", name);
+		snprintf(text, sizeof text, "there is no model %.255s; psr list shows those that there are", name);
 		session_refuse(conn, id, 0, PSR_ERR_NOT_FOUND, text);
 		return;
 	}
