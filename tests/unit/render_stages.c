@@ -125,6 +125,30 @@ static void levels_are_not_summed(void **state)
 	assert_int_equal(weight_at(&s, 4, 4), fine < coarse ? fine : coarse);
 }
 
+/* [G] 9.1.2: a surface whose left half is in level 1 and whose right half is in level 2 covers all that is behind it. */
+static void a_seam_between_levels_is_closed(void **state)
+{
+	(void)state;
+	struct stack s;
+	stack_init(&s);
+	for (uint32_t y = 0; y < SIDE / 2; y++)
+		for (uint32_t x = 0; x < SIDE / 4; x++)
+			set_cell(&s, 1, x, y, 50);
+	for (uint32_t y = 0; y < SIDE / 4; y++)
+		for (uint32_t x = SIDE / 8; x < SIDE / 4; x++)
+			set_cell(&s, 2, x, y, 51);
+	for (uint32_t x = 2; x < SIDE - 2; x++)
+		assert_int_equal(weight_at(&s, x, SIDE / 2), 0);
+	/* The edge of a surface that is in both levels is where the coarser one has it. */
+	stack_init(&s);
+	set_cell(&s, 2, 1, 1, 50);
+	uint16_t coarse = weight_at(&s, 8, 6);
+	for (uint32_t x = 2; x < 4; x++)
+		for (uint32_t y = 2; y < 4; y++)
+			set_cell(&s, 1, x, y, 50);
+	assert_int_equal(weight_at(&s, 8, 6), coarse);
+}
+
 struct picture {
 	uint16_t rgb[3 * SIDE * SIDE], weight[SIDE * SIDE];
 	float z[SIDE * SIDE];
@@ -228,6 +252,7 @@ int main(void)
 		cmocka_unit_test(what_is_within_the_threshold_stays),
 		cmocka_unit_test(empty_pixels_before_a_surface_are_holes),
 		cmocka_unit_test(levels_are_not_summed),
+		cmocka_unit_test(a_seam_between_levels_is_closed),
 		cmocka_unit_test(one_color_with_holes_is_that_color),
 		cmocka_unit_test(a_hole_gets_a_half_a_quarter_and_a_quarter),
 		cmocka_unit_test(a_hole_takes_the_near_surface_not_the_far_one),
