@@ -69,8 +69,8 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct aiMesh *
 				(float)(normals[row][0] * n->x + normals[row][1] * n->y + normals[row][2] * n->z);
 	}
 	if (uv_set >= 0 && source->mTextureCoords[uv_set] != NULL) {
-		mesh->uv[to][0] = source->mTextureCoords[uv_set][from].x;
-		mesh->uv[to][1] = 1.0f - source->mTextureCoords[uv_set][from].y; /* Assimp's v grows upwards */
+		mesh->uv[0][to][0] = source->mTextureCoords[uv_set][from].x;
+		mesh->uv[0][to][1] = 1.0f - source->mTextureCoords[uv_set][from].y; /* Assimp's v grows upwards */
 	}
 	if (source->mColors[0] != NULL) {
 		mesh->color[to][0] = assimp_linear(source->mColors[0][from].r);

@@ -210,12 +210,7 @@ int assimp_material(struct assimp_io *io, const struct aiScene *scene, unsigned 
 	struct psr_material out;
 	int rc;
 
-	memset(&out, 0, sizeof out);
-	for (int c = 0; c < 4; c++)
-		out.base_color[c] = 1.0f;
-	out.base_texture.image = -1;
-	out.roughness = 1.0f;
-	out.alpha_cutoff = 0.5f;
+	psr_material_default(&out);
 	out.two_sided = 1; /* most of these formats cannot say, and their viewers show both sides */
 	*uv_set = -1;
 	if (m < scene->mNumMaterials) {

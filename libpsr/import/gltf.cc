@@ -148,7 +148,7 @@ void add_instance(reader &r, const primitive &p, int material, const transform &
 		}
 	}
 	if (!p.uv.empty())
-		std::memcpy(mesh->uv + first_v, p.uv.data(), p.uv.size() * sizeof(float));
+		std::memcpy(mesh->uv[0] + first_v, p.uv.data(), p.uv.size() * sizeof(float));
 	if (!p.color.empty())
 		std::memcpy(mesh->color + first_v, p.color.data(), p.color.size() * sizeof(float));
 	for (size_t t = 0; t < p.triangle.size() / 3; t++) {

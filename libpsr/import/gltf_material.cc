@@ -190,13 +190,9 @@ void set_specular_glossiness(struct psr_material &m, const tinygltf::Value &v)
 
 struct psr_material plain_material()
 {
-	struct psr_material m = {};
+	struct psr_material m;
 
-	for (int c = 0; c < 4; c++)
-		m.base_color[c] = 1.0f;
-	m.base_texture.image = -1;
-	m.roughness = 1.0f;
-	m.alpha_cutoff = 0.5f;
+	psr_material_default(&m);
 	return m;
 }
 

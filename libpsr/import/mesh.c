@@ -14,7 +14,7 @@ void psr_mesh_destroy(struct psr_mesh *mesh)
 		free(mesh->image[i].rgba);
 	free(mesh->position);
 	free(mesh->normal);
-	free(mesh->uv);
+	free(mesh->uv[0]);
 	free(mesh->color);
 	free(mesh->triangle);
 	free(mesh->triangle_material);
@@ -68,7 +68,7 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 		uint64_t n = next_capacity(im->vertex_capacity, n_vertices, IMPORT_MAX_VERTICES);
 
 		if (!resize(&mesh->position, n, sizeof *mesh->position) || !resize(&mesh->normal, n, sizeof *mesh->normal) ||
-		    (mesh->uv != NULL && !resize(&mesh->uv, n, sizeof *mesh->uv)) ||
+		    (mesh->uv[0] != NULL && !resize(&mesh->uv[0], n, sizeof *mesh->uv[0])) ||
 		    (mesh->color != NULL && !resize(&mesh->color, n, sizeof *mesh->color)))
 			return 0;
 		im->vertex_capacity = n;
@@ -102,9 +102,9 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
 		                (unsigned long long)IMPORT_MAX_VERTICES, (unsigned long long)IMPORT_MAX_TRIANGLES);
 	if (!reserve(im, old_v + n_vertices, old_t + n_triangles))
 		goto no_memory;
-	if (has_uv && mesh->uv == NULL) {
-		mesh->uv = calloc(im->vertex_capacity > 0 ? im->vertex_capacity : 1, sizeof *mesh->uv);
-		if (mesh->uv == NULL)
+	if (has_uv && mesh->uv[0] == NULL) {
+		mesh->uv[0] = calloc(im->vertex_capacity > 0 ? im->vertex_capacity : 1, sizeof *mesh->uv[0]);
+		if (mesh->uv[0] == NULL)
 			goto no_memory;
 	}
 	if (has_color && mesh->color == NULL) {
@@ -116,8 +116,8 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
 	if (n_vertices > 0) {
 		memset(mesh->position + old_v, 0, n_vertices * sizeof *mesh->position);
 		memset(mesh->normal + old_v, 0, n_vertices * sizeof *mesh->normal);
-		if (mesh->uv != NULL)
-			memset(mesh->uv + old_v, 0, n_vertices * sizeof *mesh->uv);
+		if (mesh->uv[0] != NULL)
+			memset(mesh->uv[0] + old_v, 0, n_vertices * sizeof *mesh->uv[0]);
 		if (mesh->color != NULL)
 			fill_white(mesh->color, old_v, old_v + n_vertices);
 	}
@@ -187,6 +187,31 @@ static float clamp(float x, float low, float high, float otherwise)
 	return !isfinite(x) ? otherwise : x < low ? low : x > high ? high : x;
 }
 
+static void no_texture(struct psr_texture *texture)
+{
+	*texture = (struct psr_texture){ .image = -1, .transform = { 1, 0, 0, 0, 1, 0 } };
+}
+
+void psr_material_default(struct psr_material *material)
+{
+	memset(material, 0, sizeof *material);
+	for (int c = 0; c < 4; c++)
+		material->base_color[c] = 1;
+	material->roughness = 1;
+	material->occlusion_strength = 1;
+	material->normal_scale = 1;
+	for (int c = 0; c < 3; c++)
+		material->specular[c] = 1;
+	material->glossiness = 1;
+	material->alpha_cutoff = 0.5f;
+	no_texture(&material->base_texture);
+	no_texture(&material->metallic_roughness_texture);
+	no_texture(&material->emissive_texture);
+	no_texture(&material->occlusion_texture);
+	no_texture(&material->normal_texture);
+	no_texture(&material->specular_texture);
+}
+
 static void tidy_material(struct psr_material *m, uint32_t n_images)
 {
 	for (int c = 0; c < 4; c++)
@@ -216,8 +241,8 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 	/* Shrinking cannot fail in a way that matters: the old block stays. */
 	(void)resize(&mesh->position, mesh->n_vertices, sizeof *mesh->position);
 	(void)resize(&mesh->normal, mesh->n_vertices, sizeof *mesh->normal);
-	if (mesh->uv != NULL)
-		(void)resize(&mesh->uv, mesh->n_vertices, sizeof *mesh->uv);
+	if (mesh->uv[0] != NULL)
+		(void)resize(&mesh->uv[0], mesh->n_vertices, sizeof *mesh->uv[0]);
 	if (mesh->color != NULL)
 		(void)resize(&mesh->color, mesh->n_vertices, sizeof *mesh->color);
 	(void)resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);

@@ -86,8 +86,8 @@ static int drop_vertices(struct import_mesh *im, struct psr_error *err)
 		if (kept != v) {
 			memcpy(mesh->position[kept], mesh->position[v], sizeof mesh->position[v]);
 			memcpy(mesh->normal[kept], mesh->normal[v], sizeof mesh->normal[v]);
-			if (mesh->uv != NULL)
-				memcpy(mesh->uv[kept], mesh->uv[v], sizeof mesh->uv[v]);
+			if (mesh->uv[0] != NULL)
+				memcpy(mesh->uv[0][kept], mesh->uv[0][v], sizeof mesh->uv[0][v]);
 			if (mesh->color != NULL)
 				memcpy(mesh->color[kept], mesh->color[v], sizeof mesh->color[v]);
 		}
@@ -122,8 +122,8 @@ static void tidy_vertices(struct psr_mesh *mesh)
 {
 	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 		unit_normal(mesh->normal[v]);
-		if (mesh->uv != NULL && !(isfinite(mesh->uv[v][0]) && isfinite(mesh->uv[v][1])))
-			mesh->uv[v][0] = mesh->uv[v][1] = 0.0f;
+		if (mesh->uv[0] != NULL && !(isfinite(mesh->uv[0][v][0]) && isfinite(mesh->uv[0][v][1])))
+			mesh->uv[0][v][0] = mesh->uv[0][v][1] = 0.0f;
 		for (int c = 0; mesh->color != NULL && c < 4; c++) {
 			float x = mesh->color[v][c];
 

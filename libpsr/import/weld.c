@@ -19,9 +19,9 @@ static size_t key_of(const struct psr_mesh *mesh, uint32_t v, int whole, uint8_t
 		return n;
 	memcpy(key + n, mesh->normal[v], sizeof mesh->normal[v]);
 	n += sizeof mesh->normal[v];
-	if (mesh->uv != NULL) {
-		memcpy(key + n, mesh->uv[v], sizeof mesh->uv[v]);
-		n += sizeof mesh->uv[v];
+	if (mesh->uv[0] != NULL) {
+		memcpy(key + n, mesh->uv[0][v], sizeof mesh->uv[0][v]);
+		n += sizeof mesh->uv[0][v];
 	}
 	if (mesh->color != NULL) {
 		memcpy(key + n, mesh->color[v], sizeof mesh->color[v]);

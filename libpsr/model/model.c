@@ -187,12 +187,13 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 }
 
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
-                     struct psr_error *err)
+                     const struct psr_presets *presets, struct psr_error *err)
 {
 	uint64_t n_bytes;
 	uint8_t *bytes;
 	int code = check_arguments(info, blocks, err);
 
+	(void)presets;
 	if (code != PSR_OK)
 		return code;
 	bytes = file_image_make(info, blocks, &n_bytes);

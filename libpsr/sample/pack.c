@@ -296,7 +296,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, struc
 		info->box_min[k] = info->origin[k] + info->scale * pack->box_min[k];
 		info->box_max[k] = info->origin[k] + info->scale * pack->box_max[k];
 	}
-	return psr_model_create(out, info, &blocks, err);
+	return psr_model_create(out, info, &blocks, NULL, err);
 }
 
 int pack_model(struct psr_model **out, struct psr_model_info *info, const struct ray_scene *scene,

@@ -288,6 +288,44 @@ void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n
 		trace_packet(scene, ray + i, n - i < PACKET ? n - i : PACKET, t_min, hit + i);
 }
 
+#define SAME_HIT 0x1p-20
+
+void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, int n, int most, struct ray_hit *hit,
+                         int *n_hits)
+{
+	for (int i = 0; i < n; i++) {
+		struct ray_hit next;
+		double t_min = 0;
+
+		n_hits[i] = 0;
+		while (n_hits[i] < most) {
+			struct ray moved = ray[i];
+
+			for (int k = 0; k < 3; k++)
+				moved.origin[k] += t_min * moved.direction[k];
+			ray_scene_trace(scene, &moved, 1, 0, &next);
+			if (next.prim == RAY_NONE)
+				break;
+			next.t += t_min;
+			t_min = next.t + SAME_HIT;
+			hit[i * most + n_hits[i]++] = next;
+		}
+	}
+}
+
+void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded)
+{
+	struct ray_hit hit[PACKET];
+
+	for (int i = 0; i < n; i += PACKET) {
+		int part = n - i < PACKET ? n - i : PACKET;
+
+		ray_scene_trace(scene, ray + i, part, t_min, hit);
+		for (int k = 0; k < part; k++)
+			is_occluded[i + k] = hit[k].prim != RAY_NONE;
+	}
+}
+
 struct nearest {
 	const struct ray_scene *scene;
 	const double *point;

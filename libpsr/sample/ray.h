@@ -35,6 +35,15 @@ void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
 
+/* All hits of n rays at t >= 0, nearest first: those of ray i at hit[i * most], n_hits[i] of them, at most `most`; beyond,
+ * the farthest are left out. Hits of one ray that coincide to within 2^-20 and are of the same side are one, the lowest
+ * primitive's. Any number of threads may trace at once. */
+void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, int n, int most, struct ray_hit *hit,
+                         int *n_hits);
+
+/* Whether anything is met at t_min <= t. */
+void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded);
+
 /* Distance from a point to the nearest point of the mesh, whatever side it is of and whether it is cut out; INFINITY if
  * none is within `most`. */
 double ray_scene_distance(const struct ray_scene *scene, const double point[3], double most);

@@ -59,13 +59,13 @@ void texture_base_color(const struct psr_mesh *mesh, uint32_t prim, double u, do
 			rgba[c] *= (float)sum;
 		}
 	}
-	if (mesh->uv != NULL && material->base_texture.image >= 0) {
+	if (mesh->uv[0] != NULL && material->base_texture.image >= 0) {
 		double s = 0, t = 0;
 		float texel[4];
 
 		for (int i = 0; i < 3; i++) {
-			s += weight[i] * (double)mesh->uv[index[i]][0];
-			t += weight[i] * (double)mesh->uv[index[i]][1];
+			s += weight[i] * (double)mesh->uv[0][index[i]][0];
+			t += weight[i] * (double)mesh->uv[0][index[i]][1];
 		}
 		if (isfinite(s) && isfinite(t)) {
 			look_up(&mesh->image[material->base_texture.image], &material->base_texture, s, t, texel);

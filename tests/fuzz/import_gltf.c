@@ -27,7 +27,7 @@ static void check(const struct psr_mesh *mesh)
 		require(length == 0.0f || fabsf(length - 1.0f) < 1e-5f);
 		for (int c = 0; c < 3; c++)
 			require(isfinite(mesh->position[v][c]));
-		require(mesh->uv == NULL || (isfinite(mesh->uv[v][0]) && isfinite(mesh->uv[v][1])));
+		require(mesh->uv[0] == NULL || (isfinite(mesh->uv[0][v][0]) && isfinite(mesh->uv[0][v][1])));
 	}
 	for (uint32_t m = 0; m < mesh->n_materials; m++)
 		require(mesh->material[m].base_texture.image < (int)mesh->n_images);

@@ -36,7 +36,7 @@ static void check_again(const struct psr_model_info *info, const struct psr_bloc
 {
 	struct psr_model *model = NULL;
 
-	REQUIRE(psr_model_create(&model, info, blocks, NULL) == PSR_OK);
+	REQUIRE(psr_model_create(&model, info, blocks, NULL, NULL) == PSR_OK);
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const void *a = section_array(spec, blocks), *b = section_array(spec, psr_model_blocks(model));

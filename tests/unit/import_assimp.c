@@ -48,7 +48,7 @@ static void an_obj_brings_its_colors_and_texture(void **state)
 	for (uint32_t i = 0; i < 3; i++) {
 		uint32_t v = m->triangle[0][i];
 
-		assert_true(m->uv[v][0] == (float)m->position[v][0] && m->uv[v][1] == 1.0f - (float)m->position[v][1]);
+		assert_true(m->uv[0][v][0] == (float)m->position[v][0] && m->uv[0][v][1] == 1.0f - (float)m->position[v][1]);
 	}
 	assert_int_equal(m->image[0].rgba[2], 255);
 	psr_mesh_destroy(m);

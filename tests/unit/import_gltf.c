@@ -78,7 +78,7 @@ static void missing_normals_stay_zero(void **state)
 
 	for (uint32_t v = 0; v < m->n_vertices; v++)
 		assert_true(m->normal[v][0] == 0.0f && m->normal[v][1] == 0.0f && m->normal[v][2] == 0.0f);
-	assert_null(m->uv);
+	assert_null(m->uv[0]);
 	assert_null(m->color);
 	psr_mesh_destroy(m);
 }
@@ -219,8 +219,8 @@ static void textures_have_their_first_row_on_top(void **state)
 	assert_true(material->base_color[0] == 0.5f && material->base_color[1] == 0.25f && material->base_color[2] == 1.0f);
 	assert_true(material->metallic == 0.5f && material->roughness == 0.25f);
 	assert_true(!material->two_sided && !material->unlit && material->alpha == PSR_ALPHA_OPAQUE);
-	assert_non_null(m->uv);
-	assert_true(m->uv[m->triangle[0][0]][0] == 0.0f && m->uv[m->triangle[0][0]][1] == 1.0f);
+	assert_non_null(m->uv[0]);
+	assert_true(m->uv[0][m->triangle[0][0]][0] == 0.0f && m->uv[0][m->triangle[0][0]][1] == 1.0f);
 	psr_mesh_destroy(m);
 }
 
@@ -234,7 +234,7 @@ static void what_only_emits_is_unlit_in_that_color(void **state)
 	assert_true(material->unlit);
 	assert_int_equal(material->base_texture.image, 0);
 	assert_true(material->base_color[0] == 1.0f && material->base_color[1] == 0.5f && material->base_color[2] == 0.25f);
-	assert_true(m->uv[m->triangle[0][0]][0] == 0.25f && m->uv[m->triangle[0][0]][1] == 0.5f);
+	assert_true(m->uv[0][m->triangle[0][0]][0] == 0.25f && m->uv[0][m->triangle[0][0]][1] == 0.5f);
 	assert_string_equal(m->warning, "");
 	psr_mesh_destroy(m);
 	/* Not where there is a colour of its own. */
@@ -251,7 +251,7 @@ static void a_material_chooses_its_set_of_coordinates(void **state)
 	struct psr_mesh *m = import_glb(TEXTURED("{'pbrMetallicRoughness':{'baseColorTexture':{'index':0,'texCoord':1}}}",
 	                                         ""));
 
-	assert_true(m->uv[m->triangle[0][0]][0] == 0.25f && m->uv[m->triangle[0][0]][1] == 0.5f);
+	assert_true(m->uv[0][m->triangle[0][0]][0] == 0.25f && m->uv[0][m->triangle[0][0]][1] == 0.5f);
 	psr_mesh_destroy(m);
 }
 
@@ -266,8 +266,8 @@ static void texture_transforms_are_applied(void **state)
 
 	for (uint32_t v = 0; v < m->n_vertices; v++) {
 		/* the angle has 12 digits */
-		assert_true(m->uv[v][0] > -1e-6 && m->uv[v][0] < 0.5 + 1e-6);
-		assert_true(m->uv[v][1] > 0.5 - 1e-6 && m->uv[v][1] < 1 + 1e-6);
+		assert_true(m->uv[0][v][0] > -1e-6 && m->uv[0][v][0] < 0.5 + 1e-6);
+		assert_true(m->uv[0][v][1] > 0.5 - 1e-6 && m->uv[0][v][1] < 1 + 1e-6);
 	}
 	psr_mesh_destroy(m);
 }

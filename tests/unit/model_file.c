@@ -22,7 +22,7 @@ static int setup(void **state)
 	(void)state;
 	fixture_init(&fixture, 1);
 	fixture.blocks.visibility = NULL;
-	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 	bytes = model_image(model, &n_image);
 	image = malloc(n_image);
 	memcpy(image, bytes, n_image);
@@ -99,7 +99,7 @@ static void model_survives_memory_file_and_map_bit_by_bit(void **state)
 		size_t n_bytes;
 
 		fixture_init(&fixture, with_optional);
-		assert_int_equal(psr_model_create(&made, &fixture.info, &fixture.blocks, NULL), PSR_OK);
+		assert_int_equal(psr_model_create(&made, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 		assert_same(made, with_optional);
 		assert_int_equal(psr_model_write(made, path, NULL), PSR_OK);
 		assert_int_equal(psr_model_read(&read, path, NULL), PSR_OK);
@@ -129,9 +129,9 @@ static void content_id_changes_with_any_content(void **state)
 	uint8_t id_a[16], id_b[16];
 
 	(void)state;
-	assert_int_equal(psr_model_create(&a, &fixture.info, &fixture.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&a, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 	fixture.attr[FIXTURE_SAMPLES - 1] ^= 1;
-	assert_int_equal(psr_model_create(&b, &fixture.info, &fixture.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&b, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 	fixture.attr[FIXTURE_SAMPLES - 1] ^= 1;
 	psr_model_content_id(a, id_a);
 	psr_model_content_id(b, id_b);
@@ -222,7 +222,7 @@ static void long_sections_are_hashed_by_the_megabyte(void **state)
 		for (uint32_t i = 0; i < n_blocks && memcmp(spec->type, "AFST", 4) == 0; i++)
 			((uint32_t *)arrays[k])[i] = i;
 	}
-	assert_int_equal(psr_model_create(&model, &fixture.info, &blocks, &err), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &fixture.info, &blocks, NULL, &err), PSR_OK);
 	bytes = model_image(model, &n_bytes);
 	copy = malloc(n_bytes);
 	memcpy(copy, bytes, n_bytes);

@@ -27,7 +27,7 @@ static int setup(void **state)
 
 	(void)state;
 	fixture_init(&fixture, 1);
-	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
 	model_image(model, &n_bytes);
 	original = malloc(n_bytes);
 	memcpy(original, model_image(model, &n_bytes), n_bytes);
@@ -319,37 +319,37 @@ static void create_refuses_what_a_file_may_not_hold(void **state)
 
 	(void)state;
 	fixture_init(&f, 1);
-	assert_int_equal(psr_model_create(&model, NULL, &f.blocks, &err), PSR_ERR_ARG);
-	assert_int_equal(psr_model_create(&model, &f.info, NULL, &err), PSR_ERR_ARG);
+	assert_int_equal(psr_model_create(&model, NULL, &f.blocks, NULL, &err), PSR_ERR_ARG);
+	assert_int_equal(psr_model_create(&model, &f.info, NULL, NULL, &err), PSR_ERR_ARG);
 	f.blocks.cone_y = NULL;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_ARG);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
 	fixture_init(&f, 1);
 	f.blocks.row = NULL;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_ARG);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
 	assert_non_null(strstr(err.text, "BROW"));
 	fixture_init(&f, 0);
 	f.blocks.n_blocks = MODEL_MAX_BLOCKS + 1;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_LIMIT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_LIMIT);
 	fixture_init(&f, 0);
 	f.blocks.n_samples = UINT64_MAX;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_LIMIT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_LIMIT);
 	fixture_init(&f, 0);
 	memset(f.info.builder, 'x', sizeof f.info.builder);
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_ARG);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
 	fixture_init(&f, 0);
 	f.mask[2] = 0;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_FORMAT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
 	f.blocks.n_blocks = f.blocks.n_clusters = 0;
 	f.blocks.n_samples = 0;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_FORMAT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "0 blocks; it must be 1 to 67108864"));
 	fixture_init(&f, 0);
 	f.blocks.n_projections = 0;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_FORMAT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "0 projections; it must be 1 to 65536"));
 	fixture_init(&f, 0);
 	f.blocks.n_clusters = 0;
-	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, &err), PSR_ERR_FORMAT);
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "0 clusters; it must be 1 to the number of blocks"));
 	assert_null(model);
 }

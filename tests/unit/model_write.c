@@ -25,9 +25,9 @@ static int setup(void **state)
 	assert_non_null(mkdtemp(folder));
 	snprintf(path, sizeof path, "%s/m.psr", folder);
 	fixture_init(&f, 0);
-	assert_int_equal(psr_model_create(&one, &f.info, &f.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&one, &f.info, &f.blocks, NULL, NULL), PSR_OK);
 	fixture_init(&f, 1);
-	assert_int_equal(psr_model_create(&two, &f.info, &f.blocks, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&two, &f.info, &f.blocks, NULL, NULL), PSR_OK);
 	return 0;
 }
 

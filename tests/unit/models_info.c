@@ -28,7 +28,7 @@ static int write_model(void **state)
 	snprintf(files.model, sizeof files.model, "%s/small.thing.psr", files.folder);
 	snprintf(files.output, sizeof files.output, "%s/output", files.folder);
 	fixture_init(fixture, 1);
-	code = psr_model_create(&model, &fixture->info, &fixture->blocks, NULL);
+	code = psr_model_create(&model, &fixture->info, &fixture->blocks, NULL, NULL);
 	if (code == PSR_OK)
 		code = psr_model_write(model, files.model, NULL);
 	psr_model_unref(model);

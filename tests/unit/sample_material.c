@@ -12,7 +12,12 @@ static const float grey[3] = { 0.5f, 0.5f, 0.5f };
 
 static struct psr_material make(float metallic, float roughness)
 {
-	return (struct psr_material){ .metallic = metallic, .roughness = roughness };
+	struct psr_material material;
+
+	psr_material_default(&material);
+	material.metallic = metallic;
+	material.roughness = roughness;
+	return material;
 }
 
 static void exponent_code_is_the_nearest(void **state)

@@ -20,11 +20,7 @@ static inline struct psr_mesh *meshes_new(uint32_t n_vertices, uint32_t n_triang
 	mesh->triangle = calloc(n_triangles, sizeof *mesh->triangle);
 	mesh->triangle_material = calloc(n_triangles, sizeof *mesh->triangle_material);
 	mesh->material = calloc(1, sizeof *mesh->material);
-	for (int c = 0; c < 4; c++)
-		mesh->material->base_color[c] = 1;
-	mesh->material->base_texture.image = -1;
-	mesh->material->roughness = 1;
-	mesh->material->alpha_cutoff = 0.5f;
+	psr_material_default(mesh->material);
 	return mesh;
 }
 
@@ -37,7 +33,7 @@ static inline void meshes_free(struct psr_mesh *mesh)
 	free(mesh->image);
 	free(mesh->position);
 	free(mesh->normal);
-	free(mesh->uv);
+	free(mesh->uv[0]);
 	free(mesh->color);
 	free(mesh->triangle);
 	free(mesh->triangle_material);
@@ -70,15 +66,15 @@ static inline struct psr_mesh *meshes_square(uint32_t n)
 {
 	struct psr_mesh *mesh = meshes_grid(n, n);
 
-	mesh->uv = calloc(mesh->n_vertices, sizeof *mesh->uv);
+	mesh->uv[0] = calloc(mesh->n_vertices, sizeof *mesh->uv[0]);
 	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
 		double u = (double)(i % (n + 1)) / n, v = (double)(i / (n + 1)) / n;
 
 		mesh->position[i][0] = 2 * u - 1;
 		mesh->position[i][1] = 2 * v - 1;
 		mesh->normal[i][2] = 1;
-		mesh->uv[i][0] = (float)u;
-		mesh->uv[i][1] = (float)(1 - v);
+		mesh->uv[0][i][0] = (float)u;
+		mesh->uv[0][i][1] = (float)(1 - v);
 	}
 	return mesh;
 }

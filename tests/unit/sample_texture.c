@@ -28,7 +28,7 @@ static float look_up(struct psr_mesh *mesh, float s)
 	float rgba[4];
 
 	for (uint32_t i = 0; i < mesh->n_vertices; i++)
-		mesh->uv[i][0] = s;
+		mesh->uv[0][i][0] = s;
 	texture_base_color(mesh, 0, 0.25, 0.25, rgba);
 	return rgba[0];
 }

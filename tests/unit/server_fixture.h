@@ -96,7 +96,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	}
 	for (int i = 0; i < PLATE_SAMPLES; i++)
 		attr[i] = (uint64_t)1 << 15 | (uint64_t)rgb << 16; /* unlit */
-	assert_int_equal(psr_model_create(&model, &info, &blocks, &error), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &info, &blocks, NULL, &error), PSR_OK);
 	return model;
 }
 

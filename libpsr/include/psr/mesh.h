@@ -9,12 +9,14 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
+#include "psr/view.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* 8 bits a channel, RGBA, not premultiplied, sRGB-coded; row 0 is the top. */
+/* 8 bits a channel, RGBA, not premultiplied; row 0 is the top. Whether its colours are sRGB-coded or linear is up to the
+ * texture that uses it: base, emissive, specular-glossiness and vertex colours' textures are coded, the rest is linear. */
 struct psr_image {
 	uint32_t width, height;
 	uint8_t *rgba; /* width * height * 4 */
@@ -22,43 +24,77 @@ struct psr_image {
 
 enum psr_wrap { PSR_WRAP_REPEAT, PSR_WRAP_CLAMP, PSR_WRAP_MIRROR };
 
+#define PSR_UV_SETS 2
+
 struct psr_texture {
-	int image; /* index into images; -1: no texture */
+	int image;          /* index into images; -1: no texture, and the rest is not read */
+	int uv_set;         /* 0..PSR_UV_SETS - 1; a set that the mesh does not have counts as 0,0 everywhere */
+	float transform[6]; /* u' = t[0] u + t[1] v + t[2], v' = t[3] u + t[4] v + t[5] (KHR_texture_transform) */
 	enum psr_wrap wrap_s, wrap_t;
+	int is_nearest;     /* magnified without interpolation */
 };
 
 enum psr_alpha { PSR_ALPHA_OPAQUE, PSR_ALPHA_MASK, PSR_ALPHA_BLEND };
 
-/* glTF's metallic-roughness, which other formats are translated to. Factors are linear. */
+/* glTF 2.0's material (its section 3.9), which other formats are translated to. Factors are linear. A texture multiplies
+ * its factor, channel by channel, unless said otherwise. */
 struct psr_material {
 	float base_color[4];
-	struct psr_texture base_texture; /* multiplies base_color; alpha too */
+	struct psr_texture base_texture;        /* alpha too; of specular-glossiness: the diffuse texture */
 	float metallic, roughness;
-	float alpha_cutoff;              /* MASK: below it there is nothing */
+	struct psr_texture metallic_roughness_texture; /* linear; G: roughness, B: metallic */
+	float emissive[3];                      /* may exceed 1 */
+	struct psr_texture emissive_texture;
+	struct psr_texture occlusion_texture;   /* linear; R: 1 is open */
+	float occlusion_strength;               /* 0..1 */
+	struct psr_texture normal_texture;      /* linear; tangent space, 0..255 is -1..1, +y is up (towards -v) */
+	float normal_scale;
+	int is_specular_glossiness;             /* KHR_materials_pbrSpecularGlossiness: base is diffuse, these are read, metallic
+	                                         * and roughness are not */
+	float specular[3], glossiness;
+	struct psr_texture specular_texture;    /* RGB: specular, coded; A: glossiness, linear */
+	float alpha_cutoff;                     /* MASK: below it there is nothing */
 	enum psr_alpha alpha;
-	int two_sided;                   /* 0: rays that meet the back of a face go on, as glTF asks */
+	int two_sided;                          /* 0: rays that meet the back of a face go on, as glTF asks */
 	int unlit;
 };
 
+/* A material that is white, rough, not metallic, opaque, one-sided, without textures. */
+void psr_material_default(struct psr_material *material);
+
+/* Faces, and points of a cloud. Primitive i is triangle i, or from n_triangles on the disc around point i - n_triangles. */
 struct psr_mesh {
-	uint32_t n_vertices, n_triangles, n_materials, n_images;
+	uint32_t n_vertices, n_triangles, n_points, n_materials, n_images;
 	double (*position)[3];          /* n_vertices, finite */
 	float (*normal)[3];             /* n_vertices, unit length; 0,0,0 where the source has none: the face's own is taken */
-	float (*uv)[2];                 /* n_vertices, or NULL; v grows downwards, (0,0) is the image's top left, as in glTF */
+	float (*tangent)[4];            /* n_vertices, unit length and handedness (+-1), as in glTF; or NULL: made of uv */
+	float (*uv[PSR_UV_SETS])[2];    /* n_vertices, or NULL; v grows downwards, (0,0) is the image's top left, as in glTF */
 	float (*color)[4];              /* n_vertices, linear RGBA, multiplies the base colour; or NULL */
 	uint32_t (*triangle)[3];        /* n_triangles, each index < n_vertices, counter-clockwise seen from the front */
 	uint32_t *triangle_material;    /* n_triangles, < n_materials */
+
+	double (*point)[3];             /* n_points, finite; NULL if there are none, like the rest of them */
+	float (*point_normal)[3];       /* unit length */
+	float *point_radius;            /* > 0: a disc of this radius, perpendicular to the normal, takes the point's place */
+	float (*point_color)[4];        /* linear RGBA, multiplies the base colour; or NULL */
+	uint32_t *point_material;       /* < n_materials; without textures */
+
 	struct psr_material *material;  /* at least one */
 	struct psr_image *image;
 
+	uint32_t n_cameras, n_lights;
+	struct psr_preset_camera *camera;
+	struct psr_preset_light *light;
+
 	/* What was repaired or left out while importing, for the report; never silent. */
 	uint32_t n_dropped_triangles;   /* degenerate, or with a vertex that is not finite */
-	uint32_t n_dropped_primitives;  /* points and lines */
+	uint32_t n_dropped_primitives;  /* lines, and points that are not finite */
 	char warning[PSR_ERROR_TEXT];   /* one sentence for a person, or "" */
 };
 
-/* Reads any supported file: .gltf and .glb through tinygltf, all else through Assimp; images through OpenImageIO.
- * The result is validated as the comments above promise, has at least one triangle, and belongs to the caller.
+/* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through Assimp;
+ * images through OpenImageIO.
+ * The result is validated as the comments above promise, has at least one triangle or point, and belongs to the caller.
  * NOT_FOUND, IO, FORMAT (with the place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Never crashes on bad
  * input, throws nothing, reads nothing outside of the file's own folder. */
 int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err);

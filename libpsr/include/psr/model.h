@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
+#include "psr/view.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -32,8 +33,8 @@ enum psr_block_flag {
 
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice
  * origin is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth
- * along z is depth_bias + depth_step * (float)depth[64 * b + s]; its attributes are attr[attr_first[b] + number of
- * lower set bits]. Blocks of one cluster follow each other, and clusters are in the order of their blocks, without
+ * along z is depth_bias + depth_step * (float)depth[k], its attributes are attr[k], with k = attr_first[b] + number of
+ * lower set bits. Blocks of one cluster follow each other, and clusters are in the order of their blocks, without
  * gaps.
  *
  * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a
@@ -41,7 +42,7 @@ enum psr_block_flag {
  * 2^26 blocks, 65,536 projections, 32 levels. */
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
-	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr */
+	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr and depth */
 	const struct psr_projection *projection;
 	const struct psr_cluster *cluster;
 	const float *sphere_x, *sphere_y, *sphere_z, *sphere_r; /* bounds the samples and reaches half a step beyond */
@@ -52,7 +53,7 @@ struct psr_blocks {
 	const float *depth_bias, *depth_step;
 	const uint64_t *mask;                   /* never 0 */
 	const uint32_t *attr_first;
-	const uint16_t *depth;                  /* 64 a block; 0 where invalid */
+	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
 	/* Optional, NULL if absent ([G] 6.3, 6.4): */
 	const float *cone_x, *cone_y, *cone_z, *cone_cos; /* cap of the geometric normals; -1: any */
@@ -87,6 +88,12 @@ struct psr_model_info {
 	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object units */
 	double tolerance; /* angle of [G] 4.4, radians */
 	uint32_t resolution; /* >= 1; target resolution: pixels across the unit sphere at magnification 1 */
+
+	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of the
+	 * surface, at the target resolution, seen from a random direction, this many have no sample of it. 0 of 0: not measured. */
+	uint64_t n_trials, n_missing;
+	/* The same for culling by cones and masks: this many pixels out of n_trials lost all of their samples to it. */
+	uint64_t n_lost;
 	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };
 
@@ -102,20 +109,32 @@ int psr_model_read(struct psr_model **out, const char *path, struct psr_error *e
 /* The same from memory; `bytes` is copied. For tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
 
-/* Makes a model from arrays of the caller's, which are copied and validated like a file's. ARG for missing arrays,
- * LIMIT for counts, FORMAT for values that break a rule, MEMORY. */
+/* Cameras and lights of the source file, in object coordinates. */
+struct psr_presets {
+	uint32_t n_cameras, n_lights; /* each at most PSR_MAX_PRESETS */
+	const struct psr_preset_camera *camera;
+	const struct psr_preset_light *light;
+};
+
+/* Makes a model from arrays of the caller's, which are copied and validated like a file's; presets may be NULL. ARG for
+ * missing arrays, LIMIT for counts, FORMAT for values that break a rule, MEMORY. */
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
-                     struct psr_error *err);
+                     const struct psr_presets *presets, struct psr_error *err);
 
 /* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. Only
  * regular files are replaced. IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
+
+/* The same, packed: sections compressed, chunk by chunk. psr_model_read and _map open such a file too, into anonymous
+ * memory; the model, its content id included, is the same. */
+int psr_model_write_packed(const struct psr_model *model, const char *path, struct psr_error *err);
 
 struct psr_model *psr_model_ref(struct psr_model *model);
 void psr_model_unref(struct psr_model *model); /* NULL is fine */
 
 const struct psr_model_info *psr_model_info(const struct psr_model *model);
 const struct psr_blocks *psr_model_blocks(const struct psr_model *model); /* NULL if it has no such representation */
+const struct psr_presets *psr_model_presets(const struct psr_model *model); /* never NULL */
 
 /* XXH128 of the section table (types, versions, lengths, hashes): the same bytes of content, the same id. */
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);

@@ -9,6 +9,7 @@
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/model.h"
+#include "psr/view.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -17,34 +18,12 @@ extern "C" {
 #define PSR_MAX_INSTANCES 1024
 #define PSR_MAX_LIGHTS 32
 
-enum psr_camera_kind { PSR_CAMERA_PERSPECTIVE, PSR_CAMERA_ORTHOGRAPHIC };
-
-struct psr_camera {
-	double eye[3], target[3], up[3]; /* target != eye; up not parallel to target - eye; up need not have unit length */
-	enum psr_camera_kind kind;
-	double fov_y;        /* perspective: full vertical angle, radians, 1e-6..3.14159 */
-	double ortho_height; /* orthographic: world units from the top edge of the picture to its bottom, > 0 */
-	double near_z;       /* nothing nearer is drawn; world units; 0: chosen from the scene */
-};
-
 /* world = translation + scale * rotate(rotation, object) */
 struct psr_instance {
 	const struct psr_model *model;
 	double rotation[4];  /* unit quaternion x, y, z, w */
 	double translation[3];
 	double scale;        /* > 0 */
-};
-
-enum psr_light_kind { PSR_LIGHT_DIRECTIONAL, PSR_LIGHT_POINT, PSR_LIGHT_SPOT };
-
-struct psr_light {
-	enum psr_light_kind kind;
-	double position[3];  /* point, spot; world */
-	double direction[3]; /* directional, spot: where the light goes; any length but 0 */
-	double color[3];     /* linear, intensity included, >= 0 */
-	double inner, outer; /* spot: half angles from the axis, radians, 0 <= inner <= outer <= pi, outer > 0: full light inside of
-	                      * inner, none outside of outer */
-	double reference;    /* point, spot: distance at which the intensity holds, falling with the square beyond; 0: does not fall */
 };
 
 struct psr_scene {

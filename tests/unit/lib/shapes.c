@@ -167,7 +167,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	}
 	struct psr_model *model;
 	struct psr_error err;
-	if (psr_model_create(&model, &info, &blocks, &err)) {
+	if (psr_model_create(&model, &info, &blocks, NULL, &err)) {
 		fprintf(stderr, "%s\n", err.text);
 		abort();
 	}

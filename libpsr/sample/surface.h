@@ -1,0 +1,31 @@
+/* What the surface of a mesh looks like, as the attribute words of psr/model.h. */
+#ifndef PSR_SAMPLE_SURFACE_H
+#define PSR_SAMPLE_SURFACE_H
+
+#include <stdint.h>
+#include "psr/mesh.h"
+
+/* A mesh with what filtering its textures needs. Any number of threads may read it. */
+struct surface {
+	const struct psr_mesh *mesh;
+	double scale; /* object units an inner unit */
+};
+
+/* The mesh must outlive it. scale > 0. MEMORY; surface_fini() either way. */
+int surface_init(struct surface *surface, const struct psr_mesh *mesh, double scale);
+void surface_fini(struct surface *surface);
+
+/* A place on a primitive, as rays report it (ray.h). */
+struct surface_place {
+	uint32_t prim;
+	int is_back; /* met from the back */
+	double u, v;
+};
+
+/* Everything but the normal is filtered over a circle in the tangent plane, of this diameter in inner units ([G] 5.1,
+ * figure 5.2b). The normal is the shading one, on the side that was met, bent as far as it must be to face the unit vector
+ * `facing`, so that a sample is never shaded as a back in the view that found it. */
+uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
+                      const float facing[3]);
+
+#endif
