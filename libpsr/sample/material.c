@@ -1,6 +1,7 @@
 #include <math.h>
 #include "../base/srgb.h"
 #include "material.h"
+#include "psr/model.h"
 
 /* A metal has no diffuse colour: it mirrors its surroundings, and here there are none. Half of its colour stands in for
  * them, or metals would be black but for highlights. */
@@ -43,6 +44,57 @@ static uint64_t code_888(const float rgb[3])
 {
 	return (uint64_t)psr_linear_to_srgb(rgb[0]) | (uint64_t)psr_linear_to_srgb(rgb[1]) << 8
 	       | (uint64_t)psr_linear_to_srgb(rgb[2]) << 16;
+}
+
+uint64_t material_encode(const struct look *look)
+{
+	if (look->unlit)
+		return UINT64_C(1) << 15 | code_888(look->diffuse) << 16;
+	return code_888(look->diffuse) << 16 | code_565(look->specular) << 40
+	       | (uint64_t)material_exponent_code(look->exponent) << 56;
+}
+
+static float part(uint32_t code, int shift, uint32_t most)
+{
+	return psr_srgb_to_linear[((code >> shift & most) * 255 + most / 2) / most];
+}
+
+void material_decode(struct look *look, uint64_t attr)
+{
+	static const double root[16] = {
+		1,
+		1.0442737824274138403,
+		1.0905077326652576592,
+		1.1387886347566916537,
+		1.1892071150027210667,
+		1.2418578120734840486,
+		1.2968395546510096659,
+		1.3542555469368927283,
+		1.4142135623730950488,
+		1.4768261459394993114,
+		1.5422108254079408236,
+		1.6104903319492543082,
+		1.6817928305074290861,
+		1.7562521603732994832,
+		1.8340080864093424635,
+		1.9152065613971472939,
+	};
+	uint32_t e = PSR_ATTR_EXPONENT(attr), diffuse = PSR_ATTR_DIFFUSE(attr), specular = PSR_ATTR_SPECULAR(attr);
+
+	for (int c = 0; c < 3; c++)
+		look->diffuse[c] = part(diffuse, 8 * c, 255);
+	look->specular[0] = part(specular, 0, 31);
+	look->specular[1] = part(specular, 5, 63);
+	look->specular[2] = part(specular, 11, 31);
+	look->exponent = root[e & 15] * (double)(1u << (e >> 4));
+	look->unlit = (int)PSR_ATTR_UNLIT(attr);
+}
+
+double material_widened(double n, double r)
+{
+	double widened = r > 0 ? n / (1 + 4 * n * (r < 1 ? 1 - r : 0) / r) : 1;
+
+	return widened > 1 ? widened : 1;
 }
 
 uint64_t material_attr(const struct psr_material *material, const float rgb[3])

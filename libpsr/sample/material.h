@@ -14,6 +14,21 @@
  * base colour and have neither. */
 uint64_t material_attr(const struct psr_material *material, const float rgb[3]);
 
+/* What an attribute word says but for its normal, in linear light. */
+struct look {
+	float diffuse[3], specular[3]; /* encoded, clamped to 0..1 */
+	double exponent;               /* encoded, clamped to 1..2^(255/16) */
+	int unlit;                     /* encoded, neither specular nor exponent are */
+};
+
+uint64_t material_encode(const struct look *look);
+void material_decode(struct look *look, uint64_t attr); /* encoding that gives the same bits again */
+
+/* The exponent of a lobe of exponent n > 0 (of the reflected ray) over normals whose mean has length r, 0..1 ([Toksvig]:
+ * a normal spreads with the variance (1 - r) / r, the reflected ray with four times that): 1 / (1/n + 4 (1 - r) / r), at
+ * least 1. */
+double material_widened(double n, double r);
+
 /* e of the exponent 2^(e/16) that is nearest in the logarithm, in 0..255. */
 unsigned material_exponent_code(double exponent);
 

@@ -48,22 +48,28 @@ static void shading_normal(const struct psr_mesh *mesh, uint32_t prim, double u,
 		v3f_scale(normal, normal, -1);
 }
 
+void surface_face(float normal[3], const float facing[3])
+{
+	float height = v3f_dot(normal, facing);
+
+	if (height >= LEAST_HEIGHT)
+		return;
+	v3f_add_scaled(normal, normal, LEAST_HEIGHT - height, facing);
+	if (v3f_normalize(normal, normal) == 0)
+		v3f_set(normal, facing[0], facing[1], facing[2]);
+}
+
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3])
 {
 	const struct psr_mesh *mesh = surface->mesh;
-	float rgba[4], normal[3], height;
+	float rgba[4], normal[3];
 
 	(void)diameter;
 	texture_base_color(mesh, place->prim, place->u, place->v, rgba);
 	shading_normal(mesh, place->prim, place->u, place->v, normal);
 	if (place->is_back)
 		v3f_scale(normal, normal, -1);
-	height = v3f_dot(normal, facing);
-	if (height < LEAST_HEIGHT) {
-		v3f_add_scaled(normal, normal, LEAST_HEIGHT - height, facing);
-		if (v3f_normalize(normal, normal) == 0)
-			v3f_set(normal, facing[0], facing[1], facing[2]);
-	}
+	surface_face(normal, facing);
 	return material_attr(&mesh->material[mesh->triangle_material[place->prim]], rgba) | psr_direction_encode(normal);
 }

@@ -28,4 +28,7 @@ struct surface_place {
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3]);
 
+/* Bends a unit normal as far as it must be for a sample to face `facing`, however it is quantised. */
+void surface_face(float normal[3], const float facing[3]);
+
 #endif
