@@ -1,111 +1,140 @@
 #include <math.h>
-#include <string.h>
-#include "../base/maths.h"
 #include "../base/mem.h"
+#include "../base/vec.h"
 #include "cover.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 
-int cover_reserve(struct cover *cover, size_t n)
-{
-	size_t capacity = n > cover->capacity + cover->capacity / 2 ? n : cover->capacity + cover->capacity / 2;
-	struct cover_point *point;
-	struct cover_seen *seen;
-	uint32_t *n_seen;
+#include <stdlib.h>
+#include <string.h>
 
-	if (n <= cover->capacity)
-		return PSR_OK;
-	point = psr_alloc_array(capacity, sizeof *point);
-	seen = psr_alloc_array(capacity, sizeof *seen);
-	n_seen = psr_alloc_array(capacity / COVER_CHUNK + 1, sizeof *n_seen);
-	if (point == NULL || seen == NULL || n_seen == NULL) {
-		psr_free(point);
-		psr_free(seen);
-		psr_free(n_seen);
+#define FREE UINT64_MAX
+
+struct cover_cell {
+	uint64_t key;
+	uint32_t first;
+};
+
+static uint64_t key_of(const int at[3])
+{
+	return (uint64_t)(at[0] & 0x1fffff) | (uint64_t)(at[1] & 0x1fffff) << 21 | (uint64_t)(at[2] & 0x1fffff) << 42;
+}
+
+static struct cover_cell *find(const struct cover *cover, uint64_t key)
+{
+	size_t i = (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 20) & (cover->table_size - 1);
+
+	while (cover->table[i].key != FREE && cover->table[i].key != key)
+		i = (i + 1) & (cover->table_size - 1);
+	return &cover->table[i];
+}
+
+static int make_table(struct cover *cover, size_t size)
+{
+	cover->table = psr_alloc_array(size, sizeof *cover->table);
+	if (cover->table == NULL)
 		return PSR_ERR_MEMORY;
-	}
-	if (cover->n_points != 0)
-		memcpy(point, cover->point, cover->n_points * sizeof *point);
-	psr_free(cover->point);
-	psr_free(cover->seen);
-	psr_free(cover->n_seen);
-	cover->point = point;
-	cover->seen = seen;
-	cover->n_seen = n_seen;
-	cover->capacity = capacity;
+	cover->table_size = size;
+	for (size_t i = 0; i < size; i++)
+		cover->table[i].key = FREE;
 	return PSR_OK;
+}
+
+int cover_init(struct cover *cover, double ds)
+{
+	*cover = (struct cover){ .ds = ds };
+	return make_table(cover, 4096);
 }
 
 void cover_fini(struct cover *cover)
 {
-	psr_free(cover->point);
-	psr_free(cover->seen);
-	psr_free(cover->n_seen);
-	memset(cover, 0, sizeof *cover);
+	free(cover->point);
+	psr_free(cover->table);
+	*cover = (struct cover){ 0 };
 }
 
-struct look {
-	struct cover *cover;
-	const float (*axis)[3];
-	uint64_t faces[PSR_DIRECTIONS / 64]; /* bit n: normal n is turned to the viewer */
-};
-
-static int n_chunks(const struct cover *cover)
+static int grow_table(struct cover *cover)
 {
-	return (int)((cover->n_points + COVER_CHUNK - 1) / COVER_CHUNK);
-}
+	struct cover_cell *old = cover->table;
+	size_t old_size = cover->table_size;
 
-static void look_at_chunk(int i, void *userdata)
-{
-	struct look *look = userdata;
-	size_t first = (size_t)i * COVER_CHUNK, end = first + COVER_CHUNK;
-	uint32_t n = 0;
-
-	end = end < look->cover->n_points ? end : look->cover->n_points;
-	for (size_t k = first; k < end; k++) {
-		const struct cover_point *point = &look->cover->point[k];
-
-		look->cover->seen[first + n] = cover_project(look->axis, point->position);
-		n += (uint32_t)(look->faces[point->normal / 64] >> point->normal % 64 & 1) | (uint32_t)(point->two_sided != 0);
+	if (make_table(cover, 2 * old_size) != PSR_OK) {
+		cover->table = old;
+		return PSR_ERR_MEMORY;
 	}
-	look->cover->n_seen[i] = n;
+	for (size_t i = 0; i < old_size; i++)
+		if (old[i].key != FREE)
+			*find(cover, old[i].key) = old[i];
+	psr_free(old);
+	return PSR_OK;
 }
 
-void cover_look(struct cover *cover, const float axis[3][3], struct psr_pool *pool)
+static int cell_at(const struct cover *cover, float x)
 {
-	const float (*normal)[3] = psr_direction_table();
-	struct look look = { .cover = cover, .axis = axis };
-
-	for (uint32_t n = 0; n < PSR_DIRECTIONS; n++)
-		look.faces[n / 64] |= (uint64_t)(cover_project(axis, normal[n]).z > 0) << n % 64;
-	psr_pool_for(pool, n_chunks(cover), look_at_chunk, &look);
+	return (int)floor((double)x / cover->ds);
 }
 
-void cover_grid_init(struct cover_grid *grid, double angle, double shift_x, double shift_y, double ds)
+int cover_add(struct cover *cover, const struct cover_point *point)
 {
-	/* A pixel more on each side for the shift and one for rounding. */
-	uint32_t middle = (uint32_t)ceil(1 / ds) + 2;
-	double sine, cosine;
+	struct cover_cell *cell;
+	int at[3];
 
-	psr_sincos(angle, &sine, &cosine);
-	grid->cosine = (float)(cosine / ds);
-	grid->sine = (float)(sine / ds);
-	grid->shift[0] = (float)(middle + shift_x);
-	grid->shift[1] = (float)(middle + shift_y);
-	grid->side = 2 * middle;
+	if (cover->n_points == cover->capacity) {
+		uint32_t capacity = cover->capacity != 0 ? cover->capacity + cover->capacity / 2 : 4096;
+		struct cover_point *grown = realloc(cover->point, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		cover->point = grown;
+		cover->capacity = capacity;
+	}
+	if (4 * cover->n_cells >= 3 * cover->table_size && grow_table(cover) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	for (int k = 0; k < 3; k++)
+		at[k] = cell_at(cover, point->position[k]);
+	cell = find(cover, key_of(at));
+	if (cell->key == FREE) {
+		cell->key = key_of(at);
+		cell->first = COVER_NONE;
+		cover->n_cells++;
+	}
+	cover->point[cover->n_points] = *point;
+	cover->point[cover->n_points].next = cell->first;
+	cell->first = cover->n_points++;
+	return PSR_OK;
 }
 
-void cover_draw(const struct cover *cover, const struct cover_grid *grid, float *z)
+uint32_t cover_cell(const struct cover *cover, const int at[3])
 {
-	for (size_t i = 0; i < (size_t)grid->side * grid->side; i++)
-		z[i] = -INFINITY;
-	for (int i = 0; i < n_chunks(cover); i++) {
-		const struct cover_seen *seen = cover->seen + (size_t)i * COVER_CHUNK;
+	const struct cover_cell *cell = find(cover, key_of(at));
 
-		for (uint32_t k = 0; k < cover->n_seen[i]; k++) {
-			float *pixel = &z[cover_pixel(grid, &seen[k])];
+	return cell->key != FREE ? cell->first : COVER_NONE;
+}
 
-			*pixel = seen[k].z > *pixel ? seen[k].z : *pixel;
+int cover_is_near(const struct cover *cover, const float p[3], const float n[3], double radius)
+{
+	const float (*direction)[3] = psr_direction_table();
+	const float radius2 = (float)(radius * radius);
+	int low[3], high[3], at[3];
+
+	for (int k = 0; k < 3; k++) {
+		low[k] = cell_at(cover, p[k] - (float)radius);
+		high[k] = cell_at(cover, p[k] + (float)radius);
+	}
+	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
+		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
+			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
+				for (uint32_t i = cover_cell(cover, at); i != COVER_NONE; i = cover->point[i].next) {
+					const struct cover_point *point = &cover->point[i];
+					float d[3];
+
+					v3f_sub(d, point->position, p);
+					if (v3f_dot(d, d) <= radius2
+					    && (point->two_sided || v3f_dot(direction[point->normal], n) > 0))
+						return 1;
+				}
+			}
 		}
 	}
+	return 0;
 }

@@ -1,7 +1,7 @@
 #include <math.h>
 #include "../base/vec.h"
 #include "door.h"
-#include "lattice.h"
+#include "sheet.h"
 
 static int check_materials(const struct psr_mesh *mesh, struct psr_error *err)
 {
@@ -19,9 +19,9 @@ int door_check_mesh(const struct psr_mesh *mesh, struct psr_error *err)
 {
 	if (mesh->n_triangles == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the mesh has no triangles");
-	if (mesh->n_triangles >= LATTICE_BACK)
+	if (mesh->n_triangles >= SHEET_BACK)
 		return psr_fail(err, PSR_ERR_LIMIT, "%u triangles are over the limit of %u", mesh->n_triangles,
-		                LATTICE_BACK - 1);
+		                SHEET_BACK - 1);
 	for (uint32_t i = 0; i < mesh->n_triangles; i++) {
 		for (int k = 0; k < 3; k++)
 			if (mesh->triangle[i][k] >= mesh->n_vertices)

@@ -1,46 +1,56 @@
-#include <assert.h>
+#include <math.h>
 #include "../base/maths.h"
 #include "../base/vec.h"
 #include "projection.h"
 #include "psr/direction.h"
 
-static int is_known(double (*direction)[3], int n, const double wanted[3])
-{
-	for (int i = 0; i < n; i++)
-		if (v3d_dot(direction[i], wanted) > 1 - 1e-9)
-			return 1;
-	return 0;
-}
+/* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which would
+ * be as far from one direction as from the next. */
+static const double TURN[3][3] = {
+	{ 0.9744706, -0.1910647, 0.1184155 },
+	{ 0.2079117, 0.9657151, -0.1552459 },
+	{ -0.0846937, 0.1759021, 0.9807574 },
+};
 
-/* Coarse corners before fine ones. */
-static int add_corners(double (*direction)[3], int n, int level)
+static int list_directions(double direction[N_PROJECTIONS][3])
 {
-	for (unsigned i = 0; i < 8u << 2 * level; i++) {
-		double corner[3][3];
+	const double golden = (1 + sqrt(5.0)) / 2;
+	int n = 0;
 
-		psr_direction_corners(level, i, corner);
-		for (int k = 0; k < 3; k++)
-			if (!is_known(direction, n, corner[k]))
-				v3d_set(direction[n++], corner[k][0], corner[k][1], corner[k][2]);
+	for (int k = 0; k < 3; k++) {
+		for (int s = 0; s < 4; s++) {
+			double a = s & 1 ? -1 : 1, b = s & 2 ? -1 : 1;
+
+			direction[n][k] = 0;
+			direction[n][(k + 1) % 3] = a;
+			direction[n++][(k + 2) % 3] = b * golden;
+			direction[n][k] = 0;
+			direction[n][(k + 1) % 3] = a * golden;
+			direction[n++][(k + 2) % 3] = b / golden;
+		}
 	}
+	for (int s = 0; s < 8; s++)
+		v3d_set(direction[n++], s & 1 ? -1 : 1, s & 2 ? -1 : 1, s & 4 ? -1 : 1);
 	return n;
 }
 
-void projection_list(struct psr_projection list[MOST_PROJECTIONS], double ds, double tolerance)
+void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, double tolerance)
 {
-	double direction[MOST_PROJECTIONS][3], sine, cosine;
-	int n = 0;
+	double direction[N_PROJECTIONS][3], turn[3][3], sine, cosine;
+	int n = list_directions(direction);
 
+	/* The rows above are rounded: made orthonormal again. */
+	v3d_normalize(turn[0], TURN[0]);
+	v3d_cross(turn[2], turn[0], TURN[1]);
+	v3d_normalize(turn[2], turn[2]);
+	v3d_cross(turn[1], turn[2], turn[0]);
 	psr_sincos(tolerance, &sine, &cosine);
-	for (; n < PSR_PROJECTIONS; n++)
-		psr_direction_center(1, (unsigned)n, direction[n]);
-	for (int level = 0; level < 4; level++)
-		n = add_corners(direction, n, level);
-	assert(n == MOST_PROJECTIONS);
 	for (int i = 0; i < n; i++) {
-		double frame[3][3];
+		double frame[3][3], turned[3];
 
-		psr_direction_frame(direction[i], frame);
+		m3d_apply(turned, (const double(*)[3])turn, direction[i]);
+		v3d_normalize(turned, turned);
+		psr_direction_frame(turned, frame);
 		for (int k = 0; k < 9; k++)
 			list[i].axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 		list[i].spacing = (float)(ds * cosine);

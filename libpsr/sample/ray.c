@@ -34,6 +34,12 @@ void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corn
 			corner[i][k] = (scene->mesh->position[index[i]][k] - scene->origin[k]) / scene->scale;
 }
 
+void ray_scene_center(const struct ray_scene *scene, uint32_t prim, double center[3])
+{
+	for (int k = 0; k < 3; k++)
+		center[k] = (scene->mesh->point[prim - scene->mesh->n_triangles][k] - scene->origin[k]) / scene->scale;
+}
+
 const float *ray_scene_normal(const struct ray_scene *scene, uint32_t prim)
 {
 	return scene->normal[prim];

@@ -52,6 +52,7 @@ double ray_scene_distance(const struct ray_scene *scene, const double point[3], 
 void ray_locate(const struct ray_scene *scene, const struct ray *ray, uint32_t prim, double *u, double *v);
 
 /* Corners of a primitive, and its unit normal on the front; 0,0,0 if it has no area. */
+void ray_scene_center(const struct ray_scene *scene, uint32_t prim, double center[3]); /* of a point's disc */
 void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corner[3][3]);
 const float *ray_scene_normal(const struct ray_scene *scene, uint32_t prim);
 

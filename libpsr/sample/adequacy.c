@@ -1,0 +1,290 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "adequacy.h"
+#include "psr/direction.h"
+#include "psr/error.h"
+#include "texture.h"
+
+#define CHUNK 4096
+#define FARTHEST 4    /* pixels around a place in which its surface is looked for, at grazing angles */
+#define BACK 0.0125f  /* as the renderer's: what faces away by less than normals are quantised to still counts */
+
+/* SplitMix64 (Steele, Lea, Flood 2014): a stream a trial. */
+struct random {
+	uint64_t state;
+};
+
+static double draw(struct random *r)
+{
+	uint64_t z = r->state += UINT64_C(0x9e3779b97f4a7c15);
+
+	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+}
+
+static void draw_direction(struct random *r, double d[3])
+{
+	double length2;
+
+	do {
+		v3d_set(d, 2 * draw(r) - 1, 2 * draw(r) - 1, 2 * draw(r) - 1);
+		length2 = v3d_dot(d, d);
+	} while (!(length2 <= 1 && length2 > 1e-4));
+	v3d_scale(d, d, 1 / sqrt(length2));
+}
+
+struct chunk {
+	uint64_t n_trials;
+	struct surface_spot *missing;
+	size_t n_missing, capacity;
+	int failed;
+};
+
+struct job {
+	const struct level *level;
+	const double *area; /* of all primitives up to this one */
+	uint32_t n_prims;
+	uint64_t seed;
+	struct chunk *chunk;
+};
+
+struct trial {
+	struct surface_spot spot;
+	double view[3]; /* unit, towards the viewer */
+	double cosine;
+	float axis[3][3]; /* of the pixel: its sides, and the view */
+};
+
+static uint32_t draw_primitive(const struct job *job, double x)
+{
+	uint32_t low = 0, high = job->n_prims - 1;
+
+	while (low < high) {
+		uint32_t middle = low + (high - low) / 2;
+
+		if (job->area[middle] > x)
+			high = middle;
+		else
+			low = middle + 1;
+	}
+	return low;
+}
+
+/* 0: this draw is no trial. */
+static int draw_trial(const struct job *job, uint64_t index, struct trial *trial)
+{
+	struct random r = { (job->seed << 40) + index * UINT64_C(0x632be59bd9b4e019) };
+	const struct level *level = job->level;
+	uint32_t prim = draw_primitive(job, draw(&r) * job->area[job->n_prims - 1]);
+	const float *n = ray_scene_normal(level->scene, prim);
+	double u = draw(&r), v = draw(&r), p[3], along, aside[3], up[3];
+	int is_back;
+
+	if (u + v > 1) {
+		u = 1 - u;
+		v = 1 - v;
+	}
+	draw_direction(&r, trial->view);
+	draw_direction(&r, aside);
+	along = trial->view[0] * (double)n[0] + trial->view[1] * (double)n[1] + trial->view[2] * (double)n[2];
+	is_back = along < 0;
+	trial->cosine = fabs(along);
+	if ((is_back && !level_material(level, prim)->two_sided) || draw(&r) > trial->cosine)
+		return 0;
+	if (prim < level->mesh->n_triangles) {
+		double corner[3][3];
+
+		if (texture_is_absent(level->mesh, prim, u, v))
+			return 0;
+		ray_scene_corners(level->scene, prim, corner);
+		for (int k = 0; k < 3; k++)
+			p[k] = (1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k];
+	} else {
+		ray_scene_center(level->scene, prim, p);
+	}
+	v3d_cross(up, trial->view, aside);
+	if (v3d_normalize(up, up) < 1e-3)
+		return 0;
+	v3d_cross(aside, up, trial->view);
+	for (int k = 0; k < 3; k++) {
+		trial->axis[0][k] = (float)aside[k];
+		trial->axis[1][k] = (float)up[k];
+		trial->axis[2][k] = (float)trial->view[k];
+		trial->spot.p[k] = (float)p[k];
+		trial->spot.n[k] = is_back ? -n[k] : n[k];
+	}
+	trial->spot.surface = prim | (is_back ? SHEET_BACK : 0);
+	return 1;
+}
+
+static int is_hit(const struct trial *trial, const struct cover_point *point, float half, float tolerance)
+{
+	const float *n = psr_direction_table()[point->normal];
+	float d[3];
+
+	v3f_sub(d, point->position, trial->spot.p);
+	return fabsf(v3f_dot(d, trial->axis[0])) <= half && fabsf(v3f_dot(d, trial->axis[1])) <= half
+	       && v3f_dot(d, trial->axis[2]) >= -tolerance && (point->two_sided || v3f_dot(n, trial->axis[2]) > -BACK);
+}
+
+static int is_any_hit(const struct level *level, const struct trial *trial, double radius)
+{
+	double cosine = trial->cosine > 0.03 ? trial->cosine : 0.03;
+	float half = (float)(level->ds / 2), tolerance = (float)(level->ds * (1 + 1.5 * sqrt(1 - cosine * cosine) / cosine));
+	int low[3], high[3], at[3];
+
+	for (int k = 0; k < 3; k++) {
+		low[k] = (int)floor(((double)trial->spot.p[k] - radius) / level->ds);
+		high[k] = (int)floor(((double)trial->spot.p[k] + radius) / level->ds);
+	}
+	for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
+		for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
+			for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
+				for (uint32_t i = cover_cell(&level->cover, at); i != COVER_NONE; i = level->cover.point[i].next)
+					if (is_hit(trial, &level->cover.point[i], half, tolerance))
+						return 1;
+	return 0;
+}
+
+static int is_missing(const struct level *level, const struct trial *trial)
+{
+	double reach = 0.75 / (trial->cosine > 0.1 ? trial->cosine : 0.1);
+
+	if (is_any_hit(level, trial, 0.75 * level->ds))
+		return 0;
+	return !is_any_hit(level, trial, (reach < FARTHEST ? reach : FARTHEST) * level->ds);
+}
+
+static int is_visible(const struct level *level, const struct trial *trial)
+{
+	struct ray ray;
+	uint8_t is_occluded;
+
+	for (int k = 0; k < 3; k++) {
+		ray.origin[k] = (double)trial->spot.p[k] + 0.001 * level->ds * (double)trial->spot.n[k];
+		ray.direction[k] = trial->view[k];
+	}
+	ray_scene_occluded(level->scene, &ray, 1, 0, &is_occluded);
+	return !is_occluded;
+}
+
+static void run_chunk(int i, void *userdata)
+{
+	struct job *job = userdata;
+	struct chunk *chunk = &job->chunk[i];
+
+	for (uint64_t k = (uint64_t)i * CHUNK; k < (uint64_t)(i + 1) * CHUNK; k++) {
+		struct trial trial;
+
+		if (!draw_trial(job, k, &trial) || !is_visible(job->level, &trial))
+			continue;
+		chunk->n_trials++;
+		if (!is_missing(job->level, &trial))
+			continue;
+		if (chunk->n_missing == chunk->capacity) {
+			size_t capacity = chunk->capacity != 0 ? 2 * chunk->capacity : 16;
+			struct surface_spot *grown = realloc(chunk->missing, capacity * sizeof *grown);
+
+			if (grown == NULL) {
+				chunk->failed = 1;
+				return;
+			}
+			chunk->missing = grown;
+			chunk->capacity = capacity;
+		}
+		chunk->missing[chunk->n_missing++] = trial.spot;
+	}
+}
+
+static void sum_areas(const struct level *level, uint32_t n_prims, double *area)
+{
+	double sum = 0;
+
+	for (uint32_t i = 0; i < n_prims; i++) {
+		if (i < level->mesh->n_triangles) {
+			double corner[3][3], e1[3], e2[3], cross[3];
+
+			ray_scene_corners(level->scene, i, corner);
+			v3d_sub(e1, corner[1], corner[0]);
+			v3d_sub(e2, corner[2], corner[0]);
+			v3d_cross(cross, e1, e2);
+			sum += v3d_length(cross) / 2;
+		} else {
+			double radius = (double)level->mesh->point_radius[i - level->mesh->n_triangles] / level->surface->scale;
+
+			sum += 3.1415926535897931 * radius * radius;
+		}
+		area[i] = sum;
+	}
+}
+
+static int join_chunks(struct adequacy *out, struct chunk *chunk, int n_chunks)
+{
+	uint64_t n = 0;
+
+	memset(out, 0, sizeof *out);
+	for (int i = 0; i < n_chunks; i++) {
+		if (chunk[i].failed)
+			return PSR_ERR_MEMORY;
+		out->n_trials += chunk[i].n_trials;
+		out->n_missing += chunk[i].n_missing;
+	}
+	out->spot = malloc((out->n_missing + 1) * sizeof *out->spot);
+	if (out->spot == NULL)
+		return PSR_ERR_MEMORY;
+	for (int i = 0; i < n_chunks; n += chunk[i].n_missing, i++)
+		if (chunk[i].n_missing != 0)
+			memcpy(out->spot + n, chunk[i].missing, chunk[i].n_missing * sizeof *out->spot);
+	return PSR_OK;
+}
+
+int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t seed, uint64_t n_trials)
+{
+	/* About a quarter of the draws are trials: half by the angle, and half of these are visible. */
+	int n_chunks = (int)((4 * n_trials + CHUNK - 1) / CHUNK), rc = PSR_OK;
+	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points, .seed = seed };
+	double *area = psr_alloc_array(job.n_prims, sizeof *area);
+
+	job.chunk = calloc((size_t)n_chunks, sizeof *job.chunk);
+	if (area == NULL || job.chunk == NULL)
+		rc = PSR_ERR_MEMORY;
+	if (rc == PSR_OK) {
+		sum_areas(level, job.n_prims, area);
+		job.area = area;
+		psr_pool_for(level->pool, n_chunks, run_chunk, &job);
+		rc = join_chunks(out, job.chunk, n_chunks);
+	}
+	for (int i = 0; job.chunk != NULL && i < n_chunks; i++)
+		free(job.chunk[i].missing);
+	free(job.chunk);
+	psr_free(area);
+	return rc;
+}
+
+#define MOST_ROUNDS 6
+
+int adequacy_reach(struct adequacy *out, struct level *level)
+{
+	uint64_t n = level->cover.n_points / 2;
+	int rc = PSR_OK;
+
+	n = n < 100000 ? 100000 : n > 500000 ? 500000 : n;
+	for (int round = 1;; round++) {
+		rc = adequacy_measure(out, level, (uint64_t)round, n);
+		if (rc != PSR_OK || round == MOST_ROUNDS || 20000 * out->n_missing < out->n_trials)
+			break;
+		for (uint64_t i = 0; rc == PSR_OK && i < out->n_missing; i++)
+			rc = dice_cover(level, &out->spot[i]);
+		free(out->spot);
+		out->spot = NULL;
+		if (rc != PSR_OK)
+			break;
+	}
+	free(out->spot);
+	out->spot = NULL;
+	return rc;
+}

@@ -1,0 +1,394 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "../base/vec.h"
+#include "level.h"
+#include "psr/direction.h"
+#include "psr/error.h"
+#include "texture.h"
+
+/* Primitives are diced as in [G] 9.2.1 and [Cook87], though only to test what is there: places on them are this many pixels
+ * apart. */
+#define STEP 0.4
+
+/* A kept sample within half a pixel is in every pixel that has the place in its middle. */
+#define NEAR 0.5
+
+/* [G] 4.3 wants sides of at most a pixel; a twentieth is forgiven, as the middle of such a triangle is 0.6 pixels from its
+ * corners at most, and a pixel reaches 0.5 to 0.71. */
+#define LONGEST_SIDE 1.05
+
+#define N_TRIES 6
+#define LEAST_COSINE 0.35f
+#define DEAD_PATCH 5 /* a new block costs as much as this many samples more in one that is there */
+
+struct tries {
+	unsigned projection[N_TRIES];
+	int n;
+};
+
+/* Projections by how well they face a spot. */
+static void list_tries(const struct level *level, const struct surface_spot *spot, struct tries *tries)
+{
+	float smooth[3], score[N_TRIES];
+
+	tries->n = 0;
+	field_normal(&level->field, spot->p, spot->n, smooth);
+	for (unsigned q = 0; q < level->n_projections; q++) {
+		const float *axis = level->sheets[q].projection.axis[2];
+		float g = v3f_dot(axis, smooth);
+		int i = tries->n;
+
+		if (v3f_dot(axis, spot->n) < LEAST_COSINE || (i == N_TRIES && g <= score[N_TRIES - 1]))
+			continue;
+		i = i < N_TRIES ? tries->n++ : N_TRIES - 1;
+		for (; i > 0 && score[i - 1] < g; i--) {
+			score[i] = score[i - 1];
+			tries->projection[i] = tries->projection[i - 1];
+		}
+		score[i] = g;
+		tries->projection[i] = q;
+	}
+}
+
+struct corner {
+	struct lattice_point at;
+	struct sheet_ref ref;
+	float position[3], distance2;
+	int is_kept, is_alive;
+};
+
+/* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no patch. */
+static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot, struct corner corner[3])
+{
+	const struct sheets *sheets = &level->sheets[q];
+	struct lattice_point at[3];
+	float projected[3];
+
+	level_project(&sheets->projection, spot->p, projected);
+	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
+	for (int i = 0; i < 3; i++) {
+		struct corner *c = &corner[i];
+		float d[3], n[3];
+
+		c->at = at[i];
+		c->ref = sheets_find(sheets, at[i], projected[2], SHEET_STEPS * sheets->projection.spacing);
+		if (c->ref.patch == SHEET_NONE)
+			continue;
+		level_normal(level, sheets->sample[c->ref.patch][c->ref.sample].surface, n);
+		if ((sheets->patch[c->ref.patch].hidden >> c->ref.sample & 1) != 0 || v3f_dot(n, spot->n) < 0) {
+			c->ref.patch = SHEET_NONE;
+			continue;
+		}
+		sheets_position(sheets, c->ref, c->position);
+		v3f_sub(d, c->position, spot->p);
+		c->distance2 = v3f_dot(d, d);
+		c->is_kept = (int)(sheets->patch[c->ref.patch].kept >> c->ref.sample & 1);
+		c->is_alive = sheets->patch[c->ref.patch].is_alive;
+	}
+}
+
+static int is_triangle(const struct level *level, const struct corner corner[3])
+{
+	const float most = (float)(LONGEST_SIDE * LONGEST_SIDE * level->ds * level->ds);
+
+	for (int i = 0; i < 3; i++)
+		if (corner[i].ref.patch == SHEET_NONE)
+			return 0;
+	for (int i = 0; i < 3; i++) {
+		float d[3];
+
+		v3f_sub(d, corner[i].position, corner[(i + 1) % 3].position);
+		if (v3f_dot(d, d) > most)
+			return 0;
+	}
+	return 1;
+}
+
+static int is_covered(const struct level *level, const struct surface_spot *spot)
+{
+	struct tries tries;
+
+	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
+		return 1;
+	list_tries(level, spot, &tries);
+	for (int i = 0; i < tries.n && i < 3; i++) {
+		struct corner corner[3];
+
+		find_corners(level, tries.projection[i], spot, corner);
+		if (is_triangle(level, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
+			return 1;
+	}
+	return 0;
+}
+
+static int keep_corner(struct level *level, unsigned projection, const struct corner *corner)
+{
+	level->n_added += (uint64_t)!corner->is_kept;
+	return keep_sample(level, (struct level_ref){ projection, corner->ref });
+}
+
+/* The lattice triangle that lacks least. */
+static int keep_triangle(struct level *level, const struct surface_spot *spot, const struct tries *tries, int *is_done)
+{
+	struct corner best[3];
+	unsigned projection = 0;
+	int least = 1 << 30, rc = PSR_OK;
+
+	for (int i = 0; i < tries->n && i < 3; i++) {
+		struct corner corner[3];
+		int cost = 2 * i;
+
+		find_corners(level, tries->projection[i], spot, corner);
+		if (!is_triangle(level, corner))
+			continue;
+		for (int k = 0; k < 3; k++)
+			cost += corner[k].is_kept ? 0 : corner[k].is_alive ? 1 : 1 + DEAD_PATCH;
+		if (cost < least) {
+			least = cost;
+			projection = tries->projection[i];
+			memcpy(best, corner, sizeof best);
+		}
+	}
+	*is_done = least != 1 << 30;
+	for (int k = 0; *is_done && rc == PSR_OK && k < 3; k++)
+		rc = keep_corner(level, projection, &best[k]);
+	return rc;
+}
+
+/* The nearest hit of any projection, rather in a patch that is there already. */
+static int keep_nearest(struct level *level, const struct surface_spot *spot, const struct tries *tries, int *is_done)
+{
+	struct corner best = { .ref.patch = SHEET_NONE };
+	unsigned projection = 0;
+	float least = INFINITY;
+
+	for (int i = 0; i < tries->n; i++) {
+		struct corner corner[3];
+
+		find_corners(level, tries->projection[i], spot, corner);
+		for (int k = 0; k < 3; k++) {
+			float distance = (float)(sqrt((double)corner[k].distance2) / level->ds), cost;
+
+			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
+				continue;
+			cost = distance + (corner[k].is_alive ? 0 : DEAD_PATCH);
+			if (cost < least) {
+				least = cost;
+				best = corner[k];
+				projection = tries->projection[i];
+			}
+		}
+	}
+	*is_done = best.ref.patch != SHEET_NONE;
+	return *is_done ? keep_corner(level, projection, &best) : PSR_OK;
+}
+
+/* What is too thin for any lattice is moved to the nearest point of its owner's: by 0.52 pixels at most. */
+static int snap(struct level *level, const struct surface_spot *spot, const struct tries *tries)
+{
+	unsigned projection = tries->projection[0];
+	struct sheets *sheets = &level->sheets[projection];
+	uint32_t prim = spot->surface & ~SHEET_BACK;
+	struct lattice_point at[3], nearest = { 0, 0 };
+	struct level_ref ref = { .projection = projection };
+	double least = INFINITY;
+	float projected[3];
+	int rc;
+
+	level_project(&sheets->projection, spot->p, projected);
+	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
+	for (int i = 0; i < 3; i++) {
+		double x, y, d;
+
+		sheets_point(sheets, at[i].row, at[i].col, &x, &y);
+		d = (x - (double)projected[0]) * (x - (double)projected[0]) + (y - (double)projected[1]) * (y - (double)projected[1]);
+		if (d < least) {
+			least = d;
+			nearest = at[i];
+		}
+	}
+	rc = sheets_add(sheets, nearest, projected[2], spot->surface, level_material(level, prim)->two_sided != 0, &ref.at);
+	if (rc != PSR_OK || ref.at.patch == SHEET_NONE)
+		return rc;
+	level->n_snapped++;
+	return keep_sample(level, ref);
+}
+
+int dice_cover(struct level *level, const struct surface_spot *spot)
+{
+	struct tries tries;
+	int is_done = 0, rc;
+
+	list_tries(level, spot, &tries);
+	if (tries.n == 0)
+		return PSR_OK;
+	rc = keep_triangle(level, spot, &tries, &is_done);
+	if (rc == PSR_OK && !is_done)
+		rc = keep_nearest(level, spot, &tries, &is_done);
+	if (rc == PSR_OK && !is_done)
+		rc = snap(level, spot, &tries);
+	return rc;
+}
+
+/* ---- all places of the surface ---- */
+
+struct list {
+	struct surface_spot *spot;
+	size_t n, capacity;
+	int failed;
+};
+
+static void add_spot(struct list *list, const struct surface_spot *spot)
+{
+	if (list->n == list->capacity) {
+		size_t capacity = list->capacity != 0 ? 2 * list->capacity : 64;
+		struct surface_spot *grown = realloc(list->spot, capacity * sizeof *grown);
+
+		if (grown == NULL) {
+			list->failed = 1;
+			return;
+		}
+		list->spot = grown;
+		list->capacity = capacity;
+	}
+	list->spot[list->n++] = *spot;
+}
+
+/* Tests a place, on the side on which it is to be sampled; the other one too as long as it is not known to be hidden. */
+static void test_place(const struct level *level, uint32_t prim, const float p[3], struct list *list)
+{
+	uint8_t sides = level->sides[prim];
+	const float *front = ray_scene_normal(level->scene, prim);
+	int is_two_sided = level_material(level, prim)->two_sided != 0;
+
+	for (int back = 0; back <= is_two_sided; back++) {
+		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
+		struct surface_spot spot = { .surface = prim | (back ? SHEET_BACK : 0) };
+
+		if ((sides & hidden) != 0 && (sides & seen) == 0)
+			continue;
+		v3f_set(spot.p, p[0], p[1], p[2]);
+		v3f_scale(spot.n, front, back ? -1 : 1);
+		if (is_covered(level, &spot))
+			return;
+		if (owner_is_seen(level, spot.p, spot.n)) {
+			add_spot(list, &spot);
+			return;
+		}
+	}
+}
+
+static void dice_triangle(const struct level *level, uint32_t prim, struct list *list)
+{
+	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_rows;
+	double corner[3][3], side[3], e[3], height, step = STEP * level->ds;
+
+	ray_scene_corners(level->scene, prim, corner);
+	for (int i = 0; i < 3; i++) {
+		v3d_sub(e, corner[(i + 1) % 3], corner[i]);
+		side[i] = v3d_length(e);
+		longest = side[i] > side[longest] ? i : longest;
+	}
+	/* The longest side is the base: from corner `longest` to the next; rows run along it. */
+	const double *a = corner[longest], *b = corner[(longest + 1) % 3], *c = corner[(longest + 2) % 3];
+	double ab[3], ac[3], cross[3];
+
+	v3d_sub(ab, b, a);
+	v3d_sub(ac, c, a);
+	v3d_cross(cross, ab, ac);
+	height = v3d_length(cross) / side[longest];
+	n_rows = (int)ceil(height / step);
+	n_rows = n_rows > 1 ? n_rows : 1;
+	for (int r = 0; r < n_rows; r++) {
+		double t = (r + 0.5) / n_rows;
+		int n = (int)ceil(side[longest] * (1 - t) / step);
+
+		n = n > 1 ? n : 1;
+		for (int i = 0; i < n; i++) {
+			double w[3], s = (i + 0.5) / n * (1 - t);
+			float p[3];
+
+			w[longest] = 1 - s - t;
+			w[(longest + 1) % 3] = s;
+			w[(longest + 2) % 3] = t;
+			if (can_be_absent && texture_is_absent(level->mesh, prim, w[1], w[2]))
+				continue;
+			for (int k = 0; k < 3; k++)
+				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);
+			test_place(level, prim, p, list);
+		}
+	}
+}
+
+/* A disc: the crossings of a square grid around its centre. */
+static void dice_disc(const struct level *level, uint32_t prim, struct list *list)
+{
+	const struct psr_mesh *mesh = level->mesh;
+	const float *n = ray_scene_normal(level->scene, prim);
+	double radius = (double)mesh->point_radius[prim - mesh->n_triangles] / level->surface->scale, step = STEP * level->ds;
+	int reach = (int)(radius / step);
+	double center[3], frame[3][3], normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
+
+	v3d_normalize(normal, normal);
+	psr_direction_frame(normal, frame);
+	ray_scene_center(level->scene, prim, center);
+	for (int i = -reach; i <= reach; i++) {
+		for (int k = -reach; k <= reach; k++) {
+			float p[3];
+
+			if ((i * i + k * k) * step * step > radius * radius)
+				continue;
+			for (int a = 0; a < 3; a++)
+				p[a] = (float)(center[a] + step * (i * frame[0][a] + k * frame[1][a]));
+			test_place(level, prim, p, list);
+		}
+	}
+}
+
+struct job {
+	const struct level *level;
+	struct list *list; /* of each chunk */
+	uint32_t n_prims;
+};
+
+#define CHUNK 2048
+
+static void dice_chunk(int i, void *userdata)
+{
+	struct job *job = userdata;
+	const struct psr_mesh *mesh = job->level->mesh;
+	uint32_t end = ((uint32_t)i + 1) * CHUNK < job->n_prims ? ((uint32_t)i + 1) * CHUNK : job->n_prims;
+
+	for (uint32_t prim = (uint32_t)i * CHUNK; prim < end; prim++) {
+		const float *n = ray_scene_normal(job->level->scene, prim);
+
+		if (n[0] == 0 && n[1] == 0 && n[2] == 0)
+			continue;
+		if (prim < mesh->n_triangles)
+			dice_triangle(job->level, prim, &job->list[i]);
+		else
+			dice_disc(job->level, prim, &job->list[i]);
+	}
+}
+
+int dice_surface(struct level *level)
+{
+	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points };
+	int n_chunks = (int)((job.n_prims + CHUNK - 1) / CHUNK), rc = PSR_OK;
+
+	job.list = calloc((size_t)n_chunks, sizeof *job.list);
+	if (job.list == NULL)
+		return PSR_ERR_MEMORY;
+	psr_pool_for(level->pool, n_chunks, dice_chunk, &job);
+	for (int i = 0; i < n_chunks; i++) {
+		if (job.list[i].failed)
+			rc = PSR_ERR_MEMORY;
+		for (size_t k = 0; rc == PSR_OK && k < job.list[i].n; k++)
+			if (!is_covered(level, &job.list[i].spot[k]))
+				rc = dice_cover(level, &job.list[i].spot[k]);
+		free(job.list[i].spot);
+	}
+	free(job.list);
+	return rc;
+}

@@ -1,0 +1,167 @@
+#include <math.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "blend.h"
+#include "level.h"
+#include "psr/direction.h"
+#include "psr/error.h"
+
+#define MOST_BLENDED 64
+
+/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance. 0 if there are none,
+ * and then `attr` is not touched. */
+static int blend(const struct level *level, const float p[3], const float n[3], const float facing[3], uint64_t *attr)
+{
+	const struct cover *finer = level->finer;
+	const float (*direction)[3] = psr_direction_table();
+	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
+	uint64_t found[MOST_BLENDED];
+	int low[3], high[3], at[3], count = 0;
+
+	for (int k = 0; k < 3; k++) {
+		low[k] = (int)floor(((double)p[k] - level->ds) / finer->ds);
+		high[k] = (int)floor(((double)p[k] + level->ds) / finer->ds);
+	}
+	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
+		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
+			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
+				for (uint32_t i = cover_cell(finer, at); i != COVER_NONE; i = finer->point[i].next) {
+					const struct cover_point *point = &finer->point[i];
+					float d[3], w, g = v3f_dot(direction[point->normal], n);
+
+					v3f_sub(d, point->position, p);
+					w = 1 - v3f_dot(d, d) / reach2;
+					if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
+						continue;
+					weight[count] = w * w;
+					found[count++] = point->attr;
+				}
+			}
+		}
+	}
+	if (count != 0)
+		*attr = blend_attr(found, weight, count, facing);
+	return count != 0;
+}
+
+/* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal further
+ * than this from its face's, as smoothing makes them at creases, would open the crease in views along it. */
+#define LEAST_AGREEMENT 0.94f /* 20 degrees */
+
+static uint64_t agree(uint64_t attr, const float face[3])
+{
+	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
+	float g = v3f_dot(n, face), aside[3], turned[3];
+
+	if (g >= LEAST_AGREEMENT)
+		return attr;
+	v3f_add_scaled(aside, n, -g, face);
+	if (v3f_normalize(aside, aside) == 0)
+		v3f_set(aside, 0, 0, 0);
+	v3f_scale(turned, face, LEAST_AGREEMENT);
+	v3f_add_scaled(turned, turned, sqrtf(1 - LEAST_AGREEMENT * LEAST_AGREEMENT), aside);
+	return (attr & ~(uint64_t)0x7fff) | psr_direction_encode(turned);
+}
+
+static void make_point(const struct level *level, const struct level_ref *ref, struct cover_point *point)
+{
+	const struct sheets *sheets = &level->sheets[ref->projection];
+	const struct patch *patch = &sheets->patch[ref->at.patch];
+	uint32_t surface = sheets->sample[ref->at.patch][ref->at.sample].surface, prim = surface & ~SHEET_BACK;
+	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
+	struct surface_place place = { .prim = prim, .is_back = (surface & SHEET_BACK) != 0 };
+	struct ray ray;
+	double x, y;
+	float n[3];
+
+	sheets_point(sheets, PSR_BLOCK_SIDE * patch->row + (int)(ref->at.sample / PSR_BLOCK_SIDE),
+	             PSR_BLOCK_SIDE * patch->col + (int)(ref->at.sample % PSR_BLOCK_SIDE), &x, &y);
+	sheets_ray(&sheets->projection, x, y, &ray);
+	ray_locate(level->scene, &ray, prim, &place.u, &place.v);
+	sheets_position(sheets, ref->at, point->position);
+	level_normal(level, surface, n);
+	if (level->finer == NULL || !blend(level, point->position, n, sheets->projection.axis[2], &point->attr))
+		point->attr = agree(surface_attr(level->surface, &place, 1.4142135623730951 * level->ds,
+		                                 sheets->projection.axis[2]), n);
+	point->normal = (uint16_t)PSR_ATTR_NORMAL(point->attr);
+	point->two_sided = (level->sides[prim] & both) == both;
+	point->sample = (uint8_t)ref->at.sample;
+	point->projection = ref->projection;
+	point->patch = ref->at.patch;
+	point->next = COVER_NONE;
+}
+
+static void mark_kept(struct level *level, const struct level_ref *ref)
+{
+	struct patch *patch = &level->sheets[ref->projection].patch[ref->at.patch];
+
+	patch->kept |= UINT64_C(1) << ref->at.sample;
+	patch->is_alive = 1;
+}
+
+int keep_sample(struct level *level, struct level_ref ref)
+{
+	struct cover_point point;
+
+	if ((level->sheets[ref.projection].patch[ref.at.patch].kept >> ref.at.sample & 1) != 0)
+		return PSR_OK;
+	make_point(level, &ref, &point);
+	mark_kept(level, &ref);
+	return cover_add(&level->cover, &point);
+}
+
+struct job {
+	struct level *level;
+	const struct level_ref *ref;
+	struct cover_point *point;
+	uint32_t n;
+};
+
+#define CHUNK 4096
+
+static void make_chunk(int i, void *userdata)
+{
+	struct job *job = userdata;
+	uint32_t end = (uint32_t)(i + 1) * CHUNK < job->n ? (uint32_t)(i + 1) * CHUNK : job->n;
+
+	for (uint32_t k = (uint32_t)i * CHUNK; k < end; k++)
+		make_point(job->level, &job->ref[k], &job->point[k]);
+}
+
+static uint32_t list_owned(struct level *level, struct level_ref *ref)
+{
+	uint32_t n = 0;
+
+	for (unsigned i = 0; i < level->n_projections; i++) {
+		for (uint32_t p = 0; p < level->sheets[i].n_patches; p++) {
+			for (uint64_t left = level->sheets[i].patch[p].owned; left != 0; left &= left - 1, n++)
+				if (ref != NULL)
+					ref[n] = (struct level_ref){ i, { p, (uint32_t)__builtin_ctzll(left) } };
+		}
+	}
+	return n;
+}
+
+int keep_owned(struct level *level)
+{
+	struct job job = { .level = level, .n = list_owned(level, NULL) };
+	struct level_ref *ref = psr_alloc_array(job.n, sizeof *ref);
+	int rc = PSR_OK;
+
+	job.ref = ref;
+	job.point = psr_alloc_array(job.n, sizeof *job.point);
+	if (ref == NULL || job.point == NULL)
+		rc = PSR_ERR_MEMORY;
+	if (rc == PSR_OK) {
+		list_owned(level, ref);
+		psr_pool_for(level->pool, (int)((job.n + CHUNK - 1) / CHUNK), make_chunk, &job);
+	}
+	for (uint32_t i = 0; rc == PSR_OK && i < job.n; i++) {
+		mark_kept(level, &ref[i]);
+		rc = cover_add(&level->cover, &job.point[i]);
+	}
+	level->n_owned = job.n;
+	psr_free(ref);
+	psr_free(job.point);
+	return rc;
+}

@@ -1,0 +1,67 @@
+#include <stdlib.h>
+#include <string.h>
+#include "../base/mem.h"
+#include "level.h"
+#include "psr/error.h"
+
+/* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
+#define FIELD_PIXELS 3
+
+/* What dicing adds can be missed by what was tested before it was there only where it was snapped; a second time around
+ * finds the rest. */
+#define N_DICES 2
+
+int level_make(struct level *level, const struct psr_projection *projection,
+               void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
+{
+	unsigned n_steps = level->n_projections + 2 + N_DICES, done = 0;
+	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
+	int rc;
+
+#define STEP_DONE                                                                                                      \
+	do {                                                                                                               \
+		done++;                                                                                                        \
+		if (on_progress != NULL)                                                                                       \
+			on_progress(done, n_steps, userdata);                                                                      \
+	} while (0)
+
+	level->sheets = calloc(level->n_projections, sizeof *level->sheets);
+	level->sides = psr_alloc_array(n_prims, 1);
+	rc = level->sheets == NULL || level->sides == NULL ? PSR_ERR_MEMORY : PSR_OK;
+	if (rc == PSR_OK)
+		memset(level->sides, 0, n_prims);
+	if (rc == PSR_OK)
+		rc = field_init(&level->field, FIELD_PIXELS * level->ds);
+	if (rc == PSR_OK)
+		rc = cover_init(&level->cover, level->ds);
+	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
+		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
+		STEP_DONE;
+	}
+	if (rc == PSR_OK)
+		rc = owner_mark(level);
+	STEP_DONE;
+	if (rc == PSR_OK) {
+		merge_patches(level);
+		rc = keep_owned(level);
+	}
+	STEP_DONE;
+	for (int i = 0; rc == PSR_OK && i < N_DICES; i++) {
+		rc = dice_surface(level);
+		STEP_DONE;
+	}
+#undef STEP_DONE
+	return rc;
+}
+
+void level_fini(struct level *level)
+{
+	for (unsigned i = 0; level->sheets != NULL && i < level->n_projections; i++)
+		sheets_fini(&level->sheets[i]);
+	free(level->sheets);
+	psr_free(level->sides);
+	field_fini(&level->field);
+	cover_fini(&level->cover);
+	level->sheets = NULL;
+	level->sides = NULL;
+}

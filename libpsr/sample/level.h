@@ -1,0 +1,102 @@
+/* One level of a model under construction: the object, sampled at one resolution, and what of it is kept.
+ *
+ * Selection of blocks goes beyond [G] 5.2. There, blocks are added wherever projections, taken one after the other, still
+ * show a hole. Here every place of the surface is owned by the projection that faces it best; a block keeps what its
+ * projection owns; and then places all over the surface are tested one by one, and what they lack is added. A place is
+ * covered when it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3: some of its corners is
+ * in whichever pixel is centred there), or within half a pixel of a kept sample. */
+#ifndef PSR_SAMPLE_LEVEL_H
+#define PSR_SAMPLE_LEVEL_H
+
+#include <stdint.h>
+#include "cover.h"
+#include "field.h"
+#include "projection.h"
+#include "psr/mesh.h"
+#include "psr/pool.h"
+#include "ray.h"
+#include "sheet.h"
+#include "surface.h"
+
+/* What is known of a primitive's sides. */
+enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8 };
+
+struct level {
+	const struct psr_mesh *mesh;
+	const struct ray_scene *scene;
+	const struct surface *surface;
+	struct psr_pool *pool;
+	double ds;                /* a pixel at this level's resolution, inner units */
+	float cosine;             /* of the tolerance angle */
+	unsigned n_projections;
+	struct sheets *sheets;    /* of each projection */
+	struct field field;
+	struct cover cover;
+	uint8_t *sides;           /* enum side, by primitive */
+	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
+	uint64_t n_owned, n_added, n_snapped;
+};
+
+struct level_ref {
+	unsigned projection;
+	struct sheet_ref at;
+};
+
+/* owner.c: which projection owns a place that faces n. */
+unsigned owner_of(const struct level *level, const float p[3], const float n[3]);
+
+/* Sets `seen` and `owned` of all patches, after tracing. MEMORY. */
+int owner_mark(struct level *level);
+
+/* Whether a place is visible from outside, on the side that n is of: rays in up to 128 directions. */
+int owner_is_seen(const struct level *level, const float p[3], const float n[3]);
+
+/* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well. */
+void merge_patches(struct level *level);
+
+/* keep.c: keeps what is owned, or a single sample. MEMORY. */
+int keep_owned(struct level *level);
+int keep_sample(struct level *level, struct level_ref ref);
+
+/* dice.c: tests places all over the surface, half a pixel apart, and adds what they lack. MEMORY. */
+int dice_surface(struct level *level);
+
+/* Adds samples so that a place is covered. MEMORY. */
+struct surface_spot {
+	float p[3], n[3];  /* n: unit, on the side that counts */
+	uint32_t surface;  /* as in struct sheet_sample */
+};
+int dice_cover(struct level *level, const struct surface_spot *spot);
+
+/* level.c: traces all projections, of spacing projection[i].spacing, and keeps an adequate sampling. on_progress is called
+ * with 0..n_projections + 4 done; may be NULL. MEMORY; level_fini() either way. */
+int level_make(struct level *level, const struct psr_projection *projection,
+               void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata);
+void level_fini(struct level *level);
+
+/* Normal of a hit on the side that was met. */
+static inline void level_normal(const struct level *level, uint32_t surface, float n[3])
+{
+	const float *front = ray_scene_normal(level->scene, surface & ~SHEET_BACK);
+	float sign = (surface & SHEET_BACK) != 0 ? -1 : 1;
+
+	for (int k = 0; k < 3; k++)
+		n[k] = sign * front[k];
+}
+
+static inline const struct psr_material *level_material(const struct level *level, uint32_t prim)
+{
+	const struct psr_mesh *mesh = level->mesh;
+
+	return &mesh->material[prim < mesh->n_triangles ? mesh->triangle_material[prim]
+	                                                : mesh->point_material[prim - mesh->n_triangles]];
+}
+
+/* Projection space. */
+static inline void level_project(const struct psr_projection *projection, const float p[3], float out[3])
+{
+	for (int k = 0; k < 3; k++)
+		out[k] = projection->axis[k][0] * p[0] + projection->axis[k][1] * p[1] + projection->axis[k][2] * p[2];
+}
+
+#endif

@@ -1,0 +1,228 @@
+#include <string.h>
+#include "../base/vec.h"
+#include "level.h"
+#include "psr/direction.h"
+#include "psr/error.h"
+
+/* A projection that sees the face itself at over 60 degrees does not own it, however the surface around it lies. */
+#define LEAST_OWNER_COSINE 0.5f
+
+#define N_WAYS PSR_MASK_TRIANGLES
+#define BATCH 16
+
+static const float *axis_of(const struct level *level, unsigned projection)
+{
+	return level->sheets[projection].projection.axis[2];
+}
+
+static unsigned best_facing(const struct level *level, const float smooth[3], const float n[3])
+{
+	unsigned best = 0;
+	float most = -1;
+
+	for (unsigned q = 0; q < level->n_projections; q++) {
+		float g = v3f_dot(axis_of(level, q), smooth);
+
+		if (g > most && v3f_dot(axis_of(level, q), n) >= LEAST_OWNER_COSINE) {
+			most = g;
+			best = q;
+		}
+	}
+	return best;
+}
+
+unsigned owner_of(const struct level *level, const float p[3], const float n[3])
+{
+	float smooth[3];
+
+	field_normal(&level->field, p, n, smooth);
+	return best_facing(level, smooth, n);
+}
+
+/* Rays of which one gets out shows that a place is visible; neighbours in the list are far apart on the sphere, so that
+ * most places need one batch. */
+int owner_is_seen(const struct level *level, const float p[3], const float n[3])
+{
+	struct ray ray[BATCH];
+	uint8_t is_occluded[BATCH];
+	int n_rays = 0;
+
+	for (unsigned i = 0; i < N_WAYS; i++) {
+		double way[3], along;
+
+		psr_direction_center(2, i * 53 % N_WAYS, way);
+		along = way[0] * (double)n[0] + way[1] * (double)n[1] + way[2] * (double)n[2];
+		if (along > 0.03) {
+			for (int k = 0; k < 3; k++) {
+				ray[n_rays].origin[k] = (double)p[k] + 0.02 * level->ds * (double)n[k];
+				ray[n_rays].direction[k] = way[k];
+			}
+			n_rays++;
+		}
+		if (n_rays == BATCH || (i + 1 == N_WAYS && n_rays != 0)) {
+			ray_scene_occluded(level->scene, ray, n_rays, 0, is_occluded);
+			for (int k = 0; k < n_rays; k++)
+				if (!is_occluded[k])
+					return 1;
+			n_rays = 0;
+		}
+	}
+	return 0;
+}
+
+static int is_sample_seen(const struct level *level, const struct sheets *sheets, uint32_t patch, unsigned s, int turned)
+{
+	float p[3], n[3];
+
+	sheets_position(sheets, (struct sheet_ref){ patch, s }, p);
+	level_normal(level, sheets->sample[patch][s].surface, n);
+	if (turned)
+		v3f_scale(n, n, -1);
+	return owner_is_seen(level, p, n);
+}
+
+/* By the faces' own normals first: these are what the field is made of, each place once. */
+static void mark_faced(int i, void *userdata)
+{
+	struct level *level = userdata;
+	struct sheets *sheets = &level->sheets[i];
+
+	for (uint32_t p = 0; p < sheets->n_patches; p++) {
+		struct patch *patch = &sheets->patch[p];
+
+		patch->owned = 0;
+		for (uint64_t left = patch->mask; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+			float n[3];
+
+			level_normal(level, sheets->sample[p][s].surface, n);
+			patch->owned |= (uint64_t)(best_facing(level, n, n) == (unsigned)i) << s;
+		}
+	}
+}
+
+static int make_field(struct level *level)
+{
+	for (unsigned i = 0; i < level->n_projections; i++) {
+		const struct sheets *sheets = &level->sheets[i];
+
+		for (uint32_t p = 0; p < sheets->n_patches; p++) {
+			for (uint64_t left = sheets->patch[p].owned; left != 0; left &= left - 1) {
+				unsigned s = (unsigned)__builtin_ctzll(left);
+				float position[3], n[3];
+
+				sheets_position(sheets, (struct sheet_ref){ p, s }, position);
+				level_normal(level, sheets->sample[p][s].surface, n);
+				if (field_add(&level->field, position, n, 1 / v3f_dot(n, axis_of(level, i))) != PSR_OK)
+					return PSR_ERR_MEMORY;
+			}
+		}
+	}
+	return PSR_OK;
+}
+
+static void mark_owned(int i, void *userdata)
+{
+	struct level *level = userdata;
+	struct sheets *sheets = &level->sheets[i];
+
+	for (uint32_t p = 0; p < sheets->n_patches; p++) {
+		struct patch *patch = &sheets->patch[p];
+
+		patch->owned = 0;
+		for (uint64_t left = patch->mask; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+			float position[3], n[3];
+
+			level_normal(level, sheets->sample[p][s].surface, n);
+			if (v3f_dot(axis_of(level, (unsigned)i), n) < LEAST_OWNER_COSINE)
+				continue;
+			sheets_position(sheets, (struct sheet_ref){ p, s }, position);
+			patch->owned |= (uint64_t)(owner_of(level, position, n) == (unsigned)i) << s;
+		}
+	}
+}
+
+static void note_side(struct level *level, uint32_t surface, int is_seen)
+{
+	enum side side = (surface & SHEET_BACK) != 0 ? (is_seen ? SIDE_BACK_SEEN : SIDE_BACK_HIDDEN)
+	                                             : (is_seen ? SIDE_FRONT_SEEN : SIDE_FRONT_HIDDEN);
+
+	__atomic_fetch_or(&level->sides[surface & ~SHEET_BACK], (uint8_t)side, __ATOMIC_RELAXED);
+}
+
+/* First, middle and last of a mask stand for all of it when none of them is seen. */
+static int is_any_seen(const struct level *level, const struct sheets *sheets, uint32_t p, uint64_t mask)
+{
+	unsigned first = (unsigned)__builtin_ctzll(mask), last = 63 - (unsigned)__builtin_clzll(mask);
+	int half = __builtin_popcountll(mask) / 2;
+	uint64_t middle = mask;
+
+	if (is_sample_seen(level, sheets, p, first, 0) || (last != first && is_sample_seen(level, sheets, p, last, 0)))
+		return 1;
+	for (int i = 0; i < half; i++)
+		middle &= middle - 1;
+	return is_sample_seen(level, sheets, p, (unsigned)__builtin_ctzll(middle), 0);
+}
+
+static void mark_seen(int i, void *userdata)
+{
+	struct level *level = userdata;
+	struct sheets *sheets = &level->sheets[i];
+
+	for (uint32_t p = 0; p < sheets->n_patches; p++) {
+		struct patch *patch = &sheets->patch[p];
+		uint64_t unknown = patch->owned & ~patch->first;
+
+		patch->seen = patch->first;
+		if (unknown != 0 && is_any_seen(level, sheets, p, unknown))
+			for (uint64_t left = unknown; left != 0; left &= left - 1) {
+				unsigned s = (unsigned)__builtin_ctzll(left);
+
+				patch->seen |= (uint64_t)is_sample_seen(level, sheets, p, s, 0) << s;
+			}
+		patch->hidden = unknown & ~patch->seen;
+		for (uint64_t left = patch->mask & (patch->seen | patch->hidden); left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+
+			note_side(level, sheets->sample[p][s].surface, (int)(patch->seen >> s & 1));
+		}
+	}
+}
+
+/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled. */
+static void drop_hidden(int i, void *userdata)
+{
+	struct level *level = userdata;
+	struct sheets *sheets = &level->sheets[i];
+	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
+
+	for (uint32_t p = 0; p < sheets->n_patches; p++) {
+		struct patch *patch = &sheets->patch[p];
+
+		for (uint64_t left = patch->owned; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+			uint32_t surface = sheets->sample[p][s].surface;
+			int is_both = (level->sides[surface & ~SHEET_BACK] & both) == both;
+			int is_kept = (int)(patch->seen >> s & 1);
+
+			if (is_both)
+				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_sample_seen(level, sheets, p, s, 1));
+			if (!is_kept)
+				patch->owned &= ~(UINT64_C(1) << s);
+		}
+	}
+}
+
+int owner_mark(struct level *level)
+{
+	int n = (int)level->n_projections;
+
+	psr_pool_for(level->pool, n, mark_faced, level);
+	if (make_field(level) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	psr_pool_for(level->pool, n, mark_owned, level);
+	psr_pool_for(level->pool, n, mark_seen, level);
+	psr_pool_for(level->pool, n, drop_hidden, level);
+	return PSR_OK;
+}
