@@ -48,6 +48,9 @@ void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, i
 /* Whether anything is met at t_min <= t. Any number of threads may trace at once. */
 void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded);
 
+/* To be called before distances to a mesh with points are asked for; costs nothing without. MEMORY. */
+int ray_scene_index_distances(struct ray_scene *scene, struct psr_error *err);
+
 /* Distance from a point to the nearest point of the mesh, whatever side it is of and whether it is cut out; INFINITY if
  * none is within `most`. */
 double ray_scene_distance(const struct ray_scene *scene, const double point[3], double most);

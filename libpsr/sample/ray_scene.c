@@ -3,7 +3,6 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "ray_tree.h"
-#include "triangle.h"
 
 void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corner[3][3])
 {
@@ -175,61 +174,12 @@ void ray_scene_destroy(struct ray_scene *scene)
 {
 	if (scene == NULL)
 		return;
+	if (scene->discs != NULL)
+		rtcReleaseScene(scene->discs);
 	if (scene->scene != NULL)
 		rtcReleaseScene(scene->scene);
 	if (scene->device != NULL)
 		rtcReleaseDevice(scene->device);
 	psr_free(scene->normal);
 	free(scene);
-}
-
-struct nearest {
-	const struct ray_scene *scene;
-	const double *point;
-	double distance2;
-};
-
-static double disc_distance2(const struct ray_scene *scene, uint32_t prim, const double p[3])
-{
-	double center[3], normal[3], d[3], height, beyond, radius = ray_disc(scene, prim, center, normal);
-
-	v3d_sub(d, p, center);
-	height = v3d_dot(d, normal) / v3d_dot(normal, normal);
-	v3d_add_scaled(d, d, -height, normal);
-	beyond = v3d_length(d) - radius;
-	beyond = beyond > 0 ? beyond : 0;
-	return height * height * v3d_dot(normal, normal) + beyond * beyond;
-}
-
-/* The tree only chooses candidates: distances are computed in double from the primitives. */
-static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
-{
-	struct nearest *nearest = args->userPtr;
-	uint32_t prim = ray_prim(nearest->scene, args->geomID, args->primID);
-	double corner[3][3], distance2;
-
-	if (ray_is_disc(nearest->scene, prim)) {
-		distance2 = disc_distance2(nearest->scene, prim, nearest->point);
-	} else {
-		ray_scene_corners(nearest->scene, prim, corner);
-		distance2 = triangle_distance2((const double(*)[3])corner, nearest->point);
-	}
-	if (!(distance2 < nearest->distance2))
-		return false;
-	nearest->distance2 = distance2;
-	/* A little more than the distance, so that rounding does not lose an equally near one. */
-	args->query->radius = (float)(sqrt(distance2) * (1 + 0x1p-20) + 0x1p-20);
-	return true;
-}
-
-double ray_scene_distance(const struct ray_scene *scene, const double point[3], double most)
-{
-	struct nearest nearest = { scene, point, most * most };
-	struct RTCPointQuery query = { .x = (float)point[0], .y = (float)point[1], .z = (float)point[2], .time = 0,
-		                           .radius = (float)most + 0x1p-20f };
-	struct RTCPointQueryContext context;
-
-	rtcInitPointQueryContext(&context);
-	rtcPointQuery(scene->scene, &query, &context, visit_nearest, &nearest);
-	return nearest.distance2 < most * most ? sqrt(nearest.distance2) : INFINITY;
 }

@@ -17,6 +17,7 @@ struct ray_scene {
 	int lets_through;   /* whether any material may let a ray through */
 	RTCDevice device;
 	RTCScene scene;
+	RTCScene discs; /* for distances; NULL until ray_scene_index_distances */
 };
 
 /* A packet of rays under way. The context comes first: Embree hands it back to the filters. */

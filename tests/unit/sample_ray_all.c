@@ -391,6 +391,7 @@ static void distances_to_discs_are_exact(void **state)
 	v3f_set(mesh->point_normal[0], 0, 1, 0);
 	mesh->point_radius[0] = 0.25f;
 	scene = open_scene(mesh);
+	assert_int_equal(ray_scene_index_distances(scene, NULL), PSR_OK);
 	assert_true(fabs(ray_scene_distance(scene, (const double[]){ 0.2, 0.7, 0.3 }, 1) - 0.5) < 1e-14);
 	/* 0.4 above and 0.3 beyond the rim */
 	assert_true(fabs(ray_scene_distance(scene, (const double[]){ 0.1, -0.2, 0.85 }, 1) - 0.5) < 1e-14);
