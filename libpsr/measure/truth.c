@@ -44,6 +44,8 @@ int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct
 	rc = door_bound_mesh(mesh, truth->origin, &truth->scale, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_create(&truth->scene, mesh, truth->origin, truth->scale, err);
+	if (rc == PSR_OK)
+		rc = ray_scene_index_distances(truth->scene, err);
 	if (rc != PSR_OK) {
 		psr_truth_destroy(truth);
 		return rc;

@@ -1,4 +1,5 @@
-/* Rays against a mesh. Everything here is in the inner coordinates of a model: object = origin + scale * inner.
+/* Rays against a mesh, which may have triangles, discs (a cloud's points) or both; numbers of primitives are those of
+ * psr/mesh.h. Everything here is in the inner coordinates of a model: object = origin + scale * inner.
  *
  * Surfaces are seen as glTF asks: rays go on through the backs of one-sided faces, through texels of MASK materials
  * below the cutoff and through BLEND ones below one half. What a ray meets is found in float by a tree, and where it
@@ -22,7 +23,7 @@ struct ray {
 struct ray_hit {
 	uint32_t prim; /* RAY_NONE: nothing is met */
 	int is_back;   /* met from the back */
-	double t, u, v; /* position = (1 - u - v) * v0 + u * v1 + v * v2; u, v >= 0, u + v <= 1 */
+	double t, u, v; /* position = (1 - u - v) * v0 + u * v1 + v * v2; u, v >= 0, u + v <= 1; 0, 0 on discs */
 };
 
 struct ray_scene;
@@ -35,14 +36,20 @@ void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
 
-/* All hits of n rays at t >= 0, nearest first: those of ray i at hit[i * most], n_hits[i] of them, at most `most`; beyond,
- * the farthest are left out. Hits of one ray that coincide to within 2^-20 and are of the same side are one, the lowest
- * primitive's. Any number of threads may trace at once. */
+/* All hits of n rays at t >= 0, nearest first: those of ray i at hit[i * most], n_hits[i] of them, at most `most` (1..
+ * RAY_MOST_HITS); beyond, the farthest are left out, and a ray counts no more than its 2 * RAY_MOST_HITS nearest primitives.
+ * Of hits of one ray and side that coincide to within 2^-20 with the first of them the lowest primitive's stands for all.
+ * Discs of one side that are met within half of the smaller radius behind the nearest are one with it: a cloud's surface is
+ * met once. No dependence on the order in which the tree finds things. Any number of threads may trace at once. */
+#define RAY_MOST_HITS 64
 void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, int n, int most, struct ray_hit *hit,
                          int *n_hits);
 
-/* Whether anything is met at t_min <= t. */
+/* Whether anything is met at t_min <= t. Any number of threads may trace at once. */
 void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded);
+
+/* To be called before distances to a mesh with points are asked for; costs nothing without. MEMORY. */
+int ray_scene_index_distances(struct ray_scene *scene, struct psr_error *err);
 
 /* Distance from a point to the nearest point of the mesh, whatever side it is of and whether it is cut out; INFINITY if
  * none is within `most`. */
@@ -51,9 +58,11 @@ double ray_scene_distance(const struct ray_scene *scene, const double point[3], 
 /* u and v of the hit of a ray that is known to meet this primitive. */
 void ray_locate(const struct ray_scene *scene, const struct ray *ray, uint32_t prim, double *u, double *v);
 
-/* Corners of a primitive, and its unit normal on the front; 0,0,0 if it has no area. */
-void ray_scene_center(const struct ray_scene *scene, uint32_t prim, double center[3]); /* of a point's disc */
+/* Centre of a point's disc; corners of a triangle. */
+void ray_scene_center(const struct ray_scene *scene, uint32_t prim, double center[3]);
 void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corner[3][3]);
+
+/* Unit normal of a triangle or disc on its front; 0,0,0 of a triangle that has no area. */
 const float *ray_scene_normal(const struct ray_scene *scene, uint32_t prim);
 
 #endif

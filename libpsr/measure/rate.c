@@ -1,0 +1,132 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "../sample/door.h"
+#include "../sample/lattice.h"
+#include "../sample/ray_tree.h"
+#include "psr/direction.h"
+#include "rate.h"
+
+#define ACROSS 512
+#define DIRECTIONS 4
+#define ROUNDS 3
+#define RUN PSR_BLOCK_SAMPLES
+
+struct rays {
+	int n;
+	struct ray *ray;
+	struct RTCRay8 *packet;
+};
+
+static double cpu_seconds(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+/* Block after block of lattices, as the sampler goes. */
+static int make_rays(struct rays *rays)
+{
+	const int reach = (int)(ACROSS / (PSR_BLOCK_SIDE * sqrt(3.0))) + 1;
+	int n = 0, valid[RAY_PACKET];
+
+	rays->ray = psr_alloc_array((size_t)DIRECTIONS * 4 * (size_t)(reach * reach) * RUN, sizeof *rays->ray);
+	if (rays->ray == NULL)
+		return PSR_ERR_MEMORY;
+	for (unsigned d = 0; d < DIRECTIONS; d++) {
+		struct psr_projection projection = { .spacing = 2.0f / ACROSS };
+		double direction[3], frame[3][3];
+
+		psr_direction_center(1, 9 * d, direction);
+		psr_direction_frame(direction, frame);
+		for (int i = 0; i < 9; i++)
+			projection.axis[i / 3][i % 3] = (float)frame[i / 3][i % 3];
+		for (int b = 0; b < 4 * reach * reach; b++) {
+			for (unsigned s = 0; s < RUN; s++) {
+				double x, y;
+
+				lattice_position(&projection, b % (2 * reach) - reach, b / (2 * reach) - reach, s, &x, &y);
+				if (x * x + y * y <= 1)
+					lattice_ray(&projection, x, y, &rays->ray[n++]);
+			}
+		}
+	}
+	rays->n = n - n % RAY_PACKET;
+	rays->packet = psr_alloc_array((size_t)rays->n / RAY_PACKET, sizeof *rays->packet);
+	if (rays->packet == NULL)
+		return PSR_ERR_MEMORY;
+	for (int i = 0; i < rays->n; i += RAY_PACKET)
+		ray_packet_fill(&rays->packet[i / RAY_PACKET], valid, rays->ray + i, RAY_PACKET, 0);
+	return PSR_OK;
+}
+
+static double time_ours(const struct ray_scene *scene, const struct rays *rays, uint64_t *n_hits)
+{
+	double started = cpu_seconds();
+
+	for (int i = 0; i < rays->n; i += RUN) {
+		struct ray_hit hit[RUN];
+		int n = rays->n - i < RUN ? rays->n - i : RUN;
+
+		ray_scene_trace(scene, rays->ray + i, n, 0, hit);
+		for (int k = 0; k < n; k++)
+			*n_hits += hit[k].prim != RAY_NONE;
+	}
+	return cpu_seconds() - started;
+}
+
+static double time_embree(const struct ray_scene *scene, const struct rays *rays, uint64_t *n_hits)
+{
+	static const int all[RAY_PACKET] __attribute__((aligned(32))) = { -1, -1, -1, -1, -1, -1, -1, -1 };
+	struct RTCIntersectContext context;
+	double started = cpu_seconds();
+
+	rtcInitIntersectContext(&context);
+	context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+	for (int i = 0; i < rays->n / RAY_PACKET; i++) {
+		struct RTCRayHit8 rayhit;
+
+		rayhit.ray = rays->packet[i];
+		memset(rayhit.hit.geomID, -1, sizeof rayhit.hit.geomID);
+		memset(rayhit.hit.instID, -1, sizeof rayhit.hit.instID);
+		rtcIntersect8(all, scene->scene, &context, &rayhit);
+		for (int k = 0; k < RAY_PACKET; k++)
+			*n_hits += rayhit.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
+	}
+	return cpu_seconds() - started;
+}
+
+int psr_ray_rate(const struct psr_mesh *mesh, double *ours, double *embree, struct psr_error *err)
+{
+	struct rays rays = { 0 };
+	struct ray_scene *scene = NULL;
+	double center[3], radius, best[2] = { INFINITY, INFINITY };
+	uint64_t n_hits = 0;
+	int rc = door_check_mesh(mesh, err);
+
+	if (rc == PSR_OK)
+		rc = door_bound_mesh(mesh, center, &radius, err);
+	if (rc == PSR_OK)
+		rc = ray_scene_create(&scene, mesh, center, radius, err);
+	if (rc == PSR_OK && make_rays(&rays) != PSR_OK)
+		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory for a million rays");
+	for (int round = 0; round < ROUNDS && rc == PSR_OK; round++) {
+		best[0] = fmin(best[0], time_ours(scene, &rays, &n_hits));
+		best[1] = fmin(best[1], time_embree(scene, &rays, &n_hits));
+	}
+	if (rc == PSR_OK && n_hits == 0)
+		rc = psr_fail(err, PSR_ERR_ARG, "no ray meets the mesh");
+	if (rc == PSR_OK) {
+		*ours = rays.n / best[0] * 1e-6;
+		*embree = rays.n / best[1] * 1e-6;
+	}
+	psr_free(rays.ray);
+	psr_free(rays.packet);
+	ray_scene_destroy(scene);
+	return rc;
+}

@@ -1,0 +1,123 @@
+#include <assert.h>
+#include "../base/vec.h"
+#include "ray_tree.h"
+
+#define MOST_RAW (2 * RAY_MOST_HITS)
+#define SAME_HIT 0x1p-20
+
+/* What a ray met so far, sorted by distance; of equal ones the lower primitive comes first. So the list does not depend on the
+ * order in which the tree finds things, full or not. */
+struct ray_list {
+	int n;
+	struct ray_hit hit[MOST_RAW];
+};
+
+static int comes_before(const struct ray_hit *a, const struct ray_hit *b)
+{
+	return a->t != b->t ? a->t < b->t : a->prim < b->prim;
+}
+
+/* Into a sorted array of n with room for `most`; the last falls out of a full one. Returns the new n. */
+static int insert(struct ray_hit *sorted, int n, int most, const struct ray_hit *hit)
+{
+	int at = n;
+
+	if (n == most && !comes_before(hit, &sorted[n - 1]))
+		return n;
+	n = n < most ? n + 1 : n;
+	at = at < n ? at : n - 1;
+	for (; at > 0 && comes_before(hit, &sorted[at - 1]); at--)
+		sorted[at] = sorted[at - 1];
+	sorted[at] = *hit;
+	return n;
+}
+
+/* Keeps what is met and sends every ray on. */
+static void collect(const struct RTCFilterFunctionNArguments *args)
+{
+	const struct ray_packet *packet = (const struct ray_packet *)(const void *)args->context;
+	const struct ray_columns column = ray_columns_of(args);
+
+	for (unsigned i = 0; i < args->N; i++) {
+		struct ray_list *list;
+		struct ray_hit hit;
+
+		if (args->valid[i] == 0)
+			continue;
+		args->valid[i] = 0;
+		list = &packet->list[column.id[i]];
+		hit.prim = ray_prim(packet->scene, column.geometry[i], column.prim[i]);
+		hit.u = (double)column.u[i];
+		hit.v = (double)column.v[i];
+		ray_hit_locate(packet->scene, &packet->ray[column.id[i]], &hit);
+		if (!packet->scene->lets_through || !ray_hit_lets_through(packet->scene, &hit))
+			list->n = insert(list->hit, list->n, MOST_RAW, &hit);
+	}
+}
+
+/* How far apart two hits of one side may be and yet are one: surfaces that coincide, and the discs of one surface. */
+static double merge_distance(const struct ray_scene *scene, uint32_t a, uint32_t b)
+{
+	double center[3], normal[3], ra, rb;
+
+	if (!ray_is_disc(scene, a) || !ray_is_disc(scene, b))
+		return SAME_HIT;
+	ra = ray_disc(scene, a, center, normal);
+	rb = ray_disc(scene, b, center, normal);
+	return (ra < rb ? ra : rb) / 2 > SAME_HIT ? (ra < rb ? ra : rb) / 2 : SAME_HIT;
+}
+
+static int merge(const struct ray_scene *scene, const struct ray *ray, const struct ray_list *list, int most,
+                 struct ray_hit *out)
+{
+	struct ray_hit group[2]; /* the latest of each side: its first hit is at `first`, the hit itself stands for it */
+	double first[2], length = v3d_length(ray->direction);
+	int is_open[2] = { 0, 0 }, n = 0;
+
+	for (int i = 0; i < list->n; i++) {
+		const struct ray_hit *hit = &list->hit[i];
+		struct ray_hit *last = &group[hit->is_back];
+		double gap = (hit->t - first[hit->is_back]) * length;
+
+		if (is_open[hit->is_back] && gap <= merge_distance(scene, last->prim, hit->prim)) {
+			if (gap <= SAME_HIT && hit->prim < last->prim)
+				*last = *hit;
+			continue;
+		}
+		if (is_open[hit->is_back])
+			n = insert(out, n, most, last);
+		is_open[hit->is_back] = 1;
+		first[hit->is_back] = hit->t;
+		*last = *hit;
+	}
+	for (int side = 0; side < 2; side++)
+		if (is_open[side])
+			n = insert(out, n, most, &group[side]);
+	return n;
+}
+
+void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, int n, int most, struct ray_hit *hit,
+                         int *n_hits)
+{
+	assert(most >= 1 && most <= RAY_MOST_HITS);
+	for (int i = 0; i < n; i += RAY_PACKET) {
+		int part = n - i < RAY_PACKET ? n - i : RAY_PACKET;
+		_Alignas(32) int valid[RAY_PACKET];
+		struct ray_list list[RAY_PACKET];
+		struct RTCRayHit8 rays;
+		struct ray_packet packet;
+
+		ray_packet_init(&packet, scene, ray + i);
+		packet.context.filter = collect;
+		packet.list = list;
+		ray_packet_fill(&rays.ray, valid, ray + i, part, 0);
+		for (int k = 0; k < RAY_PACKET; k++) {
+			list[k].n = 0;
+			rays.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+			rays.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+		}
+		rtcIntersect8(valid, scene->scene, &packet.context, &rays);
+		for (int k = 0; k < part; k++)
+			n_hits[i + k] = merge(scene, &ray[i + k], &list[k], most, hit + (size_t)(i + k) * (size_t)most);
+	}
+}
