@@ -5,9 +5,8 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "../sample/door.h"
-#include "../sample/material.h"
 #include "../sample/ray.h"
-#include "../sample/texture.h"
+#include "../sample/surface.h"
 #include "psr/model.h"
 #include "psr/pool.h"
 
@@ -17,6 +16,7 @@
 struct psr_truth {
 	const struct psr_mesh *mesh;
 	struct ray_scene *scene;
+	struct surface surface;
 	double origin[3], scale;
 };
 
@@ -46,6 +46,8 @@ int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct
 		rc = ray_scene_create(&truth->scene, mesh, truth->origin, truth->scale, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_index_distances(truth->scene, err);
+	if (rc == PSR_OK && surface_init(&truth->surface, mesh, truth->scale) != PSR_OK)
+		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory for the mesh's textures");
 	if (rc != PSR_OK) {
 		psr_truth_destroy(truth);
 		return rc;
@@ -59,6 +61,7 @@ void psr_truth_destroy(struct psr_truth *truth)
 	if (truth == NULL)
 		return;
 	ray_scene_destroy(truth->scene);
+	surface_fini(&truth->surface);
 	free(truth);
 }
 
@@ -106,13 +109,12 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
 }
 
-static void put_color(const struct psr_mesh *mesh, const struct ray_hit *hit, uint8_t rgb[3])
+/* Diffuse, unfiltered: the pixel's rays are its filter. */
+static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, uint8_t rgb[3])
 {
-	float rgba[4];
-	uint32_t diffuse;
+	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
+	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, ray_scene_normal(truth->scene, hit->prim)));
 
-	texture_base_color(mesh, hit->prim, hit->u, hit->v, rgba);
-	diffuse = PSR_ATTR_DIFFUSE(material_attr(&mesh->material[mesh->triangle_material[hit->prim]], rgba));
 	for (int c = 0; c < 3; c++)
 		rgb[c] = (uint8_t)(diffuse >> 8 * c);
 }
@@ -142,7 +144,7 @@ static void draw_row(int row, void *userdata)
 			if (job->rgb != NULL) {
 				memset(job->rgb + 3 * (at + i), 0, 3);
 				if (is_met)
-					put_color(job->truth->mesh, &hit[i], job->rgb + 3 * (at + i));
+					put_color(job->truth, &hit[i], job->rgb + 3 * (at + i));
 			}
 		}
 	}

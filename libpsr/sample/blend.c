@@ -64,7 +64,7 @@ uint64_t blend_attr(const uint64_t *attr, const float *weight, int n, const floa
 	length = v3d_normalize(sums.normal, sums.normal) / sums.weight;
 	if (length > NO_NORMAL)
 		v3f_set(normal, (float)sums.normal[0], (float)sums.normal[1], (float)sums.normal[2]);
-	look.exponent = material_widened(1 / variance, length);
+	look.exponent = material_widened(1 / variance, length < 1 ? (1 - length) / length : 0);
 	for (int c = 0; c < 3; c++) {
 		look.diffuse[c] = (float)(sums.diffuse[c] / sums.weight);
 		look.specular[c] = (float)(sums.reflected[c] / sums.weight * (look.exponent + 2));

@@ -7,6 +7,8 @@
  * them, or metals would be black but for highlights. */
 #define METAL_LOSS 0.5f
 
+#define DIELECTRIC 0.04f /* F0 */
+
 unsigned material_exponent_code(double exponent)
 {
 	double root = sqrt(sqrt(sqrt(sqrt(2.0)))), bound = sqrt(root);
@@ -90,26 +92,84 @@ void material_decode(struct look *look, uint64_t attr)
 	look->unlit = (int)PSR_ATTR_UNLIT(attr);
 }
 
-double material_widened(double n, double r)
+double material_widened(double n, double variance)
 {
-	double widened = r > 0 ? n / (1 + 4 * n * (r < 1 ? 1 - r : 0) / r) : 1;
+	double widened = n / (1 + 4 * n * variance);
 
 	return widened > 1 ? widened : 1;
 }
 
+void material_values_default(struct material_values *values, const struct psr_material *material)
+{
+	*values = (struct material_values){ .metallic = material->metallic, .roughness = material->roughness,
+		                                .glossiness = material->glossiness, .occlusion = 1 };
+	for (int c = 0; c < 3; c++) {
+		values->base[c] = material->base_color[c];
+		values->specular[c] = material->specular[c];
+		values->emission[c] = material->emissive[c];
+	}
+}
+
+/* Diffuse colour and F0. */
+static void reflect(const struct psr_material *material, const struct material_values *values, float diffuse[3],
+                    float f0[3])
+{
+	float most = 0;
+
+	for (int c = 0; c < 3; c++) {
+		float mirrored = (values->specular[c] - DIELECTRIC) / (1 - DIELECTRIC);
+
+		f0[c] = values->specular[c];
+		diffuse[c] = mirrored > 0 ? mirrored * METAL_LOSS : 0;
+		most = mirrored > most ? mirrored : most;
+	}
+	for (int c = 0; c < 3; c++) {
+		if (material->is_specular_glossiness) {
+			diffuse[c] += values->base[c] * (1 - most);
+		} else {
+			f0[c] = DIELECTRIC + (values->base[c] - DIELECTRIC) * values->metallic;
+			diffuse[c] = values->base[c] * (1 - METAL_LOSS * values->metallic);
+		}
+		diffuse[c] *= values->occlusion;
+	}
+}
+
+static float luminance(const float rgb[3])
+{
+	return 0.2126f * rgb[0] + 0.7152f * rgb[1] + 0.0722f * rgb[2];
+}
+
+static float at_most_1(float x)
+{
+	return x < 1 ? x : 1;
+}
+
+uint64_t material_word(const struct psr_material *material, const struct material_values *values)
+{
+	float roughness = material->is_specular_glossiness ? 1 - values->glossiness : values->roughness, f0[3];
+	struct look look = { .exponent = material_widened(exponent_of((double)roughness), values->spread),
+		                 .unlit = material->unlit };
+
+	if (material->unlit) {
+		for (int c = 0; c < 3; c++)
+			look.diffuse[c] = values->base[c];
+		return material_encode(&look);
+	}
+	reflect(material, values, look.diffuse, f0);
+	look.unlit = luminance(values->emission) > luminance(look.diffuse);
+	for (int c = 0; c < 3; c++) {
+		look.diffuse[c] = at_most_1(look.diffuse[c] + values->emission[c]);
+		look.specular[c] = at_most_1(f0[c] * (float)((look.exponent + 2) / 2));
+	}
+	return material_encode(&look);
+}
+
 uint64_t material_attr(const struct psr_material *material, const float rgb[3])
 {
-	float metallic = material->metallic, diffuse[3], specular[3];
-	double exponent = exponent_of((double)material->roughness);
+	struct material_values values;
 
-	if (material->unlit)
-		return UINT64_C(1) << 15 | code_888(rgb) << 16;
-	for (int c = 0; c < 3; c++) {
-		float f0 = 0.04f + (rgb[c] - 0.04f) * metallic;
-		float lobe = f0 * (float)((exponent + 2) / 2);
-
-		diffuse[c] = rgb[c] * (1 - METAL_LOSS * metallic);
-		specular[c] = lobe < 1 ? lobe : 1;
-	}
-	return code_888(diffuse) << 16 | code_565(specular) << 40 | (uint64_t)material_exponent_code(exponent) << 56;
+	material_values_default(&values, material);
+	for (int c = 0; c < 3; c++)
+		values.base[c] = rgb[c];
+	return material_word(material, &values);
 }

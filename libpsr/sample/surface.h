@@ -5,10 +5,16 @@
 #include <stdint.h>
 #include "psr/mesh.h"
 
-/* A mesh with what filtering its textures needs. Any number of threads may read it. */
+struct mip;
+
+/* A mesh with what filtering its textures needs: their mip maps (mip.h), one for each image and use. Any number of
+ * threads may read it. */
 struct surface {
 	const struct psr_mesh *mesh;
-	double scale; /* object units an inner unit */
+	double scale;         /* object units an inner unit */
+	struct mip *mip;      /* n_images * MIP_KINDS; those that no material uses are empty */
+	uint64_t *plain_word; /* of each material by itself, normal 0 */
+	uint8_t *is_plain;    /* whether a material has no textures, so that the mesh's colours alone can change its word */
 };
 
 /* The mesh must outlive it. scale > 0. MEMORY; surface_fini() either way. */

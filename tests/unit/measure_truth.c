@@ -29,7 +29,7 @@ static struct psr_truth *open_truth(const struct psr_mesh *mesh)
 static void a_facing_square_has_one_depth(void **state)
 {
 	struct psr_mesh *mesh = meshes_square(1);
-	struct psr_truth *truth = open_truth(mesh);
+	struct psr_truth *truth;
 	struct psr_camera camera = camera_from(0, 0, 3);
 	float depth[W * H], normal[W * H][3];
 	uint8_t rgb[3 * W * H];
@@ -37,6 +37,7 @@ static void a_facing_square_has_one_depth(void **state)
 
 	(void)state;
 	mesh->material->base_color[0] = 0.5f;
+	truth = open_truth(mesh);
 	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 2, depth, normal, rgb, NULL), PSR_OK);
 	for (int y = 0; y < H; y++) {
 		for (int x = 0; x < W; x++) {
