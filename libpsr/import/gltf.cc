@@ -130,8 +130,8 @@ void add_instance(reader &r, const primitive &p, int material, const transform &
 
 	for (double c : cofactor)
 		largest = std::fmax(largest, std::fabs(c));
-	if (import_mesh_grow(&r.im, p.n_vertices(), p.triangle.size() / 3, !p.uv.empty(), !p.color.empty(),
-	                     &error) != PSR_OK)
+	if (import_mesh_grow(&r.im, p.n_vertices(), p.triangle.size() / 3,
+	                     (p.uv.empty() ? 0 : IMPORT_HAS_UV0) | (p.color.empty() ? 0 : IMPORT_HAS_COLOR), &error) != PSR_OK)
 		throw reported{ error };
 	for (size_t i = 0; i < p.n_vertices(); i++) {
 		const float *x = &p.position[3 * i];
