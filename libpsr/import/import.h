@@ -67,6 +67,14 @@ int import_mesh_add_material(struct import_mesh *im, const struct psr_material *
 int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, const char *name,
                           struct psr_error *err);
 
+/* presets.c: adds what a client can ask for by name. A name is made printable, short enough (cut at a character) and
+ * unlike the others of its kind; "" becomes "camera 1" or "light 1", and so on. Beyond PSR_MAX_PRESETS nothing is added,
+ * with a warning. MEMORY. */
+int import_mesh_add_camera(struct import_mesh *im, const char *name, const struct psr_camera *camera,
+                           struct psr_error *err);
+int import_mesh_add_light(struct import_mesh *im, const char *name, const struct psr_light *light,
+                          struct psr_error *err);
+
 /* Adds to the mesh's warning, separated by "; "; the same text is said once, and what does not fit is left out. */
 void import_mesh_warn(struct import_mesh *im, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
