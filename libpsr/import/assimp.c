@@ -157,7 +157,8 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	t.first = t.vertex = mesh->n_vertices;
 	t.triangle = mesh->n_triangles;
 	t.flip = cofactors(t.normals, m);
-	rc = import_mesh_grow(im, t.with_normals ? source->mNumVertices : 3 * n, n, t.uv_set >= 0, has_color, err);
+	rc = import_mesh_grow(im, t.with_normals ? source->mNumVertices : 3 * n, n,
+	                      (t.uv_set >= 0 ? IMPORT_HAS_UV0 : 0) | (has_color ? IMPORT_HAS_COLOR : 0), err);
 	if (rc != PSR_OK)
 		return rc;
 	t.cut = malloc((size_t)most * sizeof *t.cut);

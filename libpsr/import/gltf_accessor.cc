@@ -100,7 +100,7 @@ uint64_t view_stride(const reader &r, int view, uint64_t tight)
 }
 
 void add_sparse(const reader &r, const tinygltf::Accessor &a, size_t n_components, size_t n_wanted,
-                std::vector<float> &out, const std::string &place)
+                bool is_normalized, std::vector<float> &out, const std::string &place)
 {
 	const auto &s = a.sparse;
 	unsigned size = component_bytes(a.componentType, place), index_size;
@@ -122,7 +122,7 @@ void add_sparse(const reader &r, const tinygltf::Accessor &a, size_t n_component
 		if (at >= a.count)
 			refuse(PSR_ERR_FORMAT, "%s: sparse index %u of %zu elements", place.c_str(), at, a.count);
 		for (size_t c = 0; c < n_components; c++)
-			out[at * n_wanted + c] = load_float(value + i * value_size + c * size, a.componentType, a.normalized);
+			out[at * n_wanted + c] = load_float(value + i * value_size + c * size, a.componentType, is_normalized);
 	}
 }
 
@@ -149,7 +149,8 @@ span view_bytes(const reader &r, int view, const std::string &place)
 	return { b.data() + v.byteOffset, v.byteLength };
 }
 
-std::vector<float> accessor_floats(const reader &r, int accessor, size_t n_wanted, const std::string &place)
+std::vector<float> accessor_floats(const reader &r, int accessor, size_t n_wanted, const std::string &place,
+                                   bool is_normalized)
 {
 	const tinygltf::Accessor &a = accessor_at(r, accessor, place);
 	const std::string where = place + " (accessors[" + std::to_string(accessor) + "])";
@@ -157,6 +158,7 @@ std::vector<float> accessor_floats(const reader &r, int accessor, size_t n_wante
 	unsigned size = component_bytes(a.componentType, where);
 	std::vector<float> out;
 
+	is_normalized |= a.normalized;
 	if (n_components != n_wanted && !(n_wanted == 4 && n_components == 3))
 		refuse(PSR_ERR_FORMAT, "%s has %zu components, expected %zu", where.c_str(), n_components, n_wanted);
 	if (a.count > IMPORT_MAX_VERTICES)
@@ -173,13 +175,18 @@ std::vector<float> accessor_floats(const reader &r, int accessor, size_t n_wante
 		out.resize(a.count * n_wanted);
 		for (size_t i = 0; i < a.count; i++)
 			for (size_t c = 0; c < n_components; c++)
-				out[i * n_wanted + c] = load_float(p + i * stride + c * size, a.componentType, a.normalized);
+				out[i * n_wanted + c] = load_float(p + i * stride + c * size, a.componentType, is_normalized);
 	}
 	if (a.sparse.isSparse)
-		add_sparse(r, a, n_components, n_wanted, out, where);
+		add_sparse(r, a, n_components, n_wanted, is_normalized, out, where);
 	for (size_t i = 0; n_components < n_wanted && i < a.count; i++)
 		out[i * n_wanted + 3] = 1.0f;
 	return out;
+}
+
+size_t accessor_count(const reader &r, int accessor, const std::string &place)
+{
+	return accessor_at(r, accessor, place).count;
 }
 
 std::vector<uint32_t> accessor_indices(const reader &r, int accessor, const std::string &place)

@@ -18,16 +18,11 @@ namespace {
 const size_t max_json = (size_t)512 << 20;
 const int max_depth = 64;
 
-const std::set<std::string> known_extensions = {
-	"KHR_draco_mesh_compression", "KHR_mesh_quantization", "KHR_texture_transform", "KHR_materials_unlit",
-	"KHR_materials_pbrSpecularGlossiness", "KHR_lights_punctual", "EXT_texture_webp",
-};
-
 /* Keys whose value is an index or a count (or an array of them); tinygltf would cut a larger number to 32 bits. */
 const std::set<std::string> integer_keys = {
-	"buffer", "bufferView", "byteStride", "count", "componentType", "indices", "material", "mode", "mesh", "skin",
-		"scene",
-	"source", "sampler", "index", "texCoord", "children", "nodes", "wrapS", "wrapT",
+	"buffer", "bufferView", "byteStride", "count", "componentType", "indices", "material", "mode", "mesh", "skin", "scene",
+	"source", "sampler", "index", "texCoord", "children", "nodes", "wrapS", "wrapT", "magFilter", "minFilter", "joints",
+	"inverseBindMatrices", "camera", "light",
 };
 
 uint32_t u32(const uint8_t *p)
@@ -106,6 +101,15 @@ void tidy_integer(json &v, const std::string &place, uint64_t max)
 		refuse(PSR_ERR_FORMAT, "%s is not an integer from 0 to %llu", place.c_str(), (unsigned long long)max);
 }
 
+/* An object whose members are all indices. */
+void tidy_members(json &v, const std::string &place)
+{
+	if (!v.is_object())
+		refuse(PSR_ERR_FORMAT, "%s is not an object", place.c_str());
+	for (auto it = v.begin(); it != v.end(); ++it)
+		tidy_integer(it.value(), place + "." + it.key(), INT32_MAX);
+}
+
 void tidy(json &v, const std::string &place, bool integers)
 {
 	if (v.is_object()) {
@@ -116,7 +120,7 @@ void tidy(json &v, const std::string &place, bool integers)
 			if (!e.is_object())
 				refuse(PSR_ERR_FORMAT, "%s.extensions is not an object", place.c_str());
 			for (auto it = e.begin(); it != e.end();)
-				it = known_extensions.count(it.key()) != 0 ? std::next(it) : e.erase(it);
+				it = extension_is_known(it.key()) ? std::next(it) : e.erase(it);
 		}
 		for (auto it = v.begin(); it != v.end(); ++it) {
 			const std::string &key = it.key(), where = place.empty() ? key : place + "." + key;
@@ -126,8 +130,10 @@ void tidy(json &v, const std::string &place, bool integers)
 			else
 				tidy(it.value(), where, integer_keys.count(key) != 0);
 			if (key == "attributes" && it.value().is_object())
-				for (auto a = it.value().begin(); a != it.value().end(); ++a)
-					tidy(a.value(), where + "." + a.key(), true);
+				tidy_members(it.value(), where);
+			if (key == "targets" && it.value().is_array())
+				for (size_t i = 0; i < it.value().size(); i++)
+					tidy_members(it.value()[i], where + "[" + std::to_string(i) + "]");
 		}
 	} else if (v.is_array()) {
 		for (size_t i = 0; i < v.size(); i++)
@@ -137,20 +143,6 @@ void tidy(json &v, const std::string &place, bool integers)
 	} else if (v.is_number_integer() && (v > INT32_MAX || v < INT32_MIN)) {
 		v = v.get<double>();
 	}
-}
-
-json &array_of(json &doc, const char *key)
-{
-	json &a = doc[key];
-
-	if (a.is_null())
-		a = json::array();
-	if (!a.is_array())
-		refuse(PSR_ERR_FORMAT, "%s is not an array", key);
-	for (size_t i = 0; i < a.size(); i++)
-		if (!a[i].is_object())
-			refuse(PSR_ERR_FORMAT, "%s[%zu] is not an object", key, i);
-	return a;
 }
 
 void check_head(const json &doc)
@@ -165,11 +157,6 @@ void check_head(const json &doc)
 		refuse(PSR_ERR_UNSUPPORTED, "glTF %s; convert it to glTF 2.0", version.c_str());
 	if (version.compare(0, 2, "2.") != 0)
 		refuse(PSR_ERR_UNSUPPORTED, "glTF version \"%s\" is not known", version.c_str());
-	if (doc.contains("extensionsRequired"))
-		for (const json &e : doc["extensionsRequired"])
-			if (!e.is_string() || known_extensions.count(e.get<std::string>()) == 0)
-				refuse(PSR_ERR_UNSUPPORTED, "requires the extension %s, which is not supported",
-				       e.dump(-1, ' ', false, json::error_handler_t::replace).c_str());
 }
 
 void read_buffers(source &s, json &doc, span bin)
@@ -230,7 +217,6 @@ void tidy_primitives(json &doc)
 		for (size_t p = 0; p < primitives.size(); p++) {
 			if (!primitives[p].contains("attributes") || !primitives[p]["attributes"].is_object())
 				refuse(PSR_ERR_FORMAT, "meshes[%zu].primitives[%zu] has no attributes", m, p);
-			primitives[p].erase("targets");
 			if (primitives[p].contains("extensions") &&
 			    primitives[p]["extensions"].contains("KHR_draco_mesh_compression"))
 				primitives[p].erase("indices");
@@ -251,6 +237,20 @@ void refuse(int code, const char *format, ...)
 	throw failure{ code, text };
 }
 
+json &array_of(json &doc, const char *key)
+{
+	json &a = doc[key];
+
+	if (a.is_null())
+		a = json::array();
+	if (!a.is_array())
+		refuse(PSR_ERR_FORMAT, "%s is not an array", key);
+	for (size_t i = 0; i < a.size(); i++)
+		if (!a[i].is_object())
+			refuse(PSR_ERR_FORMAT, "%s[%zu] is not an object", key, i);
+	return a;
+}
+
 void door_open(source &s, const char *path, const uint8_t *bytes, size_t n_bytes)
 {
 	struct psr_error error = {};
@@ -269,9 +269,10 @@ void door_open(source &s, const char *path, const uint8_t *bytes, size_t n_bytes
 		json doc = json::parse(text.bytes, text.bytes + text.n);
 
 		check_head(doc);
-		for (const char *key : { "animations", "skins", "cameras", "extensionsUsed", "extensionsRequired" })
-			doc.erase(key);
+		extensions_check(s, doc);
+		doc.erase("animations");
 		tidy(doc, "", false);
+		presets_read(s, doc);
 		read_buffers(s, doc, bin);
 		list_images(s, doc);
 		tidy_primitives(doc);

@@ -25,35 +25,38 @@ float scale_of(const draco::PointAttribute &a, bool normalized)
 	}
 }
 
-std::vector<float> read_attribute(const reader &r, const draco::Mesh &mesh, const tinygltf::Primitive &p,
-                                  const tinygltf::Value &ids, const std::string &name, int n_wanted,
-                                  const std::string &place)
+} // namespace
+
+std::vector<float> draco_floats(const reader &r, const draco::Mesh &mesh, const tinygltf::Primitive &p,
+                                const std::string &name, size_t n_wanted, const std::string &place,
+                                bool is_normalized)
 {
 	const std::string where = place + "." + name;
 	std::vector<float> out;
-	int id = value_int(ids, name.c_str(), -1);
+	int id = value_int(p.extensions.at("KHR_draco_mesh_compression").Get("attributes"), name.c_str(), -1);
 
 	if (id < 0) { /* not compressed: an accessor of its own may have it */
 		auto it = p.attributes.find(name);
 
-		return it == p.attributes.end() ? out : accessor_floats(r, it->second, (size_t)n_wanted, where);
+		return it == p.attributes.end() ? out : accessor_floats(r, it->second, n_wanted, where, is_normalized);
 	}
 
 	const draco::PointAttribute *a = mesh.GetAttributeByUniqueId((uint32_t)id);
 	auto it = p.attributes.find(name);
-	bool normalized = it != p.attributes.end() && it->second >= 0 &&
-	                  (size_t)it->second < r.model.accessors.size() && r.model.accessors[(size_t)it->second].normalized;
+
+	is_normalized |= it != p.attributes.end() && it->second >= 0 && (size_t)it->second < r.model.accessors.size() &&
+	                 r.model.accessors[(size_t)it->second].normalized;
 
 	if (a == nullptr)
 		refuse(PSR_ERR_FORMAT, "%s: the Draco data have no attribute %d", where.c_str(), id);
-	if (a->num_components() != n_wanted && !(n_wanted == 4 && a->num_components() == 3))
-		refuse(PSR_ERR_FORMAT, "%s: Draco attribute %d has %d components, expected %d", where.c_str(), id,
+	if ((size_t)a->num_components() != n_wanted && !(n_wanted == 4 && a->num_components() == 3))
+		refuse(PSR_ERR_FORMAT, "%s: Draco attribute %d has %d components, expected %zu", where.c_str(), id,
 		       (int)a->num_components(), n_wanted);
 
-	float scale = scale_of(*a, normalized);
+	float scale = scale_of(*a, is_normalized);
 	int n_components = a->num_components();
 
-	out.assign((size_t)mesh.num_points() * (size_t)n_wanted, 1.0f);
+	out.assign((size_t)mesh.num_points() * n_wanted, 1.0f);
 	for (draco::PointIndex i(0); i < mesh.num_points(); ++i) {
 		float value[4] = { 0.0f, 0.0f, 0.0f, 0.0f };
 		draco::AttributeValueIndex at = a->mapped_index(i);
@@ -61,22 +64,18 @@ std::vector<float> read_attribute(const reader &r, const draco::Mesh &mesh, cons
 		if (at.value() >= a->size() || !a->ConvertValue<float>(at, (int8_t)n_components, value))
 			refuse(PSR_ERR_FORMAT, "%s: the Draco data have no value for point %u", where.c_str(), i.value());
 		for (int c = 0; c < n_components; c++)
-			out[(size_t)i.value() * (size_t)n_wanted + (size_t)c] = value[c] * scale;
+			out[(size_t)i.value() * n_wanted + (size_t)c] = value[c] * scale;
 	}
 	return out;
 }
 
-} // namespace
-
-void draco_read(const reader &r, const tinygltf::Primitive &p, const std::string &uv_name, primitive &out,
-                const std::string &place)
+std::shared_ptr<draco::Mesh> draco_open(const reader &r, const tinygltf::Primitive &p, const std::string &place)
 {
 	const tinygltf::Value &extension = p.extensions.at("KHR_draco_mesh_compression");
 
 	if (!extension.IsObject() || !extension.Get("attributes").IsObject())
 		refuse(PSR_ERR_FORMAT, "%s: KHR_draco_mesh_compression has no attributes", place.c_str());
 
-	const tinygltf::Value &ids = extension.Get("attributes");
 	span s = view_bytes(r, value_int(extension, "bufferView", -1), place + ".KHR_draco_mesh_compression");
 	draco::DecoderBuffer buffer;
 	draco::Decoder decoder;
@@ -95,14 +94,17 @@ void draco_read(const reader &r, const tinygltf::Primitive &p, const std::string
 	if (mesh->num_points() > IMPORT_MAX_VERTICES || mesh->num_faces() > IMPORT_MAX_TRIANGLES)
 		refuse(PSR_ERR_LIMIT, "%s: %u points and %u faces of Draco data are too many", place.c_str(),
 		       (unsigned)mesh->num_points(), (unsigned)mesh->num_faces());
-	out.position = read_attribute(r, *mesh, p, ids, "POSITION", 3, place);
-	out.normal = read_attribute(r, *mesh, p, ids, "NORMAL", 3, place);
-	out.color = read_attribute(r, *mesh, p, ids, "COLOR_0", 4, place);
-	if (!uv_name.empty())
-		out.uv = read_attribute(r, *mesh, p, ids, uv_name, 2, place);
-	for (draco::FaceIndex f(0); f < mesh->num_faces(); ++f)
-		for (int c = 0; c < 3; c++)
-			out.triangle.push_back(mesh->face(f)[(size_t)c].value());
+	return mesh;
+}
+
+std::vector<uint32_t> draco_triangles(const draco::Mesh &mesh)
+{
+	std::vector<uint32_t> out;
+
+	for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
+		for (size_t c = 0; c < 3; c++)
+			out.push_back(mesh.face(f)[c].value());
+	return out;
 }
 
 } // namespace gltf

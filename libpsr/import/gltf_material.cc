@@ -1,8 +1,9 @@
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <memory>
 #include "gltf.h"
+
+extern "C" {
+#include "base/maths.h"
+}
 
 namespace gltf {
 
@@ -76,158 +77,226 @@ int psr_image_of(reader &r, int image)
 	return index;
 }
 
-/* psr has one roughness and one metallic value a material, so a texture of them counts with its mean. */
-void apply_roughness_texture(reader &r, int texture, struct psr_material &m, const std::string &place)
-{
-	int image = image_of_texture(r, texture, place);
-	image_bytes i = read_image(r, image);
-	struct psr_image pixels = {};
-	struct psr_error error = {};
-	uint64_t green = 0, blue = 0, n;
+/* Which texture, as tinygltf's several kinds of it, or a member of an extension, say it. */
+struct texture_info {
+	int index = -1;
+	int tex_coord = 0;
+	const tinygltf::Value *transform = nullptr; /* KHR_texture_transform */
+	std::string place;
+};
 
-	if (import_image_decode(&pixels, i.bytes.bytes, (size_t)i.bytes.n, i.name.c_str(),
-	                        IMPORT_MAX_PIXELS - r.im.n_pixels, &error) != PSR_OK)
-		refuse(error.code, "%s", error.text);
-	n = (uint64_t)pixels.width * pixels.height;
-	for (uint64_t k = 0; k < n; k++) {
-		green += pixels.rgba[4 * k + 1];
-		blue += pixels.rgba[4 * k + 2];
-	}
-	std::free(pixels.rgba);
-	m.roughness *= (float)((double)green / (255.0 * (double)n));
-	m.metallic *= (float)((double)blue / (255.0 * (double)n));
-	import_mesh_warn(&r.im, "metallic-roughness textures count with their mean");
+template<class info> texture_info info_of(const info &t, const std::string &place)
+{
+	texture_info out;
+	auto it = t.extensions.find("KHR_texture_transform");
+
+	out.index = t.index;
+	out.tex_coord = t.texCoord;
+	out.transform = it != t.extensions.end() ? &it->second : nullptr;
+	out.place = place;
+	return out;
 }
 
-void use_texture(texture_use &use, int set, const tinygltf::ExtensionMap &extensions)
+texture_info info_of(const tinygltf::Value &extension, const char *key, const std::string &place)
 {
-	auto it = extensions.find("KHR_texture_transform");
+	texture_info out;
 
-	use.uv_name = "TEXCOORD_" + std::to_string(set);
-	if (it == extensions.end() || !it->second.IsObject())
+	if (!extension.Has(key))
+		return out;
+
+	const tinygltf::Value &t = extension.Get(key);
+
+	out.index = value_int(t, "index", -1);
+	out.tex_coord = value_int(t, "texCoord", 0);
+	out.place = place + "." + key;
+	if (t.Has("extensions") && t.Get("extensions").Has("KHR_texture_transform"))
+		out.transform = &t.Get("extensions").Get("KHR_texture_transform");
+	return out;
+}
+
+/* Numbers of an array member; the others stay. */
+void value_numbers(const tinygltf::Value &v, const char *key, double *out, int n)
+{
+	if (!v.IsObject() || !v.Has(key) || !v.Get(key).IsArray())
+		return;
+	for (int i = 0; i < n; i++)
+		if (v.Get(key).Get(i).IsNumber())
+			out[i] = v.Get(key).Get(i).GetNumberAsDouble();
+}
+
+/* The same bits on every machine, for any angle. */
+void sine_and_cosine(double angle, double &s, double &c)
+{
+	double turn = std::isfinite(angle) ? std::fmod(angle, 2.0 * M_PI) : 0.0;
+
+	if (turn < 0.0)
+		turn += 2.0 * M_PI;
+	psr_sincos(turn > M_PI ? 2.0 * M_PI - turn : turn, &s, &c);
+	s = turn > M_PI ? -s : s;
+}
+
+void set_transform(struct psr_texture &out, const tinygltf::Value &t)
+{
+	double offset[2] = { 0, 0 }, scale[2] = { 1, 1 }, s, c;
+
+	value_numbers(t, "offset", offset, 2);
+	value_numbers(t, "scale", scale, 2);
+	sine_and_cosine(value_number(t, "rotation", 0.0), s, c);
+
+	const double m[6] = { c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1] };
+
+	for (int i = 0; i < 6; i++)
+		out.transform[i] = (float)m[i];
+}
+
+/* The mesh's set for TEXCOORD_n: n where it has one, else one that the material leaves free; -1: there is none. */
+int take_set(material_use &use, int n)
+{
+	const std::string name = "TEXCOORD_" + std::to_string(n);
+
+	for (int set = 0; set < PSR_UV_SETS; set++)
+		if (use.uv_name[set] == name)
+			return set;
+	for (int k = 0; k < PSR_UV_SETS; k++) {
+		int set = n < PSR_UV_SETS ? (n + k) % PSR_UV_SETS : k;
+
+		if (use.uv_name[set].empty()) {
+			use.uv_name[set] = name;
+			return set;
+		}
+	}
+	return -1;
+}
+
+/* In the order of calls, so that the base color gets its set first. */
+void set_texture(reader &r, struct psr_texture &out, material_use &use, const texture_info &info)
+{
+	if (info.index < 0)
 		return;
 
-	const tinygltf::Value &t = it->second;
-	double offset[2] = { 0, 0 }, scale[2] = { 1, 1 }, angle = value_number(t, "rotation", 0.0);
+	const tinygltf::Texture &texture = texture_at(r, info.index, info.place);
+	const int tex_coord = info.transform != nullptr ? value_int(*info.transform, "texCoord", info.tex_coord) :
+	                                                  info.tex_coord;
+	const int set = take_set(use, tex_coord);
 
-	set = value_int(t, "texCoord", set);
-	use.uv_name = "TEXCOORD_" + std::to_string(set);
-	for (int c = 0; c < 2; c++) {
-		if (t.Has("offset") && t.Get("offset").IsArray() && t.Get("offset").Get(c).IsNumber())
-			offset[c] = t.Get("offset").Get(c).GetNumberAsDouble();
-		if (t.Has("scale") && t.Get("scale").IsArray() && t.Get("scale").Get(c).IsNumber())
-			scale[c] = t.Get("scale").Get(c).GetNumberAsDouble();
+	if (set < 0) {
+		import_mesh_warn(&r.im, "%s was left out: its material uses more than %d sets of coordinates",
+		                 info.place.c_str(), PSR_UV_SETS);
+		return;
 	}
+	out.image = psr_image_of(r, image_of_texture(r, info.index, info.place));
+	out.uv_set = set;
+	if (info.transform != nullptr)
+		set_transform(out, *info.transform);
+	if (texture.sampler >= 0 && (size_t)texture.sampler >= r.model.samplers.size())
+		refuse(PSR_ERR_FORMAT, "textures[%d]: sampler %d does not exist, there are %zu", info.index, texture.sampler,
+		       r.model.samplers.size());
+	if (texture.sampler >= 0) {
+		const tinygltf::Sampler &sampler = r.model.samplers[(size_t)texture.sampler];
 
-	double cosine = std::cos(angle), sine = std::sin(angle);
-	const double m[6] = { cosine * scale[0], sine * scale[1],   offset[0],
-		              -sine * scale[0],  cosine * scale[1], offset[1] };
-
-	std::memcpy(use.m, m, sizeof m);
-}
-
-void set_texture(reader &r, struct psr_material &m, int texture, const std::string &place)
-{
-	int sampler = texture_at(r, texture, place).sampler;
-
-	m.base_texture.image = psr_image_of(r, image_of_texture(r, texture, place));
-	if (sampler >= 0 && (size_t)sampler < r.model.samplers.size()) {
-		m.base_texture.wrap_s = wrap_of(r.model.samplers[(size_t)sampler].wrapS);
-		m.base_texture.wrap_t = wrap_of(r.model.samplers[(size_t)sampler].wrapT);
+		out.wrap_s = wrap_of(sampler.wrapS);
+		out.wrap_t = wrap_of(sampler.wrapT);
+		out.is_nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
 	}
 }
 
-bool emits(const tinygltf::Material &m)
+void set_specular_glossiness(reader &r, struct psr_material &m, material_use &use, const tinygltf::Value &v,
+                             const std::string &place)
 {
-	const auto &e = m.emissiveFactor;
+	double diffuse[4] = { 1, 1, 1, 1 }, specular[3] = { 1, 1, 1 };
 
-	return e.size() == 3 && (e[0] > 0.0 || e[1] > 0.0 || e[2] > 0.0);
-}
-
-/* A black surface that shines, as labels do: drawn unlit, in the colour that it emits. */
-bool only_emits(const tinygltf::Material &m)
-{
-	const auto &pbr = m.pbrMetallicRoughness;
-	const auto &base = pbr.baseColorFactor;
-
-	return emits(m) && pbr.baseColorTexture.index < 0 && base.size() == 4 && base[0] == 0.0 && base[1] == 0.0 &&
-	       base[2] == 0.0 && m.extensions.count("KHR_materials_pbrSpecularGlossiness") == 0;
-}
-
-/* The texture that gives the base color: of metallic-roughness, the diffuse one of specular-glossiness, or the
- * emissive one of what only emits. */
-tinygltf::TextureInfo base_texture(const tinygltf::Material &m)
-{
-	auto it = m.extensions.find("KHR_materials_pbrSpecularGlossiness");
-	tinygltf::TextureInfo info;
-
-	if (only_emits(m))
-		return m.emissiveTexture;
-	if (it == m.extensions.end() || !it->second.IsObject())
-		return m.pbrMetallicRoughness.baseColorTexture;
-	if (!it->second.Has("diffuseTexture"))
-		return info;
-
-	const tinygltf::Value &t = it->second.Get("diffuseTexture");
-
-	info.index = value_int(t, "index", -1);
-	info.texCoord = value_int(t, "texCoord", 0);
-	if (t.Has("extensions") && t.Get("extensions").IsObject())
-		info.extensions = t.Get("extensions").Get<tinygltf::Value::Object>();
-	return info;
-}
-
-void set_specular_glossiness(struct psr_material &m, const tinygltf::Value &v)
-{
-	for (int c = 0; c < 4; c++) {
-		m.base_color[c] = 1.0f;
-		if (v.Has("diffuseFactor") && v.Get("diffuseFactor").IsArray() && v.Get("diffuseFactor").Get(c).IsNumber())
-			m.base_color[c] = (float)v.Get("diffuseFactor").Get(c).GetNumberAsDouble();
-	}
+	value_numbers(v, "diffuseFactor", diffuse, 4);
+	value_numbers(v, "specularFactor", specular, 3);
+	for (int c = 0; c < 4; c++)
+		m.base_color[c] = (float)diffuse[c];
+	for (int c = 0; c < 3; c++)
+		m.specular[c] = (float)specular[c];
+	m.glossiness = (float)value_number(v, "glossinessFactor", 1.0);
+	m.is_specular_glossiness = 1;
 	m.metallic = 0.0f;
-	m.roughness = 1.0f - (float)value_number(v, "glossinessFactor", 1.0);
+	m.roughness = 1.0f - m.glossiness;
+	set_texture(r, m.base_texture, use, info_of(v, "diffuseTexture", place));
+	if (!m.unlit)
+		set_texture(r, m.specular_texture, use, info_of(v, "specularGlossinessTexture", place));
 }
 
-struct psr_material plain_material()
+void set_metallic_roughness(reader &r, struct psr_material &m, material_use &use,
+                            const tinygltf::PbrMetallicRoughness &pbr, const std::string &place)
 {
+	for (size_t c = 0; c < 4 && c < pbr.baseColorFactor.size(); c++)
+		m.base_color[c] = (float)pbr.baseColorFactor[c];
+	m.metallic = (float)pbr.metallicFactor;
+	m.roughness = (float)pbr.roughnessFactor;
+	set_texture(r, m.base_texture, use, info_of(pbr.baseColorTexture, place + ".baseColorTexture"));
+	if (!m.unlit && (m.metallic > 0.0f || m.roughness > 0.0f))
+		set_texture(r, m.metallic_roughness_texture, use,
+		            info_of(pbr.metallicRoughnessTexture, place + ".metallicRoughnessTexture"));
+}
+
+/* Textures whose factor is 0 are not read. */
+void set_relief_and_light(reader &r, struct psr_material &m, material_use &use, const tinygltf::Material &g,
+                          const std::string &place)
+{
+	auto strength = g.extensions.find("KHR_materials_emissive_strength");
+	const double factor = strength != g.extensions.end() ? value_number(strength->second, "emissiveStrength", 1.0) : 1.0;
+
+	m.normal_scale = (float)g.normalTexture.scale;
+	if (m.normal_scale != 0.0f)
+		set_texture(r, m.normal_texture, use, info_of(g.normalTexture, place + ".normalTexture"));
+	use.has_normal_map = m.normal_texture.image >= 0;
+	m.occlusion_strength = (float)g.occlusionTexture.strength;
+	if (m.occlusion_strength > 0.0f)
+		set_texture(r, m.occlusion_texture, use, info_of(g.occlusionTexture, place + ".occlusionTexture"));
+	for (size_t c = 0; c < 3 && c < g.emissiveFactor.size(); c++)
+		m.emissive[c] = (float)(g.emissiveFactor[c] * factor);
+	if (m.emissive[0] > 0.0f || m.emissive[1] > 0.0f || m.emissive[2] > 0.0f)
+		set_texture(r, m.emissive_texture, use, info_of(g.emissiveTexture, place + ".emissiveTexture"));
+}
+
+struct psr_material convert(reader &r, material_use &use, const tinygltf::Material &g, const std::string &place)
+{
+	auto glossiness = g.extensions.find("KHR_materials_pbrSpecularGlossiness");
 	struct psr_material m;
 
 	psr_material_default(&m);
-	return m;
-}
-
-struct psr_material convert(reader &r, const tinygltf::Material &g, const std::string &place)
-{
-	struct psr_material m = plain_material();
-	auto glossiness = g.extensions.find("KHR_materials_pbrSpecularGlossiness");
-	const auto &pbr = g.pbrMetallicRoughness;
-
-	if (glossiness != g.extensions.end() && glossiness->second.IsObject()) {
-		set_specular_glossiness(m, glossiness->second);
-	} else {
-		for (size_t c = 0; c < 4 && c < pbr.baseColorFactor.size(); c++)
-			m.base_color[c] = (float)pbr.baseColorFactor[c];
-		m.metallic = (float)pbr.metallicFactor;
-		m.roughness = (float)pbr.roughnessFactor;
-		if (pbr.metallicRoughnessTexture.index >= 0)
-			apply_roughness_texture(r, pbr.metallicRoughnessTexture.index, m, place);
-	}
-	if (base_texture(g).index >= 0)
-		set_texture(r, m, base_texture(g).index, place);
+	m.unlit = g.extensions.count("KHR_materials_unlit") != 0;
 	m.alpha = g.alphaMode == "MASK" ? PSR_ALPHA_MASK : g.alphaMode == "BLEND" ? PSR_ALPHA_BLEND : PSR_ALPHA_OPAQUE;
 	m.alpha_cutoff = (float)g.alphaCutoff;
 	m.two_sided = g.doubleSided;
-	m.unlit = g.extensions.count("KHR_materials_unlit") != 0;
-	if (g.normalTexture.index >= 0)
-		import_mesh_warn(&r.im, "normal maps are not used");
-	if (only_emits(g)) {
-		m.unlit = 1;
-		for (size_t c = 0; c < 3; c++)
-			m.base_color[c] = (float)g.emissiveFactor[c];
-	} else if (emits(g)) {
-		import_mesh_warn(&r.im, "emission is used only where nothing else colours a material");
-	}
+	if (glossiness != g.extensions.end() && glossiness->second.IsObject())
+		set_specular_glossiness(r, m, use, glossiness->second, place);
+	else
+		set_metallic_roughness(r, m, use, g.pbrMetallicRoughness, place);
+	if (!m.unlit)
+		set_relief_and_light(r, m, use, g, place);
 	return m;
+}
+
+int add_material(reader &r, const struct psr_material &m)
+{
+	struct psr_error error = {};
+	int index = import_mesh_add_material(&r.im, &m, &error);
+
+	if (index < 0)
+		refuse(error.code, "%s", error.text);
+	return index;
+}
+
+/* The material of `use` for points, which have no coordinates of textures. */
+int add_textureless(reader &r, const material_use &use)
+{
+	struct psr_material m = r.im.mesh->material[use.index];
+	bool has_texture = false;
+
+	for (struct psr_texture *t : { &m.base_texture, &m.metallic_roughness_texture, &m.emissive_texture,
+	                               &m.occlusion_texture, &m.normal_texture, &m.specular_texture }) {
+		has_texture |= t->image >= 0;
+		t->image = -1;
+	}
+	if (!has_texture)
+		return use.index;
+	import_mesh_warn(&r.im, "textures of points were left out");
+	return add_material(r, m);
 }
 
 } // namespace
@@ -242,34 +311,28 @@ int value_int(const tinygltf::Value &v, const char *key, int fallback)
 	return v.IsObject() && v.Has(key) && v.Get(key).IsInt() ? v.Get(key).GetNumberAsInt() : fallback;
 }
 
-int material_index(reader &r, int material, texture_use &use)
+const material_use &use_material(reader &r, int material, bool for_points)
 {
 	const size_t n = r.model.materials.size();
-	const std::string place = "materials[" + std::to_string(material) + "]";
-	struct psr_error error = {};
 
 	if (material >= 0 && (size_t)material >= n)
 		refuse(PSR_ERR_FORMAT, "material %d does not exist, there are %zu", material, n);
 
-	int &made = r.material_of[material < 0 ? n : (size_t)material];
+	material_use &use = r.materials[material < 0 ? n : (size_t)material];
 
-	if (made < 0) {
+	if (use.index < 0) {
+		struct psr_material m;
+
 		/* Nothing is said about a primitive without a material. glTF's default is a rough metal, which has no diffuse
 		 * color to show without surroundings to mirror, so it is matt and white here. */
-		struct psr_material m = material < 0 ? plain_material() : convert(r, r.model.materials[(size_t)material],
-		                                                                  place);
-
-		made = import_mesh_add_material(&r.im, &m, &error);
-		if (made < 0)
-			refuse(error.code, "%s", error.text);
+		psr_material_default(&m);
+		if (material >= 0)
+			m = convert(r, use, r.model.materials[(size_t)material], "materials[" + std::to_string(material) + "]");
+		use.index = add_material(r, m);
 	}
-	if (material >= 0) {
-		tinygltf::TextureInfo info = base_texture(r.model.materials[(size_t)material]);
-
-		if (info.index >= 0)
-			use_texture(use, info.texCoord, info.extensions);
-	}
-	return made;
+	if (for_points && use.point_index < 0)
+		use.point_index = add_textureless(r, use);
+	return use;
 }
 
 } // namespace gltf

@@ -5,21 +5,6 @@ namespace gltf {
 
 namespace {
 
-transform multiply(const transform &a, const transform &b)
-{
-	transform out;
-
-	for (int col = 0; col < 4; col++)
-		for (int row = 0; row < 4; row++) {
-			double sum = 0.0;
-
-			for (int k = 0; k < 4; k++)
-				sum += a.m[4 * k + row] * b.m[4 * col + k];
-			out.m[4 * col + row] = sum;
-		}
-	return out;
-}
-
 void check_length(const std::vector<double> &v, size_t n, const char *what, int node)
 {
 	if (!v.empty() && v.size() != n)
@@ -66,46 +51,43 @@ transform local_transform(const tinygltf::Node &node, int index)
 	return out;
 }
 
-std::vector<int> root_nodes(const tinygltf::Model &model)
+std::vector<int> parentless(const tinygltf::Model &model)
 {
 	std::vector<char> is_child(model.nodes.size(), 0);
-	std::vector<int> roots;
-	int scene = model.defaultScene;
+	std::vector<int> out;
 
-	if (scene >= 0 && (size_t)scene >= model.scenes.size())
-		refuse(PSR_ERR_FORMAT, "scene %d does not exist, there are %zu", scene, model.scenes.size());
-	if (!model.scenes.empty())
-		return model.scenes[(size_t)(scene < 0 ? 0 : scene)].nodes;
 	for (const tinygltf::Node &node : model.nodes)
 		for (int child : node.children)
 			if (child >= 0 && (size_t)child < is_child.size())
 				is_child[(size_t)child] = 1;
 	for (size_t i = 0; i < is_child.size(); i++)
 		if (!is_child[i])
-			roots.push_back((int)i);
-	if (roots.empty() && !model.nodes.empty())
-		refuse(PSR_ERR_FORMAT, "every node is the child of another: the nodes form a cycle");
-	return roots;
+			out.push_back((int)i);
+	return out;
 }
 
-} // namespace
+const std::vector<int> &scene_roots(const tinygltf::Model &model, const std::vector<int> &all)
+{
+	int scene = model.defaultScene;
+
+	if (scene >= 0 && (size_t)scene >= model.scenes.size())
+		refuse(PSR_ERR_FORMAT, "scene %d does not exist, there are %zu", scene, model.scenes.size());
+	if (!model.scenes.empty())
+		return model.scenes[(size_t)(scene < 0 ? 0 : scene)].nodes;
+	if (all.empty() && !model.nodes.empty())
+		refuse(PSR_ERR_FORMAT, "every node is the child of another: the nodes form a cycle");
+	return all;
+}
 
 /* Nodes form trees: each is reached once, so the walk ends, and its cost is bounded by their number. */
-std::vector<placement> place_meshes(reader &r)
+void walk(reader &r, const std::vector<int> &roots, bool is_scene)
 {
 	struct open_node {
 		int node;
 		transform parent;
 	};
 	const tinygltf::Model &model = r.model;
-	std::vector<char> reached(model.nodes.size(), 0);
-	std::vector<placement> out;
 	std::vector<open_node> stack;
-
-	if (model.nodes.empty())
-		for (size_t i = 0; i < model.meshes.size(); i++)
-			out.push_back({ (int)i, transform() });
-	const std::vector<int> roots = root_nodes(model);
 
 	for (size_t i = roots.size(); i-- > 0;)
 		stack.push_back({ roots[i], transform() });
@@ -115,26 +97,50 @@ std::vector<placement> place_meshes(reader &r)
 		stack.pop_back();
 		if (at.node < 0 || (size_t)at.node >= model.nodes.size())
 			refuse(PSR_ERR_FORMAT, "node %d does not exist, there are %zu", at.node, model.nodes.size());
-		if (reached[(size_t)at.node])
+		if (r.is_placed[(size_t)at.node] && !is_scene)
+			continue;
+		if (r.is_placed[(size_t)at.node])
 			refuse(PSR_ERR_FORMAT, "nodes[%d] is reached twice: the nodes form a cycle, or it has two parents",
 			       at.node);
-		reached[(size_t)at.node] = 1;
 
 		const tinygltf::Node &node = model.nodes[(size_t)at.node];
-		transform world = multiply(at.parent, local_transform(node, at.node));
 
-		if (node.mesh >= 0) {
-			if ((size_t)node.mesh >= model.meshes.size())
-				refuse(PSR_ERR_FORMAT, "nodes[%d]: mesh %d does not exist, there are %zu", at.node, node.mesh,
-				       model.meshes.size());
-			out.push_back({ node.mesh, world });
-			if (node.skin >= 0)
-				import_mesh_warn(&r.im, "skins are not used: the mesh stands as it was modelled");
-		}
+		r.is_placed[(size_t)at.node] = 1;
+		r.world[(size_t)at.node] = multiply(at.parent, local_transform(node, at.node));
+		if (is_scene)
+			r.scene.push_back(at.node);
 		for (size_t i = node.children.size(); i-- > 0;)
-			stack.push_back({ node.children[i], world });
+			stack.push_back({ node.children[i], r.world[(size_t)at.node] });
 	}
+}
+
+} // namespace
+
+transform multiply(const transform &a, const transform &b)
+{
+	transform out;
+
+	for (int col = 0; col < 4; col++)
+		for (int row = 0; row < 4; row++) {
+			double sum = 0.0;
+
+			for (int k = 0; k < 4; k++)
+				sum += a.m[4 * k + row] * b.m[4 * col + k];
+			out.m[4 * col + row] = sum;
+		}
 	return out;
+}
+
+void place_nodes(reader &r)
+{
+	const std::vector<int> all = parentless(r.model);
+
+	r.world.resize(r.model.nodes.size());
+	r.is_placed.assign(r.model.nodes.size(), 0);
+	walk(r, scene_roots(r.model, all), true);
+	/* Joints may stand outside of the scene. */
+	if (!r.model.skins.empty())
+		walk(r, all, false);
 }
 
 } // namespace gltf

@@ -16,6 +16,7 @@ extern "C" {
 #define IMPORT_MAX_FILE 0xffffffffull         /* bytes of one file; a .glb cannot say more */
 #define IMPORT_MAX_VERTICES (UINT64_C(1) << 27)
 #define IMPORT_MAX_TRIANGLES (UINT64_C(1) << 28)
+#define IMPORT_MAX_POINTS (UINT64_C(1) << 27)
 #define IMPORT_MAX_IMAGE_SIDE 16384
 #define IMPORT_MAX_PIXELS (UINT64_C(1) << 28) /* of all images of one mesh */
 #define IMPORT_MAX_MATERIALS 65536
@@ -26,32 +27,71 @@ extern "C" {
 struct import_mesh {
 	struct psr_mesh *mesh;
 	const char *path; /* of the source file, for error texts; the caller's */
-	uint64_t vertex_capacity, triangle_capacity;
+	uint64_t vertex_capacity, triangle_capacity, point_capacity;
 	uint64_t n_pixels;
 };
 
 int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err);
 void import_mesh_fini(struct import_mesh *im);
 
-/* Adds vertices (all 0, color 1,1,1,1) and triangles (all 0) at the end. uv and color exist from the first call that
- * asks for them. LIMIT, MEMORY. */
-int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, int has_uv, int has_color,
+/* What vertices may have beside a position and a normal. */
+enum {
+	IMPORT_HAS_UV0 = 1, /* IMPORT_HAS_UV0 << set */
+	IMPORT_HAS_UV1 = 2,
+	IMPORT_HAS_TANGENT = 4,
+	IMPORT_HAS_COLOR = 8,
+};
+
+/* Adds vertices (all 0, color 1,1,1,1) and triangles (all 0) at the end. uv, tangent and color exist from the first call
+ * whose `has`, a sum of IMPORT_HAS_*, asks for them. LIMIT, MEMORY. */
+int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, unsigned has,
                      struct psr_error *err);
+
+/* Adds points (all 0, color 1,1,1,1) at the end. point_color exists from the first call with has_color. A radius of 0
+ * and a normal of 0,0,0 are filled in before the mesh is handed over. LIMIT, MEMORY. */
+int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_color, struct psr_error *err);
+
+/* The arrays that exist with an element a vertex: where the pointer is (a float (**)[3] or the like), and the bytes of an
+ * element; position and normal come first. Returns how many. */
+#define IMPORT_MAX_COLUMNS (4 + PSR_UV_SETS)
+struct import_column {
+	void *array;
+	size_t size;
+};
+int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh);
+int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh);
+void *import_column_at(const struct import_column *column, uint64_t i);
 
 /* Return the index of what was added, or a negative code. `name` is what error texts call the image. */
 int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err);
 int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, const char *name,
                           struct psr_error *err);
 
+/* presets.c: adds what a client can ask for by name. A name is made printable, short enough (cut at a character) and
+ * unlike the others of its kind; "" becomes "camera 1" or "light 1", and so on. Beyond PSR_MAX_PRESETS nothing is added,
+ * with a warning. MEMORY. */
+int import_mesh_add_camera(struct import_mesh *im, const char *name, const struct psr_camera *camera,
+                           struct psr_error *err);
+int import_mesh_add_light(struct import_mesh *im, const char *name, const struct psr_light *light,
+                          struct psr_error *err);
+
 /* Adds to the mesh's warning, separated by "; "; the same text is said once, and what does not fit is left out. */
 void import_mesh_warn(struct import_mesh *im, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Repairs and checks what psr/mesh.h promises (drops triangles, unit normals, no unused vertex), then hands the mesh
- * to *out. FORMAT for an index out of range or a mesh without a triangle. */
+/* Repairs and checks what psr/mesh.h promises (drops triangles and points, unit normals, no unused vertex), then hands
+ * the mesh to *out. FORMAT for an index out of range or a mesh without a triangle and a point. */
 int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr_error *err);
 
-/* repair.c: the first half of import_mesh_finish; leaves n_triangles possibly 0. */
+/* repair.c: the first half of import_mesh_finish; leaves n_triangles and n_points possibly 0. Radii of points stay as
+ * they are, their normals get unit length or stay 0. */
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err);
+
+/* duplicates.c: drops each triangle that has the positions, the winding and the material of one before it; returns their
+ * number in *n_dropped. No index is out of range. MEMORY. */
+int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, struct psr_error *err);
+
+/* material.c: puts factors and transforms that are not finite, or out of range, right. */
+void import_material_tidy(struct psr_material *material);
 
 /* weld.c: *first_of[v] is the first vertex at v's position, or with everything the same if `whole`; the caller
  * frees. */

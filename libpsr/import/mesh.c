@@ -1,5 +1,4 @@
 #include <assert.h>
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,10 +13,19 @@ void psr_mesh_destroy(struct psr_mesh *mesh)
 		free(mesh->image[i].rgba);
 	free(mesh->position);
 	free(mesh->normal);
-	free(mesh->uv[0]);
+	free(mesh->tangent);
+	for (int set = 0; set < PSR_UV_SETS; set++)
+		free(mesh->uv[set]);
 	free(mesh->color);
 	free(mesh->triangle);
 	free(mesh->triangle_material);
+	free(mesh->point);
+	free(mesh->point_normal);
+	free(mesh->point_radius);
+	free(mesh->point_color);
+	free(mesh->point_material);
+	free(mesh->camera);
+	free(mesh->light);
 	free(mesh->material);
 	free(mesh->image);
 	free(mesh);
@@ -60,16 +68,109 @@ static uint64_t next_capacity(uint64_t capacity, uint64_t needed, uint64_t max)
 	return grown < max ? grown : max;
 }
 
-static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles)
+static int put_column(struct import_column *out, int n, void *array, size_t size)
+{
+	void *block;
+
+	memcpy(&block, array, sizeof block);
+	if (block == NULL)
+		return n;
+	out[n] = (struct import_column){ array, size };
+	return n + 1;
+}
+
+int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
+{
+	int n = 0;
+
+	n = put_column(out, n, &mesh->position, sizeof *mesh->position);
+	n = put_column(out, n, &mesh->normal, sizeof *mesh->normal);
+	for (int set = 0; set < PSR_UV_SETS; set++)
+		n = put_column(out, n, &mesh->uv[set], sizeof *mesh->uv[set]);
+	n = put_column(out, n, &mesh->tangent, sizeof *mesh->tangent);
+	return put_column(out, n, &mesh->color, sizeof *mesh->color);
+}
+
+int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
+{
+	int n = 0;
+
+	n = put_column(out, n, &mesh->point, sizeof *mesh->point);
+	n = put_column(out, n, &mesh->point_normal, sizeof *mesh->point_normal);
+	n = put_column(out, n, &mesh->point_radius, sizeof *mesh->point_radius);
+	n = put_column(out, n, &mesh->point_material, sizeof *mesh->point_material);
+	return put_column(out, n, &mesh->point_color, sizeof *mesh->point_color);
+}
+
+void *import_column_at(const struct import_column *column, uint64_t i)
+{
+	char *block;
+
+	memcpy(&block, column->array, sizeof block);
+	return block + i * column->size;
+}
+
+static int resize_columns(const struct import_column *column, int n, uint64_t n_elements)
+{
+	for (int i = 0; i < n; i++)
+		if (!resize(column[i].array, n_elements, column[i].size))
+			return 0;
+	return 1;
+}
+
+static void clear_columns(const struct import_column *column, int n, uint64_t first, uint64_t n_elements)
+{
+	for (int i = 0; i < n && n_elements > 0; i++)
+		memset(import_column_at(&column[i], first), 0, n_elements * column[i].size);
+}
+
+static void fill_white(float (*color)[4], uint64_t first, uint64_t end)
+{
+	for (uint64_t i = first; color != NULL && i < end; i++)
+		for (int c = 0; c < 4; c++)
+			color[i][c] = 1.0f;
+}
+
+/* An array of n elements of 0 at *array, a pointer of any type, unless there is one or it is not wanted. */
+static int create(void *array, int wanted, uint64_t n, size_t size)
+{
+	void *block;
+
+	memcpy(&block, array, sizeof block);
+	if (block != NULL || !wanted)
+		return 1;
+	block = calloc(n > 0 ? (size_t)n : 1, size);
+	memcpy(array, &block, sizeof block);
+	return block != NULL;
+}
+
+static int create_vertex_columns(struct import_mesh *im, unsigned has)
 {
 	struct psr_mesh *mesh = im->mesh;
+	const uint64_t n = im->vertex_capacity;
+	const int new_color = mesh->color == NULL;
 
-	if (n_vertices > im->vertex_capacity) {
+	for (unsigned set = 0; set < PSR_UV_SETS; set++)
+		if (!create(&mesh->uv[set], (has & IMPORT_HAS_UV0 << set) != 0, n, sizeof *mesh->uv[set]))
+			return 0;
+	if (!create(&mesh->tangent, (has & IMPORT_HAS_TANGENT) != 0, n, sizeof *mesh->tangent) ||
+	    !create(&mesh->color, (has & IMPORT_HAS_COLOR) != 0, n, sizeof *mesh->color))
+		return 0;
+	if (new_color)
+		fill_white(mesh->color, 0, mesh->n_vertices);
+	return 1;
+}
+
+static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles)
+{
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	struct psr_mesh *mesh = im->mesh;
+
+	if (n_vertices > im->vertex_capacity || mesh->position == NULL) {
 		uint64_t n = next_capacity(im->vertex_capacity, n_vertices, IMPORT_MAX_VERTICES);
 
-		if (!resize(&mesh->position, n, sizeof *mesh->position) || !resize(&mesh->normal, n, sizeof *mesh->normal) ||
-		    (mesh->uv[0] != NULL && !resize(&mesh->uv[0], n, sizeof *mesh->uv[0])) ||
-		    (mesh->color != NULL && !resize(&mesh->color, n, sizeof *mesh->color)))
+		if (!create(&mesh->position, 1, 1, sizeof *mesh->position) || !create(&mesh->normal, 1, 1, sizeof *mesh->normal) ||
+		    !resize_columns(column, import_vertex_columns(column, mesh), n))
 			return 0;
 		im->vertex_capacity = n;
 	}
@@ -84,43 +185,21 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 	return 1;
 }
 
-static void fill_white(float (*color)[4], uint64_t first, uint64_t end)
-{
-	for (uint64_t i = first; i < end; i++)
-		for (int c = 0; c < 4; c++)
-			color[i][c] = 1.0f;
-}
-
-int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, int has_uv, int has_color,
+int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, unsigned has,
                      struct psr_error *err)
 {
+	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t old_v = mesh->n_vertices, old_t = mesh->n_triangles;
 
 	if (n_vertices > IMPORT_MAX_VERTICES - old_v || n_triangles > IMPORT_MAX_TRIANGLES - old_t)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu vertices or %llu triangles", im->path,
 		                (unsigned long long)IMPORT_MAX_VERTICES, (unsigned long long)IMPORT_MAX_TRIANGLES);
-	if (!reserve(im, old_v + n_vertices, old_t + n_triangles))
-		goto no_memory;
-	if (has_uv && mesh->uv[0] == NULL) {
-		mesh->uv[0] = calloc(im->vertex_capacity > 0 ? im->vertex_capacity : 1, sizeof *mesh->uv[0]);
-		if (mesh->uv[0] == NULL)
-			goto no_memory;
-	}
-	if (has_color && mesh->color == NULL) {
-		mesh->color = malloc(im->vertex_capacity > 0 ? im->vertex_capacity * sizeof *mesh->color : 1);
-		if (mesh->color == NULL)
-			goto no_memory;
-		fill_white(mesh->color, 0, old_v);
-	}
-	if (n_vertices > 0) {
-		memset(mesh->position + old_v, 0, n_vertices * sizeof *mesh->position);
-		memset(mesh->normal + old_v, 0, n_vertices * sizeof *mesh->normal);
-		if (mesh->uv[0] != NULL)
-			memset(mesh->uv[0] + old_v, 0, n_vertices * sizeof *mesh->uv[0]);
-		if (mesh->color != NULL)
-			fill_white(mesh->color, old_v, old_v + n_vertices);
-	}
+	if (!reserve(im, old_v + n_vertices, old_t + n_triangles) || !create_vertex_columns(im, has))
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %llu vertices and %llu triangles", im->path,
+		                (unsigned long long)(old_v + n_vertices), (unsigned long long)(old_t + n_triangles));
+	clear_columns(column, import_vertex_columns(column, mesh), old_v, n_vertices);
+	fill_white(mesh->color, old_v, old_v + n_vertices);
 	if (n_triangles > 0) {
 		memset(mesh->triangle + old_t, 0, n_triangles * sizeof *mesh->triangle);
 		memset(mesh->triangle_material + old_t, 0, n_triangles * sizeof *mesh->triangle_material);
@@ -128,9 +207,48 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
 	mesh->n_vertices = (uint32_t)(old_v + n_vertices);
 	mesh->n_triangles = (uint32_t)(old_t + n_triangles);
 	return PSR_OK;
-no_memory:
-	return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %llu vertices and %llu triangles", im->path,
-	                (unsigned long long)(old_v + n_vertices), (unsigned long long)(old_t + n_triangles));
+}
+
+static int reserve_points(struct import_mesh *im, uint64_t n_points, int has_color)
+{
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	struct psr_mesh *mesh = im->mesh;
+	const int new_color = mesh->point_color == NULL;
+
+	if (n_points > im->point_capacity) {
+		uint64_t n = next_capacity(im->point_capacity, n_points, IMPORT_MAX_POINTS);
+
+		if (!create(&mesh->point, 1, 1, sizeof *mesh->point) ||
+		    !create(&mesh->point_normal, 1, 1, sizeof *mesh->point_normal) ||
+		    !create(&mesh->point_radius, 1, 1, sizeof *mesh->point_radius) ||
+		    !create(&mesh->point_material, 1, 1, sizeof *mesh->point_material) ||
+		    !resize_columns(column, import_point_columns(column, mesh), n))
+			return 0;
+		im->point_capacity = n;
+	}
+	if (!create(&mesh->point_color, has_color && n_points > 0, im->point_capacity, sizeof *mesh->point_color))
+		return 0;
+	if (new_color)
+		fill_white(mesh->point_color, 0, mesh->n_points);
+	return 1;
+}
+
+int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_color, struct psr_error *err)
+{
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	struct psr_mesh *mesh = im->mesh;
+	uint64_t old = mesh->n_points;
+
+	if (n_points > IMPORT_MAX_POINTS - old)
+		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu points", im->path,
+		                (unsigned long long)IMPORT_MAX_POINTS);
+	if (!reserve_points(im, old + n_points, has_color))
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %llu points", im->path,
+		                (unsigned long long)(old + n_points));
+	clear_columns(column, import_point_columns(column, mesh), old, n_points);
+	fill_white(mesh->point_color, old, old + n_points);
+	mesh->n_points = (uint32_t)(old + n_points);
+	return PSR_OK;
 }
 
 int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err)
@@ -182,45 +300,15 @@ void import_mesh_warn(struct import_mesh *im, const char *format, ...)
 	memcpy(warning + used, text, n + 1);
 }
 
-static float clamp(float x, float low, float high, float otherwise)
+/* Shrinking cannot fail in a way that matters: the old block stays. */
+static void shrink(struct psr_mesh *mesh)
 {
-	return !isfinite(x) ? otherwise : x < low ? low : x > high ? high : x;
-}
+	struct import_column column[IMPORT_MAX_COLUMNS];
 
-static void no_texture(struct psr_texture *texture)
-{
-	*texture = (struct psr_texture){ .image = -1, .transform = { 1, 0, 0, 0, 1, 0 } };
-}
-
-void psr_material_default(struct psr_material *material)
-{
-	memset(material, 0, sizeof *material);
-	for (int c = 0; c < 4; c++)
-		material->base_color[c] = 1;
-	material->roughness = 1;
-	material->occlusion_strength = 1;
-	material->normal_scale = 1;
-	for (int c = 0; c < 3; c++)
-		material->specular[c] = 1;
-	material->glossiness = 1;
-	material->alpha_cutoff = 0.5f;
-	no_texture(&material->base_texture);
-	no_texture(&material->metallic_roughness_texture);
-	no_texture(&material->emissive_texture);
-	no_texture(&material->occlusion_texture);
-	no_texture(&material->normal_texture);
-	no_texture(&material->specular_texture);
-}
-
-static void tidy_material(struct psr_material *m, uint32_t n_images)
-{
-	for (int c = 0; c < 4; c++)
-		m->base_color[c] = clamp(m->base_color[c], 0.0f, 1.0f, 1.0f);
-	m->metallic = clamp(m->metallic, 0.0f, 1.0f, 0.0f);
-	m->roughness = clamp(m->roughness, 0.0f, 1.0f, 1.0f);
-	m->alpha_cutoff = clamp(m->alpha_cutoff, 0.0f, 2.0f, 0.5f);
-	assert(m->base_texture.image >= -1 && m->base_texture.image < (int)n_images);
-	(void)n_images;
+	(void)resize_columns(column, import_vertex_columns(column, mesh), mesh->n_vertices);
+	(void)resize_columns(column, import_point_columns(column, mesh), mesh->n_points);
+	(void)resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);
+	(void)resize(&mesh->triangle_material, mesh->n_triangles, sizeof *mesh->triangle_material);
 }
 
 int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr_error *err)
@@ -230,23 +318,15 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 
 	if (rc != PSR_OK)
 		return rc;
-	if (mesh->n_triangles == 0)
+	if (mesh->n_triangles == 0 && mesh->n_points == 0)
 		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: no triangle to draw (%u degenerate or not finite, %u points and lines were left out)",
-			im->path,
-		                mesh->n_dropped_triangles, mesh->n_dropped_primitives);
+		                "%s: no triangle and no point to draw (%u faces without area, twice there or not finite, and %u "
+		                "lines and points were left out)",
+		                im->path, mesh->n_dropped_triangles, mesh->n_dropped_primitives);
 	assert(mesh->n_materials > 0);
 	for (uint32_t i = 0; i < mesh->n_materials; i++)
-		tidy_material(&mesh->material[i], mesh->n_images);
-	/* Shrinking cannot fail in a way that matters: the old block stays. */
-	(void)resize(&mesh->position, mesh->n_vertices, sizeof *mesh->position);
-	(void)resize(&mesh->normal, mesh->n_vertices, sizeof *mesh->normal);
-	if (mesh->uv[0] != NULL)
-		(void)resize(&mesh->uv[0], mesh->n_vertices, sizeof *mesh->uv[0]);
-	if (mesh->color != NULL)
-		(void)resize(&mesh->color, mesh->n_vertices, sizeof *mesh->color);
-	(void)resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);
-	(void)resize(&mesh->triangle_material, mesh->n_triangles, sizeof *mesh->triangle_material);
+		import_material_tidy(&mesh->material[i]);
+	shrink(mesh);
 	*out = mesh;
 	im->mesh = NULL;
 	return PSR_OK;

@@ -49,30 +49,51 @@ static int check_indices(const struct import_mesh *im, struct psr_error *err)
 	return PSR_OK;
 }
 
-static void drop_triangles(struct psr_mesh *mesh)
+static void drop_triangles(struct import_mesh *im)
 {
-	uint32_t kept = 0;
+	struct psr_mesh *mesh = im->mesh;
+	uint32_t kept = 0, n_flat = 0, n_infinite = 0;
 
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		const uint32_t *v = mesh->triangle[t];
 		const double *a = mesh->position[v[0]], *b = mesh->position[v[1]], *c = mesh->position[v[2]];
 
-		if (!is_finite3(a) || !is_finite3(b) || !is_finite3(c) || !has_area(a, b, c))
-			continue;
-		if (kept != t) {
-			memcpy(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
-			mesh->triangle_material[kept] = mesh->triangle_material[t];
+		if (!is_finite3(a) || !is_finite3(b) || !is_finite3(c)) {
+			n_infinite++;
+		} else if (!has_area(a, b, c)) {
+			n_flat++;
+		} else {
+			memmove(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
+			mesh->triangle_material[kept++] = mesh->triangle_material[t];
 		}
-		kept++;
 	}
-	mesh->n_dropped_triangles += mesh->n_triangles - kept;
 	mesh->n_triangles = kept;
+	mesh->n_dropped_triangles += n_flat + n_infinite;
+	if (n_flat > 0)
+		import_mesh_warn(im, "faces without area were left out: %u", n_flat);
+	if (n_infinite > 0)
+		import_mesh_warn(im, "faces with a corner that is not finite were left out: %u", n_infinite);
+}
+
+static int drop_doubles(struct import_mesh *im, struct psr_error *err)
+{
+	uint32_t n;
+	int rc = import_mesh_drop_duplicates(&n, im, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	im->mesh->n_dropped_triangles += n;
+	if (n > 0)
+		import_mesh_warn(im, "faces that were there twice were left out: %u", n);
+	return PSR_OK;
 }
 
 /* Vertices that no triangle uses would widen the bounds, and may be anything but finite. */
 static int drop_vertices(struct import_mesh *im, struct psr_error *err)
 {
+	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
+	const int n_columns = import_vertex_columns(column, mesh);
 	uint32_t *target = calloc(mesh->n_vertices > 0 ? mesh->n_vertices : 1, sizeof *target), kept = 0;
 
 	if (target == NULL)
@@ -83,14 +104,8 @@ static int drop_vertices(struct import_mesh *im, struct psr_error *err)
 	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 		if (target[v] == 0)
 			continue;
-		if (kept != v) {
-			memcpy(mesh->position[kept], mesh->position[v], sizeof mesh->position[v]);
-			memcpy(mesh->normal[kept], mesh->normal[v], sizeof mesh->normal[v]);
-			if (mesh->uv[0] != NULL)
-				memcpy(mesh->uv[0][kept], mesh->uv[0][v], sizeof mesh->uv[0][v]);
-			if (mesh->color != NULL)
-				memcpy(mesh->color[kept], mesh->color[v], sizeof mesh->color[v]);
-		}
+		for (int i = 0; kept != v && i < n_columns; i++)
+			memcpy(import_column_at(&column[i], kept), import_column_at(&column[i], v), column[i].size);
 		target[v] = kept++;
 	}
 	for (uint32_t t = 0; kept < mesh->n_vertices && t < mesh->n_triangles; t++)
@@ -98,6 +113,30 @@ static int drop_vertices(struct import_mesh *im, struct psr_error *err)
 			mesh->triangle[t][c] = target[mesh->triangle[t][c]];
 	mesh->n_vertices = kept;
 	free(target);
+	return PSR_OK;
+}
+
+static int drop_points(struct import_mesh *im, struct psr_error *err)
+{
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	struct psr_mesh *mesh = im->mesh;
+	const int n_columns = import_point_columns(column, mesh);
+	uint32_t kept = 0;
+
+	for (uint32_t p = 0; p < mesh->n_points; p++) {
+		if (mesh->point_material[p] >= mesh->n_materials)
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: point %u refers to material %u, but there are only %u", im->path, p,
+			                mesh->point_material[p], mesh->n_materials);
+		if (!is_finite3(mesh->point[p]))
+			continue;
+		for (int i = 0; kept != p && i < n_columns; i++)
+			memcpy(import_column_at(&column[i], kept), import_column_at(&column[i], p), column[i].size);
+		kept++;
+	}
+	if (kept < mesh->n_points)
+		import_mesh_warn(im, "points that are not finite were left out: %u", mesh->n_points - kept);
+	mesh->n_dropped_primitives += mesh->n_points - kept;
+	mesh->n_points = kept;
 	return PSR_OK;
 }
 
@@ -118,17 +157,35 @@ static void unit_normal(float n[3])
 	n[2] = (float)(z / length);
 }
 
-static void tidy_vertices(struct psr_mesh *mesh)
+/* The handedness stays, and is right-handed where it is none; without a direction there is no tangent. */
+static void unit_tangent(float t[4])
+{
+	unit_normal(t);
+	t[3] = t[0] == 0.0f && t[1] == 0.0f && t[2] == 0.0f ? 0.0f : t[3] < 0.0f ? -1.0f : 1.0f;
+}
+
+static void tidy_color(float color[4])
+{
+	for (int c = 0; c < 4; c++)
+		color[c] = isnan(color[c]) ? 1.0f : color[c] < 0.0f ? 0.0f : color[c] > 1.0f ? 1.0f : color[c];
+}
+
+static void tidy_elements(struct psr_mesh *mesh)
 {
 	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 		unit_normal(mesh->normal[v]);
-		if (mesh->uv[0] != NULL && !(isfinite(mesh->uv[0][v][0]) && isfinite(mesh->uv[0][v][1])))
-			mesh->uv[0][v][0] = mesh->uv[0][v][1] = 0.0f;
-		for (int c = 0; mesh->color != NULL && c < 4; c++) {
-			float x = mesh->color[v][c];
-
-			mesh->color[v][c] = isnan(x) ? 1.0f : x < 0.0f ? 0.0f : x > 1.0f ? 1.0f : x;
-		}
+		if (mesh->tangent != NULL)
+			unit_tangent(mesh->tangent[v]);
+		for (int set = 0; set < PSR_UV_SETS; set++)
+			if (mesh->uv[set] != NULL && !(isfinite(mesh->uv[set][v][0]) && isfinite(mesh->uv[set][v][1])))
+				mesh->uv[set][v][0] = mesh->uv[set][v][1] = 0.0f;
+		if (mesh->color != NULL)
+			tidy_color(mesh->color[v]);
+	}
+	for (uint32_t p = 0; p < mesh->n_points; p++) {
+		unit_normal(mesh->point_normal[p]);
+		if (mesh->point_color != NULL)
+			tidy_color(mesh->point_color[p]);
 	}
 }
 
@@ -136,12 +193,15 @@ int import_mesh_repair(struct import_mesh *im, struct psr_error *err)
 {
 	int rc = check_indices(im, err);
 
-	if (rc != PSR_OK)
-		return rc;
-	drop_triangles(im->mesh);
-	rc = drop_vertices(im, err);
-	if (rc != PSR_OK)
-		return rc;
-	tidy_vertices(im->mesh);
-	return PSR_OK;
+	if (rc == PSR_OK) {
+		drop_triangles(im);
+		rc = drop_doubles(im, err);
+	}
+	if (rc == PSR_OK)
+		rc = drop_vertices(im, err);
+	if (rc == PSR_OK)
+		rc = drop_points(im, err);
+	if (rc == PSR_OK)
+		tidy_elements(im->mesh);
+	return rc;
 }

@@ -4,35 +4,30 @@
 #include "import.h"
 
 #define EMPTY UINT32_MAX
-#define MAX_KEY (sizeof(double[3]) + sizeof(float[3]) + sizeof(float[2]) + sizeof(float[4]))
+#define MAX_KEY 128
 
 /* What makes vertices the same: the position, or everything. Adding 0 makes one zero of the two. */
-static size_t key_of(const struct psr_mesh *mesh, uint32_t v, int whole, uint8_t key[MAX_KEY])
+static size_t key_of(const struct import_column *column, int n_columns, uint32_t v, uint8_t key[MAX_KEY])
 {
 	double position[3];
 	size_t n = sizeof position;
 
+	memcpy(position, import_column_at(&column[0], v), sizeof position);
 	for (int c = 0; c < 3; c++)
-		position[c] = mesh->position[v][c] + 0.0;
+		position[c] += 0.0;
 	memcpy(key, position, n);
-	if (!whole)
-		return n;
-	memcpy(key + n, mesh->normal[v], sizeof mesh->normal[v]);
-	n += sizeof mesh->normal[v];
-	if (mesh->uv[0] != NULL) {
-		memcpy(key + n, mesh->uv[0][v], sizeof mesh->uv[0][v]);
-		n += sizeof mesh->uv[0][v];
-	}
-	if (mesh->color != NULL) {
-		memcpy(key + n, mesh->color[v], sizeof mesh->color[v]);
-		n += sizeof mesh->color[v];
+	for (int i = 1; i < n_columns; i++) {
+		memcpy(key + n, import_column_at(&column[i], v), column[i].size);
+		n += column[i].size;
 	}
 	return n;
 }
 
 int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int whole, struct psr_error *err)
 {
+	struct import_column column[IMPORT_MAX_COLUMNS];
 	const struct psr_mesh *mesh = im->mesh;
+	const int n_columns = import_vertex_columns(column, im->mesh);
 	uint64_t n_slots = 16, mask;
 	uint32_t *slot, *first;
 
@@ -49,11 +44,11 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int wh
 	memset(slot, 0xff, n_slots * sizeof *slot);
 	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 		uint8_t key[MAX_KEY], other[MAX_KEY];
-		size_t n = key_of(mesh, v, whole, key);
+		size_t n = key_of(column, whole ? n_columns : 1, v, key);
 		uint64_t at = XXH64(key, n, 0) & mask;
 
 		while (slot[at] != EMPTY) {
-			key_of(mesh, slot[at], whole, other);
+			key_of(column, whole ? n_columns : 1, slot[at], other);
 			if (memcmp(key, other, n) == 0)
 				break;
 			at = (at + 1) & mask;

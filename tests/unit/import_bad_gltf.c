@@ -130,7 +130,7 @@ static void vertices_beyond_doubles_leave_no_triangle(void **state)
 	(void)state;
 	refuse_changed("'nodes':[{'mesh':0}]",
 	               "'nodes':[{'children':[1],'scale':[1e200,1,1]},{'mesh':0,'scale':[1e200,1,1]}]",
-	               PSR_ERR_FORMAT, "2 degenerate or not finite");
+	               PSR_ERR_FORMAT, "2 faces without area, twice there or not finite");
 }
 
 static void required_extensions_that_are_missing_are_named(void **state)

@@ -67,7 +67,8 @@ struct psr_mesh {
 	uint32_t n_vertices, n_triangles, n_points, n_materials, n_images;
 	double (*position)[3];          /* n_vertices, finite */
 	float (*normal)[3];             /* n_vertices, unit length; 0,0,0 where the source has none: the face's own is taken */
-	float (*tangent)[4];            /* n_vertices, unit length and handedness (+-1), as in glTF; or NULL: made of uv */
+	float (*tangent)[4];            /* n_vertices, unit length and handedness (+-1), as in glTF; 0,0,0,0 where the source has
+	                                 * none; or NULL: made of uv */
 	float (*uv[PSR_UV_SETS])[2];    /* n_vertices, or NULL; v grows downwards, (0,0) is the image's top left, as in glTF */
 	float (*color)[4];              /* n_vertices, linear RGBA, multiplies the base colour; or NULL */
 	uint32_t (*triangle)[3];        /* n_triangles, each index < n_vertices, counter-clockwise seen from the front */
@@ -87,7 +88,7 @@ struct psr_mesh {
 	struct psr_preset_light *light;
 
 	/* What was repaired or left out while importing, for the report; never silent. */
-	uint32_t n_dropped_triangles;   /* degenerate, or with a vertex that is not finite */
+	uint32_t n_dropped_triangles;   /* degenerate, twice there, or with a vertex that is not finite */
 	uint32_t n_dropped_primitives;  /* lines, and points that are not finite */
 	char warning[PSR_ERROR_TEXT];   /* one sentence for a person, or "" */
 };
