@@ -122,6 +122,8 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 	return 0;
 }
 
+int dice_is_covered(const struct level *level, const struct surface_spot *spot);
+int dice_is_covered(const struct level *level, const struct surface_spot *spot){return is_covered(level,spot);}
 static int keep_corner(struct level *level, unsigned projection, const struct corner *corner)
 {
 	level->n_added += (uint64_t)!corner->is_kept;
@@ -272,7 +274,7 @@ static void test_place(const struct level *level, uint32_t prim, const float p[3
 		v3f_scale(spot.n, front, back ? -1 : 1);
 		if (is_covered(level, &spot))
 			return;
-		if (owner_is_seen(level, spot.p, spot.n)) {
+		if (seen_is(&level->seen, spot.p, spot.n)) {
 			add_spot(list, &spot);
 			return;
 		}

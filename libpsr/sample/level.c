@@ -14,7 +14,7 @@
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
 {
-	unsigned n_steps = level->n_projections + 2 + N_DICES, done = 0;
+	unsigned n_steps = level->n_projections + 3 + N_DICES, done = 0;
 	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
 	int rc;
 
@@ -34,6 +34,9 @@ int level_make(struct level *level, const struct psr_projection *projection,
 		rc = field_init(&level->field, FIELD_PIXELS * level->ds);
 	if (rc == PSR_OK)
 		rc = cover_init(&level->cover, level->ds);
+	if (rc == PSR_OK)
+		rc = seen_init(&level->seen, level->scene, level->ds, level->pool);
+	STEP_DONE;
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
 		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
 		STEP_DONE;
@@ -61,6 +64,7 @@ void level_fini(struct level *level)
 	free(level->sheets);
 	psr_free(level->sides);
 	field_fini(&level->field);
+	seen_fini(&level->seen);
 	cover_fini(&level->cover);
 	level->sheets = NULL;
 	level->sides = NULL;

@@ -15,6 +15,7 @@
 #include "psr/mesh.h"
 #include "psr/pool.h"
 #include "ray.h"
+#include "seen.h"
 #include "sheet.h"
 #include "surface.h"
 
@@ -31,6 +32,7 @@ struct level {
 	unsigned n_projections;
 	struct sheets *sheets;    /* of each projection */
 	struct field field;
+	struct seen seen;
 	struct cover cover;
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
@@ -47,9 +49,6 @@ unsigned owner_of(const struct level *level, const float p[3], const float n[3])
 
 /* Sets `seen` and `owned` of all patches, after tracing. MEMORY. */
 int owner_mark(struct level *level);
-
-/* Whether a place is visible from outside, on the side that n is of: rays in up to 128 directions. */
-int owner_is_seen(const struct level *level, const float p[3], const float n[3]);
 
 /* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well. */
 void merge_patches(struct level *level);

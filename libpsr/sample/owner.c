@@ -7,9 +7,6 @@
 /* A projection that sees the face itself at over 60 degrees does not own it, however the surface around it lies. */
 #define LEAST_OWNER_COSINE 0.5f
 
-#define N_WAYS PSR_MASK_TRIANGLES
-#define BATCH 16
-
 static const float *axis_of(const struct level *level, unsigned projection)
 {
 	return level->sheets[projection].projection.axis[2];
@@ -39,38 +36,7 @@ unsigned owner_of(const struct level *level, const float p[3], const float n[3])
 	return best_facing(level, smooth, n);
 }
 
-/* Rays of which one gets out shows that a place is visible; neighbours in the list are far apart on the sphere, so that
- * most places need one batch. */
-int owner_is_seen(const struct level *level, const float p[3], const float n[3])
-{
-	struct ray ray[BATCH];
-	uint8_t is_occluded[BATCH];
-	int n_rays = 0;
-
-	for (unsigned i = 0; i < N_WAYS; i++) {
-		double way[3], along;
-
-		psr_direction_center(2, i * 53 % N_WAYS, way);
-		along = way[0] * (double)n[0] + way[1] * (double)n[1] + way[2] * (double)n[2];
-		if (along > 0.03) {
-			for (int k = 0; k < 3; k++) {
-				ray[n_rays].origin[k] = (double)p[k] + 0.02 * level->ds * (double)n[k];
-				ray[n_rays].direction[k] = way[k];
-			}
-			n_rays++;
-		}
-		if (n_rays == BATCH || (i + 1 == N_WAYS && n_rays != 0)) {
-			ray_scene_occluded(level->scene, ray, n_rays, 0, is_occluded);
-			for (int k = 0; k < n_rays; k++)
-				if (!is_occluded[k])
-					return 1;
-			n_rays = 0;
-		}
-	}
-	return 0;
-}
-
-static int is_sample_seen(const struct level *level, const struct sheets *sheets, uint32_t patch, unsigned s, int turned)
+static int is_seen(const struct level *level, const struct sheets *sheets, uint32_t patch, unsigned s, int turned)
 {
 	float p[3], n[3];
 
@@ -78,7 +44,7 @@ static int is_sample_seen(const struct level *level, const struct sheets *sheets
 	level_normal(level, sheets->sample[patch][s].surface, n);
 	if (turned)
 		v3f_scale(n, n, -1);
-	return owner_is_seen(level, p, n);
+	return seen_is(&level->seen, p, n);
 }
 
 /* By the faces' own normals first: these are what the field is made of, each place once. */
@@ -151,20 +117,6 @@ static void note_side(struct level *level, uint32_t surface, int is_seen)
 	__atomic_fetch_or(&level->sides[surface & ~SHEET_BACK], (uint8_t)side, __ATOMIC_RELAXED);
 }
 
-/* First, middle and last of a mask stand for all of it when none of them is seen. */
-static int is_any_seen(const struct level *level, const struct sheets *sheets, uint32_t p, uint64_t mask)
-{
-	unsigned first = (unsigned)__builtin_ctzll(mask), last = 63 - (unsigned)__builtin_clzll(mask);
-	int half = __builtin_popcountll(mask) / 2;
-	uint64_t middle = mask;
-
-	if (is_sample_seen(level, sheets, p, first, 0) || (last != first && is_sample_seen(level, sheets, p, last, 0)))
-		return 1;
-	for (int i = 0; i < half; i++)
-		middle &= middle - 1;
-	return is_sample_seen(level, sheets, p, (unsigned)__builtin_ctzll(middle), 0);
-}
-
 static void mark_seen(int i, void *userdata)
 {
 	struct level *level = userdata;
@@ -172,16 +124,14 @@ static void mark_seen(int i, void *userdata)
 
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
 		struct patch *patch = &sheets->patch[p];
-		uint64_t unknown = patch->owned & ~patch->first;
 
 		patch->seen = patch->first;
-		if (unknown != 0 && is_any_seen(level, sheets, p, unknown))
-			for (uint64_t left = unknown; left != 0; left &= left - 1) {
-				unsigned s = (unsigned)__builtin_ctzll(left);
+		for (uint64_t left = patch->owned & ~patch->first; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
 
-				patch->seen |= (uint64_t)is_sample_seen(level, sheets, p, s, 0) << s;
-			}
-		patch->hidden = unknown & ~patch->seen;
+			patch->seen |= (uint64_t)is_seen(level, sheets, p, s, 0) << s;
+		}
+		patch->hidden = patch->owned & ~patch->seen;
 		for (uint64_t left = patch->mask & (patch->seen | patch->hidden); left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
 
@@ -207,7 +157,7 @@ static void drop_hidden(int i, void *userdata)
 			int is_kept = (int)(patch->seen >> s & 1);
 
 			if (is_both)
-				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_sample_seen(level, sheets, p, s, 1));
+				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_seen(level, sheets, p, s, 1));
 			if (!is_kept)
 				patch->owned &= ~(UINT64_C(1) << s);
 		}

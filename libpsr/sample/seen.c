@@ -1,0 +1,173 @@
+#include <math.h>
+#include <string.h>
+#include "../base/mem.h"
+#include "../base/vec.h"
+#include "psr/direction.h"
+#include "psr/error.h"
+#include "seen.h"
+
+#define FREE UINT64_MAX
+#define CELL_PIXELS 1.5
+#define BATCH 64
+#define LEAST_WAY 0.4f
+
+/* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
+static uint64_t key_of(const int at[3], int axis, int is_negative)
+{
+	uint64_t key = (uint64_t)(2 * axis + is_negative);
+
+	for (int k = 0; k < 3; k++)
+		key = key << 20 | (uint64_t)(at[k] & 0xfffff);
+	return key;
+}
+
+static size_t place_of(const struct seen *seen, uint64_t key)
+{
+	return (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 16) & (seen->size - 1);
+}
+
+/* From any thread. 0: there is no room. */
+static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
+{
+	size_t i = place_of(seen, key);
+
+	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
+		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
+
+		if (old == FREE && __atomic_compare_exchange_n(&seen->table[i], &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+			__atomic_fetch_add(n_new, 1, __ATOMIC_RELAXED);
+			return 1;
+		}
+		if (old == key)
+			return 1;
+	}
+	return 0;
+}
+
+struct look {
+	const struct seen *seen;
+	const struct ray_scene *scene;
+	double frame[3][3], ds;
+	int reach; /* rows on each side of the middle */
+	uint64_t n_new;
+	int is_full;
+};
+
+static void mark(struct look *look, const struct ray *ray, const struct ray_hit *hit)
+{
+	const float *front = ray_scene_normal(look->scene, hit->prim);
+	int at[3], axis = 0;
+
+	for (int k = 0; k < 3; k++) {
+		at[k] = (int)floor((ray->origin[k] + hit->t * ray->direction[k]) / look->seen->cell);
+		axis = fabsf(front[k]) > fabsf(front[axis]) ? k : axis;
+	}
+	if (!insert(look->seen, key_of(at, axis, (front[axis] < 0) != hit->is_back), &look->n_new))
+		__atomic_store_n(&look->is_full, 1, __ATOMIC_RELAXED);
+}
+
+static void look_along_row(int i, void *userdata)
+{
+	struct look *look = userdata;
+	double y = (i - look->reach + 0.5) * look->ds, half = 1 - y * y;
+	int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0, n = 0;
+	struct ray ray[BATCH];
+	struct ray_hit hit[BATCH];
+
+	for (int c = -reach; c < reach; c++) {
+		double x = (c + 0.5) * look->ds;
+
+		for (int k = 0; k < 3; k++) {
+			ray[n].origin[k] = x * look->frame[0][k] + y * look->frame[1][k] + 2 * look->frame[2][k];
+			ray[n].direction[k] = -look->frame[2][k];
+		}
+		if (++n < BATCH && c + 1 < reach)
+			continue;
+		ray_scene_trace(look->scene, ray, n, 0, hit);
+		for (int k = 0; k < n; k++)
+			if (hit[k].prim != RAY_NONE)
+				mark(look, &ray[k], &hit[k]);
+		n = 0;
+	}
+}
+
+static int grow(struct seen *seen)
+{
+	struct seen old = *seen;
+	uint64_t n_new = 0;
+
+	seen->table = psr_alloc_array(2 * old.size, sizeof *seen->table);
+	if (seen->table == NULL) {
+		*seen = old;
+		return PSR_ERR_MEMORY;
+	}
+	seen->size = 2 * old.size;
+	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	for (size_t i = 0; i < old.size; i++)
+		if (old.table[i] != FREE)
+			insert(seen, old.table[i], &n_new);
+	psr_free(old.table);
+	return PSR_OK;
+}
+
+int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
+{
+	struct look look = { .seen = seen, .scene = scene, .ds = ds, .reach = (int)ceil(1 / ds) };
+	uint64_t n_cells = 0;
+
+	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
+	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
+	if (seen->table == NULL)
+		return PSR_ERR_MEMORY;
+	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	for (unsigned i = 0; i < PSR_MASK_TRIANGLES;) {
+		double direction[3];
+
+		/* Far apart ones first, so that the table soon has its size. */
+		psr_direction_center(2, i * 53 % PSR_MASK_TRIANGLES, direction);
+		psr_direction_frame(direction, look.frame);
+		look.n_new = 0;
+		look.is_full = 0;
+		psr_pool_for(pool, 2 * look.reach, look_along_row, &look);
+		n_cells += look.n_new;
+		if (2 * n_cells > seen->size && grow(seen) != PSR_OK)
+			return PSR_ERR_MEMORY;
+		i += look.is_full ? 0 : 1;
+	}
+	return PSR_OK;
+}
+
+void seen_fini(struct seen *seen)
+{
+	psr_free(seen->table);
+	*seen = (struct seen){ 0 };
+}
+
+static int has(const struct seen *seen, uint64_t key)
+{
+	size_t i = place_of(seen, key);
+
+	while (seen->table[i] != FREE && seen->table[i] != key)
+		i = (i + 1) & (seen->size - 1);
+	return seen->table[i] == key;
+}
+
+int seen_is(const struct seen *seen, const float p[3], const float n[3])
+{
+	int first[3];
+
+	/* The eight cells around; and the ways that something of nearly this normal may have been put down as. */
+	for (int k = 0; k < 3; k++)
+		first[k] = (int)floor((double)p[k] / seen->cell - 0.5);
+	for (int axis = 0; axis < 3; axis++) {
+		if (fabsf(n[axis]) < LEAST_WAY)
+			continue;
+		for (int i = 0; i < 8; i++) {
+			int at[3] = { first[0] + (i & 1), first[1] + (i >> 1 & 1), first[2] + (i >> 2) };
+
+			if (has(seen, key_of(at, axis, n[axis] < 0)))
+				return 1;
+		}
+	}
+	return 0;
+}

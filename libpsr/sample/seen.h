@@ -1,0 +1,23 @@
+/* Which parts of the surface can be seen from outside: views from all around mark what they meet, as [G] 6.3 marks blocks. */
+#ifndef PSR_SAMPLE_SEEN_H
+#define PSR_SAMPLE_SEEN_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/pool.h"
+#include "ray.h"
+
+struct seen {
+	double cell;      /* side of a cubic cell, inner units */
+	size_t size;      /* a power of two */
+	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
+};
+
+/* Looks from 128 directions, a ray a pixel of ds. MEMORY; seen_fini() either way. */
+int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool);
+void seen_fini(struct seen *seen);
+
+/* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
+int seen_is(const struct seen *seen, const float p[3], const float n[3]);
+
+#endif
