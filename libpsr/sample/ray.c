@@ -85,11 +85,25 @@ static int disc_is_absent(const struct psr_mesh *mesh, uint32_t point, const str
 	       && alpha < (material->alpha == PSR_ALPHA_MASK ? material->alpha_cutoff : 0.5f);
 }
 
-static int may_let_through(const struct ray_scene *scene, uint32_t prim)
+/* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but grazes. */
+enum verdict { STOPS, GOES_ON, MUST_LOOK };
+
+static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, uint32_t prim)
 {
 	const struct psr_material *material = material_of(scene->mesh, prim);
+	const float *normal = ray_scene_normal(scene, prim);
+	double slope = 0, least = 0;
 
-	return !material->two_sided || material->alpha != PSR_ALPHA_OPAQUE;
+	if (material->alpha != PSR_ALPHA_OPAQUE)
+		return MUST_LOOK;
+	if (material->two_sided)
+		return STOPS;
+	for (int k = 0; k < 3; k++) {
+		slope += (double)normal[k] * ray->direction[k];
+		least += fabs(ray->direction[k]);
+	}
+	least *= 0x1p-20;
+	return slope < -least ? STOPS : slope > least ? GOES_ON : MUST_LOOK;
 }
 
 int ray_hit_lets_through(const struct ray_scene *scene, const struct ray_hit *hit)
@@ -109,17 +123,20 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
 	const struct ray_columns column = ray_columns_of(args);
 
 	for (unsigned i = 0; i < args->N; i++) {
+		enum verdict verdict;
 		struct ray_hit hit;
 
 		if (args->valid[i] == 0)
 			continue;
 		hit.prim = ray_prim(packet->scene, column.geometry[i], column.prim[i]);
-		if (!may_let_through(packet->scene, hit.prim))
-			continue;
-		hit.u = (double)column.u[i];
-		hit.v = (double)column.v[i];
-		ray_hit_locate(packet->scene, &packet->ray[column.id[i]], &hit);
-		if (ray_hit_lets_through(packet->scene, &hit))
+		verdict = judge(packet->scene, &packet->ray[column.id[i]], hit.prim);
+		if (verdict == MUST_LOOK) {
+			hit.u = (double)column.u[i];
+			hit.v = (double)column.v[i];
+			ray_hit_locate(packet->scene, &packet->ray[column.id[i]], &hit);
+			verdict = ray_hit_lets_through(packet->scene, &hit) ? GOES_ON : STOPS;
+		}
+		if (verdict == GOES_ON)
 			args->valid[i] = 0;
 	}
 }
@@ -138,7 +155,7 @@ void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, c
 static double first_t(const struct ray *ray, double t_min)
 {
 	double squared = v3d_dot(ray->direction, ray->direction);
-	double near_t = -v3d_dot(ray->origin, ray->direction) / squared - 2 / sqrt(squared);
+	double near_t = -(v3d_dot(ray->origin, ray->direction) + 2 * sqrt(squared)) / squared;
 
 	return near_t > t_min ? near_t : t_min;
 }

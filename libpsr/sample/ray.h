@@ -37,16 +37,18 @@ void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
 
 /* All hits of n rays at t >= 0, nearest first: those of ray i at hit[i * most], n_hits[i] of them, at most `most` (1..
- * RAY_MOST_HITS); beyond, the farthest are left out, and a ray counts no more than its 2 * RAY_MOST_HITS nearest primitives.
- * Of hits of one ray and side that coincide to within 2^-20 with the first of them the lowest primitive's stands for all.
- * Discs of one side that are met within half of the smaller radius behind the nearest are one with it: a cloud's surface is
- * met once. No dependence on the order in which the tree finds things. Any number of threads may trace at once. */
+ * RAY_MOST_HITS); beyond, the farthest are left out, and a ray counts no more than its 2 * RAY_MOST_HITS nearest
+ * primitives. Of hits of one ray and side that coincide to within 2^-20 with the first of them, the lowest primitive's
+ * stands for all. Discs of one side that are met within half of the smaller radius behind the nearest are one with it:
+ * a cloud's surface is met once. Nothing depends on the order in which the tree finds things. Any number of threads
+ * may trace at once. */
 #define RAY_MOST_HITS 64
 void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, int n, int most, struct ray_hit *hit,
                          int *n_hits);
 
 /* Whether anything is met at t_min <= t. Any number of threads may trace at once. */
-void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded);
+void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min,
+                        uint8_t *is_occluded);
 
 /* To be called before distances to a mesh with points are asked for; costs nothing without. MEMORY. */
 int ray_scene_index_distances(struct ray_scene *scene, struct psr_error *err);

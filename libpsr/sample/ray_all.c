@@ -5,8 +5,8 @@
 #define MOST_RAW (2 * RAY_MOST_HITS)
 #define SAME_HIT 0x1p-20
 
-/* What a ray met so far, sorted by distance; of equal ones the lower primitive comes first. So the list does not depend on the
- * order in which the tree finds things, full or not. */
+/* What a ray met so far, sorted by distance; of equal ones the lower primitive comes first. So the list does not depend
+ * on the order in which the tree finds things, full or not. */
 struct ray_list {
 	int n;
 	struct ray_hit hit[MOST_RAW];

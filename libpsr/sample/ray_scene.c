@@ -16,7 +16,7 @@ void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corn
 
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; k < 3; k++)
-			corner[i][k] = (scene->mesh->position[index[i]][k] - scene->origin[k]) / scene->scale;
+			corner[i][k] = (scene->mesh->position[index[i]][k] - scene->origin[k]) * scene->shrink;
 }
 
 double ray_disc(const struct ray_scene *scene, uint32_t prim, double center[3], double normal[3])
@@ -24,10 +24,10 @@ double ray_disc(const struct ray_scene *scene, uint32_t prim, double center[3], 
 	uint32_t i = prim - scene->mesh->n_triangles;
 
 	for (int k = 0; k < 3; k++) {
-		center[k] = (scene->mesh->point[i][k] - scene->origin[k]) / scene->scale;
+		center[k] = (scene->mesh->point[i][k] - scene->origin[k]) * scene->shrink;
 		normal[k] = (double)scene->mesh->point_normal[i][k];
 	}
-	return (double)scene->mesh->point_radius[i] / scene->scale;
+	return (double)scene->mesh->point_radius[i] * scene->shrink;
 }
 
 const float *ray_scene_normal(const struct ray_scene *scene, uint32_t prim)
@@ -63,7 +63,7 @@ static int attach_triangles(struct ray_scene *scene)
 	if (rc == PSR_OK) {
 		for (uint32_t i = 0; i < mesh->n_vertices; i++)
 			for (int k = 0; k < 3; k++)
-				vertex[i][k] = (float)((mesh->position[i][k] - scene->origin[k]) / scene->scale);
+				vertex[i][k] = (float)((mesh->position[i][k] - scene->origin[k]) * scene->shrink);
 		for (uint32_t i = 0; i < mesh->n_triangles; i++)
 			for (int k = 0; k < 3; k++)
 				index[i][k] = mesh->triangle[i][k];
@@ -160,7 +160,7 @@ int ray_scene_create(struct ray_scene **out, const struct psr_mesh *mesh, const 
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a mesh of %llu primitives", (unsigned long long)n);
 	scene->mesh = mesh;
 	v3d_set(scene->origin, origin[0], origin[1], origin[2]);
-	scene->scale = scale;
+	scene->shrink = 1 / scale;
 	scene->lets_through = needs_filter(mesh);
 	rc = make_normals(scene);
 	if (rc == PSR_OK)

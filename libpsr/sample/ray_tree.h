@@ -12,7 +12,7 @@ enum { RAY_TRIANGLES, RAY_DISCS };
 
 struct ray_scene {
 	const struct psr_mesh *mesh;
-	double origin[3], scale;
+	double origin[3], shrink; /* inner = (object - origin) * shrink */
 	float (*normal)[3]; /* of the triangles */
 	int lets_through;   /* whether any material may let a ray through */
 	RTCDevice device;

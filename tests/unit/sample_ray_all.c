@@ -95,7 +95,7 @@ struct found {
 	double t;
 };
 
-/* The tree's floats are off by 2^-24 of coordinates up to 4, and slopes multiply that; no ray is nearer to a rim than this. */
+/* The tree's floats are off by 2^-24 of coordinates up to 4, and slopes multiply that; no ray is nearer to a rim. */
 #define RIM 1e-4
 
 static struct found meet_triangle(const struct psr_mesh *mesh, uint32_t prim, const struct ray *ray)
