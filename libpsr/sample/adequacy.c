@@ -159,17 +159,18 @@ static int is_missing(const struct level *level, const struct trial *trial)
 	return !is_any_hit(level, trial, (reach < FARTHEST ? reach : FARTHEST) * level->ds);
 }
 
+/* Looked at from outside, as one-sided faces let rays through that come from behind them. */
 static int is_visible(const struct level *level, const struct trial *trial)
 {
 	struct ray ray;
-	uint8_t is_occluded;
+	struct ray_hit hit;
 
 	for (int k = 0; k < 3; k++) {
-		ray.origin[k] = (double)trial->spot.p[k] + 0.001 * level->ds * (double)trial->spot.n[k];
-		ray.direction[k] = trial->view[k];
+		ray.origin[k] = (double)trial->spot.p[k] + 3 * trial->view[k];
+		ray.direction[k] = -trial->view[k];
 	}
-	ray_scene_occluded(level->scene, &ray, 1, 0, &is_occluded);
-	return !is_occluded;
+	ray_scene_trace(level->scene, &ray, 1, 0, &hit);
+	return hit.prim != RAY_NONE && hit.t > 3 - 0.01 * level->ds;
 }
 
 static void run_chunk(int i, void *userdata)

@@ -130,7 +130,7 @@ int cover_is_near(const struct cover *cover, const float p[3], const float n[3],
 
 					v3f_sub(d, point->position, p);
 					if (v3f_dot(d, d) <= radius2
-					    && (point->two_sided || v3f_dot(direction[point->normal], n) > 0))
+					    && (point->two_sided || v3f_dot(direction[point->normal], n) > 0.6f))
 						return 1;
 				}
 			}

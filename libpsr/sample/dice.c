@@ -9,7 +9,7 @@
 
 /* Primitives are diced as in [G] 9.2.1 and [Cook87], though only to test what is there: places on them are this many pixels
  * apart. */
-#define STEP 0.4
+#define STEP 0.33
 
 /* A kept sample within half a pixel is in every pixel that has the place in its middle. */
 #define NEAR 0.5
@@ -18,9 +18,15 @@
  * corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
-#define N_TRIES 6
-#define LEAST_COSINE 0.35f
-#define DEAD_PATCH 5 /* a new block costs as much as this many samples more in one that is there */
+#define N_TRIES 10
+#define LEAST_COSINE 0.3f
+#define LEAST_ALIKE 0.6f
+#define N_TRIANGLES 3
+#define DEAD_PATCH 8 /* a new block costs as much as this many samples more in one that is there */
+
+/* In samples, as offers are compared. A moved sample is off by half a pixel. */
+#define SNAP 3
+#define MOST_SNAP 0.55
 
 struct tries {
 	unsigned projection[N_TRIES];
@@ -76,7 +82,7 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 		if (c->ref.patch == SHEET_NONE)
 			continue;
 		level_normal(level, sheets->sample[c->ref.patch][c->ref.sample].surface, n);
-		if ((sheets->patch[c->ref.patch].hidden >> c->ref.sample & 1) != 0 || v3f_dot(n, spot->n) < 0) {
+		if ((sheets->patch[c->ref.patch].hidden >> c->ref.sample & 1) != 0 || v3f_dot(n, spot->n) < LEAST_ALIKE) {
 			c->ref.patch = SHEET_NONE;
 			continue;
 		}
@@ -112,7 +118,7 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
 		return 1;
 	list_tries(level, spot, &tries);
-	for (int i = 0; i < tries.n && i < 3; i++) {
+	for (int i = 0; i < tries.n && i < N_TRIANGLES; i++) {
 		struct corner corner[3];
 
 		find_corners(level, tries.projection[i], spot, corner);
@@ -122,49 +128,49 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 	return 0;
 }
 
-int dice_is_covered(const struct level *level, const struct surface_spot *spot);
-int dice_is_covered(const struct level *level, const struct surface_spot *spot){return is_covered(level,spot);}
 static int keep_corner(struct level *level, unsigned projection, const struct corner *corner)
 {
 	level->n_added += (uint64_t)!corner->is_kept;
 	return keep_sample(level, (struct level_ref){ projection, corner->ref });
 }
 
-/* The lattice triangle that lacks least. */
-static int keep_triangle(struct level *level, const struct surface_spot *spot, const struct tries *tries, int *is_done)
-{
-	struct corner best[3];
-	unsigned projection = 0;
-	int least = 1 << 30, rc = PSR_OK;
+/* What would cover a spot, and what it costs in samples. */
+struct offer {
+	unsigned projection;
+	struct corner corner[3];
+	int n; /* corners to keep */
+	int is_snap; /* the one corner is to be made, with the third of `position` for its depth */
+	float cost;
+};
 
-	for (int i = 0; i < tries->n && i < 3; i++) {
+/* The lattice triangle that lacks least. */
+static void offer_triangle(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
+                           struct offer *best)
+{
+	for (int i = 0; i < tries->n && i < N_TRIANGLES; i++) {
 		struct corner corner[3];
-		int cost = 2 * i;
+		int is_dead = 0;
+		float cost = (float)i / 2;
 
 		find_corners(level, tries->projection[i], spot, corner);
 		if (!is_triangle(level, corner))
 			continue;
-		for (int k = 0; k < 3; k++)
-			cost += corner[k].is_kept ? 0 : corner[k].is_alive ? 1 : 1 + DEAD_PATCH;
-		if (cost < least) {
-			least = cost;
-			projection = tries->projection[i];
-			memcpy(best, corner, sizeof best);
+		for (int k = 0; k < 3; k++) {
+			cost += corner[k].is_kept ? 0 : 0.5f;
+			is_dead |= !corner[k].is_alive;
+		}
+		cost += is_dead ? DEAD_PATCH : 0;
+		if (cost < best->cost) {
+			*best = (struct offer){ .projection = tries->projection[i], .n = 3, .cost = cost };
+			memcpy(best->corner, corner, sizeof corner);
 		}
 	}
-	*is_done = least != 1 << 30;
-	for (int k = 0; *is_done && rc == PSR_OK && k < 3; k++)
-		rc = keep_corner(level, projection, &best[k]);
-	return rc;
 }
 
-/* The nearest hit of any projection, rather in a patch that is there already. */
-static int keep_nearest(struct level *level, const struct surface_spot *spot, const struct tries *tries, int *is_done)
+/* The nearest hit of any projection. It covers less than a triangle does. */
+static void offer_nearest(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
+                          struct offer *best)
 {
-	struct corner best = { .ref.patch = SHEET_NONE };
-	unsigned projection = 0;
-	float least = INFINITY;
-
 	for (int i = 0; i < tries->n; i++) {
 		struct corner corner[3];
 
@@ -174,43 +180,56 @@ static int keep_nearest(struct level *level, const struct surface_spot *spot, co
 
 			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
 				continue;
-			cost = distance + (corner[k].is_alive ? 0 : DEAD_PATCH);
-			if (cost < least) {
-				least = cost;
-				best = corner[k];
-				projection = tries->projection[i];
-			}
+			cost = 1.5f + distance + (corner[k].is_alive ? 0 : DEAD_PATCH);
+			if (cost < best->cost)
+				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .cost = cost,
+					                    .corner = { corner[k] } };
 		}
 	}
-	*is_done = best.ref.patch != SHEET_NONE;
-	return *is_done ? keep_corner(level, projection, &best) : PSR_OK;
 }
 
-/* What is too thin for any lattice is moved to the nearest point of its owner's: by 0.52 pixels at most. */
-static int snap(struct level *level, const struct surface_spot *spot, const struct tries *tries)
+/* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face, by
+ * what a sample may be off at most. */
+static void offer_snap(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
+                       struct offer *best)
 {
-	unsigned projection = tries->projection[0];
-	struct sheets *sheets = &level->sheets[projection];
-	uint32_t prim = spot->surface & ~SHEET_BACK;
-	struct lattice_point at[3], nearest = { 0, 0 };
-	struct level_ref ref = { .projection = projection };
-	double least = INFINITY;
-	float projected[3];
-	int rc;
+	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
 
-	level_project(&sheets->projection, spot->p, projected);
-	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
-	for (int i = 0; i < 3; i++) {
-		double x, y, d;
+	for (int i = 0; i < tries->n && i < N_TRIANGLES; i++) {
+		const struct sheets *sheets = &level->sheets[tries->projection[i]];
+		struct lattice_point at[3];
+		float p[3], n[3];
 
-		sheets_point(sheets, at[i].row, at[i].col, &x, &y);
-		d = (x - (double)projected[0]) * (x - (double)projected[0]) + (y - (double)projected[1]) * (y - (double)projected[1]);
-		if (d < least) {
-			least = d;
-			nearest = at[i];
+		level_project(&sheets->projection, spot->p, p);
+		level_project(&sheets->projection, spot->n, n);
+		sheets_triangle(sheets, (double)p[0], (double)p[1], at);
+		for (int k = 0; k < 3; k++) {
+			struct corner corner = { .at = at[k] };
+			double x, y, dx, dy, dz, distance;
+			float cost;
+
+			sheets_point(sheets, at[k].row, at[k].col, &x, &y);
+			dx = x - (double)p[0];
+			dy = y - (double)p[1];
+			dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
+			distance = sqrt(dx * dx + dy * dy + dz * dz) / level->ds;
+			corner.position[2] = p[2] + (float)dz;
+			corner.ref = sheets_room(sheets, at[k], corner.position[2], two_sided);
+			cost = SNAP + (float)distance + (corner.ref.patch != SHEET_NONE ? 0 : DEAD_PATCH);
+			if (distance <= MOST_SNAP && cost < best->cost)
+				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .is_snap = 1, .cost = cost,
+					                    .corner = { corner } };
 		}
 	}
-	rc = sheets_add(sheets, nearest, projected[2], spot->surface, level_material(level, prim)->two_sided != 0, &ref.at);
+}
+
+static int keep_snapped(struct level *level, const struct surface_spot *spot, const struct offer *offer)
+{
+	struct level_ref ref = { .projection = offer->projection };
+	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
+	int rc = sheets_add(&level->sheets[offer->projection], offer->corner[0].at, offer->corner[0].position[2],
+	                    spot->surface, two_sided, &ref.at);
+
 	if (rc != PSR_OK || ref.at.patch == SHEET_NONE)
 		return rc;
 	level->n_snapped++;
@@ -219,17 +238,20 @@ static int snap(struct level *level, const struct surface_spot *spot, const stru
 
 int dice_cover(struct level *level, const struct surface_spot *spot)
 {
+	struct offer best = { .cost = INFINITY };
 	struct tries tries;
-	int is_done = 0, rc;
+	int rc = PSR_OK;
 
 	list_tries(level, spot, &tries);
 	if (tries.n == 0)
 		return PSR_OK;
-	rc = keep_triangle(level, spot, &tries, &is_done);
-	if (rc == PSR_OK && !is_done)
-		rc = keep_nearest(level, spot, &tries, &is_done);
-	if (rc == PSR_OK && !is_done)
-		rc = snap(level, spot, &tries);
+	offer_triangle(level, spot, &tries, &best);
+	offer_nearest(level, spot, &tries, &best);
+	offer_snap(level, spot, &tries, &best);
+	if (best.is_snap)
+		return keep_snapped(level, spot, &best);
+	for (int k = 0; rc == PSR_OK && k < best.n; k++)
+		rc = keep_corner(level, best.projection, &best.corner[k]);
 	return rc;
 }
 

@@ -1,12 +1,15 @@
 #include "../base/vec.h"
 #include "level.h"
 
-/* Patches that own fewer samples than this give them away, fewest first. A block costs as much as some twenty samples. */
-static const int LEAST_OWNED[] = { 3, 6, 9, 12, 16 };
-#define N_ROUNDS (int)(sizeof LEAST_OWNED / sizeof *LEAST_OWNED)
-
-/* To projections that see them at no more than this beyond the tolerance angle: 0.06 of the cosine is some 7 degrees. */
-#define SLACK 0.06f
+/* Patches that own fewer samples than this give them away, fewest first, to projections that face them at an angle of at
+ * least this cosine: a block costs as much as some ten samples. Beyond the tolerance angle samples lie further apart than
+ * they should: dicing adds what is missing then, which for few samples is less than a block. */
+static const struct {
+	int least;
+	float cosine;
+} ROUND[] = { { 3, 0.85f }, { 6, 0.85f }, { 9, 0.85f }, { 12, 0.85f }, { 16, 0.85f }, { 6, 0.7f }, { 10, 0.7f }, { 6, 0.5f }, { 8, 0.5f } };
+#define N_ROUNDS (int)(sizeof ROUND / sizeof *ROUND)
+#define MOST_TRIES 8
 
 struct claim {
 	struct patch *patch;
@@ -43,23 +46,23 @@ static struct claim find_claim(struct level *level, unsigned q, const float p[3]
 	return claim;
 }
 
-static struct claim find_other(struct level *level, unsigned projection, const float p[3], uint32_t surface, int least)
+static struct claim find_other(struct level *level, unsigned projection, const float p[3], uint32_t surface, int least, float cosine)
 {
 	float n[3], smooth[3], tried_above = 2;
 
 	level_normal(level, surface, n);
 	field_normal(&level->field, p, n, smooth);
 	v3f_normalize(smooth, smooth);
-	for (int tries = 0; tries < 4; tries++) {
+	for (int tries = 0; tries < MOST_TRIES; tries++) {
 		unsigned best = level->n_projections;
-		float most = level->cosine - SLACK;
+		float most = cosine;
 		struct claim claim;
 
 		for (unsigned q = 0; q < level->n_projections; q++) {
 			float g = v3f_dot(level->sheets[q].projection.axis[2], smooth);
 
 			if (q != projection && g < tried_above && g > most
-			    && v3f_dot(level->sheets[q].projection.axis[2], n) >= 0.5f) {
+			    && v3f_dot(level->sheets[q].projection.axis[2], n) >= 0.4f) {
 				most = g;
 				best = q;
 			}
@@ -74,7 +77,7 @@ static struct claim find_other(struct level *level, unsigned projection, const f
 	return (struct claim){ NULL, 0 };
 }
 
-static void give_away(struct level *level, unsigned projection, uint32_t p, int least)
+static void give_away(struct level *level, unsigned projection, uint32_t p, int least, float cosine)
 {
 	struct sheets *sheets = &level->sheets[projection];
 	struct claim claim[PSR_BLOCK_SAMPLES];
@@ -85,7 +88,7 @@ static void give_away(struct level *level, unsigned projection, uint32_t p, int 
 		float position[3];
 
 		sheets_position(sheets, (struct sheet_ref){ p, s }, position);
-		claim[n] = find_other(level, projection, position, sheets->sample[p][s].surface, least);
+		claim[n] = find_other(level, projection, position, sheets->sample[p][s].surface, least, cosine);
 		if (claim[n++].patch == NULL)
 			return;
 	}
@@ -101,8 +104,8 @@ void merge_patches(struct level *level)
 			for (uint32_t p = 0; p < level->sheets[i].n_patches; p++) {
 				int owned = __builtin_popcountll(level->sheets[i].patch[p].owned);
 
-				if (owned > 0 && owned < LEAST_OWNED[round])
-					give_away(level, i, p, LEAST_OWNED[round]);
+				if (owned > 0 && owned < ROUND[round].least)
+					give_away(level, i, p, ROUND[round].least, ROUND[round].cosine);
 			}
 		}
 	}

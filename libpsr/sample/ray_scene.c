@@ -7,7 +7,7 @@
 void ray_scene_center(const struct ray_scene *scene, uint32_t prim, double center[3])
 {
 	for (int k = 0; k < 3; k++)
-		center[k] = (scene->mesh->point[prim - scene->mesh->n_triangles][k] - scene->origin[k]) / scene->scale;
+		center[k] = (scene->mesh->point[prim - scene->mesh->n_triangles][k] - scene->origin[k]) * scene->shrink;
 }
 
 void ray_scene_corners(const struct ray_scene *scene, uint32_t prim, double corner[3][3])

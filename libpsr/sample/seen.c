@@ -9,6 +9,9 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
+#define VIEW_LEVEL 3
+#define N_VIEWS (8 << 2 * VIEW_LEVEL)
+#define RAY_PIXELS 2 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
 /* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
@@ -112,7 +115,7 @@ static int grow(struct seen *seen)
 
 int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
 {
-	struct look look = { .seen = seen, .scene = scene, .ds = ds, .reach = (int)ceil(1 / ds) };
+	struct look look = { .seen = seen, .scene = scene, .ds = RAY_PIXELS * ds, .reach = (int)ceil(1 / (RAY_PIXELS * ds)) };
 	uint64_t n_cells = 0;
 
 	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
@@ -120,11 +123,11 @@ int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struc
 	if (seen->table == NULL)
 		return PSR_ERR_MEMORY;
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
-	for (unsigned i = 0; i < PSR_MASK_TRIANGLES;) {
+	for (unsigned i = 0; i < N_VIEWS;) {
 		double direction[3];
 
 		/* Far apart ones first, so that the table soon has its size. */
-		psr_direction_center(2, i * 53 % PSR_MASK_TRIANGLES, direction);
+		psr_direction_center(VIEW_LEVEL, i * 211 % N_VIEWS, direction);
 		psr_direction_frame(direction, look.frame);
 		look.n_new = 0;
 		look.is_full = 0;

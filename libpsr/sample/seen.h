@@ -13,7 +13,7 @@ struct seen {
 	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
 };
 
-/* Looks from 128 directions, a ray a pixel of ds. MEMORY; seen_fini() either way. */
+/* Looks from 512 directions, a ray every second pixel of ds. MEMORY; seen_fini() either way. */
 int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 

@@ -455,39 +455,44 @@ static int grow_sheets(struct sheets *sheets)
 	return PSR_OK;
 }
 
+struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided)
+{
+	const uint32_t *head = head_at(sheets, at);
+	struct sheet_ref room = { head != NULL ? *head : SHEET_NONE, sample_at(at) };
+
+	for (; room.patch != SHEET_NONE; room.patch = sheets->patch[room.patch].next) {
+		const struct patch *patch = &sheets->patch[room.patch];
+
+		if (patch->is_alive && (patch->mask >> room.sample & 1) == 0 && patch->two_sided == two_sided
+		    && fabsf(sheets->sample[room.patch][__builtin_ctzll(patch->kept)].z - z)
+		       < PATCH_STEPS / 2 * sheets->projection.spacing)
+			break;
+	}
+	return room;
+}
+
 int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
                struct sheet_ref *out)
 {
-	const uint32_t *head = head_at(sheets, at);
-	unsigned s = sample_at(at);
-	float most = PATCH_STEPS * sheets->projection.spacing;
-	uint32_t p = head != NULL ? *head : SHEET_NONE;
-
-	out->patch = SHEET_NONE;
-	out->sample = s;
-	if (head == NULL)
+	*out = sheets_room(sheets, at, z, two_sided);
+	if (head_at(sheets, at) == NULL)
 		return PSR_OK;
-	for (; p != SHEET_NONE; p = sheets->patch[p].next) {
-		const struct patch *patch = &sheets->patch[p];
+	if (out->patch == SHEET_NONE) {
+		uint32_t p = sheets->n_patches;
 
-		if (patch->is_alive && (patch->mask >> s & 1) == 0 && patch->two_sided == two_sided
-		    && fabsf(sheets->sample[p][__builtin_ctzll(patch->kept)].z - z) < most / 2)
-			break;
-	}
-	if (p == SHEET_NONE) {
-		if (sheets->n_patches == sheets->capacity && grow_sheets(sheets) != PSR_OK)
+		if (p == sheets->capacity && grow_sheets(sheets) != PSR_OK)
 			return PSR_ERR_MEMORY;
-		p = sheets->n_patches++;
+		sheets->n_patches++;
 		memset(&sheets->patch[p], 0, sizeof sheets->patch[p]);
 		memset(sheets->sample[p], 0, sizeof sheets->sample[p]);
 		sheets->patch[p].col = (int16_t)(at.col >> 3);
 		sheets->patch[p].row = (int16_t)(at.row >> 3);
 		sheets->patch[p].two_sided = (uint8_t)two_sided;
 		link_patch(sheets, p);
+		out->patch = p;
 	}
-	sheets->patch[p].mask |= UINT64_C(1) << s;
-	sheets->sample[p][s] = (struct sheet_sample){ z, surface };
-	out->patch = p;
+	sheets->patch[out->patch].mask |= UINT64_C(1) << out->sample;
+	sheets->sample[out->patch][out->sample] = (struct sheet_sample){ z, surface };
 	return PSR_OK;
 }
 

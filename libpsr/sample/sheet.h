@@ -80,7 +80,10 @@ struct sheet_ref {
 /* The hit at a lattice point that is nearest in depth to z, and within reach of it. */
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
 
-/* A sample that no ray found, put at a lattice point: into a patch that has none there, or into a new one. MEMORY. */
+/* A living patch that has nothing at a lattice point, and samples of these sides not far from this depth; or none. */
+struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);
+
+/* A sample that no ray found, put at a lattice point: into a patch with room, or into a new one. MEMORY. */
 int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
                struct sheet_ref *out);
 
