@@ -17,7 +17,9 @@ struct summary {
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
 	uint64_t bytes;
+	const struct psr_presets *presets;
 	uint32_t level_blocks[MAX_LEVELS];
+	uint64_t level_samples[MAX_LEVELS];
 };
 
 static void take_name(char name[256], const char *path)
@@ -43,13 +45,63 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
 	summary->bytes = psr_model_bytes(model);
-	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++)
-		summary->level_blocks[summary->blocks->level[b]]++;
+	summary->presets = psr_model_presets(model);
+	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++) {
+		uint8_t level = summary->blocks->level[b];
+
+		summary->level_blocks[level]++;
+		summary->level_samples[level] += (uint64_t)__builtin_popcountll(summary->blocks->mask[b]);
+	}
 }
 
 static double ratio(double a, double b)
 {
 	return b > 0 ? a / b : 0;
+}
+
+/* With a comma before each three digits from the right. */
+static const char *grouped(char text[28], uint64_t n)
+{
+	char *at = text + 27;
+
+	*at = '\0';
+	for (int digits = 0; n != 0 || digits == 0; n /= 10, digits++) {
+		if (digits != 0 && digits % 3 == 0)
+			*--at = ',';
+		*--at = (char)('0' + n % 10);
+	}
+	return at;
+}
+
+static void print_share(const char *label, uint64_t n, uint64_t n_trials, const char *what)
+{
+	char part[28], all[28];
+
+	if (n_trials == 0)
+		printf("%s not measured\n", label);
+	else
+		printf("%s %s of %s pixels of the visible surface %s (%.2g %%)\n", label, grouped(part, n), grouped(all, n_trials),
+		       what, ratio((double)n, (double)n_trials) * 100);
+}
+
+static const char *camera_kind(const struct psr_camera *camera)
+{
+	return camera->kind == PSR_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
+}
+
+static const char *light_kind(const struct psr_light *light)
+{
+	return light->kind == PSR_LIGHT_DIRECTIONAL ? "directional" : light->kind == PSR_LIGHT_POINT ? "point" : "spot";
+}
+
+static void print_presets(const struct psr_presets *p)
+{
+	printf("cameras           %" PRIu32 "\n", p->n_cameras);
+	for (uint32_t i = 0; i < p->n_cameras; i++)
+		printf("  %-12s    %s\n", camera_kind(&p->camera[i].camera), p->camera[i].name);
+	printf("lights            %" PRIu32 "\n", p->n_lights);
+	for (uint32_t i = 0; i < p->n_lights; i++)
+		printf("  %-12s    %s\n", light_kind(&p->light[i].light), p->light[i].name);
 }
 
 static void print_text(const struct summary *s)
@@ -66,6 +118,9 @@ static void print_text(const struct summary *s)
 	printf("box               %.6g,%.6g,%.6g to %.6g,%.6g,%.6g\n", info->box_min[0], info->box_min[1], info->box_min[2],
 	       info->box_max[0], info->box_max[1], info->box_max[2]);
 	printf("origin, scale     %.6g,%.6g,%.6g  %.6g\n", info->origin[0], info->origin[1], info->origin[2], info->scale);
+	print_share("adequacy         ", info->n_missing, info->n_trials, "miss");
+	print_share("culling loss     ", info->n_lost, info->n_trials, "are lost");
+	print_presets(s->presets);
 	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
 	if (blocks == NULL)
 		return;
@@ -75,9 +130,10 @@ static void print_text(const struct summary *s)
 	printf("levels            %" PRIu32 "\n", blocks->n_levels);
 	if (blocks->n_levels > 1) {
 		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
-			printf("  level %-3" PRIu32 "       %" PRIu32 " blocks\n", l, s->level_blocks[l]);
+			printf("  level %-3" PRIu32 "       %" PRIu64 " samples in %" PRIu32 " blocks\n", l, s->level_samples[l],
+			       s->level_blocks[l]);
 	}
-	printf("bytes a sample    %.2f\n", ratio((double)s->bytes, (double)blocks->n_samples));
+	printf("bytes a sample    %.2f of all levels, all overhead included\n", ratio((double)s->bytes, (double)blocks->n_samples));
 	printf("samples a block   %.1f of %d valid\n", ratio((double)blocks->n_samples, blocks->n_blocks),
 	       PSR_BLOCK_SAMPLES);
 }
@@ -87,9 +143,18 @@ static void add_vec3(cJSON *root, const char *name, const double v[3])
 	cJSON_AddItemToObject(root, name, cJSON_CreateDoubleArray(v, 3));
 }
 
+static void add_preset(cJSON *list, const char *name, const char *kind)
+{
+	cJSON *item = cJSON_CreateObject();
+
+	cJSON_AddStringToObject(item, "name", name);
+	cJSON_AddStringToObject(item, "kind", kind);
+	cJSON_AddItemToArray(list, item);
+}
+
 static int print_json(const struct summary *s, struct psr_error *err)
 {
-	cJSON *root = cJSON_CreateObject(), *part;
+	cJSON *root = cJSON_CreateObject(), *part, *counts;
 	const struct psr_blocks *blocks = s->blocks;
 	char builder[33];
 
@@ -104,6 +169,20 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	add_vec3(root, "box_max", s->info->box_max);
 	add_vec3(root, "origin", s->info->origin);
 	cJSON_AddNumberToObject(root, "scale", s->info->scale);
+	if (s->info->n_trials != 0) {
+		part = cJSON_AddObjectToObject(root, "adequacy");
+		cJSON_AddNumberToObject(part, "pixels", (double)s->info->n_trials);
+		cJSON_AddNumberToObject(part, "missing", (double)s->info->n_missing);
+		cJSON_AddNumberToObject(part, "lost_to_culling", (double)s->info->n_lost);
+	} else {
+		cJSON_AddNullToObject(root, "adequacy");
+	}
+	part = cJSON_AddArrayToObject(root, "cameras");
+	for (uint32_t i = 0; i < s->presets->n_cameras; i++)
+		add_preset(part, s->presets->camera[i].name, camera_kind(&s->presets->camera[i].camera));
+	part = cJSON_AddArrayToObject(root, "lights");
+	for (uint32_t i = 0; i < s->presets->n_lights; i++)
+		add_preset(part, s->presets->light[i].name, light_kind(&s->presets->light[i].light));
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
 	if (blocks != NULL) {
 		part = cJSON_AddObjectToObject(root, "blocks");
@@ -114,9 +193,12 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		cJSON_AddNumberToObject(part, "levels", blocks->n_levels);
 		cJSON_AddNumberToObject(part, "bytes_per_sample", ratio((double)s->bytes, (double)blocks->n_samples));
 		cJSON_AddNumberToObject(part, "samples_per_block", ratio((double)blocks->n_samples, blocks->n_blocks));
-		part = cJSON_AddArrayToObject(part, "level_blocks");
+		counts = cJSON_AddArrayToObject(part, "level_blocks");
 		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
-			cJSON_AddItemToArray(part, cJSON_CreateNumber(s->level_blocks[l]));
+			cJSON_AddItemToArray(counts, cJSON_CreateNumber(s->level_blocks[l]));
+		counts = cJSON_AddArrayToObject(part, "level_samples");
+		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+			cJSON_AddItemToArray(counts, cJSON_CreateNumber((double)s->level_samples[l]));
 	}
 	return json_print(root, err);
 }

@@ -144,7 +144,7 @@ static int hash_neighbours(XXH3_state_t *state, const char *source, struct psr_e
 
 int cachekey_find(char key[CATALOGUE_KEY], const char *source, const char *builder, struct psr_error *err)
 {
-	static const char version[] = "psr built model 1, psrd " PSR_VERSION;
+	static const char version[] = "psr built model 2, psrd " PSR_VERSION;
 	const char *dot = strrchr(source, '.');
 	XXH3_state_t *state = XXH3_createState();
 	XXH128_hash_t hash;

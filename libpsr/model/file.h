@@ -11,9 +11,10 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
 
 #define FILE_MAGIC "\x89PSR\r\n\x1a\n"
-#define FILE_MAJOR 1
+#define FILE_MAJOR 2
 #define FILE_MINOR 0
 #define FILE_ALIGNMENT 64
+#define FILE_TAIL_BYTES 128 /* zeros at the end, so that 64 depths may be read beyond the last one of any section */
 #define FILE_HEADER_BYTES 64
 #define FILE_ENTRY_BYTES 32
 #define FILE_CHUNK_BYTES ((uint64_t)1 << 20)
@@ -31,9 +32,11 @@ enum { ENTRY_TYPE = 0, ENTRY_VERSION = 4, ENTRY_FLAGS = 6, ENTRY_OFFSET = 8, ENT
 enum { ENTRY_REQUIRED = 1 };
 
 /* What a section's length is counted in. */
-enum section_count { COUNT_ONE, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_BLOCKS, COUNT_SAMPLES };
+enum section_count {
+	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_BLOCKS, COUNT_SAMPLES
+};
 
-enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_FIRST_ARRAY };
+enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY };
 
 struct section_spec {
 	char type[5];
@@ -43,9 +46,11 @@ struct section_spec {
 	size_t pointer; /* offset of the array's pointer in struct psr_blocks, from SECTION_FIRST_ARRAY on */
 };
 
-#define INFO_BYTES 136
+#define INFO_BYTES 160
 #define BLOCKS_BYTES 32
-#define N_KNOWN_SECTIONS 24
+#define CAMERA_BYTES 168
+#define LIGHT_BYTES 168
+#define N_KNOWN_SECTIONS 26
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 
@@ -92,13 +97,20 @@ static inline uint64_t file_chunks(uint64_t length)
 	return length > FILE_CHUNK_BYTES ? (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES : 0;
 }
 
-/* Number of items and of bytes that the known section has in this model. */
-uint64_t section_items(const struct section_spec *spec, const struct psr_blocks *blocks);
+/* What a model says: structures by value, arrays by pointer. */
+struct content {
+	struct psr_model_info info;
+	struct psr_blocks blocks;
+	struct psr_presets presets;
+};
+
+/* Number of items that the known section has in this model; section_array() is of those from SECTION_FIRST_ARRAY on. */
+uint64_t section_items(const struct section_spec *spec, const struct content *content);
 const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
 
 /* Lays a model out as a file in memory of psr_alloc_huge(), sealed. The counts must be within the limits and all
  * pointers but the optional ones set; the rest is left to the reader's checks. NULL if there is no memory. */
-uint8_t *file_image_make(const struct psr_model_info *info, const struct psr_blocks *blocks, uint64_t *n_bytes);
+uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes);
 
 /* Computes every hash of an image anew: chunks, sections, content id, header. What does not lie within the image is
  * left as it is, so that any bytes may be sealed. */
@@ -112,14 +124,19 @@ void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
 /* Checks the fixed part of a header; `name` begins the sentence of an error. Needs FILE_HEADER_BYTES bytes. */
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err);
 
-/* Checks everything and fills info and blocks with what the image says and pointers into it. The image must be aligned
- * to FILE_ALIGNMENT and outlive them. FORMAT, VERSION, UNSUPPORTED, MEMORY. */
-int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct psr_model_info *info,
-               struct psr_blocks *blocks, struct psr_error *err);
+/* Checks everything and fills `content` with what the image says and pointers into it. The image must be aligned to
+ * FILE_ALIGNMENT and outlive them. FORMAT, VERSION, UNSUPPORTED, MEMORY. */
+int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err);
 
 /* Every rule on values that docs/format.md states; the arrays have their lengths and may be read. */
-int model_validate(const struct psr_model_info *info, const struct psr_blocks *blocks, const char *name,
-                   struct psr_error *err);
+int model_validate(const struct content *content, const char *name, struct psr_error *err);
+
+/* The rules of CAMS and LGTS, which model_validate() calls; on failure *section is the one that broke them. */
+int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
+
+/* Copies as files have them: nothing but zeros after a name, in padding and where a kind does not use a field. */
+void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);
+void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_light *from, uint32_t n);
 
 /* The image of a model, for the writer. */
 const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes);

@@ -6,6 +6,10 @@
 _Static_assert(sizeof(struct psr_projection) == 40 && offsetof(struct psr_projection, spacing) == 36, "section PROJ");
 _Static_assert(sizeof(struct psr_cluster) == 32 && offsetof(struct psr_cluster, first_block) == 16, "section CLUS");
 _Static_assert(offsetof(struct psr_cluster, group) == 24 && offsetof(struct psr_cluster, level) == 28, "section CLUS");
+_Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(struct psr_preset_camera, camera) == 64
+               && offsetof(struct psr_camera, kind) == 72 && offsetof(struct psr_camera, fov_y) == 80, "section CAMS");
+_Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
+               && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
 
 #define ARRAY(type, flags, count, item, field) \
 	{ type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
@@ -13,6 +17,8 @@ _Static_assert(offsetof(struct psr_cluster, group) == 24 && offsetof(struct psr_
 const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
 	[SECTION_BLOCKS] = { "BLKS", 1, ENTRY_REQUIRED, COUNT_ONE, BLOCKS_BYTES, 0 },
+	[SECTION_CAMERAS] = { "CAMS", 1, 0, COUNT_CAMERAS, CAMERA_BYTES, 0 },
+	[SECTION_LIGHTS] = { "LGTS", 1, 0, COUNT_LIGHTS, LIGHT_BYTES, 0 },
 	ARRAY("PROJ", ENTRY_REQUIRED, COUNT_PROJECTIONS, 40, projection),
 	ARRAY("CLUS", ENTRY_REQUIRED, COUNT_CLUSTERS, 32, cluster),
 	ARRAY("SPHX", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_x),
@@ -33,13 +39,19 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("CONZ", 0, COUNT_BLOCKS, 4, cone_z),
 	ARRAY("CONC", 0, COUNT_BLOCKS, 4, cone_cos),
 	ARRAY("VISM", 0, COUNT_BLOCKS, 16, visibility),
-	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_BLOCKS, 2 * PSR_BLOCK_SAMPLES, depth),
+	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),
 };
 
-uint64_t section_items(const struct section_spec *spec, const struct psr_blocks *blocks)
+uint64_t section_items(const struct section_spec *spec, const struct content *content)
 {
+	const struct psr_blocks *blocks = &content->blocks;
+
 	switch (spec->count) {
+	case COUNT_CAMERAS:
+		return content->presets.n_cameras;
+	case COUNT_LIGHTS:
+		return content->presets.n_lights;
 	case COUNT_PROJECTIONS:
 		return blocks->n_projections;
 	case COUNT_CLUSTERS:
@@ -141,7 +153,10 @@ static void put_info(uint8_t *at, const struct psr_model_info *info)
 	file_put_double(at + 80, info->spacing);
 	file_put_double(at + 88, info->tolerance);
 	file_put(at + 96, 4, info->resolution);
-	memcpy(at + 104, info->builder, strnlen(info->builder, sizeof info->builder - 1));
+	file_put(at + 104, 8, info->n_trials);
+	file_put(at + 112, 8, info->n_missing);
+	file_put(at + 120, 8, info->n_lost);
+	memcpy(at + 128, info->builder, strnlen(info->builder, sizeof info->builder - 1));
 }
 
 static void put_blocks(uint8_t *at, const struct psr_blocks *blocks)
@@ -153,27 +168,56 @@ static void put_blocks(uint8_t *at, const struct psr_blocks *blocks)
 	file_put(at + 16, 8, blocks->n_samples);
 }
 
-static int is_present(int section, const struct psr_blocks *blocks)
+static int is_present(int section, const struct content *content)
 {
-	return section < SECTION_FIRST_ARRAY || section_array(&section_table[section], blocks) != NULL;
+	switch (section) {
+	case SECTION_INFO:
+	case SECTION_BLOCKS:
+		return 1;
+	case SECTION_CAMERAS:
+	case SECTION_LIGHTS:
+		return section_items(&section_table[section], content) > 0;
+	default:
+		return section_array(&section_table[section], &content->blocks) != NULL;
+	}
 }
 
-uint8_t *file_image_make(const struct psr_model_info *info, const struct psr_blocks *blocks, uint64_t *n_bytes)
+static void put_section(uint8_t *at, int section, const struct content *content, uint64_t length)
+{
+	switch (section) {
+	case SECTION_INFO:
+		put_info(at, &content->info);
+		break;
+	case SECTION_BLOCKS:
+		put_blocks(at, &content->blocks);
+		break;
+	case SECTION_CAMERAS:
+		preset_put_cameras((struct psr_preset_camera *)(void *)at, content->presets.camera, content->presets.n_cameras);
+		break;
+	case SECTION_LIGHTS:
+		preset_put_lights((struct psr_preset_light *)(void *)at, content->presets.light, content->presets.n_lights);
+		break;
+	default:
+		memcpy(at, section_array(&section_table[section], &content->blocks), length);
+	}
+}
+
+uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 {
 	uint64_t n_sections = 0, n_chunks = 0, at = 0;
 	uint8_t *bytes = NULL, *entry;
 
 	/* Once to add the sizes up, once to write. */
 	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
-		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], blocks);
+		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], content);
 
-		if (is_present(i, blocks)) {
+		if (is_present(i, content)) {
 			n_sections++;
 			n_chunks += file_chunks(length);
 			at += file_align(length);
 		}
 	}
-	*n_bytes = at + file_align(FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks);
+	*n_bytes = at + FILE_TAIL_BYTES + file_align(FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks);
 	bytes = psr_alloc_huge(*n_bytes);
 	if (bytes == NULL)
 		return NULL;
@@ -183,28 +227,23 @@ uint8_t *file_image_make(const struct psr_model_info *info, const struct psr_blo
 	file_put(bytes + HEADER_N_SECTIONS, 4, n_sections);
 	file_put(bytes + HEADER_FILE_SIZE, 8, *n_bytes);
 	file_put(bytes + HEADER_N_CHUNKS, 4, n_chunks);
-	at = *n_bytes - at;
+	at = *n_bytes - FILE_TAIL_BYTES - at;
 	entry = bytes + FILE_HEADER_BYTES;
 	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
-		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], blocks);
+		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], content);
 
-		if (!is_present(i, blocks))
+		if (!is_present(i, content))
 			continue;
 		memcpy(entry + ENTRY_TYPE, section_table[i].type, 4);
 		file_put(entry + ENTRY_VERSION, 2, section_table[i].version);
 		file_put(entry + ENTRY_FLAGS, 2, section_table[i].flags);
 		file_put(entry + ENTRY_OFFSET, 8, at);
 		file_put(entry + ENTRY_LENGTH, 8, length);
-		if (i == SECTION_INFO)
-			put_info(bytes + at, info);
-		else if (i == SECTION_BLOCKS)
-			put_blocks(bytes + at, blocks);
-		else
-			memcpy(bytes + at, section_array(&section_table[i], blocks), length);
+		put_section(bytes + at, i, content, length);
 		entry += FILE_ENTRY_BYTES;
 		at += file_align(length);
 	}
-	assert(at == *n_bytes);
+	assert(at + FILE_TAIL_BYTES == *n_bytes);
 	file_seal(bytes, *n_bytes);
 	return bytes;
 }

@@ -17,8 +17,7 @@ struct psr_model {
 	int is_mapped;
 	size_t n_bytes;
 	const uint8_t *bytes; /* the image */
-	struct psr_model_info info;
-	struct psr_blocks blocks;
+	struct content content;
 };
 
 static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
@@ -39,7 +38,7 @@ static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, i
 	if (model == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
-		code = file_parse(bytes, n_bytes, name, &model->info, &model->blocks, err);
+		code = file_parse(bytes, n_bytes, name, &model->content, err);
 	if (code != PSR_OK) {
 		free(model);
 		release_image(bytes, n_bytes, is_mapped);
@@ -163,7 +162,8 @@ int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, s
 	return adopt(out, copy, n_bytes, 0, "the model", err);
 }
 
-static int check_arguments(const struct psr_model_info *info, const struct psr_blocks *blocks, struct psr_error *err)
+static int check_arguments(const struct psr_model_info *info, const struct psr_blocks *blocks,
+                           const struct psr_presets *presets, struct psr_error *err)
 {
 	int n_cones;
 
@@ -183,20 +183,30 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_cos;
 	if (n_cones % 4 != 0)
 		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
+	if (presets == NULL)
+		return PSR_OK;
+	if (presets->n_cameras > PSR_MAX_PRESETS || presets->n_lights > PSR_MAX_PRESETS)
+		return psr_fail(err, PSR_ERR_LIMIT, "%" PRIu32 " cameras and %" PRIu32 " lights; a model takes %d of each",
+		                presets->n_cameras, presets->n_lights, PSR_MAX_PRESETS);
+	if ((presets->n_cameras != 0 && presets->camera == NULL) || (presets->n_lights != 0 && presets->light == NULL))
+		return psr_fail(err, PSR_ERR_ARG, "the model's array of cameras or lights is missing");
 	return PSR_OK;
 }
 
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                      const struct psr_presets *presets, struct psr_error *err)
 {
+	struct content content;
 	uint64_t n_bytes;
 	uint8_t *bytes;
-	int code = check_arguments(info, blocks, err);
+	int code = check_arguments(info, blocks, presets, err);
 
-	(void)presets;
 	if (code != PSR_OK)
 		return code;
-	bytes = file_image_make(info, blocks, &n_bytes);
+	content = (struct content){ .info = *info, .blocks = *blocks };
+	if (presets != NULL)
+		content.presets = *presets;
+	bytes = file_image_make(&content, &n_bytes);
 	if (bytes == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %" PRIu64 " bytes", n_bytes);
 	return adopt(out, bytes, n_bytes, 0, "the model", err);
@@ -218,12 +228,17 @@ void psr_model_unref(struct psr_model *model)
 
 const struct psr_model_info *psr_model_info(const struct psr_model *model)
 {
-	return &model->info;
+	return &model->content.info;
 }
 
 const struct psr_blocks *psr_model_blocks(const struct psr_model *model)
 {
-	return &model->blocks;
+	return &model->content.blocks;
+}
+
+const struct psr_presets *psr_model_presets(const struct psr_model *model)
+{
+	return &model->content.presets;
 }
 
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16])

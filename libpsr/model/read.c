@@ -123,9 +123,13 @@ static int check_places(const struct reader *r)
 	if (n_chunks != n_listed)
 		return bad(r, "the table lists %" PRIu64 " hashes of chunks, and its sections have %" PRIu64, n_listed,
 		           n_chunks);
+	at += FILE_TAIL_BYTES;
+	for (uint64_t k = at - FILE_TAIL_BYTES; k < at && k < r->n_bytes; k++)
+		if (r->bytes[k] != 0)
+			return bad(r, "byte %" PRIu64 " at the end of the file is not zero", k);
 	if (r->file_size != at)
 		return bad(r, "the header says %" PRIu64 " bytes, and the last section, %s at byte %" PRIu64
-		           ", ends at byte %" PRIu64, r->file_size, s.type, s.offset, at);
+		           ", and the zeros after it end at byte %" PRIu64, r->file_size, s.type, s.offset, at);
 	if (r->n_bytes < at)
 		return fail_cut(r, &s);
 	if (r->n_bytes > at)
@@ -225,7 +229,10 @@ static int get_info(const struct reader *r, struct psr_model_info *info)
 	info->spacing = file_get_double(at + 80);
 	info->tolerance = file_get_double(at + 88);
 	info->resolution = (uint32_t)file_get(at + 96, 4);
-	memcpy(info->builder, at + 104, sizeof info->builder);
+	info->n_trials = file_get(at + 104, 8);
+	info->n_missing = file_get(at + 112, 8);
+	info->n_lost = file_get(at + 120, 8);
+	memcpy(info->builder, at + 128, sizeof info->builder);
 	if (file_get(at + 100, 4) != 0)
 		return bad(r, "section INFO: reserved bytes are not zero");
 	return PSR_OK;
@@ -252,8 +259,29 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 	return PSR_OK;
 }
 
-static int get_arrays(const struct reader *r, struct psr_blocks *blocks)
+/* How many items of that length the optional section has, 1 to PSR_MAX_PRESETS, or 0 if it is absent. */
+static int get_presets(const struct reader *r, int known, uint32_t *n, const void **array)
 {
+	struct section s;
+	uint32_t item_bytes = section_table[known].item_bytes;
+
+	*n = 0;
+	*array = NULL;
+	if (r->entry[known] < 0)
+		return PSR_OK;
+	s = get_section(r, (uint32_t)r->entry[known]);
+	if (s.length == 0 || s.length % item_bytes != 0 || s.length / item_bytes > PSR_MAX_PRESETS)
+		return bad(r, "section %s at byte %" PRIu64 " has %" PRIu64 " bytes and should have 1 to %d times %" PRIu32,
+		           s.type, s.offset, s.length, PSR_MAX_PRESETS, item_bytes);
+	*n = (uint32_t)(s.length / item_bytes);
+	*array = r->bytes + s.offset;
+	return PSR_OK;
+}
+
+static int get_arrays(const struct reader *r, struct content *content)
+{
+	struct psr_blocks *blocks = &content->blocks;
+
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const void *array;
@@ -261,7 +289,7 @@ static int get_arrays(const struct reader *r, struct psr_blocks *blocks)
 
 		if (r->entry[k] < 0)
 			continue;
-		code = check_length(r, k, spec->item_bytes * section_items(spec, blocks));
+		code = check_length(r, k, spec->item_bytes * section_items(spec, content));
 		if (code != PSR_OK)
 			return code;
 		array = r->bytes + get_section(r, (uint32_t)r->entry[k]).offset;
@@ -272,9 +300,9 @@ static int get_arrays(const struct reader *r, struct psr_blocks *blocks)
 	return PSR_OK;
 }
 
-int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct psr_model_info *info,
-               struct psr_blocks *blocks, struct psr_error *err)
+int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err)
 {
+	const void *camera = NULL, *light = NULL;
 	struct reader r = { .bytes = bytes, .n_bytes = n_bytes, .name = name, .err = err };
 	int code;
 
@@ -302,11 +330,17 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct ps
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
 		if (section_table[k].flags & ENTRY_REQUIRED && r.entry[k] < 0)
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: section %s is missing", name, section_table[k].type);
-	memset(blocks, 0, sizeof *blocks);
-	code = get_info(&r, info);
+	memset(content, 0, sizeof *content);
+	code = get_info(&r, &content->info);
 	if (code == PSR_OK)
-		code = get_blocks(&r, blocks);
+		code = get_blocks(&r, &content->blocks);
 	if (code == PSR_OK)
-		code = get_arrays(&r, blocks);
-	return code == PSR_OK ? model_validate(info, blocks, name, err) : code;
+		code = get_presets(&r, SECTION_CAMERAS, &content->presets.n_cameras, &camera);
+	if (code == PSR_OK)
+		code = get_presets(&r, SECTION_LIGHTS, &content->presets.n_lights, &light);
+	if (code == PSR_OK)
+		code = get_arrays(&r, content);
+	content->presets.camera = camera;
+	content->presets.light = light;
+	return code == PSR_OK ? model_validate(content, name, err) : code;
 }

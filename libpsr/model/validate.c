@@ -13,6 +13,7 @@
 struct checker {
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks;
+	const struct psr_presets *presets;
 	const char *name;
 	struct psr_error *err;
 };
@@ -66,6 +67,9 @@ static int check_info(const struct checker *c)
 		return fail(c, "INFO", "the tolerance is %g; it must be an angle from 0 to half of pi", info->tolerance);
 	if (info->resolution == 0)
 		return fail(c, "INFO", "the resolution is 0");
+	if (info->n_missing > info->n_trials || info->n_lost > info->n_trials)
+		return fail(c, "INFO", "%" PRIu64 " pixels are missing and %" PRIu64 " lost, out of %" PRIu64, info->n_missing,
+		            info->n_lost, info->n_trials);
 	for (size_t i = 0; i < sizeof info->builder; i++)
 		if (i < length ? info->builder[i] < ' ' || info->builder[i] > '~' : info->builder[i] != 0)
 			return fail(c, "INFO", "byte %zu of the builder's name is not text", i);
@@ -195,22 +199,6 @@ static int check_heads(const struct checker *c)
 	return PSR_OK;
 }
 
-static int check_depths(const struct checker *c)
-{
-	const struct psr_blocks *b = c->blocks;
-
-	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		const uint16_t *depth = b->depth + (size_t)PSR_BLOCK_SAMPLES * i;
-		uint64_t invalid = ~b->mask[i];
-
-		for (; invalid != 0; invalid &= invalid - 1)
-			if (depth[__builtin_ctzll(invalid)] != 0)
-				return fail(c, "DPTH", "sample %d of block %" PRIu32 " is not valid and has a depth",
-				            __builtin_ctzll(invalid), i);
-	}
-	return PSR_OK;
-}
-
 static int check_cones(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
@@ -230,13 +218,20 @@ static int check_cones(const struct checker *c)
 	return PSR_OK;
 }
 
-int model_validate(const struct psr_model_info *info, const struct psr_blocks *blocks, const char *name,
-                   struct psr_error *err)
+static int check_presets(const struct checker *c)
+{
+	struct psr_error err = { 0 };
+	const char *section = NULL;
+
+	return presets_validate(c->presets, &section, &err) == PSR_OK ? PSR_OK : fail(c, section, "%s", err.text);
+}
+
+int model_validate(const struct content *content, const char *name, struct psr_error *err)
 {
 	static int (*const checks[])(const struct checker *) = {
-		check_info, check_counts, check_projections, check_clusters, check_heads, check_depths, check_cones,
+		check_info, check_counts, check_presets, check_projections, check_clusters, check_heads, check_cones,
 	};
-	const struct checker c = { info, blocks, name, err };
+	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;
 
 	for (size_t i = 0; i < sizeof checks / sizeof checks[0] && code == PSR_OK; i++)

@@ -5,7 +5,14 @@
 #include "psr/direction.h"
 #include "render/render.h"
 
-/* Where a sample stands in the instance's inner coordinates. */
+/* Index of a valid sample's depth and attributes. */
+static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uint32_t sample)
+{
+	const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
+	return (size_t)b->attr_first[block] + (size_t)__builtin_popcountll(below);
+}
+
+/* Where a valid sample stands in the instance's inner coordinates. */
 static inline void block_position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
 {
 	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
@@ -14,15 +21,14 @@ static inline void block_position(const struct psr_blocks *b, uint32_t block, ui
 	const float x = ((float)(8 * b->col[block] + (int32_t)c) + (float)(r & 1) * 0.5f) * dx;
 	const float y = (float)(8 * b->row[block] + (int32_t)r) * dy;
 	const float z = b->depth_bias[block] +
-	                b->depth_step[block] * (float)b->depth[(size_t)block * PSR_BLOCK_SAMPLES + sample];
+	                b->depth_step[block] * (float)b->depth[block_index(b, block, sample)];
 	for (int a = 0; a < 3; a++)
 		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
 }
 
 static inline uint64_t block_attr(const struct psr_blocks *b, uint32_t block, uint32_t sample)
 {
-	const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-	return b->attr[(uint64_t)b->attr_first[block] + (uint64_t)__builtin_popcountll(below)];
+	return b->attr[block_index(b, block, sample)];
 }
 
 /* From a position to the eye; of any length. */

@@ -157,6 +157,57 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	return 1;
 }
 
+static struct cluster_view {
+	float c[3], r;
+} view_cluster(const struct plan_instance *in, const struct psr_cluster *k)
+{
+	struct cluster_view v;
+	for (int a = 0; a < 3; a++)
+		v.c[a] = to_camera(in->center_m[a], k->center[0], k->center[1], k->center[2]);
+	v.r = k->radius * in->scale;
+	return v;
+}
+
+/* Rises with the level among clusters that fit a pixel, falls with it among those that do not, which are all below. */
+static uint32_t score_of(const struct plan_instance *in, const struct psr_cluster *k, float group_stretch)
+{
+	const uint32_t max_levels = 32;
+	int fits = level_for(group_stretch * in->spacing * (float)(1u << k->level)) == 0;
+	return fits ? max_levels + k->level : max_levels - 1 - k->level;
+}
+
+/* Serial, since it costs no more than some nanoseconds a cluster, which has many blocks. */
+static void choose_levels(struct bins *bins, const struct plan *plan)
+{
+	for (uint32_t i = 0; i < plan->n_instances; i++) {
+		const struct plan_instance *in = &plan->instance[i];
+		const struct psr_blocks *b = in->blocks;
+		struct cull_group *group = bins->group + in->first_group;
+		if (b->n_levels == 1)
+			continue;
+		memset(group, 0, b->n_clusters * sizeof *group);
+		for (uint32_t k = 0; k < b->n_clusters; k++) {
+			const struct cluster_view v = view_cluster(in, &b->cluster[k]);
+			const float s = stretch(plan, v.c, v.r);
+			float *most = &group[b->cluster[k].group].stretch;
+			*most = s > *most ? s : *most;
+		}
+		for (uint32_t k = 0; k < b->n_clusters; k++) {
+			struct cull_group *g = &group[b->cluster[k].group];
+			const uint32_t score = score_of(in, &b->cluster[k], g->stretch);
+			g->score = score > g->score ? score : g->score;
+		}
+	}
+}
+
+static int is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
+{
+	if (in->blocks->n_levels == 1)
+		return 1;
+	const struct cull_group *g = &bins->group[in->first_group + k->group];
+	return score_of(in, k, g->stretch) == g->score;
+}
+
 static void count_chunk(int i, void *userdata)
 {
 	const struct cull *cull = userdata;
@@ -171,11 +222,9 @@ static void count_chunk(int i, void *userdata)
 	memset(count, 0, cull->n_tiles * sizeof *count);
 	for (uint32_t k = 0; k < chunk->n_clusters; k++) {
 		const struct psr_cluster *cluster = &in->blocks->cluster[chunk->first_cluster + k];
+		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
-		float c[3];
-		for (int a = 0; a < 3; a++)
-			c[a] = to_camera(in->center_m[a], cluster->center[0], cluster->center[1], cluster->center[2]);
-		if (!sphere_extent(plan, c, cluster->radius * in->scale, guard, &e))
+		if (!is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk->n_tested += cluster->n_blocks;
 		for (uint32_t b = 0; b < cluster->n_blocks; b++) {
@@ -259,11 +308,13 @@ int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *poo
 	assert(plan->tiles_x <= 256 && plan->tiles_y <= 256);
 	bins->chunk = grow(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = grow(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
+	bins->group = grow(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
 	bins->count = grow(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
 	bins->tile_begin = grow(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
-	if (!bins->chunk || !bins->hit || !bins->count || !bins->tile_begin)
+	if (!bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
 		return PSR_ERR_MEMORY;
 	make_chunks(bins, plan, 1);
+	choose_levels(bins, plan);
 	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
 	int rc = place_entries(bins, &cull);
 	if (rc)
@@ -290,8 +341,8 @@ int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *poo
 size_t bins_bytes(const struct bins *bins)
 {
 	return bins->entry_capacity * sizeof *bins->entry + bins->chunk_capacity * sizeof *bins->chunk +
-	       bins->hit_capacity * sizeof *bins->hit + bins->count_capacity * sizeof *bins->count +
-	       bins->tile_capacity * sizeof *bins->tile_begin;
+	       bins->hit_capacity * sizeof *bins->hit + bins->group_capacity * sizeof *bins->group +
+	       bins->count_capacity * sizeof *bins->count + bins->tile_capacity * sizeof *bins->tile_begin;
 }
 
 void bins_clear(struct bins *bins)
@@ -300,6 +351,7 @@ void bins_clear(struct bins *bins)
 	psr_free(bins->tile_begin);
 	psr_free(bins->chunk);
 	psr_free(bins->hit);
+	psr_free(bins->group);
 	psr_free(bins->count);
 	memset(bins, 0, sizeof *bins);
 }

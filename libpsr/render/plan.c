@@ -172,14 +172,16 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	struct view_matrix *projection = plan->storage;
 	plan->instance = (struct plan_instance *)(projection + n_projections);
 	struct plan_light *light = (struct plan_light *)(plan->instance + scene->n_instances);
-	plan->n_slots = 0;
+	plan->n_slots = plan->n_groups = 0;
 	plan->n_samples = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_blocks *blocks = psr_model_blocks(scene->instance[i].model);
 		plan->instance[i].first_slot = plan->n_slots;
 		plan->instance[i].projection = projection;
 		plan->instance[i].light = light;
+		plan->instance[i].first_group = plan->n_groups;
 		plan->n_slots += blocks->n_blocks;
+		plan->n_groups += blocks->n_clusters;
 		plan->n_samples += blocks->n_samples;
 		projection += blocks->n_projections;
 		light += scene->n_lights;

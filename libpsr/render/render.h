@@ -36,6 +36,7 @@ struct plan_light {
 struct plan_instance {
 	const struct psr_blocks *blocks;
 	uint32_t first_slot;       /* slot of block b is first_slot + b */
+	uint32_t first_group;      /* place of the model's group 0 among those of all instances, of which each has n_clusters */
 	float center_m[3][4];      /* inner coordinates to camera space */
 	float scale;               /* camera space units an inner unit */
 	float spacing;             /* greatest distance of neighbours at level 0, camera space */
@@ -52,7 +53,7 @@ struct plan {
 	float near_z;
 	/* What a cell covers lies behind scale * z' + offset of it. */
 	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1];
-	uint32_t n_instances, n_lights, n_slots;
+	uint32_t n_instances, n_lights, n_slots, n_groups;
 	struct plan_instance *instance;
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
@@ -67,7 +68,14 @@ void plan_clear(struct plan *plan);
 /* Instance that a slot belongs to; the slot must be below n_slots. */
 uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
 
-/* ---- cull: blocks in view, sorted into tiles ([G] 6.1) ---- */
+/* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
+
+/* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel wherever a sphere of the
+ * group reaches, so that its blocks need no depth buffer but the picture's; the finest if there is none. */
+struct cull_group {
+	float stretch;  /* greatest of its clusters: pixels that a unit of camera space can be stretched to */
+	uint32_t score; /* of the cluster that is drawn */
+};
 
 struct bin_entry {
 	uint32_t slot;
@@ -85,6 +93,8 @@ struct bins {
 	size_t chunk_capacity;
 	struct cull_hit *hit;    /* one a block that is left, by chunk */
 	size_t hit_capacity;
+	struct cull_group *group; /* of all instances */
+	size_t group_capacity;
 	uint32_t *count;         /* chunk by tile */
 	size_t count_capacity;
 };

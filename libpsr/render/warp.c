@@ -113,7 +113,8 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 	const double x = 8.0 * b->col[block] * dx, y = 8.0 * b->row[block] * dy;
 	const float bias = b->depth_bias[block], depth_step = b->depth_step[block];
 	const uint64_t id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
-	uint64_t mask = entry->is_mixed ? facing_samples(plan, in, block) : b->mask[block];
+	const uint16_t *next_depth = b->depth + b->attr_first[block];
+	uint64_t valid = b->mask[block], mask = entry->is_mixed ? facing_samples(plan, in, block) : valid;
 	uint32_t n_inside = 0;
 	double origin[3], down[3];
 	float step[3], along_z[3];
@@ -125,7 +126,9 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 		step[a] = (float)(m[0] * dx);
 		along_z[a] = (float)m[2];
 	}
-	for (int r = 0; r < 8; r++, mask >>= 8) {
+	for (int r = 0; r < 8; r++, mask >>= 8, valid >>= 8) {
+		const uint16_t *row_depth = next_depth;
+		next_depth += __builtin_popcountll(valid & 0xff);
 		if (!(mask & 0xff))
 			continue;
 		float base[3], depth[8], z[8];
@@ -133,7 +136,7 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 		for (int a = 0; a < 3; a++)
 			base[a] = (float)(origin[a] + r * down[a]);
 		for (int c = 0; c < 8; c++)
-			depth[c] = bias + depth_step * (float)b->depth[(size_t)block * PSR_BLOCK_SAMPLES + (size_t)(8 * r + c)];
+			depth[c] = valid >> c & 1 ? bias + depth_step * (float)*row_depth++ : bias;
 		warp_row(base, step, along_z, (float)(r & 1) * 0.5f, depth, plan->perspective, u, v, z);
 		for (int c = 0; c < 8; c++) {
 			if (!(mask >> c & 1) || !(z[c] > plan->near_z))

@@ -106,6 +106,8 @@ static int select_and_pack(struct build *build, struct psr_model **out)
 		                          .projection = build->projection,
 		                          .ds = 2.0 / build->options->resolution, .pool = build->pool,
 		                          .on_progress = report_select, .userdata = (void *)build->options };
+	struct psr_presets presets = { .n_cameras = build->mesh->n_cameras, .n_lights = build->mesh->n_lights,
+		                           .camera = build->mesh->camera, .light = build->mesh->light };
 	double started = now(), sine, cosine;
 	int rc;
 
@@ -116,7 +118,7 @@ static int select_and_pack(struct build *build, struct psr_model **out)
 	if (rc != PSR_OK)
 		return psr_fail(build->err, rc, "no memory to select the blocks at resolution %u; use a lower one",
 		                build->options->resolution);
-	return pack_model(out, &build->info, build->scene, build->projection, build->lattice, &build->selection,
+	return pack_model(out, &build->info, &presets, build->scene, build->projection, build->lattice, &build->selection,
 	                  build->err);
 }
 

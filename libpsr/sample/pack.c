@@ -100,12 +100,13 @@ static void sort_blocks(struct pack *pack)
 static void quantise(struct pack *pack, uint32_t i, const struct lattice_sample *sample, double min, double max)
 {
 	float bias = (float)min, step = (float)((max - min) / 65535);
-	uint16_t *depth = pack->depth + (size_t)PSR_BLOCK_SAMPLES * i;
+	uint16_t *depth = pack->depth + pack->attr_first[i];
 
-	for (unsigned s = 0; s < PSR_BLOCK_SAMPLES; s++) {
+	for (uint64_t left = pack->mask[i]; left != 0; left &= left - 1) {
+		unsigned s = (unsigned)__builtin_ctzll(left);
 		double q = step > 0 ? ((double)sample[s].z - (double)bias) / (double)step + 0.5 : 0;
 
-		depth[s] = (pack->mask[i] >> s & 1) == 0 ? 0 : q < 65535 ? (uint16_t)q : 65535;
+		*depth++ = q < 65535 ? (uint16_t)q : 65535;
 	}
 	pack->depth_bias[i] = bias;
 	pack->depth_step[i] = step;
@@ -115,6 +116,7 @@ static void quantise(struct pack *pack, uint32_t i, const struct lattice_sample 
 static void bound_block(struct pack *pack, uint32_t i, const struct psr_projection *projection, const double min[3],
                         const double max[3])
 {
+	const uint16_t *depth = pack->depth + pack->attr_first[i];
 	double center[3], radius = 0;
 	float rounded[3];
 
@@ -126,7 +128,7 @@ static void bound_block(struct pack *pack, uint32_t i, const struct psr_projecti
 	for (uint64_t left = pack->mask[i]; left != 0; left &= left - 1) {
 		unsigned s = (unsigned)__builtin_ctzll(left);
 		double x, y, position[3], squared = 0;
-		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[PSR_BLOCK_SAMPLES * (size_t)i + s];
+		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)*depth++;
 
 		lattice_position(projection, pack->col[i], pack->row[i], s, &x, &y);
 		inner_position(projection, x, y, (double)z, position);
@@ -226,7 +228,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->depth_step, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
-	ALLOC(pack->depth, n_blocks * PSR_BLOCK_SAMPLES);
+	ALLOC(pack->depth, n_samples);
 	ALLOC(pack->col, n_blocks);
 	ALLOC(pack->row, n_blocks);
 	ALLOC(pack->level, n_blocks);
@@ -259,7 +261,8 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->attr_first);
 }
 
-static int make_model(struct psr_model **out, struct psr_model_info *info, struct pack *pack, struct psr_error *err)
+static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
+                      struct pack *pack, struct psr_error *err)
 {
 	uint32_t n_blocks = (uint32_t)pack->selection->n_blocks;
 	struct psr_blocks blocks = { .n_blocks = n_blocks, .n_projections = MOST_PROJECTIONS,
@@ -296,10 +299,11 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, struc
 		info->box_min[k] = info->origin[k] + info->scale * pack->box_min[k];
 		info->box_max[k] = info->origin[k] + info->scale * pack->box_max[k];
 	}
-	return psr_model_create(out, info, &blocks, NULL, err);
+	return psr_model_create(out, info, &blocks, presets, err);
 }
 
-int pack_model(struct psr_model **out, struct psr_model_info *info, const struct ray_scene *scene,
+int pack_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
+               const struct ray_scene *scene,
                const struct psr_projection *projection, const struct lattice *lattice,
                const struct selection *selection, struct psr_error *err)
 {
@@ -309,7 +313,7 @@ int pack_model(struct psr_model **out, struct psr_model_info *info, const struct
 	if (selection->n_samples > UINT32_MAX || selection->n_blocks > UINT32_MAX)
 		return psr_fail(err, PSR_ERR_LIMIT, "%zu samples are more than a model can hold; use a lower resolution",
 		                selection->n_samples);
-	rc = make_model(out, info, &pack, err);
+	rc = make_model(out, info, presets, &pack, err);
 	pack_fini(&pack);
 	return rc;
 }

@@ -12,6 +12,7 @@ static void check_rules(const struct psr_blocks *b)
 {
 	uint64_t n_samples = 0;
 	uint32_t n_in_clusters = 0;
+	volatile uint16_t beyond = 0; /* readable, says the header */
 
 	for (uint32_t i = 0; i < b->n_clusters; i++) {
 		const struct psr_cluster *c = &b->cluster[i];
@@ -25,24 +26,34 @@ static void check_rules(const struct psr_blocks *b)
 		REQUIRE(b->mask[i] != 0 && b->attr_first[i] == n_samples);
 		REQUIRE(b->block_projection[i] < b->n_projections && b->level[i] < b->n_levels);
 		REQUIRE(b->sphere_r[i] >= 0 && b->depth_step[i] >= 0);
-		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++)
-			REQUIRE((b->mask[i] >> s & 1) != 0 || b->depth[(size_t)PSR_BLOCK_SAMPLES * i + (size_t)s] == 0);
 		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);
 	}
 	REQUIRE(n_samples == b->n_samples);
+	for (uint64_t k = n_samples; k < n_samples + PSR_BLOCK_SAMPLES; k++)
+		beyond ^= b->depth[k];
 }
 
-static void check_again(const struct psr_model_info *info, const struct psr_blocks *blocks)
+static void check_presets(const struct psr_presets *a, const struct psr_presets *b)
 {
+	REQUIRE(a->n_cameras == b->n_cameras && a->n_lights == b->n_lights);
+	REQUIRE(a->n_cameras == 0 || memcmp(a->camera, b->camera, a->n_cameras * sizeof *a->camera) == 0);
+	REQUIRE(a->n_lights == 0 || memcmp(a->light, b->light, a->n_lights * sizeof *a->light) == 0);
+}
+
+static void check_again(const struct content *content)
+{
+	const struct psr_model_info *info = &content->info;
+	const struct psr_blocks *blocks = &content->blocks;
 	struct psr_model *model = NULL;
 
-	REQUIRE(psr_model_create(&model, info, blocks, NULL, NULL) == PSR_OK);
+	REQUIRE(psr_model_create(&model, info, blocks, &content->presets, NULL) == PSR_OK);
+	check_presets(&content->presets, psr_model_presets(model));
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const void *a = section_array(spec, blocks), *b = section_array(spec, psr_model_blocks(model));
 
 		REQUIRE((a == NULL) == (b == NULL));
-		REQUIRE(a == NULL || memcmp(a, b, spec->item_bytes * section_items(spec, blocks)) == 0);
+		REQUIRE(a == NULL || memcmp(a, b, spec->item_bytes * section_items(spec, content)) == 0);
 	}
 	/* Up to its last field: what the compiler pads with is anything. */
 	REQUIRE(memcmp(psr_model_info(model), info, offsetof(struct psr_model_info, builder) + sizeof info->builder) == 0);
@@ -53,8 +64,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 {
 	struct psr_model *model = NULL;
 	struct psr_error err = { 0, "" };
-	struct psr_model_info info;
-	struct psr_blocks blocks;
+	struct content content;
 	void *copy = NULL;
 	int code;
 
@@ -68,11 +78,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 
 	file_seal(copy, n);
 	err = (struct psr_error){ 0, "" };
-	code = file_parse(copy, n, "input", &info, &blocks, &err);
+	code = file_parse(copy, n, "input", &content, &err);
 	REQUIRE(code == err.code && (code == PSR_OK) == (err.text[0] == 0));
 	if (code == PSR_OK) {
-		check_rules(&blocks);
-		check_again(&info, &blocks);
+		check_rules(&content.blocks);
+		check_again(&content);
 	}
 	free(copy);
 	return 0;

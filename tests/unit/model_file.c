@@ -22,7 +22,7 @@ static int setup(void **state)
 	(void)state;
 	fixture_init(&fixture, 1);
 	fixture.blocks.visibility = NULL;
-	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, &fixture.presets, NULL), PSR_OK);
 	bytes = model_image(model, &n_image);
 	image = malloc(n_image);
 	memcpy(image, bytes, n_image);
@@ -40,14 +40,13 @@ static int teardown(void **state)
 /* Parses in place, in an allocation of exactly that size, so that the address sanitizer sees every step beyond it. */
 static int parse(const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
-	struct psr_model_info info;
-	struct psr_blocks blocks;
+	struct content content;
 	void *exact = NULL;
 	int code;
 
 	assert_int_equal(posix_memalign(&exact, FILE_ALIGNMENT, n_bytes), 0);
 	memcpy(exact, bytes, n_bytes);
-	code = file_parse(exact, n_bytes, "m.psr", &info, &blocks, err);
+	code = file_parse(exact, n_bytes, "m.psr", &content, err);
 	free(exact);
 	return code;
 }
@@ -63,7 +62,9 @@ static uint8_t *entry_of(uint8_t *bytes, const char *type)
 
 static void assert_same(const struct psr_model *model, int with_optional)
 {
+	const struct content content = { .blocks = fixture.blocks };
 	const struct psr_blocks *a = &fixture.blocks, *b = psr_model_blocks(model);
+	const struct psr_presets *presets = psr_model_presets(model);
 
 	/* Up to its last field: what the compiler pads with is anything. */
 	assert_memory_equal(psr_model_info(model), &fixture.info, offsetof(struct psr_model_info, builder) + 32);
@@ -81,7 +82,13 @@ static void assert_same(const struct psr_model *model, int with_optional)
 		}
 		assert_int_equal((uintptr_t)section_array(spec, b) % FILE_ALIGNMENT, 0);
 		assert_ptr_not_equal(section_array(spec, b), section_array(spec, a));
-		assert_memory_equal(section_array(spec, b), section_array(spec, a), spec->item_bytes * section_items(spec, a));
+		assert_memory_equal(section_array(spec, b), section_array(spec, a), spec->item_bytes * section_items(spec, &content));
+	}
+	assert_int_equal(presets->n_cameras, with_optional ? 2 : 0);
+	assert_int_equal(presets->n_lights, with_optional ? 3 : 0);
+	if (with_optional) {
+		assert_memory_equal(presets->camera, fixture.camera, sizeof fixture.camera);
+		assert_memory_equal(presets->light, fixture.light, sizeof fixture.light);
 	}
 }
 
@@ -99,7 +106,7 @@ static void model_survives_memory_file_and_map_bit_by_bit(void **state)
 		size_t n_bytes;
 
 		fixture_init(&fixture, with_optional);
-		assert_int_equal(psr_model_create(&made, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
+		assert_int_equal(psr_model_create(&made, &fixture.info, &fixture.blocks, &fixture.presets, NULL), PSR_OK);
 		assert_same(made, with_optional);
 		assert_int_equal(psr_model_write(made, path, NULL), PSR_OK);
 		assert_int_equal(psr_model_read(&read, path, NULL), PSR_OK);
@@ -192,7 +199,9 @@ static void any_flipped_bit_is_noticed(void **state)
 
 static void long_sections_are_hashed_by_the_megabyte(void **state)
 {
-	const uint32_t n_blocks = 20000; /* DPTH: 2,560,000 bytes, three chunks */
+	/* MASK and ATTR: 2,400,000 bytes, three chunks each. Two each: SPHX SPHY SPHZ SPHR DBIA DSTP AFST. One, which is not
+	 * listed: the others, BPRJ, BCOL, BROW and DPTH of 600,000 bytes among them. */
+	const uint32_t n_blocks = 300000;
 	struct psr_blocks blocks = fixture.blocks;
 	struct psr_cluster cluster = { { 0, 0, 0 }, 1, 0, n_blocks, 0, 0, { 0 } };
 	struct psr_model *model = NULL;
@@ -226,11 +235,11 @@ static void long_sections_are_hashed_by_the_megabyte(void **state)
 	bytes = model_image(model, &n_bytes);
 	copy = malloc(n_bytes);
 	memcpy(copy, bytes, n_bytes);
-	assert_int_equal(file_get(copy + HEADER_N_CHUNKS, 4), 3);
-	at = file_get(entry_of(copy, "DPTH") + ENTRY_OFFSET, 8) + FILE_CHUNK_BYTES + 5;
+	assert_int_equal(file_get(copy + HEADER_N_CHUNKS, 4), 2 * 3 + 7 * 2);
+	at = file_get(entry_of(copy, "ATTR") + ENTRY_OFFSET, 8) + FILE_CHUNK_BYTES + 5;
 	copy[at] ^= 1;
 	assert_int_equal(parse(copy, n_bytes, &err), PSR_ERR_FORMAT);
-	assert_non_null(strstr(err.text, "section DPTH at byte"));
+	assert_non_null(strstr(err.text, "section ATTR at byte"));
 	assert_non_null(strstr(err.text, "the hash of its chunk 1 differs"));
 	copy[at] ^= 1;
 	assert_int_equal(parse(copy, n_bytes, NULL), PSR_OK);

@@ -1,4 +1,5 @@
-/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks. */
+/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks,
+ * two cameras, three lights. */
 #ifndef MODEL_FIXTURE_H
 #define MODEL_FIXTURE_H
 
@@ -16,11 +17,14 @@ struct fixture {
 	struct psr_projection projection[2];
 	struct psr_cluster cluster[3];
 	float sphere[4][FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS], cone[4][FIXTURE_BLOCKS];
-	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_BLOCKS * PSR_BLOCK_SAMPLES];
+	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
 	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS];
 	uint8_t level[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
 	uint64_t mask[FIXTURE_BLOCKS], attr[FIXTURE_SAMPLES], visibility[FIXTURE_BLOCKS][2];
 	uint32_t attr_first[FIXTURE_BLOCKS];
+	struct psr_presets presets; /* points to the arrays below */
+	struct psr_preset_camera camera[2];
+	struct psr_preset_light light[3];
 };
 
 static inline uint64_t fixture_random(uint64_t *state)
@@ -48,6 +52,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 	memset(f, 0, sizeof *f);
 	f->info = (struct psr_model_info){ .origin = { 500000.25, 5e6, -1e-3 }, .scale = 12.5, .box_min = { 1, 2, 3 },
 		                               .box_max = { 4, 5, 6 }, .spacing = 0.01, .tolerance = 1.2, .resolution = 256,
+		                               .n_trials = 1000000, .n_missing = 3, .n_lost = 1,
 		                               .builder = "test 1.0" };
 	for (int i = 0; i < 2; i++) {
 		for (int k = 0; k < 3; k++)
@@ -74,7 +79,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->visibility[i][1] = fixture_random(&state);
 		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
 			if (f->mask[i] >> s & 1) {
-				f->depth[PSR_BLOCK_SAMPLES * i + s] = (uint16_t)fixture_random(&state);
+				f->depth[n] = (uint16_t)fixture_random(&state);
 				f->attr[n++] = fixture_random(&state);
 			}
 		}
@@ -90,6 +95,20 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		.depth = f->depth, .attr = f->attr,
 	};
 	if (with_optional) {
+		f->presets = (struct psr_presets){ .n_cameras = 2, .n_lights = 3, .camera = f->camera, .light = f->light };
+		f->camera[0] = (struct psr_preset_camera){
+			"front", { { 0, 0, 5 }, { 0, 0, 0 }, { 0, 1, 0 }, PSR_CAMERA_PERSPECTIVE, 0.75, 0, 0.5 }
+		};
+		f->camera[1] = (struct psr_preset_camera){
+			"S\303\274dwand", { { 1, 2, 3 }, { 4, 5, 6 }, { 0, 0, 1 }, PSR_CAMERA_ORTHOGRAPHIC, 0, 2.5, 0 }
+		};
+		f->light[0] = (struct psr_preset_light){ "sun", { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { 0, -1, 0 },
+			                                              .color = { 3, 2, 1 } } };
+		f->light[1] = (struct psr_preset_light){ "lamp", { .kind = PSR_LIGHT_POINT, .position = { 1, 2, 3 },
+			                                               .color = { 50, 40, 30 }, .reference = 1 } };
+		f->light[2] = (struct psr_preset_light){ "beam", { .kind = PSR_LIGHT_SPOT, .position = { 1, 2, 3 },
+			                                               .direction = { 1, 0, 0 }, .color = { 50, 40, 30 },
+			                                               .inner = 0.25, .outer = 0.5, .reference = 1 } };
 		f->blocks.cone_x = f->cone[0];
 		f->blocks.cone_y = f->cone[1];
 		f->blocks.cone_z = f->cone[2];

@@ -27,7 +27,7 @@ static int setup(void **state)
 
 	(void)state;
 	fixture_init(&fixture, 1);
-	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &fixture.info, &fixture.blocks, &fixture.presets, NULL), PSR_OK);
 	model_image(model, &n_bytes);
 	original = malloc(n_bytes);
 	memcpy(original, model_image(model, &n_bytes), n_bytes);
@@ -94,8 +94,37 @@ static const struct violation violations[] = {
 	{ "INFO", 88, 8, D_MINUS_1, "INFO: the tolerance is -1; it must be an angle from 0 to half of pi" },
 	{ "INFO", 96, 4, 0, "INFO: the resolution is 0" },
 	{ "INFO", 100, 1, 1, "INFO: reserved bytes are not zero" },
-	{ "INFO", 104, 1, '\n', "INFO: byte 0 of the builder's name is not text" },
-	{ "INFO", 134, 1, 'x', "INFO: byte 30 of the builder's name is not text" },
+	{ "INFO", 104, 8, 2, "INFO: 3 pixels are missing and 1 lost, out of 2" },
+	{ "INFO", 120, 8, 1000001, "INFO: 3 pixels are missing and 1000001 lost, out of 1000000" },
+	{ "INFO", 128, 1, '\n', "INFO: byte 0 of the builder's name is not text" },
+	{ "INFO", 158, 1, 'x', "INFO: byte 30 of the builder's name is not text" },
+	{ "CAMS", 0, 1, 0, "CAMS: the name of camera 0 is empty" },
+	{ "CAMS", 4, 1, 0x80, "CAMS: byte 4 of the name of camera 0 is not UTF-8, or a control character" },
+	{ "CAMS", 168 + 1, 1, 0xc1, "CAMS: byte 1 of the name of camera 1 is not UTF-8, or a control character" },
+	{ "CAMS", 168 + 8, 1, 0xc3, "CAMS: byte 8 of the name of camera 1 is not UTF-8, or a control character" },
+	{ "CAMS", 0, 4, 0xbfbf90f4, "CAMS: byte 0 of the name of camera 0 is not UTF-8" },    /* U+110000 */
+	{ "CAMS", 0, 3, 0x80a0ed, "CAMS: byte 0 of the name of camera 0 is not UTF-8" },      /* a surrogate */
+	{ "CAMS", 0, 3, 0xbf9fe0, "CAMS: byte 0 of the name of camera 0 is not UTF-8" },      /* longer than it need be */
+	{ "CAMS", 2, 1, '\n', "CAMS: byte 2 of the name of camera 0 is not UTF-8, or a control character" },
+	{ "CAMS", 63, 1, 'x', "CAMS: camera 0: bytes that it does not use are not zero" },
+	{ "CAMS", 64, 8, D_NAN, "CAMS: camera 0: eye, target and up must be finite and below 1e30" },
+	{ "CAMS", 80, 8, 0, "CAMS: camera 0: the target is where the eye is" },
+	{ "CAMS", 120, 8, 0, "CAMS: camera 0: up has no length" },
+	{ "CAMS", 136, 4, 2, "CAMS: camera 0: unknown kind 2" },
+	{ "CAMS", 140, 4, 1, "CAMS: camera 0: bytes that it does not use are not zero" },
+	{ "CAMS", 144, 8, 0, "CAMS: camera 0: field of view of 0 radians" },
+	{ "CAMS", 152, 8, 1, "CAMS: camera 0: bytes that it does not use are not zero" },
+	{ "CAMS", 168 + 152, 8, D_NAN, "CAMS: camera 1: orthographic height of nan" },
+	{ "CAMS", 160, 8, D_MINUS_1, "CAMS: camera 0: near distance -1" },
+	{ "LGTS", 168, 1, 0, "LGTS: the name of light 1 is empty" },
+	{ "LGTS", 168, 4, 0x6e7573, "LGTS: lights 0 and 1 have the same name" }, /* "sun" */
+	{ "LGTS", 64, 4, 3, "LGTS: light 0: unknown kind 3" },
+	{ "LGTS", 72, 8, D_2, "LGTS: light 0: bytes that it does not use are not zero" },
+	{ "LGTS", 104, 8, 0, "LGTS: light 0: its direction has no length" },
+	{ "LGTS", 120, 8, D_INF, "LGTS: light 0: colour times intensity must be within 0..1e9" },
+	{ "LGTS", 168 + 72, 8, D_NAN, "LGTS: light 1: its position must be finite" },
+	{ "LGTS", 168 + 160, 8, D_INF, "LGTS: light 1: reference distance inf" },
+	{ "LGTS", 2 * 168 + 144, 8, D_2, "LGTS: light 2: half angles 2 and 0.5" },
 	{ "BLKS", 0, 4, 0, "BLKS: 143 samples do not fit 0 blocks" },
 	{ "BLKS", 0, 4, 5, "SPHX at byte" },
 	{ "BLKS", 0, 4, UINT32_MAX, "SPHX at byte" },
@@ -105,7 +134,7 @@ static const struct violation violations[] = {
 	{ "BLKS", 12, 4, 0, "BLKS: 0 levels; it must be 1 to 32" },
 	{ "BLKS", 12, 4, 33, "BLKS: 33 levels; it must be 1 to 32" },
 	{ "BLKS", 12, 4, 1, "CLUS: cluster 2 is of level 1 of 1" },
-	{ "BLKS", 16, 8, 142, "ATTR at byte" },
+	{ "BLKS", 16, 8, 142, "DPTH at byte" },
 	{ "BLKS", 16, 8, UINT64_MAX / 8 + 144, "BLKS: 2305843009213694095 samples do not fit 6 blocks" },
 	{ "BLKS", 24, 1, 1, "BLKS: reserved bytes are not zero" },
 	{ "PROJ", 0, 4, F_NAN, "PROJ: the axes of projection 0 are not orthonormal" },
@@ -145,8 +174,6 @@ static const struct violation violations[] = {
 	{ "MASK", 40, 8, UINT64_MAX, "MASK: 171 samples are valid, and BLKS counts 143" },
 	{ "AFST", 0, 4, 1, "AFST: the attributes of block 0 begin at 1 instead of 0" },
 	{ "AFST", 20, 4, UINT32_MAX, "AFST: the attributes of block 5 begin at 4294967295 instead of 107" },
-	{ "DPTH", 0, 2, 1, "DPTH: sample 0 of block 0 is not valid and has a depth" },
-	{ "DPTH", 2 * (3 * 64 + 63), 2, 65535, "DPTH: sample 63 of block 3 is not valid and has a depth" },
 	{ "CONX", 0, 4, F_1_01, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
 	{ "CONY", 0, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
 	{ "CONZ", 16, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 4 has not unit length" },
@@ -180,7 +207,9 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "CLUS", 56, 4, 2, NULL },             /* a group of its own */
 		{ "SPHX", 0, 4, 0xc4800000, NULL },     /* center -1024 */
 		{ "DSTP", 0, 4, 0, NULL },              /* flat */
-		{ "DPTH", 2 * 63, 2, 65535, NULL },     /* valid, and the deepest */
+		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
+	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
+	{ "CAMS", 1, 4, 0xbfbf8ff4, NULL },     /* U+10FFFF, the last one */
 		{ "CONC", 0, 4, F_MINUS_1, NULL },
 		{ "CONX", 16, 4, 0, NULL },             /* of a cone of all directions */
 	};
@@ -206,9 +235,9 @@ static void versions_are_refused_by_major_and_section(void **state)
 	file_put(bytes + HEADER_MINOR, 2, 7);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
 	bytes = copy_original();
-	file_put(bytes + HEADER_MAJOR, 2, 2);
+	file_put(bytes + HEADER_MAJOR, 2, 1);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 2.0, and this build reads 1.x"));
+	assert_non_null(strstr(err.text, "the file has format 1.0, and this build reads 2.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
@@ -246,8 +275,8 @@ static void every_required_section_is_missed(void **state)
 
 		file_put(entry_of(bytes, section_table[k].type) + ENTRY_FLAGS, 2, 0);
 		memcpy(entry_of(bytes, section_table[k].type), "GONE", 4);
-		/* Of the optional ones a cone needs its four parts; the visibility stands for itself. */
-		if (strcmp(section_table[k].type, "VISM") == 0)
+		/* Of the optional ones a cone needs its four parts; the others stand for themselves. */
+		if (strcmp(section_table[k].type, "VISM") == 0 || k == SECTION_CAMERAS || k == SECTION_LIGHTS)
 			expected = PSR_OK;
 		assert_int_equal(parse_sealed(bytes, n_bytes, &err), expected);
 		if (section_table[k].flags & ENTRY_REQUIRED)
@@ -272,7 +301,7 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 136 bytes, which reach beyond the file's end" },
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 896 has 160 bytes, which reach beyond the file's end" },
 		{ NULL, 28, 4, 1, "reserved bytes of the header are not zero" },
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
@@ -280,7 +309,7 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ "MASK", ENTRY_LENGTH, 8, UINT64_MAX, "reach beyond the file's end" },
 		{ "MASK", ENTRY_LENGTH, 8, 40, "is not zero" },
 		{ "MASK", ENTRY_LENGTH, 8, 49, "has 49 bytes and should have 48" },
-		{ "ATTR", ENTRY_LENGTH, 8, 8 * FIXTURE_SAMPLES + 65, "reach beyond the file's end" },
+		{ "ATTR", ENTRY_LENGTH, 8, 8 * FIXTURE_SAMPLES + 137, "reach beyond the file's end" },
 		{ "MASK", ENTRY_TYPE, 4, 0x58485053, "there are two sections SPHX" },
 		{ "MASK", ENTRY_FLAGS, 2, 3, "has unknown flags 0x3" },
 		{ "MASK", ENTRY_FLAGS, 2, 0, "section MASK at byte" },

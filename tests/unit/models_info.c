@@ -28,7 +28,7 @@ static int write_model(void **state)
 	snprintf(files.model, sizeof files.model, "%s/small.thing.psr", files.folder);
 	snprintf(files.output, sizeof files.output, "%s/output", files.folder);
 	fixture_init(fixture, 1);
-	code = psr_model_create(&model, &fixture->info, &fixture->blocks, NULL, NULL);
+	code = psr_model_create(&model, &fixture->info, &fixture->blocks, &fixture->presets, NULL);
 	if (code == PSR_OK)
 		code = psr_model_write(model, files.model, NULL);
 	psr_model_unref(model);
@@ -86,6 +86,10 @@ static void json_tells_what_the_model_holds(void **state)
 	cJSON *root = cJSON_Parse(text);
 	const cJSON *blocks = cJSON_GetObjectItemCaseSensitive(root, "blocks");
 	const cJSON *levels = cJSON_GetObjectItemCaseSensitive(blocks, "level_blocks");
+	const cJSON *samples = cJSON_GetObjectItemCaseSensitive(blocks, "level_samples");
+	const cJSON *adequacy = cJSON_GetObjectItemCaseSensitive(root, "adequacy");
+	const cJSON *cameras = cJSON_GetObjectItemCaseSensitive(root, "cameras");
+	const cJSON *lights = cJSON_GetObjectItemCaseSensitive(root, "lights"), *last;
 
 	assert_int_equal(status, 0);
 	assert_non_null(root);
@@ -101,6 +105,19 @@ static void json_tells_what_the_model_holds(void **state)
 	assert_int_equal(cJSON_GetArraySize(levels), 2);
 	assert_int_equal(cJSON_GetArrayItem(levels, 0)->valueint, 5);
 	assert_int_equal(cJSON_GetArrayItem(levels, 1)->valueint, 1);
+	assert_int_equal(cJSON_GetArraySize(samples), 2);
+	assert_int_equal(cJSON_GetArrayItem(samples, 0)->valueint, FIXTURE_SAMPLES - 36);
+	assert_int_equal(cJSON_GetArrayItem(samples, 1)->valueint, 36);
+	assert_true(number(adequacy, "pixels") == 1e6 && number(adequacy, "missing") == 3);
+	assert_true(number(adequacy, "lost_to_culling") == 1);
+	assert_int_equal(cJSON_GetArraySize(cameras), 2);
+	last = cJSON_GetArrayItem(cameras, 1);
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(last, "name")->valuestring, "S\303\274dwand");
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(last, "kind")->valuestring, "orthographic");
+	assert_int_equal(cJSON_GetArraySize(lights), 3);
+	last = cJSON_GetArrayItem(lights, 2);
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(last, "name")->valuestring, "beam");
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(last, "kind")->valuestring, "spot");
 	cJSON_Delete(root);
 	free(text);
 }
@@ -118,6 +135,11 @@ static void text_names_samples_and_content_id(void **state)
 	assert_int_equal(sscanf(line, " samples %u", &samples), 1);
 	assert_int_equal(samples, FIXTURE_SAMPLES);
 	assert_non_null(strstr(text, "\ncontent id "));
+	assert_non_null(strstr(text, "\nadequacy          3 of 1,000,000 pixels of the visible surface miss (0.0003 %)\n"));
+	assert_non_null(strstr(text, "\nculling loss      1 of 1,000,000 pixels of the visible surface are lost (0.0001 %)\n"));
+	assert_non_null(strstr(text, "\n  perspective     front\n  orthographic    S\303\274dwand\n"));
+	assert_non_null(strstr(text, "\n  level 1         36 samples in 1 blocks\n"));
+	assert_non_null(strstr(text, " of all levels, all overhead included\n"));
 	free(text);
 }
 

@@ -45,7 +45,8 @@ static void sample_at(const struct psr_blocks *b, uint32_t block, unsigned s, fl
 	const struct psr_projection *p = &b->projection[b->block_projection[block]];
 	int row = 8 * b->row[block] + (int)s / 8, col = 8 * b->col[block] + (int)s % 8;
 	double x = (col + (row & 1) / 2.0) * (double)p->spacing, y = row * (sqrt(3.0) / 2) * (double)p->spacing;
-	double z = (double)(b->depth_bias[block] + b->depth_step[block] * (float)b->depth[64 * (size_t)block + s]);
+	uint64_t below = b->mask[block] & (((uint64_t)1 << s) - 1);
+	double z = (double)(b->depth_bias[block] + b->depth_step[block] * (float)b->depth[b->attr_first[block] + __builtin_popcountll(below)]);
 
 	for (int k = 0; k < 3; k++)
 		position[k] = (float)(x * (double)p->axis[0][k] + y * (double)p->axis[1][k] + z * (double)p->axis[2][k]);

@@ -25,7 +25,7 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 
 enum psr_stage {
 	PSR_STAGE_PLAN,    /* count: instances */
-	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters that are in view */
+	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
 	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
 	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
 	PSR_STAGE_RESOLVE, /* count: pixels resolved: they have a sample and weight above 0 */
@@ -38,8 +38,8 @@ const char *psr_stage_name(enum psr_stage stage); /* "warp" */
 struct psr_report {
 	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together and divide it by their own clocks */
 	uint64_t count[PSR_N_STAGES];
-	uint64_t n_blocks, n_samples; /* of all instances */
-	uint64_t n_blocks_drawn, n_samples_drawn; /* after culling; all samples of those blocks */
+	uint64_t n_blocks, n_samples; /* of all instances, all levels */
+	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those blocks */
 	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */

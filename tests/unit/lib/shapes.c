@@ -79,7 +79,6 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
 	a->step = grow(a->step, a->n_blocks, sizeof(float));
 	a->projection = grow(a->projection, a->n_blocks, 2);
-	a->depth = grow(a->depth, a->n_blocks, 128);
 	a->col = grow(a->col, a->n_blocks, 2);
 	a->row = grow(a->row, a->n_blocks, 2);
 	a->level = grow(a->level, a->n_blocks, 1);
@@ -87,6 +86,7 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	a->mask = grow(a->mask, a->n_blocks, 8);
 	a->first = grow(a->first, a->n_blocks, 4);
 	a->attr = grow(a->attr, a->n_samples + 64, 8);
+	a->depth = grow(a->depth, a->n_samples + 64, 2);
 
 	double middle[3] = { (8 * col + 3.75) * dx, (8 * row + 3.5) * dx * sqrt(0.75), (low + high) / 2 }, center[3];
 	m3d_apply_transposed(center, axis, middle);
@@ -115,11 +115,11 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	a->mask[b] = mask;
 	a->first[b] = a->n_samples;
 	for (int i = 0; i < 64; i++) {
-		a->depth[64 * b + i] = 0;
 		if (!s[i].valid)
 			continue;
+		a->depth[a->n_samples] = 0;
 		if (a->step[b] > 0)
-			a->depth[64 * b + i] = (uint16_t)fmin(65535, (s[i].depth - low) / a->step[b] + 0.5);
+			a->depth[a->n_samples] = (uint16_t)fmin(65535, (s[i].depth - low) / a->step[b] + 0.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
 		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 | (uint64_t)o->diffuse << 16 |
 		                          (uint64_t)o->specular << 40 | (uint64_t)o->exponent << 56;
