@@ -2,7 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/mem.h"
+#include "../base/srgb.h"
 #include "psr/measure.h"
+
+#define RAYS 4 /* along the side of a pixel */
 
 static int largest_difference(const uint8_t *a, const uint8_t *b)
 {
@@ -54,21 +57,45 @@ static void add_up(struct psr_color_accuracy *out, const uint8_t *rgb, const uin
 	out->mean = out->n_compared ? (double)sum / (double)out->n_compared : 0;
 }
 
+/* The mean of the rays of each pixel in linear light; the depth of one of them, infinite if any meets nothing. */
+static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth, uint8_t *rgb, uint32_t width,
+                    uint32_t height)
+{
+	for (size_t i = 0; i < (size_t)width * height; i++) {
+		size_t first = (i / width * width * RAYS + i % width) * RAYS;
+		float sum[3] = { 0 };
+
+		for (size_t k = 0; k < RAYS * RAYS; k++) {
+			size_t at = first + k / RAYS * RAYS * width + k % RAYS;
+
+			depth[i] = k == 0 || !isfinite(ray_depth[at]) ? ray_depth[at] : depth[i];
+			for (int c = 0; c < 3; c++)
+				sum[c] += psr_srgb_to_linear[ray_rgb[3 * at + (size_t)c]];
+		}
+		for (int c = 0; c < 3; c++)
+			rgb[3 * i + (size_t)c] = psr_linear_to_srgb(sum[c] / (RAYS * RAYS));
+	}
+}
+
 int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
                                uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads, struct psr_error *err)
 {
 	size_t n = (size_t)width * height;
-	float *depth = psr_alloc_array(n, sizeof *depth);
-	uint8_t *color = psr_alloc_array(n, 3);
+	float *depth = psr_alloc_array(n, sizeof *depth), *ray_depth = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_depth);
+	uint8_t *color = psr_alloc_array(n, 3), *ray_color = psr_alloc_array(n, RAYS * RAYS * 3);
 	int rc;
 
-	if (depth == NULL || color == NULL)
+	if (depth == NULL || color == NULL || ray_depth == NULL || ray_color == NULL)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	else
-		rc = psr_truth_draw(truth, camera, width, height, 1, n_threads, depth, NULL, color, err);
-	if (rc == PSR_OK)
+		rc = psr_truth_draw(truth, camera, width, height, RAYS, n_threads, ray_depth, NULL, ray_color, err);
+	if (rc == PSR_OK) {
+		average(ray_depth, ray_color, depth, color, width, height);
 		add_up(out, rgb, color, depth, width, height);
+	}
 	psr_free(depth);
 	psr_free(color);
+	psr_free(ray_depth);
+	psr_free(ray_color);
 	return rc;
 }

@@ -113,7 +113,8 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, uint8_t rgb[3])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
-	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, ray_scene_normal(truth->scene, hit->prim)));
+	const float *normal = ray_scene_normal(truth->scene, hit->prim);
+	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, normal));
 
 	for (int c = 0; c < 3; c++)
 		rgb[c] = (uint8_t)(diffuse >> 8 * c);

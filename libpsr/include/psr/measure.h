@@ -40,8 +40,9 @@ struct psr_accuracy {
 int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera, uint32_t width,
                          uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err);
 
-/* A frame drawn with --ambient 1 and no light, which shows the flat diffuse colour, against the truth: pixels whose whole 3x3
- * neighbourhood meets the object, each with the most similar of the nine, since a sample may be anywhere in its pixel. */
+/* A frame drawn with --ambient 1 and no light, which shows the flat diffuse colour, against the truth, the
+ * mean of 4x4 rays a pixel in linear light: pixels where all rays of the whole 3x3 neighbourhood meet the object, each with
+ * the most similar of the nine, since a sample may be anywhere in its pixel. */
 #define PSR_COLOR_WRONG 16 /* codes of sRGB, in any channel */
 struct psr_color_accuracy {
 	uint64_t n_compared;
