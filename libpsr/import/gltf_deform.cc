@@ -4,7 +4,7 @@ namespace gltf {
 
 namespace {
 
-const uint64_t max_morphed = UINT64_C(1) << 30; /* sums of one vertex and one target, of the whole file */
+const uint64_t max_morphed = UINT64_C(1) << 28; /* sums of one vertex and one target, of the whole file */
 
 void add_target(reader &r, const tinygltf::Primitive &g, size_t target, const char *name, double weight,
                 size_t n_components, std::vector<double> &sum, const std::string &place)
@@ -20,10 +20,6 @@ void add_target(reader &r, const tinygltf::Primitive &g, size_t target, const ch
 	if (accessor_count(r, it->second, where) != n)
 		refuse(PSR_ERR_FORMAT, "%s has %zu elements where the primitive has %zu", where.c_str(),
 		       accessor_count(r, it->second, where), n);
-	r.n_morphed += n;
-	if (r.n_morphed > max_morphed)
-		refuse(PSR_ERR_LIMIT, "%s: too many morph targets on too many vertices", where.c_str());
-
 	const std::vector<float> delta = accessor_floats(r, it->second, 3, where);
 
 	for (size_t i = 0; i < n; i++)
@@ -48,6 +44,10 @@ void morph_list(reader &r, const tinygltf::Primitive &g, const char *name, const
 void morph(reader &r, const tinygltf::Primitive &g, const std::vector<double> &weights, primitive &p,
            const std::string &place)
 {
+	for (size_t t = 0; t < g.targets.size() && t < weights.size(); t++)
+		r.n_morphed += weights[t] != 0.0 ? p.n_vertices() : 0;
+	if (r.n_morphed > max_morphed)
+		refuse(PSR_ERR_LIMIT, "%s: too many morph targets on too many vertices", place.c_str());
 	morph_list(r, g, "POSITION", weights, 3, p.position, place);
 	morph_list(r, g, "NORMAL", weights, 3, p.normal, place);
 	morph_list(r, g, "TANGENT", weights, 4, p.tangent, place);
