@@ -106,9 +106,10 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
 
-/* The readers. `bytes` is the source file itself; both leave an unfinished mesh in im. */
+/* The readers. `bytes` is the source file itself; all leave an unfinished mesh in im. */
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 
 #ifdef __cplusplus
 }
