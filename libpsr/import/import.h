@@ -94,6 +94,10 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves t
  * vertex. */
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 
+/* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one place,
+ * then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
+int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
+
 /* path.c. Strings and bytes that are returned belong to the caller (free). */
 int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err);
 int import_path_folder(char **folder, const char *path, struct psr_error *err); /* resolved, no slash at the end */
