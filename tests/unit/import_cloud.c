@@ -68,11 +68,11 @@ static void normals_of_a_sphere_are_radial_and_outwards(void **state)
 	for (uint32_t i = 0; i < N; i++)
 		sphere_point(im.mesh->point[i]);
 	struct psr_mesh *m = finish(&im);
-	/* The 16 nearest of N points lie within a disc of radius rho with N rho^2 / 4 = 16. There the surface is -r^2 / 2,
-	 * and the slope of the plane fitted to n = 17 uniform points has, an axis, the deviation
-	 * sqrt(E[x^2 r^4] / 4 / n) / E[x^2] = sqrt(rho^6 / 32 / 17) / (rho^2 / 4) = 0.17 rho: the mean angle is
-	 * sqrt(pi / 2) times that, 0.21 rho, and the largest of 20,000 at sqrt(2 ln N) = 4.5 times, 0.77 rho, where 16 points
-	 * are as near a Gaussian as that. */
+	/* The 16 nearest of N points lie within a disc of radius rho with N rho^2 / 4 = 16. There the surface is
+	 * z = -r^2 / 2, and the slope of the plane fitted to n = 17 uniform points has, an axis, the deviation
+	 * sqrt(E[x^2 (z - E z)^2] / n) / E[x^2] = sqrt(rho^6 / 192 / 17) / (rho^2 / 4) = 0.07 rho: the mean angle is
+	 * sqrt(pi / 2) times that, 0.09 rho, and more as rho and the moments of so few points vary, but not twice. No angle
+	 * exceeds what the neighbours subtend, rho, where those are all within 1.5 rho. */
 	double rho = sqrt(64.0 / N);
 
 	assert_int_equal(m->n_points, N);
@@ -85,7 +85,7 @@ static void normals_of_a_sphere_are_radial_and_outwards(void **state)
 		sum += angle;
 	}
 	print_message("# mean %.3f rho, most %.3f rho\n", sum / N / rho, most / rho);
-	assert_true(sum / N < 0.25 * rho);
+	assert_true(sum / N < 0.18 * rho);
 	assert_true(most < 1.5 * rho);
 	psr_mesh_destroy(m);
 }
@@ -177,11 +177,12 @@ static void discs_cover_random_points(void **state)
 			im.mesh->point[i][c] = random_unit();
 	struct psr_mesh *m = finish(&im);
 
-	assert_int_equal(count_holes(m, 1, 0.02, 20000), 0);
+	/* The cell of a point beside a gap that its 16 neighbours do not reach across stays open: the bound is that of
+	 * adequacy, 1 in 10,000. */
+	assert_true(count_holes(m, 1, 0.02, 100000) < 10);
 	print_message("# mean radius %.3f spacings\n", mean_radius(m) * sqrt(N));
-	/* The area within which one disc in exp(-9) is empty would be N pi r^2 = 9: r = 1.7 spacings. Cells of a Poisson
-	 * sampling have their farthest corner nearer than that. */
-	assert_true(mean_radius(m) * sqrt(N) < 1.3);
+	/* One radius for all that leaves exp(-N pi r^2) = 1e-4 open would be 1.7 spacings; those of the cells are less. */
+	assert_true(mean_radius(m) * sqrt(N) < 1.7);
 	psr_mesh_destroy(m);
 }
 
@@ -220,8 +221,9 @@ static void an_outlier_stays_small(void **state)
 	for (uint32_t i = 0; i < N; i++)
 		most = fmaxf(most, m->point_radius[i]);
 	assert_true(m->point_radius[N] > 0 && m->point_radius[N] <= 2 * most);
-	/* and costs the others nothing: N pi r^2 = 4 pi 9 holds as above */
-	assert_true(most < sqrt(36.0 / N));
+	/* and costs the others nothing. A corner of Voronoi's 2 N is farther than r with a chance of (1 + a) exp(-a), where
+	 * a = N / (4 pi) pi r^2: 2000 * 21 exp(-20) < 1e-4 for a = 20. */
+	assert_true(most < 1.05 * sqrt(80.0 / N));
 	psr_mesh_destroy(m);
 }
 
@@ -287,8 +289,8 @@ static void odd_clouds_keep_the_promises(void **state)
 
 					for (int c = 0; c < 3; c++)
 						p[c] = kind == 0   ? scale[s] * (2 * random_unit() - 1)
-						       : kind == 1 ? t * (c + 1) / 3
-						       : kind == 2 ? scale[s] * (double)(i / 3 % (2 + (unsigned)c))
+						       : kind == 1 ? t / 3 * (c + 1)
+						       : kind == 2 ? scale[s] / 4 * (double)(i / 3 % (2 + (unsigned)c))
 						                   : i == 0 ? scale[s] : 1e-9 * i * (c + 1);
 				}
 				struct psr_mesh *m = finish(&im);
