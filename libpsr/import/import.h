@@ -22,6 +22,8 @@ extern "C" {
 #define IMPORT_MAX_MATERIALS 65536
 /* Normals made for files without: smooth where faces meet below 60 degrees. */
 #define IMPORT_CREASE_COSINE 0.5
+#define IMPORT_GRAY 0.6f      /* linear; of what has no color */
+#define IMPORT_ROUGHNESS 0.5f /* of surfaces without a material */
 
 /* mesh.c: a mesh that grows. `mesh` is owned until import_mesh_finish hands it over. */
 struct import_mesh {
@@ -114,6 +116,7 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_las(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 
 #ifdef __cplusplus
 }

@@ -2,9 +2,6 @@
 #include <string.h>
 #include "ply.h"
 
-#define GRAY 0.6f /* linear; of a file without colors, as for other formats without materials */
-#define ROUGHNESS 0.5f
-
 static int load_image(int *image, struct import_mesh *im, const char *name, struct psr_error *err)
 {
 	char *folder = NULL, *path = NULL;
@@ -54,14 +51,14 @@ static int add_material(struct import_mesh *im, const struct ply_header *h, int 
 
 	psr_material_default(&material);
 	material.two_sided = 1;
-	material.roughness = is_cloud ? 1.0f : ROUGHNESS;
+	material.roughness = is_cloud ? 1.0f : IMPORT_ROUGHNESS;
 	if (!is_cloud)
 		rc = find_texture(&image, im, &h->texture, err);
 	if (rc != PSR_OK)
 		return rc;
 	material.base_texture.image = image;
 	for (int c = 0; c < 3 && !has_colors && image < 0; c++)
-		material.base_color[c] = GRAY;
+		material.base_color[c] = IMPORT_GRAY;
 	return import_mesh_add_material(im, &material, err);
 }
 
