@@ -6,9 +6,6 @@
 #include "assimp_material.h"
 #include "base/srgb.h"
 
-#define DEFAULT_GRAY 0.6f      /* linear; a file without materials */
-#define DEFAULT_ROUGHNESS 0.5f
-
 float assimp_linear(float c)
 {
 	int code = c > 0.0f ? c < 1.0f ? (int)(c * 255.0f + 0.5f) : 255 : 0;
@@ -189,8 +186,8 @@ static void set_colors(struct psr_material *out, const struct aiMaterial *m, int
 	if (get_float(m, "$mat.metallicFactor", &x))
 		out->metallic = x;
 	if (is_made_up(m)) {
-		out->base_color[0] = out->base_color[1] = out->base_color[2] = has_color ? 1.0f : DEFAULT_GRAY;
-		out->roughness = DEFAULT_ROUGHNESS;
+		out->base_color[0] = out->base_color[1] = out->base_color[2] = has_color ? 1.0f : IMPORT_GRAY;
+		out->roughness = IMPORT_ROUGHNESS;
 	}
 	/* Some writers mean "no transparency" by 0. */
 	if (get_float(m, "$mat.opacity", &x) && x > 0.0f && x < 1.0f) {
