@@ -5,7 +5,7 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "../sample/door.h"
-#include "../sample/lattice.h"
+#include "../sample/sheet.h"
 #include "../sample/ray_tree.h"
 #include "psr/direction.h"
 #include "rate.h"
@@ -39,20 +39,21 @@ static int make_rays(struct rays *rays)
 	if (rays->ray == NULL)
 		return PSR_ERR_MEMORY;
 	for (unsigned d = 0; d < DIRECTIONS; d++) {
-		struct psr_projection projection = { .spacing = 2.0f / ACROSS };
+		struct sheets sheets = { .projection.spacing = 2.0f / ACROSS };
+		struct psr_projection *projection = &sheets.projection;
 		double direction[3], frame[3][3];
 
 		psr_direction_center(1, 9 * d, direction);
 		psr_direction_frame(direction, frame);
 		for (int i = 0; i < 9; i++)
-			projection.axis[i / 3][i % 3] = (float)frame[i / 3][i % 3];
+			projection->axis[i / 3][i % 3] = (float)frame[i / 3][i % 3];
 		for (int b = 0; b < 4 * reach * reach; b++) {
 			for (unsigned s = 0; s < RUN; s++) {
 				double x, y;
 
-				lattice_position(&projection, b % (2 * reach) - reach, b / (2 * reach) - reach, s, &x, &y);
+				sheets_point(&sheets, 8 * (b / (2 * reach) - reach) + (int)s / 8, 8 * (b % (2 * reach) - reach) + (int)s % 8, &x, &y);
 				if (x * x + y * y <= 1)
-					lattice_ray(&projection, x, y, &rays->ray[n++]);
+					sheets_ray(projection, x, y, &rays->ray[n++]);
 			}
 		}
 	}

@@ -4,28 +4,31 @@
 #include <time.h>
 #include <unistd.h>
 #include "../base/maths.h"
+#include "adequacy.h"
 #include "door.h"
-#include "lattice.h"
+#include "draft.h"
 #include "pack.h"
 #include "projection.h"
 #include "psr/build.h"
 #include "psr/pool.h"
 #include "ray.h"
-#include "select.h"
 
 #define LEAST_RESOLUTION 8
 #define MOST_RESOLUTION 8192
 #define MOST_TOLERANCE 1.0471975511965979 /* 60 degrees, and a rounding more */
 #define MOST_THREADS 256
+#define MOST_LEVELS 8
+#define LEAST_LEVEL_RESOLUTION 32
 
 struct build {
 	const struct psr_mesh *mesh;
 	const struct psr_build_options *options;
 	struct psr_pool *pool;
 	struct ray_scene *scene;
-	struct psr_projection projection[MOST_PROJECTIONS];
-	struct lattice lattice[MOST_PROJECTIONS];
-	struct selection selection;
+	struct surface surface;
+	struct psr_projection projection[N_PROJECTIONS]; /* of level 0 */
+	unsigned n_levels, n_levels_done;
+	struct draft draft;
 	struct psr_model_info info;
 	struct psr_build_report report;
 	struct psr_error *err;
@@ -62,64 +65,106 @@ static int check_options(const struct psr_build_options *options, struct psr_err
 	return PSR_OK;
 }
 
-static void report_rays(struct build *build, uint64_t done)
+/* Coarser levels stop where a model is so small that nothing is saved. */
+static unsigned count_levels(uint32_t resolution)
 {
-	if (build->options->on_progress != NULL)
-		build->options->on_progress("rays", done, N_PROJECTIONS, build->options->userdata);
+	unsigned n = 1;
+
+	while (n < MOST_LEVELS && resolution >> n >= LEAST_LEVEL_RESOLUTION)
+		n++;
+	return n;
 }
 
-static void report_select(uint64_t done, uint64_t total, void *userdata)
+static void report_step(unsigned done, unsigned total, void *userdata)
 {
-	const struct psr_build_options *options = userdata;
+	struct build *build = userdata;
+	const struct psr_build_options *options = build->options;
 
 	if (options->on_progress != NULL)
-		options->on_progress("select", done, total, options->userdata);
+		options->on_progress("sample", (uint64_t)build->n_levels_done * total + done, (uint64_t)build->n_levels * total,
+		                     options->userdata);
 }
 
-static int trace_projections(struct build *build)
+static int check_samples(struct build *build, const struct level *level)
 {
-	double started = now();
+	if (level->cover.n_points != 0)
+		return PSR_OK;
+	return psr_fail(build->err, PSR_ERR_ARG, "no ray meets the mesh: all of it is transparent, turned away or too thin");
+}
+
+static int make_level(struct build *build, struct level *level)
+{
+	struct psr_projection projection[N_PROJECTIONS];
+	int rc;
+
+	memcpy(projection, build->projection, sizeof projection);
+	for (int i = 0; i < N_PROJECTIONS; i++)
+		projection[i].spacing *= (float)(1u << build->n_levels_done);
+	rc = level_make(level, projection, report_step, build);
+	if (rc == PSR_OK)
+		rc = check_samples(build, level);
+	if (rc == PSR_OK && build->n_levels_done == 0) {
+		struct adequacy adequacy;
+
+		rc = adequacy_reach(&adequacy, level);
+		build->info.n_trials = adequacy.n_trials;
+		build->info.n_missing = adequacy.n_missing;
+	}
+	if (rc == PSR_OK)
+		rc = draft_add(&build->draft, level);
+	build->report.n_rays += level->n_rays;
+	build->report.n_candidates += level->n_patches;
+	build->report.seconds_rays += level->seconds_rays;
+	return rc;
+}
+
+static int make_levels(struct build *build)
+{
+	struct cover finer = { 0 };
+	double sine, cosine, started = now();
+	int rc = PSR_OK;
+
+	psr_sincos(build->options->tolerance, &sine, &cosine);
+	build->n_levels = count_levels(build->options->resolution);
+	build->draft.projection = build->projection;
+	build->draft.ds = 2.0 / build->options->resolution;
+	for (; rc == PSR_OK && build->n_levels_done < build->n_levels; build->n_levels_done++) {
+		struct level level = { .mesh = build->mesh, .scene = build->scene, .surface = &build->surface, .pool = build->pool,
+			                   .ds = build->draft.ds * (double)(1u << build->n_levels_done), .cosine = (float)cosine,
+			                   .n_projections = N_PROJECTIONS };
+
+		level.finer = build->n_levels_done > 0 ? &finer : NULL;
+		rc = make_level(build, &level);
+		cover_fini(&finer);
+		finer = level.cover;
+		level.cover = (struct cover){ 0 };
+		level_fini(&level);
+	}
+	cover_fini(&finer);
+	build->report.seconds_select = now() - started - build->report.seconds_rays;
+	if (rc == PSR_ERR_MEMORY || rc == PSR_ERR_LIMIT)
+		return psr_fail(build->err, rc, "no memory to sample the mesh at resolution %u; use a lower one",
+		                build->options->resolution);
+	return rc;
+}
+
+static int sample_and_pack(struct build *build, struct psr_model **out)
+{
+	const struct psr_presets presets = { build->mesh->n_cameras, build->mesh->n_lights, build->mesh->camera,
+		                                 build->mesh->light };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)
 		return rc;
+	if (surface_init(&build->surface, build->mesh, build->info.scale) != PSR_OK)
+		return psr_fail(build->err, PSR_ERR_MEMORY, "no memory for the mesh's textures");
 	projection_list(build->projection, 2.0 / build->options->resolution, build->options->tolerance);
-	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
-		rc = lattice_trace(&build->lattice[i], build->scene, &build->projection[i], 1, build->pool);
-		if (rc != PSR_OK)
-			return psr_fail(build->err, rc, "no memory for the samples of projection %u at resolution %u; use a lower one",
-			                i, build->options->resolution);
-		build->report.n_rays += build->lattice[i].n_rays;
-		build->report.n_candidates += build->lattice[i].n_blocks;
-		report_rays(build, i + 1);
-	}
-	build->report.seconds_rays = now() - started;
-	if (build->report.n_candidates == 0)
-		return psr_fail(build->err, PSR_ERR_ARG,
-		                "no ray meets the mesh: all of it is transparent, turned away or too thin");
-	return PSR_OK;
-}
-
-static int select_and_pack(struct build *build, struct psr_model **out)
-{
-	struct select_input input = { .mesh = build->mesh, .scene = build->scene, .lattice = build->lattice,
-		                          .projection = build->projection,
-		                          .ds = 2.0 / build->options->resolution, .pool = build->pool,
-		                          .on_progress = report_select, .userdata = (void *)build->options };
-	struct psr_presets presets = { .n_cameras = build->mesh->n_cameras, .n_lights = build->mesh->n_lights,
-		                           .camera = build->mesh->camera, .light = build->mesh->light };
-	double started = now(), sine, cosine;
-	int rc;
-
-	psr_sincos(build->options->tolerance, &sine, &cosine);
-	input.cosine = (float)cosine;
-	rc = select_blocks(&build->selection, &input);
-	build->report.seconds_select = now() - started;
-	if (rc != PSR_OK)
-		return psr_fail(build->err, rc, "no memory to select the blocks at resolution %u; use a lower one",
-		                build->options->resolution);
-	return pack_model(out, &build->info, &presets, build->scene, build->projection, build->lattice, &build->selection,
-	                  build->err);
+	rc = make_levels(build);
+	if (rc == PSR_OK && draft_group(&build->draft) != PSR_OK)
+		rc = psr_fail(build->err, PSR_ERR_MEMORY, "no memory to cut the model into clusters");
+	if (rc == PSR_OK)
+		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
+	return rc;
 }
 
 static int prepare(struct build *build)
@@ -156,15 +201,12 @@ int psr_model_build(struct psr_model **out, const struct psr_mesh *mesh, const s
 	build->err = err;
 	rc = prepare(build);
 	if (rc == PSR_OK)
-		rc = trace_projections(build);
-	if (rc == PSR_OK)
-		rc = select_and_pack(build, out);
+		rc = sample_and_pack(build, out);
 	build->report.seconds_total = now() - started;
 	if (rc == PSR_OK && report != NULL)
 		*report = build->report;
-	for (unsigned i = 0; i < MOST_PROJECTIONS; i++)
-		lattice_fini(&build->lattice[i]);
-	selection_fini(&build->selection);
+	draft_fini(&build->draft);
+	surface_fini(&build->surface);
 	ray_scene_destroy(build->scene);
 	psr_pool_destroy(build->pool);
 	free(build);

@@ -1,5 +1,6 @@
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include "../base/mem.h"
 #include "level.h"
 #include "psr/error.h"
@@ -11,11 +12,20 @@
  * finds the rest. */
 #define N_DICES 2
 
+static double now(void)
+{
+	struct timespec t;
+
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
 {
 	unsigned n_steps = level->n_projections + 3 + N_DICES, done = 0;
 	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
+	double started = now();
 	int rc;
 
 #define STEP_DONE                                                                                                      \
@@ -39,8 +49,11 @@ int level_make(struct level *level, const struct psr_projection *projection,
 	STEP_DONE;
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
 		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
+		level->n_rays += level->sheets[i].n_rays;
+		level->n_patches += level->sheets[i].n_patches;
 		STEP_DONE;
 	}
+	level->seconds_rays = now() - started;
 	if (rc == PSR_OK)
 		rc = owner_mark(level);
 	STEP_DONE;

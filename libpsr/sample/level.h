@@ -36,7 +36,8 @@ struct level {
 	struct cover cover;
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
-	uint64_t n_owned, n_added, n_snapped;
+	uint64_t n_rays, n_patches, n_owned, n_added, n_snapped;
+	double seconds_rays;
 };
 
 struct level_ref {

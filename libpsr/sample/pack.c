@@ -5,23 +5,21 @@
 #include "../base/vec.h"
 #include "cone.h"
 #include "pack.h"
-#include "projection.h"
-
-#define CLUSTER_BLOCKS 64
+#include "psr/direction.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
 #define SLACK 0x1p-21f
 
 struct order {
 	uint64_t code;
-	uint32_t block; /* of the selection */
+	uint32_t block; /* of the draft */
+	uint32_t group;
+	uint8_t level;
 };
 
 struct pack {
 	const struct ray_scene *scene;
-	const struct lattice *lattice;
-	const struct selection *selection;
-	const struct psr_projection *projection;
+	const struct draft *draft;
 	struct order *order;
 	struct psr_cluster *cluster;
 	float *sphere[4], *cone[4], *depth_bias, *depth_step; /* sphere: x, y, z, r; cone: x, y, z, cosine */
@@ -30,33 +28,44 @@ struct pack {
 	uint8_t *level, *flags;
 	uint64_t *mask, *attr;
 	uint32_t *attr_first;
+	uint32_t n_clusters, n_samples;
 	double box_min[3], box_max[3];
 };
 
-static void inner_position(const struct psr_projection *projection, double x, double y, double z, double position[3])
+static double spacing_of(const struct draft *draft, const struct draft_block *block)
 {
-	for (int k = 0; k < 3; k++)
-		position[k] = x * (double)projection->axis[0][k] + y * (double)projection->axis[1][k]
-		              + z * (double)projection->axis[2][k];
+	return (double)draft->projection[block->projection].spacing * (double)(1u << block->level);
 }
 
-/* Box of a block's samples in projection space. */
-static void projection_box(const struct lattice *lattice, const struct selected_block *block, double min[3],
-                           double max[3])
+/* Projection space. */
+static void place_sample(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3])
+{
+	double spacing = spacing_of(draft, block);
+	int row = PSR_BLOCK_SIDE * block->row + (int)(s / PSR_BLOCK_SIDE);
+
+	p[0] = (PSR_BLOCK_SIDE * block->col + (int)(s % PSR_BLOCK_SIDE) + (row & 1) / 2.0) * spacing;
+	p[1] = row * 0.86602540378443864676 * spacing;
+	p[2] = (double)draft_sample(draft, block, s)->z;
+}
+
+static void projection_box(const struct draft *draft, const struct draft_block *block, double min[3], double max[3])
 {
 	v3d_set(min, INFINITY, INFINITY, INFINITY);
 	v3d_set(max, -INFINITY, -INFINITY, -INFINITY);
-	for (uint64_t left = block->mask; left != 0; left &= left - 1) {
-		unsigned s = (unsigned)__builtin_ctzll(left);
+	for (uint64_t left = block->part; left != 0; left &= left - 1) {
 		double p[3];
 
-		lattice_position(&lattice->projection, lattice->col[block->block], lattice->row[block->block], s, &p[0], &p[1]);
-		p[2] = (double)lattice->sample[block->block][s].z;
+		place_sample(draft, block, (unsigned)__builtin_ctzll(left), p);
 		for (int k = 0; k < 3; k++) {
 			min[k] = p[k] < min[k] ? p[k] : min[k];
 			max[k] = p[k] > max[k] ? p[k] : max[k];
 		}
 	}
+}
+
+static void middle_of(const struct psr_projection *projection, const double min[3], const double max[3], double middle[3])
+{
+	sheets_inner(projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, middle);
 }
 
 static uint64_t morton(const double center[3])
@@ -77,101 +86,126 @@ static int compare_order(const void *a, const void *b)
 {
 	const struct order *x = a, *y = b;
 
+	if (x->level != y->level)
+		return x->level > y->level ? -1 : 1;
+	if (x->group != y->group)
+		return x->group < y->group ? -1 : 1;
 	return x->code != y->code ? (x->code < y->code ? -1 : 1) : x->block < y->block ? -1 : x->block > y->block;
 }
 
 static void sort_blocks(struct pack *pack)
 {
-	for (uint32_t i = 0; i < pack->selection->n_blocks; i++) {
-		const struct selected_block *block = &pack->selection->block[i];
-		const struct lattice *lattice = &pack->lattice[block->projection];
-		double min[3], max[3], center[3];
+	const struct draft *draft = pack->draft;
 
-		projection_box(lattice, block, min, max);
-		inner_position(&lattice->projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2,
-		               center);
-		pack->order[i].code = morton(center);
-		pack->order[i].block = i;
+	for (uint32_t i = 0; i < draft->n_blocks; i++) {
+		const struct draft_block *block = &draft->block[i];
+		double min[3], max[3], middle[3];
+
+		projection_box(draft, block, min, max);
+		middle_of(&draft->projection[block->projection], min, max, middle);
+		pack->order[i] = (struct order){ morton(middle), i, block->group, block->level };
 	}
-	qsort(pack->order, pack->selection->n_blocks, sizeof *pack->order, compare_order);
+	qsort(pack->order, draft->n_blocks, sizeof *pack->order, compare_order);
 }
 
 /* Depths as 16 bits of the block's own range. */
-static void quantise(struct pack *pack, uint32_t i, const struct lattice_sample *sample, double min, double max)
+static void quantise(struct pack *pack, uint32_t i, const struct draft_block *block, double min, double max)
 {
 	float bias = (float)min, step = (float)((max - min) / 65535);
-	uint16_t *depth = pack->depth + pack->attr_first[i];
+	uint32_t k = pack->attr_first[i];
 
-	for (uint64_t left = pack->mask[i]; left != 0; left &= left - 1) {
-		unsigned s = (unsigned)__builtin_ctzll(left);
-		double q = step > 0 ? ((double)sample[s].z - (double)bias) / (double)step + 0.5 : 0;
+	for (uint64_t left = block->part; left != 0; left &= left - 1, k++) {
+		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
+		double q = step > 0 ? ((double)sample->z - (double)bias) / (double)step + 0.5 : 0;
 
-		*depth++ = q < 65535 ? (uint16_t)q : 65535;
+		pack->depth[k] = q < 65535 ? (uint16_t)q : 65535;
+		pack->attr[k] = sample->attr;
 	}
 	pack->depth_bias[i] = bias;
 	pack->depth_step[i] = step;
 }
 
 /* Around the middle of the box; through the samples as they will be read back, and half a step beyond. */
-static void bound_block(struct pack *pack, uint32_t i, const struct psr_projection *projection, const double min[3],
+static void bound_block(struct pack *pack, uint32_t i, const struct draft_block *block, const double min[3],
                         const double max[3])
 {
-	const uint16_t *depth = pack->depth + pack->attr_first[i];
-	double center[3], radius = 0;
+	const struct psr_projection *projection = &pack->draft->projection[block->projection];
+	uint32_t at = pack->attr_first[i];
+	double middle[3], radius = 0;
 	float rounded[3];
 
-	inner_position(projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, center);
+	middle_of(projection, min, max, middle);
 	for (int k = 0; k < 3; k++) {
-		rounded[k] = (float)center[k];
+		rounded[k] = (float)middle[k];
 		pack->sphere[k][i] = rounded[k];
 	}
-	for (uint64_t left = pack->mask[i]; left != 0; left &= left - 1) {
-		unsigned s = (unsigned)__builtin_ctzll(left);
-		double x, y, position[3], squared = 0;
-		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)*depth++;
+	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
+		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[at];
+		double p[3], position[3], squared = 0;
 
-		lattice_position(projection, pack->col[i], pack->row[i], s, &x, &y);
-		inner_position(projection, x, y, (double)z, position);
+		place_sample(pack->draft, block, (unsigned)__builtin_ctzll(left), p);
+		sheets_inner(projection, p[0], p[1], (double)z, position);
 		for (int k = 0; k < 3; k++) {
 			double d = position[k] - (double)rounded[k];
 
 			squared += d * d;
+			if (block->level != 0)
+				continue;
 			pack->box_min[k] = position[k] < pack->box_min[k] ? position[k] : pack->box_min[k];
 			pack->box_max[k] = position[k] > pack->box_max[k] ? position[k] : pack->box_max[k];
 		}
 		radius = squared > radius ? squared : radius;
 	}
-	pack->sphere[3][i] = (float)(sqrt(radius) + (double)projection->spacing / 2) * (1 + SLACK) + SLACK;
+	pack->sphere[3][i] = (float)(sqrt(radius) + spacing_of(pack->draft, block) / 2) * (1 + SLACK) + SLACK;
+}
+
+/* The cone holds the normals of the faces, and those that the samples are drawn by. */
+static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
+{
+	const float (*direction)[3] = psr_direction_table();
+	float normal[2 * PSR_BLOCK_SAMPLES][3], axis[3];
+	int n = 0;
+
+	for (uint64_t left = block->part; left != 0; left &= left - 1) {
+		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
+		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SHEET_BACK);
+
+		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
+		memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
+	}
+	cone_bound((const float(*)[3])normal, n, axis, &pack->cone[3][i]);
+	for (int k = 0; k < 3; k++)
+		pack->cone[k][i] = axis[k];
+}
+
+static void place_block(struct pack *pack, uint32_t i)
+{
+	const struct draft_block *block = &pack->draft->block[pack->order[i].block];
+
+	pack->block_projection[i] = block->projection;
+	pack->col[i] = block->col;
+	pack->row[i] = block->row;
+	pack->level[i] = block->level;
+	pack->flags[i] = block->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
+	pack->mask[i] = block->part;
+	pack->attr_first[i] = pack->n_samples;
+	pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
 }
 
 static void pack_blocks(struct pack *pack)
 {
-	uint32_t n_samples = 0;
-
 	v3d_set(pack->box_min, INFINITY, INFINITY, INFINITY);
 	v3d_set(pack->box_max, -INFINITY, -INFINITY, -INFINITY);
-	for (uint32_t i = 0; i < pack->selection->n_blocks; i++) {
-		const struct selected_block *block = &pack->selection->block[pack->order[i].block];
-		const struct lattice *lattice = &pack->lattice[block->projection];
-		uint32_t n = (uint32_t)__builtin_popcountll(block->mask);
+	pack->n_samples = 0;
+	for (uint32_t i = 0; i < pack->draft->n_blocks; i++) {
+		const struct draft_block *block = &pack->draft->block[pack->order[i].block];
 		double min[3], max[3];
 
-		projection_box(lattice, block, min, max);
-		pack->block_projection[i] = block->projection;
-		pack->col[i] = lattice->col[block->block];
-		pack->row[i] = lattice->row[block->block];
-		pack->level[i] = 0;
-		pack->flags[i] = block->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
-		pack->mask[i] = block->mask;
-		pack->attr_first[i] = n_samples;
-		memcpy(pack->attr + n_samples, pack->selection->attr + block->first, n * sizeof *pack->attr);
-		quantise(pack, i, lattice->sample[block->block], min[2], max[2]);
-		bound_block(pack, i, &lattice->projection, min, max);
-		float axis[3];
-		cone_bound(pack->scene, lattice->sample[block->block], block->mask, axis, &pack->cone[3][i]);
-		for (int k = 0; k < 3; k++)
-			pack->cone[k][i] = axis[k];
-		n_samples += n;
+		place_block(pack, i);
+		projection_box(pack->draft, block, min, max);
+		quantise(pack, i, block, min[2], max[2]);
+		bound_block(pack, i, block, min, max);
+		bound_normals(pack, i, block);
 	}
 }
 
@@ -198,20 +232,31 @@ static void bound_cluster(const struct pack *pack, struct psr_cluster *cluster)
 	}
 }
 
-static void pack_clusters(struct pack *pack, uint32_t n_clusters)
+static int is_new_cluster(const struct pack *pack, uint32_t i)
 {
-	uint32_t n_blocks = (uint32_t)pack->selection->n_blocks;
+	return i == 0 || pack->order[i].group != pack->order[i - 1].group || pack->order[i].level != pack->order[i - 1].level;
+}
 
-	memset(pack->cluster, 0, n_clusters * sizeof *pack->cluster);
-	for (uint32_t i = 0; i < n_clusters; i++) {
-		struct psr_cluster *cluster = &pack->cluster[i];
-		uint32_t left = n_blocks - CLUSTER_BLOCKS * i;
+static void count_clusters(struct pack *pack)
+{
+	pack->n_clusters = 0;
+	for (uint32_t i = 0; i < pack->draft->n_blocks; i++)
+		pack->n_clusters += (uint32_t)is_new_cluster(pack, i);
+}
 
-		cluster->group = i;
-		cluster->first_block = CLUSTER_BLOCKS * i;
-		cluster->n_blocks = left < CLUSTER_BLOCKS ? left : CLUSTER_BLOCKS;
-		bound_cluster(pack, cluster);
+static void pack_clusters(struct pack *pack)
+{
+	uint32_t c = 0;
+
+	memset(pack->cluster, 0, pack->n_clusters * sizeof *pack->cluster);
+	for (uint32_t i = 0; i < pack->draft->n_blocks; i++) {
+		if (is_new_cluster(pack, i))
+			pack->cluster[c++] = (struct psr_cluster){ .first_block = i, .group = pack->order[i].group,
+				                                       .level = pack->order[i].level };
+		pack->cluster[c - 1].n_blocks++;
 	}
+	for (c = 0; c < pack->n_clusters; c++)
+		bound_cluster(pack, &pack->cluster[c]);
 }
 
 static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size_t n_clusters)
@@ -219,7 +264,6 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	int failed = 0;
 
 #define ALLOC(array, n) failed |= ((array) = psr_alloc_array(n, sizeof *(array))) == NULL
-	ALLOC(pack->order, n_blocks);
 	ALLOC(pack->cluster, n_clusters);
 	for (int k = 0; k < 4; k++) {
 		ALLOC(pack->sphere[k], n_blocks);
@@ -228,7 +272,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->depth_step, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
-	ALLOC(pack->depth, n_samples);
+	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
 	ALLOC(pack->col, n_blocks);
 	ALLOC(pack->row, n_blocks);
 	ALLOC(pack->level, n_blocks);
@@ -261,20 +305,23 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->attr_first);
 }
 
+static uint64_t count_samples(const struct draft *draft)
+{
+	uint64_t n = 0;
+
+	for (uint32_t i = 0; i < draft->n_blocks; i++)
+		n += (uint64_t)__builtin_popcountll(draft->block[i].part);
+	return n;
+}
+
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
                       struct pack *pack, struct psr_error *err)
 {
-	uint32_t n_blocks = (uint32_t)pack->selection->n_blocks;
-	struct psr_blocks blocks = { .n_blocks = n_blocks, .n_projections = MOST_PROJECTIONS,
-		                         .n_clusters = (n_blocks + CLUSTER_BLOCKS - 1) / CLUSTER_BLOCKS, .n_levels = 1,
-		                         .n_samples = pack->selection->n_samples };
+	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
+		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
+		                         .n_samples = pack->n_samples };
 
-	if (pack_alloc(pack, n_blocks, blocks.n_samples, blocks.n_clusters) != PSR_OK)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %u blocks", n_blocks);
-	sort_blocks(pack);
-	pack_blocks(pack);
-	pack_clusters(pack, blocks.n_clusters);
-	blocks.projection = pack->projection;
+	blocks.projection = pack->draft->projection;
 	blocks.cluster = pack->cluster;
 	blocks.sphere_x = pack->sphere[0];
 	blocks.sphere_y = pack->sphere[1];
@@ -303,17 +350,28 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 }
 
 int pack_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
-               const struct ray_scene *scene,
-               const struct psr_projection *projection, const struct lattice *lattice,
-               const struct selection *selection, struct psr_error *err)
+               const struct ray_scene *scene, const struct draft *draft, struct psr_pool *pool, struct psr_error *err)
 {
-	struct pack pack = { .scene = scene, .projection = projection, .lattice = lattice, .selection = selection };
+	struct pack pack = { .scene = scene, .draft = draft };
+	uint64_t n_samples = count_samples(draft);
 	int rc;
 
-	if (selection->n_samples > UINT32_MAX || selection->n_blocks > UINT32_MAX)
-		return psr_fail(err, PSR_ERR_LIMIT, "%zu samples are more than a model can hold; use a lower resolution",
-		                selection->n_samples);
-	rc = make_model(out, info, presets, &pack, err);
+	(void)pool;
+	if (n_samples > UINT32_MAX)
+		return psr_fail(err, PSR_ERR_LIMIT, "%llu samples are more than a model can hold; use a lower resolution",
+		                (unsigned long long)n_samples);
+	pack.order = psr_alloc_array(draft->n_blocks, sizeof *pack.order);
+	if (pack.order == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %u blocks", draft->n_blocks);
+	sort_blocks(&pack);
+	count_clusters(&pack);
+	if (pack_alloc(&pack, draft->n_blocks, n_samples, pack.n_clusters) != PSR_OK) {
+		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %u blocks", draft->n_blocks);
+	} else {
+		pack_blocks(&pack);
+		pack_clusters(&pack);
+		rc = make_model(out, info, presets, &pack, err);
+	}
 	pack_fini(&pack);
 	return rc;
 }
