@@ -5,7 +5,6 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "../sample/door.h"
-#include "../sample/sheet.h"
 #include "../sample/ray_tree.h"
 #include "psr/direction.h"
 #include "rate.h"
@@ -13,7 +12,8 @@
 #define ACROSS 512
 #define DIRECTIONS 4
 #define ROUNDS 3
-#define RUN PSR_BLOCK_SAMPLES
+#define SIDE 8 /* of a block */
+#define RUN (SIDE * SIDE)
 
 struct rays {
 	int n;
@@ -32,28 +32,30 @@ static double cpu_seconds(void)
 /* Block after block of lattices, as the sampler goes. */
 static int make_rays(struct rays *rays)
 {
-	const int reach = (int)(ACROSS / (PSR_BLOCK_SIDE * sqrt(3.0))) + 1;
+	const double step = 2.0 / ACROSS, row_height = step * sqrt(3.0) / 2;
+	const int reach = (int)(1 / (SIDE * row_height)) + 1;
 	int n = 0, valid[RAY_PACKET];
 
 	rays->ray = psr_alloc_array((size_t)DIRECTIONS * 4 * (size_t)(reach * reach) * RUN, sizeof *rays->ray);
 	if (rays->ray == NULL)
 		return PSR_ERR_MEMORY;
 	for (unsigned d = 0; d < DIRECTIONS; d++) {
-		struct sheets sheets = { .projection.spacing = 2.0f / ACROSS };
-		struct psr_projection *projection = &sheets.projection;
-		double direction[3], frame[3][3];
+		double z[3], frame[3][3];
 
-		psr_direction_center(1, 9 * d, direction);
-		psr_direction_frame(direction, frame);
-		for (int i = 0; i < 9; i++)
-			projection->axis[i / 3][i % 3] = (float)frame[i / 3][i % 3];
+		psr_direction_center(1, 9 * d, z);
+		psr_direction_frame(z, frame);
 		for (int b = 0; b < 4 * reach * reach; b++) {
-			for (unsigned s = 0; s < RUN; s++) {
-				double x, y;
+			for (int s = 0; s < RUN; s++) {
+				int row = SIDE * (b / (2 * reach) - reach) + s / SIDE, col = SIDE * (b % (2 * reach) - reach) + s % SIDE;
+				double x = (col + (row & 1) / 2.0) * step, y = row * row_height;
 
-				sheets_point(&sheets, 8 * (b / (2 * reach) - reach) + (int)s / 8, 8 * (b % (2 * reach) - reach) + (int)s % 8, &x, &y);
-				if (x * x + y * y <= 1)
-					sheets_ray(projection, x, y, &rays->ray[n++]);
+				if (x * x + y * y > 1)
+					continue;
+				for (int k = 0; k < 3; k++) {
+					rays->ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
+					rays->ray[n].direction[k] = -frame[2][k];
+				}
+				n++;
 			}
 		}
 	}

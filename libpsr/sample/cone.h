@@ -2,8 +2,16 @@
 #ifndef PSR_SAMPLE_CONE_H
 #define PSR_SAMPLE_CONE_H
 
-/* A cap that holds n unit normals: a unit axis, and the cosine of the angle to the rim, rounded downwards; -1 where they
- * have no mean. */
+/* The smallest cap that holds n >= 0 unit normals: its axis, a unit vector, and the cosine of the angle from there to its
+ * rim, rounded downwards. The cosine is -1, and the axis of no meaning, if no cap smaller than a hemisphere holds them.
+ *
+ * Which normals a block's cap has to hold depends on what the renderer leaves out: a sample whose *stored* normal, which
+ * is the shading normal quantised, faces away (render/warp.c). A block is culled if every normal of the cap faces away
+ * from the eye at every place within its sphere. So with all stored normals in the cap, as they are read back, a block
+ * is culled only if each of its samples would be left out anyway, and culling changes no bit of any frame. It is not enough
+ * to hold the *geometric* normals: at a silhouette the stored normal may still face the eye where the face does not.
+ * These are to be held too: then [G] 6.4's own statement is true, that from inside the cone the surface at no
+ * sample is seen from its front, whatever is done with shading normals. */
 void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine);
 
 #endif
