@@ -6,9 +6,6 @@
 #include "base/srgb.h"
 #include "image_kind.h"
 
-#define DEFAULT_GRAY 0.6f      /* linear; a file without materials */
-#define DEFAULT_ROUGHNESS 0.5f
-
 float assimp_linear(float c)
 {
 	int code = c > 0.0f ? c < 1.0f ? (int)(c * 255.0f + 0.5f) : 255 : 0;
@@ -71,8 +68,8 @@ static void set_colors(struct psr_material *out, const struct aiMaterial *m, int
 	else if (aiGetMaterialTextureCount(m, aiTextureType_METALNESS) > 0)
 		out->metallic = 1.0f;
 	if (is_made_up(m)) {
-		out->base_color[0] = out->base_color[1] = out->base_color[2] = has_color ? 1.0f : DEFAULT_GRAY;
-		out->roughness = DEFAULT_ROUGHNESS;
+		out->base_color[0] = out->base_color[1] = out->base_color[2] = has_color ? 1.0f : IMPORT_GRAY;
+		out->roughness = IMPORT_ROUGHNESS;
 	}
 	/* Some writers mean "no transparency" by 0. */
 	if (get_float(m, "$mat.opacity", &x) && x > 0.0f && x < 1.0f) {

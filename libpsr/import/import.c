@@ -30,6 +30,16 @@ static int is_gltf(const char *path, const uint8_t *bytes, size_t n_bytes)
 	return i < n && bytes[i] == '{' && memmem(bytes + i, n - i, "\"asset\"", 7) != NULL;
 }
 
+static int is_ply(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	return ends_with(path, ".ply") || (n_bytes >= 4 && memcmp(bytes, "ply", 3) == 0 && strchr("\r\n", bytes[3]) != NULL);
+}
+
+static int is_las(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	return ends_with(path, ".las") || ends_with(path, ".laz") || (n_bytes >= 4 && memcmp(bytes, "LASF", 4) == 0);
+}
+
 int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err)
 {
 	struct import_mesh im;
@@ -50,6 +60,10 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *e
 	rc = import_mesh_init(&im, path, err);
 	if (rc == PSR_OK && is_gltf(path, bytes, n_bytes))
 		rc = import_gltf(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK && is_ply(path, bytes, n_bytes))
+		rc = import_ply(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK && is_las(path, bytes, n_bytes))
+		rc = import_las(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK)
 		rc = import_assimp(&im, bytes, n_bytes, err);
 	free(bytes);

@@ -22,6 +22,8 @@ extern "C" {
 #define IMPORT_MAX_MATERIALS 65536
 /* Normals made for files without: smooth where faces meet below 60 degrees. */
 #define IMPORT_CREASE_COSINE 0.5
+#define IMPORT_GRAY 0.6f      /* linear; of what has no color */
+#define IMPORT_ROUGHNESS 0.5f /* of surfaces without a material */
 
 /* mesh.c: a mesh that grows. `mesh` is owned until import_mesh_finish hands it over. */
 struct import_mesh {
@@ -106,6 +108,10 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves t
  * vertex. */
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 
+/* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one place,
+ * then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
+int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
+
 /* path.c. Strings and bytes that are returned belong to the caller (free). */
 int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err);
 int import_path_folder(char **folder, const char *path, struct psr_error *err); /* resolved, no slash at the end */
@@ -118,9 +124,11 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
 
-/* The readers. `bytes` is the source file itself; both leave an unfinished mesh in im. */
+/* The readers. `bytes` is the source file itself; all leave an unfinished mesh in im. */
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_las(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 
 #ifdef __cplusplus
 }

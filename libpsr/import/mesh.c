@@ -331,6 +331,11 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 		                "%s: no triangle and no point to draw (%u faces without area, twice there or not finite, and %u "
 		                "lines and points were left out)",
 		                im->path, mesh->n_dropped_triangles, mesh->n_dropped_primitives);
+	if (mesh->n_points > 0) {
+		rc = import_cloud_finish(im, err);
+		if (rc != PSR_OK)
+			return rc;
+	}
 	assert(mesh->n_materials > 0);
 	for (uint32_t i = 0; i < mesh->n_materials; i++)
 		import_material_tidy(&mesh->material[i]);

@@ -1,0 +1,222 @@
+#include <math.h>
+#include <string.h>
+#include "base/vec.h"
+#include "cloud.h"
+
+#define CHUNK 4096
+#define MAX_CORNERS (4 + CLOUD_NEIGHBOURS)
+#define OVERLAP 1.05 /* of radii, since neighbours' discs lie in planes of their own */
+#define MAX_RATIO 2.0f /* of a radius to the median of those around it */
+#define WIRE 0.01    /* points whose second extent, squared, is this part of their first lie on a line */
+
+/* Rotates rows p and q of the symmetric m (and v) so that m[p][q] becomes 0 (Jacobi). */
+static void rotate(double m[3][3], double v[3][3], int p, int q)
+{
+	double theta, t, c, s;
+
+	if (m[p][q] == 0.0)
+		return;
+	theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
+	t = (theta >= 0.0 ? 1.0 : -1.0) / (fabs(theta) + sqrt(theta * theta + 1.0));
+	c = 1.0 / sqrt(t * t + 1.0);
+	s = t * c;
+	for (int i = 0; i < 3; i++) {
+		double a = m[i][p], b = m[i][q];
+
+		m[i][p] = c * a - s * b;
+		m[i][q] = s * a + c * b;
+	}
+	for (int i = 0; i < 3; i++) {
+		double a = m[p][i], b = m[q][i];
+
+		m[p][i] = c * a - s * b;
+		m[q][i] = s * a + c * b;
+		a = v[p][i];
+		b = v[q][i];
+		v[p][i] = c * a - s * b;
+		v[q][i] = s * a + c * b;
+	}
+}
+
+/* Rows of v: the axes of m, whose values are left on its diagonal. */
+static void diagonalise(double m[3][3], double v[3][3])
+{
+	for (int i = 0; i < 3; i++)
+		for (int j = 0; j < 3; j++)
+			v[i][j] = i == j;
+	for (int sweep = 0; sweep < 8; sweep++) {
+		if (m[0][1] == 0.0 && m[0][2] == 0.0 && m[1][2] == 0.0)
+			return;
+		rotate(m, v, 0, 1);
+		rotate(m, v, 0, 2);
+		rotate(m, v, 1, 2);
+	}
+}
+
+/* The neighbours relative to the point, in units of the farthest one's distance, which is returned: nothing below
+ * overflows or vanishes. */
+static double gather(double offset[CLOUD_NEIGHBOURS][3], const struct cloud *cloud, uint32_t i)
+{
+	double largest = 0.0, length;
+
+	for (uint32_t j = 0; j < cloud->k; j++) {
+		v3d_sub(offset[j], cloud->point[cloud->near[(size_t)i * cloud->k + j]].at, cloud->point[i].at);
+		for (int c = 0; c < 3; c++)
+			largest = fmax(largest, fabs(offset[j][c]));
+	}
+	if (!(largest > 0.0))
+		return 0.0;
+	for (uint32_t j = 0; j < cloud->k; j++)
+		for (int c = 0; c < 3; c++)
+			offset[j][c] /= largest;
+	length = v3d_length(offset[cloud->k - 1]);
+	if (!(length > 0.0))
+		return largest;
+	for (uint32_t j = 0; j < cloud->k; j++)
+		v3d_scale(offset[j], offset[j], 1.0 / length);
+	return largest * length;
+}
+
+/* The normal that the point and its neighbours make, and whether they lie on a line. */
+static int fit_plane(float normal[3], double offset[CLOUD_NEIGHBOURS][3], uint32_t k)
+{
+	double mean[3] = { 0.0, 0.0, 0.0 }, m[3][3] = { { 0.0 } }, v[3][3], value[3], n[3];
+	int least = 0, most = 0;
+
+	for (uint32_t j = 0; j < k; j++)
+		v3d_add(mean, mean, offset[j]);
+	v3d_scale(mean, mean, 1.0 / (k + 1.0));
+	for (uint32_t j = 0; j <= k; j++) {
+		double d[3] = { 0.0, 0.0, 0.0 };
+
+		if (j < k)
+			memcpy(d, offset[j], sizeof d);
+		v3d_sub(d, d, mean);
+		for (int a = 0; a < 3; a++)
+			for (int b = 0; b < 3; b++)
+				m[a][b] += d[a] * d[b];
+	}
+	diagonalise(m, v);
+	for (int c = 0; c < 3; c++)
+		value[c] = m[c][c];
+	for (int c = 1; c < 3; c++) {
+		if (value[c] < value[least])
+			least = c;
+		if (value[c] >= value[most])
+			most = c;
+	}
+	if (normal != NULL) {
+		if (most == least) /* no extent at all */
+			v3d_set(n, 0.0, 0.0, 1.0);
+		else
+			v3d_normalize(n, v[least]);
+		v3f_set(normal, (float)n[0], (float)n[1], (float)n[2]);
+	}
+	return most == least || value[3 - most - least] < WIRE * value[most];
+}
+
+/* A corner of the cell, with the edge that leaves it: -1 is the frame's. */
+struct corner {
+	double at[2];
+	int edge;
+};
+
+/* Leaves what is nearer to the origin than to `site`. */
+static int clip(struct corner *out, const struct corner *in, int n, const double site[2], int edge)
+{
+	const double half = 0.5 * (site[0] * site[0] + site[1] * site[1]);
+	int n_out = 0;
+
+	for (int i = 0; i < n; i++) {
+		const struct corner *a = &in[i], *b = &in[(i + 1) % n];
+		double da = a->at[0] * site[0] + a->at[1] * site[1] - half, db = b->at[0] * site[0] + b->at[1] * site[1] - half;
+		double t;
+
+		if (da <= 0.0)
+			out[n_out++] = *a;
+		if ((da <= 0.0) == (db <= 0.0))
+			continue;
+		t = da / (da - db);
+		/* Leaving, the new edge begins here; coming back, the old one goes on. */
+		out[n_out].edge = da <= 0.0 ? edge : a->edge;
+		for (int c = 0; c < 2; c++)
+			out[n_out].at[c] = a->at[c] + t * (b->at[c] - a->at[c]);
+		n_out++;
+	}
+	return n_out;
+}
+
+/* In units of the farthest neighbour's distance; 0 where the cell has no corner but the frame's. */
+static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const float normal[3])
+{
+	struct corner corner[2][MAX_CORNERS] = { { { { -1, -1 }, -1 }, { { 1, -1 }, -1 }, { { 1, 1 }, -1 }, { { -1, 1 }, -1 } } };
+	const double n[3] = { normal[0], normal[1], normal[2] };
+	const double other[3] = { fabs(n[0]) < 0.6, fabs(n[0]) >= 0.6, 0.0 };
+	double u[3], v[3], farthest = 0.0;
+	int count = 4, now = 0;
+
+	v3d_cross(u, n, other);
+	v3d_normalize(u, u);
+	v3d_cross(v, n, u);
+	for (uint32_t j = 0; j < k && count > 0; j++) {
+		const double site[2] = { v3d_dot(offset[j], u), v3d_dot(offset[j], v) };
+
+		if (site[0] == 0.0 && site[1] == 0.0)
+			continue;
+		count = clip(corner[1 - now], corner[now], count, site, (int)j);
+		now = 1 - now;
+	}
+	for (int i = 0; i < count; i++) {
+		const struct corner *c = &corner[now][i];
+
+		if (c->edge >= 0 && corner[now][(i + count - 1) % count].edge >= 0)
+			farthest = fmax(farthest, c->at[0] * c->at[0] + c->at[1] * c->at[1]);
+	}
+	return sqrt(farthest);
+}
+
+static void planes_of_chunk(int chunk, void *userdata)
+{
+	struct cloud *cloud = userdata;
+	const uint64_t first = (uint64_t)chunk * CHUNK, end = first + CHUNK < cloud->n ? first + CHUNK : cloud->n;
+
+	for (uint64_t i = first; i < end; i++) {
+		double offset[CLOUD_NEIGHBOURS][3], unit = gather(offset, cloud, (uint32_t)i), radius = 0.0;
+		int is_wire = fit_plane(cloud->is_given[i] ? NULL : cloud->normal[i], offset, cloud->k);
+
+		if (!is_wire)
+			radius = cell_radius(offset, cloud->k, cloud->normal[i]);
+		if (!(radius > 0.0)) /* as far as the second one: along a wire one stands on each side */
+			radius = v3d_length(offset[cloud->k > 1 ? 1 : 0]);
+		cloud->open_radius[i] = (float)(OVERLAP * radius * unit);
+	}
+}
+
+static void hold_chunk(int chunk, void *userdata)
+{
+	struct cloud *cloud = userdata;
+	const uint64_t first = (uint64_t)chunk * CHUNK, end = first + CHUNK < cloud->n ? first + CHUNK : cloud->n;
+
+	for (uint64_t i = first; i < end; i++) {
+		float around[CLOUD_NEIGHBOURS], limit;
+
+		for (uint32_t j = 0; j < cloud->k; j++) {
+			float r = cloud->open_radius[cloud->near[i * cloud->k + j]];
+			uint32_t at = j;
+
+			for (; at > 0 && around[at - 1] > r; at--)
+				around[at] = around[at - 1];
+			around[at] = r;
+		}
+		limit = MAX_RATIO * around[cloud->k / 2];
+		cloud->radius[i] = cloud->open_radius[i] < limit ? cloud->open_radius[i] : limit;
+	}
+}
+
+void cloud_planes(struct cloud *cloud)
+{
+	const int n_chunks = (int)((cloud->n + CHUNK - 1) / CHUNK);
+
+	psr_pool_for(cloud->pool, n_chunks, planes_of_chunk, cloud);
+	psr_pool_for(cloud->pool, n_chunks, hold_chunk, cloud);
+}
