@@ -15,7 +15,7 @@ struct walk {
 	struct assimp_io io;
 	const struct aiScene *scene;
 	int *material; /* of the scene's material m without and with vertex colors: 2 m, 2 m + 1; -1: not made yet */
-	int *uv_set;
+	int (*uv_source)[PSR_UV_SETS];
 	int ignore_normals;
 };
 
@@ -55,7 +55,7 @@ static int cofactors(double out[3][3], const matrix m)
 
 /* One vertex of Assimp's as vertex `to` of the mesh. */
 static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct aiMesh *source, unsigned from, const matrix m,
-                       const double normals[3][3], int with_normals, int uv_set)
+                       const double normals[3][3], int with_normals, const int uv_source[PSR_UV_SETS])
 {
 	const struct aiVector3D *p = &source->mVertices[from];
 
@@ -68,10 +68,13 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct aiMesh *
 			mesh->normal[to][row] =
 				(float)(normals[row][0] * n->x + normals[row][1] * n->y + normals[row][2] * n->z);
 	}
-	if (uv_set >= 0 && source->mTextureCoords[uv_set] != NULL) {
-		mesh->uv[0][to][0] = source->mTextureCoords[uv_set][from].x;
-		mesh->uv[0][to][1] = 1.0f - source->mTextureCoords[uv_set][from].y; /* Assimp's v grows upwards */
-	}
+	for (int set = 0; set < PSR_UV_SETS; set++)
+		if (uv_source[set] >= 0 && source->mTextureCoords[uv_source[set]] != NULL) {
+			const struct aiVector3D *uv = &source->mTextureCoords[uv_source[set]][from];
+
+			mesh->uv[set][to][0] = uv->x;
+			mesh->uv[set][to][1] = 1.0f - uv->y; /* Assimp's v grows upwards */
+		}
 	if (source->mColors[0] != NULL) {
 		mesh->color[to][0] = assimp_linear(source->mColors[0][from].r);
 		mesh->color[to][1] = assimp_linear(source->mColors[0][from].g);
@@ -104,7 +107,8 @@ struct target {
 	const struct aiMesh *source;
 	const double (*m)[4];
 	double normals[3][3];
-	int flip, with_normals, uv_set, material;
+	int flip, with_normals, material;
+	const int *uv_source;
 	uint32_t first, vertex, triangle; /* the next ones */
 	unsigned (*cut)[3];
 };
@@ -129,7 +133,7 @@ static void add_face(struct psr_mesh *mesh, struct target *t, const struct aiFac
 			/* Without normals each corner is a vertex of its own until they are made. */
 			mesh->triangle[t->triangle][c] = t->with_normals ? t->first + from : t->vertex;
 			if (!t->with_normals)
-				put_vertex(mesh, t->vertex++, t->source, from, t->m, (const double(*)[3])t->normals, 0, t->uv_set);
+				put_vertex(mesh, t->vertex++, t->source, from, t->m, (const double(*)[3])t->normals, 0, t->uv_source);
 		}
 		mesh->triangle_material[t->triangle++] = (uint32_t)t->material;
 	}
@@ -142,30 +146,31 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	const int has_color = source->mColors[0] != NULL;
 	const unsigned key = 2 * (source->mMaterialIndex < w->scene->mNumMaterials ? source->mMaterialIndex : 0) +
 	                     (unsigned)has_color;
-	unsigned most;
+	unsigned most, has = has_color ? IMPORT_HAS_COLOR : 0;
 	const uint64_t n = count_triangles(mesh, source, &most);
 	struct target t = { .source = source, .m = m };
 	int rc;
 
 	if (w->material[key] < 0)
-		w->material[key] = assimp_material(&w->io, w->scene, key / 2, has_color, &w->uv_set[key], err);
+		w->material[key] = assimp_material(&w->io, w->scene, key / 2, has_color, w->uv_source[key], err);
 	if (w->material[key] < 0)
 		return w->material[key];
 	t.with_normals = source->mNormals != NULL && !w->ignore_normals;
 	t.material = w->material[key];
-	t.uv_set = w->uv_set[key];
+	t.uv_source = w->uv_source[key];
 	t.first = t.vertex = mesh->n_vertices;
 	t.triangle = mesh->n_triangles;
 	t.flip = cofactors(t.normals, m);
-	rc = import_mesh_grow(im, t.with_normals ? source->mNumVertices : 3 * n, n,
-	                      (t.uv_set >= 0 ? IMPORT_HAS_UV0 : 0) | (has_color ? IMPORT_HAS_COLOR : 0), err);
+	for (unsigned set = 0; set < PSR_UV_SETS; set++)
+		has |= t.uv_source[set] >= 0 ? IMPORT_HAS_UV0 << set : 0;
+	rc = import_mesh_grow(im, t.with_normals ? source->mNumVertices : 3 * n, n, has, err);
 	if (rc != PSR_OK)
 		return rc;
 	t.cut = malloc((size_t)most * sizeof *t.cut);
 	if (t.cut == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a face of %u corners", im->path, most);
 	for (unsigned i = 0; t.with_normals && i < source->mNumVertices; i++)
-		put_vertex(mesh, t.first + i, source, i, m, (const double(*)[3])t.normals, 1, t.uv_set);
+		put_vertex(mesh, t.first + i, source, i, m, (const double(*)[3])t.normals, 1, t.uv_source);
 	for (unsigned f = 0; f < source->mNumFaces; f++)
 		if (source->mFaces[f].mNumIndices >= 3)
 			add_face(mesh, &t, &source->mFaces[f]);
@@ -208,11 +213,11 @@ static int read_scene(struct walk *w, struct psr_error *err)
 	int rc;
 
 	w->material = malloc(n * sizeof *w->material);
-	w->uv_set = malloc(n * sizeof *w->uv_set);
-	if (w->material == NULL || w->uv_set == NULL)
+	w->uv_source = malloc(n * sizeof *w->uv_source);
+	if (w->material == NULL || w->uv_source == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for materials", w->io.im->path);
 	for (size_t i = 0; i < n; i++)
-		w->material[i] = w->uv_set[i] = -1;
+		w->material[i] = -1;
 	w->ignore_normals = is_stl(w->scene);
 	rc = add_node(w, w->scene->mRootNode, identity, 0, err);
 	if (rc == PSR_OK)
@@ -255,7 +260,7 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 	if (w.scene != NULL)
 		aiReleaseImport(w.scene);
 	free(w.material);
-	free(w.uv_set);
+	free(w.uv_source);
 	assimp_io_fini(&w.io);
 	return rc;
 }

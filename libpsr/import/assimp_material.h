@@ -9,9 +9,9 @@
 float assimp_linear(float c);
 
 /* Index of the mesh's material for material `m` of the scene, or a negative code. With vertex colors, the gray that
- * Assimp makes up for files without materials becomes white. *uv_set is what its texture wants, -1 without a
- * texture. */
-int assimp_material(struct assimp_io *io, const struct aiScene *scene, unsigned m, int has_color, int *uv_set,
-                    struct psr_error *err);
+ * Assimp makes up for files without materials becomes white. uv_source[set] is the scene's set of coordinates that the
+ * mesh's set is to hold, -1: none. */
+int assimp_material(struct assimp_io *io, const struct aiScene *scene, unsigned m, int has_color,
+                    int uv_source[PSR_UV_SETS], struct psr_error *err);
 
 #endif

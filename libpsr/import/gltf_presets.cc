@@ -168,7 +168,7 @@ void add_light(reader &r, int node, int index, const axes *a)
 	}
 	for (int k = 0; k < 3; k++) {
 		light.position[k] = a->origin[k];
-		light.direction[k] = -a->back[k];
+		light.direction[k] = 0.0 - a->back[k]; /* no -0 */
 	}
 	if (import_mesh_add_light(&r.im, name.empty() ? s.name.c_str() : name.c_str(), &light, &error) != PSR_OK)
 		refuse(error.code, "%s", error.text);

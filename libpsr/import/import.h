@@ -68,6 +68,8 @@ void *import_column_at(const struct import_column *column, uint64_t i);
 int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err);
 int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, const char *name,
                           struct psr_error *err);
+int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, struct psr_error *err); /* takes the pixels,
+                                                                                                     * on failure too */
 
 /* presets.c: adds what a client can ask for by name. A name is made printable, short enough (cut at a character) and
  * unlike the others of its kind; "" becomes "camera 1" or "light 1", and so on. Beyond PSR_MAX_PRESETS nothing is added,
@@ -92,8 +94,10 @@ int import_mesh_repair(struct import_mesh *im, struct psr_error *err);
  * number in *n_dropped. No index is out of range. MEMORY. */
 int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, struct psr_error *err);
 
-/* material.c: puts factors and transforms that are not finite, or out of range, right. */
+/* material.c: puts factors and transforms that are not finite, or out of range, right; drops images that no material
+ * uses. */
 void import_material_tidy(struct psr_material *material);
+int import_mesh_drop_images(struct import_mesh *im, struct psr_error *err);
 
 /* weld.c: *first_of[v] is the first vertex at v's position, or with everything the same if `whole`; the caller
  * frees. */

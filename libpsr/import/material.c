@@ -1,4 +1,6 @@
+#include <assert.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "import.h"
 
@@ -45,8 +47,20 @@ static void tidy_texture(struct psr_texture *t)
 		memcpy(t->transform, identity, sizeof identity);
 }
 
+static void textures_of(struct psr_texture *out[6], struct psr_material *m)
+{
+	out[0] = &m->base_texture;
+	out[1] = &m->metallic_roughness_texture;
+	out[2] = &m->emissive_texture;
+	out[3] = &m->occlusion_texture;
+	out[4] = &m->normal_texture;
+	out[5] = &m->specular_texture;
+}
+
 void import_material_tidy(struct psr_material *m)
 {
+	struct psr_texture *texture[6];
+
 	for (int c = 0; c < 4; c++)
 		m->base_color[c] = clamp(m->base_color[c], 0.0f, 1.0f, 1.0f);
 	for (int c = 0; c < 3; c++) {
@@ -59,10 +73,43 @@ void import_material_tidy(struct psr_material *m)
 	m->occlusion_strength = clamp(m->occlusion_strength, 0.0f, 1.0f, 1.0f);
 	m->normal_scale = clamp(m->normal_scale, -MAX_FACTOR, MAX_FACTOR, 1.0f);
 	m->alpha_cutoff = clamp(m->alpha_cutoff, 0.0f, 2.0f, 0.5f);
-	tidy_texture(&m->base_texture);
-	tidy_texture(&m->metallic_roughness_texture);
-	tidy_texture(&m->emissive_texture);
-	tidy_texture(&m->occlusion_texture);
-	tidy_texture(&m->normal_texture);
-	tidy_texture(&m->specular_texture);
+	textures_of(texture, m);
+	for (int i = 0; i < 6; i++)
+		tidy_texture(texture[i]);
+}
+
+int import_mesh_drop_images(struct import_mesh *im, struct psr_error *err)
+{
+	struct psr_mesh *mesh = im->mesh;
+	struct psr_texture *texture[6];
+	int *target = calloc((size_t)mesh->n_images + 1, sizeof *target);
+	uint32_t kept = 0;
+
+	if (target == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %u images", im->path, mesh->n_images);
+	for (uint32_t m = 0; m < mesh->n_materials; m++) {
+		textures_of(texture, &mesh->material[m]);
+		for (int i = 0; i < 6; i++) {
+			assert(texture[i]->image >= -1 && texture[i]->image < (int)mesh->n_images);
+			if (texture[i]->image >= 0)
+				target[texture[i]->image] = 1;
+		}
+	}
+	for (uint32_t i = 0; i < mesh->n_images; i++) {
+		if (!target[i]) {
+			free(mesh->image[i].rgba);
+			continue;
+		}
+		mesh->image[kept] = mesh->image[i];
+		target[i] = (int)kept++;
+	}
+	for (uint32_t m = 0; m < mesh->n_materials; m++) {
+		textures_of(texture, &mesh->material[m]);
+		for (int i = 0; i < 6; i++)
+			if (texture[i]->image >= 0)
+				texture[i]->image = target[texture[i]->image];
+	}
+	mesh->n_images = kept;
+	free(target);
+	return PSR_OK;
 }

@@ -263,22 +263,30 @@ int import_mesh_add_material(struct import_mesh *im, const struct psr_material *
 	return (int)mesh->n_materials++;
 }
 
+int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, struct psr_error *err)
+{
+	struct psr_mesh *mesh = im->mesh;
+	const uint64_t n = (uint64_t)image->width * image->height;
+
+	if (n > IMPORT_MAX_PIXELS - im->n_pixels || !resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
+		free(image->rgba);
+		return n > IMPORT_MAX_PIXELS - im->n_pixels ?
+		       psr_fail(err, PSR_ERR_LIMIT, "%s: its images have more than %llu pixels", im->path,
+		                (unsigned long long)IMPORT_MAX_PIXELS) :
+		       psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", im->path);
+	}
+	im->n_pixels += n;
+	mesh->image[mesh->n_images] = *image;
+	return (int)mesh->n_images++;
+}
+
 int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, const char *name,
                           struct psr_error *err)
 {
-	struct psr_mesh *mesh = im->mesh;
 	struct psr_image image;
 	int rc = import_image_decode(&image, bytes, n_bytes, name, IMPORT_MAX_PIXELS - im->n_pixels, err);
 
-	if (rc != PSR_OK)
-		return rc;
-	if (!resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
-		free(image.rgba);
-		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", im->path);
-	}
-	im->n_pixels += (uint64_t)image.width * image.height;
-	mesh->image[mesh->n_images] = image;
-	return (int)mesh->n_images++;
+	return rc == PSR_OK ? import_mesh_add_pixels(im, &image, err) : rc;
 }
 
 void import_mesh_warn(struct import_mesh *im, const char *format, ...)
@@ -331,6 +339,9 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 	assert(mesh->n_materials > 0);
 	for (uint32_t i = 0; i < mesh->n_materials; i++)
 		import_material_tidy(&mesh->material[i]);
+	rc = import_mesh_drop_images(im, err);
+	if (rc != PSR_OK)
+		return rc;
 	shrink(mesh);
 	*out = mesh;
 	im->mesh = NULL;

@@ -219,10 +219,10 @@ static void points_become_a_cloud(void **state)
 	PUT(&b, normal, F32, "VEC3", 3);
 	PUT(&b, index, U16, "SCALAR", 2);
 	struct psr_mesh *m = import_built(
-		&b, "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'NORMAL':2},'mode':0},"
+		&b, "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'NORMAL':2},'mode':0}]},{'primitives':["
 		"{'attributes':{'POSITION':0,'NORMAL':2,'COLOR_0':1},'indices':3,'mode':0,'material':0}]}],"
 		"'materials':[{'pbrMetallicRoughness':{'baseColorFactor':[0.5,0.25,1,1]}}],"
-		"'nodes':[{'mesh':0,'scale':[1,2,1],'translation':[0,0,3]}]");
+		"'nodes':[{'mesh':0,'scale':[1,2,1],'translation':[0,0,3]},{'mesh':1,'scale':[1,2,1]}]");
 
 	assert_int_equal(m->n_points, 5);
 	assert_int_equal(m->n_triangles, 0);
@@ -230,8 +230,8 @@ static void points_become_a_cloud(void **state)
 	NEAR(m->point[0], 0, 0, 0, 3);
 	NEAR(m->point[1], 0, 1, 0, 3);
 	NEAR(m->point[2], 0, 0, 2, 3);
-	NEAR(m->point[3], 0, 0, 2, 3);
-	NEAR(m->point[4], 0, 0, 0, 3);
+	NEAR(m->point[3], 0, 0, 2, 0);
+	NEAR(m->point[4], 0, 0, 0, 0);
 	NEAR_F(m->point_color[0], 0, 1, 1, 1, 1);
 	NEAR_F(m->point_color[3], 0x1p-26, 0, 0, 1, 0.2);
 	NEAR_F(m->point_color[4], 0, 1, 0, 0, 1);
@@ -239,6 +239,8 @@ static void points_become_a_cloud(void **state)
 	NEAR_F(m->point_normal[0], 0, 0, 0, 1);
 	NEAR_F(m->point_normal[1], 0x1p-24, 1 / sqrt(1.25), 0.5 / sqrt(1.25), 0);
 	NEAR_F(m->point_normal[3], 0x1p-24, 0, 1.5 / sqrt(18.25), 4 / sqrt(18.25));
+	for (uint32_t p = 0; p < m->n_points; p++)
+		assert_true(m->point_radius[p] > 0.0f);
 	NEAR_F(m->material[m->point_material[4]].base_color, 0, 0.5, 0.25, 1, 1);
 	psr_mesh_destroy(m);
 }
