@@ -147,6 +147,8 @@ static int read_all(struct import_mesh *im, struct ply_rows *rows, struct psr_er
 	struct ply_vertices vertices;
 	int rc, material;
 
+	if (rows->header->odd_line > 0)
+		import_mesh_warn(im, "line %u is no line of a PLY header and was left out", rows->header->odd_line);
 	memset(&vertices, 0, sizeof vertices);
 	rc = read_vertices(&vertices, rows, err);
 	if (rc != PSR_OK) {

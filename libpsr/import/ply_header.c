@@ -223,8 +223,10 @@ static int read_line(struct ply_header *h, const struct text *t, const struct li
 		return read_element(h, t, l, err);
 	if (ply_name_is(&l->word[0], "property"))
 		return read_property(h, t, l, err);
-	return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: \"%.*s\" is no word of a PLY header", t->path, t->line,
-	                shown(&l->word[0]), l->word[0].at);
+	/* A comment that lacks the word, as Blender once wrote; what is missing because of a misspelt one shows later. */
+	if (h->odd_line == 0)
+		h->odd_line = t->line;
+	return PSR_OK;
 }
 
 int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)

@@ -1,0 +1,8 @@
+/* PLY from memory: whatever is accepted keeps the promises of psr/mesh.h, and takes no more time than its size explains. */
+#include "import_check.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
+{
+	import_check(import_ply, "tests/data/import/fuzz.ply", data, n);
+	return 0;
+}
