@@ -83,13 +83,19 @@ static uint32_t wrap_index(int64_t i, uint32_t n, enum psr_wrap wrap)
 	return (uint32_t)(i < (int64_t)n ? i : period - 1 - i);
 }
 
-/* exp(-2 q) - exp(-2) for q in 0..1, by the series around 1/2; absolute error below 4e-6. */
+/* exp(-2 q) - exp(-2) for q in 0..1, by the series of exp(-1) exp(x) around q = 1/2; absolute error below 4e-6. */
 static float kernel(float q)
 {
-	float x = 1 - 2 * q, e = 1;
+	float x = 1 - 2 * q, e = 1.0f / 40320;
 
-	for (int i = 8; i > 0; i--)
-		e = 1 + e * x / (float)i;
+	e = e * x + 1.0f / 5040;
+	e = e * x + 1.0f / 720;
+	e = e * x + 1.0f / 120;
+	e = e * x + 1.0f / 24;
+	e = e * x + 1.0f / 6;
+	e = e * x + 1.0f / 2;
+	e = e * x + 1;
+	e = e * x + 1;
 	return 0.36787944f * e - 0.13533528f;
 }
 
@@ -147,7 +153,7 @@ static void average(const struct mip *mip, int level, const struct psr_texture *
 	double a = e->yy / det, b = -e->xy / det, c = e->xx / det; /* a x^2 + 2 b x y + c y^2 < 1 */
 	int64_t left = (int64_t)ceil(x - sqrt(e->xx)), right = (int64_t)floor(x + sqrt(e->xx));
 	int64_t top = (int64_t)ceil(y - sqrt(e->yy)), bottom = (int64_t)floor(y + sqrt(e->yy));
-	float sum = 0, texel[4];
+	float sum = 0;
 
 	assert(right - left < MOST_RUN && bottom - top < MOST_RUN);
 	for (int64_t i = left; i <= right; i++)
@@ -168,7 +174,7 @@ static void average(const struct mip *mip, int level, const struct psr_texture *
 		last = last < right ? last : right;
 		for (int64_t i = first; i <= last; i++) {
 			double dx = (double)i - x;
-			float weight = kernel((float)(a * dx * dx + 2 * b * dx * dy + c * dy * dy));
+			float weight = kernel((float)(a * dx * dx + 2 * b * dx * dy + c * dy * dy)), texel[4];
 
 			mip_texel(mip, level, column[i - left], row, texel);
 			for (int k = 0; k < 4; k++)
