@@ -7,9 +7,12 @@
 #define MOST_AXIS 40 /* texels: 1.5 * 8 of the next level, which may have a third of the texels, and a rest */
 #define MOST_RUN (2 * MOST_AXIS + 2)
 
-/* Variance of the filter along each axis in squares of that semi-axis, and of the mean over a texel. */
+/* The filter's variance along an axis over the square of that semi-axis: half of the mean of q under exp(-2 q) - exp(-2). */
 #define KERNEL_VARIANCE 0.13608
-#define TEXEL_VARIANCE (1.0 / 12)
+
+/* What adds to the square of a semi-axis: the variances of bilinear interpolation and of the mean over a texel. */
+#define BILINEAR (1.0 / 6 / KERNEL_VARIANCE)
+#define TEXEL (1.0 / 12 / KERNEL_VARIANCE)
 
 /* Texels of one level around a centre: V of x^T V^-1 x = 1. */
 struct ellipse {
@@ -80,13 +83,19 @@ static uint32_t wrap_index(int64_t i, uint32_t n, enum psr_wrap wrap)
 	return (uint32_t)(i < (int64_t)n ? i : period - 1 - i);
 }
 
-/* exp(-2 q) - exp(-2) for q in 0..1, by the series around 1/2; absolute error below 4e-6. */
+/* exp(-2 q) - exp(-2) for q in 0..1, by the series of exp(-1) exp(x) around q = 1/2; absolute error below 4e-6. */
 static float kernel(float q)
 {
-	float x = 1 - 2 * q, e = 1;
+	float x = 1 - 2 * q, e = 1.0f / 40320;
 
-	for (int i = 8; i > 0; i--)
-		e = 1 + e * x / (float)i;
+	e = e * x + 1.0f / 5040;
+	e = e * x + 1.0f / 720;
+	e = e * x + 1.0f / 120;
+	e = e * x + 1.0f / 24;
+	e = e * x + 1.0f / 6;
+	e = e * x + 1.0f / 2;
+	e = e * x + 1;
+	e = e * x + 1;
 	return 0.36787944f * e - 0.13533528f;
 }
 
@@ -144,7 +153,7 @@ static void average(const struct mip *mip, int level, const struct psr_texture *
 	double a = e->yy / det, b = -e->xy / det, c = e->xx / det; /* a x^2 + 2 b x y + c y^2 < 1 */
 	int64_t left = (int64_t)ceil(x - sqrt(e->xx)), right = (int64_t)floor(x + sqrt(e->xx));
 	int64_t top = (int64_t)ceil(y - sqrt(e->yy)), bottom = (int64_t)floor(y + sqrt(e->yy));
-	float sum = 0, texel[4];
+	float sum = 0;
 
 	assert(right - left < MOST_RUN && bottom - top < MOST_RUN);
 	for (int64_t i = left; i <= right; i++)
@@ -165,7 +174,7 @@ static void average(const struct mip *mip, int level, const struct psr_texture *
 		last = last < right ? last : right;
 		for (int64_t i = first; i <= last; i++) {
 			double dx = (double)i - x;
-			float weight = kernel((float)(a * dx * dx + 2 * b * dx * dy + c * dy * dy));
+			float weight = kernel((float)(a * dx * dx + 2 * b * dx * dy + c * dy * dy)), texel[4];
 
 			mip_texel(mip, level, column[i - left], row, texel);
 			for (int k = 0; k < 4; k++)
@@ -180,33 +189,29 @@ static void average(const struct mip *mip, int level, const struct psr_texture *
 double filter_look_up(const struct mip *mip, const struct psr_texture *texture, const double st[2],
                       const double axes[2][2], float out[4])
 {
-	struct ellipse ellipse;
-	int level = choose_level(mip, axes, &ellipse);
+	struct ellipse e;
+	int level = choose_level(mip, axes, &e);
 	double folded[2] = { fold(st[0], texture->wrap_s), fold(st[1], texture->wrap_t) };
-	double least = short_enough(&ellipse), longest, own = ellipse.long2 + ellipse.short2, added, blurred;
+	double least = short_enough(&e), longest2 = e.long2, own = e.long2 + e.short2, part = ldexp(1, -2 * level), added;
 	float point[4];
 
 	if (level == mip->n_levels - 1) {
 		mip_texel(mip, level, 0, 0, out);
 		return 1;
 	}
-	if (!(ellipse.long2 > 0)) {
+	if (!(longest2 > 0)) {
 		filter_point(mip->image, mip->kind, texture, st, out);
 		return 0;
 	}
-	longest = sqrt(ellipse.long2);
-	least = least > LEAST_AXIS * LEAST_AXIS ? least : LEAST_AXIS * LEAST_AXIS;
-	added = least - ellipse.short2;
-	blurred = level == 0 ? 0 : (1 - ldexp(1, -2 * level)) * TEXEL_VARIANCE / KERNEL_VARIANCE;
-	ellipse.xx += added - blurred;
-	ellipse.yy += added - blurred;
-	average(mip, level, texture, folded, &ellipse, out);
-	if (longest < LEAST_AXIS) {
-		float share = (float)(longest / LEAST_AXIS);
-
+	added = (least > LEAST_AXIS * LEAST_AXIS ? least : LEAST_AXIS * LEAST_AXIS) - e.short2;
+	added = added > BILINEAR * part ? added : BILINEAR * part;
+	e.xx += added - TEXEL * (1 - part);
+	e.yy += added - TEXEL * (1 - part);
+	average(mip, level, texture, folded, &e, out);
+	if (longest2 < 1) {
 		filter_point(mip->image, mip->kind, texture, st, point);
 		for (int c = 0; c < 4; c++)
-			out[c] = point[c] + share * (out[c] - point[c]);
+			out[c] = point[c] + (float)longest2 * (out[c] - point[c]);
 	}
 	return own / (own + 2 * added);
 }

@@ -163,13 +163,3 @@ uint64_t material_word(const struct psr_material *material, const struct materia
 	}
 	return material_encode(&look);
 }
-
-uint64_t material_attr(const struct psr_material *material, const float rgb[3])
-{
-	struct material_values values;
-
-	material_values_default(&values, material);
-	for (int c = 0; c < 3; c++)
-		values.base[c] = rgb[c];
-	return material_word(material, &values);
-}

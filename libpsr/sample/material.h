@@ -35,9 +35,6 @@ void material_values_default(struct material_values *values, const struct psr_ma
  * absent in the dark. Unlit materials shine in their base colour and have nothing else. */
 uint64_t material_word(const struct psr_material *material, const struct material_values *values);
 
-/* The same of the factors and this base colour. */
-uint64_t material_attr(const struct psr_material *material, const float rgb[3]);
-
 /* What an attribute word says but for its normal, in linear light. */
 struct look {
 	float diffuse[3], specular[3]; /* encoded, clamped to 0..1 */

@@ -13,7 +13,7 @@ struct taps {
 
 void mip_decode(enum mip_kind kind, const uint8_t *texel, float out[4])
 {
-	float alpha = (float)texel[3] / 255;
+	float alpha = (float)texel[3] * (1.0f / 255);
 
 	switch (kind) {
 	case MIP_COLOR:
@@ -24,37 +24,21 @@ void mip_decode(enum mip_kind kind, const uint8_t *texel, float out[4])
 		break;
 	case MIP_LINEAR:
 		for (int c = 0; c < 4; c++)
-			out[c] = (float)texel[c] / 255;
+			out[c] = (float)texel[c] * (1.0f / 255);
 		break;
 	case MIP_NORMAL:
 		for (int c = 0; c < 3; c++)
-			out[c] = (float)(2 * texel[c] - 255) / 255;
+			out[c] = (float)(2 * texel[c] - 255);
 		v3f_normalize(out, out);
 		out[3] = 0;
 		break;
 	}
 }
 
-static void decode_level(enum mip_kind kind, const uint16_t *texel, float out[4])
-{
-	for (int c = 0; c < 4; c++)
-		out[c] = kind == MIP_NORMAL ? (float)(texel[c] - 32768) / 32767 : (float)texel[c] / 65535;
-}
-
 static void encode_level(enum mip_kind kind, const float value[4], uint16_t *texel)
 {
 	for (int c = 0; c < 4; c++)
 		texel[c] = (uint16_t)(kind == MIP_NORMAL ? value[c] * 32767 + 32768.5f : value[c] * 65535 + 0.5f);
-}
-
-void mip_texel(const struct mip *mip, int level, uint32_t x, uint32_t y, float out[4])
-{
-	size_t at = 4 * ((size_t)y * mip->level[level].width + x);
-
-	if (level == 0)
-		mip_decode(mip->kind, mip->image->rgba + at, out);
-	else
-		decode_level(mip->kind, mip->level[level].texel + at, out);
 }
 
 static struct taps taps_of(uint32_t i, uint32_t from, uint32_t to)

@@ -38,6 +38,15 @@ void mip_fini(struct mip *mip);
 void mip_decode(enum mip_kind kind, const uint8_t *texel, float out[4]);
 
 /* Of one level: x < width, y < height. */
-void mip_texel(const struct mip *mip, int level, uint32_t x, uint32_t y, float out[4]);
+static inline void mip_texel(const struct mip *mip, int level, uint32_t x, uint32_t y, float out[4])
+{
+	size_t at = 4 * ((size_t)y * mip->level[level].width + x);
+	float zero = mip->kind == MIP_NORMAL ? 32768 : 0, step = mip->kind == MIP_NORMAL ? 1.0f / 32767 : 1.0f / 65535;
+
+	if (level == 0)
+		mip_decode(mip->kind, mip->image->rgba + at, out);
+	for (int c = 0; level > 0 && c < 4; c++)
+		out[c] = ((float)mip->level[level].texel[at + (size_t)c] - zero) * step;
+}
 
 #endif

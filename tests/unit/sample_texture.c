@@ -134,6 +134,41 @@ static void mask_and_blend_have_their_own_cutoffs(void **state)
 	meshes_free(mesh);
 }
 
+static void points_have_alpha_of_their_own(void **state)
+{
+	float color[2][4] = { { 1, 1, 1, 0.8f }, { 1, 1, 1, 0.4f } };
+	uint32_t material[2] = { 0, 0 };
+	struct psr_mesh *mesh = two_texels(PSR_WRAP_CLAMP);
+
+	(void)state;
+	mesh->n_points = 2;
+	mesh->point_color = color;
+	mesh->point_material = material;
+	mesh->material->alpha = PSR_ALPHA_BLEND;
+	assert_false(texture_is_absent(mesh, mesh->n_triangles, 0, 0));
+	assert_true(texture_is_absent(mesh, mesh->n_triangles + 1, 0, 0));
+	meshes_free(mesh);
+}
+
+static void masks_cut_where_the_texture_crosses_the_cutoff(void **state)
+{
+	static const uint8_t texels[] = { 9, 9, 9, 0, 9, 9, 9, 255 };
+	struct psr_mesh *mesh = meshes_square(1);
+
+	(void)state;
+	meshes_texture(mesh, 2, 1, texels);
+	mesh->material->base_texture.wrap_s = PSR_WRAP_CLAMP;
+	mesh->material->alpha = PSR_ALPHA_MASK;
+	for (int i = 0; i < 3; i++) {
+		double cut = 0.2 + 0.3 * i, s = 0.25 + 0.5 * cut; /* from texel centre to texel centre */
+
+		mesh->material->alpha_cutoff = (float)cut;
+		assert_true(texture_is_absent(mesh, 0, s - 1e-4, 0));
+		assert_false(texture_is_absent(mesh, 0, s + 1e-4, 0));
+	}
+	meshes_free(mesh);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -143,6 +178,8 @@ int main(void)
 		cmocka_unit_test(v_grows_downwards),
 		cmocka_unit_test(factor_and_vertex_color_multiply),
 		cmocka_unit_test(mask_and_blend_have_their_own_cutoffs),
+		cmocka_unit_test(points_have_alpha_of_their_own),
+		cmocka_unit_test(masks_cut_where_the_texture_crosses_the_cutoff),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
