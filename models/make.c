@@ -50,7 +50,7 @@ int cmd_make(int argc, char **argv)
 		return 0;
 	if (code == PSR_OK && list) {
 		for (size_t i = 0; i < n_generators; i++)
-			printf("%-8s  %s\n", generators[i].name, generators[i].summary);
+			printf("%-9s  %s\n", generators[i].name, generators[i].summary);
 		return 0;
 	}
 	if (code == PSR_OK && n_operands != 1)

@@ -12,6 +12,20 @@
 #include "models/surfaces.h"
 #include "models/teapot.h"
 
+/* A generated shape with its instances as triangles of their own. */
+static void make_flat(struct shape *flat, const struct generator *generator)
+{
+	struct shape shape;
+
+	shape_init(&shape);
+	generator->make(&shape);
+	assert_int_equal(shape_check(&shape, NULL), PSR_OK);
+	shape_init(flat);
+	shape_flatten(flat, &shape);
+	assert_int_equal(shape_check(flat, NULL), PSR_OK);
+	shape_fini(&shape);
+}
+
 /* A generated shape with equal places joined. */
 struct welded {
 	struct shape shape;
@@ -36,9 +50,7 @@ static void weld(struct welded *w, const struct generator *generator)
 {
 	uint32_t *order, n;
 
-	shape_init(&w->shape);
-	generator->make(&w->shape);
-	assert_int_equal(shape_check(&w->shape, NULL), PSR_OK);
+	make_flat(&w->shape, generator);
 	n = w->shape.n_vertices;
 	order = malloc(n * sizeof *order);
 	w->place = malloc(n * sizeof *w->place);
@@ -69,25 +81,31 @@ static int by_value(const void *a, const void *b)
 	return p < q ? -1 : p > q;
 }
 
-static void every_edge_is_shared_by_two_faces_in_opposite_directions(void **state)
+static int is_sheet(const struct shape *shape, uint32_t triangle)
+{
+	return shape->material[shape->triangle_material[triangle]].two_sided;
+}
+
+static void every_edge_of_a_solid_is_shared_by_two_faces_in_opposite_directions(void **state)
 {
 	(void)state;
 	for (size_t g = 0; g < n_generators; g++) {
 		struct welded w;
 		uint64_t *edge, *reverse;
-		uint32_t n;
+		uint32_t n = 0;
 		weld(&w, &generators[g]);
-		n = 3 * w.shape.n_triangles;
-		edge = malloc(n * sizeof *edge);
-		reverse = malloc(n * sizeof *reverse);
+		edge = malloc(3 * w.shape.n_triangles * sizeof *edge);
+		reverse = malloc(3 * w.shape.n_triangles * sizeof *reverse);
 		assert_non_null(edge);
 		assert_non_null(reverse);
-		for (uint32_t i = 0; i < n; i++) {
+		for (uint32_t i = 0; i < 3 * w.shape.n_triangles; i++) {
 			const uint32_t *t = w.shape.triangle[i / 3];
 			uint64_t a = w.place[t[i % 3]], b = w.place[t[(i + 1) % 3]];
 			assert_true(a != b);
-			edge[i] = a << 32 | b;
-			reverse[i] = b << 32 | a;
+			if (is_sheet(&w.shape, i / 3))
+				continue;
+			edge[n] = a << 32 | b;
+			reverse[n++] = b << 32 | a;
 		}
 		qsort(edge, n, sizeof *edge, by_value);
 		qsort(reverse, n, sizeof *reverse, by_value);
@@ -119,8 +137,7 @@ static void normals_are_unit_and_agree_with_their_faces(void **state)
 	(void)state;
 	for (size_t g = 0; g < n_generators; g++) {
 		struct shape shape;
-		shape_init(&shape);
-		generators[g].make(&shape);
+		make_flat(&shape, &generators[g]);
 		for (uint32_t i = 0; i < shape.n_vertices; i++) {
 			const float *n = shape.normal[i];
 			double squared = (double)n[0] * n[0] + (double)n[1] * n[1] + (double)n[2] * n[2];
@@ -153,11 +170,14 @@ static void every_closed_piece_has_its_outside_outside(void **state)
 		struct welded w;
 		uint32_t *parent;
 		double *volume;
+		uint8_t *sheet;
 		weld(&w, &generators[g]);
 		parent = malloc(w.n_places * sizeof *parent);
 		volume = calloc(w.n_places, sizeof *volume);
 		assert_non_null(parent);
+		sheet = calloc(w.n_places, 1);
 		assert_non_null(volume);
+		assert_non_null(sheet);
 		for (uint32_t i = 0; i < w.n_places; i++)
 			parent[i] = i;
 		for (uint32_t i = 0; i < 3 * w.shape.n_triangles; i++) {
@@ -168,13 +188,18 @@ static void every_closed_piece_has_its_outside_outside(void **state)
 			const uint32_t *t = w.shape.triangle[i];
 			const float *p = w.shape.position[t[0]];
 			double n[3];
+			if (is_sheet(&w.shape, i)) {
+				sheet[root_of(parent, w.place[t[0]])] = 1;
+				continue;
+			}
 			face_normal(&w.shape, t, n);
 			volume[root_of(parent, w.place[t[0]])] += p[0] * n[0] + p[1] * n[1] + p[2] * n[2];
 		}
 		for (uint32_t i = 0; i < w.n_places; i++)
-			assert_true(root_of(parent, i) != i || volume[i] > 0);
+			assert_true(root_of(parent, i) != i || volume[i] > 0 || sheet[i]);
 		free(parent);
 		free(volume);
+		free(sheet);
 		unweld(&w);
 	}
 }
@@ -223,6 +248,16 @@ static void shapes_are_the_same_on_every_machine(void **state)
 		hash = XXH64(shape.normal, shape.n_vertices * sizeof *shape.normal, hash);
 		hash = XXH64(shape.triangle, shape.n_triangles * sizeof *shape.triangle, hash);
 		hash = XXH64(shape.triangle_material, shape.n_triangles * sizeof *shape.triangle_material, hash);
+		for (uint32_t i = 0; i < shape.n_instances; i++) {
+			const struct shape_instance *instance = &shape.instance[i];
+			hash = XXH64(&instance->part, sizeof instance->part, hash);
+			hash = XXH64(instance->m, sizeof instance->m, hash);
+			hash = XXH64(instance->move, sizeof instance->move, hash);
+		}
+		for (uint32_t i = 0; i < shape.n_images; i++) {
+			hash = XXH64(shape.uv, shape.n_vertices * sizeof *shape.uv, hash);
+			hash = XXH64(shape.image[i].rgb, (size_t)3 * shape.image[i].size * shape.image[i].size, hash);
+		}
 		assert_string_equal(generators[g].name, expected[g].name);
 		if (hash != expected[g].hash)
 			print_message("# %s: 0x%016llx\n", generators[g].name, (unsigned long long)hash);
@@ -316,7 +351,7 @@ static void turns_are_exactly_symmetric(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(every_edge_is_shared_by_two_faces_in_opposite_directions),
+		cmocka_unit_test(every_edge_of_a_solid_is_shared_by_two_faces_in_opposite_directions),
 		cmocka_unit_test(normals_are_unit_and_agree_with_their_faces),
 		cmocka_unit_test(every_closed_piece_has_its_outside_outside),
 		cmocka_unit_test(every_material_is_used_and_every_index_exists),
