@@ -38,17 +38,14 @@ static void wing_at(double u, double v, double p[3], const void *context)
 {
 	const struct wing *w = context;
 	double z = 1 - 2 * v, tip = fabs(z) > 0.93 ? (fabs(z) - 0.93) / 0.07 : 0, c, s, at;
-	double round = tip < 1 ? sqrt(1 - tip * tip) : 0;
+	double round = v > 0 && v < 1 ? sqrt(1 - tip * tip) : 0;
 
 	sweep_angle(u, &c, &s);
 	/* 0 at the trailing edge, 1 at the leading edge */
 	at = (1 - c) / 2;
-	p[0] = w->x + w->chord * (at - 0.5) * (0.65 + 0.35 * round);
+	p[0] = w->x + w->chord * (at - 0.5) * sqrt(round);
 	p[1] = w->y + w->camber * 4 * at * (1 - at) * (0.6 + 0.8 * at) * round + w->thick * s * (0.35 + 0.65 * at) * round - w->droop * z * z;
 	p[2] = w->half_span * z;
-	/* the ends close on their chords' middle lines */
-	if (v == 0 || v == 1)
-		p[1] = w->y - w->droop;
 }
 
 static void wing(struct shape *shape, const struct wing *w, uint32_t along)
@@ -78,11 +75,11 @@ static void cell(struct shape *shape)
 			rod(shape, SPRUCE, STRUT, x, low - sag, z, x, high + 0.04 - sag, z);
 			if (i == BAYS)
 				continue;
-			rod(shape, WIRES, WIRE, x, low, z, x, high, next);
-			rod(shape, WIRES, WIRE, x, low, next, x, high, z);
+			rod(shape, WIRES, WIRE, x + 0.006, low, z, x + 0.006, high, next);
+			rod(shape, WIRES, WIRE, x - 0.006, low, next, x - 0.006, high, z);
 		}
-		rod(shape, WIRES, WIRE, -0.55, low, z, 0.8, high, z);
-		rod(shape, WIRES, WIRE, -0.55, high, z, 0.8, low, z);
+		rod(shape, WIRES, WIRE, -0.55, low, z + 0.006, 0.8, high, z + 0.006);
+		rod(shape, WIRES, WIRE, -0.55, high, z - 0.006, 0.8, low, z - 0.006);
 	}
 }
 
@@ -165,8 +162,9 @@ static void propellers(struct shape *shape)
 		shape_move(shape, first, straight, hub);
 		rod(shape, WIRES, 0.02, -1.15, y, z, -0.3, y, z);
 		for (int leg = -1; leg <= 1; leg += 2) {
-			rod(shape, SPRUCE, 0.014, -1, y, z, -0.55, LOW_Y + (leg > 0 ? GAP : 0.03), z + 0.35);
-			rod(shape, SPRUCE, 0.014, -1, y, z, -0.55, LOW_Y + (leg > 0 ? GAP : 0.03), z - 0.35);
+			for (int way = -1; way <= 1; way += 2)
+				rod(shape, SPRUCE, 0.014, -1, y + 0.01 * leg, z + 0.01 * way, -0.55, LOW_Y + (leg > 0 ? GAP : 0.03),
+				    z + 0.35 * way);
 			/* the chain's two runs to the engine */
 			rod(shape, CHAIN, 0.012, -0.35, y + 0.09 * leg, z, -0.35, LOW_Y + 0.3 + 0.05 * leg, 0.5);
 		}

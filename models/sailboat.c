@@ -36,9 +36,9 @@ static void frame_at(double v, double *x, double *half, double *sheer, double *k
 {
 	double fore = v == 1 ? 1 : v > 0.42 ? (v - 0.42) / 0.58 : 0, aft = v < 0.42 ? (0.42 - v) / 0.42 : 0;
 
-	*half = BEAM / 2 * (1 - fore * fore) * (1 - 0.28 * aft * aft);
+	*half = BEAM / 2 * (1 - 0.98 * fore * fore) * (1 - 0.28 * aft * aft);
 	*sheer = 0.62 + 0.3 * fore * fore + 0.1 * aft * aft;
-	*keel = -0.4 + 1.02 * fore * fore * fore * fore + 0.42 * aft * aft;
+	*keel = -0.4 + 1.02 * fore * fore * fore + 0.42 * aft * aft;
 	*x = LENGTH * (v - 0.5);
 }
 
@@ -51,7 +51,7 @@ static void hull_at(double u, double v, double p[3])
 	sweep_angle(u / 2, &c, &s);
 	/* a full bilge: between an ellipse and a box; the stem rakes forward */
 	side = c * (1.25 - 0.25 * c * c);
-	v3d_set(p, x + 0.45 * v * v * v * (1 - s), keel + (sheer - keel) * (1 - s * (1.3 - 0.3 * s * s)), half * side);
+	v3d_set(p, x + 0.45 * v * v * v * (1 - s) * (1 - s), keel + (sheer - keel) * (1 - s * (1.3 - 0.3 * s * s)), half * side);
 }
 
 /* The deck's line across, cambered; its ends are the hull's to the last bit. */
@@ -69,7 +69,7 @@ static void deck_at(uint32_t j, double v, double p[3])
 static void hull(struct shape *shape)
 {
 	static struct shape_vertex grid[(ALONG + 1) * (ACROSS + 1)], deck[(ALONG + 1) * (ACROSS + 1)];
-	struct shape_vertex transom[2 * (ACROSS + 1)];
+	struct shape_vertex transom[2 * (ACROSS + 1)], stem[2 * (ACROSS + 1)];
 	static const struct {
 		uint32_t last, material;
 	} bands[] = { { 2, WHITE }, { 4, STRIPE }, { 11, WHITE }, { 53, ANTIFOULING }, { 60, WHITE }, { 62, STRIPE },
@@ -88,9 +88,13 @@ static void hull(struct shape *shape)
 		for (int k = 0; k < 3; k++) {
 			transom[j].p[k] = deck[ACROSS - j].p[k];
 			transom[ACROSS + 1 + j].p[k] = grid[j].p[k];
+			stem[j].p[k] = grid[ALONG * (ACROSS + 1) + j].p[k];
+			stem[ACROSS + 1 + j].p[k] = deck[ALONG * (ACROSS + 1) + ACROSS - j].p[k];
 		}
-		v3d_set(transom[j].n, -1, 0, 0);
-		v3d_set(transom[ACROSS + 1 + j].n, -1, 0, 0);
+		for (uint32_t row = 0; row < 2; row++) {
+			v3d_set(transom[row * (ACROSS + 1) + j].n, -1, 0, 0);
+			v3d_set(stem[row * (ACROSS + 1) + j].n, 1, 0, 0);
+		}
 	}
 	sweep_normals(grid, ALONG + 1, ACROSS + 1, 0, 0);
 	sweep_normals(deck, ALONG + 1, ACROSS + 1, 0, 0);
@@ -105,6 +109,7 @@ static void hull(struct shape *shape)
 	shape_map(shape, deck_first, u, v);
 	shape->current = WOOD;
 	shape_grid(shape, transom, 2, ACROSS + 1, 0, 0);
+	shape_grid(shape, stem, 2, ACROSS + 1, 0, 0);
 }
 
 static void fittings(struct shape *shape)

@@ -49,20 +49,6 @@ static struct shape_vertex *new_grid(struct shape *shape, uint32_t rows, uint32_
 	return grid;
 }
 
-/* The sum of the normals of the triangles between a pole and the row beside it. */
-static void pole_normal(double n[3], const double pole[3], const struct shape_vertex *row, uint32_t n_cols, int wrap,
-                        int sign)
-{
-	v3d_set(n, 0, 0, 0);
-	for (uint32_t j = 0; j + !wrap < n_cols; j++) {
-		double a[3], b[3], face[3];
-		v3d_sub(a, row[j].p, pole);
-		v3d_sub(b, row[(j + 1) % n_cols].p, pole);
-		v3d_cross(face, a, b);
-		v3d_add_scaled(n, n, sign, face);
-	}
-}
-
 static int is_pole(const struct shape_vertex *row, uint32_t n_cols)
 {
 	for (uint32_t j = 1; j < n_cols; j++) {
@@ -72,27 +58,45 @@ static int is_pole(const struct shape_vertex *row, uint32_t n_cols)
 	return 1;
 }
 
+/* One normal for the whole pole, unless it is the tip of something so slender that its sides would face away from it. */
+static void join_pole(struct shape_vertex *row, uint32_t n_cols)
+{
+	double sum[3] = { 0, 0, 0 }, length;
+
+	if (!is_pole(row, n_cols))
+		return;
+	for (uint32_t j = 0; j < n_cols; j++)
+		v3d_add(sum, sum, row[j].n);
+	length = v3d_length(sum);
+	for (uint32_t j = 0; j < n_cols; j++) {
+		if (v3d_dot(sum, row[j].n) < 0.5 * length * v3d_length(row[j].n))
+			return;
+	}
+	for (uint32_t j = 0; j < n_cols; j++)
+		v3d_set(row[j].n, sum[0], sum[1], sum[2]);
+}
+
 void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows, int wrap_cols)
 {
-	for (uint32_t i = 0; i < n_rows; i++) {
-		struct shape_vertex *row = grid + (size_t)i * n_cols;
-		uint32_t up = i + 1 < n_rows ? i + 1 : wrap_rows ? 0 : i;
-		uint32_t down = i > 0 ? i - 1 : wrap_rows ? n_rows - 1 : i;
-		int pole = !wrap_rows && (up == i || down == i) && is_pole(row, n_cols);
-		for (uint32_t j = 0; j < n_cols; j++) {
-			uint32_t next = j + 1 < n_cols ? j + 1 : wrap_cols ? 0 : j;
-			uint32_t last = j > 0 ? j - 1 : wrap_cols ? n_cols - 1 : j;
-			double along[3], across[3];
-			if (pole) {
-				/* seen from outside, the row after a pole goes around it clockwise, the row before one the other way */
-				pole_normal(row[j].n, row[j].p, grid + (size_t)(down == i ? up : down) * n_cols, n_cols, wrap_cols,
-				            down == i ? -1 : 1);
-				continue;
-			}
-			v3d_sub(along, row[next].p, row[last].p);
-			v3d_sub(across, grid[(size_t)up * n_cols + j].p, grid[(size_t)down * n_cols + j].p);
-			v3d_cross(row[j].n, along, across);
+	for (uint32_t i = 0; i < n_rows * n_cols; i++)
+		v3d_set(grid[i].n, 0, 0, 0);
+	for (uint32_t i = 0; i + !wrap_rows < n_rows; i++) {
+		struct shape_vertex *low = grid + (size_t)i * n_cols, *high = grid + (size_t)((i + 1) % n_rows) * n_cols;
+		for (uint32_t j = 0; j + !wrap_cols < n_cols; j++) {
+			uint32_t next = (j + 1) % n_cols;
+			double rising[3], falling[3], n[3];
+			v3d_sub(rising, high[next].p, low[j].p);
+			v3d_sub(falling, high[j].p, low[next].p);
+			v3d_cross(n, rising, falling);
+			v3d_add(low[j].n, low[j].n, n);
+			v3d_add(low[next].n, low[next].n, n);
+			v3d_add(high[j].n, high[j].n, n);
+			v3d_add(high[next].n, high[next].n, n);
 		}
+	}
+	if (!wrap_rows) {
+		join_pole(grid, n_cols);
+		join_pole(grid + (size_t)(n_rows - 1) * n_cols, n_cols);
 	}
 }
 

@@ -14,8 +14,8 @@ void sweep_frame(const double axis[3], double turn[3][3]);
 /* Turns what was made around +Y from the origin on so that it points from a towards b, and moves it to a. */
 void sweep_along(struct shape *shape, uint32_t first, const double a[3], const double b[3]);
 
-/* The vertices' normals from their places: central differences, one-sided at borders. A first or last row that is one
- * point is a pole. */
+/* The vertices' normals from their places: the sum of those of the quads around, weighted by area. A first or last row
+ * that is one point has one normal, unless it is a sharp tip. */
 void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows, int wrap_cols);
 
 /* The columns first..last of a grid, a piece of it; last may be n_cols, which is column 0. */
