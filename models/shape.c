@@ -10,15 +10,21 @@
 void shape_init(struct shape *shape)
 {
 	memset(shape, 0, sizeof *shape);
+	shape->n_parts = 1;
 }
 
 void shape_fini(struct shape *shape)
 {
 	free(shape->position);
 	free(shape->normal);
+	free(shape->uv);
 	free(shape->triangle);
 	free(shape->triangle_material);
+	free(shape->triangle_part);
 	free(shape->material);
+	free(shape->instance);
+	for (uint32_t i = 0; i < shape->n_images; i++)
+		free(shape->image[i].rgb);
 	shape_init(shape);
 }
 
@@ -57,6 +63,45 @@ uint32_t shape_material(struct shape *shape, const struct shape_material *materi
 	return shape->n_materials++;
 }
 
+void shape_image(struct shape *shape, uint32_t material, uint32_t size, uint8_t *rgb)
+{
+	assert(shape->n_images < SHAPE_MAX_IMAGES);
+	if (rgb == NULL)
+		shape->failed = 1;
+	else
+		shape->image[shape->n_images++] = (struct shape_image){ material, size, rgb };
+}
+
+uint32_t shape_part(struct shape *shape)
+{
+	shape->current_part = shape->n_parts;
+	return shape->n_parts++;
+}
+
+static double rounded(double x)
+{
+	return floor(x * 1e6 + 0.5) / 1e6 + 0.0;
+}
+
+void shape_place(struct shape *shape, uint32_t part, const double m[3][3], const double move[3])
+{
+	struct shape_instance *instance;
+
+	assert(part < shape->n_parts);
+	if (shape->n_instances == shape->instance_room) {
+		uint32_t room = shape->instance_room * 2 + 64;
+		if (shape->failed || !grow(shape, &shape->instance, room, sizeof *shape->instance))
+			return;
+		shape->instance_room = room;
+	}
+	instance = &shape->instance[shape->n_instances++];
+	instance->part = part;
+	for (int k = 0; k < 3; k++) {
+		v3d_set(instance->m[k], rounded(m[k][0]), rounded(m[k][1]), rounded(m[k][2]));
+		instance->move[k] = rounded(move[k]);
+	}
+}
+
 static void set_vertex(struct shape *shape, uint32_t i, const double p[3], const double n[3])
 {
 	double unit[3];
@@ -74,11 +119,13 @@ uint32_t shape_vertex(struct shape *shape, const struct shape_vertex *vertex)
 	if (shape->n_vertices == shape->vertex_room) {
 		uint32_t room = shape->vertex_room * 2 + 1024;
 		if (shape->failed || !grow(shape, &shape->position, room, sizeof *shape->position) ||
-		    !grow(shape, &shape->normal, room, sizeof *shape->normal))
+		    !grow(shape, &shape->normal, room, sizeof *shape->normal) ||
+		    !grow(shape, &shape->uv, room, sizeof *shape->uv))
 			return 0;
 		shape->vertex_room = room;
 	}
 	set_vertex(shape, shape->n_vertices, vertex->p, vertex->n);
+	shape->uv[shape->n_vertices][0] = shape->uv[shape->n_vertices][1] = 0;
 	return shape->n_vertices++;
 }
 
@@ -101,7 +148,8 @@ void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c)
 	if (i == shape->triangle_room) {
 		uint32_t room = shape->triangle_room * 2 + 1024;
 		if (!grow(shape, &shape->triangle, room, sizeof *shape->triangle) ||
-		    !grow(shape, &shape->triangle_material, room, sizeof *shape->triangle_material))
+		    !grow(shape, &shape->triangle_material, room, sizeof *shape->triangle_material) ||
+		    !grow(shape, &shape->triangle_part, room, sizeof *shape->triangle_part))
 			return;
 		shape->triangle_room = room;
 	}
@@ -109,6 +157,7 @@ void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c)
 	shape->triangle[i][1] = b;
 	shape->triangle[i][2] = c;
 	shape->triangle_material[i] = shape->current;
+	shape->triangle_part[i] = shape->current_part;
 	shape->n_triangles++;
 }
 
@@ -168,4 +217,74 @@ void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], co
 		m3d_apply(n, turn, n);
 		set_vertex(shape, i, p, n);
 	}
+}
+
+void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3])
+{
+	double p[3], n[3], cofactor[3][3];
+
+	for (int k = 0; k < 3; k++)
+		v3d_cross(cofactor[k], m[(k + 1) % 3], m[(k + 2) % 3]);
+	for (uint32_t i = first; i < shape->n_vertices; i++) {
+		get_vertex(shape, i, p, n);
+		m3d_apply(p, m, p);
+		v3d_add(p, p, move);
+		m3d_apply(n, cofactor, n);
+		set_vertex(shape, i, p, n);
+	}
+}
+
+void shape_map(struct shape *shape, uint32_t first, const double u[4], const double v[4])
+{
+	double p[3], n[3];
+
+	for (uint32_t i = first; i < shape->n_vertices; i++) {
+		get_vertex(shape, i, p, n);
+		shape->uv[i][0] = (float)(v3d_dot(u, p) + u[3]);
+		shape->uv[i][1] = (float)(v3d_dot(v, p) + v[3]);
+	}
+}
+
+/* number[v] of those vertices that `stamp` marks with `mark` is their index in flat. */
+static void flatten_part(struct shape *flat, const struct shape *shape, uint32_t part, uint32_t mark, uint32_t *stamp,
+                         uint32_t *number)
+{
+	uint32_t corner[3];
+
+	for (uint32_t t = 0; t < shape->n_triangles; t++) {
+		if (shape->triangle_part[t] != part)
+			continue;
+		for (int k = 0; k < 3; k++) {
+			uint32_t v = shape->triangle[t][k];
+			if (stamp[v] != mark) {
+				struct shape_vertex vertex;
+				get_vertex(shape, v, vertex.p, vertex.n);
+				stamp[v] = mark;
+				number[v] = shape_vertex(flat, &vertex);
+			}
+			corner[k] = number[v];
+		}
+		flat->current = shape->triangle_material[t];
+		shape_triangle(flat, corner[0], corner[1], corner[2]);
+	}
+}
+
+void shape_flatten(struct shape *flat, const struct shape *shape)
+{
+	uint32_t *stamp = calloc((size_t)shape->n_vertices + 1, sizeof *stamp);
+	uint32_t *number = malloc(((size_t)shape->n_vertices + 1) * sizeof *number);
+
+	flat->failed |= shape->failed || stamp == NULL || number == NULL;
+	for (uint32_t m = 0; m < shape->n_materials; m++)
+		shape_material(flat, &shape->material[m]);
+	if (!flat->failed)
+		flatten_part(flat, shape, 0, 1, stamp, number);
+	for (uint32_t i = 0; i < shape->n_instances && !flat->failed; i++) {
+		const struct shape_instance *instance = &shape->instance[i];
+		uint32_t first = flat->n_vertices;
+		flatten_part(flat, shape, instance->part, i + 2, stamp, number);
+		shape_transform(flat, first, instance->m, instance->move);
+	}
+	free(stamp);
+	free(number);
 }

@@ -24,14 +24,34 @@ struct shape_vertex {
 	double p[3], n[3]; /* n of any length but 0 */
 };
 
+/* The picture of a material, size x size, which repeats; the material's colour multiplies it. */
+struct shape_image {
+	uint32_t material, size;
+	uint8_t *rgb; /* 3 size size, sRGB-coded, top-down */
+};
+
+/* One more copy of a part: x -> m x + move, det m > 0. */
+struct shape_instance {
+	uint32_t part;
+	double m[3][3], move[3];
+};
+
+#define SHAPE_MAX_IMAGES 8
+
+/* Part 0 is drawn as it is. The others are drawn once an instance, and not at all without one. */
 struct shape {
-	uint32_t n_vertices, n_triangles, n_materials;
+	uint32_t n_vertices, n_triangles, n_materials, n_parts, n_instances, n_images;
 	float (*position)[3], (*normal)[3]; /* n_vertices; normals are of unit length */
+	float (*uv)[2];                     /* n_vertices; 0 where nothing else was said */
 	uint32_t (*triangle)[3];            /* n_triangles */
 	uint32_t *triangle_material;        /* n_triangles, < n_materials */
+	uint32_t *triangle_part;            /* n_triangles, < n_parts */
 	struct shape_material *material;
+	struct shape_instance *instance;
+	struct shape_image image[SHAPE_MAX_IMAGES];
 	uint32_t current;                   /* the material that triangles get from now on */
-	uint32_t vertex_room, triangle_room, material_room;
+	uint32_t current_part;              /* and the part */
+	uint32_t vertex_room, triangle_room, material_room, instance_room;
 	int failed;
 };
 
@@ -43,6 +63,18 @@ int shape_check(const struct shape *shape, struct psr_error *err);
 
 /* Returns the index of the new material and makes it current. */
 uint32_t shape_material(struct shape *shape, const struct shape_material *material);
+
+/* The material's picture, which the shape owns from now on (NULL: none could be had). At most SHAPE_MAX_IMAGES. */
+void shape_image(struct shape *shape, uint32_t material, uint32_t size, uint8_t *rgb);
+
+/* Returns the index of the new part and makes it current; `current_part` = 0 leads back. */
+uint32_t shape_part(struct shape *shape);
+
+/* Draws `part` once more, under m x + move; det m > 0. The numbers are rounded to multiples of 10^-6. */
+void shape_place(struct shape *shape, uint32_t part, const double m[3][3], const double move[3]);
+
+/* Adds to `flat`, which is initialised and empty, the whole shape in one part, without pictures. */
+void shape_flatten(struct shape *flat, const struct shape *shape);
 
 /* Returns the index of the new vertex. */
 uint32_t shape_vertex(struct shape *shape, const struct shape_vertex *vertex);
@@ -60,5 +92,11 @@ void shape_fan(struct shape *shape, const double center[3], const double normal[
 
 /* Turns (rows of an orthonormal matrix of determinant 1) and then moves the vertices from `first` on. */
 void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], const double move[3]);
+
+/* The same for any m with det m > 0; the normals become those of the moved surface. */
+void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3]);
+
+/* Where the vertices from `first` on lie in their picture, v downwards: u . (x, y, z, 1) and v . (x, y, z, 1). */
+void shape_map(struct shape *shape, uint32_t first, const double u[4], const double v[4]);
 
 #endif

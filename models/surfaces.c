@@ -5,6 +5,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
+#include "sweep.h"
 
 #define QUARTER_PI 0.78539816339744830962
 
@@ -107,40 +108,21 @@ void surface_lathe(struct shape *shape, const struct surface_profile *pieces, ui
 	}
 }
 
-/* A rotation that turns +Y into `axis` (unit). */
-static void frame_along(const double axis[3], double turn[3][3])
-{
-	double helper[3] = { 0, 0, 0 }, x[3], z[3];
-	int least = 0;
-
-	for (int k = 1; k < 3; k++) {
-		if (fabs(axis[k]) < fabs(axis[least]))
-			least = k;
-	}
-	helper[least] = 1;
-	v3d_cross(x, axis, helper);
-	v3d_normalize(x, x);
-	v3d_cross(z, x, axis);
-	for (int k = 0; k < 3; k++)
-		v3d_set(turn[k], x[k], axis[k], z[k]);
-}
-
 void surface_rod(struct shape *shape, const double a[3], double ra, const double b[3], double rb, uint32_t n)
 {
 	uint32_t first = shape->n_vertices, material = shape->current;
-	double axis[3], turn[3][3], length;
+	double axis[3], length;
 
 	v3d_sub(axis, b, a);
-	length = v3d_normalize(axis, axis);
+	length = v3d_length(axis);
 	assert(length > 0);
-	frame_along(axis, turn);
 	const struct surface_profile pieces[] = {
 		surface_line(0, 0, ra, 0, 1, material),
 		surface_line(ra, 0, rb, length, 1, material),
 		surface_line(rb, length, 0, length, 1, material),
 	};
 	surface_lathe(shape, pieces, 3, n);
-	shape_move(shape, first, turn, a);
+	sweep_along(shape, first, a, b);
 }
 
 void surface_torus(struct shape *shape, double major, double minor, double y, uint32_t n_major, uint32_t n_minor)

@@ -133,7 +133,7 @@ static void json_describes_the_bytes_and_loses_no_triangle(void **state)
 		size_t n_bytes;
 		uint32_t n_json, n_triangles = 0;
 		cJSON *root;
-		const cJSON *primitive;
+		const cJSON *mesh, *primitive;
 		encode(&generators[g], &bytes, &n_bytes, &shape);
 		n_json = u32_at(bytes + 12);
 		root = cJSON_ParseWithLength((const char *)bytes + 20, n_json);
@@ -141,8 +141,9 @@ static void json_describes_the_bytes_and_loses_no_triangle(void **state)
 		assert_string_equal(item_of(item_of(root, "asset"), "version")->valuestring, "2.0");
 		assert_int_equal(cJSON_GetArraySize(item_of(root, "materials")), shape.n_materials);
 		assert_int_equal(number(cJSON_GetArrayItem(item_of(root, "buffers"), 0), "byteLength"), n_bytes - 28 - n_json);
-		cJSON_ArrayForEach(primitive, item_of(cJSON_GetArrayItem(item_of(root, "meshes"), 0), "primitives"))
-			check_primitive(root, primitive, bytes + 28 + n_json, (uint32_t)(n_bytes - 28 - n_json), &n_triangles);
+		cJSON_ArrayForEach(mesh, item_of(root, "meshes"))
+			cJSON_ArrayForEach(primitive, item_of(mesh, "primitives"))
+				check_primitive(root, primitive, bytes + 28 + n_json, (uint32_t)(n_bytes - 28 - n_json), &n_triangles);
 		assert_int_equal(n_triangles, shape.n_triangles);
 		cJSON_Delete(root);
 		free(bytes);

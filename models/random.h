@@ -1,0 +1,22 @@
+/* The generators' own random numbers (SplitMix64): the same everywhere. Seed it with any number. */
+#ifndef MODELS_RANDOM_H
+#define MODELS_RANDOM_H
+
+#include <stdint.h>
+
+static inline uint64_t random_next(uint64_t *state)
+{
+	uint64_t z = *state += 0x9e3779b97f4a7c15u;
+
+	z = (z ^ z >> 30) * 0xbf58476d1ce4e5b9u;
+	z = (z ^ z >> 27) * 0x94d049bb133111ebu;
+	return z ^ z >> 31;
+}
+
+/* Uniform in [low, high). */
+static inline double random_in(uint64_t *state, double low, double high)
+{
+	return low + (high - low) * ((double)(random_next(state) >> 11) / 9007199254740992.0);
+}
+
+#endif
