@@ -18,7 +18,7 @@
 #define MOST_TOLERANCE 1.0471975511965979 /* 60 degrees, and a rounding more */
 #define MOST_THREADS 256
 #define MOST_LEVELS 8
-#define LEAST_LEVEL_RESOLUTION 32
+#define LEAST_LEVEL_RESOLUTION 64
 
 struct build {
 	const struct psr_mesh *mesh;

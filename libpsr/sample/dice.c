@@ -215,7 +215,7 @@ static void offer_snap(const struct level *level, const struct surface_spot *spo
 			distance = sqrt(dx * dx + dy * dy + dz * dz) / level->ds;
 			corner.position[2] = p[2] + (float)dz;
 			corner.ref = sheets_room(sheets, at[k], corner.position[2], two_sided);
-			cost = SNAP + (float)distance + (corner.ref.patch != SHEET_NONE ? 0 : DEAD_PATCH);
+			cost = SNAP + 24.0f * (float)distance + (corner.ref.patch != SHEET_NONE ? 0 : DEAD_PATCH);
 			if (distance <= MOST_SNAP && cost < best->cost)
 				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .is_snap = 1, .cost = cost,
 					                    .corner = { corner } };

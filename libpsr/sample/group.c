@@ -5,7 +5,7 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_BLOCKS 256
+#define GROUP_BLOCKS 1024
 #define MOST_PARTS 64 /* groups that can share a block of a coarse level */
 
 struct place {
