@@ -180,7 +180,7 @@ static void offer_nearest(const struct level *level, const struct surface_spot *
 
 			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
 				continue;
-			cost = 1.5f + distance + (corner[k].is_alive ? 0 : DEAD_PATCH);
+			cost = 1.5f + distance / 4 + (float)i / 2 + (corner[k].is_alive ? 0 : DEAD_PATCH);
 			if (cost < best->cost)
 				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .cost = cost,
 					                    .corner = { corner[k] } };
