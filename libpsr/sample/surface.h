@@ -29,8 +29,8 @@ struct surface_place {
 };
 
 /* Everything but the normal is filtered over a circle in the tangent plane, of this diameter in inner units ([G] 5.1,
- * figure 5.2b). The normal is the shading one, on the side that was met, bent as far as it must be to face the unit vector
- * `facing`, so that a sample is never shaded as a back in the view that found it. */
+ * figure 5.2b). The normal is the shading one, on the side that was met, bent as far as it must be to face the unit
+ * vector `facing`, so that a sample is never shaded as a back in the view that found it. */
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3]);
 
