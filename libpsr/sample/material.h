@@ -22,10 +22,9 @@ void material_values_default(struct material_values *values, const struct psr_ma
  *
  * Metallic-roughness: diffuse = base * (1 - metallic / 2), since there are no surroundings that a metal could mirror:
  * half of its colour stands for them. F0 = 0.04 + (base - 0.04) * metallic.
- * Specular-glossiness: F0 = specular; what
- * it has beyond that of a dielectric, s = max(0, (F0 - 0.04) / 0.96), is a metal's: diffuse = base * (1 - the largest
- * channel of s) + s / 2. Roughness is 1 - glossiness. So dielectrics are the same described either way, and metals
- * differ by 0.02.
+ * Specular-glossiness: F0 = specular; what it has beyond that of a dielectric, s = max(0, (F0 - 0.04) / 0.96), is a
+ * metal's: diffuse = base * (1 - the largest channel of s) + s / 2. Roughness is 1 - glossiness. So dielectrics are the
+ * same described either way, and metals differ by 0.02.
  *
  * Roughness r gives the Blinn-Phong exponent 2 / r^4 - 2 of the microfacets, a fourth of it is the exponent n of the
  * reflected ray's cosine, in 1..2^(255/16); the spread of the normals widens it (material_widened). specular = min(1,
