@@ -280,6 +280,32 @@ static void every_level_wraps_where_the_image_does(void **state)
 	}
 }
 
+/* How much of a wave of 16 texels along t is left under a circle. */
+static double amplitude(const struct picture *p, double radius)
+{
+	double sum = 0;
+
+	for (int i = 0; i < 64; i++)
+		sum += (double)look(p, 0.37, i / 64.0, radius, radius) * cos(2 * 3.14159265358979 * i / 16);
+	return sum / 32;
+}
+
+/* A variance of v texels^2 leaves exp(-2 pi^2 v / 16^2) of the wave: that of a texel of level 1, (4 - 1) / 12, counted twice
+ * takes 2 %, or 0.009. */
+static void the_level_does_not_show(void **state)
+{
+	uint8_t rgba[64 * 64 * 4];
+	struct picture p;
+
+	(void)state;
+	for (int i = 0; i < 64 * 64; i++)
+		memset(rgba + 4 * i, (int)(127.5 + 127 * cos(2 * 3.14159265358979 * (i / 64 + 0.5) / 16) + 0.5), 4);
+	open_picture(&p, 64, 64, MIP_LINEAR, PSR_WRAP_REPEAT, rgba);
+	assert_float_equal(amplitude(&p, 2.999), amplitude(&p, 3.001), 0.0045);
+	assert_true(amplitude(&p, 2.999) > amplitude(&p, 4) + 0.01); /* 0.136 (16 - 9) texels^2 more: 7 % */
+	close_picture(&p);
+}
+
 static void a_point_is_bilinear_or_nearest(void **state)
 {
 	struct picture p;
@@ -381,6 +407,7 @@ int main(void)
 		cmocka_unit_test(a_gradient_keeps_its_value),
 		cmocka_unit_test(a_long_ellipse_blurs_along_itself_only),
 		cmocka_unit_test(every_level_wraps_where_the_image_does),
+		cmocka_unit_test(the_level_does_not_show),
 		cmocka_unit_test(a_point_is_bilinear_or_nearest),
 		cmocka_unit_test(clear_texels_lend_no_color),
 		cmocka_unit_test(the_share_of_the_ellipse_grows_with_it),

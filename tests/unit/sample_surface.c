@@ -309,6 +309,12 @@ static void given_tangents_go_first(void **state)
 			memcpy(tangent[i], (float[]){ 0, 1, 0, (float)side }, sizeof tangent[i]);
 		assert_true(angle_to(attr_of(red, 0), 0, 1, 1) < off);
 		assert_true(angle_to(attr_of(green, 0), -side, 0, 1) < off);
+		/* Normals that point inwards are turned, and the texture stays where it is. */
+		for (uint32_t i = 0; i < green->n_vertices; i++)
+			green->normal[i][2] = -1;
+		assert_true(angle_to(attr_of(green, 0), side, 0, 1) < off);
+		for (uint32_t i = 0; i < green->n_vertices; i++)
+			green->normal[i][2] = 1;
 	}
 	red->tangent = green->tangent = NULL;
 	meshes_free(red);
