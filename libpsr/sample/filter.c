@@ -7,7 +7,8 @@
 #define MOST_AXIS 40 /* texels: 1.5 * 8 of the next level, which may have a third of the texels, and a rest */
 #define MOST_RUN (2 * MOST_AXIS + 2)
 
-/* The filter's variance along an axis over the square of that semi-axis: half of the mean of q under exp(-2 q) - exp(-2). */
+/* The filter's variance along an axis over the square of that semi-axis: half of the mean of q under exp(-2 q) -
+ * exp(-2). */
 #define KERNEL_VARIANCE 0.13608
 
 /* What adds to the square of a semi-axis: the variances of bilinear interpolation and of the mean over a texel. */

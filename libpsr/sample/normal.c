@@ -87,12 +87,12 @@ static float given_tangent(const struct psr_mesh *mesh, uint32_t triangle, doubl
 static float made_tangent(const struct plane *plane, const double jacobian[2][2], float tangent[3])
 {
 	double det = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];
-	double sign = det > 0 ? 1 : -1, length = sign * sqrt(jacobian[1][0] * jacobian[1][0] + jacobian[1][1] * jacobian[1][1]);
+	double sign = det > 0 ? 1 : -1, x = jacobian[1][1], y = -jacobian[1][0], length = sign * sqrt(x * x + y * y);
 
 	if (!(det < 0 || det > 0) || !(fabs(length) > 0 && fabs(length) < INFINITY))
 		return 0;
 	for (int k = 0; k < 3; k++)
-		tangent[k] = (float)(jacobian[1][1] / length * plane->axis[0][k] - jacobian[1][0] / length * plane->axis[1][k]);
+		tangent[k] = (float)(x / length * plane->axis[0][k] + y / length * plane->axis[1][k]);
 	return (float)-sign;
 }
 

@@ -183,7 +183,7 @@ static double map_normal(const struct spot *spot, float normal[3])
 	           (const double(*)[2])jacobian, mapped, normal);
 	if (length + NORMAL_ROUNDING >= 1)
 		return 0;
-	/* The scale stretches small angles by as much. Where all cancels out no lobe is left, and any large number will do. */
+	/* The scale stretches small angles by as much. Where all cancels out no lobe is left: any number will do. */
 	share *= (double)m->normal_scale * (double)m->normal_scale;
 	return share * (1 - NORMAL_ROUNDING - length) / (length > 1e-3 ? length : 1e-3);
 }

@@ -60,9 +60,9 @@ for entry in $available; do
 	spacing=$(number "$work/info.json" spacing)
 	# One panel of clearcoat has a one-sided BLEND material, which is cut out at one half. Through it slivers of the far side
 	# show, where smooth normals face the eye on faces that do not. Everything else is exact.
-	# Its labels' letters are finer than a pixel, and textures are looked up unfiltered, a sample's place in its pixel apart.
+	# Its labels' letters are finer than a pixel, and a sample may be anywhere in its own.
 	allowed=0 off=1
-	[ "$model" = clearcoat ] && allowed=1 off=20
+	[ "$model" = clearcoat ] && allowed=1 off=15
 	# Magnification 1: a pixel is as wide as the samples are apart.
 	height=$(awk "BEGIN { print $spacing * $resolution }")
 	read -r cx cy cz <<<"$(array "$work/info.json" origin)"

@@ -33,7 +33,8 @@ static void close_picture(struct picture *p)
 }
 
 /* Grey of each column, from a function of its number. */
-static void open_columns(struct picture *p, uint32_t width, uint32_t height, enum psr_wrap wrap, int (*grey)(uint32_t, uint32_t))
+static void open_columns(struct picture *p, uint32_t width, uint32_t height, enum psr_wrap wrap,
+                         int (*grey)(uint32_t, uint32_t))
 {
 	uint8_t *rgba = malloc((size_t)4 * width * height);
 
@@ -84,7 +85,8 @@ static void random_axes(uint64_t *seed, double axes[2][2])
 
 static void constant_images_stay_constant_under_every_ellipse(void **state)
 {
-	static const uint32_t sides[][2] = { { 1, 1 }, { 2, 2 }, { 7, 5 }, { 13, 1 }, { 1, 64 }, { 33, 3 }, { 64, 64 }, { 3, 255 } };
+	static const uint32_t sides[][2] = { { 1, 1 },  { 2, 2 },  { 7, 5 },   { 13, 1 },
+		                                 { 1, 64 }, { 33, 3 }, { 64, 64 }, { 3, 255 } };
 	uint64_t seed = 1;
 
 	(void)state;
@@ -154,8 +156,8 @@ static uint32_t wrapped(int i, int n, enum psr_wrap wrap)
 	return (uint32_t)(i < n ? i : 2 * n - 1 - i);
 }
 
-/* What adds to the square of a semi-axis for bilinear interpolation: its variance, 1/6, over that of the kernel, half of
- * the mean of q under exp(-2 q) - exp(-2). */
+/* What adds to the square of a semi-axis for bilinear interpolation: its variance, 1/6, over that of the kernel, half
+ * of the mean of q under exp(-2 q) - exp(-2). */
 static double bilinear(void)
 {
 	double e = exp(-2), mean = ((1 - 3 * e) / 4 - e / 2) / ((1 - e) / 2 - e);
@@ -171,7 +173,8 @@ static void the_filter_is_a_gaussian_over_the_ellipse(void **state)
 	(void)state;
 	for (int k = 0; k < 300; k++) {
 		double least = 1.5 + 1.49 * meshes_random(&seed), most = least * (1 + 7 * meshes_random(&seed));
-		double angle = 3.1 * meshes_random(&seed), st[2] = { 3 * meshes_random(&seed) - 1, 3 * meshes_random(&seed) - 1 };
+		double angle = 3.1 * meshes_random(&seed);
+		double st[2] = { 3 * meshes_random(&seed) - 1, 3 * meshes_random(&seed) - 1 };
 		double axes[2][2] = { { most * cos(angle) / 16, -least * sin(angle) / 16 },
 			                  { most * sin(angle) / 16, least * cos(angle) / 16 } };
 		double long_axis = sqrt(most * most + bilinear()), short_axis = sqrt(least * least + bilinear());
@@ -198,7 +201,8 @@ static void the_filter_is_a_gaussian_over_the_ellipse(void **state)
 			}
 		}
 		filter_look_up(&p.mip, &p.texture, st, (const double(*)[2])axes, out);
-		for (int c = 0; c < 4; c++) /* the kernel's series is 4e-6 off, a texel on the edge may be in or out with less */
+		/* The kernel's series is 4e-6 off, and a texel on the edge may be in or out with less. */
+		for (int c = 0; c < 4; c++)
 			assert_float_equal(out[c], expected[c] / sum, 2 * (n + 2) * 4e-6 / sum + EPSILON);
 		close_picture(&p);
 	}
@@ -215,7 +219,8 @@ static void a_far_checkerboard_is_its_linear_mean(void **state)
 		memset(rgba + 4 * i, (i + i / 64) & 1 ? 255 : 0, 4);
 	open_picture(&p, 64, 64, MIP_COLOR, PSR_WRAP_REPEAT, rgba);
 	for (int i = 0; i < 500; i++) /* from 3 texels on the level is one whose every texel has as many of both */
-		assert_float_equal(look(&p, meshes_random(&seed), meshes_random(&seed), 3 + 60 * meshes_random(&seed), 30), 0.5, EPSILON);
+		assert_float_equal(look(&p, meshes_random(&seed), meshes_random(&seed), 3 + 60 * meshes_random(&seed), 30), 0.5,
+		                   EPSILON);
 	close_picture(&p);
 }
 
@@ -268,10 +273,37 @@ static void every_level_wraps_where_the_image_does(void **state)
 			open_columns(&p, side, 16, expected[i].wrap, left_is_black);
 			assert_float_equal(look(&p, 0, 0.4, 3.5, 4), expected[i].at_0, EPSILON);
 			assert_float_equal(look(&p, 1, 0.4, 3.5, 4), expected[i].at_1, EPSILON);
-			assert_float_equal(look(&p, -1, 0.4, 3.5, 4), expected[i].wrap == PSR_WRAP_MIRROR ? 1 : expected[i].at_0, EPSILON);
+			assert_float_equal(look(&p, -1, 0.4, 3.5, 4), expected[i].wrap == PSR_WRAP_MIRROR ? 1 : expected[i].at_0,
+			                   EPSILON);
 			close_picture(&p);
 		}
 	}
+}
+
+/* How much of a wave of 16 texels along t is left under a circle. */
+static double amplitude(const struct picture *p, double radius)
+{
+	double sum = 0;
+
+	for (int i = 0; i < 64; i++)
+		sum += (double)look(p, 0.37, i / 64.0, radius, radius) * cos(2 * 3.14159265358979 * i / 16);
+	return sum / 32;
+}
+
+/* A variance of v texels^2 leaves exp(-2 pi^2 v / 16^2) of the wave: that of a texel of level 1, (4 - 1) / 12, counted twice
+ * takes 2 %, or 0.009. */
+static void the_level_does_not_show(void **state)
+{
+	uint8_t rgba[64 * 64 * 4];
+	struct picture p;
+
+	(void)state;
+	for (int i = 0; i < 64 * 64; i++)
+		memset(rgba + 4 * i, (int)(127.5 + 127 * cos(2 * 3.14159265358979 * (i / 64 + 0.5) / 16) + 0.5), 4);
+	open_picture(&p, 64, 64, MIP_LINEAR, PSR_WRAP_REPEAT, rgba);
+	assert_float_equal(amplitude(&p, 2.999), amplitude(&p, 3.001), 0.0045);
+	assert_true(amplitude(&p, 2.999) > amplitude(&p, 4) + 0.01); /* 0.136 (16 - 9) texels^2 more: 7 % */
+	close_picture(&p);
 }
 
 static void a_point_is_bilinear_or_nearest(void **state)
@@ -326,9 +358,10 @@ static void the_share_of_the_ellipse_grows_with_it(void **state)
 		float out[4];
 
 		share = filter_look_up(&p.mip, &p.texture, st, axes, out);
-		/* A circle is raised to 1.5 texels, or by bilinear interpolation; from 1.5 texels of level 6 on it is the mean. The
-		 * kernel's variance is rounded to five digits. */
-		assert_float_equal(share, radius >= 1.5 * 64 ? 1 : radius * radius / fmax(2.25, radius * radius + bilinear()), 1e-5);
+		/* A circle is raised to 1.5 texels, or by bilinear interpolation; from 1.5 texels of level 6 on it is the mean.
+		 * The kernel's variance is rounded to five digits. */
+		assert_float_equal(share, radius >= 1.5 * 64 ? 1 : radius * radius / fmax(2.25, radius * radius + bilinear()),
+		                   1e-5);
 		assert_true(share >= last);
 		last = share;
 	}
@@ -350,7 +383,8 @@ static void wild_numbers_stay_inside(void **state)
 		open_picture(&p, 5, 3, MIP_COLOR, (enum psr_wrap)k, rgba);
 		for (int i = 0; i < N * N * N * N; i++) {
 			const double st[2] = { wild[i % (N - 2)], wild[i / N % (N - 2)] };
-			const double axes[2][2] = { { wild[i % N], wild[i / N % N] }, { wild[i / N / N % N], wild[i / N / N / N] } };
+			const double axes[2][2] = { { wild[i % N], wild[i / N % N] },
+				                        { wild[i / N / N % N], wild[i / N / N / N] } };
 			double share;
 			float out[4];
 
@@ -373,6 +407,7 @@ int main(void)
 		cmocka_unit_test(a_gradient_keeps_its_value),
 		cmocka_unit_test(a_long_ellipse_blurs_along_itself_only),
 		cmocka_unit_test(every_level_wraps_where_the_image_does),
+		cmocka_unit_test(the_level_does_not_show),
 		cmocka_unit_test(a_point_is_bilinear_or_nearest),
 		cmocka_unit_test(clear_texels_lend_no_color),
 		cmocka_unit_test(the_share_of_the_ellipse_grows_with_it),

@@ -139,7 +139,8 @@ static void spread_normals_widen_the_lobe_and_lower_it(void **state)
 	assert_true(material_widened(1e4, 1e9) == 1);
 }
 
-/* Of the two descriptions of glTF: a dielectric reflects 0.04 of all colours, a metal its own colour and has no diffuse one. */
+/* Of the two descriptions of glTF: a dielectric reflects 0.04 of all colours, a metal its own colour and has no diffuse
+ * one. */
 static void both_descriptions_of_a_material_agree(void **state)
 {
 	struct psr_material rough = make(0, 0.4f), shiny = make(1, 0.4f);

@@ -309,6 +309,12 @@ static void given_tangents_go_first(void **state)
 			memcpy(tangent[i], (float[]){ 0, 1, 0, (float)side }, sizeof tangent[i]);
 		assert_true(angle_to(attr_of(red, 0), 0, 1, 1) < off);
 		assert_true(angle_to(attr_of(green, 0), -side, 0, 1) < off);
+		/* Normals that point inwards are turned, and the texture stays where it is. */
+		for (uint32_t i = 0; i < green->n_vertices; i++)
+			green->normal[i][2] = -1;
+		assert_true(angle_to(attr_of(green, 0), side, 0, 1) < off);
+		for (uint32_t i = 0; i < green->n_vertices; i++)
+			green->normal[i][2] = 1;
 	}
 	red->tangent = green->tangent = NULL;
 	meshes_free(red);
@@ -361,15 +367,16 @@ static void unseen_bumps_widen_the_highlight(void **state)
 
 	(void)state;
 	for (int i = 0; i < 2; i++) {
-		/* A scale of one half makes a quarter of the variance. The 16 bits of the mean move its length by 3e-5 at most, and
-		 * 4 (1 - r) / r by four times that: less than a step of 2^(1/32) = 1.02 at these exponents. */
+		/* A scale of one half makes a quarter of the variance. The 16 bits of the mean move its length by 3e-5 at most,
+		 * and 4 (1 - r) / r by four times that: less than a step of 2^(1/32) = 1.02 at these exponents. */
 		double spread = (1 - cosine) / cosine / (i == 0 ? 1 : 4);
 		uint64_t attr = attr_of(mesh, 1);
 		float peak;
 
 		widened = 1 / (1 / exponent + 4 * spread);
 		assert_true(4 * 3e-5 * widened < 0.02 / 2);
-		assert_in_range(PSR_ATTR_EXPONENT(attr) + 1, material_exponent_code(widened), material_exponent_code(widened) + 2);
+		assert_in_range(PSR_ATTR_EXPONENT(attr) + 1, material_exponent_code(widened),
+		                material_exponent_code(widened) + 2);
 		peak = (float)fmin(1, 0.04 * (exp2(PSR_ATTR_EXPONENT(attr) / 16.0) + 2) / 2);
 		assert_in_range((PSR_ATTR_SPECULAR(attr) & 31) + 1, (psr_linear_to_srgb(peak) * 31 + 127) / 255,
 		                (psr_linear_to_srgb(peak) * 31 + 127) / 255 + 2);
@@ -435,7 +442,9 @@ static void every_sample_faces_its_view(void **state)
 	(void)state;
 	for (int i = 0; i < 2000; i++) {
 		struct psr_mesh *mesh = ribs(&cosine);
-		const struct surface_place place = { .prim = 0, .u = 0.5 * meshes_random(&seed), .v = 0.5 * meshes_random(&seed) };
+		const struct surface_place place = { .prim = 0,
+			                                 .u = 0.5 * meshes_random(&seed),
+			                                 .v = 0.5 * meshes_random(&seed) };
 		const float *facing = table[(size_t)(meshes_random(&seed) * PSR_DIRECTIONS)];
 		struct surface surface;
 		uint64_t attr;
