@@ -9,7 +9,7 @@ VERSION := 0.1.0
 
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
-DEPS_TEST  := libcmocka-dev
+DEPS_TEST  := libcmocka-dev assimp-testmodels
 
 CC  ?= cc
 CXX ?= c++
