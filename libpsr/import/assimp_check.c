@@ -53,33 +53,6 @@ static int check_off(const struct import_mesh *im, struct text t, size_t n_bytes
 	return PSR_OK;
 }
 
-static int check_ply(const struct import_mesh *im, struct text t, size_t n_bytes, struct psr_error *err)
-{
-	static const char element[] = "element";
-	uint64_t n;
-
-	while (skip_blank(&t)) {
-		size_t left = (size_t)(t.end - t.at);
-
-		if (left >= 10 && memcmp(t.at, "end_header", 10) == 0)
-			return PSR_OK;
-		if (left < sizeof element || memcmp(t.at, element, sizeof element - 1) != 0) {
-			skip_word(&t);
-			continue;
-		}
-		skip_word(&t);
-		if (!skip_blank(&t))
-			break;
-		skip_word(&t);
-		if (next_number(&t, &n) && n > n_bytes)
-			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: the PLY header speaks of %llu elements, but the file has only %zu bytes",
-			                im->path, (unsigned long long)n, n_bytes);
-	}
-	return psr_fail(err, PSR_ERR_FORMAT, "%s: the PLY header has no end_header in its first %d bytes", im->path,
-	                MAX_HEADER);
-}
-
 /* By the file's ending, or a first word like OFF, COFF, STCN4OFF. */
 static int is_off(const char *path, struct text t)
 {
@@ -100,8 +73,6 @@ int assimp_check_counts(const struct import_mesh *im, const uint8_t *bytes, size
 {
 	struct text t = { bytes, bytes + (n_bytes < MAX_HEADER ? n_bytes : MAX_HEADER) };
 
-	if (n_bytes >= 3 && strncasecmp((const char *)bytes, "ply", 3) == 0)
-		return check_ply(im, t, n_bytes, err);
 	return is_off(im->path, t) ? check_off(im, t, n_bytes, err) : PSR_OK;
 }
 

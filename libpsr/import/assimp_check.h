@@ -5,7 +5,7 @@
 #include <assimp/scene.h>
 #include "import.h"
 
-/* Before: PLY and OFF files tell their counts first, and Assimp allocates whatever they say. Each vertex and face takes
+/* Before: OFF files tell their counts first, and Assimp allocates whatever they say. Each vertex and face takes
  * at least a byte, so a count beyond the file's size is a lie. */
 int assimp_check_counts(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 

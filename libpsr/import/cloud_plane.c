@@ -38,14 +38,17 @@ static void rotate(double m[3][3], double v[3][3], int p, int q)
 	}
 }
 
-/* Rows of v: the axes of m, whose values are left on its diagonal. */
+/* Rows of v: the axes of m, whose values are left on its diagonal. What is off it shrinks quadratically: three sweeps do
+ * for nearly all, and below 1e-12 of the trace it turns no axis by what a float could tell. */
 static void diagonalise(double m[3][3], double v[3][3])
 {
+	const double least = 1e-12 * (m[0][0] + m[1][1] + m[2][2]);
+
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j < 3; j++)
 			v[i][j] = i == j;
 	for (int sweep = 0; sweep < 8; sweep++) {
-		if (m[0][1] == 0.0 && m[0][2] == 0.0 && m[1][2] == 0.0)
+		if (fabs(m[0][1]) <= least && fabs(m[0][2]) <= least && fabs(m[1][2]) <= least)
 			return;
 		rotate(m, v, 0, 1);
 		rotate(m, v, 0, 2);
@@ -152,7 +155,7 @@ static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const 
 	struct corner corner[2][MAX_CORNERS] = { { { { -1, -1 }, -1 }, { { 1, -1 }, -1 }, { { 1, 1 }, -1 }, { { -1, 1 }, -1 } } };
 	const double n[3] = { normal[0], normal[1], normal[2] };
 	const double other[3] = { fabs(n[0]) < 0.6, fabs(n[0]) >= 0.6, 0.0 };
-	double u[3], v[3], farthest = 0.0;
+	double u[3], v[3], farthest = 0.0, reach = 2.0; /* reach: the farthest corner, squared, frame and all */
 	int count = 4, now = 0;
 
 	v3d_cross(u, n, other);
@@ -161,10 +164,18 @@ static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const 
 	for (uint32_t j = 0; j < k && count > 0; j++) {
 		const double site[2] = { v3d_dot(offset[j], u), v3d_dot(offset[j], v) };
 
-		if (site[0] == 0.0 && site[1] == 0.0)
+		const double squared = site[0] * site[0] + site[1] * site[1];
+
+		if (squared == 0.0 || squared >= 4.0 * reach)
 			continue;
 		count = clip(corner[1 - now], corner[now], count, site, (int)j);
 		now = 1 - now;
+		reach = 0.0;
+		for (int i = 0; i < count; i++) {
+			const double *at = corner[now][i].at;
+
+			reach = fmax(reach, at[0] * at[0] + at[1] * at[1]);
+		}
 	}
 	for (int i = 0; i < count; i++) {
 		const struct corner *c = &corner[now][i];

@@ -32,7 +32,7 @@ static int is_gltf(const char *path, const uint8_t *bytes, size_t n_bytes)
 
 static int is_ply(const char *path, const uint8_t *bytes, size_t n_bytes)
 {
-	return ends_with(path, ".ply") || (n_bytes >= 4 && memcmp(bytes, "ply", 3) == 0 && strchr("\r\n", bytes[3]) != NULL);
+	return ends_with(path, ".ply") || (n_bytes >= 3 && strncasecmp((const char *)bytes, "ply", 3) == 0);
 }
 
 static int is_las(const char *path, const uint8_t *bytes, size_t n_bytes)

@@ -104,8 +104,8 @@ int import_mesh_drop_images(struct import_mesh *im, struct psr_error *err);
 int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int whole, struct psr_error *err);
 int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves the others unused */
 
-/* normals.c: smooth vertex normals for the triangles whose vertices have none; each corner has to have its own
- * vertex. */
+/* normals.c: smooth vertex normals for the triangles whose vertices have none. A vertex whose corners need several is
+ * split: the others come at the end. MEMORY, LIMIT. */
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 
 /* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one place,

@@ -108,35 +108,97 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	return PSR_OK;
 }
 
+/* A corner around the point at hand. */
+struct corner {
+	double share[3];
+	uint64_t at;
+	float normal[3];
+};
+
+static void corner_normal(float normal[3], const struct fan *fan, const struct corner *around, unsigned n, unsigned i)
+{
+	const double *face = fan->face[around[i].at / 3];
+	double sum[3] = { 0.0, 0.0, 0.0 }, length;
+
+	for (unsigned k = 0; k < n; k++)
+		for (int c = 0; c < 3 && dot(face, fan->face[around[k].at / 3]) >= IMPORT_CREASE_COSINE; c++)
+			sum[c] += around[k].share[c];
+	length = sqrt(dot(sum, sum));
+	for (int c = 0; c < 3; c++)
+		normal[c] = length > 0.0 && isfinite(length) ? (float)(sum[c] / length) : 0.0f;
+}
+
+/* A copy of vertex v at the end, for the corners that want another normal. */
+static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *err)
+{
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	const uint32_t to = im->mesh->n_vertices;
+	int n_columns, rc = import_mesh_grow(im, 1, 0, 0, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	n_columns = import_vertex_columns(column, im->mesh);
+	for (int i = 0; i < n_columns; i++)
+		memcpy(import_column_at(&column[i], to), import_column_at(&column[i], v), column[i].size);
+	return PSR_OK;
+}
+
+/* Corners of one vertex with one normal go on sharing it: the first takes it, others with the same normal follow. */
+static int put_normals(struct import_mesh *im, const struct corner *around, unsigned n, const uint32_t *old,
+                       struct psr_error *err)
+{
+	for (unsigned i = 0; i < n; i++) {
+		uint32_t *v = &im->mesh->triangle[around[i].at / 3][around[i].at % 3];
+		int is_first = 1, rc;
+		unsigned k;
+
+		for (k = 0; k < i; k++) {
+			if (old[k] != old[i])
+				continue;
+			is_first = 0;
+			if (memcmp(around[k].normal, around[i].normal, sizeof around[k].normal) == 0)
+				break;
+		}
+		if (k < i) {
+			*v = im->mesh->triangle[around[k].at / 3][around[k].at % 3];
+			continue;
+		}
+		if (!is_first) {
+			rc = split_vertex(im, *v, err);
+			if (rc != PSR_OK)
+				return rc;
+			v = &im->mesh->triangle[around[i].at / 3][around[i].at % 3];
+			*v = im->mesh->n_vertices - 1;
+		}
+		memcpy(im->mesh->normal[*v], around[i].normal, sizeof around[i].normal);
+	}
+	return PSR_OK;
+}
+
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 {
-	struct psr_mesh *mesh = im->mesh;
+	struct corner around[MAX_VALENCE];
+	uint32_t old[MAX_VALENCE];
+	const uint32_t n_vertices = im->mesh->n_vertices;
 	struct fan fan;
 	int rc = fan_init(&fan, im, err);
 
 	if (rc != PSR_OK)
 		return rc;
-	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
-		for (int c = 0; fan.wanted[t] && c < 3; c++) {
-			const uint32_t v = mesh->triangle[t][c], p = fan.point[v];
-			double sum[3] = { 0.0, 0.0, 0.0 }, length;
+	for (uint32_t p = 0; p < n_vertices && rc == PSR_OK; p++) {
+		const uint64_t first = fan.start[p], n = fan.start[p + 1] - first;
 
-			if (fan.start[p + 1] - fan.start[p] > MAX_VALENCE)
-				continue;
-			for (uint64_t i = fan.start[p]; i < fan.start[p + 1]; i++) {
-				double share[3];
-
-				if (!(dot(fan.face[t], fan.face[fan.corner[i] / 3]) >= IMPORT_CREASE_COSINE))
-					continue;
-				corner_share(share, mesh, fan.corner[i]);
-				for (int k = 0; k < 3; k++)
-					sum[k] += share[k];
-			}
-			length = sqrt(dot(sum, sum));
-			for (int k = 0; length > 0.0 && isfinite(length) && k < 3; k++)
-				mesh->normal[v][k] = (float)(sum[k] / length);
+		if (n > MAX_VALENCE)
+			continue;
+		for (unsigned i = 0; i < n; i++) {
+			around[i].at = fan.corner[first + i];
+			old[i] = im->mesh->triangle[around[i].at / 3][around[i].at % 3];
+			corner_share(around[i].share, im->mesh, around[i].at);
 		}
+		for (unsigned i = 0; i < n; i++)
+			corner_normal(around[i].normal, &fan, around, (unsigned)n, i);
+		rc = put_normals(im, around, (unsigned)n, old, err);
 	}
 	fan_fini(&fan);
-	return PSR_OK;
+	return rc;
 }

@@ -121,8 +121,7 @@ void ply_vertices_fini(struct ply_vertices *vertices);
 int ply_colors_find(struct ply_colors *colors, const struct ply_header *header, const struct ply_element *element);
 void ply_colors_get(float out[4], const struct ply_colors *colors, const struct ply_rows *rows);
 
-/* ply_face.c: the rows of "face" and "tristrips", as triangles of `material`. With normals in the file, vertices are
- * shared; otherwise each corner has its own. */
+/* ply_face.c: the rows of "face" and "tristrips", as triangles of `material`. */
 int ply_faces_read(struct import_mesh *im, struct ply_rows *rows, const struct ply_vertices *vertices,
                    uint32_t material, struct psr_error *err);
 int ply_strips_read(struct import_mesh *im, struct ply_rows *rows, const struct ply_vertices *vertices,

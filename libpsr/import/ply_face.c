@@ -8,7 +8,7 @@ struct target {
 	struct import_mesh *im;
 	struct ply_rows *rows;
 	const struct ply_vertices *vertices;
-	uint32_t material, first;   /* first: of the shared vertices */
+	uint32_t material, first;   /* first: of the shared vertices; colors or coordinates of faces need their own */
 	int is_shared, has_colors;
 	unsigned has;               /* IMPORT_HAS_* */
 	struct ply_colors colors;
@@ -115,7 +115,7 @@ static int target_init(struct target *t, struct import_mesh *im, struct ply_rows
 	t->material = material;
 	/* Colors of vertices are finer than those of faces, where a file has both. */
 	t->has_colors = vertices->color == NULL && ply_colors_find(&t->colors, rows->header, rows->element);
-	t->is_shared = vertices->normal != NULL && !t->has_colors && uv->property < 0;
+	t->is_shared = !t->has_colors && uv->property < 0;
 	t->has = (vertices->uv != NULL || uv->property >= 0 ? IMPORT_HAS_UV0 : 0u) |
 	         (vertices->color != NULL || t->has_colors ? IMPORT_HAS_COLOR : 0u);
 	t->first = im->mesh->n_vertices;
