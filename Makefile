@@ -67,8 +67,8 @@ ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(LIB)/psr-image-oiio.so
 endif
 
-L_PSR    := -lxxhash -lm
-L_CODEC  := -lturbojpeg -lzstd
+L_PSR    := -lzstd -lxxhash -lm
+L_CODEC  := -lturbojpeg
 L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
 
 .PHONY: all demo test test-all models models-all install help clean deps compile

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
+#include "preset.h"
 #include "psr.h"
 #include "report.h"
 
@@ -12,9 +13,10 @@
 #define DEFAULT_AMBIENT 0.15
 
 struct shot {
-	const char *server, *model, *codec_text, *output, *depth, *report;
+	const char *server, *model, *codec_text, *output, *depth, *report, *lights;
 	uint32_t size[2];
 	struct psr_camera_wish camera;
+	struct preset_wish preset;
 	double fov, ortho, ambient;
 	int has_fov, has_ortho, has_ambient, hash;
 	uint8_t background[3];
@@ -29,8 +31,10 @@ static const char footer[] =
 	"  point:X,Y,Z[,...]                X,Y,Z is its position\n"
 	"  spot:X,Y,Z:TX,TY,TZ:ANGLE[,...]  position, the point it shines at, half the angle of its cone in\n"
 	"                                   degrees; the light is full within 0.9 of it\n"
-	"followed by any of color=#rrggbb (white), intensity=I (1), shadow, and for point and spot ref=R: the\n"
-	"distance at which the intensity holds, falling with its square; without it the light does not fall.\n"
+	"  preset:NAME                      a light that came with the model (`psr list --presets`)\n"
+	"and, but for the last, followed by any of color=#rrggbb (white), intensity=I (1), shadow, and for\n"
+	"point and spot ref=R: the distance at which the intensity holds, falling with its square; without it\n"
+	"the light does not fall.\n"
 	"Without --light and --ambient there is one white light from the upper left behind the camera, and\n"
 	"ambient 0.15.\n"
 	"\n"
@@ -42,11 +46,15 @@ static const char footer[] =
 
 static int on_light(const char *text, void *userdata, struct psr_error *err)
 {
-	struct psr_msg_scene *scene = userdata;
+	struct shot *shot = userdata;
+	struct psr_msg_scene *scene = &shot->scene;
 
 	if (scene->n_lights == PSR_WIRE_MAX_LIGHTS)
 		return psr_fail(err, PSR_ERR_LIMIT, "there are %d lights at most", PSR_WIRE_MAX_LIGHTS);
-	if (psr_light_parse(&scene->light[scene->n_lights], text, err) != PSR_OK)
+	shot->preset.light[scene->n_lights] = preset_of_light(text);
+	if (shot->preset.light[scene->n_lights] != NULL)
+		shot->preset.has_lights = 1;
+	else if (psr_light_parse(&scene->light[scene->n_lights], text, err) != PSR_OK)
 		return PSR_ERR_ARG;
 	scene->n_lights++;
 	return PSR_OK;
@@ -72,7 +80,11 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		{ "ortho", 0, PSR_OPT_REAL, &shot->ortho, "HEIGHT",
 		  "Orthographic instead, with a picture of this height in the units of the source file.", 0, 0, NULL,
 		  &shot->has_ortho },
-		{ "light", 'l', PSR_OPT_CALL, &shot->scene, "LIGHT", "A light, see below; repeatable.", 0, 0, on_light, NULL },
+		{ "camera", 0, PSR_OPT_STRING, &shot->preset.camera, "NAME",
+		  "A camera that came with the model, in the place of all of these; `psr list --presets` shows them.", 0, 0, NULL,
+		  NULL },
+		{ "light", 'l', PSR_OPT_CALL, shot, "LIGHT", "A light, see below; repeatable.", 0, 0, on_light, NULL },
+		{ "lights", 0, PSR_OPT_STRING, &shot->lights, "model", "All lights that came with the model.", 0, 0, NULL, NULL },
 		{ "ambient", 0, PSR_OPT_REAL, &shot->ambient, "A",
 		  "Light from everywhere; 1 without a --light shows the flat diffuse colour.", 0, PSR_WIRE_MAX_INTENSITY, NULL,
 		  &shot->has_ambient },
@@ -118,6 +130,12 @@ static int check(struct shot *shot, struct psr_error *err)
 	if (w > PSR_WIRE_MAX_SIDE || h > PSR_WIRE_MAX_SIDE || (uint64_t)w * h > PSR_WIRE_MAX_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "--size: %ux%u is too large; a side has at most %d pixels, a picture %u", w,
 		                h, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
+	if (shot->preset.camera != NULL && (shot->camera.has_eye || shot->camera.has_target || shot->camera.has_up
+	                                    || shot->has_fov || shot->has_ortho))
+		return psr_fail(err, PSR_ERR_ARG, "--camera is a whole camera; it excludes --eye, --target, --up, --fov and --ortho");
+	if (shot->lights != NULL && strcmp(shot->lights, "model") != 0)
+		return psr_fail(err, PSR_ERR_ARG, "--lights takes 'model', not '%.40s'; --light is for one light", shot->lights);
+	shot->preset.all_lights = shot->lights != NULL;
 	if (shot->has_fov && shot->has_ortho)
 		return psr_fail(err, PSR_ERR_ARG, "--fov and --ortho exclude each other");
 	if (!(shot->fov >= 0.001 && shot->fov < 180))
@@ -138,7 +156,8 @@ static int check(struct shot *shot, struct psr_error *err)
 	return code == PSR_OK ? psr_address_check(shot->server, err) : code;
 }
 
-static int prepare(struct shot *shot, const struct psr_msg_opened *opened, struct psr_error *err)
+static int prepare(struct shot *shot, struct psr_client *client, const struct psr_msg_opened *opened,
+                   struct psr_error *err)
 {
 	struct psr_msg_scene *scene = &shot->scene;
 	struct psr_msg_frame *frame = &shot->frame;
@@ -148,6 +167,8 @@ static int prepare(struct shot *shot, const struct psr_msg_opened *opened, struc
 	shot->camera.ortho_height = shot->has_ortho ? shot->ortho : 0;
 	code = psr_camera_complete(&frame->camera, &shot->camera, opened->box_min, opened->box_max,
 	                           (double)shot->size[0] / shot->size[1], err);
+	if (code == PSR_OK)
+		code = preset_apply(&shot->preset, client, opened->handle, &frame->camera, scene, (int)shot->timeout * 1000, err);
 	if (code != PSR_OK)
 		return code;
 	frame->width = shot->size[0];
@@ -203,7 +224,7 @@ static int draw(struct shot *shot, struct psr_client *client, struct shot_facts 
 	code = psr_client_open(client, shot->model, psr_progress_draw, &line, timeout_ms, &opened, err);
 	psr_progress_end(&line);
 	if (code == PSR_OK)
-		code = prepare(shot, &opened, err);
+		code = prepare(shot, client, &opened, err);
 	if (code == PSR_OK)
 		code = psr_client_scene(client, &shot->scene, NULL, err);
 	if (code == PSR_OK)

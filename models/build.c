@@ -83,7 +83,8 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 
-static int build(const char *in, const char *out, struct psr_build_options *options, int quiet, struct psr_error *err)
+static int build(const char *in, const char *out, struct psr_build_options *options, int is_packed, int quiet,
+                 struct psr_error *err)
 {
 	struct progress *progress = options->userdata;
 	struct psr_mesh *mesh = NULL;
@@ -97,7 +98,7 @@ static int build(const char *in, const char *out, struct psr_build_options *opti
 		code = psr_model_build(&model, mesh, options, &report, err);
 	if (code == PSR_OK) {
 		on_progress("write", 0, 1, progress);
-		code = psr_model_write(model, out, err);
+		code = is_packed ? psr_model_write_packed(model, out, err) : psr_model_write(model, out, err);
 	}
 	if (progress->has_bar)
 		clear_bar();
@@ -124,7 +125,7 @@ int cmd_build(int argc, char **argv)
 	struct psr_error err;
 	const char *out = NULL;
 	char *made = NULL;
-	int quiet = 0, n_operands, code;
+	int quiet = 0, is_packed = 0, n_operands, code;
 	int64_t resolution, n_threads, fd = -1;
 	double tolerance;
 	const struct psr_opt opts[] = {
@@ -134,6 +135,8 @@ int cmd_build(int argc, char **argv)
 		  .help = "pixels across the model at which it is sampled without holes", .min = 8, .max = 8192 },
 		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
 		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
+		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
+		  .help = "compress the file: a third of the size, unpacked into memory when it is opened" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "threads to use; the result does not depend on it", .min = 1, .max = 256 },
 		{ .name = "progress-fd", .type = PSR_OPT_INT, .value = &fd, .arg = "FD",
@@ -172,7 +175,7 @@ int cmd_build(int argc, char **argv)
 	if (out == NULL && made == NULL)
 		code = psr_fail(&err, PSR_ERR_MEMORY, "no memory for a file name");
 	else
-		code = build(argv[1], out != NULL ? out : made, &options, quiet, &err);
+		code = build(argv[1], out != NULL ? out : made, &options, is_packed, quiet, &err);
 	free(made);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");

@@ -16,7 +16,8 @@ struct summary {
 	char id[33];
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
-	uint64_t bytes;
+	uint64_t bytes, file_bytes;
+	int is_packed;
 	const struct psr_presets *presets;
 	uint32_t level_blocks[MAX_LEVELS];
 	uint64_t level_samples[MAX_LEVELS];
@@ -45,6 +46,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
 	summary->bytes = psr_model_bytes(model);
+	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->presets = psr_model_presets(model);
 	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++) {
 		uint8_t level = summary->blocks->level[b];
@@ -121,6 +123,7 @@ static void print_text(const struct summary *s)
 	print_share("adequacy         ", info->n_missing, info->n_trials, "miss");
 	print_share("culling loss     ", info->n_lost, info->n_trials, "are lost");
 	print_presets(s->presets);
+	printf("file              %.2f MB, %s\n", (double)s->file_bytes / 1e6, s->is_packed ? "packed" : "not packed");
 	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
 	if (blocks == NULL)
 		return;
@@ -133,7 +136,8 @@ static void print_text(const struct summary *s)
 			printf("  level %-3" PRIu32 "       %" PRIu64 " samples in %" PRIu32 " blocks\n", l, s->level_samples[l],
 			       s->level_blocks[l]);
 	}
-	printf("bytes a sample    %.2f of all levels, all overhead included\n", ratio((double)s->bytes, (double)blocks->n_samples));
+	printf("bytes a sample    %.2f of all levels, all overhead included; %.2f in the file\n",
+	       ratio((double)s->bytes, (double)blocks->n_samples), ratio((double)s->file_bytes, (double)blocks->n_samples));
 	printf("samples a block   %.1f of %d valid\n", ratio((double)blocks->n_samples, blocks->n_blocks),
 	       PSR_BLOCK_SAMPLES);
 }
@@ -184,6 +188,8 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	for (uint32_t i = 0; i < s->presets->n_lights; i++)
 		add_preset(part, s->presets->light[i].name, light_kind(&s->presets->light[i].light));
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
+	cJSON_AddNumberToObject(root, "file_bytes", (double)s->file_bytes);
+	cJSON_AddBoolToObject(root, "is_packed", s->is_packed);
 	if (blocks != NULL) {
 		part = cJSON_AddObjectToObject(root, "blocks");
 		cJSON_AddNumberToObject(part, "samples", (double)blocks->n_samples);
@@ -192,6 +198,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		cJSON_AddNumberToObject(part, "clusters", blocks->n_clusters);
 		cJSON_AddNumberToObject(part, "levels", blocks->n_levels);
 		cJSON_AddNumberToObject(part, "bytes_per_sample", ratio((double)s->bytes, (double)blocks->n_samples));
+		cJSON_AddNumberToObject(part, "file_bytes_per_sample", ratio((double)s->file_bytes, (double)blocks->n_samples));
 		cJSON_AddNumberToObject(part, "samples_per_block", ratio((double)blocks->n_samples, blocks->n_blocks));
 		counts = cJSON_AddArrayToObject(part, "level_blocks");
 		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)

@@ -1,7 +1,7 @@
 #include <math.h>
 #include "wire.h"
 
-static void layout_camera(struct wire *w, struct psr_msg_camera *m)
+void layout_camera(struct wire *w, struct psr_msg_camera *m)
 {
 	wire_u8(w, &m->kind);
 	wire_reserved(w, 7);
@@ -17,7 +17,7 @@ static double length(const double v[3])
 	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-static int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
+int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
 {
 	const double least = 1 / PSR_WIRE_MAX_LENGTH;
 	double f[3], u[3], n_f, n_u;

@@ -11,7 +11,7 @@ static void layout_instance(struct wire *w, struct psr_msg_instance *m)
 	wire_f64(w, &m->scale, 1);
 }
 
-static void layout_light(struct wire *w, struct psr_msg_light *m)
+void layout_light(struct wire *w, struct psr_msg_light *m)
 {
 	wire_u8(w, &m->kind);
 	wire_u8(w, &m->flags);
@@ -67,7 +67,7 @@ static int is_zero(const double v[3])
 	return v[0] == 0 && v[1] == 0 && v[2] == 0;
 }
 
-static int check_light(const struct psr_msg_light *m, struct psr_error *err)
+int check_light(const struct psr_msg_light *m, struct psr_error *err)
 {
 	const double *d = m->direction;
 

@@ -49,6 +49,12 @@ int check_range(const char *what, double v, double min, double max, struct psr_e
 int check_integer(const char *what, uint64_t v, uint64_t min, uint64_t max, struct psr_error *err);
 int check_zero(const char *what, int all_zero, struct psr_error *err);
 
+/* Parts of more than one message: their layouts, and what they may say. */
+void layout_camera(struct wire *w, struct psr_msg_camera *camera); /* 96 bytes */
+int check_camera(const struct psr_msg_camera *camera, struct psr_error *err);
+void layout_light(struct wire *w, struct psr_msg_light *light); /* 88 bytes */
+int check_light(const struct psr_msg_light *light, struct psr_error *err);
+
 uint32_t wire_get_u32(const uint8_t *p);
 uint16_t wire_get_u16(const uint8_t *p);
 

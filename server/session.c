@@ -7,6 +7,7 @@
 #include "opener.h"
 #include "server.h"
 #include "session.h"
+#include "session_preset.h"
 #include "session_scene.h"
 
 int session_init(struct session *session, uint32_t max_handles)
@@ -26,7 +27,7 @@ void session_fini(struct session *session, struct catalogue *catalogue)
 	memset(session, 0, sizeof *session);
 }
 
-/* Ids that are open for long are counted; LIST and STATS are answered before the next message is read. */
+/* Ids that are open for long are counted; LIST, PRESETS and STATS are answered before the next message is read. */
 void session_refuse(struct conn *conn, uint32_t id, uint16_t view, int code, const char *text)
 {
 	conn->session.n_open--;
@@ -71,6 +72,14 @@ void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *mode
 	conn_send(conn, &buf);
 }
 
+static void refuse_handle(struct conn *conn, uint32_t id, uint32_t number)
+{
+	char text[PSR_ERROR_TEXT];
+
+	snprintf(text, sizeof text, "there is no open model with handle %" PRIu32, number);
+	conn_send_error(conn, id, 0, PSR_ERR_NOT_FOUND, text);
+}
+
 static void send_list(struct conn *conn, uint32_t id)
 {
 	const struct catalogue *catalogue = &conn->server->catalogue;
@@ -92,6 +101,43 @@ static void send_list(struct conn *conn, uint32_t id)
 	}
 	buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
 	if (psr_msg_list_end_encode(&buf, id, &end, NULL) == PSR_OK)
+		conn_send(conn, &buf);
+}
+
+static void send_presets(struct conn *conn, uint32_t id, uint32_t number)
+{
+	const struct session *session = &conn->session;
+	const struct psr_presets *presets = NULL;
+	struct psr_msg_presets_end end = { 0, 0 };
+	struct psr_msg_preset msg;
+	uint8_t bytes[512];
+	struct psr_buf buf;
+
+	for (uint32_t i = 0; i < session->n_handles; i++)
+		if (session->handle[i].number == number)
+			presets = psr_model_presets(session->handle[i].model->model);
+	if (presets == NULL) {
+		refuse_handle(conn, id, number);
+		return;
+	}
+	for (uint32_t i = 0; i < presets->n_cameras + presets->n_lights; i++) {
+		int is_camera = i < presets->n_cameras;
+
+		buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
+		if (is_camera)
+			preset_from_camera(&msg, &presets->camera[i]);
+		else
+			preset_from_light(&msg, &presets->light[i - presets->n_cameras]);
+		if (psr_msg_preset_encode(&buf, id, &msg, NULL) != PSR_OK)
+			continue;
+		conn_send(conn, &buf);
+		if (is_camera)
+			end.n_cameras++;
+		else
+			end.n_lights++;
+	}
+	buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
+	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
 		conn_send(conn, &buf);
 }
 
@@ -118,7 +164,6 @@ static void send_pong(struct conn *conn, const struct psr_msg_ping *ping)
 static void close_handle(struct conn *conn, uint32_t id, uint32_t number)
 {
 	struct session *session = &conn->session;
-	char text[PSR_ERROR_TEXT];
 
 	for (uint32_t i = 0; i < session->n_handles; i++) {
 		if (session->handle[i].number == number) {
@@ -127,8 +172,7 @@ static void close_handle(struct conn *conn, uint32_t id, uint32_t number)
 			return;
 		}
 	}
-	snprintf(text, sizeof text, "there is no open model with handle %" PRIu32, number);
-	conn_send_error(conn, id, 0, PSR_ERR_NOT_FOUND, text);
+	refuse_handle(conn, id, number);
 }
 
 static void cancel(struct conn *conn, uint32_t id, uint16_t view)
@@ -198,7 +242,7 @@ static void ask_frame(struct conn *conn, const struct psr_message *message, cons
 static int is_request(unsigned type)
 {
 	return type == PSR_MSG_LIST || type == PSR_MSG_OPEN || type == PSR_MSG_CLOSE || type == PSR_MSG_SCENE
-	       || type == PSR_MSG_FRAME || type == PSR_MSG_STATS;
+	       || type == PSR_MSG_FRAME || type == PSR_MSG_STATS || type == PSR_MSG_PRESETS;
 }
 
 /* Bad values cost the request; what breaks the protocol is the caller's to answer. */
@@ -213,11 +257,12 @@ static int refuse_or_break(struct conn *conn, const struct psr_message *message,
 	return PSR_OK;
 }
 
-/* LIST, OPEN, FRAME, STATS: ids that stay open until they are answered. */
+/* LIST, OPEN, PRESETS, FRAME, STATS: ids that stay open until they are answered. */
 static int take_open_id(struct conn *conn, const struct psr_message *message, struct psr_error *err)
 {
 	union {
 		struct psr_msg_open open;
+		struct psr_msg_presets presets;
 		struct psr_msg_frame frame;
 	} msg;
 	struct session *session = &conn->session;
@@ -227,6 +272,8 @@ static int take_open_id(struct conn *conn, const struct psr_message *message, st
 
 	if (message->type == PSR_MSG_OPEN)
 		code = psr_msg_open_decode(&msg.open, message->payload, message->n, &error);
+	else if (message->type == PSR_MSG_PRESETS)
+		code = psr_msg_presets_decode(&msg.presets, message->payload, message->n, &error);
 	else if (message->type == PSR_MSG_FRAME)
 		code = psr_msg_frame_decode(&msg.frame, message->payload, message->n, &error);
 	if (code != PSR_OK)
@@ -246,6 +293,8 @@ static int take_open_id(struct conn *conn, const struct psr_message *message, st
 		session->n_open--;
 		if (message->type == PSR_MSG_LIST)
 			send_list(conn, message->id);
+		else if (message->type == PSR_MSG_PRESETS)
+			send_presets(conn, message->id, msg.presets.handle);
 		else
 			send_stats(conn, message->id);
 	}
@@ -290,6 +339,7 @@ int session_take(struct conn *conn, const struct psr_message *message, struct ps
 	switch (message->type) {
 	case PSR_MSG_LIST:
 	case PSR_MSG_OPEN:
+	case PSR_MSG_PRESETS:
 	case PSR_MSG_FRAME:
 	case PSR_MSG_STATS:
 		return take_open_id(conn, message, err);

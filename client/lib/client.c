@@ -50,6 +50,7 @@ void psr_client_close(struct psr_client *client)
 	client_assembly_fini(&client->done);
 	client_decoder_destroy(client->decoder);
 	free(client->list.entry);
+	free(client->presets.preset);
 	free(client->in_storage);
 	free(client->out.data);
 	free(client);

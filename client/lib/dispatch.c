@@ -114,6 +114,48 @@ static int on_list_end(struct psr_client *client, const struct psr_message *mess
 	return answered(client, CLIENT_ANSWER_LIST_END);
 }
 
+static int on_preset(struct psr_client *client, const struct psr_message *message)
+{
+	struct client_presets *got = &client->presets;
+	uint32_t n = got->n[PSR_WIRE_PRESET_CAMERA] + got->n[PSR_WIRE_PRESET_LIGHT];
+	struct psr_msg_preset preset;
+	struct psr_error why;
+
+	if (!is_answer_to(client, message, PSR_MSG_PRESETS))
+		return unexpected(client, message);
+	if (psr_msg_preset_decode(&preset, message->payload, message->n, &why) != PSR_OK)
+		return broke(client, &why);
+	if (got->n[preset.kind] == PSR_WIRE_MAX_PRESETS)
+		return client_break(client, PSR_ERR_PROTOCOL, "the server sent more than %d cameras or lights",
+		                    PSR_WIRE_MAX_PRESETS);
+	if (n == 0) {
+		free(got->preset); /* of a request that an error ended */
+		got->preset = calloc(2 * PSR_WIRE_MAX_PRESETS, sizeof *got->preset);
+		if (got->preset == NULL)
+			return client_break(client, PSR_ERR_MEMORY, "no memory for cameras and lights");
+	}
+	got->preset[n] = preset;
+	got->n[preset.kind]++;
+	return 0;
+}
+
+static int on_presets_end(struct psr_client *client, const struct psr_message *message)
+{
+	const uint32_t *n = client->presets.n;
+	struct psr_msg_presets_end end;
+	struct psr_error why;
+
+	if (!is_answer_to(client, message, PSR_MSG_PRESETS))
+		return unexpected(client, message);
+	if (psr_msg_presets_end_decode(&end, message->payload, message->n, &why) != PSR_OK)
+		return broke(client, &why);
+	if (end.n_cameras != n[PSR_WIRE_PRESET_CAMERA] || end.n_lights != n[PSR_WIRE_PRESET_LIGHT])
+		return client_break(client, PSR_ERR_PROTOCOL, "the server sent %" PRIu32 " cameras and %" PRIu32
+		                    " lights and says that there are %" PRIu32 " and %" PRIu32, n[PSR_WIRE_PRESET_CAMERA],
+		                    n[PSR_WIRE_PRESET_LIGHT], end.n_cameras, end.n_lights);
+	return answered(client, CLIENT_ANSWER_PRESETS_END);
+}
+
 static int on_control(struct psr_client *client, const struct psr_message *message)
 {
 	enum client_answer answer;
@@ -273,6 +315,10 @@ int client_dispatch(struct psr_client *client, const struct psr_message *message
 		return on_entry(client, message);
 	case PSR_MSG_LIST_END:
 		return on_list_end(client, message);
+	case PSR_MSG_PRESET:
+		return on_preset(client, message);
+	case PSR_MSG_PRESETS_END:
+		return on_presets_end(client, message);
 	case PSR_MSG_PROGRESS:
 	case PSR_MSG_OPENED:
 	case PSR_MSG_STATS_REPLY:

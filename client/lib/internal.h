@@ -65,7 +65,7 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 
 enum client_answer { /* what the one control request that may be open has been answered */
 	CLIENT_ANSWER_NONE, CLIENT_ANSWER_WELCOME, CLIENT_ANSWER_LIST_END, CLIENT_ANSWER_PROGRESS, CLIENT_ANSWER_OPENED,
-	CLIENT_ANSWER_STATS, CLIENT_ANSWER_PONG, CLIENT_ANSWER_ERROR,
+	CLIENT_ANSWER_PRESETS_END, CLIENT_ANSWER_STATS, CLIENT_ANSWER_PONG, CLIENT_ANSWER_ERROR,
 };
 
 struct client_frame {
@@ -77,6 +77,11 @@ struct client_frame {
 struct client_list {
 	struct psr_msg_list_entry *entry;
 	uint32_t n, capacity;
+};
+
+struct client_presets {
+	struct psr_msg_preset *preset; /* PSR_WIRE_MAX_PRESETS of each kind fit */
+	uint32_t n[PSR_WIRE_PRESET_LIGHT + 1]; /* by kind */
 };
 
 struct psr_client {
@@ -95,12 +100,13 @@ struct psr_client {
 	struct client_assembly done; /* of the last event */
 	struct psr_msg_frame_end end;
 	struct psr_msg_rect rect;
-	/* the control request: LIST, OPEN, STATS or PING */
+	/* the control request: LIST, OPEN, PRESETS, STATS or PING */
 	uint32_t control_id;
 	uint16_t control_type;
 	enum client_answer answer;
 	struct psr_error control_error;
 	struct client_list list;
+	struct client_presets presets;
 	struct psr_msg_progress progress;
 	struct psr_msg_opened opened;
 	struct psr_msg_stats_reply stats;

@@ -144,6 +144,36 @@ int psr_client_open(struct psr_client *client, const char *name,
 	return code;
 }
 
+int psr_client_presets(struct psr_client *client, uint32_t handle, struct psr_msg_preset **presets, uint32_t *n_presets,
+                       int timeout_ms, struct psr_error *err)
+{
+	struct client_presets *got = &client->presets;
+	const struct psr_msg_presets msg = { .handle = handle };
+	int code;
+
+	if (!(client->welcome.capabilities & PSR_CAP_PRESETS))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server tells no cameras and lights of models (capability bit "
+		                "19)", client->address);
+	code = start_control(client, PSR_MSG_PRESETS, err);
+	if (code != PSR_OK)
+		return code;
+	memset(got->n, 0, sizeof got->n);
+	code = psr_msg_presets_encode(&client->out, client->control_id, &msg, err);
+	if (code != PSR_OK)
+		return withdraw(client, code);
+	code = next_answer(client, timeout_ms, err);
+	if (code != PSR_OK)
+		return code;
+	if (got->n[PSR_WIRE_PRESET_CAMERA] + got->n[PSR_WIRE_PRESET_LIGHT] == 0) {
+		free(got->preset);
+		got->preset = NULL;
+	}
+	*presets = got->preset;
+	*n_presets = got->n[PSR_WIRE_PRESET_CAMERA] + got->n[PSR_WIRE_PRESET_LIGHT];
+	memset(got, 0, sizeof *got);
+	return PSR_OK;
+}
+
 int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stats, int timeout_ms,
                      struct psr_error *err)
 {

@@ -9,12 +9,14 @@
 #include <unistd.h>
 #include "base/mem.h"
 #include "file.h"
+#include "pack.h"
 
 #define MAX_NAME 200 /* of a path in an error, so that the sentence after it has room */
 
 struct psr_model {
 	atomic_uint n_refs;
-	int is_mapped;
+	int is_mapped, is_packed;
+	uint64_t file_bytes;
 	size_t n_bytes;
 	const uint8_t *bytes; /* the image */
 	struct content content;
@@ -59,8 +61,24 @@ static const char *short_name(const char *path)
 	return length > MAX_NAME ? path + length - MAX_NAME : path;
 }
 
+static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
+{
+	uint8_t *image = NULL;
+	size_t n_image = 0;
+	int code = pack_open(&image, &n_image, source, err);
+
+	if (code == PSR_OK)
+		code = adopt(out, image, n_image, 0, source->name, err);
+	if (code == PSR_OK) {
+		(*out)->is_packed = 1;
+		(*out)->file_bytes = source->n_bytes;
+	}
+	return code;
+}
+
 /* Opens a regular file that begins as a .psr file; *n_bytes is its size. */
-static int open_file(int *fd, size_t *n_bytes, const char *path, const char *name, struct psr_error *err)
+static int open_file(int *fd, size_t *n_bytes, int *is_packed, const char *path, const char *name,
+                     struct psr_error *err)
 {
 	uint8_t header[FILE_HEADER_BYTES] = { 0 };
 	struct stat st;
@@ -88,24 +106,8 @@ static int open_file(int *fd, size_t *n_bytes, const char *path, const char *nam
 		return code;
 	}
 	*n_bytes = (size_t)st.st_size;
+	*is_packed = pack_is_packed(header);
 	return PSR_OK;
-}
-
-int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)
-{
-	const char *name = short_name(path);
-	size_t n_bytes;
-	uint8_t *bytes;
-	int fd, code;
-
-	code = open_file(&fd, &n_bytes, path, name, err);
-	if (code != PSR_OK)
-		return code;
-	bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
-	if (bytes == MAP_FAILED)
-		code = psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
-	close(fd);
-	return code == PSR_OK ? adopt(out, bytes, n_bytes, 1, name, err) : code;
 }
 
 static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, struct psr_error *err)
@@ -126,27 +128,62 @@ static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, st
 	return PSR_OK;
 }
 
-int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err)
+static int map_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
 {
-	const char *name = short_name(path);
-	size_t n_bytes;
-	uint8_t *bytes;
-	int fd, code;
+	void *bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
 
-	code = open_file(&fd, &n_bytes, path, name, err);
-	if (code != PSR_OK)
-		return code;
-	bytes = psr_alloc_huge(n_bytes);
+	if (bytes == MAP_FAILED)
+		return psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
+	*out = bytes;
+	return PSR_OK;
+}
+
+static int read_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
+{
+	uint8_t *bytes = psr_alloc_huge(n_bytes);
+	int code;
+
 	if (bytes == NULL)
-		code = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
-	else
-		code = read_all(fd, bytes, n_bytes, name, err);
-	close(fd);
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
+	code = read_all(fd, bytes, n_bytes, name, err);
 	if (code != PSR_OK) {
 		psr_free_huge(bytes, n_bytes);
 		return code;
 	}
-	return adopt(out, bytes, n_bytes, 0, name, err);
+	*out = bytes;
+	return PSR_OK;
+}
+
+static int open_model(struct psr_model **out, const char *path, int mapped, struct psr_error *err)
+{
+	const char *name = short_name(path);
+	const uint8_t *bytes = NULL;
+	size_t n_bytes = 0;
+	int fd, is_packed = 0, code = open_file(&fd, &n_bytes, &is_packed, path, name, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (is_packed)
+		code = adopt_packed(out, &(struct pack_source){ .fd = fd, .n_bytes = n_bytes, .name = name }, err);
+	else
+		code = mapped ? map_image(&bytes, fd, n_bytes, name, err) : read_image(&bytes, fd, n_bytes, name, err);
+	close(fd);
+	if (is_packed || code != PSR_OK)
+		return code;
+	code = adopt(out, bytes, n_bytes, mapped, name, err);
+	if (code == PSR_OK)
+		(*out)->file_bytes = n_bytes;
+	return code;
+}
+
+int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)
+{
+	return open_model(out, path, 1, err);
+}
+
+int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err)
+{
+	return open_model(out, path, 0, err);
 }
 
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)
@@ -155,6 +192,9 @@ int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, s
 
 	if (n_bytes == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "the model has no bytes");
+	if (n_bytes >= FILE_HEADER_BYTES && file_check_header(bytes, "the model", NULL) == PSR_OK && pack_is_packed(bytes))
+		return adopt_packed(out, &(struct pack_source){ .fd = -1, .bytes = bytes, .n_bytes = n_bytes,
+		                                                .name = "the model" }, err);
 	copy = psr_alloc_huge(n_bytes);
 	if (copy == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %zu bytes", n_bytes);
@@ -244,6 +284,12 @@ const struct psr_presets *psr_model_presets(const struct psr_model *model)
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16])
 {
 	memcpy(id, model->bytes + HEADER_CONTENT_ID, 16);
+}
+
+uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed)
+{
+	*is_packed = model->is_packed;
+	return model->file_bytes;
 }
 
 uint64_t psr_model_bytes(const struct psr_model *model)

@@ -5,7 +5,9 @@
 #include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "base/mem.h"
 #include "file.h"
+#include "pack.h"
 
 #define MAX_TRIES 100
 
@@ -67,10 +69,8 @@ static int sync_folder(const char *path)
 	return failed ? -1 : 0;
 }
 
-static int fill(int fd, const struct psr_model *model)
+static int fill(int fd, const uint8_t *bytes, size_t n_bytes)
 {
-	size_t n_bytes;
-	const uint8_t *bytes = model_image(model, &n_bytes);
 	int failed = write_all(fd, bytes, n_bytes) != 0 || fsync(fd) != 0, reason = errno;
 
 	if (close(fd) != 0 && !failed) {
@@ -81,18 +81,25 @@ static int fill(int fd, const struct psr_model *model)
 	return failed ? -1 : 0;
 }
 
-int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err)
+/* Before any work is put into what would go there. */
+static int check_place(const char *path, struct psr_error *err)
 {
-	char *temporary = NULL;
 	struct stat st;
-	int fd, code = PSR_OK;
 
 	if (stat(path, &st) == 0 && !S_ISREG(st.st_mode))
 		return psr_fail(err, PSR_ERR_IO, "%.200s: this is not a regular file, and will not be replaced by one", path);
+	return PSR_OK;
+}
+
+static int write_file(const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+{
+	char *temporary = NULL;
+	int fd, code = PSR_OK;
+
 	fd = open_temporary(&temporary, path, err);
 	if (fd < 0)
 		return fd;
-	if (fill(fd, model) != 0)
+	if (fill(fd, bytes, n_bytes) != 0)
 		code = psr_fail(err, PSR_ERR_IO, "%.200s: cannot write the model: %m", path);
 	else if (rename(temporary, path) != 0)
 		code = psr_fail(err, PSR_ERR_IO, "%.200s: cannot give the file its name: %m", path);
@@ -102,5 +109,30 @@ int psr_model_write(const struct psr_model *model, const char *path, struct psr_
 	if (code != PSR_OK)
 		unlink(temporary);
 	free(temporary);
+	return code;
+}
+
+int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err)
+{
+	size_t n_bytes;
+	const uint8_t *bytes = model_image(model, &n_bytes);
+	int code = check_place(path, err);
+
+	return code == PSR_OK ? write_file(path, bytes, n_bytes, err) : code;
+}
+
+int psr_model_write_packed(const struct psr_model *model, const char *path, struct psr_error *err)
+{
+	size_t n_image, n_bytes, capacity;
+	const uint8_t *image = model_image(model, &n_image);
+	uint8_t *bytes;
+	int code = check_place(path, err);
+
+	if (code == PSR_OK)
+		code = pack_image(&bytes, &n_bytes, &capacity, image, n_image, err);
+	if (code != PSR_OK)
+		return code;
+	code = write_file(path, bytes, n_bytes, err);
+	psr_free_huge(bytes, capacity);
 	return code;
 }

@@ -1,8 +1,8 @@
-/* Any bytes as a .psr file: as they are, and with their hashes put right, since no mutation would come past those.
+/* Any bytes as a .psr file, plain or packed: as they are, and with their hashes put right, since no mutation would come past those.
  * Properties: what is taken obeys the rules that readers rely on, and the same model made again from its arrays is
  * taken too and holds the same. */
 #include <stdlib.h>
-#include "../../libpsr/model/file.h"
+#include "../../libpsr/model/pack.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 
@@ -76,6 +76,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 	REQUIRE((code == PSR_OK) == (model != NULL) && code == err.code && (code == PSR_OK) == (err.text[0] == 0));
 	psr_model_unref(model);
 
+	if (n >= FILE_HEADER_BYTES && pack_is_packed(copy)) {
+		model = NULL;
+		pack_seal(copy, n);
+		if (psr_model_parse(&model, copy, n, NULL) == PSR_OK)
+			check_rules(psr_model_blocks(model));
+		psr_model_unref(model);
+		free(copy);
+		return 0;
+	}
 	file_seal(copy, n);
 	err = (struct psr_error){ 0, "" };
 	code = file_parse(copy, n, "input", &content, &err);

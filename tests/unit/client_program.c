@@ -43,6 +43,10 @@ static uint8_t color_at(uint32_t x, uint32_t y, int c)
 	return (uint8_t)(x * 3 + y * 5 + (uint32_t)c * 70);
 }
 
+/* Of any session. */
+static pthread_mutex_t last_lock = PTHREAD_MUTEX_INITIALIZER;
+static struct psr_msg_scene last_scene;
+
 static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame *asked)
 {
 	static const char *const text = "the scene is on fire";
@@ -123,10 +127,33 @@ static void put_opened(struct session *s, uint32_t id)
 	psr_msg_opened_encode(&s->buf, id, &opened, NULL);
 }
 
+/* Two cameras and two lights; none of model "slow". */
+static void put_presets(struct session *s, uint32_t id)
+{
+	static const struct psr_msg_preset presets[4] = {
+		{ .kind = PSR_WIRE_PRESET_CAMERA, .name = "front",
+		  .camera = { PSR_WIRE_CAMERA_PERSPECTIVE, { 0, 0, 7 }, { 0, 0, 0 }, { 0, 1, 0 }, 0.5, 0.25 } },
+		{ .kind = PSR_WIRE_PRESET_CAMERA, .name = "plan",
+		  .camera = { PSR_WIRE_CAMERA_ORTHOGRAPHIC, { 0, 9, 0 }, { 0, 0, 0 }, { 0, 0, -1 }, 4, 0 } },
+		{ .kind = PSR_WIRE_PRESET_LIGHT, .name = "sun",
+		  .light = { .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .color = { 255, 240, 200 }, .intensity = 3,
+		             .direction = { 0, -1, 0 } } },
+		{ .kind = PSR_WIRE_PRESET_LIGHT, .name = "the lamp",
+		  .light = { .kind = PSR_WIRE_LIGHT_POINT, .color = { 255, 255, 255 }, .intensity = 40, .position = { 1, 2, 3 },
+		             .reference = 1 } },
+	};
+	int has_some = strcmp(s->model, "slow") != 0;
+
+	for (int i = 0; i < 4 && has_some; i++)
+		psr_msg_preset_encode(&s->buf, id, &presets[i], NULL);
+	psr_msg_presets_end_encode(&s->buf, id, &(struct psr_msg_presets_end){ has_some ? 2 : 0, has_some ? 2 : 0 }, NULL);
+}
+
 /* 0: the client is gone. */
 static int answer(struct session *s, const struct psr_message *message)
 {
 	const struct psr_msg_welcome welcome = { .minor = PSR_PROTO_MINOR,
+		                                     .capabilities = PSR_CAP_PRESETS,
 		                                     .max_message = 65536,
 		                                     .max_side = 64,
 		                                     .max_pixels = 4096,
@@ -153,9 +180,15 @@ static int answer(struct session *s, const struct psr_message *message)
 		memcpy(s->model, open.name, sizeof s->model);
 		put_opened(s, message->id);
 		break;
+	case PSR_MSG_PRESETS:
+		put_presets(s, message->id);
+		break;
 	case PSR_MSG_SCENE:
 		if (psr_msg_scene_decode(&s->scene, message->payload, message->n, NULL) != PSR_OK)
 			return 0;
+		pthread_mutex_lock(&last_lock);
+		last_scene = s->scene;
+		pthread_mutex_unlock(&last_lock);
 		break;
 	case PSR_MSG_FRAME:
 		if (psr_msg_frame_decode(&frame, message->payload, message->n, NULL) != PSR_OK)
@@ -291,6 +324,75 @@ static void list_prints_a_table_and_json(void **state)
 	cJSON_Delete(list);
 }
 
+static void list_prints_cameras_and_lights_of_a_model(void **state)
+{
+	cJSON *list;
+
+	(void)state;
+	assert_int_equal(psr("list --presets cube"), 0);
+	assert_string_equal(out, "camera  perspective   front\ncamera  orthographic  plan\n"
+	                         "light   directional   sun\nlight   point         the lamp\n");
+	assert_int_equal(psr("list --presets cube --json"), 0);
+	list = cJSON_Parse(out);
+	assert_int_equal(cJSON_GetArraySize(list), 4);
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 3), "name")->valuestring, "the lamp");
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 3), "kind")->valuestring, "light");
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 3), "type")->valuestring, "point");
+	cJSON_Delete(list);
+	assert_int_equal(psr("list --presets slow"), 0);
+	assert_string_equal(out, "");
+}
+
+/* `psr ARGS` draws; the scene that it sent, and its camera by the report. */
+static cJSON *draw_for_camera(const char *args, struct psr_msg_scene *scene)
+{
+	static char text[1 << 16];
+	cJSON *report;
+
+	assert_int_equal(psr(args), 0);
+	pthread_mutex_lock(&last_lock);
+	*scene = last_scene;
+	pthread_mutex_unlock(&last_lock);
+	read_back("p.json", text, sizeof text);
+	report = cJSON_Parse(text);
+	assert_non_null(report);
+	return report;
+}
+
+static void shot_takes_cameras_and_lights_of_the_model(void **state)
+{
+	static struct psr_msg_scene scene;
+	cJSON *report, *camera;
+
+	(void)state;
+	report = draw_for_camera("shot --model cube --size 20x10 --camera front --report p.json --light dir:0,0,-1 "
+	                         "--light 'preset:the lamp'", &scene);
+	camera = cJSON_GetObjectItem(report, "camera");
+	assert_true(cJSON_GetArrayItem(cJSON_GetObjectItem(camera, "eye"), 2)->valuedouble == 7);
+	assert_string_equal(cJSON_GetObjectItem(camera, "kind")->valuestring, "perspective");
+	cJSON_Delete(report);
+	assert_int_equal(scene.n_lights, 2);
+	assert_int_equal(scene.light[0].kind, PSR_WIRE_LIGHT_DIRECTIONAL);
+	assert_int_equal(scene.light[1].kind, PSR_WIRE_LIGHT_POINT);
+	assert_true(scene.light[1].intensity == 40 && scene.light[1].position[1] == 2);
+
+	report = draw_for_camera("shot --model cube --size 20x10 --camera plan --report p.json --lights model", &scene);
+	camera = cJSON_GetObjectItem(report, "camera");
+	assert_string_equal(cJSON_GetObjectItem(camera, "kind")->valuestring, "orthographic");
+	assert_true(cJSON_GetObjectItem(camera, "height")->valuedouble == 4);
+	cJSON_Delete(report);
+	assert_int_equal(scene.n_lights, 2);
+	assert_memory_equal(scene.light[0].color, ((const uint8_t[]){ 255, 240, 200 }), 3);
+	assert_true(scene.light[0].intensity == 3 && scene.light[1].reference == 1);
+
+	/* A camera alone: the light is that of every picture for which nobody asked for one. */
+	report = draw_for_camera("shot --model cube --size 20x10 --camera front --report p.json", &scene);
+	cJSON_Delete(report);
+	assert_int_equal(scene.n_lights, 1);
+	assert_int_equal(scene.light[0].kind, PSR_WIRE_LIGHT_DIRECTIONAL);
+	assert_true(scene.light[0].intensity == 1);
+}
+
 static void shot_writes_what_was_asked_for_and_prints_nothing(void **state)
 {
 	png_image image = { .version = PNG_IMAGE_VERSION };
@@ -357,6 +459,14 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 		{ "shot --model cube -o x.png --codec jpeg:200", 2, "jpeg:200" },
 		{ "shot --model cube -o x.png --fov 30 --ortho 2", 2, "exclude" },
 		{ "shot --model cube -o x --size 8x8", 2, "ending" },
+		{ "shot --model cube -o x.png --camera front --eye 1,2,3", 2, "excludes --eye" },
+		{ "shot --model cube -o x.png --camera front --fov 30", 2, "excludes --eye" },
+		{ "shot --model cube -o x.png --camera back", 3, "no camera 'back' came with the model; there are 'front', 'plan'" },
+		{ "shot --model cube -o x.png --light preset:moon", 3, "there are 'sun', 'the lamp'" },
+		{ "shot --model slow -o x.png --camera front", 3, "the model came without cameras" },
+		{ "shot --model slow -o x.png --lights model", 3, "the model came without lights" },
+		{ "shot --model cube -o x.png --lights all", 2, "takes 'model', not 'all'" },
+		{ "list --presets nothing", 3, "no model of this name" },
 		{ "shot --model cube -o no/x.png --size 8x8", 3, "no/x.png" },
 		{ "shot --model cube -o x.png --light dir:0,-1,0,shadow", 4, "no shadows" },
 		{ "shot --model nothing -o x.png", 3, "no model of this name" },
@@ -418,6 +528,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(list_prints_a_table_and_json),
+		cmocka_unit_test(list_prints_cameras_and_lights_of_a_model),
+		cmocka_unit_test(shot_takes_cameras_and_lights_of_the_model),
 		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
 		cmocka_unit_test(report_has_the_numbers_of_the_frame),
 		cmocka_unit_test(failures_have_their_exit_status_and_leave_no_file),

@@ -116,6 +116,7 @@ static void stop(struct psr_client *client)
 static void welcome(struct peer *p)
 {
 	const struct psr_msg_welcome msg = { .minor = PSR_PROTO_MINOR,
+		                                 .capabilities = PSR_CAP_PRESETS,
 		                                 .max_message = 65536,
 		                                 .max_side = 16384,
 		                                 .max_pixels = 1 << 20,
@@ -213,6 +214,7 @@ static void serve_all(struct peer *p)
 		.handle = 7, .representations = 2, .scale = 1, .spacing = 0.1, .resolution = 1, .n_levels = 1
 	};
 	struct psr_msg_stats_reply stats = { 1, { { PSR_STAT_FRAMES, 42 } } };
+	struct psr_msg_preset light = { .kind = PSR_WIRE_PRESET_LIGHT, .light = { .kind = PSR_WIRE_LIGHT_POINT } };
 	struct psr_msg_ping ping = { 99 };
 	struct psr_message message;
 	uint32_t id;
@@ -229,6 +231,16 @@ static void serve_all(struct peer *p)
 	flush(p);
 	expect(p, PSR_MSG_PONG, &message);
 	psr_msg_opened_encode(&p->buf, id, &opened, NULL);
+	flush(p);
+	id = expect(p, PSR_MSG_PRESETS, &message);
+	for (int i = 0; i < PSR_WIRE_MAX_PRESETS; i++) {
+		snprintf(light.name, sizeof light.name, "light %d", i);
+		psr_msg_preset_encode(&p->buf, id, &light, NULL);
+	}
+	psr_msg_presets_end_encode(&p->buf, id, &(struct psr_msg_presets_end){ 0, PSR_WIRE_MAX_PRESETS }, NULL);
+	flush(p);
+	id = expect(p, PSR_MSG_PRESETS, &message);
+	psr_msg_presets_end_encode(&p->buf, id, &(struct psr_msg_presets_end){ 0, 0 }, NULL);
 	flush(p);
 	id = expect(p, PSR_MSG_STATS, &message);
 	psr_msg_stats_reply_encode(&p->buf, id, &stats, NULL);
@@ -251,6 +263,7 @@ static void session_works_for_any_split_of_the_bytes(void **state)
 		struct psr_msg_list_entry *entries;
 		struct psr_msg_stats_reply stats;
 		struct psr_msg_opened opened;
+		struct psr_msg_preset *presets;
 		struct psr_client *client;
 		struct psr_error err;
 		uint32_t n;
@@ -266,6 +279,13 @@ static void session_works_for_any_split_of_the_bytes(void **state)
 		assert_int_equal(psr_client_open(client, "bunny", count_progress, &n_progress, TIMEOUT, &opened, &err), PSR_OK);
 		assert_int_equal(opened.handle, 7);
 		assert_int_equal(n_progress, 1);
+		assert_int_equal(psr_client_presets(client, 7, &presets, &n, TIMEOUT, &err), PSR_OK);
+		assert_int_equal(n, PSR_WIRE_MAX_PRESETS);
+		assert_string_equal(presets[n - 1].name, "light 255");
+		free(presets);
+		assert_int_equal(psr_client_presets(client, 7, &presets, &n, TIMEOUT, &err), PSR_OK);
+		assert_int_equal(n, 0);
+		assert_null(presets);
 		assert_int_equal(psr_client_stats(client, &stats, TIMEOUT, &err), PSR_OK);
 		assert_int_equal(stats.stat[0].value, 42);
 		stop(client);
@@ -599,6 +619,42 @@ static void huge_length(struct peer *p)
 	p->buf.size += 16;
 }
 
+/* ---- presets ---- */
+
+static int presets_lie; /* 0: one light more than there can be; 1: END counts another number; 2: they are of no request */
+
+static void serve_wrong_presets(struct peer *p)
+{
+	const struct psr_msg_preset light = { .kind = PSR_WIRE_PRESET_LIGHT, .light = { .kind = PSR_WIRE_LIGHT_POINT },
+		                                  .name = "x" };
+	struct psr_message message;
+	uint32_t id;
+
+	welcome(p);
+	id = expect(p, PSR_MSG_PRESETS, &message);
+	for (int i = 0; i < (presets_lie == 0 ? PSR_WIRE_MAX_PRESETS + 1 : 1); i++)
+		psr_msg_preset_encode(&p->buf, presets_lie == 2 ? id + 1 : id, &light, NULL);
+	psr_msg_presets_end_encode(&p->buf, id, &(struct psr_msg_presets_end){ 1, 1 }, NULL);
+	flush(p);
+	expect(p, PSR_MSG_GOODBYE, &message);
+}
+
+static void wrong_presets_end_the_connection(void **state)
+{
+	(void)state;
+	for (presets_lie = 0; presets_lie < 3; presets_lie++) {
+		struct psr_msg_preset *presets = NULL;
+		struct psr_client *client;
+		uint32_t n;
+
+		start(serve_wrong_presets, 65536);
+		client = connected();
+		assert_int_equal(psr_client_presets(client, 1, &presets, &n, TIMEOUT, NULL), PSR_ERR_PROTOCOL);
+		assert_null(presets);
+		stop(client);
+	}
+}
+
 static void violations_end_the_connection(void **state)
 {
 	static void (*const scripts[])(struct peer *) = {
@@ -779,6 +835,7 @@ int main(void)
 		cmocka_unit_test(what_is_no_psrd_is_told_apart),
 		cmocka_unit_test(nobody_there_is_a_connection_error),
 		cmocka_unit_test(silent_server_is_given_up_and_a_busy_one_is_not),
+		cmocka_unit_test(wrong_presets_end_the_connection),
 		cmocka_unit_test(violations_end_the_connection),
 		cmocka_unit_test(wrong_hash_fails_the_frame_only),
 		cmocka_unit_test(closing_at_any_byte_is_an_error_and_no_hang),

@@ -14,6 +14,10 @@
 #include "model_fixture.h"
 
 static char folder[32], path[64];
+
+static int (*const writers[])(const struct psr_model *, const char *, struct psr_error *) = {
+	psr_model_write, psr_model_write_packed,
+};
 static struct psr_model *one, *two; /* of different content */
 
 static int setup(void **state)
@@ -111,21 +115,24 @@ static void full_disk_leaves_the_old_file_and_nothing_else(void **state)
 {
 	struct rlimit limit, low;
 	struct psr_error err;
-	int code;
 
 	(void)state;
-	assert_int_equal(psr_model_write(one, path, NULL), PSR_OK);
-	assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
-	signal(SIGXFSZ, SIG_IGN);
-	low = (struct rlimit){ .rlim_cur = 1000, .rlim_max = limit.rlim_max };
-	assert_int_equal(setrlimit(RLIMIT_FSIZE, &low), 0);
-	code = psr_model_write(two, path, &err);
-	assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
-	signal(SIGXFSZ, SIG_DFL);
-	assert_int_equal(code, PSR_ERR_IO);
-	assert_non_null(strstr(err.text, "cannot write the model: File too large"));
-	assert_holds(one);
-	assert_int_equal(count_files(), 1);
+	for (int i = 0; i < 2; i++) {
+		int code;
+
+		assert_int_equal(psr_model_write(one, path, NULL), PSR_OK);
+		assert_int_equal(getrlimit(RLIMIT_FSIZE, &limit), 0);
+		signal(SIGXFSZ, SIG_IGN);
+		low = (struct rlimit){ .rlim_cur = 1000, .rlim_max = limit.rlim_max };
+		assert_int_equal(setrlimit(RLIMIT_FSIZE, &low), 0);
+		code = writers[i](two, path, &err);
+		assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
+		signal(SIGXFSZ, SIG_DFL);
+		assert_int_equal(code, PSR_ERR_IO);
+		assert_non_null(strstr(err.text, "cannot write the model: File too large"));
+		assert_holds(one);
+		assert_int_equal(count_files(), 1);
+	}
 }
 
 static void devices_and_folders_are_never_replaced(void **state)
@@ -134,11 +141,13 @@ static void devices_and_folders_are_never_replaced(void **state)
 	struct stat st;
 
 	(void)state;
-	assert_int_equal(psr_model_write(one, "/dev/full", &err), PSR_ERR_IO);
-	assert_int_equal(stat("/dev/full", &st), 0);
-	assert_true(S_ISCHR(st.st_mode));
-	assert_int_equal(psr_model_write(one, folder, &err), PSR_ERR_IO);
-	assert_non_null(strstr(err.text, "this is not a regular file"));
+	for (int i = 0; i < 2; i++) {
+		assert_int_equal(writers[i](one, "/dev/full", &err), PSR_ERR_IO);
+		assert_int_equal(stat("/dev/full", &st), 0);
+		assert_true(S_ISCHR(st.st_mode));
+		assert_int_equal(writers[i](one, folder, &err), PSR_ERR_IO);
+		assert_non_null(strstr(err.text, "this is not a regular file"));
+	}
 }
 
 static void missing_folder_is_an_error_with_the_path(void **state)
@@ -148,9 +157,11 @@ static void missing_folder_is_an_error_with_the_path(void **state)
 
 	(void)state;
 	snprintf(nowhere, sizeof nowhere, "%s/none/m.psr", folder);
-	assert_int_equal(psr_model_write(one, nowhere, &err), PSR_ERR_IO);
-	assert_non_null(strstr(err.text, nowhere));
-	assert_non_null(strstr(err.text, "No such file or directory"));
+	for (int i = 0; i < 2; i++) {
+		assert_int_equal(writers[i](one, nowhere, &err), PSR_ERR_IO);
+		assert_non_null(strstr(err.text, nowhere));
+		assert_non_null(strstr(err.text, "No such file or directory"));
+	}
 }
 
 static void new_files_have_the_permissions_of_the_umask(void **state)

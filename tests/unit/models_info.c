@@ -139,7 +139,7 @@ static void text_names_samples_and_content_id(void **state)
 	assert_non_null(strstr(text, "\nculling loss      1 of 1,000,000 pixels of the visible surface are lost (0.0001 %)\n"));
 	assert_non_null(strstr(text, "\n  perspective     front\n  orthographic    S\303\274dwand\n"));
 	assert_non_null(strstr(text, "\n  level 1         36 samples in 1 blocks\n"));
-	assert_non_null(strstr(text, " of all levels, all overhead included\n"));
+	assert_non_null(strstr(text, " of all levels, all overhead included; "));
 	free(text);
 }
 

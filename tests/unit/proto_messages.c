@@ -210,6 +210,8 @@ static void make_end(struct psr_msg_frame_end *m)
 
 static void make(unsigned type, union proto_any *m)
 {
+	struct psr_msg_frame frame = { .slot = 0 };
+
 	memset(m, 0, sizeof *m);
 	switch (type) {
 	case PSR_MSG_HELLO:
@@ -241,6 +243,21 @@ static void make(unsigned type, union proto_any *m)
 		m->opened.n_levels = 1 + below(20);
 		m->opened.n_samples = random64() >> 11;
 		break;
+	case PSR_MSG_PRESET:
+		m->preset.kind = (uint8_t)(1 + below(2));
+		m->preset.name[0] = 'x';
+		make_text(m->preset.name + 1, 254);
+		if (m->preset.kind == PSR_WIRE_PRESET_CAMERA) {
+			make_frame(&frame);
+			m->preset.camera = frame.camera;
+		} else {
+			m->preset.light.kind = PSR_WIRE_LIGHT_POINT;
+			m->preset.light.color[below(3)] = (uint8_t)below(256);
+			m->preset.light.intensity = 1e6 * unit();
+			lengths(m->preset.light.position);
+			m->preset.light.reference = fabs(length());
+		}
+		break;
 	case PSR_MSG_SCENE: make_scene(&m->scene); break;
 	case PSR_MSG_FRAME: make_frame(&m->frame); break;
 	case PSR_MSG_FRAME_BEGIN: make_begin(&m->frame_begin); break;
@@ -253,12 +270,12 @@ static void make(unsigned type, union proto_any *m)
 static void random_messages_come_back(void **state)
 {
 	static const unsigned types[] = { PSR_MSG_HELLO, PSR_MSG_ERROR, PSR_MSG_OPEN, PSR_MSG_OPENED, PSR_MSG_SCENE,
-		PSR_MSG_FRAME, PSR_MSG_FRAME_BEGIN, PSR_MSG_RECT, PSR_MSG_FRAME_END };
+		PSR_MSG_FRAME, PSR_MSG_FRAME_BEGIN, PSR_MSG_RECT, PSR_MSG_FRAME_END, PSR_MSG_PRESET };
 
 	(void)state;
 	random_state = 11;
 	for (int round = 0; round < 2000; round++) {
-		const struct proto_case *kind = proto_case_of(types[round % 9]);
+		const struct proto_case *kind = proto_case_of(types[round % 10]);
 		struct psr_buf out = { bytes, 0, sizeof bytes };
 		struct psr_error err = { 0, "" };
 		uint8_t *exact;

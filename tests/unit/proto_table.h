@@ -17,6 +17,9 @@ union proto_any {
 	struct psr_msg_progress progress;
 	struct psr_msg_opened opened;
 	struct psr_msg_close close;
+	struct psr_msg_presets presets;
+	struct psr_msg_preset preset;
+	struct psr_msg_presets_end presets_end;
 	struct psr_msg_scene scene;
 	struct psr_msg_frame frame;
 	struct psr_msg_frame_begin frame_begin;
@@ -78,14 +81,14 @@ struct proto_case {
 	}
 PLAIN_ENCODE(hello) PLAIN_ENCODE(welcome) PLAIN_ENCODE(goodbye) PLAIN_ENCODE(ping) PLAIN_ENCODE(pong)
 ID_ENCODE(list_entry) ID_ENCODE(list_end) ID_ENCODE(open) ID_ENCODE(progress) ID_ENCODE(opened) ID_ENCODE(close)
-ID_ENCODE(scene) ID_ENCODE(stats_reply)
+ID_ENCODE(presets) ID_ENCODE(preset) ID_ENCODE(presets_end) ID_ENCODE(scene) ID_ENCODE(stats_reply)
 VIEW_ENCODE(error) VIEW_ENCODE(frame) VIEW_ENCODE(frame_begin) VIEW_ENCODE(rect) VIEW_ENCODE(frame_end)
 VIEW_ENCODE(superseded) VIEW_ENCODE(ack)
 EMPTY(list, id) EMPTY(cancelled, id, view) EMPTY(cancel, id, view) EMPTY(pause, view) EMPTY(resume, view)
 EMPTY(stats, id)
 DECODE(hello) DECODE(welcome) DECODE(goodbye) DECODE(ping) DECODE(error) DECODE(list_entry) DECODE(list_end)
 DECODE(open) DECODE(progress) DECODE(opened) DECODE(close) DECODE(scene) DECODE(frame) DECODE(frame_begin) DECODE(rect)
-DECODE(frame_end) DECODE(superseded) DECODE(ack) DECODE(stats_reply)
+DECODE(presets) DECODE(preset) DECODE(presets_end) DECODE(frame_end) DECODE(superseded) DECODE(ack) DECODE(stats_reply)
 
 #define AT(type, name, kind) { #name, kind, offsetof(struct psr_msg_##type, name), 1, NULL, 0 }
 #define ARRAY(type, name, kind, n) { #name, kind, offsetof(struct psr_msg_##type, name), n, NULL, 0 }
@@ -133,6 +136,14 @@ static const struct proto_field fields_scene[] = { AT(scene, slot, F_U16), AT(sc
 	AT(type, color_codec, F_U8), AT(type, color_quality, F_U8), AT(type, depth_format, F_U8), \
 	AT(type, depth_codec, F_U8), AT(type, data_codec, F_U8), AT(type, settings.scale, F_U8), \
 	AT(type, settings.spacing_px, F_F64), AT(type, base, F_U32)
+#define LIGHT(type) AT(type, light.kind, F_U8), AT(type, light.flags, F_U8), ARRAY(type, light.color, F_U8, 3), \
+	AT(type, light.intensity, F_F64), ARRAY(type, light.position, F_F64, 3), ARRAY(type, light.direction, F_F64, 3), \
+	AT(type, light.inner, F_F64), AT(type, light.outer, F_F64), AT(type, light.reference, F_F64)
+static const struct proto_field fields_presets[] = { AT(presets, handle, F_U32), END };
+static const struct proto_field fields_preset[] = { AT(preset, kind, F_U8), CAMERA(preset), LIGHT(preset),
+	AT(preset, name, F_TEXT), END };
+static const struct proto_field fields_presets_end[] = { AT(presets_end, n_cameras, F_U32),
+	AT(presets_end, n_lights, F_U32), END };
 static const struct proto_field fields_frame[] = { AT(frame, slot, F_U16), AT(frame, pass_limit, F_U16),
 	PICTURE(frame), AT(frame, budget, F_U8), AT(frame, time_budget_us, F_U64), AT(frame, error_bound_px, F_F64),
 	CAMERA(frame), END };
@@ -163,7 +174,8 @@ static const struct proto_case proto_cases[] = {
 	CASE(HELLO, hello), CASE(WELCOME, welcome), CASE(GOODBYE, goodbye), CASE(PING, ping),
 	{ PSR_MSG_PONG, encode_pong, decode_ping, fields_ping }, CASE(ERROR, error), BARE(LIST, list),
 	CASE(LIST_ENTRY, list_entry), CASE(LIST_END, list_end), CASE(OPEN, open), CASE(PROGRESS, progress),
-	CASE(OPENED, opened), CASE(CLOSE, close), CASE(SCENE, scene), CASE(FRAME, frame), CASE(FRAME_BEGIN, frame_begin),
+	CASE(OPENED, opened), CASE(CLOSE, close), CASE(PRESETS, presets), CASE(PRESET, preset),
+	CASE(PRESETS_END, presets_end), CASE(SCENE, scene), CASE(FRAME, frame), CASE(FRAME_BEGIN, frame_begin),
 	CASE(RECT, rect), CASE(FRAME_END, frame_end), CASE(SUPERSEDED, superseded), BARE(CANCELLED, cancelled),
 	CASE(ACK, ack), BARE(CANCEL, cancel), BARE(PAUSE, pause), BARE(RESUME, resume), BARE(STATS, stats),
 	CASE(STATS_REPLY, stats_reply),

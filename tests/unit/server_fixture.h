@@ -57,7 +57,8 @@ static inline void file_write(const char *folder, const char *name, const void *
 #define PLATE_BLOCKS 64
 #define PLATE_SAMPLES (64 * PLATE_BLOCKS)
 
-/* A plate in the plane z = 0, 8x8 full blocks, x from -0.5 to 0.5, of one color, facing +z. */
+/* A plate in the plane z = 0, 8x8 full blocks, x from -0.5 to 0.5, of one color, facing +z. It comes with a camera,
+ * 'front', and lights 'lamp', 'dim' (too narrow a spot for the wire) and 'sun'. */
 static inline struct psr_model *plate_create(uint32_t rgb)
 {
 	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, .spacing = 1.0f / 64 };
@@ -79,6 +80,14 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 		.block_projection = number, .col = col, .row = row, .level = level, .flags = flags, .depth_bias = bias,
 		.depth_step = step, .mask = mask, .attr_first = first, .depth = depth, .attr = attr,
 	};
+	static const struct psr_preset_camera camera = { "front", { { 0, 0, 3 }, { 0, 0, 0 }, { 0, 1, 0 },
+		                                                        PSR_CAMERA_PERSPECTIVE, 0.5, 0, 0.25 } };
+	static const struct psr_preset_light light[3] = {
+		{ "lamp", { .kind = PSR_LIGHT_POINT, .position = { 1, 2, 3 }, .color = { 2e6, 1e6, 0 }, .reference = 1 } },
+		{ "dim", { .kind = PSR_LIGHT_SPOT, .position = { 1, 2, 3 }, .direction = { 0, 0, -1 }, .outer = 1e-7 } },
+		{ "sun", { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { 0, 0, -1 }, .color = { 3, 3, 3 } } },
+	};
+	const struct psr_presets presets = { .n_cameras = 1, .n_lights = 3, .camera = &camera, .light = light };
 	struct psr_model *model = NULL;
 	struct psr_error error = { 0 };
 	const float side = 8.0f / 64, height = side * 0.8660254f;
@@ -96,7 +105,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	}
 	for (int i = 0; i < PLATE_SAMPLES; i++)
 		attr[i] = (uint64_t)1 << 15 | (uint64_t)rgb << 16; /* unlit */
-	assert_int_equal(psr_model_create(&model, &info, &blocks, NULL, &error), PSR_OK);
+	assert_int_equal(psr_model_create(&model, &info, &blocks, &presets, &error), PSR_OK);
 	return model;
 }
 

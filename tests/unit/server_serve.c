@@ -37,7 +37,7 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_BUILD);
+	assert_int_equal(welcome.capabilities, PSR_CAP_BUILD | PSR_CAP_PRESETS);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -390,6 +390,52 @@ static void unknown_names_and_handles_are_not_found(void **state)
 	free(scene);
 }
 
+static uint32_t ask_presets(uint32_t handle)
+{
+	assert_int_equal(psr_msg_presets_encode(&p.buf, ++p.id, &(struct psr_msg_presets){ handle }, NULL), PSR_OK);
+	peer_send(&p);
+	return p.id;
+}
+
+static void cameras_and_lights_of_a_model_are_told(void **state)
+{
+	struct psr_msg_opened opened;
+	struct psr_msg_preset got[3];
+	struct psr_msg_presets_end end;
+	struct psr_message message;
+	uint32_t id;
+
+	(void)state;
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
+	id = ask_presets(opened.handle);
+	for (int i = 0; i < 3; i++) {
+		peer_expect(&p, &message, PSR_MSG_PRESET, id);
+		assert_int_equal(psr_msg_preset_decode(&got[i], message.payload, message.n, NULL), PSR_OK);
+	}
+	peer_expect(&p, &message, PSR_MSG_PRESETS_END, id);
+	assert_int_equal(psr_msg_presets_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
+	assert_true(end.n_cameras == 1 && end.n_lights == 2);
+	assert_int_equal(got[0].kind, PSR_WIRE_PRESET_CAMERA);
+	assert_string_equal(got[0].name, "front");
+	assert_int_equal(got[0].camera.kind, PSR_WIRE_CAMERA_PERSPECTIVE);
+	assert_true(got[0].camera.eye[2] == 3 && got[0].camera.up[1] == 1);
+	assert_true(got[0].camera.extent == 0.5 && got[0].camera.near_z == 0.25);
+	/* Half of the intensity in linear light is code 188; the wire's intensity ends at a million. */
+	assert_string_equal(got[1].name, "lamp");
+	assert_int_equal(got[1].light.kind, PSR_WIRE_LIGHT_POINT);
+	assert_memory_equal(got[1].light.color, ((const uint8_t[]){ 255, 188, 0 }), 3);
+	assert_true(got[1].light.intensity == 1e6 && got[1].light.reference == 1 && got[1].light.position[2] == 3);
+	assert_string_equal(got[2].name, "sun");
+	assert_memory_equal(got[2].light.color, ((const uint8_t[]){ 255, 255, 255 }), 3);
+	assert_true(got[2].light.intensity == 3 && got[2].light.direction[2] == -1);
+	/* Another handle, and the connection goes on. */
+	peer_expect_error(&p, ask_presets(opened.handle + 1), PSR_WIRE_NOT_FOUND, NULL);
+	ask_presets(opened.handle);
+	peer_expect(&p, &message, PSR_MSG_PRESET, p.id);
+	peer_close(&p);
+}
+
 static void scenes_keep_models_that_were_closed(void **state)
 {
 	struct psr_msg_close close_handle = { .handle = 1 };
@@ -461,6 +507,7 @@ int main(void)
 		cmocka_unit_test(bad_frames_are_refused_and_the_connection_goes_on),
 		cmocka_unit_test(what_is_not_offered_is_refused_by_name),
 		cmocka_unit_test(unknown_names_and_handles_are_not_found),
+		cmocka_unit_test(cameras_and_lights_of_a_model_are_told),
 		cmocka_unit_test(scenes_keep_models_that_were_closed),
 		cmocka_unit_test(half_a_message_and_the_end_is_forgotten),
 		cmocka_unit_test(random_bytes_behind_hello_never_stop_the_daemon),

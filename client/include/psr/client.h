@@ -53,6 +53,11 @@ int psr_client_open(struct psr_client *client, const char *name,
                     void (*on_progress)(const struct psr_msg_progress *progress, void *userdata), void *userdata,
                     int timeout_ms, struct psr_msg_opened *opened, struct psr_error *err);
 
+/* The cameras and lights that came with an open model; *presets belongs to the caller (free), NULL if there are none.
+ * UNSUPPORTED by an older server. */
+int psr_client_presets(struct psr_client *client, uint32_t handle, struct psr_msg_preset **presets, uint32_t *n_presets,
+                       int timeout_ms, struct psr_error *err);
+
 int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stats, int timeout_ms,
                      struct psr_error *err);
 

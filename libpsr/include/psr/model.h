@@ -138,6 +138,8 @@ const struct psr_presets *psr_model_presets(const struct psr_model *model); /* n
 
 /* XXH128 of the section table (types, versions, lengths, hashes): the same bytes of content, the same id. */
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);
+/* Size of the file that it was opened from, 0 if it was none; *is_packed says which kind. */
+uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed);
 uint64_t psr_model_bytes(const struct psr_model *model); /* memory that it holds, all overhead included */
 
 #ifdef __cplusplus

@@ -48,6 +48,7 @@ enum psr_msg_type {
 	PSR_MSG_HELLO = 1, PSR_MSG_WELCOME = 2, PSR_MSG_GOODBYE = 3, PSR_MSG_PING = 4, PSR_MSG_PONG = 5, PSR_MSG_ERROR = 6,
 	PSR_MSG_LIST = 16, PSR_MSG_LIST_ENTRY = 17, PSR_MSG_LIST_END = 18,
 	PSR_MSG_OPEN = 19, PSR_MSG_PROGRESS = 20, PSR_MSG_OPENED = 21, PSR_MSG_CLOSE = 22,
+	PSR_MSG_PRESETS = 23, PSR_MSG_PRESET = 24, PSR_MSG_PRESETS_END = 25,
 	PSR_MSG_SCENE = 32, PSR_MSG_FRAME = 33, PSR_MSG_FRAME_BEGIN = 34, PSR_MSG_RECT = 35, PSR_MSG_FRAME_END = 36,
 	PSR_MSG_SUPERSEDED = 37, PSR_MSG_CANCELLED = 38, PSR_MSG_ACK = 39, PSR_MSG_CANCEL = 40, PSR_MSG_PAUSE = 41,
 	PSR_MSG_RESUME = 42,
@@ -78,6 +79,7 @@ enum psr_cap {
 	PSR_CAP_BUILD = 1 << 16,       /* OPEN builds source files */
 	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
 	PSR_CAP_PAUSE = 1 << 18,
+	PSR_CAP_PRESETS = 1 << 19,
 };
 
 /* ---- storage and header ---- */
@@ -306,6 +308,30 @@ struct psr_msg_camera { /* world coordinates */
 	                      * orthographic: height of the picture, world units, > 0 */
 	double near_z;       /* >= 0: z' below it is not drawn; 0: chosen from scene and camera */
 };
+
+/* ---- cameras and lights that came with a model ---- */
+
+#define PSR_WIRE_MAX_PRESETS 256 /* of each kind */
+
+struct psr_msg_presets { uint32_t handle; };
+int psr_msg_presets_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets *msg, struct psr_error *err);
+int psr_msg_presets_decode(struct psr_msg_presets *msg, const uint8_t *payload, size_t n, struct psr_error *err);
+
+enum psr_wire_preset_kind { PSR_WIRE_PRESET_CAMERA = 1, PSR_WIRE_PRESET_LIGHT = 2 };
+struct psr_msg_preset { /* object coordinates; the part that the kind has no use for is 0 */
+	uint8_t kind;
+	struct psr_msg_camera camera;
+	struct psr_msg_light light;          /* flags 0 */
+	char name[PSR_WIRE_MAX_NAME + 1];    /* not empty */
+};
+int psr_msg_preset_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_preset *msg, struct psr_error *err);
+int psr_msg_preset_decode(struct psr_msg_preset *msg, const uint8_t *payload, size_t n, struct psr_error *err);
+
+struct psr_msg_presets_end { uint32_t n_cameras, n_lights; }; /* how many were sent */
+int psr_msg_presets_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets_end *msg,
+                               struct psr_error *err);
+int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *payload, size_t n,
+                               struct psr_error *err);
 
 enum psr_wire_plane { /* bits of `planes`, values of `plane` are the bit's number */
 	PSR_WIRE_PLANE_COLOR = 0, PSR_WIRE_PLANE_DEPTH = 1, PSR_WIRE_PLANE_NORMAL = 2, PSR_WIRE_PLANE_ID = 3,

@@ -1,0 +1,191 @@
+#include <assert.h>
+#include <inttypes.h>
+#include <xxhash.h>
+#include <zstd.h>
+#include "base/mem.h"
+#include "pack.h"
+
+static uint64_t get_word(const uint8_t *at, uint32_t stride)
+{
+	uint64_t word = 0;
+
+	memcpy(&word, at, stride);
+	return word;
+}
+
+void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t stride, enum pack_method method)
+{
+	size_t n_words = n_bytes / stride;
+	uint64_t before = 0;
+
+	for (size_t i = 0; i < n_words; i++) {
+		uint64_t word = get_word(chunk + i * stride, stride), value = word;
+
+		if (method == PACK_DIFFERENCES)
+			value = word - before;
+		else if (method == PACK_XOR)
+			value = word ^ before;
+		for (uint32_t k = 0; k < stride; k++)
+			out[k * n_words + i] = (uint8_t)(value >> 8 * k);
+		before = word;
+	}
+	memcpy(out + n_words * stride, chunk + n_words * stride, n_bytes - n_words * stride);
+}
+
+void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t stride, enum pack_method method)
+{
+	size_t n_words = n_bytes / stride;
+	uint64_t before = 0;
+
+	for (size_t i = 0; i < n_words; i++) {
+		uint64_t word = 0;
+
+		for (uint32_t k = 0; k < stride; k++)
+			word |= (uint64_t)in[k * n_words + i] << 8 * k;
+		if (method == PACK_DIFFERENCES)
+			word += before;
+		else if (method == PACK_XOR)
+			word ^= before;
+		memcpy(chunk + i * stride, &word, stride);
+		before = word;
+	}
+	memcpy(chunk + n_words * stride, in + n_words * stride, n_bytes - n_words * stride);
+}
+
+/* Words of what most of a section is. */
+static uint32_t stride_of(const uint8_t *type)
+{
+	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
+		uint32_t item = section_table[k].item_bytes;
+
+		if (memcmp(type, section_table[k].type, 4) == 0)
+			return pack_is_stride(item) ? item : section_table[k].count == COUNT_BLOCKS ? 8 : 4;
+	}
+	return 1;
+}
+
+struct packer {
+	ZSTD_CCtx *context;
+	uint8_t *split, *packed; /* a chunk, and what it can grow to */
+	size_t packed_capacity;
+};
+
+/* Writes the shortest form to `out`, which has room for the chunk itself, and its entry. */
+static uint32_t pack_chunk(const struct packer *p, uint8_t *out, uint8_t *entry, const uint8_t *chunk, size_t n,
+                           uint32_t stride)
+{
+	enum pack_method best = PACK_STORED;
+	size_t length = n;
+
+	memcpy(out, chunk, n);
+	for (enum pack_method method = PACK_PLAIN; method < PACK_N_METHODS; method++) {
+		const uint8_t *bytes = chunk;
+		size_t got;
+
+		if (method == PACK_PLANES && stride == 1)
+			continue;
+		if (method != PACK_PLAIN) {
+			pack_split(p->split, chunk, n, stride, method);
+			bytes = p->split;
+		}
+		got = ZSTD_compressCCtx(p->context, p->packed, p->packed_capacity, bytes, n, PACK_LEVEL);
+		if (!ZSTD_isError(got) && got < length) {
+			best = method;
+			length = got;
+			memcpy(out, p->packed, got);
+		}
+	}
+	file_put(entry + PACK_LENGTH, 4, length);
+	entry[PACK_METHOD] = (uint8_t)best;
+	entry[PACK_STRIDE] = (uint8_t)(best == PACK_STORED || best == PACK_PLAIN ? 1 : stride);
+	file_put(entry + PACK_HASH, 8, XXH64(out, length, 0));
+	return (uint32_t)length;
+}
+
+static int packer_init(struct packer *p)
+{
+	p->packed_capacity = ZSTD_compressBound(FILE_CHUNK_BYTES);
+	p->context = ZSTD_createCCtx();
+	p->split = psr_alloc_array(FILE_CHUNK_BYTES, 1);
+	p->packed = psr_alloc_array(p->packed_capacity, 1);
+	return p->context != NULL && p->split != NULL && p->packed != NULL ? PSR_OK : PSR_ERR_MEMORY;
+}
+
+static void packer_fini(struct packer *p)
+{
+	ZSTD_freeCCtx(p->context);
+	psr_free(p->split);
+	psr_free(p->packed);
+}
+
+/* Where the directory begins, and what follows its last byte. */
+static uint64_t directory_end(const uint8_t *image, uint64_t *directory)
+{
+	uint64_t n_chunks = 0, n_sections = file_get(image + HEADER_N_SECTIONS, 4);
+
+	*directory = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(image + HEADER_N_CHUNKS, 4);
+	for (uint64_t i = 0; i < n_sections; i++)
+		n_chunks += pack_chunks(file_get(image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8));
+	return *directory + PACK_ENTRY_BYTES * n_chunks;
+}
+
+/* Directory and chunks; from chunk `n_packed` on they are stored. Returns the size of the file. */
+static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8_t *image, uint64_t n_packed)
+{
+	uint64_t directory, at = directory_end(image, &directory), n = 0;
+	uint8_t *next = out + directory;
+
+	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++) {
+		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
+		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, n++) {
+			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+
+			if (n < n_packed) {
+				at += pack_chunk(p, out + at, next, image + offset + first, size, stride_of(entry + ENTRY_TYPE));
+			} else {
+				memcpy(out + at, image + offset + first, size);
+				file_put(next + PACK_LENGTH, 4, size);
+				next[PACK_METHOD] = PACK_STORED;
+				next[PACK_STRIDE] = 1;
+				file_put(next + PACK_HASH, 8, XXH64(out + at, size, 0));
+				at += size;
+			}
+			next += PACK_ENTRY_BYTES;
+		}
+	}
+	return at;
+}
+
+int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,
+               struct psr_error *err)
+{
+	struct packer packer = { 0 };
+	uint64_t directory, end = directory_end(image, &directory), n_packed = (end - directory) / PACK_ENTRY_BYTES;
+	uint64_t size;
+	uint8_t *bytes;
+
+	*capacity = n_image + (end - directory);
+	bytes = psr_alloc_huge(*capacity);
+	if (bytes == NULL || packer_init(&packer) != PSR_OK) {
+		packer_fini(&packer);
+		psr_free_huge(bytes, *capacity);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory to pack a model of %zu bytes", n_image);
+	}
+	memcpy(bytes, image, directory);
+	size = pack_chunks_of(&packer, bytes, image, n_packed);
+	/* What repeats itself more than the reader believes has its last chunks stored. */
+	while (pack_max_image(size) < n_image) {
+		assert(n_packed > 0);
+		n_packed -= n_packed / 16 + 1;
+		size = pack_chunks_of(&packer, bytes, image, n_packed);
+	}
+	file_put(bytes + HEADER_PACKING, 4, PACKING_ZSTD);
+	file_put(bytes + HEADER_PACKED_SIZE, 8, size);
+	file_put(bytes + HEADER_HASH, 8, file_header_hash(bytes, end));
+	packer_fini(&packer);
+	*out = bytes;
+	*n_bytes = size;
+	return PSR_OK;
+}
