@@ -13,7 +13,9 @@
 #define SEED UINT64_C(0x5053525354554459)
 #define MOST_TRIES 1000 /* for each place that is wanted */
 #define AWAY 4.0        /* rays begin this far from the place: outside of the unit sphere */
+#define BACK 0.0125f    /* as the renderer's: what faces away by less than normals are quantised to still counts */
 #define RUN 64
+#define FARTHEST 4.0f   /* pixels before a place within which its surface may stand, at grazing angles */
 
 struct trial {
 	float x, y, z, cosine; /* in the frame of the view */
@@ -108,13 +110,15 @@ static void try_places(struct study_trials *trials, struct trial_view *view, con
 	for (int i = 0; i < RUN && view->n < most; i++) {
 		struct trial *trial = &view->trial[view->n];
 		float p[3] = { (float)place[i][0], (float)place[i][1], (float)place[i][2] };
+		float cosine = fminf(fabsf(v3f_dot(view->axis[2], ray_scene_normal(trials->scene, prim[i]))), 1);
 
-		if (hit[i].prim == RAY_NONE || (hit[i].prim != prim[i] && fabs(hit[i].t - AWAY) > 1e-6))
+		if (next_real(trials) > (double)cosine || hit[i].prim == RAY_NONE
+		    || (hit[i].prim != prim[i] && fabs(hit[i].t - AWAY) > 1e-6))
 			continue;
 		trial->x = v3f_dot(view->axis[0], p);
 		trial->y = v3f_dot(view->axis[1], p);
 		trial->z = v3f_dot(view->axis[2], p);
-		trial->cosine = fminf(fabsf(v3f_dot(view->axis[2], ray_scene_normal(trials->scene, prim[i]))), 1);
+		trial->cosine = cosine;
 		view->n++;
 	}
 }
@@ -235,7 +239,7 @@ static void field_make(struct field *field, const struct run *run, const struct 
 			size_t cell;
 
 			if (pass == 0)
-				counts[i] = point->two_sided || v3f_dot(view->axis[2], normal[point->normal]) > 0;
+				counts[i] = point->two_sided || v3f_dot(view->axis[2], normal[point->normal]) > -BACK;
 			if (!counts[i])
 				continue;
 			spot = (struct spot){ v3f_dot(view->axis[0], point->position), v3f_dot(view->axis[1], point->position),
@@ -253,7 +257,9 @@ static void field_make(struct field *field, const struct run *run, const struct 
 
 static int is_hit(const struct field *field, const struct trial *trial, double ds)
 {
+	float reach = fminf(0.75f / fmaxf(trial->cosine, 0.1f), FARTHEST);
 	float half = (float)(ds / 2), least = trial->z - greedy_depth_tolerance(trial->cosine, ds);
+	float most = trial->z + reach * (float)ds;
 	uint32_t u = cell_of(trial->x, ds, field->side), v = cell_of(trial->y, ds, field->side);
 
 	for (uint32_t row = v - 1; row <= v + 1; row++) {
@@ -262,7 +268,8 @@ static int is_hit(const struct field *field, const struct trial *trial, double d
 		for (uint32_t i = from; i < to; i++) {
 			const struct spot *spot = &field->spot[i];
 
-			if (fabsf(spot->x - trial->x) <= half && fabsf(spot->y - trial->y) <= half && spot->z >= least)
+			if (fabsf(spot->x - trial->x) <= half && fabsf(spot->y - trial->y) <= half && spot->z >= least
+			    && spot->z <= most)
 				return 1;
 		}
 	}

@@ -7,8 +7,8 @@
 #include "psr/mesh.h"
 #include "sample/greedy.h"
 
-/* Random places of a mesh's surface, weighted by area, from which nothing lies in a random direction; the same for the same mesh.
- * Of each one pixel of a randomly turned grid, centred on the place. */
+/* Random places of a mesh's surface that are seen from random directions, weighted by projected area; the same for the same
+ * mesh. Around each a pixel of a randomly turned grid (sample/adequacy.h). */
 struct study_trials;
 
 /* n_views directions with as many places each that n_a_view of them are seen, if a thousandth of what is tried is. scene: of
@@ -17,8 +17,8 @@ int study_trials_create(struct study_trials **out, const struct psr_mesh *mesh, 
                         int n_views, int n_a_view, struct psr_error *err);
 void study_trials_destroy(struct study_trials *trials); /* NULL is fine */
 
-/* A trial is missing if no sample that faces its view falls into its pixel, of side ds, before or not farther behind the place
- * than the surface may fall within the pixel. pool may be NULL. MEMORY. */
+/* A trial is missing if no sample that faces its view falls into its pixel, of side ds, in front of or behind the place by no
+ * more than its surface may rise or fall within the pixel. pool may be NULL. MEMORY. */
 int study_trials_run(const struct study_trials *trials, const struct greedy_point *point, size_t n_points, double ds,
                      struct psr_pool *pool, uint64_t *n_trials, uint64_t *n_missing);
 

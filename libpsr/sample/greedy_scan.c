@@ -226,6 +226,20 @@ static int add_corners(double (*direction)[3], int n, int level)
 	return n;
 }
 
+/* Each followed by its opposite, as the first two of [G] 5.2 are; what is far apart, first. */
+static int add_centers(double (*direction)[3])
+{
+	int n = 0;
+
+	for (unsigned child = 0; child < 4; child++) {
+		for (unsigned octant = 0; octant < 4; octant++) {
+			psr_direction_center(1, 4 * octant + child, direction[n++]);
+			psr_direction_center(1, 4 * (7 - octant) + child, direction[n++]);
+		}
+	}
+	return n;
+}
+
 /* The four (0, +-a, +-b) and their cyclic permutations. */
 static int add_rectangles(double (*direction)[3], int n, double a, double b)
 {
@@ -261,8 +275,7 @@ static void make_views(struct greedy *greedy)
 	if (greedy->options.directions == GREEDY_ICOSAHEDRAL) {
 		n = add_icosahedral(direction);
 	} else {
-		for (; n < PSR_PROJECTIONS; n++)
-			psr_direction_center(1, (unsigned)n, direction[n]);
+		n = add_centers(direction);
 	}
 	if (greedy->options.directions == GREEDY_CORNERS) {
 		for (int level = 0; level < 3; level++)
