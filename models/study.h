@@ -72,7 +72,7 @@ struct study {
 
 struct study_kind {
 	const char *name, *figure, *what; /* "figure 5.5" */
-	const char *models;               /* unless others are named: a list with commas */
+	const char *models;               /* unless others are named: a list with commas; NULL: the standard set */
 	int (*run)(struct study *study);  /* makes the table */
 	/* A gnuplot program after `set terminal` and `set output`; NULL: this study has no plot. Reads $table, with the means of the
 	 * table's rows: number of the row, label, values. */
@@ -97,6 +97,12 @@ int study_run_square(struct study *study);
 int study_run_block_size(struct study *study);
 int study_run_selection(struct study *study);
 int study_run_models(struct study *study);
+
+#define STUDY_TOLERANCE 0.43633231299858238 /* 25 degrees */
+
+/* psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model);
 
 /* A selection measured: blocks, samples, bytes, adequacy, time to warp. */
 struct study_measure {

@@ -3,6 +3,7 @@
 #include <unistd.h>
 #include "generators.h"
 #include "glb.h"
+#include "psr/build.h"
 #include "sample/door.h"
 #include "study.h"
 
@@ -78,4 +79,24 @@ void study_model_fini(struct study_model *model)
 	ray_scene_destroy(model->scene);
 	psr_mesh_destroy(model->mesh);
 	memset(model, 0, sizeof *model);
+}
+
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model)
+{
+	struct psr_build_options options;
+	struct psr_build_report report;
+	struct psr_model *built = NULL;
+	int rc;
+
+	psr_build_options_default(&options);
+	options.resolution = study->resolution;
+	options.n_threads = study->n_threads;
+	rc = psr_model_build(&built, model->mesh, &options, &report, study->err);
+	if (rc == PSR_OK)
+		rc = greedy_take_model(out, psr_model_blocks(built), study->resolution, result, study->err);
+	if (rc == PSR_OK)
+		*seconds = report.seconds_total;
+	psr_model_unref(built);
+	return rc;
 }

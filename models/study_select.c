@@ -60,7 +60,8 @@ static void put(struct study *study, int row, int model, const struct study_meas
 	*study_at(table, row, model, WARP) = m->warp * 1e6;
 	*study_at(table, row, model, CULLED) = 100 * m->culled;
 	*study_at(table, row, model, MISSING) = m->missing;
-	*study_at(table, row, model, FIRST_PASS) = (double)m->result.n_first_pass;
+	if (m->result.n_first_pass != 0)
+		*study_at(table, row, model, FIRST_PASS) = (double)m->result.n_first_pass;
 	*study_at(table, row, model, SECONDS) = seconds;
 }
 
@@ -209,10 +210,29 @@ static int run_variant(struct study *study, int row, int model, struct greedy *g
 	return select_and_put(study, row, model, greedy, &options);
 }
 
+static int run_product(struct study *study, int row, int model)
+{
+	struct greedy *greedy = NULL;
+	struct greedy_result result;
+	struct study_measure measure;
+	double seconds;
+	int rc = study_build(&greedy, &result, &seconds, study, &study->model[model]);
+
+	if (rc == PSR_OK)
+		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
+	greedy_destroy(greedy);
+	if (rc == PSR_OK)
+		put(study, row, model, &measure, seconds);
+	study_step(study, study->model[model].name);
+	return rc;
+}
+
 int study_run_selection(struct study *study)
 {
-	int rc = start_table(study, "selection", N_VARIANTS);
+	int rc = start_table(study, "selection", N_VARIANTS + 1);
 
+	if (rc == PSR_OK)
+		snprintf(study->table.label[N_VARIANTS], sizeof *study->table.label, "psr: ownership, all levels built");
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 		struct greedy *greedy = NULL;
 
@@ -227,6 +247,8 @@ int study_run_selection(struct study *study)
 				rc = run_variant(study, i, m, greedy);
 		}
 		greedy_destroy(greedy);
+		if (rc == PSR_OK)
+			rc = run_product(study, N_VARIANTS, m);
 	}
 	if (rc == PSR_OK)
 		finish_table(study, 1);

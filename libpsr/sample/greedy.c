@@ -118,30 +118,47 @@ static int visit_scout(struct greedy *greedy, int v, const struct greedy_select_
 	return rc == PSR_OK ? visit(greedy, v, options, strictness) : rc;
 }
 
+struct run {
+	struct greedy *greedy;
+	const struct greedy_select_options *options;
+	int done, total;
+};
+
+static int run_pass(struct run *run, int from, int to, struct greedy_strictness strictness,
+                    int (*visit_one)(struct greedy *greedy, int v, const struct greedy_select_options *options,
+                                     struct greedy_strictness strictness))
+{
+	int rc = PSR_OK;
+
+	for (int v = from; rc == PSR_OK && v < to; v++) {
+		rc = visit_one(run->greedy, v, run->options, strictness);
+		if (run->options->on_progress != NULL)
+			run->options->on_progress((uint64_t)++run->done, (uint64_t)run->total, run->options->userdata);
+	}
+	return rc;
+}
+
 static int run_passes(struct greedy *greedy, const struct greedy_select_options *options, struct greedy_result *result)
 {
 	const struct greedy_strictness strict = { .least_cosine = greedy->view[0].projection.spacing / (float)greedy->ds };
 	const struct greedy_strictness all = { .lenient_below = options->forgives_outlines ? OUTLINE_COSINE : 0 };
 	const struct greedy_strictness second = { .lenient_below = all.lenient_below, .kept_only = 1 };
-	int n_views = greedy->n_views - greedy->n_scouts, rc = PSR_OK, done = 0, total;
+	int n_views = greedy->n_views - greedy->n_scouts, rc = PSR_OK;
+	struct run run = { greedy, options, 0, 0 };
 
-	total = n_views * (1 + !!options->is_strict_first + !!options->second_pass) + greedy->n_scouts;
-#define VISIT(from, to, call) \
-	for (int v = from; rc == PSR_OK && v < to; v++) { \
-		rc = call; \
-		if (options->on_progress != NULL) \
-			options->on_progress((uint64_t)++done, (uint64_t)total, options->userdata); \
-	}
+	run.total = n_views * (1 + !!options->is_strict_first) + greedy->n_scouts
+	            + (options->second_pass ? greedy->n_views : 0);
 	if (options->is_strict_first)
-		VISIT(0, n_views, visit(greedy, v, options, strict));
-	VISIT(0, n_views, visit(greedy, v, options, all));
-	VISIT(n_views, greedy->n_views, visit_scout(greedy, v, options, all));
+		rc = run_pass(&run, 0, n_views, strict, visit);
+	if (rc == PSR_OK)
+		rc = run_pass(&run, 0, n_views, all, visit);
+	if (rc == PSR_OK)
+		rc = run_pass(&run, n_views, greedy->n_views, all, visit_scout);
 	for (int v = 0; v < greedy->n_views; v++)
 		for (uint32_t b = 0; b < greedy->view[v].n_blocks; b++)
 			result->n_first_pass += greedy->view[v].block[b].is_kept;
-	if (options->second_pass)
-		VISIT(0, greedy->n_views, visit(greedy, v, options, second));
-#undef VISIT
+	if (rc == PSR_OK && options->second_pass)
+		rc = run_pass(&run, 0, greedy->n_views, second, visit);
 	return rc;
 }
 
@@ -156,7 +173,7 @@ static int keep_all_and_prune(struct greedy *greedy, const struct greedy_select_
 	return greedy_prune(greedy, options, 0);
 }
 
-static void count(const struct greedy *greedy, struct greedy_result *result)
+void greedy_count(const struct greedy *greedy, struct greedy_result *result)
 {
 	uint64_t lanes = (uint64_t)greedy->side * (uint64_t)greedy->side;
 
@@ -192,7 +209,7 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "no memory to select blocks at resolution %u; use a lower one",
 		                greedy->options.resolution);
-	count(greedy, result);
+	greedy_count(greedy, result);
 	result->seconds = now() - started;
 	return PSR_OK;
 }

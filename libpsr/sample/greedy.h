@@ -117,6 +117,10 @@ struct greedy_result {
 int greedy_select(struct greedy *greedy, const struct greedy_select_options *options, struct greedy_result *result,
                   struct psr_error *err);
 
+/* A model's blocks of level 0 as a selection to measure beside the others; greedy_select is not for it. LIMIT, MEMORY. */
+int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint32_t resolution,
+                      struct greedy_result *result, struct psr_error *err);
+
 /* The kept samples, in the order of views, blocks and samples: position, normal (psr/direction.h) and two-sidedness, all of
  * n_samples of the result. */
 struct greedy_point {

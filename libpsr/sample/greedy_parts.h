@@ -5,6 +5,11 @@
 #include "greedy.h"
 #include "psr/direction.h"
 
+/* ---- greedy.c ---- */
+
+/* Fills in all of the result but the times and the first pass. */
+void greedy_count(const struct greedy *greedy, struct greedy_result *result);
+
 /* ---- greedy_scan.c ---- */
 
 /* Traces a view, of which no sample is there yet; or of every `stride` rows and columns of 8x8 blocks only one. MEMORY. */
