@@ -19,7 +19,7 @@ static const struct study_column columns[N_COLUMNS] = {
 	[WARP_RATIO] = { "time", "time_ratio", 3 },
 	[CULLED] = { "% culled", "percent_culled", 1 },
 	[MISSING] = { "missing/10000", "missing_of_10000", 2 },
-	[FIRST_PASS] = { "first pass", "blocks_first_pass", 0 },
+	[FIRST_PASS] = { "before", "blocks_before", 0 },
 	[SECONDS] = { "s", "seconds", 2 },
 };
 
@@ -68,6 +68,7 @@ static void put(struct study *study, int row, int model, const struct study_meas
 static int select_and_put(struct study *study, int row, int model, struct greedy *greedy,
                           const struct greedy_select_options *options)
 {
+	double before = options->goes_on ? *study_at(&study->table, row - 1, model, SECONDS) : greedy->seconds_scan;
 	struct greedy_result result;
 	struct study_measure measure;
 	int rc = greedy_select(greedy, options, &result, study->err);
@@ -75,7 +76,7 @@ static int select_and_put(struct study *study, int row, int model, struct greedy
 	if (rc == PSR_OK)
 		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
 	if (rc == PSR_OK)
-		put(study, row, model, &measure, greedy->seconds_scan + result.seconds);
+		put(study, row, model, &measure, before + result.seconds);
 	study_step(study, study->model[model].name);
 	return rc;
 }
@@ -176,22 +177,26 @@ int study_run_block_size(struct study *study)
 static const struct variant {
 	const char *label;
 	enum greedy_directions directions;
-	int second_pass, n_tests, not_facing, by_score, drops, strict;
+	int goes_on; /* from the row before */
+	int second_pass, is_one_test, not_facing, by_score, drops, strict;
+	double depth; /* 0: 1 */
 } variants[] = {
-	{ "[G] 32, first pass", GREEDY_THESIS, .n_tests = 16 },
-	{ "[G] 32, both passes", GREEDY_THESIS, .second_pass = 1, .n_tests = 16 },
-	{ "  one test", GREEDY_THESIS, .second_pass = 1, .n_tests = 1 },
-	{ "  backs count", GREEDY_THESIS, .second_pass = 1, .n_tests = 16, .not_facing = 1 },
-	{ "  samples dropped (9.2.3)", GREEDY_THESIS, .second_pass = 1, .n_tests = 16, .drops = 1 },
-	{ "  by score (9.2.2)", GREEDY_THESIS, .n_tests = 16, .by_score = 1 },
-	{ "icosahedral 32, first pass", GREEDY_ICOSAHEDRAL, .n_tests = 16 },
-	{ "icosahedral 32, both passes", GREEDY_ICOSAHEDRAL, .second_pass = 1, .n_tests = 16 },
-	{ "  samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .second_pass = 1, .n_tests = 16, .drops = 1 },
-	{ "  by score (9.2.2)", GREEDY_ICOSAHEDRAL, .n_tests = 16, .by_score = 1 },
-	{ "  by score, samples dropped", GREEDY_ICOSAHEDRAL, .n_tests = 16, .by_score = 1, .drops = 1 },
-	{ "98 and scouts, strict first", GREEDY_CORNERS, .n_tests = 16, .strict = 1 },
-	{ "  both passes", GREEDY_CORNERS, .second_pass = 1, .n_tests = 16, .strict = 1 },
+	{ "[G] 32, one test, both passes", GREEDY_THESIS, .second_pass = 1, .is_one_test = 1 },
+	{ "[G] 32, backs count, both passes", GREEDY_THESIS, .second_pass = 1, .not_facing = 1 },
+	{ "[G] 32, depths 10 times as strict, first pass", GREEDY_THESIS, .depth = 0.1 },
+	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1, .depth = 0.1 },
+	{ "[G] 32, first pass", GREEDY_THESIS, .goes_on = 0 },
+	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1 },
+	{ "    samples dropped (9.2.3)", GREEDY_THESIS, .goes_on = 1, .drops = 1 },
+	{ "icosahedral 32, first pass", GREEDY_ICOSAHEDRAL, .goes_on = 0 },
+	{ "  both passes", GREEDY_ICOSAHEDRAL, .goes_on = 1, .second_pass = 1 },
+	{ "    samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
+	{ "icosahedral 32, by score (9.2.2)", GREEDY_ICOSAHEDRAL, .by_score = 1 },
+	{ "  samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
+	{ "98 and scouts, strict first", GREEDY_CORNERS, .strict = 1 },
+	{ "  second pass", GREEDY_CORNERS, .goes_on = 1, .second_pass = 1, .strict = 1 },
 };
+#define BASE_VARIANT 5
 #define N_VARIANTS ((int)(sizeof variants / sizeof *variants))
 
 static int run_variant(struct study *study, int row, int model, struct greedy *greedy)
@@ -200,12 +205,15 @@ static int run_variant(struct study *study, int row, int model, struct greedy *g
 	struct greedy_select_options options;
 
 	greedy_select_default(&options);
+	options.goes_on = variant->goes_on;
 	options.second_pass = variant->second_pass;
 	options.is_facing = !variant->not_facing;
 	options.by_score = variant->by_score;
 	options.drops_samples = variant->drops;
 	options.is_strict_first = options.forgives_outlines = variant->strict;
-	if (variant->n_tests == 1)
+	if (variant->depth > 0)
+		options.depth_tolerance = variant->depth;
+	if (variant->is_one_test)
 		options.n_rotations = options.n_shifts = 1;
 	return select_and_put(study, row, model, greedy, &options);
 }
@@ -251,6 +259,6 @@ int study_run_selection(struct study *study)
 			rc = run_product(study, N_VARIANTS, m);
 	}
 	if (rc == PSR_OK)
-		finish_table(study, 1);
+		finish_table(study, BASE_VARIANT);
 	return rc;
 }

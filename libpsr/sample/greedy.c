@@ -22,6 +22,7 @@ void greedy_select_default(struct greedy_select_options *options)
 	options->n_rotations = GREEDY_MOST_ROTATIONS;
 	options->n_shifts = GREEDY_MOST_SHIFTS;
 	options->is_facing = 1;
+	options->depth_tolerance = 1;
 	options->second_pass = 1;
 }
 
@@ -146,13 +147,14 @@ static int run_passes(struct greedy *greedy, const struct greedy_select_options 
 	int n_views = greedy->n_views - greedy->n_scouts, rc = PSR_OK;
 	struct run run = { greedy, options, 0, 0 };
 
-	run.total = n_views * (1 + !!options->is_strict_first) + greedy->n_scouts
-	            + (options->second_pass ? greedy->n_views : 0);
-	if (options->is_strict_first)
+	run.total = options->second_pass ? greedy->n_views : 0;
+	if (!options->goes_on)
+		run.total += n_views * (1 + !!options->is_strict_first) + greedy->n_scouts;
+	if (!options->goes_on && options->is_strict_first)
 		rc = run_pass(&run, 0, n_views, strict, visit);
-	if (rc == PSR_OK)
+	if (!options->goes_on && rc == PSR_OK)
 		rc = run_pass(&run, 0, n_views, all, visit);
-	if (rc == PSR_OK)
+	if (!options->goes_on && rc == PSR_OK)
 		rc = run_pass(&run, n_views, greedy->n_views, all, visit_scout);
 	for (int v = 0; v < greedy->n_views; v++)
 		for (uint32_t b = 0; b < greedy->view[v].n_blocks; b++)
@@ -199,8 +201,9 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 	assert(options->n_rotations >= 1 && options->n_rotations <= GREEDY_MOST_ROTATIONS);
 	assert(options->n_shifts >= 1 && options->n_shifts <= GREEDY_MOST_SHIFTS);
 	memset(result, 0, sizeof *result);
-	rc = start(greedy, options->side);
-	if (rc == PSR_OK && options->by_score)
+	assert(!options->goes_on || options->side == greedy->side);
+	rc = options->goes_on ? PSR_OK : start(greedy, options->side);
+	if (rc == PSR_OK && options->by_score && !options->goes_on)
 		rc = keep_all_and_prune(greedy, options, result);
 	else if (rc == PSR_OK)
 		rc = run_passes(greedy, options, result);

@@ -95,6 +95,10 @@ struct greedy_select_options {
 	int is_strict_first;         /* a sweep before in which only samples within the tolerance angle choose blocks */
 	int forgives_outlines;       /* a sample seen at over 60 degrees chooses only where its surface is not there within half a
 	                              * pixel more */
+	double depth_tolerance;      /* how far apart depths may be to be of one surface, as a part of what the slope of the surface
+	                              * and the size of a pixel explain: 1; [G] does not say */
+	int goes_on;                 /* from what the last selection kept, with the same side: its first pass, or its order by score, is
+	                              * not repeated */
 	int second_pass;             /* [G] 5.2: in the same order, blocks that are no longer needed are removed */
 	int by_score;                /* [G] 9.2.2 instead of both passes: all blocks from the worst to the best by the deviation of
 	                              * their normals from the projection, each dropped that no test view needs */
@@ -109,11 +113,11 @@ struct greedy_result {
 	uint64_t n_blocks, n_samples; /* kept; samples: valid ones */
 	uint64_t n_lanes;             /* n_blocks * side^2: what warping costs */
 	uint64_t n_bytes;             /* as our file would take, without its fixed parts */
-	uint64_t n_first_pass;        /* blocks before the second pass */
-	double seconds;
+	uint64_t n_first_pass;        /* blocks before the second pass, or before they were dropped by score */
+	double seconds;                /* of this call */
 };
 
-/* Marks what is kept. The result depends on nothing that was selected before. MEMORY. */
+/* Marks what is kept. Without goes_on the result depends on nothing that was selected before. MEMORY. */
 int greedy_select(struct greedy *greedy, const struct greedy_select_options *options, struct greedy_result *result,
                   struct psr_error *err);
 

@@ -83,6 +83,7 @@ static void look_at_view(int v, void *userdata)
 static void take_candidates(struct look *look, struct greedy_strictness strictness)
 {
 	const struct greedy_view *view = &look->greedy->view[look->view];
+	const float tolerance = (float)look->options->depth_tolerance;
 
 	for (uint32_t b = 0; b < view->n_blocks; b++) {
 		const struct greedy_block *block = &view->block[b];
@@ -96,7 +97,8 @@ static void take_candidates(struct look *look, struct greedy_strictness strictne
 			if (sample->cosine < strictness.least_cosine)
 				continue;
 			candidate->seen = greedy_project(view->projection.axis, sample->position);
-			candidate->least_z = candidate->seen.z - greedy_depth_tolerance(sample->cosine, look->greedy->ds);
+			candidate->least_z = candidate->seen.z
+			                     - tolerance * greedy_depth_tolerance(sample->cosine, look->greedy->ds);
 			candidate->is_lenient = sample->cosine < strictness.lenient_below;
 			candidate->block = b;
 			look->n_candidates++;

@@ -40,12 +40,13 @@ static void ask(struct prune *prune, int v)
 {
 	const struct greedy_view *view = &prune->greedy->view[v];
 	struct table *table = &prune->table[v];
+	const float tolerance = (float)prune->options->depth_tolerance;
 
-	for (size_t i = 0; i < prune->n_tests * prune->n_pixels; i++)
+	for (size_t i = 0; i < (size_t)prune->n_tests * prune->n_pixels; i++)
 		table->need[i] = -INFINITY;
 	for (uint32_t i = 0; i < view->n_samples; i++) {
 		struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
-		float least = seen.z - greedy_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
+		float least = seen.z - tolerance * greedy_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
 
 		for (int t = 0; t < prune->n_tests; t++) {
 			float *need = &table->need[(size_t)t * prune->n_pixels + greedy_pixel(&prune->grid[t], &seen)];
@@ -53,7 +54,7 @@ static void ask(struct prune *prune, int v)
 			*need = least > *need ? least : *need;
 		}
 	}
-	for (size_t i = 0; i < prune->n_tests * prune->n_pixels; i++)
+	for (size_t i = 0; i < (size_t)prune->n_tests * prune->n_pixels; i++)
 		table->need[i] = table->need[i] == -INFINITY ? INFINITY : table->need[i];
 }
 
@@ -68,7 +69,7 @@ static void fill_table(int v, void *userdata)
 		return;
 	greedy_facing_init(&table->facing, axis);
 	ask(prune, v);
-	memset(table->count, 0, prune->n_tests * prune->n_pixels * sizeof *table->count);
+	memset(table->count, 0, (size_t)prune->n_tests * prune->n_pixels * sizeof *table->count);
 	for (int w = 0; w < prune->greedy->n_views; w++) {
 		const struct greedy_view *from = &prune->greedy->view[w];
 
@@ -197,8 +198,8 @@ static int prune_alloc(struct prune *prune, int is_by_sample)
 		n_units += is_by_sample ? view->n_samples : view->n_blocks;
 		if (view->n_samples == 0)
 			continue;
-		table->need = psr_alloc_array(prune->n_tests * prune->n_pixels, sizeof *table->need);
-		table->count = psr_alloc_array(prune->n_tests * prune->n_pixels, sizeof *table->count);
+		table->need = psr_alloc_array((size_t)prune->n_tests * prune->n_pixels, sizeof *table->need);
+		table->count = psr_alloc_array((size_t)prune->n_tests * prune->n_pixels, sizeof *table->count);
 		if (table->need == NULL || table->count == NULL)
 			return PSR_ERR_MEMORY;
 	}
