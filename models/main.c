@@ -11,6 +11,7 @@ static const struct command {
 	{ "info", "say what is in a .psr file", cmd_info },
 	{ "make", "generate a model of the standard set as glTF", cmd_make },
 	{ "accuracy", "compare a model's pictures with ray-traced ones", cmd_accuracy },
+	{ "study", "repeat a study of the thesis: tables and plots", cmd_study },
 };
 
 #define N_COMMANDS (sizeof commands / sizeof commands[0])

@@ -1,0 +1,117 @@
+/* The thesis's studies ([G] 5.3, 6.5, 8) as commands: `psr-model study NAME`. */
+#ifndef MODELS_STUDY_H
+#define MODELS_STUDY_H
+
+#include <stdint.h>
+#include <stdio.h>
+#include "psr/error.h"
+#include "psr/mesh.h"
+#include "psr/pool.h"
+#include "sample/greedy.h"
+#include "sample/ray.h"
+#include "study_trials.h"
+
+/* ---- study_table.c: what a study found ---- */
+
+#define STUDY_MOST_COLUMNS 12
+
+struct study_column {
+	const char *name, *key; /* heading; key in JSON */
+	int decimals;
+};
+
+/* Values by row, model and column; NAN where there is none. */
+struct study_table {
+	const char *first; /* heading of the labels */
+	const struct study_column *column;
+	int n_columns, n_rows, n_models;
+	char (*label)[64];
+	double *value;
+};
+
+/* Every value is NAN, every label empty. MEMORY. */
+int study_table_init(struct study_table *table, const char *first, const struct study_column *column, int n_columns,
+                     int n_rows, int n_models, struct psr_error *err);
+void study_table_fini(struct study_table *table);
+double *study_at(const struct study_table *table, int row, int model, int column);
+
+/* Mean over the models that have a value; NAN if none has. */
+double study_mean(const struct study_table *table, int row, int column);
+
+/* Makes a column from another: the mean of each model's value as a ratio to its own in row `base`. */
+void study_relate(const struct study_table *table, int from, int to, int base);
+
+void study_table_print(const struct study_table *table, FILE *to);
+
+/* ---- study_model.c: what is studied ---- */
+
+struct study_model {
+	char name[64];
+	struct psr_mesh *mesh;
+	double origin[3], scale;
+	struct ray_scene *scene;
+	struct study_trials *trials;
+};
+
+/* A generator's name (psr-model make), or a file, which has a dot or a slash in its name. */
+int study_model_load(struct study_model *model, const char *name, struct psr_error *err);
+void study_model_fini(struct study_model *model);
+
+/* ---- study.c ---- */
+
+struct study {
+	const struct study_kind *kind;
+	uint32_t resolution;
+	struct psr_pool *pool;
+	int n_threads, n_models;
+	struct study_model *model;
+	struct study_table table;
+	int done, total, has_bar;
+	struct psr_error *err;
+};
+
+struct study_kind {
+	const char *name, *figure, *what; /* "figure 5.5" */
+	const char *models;               /* unless others are named: a list with commas; NULL: the standard set */
+	int (*run)(struct study *study);  /* makes the table */
+	/* A gnuplot program after `set terminal` and `set output`; NULL: this study has no plot. Reads $table, with the means of the
+	 * table's rows: number of the row, label, values. */
+	const char *plot;
+	const char *note;                 /* printed below the table; may be NULL */
+};
+extern const struct study_kind study_kinds[];
+extern const int n_study_kinds;
+
+/* One step of `total` is done. */
+void study_step(struct study *study, const char *what);
+
+/* ---- study_plot.c ---- */
+
+/* Writes a picture of the table, .png or .svg by the name's end, through gnuplot. ARG, NOT_FOUND (no gnuplot), IO. */
+int study_plot(const struct study *study, const char *path, struct psr_error *err);
+
+/* ---- study_select.c, study_cull.c, study_models.c ---- */
+
+int study_run_tolerance(struct study *study);
+int study_run_square(struct study *study);
+int study_run_block_size(struct study *study);
+int study_run_selection(struct study *study);
+int study_run_models(struct study *study);
+
+#define STUDY_TOLERANCE 0.43633231299858238 /* 25 degrees */
+
+/* psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model);
+
+/* A selection measured: blocks, samples, bytes, adequacy, time to warp. */
+struct study_measure {
+	struct greedy_result result;
+	double missing; /* of 10,000 trials */
+	double warp;    /* seconds a frame */
+	double culled;  /* fraction, by cones */
+};
+int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
+                  const struct greedy *greedy, const struct greedy_result *result);
+
+#endif

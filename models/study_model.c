@@ -1,0 +1,102 @@
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "generators.h"
+#include "glb.h"
+#include "psr/build.h"
+#include "sample/door.h"
+#include "study.h"
+
+#define N_TRIAL_VIEWS 200
+#define N_TRIALS_A_VIEW 500
+
+/* Through a file, as a user would. */
+static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const char *name, struct psr_error *err)
+{
+	const char *folder = getenv("TMPDIR");
+	char place[256], path[300];
+	uint8_t *bytes = NULL;
+	size_t n_bytes = 0;
+	int code = glb_encode(&bytes, &n_bytes, shape, name, err);
+
+	snprintf(place, sizeof place, "%s/psr-study-XXXXXX", folder != NULL && folder[0] != '\0' ? folder : "/tmp");
+	if (code == PSR_OK && mkdtemp(place) == NULL)
+		code = psr_fail(err, PSR_ERR_IO, "%s: no folder can be made there for %s.glb; set TMPDIR to one", place, name);
+	else if (code == PSR_OK) {
+		snprintf(path, sizeof path, "%s/%s.glb", place, name);
+		code = glb_write(path, bytes, n_bytes, err);
+		if (code == PSR_OK)
+			code = psr_mesh_import(mesh, path, err);
+		unlink(path);
+		rmdir(place);
+	}
+	free(bytes);
+	return code;
+}
+
+static int generate(struct psr_mesh **mesh, const char *name, struct psr_error *err)
+{
+	const struct generator *generator = generator_find(name, err);
+	struct shape shape;
+	int code;
+
+	if (generator == NULL)
+		return err->code;
+	shape_init(&shape);
+	generator->make(&shape);
+	code = import_shape(mesh, &shape, generator->name, err);
+	shape_fini(&shape);
+	return code;
+}
+
+int study_model_load(struct study_model *model, const char *name, struct psr_error *err)
+{
+	const char *slash = strrchr(name, '/');
+	int code;
+
+	memset(model, 0, sizeof *model);
+	snprintf(model->name, sizeof model->name, "%s", slash != NULL ? slash + 1 : name);
+	if (strpbrk(name, "./") != NULL)
+		code = psr_mesh_import(&model->mesh, name, err);
+	else
+		code = generate(&model->mesh, name, err);
+	if (code == PSR_OK)
+		code = door_check_mesh(model->mesh, err);
+	if (code == PSR_OK)
+		code = door_bound_mesh(model->mesh, model->origin, &model->scale, err);
+	if (code == PSR_OK)
+		code = ray_scene_create(&model->scene, model->mesh, model->origin, model->scale, err);
+	if (code == PSR_OK)
+		code = study_trials_create(&model->trials, model->mesh, model->scene, N_TRIAL_VIEWS, N_TRIALS_A_VIEW, err);
+	if (code != PSR_OK)
+		study_model_fini(model);
+	return code;
+}
+
+void study_model_fini(struct study_model *model)
+{
+	study_trials_destroy(model->trials);
+	ray_scene_destroy(model->scene);
+	psr_mesh_destroy(model->mesh);
+	memset(model, 0, sizeof *model);
+}
+
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model)
+{
+	struct psr_build_options options;
+	struct psr_build_report report;
+	struct psr_model *built = NULL;
+	int rc;
+
+	psr_build_options_default(&options);
+	options.resolution = study->resolution;
+	options.n_threads = study->n_threads;
+	rc = psr_model_build(&built, model->mesh, &options, &report, study->err);
+	if (rc == PSR_OK)
+		rc = greedy_take_model(out, psr_model_blocks(built), study->resolution, result, study->err);
+	if (rc == PSR_OK)
+		*seconds = report.seconds_total;
+	psr_model_unref(built);
+	return rc;
+}
