@@ -78,8 +78,9 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	const struct psr_blocks *blocks = psr_model_blocks(model);
 
 	printf("%s: %" PRIu64 " samples in %" PRIu32 " blocks, %.1f MB, from %" PRIu32
-	       " triangles in %.1f s (rays %.1f, selection %.1f)\n",
-	       out, blocks->n_samples, blocks->n_blocks, (double)psr_model_bytes(model) / 1e6, mesh->n_triangles,
+	       " %s in %.1f s (rays %.1f, selection %.1f)\n",
+	       out, blocks->n_samples, blocks->n_blocks, (double)psr_model_bytes(model) / 1e6,
+	       mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points, mesh->n_triangles > 0 ? "triangles" : "points",
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 

@@ -1,7 +1,7 @@
 /* Clouds: what import_cloud_finish is made of, and what the readers of scans share. Shared by cloud*.c, ply*.c, las*.c.
  *
- * Points are put in order by a tree, and within these files a point is its place in that order: a slot. Slots, neighbours
- * and results depend on the points and their order in the file alone, never on threads. */
+ * Points are put in order by a tree, and within these files a point is its place in that order: a slot. Slots,
+ * neighbours and results depend on the points and their order in the file alone, never on threads. */
 #ifndef PSR_IMPORT_CLOUD_H
 #define PSR_IMPORT_CLOUD_H
 
@@ -37,8 +37,8 @@ int cloud_tree_build(struct cloud *cloud, const double (*position)[3]);
 void cloud_tree_nearest(struct cloud *cloud);
 
 /* cloud_plane.c: normals where none is given, as the direction in which a point and its neighbours extend least, of
- * either sign ([Hoppe et al. 1992, "Surface Reconstruction from Unorganized Points"] 3.1), and radii: the distance to the
- * farthest corner of the point's cell in the Voronoi diagram of its neighbours, seen along the normal. Discs of exactly
+ * either sign ([Hoppe et al. 1992, "Surface Reconstruction from Unorganized Points"] 3.1), and radii: the distance to
+ * the farthest corner of the point's cell in the Voronoi diagram of its neighbours, seen along the normal. Discs of exactly
  * these radii cover a flat sampling, however uneven. Where the cells are open (an edge, a wire) the open side does not
  * count; a point that is far from others than those are from theirs is held to twice their radius. */
 void cloud_planes(struct cloud *cloud);

@@ -38,8 +38,8 @@ static void rotate(double m[3][3], double v[3][3], int p, int q)
 	}
 }
 
-/* Rows of v: the axes of m, whose values are left on its diagonal. What is off it shrinks quadratically: three sweeps do
- * for nearly all, and below 1e-12 of the trace it turns no axis by what a float could tell. */
+/* Rows of v: the axes of m, whose values are left on its diagonal. What is off it shrinks quadratically: three sweeps
+ * do for nearly all, and below 1e-12 of the trace it turns no axis by what a float could tell. */
 static void diagonalise(double m[3][3], double v[3][3])
 {
 	const double least = 1e-12 * (m[0][0] + m[1][1] + m[2][2]);
@@ -152,7 +152,9 @@ static int clip(struct corner *out, const struct corner *in, int n, const double
 /* In units of the farthest neighbour's distance; 0 where the cell has no corner but the frame's. */
 static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const float normal[3])
 {
-	struct corner corner[2][MAX_CORNERS] = { { { { -1, -1 }, -1 }, { { 1, -1 }, -1 }, { { 1, 1 }, -1 }, { { -1, 1 }, -1 } } };
+	struct corner corner[2][MAX_CORNERS] = {
+		{ { { -1, -1 }, -1 }, { { 1, -1 }, -1 }, { { 1, 1 }, -1 }, { { -1, 1 }, -1 } },
+	};
 	const double n[3] = { normal[0], normal[1], normal[2] };
 	const double other[3] = { fabs(n[0]) < 0.6, fabs(n[0]) >= 0.6, 0.0 };
 	double u[3], v[3], farthest = 0.0, reach = 2.0; /* reach: the farthest corner, squared, frame and all */

@@ -56,8 +56,8 @@ static int ends_with(const char *path, const char *ending)
 static int refuse_laz(const struct las *las, struct psr_error *err)
 {
 	return psr_fail(err, PSR_ERR_UNSUPPORTED,
-	                "%s: is compressed (LAZ); unpack it with \"laszip -i IN.laz -o OUT.las\", with las2las, or with \"pdal "
-	                "translate IN.laz OUT.las\"",
+	                "%s: is compressed (LAZ); unpack it with \"laszip -i IN.laz -o OUT.las\", with las2las, or with "
+	                "\"pdal translate IN.laz OUT.las\"",
 	                las->path);
 }
 

@@ -1,6 +1,6 @@
 /* PLY, as its inventor's notes describe it (G. Turk, "The PLY Polygon File Format", 1994) and as programs write it: the
- * header, the values and rows of its elements. Shared by the ply*.c alone. Nothing here refers to anything but the bytes
- * of the file, which outlive it. */
+ * header, the values and rows of its elements. Shared by the ply*.c alone. Names refer to the bytes of the file, which
+ * outlive all of it. */
 #ifndef PSR_IMPORT_PLY_H
 #define PSR_IMPORT_PLY_H
 

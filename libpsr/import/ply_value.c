@@ -41,8 +41,8 @@ static int parse_rare(const uint8_t *word, size_t n, locale_t locale, double *x)
 	return end == text + n;
 }
 
-/* Digits of at most 2^53 and a power of ten of at most 10^22 are exact doubles, so that their product or quotient is the
- * nearest to what is written (W. Clinger, "How to read floating point numbers accurately", 1990). */
+/* Digits of at most 2^53 and a power of ten of at most 10^22 are exact doubles, so that their product or quotient is
+ * the nearest to what is written (W. Clinger, "How to read floating point numbers accurately", 1990). */
 static int parse_number(const uint8_t *word, size_t n, locale_t locale, double *x)
 {
 	static const double ten[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,

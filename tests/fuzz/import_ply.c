@@ -1,4 +1,4 @@
-/* PLY from memory: whatever is accepted keeps the promises of psr/mesh.h, and takes no more time than its size explains. */
+/* PLY from memory: whatever is accepted keeps the promises of psr/mesh.h. */
 #include "import_check.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)

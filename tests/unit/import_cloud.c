@@ -8,6 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "import/import.h"
+#include "psr/build.h"
+#include "psr/model.h"
 
 static uint64_t state_of_random;
 
@@ -305,6 +307,38 @@ static void odd_clouds_keep_the_promises(void **state)
 			}
 }
 
+/* The discs of a unit sphere at survey coordinates lie within a sphere that is larger by a radius at most. */
+static void a_cloud_becomes_a_model(void **state)
+{
+	(void)state;
+	enum { N = 2000 };
+	struct psr_build_options options;
+	struct psr_model *model = NULL;
+	struct psr_error err = { 0, "" };
+	struct import_mesh im;
+	float most = 0;
+
+	init(&im, N);
+	for (uint32_t i = 0; i < N; i++) {
+		sphere_point(im.mesh->point[i]);
+		im.mesh->point[i][0] += 412345;
+	}
+	struct psr_mesh *m = finish(&im);
+
+	for (uint32_t i = 0; i < N; i++)
+		most = fmaxf(most, m->point_radius[i]);
+	psr_build_options_default(&options);
+	options.resolution = 32;
+	if (psr_model_build(&model, m, &options, NULL, &err) != PSR_OK)
+		fail_msg("%s", err.text);
+	/* the sphere's half that one view sees has pi / 4 / 3 of the 32 x 32 pixels at least; there are two */
+	assert_true(psr_model_blocks(model)->n_samples > 2 * 268);
+	assert_true(psr_model_info(model)->scale > 0.99 && psr_model_info(model)->scale < sqrt(3) * (1 + most));
+	assert_true(fabs(psr_model_info(model)->origin[0] - 412345) < most + 0.01);
+	psr_model_unref(model);
+	psr_mesh_destroy(m);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -317,6 +351,7 @@ int main(void)
 		cmocka_unit_test(points_at_one_place_are_one),
 		cmocka_unit_test(normals_of_the_file_stay_and_turn_the_others),
 		cmocka_unit_test(odd_clouds_keep_the_promises),
+		cmocka_unit_test(a_cloud_becomes_a_model),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -345,7 +345,9 @@ static void strips_turn_every_other_triangle_and_start_anew(void **state)
 	for (int with_normals = 0; with_normals < 2; with_normals++)
 		for (int format = ASCII; format <= BIG; format++) {
 			begin(&f, format);
-			text(&f, "element vertex 12\n" XYZ "%s", with_normals ? "property char nx\nproperty char ny\nproperty char nz\n" : "");
+			text(&f, "element vertex 12\n" XYZ);
+			for (int c = 0; c < 3 && with_normals; c++)
+				text(&f, "property char n%c\n", "xyz"[c]);
 			text(&f, "element tristrips 1\nproperty list int int vertex_indices\n" END);
 			for (int v = 0; v < 12; v++) {
 				put(&f, "float", v % 4);
@@ -382,7 +384,10 @@ static void colors_of_vertices_are_linear_light(void **state)
 		double value[4], linear[4];
 	} kinds[] = {
 		{ "uchar", { "red", "green", "blue", "alpha" }, { 255, 128, 0, 51 }, { 1, -128, 0, 0.2 } },
-		{ "uchar", { "diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha" }, { 0, 64, 255, 255 }, { 0, -64, 1, 1 } },
+		{ "uchar",
+		  { "diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha" },
+		  { 0, 64, 255, 255 },
+		  { 0, -64, 1, 1 } },
 		{ "ushort", { "r", "g", "b", "a" }, { 65535, 128 * 257, 0, 13107 }, { 1, -128, 0, 0.2 } },
 		{ "float", { "red", "green", "blue", "alpha" }, { 0.25, 0.5, 1, 0.75 }, { 0.25, 0.5, 1, 0.75 } },
 		{ "int", { "red", "green", "blue", "alpha" }, { 255, 128, 0, 51 }, { 1, -128, 0, 0.2 } },
@@ -631,7 +636,8 @@ static void what_is_not_finite_is_left_out(void **state)
 {
 	(void)state;
 	struct psr_mesh *m = accept_text(ASCII_HEADER "element vertex 5\n" XYZ "element face 4\n" LIST END
-	                                              "0 0 0\n1 0 0\n0 1 0\nnan 0 0\n9 9 9\n3 0 1 2\n3 0 1 3\n3 1 1 2\n3 2 0 1\n");
+	                                              "0 0 0\n1 0 0\n0 1 0\nnan 0 0\n9 9 9\n"
+	                                              "3 0 1 2\n3 0 1 3\n3 1 1 2\n3 2 0 1\n");
 
 	assert_int_equal(m->n_triangles, 1);
 	assert_int_equal(m->n_vertices, 3);
