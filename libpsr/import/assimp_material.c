@@ -130,7 +130,8 @@ static int set_emission(struct psr_material *out, struct assimp_io *io, const st
 	                                                                 : aiTextureType_EMISSIVE,
 	                    uv_source, err);
 	/* A map without a color, or with black, means itself. */
-	if (out->emissive_texture.image >= 0 && !(out->emissive[0] > 0.0f || out->emissive[1] > 0.0f || out->emissive[2] > 0.0f))
+	if (out->emissive_texture.image >= 0 && out->emissive[0] <= 0.0f && out->emissive[1] <= 0.0f &&
+	    out->emissive[2] <= 0.0f)
 		out->emissive[0] = out->emissive[1] = out->emissive[2] = 1.0f;
 	return rc;
 }

@@ -157,8 +157,8 @@ int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct a
 	out->uv_set = take_set(uv_source, set < AI_MAX_NUMBER_OF_TEXTURECOORDS ? (int)set : 0);
 	if (out->uv_set < 0) {
 		out->uv_set = 0;
-		import_mesh_warn(io->im, "the texture \"%.100s\" was left out: its material uses more than %d sets of coordinates",
-		                 name.data, PSR_UV_SETS);
+		import_mesh_warn(io->im, "the texture \"%.100s\" was left out: its material uses more than %d sets of "
+		                 "coordinates", name.data, PSR_UV_SETS);
 		return PSR_OK;
 	}
 	out->image = image;
@@ -186,7 +186,8 @@ static int add_made(struct assimp_io *io, int a, int b, const char *kind,
 	paths = realloc(io->image_path, ((size_t)mesh->n_images + 1) * sizeof *paths);
 	if (paths != NULL)
 		io->image_path = paths;
-	if (copy == NULL || paths == NULL || !make(&image, a < 0 ? NULL : &mesh->image[a], b < 0 ? NULL : &mesh->image[b])) {
+	if (copy == NULL || paths == NULL ||
+	    !make(&image, a < 0 ? NULL : &mesh->image[a], b < 0 ? NULL : &mesh->image[b])) {
 		free(copy);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", io->im->path);
 	}

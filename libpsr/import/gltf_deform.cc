@@ -79,7 +79,8 @@ const std::vector<transform> &skin_joints(reader &r, int skin)
 		transform bind;
 
 		if (joint < 0 || (size_t)joint >= r.world.size() || !r.is_placed[(size_t)joint])
-			refuse(PSR_ERR_FORMAT, "%s: node %d, its joint %zu, is missing or part of a cycle", place.c_str(), joint, i);
+			refuse(PSR_ERR_FORMAT, "%s: node %d, its joint %zu, is missing or part of a cycle", place.c_str(), joint,
+			       i);
 		/* The last row is 0 0 0 1 but for rounding. */
 		for (size_t k = 0; k < 16 && !inverse.empty(); k++)
 			bind.m[k] = k % 4 < 3 ? (double)inverse[16 * i + k] : bind.m[k];

@@ -238,7 +238,8 @@ void set_relief_and_light(reader &r, struct psr_material &m, material_use &use, 
                           const std::string &place)
 {
 	auto strength = g.extensions.find("KHR_materials_emissive_strength");
-	const double factor = strength != g.extensions.end() ? value_number(strength->second, "emissiveStrength", 1.0) : 1.0;
+	const double factor =
+		strength != g.extensions.end() ? value_number(strength->second, "emissiveStrength", 1.0) : 1.0;
 
 	m.normal_scale = (float)g.normalTexture.scale;
 	if (m.normal_scale != 0.0f)

@@ -44,15 +44,15 @@ void check_counts(const primitive &p, const material_use &use, const std::string
 		check_count(p.uv[set].size() / 2, use.uv_name[set].c_str(), n, place);
 	for (size_t set = 0; set < p.joint.size(); set++) {
 		if (p.joint[set].size() != p.weight[set].size())
-			refuse(PSR_ERR_FORMAT, "%s: JOINTS_%zu and WEIGHTS_%zu have different numbers of elements", place.c_str(), set,
-			       set);
+			refuse(PSR_ERR_FORMAT, "%s: JOINTS_%zu and WEIGHTS_%zu have different numbers of elements", place.c_str(),
+			       set, set);
 		check_count(p.joint[set].size() / 4, "JOINTS", n, place);
 	}
 	for (const auto *list : { &p.triangle, &p.point })
 		for (size_t i = 0; i < list->size(); i++)
 			if ((*list)[i] >= n)
-				refuse(PSR_ERR_FORMAT, "%s: corner %zu is vertex %u, but POSITION has %zu", place.c_str(), i, (*list)[i],
-				       n);
+				refuse(PSR_ERR_FORMAT, "%s: corner %zu is vertex %u, but POSITION has %zu", place.c_str(), i,
+				       (*list)[i], n);
 }
 
 uint64_t count_flat(int mode, uint64_t n)

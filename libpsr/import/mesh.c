@@ -169,7 +169,8 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 	if (n_vertices > im->vertex_capacity || mesh->position == NULL) {
 		uint64_t n = next_capacity(im->vertex_capacity, n_vertices, IMPORT_MAX_VERTICES);
 
-		if (!create(&mesh->position, 1, 1, sizeof *mesh->position) || !create(&mesh->normal, 1, 1, sizeof *mesh->normal) ||
+		if (!create(&mesh->position, 1, 1, sizeof *mesh->position) ||
+		    !create(&mesh->normal, 1, 1, sizeof *mesh->normal) ||
 		    !resize_columns(column, import_vertex_columns(column, mesh), n))
 			return 0;
 		im->vertex_capacity = n;
@@ -268,7 +269,8 @@ int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, stru
 	struct psr_mesh *mesh = im->mesh;
 	const uint64_t n = (uint64_t)image->width * image->height;
 
-	if (n > IMPORT_MAX_PIXELS - im->n_pixels || !resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
+	if (n > IMPORT_MAX_PIXELS - im->n_pixels ||
+	    !resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
 		free(image->rgba);
 		return n > IMPORT_MAX_PIXELS - im->n_pixels ?
 		       psr_fail(err, PSR_ERR_LIMIT, "%s: its images have more than %llu pixels", im->path,

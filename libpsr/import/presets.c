@@ -39,8 +39,8 @@ static int is_taken(const char *names, size_t stride, uint32_t n, const char *na
 }
 
 /* `names` is the first of n names, one every `stride` bytes. */
-static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char *kind, const char *names, size_t stride,
-                        uint32_t n)
+static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char *kind, const char *names,
+                        size_t stride, uint32_t n)
 {
 	char base[PSR_NAME_BYTES], suffix[16];
 	unsigned number = 1;

@@ -125,8 +125,8 @@ static int drop_points(struct import_mesh *im, struct psr_error *err)
 
 	for (uint32_t p = 0; p < mesh->n_points; p++) {
 		if (mesh->point_material[p] >= mesh->n_materials)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: point %u refers to material %u, but there are only %u", im->path, p,
-			                mesh->point_material[p], mesh->n_materials);
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: point %u refers to material %u, but there are only %u", im->path,
+			                p, mesh->point_material[p], mesh->n_materials);
 		if (!is_finite3(mesh->point[p]))
 			continue;
 		for (int i = 0; kept != p && i < n_columns; i++)
