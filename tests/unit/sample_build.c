@@ -44,7 +44,8 @@ static void sample_at(const struct psr_blocks *b, uint32_t block, unsigned s, fl
 {
 	const struct psr_projection *p = &b->projection[b->block_projection[block]];
 	int row = 8 * b->row[block] + (int)s / 8, col = 8 * b->col[block] + (int)s % 8;
-	double x = (col + (row & 1) / 2.0) * (double)p->spacing, y = row * (sqrt(3.0) / 2) * (double)p->spacing;
+	double spacing = (double)p->spacing * (double)(1u << b->level[block]);
+	double x = (col + (row & 1) / 2.0) * spacing, y = row * (sqrt(3.0) / 2) * spacing;
 	uint64_t below = b->mask[block] & (((uint64_t)1 << s) - 1);
 	double z = (double)(b->depth_bias[block] + b->depth_step[block] * (float)b->depth[b->attr_first[block] + __builtin_popcountll(below)]);
 
@@ -106,7 +107,7 @@ static void spheres_hold_their_samples(void **state)
 	for (uint32_t c = 0; c < b->n_clusters; c++) {
 		const struct psr_cluster *cluster = &b->cluster[c];
 
-		assert_in_range(cluster->n_blocks, 1, 64);
+		assert_in_range(cluster->n_blocks, 1, cluster->level == 0 ? 1024 : 16384);
 		for (uint32_t i = cluster->first_block; i < cluster->first_block + cluster->n_blocks; i++) {
 			float center[3] = { b->sphere_x[i], b->sphere_y[i], b->sphere_z[i] }, d[3];
 
