@@ -29,7 +29,7 @@ static size_t place_of(const struct seen *seen, uint64_t key)
 	return (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 16) & (seen->size - 1);
 }
 
-/* From any thread. 0: there is no room. */
+/* From any thread. 0: there is no room, which takes a walk through all of it to find. */
 static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
 	size_t i = place_of(seen, key);
@@ -77,7 +77,7 @@ static void look_along_row(int i, void *userdata)
 	struct ray ray[BATCH];
 	struct ray_hit hit[BATCH];
 
-	for (int c = -reach; c < reach; c++) {
+	for (int c = -reach; c < reach && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
 		double x = (c + 0.5) * look->ds;
 
 		for (int k = 0; k < 3; k++) {
@@ -87,7 +87,7 @@ static void look_along_row(int i, void *userdata)
 		if (++n < BATCH && c + 1 < reach)
 			continue;
 		ray_scene_trace(look->scene, ray, n, 0, hit);
-		for (int k = 0; k < n; k++)
+		for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++)
 			if (hit[k].prim != RAY_NONE)
 				mark(look, &ray[k], &hit[k]);
 		n = 0;
@@ -123,6 +123,7 @@ int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struc
 	if (seen->table == NULL)
 		return PSR_ERR_MEMORY;
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	/* A view that fills the table is broken off, and looked along again once there is room. */
 	for (unsigned i = 0; i < N_VIEWS;) {
 		double direction[3];
 
