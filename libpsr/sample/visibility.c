@@ -1,4 +1,4 @@
-#include <math.h>
+#include <assert.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,9 @@
 #include "visibility_draw.h"
 
 #define TRIANGLE_LEVEL 2
-#define VIEW_LEVEL 4
-#define N_TRIANGLES (8u << 2 * VIEW_LEVEL)
+#define FINER 2 /* levels, of the directions */
+#define MOST_LEVEL 3
+#define MOST_WORDS 8
 
 /* Directions at the corners of triangles belong to them all, whatever they are rounded to. */
 #define ON_EDGE 1e-9
@@ -17,23 +18,24 @@
 /* An axis of which both ends are looked from. */
 struct view {
 	double axis[3];
-	uint64_t triangles[2][2]; /* of each end: for which it counts */
+	uint64_t triangles[2][MOST_WORDS]; /* of each end: for which it counts */
 };
 
 struct job {
 	const struct vpoints *points;
 	const struct vlevel *level;
-	uint64_t (*mask)[2];
+	size_t words; /* of a mask */
+	uint64_t *mask;
 	const struct view *view;
 	int n_views;
 	atomic_int next, failed;
 };
 
-static void planes_of(unsigned triangle, double plane[3][3])
+static void planes_of(int level, unsigned triangle, double plane[3][3])
 {
 	double corner[3][3];
 
-	psr_direction_corners(TRIANGLE_LEVEL, triangle, corner);
+	psr_direction_corners(level, triangle, corner);
 	for (int i = 0; i < 3; i++) {
 		v3d_cross(plane[i], corner[(i + 1) % 3], corner[(i + 2) % 3]);
 		v3d_normalize(plane[i], plane[i]);
@@ -42,13 +44,13 @@ static void planes_of(unsigned triangle, double plane[3][3])
 	}
 }
 
-static void add_triangles(struct view *view)
+static void add_triangles(struct view *view, int level)
 {
-	for (unsigned t = 0; t < PSR_MASK_TRIANGLES; t++) {
+	for (unsigned t = 0; t < 8u << 2 * level; t++) {
 		double plane[3][3];
 		uint64_t inside[2] = { 1, 1 };
 
-		planes_of(t, plane);
+		planes_of(level, t, plane);
 		for (int i = 0; i < 3; i++) {
 			double side = v3d_dot(plane[i], view->axis);
 
@@ -79,15 +81,15 @@ static int is_end_0(const double v[3])
 	return 0;
 }
 
-/* The corners of all triangles of a level, each pair once. */
-static int make_views(struct view *view)
+/* The corners of all triangles that are FINER than those of a level, each pair once. */
+static int make_views(struct view *view, int level)
 {
 	int n = 0, n_kept = 0;
 
-	for (unsigned t = 0; t < N_TRIANGLES; t++) {
+	for (unsigned t = 0; t < 8u << 2 * (level + FINER); t++) {
 		double corner[3][3];
 
-		psr_direction_corners(VIEW_LEVEL, t, corner);
+		psr_direction_corners(level + FINER, t, corner);
 		for (int i = 0; i < 3; i++) {
 			if (!is_end_0(corner[i]))
 				continue;
@@ -100,7 +102,7 @@ static int make_views(struct view *view)
 		if (n_kept == 0 || compare_views(&view[n_kept - 1], &view[i]) != 0)
 			view[n_kept++] = view[i];
 	for (int i = 0; i < n_kept; i++)
-		add_triangles(&view[i]);
+		add_triangles(&view[i], level);
 	return n_kept;
 }
 
@@ -111,13 +113,13 @@ static void look(const struct job *job, const struct vpicture *picture, const st
 
 		for (int end = 0; end < 2; end++) {
 			const uint64_t *triangles = view->triangles[end];
-			uint64_t *mask = job->mask[block], lacks = 0;
+			uint64_t *mask = job->mask + job->words * block, lacks = 0;
 
-			for (int w = 0; w < 2; w++)
+			for (size_t w = 0; w < job->words; w++)
 				lacks |= triangles[w] & ~__atomic_load_n(&mask[w], __ATOMIC_RELAXED);
 			if (lacks == 0 || !vpicture_sees(picture, job->points, block, end))
 				continue;
-			for (int w = 0; w < 2; w++)
+			for (size_t w = 0; w < job->words; w++)
 				__atomic_fetch_or(&mask[w], triangles[w], __ATOMIC_RELAXED);
 		}
 	}
@@ -142,36 +144,43 @@ static void draw_views(int thread, void *userdata)
 	free(picture);
 }
 
-static int mask_level(const struct vpoints *points, unsigned which, struct psr_pool *pool, const struct view *view,
-                      int n_views, uint64_t (*mask)[2])
+static int mask_level(struct job *job, unsigned which, struct psr_pool *pool)
 {
 	struct vlevel level;
-	struct job job = { .points = points, .level = &level, .mask = mask, .view = view, .n_views = n_views };
-	int rc = vlevel_init(&level, points, which);
+	int rc = vlevel_init(&level, job->points, which);
 
+	job->level = &level;
 	if (rc == PSR_OK && level.n_blocks > 0) {
-		psr_pool_for(pool, psr_pool_threads(pool), draw_views, &job);
-		rc = atomic_load(&job.failed) ? PSR_ERR_MEMORY : PSR_OK;
+		atomic_store(&job->next, 0);
+		psr_pool_for(pool, psr_pool_threads(pool), draw_views, job);
+		rc = atomic_load(&job->failed) ? PSR_ERR_MEMORY : PSR_OK;
 	}
 	vlevel_fini(&level);
 	return rc;
 }
 
-int visibility_masks(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2])
+int visibility_masks_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool, uint64_t *mask)
 {
 	struct vpoints points;
-	struct view *view = psr_alloc_array(3 * N_TRIANGLES, sizeof *view);
-	int n_views, rc = view != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
+	struct view *view = psr_alloc_array((size_t)3 * 8 << 2 * (level + FINER), sizeof *view);
+	struct job job = { .points = &points, .words = words, .mask = mask, .view = view };
+	int rc = view != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
 
-	memset(mask, 0, blocks->n_blocks * sizeof *mask);
+	assert(level >= 0 && level <= MOST_LEVEL && words <= MOST_WORDS && 64 * words >= 8u << 2 * level);
+	memset(mask, 0, blocks->n_blocks * words * sizeof *mask);
 	if (rc == PSR_OK) {
-		n_views = make_views(view);
-		for (unsigned level = 0; level < blocks->n_levels && rc == PSR_OK; level++)
-			rc = mask_level(&points, level, pool, view, n_views, mask);
+		job.n_views = make_views(view, level);
+		for (unsigned which = 0; which < blocks->n_levels && rc == PSR_OK; which++)
+			rc = mask_level(&job, which, pool);
 		vpoints_fini(&points);
 	}
 	psr_free(view);
 	return rc;
+}
+
+int visibility_masks(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2])
+{
+	return visibility_masks_at(blocks, TRIANGLE_LEVEL, 2, pool, mask[0]);
 }
 
 int visibility_is_full(uint32_t n_blocks, const uint64_t (*mask)[2])

@@ -5,11 +5,13 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "../render/render.h"
+#include "cone.h"
 #include "visibility.h"
 #include "visibility_draw.h"
 
 #define NOBODY UINT32_MAX
 #define MARGIN 2
+#define BATCH 16 /* views */
 #define NEIGHBOURS 1.0 /* steps of the lattice */
 #define MOST_SIDE 8192
 #define NEAREST_EYE 1.05 /* from the middle of the unit sphere */
@@ -31,8 +33,9 @@ struct job {
 	const struct vlevel *level;
 	const struct ray_scene *scene;
 	const uint32_t *block_of; /* of each sample */
-	int n_views;
-	uint64_t *n_seen, *n_lost; /* of each view */
+	int first_view;
+	uint64_t limit;                               /* pixels to look at, of each view */
+	uint64_t n_seen[BATCH], n_lost[BATCH];
 	atomic_int next, failed;
 };
 
@@ -116,23 +119,6 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 	}
 }
 
-/* As render/cull.c decides, but without what it allows for rounding. */
-static int cone_culls(const struct psr_blocks *b, uint32_t block, const struct eye *eye)
-{
-	float axis[3], center[3], v[3], g, sine, length, r;
-
-	if (b->cone_cos == NULL || !(b->cone_cos[block] > 0) || (b->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
-		return 0;
-	v3f_set(axis, b->cone_x[block], b->cone_y[block], b->cone_z[block]);
-	v3f_set(center, b->sphere_x[block], b->sphere_y[block], b->sphere_z[block]);
-	to_eye_from(eye, center, v);
-	g = -v3f_dot(axis, v);
-	sine = sqrtf(1 - b->cone_cos[block] * b->cone_cos[block]);
-	length = v3f_length(v);
-	r = eye->is_perspective ? b->sphere_r[block] : 0;
-	return g > (sine + BACK_SINE) * length + r * (1 + BACK_SINE);
-}
-
 static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, const struct eye *eye)
 {
 	const struct psr_blocks *b = points->blocks;
@@ -140,7 +126,11 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 	float v[3];
 	unsigned triangle;
 
-	if (cone_culls(b, block, eye))
+	float place[3];
+
+	for (int i = 0; i < 3; i++)
+		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->frame[2][i]);
+	if (cone_culls(b, block, place, eye->is_perspective))
 		return 1;
 	if (b->visibility == NULL)
 		return 0;
@@ -171,7 +161,7 @@ static void look(const struct job *job, const struct eye *eye, const struct pict
                  uint64_t *n_lost)
 {
 	*n_seen = *n_lost = 0;
-	for (int i = 0; i < picture->side * picture->side; i++) {
+	for (int i = 0; i < picture->side * picture->side && *n_seen < job->limit; i++) {
 		uint32_t k = picture->winner[i];
 
 		if (k == NOBODY)
@@ -193,10 +183,10 @@ static void draw_views(int thread, void *userdata)
 	picture.nearest = psr_alloc_array(n, sizeof *picture.nearest);
 	picture.winner = psr_alloc_array(n, sizeof *picture.winner);
 	if (picture.nearest != NULL && picture.winner != NULL) {
-		for (int i; (i = atomic_fetch_add(&job->next, 1)) < job->n_views;) {
+		for (int i; (i = atomic_fetch_add(&job->next, 1)) < BATCH;) {
 			struct eye eye;
 
-			place_eye(&eye, i);
+			place_eye(&eye, job->first_view + i);
 			draw(job, &eye, &picture);
 			look(job, &eye, &picture, &job->n_seen[i], &job->n_lost[i]);
 		}
@@ -207,37 +197,58 @@ static void draw_views(int thread, void *userdata)
 	psr_free(picture.winner);
 }
 
-int visibility_lost(const struct psr_blocks *blocks, const struct ray_scene *scene, int n_views, struct psr_pool *pool,
-                    uint64_t *n_seen, uint64_t *n_lost)
+/* Batch after batch, and of the last view that is needed only as many pixels as are. */
+static int look_at(struct job *job, uint64_t n_trials, struct psr_pool *pool, uint64_t *n_lost)
+{
+	uint64_t n_left = n_trials;
+
+	for (*n_lost = 0; n_left > 0; job->first_view += BATCH) {
+		uint64_t before = n_left;
+
+		job->limit = n_left;
+		atomic_store(&job->next, 0);
+		psr_pool_for(pool, psr_pool_threads(pool), draw_views, job);
+		for (int i = 0; i < BATCH && !atomic_load(&job->failed); i++) {
+			if (job->n_seen[i] > n_left) { /* the views after it are drawn again, too, and not counted */
+				job->limit = n_left;
+				atomic_store(&job->next, i);
+				draw_views(0, job);
+				if (atomic_load(&job->failed))
+					break;
+			}
+			n_left -= job->n_seen[i];
+			*n_lost += job->n_lost[i];
+			if (n_left == 0)
+				return PSR_OK;
+		}
+		if (atomic_load(&job->failed))
+			return PSR_ERR_MEMORY;
+		if (n_left == before)
+			break; /* all samples face away from everywhere */
+	}
+	return PSR_OK;
+}
+
+int visibility_lost(const struct psr_blocks *blocks, const struct ray_scene *scene, uint64_t n_trials,
+                    struct psr_pool *pool, uint64_t *n_lost)
 {
 	struct vpoints points = { 0 };
 	struct vlevel level = { 0 };
-	struct job job = { .points = &points, .level = &level, .scene = scene, .n_views = n_views };
+	struct job job = { .points = &points, .level = &level, .scene = scene };
 	uint32_t *block_of = psr_alloc_array(blocks->n_samples, sizeof *block_of);
-	int rc;
+	int rc = block_of != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
 
-	job.n_seen = psr_alloc_array((size_t)n_views, sizeof *job.n_seen);
-	job.n_lost = psr_alloc_array((size_t)n_views, sizeof *job.n_lost);
-	rc = block_of != NULL && job.n_seen != NULL && job.n_lost != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
 	if (rc == PSR_OK)
 		rc = vlevel_init(&level, &points, 0);
-	*n_seen = *n_lost = 0;
 	if (rc == PSR_OK) {
 		for (uint32_t b = 0; b < blocks->n_blocks; b++)
 			for (int i = 0; i < __builtin_popcountll(blocks->mask[b]); i++)
 				block_of[blocks->attr_first[b] + (uint32_t)i] = b;
 		job.block_of = block_of;
-		psr_pool_for(pool, psr_pool_threads(pool), draw_views, &job);
-		rc = atomic_load(&job.failed) ? PSR_ERR_MEMORY : PSR_OK;
-	}
-	for (int i = 0; i < n_views && rc == PSR_OK; i++) {
-		*n_seen += job.n_seen[i];
-		*n_lost += job.n_lost[i];
+		rc = look_at(&job, n_trials, pool, n_lost);
 	}
 	vpoints_fini(&points);
 	vlevel_fini(&level);
 	psr_free(block_of);
-	psr_free(job.n_seen);
-	psr_free(job.n_lost);
 	return rc;
 }
