@@ -9,8 +9,8 @@
  * its rim, rounded downwards. The cosine is -1, and the axis of no meaning, if no cap smaller than a hemisphere holds
  * them.
  *
- * Which normals a block's cap has to hold depends on what the renderer leaves out: a sample whose *stored* normal, which
- * is the shading normal quantised, faces away (render/warp.c). A block is culled if every normal of the cap faces away
+ * Which normals a block's cap has to hold depends on what the renderer leaves out: a sample whose *stored* normal,
+ * which is the shading normal quantised, faces away (render/warp.c). A block is culled if every normal of the cap faces away
  * from the eye at every place within its sphere. So with all stored normals in the cap, as they are read back, a block
  * is culled only if each of its samples would be left out anyway, and culling changes no bit of any frame. It is not
  * enough to hold the *geometric* normals: at a silhouette the stored normal may still face the eye where the face does

@@ -2,6 +2,7 @@
 #ifndef PSR_SAMPLE_VISIBILITY_H
 #define PSR_SAMPLE_VISIBILITY_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include "psr/direction.h"
 #include "psr/model.h"
@@ -11,8 +12,8 @@
 /* Masks of all blocks, whatever their level: bit t of a block is set iff one of its samples is seen from some direction
  * in triangle t (level 2 of psr/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
  *
- * As in [G] the blocks of a level are drawn orthographically, at a sample a pixel, without those samples that face away,
- * as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a triangle,
+ * As in [G] the blocks of a level are drawn orthographically, at a sample a pixel, without those samples that face
+ * away, as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a triangle,
  * those on its sides being shared with its neighbours. Since a normal that faces any direction of a triangle faces one
  * of its corners, only occlusion is left to chance; and there a sample counts as seen unless it is behind the farthest
  * of the 25 pixels around it. (Four times the directions set 2 in 100 more bits; OR-ing whole neighbouring triangles
@@ -23,7 +24,8 @@ int visibility_masks(const struct psr_blocks *blocks, struct psr_pool *pool, uin
 
 /* The same with the triangles of any level, 0..3, from directions two levels finer: `words` words a block, enough for
  * 8 * 4^level bits. */
-int visibility_masks_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool, uint64_t *mask);
+int visibility_masks_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool,
+                        uint64_t *mask);
 
 /* Whether all bits of all masks are set: then they are not worth storing. */
 int visibility_is_full(uint32_t n_blocks, const uint64_t (*mask)[2]);
