@@ -54,10 +54,11 @@ static void die(const char *what, const char *detail)
 }
 
 /* Returns "met" or "missed" and counts. */
-static const char *target(const char *name, double value, double bound, int is_met)
+static const char *target(const char *model, const char *name, double value, double bound, int is_met)
 {
 	cJSON *list = cJSON_GetObjectItemCaseSensitive(bench.json, "targets"), *item = cJSON_CreateObject();
 
+	cJSON_AddStringToObject(item, "model", model);
 	cJSON_AddStringToObject(item, "name", name);
 	cJSON_AddNumberToObject(item, "value", value);
 	cJSON_AddNumberToObject(item, "bound", bound);
@@ -148,18 +149,18 @@ static void print_head(void)
 static void print_row(const char *name, int resolution, const struct result *r, double max_seconds)
 {
 	double memory = per(r->bytes, r->samples), packed = per(r->bytes_packed, r->samples), missing = per(r->missing, r->trials);
-	char share[32], label[64];
+	char share[32], at[64];
 
 	snprintf(share, sizeof share, "%" PRIu64 " / %" PRIu64, r->missing, r->trials);
 	printf("%-9s %5d %7.2f %7.2f %6.0f %9" PRIu64 " %7" PRIu32 " %3" PRIu32 " | %6.2f %6.2f %6.2f | %-16s |", name, resolution,
 	       r->use.seconds, r->use.cpu_seconds, r->use.peak_mib, r->samples, r->blocks, r->levels, memory,
 	       per(r->bytes_plain, r->samples), packed, share);
-	snprintf(label, sizeof label, "%s at %d", name, resolution);
-	printf(" %s,", target(label, r->use.seconds, max_seconds, r->use.seconds < max_seconds));
-	printf(" %s,", target("bytes a sample in memory", memory, MAX_BYTES_IN_MEMORY, memory <= MAX_BYTES_IN_MEMORY));
-	printf(" %s,", target("bytes a sample packed", packed, MAX_BYTES_PACKED, packed <= MAX_BYTES_PACKED));
-	printf(" %s,", target("missing surface", missing, MAX_MISSING, r->trials > 0 && missing < MAX_MISSING));
-	printf(" %s\n", target("peak MiB", r->use.peak_mib, MAX_PEAK_MIB, r->use.peak_mib < MAX_PEAK_MIB));
+	snprintf(at, sizeof at, "%s at %d", name, resolution);
+	printf(" %s,", target(at, "seconds", r->use.seconds, max_seconds, r->use.seconds < max_seconds));
+	printf(" %s,", target(at, "bytes a sample in memory", memory, MAX_BYTES_IN_MEMORY, memory <= MAX_BYTES_IN_MEMORY));
+	printf(" %s,", target(at, "bytes a sample packed", packed, MAX_BYTES_PACKED, packed <= MAX_BYTES_PACKED));
+	printf(" %s,", target(at, "missing of the visible surface", missing, MAX_MISSING, r->trials > 0 && missing < MAX_MISSING));
+	printf(" %s\n", target(at, "peak MiB", r->use.peak_mib, MAX_PEAK_MIB, r->use.peak_mib < MAX_PEAK_MIB));
 	add_json(name, resolution, r);
 	fflush(stdout);
 }
@@ -221,7 +222,7 @@ static void dragon(const char *source)
 		die(source, err.text);
 	printf("primary rays on its %" PRIu32 " triangles, one thread: ours %.2f, Embree's packets %.2f Mray/s of CPU time: ratio %.2f, %s\n",
 	       mesh->n_triangles, ours, embree, ours / embree,
-	       target("primary rays against Embree's packets", ours / embree, MIN_RATE, ours / embree >= MIN_RATE));
+	       target("stanford", "primary rays against Embree's packets", ours / embree, MIN_RATE, ours / embree >= MIN_RATE));
 	psr_mesh_destroy(mesh);
 	print_head();
 	for (size_t i = 0; i < sizeof runs / sizeof runs[0]; i++) {
