@@ -90,7 +90,7 @@ static void branch(struct shape *shape, double height, double length, double tur
 		int k = (int)x, side = i & 1 ? 1 : -1;
 		double spread = i == n - 1 ? 0 : random_in(random, 0.6, 1.0) * side,
 			size = random_in(random, 0.3, 0.42) * (1.1 - 0.35 * t);
-		size *= 0.5 + 0.5 * (length < 0.8 ? length / 0.8 : 1);
+		size *= 0.3 + 0.7 * (length < 0.8 ? length / 0.8 : 1);
 		for (int j = 0; j < 3; j++)
 			at[j] = path[k][j] + (path[k + 1][j] - path[k][j]) * rest;
 		v3d_set(out, c - spread * s, random_in(random, -0.1, 0.25), -s - spread * c);

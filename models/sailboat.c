@@ -132,8 +132,8 @@ static void fittings(struct shape *shape)
 	sweep_bend(shape, tiller[0], tiller[1], tiller[2], 0.03, 16, 16);
 	shape->current = GLASS;
 	for (int i = 0; i < 6; i++) {
-		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.02 };
-		sweep_block(shape, at, half, 0.015);
+		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.045 };
+		sweep_block(shape, at, half, 0.03);
 	}
 }
 

@@ -75,7 +75,7 @@ static void head(struct shape *shape)
 	}
 	for (int side = -1; side <= 1; side += 2) {
 		const double eye[3] = { 0.76, 1.71, side * 0.225 }, pupil[3] = { 0.785, 1.72, side * 0.272 };
-		static const double eye_half[3] = { 0.085, 0.085, 0.06 }, pupil_half[3] = { 0.042, 0.042, 0.03 };
+		static const double eye_half[3] = { 0.085, 0.085, 0.06 }, pupil_half[3] = { 0.045, 0.045, 0.055 };
 		shape->current = EYE;
 		sweep_ball(shape, eye, eye_half, 20, 28);
 		shape->current = PUPIL;
