@@ -120,8 +120,9 @@ static uint64_t missing(const struct ball *ball, const struct greedy_point *poin
 	return n_missing;
 }
 
-/* Points of a spiral have a neighbour within sqrt(4 pi / n) * 1.2 in every direction: with sides of triangles of two thirds
- * of a pixel no pixel in the middle of a face can be empty ([G] 4.3); with one and a half pixels between them many are. */
+/* Points of a spiral have a neighbour within sqrt(4 pi / n) * 1.2 in every direction: with sides of triangles of two
+ * thirds of a pixel no pixel in the middle of a face can be empty ([G] 4.3); with one and a half pixels between them
+ * many are. */
 static void trials_find_holes_and_only_holes(void **state)
 {
 	struct ball ball = make_ball(0.9);
@@ -145,8 +146,8 @@ static void samples_that_face_away_or_lie_deeper_fill_no_pixel(void **state)
 	struct greedy_point *inside_out = spiral(120000, 0.9, 1), *deep = spiral(120000, 0.5, 0);
 
 	(void)state;
-	/* The far side, now turned to the viewer, is 1.8 c behind a place seen at cosine c, where ds (1 + 1.5 / c) is allowed: near
-	 * enough for c < 0.12, which are c^2 = 1.5 % of the places; a pixel reaches half as far again. */
+	/* The far side, now turned to the viewer, is 1.8 c behind a place seen at cosine c, where ds (1 + 1.5 / c) is
+	 * allowed: near enough for c < 0.12, which are c^2 = 1.5 % of the places; a pixel reaches half as far again. */
 	assert_true(missing(&ball, inside_out, 120000, ds) > 20 * 300 * 0.97);
 	/* The deeper sphere lies 0.4 and more behind places that are seen at 34 degrees or less. */
 	assert_int_equal(missing(&ball, deep, 120000, ds), 20 * 300);
