@@ -1,4 +1,5 @@
 #include "../base/vec.h"
+#include "../render/render.h"
 #include "cone.h"
 
 /* Normals and axis are rounded to floats: their product is off by some 2^-22. */
@@ -47,8 +48,8 @@ static int is_outside(const struct cap *cap, const double v[3])
 	return v3d_dot(cap->axis, v) < cap->cosine - OUTSIDE;
 }
 
-/* [G] 6.4: the smallest cap is bound by two of the normals or by three. Welzl's way to them, one normal after the other: one that
- * is outside of the cap of those before it is on the rim of the cap that holds it too. */
+/* [G] 6.4: the smallest cap is bound by two of the normals or by three. Welzl's way to them, one normal after the
+ * other: one that is outside of the cap of those before it is on the rim of the cap that holds it too. */
 static void smallest_cap(struct cap *cap, const float (*normal)[3], int n)
 {
 	double a[3], b[3], c[3];
@@ -104,4 +105,25 @@ void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine)
 		least = -1;
 	}
 	*cosine = (float)least;
+}
+
+int cone_culls(const struct psr_blocks *blocks, uint32_t block, const float eye[3], int is_perspective)
+{
+	float cosine, sine, g = 0, length2 = 0, r = is_perspective ? blocks->sphere_r[block] : 0;
+
+	if (blocks->cone_cos == NULL || (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
+		return 0;
+	cosine = blocks->cone_cos[block];
+	if (cosine <= 0)
+		return 0;
+	const float axis[3] = { blocks->cone_x[block], blocks->cone_y[block], blocks->cone_z[block] };
+	const float center[3] = { blocks->sphere_x[block], blocks->sphere_y[block], blocks->sphere_z[block] };
+	for (int k = 0; k < 3; k++) {
+		float d = is_perspective ? center[k] - eye[k] : -eye[k];
+
+		g += d * axis[k];
+		length2 += d * d;
+	}
+	sine = sqrtf(1 - cosine * cosine);
+	return g > (sine + BACK_SINE) * sqrtf(length2) + r * (1 + BACK_SINE);
 }

@@ -85,7 +85,8 @@ static int disc_is_absent(const struct psr_mesh *mesh, uint32_t point, const str
 	       && alpha < (material->alpha == PSR_ALPHA_MASK ? material->alpha_cutoff : 0.5f);
 }
 
-/* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but grazes. */
+/* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but
+ * grazes. */
 enum verdict { STOPS, GOES_ON, MUST_LOOK };
 
 static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, uint32_t prim)
