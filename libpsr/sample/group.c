@@ -6,7 +6,6 @@
 #include "psr/error.h"
 
 #define GROUP_BLOCKS 1024
-#define MOST_PARTS 64 /* groups that can share a block of a coarse level */
 
 struct place {
 	float center[3];
@@ -101,29 +100,40 @@ static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_f
 	return PSR_OK;
 }
 
-struct parts {
-	uint32_t group[MOST_PARTS];
-	uint64_t part[MOST_PARTS];
-	int n;
+/* Which samples of a coarse block each group around it needs: on a crowded coarsest level there are hundreds of groups. */
+struct part {
+	uint32_t group;
+	uint64_t mask;
 };
 
-static void add_part(struct parts *parts, uint32_t group, unsigned s)
-{
-	int i = 0;
+struct parts {
+	struct part *part;
+	uint32_t n, capacity;
+};
 
-	while (i < parts->n && parts->group[i] != group)
+static int add_part(struct parts *parts, uint32_t group, unsigned s)
+{
+	uint32_t i = 0;
+
+	while (i < parts->n && parts->part[i].group != group)
 		i++;
-	if (i == MOST_PARTS)
-		return;
-	if (i == parts->n) {
-		parts->group[parts->n] = group;
-		parts->part[parts->n++] = 0;
+	if (i == parts->capacity) {
+		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
+		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		parts->part = grown;
+		parts->capacity = capacity;
 	}
-	parts->part[i] |= UINT64_C(1) << s;
+	if (i == parts->n)
+		parts->part[parts->n++] = (struct part){ group, 0 };
+	parts->part[i].mask |= UINT64_C(1) << s;
+	return PSR_OK;
 }
 
 /* All groups with a cell within `reach` of a sample. */
-static void find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
 {
 	int at[3], low[3], high[3];
 
@@ -145,10 +155,12 @@ static void find_groups(const struct cover *map, const float p[3], double reach,
 				if (away2 > reach * reach)
 					continue;
 				for (uint32_t i = cover_cell(map, at); i != COVER_NONE; i = map->point[i].next)
-					add_part(parts, map->point[i].patch, s);
+					if (add_part(parts, map->point[i].patch, s) != PSR_OK)
+						return PSR_ERR_MEMORY;
 			}
 		}
 	}
+	return PSR_OK;
 }
 
 struct blocks {
@@ -172,33 +184,34 @@ static int add_block(struct blocks *blocks, const struct draft_block *block)
 }
 
 static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
-                       const struct cover *map)
+                       const struct cover *map, struct parts *parts)
 {
-	struct parts parts = { .n = 0 };
+	int rc = PSR_OK;
 
-	for (uint64_t left = block->mask; left != 0; left &= left - 1) {
+	parts->n = 0;
+	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
 		unsigned s = (unsigned)__builtin_ctzll(left);
-		int n = parts.n;
+		uint32_t n = parts->n;
 		float p[3];
 
 		draft_position(draft, block, s, p);
-		find_groups(map, p, map->ds, s, &parts);
-		if (n == 0 && parts.n == 0)
-			find_groups(map, p, 3 * map->ds, s, &parts);
+		rc = find_groups(map, p, map->ds, s, parts);
+		if (rc == PSR_OK && n == 0 && parts->n == 0)
+			rc = find_groups(map, p, 3 * map->ds, s, parts);
 	}
-	for (int i = 0; i < parts.n; i++) {
+	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
 		struct draft_block part = *block;
 
-		part.group = parts.group[i];
-		part.part = parts.part[i];
-		if (add_block(blocks, &part) != PSR_OK)
-			return PSR_ERR_MEMORY;
+		part.group = parts->part[i].group;
+		part.part = parts->part[i].mask;
+		rc = add_block(blocks, &part);
 	}
-	return PSR_OK;
+	return rc;
 }
 
 static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest)
 {
+	struct parts parts = { NULL, 0, 0 };
 	struct cover map;
 	int rc = cover_init(&map, draft->ds * (double)(1u << level));
 
@@ -206,8 +219,9 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 		rc = map_groups(&map, draft, n_finest);
 	for (uint32_t b = n_finest; rc == PSR_OK && b < draft->n_blocks; b++)
 		if (draft->block[b].level == level)
-			rc = split_block(blocks, draft, &draft->block[b], &map);
+			rc = split_block(blocks, draft, &draft->block[b], &map, &parts);
 	cover_fini(&map);
+	free(parts.part);
 	return rc;
 }
 
