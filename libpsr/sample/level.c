@@ -3,6 +3,7 @@
 #include <time.h>
 #include "../base/mem.h"
 #include "level.h"
+#include "psr/direction.h"
 #include "psr/error.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
@@ -18,6 +19,24 @@ static double now(void)
 
 	clock_gettime(CLOCK_MONOTONIC, &t);
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+/* What is kept of a finer level was seen. Views from all around miss some of what is thinner than a pixel, the more the
+ * coarser they are. */
+static int see_finer(struct level *level)
+{
+	const struct cover *finer = level->finer;
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; finer != NULL && rc == PSR_OK && i < finer->n_points; i++) {
+		const struct cover_point *point = &finer->point[i];
+		const float *n = psr_direction_table()[point->normal], turned[3] = { -n[0], -n[1], -n[2] };
+
+		rc = seen_add(&level->seen, point->position, n);
+		if (rc == PSR_OK && point->two_sided)
+			rc = seen_add(&level->seen, point->position, turned);
+	}
+	return rc;
 }
 
 int level_make(struct level *level, const struct psr_projection *projection,
@@ -46,6 +65,8 @@ int level_make(struct level *level, const struct psr_projection *projection,
 		rc = cover_init(&level->cover, level->ds);
 	if (rc == PSR_OK)
 		rc = seen_init(&level->seen, level->scene, level->ds, level->pool);
+	if (rc == PSR_OK)
+		rc = see_finer(level);
 	STEP_DONE;
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
 		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
