@@ -111,11 +111,11 @@ static enum facing facing_of(const struct plan *plan, const struct plan_instance
 		axis2 += axis[k] * axis[k];
 	}
 	g /= __builtin_sqrtf(axis2);
-	const float sin_alpha = (float)b->cone_sine[block] / 255, cos_alpha = __builtin_sqrtf(1 - sin_alpha * sin_alpha);
-	const float length = __builtin_sqrtf(length2), spread = sin_alpha + 0.001f;
-	const float r = plan->perspective ? b->sphere_r[block] : 0;
+	const float sin_alpha = (float)b->cone_sine[block] / 255, spread = sin_alpha + 0.001f;
+	const float length = __builtin_sqrtf(length2), r = plan->perspective ? b->sphere_r[block] : 0;
 	if (g > (spread + BACK_SINE) * length + r * (1 + BACK_SINE))
 		return FACES_AWAY;
+	const float cos_alpha = __builtin_sqrtf(1 - sin_alpha * sin_alpha);
 	return g + (spread + 1 - cos_alpha) * length + r <= BACK_SINE * (length - r) ? FACES_EYE : IS_MIXED;
 }
 
