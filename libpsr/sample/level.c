@@ -3,15 +3,10 @@
 #include <time.h>
 #include "../base/mem.h"
 #include "level.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
 #define FIELD_PIXELS 3
-
-/* What dicing adds can be missed by what was tested before it was there only where it was snapped; a second time around
- * finds the rest. */
-#define N_DICES 2
 
 static double now(void)
 {
@@ -21,28 +16,10 @@ static double now(void)
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-/* What is kept of a finer level was seen. Views from all around miss some of what is thinner than a pixel, the more the
- * coarser they are. */
-static int see_finer(struct level *level)
-{
-	const struct cover *finer = level->finer;
-	int rc = PSR_OK;
-
-	for (uint32_t i = 0; finer != NULL && rc == PSR_OK && i < finer->n_points; i++) {
-		const struct cover_point *point = &finer->point[i];
-		const float *n = psr_direction_table()[point->normal], turned[3] = { -n[0], -n[1], -n[2] };
-
-		rc = seen_add(&level->seen, point->position, n);
-		if (rc == PSR_OK && point->two_sided)
-			rc = seen_add(&level->seen, point->position, turned);
-	}
-	return rc;
-}
-
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
 {
-	unsigned n_steps = level->n_projections + 3 + N_DICES, done = 0;
+	unsigned n_steps = level->n_projections / 2 + 4, done = 0;
 	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
 	double started = now();
 	int rc;
@@ -64,14 +41,13 @@ int level_make(struct level *level, const struct psr_projection *projection,
 	if (rc == PSR_OK)
 		rc = cover_init(&level->cover, level->ds);
 	if (rc == PSR_OK)
-		rc = seen_init(&level->seen, level->scene, level->ds, level->pool);
-	if (rc == PSR_OK)
-		rc = see_finer(level);
+		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen)
+		                               : seen_init(&level->seen, level->scene, level->ds, level->pool);
 	STEP_DONE;
-	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
-		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
+	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
+		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, &projection[i], level->pool);
 		level->n_rays += level->sheets[i].n_rays;
-		level->n_patches += level->sheets[i].n_patches;
+		level->n_patches += level->sheets[i].n_patches + level->sheets[i + 1].n_patches;
 		STEP_DONE;
 	}
 	level->seconds_rays = now() - started;
@@ -83,10 +59,9 @@ int level_make(struct level *level, const struct psr_projection *projection,
 		rc = keep_owned(level);
 	}
 	STEP_DONE;
-	for (int i = 0; rc == PSR_OK && i < N_DICES; i++) {
+	if (rc == PSR_OK)
 		rc = dice_surface(level);
-		STEP_DONE;
-	}
+	STEP_DONE;
 #undef STEP_DONE
 	return rc;
 }
