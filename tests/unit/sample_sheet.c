@@ -27,7 +27,7 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 	traced->mesh = mesh;
 	assert_int_equal(ray_scene_create(&traced->scene, mesh, zero, 1, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
-	assert_int_equal(sheets_trace(&traced->sheets, traced->scene, mesh, &projection, pool), PSR_OK);
+	assert_int_equal(sheets_trace(&traced->sheets, NULL, traced->scene, mesh, &projection, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
 
