@@ -180,6 +180,48 @@ static void threads_do_not_change_a_sheet(void **state)
 		done(&traced[i]);
 }
 
+/* Nested spheres: the rays of one side find what those of the other would. */
+static void both_sides_are_traced_at_once(void **state)
+{
+	const double direction[3] = { 0.1, -0.2, 1 };
+	struct psr_mesh *mesh = joined(meshes_sphere(30, zero, 0.95), meshes_sphere(20, zero, 0.5));
+	struct psr_projection turned;
+	struct psr_pool *pool = NULL;
+	struct sheets front, behind, alone;
+	struct traced traced;
+
+	(void)state;
+	mesh->material->two_sided = 1;
+	trace(&traced, mesh, direction, 0.02, 2);
+	turned = traced.sheets.projection;
+	for (int k = 0; k < 3; k++) {
+		turned.axis[0][k] = -turned.axis[0][k];
+		turned.axis[2][k] = -turned.axis[2][k];
+	}
+	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(sheets_trace(&front, &behind, traced.scene, mesh, &traced.sheets.projection, pool), PSR_OK);
+	assert_int_equal(sheets_trace(&alone, NULL, traced.scene, mesh, &turned, pool), PSR_OK);
+	assert_memory_equal(behind.projection.axis, turned.axis, sizeof turned.axis);
+	assert_int_equal(front.n_hits, traced.sheets.n_hits);
+	assert_int_equal(count_hits(&behind), count_hits(&alone));
+	for (uint32_t p = 0; p < alone.n_patches; p++) {
+		for (uint64_t left = alone.patch[p].mask; left != 0; left &= left - 1) {
+			unsigned s = (unsigned)__builtin_ctzll(left);
+			struct lattice_point at = { 8 * alone.patch[p].row + (int)s / 8, 8 * alone.patch[p].col + (int)s % 8 };
+			struct sheet_ref ref = sheets_find(&behind, at, alone.sample[p][s].z, 1e-6f);
+
+			assert_int_not_equal(ref.patch, SHEET_NONE);
+			assert_int_equal(behind.sample[ref.patch][s].surface, alone.sample[p][s].surface);
+			assert_int_equal(behind.patch[ref.patch].first >> s & 1, alone.patch[p].first >> s & 1);
+		}
+	}
+	psr_pool_destroy(pool);
+	sheets_fini(&front);
+	sheets_fini(&behind);
+	sheets_fini(&alone);
+	done(&traced);
+}
+
 static void random_points_lie_in_their_lattice_triangles(void **state)
 {
 	struct sheets sheets = { .projection.spacing = 0.0137f };
@@ -294,6 +336,7 @@ int main(void)
 		cmocka_unit_test(parallel_squares_make_a_patch_each),
 		cmocka_unit_test(patches_stay_shallow),
 		cmocka_unit_test(threads_do_not_change_a_sheet),
+		cmocka_unit_test(both_sides_are_traced_at_once),
 		cmocka_unit_test(random_points_lie_in_their_lattice_triangles),
 		cmocka_unit_test(a_sample_is_found_where_it_is),
 		cmocka_unit_test(samples_are_added_where_there_is_room),
