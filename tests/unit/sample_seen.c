@@ -211,6 +211,44 @@ static void what_is_added_is_seen(void **state)
 	look_away(&looked);
 }
 
+/* Of a soup of triangles, with places and normals of all kinds. */
+static void what_is_seen_is_seen_of_coarser_cells(void **state)
+{
+	struct psr_mesh *mesh = meshes_new(3 * 200, 200);
+	struct seen coarse, coarser;
+	struct looked looked;
+	uint64_t seed = 9;
+	int n_seen = 0;
+
+	(void)state;
+	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
+		for (int k = 0; k < 3; k++)
+			mesh->position[i][k] = i % 3 == 0 ? 1.1 * meshes_random(&seed) - 0.55
+			                                  : mesh->position[i - i % 3][k] + 0.04 * meshes_random(&seed) - 0.02;
+		mesh->triangle[i / 3][i % 3] = i;
+	}
+	look_at(&looked, mesh, DS, 2);
+	assert_int_equal(seen_coarsen(&coarse, &looked.seen), PSR_OK);
+	assert_int_equal(seen_coarsen(&coarser, &coarse), PSR_OK);
+	for (int i = 0; i < 300000; i++) {
+		float p[3], n[3];
+
+		for (int k = 0; k < 3; k++) {
+			p[k] = (float)(1.3 * meshes_random(&seed) - 0.65);
+			n[k] = (float)(2 * meshes_random(&seed) - 1);
+		}
+		if (v3f_normalize(n, n) == 0 || !seen_is(&looked.seen, p, n))
+			continue;
+		n_seen++;
+		assert_true(seen_is(&coarse, p, n));
+		assert_true(seen_is(&coarser, p, n));
+	}
+	assert_in_range(n_seen, 3000, 200000);
+	seen_fini(&coarse);
+	seen_fini(&coarser);
+	look_away(&looked);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -220,6 +258,7 @@ int main(void)
 		cmocka_unit_test(holes_of_a_mask_are_looked_through),
 		cmocka_unit_test(what_is_seen_does_not_depend_on_threads),
 		cmocka_unit_test(what_is_added_is_seen),
+		cmocka_unit_test(what_is_seen_is_seen_of_coarser_cells),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
