@@ -39,10 +39,11 @@ static double share(const struct adequacy *adequacy)
 	return (double)adequacy->n_missing / (double)adequacy->n_trials;
 }
 
-/* Every place of a sphere is seen from as many directions as any other, so that trials are uniform in area, and half a
- * sphere of views, weighted by their cosines, makes a fourth of the draws trials. A cap misses its share of the area, but for
- * pixels at its border: half a pixel's diagonal reaches 0.71 pixels, and 2 * 0.71 along the surface in the mean over views
- * (2 is the mean of 1 / cosine with the cosine for weight). The rest is chance: five standard deviations. */
+/* Every place of a sphere is seen from as many directions as any other, so that trials are uniform in area, and half
+ * a sphere of views, weighted by their cosines, makes a fourth of the draws trials. A cap misses its share of the
+ * area, but for pixels at its border: half a pixel's diagonal reaches 0.71 pixels, and 2 * 0.71 along the surface in
+ * the mean over views (2 is the mean of 1 / cosine with the cosine for weight). The rest is chance: five standard
+ * deviations. */
 static void a_cap_that_is_gone_is_missing(void **state)
 {
 	struct level_set set;
@@ -122,7 +123,8 @@ static void what_is_hidden_is_not_missing(void **state)
 	for (uint32_t i = 0; i < set.level.cover.n_points; i++)
 		assert_true(v3f_length(set.level.cover.point[i].position) > 0.8f);
 	assert_int_equal(adequacy_measure(&adequacy, &set.level, 3, N_TRIALS), PSR_OK);
-	/* The share of trials is that of the areas: 0.9^2 / (0.9^2 + 0.4^2) of a fourth of the draws, which are 4 N_TRIALS. */
+	/* The share of trials is that of the areas: 0.9^2 / (0.9^2 + 0.4^2) of a fourth of the draws, which are 4
+	 * N_TRIALS. */
 	assert_true(fabs((double)adequacy.n_trials / N_TRIALS - 0.81 / 0.97) < 0.02);
 	assert_true(1000 * adequacy.n_missing < adequacy.n_trials);
 	for (uint64_t k = 0; k < adequacy.n_missing; k++)
@@ -157,8 +159,8 @@ static void threads_do_not_change_a_trial_and_seeds_do(void **state)
 		free(adequacy[i].spot);
 }
 
-/* The rounds go on until less than a 20,000th is missing; chance in the last one may still find some, of about 5 in 100,000 if
- * it is just that many: 5 and five standard deviations. */
+/* The rounds go on until less than a 20,000th is missing; chance in the last one may still find some, of about 5 in
+ * 100,000 if it is just that many: 5 and five standard deviations. */
 static void what_is_missing_is_added(void **state)
 {
 	struct adequacy before, after;
@@ -174,7 +176,8 @@ static void what_is_missing_is_added(void **state)
 	assert_null(after.spot);
 	assert_in_range(after.n_missing, 0, 16);
 	assert_int_equal(adequacy_measure(&before, &set.level, 9, N_TRIALS), PSR_OK);
-	printf("# missing in the end: %llu of %llu\n", (unsigned long long)before.n_missing, (unsigned long long)before.n_trials);
+	printf("# missing in the end: %llu of %llu\n", (unsigned long long)before.n_missing,
+	       (unsigned long long)before.n_trials);
 	assert_in_range(before.n_missing, 0, 16);
 	free(before.spot);
 	level_set_close(&set);

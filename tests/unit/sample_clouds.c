@@ -39,8 +39,8 @@ static void cloud_free(struct psr_mesh *mesh)
 	meshes_free(mesh);
 }
 
-/* n points evenly on the unit sphere, along a spiral: each has 4 pi / n of the area, its disc six times that. The right half is red,
- * the left one blue. */
+/* n points evenly on the unit sphere, along a spiral: each has 4 pi / n of the area, its disc six times that. The
+ * right half is red, the left one blue. */
 static struct psr_mesh *sphere_cloud(uint32_t n)
 {
 	struct psr_mesh *mesh = cloud(n);
@@ -96,8 +96,8 @@ static void inner(const struct built *built, const double p[3], float out[3])
 		out[k] = (float)((p[k] - info->origin[k]) / info->scale);
 }
 
-/* Discs of radius 0.07 stand off from the sphere by 0.0025, a sixth of a pixel, at their rims; with it the 0.96 pixels that what
- * is sampled may be away from samples (sample_dice.c) are 1.12 at level 0, less above. */
+/* Discs of radius 0.07 stand off from the sphere by 0.0025, a sixth of a pixel, at their rims; with it the 0.96
+ * pixels that what is sampled may be away from samples (sample_dice.c) are 1.12 at level 0, less above. */
 static void a_dense_cloud_has_no_holes(void **state)
 {
 	const struct built *built = *state;
@@ -125,8 +125,8 @@ static void a_dense_cloud_has_no_holes(void **state)
 	}
 }
 
-/* However many discs lie over each other: as many samples as of a sphere of triangles, give or take a fifth (discs lie off each
- * other by fractions of a pixel). */
+/* However many discs lie over each other: as many samples as of a sphere of triangles, give or take a fifth (discs
+ * lie off each other by fractions of a pixel). */
 static void overlapping_discs_are_sampled_once(void **state)
 {
 	struct psr_mesh *sphere = meshes_sphere(60, zero, 1);
@@ -140,8 +140,8 @@ static void overlapping_discs_are_sampled_once(void **state)
 	meshes_free(sphere);
 }
 
-/* Where only discs of one colour reach; normals are those of discs that are up to 0.07 away, 4 degrees, and quantised to 1.3. What
- * is bent to face its projection is none of these. */
+/* Where only discs of one colour reach; normals are those of discs that are up to 0.07 away, 4 degrees, and quantised
+ * to 1.3. What is bent to face its projection is none of these. */
 static void samples_have_colors_and_normals_of_their_points(void **state)
 {
 	const struct built *built = *state;
@@ -169,7 +169,8 @@ static void samples_have_colors_and_normals_of_their_points(void **state)
 	}
 }
 
-/* A disc of 40 pixels' radius by itself is round: covered to its rim, with nothing but what was moved by half a pixel beyond. */
+/* A disc of 40 pixels' radius by itself is round: covered to its rim, with nothing but what was moved by half a pixel
+ * beyond. */
 static void a_disc_is_round(void **state)
 {
 	struct psr_mesh *mesh = cloud(1);

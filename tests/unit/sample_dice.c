@@ -7,8 +7,8 @@
 #include "sample/adequacy.h"
 #include "sample_level.h"
 
-/* A lattice triangle with sides of at most 1.05 pixels has its middle 0.606 pixels from its corners, and places are tested
- * half a pixel apart at most, so that none is more than 0.354 from one that was. */
+/* A lattice triangle with sides of at most 1.05 pixels has its middle 0.606 pixels from its corners, and places are
+ * tested half a pixel apart at most, so that none is more than 0.354 from one that was. */
 #define FARTHEST (0.606 + 0.354)
 
 static const double zero[3];
@@ -96,8 +96,8 @@ static void sheets_are_sampled_to_their_edges(void **state)
 	}
 }
 
-/* Of what crosses itself some can be seen through gaps of a fraction of a pixel only: one place in 2,000 may be further than
- * a pixel from what is kept. */
+/* Of what crosses itself some can be seen through gaps of a fraction of a pixel only: one place in 2,000 may be
+ * further than a pixel from what is kept. */
 static void a_soup_of_triangles_is_sampled(void **state)
 {
 	(void)state;
@@ -114,7 +114,8 @@ static void a_soup_of_triangles_is_sampled(void **state)
 }
 
 /* A rectangle around the line from `from` to `to`, which is perpendicular to the unit vector n. */
-static void add_strip(struct psr_mesh *mesh, uint32_t i, const double from[3], const double to[3], const double n[3], double width)
+static void add_strip(struct psr_mesh *mesh, uint32_t i, const double from[3], const double to[3],
+                      const double n[3], double width)
 {
 	double along[3], aside[3];
 
@@ -123,7 +124,8 @@ static void add_strip(struct psr_mesh *mesh, uint32_t i, const double from[3], c
 	v3d_normalize(aside, aside);
 	for (uint32_t c = 0; c < 4; c++)
 		for (int k = 0; k < 3; k++)
-			mesh->position[4 * i + c][k] = (c == 1 || c == 2 ? to[k] : from[k]) + (c >= 2 ? 0.5 : -0.5) * width * aside[k];
+			mesh->position[4 * i + c][k] = (c == 1 || c == 2 ? to[k] : from[k])
+			                               + (c >= 2 ? 0.5 : -0.5) * width * aside[k];
 	for (uint32_t t = 0; t < 2; t++) {
 		mesh->triangle[2 * i + t][0] = 4 * i;
 		mesh->triangle[2 * i + t][1] = 4 * i + 1 + t;
@@ -155,8 +157,8 @@ static struct psr_mesh *spokes(uint32_t n, double width, int in_plane, uint64_t 
 	return mesh;
 }
 
-/* Along their middles, on the front: places are tested half a pixel apart at most, and each is in half a pixel of what is kept
- * (nothing else covers what is no pixel wide), so all in between are within 0.75. */
+/* Along their middles, on the front: places are tested half a pixel apart at most, and each is in half a pixel of
+ * what is kept (nothing else covers what is no pixel wide), so all in between are within 0.75. */
 static void check_spokes(const struct level_set *set)
 {
 	const struct psr_mesh *mesh = set->mesh;
@@ -182,7 +184,8 @@ static void thin_things_have_no_gaps(void **state)
 		uint32_t n;
 		double width; /* pixels */
 		int in_plane, two_sided;
-	} set[] = { { 1, 0.1, 0, 0 }, { 1, 0.1, 0, 1 }, { 24, 0.5, 1, 1 }, { 24, 0.2, 1, 0 }, { 20, 0.5, 0, 1 }, { 20, 0.1, 0, 0 } };
+	} set[] = { { 1, 0.1, 0, 0 }, { 1, 0.1, 0, 1 }, { 24, 0.5, 1, 1 }, { 24, 0.2, 1, 0 }, { 20, 0.5, 0, 1 },
+		        { 20, 0.1, 0, 0 } };
 
 	(void)state;
 	for (size_t i = 0; i < sizeof set / sizeof *set; i++) {
@@ -232,13 +235,16 @@ static void slivers_are_survived(void **state)
 		double width = i % 4 == 0 ? 0 : pow(10, -12 * meshes_random(&seed));
 
 		for (uint32_t c = 0; c < 3; c++) {
+			double *p = mesh->position[4 + 3 * i + c];
+
 			for (int k = 0; k < 3; k++)
-				mesh->position[4 + 3 * i + c][k] = c < 2 || i % 4 != 0 ? 0.5 * meshes_random(&seed) * (k == 0 ? 1 : width)
-				                                                     : mesh->position[4 + 3 * i][k];
+				p[k] = c < 2 || i % 4 != 0 ? 0.5 * meshes_random(&seed) * (k == 0 ? 1 : width)
+				                           : mesh->position[4 + 3 * i][k];
 			mesh->triangle[2 + i][c] = 4 + 3 * i + c;
 		}
 	}
-	add_strip(mesh, 0, (const double[3]){ -0.3, 0, 0.9 }, (const double[3]){ 0.3, 0, 0.9 }, (const double[3]){ 0, 0, 1 }, 0.4);
+	add_strip(mesh, 0, (const double[3]){ -0.3, 0, 0.9 }, (const double[3]){ 0.3, 0, 0.9 }, (const double[3]){ 0, 0, 1 },
+	          0.4);
 	level_set_make(&set, mesh, 32, 2);
 	assert_true(level_set_nearest(&set, middle, up, 2) <= FARTHEST);
 	for (uint32_t i = 0; i < set.level.cover.n_points; i++)

@@ -17,7 +17,8 @@ static void random_unit(uint64_t *seed, float n[3])
 	while (v3f_dot(n, n) > 1 || v3f_normalize(n, n) < 0.1f);
 }
 
-/* Normals are put down in steps of 1/256: sums of n of them are off by at most n / 512, which is 1/512 of their length. */
+/* Normals are put down in steps of 1/256: sums of n of them are off by at most n / 512, which is 1/512 of their
+ * length. */
 static void a_plane_has_its_own_normal(void **state)
 {
 	uint64_t seed = 7;
@@ -51,8 +52,8 @@ static void a_plane_has_its_own_normal(void **state)
 }
 
 /* Cells around a place reach no further than 1.5 sqrt(3) of them away from it, so what is mixed there is within twice
- * the angle that this chord of the sphere subtends. By symmetry it is far less: the mean of what lies around. Half that angle
- * bounds it: 1.5 sqrt(3) 0.05 / 0.8 = 0.162 rad. */
+ * the angle that this chord of the sphere subtends. By symmetry it is far less: the mean of what lies around. Half
+ * that angle bounds it: 1.5 sqrt(3) 0.05 / 0.8 = 0.162 rad. */
 static void a_sphere_is_smoothed_to_itself(void **state)
 {
 	const float radius = 0.8f;
@@ -77,8 +78,8 @@ static void a_sphere_is_smoothed_to_itself(void **state)
 	field_fini(&field);
 }
 
-/* Rough by 20 degrees, a plane is smooth on average: the spread of the mean of some 60 normals is 20 / sqrt(60) degrees a way;
- * five of these. */
+/* Rough by 20 degrees, a plane is smooth on average: the spread of the mean of some 60 normals is 20 / sqrt(60)
+ * degrees a way; five of these. */
 static void roughness_is_smoothed_away(void **state)
 {
 	struct field field;

@@ -5,67 +5,16 @@
 #include <cmocka.h>
 #include <stdio.h>
 #include "base/vec.h"
-#include "psr/build.h"
 #include "sample/draft.h"
-#include "sample/projection.h"
-#include "sample_meshes.h"
+#include "sample_model.h"
 
 #define RESOLUTION 256 /* levels of 256, 128 and 64 */
 
 static const double zero[3];
 
-static struct psr_model *build(const struct psr_mesh *mesh, uint32_t resolution)
-{
-	struct psr_build_options options;
-	struct psr_model *model = NULL;
-	struct psr_error err = { .text = "" };
-
-	psr_build_options_default(&options);
-	options.resolution = resolution;
-	options.n_threads = 2;
-	if (psr_model_build(&model, mesh, &options, NULL, &err) != PSR_OK)
-		fail_msg("%s", err.text);
-	return model;
-}
-
-/* All samples of a model, with the groups that have them. */
-struct sample {
-	float p[3];
-	uint32_t group;
-	uint8_t level;
-	uint16_t projection;
-	int row, col;
-};
-
-static struct sample *list_samples(const struct psr_blocks *b)
-{
-	struct sample *list = malloc(b->n_samples * sizeof *list), *out = list;
-
-	for (uint32_t c = 0; c < b->n_clusters; c++) {
-		for (uint32_t i = b->cluster[c].first_block; i < b->cluster[c].first_block + b->cluster[c].n_blocks; i++) {
-			const struct psr_projection *projection = &b->projection[b->block_projection[i]];
-			double spacing = (double)projection->spacing * (double)(1u << b->level[i]), inner[3];
-			uint32_t k = b->attr_first[i];
-
-			for (uint64_t left = b->mask[i]; left != 0; left &= left - 1, k++, out++) {
-				int s = __builtin_ctzll(left);
-				float z = b->depth_bias[i] + b->depth_step[i] * (float)b->depth[k];
-
-				*out = (struct sample){ .group = b->cluster[c].group, .level = b->level[i], .row = 8 * b->row[i] + s / 8,
-					                    .col = 8 * b->col[i] + s % 8, .projection = b->block_projection[i] };
-				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing, out->row * 0.86602540378443864676 * spacing,
-				             (double)z, inner);
-				v3f_set(out->p, (float)inner[0], (float)inner[1], (float)inner[2]);
-			}
-		}
-	}
-	assert_int_equal(out - list, b->n_samples);
-	return list;
-}
-
 static int compare_samples(const void *a, const void *b)
 {
-	const struct sample *x = a, *y = b;
+	const struct model_sample *x = a, *y = b;
 
 	if (x->level != y->level)
 		return x->level < y->level ? -1 : 1;
@@ -116,11 +65,11 @@ static void every_group_has_a_cluster_of_each_level(void **state)
 static void fine_samples_are_in_one_group_each(void **state)
 {
 	const struct psr_blocks *b = psr_model_blocks(*state);
-	struct sample *list = list_samples(b);
+	struct model_sample *list = model_samples(b);
 
 	qsort(list, b->n_samples, sizeof *list, compare_samples);
 	for (uint64_t i = 1; i < b->n_samples && list[i].level == 0; i++) {
-		const struct sample *x = &list[i - 1], *y = &list[i];
+		const struct model_sample *x = &list[i - 1], *y = &list[i];
 		float d[3];
 
 		if (x->projection != y->projection || x->row != y->row || x->col != y->col)
@@ -131,56 +80,23 @@ static void fine_samples_are_in_one_group_each(void **state)
 	free(list);
 }
 
-/* A group's coarse samples by the cells of a pixel. */
-static void map_samples(struct cover *map, const struct sample *list, uint64_t n, unsigned level, double ds)
-{
-	assert_int_equal(cover_init(map, ds), PSR_OK);
-	for (uint64_t i = 0; i < n; i++) {
-		struct cover_point point = { .projection = list[i].group };
-
-		if (list[i].level != level)
-			continue;
-		memcpy(point.position, list[i].p, sizeof point.position);
-		assert_int_equal(cover_add(map, &point), PSR_OK);
-	}
-}
-
-static float nearest(const struct cover *map, const float p[3], uint32_t group)
-{
-	float least = INFINITY;
-	int at[3];
-
-	for (int i = 0; i < 27; i++) {
-		for (int k = 0; k < 3; k++)
-			at[k] = (int)floor((double)p[k] / map->ds) + (k == 0 ? i % 3 : k == 1 ? i / 3 % 3 : i / 9) - 1;
-		for (uint32_t c = cover_cell(map, at); c != COVER_NONE; c = map->point[c].next) {
-			float d[3];
-
-			v3f_sub(d, map->point[c].position, p);
-			if (group == UINT32_MAX || map->point[c].projection == group)
-				least = fminf(least, v3f_length(d));
-		}
-	}
-	return least;
-}
-
-/* What lies within a pixel of a group's fine samples is in the group, so the nearest coarse sample of all is the nearest one of
- * the group; and there is one, as the coarse level covers the surface (0.96 pixels: sample_dice.c). Depths are those of
- * pieces of blocks 24 steps deep, in 65,536ths. */
+/* What lies within a pixel of a group's fine samples is in the group, so the nearest coarse sample of all is the
+ * nearest one of the group; and there is one, as the coarse level covers the surface (0.96 pixels: sample_dice.c).
+ * Depths are those of pieces of blocks 24 steps deep, in 65,536ths. */
 static void groups_have_what_is_near_at_each_level(void **state)
 {
 	const struct psr_blocks *b = psr_model_blocks(*state);
-	struct sample *list = list_samples(b);
+	struct model_sample *list = model_samples(b);
 
 	for (unsigned level = 1; level < b->n_levels; level++) {
 		double ds = 2.0 / RESOLUTION * (1u << level);
 		struct cover map;
 
-		map_samples(&map, list, b->n_samples, level, ds);
+		model_map(&map, list, b->n_samples, level, ds);
 		for (uint64_t i = 0; i < b->n_samples; i++) {
 			if (list[i].level != 0)
 				continue;
-			float all = nearest(&map, list[i].p, UINT32_MAX), own = nearest(&map, list[i].p, list[i].group);
+			float all = model_nearest(&map, list[i].p, UINT32_MAX), own = model_nearest(&map, list[i].p, list[i].group);
 
 			assert_true((double)all < 0.97 * ds);
 			assert_true(own < all + 0.002f * (float)ds);
@@ -190,12 +106,12 @@ static void groups_have_what_is_near_at_each_level(void **state)
 	free(list);
 }
 
-/* Nothing is lost or thinned out: the pieces of a coarse level hold more than it has by what they share alone, which is along
- * the borders of groups. */
+/* Nothing is lost or thinned out: the pieces of a coarse level hold more than it has by what they share alone, which
+ * is along the borders of groups. */
 static void coarse_levels_are_not_stored_many_times(void **state)
 {
 	const struct psr_blocks *b = psr_model_blocks(*state);
-	struct sample *list = list_samples(b);
+	struct model_sample *list = model_samples(b);
 
 	qsort(list, b->n_samples, sizeof *list, compare_samples);
 	for (unsigned level = 1; level < b->n_levels; level++) {
@@ -209,7 +125,8 @@ static void coarse_levels_are_not_stored_many_times(void **state)
 			            || list[i].row != list[i - 1].row || list[i].col != list[i - 1].col
 			            || fabsf(list[i].p[2] - list[i - 1].p[2]) > 1e-4f;
 		}
-		printf("# level %u: %llu samples, stored %.2f times\n", level, (unsigned long long)n_unlike, (double)n / (double)n_unlike);
+		printf("# level %u: %llu samples, stored %.2f times\n", level, (unsigned long long)n_unlike,
+		       (double)n / (double)n_unlike);
 		assert_true((double)n < 1.5 * (double)n_unlike);
 	}
 	free(list);
@@ -219,7 +136,7 @@ static int open_model(void **state)
 {
 	struct psr_mesh *mesh = peanut();
 
-	*state = build(mesh, RESOLUTION);
+	*state = model_build(mesh, RESOLUTION);
 	meshes_free(mesh);
 	return 0;
 }
@@ -247,8 +164,8 @@ static void a_block_is_shared_by_all_the_groups_around_it(void **state)
 	for (uint32_t i = 0; i < n_fine; i++) {
 		uint64_t bit = UINT64_C(1) << 36;
 
-		draft.block[i] = (struct draft_block){ .col = (int16_t)(i % 128), .row = (int16_t)(i / 128 % 128), .first = i, .mask = bit,
-			                                   .part = bit };
+		draft.block[i] = (struct draft_block){ .col = (int16_t)(i % 128), .row = (int16_t)(i / 128 % 128), .first = i,
+			                                   .mask = bit, .part = bit };
 		draft.sample[i].z = 0.04f * (float)(i / (128 * 128)) - 0.08f;
 	}
 	draft.block[n_fine] = (struct draft_block){ .level = 7, .first = n_fine, .mask = UINT64_MAX, .part = UINT64_MAX };

@@ -69,7 +69,8 @@ static inline void level_set_close(struct level_set *set)
 /* A random place of the surface, by area; returns its primitive, of which n is the front. */
 static inline uint32_t level_set_place(const struct level_set *set, uint64_t *seed, float p[3], float n[3])
 {
-	double x = meshes_random(seed) * set->area[set->mesh->n_triangles - 1], u = meshes_random(seed), v = meshes_random(seed);
+	double x = meshes_random(seed) * set->area[set->mesh->n_triangles - 1];
+	double u = meshes_random(seed), v = meshes_random(seed);
 	double corner[3][3];
 	uint32_t low = 0, high = set->mesh->n_triangles - 1;
 
@@ -93,11 +94,12 @@ static inline uint32_t level_set_place(const struct level_set *set, uint64_t *se
 	return low;
 }
 
-/* Distance to the nearest kept sample, in pixels; INFINITY if none is within `reach` pixels. Samples that are shaded away
- * from n do not count, unless they are two-sided. */
+/* Distance to the nearest kept sample, in pixels; INFINITY if none is within `reach` pixels. Samples that are shaded
+ * away from n do not count, unless they are two-sided. */
 static inline double level_set_nearest(const struct level_set *set, const float p[3], const float n[3], double reach)
 {
 	const float (*direction)[3] = psr_direction_table();
+	const struct cover *cover = &set->level.cover;
 	double ds = set->level.ds, least = reach * ds;
 	int low[3], high[3], at[3], is_any = 0;
 
@@ -108,8 +110,8 @@ static inline double level_set_nearest(const struct level_set *set, const float 
 	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
 		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
 			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				for (uint32_t i = cover_cell(&set->level.cover, at); i != COVER_NONE; i = set->level.cover.point[i].next) {
-					const struct cover_point *point = &set->level.cover.point[i];
+				for (uint32_t i = cover_cell(cover, at); i != COVER_NONE; i = cover->point[i].next) {
+					const struct cover_point *point = &cover->point[i];
 					float d[3];
 
 					v3f_sub(d, point->position, p);

@@ -51,8 +51,8 @@ static struct psr_mesh *square(void)
 	return mesh;
 }
 
-/* And some more: what is added where projections and groups meet falls to a half, not to a quarter. It is a tenth at most:
- * x = 0.1 gives (0.9 + 0.2) / (0.9 + 0.1) of a quarter, and twice that share at the next level 0.29. */
+/* And some more: what is added where projections and groups meet falls to a half, not to a quarter. It is a tenth at
+ * most: x = 0.1 gives (0.9 + 0.2) / (0.9 + 0.1) of a quarter, and twice that share at the next level 0.29. */
 static void each_level_has_a_quarter_of_the_samples(void **state)
 {
 	struct built built;
@@ -69,8 +69,9 @@ static void each_level_has_a_quarter_of_the_samples(void **state)
 	close_built(&built);
 }
 
-/* Squares of a pixel of level 0. Level 2 has pixels of 16 of them, and its samples blend what is around them within one, 50 squares
- * with falling weights. Codes of half light are off by up to 0.5 / 255 of the curve's slope there, 0.0022 each. */
+/* Squares of a pixel of level 0. Level 2 has pixels of 16 of them, and its samples blend what is around them within
+ * one, 50 squares with falling weights. Codes of half light are off by up to 0.5 / 255 of the curve's slope there,
+ * 0.0022 each. */
 static void a_checkerboard_becomes_its_linear_mean(void **state)
 {
 	static uint8_t texel[181][181][4];
@@ -106,8 +107,8 @@ static void a_checkerboard_becomes_its_linear_mean(void **state)
 	close_built(&built);
 }
 
-/* The middle of the square is cut out. What is in it can only have been moved there, by half a pixel; and around it samples
- * reach as far as anywhere (0.96 pixels: sample_dice.c). */
+/* The middle of the square is cut out. What is in it can only have been moved there, by half a pixel; and around it
+ * samples reach as far as anywhere (0.96 pixels: sample_dice.c). */
 static void cut_outs_are_cut_out_of_all_levels(void **state)
 {
 	const double half = sqrt(0.5) / 2;
@@ -165,7 +166,8 @@ static void sheets_have_two_sides_at_all_levels(void **state)
 			assert_true(psr_direction_table()[PSR_ATTR_NORMAL(s->attr)][2] > 0);
 			n[s->level]++;
 		}
-		/* Once, not once a side: a pixel's lattice has at most 1 / (0.866 cos^2 25) = 1.41 points, and its border more. */
+		/* Once, not once a side: a pixel's lattice has at most 1 / (0.866 cos^2 25) = 1.41 points, and its border
+		 * more. */
 		for (unsigned level = 0; level < N_LEVELS; level++)
 			assert_true(n[level] * pixel(level) * pixel(level) < 1.6 * 2 + 4 * sqrt(2) * 4 * pixel(level));
 		close_built(&built);
@@ -192,7 +194,8 @@ static void wires_have_no_gaps_at_any_level(void **state)
 		v3d_scale(along[i], frame[0], 1);
 		for (uint32_t c = 0; c < 4; c++) {
 			v3d_scale(mesh->position[4 * i + c], along[i], c == 1 || c == 2 ? 1 : 0.2);
-			v3d_add_scaled(mesh->position[4 * i + c], mesh->position[4 * i + c], (c >= 2 ? 0.1 : -0.1) * pixel(0), frame[1]);
+			v3d_add_scaled(mesh->position[4 * i + c], mesh->position[4 * i + c], (c >= 2 ? 0.1 : -0.1) * pixel(0),
+			               frame[1]);
 		}
 		for (uint32_t t = 0; t < 2; t++) {
 			mesh->triangle[2 * i + t][0] = 4 * i;

@@ -47,11 +47,12 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 				int s = __builtin_ctzll(left);
 				float z = b->depth_bias[i] + b->depth_step[i] * (float)b->depth[k];
 
-				*out = (struct model_sample){ .group = b->cluster[c].group, .level = b->level[i], .row = 8 * b->row[i] + s / 8,
-					                    .col = 8 * b->col[i] + s % 8, .projection = b->block_projection[i], .attr = b->attr[k],
-					                          .two_sided = b->flags[i] & PSR_BLOCK_TWO_SIDED };
-				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing, out->row * 0.86602540378443864676 * spacing,
-				             (double)z, inner);
+				*out = (struct model_sample){ .group = b->cluster[c].group, .level = b->level[i],
+					                          .two_sided = b->flags[i] & PSR_BLOCK_TWO_SIDED,
+					                          .projection = b->block_projection[i], .row = 8 * b->row[i] + s / 8,
+					                          .col = 8 * b->col[i] + s % 8, .attr = b->attr[k] };
+				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
+				             out->row * 0.86602540378443864676 * spacing, (double)z, inner);
 				v3f_set(out->p, (float)inner[0], (float)inner[1], (float)inner[2]);
 			}
 		}

@@ -54,8 +54,9 @@ static void no_direction_is_far_from_all_projections(void **state)
 	}
 }
 
-/* Normals are smoothed over a few pixels. Those of a sphere are turned by no more than half the angle that what is mixed spans:
- * cells of 3 pixels, eight of them around a place, 1.5 sqrt(3) of them away at most. The facets are 1.5 degrees wide. */
+/* Normals are smoothed over a few pixels. Those of a sphere are turned by no more than half the angle that what is
+ * mixed spans: cells of 3 pixels, eight of them around a place, 1.5 sqrt(3) of them away at most. The facets are 1.5
+ * degrees wide. */
 static void places_of_a_sphere_belong_to_who_faces_them(void **state)
 {
 	(void)state;
@@ -80,9 +81,10 @@ static void places_of_a_sphere_belong_to_who_faces_them(void **state)
 	}
 }
 
-/* What a sample stands for: a cell of its lattice, as large as it is on the surface. The sum is the whole area when each place is
- * owned once. Where owners meet, gap or overlap is no wider than a pixel: 32 regions of area 4 pi 0.9^2 / 32, taken for round,
- * have borders of 32 in all, each of them two regions'. Of these few would make blocks of less than a quarter: merged. */
+/* What a sample stands for: a cell of its lattice, as large as it is on the surface. The sum is the whole area when
+ * each place is owned once. Where owners meet, gap or overlap is no wider than a pixel: 32 regions of area 4 pi 0.9^2
+ * / 32, taken for round, have borders of 32 in all, each of them two regions'. Of these few would make blocks of less
+ * than a quarter: merged. */
 static void places_of_a_sphere_are_owned_once(void **state)
 {
 	struct level_set set;
@@ -110,14 +112,15 @@ static void places_of_a_sphere_are_owned_once(void **state)
 			}
 		}
 	}
-	printf("# %.4f of the area; %d of %d blocks own less than a quarter\n", area / (4 * 3.14159265 * 0.81), n_few, n_blocks);
+	printf("# %.4f of the area; %d of %d blocks own less than a quarter\n", area / (4 * 3.14159265 * 0.81),
+	       n_few, n_blocks);
 	assert_true(fabs(area - 4 * 3.14159265 * 0.81) < 32 * set.level.ds);
 	assert_true(20 * n_few < n_blocks);
 	level_set_close(&set);
 }
 
-/* Away from its edges a face has one owner, the one that faces it best, and its lattice is all that is kept: as many points as
- * the area has cells, give or take those along the border. */
+/* Away from its edges a face has one owner, the one that faces it best, and its lattice is all that is kept: as many
+ * points as the area has cells, give or take those along the border. */
 static void flat_faces_have_one_owner(void **state)
 {
 	const double half = 0.55;
@@ -130,9 +133,11 @@ static void flat_faces_have_one_owner(void **state)
 	level_set_make(&set, cube(half), 128, 2);
 	inside = half - 10 * set.level.ds;
 	for (int f = 0; f < 6; f++) {
+		float sign = f % 2 == 0 ? -1 : 1;
+
 		owner[f] = 0;
 		for (unsigned q = 1; q < N_PROJECTIONS; q++)
-			if ((f % 2 == 0 ? -1 : 1) * set.projection[q].axis[2][f / 2] > (f % 2 == 0 ? -1 : 1) * set.projection[owner[f]].axis[2][f / 2])
+			if (sign * set.projection[q].axis[2][f / 2] > sign * set.projection[owner[f]].axis[2][f / 2])
 				owner[f] = q;
 	}
 	for (uint32_t i = 0; i < set.level.cover.n_points; i++) {
@@ -150,7 +155,8 @@ static void flat_faces_have_one_owner(void **state)
 	}
 	for (int f = 0; f < 6; f++) {
 		double spacing = (double)set.projection[owner[f]].spacing;
-		double cells = 4 * inside * inside * fabs((double)set.projection[owner[f]].axis[2][f / 2]) / (spacing * spacing * 0.8660254);
+		double cosine = fabs((double)set.projection[owner[f]].axis[2][f / 2]);
+		double cells = 4 * inside * inside * cosine / (spacing * spacing * 0.8660254);
 
 		assert_true(fabs(n[f] - cells) < 4 * sqrt(cells));
 	}
@@ -172,8 +178,9 @@ static void a_sheet_is_sampled_once(void **state)
 		level_set_make(&set, mesh, 96, 2);
 		for (uint32_t i = 0; i < set.level.cover.n_points; i++) {
 			const struct cover_point *point = &set.level.cover.point[i];
+			const struct sheets *sheets = &set.level.sheets[point->projection];
 
-			assert_int_equal(set.level.sheets[point->projection].sample[point->patch][point->sample].surface & SHEET_BACK, 0);
+			assert_int_equal(sheets->sample[point->patch][point->sample].surface & SHEET_BACK, 0);
 			assert_true(psr_direction_table()[point->normal][2] > 0);
 			assert_int_equal(point->two_sided, two_sided);
 		}

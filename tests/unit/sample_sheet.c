@@ -14,7 +14,8 @@ struct traced {
 };
 
 /* Seen along `direction`, with neighbours on the lattice `spacing` apart. */
-static void trace(struct traced *traced, struct psr_mesh *mesh, const double direction[3], double spacing, int n_threads)
+static void trace(struct traced *traced, struct psr_mesh *mesh, const double direction[3], double spacing,
+                  int n_threads)
 {
 	struct psr_projection projection = { .spacing = (float)spacing };
 	struct psr_pool *pool = NULL;
@@ -63,9 +64,9 @@ static struct psr_mesh *joined(struct psr_mesh *a, struct psr_mesh *b)
 	return mesh;
 }
 
-/* A sphere of radius r facing within 72.5 degrees (cosine 0.3) has a shadow of pi r^2 (1 - 0.3^2), and a lattice cell an area
- * of spacing^2 sqrt(3) / 2. Facets of 3 degrees blur its rim by a share of 2 sin(1.5 degrees) tan(72.5 degrees) at most; a
- * lattice counts an area of n cells to within its outline's, 4 sqrt(n) of them. */
+/* A sphere of radius r facing within 72.5 degrees (cosine 0.3) has a shadow of pi r^2 (1 - 0.3^2), and a lattice cell
+ * an area of spacing^2 sqrt(3) / 2. Facets of 3 degrees blur its rim by a share of 2 sin(1.5 degrees) tan(72.5
+ * degrees) at most; a lattice counts an area of n cells to within its outline's, 4 sqrt(n) of them. */
 static void all_nested_spheres_are_found(void **state)
 {
 	const double radius[] = { 0.95, 0.6, 0.3 }, spacing = 0.02;
@@ -88,7 +89,8 @@ static void all_nested_spheres_are_found(void **state)
 	done(&traced);
 }
 
-/* Their samples are `first` on the front one alone, and each layer has patches of its own: none is deeper than a layer. */
+/* Their samples are `first` on the front one alone, and each layer has patches of its own: none is deeper than a
+ * layer. */
 static void parallel_squares_make_a_patch_each(void **state)
 {
 	const double spacing = 0.02, gap = 0.05;
@@ -125,9 +127,10 @@ static void parallel_squares_make_a_patch_each(void **state)
 	done(&traced);
 }
 
-/* Triangles that lie further apart than the 2.5 steps at which hits are taken for one surface. A block is 7.5 by 7 * 0.866
- * steps, 9.7 from corner to corner; a single sheet that faces within 72.5 degrees is 9.7 * tan(72.5 degrees) = 30.8 steps deep
- * at most. What several of them share must not be deeper than that, where the whole set is 56 steps deep. */
+/* Triangles that lie further apart than the 2.5 steps at which hits are taken for one surface. A block is 7.5 by 7 *
+ * 0.866 steps, 9.7 from corner to corner; a single sheet that faces within 72.5 degrees is 9.7 * tan(72.5 degrees) =
+ * 30.8 steps deep at most. What several of them share must not be deeper than that, where the whole set is 56 steps
+ * deep. */
 static void patches_stay_shallow(void **state)
 {
 	const double spacing = 0.02;
@@ -255,7 +258,8 @@ static void a_sample_is_found_where_it_is(void **state)
 	const struct sheets *sheets = &traced.sheets;
 
 	(void)state;
-	trace(&traced, joined(meshes_sphere(30, zero, 0.9), meshes_sphere(30, zero, 0.5)), (const double[3]){ 3, 1, -2 }, 0.03, 2);
+	trace(&traced, joined(meshes_sphere(30, zero, 0.9), meshes_sphere(30, zero, 0.5)), (const double[3]){ 3, 1, -2 },
+	      0.03, 2);
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
 		for (uint64_t left = sheets->patch[p].mask; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
