@@ -5,42 +5,64 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_BLOCKS 1024
+#define GROUP_SAMPLES 32768
 #define REACH 2 /* cells of half a pixel: one coarse spacing beyond a group's border */
+
+/* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
+ * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
+#define WHOLE_STEPS 10
+#define WHOLE PSR_BLOCK_SAMPLES
 
 struct place {
 	float center[3];
-	uint32_t block;
-	int axis; /* to compare by */
+	uint32_t block, group;
+	uint8_t sample, n_samples; /* sample: WHOLE of a whole block */
+	uint8_t axis;              /* to compare by */
 };
+
+static int compare_owners(const struct place *x, const struct place *y)
+{
+	return x->block != y->block ? (x->block < y->block ? -1 : 1) : (int)x->sample - (int)y->sample;
+}
 
 static int compare_places(const void *a, const void *b)
 {
 	const struct place *x = a, *y = b;
 	float p = x->center[x->axis], q = y->center[y->axis];
 
-	return p != q ? (p < q ? -1 : 1) : x->block < y->block ? -1 : x->block > y->block;
+	return p != q ? (p < q ? -1 : 1) : compare_owners(x, y);
+}
+
+static int compare_groups(const void *a, const void *b)
+{
+	const struct place *x = a, *y = b;
+
+	if (x->block == y->block && x->group != y->group)
+		return x->group < y->group ? -1 : 1;
+	return compare_owners(x, y);
 }
 
 /* Halves along the longest side of the box of the centres, until a part is small enough. */
 static void cut(struct draft *draft, struct place *place, uint32_t n)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-	int axis = 0;
+	uint64_t n_samples = 0;
+	uint8_t axis = 0;
 
-	if (n <= GROUP_BLOCKS) {
-		for (uint32_t i = 0; i < n; i++)
-			draft->block[place[i].block].group = draft->n_groups;
-		draft->n_groups++;
-		return;
-	}
 	for (uint32_t i = 0; i < n; i++) {
+		n_samples += place[i].n_samples;
 		for (int k = 0; k < 3; k++) {
 			min[k] = fminf(min[k], place[i].center[k]);
 			max[k] = fmaxf(max[k], place[i].center[k]);
 		}
 	}
-	for (int k = 1; k < 3; k++)
+	if (n_samples <= GROUP_SAMPLES) {
+		for (uint32_t i = 0; i < n; i++)
+			place[i].group = draft->n_groups;
+		draft->n_groups++;
+		return;
+	}
+	for (uint8_t k = 1; k < 3; k++)
 		axis = max[k] - min[k] > max[axis] - min[axis] ? k : axis;
 	for (uint32_t i = 0; i < n; i++)
 		place[i].axis = axis;
@@ -62,29 +84,100 @@ static void center_of(const struct draft *draft, const struct draft_block *block
 	}
 }
 
-static int cut_finest(struct draft *draft, uint32_t n)
+static int is_whole(const struct draft *draft, const struct draft_block *block)
 {
-	struct place *place = malloc((n != 0 ? n : 1) * sizeof *place);
+	float low = INFINITY, high = -INFINITY;
 
-	if (place == NULL)
-		return PSR_ERR_MEMORY;
-	for (uint32_t i = 0; i < n; i++) {
-		place[i].block = i;
-		center_of(draft, &draft->block[i], place[i].center);
+	for (uint64_t left = block->part; left != 0; left &= left - 1) {
+		float z = draft_sample(draft, block, (unsigned)__builtin_ctzll(left))->z;
+
+		low = fminf(low, z);
+		high = fmaxf(high, z);
 	}
-	draft->n_groups = 0;
-	cut(draft, place, n);
-	free(place);
-	return PSR_OK;
+	return high - low <= WHOLE_STEPS * draft->projection[block->projection].spacing;
 }
 
-/* Which groups have fine samples in each cell of half a pixel of a coarse level: points of a cover, one a group and cell. */
-static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_finest)
+/* Of whole blocks, or of single samples; returns how many. place may be NULL. */
+static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct place *place)
 {
+	uint32_t n = 0;
+
 	for (uint32_t b = 0; b < n_finest; b++) {
 		const struct draft_block *block = &draft->block[b];
 
-		for (uint64_t left = block->mask; left != 0; left &= left - 1) {
+		if (is_whole(draft, block)) {
+			if (place != NULL) {
+				place[n] = (struct place){ .block = b, .sample = WHOLE, .n_samples = (uint8_t)__builtin_popcountll(block->part) };
+				center_of(draft, block, place[n].center);
+			}
+			n++;
+			continue;
+		}
+		for (uint64_t left = block->part; left != 0; left &= left - 1, n++) {
+			if (place == NULL)
+				continue;
+			place[n] = (struct place){ .block = b, .sample = (uint8_t)__builtin_ctzll(left), .n_samples = 1 };
+			draft_position(draft, block, place[n].sample, place[n].center);
+		}
+	}
+	return n;
+}
+
+struct blocks {
+	struct draft_block *block;
+	uint32_t n, capacity;
+};
+
+static int add_block(struct blocks *blocks, const struct draft_block *block)
+{
+	if (blocks->n == blocks->capacity) {
+		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
+		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		blocks->block = grown;
+		blocks->capacity = capacity;
+	}
+	blocks->block[blocks->n++] = *block;
+	return PSR_OK;
+}
+
+/* A block for each group that has some of a finest one, in the order of these. */
+static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_finest)
+{
+	uint32_t n = list_places(draft, n_finest, NULL);
+	struct place *place = malloc(((size_t)n + 1) * sizeof *place);
+	int rc = PSR_OK;
+
+	if (place == NULL)
+		return PSR_ERR_MEMORY;
+	list_places(draft, n_finest, place);
+	draft->n_groups = 0;
+	cut(draft, place, n);
+	qsort(place, n, sizeof *place, compare_groups);
+	for (uint32_t i = 0; rc == PSR_OK && i < n;) {
+		struct draft_block piece = draft->block[place[i].block];
+		uint32_t first = i;
+
+		piece.group = place[i].group;
+		if (place[i].sample != WHOLE)
+			piece.part = 0;
+		for (; i < n && place[i].block == place[first].block && place[i].group == piece.group; i++)
+			piece.part |= place[i].sample != WHOLE ? UINT64_C(1) << place[i].sample : 0;
+		rc = add_block(blocks, &piece);
+	}
+	free(place);
+	return rc;
+}
+
+/* Which groups have fine samples in each cell of half a pixel of a coarse level: points of a cover, one a group and cell. */
+static int map_groups(struct cover *map, const struct draft *draft, const struct blocks *finest, uint32_t n)
+{
+	for (uint32_t b = 0; b < n; b++) {
+		const struct draft_block *block = &finest->block[b];
+
+		for (uint64_t left = block->part; left != 0; left &= left - 1) {
 			struct cover_point point = { .patch = block->group };
 			uint32_t i;
 			int at[3];
@@ -161,26 +254,6 @@ static int find_groups(const struct cover *map, const float p[3], double reach, 
 	return PSR_OK;
 }
 
-struct blocks {
-	struct draft_block *block;
-	uint32_t n, capacity;
-};
-
-static int add_block(struct blocks *blocks, const struct draft_block *block)
-{
-	if (blocks->n == blocks->capacity) {
-		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
-		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		blocks->block = grown;
-		blocks->capacity = capacity;
-	}
-	blocks->block[blocks->n++] = *block;
-	return PSR_OK;
-}
-
 static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
                        const struct cover *map, struct parts *parts)
 {
@@ -207,14 +280,15 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 	return rc;
 }
 
-static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest)
+static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
+                       uint32_t n_pieces)
 {
 	struct parts parts = { NULL, 0, 0 };
 	struct cover map;
 	int rc = cover_init(&map, draft->ds * (double)(1u << level) / 2);
 
 	if (rc == PSR_OK)
-		rc = map_groups(&map, draft, n_finest);
+		rc = map_groups(&map, draft, blocks, n_pieces);
 	for (uint32_t b = n_finest; rc == PSR_OK && b < draft->n_blocks; b++)
 		if (draft->block[b].level == level)
 			rc = split_block(blocks, draft, &draft->block[b], &map, &parts);
@@ -226,16 +300,15 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 int draft_group(struct draft *draft)
 {
 	struct blocks blocks = { NULL, 0, 0 };
-	uint32_t n_finest = 0;
+	uint32_t n_finest = 0, n_pieces;
 	int rc;
 
 	while (n_finest < draft->n_blocks && draft->block[n_finest].level == 0)
 		n_finest++;
-	rc = cut_finest(draft, n_finest);
-	for (uint32_t b = 0; rc == PSR_OK && b < n_finest; b++)
-		rc = add_block(&blocks, &draft->block[b]);
+	rc = cut_finest(&blocks, draft, n_finest);
+	n_pieces = blocks.n;
 	for (unsigned level = 1; rc == PSR_OK && level < draft->n_levels; level++)
-		rc = split_level(&blocks, draft, level, n_finest);
+		rc = split_level(&blocks, draft, level, n_finest, n_pieces);
 	if (rc != PSR_OK) {
 		free(blocks.block);
 		return rc;
