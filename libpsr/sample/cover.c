@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -128,6 +129,7 @@ int cover_around(const struct cover *cover, const float p[3], double radius, uin
 {
 	int low[3], high[3], at[3], n = 0;
 
+	assert(radius <= 4 * cover->ds);
 	for (int k = 0; k < 3; k++) {
 		low[k] = cell_at(cover, (double)p[k] - radius);
 		high[k] = cell_at(cover, (double)p[k] + radius);

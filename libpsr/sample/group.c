@@ -5,8 +5,10 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_SAMPLES 32768
-#define REACH 2 /* cells of half a pixel: one coarse spacing beyond a group's border */
+#define GROUP_SAMPLES 131072
+#define CELLS 4 /* that a coarse pixel is wide */
+#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
+#define FAR 4   /* where there is nothing as near */
 
 /* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
  * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
@@ -171,7 +173,7 @@ static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_fin
 	return rc;
 }
 
-/* Which groups have fine samples in each cell of half a pixel of a coarse level: points of a cover, one a group and cell. */
+/* Which groups have fine samples in each cell of a coarse level: points of a cover, one a group and cell. */
 static int map_groups(struct cover *map, const struct draft *draft, const struct blocks *finest, uint32_t n)
 {
 	for (uint32_t b = 0; b < n; b++) {
@@ -268,7 +270,7 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 		draft_position(draft, block, s, p);
 		rc = find_groups(map, p, REACH * map->ds, s, parts);
 		if (rc == PSR_OK && n == 0 && parts->n == 0)
-			rc = find_groups(map, p, 2 * REACH * map->ds, s, parts);
+			rc = find_groups(map, p, FAR * map->ds, s, parts);
 	}
 	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
 		struct draft_block part = *block;
@@ -285,7 +287,7 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 {
 	struct parts parts = { NULL, 0, 0 };
 	struct cover map;
-	int rc = cover_init(&map, draft->ds * (double)(1u << level) / 2);
+	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
 
 	if (rc == PSR_OK)
 		rc = map_groups(&map, draft, blocks, n_pieces);

@@ -49,7 +49,8 @@ static void look_at(struct looked *looked, struct psr_mesh *mesh, double ds, int
 	looked->mesh = mesh;
 	assert_int_equal(ray_scene_create(&looked->scene, mesh, zero, 1, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
-	assert_int_equal(seen_init(&looked->seen, looked->scene, ds, pool), PSR_OK);
+	assert_int_equal(seen_init(&looked->seen, ds), PSR_OK);
+	assert_int_equal(seen_look(&looked->seen, looked->scene, 0, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
 
