@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "psr/error.h"
 #include "sample/draft.h"
+#include "sample_meshes.h"
 
 /* Three waved layers above each other, sampled by one projection at four levels. */
 #define N_LEVELS 4
@@ -129,7 +130,8 @@ static void groups_have_the_nearest_samples_of_each_level(void **state)
 		for (uint32_t i = 0; i < draft.n_blocks; i++) {
 			const struct draft_block *block = &draft.block[i];
 
-			for (uint64_t left = block->level == 0 ? block->part : 0; left != 0; left &= left - 1, n_fine++) {
+			for (uint64_t left = block->level == 0 ? block->part & 0x8020100804020180u : 0; left != 0;
+			     left &= left - 1, n_fine++) {
 				float p[3], d[3], all = INFINITY, own = INFINITY;
 				uint32_t first[COVER_MOST_AROUND];
 				int n_cells;
@@ -178,51 +180,60 @@ static void coarse_levels_are_not_stored_many_times(void **state)
 	draft_fini(&draft);
 }
 
-/* Five layers of 128x128 blocks with a sample each, as many groups as these make, and all near one block of level 7. */
-static void a_block_is_shared_by_all_the_groups_around_it(void **state)
+/* A box full of samples, as needles fill it, in blocks that are twice as deep as wide and do not end at the same
+ * depths. */
+static void fill_box(struct draft *draft, int n_wide, int n_deep, uint64_t *seed)
 {
-	static const struct psr_projection straight = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, 0.0004f };
-	const uint32_t n_fine = 5 * 128 * 128;
-	struct draft draft = { .n_levels = 8, .projection = &straight, .ds = 0.0004, .n_blocks = n_fine + 1,
-		                   .block_capacity = n_fine + 1, .n_samples = n_fine + 64, .sample_capacity = n_fine + 64 };
-	float coarse[64][3];
-	uint64_t *part;
+	for (int i = 0; i < n_wide * n_wide * n_deep; i++) {
+		double z = i / (n_wide * n_wide) + i % 7 / 7.0;
+
+		draft->block[draft->n_blocks++] = (struct draft_block){ .col = (int16_t)(i % n_wide), .mask = UINT64_MAX,
+			.row = (int16_t)(i / n_wide % n_wide), .part = UINT64_MAX, .first = draft->n_samples };
+		for (int s = 0; s < 64; s++)
+			draft->sample[draft->n_samples++].z = 16 * SPACING * (float)(z + meshes_random(seed));
+	}
+}
+
+/* Of two groups one lies beyond the other along some axis: all of these blocks are cut where groups are. */
+static void groups_do_not_reach_into_each_other(void **state)
+{
+	struct draft draft = { .n_levels = 1, .projection = &projection, .ds = (double)SPACING, .block_capacity = 6400,
+		                   .sample_capacity = 64 * 6400 };
+	float min[8][3], max[8][3];
+	uint64_t seed = 17;
 
 	(void)state;
-	draft.block = calloc(n_fine + 1, sizeof *draft.block);
-	draft.sample = calloc(n_fine + 64, sizeof *draft.sample);
-	for (uint32_t i = 0; i < n_fine; i++) {
-		uint64_t bit = UINT64_C(1) << 36;
-
-		draft.block[i] = (struct draft_block){ .col = (int16_t)(i % 128), .row = (int16_t)(i / 128 % 128), .first = i,
-			                                   .mask = bit, .part = bit };
-		draft.sample[i].z = 0.04f * (float)(i / (128 * 128)) - 0.08f;
-	}
-	draft.block[n_fine] = (struct draft_block){ .level = 7, .first = n_fine, .mask = UINT64_MAX, .part = UINT64_MAX };
-	for (unsigned s = 0; s < 64; s++)
-		draft_position(&draft, &draft.block[n_fine], s, coarse[s]);
+	draft.block = calloc(draft.block_capacity, sizeof *draft.block);
+	draft.sample = calloc(draft.sample_capacity, sizeof *draft.sample);
+	fill_box(&draft, 20, 16, &seed);
 	assert_int_equal(draft_group(&draft), PSR_OK);
-	printf("# %u groups\n", draft.n_groups);
-	part = calloc(draft.n_groups, sizeof *part);
-	for (uint32_t i = 0; i < draft.n_blocks; i++) {
-		if (draft.block[i].level != 7)
-			continue;
-		assert_true(part[draft.block[i].group] == 0);
-		part[draft.block[i].group] = draft.block[i].part;
+	assert_in_range(draft.n_groups, 2, 8);
+	for (uint32_t g = 0; g < draft.n_groups; g++) {
+		v3f_set(min[g], INFINITY, INFINITY, INFINITY);
+		v3f_set(max[g], -INFINITY, -INFINITY, -INFINITY);
 	}
 	for (uint32_t i = 0; i < draft.n_blocks; i++) {
-		float p[3], d[3];
+		const struct draft_block *block = &draft.block[i];
 
-		if (draft.block[i].level != 0)
-			continue;
-		draft_position(&draft, &draft.block[i], 36, p);
-		for (unsigned s = 0; s < 64; s++) {
-			v3f_sub(d, coarse[s], p);
-			if (v3f_length(d) < 0.74f * 128 * 0.0004f)
-				assert_true((part[draft.block[i].group] >> s & 1) == 1);
+		for (uint64_t left = block->part; left != 0; left &= left - 1) {
+			float p[3];
+
+			draft_position(&draft, block, (unsigned)__builtin_ctzll(left), p);
+			for (int k = 0; k < 3; k++) {
+				min[block->group][k] = fminf(min[block->group][k], p[k]);
+				max[block->group][k] = fmaxf(max[block->group][k], p[k]);
+			}
 		}
 	}
-	free(part);
+	for (uint32_t g = 0; g < draft.n_groups; g++) {
+		for (uint32_t h = 0; h < g; h++) {
+			float least = INFINITY;
+
+			for (int k = 0; k < 3; k++)
+				least = fminf(least, fminf(max[g][k] - min[h][k], max[h][k] - min[g][k]));
+			assert_true(least < 1e-6f);
+		}
+	}
 	draft_fini(&draft);
 }
 
@@ -232,7 +243,7 @@ int main(void)
 		cmocka_unit_test(fine_samples_are_in_one_group_each),
 		cmocka_unit_test(groups_have_the_nearest_samples_of_each_level),
 		cmocka_unit_test(coarse_levels_are_not_stored_many_times),
-		cmocka_unit_test(a_block_is_shared_by_all_the_groups_around_it),
+		cmocka_unit_test(groups_do_not_reach_into_each_other),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
