@@ -8,7 +8,7 @@
 #define GROUP_SAMPLES 131072
 #define CELLS 4 /* that a coarse pixel is wide */
 #define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
-#define FAR 4   /* where there is nothing as near */
+#define FAR 4   /* for samples that have nothing as near: moved ones are off by half a pixel, and so is what they cover */
 
 /* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
  * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
@@ -242,18 +242,22 @@ static double distance2(const struct cover *map, const struct cover_point *point
 	return sum;
 }
 
-/* All groups with a cell within reach of a sample. */
+/* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
 static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
 {
 	uint32_t first[COVER_MOST_AROUND];
-	int n_cells = cover_around(map, p, reach, first);
+	int n_cells = cover_around(map, p, reach, first), n = 0;
 
-	for (int c = 0; c < n_cells; c++)
-		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next)
-			if (distance2(map, &map->point[i], p) <= reach * reach
-			    && add_part(parts, map->point[i].patch, s) != PSR_OK)
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next) {
+			if (distance2(map, &map->point[i], p) > reach * reach)
+				continue;
+			if (add_part(parts, map->point[i].patch, s) != PSR_OK)
 				return PSR_ERR_MEMORY;
-	return PSR_OK;
+			n++;
+		}
+	}
+	return n;
 }
 
 static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
@@ -264,13 +268,14 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 	parts->n = 0;
 	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
 		unsigned s = (unsigned)__builtin_ctzll(left);
-		uint32_t n = parts->n;
 		float p[3];
+		int n;
 
 		draft_position(draft, block, s, p);
-		rc = find_groups(map, p, REACH * map->ds, s, parts);
-		if (rc == PSR_OK && n == 0 && parts->n == 0)
-			rc = find_groups(map, p, FAR * map->ds, s, parts);
+		n = find_groups(map, p, REACH * map->ds, s, parts);
+		if (n == 0)
+			n = find_groups(map, p, FAR * map->ds, s, parts);
+		rc = n < 0 ? n : PSR_OK;
 	}
 	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
 		struct draft_block part = *block;
