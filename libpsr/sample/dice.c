@@ -22,6 +22,9 @@ static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
  * corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
+/* As far from such a triangle's plane, a place is on it: surfaces are rough, and places half a pixel off are on another one. */
+#define OFF_TRIANGLE 0.4
+
 #define N_TRIES 10
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
@@ -99,21 +102,24 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 	}
 }
 
-static int is_triangle(const struct level *level, const struct corner corner[3])
+/* Whether the corners make a triangle that is small enough, and the spot is on it, not on something beside it. */
+static int is_triangle(const struct level *level, const struct surface_spot *spot, const struct corner corner[3])
 {
 	const float most = (float)(LONGEST_SIDE * LONGEST_SIDE * level->ds * level->ds);
+	float d[3][3], n[3], off[3], away;
 
 	for (int i = 0; i < 3; i++)
 		if (corner[i].ref.patch == SHEET_NONE)
 			return 0;
 	for (int i = 0; i < 3; i++) {
-		float d[3];
-
-		v3f_sub(d, corner[i].position, corner[(i + 1) % 3].position);
-		if (v3f_dot(d, d) > most)
+		v3f_sub(d[i], corner[i].position, corner[(i + 1) % 3].position);
+		if (v3f_dot(d[i], d[i]) > most)
 			return 0;
 	}
-	return 1;
+	v3f_cross(n, d[0], d[1]);
+	v3f_sub(off, spot->p, corner[0].position);
+	away = v3f_dot(off, n);
+	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * level->ds * level->ds) * v3f_dot(n, n);
 }
 
 static int is_covered(const struct level *level, const struct surface_spot *spot)
@@ -127,7 +133,7 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 		struct corner corner[3];
 
 		find_corners(level, tries.projection[i], spot, corner);
-		if (is_triangle(level, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
+		if (is_triangle(level, spot, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
 			return 1;
 	}
 	return 0;
@@ -165,7 +171,7 @@ static void offer_triangle(const struct level *level, const struct surface_spot 
 		float cost = (float)i / 2, opening = 0;
 
 		find_corners(level, tries->projection[i], spot, corner);
-		if (!is_triangle(level, corner))
+		if (!is_triangle(level, spot, corner))
 			continue;
 		for (int k = 0; k < 3; k++) {
 			cost += corner[k].is_kept ? 0 : 0.5f;
