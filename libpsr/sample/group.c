@@ -5,10 +5,11 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_SAMPLES 131072
+#define LEAST_GROUP 131072 /* samples of the finest level */
+#define MOST_GROWTH 1.25   /* of the number of blocks, by those that groups share */
 #define CELLS 4 /* that a coarse pixel is wide */
 #define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
-#define FAR 4   /* for samples that have nothing as near: moved ones are off by half a pixel, and so is what they cover */
+#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
 
 /* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
  * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
@@ -45,7 +46,7 @@ static int compare_groups(const void *a, const void *b)
 }
 
 /* Halves along the longest side of the box of the centres, until a part is small enough. */
-static void cut(struct draft *draft, struct place *place, uint32_t n)
+static void cut(struct draft *draft, struct place *place, uint32_t n, uint32_t most)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
 	uint64_t n_samples = 0;
@@ -58,7 +59,7 @@ static void cut(struct draft *draft, struct place *place, uint32_t n)
 			max[k] = fmaxf(max[k], place[i].center[k]);
 		}
 	}
-	if (n_samples <= GROUP_SAMPLES) {
+	if (n_samples <= most) {
 		for (uint32_t i = 0; i < n; i++)
 			place[i].group = draft->n_groups;
 		draft->n_groups++;
@@ -69,8 +70,8 @@ static void cut(struct draft *draft, struct place *place, uint32_t n)
 	for (uint32_t i = 0; i < n; i++)
 		place[i].axis = axis;
 	qsort(place, n, sizeof *place, compare_places);
-	cut(draft, place, n / 2);
-	cut(draft, place + n / 2, n - n / 2);
+	cut(draft, place, n / 2, most);
+	cut(draft, place + n / 2, n - n / 2, most);
 }
 
 static void center_of(const struct draft *draft, const struct draft_block *block, float center[3])
@@ -109,7 +110,8 @@ static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct
 
 		if (is_whole(draft, block)) {
 			if (place != NULL) {
-				place[n] = (struct place){ .block = b, .sample = WHOLE, .n_samples = (uint8_t)__builtin_popcountll(block->part) };
+				place[n] = (struct place){ .block = b, .sample = WHOLE };
+				place[n].n_samples = (uint8_t)__builtin_popcountll(block->part);
 				center_of(draft, block, place[n].center);
 			}
 			n++;
@@ -127,11 +129,16 @@ static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct
 
 struct blocks {
 	struct draft_block *block;
-	uint32_t n, capacity;
+	uint32_t n, capacity, most;
+	int is_over; /* there would be more */
 };
 
 static int add_block(struct blocks *blocks, const struct draft_block *block)
 {
+	if (blocks->n == blocks->most) {
+		blocks->is_over = 1;
+		return PSR_OK;
+	}
 	if (blocks->n == blocks->capacity) {
 		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
 		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
@@ -146,7 +153,7 @@ static int add_block(struct blocks *blocks, const struct draft_block *block)
 }
 
 /* A block for each group that has some of a finest one, in the order of these. */
-static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_finest)
+static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
 {
 	uint32_t n = list_places(draft, n_finest, NULL);
 	struct place *place = malloc(((size_t)n + 1) * sizeof *place);
@@ -156,7 +163,7 @@ static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_fin
 		return PSR_ERR_MEMORY;
 	list_places(draft, n_finest, place);
 	draft->n_groups = 0;
-	cut(draft, place, n);
+	cut(draft, place, n, most);
 	qsort(place, n, sizeof *place, compare_groups);
 	for (uint32_t i = 0; rc == PSR_OK && i < n;) {
 		struct draft_block piece = draft->block[place[i].block];
@@ -187,8 +194,9 @@ static int map_groups(struct cover *map, const struct draft *draft, const struct
 			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
 			for (int k = 0; k < 3; k++)
 				at[k] = (int)floor((double)point.position[k] / map->ds);
-			for (i = cover_cell(map, at); i != COVER_NONE && map->point[i].patch != block->group; i = map->point[i].next)
-				;
+			i = cover_cell(map, at);
+			while (i != COVER_NONE && map->point[i].patch != block->group)
+				i = map->point[i].next;
 			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
 				return PSR_ERR_MEMORY;
 		}
@@ -196,7 +204,7 @@ static int map_groups(struct cover *map, const struct draft *draft, const struct
 	return PSR_OK;
 }
 
-/* Which samples of a coarse block each group around it needs: on a crowded coarsest level there are hundreds of groups. */
+/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
 struct part {
 	uint32_t group;
 	uint64_t mask;
@@ -296,7 +304,7 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 
 	if (rc == PSR_OK)
 		rc = map_groups(&map, draft, blocks, n_pieces);
-	for (uint32_t b = n_finest; rc == PSR_OK && b < draft->n_blocks; b++)
+	for (uint32_t b = n_finest; rc == PSR_OK && !blocks->is_over && b < draft->n_blocks; b++)
 		if (draft->block[b].level == level)
 			rc = split_block(blocks, draft, &draft->block[b], &map, &parts);
 	cover_fini(&map);
@@ -304,18 +312,38 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 	return rc;
 }
 
+/* The blocks of all levels, for groups of at most so many samples. */
+static int make_blocks(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
+{
+	uint32_t n_pieces;
+	int rc;
+
+	blocks->n = 0;
+	blocks->is_over = 0;
+	blocks->most = (uint32_t)(MOST_GROWTH * (double)draft->n_blocks);
+	rc = cut_finest(blocks, draft, n_finest, most);
+	n_pieces = blocks->n;
+	for (uint32_t b = n_finest; rc == PSR_OK && draft->n_groups == 1 && b < draft->n_blocks; b++)
+		rc = add_block(blocks, &draft->block[b]);
+	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && level < draft->n_levels; level++)
+		rc = split_level(blocks, draft, level, n_finest, n_pieces);
+	return rc;
+}
+
 int draft_group(struct draft *draft)
 {
-	struct blocks blocks = { NULL, 0, 0 };
-	uint32_t n_finest = 0, n_pieces;
-	int rc;
+	struct blocks blocks = { .block = NULL };
+	uint32_t n_finest = 0;
+	int rc = PSR_OK;
 
 	while (n_finest < draft->n_blocks && draft->block[n_finest].level == 0)
 		n_finest++;
-	rc = cut_finest(&blocks, draft, n_finest);
-	n_pieces = blocks.n;
-	for (unsigned level = 1; rc == PSR_OK && level < draft->n_levels; level++)
-		rc = split_level(&blocks, draft, level, n_finest, n_pieces);
+	/* One group shares nothing. */
+	for (uint32_t most = LEAST_GROUP; rc == PSR_OK; most = most < UINT32_MAX / 2 ? 2 * most : UINT32_MAX) {
+		rc = make_blocks(&blocks, draft, n_finest, most);
+		if (!blocks.is_over)
+			break;
+	}
 	if (rc != PSR_OK) {
 		free(blocks.block);
 		return rc;

@@ -9,7 +9,7 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
-#define VIEW_LEVEL 4
+#define VIEW_LEVEL 5
 #define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
 #define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
