@@ -22,7 +22,7 @@ static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
  * corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
-/* As far from such a triangle's plane, a place is on it: surfaces are rough, and places half a pixel off are on another one. */
+/* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another one. */
 #define OFF_TRIANGLE 0.4
 
 #define N_TRIES 10

@@ -228,6 +228,7 @@ static void slivers_are_survived(void **state)
 	struct psr_mesh *mesh = meshes_new(4 + 300, 2 + 100);
 	struct level_set set;
 	uint64_t seed = 13;
+	const double from[3] = { -0.3, 0, 0.9 }, to[3] = { 0.3, 0, 0.9 };
 	float middle[3] = { 0, 0, 0.9f }, up[3] = { 0, 0, 1 };
 
 	(void)state;
@@ -243,8 +244,7 @@ static void slivers_are_survived(void **state)
 			mesh->triangle[2 + i][c] = 4 + 3 * i + c;
 		}
 	}
-	add_strip(mesh, 0, (const double[3]){ -0.3, 0, 0.9 }, (const double[3]){ 0.3, 0, 0.9 }, (const double[3]){ 0, 0, 1 },
-	          0.4);
+	add_strip(mesh, 0, from, to, (const double[3]){ 0, 0, 1 }, 0.4);
 	level_set_make(&set, mesh, 32, 2);
 	assert_true(level_set_nearest(&set, middle, up, 2) <= FARTHEST);
 	for (uint32_t i = 0; i < set.level.cover.n_points; i++)
