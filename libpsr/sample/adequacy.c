@@ -276,6 +276,7 @@ static int add_missing(struct level *level, const struct adequacy *found, int ro
 		if (rc == PSR_OK)
 			rc = dice_cover(level, spot);
 	}
+	keep_look_again(level);
 	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 

@@ -155,7 +155,7 @@ static void sheets_have_two_sides_at_all_levels(void **state)
 	for (int two_sided = 0; two_sided < 2; two_sided++) {
 		struct psr_mesh *mesh = square();
 		struct built built;
-		int n[N_LEVELS] = { 0 };
+		int n[N_LEVELS] = { 0 }, n_backs = 0;
 
 		mesh->material->two_sided = two_sided;
 		open_built(&built, mesh);
@@ -163,9 +163,12 @@ static void sheets_have_two_sides_at_all_levels(void **state)
 			const struct model_sample *s = &built.sample[i];
 
 			assert_int_equal(s->two_sided, two_sided);
-			assert_true(psr_direction_table()[PSR_ATTR_NORMAL(s->attr)][2] > 0);
+			n_backs += psr_direction_table()[PSR_ATTR_NORMAL(s->attr)][2] < 0;
 			n[s->level]++;
 		}
+		/* A view of the back that misses something adds a sample there. */
+		printf("# %d of %d samples on the back; %d %d %d\n", n_backs, n[0] + n[1] + n[2], n[0], n[1], n[2]);
+		assert_true(100 * n_backs <= two_sided * (n[0] + n[1] + n[2]));
 		/* Once, not once a side: a pixel's lattice has at most 1 / (0.866 cos^2 25) = 1.41 points, and its border
 		 * more. */
 		for (unsigned level = 0; level < N_LEVELS; level++)
