@@ -348,7 +348,7 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 	const struct level *level = job->level;
 	uint8_t sides = level->sides[prim];
 	const float *front = ray_scene_normal(level->scene, prim);
-	int is_two_sided = level_material(level, prim)->two_sided != 0;
+	int is_two_sided = level_material(level, prim)->two_sided != 0, is_side_seen = 0;
 
 	for (int back = 0; back <= is_two_sided; back++) {
 		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
@@ -356,9 +356,13 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 
 		if (job->round == 0 && (sides & hidden) != 0 && (sides & seen) == 0)
 			continue;
+		/* What is kept for the front counts. */
+		if (back && is_side_seen && level_is_two_sided(level, prim, p, front))
+			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		if (seen_is(&level->seen, spot.p, spot.n) && !is_covered(level, &spot))
+		is_side_seen = seen_is(&level->seen, spot.p, spot.n);
+		if (is_side_seen && !is_covered(level, &spot))
 			add_spot(list, &spot);
 	}
 }
