@@ -154,7 +154,8 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	hit->tile_y1 = tile_of(e.y1, TILE_HEIGHT, plan->tiles_y);
 	chunk->levels |= 1u << level;
 	chunk->n_clamped += (uint32_t)clamped;
-	chunk->n_samples += (uint64_t)__builtin_popcountll(b->mask[block]);
+	/* As many as the mask has bits, without counting them. */
+	chunk->n_samples += (block + 1 < b->n_blocks ? b->attr_first[block + 1] : b->n_samples) - b->attr_first[block];
 	float error = s * b->depth_step[block] * in->scale / 2;
 	if (error > chunk->depth_error)
 		chunk->depth_error = error;

@@ -162,7 +162,7 @@ static void check_spheres(const struct psr_blocks *b)
 	}
 }
 
-/* Resolution 8 has the greatest blocks that there are, of spheres nearly as wide as the format has them. */
+/* Resolution 8 has the widest blocks that there are. */
 static void spheres_hold_their_samples_and_little_more(void **state)
 {
 	static const uint32_t resolution[3] = { 8, 96, 192 };
