@@ -2,6 +2,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 #include "seen.h"
@@ -9,8 +10,9 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
-#define VIEW_LEVEL 3
-#define N_VIEWS (8 << 2 * VIEW_LEVEL)
+#define VIEW_LEVEL 5
+#define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
+#define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
@@ -37,15 +39,10 @@ static uint64_t coarser_key(uint64_t key)
 	return coarser;
 }
 
-static size_t place_of(const struct seen *seen, uint64_t key)
-{
-	return (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 16) & (seen->size - 1);
-}
-
 /* From any thread. 0: there is no room. */
 static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
 		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
@@ -126,20 +123,26 @@ static int grow(struct seen *seen)
 	return PSR_OK;
 }
 
-int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
+int seen_init(struct seen *seen, double ds)
 {
-	struct look look = { .seen = seen, .scene = scene, .ds = RAY_PIXELS * ds, .reach = (int)ceil(1 / (RAY_PIXELS * ds)) };
-
 	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
 	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
 	if (seen->table == NULL)
 		return PSR_ERR_MEMORY;
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	return PSR_OK;
+}
+
+int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool)
+{
+	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
+	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+
 	for (unsigned i = 0; i < N_VIEWS;) {
 		double direction[3];
 
 		/* Far apart ones first, so that the table soon has its size. */
-		psr_direction_center(VIEW_LEVEL, i * 211 % N_VIEWS, direction);
+		psr_direction_center(VIEW_LEVEL, (SEEN_ROUNDS * (i * 211 % N_VIEWS) + (unsigned)round) % N_DIRECTIONS, direction);
 		psr_direction_frame(direction, look.frame);
 		look.n_new = 0;
 		look.is_full = 0;
@@ -173,7 +176,7 @@ void seen_fini(struct seen *seen)
 
 static int has(const struct seen *seen, uint64_t key)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	while (seen->table[i] != FREE && seen->table[i] != key)
 		i = (i + 1) & (seen->size - 1);
