@@ -165,7 +165,7 @@ static void check_spheres(const struct psr_blocks *b)
 /* Resolution 8 has the widest blocks that there are. */
 static void spheres_hold_their_samples_and_little_more(void **state)
 {
-	static const uint32_t resolution[3] = { 8, 96, 192 };
+	static const uint32_t resolution[3] = { 8, 64, 96 };
 	struct psr_mesh *mesh = dented_sphere();
 
 	(void)state;
