@@ -174,11 +174,6 @@ static int check_heads(const struct checker *c)
 	uint64_t n_samples = 0;
 
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		if (!is_coordinate(b->sphere_x[i]) || !is_coordinate(b->sphere_y[i]) || !is_coordinate(b->sphere_z[i]))
-			return fail(c, "SPHX, SPHY, SPHZ", "the center of block %" PRIu32 " is not finite or beyond %g", i,
-			            (double)MODEL_MAX_COORDINATE);
-		if (!is_length(b->sphere_r[i]))
-			return fail(c, "SPHR", "the radius of block %" PRIu32 " is %g", i, (double)b->sphere_r[i]);
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
 			            b->n_projections);

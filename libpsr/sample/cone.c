@@ -128,13 +128,15 @@ void cone_pack(const float (*normal)[3], int n, int8_t axis[3], uint8_t *sine)
 
 int cone_culls(const struct psr_blocks *blocks, uint32_t block, const float eye[3], int is_perspective)
 {
-	float g = 0, length2 = 0, axis2 = 0, r = is_perspective ? blocks->sphere_r[block] : 0;
+	float g = 0, length2 = 0, axis2 = 0, center[3], radius, r;
 
 	if (blocks->cone_sine == NULL || blocks->cone_sine[block] == PSR_CONE_ANY
 	    || (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
 		return 0;
 	const float axis[3] = { blocks->cone_x[block], blocks->cone_y[block], blocks->cone_z[block] };
-	const float center[3] = { blocks->sphere_x[block], blocks->sphere_y[block], blocks->sphere_z[block] };
+
+	psr_blocks_sphere(blocks, block, center, &radius);
+	r = is_perspective ? radius : 0;
 	for (int k = 0; k < 3; k++) {
 		float d = is_perspective ? center[k] - eye[k] : -eye[k];
 

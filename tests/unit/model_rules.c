@@ -159,11 +159,6 @@ static const struct violation violations[] = {
 	{ "CLUS", 29, 1, 1, "CLUS: reserved bytes of cluster 0 are not zero" },
 	{ "BLVL", 1, 1, 1, "BLVL: block 1 is of level 1, and its cluster 0 of level 0" },
 	{ "BLVL", 5, 1, 200, "BLVL: block 5 is of level 200, and its cluster 2 of level 1" },
-	{ "SPHX", 0, 4, F_NAN, "SPHX, SPHY, SPHZ: the center of block 0 is not finite or beyond 1024" },
-	{ "SPHY", 20, 4, F_INF, "SPHX, SPHY, SPHZ: the center of block 5 is not finite or beyond 1024" },
-	{ "SPHZ", 4, 4, F_2000, "SPHX, SPHY, SPHZ: the center of block 1 is not finite or beyond 1024" },
-	{ "SPHR", 4, 4, F_MINUS_1, "SPHR: the radius of block 1 is -1" },
-	{ "SPHR", 4, 4, F_NAN, "SPHR: the radius of block 1 is nan" },
 	{ "BPRJ", 6, 2, 2, "BPRJ: block 3 is of projection 2 of 2" },
 	{ "BFLG", 2, 1, 2, "BFLG: block 2 has unknown flags 0x2" },
 	{ "DBIA", 8, 4, F_NAN, "DBIA: the depth of block 2 begins at nan" },
@@ -204,7 +199,10 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "PROJ", 36, 4, 0x44800000, NULL },    /* spacing 1024 */
 		{ "CLUS", 12, 4, 0, NULL },             /* radius 0 */
 		{ "CLUS", 56, 4, 2, NULL },             /* a group of its own */
-		{ "SPHX", 0, 4, 0xc4800000, NULL },     /* center -1024 */
+		{ "CLUS", 0, 4, 0xc4800000, NULL },     /* center -1024 */
+		{ "SPHX", 0, 2, 0x8000, NULL },         /* center -2 */
+		{ "SPHR", 0, 2, 0xffff, NULL },
+		{ "SPHR", 0, 2, 0, NULL },
 		{ "DSTP", 0, 4, 0, NULL },              /* flat */
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
 	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
@@ -243,6 +241,7 @@ static void versions_are_refused_by_major_and_section(void **state)
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
 	assert_non_null(strstr(err.text, "required section DPTH, version 9, at byte"));
+	assert_non_null(strstr(err.text, "a newer psr may"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "VISM") + ENTRY_VERSION, 2, 2);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
@@ -264,6 +263,24 @@ static void unknown_sections_are_skipped_if_optional_and_named_if_required(void 
 	file_put(entry_of(bytes, "NEWS") + ENTRY_FLAGS, 2, ENTRY_REQUIRED);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_UNSUPPORTED);
 	assert_non_null(strstr(err.text, "required section NEWS, version 1, at byte"));
+}
+
+/* Before spheres had eight bytes, they were floats: what holds them has to be built again, and is told so. */
+static void spheres_of_version_1_are_refused_as_an_older_psr_s(void **state)
+{
+	static const char *const types[4] = { "SPHX", "SPHY", "SPHZ", "SPHR" };
+
+	(void)state;
+	for (int k = 0; k < 4; k++) {
+		uint8_t *bytes = copy_original();
+		struct psr_error err = { .text = "" };
+
+		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
+		assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
+		assert_non_null(strstr(err.text, types[k]));
+		assert_non_null(strstr(err.text, "version 1, at byte"));
+		assert_non_null(strstr(err.text, "it is an older psr's, and the model has to be built again"));
+	}
 }
 
 /* Models of before cones had four bytes open, and are drawn without culling by them. */
@@ -412,6 +429,7 @@ int main(void)
 		cmocka_unit_test(values_at_the_edge_of_a_rule_are_taken),
 		cmocka_unit_test(versions_are_refused_by_major_and_section),
 		cmocka_unit_test(unknown_sections_are_skipped_if_optional_and_named_if_required),
+		cmocka_unit_test(spheres_of_version_1_are_refused_as_an_older_psr_s),
 		cmocka_unit_test(cones_of_version_1_are_skipped),
 		cmocka_unit_test(every_required_section_is_missed),
 		cmocka_unit_test(lies_in_header_and_table_are_refused),

@@ -255,20 +255,23 @@ static void flat_blocks_along_the_axes_pack_to_a_step(void **state)
  * them nearly where they are. */
 static void no_block_is_culled_while_a_normal_of_its_cone_faces_the_eye(void **state)
 {
+	const int16_t at_center[3] = { 1638, -3277, 4915 };
+	const uint16_t reach = 1638;
 	uint64_t seed = 12;
 	int n_culled = 0, n_kept = 0;
 
 	(void)state;
 	for (int round = 0; round < 40000; round++) {
-		float normal[16][3], center[3] = { 0.1f, -0.2f, 0.3f }, radius = 0.05f, eye[3];
+		float normal[16][3], center[3], radius, eye[3];
 		int n = 1 + (int)(16 * meshes_random(&seed)), is_perspective = round % 2, faces = 0;
 		double v[3];
 		int8_t axis[3];
 		uint8_t sine, flags = 0;
-		struct psr_blocks blocks = { .n_blocks = 1, .sphere_x = &center[0], .sphere_y = &center[1], .sphere_z = &center[2],
-			                         .sphere_r = &radius, .flags = &flags, .cone_x = &axis[0], .cone_y = &axis[1],
+		struct psr_blocks blocks = { .n_blocks = 1, .sphere_x = &at_center[0], .sphere_y = &at_center[1],
+			                         .sphere_z = &at_center[2], .sphere_r = &reach, .flags = &flags, .cone_x = &axis[0], .cone_y = &axis[1],
 			                         .cone_z = &axis[2], .cone_sine = &sine };
 
+		psr_blocks_sphere(&blocks, 0, center, &radius);
 		random_normals(&seed, n, meshes_random(&seed), normal);
 		cone_pack((const float(*)[3])normal, n, axis, &sine);
 		random_unit(&seed, v);

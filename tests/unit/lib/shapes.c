@@ -8,7 +8,9 @@
 
 struct arrays {
 	uint32_t n_blocks, n_samples;
-	float *sphere[4], *bias, *step;
+	float *bias, *step;
+	int16_t *center[3];
+	uint16_t *radius;
 	int8_t *cone[3];
 	uint16_t *projection, *depth;
 	int16_t *col, *row;
@@ -73,10 +75,11 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	if (!mask)
 		return;
 	uint32_t b = a->n_blocks++;
-	for (int k = 0; k < 4; k++)
-		a->sphere[k] = grow(a->sphere[k], a->n_blocks, sizeof(float));
-	for (int k = 0; k < 3; k++)
+	for (int k = 0; k < 3; k++) {
+		a->center[k] = grow(a->center[k], a->n_blocks, 2);
 		a->cone[k] = grow(a->cone[k], a->n_blocks, 1);
+	}
+	a->radius = grow(a->radius, a->n_blocks, 2);
 	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
 	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
 	a->step = grow(a->step, a->n_blocks, sizeof(float));
@@ -93,8 +96,9 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	double middle[3] = { (8 * col + 3.75) * dx, (8 * row + 3.5) * dx * sqrt(0.75), (low + high) / 2 }, center[3];
 	m3d_apply_transposed(center, axis, middle);
 	for (int k = 0; k < 3; k++)
-		a->sphere[k][b] = (float)center[k];
-	a->sphere[3][b] = (float)(sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx);
+		a->center[k][b] = (int16_t)rint(center[k] * 0x1p14);
+	/* The center is off by half of 2^-14 along each axis. */
+	a->radius[b] = (uint16_t)ceil((sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx + 0x1p-14) * 0x1p15);
 	/* A cap that holds the normals: around their mean, rounded, a little wider than the furthest of them. */
 	double mean[3] = { 0 }, least = 1, greatest = 0;
 	for (int i = 0; i < 64; i++)
@@ -155,7 +159,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	struct psr_blocks blocks = {
 		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
 		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster,
-		.sphere_x = a.sphere[0], .sphere_y = a.sphere[1], .sphere_z = a.sphere[2], .sphere_r = a.sphere[3],
+		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
 		.block_projection = a.projection, .col = a.col, .row = a.row, .level = a.level, .flags = a.flags,
 		.depth_bias = a.bias, .depth_step = a.step, .mask = a.mask, .attr_first = a.first, .depth = a.depth, .attr = a.attr,
 	};
@@ -178,10 +182,11 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		fprintf(stderr, "%s\n", err.text);
 		abort();
 	}
-	for (int k = 0; k < 4; k++)
-		free(a.sphere[k]);
-	for (int k = 0; k < 3; k++)
+	for (int k = 0; k < 3; k++) {
+		free(a.center[k]);
 		free(a.cone[k]);
+	}
+	free(a.radius);
 	free(a.cone_sine);
 	free(a.bias); free(a.step); free(a.projection); free(a.depth); free(a.col); free(a.row);
 	free(a.level); free(a.flags); free(a.mask); free(a.first); free(a.attr);
