@@ -10,6 +10,7 @@ VERSION := 0.1.0
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels
+DEPS_BENCH := gnuplot-nox
 
 CC  ?= cc
 CXX ?= c++
@@ -71,7 +72,7 @@ L_PSR    := -lzstd -lxxhash -lm
 L_CODEC  := -lturbojpeg
 L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
 
-.PHONY: all demo test test-all models models-all install help clean deps compile
+.PHONY: all demo studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -191,6 +192,11 @@ bench-model: compile $(BENCH) ## bench-model: build the standard set and the dra
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
 	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
 	$(Q)BUILD=$(BUILD) docs/demo.sh
+
+studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
+	$(Q).ci/deps $(DEPS_BENCH)
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/studies.sh
 
 # --- packages -------------------------------------------------------------------------------------------------------
 

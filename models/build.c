@@ -5,6 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "psr/build.h"
 #include "psr/cli.h"
@@ -76,10 +77,12 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
                       const struct psr_build_report *report)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(model);
+	struct stat st;
+	uint64_t file_bytes = stat(out, &st) == 0 ? (uint64_t)st.st_size : 0;
 
 	printf("%s: %" PRIu64 " samples in %" PRIu32 " blocks, %.1f MB, from %" PRIu32
 	       " %s in %.1f s (rays %.1f, selection %.1f)\n",
-	       out, blocks->n_samples, blocks->n_blocks, (double)psr_model_bytes(model) / 1e6,
+	       out, blocks->n_samples, blocks->n_blocks, (double)file_bytes / 1e6,
 	       mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points, mesh->n_triangles > 0 ? "triangles" : "points",
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }

@@ -94,7 +94,8 @@ static void skin(struct shape *shape)
 	}
 	sweep_normals(grid, ROWS, COLS, 1, 1);
 	for (uint32_t col = 0; col < SCALES_AROUND; col++) {
-		shape->current = col >= BELLY_FROM && col < BELLY_TO ? BELLY : col < 2 || col >= SCALES_AROUND - 2 ? SCALE_DARK : SCALE;
+		shape->current = col >= BELLY_FROM && col < BELLY_TO ? BELLY : col < 2 || col >= SCALES_AROUND - 2
+			? SCALE_DARK : SCALE;
 		sweep_band(shape, grid, ROWS, COLS, col * STEPS, (col + 1) * STEPS, 1);
 	}
 }
@@ -161,7 +162,8 @@ static void head(struct shape *shape)
 	knot_at(0, p, along, out);
 	v3d_cross(side, out, along);
 	/* columns: where x, y and z go */
-	const double turn[3][3] = { { side[0], out[0], along[0] }, { side[1], out[1], along[1] }, { side[2], out[2], along[2] } };
+	const double turn[3][3] = { { side[0], out[0], along[0] }, { side[1], out[1], along[1] },
+		{ side[2], out[2], along[2] } };
 	shape_move(shape, first, turn, p);
 }
 

@@ -97,7 +97,8 @@ static void put_floats(uint8_t **at, const float *v, int n)
 }
 
 /* `bin` is all zeros */
-static void put_bin(uint8_t *bin, const struct shape *shape, const struct glb_sorted *sorted, const struct glb_layout *layout)
+static void put_bin(uint8_t *bin, const struct shape *shape, const struct glb_sorted *sorted,
+                    const struct glb_layout *layout)
 {
 	uint8_t *at = bin;
 

@@ -102,7 +102,8 @@ static void add_bounds(cJSON *accessor, const struct shape *shape, const uint32_
 	add_numbers(accessor, "max", high, 3);
 }
 
-static void add_primitives(cJSON *primitives, cJSON *accessors, const struct shape *shape, const struct glb_sorted *sorted,
+static void add_primitives(cJSON *primitives, cJSON *accessors, const struct shape *shape,
+                           const struct glb_sorted *sorted,
                            uint32_t part)
 {
 	for (uint32_t m = 0; m < shape->n_materials; m++) {
@@ -130,7 +131,8 @@ static void add_primitives(cJSON *primitives, cJSON *accessors, const struct sha
 }
 
 /* Parts without triangles have no mesh: mesh[part] is -1. */
-static void add_meshes(cJSON *root, const struct shape *shape, const struct glb_sorted *sorted, const char *name, int *mesh)
+static void add_meshes(cJSON *root, const struct shape *shape, const struct glb_sorted *sorted, const char *name,
+                       int *mesh)
 {
 	cJSON *meshes = cJSON_AddArrayToObject(root, "meshes"), *accessors = cJSON_AddArrayToObject(root, "accessors");
 	char text[64];
@@ -193,7 +195,8 @@ static void add_views(cJSON *root, const struct shape *shape, const struct glb_l
 	}
 }
 
-char *glb_json(const struct shape *shape, const struct glb_sorted *sorted, const struct glb_layout *layout, const char *name)
+char *glb_json(const struct shape *shape, const struct glb_sorted *sorted, const struct glb_layout *layout,
+               const char *name)
 {
 	static const double one_node[] = { 0 };
 	int *mesh = malloc(sizeof *mesh * shape->n_parts);

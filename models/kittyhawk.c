@@ -44,7 +44,8 @@ static void wing_at(double u, double v, double p[3], const void *context)
 	/* 0 at the trailing edge, 1 at the leading edge */
 	at = (1 - c) / 2;
 	p[0] = w->x + w->chord * (at - 0.5) * sqrt(round);
-	p[1] = w->y + w->camber * 4 * at * (1 - at) * (0.6 + 0.8 * at) * round + w->thick * s * (0.35 + 0.65 * at) * round - w->droop * z * z;
+	p[1] = w->y + w->camber * 4 * at * (1 - at) * (0.6 + 0.8 * at) * round + w->thick * s * (0.35 + 0.65 * at) * round
+		- w->droop * z * z;
 	p[2] = w->half_span * z;
 }
 
@@ -115,7 +116,8 @@ static void tail_and_canard(struct shape *shape)
 static void skids(struct shape *shape)
 {
 	for (int side = -1; side <= 1; side += 2) {
-		const double a[3] = { -1.6, 0.03, 0.7 * side }, b[3] = { 2.5, 0.03, 0.7 * side }, c[3] = { 3.3, LOW_Y + 0.6, 0.7 * side };
+		const double a[3] = { -1.6, 0.03, 0.7 * side }, b[3] = { 2.5, 0.03, 0.7 * side },
+			c[3] = { 3.3, LOW_Y + 0.6, 0.7 * side };
 		shape->current = SPRUCE;
 		sweep_bend(shape, a, b, c, 0.03, 48, 16);
 		rod(shape, SPRUCE, 0.018, -0.55, 0.04, 0.7 * side, -0.55, LOW_Y, 0.7 * side);

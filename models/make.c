@@ -41,7 +41,8 @@ static int make_file(const struct generator *generator, const char *path, struct
 		code = glb_write(path, bytes, n_bytes, err);
 	if (code == PSR_OK)
 		printf("%s: %llu triangles, %u instances, %u materials, %.2f MB\n", path,
-		       (unsigned long long)count_triangles(&shape), shape.n_instances, shape.n_materials, (double)n_bytes / 1e6);
+		       (unsigned long long)count_triangles(&shape), shape.n_instances, shape.n_materials,
+		       (double)n_bytes / 1e6);
 	free(bytes);
 	shape_fini(&shape);
 	return code;
@@ -80,7 +81,7 @@ int cmd_make(int argc, char **argv)
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model make NAME -o OUT.glb | psr-model make all -o FOLDER | psr-model make --list",
-		.summary = "Generates a model of the standard set, or all of them, as binary glTF. The same bytes on every machine.",
+		.summary = "Generates models of the standard set as binary glTF. The same bytes on every machine.",
 		.opts = opts,
 		.footer = "Example: psr-model make teapot -o teapot.glb",
 	};

@@ -70,7 +70,8 @@ static void place_twig(struct shape *shape, uint32_t part, const double at[3], c
 	shape_place(shape, part, turn, at);
 }
 
-static void branch(struct shape *shape, double height, double length, double turn, const uint32_t twig[2], uint32_t cone,
+static void branch(struct shape *shape, double height, double length, double turn, const uint32_t twig[2],
+                   uint32_t cone,
                    uint64_t *random)
 {
 	double c, s, path[13][3], radius[13], rise = 0.1 + 0.3 * height / HEIGHT;
@@ -87,8 +88,9 @@ static void branch(struct shape *shape, double height, double length, double tur
 	for (int i = 0; i < n; i++) {
 		double t = 0.16 + 0.84 * i / (n - 1), x = t * 11.999, rest = x - floor(x), at[3], out[3];
 		int k = (int)x, side = i & 1 ? 1 : -1;
-		double spread = i == n - 1 ? 0 : random_in(random, 0.6, 1.0) * side, size = random_in(random, 0.3, 0.42) * (1.1 - 0.35 * t);
-		size *= 0.5 + 0.5 * (length < 0.8 ? length / 0.8 : 1);
+		double spread = i == n - 1 ? 0 : random_in(random, 0.6, 1.0) * side,
+			size = random_in(random, 0.3, 0.42) * (1.1 - 0.35 * t);
+		size *= 0.3 + 0.7 * (length < 0.8 ? length / 0.8 : 1);
 		for (int j = 0; j < 3; j++)
 			at[j] = path[k][j] + (path[k + 1][j] - path[k][j]) * rest;
 		v3d_set(out, c - spread * s, random_in(random, -0.1, 0.25), -s - spread * c);
@@ -122,12 +124,14 @@ void make_pinetree(struct shape *shape)
 	twig[1] = twig_part(shape, 2, NEEDLES_NEW);
 	cone = cone_part(shape);
 	for (int i = 0; i < WHORLS; i++) {
-		double t = (double)i / WHORLS, height = 0.75 + (HEIGHT - 0.95) * t, length = 1.85 * (1 - t) * (1 - 0.15 * t) + 0.06;
+		double t = (double)i / WHORLS, height = 0.75 + (HEIGHT - 0.95) * t,
+			length = 1.85 * (1 - t) * (1 - 0.15 * t) + 0.06;
 		int n = 7 - (int)(2.5 * t);
 		double start = random_in(&random, 0, 1);
 		for (int j = 0; j < n; j++) {
 			double reach = length * random_in(&random, 0.85, 1.1), off = random_in(&random, -0.03, 0.03);
-			branch(shape, height + random_in(&random, -0.06, 0.06), reach, start + (double)j / n + off, twig, cone, &random);
+			branch(shape, height + random_in(&random, -0.06, 0.06), reach, start + (double)j / n + off, twig, cone,
+			       &random);
 		}
 	}
 	const double top[3] = { -0.02, HEIGHT - 0.25, 0 }, up[3] = { 0, 1, 0 };

@@ -46,7 +46,8 @@ static void leaf_at(double u, double v, double p[3], const void *context)
 	double side = 2 * u - 1, width = form[0] * sqrt(v) * (1 - v) * (1 + 0.6 * v) * 1.55, c, s;
 
 	sweep_angle(2.5 * v, &c, &s);
-	v3d_set(p, v * (1 - 0.15 * form[1] * v), 0.28 * fabs(side) * width - form[1] * v * v + form[2] * s * side * side * (1 - v), side * width);
+	v3d_set(p, v * (1 - 0.15 * form[1] * v), 0.28 * fabs(side) * width - form[1] * v * v
+	        + form[2] * s * side * side * (1 - v), side * width);
 }
 
 static void leaf_parts(struct shape *shape, uint32_t part[3])
@@ -113,7 +114,8 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 	sweep_angle(turn, &c, &s);
 	for (int i = 0; i <= 20; i++) {
 		double t = i / 20.0;
-		v3d_set(path[i], (0.08 + reach * t * t) * c, SOIL + height * t * (1 - 0.25 * t * reach), -(0.08 + reach * t * t) * s);
+		v3d_set(path[i], (0.08 + reach * t * t) * c, SOIL + height * t * (1 - 0.25 * t * reach),
+		        -(0.08 + reach * t * t) * s);
 		radius[i] = 0.014 * (1 - 0.75 * t);
 	}
 	shape->current = STEM;
@@ -125,7 +127,8 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 		sweep_angle(leaf_turn, &c, &s);
 		v3d_set(out, c, rise, -s);
 		v3d_normalize(out, out);
-		place(shape, leaf[random_next(random) % 3], path[at], out, random_in(random, 0.3, 0.46) * (1 - 0.05 * i));
+		uint32_t kind = (uint32_t)(random_next(random) % 3);
+		place(shape, leaf[kind], path[at], out, random_in(random, 0.3, 0.46) * (1 - 0.05 * i));
 	}
 	if (number < BLOSSOMS) {
 		const double top[3] = { path[20][0], path[20][1] + 0.24, path[20][2] };

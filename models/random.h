@@ -1,4 +1,5 @@
-/* The generators' own random numbers (SplitMix64): the same everywhere. Seed it with any number. */
+/* The generators' own random numbers (SplitMix64): the same everywhere, as long as no expression
+ * draws two of them. Seed it with any number. */
 #ifndef MODELS_RANDOM_H
 #define MODELS_RANDOM_H
 

@@ -51,7 +51,8 @@ static void hull_at(double u, double v, double p[3])
 	sweep_angle(u / 2, &c, &s);
 	/* a full bilge: between an ellipse and a box; the stem rakes forward */
 	side = c * (1.25 - 0.25 * c * c);
-	v3d_set(p, x + 0.45 * v * v * v * (1 - s) * (1 - s), keel + (sheer - keel) * (1 - s * (1.3 - 0.3 * s * s)), half * side);
+	v3d_set(p, x + 0.45 * v * v * v * (1 - s) * (1 - s), keel + (sheer - keel) * (1 - s * (1.3 - 0.3 * s * s)),
+	        half * side);
 }
 
 /* The deck's line across, cambered; its ends are the hull's to the last bit. */
@@ -61,7 +62,8 @@ static void deck_at(uint32_t j, double v, double p[3])
 
 	hull_at(0, v, starboard);
 	hull_at(1, v, port);
-	v3d_set(p, starboard[0], starboard[1] + 0.05 * 4 * t * (1 - t) * starboard[2], starboard[2] + (port[2] - starboard[2]) * t);
+	v3d_set(p, starboard[0], starboard[1] + 0.05 * 4 * t * (1 - t) * starboard[2],
+	        starboard[2] + (port[2] - starboard[2]) * t);
 	if (j == ACROSS)
 		v3d_set(p, port[0], port[1], port[2]);
 }
@@ -130,8 +132,8 @@ static void fittings(struct shape *shape)
 	sweep_bend(shape, tiller[0], tiller[1], tiller[2], 0.03, 16, 16);
 	shape->current = GLASS;
 	for (int i = 0; i < 6; i++) {
-		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.02 };
-		sweep_block(shape, at, half, 0.015);
+		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.045 };
+		sweep_block(shape, at, half, 0.03);
 	}
 }
 
@@ -192,12 +194,14 @@ static void flag_at(double u, double v, double p[3], const void *context)
 
 	(void)context;
 	sweep_angle(1.2 * u, &c, &s);
-	v3d_set(p, MAST_X - 0.14 - 0.9 * u, MAST_TOP - 0.03 - 0.13 * u - (0.28 - 0.26 * u) * (1 - v), 0.09 * s * u + 0.25 * u);
+	v3d_set(p, MAST_X - 0.14 - 0.9 * u, MAST_TOP - 0.03 - 0.13 * u - (0.28 - 0.26 * u) * (1 - v),
+	        0.09 * s * u + 0.25 * u);
 }
 
 static void sails(struct shape *shape)
 {
-	static const struct sail main = { { MAST_X - 0.1, 1.6, 0.02 }, { -2.65, 1.72, 0.5 }, { MAST_X - 0.16, 7.8, 0.01 }, 0.3, 0.55 };
+	static const struct sail main = { { MAST_X - 0.1, 1.6, 0.02 }, { -2.65, 1.72, 0.5 }, { MAST_X - 0.16, 7.8, 0.01 },
+		0.3, 0.55 };
 	static const struct sail jib = { { 3.3, 1.1, 0 }, { 0.25, 1.35, 0.75 }, { MAST_X + 0.0, 6.95, 0 }, -0.12, 0.55 };
 	static const double cut[] = { 0, 0.42, 0.5, 0.56, 0.6, 1 };
 

@@ -12,7 +12,8 @@
 
 #define PROGRAM "psr-model study"
 #define MOST_MODELS 64
-/* Five as different as [G] 5.3 wants, "from the large smooth surfaces of 'top' to the intricate features of 'kittyhawk'". */
+/* Five as different as [G] 5.3 wants, "from the large smooth surfaces of 'top' to the intricate features of
+ * 'kittyhawk'". */
 #define FIVE "top,teapot,chair,plant,kittyhawk"
 
 /* Size and time, relative, over the rows; x are the labels. Columns of $table: 3 + the table's. */
@@ -182,7 +183,7 @@ int cmd_study(int argc, char **argv)
 		  .help = "draw the table with gnuplot into this .svg or .png" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "threads to use; only times depend on it", .min = 1, .max = 256 },
-		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object, with a row for each model too" },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object, with each model too" },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

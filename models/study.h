@@ -74,8 +74,8 @@ struct study_kind {
 	const char *name, *figure, *what; /* "figure 5.5" */
 	const char *models;               /* unless others are named: a list with commas; NULL: the standard set */
 	int (*run)(struct study *study);  /* makes the table */
-	/* A gnuplot program after `set terminal` and `set output`; NULL: this study has no plot. Reads $table, with the means of the
-	 * table's rows: number of the row, label, values. */
+	/* A gnuplot program after `set terminal` and `set output`; NULL: this study has no plot. Reads $table, with the
+	 * means of the table's rows: number of the row, label, values. */
 	const char *plot;
 	const char *note;                 /* printed below the table; may be NULL */
 };

@@ -71,7 +71,8 @@ static int run_gnuplot(FILE *program, struct psr_error *err)
 		rc = posix_spawnp(&child, argv[0], &actions, NULL, argv, environ);
 	posix_spawn_file_actions_destroy(&actions);
 	if (rc == ENOENT)
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "gnuplot, which draws the plots, is not installed; the package is gnuplot-nox");
+		return psr_fail(err, PSR_ERR_NOT_FOUND,
+		                "gnuplot, which draws the plots, is not installed; the package is gnuplot-nox");
 	if (rc != 0)
 		return psr_fail(err, PSR_ERR_IO, "gnuplot cannot be started: %s", strerror(rc));
 	while (waitpid(child, &status, 0) < 0)

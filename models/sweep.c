@@ -58,7 +58,7 @@ static int is_pole(const struct shape_vertex *row, uint32_t n_cols)
 	return 1;
 }
 
-/* One normal for the whole pole, unless it is the tip of something so slender that its sides would face away from it. */
+/* One normal for the whole pole, unless it is the tip of something so slender that its sides face away from that. */
 static void join_pole(struct shape_vertex *row, uint32_t n_cols)
 {
 	double sum[3] = { 0, 0, 0 }, length;

@@ -66,7 +66,8 @@ static void leg(struct shape *shape, double x, double z)
 static void cloth_at(double u, double v, double p[3], const void *context)
 {
 	double half_top = HALF_LENGTH + 0.004, bend = 0.012, hang = 0.24, quarter = bend * 1.5707963267948966;
-	double length = half_top + quarter + hang, s = (2 * v - 1) * length, side = s < 0 ? -1 : 1, rest = fabs(s) - half_top;
+	double length = half_top + quarter + hang, s = (2 * v - 1) * length, side = s < 0 ? -1 : 1,
+		rest = fabs(s) - half_top;
 	double c, sine, fold_c, fold_s;
 
 	(void)context;
@@ -101,7 +102,8 @@ static void cloth(struct shape *shape)
 
 static void bowl(struct shape *shape)
 {
-	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, move[3] = { 0.12, TOP_Y + 0.004, 0.02 };
+	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
+		move[3] = { 0.12, TOP_Y + 0.004, 0.02 };
 	const struct surface_profile pieces[] = {
 		surface_line(0, 0, 0.05, 0, 1, BOWL),
 		surface_line(0.05, 0, 0.05, 0.01, 1, BOWL),
@@ -131,7 +133,8 @@ static void fruit(struct shape *shape)
 
 	for (int i = 0; i < 5; i++) {
 		double center[3] = { 0.12 + where[i][0], TOP_Y + 0.004 + where[i][1], 0.02 + where[i][2] };
-		double tip[3] = { center[0] + random_in(&random, -0.4, 0.4), center[1] + 1, center[2] + random_in(&random, -0.4, 0.4) };
+		double lean_x = random_in(&random, -0.4, 0.4), lean_z = random_in(&random, -0.4, 0.4);
+		double tip[3] = { center[0] + lean_x, center[1] + 1, center[2] + lean_z };
 		uint32_t first = shape->n_vertices;
 		if (i == 1 || i == 3) {
 			shape->current = ORANGE;

@@ -69,12 +69,13 @@ static void head(struct shape *shape)
 	sweep_cone(shape, beak, 0.12, tip, 48);
 	shape->current = COMB;
 	for (int i = 0; i < 3; i++) {
-		const double at[3] = { 0.74 - 0.14 * i, 1.95 - 0.04 * i * i + 0.02 * i, 0 }, size[3] = { 0.085, 0.12 - 0.012 * i, 0.05 };
+		const double at[3] = { 0.74 - 0.14 * i, 1.95 - 0.04 * i * i + 0.02 * i, 0 },
+			size[3] = { 0.085, 0.12 - 0.012 * i, 0.05 };
 		sweep_ball(shape, at, size, 20, 28);
 	}
 	for (int side = -1; side <= 1; side += 2) {
 		const double eye[3] = { 0.76, 1.71, side * 0.225 }, pupil[3] = { 0.785, 1.72, side * 0.272 };
-		static const double eye_half[3] = { 0.085, 0.085, 0.06 }, pupil_half[3] = { 0.042, 0.042, 0.03 };
+		static const double eye_half[3] = { 0.085, 0.085, 0.06 }, pupil_half[3] = { 0.045, 0.045, 0.055 };
 		shape->current = EYE;
 		sweep_ball(shape, eye, eye_half, 20, 28);
 		shape->current = PUPIL;
@@ -88,7 +89,8 @@ static void feathers(struct shape *shape)
 	for (int side = -1; side <= 1; side += 2) {
 		for (int i = 0; i < 3; i++) {
 			static const double origin[3] = { 0, 0, 0 };
-			const double half[3] = { 0.15, 0.4 - 0.07 * i, 0.05 }, at[3] = { 0.28 - 0.1 * i, 1.22 - 0.1 * i, side * (0.41 - 0.02 * i) };
+			const double half[3] = { 0.15, 0.4 - 0.07 * i, 0.05 },
+				at[3] = { 0.28 - 0.1 * i, 1.22 - 0.1 * i, side * (0.41 - 0.02 * i) };
 			const double from[3] = { at[0], at[1], at[2] };
 			const double to[3] = { at[0] - 0.9, at[1] + 0.32 - 0.16 * i, at[2] + side * 0.12 };
 			uint32_t first = shape->n_vertices;
@@ -150,7 +152,8 @@ static void string(struct shape *shape)
 	for (int i = 0; i <= 48; i++) {
 		double t = i / 48.0, fall = t < 0.35 ? 1 - t / 0.35 : 0;
 		sweep_angle(0.85 * t, &c, &s);
-		v3d_set(path[i], 0.84 + 0.91 * t, 0.016 + 0.284 * fall * fall + 0.059 * t * t * t * t * t * t, 0.38 * s * t * 0.8 + 0.9 * t * t * t);
+		v3d_set(path[i], 0.84 + 0.91 * t, 0.016 + 0.284 * fall * fall + 0.059 * t * t * t * t * t * t,
+		        0.38 * s * t * 0.8 + 0.9 * t * t * t);
 		path[i][2] += (0.62 - (0.38 * -0.8090169943749475 * 0.8 + 0.9)) * t * t * t;
 		radius[i] = 0.012;
 	}

@@ -82,11 +82,14 @@ void opening_prepare(void *userdata)
 {
 	struct opening *o = userdata;
 	struct stat status;
+	uint64_t need;
 
 	o->code = PSR_OK;
 	if (o->file.is_source)
 		o->code = prepare_source(o);
-	else if (stat(o->file.path, &status) == 0)
+	else if (psr_model_need(&need, o->file.path, NULL) == PSR_OK)
+		o->bytes = need;
+	else if (stat(o->file.path, &status) == 0) /* loading it says what is wrong */
 		o->bytes = (uint64_t)status.st_size;
 	else
 		o->code = psr_fail(&o->error, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s", strerror(errno));

@@ -61,6 +61,13 @@ static const char *short_name(const char *path)
 	return length > MAX_NAME ? path + length - MAX_NAME : path;
 }
 
+/* What is known of a file before it is read. */
+struct found {
+	int fd, is_packed;
+	size_t n_bytes;   /* of the file */
+	uint64_t n_image; /* what it says that it unpacks to, if it is packed */
+};
+
 static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
 {
 	uint8_t *image = NULL;
@@ -76,14 +83,13 @@ static int adopt_packed(struct psr_model **out, const struct pack_source *source
 	return code;
 }
 
-/* Opens a regular file that begins as a .psr file; *n_bytes is its size. */
-static int open_file(int *fd, size_t *n_bytes, int *is_packed, const char *path, const char *name,
-                     struct psr_error *err)
+/* Opens a regular file that begins as a .psr file. */
+static int open_file(struct found *found, const char *path, const char *name, struct psr_error *err)
 {
 	uint8_t header[FILE_HEADER_BYTES] = { 0 };
 	struct stat st;
 	ssize_t got;
-	int code;
+	int code, *fd = &found->fd;
 
 	/* Non-blocking, so that a pipe of that name does not hold anyone up. */
 	*fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
@@ -105,8 +111,9 @@ static int open_file(int *fd, size_t *n_bytes, int *is_packed, const char *path,
 		close(*fd);
 		return code;
 	}
-	*n_bytes = (size_t)st.st_size;
-	*is_packed = pack_is_packed(header);
+	found->n_bytes = (size_t)st.st_size;
+	found->is_packed = pack_is_packed(header);
+	found->n_image = file_get(header + HEADER_FILE_SIZE, 8);
 	return PSR_OK;
 }
 
@@ -158,22 +165,38 @@ static int open_model(struct psr_model **out, const char *path, int mapped, stru
 {
 	const char *name = short_name(path);
 	const uint8_t *bytes = NULL;
-	size_t n_bytes = 0;
-	int fd, is_packed = 0, code = open_file(&fd, &n_bytes, &is_packed, path, name, err);
+	struct found f;
+	int code = open_file(&f, path, name, err);
 
 	if (code != PSR_OK)
 		return code;
-	if (is_packed)
-		code = adopt_packed(out, &(struct pack_source){ .fd = fd, .n_bytes = n_bytes, .name = name }, err);
+	if (f.is_packed)
+		code = adopt_packed(out, &(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, err);
 	else
-		code = mapped ? map_image(&bytes, fd, n_bytes, name, err) : read_image(&bytes, fd, n_bytes, name, err);
-	close(fd);
-	if (is_packed || code != PSR_OK)
+		code = mapped ? map_image(&bytes, f.fd, f.n_bytes, name, err) : read_image(&bytes, f.fd, f.n_bytes, name, err);
+	close(f.fd);
+	if (f.is_packed || code != PSR_OK)
 		return code;
-	code = adopt(out, bytes, n_bytes, mapped, name, err);
+	code = adopt(out, bytes, f.n_bytes, mapped, name, err);
 	if (code == PSR_OK)
-		(*out)->file_bytes = n_bytes;
+		(*out)->file_bytes = f.n_bytes;
 	return code;
+}
+
+int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
+{
+	const char *name = short_name(path);
+	struct found f;
+	int code = open_file(&f, path, name, err);
+
+	if (code != PSR_OK)
+		return code;
+	close(f.fd);
+	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes))
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; more than %d to 1 "
+		                "is not believed", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
+	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model);
+	return PSR_OK;
 }
 
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)

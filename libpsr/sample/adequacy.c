@@ -266,7 +266,23 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 	return rc;
 }
 
-#define MOST_ROUNDS 6
+#define MOST_ROUNDS 5
+
+/* What a view found that none of those before had seen is seldom alone: it is put down as seen, and the surface diced again. */
+static int add_missing(struct level *level, const struct adequacy *found)
+{
+	int rc = PSR_OK;
+
+	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
+		const struct surface_spot *spot = &found->spot[i];
+
+		level->sides[spot->surface & ~SHEET_BACK] |= (spot->surface & SHEET_BACK) != 0 ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN;
+		rc = seen_add(&level->seen, spot->p, spot->n);
+		if (rc == PSR_OK)
+			rc = dice_cover(level, spot);
+	}
+	return rc == PSR_OK ? dice_surface(level) : rc;
+}
 
 int adequacy_reach(struct adequacy *out, struct level *level)
 {
@@ -278,8 +294,7 @@ int adequacy_reach(struct adequacy *out, struct level *level)
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
 		if (rc != PSR_OK || round == MOST_ROUNDS || 20000 * out->n_missing < out->n_trials)
 			break;
-		for (uint64_t i = 0; rc == PSR_OK && i < out->n_missing; i++)
-			rc = dice_cover(level, &out->spot[i]);
+		rc = add_missing(level, out);
 		free(out->spot);
 		out->spot = NULL;
 		if (rc != PSR_OK)

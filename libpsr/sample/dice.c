@@ -82,7 +82,7 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 		if (c->ref.patch == SHEET_NONE)
 			continue;
 		level_normal(level, sheets->sample[c->ref.patch][c->ref.sample].surface, n);
-		if ((sheets->patch[c->ref.patch].hidden >> c->ref.sample & 1) != 0 || v3f_dot(n, spot->n) < LEAST_ALIKE) {
+		if (v3f_dot(n, spot->n) < LEAST_ALIKE) {
 			c->ref.patch = SHEET_NONE;
 			continue;
 		}

@@ -56,7 +56,8 @@ int greedy_divide(struct greedy_view *view, int side)
 	for (uint32_t i = 0; i < view->n_samples; i++) {
 		const struct greedy_sample *sample = &view->sample[i];
 
-		key[i] = (struct key){ floor_div(sample->row, side), floor_div(sample->col, side), sample->row, sample->col, i };
+		key[i] = (struct key){ floor_div(sample->row, side), floor_div(sample->col, side), sample->row, sample->col,
+			                   i };
 	}
 	qsort(key, view->n_samples, sizeof *key, compare_keys);
 	for (uint32_t i = 0; i < view->n_samples; i++)

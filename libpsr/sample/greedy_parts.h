@@ -10,9 +10,15 @@
 /* Fills in all of the result but the times and the first pass. */
 void greedy_count(const struct greedy *greedy, struct greedy_result *result);
 
+/* ---- greedy_views.c ---- */
+
+/* Frames and spacing of all views, and how many they are. */
+void greedy_make_views(struct greedy *greedy);
+
 /* ---- greedy_scan.c ---- */
 
-/* Traces a view, of which no sample is there yet; or of every `stride` rows and columns of 8x8 blocks only one. MEMORY. */
+/* Traces a view, of which no sample is there yet; or of every `stride` rows and columns of 8x8 blocks only one.
+ * MEMORY. */
 int greedy_trace(struct greedy *greedy, int view, int stride);
 void greedy_forget(struct greedy_view *view); /* its samples and blocks */
 
@@ -67,8 +73,8 @@ static inline int greedy_counts(const struct greedy_facing *facing, const struct
 	return sample->two_sided || (facing->bit[n / 64] >> n % 64 & 1) != 0;
 }
 
-/* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a surface at
- * an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
+/* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a
+ * surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
 float greedy_depth_tolerance(float cosine, double ds);
 
 /* Which samples of a view may choose blocks. */
@@ -78,15 +84,15 @@ struct greedy_strictness {
 	int kept_only;       /* those of blocks that are kept */
 };
 
-/* Marks in is_missed the blocks of a view that have a sample that the kept samples of all other views, and of none of this
- * one, lack in one of the first n_tests tests. MEMORY. */
+/* Marks in is_missed the blocks of a view that have a sample that the kept samples of all other views, and of none of
+ * this one, lack in one of the first n_tests tests. MEMORY. */
 int greedy_find_missed(const struct greedy *greedy, int view, const struct greedy_select_options *options,
                        struct greedy_strictness strictness, int n_tests, uint8_t *is_missed);
 
 /* ---- greedy_prune.c ---- */
 
-/* Goes through what is kept, blocks or single samples, from the worst seen to the best, and drops what no test of any view
- * needs. MEMORY. */
+/* Goes through what is kept, blocks or single samples, from the worst seen to the best, and drops what no test of any
+ * view needs. MEMORY. */
 int greedy_prune(struct greedy *greedy, const struct greedy_select_options *options, int is_by_sample);
 
 #endif

@@ -4,7 +4,8 @@
 #include "../base/mem.h"
 #include "greedy_parts.h"
 
-/* The pixels of a view's tests: the depth that its samples ask for, and how many of the samples that are left reach it. */
+/* The pixels of a view's tests: the depth that its samples ask for, and how many of the samples that are left reach
+ * it. */
 struct table {
 	float *need;     /* test by pixel; INFINITY: nothing is asked for */
 	uint16_t *count;

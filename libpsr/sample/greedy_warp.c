@@ -15,7 +15,8 @@
 #define EMPTY UINT64_C(0x7f800000ffffffff)
 
 struct block {
-	float apex[3], axis[3], cone; /* [G] 6.4, about the mean normal; sine of the angle from it to the rim, 2: never culled */
+	float apex[3], axis[3]; /* of its visibility cone ([G] 6.4), about the mean normal */
+	float cone;             /* sine of the angle from axis to rim; 2: never culled */
 	float bias, step;
 	int16_t col, row;
 	uint16_t view;

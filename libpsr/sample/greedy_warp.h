@@ -1,8 +1,8 @@
 /* What warping a selection costs ([G] 7.1), for block sides and lattices that the renderer does not have.
  *
- * A loop in the manner of the renderer's: perspective frames at magnification 1, blocks outside of their visibility cones ([G]
- * 6.4, about the mean normal) left out, a set-up for each of the others, a row and a lane at a time, the minimum of 64-bit words.
- * Neither level buffers nor tiles nor the test of single normals are in it. */
+ * A loop in the manner of the renderer's: perspective frames at magnification 1, blocks outside of their visibility
+ * cones ([G] 6.4, about the mean normal) left out, a set-up for each of the others, a row and a lane at a time, the
+ * minimum of 64-bit words. Neither level buffers nor tiles nor the test of single normals are in it. */
 #ifndef PSR_SAMPLE_GREEDY_WARP_H
 #define PSR_SAMPLE_GREEDY_WARP_H
 

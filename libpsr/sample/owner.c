@@ -4,8 +4,8 @@
 #include "psr/direction.h"
 #include "psr/error.h"
 
-/* A projection that sees the face itself at over 60 degrees does not own it, however the surface around it lies. */
-#define LEAST_OWNER_COSINE 0.5f
+/* A projection that sees the face itself at over 50 degrees does not own it, however the surface around it lies. */
+#define LEAST_OWNER_COSINE 0.64f
 
 static const float *axis_of(const struct level *level, unsigned projection)
 {

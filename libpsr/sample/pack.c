@@ -6,6 +6,7 @@
 #include "cone.h"
 #include "pack.h"
 #include "psr/direction.h"
+#include "visibility.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
 #define SLACK 0x1p-21f
@@ -26,7 +27,7 @@ struct pack {
 	uint16_t *block_projection, *depth;
 	int16_t *col, *row;
 	uint8_t *level, *flags;
-	uint64_t *mask, *attr;
+	uint64_t *mask, *attr, (*visibility)[2];
 	uint32_t *attr_first;
 	uint32_t n_clusters, n_samples;
 	double box_min[3], box_max[3];
@@ -280,6 +281,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
 	ALLOC(pack->attr_first, n_blocks);
+	ALLOC(pack->visibility, n_blocks);
 #undef ALLOC
 	return failed ? PSR_ERR_MEMORY : PSR_OK;
 }
@@ -303,6 +305,7 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->mask);
 	psr_free(pack->attr);
 	psr_free(pack->attr_first);
+	psr_free(pack->visibility);
 }
 
 static uint64_t count_samples(const struct draft *draft)
@@ -314,8 +317,18 @@ static uint64_t count_samples(const struct draft *draft)
 	return n;
 }
 
+/* Masks, and what culling by them and by cones loses. */
+static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct psr_model_info *info, struct psr_pool *pool)
+{
+	int rc = visibility_masks(blocks, pool, pack->visibility);
+
+	if (rc == PSR_OK && !visibility_is_full(blocks->n_blocks, (const uint64_t(*)[2])pack->visibility))
+		blocks->visibility = (const uint64_t(*)[2])pack->visibility;
+	return rc == PSR_OK ? visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost) : rc;
+}
+
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
-                      struct pack *pack, struct psr_error *err)
+                      struct pack *pack, struct psr_pool *pool, struct psr_error *err)
 {
 	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
 		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
@@ -346,6 +359,8 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 		info->box_min[k] = info->origin[k] + info->scale * pack->box_min[k];
 		info->box_max[k] = info->origin[k] + info->scale * pack->box_max[k];
 	}
+	if (add_visibility(pack, &blocks, info, pool) != PSR_OK)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the visibility masks of %u blocks", blocks.n_blocks);
 	return psr_model_create(out, info, &blocks, presets, err);
 }
 
@@ -356,7 +371,6 @@ int pack_model(struct psr_model **out, struct psr_model_info *info, const struct
 	uint64_t n_samples = count_samples(draft);
 	int rc;
 
-	(void)pool;
 	if (n_samples > UINT32_MAX)
 		return psr_fail(err, PSR_ERR_LIMIT, "%llu samples are more than a model can hold; use a lower resolution",
 		                (unsigned long long)n_samples);
@@ -370,7 +384,7 @@ int pack_model(struct psr_model **out, struct psr_model_info *info, const struct
 	} else {
 		pack_blocks(&pack);
 		pack_clusters(&pack);
-		rc = make_model(out, info, presets, &pack, err);
+		rc = make_model(out, info, presets, &pack, pool, err);
 	}
 	pack_fini(&pack);
 	return rc;

@@ -13,7 +13,8 @@ enum { RAY_TRIANGLES, RAY_DISCS };
 struct ray_scene {
 	const struct psr_mesh *mesh;
 	double origin[3], shrink; /* inner = (object - origin) * shrink */
-	float (*normal)[3]; /* of the triangles */
+	double (*corner)[3][3]; /* of the triangles, inner coordinates; */
+	float (*normal)[3]; /* and their unit normals */
 	int lets_through;   /* whether any material may let a ray through */
 	RTCDevice device;
 	RTCScene scene;

@@ -11,7 +11,7 @@
 #define BATCH 64
 #define VIEW_LEVEL 3
 #define N_VIEWS (8 << 2 * VIEW_LEVEL)
-#define RAY_PIXELS 2 /* between rays: many views rather than fine ones */
+#define RAY_PIXELS 3 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
 /* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
@@ -116,7 +116,6 @@ static int grow(struct seen *seen)
 int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
 {
 	struct look look = { .seen = seen, .scene = scene, .ds = RAY_PIXELS * ds, .reach = (int)ceil(1 / (RAY_PIXELS * ds)) };
-	uint64_t n_cells = 0;
 
 	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
 	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
@@ -132,8 +131,8 @@ int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struc
 		look.n_new = 0;
 		look.is_full = 0;
 		psr_pool_for(pool, 2 * look.reach, look_along_row, &look);
-		n_cells += look.n_new;
-		if (2 * n_cells > seen->size && grow(seen) != PSR_OK)
+		seen->n_cells += look.n_new;
+		if (2 * seen->n_cells > seen->size && grow(seen) != PSR_OK)
 			return PSR_ERR_MEMORY;
 		i += look.is_full ? 0 : 1;
 	}
@@ -173,4 +172,18 @@ int seen_is(const struct seen *seen, const float p[3], const float n[3])
 		}
 	}
 	return 0;
+}
+
+int seen_add(struct seen *seen, const float p[3], const float n[3])
+{
+	int at[3], axis = 0;
+
+	for (int k = 0; k < 3; k++) {
+		at[k] = (int)floor((double)p[k] / seen->cell);
+		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
+	}
+	if (2 * seen->n_cells > seen->size && grow(seen) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	insert(seen, key_of(at, axis, n[axis] < 0), &seen->n_cells);
+	return PSR_OK;
 }

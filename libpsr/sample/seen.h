@@ -10,14 +10,18 @@
 struct seen {
 	double cell;      /* side of a cubic cell, inner units */
 	size_t size;      /* a power of two */
+	uint64_t n_cells;
 	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
 };
 
-/* Looks from 512 directions, a ray every second pixel of ds. MEMORY; seen_fini() either way. */
+/* Looks from 512 directions, a ray every third pixel of ds. MEMORY; seen_fini() either way. */
 int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 
 /* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
 int seen_is(const struct seen *seen, const float p[3], const float n[3]);
+
+/* Puts a place down as seen that the views missed. MEMORY. */
+int seen_add(struct seen *seen, const float p[3], const float n[3]);
 
 #endif

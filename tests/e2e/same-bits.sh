@@ -24,6 +24,15 @@ for name in teapot top; do
 		check "$name: $threads threads build the same" cmp "$models/$name.psr" "$work/threads.psr"
 	done
 done
+for name in teapot top; do
+	check "$name is built packed" build $name "$work/packed.psr" --pack
+	plain=$(stat -c %s "$models/$name.psr") packed=$(stat -c %s "$work/packed.psr")
+	check "$name: the packed file is smaller" test "$packed" -lt $((plain / 2))
+	is "$name: packed and plain have one content id" "$(psr-model info "$models/$name.psr" | grep '^content id')" \
+		"$(psr-model info "$work/packed.psr" | grep '^content id')"
+	head -c $((packed / 2)) "$work/packed.psr" >"$work/cut.psr"
+	refuses "$name: half of a packed file" 4 "cut short" psr-model info "$work/cut.psr"
+done
 mkdir "$work/elsewhere"
 cp "$work/top.glb" "$work/elsewhere/top.glb"
 check "a mesh elsewhere is built" psr-model build "$work/elsewhere/top.glb" -r 96 -o "$work/elsewhere.psr" --quiet

@@ -123,6 +123,7 @@ static void either_way_of_opening_gives_the_same_model(void **state)
 		uint8_t id[16], other[16];
 		size_t n, n_image;
 		uint8_t *bytes = pack(models[i], &n);
+		uint64_t need;
 		int is_packed;
 
 		model_image(models[i], &n_image);
@@ -141,8 +142,12 @@ static void either_way_of_opening_gives_the_same_model(void **state)
 			assert_int_equal(psr_model_bytes(opened[k]), psr_model_bytes(models[i]));
 			psr_model_unref(opened[k]);
 		}
+		assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+		assert_int_equal(need, psr_model_bytes(models[i]));
 		/* And from packed to plain again. */
 		assert_int_equal(psr_model_write(models[i], path, NULL), PSR_OK);
+		assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+		assert_int_equal(need, psr_model_bytes(models[i]));
 		assert_int_equal(psr_model_read(&opened[0], path, NULL), PSR_OK);
 		assert_int_equal(psr_model_file_bytes(opened[0], &is_packed), n_image);
 		assert_false(is_packed);

@@ -143,6 +143,33 @@ static void text_names_samples_and_content_id(void **state)
 	free(text);
 }
 
+static void a_packed_model_is_told_apart(void **state)
+{
+	const struct files *files = *state;
+	struct psr_model *model = NULL;
+	int status;
+	char *text = run_info(files, files->model, "--json", &status);
+	cJSON *plain = cJSON_Parse(text), *packed;
+
+	free(text);
+	assert_int_equal(psr_model_read(&model, files->model, NULL), PSR_OK);
+	assert_int_equal(psr_model_write_packed(model, files->model, NULL), PSR_OK);
+	text = run_info(files, files->model, "--json", &status);
+	packed = cJSON_Parse(text);
+	assert_int_equal(status, 0);
+	assert_true(cJSON_IsFalse(cJSON_GetObjectItemCaseSensitive(plain, "is_packed")));
+	assert_true(cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(packed, "is_packed")));
+	assert_true(number(packed, "bytes") == number(plain, "bytes"));
+	assert_true(number(packed, "file_bytes") < number(plain, "file_bytes"));
+	assert_string_equal(cJSON_GetObjectItemCaseSensitive(packed, "content_id")->valuestring,
+	                    cJSON_GetObjectItemCaseSensitive(plain, "content_id")->valuestring);
+	free(text);
+	cJSON_Delete(plain);
+	cJSON_Delete(packed);
+	assert_int_equal(psr_model_write(model, files->model, NULL), PSR_OK);
+	psr_model_unref(model);
+}
+
 static void broken_and_missing_files_have_their_exit_codes(void **state)
 {
 	const struct files *files = *state;
@@ -162,6 +189,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(json_tells_what_the_model_holds),
 		cmocka_unit_test(text_names_samples_and_content_id),
+		cmocka_unit_test(a_packed_model_is_told_apart),
 		cmocka_unit_test(broken_and_missing_files_have_their_exit_codes),
 	};
 

@@ -201,7 +201,8 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 						struct greedy_seen seen = greedy_project(view->projection.axis, from->sample[i].position);
 						uint32_t at = greedy_pixel(&grid, &seen);
 
-						if (from->sample[i].is_kept && &from->block[b] != but && greedy_counts(&facing, &from->sample[i]))
+						if (from->sample[i].is_kept && &from->block[b] != but
+						    && greedy_counts(&facing, &from->sample[i]))
 							z[at] = fmaxf(z[at], seen.z);
 					}
 				}

@@ -406,6 +406,37 @@ static void clients_take_turns(void **state)
 	daemon_stop(&psrd);
 }
 
+/* What counts is the memory that a packed model takes, which its header tells. */
+static void packed_models_beyond_max_memory_are_refused(void **state)
+{
+	static const uint8_t size[8] = { 0, 4, 16 }; /* 1 MiB and 1 KiB, little-endian */
+	struct psr_model *plate = plate_create(0x112233);
+	struct psr_msg_opened opened;
+	char text[PSR_ERROR_TEXT], limit[32], path[2 * PATH_MAX];
+	FILE *file;
+
+	(void)state;
+	snprintf(path, sizeof path, "%s/small.psr", folder);
+	assert_int_equal(psr_model_write_packed(plate, path, NULL), PSR_OK);
+	snprintf(path, sizeof path, "%s/large.psr", folder);
+	assert_int_equal(psr_model_write_packed(plate, path, NULL), PSR_OK);
+	psr_model_unref(plate);
+	file = fopen(path, "r+b");
+	assert_non_null(file);
+	assert_int_equal(fseek(file, 16, SEEK_SET), 0);
+	assert_int_equal(fwrite(size, 1, 8, file), 8);
+	fclose(file);
+	snprintf(limit, sizeof limit, "%d", 1 << 20);
+	start("--max-memory", limit, NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_open_error(&p, peer_ask_open(&p, "large"), PSR_WIRE_LIMIT, text);
+	assert_non_null(strstr(text, "--max-memory"));
+	peer_expect_opened(&p, peer_ask_open(&p, "small"), &opened);
+	assert_int_equal(opened.n_samples, PLATE_SAMPLES);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
 static void models_beyond_max_memory_are_refused(void **state)
 {
 	struct psr_msg_opened opened;
@@ -623,6 +654,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_full_server_says_so, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(requests_beyond_max_open_are_busy, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(frames_beyond_max_pixels_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(packed_models_beyond_max_memory_are_refused, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(models_beyond_max_handles_are_refused, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(clients_take_turns, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(models_beyond_max_memory_are_refused, set_up, tear_down),

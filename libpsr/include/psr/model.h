@@ -106,6 +106,10 @@ struct psr_model;
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
+/* Bytes of memory that psr_model_read() of this file will take, by its header: more than the file has, if it is packed.
+ * Errors as of psr_model_read(), as far as the header shows them. */
+int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
+
 /* The same from memory; `bytes` is copied. For tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
 

@@ -1,0 +1,24 @@
+#!/bin/bash
+# Runs the studies of docs/studies.md (all of them, or those named), puts their tables into it and their plots beside it.
+set -eu
+cd "$(dirname "$0")/.."
+model=${BUILD:-build/release}/bin/psr-model
+page=docs/studies.md
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p docs/studies
+
+[ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models
+for study; do
+	echo "study $study" >&2
+	plot=()
+	grep -q "(studies/$study.svg)" $page && plot=(--plot "$work/$study.svg")
+	"$model" study "$study" "${plot[@]}" >"$work/table"
+	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/
+	awk -v begin="<!-- study $study -->" -v table="$work/table" '
+		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
+		inside && /^<!-- end -->$/ { inside = 0 }
+		!inside { print }
+	' $page >"$work/page"
+	cat "$work/page" >$page
+done
