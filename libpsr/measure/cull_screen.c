@@ -1,10 +1,13 @@
+#include "cull_screen.h"
+
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 #include "../base/vec.h"
-#include "cull_screen.h"
 #include "psr/direction.h"
 
-#define MOST_CORNERS 16
+/* A triangle within a rectangle has 7 corners at most; where rounding doubles some, there are more. */
+#define MOST_CORNERS 24
 
 /* A cone over a convex polygon on the sphere of rays: what of a triangle is seen in a region. */
 struct part {
@@ -20,11 +23,14 @@ static void clip(struct part *out, const struct part *in, const double a[3])
 		const double *p = in->corner[i], *q = in->corner[(i + 1) % in->n];
 		double dp = v3d_dot(a, p), dq = v3d_dot(a, q);
 
+		assert(out->n + 2 <= MOST_CORNERS);
 		if (dp >= 0)
 			v3d_set(out->corner[out->n++], p[0], p[1], p[2]);
 		if ((dp < 0) != (dq < 0) && dp != 0 && dq != 0) {
-			for (int k = 0; k < 3; k++)
-				out->corner[out->n][k] = p[k] * (fabs(dq) / (fabs(dp) + fabs(dq))) + q[k] * (fabs(dp) / (fabs(dp) + fabs(dq)));
+			double part = fabs(dp) / (fabs(dp) + fabs(dq));
+
+			v3d_scale(out->corner[out->n], p, 1 - part);
+			v3d_add_scaled(out->corner[out->n], out->corner[out->n], part, q);
 			out->n++;
 		}
 	}
