@@ -47,8 +47,8 @@ const struct psr_model *cull_set_base(const struct cull_set *set);
 void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struct cull_choice *choice, uint8_t *is_kept);
 
 /* The truth: n_seen[b] is how many of a block's samples are in the picture, do not face away as the renderer sees it,
- * and are reached by a ray from the eye, which meets nothing before them but what is as near to them as their neighbours
- * on the lattice. scene: of the same object. */
+ * and are reached by a ray from the eye, which meets nothing that is before them by more than a quarter of the lattice's
+ * step. scene: of the same object. */
 void cull_set_look(const struct cull_set *set, const struct ray_scene *scene, const struct cull_eye *eye,
                    struct psr_pool *pool, uint8_t *n_seen);
 

@@ -6,7 +6,7 @@
 #include "cull_set.h"
 
 #define RUN 32 /* blocks */
-#define NEIGHBOURS 1.0 /* steps of the lattice */
+#define NEAR 0.25 /* steps of the lattice */
 
 struct job {
 	const struct psr_blocks *blocks;
@@ -49,7 +49,7 @@ static void look_at_block(const struct job *job, uint32_t block)
 	const struct psr_projection *projection = &job->blocks->projection[job->blocks->block_projection[block]];
 	struct ray ray[PSR_BLOCK_SAMPLES];
 	struct ray_hit hit[PSR_BLOCK_SAMPLES];
-	double distance[PSR_BLOCK_SAMPLES], near = NEIGHBOURS * (double)projection->spacing;
+	double distance[PSR_BLOCK_SAMPLES], near = NEAR * (double)projection->spacing;
 	int n = 0;
 
 	for (uint64_t left = job->blocks->mask[block]; left != 0; left &= left - 1)

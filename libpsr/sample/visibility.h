@@ -12,7 +12,7 @@
 /* Masks of all blocks, whatever their level: bit t of a block is set iff one of its samples is seen from some direction
  * in triangle t (level 2 of psr/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
  *
- * As in [G] the blocks of a level are drawn orthographically, at a sample a pixel, without those samples that face
+ * As in [G] the blocks of a level are drawn orthographically, at about a sample a pixel, without those samples that face
  * away, as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a triangle,
  * those on its sides being shared with its neighbours. Since a normal that faces any direction of a triangle faces one
  * of its corners, only occlusion is left to chance; and there a sample counts as seen unless it is behind the farthest

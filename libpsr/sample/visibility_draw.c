@@ -10,6 +10,10 @@
 #define MARGIN (VPICTURE_REACH + 1) /* pixels */
 #define CHUNK 16 /* samples */
 
+/* Steps of the lattice: as far apart as samples are on a surface that is tilted by 25 degrees. Smaller ones have holes, and
+ * a sample behind a hole counts as seen. */
+#define PIXEL 1.11f
+
 static int alloc_points(struct vpoints *points, size_t n)
 {
 	points->x = psr_alloc_array(n, sizeof *points->x);
@@ -97,13 +101,13 @@ void vlevel_fini(struct vlevel *level)
 
 int vpicture_init(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level)
 {
-	float across = 2 * points->reach / level->spacing;
+	const float pixel = PIXEL * level->spacing, across = 2 * points->reach / pixel;
 	size_t n;
 	int failed = 0;
 
 	memset(picture, 0, sizeof *picture);
 	picture->side = (across < MOST_SIDE ? (int)across + 1 : MOST_SIDE) + 2 * MARGIN + 2;
-	picture->scale = across < MOST_SIDE ? 1 / level->spacing : MOST_SIDE / (2 * points->reach);
+	picture->scale = across < MOST_SIDE ? 1 / pixel : MOST_SIDE / (2 * points->reach);
 	n = (size_t)picture->side * (size_t)picture->side;
 	for (int end = 0; end < 2; end++) {
 		picture->nearest[end] = psr_alloc_array(n, sizeof *picture->nearest[end]);

@@ -44,7 +44,7 @@ struct vpicture {
 	float *nearest[2], *farthest[2], *row;
 };
 
-/* Pixels of the level's spacing, or greater ones if those were too many. MEMORY. */
+/* Pixels a little greater than the level's spacing, or greater ones if those were too many. MEMORY. */
 int vpicture_init(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level);
 void vpicture_fini(struct vpicture *picture);
 
