@@ -11,8 +11,9 @@ _Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(stru
 _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
                && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
 
-#define ARRAY(type, flags, count, item, field) \
-	{ type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
+#define ARRAY_VERSION(type, version, flags, count, item, field) \
+	{ type, version, flags, count, item, offsetof(struct psr_blocks, field) }
+#define ARRAY(type, flags, count, item, field) ARRAY_VERSION(type, 1, flags, count, item, field)
 
 const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
@@ -34,10 +35,10 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("DSTP", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_step),
 	ARRAY("MASK", ENTRY_REQUIRED, COUNT_BLOCKS, 8, mask),
 	ARRAY("AFST", ENTRY_REQUIRED, COUNT_BLOCKS, 4, attr_first),
-	ARRAY("CONX", 0, COUNT_BLOCKS, 4, cone_x),
-	ARRAY("CONY", 0, COUNT_BLOCKS, 4, cone_y),
-	ARRAY("CONZ", 0, COUNT_BLOCKS, 4, cone_z),
-	ARRAY("CONC", 0, COUNT_BLOCKS, 4, cone_cos),
+	ARRAY_VERSION("CONX", 2, 0, COUNT_BLOCKS, 1, cone_x),
+	ARRAY_VERSION("CONY", 2, 0, COUNT_BLOCKS, 1, cone_y),
+	ARRAY_VERSION("CONZ", 2, 0, COUNT_BLOCKS, 1, cone_z),
+	ARRAY("CONS", 0, COUNT_BLOCKS, 1, cone_sine),
 	ARRAY("VISM", 0, COUNT_BLOCKS, 16, visibility),
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),

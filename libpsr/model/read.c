@@ -295,8 +295,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 		array = r->bytes + get_section(r, (uint32_t)r->entry[k]).offset;
 		memcpy((char *)blocks + spec->pointer, &array, sizeof array);
 	}
-	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_cos) % 4 != 0)
-		return bad(r, "of the sections CONX, CONY, CONZ and CONC only some are there");
+	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
+		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
 	return PSR_OK;
 }
 

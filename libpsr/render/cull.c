@@ -99,21 +99,23 @@ static enum facing facing_of(const struct plan *plan, const struct plan_instance
 	const struct psr_blocks *b = in->blocks;
 	if (b->flags[block] & PSR_BLOCK_TWO_SIDED)
 		return FACES_EYE;
-	if (!b->cone_cos || b->cone_cos[block] <= 0)
+	if (!b->cone_sine || b->cone_sine[block] == PSR_CONE_ANY)
 		return IS_MIXED;
 	const float axis[3] = { b->cone_x[block], b->cone_y[block], b->cone_z[block] };
 	const float center[3] = { b->sphere_x[block], b->sphere_y[block], b->sphere_z[block] };
-	float g = 0, length2 = 0;
+	float g = 0, length2 = 0, axis2 = 0;
 	for (int k = 0; k < 3; k++) {
 		float d = plan->perspective ? center[k] - in->eye[k] : -in->eye[k];
 		g += d * axis[k];
 		length2 += d * d;
+		axis2 += axis[k] * axis[k];
 	}
-	const float cos_alpha = b->cone_cos[block], length = __builtin_sqrtf(length2);
-	const float spread = __builtin_sqrtf(1 - cos_alpha * cos_alpha) + 0.001f;
-	const float r = plan->perspective ? b->sphere_r[block] : 0;
+	g /= __builtin_sqrtf(axis2);
+	const float sin_alpha = (float)b->cone_sine[block] / 255, spread = sin_alpha + 0.001f;
+	const float length = __builtin_sqrtf(length2), r = plan->perspective ? b->sphere_r[block] : 0;
 	if (g > (spread + BACK_SINE) * length + r * (1 + BACK_SINE))
 		return FACES_AWAY;
+	const float cos_alpha = __builtin_sqrtf(1 - sin_alpha * sin_alpha);
 	return g + (spread + 1 - cos_alpha) * length + r <= BACK_SINE * (length - r) ? FACES_EYE : IS_MIXED;
 }
 

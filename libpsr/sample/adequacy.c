@@ -135,18 +135,13 @@ static int is_any_hit(const struct level *level, const struct trial *trial, doub
 {
 	double cosine = trial->cosine > 0.03 ? trial->cosine : 0.03;
 	float half = (float)(level->ds / 2), tolerance = (float)(level->ds * (1 + 1.5 * sqrt(1 - cosine * cosine) / cosine));
-	int low[3], high[3], at[3];
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(&level->cover, trial->spot.p, radius, first);
 
-	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)trial->spot.p[k] - radius) / level->ds);
-		high[k] = (int)floor(((double)trial->spot.p[k] + radius) / level->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
-				for (uint32_t i = cover_cell(&level->cover, at); i != COVER_NONE; i = level->cover.point[i].next)
-					if (is_hit(trial, &level->cover.point[i], half, tolerance))
-						return 1;
+	for (int c = 0; c < n_cells; c++)
+		for (uint32_t i = first[c]; i != COVER_NONE; i = level->cover.point[i].next)
+			if (is_hit(trial, &level->cover.point[i], half, tolerance))
+				return 1;
 	return 0;
 }
 

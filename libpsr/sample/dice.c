@@ -396,6 +396,17 @@ static void dice_chunk(int i, void *userdata)
 	}
 }
 
+/* In a fixed order, one at a time: what one place adds may cover the next. */
+static int cover_list(struct level *level, const struct list *list)
+{
+	int rc = list->failed ? PSR_ERR_MEMORY : PSR_OK;
+
+	for (size_t k = 0; rc == PSR_OK && k < list->n; k++)
+		if (!is_covered(level, &list->spot[k]))
+			rc = dice_cover(level, &list->spot[k]);
+	return rc;
+}
+
 int dice_surface(struct level *level)
 {
 	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points };
@@ -405,14 +416,11 @@ int dice_surface(struct level *level)
 	if (job.list == NULL)
 		return PSR_ERR_MEMORY;
 	psr_pool_for(level->pool, n_chunks, dice_chunk, &job);
-	for (int i = 0; i < n_chunks; i++) {
-		if (job.list[i].failed)
-			rc = PSR_ERR_MEMORY;
-		for (size_t k = 0; rc == PSR_OK && k < job.list[i].n; k++)
-			if (!is_covered(level, &job.list[i].spot[k]))
-				rc = dice_cover(level, &job.list[i].spot[k]);
+	/* A sample that was moved may not reach the place that it was added for: once more around then. */
+	for (int i = 0; rc == PSR_OK && i < 2 * n_chunks; i++)
+		rc = cover_list(level, &job.list[i % n_chunks]);
+	for (int i = 0; i < n_chunks; i++)
 		free(job.list[i].spot);
-	}
 	free(job.list);
 	return rc;
 }

@@ -112,9 +112,12 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 		float w = weight[0][i & 1] * weight[1][i >> 1 & 1] * weight[2][i >> 2];
 
 		for (int l = 0; cell->key != FREE && l < FIELD_LOBES; l++) {
-			float lobe[3] = { (float)cell->lobe[l][0], (float)cell->lobe[l][1], (float)cell->lobe[l][2] };
-			float g = v3f_dot(lobe, n);
+			const int32_t *sums = cell->lobe[l];
+			float lobe[3] = { (float)sums[0], (float)sums[1], (float)sums[2] }, g;
 
+			if ((sums[0] | sums[1] | sums[2]) == 0)
+				continue;
+			g = v3f_dot(lobe, n);
 			/* What faces within some 70 degrees of n counts. */
 			if (g > 0 && g * g > 0.1f * v3f_dot(lobe, lobe))
 				v3f_add_scaled(sum, sum, w, lobe);

@@ -6,6 +6,7 @@
 #include "psr/error.h"
 
 #define GROUP_BLOCKS 1024
+#define REACH 2 /* cells of half a pixel: one coarse spacing beyond a group's border */
 #define MOST_PARTS 64 /* groups that can share a block of a coarse level */
 
 struct place {
@@ -78,7 +79,7 @@ static int cut_finest(struct draft *draft, uint32_t n)
 	return PSR_OK;
 }
 
-/* Which groups have fine samples in each cell of a pixel of a coarse level: points of a cover, one a group and cell. */
+/* Which groups have fine samples in each cell of half a pixel of a coarse level: points of a cover, one a group and cell. */
 static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_finest)
 {
 	for (uint32_t b = 0; b < n_finest; b++) {
@@ -122,33 +123,30 @@ static void add_part(struct parts *parts, uint32_t group, unsigned s)
 	parts->part[i] |= UINT64_C(1) << s;
 }
 
-/* All groups with a cell within `reach` of a sample. */
-static void find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+/* From p to the nearest place of a point's cell. */
+static double distance2(const struct cover *map, const struct cover_point *point, const float p[3])
 {
-	int at[3], low[3], high[3];
+	double sum = 0;
 
 	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)p[k] - reach) / map->ds);
-		high[k] = (int)floor(((double)p[k] + reach) / map->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				double away2 = 0;
+		double low = floor((double)point->position[k] / map->ds) * map->ds, x = (double)p[k];
+		double away = x < low ? low - x : x > low + map->ds ? x - low - map->ds : 0;
 
-				for (int k = 0; k < 3; k++) {
-					double below = at[k] * map->ds - (double)p[k], above = (double)p[k] - (at[k] + 1) * map->ds;
-					double away = below > 0 ? below : above > 0 ? above : 0;
-
-					away2 += away * away;
-				}
-				if (away2 > reach * reach)
-					continue;
-				for (uint32_t i = cover_cell(map, at); i != COVER_NONE; i = map->point[i].next)
-					add_part(parts, map->point[i].patch, s);
-			}
-		}
+		sum += away * away;
 	}
+	return sum;
+}
+
+/* All groups with a cell within reach of a sample. */
+static void find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+{
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(map, p, reach, first);
+
+	for (int c = 0; c < n_cells; c++)
+		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next)
+			if (distance2(map, &map->point[i], p) <= reach * reach)
+				add_part(parts, map->point[i].patch, s);
 }
 
 struct blocks {
@@ -182,9 +180,9 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 		float p[3];
 
 		draft_position(draft, block, s, p);
-		find_groups(map, p, map->ds, s, &parts);
+		find_groups(map, p, REACH * map->ds, s, &parts);
 		if (n == 0 && parts.n == 0)
-			find_groups(map, p, 3 * map->ds, s, &parts);
+			find_groups(map, p, 2 * REACH * map->ds, s, &parts);
 	}
 	for (int i = 0; i < parts.n; i++) {
 		struct draft_block part = *block;
@@ -200,7 +198,7 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest)
 {
 	struct cover map;
-	int rc = cover_init(&map, draft->ds * (double)(1u << level));
+	int rc = cover_init(&map, draft->ds * (double)(1u << level) / 2);
 
 	if (rc == PSR_OK)
 		rc = map_groups(&map, draft, n_finest);

@@ -16,27 +16,20 @@ static int blend(const struct level *level, const float p[3], const float n[3], 
 	const float (*direction)[3] = psr_direction_table();
 	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
 	uint64_t found[MOST_BLENDED];
-	int low[3], high[3], at[3], count = 0;
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(finer, p, level->ds, first), count = 0;
 
-	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)p[k] - level->ds) / finer->ds);
-		high[k] = (int)floor(((double)p[k] + level->ds) / finer->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				for (uint32_t i = cover_cell(finer, at); i != COVER_NONE; i = finer->point[i].next) {
-					const struct cover_point *point = &finer->point[i];
-					float d[3], w, g = v3f_dot(direction[point->normal], n);
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = finer->point[i].next) {
+			const struct cover_point *point = &finer->point[i];
+			float d[3], w, g = v3f_dot(direction[point->normal], n);
 
-					v3f_sub(d, point->position, p);
-					w = 1 - v3f_dot(d, d) / reach2;
-					if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
-						continue;
-					weight[count] = w * w;
-					found[count++] = point->attr;
-				}
-			}
+			v3f_sub(d, point->position, p);
+			w = 1 - v3f_dot(d, d) / reach2;
+			if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
+				continue;
+			weight[count] = w * w;
+			found[count++] = point->attr;
 		}
 	}
 	if (count != 0)

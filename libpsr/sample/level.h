@@ -36,6 +36,7 @@ struct level {
 	struct cover cover;
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
+	const struct seen *finer_seen; /* of the same level */
 	uint64_t n_rays, n_patches, n_owned, n_added, n_snapped;
 	double seconds_rays;
 };
@@ -69,7 +70,7 @@ struct surface_spot {
 int dice_cover(struct level *level, const struct surface_spot *spot);
 
 /* level.c: traces all projections, of spacing projection[i].spacing, and keeps an adequate sampling. on_progress is called
- * with 0..n_projections + 4 done; may be NULL. MEMORY; level_fini() either way. */
+ * with 0..n_projections / 2 + 4 done; may be NULL. MEMORY; level_fini() either way. */
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata);
 void level_fini(struct level *level);

@@ -23,7 +23,9 @@ struct pack {
 	const struct draft *draft;
 	struct order *order;
 	struct psr_cluster *cluster;
-	float *sphere[4], *cone[4], *depth_bias, *depth_step; /* sphere: x, y, z, r; cone: x, y, z, cosine */
+	float *sphere[4], *depth_bias, *depth_step; /* sphere: x, y, z, r */
+	int8_t *cone[3];
+	uint8_t *cone_sine;
 	uint16_t *block_projection, *depth;
 	int16_t *col, *row;
 	uint8_t *level, *flags;
@@ -164,7 +166,8 @@ static void bound_block(struct pack *pack, uint32_t i, const struct draft_block 
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
-	float normal[2 * PSR_BLOCK_SAMPLES][3], axis[3];
+	float normal[2 * PSR_BLOCK_SAMPLES][3];
+	int8_t axis[3];
 	int n = 0;
 
 	for (uint64_t left = block->part; left != 0; left &= left - 1) {
@@ -174,7 +177,7 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
 		memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
-	cone_bound((const float(*)[3])normal, n, axis, &pack->cone[3][i]);
+	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);
 	for (int k = 0; k < 3; k++)
 		pack->cone[k][i] = axis[k];
 }
@@ -266,10 +269,11 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 
 #define ALLOC(array, n) failed |= ((array) = psr_alloc_array(n, sizeof *(array))) == NULL
 	ALLOC(pack->cluster, n_clusters);
-	for (int k = 0; k < 4; k++) {
+	for (int k = 0; k < 4; k++)
 		ALLOC(pack->sphere[k], n_blocks);
+	for (int k = 0; k < 3; k++)
 		ALLOC(pack->cone[k], n_blocks);
-	}
+	ALLOC(pack->cone_sine, n_blocks);
 	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->depth_step, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
@@ -290,10 +294,11 @@ static void pack_fini(struct pack *pack)
 {
 	psr_free(pack->order);
 	psr_free(pack->cluster);
-	for (int k = 0; k < 4; k++) {
+	for (int k = 0; k < 4; k++)
 		psr_free(pack->sphere[k]);
+	for (int k = 0; k < 3; k++)
 		psr_free(pack->cone[k]);
-	}
+	psr_free(pack->cone_sine);
 	psr_free(pack->depth_bias);
 	psr_free(pack->depth_step);
 	psr_free(pack->block_projection);
@@ -343,7 +348,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_x = pack->cone[0];
 	blocks.cone_y = pack->cone[1];
 	blocks.cone_z = pack->cone[2];
-	blocks.cone_cos = pack->cone[3];
+	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.col = pack->col;
 	blocks.row = pack->row;

@@ -11,7 +11,7 @@
 #define BATCH 64
 #define VIEW_LEVEL 3
 #define N_VIEWS (8 << 2 * VIEW_LEVEL)
-#define RAY_PIXELS 3 /* between rays: many views rather than fine ones */
+#define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
 /* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
@@ -22,6 +22,19 @@ static uint64_t key_of(const int at[3], int axis, int is_negative)
 	for (int k = 0; k < 3; k++)
 		key = key << 20 | (uint64_t)(at[k] & 0xfffff);
 	return key;
+}
+
+static uint64_t coarser_key(uint64_t key)
+{
+	uint64_t coarser = key >> 60 << 60;
+
+	for (int shift = 0; shift <= 40; shift += 20) {
+		int at = (int)(key >> shift & 0xfffff);
+
+		at = at < 1 << 19 ? at : at - (1 << 20);
+		coarser |= (uint64_t)(at >> 1 & 0xfffff) << shift;
+	}
+	return coarser;
 }
 
 static size_t place_of(const struct seen *seen, uint64_t key)
@@ -136,6 +149,19 @@ int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struc
 			return PSR_ERR_MEMORY;
 		i += look.is_full ? 0 : 1;
 	}
+	return PSR_OK;
+}
+
+int seen_coarsen(struct seen *seen, const struct seen *finer)
+{
+	*seen = (struct seen){ .cell = 2 * finer->cell, .size = finer->size };
+	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
+	if (seen->table == NULL)
+		return PSR_ERR_MEMORY;
+	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	for (size_t i = 0; i < finer->size; i++)
+		if (finer->table[i] != FREE)
+			insert(seen, coarser_key(finer->table[i]), &seen->n_cells);
 	return PSR_OK;
 }
 

@@ -18,6 +18,9 @@ struct seen {
 int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 
+/* What was seen of cells half as wide. MEMORY; seen_fini() either way. */
+int seen_coarsen(struct seen *seen, const struct seen *finer);
+
 /* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
 int seen_is(const struct seen *seen, const float p[3], const float n[3]);
 

@@ -16,7 +16,9 @@ struct fixture {
 	struct psr_blocks blocks; /* points to the arrays below */
 	struct psr_projection projection[2];
 	struct psr_cluster cluster[3];
-	float sphere[4][FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS], cone[4][FIXTURE_BLOCKS];
+	float sphere[4][FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS];
+	int8_t cone[3][FIXTURE_BLOCKS];
+	uint8_t cone_sine[FIXTURE_BLOCKS];
 	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
 	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS];
 	uint8_t level[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
@@ -66,8 +68,9 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		for (int k = 0; k < 3; k++)
 			f->sphere[k][i] = 0.125f * (float)(i - 2 + k);
 		f->sphere[3][i] = 0.25f;
-		f->cone[i % 3][i] = 1;
-		f->cone[3][i] = i == 4 ? -1.0f : 0.5f;
+		f->cone[i % 3][i] = 127;
+		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
+		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
 		f->depth_bias[i] = -0.5f;
 		f->depth_step[i] = 0.0001f;
 		f->block_projection[i] = (uint16_t)(i % 2);
@@ -112,7 +115,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->blocks.cone_x = f->cone[0];
 		f->blocks.cone_y = f->cone[1];
 		f->blocks.cone_z = f->cone[2];
-		f->blocks.cone_cos = f->cone[3];
+		f->blocks.cone_sine = f->cone_sine;
 		f->blocks.visibility = (const uint64_t(*)[2])f->visibility;
 	}
 }

@@ -174,11 +174,10 @@ static const struct violation violations[] = {
 	{ "MASK", 40, 8, UINT64_MAX, "MASK: 171 samples are valid, and BLKS counts 143" },
 	{ "AFST", 0, 4, 1, "AFST: the attributes of block 0 begin at 1 instead of 0" },
 	{ "AFST", 20, 4, UINT32_MAX, "AFST: the attributes of block 5 begin at 4294967295 instead of 107" },
-	{ "CONX", 0, 4, F_1_01, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
-	{ "CONY", 0, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
-	{ "CONZ", 16, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 4 has not unit length" },
-	{ "CONC", 0, 4, F_1_01, "CONC: the cosine of block 0 is 1.01" },
-	{ "CONC", 0, 4, F_NAN, "CONC: the cosine of block 0 is nan" },
+	{ "CONX", 0, 1, 126, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 126 instead of 127" },
+	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
+	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
+	{ "CONZ", 0, 1, 0x80, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 128 instead of 127" },
 };
 
 static void each_violated_rule_is_refused_by_its_name(void **state)
@@ -210,8 +209,10 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
 	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
 	{ "CAMS", 1, 4, 0xbfbf8ff4, NULL },     /* U+10FFFF, the last one */
-		{ "CONC", 0, 4, F_MINUS_1, NULL },
-		{ "CONX", 16, 4, 0, NULL },             /* of a cone of all directions */
+		{ "CONX", 0, 1, 0x81, NULL },           /* -127 */
+		{ "CONY", 0, 1, 0x81, NULL },           /* two components are the greatest */
+		{ "CONS", 0, 1, 0, NULL },
+		{ "CONS", 0, 1, PSR_CONE_ANY, NULL },
 	};
 
 	(void)state;
@@ -263,6 +264,27 @@ static void unknown_sections_are_skipped_if_optional_and_named_if_required(void 
 	file_put(entry_of(bytes, "NEWS") + ENTRY_FLAGS, 2, ENTRY_REQUIRED);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_UNSUPPORTED);
 	assert_non_null(strstr(err.text, "required section NEWS, version 1, at byte"));
+}
+
+/* Models of before cones had four bytes open, and are drawn without culling by them. */
+static void cones_of_version_1_are_skipped(void **state)
+{
+	static const char *const types[3] = { "CONX", "CONY", "CONZ" };
+	uint8_t *bytes = copy_original();
+	struct psr_model *model = NULL;
+	struct psr_error err;
+
+	(void)state;
+	for (int k = 0; k < 3; k++)
+		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
+	memcpy(entry_of(bytes, "CONS"), "CONC", 4);
+	file_seal(bytes, n_bytes);
+	assert_int_equal(psr_model_parse(&model, bytes, n_bytes, &err), PSR_OK);
+	assert_null(psr_model_blocks(model)->cone_x);
+	assert_null(psr_model_blocks(model)->cone_sine);
+	assert_non_null(psr_model_blocks(model)->visibility);
+	psr_model_unref(model);
+	free(bytes);
 }
 
 static void every_required_section_is_missed(void **state)
@@ -390,6 +412,7 @@ int main(void)
 		cmocka_unit_test(values_at_the_edge_of_a_rule_are_taken),
 		cmocka_unit_test(versions_are_refused_by_major_and_section),
 		cmocka_unit_test(unknown_sections_are_skipped_if_optional_and_named_if_required),
+		cmocka_unit_test(cones_of_version_1_are_skipped),
 		cmocka_unit_test(every_required_section_is_missed),
 		cmocka_unit_test(lies_in_header_and_table_are_refused),
 		cmocka_unit_test(stray_bytes_between_sections_are_refused),

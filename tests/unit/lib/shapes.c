@@ -8,10 +8,11 @@
 
 struct arrays {
 	uint32_t n_blocks, n_samples;
-	float *sphere[4], *cone[4], *bias, *step;
+	float *sphere[4], *bias, *step;
+	int8_t *cone[3];
 	uint16_t *projection, *depth;
 	int16_t *col, *row;
-	uint8_t *level, *flags;
+	uint8_t *level, *flags, *cone_sine;
 	uint64_t *mask, *attr;
 	uint32_t *first;
 };
@@ -72,10 +73,11 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	if (!mask)
 		return;
 	uint32_t b = a->n_blocks++;
-	for (int k = 0; k < 4; k++) {
+	for (int k = 0; k < 4; k++)
 		a->sphere[k] = grow(a->sphere[k], a->n_blocks, sizeof(float));
-		a->cone[k] = grow(a->cone[k], a->n_blocks, sizeof(float));
-	}
+	for (int k = 0; k < 3; k++)
+		a->cone[k] = grow(a->cone[k], a->n_blocks, 1);
+	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
 	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
 	a->step = grow(a->step, a->n_blocks, sizeof(float));
 	a->projection = grow(a->projection, a->n_blocks, 2);
@@ -93,18 +95,23 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	for (int k = 0; k < 3; k++)
 		a->sphere[k][b] = (float)center[k];
 	a->sphere[3][b] = (float)(sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx);
-	/* A cap that holds the normals: around their mean, a little wider than the furthest of them. */
-	double mean[3] = { 0 }, least = 1;
+	/* A cap that holds the normals: around their mean, rounded, a little wider than the furthest of them. */
+	double mean[3] = { 0 }, least = 1, greatest = 0;
 	for (int i = 0; i < 64; i++)
 		if (s[i].valid)
 			v3d_add(mean, mean, s[i].normal);
+	for (int k = 0; k < 3; k++)
+		greatest = fmax(greatest, fabs(mean[k]));
+	for (int k = 0; k < 3; k++) {
+		mean[k] = rint(mean[k] / greatest * 127);
+		a->cone[k][b] = (int8_t)mean[k];
+	}
 	v3d_normalize(mean, mean);
 	for (int i = 0; i < 64; i++)
 		if (s[i].valid)
 			least = fmin(least, v3d_dot(mean, s[i].normal));
-	for (int k = 0; k < 3; k++)
-		a->cone[k][b] = (float)mean[k];
-	a->cone[3][b] = (float)fmax(-1, least - 1e-6);
+	least = fmax(0, least - 1e-6);
+	a->cone_sine[b] = (uint8_t)ceil(sqrt(1 - least * least) * 255);
 	a->bias[b] = (float)low;
 	a->step[b] = (float)((high - low) / 65535);
 	a->projection[b] = (uint16_t)p;
@@ -156,7 +163,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		blocks.cone_x = a.cone[0];
 		blocks.cone_y = a.cone[1];
 		blocks.cone_z = a.cone[2];
-		blocks.cone_cos = a.cone[3];
+		blocks.cone_sine = a.cone_sine;
 	}
 	struct psr_model_info info = { .scale = o->scale, .spacing = ds * o->scale, .tolerance = 25 * 3.14159265358979 / 180,
 		                           .resolution = o->resolution, .builder = "test" };
@@ -171,10 +178,11 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		fprintf(stderr, "%s\n", err.text);
 		abort();
 	}
-	for (int k = 0; k < 4; k++) {
+	for (int k = 0; k < 4; k++)
 		free(a.sphere[k]);
+	for (int k = 0; k < 3; k++)
 		free(a.cone[k]);
-	}
+	free(a.cone_sine);
 	free(a.bias); free(a.step); free(a.projection); free(a.depth); free(a.col); free(a.row);
 	free(a.level); free(a.flags); free(a.mask); free(a.first); free(a.attr);
 	return model;
