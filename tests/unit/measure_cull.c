@@ -399,7 +399,7 @@ static void a_part_has_the_blocks_of_level_0_that_are_kept(void **state)
 		is_kept[i] = 1;
 	assert_int_equal(cull_part(&part, o.model, is_kept, index, NULL), PSR_OK);
 	b = psr_model_blocks(part);
-	assert_null(b->cone_cos);
+	assert_null(b->cone_x);
 	assert_null(b->visibility);
 	for (uint32_t i = 0; i < all->n_blocks; i++) {
 		size_t n_samples = (size_t)__builtin_popcountll(all->mask[i]);
