@@ -29,7 +29,8 @@
 	"set xtics ('none' 0, '8' 1, '32' 2, '128' 3, '512' 4)\n" \
 	"set ylabel '% of blocks culled'\n" \
 	"plot $table every ::0::4 using 1:3 title 'masks' lw 2 pt 7, " \
-	"'' every ::5::9 using ($1-5):3 title 'masks and cones' lw 2 pt 5, '' every ::0::4 using 1:5 title 'hidden' lt 0 lw 2 pt -1\n" \
+	"'' every ::5::9 using ($1-5):3 title 'masks and cones' lw 2 pt 5, " \
+	"'' every ::0::4 using 1:5 title 'hidden' lt 0 lw 2 pt -1\n" \
 	"set ylabel '% speedup'\n" \
 	"plot $table every ::0::4 using 1:9 title 'masks' lw 2 pt 7, " \
 	"'' every ::5::9 using ($1-5):9 title 'masks and cones' lw 2 pt 5\nunset multiplot\n"

@@ -40,8 +40,8 @@ static const struct study_column columns[N_COLUMNS] = {
 	[GAIN] = { "% more culled", "percent_more_culled", 1 },
 };
 
-static void put(struct study *study, int row, int model, const struct cull_figures *figures, const struct cull_truth *truth,
-                const struct cull_figures *base)
+static void put(struct study *study, int row, int model, const struct cull_figures *figures,
+                const struct cull_truth *truth, const struct cull_figures *base)
 {
 	const struct study_table *table = &study->table;
 

@@ -30,9 +30,9 @@ void cull_eye_place(struct cull_eye *eye, uint32_t which, double zoom);
 
 struct cull_set;
 
-/* What tests need of level 0, with masks of triangles of `finest` and all coarser levels: a bit of a coarser mask is set
- * iff one of the four that it is made of is. The model's own masks are not read; its cones are, and the set keeps a
- * reference to it. ARG for a model without blocks at level 0, MEMORY. */
+/* What tests need of level 0, with masks of triangles of `finest` and all coarser levels: a bit of a coarser mask is
+ * set iff one of the four that it is made of is. The model's own masks are not read; its cones are, and the set keeps
+ * a reference to it. ARG for a model without blocks at level 0, MEMORY. */
 int cull_set_create(struct cull_set **out, const struct psr_model *model, int finest, struct psr_pool *pool,
                     struct psr_error *err);
 void cull_set_destroy(struct cull_set *set); /* NULL is fine */
@@ -41,14 +41,15 @@ uint32_t cull_set_n_blocks(const struct cull_set *set);
 /* A model of level 0 alone, without cones and masks: its block b is the set's. Lives as long as the set. */
 const struct psr_model *cull_set_base(const struct cull_set *set);
 
-/* is_kept[b] = 1 for blocks that stay: their spheres are not wholly outside of one side of the frustum ([G] 6.1), the cone
- * does not turn them away (6.4, cone_culls), and their mask has a bit in common with that of the smallest node of the
- * screen's tree that holds their sphere (6.3). Uses buffers of the set: one thread at a time. */
-void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struct cull_choice *choice, uint8_t *is_kept);
+/* is_kept[b] = 1 for blocks that stay: their spheres are not wholly outside of one side of the frustum ([G] 6.1), the
+ * cone does not turn them away (6.4, cone_culls), and their mask has a bit in common with that of the smallest node of
+ * the screen's tree that holds their sphere (6.3). Uses buffers of the set: one thread at a time. */
+void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struct cull_choice *choice,
+                   uint8_t *is_kept);
 
 /* The truth: n_seen[b] is how many of a block's samples are in the picture, do not face away as the renderer sees it,
- * and are reached by a ray from the eye, which meets nothing that is before them by more than a quarter of the lattice's
- * step. scene: of the same object. */
+ * and are reached by a ray from the eye, which meets nothing that is before them by more than a quarter of the
+ * lattice's step. scene: of the same object. */
 void cull_set_look(const struct cull_set *set, const struct ray_scene *scene, const struct cull_eye *eye,
                    struct psr_pool *pool, uint8_t *n_seen);
 
@@ -69,9 +70,9 @@ struct cull_truth {
 	double blocks, samples; /* share that no ray finds */
 };
 
-/* figures[i] for choice[i]; truth and wrong if scene is given, else 0. Shares are the same whatever the number of threads.
- * Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from models that
- * have just the blocks that are kept. MEMORY. */
+/* figures[i] for choice[i]; truth and wrong if scene is given, else 0. Shares are the same whatever the number of
+ * threads. Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from
+ * models that have just the blocks that are kept. MEMORY. */
 int cull_measure(struct cull_set *set, const struct ray_scene *scene, const struct cull_views *views,
                  const struct cull_choice *choice, int n_choices, struct psr_pool *pool, struct cull_figures *figures,
                  struct cull_truth *truth, struct psr_error *err);

@@ -33,7 +33,8 @@ static double cpu_seconds(void)
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-static double time_test(struct measure *m, const struct cull_eye *eye, const struct cull_choice *choice, uint8_t *is_kept)
+static double time_test(struct measure *m, const struct cull_eye *eye, const struct cull_choice *choice,
+                        uint8_t *is_kept)
 {
 	double started = cpu_seconds();
 

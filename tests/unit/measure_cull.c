@@ -91,9 +91,9 @@ static struct psr_mesh *ball(double x, double y, double z, double radius)
 
 /* ---- a convex body ---- */
 
-/* With a block's centre c at a distance of about 1 in the cone's direction and e at 2.92, a block with c . e < 0 is more
- * than |e - c| > sqrt(1 + 2.92^2) = 3.08 away, and g > 1: [G] 6.4's test holds for g > (sin alpha + 0.0125) |e - c| + 1.0125 r
- * when alpha and r are below 0.2, and the more, the farther round it is. */
+/* A block at the unit vector c with c . e < 0, for an eye e at 2.92, is |e - c| > 3.08 away, and g = c . (c - e) > 1:
+ * render/cull.c's test, g > (sin alpha + 0.0135) |e - c| + 1.0125 r, holds when alpha and r are below 0.2, and the
+ * more, the farther round it is. */
 static void cones_cull_the_back_half_of_a_ball(void **state)
 {
 	struct object o = make_object(ball(0, 0, 0, 1), 2);
@@ -123,9 +123,9 @@ static void cones_cull_the_back_half_of_a_ball(void **state)
 	drop_object(&o);
 }
 
-/* A sample at p on a unit ball is seen iff n . (e - p) > 0. Margins, as sines: normals turned by 0.0125 by being quantised,
- * 0.0125 that still count, and faces of half an angle of 0.066 / 2 against the ball's own normals. A sample that no margin
- * decides may count or not. */
+/* A sample at p on a unit ball is seen iff n . (e - p) > 0. Margins, as sines: normals turned by 0.0125 by being
+ * quantised, 0.0125 that still count, and half the angle between faces, pi / 48, against the ball's own normals. A
+ * sample that no margin decides may count or not. */
 static void rays_find_the_cap_of_a_ball(void **state)
 {
 	const double margin = 0.0125 + 0.0125 + 0.0655;
@@ -220,9 +220,9 @@ static struct psr_mesh *ball_in_a_bowl(void)
 	return join(bowl, ball(0, 0, -0.35, 0.5), 0);
 }
 
-/* An eye below z = -2.1 looks up at 46 degrees at least, and each of its rays, 27 degrees from the middle one at most, comes
- * from below: through no opening. Masks are made of samples, which leave a pixel in some thousands open: a block that is
- * behind one of them is kept, though rays do not find it. */
+/* An eye below z = -2.1 looks up at 46 degrees at least, and each of its rays, 27 degrees from the middle one at most,
+ * comes from below: through no opening. Masks are made of samples, which leave a pixel in some thousands open: a block
+ * that is behind one of them is kept, though rays do not find it. */
 static void masks_cull_a_ball_in_a_bowl_from_below(void **state)
 {
 	struct object o = make_object(ball_in_a_bowl(), 2);
