@@ -205,9 +205,8 @@ void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struc
 		float c[3];
 
 		m3f_apply(c, (const float(*)[3])lens.frame, v);
-		is_kept[b] = is_in_view(&lens, c, r)
-		             && !(choice->cones && cone_culls(all, set->index[b], lens.place, 1))
-		             && (words == 0 || masks_meet(mask + words * b, set->screen.mask[node_of(&set->screen, &lens, c, r)],
-		                                          words));
+		is_kept[b] = is_in_view(&lens, c, r) && !(choice->cones && cone_culls(all, set->index[b], lens.place, 1));
+		if (is_kept[b] && words != 0)
+			is_kept[b] = masks_meet(mask + words * b, set->screen.mask[node_of(&set->screen, &lens, c, r)], words);
 	}
 }

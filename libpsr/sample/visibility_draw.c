@@ -10,8 +10,8 @@
 #define MARGIN (VPICTURE_REACH + 1) /* pixels */
 #define CHUNK 16 /* samples */
 
-/* Steps of the lattice: as far apart as samples are on a surface that is tilted by 25 degrees. Smaller ones have holes, and
- * a sample behind a hole counts as seen. */
+/* Steps of the lattice: as far apart as samples are on a surface that is tilted by 25 degrees. Smaller ones have holes,
+ * and a sample behind a hole counts as seen. */
 #define PIXEL 1.11f
 
 static int alloc_points(struct vpoints *points, size_t n)

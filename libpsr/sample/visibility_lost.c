@@ -140,8 +140,8 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 	return (b->visibility[block][triangle >> 6] >> (triangle & 63) & 1) == 0;
 }
 
-/* Whether a ray from the eye, which meets fronts as the eye does, meets nothing before the sample but what is as near to
- * it as its neighbours are. */
+/* Whether a ray from the eye, which meets fronts as the eye does, meets nothing before the sample but what is as near
+ * to it as its neighbours are. */
 static int is_open(const struct job *job, uint32_t k, const struct eye *eye)
 {
 	const double p[3] = { (double)job->points->x[k], (double)job->points->y[k], (double)job->points->z[k] };

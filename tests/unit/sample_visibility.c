@@ -60,8 +60,8 @@ static uint64_t lost(const struct object *o, uint64_t n_trials, struct psr_pool 
 
 /* ---- masks ---- */
 
-/* Angle from c to the nearest place of a triangle that it is outside of, at least: that is on a side, a quarter of which
- * (36 degrees at the most at level 2, 0.16 radians for a quarter) is as far as it gets from a corner or a middle. */
+/* Angle from c to the nearest place of a triangle that it is outside of, at least: that is on a side, and within a
+ * quarter of that (36 degrees at the most at level 2, 0.16 radians for a quarter) of a corner or a middle. */
 static double angle_to(const double c[3], double corner[3][3], double *to_corner)
 {
 	double least = 10;
@@ -142,9 +142,9 @@ static void a_ball_loses_nothing_to_its_cones_and_masks(void **state)
 	drop_object(&o);
 }
 
-/* Nothing hides a ball's front from the eye: with no bit set each pixel is lost, but for those few behind the limb where
- * the faces of the mesh are before the sample, and those that show its far side through a hole; with one bit set, all but
- * those seen from there, a 128th. */
+/* Nothing hides a ball's front from the eye: with no bit set each pixel is lost, but for those few behind the limb
+ * where the faces of the mesh are before the sample, and those that show its far side through a hole; with one bit set,
+ * all but those seen from there, some 128th. */
 static void without_bits_in_masks_all_is_lost(void **state)
 {
 	struct object o = make_object(meshes_sphere(64, zero, 1));
