@@ -264,9 +264,9 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 #define MOST_ROUNDS 5
 
 /* What a view found that none of those before had seen is seldom alone: it is put down as seen, and the surface diced again. */
-static int add_missing(struct level *level, const struct adequacy *found)
+static int add_missing(struct level *level, const struct adequacy *found, int round)
 {
-	int rc = PSR_OK;
+	int rc = seen_look(&level->seen, level->scene, round % SEEN_ROUNDS, level->pool);
 
 	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
 		const struct surface_spot *spot = &found->spot[i];
@@ -276,7 +276,7 @@ static int add_missing(struct level *level, const struct adequacy *found)
 		if (rc == PSR_OK)
 			rc = dice_cover(level, spot);
 	}
-	return rc == PSR_OK ? dice_surface(level) : rc;
+	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 
 int adequacy_reach(struct adequacy *out, struct level *level)
@@ -289,7 +289,7 @@ int adequacy_reach(struct adequacy *out, struct level *level)
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
 		if (rc != PSR_OK || round == MOST_ROUNDS || 20000 * out->n_missing < out->n_trials)
 			break;
-		rc = add_missing(level, out);
+		rc = add_missing(level, out, round);
 		free(out->spot);
 		out->spot = NULL;
 		if (rc != PSR_OK)

@@ -35,9 +35,9 @@ void draft_fini(struct draft *draft);
 /* Adds the next level. MEMORY, LIMIT. */
 int draft_add(struct draft *draft, const struct level *level);
 
-/* Cuts the finest level into groups of at most 1024 blocks that lie together, and each coarser one into blocks of the same
- * groups: a group has all samples within a pixel, at that level, of its finest samples, so that pieces drawn at different
- * levels overlap. MEMORY. */
+/* Cuts the finest level into groups of at most 32768 samples that lie together, and each coarser one into blocks of the
+ * same groups: a group has all samples within three quarters of a pixel, at that level, of its finest samples, so that
+ * pieces drawn at different levels meet. MEMORY. */
 int draft_group(struct draft *draft);
 
 /* Inner coordinates of sample s of a block. */

@@ -5,13 +5,14 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_BLOCKS 1024
-#define REACH 2 /* cells of half a pixel: one coarse spacing beyond a group's border */
+#define GROUP_SAMPLES 131072
+#define CELLS 4 /* that a coarse pixel is wide */
+#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: the farthest corner of a pixel is 0.71 of one away) */
 #define MOST_PARTS 64 /* groups that can share a block of a coarse level */
 
 struct place {
 	float center[3];
-	uint32_t block;
+	uint32_t block, n_samples;
 	int axis; /* to compare by */
 };
 
@@ -27,9 +28,12 @@ static int compare_places(const void *a, const void *b)
 static void cut(struct draft *draft, struct place *place, uint32_t n)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
+	uint32_t n_samples = 0;
 	int axis = 0;
 
-	if (n <= GROUP_BLOCKS) {
+	for (uint32_t i = 0; i < n; i++)
+		n_samples += place[i].n_samples;
+	if (n_samples <= GROUP_SAMPLES) {
 		for (uint32_t i = 0; i < n; i++)
 			draft->block[place[i].block].group = draft->n_groups;
 		draft->n_groups++;
@@ -71,6 +75,7 @@ static int cut_finest(struct draft *draft, uint32_t n)
 		return PSR_ERR_MEMORY;
 	for (uint32_t i = 0; i < n; i++) {
 		place[i].block = i;
+		place[i].n_samples = (uint32_t)__builtin_popcountll(draft->block[i].part);
 		center_of(draft, &draft->block[i], place[i].center);
 	}
 	draft->n_groups = 0;
@@ -79,7 +84,7 @@ static int cut_finest(struct draft *draft, uint32_t n)
 	return PSR_OK;
 }
 
-/* Which groups have fine samples in each cell of half a pixel of a coarse level: points of a cover, one a group and cell. */
+/* Which groups have fine samples in each cell of a quarter of a pixel of a coarse level: points of a cover, one a group and cell. */
 static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_finest)
 {
 	for (uint32_t b = 0; b < n_finest; b++) {
@@ -198,7 +203,7 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest)
 {
 	struct cover map;
-	int rc = cover_init(&map, draft->ds * (double)(1u << level) / 2);
+	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
 
 	if (rc == PSR_OK)
 		rc = map_groups(&map, draft, n_finest);

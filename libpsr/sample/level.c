@@ -41,8 +41,9 @@ int level_make(struct level *level, const struct psr_projection *projection,
 	if (rc == PSR_OK)
 		rc = cover_init(&level->cover, level->ds);
 	if (rc == PSR_OK)
-		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen)
-		                               : seen_init(&level->seen, level->scene, level->ds, level->pool);
+		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen) : seen_init(&level->seen, level->ds);
+	if (rc == PSR_OK && level->finer_seen == NULL)
+		rc = seen_look(&level->seen, level->scene, 0, level->pool);
 	STEP_DONE;
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
 		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, &projection[i], level->pool);
@@ -60,7 +61,7 @@ int level_make(struct level *level, const struct psr_projection *projection,
 	}
 	STEP_DONE;
 	if (rc == PSR_OK)
-		rc = dice_surface(level);
+		rc = dice_surface(level, 0);
 	STEP_DONE;
 #undef STEP_DONE
 	return rc;

@@ -59,8 +59,9 @@ void merge_patches(struct level *level);
 int keep_owned(struct level *level);
 int keep_sample(struct level *level, struct level_ref ref);
 
-/* dice.c: tests places all over the surface, half a pixel apart, and adds what they lack. MEMORY. */
-int dice_surface(struct level *level);
+/* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
+ * greater. MEMORY. */
+int dice_surface(struct level *level, int round);
 
 /* Adds samples so that a place is covered. MEMORY. */
 struct surface_spot {

@@ -9,8 +9,9 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
-#define VIEW_LEVEL 3
-#define N_VIEWS (8 << 2 * VIEW_LEVEL)
+#define VIEW_LEVEL 4
+#define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
+#define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
@@ -126,20 +127,26 @@ static int grow(struct seen *seen)
 	return PSR_OK;
 }
 
-int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
+int seen_init(struct seen *seen, double ds)
 {
-	struct look look = { .seen = seen, .scene = scene, .ds = RAY_PIXELS * ds, .reach = (int)ceil(1 / (RAY_PIXELS * ds)) };
-
 	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
 	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
 	if (seen->table == NULL)
 		return PSR_ERR_MEMORY;
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	return PSR_OK;
+}
+
+int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool)
+{
+	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
+	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+
 	for (unsigned i = 0; i < N_VIEWS;) {
 		double direction[3];
 
 		/* Far apart ones first, so that the table soon has its size. */
-		psr_direction_center(VIEW_LEVEL, i * 211 % N_VIEWS, direction);
+		psr_direction_center(VIEW_LEVEL, (SEEN_ROUNDS * (i * 211 % N_VIEWS) + (unsigned)round) % N_DIRECTIONS, direction);
 		psr_direction_frame(direction, look.frame);
 		look.n_new = 0;
 		look.is_full = 0;

@@ -32,6 +32,7 @@ struct patch {
 	int16_t col, row;   /* in blocks */
 	uint8_t two_sided;  /* of materials that are seen from both sides; or of one-sided ones */
 	uint8_t is_alive;   /* some of it is kept */
+	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
 	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
 	uint64_t mask;      /* hits; */
 	uint64_t first;     /* of these, the first of their rays: nothing hides them; */
