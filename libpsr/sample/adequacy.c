@@ -261,7 +261,7 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 	return rc;
 }
 
-#define MOST_ROUNDS 5
+#define MOST_ROUNDS 7
 
 /* What a view found that none of those before had seen is seldom alone: it is put down as seen, and the surface diced again. */
 static int add_missing(struct level *level, const struct adequacy *found, int round)
@@ -276,6 +276,7 @@ static int add_missing(struct level *level, const struct adequacy *found, int ro
 		if (rc == PSR_OK)
 			rc = dice_cover(level, spot);
 	}
+	keep_look_again(level);
 	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 
@@ -287,7 +288,7 @@ int adequacy_reach(struct adequacy *out, struct level *level)
 	n = n < 100000 ? 100000 : n > 500000 ? 500000 : n;
 	for (int round = 1;; round++) {
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
-		if (rc != PSR_OK || round == MOST_ROUNDS || 20000 * out->n_missing < out->n_trials)
+		if (rc != PSR_OK || round == MOST_ROUNDS || 15000 * out->n_missing < out->n_trials)
 			break;
 		rc = add_missing(level, out, round);
 		free(out->spot);

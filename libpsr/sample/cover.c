@@ -3,6 +3,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "cover.h"
 #include "psr/direction.h"
 #include "psr/error.h"
@@ -32,7 +33,7 @@ static int place_in_brick(const int at[3])
 
 static struct cover_brick *find(const struct cover *cover, uint64_t key)
 {
-	size_t i = (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 20) & (cover->table_size - 1);
+	size_t i = cell_place(key, cover->table_size);
 
 	while (cover->table[i].key != FREE && cover->table[i].key != key)
 		i = (i + 1) & (cover->table_size - 1);

@@ -335,8 +335,8 @@ struct job {
 	int round;
 };
 
-/* Tests a place, on the side on which it is to be sampled; the other one too as long as it is not known to be hidden, which
- * holds until more was seen. */
+/* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for until
+ * more was seen. */
 static void test_place(const struct job *job, uint32_t prim, const float p[3], struct list *list)
 {
 	const struct level *level = job->level;
@@ -352,12 +352,8 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		if (is_covered(level, &spot))
-			return;
-		if (seen_is(&level->seen, spot.p, spot.n)) {
+		if (seen_is(&level->seen, spot.p, spot.n) && !is_covered(level, &spot))
 			add_spot(list, &spot);
-			return;
-		}
 	}
 }
 

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "field.h"
 #include "psr/error.h"
 
@@ -13,15 +14,9 @@ static uint64_t key_of(int x, int y, int z)
 	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
 }
 
-static size_t hash_of(uint64_t key, size_t capacity)
-{
-	key *= UINT64_C(0x9e3779b97f4a7c15);
-	return (size_t)(key >> 20) & (capacity - 1);
-}
-
 static struct field_cell *find(const struct field *field, uint64_t key)
 {
-	size_t i = hash_of(key, field->capacity);
+	size_t i = cell_place(key, field->capacity);
 
 	while (field->table[i].key != FREE && field->table[i].key != key)
 		i = (i + 1) & (field->capacity - 1);

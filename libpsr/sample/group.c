@@ -5,7 +5,8 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_SAMPLES 131072
+#define LEAST_GROUP 131072 /* samples of the finest level */
+#define MOST_GROWTH 1.25   /* of the number of coarse blocks, by those that groups share */
 #define CELLS 4 /* that a coarse pixel is wide */
 #define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: the farthest corner of a pixel is 0.71 of one away) */
 #define MOST_PARTS 64 /* groups that can share a block of a coarse level */
@@ -25,7 +26,7 @@ static int compare_places(const void *a, const void *b)
 }
 
 /* Halves along the longest side of the box of the centres, until a part is small enough. */
-static void cut(struct draft *draft, struct place *place, uint32_t n)
+static void cut(struct draft *draft, struct place *place, uint32_t n, uint32_t most)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
 	uint32_t n_samples = 0;
@@ -33,7 +34,7 @@ static void cut(struct draft *draft, struct place *place, uint32_t n)
 
 	for (uint32_t i = 0; i < n; i++)
 		n_samples += place[i].n_samples;
-	if (n_samples <= GROUP_SAMPLES) {
+	if (n_samples <= most) {
 		for (uint32_t i = 0; i < n; i++)
 			draft->block[place[i].block].group = draft->n_groups;
 		draft->n_groups++;
@@ -50,8 +51,8 @@ static void cut(struct draft *draft, struct place *place, uint32_t n)
 	for (uint32_t i = 0; i < n; i++)
 		place[i].axis = axis;
 	qsort(place, n, sizeof *place, compare_places);
-	cut(draft, place, n / 2);
-	cut(draft, place + n / 2, n - n / 2);
+	cut(draft, place, n / 2, most);
+	cut(draft, place + n / 2, n - n / 2, most);
 }
 
 static void center_of(const struct draft *draft, const struct draft_block *block, float center[3])
@@ -67,7 +68,7 @@ static void center_of(const struct draft *draft, const struct draft_block *block
 	}
 }
 
-static int cut_finest(struct draft *draft, uint32_t n)
+static int cut_finest(struct draft *draft, uint32_t n, uint32_t most)
 {
 	struct place *place = malloc((n != 0 ? n : 1) * sizeof *place);
 
@@ -79,7 +80,7 @@ static int cut_finest(struct draft *draft, uint32_t n)
 		center_of(draft, &draft->block[i], place[i].center);
 	}
 	draft->n_groups = 0;
-	cut(draft, place, n);
+	cut(draft, place, n, most);
 	free(place);
 	return PSR_OK;
 }
@@ -110,7 +111,7 @@ static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_f
 struct parts {
 	uint32_t group[MOST_PARTS];
 	uint64_t part[MOST_PARTS];
-	int n;
+	int n, is_full;
 };
 
 static void add_part(struct parts *parts, uint32_t group, unsigned s)
@@ -119,8 +120,10 @@ static void add_part(struct parts *parts, uint32_t group, unsigned s)
 
 	while (i < parts->n && parts->group[i] != group)
 		i++;
-	if (i == MOST_PARTS)
+	if (i == MOST_PARTS) {
+		parts->is_full = 1;
 		return;
+	}
 	if (i == parts->n) {
 		parts->group[parts->n] = group;
 		parts->part[parts->n++] = 0;
@@ -156,11 +159,16 @@ static void find_groups(const struct cover *map, const float p[3], double reach,
 
 struct blocks {
 	struct draft_block *block;
-	uint32_t n, capacity;
+	uint32_t n, capacity, most;
+	int is_over; /* there would be more */
 };
 
 static int add_block(struct blocks *blocks, const struct draft_block *block)
 {
+	if (blocks->n == blocks->most) {
+		blocks->is_over = 1;
+		return PSR_OK;
+	}
 	if (blocks->n == blocks->capacity) {
 		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
 		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
@@ -189,6 +197,7 @@ static int split_block(struct blocks *blocks, const struct draft *draft, const s
 		if (n == 0 && parts.n == 0)
 			find_groups(map, p, 2 * REACH * map->ds, s, &parts);
 	}
+	blocks->is_over |= parts.is_full;
 	for (int i = 0; i < parts.n; i++) {
 		struct draft_block part = *block;
 
@@ -207,26 +216,42 @@ static int split_level(struct blocks *blocks, const struct draft *draft, unsigne
 
 	if (rc == PSR_OK)
 		rc = map_groups(&map, draft, n_finest);
-	for (uint32_t b = n_finest; rc == PSR_OK && b < draft->n_blocks; b++)
+	for (uint32_t b = n_finest; rc == PSR_OK && !blocks->is_over && b < draft->n_blocks; b++)
 		if (draft->block[b].level == level)
 			rc = split_block(blocks, draft, &draft->block[b], &map);
 	cover_fini(&map);
 	return rc;
 }
 
+/* The blocks of all levels, for groups of at most so many samples. */
+static int make_blocks(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
+{
+	int rc = cut_finest(draft, n_finest, most);
+
+	blocks->n = 0;
+	blocks->is_over = 0;
+	blocks->most = n_finest + (uint32_t)(MOST_GROWTH * (double)(draft->n_blocks - n_finest));
+	for (uint32_t b = 0; rc == PSR_OK && b < (draft->n_groups == 1 ? draft->n_blocks : n_finest); b++)
+		rc = add_block(blocks, &draft->block[b]);
+	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && level < draft->n_levels; level++)
+		rc = split_level(blocks, draft, level, n_finest);
+	return rc;
+}
+
 int draft_group(struct draft *draft)
 {
-	struct blocks blocks = { NULL, 0, 0 };
+	struct blocks blocks = { .block = NULL };
 	uint32_t n_finest = 0;
-	int rc;
+	int rc = PSR_OK;
 
 	while (n_finest < draft->n_blocks && draft->block[n_finest].level == 0)
 		n_finest++;
-	rc = cut_finest(draft, n_finest);
-	for (uint32_t b = 0; rc == PSR_OK && b < n_finest; b++)
-		rc = add_block(&blocks, &draft->block[b]);
-	for (unsigned level = 1; rc == PSR_OK && level < draft->n_levels; level++)
-		rc = split_level(&blocks, draft, level, n_finest);
+	/* One group shares nothing. */
+	for (uint32_t most = LEAST_GROUP; rc == PSR_OK; most = most < UINT32_MAX / 2 ? 2 * most : UINT32_MAX) {
+		rc = make_blocks(&blocks, draft, n_finest, most);
+		if (!blocks.is_over)
+			break;
+	}
 	if (rc != PSR_OK) {
 		free(blocks.block);
 		return rc;

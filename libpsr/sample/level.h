@@ -55,9 +55,15 @@ int owner_mark(struct level *level);
 /* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well. */
 void merge_patches(struct level *level);
 
-/* keep.c: keeps what is owned, or a single sample. MEMORY. */
+/* keep.c: whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */
+int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3], const float n[3]);
+
+/* Keeps what is owned, or a single sample. MEMORY. */
 int keep_owned(struct level *level);
 int keep_sample(struct level *level, struct level_ref ref);
+
+/* After more was seen: which samples are of thin sheets. */
+void keep_look_again(struct level *level);
 
 /* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
  * greater. MEMORY. */

@@ -2,6 +2,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 #include "seen.h"
@@ -9,7 +10,7 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
-#define VIEW_LEVEL 4
+#define VIEW_LEVEL 5
 #define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
 #define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
@@ -38,15 +39,10 @@ static uint64_t coarser_key(uint64_t key)
 	return coarser;
 }
 
-static size_t place_of(const struct seen *seen, uint64_t key)
-{
-	return (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 16) & (seen->size - 1);
-}
-
 /* From any thread. 0: there is no room. */
 static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
 		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
@@ -180,7 +176,7 @@ void seen_fini(struct seen *seen)
 
 static int has(const struct seen *seen, uint64_t key)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	while (seen->table[i] != FREE && seen->table[i] != key)
 		i = (i + 1) & (seen->size - 1);

@@ -17,7 +17,7 @@ struct seen {
 int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
 
 /* Looks from 512 directions, others for each round of 0..SEEN_ROUNDS - 1, a ray every fourth pixel. MEMORY. */
-#define SEEN_ROUNDS 4
+#define SEEN_ROUNDS 16
 int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 
