@@ -200,10 +200,11 @@ void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struc
 	if (words != 0)
 		screen_make(&set->screen, choice->n, eye->frame, eye->tangent, choice->level);
 	for (uint32_t b = 0; b < set->n_blocks; b++) {
-		const float v[3] = { blocks->sphere_x[b] - lens.place[0], blocks->sphere_y[b] - lens.place[1],
-			                 blocks->sphere_z[b] - lens.place[2] }, r = blocks->sphere_r[b] * 1.0001f;
-		float c[3];
+		float center[3], v[3], c[3], r;
 
+		psr_blocks_sphere(blocks, b, center, &r);
+		v3f_sub(v, center, lens.place);
+		r *= 1.0001f;
 		m3f_apply(c, (const float(*)[3])lens.frame, v);
 		is_kept[b] = is_in_view(&lens, c, r) && !(choice->cones && cone_culls(all, set->index[b], lens.place, 1));
 		if (is_kept[b] && words != 0)

@@ -7,9 +7,9 @@
 struct part {
 	struct psr_blocks blocks;
 	struct psr_cluster *cluster;
-	float *sphere[4], *bias, *step;
-	uint16_t *projection, *depth;
-	int16_t *col, *row;
+	float *bias, *step;
+	uint16_t *projection, *radius, *depth;
+	int16_t *center[3], *col, *row;
 	uint8_t *level, *flags;
 	uint64_t *mask, *attr;
 	uint32_t *attr_first;
@@ -29,8 +29,9 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 	size_t n = all->n_blocks;
 
 	part->cluster = take(&at, all->n_clusters, sizeof *part->cluster);
-	for (int k = 0; k < 4; k++)
-		part->sphere[k] = take(&at, n, sizeof *part->sphere[k]);
+	for (int k = 0; k < 3; k++)
+		part->center[k] = take(&at, n, sizeof *part->center[k]);
+	part->radius = take(&at, n, sizeof *part->radius);
 	part->bias = take(&at, n, sizeof *part->bias);
 	part->step = take(&at, n, sizeof *part->step);
 	part->projection = take(&at, n, sizeof *part->projection);
@@ -46,7 +47,7 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 
 static int part_init(struct part *part, const struct psr_blocks *all)
 {
-	const size_t a_block = 4 * sizeof(float) + 2 * sizeof(float) + 3 * sizeof(uint16_t) + 2 + sizeof(uint64_t) +
+	const size_t a_block = 2 * sizeof(float) + 7 * sizeof(uint16_t) + 2 + sizeof(uint64_t) +
 	                       sizeof(uint32_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t), n_arrays = 18;
 	size_t size = all->n_clusters * sizeof(struct psr_cluster) + all->n_blocks * a_block + all->n_samples * a_sample;
 
@@ -56,8 +57,8 @@ static int part_init(struct part *part, const struct psr_blocks *all)
 		return PSR_ERR_MEMORY;
 	place_arrays(part, part->memory, all);
 	part->blocks = (struct psr_blocks){ .n_projections = all->n_projections, .n_levels = 1,
-		.projection = all->projection, .cluster = part->cluster, .sphere_x = part->sphere[0],
-		.sphere_y = part->sphere[1], .sphere_z = part->sphere[2], .sphere_r = part->sphere[3],
+		.projection = all->projection, .cluster = part->cluster, .sphere_x = part->center[0],
+		.sphere_y = part->center[1], .sphere_z = part->center[2], .sphere_r = part->radius,
 		.block_projection = part->projection, .col = part->col, .row = part->row, .level = part->level,
 		.flags = part->flags, .depth_bias = part->bias, .depth_step = part->step, .mask = part->mask,
 		.attr_first = part->attr_first, .depth = part->depth, .attr = part->attr };
@@ -69,10 +70,10 @@ static void add_block(struct part *part, const struct psr_blocks *all, uint32_t 
 	struct psr_blocks *blocks = &part->blocks;
 	uint32_t to = blocks->n_blocks++, from = all->attr_first[b], n = (uint32_t)__builtin_popcountll(all->mask[b]);
 
-	part->sphere[0][to] = all->sphere_x[b];
-	part->sphere[1][to] = all->sphere_y[b];
-	part->sphere[2][to] = all->sphere_z[b];
-	part->sphere[3][to] = all->sphere_r[b];
+	part->center[0][to] = all->sphere_x[b];
+	part->center[1][to] = all->sphere_y[b];
+	part->center[2][to] = all->sphere_z[b];
+	part->radius[to] = all->sphere_r[b];
 	part->bias[to] = all->depth_bias[b];
 	part->step[to] = all->depth_step[b];
 	part->projection[to] = all->block_projection[b];
