@@ -33,8 +33,8 @@ for source in "$work"/source/*.glb; do
 	case $model in
 	kittyhawk) color=200 ;;
 	sailboat | table) color=60 ;;
-	pinetree) color=600 p999=2 ;;
-	# between needles and leaves, pixels are filled from several of them: a sample of each side of the gap away at most
+	pinetree) color=600 ;;
+	# between its leaves, pixels are filled from several of them
 	tree) color=250 p999=2 ;;
 	esac
 	check_views "$model" "$source" "$models/$model.psr" "$(size_of "$model")" 10 0 $p999 $color
