@@ -312,7 +312,7 @@ int adequacy_reach(struct adequacy *out, struct level *level)
 	uint64_t n = level->cover.n_points / 2, before[2] = { 0, 0 };
 	int rc = PSR_OK;
 
-	n = n < 100000 ? 100000 : n > 500000 ? 500000 : n;
+	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
 	for (int round = 1; rc == PSR_OK; round++) {
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
 		if (rc != PSR_OK || is_over(out, round, before[0]))

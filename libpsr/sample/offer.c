@@ -21,7 +21,9 @@
 #define N_TRIANGLES 3
 #define DEAD_PATCH 12 /* a new block costs as much as this many samples more in one that is there */
 
-/* In samples, as offers are compared. A moved sample is off by half a pixel. */
+/* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half a
+ * pixel. */
+#define HIT 1.5f
 #define SNAP 3
 #define MOST_SNAP 0.55
 
@@ -155,7 +157,7 @@ struct offer {
 static void offer_triangle(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
                            struct offer *best)
 {
-	for (int i = 0; i < tries->n && i < N_TRIANGLES; i++) {
+	for (int i = 0; i < tries->n && i < N_TRIANGLES && (float)i / 2 < best->cost; i++) {
 		struct corner corner[3];
 		float cost = (float)i / 2, opening = 0;
 
@@ -178,7 +180,7 @@ static void offer_triangle(const struct level *level, const struct surface_spot 
 static void offer_nearest(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
                           struct offer *best)
 {
-	for (int i = 0; i < tries->n; i++) {
+	for (int i = 0; i < tries->n && HIT + (float)i / 2 < best->cost; i++) {
 		struct corner corner[3];
 
 		find_corners(level, tries->projection[i], spot, corner);
@@ -187,7 +189,7 @@ static void offer_nearest(const struct level *level, const struct surface_spot *
 
 			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
 				continue;
-			cost = 1.5f + distance / 4 + (float)i / 2 + opening_cost(level, tries->projection[i], &corner[k]);
+			cost = HIT + distance / 4 + (float)i / 2 + opening_cost(level, tries->projection[i], &corner[k]);
 			if (cost < best->cost)
 				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .cost = cost,
 					                    .corner = { corner[k] } };
@@ -202,7 +204,7 @@ static void offer_snap(const struct level *level, const struct surface_spot *spo
 {
 	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
 
-	for (int i = 0; i < tries->n && i < N_TRIANGLES; i++) {
+	for (int i = 0; i < tries->n && i < N_TRIANGLES && SNAP < best->cost; i++) {
 		const struct sheets *sheets = &level->sheets[tries->projection[i]];
 		struct lattice_point at[3];
 		float p[3], n[3];
