@@ -17,7 +17,7 @@ struct adequacy {
 /* Makes about n_trials trials; other seeds make others. The same numbers whatever the threads. MEMORY. */
 int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t seed, uint64_t n_trials);
 
-/* Measures and adds what is missing, until less than a 20,000th is or it does not get better; *out: of the last round,
+/* Measures and adds what is missing, until less than a 15,000th is or it does not get better; *out: of the last round,
  * with another seed, without spots. MEMORY. */
 int adequacy_reach(struct adequacy *out, struct level *level);
 
