@@ -8,7 +8,7 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p docs/studies
 
-[ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models
+[ $# -gt 0 ] || set -- tolerance block-size square-lattice masks subdivision selection models culling
 for study; do
 	echo "study $study" >&2
 	plot=()

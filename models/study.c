@@ -22,6 +22,25 @@
 	"set ylabel 'relative'\nset pointsize 1\nset xrange [-0.4:*]\nset offsets 0,0.4,0.02,0.02\n" \
 	"plot $table using 1:7:xtic(2) title 'file size' lw 2 pt 7, '' using 1:9 title 'warping time' lw 2 pt 5\n"
 
+/* Rows 0-4 without cones, 5-9 with them. */
+#define PLOT_MASKS \
+	"set multiplot layout 1,2\nset style data linespoints\nset grid ytics\nset key bottom right\n" \
+	"set xlabel 'bits of the mask'\nset xrange [-0.4:4.4]\nset yrange [*:*]\nset pointsize 1\n" \
+	"set xtics ('none' 0, '8' 1, '32' 2, '128' 3, '512' 4)\n" \
+	"set ylabel '% of blocks culled'\n" \
+	"plot $table every ::0::4 using 1:3 title 'masks' lw 2 pt 7, " \
+	"'' every ::5::9 using ($1-5):3 title 'masks and cones' lw 2 pt 5, " \
+	"'' every ::0::4 using 1:5 title 'hidden' lt 0 lw 2 pt -1\n" \
+	"set ylabel '% speedup'\n" \
+	"plot $table every ::0::4 using 1:9 title 'masks' lw 2 pt 7, " \
+	"'' every ::5::9 using ($1-5):9 title 'masks and cones' lw 2 pt 5\nunset multiplot\n"
+#define PLOT_SUBDIVISION \
+	"set style data linespoints\nset grid ytics\nset key top left\nset xlabel 'regions of the screen'\n" \
+	"set ylabel '% over 1x1'\nset pointsize 1\nset xrange [-0.4:*]\nset offsets 0,0.4,0.02,0.02\n" \
+	"plot $table using 1:10:xtic(2) title 'blocks culled' lw 2 pt 7, '' using 1:9 title 'speed' lw 2 pt 5\n"
+#define NOTE_CULLING \
+	"hidden: no ray from a sample gets to the eye; wrong: culled though one does; speedup: over the first line."
+
 const struct study_kind study_kinds[] = {
 	{ "tolerance", "figure 5.5", "tolerance angle, equilateral lattice", FIVE, study_run_tolerance,
 	  PLOT_SIZE_TIME("tolerance angle, degrees"), NULL },
@@ -29,7 +48,14 @@ const struct study_kind study_kinds[] = {
 	{ "square-lattice", "figure 5.7", "tolerance angle, square lattice", FIVE, study_run_square,
 	  PLOT_SIZE_TIME("tolerance angle, degrees"), NULL },
 	{ "selection", "sections 5.2, 9.2", "what was tried to select blocks", FIVE, study_run_selection, NULL, NULL },
+	{ "masks", "figure 6.7", "visibility tests and bits of the masks", FIVE, study_run_masks, PLOT_MASKS,
+	  NOTE_CULLING },
+	{ "subdivision", "figure 6.8", "subdivision of the screen, cones and 128 bits", FIVE, study_run_subdivision,
+	  PLOT_SUBDIVISION, NOTE_CULLING },
 	{ "models", "table 8.1", "the standard set", NULL, study_run_models, NULL, NULL },
+	{ "culling", "table 8.3", "% of blocks culled by cones and masks", NULL, study_run_culling, NULL,
+	  "hidden: no ray from a sample gets to the eye; wrong: culled though one does. frustum and after it: the same\n"
+	  "views zoomed in, a quarter of the picture wide." },
 };
 const int n_study_kinds = sizeof study_kinds / sizeof *study_kinds;
 

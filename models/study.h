@@ -13,7 +13,7 @@
 
 /* ---- study_table.c: what a study found ---- */
 
-#define STUDY_MOST_COLUMNS 12
+#define STUDY_MOST_COLUMNS 16
 
 struct study_column {
 	const char *name, *key; /* heading; key in JSON */
@@ -97,6 +97,9 @@ int study_run_square(struct study *study);
 int study_run_block_size(struct study *study);
 int study_run_selection(struct study *study);
 int study_run_models(struct study *study);
+int study_run_masks(struct study *study);
+int study_run_subdivision(struct study *study);
+int study_run_culling(struct study *study);
 
 #define STUDY_TOLERANCE 0.43633231299858238 /* 25 degrees */
 

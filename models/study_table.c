@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,6 +8,8 @@ int study_table_init(struct study_table *table, const char *first, const struct 
                      int n_rows, int n_models, struct psr_error *err)
 {
 	size_t n = (size_t)n_rows * (size_t)n_models * (size_t)n_columns;
+
+	assert(n_columns <= STUDY_MOST_COLUMNS);
 
 	*table = (struct study_table){ .first = first, .column = column, .n_columns = n_columns, .n_rows = n_rows,
 		                           .n_models = n_models };

@@ -11,8 +11,9 @@ _Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(stru
 _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
                && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
 
-#define ARRAY(type, flags, count, item, field) \
-	{ type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
+#define ARRAY_VERSION(type, version, flags, count, item, field) \
+	{ type, version, flags, count, item, offsetof(struct psr_blocks, field) }
+#define ARRAY(type, flags, count, item, field) ARRAY_VERSION(type, 1, flags, count, item, field)
 
 const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
@@ -21,10 +22,10 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_LIGHTS] = { "LGTS", 1, 0, COUNT_LIGHTS, LIGHT_BYTES, 0 },
 	ARRAY("PROJ", ENTRY_REQUIRED, COUNT_PROJECTIONS, 40, projection),
 	ARRAY("CLUS", ENTRY_REQUIRED, COUNT_CLUSTERS, 32, cluster),
-	ARRAY("SPHX", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_x),
-	ARRAY("SPHY", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_y),
-	ARRAY("SPHZ", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_z),
-	ARRAY("SPHR", ENTRY_REQUIRED, COUNT_BLOCKS, 4, sphere_r),
+	ARRAY_VERSION("SPHX", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_x),
+	ARRAY_VERSION("SPHY", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_y),
+	ARRAY_VERSION("SPHZ", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_z),
+	ARRAY_VERSION("SPHR", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_r),
 	ARRAY("BPRJ", ENTRY_REQUIRED, COUNT_BLOCKS, 2, block_projection),
 	ARRAY("BCOL", ENTRY_REQUIRED, COUNT_BLOCKS, 2, col),
 	ARRAY("BROW", ENTRY_REQUIRED, COUNT_BLOCKS, 2, row),
@@ -34,10 +35,10 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("DSTP", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_step),
 	ARRAY("MASK", ENTRY_REQUIRED, COUNT_BLOCKS, 8, mask),
 	ARRAY("AFST", ENTRY_REQUIRED, COUNT_BLOCKS, 4, attr_first),
-	ARRAY("CONX", 0, COUNT_BLOCKS, 4, cone_x),
-	ARRAY("CONY", 0, COUNT_BLOCKS, 4, cone_y),
-	ARRAY("CONZ", 0, COUNT_BLOCKS, 4, cone_z),
-	ARRAY("CONC", 0, COUNT_BLOCKS, 4, cone_cos),
+	ARRAY_VERSION("CONX", 2, 0, COUNT_BLOCKS, 1, cone_x),
+	ARRAY_VERSION("CONY", 2, 0, COUNT_BLOCKS, 1, cone_y),
+	ARRAY_VERSION("CONZ", 2, 0, COUNT_BLOCKS, 1, cone_z),
+	ARRAY("CONS", 0, COUNT_BLOCKS, 1, cone_sine),
 	ARRAY("VISM", 0, COUNT_BLOCKS, 16, visibility),
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),

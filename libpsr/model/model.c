@@ -243,7 +243,7 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++)
 		if (section_table[k].flags & ENTRY_REQUIRED && section_array(&section_table[k], blocks) == NULL)
 			return psr_fail(err, PSR_ERR_ARG, "the model's array for section %s is missing", section_table[k].type);
-	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_cos;
+	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_sine;
 	if (n_cones % 4 != 0)
 		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
 	if (presets == NULL)

@@ -195,9 +195,12 @@ static int sort_sections(struct reader *r)
 				           section_table[known].flags ? "" : "not ");
 			r->entry[known] = (int)i;
 		} else if (s.flags & ENTRY_REQUIRED) {
+			const char *advice = known >= 0 && s.version < section_table[known].version
+			                     ? "it is an older psr's, and the model has to be built again" : "a newer psr may";
+
 			return psr_fail(r->err, known < 0 ? PSR_ERR_UNSUPPORTED : PSR_ERR_VERSION, "%s: this build cannot read the "
-			                "required section %s, version %" PRIu32 ", at byte %" PRIu64 "; a newer psr may", r->name,
-			                s.type, s.version, s.offset);
+			                "required section %s, version %" PRIu32 ", at byte %" PRIu64 "; %s", r->name, s.type,
+			                s.version, s.offset, advice);
 		}
 	}
 	return PSR_OK;
@@ -295,8 +298,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 		array = r->bytes + get_section(r, (uint32_t)r->entry[k]).offset;
 		memcpy((char *)blocks + spec->pointer, &array, sizeof array);
 	}
-	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_cos) % 4 != 0)
-		return bad(r, "of the sections CONX, CONY, CONZ and CONC only some are there");
+	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
+		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
 	return PSR_OK;
 }
 

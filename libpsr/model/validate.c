@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include "base/mem.h"
 #include "base/vec.h"
 #include "file.h"
@@ -173,11 +174,6 @@ static int check_heads(const struct checker *c)
 	uint64_t n_samples = 0;
 
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		if (!is_coordinate(b->sphere_x[i]) || !is_coordinate(b->sphere_y[i]) || !is_coordinate(b->sphere_z[i]))
-			return fail(c, "SPHX, SPHY, SPHZ", "the center of block %" PRIu32 " is not finite or beyond %g", i,
-			            (double)MODEL_MAX_COORDINATE);
-		if (!is_length(b->sphere_r[i]))
-			return fail(c, "SPHR", "the radius of block %" PRIu32 " is %g", i, (double)b->sphere_r[i]);
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
 			            b->n_projections);
@@ -206,14 +202,13 @@ static int check_cones(const struct checker *c)
 	if (b->cone_x == NULL)
 		return PSR_OK;
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		float axis[3] = { b->cone_x[i], b->cone_y[i], b->cone_z[i] };
+		const int axis[3] = { abs(b->cone_x[i]), abs(b->cone_y[i]), abs(b->cone_z[i]) };
+		int greatest = axis[0] > axis[1] ? axis[0] : axis[1];
 
-		if (!(b->cone_cos[i] >= -1 && b->cone_cos[i] <= 1))
-			return fail(c, "CONC", "the cosine of block %" PRIu32 " is %g", i, (double)b->cone_cos[i]);
-		/* A cone of all directions has no axis to speak of, but no NaN either. */
-		if (b->cone_cos[i] > -1 ? !is_unit(axis)
-		                        : !is_coordinate(axis[0]) || !is_coordinate(axis[1]) || !is_coordinate(axis[2]))
-			return fail(c, "CONX, CONY, CONZ", "the axis of block %" PRIu32 " has not unit length", i);
+		greatest = axis[2] > greatest ? axis[2] : greatest;
+		if (greatest != 127)
+			return fail(c, "CONX, CONY, CONZ", "the greatest component of the axis of block %" PRIu32 " is %d instead of 127",
+			            i, greatest);
 	}
 	return PSR_OK;
 }

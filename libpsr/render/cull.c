@@ -94,26 +94,28 @@ enum facing { FACES_AWAY, IS_MIXED, FACES_EYE };
  * the cone's axis a, a normal n within alpha of it and a sample x within r of the centre, n . (x - eye) is between
  * |d| cos(angle(a, d) + alpha) - r >= g - |d| (sin alpha + 1 - cos alpha) - r and g + |d| (sin alpha + 1 - cos
  * alpha) + r. A thousandth makes up for rounding. */
-static enum facing facing_of(const struct plan *plan, const struct plan_instance *in, uint32_t block)
+static enum facing facing_of(const struct plan *plan, const struct plan_instance *in, uint32_t block,
+                             const float center[3], float radius)
 {
 	const struct psr_blocks *b = in->blocks;
 	if (b->flags[block] & PSR_BLOCK_TWO_SIDED)
 		return FACES_EYE;
-	if (!b->cone_cos || b->cone_cos[block] <= 0)
+	if (!b->cone_sine || b->cone_sine[block] == PSR_CONE_ANY)
 		return IS_MIXED;
 	const float axis[3] = { b->cone_x[block], b->cone_y[block], b->cone_z[block] };
-	const float center[3] = { b->sphere_x[block], b->sphere_y[block], b->sphere_z[block] };
-	float g = 0, length2 = 0;
+	float g = 0, length2 = 0, axis2 = 0;
 	for (int k = 0; k < 3; k++) {
 		float d = plan->perspective ? center[k] - in->eye[k] : -in->eye[k];
 		g += d * axis[k];
 		length2 += d * d;
+		axis2 += axis[k] * axis[k];
 	}
-	const float cos_alpha = b->cone_cos[block], length = __builtin_sqrtf(length2);
-	const float spread = __builtin_sqrtf(1 - cos_alpha * cos_alpha) + 0.001f;
-	const float r = plan->perspective ? b->sphere_r[block] : 0;
+	g /= __builtin_sqrtf(axis2);
+	const float sin_alpha = (float)b->cone_sine[block] / 255, spread = sin_alpha + 0.001f;
+	const float length = __builtin_sqrtf(length2), r = plan->perspective ? radius : 0;
 	if (g > (spread + BACK_SINE) * length + r * (1 + BACK_SINE))
 		return FACES_AWAY;
+	const float cos_alpha = __builtin_sqrtf(1 - sin_alpha * sin_alpha);
 	return g + (spread + 1 - cos_alpha) * length + r <= BACK_SINE * (length - r) ? FACES_EYE : IS_MIXED;
 }
 
@@ -127,10 +129,12 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
                       struct cull_hit *hit)
 {
 	const struct psr_blocks *b = in->blocks;
-	const enum facing facing = facing_of(plan, in, block);
+	float center[3], radius;
+	psr_blocks_sphere(b, block, center, &radius);
+	const enum facing facing = facing_of(plan, in, block, center, radius);
 	if (facing == FACES_AWAY)
 		return 0;
-	float x = b->sphere_x[block], y = b->sphere_y[block], z = b->sphere_z[block], r = b->sphere_r[block] * in->scale;
+	float x = center[0], y = center[1], z = center[2], r = radius * in->scale;
 	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
 		           to_camera(in->center_m[2], x, y, z) };
 	float s = stretch(plan, c, r);
@@ -150,7 +154,8 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	hit->tile_y1 = tile_of(e.y1, TILE_HEIGHT, plan->tiles_y);
 	chunk->levels |= 1u << level;
 	chunk->n_clamped += (uint32_t)clamped;
-	chunk->n_samples += (uint64_t)__builtin_popcountll(b->mask[block]);
+	/* As many as the mask has bits, without counting them. */
+	chunk->n_samples += (block + 1 < b->n_blocks ? b->attr_first[block + 1] : b->n_samples) - b->attr_first[block];
 	float error = s * b->depth_step[block] * in->scale / 2;
 	if (error > chunk->depth_error)
 		chunk->depth_error = error;

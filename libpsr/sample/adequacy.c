@@ -135,18 +135,13 @@ static int is_any_hit(const struct level *level, const struct trial *trial, doub
 {
 	double cosine = trial->cosine > 0.03 ? trial->cosine : 0.03;
 	float half = (float)(level->ds / 2), tolerance = (float)(level->ds * (1 + 1.5 * sqrt(1 - cosine * cosine) / cosine));
-	int low[3], high[3], at[3];
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(&level->cover, trial->spot.p, radius, first);
 
-	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)trial->spot.p[k] - radius) / level->ds);
-		high[k] = (int)floor(((double)trial->spot.p[k] + radius) / level->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++)
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++)
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++)
-				for (uint32_t i = cover_cell(&level->cover, at); i != COVER_NONE; i = level->cover.point[i].next)
-					if (is_hit(trial, &level->cover.point[i], half, tolerance))
-						return 1;
+	for (int c = 0; c < n_cells; c++)
+		for (uint32_t i = first[c]; i != COVER_NONE; i = level->cover.point[i].next)
+			if (is_hit(trial, &level->cover.point[i], half, tolerance))
+				return 1;
 	return 0;
 }
 
@@ -266,12 +261,12 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 	return rc;
 }
 
-#define MOST_ROUNDS 5
+#define MOST_ROUNDS 7
 
 /* What a view found that none of those before had seen is seldom alone: it is put down as seen, and the surface diced again. */
-static int add_missing(struct level *level, const struct adequacy *found)
+static int add_missing(struct level *level, const struct adequacy *found, int round)
 {
-	int rc = PSR_OK;
+	int rc = seen_look(&level->seen, level->scene, round % SEEN_ROUNDS, level->pool);
 
 	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
 		const struct surface_spot *spot = &found->spot[i];
@@ -281,7 +276,8 @@ static int add_missing(struct level *level, const struct adequacy *found)
 		if (rc == PSR_OK)
 			rc = dice_cover(level, spot);
 	}
-	return rc == PSR_OK ? dice_surface(level) : rc;
+	keep_look_again(level);
+	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 
 int adequacy_reach(struct adequacy *out, struct level *level)
@@ -292,9 +288,9 @@ int adequacy_reach(struct adequacy *out, struct level *level)
 	n = n < 100000 ? 100000 : n > 500000 ? 500000 : n;
 	for (int round = 1;; round++) {
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
-		if (rc != PSR_OK || round == MOST_ROUNDS || 20000 * out->n_missing < out->n_trials)
+		if (rc != PSR_OK || round == MOST_ROUNDS || 15000 * out->n_missing < out->n_trials)
 			break;
-		rc = add_missing(level, out);
+		rc = add_missing(level, out, round);
 		free(out->spot);
 		out->spot = NULL;
 		if (rc != PSR_OK)

@@ -121,6 +121,7 @@ static int make_level(struct build *build, struct level *level)
 static int make_levels(struct build *build)
 {
 	struct cover finer = { 0 };
+	struct seen finer_seen = { 0 };
 	double sine, cosine, started = now();
 	int rc = PSR_OK;
 
@@ -133,14 +134,21 @@ static int make_levels(struct build *build)
 			                   .ds = build->draft.ds * (double)(1u << build->n_levels_done), .cosine = (float)cosine,
 			                   .n_projections = N_PROJECTIONS };
 
-		level.finer = build->n_levels_done > 0 ? &finer : NULL;
+		if (build->n_levels_done > 0) {
+			level.finer = &finer;
+			level.finer_seen = &finer_seen;
+		}
 		rc = make_level(build, &level);
 		cover_fini(&finer);
+		seen_fini(&finer_seen);
 		finer = level.cover;
+		finer_seen = level.seen;
 		level.cover = (struct cover){ 0 };
+		level.seen = (struct seen){ 0 };
 		level_fini(&level);
 	}
 	cover_fini(&finer);
+	seen_fini(&finer_seen);
 	build->report.seconds_select = now() - started - build->report.seconds_rays;
 	if (rc == PSR_ERR_MEMORY || rc == PSR_ERR_LIMIT)
 		return psr_fail(build->err, rc, "no memory to sample the mesh at resolution %u; use a lower one",

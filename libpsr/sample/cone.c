@@ -76,7 +76,7 @@ static void smallest_cap(struct cap *cap, const float (*normal)[3], int n)
 	}
 }
 
-static double least_cosine(const float (*normal)[3], int n, const float axis[3])
+static double least_cosine(const float (*normal)[3], int n, const double axis[3])
 {
 	double least = 1;
 
@@ -84,7 +84,7 @@ static double least_cosine(const float (*normal)[3], int n, const float axis[3])
 		double c = 0;
 
 		for (int k = 0; k < 3; k++)
-			c += (double)axis[k] * (double)normal[i][k];
+			c += axis[k] * (double)normal[i][k];
 		least = c < least ? c : least;
 	}
 	return least;
@@ -98,7 +98,8 @@ void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine)
 	if (n > 0) {
 		smallest_cap(&cap, normal, n);
 		v3f_set(axis, (float)cap.axis[0], (float)cap.axis[1], (float)cap.axis[2]);
-		least = least_cosine(normal, n, axis) - SLACK;
+		v3d_set(cap.axis, (double)axis[0], (double)axis[1], (double)axis[2]);
+		least = least_cosine(normal, n, cap.axis) - SLACK;
 	}
 	if (!(least > 0)) {
 		v3f_set(axis, 0, 0, 1);
@@ -107,23 +108,41 @@ void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine)
 	*cosine = (float)least;
 }
 
+void cone_pack(const float (*normal)[3], int n, int8_t axis[3], uint8_t *sine)
+{
+	float bound[3], cosine, greatest = 0;
+	double unit[3], least = -1;
+
+	cone_bound(normal, n, bound, &cosine);
+	for (int k = 0; k < 3; k++)
+		greatest = fmaxf(greatest, fabsf(bound[k]));
+	for (int k = 0; k < 3; k++) {
+		unit[k] = rint((double)bound[k] / (double)greatest * 127);
+		axis[k] = (int8_t)unit[k];
+	}
+	v3d_normalize(unit, unit);
+	if (cosine > 0)
+		least = least_cosine(normal, n, unit) - SLACK;
+	*sine = least > 0 ? (uint8_t)ceil(sqrt(1 - least * least) * 255) : PSR_CONE_ANY;
+}
+
 int cone_culls(const struct psr_blocks *blocks, uint32_t block, const float eye[3], int is_perspective)
 {
-	float cosine, sine, g = 0, length2 = 0, r = is_perspective ? blocks->sphere_r[block] : 0;
+	float g = 0, length2 = 0, axis2 = 0, center[3], radius, r;
 
-	if (blocks->cone_cos == NULL || (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
-		return 0;
-	cosine = blocks->cone_cos[block];
-	if (cosine <= 0)
+	if (blocks->cone_sine == NULL || blocks->cone_sine[block] == PSR_CONE_ANY
+	    || (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
 		return 0;
 	const float axis[3] = { blocks->cone_x[block], blocks->cone_y[block], blocks->cone_z[block] };
-	const float center[3] = { blocks->sphere_x[block], blocks->sphere_y[block], blocks->sphere_z[block] };
+
+	psr_blocks_sphere(blocks, block, center, &radius);
+	r = is_perspective ? radius : 0;
 	for (int k = 0; k < 3; k++) {
 		float d = is_perspective ? center[k] - eye[k] : -eye[k];
 
 		g += d * axis[k];
 		length2 += d * d;
+		axis2 += axis[k] * axis[k];
 	}
-	sine = sqrtf(1 - cosine * cosine);
-	return g > (sine + BACK_SINE) * sqrtf(length2) + r * (1 + BACK_SINE);
+	return g / sqrtf(axis2) > ((float)blocks->cone_sine[block] / 255 + BACK_SINE) * sqrtf(length2) + r * (1 + BACK_SINE);
 }

@@ -18,6 +18,13 @@
  * sample is seen from its front, whatever is done with shading normals. */
 void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine);
 
+/* The same as psr/model.h has it: the axis so long that its greatest component is 127 and the others rounded, which turns
+ * it by up to 0.32 degrees (half a unit in two components of a vector of 127 or more); around that a cap that still
+ * holds the normals, its sine rounded upwards. So the sine is at most 1/255 + 0.0056 + 0.0014 above that of the smallest cap:
+ * a step, the turn, and 2^-20 of the cosine for roundings. The sine and not the cosine, because the sine is what culling
+ * compares: the cosine of a nearly flat block, in steps of 1/255, would be 5 degrees off. */
+void cone_pack(const float (*normal)[3], int n, int8_t axis[3], uint8_t *sine);
+
 /* Whether the renderer may leave a block out because of its cone: with the arithmetic of render/cull.c less what that
  * allows for rounding, so that it culls no more than this says. eye: inner coordinates; if not is_perspective, a unit
  * vector to the viewer. */

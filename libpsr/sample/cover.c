@@ -1,28 +1,40 @@
+#include <assert.h>
 #include <math.h>
+#include <stdlib.h>
+#include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "cover.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 #define FREE UINT64_MAX
 
-struct cover_cell {
+/* 2 x 2 x 2 cells: what is asked for is mostly in one or two of them. */
+struct cover_brick {
 	uint64_t key;
-	uint32_t first;
+	uint32_t first[8]; /* points of its cells */
 };
 
-static uint64_t key_of(const int at[3])
+static uint64_t key_of(const int brick[3])
 {
-	return (uint64_t)(at[0] & 0x1fffff) | (uint64_t)(at[1] & 0x1fffff) << 21 | (uint64_t)(at[2] & 0x1fffff) << 42;
+	return (uint64_t)(brick[0] & 0x1fffff) | (uint64_t)(brick[1] & 0x1fffff) << 21 | (uint64_t)(brick[2] & 0x1fffff) << 42;
 }
 
-static struct cover_cell *find(const struct cover *cover, uint64_t key)
+static uint64_t key_of_cell(const int at[3])
 {
-	size_t i = (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 20) & (cover->table_size - 1);
+	return key_of((const int[3]){ at[0] >> 1, at[1] >> 1, at[2] >> 1 });
+}
+
+static int place_in_brick(const int at[3])
+{
+	return (at[0] & 1) | (at[1] & 1) << 1 | (at[2] & 1) << 2;
+}
+
+static struct cover_brick *find(const struct cover *cover, uint64_t key)
+{
+	size_t i = cell_place(key, cover->table_size);
 
 	while (cover->table[i].key != FREE && cover->table[i].key != key)
 		i = (i + 1) & (cover->table_size - 1);
@@ -55,7 +67,7 @@ void cover_fini(struct cover *cover)
 
 static int grow_table(struct cover *cover)
 {
-	struct cover_cell *old = cover->table;
+	struct cover_brick *old = cover->table;
 	size_t old_size = cover->table_size;
 
 	if (make_table(cover, 2 * old_size) != PSR_OK) {
@@ -69,14 +81,15 @@ static int grow_table(struct cover *cover)
 	return PSR_OK;
 }
 
-static int cell_at(const struct cover *cover, float x)
+static int cell_at(const struct cover *cover, double x)
 {
-	return (int)floor((double)x / cover->ds);
+	return (int)floor(x / cover->ds);
 }
 
 int cover_add(struct cover *cover, const struct cover_point *point)
 {
-	struct cover_cell *cell;
+	struct cover_brick *brick;
+	uint32_t *first;
 	int at[3];
 
 	if (cover->n_points == cover->capacity) {
@@ -88,52 +101,73 @@ int cover_add(struct cover *cover, const struct cover_point *point)
 		cover->point = grown;
 		cover->capacity = capacity;
 	}
-	if (4 * cover->n_cells >= 3 * cover->table_size && grow_table(cover) != PSR_OK)
+	if (4 * cover->n_bricks >= 3 * cover->table_size && grow_table(cover) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k < 3; k++)
-		at[k] = cell_at(cover, point->position[k]);
-	cell = find(cover, key_of(at));
-	if (cell->key == FREE) {
-		cell->key = key_of(at);
-		cell->first = COVER_NONE;
-		cover->n_cells++;
+		at[k] = cell_at(cover, (double)point->position[k]);
+	brick = find(cover, key_of_cell(at));
+	if (brick->key == FREE) {
+		brick->key = key_of_cell(at);
+		for (int i = 0; i < 8; i++)
+			brick->first[i] = COVER_NONE;
+		cover->n_bricks++;
 	}
+	first = &brick->first[place_in_brick(at)];
 	cover->point[cover->n_points] = *point;
-	cover->point[cover->n_points].next = cell->first;
-	cell->first = cover->n_points++;
+	cover->point[cover->n_points].next = *first;
+	*first = cover->n_points++;
 	return PSR_OK;
 }
 
 uint32_t cover_cell(const struct cover *cover, const int at[3])
 {
-	const struct cover_cell *cell = find(cover, key_of(at));
+	const struct cover_brick *brick = find(cover, key_of_cell(at));
 
-	return cell->key != FREE ? cell->first : COVER_NONE;
+	return brick->key != FREE ? brick->first[place_in_brick(at)] : COVER_NONE;
+}
+
+int cover_around(const struct cover *cover, const float p[3], double radius, uint32_t first[COVER_MOST_AROUND])
+{
+	int low[3], high[3], at[3], n = 0;
+
+	assert(radius <= 4 * cover->ds);
+	for (int k = 0; k < 3; k++) {
+		low[k] = cell_at(cover, (double)p[k] - radius);
+		high[k] = cell_at(cover, (double)p[k] + radius);
+	}
+	for (at[2] = low[2] >> 1; at[2] <= high[2] >> 1; at[2]++) {
+		for (at[1] = low[1] >> 1; at[1] <= high[1] >> 1; at[1]++) {
+			for (at[0] = low[0] >> 1; at[0] <= high[0] >> 1; at[0]++) {
+				const struct cover_brick *brick = find(cover, key_of(at));
+
+				for (int i = 0; brick->key != FREE && i < 8; i++) {
+					int x = 2 * at[0] + (i & 1), y = 2 * at[1] + (i >> 1 & 1), z = 2 * at[2] + (i >> 2);
+
+					if (brick->first[i] != COVER_NONE && x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1]
+					    && z >= low[2] && z <= high[2])
+						first[n++] = brick->first[i];
+				}
+			}
+		}
+	}
+	return n;
 }
 
 int cover_is_near(const struct cover *cover, const float p[3], const float n[3], double radius)
 {
 	const float (*direction)[3] = psr_direction_table();
 	const float radius2 = (float)(radius * radius);
-	int low[3], high[3], at[3];
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(cover, p, radius, first);
 
-	for (int k = 0; k < 3; k++) {
-		low[k] = cell_at(cover, p[k] - (float)radius);
-		high[k] = cell_at(cover, p[k] + (float)radius);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				for (uint32_t i = cover_cell(cover, at); i != COVER_NONE; i = cover->point[i].next) {
-					const struct cover_point *point = &cover->point[i];
-					float d[3];
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = cover->point[i].next) {
+			const struct cover_point *point = &cover->point[i];
+			float d[3];
 
-					v3f_sub(d, point->position, p);
-					if (v3f_dot(d, d) <= radius2
-					    && (point->two_sided || v3f_dot(direction[point->normal], n) > 0.6f))
-						return 1;
-				}
-			}
+			v3f_sub(d, point->position, p);
+			if (v3f_dot(d, d) <= radius2 && (point->two_sided || v3f_dot(direction[point->normal], n) > 0.6f))
+				return 1;
 		}
 	}
 	return 0;

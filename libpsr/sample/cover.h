@@ -19,8 +19,8 @@ struct cover {
 	double ds;           /* cells are as wide as a pixel */
 	struct cover_point *point;
 	uint32_t n_points, capacity;
-	struct cover_cell *table;
-	size_t n_cells, table_size;
+	struct cover_brick *table;
+	size_t n_bricks, table_size;
 };
 
 int cover_init(struct cover *cover, double ds); /* MEMORY; cover_fini() either way */
@@ -31,6 +31,10 @@ int cover_add(struct cover *cover, const struct cover_point *point); /* `next` i
 
 /* First point of the cell of integer coordinates at (position / ds, rounded down); COVER_NONE. */
 uint32_t cover_cell(const struct cover *cover, const int at[3]);
+
+/* First points of all cells with any that the cube of half-side radius <= 4 ds around p touches; returns how many. */
+#define COVER_MOST_AROUND 729
+int cover_around(const struct cover *cover, const float p[3], double radius, uint32_t first[COVER_MOST_AROUND]);
 
 /* Whether a point that faces like n lies within radius <= ds of p. */
 int cover_is_near(const struct cover *cover, const float p[3], const float n[3], double radius);

@@ -11,6 +11,10 @@
  * apart. */
 #define STEP 0.33
 
+/* Where between the lines of such a grid they are, by round: what is smaller than a step shows in one of them. */
+static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
+#define N_SHIFTS (int)(sizeof SHIFT / sizeof *SHIFT)
+
 /* A kept sample within half a pixel is in every pixel that has the place in its middle. */
 #define NEAR 0.5
 
@@ -18,11 +22,15 @@
  * corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
+/* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another one. */
+#define OFF_TRIANGLE 0.4
+
 #define N_TRIES 10
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 #define N_TRIANGLES 3
-#define DEAD_PATCH 8 /* a new block costs as much as this many samples more in one that is there */
+#define CHEAP 7      /* an offer that needs no new block */
+#define DEAD_PATCH 12 /* a new block costs as much as this many samples more in one that is there */
 
 /* In samples, as offers are compared. A moved sample is off by half a pixel. */
 #define SNAP 3
@@ -94,21 +102,24 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 	}
 }
 
-static int is_triangle(const struct level *level, const struct corner corner[3])
+/* Whether the corners make a triangle that is small enough, and the spot is on it, not on something beside it. */
+static int is_triangle(const struct level *level, const struct surface_spot *spot, const struct corner corner[3])
 {
 	const float most = (float)(LONGEST_SIDE * LONGEST_SIDE * level->ds * level->ds);
+	float d[3][3], n[3], off[3], away;
 
 	for (int i = 0; i < 3; i++)
 		if (corner[i].ref.patch == SHEET_NONE)
 			return 0;
 	for (int i = 0; i < 3; i++) {
-		float d[3];
-
-		v3f_sub(d, corner[i].position, corner[(i + 1) % 3].position);
-		if (v3f_dot(d, d) > most)
+		v3f_sub(d[i], corner[i].position, corner[(i + 1) % 3].position);
+		if (v3f_dot(d[i], d[i]) > most)
 			return 0;
 	}
-	return 1;
+	v3f_cross(n, d[0], d[1]);
+	v3f_sub(off, spot->p, corner[0].position);
+	away = v3f_dot(off, n);
+	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * level->ds * level->ds) * v3f_dot(n, n);
 }
 
 static int is_covered(const struct level *level, const struct surface_spot *spot)
@@ -122,7 +133,7 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 		struct corner corner[3];
 
 		find_corners(level, tries.projection[i], spot, corner);
-		if (is_triangle(level, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
+		if (is_triangle(level, spot, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
 			return 1;
 	}
 	return 0;
@@ -132,6 +143,14 @@ static int keep_corner(struct level *level, unsigned projection, const struct co
 {
 	level->n_added += (uint64_t)!corner->is_kept;
 	return keep_sample(level, (struct level_ref){ projection, corner->ref });
+}
+
+/* A patch of which nothing is kept yet costs a block, shared by all places that could use it. */
+static float opening_cost(const struct level *level, unsigned projection, const struct corner *corner)
+{
+	const struct patch *patch = &level->sheets[projection].patch[corner->ref.patch];
+
+	return patch->is_alive ? 0 : DEAD_PATCH + 4.0f / (float)(1 + patch->n_wanted);
 }
 
 /* What would cover a spot, and what it costs in samples. */
@@ -149,17 +168,16 @@ static void offer_triangle(const struct level *level, const struct surface_spot 
 {
 	for (int i = 0; i < tries->n && i < N_TRIANGLES; i++) {
 		struct corner corner[3];
-		int is_dead = 0;
-		float cost = (float)i / 2;
+		float cost = (float)i / 2, opening = 0;
 
 		find_corners(level, tries->projection[i], spot, corner);
-		if (!is_triangle(level, corner))
+		if (!is_triangle(level, spot, corner))
 			continue;
 		for (int k = 0; k < 3; k++) {
 			cost += corner[k].is_kept ? 0 : 0.5f;
-			is_dead |= !corner[k].is_alive;
+			opening = fmaxf(opening, opening_cost(level, tries->projection[i], &corner[k]));
 		}
-		cost += is_dead ? DEAD_PATCH : 0;
+		cost += opening;
 		if (cost < best->cost) {
 			*best = (struct offer){ .projection = tries->projection[i], .n = 3, .cost = cost };
 			memcpy(best->corner, corner, sizeof corner);
@@ -180,7 +198,7 @@ static void offer_nearest(const struct level *level, const struct surface_spot *
 
 			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
 				continue;
-			cost = 1.5f + distance / 4 + (float)i / 2 + (corner[k].is_alive ? 0 : DEAD_PATCH);
+			cost = 1.5f + distance / 4 + (float)i / 2 + opening_cost(level, tries->projection[i], &corner[k]);
 			if (cost < best->cost)
 				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .cost = cost,
 					                    .corner = { corner[k] } };
@@ -236,18 +254,23 @@ static int keep_snapped(struct level *level, const struct surface_spot *spot, co
 	return keep_sample(level, ref);
 }
 
-int dice_cover(struct level *level, const struct surface_spot *spot)
+/* Keeps what costs least, if it costs at most so much; or tells that it does not. */
+static int cover_spot(struct level *level, const struct surface_spot *spot, float most, int *is_left)
 {
 	struct offer best = { .cost = INFINITY };
 	struct tries tries;
 	int rc = PSR_OK;
 
+	*is_left = 0;
 	list_tries(level, spot, &tries);
 	if (tries.n == 0)
 		return PSR_OK;
 	offer_triangle(level, spot, &tries, &best);
 	offer_nearest(level, spot, &tries, &best);
 	offer_snap(level, spot, &tries, &best);
+	*is_left = best.cost > most;
+	if (*is_left)
+		return PSR_OK;
 	if (best.is_snap)
 		return keep_snapped(level, spot, &best);
 	for (int k = 0; rc == PSR_OK && k < best.n; k++)
@@ -255,7 +278,39 @@ int dice_cover(struct level *level, const struct surface_spot *spot)
 	return rc;
 }
 
+int dice_cover(struct level *level, const struct surface_spot *spot)
+{
+	int is_left;
+
+	return cover_spot(level, spot, INFINITY, &is_left);
+}
+
+/* Counts a place for each patch that could cover it. */
+static void ask_for_patches(struct level *level, const struct surface_spot *spot)
+{
+	const float near2 = (float)(NEAR * NEAR * level->ds * level->ds);
+	struct tries tries;
+
+	list_tries(level, spot, &tries);
+	for (int i = 0; i < tries.n; i++) {
+		struct sheets *sheets = &level->sheets[tries.projection[i]];
+		uint32_t last = SHEET_NONE;
+		struct corner corner[3];
+
+		find_corners(level, tries.projection[i], spot, corner);
+		for (int k = 0; k < 3; k++) {
+			uint32_t p = corner[k].ref.patch;
+
+			if (p == SHEET_NONE || p == last || corner[k].distance2 > near2 || sheets->patch[p].n_wanted == UINT16_MAX)
+				continue;
+			sheets->patch[p].n_wanted++;
+			last = p;
+		}
+	}
+}
+
 /* ---- all places of the surface ---- */
+
 
 struct list {
 	struct surface_spot *spot;
@@ -279,32 +334,43 @@ static void add_spot(struct list *list, const struct surface_spot *spot)
 	list->spot[list->n++] = *spot;
 }
 
-/* Tests a place, on the side on which it is to be sampled; the other one too as long as it is not known to be hidden. */
-static void test_place(const struct level *level, uint32_t prim, const float p[3], struct list *list)
+struct job {
+	const struct level *level;
+	struct list *list; /* of each chunk */
+	uint32_t n_prims;
+	int round;
+};
+
+/* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for until
+ * more was seen. */
+static void test_place(const struct job *job, uint32_t prim, const float p[3], struct list *list)
 {
+	const struct level *level = job->level;
 	uint8_t sides = level->sides[prim];
 	const float *front = ray_scene_normal(level->scene, prim);
-	int is_two_sided = level_material(level, prim)->two_sided != 0;
+	int is_two_sided = level_material(level, prim)->two_sided != 0, is_side_seen = 0;
 
 	for (int back = 0; back <= is_two_sided; back++) {
 		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
 		struct surface_spot spot = { .surface = prim | (back ? SHEET_BACK : 0) };
 
-		if ((sides & hidden) != 0 && (sides & seen) == 0)
+		if (job->round == 0 && (sides & hidden) != 0 && (sides & seen) == 0)
+			continue;
+		/* What is kept for the front counts. */
+		if (back && is_side_seen && level_is_two_sided(level, prim, p, front))
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		if (is_covered(level, &spot))
-			return;
-		if (seen_is(&level->seen, spot.p, spot.n)) {
+		is_side_seen = seen_is(&level->seen, spot.p, spot.n);
+		if (is_side_seen && !is_covered(level, &spot))
 			add_spot(list, &spot);
-			return;
-		}
 	}
 }
 
-static void dice_triangle(const struct level *level, uint32_t prim, struct list *list)
+static void dice_triangle(const struct job *job, uint32_t prim, struct list *list)
 {
+	const struct level *level = job->level;
+	const double shift = SHIFT[job->round % N_SHIFTS];
 	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_rows;
 	double corner[3][3], side[3], e[3], height, step = STEP * level->ds;
 
@@ -325,12 +391,12 @@ static void dice_triangle(const struct level *level, uint32_t prim, struct list 
 	n_rows = (int)ceil(height / step);
 	n_rows = n_rows > 1 ? n_rows : 1;
 	for (int r = 0; r < n_rows; r++) {
-		double t = (r + 0.5) / n_rows;
+		double t = (r + shift) / n_rows;
 		int n = (int)ceil(side[longest] * (1 - t) / step);
 
 		n = n > 1 ? n : 1;
 		for (int i = 0; i < n; i++) {
-			double w[3], s = (i + 0.5) / n * (1 - t);
+			double w[3], s = (i + shift) / n * (1 - t);
 			float p[3];
 
 			w[longest] = 1 - s - t;
@@ -340,14 +406,16 @@ static void dice_triangle(const struct level *level, uint32_t prim, struct list 
 				continue;
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);
-			test_place(level, prim, p, list);
+			test_place(job, prim, p, list);
 		}
 	}
 }
 
 /* A disc: the crossings of a square grid around its centre. */
-static void dice_disc(const struct level *level, uint32_t prim, struct list *list)
+static void dice_disc(const struct job *job, uint32_t prim, struct list *list)
 {
+	const struct level *level = job->level;
+	const double shift = SHIFT[job->round % N_SHIFTS] - 0.5;
 	const struct psr_mesh *mesh = level->mesh;
 	const float *n = ray_scene_normal(level->scene, prim);
 	double radius = (double)mesh->point_radius[prim - mesh->n_triangles] / level->surface->scale, step = STEP * level->ds;
@@ -361,20 +429,16 @@ static void dice_disc(const struct level *level, uint32_t prim, struct list *lis
 		for (int k = -reach; k <= reach; k++) {
 			float p[3];
 
-			if ((i * i + k * k) * step * step > radius * radius)
+			double x = (i + shift) * step, y = (k + shift) * step;
+
+			if (x * x + y * y > radius * radius)
 				continue;
 			for (int a = 0; a < 3; a++)
-				p[a] = (float)(center[a] + step * (i * frame[0][a] + k * frame[1][a]));
-			test_place(level, prim, p, list);
+				p[a] = (float)(center[a] + x * frame[0][a] + y * frame[1][a]);
+			test_place(job, prim, p, list);
 		}
 	}
 }
-
-struct job {
-	const struct level *level;
-	struct list *list; /* of each chunk */
-	uint32_t n_prims;
-};
 
 #define CHUNK 2048
 
@@ -390,29 +454,57 @@ static void dice_chunk(int i, void *userdata)
 		if (n[0] == 0 && n[1] == 0 && n[2] == 0)
 			continue;
 		if (prim < mesh->n_triangles)
-			dice_triangle(job->level, prim, &job->list[i]);
+			dice_triangle(job, prim, &job->list[i]);
 		else
-			dice_disc(job->level, prim, &job->list[i]);
+			dice_disc(job, prim, &job->list[i]);
 	}
 }
 
-int dice_surface(struct level *level)
+/* In a fixed order, one at a time: what one place adds may cover the next. What costs more than `most` is left. */
+static int cover_list(struct level *level, struct list *list, float most)
 {
-	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points };
+	int rc = list->failed ? PSR_ERR_MEMORY : PSR_OK;
+	size_t n = 0;
+
+	for (size_t k = 0; rc == PSR_OK && k < list->n; k++) {
+		int is_left = 0;
+
+		if (!is_covered(level, &list->spot[k]))
+			rc = cover_spot(level, &list->spot[k], most, &is_left);
+		if (is_left)
+			list->spot[n++] = list->spot[k];
+	}
+	list->n = n;
+	return rc;
+}
+
+/* First what blocks that are there can cover; then new ones are opened, those first that most of the rest could use. */
+static int cover_lists(struct level *level, struct list *list, int n)
+{
+	int rc = PSR_OK;
+
+	for (int i = 0; rc == PSR_OK && i < n; i++)
+		rc = cover_list(level, &list[i], CHEAP);
+	for (int i = 0; rc == PSR_OK && i < n; i++)
+		for (size_t k = 0; k < list[i].n; k++)
+			ask_for_patches(level, &list[i].spot[k]);
+	for (int i = 0; rc == PSR_OK && i < n; i++)
+		rc = cover_list(level, &list[i], INFINITY);
+	return rc;
+}
+
+int dice_surface(struct level *level, int round)
+{
+	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points, .round = round };
 	int n_chunks = (int)((job.n_prims + CHUNK - 1) / CHUNK), rc = PSR_OK;
 
 	job.list = calloc((size_t)n_chunks, sizeof *job.list);
 	if (job.list == NULL)
 		return PSR_ERR_MEMORY;
 	psr_pool_for(level->pool, n_chunks, dice_chunk, &job);
-	for (int i = 0; i < n_chunks; i++) {
-		if (job.list[i].failed)
-			rc = PSR_ERR_MEMORY;
-		for (size_t k = 0; rc == PSR_OK && k < job.list[i].n; k++)
-			if (!is_covered(level, &job.list[i].spot[k]))
-				rc = dice_cover(level, &job.list[i].spot[k]);
+	rc = cover_lists(level, job.list, n_chunks);
+	for (int i = 0; i < n_chunks; i++)
 		free(job.list[i].spot);
-	}
 	free(job.list);
 	return rc;
 }

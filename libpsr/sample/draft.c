@@ -56,19 +56,6 @@ static uint32_t count_kept(const struct level *level)
 	return n;
 }
 
-static uint8_t is_two_sided(const struct level *level, const struct sheets *sheets, uint32_t p)
-{
-	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
-
-	for (uint64_t left = sheets->patch[p].kept; left != 0; left &= left - 1) {
-		uint32_t prim = sheets->sample[p][__builtin_ctzll(left)].surface & ~SHEET_BACK;
-
-		if ((level->sides[prim] & both) == both)
-			return 1;
-	}
-	return 0;
-}
-
 /* Sets block_of[i][p], the number of a patch's block. */
 static void add_blocks(struct draft *draft, const struct level *level, uint32_t *const *block_of)
 {
@@ -84,7 +71,7 @@ static void add_blocks(struct draft *draft, const struct level *level, uint32_t 
 				continue;
 			*block = (struct draft_block){ .projection = (uint16_t)i, .col = patch->col, .row = patch->row,
 				                           .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
-				                           .two_sided = is_two_sided(level, sheets, p), .first = k };
+				                           .first = k };
 			for (uint64_t left = patch->kept; left != 0; left &= left - 1, k++) {
 				const struct sheet_sample *sample = &sheets->sample[p][__builtin_ctzll(left)];
 
@@ -100,8 +87,9 @@ static void set_attributes(struct draft *draft, const struct level *level, uint3
 {
 	for (uint32_t i = 0; i < level->cover.n_points; i++) {
 		const struct cover_point *point = &level->cover.point[i];
-		const struct draft_block *block = &draft->block[block_of[point->projection][point->patch]];
+		struct draft_block *block = &draft->block[block_of[point->projection][point->patch]];
 
+		block->two_sided |= point->two_sided;
 		draft->sample[draft_sample(draft, block, point->sample) - draft->sample].attr = point->attr;
 	}
 }

@@ -35,9 +35,10 @@ void draft_fini(struct draft *draft);
 /* Adds the next level. MEMORY, LIMIT. */
 int draft_add(struct draft *draft, const struct level *level);
 
-/* Cuts the finest level into groups of at most 1024 blocks that lie together, and each coarser one into blocks of the same
- * groups: a group has all samples within a pixel, at that level, of its finest samples, so that pieces drawn at different
- * levels overlap. MEMORY. */
+/* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has all
+ * samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different levels
+ * meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they share do
+ * not cost too much: where surfaces lie all through each other (leaves), that may be one group. MEMORY. */
 int draft_group(struct draft *draft);
 
 /* Inner coordinates of sample s of a block. */

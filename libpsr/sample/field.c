@@ -3,6 +3,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "field.h"
 #include "psr/error.h"
 
@@ -13,15 +14,9 @@ static uint64_t key_of(int x, int y, int z)
 	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
 }
 
-static size_t hash_of(uint64_t key, size_t capacity)
-{
-	key *= UINT64_C(0x9e3779b97f4a7c15);
-	return (size_t)(key >> 20) & (capacity - 1);
-}
-
 static struct field_cell *find(const struct field *field, uint64_t key)
 {
-	size_t i = hash_of(key, field->capacity);
+	size_t i = cell_place(key, field->capacity);
 
 	while (field->table[i].key != FREE && field->table[i].key != key)
 		i = (i + 1) & (field->capacity - 1);
@@ -112,9 +107,12 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 		float w = weight[0][i & 1] * weight[1][i >> 1 & 1] * weight[2][i >> 2];
 
 		for (int l = 0; cell->key != FREE && l < FIELD_LOBES; l++) {
-			float lobe[3] = { (float)cell->lobe[l][0], (float)cell->lobe[l][1], (float)cell->lobe[l][2] };
-			float g = v3f_dot(lobe, n);
+			const int32_t *sums = cell->lobe[l];
+			float lobe[3] = { (float)sums[0], (float)sums[1], (float)sums[2] }, g;
 
+			if ((sums[0] | sums[1] | sums[2]) == 0)
+				continue;
+			g = v3f_dot(lobe, n);
 			/* What faces within some 70 degrees of n counts. */
 			if (g > 0 && g * g > 0.1f * v3f_dot(lobe, lobe))
 				v3f_add_scaled(sum, sum, w, lobe);

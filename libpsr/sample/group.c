@@ -5,48 +5,73 @@
 #include "draft.h"
 #include "psr/error.h"
 
-#define GROUP_BLOCKS 1024
-#define MOST_PARTS 64 /* groups that can share a block of a coarse level */
+#define LEAST_GROUP 131072 /* samples of the finest level */
+#define MOST_GROWTH 1.25   /* of the number of blocks, by those that groups share */
+#define CELLS 4 /* that a coarse pixel is wide */
+#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
+#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
+
+/* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
+ * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
+#define WHOLE_STEPS 10
+#define WHOLE PSR_BLOCK_SAMPLES
 
 struct place {
 	float center[3];
-	uint32_t block;
-	int axis; /* to compare by */
+	uint32_t block, group;
+	uint8_t sample, n_samples; /* sample: WHOLE of a whole block */
+	uint8_t axis;              /* to compare by */
 };
+
+static int compare_owners(const struct place *x, const struct place *y)
+{
+	return x->block != y->block ? (x->block < y->block ? -1 : 1) : (int)x->sample - (int)y->sample;
+}
 
 static int compare_places(const void *a, const void *b)
 {
 	const struct place *x = a, *y = b;
 	float p = x->center[x->axis], q = y->center[y->axis];
 
-	return p != q ? (p < q ? -1 : 1) : x->block < y->block ? -1 : x->block > y->block;
+	return p != q ? (p < q ? -1 : 1) : compare_owners(x, y);
+}
+
+static int compare_groups(const void *a, const void *b)
+{
+	const struct place *x = a, *y = b;
+
+	if (x->block == y->block && x->group != y->group)
+		return x->group < y->group ? -1 : 1;
+	return compare_owners(x, y);
 }
 
 /* Halves along the longest side of the box of the centres, until a part is small enough. */
-static void cut(struct draft *draft, struct place *place, uint32_t n)
+static void cut(struct draft *draft, struct place *place, uint32_t n, uint32_t most)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
-	int axis = 0;
+	uint64_t n_samples = 0;
+	uint8_t axis = 0;
 
-	if (n <= GROUP_BLOCKS) {
-		for (uint32_t i = 0; i < n; i++)
-			draft->block[place[i].block].group = draft->n_groups;
-		draft->n_groups++;
-		return;
-	}
 	for (uint32_t i = 0; i < n; i++) {
+		n_samples += place[i].n_samples;
 		for (int k = 0; k < 3; k++) {
 			min[k] = fminf(min[k], place[i].center[k]);
 			max[k] = fmaxf(max[k], place[i].center[k]);
 		}
 	}
-	for (int k = 1; k < 3; k++)
+	if (n_samples <= most) {
+		for (uint32_t i = 0; i < n; i++)
+			place[i].group = draft->n_groups;
+		draft->n_groups++;
+		return;
+	}
+	for (uint8_t k = 1; k < 3; k++)
 		axis = max[k] - min[k] > max[axis] - min[axis] ? k : axis;
 	for (uint32_t i = 0; i < n; i++)
 		place[i].axis = axis;
 	qsort(place, n, sizeof *place, compare_places);
-	cut(draft, place, n / 2);
-	cut(draft, place + n / 2, n - n / 2);
+	cut(draft, place, n / 2, most);
+	cut(draft, place + n / 2, n - n / 2, most);
 }
 
 static void center_of(const struct draft *draft, const struct draft_block *block, float center[3])
@@ -62,102 +87,58 @@ static void center_of(const struct draft *draft, const struct draft_block *block
 	}
 }
 
-static int cut_finest(struct draft *draft, uint32_t n)
+static int is_whole(const struct draft *draft, const struct draft_block *block)
 {
-	struct place *place = malloc((n != 0 ? n : 1) * sizeof *place);
+	float low = INFINITY, high = -INFINITY;
 
-	if (place == NULL)
-		return PSR_ERR_MEMORY;
-	for (uint32_t i = 0; i < n; i++) {
-		place[i].block = i;
-		center_of(draft, &draft->block[i], place[i].center);
+	for (uint64_t left = block->part; left != 0; left &= left - 1) {
+		float z = draft_sample(draft, block, (unsigned)__builtin_ctzll(left))->z;
+
+		low = fminf(low, z);
+		high = fmaxf(high, z);
 	}
-	draft->n_groups = 0;
-	cut(draft, place, n);
-	free(place);
-	return PSR_OK;
+	return high - low <= WHOLE_STEPS * draft->projection[block->projection].spacing;
 }
 
-/* Which groups have fine samples in each cell of a pixel of a coarse level: points of a cover, one a group and cell. */
-static int map_groups(struct cover *map, const struct draft *draft, uint32_t n_finest)
+/* Of whole blocks, or of single samples; returns how many. place may be NULL. */
+static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct place *place)
 {
+	uint32_t n = 0;
+
 	for (uint32_t b = 0; b < n_finest; b++) {
 		const struct draft_block *block = &draft->block[b];
 
-		for (uint64_t left = block->mask; left != 0; left &= left - 1) {
-			struct cover_point point = { .patch = block->group };
-			uint32_t i;
-			int at[3];
-
-			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
-			for (int k = 0; k < 3; k++)
-				at[k] = (int)floor((double)point.position[k] / map->ds);
-			for (i = cover_cell(map, at); i != COVER_NONE && map->point[i].patch != block->group; i = map->point[i].next)
-				;
-			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
-				return PSR_ERR_MEMORY;
-		}
-	}
-	return PSR_OK;
-}
-
-struct parts {
-	uint32_t group[MOST_PARTS];
-	uint64_t part[MOST_PARTS];
-	int n;
-};
-
-static void add_part(struct parts *parts, uint32_t group, unsigned s)
-{
-	int i = 0;
-
-	while (i < parts->n && parts->group[i] != group)
-		i++;
-	if (i == MOST_PARTS)
-		return;
-	if (i == parts->n) {
-		parts->group[parts->n] = group;
-		parts->part[parts->n++] = 0;
-	}
-	parts->part[i] |= UINT64_C(1) << s;
-}
-
-/* All groups with a cell within `reach` of a sample. */
-static void find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
-{
-	int at[3], low[3], high[3];
-
-	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)p[k] - reach) / map->ds);
-		high[k] = (int)floor(((double)p[k] + reach) / map->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				double away2 = 0;
-
-				for (int k = 0; k < 3; k++) {
-					double below = at[k] * map->ds - (double)p[k], above = (double)p[k] - (at[k] + 1) * map->ds;
-					double away = below > 0 ? below : above > 0 ? above : 0;
-
-					away2 += away * away;
-				}
-				if (away2 > reach * reach)
-					continue;
-				for (uint32_t i = cover_cell(map, at); i != COVER_NONE; i = map->point[i].next)
-					add_part(parts, map->point[i].patch, s);
+		if (is_whole(draft, block)) {
+			if (place != NULL) {
+				place[n] = (struct place){ .block = b, .sample = WHOLE };
+				place[n].n_samples = (uint8_t)__builtin_popcountll(block->part);
+				center_of(draft, block, place[n].center);
 			}
+			n++;
+			continue;
+		}
+		for (uint64_t left = block->part; left != 0; left &= left - 1, n++) {
+			if (place == NULL)
+				continue;
+			place[n] = (struct place){ .block = b, .sample = (uint8_t)__builtin_ctzll(left), .n_samples = 1 };
+			draft_position(draft, block, place[n].sample, place[n].center);
 		}
 	}
+	return n;
 }
 
 struct blocks {
 	struct draft_block *block;
-	uint32_t n, capacity;
+	uint32_t n, capacity, most;
+	int is_over; /* there would be more */
 };
 
 static int add_block(struct blocks *blocks, const struct draft_block *block)
 {
+	if (blocks->n == blocks->most) {
+		blocks->is_over = 1;
+		return PSR_OK;
+	}
 	if (blocks->n == blocks->capacity) {
 		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
 		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
@@ -171,59 +152,198 @@ static int add_block(struct blocks *blocks, const struct draft_block *block)
 	return PSR_OK;
 }
 
-static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
-                       const struct cover *map)
+/* A block for each group that has some of a finest one, in the order of these. */
+static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
 {
-	struct parts parts = { .n = 0 };
+	uint32_t n = list_places(draft, n_finest, NULL);
+	struct place *place = malloc(((size_t)n + 1) * sizeof *place);
+	int rc = PSR_OK;
 
-	for (uint64_t left = block->mask; left != 0; left &= left - 1) {
-		unsigned s = (unsigned)__builtin_ctzll(left);
-		int n = parts.n;
-		float p[3];
+	if (place == NULL)
+		return PSR_ERR_MEMORY;
+	list_places(draft, n_finest, place);
+	draft->n_groups = 0;
+	cut(draft, place, n, most);
+	qsort(place, n, sizeof *place, compare_groups);
+	for (uint32_t i = 0; rc == PSR_OK && i < n;) {
+		struct draft_block piece = draft->block[place[i].block];
+		uint32_t first = i;
 
-		draft_position(draft, block, s, p);
-		find_groups(map, p, map->ds, s, &parts);
-		if (n == 0 && parts.n == 0)
-			find_groups(map, p, 3 * map->ds, s, &parts);
+		piece.group = place[i].group;
+		if (place[i].sample != WHOLE)
+			piece.part = 0;
+		for (; i < n && place[i].block == place[first].block && place[i].group == piece.group; i++)
+			piece.part |= place[i].sample != WHOLE ? UINT64_C(1) << place[i].sample : 0;
+		rc = add_block(blocks, &piece);
 	}
-	for (int i = 0; i < parts.n; i++) {
-		struct draft_block part = *block;
+	free(place);
+	return rc;
+}
 
-		part.group = parts.group[i];
-		part.part = parts.part[i];
-		if (add_block(blocks, &part) != PSR_OK)
-			return PSR_ERR_MEMORY;
+/* Which groups have fine samples in each cell of a coarse level: points of a cover, one a group and cell. */
+static int map_groups(struct cover *map, const struct draft *draft, const struct blocks *finest, uint32_t n)
+{
+	for (uint32_t b = 0; b < n; b++) {
+		const struct draft_block *block = &finest->block[b];
+
+		for (uint64_t left = block->part; left != 0; left &= left - 1) {
+			struct cover_point point = { .patch = block->group };
+			uint32_t i;
+			int at[3];
+
+			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
+			for (int k = 0; k < 3; k++)
+				at[k] = (int)floor((double)point.position[k] / map->ds);
+			i = cover_cell(map, at);
+			while (i != COVER_NONE && map->point[i].patch != block->group)
+				i = map->point[i].next;
+			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
+				return PSR_ERR_MEMORY;
+		}
 	}
 	return PSR_OK;
 }
 
-static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest)
+/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
+struct part {
+	uint32_t group;
+	uint64_t mask;
+};
+
+struct parts {
+	struct part *part;
+	uint32_t n, capacity;
+};
+
+static int add_part(struct parts *parts, uint32_t group, unsigned s)
 {
+	uint32_t i = 0;
+
+	while (i < parts->n && parts->part[i].group != group)
+		i++;
+	if (i == parts->capacity) {
+		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
+		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		parts->part = grown;
+		parts->capacity = capacity;
+	}
+	if (i == parts->n)
+		parts->part[parts->n++] = (struct part){ group, 0 };
+	parts->part[i].mask |= UINT64_C(1) << s;
+	return PSR_OK;
+}
+
+/* From p to the nearest place of a point's cell. */
+static double distance2(const struct cover *map, const struct cover_point *point, const float p[3])
+{
+	double sum = 0;
+
+	for (int k = 0; k < 3; k++) {
+		double low = floor((double)point->position[k] / map->ds) * map->ds, x = (double)p[k];
+		double away = x < low ? low - x : x > low + map->ds ? x - low - map->ds : 0;
+
+		sum += away * away;
+	}
+	return sum;
+}
+
+/* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
+static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+{
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(map, p, reach, first), n = 0;
+
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next) {
+			if (distance2(map, &map->point[i], p) > reach * reach)
+				continue;
+			if (add_part(parts, map->point[i].patch, s) != PSR_OK)
+				return PSR_ERR_MEMORY;
+			n++;
+		}
+	}
+	return n;
+}
+
+static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
+                       const struct cover *map, struct parts *parts)
+{
+	int rc = PSR_OK;
+
+	parts->n = 0;
+	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
+		unsigned s = (unsigned)__builtin_ctzll(left);
+		float p[3];
+		int n;
+
+		draft_position(draft, block, s, p);
+		n = find_groups(map, p, REACH * map->ds, s, parts);
+		if (n == 0)
+			n = find_groups(map, p, FAR * map->ds, s, parts);
+		rc = n < 0 ? n : PSR_OK;
+	}
+	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
+		struct draft_block part = *block;
+
+		part.group = parts->part[i].group;
+		part.part = parts->part[i].mask;
+		rc = add_block(blocks, &part);
+	}
+	return rc;
+}
+
+static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
+                       uint32_t n_pieces)
+{
+	struct parts parts = { NULL, 0, 0 };
 	struct cover map;
-	int rc = cover_init(&map, draft->ds * (double)(1u << level));
+	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
 
 	if (rc == PSR_OK)
-		rc = map_groups(&map, draft, n_finest);
-	for (uint32_t b = n_finest; rc == PSR_OK && b < draft->n_blocks; b++)
+		rc = map_groups(&map, draft, blocks, n_pieces);
+	for (uint32_t b = n_finest; rc == PSR_OK && !blocks->is_over && b < draft->n_blocks; b++)
 		if (draft->block[b].level == level)
-			rc = split_block(blocks, draft, &draft->block[b], &map);
+			rc = split_block(blocks, draft, &draft->block[b], &map, &parts);
 	cover_fini(&map);
+	free(parts.part);
+	return rc;
+}
+
+/* The blocks of all levels, for groups of at most so many samples. */
+static int make_blocks(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
+{
+	uint32_t n_pieces;
+	int rc;
+
+	blocks->n = 0;
+	blocks->is_over = 0;
+	blocks->most = (uint32_t)(MOST_GROWTH * (double)draft->n_blocks);
+	rc = cut_finest(blocks, draft, n_finest, most);
+	n_pieces = blocks->n;
+	for (uint32_t b = n_finest; rc == PSR_OK && draft->n_groups == 1 && b < draft->n_blocks; b++)
+		rc = add_block(blocks, &draft->block[b]);
+	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && level < draft->n_levels; level++)
+		rc = split_level(blocks, draft, level, n_finest, n_pieces);
 	return rc;
 }
 
 int draft_group(struct draft *draft)
 {
-	struct blocks blocks = { NULL, 0, 0 };
+	struct blocks blocks = { .block = NULL };
 	uint32_t n_finest = 0;
-	int rc;
+	int rc = PSR_OK;
 
 	while (n_finest < draft->n_blocks && draft->block[n_finest].level == 0)
 		n_finest++;
-	rc = cut_finest(draft, n_finest);
-	for (uint32_t b = 0; rc == PSR_OK && b < n_finest; b++)
-		rc = add_block(&blocks, &draft->block[b]);
-	for (unsigned level = 1; rc == PSR_OK && level < draft->n_levels; level++)
-		rc = split_level(&blocks, draft, level, n_finest);
+	/* One group shares nothing. */
+	for (uint32_t most = LEAST_GROUP; rc == PSR_OK; most = most < UINT32_MAX / 2 ? 2 * most : UINT32_MAX) {
+		rc = make_blocks(&blocks, draft, n_finest, most);
+		if (!blocks.is_over)
+			break;
+	}
 	if (rc != PSR_OK) {
 		free(blocks.block);
 		return rc;

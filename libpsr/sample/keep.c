@@ -16,27 +16,20 @@ static int blend(const struct level *level, const float p[3], const float n[3], 
 	const float (*direction)[3] = psr_direction_table();
 	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
 	uint64_t found[MOST_BLENDED];
-	int low[3], high[3], at[3], count = 0;
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(finer, p, level->ds, first), count = 0;
 
-	for (int k = 0; k < 3; k++) {
-		low[k] = (int)floor(((double)p[k] - level->ds) / finer->ds);
-		high[k] = (int)floor(((double)p[k] + level->ds) / finer->ds);
-	}
-	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
-		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
-			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				for (uint32_t i = cover_cell(finer, at); i != COVER_NONE; i = finer->point[i].next) {
-					const struct cover_point *point = &finer->point[i];
-					float d[3], w, g = v3f_dot(direction[point->normal], n);
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = finer->point[i].next) {
+			const struct cover_point *point = &finer->point[i];
+			float d[3], w, g = v3f_dot(direction[point->normal], n);
 
-					v3f_sub(d, point->position, p);
-					w = 1 - v3f_dot(d, d) / reach2;
-					if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
-						continue;
-					weight[count] = w * w;
-					found[count++] = point->attr;
-				}
-			}
+			v3f_sub(d, point->position, p);
+			w = 1 - v3f_dot(d, d) / reach2;
+			if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
+				continue;
+			weight[count] = w * w;
+			found[count++] = point->attr;
 		}
 	}
 	if (count != 0)
@@ -68,7 +61,6 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 	const struct sheets *sheets = &level->sheets[ref->projection];
 	const struct patch *patch = &sheets->patch[ref->at.patch];
 	uint32_t surface = sheets->sample[ref->at.patch][ref->at.sample].surface, prim = surface & ~SHEET_BACK;
-	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
 	struct surface_place place = { .prim = prim, .is_back = (surface & SHEET_BACK) != 0 };
 	struct ray ray;
 	double x, y;
@@ -84,11 +76,22 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 		point->attr = agree(surface_attr(level->surface, &place, 1.4142135623730951 * level->ds,
 		                                 sheets->projection.axis[2]), n);
 	point->normal = (uint16_t)PSR_ATTR_NORMAL(point->attr);
-	point->two_sided = (level->sides[prim] & both) == both;
+	point->two_sided = (uint8_t)level_is_two_sided(level, prim, point->position, n);
 	point->sample = (uint8_t)ref->at.sample;
 	point->projection = ref->projection;
 	point->patch = ref->at.patch;
 	point->next = COVER_NONE;
+}
+
+int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3], const float n[3])
+{
+	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
+	float back[3];
+
+	if (!level_material(level, prim)->two_sided)
+		return 0;
+	v3f_scale(back, n, -1);
+	return (level->sides[prim] & both) == both || (seen_is(&level->seen, p, back) && seen_is(&level->seen, p, n));
 }
 
 static void mark_kept(struct level *level, const struct level_ref *ref)
@@ -164,4 +167,24 @@ int keep_owned(struct level *level)
 	psr_free(ref);
 	psr_free(job.point);
 	return rc;
+}
+
+static void look_again(int i, void *userdata)
+{
+	struct level *level = userdata;
+	uint32_t end = (uint32_t)(i + 1) * CHUNK < level->cover.n_points ? (uint32_t)(i + 1) * CHUNK : level->cover.n_points;
+
+	for (uint32_t k = (uint32_t)i * CHUNK; k < end; k++) {
+		struct cover_point *point = &level->cover.point[k];
+		uint32_t surface = level->sheets[point->projection].sample[point->patch][point->sample].surface;
+		float n[3];
+
+		level_normal(level, surface, n);
+		point->two_sided = (uint8_t)level_is_two_sided(level, surface & ~SHEET_BACK, point->position, n);
+	}
+}
+
+void keep_look_again(struct level *level)
+{
+	psr_pool_for(level->pool, (int)((level->cover.n_points + CHUNK - 1) / CHUNK), look_again, level);
 }

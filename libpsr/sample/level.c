@@ -8,10 +8,6 @@
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
 #define FIELD_PIXELS 3
 
-/* What dicing adds can be missed by what was tested before it was there only where it was snapped; a second time around
- * finds the rest. */
-#define N_DICES 2
-
 static double now(void)
 {
 	struct timespec t;
@@ -23,7 +19,7 @@ static double now(void)
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
 {
-	unsigned n_steps = level->n_projections + 3 + N_DICES, done = 0;
+	unsigned n_steps = level->n_projections / 2 + 4, done = 0;
 	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
 	double started = now();
 	int rc;
@@ -45,12 +41,14 @@ int level_make(struct level *level, const struct psr_projection *projection,
 	if (rc == PSR_OK)
 		rc = cover_init(&level->cover, level->ds);
 	if (rc == PSR_OK)
-		rc = seen_init(&level->seen, level->scene, level->ds, level->pool);
+		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen) : seen_init(&level->seen, level->ds);
+	if (rc == PSR_OK && level->finer_seen == NULL)
+		rc = seen_look(&level->seen, level->scene, 0, level->pool);
 	STEP_DONE;
-	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
-		rc = sheets_trace(&level->sheets[i], level->scene, level->mesh, &projection[i], level->pool);
+	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
+		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, &projection[i], level->pool);
 		level->n_rays += level->sheets[i].n_rays;
-		level->n_patches += level->sheets[i].n_patches;
+		level->n_patches += level->sheets[i].n_patches + level->sheets[i + 1].n_patches;
 		STEP_DONE;
 	}
 	level->seconds_rays = now() - started;
@@ -62,10 +60,9 @@ int level_make(struct level *level, const struct psr_projection *projection,
 		rc = keep_owned(level);
 	}
 	STEP_DONE;
-	for (int i = 0; rc == PSR_OK && i < N_DICES; i++) {
-		rc = dice_surface(level);
-		STEP_DONE;
-	}
+	if (rc == PSR_OK)
+		rc = dice_surface(level, 0);
+	STEP_DONE;
 #undef STEP_DONE
 	return rc;
 }

@@ -36,6 +36,7 @@ struct level {
 	struct cover cover;
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
+	const struct seen *finer_seen; /* of the same level */
 	uint64_t n_rays, n_patches, n_owned, n_added, n_snapped;
 	double seconds_rays;
 };
@@ -54,12 +55,19 @@ int owner_mark(struct level *level);
 /* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well. */
 void merge_patches(struct level *level);
 
-/* keep.c: keeps what is owned, or a single sample. MEMORY. */
+/* keep.c: whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */
+int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3], const float n[3]);
+
+/* Keeps what is owned, or a single sample. MEMORY. */
 int keep_owned(struct level *level);
 int keep_sample(struct level *level, struct level_ref ref);
 
-/* dice.c: tests places all over the surface, half a pixel apart, and adds what they lack. MEMORY. */
-int dice_surface(struct level *level);
+/* After more was seen: which samples are of thin sheets. */
+void keep_look_again(struct level *level);
+
+/* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
+ * greater. MEMORY. */
+int dice_surface(struct level *level, int round);
 
 /* Adds samples so that a place is covered. MEMORY. */
 struct surface_spot {
@@ -69,7 +77,7 @@ struct surface_spot {
 int dice_cover(struct level *level, const struct surface_spot *spot);
 
 /* level.c: traces all projections, of spacing projection[i].spacing, and keeps an adequate sampling. on_progress is called
- * with 0..n_projections + 4 done; may be NULL. MEMORY; level_fini() either way. */
+ * with 0..n_projections / 2 + 4 done; may be NULL. MEMORY; level_fini() either way. */
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata);
 void level_fini(struct level *level);

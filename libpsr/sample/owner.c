@@ -164,6 +164,27 @@ static void drop_hidden(int i, void *userdata)
 	}
 }
 
+/* What rays met first is seen, here and at coarser levels, though of thin things few views meet anything. */
+static int see_first(struct level *level)
+{
+	for (unsigned i = 0; i < level->n_projections; i++) {
+		const struct sheets *sheets = &level->sheets[i];
+
+		for (uint32_t p = 0; p < sheets->n_patches; p++) {
+			for (uint64_t left = sheets->patch[p].owned & sheets->patch[p].first; left != 0; left &= left - 1) {
+				unsigned s = (unsigned)__builtin_ctzll(left);
+				float position[3], n[3];
+
+				sheets_position(sheets, (struct sheet_ref){ p, s }, position);
+				level_normal(level, sheets->sample[p][s].surface, n);
+				if (seen_add(&level->seen, position, n) != PSR_OK)
+					return PSR_ERR_MEMORY;
+			}
+		}
+	}
+	return PSR_OK;
+}
+
 int owner_mark(struct level *level)
 {
 	int n = (int)level->n_projections;
@@ -172,6 +193,8 @@ int owner_mark(struct level *level)
 	if (make_field(level) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	psr_pool_for(level->pool, n, mark_owned, level);
+	if (see_first(level) != PSR_OK)
+		return PSR_ERR_MEMORY;
 	psr_pool_for(level->pool, n, mark_seen, level);
 	psr_pool_for(level->pool, n, drop_hidden, level);
 	return PSR_OK;

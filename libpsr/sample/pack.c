@@ -1,3 +1,4 @@
+#include <assert.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -9,7 +10,7 @@
 #include "visibility.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
-#define SLACK 0x1p-21f
+#define SLACK 0x1p-21
 
 struct order {
 	uint64_t code;
@@ -23,7 +24,11 @@ struct pack {
 	const struct draft *draft;
 	struct order *order;
 	struct psr_cluster *cluster;
-	float *sphere[4], *cone[4], *depth_bias, *depth_step; /* sphere: x, y, z, r; cone: x, y, z, cosine */
+	float *depth_bias, *depth_step;
+	int16_t *center[3];
+	uint16_t *radius;
+	int8_t *cone[3];
+	uint8_t *cone_sine;
 	uint16_t *block_projection, *depth;
 	int16_t *col, *row;
 	uint8_t *level, *flags;
@@ -126,19 +131,26 @@ static void quantise(struct pack *pack, uint32_t i, const struct draft_block *bl
 	pack->depth_step[i] = step;
 }
 
-/* Around the middle of the box; through the samples as they will be read back, and half a step beyond. */
+/* Around the middle of the box, rounded; through the samples as they will be read back, and half a step beyond.
+ *
+ * Both fit. A pixel ds is at most 1/4 (at resolution 8), and a sample stands on the surface, which is within the unit
+ * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
+ * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
+ * half a step more, 1.79 < 2. */
 static void bound_block(struct pack *pack, uint32_t i, const struct draft_block *block, const double min[3],
                         const double max[3])
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
 	uint32_t at = pack->attr_first[i];
 	double middle[3], radius = 0;
-	float rounded[3];
 
 	middle_of(projection, min, max, middle);
 	for (int k = 0; k < 3; k++) {
-		rounded[k] = (float)middle[k];
-		pack->sphere[k][i] = rounded[k];
+		double rounded = rint(middle[k] * 0x1p14);
+
+		assert(fabs(rounded) <= INT16_MAX);
+		pack->center[k][i] = (int16_t)rounded;
+		middle[k] = rounded * 0x1p-14;
 	}
 	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
 		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[at];
@@ -147,7 +159,7 @@ static void bound_block(struct pack *pack, uint32_t i, const struct draft_block 
 		place_sample(pack->draft, block, (unsigned)__builtin_ctzll(left), p);
 		sheets_inner(projection, p[0], p[1], (double)z, position);
 		for (int k = 0; k < 3; k++) {
-			double d = position[k] - (double)rounded[k];
+			double d = position[k] - middle[k];
 
 			squared += d * d;
 			if (block->level != 0)
@@ -157,14 +169,17 @@ static void bound_block(struct pack *pack, uint32_t i, const struct draft_block 
 		}
 		radius = squared > radius ? squared : radius;
 	}
-	pack->sphere[3][i] = (float)(sqrt(radius) + spacing_of(pack->draft, block) / 2) * (1 + SLACK) + SLACK;
+	radius = ceil(((sqrt(radius) + spacing_of(pack->draft, block) / 2) * (1 + SLACK) + SLACK) * 0x1p15);
+	assert(radius <= UINT16_MAX);
+	pack->radius[i] = (uint16_t)radius;
 }
 
 /* The cone holds the normals of the faces, and those that the samples are drawn by. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
-	float normal[2 * PSR_BLOCK_SAMPLES][3], axis[3];
+	float normal[2 * PSR_BLOCK_SAMPLES][3];
+	int8_t axis[3];
 	int n = 0;
 
 	for (uint64_t left = block->part; left != 0; left &= left - 1) {
@@ -174,7 +189,7 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
 		memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
-	cone_bound((const float(*)[3])normal, n, axis, &pack->cone[3][i]);
+	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);
 	for (int k = 0; k < 3; k++)
 		pack->cone[k][i] = axis[k];
 }
@@ -210,25 +225,27 @@ static void pack_blocks(struct pack *pack)
 	}
 }
 
-static void bound_cluster(const struct pack *pack, struct psr_cluster *cluster)
+static void bound_cluster(const struct psr_blocks *blocks, struct psr_cluster *cluster)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
 
 	for (uint32_t i = cluster->first_block; i < cluster->first_block + cluster->n_blocks; i++) {
-		for (int k = 0; k < 3; k++) {
-			float c = pack->sphere[k][i], r = pack->sphere[3][i];
+		float c[3], r;
 
-			min[k] = c - r < min[k] ? c - r : min[k];
-			max[k] = c + r > max[k] ? c + r : max[k];
+		psr_blocks_sphere(blocks, i, c, &r);
+		for (int k = 0; k < 3; k++) {
+			min[k] = c[k] - r < min[k] ? c[k] - r : min[k];
+			max[k] = c[k] + r > max[k] ? c[k] + r : max[k];
 		}
 	}
 	for (int k = 0; k < 3; k++)
 		cluster->center[k] = (min[k] + max[k]) / 2;
 	for (uint32_t i = cluster->first_block; i < cluster->first_block + cluster->n_blocks; i++) {
-		float d[3] = { pack->sphere[0][i], pack->sphere[1][i], pack->sphere[2][i] }, reach;
+		float d[3], r, reach;
 
+		psr_blocks_sphere(blocks, i, d, &r);
 		v3f_sub(d, d, cluster->center);
-		reach = (v3f_length(d) + pack->sphere[3][i]) * (1 + SLACK) + SLACK;
+		reach = (v3f_length(d) + r) * (1 + (float)SLACK) + (float)SLACK;
 		cluster->radius = reach > cluster->radius ? reach : cluster->radius;
 	}
 }
@@ -247,6 +264,8 @@ static void count_clusters(struct pack *pack)
 
 static void pack_clusters(struct pack *pack)
 {
+	const struct psr_blocks spheres = { .sphere_x = pack->center[0], .sphere_y = pack->center[1],
+		                                .sphere_z = pack->center[2], .sphere_r = pack->radius };
 	uint32_t c = 0;
 
 	memset(pack->cluster, 0, pack->n_clusters * sizeof *pack->cluster);
@@ -257,7 +276,7 @@ static void pack_clusters(struct pack *pack)
 		pack->cluster[c - 1].n_blocks++;
 	}
 	for (c = 0; c < pack->n_clusters; c++)
-		bound_cluster(pack, &pack->cluster[c]);
+		bound_cluster(&spheres, &pack->cluster[c]);
 }
 
 static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size_t n_clusters)
@@ -266,10 +285,12 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 
 #define ALLOC(array, n) failed |= ((array) = psr_alloc_array(n, sizeof *(array))) == NULL
 	ALLOC(pack->cluster, n_clusters);
-	for (int k = 0; k < 4; k++) {
-		ALLOC(pack->sphere[k], n_blocks);
+	for (int k = 0; k < 3; k++) {
+		ALLOC(pack->center[k], n_blocks);
 		ALLOC(pack->cone[k], n_blocks);
 	}
+	ALLOC(pack->radius, n_blocks);
+	ALLOC(pack->cone_sine, n_blocks);
 	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->depth_step, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
@@ -290,10 +311,12 @@ static void pack_fini(struct pack *pack)
 {
 	psr_free(pack->order);
 	psr_free(pack->cluster);
-	for (int k = 0; k < 4; k++) {
-		psr_free(pack->sphere[k]);
+	for (int k = 0; k < 3; k++) {
+		psr_free(pack->center[k]);
 		psr_free(pack->cone[k]);
 	}
+	psr_free(pack->radius);
+	psr_free(pack->cone_sine);
 	psr_free(pack->depth_bias);
 	psr_free(pack->depth_step);
 	psr_free(pack->block_projection);
@@ -336,14 +359,14 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 
 	blocks.projection = pack->draft->projection;
 	blocks.cluster = pack->cluster;
-	blocks.sphere_x = pack->sphere[0];
-	blocks.sphere_y = pack->sphere[1];
-	blocks.sphere_z = pack->sphere[2];
-	blocks.sphere_r = pack->sphere[3];
+	blocks.sphere_x = pack->center[0];
+	blocks.sphere_y = pack->center[1];
+	blocks.sphere_z = pack->center[2];
+	blocks.sphere_r = pack->radius;
 	blocks.cone_x = pack->cone[0];
 	blocks.cone_y = pack->cone[1];
 	blocks.cone_z = pack->cone[2];
-	blocks.cone_cos = pack->cone[3];
+	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.col = pack->col;
 	blocks.row = pack->row;

@@ -12,25 +12,28 @@ static const double TURN[3][3] = {
 	{ -0.0846937, 0.1759021, 0.9807574 },
 };
 
+static int add_pair(double direction[N_PROJECTIONS][3], int n, double x, double y, double z)
+{
+	v3d_set(direction[n], x, y, z);
+	v3d_set(direction[n + 1], -x, -y, -z);
+	return n + 2;
+}
+
 static int list_directions(double direction[N_PROJECTIONS][3])
 {
 	const double golden = (1 + sqrt(5.0)) / 2;
 	int n = 0;
 
-	for (int k = 0; k < 3; k++) {
-		for (int s = 0; s < 4; s++) {
-			double a = s & 1 ? -1 : 1, b = s & 2 ? -1 : 1;
-
-			direction[n][k] = 0;
-			direction[n][(k + 1) % 3] = a;
-			direction[n++][(k + 2) % 3] = b * golden;
-			direction[n][k] = 0;
-			direction[n][(k + 1) % 3] = a * golden;
-			direction[n++][(k + 2) % 3] = b / golden;
-		}
+	for (int sign = -1; sign <= 1; sign += 2) {
+		n = add_pair(direction, n, 0, 1, sign * golden);
+		n = add_pair(direction, n, 0, golden, sign / golden);
+		n = add_pair(direction, n, sign * golden, 0, 1);
+		n = add_pair(direction, n, sign / golden, 0, golden);
+		n = add_pair(direction, n, 1, sign * golden, 0);
+		n = add_pair(direction, n, golden, sign / golden, 0);
+		n = add_pair(direction, n, sign, 1, 1);
+		n = add_pair(direction, n, sign, 1, -1);
 	}
-	for (int s = 0; s < 8; s++)
-		v3d_set(direction[n++], s & 1 ? -1 : 1, s & 2 ? -1 : 1, s & 4 ? -1 : 1);
 	return n;
 }
 

@@ -10,7 +10,9 @@
 
 #define N_PROJECTIONS 32
 
-/* ds: a pixel at the target resolution, inner units. Frames and the spacing ds * cos(tolerance) ([G] 4.4) are rounded
+/* Number i ^ 1 looks at the other side of the same lattice as number i: its axes are -x, y, -z.
+ *
+ * ds: a pixel at the target resolution, inner units. Frames and the spacing ds * cos(tolerance) ([G] 4.4) are rounded
  * to the floats that models hold. */
 void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, double tolerance);
 

@@ -197,11 +197,15 @@ static void trace_packet(const struct ray_scene *scene, const struct ray *ray, i
 	}
 	rtcIntersect8(valid, scene->scene, &packet.context, &rays);
 	for (int i = 0; i < n; i++) {
-		if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
-			hit[i].prim = RAY_NONE;
-			continue;
+		hit[i].prim = RAY_NONE;
+		if (rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
+			hit[i].prim = ray_prim(scene, rays.hit.geomID[i], rays.hit.primID[i]);
+			ray_prefetch(scene, hit[i].prim);
 		}
-		hit[i].prim = ray_prim(scene, rays.hit.geomID[i], rays.hit.primID[i]);
+	}
+	for (int i = 0; i < n; i++) {
+		if (hit[i].prim == RAY_NONE)
+			continue;
 		hit[i].u = (double)rays.hit.u[i];
 		hit[i].v = (double)rays.hit.v[i];
 		ray_hit_locate(scene, &ray[i], &hit[i]);

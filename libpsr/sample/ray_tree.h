@@ -26,7 +26,8 @@ struct ray_packet {
 	struct RTCIntersectContext context;
 	const struct ray_scene *scene;
 	const struct ray *ray;
-	struct ray_list *list; /* where ray_scene_trace_all collects */
+	struct ray_list *list; /* where ray_scene_trace_all collects, */
+	int has_ends;          /* of rays that are looked along from both ends */
 };
 
 void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, const struct ray *ray);
@@ -62,6 +63,23 @@ static inline uint32_t ray_prim(const struct ray_scene *scene, unsigned geometry
 static inline int ray_is_disc(const struct ray_scene *scene, uint32_t prim)
 {
 	return prim >= scene->mesh->n_triangles;
+}
+
+static inline int ray_is_two_sided(const struct ray_scene *scene, uint32_t prim)
+{
+	const struct psr_mesh *mesh = scene->mesh;
+
+	return mesh->material[ray_is_disc(scene, prim) ? mesh->point_material[prim - mesh->n_triangles]
+	                                               : mesh->triangle_material[prim]].two_sided != 0;
+}
+
+/* What locates a hit is in no order that a cache could guess: asked for early, for all of a packet. */
+static inline void ray_prefetch(const struct ray_scene *scene, uint32_t prim)
+{
+	if (!ray_is_disc(scene, prim)) {
+		__builtin_prefetch(scene->corner[prim]);
+		__builtin_prefetch(scene->corner[prim][2]);
+	}
 }
 
 /* Centre, normal and radius of the disc of a primitive, in inner coordinates. */

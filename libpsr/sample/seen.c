@@ -2,6 +2,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "cell.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 #include "seen.h"
@@ -9,9 +10,10 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
-#define VIEW_LEVEL 3
-#define N_VIEWS (8 << 2 * VIEW_LEVEL)
-#define RAY_PIXELS 3 /* between rays: many views rather than fine ones */
+#define VIEW_LEVEL 5
+#define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
+#define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
+#define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
 /* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
@@ -24,15 +26,23 @@ static uint64_t key_of(const int at[3], int axis, int is_negative)
 	return key;
 }
 
-static size_t place_of(const struct seen *seen, uint64_t key)
+static uint64_t coarser_key(uint64_t key)
 {
-	return (size_t)(key * UINT64_C(0x9e3779b97f4a7c15) >> 16) & (seen->size - 1);
+	uint64_t coarser = key >> 60 << 60;
+
+	for (int shift = 0; shift <= 40; shift += 20) {
+		int at = (int)(key >> shift & 0xfffff);
+
+		at = at < 1 << 19 ? at : at - (1 << 20);
+		coarser |= (uint64_t)(at >> 1 & 0xfffff) << shift;
+	}
+	return coarser;
 }
 
-/* From any thread. 0: there is no room. */
+/* From any thread. 0: there is no room, which takes a walk through all of it to find. */
 static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
 		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
@@ -77,7 +87,7 @@ static void look_along_row(int i, void *userdata)
 	struct ray ray[BATCH];
 	struct ray_hit hit[BATCH];
 
-	for (int c = -reach; c < reach; c++) {
+	for (int c = -reach; c < reach && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
 		double x = (c + 0.5) * look->ds;
 
 		for (int k = 0; k < 3; k++) {
@@ -87,7 +97,7 @@ static void look_along_row(int i, void *userdata)
 		if (++n < BATCH && c + 1 < reach)
 			continue;
 		ray_scene_trace(look->scene, ray, n, 0, hit);
-		for (int k = 0; k < n; k++)
+		for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++)
 			if (hit[k].prim != RAY_NONE)
 				mark(look, &ray[k], &hit[k]);
 		n = 0;
@@ -113,20 +123,27 @@ static int grow(struct seen *seen)
 	return PSR_OK;
 }
 
-int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool)
+int seen_init(struct seen *seen, double ds)
 {
-	struct look look = { .seen = seen, .scene = scene, .ds = RAY_PIXELS * ds, .reach = (int)ceil(1 / (RAY_PIXELS * ds)) };
-
 	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
 	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
 	if (seen->table == NULL)
 		return PSR_ERR_MEMORY;
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	return PSR_OK;
+}
+
+int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool)
+{
+	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
+	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+
+	/* A view that fills the table is broken off, and looked along again once there is room. */
 	for (unsigned i = 0; i < N_VIEWS;) {
 		double direction[3];
 
 		/* Far apart ones first, so that the table soon has its size. */
-		psr_direction_center(VIEW_LEVEL, i * 211 % N_VIEWS, direction);
+		psr_direction_center(VIEW_LEVEL, (SEEN_ROUNDS * (i * 211 % N_VIEWS) + (unsigned)round) % N_DIRECTIONS, direction);
 		psr_direction_frame(direction, look.frame);
 		look.n_new = 0;
 		look.is_full = 0;
@@ -139,6 +156,19 @@ int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struc
 	return PSR_OK;
 }
 
+int seen_coarsen(struct seen *seen, const struct seen *finer)
+{
+	*seen = (struct seen){ .cell = 2 * finer->cell, .size = finer->size };
+	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
+	if (seen->table == NULL)
+		return PSR_ERR_MEMORY;
+	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
+	for (size_t i = 0; i < finer->size; i++)
+		if (finer->table[i] != FREE)
+			insert(seen, coarser_key(finer->table[i]), &seen->n_cells);
+	return PSR_OK;
+}
+
 void seen_fini(struct seen *seen)
 {
 	psr_free(seen->table);
@@ -147,7 +177,7 @@ void seen_fini(struct seen *seen)
 
 static int has(const struct seen *seen, uint64_t key)
 {
-	size_t i = place_of(seen, key);
+	size_t i = cell_place(key, seen->size);
 
 	while (seen->table[i] != FREE && seen->table[i] != key)
 		i = (i + 1) & (seen->size - 1);

@@ -14,9 +14,15 @@ struct seen {
 	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
 };
 
-/* Looks from 512 directions, a ray every third pixel of ds. MEMORY; seen_fini() either way. */
-int seen_init(struct seen *seen, const struct ray_scene *scene, double ds, struct psr_pool *pool);
+int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
+
+/* Looks from 512 directions, others for each round of 0..SEEN_ROUNDS - 1, a ray every fourth pixel. MEMORY. */
+#define SEEN_ROUNDS 16
+int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
+
+/* What was seen of cells half as wide. MEMORY; seen_fini() either way. */
+int seen_coarsen(struct seen *seen, const struct seen *finer);
 
 /* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
 int seen_is(const struct seen *seen, const float p[3], const float n[3]);

@@ -20,6 +20,9 @@
 /* Neighbours on the lattice whose depths differ by more steps than this are not taken for one surface. */
 #define SHEET_STEPS 2.5f
 
+/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide. */
+#define SHEET_PATCH_STEPS 24
+
 struct sheet_sample {
 	float z;          /* along the projection's z, inner units */
 	uint32_t surface; /* primitive, and SHEET_BACK */
@@ -29,6 +32,7 @@ struct patch {
 	int16_t col, row;   /* in blocks */
 	uint8_t two_sided;  /* of materials that are seen from both sides; or of one-sided ones */
 	uint8_t is_alive;   /* some of it is kept */
+	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
 	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
 	uint64_t mask;      /* hits; */
 	uint64_t first;     /* of these, the first of their rays: nothing hides them; */
@@ -45,11 +49,12 @@ struct sheets {
 	uint32_t n_patches, capacity;
 	struct patch *patch;
 	struct sheet_sample (*sample)[PSR_BLOCK_SAMPLES];
-	uint64_t n_rays, n_hits;
+	uint64_t n_rays, n_hits; /* n_rays: 0 of what is behind others */
 };
 
-/* projection->spacing is that of the lattice to trace. The same bytes whatever the number of threads. MEMORY. */
-int sheets_trace(struct sheets *sheets, const struct ray_scene *scene, const struct psr_mesh *mesh,
+/* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z and
+ * the same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
                  const struct psr_projection *projection, struct psr_pool *pool);
 void sheets_fini(struct sheets *sheets);
 
@@ -86,6 +91,9 @@ struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point a
 /* A sample that no ray found, put at a lattice point: into a patch with room, or into a new one. MEMORY. */
 int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
                struct sheet_ref *out);
+
+/* Puts the last patch of `patch` into the list of its lattice block. */
+void sheets_link(struct sheets *sheets, uint32_t patch);
 
 void sheets_position(const struct sheets *sheets, struct sheet_ref ref, float position[3]);
 

@@ -8,7 +8,11 @@
 
 #define MOST_SIDE 4000 /* its square is below 2^24, with margins */
 #define MARGIN (VPICTURE_REACH + 1) /* pixels */
-#define ALL PSR_BLOCK_SAMPLES
+#define CHUNK 16 /* samples */
+
+/* Steps of the lattice: as far apart as samples are on a surface that is tilted by 25 degrees. Smaller ones have holes,
+ * and a sample behind a hole counts as seen. */
+#define PIXEL 1.11f
 
 static int alloc_points(struct vpoints *points, size_t n)
 {
@@ -26,7 +30,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 
 	memset(points, 0, sizeof *points);
 	points->blocks = blocks;
-	if (alloc_points(points, blocks->n_samples + ALL) != PSR_OK) {
+	if (alloc_points(points, blocks->n_samples + VPOINTS_BEYOND) != PSR_OK) {
 		vpoints_fini(points);
 		return PSR_ERR_MEMORY;
 	}
@@ -47,7 +51,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 			                            : (uint16_t)PSR_ATTR_NORMAL(blocks->attr[k]);
 		}
 	}
-	for (size_t k = blocks->n_samples; k < blocks->n_samples + ALL; k++) {
+	for (size_t k = blocks->n_samples; k < blocks->n_samples + VPOINTS_BEYOND; k++) {
 		points->x[k] = points->y[k] = points->z[k] = 0;
 		points->normal[k] = PSR_DIRECTIONS;
 	}
@@ -69,15 +73,22 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 
 	memset(level, 0, sizeof *level);
 	level->block = psr_alloc_array(b->n_blocks, sizeof *level->block);
-	if (level->block == NULL)
+	level->run = psr_alloc_array(b->n_blocks, sizeof *level->run);
+	if (level->block == NULL || level->run == NULL) {
+		vlevel_fini(level);
 		return PSR_ERR_MEMORY;
+	}
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		float spacing = b->projection[b->block_projection[i]].spacing * (float)(1u << b->level[i]);
+		uint32_t first = b->attr_first[i], n = (uint32_t)__builtin_popcountll(b->mask[i]);
 
 		if (b->level[i] != which)
 			continue;
 		level->block[level->n_blocks++] = i;
 		level->spacing = spacing > level->spacing ? spacing : level->spacing;
+		if (level->n_runs == 0 || level->run[level->n_runs - 1][1] != first)
+			level->run[level->n_runs++][0] = first;
+		level->run[level->n_runs - 1][1] = first + n;
 	}
 	return PSR_OK;
 }
@@ -85,17 +96,18 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 void vlevel_fini(struct vlevel *level)
 {
 	psr_free(level->block);
+	psr_free(level->run);
 }
 
 int vpicture_init(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level)
 {
-	float across = 2 * points->reach / level->spacing;
+	const float pixel = PIXEL * level->spacing, across = 2 * points->reach / pixel;
 	size_t n;
 	int failed = 0;
 
 	memset(picture, 0, sizeof *picture);
 	picture->side = (across < MOST_SIDE ? (int)across + 1 : MOST_SIDE) + 2 * MARGIN + 2;
-	picture->scale = across < MOST_SIDE ? 1 / level->spacing : MOST_SIDE / (2 * points->reach);
+	picture->scale = across < MOST_SIDE ? 1 / pixel : MOST_SIDE / (2 * points->reach);
 	n = (size_t)picture->side * (size_t)picture->side;
 	for (int end = 0; end < 2; end++) {
 		picture->nearest[end] = psr_alloc_array(n, sizeof *picture->nearest[end]);
@@ -141,10 +153,10 @@ static void aim(struct vpicture *picture, const struct vpoints *points, const do
 	}
 }
 
-/* Pixels and heights of a block's samples: as many as a block can have, so that the compiler knows how many. Indices of
- * pixels are below 2^24 and thus exact in floats, which every CPU multiplies four at a time. */
+/* Pixels and heights of samples: a fixed number, so that the compiler does four at a time. Indices of pixels are below 2^24
+ * and thus exact in floats, which every CPU can multiply so. */
 static void project(const struct vpicture *picture, const struct vpoints *points, uint32_t first,
-                    int32_t at[restrict ALL], float height[restrict ALL])
+                    int32_t at[restrict CHUNK], float height[restrict CHUNK])
 {
 	const float(*f)[3] = picture->frame;
 	const float *restrict x = points->x + first, *restrict y = points->y + first, *restrict z = points->z + first;
@@ -153,7 +165,7 @@ static void project(const struct vpicture *picture, const struct vpoints *points
 	const float hx = f[2][0], hy = f[2][1], hz = f[2][2];
 	const float u0 = picture->offset[0], v0 = picture->offset[1], side = (float)picture->side;
 
-	for (int i = 0; i < ALL; i++) {
+	for (int i = 0; i < CHUNK; i++) {
 		int32_t u = (int32_t)(ux * x[i] + uy * y[i] + uz * z[i] + u0);
 		int32_t v = (int32_t)(vx * x[i] + vy * y[i] + vz * z[i] + v0);
 
@@ -187,26 +199,26 @@ static void spread(const struct vpicture *picture, int end)
 void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level,
                    const double axis[3], uint32_t seed)
 {
-	const struct psr_blocks *b = points->blocks;
 	float *near0 = picture->nearest[0], *near1 = picture->nearest[1];
 
 	aim(picture, points, axis, seed);
 	for (int i = 0; i < picture->side * picture->side; i++)
 		near0[i] = near1[i] = -INFINITY;
-	for (uint32_t i = 0; i < level->n_blocks; i++) {
-		const uint32_t block = level->block[i], first = b->attr_first[block];
-		const int n = __builtin_popcountll(b->mask[block]);
-		int32_t at[ALL];
-		float height[ALL];
+	for (uint32_t r = 0; r < level->n_runs; r++) {
+		for (uint32_t first = level->run[r][0], end = level->run[r][1]; first < end; first += CHUNK) {
+			const uint32_t n = end - first < CHUNK ? end - first : CHUNK;
+			int32_t at[CHUNK];
+			float height[CHUNK];
 
-		project(picture, points, first, at, height);
-		for (int k = 0; k < n; k++) {
-			const uint8_t faces = picture->faces[points->normal[first + (uint32_t)k]];
-			const float h0 = (faces & 1) != 0 ? height[k] : -INFINITY, h1 = (faces & 2) != 0 ? -height[k] : -INFINITY;
+			project(picture, points, first, at, height);
+			for (uint32_t k = 0; k < n; k++) {
+				const uint8_t faces = picture->faces[points->normal[first + k]];
+				const float h0 = (faces & 1) != 0 ? height[k] : -INFINITY, h1 = (faces & 2) != 0 ? -height[k] : -INFINITY;
 
-			assert(at[k] > picture->side && at[k] < picture->side * (picture->side - 1) - 1);
-			near0[at[k]] = h0 > near0[at[k]] ? h0 : near0[at[k]];
-			near1[at[k]] = h1 > near1[at[k]] ? h1 : near1[at[k]];
+				assert(at[k] > picture->side && at[k] < picture->side * (picture->side - 1) - 1);
+				near0[at[k]] = h0 > near0[at[k]] ? h0 : near0[at[k]];
+				near1[at[k]] = h1 > near1[at[k]] ? h1 : near1[at[k]];
+			}
 		}
 	}
 	spread(picture, 0);
@@ -216,15 +228,18 @@ void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const
 int vpicture_sees(const struct vpicture *picture, const struct vpoints *points, uint32_t block, int end)
 {
 	const struct psr_blocks *b = points->blocks;
-	const uint32_t first = b->attr_first[block];
-	const int n = __builtin_popcountll(b->mask[block]);
-	int32_t at[ALL];
-	float height[ALL];
+	const uint32_t end_of_block = b->attr_first[block] + (uint32_t)__builtin_popcountll(b->mask[block]);
 
-	project(picture, points, first, at, height);
-	for (int k = 0; k < n; k++)
-		if ((picture->faces[points->normal[first + (uint32_t)k]] >> end & 1) != 0
-		    && (end == 0 ? height[k] : -height[k]) >= picture->farthest[end][at[k]])
-			return 1;
+	for (uint32_t first = b->attr_first[block]; first < end_of_block; first += CHUNK) {
+		const uint32_t n = end_of_block - first < CHUNK ? end_of_block - first : CHUNK;
+		int32_t at[CHUNK];
+		float height[CHUNK];
+
+		project(picture, points, first, at, height);
+		for (uint32_t k = 0; k < n; k++)
+			if ((picture->faces[points->normal[first + k]] >> end & 1) != 0
+			    && (end == 0 ? height[k] : -height[k]) >= picture->farthest[end][at[k]])
+				return 1;
+	}
 	return 0;
 }

@@ -6,7 +6,9 @@
 #include "psr/direction.h"
 #include "psr/model.h"
 
-/* The samples of a model, unpacked. Each array is readable for a block's samples beyond its last. */
+/* The samples of a model, unpacked. Each array is readable for VPOINTS_BEYOND elements beyond its last. */
+#define VPOINTS_BEYOND 64
+
 struct vpoints {
 	const struct psr_blocks *blocks;
 	float *x, *y, *z;
@@ -19,8 +21,9 @@ void vpoints_fini(struct vpoints *points);
 
 /* Blocks of one level, and the greatest distance of neighbours on their lattices. */
 struct vlevel {
-	uint32_t n_blocks;
+	uint32_t n_blocks, n_runs;
 	uint32_t *block;
+	uint32_t (*run)[2]; /* of samples: first and end */
 	float spacing;
 };
 
@@ -41,7 +44,7 @@ struct vpicture {
 	float *nearest[2], *farthest[2], *row;
 };
 
-/* Pixels of the level's spacing, or greater ones if those were too many. MEMORY. */
+/* Pixels a little greater than the level's spacing, or greater ones if those were too many. MEMORY. */
 int vpicture_init(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level);
 void vpicture_fini(struct vpicture *picture);
 

@@ -16,6 +16,7 @@
 #define MOST_SIDE 8192
 #define NEAREST_EYE 1.05 /* from the middle of the unit sphere */
 #define FURTHEST_EYE 8.0
+#define FAR_AWAY 4.0 /* from any place: outside of the unit sphere */
 
 struct eye {
 	double place[3], frame[3][3], distance;
@@ -139,22 +140,24 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 	return (b->visibility[block][triangle >> 6] >> (triangle & 63) & 1) == 0;
 }
 
-/* Whether nothing is between the sample and the eye but what is as near to it as its neighbours are. */
+/* Whether a ray from the eye, which meets fronts as the eye does, meets nothing before the sample but what is as near
+ * to it as its neighbours are. */
 static int is_open(const struct job *job, uint32_t k, const struct eye *eye)
 {
-	const float p[3] = { job->points->x[k], job->points->y[k], job->points->z[k] };
-	float v[3];
+	const double p[3] = { (double)job->points->x[k], (double)job->points->y[k], (double)job->points->z[k] };
+	double distance = eye->is_perspective ? 0 : FAR_AWAY;
 	struct ray ray;
-	uint8_t is_occluded;
+	struct ray_hit hit;
 
-	to_eye_from(eye, p, v);
-	v3f_normalize(v, v);
-	for (int i = 0; i < 3; i++) {
-		ray.origin[i] = (double)p[i];
-		ray.direction[i] = (double)v[i];
+	if (eye->is_perspective) {
+		v3d_sub(ray.direction, p, eye->place);
+		distance = v3d_normalize(ray.direction, ray.direction);
+	} else {
+		v3d_scale(ray.direction, eye->frame[2], -1);
 	}
-	ray_scene_occluded(job->scene, &ray, 1, NEIGHBOURS * (double)job->level->spacing, &is_occluded);
-	return !is_occluded;
+	v3d_add_scaled(ray.origin, p, -distance, ray.direction);
+	ray_scene_trace(job->scene, &ray, 1, 0, &hit);
+	return hit.prim == RAY_NONE || hit.t >= distance - NEIGHBOURS * (double)job->level->spacing;
 }
 
 static void look(const struct job *job, const struct eye *eye, const struct picture *picture, uint64_t *n_seen,

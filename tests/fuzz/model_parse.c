@@ -25,7 +25,8 @@ static void check_rules(const struct psr_blocks *b)
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		REQUIRE(b->mask[i] != 0 && b->attr_first[i] == n_samples);
 		REQUIRE(b->block_projection[i] < b->n_projections && b->level[i] < b->n_levels);
-		REQUIRE(b->sphere_r[i] >= 0 && b->depth_step[i] >= 0);
+		REQUIRE(b->depth_step[i] >= 0);
+		REQUIRE(b->cone_x == NULL || (b->cone_x[i] | b->cone_y[i] | b->cone_z[i]) != 0); /* its length divides */
 		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);
 	}
 	REQUIRE(n_samples == b->n_samples);

@@ -16,7 +16,11 @@ struct fixture {
 	struct psr_blocks blocks; /* points to the arrays below */
 	struct psr_projection projection[2];
 	struct psr_cluster cluster[3];
-	float sphere[4][FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS], cone[4][FIXTURE_BLOCKS];
+	int16_t center[3][FIXTURE_BLOCKS];
+	uint16_t radius[FIXTURE_BLOCKS];
+	float depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS];
+	int8_t cone[3][FIXTURE_BLOCKS];
+	uint8_t cone_sine[FIXTURE_BLOCKS];
 	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
 	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS];
 	uint8_t level[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
@@ -64,10 +68,11 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 	memcpy(f->level, levels, sizeof levels);
 	for (int i = 0; i < FIXTURE_BLOCKS; i++) {
 		for (int k = 0; k < 3; k++)
-			f->sphere[k][i] = 0.125f * (float)(i - 2 + k);
-		f->sphere[3][i] = 0.25f;
-		f->cone[i % 3][i] = 1;
-		f->cone[3][i] = i == 4 ? -1.0f : 0.5f;
+			f->center[k][i] = (int16_t)(2048 * (i - 2 + k)); /* eighths */
+		f->radius[i] = 8192;                                 /* a quarter */
+		f->cone[i % 3][i] = 127;
+		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
+		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
 		f->depth_bias[i] = -0.5f;
 		f->depth_step[i] = 0.0001f;
 		f->block_projection[i] = (uint16_t)(i % 2);
@@ -89,7 +94,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 	f->blocks = (struct psr_blocks){
 		.n_blocks = FIXTURE_BLOCKS, .n_projections = 2, .n_clusters = 3, .n_levels = 2, .n_samples = FIXTURE_SAMPLES,
 		.projection = f->projection, .cluster = f->cluster,
-		.sphere_x = f->sphere[0], .sphere_y = f->sphere[1], .sphere_z = f->sphere[2], .sphere_r = f->sphere[3],
+		.sphere_x = f->center[0], .sphere_y = f->center[1], .sphere_z = f->center[2], .sphere_r = f->radius,
 		.block_projection = f->block_projection, .col = f->col, .row = f->row, .level = f->level, .flags = f->flags,
 		.depth_bias = f->depth_bias, .depth_step = f->depth_step, .mask = f->mask, .attr_first = f->attr_first,
 		.depth = f->depth, .attr = f->attr,
@@ -112,7 +117,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->blocks.cone_x = f->cone[0];
 		f->blocks.cone_y = f->cone[1];
 		f->blocks.cone_z = f->cone[2];
-		f->blocks.cone_cos = f->cone[3];
+		f->blocks.cone_sine = f->cone_sine;
 		f->blocks.visibility = (const uint64_t(*)[2])f->visibility;
 	}
 }

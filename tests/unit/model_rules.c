@@ -159,11 +159,6 @@ static const struct violation violations[] = {
 	{ "CLUS", 29, 1, 1, "CLUS: reserved bytes of cluster 0 are not zero" },
 	{ "BLVL", 1, 1, 1, "BLVL: block 1 is of level 1, and its cluster 0 of level 0" },
 	{ "BLVL", 5, 1, 200, "BLVL: block 5 is of level 200, and its cluster 2 of level 1" },
-	{ "SPHX", 0, 4, F_NAN, "SPHX, SPHY, SPHZ: the center of block 0 is not finite or beyond 1024" },
-	{ "SPHY", 20, 4, F_INF, "SPHX, SPHY, SPHZ: the center of block 5 is not finite or beyond 1024" },
-	{ "SPHZ", 4, 4, F_2000, "SPHX, SPHY, SPHZ: the center of block 1 is not finite or beyond 1024" },
-	{ "SPHR", 4, 4, F_MINUS_1, "SPHR: the radius of block 1 is -1" },
-	{ "SPHR", 4, 4, F_NAN, "SPHR: the radius of block 1 is nan" },
 	{ "BPRJ", 6, 2, 2, "BPRJ: block 3 is of projection 2 of 2" },
 	{ "BFLG", 2, 1, 2, "BFLG: block 2 has unknown flags 0x2" },
 	{ "DBIA", 8, 4, F_NAN, "DBIA: the depth of block 2 begins at nan" },
@@ -174,11 +169,10 @@ static const struct violation violations[] = {
 	{ "MASK", 40, 8, UINT64_MAX, "MASK: 171 samples are valid, and BLKS counts 143" },
 	{ "AFST", 0, 4, 1, "AFST: the attributes of block 0 begin at 1 instead of 0" },
 	{ "AFST", 20, 4, UINT32_MAX, "AFST: the attributes of block 5 begin at 4294967295 instead of 107" },
-	{ "CONX", 0, 4, F_1_01, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
-	{ "CONY", 0, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 0 has not unit length" },
-	{ "CONZ", 16, 4, F_NAN, "CONX, CONY, CONZ: the axis of block 4 has not unit length" },
-	{ "CONC", 0, 4, F_1_01, "CONC: the cosine of block 0 is 1.01" },
-	{ "CONC", 0, 4, F_NAN, "CONC: the cosine of block 0 is nan" },
+	{ "CONX", 0, 1, 126, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 126 instead of 127" },
+	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
+	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
+	{ "CONZ", 0, 1, 0x80, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 128 instead of 127" },
 };
 
 static void each_violated_rule_is_refused_by_its_name(void **state)
@@ -205,13 +199,18 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "PROJ", 36, 4, 0x44800000, NULL },    /* spacing 1024 */
 		{ "CLUS", 12, 4, 0, NULL },             /* radius 0 */
 		{ "CLUS", 56, 4, 2, NULL },             /* a group of its own */
-		{ "SPHX", 0, 4, 0xc4800000, NULL },     /* center -1024 */
+		{ "CLUS", 0, 4, 0xc4800000, NULL },     /* center -1024 */
+		{ "SPHX", 0, 2, 0x8000, NULL },         /* center -2 */
+		{ "SPHR", 0, 2, 0xffff, NULL },
+		{ "SPHR", 0, 2, 0, NULL },
 		{ "DSTP", 0, 4, 0, NULL },              /* flat */
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
 	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
 	{ "CAMS", 1, 4, 0xbfbf8ff4, NULL },     /* U+10FFFF, the last one */
-		{ "CONC", 0, 4, F_MINUS_1, NULL },
-		{ "CONX", 16, 4, 0, NULL },             /* of a cone of all directions */
+		{ "CONX", 0, 1, 0x81, NULL },           /* -127 */
+		{ "CONY", 0, 1, 0x81, NULL },           /* two components are the greatest */
+		{ "CONS", 0, 1, 0, NULL },
+		{ "CONS", 0, 1, PSR_CONE_ANY, NULL },
 	};
 
 	(void)state;
@@ -242,6 +241,7 @@ static void versions_are_refused_by_major_and_section(void **state)
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
 	assert_non_null(strstr(err.text, "required section DPTH, version 9, at byte"));
+	assert_non_null(strstr(err.text, "a newer psr may"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "VISM") + ENTRY_VERSION, 2, 2);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
@@ -263,6 +263,45 @@ static void unknown_sections_are_skipped_if_optional_and_named_if_required(void 
 	file_put(entry_of(bytes, "NEWS") + ENTRY_FLAGS, 2, ENTRY_REQUIRED);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_UNSUPPORTED);
 	assert_non_null(strstr(err.text, "required section NEWS, version 1, at byte"));
+}
+
+/* Before spheres had eight bytes, they were floats: what holds them has to be built again, and is told so. */
+static void spheres_of_version_1_are_refused_as_an_older_psr_s(void **state)
+{
+	static const char *const types[4] = { "SPHX", "SPHY", "SPHZ", "SPHR" };
+
+	(void)state;
+	for (int k = 0; k < 4; k++) {
+		uint8_t *bytes = copy_original();
+		struct psr_error err = { .text = "" };
+
+		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
+		assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
+		assert_non_null(strstr(err.text, types[k]));
+		assert_non_null(strstr(err.text, "version 1, at byte"));
+		assert_non_null(strstr(err.text, "it is an older psr's, and the model has to be built again"));
+	}
+}
+
+/* Models of before cones had four bytes open, and are drawn without culling by them. */
+static void cones_of_version_1_are_skipped(void **state)
+{
+	static const char *const types[3] = { "CONX", "CONY", "CONZ" };
+	uint8_t *bytes = copy_original();
+	struct psr_model *model = NULL;
+	struct psr_error err;
+
+	(void)state;
+	for (int k = 0; k < 3; k++)
+		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
+	memcpy(entry_of(bytes, "CONS"), "CONC", 4);
+	file_seal(bytes, n_bytes);
+	assert_int_equal(psr_model_parse(&model, bytes, n_bytes, &err), PSR_OK);
+	assert_null(psr_model_blocks(model)->cone_x);
+	assert_null(psr_model_blocks(model)->cone_sine);
+	assert_non_null(psr_model_blocks(model)->visibility);
+	psr_model_unref(model);
+	free(bytes);
 }
 
 static void every_required_section_is_missed(void **state)
@@ -390,6 +429,8 @@ int main(void)
 		cmocka_unit_test(values_at_the_edge_of_a_rule_are_taken),
 		cmocka_unit_test(versions_are_refused_by_major_and_section),
 		cmocka_unit_test(unknown_sections_are_skipped_if_optional_and_named_if_required),
+		cmocka_unit_test(spheres_of_version_1_are_refused_as_an_older_psr_s),
+		cmocka_unit_test(cones_of_version_1_are_skipped),
 		cmocka_unit_test(every_required_section_is_missed),
 		cmocka_unit_test(lies_in_header_and_table_are_refused),
 		cmocka_unit_test(stray_bytes_between_sections_are_refused),

@@ -27,7 +27,9 @@ static struct psr_model *model;
 static int setup(void **state)
 {
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
-	static float x[MAX_CLUSTERS], y[MAX_CLUSTERS], z[MAX_CLUSTERS], r[MAX_CLUSTERS], bias[MAX_CLUSTERS], step[MAX_CLUSTERS];
+	static float bias[MAX_CLUSTERS], step[MAX_CLUSTERS];
+	static int16_t x[MAX_CLUSTERS], y[MAX_CLUSTERS], z[MAX_CLUSTERS];
+	static uint16_t r[MAX_CLUSTERS];
 	static uint16_t number[MAX_CLUSTERS], depth[64 * MAX_CLUSTERS];
 	static int16_t col[MAX_CLUSTERS], row[MAX_CLUSTERS];
 	static uint8_t level[MAX_CLUSTERS], flags[MAX_CLUSTERS];
@@ -47,17 +49,18 @@ static int setup(void **state)
 		for (int g = 0; g < GROUPS; g++) {
 			if (!(levels_of[g] >> l & 1))
 				continue;
-			x[n] = (float)(g - 2) * 0.25f + RADIUS;
-			y[n] = RADIUS;
-			r[n] = 1.42f * RADIUS;
+			cluster[n] = (struct psr_cluster){ .center = { (float)(g - 2) * 0.25f + RADIUS, RADIUS, 0 },
+				                               .radius = 1.42f * RADIUS, .first_block = n, .n_blocks = 1,
+				                               .group = (uint32_t)(GROUPS - 1 - g), .level = (uint8_t)l };
+			x[n] = (int16_t)(cluster[n].center[0] * 0x1p14f);
+			y[n] = (int16_t)(cluster[n].center[1] * 0x1p14f);
+			r[n] = (uint16_t)(cluster[n].radius * 0x1p15f);
 			col[n] = (int16_t)((g - 2) * 32 >> l);
 			level[n] = (uint8_t)l;
 			mask[n] = UINT64_MAX;
 			first[n] = 64 * n;
 			for (int i = 0; i < 64; i++)
 				attr[64 * n + (uint32_t)i] = psr_direction_encode((const float[3]){ 0, 0, 1 });
-			cluster[n] = (struct psr_cluster){ .center = { x[n], y[n], 0 }, .radius = r[n], .first_block = n,
-				                               .n_blocks = 1, .group = (uint32_t)(GROUPS - 1 - g), .level = (uint8_t)l };
 			n++;
 		}
 	}

@@ -97,32 +97,84 @@ static void samples_lie_on_the_surface(void **state)
 	meshes_free(mesh);
 }
 
-static void spheres_hold_their_samples(void **state)
+/* The middle of the box of a block's samples, along the axes of its projection, and from there to the furthest of them. */
+static void block_box(const struct psr_blocks *b, uint32_t block, double middle[3], double *reach)
 {
-	struct psr_mesh *mesh = dented_sphere();
-	struct psr_model *model = build(mesh, 96, 2);
-	const struct psr_blocks *b = psr_model_blocks(model);
+	const float (*axis)[3] = b->projection[b->block_projection[block]].axis;
+	double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
 
-	(void)state;
+	for (uint64_t left = b->mask[block]; left != 0; left &= left - 1) {
+		float p[3];
+
+		sample_at(b, block, (unsigned)__builtin_ctzll(left), p);
+		for (int k = 0; k < 3; k++) {
+			min[k] = fmin(min[k], (double)v3f_dot(p, axis[k]));
+			max[k] = fmax(max[k], (double)v3f_dot(p, axis[k]));
+		}
+	}
+	for (int k = 0; k < 3; k++) {
+		middle[k] = 0;
+		for (int a = 0; a < 3; a++)
+			middle[k] += (min[a] + max[a]) / 2 * (double)axis[a][k];
+	}
+	*reach = 0;
+	for (uint64_t left = b->mask[block]; left != 0; left &= left - 1) {
+		double d = 0;
+		float p[3];
+
+		sample_at(b, block, (unsigned)__builtin_ctzll(left), p);
+		for (int k = 0; k < 3; k++)
+			d += ((double)p[k] - middle[k]) * ((double)p[k] - middle[k]);
+		*reach = fmax(*reach, sqrt(d));
+	}
+}
+
+/* Of all blocks of a model: what they hold, in what they are held, and how much wider than need be they are: by the rounding
+ * of the centre, half a unit of 2^-14 along each axis, that of the radius, a unit of 2^-15, and some 2^-20 for the
+ * rounding of positions here and there. */
+static void check_spheres(const struct psr_blocks *b)
+{
+	const double roundings = sqrt(3.0) * 0x1p-15 + 0x1p-15 + 0x1p-20;
+
 	for (uint32_t c = 0; c < b->n_clusters; c++) {
 		const struct psr_cluster *cluster = &b->cluster[c];
 
 		assert_in_range(cluster->n_blocks, 1, cluster->level == 0 ? 1024 : 16384);
 		for (uint32_t i = cluster->first_block; i < cluster->first_block + cluster->n_blocks; i++) {
-			float center[3] = { b->sphere_x[i], b->sphere_y[i], b->sphere_z[i] }, d[3];
+			double middle[3], reach, half_step = (double)b->projection[0].spacing * (double)(1 << b->level[i]) / 2;
+			float center[3], radius, d[3];
 
+			psr_blocks_sphere(b, i, center, &radius);
 			v3f_sub(d, center, cluster->center);
-			assert_true(v3f_length(d) + b->sphere_r[i] <= cluster->radius * (1 + 0x1p-20f));
+			assert_true(v3f_length(d) + radius <= cluster->radius * (1 + 0x1p-20f));
+			block_box(b, i, middle, &reach);
+			assert_true((double)radius <= reach + half_step + roundings);
+			for (int k = 0; k < 3; k++)
+				assert_float_equal(center[k], middle[k], 0x1p-15 + 0x1p-20);
 			for (uint64_t left = b->mask[i]; left != 0; left &= left - 1) {
 				float p[3];
 
 				sample_at(b, i, (unsigned)__builtin_ctzll(left), p);
 				v3f_sub(d, p, center);
-				assert_true(v3f_length(d) + b->projection[0].spacing / 2 <= b->sphere_r[i] * (1 + 0x1p-20f));
+				assert_true(v3f_length(d) + (float)half_step <= radius * (1 + 0x1p-20f));
 			}
 		}
 	}
-	psr_model_unref(model);
+}
+
+/* Resolution 8 has the widest blocks that there are. */
+static void spheres_hold_their_samples_and_little_more(void **state)
+{
+	static const uint32_t resolution[3] = { 8, 64, 96 };
+	struct psr_mesh *mesh = dented_sphere();
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		struct psr_model *model = build(mesh, resolution[i], 2);
+
+		check_spheres(psr_model_blocks(model));
+		psr_model_unref(model);
+	}
 	meshes_free(mesh);
 }
 
@@ -310,7 +362,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(threads_do_not_change_a_byte),
 		cmocka_unit_test(samples_lie_on_the_surface),
-		cmocka_unit_test(spheres_hold_their_samples),
+		cmocka_unit_test(spheres_hold_their_samples_and_little_more),
 		cmocka_unit_test(random_views_have_no_holes),
 		cmocka_unit_test(sheets_are_two_sided_and_closed_things_are_not),
 		cmocka_unit_test(flat_faces_are_not_sampled_twice),

@@ -165,6 +165,141 @@ static void the_order_does_not_matter(void **state)
 	}
 }
 
+/* Of a packed cone: the sine with which it holds the normals, and its own. */
+static double widest_sine(const float (*normal)[3], int n, const int8_t axis[3])
+{
+	double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]), least = 1;
+
+	for (int i = 0; i < n; i++) {
+		double c = 0;
+
+		for (int k = 0; k < 3; k++)
+			c += axis[k] / length * (double)normal[i][k];
+		least = fmin(least, c);
+	}
+	return least > 0 ? sqrt(1 - least * least) : 1;
+}
+
+/* At every size of cap, the smallest ones too. The bound is the header's: a step of the sine, the turn of the axis, half
+ * a unit in two components of a vector of at least 127, and 2^-20 of the cosine, beside 2^-20 that cone_bound() takes. */
+static void a_packed_cone_holds_every_normal_and_is_little_wider(void **state)
+{
+	const double turn = sqrt(0.5) / 127, slack = sqrt(2 * 0x1p-20);
+	double most = 0;
+	uint64_t seed = 11;
+	int n_any = 0;
+
+	(void)state;
+	for (int round = 0; round < 40000; round++) {
+		float normal[128][3], bound[3], cosine;
+		int n = 1 + (int)(128 * meshes_random(&seed)), greatest = 0;
+		double spread = 1.2 * pow(meshes_random(&seed), 4), smallest; /* mostly small; at times no cap holds them */
+		int8_t axis[3];
+		uint8_t sine;
+
+		random_normals(&seed, n, spread, normal);
+		cone_bound((const float(*)[3])normal, n, bound, &cosine);
+		cone_pack((const float(*)[3])normal, n, axis, &sine);
+		for (int k = 0; k < 3; k++)
+			greatest = abs(axis[k]) > greatest ? abs(axis[k]) : greatest;
+		assert_int_equal(greatest, 127);
+		smallest = cosine > 0 ? sqrt(1 - (double)cosine * (double)cosine) : 1;
+		if (sine == PSR_CONE_ANY) {
+			assert_true(smallest + turn + slack > 254.0 / 255);
+			n_any++;
+			continue;
+		}
+		assert_true(widest_sine((const float(*)[3])normal, n, axis) <= sine / 255.0);
+		assert_true(sine / 255.0 <= smallest + turn + slack + 1 / 255.0);
+		most = fmax(most, sine / 255.0 - smallest);
+	}
+	assert_in_range(n_any, 40, 4000); /* both happen */
+	assert_true(most > 1 / 255.0);    /* the turn shows: rounding the sine alone would stay below */
+}
+
+static void normals_all_around_pack_as_any(void **state)
+{
+	const float around[4][3] = { { 1, 0, 0 }, { -0.6f, 0.8f, 0 }, { -0.6f, -0.8f, 0 }, { 0, 0, 1 } };
+	const float nearly[2][3] = { { 0.999999f, 0, 0.001414f }, { -0.999999f, 0, 0.001414f } }; /* of cosine 0.0014 */
+	int8_t axis[3];
+	uint8_t sine;
+
+	(void)state;
+	cone_pack(around, 4, axis, &sine);
+	assert_int_equal(sine, PSR_CONE_ANY);
+	cone_pack(nearly, 2, axis, &sine);
+	assert_int_equal(sine, PSR_CONE_ANY);
+	cone_pack(NULL, 0, axis, &sine);
+	assert_int_equal(sine, PSR_CONE_ANY);
+	assert_true(axis[0] == 0 && axis[1] == 0 && axis[2] == 127);
+}
+
+/* Directions whose axis has no rounding: what is left of a flat block is 2^-20 of the cosine, which is less than a step. */
+static void flat_blocks_along_the_axes_pack_to_a_step(void **state)
+{
+	(void)state;
+	for (int side = 0; side < 6; side++) {
+		float normal[2][3] = { { 0 } };
+		int8_t axis[3];
+		uint8_t sine;
+
+		normal[0][side % 3] = normal[1][side % 3] = side < 3 ? 1 : -1;
+		cone_pack((const float(*)[3])normal, 2, axis, &sine);
+		assert_int_equal(sine, 1);
+		for (int k = 0; k < 3; k++)
+			assert_int_equal(axis[k], k != side % 3 ? 0 : side < 3 ? 127 : -127);
+	}
+}
+
+/* A block whose one sample still faces the eye, whatever the eye's place, is not culled: for random cones and eyes, some of
+ * them nearly where they are. */
+static void no_block_is_culled_while_a_normal_of_its_cone_faces_the_eye(void **state)
+{
+	const int16_t at_center[3] = { 1638, -3277, 4915 };
+	const uint16_t reach = 1638;
+	uint64_t seed = 12;
+	int n_culled = 0, n_kept = 0;
+
+	(void)state;
+	for (int round = 0; round < 40000; round++) {
+		float normal[16][3], center[3], radius, eye[3];
+		int n = 1 + (int)(16 * meshes_random(&seed)), is_perspective = round % 2, faces = 0;
+		double v[3];
+		int8_t axis[3];
+		uint8_t sine, flags = 0;
+		struct psr_blocks blocks = { .n_blocks = 1, .sphere_x = &at_center[0], .sphere_y = &at_center[1],
+			                         .sphere_z = &at_center[2], .sphere_r = &reach, .flags = &flags, .cone_x = &axis[0], .cone_y = &axis[1],
+			                         .cone_z = &axis[2], .cone_sine = &sine };
+
+		psr_blocks_sphere(&blocks, 0, center, &radius);
+		random_normals(&seed, n, meshes_random(&seed), normal);
+		cone_pack((const float(*)[3])normal, n, axis, &sine);
+		random_unit(&seed, v);
+		for (int k = 0; k < 3; k++)
+			eye[k] = is_perspective ? center[k] + (float)(v[k] * (0.04 + 2 * meshes_random(&seed))) : (float)v[k];
+		/* At its centre and at a place of its sphere, with what the renderer forgives left out. */
+		for (int i = 0; i < 2 * n; i++) {
+			double to[3], product = 0;
+
+			random_unit(&seed, to);
+			for (int k = 0; k < 3; k++) {
+				double at = (double)center[k] + (i < n ? 0 : (double)radius * to[k]);
+
+				to[k] = is_perspective ? (double)eye[k] - at : (double)eye[k];
+				product += to[k] * (double)normal[i % n][k];
+			}
+			faces |= product >= -0.0125 * v3d_length(to);
+		}
+		if (cone_culls(&blocks, 0, eye, is_perspective)) {
+			assert_false(faces);
+			n_culled++;
+		} else {
+			n_kept++;
+		}
+	}
+	assert_true(n_culled > 4000 && n_kept > 4000);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -174,6 +309,10 @@ int main(void)
 		cmocka_unit_test(two_and_three_normals_are_on_the_rim),
 		cmocka_unit_test(normals_all_around_have_no_cone),
 		cmocka_unit_test(the_order_does_not_matter),
+		cmocka_unit_test(a_packed_cone_holds_every_normal_and_is_little_wider),
+		cmocka_unit_test(normals_all_around_pack_as_any),
+		cmocka_unit_test(flat_blocks_along_the_axes_pack_to_a_step),
+		cmocka_unit_test(no_block_is_culled_while_a_normal_of_its_cone_faces_the_eye),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

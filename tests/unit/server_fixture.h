@@ -63,7 +63,8 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 {
 	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, .spacing = 1.0f / 64 };
 	static struct psr_cluster cluster = { .radius = 1, .n_blocks = PLATE_BLOCKS };
-	static float x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS], r[PLATE_BLOCKS];
+	static int16_t x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS];
+	static uint16_t r[PLATE_BLOCKS];
 	static float bias[PLATE_BLOCKS], step[PLATE_BLOCKS];
 	static uint16_t number[PLATE_BLOCKS], depth[PLATE_SAMPLES];
 	static int16_t col[PLATE_BLOCKS], row[PLATE_BLOCKS];
@@ -95,9 +96,9 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	for (int i = 0; i < PLATE_BLOCKS; i++) {
 		col[i] = (int16_t)(i % 8 - 4);
 		row[i] = (int16_t)(i / 8 - 4);
-		x[i] = ((float)col[i] + 0.5f) * side;
-		y[i] = ((float)row[i] + 0.5f) * height;
-		r[i] = side;
+		x[i] = (int16_t)(((float)col[i] + 0.5f) * side * 0x1p14f);
+		y[i] = (int16_t)(((float)row[i] + 0.5f) * height * 0x1p14f);
+		r[i] = (uint16_t)(side * 0x1p15f);
 		mask[i] = UINT64_MAX;
 		first[i] = (uint32_t)(64 * i);
 		flags[i] = PSR_BLOCK_TWO_SIDED;

@@ -31,6 +31,8 @@ enum psr_block_flag {
 	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
 };
 
+#define PSR_CONE_ANY 255
+
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice
  * origin is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth
  * along z is depth_bias + depth_step * (float)depth[k], its attributes are attr[k], with k = attr_first[b] + number of
@@ -45,7 +47,8 @@ struct psr_blocks {
 	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr and depth */
 	const struct psr_projection *projection;
 	const struct psr_cluster *cluster;
-	const float *sphere_x, *sphere_y, *sphere_z, *sphere_r; /* bounds the samples and reaches half a step beyond */
+	const int16_t *sphere_x, *sphere_y, *sphere_z; /* see psr_blocks_sphere() */
+	const uint16_t *sphere_r;
 	const uint16_t *block_projection;
 	const int16_t *col, *row;               /* in blocks */
 	const uint8_t *level;                   /* 0 is the finest */
@@ -55,10 +58,23 @@ struct psr_blocks {
 	const uint32_t *attr_first;
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
-	/* Optional, NULL if absent ([G] 6.3, 6.4): */
-	const float *cone_x, *cone_y, *cone_z, *cone_cos; /* cap of the geometric normals; -1: any */
+	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block, its faces' and its samples', are within
+	 * an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x, cone_y, cone_z); the greatest
+	 * magnitude of these is 127. */
+	const int8_t *cone_x, *cone_y, *cone_z;
+	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
 	const uint64_t (*visibility)[2];        /* 128 bits, one a triangle of directions */
 };
+
+/* The sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x, sphere_y,
+ * sphere_z) / 2^14, its radius sphere_r / 2^15, in inner units. All are exact. */
+static inline void psr_blocks_sphere(const struct psr_blocks *blocks, uint32_t block, float center[3], float *radius)
+{
+	center[0] = (float)blocks->sphere_x[block] * (1.0f / 16384);
+	center[1] = (float)blocks->sphere_y[block] * (1.0f / 16384);
+	center[2] = (float)blocks->sphere_z[block] * (1.0f / 16384);
+	*radius = (float)blocks->sphere_r[block] * (1.0f / 32768);
+}
 
 /* A spatial cluster at one level: blocks first_block .. first_block + n_blocks - 1. Clusters of one `group` are the
  * same piece of the object at different levels; exactly one of them is drawn. */

@@ -8,10 +8,13 @@
 
 struct arrays {
 	uint32_t n_blocks, n_samples;
-	float *sphere[4], *cone[4], *bias, *step;
+	float *bias, *step;
+	int16_t *center[3];
+	uint16_t *radius;
+	int8_t *cone[3];
 	uint16_t *projection, *depth;
 	int16_t *col, *row;
-	uint8_t *level, *flags;
+	uint8_t *level, *flags, *cone_sine;
 	uint64_t *mask, *attr;
 	uint32_t *first;
 };
@@ -72,10 +75,12 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	if (!mask)
 		return;
 	uint32_t b = a->n_blocks++;
-	for (int k = 0; k < 4; k++) {
-		a->sphere[k] = grow(a->sphere[k], a->n_blocks, sizeof(float));
-		a->cone[k] = grow(a->cone[k], a->n_blocks, sizeof(float));
+	for (int k = 0; k < 3; k++) {
+		a->center[k] = grow(a->center[k], a->n_blocks, 2);
+		a->cone[k] = grow(a->cone[k], a->n_blocks, 1);
 	}
+	a->radius = grow(a->radius, a->n_blocks, 2);
+	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
 	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
 	a->step = grow(a->step, a->n_blocks, sizeof(float));
 	a->projection = grow(a->projection, a->n_blocks, 2);
@@ -91,20 +96,26 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	double middle[3] = { (8 * col + 3.75) * dx, (8 * row + 3.5) * dx * sqrt(0.75), (low + high) / 2 }, center[3];
 	m3d_apply_transposed(center, axis, middle);
 	for (int k = 0; k < 3; k++)
-		a->sphere[k][b] = (float)center[k];
-	a->sphere[3][b] = (float)(sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx);
-	/* A cap that holds the normals: around their mean, a little wider than the furthest of them. */
-	double mean[3] = { 0 }, least = 1;
+		a->center[k][b] = (int16_t)rint(center[k] * 0x1p14);
+	/* The center is off by half of 2^-14 along each axis. */
+	a->radius[b] = (uint16_t)ceil((sqrt(3.75 * 3.75 + 3.04 * 3.04) * dx + (high - low) / 2 + dx + 0x1p-14) * 0x1p15);
+	/* A cap that holds the normals: around their mean, rounded, a little wider than the furthest of them. */
+	double mean[3] = { 0 }, least = 1, greatest = 0;
 	for (int i = 0; i < 64; i++)
 		if (s[i].valid)
 			v3d_add(mean, mean, s[i].normal);
+	for (int k = 0; k < 3; k++)
+		greatest = fmax(greatest, fabs(mean[k]));
+	for (int k = 0; k < 3; k++) {
+		mean[k] = rint(mean[k] / greatest * 127);
+		a->cone[k][b] = (int8_t)mean[k];
+	}
 	v3d_normalize(mean, mean);
 	for (int i = 0; i < 64; i++)
 		if (s[i].valid)
 			least = fmin(least, v3d_dot(mean, s[i].normal));
-	for (int k = 0; k < 3; k++)
-		a->cone[k][b] = (float)mean[k];
-	a->cone[3][b] = (float)fmax(-1, least - 1e-6);
+	least = fmax(0, least - 1e-6);
+	a->cone_sine[b] = (uint8_t)ceil(sqrt(1 - least * least) * 255);
 	a->bias[b] = (float)low;
 	a->step[b] = (float)((high - low) / 65535);
 	a->projection[b] = (uint16_t)p;
@@ -148,7 +159,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	struct psr_blocks blocks = {
 		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
 		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster,
-		.sphere_x = a.sphere[0], .sphere_y = a.sphere[1], .sphere_z = a.sphere[2], .sphere_r = a.sphere[3],
+		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
 		.block_projection = a.projection, .col = a.col, .row = a.row, .level = a.level, .flags = a.flags,
 		.depth_bias = a.bias, .depth_step = a.step, .mask = a.mask, .attr_first = a.first, .depth = a.depth, .attr = a.attr,
 	};
@@ -156,7 +167,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		blocks.cone_x = a.cone[0];
 		blocks.cone_y = a.cone[1];
 		blocks.cone_z = a.cone[2];
-		blocks.cone_cos = a.cone[3];
+		blocks.cone_sine = a.cone_sine;
 	}
 	struct psr_model_info info = { .scale = o->scale, .spacing = ds * o->scale, .tolerance = 25 * 3.14159265358979 / 180,
 		                           .resolution = o->resolution, .builder = "test" };
@@ -171,10 +182,12 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		fprintf(stderr, "%s\n", err.text);
 		abort();
 	}
-	for (int k = 0; k < 4; k++) {
-		free(a.sphere[k]);
+	for (int k = 0; k < 3; k++) {
+		free(a.center[k]);
 		free(a.cone[k]);
 	}
+	free(a.radius);
+	free(a.cone_sine);
 	free(a.bias); free(a.step); free(a.projection); free(a.depth); free(a.col); free(a.row);
 	free(a.level); free(a.flags); free(a.mask); free(a.first); free(a.attr);
 	return model;
