@@ -85,27 +85,16 @@ extern const int n_study_kinds;
 /* One step of `total` is done. */
 void study_step(struct study *study, const char *what);
 
+/* study_model.c: psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model);
+
 /* ---- study_plot.c ---- */
 
 /* Writes a picture of the table, .png or .svg by the name's end, through gnuplot. ARG, NOT_FOUND (no gnuplot), IO. */
 int study_plot(const struct study *study, const char *path, struct psr_error *err);
 
-/* ---- study_select.c, study_cull.c, study_models.c ---- */
-
-int study_run_tolerance(struct study *study);
-int study_run_square(struct study *study);
-int study_run_block_size(struct study *study);
-int study_run_selection(struct study *study);
-int study_run_models(struct study *study);
-int study_run_masks(struct study *study);
-int study_run_subdivision(struct study *study);
-int study_run_culling(struct study *study);
-
-#define STUDY_TOLERANCE 0.43633231299858238 /* 25 degrees */
-
-/* psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
-int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
-                const struct study_model *model);
+/* ---- study_select.c: selections of blocks, row by row ---- */
 
 /* A selection measured: blocks, samples, bytes, adequacy, time to warp. */
 struct study_measure {
@@ -116,5 +105,30 @@ struct study_measure {
 };
 int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
                   const struct greedy *greedy, const struct greedy_result *result);
+
+/* A table for such rows, and its ratios to row `base`, made last. MEMORY. */
+int study_start(struct study *study, const char *first, int n_rows);
+void study_finish(struct study *study, int base);
+void study_put(struct study *study, int row, int model, const struct study_measure *measure, double seconds);
+
+/* Projections at a tolerance angle in degrees; greedy_destroy() it. */
+int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
+               enum greedy_directions directions);
+
+/* Selects, measures and puts down; a step of the study. options->goes_on: from the row before. */
+int study_select(struct study *study, int row, int model, struct greedy *greedy,
+                 const struct greedy_select_options *options);
+
+int study_run_tolerance(struct study *study);
+int study_run_square(struct study *study);
+int study_run_block_size(struct study *study);
+
+/* ---- study_tried.c, study_cull.c, study_models.c ---- */
+
+int study_run_selection(struct study *study);
+int study_run_models(struct study *study);
+int study_run_masks(struct study *study);
+int study_run_subdivision(struct study *study);
+int study_run_culling(struct study *study);
 
 #endif

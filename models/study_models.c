@@ -49,12 +49,11 @@ static void put_thesis(const struct study *study, int row)
 static int put_greedy(struct study *study, int row)
 {
 	const struct study_model *model = &study->model[row];
-	const struct greedy_scan_options scan = { .resolution = study->resolution, .tolerance = STUDY_TOLERANCE };
 	struct greedy_select_options options;
 	struct greedy_result result;
 	struct study_measure measure;
 	struct greedy *greedy = NULL;
-	int rc = greedy_create(&greedy, model->mesh, model->scene, model->scale, &scan, study->pool, study->err);
+	int rc = study_scan(&greedy, study, row, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 
 	greedy_select_default(&options);
 	if (rc == PSR_OK)

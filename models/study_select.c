@@ -49,7 +49,7 @@ int study_measure(struct study_measure *out, const struct study *study, const st
 	return rc;
 }
 
-static void put(struct study *study, int row, int model, const struct study_measure *m, double seconds)
+void study_put(struct study *study, int row, int model, const struct study_measure *m, double seconds)
 {
 	const struct study_table *table = &study->table;
 
@@ -65,8 +65,8 @@ static void put(struct study *study, int row, int model, const struct study_meas
 	*study_at(table, row, model, SECONDS) = seconds;
 }
 
-static int select_and_put(struct study *study, int row, int model, struct greedy *greedy,
-                          const struct greedy_select_options *options)
+int study_select(struct study *study, int row, int model, struct greedy *greedy,
+                 const struct greedy_select_options *options)
 {
 	double before = options->goes_on ? *study_at(&study->table, row - 1, model, SECONDS) : greedy->seconds_scan;
 	struct greedy_result result;
@@ -76,13 +76,13 @@ static int select_and_put(struct study *study, int row, int model, struct greedy
 	if (rc == PSR_OK)
 		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
 	if (rc == PSR_OK)
-		put(study, row, model, &measure, before + result.seconds);
+		study_put(study, row, model, &measure, before + result.seconds);
 	study_step(study, study->model[model].name);
 	return rc;
 }
 
-static int scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
-                enum greedy_directions directions)
+int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
+               enum greedy_directions directions)
 {
 	const struct study_model *m = &study->model[model];
 	const struct greedy_scan_options options = { .resolution = study->resolution, .tolerance = degrees * RADIANS,
@@ -91,13 +91,13 @@ static int scan(struct greedy **out, struct study *study, int model, double degr
 	return greedy_create(out, m->mesh, m->scene, m->scale, &options, study->pool, study->err);
 }
 
-static int start_table(struct study *study, const char *first, int n_rows)
+int study_start(struct study *study, const char *first, int n_rows)
 {
 	study->total = n_rows * study->n_models;
 	return study_table_init(&study->table, first, columns, N_COLUMNS, n_rows, study->n_models, study->err);
 }
 
-static void finish_table(struct study *study, int base)
+void study_finish(struct study *study, int base)
 {
 	study_relate(&study->table, SIZE, SIZE_RATIO, base);
 	study_relate(&study->table, WARP, WARP_RATIO, base);
@@ -106,7 +106,7 @@ static void finish_table(struct study *study, int base)
 static int run_angles(struct study *study, const double *degrees, int n, enum greedy_lattice lattice)
 {
 	struct greedy_select_options options;
-	int rc = start_table(study, "degrees", n + (lattice == GREEDY_SQUARE)), base = n;
+	int rc = study_start(study, "degrees", n + (lattice == GREEDY_SQUARE)), base = n;
 
 	greedy_select_default(&options);
 	for (int i = 0; rc == PSR_OK && i < n; i++) {
@@ -115,9 +115,9 @@ static int run_angles(struct study *study, const double *degrees, int n, enum gr
 		for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 			struct greedy *greedy = NULL;
 
-			rc = scan(&greedy, study, m, degrees[i], lattice, GREEDY_THESIS);
+			rc = study_scan(&greedy, study, m, degrees[i], lattice, GREEDY_THESIS);
 			if (rc == PSR_OK)
-				rc = select_and_put(study, i, m, greedy, &options);
+				rc = study_select(study, i, m, greedy, &options);
 			greedy_destroy(greedy);
 		}
 	}
@@ -125,13 +125,13 @@ static int run_angles(struct study *study, const double *degrees, int n, enum gr
 		struct greedy *greedy = NULL;
 
 		snprintf(study->table.label[n], sizeof study->table.label[n], "25 (equilateral)");
-		rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
+		rc = study_scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 		if (rc == PSR_OK)
-			rc = select_and_put(study, n, m, greedy, &options);
+			rc = study_select(study, n, m, greedy, &options);
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		finish_table(study, base);
+		study_finish(study, base);
 	return rc;
 }
 
@@ -153,112 +153,21 @@ int study_run_block_size(struct study *study)
 {
 	static const int side[] = { 4, 8, 16, 32 };
 	struct greedy_select_options options;
-	int n = (int)(sizeof side / sizeof *side), rc = start_table(study, "block", n);
+	int n = (int)(sizeof side / sizeof *side), rc = study_start(study, "block", n);
 
 	greedy_select_default(&options);
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 		struct greedy *greedy = NULL;
 
-		rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
+		rc = study_scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 		for (int i = 0; rc == PSR_OK && i < n; i++) {
 			snprintf(study->table.label[i], sizeof study->table.label[i], "%dx%d", side[i], side[i]);
 			options.side = side[i];
-			rc = select_and_put(study, i, m, greedy, &options);
+			rc = study_select(study, i, m, greedy, &options);
 		}
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		finish_table(study, 1);
-	return rc;
-}
-
-/* ---- what was tried for selection ---- */
-
-static const struct variant {
-	const char *label;
-	enum greedy_directions directions;
-	int goes_on; /* from the row before */
-	int second_pass, is_one_test, not_facing, by_score, drops, strict;
-	double depth; /* 0: 1 */
-} variants[] = {
-	{ "[G] 32, one test, both passes", GREEDY_THESIS, .second_pass = 1, .is_one_test = 1 },
-	{ "[G] 32, backs count, both passes", GREEDY_THESIS, .second_pass = 1, .not_facing = 1 },
-	{ "[G] 32, depths 10 times as strict, first pass", GREEDY_THESIS, .depth = 0.1 },
-	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1, .depth = 0.1 },
-	{ "[G] 32, first pass", GREEDY_THESIS, .goes_on = 0 },
-	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1 },
-	{ "    samples dropped (9.2.3)", GREEDY_THESIS, .goes_on = 1, .drops = 1 },
-	{ "icosahedral 32, first pass", GREEDY_ICOSAHEDRAL, .goes_on = 0 },
-	{ "  both passes", GREEDY_ICOSAHEDRAL, .goes_on = 1, .second_pass = 1 },
-	{ "    samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
-	{ "icosahedral 32, by score (9.2.2)", GREEDY_ICOSAHEDRAL, .by_score = 1 },
-	{ "  samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
-	{ "98 and scouts, strict first", GREEDY_CORNERS, .strict = 1 },
-	{ "  second pass", GREEDY_CORNERS, .goes_on = 1, .second_pass = 1, .strict = 1 },
-};
-#define BASE_VARIANT 5
-#define N_VARIANTS ((int)(sizeof variants / sizeof *variants))
-
-static int run_variant(struct study *study, int row, int model, struct greedy *greedy)
-{
-	const struct variant *variant = &variants[row];
-	struct greedy_select_options options;
-
-	greedy_select_default(&options);
-	options.goes_on = variant->goes_on;
-	options.second_pass = variant->second_pass;
-	options.is_facing = !variant->not_facing;
-	options.by_score = variant->by_score;
-	options.drops_samples = variant->drops;
-	options.is_strict_first = options.forgives_outlines = variant->strict;
-	if (variant->depth > 0)
-		options.depth_tolerance = variant->depth;
-	if (variant->is_one_test)
-		options.n_rotations = options.n_shifts = 1;
-	return select_and_put(study, row, model, greedy, &options);
-}
-
-static int run_product(struct study *study, int row, int model)
-{
-	struct greedy *greedy = NULL;
-	struct greedy_result result;
-	struct study_measure measure;
-	double seconds;
-	int rc = study_build(&greedy, &result, &seconds, study, &study->model[model]);
-
-	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
-	greedy_destroy(greedy);
-	if (rc == PSR_OK)
-		put(study, row, model, &measure, seconds);
-	study_step(study, study->model[model].name);
-	return rc;
-}
-
-int study_run_selection(struct study *study)
-{
-	int rc = start_table(study, "selection", N_VARIANTS + 1);
-
-	if (rc == PSR_OK)
-		snprintf(study->table.label[N_VARIANTS], sizeof *study->table.label, "psr: ownership, all levels built");
-	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
-		struct greedy *greedy = NULL;
-
-		for (int i = 0; rc == PSR_OK && i < N_VARIANTS; i++) {
-			snprintf(study->table.label[i], sizeof study->table.label[i], "%s", variants[i].label);
-			if (i == 0 || variants[i].directions != variants[i - 1].directions) {
-				greedy_destroy(greedy);
-				greedy = NULL;
-				rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, variants[i].directions);
-			}
-			if (rc == PSR_OK)
-				rc = run_variant(study, i, m, greedy);
-		}
-		greedy_destroy(greedy);
-		if (rc == PSR_OK)
-			rc = run_product(study, N_VARIANTS, m);
-	}
-	if (rc == PSR_OK)
-		finish_table(study, BASE_VARIANT);
+		study_finish(study, 1);
 	return rc;
 }
