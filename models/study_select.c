@@ -144,7 +144,7 @@ int study_run_tolerance(struct study *study)
 
 int study_run_square(struct study *study)
 {
-	static const double degrees[] = { 20, 25, 30, 35, 40, 45, 50, 55 };
+	static const double degrees[] = { 20, 25, 30, 35, 40, 44, 45, 46, 50, 55 };
 
 	return run_angles(study, degrees, (int)(sizeof degrees / sizeof *degrees), GREEDY_SQUARE);
 }

@@ -25,7 +25,7 @@ static const struct variant {
 	{ "[G] 32, first pass", GREEDY_THESIS, .goes_on = 0 },
 	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1 },
 	{ "    samples dropped (9.2.3)", GREEDY_THESIS, .goes_on = 1, .drops = 1 },
-	{ "[G] 32, square lattice, 45 degrees, both passes", GREEDY_THESIS, .second_pass = 1, .degrees = 45 },
+	{ "[G] 32, square lattice, 40 degrees, both passes", GREEDY_THESIS, .second_pass = 1, .degrees = 40 },
 	{ "icosahedral 32, first pass", GREEDY_ICOSAHEDRAL, .goes_on = 0 },
 	{ "  both passes", GREEDY_ICOSAHEDRAL, .goes_on = 1, .second_pass = 1 },
 	{ "    samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
