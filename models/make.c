@@ -97,7 +97,7 @@ int cmd_make(int argc, char **argv)
 	if (code == PSR_OK && n_operands != 1)
 		code = psr_fail(&err, PSR_ERR_ARG, "one NAME is needed; psr-model make --list prints them");
 	if (code == PSR_OK && path == NULL)
-		code = psr_fail(&err, PSR_ERR_ARG, "-o OUT is missing");
+		code = psr_fail(&err, PSR_ERR_ARG, "-o %s is missing", strcmp(argv[1], "all") == 0 ? "FOLDER" : "OUT.glb");
 	if (code == PSR_OK && strcmp(argv[1], "all") == 0) {
 		code = make_all(path, &err);
 	} else if (code == PSR_OK) {

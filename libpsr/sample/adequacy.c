@@ -9,6 +9,7 @@
 #include "texture.h"
 
 #define CHUNK 4096
+#define BATCH 64
 #define FARTHEST 4    /* pixels around a place in which its surface is looked for, at grazing angles */
 #define BACK 0.0125f  /* as the renderer's: what faces away by less than normals are quantised to still counts */
 
@@ -155,44 +156,63 @@ static int is_missing(const struct level *level, const struct trial *trial)
 }
 
 /* Looked at from outside, as one-sided faces let rays through that come from behind them. */
-static int is_visible(const struct level *level, const struct trial *trial)
+static void look_at(const struct level *level, const struct trial *trial, int n, uint8_t *is_visible)
 {
-	struct ray ray;
-	struct ray_hit hit;
+	struct ray ray[BATCH];
+	struct ray_hit hit[BATCH];
 
-	for (int k = 0; k < 3; k++) {
-		ray.origin[k] = (double)trial->spot.p[k] + 3 * trial->view[k];
-		ray.direction[k] = -trial->view[k];
+	for (int i = 0; i < n; i++) {
+		for (int k = 0; k < 3; k++) {
+			ray[i].origin[k] = (double)trial[i].spot.p[k] + 3 * trial[i].view[k];
+			ray[i].direction[k] = -trial[i].view[k];
+		}
 	}
-	ray_scene_trace(level->scene, &ray, 1, 0, &hit);
-	return hit.prim != RAY_NONE && hit.t > 3 - 0.01 * level->ds;
+	ray_scene_trace(level->scene, ray, n, 0, hit);
+	for (int i = 0; i < n; i++)
+		is_visible[i] = hit[i].prim != RAY_NONE && hit[i].t > 3 - 0.01 * level->ds;
+}
+
+static int add_missing_spot(struct chunk *chunk, const struct surface_spot *spot)
+{
+	if (chunk->n_missing == chunk->capacity) {
+		size_t capacity = chunk->capacity != 0 ? 2 * chunk->capacity : 16;
+		struct surface_spot *grown = realloc(chunk->missing, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		chunk->missing = grown;
+		chunk->capacity = capacity;
+	}
+	chunk->missing[chunk->n_missing++] = *spot;
+	return PSR_OK;
+}
+
+static int run_batch(const struct level *level, struct chunk *chunk, const struct trial *trial, int n)
+{
+	uint8_t is_visible[BATCH];
+
+	look_at(level, trial, n, is_visible);
+	for (int i = 0; i < n; i++) {
+		chunk->n_trials += is_visible[i];
+		if (is_visible[i] && is_missing(level, &trial[i]) && add_missing_spot(chunk, &trial[i].spot) != PSR_OK)
+			return PSR_ERR_MEMORY;
+	}
+	return PSR_OK;
 }
 
 static void run_chunk(int i, void *userdata)
 {
 	struct job *job = userdata;
 	struct chunk *chunk = &job->chunk[i];
+	struct trial trial[BATCH];
+	int n = 0;
 
-	for (uint64_t k = (uint64_t)i * CHUNK; k < (uint64_t)(i + 1) * CHUNK; k++) {
-		struct trial trial;
-
-		if (!draw_trial(job, k, &trial) || !is_visible(job->level, &trial))
-			continue;
-		chunk->n_trials++;
-		if (!is_missing(job->level, &trial))
-			continue;
-		if (chunk->n_missing == chunk->capacity) {
-			size_t capacity = chunk->capacity != 0 ? 2 * chunk->capacity : 16;
-			struct surface_spot *grown = realloc(chunk->missing, capacity * sizeof *grown);
-
-			if (grown == NULL) {
-				chunk->failed = 1;
-				return;
-			}
-			chunk->missing = grown;
-			chunk->capacity = capacity;
+	for (uint64_t k = (uint64_t)i * CHUNK; k < (uint64_t)(i + 1) * CHUNK && !chunk->failed; k++) {
+		n += draw_trial(job, k, &trial[n]);
+		if (n == BATCH || k + 1 == (uint64_t)(i + 1) * CHUNK) {
+			chunk->failed = run_batch(job->level, chunk, trial, n) != PSR_OK;
+			n = 0;
 		}
-		chunk->missing[chunk->n_missing++] = trial.spot;
 	}
 }
 
@@ -280,21 +300,28 @@ static int add_missing(struct level *level, const struct adequacy *found, int ro
 	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 
+/* Enough, or no better than two rounds ago by a fifth: the rest is what this way of looking does not find. */
+static int is_over(const struct adequacy *found, int round, uint64_t before_last)
+{
+	return 15000 * found->n_missing < found->n_trials || round == MOST_ROUNDS
+	       || (round > 2 && 5 * found->n_missing > 4 * before_last);
+}
+
 int adequacy_reach(struct adequacy *out, struct level *level)
 {
-	uint64_t n = level->cover.n_points / 2;
+	uint64_t n = level->cover.n_points / 2, before[2] = { 0, 0 };
 	int rc = PSR_OK;
 
-	n = n < 100000 ? 100000 : n > 500000 ? 500000 : n;
-	for (int round = 1;; round++) {
+	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
+	for (int round = 1; rc == PSR_OK; round++) {
 		rc = adequacy_measure(out, level, (uint64_t)round, n);
-		if (rc != PSR_OK || round == MOST_ROUNDS || 15000 * out->n_missing < out->n_trials)
+		if (rc != PSR_OK || is_over(out, round, before[0]))
 			break;
+		before[0] = before[1];
+		before[1] = out->n_missing;
 		rc = add_missing(level, out, round);
 		free(out->spot);
 		out->spot = NULL;
-		if (rc != PSR_OK)
-			break;
 	}
 	free(out->spot);
 	out->spot = NULL;

@@ -168,7 +168,7 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		return psr_fail(build->err, PSR_ERR_MEMORY, "no memory for the mesh's textures");
 	projection_list(build->projection, 2.0 / build->options->resolution, build->options->tolerance);
 	rc = make_levels(build);
-	if (rc == PSR_OK && draft_group(&build->draft) != PSR_OK)
+	if (rc == PSR_OK && draft_group(&build->draft, build->pool) != PSR_OK)
 		rc = psr_fail(build->err, PSR_ERR_MEMORY, "no memory to cut the model into clusters");
 	if (rc == PSR_OK)
 		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);

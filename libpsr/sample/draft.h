@@ -38,8 +38,9 @@ int draft_add(struct draft *draft, const struct level *level);
 /* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has all
  * samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different levels
  * meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they share do
- * not cost too much: where surfaces lie all through each other (leaves), that may be one group. MEMORY. */
-int draft_group(struct draft *draft);
+ * not cost too much: where surfaces lie all through each other (leaves), that may be one group. The same whatever the
+ * threads. MEMORY. */
+int draft_group(struct draft *draft, struct psr_pool *pool);
 
 /* Inner coordinates of sample s of a block. */
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);

@@ -2,14 +2,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vec.h"
-#include "draft.h"
+#include "group.h"
 #include "psr/error.h"
 
 #define LEAST_GROUP 131072 /* samples of the finest level */
 #define MOST_GROWTH 1.25   /* of the number of blocks, by those that groups share */
-#define CELLS 4 /* that a coarse pixel is wide */
-#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
-#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
 
 /* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
  * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
@@ -127,13 +124,7 @@ static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct
 	return n;
 }
 
-struct blocks {
-	struct draft_block *block;
-	uint32_t n, capacity, most;
-	int is_over; /* there would be more */
-};
-
-static int add_block(struct blocks *blocks, const struct draft_block *block)
+int group_add(struct group_blocks *blocks, const struct draft_block *block)
 {
 	if (blocks->n == blocks->most) {
 		blocks->is_over = 1;
@@ -153,7 +144,7 @@ static int add_block(struct blocks *blocks, const struct draft_block *block)
 }
 
 /* A block for each group that has some of a finest one, in the order of these. */
-static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
+static int cut_finest(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
 {
 	uint32_t n = list_places(draft, n_finest, NULL);
 	struct place *place = malloc(((size_t)n + 1) * sizeof *place);
@@ -174,146 +165,14 @@ static int cut_finest(struct blocks *blocks, struct draft *draft, uint32_t n_fin
 			piece.part = 0;
 		for (; i < n && place[i].block == place[first].block && place[i].group == piece.group; i++)
 			piece.part |= place[i].sample != WHOLE ? UINT64_C(1) << place[i].sample : 0;
-		rc = add_block(blocks, &piece);
+		rc = group_add(blocks, &piece);
 	}
 	free(place);
 	return rc;
 }
 
-/* Which groups have fine samples in each cell of a coarse level: points of a cover, one a group and cell. */
-static int map_groups(struct cover *map, const struct draft *draft, const struct blocks *finest, uint32_t n)
-{
-	for (uint32_t b = 0; b < n; b++) {
-		const struct draft_block *block = &finest->block[b];
-
-		for (uint64_t left = block->part; left != 0; left &= left - 1) {
-			struct cover_point point = { .patch = block->group };
-			uint32_t i;
-			int at[3];
-
-			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
-			for (int k = 0; k < 3; k++)
-				at[k] = (int)floor((double)point.position[k] / map->ds);
-			i = cover_cell(map, at);
-			while (i != COVER_NONE && map->point[i].patch != block->group)
-				i = map->point[i].next;
-			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
-				return PSR_ERR_MEMORY;
-		}
-	}
-	return PSR_OK;
-}
-
-/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
-struct part {
-	uint32_t group;
-	uint64_t mask;
-};
-
-struct parts {
-	struct part *part;
-	uint32_t n, capacity;
-};
-
-static int add_part(struct parts *parts, uint32_t group, unsigned s)
-{
-	uint32_t i = 0;
-
-	while (i < parts->n && parts->part[i].group != group)
-		i++;
-	if (i == parts->capacity) {
-		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
-		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		parts->part = grown;
-		parts->capacity = capacity;
-	}
-	if (i == parts->n)
-		parts->part[parts->n++] = (struct part){ group, 0 };
-	parts->part[i].mask |= UINT64_C(1) << s;
-	return PSR_OK;
-}
-
-/* From p to the nearest place of a point's cell. */
-static double distance2(const struct cover *map, const struct cover_point *point, const float p[3])
-{
-	double sum = 0;
-
-	for (int k = 0; k < 3; k++) {
-		double low = floor((double)point->position[k] / map->ds) * map->ds, x = (double)p[k];
-		double away = x < low ? low - x : x > low + map->ds ? x - low - map->ds : 0;
-
-		sum += away * away;
-	}
-	return sum;
-}
-
-/* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
-static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
-{
-	uint32_t first[COVER_MOST_AROUND];
-	int n_cells = cover_around(map, p, reach, first), n = 0;
-
-	for (int c = 0; c < n_cells; c++) {
-		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next) {
-			if (distance2(map, &map->point[i], p) > reach * reach)
-				continue;
-			if (add_part(parts, map->point[i].patch, s) != PSR_OK)
-				return PSR_ERR_MEMORY;
-			n++;
-		}
-	}
-	return n;
-}
-
-static int split_block(struct blocks *blocks, const struct draft *draft, const struct draft_block *block,
-                       const struct cover *map, struct parts *parts)
-{
-	int rc = PSR_OK;
-
-	parts->n = 0;
-	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
-		unsigned s = (unsigned)__builtin_ctzll(left);
-		float p[3];
-		int n;
-
-		draft_position(draft, block, s, p);
-		n = find_groups(map, p, REACH * map->ds, s, parts);
-		if (n == 0)
-			n = find_groups(map, p, FAR * map->ds, s, parts);
-		rc = n < 0 ? n : PSR_OK;
-	}
-	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
-		struct draft_block part = *block;
-
-		part.group = parts->part[i].group;
-		part.part = parts->part[i].mask;
-		rc = add_block(blocks, &part);
-	}
-	return rc;
-}
-
-static int split_level(struct blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
-                       uint32_t n_pieces)
-{
-	struct parts parts = { NULL, 0, 0 };
-	struct cover map;
-	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
-
-	if (rc == PSR_OK)
-		rc = map_groups(&map, draft, blocks, n_pieces);
-	for (uint32_t b = n_finest; rc == PSR_OK && !blocks->is_over && b < draft->n_blocks; b++)
-		if (draft->block[b].level == level)
-			rc = split_block(blocks, draft, &draft->block[b], &map, &parts);
-	cover_fini(&map);
-	free(parts.part);
-	return rc;
-}
-
 /* The blocks of all levels, for groups of at most so many samples. */
-static int make_blocks(struct blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
+static int make_blocks(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most, struct psr_pool *pool)
 {
 	uint32_t n_pieces;
 	int rc;
@@ -324,15 +183,15 @@ static int make_blocks(struct blocks *blocks, struct draft *draft, uint32_t n_fi
 	rc = cut_finest(blocks, draft, n_finest, most);
 	n_pieces = blocks->n;
 	for (uint32_t b = n_finest; rc == PSR_OK && draft->n_groups == 1 && b < draft->n_blocks; b++)
-		rc = add_block(blocks, &draft->block[b]);
-	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && level < draft->n_levels; level++)
-		rc = split_level(blocks, draft, level, n_finest, n_pieces);
+		rc = group_add(blocks, &draft->block[b]);
+	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && !blocks->is_over && level < draft->n_levels; level++)
+		rc = group_split(blocks, draft, level, n_finest, n_pieces, pool);
 	return rc;
 }
 
-int draft_group(struct draft *draft)
+int draft_group(struct draft *draft, struct psr_pool *pool)
 {
-	struct blocks blocks = { .block = NULL };
+	struct group_blocks blocks = { .block = NULL };
 	uint32_t n_finest = 0;
 	int rc = PSR_OK;
 
@@ -340,7 +199,7 @@ int draft_group(struct draft *draft)
 		n_finest++;
 	/* One group shares nothing. */
 	for (uint32_t most = LEAST_GROUP; rc == PSR_OK; most = most < UINT32_MAX / 2 ? 2 * most : UINT32_MAX) {
-		rc = make_blocks(&blocks, draft, n_finest, most);
+		rc = make_blocks(&blocks, draft, n_finest, most, pool);
 		if (!blocks.is_over)
 			break;
 	}

@@ -10,6 +10,7 @@
 #define FREE UINT64_MAX
 #define CELL_PIXELS 1.5
 #define BATCH 64
+#define AT_ONCE 16 /* views */
 #define VIEW_LEVEL 5
 #define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
 #define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
@@ -60,7 +61,7 @@ static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 struct look {
 	const struct seen *seen;
 	const struct ray_scene *scene;
-	double frame[3][3], ds;
+	double frame[AT_ONCE][3][3], ds;
 	int reach; /* rows on each side of the middle */
 	uint64_t n_new;
 	int is_full;
@@ -82,7 +83,8 @@ static void mark(struct look *look, const struct ray *ray, const struct ray_hit 
 static void look_along_row(int i, void *userdata)
 {
 	struct look *look = userdata;
-	double y = (i - look->reach + 0.5) * look->ds, half = 1 - y * y;
+	double y = (i % (2 * look->reach) - look->reach + 0.5) * look->ds, half = 1 - y * y;
+	double (*frame)[3] = look->frame[i / (2 * look->reach)];
 	int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0, n = 0;
 	struct ray ray[BATCH];
 	struct ray_hit hit[BATCH];
@@ -91,8 +93,8 @@ static void look_along_row(int i, void *userdata)
 		double x = (c + 0.5) * look->ds;
 
 		for (int k = 0; k < 3; k++) {
-			ray[n].origin[k] = x * look->frame[0][k] + y * look->frame[1][k] + 2 * look->frame[2][k];
-			ray[n].direction[k] = -look->frame[2][k];
+			ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
+			ray[n].direction[k] = -frame[2][k];
 		}
 		if (++n < BATCH && c + 1 < reach)
 			continue;
@@ -138,20 +140,24 @@ int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struc
 	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
 	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
 
-	/* A view that fills the table is broken off, and looked along again once there is room. */
+	/* Views that fill the table are broken off, and looked along again once there is room. */
 	for (unsigned i = 0; i < N_VIEWS;) {
-		double direction[3];
-
 		/* Far apart ones first, so that the table soon has its size. */
-		psr_direction_center(VIEW_LEVEL, (SEEN_ROUNDS * (i * 211 % N_VIEWS) + (unsigned)round) % N_DIRECTIONS, direction);
-		psr_direction_frame(direction, look.frame);
+		for (unsigned k = 0; k < AT_ONCE; k++) {
+			unsigned view = SEEN_ROUNDS * ((i + k) * 211 % N_VIEWS) + (unsigned)round;
+			double direction[3];
+
+			psr_direction_center(VIEW_LEVEL, view % N_DIRECTIONS, direction);
+			psr_direction_frame(direction, look.frame[k]);
+		}
 		look.n_new = 0;
 		look.is_full = 0;
-		psr_pool_for(pool, 2 * look.reach, look_along_row, &look);
+		psr_pool_for(pool, AT_ONCE * 2 * look.reach, look_along_row, &look);
 		seen->n_cells += look.n_new;
-		if (2 * seen->n_cells > seen->size && grow(seen) != PSR_OK)
-			return PSR_ERR_MEMORY;
-		i += look.is_full ? 0 : 1;
+		while (2 * seen->n_cells > seen->size)
+			if (grow(seen) != PSR_OK)
+				return PSR_ERR_MEMORY;
+		i += look.is_full ? 0 : AT_ONCE;
 	}
 	return PSR_OK;
 }

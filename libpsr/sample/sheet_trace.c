@@ -3,211 +3,10 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
-#include "sheet.h"
+#include "sheet_patch.h"
 
 #define SIDE PSR_BLOCK_SIDE
-#define MOST_LAYERS 24
-#define MOST_HITS (PSR_BLOCK_SAMPLES * MOST_LAYERS)
 #define BATCH 64
-
-struct block_hit {
-	float z;
-	uint32_t surface;
-	uint8_t at, two_sided, is_first;
-	uint16_t parent; /* union-find: hits of a connected sheet have one root */
-};
-
-struct block_hits {
-	struct block_hit hit[MOST_HITS];
-	uint16_t first_of[PSR_BLOCK_SAMPLES + 1]; /* hits are by lattice point */
-	int n;
-};
-
-static int root_of(struct block_hits *h, int i)
-{
-	while (h->hit[i].parent != i) {
-		h->hit[i].parent = h->hit[h->hit[i].parent].parent;
-		i = h->hit[i].parent;
-	}
-	return i;
-}
-
-/* Joins the hits of two neighbouring lattice points that may be one surface: each with the nearest in depth. */
-static void join(struct block_hits *h, int a, int b, float reach)
-{
-	for (int i = h->first_of[a]; i < h->first_of[a + 1]; i++) {
-		int nearest = -1;
-		float least = reach;
-
-		for (int k = h->first_of[b]; k < h->first_of[b + 1]; k++) {
-			float d = fabsf(h->hit[k].z - h->hit[i].z);
-
-			if (d <= least && h->hit[k].two_sided == h->hit[i].two_sided) {
-				least = d;
-				nearest = k;
-			}
-		}
-		if (nearest >= 0) {
-			int p = root_of(h, i), q = root_of(h, nearest);
-
-			if (p < q)
-				h->hit[q].parent = (uint16_t)p;
-			else
-				h->hit[p].parent = (uint16_t)q;
-		}
-	}
-}
-
-static void connect(struct block_hits *h, float reach)
-{
-	for (int r = 0; r < SIDE; r++) {
-		for (int c = 0; c < SIDE; c++) {
-			int s = SIDE * r + c, left = c - 1 + (r & 1);
-
-			if (c + 1 < SIDE)
-				join(h, s, s + 1, reach);
-			if (r + 1 < SIDE && left >= 0)
-				join(h, s, SIDE * (r + 1) + left, reach);
-			if (r + 1 < SIDE && left + 1 < SIDE)
-				join(h, s, SIDE * (r + 1) + left + 1, reach);
-		}
-	}
-}
-
-/* The patches of a row of lattice blocks, which one thread makes. */
-struct row {
-	uint32_t n, capacity;
-	uint64_t n_rays, n_hits;
-	struct patch *patch;
-	struct sheet_sample (*sample)[PSR_BLOCK_SAMPLES];
-	int failed;
-};
-
-static int grow_row(struct row *row)
-{
-	uint32_t capacity = row->capacity != 0 ? 2 * row->capacity : 32;
-	struct patch *patch = realloc(row->patch, capacity * sizeof *patch);
-	void *sample;
-
-	if (patch != NULL)
-		row->patch = patch;
-	sample = realloc(row->sample, capacity * sizeof *row->sample);
-	if (sample != NULL)
-		row->sample = sample;
-	if (patch == NULL || sample == NULL)
-		return PSR_ERR_MEMORY;
-	row->capacity = capacity;
-	return PSR_OK;
-}
-
-struct sheet {
-	uint64_t mask;
-	float low, high;
-	uint16_t root;
-	uint8_t two_sided;
-};
-
-static void list_sheets(struct block_hits *h, struct sheet *sheet, int *n_sheets)
-{
-	int16_t number[MOST_HITS];
-
-	*n_sheets = 0;
-	for (int i = 0; i < h->n; i++) {
-		int root = root_of(h, i);
-		const struct block_hit *hit = &h->hit[i];
-		struct sheet *s;
-
-		if (root == i) {
-			number[i] = (int16_t)*n_sheets;
-			sheet[(*n_sheets)++] = (struct sheet){ .low = hit->z, .high = hit->z, .root = (uint16_t)i,
-				                                   .two_sided = hit->two_sided };
-		}
-		s = &sheet[number[root]];
-		s->low = hit->z < s->low ? hit->z : s->low;
-		s->high = hit->z > s->high ? hit->z : s->high;
-		s->mask |= UINT64_C(1) << hit->at;
-	}
-}
-
-static int compare_sheets(const void *a, const void *b)
-{
-	const struct sheet *x = a, *y = b;
-
-	return x->low != y->low ? (x->low < y->low ? -1 : 1) : (int)x->root - (int)y->root;
-}
-
-/* A sheet may pass over a lattice point more than once (a spiral): hits that find their place taken start a patch of
- * their own. */
-static int add_hit(struct row *row, uint32_t first, const struct block_hit *hit, uint32_t wanted)
-{
-	uint64_t bit = UINT64_C(1) << hit->at;
-	uint32_t p = wanted;
-
-	if ((row->patch[p].mask & bit) != 0)
-		for (p = first; p < row->n && ((row->patch[p].mask & bit) != 0 || row->patch[p].two_sided != hit->two_sided); p++)
-			;
-	if (p == row->n) {
-		if (row->n == row->capacity && grow_row(row) != PSR_OK)
-			return PSR_ERR_MEMORY;
-		row->patch[p] = row->patch[wanted];
-		row->patch[p].mask = row->patch[p].first = 0;
-		memset(row->sample[p], 0, sizeof row->sample[p]);
-		row->n++;
-	}
-	row->patch[p].mask |= bit;
-	row->patch[p].first |= hit->is_first ? bit : 0;
-	row->sample[p][hit->at] = (struct sheet_sample){ hit->z, hit->surface };
-	return PSR_OK;
-}
-
-static int add_patches(struct row *row, struct block_hits *h, int col, int block_row, float step)
-{
-	struct sheet sheet[MOST_HITS];
-	float low[MOST_HITS], high[MOST_HITS];
-	uint16_t patch_of[MOST_HITS];
-	uint32_t first = row->n;
-	int n_sheets;
-
-	connect(h, SHEET_STEPS * step);
-	list_sheets(h, sheet, &n_sheets);
-	qsort(sheet, (size_t)n_sheets, sizeof *sheet, compare_sheets);
-	for (int i = 0; i < n_sheets; i++) {
-		uint32_t p = first;
-
-		/* The first patch with room for all of it that stays shallow. */
-		for (; p < row->n; p++) {
-			float top = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
-			float bottom = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
-
-			if ((row->patch[p].mask & sheet[i].mask) == 0 && row->patch[p].two_sided == sheet[i].two_sided
-			    && top - bottom <= SHEET_PATCH_STEPS * step)
-				break;
-		}
-		if (p == row->n) {
-			if (row->n == row->capacity && grow_row(row) != PSR_OK)
-				return PSR_ERR_MEMORY;
-			memset(&row->patch[p], 0, sizeof row->patch[p]);
-			memset(row->sample[p], 0, sizeof row->sample[p]);
-			row->patch[p].col = (int16_t)col;
-			row->patch[p].row = (int16_t)block_row;
-			row->patch[p].two_sided = sheet[i].two_sided;
-			low[p - first] = sheet[i].low;
-			high[p - first] = sheet[i].high;
-			row->n++;
-		}
-		low[p - first] = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
-		high[p - first] = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
-		/* Reserve the places, so that no later sheet takes them; the hits themselves follow. */
-		row->patch[p].mask |= sheet[i].mask;
-		patch_of[sheet[i].root] = (uint16_t)(p - first);
-	}
-	for (uint32_t p = first; p < row->n; p++)
-		row->patch[p].mask = 0;
-	for (int i = 0; i < h->n; i++)
-		if (add_hit(row, first, &h->hit[i], first + patch_of[root_of(h, i)]) != PSR_OK)
-			return PSR_ERR_MEMORY;
-	return PSR_OK;
-}
 
 /* What the rays through a row of lattice blocks meet. */
 struct strip {
@@ -227,7 +26,7 @@ struct job {
 	                             column -c - (r & 1) there; NULL if nobody asks for it */
 	const struct ray_scene *scene;
 	const struct psr_mesh *mesh;
-	struct row *row[2];
+	struct patch_row *row[2];
 };
 
 static int strip_init(struct strip *strip, int n_columns)
@@ -275,7 +74,7 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 
 struct batch {
 	struct ray ray[BATCH];
-	struct ray_hit hit[2][BATCH * MOST_LAYERS];
+	struct ray_hit hit[2][BATCH * SHEET_LAYERS];
 	int n_hits[2][BATCH];
 };
 
@@ -294,7 +93,7 @@ static int trace_columns(const struct job *job, struct strip strip[2], int row, 
 			sheets_ray(&job->sheets[0]->projection, x, y, &batch.ray[n++]);
 	}
 	strip->n_rays += (uint64_t)n;
-	ray_scene_trace_ends(job->scene, batch.ray, n, 2 * SHEET_START, MOST_LAYERS, batch.hit[0], batch.n_hits[0],
+	ray_scene_trace_ends(job->scene, batch.ray, n, 2 * SHEET_START, SHEET_LAYERS, batch.hit[0], batch.n_hits[0],
 	                     job->sheets[1] != NULL ? batch.hit[1] : NULL, batch.n_hits[1]);
 	for (int end_of_ray = 0; end_of_ray < 2 && job->sheets[end_of_ray] != NULL; end_of_ray++) {
 		struct strip *s = &strip[end_of_ray];
@@ -302,7 +101,7 @@ static int trace_columns(const struct job *job, struct strip strip[2], int row, 
 		for (int i = 0; rc == PSR_OK && i < end - first; i++) {
 			s->first[(row & (SIDE - 1)) * s->n_columns + first + i + s->n_columns / 2] = s->n;
 			if (is_of[i] >= 0)
-				rc = add_hits(job, s, &batch.hit[end_of_ray][is_of[i] * MOST_LAYERS], batch.n_hits[end_of_ray][is_of[i]]);
+				rc = add_hits(job, s, &batch.hit[end_of_ray][is_of[i] * SHEET_LAYERS], batch.n_hits[end_of_ray][is_of[i]]);
 		}
 	}
 	return rc;
@@ -322,7 +121,7 @@ static int trace_strip(const struct job *job, struct strip strip[2], int block_r
 }
 
 /* The patches of a lattice block: of the rays' own projection, or of the one behind. */
-static int make_block(const struct strip *strip, struct row *row, int col, int block_row, int is_behind, float step)
+static int make_block(const struct strip *strip, struct patch_row *row, int col, int block_row, int is_behind, float step)
 {
 	struct block_hits h = { .n = 0 };
 
@@ -343,7 +142,7 @@ static int make_block(const struct strip *strip, struct row *row, int col, int b
 	}
 	h.first_of[PSR_BLOCK_SAMPLES] = (uint16_t)h.n;
 	row->n_hits += (uint64_t)h.n;
-	return h.n != 0 ? add_patches(row, &h, col, block_row, step) : PSR_OK;
+	return h.n != 0 ? patch_row_add(row, &h, col, block_row, step) : PSR_OK;
 }
 
 static void trace_row(int i, void *userdata)
@@ -357,7 +156,7 @@ static void trace_row(int i, void *userdata)
 	if (rc == PSR_OK)
 		rc = trace_strip(job, strip, i - reach);
 	for (int k = 0; k < 2 && job->sheets[k] != NULL; k++) {
-		struct row *row = &job->row[k][i];
+		struct patch_row *row = &job->row[k][i];
 
 		for (int col = -reach; rc == PSR_OK && col < reach; col++)
 			rc = make_block(&strip[k], row, col, i - reach, k, job->sheets[k]->projection.spacing);
@@ -367,7 +166,7 @@ static void trace_row(int i, void *userdata)
 	}
 }
 
-static int join_rows(struct sheets *sheets, const struct row *rows)
+static int join_rows(struct sheets *sheets, const struct patch_row *rows)
 {
 	size_t n_heads = 4 * (size_t)sheets->reach * (size_t)sheets->reach, n = 0;
 
@@ -385,7 +184,7 @@ static int join_rows(struct sheets *sheets, const struct row *rows)
 	for (size_t i = 0; i < n_heads; i++)
 		sheets->head[i] = SHEET_NONE;
 	for (int i = 0; i < 2 * sheets->reach; i++) {
-		const struct row *row = &rows[i];
+		const struct patch_row *row = &rows[i];
 
 		if (row->n != 0) {
 			memcpy(sheets->patch + sheets->n_patches, row->patch, row->n * sizeof *row->patch);
@@ -400,7 +199,7 @@ static int join_rows(struct sheets *sheets, const struct row *rows)
 	return PSR_OK;
 }
 
-static int start(struct sheets *sheets, struct row **row, const struct psr_projection *projection)
+static int start(struct sheets *sheets, struct patch_row **row, const struct psr_projection *projection)
 {
 	double row_height = SIDE * sqrt(3.0) / 2 * (double)projection->spacing;
 
@@ -412,7 +211,7 @@ static int start(struct sheets *sheets, struct row **row, const struct psr_proje
 	return *row != NULL ? PSR_OK : PSR_ERR_MEMORY;
 }
 
-static int finish(struct sheets *sheets, struct row *row, int rc)
+static int finish(struct sheets *sheets, struct patch_row *row, int rc)
 {
 	if (rc == PSR_OK)
 		rc = join_rows(sheets, row);

@@ -61,9 +61,20 @@ static void drop_object(struct object *o)
 	meshes_free(o->mesh);
 }
 
+static double radius_of(const struct object *o, uint32_t b)
+{
+	float center[3], radius;
+
+	psr_blocks_sphere(o->blocks, b, center, &radius);
+	return (double)radius;
+}
+
 static void center_of(const struct object *o, uint32_t b, double c[3])
 {
-	v3d_set(c, (double)o->blocks->sphere_x[b], (double)o->blocks->sphere_y[b], (double)o->blocks->sphere_z[b]);
+	float center[3], radius;
+
+	psr_blocks_sphere(o->blocks, b, center, &radius);
+	v3d_set(c, (double)center[0], (double)center[1], (double)center[2]);
 }
 
 /* Adds a copy of a mesh, with its faces turned if asked for. */
@@ -108,7 +119,7 @@ static void cones_cull_the_back_half_of_a_ball(void **state)
 		for (uint32_t b = 0; b < o.blocks->n_blocks; b++) {
 			double c[3];
 
-			assert_true(o.blocks->sphere_r[b] < 0.2f);
+			assert_true(radius_of(&o, b) < 0.2);
 			center_of(&o, b, c);
 			if (v3d_dot(c, eye.place) < 0) {
 				assert_int_equal(o.is_kept[b], 0);
@@ -139,7 +150,7 @@ static void rays_find_the_cap_of_a_ball(void **state)
 		cull_eye_place(&eye, which, 1);
 		cull_set_look(o.set, o.scene, &eye, o.pool, o.n_seen);
 		for (uint32_t b = 0; b < o.blocks->n_blocks; b++) {
-			double c[3], to_eye[3], g, r = (double)o.blocks->sphere_r[b];
+			double c[3], to_eye[3], g, r = radius_of(&o, b);
 
 			center_of(&o, b, c);
 			v3d_sub(to_eye, eye.place, c);

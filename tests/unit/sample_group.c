@@ -55,7 +55,7 @@ static void make_layers(struct draft *draft)
 	for (unsigned level = 0; level < N_LEVELS; level++)
 		for (int layer = 0; layer < N_LAYERS; layer++)
 			add_layer(draft, level, layer);
-	assert_int_equal(draft_group(draft), PSR_OK);
+	assert_int_equal(draft_group(draft, NULL), PSR_OK);
 	printf("# %u groups\n", draft->n_groups);
 	assert_true(draft->n_groups > 1);
 }
@@ -206,7 +206,7 @@ static void groups_do_not_reach_into_each_other(void **state)
 	draft.block = calloc(draft.block_capacity, sizeof *draft.block);
 	draft.sample = calloc(draft.sample_capacity, sizeof *draft.sample);
 	fill_box(&draft, 20, 16, &seed);
-	assert_int_equal(draft_group(&draft), PSR_OK);
+	assert_int_equal(draft_group(&draft, NULL), PSR_OK);
 	assert_in_range(draft.n_groups, 2, 8);
 	for (uint32_t g = 0; g < draft.n_groups; g++) {
 		v3f_set(min[g], INFINITY, INFINITY, INFINITY);

@@ -89,9 +89,12 @@ static void a_ball_is_seen_from_the_triangles_above_it(void **state)
 	(void)state;
 	assert_int_equal(visibility_masks(&o.blocks, o.pool, o.mask), PSR_OK);
 	for (uint32_t b = 0; b < o.blocks.n_blocks; b++) {
-		double c[3] = { (double)o.blocks.sphere_x[b], (double)o.blocks.sphere_y[b], (double)o.blocks.sphere_z[b] };
-		double beta = (double)o.blocks.sphere_r[b] * 1.05; /* of a chord: an angle up to 0.9 */
+		float center[3], radius;
+		double c[3], beta; /* of a chord: an angle up to 0.9 */
 
+		psr_blocks_sphere(&o.blocks, b, center, &radius);
+		v3d_set(c, (double)center[0], (double)center[1], (double)center[2]);
+		beta = (double)radius * 1.05;
 		assert_true(beta < 0.9);
 		v3d_normalize(c, c);
 		for (unsigned t = 0; t < PSR_MASK_TRIANGLES; t++) {
