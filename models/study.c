@@ -183,6 +183,7 @@ static int run_study(struct study *study, const char *models, const char *plot, 
 		rc = print_json(study);
 	else if (rc == PSR_OK)
 		print_text(study);
+	study_drop(study);
 	study_table_fini(&study->table);
 	for (int m = 0; m < study->n_models; m++)
 		study_model_fini(&study->model[m]);

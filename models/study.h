@@ -8,6 +8,7 @@
 #include "psr/mesh.h"
 #include "psr/pool.h"
 #include "sample/greedy.h"
+#include "sample/greedy_warp.h"
 #include "sample/ray.h"
 #include "study_trials.h"
 
@@ -66,6 +67,8 @@ struct study {
 	int n_threads, n_models;
 	struct study_model *model;
 	struct study_table table;
+	struct greedy_warp **warp; /* study_select.c: n_warps, by row and model; NULL: not measured yet */
+	int n_warps;
 	int done, total, has_bar;
 	struct psr_error *err;
 };
@@ -96,26 +99,23 @@ int study_plot(const struct study *study, const char *path, struct psr_error *er
 
 /* ---- study_select.c: selections of blocks, row by row ---- */
 
-/* A selection measured: blocks, samples, bytes, adequacy, time to warp. */
-struct study_measure {
-	struct greedy_result result;
-	double missing; /* of 10,000 trials */
-	double warp;    /* seconds a frame */
-	double culled;  /* fraction, by cones */
-};
-int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
+/* How many of 10,000 trials a selection misses. MEMORY. */
+int study_missing(double *missing, const struct study *study, const struct study_model *model,
                   const struct greedy *greedy, const struct greedy_result *result);
 
-/* A table for such rows, and its ratios to row `base`, made last. MEMORY. */
+/* A table for a selection a row and model. Each is measured and put down, which is a step of the study; the time to warp
+ * them is measured at the end, with what was kept of them to do so, and with the ratios to row `base`. MEMORY. */
 int study_start(struct study *study, const char *first, int n_rows);
-void study_finish(struct study *study, int base);
-void study_put(struct study *study, int row, int model, const struct study_measure *measure, double seconds);
+int study_put(struct study *study, int row, int model, const struct greedy *greedy, const struct greedy_result *result,
+              double seconds);
+int study_finish(struct study *study, int base);
+void study_drop(struct study *study); /* what was kept; also without study_finish */
 
 /* Projections at a tolerance angle in degrees; greedy_destroy() it. */
 int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
                enum greedy_directions directions);
 
-/* Selects, measures and puts down; a step of the study. options->goes_on: from the row before. */
+/* Selects and puts down. options->goes_on: from the row before. */
 int study_select(struct study *study, int row, int model, struct greedy *greedy,
                  const struct greedy_select_options *options);
 

@@ -1,4 +1,5 @@
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/mem.h"
 #include "sample/greedy_warp.h"
@@ -6,6 +7,7 @@
 
 #define RADIANS (3.14159265358979323846 / 180)
 #define N_FRAMES 16
+#define N_ROUNDS 3
 
 enum { BLOCKS, SAMPLES, FILLED, SIZE, SIZE_RATIO, WARP, WARP_RATIO, CULLED, MISSING, FIRST_PASS, SECONDS, N_COLUMNS };
 
@@ -23,12 +25,10 @@ static const struct study_column columns[N_COLUMNS] = {
 	[SECONDS] = { "s", "seconds", 2 },
 };
 
-int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
+int study_missing(double *missing, const struct study *study, const struct study_model *model,
                   const struct greedy *greedy, const struct greedy_result *result)
 {
 	struct greedy_point *point = psr_alloc_array(result->n_samples, sizeof *point);
-	struct greedy_warp *warp = NULL;
-	struct greedy_warp_time time = { 0 };
 	uint64_t n_trials = 0, n_missing = 0;
 	int rc;
 
@@ -40,29 +40,27 @@ int study_measure(struct study_measure *out, const struct study *study, const st
 	psr_free(point);
 	if (rc != PSR_OK)
 		return psr_fail(study->err, rc, "no memory to measure adequacy");
-	rc = greedy_warp_create(&warp, greedy, study->err);
-	if (rc == PSR_OK)
-		rc = greedy_warp_run(warp, N_FRAMES, &time, study->err);
-	greedy_warp_destroy(warp);
-	*out = (struct study_measure){ .result = *result, .warp = time.seconds, .culled = time.culled,
-		                           .missing = n_trials != 0 ? 1e4 * (double)n_missing / (double)n_trials : 0 };
-	return rc;
+	*missing = n_trials != 0 ? 1e4 * (double)n_missing / (double)n_trials : 0;
+	return PSR_OK;
 }
 
-void study_put(struct study *study, int row, int model, const struct study_measure *m, double seconds)
+int study_put(struct study *study, int row, int model, const struct greedy *greedy, const struct greedy_result *result,
+              double seconds)
 {
 	const struct study_table *table = &study->table;
+	int rc = study_missing(study_at(table, row, model, MISSING), study, &study->model[model], greedy, result);
 
-	*study_at(table, row, model, BLOCKS) = (double)m->result.n_blocks;
-	*study_at(table, row, model, SAMPLES) = (double)m->result.n_samples;
-	*study_at(table, row, model, FILLED) = 100 * (double)m->result.n_samples / (double)m->result.n_lanes;
-	*study_at(table, row, model, SIZE) = (double)m->result.n_bytes / 1e6;
-	*study_at(table, row, model, WARP) = m->warp * 1e6;
-	*study_at(table, row, model, CULLED) = 100 * m->culled;
-	*study_at(table, row, model, MISSING) = m->missing;
-	if (m->result.n_first_pass != 0)
-		*study_at(table, row, model, FIRST_PASS) = (double)m->result.n_first_pass;
+	if (rc == PSR_OK)
+		rc = greedy_warp_create(&study->warp[row * study->n_models + model], greedy, study->err);
+	*study_at(table, row, model, BLOCKS) = (double)result->n_blocks;
+	*study_at(table, row, model, SAMPLES) = (double)result->n_samples;
+	*study_at(table, row, model, FILLED) = 100 * (double)result->n_samples / (double)result->n_lanes;
+	*study_at(table, row, model, SIZE) = (double)result->n_bytes / 1e6;
+	if (result->n_first_pass != 0)
+		*study_at(table, row, model, FIRST_PASS) = (double)result->n_first_pass;
 	*study_at(table, row, model, SECONDS) = seconds;
+	study_step(study, study->model[model].name);
+	return rc;
 }
 
 int study_select(struct study *study, int row, int model, struct greedy *greedy,
@@ -70,15 +68,9 @@ int study_select(struct study *study, int row, int model, struct greedy *greedy,
 {
 	double before = options->goes_on ? *study_at(&study->table, row - 1, model, SECONDS) : greedy->seconds_scan;
 	struct greedy_result result;
-	struct study_measure measure;
 	int rc = greedy_select(greedy, options, &result, study->err);
 
-	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
-	if (rc == PSR_OK)
-		study_put(study, row, model, &measure, before + result.seconds);
-	study_step(study, study->model[model].name);
-	return rc;
+	return rc == PSR_OK ? study_put(study, row, model, greedy, &result, before + result.seconds) : rc;
 }
 
 int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
@@ -94,13 +86,49 @@ int study_scan(struct greedy **out, struct study *study, int model, double degre
 int study_start(struct study *study, const char *first, int n_rows)
 {
 	study->total = n_rows * study->n_models;
+	study->warp = calloc((size_t)study->total, sizeof *study->warp);
+	if (study->warp == NULL)
+		return psr_fail(study->err, PSR_ERR_MEMORY, "no memory for %d rows", n_rows);
+	study->n_warps = study->total;
 	return study_table_init(&study->table, first, columns, N_COLUMNS, n_rows, study->n_models, study->err);
 }
 
-void study_finish(struct study *study, int base)
+void study_drop(struct study *study)
 {
+	for (int i = 0; i < study->n_warps; i++)
+		greedy_warp_destroy(study->warp[i]);
+	free(study->warp);
+	study->warp = NULL;
+	study->n_warps = 0;
+}
+
+/* All rows of a model one after the other, some times: a machine's speed drifts. */
+static int time_warps(struct study *study)
+{
+	const struct study_table *table = &study->table;
+
+	for (int i = 0; i < N_ROUNDS * study->n_warps; i++) {
+		int row = i % table->n_rows, model = i / table->n_rows % study->n_models;
+		double *us = study_at(table, row, model, WARP);
+		struct greedy_warp_time time;
+		int rc = greedy_warp_run(study->warp[row * study->n_models + model], N_FRAMES, &time, study->err);
+
+		if (rc != PSR_OK)
+			return rc;
+		*us = fmin(*us, 1e6 * time.seconds); /* NAN at first */
+		*study_at(table, row, model, CULLED) = 100 * time.culled;
+	}
+	return PSR_OK;
+}
+
+int study_finish(struct study *study, int base)
+{
+	int rc = time_warps(study);
+
+	study_drop(study);
 	study_relate(&study->table, SIZE, SIZE_RATIO, base);
 	study_relate(&study->table, WARP, WARP_RATIO, base);
+	return rc;
 }
 
 static int run_angles(struct study *study, const double *degrees, int n, enum greedy_lattice lattice)
@@ -131,7 +159,7 @@ static int run_angles(struct study *study, const double *degrees, int n, enum gr
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		study_finish(study, base);
+		rc = study_finish(study, base);
 	return rc;
 }
 
@@ -168,6 +196,6 @@ int study_run_block_size(struct study *study)
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		study_finish(study, 1);
+		rc = study_finish(study, 1);
 	return rc;
 }

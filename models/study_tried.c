@@ -92,18 +92,6 @@ static int run_variants(struct study *study, int model)
 	return rc;
 }
 
-static int measure(struct study *study, int row, int model, const struct greedy *greedy,
-                   const struct greedy_result *result, double seconds)
-{
-	struct study_measure measured;
-	int rc = study_measure(&measured, study, &study->model[model], greedy, result);
-
-	if (rc == PSR_OK)
-		study_put(study, row, model, &measured, seconds);
-	study_step(study, study->model[model].name);
-	return rc;
-}
-
 static double now(void)
 {
 	struct timespec t;
@@ -127,7 +115,7 @@ static int measure_level(struct study *study, int row, int model, const struct l
 		rc = greedy_take_draft(&greedy, &draft, level->n_projections, study->resolution, &result, study->err);
 	draft_fini(&draft);
 	if (rc == PSR_OK)
-		rc = measure(study, row, model, greedy, &result, seconds);
+		rc = study_put(study, row, model, greedy, &result, seconds);
 	greedy_destroy(greedy);
 	return rc;
 }
@@ -191,7 +179,7 @@ static int run_product(struct study *study, int model)
 	if (rc == PSR_OK)
 		rc = study_build(&greedy, &result, &seconds, study, &study->model[model]);
 	if (rc == PSR_OK)
-		rc = measure(study, BUILT, model, greedy, &result, seconds);
+		rc = study_put(study, BUILT, model, greedy, &result, seconds);
 	greedy_destroy(greedy);
 	return rc;
 }
@@ -206,6 +194,6 @@ int study_run_selection(struct study *study)
 			rc = run_product(study, m);
 	}
 	if (rc == PSR_OK)
-		study_finish(study, BASE_VARIANT);
+		rc = study_finish(study, BASE_VARIANT);
 	return rc;
 }
