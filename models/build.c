@@ -15,6 +15,15 @@
 #define PROGRAM "psr-model build"
 #define RADIANS (3.14159265358979323846 / 180)
 #define BAR_WIDTH 32
+#define FORMATS \
+	"IN is told by its first bytes and its ending:\n" \
+	"  glTF 2.0    .gltf, .glb; with KHR_draco_mesh_compression, KHR_lights_punctual,\n" \
+	"              KHR_materials_emissive_strength, KHR_materials_pbrSpecularGlossiness,\n" \
+	"              KHR_materials_unlit, KHR_mesh_quantization, KHR_texture_transform,\n" \
+	"              EXT_texture_webp\n" \
+	"  PLY         meshes and clouds; text and binary\n" \
+	"  LAS         clouds of versions 1.0 to 1.4; not compressed ones (LAZ)\n" \
+	"  the others  OBJ, STL, OFF, 3DS, Collada and what else Assimp reads"
 
 struct progress {
 	int fd;     /* -1: none */
@@ -140,7 +149,7 @@ int cmd_build(int argc, char **argv)
 		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
 		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
-		  .help = "compress the file: a third of the size, unpacked into memory when it is opened" },
+		  .help = "compress the file, to a third or half of its size; opening it unpacks it into memory" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "threads to use; the result does not depend on it", .min = 1, .max = 256 },
 		{ .name = "progress-fd", .type = PSR_OPT_INT, .value = &fd, .arg = "FD",
@@ -150,9 +159,9 @@ int cmd_build(int argc, char **argv)
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [options]",
-		.summary = "Samples a mesh (glTF, GLB, OBJ, STL, PLY, OFF and what else Assimp reads) into a .psr model.",
+		.summary = "Samples a mesh or a cloud of points into a .psr model.",
 		.opts = opts,
-		.footer = NULL,
+		.footer = FORMATS,
 	};
 
 	psr_build_options_default(&options);

@@ -7,7 +7,7 @@ static const struct command {
 	const char *name, *summary;
 	int (*run)(int argc, char **argv);
 } commands[] = {
-	{ "build", "make a .psr model of a mesh (glTF, OBJ, PLY, STL, ...)", cmd_build },
+	{ "build", "make a .psr model of a mesh or scan (glTF, OBJ, PLY, STL, LAS, ...)", cmd_build },
 	{ "info", "say what is in a .psr file", cmd_info },
 	{ "make", "generate a model of the standard set as glTF", cmd_make },
 	{ "accuracy", "compare a model's pictures with ray-traced ones", cmd_accuracy },

@@ -43,7 +43,7 @@ static int hash_file(XXH3_state_t *state, const char *path, struct psr_error *er
 
 static int is_alone(const char *source)
 {
-	static const char *const endings[] = { ".glb", ".stl", ".ply", ".off" };
+	static const char *const endings[] = { ".glb", ".stl", ".ply", ".off", ".las" };
 	const char *dot = strrchr(source, '.');
 
 	for (size_t i = 0; dot != NULL && i < sizeof endings / sizeof endings[0]; i++)

@@ -11,7 +11,7 @@
 
 /* In order of preference. */
 static const char *const endings[] = {
-	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "lwo", "obj", "off", "ply", "stl", "x",
+	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "ply", "stl", "x",
 };
 #define N_ENDINGS (sizeof endings / sizeof endings[0])
 

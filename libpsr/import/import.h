@@ -1,4 +1,4 @@
-/* What the files of this folder share: the mesh under construction, files and paths, images, and the two readers.
+/* What the files of this folder share: the mesh under construction, files and paths, images, and the four readers.
  *
  * Everything that a source file names is looked up by import_path_inside: it lies, symbolic links resolved, in the
  * folder of the source file or below it. Limits below bound what a small file can make the importer allocate. */

@@ -81,13 +81,15 @@ static void names_are_stems_and_the_psr_wins(void **state)
 	make(".hidden.psr");
 	make("no-ending");
 	make("two.dots.stl");
+	make("scan.LAS");
 	scan();
-	assert_int_equal(catalogue.n, 3);
+	assert_int_equal(catalogue.n, 4);
 	expect_path("dragon", "dragon.psr");
 	expect_path("bunny", "bunny.GLB");
 	expect_path("two.dots", "two.dots.stl");
 	assert_false(catalogue_find(&catalogue, "dragon")->file.is_source);
 	assert_true(catalogue_find(&catalogue, "bunny")->file.is_source);
+	assert_true(catalogue_find(&catalogue, "scan")->file.is_source);
 	assert_null(catalogue_find(&catalogue, "readme"));
 	assert_null(catalogue_find(&catalogue, "dragon.psr"));
 	assert_null(catalogue_find(&catalogue, "../dragon"));
@@ -256,9 +258,9 @@ static void keys_change_with_what_a_model_is_made_of(void **state)
 	assert_string_not_equal(first, next);
 }
 
-static void other_models_and_glb_neighbours_do_not_change_keys(void **state)
+static void other_models_and_neighbours_of_glb_and_las_do_not_change_keys(void **state)
 {
-	char first[CATALOGUE_KEY], next[CATALOGUE_KEY], glb[CATALOGUE_KEY];
+	char first[CATALOGUE_KEY], next[CATALOGUE_KEY], glb[CATALOGUE_KEY], las[CATALOGUE_KEY];
 
 	(void)state;
 	file_write(folder, "builder", "1", 1);
@@ -267,6 +269,8 @@ static void other_models_and_glb_neighbours_do_not_change_keys(void **state)
 	file_write(folder, "m/b.glb", "v", 1);
 	find_key(first, "m/a.obj");
 	find_key(glb, "m/b.glb");
+	file_write(folder, "m/e.las", "v", 1);
+	find_key(las, "m/e.las");
 	assert_string_not_equal(first, glb);
 	file_write(folder, "m/c.psr", "v", 1);
 	file_write(folder, "m/d.stl", "v", 1);
@@ -277,6 +281,8 @@ static void other_models_and_glb_neighbours_do_not_change_keys(void **state)
 	assert_string_not_equal(first, next);
 	find_key(next, "m/b.glb");
 	assert_string_equal(glb, next);
+	find_key(next, "m/e.las");
+	assert_string_equal(las, next);
 }
 
 int main(void)
@@ -290,7 +296,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(scanning_again_keeps_what_did_not_change, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_longest_unused_makes_room_and_the_used_stay, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(keys_change_with_what_a_model_is_made_of, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(other_models_and_glb_neighbours_do_not_change_keys, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(other_models_and_neighbours_of_glb_and_las_do_not_change_keys, set_up, tear_down),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

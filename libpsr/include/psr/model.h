@@ -108,7 +108,8 @@ struct psr_model_info {
 	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of the
 	 * surface, at the target resolution, seen from a random direction, this many have no sample of it. 0 of 0: not measured. */
 	uint64_t n_trials, n_missing;
-	/* The same for culling by cones and masks: this many pixels out of n_trials lost all of their samples to it. */
+	/* Out of as many pixels that hold a sample, in views from random places, this many hold one whose block cones or masks
+	 * would cull, though a ray from the eye reaches it. */
 	uint64_t n_lost;
 	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };
