@@ -215,6 +215,9 @@ int cmd_study(int argc, char **argv)
 		  .help = "target resolution of the models", .min = 16, .max = 2048 },
 		{ .name = "plot", .type = PSR_OPT_STRING, .value = &plot, .arg = "FILE",
 		  .help = "draw the table with gnuplot into this .svg or .png" },
+		{ .name = "keep", .type = PSR_OPT_STRING, .value = &study.keep, .arg = "DIR",
+		  .help = "keep the models of the standard set that are built in this folder; studies that do not need the\n"
+		          "time that building takes read them there" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "threads to use; only times depend on it", .min = 1, .max = 256 },
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object, with each model too" },

@@ -63,6 +63,7 @@ void study_model_fini(struct study_model *model);
 struct study {
 	const struct study_kind *kind;
 	uint32_t resolution;
+	const char *keep; /* folder of models that are built, for other studies to take; NULL: none */
 	struct psr_pool *pool;
 	int n_threads, n_models;
 	struct study_model *model;
@@ -88,7 +89,11 @@ extern const int n_study_kinds;
 /* One step of `total` is done. */
 void study_step(struct study *study, const char *what);
 
-/* study_model.c: psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
+/* study_model.c: psr's own model (psr/build.h) of this mesh. Where the study keeps models it may be one that was kept,
+ * unless the time to build it is asked for; seconds: or NULL. */
+int study_built(struct psr_model **out, double *seconds, const struct study *study, const struct study_model *model);
+
+/* What its level 0 has, and the time that all of it took. */
 int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
                 const struct study_model *model);
 
