@@ -108,8 +108,8 @@ int study_plot(const struct study *study, const char *path, struct psr_error *er
 int study_missing(double *missing, const struct study *study, const struct study_model *model,
                   const struct greedy *greedy, const struct greedy_result *result);
 
-/* A table for a selection a row and model. Each is measured and put down, which is a step of the study; the time to warp
- * them is measured at the end, with what was kept of them to do so, and with the ratios to row `base`. MEMORY. */
+/* A table for a selection a row and model. Each is measured and put down, which is a step of the study; the time to
+ * warp them is measured at the end, with what was kept of them to do so, and with the ratios to row `base`. MEMORY. */
 int study_start(struct study *study, const char *first, int n_rows);
 int study_put(struct study *study, int row, int model, const struct greedy *greedy, const struct greedy_result *result,
               double seconds);
