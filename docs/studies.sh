@@ -8,12 +8,12 @@ work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p docs/studies
 
-[ $# -gt 0 ] || set -- tolerance block-size square-lattice masks subdivision selection models culling
+[ $# -gt 0 ] || set -- tolerance block-size square-lattice selection models masks subdivision culling
 for study; do
 	echo "study $study" >&2
 	plot=()
 	grep -q "(studies/$study.svg)" $page && plot=(--plot "$work/$study.svg")
-	"$model" study "$study" "${plot[@]}" >"$work/table"
+	"$model" study "$study" --keep "$work" "${plot[@]}" >"$work/table"
 	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/
 	awk -v begin="<!-- study $study -->" -v table="$work/table" '
 		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }

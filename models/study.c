@@ -17,10 +17,17 @@
 #define FIVE "top,teapot,chair,plant,kittyhawk"
 
 /* Size and time, relative, over the rows; x are the labels. Columns of $table: 3 + the table's. */
-#define PLOT_SIZE_TIME(xlabel) \
+#define PLOT_SIZE_TIME(xlabel) PLOT_SIZE_TIME_OF(xlabel, "")
+#define PLOT_SIZE_TIME_OF(xlabel, every) \
 	"set style data linespoints\nset grid ytics\nset key top center\nset xlabel '" xlabel "'\n" \
 	"set ylabel 'relative'\nset pointsize 1\nset xrange [-0.4:*]\nset offsets 0,0.4,0.02,0.02\n" \
-	"plot $table using 1:7:xtic(2) title 'file size' lw 2 pt 7, '' using 1:9 title 'warping time' lw 2 pt 5\n"
+	"plot $table " every " using 1:7:xtic(2) title 'file size' lw 2 pt 7, " \
+	"'' " every " using 1:9 title 'warping time' lw 2 pt 5"
+
+/* The last row is the equilateral lattice, the reference. */
+#define PLOT_SQUARE \
+	PLOT_SIZE_TIME_OF("tolerance angle, degrees", "every ::0::9") \
+	", [-0.4:9.4] 1 title 'equilateral lattice, 25 degrees' lt 0 lw 2\n"
 
 /* Rows 0-4 without cones, 5-9 with them. */
 #define PLOT_MASKS \
@@ -46,7 +53,7 @@ const struct study_kind study_kinds[] = {
 	  PLOT_SIZE_TIME("tolerance angle, degrees"), NULL },
 	{ "block-size", "figure 5.6", "side of the blocks", FIVE, study_run_block_size, PLOT_SIZE_TIME("block"), NULL },
 	{ "square-lattice", "figure 5.7", "tolerance angle, square lattice", FIVE, study_run_square,
-	  PLOT_SIZE_TIME("tolerance angle, degrees"), NULL },
+	  PLOT_SQUARE, NULL },
 	{ "selection", "sections 5.2, 9.2", "what was tried to select blocks", FIVE, study_run_selection, NULL, NULL },
 	{ "masks", "figure 6.7", "visibility tests and bits of the masks", FIVE, study_run_masks, PLOT_MASKS,
 	  NOTE_CULLING },
@@ -176,6 +183,7 @@ static int run_study(struct study *study, const char *models, const char *plot, 
 		rc = print_json(study);
 	else if (rc == PSR_OK)
 		print_text(study);
+	study_drop(study);
 	study_table_fini(&study->table);
 	for (int m = 0; m < study->n_models; m++)
 		study_model_fini(&study->model[m]);
@@ -207,6 +215,9 @@ int cmd_study(int argc, char **argv)
 		  .help = "target resolution of the models", .min = 16, .max = 2048 },
 		{ .name = "plot", .type = PSR_OPT_STRING, .value = &plot, .arg = "FILE",
 		  .help = "draw the table with gnuplot into this .svg or .png" },
+		{ .name = "keep", .type = PSR_OPT_STRING, .value = &study.keep, .arg = "DIR",
+		  .help = "keep the models of the standard set that are built in this folder; studies that do not need the\n"
+		          "time that building takes read them there" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "threads to use; only times depend on it", .min = 1, .max = 256 },
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object, with each model too" },

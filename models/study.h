@@ -8,6 +8,7 @@
 #include "psr/mesh.h"
 #include "psr/pool.h"
 #include "sample/greedy.h"
+#include "sample/greedy_warp.h"
 #include "sample/ray.h"
 #include "study_trials.h"
 
@@ -62,10 +63,13 @@ void study_model_fini(struct study_model *model);
 struct study {
 	const struct study_kind *kind;
 	uint32_t resolution;
+	const char *keep; /* folder of models that are built, for other studies to take; NULL: none */
 	struct psr_pool *pool;
 	int n_threads, n_models;
 	struct study_model *model;
 	struct study_table table;
+	struct greedy_warp **warp; /* study_select.c: n_warps, by row and model; NULL: not measured yet */
+	int n_warps;
 	int done, total, has_bar;
 	struct psr_error *err;
 };
@@ -85,36 +89,51 @@ extern const int n_study_kinds;
 /* One step of `total` is done. */
 void study_step(struct study *study, const char *what);
 
+/* study_model.c: psr's own model (psr/build.h) of this mesh. Where the study keeps models it may be one that was kept,
+ * unless the time to build it is asked for; seconds: or NULL. */
+int study_built(struct psr_model **out, double *seconds, const struct study *study, const struct study_model *model);
+
+/* What its level 0 has, and the time that all of it took. */
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model);
+
 /* ---- study_plot.c ---- */
 
 /* Writes a picture of the table, .png or .svg by the name's end, through gnuplot. ARG, NOT_FOUND (no gnuplot), IO. */
 int study_plot(const struct study *study, const char *path, struct psr_error *err);
 
-/* ---- study_select.c, study_cull.c, study_models.c ---- */
+/* ---- study_select.c: selections of blocks, row by row ---- */
+
+/* How many of 10,000 trials a selection misses. MEMORY. */
+int study_missing(double *missing, const struct study *study, const struct study_model *model,
+                  const struct greedy *greedy, const struct greedy_result *result);
+
+/* A table for a selection a row and model. Each is measured and put down, which is a step of the study; the time to
+ * warp them is measured at the end, with what was kept of them to do so, and with the ratios to row `base`. MEMORY. */
+int study_start(struct study *study, const char *first, int n_rows);
+int study_put(struct study *study, int row, int model, const struct greedy *greedy, const struct greedy_result *result,
+              double seconds);
+int study_finish(struct study *study, int base);
+void study_drop(struct study *study); /* what was kept; also without study_finish */
+
+/* Projections at a tolerance angle in degrees; greedy_destroy() it. */
+int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
+               enum greedy_directions directions);
+
+/* Selects and puts down. options->goes_on: from the row before. */
+int study_select(struct study *study, int row, int model, struct greedy *greedy,
+                 const struct greedy_select_options *options);
 
 int study_run_tolerance(struct study *study);
 int study_run_square(struct study *study);
 int study_run_block_size(struct study *study);
+
+/* ---- study_tried.c, study_cull.c, study_models.c ---- */
+
 int study_run_selection(struct study *study);
 int study_run_models(struct study *study);
 int study_run_masks(struct study *study);
 int study_run_subdivision(struct study *study);
 int study_run_culling(struct study *study);
-
-#define STUDY_TOLERANCE 0.43633231299858238 /* 25 degrees */
-
-/* psr's own model (psr/build.h) of this mesh: what its level 0 has, and the time that all of it took. */
-int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
-                const struct study_model *model);
-
-/* A selection measured: blocks, samples, bytes, adequacy, time to warp. */
-struct study_measure {
-	struct greedy_result result;
-	double missing; /* of 10,000 trials */
-	double warp;    /* seconds a frame */
-	double culled;  /* fraction, by cones */
-};
-int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
-                  const struct greedy *greedy, const struct greedy_result *result);
 
 #endif

@@ -1,6 +1,5 @@
 #include <string.h>
 #include "measure/cull.h"
-#include "psr/build.h"
 #include "study.h"
 
 #define N_VIEWS 24
@@ -11,16 +10,12 @@
 
 static int make_set(struct cull_set **out, const struct study *study, const struct study_model *model, int finest)
 {
-	struct psr_build_options options;
 	struct psr_model *built = NULL;
-	int rc;
+	int rc = study_built(&built, NULL, study, model);
 
-	psr_build_options_default(&options);
-	options.resolution = study->resolution;
-	options.n_threads = study->n_threads;
-	rc = psr_model_build(&built, model->mesh, &options, NULL, study->err);
-	if (rc == PSR_OK)
-		rc = cull_set_create(out, built, finest, study->pool, study->err);
+	if (rc != PSR_OK)
+		return rc;
+	rc = cull_set_create(out, built, finest, study->pool, study->err);
 	psr_model_unref(built);
 	return rc;
 }

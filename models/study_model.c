@@ -81,22 +81,42 @@ void study_model_fini(struct study_model *model)
 	memset(model, 0, sizeof *model);
 }
 
-int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
-                const struct study_model *model)
+/* Only a generator's name says what the model is. */
+static int kept_path(char path[1024], const struct study *study, const struct study_model *model)
+{
+	return study->keep != NULL && strchr(model->name, '.') == NULL
+	       && snprintf(path, 1024, "%s/%s-%u.psr", study->keep, model->name, study->resolution) < 1024;
+}
+
+int study_built(struct psr_model **out, double *seconds, const struct study *study, const struct study_model *model)
 {
 	struct psr_build_options options;
 	struct psr_build_report report;
-	struct psr_model *built = NULL;
-	int rc;
+	char path[1024];
+	int is_kept = kept_path(path, study, model), rc;
 
+	if (is_kept && seconds == NULL && access(path, F_OK) == 0)
+		return psr_model_read(out, path, study->err);
 	psr_build_options_default(&options);
 	options.resolution = study->resolution;
 	options.n_threads = study->n_threads;
-	rc = psr_model_build(&built, model->mesh, &options, &report, study->err);
-	if (rc == PSR_OK)
-		rc = greedy_take_model(out, psr_model_blocks(built), study->resolution, result, study->err);
-	if (rc == PSR_OK)
+	rc = psr_model_build(out, model->mesh, &options, &report, study->err);
+	if (rc == PSR_OK && seconds != NULL)
 		*seconds = report.seconds_total;
+	if (rc == PSR_OK && is_kept && (rc = psr_model_write(*out, path, study->err)) != PSR_OK)
+		psr_model_unref(*out);
+	return rc;
+}
+
+int study_build(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
+                const struct study_model *model)
+{
+	struct psr_model *built = NULL;
+	int rc = study_built(&built, seconds, study, model);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = greedy_take_model(out, psr_model_blocks(built), study->resolution, result, study->err);
 	psr_model_unref(built);
 	return rc;
 }

@@ -49,24 +49,23 @@ static void put_thesis(const struct study *study, int row)
 static int put_greedy(struct study *study, int row)
 {
 	const struct study_model *model = &study->model[row];
-	const struct greedy_scan_options scan = { .resolution = study->resolution, .tolerance = STUDY_TOLERANCE };
 	struct greedy_select_options options;
 	struct greedy_result result;
-	struct study_measure measure;
+	double missing = 0;
 	struct greedy *greedy = NULL;
-	int rc = greedy_create(&greedy, model->mesh, model->scene, model->scale, &scan, study->pool, study->err);
+	int rc = study_scan(&greedy, study, row, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 
 	greedy_select_default(&options);
 	if (rc == PSR_OK)
 		rc = greedy_select(greedy, &options, &result, study->err);
 	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, model, greedy, &result);
+		rc = study_missing(&missing, study, model, greedy, &result);
 	if (rc == PSR_OK) {
 		*study_at(&study->table, row, 0, BLOCKS) = (double)result.n_blocks;
 		*study_at(&study->table, row, 0, SAMPLES) = (double)result.n_samples;
 		*study_at(&study->table, row, 0, SIZE) = (double)result.n_bytes / 1e6;
 		*study_at(&study->table, row, 0, SECONDS) = greedy->seconds_scan + result.seconds;
-		*study_at(&study->table, row, 0, MISSING) = measure.missing;
+		*study_at(&study->table, row, 0, MISSING) = missing;
 	}
 	greedy_destroy(greedy);
 	return rc;
@@ -75,13 +74,12 @@ static int put_greedy(struct study *study, int row)
 static int put_product(struct study *study, int row)
 {
 	struct greedy_result result;
-	struct study_measure measure;
 	struct greedy *greedy = NULL;
-	double seconds;
+	double seconds, missing = 0;
 	int rc = study_build(&greedy, &result, &seconds, study, &study->model[row]);
 
 	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, &study->model[row], greedy, &result);
+		rc = study_missing(&missing, study, &study->model[row], greedy, &result);
 	greedy_destroy(greedy);
 	if (rc != PSR_OK)
 		return rc;
@@ -89,7 +87,7 @@ static int put_product(struct study *study, int row)
 	*study_at(&study->table, row, 0, PRODUCT_SAMPLES) = (double)result.n_samples;
 	*study_at(&study->table, row, 0, PRODUCT_SIZE) = (double)result.n_bytes / 1e6;
 	*study_at(&study->table, row, 0, PRODUCT_SECONDS) = seconds;
-	*study_at(&study->table, row, 0, PRODUCT_MISSING) = measure.missing;
+	*study_at(&study->table, row, 0, PRODUCT_MISSING) = missing;
 	return PSR_OK;
 }
 

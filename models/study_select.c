@@ -1,4 +1,5 @@
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/mem.h"
 #include "sample/greedy_warp.h"
@@ -6,6 +7,7 @@
 
 #define RADIANS (3.14159265358979323846 / 180)
 #define N_FRAMES 16
+#define N_ROUNDS 3
 
 enum { BLOCKS, SAMPLES, FILLED, SIZE, SIZE_RATIO, WARP, WARP_RATIO, CULLED, MISSING, FIRST_PASS, SECONDS, N_COLUMNS };
 
@@ -23,12 +25,10 @@ static const struct study_column columns[N_COLUMNS] = {
 	[SECONDS] = { "s", "seconds", 2 },
 };
 
-int study_measure(struct study_measure *out, const struct study *study, const struct study_model *model,
+int study_missing(double *missing, const struct study *study, const struct study_model *model,
                   const struct greedy *greedy, const struct greedy_result *result)
 {
 	struct greedy_point *point = psr_alloc_array(result->n_samples, sizeof *point);
-	struct greedy_warp *warp = NULL;
-	struct greedy_warp_time time = { 0 };
 	uint64_t n_trials = 0, n_missing = 0;
 	int rc;
 
@@ -40,49 +40,41 @@ int study_measure(struct study_measure *out, const struct study *study, const st
 	psr_free(point);
 	if (rc != PSR_OK)
 		return psr_fail(study->err, rc, "no memory to measure adequacy");
-	rc = greedy_warp_create(&warp, greedy, study->err);
-	if (rc == PSR_OK)
-		rc = greedy_warp_run(warp, N_FRAMES, &time, study->err);
-	greedy_warp_destroy(warp);
-	*out = (struct study_measure){ .result = *result, .warp = time.seconds, .culled = time.culled,
-		                           .missing = n_trials != 0 ? 1e4 * (double)n_missing / (double)n_trials : 0 };
-	return rc;
+	*missing = n_trials != 0 ? 1e4 * (double)n_missing / (double)n_trials : 0;
+	return PSR_OK;
 }
 
-static void put(struct study *study, int row, int model, const struct study_measure *m, double seconds)
+int study_put(struct study *study, int row, int model, const struct greedy *greedy, const struct greedy_result *result,
+              double seconds)
 {
 	const struct study_table *table = &study->table;
+	int rc = study_missing(study_at(table, row, model, MISSING), study, &study->model[model], greedy, result);
 
-	*study_at(table, row, model, BLOCKS) = (double)m->result.n_blocks;
-	*study_at(table, row, model, SAMPLES) = (double)m->result.n_samples;
-	*study_at(table, row, model, FILLED) = 100 * (double)m->result.n_samples / (double)m->result.n_lanes;
-	*study_at(table, row, model, SIZE) = (double)m->result.n_bytes / 1e6;
-	*study_at(table, row, model, WARP) = m->warp * 1e6;
-	*study_at(table, row, model, CULLED) = 100 * m->culled;
-	*study_at(table, row, model, MISSING) = m->missing;
-	if (m->result.n_first_pass != 0)
-		*study_at(table, row, model, FIRST_PASS) = (double)m->result.n_first_pass;
+	if (rc == PSR_OK)
+		rc = greedy_warp_create(&study->warp[row * study->n_models + model], greedy, study->err);
+	*study_at(table, row, model, BLOCKS) = (double)result->n_blocks;
+	*study_at(table, row, model, SAMPLES) = (double)result->n_samples;
+	*study_at(table, row, model, FILLED) = 100 * (double)result->n_samples / (double)result->n_lanes;
+	*study_at(table, row, model, SIZE) = (double)result->n_bytes / 1e6;
+	if (result->n_first_pass != 0)
+		*study_at(table, row, model, FIRST_PASS) = (double)result->n_first_pass;
 	*study_at(table, row, model, SECONDS) = seconds;
-}
-
-static int select_and_put(struct study *study, int row, int model, struct greedy *greedy,
-                          const struct greedy_select_options *options)
-{
-	double before = options->goes_on ? *study_at(&study->table, row - 1, model, SECONDS) : greedy->seconds_scan;
-	struct greedy_result result;
-	struct study_measure measure;
-	int rc = greedy_select(greedy, options, &result, study->err);
-
-	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
-	if (rc == PSR_OK)
-		put(study, row, model, &measure, before + result.seconds);
 	study_step(study, study->model[model].name);
 	return rc;
 }
 
-static int scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
-                enum greedy_directions directions)
+int study_select(struct study *study, int row, int model, struct greedy *greedy,
+                 const struct greedy_select_options *options)
+{
+	double before = options->goes_on ? *study_at(&study->table, row - 1, model, SECONDS) : greedy->seconds_scan;
+	struct greedy_result result;
+	int rc = greedy_select(greedy, options, &result, study->err);
+
+	return rc == PSR_OK ? study_put(study, row, model, greedy, &result, before + result.seconds) : rc;
+}
+
+int study_scan(struct greedy **out, struct study *study, int model, double degrees, enum greedy_lattice lattice,
+               enum greedy_directions directions)
 {
 	const struct study_model *m = &study->model[model];
 	const struct greedy_scan_options options = { .resolution = study->resolution, .tolerance = degrees * RADIANS,
@@ -91,22 +83,58 @@ static int scan(struct greedy **out, struct study *study, int model, double degr
 	return greedy_create(out, m->mesh, m->scene, m->scale, &options, study->pool, study->err);
 }
 
-static int start_table(struct study *study, const char *first, int n_rows)
+int study_start(struct study *study, const char *first, int n_rows)
 {
 	study->total = n_rows * study->n_models;
+	study->warp = calloc((size_t)study->total, sizeof *study->warp);
+	if (study->warp == NULL)
+		return psr_fail(study->err, PSR_ERR_MEMORY, "no memory for %d rows", n_rows);
+	study->n_warps = study->total;
 	return study_table_init(&study->table, first, columns, N_COLUMNS, n_rows, study->n_models, study->err);
 }
 
-static void finish_table(struct study *study, int base)
+void study_drop(struct study *study)
 {
+	for (int i = 0; i < study->n_warps; i++)
+		greedy_warp_destroy(study->warp[i]);
+	free(study->warp);
+	study->warp = NULL;
+	study->n_warps = 0;
+}
+
+/* All rows of a model one after the other, some times: a machine's speed drifts. */
+static int time_warps(struct study *study)
+{
+	const struct study_table *table = &study->table;
+
+	for (int i = 0; i < N_ROUNDS * study->n_warps; i++) {
+		int row = i % table->n_rows, model = i / table->n_rows % study->n_models;
+		double *us = study_at(table, row, model, WARP);
+		struct greedy_warp_time time;
+		int rc = greedy_warp_run(study->warp[row * study->n_models + model], N_FRAMES, &time, study->err);
+
+		if (rc != PSR_OK)
+			return rc;
+		*us = fmin(*us, 1e6 * time.seconds); /* NAN at first */
+		*study_at(table, row, model, CULLED) = 100 * time.culled;
+	}
+	return PSR_OK;
+}
+
+int study_finish(struct study *study, int base)
+{
+	int rc = time_warps(study);
+
+	study_drop(study);
 	study_relate(&study->table, SIZE, SIZE_RATIO, base);
 	study_relate(&study->table, WARP, WARP_RATIO, base);
+	return rc;
 }
 
 static int run_angles(struct study *study, const double *degrees, int n, enum greedy_lattice lattice)
 {
 	struct greedy_select_options options;
-	int rc = start_table(study, "degrees", n + (lattice == GREEDY_SQUARE)), base = n;
+	int rc = study_start(study, "degrees", n + (lattice == GREEDY_SQUARE)), base = n;
 
 	greedy_select_default(&options);
 	for (int i = 0; rc == PSR_OK && i < n; i++) {
@@ -115,9 +143,9 @@ static int run_angles(struct study *study, const double *degrees, int n, enum gr
 		for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 			struct greedy *greedy = NULL;
 
-			rc = scan(&greedy, study, m, degrees[i], lattice, GREEDY_THESIS);
+			rc = study_scan(&greedy, study, m, degrees[i], lattice, GREEDY_THESIS);
 			if (rc == PSR_OK)
-				rc = select_and_put(study, i, m, greedy, &options);
+				rc = study_select(study, i, m, greedy, &options);
 			greedy_destroy(greedy);
 		}
 	}
@@ -125,13 +153,13 @@ static int run_angles(struct study *study, const double *degrees, int n, enum gr
 		struct greedy *greedy = NULL;
 
 		snprintf(study->table.label[n], sizeof study->table.label[n], "25 (equilateral)");
-		rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
+		rc = study_scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 		if (rc == PSR_OK)
-			rc = select_and_put(study, n, m, greedy, &options);
+			rc = study_select(study, n, m, greedy, &options);
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		finish_table(study, base);
+		rc = study_finish(study, base);
 	return rc;
 }
 
@@ -144,7 +172,7 @@ int study_run_tolerance(struct study *study)
 
 int study_run_square(struct study *study)
 {
-	static const double degrees[] = { 20, 25, 30, 35, 40, 45, 50, 55 };
+	static const double degrees[] = { 20, 25, 30, 35, 40, 44, 45, 46, 50, 55 };
 
 	return run_angles(study, degrees, (int)(sizeof degrees / sizeof *degrees), GREEDY_SQUARE);
 }
@@ -153,112 +181,21 @@ int study_run_block_size(struct study *study)
 {
 	static const int side[] = { 4, 8, 16, 32 };
 	struct greedy_select_options options;
-	int n = (int)(sizeof side / sizeof *side), rc = start_table(study, "block", n);
+	int n = (int)(sizeof side / sizeof *side), rc = study_start(study, "block", n);
 
 	greedy_select_default(&options);
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 		struct greedy *greedy = NULL;
 
-		rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
+		rc = study_scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, GREEDY_THESIS);
 		for (int i = 0; rc == PSR_OK && i < n; i++) {
 			snprintf(study->table.label[i], sizeof study->table.label[i], "%dx%d", side[i], side[i]);
 			options.side = side[i];
-			rc = select_and_put(study, i, m, greedy, &options);
+			rc = study_select(study, i, m, greedy, &options);
 		}
 		greedy_destroy(greedy);
 	}
 	if (rc == PSR_OK)
-		finish_table(study, 1);
-	return rc;
-}
-
-/* ---- what was tried for selection ---- */
-
-static const struct variant {
-	const char *label;
-	enum greedy_directions directions;
-	int goes_on; /* from the row before */
-	int second_pass, is_one_test, not_facing, by_score, drops, strict;
-	double depth; /* 0: 1 */
-} variants[] = {
-	{ "[G] 32, one test, both passes", GREEDY_THESIS, .second_pass = 1, .is_one_test = 1 },
-	{ "[G] 32, backs count, both passes", GREEDY_THESIS, .second_pass = 1, .not_facing = 1 },
-	{ "[G] 32, depths 10 times as strict, first pass", GREEDY_THESIS, .depth = 0.1 },
-	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1, .depth = 0.1 },
-	{ "[G] 32, first pass", GREEDY_THESIS, .goes_on = 0 },
-	{ "  both passes", GREEDY_THESIS, .goes_on = 1, .second_pass = 1 },
-	{ "    samples dropped (9.2.3)", GREEDY_THESIS, .goes_on = 1, .drops = 1 },
-	{ "icosahedral 32, first pass", GREEDY_ICOSAHEDRAL, .goes_on = 0 },
-	{ "  both passes", GREEDY_ICOSAHEDRAL, .goes_on = 1, .second_pass = 1 },
-	{ "    samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
-	{ "icosahedral 32, by score (9.2.2)", GREEDY_ICOSAHEDRAL, .by_score = 1 },
-	{ "  samples dropped (9.2.3)", GREEDY_ICOSAHEDRAL, .goes_on = 1, .drops = 1 },
-	{ "98 and scouts, strict first", GREEDY_CORNERS, .strict = 1 },
-	{ "  second pass", GREEDY_CORNERS, .goes_on = 1, .second_pass = 1, .strict = 1 },
-};
-#define BASE_VARIANT 5
-#define N_VARIANTS ((int)(sizeof variants / sizeof *variants))
-
-static int run_variant(struct study *study, int row, int model, struct greedy *greedy)
-{
-	const struct variant *variant = &variants[row];
-	struct greedy_select_options options;
-
-	greedy_select_default(&options);
-	options.goes_on = variant->goes_on;
-	options.second_pass = variant->second_pass;
-	options.is_facing = !variant->not_facing;
-	options.by_score = variant->by_score;
-	options.drops_samples = variant->drops;
-	options.is_strict_first = options.forgives_outlines = variant->strict;
-	if (variant->depth > 0)
-		options.depth_tolerance = variant->depth;
-	if (variant->is_one_test)
-		options.n_rotations = options.n_shifts = 1;
-	return select_and_put(study, row, model, greedy, &options);
-}
-
-static int run_product(struct study *study, int row, int model)
-{
-	struct greedy *greedy = NULL;
-	struct greedy_result result;
-	struct study_measure measure;
-	double seconds;
-	int rc = study_build(&greedy, &result, &seconds, study, &study->model[model]);
-
-	if (rc == PSR_OK)
-		rc = study_measure(&measure, study, &study->model[model], greedy, &result);
-	greedy_destroy(greedy);
-	if (rc == PSR_OK)
-		put(study, row, model, &measure, seconds);
-	study_step(study, study->model[model].name);
-	return rc;
-}
-
-int study_run_selection(struct study *study)
-{
-	int rc = start_table(study, "selection", N_VARIANTS + 1);
-
-	if (rc == PSR_OK)
-		snprintf(study->table.label[N_VARIANTS], sizeof *study->table.label, "psr: ownership, all levels built");
-	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
-		struct greedy *greedy = NULL;
-
-		for (int i = 0; rc == PSR_OK && i < N_VARIANTS; i++) {
-			snprintf(study->table.label[i], sizeof study->table.label[i], "%s", variants[i].label);
-			if (i == 0 || variants[i].directions != variants[i - 1].directions) {
-				greedy_destroy(greedy);
-				greedy = NULL;
-				rc = scan(&greedy, study, m, 25, GREEDY_EQUILATERAL, variants[i].directions);
-			}
-			if (rc == PSR_OK)
-				rc = run_variant(study, i, m, greedy);
-		}
-		greedy_destroy(greedy);
-		if (rc == PSR_OK)
-			rc = run_product(study, N_VARIANTS, m);
-	}
-	if (rc == PSR_OK)
-		finish_table(study, BASE_VARIANT);
+		rc = study_finish(study, 1);
 	return rc;
 }

@@ -130,6 +130,12 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
 
+/* The same of what the sampler drafts (draft.h), which has one level and these projections, GREEDY_MOST_VIEWS at most.
+ * MEMORY. */
+struct draft;
+int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n_projections, uint32_t resolution,
+                      struct greedy_result *result, struct psr_error *err);
+
 /* The kept samples, in the order of views, blocks and samples: position, normal (psr/direction.h) and two-sidedness,
  * all of n_samples of the result. */
 struct greedy_point {

@@ -10,7 +10,7 @@
 #include "greedy_parts.h"
 #include "psr/direction.h"
 
-#define N_REPETITIONS 5
+#define N_REPETITIONS 3
 #define DISTANCE 1.7320508075688772 /* of the eye, where a field of view of 60 degrees shows the unit sphere */
 #define EMPTY UINT64_C(0x7f800000ffffffff)
 

@@ -16,20 +16,23 @@ static double now(void)
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-int level_make(struct level *level, const struct psr_projection *projection,
-               void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
-{
-	unsigned n_steps = level->n_projections / 2 + 4, done = 0;
-	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
-	double started = now();
-	int rc;
+struct steps {
+	unsigned done, total;
+	void (*on_progress)(unsigned done, unsigned total, void *userdata);
+	void *userdata;
+};
 
-#define STEP_DONE                                                                                                      \
-	do {                                                                                                               \
-		done++;                                                                                                        \
-		if (on_progress != NULL)                                                                                       \
-			on_progress(done, n_steps, userdata);                                                                      \
-	} while (0)
+static void step(struct steps *steps)
+{
+	steps->done++;
+	if (steps->on_progress != NULL)
+		steps->on_progress(steps->done, steps->total, steps->userdata);
+}
+
+static int prepare(struct level *level)
+{
+	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
+	int rc;
 
 	level->sheets = calloc(level->n_projections, sizeof *level->sheets);
 	level->sides = psr_alloc_array(n_prims, 1);
@@ -44,26 +47,50 @@ int level_make(struct level *level, const struct psr_projection *projection,
 		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen) : seen_init(&level->seen, level->ds);
 	if (rc == PSR_OK && level->finer_seen == NULL)
 		rc = seen_look(&level->seen, level->scene, 0, level->pool);
-	STEP_DONE;
+	return rc;
+}
+
+static int trace(struct level *level, const struct psr_projection *projection, struct steps *steps)
+{
+	double started = now();
+	int rc = prepare(level);
+
+	step(steps);
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
 		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, &projection[i], level->pool);
 		level->n_rays += level->sheets[i].n_rays;
 		level->n_patches += level->sheets[i].n_patches + level->sheets[i + 1].n_patches;
-		STEP_DONE;
+		step(steps);
 	}
 	level->seconds_rays = now() - started;
+	return rc;
+}
+
+int level_own(struct level *level, const struct psr_projection *projection)
+{
+	struct steps none = { 0 };
+	int rc = trace(level, projection, &none);
+
+	return rc == PSR_OK ? owner_mark(level) : rc;
+}
+
+int level_make(struct level *level, const struct psr_projection *projection,
+               void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
+{
+	struct steps steps = { 0, level->n_projections / 2 + 4, on_progress, userdata };
+	int rc = trace(level, projection, &steps);
+
 	if (rc == PSR_OK)
 		rc = owner_mark(level);
-	STEP_DONE;
+	step(&steps);
 	if (rc == PSR_OK) {
 		merge_patches(level);
 		rc = keep_owned(level);
 	}
-	STEP_DONE;
+	step(&steps);
 	if (rc == PSR_OK)
 		rc = dice_surface(level, 0);
-	STEP_DONE;
-#undef STEP_DONE
+	step(&steps);
 	return rc;
 }
 

@@ -93,6 +93,9 @@ int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata);
 void level_fini(struct level *level);
 
+/* The first part of that: everything is traced and owned, and nothing kept. MEMORY; level_fini() either way. */
+int level_own(struct level *level, const struct psr_projection *projection);
+
 /* Normal of a hit on the side that was met. */
 static inline void level_normal(const struct level *level, uint32_t surface, float n[3])
 {
