@@ -7,6 +7,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "psr/direction.h"
+#include "random.h"
 #include "sample/greedy_parts.h"
 
 #define PI 3.14159265358979323846
@@ -36,19 +37,9 @@ struct study_trials {
 	struct trial_view *view;
 };
 
-/* Sebastiano Vigna's splitmix64. */
-static uint64_t next_random(struct study_trials *trials)
-{
-	uint64_t z = trials->random += UINT64_C(0x9e3779b97f4a7c15);
-
-	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-	return z ^ z >> 31;
-}
-
 static double next_real(struct study_trials *trials) /* 0 <= x < 1 */
 {
-	return (double)(next_random(trials) >> 11) * 0x1p-53;
+	return random_in(&trials->random, 0, 1);
 }
 
 static void next_direction(struct study_trials *trials, double v[3])

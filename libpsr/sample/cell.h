@@ -1,10 +1,16 @@
-/* Where a cell's number goes in a table: all of its bits count, so that cells in a row of any direction spread
+/* The number of a cubic cell, and where it goes in a table: all of its bits count, so that cells in a row of any direction spread
  * (the last step of MurmurHash3, Appleby 2011). */
 #ifndef PSR_SAMPLE_CELL_H
 #define PSR_SAMPLE_CELL_H
 
 #include <stddef.h>
 #include <stdint.h>
+
+/* 21 bits of each coordinate. */
+static inline uint64_t cell_key(int x, int y, int z)
+{
+	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
+}
 
 /* n: a power of two. */
 static inline size_t cell_place(uint64_t key, size_t n)

@@ -17,14 +17,9 @@ struct cover_brick {
 	uint32_t first[8]; /* points of its cells */
 };
 
-static uint64_t key_of(const int brick[3])
+static uint64_t brick_key(const int at[3])
 {
-	return (uint64_t)(brick[0] & 0x1fffff) | (uint64_t)(brick[1] & 0x1fffff) << 21 | (uint64_t)(brick[2] & 0x1fffff) << 42;
-}
-
-static uint64_t key_of_cell(const int at[3])
-{
-	return key_of((const int[3]){ at[0] >> 1, at[1] >> 1, at[2] >> 1 });
+	return cell_key(at[0] >> 1, at[1] >> 1, at[2] >> 1);
 }
 
 static int place_in_brick(const int at[3])
@@ -105,9 +100,9 @@ int cover_add(struct cover *cover, const struct cover_point *point)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k < 3; k++)
 		at[k] = cell_at(cover, (double)point->position[k]);
-	brick = find(cover, key_of_cell(at));
+	brick = find(cover, brick_key(at));
 	if (brick->key == FREE) {
-		brick->key = key_of_cell(at);
+		brick->key = brick_key(at);
 		for (int i = 0; i < 8; i++)
 			brick->first[i] = COVER_NONE;
 		cover->n_bricks++;
@@ -121,7 +116,7 @@ int cover_add(struct cover *cover, const struct cover_point *point)
 
 uint32_t cover_cell(const struct cover *cover, const int at[3])
 {
-	const struct cover_brick *brick = find(cover, key_of_cell(at));
+	const struct cover_brick *brick = find(cover, brick_key(at));
 
 	return brick->key != FREE ? brick->first[place_in_brick(at)] : COVER_NONE;
 }
@@ -138,7 +133,7 @@ int cover_around(const struct cover *cover, const float p[3], double radius, uin
 	for (at[2] = low[2] >> 1; at[2] <= high[2] >> 1; at[2]++) {
 		for (at[1] = low[1] >> 1; at[1] <= high[1] >> 1; at[1]++) {
 			for (at[0] = low[0] >> 1; at[0] <= high[0] >> 1; at[0]++) {
-				const struct cover_brick *brick = find(cover, key_of(at));
+				const struct cover_brick *brick = find(cover, cell_key(at[0], at[1], at[2]));
 
 				for (int i = 0; brick->key != FREE && i < 8; i++) {
 					int x = 2 * at[0] + (i & 1), y = 2 * at[1] + (i >> 1 & 1), z = 2 * at[2] + (i >> 2);

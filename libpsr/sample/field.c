@@ -9,11 +9,6 @@
 
 #define FREE UINT64_MAX
 
-static uint64_t key_of(int x, int y, int z)
-{
-	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
-}
-
 static struct field_cell *find(const struct field *field, uint64_t key)
 {
 	size_t i = cell_place(key, field->capacity);
@@ -79,10 +74,10 @@ int field_add(struct field *field, const float p[3], const float n[3], float wei
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k < 3; k++)
 		at[k] = (int)floor((double)p[k] / field->cell);
-	cell = find(field, key_of(at[0], at[1], at[2]));
+	cell = find(field, cell_key(at[0], at[1], at[2]));
 	if (cell->key == FREE) {
 		memset(cell, 0, sizeof *cell);
-		cell->key = key_of(at[0], at[1], at[2]);
+		cell->key = cell_key(at[0], at[1], at[2]);
 		field->n_cells++;
 	}
 	for (int k = 0; k < 3; k++)
@@ -103,7 +98,7 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 		weight[k][0] = 1 - weight[k][1];
 	}
 	for (int i = 0; i < 8; i++) {
-		const struct field_cell *cell = find(field, key_of(at[0] + (i & 1), at[1] + (i >> 1 & 1), at[2] + (i >> 2)));
+		const struct field_cell *cell = find(field, cell_key(at[0] + (i & 1), at[1] + (i >> 1 & 1), at[2] + (i >> 2)));
 		float w = weight[0][i & 1] * weight[1][i >> 1 & 1] * weight[2][i >> 2];
 
 		for (int l = 0; cell->key != FREE && l < FIELD_LOBES; l++) {

@@ -163,7 +163,6 @@ int keep_owned(struct level *level)
 		mark_kept(level, &ref[i]);
 		rc = cover_add(&level->cover, &job.point[i]);
 	}
-	level->n_owned = job.n;
 	psr_free(ref);
 	psr_free(job.point);
 	return rc;

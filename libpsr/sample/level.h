@@ -18,6 +18,7 @@
 #include "seen.h"
 #include "sheet.h"
 #include "surface.h"
+#include "texture.h"
 
 /* What is known of a primitive's sides. */
 enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8 };
@@ -37,7 +38,7 @@ struct level {
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
 	const struct seen *finer_seen; /* of the same level */
-	uint64_t n_rays, n_patches, n_owned, n_added, n_snapped;
+	uint64_t n_rays, n_patches;
 	double seconds_rays;
 };
 
@@ -110,8 +111,7 @@ static inline const struct psr_material *level_material(const struct level *leve
 {
 	const struct psr_mesh *mesh = level->mesh;
 
-	return &mesh->material[prim < mesh->n_triangles ? mesh->triangle_material[prim]
-	                                                : mesh->point_material[prim - mesh->n_triangles]];
+	return &mesh->material[texture_material(mesh, prim)];
 }
 
 /* Projection space. */

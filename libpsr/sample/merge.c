@@ -7,7 +7,8 @@
 static const struct {
 	int least;
 	float cosine;
-} ROUND[] = { { 3, 0.85f }, { 6, 0.85f }, { 9, 0.85f }, { 12, 0.85f }, { 16, 0.85f }, { 6, 0.7f }, { 10, 0.7f }, { 6, 0.5f }, { 8, 0.5f } };
+} ROUND[] = { { 3, 0.85f }, { 6, 0.85f }, { 9, 0.85f }, { 12, 0.85f }, { 16, 0.85f },
+	          { 6, 0.7f },  { 10, 0.7f }, { 6, 0.5f }, { 8, 0.5f } };
 #define N_ROUNDS (int)(sizeof ROUND / sizeof *ROUND)
 #define MOST_TRIES 8
 
@@ -46,7 +47,8 @@ static struct claim find_claim(struct level *level, unsigned q, const float p[3]
 	return claim;
 }
 
-static struct claim find_other(struct level *level, unsigned projection, const float p[3], uint32_t surface, int least, float cosine)
+static struct claim find_other(struct level *level, unsigned projection, const float p[3], uint32_t surface, int least,
+                               float cosine)
 {
 	float n[3], smooth[3], tried_above = 2;
 

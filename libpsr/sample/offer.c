@@ -60,7 +60,7 @@ struct corner {
 	struct lattice_point at;
 	struct sheet_ref ref;
 	float position[3], distance2;
-	int is_kept, is_alive;
+	int is_kept;
 };
 
 /* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no patch. */
@@ -89,7 +89,6 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 		v3f_sub(d, c->position, spot->p);
 		c->distance2 = v3f_dot(d, d);
 		c->is_kept = (int)(sheets->patch[c->ref.patch].kept >> c->ref.sample & 1);
-		c->is_alive = sheets->patch[c->ref.patch].is_alive;
 	}
 }
 
@@ -132,7 +131,6 @@ int offer_is_covered(const struct level *level, const struct surface_spot *spot)
 
 static int keep_corner(struct level *level, unsigned projection, const struct corner *corner)
 {
-	level->n_added += (uint64_t)!corner->is_kept;
 	return keep_sample(level, (struct level_ref){ projection, corner->ref });
 }
 
@@ -241,7 +239,6 @@ static int keep_snapped(struct level *level, const struct surface_spot *spot, co
 
 	if (rc != PSR_OK || ref.at.patch == SHEET_NONE)
 		return rc;
-	level->n_snapped++;
 	return keep_sample(level, ref);
 }
 

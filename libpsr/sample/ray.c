@@ -73,8 +73,7 @@ void ray_locate(const struct ray_scene *scene, const struct ray *ray, uint32_t p
 
 static const struct psr_material *material_of(const struct psr_mesh *mesh, uint32_t prim)
 {
-	return &mesh->material[prim < mesh->n_triangles ? mesh->triangle_material[prim]
-	                                                : mesh->point_material[prim - mesh->n_triangles]];
+	return &mesh->material[texture_material(mesh, prim)];
 }
 
 static int disc_is_absent(const struct psr_mesh *mesh, uint32_t point, const struct psr_material *material)

@@ -4,6 +4,7 @@
 
 #include <embree3/rtcore.h>
 #include "ray.h"
+#include "texture.h"
 
 #define RAY_PACKET 8
 
@@ -69,8 +70,7 @@ static inline int ray_is_two_sided(const struct ray_scene *scene, uint32_t prim)
 {
 	const struct psr_mesh *mesh = scene->mesh;
 
-	return mesh->material[ray_is_disc(scene, prim) ? mesh->point_material[prim - mesh->n_triangles]
-	                                               : mesh->triangle_material[prim]].two_sided != 0;
+	return mesh->material[texture_material(mesh, prim)].two_sided != 0;
 }
 
 /* What locates a hit is in no order that a cache could guess: asked for early, for all of a packet. */

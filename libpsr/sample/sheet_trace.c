@@ -4,6 +4,7 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "sheet_patch.h"
+#include "texture.h"
 
 #define SIDE PSR_BLOCK_SIDE
 #define BATCH 64
@@ -59,14 +60,12 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 	}
 	for (int k = 0; k < n_hits; k++) {
 		uint32_t prim = ray_hit[k].prim;
-		uint32_t material = prim < mesh->n_triangles ? mesh->triangle_material[prim]
-		                                             : mesh->point_material[prim - mesh->n_triangles];
 
 		if (fabsf(v3f_dot(ray_scene_normal(job->scene, prim), z_axis)) < SHEET_LEAST_COSINE)
 			continue;
 		strip->hit[strip->n++] = (struct strip_hit){ .z = (float)(SHEET_START - ray_hit[k].t),
 			                                         .surface = prim | (ray_hit[k].is_back ? SHEET_BACK : 0),
-			                                         .two_sided = mesh->material[material].two_sided != 0,
+			                                         .two_sided = mesh->material[texture_material(mesh, prim)].two_sided != 0,
 			                                         .is_first = k == 0 };
 	}
 	return PSR_OK;

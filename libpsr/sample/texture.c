@@ -2,11 +2,6 @@
 #include "filter.h"
 #include "texture.h"
 
-uint32_t texture_material(const struct psr_mesh *mesh, uint32_t prim)
-{
-	return prim < mesh->n_triangles ? mesh->triangle_material[prim] : mesh->point_material[prim - mesh->n_triangles];
-}
-
 int texture_place(const struct psr_mesh *mesh, const struct psr_texture *texture, uint32_t triangle, double u, double v,
                   double st[2])
 {

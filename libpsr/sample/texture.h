@@ -24,6 +24,9 @@ void texture_base_color(const struct psr_mesh *mesh, uint32_t prim, double u, do
  * as magnification filters it. */
 int texture_is_absent(const struct psr_mesh *mesh, uint32_t prim, double u, double v);
 
-uint32_t texture_material(const struct psr_mesh *mesh, uint32_t prim); /* index of a primitive's material */
+static inline uint32_t texture_material(const struct psr_mesh *mesh, uint32_t prim)
+{
+	return prim < mesh->n_triangles ? mesh->triangle_material[prim] : mesh->point_material[prim - mesh->n_triangles];
+}
 
 #endif

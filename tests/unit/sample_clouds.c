@@ -59,36 +59,13 @@ static struct psr_mesh *sphere_cloud(uint32_t n)
 	return mesh;
 }
 
-struct built {
-	struct psr_mesh *mesh;
-	struct psr_model *model;
-	const struct psr_blocks *blocks;
-	struct model_sample *sample;
-};
-
-static void open_built(struct built *built, struct psr_mesh *mesh)
-{
-	built->mesh = mesh;
-	built->model = model_build(mesh, RESOLUTION);
-	built->blocks = psr_model_blocks(built->model);
-	built->sample = model_samples(built->blocks);
-	assert_int_equal(built->blocks->n_levels, N_LEVELS);
-}
-
-static void close_built(struct built *built)
-{
-	free(built->sample);
-	psr_model_unref(built->model);
-	cloud_free(built->mesh);
-}
-
 static double pixel(unsigned level)
 {
 	return 2.0 / RESOLUTION * (1u << level);
 }
 
 /* To inner coordinates. */
-static void inner(const struct built *built, const double p[3], float out[3])
+static void inner(const struct model_built *built, const double p[3], float out[3])
 {
 	const struct psr_model_info *info = psr_model_info(built->model);
 
@@ -100,7 +77,7 @@ static void inner(const struct built *built, const double p[3], float out[3])
  * pixels that what is sampled may be away from samples (sample_dice.c) are 1.12 at level 0, less above. */
 static void a_dense_cloud_has_no_holes(void **state)
 {
-	const struct built *built = *state;
+	const struct model_built *built = *state;
 	uint64_t seed = 31;
 
 	for (unsigned level = 0; level < N_LEVELS; level++) {
@@ -132,7 +109,7 @@ static void overlapping_discs_are_sampled_once(void **state)
 	struct psr_mesh *sphere = meshes_sphere(60, zero, 1);
 	struct psr_model *model = model_build(sphere, RESOLUTION);
 	double n = (double)psr_model_blocks(model)->n_samples;
-	const struct built *built = *state;
+	const struct model_built *built = *state;
 
 	printf("# %.2f of a mesh's samples\n", (double)built->blocks->n_samples / n);
 	assert_true((double)built->blocks->n_samples < 1.2 * n && (double)built->blocks->n_samples > 0.8 * n);
@@ -144,7 +121,7 @@ static void overlapping_discs_are_sampled_once(void **state)
  * to 1.3. What is bent to face its projection is none of these. */
 static void samples_have_colors_and_normals_of_their_points(void **state)
 {
-	const struct built *built = *state;
+	const struct model_built *built = *state;
 	const struct psr_model_info *info = psr_model_info(built->model);
 
 	for (uint64_t i = 0; i < built->blocks->n_samples; i++) {
@@ -174,7 +151,7 @@ static void samples_have_colors_and_normals_of_their_points(void **state)
 static void a_disc_is_round(void **state)
 {
 	struct psr_mesh *mesh = cloud(1);
-	struct built built;
+	struct model_built built;
 	double frame[3][3], normal[3] = { 0.36, 0.48, 0.8 };
 	float center[3];
 
@@ -182,7 +159,7 @@ static void a_disc_is_round(void **state)
 	for (int k = 0; k < 3; k++)
 		mesh->point_normal[0][k] = (float)normal[k];
 	mesh->point_radius[0] = 3;
-	open_built(&built, mesh);
+	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	inner(&built, mesh->point[0], center);
 	psr_direction_frame(normal, frame);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
@@ -211,14 +188,14 @@ static void a_disc_is_round(void **state)
 		}
 		cover_fini(&map);
 	}
-	close_built(&built);
+	model_close(&built, cloud_free);
 }
 
 /* Alone, and a tenth of a pixel wide: each has a sample within half a pixel of its centre, by which it is tested. */
 static void lone_points_are_all_there(void **state)
 {
 	struct psr_mesh *mesh = cloud(500);
-	struct built built;
+	struct model_built built;
 	uint64_t seed = 5;
 
 	(void)state;
@@ -232,7 +209,7 @@ static void lone_points_are_all_there(void **state)
 			mesh->point[i][k] = 2 * meshes_random(&seed) - 1;
 		mesh->point_radius[i] = (float)(0.05 * 2 / RESOLUTION);
 	}
-	open_built(&built, mesh);
+	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	for (unsigned level = 0; level < N_LEVELS; level++) {
 		struct cover map;
 		int n_missing = 0;
@@ -248,21 +225,21 @@ static void lone_points_are_all_there(void **state)
 		assert_int_equal(n_missing, 0);
 		cover_fini(&map);
 	}
-	close_built(&built);
+	model_close(&built, cloud_free);
 }
 
 static int open_sphere(void **state)
 {
-	static struct built sphere;
+	static struct model_built sphere;
 
-	open_built(&sphere, sphere_cloud(5000));
+	model_open(&sphere, sphere_cloud(5000), RESOLUTION, N_LEVELS);
 	*state = &sphere;
 	return 0;
 }
 
 static int close_sphere(void **state)
 {
-	close_built(*state);
+	model_close(*state, cloud_free);
 	return 0;
 }
 

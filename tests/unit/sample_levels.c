@@ -13,29 +13,6 @@
 
 static const double zero[3];
 
-struct built {
-	struct psr_mesh *mesh;
-	struct psr_model *model;
-	const struct psr_blocks *blocks;
-	struct model_sample *sample;
-};
-
-static void open_built(struct built *built, struct psr_mesh *mesh)
-{
-	built->mesh = mesh;
-	built->model = model_build(mesh, RESOLUTION);
-	built->blocks = psr_model_blocks(built->model);
-	built->sample = model_samples(built->blocks);
-	assert_int_equal(built->blocks->n_levels, N_LEVELS);
-}
-
-static void close_built(struct built *built)
-{
-	free(built->sample);
-	psr_model_unref(built->model);
-	meshes_free(built->mesh);
-}
-
 static double pixel(unsigned level)
 {
 	return 2.0 / RESOLUTION * (1u << level);
@@ -55,18 +32,18 @@ static struct psr_mesh *square(void)
  * most: x = 0.1 gives (0.9 + 0.2) / (0.9 + 0.1) of a quarter, and twice that share at the next level 0.29. */
 static void each_level_has_a_quarter_of_the_samples(void **state)
 {
-	struct built built;
+	struct model_built built;
 	double n[N_LEVELS] = { 0 };
 
 	(void)state;
-	open_built(&built, meshes_sphere(60, zero, 1));
+	model_open(&built, meshes_sphere(60, zero, 1), RESOLUTION, N_LEVELS);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++)
 		n[built.sample[i].level]++;
 	for (int level = 1; level < N_LEVELS; level++) {
 		printf("# level %d: %.3f of the finer one\n", level, n[level] / n[level - 1]);
 		assert_true(n[level] / n[level - 1] > 0.24 && n[level] / n[level - 1] < 0.30);
 	}
-	close_built(&built);
+	model_close(&built, meshes_free);
 }
 
 /* Squares of a pixel of level 0. Level 2 has pixels of 16 of them, and its samples blend what is around them within
@@ -78,7 +55,7 @@ static void a_checkerboard_becomes_its_linear_mean(void **state)
 	struct psr_mesh *mesh = square();
 	double sum[N_LEVELS] = { 0 }, most[N_LEVELS] = { 0 };
 	int n[N_LEVELS] = { 0 };
-	struct built built;
+	struct model_built built;
 
 	(void)state;
 	for (int y = 0; y < 181; y++)
@@ -86,7 +63,7 @@ static void a_checkerboard_becomes_its_linear_mean(void **state)
 			memcpy(texel[y][x], (x + y) % 2 == 0 ? "\0\0\0\377" : "\377\377\377\377", 4);
 	meshes_texture(mesh, 181, 181, &texel[0][0][0]);
 	mesh->material->base_texture.is_nearest = 1;
-	open_built(&built, mesh);
+	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
 		const struct model_sample *s = &built.sample[i];
 		double value = (double)psr_srgb_to_linear[PSR_ATTR_DIFFUSE(s->attr) & 255];
@@ -104,7 +81,7 @@ static void a_checkerboard_becomes_its_linear_mean(void **state)
 	/* A pixel's own circle holds one square and some of the next. */
 	assert_true(most[0] > 0.15 && most[0] < 0.4);
 	assert_true(most[2] < 0.05);
-	close_built(&built);
+	model_close(&built, meshes_free);
 }
 
 /* The middle of the square is cut out. What is in it can only have been moved there, by half a pixel; and around it
@@ -114,7 +91,7 @@ static void cut_outs_are_cut_out_of_all_levels(void **state)
 	const double half = sqrt(0.5) / 2;
 	uint8_t texel[8][8][4];
 	struct psr_mesh *mesh = square();
-	struct built built;
+	struct model_built built;
 
 	(void)state;
 	for (int y = 0; y < 8; y++)
@@ -125,7 +102,7 @@ static void cut_outs_are_cut_out_of_all_levels(void **state)
 	mesh->material->alpha = PSR_ALPHA_MASK;
 	mesh->material->alpha_cutoff = 0.5f;
 	mesh->material->two_sided = 1;
-	open_built(&built, mesh);
+	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
 		const struct model_sample *s = &built.sample[i];
 		double inside = half - 0.6 * pixel(s->level);
@@ -146,7 +123,7 @@ static void cut_outs_are_cut_out_of_all_levels(void **state)
 		}
 		cover_fini(&map);
 	}
-	close_built(&built);
+	model_close(&built, meshes_free);
 }
 
 static void sheets_have_two_sides_at_all_levels(void **state)
@@ -154,11 +131,11 @@ static void sheets_have_two_sides_at_all_levels(void **state)
 	(void)state;
 	for (int two_sided = 0; two_sided < 2; two_sided++) {
 		struct psr_mesh *mesh = square();
-		struct built built;
+		struct model_built built;
 		int n[N_LEVELS] = { 0 }, n_backs = 0;
 
 		mesh->material->two_sided = two_sided;
-		open_built(&built, mesh);
+		model_open(&built, mesh, RESOLUTION, N_LEVELS);
 		for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
 			const struct model_sample *s = &built.sample[i];
 
@@ -173,7 +150,7 @@ static void sheets_have_two_sides_at_all_levels(void **state)
 		 * more. */
 		for (unsigned level = 0; level < N_LEVELS; level++)
 			assert_true(n[level] * pixel(level) * pixel(level) < 1.6 * 2 + 4 * sqrt(2) * 4 * pixel(level));
-		close_built(&built);
+		model_close(&built, meshes_free);
 	}
 }
 
@@ -184,7 +161,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 	struct psr_mesh *mesh = meshes_new(4 * n, 2 * n);
 	double along[20][3], frame[3][3], direction[3];
 	const struct psr_model_info *info;
-	struct built built;
+	struct model_built built;
 	uint64_t seed = 3;
 
 	(void)state;
@@ -207,7 +184,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 		}
 	}
 	mesh->material->two_sided = 1;
-	open_built(&built, mesh);
+	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	info = psr_model_info(built.model);
 	for (unsigned level = 0; level < N_LEVELS; level++) {
 		struct cover map;
@@ -224,7 +201,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 		}
 		cover_fini(&map);
 	}
-	close_built(&built);
+	model_close(&built, meshes_free);
 }
 
 int main(void)

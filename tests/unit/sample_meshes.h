@@ -41,6 +41,31 @@ static inline void meshes_free(struct psr_mesh *mesh)
 	free(mesh);
 }
 
+/* Six squares of half side `half`, fronts outside; or five of them, without the one at +z. */
+static inline struct psr_mesh *meshes_box(double half, int is_open)
+{
+	uint32_t n = is_open ? 5 : 6;
+	struct psr_mesh *mesh = meshes_new(4 * n, 2 * n);
+
+	for (uint32_t f = 0; f < n; f++) {
+		int axis = (int)f / 2, sign = f % 2 == 0 ? -1 : 1; /* -x, +x, -y, +y, -z, and last +z */
+
+		for (uint32_t c = 0; c < 4; c++) {
+			double *p = mesh->position[4 * f + c];
+
+			p[axis] = sign * half;
+			p[(axis + 1) % 3] = (c == 1 || c == 2 ? 1 : -1) * half;
+			p[(axis + 2) % 3] = (c >= 2 ? 1 : -1) * sign * half;
+		}
+		for (uint32_t t = 0; t < 2; t++) {
+			mesh->triangle[2 * f + t][0] = 4 * f;
+			mesh->triangle[2 * f + t][1] = 4 * f + 1 + t;
+			mesh->triangle[2 * f + t][2] = 4 * f + 2 + t;
+		}
+	}
+	return mesh;
+}
+
 /* A grid of 2 * n_u * n_v triangles, (n_u + 1) * (n_v + 1) vertices; front on the left of u cross v. */
 static inline struct psr_mesh *meshes_grid(uint32_t n_u, uint32_t n_v)
 {

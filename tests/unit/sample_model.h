@@ -61,6 +61,29 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 	return list;
 }
 
+struct model_built {
+	struct psr_mesh *mesh;
+	struct psr_model *model;
+	const struct psr_blocks *blocks;
+	struct model_sample *sample;
+};
+
+static inline void model_open(struct model_built *built, struct psr_mesh *mesh, uint32_t resolution, uint32_t n_levels)
+{
+	built->mesh = mesh;
+	built->model = model_build(mesh, resolution);
+	built->blocks = psr_model_blocks(built->model);
+	built->sample = model_samples(built->blocks);
+	assert_int_equal(built->blocks->n_levels, n_levels);
+}
+
+static inline void model_close(struct model_built *built, void (*mesh_free)(struct psr_mesh *mesh))
+{
+	free(built->sample);
+	psr_model_unref(built->model);
+	mesh_free(built->mesh);
+}
+
 /* Those of a level by cells of a pixel of it, number in the list in `patch`; group in `projection`. cover_fini(). */
 static inline void model_map(struct cover *map, const struct model_sample *list, uint64_t n, unsigned level, double ds)
 {

@@ -10,30 +10,6 @@
 
 static const double zero[3];
 
-/* An axis-parallel cube of half side `half`, fronts outside. */
-static struct psr_mesh *cube(double half)
-{
-	struct psr_mesh *mesh = meshes_new(24, 12);
-
-	for (uint32_t f = 0; f < 6; f++) {
-		int axis = (int)f / 2, sign = f % 2 == 0 ? -1 : 1;
-
-		for (uint32_t c = 0; c < 4; c++) {
-			double *p = mesh->position[4 * f + c];
-
-			p[axis] = sign * half;
-			p[(axis + 1) % 3] = (c == 1 || c == 2 ? 1 : -1) * half;
-			p[(axis + 2) % 3] = (c >= 2 ? 1 : -1) * sign * half;
-		}
-		for (uint32_t t = 0; t < 2; t++) {
-			mesh->triangle[2 * f + t][0] = 4 * f;
-			mesh->triangle[2 * f + t][1] = 4 * f + 1 + t;
-			mesh->triangle[2 * f + t][2] = 4 * f + 2 + t;
-		}
-	}
-	return mesh;
-}
-
 static void no_direction_is_far_from_all_projections(void **state)
 {
 	struct psr_projection projection[N_PROJECTIONS];
@@ -130,7 +106,7 @@ static void flat_faces_have_one_owner(void **state)
 	unsigned owner[6];
 
 	(void)state;
-	level_set_make(&set, cube(half), 128, 2);
+	level_set_make(&set, meshes_box(half, 0), 128, 2);
 	inside = half - 10 * set.level.ds;
 	for (int f = 0; f < 6; f++) {
 		float sign = f % 2 == 0 ? -1 : 1;

@@ -10,31 +10,6 @@
 #define RESOLUTION 64
 #define DS (2.0 / RESOLUTION)
 
-/* Six squares of half side `half`, fronts outside; or five of them, without the one at +z. */
-static struct psr_mesh *box(double half, int is_open)
-{
-	uint32_t n = is_open ? 5 : 6;
-	struct psr_mesh *mesh = meshes_new(4 * n, 2 * n);
-
-	for (uint32_t f = 0; f < n; f++) {
-		int axis = (int)f / 2, sign = f % 2 == 0 ? -1 : 1; /* -x, +x, -y, +y, -z, and last +z */
-
-		for (uint32_t c = 0; c < 4; c++) {
-			double *p = mesh->position[4 * f + c];
-
-			p[axis] = sign * half;
-			p[(axis + 1) % 3] = (c == 1 || c == 2 ? 1 : -1) * half;
-			p[(axis + 2) % 3] = (c >= 2 ? 1 : -1) * sign * half;
-		}
-		for (uint32_t t = 0; t < 2; t++) {
-			mesh->triangle[2 * f + t][0] = 4 * f;
-			mesh->triangle[2 * f + t][1] = 4 * f + 1 + t;
-			mesh->triangle[2 * f + t][2] = 4 * f + 2 + t;
-		}
-	}
-	return mesh;
-}
-
 struct looked {
 	struct psr_mesh *mesh;
 	struct ray_scene *scene;
@@ -89,7 +64,7 @@ static void count_sides(const struct looked *looked, double half, int *n, int *n
 
 static void inside_of_a_closed_box_is_not_seen(void **state)
 {
-	struct psr_mesh *mesh = box(0.5, 0);
+	struct psr_mesh *mesh = meshes_box(0.5, 0);
 	struct looked looked;
 	int n, n_outside, n_inside;
 
@@ -104,7 +79,7 @@ static void inside_of_a_closed_box_is_not_seen(void **state)
 
 static void inside_of_an_open_box_is_seen(void **state)
 {
-	struct psr_mesh *mesh = box(0.5, 1);
+	struct psr_mesh *mesh = meshes_box(0.5, 1);
 	struct looked looked;
 	int n, n_outside, n_inside;
 
@@ -120,7 +95,7 @@ static void inside_of_an_open_box_is_seen(void **state)
 /* Fronts inside: from outside all that is seen are the fronts of the far walls. */
 static void backs_of_one_sided_faces_are_looked_through(void **state)
 {
-	struct psr_mesh *mesh = box(0.5, 0);
+	struct psr_mesh *mesh = meshes_box(0.5, 0);
 	struct looked looked;
 	int n, n_front, n_back;
 
