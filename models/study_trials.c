@@ -8,6 +8,7 @@
 #include "base/vec.h"
 #include "psr/direction.h"
 #include "random.h"
+#include "sample/area.h"
 #include "sample/greedy_parts.h"
 
 #define PI 3.14159265358979323846
@@ -56,18 +57,9 @@ static void next_direction(struct study_trials *trials, double v[3])
 
 static uint32_t next_triangle(struct study_trials *trials)
 {
-	double wanted = next_real(trials) * trials->area[trials->mesh->n_triangles - 1];
-	uint32_t low = 0, high = trials->mesh->n_triangles - 1;
+	uint32_t n = trials->mesh->n_triangles;
 
-	while (low < high) {
-		uint32_t middle = low + (high - low) / 2;
-
-		if (trials->area[middle] > wanted)
-			high = middle;
-		else
-			low = middle + 1;
-	}
-	return low;
+	return area_find(trials->area, n, next_real(trials) * trials->area[n - 1]);
 }
 
 static void next_place(struct study_trials *trials, uint32_t *prim, double place[3])

@@ -4,6 +4,7 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "adequacy.h"
+#include "area.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 #include "texture.h"
@@ -60,27 +61,12 @@ struct trial {
 	float axis[3][3]; /* of the pixel: its sides, and the view */
 };
 
-static uint32_t draw_primitive(const struct job *job, double x)
-{
-	uint32_t low = 0, high = job->n_prims - 1;
-
-	while (low < high) {
-		uint32_t middle = low + (high - low) / 2;
-
-		if (job->area[middle] > x)
-			high = middle;
-		else
-			low = middle + 1;
-	}
-	return low;
-}
-
 /* 0: this draw is no trial. */
 static int draw_trial(const struct job *job, uint64_t index, struct trial *trial)
 {
 	struct random r = { (job->seed << 40) + index * UINT64_C(0x632be59bd9b4e019) };
 	const struct level *level = job->level;
-	uint32_t prim = draw_primitive(job, draw(&r) * job->area[job->n_prims - 1]);
+	uint32_t prim = area_find(job->area, job->n_prims, draw(&r) * job->area[job->n_prims - 1]);
 	const float *n = ray_scene_normal(level->scene, prim);
 	double u = draw(&r), v = draw(&r), p[3], along, aside[3], up[3];
 	int is_back;

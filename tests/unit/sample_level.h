@@ -5,6 +5,7 @@
 #include "base/vec.h"
 #include "psr/direction.h"
 #include "psr/pool.h"
+#include "sample/area.h"
 #include "sample/level.h"
 #include "sample/projection.h"
 #include "sample_meshes.h"
@@ -72,26 +73,18 @@ static inline uint32_t level_set_place(const struct level_set *set, uint64_t *se
 	double x = meshes_random(seed) * set->area[set->mesh->n_triangles - 1];
 	double u = meshes_random(seed), v = meshes_random(seed);
 	double corner[3][3];
-	uint32_t low = 0, high = set->mesh->n_triangles - 1;
+	uint32_t prim = area_find(set->area, set->mesh->n_triangles, x);
 
-	while (low < high) {
-		uint32_t middle = low + (high - low) / 2;
-
-		if (set->area[middle] > x)
-			high = middle;
-		else
-			low = middle + 1;
-	}
 	if (u + v > 1) {
 		u = 1 - u;
 		v = 1 - v;
 	}
-	ray_scene_corners(set->scene, low, corner);
+	ray_scene_corners(set->scene, prim, corner);
 	for (int k = 0; k < 3; k++) {
 		p[k] = (float)((1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k]);
-		n[k] = ray_scene_normal(set->scene, low)[k];
+		n[k] = ray_scene_normal(set->scene, prim)[k];
 	}
-	return low;
+	return prim;
 }
 
 /* Distance to the nearest kept sample, in pixels; INFINITY if none is within `reach` pixels. Samples that are shaded
