@@ -51,7 +51,11 @@ say = $(if $(filter 1,$(V)),,@printf '  %-5s %s\n' $(1) $(2))
 
 objs = $(patsubst %,$(BUILD)/%.o,$(sort $(wildcard $(1))))
 
-LIBPSR_O       := $(call objs,libpsr/base/*.c libpsr/model/*.c libpsr/render/*.c)
+SIMD_O         := $(call objs,libpsr/simd/*.c libpsr/simd/c/*.c)
+ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
+SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
+endif
+LIBPSR_O       := $(call objs,libpsr/base/*.c libpsr/model/*.c libpsr/render/*.c) $(SIMD_O)
 LIBPSR_BUILD_O := $(call objs,libpsr/import/*.c libpsr/import/*.cc libpsr/sample/*.c libpsr/measure/*.c)
 PROTO_O        := $(call objs,proto/*.c)
 CLIENT_LIB_O   := $(call objs,client/lib/*.c)
@@ -77,6 +81,12 @@ all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
 compile: $(PROGRAMS)
+
+# Kernels: the compiler may turn loops into vectors, and speculate where only an exception flag would tell.
+$(BUILD)/libpsr/simd/c/%.o: CFLAGS += -O3 -fno-trapping-math
+$(BUILD)/libpsr/simd/avx2/%.o: CFLAGS += -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
+$(BUILD)/libpsr/simd/avx512/%.o: CFLAGS += -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
+	-mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vbmi2
 
 $(BUILD)/%.c.o: %.c
 	@mkdir -p $(@D)

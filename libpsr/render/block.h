@@ -38,7 +38,7 @@ static inline void to_eye(const struct plan *plan, const struct plan_instance *i
 		v[k] = plan->perspective ? in->eye[k] - p[k] : in->eye[k];
 }
 
-/* Whether a normal whose product with the vector v to the eye is g faces away. */
+/* Whether a normal whose product with the vector v to the eye is g faces away, as the warp has it. */
 static inline int faces_away(float g, const float v[3])
 {
 	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);

@@ -16,6 +16,7 @@ struct band {
 };
 
 struct psr_renderer {
+	const struct simd *simd;
 	struct plan plan;
 	struct bins bins;
 	struct fill fill;
@@ -72,6 +73,7 @@ int psr_renderer_create(struct psr_renderer **out)
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	if (!r)
 		return PSR_ERR_MEMORY;
+	r->simd = simd_get();
 	for (int i = 0; i < 65536; i++)
 		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
 	*out = r;
@@ -85,7 +87,7 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	plan_clear(&r->plan);
 	bins_clear(&r->bins);
 	fill_clear(&r->fill);
-	psr_free(r->pixels);
+	psr_free_huge(r->pixels, r->pixels_size);
 	psr_free(r->counters);
 	free(r);
 }
@@ -93,6 +95,16 @@ void psr_renderer_destroy(struct psr_renderer *r)
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
 	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->counters_size + bins_bytes(&r->bins);
+}
+
+static void *grow_huge(void *memory, size_t *capacity, size_t size)
+{
+	if (memory && size <= *capacity)
+		return memory;
+	psr_free_huge(memory, *capacity);
+	memory = psr_alloc_huge(size);
+	*capacity = memory ? size : 0;
+	return memory;
 }
 
 static void *grow(void *memory, size_t *capacity, size_t size)
@@ -128,7 +140,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = grow(r->pixels, &r->pixels_size, area * (8 + 4 + 4 * 2) + cells * 4);
+	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 + 4 * 2) + WARP_PADDING * 8 + cells * 4);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
 	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile_inside + n_bands(&r->plan) * sizeof *r->band);
 	if (!r->pixels || !r->counters)
@@ -137,7 +149,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	r->band = (struct band *)(r->tile_inside + n_tiles);
 
 	stack->word = r->pixels;
-	r->z = (float *)(stack->word + area);
+	r->z = (float *)(stack->word + area + WARP_PADDING);
 	float *next = r->z + area;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
@@ -152,7 +164,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 static void warp_one(int tile, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	warp_tile(&r->plan, &r->bins, &r->stack, (uint32_t)tile, &r->tile_inside[tile]);
+	r->tile_inside[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 }
 
 int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,

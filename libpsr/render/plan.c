@@ -93,27 +93,42 @@ static void light_make(struct plan_light *out, const struct psr_light *light, do
 	}
 }
 
-static void projection_make(struct view_matrix *out, const struct psr_projection *projection, double to_camera[3][3],
-                            const double center[3], const struct plan *plan, double focal)
+static void lattice_make(struct warp_lattice *out, const struct psr_projection *projection, double to_camera[3][3],
+                         const double center[3], const struct plan *plan, double focal)
 {
-	/* Columns of `axis` as rows: projection space to inner coordinates is the transpose of a frame of rows. */
-	double a[3][4];
-	for (int i = 0; i < 3; i++) {
-		for (int k = 0; k < 3; k++)
-			a[i][k] = to_camera[i][0] * projection->axis[k][0] + to_camera[i][1] * projection->axis[k][1] +
-			          to_camera[i][2] * projection->axis[k][2];
-		a[i][3] = center[i];
-	}
-	double half[2] = { plan->width / 2.0, plan->height / 2.0 };
-	for (int k = 0; k < 4; k++) {
-		for (int i = 0; i < 2; i++)
-			out->m[i][k] = focal * a[i][k] + (plan->perspective ? half[i] * a[2][k] : k == 3 ? half[i] : 0);
-		out->m[2][k] = a[2][k];
+	const double dx = projection->spacing, dy = dx * 0.86602540378443864676;
+	const double half[3] = { plan->width / 2.0, plan->height / 2.0, 0 };
+	double column[4][3]; /* in camera space: a unit of projection space's x, y, z, and its origin */
+	for (int k = 0; k < 3; k++)
+		m3d_apply(column[k], (const double(*)[3])to_camera, (const double[3]){ projection->axis[k][0], projection->axis[k][1], projection->axis[k][2] });
+	memcpy(column[3], center, sizeof column[3]);
+	double *to[4] = { out->step, out->down, out->along, out->origin };
+	const double length[4] = { dx, dy, 1, 1 };
+	for (int a = 0; a < 3; a++) {
+		for (int k = 0; k < 4; k++) {
+			const double sideways = (a < 2 ? focal : 1) * column[k][a];
+			to[k][a] = length[k] * (sideways + (plan->perspective ? half[a] * column[k][2] : k == 3 ? half[a] : 0));
+		}
+		for (int i = 0; i < 8; i++) {
+			out->row[a][i] = i * out->down[a] + (i & 1) * 0.5 * out->step[a];
+			out->col[a][i] = (float)(i * out->step[a]);
+		}
 	}
 }
 
-static void instance_make(struct plan_instance *out, const struct psr_instance *instance, const struct plan *plan,
-                          const struct view *view, const struct psr_scene *scene, double focal)
+/* What a pixel's line of sight is in inner coordinates: of length 1 along the view axis. */
+static void sight_make(struct warp_instance *out, double turn[3][3], const struct plan *plan, double focal)
+{
+	for (int k = 0; k < 3; k++) {
+		const double across = turn[0][k] / focal, down = turn[1][k] / focal, forward = turn[2][k];
+		out->du[k] = (float)(plan->perspective ? across : 0);
+		out->dv[k] = (float)(plan->perspective ? down : 0);
+		out->d0[k] = (float)(plan->perspective ? forward - across * plan->width / 2.0 - down * plan->height / 2.0 : forward);
+	}
+}
+
+static void instance_make(struct plan_instance *out, struct warp_instance *warp, const struct psr_instance *instance,
+                          const struct plan *plan, const struct view *view, const struct psr_scene *scene, double focal)
 {
 	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
 	double world = instance_center(center, rotation, instance, view->eye), scale = world * view->scale;
@@ -122,6 +137,7 @@ static void instance_make(struct plan_instance *out, const struct psr_instance *
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
 	m3d_apply(camera_center, view->axis, center);
 	v3d_scale(camera_center, camera_center, view->scale);
+	sight_make(warp, to_camera, plan, focal);
 	for (int i = 0; i < 3; i++) {
 		v3d_scale(to_camera[i], to_camera[i], scale);
 		for (int k = 0; k < 3; k++)
@@ -137,8 +153,9 @@ static void instance_make(struct plan_instance *out, const struct psr_instance *
 	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
 	v3f_set(out->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
 
+	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < out->blocks->n_projections; p++)
-		projection_make(&out->projection[p], &out->blocks->projection[p], to_camera, camera_center, plan, focal);
+		lattice_make(&lattice[p], &out->blocks->projection[p], to_camera, camera_center, plan, focal);
 	for (uint32_t l = 0; l < plan->n_lights; l++)
 		light_make(&out->light[l], &scene->light[l], rotation, center, world, view->eye);
 }
@@ -160,8 +177,8 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	for (uint32_t i = 0; i < scene->n_instances; i++)
 		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
 	size_t lights = (size_t)scene->n_instances * scene->n_lights;
-	size_t size = n_projections * sizeof(struct view_matrix) + scene->n_instances * sizeof(struct plan_instance) +
-	              lights * sizeof(struct plan_light);
+	size_t size = n_projections * sizeof(struct warp_lattice) + lights * sizeof(struct plan_light) +
+	              scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	if (size > plan->storage_size) {
 		psr_free(plan->storage);
 		plan->storage = psr_alloc_array(size, 1);
@@ -169,21 +186,24 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 		if (!plan->storage)
 			return PSR_ERR_MEMORY;
 	}
-	struct view_matrix *projection = plan->storage;
-	plan->instance = (struct plan_instance *)(projection + n_projections);
-	struct plan_light *light = (struct plan_light *)(plan->instance + scene->n_instances);
+	struct warp_lattice *lattice = plan->storage;
+	plan->instance = (struct plan_instance *)(lattice + n_projections);
+	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
+	struct plan_light *light = (struct plan_light *)(plan->warp + scene->n_instances);
 	plan->n_slots = plan->n_groups = 0;
 	plan->n_samples = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_blocks *blocks = psr_model_blocks(scene->instance[i].model);
 		plan->instance[i].first_slot = plan->n_slots;
-		plan->instance[i].projection = projection;
+		plan->warp[i].blocks = blocks;
+		plan->warp[i].lattice = lattice;
+		plan->warp[i].first_slot = plan->n_slots;
 		plan->instance[i].light = light;
 		plan->instance[i].first_group = plan->n_groups;
 		plan->n_slots += blocks->n_blocks;
 		plan->n_groups += blocks->n_clusters;
 		plan->n_samples += blocks->n_samples;
-		projection += blocks->n_projections;
+		lattice += blocks->n_projections;
 		light += scene->n_lights;
 	}
 	return PSR_OK;
@@ -232,7 +252,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		plan->background[i] = light16(scene->background[i]);
 	}
 	for (uint32_t i = 0; i < scene->n_instances; i++)
-		instance_make(&plan->instance[i], &scene->instance[i], plan, &view, scene, focal);
+		instance_make(&plan->instance[i], &plan->warp[i], &scene->instance[i], plan, &view, scene, focal);
 	return PSR_OK;
 }
 

@@ -5,25 +5,14 @@
 #include <stdint.h>
 #include "psr/pool.h"
 #include "psr/render.h"
+#include "simd/simd.h"
 
 #define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
 #define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 #define STRIP 256       /* samples that are resolved and shaded together */
 
-/* A sample of a one-sided block faces away when its normal is more than this sine beyond perpendicular: what
- * normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out
- * when they are warped, before they hide what is behind them, so that open one-sided surfaces are seen through
- * from their backs. */
-#define BACK_SINE 0.0125f
-
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
-
-/* From a projection's space to the picture: u = (m[0] . (x, y, z, 1)) / w, v alike, and z' = m[2] . (x, y, z, 1).
- * w is z' in perspective and 1 in orthographic pictures; the focal length and the picture's centre are absorbed. */
-struct view_matrix {
-	double m[3][4];
-};
 
 struct plan_light {
 	enum psr_light_kind kind;
@@ -41,7 +30,6 @@ struct plan_instance {
 	float scale;               /* camera space units an inner unit */
 	float spacing;             /* greatest distance of neighbours at level 0, camera space */
 	float eye[3];              /* inner coordinates; orthographic: unit vector to the viewer instead */
-	struct view_matrix *projection; /* one a projection of the model */
 	struct plan_light *light;  /* n_lights */
 };
 
@@ -55,6 +43,7 @@ struct plan {
 	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_instances, n_lights, n_slots, n_groups;
 	struct plan_instance *instance;
+	struct warp_instance *warp; /* what warping knows of each */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
 	uint64_t n_samples;
@@ -75,13 +64,6 @@ uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
 struct cull_group {
 	float stretch;  /* greatest of its clusters: pixels that a unit of camera space can be stretched to */
 	uint32_t score; /* of the cluster that is drawn */
-};
-
-struct bin_entry {
-	uint32_t slot;
-	uint16_t instance;
-	uint8_t level; /* of the depth buffer that fits the block */
-	uint8_t is_mixed; /* some of its samples may face away */
 };
 
 struct bins {
@@ -105,7 +87,8 @@ void bins_clear(struct bins *bins);
 
 /* ---- warp: samples to words and cells, by tile ([G] 7.1, 7.2) ---- */
 
-void warp_tile(const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile, uint64_t *n_inside);
+/* Clears a tile and draws its blocks; returns how many samples fell into it. */
+uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile);
 
 /* ---- gaps: weights from the level buffers ([G] 4.6) ---- */
 

@@ -1,0 +1,190 @@
+#include <immintrin.h>
+#include <string.h>
+#include "simd/block.h"
+#include "simd/kernels.h"
+
+/* As in avx512/warp.c, in groups of 8 samples. */
+struct stores {
+	_Alignas(32) uint64_t word[8][8];
+	_Alignas(32) uint32_t at[8][8];
+};
+
+static inline void lower_words(uint64_t *base, const struct stores *s, int n_groups)
+{
+	const int half = (n_groups + 1) / 2;
+	for (int g = 0; g < n_groups / 2; g++)
+		for (int l = 0; l < 8; l++)
+			_Pragma("GCC unroll 2") for (int h = 0; h < 2; h++) {
+				uint64_t *at = &base[s->at[g + h * half][l]];
+				const uint64_t word = s->word[g + h * half][l], there = *at;
+				*at = word < there ? word : there;
+			}
+	if (n_groups & 1)
+		for (int l = 0; l < 8; l++) {
+			uint64_t *at = &base[s->at[half - 1][l]];
+			const uint64_t word = s->word[half - 1][l], there = *at;
+			*at = word < there ? word : there;
+		}
+}
+
+static inline __m256 rows_of(const struct warp_block *b, int a)
+{
+	__m128 part[2];
+	for (int h = 0; h < 2; h++) {
+		const __m256d row = _mm256_loadu_pd(b->lattice->row[a] + 4 * h);
+		part[h] = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_set1_pd(b->origin[a]), _mm256_mul_pd(_mm256_set1_pd(b->scale), row)));
+	}
+	return _mm256_set_m128(part[1], part[0]);
+}
+
+static inline __m256 columns_of(const struct warp_block *b, int a)
+{
+	return _mm256_mul_ps(_mm256_set1_ps((float)b->scale), _mm256_loadu_ps(b->lattice->col[a]));
+}
+
+static inline __m256 axis_of(__m256 rows, __m256 columns, __m256i r, __m256i c, __m256 depth, float unit)
+{
+	const __m256 place = _mm256_add_ps(_mm256_permutevar8x32_ps(rows, r), _mm256_permutevar8x32_ps(columns, c));
+	return _mm256_add_ps(place, _mm256_mul_ps(depth, _mm256_set1_ps(unit)));
+}
+
+static inline __m256 clamp_pixel(__m256 u)
+{
+	const float far = 2.0f * PSR_MAX_SIDE;
+	return _mm256_min_ps(_mm256_max_ps(u, _mm256_set1_ps(-far)), _mm256_set1_ps(far));
+}
+
+static inline __m256 sight_axis(const struct warp_instance *in, int k, __m256 u, __m256 v)
+{
+	const __m256 across = _mm256_mul_ps(u, _mm256_set1_ps(in->du[k])), down = _mm256_mul_ps(v, _mm256_set1_ps(in->dv[k]));
+	return _mm256_add_ps(_mm256_add_ps(across, down), _mm256_set1_ps(in->d0[k]));
+}
+
+static inline __m256 dot(const __m256 a[3], const __m256 b[3])
+{
+	return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])), _mm256_mul_ps(a[2], b[2]));
+}
+
+/* Masks here have all bits of a lane set or none. Only the attributes of lanes of `valid` are read. */
+static inline __m256i faces_away(const struct warp_target *t, const struct warp_instance *in, const uint64_t *attr,
+                                 __m256i valid, __m256 u, __m256 v)
+{
+	const __m256i low_mask = _mm256_cvtepi32_epi64(_mm256_castsi256_si128(valid));
+	const __m256i high_mask = _mm256_cvtepi32_epi64(_mm256_extracti128_si256(valid, 1));
+	const __m256 low = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr, low_mask));
+	const __m256 high = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr + 4, high_mask));
+	const __m256i a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
+	const __m256i index = _mm256_mullo_epi32(_mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), _mm256_set1_epi32(3));
+	__m256 n[3], d[3];
+	for (int i = 0; i < 3; i++) {
+		n[i] = _mm256_i32gather_ps(t->direction[0] + i, index, 4);
+		d[i] = sight_axis(in, i, u, v);
+	}
+	const __m256 g = dot(n, d), limit = _mm256_mul_ps(_mm256_set1_ps(BACK_SINE * BACK_SINE), dot(d, d));
+	const __m256 behind = _mm256_cmp_ps(g, _mm256_setzero_ps(), _CMP_GT_OQ);
+	return _mm256_castps_si256(_mm256_and_ps(behind, _mm256_cmp_ps(_mm256_mul_ps(g, g), limit, _CMP_GT_OQ)));
+}
+
+/* Lanes with first <= a < end. */
+static inline __m256i within(__m256i a, int32_t first, int32_t end)
+{
+	return _mm256_andnot_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(first), a), _mm256_cmpgt_epi32(_mm256_set1_epi32(end), a));
+}
+
+static inline __m256i inside(__m256i k, __m256i u, __m256i v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
+{
+	return _mm256_and_si256(k, _mm256_and_si256(within(u, x0, x1), within(v, y0, y1)));
+}
+
+static inline uint32_t bits_of(__m256i k)
+{
+	return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(k));
+}
+
+static inline void lower_cells(const struct warp_cells *cells, int level, __m256i k, __m256i u, __m256i v, __m256 z)
+{
+	_Alignas(32) uint32_t at[8], bits[8];
+	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32(level), first = _mm256_set1_epi32((int)cells->first);
+	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one), y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
+	const __m256i line = _mm256_mullo_epi32(y, _mm256_set1_epi32((int)cells->stride));
+	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
+	_mm256_store_si256((__m256i *)at, _mm256_blendv_epi8(first, _mm256_add_epi32(line, x), k));
+	_mm256_store_si256((__m256i *)bits, _mm256_blendv_epi8(_mm256_set1_epi32(-1), _mm256_castps_si256(z), k));
+	uint32_t *base = (uint32_t *)cells->z;
+	_Pragma("GCC unroll 8") for (int l = 0; l < 8; l++)
+	{
+		uint32_t *cell = &base[at[l]];
+		const uint32_t there = *cell;
+		*cell = bits[l] < there ? bits[l] : there;
+	}
+}
+
+/* The numbers of the bits of a mask, in order; what follows them is of no value. */
+static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
+{
+	uint32_t n = 0;
+	for (uint64_t row = 0; row < 8; row++) {
+		const uint64_t bits = mask >> 8 * row & 0xff;
+		const uint64_t columns = _pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
+		const uint64_t numbers = columns + row * UINT64_C(0x0808080808080808);
+		memcpy(sample + n, &numbers, sizeof numbers);
+		n += (uint32_t)__builtin_popcountll(bits);
+	}
+}
+
+static inline uint32_t warp_one(const struct warp_target *t, const struct bin_entry *entry, __m256i unused)
+{
+	const __m256i order = _mm256_setr_epi32(0, 1, 4, 5, 2, 3, 6, 7), lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+	const struct warp_instance *in = &t->instance[entry->instance];
+	uint8_t sample[64 + 8];
+	struct warp_block b;
+	struct stores stores;
+	uint32_t n_inside = 0;
+
+	warp_block_make(&b, in, entry->slot);
+	const int n = __builtin_popcountll(b.mask), n_groups = (n + 7) / 8;
+	list_samples(sample, b.mask);
+	const __m256 row_x = rows_of(&b, 0), row_y = rows_of(&b, 1), row_z = rows_of(&b, 2);
+	const __m256 col_x = columns_of(&b, 0), col_y = columns_of(&b, 1), col_z = columns_of(&b, 2);
+
+	for (int g = 0; g < n_groups; g++) {
+		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(sample + 8 * g)));
+		const __m256i r = _mm256_srli_epi32(s, 3), c = s; /* the low three bits count */
+		const __m256 depth = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(b.depth + 8 * g))));
+		const __m256 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
+		const __m256 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
+		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
+		const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
+		const __m256 u = clamp_pixel(_mm256_mul_ps(x1, inverse)), v = clamp_pixel(_mm256_mul_ps(y1, inverse));
+		const __m256i pixel_u = _mm256_cvttps_epi32(_mm256_floor_ps(u)), pixel_v = _mm256_cvttps_epi32(_mm256_floor_ps(v));
+
+		const __m256i valid = _mm256_cmpgt_epi32(_mm256_set1_epi32(n - 8 * g), lane);
+		__m256i k = _mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
+		if (entry->is_mixed)
+			k = _mm256_andnot_si256(faces_away(t, in, b.attr + 8 * g, valid, u, v), k);
+		if (entry->level)
+			lower_cells(&t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
+		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
+		n_inside += (uint32_t)__builtin_popcount(bits_of(k));
+
+		const __m256i line = _mm256_mullo_epi32(pixel_v, _mm256_set1_epi32((int)t->stride));
+		const __m256i at = _mm256_blendv_epi8(unused, _mm256_add_epi32(line, pixel_u), k);
+		const __m256i id = _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id));
+		const __m256i bits = _mm256_blendv_epi8(_mm256_set1_epi32(-1), _mm256_castps_si256(z1), k);
+		_mm256_store_si256((__m256i *)stores.at[g], _mm256_permutevar8x32_epi32(at, order));
+		_mm256_store_si256((__m256i *)stores.word[g], _mm256_unpacklo_epi32(id, bits));
+		_mm256_store_si256((__m256i *)(stores.word[g] + 4), _mm256_unpackhi_epi32(id, bits));
+	}
+	lower_words(t->word, &stores, n_groups);
+	return n_inside;
+}
+
+uint64_t warp_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
+{
+	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+	const __m256i unused = _mm256_add_epi32(lane, _mm256_set1_epi32(target->y0 * (int)target->stride + target->x0));
+	uint64_t n_inside = 0;
+	for (uint32_t e = 0; e < n; e++)
+		n_inside += warp_one(target, &entry[e], unused);
+	return n_inside;
+}

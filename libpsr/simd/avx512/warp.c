@@ -1,0 +1,180 @@
+#include <immintrin.h>
+#include "simd/block.h"
+#include "simd/kernels.h"
+
+/* Up to 64 words and depths of cells, and the places that they go to. They are computed first and stored after, 16 apart
+ * in turn, since samples that follow each other often fall into one pixel, and a store must not wait for the one just
+ * before. Depths are above 0, so that they compare as integers. Ones change nothing. */
+struct stores {
+	_Alignas(64) uint64_t word[4][16];
+	_Alignas(64) uint32_t at[4][16], z[4][16], cell[4][16];
+};
+
+#define LOWER(n, type, base, value, place)                                            \
+	for (int l = 0; l < 16; l++) {                                                \
+		_Pragma("GCC unroll 4") for (int g = 0; g < n; g++) {                 \
+			type *at = &base[place[g][l]];                                \
+			const type own = value[g][l], there = *at;                    \
+			*at = own < there ? own : there;                              \
+		}                                                                     \
+	}
+#define LOWER_ALL(n_groups, ...)                                                      \
+	switch (n_groups) {                                                           \
+	case 1: LOWER(1, __VA_ARGS__) break;                                          \
+	case 2: LOWER(2, __VA_ARGS__) break;                                          \
+	case 3: LOWER(3, __VA_ARGS__) break;                                          \
+	default: LOWER(4, __VA_ARGS__) break;                                         \
+	}
+
+static inline void lower_words(uint64_t *base, const struct stores *s, int n_groups)
+{
+	LOWER_ALL(n_groups, uint64_t, base, s->word, s->at)
+}
+
+static inline void lower_cells(uint32_t *base, const struct stores *s, int n_groups)
+{
+	LOWER_ALL(n_groups, uint32_t, base, s->z, s->cell)
+}
+
+static inline __m512 rows_of(const struct warp_block *b, int a)
+{
+	const __m512d row = _mm512_loadu_pd(b->lattice->row[a]);
+	const __m512d at = _mm512_add_pd(_mm512_set1_pd(b->origin[a]), _mm512_mul_pd(_mm512_set1_pd(b->scale), row));
+	return _mm512_castps256_ps512(_mm512_cvtpd_ps(at));
+}
+
+static inline __m512 columns_of(const struct warp_block *b, int a)
+{
+	const __m256 col = _mm256_loadu_ps(b->lattice->col[a]);
+	return _mm512_castps256_ps512(_mm256_mul_ps(_mm256_set1_ps((float)b->scale), col));
+}
+
+static inline __m512 axis_of(__m512 rows, __m512 columns, __m512i r, __m512i c, __m512 depth, float unit)
+{
+	const __m512 place = _mm512_add_ps(_mm512_permutexvar_ps(r, rows), _mm512_permutexvar_ps(c, columns));
+	return _mm512_add_ps(place, _mm512_mul_ps(depth, _mm512_set1_ps(unit)));
+}
+
+/* MAXPS and MINPS return their second operand if the first is NaN. */
+static inline __m512 clamp_pixel(__m512 u)
+{
+	const float far = 2.0f * PSR_MAX_SIDE;
+	return _mm512_min_ps(_mm512_max_ps(u, _mm512_set1_ps(-far)), _mm512_set1_ps(far));
+}
+
+static inline __m512i floor_int(__m512 u)
+{
+	return _mm512_cvt_roundps_epi32(u, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+}
+
+static inline __m512 sight_axis(const struct warp_instance *in, int k, __m512 u, __m512 v)
+{
+	const __m512 across = _mm512_mul_ps(u, _mm512_set1_ps(in->du[k])), down = _mm512_mul_ps(v, _mm512_set1_ps(in->dv[k]));
+	return _mm512_add_ps(_mm512_add_ps(across, down), _mm512_set1_ps(in->d0[k]));
+}
+
+static inline __m512 dot(const __m512 a[3], const __m512 b[3])
+{
+	return _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(a[0], b[0]), _mm512_mul_ps(a[1], b[1])), _mm512_mul_ps(a[2], b[2]));
+}
+
+/* Of the lanes of k, those whose samples face away. */
+static inline __mmask16 faces_away(const struct warp_target *t, const struct warp_instance *in, const uint64_t *attr,
+                                   __mmask16 k, __m512 u, __m512 v)
+{
+	const __m256i low = _mm512_cvtepi64_epi32(_mm512_maskz_loadu_epi64((__mmask8)k, attr));
+	const __m256i high = _mm512_cvtepi64_epi32(_mm512_maskz_loadu_epi64((__mmask8)(k >> 8), attr + 8));
+	const __m512i a = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+	const __m512i index = _mm512_mullo_epi32(_mm512_and_si512(a, _mm512_set1_epi32(0x7fff)), _mm512_set1_epi32(3));
+	__m512 n[3], d[3];
+	for (int i = 0; i < 3; i++) {
+		n[i] = _mm512_i32gather_ps(index, t->direction[0] + i, 4);
+		d[i] = sight_axis(in, i, u, v);
+	}
+	const __m512 g = dot(n, d), limit = _mm512_mul_ps(_mm512_set1_ps(BACK_SINE * BACK_SINE), dot(d, d));
+	k = _mm512_mask_cmp_ps_mask(k, g, _mm512_setzero_ps(), _CMP_GT_OQ);
+	return _mm512_mask_cmp_ps_mask(k, _mm512_mul_ps(g, g), limit, _CMP_GT_OQ);
+}
+
+static inline __mmask16 inside(__mmask16 k, __m512i u, __m512i v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
+{
+	k = _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(u, _mm512_set1_epi32(x0)), _mm512_set1_epi32(x1 - x0));
+	return _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(v, _mm512_set1_epi32(y0)), _mm512_set1_epi32(y1 - y0));
+}
+
+static inline void place_cells(struct stores *stores, int g, const struct warp_cells *cells, int level, __mmask16 k, __m512i u,
+                               __m512i v, __m512 z)
+{
+	const __m512i one = _mm512_set1_epi32(1), by = _mm512_set1_epi32(level);
+	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one), y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
+	const __m512i line = _mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride));
+	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
+	_mm512_store_si512(stores->cell[g], _mm512_mask_add_epi32(_mm512_set1_epi32((int)cells->first), k, line, x));
+	_mm512_store_si512(stores->z[g], _mm512_mask_mov_epi32(_mm512_set1_epi32(-1), k, _mm512_castps_si512(z)));
+}
+
+static const uint8_t ordinals[64] = {
+	0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31,
+	32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
+};
+
+static inline uint32_t warp_one(const struct warp_target *t, const struct bin_entry *entry, __m512i unused)
+{
+	/* What interleaving 32-bit halves within 128 bits does to the order of 16. */
+	const __m512i order = _mm512_setr_epi32(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15);
+	const struct warp_instance *in = &t->instance[entry->instance];
+	_Alignas(64) uint8_t sample[64];
+	struct warp_block b;
+	struct stores stores;
+	uint32_t n_inside = 0;
+
+	warp_block_make(&b, in, entry->slot);
+	const int n = __builtin_popcountll(b.mask), n_groups = (n + 15) / 16;
+	_mm512_store_si512(sample, _mm512_maskz_compress_epi8(b.mask, _mm512_loadu_si512(ordinals)));
+	const __m512 row_x = rows_of(&b, 0), row_y = rows_of(&b, 1), row_z = rows_of(&b, 2);
+	const __m512 col_x = columns_of(&b, 0), col_y = columns_of(&b, 1), col_z = columns_of(&b, 2);
+
+	for (int g = 0; g < n_groups; g++) {
+		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(sample + 16 * g)));
+		const __m512i r = _mm512_srli_epi32(s, 3), c = _mm512_and_si512(s, _mm512_set1_epi32(7));
+		const __m256i raw = _mm256_loadu_si256((const __m256i *)(b.depth + 16 * g));
+		const __m512 depth = _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(raw));
+		const __m512 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
+		const __m512 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
+		const __m512 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
+		const __m512 one = _mm512_set1_ps(1), inverse = t->perspective ? _mm512_div_ps(one, z1) : one;
+		const __m512 u = clamp_pixel(_mm512_mul_ps(x1, inverse)), v = clamp_pixel(_mm512_mul_ps(y1, inverse));
+		const __m512i pixel_u = floor_int(u), pixel_v = floor_int(v);
+
+		__mmask16 k = (__mmask16)_bzhi_u32(0xffff, (uint32_t)(n - 16 * g));
+		k = _mm512_mask_cmp_ps_mask(k, z1, _mm512_set1_ps(t->near_z), _CMP_GT_OQ);
+		if (entry->is_mixed)
+			k &= (__mmask16)~faces_away(t, in, b.attr + 16 * g, k, u, v);
+		if (entry->level)
+			place_cells(&stores, g, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
+		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
+		n_inside += (uint32_t)__builtin_popcount(k);
+
+		const __m512i line = _mm512_mullo_epi32(pixel_v, _mm512_set1_epi32((int)t->stride));
+		const __m512i at = _mm512_mask_add_epi32(unused, k, line, pixel_u);
+		const __m512i id = _mm512_add_epi32(s, _mm512_set1_epi32((int)b.id));
+		const __m512i bits = _mm512_mask_mov_epi32(_mm512_set1_epi32(-1), k, _mm512_castps_si512(z1));
+		_mm512_store_si512(stores.at[g], _mm512_permutexvar_epi32(order, at));
+		_mm512_store_si512(stores.word[g], _mm512_unpacklo_epi32(id, bits));
+		_mm512_store_si512(stores.word[g] + 8, _mm512_unpackhi_epi32(id, bits));
+	}
+	lower_words(t->word, &stores, n_groups);
+	if (entry->level)
+		lower_cells((uint32_t *)t->cells[entry->level].z, &stores, n_groups);
+	return n_inside;
+}
+
+uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
+{
+	const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+	const __m512i unused = _mm512_add_epi32(lane, _mm512_set1_epi32(target->y0 * (int)target->stride + target->x0));
+	uint64_t n_inside = 0;
+	for (uint32_t e = 0; e < n; e++)
+		n_inside += warp_one(target, &entry[e], unused);
+	return n_inside;
+}

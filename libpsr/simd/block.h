@@ -1,0 +1,39 @@
+/* One block made ready for the warp, the same for all variants. */
+#ifndef PSR_SIMD_BLOCK_H
+#define PSR_SIMD_BLOCK_H
+
+#include "simd/simd.h"
+
+struct warp_block {
+	double origin[3]; /* of its first sample, at depth bias */
+	double scale;     /* 2^level */
+	float unit[3];    /* what a step of depth adds */
+	const struct warp_lattice *lattice;
+	const uint16_t *depth;
+	const uint64_t *attr;
+	uint64_t mask;
+	uint32_t id;
+};
+
+static inline void warp_block_make(struct warp_block *out, const struct warp_instance *in, uint32_t slot)
+{
+	const struct psr_blocks *b = in->blocks;
+	const uint32_t block = slot - in->first_slot;
+	const struct warp_lattice *lattice = &in->lattice[b->block_projection[block]];
+	const double scale = (double)(1u << b->level[block]);
+	const double x = 8 * scale * b->col[block], y = 8 * scale * b->row[block];
+	const double bias = (double)b->depth_bias[block];
+	const float step = b->depth_step[block];
+	for (int a = 0; a < 3; a++) {
+		out->origin[a] = lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + bias * lattice->along[a];
+		out->unit[a] = (float)lattice->along[a] * step;
+	}
+	out->scale = scale;
+	out->lattice = lattice;
+	out->depth = b->depth + b->attr_first[block];
+	out->attr = b->attr + b->attr_first[block];
+	out->mask = b->mask[block];
+	out->id = slot * PSR_BLOCK_SAMPLES;
+}
+
+#endif

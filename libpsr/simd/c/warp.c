@@ -1,0 +1,74 @@
+#include "base/maths.h"
+#include "simd/block.h"
+#include "simd/kernels.h"
+
+/* Far enough outside of every picture to be clipped, and small enough to be an int; NaN is clipped, too. */
+static inline float clamp_pixel(float u)
+{
+	const float far = 2.0f * PSR_MAX_SIDE;
+	u = u > -far ? u : -far;
+	return u < far ? u : far;
+}
+
+static inline int faces_away(const struct warp_instance *in, const float n[3], float u, float v)
+{
+	float d[3];
+	for (int k = 0; k < 3; k++)
+		d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
+	const float g = (n[0] * d[0] + n[1] * d[1]) + n[2] * d[2];
+	const float length2 = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
+	return g > 0 && g * g > (BACK_SINE * BACK_SINE) * length2;
+}
+
+static inline int inside(int32_t u, int32_t v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
+{
+	return u >= x0 && u < x1 && v >= y0 && v < y1;
+}
+
+static uint64_t warp_one(const struct warp_target *t, const struct bin_entry *entry)
+{
+	const struct warp_instance *in = &t->instance[entry->instance];
+	const struct warp_cells *cells = entry->level ? &t->cells[entry->level] : NULL;
+	struct warp_block b;
+	float row[3][8], col[3][8];
+	uint64_t n_inside = 0;
+
+	warp_block_make(&b, in, entry->slot);
+	for (int a = 0; a < 3; a++)
+		for (int i = 0; i < 8; i++) {
+			row[a][i] = (float)(b.origin[a] + b.scale * b.lattice->row[a][i]);
+			col[a][i] = (float)b.scale * b.lattice->col[a][i];
+		}
+	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
+		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
+		const float depth = (float)*b.depth;
+		const float x1 = (row[0][r] + col[0][c]) + depth * b.unit[0];
+		const float y1 = (row[1][r] + col[1][c]) + depth * b.unit[1];
+		const float z1 = (row[2][r] + col[2][c]) + depth * b.unit[2];
+		const float inverse = t->perspective ? 1.0f / z1 : 1.0f;
+		const float u = clamp_pixel(x1 * inverse), v = clamp_pixel(y1 * inverse);
+		const int32_t pixel_u = psr_floor_int(u), pixel_v = psr_floor_int(v);
+		if (!(z1 > t->near_z) || (entry->is_mixed && faces_away(in, t->direction[PSR_ATTR_NORMAL(*b.attr)], u, v)))
+			continue;
+		if (inside(pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1)) {
+			const uint64_t word = (uint64_t)psr_bits_from_float(z1) << 32 | (b.id + sample);
+			uint64_t *at = &t->word[(size_t)pixel_v * t->stride + (size_t)pixel_u];
+			*at = word < *at ? word : *at;
+			n_inside++;
+		}
+		if (cells && inside(pixel_u, pixel_v, cells->x0, cells->y0, cells->x1, cells->y1)) {
+			const size_t cx = (size_t)((pixel_u >> entry->level) + 1), cy = (size_t)((pixel_v >> entry->level) + 1);
+			float *at = &cells->z[cy * cells->stride + cx];
+			*at = z1 < *at ? z1 : *at;
+		}
+	}
+	return n_inside;
+}
+
+uint64_t warp_c(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
+{
+	uint64_t n_inside = 0;
+	for (uint32_t e = 0; e < n; e++)
+		n_inside += warp_one(target, &entry[e]);
+	return n_inside;
+}
