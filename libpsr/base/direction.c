@@ -11,6 +11,7 @@
  * the origin) that cuts it off, with its normal towards the child. The other octants are mirror images. */
 static double cut_plane[N_INNER][3][3];
 static float direction_table[PSR_DIRECTIONS][3];
+static uint64_t direction_words[PSR_DIRECTIONS];
 static pthread_once_t tables_once = PTHREAD_ONCE_INIT;
 
 static void midpoint(double m[3], const double a[3], const double b[3])
@@ -87,9 +88,17 @@ static void make_tables(void)
 		double v[3];
 
 		psr_direction_center(LEVELS, index, v);
-		for (int k = 0; k < 3; k++)
+		for (int k = 0; k < 3; k++) {
 			direction_table[index][k] = (float)v[k];
+			direction_words[index] |= (uint64_t)(uint16_t)lround(v[k] * 32767) << 16 * k;
+		}
 	}
+}
+
+const uint64_t *psr_direction_words(void)
+{
+	pthread_once(&tables_once, make_tables);
+	return direction_words;
 }
 
 const float (*psr_direction_table(void))[3]

@@ -23,6 +23,18 @@ static inline uint32_t psr_bits_from_float(float f)
 	return bits;
 }
 
+/* Choices by bits, which the compiler does not take for branches, so that loops become vectors. */
+static inline float psr_choose(int condition, float yes, float no)
+{
+	const uint32_t mask = 0u - (uint32_t)(condition != 0);
+	return psr_float_from_bits((psr_bits_from_float(yes) & mask) | (psr_bits_from_float(no) & ~mask));
+}
+
+static inline float psr_where(int condition, float value)
+{
+	return psr_float_from_bits(psr_bits_from_float(value) & (0u - (uint32_t)(condition != 0)));
+}
+
 /* Largest integer <= x; |x| < 2^31. Compiles to a truncation and a compare where the ISA has no rounding. */
 static inline int32_t psr_floor_int(float x)
 {
@@ -38,9 +50,8 @@ static inline int32_t psr_floor_int(float x)
  * (s <= 0.172), (ln 2 / 2)^8 / 8! < 6e-9. */
 static inline float psr_power(float x, float y)
 {
+	/* Choices are made at the end, so that a loop over this becomes vectors. */
 	uint32_t bits = psr_bits_from_float(x);
-	if (bits < 0x00800000)
-		return 0;
 	int32_t e = (int32_t)((bits - 0x3f3504f3u) >> 23 << 23) >> 23;
 	float m = psr_float_from_bits(bits - ((uint32_t)e << 23));
 	float s = (m - 1.0f) / (m + 1.0f);
@@ -51,9 +62,8 @@ static inline float psr_power(float x, float y)
 	p = p * q + 0.57707802f;            /* 2 / (5 ln 2) */
 	p = p * q + 0.96179669f;            /* 2 / (3 ln 2) */
 	p = p * q + 2.88539008f;            /* 2 / ln 2 */
-	float t = ((float)e + s * p) * y;
-	if (!(t > -60.0f))
-		return 0;
+	float power = ((float)e + s * p) * y;
+	float t = psr_choose(power > -60.0f, power, -60.0f);
 	int32_t n = psr_floor_int(t + 0.5f);
 	float f = t - (float)n;
 	p = 1.5252733e-5f;                  /* (ln 2)^7 / 7! */
@@ -64,7 +74,8 @@ static inline float psr_power(float x, float y)
 	p = p * f + 2.4022651e-1f;
 	p = p * f + 6.9314718e-1f;
 	p = p * f + 1.0f;
-	return p * psr_float_from_bits((uint32_t)(n + 127) << 23);
+	float result = p * psr_float_from_bits((uint32_t)(n + 127) << 23);
+	return psr_where((power > -60.0f) & (bits >= 0x00800000), result);
 }
 
 #endif

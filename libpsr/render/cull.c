@@ -12,6 +12,7 @@
 struct cull_chunk {
 	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
 	uint32_t levels, n_tested, n_clamped;
+	uint8_t flags; /* of all blocks that are left, OR-ed */
 	uint64_t n_samples;
 	float depth_error; /* greatest half step of depth, in pixels */
 };
@@ -153,6 +154,7 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	hit->tile_y0 = tile_of(e.y0, TILE_HEIGHT, plan->tiles_y);
 	hit->tile_y1 = tile_of(e.y1, TILE_HEIGHT, plan->tiles_y);
 	chunk->levels |= 1u << level;
+	chunk->flags |= b->flags[block];
 	chunk->n_clamped += (uint32_t)clamped;
 	/* As many as the mask has bits, without counting them. */
 	chunk->n_samples += (block + 1 < b->n_blocks ? b->attr_first[block + 1] : b->n_samples) - b->attr_first[block];
@@ -307,7 +309,7 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	return bins->entry ? PSR_OK : PSR_ERR_MEMORY;
 }
 
-int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *pool, struct psr_report *report)
+int cull_blocks(struct bins *bins, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
 {
 	struct cull cull = { bins, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
 	assert(plan->tiles_x <= 256 && plan->tiles_y <= 256);
@@ -335,6 +337,8 @@ int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *poo
 		report->n_blocks_drawn += chunk->n_hits;
 		report->n_samples_drawn += chunk->n_samples;
 		report->levels |= chunk->levels;
+		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
+			plan->view.needs |= STRIP_TWO_SIDED;
 		report->n_clamped += chunk->n_clamped;
 		if (chunk->depth_error > depth_error)
 			depth_error = chunk->depth_error;

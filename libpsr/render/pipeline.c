@@ -9,9 +9,10 @@
 
 #define BAND_ROWS 16
 
-/* What one band of rows counted on its way through gaps, resolve and shade. */
+/* What one band of rows counted on its way through gaps and shade. */
 struct band {
-	uint64_t ns[PSR_N_STAGES], count[PSR_N_STAGES];
+	struct shade_counts shade;
+	uint32_t n_partial;
 	int has_gaps;
 };
 
@@ -200,56 +201,31 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	return PSR_OK;
 }
 
-/* Resolves and shades what the strip has gathered. */
-static void flush_strip(struct psr_renderer *r, struct strip *strip, struct band *band)
+static void gaps_band(int i, void *userdata)
 {
-	if (!strip->n)
-		return;
-	uint64_t start = now_ns();
-	resolve_strip(&r->plan, r->stack.word, strip);
-	uint64_t middle = now_ns();
-	shade_strip(&r->plan, strip, r->rgb);
-	band->ns[PSR_STAGE_RESOLVE] += middle - start;
-	band->ns[PSR_STAGE_SHADE] += now_ns() - middle;
-	band->count[PSR_STAGE_RESOLVE] += strip->n;
-	band->count[PSR_STAGE_SHADE] += strip->n;
-	strip->n = 0;
+	struct psr_renderer *r = userdata;
+	const struct plan *plan = &r->plan;
+	struct band *band = &r->band[i];
+	memset(band, 0, sizeof *band);
+	for (uint32_t y = (uint32_t)i * BAND_ROWS; y < ((uint32_t)i + 1) * BAND_ROWS && y < plan->height; y++) {
+		const size_t row = (size_t)y * plan->width;
+		band->n_partial += gaps_row(plan, &r->stack, y, r->weight + row);
+		for (size_t at = row; at < row + plan->width; at++) {
+			r->z[at] = psr_float_from_bits((uint32_t)(r->stack.word[at] >> 32));
+			band->has_gaps |= r->weight[at] < WEIGHT_ONE;
+		}
+	}
 }
 
 static void shade_band(int i, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
-	struct band *band = &r->band[i];
 	struct strip strip;
-	strip.n = strip.instance = 0;
-	memset(band, 0, sizeof *band);
-
 	for (uint32_t y = (uint32_t)i * BAND_ROWS; y < ((uint32_t)i + 1) * BAND_ROWS && y < plan->height; y++) {
 		const size_t row = (size_t)y * plan->width;
-		uint64_t start = now_ns();
-		band->count[PSR_STAGE_GAPS] += gaps_row(plan, &r->stack, y, r->weight + row);
-		band->ns[PSR_STAGE_GAPS] += now_ns() - start;
-		for (size_t at = row; at < row + plan->width; at++) {
-			const uint64_t word = r->stack.word[at];
-			r->z[at] = psr_float_from_bits((uint32_t)(word >> 32));
-			band->has_gaps |= r->weight[at] < WEIGHT_ONE;
-			if (word == PSR_WORD_EMPTY) {
-				memcpy(r->rgb + 3 * at, plan->background, sizeof plan->background);
-				continue;
-			}
-			if (!r->weight[at])
-				continue;
-			const uint32_t slot = (uint32_t)word / PSR_BLOCK_SAMPLES;
-			const struct plan_instance *in = &plan->instance[strip.instance];
-			if (strip.n == STRIP || slot < in->first_slot || slot - in->first_slot >= in->blocks->n_blocks) {
-				flush_strip(r, &strip, band);
-				strip.instance = plan_find_instance(plan, slot);
-			}
-			strip.pixel[strip.n++] = (uint32_t)at;
-		}
+		shade_row(r->simd, plan, &strip, r->stack.word + row, r->weight + row, y, r->rgb + 3 * row, &r->band[i].shade);
 	}
-	flush_strip(r, &strip, band);
 }
 
 static void output_band(int i, void *userdata)
@@ -267,26 +243,6 @@ static void output_band(int i, void *userdata)
 			r->frame->depth[at] = ldexpf(r->z[at], r->stack.exponent);
 }
 
-/* Wall time of the three stages that bands run together, divided as the threads' own clocks say. */
-static int gather_bands(const struct psr_renderer *r, struct psr_report *report, uint64_t wall)
-{
-	uint64_t spent = 0;
-	int has_gaps = 0;
-	for (uint32_t i = 0; i < n_bands(&r->plan); i++) {
-		const struct band *band = &r->band[i];
-		for (int s = PSR_STAGE_GAPS; s <= PSR_STAGE_SHADE; s++) {
-			report->ns[s] += band->ns[s];
-			report->count[s] += band->count[s];
-			spent += band->ns[s];
-		}
-		has_gaps |= band->has_gaps;
-	}
-	report->n_covered = report->count[PSR_STAGE_SHADE];
-	for (int s = PSR_STAGE_GAPS; s <= PSR_STAGE_SHADE && spent; s++)
-		report->ns[s] = (uint64_t)((double)report->ns[s] / (double)spent * (double)wall);
-	return has_gaps;
-}
-
 int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
                struct psr_error *err)
 {
@@ -296,16 +252,28 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	*report = r->report;
 	r->frame = frame;
 
-	uint64_t start = now_ns();
-	psr_pool_for(pool, (int)n_bands(&r->plan), shade_band, r);
-	uint64_t middle = now_ns();
-	if (gather_bands(r, report, middle - start)) {
+	const int n = (int)n_bands(&r->plan);
+	int has_gaps = 0;
+	uint64_t start = now_ns(), end;
+	psr_pool_for(pool, n, gaps_band, r);
+	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
+	start = end;
+	psr_pool_for(pool, n, shade_band, r);
+	for (int i = 0; i < n; i++) {
+		report->count[PSR_STAGE_GAPS] += r->band[i].n_partial;
+		report->count[PSR_STAGE_SHADE] += r->band[i].shade.n_pixels;
+		has_gaps |= r->band[i].has_gaps;
+	}
+	report->n_covered = report->count[PSR_STAGE_SHADE];
+	report->ns[PSR_STAGE_SHADE] = (end = now_ns()) - start;
+	start = end;
+	if (has_gaps) {
 		if (fill_prepare(&r->fill, r->plan.width, r->plan.height, r->rgb, r->weight, r->z))
 			return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
 		fill_run(&r->fill, &r->plan, pool, report);
 	}
-	psr_pool_for(pool, (int)n_bands(&r->plan), output_band, r);
-	report->ns[PSR_STAGE_FILL] = now_ns() - middle;
+	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
+	psr_pool_for(pool, n, output_band, r);
 	return PSR_OK;
 }
 

@@ -3,6 +3,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
+#include "psr/direction.h"
 #include "render/render.h"
 
 /* z' below this part of the scene's extent is not drawn when the request names no near distance. */
@@ -64,8 +65,7 @@ static int scene_exponent(const struct psr_scene *scene)
 	return exponent;
 }
 
-static void light_make(struct plan_light *out, const struct psr_light *light, double rotation[3][3],
-                       const double center[3], double scale, const double eye[3])
+static void light_make(struct strip_light *out, const struct psr_light *light, const struct view *view)
 {
 	double v[3], s, c;
 	out->kind = light->kind;
@@ -73,16 +73,15 @@ static void light_make(struct plan_light *out, const struct psr_light *light, do
 		out->color[i] = (float)light->color[i];
 	if (light->kind != PSR_LIGHT_POINT) {
 		v3d_normalize(v, light->direction);
-		m3d_apply_transposed(v, (const double(*)[3])rotation, v);
+		m3d_apply(v, view->axis, v);
 		v3f_set(out->axis, (float)v[0], (float)v[1], (float)v[2]);
 		v3f_set(out->to_light, (float)-v[0], (float)-v[1], (float)-v[2]);
 	}
 	if (light->kind != PSR_LIGHT_DIRECTIONAL) {
-		v3d_sub(v, light->position, eye);
-		v3d_sub(v, v, center);
-		m3d_apply_transposed(v, (const double(*)[3])rotation, v);
-		v3f_set(out->position, (float)(v[0] / scale), (float)(v[1] / scale), (float)(v[2] / scale));
-		double r = light->reference / scale;
+		v3d_sub(v, light->position, view->eye);
+		m3d_apply(v, view->axis, v);
+		v3f_set(out->position, (float)(v[0] * view->scale), (float)(v[1] * view->scale), (float)(v[2] * view->scale));
+		double r = light->reference * view->scale;
 		out->reference2 = (float)(r * r);
 	}
 	if (light->kind == PSR_LIGHT_SPOT) {
@@ -128,7 +127,7 @@ static void sight_make(struct warp_instance *out, double turn[3][3], const struc
 }
 
 static void instance_make(struct plan_instance *out, struct warp_instance *warp, const struct psr_instance *instance,
-                          const struct plan *plan, const struct view *view, const struct psr_scene *scene, double focal)
+                          const struct plan *plan, const struct view *view, double focal)
 {
 	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
 	double world = instance_center(center, rotation, instance, view->eye), scale = world * view->scale;
@@ -139,6 +138,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	v3d_scale(camera_center, camera_center, view->scale);
 	sight_make(warp, to_camera, plan, focal);
 	for (int i = 0; i < 3; i++) {
+		v3f_set(warp->turn[i], (float)to_camera[i][0], (float)to_camera[i][1], (float)to_camera[i][2]);
 		v3d_scale(to_camera[i], to_camera[i], scale);
 		for (int k = 0; k < 3; k++)
 			out->center_m[i][k] = (float)to_camera[i][k];
@@ -156,8 +156,6 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < out->blocks->n_projections; p++)
 		lattice_make(&lattice[p], &out->blocks->projection[p], to_camera, camera_center, plan, focal);
-	for (uint32_t l = 0; l < plan->n_lights; l++)
-		light_make(&out->light[l], &scene->light[l], rotation, center, world, view->eye);
 }
 
 /* A cell covers a pixel that lies behind it by more than the threshold: `gap_threshold` pixel widths for cells of two
@@ -176,8 +174,7 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	size_t n_projections = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++)
 		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
-	size_t lights = (size_t)scene->n_instances * scene->n_lights;
-	size_t size = n_projections * sizeof(struct warp_lattice) + lights * sizeof(struct plan_light) +
+	size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light) +
 	              scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	if (size > plan->storage_size) {
 		psr_free(plan->storage);
@@ -189,7 +186,7 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	struct warp_lattice *lattice = plan->storage;
 	plan->instance = (struct plan_instance *)(lattice + n_projections);
 	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
-	struct plan_light *light = (struct plan_light *)(plan->warp + scene->n_instances);
+	plan->light = (struct strip_light *)(plan->warp + scene->n_instances);
 	plan->n_slots = plan->n_groups = 0;
 	plan->n_samples = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
@@ -198,13 +195,11 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 		plan->warp[i].blocks = blocks;
 		plan->warp[i].lattice = lattice;
 		plan->warp[i].first_slot = plan->n_slots;
-		plan->instance[i].light = light;
 		plan->instance[i].first_group = plan->n_groups;
 		plan->n_slots += blocks->n_blocks;
 		plan->n_groups += blocks->n_clusters;
 		plan->n_samples += blocks->n_samples;
 		lattice += blocks->n_projections;
-		light += scene->n_lights;
 	}
 	return PSR_OK;
 }
@@ -252,7 +247,17 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		plan->background[i] = light16(scene->background[i]);
 	}
 	for (uint32_t i = 0; i < scene->n_instances; i++)
-		instance_make(&plan->instance[i], &plan->warp[i], &scene->instance[i], plan, &view, scene, focal);
+		instance_make(&plan->instance[i], &plan->warp[i], &scene->instance[i], plan, &view, focal);
+	plan->view = (struct strip_view){
+		.instance = plan->warp, .n_instances = plan->n_instances, .direction_word = psr_direction_words(),
+		.half_width = (float)(plan->width / 2.0), .half_height = (float)(plan->height / 2.0),
+		.focal = plan->focal, .perspective = plan->perspective,
+	};
+	for (uint32_t l = 0; l < plan->n_lights; l++) {
+		light_make(&plan->light[l], &scene->light[l], &view);
+		if (plan->light[l].kind != PSR_LIGHT_DIRECTIONAL)
+			plan->view.needs |= STRIP_POSITION;
+	}
 	return PSR_OK;
 }
 

@@ -10,17 +10,8 @@
 #define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
 #define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
 #define WEIGHT_ONE 256  /* weights are 0..256 */
-#define STRIP 256       /* samples that are resolved and shaded together */
 
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
-
-struct plan_light {
-	enum psr_light_kind kind;
-	float position[3], to_light[3]; /* in the instance's inner coordinates; to_light: unit, of directional lights */
-	float axis[3], cos_inner, cos_outer; /* spot; axis: unit, away from the light */
-	float reference2;               /* square of the reference distance, inner units; 0: no fall-off */
-	float color[3];
-};
 
 struct plan_instance {
 	const struct psr_blocks *blocks;
@@ -30,7 +21,6 @@ struct plan_instance {
 	float scale;               /* camera space units an inner unit */
 	float spacing;             /* greatest distance of neighbours at level 0, camera space */
 	float eye[3];              /* inner coordinates; orthographic: unit vector to the viewer instead */
-	struct plan_light *light;  /* n_lights */
 };
 
 struct plan {
@@ -44,6 +34,8 @@ struct plan {
 	uint32_t n_instances, n_lights, n_slots, n_groups;
 	struct plan_instance *instance;
 	struct warp_instance *warp; /* what warping knows of each */
+	struct strip_view view;    /* needs is filled by the cull */
+	struct strip_light *light;
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
 	uint64_t n_samples;
@@ -81,7 +73,8 @@ struct bins {
 	size_t count_capacity;
 };
 
-int cull_blocks(struct bins *bins, const struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+/* Also notes in plan->view what the blocks that are left need. */
+int cull_blocks(struct bins *bins, struct plan *plan, struct psr_pool *pool, struct psr_report *report);
 size_t bins_bytes(const struct bins *bins);
 void bins_clear(struct bins *bins);
 
@@ -95,27 +88,17 @@ uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struc
 /* Weights of row y: WEIGHT_ONE * (1 - coverage). Returns how many pixels with a sample are below WEIGHT_ONE. */
 uint32_t gaps_row(const struct plan *plan, const struct psr_zstack *stack, uint32_t y, uint16_t *weight);
 
-/* ---- resolve: ids to what shading reads ---- */
+/* ---- shade: words to linear colours ([G] 7.3) ---- */
 
-/* Samples of one instance; positions and normals in its inner coordinates, colours linear. */
-struct strip {
-	uint32_t n, instance;
-	uint32_t pixel[STRIP];
-	float px[STRIP], py[STRIP], pz[STRIP];
-	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
-	float dr[STRIP], dg[STRIP], db[STRIP];
-	float sr[STRIP], sg[STRIP], sb[STRIP];
-	float exponent[STRIP];
-	uint8_t unlit[STRIP];
+struct shade_counts {
+	uint64_t n_pixels;   /* shaded */
+	uint64_t n_specular; /* of these with highlights looked for */
 };
 
-/* Fills a strip from words whose slots all belong to `instance`. pixel[] is filled by the caller. */
-void resolve_strip(const struct plan *plan, const uint64_t *word, struct strip *strip);
-
-/* ---- shade: strips to linear colours ([G] 7.3) ---- */
-
-/* Writes 16-bit linear light into rgb + 3 * pixel. */
-void shade_strip(const struct plan *plan, const struct strip *strip, uint16_t *rgb);
+/* Writes 16-bit linear light of row y into rgb, from the row's words and weights: of samples, lit, where weights are above
+ * 0, and of the background where no sample is. */
+void shade_row(const struct simd *simd, const struct plan *plan, struct strip *strip, const uint64_t *word, const uint16_t *weight,
+               uint32_t y, uint16_t *rgb, struct shade_counts *counts);
 
 /* ---- fill: pull-push ([G] 4.7, appendix) ---- */
 

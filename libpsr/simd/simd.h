@@ -32,6 +32,7 @@ struct warp_instance {
 	uint32_t first_slot;
 	/* The direction of sight through (u, v), in inner coordinates: u du + v dv + d0, of any length. */
 	float du[3], dv[3], d0[3];
+	float turn[3][3]; /* inner coordinates to camera space, a rotation */
 };
 
 /* A block that may show in a tile. */
@@ -67,9 +68,74 @@ typedef uint64_t warp_fn(const struct warp_target *target, const struct bin_entr
 /* Makes a tile empty: words, and cells of the levels of the bit mask. */
 typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 
+/* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */
+
+#define STRIP 256
+
+enum strip_needs {
+	STRIP_TWO_SIDED = 1, /* some block in view is two-sided */
+	STRIP_POSITION = 2,  /* some light is near */
+};
+
+/* The covered pixels of a part of a row. Everything is in camera space; colours are linear. */
+struct strip {
+	uint32_t n, x0, y;       /* pixel i is (x0 + x[i], y) */
+	uint64_t all;            /* OR of the attributes: no bit of specular, no highlight */
+	uint16_t x[STRIP];
+	uint32_t id[STRIP];      /* slot * 64 + sample */
+	uint64_t attr[STRIP];
+	uint64_t normal_word[STRIP];
+	uint8_t two_sided[STRIP]; /* with STRIP_TWO_SIDED */
+	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
+	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
+	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
+	float dr[STRIP], dg[STRIP], db[STRIP];
+	float sr[STRIP], sg[STRIP], sb[STRIP], exponent[STRIP]; /* where any sample is specular */
+	/* Light that comes back diffusely and as highlights, before it is multiplied with colours. */
+	float lr[STRIP], lg[STRIP], lb[STRIP];
+	float hr[STRIP], hg[STRIP], hb[STRIP];
+	uint16_t r[STRIP], g[STRIP], b[STRIP];
+};
+
+struct strip_view {
+	const struct warp_instance *instance;
+	uint32_t n_instances;
+	const uint64_t *direction_word;
+	float half_width, half_height, focal; /* pixels */
+	int perspective;
+	unsigned needs; /* enum strip_needs */
+};
+
+/* A light in camera space. */
+struct strip_light {
+	enum psr_light_kind kind;
+	float position[3], to_light[3];      /* to_light: unit, of directional lights */
+	float axis[3], cos_inner, cos_outer; /* spot; axis: unit, away from the light */
+	float reference2;                    /* square of the reference distance; 0: no fall-off */
+	float color[3];
+};
+
+/* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): x, id, n. */
+typedef void strip_list_fn(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n);
+/* Attributes, normals, colours and what else is needed of the samples listed; clears the light to `ambient` and no highlight. */
+typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
+/* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. */
+typedef void strip_light_fn(struct strip *strip, const struct strip_light *light);
+/* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
+typedef void strip_color_fn(struct strip *strip);
+
+static inline int strip_is_specular(const struct strip *strip)
+{
+	return PSR_ATTR_SPECULAR(strip->all) != 0;
+}
+
 struct simd {
 	warp_clear_fn *warp_clear;
 	warp_fn *warp;
+	strip_list_fn *strip_list;
+	strip_resolve_fn *strip_resolve;
+	strip_light_fn *strip_light;
+	strip_color_fn *strip_color;
 };
 
 extern const struct simd simd_c, simd_avx2, simd_avx512;

@@ -1,7 +1,12 @@
 #include "simd/kernels.h"
+#include "simd/strip.h"
 #include "simd/warp_clear.h"
 
 const struct simd simd_c = {
 	.warp_clear = warp_clear,
 	.warp = warp_c,
+	.strip_list = strip_list,
+	.strip_resolve = strip_resolve,
+	.strip_light = strip_light,
+	.strip_color = strip_color,
 };

@@ -1,0 +1,246 @@
+/* Strips, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+#include "base/maths.h"
+#include "base/srgb.h"
+#include "simd/block.h"
+
+static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+{
+	uint32_t n = 0;
+	for (uint32_t x = 0; x < n_pixels; x++) {
+		strip->x[n] = (uint16_t)x;
+		strip->id[n] = (uint32_t)word[x];
+		n += word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
+	}
+	strip->n = n;
+}
+
+static const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
+{
+	uint32_t low = 0, high = view->n_instances;
+	while (high - low > 1) {
+		const uint32_t middle = (low + high) / 2;
+		if (view->instance[middle].first_slot <= slot)
+			low = middle;
+		else
+			high = middle;
+	}
+	return &view->instance[low];
+}
+
+/* Where samples are, from their lattices: as the warp computes it, brought back from the picture to the camera's axes. */
+static void locate(struct strip *strip, const struct strip_view *view, const struct warp_instance *in, uint32_t i)
+{
+	const uint32_t sample = strip->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
+	struct warp_block b;
+	float at[3];
+	warp_block_make(&b, in, strip->id[i] / PSR_BLOCK_SAMPLES);
+	const uint64_t below = b.mask & ((UINT64_C(1) << sample) - 1);
+	const float depth = (float)b.depth[__builtin_popcountll(below)];
+	for (int a = 0; a < 3; a++)
+		at[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + (float)b.scale * b.lattice->col[a][c]) + depth * b.unit[a];
+	const float w = view->perspective ? at[2] : 1;
+	strip->px[i] = (at[0] - view->half_width * w) / view->focal;
+	strip->py[i] = (at[1] - view->half_height * w) / view->focal;
+	strip->pz[i] = at[2];
+}
+
+/* Finds the attributes of samples first .. end - 1, all of one instance, and asks for them; reads them later. */
+static void find_attributes(struct strip *strip, const struct strip_view *view, const struct warp_instance *in, uint32_t first,
+                            uint32_t end, const uint64_t **at)
+{
+	const struct psr_blocks *b = in->blocks;
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t block = strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = strip->id[i] % PSR_BLOCK_SAMPLES;
+		const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
+		at[i] = b->attr + b->attr_first[block] + __builtin_popcountll(below);
+		__builtin_prefetch(at[i]);
+	}
+	if (view->needs & STRIP_TWO_SIDED)
+		for (uint32_t i = first; i < end; i++)
+			strip->two_sided[i] = b->flags[strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot] & PSR_BLOCK_TWO_SIDED;
+	if (view->needs & STRIP_POSITION)
+		for (uint32_t i = first; i < end; i++)
+			locate(strip, view, in, i);
+}
+
+static void turn_normals(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
+{
+	for (uint32_t i = first; i < end; i++) {
+		const uint64_t word = strip->normal_word[i];
+		const float x = (float)(int16_t)word, y = (float)(int16_t)(word >> 16), z = (float)(int16_t)(word >> 32);
+		strip->nx[i] = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * (1 / 32767.0f);
+		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
+		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);
+	}
+}
+
+static void look(struct strip *strip, const struct strip_view *view)
+{
+	const float y = ((float)strip->y + 0.5f - view->half_height) / view->focal;
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const float x = ((float)(strip->x0 + strip->x[i]) + 0.5f - view->half_width) / view->focal;
+		const float length = __builtin_sqrtf((x * x + y * y) + 1);
+		strip->vx[i] = view->perspective ? -x / length : 0;
+		strip->vy[i] = view->perspective ? -y / length : 0;
+		strip->vz[i] = view->perspective ? -1 / length : -1;
+	}
+}
+
+/* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
+static const float exponent_root[16] = {
+	1.0f,        1.04427378f, 1.09050773f, 1.13878863f, 1.18920712f, 1.24185781f, 1.29683955f, 1.35425555f,
+	1.41421356f, 1.47682615f, 1.54221083f, 1.61049033f, 1.68179283f, 1.75625216f, 1.83400809f, 1.91520656f,
+};
+
+static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
+{
+	const uint64_t *at[STRIP];
+	const struct warp_instance *run[STRIP];
+	uint32_t run_first[STRIP + 1], n_runs = 0;
+	const uint32_t n = strip->n;
+	for (uint32_t i = 0; i < n; n_runs++) {
+		const struct warp_instance *in = instance_of(view, strip->id[i] / PSR_BLOCK_SAMPLES);
+		const uint32_t first = i;
+		run[n_runs] = in;
+		run_first[n_runs] = first;
+		while (i < n && strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot < in->blocks->n_blocks)
+			i++;
+		find_attributes(strip, view, in, first, i, at);
+	}
+	run_first[n_runs] = n;
+
+	uint64_t all = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		const uint64_t attr = *at[i];
+		strip->attr[i] = attr;
+		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
+		all |= attr;
+	}
+	strip->all = all;
+	for (uint32_t k = 0; k < n_runs; k++)
+		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t diffuse = PSR_ATTR_DIFFUSE(strip->attr[i]);
+		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
+		strip->lr[i] = ambient[0];
+		strip->lg[i] = ambient[1];
+		strip->lb[i] = ambient[2];
+	}
+	if (strip_is_specular(strip) || view->needs & STRIP_TWO_SIDED)
+		look(strip, view);
+	if (view->needs & STRIP_TWO_SIDED)
+		for (uint32_t i = 0; i < n; i++) {
+			const float g = (strip->nx[i] * strip->vx[i] + strip->ny[i] * strip->vy[i]) + strip->nz[i] * strip->vz[i];
+			const float turn = psr_choose((strip->two_sided[i] != 0) & (g < 0), -1, 1);
+			strip->nx[i] *= turn;
+			strip->ny[i] *= turn;
+			strip->nz[i] *= turn;
+		}
+	if (strip_is_specular(strip))
+		for (uint32_t i = 0; i < n; i++) {
+			const uint32_t specular = PSR_ATTR_SPECULAR(strip->attr[i]), e = PSR_ATTR_EXPONENT(strip->attr[i]);
+			strip->sr[i] = psr_srgb_to_linear[((specular & 31) * 255 + 15) / 31];
+			strip->sg[i] = psr_srgb_to_linear[((specular >> 5 & 63) * 255 + 31) / 63];
+			strip->sb[i] = psr_srgb_to_linear[((specular >> 11) * 255 + 15) / 31];
+			strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
+			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
+		}
+}
+
+/* What arrives of a light, and N.L, where both are above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
+static inline void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
+{
+	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
+	const int is_lit = (amount > 0) & (facing > 0);
+	const float diffuse = psr_where(is_lit, amount * facing);
+	s->lr[i] += color[0] * diffuse;
+	s->lg[i] += color[1] * diffuse;
+	s->lb[i] += color[2] * diffuse;
+	if (is_specular) {
+		const float normal_view = (s->nx[i] * s->vx[i] + s->ny[i] * s->vy[i]) + s->nz[i] * s->vz[i];
+		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
+		const float mirror = 2 * facing * normal_view - light_view;
+		const float least = psr_where(mirror > 0, mirror), clamped = psr_choose(least < 1, least, 1);
+		const float power = psr_power(clamped, s->exponent[i]);
+		const float highlight = psr_where(is_lit, amount * power);
+		s->hr[i] += color[0] * highlight;
+		s->hg[i] += color[1] * highlight;
+		s->hb[i] += color[2] * highlight;
+	}
+}
+
+static inline void light_directional(struct strip *s, const struct strip_light *light, int is_specular)
+{
+	const float x = light->to_light[0], y = light->to_light[1], z = light->to_light[2];
+	const float color[3] = { light->color[0], light->color[1], light->color[2] };
+	for (uint32_t i = 0; i < s->n; i++)
+		reflect(s, i, is_specular, color, 1, x, y, z);
+}
+
+static inline void light_near(struct strip *s, const struct strip_light *light, int is_specular, int is_spot)
+{
+	const struct strip_light l = *light;
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
+		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
+		const float x = dx / distance, y = dy / distance, z = dz / distance;
+		float amount = psr_choose(l.reference2 > 0, l.reference2 / distance2, 1);
+		if (is_spot) { /* a smooth edge: 3 t^2 - 2 t^3 */
+			const float c = -((x * l.axis[0] + y * l.axis[1]) + z * l.axis[2]);
+			const float t = (c - l.cos_outer) / (l.cos_inner - l.cos_outer);
+			const float edge = psr_choose(c < l.cos_inner, t * t * (3 - 2 * t), 1);
+			amount = psr_where(c > l.cos_outer, amount * edge);
+		}
+		reflect(s, i, is_specular, l.color, psr_where(distance2 > 0, amount), x, y, z);
+	}
+}
+
+static void strip_light(struct strip *strip, const struct strip_light *light)
+{
+	const int is_specular = strip_is_specular(strip);
+	if (light->kind == PSR_LIGHT_DIRECTIONAL && is_specular)
+		light_directional(strip, light, 1);
+	else if (light->kind == PSR_LIGHT_DIRECTIONAL)
+		light_directional(strip, light, 0);
+	else if (light->kind == PSR_LIGHT_SPOT && is_specular)
+		light_near(strip, light, 1, 1);
+	else if (light->kind == PSR_LIGHT_SPOT)
+		light_near(strip, light, 0, 1);
+	else if (is_specular)
+		light_near(strip, light, 1, 0);
+	else
+		light_near(strip, light, 0, 0);
+}
+
+static inline uint16_t light16(float linear)
+{
+	linear = linear > 0 ? linear : 0;
+	linear = linear < 1 ? linear : 1;
+	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
+}
+
+static inline void strip_color_by(struct strip *s, int is_specular)
+{
+	for (uint32_t i = 0; i < s->n; i++) {
+		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
+		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
+		if (is_specular) {
+			r += s->sr[i] * s->hr[i];
+			g += s->sg[i] * s->hg[i];
+			b += s->sb[i] * s->hb[i];
+		}
+		s->r[i] = light16(is_unlit ? s->dr[i] : r);
+		s->g[i] = light16(is_unlit ? s->dg[i] : g);
+		s->b[i] = light16(is_unlit ? s->db[i] : b);
+	}
+}
+
+static void strip_color(struct strip *strip)
+{
+	if (strip_is_specular(strip))
+		strip_color_by(strip, 1);
+	else
+		strip_color_by(strip, 0);
+}
