@@ -71,6 +71,7 @@ typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 /* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */
 
 #define STRIP 256
+#define STRIP_PADDING 16 /* elements that listing may write beyond the last */
 
 enum strip_needs {
 	STRIP_TWO_SIDED = 1, /* some block in view is two-sided */
@@ -81,8 +82,8 @@ enum strip_needs {
 struct strip {
 	uint32_t n, x0, y;       /* pixel i is (x0 + x[i], y) */
 	uint64_t all;            /* OR of the attributes: no bit of specular, no highlight */
-	uint16_t x[STRIP];
-	uint32_t id[STRIP];      /* slot * 64 + sample */
+	uint16_t x[STRIP + STRIP_PADDING];
+	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
 	uint64_t attr[STRIP];
 	uint64_t normal_word[STRIP];
 	uint8_t two_sided[STRIP]; /* with STRIP_TWO_SIDED */

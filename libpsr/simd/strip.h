@@ -3,6 +3,7 @@
 #include "base/srgb.h"
 #include "simd/block.h"
 
+#ifndef STRIP_LIST_IS_ELSEWHERE
 static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	uint32_t n = 0;
@@ -13,6 +14,7 @@ static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t
 	}
 	strip->n = n;
 }
+#endif
 
 static const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
 {
@@ -76,13 +78,14 @@ static void turn_normals(struct strip *strip, const float m[3][3], uint32_t firs
 
 static void look(struct strip *strip, const struct strip_view *view)
 {
-	const float y = ((float)strip->y + 0.5f - view->half_height) / view->focal;
+	const float scale = view->perspective ? 1 / view->focal : 0;
+	const float y = ((float)strip->y + 0.5f - view->half_height) * scale;
 	for (uint32_t i = 0; i < strip->n; i++) {
-		const float x = ((float)(strip->x0 + strip->x[i]) + 0.5f - view->half_width) / view->focal;
-		const float length = __builtin_sqrtf((x * x + y * y) + 1);
-		strip->vx[i] = view->perspective ? -x / length : 0;
-		strip->vy[i] = view->perspective ? -y / length : 0;
-		strip->vz[i] = view->perspective ? -1 / length : -1;
+		const float x = ((float)(int32_t)(strip->x0 + strip->x[i]) + 0.5f - view->half_width) * scale;
+		const float unit = -1 / __builtin_sqrtf((x * x + y * y) + 1);
+		strip->vx[i] = x * unit;
+		strip->vy[i] = y * unit;
+		strip->vz[i] = unit;
 	}
 }
 

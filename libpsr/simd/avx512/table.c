@@ -1,11 +1,12 @@
 #include "simd/kernels.h"
+#define STRIP_LIST_IS_ELSEWHERE
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
 const struct simd simd_avx512 = {
 	.warp_clear = warp_clear,
 	.warp = warp_avx512,
-	.strip_list = strip_list,
+	.strip_list = strip_list_avx512,
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
 	.strip_color = strip_color,
