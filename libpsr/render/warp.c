@@ -108,17 +108,17 @@ static uint32_t warp_block(const struct plan *plan, const struct plan_instance *
 	const uint32_t block = entry->slot - in->first_slot;
 	const struct view_matrix *view = &in->projection[b->block_projection[block]];
 	const struct cells *cells = entry->level ? &t->cells[entry->level] : NULL;
-	const double dx = (double)b->projection[b->block_projection[block]].spacing * (double)(1u << b->level[block]);
+	const double dx = (double)b->projection[b->block_projection[block]].spacing * (double)(1u << psr_blocks_level(b, block));
 	const double dy = dx * 0.86602540378443864676;
 	const double x = 8.0 * b->col[block] * dx, y = 8.0 * b->row[block] * dy;
-	const float bias = b->depth_bias[block], depth_step = b->depth_step[block];
 	const uint64_t id = (uint64_t)entry->slot * PSR_BLOCK_SAMPLES;
-	const uint16_t *next_depth = b->depth + b->attr_first[block];
+	const uint16_t *next_depth = b->depth + psr_blocks_attr_first(b, block);
 	uint64_t valid = b->mask[block], mask = entry->is_mixed ? facing_samples(plan, in, block) : valid;
 	uint32_t n_inside = 0;
 	double origin[3], down[3];
-	float step[3], along_z[3];
+	float step[3], along_z[3], bias, depth_step;
 
+	psr_blocks_depth(b, block, &bias, &depth_step);
 	for (int a = 0; a < 3; a++) {
 		const double *m = view->m[a];
 		origin[a] = m[0] * x + m[1] * y + m[3];
