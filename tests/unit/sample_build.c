@@ -270,7 +270,7 @@ static uint32_t count_two_sided(const struct psr_model *model)
 	uint32_t n = 0;
 
 	for (uint32_t i = 0; i < b->n_blocks; i++)
-		n += b->flags[i] & PSR_BLOCK_TWO_SIDED;
+		n += (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0;
 	return n;
 }
 

@@ -50,7 +50,7 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 				float z = bias + step * (float)b->depth[k];
 
 				*out = (struct model_sample){ .group = b->cluster[c].group, .level = (uint8_t)psr_blocks_level(b, i),
-					                          .two_sided = b->flags[i] & PSR_BLOCK_TWO_SIDED,
+					                          .two_sided = (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0,
 					                          .projection = b->block_projection[i], .row = 8 * b->row[i] + s / 8,
 					                          .col = 8 * b->col[i] + s % 8, .attr = b->attr[k] };
 				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
