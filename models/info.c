@@ -8,7 +8,7 @@
 #include "psr/model.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
-#define MAX_LEVELS 256 /* of a level's 8 bits */
+#define MAX_LEVELS (PSR_BLOCK_LEVEL + 1)
 
 /* What both forms of the answer say. */
 struct summary {
@@ -49,7 +49,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->presets = psr_model_presets(model);
 	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++) {
-		uint8_t level = summary->blocks->level[b];
+		unsigned level = psr_blocks_level(summary->blocks, b);
 
 		summary->level_blocks[level]++;
 		summary->level_samples[level] += (uint64_t)__builtin_popcountll(summary->blocks->mask[b]);

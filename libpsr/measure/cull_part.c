@@ -7,12 +7,11 @@
 struct part {
 	struct psr_blocks blocks;
 	struct psr_cluster *cluster;
-	float *bias, *step;
-	uint16_t *projection, *radius, *depth;
-	int16_t *center[3], *col, *row;
-	uint8_t *level, *flags;
+	struct psr_run *run;
+	uint16_t *radius, *depth, *attr_offset;
+	int16_t *center[3], *col, *row, *bias;
+	uint8_t *projection, *flags, *shift;
 	uint64_t *mask, *attr;
-	uint32_t *attr_first;
 	void *memory;
 };
 
@@ -29,27 +28,28 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 	size_t n = all->n_blocks;
 
 	part->cluster = take(&at, all->n_clusters, sizeof *part->cluster);
+	part->run = take(&at, psr_blocks_runs(all), sizeof *part->run);
 	for (int k = 0; k < 3; k++)
 		part->center[k] = take(&at, n, sizeof *part->center[k]);
 	part->radius = take(&at, n, sizeof *part->radius);
 	part->bias = take(&at, n, sizeof *part->bias);
-	part->step = take(&at, n, sizeof *part->step);
+	part->shift = take(&at, n, sizeof *part->shift);
 	part->projection = take(&at, n, sizeof *part->projection);
 	part->col = take(&at, n, sizeof *part->col);
 	part->row = take(&at, n, sizeof *part->row);
-	part->level = take(&at, n, sizeof *part->level);
 	part->flags = take(&at, n, sizeof *part->flags);
 	part->mask = take(&at, n, sizeof *part->mask);
-	part->attr_first = take(&at, n, sizeof *part->attr_first);
+	part->attr_offset = take(&at, n, sizeof *part->attr_offset);
 	part->attr = take(&at, all->n_samples, sizeof *part->attr);
 	part->depth = take(&at, all->n_samples, sizeof *part->depth);
 }
 
 static int part_init(struct part *part, const struct psr_blocks *all)
 {
-	const size_t a_block = 2 * sizeof(float) + 7 * sizeof(uint16_t) + 2 + sizeof(uint64_t) +
-	                       sizeof(uint32_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t), n_arrays = 18;
-	size_t size = all->n_clusters * sizeof(struct psr_cluster) + all->n_blocks * a_block + all->n_samples * a_sample;
+	const size_t a_block = 8 * sizeof(uint16_t) + 3 + sizeof(uint64_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t),
+	             n_arrays = 16;
+	size_t size = all->n_clusters * sizeof(struct psr_cluster) + psr_blocks_runs(all) * sizeof(struct psr_run) +
+	              all->n_blocks * a_block + all->n_samples * a_sample;
 
 	memset(part, 0, sizeof *part);
 	part->memory = psr_alloc_array(size + n_arrays * PSR_ALIGNMENT, 1);
@@ -57,32 +57,33 @@ static int part_init(struct part *part, const struct psr_blocks *all)
 		return PSR_ERR_MEMORY;
 	place_arrays(part, part->memory, all);
 	part->blocks = (struct psr_blocks){ .n_projections = all->n_projections, .n_levels = 1,
-		.projection = all->projection, .cluster = part->cluster, .sphere_x = part->center[0],
+		.projection = all->projection, .cluster = part->cluster, .run = part->run, .sphere_x = part->center[0],
 		.sphere_y = part->center[1], .sphere_z = part->center[2], .sphere_r = part->radius,
-		.block_projection = part->projection, .col = part->col, .row = part->row, .level = part->level,
-		.flags = part->flags, .depth_bias = part->bias, .depth_step = part->step, .mask = part->mask,
-		.attr_first = part->attr_first, .depth = part->depth, .attr = part->attr };
+		.block_projection = part->projection, .col = part->col, .row = part->row, .flags = part->flags,
+		.depth_bias = part->bias, .depth_shift = part->shift, .mask = part->mask, .attr_offset = part->attr_offset,
+		.depth = part->depth, .attr = part->attr };
 	return PSR_OK;
 }
 
 static void add_block(struct part *part, const struct psr_blocks *all, uint32_t b)
 {
 	struct psr_blocks *blocks = &part->blocks;
-	uint32_t to = blocks->n_blocks++, from = all->attr_first[b], n = (uint32_t)__builtin_popcountll(all->mask[b]);
+	uint32_t to = blocks->n_blocks++, from = psr_blocks_attr_first(all, b), n = (uint32_t)__builtin_popcountll(all->mask[b]);
 
 	part->center[0][to] = all->sphere_x[b];
 	part->center[1][to] = all->sphere_y[b];
 	part->center[2][to] = all->sphere_z[b];
 	part->radius[to] = all->sphere_r[b];
 	part->bias[to] = all->depth_bias[b];
-	part->step[to] = all->depth_step[b];
+	part->shift[to] = all->depth_shift[b];
 	part->projection[to] = all->block_projection[b];
 	part->col[to] = all->col[b];
 	part->row[to] = all->row[b];
-	part->level[to] = 0;
 	part->flags[to] = all->flags[b];
 	part->mask[to] = all->mask[b];
-	part->attr_first[to] = (uint32_t)blocks->n_samples;
+	if (to % PSR_RUN_BLOCKS == 0)
+		part->run[to / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = (uint32_t)blocks->n_samples };
+	part->attr_offset[to] = (uint16_t)(blocks->n_samples - part->run[to / PSR_RUN_BLOCKS].attr_first);
 	memcpy(part->attr + blocks->n_samples, all->attr + from, n * sizeof *part->attr);
 	memcpy(part->depth + blocks->n_samples, all->depth + from, n * sizeof *part->depth);
 	blocks->n_samples += n;

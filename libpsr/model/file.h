@@ -11,7 +11,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
 
 #define FILE_MAGIC "\x89PSR\r\n\x1a\n"
-#define FILE_MAJOR 2
+#define FILE_MAJOR 3
 #define FILE_MINOR 0
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end, so that 64 depths may be read beyond the last one of any section */
@@ -21,7 +21,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MAX_SECTIONS 256
 
 #define MODEL_MAX_BLOCKS ((uint32_t)1 << 26)
-#define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 16)
+#define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 8)
 #define MODEL_MAX_LEVELS 32
 #define MODEL_MAX_COORDINATE 1024.0f /* magnitude of any length or coordinate inside of a model */
 
@@ -33,7 +33,8 @@ enum { ENTRY_REQUIRED = 1 };
 
 /* What a section's length is counted in. */
 enum section_count {
-	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_BLOCKS, COUNT_SAMPLES
+	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
+	COUNT_SAMPLES
 };
 
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY };
@@ -50,7 +51,7 @@ struct section_spec {
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
-#define N_KNOWN_SECTIONS 26
+#define N_KNOWN_SECTIONS 27
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 
@@ -107,6 +108,9 @@ struct content {
 /* Number of items that the known section has in this model; section_array() is of those from SECTION_FIRST_ARRAY on. */
 uint64_t section_items(const struct section_spec *spec, const struct content *content);
 const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
+
+/* The counts of BLKS, from its BLOCKS_BYTES; not checked. */
+void file_get_counts(struct psr_blocks *blocks, const uint8_t *at);
 
 /* Lays a model out as a file in memory of psr_alloc_huge(), sealed. The counts must be within the limits and all
  * pointers but the optional ones set; the rest is left to the reader's checks. NULL if there is no memory. */

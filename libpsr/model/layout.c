@@ -6,14 +6,13 @@
 _Static_assert(sizeof(struct psr_projection) == 40 && offsetof(struct psr_projection, spacing) == 36, "section PROJ");
 _Static_assert(sizeof(struct psr_cluster) == 32 && offsetof(struct psr_cluster, first_block) == 16, "section CLUS");
 _Static_assert(offsetof(struct psr_cluster, group) == 24 && offsetof(struct psr_cluster, level) == 28, "section CLUS");
+_Static_assert(sizeof(struct psr_run) == 8 && offsetof(struct psr_run, visibility_first) == 4, "section RUNS");
 _Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(struct psr_preset_camera, camera) == 64
                && offsetof(struct psr_camera, kind) == 72 && offsetof(struct psr_camera, fov_y) == 80, "section CAMS");
 _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
                && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
 
-#define ARRAY_VERSION(type, version, flags, count, item, field) \
-	{ type, version, flags, count, item, offsetof(struct psr_blocks, field) }
-#define ARRAY(type, flags, count, item, field) ARRAY_VERSION(type, 1, flags, count, item, field)
+#define ARRAY(type, flags, count, item, field) { type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
 
 const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
@@ -22,24 +21,25 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_LIGHTS] = { "LGTS", 1, 0, COUNT_LIGHTS, LIGHT_BYTES, 0 },
 	ARRAY("PROJ", ENTRY_REQUIRED, COUNT_PROJECTIONS, 40, projection),
 	ARRAY("CLUS", ENTRY_REQUIRED, COUNT_CLUSTERS, 32, cluster),
-	ARRAY_VERSION("SPHX", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_x),
-	ARRAY_VERSION("SPHY", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_y),
-	ARRAY_VERSION("SPHZ", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_z),
-	ARRAY_VERSION("SPHR", 2, ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_r),
-	ARRAY("BPRJ", ENTRY_REQUIRED, COUNT_BLOCKS, 2, block_projection),
+	ARRAY("RUNS", ENTRY_REQUIRED, COUNT_RUNS, 8, run),
+	ARRAY("SPHX", ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_x),
+	ARRAY("SPHY", ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_y),
+	ARRAY("SPHZ", ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_z),
+	ARRAY("SPHR", ENTRY_REQUIRED, COUNT_BLOCKS, 2, sphere_r),
+	ARRAY("BPRJ", ENTRY_REQUIRED, COUNT_BLOCKS, 1, block_projection),
 	ARRAY("BCOL", ENTRY_REQUIRED, COUNT_BLOCKS, 2, col),
 	ARRAY("BROW", ENTRY_REQUIRED, COUNT_BLOCKS, 2, row),
-	ARRAY("BLVL", ENTRY_REQUIRED, COUNT_BLOCKS, 1, level),
 	ARRAY("BFLG", ENTRY_REQUIRED, COUNT_BLOCKS, 1, flags),
-	ARRAY("DBIA", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_bias),
-	ARRAY("DSTP", ENTRY_REQUIRED, COUNT_BLOCKS, 4, depth_step),
+	ARRAY("DBIA", ENTRY_REQUIRED, COUNT_BLOCKS, 2, depth_bias),
+	ARRAY("DSHF", ENTRY_REQUIRED, COUNT_BLOCKS, 1, depth_shift),
 	ARRAY("MASK", ENTRY_REQUIRED, COUNT_BLOCKS, 8, mask),
-	ARRAY("AFST", ENTRY_REQUIRED, COUNT_BLOCKS, 4, attr_first),
-	ARRAY_VERSION("CONX", 2, 0, COUNT_BLOCKS, 1, cone_x),
-	ARRAY_VERSION("CONY", 2, 0, COUNT_BLOCKS, 1, cone_y),
-	ARRAY_VERSION("CONZ", 2, 0, COUNT_BLOCKS, 1, cone_z),
+	ARRAY("AOFF", ENTRY_REQUIRED, COUNT_BLOCKS, 2, attr_offset),
+	ARRAY("CONX", 0, COUNT_BLOCKS, 1, cone_x),
+	ARRAY("CONY", 0, COUNT_BLOCKS, 1, cone_y),
+	ARRAY("CONZ", 0, COUNT_BLOCKS, 1, cone_z),
 	ARRAY("CONS", 0, COUNT_BLOCKS, 1, cone_sine),
-	ARRAY("VISM", 0, COUNT_BLOCKS, 16, visibility),
+	ARRAY("VISI", 0, COUNT_BLOCKS, 1, visibility_index),
+	ARRAY("VISM", 0, COUNT_MASKS, 16, visibility_mask),
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),
 };
@@ -57,6 +57,10 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 		return blocks->n_projections;
 	case COUNT_CLUSTERS:
 		return blocks->n_clusters;
+	case COUNT_RUNS:
+		return psr_blocks_runs(blocks);
+	case COUNT_MASKS:
+		return blocks->n_masks;
 	case COUNT_BLOCKS:
 		return blocks->n_blocks;
 	case COUNT_SAMPLES:
@@ -167,6 +171,17 @@ static void put_blocks(uint8_t *at, const struct psr_blocks *blocks)
 	file_put(at + 8, 4, blocks->n_clusters);
 	file_put(at + 12, 4, blocks->n_levels);
 	file_put(at + 16, 8, blocks->n_samples);
+	file_put(at + 24, 4, blocks->n_masks);
+}
+
+void file_get_counts(struct psr_blocks *blocks, const uint8_t *at)
+{
+	blocks->n_blocks = (uint32_t)file_get(at, 4);
+	blocks->n_projections = (uint32_t)file_get(at + 4, 4);
+	blocks->n_clusters = (uint32_t)file_get(at + 8, 4);
+	blocks->n_levels = (uint32_t)file_get(at + 12, 4);
+	blocks->n_samples = file_get(at + 16, 8);
+	blocks->n_masks = (uint32_t)file_get(at + 24, 4);
 }
 
 static int is_present(int section, const struct content *content)

@@ -236,7 +236,7 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 		return psr_fail(err, PSR_ERR_ARG, "the builder's name is longer than %zu bytes", sizeof info->builder - 1);
 	/* The other counts are no larger: the validator says so, once the image stands. */
 	if (blocks->n_blocks > MODEL_MAX_BLOCKS || blocks->n_projections > MODEL_MAX_PROJECTIONS
-	    || blocks->n_clusters > blocks->n_blocks || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
+	    || blocks->n_clusters > blocks->n_blocks || blocks->n_masks > blocks->n_blocks || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
 		return psr_fail(err, PSR_ERR_LIMIT, "a model of %" PRIu32 " blocks, %" PRIu32 " projections, %" PRIu32
 		                " clusters and %" PRIu64 " samples is over the limits", blocks->n_blocks, blocks->n_projections,
 		                blocks->n_clusters, blocks->n_samples);
@@ -246,6 +246,8 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_sine;
 	if (n_cones % 4 != 0)
 		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
+	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
+		return psr_fail(err, PSR_ERR_ARG, "of visibility masks, their number and their indices only some are there");
 	if (presets == NULL)
 		return PSR_OK;
 	if (presets->n_cameras > PSR_MAX_PRESETS || presets->n_lights > PSR_MAX_PRESETS)

@@ -59,7 +59,7 @@ static uint32_t stride_of(const uint8_t *type)
 		uint32_t item = section_table[k].item_bytes;
 
 		if (memcmp(type, section_table[k].type, 4) == 0)
-			return pack_is_stride(item) ? item : section_table[k].count == COUNT_BLOCKS ? 8 : 4;
+			return pack_is_stride(item) ? item : section_table[k].count == COUNT_MASKS ? 8 : 4;
 	}
 	return 1;
 }

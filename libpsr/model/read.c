@@ -195,12 +195,9 @@ static int sort_sections(struct reader *r)
 				           section_table[known].flags ? "" : "not ");
 			r->entry[known] = (int)i;
 		} else if (s.flags & ENTRY_REQUIRED) {
-			const char *advice = known >= 0 && s.version < section_table[known].version
-			                     ? "it is an older psr's, and the model has to be built again" : "a newer psr may";
-
 			return psr_fail(r->err, known < 0 ? PSR_ERR_UNSUPPORTED : PSR_ERR_VERSION, "%s: this build cannot read the "
-			                "required section %s, version %" PRIu32 ", at byte %" PRIu64 "; %s", r->name, s.type,
-			                s.version, s.offset, advice);
+			                "required section %s, version %" PRIu32 ", at byte %" PRIu64 "; a newer psr may", r->name,
+			                s.type, s.version, s.offset);
 		}
 	}
 	return PSR_OK;
@@ -248,12 +245,8 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 
 	if (code != PSR_OK)
 		return code;
-	blocks->n_blocks = (uint32_t)file_get(at, 4);
-	blocks->n_projections = (uint32_t)file_get(at + 4, 4);
-	blocks->n_clusters = (uint32_t)file_get(at + 8, 4);
-	blocks->n_levels = (uint32_t)file_get(at + 12, 4);
-	blocks->n_samples = file_get(at + 16, 8);
-	if (file_get(at + 24, 8) != 0)
+	file_get_counts(blocks, at);
+	if (file_get(at + 28, 4) != 0)
 		return bad(r, "section BLKS: reserved bytes are not zero");
 	/* With 32-bit counts and this no product below overflows; the counts' own limits are the validator's. */
 	if (blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
@@ -300,6 +293,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 	}
 	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
 		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
+	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
+		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS only some are there");
 	return PSR_OK;
 }
 

@@ -227,10 +227,7 @@ static int check_lengths(const struct unpacker *u)
 	code = unpack_chunks(u, NULL, at);
 	if (code != PSR_OK)
 		return code;
-	content.blocks.n_blocks = (uint32_t)file_get(at, 4);
-	content.blocks.n_projections = (uint32_t)file_get(at + 4, 4);
-	content.blocks.n_clusters = (uint32_t)file_get(at + 8, 4);
-	content.blocks.n_samples = file_get(at + 16, 8);
+	file_get_counts(&content.blocks, at);
 	if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
 		return bad(u, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", content.blocks.n_samples,
 		           content.blocks.n_blocks);

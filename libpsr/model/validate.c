@@ -90,6 +90,8 @@ static int check_counts(const struct checker *c)
 		return fail(c, "BLKS", "%" PRIu32 " clusters; it must be 1 to the number of blocks", b->n_clusters);
 	if (b->n_levels == 0 || b->n_levels > MODEL_MAX_LEVELS)
 		return fail(c, "BLKS", "%" PRIu32 " levels; it must be 1 to %d", b->n_levels, MODEL_MAX_LEVELS);
+	if (b->n_masks > b->n_blocks)
+		return fail(c, "BLKS", "%" PRIu32 " visibility masks; it must be at most one a block", b->n_masks);
 	return PSR_OK;
 }
 
@@ -133,9 +135,9 @@ static int check_cluster(const struct checker *c, uint32_t i, uint64_t next_bloc
 	if (k->zero[0] != 0 || k->zero[1] != 0 || k->zero[2] != 0)
 		return fail(c, "CLUS", "reserved bytes of cluster %" PRIu32 " are not zero", i);
 	for (uint32_t j = k->first_block; j < k->first_block + k->n_blocks; j++)
-		if (b->level[j] != k->level)
-			return fail(c, "BLVL", "block %" PRIu32 " is of level %d, and its cluster %" PRIu32 " of level %d", j,
-			            b->level[j], i, k->level);
+		if (psr_blocks_level(b, j) != k->level)
+			return fail(c, "BFLG", "block %" PRIu32 " is of level %u, and its cluster %" PRIu32 " of level %d", j,
+			            psr_blocks_level(b, j), i, k->level);
 	return PSR_OK;
 }
 
@@ -177,21 +179,38 @@ static int check_heads(const struct checker *c)
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
 			            b->n_projections);
-		if ((b->flags[i] & ~PSR_BLOCK_TWO_SIDED) != 0)
+		if ((b->flags[i] & ~(PSR_BLOCK_LEVEL | PSR_BLOCK_TWO_SIDED)) != 0)
 			return fail(c, "BFLG", "block %" PRIu32 " has unknown flags %#x", i, b->flags[i]);
-		if (!is_coordinate(b->depth_bias[i]))
-			return fail(c, "DBIA", "the depth of block %" PRIu32 " begins at %g", i, (double)b->depth_bias[i]);
-		if (!is_length(b->depth_step[i]))
-			return fail(c, "DSTP", "the depth step of block %" PRIu32 " is %g", i, (double)b->depth_step[i]);
+		if (b->depth_shift[i] < PSR_DEPTH_SHIFT_MIN || b->depth_shift[i] > PSR_DEPTH_SHIFT_MAX)
+			return fail(c, "DSHF", "the depth step of block %" PRIu32 " is 2^-%d; it must be 2^-%d to 2^-%d", i,
+			            b->depth_shift[i], PSR_DEPTH_SHIFT_MIN, PSR_DEPTH_SHIFT_MAX);
 		if (b->mask[i] == 0)
 			return fail(c, "MASK", "block %" PRIu32 " has no valid sample", i);
-		if (b->attr_first[i] != n_samples)
-			return fail(c, "AFST", "the attributes of block %" PRIu32 " begin at %" PRIu32 " instead of %" PRIu64, i,
-			            b->attr_first[i], n_samples);
+		if (i % PSR_RUN_BLOCKS == 0 && b->run[i / PSR_RUN_BLOCKS].attr_first != n_samples)
+			return fail(c, "RUNS", "the attributes of run %" PRIu32 " begin at %" PRIu32 " instead of %" PRIu64,
+			            i / PSR_RUN_BLOCKS, b->run[i / PSR_RUN_BLOCKS].attr_first, n_samples);
+		if (psr_blocks_attr_first(b, i) != n_samples)
+			return fail(c, "AOFF", "the attributes of block %" PRIu32 " begin at %" PRIu32 " instead of %" PRIu64, i,
+			            psr_blocks_attr_first(b, i), n_samples);
 		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);
 	}
 	if (n_samples != b->n_samples)
 		return fail(c, "MASK", "%" PRIu64 " samples are valid, and BLKS counts %" PRIu64, n_samples, b->n_samples);
+	return PSR_OK;
+}
+
+static int check_visibility(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+
+	for (uint32_t i = 0; i < psr_blocks_runs(b); i++)
+		if (b->run[i].visibility_first > b->n_masks)
+			return fail(c, "RUNS", "the visibility masks of run %" PRIu32 " begin at %" PRIu32 " of %" PRIu32, i,
+			            b->run[i].visibility_first, b->n_masks);
+	for (uint32_t i = 0; i < b->n_blocks && b->n_masks != 0; i++)
+		if (psr_blocks_visibility(b, i) >= b->n_masks)
+			return fail(c, "VISI", "block %" PRIu32 " has visibility mask %" PRIu32 " of %" PRIu32, i,
+			            psr_blocks_visibility(b, i), b->n_masks);
 	return PSR_OK;
 }
 
@@ -225,6 +244,7 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 {
 	static int (*const checks[])(const struct checker *) = {
 		check_info, check_counts, check_presets, check_projections, check_clusters, check_heads, check_cones,
+		check_visibility,
 	};
 	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;

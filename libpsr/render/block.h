@@ -9,19 +9,20 @@
 static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uint32_t sample)
 {
 	const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-	return (size_t)b->attr_first[block] + (size_t)__builtin_popcountll(below);
+	return (size_t)psr_blocks_attr_first(b, block) + (size_t)__builtin_popcountll(below);
 }
 
 /* Where a valid sample stands in the instance's inner coordinates. */
 static inline void block_position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
 {
 	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
-	const float dx = projection->spacing * (float)(1u << b->level[block]), dy = dx * 0.866025404f;
+	const float dx = projection->spacing * (float)(1u << psr_blocks_level(b, block)), dy = dx * 0.866025404f;
 	const uint32_t r = sample >> 3, c = sample & 7;
 	const float x = ((float)(8 * b->col[block] + (int32_t)c) + (float)(r & 1) * 0.5f) * dx;
 	const float y = (float)(8 * b->row[block] + (int32_t)r) * dy;
-	const float z = b->depth_bias[block] +
-	                b->depth_step[block] * (float)b->depth[block_index(b, block, sample)];
+	float bias, step;
+	psr_blocks_depth(b, block, &bias, &step);
+	const float z = bias + step * (float)b->depth[block_index(b, block, sample)];
 	for (int a = 0; a < 3; a++)
 		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
 }

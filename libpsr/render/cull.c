@@ -130,7 +130,7 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
                       struct cull_hit *hit)
 {
 	const struct psr_blocks *b = in->blocks;
-	float center[3], radius;
+	float center[3], radius, depth_bias, depth_step;
 	psr_blocks_sphere(b, block, center, &radius);
 	const enum facing facing = facing_of(plan, in, block, center, radius);
 	if (facing == FACES_AWAY)
@@ -139,7 +139,7 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
 		           to_camera(in->center_m[2], x, y, z) };
 	float s = stretch(plan, c, r);
-	uint32_t level = level_for(s * in->spacing * (float)(1u << b->level[block]));
+	uint32_t level = level_for(s * in->spacing * (float)(1u << psr_blocks_level(b, block)));
 	int clamped = level > PSR_MAX_DEPTH_LEVEL;
 	if (clamped)
 		level = PSR_MAX_DEPTH_LEVEL;
@@ -157,8 +157,10 @@ static int cull_block(const struct plan *plan, const struct plan_instance *in, u
 	chunk->flags |= b->flags[block];
 	chunk->n_clamped += (uint32_t)clamped;
 	/* As many as the mask has bits, without counting them. */
-	chunk->n_samples += (block + 1 < b->n_blocks ? b->attr_first[block + 1] : b->n_samples) - b->attr_first[block];
-	float error = s * b->depth_step[block] * in->scale / 2;
+	const uint64_t end = block + 1 < b->n_blocks ? psr_blocks_attr_first(b, block + 1) : b->n_samples;
+	chunk->n_samples += end - psr_blocks_attr_first(b, block);
+	psr_blocks_depth(b, block, &depth_bias, &depth_step);
+	float error = s * depth_step * in->scale / 2;
 	if (error > chunk->depth_error)
 		chunk->depth_error = error;
 	return 1;

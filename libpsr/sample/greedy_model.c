@@ -14,7 +14,7 @@ struct taken {
 
 static int is_first_level(const struct psr_blocks *blocks, uint32_t b)
 {
-	return blocks->level[b] == 0;
+	return psr_blocks_level(blocks, b) == 0;
 }
 
 static void take_block(struct greedy *greedy, const struct taken *taken)
@@ -102,14 +102,16 @@ int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint
 	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
 		const struct taken taken = { blocks->block_projection[b], blocks->col[b], blocks->row[b],
 			                         (blocks->flags[b] & PSR_BLOCK_TWO_SIDED) != 0, blocks->mask[b] };
-		uint64_t at = blocks->attr_first[b];
+		uint64_t at = psr_blocks_attr_first(blocks, b);
+		float bias, step;
 
 		if (!is_first_level(blocks, b))
 			continue;
 		take_block(*out, &taken);
+		psr_blocks_depth(blocks, b, &bias, &step);
 		for (uint64_t left = taken.mask; left != 0; left &= left - 1, at++)
-			take_sample(*out, &taken, (unsigned)__builtin_ctzll(left),
-			            blocks->depth_bias[b] + blocks->depth_step[b] * (float)blocks->depth[at], blocks->attr[at]);
+			take_sample(*out, &taken, (unsigned)__builtin_ctzll(left), bias + step * (float)blocks->depth[at],
+			            blocks->attr[at]);
 	}
 	finish(*out, result);
 	return PSR_OK;

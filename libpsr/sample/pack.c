@@ -8,6 +8,7 @@
 #include "pack.h"
 #include "psr/direction.h"
 #include "visibility.h"
+#include "visibility_table.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
 #define SLACK 0x1p-21
@@ -24,16 +25,14 @@ struct pack {
 	const struct draft *draft;
 	struct order *order;
 	struct psr_cluster *cluster;
-	float *depth_bias, *depth_step;
+	struct psr_run *run;
 	int16_t *center[3];
 	uint16_t *radius;
 	int8_t *cone[3];
-	uint8_t *cone_sine;
-	uint16_t *block_projection, *depth;
-	int16_t *col, *row;
-	uint8_t *level, *flags;
-	uint64_t *mask, *attr, (*visibility)[2];
-	uint32_t *attr_first;
+	uint8_t *cone_sine, *block_projection, *flags, *depth_shift;
+	uint16_t *attr_offset, *depth;
+	int16_t *col, *row, *depth_bias;
+	uint64_t *mask, *attr;
 	uint32_t n_clusters, n_samples;
 	double box_min[3], box_max[3];
 };
@@ -114,21 +113,23 @@ static void sort_blocks(struct pack *pack)
 	qsort(pack->order, draft->n_blocks, sizeof *pack->order, compare_order);
 }
 
-/* Depths as 16 bits of the block's own range. */
-static void quantise(struct pack *pack, uint32_t i, const struct draft_block *block, double min, double max)
+/* Depths as 16 bits from the multiple of 2^-14 before them on, in the least step, a power of two, that reaches them all. */
+static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min, double max)
 {
-	float bias = (float)min, step = (float)((max - min) / 65535);
-	uint32_t k = pack->attr_first[i];
+	double bias = floor(min * 0x1p14), range = max - bias * 0x1p-14;
+	unsigned shift = PSR_DEPTH_SHIFT_MAX;
 
-	for (uint64_t left = block->part; left != 0; left &= left - 1, k++) {
+	while (range * (double)(1u << shift) > UINT16_MAX)
+		shift--;
+	assert(fabs(bias) <= INT16_MAX && shift >= PSR_DEPTH_SHIFT_MIN);
+	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
-		double q = step > 0 ? ((double)sample->z - (double)bias) / (double)step + 0.5 : 0;
 
-		pack->depth[k] = q < 65535 ? (uint16_t)q : 65535;
-		pack->attr[k] = sample->attr;
+		pack->depth[at] = (uint16_t)(((double)sample->z - bias * 0x1p-14) * (double)(1u << shift) + 0.5);
+		pack->attr[at] = sample->attr;
 	}
-	pack->depth_bias[i] = bias;
-	pack->depth_step[i] = step;
+	pack->depth_bias[i] = (int16_t)bias;
+	pack->depth_shift[i] = (uint8_t)shift;
 }
 
 /* Around the middle of the box, rounded; through the samples as they will be read back, and half a step beyond.
@@ -137,13 +138,15 @@ static void quantise(struct pack *pack, uint32_t i, const struct draft_block *bl
  * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
  * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
  * half a step more, 1.79 < 2. */
-static void bound_block(struct pack *pack, uint32_t i, const struct draft_block *block, const double min[3],
+static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, const double min[3],
                         const double max[3])
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
-	uint32_t at = pack->attr_first[i];
+	const struct psr_blocks depths = { .depth_bias = pack->depth_bias, .depth_shift = pack->depth_shift };
 	double middle[3], radius = 0;
+	float bias, step;
 
+	psr_blocks_depth(&depths, i, &bias, &step);
 	middle_of(projection, min, max, middle);
 	for (int k = 0; k < 3; k++) {
 		double rounded = rint(middle[k] * 0x1p14);
@@ -153,7 +156,7 @@ static void bound_block(struct pack *pack, uint32_t i, const struct draft_block 
 		middle[k] = rounded * 0x1p-14;
 	}
 	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
-		float z = pack->depth_bias[i] + pack->depth_step[i] * (float)pack->depth[at];
+		float z = bias + step * (float)pack->depth[at];
 		double p[3], position[3], squared = 0;
 
 		place_sample(pack->draft, block, (unsigned)__builtin_ctzll(left), p);
@@ -194,18 +197,16 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		pack->cone[k][i] = axis[k];
 }
 
-static void place_block(struct pack *pack, uint32_t i)
+static void place_block(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
-	const struct draft_block *block = &pack->draft->block[pack->order[i].block];
-
+	if (i % PSR_RUN_BLOCKS == 0)
+		pack->run[i / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = pack->n_samples };
 	pack->block_projection[i] = block->projection;
 	pack->col[i] = block->col;
 	pack->row[i] = block->row;
-	pack->level[i] = block->level;
-	pack->flags[i] = block->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
+	pack->flags[i] = block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0);
 	pack->mask[i] = block->part;
-	pack->attr_first[i] = pack->n_samples;
-	pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
+	pack->attr_offset[i] = (uint16_t)(pack->n_samples - pack->run[i / PSR_RUN_BLOCKS].attr_first);
 }
 
 static void pack_blocks(struct pack *pack)
@@ -217,11 +218,12 @@ static void pack_blocks(struct pack *pack)
 		const struct draft_block *block = &pack->draft->block[pack->order[i].block];
 		double min[3], max[3];
 
-		place_block(pack, i);
+		place_block(pack, i, block);
 		projection_box(pack->draft, block, min, max);
-		quantise(pack, i, block, min[2], max[2]);
-		bound_block(pack, i, block, min, max);
+		quantise(pack, i, pack->n_samples, block, min[2], max[2]);
+		bound_block(pack, i, pack->n_samples, block, min, max);
 		bound_normals(pack, i, block);
+		pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
 	}
 }
 
@@ -292,17 +294,16 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->radius, n_blocks);
 	ALLOC(pack->cone_sine, n_blocks);
 	ALLOC(pack->depth_bias, n_blocks);
-	ALLOC(pack->depth_step, n_blocks);
+	ALLOC(pack->depth_shift, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
 	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
 	ALLOC(pack->col, n_blocks);
 	ALLOC(pack->row, n_blocks);
-	ALLOC(pack->level, n_blocks);
 	ALLOC(pack->flags, n_blocks);
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
-	ALLOC(pack->attr_first, n_blocks);
-	ALLOC(pack->visibility, n_blocks);
+	ALLOC(pack->attr_offset, n_blocks);
+	ALLOC(pack->run, n_blocks / PSR_RUN_BLOCKS + 1);
 #undef ALLOC
 	return failed ? PSR_ERR_MEMORY : PSR_OK;
 }
@@ -318,17 +319,16 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->radius);
 	psr_free(pack->cone_sine);
 	psr_free(pack->depth_bias);
-	psr_free(pack->depth_step);
+	psr_free(pack->depth_shift);
 	psr_free(pack->block_projection);
 	psr_free(pack->depth);
 	psr_free(pack->col);
 	psr_free(pack->row);
-	psr_free(pack->level);
 	psr_free(pack->flags);
 	psr_free(pack->mask);
 	psr_free(pack->attr);
-	psr_free(pack->attr_first);
-	psr_free(pack->visibility);
+	psr_free(pack->attr_offset);
+	psr_free(pack->run);
 }
 
 static uint64_t count_samples(const struct draft *draft)
@@ -341,21 +341,31 @@ static uint64_t count_samples(const struct draft *draft)
 }
 
 /* Masks, and what culling by them and by cones loses. */
-static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct psr_model_info *info, struct psr_pool *pool)
+static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_table *table,
+                          struct psr_model_info *info, struct psr_pool *pool)
 {
-	int rc = visibility_masks(blocks, pool, pack->visibility);
+	uint64_t (*mask)[2] = psr_alloc_array(blocks->n_blocks, sizeof *mask);
+	int rc = mask != NULL ? visibility_masks(blocks, pool, mask) : PSR_ERR_MEMORY;
 
-	if (rc == PSR_OK && !visibility_is_full(blocks->n_blocks, (const uint64_t(*)[2])pack->visibility))
-		blocks->visibility = (const uint64_t(*)[2])pack->visibility;
-	return rc == PSR_OK ? visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost) : rc;
+	if (rc == PSR_OK && !visibility_is_full(blocks->n_blocks, (const uint64_t(*)[2])mask))
+		rc = visibility_table_make(table, blocks, (const uint64_t(*)[2])mask, pack->run, pool);
+	psr_free(mask);
+	if (rc != PSR_OK)
+		return rc;
+	blocks->n_masks = table->n_masks;
+	blocks->visibility_mask = (const uint64_t(*)[2])table->mask;
+	blocks->visibility_index = table->index;
+	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
                       struct pack *pack, struct psr_pool *pool, struct psr_error *err)
 {
+	struct visibility_table table = { 0 };
 	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
 		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
 		                         .n_samples = pack->n_samples };
+	int rc;
 
 	blocks.projection = pack->draft->projection;
 	blocks.cluster = pack->cluster;
@@ -370,21 +380,25 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.block_projection = pack->block_projection;
 	blocks.col = pack->col;
 	blocks.row = pack->row;
-	blocks.level = pack->level;
 	blocks.flags = pack->flags;
 	blocks.depth_bias = pack->depth_bias;
-	blocks.depth_step = pack->depth_step;
+	blocks.depth_shift = pack->depth_shift;
 	blocks.mask = pack->mask;
-	blocks.attr_first = pack->attr_first;
+	blocks.attr_offset = pack->attr_offset;
+	blocks.run = pack->run;
 	blocks.depth = pack->depth;
 	blocks.attr = pack->attr;
 	for (int k = 0; k < 3; k++) {
 		info->box_min[k] = info->origin[k] + info->scale * pack->box_min[k];
 		info->box_max[k] = info->origin[k] + info->scale * pack->box_max[k];
 	}
-	if (add_visibility(pack, &blocks, info, pool) != PSR_OK)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the visibility masks of %u blocks", blocks.n_blocks);
-	return psr_model_create(out, info, &blocks, presets, err);
+	rc = add_visibility(pack, &blocks, &table, info, pool);
+	if (rc != PSR_OK)
+		psr_fail(err, rc, "no memory for the visibility masks of %u blocks", blocks.n_blocks);
+	else
+		rc = psr_model_create(out, info, &blocks, presets, err);
+	visibility_table_fini(&table);
+	return rc;
 }
 
 int pack_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,

@@ -35,7 +35,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 		return PSR_ERR_MEMORY;
 	}
 	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
-		uint32_t k = blocks->attr_first[b];
+		uint32_t k = psr_blocks_attr_first(blocks, b);
 
 		for (uint64_t left = blocks->mask[b]; left != 0; left &= left - 1, k++) {
 			float p[3], length2;
@@ -79,10 +79,10 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 		return PSR_ERR_MEMORY;
 	}
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		float spacing = b->projection[b->block_projection[i]].spacing * (float)(1u << b->level[i]);
-		uint32_t first = b->attr_first[i], n = (uint32_t)__builtin_popcountll(b->mask[i]);
+		float spacing = b->projection[b->block_projection[i]].spacing * (float)(1u << psr_blocks_level(b, i));
+		uint32_t first = psr_blocks_attr_first(b, i), n = (uint32_t)__builtin_popcountll(b->mask[i]);
 
-		if (b->level[i] != which)
+		if (psr_blocks_level(b, i) != which)
 			continue;
 		level->block[level->n_blocks++] = i;
 		level->spacing = spacing > level->spacing ? spacing : level->spacing;
@@ -228,9 +228,9 @@ void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const
 int vpicture_sees(const struct vpicture *picture, const struct vpoints *points, uint32_t block, int end)
 {
 	const struct psr_blocks *b = points->blocks;
-	const uint32_t end_of_block = b->attr_first[block] + (uint32_t)__builtin_popcountll(b->mask[block]);
+	const uint32_t end_of_block = psr_blocks_attr_first(b, block) + (uint32_t)__builtin_popcountll(b->mask[block]);
 
-	for (uint32_t first = b->attr_first[block]; first < end_of_block; first += CHUNK) {
+	for (uint32_t first = psr_blocks_attr_first(b, block); first < end_of_block; first += CHUNK) {
 		const uint32_t n = end_of_block - first < CHUNK ? end_of_block - first : CHUNK;
 		int32_t at[CHUNK];
 		float height[CHUNK];

@@ -93,7 +93,7 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 		picture->winner[i] = NOBODY;
 	}
 	for (uint32_t i = 0; i < job->level->n_blocks; i++) {
-		uint32_t block = job->level->block[i], first = b->attr_first[block];
+		uint32_t block = job->level->block[i], first = psr_blocks_attr_first(b, block);
 		uint32_t end = first + (uint32_t)__builtin_popcountll(b->mask[block]);
 
 		for (uint32_t k = first; k < end; k++) {
@@ -133,11 +133,11 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->frame[2][i]);
 	if (cone_culls(b, block, place, eye->is_perspective))
 		return 1;
-	if (b->visibility == NULL)
+	if (b->visibility_mask == NULL)
 		return 0;
 	to_eye_from(eye, p, v);
 	triangle = psr_direction_encode(v) >> 8;
-	return (b->visibility[block][triangle >> 6] >> (triangle & 63) & 1) == 0;
+	return (b->visibility_mask[psr_blocks_visibility(b, block)][triangle >> 6] >> (triangle & 63) & 1) == 0;
 }
 
 /* Whether a ray from the eye, which meets fronts as the eye does, meets nothing before the sample but what is as near
@@ -246,7 +246,7 @@ int visibility_lost(const struct psr_blocks *blocks, const struct ray_scene *sce
 	if (rc == PSR_OK) {
 		for (uint32_t b = 0; b < blocks->n_blocks; b++)
 			for (int i = 0; i < __builtin_popcountll(blocks->mask[b]); i++)
-				block_of[blocks->attr_first[b] + (uint32_t)i] = b;
+				block_of[psr_blocks_attr_first(blocks, b) + (uint32_t)i] = b;
 		job.block_of = block_of;
 		rc = look_at(&job, n_trials, pool, n_lost);
 	}

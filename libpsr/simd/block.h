@@ -20,18 +20,19 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 	const struct psr_blocks *b = in->blocks;
 	const uint32_t block = slot - in->first_slot;
 	const struct warp_lattice *lattice = &in->lattice[b->block_projection[block]];
-	const double scale = (double)(1u << b->level[block]);
+	const double scale = (double)(1u << psr_blocks_level(b, block));
 	const double x = 8 * scale * b->col[block], y = 8 * scale * b->row[block];
-	const double bias = (double)b->depth_bias[block];
-	const float step = b->depth_step[block];
+	const uint32_t first = psr_blocks_attr_first(b, block);
+	float bias, step;
+	psr_blocks_depth(b, block, &bias, &step);
 	for (int a = 0; a < 3; a++) {
-		out->origin[a] = lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + bias * lattice->along[a];
+		out->origin[a] = lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + (double)bias * lattice->along[a];
 		out->unit[a] = (float)lattice->along[a] * step;
 	}
 	out->scale = scale;
 	out->lattice = lattice;
-	out->depth = b->depth + b->attr_first[block];
-	out->attr = b->attr + b->attr_first[block];
+	out->depth = b->depth + first;
+	out->attr = b->attr + first;
 	out->mask = b->mask[block];
 	out->id = slot * PSR_BLOCK_SAMPLES;
 }

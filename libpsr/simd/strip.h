@@ -54,7 +54,7 @@ static void find_attributes(struct strip *strip, const struct strip_view *view, 
 	for (uint32_t i = first; i < end; i++) {
 		const uint32_t block = strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = strip->id[i] % PSR_BLOCK_SAMPLES;
 		const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-		at[i] = b->attr + b->attr_first[block] + __builtin_popcountll(below);
+		at[i] = b->attr + psr_blocks_attr_first(b, block) + __builtin_popcountll(below);
 		__builtin_prefetch(at[i]);
 	}
 	if (view->needs & STRIP_TWO_SIDED)

@@ -108,8 +108,8 @@ static struct result build(const char *source, const char *name, int resolution)
 	r.trials = psr_model_info(model)->n_trials;
 	r.missing = psr_model_info(model)->n_missing;
 	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
-		r.blocks_finest += blocks->level[b] == 0;
-		r.samples_finest += blocks->level[b] == 0 ? (uint64_t)__builtin_popcountll(blocks->mask[b]) : 0;
+		r.blocks_finest += psr_blocks_level(blocks, b) == 0;
+		r.samples_finest += psr_blocks_level(blocks, b) == 0 ? (uint64_t)__builtin_popcountll(blocks->mask[b]) : 0;
 	}
 	psr_model_unref(model);
 	r.bytes_plain = file_bytes(path);

@@ -411,16 +411,19 @@ static void a_part_has_the_blocks_of_level_0_that_are_kept(void **state)
 	assert_int_equal(cull_part(&part, o.model, is_kept, index, NULL), PSR_OK);
 	b = psr_model_blocks(part);
 	assert_null(b->cone_x);
-	assert_null(b->visibility);
+	assert_null(b->visibility_mask);
 	for (uint32_t i = 0; i < all->n_blocks; i++) {
 		size_t n_samples = (size_t)__builtin_popcountll(all->mask[i]);
+		uint32_t from, to;
 
-		if (!is_kept[i] || all->level[i] != 0)
+		if (!is_kept[i] || psr_blocks_level(all, i) != 0)
 			continue;
 		assert_int_equal(index[n], i);
 		assert_true(b->mask[n] == all->mask[i] && b->sphere_x[n] == all->sphere_x[i] && b->row[n] == all->row[i]);
-		assert_memory_equal(b->attr + b->attr_first[n], all->attr + all->attr_first[i], n_samples * sizeof *b->attr);
-		assert_memory_equal(b->depth + b->attr_first[n], all->depth + all->attr_first[i], n_samples * sizeof *b->depth);
+		to = psr_blocks_attr_first(b, n);
+		from = psr_blocks_attr_first(all, i);
+		assert_memory_equal(b->attr + to, all->attr + from, n_samples * sizeof *b->attr);
+		assert_memory_equal(b->depth + to, all->depth + from, n_samples * sizeof *b->depth);
 		n++;
 	}
 	assert_int_equal(b->n_blocks, n);

@@ -1,4 +1,4 @@
-/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks,
+/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks with three visibility masks,
  * two cameras, three lights. */
 #ifndef MODEL_FIXTURE_H
 #define MODEL_FIXTURE_H
@@ -10,6 +10,7 @@
 
 #define FIXTURE_BLOCKS 6
 #define FIXTURE_SAMPLES 143
+#define FIXTURE_MASKS 3
 
 struct fixture {
 	struct psr_model_info info;
@@ -18,14 +19,14 @@ struct fixture {
 	struct psr_cluster cluster[3];
 	int16_t center[3][FIXTURE_BLOCKS];
 	uint16_t radius[FIXTURE_BLOCKS];
-	float depth_bias[FIXTURE_BLOCKS], depth_step[FIXTURE_BLOCKS];
+	struct psr_run run;
 	int8_t cone[3][FIXTURE_BLOCKS];
 	uint8_t cone_sine[FIXTURE_BLOCKS];
-	uint16_t block_projection[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
-	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS];
-	uint8_t level[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
-	uint64_t mask[FIXTURE_BLOCKS], attr[FIXTURE_SAMPLES], visibility[FIXTURE_BLOCKS][2];
-	uint32_t attr_first[FIXTURE_BLOCKS];
+	uint8_t block_projection[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS], depth_shift[FIXTURE_BLOCKS];
+	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS];
+	uint16_t attr_offset[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
+	uint64_t mask[FIXTURE_BLOCKS], attr[FIXTURE_SAMPLES], visibility_mask[FIXTURE_MASKS][2];
+	uint8_t visibility_index[FIXTURE_BLOCKS];
 	struct psr_presets presets; /* points to the arrays below */
 	struct psr_preset_camera camera[2];
 	struct psr_preset_light light[3];
@@ -65,7 +66,6 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 	}
 	memcpy(f->cluster, clusters, sizeof clusters);
 	memcpy(f->mask, masks, sizeof masks);
-	memcpy(f->level, levels, sizeof levels);
 	for (int i = 0; i < FIXTURE_BLOCKS; i++) {
 		for (int k = 0; k < 3; k++)
 			f->center[k][i] = (int16_t)(2048 * (i - 2 + k)); /* eighths */
@@ -73,15 +73,14 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->cone[i % 3][i] = 127;
 		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
 		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
-		f->depth_bias[i] = -0.5f;
-		f->depth_step[i] = 0.0001f;
-		f->block_projection[i] = (uint16_t)(i % 2);
+		f->depth_bias[i] = -8192; /* half a unit */
+		f->depth_shift[i] = 20;
+		f->block_projection[i] = (uint8_t)(i % 2);
 		f->col[i] = (int16_t)(i - 3);
 		f->row[i] = (int16_t)(3 - i);
-		f->flags[i] = i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0;
-		f->attr_first[i] = n;
-		f->visibility[i][0] = fixture_random(&state);
-		f->visibility[i][1] = fixture_random(&state);
+		f->flags[i] = levels[i] | (i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0);
+		f->attr_offset[i] = (uint16_t)n;
+		f->visibility_index[i] = (uint8_t)(i * i % FIXTURE_MASKS);
 		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
 			if (f->mask[i] >> s & 1) {
 				f->depth[n] = (uint16_t)fixture_random(&state);
@@ -89,14 +88,17 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 			}
 		}
 	}
+	for (int i = 0; i < FIXTURE_MASKS; i++)
+		for (int w = 0; w < 2; w++)
+			f->visibility_mask[i][w] = fixture_random(&state);
 	if (n != FIXTURE_SAMPLES)
 		abort();
 	f->blocks = (struct psr_blocks){
 		.n_blocks = FIXTURE_BLOCKS, .n_projections = 2, .n_clusters = 3, .n_levels = 2, .n_samples = FIXTURE_SAMPLES,
-		.projection = f->projection, .cluster = f->cluster,
+		.projection = f->projection, .cluster = f->cluster, .run = &f->run,
 		.sphere_x = f->center[0], .sphere_y = f->center[1], .sphere_z = f->center[2], .sphere_r = f->radius,
-		.block_projection = f->block_projection, .col = f->col, .row = f->row, .level = f->level, .flags = f->flags,
-		.depth_bias = f->depth_bias, .depth_step = f->depth_step, .mask = f->mask, .attr_first = f->attr_first,
+		.block_projection = f->block_projection, .col = f->col, .row = f->row, .flags = f->flags,
+		.depth_bias = f->depth_bias, .depth_shift = f->depth_shift, .mask = f->mask, .attr_offset = f->attr_offset,
 		.depth = f->depth, .attr = f->attr,
 	};
 	if (with_optional) {
@@ -118,7 +120,9 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->blocks.cone_y = f->cone[1];
 		f->blocks.cone_z = f->cone[2];
 		f->blocks.cone_sine = f->cone_sine;
-		f->blocks.visibility = (const uint64_t(*)[2])f->visibility;
+		f->blocks.n_masks = FIXTURE_MASKS;
+		f->blocks.visibility_index = f->visibility_index;
+		f->blocks.visibility_mask = (const uint64_t(*)[2])f->visibility_mask;
 	}
 }
 

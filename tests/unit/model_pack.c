@@ -79,9 +79,13 @@ static struct psr_model *many_blocks(uint32_t n, int noise)
 	struct psr_cluster cluster = { { 0, 0, 0 }, 1, 0, n, 0, 0, { 0 } };
 	void *arrays[N_KNOWN_SECTIONS] = { NULL };
 	struct psr_model *model = NULL;
+	struct psr_run *run = calloc(n / PSR_RUN_BLOCKS + 1, sizeof *run);
 	uint64_t state = 42;
 
 	fixture_init(&f, 0);
+	f.blocks.run = run;
+	for (uint32_t i = 0; i < n; i += PSR_RUN_BLOCKS)
+		run[i / PSR_RUN_BLOCKS].attr_first = i;
 	f.blocks.n_blocks = n;
 	f.blocks.n_samples = n;
 	f.blocks.n_clusters = f.blocks.n_levels = 1;
@@ -96,8 +100,10 @@ static struct psr_model *many_blocks(uint32_t n, int noise)
 		for (uint32_t i = 0; i < n; i++) {
 			if (memcmp(spec->type, "MASK", 4) == 0)
 				((uint64_t *)arrays[k])[i] = 1;
-			else if (memcmp(spec->type, "AFST", 4) == 0)
-				((uint32_t *)arrays[k])[i] = i;
+			else if (memcmp(spec->type, "AOFF", 4) == 0)
+				((uint16_t *)arrays[k])[i] = (uint16_t)(i % PSR_RUN_BLOCKS);
+			else if (memcmp(spec->type, "DSHF", 4) == 0)
+				((uint8_t *)arrays[k])[i] = PSR_DEPTH_SHIFT_MIN;
 			else if (noise && memcmp(spec->type, "DPTH", 4) == 0)
 				((uint16_t *)arrays[k])[i] = (uint16_t)(100 * i + (fixture_random(&state) & 7));
 			else if (noise && memcmp(spec->type, "ATTR", 4) == 0)
@@ -107,6 +113,7 @@ static struct psr_model *many_blocks(uint32_t n, int noise)
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, NULL), PSR_OK);
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
 		free(arrays[k]);
+	free(run);
 	return model;
 }
 
@@ -311,7 +318,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		{ "MASK", 1, PACK_LENGTH, 4, 0, PSR_ERR_FORMAT, "of 48 bytes is packed into 0" },
 		{ "MASK", 1, PACK_LENGTH, 4, UINT32_MAX, PSR_ERR_FORMAT, "of 48 bytes is packed into 4294967295" },
 		{ "INFO", 1, PACK_LENGTH, 4, 20, PSR_ERR_FORMAT, "the chunks end at byte" },
-		{ "BLKS", 1, PACK_METHOD, 1, PACK_STORED, PSR_ERR_FORMAT, "of 32 bytes is packed into" },
+		{ "INFO", 1, PACK_METHOD, 1, PACK_STORED, PSR_ERR_FORMAT, "of 160 bytes is packed into" },
 		{ "INFO", 1, PACK_METHOD, 1, PACK_XOR, PSR_ERR_FORMAT, "section INFO at byte" },
 	};
 

@@ -127,7 +127,7 @@ static const struct violation violations[] = {
 	{ "LGTS", 2 * 168 + 144, 8, D_2, "LGTS: light 2: half angles 2 and 0.5" },
 	{ "BLKS", 0, 4, 0, "BLKS: 143 samples do not fit 0 blocks" },
 	{ "BLKS", 0, 4, 5, "SPHX at byte" },
-	{ "BLKS", 0, 4, UINT32_MAX, "SPHX at byte" },
+	{ "BLKS", 0, 4, UINT32_MAX, "RUNS at byte" },
 	{ "BLKS", 4, 4, 0, "PROJ at byte" },
 	{ "BLKS", 4, 4, UINT32_MAX, "PROJ at byte" },
 	{ "BLKS", 8, 4, 4, "CLUS at byte" },
@@ -136,7 +136,8 @@ static const struct violation violations[] = {
 	{ "BLKS", 12, 4, 1, "CLUS: cluster 2 is of level 1 of 1" },
 	{ "BLKS", 16, 8, 142, "DPTH at byte" },
 	{ "BLKS", 16, 8, UINT64_MAX / 8 + 144, "BLKS: 2305843009213694095 samples do not fit 6 blocks" },
-	{ "BLKS", 24, 1, 1, "BLKS: reserved bytes are not zero" },
+	{ "BLKS", 24, 4, 2, "VISM at byte" },
+	{ "BLKS", 28, 1, 1, "BLKS: reserved bytes are not zero" },
 	{ "PROJ", 0, 4, F_NAN, "PROJ: the axes of projection 0 are not orthonormal" },
 	{ "PROJ", 0, 4, F_1_01, "PROJ: the axes of projection 0 are not orthonormal" },
 	{ "PROJ", 44, 4, 0x3c23d70a, "PROJ: the axes of projection 1 are not orthonormal" }, /* 0.01 beside (0, 1, 0) */
@@ -157,18 +158,22 @@ static const struct violation violations[] = {
 	{ "CLUS", 56, 4, 0, "CLUS: cluster 1 is the second of group 0 at level 0" },
 	{ "CLUS", 28, 1, 2, "CLUS: cluster 0 is of level 2 of 2" },
 	{ "CLUS", 29, 1, 1, "CLUS: reserved bytes of cluster 0 are not zero" },
-	{ "BLVL", 1, 1, 1, "BLVL: block 1 is of level 1, and its cluster 0 of level 0" },
-	{ "BLVL", 5, 1, 200, "BLVL: block 5 is of level 200, and its cluster 2 of level 1" },
-	{ "BPRJ", 6, 2, 2, "BPRJ: block 3 is of projection 2 of 2" },
-	{ "BFLG", 2, 1, 2, "BFLG: block 2 has unknown flags 0x2" },
-	{ "DBIA", 8, 4, F_NAN, "DBIA: the depth of block 2 begins at nan" },
-	{ "DSTP", 8, 4, F_MINUS_1, "DSTP: the depth step of block 2 is -1" },
-	{ "DSTP", 8, 4, F_INF, "DSTP: the depth step of block 2 is inf" },
+	{ "RUNS", 0, 4, 1, "RUNS: the attributes of run 0 begin at 1 instead of 0" },
+	{ "RUNS", 4, 4, 4, "RUNS: the visibility masks of run 0 begin at 4 of 3" },
+	{ "RUNS", 4, 4, 3, "VISI: block 0 has visibility mask 3 of 3" },
+	{ "VISI", 4, 1, 3, "VISI: block 4 has visibility mask 3 of 3" },
+	{ "BPRJ", 3, 1, 2, "BPRJ: block 3 is of projection 2 of 2" },
+	{ "BFLG", 1, 1, 1, "BFLG: block 1 is of level 1, and its cluster 0 of level 0" },
+	{ "BFLG", 5, 1, 31, "BFLG: block 5 is of level 31, and its cluster 2 of level 1" },
+	{ "BFLG", 2, 1, 64, "BFLG: block 2 has unknown flags 0x40" },
+	{ "BFLG", 2, 1, 128, "BFLG: block 2 has unknown flags 0x80" },
+	{ "DSHF", 2, 1, 13, "DSHF: the depth step of block 2 is 2^-13; it must be 2^-14 to 2^-30" },
+	{ "DSHF", 2, 1, 31, "DSHF: the depth step of block 2 is 2^-31; it must be 2^-14 to 2^-30" },
 	{ "MASK", 24, 8, 0, "MASK: block 3 has no valid sample" },
-	{ "MASK", 24, 8, 1, "AFST: the attributes of block 4 begin at 99 instead of 98" },
+	{ "MASK", 24, 8, 1, "AOFF: the attributes of block 4 begin at 99 instead of 98" },
 	{ "MASK", 40, 8, UINT64_MAX, "MASK: 171 samples are valid, and BLKS counts 143" },
-	{ "AFST", 0, 4, 1, "AFST: the attributes of block 0 begin at 1 instead of 0" },
-	{ "AFST", 20, 4, UINT32_MAX, "AFST: the attributes of block 5 begin at 4294967295 instead of 107" },
+	{ "AOFF", 0, 2, 1, "AOFF: the attributes of block 0 begin at 1 instead of 0" },
+	{ "AOFF", 10, 2, UINT16_MAX, "AOFF: the attributes of block 5 begin at 65535 instead of 107" },
 	{ "CONX", 0, 1, 126, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 126 instead of 127" },
 	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
 	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
@@ -203,7 +208,9 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "SPHX", 0, 2, 0x8000, NULL },         /* center -2 */
 		{ "SPHR", 0, 2, 0xffff, NULL },
 		{ "SPHR", 0, 2, 0, NULL },
-		{ "DSTP", 0, 4, 0, NULL },              /* flat */
+		{ "DBIA", 0, 2, 0x8000, NULL },         /* depth -2 */
+		{ "DSHF", 0, 1, 14, NULL },
+		{ "DSHF", 0, 1, 30, NULL },
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
 	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
 	{ "CAMS", 1, 4, 0xbfbf8ff4, NULL },     /* U+10FFFF, the last one */
@@ -234,16 +241,16 @@ static void versions_are_refused_by_major_and_section(void **state)
 	file_put(bytes + HEADER_MINOR, 2, 7);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
 	bytes = copy_original();
-	file_put(bytes + HEADER_MAJOR, 2, 1);
+	file_put(bytes + HEADER_MAJOR, 2, 2);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 1.0, and this build reads 2.x"));
+	assert_non_null(strstr(err.text, "the file has format 2.0, and this build reads 3.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
 	assert_non_null(strstr(err.text, "required section DPTH, version 9, at byte"));
 	assert_non_null(strstr(err.text, "a newer psr may"));
 	bytes = copy_original();
-	file_put(entry_of(bytes, "VISM") + ENTRY_VERSION, 2, 2);
+	file_put(entry_of(bytes, "CAMS") + ENTRY_VERSION, 2, 2);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
 }
 
@@ -254,54 +261,52 @@ static void unknown_sections_are_skipped_if_optional_and_named_if_required(void 
 	struct psr_error err;
 
 	(void)state;
-	memcpy(entry_of(bytes, "VISM"), "NEWS", 4);
+	memcpy(entry_of(bytes, "LGTS"), "NEWS", 4);
 	file_seal(bytes, n_bytes);
 	assert_int_equal(psr_model_parse(&model, bytes, n_bytes, &err), PSR_OK);
-	assert_null(psr_model_blocks(model)->visibility);
-	assert_non_null(psr_model_blocks(model)->cone_x);
+	assert_int_equal(psr_model_presets(model)->n_lights, 0);
+	assert_int_equal(psr_model_presets(model)->n_cameras, 2);
 	psr_model_unref(model);
 	file_put(entry_of(bytes, "NEWS") + ENTRY_FLAGS, 2, ENTRY_REQUIRED);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_UNSUPPORTED);
 	assert_non_null(strstr(err.text, "required section NEWS, version 1, at byte"));
 }
 
-/* Before spheres had eight bytes, they were floats: what holds them has to be built again, and is told so. */
-static void spheres_of_version_1_are_refused_as_an_older_psr_s(void **state)
+static void masks_need_their_indices_and_their_number(void **state)
 {
-	static const char *const types[4] = { "SPHX", "SPHY", "SPHZ", "SPHR" };
-
-	(void)state;
-	for (int k = 0; k < 4; k++) {
-		uint8_t *bytes = copy_original();
-		struct psr_error err = { .text = "" };
-
-		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
-		assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-		assert_non_null(strstr(err.text, types[k]));
-		assert_non_null(strstr(err.text, "version 1, at byte"));
-		assert_non_null(strstr(err.text, "it is an older psr's, and the model has to be built again"));
-	}
-}
-
-/* Models of before cones had four bytes open, and are drawn without culling by them. */
-static void cones_of_version_1_are_skipped(void **state)
-{
-	static const char *const types[3] = { "CONX", "CONY", "CONZ" };
-	uint8_t *bytes = copy_original();
 	struct psr_model *model = NULL;
 	struct psr_error err;
+	struct fixture f;
 
 	(void)state;
-	for (int k = 0; k < 3; k++)
-		file_put(entry_of(bytes, types[k]) + ENTRY_VERSION, 2, 1);
-	memcpy(entry_of(bytes, "CONS"), "CONC", 4);
-	file_seal(bytes, n_bytes);
-	assert_int_equal(psr_model_parse(&model, bytes, n_bytes, &err), PSR_OK);
-	assert_null(psr_model_blocks(model)->cone_x);
-	assert_null(psr_model_blocks(model)->cone_sine);
-	assert_non_null(psr_model_blocks(model)->visibility);
-	psr_model_unref(model);
-	free(bytes);
+	for (int i = 0; i < 3; i++) {
+		uint8_t *bytes = copy_original();
+
+		if (i < 2)
+			memcpy(entry_of(bytes, i == 0 ? "VISI" : "VISM"), "GONE", 4);
+		else
+			file_put(bytes + file_get(entry_of(bytes, "BLKS") + ENTRY_OFFSET, 8) + 24, 4, 0);
+		assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_FORMAT);
+		assert_non_null(strstr(err.text, i < 2 ? "of the sections VISI and VISM" : "section VISM at byte"));
+		fixture_init(&f, 1);
+		if (i == 0)
+			f.blocks.visibility_index = NULL;
+		else if (i == 1)
+			f.blocks.visibility_mask = NULL;
+		else
+			f.blocks.n_masks = 0;
+		assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
+		assert_non_null(strstr(err.text, "only some are there"));
+	}
+	fixture_init(&f, 1);
+	f.run.visibility_first = 1;
+	f.visibility_index[5] = FIXTURE_MASKS - 1;
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
+	fixture_init(&f, 0);
+	f.run.visibility_first = 1;
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "RUNS: the visibility masks of run 0 begin at 1 of 0"));
+	assert_null(model);
 }
 
 static void every_required_section_is_missed(void **state)
@@ -314,8 +319,8 @@ static void every_required_section_is_missed(void **state)
 
 		file_put(entry_of(bytes, section_table[k].type) + ENTRY_FLAGS, 2, 0);
 		memcpy(entry_of(bytes, section_table[k].type), "GONE", 4);
-		/* Of the optional ones a cone needs its four parts; the others stand for themselves. */
-		if (strcmp(section_table[k].type, "VISM") == 0 || k == SECTION_CAMERAS || k == SECTION_LIGHTS)
+		/* Of the optional ones a cone needs its four parts, a mask both; the others stand for themselves. */
+		if (k == SECTION_CAMERAS || k == SECTION_LIGHTS)
 			expected = PSR_OK;
 		assert_int_equal(parse_sealed(bytes, n_bytes, &err), expected);
 		if (section_table[k].flags & ENTRY_REQUIRED)
@@ -340,8 +345,8 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 896 has 160 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "5120 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 960 has 160 bytes, which reach beyond the file's end" },
+		{ NULL, 28, 4, 1, "5184 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },
@@ -414,7 +419,7 @@ static void create_refuses_what_a_file_may_not_hold(void **state)
 	fixture_init(&f, 0);
 	f.blocks.n_projections = 0;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
-	assert_non_null(strstr(err.text, "0 projections; it must be 1 to 65536"));
+	assert_non_null(strstr(err.text, "0 projections; it must be 1 to 256"));
 	fixture_init(&f, 0);
 	f.blocks.n_clusters = 0;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
@@ -429,8 +434,7 @@ int main(void)
 		cmocka_unit_test(values_at_the_edge_of_a_rule_are_taken),
 		cmocka_unit_test(versions_are_refused_by_major_and_section),
 		cmocka_unit_test(unknown_sections_are_skipped_if_optional_and_named_if_required),
-		cmocka_unit_test(spheres_of_version_1_are_refused_as_an_older_psr_s),
-		cmocka_unit_test(cones_of_version_1_are_skipped),
+		cmocka_unit_test(masks_need_their_indices_and_their_number),
 		cmocka_unit_test(every_required_section_is_missed),
 		cmocka_unit_test(lies_in_header_and_table_are_refused),
 		cmocka_unit_test(stray_bytes_between_sections_are_refused),

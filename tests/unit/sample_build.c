@@ -44,10 +44,13 @@ static void sample_at(const struct psr_blocks *b, uint32_t block, unsigned s, fl
 {
 	const struct psr_projection *p = &b->projection[b->block_projection[block]];
 	int row = 8 * b->row[block] + (int)s / 8, col = 8 * b->col[block] + (int)s % 8;
-	double spacing = (double)p->spacing * (double)(1u << b->level[block]);
+	double spacing = (double)p->spacing * (double)(1u << psr_blocks_level(b, block));
 	double x = (col + (row & 1) / 2.0) * spacing, y = row * (sqrt(3.0) / 2) * spacing;
 	uint64_t below = b->mask[block] & (((uint64_t)1 << s) - 1);
-	double z = (double)(b->depth_bias[block] + b->depth_step[block] * (float)b->depth[b->attr_first[block] + __builtin_popcountll(below)]);
+	float bias, step;
+
+	psr_blocks_depth(b, block, &bias, &step);
+	double z = (double)(bias + step * (float)b->depth[psr_blocks_attr_first(b, block) + (uint32_t)__builtin_popcountll(below)]);
 
 	for (int k = 0; k < 3; k++)
 		position[k] = (float)(x * (double)p->axis[0][k] + y * (double)p->axis[1][k] + z * (double)p->axis[2][k]);
@@ -81,7 +84,7 @@ static void samples_lie_on_the_surface(void **state)
 	assert_float_equal(psr_model_info(model)->scale, 3, 1e-5);
 	assert_float_equal(psr_model_info(model)->spacing, 2.0 / 128 * 3, 1e-6);
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		const uint64_t *attr = b->attr + b->attr_first[i];
+		const uint64_t *attr = b->attr + psr_blocks_attr_first(b, i);
 
 		for (uint64_t left = b->mask[i]; left != 0; left &= left - 1, attr++) {
 			float p[3];
@@ -141,7 +144,7 @@ static void check_spheres(const struct psr_blocks *b)
 
 		assert_in_range(cluster->n_blocks, 1, cluster->level == 0 ? 1024 : 16384);
 		for (uint32_t i = cluster->first_block; i < cluster->first_block + cluster->n_blocks; i++) {
-			double middle[3], reach, half_step = (double)b->projection[0].spacing * (double)(1 << b->level[i]) / 2;
+			double middle[3], reach, half_step = (double)b->projection[0].spacing * (double)(1 << psr_blocks_level(b, i)) / 2;
 			float center[3], radius, d[3];
 
 			psr_blocks_sphere(b, i, center, &radius);
@@ -206,7 +209,7 @@ static void count_missing(const struct psr_mesh *mesh, const struct psr_model *m
 		is_met[i] = hit.prim != RAY_NONE;
 	}
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
-		const uint64_t *attr = b->attr + b->attr_first[i];
+		const uint64_t *attr = b->attr + psr_blocks_attr_first(b, i);
 
 		for (uint64_t left = b->mask[i]; left != 0; left &= left - 1, attr++) {
 			const float *n = normal[PSR_ATTR_NORMAL(*attr)];
@@ -267,7 +270,7 @@ static uint32_t count_two_sided(const struct psr_model *model)
 	uint32_t n = 0;
 
 	for (uint32_t i = 0; i < b->n_blocks; i++)
-		n += b->flags[i] & PSR_BLOCK_TWO_SIDED;
+		n += (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0;
 	return n;
 }
 

@@ -40,15 +40,17 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 	for (uint32_t c = 0; c < b->n_clusters; c++) {
 		for (uint32_t i = b->cluster[c].first_block; i < b->cluster[c].first_block + b->cluster[c].n_blocks; i++) {
 			const struct psr_projection *projection = &b->projection[b->block_projection[i]];
-			double spacing = (double)projection->spacing * (double)(1u << b->level[i]), inner[3];
-			uint32_t k = b->attr_first[i];
+			double spacing = (double)projection->spacing * (double)(1u << psr_blocks_level(b, i)), inner[3];
+			uint32_t k = psr_blocks_attr_first(b, i);
+			float bias, step;
 
+			psr_blocks_depth(b, i, &bias, &step);
 			for (uint64_t left = b->mask[i]; left != 0; left &= left - 1, k++, out++) {
 				int s = __builtin_ctzll(left);
-				float z = b->depth_bias[i] + b->depth_step[i] * (float)b->depth[k];
+				float z = bias + step * (float)b->depth[k];
 
-				*out = (struct model_sample){ .group = b->cluster[c].group, .level = b->level[i],
-					                          .two_sided = b->flags[i] & PSR_BLOCK_TWO_SIDED,
+				*out = (struct model_sample){ .group = b->cluster[c].group, .level = (uint8_t)psr_blocks_level(b, i),
+					                          .two_sided = (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0,
 					                          .projection = b->block_projection[i], .row = 8 * b->row[i] + s / 8,
 					                          .col = 8 * b->col[i] + s % 8, .attr = b->attr[k] };
 				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,

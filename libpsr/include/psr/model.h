@@ -28,34 +28,45 @@ struct psr_projection {
 };
 
 enum psr_block_flag {
-	PSR_BLOCK_TWO_SIDED = 1, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
+	PSR_BLOCK_LEVEL = 31, /* these bits are the level, 0 the finest */
+	PSR_BLOCK_TWO_SIDED = 32, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
+};
+
+/* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */
+#define PSR_RUN_BLOCKS 1024
+
+struct psr_run {
+	uint32_t attr_first;       /* of the first block */
+	uint32_t visibility_first; /* 0 in a model without visibility masks */
 };
 
 #define PSR_CONE_ANY 255
 
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice
  * origin is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth
- * along z is depth_bias + depth_step * (float)depth[k], its attributes are attr[k], with k = attr_first[b] + number of
- * lower set bits. Blocks of one cluster follow each other, and clusters are in the order of their blocks, without
- * gaps.
+ * along z is bias + step * (float)depth[k] (psr_blocks_depth()), its attributes are attr[k], with k =
+ * psr_blocks_attr_first() + number of lower set bits. Blocks of one cluster follow each other, and clusters are in the
+ * order of their blocks, without gaps.
  *
  * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a
  * model are finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most
- * 2^26 blocks, 65,536 projections, 32 levels. */
+ * 2^26 blocks, 256 projections, 32 levels. */
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
+	uint32_t n_masks;                       /* length of visibility_mask, at most n_blocks; 0 without */
 	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr and depth */
 	const struct psr_projection *projection;
 	const struct psr_cluster *cluster;
+	const struct psr_run *run;              /* psr_blocks_runs() of them */
 	const int16_t *sphere_x, *sphere_y, *sphere_z; /* see psr_blocks_sphere() */
 	const uint16_t *sphere_r;
-	const uint16_t *block_projection;
+	const uint8_t *block_projection;
 	const int16_t *col, *row;               /* in blocks */
-	const uint8_t *level;                   /* 0 is the finest */
 	const uint8_t *flags;                   /* enum psr_block_flag */
-	const float *depth_bias, *depth_step;
+	const int16_t *depth_bias;              /* see psr_blocks_depth() */
+	const uint8_t *depth_shift;
 	const uint64_t *mask;                   /* never 0 */
-	const uint32_t *attr_first;
+	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
 	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block, its faces' and its samples', are within
@@ -63,8 +74,40 @@ struct psr_blocks {
 	 * magnitude of these is 127. */
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
-	const uint64_t (*visibility)[2];        /* 128 bits, one a triangle of directions */
+	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
+	const uint64_t (*visibility_mask)[2];   /* 128 bits, one a triangle of directions; many blocks share one */
 };
+
+static inline uint32_t psr_blocks_runs(const struct psr_blocks *blocks)
+{
+	return blocks->n_blocks / PSR_RUN_BLOCKS + (blocks->n_blocks % PSR_RUN_BLOCKS != 0);
+}
+
+static inline unsigned psr_blocks_level(const struct psr_blocks *blocks, uint32_t block)
+{
+	return blocks->flags[block] & PSR_BLOCK_LEVEL;
+}
+
+/* Index of a block's first sample. */
+static inline uint32_t psr_blocks_attr_first(const struct psr_blocks *blocks, uint32_t block)
+{
+	return blocks->run[block / PSR_RUN_BLOCKS].attr_first + blocks->attr_offset[block];
+}
+
+/* Index in visibility_mask of a block's mask, in a model that has them. */
+static inline uint32_t psr_blocks_visibility(const struct psr_blocks *blocks, uint32_t block)
+{
+	return blocks->run[block / PSR_RUN_BLOCKS].visibility_first + blocks->visibility_index[block];
+}
+
+/* Where the depths of a block begin, depth_bias / 2^14, and their step, 2^-depth_shift, in inner units. All are exact. */
+#define PSR_DEPTH_SHIFT_MIN 14
+#define PSR_DEPTH_SHIFT_MAX 30
+static inline void psr_blocks_depth(const struct psr_blocks *blocks, uint32_t block, float *bias, float *step)
+{
+	*bias = (float)blocks->depth_bias[block] * (1.0f / 16384);
+	*step = 1.0f / (float)(1u << blocks->depth_shift[block]);
+}
 
 /* The sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x, sphere_y,
  * sphere_z) / 2^14, its radius sphere_r / 2^15, in inner units. All are exact. */

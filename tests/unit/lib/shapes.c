@@ -8,15 +8,12 @@
 
 struct arrays {
 	uint32_t n_blocks, n_samples;
-	float *bias, *step;
-	int16_t *center[3];
-	uint16_t *radius;
+	struct psr_run *run;
+	int16_t *center[3], *col, *row, *bias;
+	uint16_t *radius, *offset, *depth;
 	int8_t *cone[3];
-	uint16_t *projection, *depth;
-	int16_t *col, *row;
-	uint8_t *level, *flags, *cone_sine;
+	uint8_t *projection, *flags, *cone_sine, *shift;
 	uint64_t *mask, *attr;
-	uint32_t *first;
 };
 
 struct sample {
@@ -81,15 +78,15 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	}
 	a->radius = grow(a->radius, a->n_blocks, 2);
 	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
-	a->bias = grow(a->bias, a->n_blocks, sizeof(float));
-	a->step = grow(a->step, a->n_blocks, sizeof(float));
-	a->projection = grow(a->projection, a->n_blocks, 2);
+	a->bias = grow(a->bias, a->n_blocks, 2);
+	a->shift = grow(a->shift, a->n_blocks, 1);
+	a->projection = grow(a->projection, a->n_blocks, 1);
 	a->col = grow(a->col, a->n_blocks, 2);
 	a->row = grow(a->row, a->n_blocks, 2);
-	a->level = grow(a->level, a->n_blocks, 1);
 	a->flags = grow(a->flags, a->n_blocks, 1);
 	a->mask = grow(a->mask, a->n_blocks, 8);
-	a->first = grow(a->first, a->n_blocks, 4);
+	a->offset = grow(a->offset, a->n_blocks, 2);
+	a->run = grow(a->run, b / PSR_RUN_BLOCKS + 1, sizeof *a->run);
 	a->attr = grow(a->attr, a->n_samples + 64, 8);
 	a->depth = grow(a->depth, a->n_samples + 64, 2);
 
@@ -116,21 +113,23 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 			least = fmin(least, v3d_dot(mean, s[i].normal));
 	least = fmax(0, least - 1e-6);
 	a->cone_sine[b] = (uint8_t)ceil(sqrt(1 - least * least) * 255);
-	a->bias[b] = (float)low;
-	a->step[b] = (float)((high - low) / 65535);
-	a->projection[b] = (uint16_t)p;
+	a->bias[b] = (int16_t)floor(low * 0x1p14);
+	low = a->bias[b] * 0x1p-14;
+	a->shift[b] = PSR_DEPTH_SHIFT_MAX;
+	while ((high - low) * (double)(1u << a->shift[b]) > 65535)
+		a->shift[b]--;
+	a->projection[b] = (uint8_t)p;
 	a->col[b] = (int16_t)col;
 	a->row[b] = (int16_t)row;
-	a->level[b] = 0;
 	a->flags[b] = o->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
 	a->mask[b] = mask;
-	a->first[b] = a->n_samples;
+	if (b % PSR_RUN_BLOCKS == 0)
+		a->run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = a->n_samples };
+	a->offset[b] = (uint16_t)(a->n_samples - a->run[b / PSR_RUN_BLOCKS].attr_first);
 	for (int i = 0; i < 64; i++) {
 		if (!s[i].valid)
 			continue;
-		a->depth[a->n_samples] = 0;
-		if (a->step[b] > 0)
-			a->depth[a->n_samples] = (uint16_t)fmin(65535, (s[i].depth - low) / a->step[b] + 0.5);
+		a->depth[a->n_samples] = (uint16_t)((s[i].depth - low) * (double)(1u << a->shift[b]) + 0.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
 		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 | (uint64_t)o->diffuse << 16 |
 		                          (uint64_t)o->specular << 40 | (uint64_t)o->exponent << 56;
@@ -158,10 +157,10 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	struct psr_cluster cluster = { .center = { 0, 0, 0 }, .radius = 1.5f, .n_blocks = a.n_blocks };
 	struct psr_blocks blocks = {
 		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
-		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster,
+		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster, .run = a.run,
 		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
-		.block_projection = a.projection, .col = a.col, .row = a.row, .level = a.level, .flags = a.flags,
-		.depth_bias = a.bias, .depth_step = a.step, .mask = a.mask, .attr_first = a.first, .depth = a.depth, .attr = a.attr,
+		.block_projection = a.projection, .col = a.col, .row = a.row, .flags = a.flags, .depth_bias = a.bias,
+		.depth_shift = a.shift, .mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
 	};
 	if (o->cones) {
 		blocks.cone_x = a.cone[0];
@@ -188,7 +187,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	}
 	free(a.radius);
 	free(a.cone_sine);
-	free(a.bias); free(a.step); free(a.projection); free(a.depth); free(a.col); free(a.row);
-	free(a.level); free(a.flags); free(a.mask); free(a.first); free(a.attr);
+	free(a.bias); free(a.shift); free(a.projection); free(a.depth); free(a.col); free(a.row);
+	free(a.run); free(a.flags); free(a.mask); free(a.offset); free(a.attr);
 	return model;
 }
