@@ -32,13 +32,6 @@ static inline uint64_t block_attr(const struct psr_blocks *b, uint32_t block, ui
 	return b->attr[block_index(b, block, sample)];
 }
 
-/* From a position to the eye; of any length. */
-static inline void to_eye(const struct plan *plan, const struct plan_instance *in, const float p[3], float v[3])
-{
-	for (int k = 0; k < 3; k++)
-		v[k] = plan->perspective ? in->eye[k] - p[k] : in->eye[k];
-}
-
 /* Whether a normal whose product with the vector v to the eye is g faces away, as the warp has it. */
 static inline int faces_away(float g, const float v[3])
 {

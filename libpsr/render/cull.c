@@ -24,6 +24,7 @@ struct cull_hit {
 
 struct cull {
 	struct bins *bins;
+	const struct simd *simd;
 	const struct plan *plan;
 	uint32_t n_chunks, n_tiles;
 };
@@ -79,91 +80,36 @@ static inline float stretch(const struct plan *plan, const float c[3], float r)
 	return plan->focal * distance / (z * z);
 }
 
-/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding
- * does not double the cells of a picture drawn at just the magnification that a level is made for. */
-static inline uint32_t level_for(float pixels)
+/* Whether samples at this distance in pixels need no depth buffer but the picture's, as the kernel has it. */
+static inline int fits_pixel(float pixels)
 {
-	uint32_t bits = psr_bits_from_float(pixels * (1 - 0x1p-12f));
-	if (bits <= psr_bits_from_float(1.0f))
-		return 0;
-	return (bits >> 23) - 127 + ((bits & 0x7fffff) != 0);
+	return pixels * (1 - 0x1p-12f) <= 1;
 }
 
-enum facing { FACES_AWAY, IS_MIXED, FACES_EYE };
-
-/* How a block faces, by its visibility cone ([G] 6.4). With d from the eye to the sphere's centre, g = a . d for
- * the cone's axis a, a normal n within alpha of it and a sample x within r of the centre, n . (x - eye) is between
- * |d| cos(angle(a, d) + alpha) - r >= g - |d| (sin alpha + 1 - cos alpha) - r and g + |d| (sin alpha + 1 - cos
- * alpha) + r. A thousandth makes up for rounding. */
-static enum facing facing_of(const struct plan *plan, const struct plan_instance *in, uint32_t block,
-                             const float center[3], float radius)
+/* Takes over what a batch says of its blocks. */
+static struct cull_hit *take_batch(struct cull_chunk *chunk, const struct cull_batch *batch, const struct plan_instance *in,
+                                   uint32_t first, uint32_t n, struct cull_hit *hit)
 {
-	const struct psr_blocks *b = in->blocks;
-	if (b->flags[block] & PSR_BLOCK_TWO_SIDED)
-		return FACES_EYE;
-	if (!b->cone_sine || b->cone_sine[block] == PSR_CONE_ANY)
-		return IS_MIXED;
-	const float axis[3] = { b->cone_x[block], b->cone_y[block], b->cone_z[block] };
-	float g = 0, length2 = 0, axis2 = 0;
-	for (int k = 0; k < 3; k++) {
-		float d = plan->perspective ? center[k] - in->eye[k] : -in->eye[k];
-		g += d * axis[k];
-		length2 += d * d;
-		axis2 += axis[k] * axis[k];
+	const struct psr_blocks *b = in->cull.blocks;
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t block = first + i;
+		if (!batch->is_left[i])
+			continue;
+		const int is_clamped = batch->level[i] > PSR_MAX_DEPTH_LEVEL;
+		*hit++ = (struct cull_hit){
+			.slot = in->first_slot + block, .level = is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i],
+			.is_mixed = batch->is_mixed[i],
+			.tile_x0 = batch->tile_x0[i], .tile_x1 = batch->tile_x1[i],
+			.tile_y0 = batch->tile_y0[i], .tile_y1 = batch->tile_y1[i],
+		};
+		chunk->levels |= 1u << hit[-1].level;
+		chunk->n_clamped += (uint32_t)is_clamped;
+		chunk->flags |= b->flags[block];
+		chunk->n_samples += (uint32_t)__builtin_popcountll(b->mask[block]);
+		if (batch->depth_error[i] > chunk->depth_error)
+			chunk->depth_error = batch->depth_error[i];
 	}
-	g /= __builtin_sqrtf(axis2);
-	const float sin_alpha = (float)b->cone_sine[block] / 255, spread = sin_alpha + 0.001f;
-	const float length = __builtin_sqrtf(length2), r = plan->perspective ? radius : 0;
-	if (g > (spread + BACK_SINE) * length + r * (1 + BACK_SINE))
-		return FACES_AWAY;
-	const float cos_alpha = __builtin_sqrtf(1 - sin_alpha * sin_alpha);
-	return g + (spread + 1 - cos_alpha) * length + r <= BACK_SINE * (length - r) ? FACES_EYE : IS_MIXED;
-}
-
-static inline uint8_t tile_of(float pixel, uint32_t size, uint32_t n_tiles)
-{
-	uint32_t tile = pixel > 0 ? (uint32_t)(pixel < PSR_MAX_SIDE ? pixel : PSR_MAX_SIDE) / size : 0;
-	return (uint8_t)(tile < n_tiles ? tile : n_tiles - 1);
-}
-
-static int cull_block(const struct plan *plan, const struct plan_instance *in, uint32_t block, struct cull_chunk *chunk,
-                      struct cull_hit *hit)
-{
-	const struct psr_blocks *b = in->blocks;
-	float center[3], radius, depth_bias, depth_step;
-	psr_blocks_sphere(b, block, center, &radius);
-	const enum facing facing = facing_of(plan, in, block, center, radius);
-	if (facing == FACES_AWAY)
-		return 0;
-	float x = center[0], y = center[1], z = center[2], r = radius * in->scale;
-	float c[3] = { to_camera(in->center_m[0], x, y, z), to_camera(in->center_m[1], x, y, z),
-		           to_camera(in->center_m[2], x, y, z) };
-	float s = stretch(plan, c, r);
-	uint32_t level = level_for(s * in->spacing * (float)(1u << psr_blocks_level(b, block)));
-	int clamped = level > PSR_MAX_DEPTH_LEVEL;
-	if (clamped)
-		level = PSR_MAX_DEPTH_LEVEL;
-	struct extent e;
-	if (!sphere_extent(plan, c, r, (float)(1 << level), &e))
-		return 0;
-	hit->slot = in->first_slot + block;
-	hit->level = (uint8_t)level;
-	hit->is_mixed = facing == IS_MIXED;
-	hit->tile_x0 = tile_of(e.x0, TILE_WIDTH, plan->tiles_x);
-	hit->tile_x1 = tile_of(e.x1, TILE_WIDTH, plan->tiles_x);
-	hit->tile_y0 = tile_of(e.y0, TILE_HEIGHT, plan->tiles_y);
-	hit->tile_y1 = tile_of(e.y1, TILE_HEIGHT, plan->tiles_y);
-	chunk->levels |= 1u << level;
-	chunk->flags |= b->flags[block];
-	chunk->n_clamped += (uint32_t)clamped;
-	/* As many as the mask has bits, without counting them. */
-	const uint64_t end = block + 1 < b->n_blocks ? psr_blocks_attr_first(b, block + 1) : b->n_samples;
-	chunk->n_samples += end - psr_blocks_attr_first(b, block);
-	psr_blocks_depth(b, block, &depth_bias, &depth_step);
-	float error = s * depth_step * in->scale / 2;
-	if (error > chunk->depth_error)
-		chunk->depth_error = error;
-	return 1;
+	return hit;
 }
 
 static struct cluster_view {
@@ -172,8 +118,8 @@ static struct cluster_view {
 {
 	struct cluster_view v;
 	for (int a = 0; a < 3; a++)
-		v.c[a] = to_camera(in->center_m[a], k->center[0], k->center[1], k->center[2]);
-	v.r = k->radius * in->scale;
+		v.c[a] = to_camera(in->cull.center_m[a], k->center[0], k->center[1], k->center[2]);
+	v.r = k->radius * in->cull.scale;
 	return v;
 }
 
@@ -181,7 +127,7 @@ static struct cluster_view {
 static uint32_t score_of(const struct plan_instance *in, const struct psr_cluster *k, float group_stretch)
 {
 	const uint32_t max_levels = 32;
-	int fits = level_for(group_stretch * in->spacing * (float)(1u << k->level)) == 0;
+	int fits = fits_pixel(group_stretch * in->cull.spacing * (float)(1u << k->level));
 	return fits ? max_levels + k->level : max_levels - 1 - k->level;
 }
 
@@ -190,7 +136,7 @@ static void choose_levels(struct bins *bins, const struct plan *plan)
 {
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct plan_instance *in = &plan->instance[i];
-		const struct psr_blocks *b = in->blocks;
+		const struct psr_blocks *b = in->cull.blocks;
 		struct cull_group *group = bins->group + in->first_group;
 		if (b->n_levels == 1)
 			continue;
@@ -211,7 +157,7 @@ static void choose_levels(struct bins *bins, const struct plan *plan)
 
 static int is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
 {
-	if (in->blocks->n_levels == 1)
+	if (in->cull.blocks->n_levels == 1)
 		return 1;
 	const struct cull_group *g = &bins->group[in->first_group + k->group];
 	return score_of(in, k, g->stretch) == g->score;
@@ -230,21 +176,23 @@ static void count_chunk(int i, void *userdata)
 
 	memset(count, 0, cull->n_tiles * sizeof *count);
 	for (uint32_t k = 0; k < chunk->n_clusters; k++) {
-		const struct psr_cluster *cluster = &in->blocks->cluster[chunk->first_cluster + k];
+		const struct psr_cluster *cluster = &in->cull.blocks->cluster[chunk->first_cluster + k];
 		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
 		if (!is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk->n_tested += cluster->n_blocks;
-		for (uint32_t b = 0; b < cluster->n_blocks; b++) {
-			if (!cull_block(plan, in, cluster->first_block + b, chunk, hit))
-				continue;
-			for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
-				for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-					count[y * plan->tiles_x + x]++;
-			hit++;
+		for (uint32_t at = 0; at < cluster->n_blocks; at += CULL_BATCH) {
+			const uint32_t n = cluster->n_blocks - at < CULL_BATCH ? cluster->n_blocks - at : CULL_BATCH;
+			struct cull_batch batch;
+			cull->simd->cull(&batch, &in->cull, cluster->first_block + at, n);
+			hit = take_batch(chunk, &batch, in, cluster->first_block + at, n, hit);
 		}
 	}
+	for (const struct cull_hit *h = cull->bins->hit + chunk->first_hit; h < hit; h++)
+		for (uint32_t y = h->tile_y0; y <= h->tile_y1; y++)
+			for (uint32_t x = h->tile_x0; x <= h->tile_x1; x++)
+				count[y * plan->tiles_x + x]++;
 	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
 }
 
@@ -277,7 +225,7 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 {
 	uint32_t n = 0;
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
-		const struct psr_blocks *blocks = plan->instance[i].blocks;
+		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
 		for (uint32_t k = 0; k < blocks->n_clusters; n++) {
 			uint32_t first = k, size = 0;
 			do
@@ -311,9 +259,9 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	return bins->entry ? PSR_OK : PSR_ERR_MEMORY;
 }
 
-int cull_blocks(struct bins *bins, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
+int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
 {
-	struct cull cull = { bins, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
+	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
 	assert(plan->tiles_x <= 256 && plan->tiles_y <= 256);
 	bins->chunk = grow(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = grow(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);

@@ -183,7 +183,7 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
 	start = end;
 
-	rc = cull_blocks(&r->bins, &r->plan, pool, report);
+	rc = cull_blocks(&r->bins, r->simd, &r->plan, pool, report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(err, rc, "too many blocks for a picture of this size");
 	if (rc || prepare_buffers(r, report->levels))

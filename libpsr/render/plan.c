@@ -131,8 +131,14 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 {
 	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
 	double world = instance_center(center, rotation, instance, view->eye), scale = world * view->scale;
+	struct cull_view *cull = &out->cull;
 
-	out->blocks = psr_model_blocks(instance->model);
+	*cull = (struct cull_view){
+		.blocks = warp->blocks, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
+		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
+		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
+		.tiles_x = plan->tiles_x, .tiles_y = plan->tiles_y,
+	};
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
 	m3d_apply(camera_center, view->axis, center);
 	v3d_scale(camera_center, camera_center, view->scale);
@@ -141,21 +147,19 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		v3f_set(warp->turn[i], (float)to_camera[i][0], (float)to_camera[i][1], (float)to_camera[i][2]);
 		v3d_scale(to_camera[i], to_camera[i], scale);
 		for (int k = 0; k < 3; k++)
-			out->center_m[i][k] = (float)to_camera[i][k];
-		out->center_m[i][3] = (float)camera_center[i];
+			cull->center_m[i][k] = (float)to_camera[i][k];
+		cull->center_m[i][3] = (float)camera_center[i];
 	}
-	out->scale = (float)scale;
-	out->spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale);
 
 	double eye[3];
 	v3d_scale(eye, plan->perspective ? center : view->axis[2], -1);
 	m3d_apply_transposed(eye, (const double(*)[3])rotation, eye);
 	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
-	v3f_set(out->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
+	v3f_set(cull->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
 
 	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
-	for (uint32_t p = 0; p < out->blocks->n_projections; p++)
-		lattice_make(&lattice[p], &out->blocks->projection[p], to_camera, camera_center, plan, focal);
+	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
+		lattice_make(&lattice[p], &warp->blocks->projection[p], to_camera, camera_center, plan, focal);
 }
 
 /* A cell covers a pixel that lies behind it by more than the threshold: `gap_threshold` pixel widths for cells of two

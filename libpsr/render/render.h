@@ -7,20 +7,14 @@
 #include "psr/render.h"
 #include "simd/simd.h"
 
-#define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
-#define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 
 /* ---- plan: a request, made ready ([G] 7.1) ---- */
 
 struct plan_instance {
-	const struct psr_blocks *blocks;
-	uint32_t first_slot;       /* slot of block b is first_slot + b */
-	uint32_t first_group;      /* place of the model's group 0 among those of all instances, of which each has n_clusters */
-	float center_m[3][4];      /* inner coordinates to camera space */
-	float scale;               /* camera space units an inner unit */
-	float spacing;             /* greatest distance of neighbours at level 0, camera space */
-	float eye[3];              /* inner coordinates; orthographic: unit vector to the viewer instead */
+	uint32_t first_slot;  /* slot of block b is first_slot + b */
+	uint32_t first_group; /* place of the model's group 0 among those of all instances, of which each has n_clusters */
+	struct cull_view cull;
 };
 
 struct plan {
@@ -74,7 +68,7 @@ struct bins {
 };
 
 /* Also notes in plan->view what the blocks that are left need. */
-int cull_blocks(struct bins *bins, struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report);
 size_t bins_bytes(const struct bins *bins);
 void bins_clear(struct bins *bins);
 

@@ -14,6 +14,34 @@
  * from their backs. */
 #define BACK_SINE 0.0125f
 
+#define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
+#define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
+
+/* ---- cull ([G] 6.1, 6.4) ---- */
+
+struct cull_view {
+	const struct psr_blocks *blocks;
+	float center_m[3][4]; /* inner coordinates to camera space */
+	float scale;          /* camera space units an inner unit */
+	float spacing;        /* greatest distance of neighbours at level 0, camera space */
+	float eye[3];         /* inner coordinates; orthographic: unit vector to the viewer instead */
+	int perspective;
+	float focal, near_z, width, height;
+	uint32_t tiles_x, tiles_y;
+};
+
+#define CULL_BATCH 64
+struct cull_batch {
+	uint8_t is_left[CULL_BATCH];  /* 0: nothing of the block can show, and the rest says nothing */
+	uint8_t is_mixed[CULL_BATCH]; /* some of its samples may face away */
+	uint8_t level[CULL_BATCH];    /* of the depth buffer that fits; PSR_MAX_DEPTH_LEVEL + 1 and more do not exist */
+	uint8_t tile_x0[CULL_BATCH], tile_x1[CULL_BATCH], tile_y0[CULL_BATCH], tile_y1[CULL_BATCH]; /* inclusive */
+	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels */
+};
+
+/* Blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. */
+typedef void cull_fn(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n);
+
 /* ---- warp ([G] 7.1, 7.2) ---- */
 
 /* The lattice of one projection in the picture of a frame, at level 0; at level l all but `origin` is 2^l times as long,
@@ -131,6 +159,7 @@ static inline int strip_is_specular(const struct strip *strip)
 }
 
 struct simd {
+	cull_fn *cull;
 	warp_clear_fn *warp_clear;
 	warp_fn *warp;
 	strip_list_fn *strip_list;

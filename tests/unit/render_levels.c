@@ -92,7 +92,7 @@ static void choose(const struct psr_scene *scene, uint32_t side, struct psr_pool
 
 	psr_settings_default(&settings, side, side);
 	assert_int_equal(plan_make(&plan, scene, &settings, NULL), PSR_OK);
-	assert_int_equal(cull_blocks(&bins, &plan, pool, &report), PSR_OK);
+	assert_int_equal(cull_blocks(&bins, simd_get(), &plan, pool, &report), PSR_OK);
 	memset(choice, 0, scene->n_instances * sizeof *choice);
 	for (uint32_t s = 0; s < plan.n_slots; s++) {
 		const struct psr_cluster *k = &cluster[s % n_clusters];

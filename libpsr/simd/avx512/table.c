@@ -1,9 +1,11 @@
 #include "simd/kernels.h"
 #define STRIP_LIST_IS_ELSEWHERE
+#include "simd/cull.h"
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
 const struct simd simd_avx512 = {
+	.cull = cull,
 	.warp_clear = warp_clear,
 	.warp = warp_avx512,
 	.strip_list = strip_list_avx512,

@@ -1,8 +1,10 @@
 #include "simd/kernels.h"
+#include "simd/cull.h"
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
 const struct simd simd_c = {
+	.cull = cull,
 	.warp_clear = warp_clear,
 	.warp = warp_c,
 	.strip_list = strip_list,
