@@ -27,7 +27,7 @@ void shade_row(const struct simd *simd, const struct plan *plan, struct strip *s
 		if (strip->n) {
 			simd->strip_resolve(strip, &plan->view, plan->ambient);
 			for (uint32_t l = 0; l < plan->n_lights; l++)
-				simd->strip_light(strip, &plan->light[l]);
+				simd->strip_light(strip, &plan->light[l], NULL);
 			simd->strip_color(strip);
 			counts->n_pixels += strip->n;
 			counts->n_specular += strip_is_specular(strip) ? strip->n : 0;

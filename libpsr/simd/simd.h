@@ -148,8 +148,9 @@ struct strip_light {
 typedef void strip_list_fn(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n);
 /* Attributes, normals, colours and what else is needed of the samples listed; clears the light to `ambient` and no highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
-/* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. */
-typedef void strip_light_fn(struct strip *strip, const struct strip_light *light);
+/* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
+ * each sample is 0..1; NULL: all of it. */
+typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 

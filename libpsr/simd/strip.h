@@ -174,15 +174,14 @@ static inline void reflect(struct strip *s, uint32_t i, int is_specular, const f
 	}
 }
 
-static inline void light_directional(struct strip *s, const struct strip_light *light, int is_specular)
+static inline void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_specular)
 {
-	const float x = light->to_light[0], y = light->to_light[1], z = light->to_light[2];
-	const float color[3] = { light->color[0], light->color[1], light->color[2] };
+	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++)
-		reflect(s, i, is_specular, color, 1, x, y, z);
+		reflect(s, i, is_specular, l.color, reaches ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
 }
 
-static inline void light_near(struct strip *s, const struct strip_light *light, int is_specular, int is_spot)
+static inline void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_specular, int is_spot)
 {
 	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++) {
@@ -196,25 +195,32 @@ static inline void light_near(struct strip *s, const struct strip_light *light, 
 			const float edge = psr_choose(c < l.cos_inner, t * t * (3 - 2 * t), 1);
 			amount = psr_where(c > l.cos_outer, amount * edge);
 		}
-		reflect(s, i, is_specular, l.color, psr_where(distance2 > 0, amount), x, y, z);
+		amount = psr_where(distance2 > 0, amount) * (reaches ? reaches[i] : 1);
+		reflect(s, i, is_specular, l.color, amount, x, y, z);
 	}
 }
 
-static void strip_light(struct strip *strip, const struct strip_light *light)
+/* Constants, so that each case is a loop of its own. */
+static inline void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_specular)
 {
-	const int is_specular = strip_is_specular(strip);
-	if (light->kind == PSR_LIGHT_DIRECTIONAL && is_specular)
-		light_directional(strip, light, 1);
-	else if (light->kind == PSR_LIGHT_DIRECTIONAL)
-		light_directional(strip, light, 0);
-	else if (light->kind == PSR_LIGHT_SPOT && is_specular)
-		light_near(strip, light, 1, 1);
+	if (light->kind == PSR_LIGHT_DIRECTIONAL)
+		light_directional(strip, light, reaches, is_specular);
 	else if (light->kind == PSR_LIGHT_SPOT)
-		light_near(strip, light, 0, 1);
-	else if (is_specular)
-		light_near(strip, light, 1, 0);
+		light_near(strip, light, reaches, is_specular, 1);
 	else
-		light_near(strip, light, 0, 0);
+		light_near(strip, light, reaches, is_specular, 0);
+}
+
+static void strip_light(struct strip *strip, const struct strip_light *light, const float *reaches)
+{
+	if (strip_is_specular(strip) && reaches)
+		light_by(strip, light, reaches, 1);
+	else if (strip_is_specular(strip))
+		light_by(strip, light, NULL, 1);
+	else if (reaches)
+		light_by(strip, light, reaches, 0);
+	else
+		light_by(strip, light, NULL, 0);
 }
 
 static inline uint16_t light16(float linear)
