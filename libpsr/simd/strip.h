@@ -152,12 +152,11 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		}
 }
 
-/* What arrives of a light, and N.L, where both are above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
+/* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
 static inline void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
 {
 	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
-	const int is_lit = (amount > 0) & (facing > 0);
-	const float diffuse = psr_where(is_lit, amount * facing);
+	const float diffuse = psr_where(facing > 0, facing) * amount;
 	s->lr[i] += color[0] * diffuse;
 	s->lg[i] += color[1] * diffuse;
 	s->lb[i] += color[2] * diffuse;
@@ -167,21 +166,23 @@ static inline void reflect(struct strip *s, uint32_t i, int is_specular, const f
 		const float mirror = 2 * facing * normal_view - light_view;
 		const float least = psr_where(mirror > 0, mirror), clamped = psr_choose(least < 1, least, 1);
 		const float power = psr_power(clamped, s->exponent[i]);
-		const float highlight = psr_where(is_lit, amount * power);
+		const float highlight = psr_where(facing > 0, power) * amount;
 		s->hr[i] += color[0] * highlight;
 		s->hg[i] += color[1] * highlight;
 		s->hb[i] += color[2] * highlight;
 	}
 }
 
-static inline void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_specular)
+static inline void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+                                     int is_specular)
 {
 	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++)
-		reflect(s, i, is_specular, l.color, reaches ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
+		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
 }
 
-static inline void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_specular, int is_spot)
+static inline void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+                              int is_specular, int is_spot)
 {
 	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++) {
@@ -195,32 +196,33 @@ static inline void light_near(struct strip *s, const struct strip_light *light, 
 			const float edge = psr_choose(c < l.cos_inner, t * t * (3 - 2 * t), 1);
 			amount = psr_where(c > l.cos_outer, amount * edge);
 		}
-		amount = psr_where(distance2 > 0, amount) * (reaches ? reaches[i] : 1);
+		amount = psr_where(distance2 > 0, amount) * (is_partial ? reaches[i] : 1);
 		reflect(s, i, is_specular, l.color, amount, x, y, z);
 	}
 }
 
 /* Constants, so that each case is a loop of its own. */
-static inline void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_specular)
+static inline void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
+                            int is_specular)
 {
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
-		light_directional(strip, light, reaches, is_specular);
+		light_directional(strip, light, reaches, is_partial, is_specular);
 	else if (light->kind == PSR_LIGHT_SPOT)
-		light_near(strip, light, reaches, is_specular, 1);
+		light_near(strip, light, reaches, is_partial, is_specular, 1);
 	else
-		light_near(strip, light, reaches, is_specular, 0);
+		light_near(strip, light, reaches, is_partial, is_specular, 0);
 }
 
 static void strip_light(struct strip *strip, const struct strip_light *light, const float *reaches)
 {
 	if (strip_is_specular(strip) && reaches)
-		light_by(strip, light, reaches, 1);
+		light_by(strip, light, reaches, 1, 1);
 	else if (strip_is_specular(strip))
-		light_by(strip, light, NULL, 1);
+		light_by(strip, light, NULL, 0, 1);
 	else if (reaches)
-		light_by(strip, light, reaches, 0);
+		light_by(strip, light, reaches, 1, 0);
 	else
-		light_by(strip, light, NULL, 0);
+		light_by(strip, light, NULL, 0, 0);
 }
 
 static inline uint16_t light16(float linear)
