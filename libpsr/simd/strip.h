@@ -3,6 +3,9 @@
 #include "base/srgb.h"
 #include "simd/block.h"
 
+/* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
+#define CONSTANT_FLAGS inline __attribute__((always_inline))
+
 #ifndef STRIP_LIST_IS_ELSEWHERE
 static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
@@ -153,7 +156,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 }
 
 /* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
-static inline void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
+static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
 {
 	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
 	const float diffuse = psr_where(facing > 0, facing) * amount;
@@ -173,7 +176,7 @@ static inline void reflect(struct strip *s, uint32_t i, int is_specular, const f
 	}
 }
 
-static inline void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
                                      int is_specular)
 {
 	const struct strip_light l = *light;
@@ -181,7 +184,7 @@ static inline void light_directional(struct strip *s, const struct strip_light *
 		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
 }
 
-static inline void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
                               int is_specular, int is_spot)
 {
 	const struct strip_light l = *light;
@@ -201,8 +204,7 @@ static inline void light_near(struct strip *s, const struct strip_light *light, 
 	}
 }
 
-/* Constants, so that each case is a loop of its own. */
-static inline void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
+static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
                             int is_specular)
 {
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
@@ -232,7 +234,7 @@ static inline uint16_t light16(float linear)
 	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
 }
 
-static inline void strip_color_by(struct strip *s, int is_specular)
+static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
 {
 	for (uint32_t i = 0; i < s->n; i++) {
 		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
