@@ -122,7 +122,6 @@ static void cover_level(const struct gaps_target *t, const struct gaps_tile *til
 	struct limits limits[2], *upper = &limits[0], *lower = &limits[1];
 	struct between at;
 	int32_t cover[GAPS_WIDTH], either[GAPS_WIDTH];
-	uint32_t last = UINT32_MAX;
 
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
 		at.right[x] = (int32_t)((2 * x + 1 + (1u << k)) & ((2u << k) - 1));
@@ -132,16 +131,14 @@ static void cover_level(const struct gaps_target *t, const struct gaps_tile *til
 		const uint32_t from_top = 2 * (tile->y0 + y) + 1 + (1u << k); /* a cell further down: not below 0 */
 		const uint32_t j = from_top >> (k + 1);
 		const int32_t fy = (int32_t)(from_top & ((2u << k) - 1));
-		if (j == last + 1) {
+		if (y == 0)
+			find_limits(lower, t, k, i, j, n_cells, has_finer);
+		if (y == 0 || fy == 1) {
 			struct limits *was = upper;
 			upper = lower;
 			lower = was;
 			find_limits(lower, t, k, i, j + 1, n_cells, has_finer);
-		} else if (j != last) {
-			find_limits(upper, t, k, i, j, n_cells, has_finer);
-			find_limits(lower, t, k, i, j + 1, n_cells, has_finer);
 		}
-		last = j;
 		if (upper->is_empty && lower->is_empty)
 			continue;
 		const float *z = &tile->z[y + 1][TILE_LEFT];
