@@ -1,166 +1,64 @@
 #include <math.h>
-#include <stdatomic.h>
 #include <string.h>
 #include "base/mem.h"
 #include "render/render.h"
 
 /* Beyond the paper, both phases know depth: what shines through a hole is whatever is nearest, so among the pixels that
  * are averaged only those count that are not behind the nearest by more than a cell's threshold. A near edge's colour
- * thus is not mixed with the background's before it fills a hole, and depths are filled along with colours. */
+ * thus is not mixed with the background's before it fills a hole, and depths are filled along with colours.
+ *
+ * A cell whose weight is whole needs nothing from above, and a cell above whole cells is whole. So a brick needs the levels up to
+ * the first that is whole in it and in the eight bricks around, which hold all that its pixels and their ancestors look at. */
 
-#define ROWS 32 /* rows that a thread takes at a time */
-
-struct pass {
-	struct fill *fill;
-	const struct plan *plan;
-	int level; /* the finer one of the two */
-	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
-	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
-};
-
-static float limit_of(const struct plan *plan, int level, float nearest)
+float fill_scale(const struct plan *plan, int level)
 {
-	int k = level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL;
-	return nearest * plan->gap_scale[k] + plan->gap_offset[k];
+	return plan->gap_scale[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
 }
 
-/* Cell (x, y) of the coarser level: the sum of its four, premultiplied; divided where the weights exceed one. */
-static void pull_cell(const struct pass *pass, uint32_t x, uint32_t y)
+float fill_offset(const struct plan *plan, int level)
 {
-	const struct fill_level *from = &pass->fill->level[pass->level], *to = from + 1;
-	size_t child[4];
-	int n = 0;
-	float nearest = INFINITY;
-	for (uint32_t v = 2 * y; v <= 2 * y + 1 && v < from->height; v++)
-		for (uint32_t u = 2 * x; u <= 2 * x + 1 && u < from->width; u++) {
-			size_t at = (size_t)v * from->width + u;
-			if (!from->weight[at])
-				continue;
-			child[n++] = at;
-			nearest = from->z[at] < nearest ? from->z[at] : nearest;
-		}
-
-	const float limit = limit_of(pass->plan, pass->level + 1, nearest);
-	uint32_t w = 0, sum[3] = { 0, 0, 0 };
-	float z = 0;
-	for (int i = 0; i < n; i++) {
-		size_t at = child[i];
-		if (from->z[at] > limit)
-			continue;
-		uint32_t own = from->weight[at];
-		for (int k = 0; k < 3; k++) /* only level 0 is not premultiplied */
-			sum[k] += pass->level ? from->rgb[3 * at + (size_t)k] : from->rgb[3 * at + (size_t)k] * own / WEIGHT_ONE;
-		z += (float)own * from->z[at];
-		w += own;
-	}
-	size_t at = (size_t)y * to->width + x;
-	for (int k = 0; k < 3; k++)
-		to->rgb[3 * at + (size_t)k] = (uint16_t)(w > WEIGHT_ONE ? sum[k] * WEIGHT_ONE / w : sum[k]);
-	to->weight[at] = (uint16_t)(w > WEIGHT_ONE ? WEIGHT_ONE : w);
-	to->z[at] = w ? z / (float)w : INFINITY;
+	return plan->gap_offset[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
 }
 
-static void pull_rows(int i, void *userdata)
+struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y)
 {
-	struct pass *pass = userdata;
-	const struct fill_level *to = &pass->fill->level[pass->level + 1];
-	int is_moved = 0;
-	for (uint32_t y = (uint32_t)i * ROWS; y < ((uint32_t)i + 1) * ROWS && y < to->height; y++)
-		for (uint32_t x = 0; x < to->width; x++) {
-			pull_cell(pass, x, y);
-			is_moved |= to->weight[(size_t)y * to->width + x] < WEIGHT_ONE / 2;
-		}
-	if (is_moved) {
-		int seen = atomic_load(&pass->deepest);
-		while (seen < pass->level + 1 && !atomic_compare_exchange_weak(&pass->deepest, &seen, pass->level + 1))
-			;
+	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
+	const struct fill_row *cell = &level->cell;
+	return (struct fill_row){ cell->r + at, cell->g + at, cell->b + at, cell->weight + at, cell->z + at };
+}
+
+void fill_note_depth(struct fill_pass *pass, int level)
+{
+	int seen = atomic_load(&pass->deepest);
+	while (seen < level && !atomic_compare_exchange_weak(&pass->deepest, &seen, level))
+		;
+}
+
+/* All cells outside of the picture; those inside are written before they are read. */
+static void clear_level(struct fill_level *level, size_t area)
+{
+	memset(level->cell.r, 0, 3 * area * sizeof *level->cell.r);
+	for (size_t i = 0; i < area; i++) {
+		level->cell.weight[i] = WEIGHT_ONE;
+		level->cell.z[i] = NAN;
 	}
 }
 
-/* The interpolated colour of a finer cell: its parent counts a half, the parent's two neighbours on the cell's own
- * side a quarter each ([G] figure 4.11a). */
-static float interpolate(const struct pass *pass, uint32_t x, uint32_t y, uint32_t rgb[3])
+int fill_prepare(struct fill *fill, uint32_t width, uint32_t height)
 {
-	const struct fill_level *from = &pass->fill->level[pass->level + 1];
-	const uint32_t px = x / 2, py = y / 2;
-	const uint32_t nx = x & 1 ? px + 1 : px - 1, ny = y & 1 ? py + 1 : py - 1;
-	size_t at[3] = { (size_t)py * from->width + px };
-	int n = 1;
-	if (nx < from->width)
-		at[n++] = (size_t)py * from->width + nx;
-	if (ny < from->height)
-		at[n++] = (size_t)ny * from->width + px;
-
-	float nearest = INFINITY, z = 0;
-	for (int i = 0; i < n; i++)
-		nearest = from->z[at[i]] < nearest ? from->z[at[i]] : nearest;
-	const float limit = limit_of(pass->plan, pass->level + 1, nearest);
-	uint32_t w = 0;
-	rgb[0] = rgb[1] = rgb[2] = 0;
-	for (int i = 0; i < n; i++) {
-		if (from->z[at[i]] > limit)
-			continue;
-		uint32_t share = i ? 1 : 2;
-		for (int k = 0; k < 3; k++)
-			rgb[k] += share * from->rgb[3 * at[i] + (size_t)k];
-		z += (float)share * from->z[at[i]];
-		w += share;
-	}
-	for (int k = 0; k < 3; k++)
-		rgb[k] /= w;
-	return z / (float)w;
-}
-
-static void push_rows(int i, void *userdata)
-{
-	struct pass *pass = userdata;
-	const struct fill_level *to = &pass->fill->level[pass->level];
-	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
-	for (uint32_t y = (uint32_t)i * ROWS; y < ((uint32_t)i + 1) * ROWS && y < to->height; y++)
-		for (uint32_t x = 0; x < to->width; x++) {
-			size_t at = (size_t)y * to->width + x;
-			uint32_t w = to->weight[at], rgb[3];
-			if (w == WEIGHT_ONE)
-				continue;
-			float z = interpolate(pass, x, y, rgb);
-			for (int k = 0; k < 3; k++) {
-				uint32_t own = to->rgb[3 * at + (size_t)k];
-				if (!pass->level)
-					own = own * w / WEIGHT_ONE;
-				to->rgb[3 * at + (size_t)k] = (uint16_t)(own + rgb[k] * (WEIGHT_ONE - w) / WEIGHT_ONE);
-			}
-			if (w < WEIGHT_ONE / 2) {
-				to->z[at] = z;
-				n_moved++;
-			}
-			n_changed++;
-			n_filled += w == 0 && z < INFINITY;
-		}
-	if (!pass->level) {
-		atomic_fetch_add(&pass->n_changed, n_changed);
-		atomic_fetch_add(&pass->n_filled, n_filled);
-		atomic_fetch_add(&pass->n_moved, n_moved);
-	}
-}
-
-/* The single cell at the top has nothing above it: what it holds becomes whole, or the background if it is empty. */
-static void finish_top(struct fill_level *top, const struct plan *plan)
-{
-	uint32_t w = top->weight[0];
-	for (int k = 0; k < 3; k++)
-		top->rgb[k] = (uint16_t)(w ? top->rgb[k] * (uint32_t)WEIGHT_ONE / w : plan->background[k]);
-}
-
-int fill_prepare(struct fill *fill, uint32_t width, uint32_t height, uint16_t *rgb, uint16_t *weight, float *z)
-{
+	if (fill->width == width && fill->height == height)
+		return PSR_OK;
+	const uint32_t bricks_x = (width + BRICK - 1) / BRICK, bricks_y = (height + BRICK - 1) / BRICK;
+	const size_t n_bricks = (size_t)bricks_x * bricks_y;
 	size_t cells = 0;
-	int n = 0;
-	for (uint32_t w = width, h = height; w > 1 || h > 1; n++) {
+	int top = 0;
+	for (uint32_t w = width, h = height; top == 0 || w > 1 || h > 1; top++) {
 		w = (w + 1) / 2;
 		h = (h + 1) / 2;
-		cells += (size_t)w * h;
+		cells += (size_t)(w + 2) * (h + 2);
 	}
-	size_t size = cells * (4 * sizeof(uint16_t) + sizeof(float));
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 3 * n_bricks;
+	fill->width = fill->height = 0;
 	if (size > fill->storage_size) {
 		psr_free(fill->storage);
 		fill->storage = psr_alloc_array(size, 1);
@@ -168,22 +66,28 @@ int fill_prepare(struct fill *fill, uint32_t width, uint32_t height, uint16_t *r
 		if (!fill->storage)
 			return PSR_ERR_MEMORY;
 	}
-	fill->n_levels = n + 1;
-	fill->level[0] = (struct fill_level){ width, height, rgb, weight, z };
-	float *next_z = fill->storage;
-	uint16_t *next_rgb = (uint16_t *)(next_z + cells), *next_weight = next_rgb + 3 * cells;
-	for (int l = 1; l <= n; l++) {
-		struct fill_level *level = &fill->level[l];
-		level->width = (level[-1].width + 1) / 2;
-		level->height = (level[-1].height + 1) / 2;
-		size_t area = (size_t)level->width * level->height;
-		level->z = next_z;
-		level->rgb = next_rgb;
-		level->weight = next_weight;
-		next_z += area;
-		next_rgb += 3 * area;
-		next_weight += area;
+	float *z = fill->storage;
+	uint16_t *values = (uint16_t *)(z + cells);
+	uint32_t w = width, h = height;
+	for (int l = 1; l <= top; l++) {
+		w = (w + 1) / 2;
+		h = (h + 1) / 2;
+		const size_t area = (size_t)(w + 2) * (h + 2);
+		fill->level[l] = (struct fill_level){ .width = w, .height = h, .left = -1, .top = -1, .stride = w + 2,
+			.cell = { values, values + area, values + 2 * area, values + 3 * area, z } };
+		clear_level(&fill->level[l], area);
+		z += area;
+		values += 4 * area;
 	}
+	fill->whole = (uint8_t *)values;
+	fill->needs = fill->whole + n_bricks;
+	fill->wants = fill->needs + n_bricks;
+	fill->top = top;
+	fill->brick_top = top < FILL_BRICK_LEVELS ? top : FILL_BRICK_LEVELS;
+	fill->bricks_x = bricks_x;
+	fill->bricks_y = bricks_y;
+	fill->width = width;
+	fill->height = height;
 	return PSR_OK;
 }
 
@@ -193,22 +97,155 @@ void fill_clear(struct fill *fill)
 	memset(fill, 0, sizeof *fill);
 }
 
-void fill_run(struct fill *fill, const struct plan *plan, struct psr_pool *pool, struct psr_report *report)
+/* The finest level that is whole in a brick, whose weights were pulled at least so far. */
+static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 {
-	struct pass pass = { .fill = fill, .plan = plan };
-	const int top = fill->n_levels - 1;
-	for (int l = 0; l < top; l++) {
-		pass.level = l;
-		psr_pool_for(pool, (int)((fill->level[l + 1].height + ROWS - 1) / ROWS), pull_rows, &pass);
+	for (int l = 1; l <= fill->brick_top; l++) {
+		const struct fill_level *level = &fill->level[l];
+		const uint32_t side = BRICK >> l;
+		uint16_t least = WEIGHT_ONE;
+		for (uint32_t y = by * side; y < (by + 1) * side && y < level->height; y++) {
+			const uint16_t *weight = fill_row_at(level, 0, (int32_t)y).weight;
+			for (uint32_t x = bx * side; x < (bx + 1) * side && x < level->width; x++)
+				least = weight[x] < least ? weight[x] : least;
+		}
+		if (least == WEIGHT_ONE)
+			return l;
 	}
-	if (top)
-		finish_top(&fill->level[top], plan);
-	for (int l = top - 1; l >= 0; l--) {
-		pass.level = l;
-		psr_pool_for(pool, (int)((fill->level[l].height + ROWS - 1) / ROWS), push_rows, &pass);
+	return fill->brick_top + 1;
+}
+
+/* The end of a run of bricks of row `by` with the same value as bx in a map. */
+static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by)
+{
+	const uint8_t *row = map + (size_t)by * fill->bricks_x;
+	uint32_t end = bx + 1;
+	while (end < fill->bricks_x && end - bx < FILL_RUN && row[end] == row[bx])
+		end++;
+	return end;
+}
+
+static void find_whole(int i, void *userdata)
+{
+	struct fill_pass *pass = userdata;
+	struct fill *fill = pass->fill;
+	const uint32_t by = (uint32_t)i;
+	const size_t row = (size_t)by * fill->bricks_x;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = run_end(fill, pass->picture->bricks, bx, by);
+		if (!pass->picture->bricks[row + bx]) {
+			memset(fill->whole + row + bx, 0, end - bx);
+			continue;
+		}
+		fill_pull_bricks(pass, bx, end, by, fill->brick_top, 0);
+		for (uint32_t b = bx; b < end; b++)
+			fill->whole[row + b] = (uint8_t)whole_level(fill, b, by);
 	}
-	report->count[PSR_STAGE_FILL] = pass.n_changed;
-	report->n_filled = pass.n_filled;
+}
+
+/* The greatest value of a map at a brick and around it. */
+static uint8_t greatest_around(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by)
+{
+	uint8_t greatest = 0;
+	for (uint32_t y = by ? by - 1 : 0; y <= by + 1 && y < fill->bricks_y; y++)
+		for (uint32_t x = bx ? bx - 1 : 0; x <= bx + 1 && x < fill->bricks_x; x++) {
+			const uint8_t value = map[(size_t)y * fill->bricks_x + x];
+			greatest = value > greatest ? value : greatest;
+		}
+	return greatest;
+}
+
+const uint8_t *fill_wants(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                          const struct fill_picture *picture)
+{
+	struct fill_pass pass = { .fill = fill, .simd = simd, .plan = plan, .picture = picture };
+	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
+	psr_pool_for(pool, (int)fill->bricks_y, find_whole, &pass);
+	fill->is_coarse = 0;
+	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
+		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++) {
+			fill->needs[i] = fill->whole[i] ? greatest_around(fill, fill->whole, bx, by) : 0;
+			fill->is_coarse |= fill->whole[i] > fill->brick_top;
+		}
+	for (size_t i = 0; i < n_bricks; i++)
+		fill->needs[i] = fill->needs[i] > fill->brick_top ? (uint8_t)fill->brick_top : fill->needs[i];
+	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
+		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++)
+			fill->wants[i] = fill->is_coarse ? (uint8_t)fill->brick_top : greatest_around(fill, fill->needs, bx, by);
+	return fill->wants;
+}
+
+static void pull_row(int i, void *userdata)
+{
+	struct fill_pass *pass = userdata;
+	const struct fill *fill = pass->fill;
+	const uint8_t *wants = fill->wants + (size_t)i * fill->bricks_x;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = run_end(fill, fill->wants, bx, (uint32_t)i);
+		fill_pull_bricks(pass, bx, end, (uint32_t)i, wants[bx], 1);
+	}
+}
+
+static void push_row(int i, void *userdata)
+{
+	struct fill_pass *pass = userdata;
+	const struct fill *fill = pass->fill;
+	const uint8_t *needs = fill->needs + (size_t)i * fill->bricks_x;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = run_end(fill, fill->needs, bx, (uint32_t)i);
+		if (needs[bx])
+			fill_push_bricks(pass, bx, end, (uint32_t)i, needs[bx]);
+	}
+}
+
+/* The single cell at the top has nothing above it: what it holds becomes whole, or the background if it is empty. */
+static void finish_top(const struct fill_level *top, const struct plan *plan)
+{
+	const struct fill_row cell = fill_row_at(top, 0, 0);
+	uint16_t *const rgb[3] = { cell.r, cell.g, cell.b };
+	const uint32_t w = cell.weight[0];
+	for (int k = 0; k < 3; k++)
+		*rgb[k] = (uint16_t)(w ? *rgb[k] * (uint32_t)WEIGHT_ONE / w : plan->background[k]);
+}
+
+/* The levels of which a brick has less than a cell. */
+static void run_coarse(struct fill_pass *pass)
+{
+	const struct fill *fill = pass->fill;
+	for (int l = fill->brick_top; l < fill->top; l++) {
+		const struct fill_level *from = &fill->level[l], *to = from + 1;
+		for (int32_t y = 0; y < (int32_t)to->height; y++) {
+			const struct fill_row row = fill_row_at(to, 0, y), upper = fill_row_at(from, 0, 2 * y);
+			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
+			const uint16_t least = pass->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(pass->plan, l + 1),
+			                                             fill_offset(pass->plan, l + 1));
+			if (least < WEIGHT_ONE / 2)
+				fill_note_depth(pass, l + 1);
+		}
+	}
+	finish_top(&fill->level[fill->top], pass->plan);
+	for (int l = fill->top - 1; l >= fill->brick_top; l--) {
+		const struct fill_level *to = &fill->level[l], *from = to + 1;
+		for (int32_t y = 0; y < (int32_t)to->height; y++) {
+			const int32_t parent = y >> 1;
+			const struct fill_row row = fill_row_at(to, 0, y), own = fill_row_at(from, 0, parent);
+			const struct fill_row beside = fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1);
+			pass->simd->fill_push(&row, &own, &beside, from->width, 0, fill_scale(pass->plan, l + 1),
+			                      fill_offset(pass->plan, l + 1));
+		}
+	}
+}
+
+void fill_run(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+              const struct fill_picture *picture, struct psr_report *report)
+{
+	struct fill_pass pass = { .fill = fill, .simd = simd, .plan = plan, .picture = picture };
+	psr_pool_for(pool, (int)fill->bricks_y, pull_row, &pass);
+	if (fill->is_coarse)
+		run_coarse(&pass);
+	psr_pool_for(pool, (int)fill->bricks_y, push_row, &pass);
+	report->count[PSR_STAGE_FILL] += pass.n_changed;
+	report->n_filled += pass.n_filled;
 	if (pass.n_moved)
 		report->error_bound += (double)(2 << pass.deepest);
 }

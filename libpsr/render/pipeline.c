@@ -7,14 +7,6 @@
 #include "base/srgb.h"
 #include "render/render.h"
 
-#define BAND_ROWS 16
-
-/* What one band of rows counted on its way through gaps and shade. */
-struct band {
-	struct shade_counts shade;
-	uint32_t n_partial;
-	int has_gaps;
-};
 
 struct psr_renderer {
 	const struct simd *simd;
@@ -24,13 +16,15 @@ struct psr_renderer {
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
-	/* All of a pixel, in one piece of memory: words, levels, linear colours, weights, depths. */
+	/* All of a pixel, in one piece of memory: words, levels, linear colours by channel, weights. */
 	void *pixels;
 	size_t pixels_size;
-	uint16_t *rgb, *weight;
-	float *z;
+	uint16_t *rgb[3], *weight;
+	uint8_t *bricks; /* that gaps marked */
 	uint64_t *tile_inside;
-	struct band *band;
+	/* By row of bricks. */
+	struct gaps_counts *gaps;
+	struct shade_counts *shade;
 	void *counters;
 	size_t counters_size;
 	uint8_t srgb[65536];      /* of 16-bit linear light */
@@ -118,9 +112,16 @@ static void *grow(void *memory, size_t *capacity, size_t size)
 	return memory;
 }
 
-static uint32_t n_bands(const struct plan *plan)
+static uint32_t n_rows(const struct plan *plan)
 {
-	return (plan->height + BAND_ROWS - 1) / BAND_ROWS;
+	return (plan->height + BRICK - 1) / BRICK;
+}
+
+/* The end of a row of bricks, in pixels. */
+static uint32_t row_end(const struct plan *plan, int row)
+{
+	const uint32_t end = ((uint32_t)row + 1) * BRICK;
+	return end < plan->height ? end : plan->height;
 }
 
 static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
@@ -128,6 +129,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	const uint32_t w = r->plan.width, h = r->plan.height;
 	const size_t area = (size_t)w * h;
 	struct psr_zstack *stack = &r->stack;
+	const size_t rows = n_rows(&r->plan), n_bricks = rows * ((w + BRICK - 1) / BRICK);
 	size_t cells = 0;
 
 	stack->width = w;
@@ -141,24 +143,26 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 + 4 * 2) + WARP_PADDING * 8 + cells * 4);
+	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + WARP_PADDING * 8 + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
-	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile_inside + n_bands(&r->plan) * sizeof *r->band);
+	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile_inside + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
 		return PSR_ERR_MEMORY;
 	r->tile_inside = r->counters;
-	r->band = (struct band *)(r->tile_inside + n_tiles);
+	r->shade = (struct shade_counts *)(r->tile_inside + n_tiles);
+	r->gaps = (struct gaps_counts *)(r->shade + rows);
 
 	stack->word = r->pixels;
-	r->z = (float *)(stack->word + area + WARP_PADDING);
-	float *next = r->z + area;
+	float *next = (float *)(stack->word + area + WARP_PADDING);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
 		if (stack->level[k].z)
 			next += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->rgb = (uint16_t *)next;
-	r->weight = r->rgb + 3 * area;
+	r->weight = (uint16_t *)next;
+	for (int k = 0; k < 3; k++)
+		r->rgb[k] = r->weight + (size_t)(k + 1) * area;
+	r->bricks = (uint8_t *)(r->rgb[2] + area);
 	return PSR_OK;
 }
 
@@ -201,46 +205,35 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	return PSR_OK;
 }
 
-static void gaps_band(int i, void *userdata)
+static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	const struct plan *plan = &r->plan;
-	struct band *band = &r->band[i];
-	memset(band, 0, sizeof *band);
-	for (uint32_t y = (uint32_t)i * BAND_ROWS; y < ((uint32_t)i + 1) * BAND_ROWS && y < plan->height; y++) {
-		const size_t row = (size_t)y * plan->width;
-		band->n_partial += gaps_row(plan, &r->stack, y, r->weight + row);
-		for (size_t at = row; at < row + plan->width; at++) {
-			r->z[at] = psr_float_from_bits((uint32_t)(r->stack.word[at] >> 32));
-			band->has_gaps |= r->weight[at] < WEIGHT_ONE;
-		}
-	}
+	r->gaps[row] = gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 }
 
-static void shade_band(int i, void *userdata)
+static void shade_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
 	struct strip strip;
-	for (uint32_t y = (uint32_t)i * BAND_ROWS; y < ((uint32_t)i + 1) * BAND_ROWS && y < plan->height; y++) {
-		const size_t row = (size_t)y * plan->width;
-		shade_row(r->simd, plan, &strip, r->stack.word + row, r->weight + row, y, r->rgb + 3 * row, &r->band[i].shade);
+	r->shade[row] = (struct shade_counts){ 0, 0 };
+	for (uint32_t y = (uint32_t)row * BRICK; y < row_end(plan, row); y++) {
+		const size_t first = (size_t)y * plan->width;
+		shade_row(r->simd, plan, &strip, r->stack.word + first, r->weight + first, y, r->rgb, &r->shade[row]);
 	}
 }
 
-static void output_band(int i, void *userdata)
+static void output_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	const size_t width = r->plan.width, begin = (size_t)i * BAND_ROWS * width;
-	size_t end = begin + BAND_ROWS * width;
-	if (end > width * r->plan.height)
-		end = width * r->plan.height;
+	const size_t width = r->plan.width, begin = (size_t)row * BRICK * width, end = row_end(&r->plan, row) * width;
 	if (r->frame->rgb)
-		for (size_t at = 3 * begin; at < 3 * end; at++)
-			r->frame->rgb[at] = r->srgb[r->rgb[at]];
+		for (size_t at = begin; at < end; at++)
+			for (int k = 0; k < 3; k++)
+				r->frame->rgb[3 * at + (size_t)k] = r->srgb[r->rgb[k][at]];
 	if (r->frame->depth)
 		for (size_t at = begin; at < end; at++)
-			r->frame->depth[at] = ldexpf(r->z[at], r->stack.exponent);
+			r->frame->depth[at] = ldexpf(psr_float_from_bits((uint32_t)(r->stack.word[at] >> 32)), r->stack.exponent);
 }
 
 int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
@@ -252,28 +245,35 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	*report = r->report;
 	r->frame = frame;
 
-	const int n = (int)n_bands(&r->plan);
-	int has_gaps = 0;
+	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, frame->rgb, frame->depth };
+	const int n = (int)n_rows(&r->plan);
+	uint32_t n_marked = 0;
 	uint64_t start = now_ns(), end;
-	psr_pool_for(pool, n, gaps_band, r);
+	psr_pool_for(pool, n, gaps_one, r);
+	for (int i = 0; i < n; i++) {
+		n_marked += r->gaps[i].n_marked;
+		report->count[PSR_STAGE_GAPS] += r->gaps[i].n_partial;
+	}
 	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
 	start = end;
-	psr_pool_for(pool, n, shade_band, r);
-	for (int i = 0; i < n; i++) {
-		report->count[PSR_STAGE_GAPS] += r->band[i].n_partial;
-		report->count[PSR_STAGE_SHADE] += r->band[i].shade.n_pixels;
-		has_gaps |= r->band[i].has_gaps;
-	}
-	report->n_covered = report->count[PSR_STAGE_SHADE];
-	report->ns[PSR_STAGE_SHADE] = (end = now_ns()) - start;
-	start = end;
-	if (has_gaps) {
-		if (fill_prepare(&r->fill, r->plan.width, r->plan.height, r->rgb, r->weight, r->z))
+	if (n_marked) {
+		if (fill_prepare(&r->fill, r->plan.width, r->plan.height))
 			return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-		fill_run(&r->fill, &r->plan, pool, report);
+		fill_wants(&r->fill, r->simd, &r->plan, pool, &picture);
 	}
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
-	psr_pool_for(pool, n, output_band, r);
+	start = end;
+
+	psr_pool_for(pool, n, shade_one, r);
+	for (int i = 0; i < n; i++)
+		report->count[PSR_STAGE_SHADE] += r->shade[i].n_pixels;
+	report->n_covered = report->count[PSR_STAGE_SHADE];
+	psr_pool_for(pool, n, output_one, r);
+	report->ns[PSR_STAGE_SHADE] = (end = now_ns()) - start;
+	start = end;
+	if (n_marked)
+		fill_run(&r->fill, r->simd, &r->plan, pool, &picture, report);
+	report->ns[PSR_STAGE_FILL] += now_ns() - start;
 	return PSR_OK;
 }
 

@@ -2,6 +2,7 @@
 #ifndef PSR_RENDER_RENDER_H
 #define PSR_RENDER_RENDER_H
 
+#include <stdatomic.h>
 #include <stdint.h>
 #include "psr/pool.h"
 #include "psr/render.h"
@@ -77,10 +78,17 @@ void bins_clear(struct bins *bins);
 /* Clears a tile and draws its blocks; returns how many samples fell into it. */
 uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile);
 
-/* ---- gaps: weights from the level buffers ([G] 4.6) ---- */
+/* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 
-/* Weights of row y: WEIGHT_ONE * (1 - coverage). Returns how many pixels with a sample are below WEIGHT_ONE. */
-uint32_t gaps_row(const struct plan *plan, const struct psr_zstack *stack, uint32_t y, uint16_t *weight);
+#define BRICK GAPS_BRICK /* pixels a side; bricks are numbered in rows, those at the border may be cut off */
+
+/* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 - coverage), by
+ * what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A pinhole has weight 0: a
+ * pixel that at least seven of its eight neighbours are before by more than level 1's threshold, where those are one surface
+ * (within level 3's threshold). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and
+ * `bricks` are of the whole picture. A pure function of words and cells. */
+struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
+                             uint32_t y1, uint16_t *weight, uint8_t *bricks);
 
 /* ---- shade: words to linear colours ([G] 7.3) ---- */
 
@@ -89,33 +97,84 @@ struct shade_counts {
 	uint64_t n_specular; /* of these with highlights looked for */
 };
 
-/* Writes 16-bit linear light of row y into rgb, from the row's words and weights: of samples, lit, where weights are above
+/* Writes 16-bit linear light of row y, into the planes of the whole picture, from the row's words and weights: of samples, lit, where weights are above
  * 0, and of the background where no sample is. */
 void shade_row(const struct simd *simd, const struct plan *plan, struct strip *strip, const uint64_t *word, const uint16_t *weight,
-               uint32_t y, uint16_t *rgb, struct shade_counts *counts);
+               uint32_t y, uint16_t *const rgb[3], struct shade_counts *counts);
 
 /* ---- fill: pull-push ([G] 4.7, appendix) ---- */
 
+#define FILL_LEVELS 15      /* 2^14 is the largest side */
+#define FILL_BRICK_LEVELS 5 /* a brick is one cell there */
+
+/* Cells of one level with a border that is not in the picture; `cell` is the one at (left, top). */
 struct fill_level {
-	uint32_t width, height;
-	uint16_t *rgb;    /* premultiplied with the weight */
-	uint16_t *weight;
-	float *z;
+	uint32_t width, height; /* of the picture */
+	int32_t left, top;
+	uint32_t stride;
+	struct fill_row cell;
 };
 
-#define FILL_LEVELS 15 /* 2^14 is the largest side */
-
 struct fill {
-	struct fill_level level[FILL_LEVELS]; /* level 0 is the picture */
-	int n_levels;
-	void *storage;    /* of levels above 0 */
+	struct fill_level level[FILL_LEVELS]; /* of 1..top, the single cell */
+	int top, brick_top;                   /* brick_top: the coarsest that bricks are pulled to by themselves */
+	uint32_t width, height, bricks_x, bricks_y;
+	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
+	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
+	uint8_t *wants;   /* by brick: how many levels are pulled from it */
+	int is_coarse;    /* some brick needs levels beyond brick_top */
+	void *storage;
 	size_t storage_size;
 };
 
-int fill_prepare(struct fill *fill, uint32_t width, uint32_t height, uint16_t *rgb, uint16_t *weight, float *z);
+/* What is filled. The linear colours r, g, b of pixels with weight above 0, the background's too, are valid in all bricks that
+ * fill_wants names, and change. */
+struct fill_picture {
+	const struct psr_zstack *stack;
+	uint16_t *weight;
+	const uint8_t *bricks; /* as gaps_rows marks them */
+	uint16_t *r, *g, *b;
+	const uint8_t *srgb;   /* 8 bits of 16-bit linear light */
+	uint8_t *rgb;          /* 3 * width * height, or NULL */
+	float *depth;          /* world units, or NULL */
+};
+
+int fill_prepare(struct fill *fill, uint32_t width, uint32_t height);
 void fill_clear(struct fill *fill);
 
-/* Gives every pixel of weight below WEIGHT_ONE its colour and z'. */
-void fill_run(struct fill *fill, const struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+/* Finds what the bricks that are marked need from others: the result has one byte a brick, not 0 where the 16-bit colours of the
+ * brick's pixels are needed. Does not read colours. */
+const uint8_t *fill_wants(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                          const struct fill_picture *picture);
+
+/* After fill_wants for the same picture: gives every pixel of weight below WEIGHT_ONE its color and, where it is below a half,
+ * its depth, and touches no other pixel of rgb and depth. Adds the counts and the error bound of the stage to the report. */
+void fill_run(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+              const struct fill_picture *picture, struct psr_report *report);
+
+/* -- between fill.c and fill_bricks.c -- */
+
+#define FILL_RUN (FILL_WIDTH / BRICK) /* bricks side by side that are worked on together */
+
+struct fill_pass {
+	struct fill *fill;
+	const struct simd *simd;
+	const struct plan *plan;
+	const struct fill_picture *picture;
+	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
+	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
+};
+
+struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y);
+float fill_scale(const struct plan *plan, int level); /* of the threshold among cells of `level` */
+float fill_offset(const struct plan *plan, int level);
+void fill_note_depth(struct fill_pass *pass, int level);
+
+/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level, or only weights and depths until all cells are
+ * whole. */
+void fill_pull_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors);
+
+/* Fills their pixels, of which none needs more than `level`. */
+void fill_push_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
 
 #endif

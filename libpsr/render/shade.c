@@ -1,23 +1,24 @@
-#include <string.h>
 #include "render/render.h"
 
 /* Writes the colours of a strip into its row, and the background where no sample is. Pixels of weight 0 stay as they are. */
-static void write_strip(const struct plan *plan, const struct strip *strip, const uint64_t *word, uint32_t n, uint16_t *rgb)
+static void write_strip(const struct plan *plan, const struct strip *strip, const uint64_t *word, uint32_t n, size_t first,
+                        uint16_t *const rgb[3])
 {
 	for (uint32_t i = 0; i < strip->n; i++) {
-		uint16_t *to = rgb + 3 * (size_t)strip->x[i];
-		to[0] = strip->r[i];
-		to[1] = strip->g[i];
-		to[2] = strip->b[i];
+		const size_t at = first + strip->x[i];
+		rgb[0][at] = strip->r[i];
+		rgb[1][at] = strip->g[i];
+		rgb[2][at] = strip->b[i];
 	}
 	if (strip->n < n)
-		for (uint32_t x = 0; x < n; x++)
-			if (word[x] == PSR_WORD_EMPTY)
-				memcpy(rgb + 3 * (size_t)x, plan->background, sizeof plan->background);
+		for (int k = 0; k < 3; k++)
+			for (uint32_t x = 0; x < n; x++)
+				if (word[x] == PSR_WORD_EMPTY)
+					rgb[k][first + x] = plan->background[k];
 }
 
 void shade_row(const struct simd *simd, const struct plan *plan, struct strip *strip, const uint64_t *word, const uint16_t *weight,
-               uint32_t y, uint16_t *rgb, struct shade_counts *counts)
+               uint32_t y, uint16_t *const rgb[3], struct shade_counts *counts)
 {
 	strip->y = y;
 	for (uint32_t x = 0; x < plan->width; x += STRIP) {
@@ -32,6 +33,6 @@ void shade_row(const struct simd *simd, const struct plan *plan, struct strip *s
 			counts->n_pixels += strip->n;
 			counts->n_specular += strip_is_specular(strip) ? strip->n : 0;
 		}
-		write_strip(plan, strip, word + x, n, rgb + 3 * (size_t)x);
+		write_strip(plan, strip, word + x, n, (size_t)y * plan->width + x, rgb);
 	}
 }

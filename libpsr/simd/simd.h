@@ -159,6 +159,55 @@ static inline int strip_is_specular(const struct strip *strip)
 	return PSR_ATTR_SPECULAR(strip->all) != 0;
 }
 
+/* ---- gaps ([G] 4.6) ---- */
+
+#define GAPS_WIDTH 128 /* a multiple of the coarsest cell */
+#define GAPS_BRICK 32
+#define GAPS_WHOLE 256 /* the weight of a pixel that nothing covers */
+
+/* A picture. What a cell of level k covers lies behind scale[k] * z' + offset[k] of it. */
+struct gaps_target {
+	const struct psr_zstack *stack;
+	const float *scale, *offset; /* by level */
+	uint16_t *weight;            /* stack->width * stack->height */
+};
+
+struct gaps_counts {
+	uint32_t n_partial;  /* pixels with a sample whose weight is below 1 */
+	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard took */
+	uint32_t n_marked;   /* bricks with a weight below 1 */
+};
+
+/* Weights of the pixels x0 <= x < x1, y0 <= y < y1: 0..GAPS_WHOLE, of the share that no cell nearer than the pixel covers, and 0
+ * for pinholes. x0 is a multiple of GAPS_WIDTH, x1 at most GAPS_WIDTH more; y0 a multiple of GAPS_BRICK, y1 at most GAPS_BRICK
+ * more. Sets marks[i] to whether brick i of the GAPS_WIDTH / GAPS_BRICK side by side has a weight below GAPS_WHOLE. */
+typedef struct gaps_counts gaps_fn(const struct gaps_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1,
+                                   uint8_t *marks);
+
+/* ---- fill ([G] 4.7, appendix) ---- */
+
+#define FILL_WIDTH 256 /* cells of a row at most, in one call */
+
+/* Cells side by side. Colours are premultiplied with the weight, but in the picture itself. Outside of the picture z is NaN,
+ * nearer than nothing and farther than nothing, and the weight GAPS_WHOLE. */
+struct fill_row {
+	uint16_t *r, *g, *b, *weight; /* r, g, b: NULL where only weights and depths matter */
+	float *z;
+};
+
+/* Cells to[0..n-1] from cells upper[0..2n-1] and lower[0..2n-1]: of those that have a weight, the ones that are not beyond
+ * scale * z + offset of the nearest. Returns the least weight. */
+typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
+                              int is_picture, float scale, float offset);
+
+/* Whole cells to[0..2n-1] from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n] count,
+ * too, and beside[0..n-1] the parents' neighbours above or below. Depths are replaced where the weight is below a half. */
+typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                          int is_picture, float scale, float offset);
+
+/* z' of n words. */
+typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
+
 struct simd {
 	cull_fn *cull;
 	warp_clear_fn *warp_clear;
@@ -167,6 +216,10 @@ struct simd {
 	strip_resolve_fn *strip_resolve;
 	strip_light_fn *strip_light;
 	strip_color_fn *strip_color;
+	gaps_fn *gaps;
+	fill_pull_fn *fill_pull;
+	fill_push_fn *fill_push;
+	fill_depths_fn *fill_depths;
 };
 
 extern const struct simd simd_c, simd_avx2, simd_avx512;

@@ -1,3 +1,5 @@
+#include "simd/fill.h"
+#include "simd/gaps.h"
 #include "simd/kernels.h"
 #define STRIP_LIST_IS_ELSEWHERE
 #include "simd/cull.h"
@@ -12,4 +14,8 @@ const struct simd simd_avx512 = {
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
 	.strip_color = strip_color,
+	.gaps = gaps,
+	.fill_pull = fill_pull,
+	.fill_push = fill_push,
+	.fill_depths = fill_depths,
 };

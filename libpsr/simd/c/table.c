@@ -1,3 +1,5 @@
+#include "simd/fill.h"
+#include "simd/gaps.h"
 #include "simd/kernels.h"
 #include "simd/cull.h"
 #include "simd/strip.h"
@@ -11,4 +13,8 @@ const struct simd simd_c = {
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
 	.strip_color = strip_color,
+	.gaps = gaps,
+	.fill_pull = fill_pull,
+	.fill_push = fill_push,
+	.fill_depths = fill_depths,
 };

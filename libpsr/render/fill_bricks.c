@@ -1,0 +1,198 @@
+#include <math.h>
+#include <string.h>
+#include "render/render.h"
+
+/* Rows of the picture reach no further than the picture: one that does is copied, with a border. */
+struct picture_row {
+	float z[FILL_WIDTH + 1];
+	uint16_t r[FILL_WIDTH + 1], g[FILL_WIDTH + 1], b[FILL_WIDTH + 1], weight[FILL_WIDTH + 1];
+};
+
+enum use { READ_WEIGHTS, READ, WRITE };
+
+/* Pixel (x, y) and the n - 1 to the right of it; a copy where they are written, too. */
+static struct fill_row picture_row_at(struct picture_row *to, const struct fill_pass *pass, uint32_t x, uint32_t y, uint32_t n,
+                                      enum use use)
+{
+	const struct fill_picture *p = pass->picture;
+	const uint32_t width = p->stack->width, n_inside = y >= p->stack->height ? 0 : x + n > width ? width - x : n;
+	const size_t first = (size_t)y * width + x;
+	if (n_inside)
+		pass->simd->fill_depths(to->z, p->stack->word + first, n_inside);
+	if (n_inside == n && use == READ_WEIGHTS)
+		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, to->z };
+	if (n_inside == n && use == READ)
+		return (struct fill_row){ p->r + first, p->g + first, p->b + first, p->weight + first, to->z };
+	if (n_inside)
+		memcpy(to->weight, p->weight + first, n_inside * sizeof *to->weight);
+	if (n_inside && use != READ_WEIGHTS) {
+		memcpy(to->r, p->r + first, n_inside * sizeof *to->r);
+		memcpy(to->g, p->g + first, n_inside * sizeof *to->g);
+		memcpy(to->b, p->b + first, n_inside * sizeof *to->b);
+	}
+	for (uint32_t i = n_inside; i < n; i++) {
+		to->z[i] = NAN;
+		to->weight[i] = WEIGHT_ONE;
+		to->r[i] = to->g[i] = to->b[i] = 0;
+	}
+	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
+}
+
+static uint32_t least_of(uint32_t a, uint32_t b)
+{
+	return a < b ? a : b;
+}
+
+void fill_pull_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors)
+{
+	const enum use use = has_colors ? READ : READ_WEIGHTS;
+	struct picture_row rows[2];
+	for (int l = 1; l <= level; l++) {
+		const struct fill_level *to = &pass->fill->level[l], *from = to - 1;
+		const uint32_t side = BRICK >> l, x0 = bx0 * side, x1 = least_of(bx1 * side, to->width);
+		const uint32_t y1 = least_of((by + 1) * side, to->height);
+		const float scale = fill_scale(pass->plan, l), offset = fill_offset(pass->plan, l);
+		uint16_t least = WEIGHT_ONE;
+		for (uint32_t y = by * side; y < y1; y++) {
+			struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), upper, lower;
+			if (!has_colors)
+				row.r = row.g = row.b = NULL;
+			if (l == 1) {
+				upper = picture_row_at(&rows[0], pass, 2 * x0, 2 * y, 2 * (x1 - x0), use);
+				lower = picture_row_at(&rows[1], pass, 2 * x0, 2 * y + 1, 2 * (x1 - x0), use);
+			} else {
+				upper = fill_row_at(from, (int32_t)(2 * x0), (int32_t)(2 * y));
+				lower = fill_row_at(from, (int32_t)(2 * x0), (int32_t)(2 * y + 1));
+			}
+			const uint16_t weight = pass->simd->fill_pull(&row, &upper, &lower, x1 - x0, l == 1, scale, offset);
+			least = weight < least ? weight : least;
+		}
+		if (has_colors && least < WEIGHT_ONE / 2)
+			fill_note_depth(pass, l);
+		if (!has_colors && least == WEIGHT_ONE)
+			return;
+	}
+}
+
+/* Cells of levels 1..5 that bricks are pushed through, so that what bricks share stays as it was pulled. They reach a
+ * cell beyond the bricks; a row's border is there to be read and written, and never used. */
+#define BORDER 2
+#define STRIDE(level) (FILL_RUN * (BRICK >> (level)) + 2 * BORDER + 1)
+#define AREA(level) (STRIDE(level) * ((BRICK >> (level)) + 2))
+
+struct scratch {
+	struct fill_level level[FILL_BRICK_LEVELS + 1];
+	uint16_t values[4 * (AREA(1) + AREA(2) + AREA(3) + AREA(4) + AREA(5))];
+	float z[AREA(1) + AREA(2) + AREA(3) + AREA(4) + AREA(5)];
+};
+
+static void copy_cells(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
+{
+	for (int i = 0; i < BORDER - 1; i++)
+		to[i] = outside;
+	memcpy(to + BORDER - 1, from, n * sizeof *to);
+	for (int i = 0; i < BORDER; i++)
+		to[BORDER - 1 + n + (uint32_t)i] = outside;
+}
+
+/* What was pulled, with the cells around it. */
+static void load_level(struct scratch *scratch, const struct fill *fill, int l, uint32_t bx0, uint32_t bx1, uint32_t by)
+{
+	const struct fill_level *from = &fill->level[l];
+	struct fill_level *to = &scratch->level[l];
+	const uint32_t side = BRICK >> l, x0 = bx0 * side, n = least_of(bx1 * side, from->width) - x0 + 2;
+	size_t first = 0;
+	for (int i = 1; i < l; i++)
+		first += (size_t)AREA(i);
+	*to = (struct fill_level){ .width = n - 2, .height = least_of((by + 1) * side, from->height) - by * side,
+		                       .left = (int32_t)x0 - BORDER, .top = (int32_t)(by * side) - 1, .stride = n + 2 * BORDER - 1 };
+	const size_t area = (size_t)to->stride * (to->height + 2);
+	uint16_t *values = scratch->values + 4 * first;
+	to->cell = (struct fill_row){ values, values + area, values + 2 * area, values + 3 * area, scratch->z + first };
+	for (uint32_t y = 0; y < to->height + 2; y++) {
+		const struct fill_row in = fill_row_at(from, (int32_t)x0 - 1, to->top + (int32_t)y);
+		const struct fill_row out = fill_row_at(to, to->left, to->top + (int32_t)y);
+		copy_cells(out.r, in.r, n, 0);
+		copy_cells(out.g, in.g, n, 0);
+		copy_cells(out.b, in.b, n, 0);
+		copy_cells(out.weight, in.weight, n, WEIGHT_ONE);
+		memcpy(out.z + BORDER - 1, in.z, n * sizeof *out.z);
+		out.z[0] = out.z[n + BORDER - 1] = out.z[n + BORDER] = NAN;
+	}
+}
+
+static void push_level(const struct fill_pass *pass, const struct scratch *scratch, int l)
+{
+	const struct fill_level *to = &scratch->level[l], *from = to + 1;
+	const float scale = fill_scale(pass->plan, l + 1), offset = fill_offset(pass->plan, l + 1);
+	for (int32_t y = to->top; y < to->top + (int32_t)to->height + 2; y++) {
+		const int32_t parent = y >> 1, x = from->left + 1;
+		const struct fill_row row = fill_row_at(to, 2 * x, y), own = fill_row_at(from, x, parent);
+		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
+		pass->simd->fill_push(&row, &own, &beside, from->width + 2, 0, scale, offset);
+	}
+}
+
+/* The places of weights below one, in order. */
+static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n)
+{
+	const uint64_t whole = UINT64_C(0x0001000100010001) * WEIGHT_ONE;
+	uint32_t n_places = 0;
+	for (uint32_t x = 0; x < n; x += 4) {
+		uint64_t four = whole;
+		memcpy(&four, weight + x, least_of(n - x, 4) * sizeof *weight);
+		if (four == whole)
+			continue;
+		for (uint32_t i = x; i < n && i < x + 4; i++) {
+			place[n_places] = (uint16_t)i;
+			n_places += weight[i] < WEIGHT_ONE;
+		}
+	}
+	return n_places;
+}
+
+void fill_push_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
+{
+	const struct fill_picture *p = pass->picture;
+	const uint32_t width = p->stack->width, x0 = bx0 * BRICK, n = least_of(bx1 * BRICK, width) - x0;
+	const uint32_t y1 = least_of((by + 1) * BRICK, p->stack->height);
+	const float scale = fill_scale(pass->plan, 1), offset = fill_offset(pass->plan, 1);
+	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
+	uint16_t place[FILL_WIDTH + 4];
+	struct scratch scratch;
+	struct picture_row pixels;
+
+	for (int l = level; l >= 1; l--) {
+		load_level(&scratch, pass->fill, l, bx0, bx1, by);
+		if (l < level)
+			push_level(pass, &scratch, l);
+	}
+	const struct fill_level *from = &scratch.level[1];
+	for (uint32_t y = by * BRICK; y < y1; y++) {
+		const size_t first = (size_t)y * width + x0;
+		const uint32_t n_places = list_partial(place, p->weight + first, n);
+		if (!n_places)
+			continue;
+		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
+		const struct fill_row row = picture_row_at(&pixels, pass, x0, y, 2 * from->width, WRITE), own = fill_row_at(from, x, parent);
+		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
+		pass->simd->fill_push(&row, &own, &beside, from->width, 1, scale, offset);
+		for (uint32_t i = 0; i < n_places; i++) {
+			const uint32_t at = place[i];
+			n_filled += row.weight[at] == 0 && row.z[at] < INFINITY;
+			n_moved += row.weight[at] < WEIGHT_ONE / 2;
+			if (p->rgb) {
+				uint8_t *rgb = p->rgb + 3 * (first + at);
+				rgb[0] = p->srgb[row.r[at]];
+				rgb[1] = p->srgb[row.g[at]];
+				rgb[2] = p->srgb[row.b[at]];
+			}
+			if (p->depth)
+				p->depth[first + at] = ldexpf(row.z[at], p->stack->exponent);
+		}
+		n_changed += n_places;
+	}
+	atomic_fetch_add_explicit(&pass->n_changed, n_changed, memory_order_relaxed);
+	atomic_fetch_add_explicit(&pass->n_filled, n_filled, memory_order_relaxed);
+	atomic_fetch_add_explicit(&pass->n_moved, n_moved, memory_order_relaxed);
+}
