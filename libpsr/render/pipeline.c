@@ -16,6 +16,7 @@ struct psr_renderer {
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
+	struct shade_target target;
 	/* All of a pixel, in one piece of memory: words, levels, linear colours by channel, weights. */
 	void *pixels;
 	size_t pixels_size;
@@ -215,25 +216,14 @@ static void shade_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
-	struct strip strip;
-	r->shade[row] = (struct shade_counts){ 0, 0 };
+	struct shade_counts counts = { 0, 0 };
 	for (uint32_t y = (uint32_t)row * BRICK; y < row_end(plan, row); y++) {
 		const size_t first = (size_t)y * plan->width;
-		shade_row(r->simd, plan, &strip, r->stack.word + first, r->weight + first, y, r->rgb, &r->shade[row]);
+		shade_row(r->simd, plan, &r->target, r->stack.word + first, r->weight + first, y, &counts);
+		if (r->frame->depth)
+			r->simd->depth_row(r->frame->depth + first, r->stack.word + first, plan->width, r->stack.exponent);
 	}
-}
-
-static void output_one(int row, void *userdata)
-{
-	struct psr_renderer *r = userdata;
-	const size_t width = r->plan.width, begin = (size_t)row * BRICK * width, end = row_end(&r->plan, row) * width;
-	if (r->frame->rgb)
-		for (size_t at = begin; at < end; at++)
-			for (int k = 0; k < 3; k++)
-				r->frame->rgb[3 * at + (size_t)k] = r->srgb[r->rgb[k][at]];
-	if (r->frame->depth)
-		for (size_t at = begin; at < end; at++)
-			r->frame->depth[at] = ldexpf(psr_float_from_bits((uint32_t)(r->stack.word[at] >> 32)), r->stack.exponent);
+	r->shade[row] = counts;
 }
 
 int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
@@ -245,6 +235,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	*report = r->report;
 	r->frame = frame;
 
+	r->target = (struct shade_target){ frame->rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
 	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, frame->rgb, frame->depth };
 	const int n = (int)n_rows(&r->plan);
 	uint32_t n_marked = 0;
@@ -259,7 +250,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	if (n_marked) {
 		if (fill_prepare(&r->fill, r->plan.width, r->plan.height))
 			return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-		fill_wants(&r->fill, r->simd, &r->plan, pool, &picture);
+		r->target.wants = fill_wants(&r->fill, r->simd, &r->plan, pool, &picture);
 	}
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
 	start = end;
@@ -268,7 +259,6 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	for (int i = 0; i < n; i++)
 		report->count[PSR_STAGE_SHADE] += r->shade[i].n_pixels;
 	report->n_covered = report->count[PSR_STAGE_SHADE];
-	psr_pool_for(pool, n, output_one, r);
 	report->ns[PSR_STAGE_SHADE] = (end = now_ns()) - start;
 	start = end;
 	if (n_marked)

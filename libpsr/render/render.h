@@ -97,10 +97,16 @@ struct shade_counts {
 	uint64_t n_specular; /* of these with highlights looked for */
 };
 
-/* Writes 16-bit linear light of row y, into the planes of the whole picture, from the row's words and weights: of samples, lit, where weights are above
- * 0, and of the background where no sample is. */
-void shade_row(const struct simd *simd, const struct plan *plan, struct strip *strip, const uint64_t *word, const uint16_t *weight,
-               uint32_t y, uint16_t *const rgb[3], struct shade_counts *counts);
+struct shade_target {
+	uint8_t *rgb;         /* sRGB, 3 * width * height, or NULL */
+	const uint8_t *srgb;  /* 8 bits of 16-bit linear light */
+	uint16_t *r, *g, *b;  /* linear light, width * height: written in bricks that are wanted, and maybe in others */
+	const uint8_t *wants; /* one byte a brick, as of fill_wants; NULL: none */
+};
+
+/* Gives the pixels of row y their colours: samples of weight above 0, lit, and the background where none is. */
+void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
+               const uint16_t *weight, uint32_t y, struct shade_counts *counts);
 
 /* ---- fill: pull-push ([G] 4.7, appendix) ---- */
 

@@ -154,6 +154,9 @@ typedef void strip_light_fn(struct strip *strip, const struct strip_light *light
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 
+/* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
+typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int exponent);
+
 static inline int strip_is_specular(const struct strip *strip)
 {
 	return PSR_ATTR_SPECULAR(strip->all) != 0;
@@ -216,6 +219,7 @@ struct simd {
 	strip_resolve_fn *strip_resolve;
 	strip_light_fn *strip_light;
 	strip_color_fn *strip_color;
+	depth_row_fn *depth_row;
 	gaps_fn *gaps;
 	fill_pull_fn *fill_pull;
 	fill_push_fn *fill_push;

@@ -257,3 +257,13 @@ static void strip_color(struct strip *strip)
 	else
 		strip_color_by(strip, 0);
 }
+
+/* By two factors, since one of them may be beyond a float: exact unless the result is. */
+static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
+{
+	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
+	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
+	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
+	for (uint32_t i = 0; i < n; i++)
+		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
+}
