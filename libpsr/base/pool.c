@@ -5,10 +5,12 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <time.h>
 #include "psr/error.h"
 #include "psr/pool.h"
 
 #define MAX_THREADS 256
+#define SPIN_NS 50000
 
 struct job {
 	struct job *next;
@@ -21,8 +23,9 @@ struct loop {
 	struct loop *next, *previous;
 	void (*fn)(int i, void *userdata);
 	void *userdata;
-	int n, n_helpers;
-	atomic_int taken; /* indices given out */
+	int n;
+	atomic_int n_helpers; /* changed under the mutex */
+	atomic_int taken;     /* indices given out */
 	pthread_cond_t left;
 };
 
@@ -32,7 +35,8 @@ struct psr_pool {
 	struct job *first_job, **last_job;
 	struct loop loops; /* head of a ring */
 	atomic_int n_jobs; /* queued ones */
-	int n_threads, n_workers, with_jobs, stopping;
+	atomic_uint n_offers; /* loops and jobs ever, and the end: idle workers watch it for a while before they sleep */
+	int n_threads, n_workers, n_asleep, with_jobs, stopping;
 	pthread_t worker[MAX_THREADS];
 };
 
@@ -88,21 +92,66 @@ static void help(struct psr_pool *pool, struct loop *loop)
 		pthread_cond_signal(&loop->left);
 }
 
+static void pause_briefly(void)
+{
+#ifdef __x86_64__
+	__builtin_ia32_pause();
+#endif
+}
+
+/* A frame is a dozen loops one after the other, each well below a millisecond: waking a thread costs some 50 us, which
+ * is what a worker spins for at most. */
+static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
+{
+	struct timespec start, now;
+
+	clock_gettime(CLOCK_MONOTONIC, &start);
+	do {
+		for (int i = 0; i < 64; i++) {
+			if (atomic_load_explicit(&pool->n_offers, memory_order_acquire) != n_offers)
+				return 1;
+			pause_briefly();
+		}
+		clock_gettime(CLOCK_MONOTONIC, &now);
+	} while ((now.tv_sec - start.tv_sec) * 1000000000L + now.tv_nsec - start.tv_nsec < SPIN_NS);
+	return 0;
+}
+
+static void offer(struct psr_pool *pool)
+{
+	atomic_fetch_add_explicit(&pool->n_offers, 1, memory_order_release);
+	if (pool->n_asleep > 0)
+		pthread_cond_broadcast(&pool->work);
+}
+
 static void *work(void *userdata)
 {
 	struct psr_pool *pool = userdata;
 	struct loop *loop;
+	int has_spun = 0;
 
 	pthread_mutex_lock(&pool->mutex);
 	for (;;) {
-		if (pool->first_job != NULL)
+		const unsigned n_offers = atomic_load_explicit(&pool->n_offers, memory_order_relaxed);
+
+		if (pool->first_job != NULL) {
 			run_job(pool);
-		else if ((loop = neediest_loop(pool)) != NULL)
+			has_spun = 0;
+		} else if ((loop = neediest_loop(pool)) != NULL) {
 			help(pool, loop);
-		else if (pool->stopping)
+			has_spun = 0;
+		} else if (pool->stopping) {
 			break;
-		else
+		} else if (!has_spun) {
+			pthread_mutex_unlock(&pool->mutex);
+			has_spun = !spin_until_offer(pool, n_offers);
+			pthread_mutex_lock(&pool->mutex);
+		} else {
+			pool->n_asleep++;
 			pthread_cond_wait(&pool->work, &pool->mutex);
+			pool->n_asleep--;
+			has_spun = 0;
+		}
 	}
 	pthread_mutex_unlock(&pool->mutex);
 	return NULL;
@@ -159,7 +208,7 @@ void psr_pool_destroy(struct psr_pool *pool)
 		return;
 	pthread_mutex_lock(&pool->mutex);
 	pool->stopping = 1;
-	pthread_cond_broadcast(&pool->work);
+	offer(pool);
 	pthread_mutex_unlock(&pool->mutex);
 	for (int i = 0; i < pool->n_workers; i++)
 		pthread_join(pool->worker[i], NULL);
@@ -191,7 +240,7 @@ void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata
 	loop.next = &pool->loops;
 	loop.previous = pool->loops.previous;
 	loop.previous->next = loop.next->previous = &loop;
-	pthread_cond_broadcast(&pool->work);
+	offer(pool);
 	pthread_mutex_unlock(&pool->mutex);
 
 	run_indices(&loop, NULL);
@@ -199,6 +248,12 @@ void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata
 	pthread_mutex_lock(&pool->mutex);
 	loop.previous->next = loop.next;
 	loop.next->previous = loop.previous;
+	if (loop.n_helpers > 0) {
+		pthread_mutex_unlock(&pool->mutex);
+		for (int i = 0; i < 4096 && atomic_load_explicit(&loop.n_helpers, memory_order_acquire) > 0; i++)
+			pause_briefly();
+		pthread_mutex_lock(&pool->mutex);
+	}
 	while (loop.n_helpers > 0)
 		pthread_cond_wait(&loop.left, &pool->mutex);
 	pthread_mutex_unlock(&pool->mutex);
@@ -218,7 +273,7 @@ int psr_pool_submit(struct psr_pool *pool, void (*fn)(void *userdata), void *use
 	*pool->last_job = job;
 	pool->last_job = &job->next;
 	atomic_fetch_add_explicit(&pool->n_jobs, 1, memory_order_relaxed);
-	pthread_cond_signal(&pool->work);
+	offer(pool);
 	pthread_mutex_unlock(&pool->mutex);
 	return PSR_OK;
 }
