@@ -12,6 +12,7 @@
 static double cut_plane[N_INNER][3][3];
 static float direction_table[PSR_DIRECTIONS][3];
 static uint64_t direction_words[PSR_DIRECTIONS];
+static uint32_t direction_tens[PSR_DIRECTIONS];
 static pthread_once_t tables_once = PTHREAD_ONCE_INIT;
 
 static void midpoint(double m[3], const double a[3], const double b[3])
@@ -91,6 +92,7 @@ static void make_tables(void)
 		for (int k = 0; k < 3; k++) {
 			direction_table[index][k] = (float)v[k];
 			direction_words[index] |= (uint64_t)(uint16_t)lround(v[k] * 32767) << 16 * k;
+			direction_tens[index] |= ((uint32_t)lround(v[k] * 511) & 0x3ff) << 10 * k;
 		}
 	}
 }
@@ -105,6 +107,12 @@ const float (*psr_direction_table(void))[3]
 {
 	pthread_once(&tables_once, make_tables);
 	return (const float(*)[3])direction_table;
+}
+
+const uint32_t *psr_direction_tens(void)
+{
+	pthread_once(&tables_once, make_tables);
+	return direction_tens;
 }
 
 uint16_t psr_direction_encode(const float v[3])

@@ -4,7 +4,7 @@
 static void target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile)
 {
 	t->instance = plan->warp;
-	t->direction = psr_direction_table();
+	t->direction = psr_direction_tens();
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
 	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;

@@ -4,9 +4,9 @@
 
 /* How a block faces, by its visibility cone ([G] 6.4): with d from the eye to the sphere's centre, at the angle theta from
  * the cone's axis, a normal n within alpha of that and a sample x within r of the centre, n . (x - eye) is between
- * |d| cos(theta + alpha) - r and |d| cos(theta - alpha) + r, and |x - eye| within r of |d|. A thousandth makes up for
- * rounding. */
-#define CONE_SLACK 0.001f
+ * |d| cos(theta + alpha) - r and |d| cos(theta - alpha) + r, and |x - eye| within r of |d|. The slack makes up for
+ * rounding, and for normals in 10 bits, which are off by sqrt(3) / 1022 at most. */
+#define CONE_SLACK 0.0027f
 
 /* Smallest c - r or greatest c + r, over z within z0..z1: where perspective takes it. */
 static inline float edge_of(float at, int is_perspective, float z_if_negative, float z_if_positive)

@@ -8,8 +8,8 @@
 #include "psr/isa.h"
 #include "psr/render.h"
 
-/* A sample of a one-sided block faces away when its normal is more than this sine beyond perpendicular: what
- * normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out
+/* A sample of a one-sided block faces away when its normal (psr_direction_tens) is more than this sine beyond
+ * perpendicular: what normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out
  * when they are warped, before they hide what is behind them, so that open one-sided surfaces are seen through
  * from their backs. */
 #define BACK_SINE 0.0125f
@@ -75,7 +75,7 @@ struct bin_entry {
  * border the guard band. Pixels count from the picture's corner, cells from the guard band's. */
 struct warp_target {
 	const struct warp_instance *instance;
-	const float (*direction)[3];
+	const uint32_t *direction; /* psr_direction_tens() */
 	float near_z;
 	int perspective;
 	uint64_t *word; /* of the whole picture; WARP_PADDING more can be written */

@@ -33,6 +33,9 @@ const float (*psr_direction_table(void))[3];
 /* The same in one word each: x, y and z as integers of 16 bits, 32,767 times as long, x lowest. */
 const uint64_t *psr_direction_words(void);
 
+/* The same as integers of 10 bits, 511 times as long, x lowest: no component is off by more than 1/1022. */
+const uint32_t *psr_direction_tens(void);
+
 /* Centre (normalised sum of the corners) of triangle `index` of the sphere subdivided `level` times (0..6):
  * index < 8 * 4^level. The 32 projections of [G] 5.1 are level 1, the 128 triangles of [G] 6.3 level 2. */
 void psr_direction_center(int level, unsigned index, double v[3]);

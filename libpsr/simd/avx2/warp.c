@@ -74,13 +74,13 @@ static inline __m256i faces_away(const struct warp_target *t, const struct warp_
 	const __m256 low = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr, low_mask));
 	const __m256 high = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr + 4, high_mask));
 	const __m256i a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
-	const __m256i index = _mm256_mullo_epi32(_mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), _mm256_set1_epi32(3));
+	const __m256i normal = _mm256_i32gather_epi32((const int *)t->direction, _mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), 4);
 	__m256 n[3], d[3];
 	for (int i = 0; i < 3; i++) {
-		n[i] = _mm256_i32gather_ps(t->direction[0] + i, index, 4);
+		n[i] = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(normal, 22 - 10 * i), 22));
 		d[i] = sight_axis(in, i, u, v);
 	}
-	const __m256 g = dot(n, d), limit = _mm256_mul_ps(_mm256_set1_ps(BACK_SINE * BACK_SINE), dot(d, d));
+	const __m256 g = dot(n, d), limit = _mm256_mul_ps(_mm256_set1_ps(BACK_SINE * BACK_SINE * 511 * 511), dot(d, d));
 	const __m256 behind = _mm256_cmp_ps(g, _mm256_setzero_ps(), _CMP_GT_OQ);
 	return _mm256_castps_si256(_mm256_and_ps(behind, _mm256_cmp_ps(_mm256_mul_ps(g, g), limit, _CMP_GT_OQ)));
 }

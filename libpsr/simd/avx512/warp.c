@@ -85,13 +85,13 @@ static inline __mmask16 faces_away(const struct warp_target *t, const struct war
 	const __m256i low = _mm512_cvtepi64_epi32(_mm512_maskz_loadu_epi64((__mmask8)k, attr));
 	const __m256i high = _mm512_cvtepi64_epi32(_mm512_maskz_loadu_epi64((__mmask8)(k >> 8), attr + 8));
 	const __m512i a = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
-	const __m512i index = _mm512_mullo_epi32(_mm512_and_si512(a, _mm512_set1_epi32(0x7fff)), _mm512_set1_epi32(3));
+	const __m512i normal = _mm512_i32gather_epi32(_mm512_and_si512(a, _mm512_set1_epi32(0x7fff)), t->direction, 4);
 	__m512 n[3], d[3];
 	for (int i = 0; i < 3; i++) {
-		n[i] = _mm512_i32gather_ps(index, t->direction[0] + i, 4);
+		n[i] = _mm512_cvtepi32_ps(_mm512_srai_epi32(_mm512_slli_epi32(normal, (unsigned)(22 - 10 * i)), 22));
 		d[i] = sight_axis(in, i, u, v);
 	}
-	const __m512 g = dot(n, d), limit = _mm512_mul_ps(_mm512_set1_ps(BACK_SINE * BACK_SINE), dot(d, d));
+	const __m512 g = dot(n, d), limit = _mm512_mul_ps(_mm512_set1_ps(BACK_SINE * BACK_SINE * 511 * 511), dot(d, d));
 	k = _mm512_mask_cmp_ps_mask(k, g, _mm512_setzero_ps(), _CMP_GT_OQ);
 	return _mm512_mask_cmp_ps_mask(k, _mm512_mul_ps(g, g), limit, _CMP_GT_OQ);
 }

@@ -10,14 +10,16 @@ static inline float clamp_pixel(float u)
 	return u < far ? u : far;
 }
 
-static inline int faces_away(const struct warp_instance *in, const float n[3], float u, float v)
+static inline int faces_away(const struct warp_instance *in, uint32_t normal, float u, float v)
 {
-	float d[3];
-	for (int k = 0; k < 3; k++)
+	float n[3], d[3];
+	for (int k = 0; k < 3; k++) {
+		n[k] = (float)((int32_t)(normal << (22 - 10 * k)) >> 22);
 		d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
+	}
 	const float g = (n[0] * d[0] + n[1] * d[1]) + n[2] * d[2];
 	const float length2 = (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
-	return g > 0 && g * g > (BACK_SINE * BACK_SINE) * length2;
+	return g > 0 && g * g > (BACK_SINE * BACK_SINE * 511 * 511) * length2;
 }
 
 static inline int inside(int32_t u, int32_t v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
