@@ -154,6 +154,16 @@ typedef void strip_light_fn(struct strip *strip, const struct strip_light *light
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 
+struct strip_target {
+	uint32_t width;
+	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
+	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
+	uint16_t *r, *g, *b;    /* linear light, or NULL */
+	uint16_t background[3]; /* linear */
+};
+/* Colours of the n pixels of the part of the row: those of the strip's samples, elsewhere the background. */
+typedef void strip_write_fn(const struct strip *strip, const struct strip_target *target, uint32_t n);
+
 /* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
 typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int exponent);
 
@@ -219,6 +229,7 @@ struct simd {
 	strip_resolve_fn *strip_resolve;
 	strip_light_fn *strip_light;
 	strip_color_fn *strip_color;
+	strip_write_fn *strip_write;
 	depth_row_fn *depth_row;
 	gaps_fn *gaps;
 	fill_pull_fn *fill_pull;

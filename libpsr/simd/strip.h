@@ -1,4 +1,5 @@
 /* Strips, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+#include <string.h>
 #include "base/maths.h"
 #include "base/srgb.h"
 #include "simd/block.h"
@@ -98,6 +99,32 @@ static const float exponent_root[16] = {
 	1.41421356f, 1.47682615f, 1.54221083f, 1.61049033f, 1.68179283f, 1.75625216f, 1.83400809f, 1.91520656f,
 };
 
+/* Colours, from the attributes: often the same in the whole strip. */
+static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
+		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
+	}
+}
+
+static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint64_t attr = is_one ? first : strip->attr[i];
+		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
+		strip->sr[i] = psr_srgb_to_linear[((specular & 31) * 255 + 15) / 31];
+		strip->sg[i] = psr_srgb_to_linear[((specular >> 5 & 63) * 255 + 31) / 63];
+		strip->sb[i] = psr_srgb_to_linear[((specular >> 11) * 255 + 15) / 31];
+		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
+		strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
+	}
+}
+
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const uint64_t *at[STRIP];
@@ -115,21 +142,22 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	}
 	run_first[n_runs] = n;
 
-	uint64_t all = 0;
+	uint64_t all = 0, common = ~UINT64_C(0);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint64_t attr = *at[i];
 		strip->attr[i] = attr;
 		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
 		all |= attr;
+		common &= attr;
 	}
 	strip->all = all;
 	for (uint32_t k = 0; k < n_runs; k++)
 		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
+	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
+		read_diffuse(strip, 1);
+	else
+		read_diffuse(strip, 0);
 	for (uint32_t i = 0; i < n; i++) {
-		const uint32_t diffuse = PSR_ATTR_DIFFUSE(strip->attr[i]);
-		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
-		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
-		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
 		strip->lr[i] = ambient[0];
 		strip->lg[i] = ambient[1];
 		strip->lb[i] = ambient[2];
@@ -144,15 +172,10 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
 		}
-	if (strip_is_specular(strip))
-		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t specular = PSR_ATTR_SPECULAR(strip->attr[i]), e = PSR_ATTR_EXPONENT(strip->attr[i]);
-			strip->sr[i] = psr_srgb_to_linear[((specular & 31) * 255 + 15) / 31];
-			strip->sg[i] = psr_srgb_to_linear[((specular >> 5 & 63) * 255 + 31) / 63];
-			strip->sb[i] = psr_srgb_to_linear[((specular >> 11) * 255 + 15) / 31];
-			strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
-			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
-		}
+	if (strip_is_specular(strip) && all >> 40 == common >> 40)
+		read_specular(strip, 1);
+	else if (strip_is_specular(strip))
+		read_specular(strip, 0);
 }
 
 /* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
@@ -256,6 +279,42 @@ static void strip_color(struct strip *strip)
 		strip_color_by(strip, 1);
 	else
 		strip_color_by(strip, 0);
+}
+
+static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uint16_t b)
+{
+	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
+}
+
+static void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const size_t first = (size_t)strip->y * target->width + strip->x0;
+	const uint16_t r = target->background[0], g = target->background[1], b = target->background[2];
+	if (target->rgb) {
+		const uint32_t empty = pixel_of(target->srgb, r, g, b);
+		uint8_t *to = target->rgb + 3 * first;
+		uint32_t pixel[STRIP];
+		for (uint32_t x = 0; x < n; x++)
+			pixel[x] = empty;
+		for (uint32_t i = 0; i < strip->n; i++)
+			pixel[strip->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
+		for (uint32_t x = 0; x + 1 < n; x++) /* the fourth byte is the next pixel's */
+			memcpy(to + 3 * (size_t)x, &pixel[x], 4);
+		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
+	}
+	if (!target->r)
+		return;
+	for (uint32_t x = 0; x < n; x++)
+		target->r[first + x] = r;
+	for (uint32_t x = 0; x < n; x++)
+		target->g[first + x] = g;
+	for (uint32_t x = 0; x < n; x++)
+		target->b[first + x] = b;
+	for (uint32_t i = 0; i < strip->n; i++) {
+		target->r[first + strip->x[i]] = strip->r[i];
+		target->g[first + strip->x[i]] = strip->g[i];
+		target->b[first + strip->x[i]] = strip->b[i];
+	}
 }
 
 /* By two factors, since one of them may be beyond a float: exact unless the result is. */

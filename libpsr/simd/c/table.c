@@ -13,6 +13,7 @@ const struct simd simd_c = {
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
 	.strip_color = strip_color,
+	.strip_write = strip_write,
 	.depth_row = depth_row,
 	.gaps = gaps,
 	.fill_pull = fill_pull,
