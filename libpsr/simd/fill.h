@@ -20,37 +20,62 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 	}
 }
 
+/* The four children of each of n cells, apart. */
+struct children {
+	float z[4][FILL_WIDTH];
+	int32_t weight[4][FILL_WIDTH];
+};
+
+static inline void load_children(struct children *to, int first, const struct fill_row *from, uint32_t n)
+{
+	const float *z = from->z;
+	const uint16_t *weight = from->weight;
+	for (uint32_t x = 0; x < n; x++) {
+		to->z[first][x] = z[2 * x];
+		to->z[first + 1][x] = z[2 * x + 1];
+	}
+	for (uint32_t x = 0; x < n; x++) {
+		to->weight[first][x] = weight[2 * x];
+		to->weight[first + 1][x] = weight[2 * x + 1];
+	}
+}
+
 static uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                           int is_picture, float scale, float offset)
 {
+	struct children child;
 	uint16_t share[4 * FILL_WIDTH], divisor[FILL_WIDTH];
 	float inverse[FILL_WIDTH];
-	uint16_t least = GAPS_WHOLE;
+	int32_t sum[FILL_WIDTH], least = GAPS_WHOLE;
+	load_children(&child, 0, upper, n);
+	load_children(&child, 2, lower, n);
 	for (uint32_t x = 0; x < n; x++) {
-		const uint32_t wa = upper->weight[2 * x], wb = upper->weight[2 * x + 1];
-		const uint32_t wc = lower->weight[2 * x], wd = lower->weight[2 * x + 1];
-		const float za = upper->z[2 * x], zb = upper->z[2 * x + 1], zc = lower->z[2 * x], zd = lower->z[2 * x + 1];
-		const float a = wa ? za : INFINITY, b = wb ? zb : INFINITY, c = wc ? zc : INFINITY, d = wd ? zd : INFINITY;
-		/* What is NaN is nearer than nothing. */
-		float nearest = a < INFINITY ? a : INFINITY;
-		nearest = b < nearest ? b : nearest;
-		nearest = c < nearest ? c : nearest;
-		nearest = d < nearest ? d : nearest;
+		float nearest = INFINITY, z = 0;
+		int32_t w = 0;
+		for (int i = 0; i < 4; i++) { /* what is NaN is nearer than nothing */
+			const float own = child.weight[i][x] ? child.z[i][x] : INFINITY;
+			nearest = own < nearest ? own : nearest;
+		}
 		const float limit = nearest * scale + offset;
-		const uint32_t ua = a <= limit ? wa : 0, ub = b <= limit ? wb : 0, uc = c <= limit ? wc : 0, ud = d <= limit ? wd : 0;
-		const uint32_t w = ua + ub + uc + ud;
-		const float z = (((ua ? (float)ua * za : 0) + (ub ? (float)ub * zb : 0)) + (uc ? (float)uc * zc : 0)) +
-		                (ud ? (float)ud * zd : 0);
-		const uint16_t weight = (uint16_t)(w < GAPS_WHOLE ? w : GAPS_WHOLE);
-		to->z[x] = w ? z / (float)w : INFINITY;
-		to->weight[x] = weight;
-		least = weight < least ? weight : least;
-		divisor[x] = (uint16_t)(w > GAPS_WHOLE ? w : GAPS_WHOLE);
-		share[x] = (uint16_t)(ua && !is_picture ? 256 : ua);
-		share[FILL_WIDTH + x] = (uint16_t)(ub && !is_picture ? 256 : ub);
-		share[2 * FILL_WIDTH + x] = (uint16_t)(uc && !is_picture ? 256 : uc);
-		share[3 * FILL_WIDTH + x] = (uint16_t)(ud && !is_picture ? 256 : ud);
+		for (int i = 0; i < 4; i++) {
+			const int32_t is_near = child.z[i][x] <= limit, own = is_near ? child.weight[i][x] : 0;
+			const float product = (float)own * child.z[i][x];
+			z += own ? product : 0;
+			w += own;
+			child.weight[i][x] = own;
+		}
+		z /= (float)w;
+		to->z[x] = w ? z : INFINITY;
+		sum[x] = w;
+		least = w < least ? w : least;
 	}
+	for (uint32_t x = 0; x < n; x++) {
+		to->weight[x] = (uint16_t)(sum[x] < GAPS_WHOLE ? sum[x] : GAPS_WHOLE);
+		divisor[x] = (uint16_t)(sum[x] > GAPS_WHOLE ? sum[x] : GAPS_WHOLE);
+	}
+	for (int i = 0; i < 4 && to->r; i++)
+		for (uint32_t x = 0; x < n; x++)
+			share[i * FILL_WIDTH + x] = (uint16_t)(child.weight[i][x] && !is_picture ? 256 : child.weight[i][x]);
 	if (to->r) {
 		for (uint32_t x = 0; x < n; x++)
 			inverse[x] = (256 - 0x1p-12f) / (float)divisor[x];
@@ -58,7 +83,7 @@ static uint16_t fill_pull(const struct fill_row *to, const struct fill_row *uppe
 		pull_channel(to->g, upper->g, lower->g, share, divisor, inverse, n);
 		pull_channel(to->b, upper->b, lower->b, share, divisor, inverse, n);
 	}
-	return least;
+	return (uint16_t)least;
 }
 
 /* What a finer cell takes from its parent, from the parent's neighbour to its own side and from that above or below, and

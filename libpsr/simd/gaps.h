@@ -59,29 +59,27 @@ static void find_limits(struct limits *to, const struct gaps_target *t, int k, u
 	const struct psr_zstack *stack = t->stack;
 	const float *cell = stack->level[k].z + (size_t)j * stack->level[k].width + i;
 	const float scale = t->scale[k], offset = t->offset[k];
-	float nearest = INFINITY;
+	int32_t has_any = 0;
 	for (uint32_t c = 0; c < n; c++) {
 		to->own[c] = cell[c] * scale + offset;
-		nearest = to->own[c] < nearest ? to->own[c] : nearest;
+		has_any |= cell[c] < INFINITY;
 	}
-	to->is_empty = nearest == INFINITY;
+	to->is_empty = !has_any;
 	if (has_finer) {
 		const float fine_scale = t->scale[k - 1], fine_offset = t->offset[k - 1];
 		const uint32_t width = stack->level[k - 1].width, height = stack->level[k - 1].height;
-		const int32_t u0 = 2 * (int32_t)i - 1;
+		/* The finer level has no cell where 2 i - 1 is below 0, and may have none at its other end. */
+		const uint32_t before = i ? 0 : 1, u0 = 2 * i + before - 1, end = before + (width - u0 < 2 * n - before ? width - u0 : 2 * n - before);
+		float children[2 * MAX_CELLS];
+		children[0] = children[2 * n - 1] = INFINITY;
 		for (uint32_t c = 0; c < n; c++)
 			to->either[c] = to->own[c];
-		for (int32_t v = 2 * (int32_t)j - 1; v <= 2 * (int32_t)j; v++) {
-			if ((uint32_t)v >= height)
-				continue;
-			const float *fine = stack->level[k - 1].z + (size_t)v * width;
-			float padded[2 * MAX_CELLS];
-			for (uint32_t c = 0; c < 2 * n; c++) {
-				const uint32_t u = (uint32_t)(u0 + (int32_t)c);
-				padded[c] = u < width ? fine[u] * fine_scale + fine_offset : INFINITY;
-			}
+		for (uint32_t v = j ? 2 * j - 1 : 0; v <= 2 * j && v < height; v++) {
+			const float *fine = stack->level[k - 1].z + (size_t)v * width + u0;
+			for (uint32_t c = before; c < end; c++)
+				children[c] = fine[c - before] * fine_scale + fine_offset;
 			for (uint32_t c = 0; c < n; c++) {
-				const float a = padded[2 * c], b = padded[2 * c + 1], two = a < b ? a : b;
+				const float a = children[2 * c], b = children[2 * c + 1], two = a < b ? a : b;
 				to->either[c] = two < to->either[c] ? two : to->either[c];
 			}
 		}

@@ -50,9 +50,10 @@ static void set_cell(struct stack *s, int k, uint32_t x, uint32_t y, float z)
 static uint16_t weight_at(const struct stack *s, uint32_t x, uint32_t y)
 {
 	struct plan plan = flat_plan();
-	uint16_t weight[SIDE];
-	gaps_row(&plan, &s->stack, y, weight);
-	return weight[x];
+	uint16_t weight[SIDE * SIDE];
+	uint8_t brick;
+	gaps_rows(simd_get(), &plan, &s->stack, 0, SIDE, weight, &brick);
+	return weight[y * SIDE + x];
 }
 
 /* [G] figure 4.7: one of four vertices in front. Cell (2, 2) of level 1 is the pixels 4..5. */
@@ -104,11 +105,12 @@ static void empty_pixels_before_a_surface_are_holes(void **state)
 	(void)state;
 	struct stack s;
 	stack_init(&s);
-	s.word[4 * SIDE + 4] = PSR_WORD_EMPTY;
+	for (uint32_t x = 3; x < 6; x++)
+		s.word[4 * SIDE + x] = PSR_WORD_EMPTY;
 	assert_int_equal(weight_at(&s, 4, 4), WEIGHT_ONE); /* nothing covers it: background */
 	set_cell(&s, 1, 2, 2, 100);
 	assert_int_equal(weight_at(&s, 4, 4), WEIGHT_ONE * 7 / 16);
-	assert_int_equal(weight_at(&s, 5, 4), WEIGHT_ONE); /* the surface itself */
+	assert_int_equal(weight_at(&s, 5, 5), WEIGHT_ONE); /* the surface itself */
 }
 
 static void levels_are_not_summed(void **state)
@@ -150,27 +152,64 @@ static void a_seam_between_levels_is_closed(void **state)
 }
 
 struct picture {
-	uint16_t rgb[3 * SIDE * SIDE], weight[SIDE * SIDE];
+	uint16_t grey[SIDE * SIDE], weight[SIDE * SIDE]; /* what is painted */
 	float z[SIDE * SIDE];
+	uint16_t r[SIDE * SIDE], g[SIDE * SIDE], b[SIDE * SIDE];
+	uint64_t word[SIDE * SIDE];
+	/* What the fill makes of it, where it fills: high bytes and low bytes of colours, depths. */
+	uint8_t high[3 * SIDE * SIDE], low[3 * SIDE * SIDE];
+	float depth[SIDE * SIDE];
 };
+
+static uint8_t high_byte[65536], low_byte[65536];
 
 static void paint(struct picture *p, uint32_t x, uint32_t y, uint16_t grey, uint16_t weight, float z)
 {
-	for (int k = 0; k < 3; k++)
-		p->rgb[3 * (y * SIDE + x) + (uint32_t)k] = grey;
+	p->grey[y * SIDE + x] = grey;
 	p->weight[y * SIDE + x] = weight;
 	p->z[y * SIDE + x] = z;
 }
 
-static struct psr_report fill_picture(struct picture *p)
+static struct psr_report fill_once(struct picture *p, const uint8_t *table, uint8_t *rgb)
 {
 	struct plan plan = flat_plan();
-	struct fill fill = { .n_levels = 0 };
+	const struct psr_zstack stack = { .width = SIDE, .height = SIDE, .word = p->word };
+	const uint8_t brick = 1;
+	const struct fill_picture picture = { &stack, p->weight, &brick, p->r, p->g, p->b, table, rgb, p->depth };
+	struct fill fill = { .top = 0 };
 	struct psr_report report = { .n_filled = 0 };
-	assert_int_equal(fill_prepare(&fill, SIDE, SIDE, p->rgb, p->weight, p->z), 0);
-	fill_run(&fill, &plan, NULL, &report);
+	for (int i = 0; i < SIDE * SIDE; i++) {
+		p->r[i] = p->g[i] = p->b[i] = p->grey[i];
+		p->word[i] = (uint64_t)psr_bits_from_float(p->z[i]) << 32 | 0xffffffff;
+	}
+	assert_int_equal(fill_prepare(&fill, SIDE, SIDE), 0);
+	assert_int_equal(*fill_wants(&fill, simd_get(), &plan, NULL, &picture) > 0, 1);
+	fill_run(&fill, simd_get(), &plan, NULL, &picture, &report);
 	fill_clear(&fill);
 	return report;
+}
+
+static struct psr_report fill_picture(struct picture *p)
+{
+	for (uint32_t i = 0; i < 65536; i++) {
+		high_byte[i] = (uint8_t)(i >> 8);
+		low_byte[i] = (uint8_t)i;
+	}
+	for (int i = 0; i < SIDE * SIDE; i++) {
+		p->depth[i] = p->z[i];
+		for (int k = 0; k < 3; k++) {
+			p->high[3 * i + k] = (uint8_t)(p->grey[i] >> 8);
+			p->low[3 * i + k] = (uint8_t)p->grey[i];
+		}
+	}
+	fill_once(p, high_byte, p->high);
+	return fill_once(p, low_byte, p->low);
+}
+
+static uint32_t color_at(const struct picture *p, uint32_t x, uint32_t y, uint32_t k)
+{
+	const uint32_t i = 3 * (y * SIDE + x) + k;
+	return (uint32_t)p->high[i] << 8 | p->low[i];
 }
 
 static void one_color_with_holes_is_that_color(void **state)
@@ -185,8 +224,8 @@ static void one_color_with_holes_is_that_color(void **state)
 	}
 	struct psr_report report = fill_picture(&p);
 	for (uint32_t i = 0; i < SIDE * SIDE; i++) {
-		assert_int_equal(p.rgb[3 * i], 54321);
-		assert_true(p.z[i] == 100);
+		assert_int_equal(color_at(&p, i, 0, 0), 54321);
+		assert_true(p.depth[i] == 100);
 	}
 	assert_int_equal(report.n_filled, holes);
 	assert_int_equal(report.count[PSR_STAGE_FILL], holes);
@@ -202,12 +241,12 @@ static void a_hole_gets_a_half_a_quarter_and_a_quarter(void **state)
 	uint32_t parent = (4400 + 5400 + 4500) / 3, right = (6400 + 7400 + 6500 + 7500) / 4, below = (4600 + 5600 + 4700 + 5700) / 4;
 	paint(&p, 5, 5, 0, 0, 500);
 	fill_picture(&p);
-	assert_int_equal(p.rgb[3 * (5 * SIDE + 5)], (2 * parent + right + below) / 4);
+	assert_int_equal(color_at(&p, 5, 5, 0), (2 * parent + right + below) / 4);
 	/* Half a weight keeps half of its own colour. */
 	paint(&p, 5, 5, 9000, WEIGHT_ONE / 2, 100);
 	fill_picture(&p);
 	parent = (4400 + 5400 + 4500 + 9000 / 2) * 2 / 7;
-	assert_in_range(p.rgb[3 * (5 * SIDE + 5)], 4500 + (2 * parent + right + below) / 8 - 2, 4500 + (2 * parent + right + below) / 8 + 2);
+	assert_in_range(color_at(&p, 5, 5, 0), 4500 + (2 * parent + right + below) / 8 - 2, 4500 + (2 * parent + right + below) / 8 + 2);
 }
 
 static void a_hole_takes_the_near_surface_not_the_far_one(void **state)
@@ -223,9 +262,9 @@ static void a_hole_takes_the_near_surface_not_the_far_one(void **state)
 		paint(&p, 7, y, 100, 0, INFINITY);
 	struct psr_report report = fill_picture(&p);
 	for (uint32_t y = 0; y < SIDE; y++) {
-		assert_int_equal(p.rgb[3 * (y * SIDE + 7)], 40000);
-		assert_true(p.z[y * SIDE + 7] == 100);
-		assert_int_equal(p.rgb[3 * (y * SIDE + 8)], 100);
+		assert_int_equal(color_at(&p, 7, y, 1), 40000);
+		assert_true(p.depth[y * SIDE + 7] == 100);
+		assert_int_equal(color_at(&p, 8, y, 1), 100);
 	}
 	assert_int_equal(report.n_filled, SIDE);
 }
@@ -238,9 +277,9 @@ static void nothing_at_all_is_background(void **state)
 		paint(&p, i % SIDE, i / SIDE, 7, 0, INFINITY);
 	fill_picture(&p);
 	for (uint32_t i = 0; i < SIDE * SIDE; i++) {
-		assert_int_equal(p.rgb[3 * i], 100);
-		assert_int_equal(p.rgb[3 * i + 2], 300);
-		assert_true(isinf(p.z[i]));
+		assert_int_equal(color_at(&p, i, 0, 0), 100);
+		assert_int_equal(color_at(&p, i, 0, 2), 300);
+		assert_true(isinf(p.depth[i]));
 	}
 }
 
