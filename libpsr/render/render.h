@@ -95,6 +95,7 @@ struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, c
 struct shade_counts {
 	uint64_t n_pixels;   /* shaded */
 	uint64_t n_specular; /* of these with highlights looked for */
+	uint64_t resolve_ns, shade_ns; /* of a part of the strips */
 };
 
 struct shade_target {

@@ -1,4 +1,14 @@
+#include <time.h>
 #include "render/render.h"
+
+#define TIMED_EVERY 16 /* strips: clocks cost, too */
+
+static uint64_t now_ns(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
 
 /* Whether any of the bricks of a part of row y is wanted in linear light. Pixels of weight 0 are filled later, whatever they
  * get here. */
@@ -23,8 +33,11 @@ void shade_row(const struct simd *simd, const struct plan *plan, const struct sh
 		const int keeps_linear = target->wants && is_wanted(plan, target->wants, x, y, n);
 		strip.x0 = x;
 		simd->strip_list(&strip, word + x, weight + x, n);
+		const int is_timed = (x / STRIP + y) % TIMED_EVERY == 0;
+		uint64_t start = is_timed ? now_ns() : 0, middle = start;
 		if (strip.n) {
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
+			middle = is_timed ? now_ns() : 0;
 			for (uint32_t l = 0; l < plan->n_lights; l++)
 				simd->strip_light(&strip, &plan->light[l], NULL);
 			simd->strip_color(&strip);
@@ -35,5 +48,9 @@ void shade_row(const struct simd *simd, const struct plan *plan, const struct sh
 		part.g = keeps_linear ? target->g : NULL;
 		part.b = keeps_linear ? target->b : NULL;
 		simd->strip_write(&strip, &part, n);
+		if (is_timed) {
+			counts->resolve_ns += middle - start;
+			counts->shade_ns += now_ns() - middle;
+		}
 	}
 }
