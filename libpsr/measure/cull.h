@@ -5,7 +5,7 @@
 
 #include <stdint.h>
 #include "../sample/ray.h"
-#include "cull_screen.h"
+#include "../render/screen.h"
 #include "psr/model.h"
 #include "psr/pool.h"
 

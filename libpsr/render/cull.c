@@ -2,7 +2,9 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
+#include "psr/direction.h"
 #include "render/render.h"
+#include "render/screen.h"
 
 /* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second
  * writes the bins where the counts say, in canonical order whatever the threads did. */
@@ -11,16 +13,26 @@
 
 struct cull_chunk {
 	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
-	uint32_t levels, n_tested, n_clamped;
+	uint32_t levels, n_tested, n_clamped, n_masked;
 	uint8_t flags; /* of all blocks that are left, OR-ed */
 	uint64_t n_samples;
 	float depth_error; /* greatest half step of depth, in pixels */
 };
 
-struct cull_hit {
-	uint32_t slot;
-	uint8_t level, is_mixed, tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
+/* The masks of the screen's regions, for one instance ([G] 6.3: 4x4 regions). In the place of the smallest node of a tree that
+ * holds a block there is one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
+#define SCREEN_SPLITS 2
+#define SCREEN_SIDE (1 << SCREEN_SPLITS)
+#define SCREEN_RANGES (SCREEN_SIDE * (SCREEN_SIDE + 1) / 2)
+struct screen_masks {
+	float scale[2]; /* regions a pixel */
+	uint64_t range[SCREEN_RANGES * SCREEN_RANGES][2];
 };
+
+static inline uint32_t range_of(uint32_t first, uint32_t last)
+{
+	return last * (last + 1) / 2 + first;
+}
 
 struct cull {
 	struct bins *bins;
@@ -86,28 +98,83 @@ static inline int fits_pixel(float pixels)
 	return pixels * (1 - 0x1p-12f) <= 1;
 }
 
-/* Takes over what a batch says of its blocks. */
-static struct cull_hit *take_batch(struct cull_chunk *chunk, const struct cull_batch *batch, const struct plan_instance *in,
-                                   uint32_t first, uint32_t n, struct cull_hit *hit)
+/* The node of a region: its coordinates' bits in turn, x first, after a one. */
+static uint32_t node_of(uint32_t x, uint32_t y)
 {
+	uint32_t node = 1;
+	for (int bit = SCREEN_SPLITS - 1; bit >= 0; bit--)
+		node = node << 2 | (x >> bit & 1) << 1 | (y >> bit & 1);
+	return node;
+}
+
+static void masks_make(struct screen_masks *masks, const struct plan *plan, const struct plan_instance *in)
+{
+	uint64_t region[2 << 2 * SCREEN_SPLITS][SCREEN_WORDS];
+	struct screen screen = { .mask = region };
+	if (plan->perspective) {
+		screen_make(&screen, SCREEN_SPLITS, in->turn, plan->tangent, 2);
+	} else { /* an eye at infinity sees along one direction */
+		const unsigned triangle = psr_direction_encode(in->cull.eye) >> 8;
+		memset(region, 0, sizeof region);
+		for (uint32_t node = node_of(0, 0); node < 2u << 2 * SCREEN_SPLITS; node++)
+			region[node][triangle >> 6] = UINT64_C(1) << (triangle & 63);
+	}
+	masks->scale[0] = (float)SCREEN_SIDE / (float)plan->width;
+	masks->scale[1] = (float)SCREEN_SIDE / (float)plan->height;
+	memset(masks->range, 0, sizeof masks->range);
+	for (uint32_t x1 = 0; x1 < SCREEN_SIDE; x1++)
+		for (uint32_t x0 = 0; x0 <= x1; x0++)
+			for (uint32_t y1 = 0; y1 < SCREEN_SIDE; y1++)
+				for (uint32_t y0 = 0; y0 <= y1; y0++)
+					for (uint32_t r = 0; r < (x1 - x0 + 1) * (y1 - y0 + 1); r++)
+						for (int w = 0; w < 2; w++)
+							masks->range[range_of(x0, x1) * SCREEN_RANGES + range_of(y0, y1)][w] |=
+								region[node_of(x0 + r % (x1 - x0 + 1), y0 + r / (x1 - x0 + 1))][w];
+}
+
+static inline uint32_t region_of(uint16_t pixel, float scale)
+{
+	const uint32_t region = (uint32_t)((float)pixel * scale);
+	return region < SCREEN_SIDE ? region : SCREEN_SIDE - 1;
+}
+
+static int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block, const struct cull_hit *hit)
+{
+	const uint32_t x = range_of(region_of(hit->x0, masks->scale[0]), region_of(hit->x1, masks->scale[0]));
+	const uint32_t y = range_of(region_of(hit->y0, masks->scale[1]), region_of(hit->y1, masks->scale[1]));
+	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[x * SCREEN_RANGES + y];
+	return !((own[0] & seen[0]) | (own[1] & seen[1]));
+}
+
+/* Takes over what a batch says of its blocks. */
+static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, const struct cull_batch *batch, uint32_t first,
+                                   uint32_t n, struct cull_hit *hit)
+{
+	const struct plan_instance *in = &cull->plan->instance[chunk->instance];
+	const struct screen_masks *masks = in->with_masks ? &cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
 		if (!batch->is_left[i])
 			continue;
 		const int is_clamped = batch->level[i] > PSR_MAX_DEPTH_LEVEL;
-		*hit++ = (struct cull_hit){
-			.slot = in->first_slot + block, .level = is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i],
-			.is_mixed = batch->is_mixed[i],
-			.tile_x0 = batch->tile_x0[i], .tile_x1 = batch->tile_x1[i],
-			.tile_y0 = batch->tile_y0[i], .tile_y1 = batch->tile_y1[i],
+		*hit = (struct cull_hit){
+			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
+			.level = is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i], .is_mixed = batch->is_mixed[i],
+			.x0 = (uint16_t)batch->x0[i], .x1 = (uint16_t)batch->x1[i],
+			.y0 = (uint16_t)batch->y0[i], .y1 = (uint16_t)batch->y1[i],
 		};
-		chunk->levels |= 1u << hit[-1].level;
+		if (masks && mask_culls(masks, b, block, hit)) {
+			chunk->n_masked++;
+			continue;
+		}
+		chunk->levels |= 1u << hit->level;
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
 		chunk->n_samples += (uint32_t)__builtin_popcountll(b->mask[block]);
 		if (batch->depth_error[i] > chunk->depth_error)
 			chunk->depth_error = batch->depth_error[i];
+		hit++;
 	}
 	return hit;
 }
@@ -186,12 +253,12 @@ static void count_chunk(int i, void *userdata)
 			const uint32_t n = cluster->n_blocks - at < CULL_BATCH ? cluster->n_blocks - at : CULL_BATCH;
 			struct cull_batch batch;
 			cull->simd->cull(&batch, &in->cull, cluster->first_block + at, n);
-			hit = take_batch(chunk, &batch, in, cluster->first_block + at, n, hit);
+			hit = take_batch(cull, chunk, &batch, cluster->first_block + at, n, hit);
 		}
 	}
 	for (const struct cull_hit *h = cull->bins->hit + chunk->first_hit; h < hit; h++)
-		for (uint32_t y = h->tile_y0; y <= h->tile_y1; y++)
-			for (uint32_t x = h->tile_x0; x <= h->tile_x1; x++)
+		for (uint32_t y = h->y0 / TILE_HEIGHT; y <= h->y1 / TILE_HEIGHT; y++)
+			for (uint32_t x = h->x0 / TILE_WIDTH; x <= h->x1 / TILE_WIDTH; x++)
 				count[y * plan->tiles_x + x]++;
 	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
 }
@@ -203,9 +270,9 @@ static void fill_chunk(int i, void *userdata)
 	uint32_t *next = cull->bins->count + (size_t)i * cull->n_tiles;
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
-		struct bin_entry entry = { hit->slot, (uint16_t)chunk->instance, hit->level, hit->is_mixed };
-		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
-			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
+		const struct bin_entry entry = { hit->slot, hit->instance, hit->level, hit->is_mixed, chunk->first_hit + h };
+		for (uint32_t y = hit->y0 / TILE_HEIGHT; y <= hit->y1 / TILE_HEIGHT; y++)
+			for (uint32_t x = hit->x0 / TILE_WIDTH; x <= hit->x1 / TILE_WIDTH; x++)
 				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;
 	}
 }
@@ -256,22 +323,26 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	}
 	bins->tile_begin[cull->n_tiles] = (uint32_t)total;
 	bins->entry = grow(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
-	return bins->entry ? PSR_OK : PSR_ERR_MEMORY;
+	bins->order = grow(bins->order, &bins->order_capacity, total, sizeof *bins->order);
+	return bins->entry && bins->order ? PSR_OK : PSR_ERR_MEMORY;
 }
 
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
 {
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
-	assert(plan->tiles_x <= 256 && plan->tiles_y <= 256);
 	bins->chunk = grow(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = grow(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
 	bins->group = grow(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
 	bins->count = grow(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
 	bins->tile_begin = grow(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
-	if (!bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
+	bins->masks = grow(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
+	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
 		return PSR_ERR_MEMORY;
 	make_chunks(bins, plan, 1);
 	choose_levels(bins, plan);
+	for (uint32_t i = 0; i < plan->n_instances; i++)
+		if (plan->instance[i].with_masks)
+			masks_make(&bins->masks[i], plan, &plan->instance[i]);
 	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
 	int rc = place_entries(bins, &cull);
 	if (rc)
@@ -279,6 +350,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
 
 	float depth_error = 0;
+	report->n_tile_blocks = bins->tile_begin[cull.n_tiles];
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
 	for (uint32_t i = 0; i < cull.n_chunks; i++) {
@@ -290,6 +362,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
 		report->n_clamped += chunk->n_clamped;
+		report->n_masked += chunk->n_masked;
 		if (chunk->depth_error > depth_error)
 			depth_error = chunk->depth_error;
 	}
@@ -300,7 +373,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 size_t bins_bytes(const struct bins *bins)
 {
 	return bins->entry_capacity * sizeof *bins->entry + bins->chunk_capacity * sizeof *bins->chunk +
-	       bins->hit_capacity * sizeof *bins->hit + bins->group_capacity * sizeof *bins->group +
+	       bins->hit_capacity * sizeof *bins->hit + bins->order_capacity * sizeof *bins->order +
+	       bins->masks_capacity * sizeof *bins->masks + bins->group_capacity * sizeof *bins->group +
 	       bins->count_capacity * sizeof *bins->count + bins->tile_capacity * sizeof *bins->tile_begin;
 }
 
@@ -310,6 +384,8 @@ void bins_clear(struct bins *bins)
 	psr_free(bins->tile_begin);
 	psr_free(bins->chunk);
 	psr_free(bins->hit);
+	psr_free(bins->order);
+	psr_free(bins->masks);
 	psr_free(bins->group);
 	psr_free(bins->count);
 	memset(bins, 0, sizeof *bins);

@@ -22,7 +22,7 @@ struct psr_renderer {
 	size_t pixels_size;
 	uint16_t *rgb[3], *weight;
 	uint8_t *bricks; /* that gaps marked */
-	uint64_t *tile_inside;
+	struct warp_counts *tile;
 	/* By row of bricks. */
 	struct gaps_counts *gaps;
 	struct shade_counts *shade;
@@ -48,6 +48,7 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 {
 	settings->width = width;
 	settings->height = height;
+	settings->cull_tests = PSR_CULL_ALL;
 	settings->gap_threshold = 3;
 }
 
@@ -59,6 +60,8 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 	if (w > PSR_MAX_SIDE || h > PSR_MAX_SIDE || (uint64_t)w * h > PSR_MAX_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u is too large: at most %d a side and %u pixels", w, h,
 		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
+	if (settings->cull_tests & ~(unsigned)PSR_CULL_ALL)
+		return psr_fail(err, PSR_ERR_ARG, "there are no tests %#x to cull by", settings->cull_tests);
 	if (!(settings->gap_threshold >= 0 && settings->gap_threshold <= 64))
 		return psr_fail(err, PSR_ERR_ARG, "gap threshold %g is not within 0..64 pixels", settings->gap_threshold);
 	return psr_scene_validate(scene, err);
@@ -146,11 +149,11 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	}
 	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + WARP_PADDING * 8 + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
-	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile_inside + rows * (sizeof *r->gaps + sizeof *r->shade));
+	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
 		return PSR_ERR_MEMORY;
-	r->tile_inside = r->counters;
-	r->shade = (struct shade_counts *)(r->tile_inside + n_tiles);
+	r->tile = r->counters;
+	r->shade = (struct shade_counts *)(r->tile + n_tiles);
 	r->gaps = (struct gaps_counts *)(r->shade + rows);
 
 	stack->word = r->pixels;
@@ -170,7 +173,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 static void warp_one(int tile, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	r->tile_inside[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
+	r->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 }
 
 int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
@@ -198,8 +201,10 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 
 	const int n_tiles = (int)(r->plan.tiles_x * r->plan.tiles_y);
 	psr_pool_for(pool, n_tiles, warp_one, r);
-	for (int t = 0; t < n_tiles; t++)
-		report->count[PSR_STAGE_WARP] += r->tile_inside[t];
+	for (int t = 0; t < n_tiles; t++) {
+		report->count[PSR_STAGE_WARP] += r->tile[t].n_inside;
+		report->n_occluded += r->tile[t].n_occluded;
+	}
 	report->ns[PSR_STAGE_WARP] = now_ns() - start;
 	r->report = *report;
 	*stack = &r->stack;

@@ -137,12 +137,13 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.blocks = warp->blocks, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
 		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
-		.tiles_x = plan->tiles_x, .tiles_y = plan->tiles_y,
+		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
 	};
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
 	m3d_apply(camera_center, view->axis, center);
 	v3d_scale(camera_center, camera_center, view->scale);
 	sight_make(warp, to_camera, plan, focal);
+	memcpy(out->turn, to_camera, sizeof out->turn);
 	for (int i = 0; i < 3; i++) {
 		v3f_set(warp->turn[i], (float)to_camera[i][0], (float)to_camera[i][1], (float)to_camera[i][2]);
 		v3d_scale(to_camera[i], to_camera[i], scale);
@@ -156,6 +157,12 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	m3d_apply_transposed(eye, (const double(*)[3])rotation, eye);
 	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
 	v3f_set(cull->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
+
+	/* The eye is outside of the object's convex hull wherever it is outside of the unit sphere. */
+	const struct psr_model_info *info = psr_model_info(instance->model);
+	const int is_outside = !plan->perspective || v3d_length(eye) > 1;
+	out->with_masks = plan->cull_tests & PSR_CULL_MASKS && warp->blocks->visibility_mask && is_outside && info->n_trials > 0 &&
+	                  info->n_lost == 0;
 
 	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
@@ -227,6 +234,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->tiles_x = (plan->width + TILE_WIDTH - 1) / TILE_WIDTH;
 	plan->tiles_y = (plan->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
+	plan->cull_tests = settings->cull_tests;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 
@@ -235,6 +243,8 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		double s, c;
 		psr_sincos(camera->fov_y / 2, &s, &c);
 		focal = plan->height / 2.0 * c / s;
+		plan->tangent[0] = plan->width / 2.0 / focal;
+		plan->tangent[1] = s / c;
 	} else {
 		focal = plan->height / (camera->ortho_height * view.scale);
 	}

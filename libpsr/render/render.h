@@ -16,12 +16,16 @@ struct plan_instance {
 	uint32_t first_slot;  /* slot of block b is first_slot + b */
 	uint32_t first_group; /* place of the model's group 0 among those of all instances, of which each has n_clusters */
 	struct cull_view cull;
+	double turn[3][3];    /* inner coordinates to camera space, a rotation */
+	int with_masks;
 };
 
 struct plan {
 	uint32_t width, height, tiles_x, tiles_y;
 	int perspective;
+	unsigned cull_tests;
 	int exponent;              /* everything here is world * 2^-exponent, relative to the eye */
+	double tangent[2];         /* of half the angles that the picture spans; perspective */
 	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
 	float near_z;
 	/* What a cell covers lies behind scale * z' + offset of it. */
@@ -53,6 +57,15 @@ struct cull_group {
 	uint32_t score; /* of the cluster that is drawn */
 };
 
+/* A block that is left, and where it may show. */
+struct cull_hit {
+	uint32_t slot;
+	float near;                 /* no sample's z' is less */
+	uint16_t x0, x1, y0, y1;    /* pixels, inclusive, with the guard band */
+	uint16_t instance;
+	uint8_t level, is_mixed;
+};
+
 struct bins {
 	struct bin_entry *entry;
 	size_t entry_capacity;
@@ -62,6 +75,10 @@ struct bins {
 	size_t chunk_capacity;
 	struct cull_hit *hit;    /* one a block that is left, by chunk */
 	size_t hit_capacity;
+	uint32_t *order;         /* one an entry, for the thread that draws its tile */
+	size_t order_capacity;
+	struct screen_masks *masks; /* of all instances */
+	size_t masks_capacity;
 	struct cull_group *group; /* of all instances */
 	size_t group_capacity;
 	uint32_t *count;         /* chunk by tile */
@@ -75,8 +92,14 @@ void bins_clear(struct bins *bins);
 
 /* ---- warp: samples to words and cells, by tile ([G] 7.1, 7.2) ---- */
 
-/* Clears a tile and draws its blocks; returns how many samples fell into it. */
-uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile);
+struct warp_counts {
+	uint64_t n_inside;   /* samples that fell into the tile and do not face away */
+	uint32_t n_occluded; /* blocks that were left out there */
+};
+
+/* Clears a tile and draws its blocks. */
+struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
+                             uint32_t tile);
 
 /* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 

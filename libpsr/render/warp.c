@@ -1,3 +1,4 @@
+#include "base/maths.h"
 #include "psr/direction.h"
 #include "render/render.h"
 
@@ -29,11 +30,106 @@ static void target_make(struct warp_target *t, const struct plan *plan, const st
 	}
 }
 
-uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack, uint32_t tile)
+/* ---- occlusion: near to far, what the tile already hides is left out ---- */
+
+#define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel, below which looking costs what it saves */
+#define LOOK_EVERY 1024       /* blocks that are drawn between two looks at the tile */
+#define WORTH 16              /* a look must leave out one block of so many that are tested, or it is the last */
+#define KEYS 1024
+
+struct occlusion {
+	uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)];
+	int is_known;
+};
+
+/* Stable, by the upper bits of depth, which are in order for floats above 0. */
+static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
+{
+	uint32_t low = UINT32_MAX, high = 0, count[KEYS + 1] = { 0 };
+	for (uint32_t e = begin; e < end; e++) {
+		const float near = bins->hit[bins->entry[e].hit].near;
+		const uint32_t bits = near > 0 ? psr_bits_from_float(near) : 0;
+		low = bits < low ? bits : low;
+		high = bits > high ? bits : high;
+	}
+	int shift = 0;
+	while ((high - low) >> shift >= KEYS)
+		shift++;
+#define KEY_OF(e) (((bins->hit[bins->entry[e].hit].near > 0 ? psr_bits_from_float(bins->hit[bins->entry[e].hit].near) : 0) - low) >> shift)
+	for (uint32_t e = begin; e < end; e++)
+		count[KEY_OF(e) + 1]++;
+	for (int k = 0; k < KEYS; k++)
+		count[k + 1] += count[k];
+	for (uint32_t e = begin; e < end; e++)
+		bins->order[begin + count[KEY_OF(e)]++] = e;
+#undef KEY_OF
+}
+
+/* Whether all pixels that the block can change are nearer already. A block that lowers cells of level k changes what is seen
+ * through them up to two cells away, which must be in this tile, too. */
+static int is_occluded(const struct occlusion *o, const struct warp_target *t, const struct cull_hit *hit)
+{
+	const int32_t grown = hit->level ? 2 << hit->level : 0;
+	int32_t x0 = hit->x0 - grown, x1 = hit->x1 + grown, y0 = hit->y0 - grown, y1 = hit->y1 + grown;
+	if (!o->is_known || !(hit->near > 0))
+		return 0;
+	if (hit->level && (x0 < t->x0 || y0 < t->y0 || x1 >= t->x1 || y1 >= t->y1))
+		return 0;
+	x0 = (x0 > t->x0 ? x0 - t->x0 : 0) / FAR_SIDE;
+	y0 = (y0 > t->y0 ? y0 - t->y0 : 0) / FAR_SIDE;
+	x1 = ((x1 < t->x1 ? x1 : t->x1 - 1) - t->x0) / FAR_SIDE;
+	y1 = ((y1 < t->y1 ? y1 : t->y1 - 1) - t->y0) / FAR_SIDE;
+	const uint32_t near = psr_bits_from_float(hit->near);
+	for (int32_t y = y0; y <= y1; y++)
+		for (int32_t x = x0; x <= x1; x++)
+			if (o->far[y * (TILE_WIDTH / FAR_SIDE) + x] >= near)
+				return 0;
+	return 1;
+}
+
+static struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins, const struct warp_target *target,
+                                           uint32_t begin, uint32_t end)
+{
+	struct warp_counts counts = { 0, 0 };
+	struct occlusion occlusion = { .is_known = 0 };
+	struct bin_entry some[64];
+	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* the latter two since the last look */
+	int is_over = 0;
+	sort_by_depth(bins, begin, end);
+	for (uint32_t i = begin; i < end; i++) {
+		const struct bin_entry *entry = &bins->entry[bins->order[i]];
+		if (is_occluded(&occlusion, target, &bins->hit[entry->hit])) {
+			n_left_out++;
+			continue;
+		}
+		some[n++] = *entry;
+		if (n < 64)
+			continue;
+		counts.n_inside += simd->warp(target, some, n);
+		n_drawn += n;
+		n = 0;
+		if (n_drawn >= LOOK_EVERY && !is_over) {
+			is_over = occlusion.is_known && n_left_out * WORTH < n_drawn;
+			occlusion.is_known = !is_over;
+			if (!is_over)
+				simd->warp_far(target, occlusion.far);
+			counts.n_occluded += n_left_out;
+			n_drawn = n_left_out = 0;
+		}
+	}
+	counts.n_inside += simd->warp(target, some, n);
+	counts.n_occluded += n_left_out;
+	return counts;
+}
+
+struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
+                             uint32_t tile)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;
 	target_make(&target, plan, stack, tile);
 	simd->warp_clear(&target, stack->levels);
-	return simd->warp(&target, bins->entry + begin, end - begin);
+	if (plan->cull_tests & PSR_CULL_OCCLUSION && end - begin >= OCCLUSION_BLOCKS)
+		return warp_near_to_far(simd, bins, &target, begin, end);
+	return (struct warp_counts){ simd->warp(&target, bins->entry + begin, end - begin), 0 };
 }

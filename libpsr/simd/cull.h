@@ -14,10 +14,10 @@ static inline float edge_of(float at, int is_perspective, float z_if_negative, f
 	return psr_choose(is_perspective, at / psr_choose(at < 0, z_if_negative, z_if_positive), at);
 }
 
-static inline uint8_t tile_of(float pixel, float most, int size)
+static inline int32_t pixel_within(float pixel, float most)
 {
-	const float low = psr_where(pixel > 0, pixel), clamped = psr_choose(low < most, low, most);
-	return (uint8_t)((int32_t)clamped / size);
+	const float low = psr_where(pixel > 0, pixel);
+	return (int32_t)psr_choose(low < most, low, most);
 }
 
 static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n)
@@ -61,13 +61,14 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		out->is_left[i] = (uint8_t)((z1 > v.near_z) & (x1 >= 0) & (y1 >= 0) & (x0 < v.width) & (y0 < v.height));
 		out->is_mixed[i] = !(flags[i] & PSR_BLOCK_TWO_SIDED);
 		out->level[i] = (uint8_t)level;
-		out->tile_x0[i] = tile_of(x0, most_x, TILE_WIDTH);
-		out->tile_x1[i] = tile_of(x1, most_x, TILE_WIDTH);
-		out->tile_y0[i] = tile_of(y0, most_y, TILE_HEIGHT);
-		out->tile_y1[i] = tile_of(y1, most_y, TILE_HEIGHT);
+		out->x0[i] = pixel_within(x0, most_x);
+		out->x1[i] = pixel_within(x1, most_x);
+		out->y0[i] = pixel_within(y0, most_y);
+		out->y1[i] = pixel_within(y1, most_y);
+		out->near[i] = front1 * (1 - 0x1p-16f);
 		out->depth_error[i] = stretch * v.scale * psr_float_from_bits((126u - shift[i]) << 23);
 	}
-	if (!b->cone_sine)
+	if (!b->cone_sine || !v.with_cones)
 		return;
 	const int8_t *cone_x = b->cone_x + first, *cone_y = b->cone_y + first, *cone_z = b->cone_z + first;
 	const uint8_t *cone_sine = b->cone_sine + first;

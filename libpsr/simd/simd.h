@@ -27,7 +27,7 @@ struct cull_view {
 	float eye[3];         /* inner coordinates; orthographic: unit vector to the viewer instead */
 	int perspective;
 	float focal, near_z, width, height;
-	uint32_t tiles_x, tiles_y;
+	int with_cones;
 };
 
 #define CULL_BATCH 64
@@ -35,7 +35,8 @@ struct cull_batch {
 	uint8_t is_left[CULL_BATCH];  /* 0: nothing of the block can show, and the rest says nothing */
 	uint8_t is_mixed[CULL_BATCH]; /* some of its samples may face away */
 	uint8_t level[CULL_BATCH];    /* of the depth buffer that fits; PSR_MAX_DEPTH_LEVEL + 1 and more do not exist */
-	uint8_t tile_x0[CULL_BATCH], tile_x1[CULL_BATCH], tile_y0[CULL_BATCH], tile_y1[CULL_BATCH]; /* inclusive */
+	int32_t x0[CULL_BATCH], x1[CULL_BATCH], y0[CULL_BATCH], y1[CULL_BATCH]; /* pixels, inclusive, with the guard band */
+	float near[CULL_BATCH];        /* no sample's z' is less */
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels */
 };
 
@@ -69,6 +70,7 @@ struct bin_entry {
 	uint16_t instance;
 	uint8_t level;    /* of the depth buffer that fits the block */
 	uint8_t is_mixed; /* some of its samples may face away */
+	uint32_t hit;     /* index in bins->hit */
 };
 
 /* One tile of the picture, and for each level the cells that belong to it: those of its pixels, and at the picture's
@@ -221,8 +223,14 @@ typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own,
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
 
+/* The greatest z' of each 8x8 pixels of a tile, as bits: far[y / 8 * (TILE_WIDTH / 8) + x / 8]; those of +inf where a pixel is
+ * empty. */
+#define FAR_SIDE 8
+typedef void warp_far_fn(const struct warp_target *target, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)]);
+
 struct simd {
 	cull_fn *cull;
+	warp_far_fn *warp_far;
 	warp_clear_fn *warp_clear;
 	warp_fn *warp;
 	strip_list_fn *strip_list;

@@ -20,3 +20,24 @@ static void warp_clear(const struct warp_target *t, uint32_t levels)
 		}
 	}
 }
+
+static void warp_far(const struct warp_target *t, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)])
+{
+	for (int32_t y = t->y0; y < t->y1; y += FAR_SIDE) {
+		const int32_t y1 = y + FAR_SIDE < t->y1 ? y + FAR_SIDE : t->y1, n = t->x1 - t->x0;
+		uint32_t *to = far + (y - t->y0) / FAR_SIDE * (TILE_WIDTH / FAR_SIDE), column[TILE_WIDTH] = { 0 };
+		for (int32_t v = y; v < y1; v++) {
+			const uint64_t *word = t->word + (size_t)v * t->stride + (size_t)t->x0;
+			for (int32_t x = 0; x < n; x++) {
+				const uint32_t z = (uint32_t)(word[x] >> 32);
+				column[x] = column[x] > z ? column[x] : z;
+			}
+		}
+		for (int32_t x = 0; x < TILE_WIDTH / FAR_SIDE; x++) {
+			uint32_t most = 0;
+			for (int32_t i = 0; i < FAR_SIDE; i++)
+				most = column[FAR_SIDE * x + i] > most ? column[FAR_SIDE * x + i] : most;
+			to[x] = most;
+		}
+	}
+}

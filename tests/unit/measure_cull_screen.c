@@ -71,7 +71,7 @@ static void every_direction_of_a_node_is_in_its_mask(void **state)
 
 		cull_eye_place(&eye, which, 1);
 		eye.tangent = 0.1 + 3 * meshes_random(&seed); /* up to 144 degrees */
-		screen_make(&screen, n, eye.frame, eye.tangent, level);
+		screen_make(&screen, n, eye.frame, (const double[2]){ eye.tangent, eye.tangent }, level);
 		for (int i = 0; i < 2000; i++) {
 			double x = 2 * meshes_random(&seed) - 1, y = 2 * meshes_random(&seed) - 1, v[3];
 			int node = screen_node(&screen, x, y, x, y), t;
@@ -98,7 +98,7 @@ static void a_small_screen_has_one_direction(void **state)
 		psr_direction_center(2, t, center);
 		v3d_scale(center, center, -1); /* forward: from the eye */
 		psr_direction_frame(center, frame);
-		screen_make(&screen, 3, (const double(*)[3])frame, 1e-5, 2);
+		screen_make(&screen, 3, (const double(*)[3])frame, (const double[2]){ 1e-5, 1e-5 }, 2);
 		for (int node = 1; node < 2 << 6; node++)
 			for (unsigned other = 0; other < 128; other++)
 				assert_int_equal(has(node, other), other == t);
@@ -112,7 +112,7 @@ static void a_screen_along_an_axis_has_four_octants(void **state)
 	struct screen screen = { 0, masks };
 
 	(void)state;
-	screen_make(&screen, 0, frame, 1, 0);
+	screen_make(&screen, 0, frame, (const double[2]){ 1, 1 }, 0);
 	assert_int_equal(masks[1][0], 0x0f); /* bit 4 of an octant is z < 0 */
 }
 
@@ -125,7 +125,7 @@ static void a_node_has_what_its_children_have(void **state)
 		struct cull_eye eye;
 
 		cull_eye_place(&eye, which, 1);
-		screen_make(&screen, 4, eye.frame, eye.tangent, (int)(which % 4));
+		screen_make(&screen, 4, eye.frame, (const double[2]){ eye.tangent, eye.tangent }, (int)(which % 4));
 		for (int node = 1; node < 1 << 8; node++)
 			for (int w = 0; w < SCREEN_WORDS; w++)
 				assert_true(masks[node][w] == (masks[2 * node][w] | masks[2 * node + 1][w]));

@@ -17,8 +17,18 @@ extern "C" {
 #define PSR_MAX_PIXELS (64u << 20)
 #define PSR_MAX_DEPTH_LEVEL 7 /* the coarsest level buffer has cells of 2^7 pixels */
 
+/* What may leave out blocks that cannot show, beside the frustum. All are conservative: without any of them a frame has
+ * the same bytes. */
+enum psr_cull_test {
+	PSR_CULL_CONES = 1,     /* [G] 6.4 */
+	PSR_CULL_MASKS = 2,     /* [G] 6.3: from outside of a model's unit sphere, if it was measured to lose nothing by them */
+	PSR_CULL_OCCLUSION = 4, /* what is drawn nearer, where many samples fall into a tile */
+	PSR_CULL_ALL = 7
+};
+
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
+	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
@@ -40,6 +50,8 @@ struct psr_report {
 	uint64_t count[PSR_N_STAGES];
 	uint64_t n_blocks, n_samples; /* of all instances, all levels */
 	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those blocks */
+	uint64_t n_masked;            /* blocks that only their visibility mask culls */
+	uint64_t n_tile_blocks, n_occluded; /* blocks by tile, once in each that they touch; those that were occluded there */
 	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */

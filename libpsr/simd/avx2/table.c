@@ -7,6 +7,7 @@
 
 const struct simd simd_avx2 = {
 	.cull = cull,
+	.warp_far = warp_far,
 	.warp_clear = warp_clear,
 	.warp = warp_avx2,
 	.strip_list = strip_list,

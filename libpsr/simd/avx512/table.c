@@ -8,6 +8,7 @@
 
 const struct simd simd_avx512 = {
 	.cull = cull,
+	.warp_far = warp_far,
 	.warp_clear = warp_clear,
 	.warp = warp_avx512,
 	.strip_list = strip_list_avx512,

@@ -7,6 +7,7 @@
 
 const struct simd simd_c = {
 	.cull = cull,
+	.warp_far = warp_far,
 	.warp_clear = warp_clear,
 	.warp = warp_c,
 	.strip_list = strip_list,

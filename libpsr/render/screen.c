@@ -1,9 +1,9 @@
-#include "cull_screen.h"
+#include "render/screen.h"
 
 #include <assert.h>
 #include <math.h>
 #include <string.h>
-#include "../base/vec.h"
+#include "base/vec.h"
 #include "psr/direction.h"
 
 /* A triangle within a rectangle has 7 corners at most; where rounding doubles some, there are more. */
@@ -64,10 +64,10 @@ static void descend(struct screen *screen, unsigned triangle, int node, int dept
 	}
 }
 
-void screen_make(struct screen *screen, int n, const double frame[3][3], double tangent, int level)
+void screen_make(struct screen *screen, int n, const double frame[3][3], const double tangent[2], int level)
 {
 	static const double sides[4][2] = { { 1, 0 }, { -1, 0 }, { 0, 1 }, { 0, -1 } };
-	struct region whole = { { -tangent, -tangent }, { tangent, tangent } };
+	const struct region whole = { { -tangent[0], -tangent[1] }, { tangent[0], tangent[1] } };
 
 	screen->n = n;
 	memset(screen->mask, 0, (size_t)(2 << 2 * n) * sizeof *screen->mask);
@@ -82,7 +82,7 @@ void screen_make(struct screen *screen, int n, const double frame[3][3], double 
 			m3d_apply(part[0].corner[i], frame, corner[i]);
 		}
 		for (int i = 0; i < 4; i++, last ^= 1) {
-			double plane[3] = { sides[i][0], sides[i][1], tangent };
+			double plane[3] = { sides[i][0], sides[i][1], tangent[i / 2] };
 
 			clip(&part[last ^ 1], &part[last], plane);
 		}
