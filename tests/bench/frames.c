@@ -62,9 +62,9 @@ int main(int argc, char **argv)
 	char path[N_SUBJECTS][4096], json[4096], **names;
 	int n;
 	struct subject subject[N_SUBJECTS] = {
-		{ "dragon", "stanford", path[0], 2048, { -0.1, -0.15, 0 }, 1 },
-		{ "engine", "engine", path[1], 1024, { 0, 0, 0 }, 0 },
-		{ "teapot", "teapot", path[2], 2048, { 0, 0, 0 }, 0 },
+		{ "dragon", "stanford", path[0], { 256, 1024, 1024, 2048 }, { -0.1, -0.15, 0 }, 1 },
+		{ "engine", "engine", path[1], { 256, 1024, 1024, 1024 }, { 0, 0, 0 }, 0 },
+		{ "teapot", "teapot", path[2], { 256, 1024, 1024, 2048 }, { 0, 0, 0 }, 0 },
 	};
 	struct part part;
 

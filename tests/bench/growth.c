@@ -231,11 +231,11 @@ void growth_run(const struct part *part, const struct subject *subject)
 {
 	struct job *job = isolate_alloc(sizeof *job);
 	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution, NULL);
+	                                      subject->resolution[N_PICTURES - 1], NULL);
 	struct psr_model *small;
 	char source[4096];
 
-	printf("\nHow time grows: %s at %d, %d threads, nothing encoded", subject->name, subject->resolution,
+	printf("\nHow time grows: %s at %d, %d threads, nothing encoded", subject->name, subject->resolution[N_PICTURES - 1],
 	       part->n_threads);
 	samples(job, part, model);
 	pixels(job, part, model);
@@ -259,9 +259,8 @@ static double gigahertz(void)
 		long x = 0;
 		double start = report_ms(), rate;
 
-		for (long i = 0; i < n; i += 8)
-			__asm__ volatile("add $1, %0\n\tadd $1, %0\n\tadd $1, %0\n\tadd $1, %0\n\t"
-			                 "add $1, %0\n\tadd $1, %0\n\tadd $1, %0\n\tadd $1, %0" : "+r"(x));
+		for (long i = 0; i < n; i += 4)
+			__asm__ volatile("add %1, %0\n\tadd %1, %0\n\tadd %1, %0\n\tadd %1, %0" : "+r"(x) : "r"(n));
 		rate = (double)n / (report_ms() - start) / 1e6;
 		best = rate > best ? rate : best;
 	}
@@ -273,7 +272,7 @@ void threads_run(const struct part *part, const struct subject *subject)
 {
 	struct job *job = isolate_alloc(sizeof *job);
 	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution, NULL);
+	                                      subject->resolution[N_PICTURES - 1], NULL);
 	const double ghz = gigahertz();
 	double one = 0;
 

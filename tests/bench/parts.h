@@ -10,10 +10,12 @@ struct part {
 	int n_threads;
 };
 
-/* A model of the benchmark. source: its mesh. */
+/* A model of the benchmark. source: its mesh. It is built for each picture, so that magnification is about 1 as far as
+ * building takes minutes only. */
+#define N_PICTURES 4
 struct subject {
 	const char *name, *file, *source;
-	int resolution;
+	int resolution[N_PICTURES]; /* the last is the finest */
 	double aim[3];         /* of the pictures that it is to cover, see scene.h */
 	int is_of_the_targets; /* whether the targets that name the dragon hold for it */
 };

@@ -9,13 +9,12 @@
 #include "parts.h"
 #include "report.h"
 
-static const struct scene_picture pictures[] = {
+static const struct scene_picture pictures[N_PICTURES] = {
 	{ "256x256", 256, 256, 0 },
 	{ "1024x1024", 1024, 1024, 0 },
 	{ "1024x1024, half covered", 1024, 1024, 0.5 },
 	{ "1920x1080, filled", 1920, 1080, 0.8 },
 };
-#define N_PICTURES (sizeof pictures / sizeof pictures[0])
 
 #define LLVMPIPE_FRAMES 6
 #define EMBREE_FRAMES 12
@@ -98,12 +97,12 @@ static double covered(const struct cell *cell, const struct scene_film *film)
 	return (cell->all.n_covered + cell->all.n_filled) / ((double)film->picture.width * film->picture.height);
 }
 
-static void print_ratios(const struct scene_film *film, const struct cell *cell, size_t n)
+static void print_ratios(const struct scene_film *film, const struct cell *cell)
 {
 	printf("%-24s | %44s | %8s | %s\n", "times as long as ours", "llvmpipe              Embree", "ours", "ms");
 	printf("%-24s | %10s %10s %10s %11s | %8s | %8s %8s %8s %8s %8s | %7s %6s\n", "(nothing encoded)", "mesh", "points",
 	       "mesh", "with shadow", "ms", "mesh", "points", "by vert.", "Embree", "shadow", "covered", "magn.");
-	for (size_t i = 0; i < n; i++, film++, cell++) {
+	for (int i = 0; i < N_PICTURES; i++, film++, cell++) {
 		const double ms = cell->all.ms;
 
 		printf("%-24s | %10.1f %10.1f %10.1f %11.1f | %8.3f | %8.1f %8.1f %8.1f %8.1f %8.1f | %5.0f %% %6.2f\n",
@@ -114,33 +113,35 @@ static void print_ratios(const struct scene_film *film, const struct cell *cell,
 	}
 }
 
-static void print_ours(const struct part *part, const struct scene_film *film, const struct cell *cell, size_t n)
+static void print_ours(const struct part *part, const struct subject *subject, const struct scene_film *film,
+                       const struct cell *cell)
 {
 	printf("%-24s | %8s %8s | %8s %8s | %6s %6s | ", "ours, ms", "1 thread", "JPEG", "threads", "JPEG", "kB", "MB");
 	for (int s = 0; s < PSR_N_STAGES; s++)
 		printf(" %7s", psr_stage_name((enum psr_stage)s));
-	printf(" | %6s %7s\n%-24s | %8s %8s | %8d %8s | %6s %6s |\n", "Mpt", "pt a px", "", "", "q90", part->n_threads, "q90",
-	       "JPEG", "buffers");
-	for (size_t i = 0; i < n; i++, film++, cell++) {
+	printf(" | %6s %7s %6s\n%-24s | %8s %8s | %8d %8s | %6s %6s |\n", "Mpt", "pt a px", "model", "", "", "q90",
+	       part->n_threads, "q90", "JPEG", "buffer");
+	for (int i = 0; i < N_PICTURES; i++, film++, cell++) {
 		const struct ours_result *r = &cell->all;
 
 		printf("%-24s | %8.3f %8.3f | %8.3f %8.3f | %6.0f %6.1f | ", film->picture.name, cell->one.ms,
 		       cell->one.ms_encoded, r->ms, r->ms_encoded, r->encoded_bytes / 1e3, (double)r->renderer_bytes / 1e6);
 		for (int s = 0; s < PSR_N_STAGES; s++)
 			printf(" %7.3f", r->stage_ms[s]);
-		printf(" | %6.3f %7.2f\n", r->count[PSR_STAGE_WARP] / 1e6, report_ratio(r->count[PSR_STAGE_WARP], r->n_covered));
+		printf(" | %6.3f %7.2f %6d\n", r->count[PSR_STAGE_WARP] / 1e6,
+		       report_ratio(r->count[PSR_STAGE_WARP], r->n_covered), subject->resolution[i]);
 	}
 }
 
 /* What the peers drew beside what we drew: silhouette and shading. */
 static void print_agreement(const struct part *part, const struct subject *subject, const struct scene_film *film,
-                            const struct cell *cell, size_t n)
+                            const struct cell *cell)
 {
 	printf("%-24s | same silhouette, %%; difference of shading, codes of 255\n%-24s |", "the same picture?", "");
 	for (int p = 0; p < N_PEERS; p++)
 		printf(" %22s", peer_name[p]);
 	puts("");
-	for (size_t i = 0; i < n; i++, film++, cell++) {
+	for (int i = 0; i < N_PICTURES; i++, film++, cell++) {
 		printf("%-24s |", film->picture.name);
 		for (int p = 0; p <= N_PEERS; p++) {
 			const uint32_t w = film->picture.width, h = film->picture.height;
@@ -149,7 +150,7 @@ static void print_agreement(const struct part *part, const struct subject *subje
 
 			if (p < N_PEERS)
 				printf(" %14.2f %7.2f", 100 * c.overlap, c.difference);
-			snprintf(path, sizeof path, "%s/%s-%zu-%s.png", part->out, subject->name, i,
+			snprintf(path, sizeof path, "%s/%s-%d-%s.png", part->out, subject->name, i,
 			         p < N_PEERS ? peer_name[p] : "psr");
 			compare_save(path, cell->rgb[p], w, h);
 		}
@@ -176,13 +177,13 @@ static void add_ours(cJSON *item, const char *name, const struct ours_result *r)
 	}
 }
 
-static void add_json(const struct subject *subject, const struct scene_film *film, const struct cell *cell)
+static void add_json(const struct subject *subject, int i, const struct scene_film *film, const struct cell *cell)
 {
 	cJSON *item = report_add(report_array("pictures"));
 
 	report_text(item, "model", subject->name);
 	report_text(item, "picture", film->picture.name);
-	report_number(item, "resolution", subject->resolution);
+	report_number(item, "resolution", subject->resolution[i]);
 	report_number(item, "covered", covered(cell, film));
 	report_number(item, "magnification", film->magnification);
 	add_ours(item, "ours", &cell->all);
@@ -226,35 +227,41 @@ static void add_targets(const struct subject *subject, const struct cell *cell)
 	           REPORT_AT_LEAST, 50);
 }
 
-void pictures_run(const struct part *part, const struct subject *subject)
+static struct psr_mesh *import(const char *path)
 {
-	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution, NULL);
-	struct cell *cell = isolate_alloc(N_PICTURES * sizeof *cell);
-	struct scene_film film[N_PICTURES];
 	struct psr_mesh *mesh;
-	struct peer_mesh peer;
 	struct psr_error err;
 
-	if (psr_mesh_import(&mesh, subject->source, &err) != PSR_OK)
-		report_die(subject->source, err.text);
-	peer_mesh_init(&peer, mesh, model);
-	psr_mesh_destroy(mesh);
-	for (size_t i = 0; i < N_PICTURES; i++) {
+	if (psr_mesh_import(&mesh, path, &err) != PSR_OK)
+		report_die(path, err.text);
+	return mesh;
+}
+
+void pictures_run(const struct part *part, const struct subject *subject)
+{
+	struct psr_mesh *mesh = import(subject->source);
+	struct cell *cell = isolate_alloc(N_PICTURES * sizeof *cell);
+	struct scene_film film[N_PICTURES];
+
+	for (int i = 0; i < N_PICTURES; i++) {
+		struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
+		                                      subject->resolution[i], NULL);
+		struct peer_mesh peer;
+
+		peer_mesh_init(&peer, mesh, model);
 		scene_film_init(&film[i], &pictures[i], model, subject->aim);
 		draw(&(struct job){ .part = part, .film = &film[i], .mesh = &peer, .cell = &cell[i] });
-		add_json(subject, &film[i], &cell[i]);
+		add_json(subject, i, &film[i], &cell[i]);
+		peer_mesh_fini(&peer);
+		psr_model_unref(model);
 	}
-	printf("\n%s: %u triangles; model at %d: %llu samples of all levels, %.0f MB. One light, moving camera, %d threads;\n"
-	       "%s; %s\n", subject->name, peer.n_triangles, subject->resolution,
-	       (unsigned long long)psr_model_blocks(model)->n_samples, (double)psr_model_bytes(model) / 1e6, part->n_threads,
-	       cell->peer[MESH].what, cell->peer[EMBREE].what);
-	print_ratios(film, cell, N_PICTURES);
-	print_ours(part, film, cell, N_PICTURES);
-	print_agreement(part, subject, film, cell, N_PICTURES);
+	printf("\n%s: %u triangles; one light, moving camera, %d threads; %s; %s\n", subject->name, mesh->n_triangles,
+	       part->n_threads, cell->peer[MESH].what, cell->peer[EMBREE].what);
+	print_ratios(film, cell);
+	print_ours(part, subject, film, cell);
+	print_agreement(part, subject, film, cell);
 	add_targets(subject, cell);
 	fflush(stdout);
-	peer_mesh_fini(&peer);
-	psr_model_unref(model);
+	psr_mesh_destroy(mesh);
 	isolate_free(cell, N_PICTURES * sizeof *cell);
 }
