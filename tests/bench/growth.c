@@ -38,7 +38,7 @@ static void draw(void *arg)
 {
 	struct job *job = arg;
 	const struct ours_settings settings = {
-		.width = job->film.picture.width, .height = job->film.picture.height, .n_threads = job->n_threads, .least_ms = 60,
+		.width = job->film.picture.width, .height = job->film.picture.height, .n_threads = job->n_threads, .least_ms = 60, .most_ms = 500,
 		.n_frames = GROWTH_FRAMES, .scene = scene, .userdata = job,
 	};
 

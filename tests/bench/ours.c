@@ -9,6 +9,7 @@
 
 #define MAX_FRAMES 512
 #define N_WARM 3
+#define LEAST_FRAMES 3
 
 struct bench {
 	struct psr_pool *pool;
@@ -102,6 +103,33 @@ static void summarize(struct ours_result *out, struct series *series)
 	}
 }
 
+static int is_over(double ms, double since)
+{
+	return report_ms() - since >= ms;
+}
+
+static void draw_frame(struct bench *bench, const struct ours_settings *settings, int frame)
+{
+	struct psr_scene scene;
+
+	settings->scene(&scene, frame, settings->userdata);
+	draw(bench, &scene);
+}
+
+static void time_frame(struct ours_result *out, struct series *series, struct bench *bench,
+                       const struct ours_settings *settings, int frame)
+{
+	const double before = report_ms();
+
+	draw_frame(bench, settings, frame);
+	series->ms[out->n_frames] = report_ms() - before;
+	if (settings->is_encoded) {
+		out->encoded_bytes += encode(bench);
+		series->ms_encoded[out->n_frames] = report_ms() - before;
+	}
+	add(out, series, &bench->frame.report);
+}
+
 void ours_measure(struct ours_result *out, const struct ours_settings *settings, uint8_t *rgb)
 {
 	struct series *series = report_alloc(1, sizeof *series);
@@ -110,34 +138,21 @@ void ours_measure(struct ours_result *out, const struct ours_settings *settings,
 
 	memset(out, 0, sizeof *out);
 	bench_init(&bench, settings->width, settings->height, settings->n_threads);
+	start = report_ms();
 	for (int i = N_WARM; i-- > 0;) {
-		struct psr_scene scene;
-
-		settings->scene(&scene, i, settings->userdata);
-		draw(&bench, &scene);
-		if (settings->is_encoded)
-			encode(&bench);
+		if (i == 0 || !is_over(settings->most_ms / N_WARM, start))
+			draw_frame(&bench, settings, i);
 	}
 	if (rgb != NULL)
 		memcpy(rgb, bench.frame.rgb, (size_t)3 * settings->width * settings->height);
 	start = report_ms();
-	while (out->n_frames + settings->n_frames <= MAX_FRAMES
-	       && (out->n_frames == 0 || report_ms() - start < settings->least_ms)) {
-		for (int i = 0; i < settings->n_frames; i++) {
-			struct psr_scene scene;
-			double before;
-
-			settings->scene(&scene, i, settings->userdata);
-			before = report_ms();
-			draw(&bench, &scene);
-			series->ms[out->n_frames] = report_ms() - before;
-			if (settings->is_encoded) {
-				out->encoded_bytes += encode(&bench);
-				series->ms_encoded[out->n_frames] = report_ms() - before;
-			}
-			add(out, series, &bench.frame.report);
+	do {
+		for (int i = 0; i < settings->n_frames && out->n_frames < MAX_FRAMES; i++) {
+			if (out->n_frames >= LEAST_FRAMES && is_over(settings->most_ms, start))
+				break;
+			time_frame(out, series, &bench, settings, i);
 		}
-	}
+	} while (out->n_frames < MAX_FRAMES && !is_over(settings->least_ms, start));
 	out->renderer_bytes = psr_renderer_bytes(bench.renderer);
 	summarize(out, series);
 	bench_fini(&bench);

@@ -11,8 +11,8 @@
 struct ours_settings {
 	uint32_t width, height;
 	int n_threads, is_encoded;
-	double least_ms; /* frames are drawn again until this much time has gone */
-	int n_frames;    /* of one round */
+	int n_frames;             /* of one round */
+	double least_ms, most_ms; /* rounds are drawn until the one is over; from the other on nothing more but a third frame */
 	/* The scene of frame i; it must stay until the next call. */
 	void (*scene)(struct psr_scene *scene, int frame, const void *userdata);
 	const void *userdata;

@@ -57,7 +57,7 @@ static void scene(struct psr_scene *out, int frame, const void *userdata)
 static void draw(void *arg)
 {
 	struct job *job = arg;
-	struct ours_settings settings = { .width = SIDE, .height = SIDE, .n_threads = 1, .least_ms = 150,
+	struct ours_settings settings = { .width = SIDE, .height = SIDE, .n_threads = 1, .least_ms = 150, .most_ms = 500,
 		                              .n_frames = SCENE_FRAMES, .scene = scene, .userdata = job };
 
 	ours_measure(&job->one, &settings, NULL);
