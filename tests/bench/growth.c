@@ -254,8 +254,8 @@ static double gigahertz(void)
 	double best = 0;
 
 #ifdef __x86_64__
-	for (int round = 0; round < 5; round++) {
-		const long n = 20000000;
+	for (int round = 0; round < 40; round++) {
+		const long n = 2000000;
 		long x = 0;
 		double start = report_ms(), rate;
 

@@ -20,19 +20,14 @@ static void look_of(struct peer_look *out, uint64_t attr)
 
 static void fill_triangles(struct peer_mesh *out, const struct psr_mesh *mesh)
 {
-	uint32_t n = 0;
-
+	memcpy(out->triangle, mesh->triangle, mesh->n_triangles * sizeof *out->triangle);
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		out->triangle_look[t] = (uint16_t)mesh->triangle_material[t];
 	for (uint32_t m = 0; m < mesh->n_materials; m++) {
 		struct material_values values;
 
 		material_values_default(&values, &mesh->material[m]);
 		look_of(&out->look[m], material_word(&mesh->material[m], &values));
-		for (uint32_t t = 0; t < mesh->n_triangles; t++) {
-			if (mesh->triangle_material[t] != m)
-				continue;
-			memcpy(out->triangle[n], mesh->triangle[t], sizeof out->triangle[n]);
-			out->triangle_look[n++] = (uint16_t)m;
-		}
 	}
 }
 
@@ -70,6 +65,7 @@ void peer_mesh_init(struct peer_mesh *out, const struct psr_mesh *mesh, const st
 			out->position[v][k] = (float)((mesh->position[v][k] - info->origin[k]) / info->scale);
 	fill_triangles(out, mesh);
 	fill_normals(out, mesh);
+	peer_mesh_order(out);
 }
 
 void peer_mesh_fini(struct peer_mesh *mesh)

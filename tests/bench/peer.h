@@ -15,11 +15,12 @@ struct peer_look {
 struct peer_mesh {
 	uint32_t n_vertices, n_triangles, n_looks;
 	float (*position)[3], (*normal)[3]; /* of vertices */
-	uint32_t (*triangle)[3];            /* counter-clockwise from the front, in the order of their looks */
+	uint32_t (*triangle)[3];            /* counter-clockwise from the front, look by look */
 	uint16_t *triangle_look;
 	struct peer_look *look;
 };
 void peer_mesh_init(struct peer_mesh *out, const struct psr_mesh *mesh, const struct psr_model *model);
+void peer_mesh_order(struct peer_mesh *mesh); /* for caches; look by look, then by place; done by init */
 void peer_mesh_fini(struct peer_mesh *mesh);
 
 struct peer_points {
