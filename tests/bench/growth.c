@@ -231,7 +231,7 @@ void growth_run(const struct part *part, const struct subject *subject)
 {
 	struct job *job = isolate_alloc(sizeof *job);
 	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution[N_PICTURES - 1], NULL);
+	                                      subject->resolution[N_PICTURES - 1]);
 	struct psr_model *small;
 	char source[4096];
 
@@ -242,7 +242,7 @@ void growth_run(const struct part *part, const struct subject *subject)
 	lights(job, part, model);
 	psr_model_unref(model);
 	scene_standard(source, part->psr_model, part->models, "teapot");
-	small = scene_model(part->psr_model, part->models, "teapot", source, 256, NULL);
+	small = scene_model(part->psr_model, part->models, "teapot", source, 256);
 	instances(job, part, small);
 	psr_model_unref(small);
 	isolate_free(job, sizeof *job);
@@ -272,7 +272,7 @@ void threads_run(const struct part *part, const struct subject *subject)
 {
 	struct job *job = isolate_alloc(sizeof *job);
 	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution[N_PICTURES - 1], NULL);
+	                                      subject->resolution[N_PICTURES - 1]);
 	const double ghz = gigahertz();
 	double one = 0;
 

@@ -27,8 +27,8 @@ struct point_vertex {
 	uint16_t diffuse[4], specular[4]; /* linear; specular[3]: log2 of the exponent / 16 */
 };
 
-/* Colours are coded by the shader, sRGB's curve as three square roots (within a code of 255): a frame buffer that does
- * it takes a tenth longer. */
+/* Colours are coded by the shader, sRGB's curve as three square roots (3 codes of 255 off at most, where it is
+ * nearly black): a frame buffer that does it takes a tenth longer. */
 #define PHONG                                                                                                          \
 	"vec3 coded(vec3 c) {\n"                                                                                           \
 	"	vec3 a = sqrt(min(c, 1.0)), b = sqrt(a);\n"                                                                    \

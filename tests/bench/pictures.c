@@ -245,7 +245,7 @@ void pictures_run(const struct part *part, const struct subject *subject)
 
 	for (int i = 0; i < N_PICTURES; i++) {
 		struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-		                                      subject->resolution[i], NULL);
+		                                      subject->resolution[i]);
 		struct peer_mesh peer;
 
 		peer_mesh_init(&peer, mesh, model);

@@ -25,25 +25,19 @@ static void run(const char *const *argv, const char *what)
 }
 
 struct psr_model *scene_model(const char *psr_model, const char *folder, const char *name, const char *source,
-                              int resolution, double *seconds)
+                              int resolution)
 {
 	struct psr_model *model;
 	struct psr_error err;
 	char path[4096], number[16];
-	double start = report_ms();
+	const char *argv[] = { psr_model, "build", source, "-o", path, "-r", number, "--quiet", NULL };
 
 	snprintf(path, sizeof path, "%s/%s-%d.psr", folder, name, resolution);
 	snprintf(number, sizeof number, "%d", resolution);
-	if (seconds != NULL)
-		*seconds = 0;
-	if (access(path, R_OK) != 0) {
-		const char *argv[] = { psr_model, "build", source, "-o", path, "-r", number, "--quiet", NULL };
-
-		fprintf(stderr, "bench: building %s, once\n", path);
-		run(argv, source);
-		if (seconds != NULL)
-			*seconds = (report_ms() - start) / 1e3;
-	}
+	if (psr_model_read(&model, path, &err) == PSR_OK)
+		return model;
+	fprintf(stderr, "bench: building %s, once\n", path);
+	run(argv, source);
 	if (psr_model_read(&model, path, &err) != PSR_OK)
 		report_die(path, err.text);
 	return model;

@@ -7,10 +7,9 @@
 #include "psr/model.h"
 #include "psr/scene.h"
 
-/* Opens FOLDER/NAME-RESOLUTION.psr, which psr-model builds of `source` first if it is not there. *seconds, unless NULL:
- * what building took, 0 if it was there. */
+/* Opens FOLDER/NAME-RESOLUTION.psr, which psr-model builds of `source` first if it is not there or an older psr's. */
 struct psr_model *scene_model(const char *psr_model, const char *folder, const char *name, const char *source,
-                              int resolution, double *seconds);
+                              int resolution);
 
 /* Makes FOLDER/NAME.glb of the standard set, if it is not there, and writes its path. */
 void scene_standard(char path[4096], const char *psr_model, const char *folder, const char *name);

@@ -73,7 +73,7 @@ static struct psr_model *film_of(struct job *job, const struct part *part, const
 	char source[4096];
 
 	scene_standard(source, part->psr_model, part->models, name);
-	model = scene_model(part->psr_model, part->models, name, source, SIDE, NULL);
+	model = scene_model(part->psr_model, part->models, name, source, SIDE);
 	scene_film_init(&job->film, &picture, model, aim);
 	scene_film_magnify(&job->film, 1);
 	job->n_threads = part->n_threads;
