@@ -175,7 +175,7 @@ $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD) $(L_PSR)
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
-	peer peer_order pictures plot report scene thesis))
+	peer peer_order pictures plot report scene thesis warp))
 $(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.

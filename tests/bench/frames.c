@@ -1,6 +1,6 @@
 /* frames PSR-MODEL MODELS OUT CACHE [NAME...]: how fast frames are, beside other renderers, beside the thesis, and as
  * things grow. MODELS takes models that are built once, OUT pictures, plots and bench.json; CACHE has the real meshes.
- * NAME...: parts to run (dragon, engine, teapot, table-8.2, figure-7.4, growth, threads), all without any. */
+ * NAME...: parts to run (dragon, engine, teapot, table-8.2, figure-7.4, growth, warp), all without any. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -29,14 +29,14 @@ static int is_asked(const char *name, char **names, int n)
 
 static void check_names(char **names, int n)
 {
-	static const char known[] = " dragon engine teapot table-8.2 figure-7.4 growth threads ";
+	static const char known[] = " dragon engine teapot table-8.2 figure-7.4 growth warp ";
 
 	for (int i = 0; i < n; i++) {
 		char word[64];
 
 		snprintf(word, sizeof word, " %s ", names[i]);
 		if (strstr(known, word) == NULL)
-			report_die(names[i], "is no part; there are dragon, engine, teapot, table-8.2, figure-7.4, growth, threads");
+			report_die(names[i], "is no part; there are dragon, engine, teapot, table-8.2, figure-7.4, growth, warp");
 	}
 }
 
@@ -97,8 +97,8 @@ int main(int argc, char **argv)
 		thesis_figure(&part);
 	if (is_asked("growth", names, n))
 		growth_run(&part, largest);
-	if (is_asked("threads", names, n))
-		threads_run(&part, largest);
+	if (is_asked("warp", names, n))
+		warp_run(&part, largest);
 	plot_all(&part);
 	report_print_targets();
 	snprintf(json, sizeof json, "%s/bench.json", part.out);

@@ -1,4 +1,4 @@
-/* How time grows: with samples, pixels, lights, instances, and how it falls with threads. */
+/* How time grows: with samples, pixels, lights, instances. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -139,7 +139,7 @@ static uint64_t samples_of_level(const struct psr_model *model, unsigned level)
 	uint64_t n = 0;
 
 	for (uint32_t i = 0; i < b->n_blocks; i++)
-		n += b->level[i] == level ? (uint64_t)__builtin_popcountll(b->mask[i]) : 0;
+		n += psr_blocks_level(b, i) == level ? (uint64_t)__builtin_popcountll(b->mask[i]) : 0;
 	return n;
 }
 
@@ -246,58 +246,4 @@ void growth_run(const struct part *part, const struct subject *subject)
 	instances(job, part, small);
 	psr_model_unref(small);
 	isolate_free(job, sizeof *job);
-}
-
-/* The clock while a core works, by a chain of additions that wait for each other: one a cycle. 0 where not known. */
-static double gigahertz(void)
-{
-	double best = 0;
-
-#ifdef __x86_64__
-	for (int round = 0; round < 40; round++) {
-		const long n = 2000000;
-		long x = 0;
-		double start = report_ms(), rate;
-
-		for (long i = 0; i < n; i += 4)
-			__asm__ volatile("add %1, %0\n\tadd %1, %0\n\tadd %1, %0\n\tadd %1, %0" : "+r"(x) : "r"(n));
-		rate = (double)n / (report_ms() - start) / 1e6;
-		best = rate > best ? rate : best;
-	}
-#endif
-	return best;
-}
-
-void threads_run(const struct part *part, const struct subject *subject)
-{
-	struct job *job = isolate_alloc(sizeof *job);
-	struct psr_model *model = scene_model(part->psr_model, part->models, subject->file, subject->source,
-	                                      subject->resolution[N_PICTURES - 1]);
-	const double ghz = gigahertz();
-	double one = 0;
-
-	printf("\nThreads: %s, %dx%d half covered; a core makes %.2f GHz. Warp includes culling and binning.\n"
-	       "%7s | %9s %9s | %9s %9s %11s | %9s %9s %9s\n", subject->name, SIDE, SIDE, ghz, "threads", "ms", "speedup",
-	       "warp", "ns a", "cycles a", "cull", "warp", "rest, ms");
-	printf("%7s | %9s %9s | %9s %9s %11s |\n", "", "", "", "Mpt/s", "point", "point");
-	prepare(job, part, model, SIDE, 0.5);
-	for (int n = 1; n <= part->n_threads; n = n < part->n_threads && 2 * n > part->n_threads ? part->n_threads : 2 * n) {
-		const struct ours_result *r = &job->result;
-		double rate;
-
-		job->n_threads = n;
-		isolate_run(draw, job);
-		one = n == 1 ? r->ms : one;
-		rate = report_ratio(r->count[PSR_STAGE_WARP], warp_ms(r)) / 1e3;
-		report_number(add("threads", n, job), "warp_mpt_s", rate);
-		printf("%7d | %9.2f %9.2f | %9.0f %9.3f %11.2f | %9.3f %9.3f %9.3f\n", n, r->ms, one / r->ms, rate,
-		       report_ratio(1e3, rate), report_ratio(1e3, rate) * ghz * n, r->stage_ms[PSR_STAGE_CULL],
-		       r->stage_ms[PSR_STAGE_WARP], r->ms - warp_ms(r));
-		if (n <= 2)
-			report_target(n == 1 ? "warp on one thread, binning included" : "warp on two threads, binning included", rate,
-			              "Mpt/s", REPORT_AT_LEAST, n == 1 ? 900 : 1400);
-	}
-	psr_model_unref(model);
-	isolate_free(job, sizeof *job);
-	fflush(stdout);
 }

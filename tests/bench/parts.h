@@ -24,7 +24,7 @@ void pictures_run(const struct part *part, const struct subject *subject);
 void thesis_table(const struct part *part);
 void thesis_figure(const struct part *part);
 void growth_run(const struct part *part, const struct subject *subject);
-void threads_run(const struct part *part, const struct subject *subject);
+void warp_run(const struct part *part, const struct subject *subject);
 void plot_all(const struct part *part);
 
 #endif

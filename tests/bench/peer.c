@@ -140,9 +140,11 @@ static uint8_t *choose(const struct psr_blocks *b, const struct peer_view *view,
 static void put_block(struct peer_points *out, const struct psr_blocks *b, uint32_t i)
 {
 	const struct psr_projection *p = &b->projection[b->block_projection[i]];
-	const float dx = p->spacing * (float)(1u << b->level[i]), dy = dx * 0.866025404f;
-	uint32_t k = b->attr_first[i];
+	const float dx = p->spacing * (float)(1u << psr_blocks_level(b, i)), dy = dx * 0.866025404f;
+	uint32_t k = psr_blocks_attr_first(b, i);
+	float bias, step;
 
+	psr_blocks_depth(b, i, &bias, &step);
 	for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
 		const int row = PSR_BLOCK_SIDE * b->row[i] + s / PSR_BLOCK_SIDE;
 		float x, y, z;
@@ -151,7 +153,7 @@ static void put_block(struct peer_points *out, const struct psr_blocks *b, uint3
 			continue;
 		x = ((float)(PSR_BLOCK_SIDE * b->col[i] + s % PSR_BLOCK_SIDE) + (float)(row & 1) / 2) * dx;
 		y = (float)row * dy;
-		z = b->depth_bias[i] + b->depth_step[i] * (float)b->depth[k];
+		z = bias + step * (float)b->depth[k];
 		for (int c = 0; c < 3; c++)
 			out->position[out->n][c] = x * p->axis[0][c] + y * p->axis[1][c] + z * p->axis[2][c];
 		out->attr[out->n++] = b->attr[k++];

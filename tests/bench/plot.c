@@ -5,23 +5,25 @@
 #include "parts.h"
 #include "report.h"
 
+#define MOST_LINES 3
+
 struct line {
 	const char *title, *key; /* of a number of each item */
 };
 
 static const struct plot {
 	const char *array, *title, *x_label, *y_label, *axes;
-	struct line line[2];
+	struct line line[MOST_LINES];
 } plots[] = {
 	{ "samples", "1024x1024: milliseconds by samples of the scene", "samples", "ms", "set logscale xy",
 	  { { "one level", "ms" }, { "all levels", "ms_with_levels" } } },
 	{ "pixels", "milliseconds by pixels, half covered", "pixels", "ms", "set logscale xy", { { "frame", "ms" } } },
 	{ "lights", "1024x1024 half covered: milliseconds by lights", "lights", "ms", "set yrange [0:*]",
 	  { { "directional", "ms" }, { "point", "ms_point" } } },
-	{ "instances", "1024x1024: milliseconds by instances in the room of one", "instances", "ms", "set logscale x 2\nset yrange [0:*]",
-	  { { "frame", "ms" } } },
-	{ "threads", "warp with culling and binning, by threads", "threads", "Mpt/s", "set yrange [0:*]",
-	  { { "warp", "warp_mpt_s" } } },
+	{ "instances", "1024x1024: milliseconds by instances in the room of one", "instances", "ms",
+	  "set logscale x 2\nset yrange [0:*]",   { { "frame", "ms" } } },
+	{ "warp", "warp with culling and binning, by threads", "threads", "Mpt/s", "set yrange [0:*]",
+	  { { "C", "c" }, { "AVX2", "avx2" }, { "AVX-512", "avx512" } } },
 };
 
 static void write_data(FILE *file, const cJSON *array, const char *key)
@@ -47,10 +49,10 @@ static int write_plot(FILE *file, const struct part *part, const struct plot *pl
 	fprintf(file, "reset\nset terminal svg size 640,400 background 'white'\nset output '%s/%s.svg'\nset title '%s'\n"
 	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key left top\n%s\nplot", part->out, plot->array, plot->title,
 	        plot->x_label, plot->y_label, plot->axes);
-	for (int i = 0; i < 2 && plot->line[i].key != NULL; i++)
+	for (int i = 0; i < MOST_LINES && plot->line[i].key != NULL; i++)
 		fprintf(file, "%s '-' with linespoints title '%s'", i > 0 ? "," : "", plot->line[i].title);
 	fputs("\n", file);
-	for (int i = 0; i < 2 && plot->line[i].key != NULL; i++)
+	for (int i = 0; i < MOST_LINES && plot->line[i].key != NULL; i++)
 		write_data(file, array, plot->line[i].key);
 	return 1;
 }
