@@ -25,7 +25,8 @@ struct compare compare_pictures(const uint8_t *a, const uint8_t *b, uint32_t wid
 			most = abs(a[c] - b[c]) > most ? abs(a[c] - b[c]) : most;
 		sum += (uint64_t)most;
 	}
-	return (struct compare){ report_ratio((double)n_both, (double)n_either), report_ratio((double)sum, (double)n_both) };
+	return (struct compare){ report_ratio((double)n_both, (double)n_either),
+		                     report_ratio((double)sum, (double)n_both) };
 }
 
 double compare_covered(const uint8_t *rgb, uint32_t width, uint32_t height)

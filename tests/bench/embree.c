@@ -251,8 +251,8 @@ static void draw(struct tracer *t, struct psr_pool *pool, const struct scene_fil
 	psr_pool_for(pool, (int)(t->tiles_x * ((t->view.height + TILE - 1) / TILE)), trace_tile, t);
 }
 
-void embree_measure(struct peer_result *out, const struct scene_film *film, const struct peer_mesh *mesh, int has_shadow,
-                    int n_threads, int n_frames, uint8_t *rgb)
+void embree_measure(struct peer_result *out, const struct scene_film *film, const struct peer_mesh *mesh,
+                    int has_shadow, int n_threads, int n_frames, uint8_t *rgb)
 {
 	const size_t n_bytes = (size_t)3 * film->picture.width * film->picture.height;
 	struct tracer *t = report_alloc(1, sizeof *t);

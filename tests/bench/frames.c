@@ -53,8 +53,8 @@ static void describe(const struct part *part)
 		fclose(file);
 	report_text(machine, "processor", name);
 	report_number(machine, "threads", part->n_threads);
-	printf("%s, %d threads. Every figure is the median of frames of a camera that swings; ratios hold, times drift.\n", name,
-	       part->n_threads);
+	printf("%s, %d threads. Every figure is the median of frames of a camera that swings; ratios hold, times drift.\n",
+	       name, part->n_threads);
 }
 
 int main(int argc, char **argv)

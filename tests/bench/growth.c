@@ -38,8 +38,8 @@ static void draw(void *arg)
 {
 	struct job *job = arg;
 	const struct ours_settings settings = {
-		.width = job->film.picture.width, .height = job->film.picture.height, .n_threads = job->n_threads, .least_ms = 60, .most_ms = 500,
-		.n_frames = GROWTH_FRAMES, .scene = scene, .userdata = job,
+		.width = job->film.picture.width, .height = job->film.picture.height, .n_threads = job->n_threads,
+		.least_ms = 60, .most_ms = 500, .n_frames = GROWTH_FRAMES, .scene = scene, .userdata = job,
 	};
 
 	ours_measure(&job->result, &settings, NULL);
@@ -121,7 +121,8 @@ static void sample_row(struct job *job, const struct part *part, struct psr_mode
 	samples = job->result.n_samples;
 	item = add("samples", samples, job);
 	printf("%10.3f %8u | %9.2f %9.0f %9.2f |", samples / 1e6, n, job->result.ms,
-	       report_ratio(job->result.count[PSR_STAGE_WARP], warp_ms(&job->result)) / 1e3, job->result.ms * 1e6 / samples);
+	       report_ratio(job->result.count[PSR_STAGE_WARP], warp_ms(&job->result)) / 1e3,
+	       job->result.ms * 1e6 / samples);
 	if (model != NULL) {
 		spread(job, model, n);
 		isolate_run(draw, job);
@@ -145,9 +146,10 @@ static uint64_t samples_of_level(const struct psr_model *model, unsigned level)
 
 static void samples(struct job *job, const struct part *part, struct psr_model *model)
 {
-	printf("\nSamples, at %dx%d: levels of the model alone, then copies of the finest in the room of one, and with all levels\n"
-	       "%10s %8s | %9s %9s %9s | %9s %9s\n%10s %8s | %9s %9s %9s | %9s %9s\n", SIDE, SIDE, "million", "copies", "ms",
-	       "warp", "ns a", "levels", "of them", "samples", "", "", "Mpt/s", "sample", "ms", "drawn, M");
+	printf("\nSamples, at %dx%d: levels of the model alone, then copies of the finest in the room of one, and with all "
+	       "levels\n", SIDE, SIDE);
+	printf("%10s %8s | %9s %9s %9s | %9s %9s\n", "million", "copies", "one level", "warp", "ns a", "levels", "of them");
+	printf("%10s %8s | %9s %9s %9s | %9s %9s\n", "samples", "", "ms", "Mpt/s", "sample", "ms", "drawn, M");
 	for (unsigned level = psr_model_blocks(model)->n_levels; level-- > 0;) {
 		const double n = (double)samples_of_level(model, level);
 		struct psr_model *single;
@@ -214,8 +216,8 @@ static void lights(struct job *job, const struct part *part, struct psr_model *m
 
 static void instances(struct job *job, const struct part *part, struct psr_model *model)
 {
-	printf("\nInstances, at %dx%d, in the room of one\n%9s | %9s %12s %12s\n", SIDE, SIDE, "instances", "ms", "samples, M",
-	       "drawn, M");
+	printf("\nInstances of the teapot, at %dx%d, in the room of one\n%9s | %9s %12s %12s\n", SIDE, SIDE,
+	       "instances", "ms", "samples, M", "drawn, M");
 	prepare(job, part, model, SIDE, 0);
 	for (uint32_t n = 1; n <= PSR_MAX_INSTANCES; n *= 4) {
 		spread(job, model, n);
@@ -235,8 +237,8 @@ void growth_run(const struct part *part, const struct subject *subject)
 	struct psr_model *small;
 	char source[4096];
 
-	printf("\nHow time grows: %s at %d, %d threads, nothing encoded", subject->name, subject->resolution[N_PICTURES - 1],
-	       part->n_threads);
+	printf("\nHow time grows: %s at %d, %d threads, nothing encoded", subject->name,
+	       subject->resolution[N_PICTURES - 1], part->n_threads);
 	samples(job, part, model);
 	pixels(job, part, model);
 	lights(job, part, model);

@@ -12,7 +12,7 @@ struct ours_settings {
 	uint32_t width, height;
 	int n_threads, is_encoded;
 	int n_frames;             /* of one round */
-	double least_ms, most_ms; /* rounds are drawn until the one is over; from the other on nothing more but a third frame */
+	double least_ms, most_ms; /* rounds are drawn until the one is over; after the other, no more frames than three */
 	/* The scene of frame i; it must stay until the next call. */
 	void (*scene)(struct psr_scene *scene, int frame, const void *userdata);
 	const void *userdata;

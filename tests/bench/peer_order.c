@@ -4,7 +4,7 @@
 #include "report.h"
 
 /* Triangles along a curve through space, vertices in the order of their first use: few vertices are transformed twice,
- * attributes are near to each other. On the dragon it takes a quarter off llvmpipe's frames and a tenth off Embree's. */
+ * attributes are near to each other. On the dragon it takes a quarter off llvmpipe's time and a tenth off Embree's. */
 
 struct key {
 	uint32_t look, place, triangle;

@@ -47,7 +47,8 @@ static void draw_ours(void *arg)
 	const struct job *job = arg;
 	struct ours_settings settings = {
 		.width = job->film->picture.width, .height = job->film->picture.height, .n_threads = job->part->n_threads,
-		.is_encoded = 1, .least_ms = 400, .most_ms = 1500, .n_frames = SCENE_FRAMES, .scene = scene, .userdata = job->film,
+		.is_encoded = 1, .least_ms = 400, .most_ms = 1500, .n_frames = SCENE_FRAMES, .scene = scene,
+		.userdata = job->film,
 	};
 
 	ours_measure(&job->cell->all, &settings, job->cell->rgb[N_PEERS]);

@@ -47,8 +47,8 @@ static int write_plot(FILE *file, const struct part *part, const struct plot *pl
 	if (cJSON_GetArraySize(array) == 0)
 		return 0;
 	fprintf(file, "reset\nset terminal svg size 640,400 background 'white'\nset output '%s/%s.svg'\nset title '%s'\n"
-	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key left top\n%s\nplot", part->out, plot->array, plot->title,
-	        plot->x_label, plot->y_label, plot->axes);
+	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key left top\n%s\nplot", part->out, plot->array,
+	        plot->title, plot->x_label, plot->y_label, plot->axes);
 	for (int i = 0; i < MOST_LINES && plot->line[i].key != NULL; i++)
 		fprintf(file, "%s '-' with linespoints title '%s'", i > 0 ? "," : "", plot->line[i].title);
 	fputs("\n", file);

@@ -25,7 +25,7 @@ struct scene_picture {
 	double coverage; /* part of the picture that the object is to cover; 0: the whole object fits */
 };
 
-/* A camera that swings by 15 degrees to either side, its eye at the place of one that shows the whole object; it looks at
+/* A camera that swings by 15 degrees to either side, its eye where one stands that shows the whole object; it looks at
  * the middle of the box plus `aim`, in half sides of the box, and has 1 / zoom of the opening. */
 #define SCENE_FRAMES 24
 struct scene_film {

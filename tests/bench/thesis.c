@@ -99,9 +99,9 @@ void thesis_table(const struct part *part)
 	const size_t n_shown = sizeof shown / sizeof shown[0];
 	struct job *job = isolate_alloc(sizeof *job);
 
-	printf("\n[G] table 8.2, ms at %dx%d, one light, a sample a pixel: ours on one thread, the factor to 1998 (a Pentium II of "
-	       "333 MHz)\nunder each column. Clearing buffers is init in the thesis and part of warp here; pull and push are one "
-	       "stage here.\n%-9s |", SIDE, SIDE, "model");
+	printf("\n[G] table 8.2, ms at %dx%d, one light, a sample a pixel: ours on one thread, and the factor to 1998 (a "
+	       "Pentium II\nof 333 MHz). Clearing buffers is init in the thesis and part of warp here; pull and push are one stage "
+	       "here.\n%-9s |", SIDE, SIDE, "model");
 	for (size_t c = 0; c < n_shown; c++)
 		printf(" %15s", head[c]);
 	printf(" | %d threads, factor\n", part->n_threads);
@@ -145,8 +145,8 @@ void thesis_figure(const struct part *part)
 	for (int k = 0; k < 3; k++)
 		job->light[2].position[k] = (info->box_min[k] + info->box_max[k]) / 2 + (k == 1 ? 2 * info->scale : 0);
 	isolate_run(draw, job);
-	printf("\n[G] figure 7.4: %s at %dx%d, ms, by lights; %.0f ms in 1998\n%-36s %10s %10s %s\n", FIGURE_MODEL, SIDE, SIDE,
-	       FIGURE_MS, "", "1 thread", "threads", "factor to 1998 on one thread");
+	printf("\n[G] figure 7.4: %s at %dx%d, ms, without shadows; %.0f ms in 1998\n%-36s %10s %8d t. %s\n", FIGURE_MODEL,
+	       SIDE, SIDE, FIGURE_MS, "", "1 thread", part->n_threads, "factor to 1998 on one thread");
 	job->n_lights = 3;
 	const double single = job->one.ms;
 	printf("%-36s %10.3f %10.3f\n", "one directional light", job->one.ms, job->all.ms);

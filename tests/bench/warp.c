@@ -99,10 +99,12 @@ void warp_run(const struct part *part, const struct subject *subject)
 	double one_ms = 0;
 
 	scene_film_init(&job->film, &picture, model, (const double[3]){ 0, 0, 0 });
-	printf("\nWarp: %s at %d, %dx%d half covered; a core makes %.2f GHz. Rates include culling and binning.\n"
-	       "%-7s %7s | %9s %8s | %8s %8s %8s | %8s %8s %8s\n%-7s %7s | %9s %8s | %8s %8s %8s | %8s %8s %8s\n", subject->name,
-	       subject->resolution[1], SIDE, SIDE, ghz, "isa", "threads", "frame", "speedup", "rate", "ns a", "cycles", "cull",
-	       "warp", "rest", "", "", "ms", "", "Mpt/s", "point", "a point", "ms", "ms", "ms");
+	printf("\nWarp: %s at %d, %dx%d half covered; a core makes %.2f GHz. Rates include culling and binning.\n",
+	       subject->name, subject->resolution[1], SIDE, SIDE, ghz);
+	printf("%-7s %7s | %9s %8s | %8s %8s %8s | %8s %8s %8s\n", "isa", "threads", "frame", "speedup", "rate", "ns a",
+	       "cycles", "cull", "warp", "rest");
+	printf("%-7s %7s | %9s %8s | %8s %8s %8s | %8s %8s %8s\n", "", "", "ms", "", "Mpt/s", "point", "a point", "ms",
+	       "ms", "ms");
 	for (int isa = 0; isa <= (int)psr_isa_get(); isa++) {
 		for (int n = 1; n <= part->n_threads; n = more_threads(n, part->n_threads)) {
 			double rate;
