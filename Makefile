@@ -10,7 +10,8 @@ VERSION := 0.1.0
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels
-DEPS_BENCH := gnuplot-nox libosmesa6-dev libgl-dev
+DEPS_STUDY := gnuplot-nox
+DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev
 
 CC  ?= cc
 CXX ?= c++
@@ -217,7 +218,7 @@ demo: deps ## demo: install what is missing, build, draw pictures of several mod
 	$(Q)BUILD=$(BUILD) docs/demo.sh
 
 studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
-	$(Q).ci/deps $(DEPS_BENCH)
+	$(Q).ci/deps $(DEPS_STUDY)
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/studies.sh
 

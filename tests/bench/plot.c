@@ -22,7 +22,7 @@ static const struct plot {
 	  { { "directional", "ms" }, { "point", "ms_point" } } },
 	{ "instances", "1024x1024: milliseconds by instances in the room of one", "instances", "ms",
 	  "set logscale x 2\nset yrange [0:*]",   { { "frame", "ms" } } },
-	{ "warp", "warp with culling and binning, by threads", "threads", "Mpt/s", "set yrange [0:*]",
+	{ "warp", "warp with culling and binning, by threads", "threads", "Mpt/s", "set yrange [0:*]\nset xtics 1",
 	  { { "C", "c" }, { "AVX2", "avx2" }, { "AVX-512", "avx512" } } },
 };
 
@@ -40,6 +40,16 @@ static void write_data(FILE *file, const cJSON *array, const char *key)
 	fputs("e\n", file);
 }
 
+static int has_data(const cJSON *array, const char *key)
+{
+	const cJSON *item;
+	int n = 0;
+
+	cJSON_ArrayForEach(item, array)
+		n += key != NULL && cJSON_GetObjectItemCaseSensitive(item, key) != NULL;
+	return n > 0;
+}
+
 static int write_plot(FILE *file, const struct part *part, const struct plot *plot)
 {
 	const cJSON *array = report_array(plot->array);
@@ -47,27 +57,29 @@ static int write_plot(FILE *file, const struct part *part, const struct plot *pl
 	if (cJSON_GetArraySize(array) == 0)
 		return 0;
 	fprintf(file, "reset\nset terminal svg size 640,400 background 'white'\nset output '%s/%s.svg'\nset title '%s'\n"
-	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key left top\n%s\nplot", part->out, plot->array,
+	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key outside top horizontal\n%s\nplot", part->out, plot->array,
 	        plot->title, plot->x_label, plot->y_label, plot->axes);
-	for (int i = 0; i < MOST_LINES && plot->line[i].key != NULL; i++)
-		fprintf(file, "%s '-' with linespoints title '%s'", i > 0 ? "," : "", plot->line[i].title);
+	for (int i = 0, n = 0; i < MOST_LINES; i++)
+		if (has_data(array, plot->line[i].key))
+			fprintf(file, "%s '-' with linespoints title '%s'", n++ > 0 ? "," : "", plot->line[i].title);
 	fputs("\n", file);
-	for (int i = 0; i < MOST_LINES && plot->line[i].key != NULL; i++)
-		write_data(file, array, plot->line[i].key);
+	for (int i = 0; i < MOST_LINES; i++)
+		if (has_data(array, plot->line[i].key))
+			write_data(file, array, plot->line[i].key);
 	return 1;
 }
 
 /* Bars, a picture each, of all renderers' times. */
 static int write_peers(FILE *file, const struct part *part)
 {
-	static const char *const key[] = { "ours", "embree", "embree-shadow", "llvmpipe-mesh", "llvmpipe-points" };
+	static const char *const key[] = { "ours", "embree", "embree-shadow", "llvmpipe-mesh", "llvmpipe-points-vertex" };
 	const cJSON *array = report_array("pictures"), *item;
 
 	if (cJSON_GetArraySize(array) == 0)
 		return 0;
 	fprintf(file, "reset\nset terminal svg size 900,500 background 'white'\nset output '%s/peers.svg'\n"
 	        "set title 'milliseconds a frame, nothing encoded'\nset style data histograms\nset style fill solid 0.7\n"
-	        "set logscale y\nset grid ytics\nset xtics rotate by -30\nset key outside top horizontal\nplot", part->out);
+	        "set logscale y\nset yrange [0.1:*]\nset grid ytics\nset xtics rotate by -30\nset key outside top horizontal\nplot", part->out);
 	for (int i = 0; i < 5; i++)
 		fprintf(file, "%s '-' using 2:xtic(1) title '%s'", i > 0 ? "," : "", key[i]);
 	fputs("\n", file);
