@@ -57,8 +57,8 @@ static int write_plot(FILE *file, const struct part *part, const struct plot *pl
 	if (cJSON_GetArraySize(array) == 0)
 		return 0;
 	fprintf(file, "reset\nset terminal svg size 640,400 background 'white'\nset output '%s/%s.svg'\nset title '%s'\n"
-	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key outside top horizontal\n%s\nplot", part->out, plot->array,
-	        plot->title, plot->x_label, plot->y_label, plot->axes);
+	        "set xlabel '%s'\nset ylabel '%s'\nset grid\nset key outside top horizontal\n%s\nplot", part->out,
+	        plot->array, plot->title, plot->x_label, plot->y_label, plot->axes);
 	for (int i = 0, n = 0; i < MOST_LINES; i++)
 		if (has_data(array, plot->line[i].key))
 			fprintf(file, "%s '-' with linespoints title '%s'", n++ > 0 ? "," : "", plot->line[i].title);
@@ -79,7 +79,8 @@ static int write_peers(FILE *file, const struct part *part)
 		return 0;
 	fprintf(file, "reset\nset terminal svg size 900,500 background 'white'\nset output '%s/peers.svg'\n"
 	        "set title 'milliseconds a frame, nothing encoded'\nset style data histograms\nset style fill solid 0.7\n"
-	        "set logscale y\nset yrange [0.1:*]\nset grid ytics\nset xtics rotate by -30\nset key outside top horizontal\nplot", part->out);
+	        "set logscale y\nset yrange [0.1:*]\nset grid ytics\nset xtics rotate by -30\nset key outside top horizontal\nplot",
+	        part->out);
 	for (int i = 0; i < 5; i++)
 		fprintf(file, "%s '-' using 2:xtic(1) title '%s'", i > 0 ? "," : "", key[i]);
 	fputs("\n", file);

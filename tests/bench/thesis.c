@@ -100,8 +100,8 @@ void thesis_table(const struct part *part)
 	struct job *job = isolate_alloc(sizeof *job);
 
 	printf("\n[G] table 8.2, ms at %dx%d, one light, a sample a pixel: ours on one thread, and the factor to 1998 (a "
-	       "Pentium II\nof 333 MHz). Clearing buffers is init in the thesis and part of warp here; pull and push are one "
-	       "stage here.\n%-9s |", SIDE, SIDE, "model");
+	       "Pentium II\nof 333 MHz). Clearing buffers is init in the thesis and part of warp here; pull and push are "
+	       "one stage here.\n%-9s |", SIDE, SIDE, "model");
 	for (size_t c = 0; c < n_shown; c++)
 		printf(" %15s", head[c]);
 	printf(" | %d threads, factor\n", part->n_threads);
