@@ -27,10 +27,10 @@ struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y
 	return (struct fill_row){ cell->r + at, cell->g + at, cell->b + at, cell->weight + at, cell->z + at };
 }
 
-void fill_note_depth(struct fill_pass *pass, int level)
+void fill_note_depth(struct fill *fill, int level)
 {
-	int seen = atomic_load(&pass->deepest);
-	while (seen < level && !atomic_compare_exchange_weak(&pass->deepest, &seen, level))
+	int seen = atomic_load(&fill->deepest);
+	while (seen < level && !atomic_compare_exchange_weak(&fill->deepest, &seen, level))
 		;
 }
 
@@ -44,7 +44,7 @@ static void clear_level(struct fill_level *level, size_t area)
 	}
 }
 
-int fill_prepare(struct fill *fill, uint32_t width, uint32_t height)
+static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 {
 	if (fill->width == width && fill->height == height)
 		return PSR_OK;
@@ -91,6 +91,16 @@ int fill_prepare(struct fill *fill, uint32_t width, uint32_t height)
 	return PSR_OK;
 }
 
+int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *plan, const struct fill_picture *picture)
+{
+	fill->simd = simd;
+	fill->plan = plan;
+	fill->picture = *picture;
+	fill->deepest = 0;
+	fill->n_changed = fill->n_filled = fill->n_moved = 0;
+	return prepare(fill, picture->stack->width, picture->stack->height);
+}
+
 void fill_clear(struct fill *fill)
 {
 	psr_free(fill->storage);
@@ -125,21 +135,18 @@ static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx
 	return end;
 }
 
-static void find_whole(int i, void *userdata)
+void fill_look(struct fill *fill, uint32_t row)
 {
-	struct fill_pass *pass = userdata;
-	struct fill *fill = pass->fill;
-	const uint32_t by = (uint32_t)i;
-	const size_t row = (size_t)by * fill->bricks_x;
+	const uint8_t *bricks = fill->picture.bricks + (size_t)row * fill->bricks_x;
+	uint8_t *whole = fill->whole + (size_t)row * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = run_end(fill, pass->picture->bricks, bx, by);
-		if (!pass->picture->bricks[row + bx]) {
-			memset(fill->whole + row + bx, 0, end - bx);
+		end = run_end(fill, fill->picture.bricks, bx, row);
+		memset(whole + bx, 0, end - bx);
+		if (!bricks[bx])
 			continue;
-		}
-		fill_pull_bricks(pass, bx, end, by, fill->brick_top, 0);
+		fill_pull_bricks(fill, bx, end, row, fill->brick_top, 0);
 		for (uint32_t b = bx; b < end; b++)
-			fill->whole[row + b] = (uint8_t)whole_level(fill, b, by);
+			whole[b] = (uint8_t)whole_level(fill, b, row);
 	}
 }
 
@@ -155,12 +162,9 @@ static uint8_t greatest_around(const struct fill *fill, const uint8_t *map, uint
 	return greatest;
 }
 
-const uint8_t *fill_wants(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-                          const struct fill_picture *picture)
+const uint8_t *fill_wants(struct fill *fill)
 {
-	struct fill_pass pass = { .fill = fill, .simd = simd, .plan = plan, .picture = picture };
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
-	psr_pool_for(pool, (int)fill->bricks_y, find_whole, &pass);
 	fill->is_coarse = 0;
 	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
 		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++) {
@@ -175,26 +179,23 @@ const uint8_t *fill_wants(struct fill *fill, const struct simd *simd, const stru
 	return fill->wants;
 }
 
-static void pull_row(int i, void *userdata)
+void fill_pull(struct fill *fill, uint32_t row)
 {
-	struct fill_pass *pass = userdata;
-	const struct fill *fill = pass->fill;
-	const uint8_t *wants = fill->wants + (size_t)i * fill->bricks_x;
+	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = run_end(fill, fill->wants, bx, (uint32_t)i);
-		fill_pull_bricks(pass, bx, end, (uint32_t)i, wants[bx], 1);
+		end = run_end(fill, fill->wants, bx, row);
+		fill_pull_bricks(fill, bx, end, row, wants[bx], 1);
 	}
 }
 
 static void push_row(int i, void *userdata)
 {
-	struct fill_pass *pass = userdata;
-	const struct fill *fill = pass->fill;
+	struct fill *fill = userdata;
 	const uint8_t *needs = fill->needs + (size_t)i * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		end = run_end(fill, fill->needs, bx, (uint32_t)i);
 		if (needs[bx])
-			fill_push_bricks(pass, bx, end, (uint32_t)i, needs[bx]);
+			fill_push_bricks(fill, bx, end, (uint32_t)i, needs[bx]);
 	}
 }
 
@@ -209,43 +210,39 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 }
 
 /* The levels of which a brick has less than a cell. */
-static void run_coarse(struct fill_pass *pass)
+static void run_coarse(struct fill *fill)
 {
-	const struct fill *fill = pass->fill;
 	for (int l = fill->brick_top; l < fill->top; l++) {
 		const struct fill_level *from = &fill->level[l], *to = from + 1;
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const struct fill_row row = fill_row_at(to, 0, y), upper = fill_row_at(from, 0, 2 * y);
 			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
-			const uint16_t least = pass->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(pass->plan, l + 1),
-			                                             fill_offset(pass->plan, l + 1));
+			const uint16_t least = fill->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(fill->plan, l + 1),
+			                                             fill_offset(fill->plan, l + 1));
 			if (least < WEIGHT_ONE / 2)
-				fill_note_depth(pass, l + 1);
+				fill_note_depth(fill, l + 1);
 		}
 	}
-	finish_top(&fill->level[fill->top], pass->plan);
+	finish_top(&fill->level[fill->top], fill->plan);
 	for (int l = fill->top - 1; l >= fill->brick_top; l--) {
 		const struct fill_level *to = &fill->level[l], *from = to + 1;
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const int32_t parent = y >> 1;
 			const struct fill_row row = fill_row_at(to, 0, y), own = fill_row_at(from, 0, parent);
 			const struct fill_row beside = fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1);
-			pass->simd->fill_push(&row, &own, &beside, from->width, 0, fill_scale(pass->plan, l + 1),
-			                      fill_offset(pass->plan, l + 1));
+			fill->simd->fill_push(&row, &own, &beside, from->width, fill_scale(fill->plan, l + 1),
+			                      fill_offset(fill->plan, l + 1));
 		}
 	}
 }
 
-void fill_run(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-              const struct fill_picture *picture, struct psr_report *report)
+void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report)
 {
-	struct fill_pass pass = { .fill = fill, .simd = simd, .plan = plan, .picture = picture };
-	psr_pool_for(pool, (int)fill->bricks_y, pull_row, &pass);
 	if (fill->is_coarse)
-		run_coarse(&pass);
-	psr_pool_for(pool, (int)fill->bricks_y, push_row, &pass);
-	report->count[PSR_STAGE_FILL] += pass.n_changed;
-	report->n_filled += pass.n_filled;
-	if (pass.n_moved)
-		report->error_bound += (double)(2 << pass.deepest);
+		run_coarse(fill);
+	psr_pool_for(pool, (int)fill->bricks_y, push_row, fill);
+	report->count[PSR_STAGE_FILL] += fill->n_changed;
+	report->n_filled += fill->n_filled;
+	if (fill->n_moved)
+		report->error_bound += (double)(2 << fill->deepest);
 }

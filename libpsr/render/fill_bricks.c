@@ -8,24 +8,22 @@ struct picture_row {
 	uint16_t r[FILL_WIDTH + 1], g[FILL_WIDTH + 1], b[FILL_WIDTH + 1], weight[FILL_WIDTH + 1];
 };
 
-enum use { READ_WEIGHTS, READ, WRITE };
-
-/* Pixel (x, y) and the n - 1 to the right of it; a copy where they are written, too. */
-static struct fill_row picture_row_at(struct picture_row *to, const struct fill_pass *pass, uint32_t x, uint32_t y, uint32_t n,
-                                      enum use use)
+/* Pixel (x, y) and the n - 1 to the right of it; without depths or colours where they are not asked for. */
+static struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y, uint32_t n,
+                                      int has_depths, int has_colors)
 {
-	const struct fill_picture *p = pass->picture;
+	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = p->stack->width, n_inside = y >= p->stack->height ? 0 : x + n > width ? width - x : n;
 	const size_t first = (size_t)y * width + x;
-	if (n_inside)
-		pass->simd->fill_depths(to->z, p->stack->word + first, n_inside);
-	if (n_inside == n && use == READ_WEIGHTS)
-		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, to->z };
-	if (n_inside == n && use == READ)
+	if (n_inside && has_depths)
+		fill->simd->fill_depths(to->z, p->stack->word + first, n_inside);
+	if (n_inside == n && has_colors)
 		return (struct fill_row){ p->r + first, p->g + first, p->b + first, p->weight + first, to->z };
+	if (n_inside == n)
+		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, to->z };
 	if (n_inside)
 		memcpy(to->weight, p->weight + first, n_inside * sizeof *to->weight);
-	if (n_inside && use != READ_WEIGHTS) {
+	if (n_inside && has_colors) {
 		memcpy(to->r, p->r + first, n_inside * sizeof *to->r);
 		memcpy(to->g, p->g + first, n_inside * sizeof *to->g);
 		memcpy(to->b, p->b + first, n_inside * sizeof *to->b);
@@ -43,32 +41,31 @@ static uint32_t least_of(uint32_t a, uint32_t b)
 	return a < b ? a : b;
 }
 
-void fill_pull_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors)
+void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors)
 {
-	const enum use use = has_colors ? READ : READ_WEIGHTS;
 	struct picture_row rows[2];
 	for (int l = 1; l <= level; l++) {
-		const struct fill_level *to = &pass->fill->level[l], *from = to - 1;
+		const struct fill_level *to = &fill->level[l], *from = to - 1;
 		const uint32_t side = BRICK >> l, x0 = bx0 * side, x1 = least_of(bx1 * side, to->width);
 		const uint32_t y1 = least_of((by + 1) * side, to->height);
-		const float scale = fill_scale(pass->plan, l), offset = fill_offset(pass->plan, l);
+		const float scale = fill_scale(fill->plan, l), offset = fill_offset(fill->plan, l);
 		uint16_t least = WEIGHT_ONE;
 		for (uint32_t y = by * side; y < y1; y++) {
 			struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), upper, lower;
 			if (!has_colors)
 				row.r = row.g = row.b = NULL;
 			if (l == 1) {
-				upper = picture_row_at(&rows[0], pass, 2 * x0, 2 * y, 2 * (x1 - x0), use);
-				lower = picture_row_at(&rows[1], pass, 2 * x0, 2 * y + 1, 2 * (x1 - x0), use);
+				upper = picture_row_at(&rows[0], fill, 2 * x0, 2 * y, 2 * (x1 - x0), 1, has_colors);
+				lower = picture_row_at(&rows[1], fill, 2 * x0, 2 * y + 1, 2 * (x1 - x0), 1, has_colors);
 			} else {
 				upper = fill_row_at(from, (int32_t)(2 * x0), (int32_t)(2 * y));
 				lower = fill_row_at(from, (int32_t)(2 * x0), (int32_t)(2 * y + 1));
 			}
-			const uint16_t weight = pass->simd->fill_pull(&row, &upper, &lower, x1 - x0, l == 1, scale, offset);
+			const uint16_t weight = fill->simd->fill_pull(&row, &upper, &lower, x1 - x0, l == 1, scale, offset);
 			least = weight < least ? weight : least;
 		}
 		if (has_colors && least < WEIGHT_ONE / 2)
-			fill_note_depth(pass, l);
+			fill_note_depth(fill, l);
 		if (!has_colors && least == WEIGHT_ONE)
 			return;
 	}
@@ -121,15 +118,15 @@ static void load_level(struct scratch *scratch, const struct fill *fill, int l, 
 	}
 }
 
-static void push_level(const struct fill_pass *pass, const struct scratch *scratch, int l)
+static void push_level(const struct fill *fill, const struct scratch *scratch, int l)
 {
 	const struct fill_level *to = &scratch->level[l], *from = to + 1;
-	const float scale = fill_scale(pass->plan, l + 1), offset = fill_offset(pass->plan, l + 1);
+	const float scale = fill_scale(fill->plan, l + 1), offset = fill_offset(fill->plan, l + 1);
 	for (int32_t y = to->top; y < to->top + (int32_t)to->height + 2; y++) {
 		const int32_t parent = y >> 1, x = from->left + 1;
 		const struct fill_row row = fill_row_at(to, 2 * x, y), own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		pass->simd->fill_push(&row, &own, &beside, from->width + 2, 0, scale, offset);
+		fill->simd->fill_push(&row, &own, &beside, from->width + 2, scale, offset);
 	}
 }
 
@@ -151,21 +148,22 @@ static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n
 	return n_places;
 }
 
-void fill_push_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
 {
-	const struct fill_picture *p = pass->picture;
+	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = p->stack->width, x0 = bx0 * BRICK, n = least_of(bx1 * BRICK, width) - x0;
 	const uint32_t y1 = least_of((by + 1) * BRICK, p->stack->height);
-	const float scale = fill_scale(pass->plan, 1), offset = fill_offset(pass->plan, 1);
+	const float scale = fill_scale(fill->plan, 1), offset = fill_offset(fill->plan, 1);
 	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
 	uint16_t place[FILL_WIDTH + 4];
 	struct scratch scratch;
-	struct picture_row pixels;
+	struct picture_row pixels, filled;
+	const struct fill_row row = { filled.r, filled.g, filled.b, NULL, filled.z };
 
 	for (int l = level; l >= 1; l--) {
-		load_level(&scratch, pass->fill, l, bx0, bx1, by);
+		load_level(&scratch, fill, l, bx0, bx1, by);
 		if (l < level)
-			push_level(pass, &scratch, l);
+			push_level(fill, &scratch, l);
 	}
 	const struct fill_level *from = &scratch.level[1];
 	for (uint32_t y = by * BRICK; y < y1; y++) {
@@ -174,25 +172,26 @@ void fill_push_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32
 		if (!n_places)
 			continue;
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
-		const struct fill_row row = picture_row_at(&pixels, pass, x0, y, 2 * from->width, WRITE), own = fill_row_at(from, x, parent);
+		const struct fill_row was = picture_row_at(&pixels, fill, x0, y, 2 * from->width, 0, 1);
+		const struct fill_row own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		pass->simd->fill_push(&row, &own, &beside, from->width, 1, scale, offset);
+		fill->simd->fill_push_picture(&row, &was, &own, &beside, from->width, scale, offset);
 		for (uint32_t i = 0; i < n_places; i++) {
 			const uint32_t at = place[i];
-			n_filled += row.weight[at] == 0 && row.z[at] < INFINITY;
-			n_moved += row.weight[at] < WEIGHT_ONE / 2;
 			if (p->rgb) {
 				uint8_t *rgb = p->rgb + 3 * (first + at);
 				rgb[0] = p->srgb[row.r[at]];
 				rgb[1] = p->srgb[row.g[at]];
 				rgb[2] = p->srgb[row.b[at]];
 			}
-			if (p->depth)
+			n_filled += (was.weight[at] == 0) & (row.z[at] < INFINITY);
+			n_moved += was.weight[at] < WEIGHT_ONE / 2;
+			if (p->depth && was.weight[at] < WEIGHT_ONE / 2)
 				p->depth[first + at] = ldexpf(row.z[at], p->stack->exponent);
 		}
 		n_changed += n_places;
 	}
-	atomic_fetch_add_explicit(&pass->n_changed, n_changed, memory_order_relaxed);
-	atomic_fetch_add_explicit(&pass->n_filled, n_filled, memory_order_relaxed);
-	atomic_fetch_add_explicit(&pass->n_moved, n_moved, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_changed, n_changed, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_filled, n_filled, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_moved, n_moved, memory_order_relaxed);
 }

@@ -215,6 +215,7 @@ static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	r->gaps[row] = gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+	fill_look(&r->fill, (uint32_t)row);
 }
 
 static void shade_one(int row, void *userdata)
@@ -229,6 +230,8 @@ static void shade_one(int row, void *userdata)
 			r->simd->depth_row(r->frame->depth + first, r->stack.word + first, plan->width, r->stack.exponent);
 	}
 	r->shade[row] = counts;
+	if (r->target.wants)
+		fill_pull(&r->fill, (uint32_t)row);
 }
 
 /* Wall time of the two stages that run together, divided as their own clocks say. */
@@ -257,6 +260,8 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 
 	r->target = (struct shade_target){ frame->rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
 	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, frame->rgb, frame->depth };
+	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
 	const int n = (int)n_rows(&r->plan);
 	uint32_t n_marked = 0;
 	uint64_t start = now_ns(), end;
@@ -267,11 +272,8 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	}
 	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
 	start = end;
-	if (n_marked) {
-		if (fill_prepare(&r->fill, r->plan.width, r->plan.height))
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-		r->target.wants = fill_wants(&r->fill, r->simd, &r->plan, pool, &picture);
-	}
+	if (n_marked)
+		r->target.wants = fill_wants(&r->fill);
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
 	start = end;
 
@@ -279,7 +281,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	report_shading(r, report, (end = now_ns()) - start);
 	start = end;
 	if (n_marked)
-		fill_run(&r->fill, r->simd, &r->plan, pool, &picture, report);
+		fill_push(&r->fill, pool, report);
 	report->ns[PSR_STAGE_FILL] += now_ns() - start;
 	return PSR_OK;
 }

@@ -108,7 +108,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 /* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 - coverage), by
  * what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A pinhole has weight 0: a
  * pixel that at least seven of its eight neighbours are before by more than level 1's threshold, where those are one surface
- * (within level 3's threshold). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and
+ * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and
  * `bricks` are of the whole picture. A pure function of words and cells. */
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
                              uint32_t y1, uint16_t *weight, uint8_t *bricks);
@@ -145,20 +145,8 @@ struct fill_level {
 	struct fill_row cell;
 };
 
-struct fill {
-	struct fill_level level[FILL_LEVELS]; /* of 1..top, the single cell */
-	int top, brick_top;                   /* brick_top: the coarsest that bricks are pulled to by themselves */
-	uint32_t width, height, bricks_x, bricks_y;
-	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
-	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
-	uint8_t *wants;   /* by brick: how many levels are pulled from it */
-	int is_coarse;    /* some brick needs levels beyond brick_top */
-	void *storage;
-	size_t storage_size;
-};
-
 /* What is filled. The linear colours r, g, b of pixels with weight above 0, the background's too, are valid in all bricks that
- * fill_wants names, and change. */
+ * fill_wants names. */
 struct fill_picture {
 	const struct psr_zstack *stack;
 	uint16_t *weight;
@@ -169,42 +157,56 @@ struct fill_picture {
 	float *depth;          /* world units, or NULL */
 };
 
-int fill_prepare(struct fill *fill, uint32_t width, uint32_t height);
+struct fill {
+	struct fill_level level[FILL_LEVELS]; /* of 1..top, the single cell */
+	int top, brick_top;                   /* brick_top: the coarsest that bricks are pulled to by themselves */
+	uint32_t width, height, bricks_x, bricks_y;
+	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
+	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
+	uint8_t *wants;   /* by brick: how many levels are pulled from it */
+	int is_coarse;    /* some brick needs levels beyond brick_top */
+	void *storage;
+	size_t storage_size;
+	/* The picture under way. */
+	const struct simd *simd;
+	const struct plan *plan;
+	struct fill_picture picture;
+	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
+	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
+};
+
+/* A picture is filled in four steps. Those by row of bricks are for any thread, in any order; each step begins when the
+ * one before is done. They come where the row's pixels are at hand: looking after gaps_rows, pulling after shading. */
+int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *plan, const struct fill_picture *picture);
 void fill_clear(struct fill *fill);
 
-/* Finds what the bricks that are marked need from others: the result has one byte a brick, not 0 where the 16-bit colours of the
- * brick's pixels are needed. Does not read colours. */
-const uint8_t *fill_wants(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-                          const struct fill_picture *picture);
+/* 1. How far the row's bricks need coarser levels, from weights and depths. */
+void fill_look(struct fill *fill, uint32_t row);
 
-/* After fill_wants for the same picture: gives every pixel of weight below WEIGHT_ONE its color and, where it is below a half,
- * its depth, and touches no other pixel of rgb and depth. Adds the counts and the error bound of the stage to the report. */
-void fill_run(struct fill *fill, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-              const struct fill_picture *picture, struct psr_report *report);
+/* 2. What that takes from others: one byte a brick, not 0 where the 16-bit colours of the brick's pixels are needed. */
+const uint8_t *fill_wants(struct fill *fill);
+
+/* 3. Coarser levels from the row's colours, where they are needed. */
+void fill_pull(struct fill *fill, uint32_t row);
+
+/* 4. Gives every pixel of weight below WEIGHT_ONE its color and, where the weight is below a half, its depth, and touches no
+ * other pixel of rgb and depth. Adds the counts and the error bound of the stage to the report. */
+void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
 
 /* -- between fill.c and fill_bricks.c -- */
 
 #define FILL_RUN (FILL_WIDTH / BRICK) /* bricks side by side that are worked on together */
 
-struct fill_pass {
-	struct fill *fill;
-	const struct simd *simd;
-	const struct plan *plan;
-	const struct fill_picture *picture;
-	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
-	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
-};
-
 struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y);
 float fill_scale(const struct plan *plan, int level); /* of the threshold among cells of `level` */
 float fill_offset(const struct plan *plan, int level);
-void fill_note_depth(struct fill_pass *pass, int level);
+void fill_note_depth(struct fill *fill, int level);
 
 /* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level, or only weights and depths until all cells are
  * whole. */
-void fill_pull_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors);
+void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors);
 
 /* Fills their pixels, of which none needs more than `level`. */
-void fill_push_bricks(struct fill_pass *pass, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
 
 #endif

@@ -121,20 +121,21 @@ static inline int32_t interpolate(const struct shares *s, int right, uint32_t x,
 	return (int32_t)((float)sum * s->inverse[right][x] + 0.125f);
 }
 
-static inline void push_channel(uint16_t *to, const uint16_t *weight, const uint16_t *own, const uint16_t *beside,
-                                const struct shares *s, uint32_t n, int is_picture)
+/* Cells of a share of 256 in `was` and of the rest from their parents. */
+static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *own,
+                                const uint16_t *beside, const struct shares *s, uint32_t n, int is_picture)
 {
 	for (uint32_t x = 0; x < n; x++) {
 		const int32_t wl = weight[2 * x], wr = weight[2 * x + 1], el = is_picture ? wl : 256, er = is_picture ? wr : 256;
 		const int32_t l = interpolate(s, 0, x, own[x], own[(int32_t)x - 1], beside[x]);
 		const int32_t r = interpolate(s, 1, x, own[x], own[x + 1], beside[x]);
-		to[2 * x] = (uint16_t)((to[2 * x] * el >> 8) + (l * (GAPS_WHOLE - wl) >> 8));
-		to[2 * x + 1] = (uint16_t)((to[2 * x + 1] * er >> 8) + (r * (GAPS_WHOLE - wr) >> 8));
+		to[2 * x] = (uint16_t)((was[2 * x] * el >> 8) + (l * (GAPS_WHOLE - wl) >> 8));
+		to[2 * x + 1] = (uint16_t)((was[2 * x + 1] * er >> 8) + (r * (GAPS_WHOLE - wr) >> 8));
 	}
 }
 
-static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                      int is_picture, float scale, float offset)
+static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
+                      float offset)
 {
 	struct shares s;
 	float z[2][FILL_WIDTH];
@@ -144,9 +145,25 @@ static void fill_push(const struct fill_row *to, const struct fill_row *own, con
 		to->z[2 * x] = to->weight[2 * x] < GAPS_WHOLE / 2 ? z[0][x] : to->z[2 * x];
 		to->z[2 * x + 1] = to->weight[2 * x + 1] < GAPS_WHOLE / 2 ? z[1][x] : to->z[2 * x + 1];
 	}
-	push_channel(to->r, to->weight, own->r, beside->r, &s, n, is_picture);
-	push_channel(to->g, to->weight, own->g, beside->g, &s, n, is_picture);
-	push_channel(to->b, to->weight, own->b, beside->b, &s, n, is_picture);
+	push_channel(to->r, to->r, to->weight, own->r, beside->r, &s, n, 0);
+	push_channel(to->g, to->g, to->weight, own->g, beside->g, &s, n, 0);
+	push_channel(to->b, to->b, to->weight, own->b, beside->b, &s, n, 0);
+}
+
+static void fill_push_picture(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
+                              const struct fill_row *beside, uint32_t n, float scale, float offset)
+{
+	struct shares s;
+	float z[2][FILL_WIDTH];
+	share_parents(&s, z[0], own, beside, n, 0, scale, offset);
+	share_parents(&s, z[1], own, beside, n, 1, scale, offset);
+	for (uint32_t x = 0; x < n; x++) {
+		to->z[2 * x] = z[0][x];
+		to->z[2 * x + 1] = z[1][x];
+	}
+	push_channel(to->r, was->r, was->weight, own->r, beside->r, &s, n, 1);
+	push_channel(to->g, was->g, was->weight, own->g, beside->g, &s, n, 1);
+	push_channel(to->b, was->b, was->weight, own->b, beside->b, &s, n, 1);
 }
 
 static void fill_depths(float *z, const uint64_t *word, uint32_t n)

@@ -154,15 +154,18 @@ static void cover_level(const struct gaps_target *t, const struct gaps_tile *til
 	}
 }
 
-/* Which level's threshold the neighbours of a pinhole must keep among themselves. */
-#define ALIKE_LEVEL 3
-
 /* Samples of level 0 leave no pixel out but for rounding, and then a single one: the guard takes pixels that lie behind at
- * least seven of their eight neighbours, where those are one surface. */
+ * least seven of their eight neighbours, where those are one surface: within one threshold of each other, since deep in a
+ * crevice there may be anything; but within that of a coarser level where the pixel is empty, since what is seen through a
+ * model is seldom one pixel wide. */
+#define ALIKE 1
+#define ALIKE_BEFORE_NOTHING 4
+
 static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *tile, uint32_t y, uint16_t *weight)
 {
 	const float scale = t->scale[1], offset = t->offset[1];
-	const float alike = t->scale[ALIKE_LEVEL], alike_offset = t->offset[ALIKE_LEVEL];
+	const float alike = t->scale[ALIKE], alike_offset = t->offset[ALIKE];
+	const float nothing = t->scale[ALIKE_BEFORE_NOTHING], nothing_offset = t->offset[ALIKE_BEFORE_NOTHING];
 	const float *above = &tile->z[y][TILE_LEFT], *own = above + TILE_STRIDE, *below = own + TILE_STRIDE;
 	uint32_t n_pinholes = 0;
 
@@ -188,7 +191,8 @@ static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *t
 			nearest = z[i] < nearest ? z[i] : nearest;
 			farthest = seen > farthest ? seen : farthest;
 		}
-		const int32_t is_pinhole = (n_before >= 7) & (farthest <= nearest * alike + alike_offset);
+		const float limit = nearest * alike + alike_offset, limit_before_nothing = nearest * nothing + nothing_offset;
+		const int32_t is_pinhole = (n_before >= 7) & (farthest <= (own[x] < INFINITY ? limit : limit_before_nothing));
 		weight[x] = is_pinhole ? 0 : weight[x];
 		n_pinholes += (uint32_t)is_pinhole;
 	}

@@ -215,10 +215,15 @@ struct fill_row {
 typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                               int is_picture, float scale, float offset);
 
-/* Whole cells to[0..2n-1] from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n] count,
- * too, and beside[0..n-1] the parents' neighbours above or below. Depths are replaced where the weight is below a half. */
-typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                          int is_picture, float scale, float offset);
+/* Makes cells to[0..2n-1] whole, from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n]
+ * count, too, and beside[0..n-1] the parents' neighbours above or below. Depths change where the weight is below a half. */
+typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
+                          float offset);
+
+/* The same for pixels that stay as they are in `was`, whose z is not read: `to` receives their colours and, whatever their
+ * weight is, the depths that are interpolated. */
+typedef void fill_push_picture_fn(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
+                                  const struct fill_row *beside, uint32_t n, float scale, float offset);
 
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
@@ -242,6 +247,7 @@ struct simd {
 	gaps_fn *gaps;
 	fill_pull_fn *fill_pull;
 	fill_push_fn *fill_push;
+	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;
 };
 

@@ -220,10 +220,14 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
 
 	p.fill.stack = &p.stack;
-	assert_int_equal(fill_prepare(fill, width, height), PSR_OK);
-	spoil(&p, fill_wants(fill, simd, &plan, NULL, &p.fill));
+	assert_int_equal(fill_begin(fill, simd, &plan, &p.fill), PSR_OK);
+	for (uint32_t row = 0; row < (height + BRICK - 1) / BRICK; row++)
+		fill_look(fill, row);
+	spoil(&p, fill_wants(fill));
 	dense_fill(&d, &plan);
-	fill_run(fill, simd, &plan, NULL, &p.fill, &report);
+	for (uint32_t row = 0; row < (height + BRICK - 1) / BRICK; row++)
+		fill_pull(fill, row);
+	fill_push(fill, NULL, &report);
 	for (size_t i = 0; i < p.area; i++) {
 		const struct cell *c = &d.cell[0][i];
 		if (p.fill.weight[i] == WEIGHT_ONE) {
@@ -234,7 +238,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 			if (p.fill.rgb[3 * i + k] != srgb[c->rgb[k]])
 				fail_msg("%ux%u, pixel (%u, %u): colour %u is %u and should be %u", width, height, (unsigned)(i % width),
 				         (unsigned)(i / width), (unsigned)k, p.fill.rgb[3 * i + k], srgb[c->rgb[k]]);
-		assert_true(p.fill.depth[i] == ldexpf(c->z, p.stack.exponent));
+		assert_true(p.fill.depth[i] == (p.fill.weight[i] < WEIGHT_ONE / 2 ? ldexpf(c->z, p.stack.exponent) : -1));
 		n_changed++;
 		n_filled += p.fill.weight[i] == 0 && c->z < INFINITY;
 		n_moved += p.fill.weight[i] < WEIGHT_ONE / 2;

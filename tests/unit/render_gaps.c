@@ -91,7 +91,8 @@ static int is_pinhole(const struct plan *plan, const struct psr_zstack *stack, u
 			nearest = z < nearest ? z : nearest;
 			farthest = z > farthest ? z : farthest;
 		}
-	return n >= 7 && farthest <= nearest * plan->gap_scale[3] + plan->gap_offset[3];
+	const int alike = own < INFINITY ? 1 : 4;
+	return n >= 7 && farthest <= nearest * plan->gap_scale[alike] + plan->gap_offset[alike];
 }
 
 static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
@@ -289,16 +290,21 @@ static void slits_edges_and_corners_are_left_alone(void **state)
 	stack_free(&stack);
 }
 
-/* Leaves before the sky: seven are nearer, each at a depth of its own. */
+/* Leaves before the sky, and what is in a crevice: seven are nearer, and at depths of their own. */
 static void neighbors_must_be_one_surface(void **state)
 {
 	(void)state;
 	uint16_t weight[SIDE * SIDE];
 	struct psr_zstack stack = wall();
 	empty(&stack, 5, 5);
-	set_depth(&stack, 4, 4, 88.5f); /* level 3 forgives 12 */
+	set_depth(&stack, 4, 4, 76.5f); /* level 4 forgives 24 */
 	assert_int_equal(weigh(&stack, weight).n_pinholes, 1);
-	set_depth(&stack, 4, 4, 87.5f);
+	set_depth(&stack, 4, 4, 75.5f);
+	assert_int_equal(weigh(&stack, weight).n_pinholes, 0);
+	set_depth(&stack, 5, 5, 110); /* before another surface, level 1 forgives 3 */
+	set_depth(&stack, 4, 4, 97.5f);
+	assert_int_equal(weigh(&stack, weight).n_pinholes, 1);
+	set_depth(&stack, 4, 4, 96.5f);
 	assert_int_equal(weigh(&stack, weight).n_pinholes, 0);
 	stack_free(&stack);
 }

@@ -182,9 +182,11 @@ static struct psr_report fill_once(struct picture *p, const uint8_t *table, uint
 		p->r[i] = p->g[i] = p->b[i] = p->grey[i];
 		p->word[i] = (uint64_t)psr_bits_from_float(p->z[i]) << 32 | 0xffffffff;
 	}
-	assert_int_equal(fill_prepare(&fill, SIDE, SIDE), 0);
-	assert_int_equal(*fill_wants(&fill, simd_get(), &plan, NULL, &picture) > 0, 1);
-	fill_run(&fill, simd_get(), &plan, NULL, &picture, &report);
+	assert_int_equal(fill_begin(&fill, simd_get(), &plan, &picture), PSR_OK);
+	fill_look(&fill, 0);
+	assert_true(*fill_wants(&fill) > 0);
+	fill_pull(&fill, 0);
+	fill_push(&fill, NULL, &report);
 	fill_clear(&fill);
 	return report;
 }

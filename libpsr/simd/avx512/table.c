@@ -20,5 +20,6 @@ const struct simd simd_avx512 = {
 	.gaps = gaps,
 	.fill_pull = fill_pull,
 	.fill_push = fill_push,
+	.fill_push_picture = fill_push_picture,
 	.fill_depths = fill_depths,
 };

@@ -19,5 +19,6 @@ const struct simd simd_c = {
 	.gaps = gaps,
 	.fill_pull = fill_pull,
 	.fill_push = fill_push,
+	.fill_push_picture = fill_push_picture,
 	.fill_depths = fill_depths,
 };
