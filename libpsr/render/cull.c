@@ -13,7 +13,7 @@
 
 struct cull_chunk {
 	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
-	uint32_t levels, n_tested, n_clamped, n_masked;
+	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
 	uint8_t flags; /* of all blocks that are left, OR-ed */
 	uint64_t n_samples;
 	float depth_error; /* greatest half step of depth, in pixels */
@@ -151,7 +151,7 @@ static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *c
                                    uint32_t n, struct cull_hit *hit)
 {
 	const struct plan_instance *in = &cull->plan->instance[chunk->instance];
-	const struct screen_masks *masks = in->with_masks ? &cull->bins->masks[chunk->instance] : NULL;
+	const struct screen_masks *masks = in->masks == PSR_WHY_RAN ? &cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
@@ -169,6 +169,7 @@ static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *c
 			continue;
 		}
 		chunk->levels |= 1u << hit->level;
+		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
 		chunk->n_samples += (uint32_t)__builtin_popcountll(b->mask[block]);
@@ -327,6 +328,23 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	return bins->entry && bins->order ? PSR_OK : PSR_ERR_MEMORY;
 }
 
+static void note_tests(const struct plan *plan, struct psr_report *report, uint64_t n_masked, uint64_t n_mixed)
+{
+	enum psr_why cones = PSR_WHY_NOTHING, masks = PSR_WHY_NOTHING;
+	for (uint32_t i = 0; i < plan->n_instances; i++) {
+		const struct plan_instance *in = &plan->instance[i];
+		if (in->cull.blocks->cone_sine)
+			cones = in->cull.with_cones ? PSR_WHY_RAN : PSR_WHY_OFF;
+		if (masks != PSR_WHY_RAN && in->masks != PSR_WHY_NOTHING)
+			masks = in->masks;
+	}
+	effect_note(report, PSR_EFFECT_CONES, cones, report->count[PSR_STAGE_CULL]);
+	effect_note(report, PSR_EFFECT_MASKS, masks, n_masked);
+	effect_note(report, PSR_EFFECT_FACING, n_mixed ? PSR_WHY_RAN : PSR_WHY_NOTHING, n_mixed);
+	effect_note(report, PSR_EFFECT_LEVELS, report->levels & ~1u ? PSR_WHY_RAN : PSR_WHY_NOTHING,
+	            (uint64_t)__builtin_popcount(report->levels & ~1u));
+}
+
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
 {
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
@@ -341,7 +359,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	make_chunks(bins, plan, 1);
 	choose_levels(bins, plan);
 	for (uint32_t i = 0; i < plan->n_instances; i++)
-		if (plan->instance[i].with_masks)
+		if (plan->instance[i].masks == PSR_WHY_RAN)
 			masks_make(&bins->masks[i], plan, &plan->instance[i]);
 	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
 	int rc = place_entries(bins, &cull);
@@ -350,7 +368,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
 
 	float depth_error = 0;
-	report->n_tile_blocks = bins->tile_begin[cull.n_tiles];
+	uint64_t n_masked = 0, n_mixed = 0;
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
 	for (uint32_t i = 0; i < cull.n_chunks; i++) {
@@ -362,11 +380,15 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
 		report->n_clamped += chunk->n_clamped;
-		report->n_masked += chunk->n_masked;
+		n_masked += chunk->n_masked;
+		n_mixed += chunk->n_mixed;
 		if (chunk->depth_error > depth_error)
 			depth_error = chunk->depth_error;
 	}
 	report->error_bound = 0.5 + (double)depth_error;
+	if (plan->is_full)
+		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
+	note_tests(plan, report, n_masked, n_mixed);
 	return PSR_OK;
 }
 

@@ -5,6 +5,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
+#include "psr/direction.h"
 #include "render/render.h"
 
 
@@ -26,6 +27,8 @@ struct psr_renderer {
 	/* By row of bricks. */
 	struct gaps_counts *gaps;
 	struct shade_counts *shade;
+	float (*lit)[4];          /* diffuse light by normal */
+	size_t lit_size;
 	void *counters;
 	size_t counters_size;
 	uint8_t srgb[65536];      /* of 16-bit linear light */
@@ -49,6 +52,7 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 	settings->width = width;
 	settings->height = height;
 	settings->cull_tests = PSR_CULL_ALL;
+	settings->is_full = 0;
 	settings->gap_threshold = 3;
 }
 
@@ -79,6 +83,11 @@ int psr_renderer_create(struct psr_renderer **out)
 	return PSR_OK;
 }
 
+void renderer_use(struct psr_renderer *r, const struct simd *simd)
+{
+	r->simd = simd;
+}
+
 void psr_renderer_destroy(struct psr_renderer *r)
 {
 	if (!r)
@@ -87,13 +96,14 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	bins_clear(&r->bins);
 	fill_clear(&r->fill);
 	psr_free_huge(r->pixels, r->pixels_size);
+	psr_free(r->lit);
 	psr_free(r->counters);
 	free(r);
 }
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->counters_size + bins_bytes(&r->bins);
+	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->lit_size + r->counters_size + bins_bytes(&r->bins);
 }
 
 static void *grow_huge(void *memory, size_t *capacity, size_t size)
@@ -200,11 +210,16 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	start = end;
 
 	const int n_tiles = (int)(r->plan.tiles_x * r->plan.tiles_y);
+	uint64_t n_occluded = 0;
+	int with_occlusion = 0;
 	psr_pool_for(pool, n_tiles, warp_one, r);
 	for (int t = 0; t < n_tiles; t++) {
 		report->count[PSR_STAGE_WARP] += r->tile[t].n_inside;
-		report->n_occluded += r->tile[t].n_occluded;
+		n_occluded += r->tile[t].n_occluded;
+		with_occlusion |= r->tile[t].with_occlusion;
 	}
+	effect_note(report, PSR_EFFECT_OCCLUSION,
+	            with_occlusion ? PSR_WHY_RAN : settings->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF, n_occluded);
 	report->ns[PSR_STAGE_WARP] = now_ns() - start;
 	r->report = *report;
 	*stack = &r->stack;
@@ -240,9 +255,14 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	struct shade_counts all = { 0, 0, 0, 0 };
 	for (uint32_t i = 0; i < n_rows(&r->plan); i++) {
 		all.n_pixels += r->shade[i].n_pixels;
+		all.n_specular += r->shade[i].n_specular;
 		all.resolve_ns += r->shade[i].resolve_ns;
 		all.shade_ns += r->shade[i].shade_ns;
 	}
+	const unsigned needs = r->plan.view.needs;
+	effect_note(report, PSR_EFFECT_TWO_SIDED, needs & STRIP_TWO_SIDED ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_pixels);
+	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_pixels);
+	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_specular);
 	const double spent = (double)(all.resolve_ns + all.shade_ns);
 	report->n_covered = report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = all.n_pixels;
 	report->ns[PSR_STAGE_RESOLVE] = spent > 0 ? (uint64_t)((double)all.resolve_ns / spent * (double)wall) : 0;
@@ -277,12 +297,22 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
 	start = end;
 
+	const enum psr_why table = r->plan.is_full ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+	if (table == PSR_WHY_RAN) {
+		r->lit = grow(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
+		if (!r->lit)
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
+		shade_tabulate(r->simd, &r->plan, pool, r->lit);
+		r->plan.view.lit = (const float(*)[4])r->lit;
+	}
+	effect_note(report, PSR_EFFECT_TABLE, table, PSR_DIRECTIONS);
 	psr_pool_for(pool, n, shade_one, r);
 	report_shading(r, report, (end = now_ns()) - start);
 	start = end;
 	if (n_marked)
 		fill_push(&r->fill, pool, report);
 	report->ns[PSR_STAGE_FILL] += now_ns() - start;
+	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	return PSR_OK;
 }
 

@@ -161,8 +161,10 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	/* The eye is outside of the object's convex hull wherever it is outside of the unit sphere. */
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	const int is_outside = !plan->perspective || v3d_length(eye) > 1;
-	out->with_masks = plan->cull_tests & PSR_CULL_MASKS && warp->blocks->visibility_mask && is_outside && info->n_trials > 0 &&
-	                  info->n_lost == 0;
+	out->masks = !(plan->cull_tests & PSR_CULL_MASKS)                        ? PSR_WHY_OFF
+	             : !warp->blocks->visibility_mask                            ? PSR_WHY_NOTHING
+	             : !is_outside || info->n_trials == 0 || info->n_lost > 0    ? PSR_WHY_VOID
+	                                                                         : PSR_WHY_RAN;
 
 	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
@@ -235,6 +237,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->tiles_y = (plan->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
 	plan->cull_tests = settings->cull_tests;
+	plan->is_full = settings->is_full;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 
@@ -255,7 +258,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	threshold_make(plan, settings->gap_threshold);
 
 	plan->n_instances = scene->n_instances;
-	plan->n_lights = scene->n_lights;
+	plan->n_lights = 0;
 	for (int i = 0; i < 3; i++) {
 		plan->ambient[i] = (float)scene->ambient[i];
 		plan->background[i] = light16(scene->background[i]);
@@ -267,11 +270,18 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		.half_width = (float)(plan->width / 2.0), .half_height = (float)(plan->height / 2.0),
 		.focal = plan->focal, .perspective = plan->perspective,
 	};
-	for (uint32_t l = 0; l < plan->n_lights; l++) {
-		light_make(&plan->light[l], &scene->light[l], &view);
-		if (plan->light[l].kind != PSR_LIGHT_DIRECTIONAL)
+	for (uint32_t l = 0; l < scene->n_lights; l++) {
+		const double *color = scene->light[l].color;
+		if (!(color[0] > 0 || color[1] > 0 || color[2] > 0) && !plan->is_full)
+			continue;
+		light_make(&plan->light[plan->n_lights], &scene->light[l], &view);
+		if (plan->light[plan->n_lights++].kind != PSR_LIGHT_DIRECTIONAL)
 			plan->view.needs |= STRIP_POSITION;
 	}
+	if (plan->n_lights)
+		plan->view.needs |= STRIP_LIGHTS;
+	if (plan->is_full)
+		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR;
 	return PSR_OK;
 }
 

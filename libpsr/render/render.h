@@ -17,13 +17,14 @@ struct plan_instance {
 	uint32_t first_group; /* place of the model's group 0 among those of all instances, of which each has n_clusters */
 	struct cull_view cull;
 	double turn[3][3];    /* inner coordinates to camera space, a rotation */
-	int with_masks;
+	enum psr_why masks;   /* PSR_WHY_RAN: they are tested */
 };
 
 struct plan {
 	uint32_t width, height, tiles_x, tiles_y;
 	int perspective;
 	unsigned cull_tests;
+	int is_full;
 	int exponent;              /* everything here is world * 2^-exponent, relative to the eye */
 	double tangent[2];         /* of half the angles that the picture spans; perspective */
 	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
@@ -47,6 +48,10 @@ void plan_clear(struct plan *plan);
 
 /* Instance that a slot belongs to; the slot must be below n_slots. */
 uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
+
+/* ---- effects: what was run, and why the rest was not ---- */
+
+void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why why, uint64_t count);
 
 /* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
 
@@ -95,6 +100,7 @@ void bins_clear(struct bins *bins);
 struct warp_counts {
 	uint64_t n_inside;   /* samples that fell into the tile and do not face away */
 	uint32_t n_occluded; /* blocks that were left out there */
+	int with_occlusion;
 };
 
 /* Clears a tile and draws its blocks. */
@@ -120,6 +126,10 @@ struct shade_counts {
 	uint64_t n_specular; /* of these with highlights looked for */
 	uint64_t resolve_ns, shade_ns; /* of a part of the strips */
 };
+
+/* Diffuse light by normal ([B] 4.1): PSR_DIRECTIONS rows; and whether that is worth while. */
+enum psr_why shade_wants_table(const struct plan *plan);
+void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4]);
 
 struct shade_target {
 	uint8_t *rgb;         /* sRGB, 3 * width * height, or NULL */
@@ -208,5 +218,9 @@ void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 
 /* Fills their pixels, of which none needs more than `level`. */
 void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+
+/* ---- for tests: a renderer that calls other kernels ---- */
+
+void renderer_use(struct psr_renderer *renderer, const struct simd *simd);
 
 #endif

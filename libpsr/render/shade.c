@@ -1,4 +1,5 @@
 #include <time.h>
+#include "psr/direction.h"
 #include "render/render.h"
 
 #define TIMED_EVERY 16 /* strips: clocks cost, too */
@@ -21,6 +22,40 @@ static int is_wanted(const struct plan *plan, const uint8_t *wants, uint32_t x, 
 	return 0;
 }
 
+/* A table costs as much as lighting so many pixels; it saves nothing where there are few lights to add up. */
+#define TABLE_LIGHTS 3
+#define TABLE_PIXELS (8 * PSR_DIRECTIONS)
+
+enum psr_why shade_wants_table(const struct plan *plan)
+{
+	if (plan->n_lights == 0)
+		return PSR_WHY_NOTHING;
+	if (plan->view.needs & (STRIP_POSITION | STRIP_TWO_SIDED))
+		return PSR_WHY_VOID;
+	if (plan->n_lights < TABLE_LIGHTS || plan->n_instances > 1 || (uint64_t)plan->width * plan->height < TABLE_PIXELS)
+		return PSR_WHY_COST;
+	return PSR_WHY_RAN;
+}
+
+struct tabulating {
+	const struct simd *simd;
+	const struct plan *plan;
+	float (*lit)[4];
+};
+
+static void tabulate_part(int part, void *userdata)
+{
+	const struct tabulating *t = userdata;
+	t->simd->strip_lit(t->lit, &t->plan->view, t->plan->light, t->plan->n_lights, t->plan->ambient, (uint32_t)part * STRIP, STRIP);
+}
+
+void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
+{
+	struct tabulating tabulating = { simd, plan, lit };
+	_Static_assert(PSR_DIRECTIONS % STRIP == 0, "parts are whole strips");
+	psr_pool_for(pool, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
+}
+
 void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
                const uint16_t *weight, uint32_t y, struct shade_counts *counts)
 {
@@ -38,11 +73,11 @@ void shade_row(const struct simd *simd, const struct plan *plan, const struct sh
 		if (strip.n) {
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
 			middle = is_timed ? now_ns() : 0;
-			for (uint32_t l = 0; l < plan->n_lights; l++)
+			for (uint32_t l = 0; l < plan->n_lights && !(plan->view.lit && !strip.is_specular); l++)
 				simd->strip_light(&strip, &plan->light[l], NULL);
 			simd->strip_color(&strip);
 			counts->n_pixels += strip.n;
-			counts->n_specular += strip_is_specular(&strip) ? strip.n : 0;
+			counts->n_specular += strip.is_specular ? strip.n : 0;
 		}
 		part.r = keeps_linear ? target->r : NULL;
 		part.g = keeps_linear ? target->g : NULL;

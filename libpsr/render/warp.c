@@ -90,7 +90,7 @@ static int is_occluded(const struct occlusion *o, const struct warp_target *t, c
 static struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins, const struct warp_target *target,
                                            uint32_t begin, uint32_t end)
 {
-	struct warp_counts counts = { 0, 0 };
+	struct warp_counts counts = { 0, 0, 1 };
 	struct occlusion occlusion = { .is_known = 0 };
 	struct bin_entry some[64];
 	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* the latter two since the last look */
@@ -129,7 +129,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	struct warp_target target;
 	target_make(&target, plan, stack, tile);
 	simd->warp_clear(&target, stack->levels);
-	if (plan->cull_tests & PSR_CULL_OCCLUSION && end - begin >= OCCLUSION_BLOCKS)
+	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full))
 		return warp_near_to_far(simd, bins, &target, begin, end);
-	return (struct warp_counts){ simd->warp(&target, bins->entry + begin, end - begin), 0 };
+	return (struct warp_counts){ simd->warp(&target, bins->entry + begin, end - begin), 0, 0 };
 }

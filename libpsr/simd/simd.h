@@ -106,12 +106,14 @@ typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 enum strip_needs {
 	STRIP_TWO_SIDED = 1, /* some block in view is two-sided */
 	STRIP_POSITION = 2,  /* some light is near */
+	STRIP_LIGHTS = 8,    /* some light shines */
+	STRIP_SPECULAR = 4,  /* highlights are looked for whether any sample is specular or not */
 };
 
 /* The covered pixels of a part of a row. Everything is in camera space; colours are linear. */
 struct strip {
 	uint32_t n, x0, y;       /* pixel i is (x0 + x[i], y) */
-	uint64_t all;            /* OR of the attributes: no bit of specular, no highlight */
+	int is_specular;         /* some sample is, or the view wants it so */
 	uint16_t x[STRIP + STRIP_PADDING];
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
 	uint64_t attr[STRIP];
@@ -132,6 +134,7 @@ struct strip_view {
 	const struct warp_instance *instance;
 	uint32_t n_instances;
 	const uint64_t *direction_word;
+	const float (*lit)[4]; /* by normal: what strips without highlights get in the place of lights; NULL: no such table */
 	float half_width, half_height, focal; /* pixels */
 	int perspective;
 	unsigned needs; /* enum strip_needs */
@@ -153,6 +156,9 @@ typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
 typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
+/* Light by normal, as strip_light gives it, of normals first .. first + n - 1; n at most STRIP. */
+typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
+                          const float ambient[3], uint32_t first, uint32_t n);
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 
@@ -168,11 +174,6 @@ typedef void strip_write_fn(const struct strip *strip, const struct strip_target
 
 /* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
 typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int exponent);
-
-static inline int strip_is_specular(const struct strip *strip)
-{
-	return PSR_ATTR_SPECULAR(strip->all) != 0;
-}
 
 /* ---- gaps ([G] 4.6) ---- */
 
@@ -241,6 +242,7 @@ struct simd {
 	strip_list_fn *strip_list;
 	strip_resolve_fn *strip_resolve;
 	strip_light_fn *strip_light;
+	strip_lit_fn *strip_lit;
 	strip_color_fn *strip_color;
 	strip_write_fn *strip_write;
 	depth_row_fn *depth_row;

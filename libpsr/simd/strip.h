@@ -150,19 +150,28 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		all |= attr;
 		common &= attr;
 	}
-	strip->all = all;
-	for (uint32_t k = 0; k < n_runs; k++)
-		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
+	strip->is_specular = (PSR_ATTR_SPECULAR(all) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
 	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
 		read_diffuse(strip, 1);
 	else
 		read_diffuse(strip, 0);
+	if (view->lit && !strip->is_specular) {
+		for (uint32_t i = 0; i < n; i++) {
+			const float *lit = view->lit[PSR_ATTR_NORMAL(strip->attr[i])];
+			strip->lr[i] = lit[0];
+			strip->lg[i] = lit[1];
+			strip->lb[i] = lit[2];
+		}
+		return;
+	}
+	for (uint32_t k = 0; k < n_runs; k++)
+		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
 	for (uint32_t i = 0; i < n; i++) {
 		strip->lr[i] = ambient[0];
 		strip->lg[i] = ambient[1];
 		strip->lb[i] = ambient[2];
 	}
-	if (strip_is_specular(strip) || view->needs & STRIP_TWO_SIDED)
+	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
 		look(strip, view);
 	if (view->needs & STRIP_TWO_SIDED)
 		for (uint32_t i = 0; i < n; i++) {
@@ -172,9 +181,9 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
 		}
-	if (strip_is_specular(strip) && all >> 40 == common >> 40)
+	if (strip->is_specular && all >> 40 == common >> 40)
 		read_specular(strip, 1);
-	else if (strip_is_specular(strip))
+	else if (strip->is_specular)
 		read_specular(strip, 0);
 }
 
@@ -240,14 +249,37 @@ static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_ligh
 
 static void strip_light(struct strip *strip, const struct strip_light *light, const float *reaches)
 {
-	if (strip_is_specular(strip) && reaches)
+	if (strip->is_specular && reaches)
 		light_by(strip, light, reaches, 1, 1);
-	else if (strip_is_specular(strip))
+	else if (strip->is_specular)
 		light_by(strip, light, NULL, 0, 1);
 	else if (reaches)
 		light_by(strip, light, reaches, 1, 0);
 	else
 		light_by(strip, light, NULL, 0, 0);
+}
+
+static void strip_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
+                      const float ambient[3], uint32_t first, uint32_t n)
+{
+	struct strip strip;
+	strip.n = n;
+	strip.is_specular = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		strip.normal_word[i] = view->direction_word[first + i];
+		strip.lr[i] = ambient[0];
+		strip.lg[i] = ambient[1];
+		strip.lb[i] = ambient[2];
+	}
+	turn_normals(&strip, view->instance->turn, 0, n);
+	for (uint32_t l = 0; l < n_lights; l++)
+		strip_light(&strip, &light[l], NULL);
+	for (uint32_t i = 0; i < n; i++) {
+		lit[first + i][0] = strip.lr[i];
+		lit[first + i][1] = strip.lg[i];
+		lit[first + i][2] = strip.lb[i];
+		lit[first + i][3] = 0;
+	}
 }
 
 static inline uint16_t light16(float linear)
@@ -275,7 +307,7 @@ static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
 
 static void strip_color(struct strip *strip)
 {
-	if (strip_is_specular(strip))
+	if (strip->is_specular)
 		strip_color_by(strip, 1);
 	else
 		strip_color_by(strip, 0);

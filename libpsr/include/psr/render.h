@@ -26,9 +26,35 @@ enum psr_cull_test {
 	PSR_CULL_ALL = 7
 };
 
+/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. */
+enum psr_effect {
+	PSR_EFFECT_CONES,     /* count: blocks tested */
+	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
+	PSR_EFFECT_OCCLUSION, /* count: blocks left out, once in each tile that they touch */
+	PSR_EFFECT_FACING,    /* count: blocks some of whose samples may face away, which are asked one by one */
+	PSR_EFFECT_LEVELS,    /* count: depth buffers beside the picture's own */
+	PSR_EFFECT_FILL,      /* count: pixels whose colour changed */
+	PSR_EFFECT_TWO_SIDED, /* count: pixels whose normals may be turned to the eye */
+	PSR_EFFECT_SPECULAR,  /* count: pixels whose highlights are looked for */
+	PSR_EFFECT_POSITIONS, /* count: pixels whose samples' positions are worked out */
+	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
+	PSR_N_EFFECTS
+};
+enum psr_why {
+	PSR_WHY_RAN,
+	PSR_WHY_OFF,     /* the settings leave it out */
+	PSR_WHY_NOTHING, /* nothing in view calls for it */
+	PSR_WHY_VOID,    /* it would not hold here */
+	PSR_WHY_COST,    /* it would cost more than it saves, and changes nothing */
+};
+const char *psr_effect_name(enum psr_effect effect); /* "specular" */
+/* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
+const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
+
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
+	int is_full;            /* 1: nothing is left out that could be; the same bytes, later. For proofs and benchmarks */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
@@ -50,12 +76,14 @@ struct psr_report {
 	uint64_t count[PSR_N_STAGES];
 	uint64_t n_blocks, n_samples; /* of all instances, all levels */
 	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those blocks */
-	uint64_t n_masked;            /* blocks that only their visibility mask culls */
-	uint64_t n_tile_blocks, n_occluded; /* blocks by tile, once in each that they touch; those that were occluded there */
 	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */
 	uint32_t n_clamped;           /* blocks that wanted a level beyond PSR_MAX_DEPTH_LEVEL: holes are possible there */
+	struct {
+		uint64_t count;
+		enum psr_why why;
+	} effect[PSR_N_EFFECTS];
 	double error_bound;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
 };
 

@@ -13,6 +13,7 @@ const struct simd simd_avx2 = {
 	.strip_list = strip_list,
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
+	.strip_lit = strip_lit,
 	.strip_color = strip_color,
 	.strip_write = strip_write,
 	.depth_row = depth_row,

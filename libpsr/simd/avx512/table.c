@@ -14,6 +14,7 @@ const struct simd simd_avx512 = {
 	.strip_list = strip_list_avx512,
 	.strip_resolve = strip_resolve,
 	.strip_light = strip_light,
+	.strip_lit = strip_lit,
 	.strip_color = strip_color,
 	.strip_write = strip_write,
 	.depth_row = depth_row,

@@ -1,0 +1,276 @@
+/* What a frame leaves out changes no byte of it, and costs nothing. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "psr/render.h"
+#include "render/render.h"
+#include "tests/unit/lib/shapes.h"
+
+#define MODELS 5
+
+static struct psr_model *models[MODELS];
+static const char *const names[MODELS] = { "teapot", "wheel", "top", "sphere", "square" };
+
+static int open_models(void **state)
+{
+	(void)state;
+	const struct shape_options shiny = { .resolution = 96, .diffuse = 0x6090c0, .specular = 0x8410, .exponent = 80, .cones = 1,
+		                                 .scale = 3, .origin = { 5, -2, 1 } };
+	const struct shape_options leaf = { .resolution = 64, .diffuse = 0x20ff20, .two_sided = 1, .scale = 1 };
+	struct psr_error err;
+	for (int i = 0; i < 3; i++) {
+		char path[64];
+		snprintf(path, sizeof path, "tests/golden/%s.psr", names[i]);
+		if (psr_model_read(&models[i], path, &err))
+			return -1;
+	}
+	models[3] = shape_build(&shiny, 0.9);
+	models[4] = shape_build(&leaf, 0);
+	return 0;
+}
+
+static int close_models(void **state)
+{
+	(void)state;
+	for (int i = 0; i < MODELS; i++)
+		psr_model_unref(models[i]);
+	return 0;
+}
+
+/* A view of one or three models: scene `which` of many. */
+struct case_of {
+	struct psr_instance instance[3];
+	struct psr_light light[5];
+	struct psr_scene scene;
+	struct psr_settings settings;
+};
+
+static uint32_t next(uint32_t *seed)
+{
+	*seed = *seed * 1664525u + 1013904223u;
+	return *seed >> 8;
+}
+
+static double between(uint32_t *seed, double low, double high)
+{
+	return low + (high - low) * (next(seed) % 65536) / 65536.0;
+}
+
+static void case_make(struct case_of *c, uint32_t which)
+{
+	uint32_t seed = which * 2654435761u + 1;
+	const struct psr_model *first = models[which % MODELS];
+	const struct psr_model_info *info = psr_model_info(first);
+	memset(c, 0, sizeof *c);
+	c->scene = (struct psr_scene){ .instance = c->instance, .n_instances = which % 3 == 2 ? 3 : 1, .light = c->light,
+		                           .n_lights = next(&seed) % 6, .ambient = { 0.1, 0.2, 0.1 }, .background = { 0.2, 0, 0.5 } };
+	for (uint32_t i = 0; i < c->scene.n_instances; i++) {
+		c->instance[i] = (struct psr_instance){ i ? models[next(&seed) % MODELS] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
+		for (int k = 0; k < 3 && i; k++)
+			c->instance[i].translation[k] = between(&seed, -info->scale, info->scale);
+		if (i) /* a third of a turn about a diagonal */
+			for (int k = 0; k < 4; k++)
+				c->instance[i].rotation[k] = 0.5;
+	}
+	for (uint32_t i = 0; i < c->scene.n_lights; i++) {
+		struct psr_light *l = &c->light[i];
+		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(next(&seed) % 3);
+		for (int k = 0; k < 3; k++) {
+			l->direction[k] = between(&seed, -1, 1);
+			l->position[k] = info->origin[k] + between(&seed, -3, 3) * info->scale;
+			l->color[k] = i == 3 ? 0 : between(&seed, 0, 1);
+		}
+		l->outer = between(&seed, 0.2, 1);
+		l->inner = l->outer * 0.7;
+	}
+	struct psr_camera *camera = &c->scene.camera;
+	const double distance = between(&seed, which % 7 == 6 ? 0.3 : 1.2, 5) * info->scale;
+	double direction[3] = { between(&seed, -1, 1), between(&seed, -1, 1), between(&seed, 0.1, 1) };
+	for (int k = 0; k < 3; k++) {
+		camera->target[k] = info->origin[k];
+		camera->eye[k] = info->origin[k] + direction[k] * distance;
+	}
+	camera->up[1] = 1;
+	camera->kind = next(&seed) % 4 ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = between(&seed, 0.2, 1.5);
+	camera->ortho_height = between(&seed, 0.5, 4) * info->scale;
+	psr_settings_default(&c->settings, 64 + next(&seed) % 600, 64 + next(&seed) % 500);
+}
+
+struct drawn {
+	struct psr_frame frame;
+};
+
+static void draw(struct drawn *d, const struct case_of *c, const struct psr_settings *settings, const struct simd *simd)
+{
+	struct psr_renderer *renderer;
+	struct psr_error err;
+	const size_t area = (size_t)settings->width * settings->height;
+	d->frame = (struct psr_frame){ .width = settings->width, .height = settings->height, .rgb = malloc(3 * area),
+		                           .depth = malloc(4 * area) };
+	assert_int_equal(psr_renderer_create(&renderer), 0);
+	if (simd)
+		renderer_use(renderer, simd);
+	if (psr_render(renderer, &c->scene, settings, NULL, &d->frame, &err))
+		fail_msg("%s", err.text);
+	psr_renderer_destroy(renderer);
+}
+
+static void release(struct drawn *d)
+{
+	free(d->frame.rgb);
+	free(d->frame.depth);
+}
+
+static void assert_same(const struct drawn *a, const struct drawn *b, uint32_t which, const char *what)
+{
+	const size_t area = (size_t)a->frame.width * a->frame.height;
+	if (memcmp(a->frame.rgb, b->frame.rgb, 3 * area) || memcmp(a->frame.depth, b->frame.depth, 4 * area))
+		fail_msg("case %u: %s changes the frame", which, what);
+}
+
+static void leaving_out_changes_no_byte(void **state)
+{
+	(void)state;
+	for (uint32_t which = 0; which < 60; which++) {
+		struct case_of c;
+		struct drawn lean, full;
+		case_make(&c, which);
+		draw(&lean, &c, &c.settings, NULL);
+		c.settings.is_full = 1;
+		draw(&full, &c, &c.settings, NULL);
+		assert_same(&lean, &full, which, "leaving out what can be left out");
+		release(&lean);
+		release(&full);
+	}
+}
+
+static void tests_of_blocks_change_no_byte(void **state)
+{
+	(void)state;
+	for (uint32_t which = 0; which < 40; which++) {
+		struct case_of c;
+		struct drawn all, some;
+		case_make(&c, which);
+		draw(&all, &c, &c.settings, NULL);
+		for (unsigned tests = 0; tests < PSR_CULL_ALL; tests += which % 2 ? 3 : 1) {
+			c.settings.cull_tests = tests;
+			draw(&some, &c, &c.settings, NULL);
+			assert_same(&all, &some, which, "a test of blocks");
+			assert_true(some.frame.report.n_blocks_drawn >= all.frame.report.n_blocks_drawn);
+			release(&some);
+		}
+		release(&all);
+	}
+}
+
+/* ---- kernels that count how often they are called ---- */
+
+static struct {
+	uint64_t light, lit, warp_far, depth_row, fill_push;
+} calls;
+
+static void count_light(struct strip *strip, const struct strip_light *light, const float *reaches)
+{
+	calls.light++;
+	simd_c.strip_light(strip, light, reaches);
+}
+
+static void count_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
+                      const float ambient[3], uint32_t first, uint32_t n)
+{
+	calls.lit++;
+	simd_c.strip_lit(lit, view, light, n_lights, ambient, first, n);
+}
+
+static void count_far(const struct warp_target *target, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)])
+{
+	calls.warp_far++;
+	simd_c.warp_far(target, far);
+}
+
+static struct simd counting(void)
+{
+	struct simd simd = simd_c;
+	simd.strip_light = count_light;
+	simd.strip_lit = count_lit;
+	simd.warp_far = count_far;
+	memset(&calls, 0, sizeof calls);
+	return simd;
+}
+
+static void a_light_without_color_is_not_asked(void **state)
+{
+	(void)state;
+	struct case_of c;
+	struct drawn d;
+	struct simd simd = counting();
+	case_make(&c, 1);
+	c.scene.n_lights = 1;
+	memset(c.light[0].color, 0, sizeof c.light[0].color);
+	draw(&d, &c, &c.settings, &simd);
+	assert_true(d.frame.report.n_covered > 0);
+	assert_int_equal(calls.light, 0);
+	assert_int_equal(d.frame.report.effect[PSR_EFFECT_SPECULAR].why, PSR_WHY_NOTHING);
+	release(&d);
+}
+
+static void many_lights_are_tabulated_and_few_are_not(void **state)
+{
+	(void)state;
+	struct case_of c;
+	struct drawn d;
+	struct simd simd = counting();
+	case_make(&c, 1);
+	c.instance[0].model = models[1]; /* the wheel has no highlights */
+	psr_settings_default(&c.settings, 640, 480);
+	for (int i = 0; i < 5; i++)
+		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { i - 2, -1, -1 }, .color = { 0.3, 0.3, 0.3 } };
+	c.scene.n_lights = 5;
+	draw(&d, &c, &c.settings, &simd);
+	assert_int_equal(calls.lit, 32768 / STRIP);
+	assert_int_equal(d.frame.report.effect[PSR_EFFECT_TABLE].why, PSR_WHY_RAN);
+	release(&d);
+
+	simd = counting();
+	c.scene.n_lights = 2;
+	draw(&d, &c, &c.settings, &simd);
+	assert_int_equal(calls.lit, 0);
+	assert_int_equal(d.frame.report.effect[PSR_EFFECT_TABLE].why, PSR_WHY_COST);
+	release(&d);
+}
+
+static void every_effect_says_why_it_was_left_out(void **state)
+{
+	(void)state;
+	for (uint32_t which = 0; which < 60; which++) {
+		struct case_of c;
+		struct drawn d;
+		case_make(&c, which);
+		draw(&d, &c, &c.settings, NULL);
+		for (int e = 0; e < PSR_N_EFFECTS; e++) {
+			const char *why = psr_effect_why((enum psr_effect)e, d.frame.report.effect[e].why);
+			assert_int_equal(d.frame.report.effect[e].why == PSR_WHY_RAN, *why == '\0');
+			if (*why)
+				assert_int_equal(d.frame.report.effect[e].count, 0);
+		}
+		release(&d);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(leaving_out_changes_no_byte),
+		cmocka_unit_test(tests_of_blocks_change_no_byte),
+		cmocka_unit_test(a_light_without_color_is_not_asked),
+		cmocka_unit_test(many_lights_are_tabulated_and_few_are_not),
+		cmocka_unit_test(every_effect_says_why_it_was_left_out),
+	};
+	return cmocka_run_group_tests(tests, open_models, close_models);
+}
