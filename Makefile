@@ -64,6 +64,7 @@ PSRD_O         := $(call objs,server/*.c)
 PSR_O          := $(call objs,client/*.c)
 MODEL_O        := $(call objs,models/*.c)
 TEST_LIB_O     := $(call objs,tests/unit/lib/*.c)
+SIMD_TEST_O    := $(call objs,tests/simd/lib/*.c)
 
 LIB := $(BUILD)/lib
 BIN := $(BUILD)/bin
@@ -145,7 +146,8 @@ unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
 FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
 FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
 TOOLS      := $(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c))
-TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS)
+SIMD_TESTS := $(patsubst tests/simd/%.c,$(BUILD)/tests/simd/%,$(wildcard tests/simd/*.c))
+TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SIMD_TESTS)
 ifneq ($(filter release debug,$(config)),)
 TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
 endif
@@ -170,6 +172,8 @@ $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/ma
 	$(link) $(L_TEST)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD)
+$(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
+	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
 
@@ -182,7 +186,7 @@ $(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/l
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: test-bin check bench bench-model
+.PHONY: test-bin check bench bench-model bench-simd
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -212,6 +216,9 @@ bench: deps ## bench: install what is missing, build, time frames beside llvmpip
 
 bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)
+
+bench-simd: $(SIMD_TESTS) ## bench-simd: nanoseconds a sample (pixel, ...) of each kernel by instruction set
+	$(Q)for test in $(SIMD_TESTS); do $$test --bench || exit 1; done
 
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
 	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
