@@ -147,7 +147,8 @@ FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests
 FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
 TOOLS      := $(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c))
 SIMD_TESTS := $(patsubst tests/simd/%.c,$(BUILD)/tests/simd/%,$(wildcard tests/simd/*.c))
-TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SIMD_TESTS)
+GOLDEN     := $(BUILD)/tests/golden/frames
+TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SIMD_TESTS) $(GOLDEN)
 ifneq ($(filter release debug,$(config)),)
 TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
 endif
@@ -173,6 +174,8 @@ $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/ma
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
+	$(link) $(L_PSR)
+$(GOLDEN): $(call objs,tests/golden/*.c) $(A)
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
