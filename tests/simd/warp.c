@@ -153,7 +153,7 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 	t->perspective = check_one_in(c, 4) ? 0 : 1;
 	t->near_z = numbers == SPOILT && check_one_in(c, 3) ? fabsf(check_float(c)) : 0x1p-14f;
 	t->near_z = t->near_z > 0 ? t->near_z : 0x1p-149f;
-	check_blocks(c, &blocks, 1 + check_below(c, 40), MAX_PROJECTIONS, n_samples);
+	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS, n_samples);
 	const uint32_t last_slot = (1u << 26) - 1 - n_instances * blocks.n_blocks;
 	const uint32_t first_slot = check_one_in(c, 3) ? last_slot : check_below(c, last_slot);
 	for (uint32_t i = 0; i < n_instances; i++) {

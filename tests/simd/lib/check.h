@@ -59,6 +59,9 @@ int check_next(struct check *c);
 void check_result(struct check *c, uint64_t result);
 void check_units(struct check *c, uint64_t n); /* that a call handles; for --bench */
 
+/* All NaNs become one: which of two operands a NaN comes from is the compiler's choice. */
+void check_settle(float *value, size_t n);
+
 uint32_t check_u32(struct check *c);
 uint64_t check_u64(struct check *c);
 uint32_t check_below(struct check *c, uint32_t n); /* 0..n-1 */
