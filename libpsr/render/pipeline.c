@@ -1,3 +1,4 @@
+#include <fenv.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,14 +68,24 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 	return psr_scene_validate(scene, err);
 }
 
+/* As the pool does for its functions: what runs outside of them must not see the caller's rounding either. */
+static void set_environment(fenv_t *callers)
+{
+	fegetenv(callers);
+	fesetenv(FE_DFL_ENV);
+}
+
 int psr_renderer_create(struct psr_renderer **out)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
+	fenv_t callers;
 	if (!r)
 		return PSR_ERR_MEMORY;
 	r->simd = simd_get();
+	set_environment(&callers);
 	for (int i = 0; i < 65536; i++)
 		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
+	fesetenv(&callers);
 	*out = r;
 	return PSR_OK;
 }
@@ -176,8 +187,8 @@ static void warp_one(int tile, void *userdata)
 	r->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 }
 
-int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
-             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
 	if (rc)
@@ -209,6 +220,16 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	r->report = *report;
 	*stack = &r->stack;
 	return PSR_OK;
+}
+
+int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+{
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = make_stack(r, scene, settings, pool, stack, report, err);
+	fesetenv(&callers);
+	return rc;
 }
 
 static void gaps_one(int row, void *userdata)
@@ -249,8 +270,8 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	report->ns[PSR_STAGE_SHADE] = wall - report->ns[PSR_STAGE_RESOLVE];
 }
 
-int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
-               struct psr_error *err)
+static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+                        struct psr_error *err)
 {
 	if (stack != &r->stack || frame->width != stack->width || frame->height != stack->height)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack is not this renderer's, or of another size than the frame");
@@ -284,6 +305,16 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 		fill_push(&r->fill, pool, report);
 	report->ns[PSR_STAGE_FILL] += now_ns() - start;
 	return PSR_OK;
+}
+
+int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+               struct psr_error *err)
+{
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = finish_stack(r, stack, pool, frame, err);
+	fesetenv(&callers);
+	return rc;
 }
 
 int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
