@@ -1,5 +1,4 @@
-/* strip_list, strip_resolve, strip_light and strip_color: rows of 1 to STRIP pixels, lights of each kind, any numbers. */
-#include <math.h>
+/* strip_list and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
 #include <stddef.h>
 #include <string.h>
 #include "psr/direction.h"
@@ -7,11 +6,6 @@
 
 #define MAX_INSTANCES 3
 #define MAX_PROJECTIONS 4
-
-static float plain_or_any(struct check *c, int is_spoilt, double low, double high)
-{
-	return is_spoilt && check_one_in(c, 5) ? check_float(c) : (float)check_real(c, low, high);
-}
 
 static void settle(struct strip *strip)
 {
@@ -68,10 +62,10 @@ static void random_instance(struct check *c, struct warp_instance *in, const str
 	struct warp_lattice *lattice = check_in(c, MAX_PROJECTIONS, sizeof *lattice);
 	for (int p = 0; p < MAX_PROJECTIONS; p++)
 		for (int a = 0; a < 3; a++) {
-			lattice[p].origin[a] = (double)plain_or_any(c, is_spoilt, -1, 1);
-			lattice[p].step[a] = (double)plain_or_any(c, is_spoilt, -0.01, 0.01);
-			lattice[p].down[a] = (double)plain_or_any(c, is_spoilt, -0.01, 0.01);
-			lattice[p].along[a] = (double)plain_or_any(c, is_spoilt, -1, 1);
+			lattice[p].origin[a] = (double)check_plain_or_any(c, is_spoilt, -1, 1);
+			lattice[p].step[a] = (double)check_plain_or_any(c, is_spoilt, -0.01, 0.01);
+			lattice[p].down[a] = (double)check_plain_or_any(c, is_spoilt, -0.01, 0.01);
+			lattice[p].along[a] = (double)check_plain_or_any(c, is_spoilt, -1, 1);
 			for (int i = 0; i < 8; i++) {
 				lattice[p].row[a][i] = i * lattice[p].down[a] + (i & 1) * 0.5 * lattice[p].step[a];
 				lattice[p].col[a][i] = (float)(i * lattice[p].step[a]);
@@ -80,7 +74,7 @@ static void random_instance(struct check *c, struct warp_instance *in, const str
 	in->blocks = blocks;
 	in->lattice = lattice;
 	for (int k = 0; k < 9; k++)
-		in->turn[k / 3][k % 3] = plain_or_any(c, is_spoilt, -1, 1);
+		in->turn[k / 3][k % 3] = check_plain_or_any(c, is_spoilt, -1, 1);
 }
 
 /* The covered pixels of a row, runs of a few instances. */
@@ -113,6 +107,9 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	if (check_one_in(c, 2)) /* no highlights */
 		for (uint64_t i = 0; i < blocks.n_samples; i++)
 			((uint64_t *)blocks.attr)[i] &= ~(UINT64_C(0xffff) << 40);
+	if (check_one_in(c, 3)) /* one colour */
+		for (uint64_t i = 0; i < blocks.n_samples; i++)
+			((uint64_t *)blocks.attr)[i] = (blocks.attr[i] & 0xffff) | UINT64_C(0x5012348090a00000);
 	uint32_t slot = check_one_in(c, 3) ? (1u << 26) - 1 - n_instances * blocks.n_blocks : 0;
 	for (uint32_t i = 0; i < n_instances; i++, slot += blocks.n_blocks) {
 		random_instance(c, &instance[i], &blocks, is_spoilt);
@@ -121,10 +118,10 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	*view = (struct strip_view){
 		.instance = instance, .n_instances = n_instances, .direction_word = psr_direction_words(), .needs = needs,
 		.half_width = (float)check_below(c, PSR_MAX_SIDE) / 2, .half_height = (float)check_below(c, PSR_MAX_SIDE) / 2,
-		.focal = plain_or_any(c, is_spoilt, 1, 1000), .perspective = (int)check_below(c, 2),
+		.focal = check_plain_or_any(c, is_spoilt, 1, 1000), .perspective = (int)check_below(c, 2),
 	};
 	for (int k = 0; k < 3; k++)
-		ambient[k] = plain_or_any(c, is_spoilt, 0, 1);
+		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
 	random_strip(c, strip, view, n);
 	check_units(c, strip->n);
 	while (check_next(c)) {
@@ -149,117 +146,14 @@ static void bench_resolve(struct check *c)
 	resolve(c, STRIP, 0, 0);
 }
 
-/* ---- light and color ---- */
-
-static void random_samples(struct check *c, struct strip *strip, uint32_t n, int is_specular, int is_spoilt)
-{
-	strip->n = n;
-	strip->all = 0;
-	for (uint32_t i = 0; i < n; i++) {
-		if (!is_specular)
-			strip->attr[i] &= ~(UINT64_C(0xffff) << 40);
-		strip->all |= strip->attr[i];
-	}
-	for (float *value = strip->px; value < strip->sr; value++)
-		*value = plain_or_any(c, is_spoilt, -1, 1);
-	for (uint32_t i = 0; i < STRIP; i++) {
-		strip->sr[i] = plain_or_any(c, is_spoilt, 0, 1);
-		strip->sg[i] = plain_or_any(c, is_spoilt, 0, 1);
-		strip->sb[i] = plain_or_any(c, is_spoilt, 0, 1);
-		strip->exponent[i] = (float)exp2(check_below(c, 256) / 16.0);
-	}
-	for (float *value = strip->lr; value < (float *)strip->r; value++)
-		*value = plain_or_any(c, is_spoilt, 0, 2);
-}
-
-static void light(struct check *c, uint32_t n, enum psr_light_kind kind, int is_specular, int is_spoilt)
-{
-	struct strip *strip = check_out(c, 1, sizeof *strip);
-	struct strip_light *to = check_in(c, 1, sizeof *to);
-
-	random_samples(c, strip, n, is_specular, is_spoilt);
-	to->kind = kind;
-	for (int k = 0; k < 3; k++) {
-		to->position[k] = plain_or_any(c, is_spoilt, -2, 2);
-		to->to_light[k] = plain_or_any(c, is_spoilt, -1, 1);
-		to->axis[k] = plain_or_any(c, is_spoilt, -1, 1);
-		to->color[k] = plain_or_any(c, is_spoilt, 0, 2);
-	}
-	to->cos_outer = plain_or_any(c, is_spoilt, -1, 1);
-	to->cos_inner = check_one_in(c, 4) ? to->cos_outer : plain_or_any(c, is_spoilt, (double)to->cos_outer, 1);
-	to->reference2 = check_one_in(c, 3) ? 0 : plain_or_any(c, is_spoilt, 0, 4);
-	if (check_one_in(c, 2)) { /* a light in a sample */
-		to->position[0] = strip->px[0];
-		to->position[1] = strip->py[0];
-		to->position[2] = strip->pz[0];
-	}
-	check_units(c, n);
-	while (check_next(c)) {
-		c->simd->strip_light(strip, to);
-		if (!c->is_bench)
-			settle(strip);
-	}
-}
-
-static void random_light(struct check *c)
-{
-	light(c, 1 + check_below(c, STRIP), (enum psr_light_kind)check_below(c, 3), (int)check_below(c, 2), 0);
-}
-
-static void spoilt_light(struct check *c)
-{
-	light(c, 1 + check_below(c, STRIP), (enum psr_light_kind)check_below(c, 3), (int)check_below(c, 2), 1);
-}
-
-static void bench_sun(struct check *c)
-{
-	light(c, STRIP, PSR_LIGHT_DIRECTIONAL, 0, 0);
-}
-
-static void bench_sun_specular(struct check *c)
-{
-	light(c, STRIP, PSR_LIGHT_DIRECTIONAL, 1, 0);
-}
-
-static void bench_spot_specular(struct check *c)
-{
-	light(c, STRIP, PSR_LIGHT_SPOT, 1, 0);
-}
-
-static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
-{
-	struct strip *strip = check_out(c, 1, sizeof *strip);
-	random_samples(c, strip, n, is_specular, is_spoilt);
-	check_units(c, n);
-	while (check_next(c))
-		c->simd->strip_color(strip);
-}
-
-static void random_color(struct check *c)
-{
-	color(c, 1 + check_below(c, STRIP), (int)check_below(c, 2), (int)check_below(c, 2));
-}
-
-static void bench_color(struct check *c)
-{
-	color(c, STRIP, 1, 0);
-}
-
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "strip_list: random rows", random_lists, 2000, NULL },
 		{ "strip_resolve: random samples", random_resolve, 1000, NULL },
 		{ "strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
-		{ "strip_light: random lights", random_light, 2000, NULL },
-		{ "strip_light: infinite, huge, denormal and no numbers", spoilt_light, 2000, NULL },
-		{ "strip_color: random samples", random_color, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
 		{ "strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
-		{ "strip_light, directional", bench_sun, 0, "sample" },
-		{ "strip_light, directional, highlights", bench_sun_specular, 0, "sample" },
-		{ "strip_light, spot, highlights", bench_spot_specular, 0, "sample" },
-		{ "strip_color, highlights", bench_color, 0, "sample" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }

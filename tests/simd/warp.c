@@ -3,7 +3,6 @@
 #include <string.h>
 #include "base/maths.h"
 #include "psr/direction.h"
-#include "render/render.h"
 #include "tests/simd/lib/blocks.h"
 
 #define MAX_INSTANCES 3
@@ -44,7 +43,7 @@ static void make_picture(struct check *c, struct picture *p, uint32_t width, uin
 	p->width = width;
 	p->height = height;
 	p->levels = levels & 0xfe;
-	t->direction = psr_direction_table();
+	t->direction = psr_direction_tens();
 	t->stride = width;
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);

@@ -42,6 +42,9 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	*blocks = (struct psr_blocks){
 		.n_blocks = n_blocks, .n_projections = n_projections, .n_samples = n, .run = run, .block_projection = projection,
 		.col = col, .row = row, .flags = flags, .depth_bias = bias, .depth_shift = shift, .mask = mask,
+		.sphere_x = check_in(c, n_blocks, 2), .sphere_y = check_in(c, n_blocks, 2), .sphere_z = check_in(c, n_blocks, 2),
+		.sphere_r = check_in(c, n_blocks, 2), .cone_x = check_in(c, n_blocks, 1), .cone_y = check_in(c, n_blocks, 1),
+		.cone_z = check_in(c, n_blocks, 1), .cone_sine = check_in(c, n_blocks, 1),
 		.attr_offset = offset, .depth = check_in(c, n + DEPTH_PADDING, 2), .attr = check_in(c, n, 8),
 	};
 }

@@ -76,6 +76,11 @@ float check_float(struct check *c)
 	}
 }
 
+float check_plain_or_any(struct check *c, int is_any, double low, double high)
+{
+	return is_any && check_one_in(c, 5) ? check_float(c) : (float)check_real(c, low, high);
+}
+
 static void *add_buffer(struct check *c, size_t n, size_t size, int is_output)
 {
 	const size_t page = (size_t)sysconf(_SC_PAGESIZE);

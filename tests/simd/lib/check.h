@@ -68,5 +68,6 @@ uint32_t check_below(struct check *c, uint32_t n); /* 0..n-1 */
 int check_one_in(struct check *c, uint32_t n);     /* true once in n times */
 double check_real(struct check *c, double low, double high);
 float check_float(struct check *c); /* any bits: denormal, huge, infinite, NaN, -0 and plain ones, all often */
+float check_plain_or_any(struct check *c, int is_any, double low, double high); /* any one time in five */
 
 #endif
