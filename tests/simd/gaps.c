@@ -21,7 +21,6 @@ static void piece(struct check *c, uint32_t width, uint32_t height, uint32_t lev
 	struct psr_zstack *stack = check_in(c, 1, sizeof *stack);
 	float *scale = check_in(c, PSR_MAX_DEPTH_LEVEL + 1, sizeof *scale);
 	float *offset = check_in(c, PSR_MAX_DEPTH_LEVEL + 1, sizeof *offset);
-	const int is_perspective = (int)check_below(c, 2);
 	const float threshold = (float)check_real(c, 0, 0.01);
 
 	memset(stack, 0, sizeof *stack);
@@ -32,8 +31,8 @@ static void piece(struct check *c, uint32_t width, uint32_t height, uint32_t lev
 	for (size_t i = 0; i < area; i++)
 		stack->word[i] = (uint64_t)psr_bits_from_float(random_depth(c, numbers)) << 32 | check_u32(c);
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		scale[k] = is_perspective ? 1 + threshold * (float)(1 << k) : 1;
-		offset[k] = is_perspective ? 0 : threshold * (float)(1 << k);
+		scale[k] = 1 + (check_one_in(c, 2) ? threshold * (float)(1 << k) : 0);
+		offset[k] = check_one_in(c, 2) ? threshold * (float)(1 << k) : 0;
 		const uint32_t side = 1u << k, w = (width + side - 1) / side + 2, h = (height + side - 1) / side + 2;
 		stack->level[k].width = w;
 		stack->level[k].height = h;
