@@ -158,7 +158,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + WARP_PADDING * 8 + cells * 4 + n_bricks);
+	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
 	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
@@ -168,7 +168,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	r->gaps = (struct gaps_counts *)(r->shade + rows);
 
 	stack->word = r->pixels;
-	float *next = (float *)(stack->word + area + WARP_PADDING);
+	float *next = (float *)(stack->word + area);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
 		if (stack->level[k].z)
