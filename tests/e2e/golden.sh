@@ -16,8 +16,9 @@ shots() {
 
 for way in "--threads 3" "--threads 1 --isa c"; do
 	# shellcheck disable=SC2086
-	start_psrd --models tests/golden $way
+	start_psrd --models tests/golden --verbose $way
 	shots >"$work/got"
 	check "psrd $way stops cleanly" stop_psrd
 	check "psrd $way draws frames of the golden hashes" diff -u $hashes "$work/got"
 done
+check "psrd --isa c draws with c" grep -q "with 1 threads and c$" "$work/psrd.log"

@@ -1,11 +1,13 @@
-/* fill_pull, fill_push and fill_depths: rows of 1 to FILL_WIDTH cells, whole, partial and empty, inside the picture or not. */
+/* fill_pull, fill_push and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty ones, and outside of the
+ * picture. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
 #include "tests/simd/lib/check.h"
 
 /* n cells, and `around` more on each side. */
-static struct fill_row random_row(struct check *c, uint32_t n, uint32_t around, int is_output, int has_colors, int is_spoilt)
+static struct fill_row random_row(struct check *c, uint32_t n, uint32_t around, int is_output, int has_colors,
+                                  int is_spoilt)
 {
 	void *(*buffer)(struct check *, size_t, size_t) = is_output ? check_out : check_in;
 	const uint32_t all = n + 2 * around;

@@ -148,7 +148,8 @@ static void depths(struct check *c, uint32_t n, int exponent)
 	uint64_t *word = check_in(c, n, sizeof *word);
 	float *depth = check_out(c, n, sizeof *depth);
 	for (uint32_t i = 0; i < n; i++) {
-		word[i] = (uint64_t)psr_bits_from_float(c->is_bench ? (float)check_real(c, 0.1, 1) : fabsf(check_float(c))) << 32 | check_u32(c);
+		const float z = c->is_bench ? (float)check_real(c, 0.1, 1) : fabsf(check_float(c));
+		word[i] = (uint64_t)psr_bits_from_float(z) << 32 | check_u32(c);
 		if (check_one_in(c, 4))
 			word[i] = PSR_WORD_EMPTY;
 	}

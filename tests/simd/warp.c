@@ -119,10 +119,12 @@ static void spoil_lattice(struct check *c, struct warp_lattice *lattice)
 static void edge_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t)
 {
 	const double x = check_one_in(c, 2) ? t->x0 : t->x1, y = check_one_in(c, 2) ? t->y0 : t->y1;
-	const double z = check_one_in(c, 2) ? (double)t->near_z : exp2(check_below(c, 3)), step = exp2((double)check_below(c, 4) - 2);
+	const double z = check_one_in(c, 2) ? (double)t->near_z : exp2(check_below(c, 3));
+	const double step = exp2((double)check_below(c, 4) - 2);
 	const double scale = t->perspective ? z : 1;
 	*lattice = (struct warp_lattice){
-		.origin = { (x - 4 * step) * scale, (y - 4 * step) * scale, z }, .step = { step * scale, 0, 0 }, .down = { 0, step * scale, 0 },
+		.origin = { (x - 4 * step) * scale, (y - 4 * step) * scale, z },
+		.step = { step * scale, 0, 0 }, .down = { 0, step * scale, 0 },
 	};
 	complete_lattice(lattice);
 }
@@ -140,7 +142,8 @@ static void random_sight(struct check *c, struct warp_instance *in, const struct
 	}
 }
 
-static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step, enum numbers numbers)
+static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step,
+                        enum numbers numbers)
 {
 	struct warp_target *t = &p->target;
 	const uint32_t n_instances = 1 + check_below(c, MAX_INSTANCES);

@@ -9,8 +9,11 @@ static uint64_t random_mask(struct check *c, uint32_t n)
 	uint64_t mask = 0;
 	if (n == 64)
 		return ~UINT64_C(0);
-	for (uint32_t at = check_below(c, 64); (uint32_t)__builtin_popcountll(mask) < n; at = (at + 1 + (check_one_in(c, 3) ? check_below(c, 64) : 0)) % 64)
+	for (uint32_t at = check_below(c, 64); (uint32_t)__builtin_popcountll(mask) < n; at = (at + 1) % 64) {
 		mask |= UINT64_C(1) << at;
+		if (check_one_in(c, 3))
+			at = check_below(c, 64);
+	}
 	return mask;
 }
 
