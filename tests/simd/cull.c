@@ -18,8 +18,7 @@ static void random_view(struct check *c, struct cull_view *view, const struct ps
 	}
 	view->width = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
 	view->height = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
-	view->tiles_x = ((uint32_t)view->width + TILE_WIDTH - 1) / TILE_WIDTH;
-	view->tiles_y = ((uint32_t)view->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+	view->with_cones = !check_one_in(c, 4);
 }
 
 /* What is said of blocks that are not left, and what is left of the batch, has no meaning. */
@@ -31,9 +30,10 @@ static void settle(struct cull_batch *out, uint32_t n)
 		if (i >= n)
 			out->is_left[i] = 0;
 		out->is_mixed[i] = out->level[i] = 0;
-		out->tile_x0[i] = out->tile_x1[i] = out->tile_y0[i] = out->tile_y1[i] = 0;
-		out->depth_error[i] = 0;
+		out->x0[i] = out->x1[i] = out->y0[i] = out->y1[i] = 0;
+		out->near[i] = out->depth_error[i] = 0;
 	}
+	check_settle(out->near, CULL_BATCH);
 	check_settle(out->depth_error, CULL_BATCH);
 }
 

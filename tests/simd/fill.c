@@ -1,4 +1,4 @@
-/* fill_pull, fill_push and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty ones, and outside of the
+/* fill_pull, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty ones, and outside of the
  * picture. */
 #include <math.h>
 #include <string.h>
@@ -66,11 +66,14 @@ static void bench_pull(struct check *c)
 static void push(struct check *c, uint32_t n, int is_picture, int is_spoilt)
 {
 	const struct fill_row to = random_row(c, 2 * n, 0, 1, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
-	const struct fill_row beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	const struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt), beside = random_row(c, n, 0, 0, 1, is_spoilt);
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
 	check_units(c, 2 * n);
 	while (check_next(c)) {
-		c->simd->fill_push(&to, &own, &beside, n, is_picture, scale, offset);
+		if (is_picture)
+			c->simd->fill_push_picture(&to, &was, &own, &beside, n, scale, offset);
+		else
+			c->simd->fill_push(&to, &own, &beside, n, scale, offset);
 		if (!c->is_bench)
 			check_settle(to.z, 2 * (size_t)n);
 	}
@@ -78,12 +81,17 @@ static void push(struct check *c, uint32_t n, int is_picture, int is_spoilt)
 
 static void random_push(struct check *c)
 {
-	push(c, 1 + check_below(c, FILL_WIDTH), (int)check_below(c, 2), 0);
+	push(c, 1 + check_below(c, FILL_WIDTH), 0, 0);
 }
 
 static void spoilt_push(struct check *c)
 {
-	push(c, 1 + check_below(c, FILL_WIDTH), (int)check_below(c, 2), 1);
+	push(c, 1 + check_below(c, FILL_WIDTH), 0, 1);
+}
+
+static void random_push_picture(struct check *c)
+{
+	push(c, 1 + check_below(c, FILL_WIDTH), 1, (int)check_below(c, 2));
 }
 
 static void bench_push(struct check *c)
@@ -117,9 +125,10 @@ int main(int argc, char **argv)
 		{ "fill_pull: infinite, huge, denormal and no numbers", spoilt_pull, 2000, NULL },
 		{ "fill_push: random cells", random_push, 2000, NULL },
 		{ "fill_push: infinite, huge, denormal and no numbers", spoilt_push, 2000, NULL },
+		{ "fill_push_picture: random and spoilt pixels", random_push_picture, 2000, NULL },
 		{ "fill_depths: any words", random_depths, 500, NULL },
 		{ "fill_pull, from the picture", bench_pull, 0, "cell" },
-		{ "fill_push, into the picture", bench_push, 0, "cell" },
+		{ "fill_push_picture", bench_push, 0, "cell" },
 		{ "fill_depths", bench_depths, 0, "pixel" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

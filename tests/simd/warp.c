@@ -1,4 +1,4 @@
-/* warp and warp_clear: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
+/* warp, warp_clear and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -231,6 +231,16 @@ static void random_clear(struct check *c)
 		c->simd->warp_clear(&p.target, p.levels);
 }
 
+static void random_far(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	const uint32_t rows = (uint32_t)(p.target.y1 - p.target.y0 + FAR_SIDE - 1) / FAR_SIDE;
+	uint32_t *far = check_out(c, rows * (TILE_WIDTH / FAR_SIDE), sizeof *far);
+	while (check_next(c))
+		c->simd->warp_far(&p.target, far);
+}
+
 static void bench_full_blocks(struct check *c)
 {
 	struct picture p;
@@ -252,6 +262,16 @@ static void bench_levels(struct check *c)
 	warp_blocks(c, &p, 400, 64, 2, PLAIN);
 }
 
+static void bench_far(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	uint32_t *far = check_out(c, TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE), sizeof *far);
+	check_units(c, TILE_WIDTH * TILE_HEIGHT);
+	while (check_next(c))
+		c->simd->warp_far(&p.target, far);
+}
+
 static void bench_clear(struct check *c)
 {
 	struct picture p;
@@ -270,10 +290,12 @@ int main(int argc, char **argv)
 		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
 		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
 		{ "warp_clear: random tiles and levels", random_clear, 400, NULL },
+		{ "warp_far: random tiles", random_far, 400, NULL },
 		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
 		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
 		{ "warp, full blocks, depth levels 1 and 2", bench_levels, 0, "sample" },
 		{ "warp_clear, a tile", bench_clear, 0, "pixel" },
+		{ "warp_far, a tile", bench_far, 0, "pixel" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }
