@@ -1,7 +1,9 @@
 #include <stdio.h>
 #include <string.h>
 #include "commands.h"
+#include "psr/cli.h"
 #include "psr/error.h"
+#include "psr/isa.h"
 
 static const struct command {
 	const char *name, *summary;
@@ -40,6 +42,9 @@ int main(int argc, char **argv)
 		puts("psr-model " PSR_VERSION);
 		return 0;
 	}
+	struct psr_error error;
+	if (psr_isa_check_environment(&error) != PSR_OK)
+		return psr_cli_fail("psr-model", &error);
 	for (size_t i = 0; i < N_COMMANDS; i++) {
 		if (strcmp(argv[1], commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);

@@ -8,6 +8,7 @@
 #include <unistd.h>
 #include "options.h"
 #include "psr/cli.h"
+#include "psr/isa.h"
 
 #define MAX_OPTIONS 32
 #define MAX_CONFIG 65536
@@ -56,6 +57,7 @@ static int set_defaults(struct options *options)
 		.handshake_timeout = 10, .idle_timeout = 600, .slow_timeout = 30, .drain_timeout = 5,
 		.build_time = 3600,
 	};
+	options->isa = psr_isa_name(psr_isa_get());
 	options->cache = options->cache_default = find_cache();
 	return options->cache != NULL ? PSR_OK : PSR_ERR_MEMORY;
 }
@@ -70,6 +72,9 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		  .help = "Folder of models: .psr files, and sources that are built on first use. Required." },
 		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
 		  .help = "Threads that draw and encode; as many frames are drawn at once." },
+		{ .name = "isa", .type = PSR_OPT_STRING, .value = &o->isa, .arg = "NAME",
+		  .help = "The widest instructions that draw: c (what any processor of the kind has), avx2 or avx512. Frames are the"
+		          " same bytes with each; what the machine has is the default." },
 		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
 		  .help = "Where models built from sources are kept." },
 		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
@@ -197,6 +202,7 @@ static int apply_config(const struct psr_cli *cli, const int *given, struct opti
 
 int options_parse(struct options *options, int argc, char **argv, struct psr_error *err)
 {
+	enum psr_isa isa;
 	struct psr_opt table[MAX_OPTIONS];
 	int seen[MAX_OPTIONS] = { 0 }, given[MAX_OPTIONS], n_operands = 0, code;
 	const struct psr_cli cli = {
@@ -230,6 +236,11 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 		if (code != PSR_OK)
 			return code;
 	}
+	if (psr_isa_check_environment(err) != PSR_OK)
+		return PSR_ERR_ARG;
+	if (psr_isa_parse(&isa, options->isa) != PSR_OK)
+		return psr_fail(err, PSR_ERR_ARG, "--isa: there is no '%.40s'; it takes c, avx2 or avx512", options->isa);
+	psr_isa_cap(isa);
 	if (options->models == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--models DIR is missing: it names the folder of models");
 	if (options->n_listen == 0)

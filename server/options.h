@@ -11,7 +11,7 @@
 struct options {
 	const char *listen[OPTIONS_MAX_LISTEN]; /* at least one after parsing */
 	int n_listen;
-	const char *models, *cache, *config;
+	const char *models, *cache, *config, *isa;
 	int64_t threads;
 	int64_t max_clients, max_open, max_handles, max_builds;
 	int64_t max_pixels;

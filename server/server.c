@@ -10,6 +10,7 @@
 #include "frames.h"
 #include "log.h"
 #include "opener.h"
+#include "psr/isa.h"
 #include "server.h"
 
 #define IO_THREADS 2
@@ -269,7 +270,8 @@ int server_run(struct server *server, struct psr_error *err)
 	for (int i = 0; i < server->n_listeners; i++)
 		printf("READY %s\n", server->listener[i].listener.name);
 	fflush(stdout);
-	log_info("serving %zu models with %d threads", server->catalogue.n, psr_pool_threads(server->pool));
+	log_info("serving %zu models with %d threads and %s", server->catalogue.n, psr_pool_threads(server->pool),
+	         psr_isa_name(psr_isa_get()));
 	code = loop_run(&server->loop, err);
 	if (frames_running(server->frames) > 0 || opener_is_working(server->opener) || server->is_scanning) {
 		/* Past the time that it had: what still draws or reads cannot be stopped, and nobody waits for it. */

@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <fenv.h>
 #include <math.h>
 #include <pthread.h>
 #include "psr/direction.h"
@@ -73,7 +74,10 @@ static void cut_off(double plane[3], const double first[3], const double second[
 static void make_tables(void)
 {
 	unsigned node = 0;
+	fenv_t callers;
 
+	fegetenv(&callers);
+	fesetenv(FE_DFL_ENV);
 	for (int level = 0; level < LEVELS; level++) {
 		for (unsigned index = 0; index < 1u << 2 * level; index++, node++) {
 			double corner[3][3], middle[3][3]; /* bc, ca, ab */
@@ -95,6 +99,7 @@ static void make_tables(void)
 			direction_tens[index] |= ((uint32_t)lround(v[k] * 511) & 0x3ff) << 10 * k;
 		}
 	}
+	fesetenv(&callers);
 }
 
 const uint64_t *psr_direction_words(void)

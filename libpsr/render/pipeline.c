@@ -1,3 +1,4 @@
+#include <fenv.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -71,14 +72,24 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 	return psr_scene_validate(scene, err);
 }
 
+/* As the pool does for its functions: what runs outside of them must not see the caller's rounding either. */
+static void set_environment(fenv_t *callers)
+{
+	fegetenv(callers);
+	fesetenv(FE_DFL_ENV);
+}
+
 int psr_renderer_create(struct psr_renderer **out)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
+	fenv_t callers;
 	if (!r)
 		return PSR_ERR_MEMORY;
 	r->simd = simd_get();
+	set_environment(&callers);
 	for (int i = 0; i < 65536; i++)
 		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
+	fesetenv(&callers);
 	*out = r;
 	return PSR_OK;
 }
@@ -157,7 +168,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + WARP_PADDING * 8 + cells * 4 + n_bricks);
+	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
 	r->counters = grow(r->counters, &r->counters_size, n_tiles * sizeof *r->tile + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
@@ -167,7 +178,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	r->gaps = (struct gaps_counts *)(r->shade + rows);
 
 	stack->word = r->pixels;
-	float *next = (float *)(stack->word + area + WARP_PADDING);
+	float *next = (float *)(stack->word + area);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
 		if (stack->level[k].z)
@@ -186,8 +197,8 @@ static void warp_one(int tile, void *userdata)
 	r->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 }
 
-int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
-             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
 	if (rc)
@@ -224,6 +235,16 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 	r->report = *report;
 	*stack = &r->stack;
 	return PSR_OK;
+}
+
+int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+{
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = make_stack(r, scene, settings, pool, stack, report, err);
+	fesetenv(&callers);
+	return rc;
 }
 
 static void gaps_one(int row, void *userdata)
@@ -269,8 +290,8 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	report->ns[PSR_STAGE_SHADE] = wall - report->ns[PSR_STAGE_RESOLVE];
 }
 
-int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
-               struct psr_error *err)
+static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+                        struct psr_error *err)
 {
 	if (stack != &r->stack || frame->width != stack->width || frame->height != stack->height)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack is not this renderer's, or of another size than the frame");
@@ -314,6 +335,16 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	report->ns[PSR_STAGE_FILL] += now_ns() - start;
 	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	return PSR_OK;
+}
+
+int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+               struct psr_error *err)
+{
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = finish_stack(r, stack, pool, frame, err);
+	fesetenv(&callers);
+	return rc;
 }
 
 int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,

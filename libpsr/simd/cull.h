@@ -47,7 +47,8 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding
 		 * does not double the cells of a picture drawn at just the magnification that a level is made for. */
 		const float spacing = v.spacing * psr_float_from_bits((127u + (flags[i] & PSR_BLOCK_LEVEL)) << 23);
-		const int32_t bits = (int32_t)psr_bits_from_float(stretch * spacing * (1 - 0x1p-12f));
+		const float pixels = stretch * spacing * (1 - 0x1p-12f); /* no number where 0 meets infinity */
+		const int32_t bits = (int32_t)psr_bits_from_float(psr_choose(pixels < 0x1p100f, pixels, 0x1p100f));
 		const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127, level = exponent > 0 ? exponent : 0;
 		const int32_t used = level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL;
 

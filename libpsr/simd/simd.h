@@ -80,7 +80,7 @@ struct warp_target {
 	const uint32_t *direction; /* psr_direction_tens() */
 	float near_z;
 	int perspective;
-	uint64_t *word; /* of the whole picture; WARP_PADDING more can be written */
+	uint64_t *word; /* of the whole picture; other tiles' are left alone, even by writing what is there */
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
 	struct warp_cells {
@@ -89,7 +89,6 @@ struct warp_target {
 		int32_t x0, y0, x1, y1; /* pixels whose cells belong to the tile, of which `first` is one */
 	} cells[PSR_MAX_DEPTH_LEVEL + 1];
 };
-#define WARP_PADDING 16
 
 /* Lowers words, and the cells of entries with a level above 0, to the samples of the entries' blocks that fall into the tile,
  * lie beyond near_z and do not face away. Returns how many samples fell into the tile. */

@@ -165,6 +165,8 @@ refuses "no models folder" 2 "--models DIR is missing" timeout 30 psrd --listen 
 refuses "no threads" 2 "--threads: '0'" daemon --threads 0
 refuses "an unknown option of psrd" 2 "unknown option --colour" daemon --colour
 refuses "an operand of psrd" 2 "unexpected argument" daemon operand
+refuses "instructions that are none" 2 "--isa: there is no 'sse9'; it takes c, avx2 or avx512" daemon --isa sse9
+PSR_ISA=sse9 refuses "a PSR_ISA that is none, for psrd" 2 "PSR_ISA is 'sse9'; it takes c, avx2 or avx512" daemon
 refuses "a configuration that is not there" 3 "--config $work/nosuch" daemon --config "$work/nosuch"
 config() { # claim pattern text
 	printf '%s\n' "$3" >"$work/config"

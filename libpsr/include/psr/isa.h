@@ -1,8 +1,11 @@
 /* Which instructions the renderer's kernels may use. Frames are the same bytes with all of them; only time differs.
  *
- * The best that the machine has is used, unless PSR_ISA in the environment (c, avx2 or avx512) or a call caps it. */
+ * The best that the machine has is used, unless PSR_ISA in the environment (c, avx2 or avx512; other words are passed
+ * over) or a call caps it. */
 #ifndef PSR_ISA_H
 #define PSR_ISA_H
+
+#include "psr/error.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -25,6 +28,9 @@ const char *psr_isa_name(enum psr_isa isa); /* "avx2" */
 
 /* 0, or PSR_ERR_ARG if there is none of this name; `out` is then as it was. */
 int psr_isa_parse(enum psr_isa *out, const char *name);
+
+/* ARG with a sentence if PSR_ISA holds a word that is no name: what programs look at when they start. */
+int psr_isa_check_environment(struct psr_error *err);
 
 #ifdef __cplusplus
 }

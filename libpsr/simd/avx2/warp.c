@@ -181,7 +181,8 @@ static inline uint32_t warp_one(const struct warp_target *t, const struct bin_en
 
 uint64_t warp_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+	const __m256i lane = _mm256_min_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
+	                                      _mm256_set1_epi32(target->x1 - target->x0 - 1));
 	const __m256i unused = _mm256_add_epi32(lane, _mm256_set1_epi32(target->y0 * (int)target->stride + target->x0));
 	uint64_t n_inside = 0;
 	for (uint32_t e = 0; e < n; e++)

@@ -171,7 +171,9 @@ static inline uint32_t warp_one(const struct warp_target *t, const struct bin_en
 
 uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	const __m512i lane = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+	/* Words of the tile and no others, however narrow it is: its neighbours may be another thread's. */
+	const __m512i lane = _mm512_min_epi32(_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+	                                      _mm512_set1_epi32(target->x1 - target->x0 - 1));
 	const __m512i unused = _mm512_add_epi32(lane, _mm512_set1_epi32(target->y0 * (int)target->stride + target->x0));
 	uint64_t n_inside = 0;
 	for (uint32_t e = 0; e < n; e++)

@@ -1,0 +1,94 @@
+/* cull: batches of 1 to CULL_BATCH blocks, before the eye and behind it, within the picture and outside of it. */
+#include <math.h>
+#include <string.h>
+#include "tests/simd/lib/blocks.h"
+
+static void random_view(struct check *c, struct cull_view *view, const struct psr_blocks *blocks, int is_spoilt)
+{
+	view->blocks = blocks;
+	view->scale = check_plain_or_any(c, is_spoilt, 0, 1);
+	view->spacing = check_plain_or_any(c, is_spoilt, 0, 0.01);
+	view->perspective = (int)check_below(c, 2);
+	view->focal = check_plain_or_any(c, is_spoilt, 1, 3000);
+	view->near_z = fabsf(check_plain_or_any(c, is_spoilt, 0x1p-14, 0.1));
+	for (int a = 0; a < 3; a++) {
+		for (int k = 0; k < 4; k++)
+			view->center_m[a][k] = check_plain_or_any(c, is_spoilt, -1, 1) * (is_spoilt || k == 3 ? 1 : view->scale);
+		view->eye[a] = check_plain_or_any(c, is_spoilt, -3, 3);
+	}
+	view->width = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
+	view->height = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
+	view->with_cones = !check_one_in(c, 4);
+}
+
+/* What is said of blocks that are not left, and what is left of the batch, has no meaning. */
+static void settle(struct cull_batch *out, uint32_t n)
+{
+	for (uint32_t i = 0; i < CULL_BATCH; i++) {
+		if (i < n && out->is_left[i])
+			continue;
+		if (i >= n)
+			out->is_left[i] = 0;
+		out->is_mixed[i] = out->level[i] = 0;
+		out->x0[i] = out->x1[i] = out->y0[i] = out->y1[i] = 0;
+		out->near[i] = out->depth_error[i] = 0;
+	}
+	check_settle(out->near, CULL_BATCH);
+	check_settle(out->depth_error, CULL_BATCH);
+}
+
+static void batch(struct check *c, uint32_t n_blocks, uint32_t n, int has_cones, int is_spoilt)
+{
+	struct cull_view *view = check_in(c, 1, sizeof *view);
+	struct cull_batch *out = check_out(c, 1, sizeof *out);
+	struct psr_blocks blocks;
+
+	check_blocks(c, &blocks, n_blocks, 1, 1);
+	if (!has_cones)
+		blocks.cone_x = blocks.cone_y = blocks.cone_z = NULL, blocks.cone_sine = NULL;
+	random_view(c, view, &blocks, is_spoilt);
+	const uint32_t first = check_below(c, n_blocks - n + 1);
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->cull(out, view, first, n);
+		if (!c->is_bench)
+			settle(out, n);
+	}
+}
+
+static void random_batch(struct check *c, int is_spoilt)
+{
+	const uint32_t n_blocks = 1 + check_below(c, 2 * CULL_BATCH), most = n_blocks < CULL_BATCH ? n_blocks : CULL_BATCH;
+	batch(c, n_blocks, 1 + check_below(c, most), check_below(c, 4) != 0, is_spoilt);
+}
+
+static void random_blocks(struct check *c)
+{
+	random_batch(c, 0);
+}
+
+static void spoilt_numbers(struct check *c)
+{
+	random_batch(c, 1);
+}
+
+static void bench_cones(struct check *c)
+{
+	batch(c, CULL_BATCH, CULL_BATCH, 1, 0);
+}
+
+static void bench_frustum(struct check *c)
+{
+	batch(c, CULL_BATCH, CULL_BATCH, 0, 0);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct check_test tests[] = {
+		{ "cull: random blocks and views", random_blocks, 3000, NULL },
+		{ "cull: infinite, huge, denormal and no numbers", spoilt_numbers, 3000, NULL },
+		{ "cull, frustum", bench_frustum, 0, "block" },
+		{ "cull, frustum and cones", bench_cones, 0, "block" },
+	};
+	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
+}

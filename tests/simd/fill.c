@@ -1,0 +1,135 @@
+/* fill_pull, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty ones, and outside of the
+ * picture. */
+#include <math.h>
+#include <string.h>
+#include "base/maths.h"
+#include "tests/simd/lib/check.h"
+
+/* n cells, and `around` more on each side. */
+static struct fill_row random_row(struct check *c, uint32_t n, uint32_t around, int is_output, int has_colors,
+                                  int is_spoilt)
+{
+	void *(*buffer)(struct check *, size_t, size_t) = is_output ? check_out : check_in;
+	const uint32_t all = n + 2 * around;
+	struct fill_row row = { .weight = buffer(c, all, 2), .z = buffer(c, all, 4) };
+	if (has_colors) {
+		row.r = (uint16_t *)buffer(c, all, 2) + around;
+		row.g = (uint16_t *)buffer(c, all, 2) + around;
+		row.b = (uint16_t *)buffer(c, all, 2) + around;
+	}
+	const float far = (float)check_real(c, 0.5, 1);
+	for (uint32_t i = 0; i < all; i++) {
+		const uint32_t kind = check_below(c, 5);
+		row.weight[i] = (uint16_t)(kind == 0 ? 0 : kind < 3 ? GAPS_WHOLE : check_below(c, GAPS_WHOLE + 1));
+		row.z[i] = kind == 0 ? INFINITY : check_one_in(c, 3) ? far : (float)check_real(c, 0.5, 0.52);
+		if (check_one_in(c, 40)) {
+			row.weight[i] = GAPS_WHOLE;
+			row.z[i] = NAN;
+		}
+		if (is_spoilt && check_one_in(c, 5))
+			row.z[i] = fabsf(check_float(c));
+	}
+	row.weight += around;
+	row.z += around;
+	return row;
+}
+
+static void pull(struct check *c, uint32_t n, int has_colors, int is_picture, int is_spoilt)
+{
+	const struct fill_row to = random_row(c, n, 0, 1, has_colors, 0);
+	const struct fill_row upper = random_row(c, 2 * n, 0, 0, has_colors, is_spoilt);
+	const struct fill_row lower = random_row(c, 2 * n, 0, 0, has_colors, is_spoilt);
+	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
+	check_units(c, n);
+	while (check_next(c)) {
+		check_result(c, c->simd->fill_pull(&to, &upper, &lower, n, is_picture, scale, offset));
+		if (!c->is_bench)
+			check_settle(to.z, n);
+	}
+}
+
+static void random_pull(struct check *c)
+{
+	pull(c, 1 + check_below(c, FILL_WIDTH), check_below(c, 4) != 0, (int)check_below(c, 2), 0);
+}
+
+static void spoilt_pull(struct check *c)
+{
+	pull(c, 1 + check_below(c, FILL_WIDTH), check_below(c, 4) != 0, (int)check_below(c, 2), 1);
+}
+
+static void bench_pull(struct check *c)
+{
+	pull(c, FILL_WIDTH, 1, 1, 0);
+}
+
+static void push(struct check *c, uint32_t n, int is_picture, int is_spoilt)
+{
+	const struct fill_row to = random_row(c, 2 * n, 0, 1, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
+	const struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt), beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
+	check_units(c, 2 * n);
+	while (check_next(c)) {
+		if (is_picture)
+			c->simd->fill_push_picture(&to, &was, &own, &beside, n, scale, offset);
+		else
+			c->simd->fill_push(&to, &own, &beside, n, scale, offset);
+		if (!c->is_bench)
+			check_settle(to.z, 2 * (size_t)n);
+	}
+}
+
+static void random_push(struct check *c)
+{
+	push(c, 1 + check_below(c, FILL_WIDTH), 0, 0);
+}
+
+static void spoilt_push(struct check *c)
+{
+	push(c, 1 + check_below(c, FILL_WIDTH), 0, 1);
+}
+
+static void random_push_picture(struct check *c)
+{
+	push(c, 1 + check_below(c, FILL_WIDTH), 1, (int)check_below(c, 2));
+}
+
+static void bench_push(struct check *c)
+{
+	push(c, FILL_WIDTH, 1, 0);
+}
+
+static void depths(struct check *c, uint32_t n)
+{
+	uint64_t *word = check_in(c, n, sizeof *word);
+	float *z = check_out(c, n, sizeof *z);
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->fill_depths(z, word, n);
+}
+
+static void random_depths(struct check *c)
+{
+	depths(c, 1 + check_below(c, 2 * FILL_WIDTH));
+}
+
+static void bench_depths(struct check *c)
+{
+	depths(c, 2 * FILL_WIDTH);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct check_test tests[] = {
+		{ "fill_pull: random cells", random_pull, 2000, NULL },
+		{ "fill_pull: infinite, huge, denormal and no numbers", spoilt_pull, 2000, NULL },
+		{ "fill_push: random cells", random_push, 2000, NULL },
+		{ "fill_push: infinite, huge, denormal and no numbers", spoilt_push, 2000, NULL },
+		{ "fill_push_picture: random and spoilt pixels", random_push_picture, 2000, NULL },
+		{ "fill_depths: any words", random_depths, 500, NULL },
+		{ "fill_pull, from the picture", bench_pull, 0, "cell" },
+		{ "fill_push_picture", bench_push, 0, "cell" },
+		{ "fill_depths", bench_depths, 0, "pixel" },
+	};
+	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
+}

@@ -1,0 +1,53 @@
+#include <string.h>
+#include "tests/simd/lib/blocks.h"
+
+#define DEPTH_PADDING 64 /* what psr/model.h promises beyond the last depth */
+
+/* Of the given number of bits, wherever they are: runs, rows and scattered ones. */
+static uint64_t random_mask(struct check *c, uint32_t n)
+{
+	uint64_t mask = 0;
+	if (n == 64)
+		return ~UINT64_C(0);
+	for (uint32_t at = check_below(c, 64); (uint32_t)__builtin_popcountll(mask) < n; at = (at + 1) % 64) {
+		mask |= UINT64_C(1) << at;
+		if (check_one_in(c, 3))
+			at = check_below(c, 64);
+	}
+	return mask;
+}
+
+void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections, uint32_t n_samples)
+{
+	const uint32_t n_runs = (n_blocks + PSR_RUN_BLOCKS - 1) / PSR_RUN_BLOCKS;
+	struct psr_run *run = check_in(c, n_runs, sizeof *run);
+	uint8_t *projection = check_in(c, n_blocks, 1), *flags = check_in(c, n_blocks, 1), *shift = check_in(c, n_blocks, 1);
+	int16_t *col = check_in(c, n_blocks, 2), *row = check_in(c, n_blocks, 2), *bias = check_in(c, n_blocks, 2);
+	uint16_t *offset = check_in(c, n_blocks, 2);
+	uint64_t *mask = check_in(c, n_blocks, 8);
+	uint32_t n = 0;
+
+	for (uint32_t b = 0; b < n_blocks; b++) {
+		const uint32_t level = check_one_in(c, 4) ? check_below(c, 32) : check_below(c, 3);
+		projection[b] = (uint8_t)check_below(c, n_projections);
+		flags[b] = (uint8_t)(level | (check_below(c, 2) ? PSR_BLOCK_TWO_SIDED : 0));
+		shift[b] = (uint8_t)(PSR_DEPTH_SHIFT_MIN + check_below(c, PSR_DEPTH_SHIFT_MAX - PSR_DEPTH_SHIFT_MIN + 1));
+		if (!check_one_in(c, 8)) { /* else anywhere */
+			col[b] = (int16_t)((int)check_below(c, 8) - 4);
+			row[b] = (int16_t)((int)check_below(c, 8) - 4);
+		}
+		if (b % PSR_RUN_BLOCKS == 0)
+			run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = n };
+		offset[b] = (uint16_t)(n - run[b / PSR_RUN_BLOCKS].attr_first);
+		mask[b] = random_mask(c, n_samples ? n_samples : check_one_in(c, 3) ? 64 : 1 + check_below(c, 64));
+		n += (uint32_t)__builtin_popcountll(mask[b]);
+	}
+	*blocks = (struct psr_blocks){
+		.n_blocks = n_blocks, .n_projections = n_projections, .n_samples = n, .run = run, .block_projection = projection,
+		.col = col, .row = row, .flags = flags, .depth_bias = bias, .depth_shift = shift, .mask = mask,
+		.sphere_x = check_in(c, n_blocks, 2), .sphere_y = check_in(c, n_blocks, 2), .sphere_z = check_in(c, n_blocks, 2),
+		.sphere_r = check_in(c, n_blocks, 2), .cone_x = check_in(c, n_blocks, 1), .cone_y = check_in(c, n_blocks, 1),
+		.cone_z = check_in(c, n_blocks, 1), .cone_sine = check_in(c, n_blocks, 1),
+		.attr_offset = offset, .depth = check_in(c, n + DEPTH_PADDING, 2), .attr = check_in(c, n, 8),
+	};
+}

@@ -1,0 +1,190 @@
+/* strip_light, strip_color, strip_write and depth_row: samples of 1 to STRIP pixels, lights of each kind, any numbers. */
+#include <math.h>
+#include <stddef.h>
+#include "base/maths.h"
+#include "tests/simd/lib/check.h"
+
+static void settle(struct strip *strip)
+{
+	check_settle(strip->px, (offsetof(struct strip, r) - offsetof(struct strip, px)) / sizeof(float));
+}
+
+static void random_samples(struct check *c, struct strip *strip, uint32_t n, int is_specular, int is_spoilt)
+{
+	strip->n = n;
+	strip->all = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		if (!is_specular)
+			strip->attr[i] &= ~(UINT64_C(0xffff) << 40);
+		strip->all |= strip->attr[i];
+	}
+	for (float *value = strip->px; value < strip->sr; value++)
+		*value = check_plain_or_any(c, is_spoilt, -1, 1);
+	for (uint32_t i = 0; i < STRIP; i++) {
+		strip->sr[i] = check_plain_or_any(c, is_spoilt, 0, 1);
+		strip->sg[i] = check_plain_or_any(c, is_spoilt, 0, 1);
+		strip->sb[i] = check_plain_or_any(c, is_spoilt, 0, 1);
+		strip->exponent[i] = (float)exp2(check_below(c, 256) / 16.0);
+	}
+	for (float *value = strip->lr; value < (float *)strip->r; value++)
+		*value = check_plain_or_any(c, is_spoilt, 0, 2);
+}
+
+static void light(struct check *c, uint32_t n, enum psr_light_kind kind, int is_specular, int is_spoilt)
+{
+	struct strip *strip = check_out(c, 1, sizeof *strip);
+	struct strip_light *to = check_in(c, 1, sizeof *to);
+
+	float *reaches = check_one_in(c, 2) && !c->is_bench ? check_in(c, n, sizeof *reaches) : NULL;
+
+	random_samples(c, strip, n, is_specular, is_spoilt);
+	for (uint32_t i = 0; reaches && i < n; i++)
+		reaches[i] = check_plain_or_any(c, is_spoilt, 0, 1);
+	to->kind = kind;
+	for (int k = 0; k < 3; k++) {
+		to->position[k] = check_plain_or_any(c, is_spoilt, -2, 2);
+		to->to_light[k] = check_plain_or_any(c, is_spoilt, -1, 1);
+		to->axis[k] = check_plain_or_any(c, is_spoilt, -1, 1);
+		to->color[k] = check_plain_or_any(c, is_spoilt, 0, 2);
+	}
+	to->cos_outer = check_plain_or_any(c, is_spoilt, -1, 1);
+	to->cos_inner = check_one_in(c, 4) ? to->cos_outer : check_plain_or_any(c, is_spoilt, (double)to->cos_outer, 1);
+	to->reference2 = check_one_in(c, 3) ? 0 : check_plain_or_any(c, is_spoilt, 0, 4);
+	if (check_one_in(c, 2)) { /* a light in a sample */
+		to->position[0] = strip->px[0];
+		to->position[1] = strip->py[0];
+		to->position[2] = strip->pz[0];
+	}
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->strip_light(strip, to, reaches);
+		if (!c->is_bench)
+			settle(strip);
+	}
+}
+
+static void random_light(struct check *c)
+{
+	light(c, 1 + check_below(c, STRIP), (enum psr_light_kind)check_below(c, 3), (int)check_below(c, 2), 0);
+}
+
+static void spoilt_light(struct check *c)
+{
+	light(c, 1 + check_below(c, STRIP), (enum psr_light_kind)check_below(c, 3), (int)check_below(c, 2), 1);
+}
+
+static void bench_sun(struct check *c)
+{
+	light(c, STRIP, PSR_LIGHT_DIRECTIONAL, 0, 0);
+}
+
+static void bench_sun_specular(struct check *c)
+{
+	light(c, STRIP, PSR_LIGHT_DIRECTIONAL, 1, 0);
+}
+
+static void bench_spot_specular(struct check *c)
+{
+	light(c, STRIP, PSR_LIGHT_SPOT, 1, 0);
+}
+
+static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
+{
+	struct strip *strip = check_out(c, 1, sizeof *strip);
+	random_samples(c, strip, n, is_specular, is_spoilt);
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->strip_color(strip);
+}
+
+static void random_color(struct check *c)
+{
+	color(c, 1 + check_below(c, STRIP), (int)check_below(c, 2), (int)check_below(c, 2));
+}
+
+static void bench_color(struct check *c)
+{
+	color(c, STRIP, 1, 0);
+}
+
+/* ---- write and depths ---- */
+
+static void write_pixels(struct check *c, uint32_t width, uint32_t height, int has_rgb, int has_linear)
+{
+	struct strip *strip = check_in(c, 1, sizeof *strip);
+	struct strip_target *to = check_in(c, 1, sizeof *to);
+	const size_t area = (size_t)width * height;
+
+	strip->x0 = STRIP * check_below(c, (width + STRIP - 1) / STRIP);
+	strip->y = check_below(c, height);
+	const uint32_t n = width - strip->x0 < STRIP ? width - strip->x0 : STRIP;
+	strip->n = 0;
+	for (uint32_t x = check_below(c, 3); x < n; x += check_one_in(c, 6) ? 1 + check_below(c, 40) : 1)
+		strip->x[strip->n++] = (uint16_t)x;
+	to->width = width;
+	to->srgb = check_in(c, 65536, 1);
+	to->rgb = has_rgb ? check_out(c, area, 3) : NULL;
+	to->r = has_linear ? check_out(c, area, 2) : NULL;
+	to->g = has_linear ? check_out(c, area, 2) : NULL;
+	to->b = has_linear ? check_out(c, area, 2) : NULL;
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->strip_write(strip, to, n);
+}
+
+static void random_write(struct check *c)
+{
+	const uint32_t kind = check_below(c, 3);
+	write_pixels(c, 1 + check_below(c, 3 * STRIP), 1 + check_below(c, 4), kind < 2, kind > 0);
+}
+
+static void bench_write(struct check *c)
+{
+	write_pixels(c, STRIP, 1, 1, 0);
+}
+
+static void depths(struct check *c, uint32_t n, int exponent)
+{
+	uint64_t *word = check_in(c, n, sizeof *word);
+	float *depth = check_out(c, n, sizeof *depth);
+	for (uint32_t i = 0; i < n; i++) {
+		const float z = c->is_bench ? (float)check_real(c, 0.1, 1) : fabsf(check_float(c));
+		word[i] = (uint64_t)psr_bits_from_float(z) << 32 | check_u32(c);
+		if (check_one_in(c, 4))
+			word[i] = PSR_WORD_EMPTY;
+	}
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->depth_row(depth, word, n, exponent);
+		if (!c->is_bench)
+			check_settle(depth, n);
+	}
+}
+
+static void random_depths(struct check *c)
+{
+	depths(c, 1 + check_below(c, 700), (int)check_below(c, 900) - 450);
+}
+
+static void bench_depths(struct check *c)
+{
+	depths(c, 1024, 3);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct check_test tests[] = {
+		{ "strip_light: random lights", random_light, 2000, NULL },
+		{ "strip_light: infinite, huge, denormal and no numbers", spoilt_light, 2000, NULL },
+		{ "strip_color: random samples", random_color, 1000, NULL },
+		{ "strip_write: random rows", random_write, 1000, NULL },
+		{ "depth_row: any depths and exponents", random_depths, 1000, NULL },
+		{ "strip_light, directional", bench_sun, 0, "sample" },
+		{ "strip_light, directional, highlights", bench_sun_specular, 0, "sample" },
+		{ "strip_light, spot, highlights", bench_spot_specular, 0, "sample" },
+		{ "strip_color, highlights", bench_color, 0, "sample" },
+		{ "strip_write, 8 bits", bench_write, 0, "pixel" },
+		{ "depth_row", bench_depths, 0, "pixel" },
+	};
+	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
+}

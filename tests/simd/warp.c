@@ -1,0 +1,301 @@
+/* warp, warp_clear and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
+#include <math.h>
+#include <string.h>
+#include "base/maths.h"
+#include "psr/direction.h"
+#include "tests/simd/lib/blocks.h"
+
+#define MAX_INSTANCES 3
+#define MAX_PROJECTIONS 4
+
+enum numbers { PLAIN, SPOILT, EDGES };
+
+struct picture {
+	uint32_t width, height, levels;
+	struct warp_target target;
+};
+
+static uint32_t random_side(struct check *c, uint32_t tile)
+{
+	static const uint32_t odd[] = { 1, 2, 3, 15, 16, 17, 31, 33, 64, 127 };
+	if (check_one_in(c, 2))
+		return odd[check_below(c, sizeof odd / sizeof odd[0])] + (check_one_in(c, 3) ? tile : 0);
+	return 1 + check_below(c, 2 * tile);
+}
+
+/* Depths as they are while a tile is drawn: nothing, or something nearer. */
+static float random_depth(struct check *c)
+{
+	if (check_one_in(c, 3))
+		return INFINITY;
+	return (float)check_real(c, 0, 2);
+}
+
+/* Any tile of a picture, as render/warp.c makes it. */
+static void make_picture(struct check *c, struct picture *p, uint32_t width, uint32_t height, uint32_t levels)
+{
+	struct warp_target *t = &p->target;
+	const uint32_t tiles_x = (width + TILE_WIDTH - 1) / TILE_WIDTH, tiles_y = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+	const uint32_t tx = check_below(c, tiles_x), ty = check_below(c, tiles_y);
+	const int is_last_x = tx + 1 == tiles_x, is_last_y = ty + 1 == tiles_y;
+
+	memset(p, 0, sizeof *p);
+	p->width = width;
+	p->height = height;
+	p->levels = levels & 0xfe;
+	t->direction = psr_direction_tens();
+	t->stride = width;
+	t->x0 = (int32_t)(tx * TILE_WIDTH);
+	t->y0 = (int32_t)(ty * TILE_HEIGHT);
+	t->x1 = is_last_x ? (int32_t)width : t->x0 + TILE_WIDTH;
+	t->y1 = is_last_y ? (int32_t)height : t->y0 + TILE_HEIGHT;
+	t->word = check_out(c, (size_t)width * height, sizeof *t->word);
+	for (size_t i = 0; i < (size_t)width * height; i++)
+		t->word[i] = (uint64_t)psr_bits_from_float(random_depth(c)) << 32 | check_u32(c);
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		if (!(p->levels >> k & 1))
+			continue;
+		struct warp_cells *cells = &t->cells[k];
+		const uint32_t side = 1u << k, cells_x = (width + side - 1) / side + 2, cells_y = (height + side - 1) / side + 2;
+		cells->stride = cells_x;
+		cells->x0 = tx ? t->x0 : -(1 << k);
+		cells->y0 = ty ? t->y0 : -(1 << k);
+		cells->x1 = is_last_x ? (int32_t)(cells_x - 1) << k : t->x1;
+		cells->y1 = is_last_y ? (int32_t)(cells_y - 1) << k : t->y1;
+		cells->first = (uint32_t)((cells->y0 >> k) + 1) * cells_x + (uint32_t)((cells->x0 >> k) + 1);
+		cells->z = check_out(c, (size_t)cells_x * cells_y, sizeof *cells->z);
+		for (size_t i = 0; i < (size_t)cells_x * cells_y; i++)
+			cells->z[i] = random_depth(c);
+	}
+}
+
+static void random_picture(struct check *c, struct picture *p)
+{
+	make_picture(c, p, random_side(c, TILE_WIDTH), random_side(c, TILE_HEIGHT), check_u32(c) & check_u32(c));
+}
+
+static void complete_lattice(struct warp_lattice *lattice)
+{
+	for (int a = 0; a < 3; a++)
+		for (int i = 0; i < 8; i++) {
+			lattice->row[a][i] = i * lattice->down[a] + (i & 1) * 0.5 * lattice->step[a];
+			lattice->col[a][i] = (float)(i * lattice->step[a]);
+		}
+}
+
+/* A sample's step is `step` pixels, and the lattice lies in the tile or near it, before the eye or on both sides of it. */
+static void random_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t, double step)
+{
+	const double u = check_real(c, t->x0 - 20, t->x1 + 20), v = check_real(c, t->y0 - 20, t->y1 + 20);
+	const double z = check_real(c, check_one_in(c, 4) ? -0.1 : 0.3, 1), scale = t->perspective ? z : 1;
+	const double turn = check_real(c, 0, 6.28), across = cos(turn) * step * scale, down = sin(turn) * step * scale;
+
+	*lattice = (struct warp_lattice){
+		.origin = { u * scale, v * scale, z }, .step = { across, down, check_real(c, -0.01, 0.01) },
+		.down = { -down, across, check_real(c, -0.01, 0.01) },
+		.along = { check_real(c, -30, 30), check_real(c, -30, 30), check_real(c, -0.3, 0.3) },
+	};
+	complete_lattice(lattice);
+}
+
+/* Numbers that no lattice should have, here and there. */
+static void spoil_lattice(struct check *c, struct warp_lattice *lattice)
+{
+	for (int a = 0; a < 3; a++) {
+		double *one[] = { &lattice->origin[a], &lattice->step[a], &lattice->down[a], &lattice->along[a] };
+		for (int i = 0; i < 4; i++)
+			if (check_one_in(c, 6))
+				*one[i] = (double)check_float(c) * (check_one_in(c, 8) ? 0x1p1000 : 1);
+		for (int i = 0; i < 8; i++) {
+			if (check_one_in(c, 12))
+				lattice->row[a][i] = (double)check_float(c) * (check_one_in(c, 8) ? 0x1p-1000 : 1);
+			if (check_one_in(c, 12))
+				lattice->col[a][i] = check_float(c);
+		}
+	}
+}
+
+/* Samples on the very edges: of pixels, cells and tiles, and at near_z itself. */
+static void edge_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t)
+{
+	const double x = check_one_in(c, 2) ? t->x0 : t->x1, y = check_one_in(c, 2) ? t->y0 : t->y1;
+	const double z = check_one_in(c, 2) ? (double)t->near_z : exp2(check_below(c, 3));
+	const double step = exp2((double)check_below(c, 4) - 2);
+	const double scale = t->perspective ? z : 1;
+	*lattice = (struct warp_lattice){
+		.origin = { (x - 4 * step) * scale, (y - 4 * step) * scale, z },
+		.step = { step * scale, 0, 0 }, .down = { 0, step * scale, 0 },
+	};
+	complete_lattice(lattice);
+}
+
+static void random_sight(struct check *c, struct warp_instance *in, const struct warp_target *t, int is_spoilt)
+{
+	for (int k = 0; k < 3; k++) {
+		in->du[k] = t->perspective ? (float)check_real(c, -0.01, 0.01) : 0;
+		in->dv[k] = t->perspective ? (float)check_real(c, -0.01, 0.01) : 0;
+		in->d0[k] = (float)check_real(c, -1, 1);
+		if (is_spoilt && check_one_in(c, 6))
+			in->du[k] = check_float(c);
+		if (is_spoilt && check_one_in(c, 6))
+			in->d0[k] = check_float(c);
+	}
+}
+
+static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step,
+                        enum numbers numbers)
+{
+	struct warp_target *t = &p->target;
+	const uint32_t n_instances = 1 + check_below(c, MAX_INSTANCES);
+	struct warp_instance *instance = check_in(c, n_instances, sizeof *instance);
+	struct bin_entry *entry = check_in(c, n_entries, sizeof *entry);
+	struct psr_blocks blocks;
+
+	t->instance = instance;
+	t->perspective = check_one_in(c, 4) ? 0 : 1;
+	t->near_z = numbers == SPOILT && check_one_in(c, 3) ? fabsf(check_float(c)) : 0x1p-14f;
+	t->near_z = t->near_z > 0 ? t->near_z : 0x1p-149f;
+	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS, n_samples);
+	const uint32_t last_slot = (1u << 26) - 1 - n_instances * blocks.n_blocks;
+	const uint32_t first_slot = check_one_in(c, 3) ? last_slot : check_below(c, last_slot);
+	for (uint32_t i = 0; i < n_instances; i++) {
+		struct warp_lattice *lattice = check_in(c, MAX_PROJECTIONS, sizeof *lattice);
+		for (int k = 0; k < MAX_PROJECTIONS; k++) {
+			if (numbers == EDGES)
+				edge_lattice(c, &lattice[k], t);
+			else
+				random_lattice(c, &lattice[k], t, step);
+			if (numbers == SPOILT)
+				spoil_lattice(c, &lattice[k]);
+		}
+		instance[i].blocks = &blocks;
+		instance[i].lattice = lattice;
+		instance[i].first_slot = first_slot + i * blocks.n_blocks;
+		random_sight(c, &instance[i], t, numbers == SPOILT);
+	}
+	for (uint32_t e = 0; e < n_entries; e++) {
+		const uint32_t i = check_below(c, n_instances);
+		int level = (int)check_below(c, PSR_MAX_DEPTH_LEVEL + 1);
+		while (level && !(p->levels >> level & 1))
+			level--;
+		entry[e] = (struct bin_entry){ .slot = instance[i].first_slot + check_below(c, blocks.n_blocks), .instance = (uint16_t)i,
+			                       .level = (uint8_t)level, .is_mixed = (uint8_t)check_below(c, 2) };
+	}
+	check_units(c, (uint64_t)n_entries * n_samples);
+	while (check_next(c))
+		check_result(c, c->simd->warp(t, entry, n_entries));
+}
+
+static void random_blocks(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	warp_blocks(c, &p, check_below(c, 30), 0, exp2(check_real(c, -8, 6)), PLAIN);
+}
+
+static void blocks_of_each_count(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	warp_blocks(c, &p, 1, 1 + (uint32_t)c->trial / 2 % 64, exp2(check_real(c, -3, 2)), PLAIN);
+}
+
+static void spoilt_numbers(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	warp_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -8, 6)), SPOILT);
+}
+
+static void edges(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	warp_blocks(c, &p, 1 + check_below(c, 12), 0, 1, EDGES);
+}
+
+/* One-row and one-column tiles: a variant has less room there than it has lanes. */
+static void narrow_tiles(struct check *c)
+{
+	struct picture p;
+	const uint32_t w = check_one_in(c, 2) ? 1 + check_below(c, 17) : TILE_WIDTH + 1 + check_below(c, 17);
+	make_picture(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
+	warp_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -3, 3)), PLAIN);
+}
+
+static void random_clear(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	while (check_next(c))
+		c->simd->warp_clear(&p.target, p.levels);
+}
+
+static void random_far(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	const uint32_t rows = (uint32_t)(p.target.y1 - p.target.y0 + FAR_SIDE - 1) / FAR_SIDE;
+	uint32_t *far = check_out(c, rows * (TILE_WIDTH / FAR_SIDE), sizeof *far);
+	while (check_next(c))
+		c->simd->warp_far(&p.target, far);
+}
+
+static void bench_full_blocks(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	warp_blocks(c, &p, 400, 64, 0.7, PLAIN);
+}
+
+static void bench_thirds(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	warp_blocks(c, &p, 1200, 21, 0.7, PLAIN);
+}
+
+static void bench_levels(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1 | 1 << 2);
+	warp_blocks(c, &p, 400, 64, 2, PLAIN);
+}
+
+static void bench_far(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	uint32_t *far = check_out(c, TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE), sizeof *far);
+	check_units(c, TILE_WIDTH * TILE_HEIGHT);
+	while (check_next(c))
+		c->simd->warp_far(&p.target, far);
+}
+
+static void bench_clear(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
+	check_units(c, TILE_WIDTH * TILE_HEIGHT);
+	while (check_next(c))
+		c->simd->warp_clear(&p.target, p.levels);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct check_test tests[] = {
+		{ "warp: random blocks, tiles and levels", random_blocks, 1500, NULL },
+		{ "warp: blocks of 1 to 64 samples", blocks_of_each_count, 512, NULL },
+		{ "warp: infinite, huge, denormal and no numbers", spoilt_numbers, 1500, NULL },
+		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
+		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "warp_clear: random tiles and levels", random_clear, 400, NULL },
+		{ "warp_far: random tiles", random_far, 400, NULL },
+		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
+		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
+		{ "warp, full blocks, depth levels 1 and 2", bench_levels, 0, "sample" },
+		{ "warp_clear, a tile", bench_clear, 0, "pixel" },
+		{ "warp_far, a tile", bench_far, 0, "pixel" },
+	};
+	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
+}
