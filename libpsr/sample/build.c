@@ -170,6 +170,11 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 	rc = make_levels(build);
 	if (rc == PSR_OK && draft_group(&build->draft, build->pool) != PSR_OK)
 		rc = psr_fail(build->err, PSR_ERR_MEMORY, "no memory to cut the model into clusters");
+	if (rc == PSR_OK) {
+		rc = draft_join(&build->draft);
+		if (rc != PSR_OK)
+			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
+	}
 	if (rc == PSR_OK)
 		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
 	return rc;
