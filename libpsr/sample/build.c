@@ -17,7 +17,6 @@
 #define MOST_RESOLUTION 8192
 #define MOST_TOLERANCE 1.0471975511965979 /* 60 degrees, and a rounding more */
 #define MOST_THREADS 256
-#define MOST_LEVELS 8
 #define LEAST_LEVEL_RESOLUTION 64
 
 struct build {
@@ -70,7 +69,7 @@ static unsigned count_levels(uint32_t resolution)
 {
 	unsigned n = 1;
 
-	while (n < MOST_LEVELS && resolution >> n >= LEAST_LEVEL_RESOLUTION)
+	while (n < PSR_MAX_LEVELS && resolution >> n >= LEAST_LEVEL_RESOLUTION)
 		n++;
 	return n;
 }
