@@ -8,7 +8,6 @@
 #include "psr/model.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
-#define MAX_LEVELS (PSR_BLOCK_LEVEL + 1)
 
 /* What both forms of the answer say. */
 struct summary {
@@ -19,8 +18,8 @@ struct summary {
 	uint64_t bytes, file_bytes;
 	int is_packed;
 	const struct psr_presets *presets;
-	uint32_t level_blocks[MAX_LEVELS];
-	uint64_t level_samples[MAX_LEVELS];
+	uint32_t level_blocks[PSR_MAX_LEVELS];
+	uint64_t level_samples[PSR_MAX_LEVELS];
 };
 
 static void take_name(char name[256], const char *path)
@@ -132,7 +131,7 @@ static void print_text(const struct summary *s)
 	printf("clusters          %" PRIu32 "\n", blocks->n_clusters);
 	printf("levels            %" PRIu32 "\n", blocks->n_levels);
 	if (blocks->n_levels > 1) {
-		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+		for (uint32_t l = 0; l < blocks->n_levels; l++)
 			printf("  level %-3" PRIu32 "       %" PRIu64 " samples in %" PRIu32 " blocks\n", l, s->level_samples[l],
 			       s->level_blocks[l]);
 	}
@@ -201,10 +200,10 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		cJSON_AddNumberToObject(part, "file_bytes_per_sample", ratio((double)s->file_bytes, (double)blocks->n_samples));
 		cJSON_AddNumberToObject(part, "samples_per_block", ratio((double)blocks->n_samples, blocks->n_blocks));
 		counts = cJSON_AddArrayToObject(part, "level_blocks");
-		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+		for (uint32_t l = 0; l < blocks->n_levels; l++)
 			cJSON_AddItemToArray(counts, cJSON_CreateNumber(s->level_blocks[l]));
 		counts = cJSON_AddArrayToObject(part, "level_samples");
-		for (uint32_t l = 0; l < blocks->n_levels && l < MAX_LEVELS; l++)
+		for (uint32_t l = 0; l < blocks->n_levels; l++)
 			cJSON_AddItemToArray(counts, cJSON_CreateNumber((double)s->level_samples[l]));
 	}
 	return json_print(root, err);

@@ -22,7 +22,6 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 
 #define MODEL_MAX_BLOCKS ((uint32_t)1 << 26)
 #define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 8)
-#define MODEL_MAX_LEVELS 32
 #define MODEL_MAX_COORDINATE 1024.0f /* magnitude of any length or coordinate inside of a model */
 
 /* Byte offsets in the header, and in an entry of the table. */
@@ -51,7 +50,7 @@ struct section_spec {
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
-#define N_KNOWN_SECTIONS 27
+#define N_KNOWN_SECTIONS 26
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 

@@ -88,8 +88,8 @@ static int check_counts(const struct checker *c)
 		            MODEL_MAX_PROJECTIONS);
 	if (b->n_clusters == 0 || b->n_clusters > b->n_blocks)
 		return fail(c, "BLKS", "%" PRIu32 " clusters; it must be 1 to the number of blocks", b->n_clusters);
-	if (b->n_levels == 0 || b->n_levels > MODEL_MAX_LEVELS)
-		return fail(c, "BLKS", "%" PRIu32 " levels; it must be 1 to %d", b->n_levels, MODEL_MAX_LEVELS);
+	if (b->n_levels == 0 || b->n_levels > PSR_MAX_LEVELS)
+		return fail(c, "BLKS", "%" PRIu32 " levels; it must be 1 to %d", b->n_levels, PSR_MAX_LEVELS);
 	if (b->n_masks > b->n_blocks)
 		return fail(c, "BLKS", "%" PRIu32 " visibility masks; it must be at most one a block", b->n_masks);
 	return PSR_OK;
@@ -179,11 +179,6 @@ static int check_heads(const struct checker *c)
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
 			            b->n_projections);
-		if ((b->flags[i] & ~(PSR_BLOCK_LEVEL | PSR_BLOCK_TWO_SIDED)) != 0)
-			return fail(c, "BFLG", "block %" PRIu32 " has unknown flags %#x", i, b->flags[i]);
-		if (b->depth_shift[i] < PSR_DEPTH_SHIFT_MIN || b->depth_shift[i] > PSR_DEPTH_SHIFT_MAX)
-			return fail(c, "DSHF", "the depth step of block %" PRIu32 " is 2^-%d; it must be 2^-%d to 2^-%d", i,
-			            b->depth_shift[i], PSR_DEPTH_SHIFT_MIN, PSR_DEPTH_SHIFT_MAX);
 		if (b->mask[i] == 0)
 			return fail(c, "MASK", "block %" PRIu32 " has no valid sample", i);
 		if (i % PSR_RUN_BLOCKS == 0 && b->run[i / PSR_RUN_BLOCKS].attr_first != n_samples)

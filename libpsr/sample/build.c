@@ -17,7 +17,6 @@
 #define MOST_RESOLUTION 8192
 #define MOST_TOLERANCE 1.0471975511965979 /* 60 degrees, and a rounding more */
 #define MOST_THREADS 256
-#define MOST_LEVELS 8
 #define LEAST_LEVEL_RESOLUTION 64
 
 struct build {
@@ -70,7 +69,7 @@ static unsigned count_levels(uint32_t resolution)
 {
 	unsigned n = 1;
 
-	while (n < MOST_LEVELS && resolution >> n >= LEAST_LEVEL_RESOLUTION)
+	while (n < PSR_MAX_LEVELS && resolution >> n >= LEAST_LEVEL_RESOLUTION)
 		n++;
 	return n;
 }
@@ -170,6 +169,11 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 	rc = make_levels(build);
 	if (rc == PSR_OK && draft_group(&build->draft, build->pool) != PSR_OK)
 		rc = psr_fail(build->err, PSR_ERR_MEMORY, "no memory to cut the model into clusters");
+	if (rc == PSR_OK) {
+		rc = draft_join(&build->draft);
+		if (rc != PSR_OK)
+			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
+	}
 	if (rc == PSR_OK)
 		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
 	return rc;

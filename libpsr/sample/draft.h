@@ -42,6 +42,11 @@ int draft_add(struct draft *draft, const struct level *level);
  * threads. MEMORY. */
 int draft_group(struct draft *draft, struct psr_pool *pool);
 
+/* join.c: makes one block of all that have the same level, group, projection and place on the lattice, are seen from as many sides,
+ * and have no lattice point in common, as long as it is not too deep: sheets that were apart when all of their hits were
+ * there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
+int draft_join(struct draft *draft);
+
 /* Inner coordinates of sample s of a block. */
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);
 

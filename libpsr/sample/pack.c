@@ -29,7 +29,7 @@ struct pack {
 	int16_t *center[3];
 	uint16_t *radius;
 	int8_t *cone[3];
-	uint8_t *cone_sine, *block_projection, *flags, *depth_shift;
+	uint8_t *cone_sine, *block_projection, *flags;
 	uint16_t *attr_offset, *depth;
 	int16_t *col, *row, *depth_bias;
 	uint64_t *mask, *attr;
@@ -117,11 +117,11 @@ static void sort_blocks(struct pack *pack)
 static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min, double max)
 {
 	double bias = floor(min * 0x1p14), range = max - bias * 0x1p-14;
-	unsigned shift = PSR_DEPTH_SHIFT_MAX;
+	unsigned shift = 14 + (PSR_BLOCK_DEPTH >> 3);
 
 	while (range * (double)(1u << shift) > UINT16_MAX)
 		shift--;
-	assert(fabs(bias) <= INT16_MAX && shift >= PSR_DEPTH_SHIFT_MIN);
+	assert(fabs(bias) <= INT16_MAX && shift >= 14);
 	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 
@@ -129,7 +129,7 @@ static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct dr
 		pack->attr[at] = sample->attr;
 	}
 	pack->depth_bias[i] = (int16_t)bias;
-	pack->depth_shift[i] = (uint8_t)shift;
+	pack->flags[i] |= (uint8_t)((shift - 14) << 3);
 }
 
 /* Around the middle of the box, rounded; through the samples as they will be read back, and half a step beyond.
@@ -142,7 +142,7 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
                         const double max[3])
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
-	const struct psr_blocks depths = { .depth_bias = pack->depth_bias, .depth_shift = pack->depth_shift };
+	const struct psr_blocks depths = { .depth_bias = pack->depth_bias, .flags = pack->flags };
 	double middle[3], radius = 0;
 	float bias, step;
 
@@ -204,7 +204,7 @@ static void place_block(struct pack *pack, uint32_t i, const struct draft_block 
 	pack->block_projection[i] = block->projection;
 	pack->col[i] = block->col;
 	pack->row[i] = block->row;
-	pack->flags[i] = block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0);
+	pack->flags[i] = (uint8_t)(block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
 	pack->mask[i] = block->part;
 	pack->attr_offset[i] = (uint16_t)(pack->n_samples - pack->run[i / PSR_RUN_BLOCKS].attr_first);
 }
@@ -294,7 +294,6 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->radius, n_blocks);
 	ALLOC(pack->cone_sine, n_blocks);
 	ALLOC(pack->depth_bias, n_blocks);
-	ALLOC(pack->depth_shift, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
 	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
 	ALLOC(pack->col, n_blocks);
@@ -319,7 +318,6 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->radius);
 	psr_free(pack->cone_sine);
 	psr_free(pack->depth_bias);
-	psr_free(pack->depth_shift);
 	psr_free(pack->block_projection);
 	psr_free(pack->depth);
 	psr_free(pack->col);
@@ -382,7 +380,6 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.row = pack->row;
 	blocks.flags = pack->flags;
 	blocks.depth_bias = pack->depth_bias;
-	blocks.depth_shift = pack->depth_shift;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;

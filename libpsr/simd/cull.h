@@ -26,7 +26,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 	const struct cull_view v = *view;
 	const int16_t *sphere_x = b->sphere_x + first, *sphere_y = b->sphere_y + first, *sphere_z = b->sphere_z + first;
 	const uint16_t *sphere_r = b->sphere_r + first;
-	const uint8_t *flags = b->flags + first, *shift = b->depth_shift + first;
+	const uint8_t *flags = b->flags + first;
 	const float half_width = v.width / 2, half_height = v.height / 2;
 	const float most_x = v.width - 1, most_y = v.height - 1;
 	const int is_perspective = v.perspective;
@@ -67,7 +67,8 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		out->y0[i] = pixel_within(y0, most_y);
 		out->y1[i] = pixel_within(y1, most_y);
 		out->near[i] = front1 * (1 - 0x1p-16f);
-		out->depth_error[i] = stretch * v.scale * psr_float_from_bits((126u - shift[i]) << 23);
+		const uint32_t shift = 14u + ((uint32_t)(flags[i] & PSR_BLOCK_DEPTH) >> 3);
+		out->depth_error[i] = stretch * v.scale * psr_float_from_bits((126u - shift) << 23);
 	}
 	if (!b->cone_sine || !v.with_cones)
 		return;

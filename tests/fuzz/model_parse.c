@@ -25,7 +25,6 @@ static void check_rules(const struct psr_blocks *b)
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		REQUIRE(b->mask[i] != 0 && psr_blocks_attr_first(b, i) == n_samples);
 		REQUIRE(b->block_projection[i] < b->n_projections && psr_blocks_level(b, i) < b->n_levels);
-		REQUIRE(b->depth_shift[i] >= PSR_DEPTH_SHIFT_MIN && b->depth_shift[i] <= PSR_DEPTH_SHIFT_MAX);
 		REQUIRE(b->visibility_mask == NULL || psr_blocks_visibility(b, i) < b->n_masks);
 		REQUIRE(b->cone_x == NULL || (b->cone_x[i] | b->cone_y[i] | b->cone_z[i]) != 0); /* its length divides */
 		n_samples += (uint64_t)__builtin_popcountll(b->mask[i]);

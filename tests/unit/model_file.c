@@ -237,8 +237,6 @@ static void long_sections_are_hashed_by_the_megabyte(void **state)
 			((uint64_t *)arrays[k])[i] = 1;
 		for (uint32_t i = 0; i < n_blocks && memcmp(spec->type, "AOFF", 4) == 0; i++)
 			((uint16_t *)arrays[k])[i] = (uint16_t)(i % PSR_RUN_BLOCKS);
-		for (uint32_t i = 0; i < n_blocks && memcmp(spec->type, "DSHF", 4) == 0; i++)
-			((uint8_t *)arrays[k])[i] = PSR_DEPTH_SHIFT_MIN;
 	}
 	assert_int_equal(psr_model_create(&model, &fixture.info, &blocks, NULL, &err), PSR_OK);
 	bytes = model_image(model, &n_bytes);

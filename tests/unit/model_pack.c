@@ -102,8 +102,6 @@ static struct psr_model *many_blocks(uint32_t n, int noise)
 				((uint64_t *)arrays[k])[i] = 1;
 			else if (memcmp(spec->type, "AOFF", 4) == 0)
 				((uint16_t *)arrays[k])[i] = (uint16_t)(i % PSR_RUN_BLOCKS);
-			else if (memcmp(spec->type, "DSHF", 4) == 0)
-				((uint8_t *)arrays[k])[i] = PSR_DEPTH_SHIFT_MIN;
 			else if (noise && memcmp(spec->type, "DPTH", 4) == 0)
 				((uint16_t *)arrays[k])[i] = (uint16_t)(100 * i + (fixture_random(&state) & 7));
 			else if (noise && memcmp(spec->type, "ATTR", 4) == 0)

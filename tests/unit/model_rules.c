@@ -131,8 +131,8 @@ static const struct violation violations[] = {
 	{ "BLKS", 4, 4, 0, "PROJ at byte" },
 	{ "BLKS", 4, 4, UINT32_MAX, "PROJ at byte" },
 	{ "BLKS", 8, 4, 4, "CLUS at byte" },
-	{ "BLKS", 12, 4, 0, "BLKS: 0 levels; it must be 1 to 32" },
-	{ "BLKS", 12, 4, 33, "BLKS: 33 levels; it must be 1 to 32" },
+	{ "BLKS", 12, 4, 0, "BLKS: 0 levels; it must be 1 to 8" },
+	{ "BLKS", 12, 4, 9, "BLKS: 9 levels; it must be 1 to 8" },
 	{ "BLKS", 12, 4, 1, "CLUS: cluster 2 is of level 1 of 1" },
 	{ "BLKS", 16, 8, 142, "DPTH at byte" },
 	{ "BLKS", 16, 8, UINT64_MAX / 8 + 144, "BLKS: 2305843009213694095 samples do not fit 6 blocks" },
@@ -164,11 +164,7 @@ static const struct violation violations[] = {
 	{ "VISI", 4, 1, 3, "VISI: block 4 has visibility mask 3 of 3" },
 	{ "BPRJ", 3, 1, 2, "BPRJ: block 3 is of projection 2 of 2" },
 	{ "BFLG", 1, 1, 1, "BFLG: block 1 is of level 1, and its cluster 0 of level 0" },
-	{ "BFLG", 5, 1, 31, "BFLG: block 5 is of level 31, and its cluster 2 of level 1" },
-	{ "BFLG", 2, 1, 64, "BFLG: block 2 has unknown flags 0x40" },
-	{ "BFLG", 2, 1, 128, "BFLG: block 2 has unknown flags 0x80" },
-	{ "DSHF", 2, 1, 13, "DSHF: the depth step of block 2 is 2^-13; it must be 2^-14 to 2^-30" },
-	{ "DSHF", 2, 1, 31, "DSHF: the depth step of block 2 is 2^-31; it must be 2^-14 to 2^-30" },
+	{ "BFLG", 5, 1, 255, "BFLG: block 5 is of level 7, and its cluster 2 of level 1" },
 	{ "MASK", 24, 8, 0, "MASK: block 3 has no valid sample" },
 	{ "MASK", 24, 8, 1, "AOFF: the attributes of block 4 begin at 99 instead of 98" },
 	{ "MASK", 40, 8, UINT64_MAX, "MASK: 171 samples are valid, and BLKS counts 143" },
@@ -199,7 +195,7 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 {
 	static const struct violation edges[] = {
 		{ "INFO", 88, 8, 0, NULL },             /* tolerance 0 */
-		{ "BLKS", 12, 4, 32, NULL },            /* levels that are not used */
+		{ "BLKS", 12, 4, 8, NULL },            /* levels that are not used */
 		{ "PROJ", 0, 4, 0x3f800001, NULL },     /* an axis of 1 + 2^-23 */
 		{ "PROJ", 36, 4, 0x44800000, NULL },    /* spacing 1024 */
 		{ "CLUS", 12, 4, 0, NULL },             /* radius 0 */
@@ -209,8 +205,8 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "SPHR", 0, 2, 0xffff, NULL },
 		{ "SPHR", 0, 2, 0, NULL },
 		{ "DBIA", 0, 2, 0x8000, NULL },         /* depth -2 */
-		{ "DSHF", 0, 1, 14, NULL },
-		{ "DSHF", 0, 1, 30, NULL },
+		{ "BFLG", 0, 1, 0, NULL },              /* the greatest step, one-sided */
+		{ "BFLG", 0, 1, 0xf8, NULL },           /* the least, two-sided */
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
 	{ "INFO", 112, 8, 1000000, NULL },      /* all are missing */
 	{ "CAMS", 1, 4, 0xbfbf8ff4, NULL },     /* U+10FFFF, the last one */
@@ -345,8 +341,8 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 960 has 160 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "5184 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 896 has 160 bytes, which reach beyond the file's end" },
+		{ NULL, 28, 4, 1, "5056 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },

@@ -29,17 +29,16 @@ static int setup(void **state)
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
 	static const struct psr_run run;
 	static int16_t bias[MAX_CLUSTERS], x[MAX_CLUSTERS], y[MAX_CLUSTERS], z[MAX_CLUSTERS];
-	static uint16_t r[MAX_CLUSTERS];
-	static uint16_t depth[64 * MAX_CLUSTERS], offset[MAX_CLUSTERS];
+	static uint16_t depth[64 * MAX_CLUSTERS], offset[MAX_CLUSTERS], r[MAX_CLUSTERS];
 	static int16_t col[MAX_CLUSTERS], row[MAX_CLUSTERS];
-	static uint8_t number[MAX_CLUSTERS], flags[MAX_CLUSTERS], shift[MAX_CLUSTERS];
+	static uint8_t number[MAX_CLUSTERS], flags[MAX_CLUSTERS];
 	static uint64_t mask[MAX_CLUSTERS], attr[64 * MAX_CLUSTERS];
 	struct psr_model_info info = { .scale = 1, .box_min = { -1, -1, 0 }, .box_max = { 1, 1, 0 }, .spacing = (double)SPACING,
 		                           .tolerance = 0.4, .resolution = 1024, .builder = "test" };
 	struct psr_blocks blocks = { .n_projections = 1, .n_levels = LEVELS, .projection = &projection, .cluster = cluster,
 		                         .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z, .sphere_r = r,
 		                         .block_projection = number, .col = col, .row = row, .flags = flags, .depth_bias = bias,
-		                         .depth_shift = shift, .mask = mask, .attr_offset = offset, .depth = depth,
+		                         .mask = mask, .attr_offset = offset, .depth = depth,
 		                         .attr = attr };
 	uint32_t n = 0;
 
@@ -56,8 +55,7 @@ static int setup(void **state)
 			y[n] = (int16_t)(cluster[n].center[1] * 0x1p14f);
 			r[n] = (uint16_t)(cluster[n].radius * 0x1p15f);
 			col[n] = (int16_t)((g - 2) * 32 >> l);
-			flags[n] = (uint8_t)l;
-			shift[n] = PSR_DEPTH_SHIFT_MAX;
+			flags[n] = (uint8_t)(l | PSR_BLOCK_DEPTH);
 			mask[n] = UINT64_MAX;
 			offset[n] = (uint16_t)(64 * n);
 			for (int i = 0; i < 64; i++)

@@ -64,11 +64,10 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, .spacing = 1.0f / 64 };
 	static struct psr_cluster cluster = { .radius = 1, .n_blocks = PLATE_BLOCKS };
 	static int16_t x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS];
-	static uint16_t r[PLATE_BLOCKS];
 	static const struct psr_run run;
-	static uint16_t depth[PLATE_SAMPLES], offset[PLATE_BLOCKS];
+	static uint16_t depth[PLATE_SAMPLES], offset[PLATE_BLOCKS], r[PLATE_BLOCKS];
 	static int16_t col[PLATE_BLOCKS], row[PLATE_BLOCKS], bias[PLATE_BLOCKS];
-	static uint8_t number[PLATE_BLOCKS], flags[PLATE_BLOCKS], shift[PLATE_BLOCKS];
+	static uint8_t number[PLATE_BLOCKS], flags[PLATE_BLOCKS];
 	static uint64_t mask[PLATE_BLOCKS], attr[PLATE_SAMPLES];
 	struct psr_model_info info = {
 		.scale = 1, .box_min = { -0.5, -0.5, 0 }, .box_max = { 0.5, 0.5, 0 }, .spacing = 1.0 / 64, .tolerance = 0.4,
@@ -78,7 +77,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 		.n_blocks = PLATE_BLOCKS, .n_projections = 1, .n_clusters = 1, .n_levels = 1, .n_samples = PLATE_SAMPLES,
 		.projection = &projection, .cluster = &cluster, .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z,
 		.sphere_r = r, .block_projection = number, .col = col, .row = row, .flags = flags, .depth_bias = bias,
-		.depth_shift = shift, .mask = mask, .attr_offset = offset, .depth = depth, .attr = attr,
+		.mask = mask, .attr_offset = offset, .depth = depth, .attr = attr,
 	};
 	static const struct psr_preset_camera camera = { "front", { { 0, 0, 3 }, { 0, 0, 0 }, { 0, 1, 0 },
 		                                                        PSR_CAMERA_PERSPECTIVE, 0.5, 0, 0.25 } };
@@ -100,8 +99,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 		r[i] = (uint16_t)(side * 0x1p15f);
 		mask[i] = UINT64_MAX;
 		offset[i] = (uint16_t)(64 * i);
-		flags[i] = PSR_BLOCK_TWO_SIDED;
-		shift[i] = 20;
+		flags[i] = PSR_BLOCK_TWO_SIDED | 6 << 3;
 	}
 	for (int i = 0; i < PLATE_SAMPLES; i++)
 		attr[i] = (uint64_t)1 << 15 | (uint64_t)rgb << 16; /* unlit */

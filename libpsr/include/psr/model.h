@@ -27,9 +27,13 @@ struct psr_projection {
 	float spacing; /* at level 0; level l has spacing * 2^l */
 };
 
+#define PSR_MAX_LEVELS 8
+
+/* A byte a block. */
 enum psr_block_flag {
-	PSR_BLOCK_LEVEL = 31, /* these bits are the level, 0 the finest */
-	PSR_BLOCK_TWO_SIDED = 32, /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
+	PSR_BLOCK_LEVEL = 7,         /* these bits are the level, 0 the finest */
+	PSR_BLOCK_DEPTH = 15 << 3,   /* these times an eighth are n: the step of its depths is 2^-(14 + n) */
+	PSR_BLOCK_TWO_SIDED = 1 << 7 /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
 };
 
 /* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */
@@ -50,7 +54,7 @@ struct psr_run {
  *
  * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a
  * model are finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most
- * 2^26 blocks, 256 projections, 32 levels. */
+ * 2^26 blocks, 256 projections, 8 levels. */
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
 	uint32_t n_masks;                       /* length of visibility_mask, at most n_blocks; 0 without */
@@ -64,7 +68,6 @@ struct psr_blocks {
 	const int16_t *col, *row;               /* in blocks */
 	const uint8_t *flags;                   /* enum psr_block_flag */
 	const int16_t *depth_bias;              /* see psr_blocks_depth() */
-	const uint8_t *depth_shift;
 	const uint64_t *mask;                   /* never 0 */
 	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
@@ -100,13 +103,11 @@ static inline uint32_t psr_blocks_visibility(const struct psr_blocks *blocks, ui
 	return blocks->run[block / PSR_RUN_BLOCKS].visibility_first + blocks->visibility_index[block];
 }
 
-/* Where the depths of a block begin, depth_bias / 2^14, and their step, 2^-depth_shift, in inner units. All are exact. */
-#define PSR_DEPTH_SHIFT_MIN 14
-#define PSR_DEPTH_SHIFT_MAX 30
+/* Where the depths of a block begin, depth_bias / 2^14, and their step, in inner units. Both are exact. */
 static inline void psr_blocks_depth(const struct psr_blocks *blocks, uint32_t block, float *bias, float *step)
 {
 	*bias = (float)blocks->depth_bias[block] * (1.0f / 16384);
-	*step = 1.0f / (float)(1u << blocks->depth_shift[block]);
+	*step = (1.0f / 16384) / (float)(1u << ((blocks->flags[block] & PSR_BLOCK_DEPTH) >> 3));
 }
 
 /* The sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x, sphere_y,

@@ -12,7 +12,7 @@ struct arrays {
 	int16_t *center[3], *col, *row, *bias;
 	uint16_t *radius, *offset, *depth;
 	int8_t *cone[3];
-	uint8_t *projection, *flags, *cone_sine, *shift;
+	uint8_t *projection, *flags, *cone_sine;
 	uint64_t *mask, *attr;
 };
 
@@ -79,7 +79,6 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	a->radius = grow(a->radius, a->n_blocks, 2);
 	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
 	a->bias = grow(a->bias, a->n_blocks, 2);
-	a->shift = grow(a->shift, a->n_blocks, 1);
 	a->projection = grow(a->projection, a->n_blocks, 1);
 	a->col = grow(a->col, a->n_blocks, 2);
 	a->row = grow(a->row, a->n_blocks, 2);
@@ -115,13 +114,13 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	a->cone_sine[b] = (uint8_t)ceil(sqrt(1 - least * least) * 255);
 	a->bias[b] = (int16_t)floor(low * 0x1p14);
 	low = a->bias[b] * 0x1p-14;
-	a->shift[b] = PSR_DEPTH_SHIFT_MAX;
-	while ((high - low) * (double)(1u << a->shift[b]) > 65535)
-		a->shift[b]--;
+	unsigned shift = 29;
+	while ((high - low) * (double)(1u << shift) > 65535)
+		shift--;
 	a->projection[b] = (uint8_t)p;
 	a->col[b] = (int16_t)col;
 	a->row[b] = (int16_t)row;
-	a->flags[b] = o->two_sided ? PSR_BLOCK_TWO_SIDED : 0;
+	a->flags[b] = (uint8_t)((shift - 14) << 3 | (o->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
 	a->mask[b] = mask;
 	if (b % PSR_RUN_BLOCKS == 0)
 		a->run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = a->n_samples };
@@ -129,7 +128,7 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	for (int i = 0; i < 64; i++) {
 		if (!s[i].valid)
 			continue;
-		a->depth[a->n_samples] = (uint16_t)((s[i].depth - low) * (double)(1u << a->shift[b]) + 0.5);
+		a->depth[a->n_samples] = (uint16_t)((s[i].depth - low) * (double)(1u << shift) + 0.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
 		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 | (uint64_t)o->diffuse << 16 |
 		                          (uint64_t)o->specular << 40 | (uint64_t)o->exponent << 56;
@@ -160,7 +159,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster, .run = a.run,
 		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
 		.block_projection = a.projection, .col = a.col, .row = a.row, .flags = a.flags, .depth_bias = a.bias,
-		.depth_shift = a.shift, .mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
+		.mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
 	};
 	if (o->cones) {
 		blocks.cone_x = a.cone[0];
@@ -187,7 +186,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	}
 	free(a.radius);
 	free(a.cone_sine);
-	free(a.bias); free(a.shift); free(a.projection); free(a.depth); free(a.col); free(a.row);
+	free(a.bias); free(a.projection); free(a.depth); free(a.col); free(a.row);
 	free(a.run); free(a.flags); free(a.mask); free(a.offset); free(a.attr);
 	return model;
 }
