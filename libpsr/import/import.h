@@ -120,7 +120,8 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err); 
  * outside. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
 
-/* image.cc: decodes by magic (TGA, which has none, by the ending of `name`). FORMAT, UNSUPPORTED, LIMIT, MEMORY. */
+/* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT, UNSUPPORTED,
+ * LIMIT, MEMORY, and what opening the module returns. */
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
 

@@ -24,6 +24,19 @@ static void refuse_image(const void *bytes, size_t n, const char *name, int code
 	assert_null(image.rgba);
 }
 
+/* The first of all: once it is open it stays. */
+static void missing_module_is_a_clear_error(void **state)
+{
+	(void)state;
+	assert_int_equal(setenv("PSR_IMAGE_MODULE", "/nowhere/module.so", 1), 0);
+	refuse_image("BM", 2, "a.bmp", PSR_ERR_UNSUPPORTED,
+	             "no image can be read: the image module cannot be loaded: /nowhere/module.so");
+	refuse_image("nonsense", 8, "a.bmp", PSR_ERR_UNSUPPORTED, "not an image of a known format");
+	assert_int_equal(setenv("PSR_IMAGE_MODULE", "libm.so.6", 1), 0);
+	refuse_image("BM", 2, "a.bmp", PSR_ERR_VERSION, "libm.so.6 is not the image module of this version");
+	unsetenv("PSR_IMAGE_MODULE");
+}
+
 static void rows_come_from_the_top(void **state)
 {
 	(void)state;
@@ -132,6 +145,7 @@ static void a_cut_image_is_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(missing_module_is_a_clear_error),
 		cmocka_unit_test(rows_come_from_the_top),
 		cmocka_unit_test(linear_floats_become_srgb),
 		cmocka_unit_test(gray_images_have_three_equal_channels),
