@@ -148,7 +148,7 @@ static int is_missing(const struct level *level, const struct trial *trial)
 static void look_at(const struct level *level, const struct trial *trial, int n, uint8_t *is_visible)
 {
 	struct ray ray[BATCH];
-	struct ray_hit hit[BATCH];
+	uint8_t is_hidden[BATCH];
 
 	for (int i = 0; i < n; i++) {
 		for (int k = 0; k < 3; k++) {
@@ -156,9 +156,9 @@ static void look_at(const struct level *level, const struct trial *trial, int n,
 			ray[i].direction[k] = -trial[i].view[k];
 		}
 	}
-	ray_scene_trace(level->scene, ray, n, 0, hit);
+	ray_scene_occluded(level->scene, ray, n, 3 - 0.01 * level->ds, is_hidden);
 	for (int i = 0; i < n; i++)
-		is_visible[i] = hit[i].prim != RAY_NONE && hit[i].t > 3 - 0.01 * level->ds;
+		is_visible[i] = !is_hidden[i];
 }
 
 static int add_missing_spot(struct chunk *chunk, const struct surface_spot *spot)

@@ -69,7 +69,7 @@ struct look {
 	const struct seen *seen;
 	const struct ray_scene *scene;
 	double frame[AT_ONCE][3][3], ds;
-	int reach; /* rows on each side of the middle */
+	int reach; /* rows and columns on each side of the middle */
 	uint64_t n_new, n_hits, n_unseen; /* cells; rays; those that met what no view of before had seen */
 	int is_full;
 };
@@ -102,35 +102,49 @@ static void mark(struct look *look, const struct ray *ray, const struct ray_hit 
 		__atomic_fetch_add(&look->n_unseen, 1, __ATOMIC_RELAXED);
 }
 
-static void look_along_row(int i, void *userdata)
+static void trace_batch(struct look *look, const struct ray *ray, int n)
 {
-	struct look *look = userdata;
-	double y = (i % (2 * look->reach) - look->reach + 0.5) * look->ds, half = 1 - y * y;
-	double (*frame)[3] = look->frame[i / (2 * look->reach)];
-	int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0, n = 0;
-	uint64_t n_hits = 0;
-	struct ray ray[BATCH];
 	struct ray_hit hit[BATCH];
+	uint64_t n_hits = 0;
 
-	for (int c = -reach; c < reach && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
-		double x = (c + 0.5) * look->ds;
-
-		for (int k = 0; k < 3; k++) {
-			ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
-			ray[n].direction[k] = -frame[2][k];
-		}
-		if (++n < BATCH && c + 1 < reach)
+	ray_scene_trace(look->scene, ray, n, 0, hit);
+	for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++) {
+		if (hit[k].prim == RAY_NONE)
 			continue;
-		ray_scene_trace(look->scene, ray, n, 0, hit);
-		for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++) {
-			if (hit[k].prim == RAY_NONE)
-				continue;
-			mark(look, &ray[k], &hit[k]);
-			n_hits++;
-		}
-		n = 0;
+		mark(look, &ray[k], &hit[k]);
+		n_hits++;
 	}
 	__atomic_fetch_add(&look->n_hits, n_hits, __ATOMIC_RELAXED);
+}
+
+/* Two rows at once: rays that are traced together are to be near to each other. */
+static void look_along_rows(int i, void *userdata)
+{
+	struct look *look = userdata;
+	double (*frame)[3] = look->frame[i / look->reach];
+	int row = 2 * (i % look->reach) - look->reach, columns = 0, n = 0;
+	struct ray ray[BATCH];
+
+	for (int r = row; r < row + 2; r++) {
+		double y = (r + 0.5) * look->ds, half = 1 - y * y;
+		int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0;
+
+		columns = reach > columns ? reach : columns;
+	}
+	for (int c = -columns; c < columns && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
+		for (int r = row; r < row + 2; r++, n++) {
+			double x = (c + 0.5) * look->ds, y = (r + 0.5) * look->ds;
+
+			for (int k = 0; k < 3; k++) {
+				ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
+				ray[n].direction[k] = -frame[2][k];
+			}
+		}
+		if (n == BATCH || c + 1 == columns) {
+			trace_batch(look, ray, n);
+			n = 0;
+		}
+	}
 }
 
 static int grow(struct seen *seen)
@@ -176,7 +190,7 @@ static int look_along(struct look *look, struct seen *seen, struct psr_pool *poo
 	do {
 		look->n_new = look->n_hits = look->n_unseen = 0;
 		look->is_full = 0;
-		psr_pool_for(pool, AT_ONCE * 2 * look->reach, look_along_row, look);
+		psr_pool_for(pool, AT_ONCE * look->reach, look_along_rows, look);
 		seen->n_cells += look->n_new;
 		while (2 * seen->n_cells > seen->size)
 			if (grow(seen) != PSR_OK)
