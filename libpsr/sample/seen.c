@@ -79,7 +79,7 @@ static uint64_t place_key(const struct seen *seen, const float p[3], const float
 	int at[3], axis = 0;
 
 	for (int k = 0; k < 3; k++) {
-		at[k] = (int)floor((double)p[k] / seen->cell);
+		at[k] = cell_floor((double)p[k] / seen->cell);
 		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
 	}
 	return key_of(at, axis, n[axis] < 0);
@@ -261,7 +261,7 @@ int seen_is(const struct seen *seen, const float p[3], const float n[3])
 
 	/* The eight cells around; and the ways that something of nearly this normal may have been put down as. */
 	for (int k = 0; k < 3; k++)
-		first[k] = (int)floor((double)p[k] / seen->cell - 0.5);
+		first[k] = cell_floor((double)p[k] / seen->cell - 0.5);
 	for (int axis = 0; axis < 3; axis++) {
 		if (fabsf(n[axis]) < LEAST_WAY)
 			continue;
