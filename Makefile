@@ -76,7 +76,7 @@ endif
 
 L_PSR    := -lzstd -lxxhash -lm -ldl
 L_CODEC  := -lturbojpeg
-L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -lstdc++
+L_BUILD  := -lembree3 -lassimp -ldraco -lpng -lcjson -lstdc++
 
 .PHONY: all demo studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)

@@ -46,6 +46,8 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 	if (format == NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: not an image of a known format (PNG, JPEG, WebP, TIFF, TGA, ...)",
 		                name);
+	if (strcmp(format, "png") == 0 && import_image_plain_png(out, bytes, n_bytes, max_pixels))
+		return PSR_OK;
 	rc = image_module_open(&module, &why);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%s: no image can be read: %s", name, why.text);
