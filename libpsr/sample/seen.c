@@ -71,7 +71,7 @@ struct look {
 	double frame[AT_ONCE][3][3], ds;
 	int reach; /* rows and columns on each side of the middle */
 	uint64_t n_new, n_hits, n_unseen; /* cells; rays; those that met what no view of before had seen */
-	int is_full;
+	int is_full, is_counting;
 };
 
 static uint64_t place_key(const struct seen *seen, const float p[3], const float n[3])
@@ -98,7 +98,7 @@ static void mark(struct look *look, const struct ray *ray, const struct ray_hit 
 	found = insert(look->seen, place_key(look->seen, p, n) | RECENT, &look->n_new);
 	if (found == NO_ROOM)
 		__atomic_store_n(&look->is_full, 1, __ATOMIC_RELAXED);
-	else if (found == NEW && !seen_is(look->seen, p, n))
+	else if (found == NEW && look->is_counting && !seen_is(look->seen, p, n))
 		__atomic_fetch_add(&look->n_unseen, 1, __ATOMIC_RELAXED);
 }
 
@@ -210,13 +210,14 @@ int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough,
 	uint64_t n_hits = 0, n_unseen = 0;
 
 	for (unsigned i = 1; i <= SEEN_MOST_VIEWS / AT_ONCE; i++) {
+		look.is_counting = seen->n_views >= SEEN_LEAST_VIEWS; /* to the first ones nearly all is new */
 		if (look_along(&look, seen, pool) != PSR_OK)
 			return PSR_ERR_MEMORY;
 		n_hits += look.n_hits;
 		n_unseen += look.n_unseen;
 		if (i % (SEEN_LEAST_VIEWS / AT_ONCE) != 0)
 			continue;
-		if (enough * n_unseen <= n_hits)
+		if (look.is_counting && enough * n_unseen <= n_hits)
 			break;
 		n_hits = n_unseen = 0;
 	}
