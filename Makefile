@@ -65,6 +65,7 @@ SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
 endif
 LIBPSR_O       := $(call objs,libpsr/base/*.c libpsr/model/*.c libpsr/render/*.c) $(SIMD_O)
 LIBPSR_BUILD_O := $(call objs,libpsr/import/*.c libpsr/import/*.cc libpsr/sample/*.c libpsr/measure/*.c)
+IMAGE_O        := $(call objs,libpsr/image/*.cc)
 PROTO_O        := $(call objs,proto/*.c)
 CLIENT_LIB_O   := $(call objs,client/lib/*.c)
 PSRD_O         := $(call objs,server/*.c)
@@ -81,12 +82,12 @@ ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(LIB)/psr-image-oiio.so
 endif
 
-L_PSR    := -lzstd -lxxhash -lm
+L_PSR    := -lzstd -lxxhash -lm -ldl
 ifeq ($(config),aarch64)
 L_PSR    := -lm
 endif
 L_CODEC  := -lturbojpeg
-L_BUILD  := -lembree3 -lassimp -lOpenImageIO -lOpenImageIO_Util -ldraco -lcjson -lstdc++
+L_BUILD  := -lembree3 -lassimp -ldraco -lpng -lcjson -lstdc++
 
 .PHONY: all demo studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
@@ -139,13 +140,13 @@ endef
 $(BIN)/psrd: $(PSRD_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
 $(BIN)/psr: $(PSR_O) $(A)
-	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
+	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
 $(BIN)/psr-model: $(MODEL_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD) $(L_PSR)
-$(LIB)/psr-image-oiio.so: $(BUILD)/client/image/oiio.cc.o
+$(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 	@mkdir -p $(@D)
 	$(call say,LD,$@)
-	$(Q)$(CXX) $(LINK) $(LDFLAGS) -shared -o $@ $< -lOpenImageIO -lOpenImageIO_Util
+	$(Q)$(CXX) $(LINK) $(LDFLAGS) -shared -o $@ $^ -lOpenImageIO -lOpenImageIO_Util
 
 # --- tests ----------------------------------------------------------------------------------------------------------
 
@@ -173,7 +174,9 @@ FRAMES     := $(BUILD)/tests/bench/frames
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
-L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
+L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson $(L_PSR)
+# What stands in tests/*/ finds the image module by its run path.
+L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib'
 
 # Tests keep their assertions in every configuration.
 $(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
@@ -182,25 +185,25 @@ $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 	$(link) $(L_TEST)
 $(call unit_bin,$(filter tests/unit/server_%,$(UNIT))): $(SERVER_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
-	$(link) $(L_TEST) $(L_BUILD)
+	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(call unit_bin,$(filter tests/unit/models_%,$(UNIT))): $(MODEL_PARTS)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
 	$(link) $(L_TEST)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
-	$(link) $(L_TEST) $(L_BUILD)
+	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
-	$(link) $(L_CODEC) -lpng -lcjson -ldl $(L_PSR)
+	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
 
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
-	$(link) $(L_BUILD) $(L_PSR)
+	$(link) $(L_BUILD_HERE) $(L_PSR)
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
 	peer peer_order pictures plot report scene thesis warp))
 $(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
-	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD) $(L_PSR)
+	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 

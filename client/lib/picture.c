@@ -1,18 +1,20 @@
 #include <string.h>
 #include <strings.h>
+#include "base/image_module.h"
 #include "picture.h"
 
 typedef int native_writer(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);
 
 struct plan {
 	native_writer *write; /* NULL: the module does it */
-	picture_module_write *module_write;
+	image_module_write *module_write;
 };
 
 static int choose(struct plan *plan, const char *path, int is_depth, struct psr_error *err)
 {
 	const char *ending = outfile_ending(path);
-	picture_module_check *check;
+	const struct image_module *module;
+	struct psr_error why;
 	char message[256] = "";
 	int code;
 
@@ -34,10 +36,11 @@ static int choose(struct plan *plan, const char *path, int is_depth, struct psr_
 		plan->write = picture_write_pfm;
 		return PSR_OK;
 	}
-	code = picture_module_load(&plan->module_write, &check, err);
+	code = image_module_open(&module, &why);
 	if (code != PSR_OK)
-		return code;
-	if (check(ending, is_depth, message, sizeof message) != 0)
+		return psr_fail(err, code, "only .png, .ppm and .pfm can be written: %s", why.text);
+	plan->module_write = module->write;
+	if (module->check(ending, is_depth, message, sizeof message) != 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "'%.200s': %s", path, message);
 	return PSR_OK;
 }

@@ -120,9 +120,15 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err); 
  * outside. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
 
-/* image.cc: decodes by magic (TGA, which has none, by the ending of `name`). FORMAT, UNSUPPORTED, LIMIT, MEMORY. */
+/* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT, UNSUPPORTED,
+ * LIMIT, MEMORY, and what opening the module returns. */
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
+
+/* image_png.c: the most common kind by libpng, without the module, which takes a quarter of a second to open: PNG of 8 bits,
+ * RGB with or without alpha, not interlaced. The same pixels. 0 if it is another kind, over a limit or broken: then *out is
+ * not touched, and the module says what it is. */
+int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, uint64_t max_pixels);
 
 /* The readers. `bytes` is the source file itself; all leave an unfinished mesh in im. */
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);

@@ -11,6 +11,8 @@
 
 #define CHUNK 4096
 #define BATCH 64
+#define PARTS 8       /* of the trials: after each it may be clear that too many are missing */
+#define FEW 15000     /* one missing in so many is good enough */
 #define FARTHEST 4    /* pixels around a place in which its surface is looked for, at grazing angles */
 #define BACK 0.0125f  /* as the renderer's: what faces away by less than normals are quantised to still counts */
 
@@ -52,6 +54,7 @@ struct job {
 	uint32_t n_prims;
 	uint64_t seed;
 	struct chunk *chunk;
+	int first_chunk; /* of those that are run now */
 };
 
 struct trial {
@@ -145,7 +148,7 @@ static int is_missing(const struct level *level, const struct trial *trial)
 static void look_at(const struct level *level, const struct trial *trial, int n, uint8_t *is_visible)
 {
 	struct ray ray[BATCH];
-	struct ray_hit hit[BATCH];
+	uint8_t is_hidden[BATCH];
 
 	for (int i = 0; i < n; i++) {
 		for (int k = 0; k < 3; k++) {
@@ -153,9 +156,9 @@ static void look_at(const struct level *level, const struct trial *trial, int n,
 			ray[i].direction[k] = -trial[i].view[k];
 		}
 	}
-	ray_scene_trace(level->scene, ray, n, 0, hit);
+	ray_scene_occluded(level->scene, ray, n, 3 - 0.01 * level->ds, is_hidden);
 	for (int i = 0; i < n; i++)
-		is_visible[i] = hit[i].prim != RAY_NONE && hit[i].t > 3 - 0.01 * level->ds;
+		is_visible[i] = !is_hidden[i];
 }
 
 static int add_missing_spot(struct chunk *chunk, const struct surface_spot *spot)
@@ -189,13 +192,14 @@ static int run_batch(const struct level *level, struct chunk *chunk, const struc
 static void run_chunk(int i, void *userdata)
 {
 	struct job *job = userdata;
-	struct chunk *chunk = &job->chunk[i];
+	const uint64_t first = (uint64_t)(job->first_chunk + i) * CHUNK;
+	struct chunk *chunk = &job->chunk[job->first_chunk + i];
 	struct trial trial[BATCH];
 	int n = 0;
 
-	for (uint64_t k = (uint64_t)i * CHUNK; k < (uint64_t)(i + 1) * CHUNK && !chunk->failed; k++) {
+	for (uint64_t k = first; k < first + CHUNK && !chunk->failed; k++) {
 		n += draw_trial(job, k, &trial[n]);
-		if (n == BATCH || k + 1 == (uint64_t)(i + 1) * CHUNK) {
+		if (n == BATCH || k + 1 == first + CHUNK) {
 			chunk->failed = run_batch(job->level, chunk, trial, n) != PSR_OK;
 			n = 0;
 		}
@@ -244,7 +248,35 @@ static int join_chunks(struct adequacy *out, struct chunk *chunk, int n_chunks)
 	return PSR_OK;
 }
 
-int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t seed, uint64_t n_trials)
+/* Whether as many are missing of the first chunks as may be of all. */
+static int are_too_many(const struct chunk *chunk, int n_done, int n_chunks)
+{
+	uint64_t n_trials = 0, n_missing = 0;
+
+	for (int i = 0; i < n_done; i++) {
+		n_trials += chunk[i].n_trials;
+		n_missing += chunk[i].n_missing;
+	}
+	return FEW * n_missing * (uint64_t)n_done >= n_trials * (uint64_t)n_chunks;
+}
+
+/* Returns how many chunks were run. */
+static int run_chunks(struct job *job, int n_chunks, int can_stop)
+{
+	int n_done = 0;
+
+	for (int part = 1; part <= PARTS; part++) {
+		job->first_chunk = n_done;
+		n_done = n_chunks * part / PARTS;
+		psr_pool_for(job->level->pool, n_done - job->first_chunk, run_chunk, job);
+		if (can_stop && n_done > 0 && are_too_many(job->chunk, n_done, n_chunks))
+			break;
+	}
+	return n_done;
+}
+
+/* can_stop: makes fewer trials where that many show already that too many are missing. */
+static int measure(struct adequacy *out, const struct level *level, uint64_t seed, uint64_t n_trials, int can_stop)
 {
 	/* About a quarter of the draws are trials: half by the angle, and half of these are visible. */
 	int n_chunks = (int)((4 * n_trials + CHUNK - 1) / CHUNK), rc = PSR_OK;
@@ -257,8 +289,7 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 	if (rc == PSR_OK) {
 		sum_areas(level, job.n_prims, area);
 		job.area = area;
-		psr_pool_for(level->pool, n_chunks, run_chunk, &job);
-		rc = join_chunks(out, job.chunk, n_chunks);
+		rc = join_chunks(out, job.chunk, run_chunks(&job, n_chunks, can_stop));
 	}
 	for (int i = 0; job.chunk != NULL && i < n_chunks; i++)
 		free(job.chunk[i].missing);
@@ -267,13 +298,24 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 	return rc;
 }
 
+int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t seed, uint64_t n_trials)
+{
+	return measure(out, level, seed, n_trials, 0);
+}
+
 #define MOST_ROUNDS 7
 
-/* What a view found that none of those before had seen is seldom alone: it is put down as seen, and the surface diced again. */
+/* What a view found that none of those before had seen is seldom alone: it is put down as seen, views look for more of that
+ * kind, and the surface is diced again. */
 static int add_missing(struct level *level, const struct adequacy *found, int round)
 {
-	int rc = seen_look(&level->seen, level->scene, round % SEEN_ROUNDS, level->pool);
+	uint64_t n_unseen = 0;
+	int rc = PSR_OK;
 
+	for (uint64_t i = 0; i < found->n_missing; i++)
+		n_unseen += !seen_is(&level->seen, found->spot[i].p, found->spot[i].n);
+	if (2 * FEW * n_unseen > found->n_trials)
+		rc = seen_look(&level->seen, level->scene, (uint64_t)SEEN_ENOUGH << 2 * round, level->pool);
 	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
 		const struct surface_spot *spot = &found->spot[i];
 
@@ -286,25 +328,32 @@ static int add_missing(struct level *level, const struct adequacy *found, int ro
 	return rc == PSR_OK ? dice_surface(level, round) : rc;
 }
 
-/* Enough, or no better than two rounds ago by a fifth: the rest is what this way of looking does not find. */
-static int is_over(const struct adequacy *found, int round, uint64_t before_last)
+static double share(const struct adequacy *found)
 {
-	return 15000 * found->n_missing < found->n_trials || round == MOST_ROUNDS
-	       || (round > 2 && 5 * found->n_missing > 4 * before_last);
+	return (double)found->n_missing / (double)(found->n_trials + 1);
+}
+
+/* Enough, or no better than two rounds ago by a fifth: the rest is what this way of looking does not find. */
+static int is_over(const struct adequacy *found, int round, double before_last)
+{
+	return FEW * found->n_missing < found->n_trials || round == MOST_ROUNDS
+	       || (round > 2 && share(found) > 0.8 * before_last);
 }
 
 int adequacy_reach(struct adequacy *out, struct level *level)
 {
-	uint64_t n = level->cover.n_points / 2, before[2] = { 0, 0 };
+	uint64_t n = level->cover.n_points / 2;
+	double before[2] = { 0, 0 };
 	int rc = PSR_OK;
 
 	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
 	for (int round = 1; rc == PSR_OK; round++) {
-		rc = adequacy_measure(out, level, (uint64_t)round, n);
+		/* Of the first two, what is not enough cannot be the last. */
+		rc = measure(out, level, (uint64_t)round, n, round <= 2);
 		if (rc != PSR_OK || is_over(out, round, before[0]))
 			break;
 		before[0] = before[1];
-		before[1] = out->n_missing;
+		before[1] = share(out);
 		rc = add_missing(level, out, round);
 		free(out->spot);
 		out->spot = NULL;

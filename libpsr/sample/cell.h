@@ -6,6 +6,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* x rounded down, of what an int can hold. As fast as truncation, where floor() takes a dozen instructions before SSE4.1. */
+static inline int cell_floor(double x)
+{
+	int i = (int)x;
+
+	return i - (x < i);
+}
+
 /* 21 bits of each coordinate. */
 static inline uint64_t cell_key(int x, int y, int z)
 {

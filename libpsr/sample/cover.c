@@ -1,5 +1,4 @@
 #include <assert.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "../base/mem.h"
@@ -78,7 +77,7 @@ static int grow_table(struct cover *cover)
 
 static int cell_at(const struct cover *cover, double x)
 {
-	return (int)floor(x / cover->ds);
+	return cell_floor(x / cover->ds);
 }
 
 int cover_add(struct cover *cover, const struct cover_point *point)

@@ -73,7 +73,7 @@ int field_add(struct field *field, const float p[3], const float n[3], float wei
 	if (4 * field->n_cells >= 3 * field->capacity && grow(field) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k < 3; k++)
-		at[k] = (int)floor((double)p[k] / field->cell);
+		at[k] = cell_floor((double)p[k] / field->cell);
 	cell = find(field, cell_key(at[0], at[1], at[2]));
 	if (cell->key == FREE) {
 		memset(cell, 0, sizeof *cell);
@@ -93,7 +93,7 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 	for (int k = 0; k < 3; k++) {
 		double x = (double)p[k] / field->cell - 0.5;
 
-		at[k] = (int)floor(x);
+		at[k] = cell_floor(x);
 		weight[k][1] = (float)(x - at[k]);
 		weight[k][0] = 1 - weight[k][1];
 	}

@@ -1,5 +1,6 @@
 #include <math.h>
 #include <stdlib.h>
+#include "cell.h"
 #include "group.h"
 #include "psr/error.h"
 
@@ -20,7 +21,7 @@ static int map_groups(struct cover *map, const struct draft *draft, const struct
 
 			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
 			for (int k = 0; k < 3; k++)
-				at[k] = (int)floor((double)point.position[k] / map->ds);
+				at[k] = cell_floor((double)point.position[k] / map->ds);
 			i = cover_cell(map, at);
 			while (i != COVER_NONE && map->point[i].patch != block->group)
 				i = map->point[i].next;

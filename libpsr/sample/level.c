@@ -46,7 +46,7 @@ static int prepare(struct level *level)
 	if (rc == PSR_OK)
 		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen) : seen_init(&level->seen, level->ds);
 	if (rc == PSR_OK && level->finer_seen == NULL)
-		rc = seen_look(&level->seen, level->scene, 0, level->pool);
+		rc = seen_look(&level->seen, level->scene, SEEN_ENOUGH, level->pool);
 	return rc;
 }
 

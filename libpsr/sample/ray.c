@@ -217,7 +217,7 @@ void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n
 		trace_packet(scene, ray + i, n - i < RAY_PACKET ? n - i : RAY_PACKET, t_min, hit + i);
 }
 
-void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, uint8_t *is_occluded)
+void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_max, uint8_t *is_occluded)
 {
 	for (int i = 0; i < n; i += RAY_PACKET) {
 		int part = n - i < RAY_PACKET ? n - i : RAY_PACKET;
@@ -226,10 +226,13 @@ void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, in
 		struct ray_packet packet;
 
 		ray_packet_init(&packet, scene, ray + i);
-		ray_packet_fill(&rays, valid, ray + i, part, t_min);
+		packet.context.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+		ray_packet_fill(&rays, valid, ray + i, part, 0);
+		for (int k = 0; k < part; k++)
+			rays.tfar[k] = (float)(t_max - first_t(&ray[i + k], 0));
 		rtcOccluded8(valid, scene->scene, &packet.context, &rays);
 		/* Embree tells by a tfar of minus infinity. */
 		for (int k = 0; k < part; k++)
-			is_occluded[i + k] = rays.tfar[k] < 0;
+			is_occluded[i + k] = rays.tfar[k] == -INFINITY;
 	}
 }

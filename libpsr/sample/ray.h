@@ -51,8 +51,9 @@ void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, i
 void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, int n, double length, int most,
                           struct ray_hit *hit, int *n_hits, struct ray_hit *other_hit, int *other_n_hits);
 
-/* Whether anything is met at t_min <= t. Any number of threads may trace at once. */
-void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_min,
+/* Whether anything is met at 0 <= t < t_max, to the rounding of a float. For rays that go all ways. Any number of threads may
+ * trace at once. */
+void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_max,
                         uint8_t *is_occluded);
 
 /* To be called before distances to a mesh with points are asked for; costs nothing without. MEMORY. */

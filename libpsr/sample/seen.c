@@ -8,12 +8,14 @@
 #include "seen.h"
 
 #define FREE UINT64_MAX
+#define RECENT (UINT64_C(1) << 63) /* what the views met that are being looked along */
 #define CELL_PIXELS 1.5
 #define BATCH 64
 #define AT_ONCE 16 /* views */
 #define VIEW_LEVEL 5
-#define N_DIRECTIONS (8 << 2 * VIEW_LEVEL)
-#define N_VIEWS (N_DIRECTIONS / SEEN_ROUNDS)
+#define N_DIRECTIONS (8u << 2 * VIEW_LEVEL)
+#define N_SETS 16 /* of directions, each all around */
+#define SET_SIZE (N_DIRECTIONS / N_SETS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
 
@@ -40,69 +42,108 @@ static uint64_t coarser_key(uint64_t key)
 	return coarser;
 }
 
-/* From any thread. 0: there is no room, which takes a walk through all of it to find. */
-static int insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
+enum found { NO_ROOM, OLD, NEW };
+
+/* From any thread. What is marked as recent is as good as new. To find that there is no room takes a walk through all of it. */
+static enum found insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
-	size_t i = cell_place(key, seen->size);
+	const uint64_t plain = key & ~RECENT;
+	size_t i = cell_place(plain, seen->size);
 
 	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
 		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
 
 		if (old == FREE && __atomic_compare_exchange_n(&seen->table[i], &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
 			__atomic_fetch_add(n_new, 1, __ATOMIC_RELAXED);
-			return 1;
+			return NEW;
 		}
-		if (old == key)
-			return 1;
+		if (old == plain)
+			return OLD;
+		if (old == (plain | RECENT))
+			return NEW;
 	}
-	return 0;
+	return NO_ROOM;
 }
 
 struct look {
 	const struct seen *seen;
 	const struct ray_scene *scene;
 	double frame[AT_ONCE][3][3], ds;
-	int reach; /* rows on each side of the middle */
-	uint64_t n_new;
-	int is_full;
+	int reach; /* rows and columns on each side of the middle */
+	uint64_t n_new, n_hits, n_unseen; /* cells; rays; those that met what no view of before had seen */
+	int is_full, is_counting;
 };
+
+static uint64_t place_key(const struct seen *seen, const float p[3], const float n[3])
+{
+	int at[3], axis = 0;
+
+	for (int k = 0; k < 3; k++) {
+		at[k] = cell_floor((double)p[k] / seen->cell);
+		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
+	}
+	return key_of(at, axis, n[axis] < 0);
+}
 
 static void mark(struct look *look, const struct ray *ray, const struct ray_hit *hit)
 {
 	const float *front = ray_scene_normal(look->scene, hit->prim);
-	int at[3], axis = 0;
+	enum found found;
+	float p[3], n[3];
 
 	for (int k = 0; k < 3; k++) {
-		at[k] = (int)floor((ray->origin[k] + hit->t * ray->direction[k]) / look->seen->cell);
-		axis = fabsf(front[k]) > fabsf(front[axis]) ? k : axis;
+		p[k] = (float)(ray->origin[k] + hit->t * ray->direction[k]);
+		n[k] = hit->is_back ? -front[k] : front[k];
 	}
-	if (!insert(look->seen, key_of(at, axis, (front[axis] < 0) != hit->is_back), &look->n_new))
+	found = insert(look->seen, place_key(look->seen, p, n) | RECENT, &look->n_new);
+	if (found == NO_ROOM)
 		__atomic_store_n(&look->is_full, 1, __ATOMIC_RELAXED);
+	else if (found == NEW && look->is_counting && !seen_is(look->seen, p, n))
+		__atomic_fetch_add(&look->n_unseen, 1, __ATOMIC_RELAXED);
 }
 
-static void look_along_row(int i, void *userdata)
+static void trace_batch(struct look *look, const struct ray *ray, int n)
+{
+	struct ray_hit hit[BATCH];
+	uint64_t n_hits = 0;
+
+	ray_scene_trace(look->scene, ray, n, 0, hit);
+	for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++) {
+		if (hit[k].prim == RAY_NONE)
+			continue;
+		mark(look, &ray[k], &hit[k]);
+		n_hits++;
+	}
+	__atomic_fetch_add(&look->n_hits, n_hits, __ATOMIC_RELAXED);
+}
+
+/* Two rows at once: rays that are traced together are to be near to each other. */
+static void look_along_rows(int i, void *userdata)
 {
 	struct look *look = userdata;
-	double y = (i % (2 * look->reach) - look->reach + 0.5) * look->ds, half = 1 - y * y;
-	double (*frame)[3] = look->frame[i / (2 * look->reach)];
-	int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0, n = 0;
+	double (*frame)[3] = look->frame[i / look->reach];
+	int row = 2 * (i % look->reach) - look->reach, columns = 0, n = 0;
 	struct ray ray[BATCH];
-	struct ray_hit hit[BATCH];
 
-	for (int c = -reach; c < reach && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
-		double x = (c + 0.5) * look->ds;
+	for (int r = row; r < row + 2; r++) {
+		double y = (r + 0.5) * look->ds, half = 1 - y * y;
+		int reach = half > 0 ? (int)(sqrt(half) / look->ds) + 1 : 0;
 
-		for (int k = 0; k < 3; k++) {
-			ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
-			ray[n].direction[k] = -frame[2][k];
+		columns = reach > columns ? reach : columns;
+	}
+	for (int c = -columns; c < columns && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); c++) {
+		for (int r = row; r < row + 2; r++, n++) {
+			double x = (c + 0.5) * look->ds, y = (r + 0.5) * look->ds;
+
+			for (int k = 0; k < 3; k++) {
+				ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
+				ray[n].direction[k] = -frame[2][k];
+			}
 		}
-		if (++n < BATCH && c + 1 < reach)
-			continue;
-		ray_scene_trace(look->scene, ray, n, 0, hit);
-		for (int k = 0; k < n && !__atomic_load_n(&look->is_full, __ATOMIC_RELAXED); k++)
-			if (hit[k].prim != RAY_NONE)
-				mark(look, &ray[k], &hit[k]);
-		n = 0;
+		if (n == BATCH || c + 1 == columns) {
+			trace_batch(look, ray, n);
+			n = 0;
+		}
 	}
 }
 
@@ -120,7 +161,7 @@ static int grow(struct seen *seen)
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
 	for (size_t i = 0; i < old.size; i++)
 		if (old.table[i] != FREE)
-			insert(seen, old.table[i], &n_new);
+			(void)insert(seen, old.table[i], &n_new);
 	psr_free(old.table);
 	return PSR_OK;
 }
@@ -135,29 +176,50 @@ int seen_init(struct seen *seen, double ds)
 	return PSR_OK;
 }
 
-int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool)
+/* Views that fill the table are broken off, and looked along again once there is room. */
+static int look_along(struct look *look, struct seen *seen, struct psr_pool *pool)
 {
-	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
-	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+	/* Far apart ones first, so that the table soon has its size. */
+	for (unsigned k = 0; k < AT_ONCE; k++) {
+		unsigned i = seen->n_views + k, view = N_SETS * (i * 211 % SET_SIZE) + i / SET_SIZE % N_SETS;
+		double direction[3];
 
-	/* Views that fill the table are broken off, and looked along again once there is room. */
-	for (unsigned i = 0; i < N_VIEWS;) {
-		/* Far apart ones first, so that the table soon has its size. */
-		for (unsigned k = 0; k < AT_ONCE; k++) {
-			unsigned view = SEEN_ROUNDS * ((i + k) * 211 % N_VIEWS) + (unsigned)round;
-			double direction[3];
-
-			psr_direction_center(VIEW_LEVEL, view % N_DIRECTIONS, direction);
-			psr_direction_frame(direction, look.frame[k]);
-		}
-		look.n_new = 0;
-		look.is_full = 0;
-		psr_pool_for(pool, AT_ONCE * 2 * look.reach, look_along_row, &look);
-		seen->n_cells += look.n_new;
+		psr_direction_center(VIEW_LEVEL, view, direction);
+		psr_direction_frame(direction, look->frame[k]);
+	}
+	do {
+		look->n_new = look->n_hits = look->n_unseen = 0;
+		look->is_full = 0;
+		psr_pool_for(pool, AT_ONCE * look->reach, look_along_rows, look);
+		seen->n_cells += look->n_new;
 		while (2 * seen->n_cells > seen->size)
 			if (grow(seen) != PSR_OK)
 				return PSR_ERR_MEMORY;
-		i += look.is_full ? 0 : AT_ONCE;
+	} while (look->is_full);
+	seen->n_views += AT_ONCE;
+	for (size_t i = 0; i < seen->size; i++)
+		if (seen->table[i] != FREE)
+			seen->table[i] &= ~RECENT;
+	return PSR_OK;
+}
+
+int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool)
+{
+	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
+	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+	uint64_t n_hits = 0, n_unseen = 0;
+
+	for (unsigned i = 1; i <= SEEN_MOST_VIEWS / AT_ONCE; i++) {
+		look.is_counting = seen->n_views >= SEEN_LEAST_VIEWS; /* to the first ones nearly all is new */
+		if (look_along(&look, seen, pool) != PSR_OK)
+			return PSR_ERR_MEMORY;
+		n_hits += look.n_hits;
+		n_unseen += look.n_unseen;
+		if (i % (SEEN_LEAST_VIEWS / AT_ONCE) != 0)
+			continue;
+		if (look.is_counting && enough * n_unseen <= n_hits)
+			break;
+		n_hits = n_unseen = 0;
 	}
 	return PSR_OK;
 }
@@ -171,7 +233,7 @@ int seen_coarsen(struct seen *seen, const struct seen *finer)
 	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
 	for (size_t i = 0; i < finer->size; i++)
 		if (finer->table[i] != FREE)
-			insert(seen, coarser_key(finer->table[i]), &seen->n_cells);
+			(void)insert(seen, coarser_key(finer->table[i]), &seen->n_cells);
 	return PSR_OK;
 }
 
@@ -185,9 +247,13 @@ static int has(const struct seen *seen, uint64_t key)
 {
 	size_t i = cell_place(key, seen->size);
 
-	while (seen->table[i] != FREE && seen->table[i] != key)
-		i = (i + 1) & (seen->size - 1);
-	return seen->table[i] == key;
+	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
+		uint64_t found = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
+
+		if (found == FREE || (found & ~RECENT) == key)
+			return found == key;
+	}
+	return 0;
 }
 
 int seen_is(const struct seen *seen, const float p[3], const float n[3])
@@ -196,7 +262,7 @@ int seen_is(const struct seen *seen, const float p[3], const float n[3])
 
 	/* The eight cells around; and the ways that something of nearly this normal may have been put down as. */
 	for (int k = 0; k < 3; k++)
-		first[k] = (int)floor((double)p[k] / seen->cell - 0.5);
+		first[k] = cell_floor((double)p[k] / seen->cell - 0.5);
 	for (int axis = 0; axis < 3; axis++) {
 		if (fabsf(n[axis]) < LEAST_WAY)
 			continue;
@@ -212,14 +278,8 @@ int seen_is(const struct seen *seen, const float p[3], const float n[3])
 
 int seen_add(struct seen *seen, const float p[3], const float n[3])
 {
-	int at[3], axis = 0;
-
-	for (int k = 0; k < 3; k++) {
-		at[k] = (int)floor((double)p[k] / seen->cell);
-		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
-	}
 	if (2 * seen->n_cells > seen->size && grow(seen) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	insert(seen, key_of(at, axis, n[axis] < 0), &seen->n_cells);
+	(void)insert(seen, place_key(seen, p, n), &seen->n_cells);
 	return PSR_OK;
 }

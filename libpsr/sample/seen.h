@@ -11,14 +11,18 @@ struct seen {
 	double cell;      /* side of a cubic cell, inner units */
 	size_t size;      /* a power of two */
 	uint64_t n_cells;
+	unsigned n_views; /* looked along so far */
 	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
 };
 
 int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
 
-/* Looks from 512 directions, others for each round of 0..SEEN_ROUNDS - 1, a ray every fourth pixel. MEMORY. */
-#define SEEN_ROUNDS 16
-int seen_look(struct seen *seen, const struct ray_scene *scene, int round, struct psr_pool *pool);
+/* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what 64 of
+ * them met at most one in `enough` places had not been seen by any earlier one, or until there were 1,024. MEMORY. */
+#define SEEN_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
+#define SEEN_LEAST_VIEWS 64
+#define SEEN_MOST_VIEWS 1024
+int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 
 /* What was seen of cells half as wide. MEMORY; seen_fini() either way. */

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/vec.h"
+#include "cell.h"
 #include "sheet.h"
 
 #define SIDE PSR_BLOCK_SIDE
@@ -47,9 +48,9 @@ void sheets_triangle(const struct sheets *sheets, double x, double y, struct lat
 {
 	double spacing = (double)sheets->projection.spacing;
 	double v = y / (0.86602540378443864676 * spacing), u = x / spacing;
-	int row = (int)floor(v), shift = row & 1;
+	int row = cell_floor(v), shift = row & 1;
 	double f = v - row, a = u - shift / 2.0, b = u - (1 - shift) / 2.0;
-	int ca = (int)floor(a), cb = (int)floor(b);
+	int ca = cell_floor(a), cb = cell_floor(b);
 	double ta = a - ca;
 
 	if (f <= 2 * (ta < 0.5 ? ta : 1 - ta)) {

@@ -103,19 +103,15 @@ int vpicture_init(struct vpicture *picture, const struct vpoints *points, const 
 {
 	const float pixel = PIXEL * level->spacing, across = 2 * points->reach / pixel;
 	size_t n;
-	int failed = 0;
 
 	memset(picture, 0, sizeof *picture);
 	picture->side = (across < MOST_SIDE ? (int)across + 1 : MOST_SIDE) + 2 * MARGIN + 2;
 	picture->scale = across < MOST_SIDE ? 1 / pixel : MOST_SIDE / (2 * points->reach);
-	n = (size_t)picture->side * (size_t)picture->side;
-	for (int end = 0; end < 2; end++) {
-		picture->nearest[end] = psr_alloc_array(n, sizeof *picture->nearest[end]);
-		picture->farthest[end] = psr_alloc_array(n, sizeof *picture->farthest[end]);
-		failed |= picture->nearest[end] == NULL || picture->farthest[end] == NULL;
-	}
+	n = 2 * (size_t)picture->side * (size_t)picture->side;
+	picture->nearest = psr_alloc_array(n, sizeof *picture->nearest);
 	picture->row = psr_alloc_array(n, sizeof *picture->row);
-	if (failed || picture->row == NULL) {
+	picture->farthest = psr_alloc_array(n, sizeof *picture->farthest);
+	if (picture->nearest == NULL || picture->row == NULL || picture->farthest == NULL) {
 		vpicture_fini(picture);
 		return PSR_ERR_MEMORY;
 	}
@@ -124,11 +120,9 @@ int vpicture_init(struct vpicture *picture, const struct vpoints *points, const 
 
 void vpicture_fini(struct vpicture *picture)
 {
-	for (int end = 0; end < 2; end++) {
-		psr_free(picture->nearest[end]);
-		psr_free(picture->farthest[end]);
-	}
+	psr_free(picture->nearest);
 	psr_free(picture->row);
+	psr_free(picture->farthest);
 }
 
 static void aim(struct vpicture *picture, const struct vpoints *points, const double axis[3], uint32_t seed)
@@ -174,36 +168,48 @@ static void project(const struct vpicture *picture, const struct vpoints *points
 	}
 }
 
-/* out[i]: smallest of those within VPICTURE_REACH strides of in[i], where all of them are in 0..n-1. */
+_Static_assert(VPICTURE_REACH == 2, "five strides are written out below");
+
+static float least(float a, float b)
+{
+	return a < b ? a : b;
+}
+
+/* out[i]: smallest of those within VPICTURE_REACH strides of in[i], where all of them are in 0..n-1. A fixed number at a time,
+ * as above. */
 static void least_around(float *restrict out, const float *restrict in, int n, int stride)
 {
-	for (int i = VPICTURE_REACH * stride; i < n - VPICTURE_REACH * stride; i++) {
-		float low = in[i - VPICTURE_REACH * stride];
+	const int end = n - 2 * stride;
+	int first = 2 * stride;
 
-		for (int k = 1 - VPICTURE_REACH; k <= VPICTURE_REACH; k++)
-			low = in[i + k * stride] < low ? in[i + k * stride] : low;
-		out[i] = low;
+	for (; first < end; first += CHUNK) {
+		/* The last ones are done twice. */
+		const int at = first + CHUNK <= end ? first : end - CHUNK;
+		const float *p = in + at;
+
+		for (int i = 0; i < CHUNK; i++)
+			out[at + i] = least(least(least(p[i - 2 * stride], p[i - stride]), least(p[i], p[i + stride])),
+			                    p[i + 2 * stride]);
 	}
 }
 
-static void spread(const struct vpicture *picture, int end)
+/* Numbers of a row are two a pixel: those of an end are two apart. */
+static void spread(const struct vpicture *picture)
 {
-	const int n = picture->side * picture->side;
+	const int n = 2 * picture->side * picture->side;
 
-	least_around(picture->row, picture->nearest[end], n, 1);
-	for (int i = 0; i < VPICTURE_REACH; i++)
+	least_around(picture->row, picture->nearest, n, 2);
+	for (int i = 0; i < 2 * VPICTURE_REACH; i++)
 		picture->row[i] = picture->row[n - 1 - i] = -INFINITY;
-	least_around(picture->farthest[end], picture->row, n, picture->side);
+	least_around(picture->farthest, picture->row, n, 2 * picture->side);
 }
 
 void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level,
                    const double axis[3], uint32_t seed)
 {
-	float *near0 = picture->nearest[0], *near1 = picture->nearest[1];
-
 	aim(picture, points, axis, seed);
-	for (int i = 0; i < picture->side * picture->side; i++)
-		near0[i] = near1[i] = -INFINITY;
+	for (int i = 0; i < 2 * picture->side * picture->side; i++)
+		picture->nearest[i] = -INFINITY;
 	for (uint32_t r = 0; r < level->n_runs; r++) {
 		for (uint32_t first = level->run[r][0], end = level->run[r][1]; first < end; first += CHUNK) {
 			const uint32_t n = end - first < CHUNK ? end - first : CHUNK;
@@ -214,15 +220,15 @@ void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const
 			for (uint32_t k = 0; k < n; k++) {
 				const uint8_t faces = picture->faces[points->normal[first + k]];
 				const float h0 = (faces & 1) != 0 ? height[k] : -INFINITY, h1 = (faces & 2) != 0 ? -height[k] : -INFINITY;
+				float *nearest = &picture->nearest[2 * at[k]];
 
 				assert(at[k] > picture->side && at[k] < picture->side * (picture->side - 1) - 1);
-				near0[at[k]] = h0 > near0[at[k]] ? h0 : near0[at[k]];
-				near1[at[k]] = h1 > near1[at[k]] ? h1 : near1[at[k]];
+				nearest[0] = h0 > nearest[0] ? h0 : nearest[0];
+				nearest[1] = h1 > nearest[1] ? h1 : nearest[1];
 			}
 		}
 	}
-	spread(picture, 0);
-	spread(picture, 1);
+	spread(picture);
 }
 
 int vpicture_sees(const struct vpicture *picture, const struct vpoints *points, uint32_t block, int end)
@@ -238,7 +244,7 @@ int vpicture_sees(const struct vpicture *picture, const struct vpoints *points, 
 		project(picture, points, first, at, height);
 		for (uint32_t k = 0; k < n; k++)
 			if ((picture->faces[points->normal[first + k]] >> end & 1) != 0
-			    && (end == 0 ? height[k] : -height[k]) >= picture->farthest[end][at[k]])
+			    && (end == 0 ? height[k] : -height[k]) >= picture->farthest[2 * at[k] + end])
 				return 1;
 	}
 	return 0;

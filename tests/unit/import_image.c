@@ -4,6 +4,8 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <png.h>
+#include "base/image_module.h"
 #include "import/import.h"
 #include "import_files.h"
 
@@ -22,6 +24,19 @@ static void refuse_image(const void *bytes, size_t n, const char *name, int code
 	if (rc != code || strstr(err.text, words) == NULL || strstr(err.text, name) == NULL)
 		fail_msg("expected %d with \"%s\", got %d: %s", code, words, rc, err.text);
 	assert_null(image.rgba);
+}
+
+/* The first of all: once it is open it stays. */
+static void missing_module_is_a_clear_error(void **state)
+{
+	(void)state;
+	assert_int_equal(setenv("PSR_IMAGE_MODULE", "/nowhere/module.so", 1), 0);
+	refuse_image("BM", 2, "a.bmp", PSR_ERR_UNSUPPORTED,
+	             "no image can be read: the image module cannot be loaded: /nowhere/module.so");
+	refuse_image("nonsense", 8, "a.bmp", PSR_ERR_UNSUPPORTED, "not an image of a known format");
+	assert_int_equal(setenv("PSR_IMAGE_MODULE", "libm.so.6", 1), 0);
+	refuse_image("BM", 2, "a.bmp", PSR_ERR_VERSION, "libm.so.6 is not the image module of this version");
+	unsetenv("PSR_IMAGE_MODULE");
 }
 
 static void rows_come_from_the_top(void **state)
@@ -87,6 +102,56 @@ static void alpha_is_not_premultiplied(void **state)
 	free(image.rgba);
 }
 
+static size_t make_png(uint8_t *out, size_t size, uint32_t width, uint32_t height, png_uint_32 format, const void *pixels)
+{
+	png_image image = { .version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = format };
+	png_alloc_size_t n = size;
+
+	assert_true(png_image_write_to_memory(&image, out, &n, 0, pixels, 0, NULL));
+	return n;
+}
+
+/* What libpng decodes here is what the module's OpenImageIO decodes; other kinds are left to it. */
+static void plain_pngs_are_read_alike_without_the_module(void **state)
+{
+	static const struct {
+		png_uint_32 format;
+		int is_plain;
+	} kind[] = { { PNG_FORMAT_RGB, 1 }, { PNG_FORMAT_RGBA, 1 }, { PNG_FORMAT_GRAY, 0 }, { PNG_FORMAT_GA, 0 },
+		         { PNG_FORMAT_LINEAR_RGB, 0 } };
+	const struct image_module *module;
+	static uint8_t pixels[7 * 5 * 8], png[4096];
+
+	(void)state;
+	assert_int_equal(image_module_open(&module, NULL), PSR_OK);
+	for (size_t i = 0; i < sizeof pixels; i++)
+		pixels[i] = (uint8_t)(i * i * 2654435761u >> 13);
+	for (size_t i = 0; i < sizeof kind / sizeof kind[0]; i++) {
+		size_t n = make_png(png, sizeof png, 7, 5, kind[i].format, pixels);
+		struct psr_image image = { 0 }, decoded;
+		char message[256] = "";
+		uint32_t size[2];
+		uint8_t *rgba;
+
+		assert_int_equal(import_image_plain_png(&image, png, n, 35), kind[i].is_plain);
+		assert_int_equal(module->read(&rgba, size, png, n, "png", 35, message, sizeof message), PSR_OK);
+		assert_int_equal(decode(&decoded, png, n, "a.png", NULL), PSR_OK);
+		assert_memory_equal(decoded.rgba, rgba, 4 * 7 * 5);
+		if (kind[i].is_plain) {
+			assert_true(image.width == 7 && image.height == 5);
+			assert_memory_equal(image.rgba, rgba, 4 * 7 * 5);
+		} else {
+			assert_null(image.rgba);
+		}
+		assert_false(import_image_plain_png(&image, png, n, 34));
+		for (size_t cut = 0; cut < n; cut++)
+			assert_false(import_image_plain_png(&image, png, cut, 35));
+		free(image.rgba);
+		free(decoded.rgba);
+		free(rgba);
+	}
+}
+
 static void headers_that_lie_are_refused(void **state)
 {
 	(void)state;
@@ -132,10 +197,12 @@ static void a_cut_image_is_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(missing_module_is_a_clear_error),
 		cmocka_unit_test(rows_come_from_the_top),
 		cmocka_unit_test(linear_floats_become_srgb),
 		cmocka_unit_test(gray_images_have_three_equal_channels),
 		cmocka_unit_test(alpha_is_not_premultiplied),
+		cmocka_unit_test(plain_pngs_are_read_alike_without_the_module),
 		cmocka_unit_test(headers_that_lie_are_refused),
 		cmocka_unit_test(what_is_no_image_is_refused),
 		cmocka_unit_test(a_cut_image_is_refused),

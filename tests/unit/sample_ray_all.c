@@ -170,14 +170,15 @@ static void compare_with_brute_force(const struct psr_mesh *mesh, int most, uint
 	static struct ray ray[RAYS];
 	static struct ray_hit hit[RAYS * RAY_MOST_HITS], first[RAYS];
 	static int n_hits[RAYS];
-	static uint8_t is_occluded[RAYS];
-	int n_compared = 0, n_full = 0;
+	static uint8_t is_occluded[RAYS], is_near[RAYS];
+	int n_compared = 0, n_full = 0, n_near = 0;
 
 	for (int i = 0; i < RAYS; i++)
 		ray[i] = random_ray(&seed);
 	ray_scene_trace_all(scene, ray, RAYS, most, hit, n_hits);
 	ray_scene_trace(scene, ray, RAYS, 0, first);
-	ray_scene_occluded(scene, ray, RAYS, 0, is_occluded);
+	ray_scene_occluded(scene, ray, RAYS, INFINITY, is_occluded);
+	ray_scene_occluded(scene, ray, RAYS, 3, is_near);
 	for (int i = 0; i < RAYS; i++) {
 		struct ray_hit truth[RAY_MOST_HITS];
 		const struct ray_hit *got = hit + i * most;
@@ -194,6 +195,9 @@ static void compare_with_brute_force(const struct psr_mesh *mesh, int most, uint
 		n_full += n == most;
 		assert_int_equal(n_hits[i], n);
 		assert_int_equal(is_occluded[i], n > 0);
+		if (n == 0 || fabs(truth[0].t - 3) > 1e-5)
+			assert_int_equal(is_near[i], n > 0 && truth[0].t < 3);
+		n_near += is_near[i];
 		assert_int_equal(first[i].prim, n > 0 ? truth[0].prim : RAY_NONE);
 		for (int h = 0; h < n; h++) {
 			assert_int_equal(got[h].prim, truth[h].prim);
@@ -205,6 +209,7 @@ static void compare_with_brute_force(const struct psr_mesh *mesh, int most, uint
 			assert_memory_equal(&first[i].t, &got[0].t, sizeof first[i].t);
 	}
 	assert_true(n_compared > RAYS / 2);
+	assert_in_range(n_near, 10, n_compared - 10);
 	assert_true(most > 8 || n_full > 50);
 	ray_scene_destroy(scene);
 }
@@ -343,10 +348,14 @@ static void cut_outs_are_not_met(void **state)
 	ray_scene_trace_all(scene, ray, 2, RAY_MOST_HITS, hit, n);
 	assert_int_equal(n[0], 0);
 	assert_int_equal(n[1], 1);
-	ray_scene_occluded(scene, ray, 2, 0, is_occluded);
+	ray_scene_occluded(scene, ray, 2, INFINITY, is_occluded);
 	assert_false(is_occluded[0]);
 	assert_true(is_occluded[1]);
 	ray_scene_occluded(scene, ray, 2, 2.001, is_occluded);
+	assert_true(is_occluded[1]);
+	ray_scene_occluded(scene, ray, 2, 1.999, is_occluded);
+	assert_false(is_occluded[1]);
+	ray_scene_occluded(scene, ray, 2, 0.5, is_occluded); /* before it is anywhere near */
 	assert_false(is_occluded[1]);
 	ray_scene_destroy(scene);
 	meshes_free(mesh);

@@ -25,7 +25,7 @@ static void look_at(struct looked *looked, struct psr_mesh *mesh, double ds, int
 	assert_int_equal(ray_scene_create(&looked->scene, mesh, zero, 1, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
 	assert_int_equal(seen_init(&looked->seen, ds), PSR_OK);
-	assert_int_equal(seen_look(&looked->seen, looked->scene, 0, pool), PSR_OK);
+	assert_int_equal(seen_look(&looked->seen, looked->scene, SEEN_ENOUGH, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
 
@@ -142,8 +142,11 @@ static void what_is_seen_does_not_depend_on_threads(void **state)
 	int n_seen = 0;
 
 	(void)state;
-	for (int i = 0; i < 3; i++)
+	for (int i = 0; i < 3; i++) {
 		look_at(&looked[i], meshes_sphere(20, (const double[3]){ 0, 0, 0 }, 1), 2.0 / 256, i + 1);
+		assert_int_equal(looked[i].seen.n_views, looked[0].seen.n_views);
+		assert_int_equal(looked[i].seen.n_cells, looked[0].seen.n_cells);
+	}
 	for (int i = 0; i < 200000; i++) {
 		float p[3], n[3];
 		int is_seen;
@@ -187,22 +190,52 @@ static void what_is_added_is_seen(void **state)
 	look_away(&looked);
 }
 
-/* Of a soup of triangles, with places and normals of all kinds. */
-static void what_is_seen_is_seen_of_coarser_cells(void **state)
+/* n triangles of about `size`, anywhere. */
+static struct psr_mesh *make_soup(uint32_t n, double size)
 {
-	struct psr_mesh *mesh = meshes_new(3 * 200, 200);
-	struct seen coarse, coarser;
-	struct looked looked;
+	struct psr_mesh *mesh = meshes_new(3 * n, n);
 	uint64_t seed = 9;
-	int n_seen = 0;
 
-	(void)state;
 	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
 		for (int k = 0; k < 3; k++)
 			mesh->position[i][k] = i % 3 == 0 ? 1.1 * meshes_random(&seed) - 0.55
-			                                  : mesh->position[i - i % 3][k] + 0.04 * meshes_random(&seed) - 0.02;
+			                                  : mesh->position[i - i % 3][k] + size * (meshes_random(&seed) - 0.5);
 		mesh->triangle[i / 3][i % 3] = i;
 	}
+	return mesh;
+}
+
+static void looking_ends_soon_where_nothing_hides(void **state)
+{
+	struct psr_pool *pool = NULL;
+	struct looked ball, soup;
+	unsigned n_views;
+
+	(void)state;
+	look_at(&ball, meshes_sphere(20, (const double[3]){ 0, 0, 0 }, 0.9), DS, 2);
+	look_at(&soup, make_soup(3000, 0.2), DS, 2);
+	assert_int_equal(soup.seen.n_views % SEEN_LEAST_VIEWS, 0);
+	assert_in_range(soup.seen.n_views, 2 * ball.seen.n_views, SEEN_MOST_VIEWS);
+	/* Asked again it goes on with other views. */
+	n_views = ball.seen.n_views;
+	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(seen_look(&ball.seen, ball.scene, SEEN_ENOUGH, pool), PSR_OK);
+	assert_int_equal(ball.seen.n_views, n_views + SEEN_LEAST_VIEWS);
+	psr_pool_destroy(pool);
+	look_away(&ball);
+	look_away(&soup);
+}
+
+/* Of a soup of triangles, with places and normals of all kinds. */
+static void what_is_seen_is_seen_of_coarser_cells(void **state)
+{
+	struct psr_mesh *mesh = make_soup(200, 0.04);
+	struct seen coarse, coarser;
+	struct looked looked;
+	uint64_t seed = 10;
+	int n_seen = 0;
+
+	(void)state;
 	look_at(&looked, mesh, DS, 2);
 	assert_int_equal(seen_coarsen(&coarse, &looked.seen), PSR_OK);
 	assert_int_equal(seen_coarsen(&coarser, &coarse), PSR_OK);
@@ -234,6 +267,7 @@ int main(void)
 		cmocka_unit_test(holes_of_a_mask_are_looked_through),
 		cmocka_unit_test(what_is_seen_does_not_depend_on_threads),
 		cmocka_unit_test(what_is_added_is_seen),
+		cmocka_unit_test(looking_ends_soon_where_nothing_hides),
 		cmocka_unit_test(what_is_seen_is_seen_of_coarser_cells),
 	};
 

@@ -94,7 +94,8 @@ struct psr_mesh {
 };
 
 /* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through Assimp;
- * images through OpenImageIO.
+ * images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of them (UNSUPPORTED
+ * if it is missing).
  * The result is validated as the comments above promise, has at least one triangle or point, and belongs to the caller.
  * NOT_FOUND, IO, FORMAT (with the place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Never crashes on bad
  * input, throws nothing, reads nothing outside of the file's own folder. */

@@ -1,5 +1,4 @@
-// The image module: all formats that OpenImageIO writes. It is loaded on demand, because linking OpenImageIO costs
-// hundreds of libraries at every start. The contract stands in client/lib/picture.h.
+// The image module's writers: all formats that OpenImageIO writes. The contract stands in base/image_module.h.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <cerrno>
@@ -11,6 +10,10 @@
 #include <memory>
 #include <string>
 #include <vector>
+
+extern "C" {
+#include "base/image_module.h"
+}
 
 namespace {
 

@@ -1,0 +1,78 @@
+#include <dlfcn.h>
+#include <limits.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "image_module.h"
+
+#define FILE_NAME "psr-image-oiio.so"
+#define MOST_PATH (PATH_MAX + 64)
+
+/* 0: it is not beside this program. */
+static int find_beside(char path[MOST_PATH])
+{
+	static const char *const beside[] = { "/../lib/psr/" FILE_NAME, "/../lib/" FILE_NAME };
+	char folder[PATH_MAX], *slash;
+	ssize_t n = readlink("/proc/self/exe", folder, sizeof folder - 1);
+
+	if (n <= 0)
+		return 0;
+	folder[n] = '\0';
+	slash = strrchr(folder, '/');
+	if (slash == NULL)
+		return 0;
+	*slash = '\0';
+	for (size_t i = 0; i < sizeof beside / sizeof beside[0]; i++) {
+		snprintf(path, MOST_PATH, "%s%s", folder, beside[i]);
+		if (access(path, R_OK) == 0)
+			return 1;
+	}
+	return 0;
+}
+
+static int load(struct image_module *module, struct psr_error *err)
+{
+	const char *chosen = getenv("PSR_IMAGE_MODULE");
+	char path[MOST_PATH] = FILE_NAME;
+	int is_anywhere = 0;
+	void *handle;
+
+	if (chosen != NULL && chosen[0] != '\0') {
+		snprintf(path, sizeof path, "%s", chosen);
+	} else if (!find_beside(path)) {
+		snprintf(path, sizeof path, "%s", FILE_NAME);
+		is_anywhere = 1;
+	}
+	handle = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+	if (handle == NULL && is_anywhere)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "the module " FILE_NAME " is not installed beside this program; PSR_IMAGE_MODULE can name it");
+	if (handle == NULL)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "the image module cannot be loaded: %.300s", dlerror());
+	module->read = (image_module_read *)(uintptr_t)dlsym(handle, "psr_image_module_read");
+	module->write = (image_module_write *)(uintptr_t)dlsym(handle, "psr_image_module_write");
+	module->check = (image_module_check *)(uintptr_t)dlsym(handle, "psr_image_module_check");
+	if (module->read == NULL || module->write == NULL || module->check == NULL) {
+		dlclose(handle);
+		return psr_fail(err, PSR_ERR_VERSION, "%.300s is not the image module of this version of psr", path);
+	}
+	return PSR_OK;
+}
+
+int image_module_open(const struct image_module **out, struct psr_error *err)
+{
+	static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+	static struct image_module module;
+	static int is_loaded;
+	int rc = PSR_OK;
+
+	pthread_mutex_lock(&lock);
+	if (!is_loaded)
+		rc = load(&module, err);
+	is_loaded = rc == PSR_OK;
+	pthread_mutex_unlock(&lock);
+	*out = &module;
+	return rc;
+}
