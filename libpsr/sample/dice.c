@@ -76,8 +76,8 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS];
-	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_rows;
-	double corner[3][3], side[3], e[3], height, step = STEP * level->ds;
+	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns;
+	double corner[3][3], side[3], e[3], height, foot, step = STEP * level->ds;
 
 	ray_scene_corners(level->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
@@ -85,7 +85,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 		side[i] = v3d_length(e);
 		longest = side[i] > side[longest] ? i : longest;
 	}
-	/* The longest side is the base: from corner `longest` to the next; rows run along it. */
+	/* The longest side is the base: from corner `longest` to the next. */
 	const double *a = corner[longest], *b = corner[(longest + 1) % 3], *c = corner[(longest + 2) % 3];
 	double ab[3], ac[3], cross[3];
 
@@ -93,20 +93,22 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 	v3d_sub(ac, c, a);
 	v3d_cross(cross, ab, ac);
 	height = v3d_length(cross) / side[longest];
-	n_rows = (int)ceil(height / step);
-	n_rows = n_rows > 1 ? n_rows : 1;
-	for (int r = 0; r < n_rows; r++) {
-		double t = (r + shift) / n_rows;
-		int n = (int)ceil(side[longest] * (1 - t) / step);
+	/* Columns stand on it, as high as the triangle is there: one that is thinner than a step is tested all along. */
+	foot = v3d_dot(ab, ac) / (side[longest] * side[longest]);
+	n_columns = (int)ceil(side[longest] / step);
+	n_columns = n_columns > 1 ? n_columns : 1;
+	for (int col = 0; col < n_columns; col++) {
+		double x = (col + shift) / n_columns, top = x < foot ? x / foot : (1 - x) / (1 - foot);
+		int n = (int)ceil(height * top / step);
 
 		n = n > 1 ? n : 1;
 		for (int i = 0; i < n; i++) {
-			double w[3], s = (i + shift) / n * (1 - t);
+			double w[3], t = (i + shift) / n * top;
 			float p[3];
 
-			w[longest] = 1 - s - t;
-			w[(longest + 1) % 3] = s;
 			w[(longest + 2) % 3] = t;
+			w[(longest + 1) % 3] = x - t * foot;
+			w[longest] = 1 - x - t * (1 - foot);
 			if (can_be_absent && texture_is_absent(level->mesh, prim, w[1], w[2]))
 				continue;
 			for (int k = 0; k < 3; k++)
