@@ -20,8 +20,9 @@
 #include "surface.h"
 #include "texture.h"
 
-/* What is known of a primitive's sides. */
-enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8 };
+/* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same plain
+ * material, as of needles and leaves. A sample there stands for the other side, too. */
+enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16 };
 
 struct level {
 	const struct psr_mesh *mesh;
@@ -46,6 +47,9 @@ struct level_ref {
 	unsigned projection;
 	struct sheet_ref at;
 };
+
+/* thin.c: finds what is thin. */
+void thin_mark(struct level *level);
 
 /* owner.c: which projection owns a place that faces n. */
 unsigned owner_of(const struct level *level, const float p[3], const float n[3]);
@@ -112,6 +116,17 @@ static inline const struct psr_material *level_material(const struct level *leve
 	const struct psr_mesh *mesh = level->mesh;
 
 	return &mesh->material[texture_material(mesh, prim)];
+}
+
+static inline int level_is_thin(const struct level *level, uint32_t surface)
+{
+	return (level->sides[surface & ~SHEET_BACK] & SIDE_THIN) != 0;
+}
+
+/* Whether samples of it may count for both sides, so that they go into patches of their own. */
+static inline int level_is_sheet(const struct level *level, uint32_t surface)
+{
+	return level_is_thin(level, surface) || level_material(level, surface & ~SHEET_BACK)->two_sided != 0;
 }
 
 /* Projection space. */

@@ -69,19 +69,22 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 	const struct sheets *sheets = &level->sheets[q];
 	struct lattice_point at[3];
 	float projected[3];
+	int is_thin = level_is_thin(level, spot->surface);
 
 	level_project(&sheets->projection, spot->p, projected);
 	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
 	for (int i = 0; i < 3; i++) {
 		struct corner *c = &corner[i];
 		float d[3], n[3];
+		uint32_t surface;
 
 		c->at = at[i];
 		c->ref = sheets_find(sheets, at[i], projected[2], SHEET_STEPS * sheets->projection.spacing);
 		if (c->ref.patch == SHEET_NONE)
 			continue;
-		level_normal(level, sheets->sample[c->ref.patch][c->ref.sample].surface, n);
-		if (v3f_dot(n, spot->n) < LEAST_ALIKE) {
+		surface = sheets->sample[c->ref.patch][c->ref.sample].surface;
+		level_normal(level, surface, n);
+		if (v3f_dot(n, spot->n) < LEAST_ALIKE && !(is_thin && level_is_thin(level, surface))) {
 			c->ref.patch = SHEET_NONE;
 			continue;
 		}
@@ -200,7 +203,7 @@ static void offer_nearest(const struct level *level, const struct surface_spot *
 static void offer_snap(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
                        struct offer *best)
 {
-	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
+	int two_sided = level_is_sheet(level, spot->surface);
 
 	for (int i = 0; i < tries->n && i < N_TRIANGLES && SNAP < best->cost; i++) {
 		const struct sheets *sheets = &level->sheets[tries->projection[i]];
@@ -233,7 +236,7 @@ static void offer_snap(const struct level *level, const struct surface_spot *spo
 static int keep_snapped(struct level *level, const struct surface_spot *spot, const struct offer *offer)
 {
 	struct level_ref ref = { .projection = offer->projection };
-	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
+	int two_sided = level_is_sheet(level, spot->surface);
 	int rc = sheets_add(&level->sheets[offer->projection], offer->corner[0].at, offer->corner[0].position[2],
 	                    spot->surface, two_sided, &ref.at);
 

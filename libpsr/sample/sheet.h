@@ -53,9 +53,9 @@ struct sheets {
 };
 
 /* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z and
- * the same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
+ * the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes whatever the number of threads. MEMORY. */
 int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
-                 const struct psr_projection *projection, struct psr_pool *pool);
+                 const uint8_t *sides, const struct psr_projection *projection, struct psr_pool *pool);
 void sheets_fini(struct sheets *sheets);
 
 /* Projection space x and y of lattice point (row, column). */
