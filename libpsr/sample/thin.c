@@ -45,7 +45,7 @@ static void keep_thin(const struct level *level, struct part *part, const double
 
 	for (int i = 0; i < part->n; i++)
 		aim(level, part->prim[i], place, &ray[i]);
-	ray_scene_trace(level->scene, ray, part->n, 0, hit);
+	ray_scene_trace_near(level->scene, ray, part->n, 0, THICKNESS * level->ds, hit);
 	for (int i = 0; i < part->n; i++)
 		if (is_other_side(level, part->prim[i], &hit[i]))
 			part->prim[n++] = part->prim[i];
