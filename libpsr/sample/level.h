@@ -75,16 +75,6 @@ struct surface_spot {
 	uint32_t surface;  /* as in struct sheet_sample */
 };
 
-/* offer.c: whether a place is covered. */
-int offer_is_covered(const struct level *level, const struct surface_spot *spot);
-
-/* Keeps what covers a place at the least cost: a lattice triangle, a single hit, or a sample that is moved to a lattice
- * point. Costs are in samples; *is_left tells that the least is above `most`, and nothing was kept. MEMORY. */
-int offer_take(struct level *level, const struct surface_spot *spot, float most, int *is_left);
-
-/* Counts a place for each patch that could cover it: of those that are not kept yet, the most wanted are opened. */
-void offer_ask(struct level *level, const struct surface_spot *spot);
-
 /* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
  * greater. MEMORY. */
 int dice_surface(struct level *level, int round);

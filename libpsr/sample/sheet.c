@@ -82,7 +82,7 @@ struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point a
 	for (uint32_t p = head != NULL ? *head : SHEET_NONE; p != SHEET_NONE; p = sheets->patch[p].next) {
 		float d;
 
-		if ((sheets->patch[p].mask >> s & 1) == 0)
+		if ((sheets->patch[p].mask >> s & 1) == 0 || z - sheets->patch[p].high > reach || sheets->patch[p].low - z > reach)
 			continue;
 		d = fabsf(sheets->sample[p][s].z - z);
 		if (d <= reach) {
@@ -146,7 +146,7 @@ int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t
 		sheets_link(sheets, p);
 		out->patch = p;
 	}
-	sheets->patch[out->patch].mask |= UINT64_C(1) << out->sample;
+	patch_put(&sheets->patch[out->patch], out->sample, z);
 	sheets->sample[out->patch][out->sample] = (struct sheet_sample){ z, surface };
 	return PSR_OK;
 }

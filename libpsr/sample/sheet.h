@@ -28,19 +28,29 @@ struct sheet_sample {
 	uint32_t surface; /* primitive, and SHEET_BACK */
 };
 
+/* What is looked for most comes first. */
 struct patch {
+	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
+	float low, high;    /* z of hits is within */
 	int16_t col, row;   /* in blocks */
-	uint8_t two_sided;  /* of materials that are seen from both sides; or of one-sided ones */
+	uint64_t mask;      /* hits; */
+	uint64_t kept;
+	uint8_t two_sided;  /* of what may count for both of its sides; or of the rest */
 	uint8_t is_alive;   /* some of it is kept */
 	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
-	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
-	uint64_t mask;      /* hits; */
-	uint64_t first;     /* of these, the first of their rays: nothing hides them; */
+	uint64_t first;     /* of the hits, the first of their rays: nothing hides them; */
 	uint64_t seen;      /* those that are known to be visible, */
 	uint64_t hidden;    /* and known to be hidden; */
 	uint64_t owned;     /* those that this projection faces best */
-	uint64_t kept;
 };
+
+/* Puts a hit into a patch that has none at s yet. */
+static inline void patch_put(struct patch *patch, unsigned s, float z)
+{
+	patch->low = patch->mask == 0 || z < patch->low ? z : patch->low;
+	patch->high = patch->mask == 0 || z > patch->high ? z : patch->high;
+	patch->mask |= UINT64_C(1) << s;
+}
 
 struct sheets {
 	struct psr_projection projection; /* spacing: that of this level */
