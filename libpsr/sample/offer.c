@@ -63,17 +63,19 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 {
 	const struct sheets *sheets = &level->sheets[q];
 	struct lattice_point at[3];
+	struct sheet_ref ref[3];
 	float projected[3];
 	int is_thin = level_is_thin(level, spot->surface);
 
 	level_project(&sheets->projection, spot->p, projected);
 	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
+	sheets_find_corners(sheets, at, projected[2], SHEET_STEPS * sheets->projection.spacing, ref);
 	for (int i = 0; i < 3; i++) {
 		struct corner *c = &corner[i];
 		float d[3], n[3];
 		uint32_t surface;
 
-		c->ref = sheets_find(sheets, at[i], projected[2], SHEET_STEPS * sheets->projection.spacing);
+		c->ref = ref[i];
 		if (c->ref.patch == SHEET_NONE)
 			continue;
 		surface = sheets->sample[c->ref.patch][c->ref.sample].surface;
@@ -148,13 +150,20 @@ static void find_snaps(const struct level *level, unsigned q, const struct surfa
 	}
 }
 
+static const struct patch *patch_of(const struct level *level, unsigned projection, struct sheet_ref ref)
+{
+	return &level->sheets[projection].patch[ref.patch];
+}
+
 void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers)
 {
 	struct tries tries;
+	float least = INFINITY;
 
 	offers->n_triangles = offers->n_hits = offers->n_snaps = 0;
 	list_tries(level, spot, &tries);
-	for (int i = 0; i < tries.n; i++) {
+	/* Hits of others cannot cost less than one in a block that is there, and these stay. */
+	for (int i = 0; i < tries.n && (i < OFFER_TRIANGLES || HIT + (float)i / 2 < least); i++) {
 		unsigned q = tries.projection[i];
 		struct corner corner[3];
 
@@ -164,19 +173,17 @@ void offer_find(const struct level *level, const struct surface_spot *spot, stru
 				(struct offer){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
 		for (int k = 0; k < 3; k++) {
 			float distance = (float)(sqrt((double)corner[k].distance2) / level->ds);
+			float cost = HIT + distance / 4 + (float)i / 2;
 
-			if (corner[k].ref.patch != SHEET_NONE && distance <= (float)NEAR)
-				offers->hit[offers->n_hits++] =
-					(struct offer){ q, HIT + distance / 4 + (float)i / 2, { corner[k].ref } };
+			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
+				continue;
+			offers->hit[offers->n_hits++] = (struct offer){ q, cost, { corner[k].ref } };
+			if (cost < least && patch_of(level, q, corner[k].ref)->is_alive)
+				least = cost;
 		}
 		if (i < OFFER_TRIANGLES)
 			find_snaps(level, q, spot, offers);
 	}
-}
-
-static const struct patch *patch_of(const struct level *level, unsigned projection, struct sheet_ref ref)
-{
-	return &level->sheets[projection].patch[ref.patch];
 }
 
 static int is_kept(const struct level *level, const struct offer *offer, int corner)

@@ -95,6 +95,10 @@ struct sheet_ref {
 /* The hit at a lattice point that is nearest in depth to z, and within reach of it. */
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
 
+/* The same for the corners of a lattice triangle. */
+void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
+                         struct sheet_ref found[3]);
+
 /* A living patch that has nothing at a lattice point, and samples of these sides not far from this depth; or none. */
 struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);
 
