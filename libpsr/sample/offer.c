@@ -172,10 +172,13 @@ void offer_find(const struct level *level, const struct surface_spot *spot, stru
 			offers->triangle[offers->n_triangles++] =
 				(struct offer){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
 		for (int k = 0; k < 3; k++) {
-			float distance = (float)(sqrt((double)corner[k].distance2) / level->ds);
-			float cost = HIT + distance / 4 + (float)i / 2;
+			float distance, cost;
 
-			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
+			if (corner[k].ref.patch == SHEET_NONE)
+				continue;
+			distance = (float)(sqrt((double)corner[k].distance2) / level->ds);
+			cost = HIT + distance / 4 + (float)i / 2;
+			if (distance > (float)NEAR)
 				continue;
 			offers->hit[offers->n_hits++] = (struct offer){ q, cost, { corner[k].ref } };
 			if (cost < least && patch_of(level, q, corner[k].ref)->is_alive)
