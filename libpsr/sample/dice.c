@@ -1,8 +1,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "../base/mem.h"
 #include "../base/vec.h"
-#include "level.h"
+#include "offer.h"
 #include "psr/direction.h"
 #include "psr/error.h"
 #include "texture.h"
@@ -76,8 +77,8 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS];
-	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_rows;
-	double corner[3][3], side[3], e[3], height, step = STEP * level->ds;
+	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns;
+	double corner[3][3], side[3], e[3], height, foot, step = STEP * level->ds;
 
 	ray_scene_corners(level->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
@@ -85,7 +86,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 		side[i] = v3d_length(e);
 		longest = side[i] > side[longest] ? i : longest;
 	}
-	/* The longest side is the base: from corner `longest` to the next; rows run along it. */
+	/* The longest side is the base: from corner `longest` to the next. */
 	const double *a = corner[longest], *b = corner[(longest + 1) % 3], *c = corner[(longest + 2) % 3];
 	double ab[3], ac[3], cross[3];
 
@@ -93,20 +94,22 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 	v3d_sub(ac, c, a);
 	v3d_cross(cross, ab, ac);
 	height = v3d_length(cross) / side[longest];
-	n_rows = (int)ceil(height / step);
-	n_rows = n_rows > 1 ? n_rows : 1;
-	for (int r = 0; r < n_rows; r++) {
-		double t = (r + shift) / n_rows;
-		int n = (int)ceil(side[longest] * (1 - t) / step);
+	/* Columns stand on it, as high as the triangle is there: one that is thinner than a step is tested all along. */
+	foot = v3d_dot(ab, ac) / (side[longest] * side[longest]);
+	n_columns = (int)ceil(side[longest] / step);
+	n_columns = n_columns > 1 ? n_columns : 1;
+	for (int col = 0; col < n_columns; col++) {
+		double x = (col + shift) / n_columns, top = x < foot ? x / foot : (1 - x) / (1 - foot);
+		int n = (int)ceil(height * top / step);
 
 		n = n > 1 ? n : 1;
 		for (int i = 0; i < n; i++) {
-			double w[3], s = (i + shift) / n * (1 - t);
+			double w[3], t = (i + shift) / n * top;
 			float p[3];
 
-			w[longest] = 1 - s - t;
-			w[(longest + 1) % 3] = s;
 			w[(longest + 2) % 3] = t;
+			w[(longest + 1) % 3] = x - t * foot;
+			w[longest] = 1 - x - t * (1 - foot);
 			if (can_be_absent && texture_is_absent(level->mesh, prim, w[1], w[2]))
 				continue;
 			for (int k = 0; k < 3; k++)
@@ -164,36 +167,99 @@ static void dice_chunk(int i, void *userdata)
 	}
 }
 
-/* In a fixed order, one at a time: what one place adds may cover the next. What costs more than `most` is left. */
-static int cover_list(struct level *level, struct list *list, float most)
+/* Places for which offers are found at once, by all threads. */
+#define WINDOW 2048
+#define PART 32
+
+struct window {
+	struct level *level;
+	const struct surface_spot *spot;
+	struct offers *offers;
+	uint8_t *is_covered;
+	int n;
+};
+
+static void look_for_offers(int i, void *userdata)
 {
-	int rc = list->failed ? PSR_ERR_MEMORY : PSR_OK;
-	size_t n = 0;
+	struct window *window = userdata;
 
-	for (size_t k = 0; rc == PSR_OK && k < list->n; k++) {
-		int is_left = 0;
-
-		if (!offer_is_covered(level, &list->spot[k]))
-			rc = offer_take(level, &list->spot[k], most, &is_left);
-		if (is_left)
-			list->spot[n++] = list->spot[k];
+	for (int k = i * PART; k < (i + 1) * PART && k < window->n; k++) {
+		window->is_covered[k] = (uint8_t)offer_is_covered(window->level, &window->spot[k]);
+		if (!window->is_covered[k])
+			offer_find(window->level, &window->spot[k], &window->offers[k]);
 	}
-	list->n = n;
-	return rc;
 }
 
-/* First what blocks that are there can cover; then new ones are opened, those first that most of the rest could use. */
-static int cover_lists(struct level *level, struct list *list, int n)
+/* In a fixed order, one at a time. What costs more than `most` is left, and asked for. */
+static int cover_window(const struct window *window, float most, struct surface_spot *left, size_t *n_left)
 {
 	int rc = PSR_OK;
 
-	for (int i = 0; rc == PSR_OK && i < n; i++)
-		rc = cover_list(level, &list[i], CHEAP);
-	for (int i = 0; rc == PSR_OK && i < n; i++)
-		for (size_t k = 0; k < list[i].n; k++)
-			offer_ask(level, &list[i].spot[k]);
-	for (int i = 0; rc == PSR_OK && i < n; i++)
-		rc = cover_list(level, &list[i], INFINITY);
+	for (int k = 0; rc == PSR_OK && k < window->n; k++) {
+		int is_left = 0;
+
+		if (!window->is_covered[k] && !offer_is_superfluous(window->level, &window->spot[k], &window->offers[k]))
+			rc = offer_take(window->level, &window->spot[k], &window->offers[k], most, &is_left);
+		if (is_left) {
+			offer_ask(window->level, &window->offers[k]);
+			left[(*n_left)++] = window->spot[k];
+		}
+	}
+	return rc;
+}
+
+static int cover_spots(struct level *level, struct surface_spot *spot, size_t *n, float most)
+{
+	struct window window = { .level = level };
+	size_t n_left = 0;
+	int rc = PSR_OK;
+
+	window.offers = psr_alloc_array(WINDOW, sizeof *window.offers);
+	window.is_covered = psr_alloc_array(WINDOW, 1);
+	if (window.offers == NULL || window.is_covered == NULL)
+		rc = PSR_ERR_MEMORY;
+	for (size_t done = 0; rc == PSR_OK && done < *n; done += (size_t)window.n) {
+		window.spot = spot + done;
+		window.n = (int)(*n - done < WINDOW ? *n - done : WINDOW);
+		psr_pool_for(level->pool, (window.n + PART - 1) / PART, look_for_offers, &window);
+		rc = cover_window(&window, most, spot, &n_left);
+	}
+	*n = n_left;
+	psr_free(window.offers);
+	psr_free(window.is_covered);
+	return rc;
+}
+
+static int join_lists(const struct list *list, int n_lists, struct surface_spot **spot, size_t *n)
+{
+	*n = 0;
+	for (int i = 0; i < n_lists; i++) {
+		if (list[i].failed)
+			return PSR_ERR_MEMORY;
+		*n += list[i].n;
+	}
+	*spot = psr_alloc_array(*n, sizeof **spot);
+	if (*spot == NULL)
+		return PSR_ERR_MEMORY;
+	*n = 0;
+	for (int i = 0; i < n_lists; *n += list[i].n, i++)
+		if (list[i].n != 0)
+			memcpy(*spot + *n, list[i].spot, list[i].n * sizeof **spot);
+	return PSR_OK;
+}
+
+/* First what blocks that are there can cover; then new ones are opened, those first that most of the rest could use. */
+static int cover_lists(struct level *level, const struct list *list, int n_lists)
+{
+	struct surface_spot *spot = NULL;
+	size_t n;
+	int rc = join_lists(list, n_lists, &spot, &n);
+
+	if (rc == PSR_OK)
+		rc = cover_spots(level, spot, &n, CHEAP);
+	if (rc == PSR_OK)
+		rc = cover_spots(level, spot, &n, INFINITY);
+	psr_free(spot);
 	return rc;
 }
 
@@ -215,7 +281,9 @@ int dice_surface(struct level *level, int round)
 
 int dice_cover(struct level *level, const struct surface_spot *spot)
 {
+	struct offers offers;
 	int is_left;
 
-	return offer_take(level, spot, INFINITY, &is_left);
+	offer_find(level, spot, &offers);
+	return offer_take(level, spot, &offers, INFINITY, &is_left);
 }

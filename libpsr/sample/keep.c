@@ -88,6 +88,8 @@ int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3
 	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
 	float back[3];
 
+	if (level_is_thin(level, prim))
+		return 1;
 	if (!level_material(level, prim)->two_sided)
 		return 0;
 	v3f_scale(back, n, -1);

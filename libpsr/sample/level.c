@@ -37,8 +37,10 @@ static int prepare(struct level *level)
 	level->sheets = calloc(level->n_projections, sizeof *level->sheets);
 	level->sides = psr_alloc_array(n_prims, 1);
 	rc = level->sheets == NULL || level->sides == NULL ? PSR_ERR_MEMORY : PSR_OK;
-	if (rc == PSR_OK)
+	if (rc == PSR_OK) {
 		memset(level->sides, 0, n_prims);
+		thin_mark(level);
+	}
 	if (rc == PSR_OK)
 		rc = field_init(&level->field, FIELD_PIXELS * level->ds);
 	if (rc == PSR_OK)
@@ -57,7 +59,8 @@ static int trace(struct level *level, const struct psr_projection *projection, s
 
 	step(steps);
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
-		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, &projection[i], level->pool);
+		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, level->sides,
+		                  &projection[i], level->pool);
 		level->n_rays += level->sheets[i].n_rays;
 		level->n_patches += level->sheets[i].n_patches + level->sheets[i + 1].n_patches;
 		step(steps);

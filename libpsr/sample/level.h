@@ -20,8 +20,9 @@
 #include "surface.h"
 #include "texture.h"
 
-/* What is known of a primitive's sides. */
-enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8 };
+/* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same plain
+ * material, as of needles and leaves. A sample there stands for the other side, too. */
+enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16 };
 
 struct level {
 	const struct psr_mesh *mesh;
@@ -47,6 +48,9 @@ struct level_ref {
 	struct sheet_ref at;
 };
 
+/* thin.c: finds what is thin. */
+void thin_mark(struct level *level);
+
 /* owner.c: which projection owns a place that faces n. */
 unsigned owner_of(const struct level *level, const float p[3], const float n[3]);
 
@@ -70,16 +74,6 @@ struct surface_spot {
 	float p[3], n[3];  /* n: unit, on the side that counts */
 	uint32_t surface;  /* as in struct sheet_sample */
 };
-
-/* offer.c: whether a place is covered. */
-int offer_is_covered(const struct level *level, const struct surface_spot *spot);
-
-/* Keeps what covers a place at the least cost: a lattice triangle, a single hit, or a sample that is moved to a lattice
- * point. Costs are in samples; *is_left tells that the least is above `most`, and nothing was kept. MEMORY. */
-int offer_take(struct level *level, const struct surface_spot *spot, float most, int *is_left);
-
-/* Counts a place for each patch that could cover it: of those that are not kept yet, the most wanted are opened. */
-void offer_ask(struct level *level, const struct surface_spot *spot);
 
 /* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
  * greater. MEMORY. */
@@ -112,6 +106,17 @@ static inline const struct psr_material *level_material(const struct level *leve
 	const struct psr_mesh *mesh = level->mesh;
 
 	return &mesh->material[texture_material(mesh, prim)];
+}
+
+static inline int level_is_thin(const struct level *level, uint32_t surface)
+{
+	return (level->sides[surface & ~SHEET_BACK] & SIDE_THIN) != 0;
+}
+
+/* Whether samples of it may count for both sides, so that they go into patches of their own. */
+static inline int level_is_sheet(const struct level *level, uint32_t surface)
+{
+	return level_is_thin(level, surface) || level_material(level, surface & ~SHEET_BACK)->two_sided != 0;
 }
 
 /* Projection space. */

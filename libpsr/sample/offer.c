@@ -1,8 +1,6 @@
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include "../base/vec.h"
-#include "level.h"
+#include "offer.h"
 #include "psr/error.h"
 
 /* A kept sample within half a pixel is in every pixel that has the place in its middle. */
@@ -15,10 +13,8 @@
 /* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another one. */
 #define OFF_TRIANGLE 0.4
 
-#define N_TRIES 10
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
-#define N_TRIANGLES 3
 #define DEAD_PATCH 12 /* a new block costs as much as this many samples more in one that is there */
 
 /* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half a
@@ -28,14 +24,14 @@
 #define MOST_SNAP 0.55
 
 struct tries {
-	unsigned projection[N_TRIES];
+	unsigned projection[OFFER_TRIES];
 	int n;
 };
 
 /* Projections by how well they face a spot. */
 static void list_tries(const struct level *level, const struct surface_spot *spot, struct tries *tries)
 {
-	float smooth[3], score[N_TRIES];
+	float smooth[3], score[OFFER_TRIES];
 
 	tries->n = 0;
 	field_normal(&level->field, spot->p, spot->n, smooth);
@@ -44,9 +40,9 @@ static void list_tries(const struct level *level, const struct surface_spot *spo
 		float g = v3f_dot(axis, smooth);
 		int i = tries->n;
 
-		if (v3f_dot(axis, spot->n) < LEAST_COSINE || (i == N_TRIES && g <= score[N_TRIES - 1]))
+		if (v3f_dot(axis, spot->n) < LEAST_COSINE || (i == OFFER_TRIES && g <= score[OFFER_TRIES - 1]))
 			continue;
-		i = i < N_TRIES ? tries->n++ : N_TRIES - 1;
+		i = i < OFFER_TRIES ? tries->n++ : OFFER_TRIES - 1;
 		for (; i > 0 && score[i - 1] < g; i--) {
 			score[i] = score[i - 1];
 			tries->projection[i] = tries->projection[i - 1];
@@ -57,7 +53,6 @@ static void list_tries(const struct level *level, const struct surface_spot *spo
 }
 
 struct corner {
-	struct lattice_point at;
 	struct sheet_ref ref;
 	float position[3], distance2;
 	int is_kept;
@@ -68,20 +63,24 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 {
 	const struct sheets *sheets = &level->sheets[q];
 	struct lattice_point at[3];
+	struct sheet_ref ref[3];
 	float projected[3];
+	int is_thin = level_is_thin(level, spot->surface);
 
 	level_project(&sheets->projection, spot->p, projected);
 	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
+	sheets_find_corners(sheets, at, projected[2], SHEET_STEPS * sheets->projection.spacing, ref);
 	for (int i = 0; i < 3; i++) {
 		struct corner *c = &corner[i];
 		float d[3], n[3];
+		uint32_t surface;
 
-		c->at = at[i];
-		c->ref = sheets_find(sheets, at[i], projected[2], SHEET_STEPS * sheets->projection.spacing);
+		c->ref = ref[i];
 		if (c->ref.patch == SHEET_NONE)
 			continue;
-		level_normal(level, sheets->sample[c->ref.patch][c->ref.sample].surface, n);
-		if (v3f_dot(n, spot->n) < LEAST_ALIKE) {
+		surface = sheets->sample[c->ref.patch][c->ref.sample].surface;
+		level_normal(level, surface, n);
+		if (v3f_dot(n, spot->n) < LEAST_ALIKE && !(is_thin && level_is_thin(level, surface))) {
 			c->ref.patch = SHEET_NONE;
 			continue;
 		}
@@ -119,7 +118,7 @@ int offer_is_covered(const struct level *level, const struct surface_spot *spot)
 	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
 		return 1;
 	list_tries(level, spot, &tries);
-	for (int i = 0; i < tries.n && i < N_TRIANGLES; i++) {
+	for (int i = 0; i < tries.n && i < OFFER_TRIANGLES; i++) {
 		struct corner corner[3];
 
 		find_corners(level, tries.projection[i], spot, corner);
@@ -129,161 +128,195 @@ int offer_is_covered(const struct level *level, const struct surface_spot *spot)
 	return 0;
 }
 
-static int keep_corner(struct level *level, unsigned projection, const struct corner *corner)
+static void find_snaps(const struct level *level, unsigned q, const struct surface_spot *spot, struct offers *offers)
 {
-	return keep_sample(level, (struct level_ref){ projection, corner->ref });
+	const struct sheets *sheets = &level->sheets[q];
+	struct lattice_point at[3];
+	float p[3], n[3];
+
+	level_project(&sheets->projection, spot->p, p);
+	level_project(&sheets->projection, spot->n, n);
+	sheets_triangle(sheets, (double)p[0], (double)p[1], at);
+	for (int k = 0; k < 3; k++) {
+		double x, y, dx, dy, dz, distance;
+
+		sheets_point(sheets, at[k].row, at[k].col, &x, &y);
+		dx = x - (double)p[0];
+		dy = y - (double)p[1];
+		dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
+		distance = sqrt(dx * dx + dy * dy + dz * dz) / level->ds;
+		if (distance <= MOST_SNAP)
+			offers->snap[offers->n_snaps++] = (struct offer_snap){ q, SNAP + 24 * (float)distance, p[2] + (float)dz, at[k] };
+	}
+}
+
+static const struct patch *patch_of(const struct level *level, unsigned projection, struct sheet_ref ref)
+{
+	return &level->sheets[projection].patch[ref.patch];
+}
+
+void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+{
+	struct tries tries;
+	float least = INFINITY;
+
+	offers->n_triangles = offers->n_hits = offers->n_snaps = 0;
+	list_tries(level, spot, &tries);
+	/* Hits of others cannot cost less than one in a block that is there, and these stay. */
+	for (int i = 0; i < tries.n && (i < OFFER_TRIANGLES || HIT + (float)i / 2 < least); i++) {
+		unsigned q = tries.projection[i];
+		struct corner corner[3];
+
+		find_corners(level, q, spot, corner);
+		if (i < OFFER_TRIANGLES && is_triangle(level, spot, corner))
+			offers->triangle[offers->n_triangles++] =
+				(struct offer){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
+		for (int k = 0; k < 3; k++) {
+			float distance, cost;
+
+			if (corner[k].ref.patch == SHEET_NONE)
+				continue;
+			distance = (float)(sqrt((double)corner[k].distance2) / level->ds);
+			cost = HIT + distance / 4 + (float)i / 2;
+			if (distance > (float)NEAR)
+				continue;
+			offers->hit[offers->n_hits++] = (struct offer){ q, cost, { corner[k].ref } };
+			if (cost < least && patch_of(level, q, corner[k].ref)->is_alive)
+				least = cost;
+		}
+		if (i < OFFER_TRIANGLES)
+			find_snaps(level, q, spot, offers);
+	}
+}
+
+static int is_kept(const struct level *level, const struct offer *offer, int corner)
+{
+	return (int)(patch_of(level, offer->projection, offer->ref[corner])->kept >> offer->ref[corner].sample & 1);
+}
+
+int offer_is_superfluous(const struct level *level, const struct surface_spot *spot, const struct offers *offers)
+{
+	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
+		return 1;
+	for (int i = 0; i < offers->n_triangles; i++) {
+		const struct offer *offer = &offers->triangle[i];
+
+		if (is_kept(level, offer, 0) && is_kept(level, offer, 1) && is_kept(level, offer, 2))
+			return 1;
+	}
+	return 0;
 }
 
 /* A patch of which nothing is kept yet costs a block, shared by all places that could use it. */
-static float opening_cost(const struct level *level, unsigned projection, const struct corner *corner)
+static float opening_cost(const struct level *level, unsigned projection, struct sheet_ref ref)
 {
-	const struct patch *patch = &level->sheets[projection].patch[corner->ref.patch];
+	const struct patch *patch = patch_of(level, projection, ref);
 
 	return patch->is_alive ? 0 : DEAD_PATCH + 4.0f / (float)(1 + patch->n_wanted);
 }
 
-/* What would cover a spot, and what it costs in samples. */
-struct offer {
-	unsigned projection;
-	struct corner corner[3];
-	int n; /* corners to keep */
-	int is_snap; /* the one corner is to be made, with the third of `position` for its depth */
-	float cost;
-};
-
-/* The lattice triangle that lacks least. */
-static void offer_triangle(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
-                           struct offer *best)
+/* The triangle that lacks least. */
+static const struct offer *best_triangle(const struct level *level, const struct offers *offers, float *least)
 {
-	for (int i = 0; i < tries->n && i < N_TRIANGLES && (float)i / 2 < best->cost; i++) {
-		struct corner corner[3];
-		float cost = (float)i / 2, opening = 0;
+	const struct offer *best = NULL;
 
-		find_corners(level, tries->projection[i], spot, corner);
-		if (!is_triangle(level, spot, corner))
-			continue;
+	for (int i = 0; i < offers->n_triangles; i++) {
+		const struct offer *offer = &offers->triangle[i];
+		float cost = offer->cost, opening = 0;
+
 		for (int k = 0; k < 3; k++) {
-			cost += corner[k].is_kept ? 0 : 0.5f;
-			opening = fmaxf(opening, opening_cost(level, tries->projection[i], &corner[k]));
+			cost += is_kept(level, offer, k) ? 0 : 0.5f;
+			opening = fmaxf(opening, opening_cost(level, offer->projection, offer->ref[k]));
 		}
-		cost += opening;
-		if (cost < best->cost) {
-			*best = (struct offer){ .projection = tries->projection[i], .n = 3, .cost = cost };
-			memcpy(best->corner, corner, sizeof corner);
+		if (cost + opening < *least) {
+			*least = cost + opening;
+			best = offer;
 		}
 	}
+	return best;
 }
 
-/* The nearest hit of any projection. It covers less than a triangle does. */
-static void offer_nearest(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
-                          struct offer *best)
+static const struct offer *best_hit(const struct level *level, const struct offers *offers, float *least)
 {
-	for (int i = 0; i < tries->n && HIT + (float)i / 2 < best->cost; i++) {
-		struct corner corner[3];
+	const struct offer *best = NULL;
 
-		find_corners(level, tries->projection[i], spot, corner);
-		for (int k = 0; k < 3; k++) {
-			float distance = (float)(sqrt((double)corner[k].distance2) / level->ds), cost;
+	for (int i = 0; i < offers->n_hits; i++) {
+		const struct offer *offer = &offers->hit[i];
+		float cost = offer->cost;
 
-			if (corner[k].ref.patch == SHEET_NONE || distance > (float)NEAR)
-				continue;
-			cost = HIT + distance / 4 + (float)i / 2 + opening_cost(level, tries->projection[i], &corner[k]);
-			if (cost < best->cost)
-				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .cost = cost,
-					                    .corner = { corner[k] } };
+		if (cost < *least)
+			cost += opening_cost(level, offer->projection, offer->ref[0]);
+		if (cost < *least) {
+			*least = cost;
+			best = offer;
 		}
 	}
+	return best;
 }
 
 /* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face, by
  * what a sample may be off at most. */
-static void offer_snap(const struct level *level, const struct surface_spot *spot, const struct tries *tries,
-                       struct offer *best)
+static const struct offer_snap *best_snap(const struct level *level, const struct surface_spot *spot,
+                                          const struct offers *offers, float *least)
 {
-	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
+	const struct offer_snap *best = NULL;
+	int is_sheet = level_is_sheet(level, spot->surface);
 
-	for (int i = 0; i < tries->n && i < N_TRIANGLES && SNAP < best->cost; i++) {
-		const struct sheets *sheets = &level->sheets[tries->projection[i]];
-		struct lattice_point at[3];
-		float p[3], n[3];
+	for (int i = 0; i < offers->n_snaps; i++) {
+		const struct offer_snap *snap = &offers->snap[i];
+		float cost = snap->cost;
 
-		level_project(&sheets->projection, spot->p, p);
-		level_project(&sheets->projection, spot->n, n);
-		sheets_triangle(sheets, (double)p[0], (double)p[1], at);
-		for (int k = 0; k < 3; k++) {
-			struct corner corner = { .at = at[k] };
-			double x, y, dx, dy, dz, distance;
-			float cost;
-
-			sheets_point(sheets, at[k].row, at[k].col, &x, &y);
-			dx = x - (double)p[0];
-			dy = y - (double)p[1];
-			dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
-			distance = sqrt(dx * dx + dy * dy + dz * dz) / level->ds;
-			corner.position[2] = p[2] + (float)dz;
-			corner.ref = sheets_room(sheets, at[k], corner.position[2], two_sided);
-			cost = SNAP + 24.0f * (float)distance + (corner.ref.patch != SHEET_NONE ? 0 : DEAD_PATCH);
-			if (distance <= MOST_SNAP && cost < best->cost)
-				*best = (struct offer){ .projection = tries->projection[i], .n = 1, .is_snap = 1, .cost = cost,
-					                    .corner = { corner } };
+		if (cost < *least
+		    && sheets_room(&level->sheets[snap->projection], snap->at, snap->z, is_sheet).patch == SHEET_NONE)
+			cost += DEAD_PATCH;
+		if (cost < *least) {
+			*least = cost;
+			best = snap;
 		}
 	}
+	return best;
 }
 
-static int keep_snapped(struct level *level, const struct surface_spot *spot, const struct offer *offer)
+static int keep_snapped(struct level *level, const struct surface_spot *spot, const struct offer_snap *snap)
 {
-	struct level_ref ref = { .projection = offer->projection };
-	int two_sided = level_material(level, spot->surface & ~SHEET_BACK)->two_sided != 0;
-	int rc = sheets_add(&level->sheets[offer->projection], offer->corner[0].at, offer->corner[0].position[2],
-	                    spot->surface, two_sided, &ref.at);
+	struct level_ref ref = { .projection = snap->projection };
+	int rc = sheets_add(&level->sheets[snap->projection], snap->at, snap->z, spot->surface,
+	                    level_is_sheet(level, spot->surface), &ref.at);
 
 	if (rc != PSR_OK || ref.at.patch == SHEET_NONE)
 		return rc;
 	return keep_sample(level, ref);
 }
 
-int offer_take(struct level *level, const struct surface_spot *spot, float most, int *is_left)
+int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most, int *is_left)
 {
-	struct offer best = { .cost = INFINITY };
-	struct tries tries;
+	float least = INFINITY;
+	const struct offer *triangle = best_triangle(level, offers, &least), *hit = best_hit(level, offers, &least);
+	const struct offer_snap *snap = best_snap(level, spot, offers, &least);
 	int rc = PSR_OK;
 
-	*is_left = 0;
-	list_tries(level, spot, &tries);
-	if (tries.n == 0)
+	*is_left = least < INFINITY && least > most;
+	if (least > most || least == INFINITY)
 		return PSR_OK;
-	offer_triangle(level, spot, &tries, &best);
-	offer_nearest(level, spot, &tries, &best);
-	offer_snap(level, spot, &tries, &best);
-	*is_left = best.cost > most;
-	if (*is_left)
-		return PSR_OK;
-	if (best.is_snap)
-		return keep_snapped(level, spot, &best);
-	for (int k = 0; rc == PSR_OK && k < best.n; k++)
-		rc = keep_corner(level, best.projection, &best.corner[k]);
+	if (snap != NULL)
+		return keep_snapped(level, spot, snap);
+	if (hit != NULL)
+		return keep_sample(level, (struct level_ref){ hit->projection, hit->ref[0] });
+	for (int k = 0; rc == PSR_OK && k < 3; k++)
+		rc = keep_sample(level, (struct level_ref){ triangle->projection, triangle->ref[k] });
 	return rc;
 }
 
-void offer_ask(struct level *level, const struct surface_spot *spot)
+void offer_ask(struct level *level, const struct offers *offers)
 {
-	const float near2 = (float)(NEAR * NEAR * level->ds * level->ds);
-	struct tries tries;
+	const struct patch *last = NULL;
 
-	list_tries(level, spot, &tries);
-	for (int i = 0; i < tries.n; i++) {
-		struct sheets *sheets = &level->sheets[tries.projection[i]];
-		uint32_t last = SHEET_NONE;
-		struct corner corner[3];
+	for (int i = 0; i < offers->n_hits; i++) {
+		const struct offer *offer = &offers->hit[i];
+		struct patch *patch = &level->sheets[offer->projection].patch[offer->ref[0].patch];
 
-		find_corners(level, tries.projection[i], spot, corner);
-		for (int k = 0; k < 3; k++) {
-			uint32_t p = corner[k].ref.patch;
-
-			if (p == SHEET_NONE || p == last || corner[k].distance2 > near2 || sheets->patch[p].n_wanted == UINT16_MAX)
-				continue;
-			sheets->patch[p].n_wanted++;
-			last = p;
-		}
+		if (patch != last && patch->n_wanted != UINT16_MAX)
+			patch->n_wanted++;
+		last = patch;
 	}
 }

@@ -101,7 +101,8 @@ static void mark_owned(int i, void *userdata)
 			float position[3], n[3];
 
 			level_normal(level, sheets->sample[p][s].surface, n);
-			if (v3f_dot(axis_of(level, (unsigned)i), n) < LEAST_OWNER_COSINE)
+			if (v3f_dot(axis_of(level, (unsigned)i), n) < LEAST_OWNER_COSINE
+			    || (i % 2 != 0 && level_is_thin(level, sheets->sample[p][s].surface)))
 				continue;
 			sheets_position(sheets, (struct sheet_ref){ p, s }, position);
 			patch->owned |= (uint64_t)(owner_of(level, position, n) == (unsigned)i) << s;

@@ -182,7 +182,8 @@ void ray_packet_fill(struct RTCRay8 *rays, int valid[RAY_PACKET], const struct r
 	}
 }
 
-static void trace_packet(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit)
+static void trace_packet(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, double t_max,
+                         struct ray_hit *hit)
 {
 	_Alignas(32) int valid[RAY_PACKET];
 	struct RTCRayHit8 rays;
@@ -191,6 +192,7 @@ static void trace_packet(const struct ray_scene *scene, const struct ray *ray, i
 	ray_packet_init(&packet, scene, ray);
 	ray_packet_fill(&rays.ray, valid, ray, n, t_min);
 	for (int i = 0; i < RAY_PACKET; i++) {
+		rays.ray.tfar[i] = (float)(t_max - first_t(&ray[i < n ? i : 0], t_min));
 		rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
 		rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
 	}
@@ -213,8 +215,14 @@ static void trace_packet(const struct ray_scene *scene, const struct ray *ray, i
 
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit)
 {
+	ray_scene_trace_near(scene, ray, n, t_min, INFINITY, hit);
+}
+
+void ray_scene_trace_near(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, double t_max,
+                          struct ray_hit *hit)
+{
 	for (int i = 0; i < n; i += RAY_PACKET)
-		trace_packet(scene, ray + i, n - i < RAY_PACKET ? n - i : RAY_PACKET, t_min, hit + i);
+		trace_packet(scene, ray + i, n - i < RAY_PACKET ? n - i : RAY_PACKET, t_min, t_max, hit + i);
 }
 
 void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, int n, double t_max, uint8_t *is_occluded)

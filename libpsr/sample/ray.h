@@ -36,6 +36,10 @@ void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);
 
+/* The same, and nothing beyond t_max, to the rounding of a float. t_min <= t_max. */
+void ray_scene_trace_near(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, double t_max,
+                          struct ray_hit *hit);
+
 /* All hits of n rays at t >= 0, nearest first: those of ray i at hit[i * most], n_hits[i] of them, at most `most` (1..
  * RAY_MOST_HITS); beyond, the farthest are left out, and a ray counts no more than its 2 * RAY_MOST_HITS nearest
  * primitives. Of hits of one ray and side that coincide to within 2^-20 with the first of them, the lowest primitive's

@@ -74,24 +74,52 @@ static const uint32_t *head_at(const struct sheets *sheets, struct lattice_point
 	return head_of(sheets, at.col >> 3, at.row >> 3);
 }
 
+/* Of patch p, for a sample, if it is nearer than what was found before. */
+static inline void look_at(const struct sheets *sheets, uint32_t p, float z, float *reach, struct sheet_ref *found)
+{
+	float d;
+
+	if ((sheets->patch[p].mask >> found->sample & 1) == 0)
+		return;
+	d = fabsf(sheets->sample[p][found->sample].z - z);
+	if (d <= *reach) {
+		*reach = d;
+		found->patch = p;
+	}
+}
+
+static int is_near(const struct patch *patch, float z, float reach)
+{
+	return z - patch->high <= reach && patch->low - z <= reach;
+}
+
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach)
 {
 	const uint32_t *head = head_at(sheets, at);
-	unsigned s = sample_at(at);
-	struct sheet_ref found = { SHEET_NONE, s };
+	struct sheet_ref found = { SHEET_NONE, sample_at(at) };
 
-	for (uint32_t p = head != NULL ? *head : SHEET_NONE; p != SHEET_NONE; p = sheets->patch[p].next) {
-		float d;
-
-		if ((sheets->patch[p].mask >> s & 1) == 0)
-			continue;
-		d = fabsf(sheets->sample[p][s].z - z);
-		if (d <= reach) {
-			reach = d;
-			found.patch = p;
-		}
-	}
+	for (uint32_t p = head != NULL ? *head : SHEET_NONE; p != SHEET_NONE; p = sheets->patch[p].next)
+		if (is_near(&sheets->patch[p], z, reach))
+			look_at(sheets, p, z, &reach, &found);
 	return found;
+}
+
+void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
+                         struct sheet_ref found[3])
+{
+	const uint32_t *head = head_at(sheets, at[0]);
+	float left[3] = { reach, reach, reach };
+
+	if (head != head_at(sheets, at[1]) || head != head_at(sheets, at[2])) {
+		for (int k = 0; k < 3; k++)
+			found[k] = sheets_find(sheets, at[k], z, reach);
+		return;
+	}
+	for (int k = 0; k < 3; k++)
+		found[k] = (struct sheet_ref){ SHEET_NONE, sample_at(at[k]) };
+	for (uint32_t p = head != NULL ? *head : SHEET_NONE; p != SHEET_NONE; p = sheets->patch[p].next)
+		for (int k = 0; k < 3 && is_near(&sheets->patch[p], z, reach); k++)
+			look_at(sheets, p, z, &left[k], &found[k]);
 }
 
 static int grow_sheets(struct sheets *sheets)
@@ -147,7 +175,7 @@ int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t
 		sheets_link(sheets, p);
 		out->patch = p;
 	}
-	sheets->patch[out->patch].mask |= UINT64_C(1) << out->sample;
+	patch_put(&sheets->patch[out->patch], out->sample, z);
 	sheets->sample[out->patch][out->sample] = (struct sheet_sample){ z, surface };
 	return PSR_OK;
 }

@@ -28,19 +28,29 @@ struct sheet_sample {
 	uint32_t surface; /* primitive, and SHEET_BACK */
 };
 
+/* What is looked for most comes first. */
 struct patch {
+	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
+	float low, high;    /* z of hits is within */
 	int16_t col, row;   /* in blocks */
-	uint8_t two_sided;  /* of materials that are seen from both sides; or of one-sided ones */
+	uint64_t mask;      /* hits; */
+	uint64_t kept;
+	uint8_t two_sided;  /* of what may count for both of its sides; or of the rest */
 	uint8_t is_alive;   /* some of it is kept */
 	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
-	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
-	uint64_t mask;      /* hits; */
-	uint64_t first;     /* of these, the first of their rays: nothing hides them; */
+	uint64_t first;     /* of the hits, the first of their rays: nothing hides them; */
 	uint64_t seen;      /* those that are known to be visible, */
 	uint64_t hidden;    /* and known to be hidden; */
 	uint64_t owned;     /* those that this projection faces best */
-	uint64_t kept;
 };
+
+/* Puts a hit into a patch that has none at s yet. */
+static inline void patch_put(struct patch *patch, unsigned s, float z)
+{
+	patch->low = patch->mask == 0 || z < patch->low ? z : patch->low;
+	patch->high = patch->mask == 0 || z > patch->high ? z : patch->high;
+	patch->mask |= UINT64_C(1) << s;
+}
 
 struct sheets {
 	struct psr_projection projection; /* spacing: that of this level */
@@ -53,9 +63,9 @@ struct sheets {
 };
 
 /* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z and
- * the same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
+ * the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes whatever the number of threads. MEMORY. */
 int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
-                 const struct psr_projection *projection, struct psr_pool *pool);
+                 const uint8_t *sides, const struct psr_projection *projection, struct psr_pool *pool);
 void sheets_fini(struct sheets *sheets);
 
 /* Projection space x and y of lattice point (row, column). */
@@ -84,6 +94,10 @@ struct sheet_ref {
 
 /* The hit at a lattice point that is nearest in depth to z, and within reach of it. */
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
+
+/* The same for the corners of a lattice triangle. */
+void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
+                         struct sheet_ref found[3]);
 
 /* A living patch that has nothing at a lattice point, and samples of these sides not far from this depth; or none. */
 struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);

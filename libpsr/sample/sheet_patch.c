@@ -128,7 +128,7 @@ static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit
 		memset(row->sample[p], 0, sizeof row->sample[p]);
 		row->n++;
 	}
-	row->patch[p].mask |= bit;
+	patch_put(&row->patch[p], hit->at, hit->z);
 	row->patch[p].first |= hit->is_first ? bit : 0;
 	row->sample[p][hit->at] = (struct sheet_sample){ hit->z, hit->surface };
 	return PSR_OK;

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "../base/mem.h"
 #include "../base/vec.h"
+#include "level.h"
 #include "sheet_patch.h"
 #include "texture.h"
 
@@ -27,6 +28,7 @@ struct job {
 	                             column -c - (r & 1) there; NULL if nobody asks for it */
 	const struct ray_scene *scene;
 	const struct psr_mesh *mesh;
+	const uint8_t *sides;
 	struct patch_row *row[2];
 };
 
@@ -43,10 +45,15 @@ static void strip_fini(struct strip *strip)
 	free(strip->hit);
 }
 
+static int is_sheet(const struct job *job, uint32_t prim)
+{
+	return job->mesh->material[texture_material(job->mesh, prim)].two_sided
+	       || (job->sides != NULL && (job->sides[prim] & SIDE_THIN) != 0);
+}
+
 /* The hits of one ray that are not too steep. */
 static int add_hits(const struct job *job, struct strip *strip, const struct ray_hit *ray_hit, int n_hits)
 {
-	const struct psr_mesh *mesh = job->mesh;
 	const float *z_axis = job->sheets[0]->projection.axis[2];
 
 	if (strip->n + (size_t)n_hits > strip->capacity) {
@@ -65,7 +72,7 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 			continue;
 		strip->hit[strip->n++] = (struct strip_hit){ .z = (float)(SHEET_START - ray_hit[k].t),
 			                                         .surface = prim | (ray_hit[k].is_back ? SHEET_BACK : 0),
-			                                         .two_sided = mesh->material[texture_material(mesh, prim)].two_sided != 0,
+			                                         .two_sided = is_sheet(job, prim),
 			                                         .is_first = k == 0 };
 	}
 	return PSR_OK;
@@ -223,9 +230,9 @@ static int finish(struct sheets *sheets, struct patch_row *row, int rc)
 }
 
 int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
-                 const struct psr_projection *projection, struct psr_pool *pool)
+                 const uint8_t *sides, const struct psr_projection *projection, struct psr_pool *pool)
 {
-	struct job job = { .sheets = { sheets, behind }, .scene = scene, .mesh = mesh };
+	struct job job = { .sheets = { sheets, behind }, .scene = scene, .mesh = mesh, .sides = sides };
 	struct psr_projection turned = *projection;
 	int rc = start(sheets, &job.row[0], projection), rc_behind = PSR_OK;
 

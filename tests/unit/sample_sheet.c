@@ -28,7 +28,7 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 	traced->mesh = mesh;
 	assert_int_equal(ray_scene_create(&traced->scene, mesh, zero, 1, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
-	assert_int_equal(sheets_trace(&traced->sheets, NULL, traced->scene, mesh, &projection, pool), PSR_OK);
+	assert_int_equal(sheets_trace(&traced->sheets, NULL, traced->scene, mesh, NULL, &projection, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
 
@@ -202,8 +202,8 @@ static void both_sides_are_traced_at_once(void **state)
 		turned.axis[2][k] = -turned.axis[2][k];
 	}
 	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
-	assert_int_equal(sheets_trace(&front, &behind, traced.scene, mesh, &traced.sheets.projection, pool), PSR_OK);
-	assert_int_equal(sheets_trace(&alone, NULL, traced.scene, mesh, &turned, pool), PSR_OK);
+	assert_int_equal(sheets_trace(&front, &behind, traced.scene, mesh, NULL, &traced.sheets.projection, pool), PSR_OK);
+	assert_int_equal(sheets_trace(&alone, NULL, traced.scene, mesh, NULL, &turned, pool), PSR_OK);
 	assert_memory_equal(behind.projection.axis, turned.axis, sizeof turned.axis);
 	assert_int_equal(front.n_hits, traced.sheets.n_hits);
 	assert_int_equal(count_hits(&behind), count_hits(&alone));
