@@ -12,12 +12,10 @@ static void settle(struct strip *strip)
 static void random_samples(struct check *c, struct strip *strip, uint32_t n, int is_specular, int is_spoilt)
 {
 	strip->n = n;
-	strip->all = 0;
-	for (uint32_t i = 0; i < n; i++) {
+	strip->is_specular = is_specular;
+	for (uint32_t i = 0; i < n; i++)
 		if (!is_specular)
 			strip->attr[i] &= ~(UINT64_C(0xffff) << 40);
-		strip->all |= strip->attr[i];
-	}
 	for (float *value = strip->px; value < strip->sr; value++)
 		*value = check_plain_or_any(c, is_spoilt, -1, 1);
 	for (uint32_t i = 0; i < STRIP; i++) {
