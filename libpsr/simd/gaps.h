@@ -198,12 +198,13 @@ static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *t
 
 	if (!(tile->has_samples[y] | tile->has_samples[y + 2]))
 		return 0;
-	/* Most rows have none: one of the two beside it lies before a pinhole, and one of those above and below. */
+	/* Most rows have none: one of the two beside it lies before a pinhole, and one of those above and below. Where cells cover
+	 * the pixel already, nothing is left to take. */
 	for (uint32_t x = 0; x < tile->width; x++) {
 		const float side = own[(int32_t)x - 1] < own[x + 1] ? own[(int32_t)x - 1] : own[x + 1];
 		const float line = above[x] < below[x] ? above[x] : below[x];
 		const float later = side < line ? line : side;
-		n_pinholes |= later * scale + offset < own[x];
+		n_pinholes |= (later * scale + offset < own[x]) & (weight[x] > 0);
 	}
 	if (!n_pinholes)
 		return 0;
@@ -221,7 +222,7 @@ static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *t
 			farthest = seen > farthest ? seen : farthest;
 		}
 		const float limit = nearest * alike + alike_offset, limit_before_nothing = nearest * nothing + nothing_offset;
-		const int32_t is_pinhole = (n_before >= 7) & (farthest <= (own[x] < INFINITY ? limit : limit_before_nothing));
+		const int32_t is_pinhole = (weight[x] > 0) & (n_before >= 7) & (farthest <= (own[x] < INFINITY ? limit : limit_before_nothing));
 		weight[x] = is_pinhole ? 0 : weight[x];
 		n_pinholes += (uint32_t)is_pinhole;
 	}

@@ -187,7 +187,7 @@ struct gaps_target {
 
 struct gaps_counts {
 	uint32_t n_partial;  /* pixels with a sample whose weight is below 1 */
-	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard took */
+	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard took and no cell covers whole */
 	uint32_t n_marked;   /* bricks with a weight below 1 */
 };
 
