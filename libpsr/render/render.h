@@ -141,6 +141,8 @@ struct fill {
 	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
 	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
 	uint8_t *wants;   /* by brick: how many levels are pulled from it */
+	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
+	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* some brick needs levels beyond brick_top */
 	void *storage;
 	size_t storage_size;
@@ -179,9 +181,11 @@ float fill_scale(const struct plan *plan, int level); /* of the threshold among 
 float fill_offset(const struct plan *plan, int level);
 void fill_note_depth(struct fill *fill, int level);
 
-/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level, or only weights and depths until all cells are
- * whole. */
-void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors);
+enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
+enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weights and depths, without colours */
+
+/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
+void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
 
 /* Fills their pixels, of which none needs more than `level`. */
 void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
