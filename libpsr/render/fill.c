@@ -57,7 +57,8 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		h = (h + 1) / 2;
 		cells += (size_t)(w + 2) * (h + 2);
 	}
-	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 3 * n_bricks + 2 * n_bricks + 2 * FILL_LEVELS * (bricks_x + bricks_y);
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 5 * n_bricks +
+	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	if (size > fill->storage_size) {
 		psr_free(fill->storage);

@@ -85,8 +85,8 @@ uint64_t warp_tile(const struct simd *simd, const struct plan *plan, const struc
 /* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 - coverage), by
  * what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A pinhole has weight 0: a
  * pixel that at least seven of its eight neighbours are before by more than level 1's threshold, where those are one surface
- * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and
- * `bricks` are of the whole picture. A pure function of words and cells. */
+ * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a
+ * weight below WEIGHT_ONE, else to 0. `weight` and `bricks` are of the whole picture. A pure function of words and cells. */
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
                              uint32_t y1, uint16_t *weight, uint8_t *bricks);
 

@@ -215,8 +215,8 @@ typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *
 
 /* Makes cells to[0..2n-1] whole, from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n]
  * count, too, and beside[0..n-1] the parents' neighbours above or below. Depths change where the weight is below a half. */
-typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
-                          float offset);
+typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                          float scale, float offset);
 
 /* The same for pixels that stay as they are in `was`, whose z is not read: `to` receives their colours and, whatever their
  * weight is, the depths that are interpolated. */

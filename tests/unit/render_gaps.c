@@ -59,7 +59,8 @@ static int covers_either(const struct plan *plan, const struct psr_zstack *stack
 
 typedef int covers_fn(const struct plan *plan, const struct psr_zstack *stack, int k, int32_t i, int32_t j, float z);
 
-static int32_t coverage(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z, covers_fn *corner)
+static int32_t coverage(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z,
+                        covers_fn *corner)
 {
 	int32_t fx, fy;
 	const int32_t i = square_of(x, k, &fx), j = square_of(y, k, &fy), one = 2 << k;
