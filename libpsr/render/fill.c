@@ -57,7 +57,8 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		h = (h + 1) / 2;
 		cells += (size_t)(w + 2) * (h + 2);
 	}
-	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 3 * n_bricks;
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 5 * n_bricks +
+	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	if (size > fill->storage_size) {
 		psr_free(fill->storage);
@@ -82,8 +83,14 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 	fill->whole = (uint8_t *)values;
 	fill->needs = fill->whole + n_bricks;
 	fill->wants = fill->needs + n_bricks;
+	fill->coarse = fill->wants + n_bricks;
 	fill->top = top;
 	fill->brick_top = top < FILL_BRICK_LEVELS ? top : FILL_BRICK_LEVELS;
+	fill->n_coarse = 0;
+	for (int l = fill->brick_top; l <= top; l++) {
+		fill->coarse_first[l] = fill->n_coarse;
+		fill->n_coarse += (size_t)fill->level[l].width * fill->level[l].height;
+	}
 	fill->bricks_x = bricks_x;
 	fill->bricks_y = bricks_y;
 	fill->width = width;
@@ -144,7 +151,7 @@ void fill_look(struct fill *fill, uint32_t row)
 		memset(whole + bx, 0, end - bx);
 		if (!bricks[bx])
 			continue;
-		fill_pull_bricks(fill, bx, end, row, fill->brick_top, 0);
+		fill_pull_bricks(fill, bx, end, row, fill->brick_top, FILL_WEIGHTS_UNTIL_WHOLE);
 		for (uint32_t b = bx; b < end; b++)
 			whole[b] = (uint8_t)whole_level(fill, b, row);
 	}
@@ -162,6 +169,67 @@ static uint8_t greatest_around(const struct fill *fill, const uint8_t *map, uint
 	return greatest;
 }
 
+static uint8_t *coarse_at(const struct fill *fill, int l, uint32_t x, uint32_t y)
+{
+	return &fill->coarse[fill->coarse_first[l] + (size_t)y * fill->level[l].width + x];
+}
+
+/* Weight and depth of a coarse cell, and the wish for the colours of the bricks below it. */
+static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
+{
+	uint8_t *state = coarse_at(fill, l, x, y);
+	if (*state & FILL_PULLED)
+		return;
+	*state |= FILL_PULLED;
+	if (l == fill->brick_top) {
+		fill->wants[(size_t)y * fill->bricks_x + x] = (uint8_t)l;
+		fill_pull_bricks(fill, x, x + 1, y, l, FILL_WEIGHTS);
+		return;
+	}
+	for (uint32_t v = 2 * y; v <= 2 * y + 1 && v < fill->level[l - 1].height; v++)
+		for (uint32_t u = 2 * x; u <= 2 * x + 1 && u < fill->level[l - 1].width; u++)
+			pull_tree(fill, l - 1, u, v);
+	struct fill_row to = fill_row_at(&fill->level[l], (int32_t)x, (int32_t)y);
+	const struct fill_row upper = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y));
+	const struct fill_row lower = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y + 1));
+	to.r = to.g = to.b = NULL;
+	if (fill->simd->fill_pull(&to, &upper, &lower, 1, 0, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) < WEIGHT_ONE / 2)
+		fill_note_depth(fill, l);
+}
+
+/* Which bricks and coarse cells those need that are not whole at the bricks' own level, up to where all that is needed is
+ * whole, or to the top. */
+static void find_coarse(struct fill *fill)
+{
+	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
+	int is_whole = 0;
+	memset(fill->coarse, 0, fill->n_coarse);
+	for (size_t i = 0; i < n_bricks; i++)
+		fill->coarse[i] = fill->whole[i] > fill->brick_top ? FILL_NEEDED : 0;
+	for (int l = fill->brick_top; l < fill->top && !is_whole; l++) {
+		const struct fill_level *from = &fill->level[l], *to = from + 1;
+		is_whole = 1;
+		for (uint32_t y = 0; y < from->height; y++)
+			for (uint32_t x = 0; x < from->width; x++) {
+				const uint32_t px = x / 2, py = y / 2, nx = x & 1 ? px + 1 : px - 1, ny = y & 1 ? py + 1 : py - 1;
+				if (!(*coarse_at(fill, l, x, y) & FILL_NEEDED) ||
+				    fill_row_at(from, (int32_t)x, (int32_t)y).weight[0] == WEIGHT_ONE)
+					continue;
+				is_whole = 0;
+				pull_tree(fill, l + 1, px, py);
+				*coarse_at(fill, l + 1, px, py) |= FILL_NEEDED;
+				if (nx < to->width) {
+					pull_tree(fill, l + 1, nx, py);
+					*coarse_at(fill, l + 1, nx, py) |= FILL_NEEDED;
+				}
+				if (ny < to->height) {
+					pull_tree(fill, l + 1, px, ny);
+					*coarse_at(fill, l + 1, px, ny) |= FILL_NEEDED;
+				}
+			}
+	}
+}
+
 const uint8_t *fill_wants(struct fill *fill)
 {
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
@@ -175,7 +243,9 @@ const uint8_t *fill_wants(struct fill *fill)
 		fill->needs[i] = fill->needs[i] > fill->brick_top ? (uint8_t)fill->brick_top : fill->needs[i];
 	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
 		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++)
-			fill->wants[i] = fill->is_coarse ? (uint8_t)fill->brick_top : greatest_around(fill, fill->needs, bx, by);
+			fill->wants[i] = greatest_around(fill, fill->needs, bx, by);
+	if (fill->is_coarse)
+		find_coarse(fill);
 	return fill->wants;
 }
 
@@ -184,7 +254,7 @@ void fill_pull(struct fill *fill, uint32_t row)
 	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		end = run_end(fill, fill->wants, bx, row);
-		fill_pull_bricks(fill, bx, end, row, wants[bx], 1);
+		fill_pull_bricks(fill, bx, end, row, wants[bx], FILL_COLORS);
 	}
 }
 
@@ -209,7 +279,8 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 		*rgb[k] = (uint16_t)(w ? *rgb[k] * (uint32_t)WEIGHT_ONE / w : plan->background[k]);
 }
 
-/* The levels of which a brick has less than a cell. */
+/* The levels of which a brick has less than a cell: all of their cells, since they are few; those that find_coarse did not
+ * pull hold anything, and nothing reads them. */
 static void run_coarse(struct fill *fill)
 {
 	for (int l = fill->brick_top; l < fill->top; l++) {
@@ -217,10 +288,8 @@ static void run_coarse(struct fill *fill)
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const struct fill_row row = fill_row_at(to, 0, y), upper = fill_row_at(from, 0, 2 * y);
 			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
-			const uint16_t least = fill->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(fill->plan, l + 1),
-			                                             fill_offset(fill->plan, l + 1));
-			if (least < WEIGHT_ONE / 2)
-				fill_note_depth(fill, l + 1);
+			fill->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(fill->plan, l + 1),
+			                      fill_offset(fill->plan, l + 1));
 		}
 	}
 	finish_top(&fill->level[fill->top], fill->plan);

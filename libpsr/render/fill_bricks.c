@@ -41,8 +41,9 @@ static uint32_t least_of(uint32_t a, uint32_t b)
 	return a < b ? a : b;
 }
 
-void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors)
+void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what)
 {
+	const int has_colors = what == FILL_COLORS;
 	struct picture_row rows[2];
 	for (int l = 1; l <= level; l++) {
 		const struct fill_level *to = &fill->level[l], *from = to - 1;
@@ -64,9 +65,9 @@ void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 			const uint16_t weight = fill->simd->fill_pull(&row, &upper, &lower, x1 - x0, l == 1, scale, offset);
 			least = weight < least ? weight : least;
 		}
-		if (has_colors && least < WEIGHT_ONE / 2)
+		if (least < WEIGHT_ONE / 2)
 			fill_note_depth(fill, l);
-		if (!has_colors && least == WEIGHT_ONE)
+		if (what == FILL_WEIGHTS_UNTIL_WHOLE && least == WEIGHT_ONE)
 			return;
 	}
 }
@@ -130,17 +131,18 @@ static void push_level(const struct fill *fill, const struct scratch *scratch, i
 	}
 }
 
-/* The places of weights below one, in order. */
+/* The places of weights below one, in order; the list has room for one more. */
 static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n)
 {
 	const uint64_t whole = UINT64_C(0x0001000100010001) * WEIGHT_ONE;
 	uint32_t n_places = 0;
-	for (uint32_t x = 0; x < n; x += 4) {
-		uint64_t four = whole;
-		memcpy(&four, weight + x, least_of(n - x, 4) * sizeof *weight);
-		if (four == whole)
+	for (uint32_t x = 0, end; x < n; x = end) {
+		uint64_t eight[2] = { whole, whole };
+		end = least_of(x + 8, n);
+		memcpy(eight, weight + x, (end - x) * sizeof *weight);
+		if (((eight[0] ^ whole) | (eight[1] ^ whole)) == 0)
 			continue;
-		for (uint32_t i = x; i < n && i < x + 4; i++) {
+		for (uint32_t i = x; i < end; i++) {
 			place[n_places] = (uint16_t)i;
 			n_places += weight[i] < WEIGHT_ONE;
 		}
@@ -155,7 +157,7 @@ void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 	const uint32_t y1 = least_of((by + 1) * BRICK, p->stack->height);
 	const float scale = fill_scale(fill->plan, 1), offset = fill_offset(fill->plan, 1);
 	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
-	uint16_t place[FILL_WIDTH + 4];
+	uint16_t place[FILL_WIDTH + 1];
 	struct scratch scratch;
 	struct picture_row pixels, filled;
 	const struct fill_row row = { filled.r, filled.g, filled.b, NULL, filled.z };

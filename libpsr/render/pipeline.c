@@ -300,7 +300,8 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	r->frame = frame;
 
 	r->target = (struct shade_target){ frame->rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
-	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, frame->rgb, frame->depth };
+	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2],
+		                                  r->srgb, frame->rgb, frame->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
 	const int n = (int)n_rows(&r->plan);

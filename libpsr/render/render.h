@@ -114,8 +114,8 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 /* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 - coverage), by
  * what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A pinhole has weight 0: a
  * pixel that at least seven of its eight neighbours are before by more than level 1's threshold, where those are one surface
- * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and
- * `bricks` are of the whole picture. A pure function of words and cells. */
+ * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a
+ * weight below WEIGHT_ONE, else to 0. `weight` and `bricks` are of the whole picture. A pure function of words and cells. */
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
                              uint32_t y1, uint16_t *weight, uint8_t *bricks);
 
@@ -174,6 +174,8 @@ struct fill {
 	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
 	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
 	uint8_t *wants;   /* by brick: how many levels are pulled from it */
+	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
+	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* some brick needs levels beyond brick_top */
 	void *storage;
 	size_t storage_size;
@@ -212,9 +214,11 @@ float fill_scale(const struct plan *plan, int level); /* of the threshold among 
 float fill_offset(const struct plan *plan, int level);
 void fill_note_depth(struct fill *fill, int level);
 
-/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level, or only weights and depths until all cells are
- * whole. */
-void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int has_colors);
+enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
+enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weights and depths, without colours */
+
+/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
+void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
 
 /* Fills their pixels, of which none needs more than `level`. */
 void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);

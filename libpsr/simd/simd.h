@@ -189,7 +189,7 @@ struct gaps_target {
 
 struct gaps_counts {
 	uint32_t n_partial;  /* pixels with a sample whose weight is below 1 */
-	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard took */
+	uint32_t n_pinholes; /* pixels, with a sample or without, that the guard took and no cell covers whole */
 	uint32_t n_marked;   /* bricks with a weight below 1 */
 };
 
@@ -217,8 +217,8 @@ typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *
 
 /* Makes cells to[0..2n-1] whole, from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n]
  * count, too, and beside[0..n-1] the parents' neighbours above or below. Depths change where the weight is below a half. */
-typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
-                          float offset);
+typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                          float scale, float offset);
 
 /* The same for pixels that stay as they are in `was`, whose z is not read: `to` receives their colours and, whatever their
  * weight is, the depths that are interpolated. */

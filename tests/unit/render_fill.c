@@ -136,7 +136,7 @@ static struct plan plan_of(int perspective)
 }
 
 /* Surfaces at a few depths over the background; of `holes` in 256 pixels the weight is 0, of `partial` it is anything. `whole`
- * in 8 bricks are left alone. */
+ * in 8 bricks are left alone. Wide pictures have nothing at all in the middle of their left half. */
 static struct picture picture_make(uint32_t width, uint32_t height, uint32_t holes, uint32_t partial, uint32_t whole,
                                    const struct plan *plan)
 {
@@ -152,10 +152,12 @@ static struct picture picture_make(uint32_t width, uint32_t height, uint32_t hol
 	for (uint32_t y = 0; y < height; y++)
 		for (uint32_t x = 0; x < width; x++) {
 			const size_t at = (size_t)y * width + x, brick = (size_t)(y / BRICK) * bricks_x + x / BRICK;
-			const uint32_t surface = (x / 23 + y / 17 + draw(40) / 39) % 4, kind = is_left[brick] ? 256 : draw(256);
+			const uint32_t surface = (x / 23 + y / 17 + draw(40) / 39) % 4;
+			const uint32_t is_void = x > width / 4 - 80 && x < width / 4 + 80 && y > height / 4 && y < height / 2;
+			const uint32_t kind = is_left[brick] ? 256 : draw(256), is_hole = kind < holes || (width > 1000 && is_void);
 			const float z = 1 + 0.05f * (float)surface + 0.001f * (float)draw(100);
 			p.stack.word[at] = surface == 3 ? PSR_WORD_EMPTY : (uint64_t)psr_bits_from_float(z) << 32 | (uint32_t)at;
-			p.fill.weight[at] = (uint16_t)(kind < holes ? 0 : kind < holes + partial ? draw(257) : WEIGHT_ONE);
+			p.fill.weight[at] = (uint16_t)(is_hole ? 0 : kind < holes + partial ? draw(257) : WEIGHT_ONE);
 			bricks[brick] |= p.fill.weight[at] < WEIGHT_ONE;
 			p.fill.r[at] = surface == 3 ? plan->background[0] : (uint16_t)draw(65536);
 			p.fill.g[at] = surface == 3 ? plan->background[1] : (uint16_t)(65535 - draw(2));
@@ -266,8 +268,8 @@ static void for_each_isa(void (*check)(const struct simd *simd, struct fill *fil
 
 static void check_sizes(const struct simd *simd, struct fill *fill)
 {
-	static const uint32_t size[][2] = { { 1, 1 }, { 1, 2 }, { 3, 1 }, { 16, 16 }, { 31, 33 }, { 32, 32 }, { 64, 64 }, { 65, 1 }, { 1, 70 },
-		                                { 97, 55 }, { 256, 40 }, { 257, 64 }, { 300, 131 }, { 511, 96 }, { 513, 33 } };
+	static const uint32_t size[][2] = { { 1, 1 }, { 1, 2 }, { 3, 1 }, { 16, 16 }, { 31, 33 }, { 32, 32 }, { 64, 64 }, { 65, 1 },
+		                                { 1, 70 }, { 97, 55 }, { 256, 40 }, { 257, 64 }, { 300, 131 }, { 511, 96 }, { 513, 33 } };
 	for (size_t i = 0; i < sizeof size / sizeof *size; i++) {
 		compare(size[i][0], size[i][1], 60, 60, 0, simd, fill);
 		compare(size[i][0], size[i][1], 4, 4, 4, simd, fill);
@@ -289,6 +291,34 @@ static void check_densities(const struct simd *simd, struct fill *fill)
 			compare(150 + draw(200), 60 + draw(120), holes[i / 3], partial[i % 3], whole, simd, fill);
 }
 
+static void check_voids(const struct simd *simd, struct fill *fill)
+{
+	const struct psr_zstack stack = { .width = 1300, .height = 610 };
+	const struct plan plan = plan_of(1);
+	compare(stack.width, stack.height, 1, 1, 6, simd, fill);
+	compare(stack.width, stack.height, 1, 0, 8, simd, fill);
+	compare(stack.height, stack.width, 1, 1, 7, simd, fill);
+	/* Not all of the picture is pulled for the sake of one void. */
+	struct picture p = picture_make(stack.width, stack.height, 1, 0, 8, &plan);
+	uint32_t n_wanted = 0, n_bricks = ((stack.width + BRICK - 1) / BRICK) * ((stack.height + BRICK - 1) / BRICK);
+	p.fill.stack = &p.stack;
+	assert_int_equal(fill_begin(fill, simd, &plan, &p.fill), PSR_OK);
+	for (uint32_t row = 0; row < (stack.height + BRICK - 1) / BRICK; row++)
+		fill_look(fill, row);
+	const uint8_t *wants = fill_wants(fill);
+	for (uint32_t i = 0; i < n_bricks; i++)
+		n_wanted += wants[i] > 0;
+	assert_true(fill->is_coarse);
+	assert_in_range(n_wanted, 1, n_bricks / 2);
+	picture_free(&p);
+}
+
+static void a_void_is_filled_from_around_it(void **state)
+{
+	(void)state;
+	for_each_isa(check_voids);
+}
+
 static void sparse_equals_dense_for_all_densities(void **state)
 {
 	(void)state;
@@ -308,6 +338,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sparse_equals_dense_at_every_size),
 		cmocka_unit_test(sparse_equals_dense_for_all_densities),
+		cmocka_unit_test(a_void_is_filled_from_around_it),
 	};
 	return cmocka_run_group_tests(tests, setup, NULL);
 }

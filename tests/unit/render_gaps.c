@@ -59,7 +59,8 @@ static int covers_either(const struct plan *plan, const struct psr_zstack *stack
 
 typedef int covers_fn(const struct plan *plan, const struct psr_zstack *stack, int k, int32_t i, int32_t j, float z);
 
-static int32_t coverage(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z, covers_fn *corner)
+static int32_t coverage(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z,
+                        covers_fn *corner)
 {
 	int32_t fx, fy;
 	const int32_t i = square_of(x, k, &fx), j = square_of(y, k, &fy), one = 2 << k;
@@ -95,10 +96,10 @@ static int is_pinhole(const struct plan *plan, const struct psr_zstack *stack, u
 	return n >= 7 && farthest <= nearest * plan->gap_scale[alike] + plan->gap_offset[alike];
 }
 
-static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
+static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, uint32_t *n_pinholes)
 {
 	const float z = depth_at(stack, x, y);
-	int32_t most = is_pinhole(plan, stack, x, y) ? WEIGHT_ONE : 0;
+	int32_t most = 0;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(stack->levels >> k & 1))
 			continue;
@@ -106,6 +107,10 @@ static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stac
 		if (k > 1 && (stack->levels >> (k - 1) & 1) && cover > 0 && cover < WEIGHT_ONE)
 			cover = coverage(plan, stack, x, y, k, z, covers_either);
 		most = cover > most ? cover : most;
+	}
+	if (most < WEIGHT_ONE && is_pinhole(plan, stack, x, y)) {
+		++*n_pinholes;
+		return 0;
 	}
 	return (uint16_t)(WEIGHT_ONE - most);
 }
@@ -175,12 +180,11 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 	struct gaps_counts lower = gaps_rows(simd, &plan, &stack, half, height, weight, bricks);
 	for (uint32_t y = 0; y < height; y++)
 		for (uint32_t x = 0; x < width; x++) {
-			const uint16_t w = weight_of(&plan, &stack, x, y);
+			const uint16_t w = weight_of(&plan, &stack, x, y, &n_pinholes);
 			if (weight[(size_t)y * width + x] != w)
 				fail_msg("%ux%u, levels %x, pixel (%u, %u): weight %u should be %u", width, height, levels, x, y,
 				         weight[(size_t)y * width + x], w);
 			n_partial += w < WEIGHT_ONE && depth_at(&stack, x, y) < INFINITY;
-			n_pinholes += (uint32_t)is_pinhole(&plan, &stack, x, y);
 			expected[(y / BRICK) * bricks_x + x / BRICK] |= w < WEIGHT_ONE;
 		}
 	for (uint32_t i = 0; i < bricks_x * bricks_y; i++)

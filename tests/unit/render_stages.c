@@ -233,7 +233,8 @@ static void one_color_with_holes_is_that_color(void **state)
 	assert_int_equal(report.count[PSR_STAGE_FILL], holes);
 }
 
-/* [G] 4.7 by hand: the hole (5, 5) has the parent (2, 2), of whose four pixels three are left, and the neighbours (3, 2) and (2, 3). */
+/* [G] 4.7 by hand: the hole (5, 5) has the parent (2, 2), of whose four pixels three are left, and the
+ * neighbours (3, 2) and (2, 3). */
 static void a_hole_gets_a_half_a_quarter_and_a_quarter(void **state)
 {
 	(void)state;
