@@ -21,17 +21,16 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 {
 	const uint32_t n_runs = (n_blocks + PSR_RUN_BLOCKS - 1) / PSR_RUN_BLOCKS;
 	struct psr_run *run = check_in(c, n_runs, sizeof *run);
-	uint8_t *projection = check_in(c, n_blocks, 1), *flags = check_in(c, n_blocks, 1), *shift = check_in(c, n_blocks, 1);
+	uint8_t *projection = check_in(c, n_blocks, 1), *flags = check_in(c, n_blocks, 1);
 	int16_t *col = check_in(c, n_blocks, 2), *row = check_in(c, n_blocks, 2), *bias = check_in(c, n_blocks, 2);
 	uint16_t *offset = check_in(c, n_blocks, 2);
 	uint64_t *mask = check_in(c, n_blocks, 8);
 	uint32_t n = 0;
 
 	for (uint32_t b = 0; b < n_blocks; b++) {
-		const uint32_t level = check_one_in(c, 4) ? check_below(c, 32) : check_below(c, 3);
+		const uint32_t level = check_one_in(c, 4) ? check_below(c, PSR_MAX_LEVELS) : check_below(c, 3);
 		projection[b] = (uint8_t)check_below(c, n_projections);
-		flags[b] = (uint8_t)(level | (check_below(c, 2) ? PSR_BLOCK_TWO_SIDED : 0));
-		shift[b] = (uint8_t)(PSR_DEPTH_SHIFT_MIN + check_below(c, PSR_DEPTH_SHIFT_MAX - PSR_DEPTH_SHIFT_MIN + 1));
+		flags[b] = (uint8_t)(level | (check_u32(c) & (PSR_BLOCK_DEPTH | PSR_BLOCK_TWO_SIDED)));
 		if (!check_one_in(c, 8)) { /* else anywhere */
 			col[b] = (int16_t)((int)check_below(c, 8) - 4);
 			row[b] = (int16_t)((int)check_below(c, 8) - 4);
@@ -44,7 +43,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	}
 	*blocks = (struct psr_blocks){
 		.n_blocks = n_blocks, .n_projections = n_projections, .n_samples = n, .run = run, .block_projection = projection,
-		.col = col, .row = row, .flags = flags, .depth_bias = bias, .depth_shift = shift, .mask = mask,
+		.col = col, .row = row, .flags = flags, .depth_bias = bias, .mask = mask,
 		.sphere_x = check_in(c, n_blocks, 2), .sphere_y = check_in(c, n_blocks, 2), .sphere_z = check_in(c, n_blocks, 2),
 		.sphere_r = check_in(c, n_blocks, 2), .cone_x = check_in(c, n_blocks, 1), .cone_y = check_in(c, n_blocks, 1),
 		.cone_z = check_in(c, n_blocks, 1), .cone_sine = check_in(c, n_blocks, 1),
