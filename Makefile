@@ -43,7 +43,7 @@ $(error config=$(config): one of release, debug, asan, tsan, aarch64)
 endif
 
 INC := -I. -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
-CFLAGS_ALL   = -std=gnu11 $(COMMON) $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(INC) $(CFLAGS) -MMD -MP
+CFLAGS_ALL   = -std=gnu11 $(COMMON) $(WARN) -Wstrict-prototypes -Wmissing-prototypes $(INC) $(ISA) $(CFLAGS) -MMD -MP
 CXXFLAGS_ALL = -std=c++17 $(COMMON) $(WARN) $(INC) $(CXXFLAGS) -MMD -MP
 
 # All cores unless told otherwise: jobs=1, or make -j.
@@ -96,9 +96,9 @@ all: deps ## all: install what is missing, build everything (the default)
 compile: $(PROGRAMS)
 
 # Kernels: the compiler may turn loops into vectors, and speculate where only an exception flag would tell.
-$(BUILD)/libpsr/simd/c/%.o: CFLAGS += -O3 -fno-trapping-math
-$(BUILD)/libpsr/simd/avx2/%.o: CFLAGS += -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
-$(BUILD)/libpsr/simd/avx512/%.o: CFLAGS += -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
+$(BUILD)/libpsr/simd/c/%.o: ISA := -O3 -fno-trapping-math
+$(BUILD)/libpsr/simd/avx2/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
+$(BUILD)/libpsr/simd/avx512/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
 	-mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vbmi2
 
 $(BUILD)/%.c.o: %.c

@@ -3,8 +3,8 @@
 # on a machine without them, or give other bits.
 . "$(dirname "$0")/../e2e/lib.sh"
 
-if [ "$CONFIG" != release ] || [ "$(uname -m)" != x86_64 ]; then
-	skip "no instruction set leaks" "looked for in release builds for x86-64"
+if [ "$(uname -m)" != x86_64 ]; then
+	skip "no instruction set leaks" "looked for in builds for x86-64"
 	exit
 fi
 

@@ -1,7 +1,8 @@
-/* strip_light, strip_color, strip_write and depth_row: samples of 1 to STRIP pixels, lights of each kind, any numbers. */
+/* strip_light, strip_lit, strip_color, strip_write and depth_row: 1 to STRIP samples, lights of each kind, any numbers. */
 #include <math.h>
 #include <stddef.h>
 #include "base/maths.h"
+#include "psr/direction.h"
 #include "tests/simd/lib/check.h"
 
 static void settle(struct strip *strip)
@@ -13,9 +14,6 @@ static void random_samples(struct check *c, struct strip *strip, uint32_t n, int
 {
 	strip->n = n;
 	strip->is_specular = is_specular;
-	for (uint32_t i = 0; i < n; i++)
-		if (!is_specular)
-			strip->attr[i] &= ~(UINT64_C(0xffff) << 40);
 	for (float *value = strip->px; value < strip->sr; value++)
 		*value = check_plain_or_any(c, is_spoilt, -1, 1);
 	for (uint32_t i = 0; i < STRIP; i++) {
@@ -84,6 +82,43 @@ static void bench_sun_specular(struct check *c)
 static void bench_spot_specular(struct check *c)
 {
 	light(c, STRIP, PSR_LIGHT_SPOT, 1, 0);
+}
+
+/* Of directional lights: tables are made for these alone. */
+static void lit(struct check *c, uint32_t first, uint32_t n, uint32_t n_lights, int is_spoilt)
+{
+	float (*table)[4] = check_out(c, first + n, sizeof *table), *ambient = check_in(c, 3, sizeof *ambient);
+	struct strip_light *lights = check_in(c, n_lights, sizeof *lights);
+	struct warp_instance *instance = check_in(c, 1, sizeof *instance);
+	const struct strip_view view = { .instance = instance, .n_instances = 1, .direction_word = psr_direction_words() };
+
+	for (uint32_t l = 0; l < n_lights; l++) {
+		lights[l].kind = PSR_LIGHT_DIRECTIONAL;
+		for (int k = 0; k < 3; k++) {
+			lights[l].to_light[k] = check_plain_or_any(c, is_spoilt, -1, 1);
+			lights[l].color[k] = check_plain_or_any(c, is_spoilt, 0, 2);
+		}
+	}
+	for (int k = 0; k < 9; k++)
+		instance->turn[k / 3][k % 3] = check_plain_or_any(c, is_spoilt, -1, 1);
+	for (int k = 0; k < 3; k++)
+		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->strip_lit(table, &view, lights, n_lights, ambient, first, n);
+		if (!c->is_bench)
+			check_settle(table[0], 4 * (size_t)(first + n));
+	}
+}
+
+static void random_lit(struct check *c)
+{
+	lit(c, check_below(c, 1000), 1 + check_below(c, STRIP), check_below(c, 5), (int)check_below(c, 2));
+}
+
+static void bench_lit(struct check *c)
+{
+	lit(c, 0, STRIP, 2, 0);
 }
 
 static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
@@ -174,12 +209,14 @@ int main(int argc, char **argv)
 	static const struct check_test tests[] = {
 		{ "strip_light: random lights", random_light, 2000, NULL },
 		{ "strip_light: infinite, huge, denormal and no numbers", spoilt_light, 2000, NULL },
+		{ "strip_lit: random normals and lights", random_lit, 1000, NULL },
 		{ "strip_color: random samples", random_color, 1000, NULL },
 		{ "strip_write: random rows", random_write, 1000, NULL },
 		{ "depth_row: any depths and exponents", random_depths, 1000, NULL },
 		{ "strip_light, directional", bench_sun, 0, "sample" },
 		{ "strip_light, directional, highlights", bench_sun_specular, 0, "sample" },
 		{ "strip_light, spot, highlights", bench_spot_specular, 0, "sample" },
+		{ "strip_lit, two lights", bench_lit, 0, "normal" },
 		{ "strip_color, highlights", bench_color, 0, "sample" },
 		{ "strip_write, 8 bits", bench_write, 0, "pixel" },
 		{ "depth_row", bench_depths, 0, "pixel" },

@@ -119,6 +119,7 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 		.instance = instance, .n_instances = n_instances, .direction_word = psr_direction_words(), .needs = needs,
 		.half_width = (float)check_below(c, PSR_MAX_SIDE) / 2, .half_height = (float)check_below(c, PSR_MAX_SIDE) / 2,
 		.focal = check_plain_or_any(c, is_spoilt, 1, 1000), .perspective = (int)check_below(c, 2),
+		.lit = check_one_in(c, 4) && !c->is_bench ? check_in(c, PSR_DIRECTIONS, sizeof *view->lit) : NULL,
 	};
 	for (int k = 0; k < 3; k++)
 		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);

@@ -30,7 +30,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const uint32_t level = check_one_in(c, 4) ? check_below(c, PSR_MAX_LEVELS) : check_below(c, 3);
 		projection[b] = (uint8_t)check_below(c, n_projections);
-		flags[b] = (uint8_t)(level | check_below(c, 16) << 3 | (check_below(c, 2) ? PSR_BLOCK_TWO_SIDED : 0));
+		flags[b] = (uint8_t)(level | (check_u32(c) & (PSR_BLOCK_DEPTH | PSR_BLOCK_TWO_SIDED)));
 		if (!check_one_in(c, 8)) { /* else anywhere */
 			col[b] = (int16_t)((int)check_below(c, 8) - 4);
 			row[b] = (int16_t)((int)check_below(c, 8) - 4);
