@@ -224,7 +224,8 @@ static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light 
 		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
 		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
 		const float x = dx / distance, y = dy / distance, z = dz / distance;
-		float amount = psr_choose(l.reference2 > 0, l.reference2 / distance2, 1);
+		const float falling = l.reference2 / distance2; /* a light in a sample itself is not to be infinite */
+		float amount = psr_choose(l.reference2 > 0, psr_choose(falling < 0x1p60f, falling, 0x1p60f), 1);
 		if (is_spot) { /* a smooth edge: 3 t^2 - 2 t^3 */
 			const float c = -((x * l.axis[0] + y * l.axis[1]) + z * l.axis[2]);
 			const float t = (c - l.cos_outer) / (l.cos_inner - l.cos_outer);
