@@ -278,12 +278,13 @@ static void fill_chunk(int i, void *userdata)
 	}
 }
 
-/* Room for n elements; what was there is gone. */
+/* Room for n elements, and a quarter more, so that the next frame's will do; what was there is gone. */
 static void *grow(void *array, size_t *capacity, size_t n, size_t size)
 {
 	if (n <= *capacity && array)
 		return array;
 	psr_free(array);
+	n += n / 4;
 	array = psr_alloc_array(n, size);
 	*capacity = array ? n : 0;
 	return array;

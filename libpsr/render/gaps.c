@@ -1,5 +1,15 @@
 #include "render/render.h"
 
+/* Nothing is drawn near: whole weights, and no look at the words. */
+static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
+{
+	for (uint32_t y = y0; y < y1; y++)
+		for (uint32_t x = x0; x < x1; x++)
+			weight[(size_t)y * stride + x] = WEIGHT_ONE;
+}
+
+_Static_assert(TILE_WIDTH % GAPS_WIDTH == 0 && TILE_HEIGHT % BRICK == 0, "what gaps are looked for in lies in one tile");
+
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
                              uint32_t y1, uint16_t *weight, uint8_t *bricks)
 {
@@ -9,8 +19,13 @@ struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, c
 	for (uint32_t y = y0; y < y1; y += BRICK)
 		for (uint32_t x = 0; x < stack->width; x += GAPS_WIDTH) {
 			const uint32_t x1 = x + GAPS_WIDTH < stack->width ? x + GAPS_WIDTH : stack->width;
-			uint8_t marks[GAPS_WIDTH / BRICK];
-			const struct gaps_counts counts = simd->gaps(&target, x, x1, y, y + BRICK < y1 ? y + BRICK : y1, marks);
+			const uint32_t brick_y1 = y + BRICK < y1 ? y + BRICK : y1;
+			uint8_t marks[GAPS_WIDTH / BRICK] = { 0 };
+			struct gaps_counts counts = { 0, 0, 0 };
+			if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
+				make_whole(weight, stack->width, x, x1, y, brick_y1);
+			else
+				counts = simd->gaps(&target, x, x1, y, brick_y1, marks);
 			for (uint32_t b = x / BRICK; b * BRICK < x1; b++)
 				bricks[(size_t)(y / BRICK) * bricks_x + b] = marks[b - x / BRICK];
 			total.n_partial += counts.n_partial;

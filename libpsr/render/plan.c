@@ -238,6 +238,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;
+	plan->is_quiet = NULL;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 

@@ -38,6 +38,9 @@ struct plan {
 	struct strip_light *light;
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
+	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are empty
+	 * and weights are whole there. */
+	const uint8_t *is_quiet;
 	uint64_t n_samples;
 	void *storage;             /* of all arrays */
 	size_t storage_size;

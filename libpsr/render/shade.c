@@ -56,6 +56,8 @@ void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr
 	psr_pool_for(pool, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
 }
 
+_Static_assert(STRIP == TILE_WIDTH, "a strip lies in one tile");
+
 void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
                const uint16_t *weight, uint32_t y, struct shade_counts *counts)
 {
@@ -67,7 +69,10 @@ void shade_row(const struct simd *simd, const struct plan *plan, const struct sh
 		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
 		const int keeps_linear = target->wants && is_wanted(plan, target->wants, x, y, n);
 		strip.x0 = x;
-		simd->strip_list(&strip, word + x, weight + x, n);
+		if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
+			strip.n = 0;
+		else
+			simd->strip_list(&strip, word + x, weight + x, n);
 		const int is_timed = (x / STRIP + y) % TIMED_EVERY == 0;
 		uint64_t start = is_timed ? now_ns() : 0, middle = start;
 		if (strip.n) {

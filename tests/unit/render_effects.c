@@ -4,6 +4,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -263,6 +264,61 @@ static void every_effect_says_why_it_was_left_out(void **state)
 	}
 }
 
+/* A renderer that goes from scene to scene: what it keeps from the frame before must not show. */
+static void frames_do_not_depend_on_the_frame_before(void **state)
+{
+	(void)state;
+	struct psr_renderer *renderer;
+	struct psr_error err;
+	assert_int_equal(psr_renderer_create(&renderer), 0);
+	for (uint32_t i = 0; i < 90; i++) {
+		const uint32_t which = i / 3 * 7 % 60;
+		struct case_of c;
+		struct drawn alone, next_one;
+		case_make(&c, which);
+		for (int k = 0; k < 3; k++) /* thrice the same picture, its object somewhere else, and out of it at last */
+			c.scene.camera.target[k] += (i % 3) * psr_model_info(c.instance[0].model)->scale;
+		psr_settings_default(&c.settings, 700, 300);
+		draw(&alone, &c, &c.settings, NULL);
+		next_one.frame = alone.frame;
+		next_one.frame.rgb = malloc(3 * 700 * 300);
+		next_one.frame.depth = malloc(4 * 700 * 300);
+		if (psr_render(renderer, &c.scene, &c.settings, NULL, &next_one.frame, &err))
+			fail_msg("%s", err.text);
+		assert_same(&alone, &next_one, which, "the frame before");
+		release(&alone);
+		release(&next_one);
+	}
+	psr_renderer_destroy(renderer);
+}
+
+static void a_moving_camera_takes_no_more_memory(void **state)
+{
+	(void)state;
+	struct psr_renderer *renderer;
+	struct psr_error err;
+	struct case_of c;
+	uint64_t bytes = 0;
+	case_make(&c, 3);
+	c.scene.n_instances = 1;
+	psr_settings_default(&c.settings, 320, 240);
+	struct psr_frame frame = { .width = 320, .height = 240, .rgb = malloc(3 * 320 * 240) };
+	assert_int_equal(psr_renderer_create(&renderer), 0);
+	for (int i = 0; i < 40; i++) {
+		const double *middle = psr_model_info(c.instance[0].model)->origin, scale = psr_model_info(c.instance[0].model)->scale;
+		c.scene.camera.eye[0] = middle[0] + 3 * scale * sin(i * 0.01);
+		c.scene.camera.eye[1] = middle[1];
+		c.scene.camera.eye[2] = middle[2] + 3 * scale * cos(i * 0.01);
+		if (psr_render(renderer, &c.scene, &c.settings, NULL, &frame, &err))
+			fail_msg("%s", err.text);
+		if (i == 0)
+			bytes = psr_renderer_bytes(renderer);
+		assert_int_equal(psr_renderer_bytes(renderer), bytes);
+	}
+	psr_renderer_destroy(renderer);
+	free(frame.rgb);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -271,6 +327,8 @@ int main(void)
 		cmocka_unit_test(a_light_without_color_is_not_asked),
 		cmocka_unit_test(many_lights_are_tabulated_and_few_are_not),
 		cmocka_unit_test(every_effect_says_why_it_was_left_out),
+		cmocka_unit_test(frames_do_not_depend_on_the_frame_before),
+		cmocka_unit_test(a_moving_camera_takes_no_more_memory),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }
