@@ -133,12 +133,33 @@ static void needles_are_seen_from_all_around_with_fewer_samples(void **state)
 	assert_true(3 * n_points[0] < 2 * n_points[1]);
 }
 
+/* Places are covered in windows of 2,048; these needles have several of them. */
+static void threads_do_not_change_a_sample_of_needles(void **state)
+{
+	struct level_set set[3];
+
+	(void)state;
+	for (int i = 0; i < 3; i++) {
+		level_set_make(&set[i], meshes_needles(400, 0.4 * PIXEL), RESOLUTION, i + 1);
+		assert_int_equal(set[i].level.cover.n_points, set[0].level.cover.n_points);
+		for (uint32_t k = 0; k < set[0].level.cover.n_points; k++) {
+			const struct cover_point *a = &set[0].level.cover.point[k], *b = &set[i].level.cover.point[k];
+
+			assert_memory_equal(a->position, b->position, sizeof a->position);
+			assert_true(a->attr == b->attr && a->projection == b->projection && a->patch == b->patch && a->sample == b->sample);
+		}
+	}
+	for (int i = 0; i < 3; i++)
+		level_set_close(&set[i]);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(only_plates_of_half_a_pixel_and_one_look_are_thin),
 		cmocka_unit_test(bodies_and_sheets_are_not_thin),
 		cmocka_unit_test(needles_are_seen_from_all_around_with_fewer_samples),
+		cmocka_unit_test(threads_do_not_change_a_sample_of_needles),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
