@@ -4,6 +4,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "../base/maths.h"
+#include "../base/mem.h"
 #include "adequacy.h"
 #include "door.h"
 #include "draft.h"
@@ -121,6 +122,7 @@ static int make_levels(struct build *build)
 {
 	struct cover finer = { 0 };
 	struct seen finer_seen = { 0 };
+	uint8_t *finer_sides = NULL;
 	double sine, cosine, started = now();
 	int rc = PSR_OK;
 
@@ -136,18 +138,23 @@ static int make_levels(struct build *build)
 		if (build->n_levels_done > 0) {
 			level.finer = &finer;
 			level.finer_seen = &finer_seen;
+			level.finer_sides = finer_sides;
 		}
 		rc = make_level(build, &level);
 		cover_fini(&finer);
 		seen_fini(&finer_seen);
 		finer = level.cover;
 		finer_seen = level.seen;
+		psr_free(finer_sides);
+		finer_sides = level.sides;
+		level.sides = NULL;
 		level.cover = (struct cover){ 0 };
 		level.seen = (struct seen){ 0 };
 		level_fini(&level);
 	}
 	cover_fini(&finer);
 	seen_fini(&finer_seen);
+	psr_free(finer_sides);
 	build->report.seconds_select = now() - started - build->report.seconds_rays;
 	if (rc == PSR_ERR_MEMORY || rc == PSR_ERR_LIMIT)
 		return psr_fail(build->err, rc, "no memory to sample the mesh at resolution %u; use a lower one",

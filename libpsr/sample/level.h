@@ -38,7 +38,8 @@ struct level {
 	struct cover cover;
 	uint8_t *sides;           /* enum side, by primitive */
 	const struct cover *finer; /* of the level with half of this one's ds, from which attributes are blended; or NULL */
-	const struct seen *finer_seen; /* of the same level */
+	const struct seen *finer_seen; /* of the same level, */
+	const uint8_t *finer_sides;    /* and: what is thin there is thin here */
 	uint64_t n_rays, n_patches;
 	double seconds_rays;
 };

@@ -64,7 +64,9 @@ static void mark_chunk(int i, void *userdata)
 		for (; prim < end && part.n < BATCH; prim++) {
 			const float *n = ray_scene_normal(level->scene, prim);
 
-			if (level->surface->is_plain[texture_material(level->mesh, prim)] && (n[0] != 0 || n[1] != 0 || n[2] != 0))
+			if (level->finer_sides != NULL && (level->finer_sides[prim] & SIDE_THIN) != 0)
+				level->sides[prim] |= SIDE_THIN;
+			else if (level->surface->is_plain[texture_material(level->mesh, prim)] && (n[0] != 0 || n[1] != 0 || n[2] != 0))
 				part.prim[part.n++] = prim;
 		}
 		for (int k = 0; k < N_PLACES && part.n != 0; k++)

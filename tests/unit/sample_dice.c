@@ -202,41 +202,12 @@ static void thin_things_have_no_gaps(void **state)
 	}
 }
 
-/* Pyramids of three sides from the middle outwards. */
-static struct psr_mesh *needles(uint32_t n, double width)
-{
-	struct psr_mesh *mesh = meshes_new(4 * n, 3 * n);
-	uint64_t seed = 5;
-
-	for (uint32_t i = 0; i < n; i++) {
-		double direction[3], frame[3][3];
-
-		do {
-			for (int k = 0; k < 3; k++)
-				direction[k] = 2 * meshes_random(&seed) - 1;
-		} while (v3d_dot(direction, direction) > 1 || v3d_normalize(direction, direction) < 0.1);
-		psr_direction_frame(direction, frame);
-		v3d_scale(mesh->position[4 * i + 3], direction, 0.9);
-		for (uint32_t c = 0; c < 3; c++) {
-			double *foot = mesh->position[4 * i + c], angle = 2.0943951 * c;
-
-			v3d_scale(foot, direction, 0.4);
-			v3d_add_scaled(foot, foot, width / 2 * cos(angle), frame[0]);
-			v3d_add_scaled(foot, foot, width / 2 * sin(angle), frame[1]);
-			mesh->triangle[3 * i + c][0] = 4 * i + c;
-			mesh->triangle[3 * i + c][1] = 4 * i + (c + 1) % 3;
-			mesh->triangle[3 * i + c][2] = 4 * i + 3;
-		}
-	}
-	return mesh;
-}
-
 /* Places are tested a third of a pixel apart, from the foot to the tip of each face, and covered by a sample within half a
  * pixel or moved by 0.55: the middle of a face that is thinner than that is within 0.55 + 0.165, and a tenth for its
  * slant. What views have not found is left to adequacy's rounds; it is little. */
 static void needles_are_sampled_from_foot_to_tip_on_every_face(void **state)
 {
-	struct psr_mesh *mesh = needles(60, 0.3 * 2 / 96);
+	struct psr_mesh *mesh = meshes_needles(60, 0.3 * 2 / 96);
 	struct level_set set;
 	uint32_t n_seen = 0;
 

@@ -67,6 +67,35 @@ static inline void level_set_close(struct level_set *set)
 	free(set->area);
 }
 
+/* Pyramids of three sides from the middle outwards. */
+static inline struct psr_mesh *meshes_needles(uint32_t n, double width)
+{
+	struct psr_mesh *mesh = meshes_new(4 * n, 3 * n);
+	uint64_t seed = 5;
+
+	for (uint32_t i = 0; i < n; i++) {
+		double direction[3], frame[3][3];
+
+		do {
+			for (int k = 0; k < 3; k++)
+				direction[k] = 2 * meshes_random(&seed) - 1;
+		} while (v3d_dot(direction, direction) > 1 || v3d_normalize(direction, direction) < 0.1);
+		psr_direction_frame(direction, frame);
+		v3d_scale(mesh->position[4 * i + 3], direction, 0.9);
+		for (uint32_t c = 0; c < 3; c++) {
+			double *foot = mesh->position[4 * i + c], angle = 2.0943951 * c;
+
+			v3d_scale(foot, direction, 0.4);
+			v3d_add_scaled(foot, foot, width / 2 * cos(angle), frame[0]);
+			v3d_add_scaled(foot, foot, width / 2 * sin(angle), frame[1]);
+			mesh->triangle[3 * i + c][0] = 4 * i + c;
+			mesh->triangle[3 * i + c][1] = 4 * i + (c + 1) % 3;
+			mesh->triangle[3 * i + c][2] = 4 * i + 3;
+		}
+	}
+	return mesh;
+}
+
 /* A random place of the surface, by area; returns its primitive, of which n is the front. */
 static inline uint32_t level_set_place(const struct level_set *set, uint64_t *seed, float p[3], float n[3])
 {
