@@ -12,10 +12,10 @@
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
 
-#define MODELS 5
+#define MODELS 6
 
 static struct psr_model *models[MODELS];
-static const char *const names[MODELS] = { "teapot", "wheel", "top", "sphere", "square" };
+static const char *const names[MODELS] = { "teapot", "wheel", "top", "sphere", "square", "matt sphere" };
 
 static int open_models(void **state)
 {
@@ -23,6 +23,7 @@ static int open_models(void **state)
 	const struct shape_options shiny = { .resolution = 96, .diffuse = 0x6090c0, .specular = 0x8410, .exponent = 80, .cones = 1,
 		                                 .scale = 3, .origin = { 5, -2, 1 } };
 	const struct shape_options leaf = { .resolution = 64, .diffuse = 0x20ff20, .two_sided = 1, .scale = 1 };
+	const struct shape_options matt = { .resolution = 128, .diffuse = 0xc0c0c0, .scale = 1 };
 	struct psr_error err;
 	for (int i = 0; i < 3; i++) {
 		char path[64];
@@ -32,6 +33,7 @@ static int open_models(void **state)
 	}
 	models[3] = shape_build(&shiny, 0.9);
 	models[4] = shape_build(&leaf, 0);
+	models[5] = shape_build(&matt, 0.8);
 	return 0;
 }
 
@@ -227,8 +229,8 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 	struct case_of c;
 	struct drawn d;
 	struct simd simd = counting();
-	case_make(&c, 1);
-	c.instance[0].model = models[1]; /* the wheel has no highlights */
+	case_make(&c, 5);
+	c.scene.n_instances = 1;
 	psr_settings_default(&c.settings, 640, 480);
 	for (int i = 0; i < 5; i++)
 		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { i - 2, -1, -1 }, .color = { 0.3, 0.3, 0.3 } };
