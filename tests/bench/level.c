@@ -13,7 +13,7 @@ struct level {
 	struct psr_run *run;
 	int16_t *sphere[3], *col, *row, *bias;
 	uint16_t *radius, *attr_offset, *depth;
-	uint8_t *block_projection, *flags, *shift, *cone_sine, *visibility;
+	uint8_t *block_projection, *flags,  *cone_sine, *visibility;
 	int8_t *cone[3];
 	uint64_t *mask, *attr, (*visible)[2];
 };
@@ -55,7 +55,6 @@ static void allocate(struct level *to, const struct psr_blocks *room)
 	to->attr_offset = report_alloc(n, sizeof *to->attr_offset);
 	to->block_projection = report_alloc(n, 1);
 	to->flags = report_alloc(n, 1);
-	to->shift = report_alloc(n, 1);
 	to->cone_sine = report_alloc(n, 1);
 	to->visibility = report_alloc(n, 1);
 	to->mask = report_alloc(n, sizeof *to->mask);
@@ -103,7 +102,6 @@ static void add_block(struct level *to, const struct psr_blocks *from, uint32_t 
 	to->flags[j] = from->flags[b] & (uint8_t)~PSR_BLOCK_LEVEL;
 	to->cone_sine[j] = from->cone_sine != NULL ? from->cone_sine[b] : 0;
 	to->bias[j] = from->depth_bias[b];
-	to->shift[j] = from->depth_shift[b];
 	to->mask[j] = from->mask[b];
 	if (from->visibility_mask != NULL)
 		to->visibility[j] = share_mask(to, run, from->visibility_mask[psr_blocks_visibility(from, b)]);
@@ -151,7 +149,6 @@ static void attach(struct level *to, const struct psr_blocks *from)
 	b->row = to->row;
 	b->flags = to->flags;
 	b->depth_bias = to->bias;
-	b->depth_shift = to->shift;
 	b->mask = to->mask;
 	b->attr_offset = to->attr_offset;
 	b->depth = to->depth;
@@ -172,7 +169,7 @@ static void release(struct level *to)
 {
 	void *all[] = { to->projection, to->cluster, to->run, to->sphere[0], to->sphere[1], to->sphere[2], to->cone[0],
 		            to->cone[1], to->cone[2], to->col, to->row, to->bias, to->radius, to->attr_offset,
-		            to->block_projection, to->flags, to->shift, to->cone_sine, to->visibility, to->mask, to->visible,
+		            to->block_projection, to->flags, to->cone_sine, to->visibility, to->mask, to->visible,
 		            to->depth, to->attr };
 
 	for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
