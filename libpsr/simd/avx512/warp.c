@@ -2,38 +2,52 @@
 #include "simd/block.h"
 #include "simd/kernels.h"
 
-/* Up to 64 words and depths of cells, and the places that they go to. They are computed first and stored after, 16 apart
- * in turn, since samples that follow each other often fall into one pixel, and a store must not wait for the one just
- * before. Depths are above 0, so that they compare as integers. Ones change nothing. */
-struct stores {
-	_Alignas(64) uint64_t word[4][16];
-	_Alignas(64) uint32_t at[4][16], z[4][16], cell[4][16];
+/* What falls into the tile, of many blocks: words, depths of cells, and the places that they go to. They are computed first
+ * and stored after, so that the long way from a block's head to its words is walked for several blocks at a time; and stored a
+ * quarter of the list apart in turn, since samples that follow each other often fall into one pixel, and a store must not wait
+ * for the one just before. */
+#define LIST 512
+struct words {
+	_Alignas(64) uint64_t word[LIST + 16];
+	_Alignas(64) uint32_t at[LIST + 16];
+	uint32_t n;
+};
+struct cells {
+	_Alignas(64) uint32_t z[LIST + 16];
+	_Alignas(64) uint32_t at[LIST + 16];
+	uint32_t n, level;
 };
 
-#define LOWER(n, type, base, value, place)                                            \
-	for (int l = 0; l < 16; l++) {                                                \
-		_Pragma("GCC unroll 4") for (int g = 0; g < n; g++) {                 \
-			type *at = &base[place[g][l]];                                \
-			const type own = value[g][l], there = *at;                    \
-			*at = own < there ? own : there;                              \
-		}                                                                     \
-	}
-#define LOWER_ALL(n_groups, ...)                                                      \
-	switch (n_groups) {                                                           \
-	case 1: LOWER(1, __VA_ARGS__) break;                                          \
-	case 2: LOWER(2, __VA_ARGS__) break;                                          \
-	case 3: LOWER(3, __VA_ARGS__) break;                                          \
-	default: LOWER(4, __VA_ARGS__) break;                                         \
-	}
+#define LOWER(type, base, value, i)                     \
+	do {                                                \
+		type *at = &(base)[list->at[i]];                \
+		const type own = list->value[i], there = *at;   \
+		*at = own < there ? own : there;                \
+	} while (0)
+#define LOWER_ALL(type, base, value)                    \
+	do {                                                \
+		const uint32_t part = list->n / 4;              \
+		for (uint32_t i = 0; i < part; i++) {           \
+			LOWER(type, base, value, i);                \
+			LOWER(type, base, value, i + part);         \
+			LOWER(type, base, value, i + 2 * part);     \
+			LOWER(type, base, value, i + 3 * part);     \
+		}                                               \
+		for (uint32_t i = 4 * part; i < list->n; i++)   \
+			LOWER(type, base, value, i);                \
+		list->n = 0;                                    \
+	} while (0)
 
-static inline void lower_words(uint64_t *base, const struct stores *s, int n_groups)
+static void lower_words(uint64_t *base, struct words *list)
 {
-	LOWER_ALL(n_groups, uint64_t, base, s->word, s->at)
+	LOWER_ALL(uint64_t, base, word);
 }
 
-static inline void lower_cells(uint32_t *base, const struct stores *s, int n_groups)
+/* Depths are above 0, so that they compare as integers. */
+static void lower_cells(const struct warp_target *t, struct cells *list)
 {
-	LOWER_ALL(n_groups, uint32_t, base, s->z, s->cell)
+	uint32_t *base = (uint32_t *)t->cells[list->level].z;
+	LOWER_ALL(uint32_t, base, z);
 }
 
 static inline __m512 rows_of(const struct warp_block *b, int a)
@@ -102,15 +116,27 @@ static inline __mmask16 inside(__mmask16 k, __m512i u, __m512i v, int32_t x0, in
 	return _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(v, _mm512_set1_epi32(y0)), _mm512_set1_epi32(y1 - y0));
 }
 
-static inline void place_cells(struct stores *stores, int g, const struct warp_cells *cells, int level, __mmask16 k, __m512i u,
-                               __m512i v, __m512 z)
+static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __mmask16 k, __m512i u, __m512i v,
+                              __m512 z)
 {
 	const __m512i one = _mm512_set1_epi32(1), by = _mm512_set1_epi32(level);
 	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one), y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
-	const __m512i line = _mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride));
+	const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride)), x);
 	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
-	_mm512_store_si512(stores->cell[g], _mm512_mask_add_epi32(_mm512_set1_epi32((int)cells->first), k, line, x));
-	_mm512_store_si512(stores->z[g], _mm512_mask_mov_epi32(_mm512_set1_epi32(-1), k, _mm512_castps_si512(z)));
+	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
+	_mm512_storeu_si512(list->z + list->n, _mm512_maskz_compress_epi32(k, _mm512_castps_si512(z)));
+	list->n += (uint32_t)__builtin_popcount(k);
+}
+
+static inline void list_words(struct words *list, __mmask16 k, __m512i at, __m512i id, __m512 z)
+{
+	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+	const __m512i high = _mm512_add_epi32(low, _mm512_set1_epi32(8));
+	const __m512i own = _mm512_maskz_compress_epi32(k, id), bits = _mm512_maskz_compress_epi32(k, _mm512_castps_si512(z));
+	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
+	_mm512_storeu_si512(list->word + list->n, _mm512_permutex2var_epi32(own, low, bits));
+	_mm512_storeu_si512(list->word + list->n + 8, _mm512_permutex2var_epi32(own, high, bits));
+	list->n += (uint32_t)__builtin_popcount(k);
 }
 
 static const uint8_t ordinals[64] = {
@@ -118,15 +144,11 @@ static const uint8_t ordinals[64] = {
 	32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
 };
 
-static inline uint32_t warp_one(const struct warp_target *t, const struct bin_entry *entry, __m512i unused)
+static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry)
 {
-	/* What interleaving 32-bit halves within 128 bits does to the order of 16. */
-	const __m512i order = _mm512_setr_epi32(0, 1, 4, 5, 8, 9, 12, 13, 2, 3, 6, 7, 10, 11, 14, 15);
 	const struct warp_instance *in = &t->instance[entry->instance];
 	_Alignas(64) uint8_t sample[64];
 	struct warp_block b;
-	struct stores stores;
-	uint32_t n_inside = 0;
 
 	warp_block_make(&b, in, entry->slot);
 	const int n = __builtin_popcountll(b.mask), n_groups = (n + 15) / 16;
@@ -151,32 +173,32 @@ static inline uint32_t warp_one(const struct warp_target *t, const struct bin_en
 		if (entry->is_mixed)
 			k &= (__mmask16)~faces_away(t, in, b.attr + 16 * g, k, u, v);
 		if (entry->level)
-			place_cells(&stores, g, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
+			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
 		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
-		n_inside += (uint32_t)__builtin_popcount(k);
-
 		const __m512i line = _mm512_mullo_epi32(pixel_v, _mm512_set1_epi32((int)t->stride));
-		const __m512i at = _mm512_mask_add_epi32(unused, k, line, pixel_u);
-		const __m512i id = _mm512_add_epi32(s, _mm512_set1_epi32((int)b.id));
-		const __m512i bits = _mm512_mask_mov_epi32(_mm512_set1_epi32(-1), k, _mm512_castps_si512(z1));
-		_mm512_store_si512(stores.at[g], _mm512_permutexvar_epi32(order, at));
-		_mm512_store_si512(stores.word[g], _mm512_unpacklo_epi32(id, bits));
-		_mm512_store_si512(stores.word[g] + 8, _mm512_unpackhi_epi32(id, bits));
+		list_words(words, k, _mm512_add_epi32(line, pixel_u), _mm512_add_epi32(s, _mm512_set1_epi32((int)b.id)), z1);
 	}
-	lower_words(t->word, &stores, n_groups);
-	if (entry->level)
-		lower_cells((uint32_t *)t->cells[entry->level].z, &stores, n_groups);
-	return n_inside;
 }
 
 uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	/* Words of the tile and no others, however narrow it is: its neighbours may be another thread's. */
-	const __m512i lane = _mm512_min_epi32(_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
-	                                      _mm512_set1_epi32(target->x1 - target->x0 - 1));
-	const __m512i unused = _mm512_add_epi32(lane, _mm512_set1_epi32(target->y0 * (int)target->stride + target->x0));
+	struct words words;
+	struct cells cells;
 	uint64_t n_inside = 0;
-	for (uint32_t e = 0; e < n; e++)
-		n_inside += warp_one(target, &entry[e], unused);
+	words.n = cells.n = cells.level = 0;
+	for (uint32_t e = 0; e < n; e++) {
+		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
+			n_inside += words.n;
+			lower_words(target->word, &words);
+		}
+		if (entry[e].level && (entry[e].level != cells.level || cells.n > LIST - PSR_BLOCK_SAMPLES)) {
+			lower_cells(target, &cells);
+			cells.level = entry[e].level;
+		}
+		list_block(&words, &cells, target, &entry[e]);
+	}
+	n_inside += words.n;
+	lower_words(target->word, &words);
+	lower_cells(target, &cells);
 	return n_inside;
 }
