@@ -106,8 +106,8 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  "facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
 		  0, 0, NULL, NULL },
 		{ "show", 0, PSR_OPT_STRING, &shot->show_text, "STAGE",
-		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, weights, holes, depth "
-		  "or normals.",
+		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
+		  "holes or depth.",
 		  0, 0, NULL, NULL },
 		{ "depth", 0, PSR_OPT_STRING, &shot->depth, "FILE",
 		  "Depth along the view axis in the units of the source file, +inf where nothing is: .pfm, .exr or .tif.", 0, 0,

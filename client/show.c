@@ -6,6 +6,7 @@
 #define PLANE(name) (1u << PSR_WIRE_PLANE_##name)
 #define EMPTY_WORD UINT64_C(0x7f800000ffffffff)
 #define NO_SAMPLE 255 /* in the block plane */
+#define BACKGROUND "\x10\x14\x28"
 
 struct canvas {
 	const struct psr_picture *picture;
@@ -13,6 +14,9 @@ struct canvas {
 	double forward[3];
 	uint8_t *rgb;
 };
+
+/* What painters of samples need. */
+#define OF_SAMPLES (PLANE(DEPTH) | PLANE(NORMAL) | PLANE(WORDS) | PLANE(BLOCK))
 
 typedef void painter(uint8_t rgb[3], const struct canvas *canvas, size_t i);
 
@@ -69,43 +73,29 @@ static double light_of(const struct canvas *canvas, size_t i)
 	return facing > 0 ? 0.45 + 0.55 * fmin(facing, 1) : 0.45;
 }
 
-static int has_sample(const struct canvas *canvas, size_t i)
-{
-	return canvas->picture->block[3 * i] != NO_SAMPLE;
-}
-
 static uint32_t block_of(const struct canvas *canvas, size_t i)
 {
 	return (uint32_t)canvas->picture->words[i] / 64;
 }
 
+/* ---- painters of samples, of pixels that have one ---- */
+
 static void paint_blocks(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
-	if (has_sample(canvas, i))
-		set_random(rgb, block_of(canvas, i), light_of(canvas, i));
-	else
-		set_dim(rgb, canvas, i);
+	set_random(rgb, block_of(canvas, i), light_of(canvas, i));
 }
 
 static void paint_samples(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
-	if (has_sample(canvas, i))
-		set_random(rgb, (uint32_t)canvas->picture->words[i], light_of(canvas, i));
-	else
-		set_dim(rgb, canvas, i);
+	set_random(rgb, (uint32_t)canvas->picture->words[i], light_of(canvas, i));
 }
 
 static void paint_cull(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
 	static const uint8_t colors[3][3] = { { 70, 200, 90 }, { 255, 150, 40 }, { 170, 100, 230 } };
 	const uint8_t *color = colors[canvas->picture->block[3 * i + 2] % 3];
-	double light;
+	double light = light_of(canvas, i) * (0.6 + 0.1 * (mix(block_of(canvas, i)) % 5));
 
-	if (!has_sample(canvas, i)) {
-		set_dim(rgb, canvas, i);
-		return;
-	}
-	light = light_of(canvas, i) * (0.6 + 0.1 * (mix(block_of(canvas, i)) % 5));
 	set(rgb, light * color[0], light * color[1], light * color[2]);
 }
 
@@ -114,17 +104,87 @@ static void paint_levels(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 	static const uint8_t colors[8][3] = { { 220, 40, 40 }, { 240, 140, 20 }, { 225, 215, 30 }, { 50, 190, 60 },
 		                                  { 30, 190, 200 }, { 50, 90, 240 }, { 150, 60, 220 }, { 240, 90, 180 } };
 	const uint8_t *block = canvas->picture->block + 3 * i, *color = colors[block[0] % 8];
-	double light, pale;
+	double light = light_of(canvas, i), pale = block[1] % 8 / 8.0;
 
-	if (!has_sample(canvas, i)) {
-		set_dim(rgb, canvas, i);
-		return;
-	}
-	light = light_of(canvas, i);
-	pale = block[1] / 8.0;
 	set(rgb, light * (color[0] + pale * (255 - color[0])), light * (color[1] + pale * (255 - color[1])),
 	    light * (color[2] + pale * (255 - color[2])));
 }
+
+static void paint_normals(uint8_t rgb[3], const struct canvas *canvas, size_t i)
+{
+	psr_picture_color_normals(rgb, canvas->picture->normal + 3 * i, 1);
+}
+
+#define NONE SIZE_MAX
+
+static size_t distance(const struct canvas *canvas, size_t i, size_t k)
+{
+	size_t width = canvas->picture->width;
+	size_t dx = i % width > k % width ? i % width - k % width : k % width - i % width;
+	size_t dy = i / width > k / width ? i / width - k / width : k / width - i / width;
+
+	return dx * dx + dy * dy;
+}
+
+static void offer(size_t *nearest, const struct canvas *canvas, size_t i, size_t from)
+{
+	size_t k = nearest[from];
+
+	if (k != NONE && (nearest[i] == NONE || distance(canvas, i, k) < distance(canvas, i, nearest[i])))
+		nearest[i] = k;
+}
+
+/* The nearest pixel that has a sample, or almost: what comes from a neighbour's is looked at, in two passes. */
+static void find_nearest(size_t *nearest, const struct canvas *canvas)
+{
+	size_t width = canvas->picture->width, height = canvas->picture->height, n = width * height;
+
+	for (size_t i = 0; i < n; i++)
+		nearest[i] = canvas->picture->block[3 * i] == NO_SAMPLE ? NONE : i;
+	for (size_t i = 0; i < n; i++) {
+		size_t x = i % width;
+
+		if (x > 0)
+			offer(nearest, canvas, i, i - 1);
+		for (size_t at = x > 0 ? x - 1 : 0; i >= width && at <= x + 1 && at < width; at++)
+			offer(nearest, canvas, i, i - width - x + at);
+	}
+	for (size_t i = n; i-- > 0;) {
+		size_t x = i % width;
+
+		if (x + 1 < width)
+			offer(nearest, canvas, i, i + 1);
+		for (size_t at = x > 0 ? x - 1 : 0; i + width < n && at <= x + 1 && at < width; at++)
+			offer(nearest, canvas, i, i + width - x + at);
+	}
+}
+
+/* Filled pixels look like the nearest sample, but darker. */
+static int paint_all_samples(const struct canvas *canvas, painter *paint)
+{
+	const struct psr_picture *picture = canvas->picture;
+	size_t n = (size_t)picture->width * picture->height, *nearest = malloc(n * sizeof *nearest);
+
+	if (nearest == NULL)
+		return PSR_ERR_MEMORY;
+	find_nearest(nearest, canvas);
+	for (size_t i = 0; i < n; i++) {
+		uint8_t *rgb = canvas->rgb + 3 * i;
+
+		if (nearest[i] == i) {
+			paint(rgb, canvas, i);
+		} else if (picture->depth[i] < INFINITY && nearest[i] != NONE) {
+			paint(rgb, canvas, nearest[i]);
+			set(rgb, 0.6 * rgb[0], 0.6 * rgb[1], 0.6 * rgb[2]);
+		} else {
+			memcpy(rgb, BACKGROUND, 3);
+		}
+	}
+	free(nearest);
+	return PSR_OK;
+}
+
+/* ---- the others ---- */
 
 static int is_hole(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
@@ -161,7 +221,7 @@ static void paint_depth(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 	double z = (double)canvas->picture->depth[i], near = canvas->begin->depth_min, far = canvas->begin->depth_max, part;
 
 	if (!(z < INFINITY)) {
-		set(rgb, 16, 20, 40);
+		memcpy(rgb, BACKGROUND, 3);
 		return;
 	}
 	if (canvas->begin->camera.kind == PSR_WIRE_CAMERA_PERSPECTIVE) {
@@ -173,17 +233,15 @@ static void paint_depth(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 	set(rgb, 255 - 215 * part, 255 - 215 * part, 255 - 215 * part);
 }
 
-#define OF_SAMPLES (PLANE(COLOR) | PLANE(NORMAL) | PLANE(WORDS) | PLANE(BLOCK))
-
 static const struct show shows[] = {
 	{ "blocks", OF_SAMPLES, paint_blocks },
 	{ "samples", OF_SAMPLES, paint_samples },
 	{ "cull", OF_SAMPLES, paint_cull },
 	{ "levels", OF_SAMPLES, paint_levels },
+	{ "normals", OF_SAMPLES, paint_normals },
 	{ "weights", PLANE(WEIGHT) | PLANE(WORDS), paint_weights },
 	{ "holes", PLANE(COLOR) | PLANE(WEIGHT) | PLANE(WORDS), paint_holes },
 	{ "depth", PLANE(DEPTH), paint_depth },
-	{ "normals", PLANE(NORMAL), NULL },
 };
 
 const struct show *show_find(const char *name, struct psr_error *err)
@@ -191,7 +249,7 @@ const struct show *show_find(const char *name, struct psr_error *err)
 	for (size_t i = 0; i < sizeof shows / sizeof shows[0]; i++)
 		if (strcmp(name, shows[i].name) == 0)
 			return &shows[i];
-	psr_fail(err, PSR_ERR_ARG, "--show takes blocks, samples, cull, levels, weights, holes, depth or normals, not '%.40s'",
+	psr_fail(err, PSR_ERR_ARG, "--show takes blocks, samples, cull, levels, normals, weights, holes or depth, not '%.40s'",
 	         name);
 	return NULL;
 }
@@ -209,7 +267,7 @@ int show_write(const struct show *show, const struct psr_event *event, const cha
 	struct canvas canvas = { .picture = picture, .begin = event->begin, .rgb = malloc(3 * n) };
 	struct psr_picture painted = { .width = picture->width, .height = picture->height, .rgb = canvas.rgb };
 	double length = 0;
-	int code;
+	int code = PSR_OK;
 
 	if (canvas.rgb == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width, picture->height);
@@ -217,12 +275,13 @@ int show_write(const struct show *show, const struct psr_event *event, const cha
 		length = hypot(length, camera->target[a] - camera->eye[a]);
 	for (int a = 0; a < 3; a++)
 		canvas.forward[a] = (camera->target[a] - camera->eye[a]) / length;
-	if (show->paint == NULL)
-		psr_picture_color_normals(canvas.rgb, picture);
+	if (show->planes == OF_SAMPLES)
+		code = paint_all_samples(&canvas, show->paint);
 	else
 		for (size_t i = 0; i < n; i++)
 			show->paint(canvas.rgb + 3 * i, &canvas, i);
-	code = psr_picture_write_color(&painted, path, err);
+	code = code != PSR_OK ? psr_fail(err, code, "no memory to paint %ux%u pixels", picture->width, picture->height)
+	                      : psr_picture_write_color(&painted, path, err);
 	free(canvas.rgb);
 	return code;
 }

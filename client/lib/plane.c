@@ -61,14 +61,12 @@ static int write_npy(const struct psr_picture *picture, unsigned plane, const ch
 
 /* ---- pictures to look at ---- */
 
-void psr_picture_color_normals(uint8_t *rgb, const struct psr_picture *picture)
+void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n)
 {
-	const int16_t *n = picture->normal;
-
-	for (size_t i = 0; i < (size_t)picture->width * picture->height; i++, n += 3)
-		for (int c = 0; c < 3; c++)
-			rgb[3 * i + (size_t)c] =
-				n[0] == 0 && n[1] == 0 && n[2] == 0 ? 0 : (uint8_t)(((n[c] + 32767) * 255 + 32767) / 65534);
+	for (size_t i = 0; i < 3 * n; i += 3)
+		for (size_t c = i; c < i + 3; c++)
+			rgb[c] = normal[i] == 0 && normal[i + 1] == 0 && normal[i + 2] == 0
+			             ? 0 : (uint8_t)(((normal[c] + 32767) * 255 + 32767) / 65534);
 }
 
 static int write_colored(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err)
@@ -80,7 +78,7 @@ static int write_colored(const struct psr_picture *picture, unsigned plane, cons
 	if (colored.rgb == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width, picture->height);
 	if (plane == PSR_WIRE_PLANE_NORMAL)
-		psr_picture_color_normals(colored.rgb, picture);
+		psr_picture_color_normals(colored.rgb, picture->normal, n);
 	else
 		for (size_t i = 0; i < n; i++)
 			memset(colored.rgb + 3 * i, picture->weight[i], 3);

@@ -2,6 +2,7 @@
 #ifndef PSR_PICTURE_H
 #define PSR_PICTURE_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
 
@@ -43,8 +44,8 @@ int psr_picture_write_depth(const struct psr_picture *picture, const char *path,
  * grey. Ids, words and blocks take no other format than .npy. */
 int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err);
 
-/* The colours in which normals are written; 3 * width * height bytes. */
-void psr_picture_color_normals(uint8_t *rgb, const struct psr_picture *picture);
+/* The colours in which n normals are written. */
+void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n);
 
 /* What the calls above would refuse at once: the ending, and a missing module. */
 int psr_picture_check_color(const char *path, struct psr_error *err);
