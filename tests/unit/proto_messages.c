@@ -525,6 +525,30 @@ static void planes_have_the_bytes_of_the_table(void **state)
 	assert_int_equal(psr_plane_component_bytes(PSR_WIRE_PLANE_BLOCK, 0), 1);
 }
 
+static void planes_have_names_capabilities_and_backgrounds(void **state)
+{
+	static const struct {
+		const char *name;
+		uint64_t capability;
+		uint8_t background[8];
+	} table[PSR_WIRE_PLANES] = {
+		{ "color", 0, { 0 } },
+		{ "depth", 0, { 0, 0, 0x80, 0x7f } },
+		{ "normal", 1 << 8, { 0 } },
+		{ "id", 1 << 9, { 0xff, 0xff, 0xff, 0xff } },
+		{ "weight", 1 << 10, { 0xff } },
+		{ "words", 1 << 11, { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f } },
+		{ "block", 1 << 20, { 0xff, 0xff, 0xff } },
+	};
+
+	(void)state;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		assert_string_equal(psr_plane_name(plane), table[plane].name);
+		assert_true(psr_plane_capability(plane) == table[plane].capability);
+		assert_memory_equal(psr_plane_background(plane), table[plane].background, 8);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -540,6 +564,7 @@ int main(void)
 		cmocka_unit_test(another_version_is_told_apart_first),
 		cmocka_unit_test(routing_key_is_xxh64),
 		cmocka_unit_test(planes_have_the_bytes_of_the_table),
+		cmocka_unit_test(planes_have_names_capabilities_and_backgrounds),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
