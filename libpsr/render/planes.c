@@ -27,10 +27,12 @@ static int16_t to_steps(float n)
 
 static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip *strip, uint32_t n)
 {
+	struct strip_view view = plan->view;
+	view.lit = NULL; /* with a table of light normals are not looked for */
 	memset(to, 0, 3 * n * sizeof *to);
 	if (!strip->n)
 		return;
-	simd->strip_resolve(strip, &plan->view, plan->ambient);
+	simd->strip_resolve(strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < strip->n; i++)
 		for (int a = 0; a < 3; a++)
 			to[3 * strip->x[i] + a] = to_steps((plan->axis[0][a] * strip->nx[i] + plan->axis[1][a] * strip->ny[i]) +

@@ -14,7 +14,7 @@
 #include "tests/unit/lib/shapes.h"
 
 #define WIDTH 531 /* strips of 256, 256, 19 */
-#define HEIGHT 203
+#define HEIGHT 503
 #define PIXELS (WIDTH * HEIGHT)
 
 struct planes {
@@ -236,6 +236,29 @@ static void normals_are_those_of_the_samples_turned_to_the_eye(void **state)
 	stage_clear(&s);
 }
 
+/* Many lights are tabulated by normal, and samples' own normals are not worked out for colours then. */
+static void lights_do_not_change_normals(void **state)
+{
+	struct psr_light light[16];
+	struct stage s;
+
+	(void)state;
+	stage_make(&s);
+	s.scene.n_instances = 1;
+	struct planes *one = draw(&s.scene, 1, 1);
+	for (int i = 0; i < 16; i++)
+		light[i] = s.scene.light[0];
+	s.scene.light = light;
+	s.scene.n_lights = 16;
+	struct planes *many = draw(&s.scene, 1, 1);
+	assert_int_equal(one->report.effect[PSR_EFFECT_TABLE].why, PSR_WHY_COST);
+	assert_int_equal(many->report.effect[PSR_EFFECT_TABLE].why, PSR_WHY_RAN);
+	assert_memory_equal(one->normal, many->normal, sizeof one->normal);
+	free(one);
+	free(many);
+	stage_clear(&s);
+}
+
 static void ids_are_instances_and_blocks_say_how_they_were_drawn(void **state)
 {
 	struct stage s;
@@ -366,6 +389,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(words_name_the_sample_that_falls_into_the_pixel),
 		cmocka_unit_test(normals_are_those_of_the_samples_turned_to_the_eye),
+		cmocka_unit_test(lights_do_not_change_normals),
 		cmocka_unit_test(ids_are_instances_and_blocks_say_how_they_were_drawn),
 		cmocka_unit_test(the_depth_level_of_a_block_is_that_of_its_magnification),
 		cmocka_unit_test(weights_count_what_the_report_counts),
