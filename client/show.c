@@ -54,12 +54,12 @@ static void set_random(uint8_t rgb[3], uint32_t number, double light)
 	set(rgb, light * color[0], light * color[1], light * color[2]);
 }
 
-static void set_dim(uint8_t rgb[3], const struct canvas *canvas, size_t i)
+/* 0..1, of the picture itself. */
+static double grey_of(const struct canvas *canvas, size_t i)
 {
 	const uint8_t *c = canvas->picture->rgb + 3 * i;
-	double grey = 0.35 * (0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]);
 
-	set(rgb, grey, grey, grey);
+	return (0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]) / 255;
 }
 
 /* As a lamp at the eye lights it. */
@@ -115,7 +115,7 @@ static void paint_normals(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 	psr_picture_color_normals(rgb, canvas->picture->normal + 3 * i, 1);
 }
 
-#define NONE SIZE_MAX
+#define NONE UINT32_MAX /* pictures have 2^26 pixels at most */
 
 static size_t distance(const struct canvas *canvas, size_t i, size_t k)
 {
@@ -126,21 +126,21 @@ static size_t distance(const struct canvas *canvas, size_t i, size_t k)
 	return dx * dx + dy * dy;
 }
 
-static void offer(size_t *nearest, const struct canvas *canvas, size_t i, size_t from)
+static void offer(uint32_t *nearest, const struct canvas *canvas, size_t i, size_t from)
 {
-	size_t k = nearest[from];
+	uint32_t k = nearest[from];
 
 	if (k != NONE && (nearest[i] == NONE || distance(canvas, i, k) < distance(canvas, i, nearest[i])))
 		nearest[i] = k;
 }
 
 /* The nearest pixel that has a sample, or almost: what comes from a neighbour's is looked at, in two passes. */
-static void find_nearest(size_t *nearest, const struct canvas *canvas)
+static void find_nearest(uint32_t *nearest, const struct canvas *canvas)
 {
 	size_t width = canvas->picture->width, height = canvas->picture->height, n = width * height;
 
 	for (size_t i = 0; i < n; i++)
-		nearest[i] = canvas->picture->block[3 * i] == NO_SAMPLE ? NONE : i;
+		nearest[i] = canvas->picture->block[3 * i] == NO_SAMPLE ? NONE : (uint32_t)i;
 	for (size_t i = 0; i < n; i++) {
 		size_t x = i % width;
 
@@ -163,7 +163,8 @@ static void find_nearest(size_t *nearest, const struct canvas *canvas)
 static int paint_all_samples(const struct canvas *canvas, painter *paint)
 {
 	const struct psr_picture *picture = canvas->picture;
-	size_t n = (size_t)picture->width * picture->height, *nearest = malloc(n * sizeof *nearest);
+	size_t n = (size_t)picture->width * picture->height;
+	uint32_t *nearest = malloc(n * sizeof *nearest);
 
 	if (nearest == NULL)
 		return PSR_ERR_MEMORY;
@@ -211,8 +212,12 @@ static void paint_weights(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 
 static void paint_holes(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
-	if (!is_hole(rgb, canvas, i))
-		set_dim(rgb, canvas, i);
+	double grey = grey_of(canvas, i), light = 0.4 + 0.6 * grey;
+
+	if (is_hole(rgb, canvas, i))
+		set(rgb, light * rgb[0], light * rgb[1], light * rgb[2]);
+	else
+		set(rgb, 90 * grey, 90 * grey, 90 * grey);
 }
 
 /* Evenly in 1 / z of a perspective camera, as the picture's pixels are. */
