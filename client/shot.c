@@ -121,7 +121,8 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
-		"psr shot --model NAME [--server ADDR] [--size WxH] [camera, lights] -o FILE [--plane PLANE | --show STAGE] [--depth FILE] "
+		"psr shot --model NAME [--server ADDR] [--size WxH] [camera, lights] -o FILE [--plane PLANE | --show STAGE] "
+		"[--depth FILE] "
 		"[--report FILE] [--hash]",
 		"Asks a server for one picture of a model and writes it to a file. Prints nothing but what was asked for.",
 		opts,

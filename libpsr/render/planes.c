@@ -56,10 +56,12 @@ static void describe(uint8_t to[3], const struct simd *simd, const struct plan *
 	simd->cull(&batch, &in->cull, block, 1);
 	to[0] = (uint8_t)psr_blocks_level(b, block);
 	to[1] = batch.level[0] > PSR_MAX_DEPTH_LEVEL ? PSR_MAX_DEPTH_LEVEL : batch.level[0];
-	to[2] = b->flags[block] & PSR_BLOCK_TWO_SIDED ? PSR_FACING_TWO_SIDED : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;
+	to[2] = b->flags[block] & PSR_BLOCK_TWO_SIDED ? PSR_FACING_TWO_SIDED
+	        : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;
 }
 
-static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip *strip, uint32_t n)
+static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip *strip,
+                       uint32_t n)
 {
 	uint8_t last[3] = { 0, 0, 0 };
 	memset(to, 0xff, 3 * n);

@@ -35,7 +35,8 @@ struct stage {
 
 static void stage_make(struct stage *s)
 {
-	static const struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -1, -1 }, .color = { 1, 1, 1 } };
+	static const struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -1, -1 },
+		                                    .color = { 1, 1, 1 } };
 	const double c = cos(0.35), h = sin(0.35); /* half of the angle that the square is turned by */
 
 	for (int i = 0; i < 3; i++) {
