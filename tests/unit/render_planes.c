@@ -26,7 +26,8 @@ struct planes {
 	struct psr_report report;
 };
 
-/* A sphere, the back of a two-sided square that reaches into the picture beside it, and a further sphere behind both. */
+/* A sphere, the back of a two-sided square that reaches into the picture beside it, and a further sphere behind both.
+ * */
 struct stage {
 	struct psr_model *model[3];
 	struct psr_instance instance[3];
@@ -148,9 +149,9 @@ static double float_of_bits(uint32_t bits)
 	return (double)f;
 }
 
-/* The sample that a word names lies in the word's pixel, at the word's depth. The warp works in double up to a sum of a few
- * floats of at most WIDTH, the test's position is float up to the last: a hundredth of a pixel and 1e-5 of the depth are far
- * above both. */
+/* The sample that a word names lies in the word's pixel, at the word's depth. The warp works in double up to a sum of
+ * a few floats of at most WIDTH, the test's position is float up to the last: a hundredth of a pixel and 1e-5 of the
+ * depth are far above both. */
 static void words_name_the_sample_that_falls_into_the_pixel(void **state)
 {
 	struct stage s;
@@ -189,10 +190,10 @@ static void words_name_the_sample_that_falls_into_the_pixel(void **state)
 	stage_clear(&s);
 }
 
-/* No sample is drawn that faces away from its line of sight by more than BACK_SINE; its normal was looked at in 10 bits a
- * component, sqrt(3) / 1022 off at most, and the line of sight is here that of the pixel's centre, 0.71 pixels off at most.
- * Components come in steps of 1/32767, once in the table and once in the plane, between them are rotations in float: half a
- * step on each of three axes, half a step, and 32767 * 2^-20. */
+/* No sample is drawn that faces away from its line of sight by more than BACK_SINE; its normal was looked at in 10
+ * bits a component, sqrt(3) / 1022 off at most, and the line of sight is here that of the pixel's centre, 0.71 pixels
+ * off at most. Components come in steps of 1/32767, once in the table and once in the plane, between them are
+ * rotations in float: half a step on each of three axes, half a step, and 32767 * 2^-20. */
 static void normals_are_those_of_the_samples_turned_to_the_eye(void **state)
 {
 	const double tolerance = 0.5 * 1.7321 + 0.5 + 0.04;

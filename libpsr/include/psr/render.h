@@ -99,7 +99,8 @@ struct psr_frame {
 	uint8_t *block;   /* 3 * width * height: of its block the model's level, the level k of the depth buffer, and enum
 	                   * psr_facing; 255, 255, 255 without a sample */
 	/* Of the stages before, NULL to leave it out: */
-	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where nothing is and nothing covers */
+	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where nothing is and nothing
+	                   * covers */
 	uint64_t *words;  /* width * height, as warped: bits of the float z' in world units << 32 | sample id; PSR_WORD_EMPTY.
 	                   * The sample id is 64 * (block, counted over all instances' models) + place in the block */
 	struct psr_report report;
