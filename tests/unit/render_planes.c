@@ -26,8 +26,7 @@ struct planes {
 	struct psr_report report;
 };
 
-/* A sphere, the back of a two-sided square that reaches into the picture beside it, and a further sphere behind both.
- * */
+/* A sphere, the back of a two-sided square beside it that reaches into the picture, and a sphere behind both. */
 struct stage {
 	struct psr_model *model[3];
 	struct psr_instance instance[3];
