@@ -8,8 +8,6 @@
 
 #define DEGREE (3.14159265358979323846 / 180)
 
-static const char *const plane_names[] = { "color", "depth" };
-
 static void add_vec3(cJSON *to, const char *name, const double v[3])
 {
 	cJSON_AddItemToObject(to, name, cJSON_CreateDoubleArray(v, 3));
@@ -83,16 +81,16 @@ static void add_planes(cJSON *to, const struct psr_event *event)
 	cJSON *planes = cJSON_AddArrayToObject(to, "planes"), *hashes = cJSON_AddObjectToObject(to, "hashes");
 	cJSON *checked = cJSON_AddArrayToObject(to, "checked");
 
-	for (unsigned plane = 0; plane < 2; plane++) {
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
 		char hash[17];
 
 		if (!(event->end->planes >> plane & 1))
 			continue;
 		snprintf(hash, sizeof hash, "%016" PRIx64, event->end->hash[plane]);
-		cJSON_AddItemToArray(planes, cJSON_CreateString(plane_names[plane]));
-		cJSON_AddStringToObject(hashes, plane_names[plane], hash);
+		cJSON_AddItemToArray(planes, cJSON_CreateString(psr_plane_name(plane)));
+		cJSON_AddStringToObject(hashes, psr_plane_name(plane), hash);
 		if (event->checked >> plane & 1)
-			cJSON_AddItemToArray(checked, cJSON_CreateString(plane_names[plane]));
+			cJSON_AddItemToArray(checked, cJSON_CreateString(psr_plane_name(plane)));
 	}
 }
 

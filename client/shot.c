@@ -8,12 +8,15 @@
 #include "preset.h"
 #include "psr.h"
 #include "report.h"
+#include "show.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 #define DEFAULT_AMBIENT 0.15
 
 struct shot {
-	const char *server, *model, *codec_text, *output, *depth, *report, *lights;
+	const char *server, *model, *codec_text, *output, *depth, *report, *lights, *plane_text, *show_text;
+	const struct show *show;
+	unsigned plane; /* that -o writes, unless `show` does */
 	uint32_t size[2];
 	struct psr_camera_wish camera;
 	struct preset_wish preset;
@@ -38,10 +41,14 @@ static const char footer[] =
 	"Without --light and --ambient there is one white light from the upper left behind the camera, and\n"
 	"ambient 0.15.\n"
 	"\n"
+	SHOW_HELP
+	"\n"
 	"examples:\n"
 	"  psr shot --model teapot --size 1280x720 -o teapot.png\n"
 	"  psr shot --model dragon --eye 0,0.2,0.5 --target 0,0.1,0 --light dir:-1,-2,-1 -o dragon.png\n"
 	"  psr shot --model dragon --ambient 1 --ortho 0.3 -o flat.png --depth flat.exr --hash\n"
+	"  psr shot --model dragon --show levels -o levels.png\n"
+	"  psr shot --model dragon --plane normal -o normals.npy\n"
 	"\n" PSR_EXIT_CODES;
 
 static int on_light(const char *text, void *userdata, struct psr_error *err)
@@ -94,6 +101,14 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  "How colour travels: jpeg:Q (quality of 1 to 100), lossless, or raw.", 0, 0, NULL, NULL },
 		{ "output", 'o', PSR_OPT_STRING, &shot->output, "FILE",
 		  "The picture; its ending is the format: .png, .ppm, or any that OpenImageIO writes.", 0, 0, NULL, NULL },
+		{ "plane", 0, PSR_OPT_STRING, &shot->plane_text, "PLANE",
+		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block (levels, "
+		  "facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
+		  0, 0, NULL, NULL },
+		{ "show", 0, PSR_OPT_STRING, &shot->show_text, "STAGE",
+		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
+		  "holes or depth.",
+		  0, 0, NULL, NULL },
 		{ "depth", 0, PSR_OPT_STRING, &shot->depth, "FILE",
 		  "Depth along the view axis in the units of the source file, +inf where nothing is: .pfm, .exr or .tif.", 0, 0,
 		  NULL, NULL },
@@ -106,8 +121,9 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
-		"psr shot --model NAME [--server ADDR] [--size WxH] [camera, lights] -o FILE [--depth FILE] [--report FILE] "
-		"[--hash]",
+		"psr shot --model NAME [--server ADDR] [--size WxH] [camera, lights] -o FILE [--plane PLANE | --show STAGE] "
+		"[--depth FILE] "
+		"[--report FILE] [--hash]",
 		"Asks a server for one picture of a model and writes it to a file. Prints nothing but what was asked for.",
 		opts,
 		footer,
@@ -116,10 +132,27 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 	return psr_cli_parse(&cli, argc, argv, NULL, err);
 }
 
+static int check_output(struct shot *shot, struct psr_error *err)
+{
+	if (shot->plane_text != NULL && shot->show_text != NULL)
+		return psr_fail(err, PSR_ERR_ARG, "--plane and --show exclude each other: both say what -o writes");
+	if (shot->output == NULL && shot->show_text != NULL)
+		return psr_fail(err, PSR_ERR_ARG, "--show paints a picture; -o FILE says where");
+	for (shot->plane = 0; shot->plane_text != NULL && strcmp(psr_plane_name(shot->plane), shot->plane_text) != 0;)
+		if (++shot->plane == PSR_WIRE_PLANES)
+			return psr_fail(err, PSR_ERR_ARG, "--plane takes color, depth, normal, id, weight, words or block, not '%.40s'",
+			                shot->plane_text);
+	if (shot->show_text != NULL) {
+		shot->show = show_find(shot->show_text, err);
+		return shot->show == NULL ? PSR_ERR_ARG : psr_picture_check_color(shot->output, err);
+	}
+	return shot->output == NULL ? PSR_OK : psr_picture_check_plane(shot->plane, shot->output, err);
+}
+
 static int check(struct shot *shot, struct psr_error *err)
 {
 	uint32_t w = shot->size[0], h = shot->size[1];
-	int code = PSR_OK;
+	int code;
 
 	if (shot->model == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--model NAME is missing; `psr list` shows the names");
@@ -149,8 +182,7 @@ static int check(struct shot *shot, struct psr_error *err)
 			return psr_fail(err, PSR_ERR_ARG, "--eye, --target, --up: coordinates are at most 1e30");
 	if (psr_codec_parse(&shot->frame.color_codec, &shot->frame.color_quality, shot->codec_text, err) != PSR_OK)
 		return PSR_ERR_ARG;
-	if (shot->output != NULL)
-		code = psr_picture_check_color(shot->output, err);
+	code = check_output(shot, err);
 	if (code == PSR_OK && shot->depth != NULL)
 		code = psr_picture_check_depth(shot->depth, err);
 	return code == PSR_OK ? psr_address_check(shot->server, err) : code;
@@ -173,12 +205,17 @@ static int prepare(struct shot *shot, struct psr_client *client, const struct ps
 		return code;
 	frame->width = shot->size[0];
 	frame->height = shot->size[1];
-	frame->planes = 1 << PSR_WIRE_PLANE_COLOR;
-	if (shot->depth != NULL) {
+	frame->planes = shot->show != NULL ? show_planes(shot->show) : 1u << shot->plane;
+	if (shot->depth != NULL)
 		frame->planes |= 1 << PSR_WIRE_PLANE_DEPTH;
+	if (!(frame->planes & 1 << PSR_WIRE_PLANE_COLOR))
+		frame->color_codec = frame->color_quality = 0;
+	if (frame->planes & 1 << PSR_WIRE_PLANE_DEPTH) {
 		frame->depth_format = PSR_WIRE_DEPTH_F32;
 		frame->depth_codec = PSR_CODEC_ZSTD;
 	}
+	if (frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+		frame->data_codec = PSR_CODEC_ZSTD;
 	if (scene->n_lights == 0 && !shot->has_ambient)
 		psr_light_key(&scene->light[scene->n_lights++], &frame->camera);
 	scene->ambient = shot->ambient;
@@ -193,16 +230,18 @@ static int write_files(const struct shot *shot, const struct shot_facts *facts, 
 	const struct psr_event *event = facts->event;
 	int code = PSR_OK;
 
-	if (shot->output != NULL)
-		code = psr_picture_write_color(event->picture, shot->output, err);
+	if (shot->show != NULL)
+		code = show_write(shot->show, event, shot->output, err);
+	else if (shot->output != NULL)
+		code = psr_picture_write_plane(event->picture, shot->plane, shot->output, err);
 	if (code == PSR_OK && shot->depth != NULL)
 		code = psr_picture_write_depth(event->picture, shot->depth, err);
 	if (code == PSR_OK && shot->report != NULL)
 		code = report_write(facts, shot->report, err);
 	if (code == PSR_OK && shot->hash) {
-		printf("color %016" PRIx64 "\n", event->end->hash[PSR_WIRE_PLANE_COLOR]);
-		if (shot->depth != NULL)
-			printf("depth %016" PRIx64 "\n", event->end->hash[PSR_WIRE_PLANE_DEPTH]);
+		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+			if (event->end->planes >> plane & 1)
+				printf("%s %016" PRIx64 "\n", psr_plane_name(plane), event->end->hash[plane]);
 		code = psr_flush_output(err);
 	}
 	if (code == PSR_OK && isatty(STDERR_FILENO))

@@ -2,16 +2,47 @@
 
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format)
 {
-	static const uint8_t bytes[PSR_WIRE_PLANES] = { 1, 4, 2, 4, 1, 8 };
+	static const uint8_t bytes[PSR_WIRE_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
 
 	return plane == PSR_WIRE_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
 }
 
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format)
 {
-	unsigned bytes = psr_plane_component_bytes(plane, depth_format);
+	static const uint8_t n_components[PSR_WIRE_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
 
-	return plane == PSR_WIRE_PLANE_COLOR || plane == PSR_WIRE_PLANE_NORMAL ? 3 * bytes : bytes;
+	return n_components[plane] * psr_plane_component_bytes(plane, depth_format);
+}
+
+const char *psr_plane_name(unsigned plane)
+{
+	static const char *const names[PSR_WIRE_PLANES] = { "color", "depth", "normal", "id", "weight", "words", "block" };
+
+	return names[plane];
+}
+
+const uint8_t *psr_plane_background(unsigned plane)
+{
+	static const uint8_t bytes[PSR_WIRE_PLANES][8] = {
+		[PSR_WIRE_PLANE_DEPTH] = { 0, 0, 0x80, 0x7f },
+		[PSR_WIRE_PLANE_ID] = { 0xff, 0xff, 0xff, 0xff },
+		[PSR_WIRE_PLANE_WEIGHT] = { 0xff },
+		[PSR_WIRE_PLANE_WORDS] = { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f },
+		[PSR_WIRE_PLANE_BLOCK] = { 0xff, 0xff, 0xff },
+	};
+
+	return bytes[plane];
+}
+
+uint64_t psr_plane_capability(unsigned plane)
+{
+	static const uint32_t capability[PSR_WIRE_PLANES] = {
+		[PSR_WIRE_PLANE_NORMAL] = PSR_CAP_NORMAL, [PSR_WIRE_PLANE_ID] = PSR_CAP_ID,
+		[PSR_WIRE_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_WIRE_PLANE_WORDS] = PSR_CAP_WORDS,
+		[PSR_WIRE_PLANE_BLOCK] = PSR_CAP_BLOCK,
+	};
+
+	return capability[plane];
 }
 
 uint64_t psr_rect_total_max(uint64_t n_pixels, unsigned pixel_bytes)

@@ -8,7 +8,7 @@
 
 struct draw_worker {
 	struct psr_renderer *renderer;
-	uint8_t *pixels; /* depth, then colour */
+	uint8_t *pixels; /* of all planes */
 	uint64_t capacity;
 };
 
@@ -138,13 +138,28 @@ static int join_answer(struct drawing *d, const struct codec_result *coded, cons
 	return PSR_OK;
 }
 
+/* The room for a plane from *next on, if it is wanted. */
+static void *take_plane(uint8_t **next, const struct psr_frame *picture, uint32_t wanted, unsigned plane)
+{
+	uint8_t *pixels = *next;
+
+	if (!(wanted >> plane & 1))
+		return NULL;
+	*next += (uint64_t)picture->width * picture->height * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+	return pixels;
+}
+
 static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, struct psr_frame *picture,
                           struct psr_error *err)
 {
-	uint64_t n = (uint64_t)d->request.width * d->request.height;
-	int has_depth = (d->request.planes >> PSR_WIRE_PLANE_DEPTH & 1) != 0;
-	uint64_t bytes = n * (has_depth ? 7 : 3);
+	/* Colour is drawn whether it was asked for or not. */
+	uint32_t wanted = d->request.planes | 1u << PSR_WIRE_PLANE_COLOR;
+	uint64_t n = (uint64_t)d->request.width * d->request.height, bytes = 0;
+	uint8_t *next;
 
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		if (wanted >> plane & 1)
+			bytes += n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	if (bytes > worker->capacity) {
 		psr_free(worker->pixels);
 		worker->capacity = 0;
@@ -156,8 +171,14 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	}
 	picture->width = d->request.width;
 	picture->height = d->request.height;
-	picture->depth = has_depth ? (float *)(void *)worker->pixels : NULL;
-	picture->rgb = worker->pixels + (has_depth ? 4 * n : 0);
+	next = worker->pixels; /* those of the longest components first, so that each is aligned */
+	picture->words = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WORDS);
+	picture->depth = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_DEPTH);
+	picture->id = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_ID);
+	picture->normal = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_NORMAL);
+	picture->weight = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WEIGHT);
+	picture->block = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_BLOCK);
+	picture->rgb = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_COLOR);
 	return PSR_OK;
 }
 

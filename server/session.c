@@ -192,7 +192,6 @@ static void cancel(struct conn *conn, uint32_t id, uint16_t view)
 static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const struct server *server,
                        struct psr_error *err)
 {
-	const unsigned offered = 1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH;
 	uint64_t n_pixels = (uint64_t)frame->width * frame->height;
 
 	if (view != 0)
@@ -201,9 +200,6 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %" PRIu32 "x%" PRIu32 " has %" PRIu64 " pixels; this server draws "
 		                "%" PRId64 " at most (--max-pixels)", frame->width, frame->height, n_pixels,
 		                server->options->max_pixels);
-	if (frame->planes & ~offered)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "planes 0x%x were asked for; this server sends colour and depth (0x%x)",
-		                frame->planes, offered);
 	if (frame->color_codec == PSR_CODEC_PNG)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not send PNG; ask for raw, JPEG or zstd");
 	if (frame->planes & 1u << PSR_WIRE_PLANE_DEPTH && frame->depth_format != PSR_WIRE_DEPTH_F32)

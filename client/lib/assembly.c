@@ -13,10 +13,29 @@ void client_assembly_init(struct client_assembly *assembly, const struct psr_msg
 
 void client_assembly_fini(struct client_assembly *assembly)
 {
-	free(assembly->picture.rgb);
-	free(assembly->picture.depth);
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		free(psr_picture_plane(&assembly->picture, plane));
 	free(assembly->pieces);
 	memset(assembly, 0, sizeof *assembly);
+}
+
+/* A plane of background; *has_failed is set if there is no memory for it. */
+static void *make_plane(const struct psr_msg_frame_begin *begin, unsigned plane, int *has_failed)
+{
+	size_t pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), n = (size_t)begin->width * begin->height * pixel;
+	uint8_t *pixels;
+
+	if (!(begin->planes >> plane & 1))
+		return NULL;
+	pixels = malloc(n);
+	if (pixels == NULL) {
+		*has_failed = 1;
+		return NULL;
+	}
+	memcpy(pixels, plane == PSR_WIRE_PLANE_COLOR ? begin->background : psr_plane_background(plane), pixel);
+	for (size_t done = pixel; done < n; done *= 2)
+		memcpy(pixels + done, pixels, done < n - done ? done : n - done);
+	return pixels;
 }
 
 int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg_frame_begin *begin,
@@ -24,7 +43,7 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 {
 	const struct psr_msg_frame *asked = &assembly->asked;
 	struct psr_picture *picture = &assembly->picture;
-	size_t n = (size_t)asked->width * asked->height;
+	int has_failed = 0;
 
 	if (assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
@@ -40,16 +59,16 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 	assembly->has_begun = 1;
 	picture->width = asked->width;
 	picture->height = asked->height;
-	picture->rgb = malloc(n * 3);
-	if (asked->planes & 1 << PSR_WIRE_PLANE_DEPTH)
-		picture->depth = malloc(n * sizeof *picture->depth);
-	if (picture->rgb == NULL || (picture->depth == NULL && asked->planes & 1 << PSR_WIRE_PLANE_DEPTH))
+	picture->rgb = make_plane(begin, PSR_WIRE_PLANE_COLOR, &has_failed);
+	picture->depth = make_plane(begin, PSR_WIRE_PLANE_DEPTH, &has_failed);
+	picture->normal = make_plane(begin, PSR_WIRE_PLANE_NORMAL, &has_failed);
+	picture->id = make_plane(begin, PSR_WIRE_PLANE_ID, &has_failed);
+	picture->weight = make_plane(begin, PSR_WIRE_PLANE_WEIGHT, &has_failed);
+	picture->words = make_plane(begin, PSR_WIRE_PLANE_WORDS, &has_failed);
+	picture->block = make_plane(begin, PSR_WIRE_PLANE_BLOCK, &has_failed);
+	if (has_failed)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %" PRIu32 "x%" PRIu32 " pixels", asked->width,
 		                asked->height);
-	for (size_t i = 0; i < n; i++)
-		memcpy(picture->rgb + 3 * i, begin->background, 3);
-	for (size_t i = 0; i < n && picture->depth != NULL; i++)
-		picture->depth[i] = INFINITY;
 	return PSR_OK;
 }
 
@@ -62,7 +81,7 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 
 	if (!assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle before the frame's beginning");
-	if (rect->plane > PSR_WIRE_PLANE_DEPTH || !(asked->planes >> rect->plane & 1))
+	if (rect->plane >= PSR_WIRE_PLANES || !(asked->planes >> rect->plane & 1))
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle of plane %u, which was not asked for",
 		                rect->plane);
 	if (rect->scale != 1 && rect->scale != 2 && rect->scale != 4)
@@ -72,7 +91,8 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server sent a rectangle %ux%u at %u,%u: outside of the picture of %" PRIu32 "x%" PRIu32,
 		                rect->w, rect->h, rect->x, rect->y, asked->width, asked->height);
-	wanted = rect->plane == PSR_WIRE_PLANE_COLOR ? asked->color_codec : asked->depth_codec;
+	wanted = rect->plane == PSR_WIRE_PLANE_COLOR ? asked->color_codec
+	         : rect->plane == PSR_WIRE_PLANE_DEPTH ? asked->depth_codec : asked->data_codec;
 	if (rect->codec != PSR_CODEC_RAW && rect->codec != wanted)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle with codec %u, %u was asked for",
 		                rect->codec, wanted);
@@ -143,7 +163,6 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
                         struct psr_error *err)
 {
-	static const char *const names[] = { "colour", "depth" };
 	const struct psr_picture *picture = &assembly->picture;
 	size_t n = (size_t)picture->width * picture->height;
 
@@ -153,17 +172,16 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 	if (end->pass != 0 || !end->is_final || end->planes != assembly->asked.planes)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
 	*checked = 0;
-	for (unsigned plane = 0; plane <= PSR_WIRE_PLANE_DEPTH; plane++) {
-		const void *pixels = plane == PSR_WIRE_PLANE_COLOR ? (void *)picture->rgb : (void *)picture->depth;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
 		uint64_t hash;
 
 		if (!(end->planes >> plane & 1) || assembly->lossy >> plane & 1)
 			continue;
-		hash = XXH64(pixels, n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
+		hash = XXH64(psr_picture_plane(picture, plane), n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
 		if (hash != end->hash[plane])
 			return psr_fail(err, PSR_ERR_FORMAT,
-			                "the %s of a frame is damaged: its hash is %016" PRIx64 ", the server drew %016" PRIx64,
-			                names[plane], hash, end->hash[plane]);
+			                "the %s plane of a frame is damaged: its hash is %016" PRIx64 ", the server drew %016" PRIx64,
+			                plane == PSR_WIRE_PLANE_COLOR ? "colour" : psr_plane_name(plane), hash, end->hash[plane]);
 		*checked |= 1u << plane;
 	}
 	return PSR_OK;

@@ -249,7 +249,6 @@ static struct client_frame *free_frame(struct psr_client *client)
 
 int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *asked, uint32_t *id, struct psr_error *err)
 {
-	static const unsigned color = 1 << PSR_WIRE_PLANE_COLOR, depth = 1 << PSR_WIRE_PLANE_DEPTH;
 	struct client_frame *frame = free_frame(client);
 	size_t start = client->out.size;
 	int code = start_request(client, err);
@@ -258,12 +257,15 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 		return code;
 	if (frame == NULL)
 		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address, client->welcome.max_open);
-	if ((asked->planes | depth) != (color | depth) || asked->pass_limit != 0 || asked->base != 0
-	    || asked->budget != PSR_WIRE_BUDGET_NONE || asked->color_codec > PSR_CODEC_ZSTD
-	    || (asked->planes & depth && asked->depth_format != PSR_WIRE_DEPTH_F32))
+	if (asked->pass_limit != 0 || asked->base != 0 || asked->budget != PSR_WIRE_BUDGET_NONE
+	    || asked->color_codec > PSR_CODEC_ZSTD
+	    || (asked->planes >> PSR_WIRE_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "this client asks for colour, and depth as float, without budget, "
-		                "refinement or base");
+		                "this client asks for planes, depth as float, without budget, refinement or base");
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		if (asked->planes >> plane & 1 && psr_plane_capability(plane) & ~client->welcome.capabilities)
+			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
+			                psr_plane_name(plane));
 	code = psr_msg_frame_encode(&client->out, client->next_id, 0, asked, err);
 	*id = client->next_id;
 	code = finish_request(client, start, code, "request", err);

@@ -100,13 +100,13 @@ static void copy_pixels(uint8_t *to, size_t pitch, const uint8_t *from, const st
 int client_decode(struct client_decoder *decoder, struct psr_picture *picture, const struct psr_msg_rect *rect,
                   const uint8_t *data, struct psr_error *err)
 {
-	int is_color = rect->plane == PSR_WIRE_PLANE_COLOR, code;
+	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
+	int code;
 	uint32_t width = (rect->w + rect->scale - 1u) / rect->scale, height = (rect->h + rect->scale - 1u) / rect->scale;
-	size_t pixel = is_color ? 3 : 4, raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
-	uint8_t *plane = is_color ? picture->rgb : (uint8_t *)picture->depth;
-	uint8_t *to = plane + rect->y * pitch + rect->x * pixel;
+	size_t pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32), raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
+	uint8_t *plane = psr_picture_plane(picture, rect->plane), *to = plane + rect->y * pitch + rect->x * pixel;
 
-	assert(is_color || rect->plane == PSR_WIRE_PLANE_DEPTH);
+	assert(plane != NULL);
 	if (rect->codec == PSR_CODEC_RAW) {
 		copy_pixels(to, pitch, data, rect, width, pixel);
 		return PSR_OK;
@@ -123,7 +123,7 @@ int client_decode(struct client_decoder *decoder, struct psr_picture *picture, c
 		if (code == PSR_OK)
 			code = decode_zstd(decoder, decoder->coded, raw, data, rect->total, err);
 		if (code == PSR_OK)
-			psr_unfilter_rows(decoder->pixels, decoder->coded, width, height, is_color ? 3 : 1, is_color ? 1 : 4);
+			psr_unfilter_rows(decoder->pixels, decoder->coded, width, height, (unsigned)pixel / component, component);
 	}
 	if (code == PSR_OK)
 		copy_pixels(to, pitch, decoder->pixels, rect, width, pixel);

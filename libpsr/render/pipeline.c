@@ -18,6 +18,7 @@ struct psr_renderer {
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
+	int has_planes;           /* it wants more than colour and depth */
 	struct shade_target target;
 	/* All of a pixel, in one piece of memory: words, levels, linear colours by channel, weights. */
 	void *pixels;
@@ -304,6 +305,8 @@ static void shade_one(int row, void *userdata)
 		shade_row(r->simd, plan, &r->target, r->stack.word + first, r->weight + first, y, &counts);
 		if (r->frame->depth)
 			r->simd->depth_row(r->frame->depth + first, r->stack.word + first, plan->width, r->stack.exponent);
+		if (r->has_planes)
+			planes_row(r->simd, plan, r->frame, r->stack.word + first, r->weight + first, y);
 	}
 	r->shade[row] = counts;
 	if (r->target.wants)
@@ -338,6 +341,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	struct psr_report *report = &frame->report;
 	*report = r->report;
 	r->frame = frame;
+	r->has_planes = frame->normal || frame->id || frame->block || frame->weight || frame->words;
 
 	r->target = (struct shade_target){ frame->rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
 	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2],

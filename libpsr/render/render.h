@@ -36,6 +36,7 @@ struct plan {
 	struct warp_instance *warp; /* what warping knows of each */
 	struct strip_view view;    /* needs is filled by the cull */
 	struct strip_light *light;
+	float axis[3][3];          /* right, down and forward in the world */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
 	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are empty
@@ -144,6 +145,12 @@ struct shade_target {
 /* Gives the pixels of row y their colours: samples of weight above 0, lit, and the background where none is. */
 void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
                const uint16_t *weight, uint32_t y, struct shade_counts *counts);
+
+/* ---- planes: what else is known of a row's pixels ---- */
+
+/* Writes those of the planes normal, id, block, weight and words that the frame has, before the fill changes weights. */
+void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
+                const uint16_t *weight, uint32_t y);
 
 /* ---- fill: pull-push ([G] 4.7, appendix) ---- */
 

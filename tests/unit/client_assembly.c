@@ -16,6 +16,7 @@
 #define W 37
 #define H 29
 
+static uint8_t planes[PSR_WIRE_PLANES][8 * W * H]; /* colour and depth are these: */
 static uint8_t rgb[3 * W * H];
 static float depth[W * H];
 static struct client_decoder *decoder;
@@ -42,6 +43,11 @@ static int set_up(void **state)
 		rgb[i] = (uint8_t)next_random(256);
 	for (size_t i = 0; i < W * H; i++)
 		depth[i] = next_random(3) == 0 ? INFINITY : (float)next_random(100000) / 777;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		for (size_t i = 0; i < sizeof planes[plane]; i++)
+			planes[plane][i] = (uint8_t)next_random(256);
+	memcpy(planes[PSR_WIRE_PLANE_COLOR], rgb, sizeof rgb);
+	memcpy(planes[PSR_WIRE_PLANE_DEPTH], depth, sizeof depth);
 	return client_decoder_create(&decoder);
 }
 
@@ -52,7 +58,7 @@ static int tear_down(void **state)
 	return 0;
 }
 
-static void start(struct trial *trial, uint8_t codec)
+static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 {
 	struct psr_msg_frame_begin begin = { .width = W, .height = H };
 	struct psr_msg_frame *asked = &trial->asked;
@@ -60,30 +66,39 @@ static void start(struct trial *trial, uint8_t codec)
 	memset(trial, 0, sizeof *trial);
 	asked->width = W;
 	asked->height = H;
-	asked->planes = 3;
+	asked->planes = wanted;
 	asked->color_codec = codec;
 	asked->color_quality = codec == PSR_CODEC_JPEG ? 90 : 0;
 	asked->depth_format = PSR_WIRE_DEPTH_F32;
 	asked->depth_codec = PSR_CODEC_ZSTD;
+	asked->data_codec = wanted >> 2 ? PSR_CODEC_ZSTD : 0;
 	client_assembly_init(&trial->assembly, asked);
 	begin.planes = asked->planes;
 	begin.color_codec = asked->color_codec;
 	begin.color_quality = asked->color_quality;
 	begin.depth_format = asked->depth_format;
 	begin.depth_codec = asked->depth_codec;
+	begin.data_codec = asked->data_codec;
 	memcpy(begin.background, "\x01\x02\x03", 3);
 	assert_int_equal(client_assembly_begin(&trial->assembly, &begin, &trial->err), PSR_OK);
 	trial->end.is_final = 1;
 	trial->end.planes = asked->planes;
-	trial->end.hash[0] = XXH64(rgb, sizeof rgb, 0);
-	trial->end.hash[1] = XXH64(depth, sizeof depth, 0);
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		if (wanted >> plane & 1)
+			trial->end.hash[plane] = XXH64(planes[plane], W * H * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
+}
+
+static void start(struct trial *trial, uint8_t codec)
+{
+	start_planes(trial, codec, 3);
 }
 
 /* The coded bytes of a rectangle of the plane; the caller frees them. */
 static uint8_t *encode(const struct psr_msg_rect *rect, size_t *n)
 {
-	unsigned pixel = rect->plane == 0 ? 3 : 4;
-	const uint8_t *plane = rect->plane == 0 ? rgb : (const uint8_t *)depth;
+	unsigned pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
+	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
+	const uint8_t *plane = planes[rect->plane];
 	size_t raw = (size_t)rect->w * rect->h * pixel;
 	uint8_t *rows = malloc(raw), *out;
 
@@ -108,7 +123,7 @@ static uint8_t *encode(const struct psr_msg_rect *rect, size_t *n)
 	} else {
 		uint8_t *filtered = malloc(raw);
 
-		psr_filter_rows(filtered, rows, rect->w, rect->h, rect->plane == 0 ? 3 : 1, rect->plane == 0 ? 1 : 4);
+		psr_filter_rows(filtered, rows, rect->w, rect->h, pixel / component, component);
 		out = malloc(ZSTD_compressBound(raw));
 		*n = ZSTD_compress(out, ZSTD_compressBound(raw), filtered, raw, 1);
 		assert_false(ZSTD_isError(*n));
@@ -178,6 +193,43 @@ static void rectangles_in_pieces_make_the_picture(void **state)
 		assert_memory_equal(trial.assembly.picture.rgb, rgb, sizeof rgb);
 		assert_memory_equal(trial.assembly.picture.depth, depth, sizeof depth);
 		client_assembly_fini(&trial.assembly);
+	}
+}
+
+static void every_plane_comes_back_and_starts_as_its_background(void **state)
+{
+	(void)state;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		for (unsigned others = 0; others < 2; others++) {
+			const unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+			struct psr_msg_rect rect = { (uint8_t)plane, PSR_CODEC_ZSTD, 1, 0, 0, W, 1, 0, 0, 0, NULL };
+			struct trial trial;
+			const uint8_t *got;
+			unsigned checked;
+
+			start_planes(&trial, PSR_CODEC_ZSTD, others ? (1u << PSR_WIRE_PLANES) - 1 : 1u << plane);
+			got = psr_picture_plane(&trial.assembly.picture, plane);
+			assert_int_equal(psr_picture_plane(&trial.assembly.picture, (plane + 1) % PSR_WIRE_PLANES) != NULL, others);
+			for (size_t i = 0; i < W * H; i++)
+				assert_memory_equal(got + i * pixel,
+				                    plane == 0 ? (const uint8_t *)"\x01\x02\x03" : psr_plane_background(plane), pixel);
+			assert_int_equal(send_rect(&trial, rect, 100), PSR_OK);
+			rect.y = 1;
+			rect.h = H - 1;
+			rect.codec = PSR_CODEC_RAW;
+			assert_int_equal(send_rect(&trial, rect, 100), PSR_OK);
+			assert_memory_equal(got, planes[plane], W * H * pixel);
+			for (unsigned other = 0; other < PSR_WIRE_PLANES && others; other++) {
+				rect = (struct psr_msg_rect){ (uint8_t)other, PSR_CODEC_ZSTD, 1, 0, 0, W, H, 0, 0, 0, NULL };
+				assert_int_equal(send_rect(&trial, rect, 1000), PSR_OK);
+			}
+			assert_int_equal(finish(&trial, &checked), PSR_OK);
+			assert_int_equal(checked, trial.asked.planes);
+			trial.end.hash[plane] ^= 1;
+			assert_int_equal(finish(&trial, &checked), PSR_ERR_FORMAT);
+			assert_non_null(strstr(trial.err.text, plane == 0 ? "colour plane" : psr_plane_name(plane)));
+			client_assembly_fini(&trial.assembly);
+		}
 	}
 }
 
@@ -433,6 +485,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rectangles_in_pieces_make_the_picture),
+		cmocka_unit_test(every_plane_comes_back_and_starts_as_its_background),
 		cmocka_unit_test(pixels_without_a_rectangle_are_background),
 		cmocka_unit_test(wrong_hash_is_found),
 		cmocka_unit_test(jpeg_is_close_and_its_hash_is_not_checked),

@@ -58,6 +58,7 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 		                                 .color_quality = asked->color_quality,
 		                                 .depth_format = asked->depth_format,
 		                                 .depth_codec = asked->depth_codec,
+		                                 .data_codec = asked->data_codec,
 		                                 .settings = { 1, 1 },
 		                                 .camera = asked->camera };
 	struct psr_msg_frame_end end = { .is_final = 1,
@@ -68,7 +69,9 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 		                                        { PSR_WIRE_REPORT_TOTAL, 3000000, 2 } } };
 	uint8_t rgb[3 * MAX_SIDE * MAX_SIDE];
 	float depth[MAX_SIDE * MAX_SIDE];
-	struct psr_msg_rect rect = { 0, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, 3 * n, 0, 3 * n, rgb };
+	uint8_t weight[MAX_SIDE * MAX_SIDE];
+	uint64_t words[MAX_SIDE * MAX_SIDE];
+	const uint8_t *const planes[PSR_WIRE_PLANES] = { rgb, (uint8_t *)depth, NULL, NULL, weight, (uint8_t *)words };
 
 	if (strcmp(s->model, "broken") == 0 || (strcmp(s->model, "flaky") == 0 && id > 10) || w > MAX_SIDE
 	    || h > MAX_SIDE) {
@@ -80,17 +83,22 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		depth[i] = i % 5 == 0 ? INFINITY : 1 + (float)i;
+		weight[i] = (uint8_t)(i % 4 * 85);
+		words[i] = i % 3 == 0 ? UINT64_C(0x7f800000ffffffff) : UINT64_C(0x3f80000000000000) + i;
 		for (int c = 0; c < 3; c++)
 			rgb[3 * i + (uint32_t)c] = color_at(i % w, i / w, c);
 	}
-	end.hash[0] = XXH64(rgb, 3 * n, 0) ^ (strcmp(s->model, "damaged") == 0);
-	end.hash[1] = asked->planes & 2 ? XXH64(depth, 4 * n, 0) : 0;
 	psr_msg_frame_begin_encode(&s->buf, id, 0, &begin, NULL);
-	psr_msg_rect_encode(&s->buf, id, 0, &rect, NULL);
-	rect =
-		(struct psr_msg_rect){ 1, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, 4 * n, 0, 4 * n, (uint8_t *)depth };
-	if (asked->planes & 2)
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		uint32_t bytes = n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+		const struct psr_msg_rect rect = { (uint8_t)plane, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, bytes, 0,
+			                               bytes, planes[plane] };
+
+		if (!(asked->planes >> plane & 1))
+			continue;
+		end.hash[plane] = XXH64(planes[plane], bytes, 0) ^ (plane == 0 && strcmp(s->model, "damaged") == 0);
 		psr_msg_rect_encode(&s->buf, id, 0, &rect, NULL);
+	}
 	psr_msg_frame_end_encode(&s->buf, id, 0, &end, NULL);
 }
 
@@ -153,7 +161,7 @@ static void put_presets(struct session *s, uint32_t id)
 static int answer(struct session *s, const struct psr_message *message)
 {
 	const struct psr_msg_welcome welcome = { .minor = PSR_PROTO_MINOR,
-		                                     .capabilities = PSR_CAP_PRESETS,
+		                                     .capabilities = PSR_CAP_PRESETS | PSR_CAP_WEIGHT | PSR_CAP_WORDS,
 		                                     .max_message = 65536,
 		                                     .max_side = 64,
 		                                     .max_pixels = 4096,
@@ -412,6 +420,46 @@ static void shot_writes_what_was_asked_for_and_prints_nothing(void **state)
 		assert_int_equal(rgb[i], color_at(i / 3 % 20, i / 60, (int)(i % 3)));
 }
 
+static void shot_writes_planes_and_paints_stages(void **state)
+{
+	static uint8_t bytes[1 << 16];
+
+	(void)state;
+	assert_int_equal(psr("shot --model cube --size 20x10 --plane words -o w.npy --hash"), 0);
+	assert_true(strncmp(out, "words ", 6) == 0 && strlen(out) == 23);
+	read_back("w.npy", (char *)bytes, sizeof bytes);
+	for (uint32_t i = 0; i < 200; i++) {
+		uint64_t word;
+
+		memcpy(&word, bytes + 128 + 8 * i, 8);
+		assert_true(word == (i % 3 == 0 ? UINT64_C(0x7f800000ffffffff) : UINT64_C(0x3f80000000000000) + i));
+	}
+	assert_int_equal(psr("shot --model cube --size 20x10 --plane weight -o w.ppm --report r.json --codec jpeg:50"), 0);
+	assert_string_equal(out, "");
+	read_back("w.ppm", (char *)bytes, sizeof bytes);
+	for (uint32_t i = 0; i < 200; i++)
+		assert_int_equal(bytes[13 + 3 * i], i % 4 * 85);
+	read_back("r.json", (char *)bytes, sizeof bytes);
+	assert_non_null(strstr((char *)bytes, "\"planes\":\t[\"weight\"]"));
+
+	/* Weight 0 is red without a sample, else yellow; other weights are grey with a sample, blue without. */
+	assert_int_equal(psr("shot --model cube --size 20x10 --show weights -o s.ppm --hash"), 0);
+	assert_true(strncmp(out, "weight ", 7) == 0 && strncmp(out + 24, "words ", 6) == 0 && strlen(out) == 24 + 23);
+	read_back("s.ppm", (char *)bytes, sizeof bytes);
+	for (uint32_t i = 0; i < 200; i++) {
+		const uint8_t *c = bytes + 13 + 3 * i, weight = (uint8_t)(i % 4 * 85);
+
+		if (weight == 0)
+			assert_true(c[0] > 200 && c[2] < 100 && (i % 3 == 0 ? c[1] < 100 : c[1] > 200));
+		else if (i % 3 == 0)
+			assert_true(c[0] == 0 && c[1] <= c[2] && c[2] == 255 - weight);
+		else
+			assert_true(c[0] == weight && c[1] == weight && c[2] == weight);
+	}
+	assert_int_equal(psr("shot --model cube --size 20x10 --show depth -o s.ppm --depth d.pfm"), 0);
+	assert_int_equal(psr("shot --model cube --size 20x10 --show holes -o s.png"), 0);
+}
+
 static void report_has_the_numbers_of_the_frame(void **state)
 {
 	static char text[1 << 16];
@@ -475,6 +523,13 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 		{ "shot --model damaged -o x.png --size 8x8", 4, "damaged" },
 		{ "shot --server 127.0.0.1:1 --model cube -o x.png", 6, "127.0.0.1:1" },
 		{ "list --server nowhere", 2, "nowhere" },
+		{ "shot --model cube -o x.png --plane color --show holes", 2, "exclude each other" },
+		{ "shot --model cube --show holes --hash", 2, "-o FILE" },
+		{ "shot --model cube -o x.png --show pixels", 2, "not 'pixels'" },
+		{ "shot --model cube -o x.png --plane pixels", 2, "not 'pixels'" },
+		{ "shot --model cube -o x.png --plane words", 2, "the words plane is written as .npy only" },
+		{ "shot --model cube -o x.png --plane normal", 4, "does not send the normal plane" },
+		{ "shot --model cube -o x.png --show cull", 4, "does not send the normal plane" },
 	};
 	char path[160];
 
@@ -531,6 +586,7 @@ int main(void)
 		cmocka_unit_test(list_prints_cameras_and_lights_of_a_model),
 		cmocka_unit_test(shot_takes_cameras_and_lights_of_the_model),
 		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
+		cmocka_unit_test(shot_writes_planes_and_paints_stages),
 		cmocka_unit_test(report_has_the_numbers_of_the_frame),
 		cmocka_unit_test(failures_have_their_exit_status_and_leave_no_file),
 		cmocka_unit_test(bench_counts_frames_and_fails_if_one_failed),

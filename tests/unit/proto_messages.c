@@ -123,7 +123,7 @@ static void make_frame(struct psr_msg_frame *m)
 	m->pass_limit = (uint16_t)below(65536);
 	m->width = 1 + below(16384);
 	m->height = 1 + below(4096);
-	m->planes = 1 + below(63);
+	m->planes = 1 + below(127);
 	if (m->planes & 1) {
 		m->color_codec = (uint8_t)below(4);
 		m->color_quality = m->color_codec == PSR_CODEC_JPEG ? (uint8_t)(1 + below(100)) : 0;
@@ -197,7 +197,7 @@ static void make_end(struct psr_msg_frame_end *m)
 	m->is_final = (uint8_t)below(2);
 	m->status = (uint8_t)below(3);
 	m->error_px = fabs(length());
-	m->planes = 1 + below(63);
+	m->planes = 1 + below(127);
 	for (unsigned i = 0; i < PSR_WIRE_PLANES; i++)
 		m->hash[i] = m->planes >> i & 1 ? random64() : 0;
 	m->n_entries = (uint16_t)below(65);
@@ -521,6 +521,32 @@ static void planes_have_the_bytes_of_the_table(void **state)
 	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_ID, 0), 4);
 	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_WEIGHT, 0), 1);
 	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_WORDS, 0), 8);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_BLOCK, 0), 3);
+	assert_int_equal(psr_plane_component_bytes(PSR_WIRE_PLANE_BLOCK, 0), 1);
+}
+
+static void planes_have_names_capabilities_and_backgrounds(void **state)
+{
+	static const struct {
+		const char *name;
+		uint64_t capability;
+		uint8_t background[8];
+	} table[PSR_WIRE_PLANES] = {
+		{ "color", 0, { 0 } },
+		{ "depth", 0, { 0, 0, 0x80, 0x7f } },
+		{ "normal", 1 << 8, { 0 } },
+		{ "id", 1 << 9, { 0xff, 0xff, 0xff, 0xff } },
+		{ "weight", 1 << 10, { 0xff } },
+		{ "words", 1 << 11, { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f } },
+		{ "block", 1 << 20, { 0xff, 0xff, 0xff } },
+	};
+
+	(void)state;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		assert_string_equal(psr_plane_name(plane), table[plane].name);
+		assert_true(psr_plane_capability(plane) == table[plane].capability);
+		assert_memory_equal(psr_plane_background(plane), table[plane].background, 8);
+	}
 }
 
 int main(void)
@@ -538,6 +564,7 @@ int main(void)
 		cmocka_unit_test(another_version_is_told_apart_first),
 		cmocka_unit_test(routing_key_is_xxh64),
 		cmocka_unit_test(planes_have_the_bytes_of_the_table),
+		cmocka_unit_test(planes_have_names_capabilities_and_backgrounds),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -159,7 +159,7 @@ static const struct proto_field fields_entry[] = { AT(report_entry, id, F_U16), 
 #define HASH(i) { "hash." #i, F_U64, offsetof(struct psr_msg_frame_end, hash) + 8 * i, 1, NULL, 0 }
 static const struct proto_field fields_frame_end[] = { AT(frame_end, pass, F_U16), AT(frame_end, is_final, F_U8),
 	AT(frame_end, status, F_U8), AT(frame_end, error_px, F_F64), AT(frame_end, planes, F_U32), HASH(0), HASH(1),
-	HASH(2), HASH(3), HASH(4), HASH(5), AT(frame_end, n_entries, F_U16),
+	HASH(2), HASH(3), HASH(4), HASH(5), HASH(6), AT(frame_end, n_entries, F_U16),
 	LIST(frame_end, entry, PSR_WIRE_MAX_REPORT, fields_entry, report_entry), END };
 static const struct proto_field fields_superseded[] = { AT(superseded, by, F_U32), END };
 static const struct proto_field fields_ack[] = { AT(ack, pass, F_U16), END };

@@ -16,10 +16,27 @@
 #define WIDTH 333
 #define HEIGHT 300 /* strips of 128, 128, 44 rows */
 #define PIXELS (WIDTH * HEIGHT)
+#define ALL ((1u << PSR_WIRE_PLANES) - 1)
 
-static uint8_t rgb[3 * PIXELS], out_rgb[3 * PIXELS];
-static float depth[PIXELS], out_depth[PIXELS];
+/* By plane, as bytes. */
+static uint8_t in[PSR_WIRE_PLANES][8 * PIXELS], out[PSR_WIRE_PLANES][8 * PIXELS];
+static uint8_t *const rgb = in[PSR_WIRE_PLANE_COLOR];
 static const uint8_t background[3] = { 10, 20, 30 };
+
+static size_t plane_bytes(unsigned plane)
+{
+	return (size_t)PIXELS * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+}
+
+static const uint8_t *empty_pixel(unsigned plane)
+{
+	return plane == PSR_WIRE_PLANE_COLOR ? background : psr_plane_background(plane);
+}
+
+static void set_depth(int i, float z)
+{
+	memcpy(in[PSR_WIRE_PLANE_DEPTH] + 4 * i, &z, 4);
+}
 
 enum picture { NOISE, SMOOTH, EMPTY, TOP_EMPTY };
 
@@ -38,18 +55,31 @@ static void paint(enum picture kind)
 
 			rgb[3 * i + c] = is_empty ? background[c] : kind == NOISE ? (uint8_t)(random >> (8 * c)) : smooth;
 		}
-		depth[i] = is_empty ? INFINITY : 2 + (float)x / 64 + (float)(kind == NOISE ? random >> 48 : 0);
+		set_depth(i, is_empty ? INFINITY : 2 + (float)x / 64 + (float)(kind == NOISE ? random >> 48 : 0));
+		for (unsigned plane = PSR_WIRE_PLANE_NORMAL; plane < PSR_WIRE_PLANES; plane++) {
+			unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+			uint64_t smooth = (uint64_t)(x / 7 * 3 + y) * 0x0001000100010001, value = kind == NOISE ? random : smooth;
+
+			memcpy(in[plane] + pixel * (unsigned)i, is_empty ? empty_pixel(plane) : (const uint8_t *)&value, pixel);
+		}
 	}
 }
 
+/* Normal, id and so on have the codec of depth. */
 static struct codec_result encode(unsigned color_codec, unsigned quality, unsigned depth_codec, unsigned planes,
                                   struct psr_pool *pool)
 {
 	struct psr_msg_frame request = {
 		.width = WIDTH, .height = HEIGHT, .planes = planes, .color_codec = (uint8_t)color_codec,
 		.color_quality = (uint8_t)quality, .depth_format = PSR_WIRE_DEPTH_F32, .depth_codec = (uint8_t)depth_codec,
+		.data_codec = (uint8_t)depth_codec,
 	};
-	struct psr_frame frame = { .width = WIDTH, .height = HEIGHT, .rgb = rgb, .depth = depth };
+	struct psr_frame frame = {
+		.width = WIDTH, .height = HEIGHT, .rgb = rgb, .depth = (float *)in[PSR_WIRE_PLANE_DEPTH],
+		.normal = (int16_t *)in[PSR_WIRE_PLANE_NORMAL], .id = (uint32_t *)in[PSR_WIRE_PLANE_ID],
+		.weight = in[PSR_WIRE_PLANE_WEIGHT], .words = (uint64_t *)in[PSR_WIRE_PLANE_WORDS],
+		.block = in[PSR_WIRE_PLANE_BLOCK],
+	};
 	struct codec_result result;
 	struct psr_error error = { 0 };
 	struct codec *codec;
@@ -62,10 +92,11 @@ static struct codec_result encode(unsigned color_codec, unsigned quality, unsign
 
 static void decode_rect(const struct psr_msg_rect *rect, const uint8_t *coded)
 {
-	static uint8_t filtered[4 * WIDTH * CODEC_STRIP_ROWS], plain[4 * WIDTH * CODEC_STRIP_ROWS];
-	unsigned pixel = rect->plane == PSR_WIRE_PLANE_COLOR ? 3 : 4, component = pixel == 3 ? 1 : 4;
+	static uint8_t filtered[8 * WIDTH * CODEC_STRIP_ROWS], plain[8 * WIDTH * CODEC_STRIP_ROWS];
+	unsigned pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
+	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	size_t n = (size_t)rect->w * rect->h * pixel;
-	uint8_t *to = rect->plane == PSR_WIRE_PLANE_COLOR ? out_rgb : (uint8_t *)out_depth;
+	uint8_t *to = out[rect->plane];
 	int w, h, chroma, space;
 
 	assert_true(rect->x == 0 && rect->w == WIDTH && rect->y % CODEC_STRIP_ROWS == 0);
@@ -91,14 +122,16 @@ static void decode_rect(const struct psr_msg_rect *rect, const uint8_t *coded)
 /* Takes the messages apart, pieces of 64 KiB put together; returns the number of rectangles. */
 static int decode(struct codec_result *result, unsigned *codecs)
 {
-	static uint8_t coded[8 * WIDTH * CODEC_STRIP_ROWS];
+	static uint8_t coded[16 * WIDTH * CODEC_STRIP_ROWS];
 	int n = 0;
 	uint64_t bytes = 0;
 
 	*codecs = 0;
-	for (int i = 0; i < PIXELS; i++) {
-		memcpy(out_rgb + 3 * i, background, 3);
-		out_depth[i] = INFINITY;
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
+
+		for (unsigned i = 0; i < PIXELS; i++)
+			memcpy(out[plane] + pixel * i, empty_pixel(plane), pixel);
 	}
 	for (struct outq_chunk *chunk = result->first; chunk != NULL; chunk = chunk->next) {
 		for (size_t at = 0; at < chunk->size;) {
@@ -137,10 +170,10 @@ static void lossless_planes_come_back_bit_for_bit(void **state)
 			struct codec_result result;
 
 			paint(kinds[k]);
-			result = encode(codecs[c], 0, codecs[c], 3, NULL);
+			result = encode(codecs[c], 0, codecs[c], ALL, NULL);
 			decode(&result, &used);
-			assert_memory_equal(out_rgb, rgb, sizeof rgb);
-			assert_memory_equal(out_depth, depth, sizeof depth);
+			for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+				assert_memory_equal(out[plane], in[plane], plane_bytes(plane));
 		}
 	}
 }
@@ -152,9 +185,9 @@ static void hashes_are_of_the_whole_planes(void **state)
 
 	(void)state;
 	paint(TOP_EMPTY);
-	result = encode(PSR_CODEC_JPEG, 50, PSR_CODEC_ZSTD, 3, NULL);
-	assert_true(result.hash[PSR_WIRE_PLANE_COLOR] == XXH64(rgb, sizeof rgb, 0));
-	assert_true(result.hash[PSR_WIRE_PLANE_DEPTH] == XXH64(depth, sizeof depth, 0));
+	result = encode(PSR_CODEC_JPEG, 50, PSR_CODEC_ZSTD, ALL, NULL);
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		assert_true(result.hash[plane] == XXH64(in[plane], plane_bytes(plane), 0));
 	decode(&result, &used);
 }
 
@@ -165,17 +198,17 @@ static void background_strips_are_left_out(void **state)
 
 	(void)state;
 	paint(EMPTY);
-	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, 3, NULL);
+	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
 	assert_true(result.depth_min == 0 && result.depth_max == 0);
 	assert_int_equal(decode(&result, &used), 0);
-	paint(TOP_EMPTY); /* 200 of 300 rows: one strip of three */
-	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, 3, NULL);
-	assert_int_equal(decode(&result, &used), 4);
+	paint(TOP_EMPTY); /* 200 of 300 rows: one strip of three, of each plane */
+	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
+	assert_int_equal(decode(&result, &used), 2 * PSR_WIRE_PLANES);
 	paint(EMPTY);
 	rgb[3 * (128 * WIDTH - 1) + 2] ^= 1; /* the last byte of the first strip */
 	result = encode(PSR_CODEC_RAW, 0, 0, 1, NULL);
 	assert_int_equal(decode(&result, &used), 1);
-	assert_memory_equal(out_rgb, rgb, sizeof rgb);
+	assert_memory_equal(out[PSR_WIRE_PLANE_COLOR], rgb, 3 * PIXELS);
 }
 
 static void what_does_not_shrink_travels_raw(void **state)
@@ -190,7 +223,7 @@ static void what_does_not_shrink_travels_raw(void **state)
 	assert_int_equal(used, 1u << PSR_CODEC_RAW);
 	paint(SMOOTH);
 	result = encode(PSR_CODEC_ZSTD, 0, 0, 1, NULL);
-	assert_true(result.rect_bytes < sizeof rgb / 4);
+	assert_true(result.rect_bytes < 3 * PIXELS / 4);
 	decode(&result, &used);
 	assert_int_equal(used, 1u << PSR_CODEC_ZSTD);
 }
@@ -206,11 +239,11 @@ static void each_strip_is_a_whole_jpeg(void **state)
 	result = encode(PSR_CODEC_JPEG, 95, 0, 1, NULL);
 	assert_int_equal(decode(&result, &used), 3);
 	assert_int_equal(used, 1u << PSR_CODEC_JPEG);
-	for (size_t i = 0; i < sizeof rgb; i++)
-		sum += (rgb[i] - out_rgb[i]) * (rgb[i] - out_rgb[i]);
+	for (size_t i = 0; i < 3 * PIXELS; i++)
+		sum += (rgb[i] - out[0][i]) * (rgb[i] - out[0][i]);
 	/* Quality 95 has quantisers of up to 12: an error of 6 in each of 64 coefficients is one of 6 a pixel, YCbCr to RGB
 	 * makes it 1.8 times as much at worst. */
-	assert_true(sqrt(sum / sizeof rgb) < 6 * 1.8);
+	assert_true(sqrt(sum / (3 * PIXELS)) < 6 * 1.8);
 }
 
 static void threads_do_not_change_a_byte(void **state)
@@ -223,8 +256,8 @@ static void threads_do_not_change_a_byte(void **state)
 	(void)state;
 	paint(SMOOTH);
 	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
-	one = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, 3, NULL);
-	many = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, 3, pool);
+	one = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, ALL, NULL);
+	many = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, ALL, pool);
 	for (a = one.first, b = many.first; a != NULL && b != NULL; a = a->next, b = b->next) {
 		assert_int_equal(a->size, b->size);
 		assert_memory_equal(a->data, b->data, a->size);
@@ -242,12 +275,12 @@ static void the_depth_range_is_of_finite_depths(void **state)
 
 	(void)state;
 	paint(EMPTY);
-	depth[5] = 7.5f;
-	depth[PIXELS - 1] = 0.25f;
+	set_depth(5, 7.5f);
+	set_depth(PIXELS - 1, 0.25f);
 	result = encode(0, 0, PSR_CODEC_RAW, 2, NULL);
 	assert_true(result.depth_min == 0.25 && result.depth_max == 7.5);
 	decode(&result, &used);
-	assert_memory_equal(out_depth, depth, sizeof depth);
+	assert_memory_equal(out[PSR_WIRE_PLANE_DEPTH], in[PSR_WIRE_PLANE_DEPTH], 4 * PIXELS);
 }
 
 int main(void)

@@ -2,6 +2,7 @@
 #ifndef PSR_PICTURE_H
 #define PSR_PICTURE_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
 
@@ -12,9 +13,18 @@ extern "C" {
 /* Rows top-down, packed. */
 struct psr_picture {
 	uint32_t width, height;
-	uint8_t *rgb; /* 3 * width * height, sRGB */
-	float *depth; /* width * height, z' in world units, +inf where nothing is; NULL if it was not asked for */
+	/* Each NULL if it was not asked for; what they hold is told by PROTOCOL.md, RECT. */
+	uint8_t *rgb;    /* 3 * width * height, sRGB */
+	float *depth;    /* width * height, z' in world units, +inf where nothing is */
+	int16_t *normal; /* 3 * width * height, world space, of length 32767; 0, 0, 0 without a sample */
+	uint32_t *id;    /* width * height, instance; UINT32_MAX without a sample */
+	uint8_t *weight; /* width * height, 255 * weight before the fill */
+	uint64_t *words; /* width * height, bits of z' << 32 | sample id; 7F800000FFFFFFFF without a sample */
+	uint8_t *block;  /* 3 * width * height, level of the model, of the depth buffer, facing; 255 without a sample */
 };
+
+/* The pixels of a plane (enum psr_wire_plane), NULL if it was not asked for. */
+void *psr_picture_plane(const struct psr_picture *picture, unsigned plane);
 
 /* The file's ending, in lower case or not, chooses the format. Colour: .png (libpng, 8 bits, with an sRGB chunk) and
  * .ppm. Depth: .pfm (little-endian, bottom-up as the format has it, +inf kept). All other endings that OpenImageIO
@@ -28,9 +38,19 @@ struct psr_picture {
 int psr_picture_write_color(const struct psr_picture *picture, const char *path, struct psr_error *err);
 int psr_picture_write_depth(const struct psr_picture *picture, const char *path, struct psr_error *err);
 
-/* What the two calls above would refuse at once: the ending, and a missing module. */
+/* One plane, which the picture has. Every plane goes to .npy as it is: NumPy's array of (height, width) or (height, width, 3)
+ * little-endian numbers, rows from the top. Otherwise colour and depth go where the calls above put them; of normals and
+ * weights a picture to look at is written as if it were colour: 255 (n + 1) / 2 as red, green and blue, black without a sample;
+ * grey. Ids, words and blocks take no other format than .npy. */
+int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err);
+
+/* The colours in which n normals are written. */
+void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n);
+
+/* What the calls above would refuse at once: the ending, and a missing module. */
 int psr_picture_check_color(const char *path, struct psr_error *err);
 int psr_picture_check_depth(const char *path, struct psr_error *err);
+int psr_picture_check_plane(unsigned plane, const char *path, struct psr_error *err);
 
 #ifdef __cplusplus
 }

@@ -91,7 +91,26 @@ struct psr_frame {
 	uint32_t width, height;
 	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed */
 	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out */
+	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour and
+	 * depth may have been filled in. */
+	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is two-sided;
+	                   * 0, 0, 0 without a sample */
+	uint32_t *id;     /* width * height, index of its instance; UINT32_MAX without a sample */
+	uint8_t *block;   /* 3 * width * height: of its block the model's level, the level k of the depth buffer, and enum
+	                   * psr_facing; 255, 255, 255 without a sample */
+	/* Of the stages before, NULL to leave it out: */
+	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where nothing is and nothing
+	                   * covers */
+	uint64_t *words;  /* width * height, as warped: bits of the float z' in world units << 32 | sample id; PSR_WORD_EMPTY.
+	                   * The sample id is 64 * (block, counted over all instances' models) + place in the block */
 	struct psr_report report;
+};
+
+/* What the cull knew of a block that is drawn ([G] 6.4, 7.3.2). */
+enum psr_facing {
+	PSR_FACING_EYE,       /* its cone faces the eye, and so do all of its samples */
+	PSR_FACING_MIXED,     /* some may face away: each was asked */
+	PSR_FACING_TWO_SIDED, /* none was asked */
 };
 
 struct psr_renderer; /* buffers for one frame at a time; kept from frame to frame */
@@ -100,7 +119,7 @@ int psr_renderer_create(struct psr_renderer **out);
 void psr_renderer_destroy(struct psr_renderer *renderer); /* NULL is fine */
 uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 
-/* The whole pipeline into frame->rgb and, if not NULL, frame->depth; both of the caller's, at the size of the
+/* The whole pipeline into frame->rgb and the other planes that are not NULL; all of the caller's, at the size of the
  * settings. pool may be NULL. ARG or LIMIT for what the door refuses, MEMORY. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);

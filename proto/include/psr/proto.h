@@ -80,6 +80,7 @@ enum psr_cap {
 	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
 	PSR_CAP_PAUSE = 1 << 18,
 	PSR_CAP_PRESETS = 1 << 19,
+	PSR_CAP_BLOCK = 1 << 20,
 };
 
 /* ---- storage and header ---- */
@@ -335,8 +336,8 @@ int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *p
 
 enum psr_wire_plane { /* bits of `planes`, values of `plane` are the bit's number */
 	PSR_WIRE_PLANE_COLOR = 0, PSR_WIRE_PLANE_DEPTH = 1, PSR_WIRE_PLANE_NORMAL = 2, PSR_WIRE_PLANE_ID = 3,
-	PSR_WIRE_PLANE_WEIGHT = 4, PSR_WIRE_PLANE_WORDS = 5,
-	PSR_WIRE_PLANES = 6,
+	PSR_WIRE_PLANE_WEIGHT = 4, PSR_WIRE_PLANE_WORDS = 5, PSR_WIRE_PLANE_BLOCK = 6,
+	PSR_WIRE_PLANES = 7,
 };
 enum psr_codec { PSR_CODEC_RAW = 0, PSR_CODEC_JPEG = 1, PSR_CODEC_ZSTD = 2, PSR_CODEC_PNG = 3 };
 enum psr_wire_depth_format { PSR_WIRE_DEPTH_F32 = 1, PSR_WIRE_DEPTH_U16 = 2, PSR_WIRE_DEPTH_U16_HALF = 3 };
@@ -358,7 +359,7 @@ struct psr_msg_frame { /* client -> server */
 	uint8_t color_quality;   /* JPEG: 1..100; else 0 */
 	uint8_t depth_format;
 	uint8_t depth_codec;     /* raw or zstd */
-	uint8_t data_codec;      /* of normal, id, weight, words: raw or zstd */
+	uint8_t data_codec;      /* of normal, id, weight, words, block: raw or zstd */
 	uint8_t budget;          /* enum psr_wire_budget: exactly one of the next three counts, the others are 0 */
 	uint64_t time_budget_us; /* TIME: 1..2^53-1, from the start of work on the frame to its END in the output queue */
 	double error_bound_px;   /* ERROR: of the geometric error, > 0 */
@@ -404,6 +405,14 @@ int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t
  * filter works on. */
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format);
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format);
+
+const char *psr_plane_name(unsigned plane); /* "color", "depth", "normal", "id", "weight", "words", "block" */
+
+/* The bytes of a pixel of a plane (depth: F32) that a picture has where no rectangle came: 8 of them, of which the plane has
+ * the first. Colour has FRAME_BEGIN's background instead. */
+const uint8_t *psr_plane_background(unsigned plane);
+
+uint64_t psr_plane_capability(unsigned plane); /* of enum psr_cap, what offers the plane; 0: every server does */
 
 /* The greatest `total` that a rectangle of so many data pixels of so many bytes may claim: what a receiver holds. */
 uint64_t psr_rect_total_max(uint64_t n_pixels, unsigned pixel_bytes);

@@ -1,0 +1,100 @@
+#include <string.h>
+#include "render/render.h"
+
+static void put_words(const struct simd *simd, const struct plan *plan, uint64_t *to, const uint64_t *word, uint32_t n)
+{
+	float z[STRIP];
+	simd->depth_row(z, word, n, plan->exponent);
+	for (uint32_t x = 0; x < n; x++) {
+		uint32_t bits;
+		memcpy(&bits, &z[x], sizeof bits);
+		to[x] = (uint64_t)bits << 32 | (uint32_t)word[x];
+	}
+}
+
+static void put_weights(uint8_t *to, const uint16_t *weight, uint32_t n)
+{
+	for (uint32_t x = 0; x < n; x++)
+		to[x] = (uint8_t)((weight[x] * 255u + WEIGHT_ONE / 2) / WEIGHT_ONE);
+}
+
+/* Normals are unit vectors but for rounding. */
+static int16_t to_steps(float n)
+{
+	const float scaled = n * 32767, clamped = scaled < -32767 ? -32767 : scaled > 32767 ? 32767 : scaled;
+	return (int16_t)(clamped + (clamped < 0 ? -0.5f : 0.5f));
+}
+
+static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip *strip, uint32_t n)
+{
+	struct strip_view view = plan->view;
+	view.lit = NULL; /* with a table of light normals are not looked for */
+	memset(to, 0, 3 * n * sizeof *to);
+	if (!strip->n)
+		return;
+	simd->strip_resolve(strip, &view, plan->ambient);
+	for (uint32_t i = 0; i < strip->n; i++)
+		for (int a = 0; a < 3; a++)
+			to[3 * strip->x[i] + a] = to_steps((plan->axis[0][a] * strip->nx[i] + plan->axis[1][a] * strip->ny[i]) +
+			                                   plan->axis[2][a] * strip->nz[i]);
+}
+
+static void put_instances(const struct plan *plan, uint32_t *to, const struct strip *strip, uint32_t n)
+{
+	memset(to, 0xff, n * sizeof *to);
+	for (uint32_t i = 0; i < strip->n; i++)
+		to[strip->x[i]] = plan_find_instance(plan, strip->id[i] / PSR_BLOCK_SAMPLES);
+}
+
+/* What the cull says of one block: it is asked again, so that frames without this plane keep nothing of it. */
+static void describe(uint8_t to[3], const struct simd *simd, const struct plan *plan, uint32_t slot)
+{
+	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t block = slot - in->first_slot;
+	struct cull_batch batch;
+	simd->cull(&batch, &in->cull, block, 1);
+	to[0] = (uint8_t)psr_blocks_level(b, block);
+	to[1] = batch.level[0] > PSR_MAX_DEPTH_LEVEL ? PSR_MAX_DEPTH_LEVEL : batch.level[0];
+	to[2] = b->flags[block] & PSR_BLOCK_TWO_SIDED ? PSR_FACING_TWO_SIDED
+	        : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;
+}
+
+static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip *strip,
+                       uint32_t n)
+{
+	uint8_t last[3] = { 0, 0, 0 };
+	memset(to, 0xff, 3 * n);
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint32_t slot = strip->id[i] / PSR_BLOCK_SAMPLES;
+		if (i == 0 || slot != strip->id[i - 1] / PSR_BLOCK_SAMPLES)
+			describe(last, simd, plan, slot);
+		memcpy(to + 3 * strip->x[i], last, 3);
+	}
+}
+
+void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
+                const uint16_t *weight, uint32_t y)
+{
+	const size_t row = (size_t)y * plan->width;
+	struct strip strip;
+	strip.y = y;
+	for (uint32_t x = 0; x < plan->width; x += STRIP) {
+		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
+		const size_t first = row + x;
+		if (frame->words)
+			put_words(simd, plan, frame->words + first, word + x, n);
+		if (frame->weight)
+			put_weights(frame->weight + first, weight + x, n);
+		if (!frame->normal && !frame->id && !frame->block)
+			continue;
+		strip.x0 = x;
+		simd->strip_list(&strip, word + x, weight + x, n);
+		if (frame->normal)
+			put_normals(simd, plan, frame->normal + 3 * first, &strip, n);
+		if (frame->id)
+			put_instances(plan, frame->id + first, &strip, n);
+		if (frame->block)
+			put_blocks(simd, plan, frame->block + 3 * first, &strip, n);
+	}
+}
