@@ -1,31 +1,7 @@
 #include <immintrin.h>
 #include <string.h>
-#include "simd/block.h"
 #include "simd/kernels.h"
-
-/* As in avx512/warp.c, in groups of 8 samples. */
-struct stores {
-	_Alignas(32) uint64_t word[8][8];
-	_Alignas(32) uint32_t at[8][8];
-};
-
-static inline void lower_words(uint64_t *base, const struct stores *s, int n_groups)
-{
-	const int half = (n_groups + 1) / 2;
-	for (int g = 0; g < n_groups / 2; g++)
-		for (int l = 0; l < 8; l++)
-			_Pragma("GCC unroll 2") for (int h = 0; h < 2; h++) {
-				uint64_t *at = &base[s->at[g + h * half][l]];
-				const uint64_t word = s->word[g + h * half][l], there = *at;
-				*at = word < there ? word : there;
-			}
-	if (n_groups & 1)
-		for (int l = 0; l < 8; l++) {
-			uint64_t *at = &base[s->at[half - 1][l]];
-			const uint64_t word = s->word[half - 1][l], there = *at;
-			*at = word < there ? word : there;
-		}
-}
+#include "simd/warp_list.h"
 
 static inline __m256 rows_of(const struct warp_block *b, int a)
 {
@@ -101,22 +77,41 @@ static inline uint32_t bits_of(__m256i k)
 	return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(k));
 }
 
-static inline void lower_cells(const struct warp_cells *cells, int level, __m256i k, __m256i u, __m256i v, __m256 z)
+/* The order that brings the lanes of a mask to the front. */
+static inline __m256i front_of(uint32_t bits)
 {
-	_Alignas(32) uint32_t at[8], bits[8];
-	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32(level), first = _mm256_set1_epi32((int)cells->first);
+	const uint64_t lanes = _pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
+	return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)lanes));
+}
+
+static inline void store(void *to, __m256i value)
+{
+	_mm256_storeu_si256(to, value);
+}
+
+static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __m256i k, __m256i u, __m256i v,
+                              __m256 z)
+{
+	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32(level);
 	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one), y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
-	const __m256i line = _mm256_mullo_epi32(y, _mm256_set1_epi32((int)cells->stride));
-	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
-	_mm256_store_si256((__m256i *)at, _mm256_blendv_epi8(first, _mm256_add_epi32(line, x), k));
-	_mm256_store_si256((__m256i *)bits, _mm256_blendv_epi8(_mm256_set1_epi32(-1), _mm256_castps_si256(z), k));
-	uint32_t *base = (uint32_t *)cells->z;
-	_Pragma("GCC unroll 8") for (int l = 0; l < 8; l++)
-	{
-		uint32_t *cell = &base[at[l]];
-		const uint32_t there = *cell;
-		*cell = bits[l] < there ? bits[l] : there;
-	}
+	const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)cells->stride)), x);
+	const uint32_t bits = bits_of(inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1));
+	const __m256i front = front_of(bits);
+	store(list->at + list->n, _mm256_permutevar8x32_epi32(at, front));
+	store(list->z + list->n, _mm256_permutevar8x32_epi32(_mm256_castps_si256(z), front));
+	list->n += (uint32_t)__builtin_popcount(bits);
+}
+
+static inline void list_words(struct words *list, __m256i k, __m256i at, __m256i id, __m256 z)
+{
+	const uint32_t bits = bits_of(k);
+	const __m256i front = front_of(bits), own = _mm256_permutevar8x32_epi32(id, front);
+	const __m256i depth = _mm256_permutevar8x32_epi32(_mm256_castps_si256(z), front);
+	const __m256i low = _mm256_unpacklo_epi32(own, depth), high = _mm256_unpackhi_epi32(own, depth);
+	store(list->at + list->n, _mm256_permutevar8x32_epi32(at, front));
+	store(list->word + list->n, _mm256_permute2x128_si256(low, high, 0x20));
+	store(list->word + list->n + 4, _mm256_permute2x128_si256(low, high, 0x31));
+	list->n += (uint32_t)__builtin_popcount(bits);
 }
 
 /* The numbers of the bits of a mask, in order; what follows them is of no value. */
@@ -132,14 +127,12 @@ static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 	}
 }
 
-static inline uint32_t warp_one(const struct warp_target *t, const struct bin_entry *entry, __m256i unused)
+static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry)
 {
-	const __m256i order = _mm256_setr_epi32(0, 1, 4, 5, 2, 3, 6, 7), lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
 	const struct warp_instance *in = &t->instance[entry->instance];
 	uint8_t sample[64 + 8];
 	struct warp_block b;
-	struct stores stores;
-	uint32_t n_inside = 0;
 
 	warp_block_make(&b, in, entry->slot);
 	const int n = __builtin_popcountll(b.mask), n_groups = (n + 7) / 8;
@@ -163,29 +156,14 @@ static inline uint32_t warp_one(const struct warp_target *t, const struct bin_en
 		if (entry->is_mixed)
 			k = _mm256_andnot_si256(faces_away(t, in, b.attr + 8 * g, valid, u, v), k);
 		if (entry->level)
-			lower_cells(&t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
+			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
 		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
-		n_inside += (uint32_t)__builtin_popcount(bits_of(k));
-
 		const __m256i line = _mm256_mullo_epi32(pixel_v, _mm256_set1_epi32((int)t->stride));
-		const __m256i at = _mm256_blendv_epi8(unused, _mm256_add_epi32(line, pixel_u), k);
-		const __m256i id = _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id));
-		const __m256i bits = _mm256_blendv_epi8(_mm256_set1_epi32(-1), _mm256_castps_si256(z1), k);
-		_mm256_store_si256((__m256i *)stores.at[g], _mm256_permutevar8x32_epi32(at, order));
-		_mm256_store_si256((__m256i *)stores.word[g], _mm256_unpacklo_epi32(id, bits));
-		_mm256_store_si256((__m256i *)(stores.word[g] + 4), _mm256_unpackhi_epi32(id, bits));
+		list_words(words, k, _mm256_add_epi32(line, pixel_u), _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id)), z1);
 	}
-	lower_words(t->word, &stores, n_groups);
-	return n_inside;
 }
 
 uint64_t warp_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
-	const __m256i lane = _mm256_min_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
-	                                      _mm256_set1_epi32(target->x1 - target->x0 - 1));
-	const __m256i unused = _mm256_add_epi32(lane, _mm256_set1_epi32(target->y0 * (int)target->stride + target->x0));
-	uint64_t n_inside = 0;
-	for (uint32_t e = 0; e < n; e++)
-		n_inside += warp_one(target, &entry[e], unused);
-	return n_inside;
+	return warp_by(list_block, target, entry, n);
 }

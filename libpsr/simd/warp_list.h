@@ -1,0 +1,84 @@
+/* What falls into a tile, of many blocks: words, depths of cells, and the places that they go to. They are computed first and
+ * stored after, so that the long way from a block's head to its words is walked for several blocks at a time; and stored a
+ * quarter of the list apart in turn, since samples that follow each other often fall into one pixel, and a store must not wait
+ * for the one just before. */
+#ifndef PSR_SIMD_WARP_LIST_H
+#define PSR_SIMD_WARP_LIST_H
+
+#include "simd/block.h"
+
+#define LIST 512
+struct words {
+	_Alignas(64) uint64_t word[LIST + 16];
+	_Alignas(64) uint32_t at[LIST + 16];
+	uint32_t n;
+};
+struct cells {
+	_Alignas(64) uint32_t z[LIST + 16];
+	_Alignas(64) uint32_t at[LIST + 16];
+	uint32_t n, level;
+};
+
+#define LOWER(type, base, value, i)                     \
+	do {                                                \
+		type *at = &(base)[list->at[i]];                \
+		const type own = list->value[i], there = *at;   \
+		*at = own < there ? own : there;                \
+	} while (0)
+#define LOWER_ALL(type, base, value)                    \
+	do {                                                \
+		const uint32_t part = list->n / 4;              \
+		for (uint32_t i = 0; i < part; i++) {           \
+			LOWER(type, base, value, i);                \
+			LOWER(type, base, value, i + part);         \
+			LOWER(type, base, value, i + 2 * part);     \
+			LOWER(type, base, value, i + 3 * part);     \
+		}                                               \
+		for (uint32_t i = 4 * part; i < list->n; i++)   \
+			LOWER(type, base, value, i);                \
+		list->n = 0;                                    \
+	} while (0)
+
+static inline void lower_words(uint64_t *base, struct words *list)
+{
+	LOWER_ALL(uint64_t, base, word);
+}
+
+/* Depths are above 0, so that they compare as integers. */
+static inline void lower_cells(const struct warp_target *t, struct cells *list)
+{
+	uint32_t *base = (uint32_t *)t->cells[list->level].z;
+	LOWER_ALL(uint32_t, base, z);
+}
+
+#undef LOWER
+#undef LOWER_ALL
+
+typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry);
+
+/* The warp, by what lists a block; room for one more block is there whenever it is called. */
+static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *list_block, const struct warp_target *target,
+                                                              const struct bin_entry *entry, uint32_t n)
+{
+	struct words words;
+	struct cells cells;
+	uint64_t n_inside = 0;
+	words.n = cells.n = cells.level = 0;
+	for (uint32_t e = 0; e < n; e++) {
+		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
+			n_inside += words.n;
+			lower_words(target->word, &words);
+		}
+		if (entry[e].level && (entry[e].level != cells.level || cells.n > LIST - PSR_BLOCK_SAMPLES)) {
+			lower_cells(target, &cells);
+			cells.level = entry[e].level;
+		}
+		list_block(&words, &cells, target, &entry[e]);
+	}
+	n_inside += words.n;
+	lower_words(target->word, &words);
+	lower_cells(target, &cells);
+	return n_inside;
+}
+
+#endif
