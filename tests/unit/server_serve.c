@@ -37,7 +37,7 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
+	assert_int_equal(welcome.capabilities, PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
 	                                       PSR_CAP_WORDS | PSR_CAP_BLOCK);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
@@ -359,12 +359,10 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "view"));
 	scene_default(scene, 1);
-	scene->n_lights = 1;
-	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .flags = PSR_WIRE_LIGHT_SHADOW,
-		                                      .intensity = 1, .direction = { 0, -1, 0 } };
+	scene->instance[0].representation = PSR_WIRE_REP_OCTREE;
 	peer_send_scene(&p, scene);
 	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "shadow"));
+	assert_non_null(strstr(text, "representation"));
 	/* The scene that failed has left its slot empty. */
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_NOT_FOUND, NULL);
 	peer_close(&p);

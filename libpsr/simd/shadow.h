@@ -1,0 +1,114 @@
+/* How much of a light reaches the samples of a strip, by shadow maps ([G] 7.3.1), as plain loops, which the compiler turns
+ * into vectors; compiled once for each ISA. */
+#include "base/maths.h"
+#include "simd/simd.h"
+
+/* Samples of a strip as one map sees them. */
+struct shadow_place {
+	float u[STRIP], v[STRIP], z[STRIP]; /* texels of level 0, and z' */
+	float texel[STRIP];                 /* its width there */
+	float du[STRIP], dv[STRIP];         /* what z' of the sample's plane gains by a texel */
+	uint8_t is_here[STRIP];             /* in the map, and lit if nothing is before it */
+	float cover[STRIP];
+};
+
+/* The plane of a sample at q with normal n holds all p with n.p = n.q. With p = (x z', y z', z') in perspective dz'/dx = -z' n_x /
+ * (n.(x, y, 1)), which is z'^2 n_x / -(n.q); from afar it is n_x / -n_z. A surface that the light meets at less than 0.6
+ * degrees is taken for one that it meets so. */
+#define GRAZING 0.01f
+
+/* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something of. */
+static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face, uint32_t *n_here)
+{
+	const struct shadow_map m = *map;
+	const float least = GRAZING * m.scale;
+	uint32_t n_facing = 0, n = 0;
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float px = s->px[i], py = s->py[i], pz = s->pz[i], nx = s->nx[i], ny = s->ny[i], nz = s->nz[i];
+		const float x = ((m.turn[0][0] * px + m.turn[0][1] * py) + m.turn[0][2] * pz) + m.move[0];
+		const float y = ((m.turn[1][0] * px + m.turn[1][1] * py) + m.turn[1][2] * pz) + m.move[1];
+		const float z = ((m.turn[2][0] * px + m.turn[2][1] * py) + m.turn[2][2] * pz) + m.move[2];
+		const float mx = (m.turn[0][0] * nx + m.turn[0][1] * ny) + m.turn[0][2] * nz;
+		const float my = (m.turn[1][0] * nx + m.turn[1][1] * ny) + m.turn[1][2] * nz;
+		const float mz = (m.turn[2][0] * nx + m.turn[2][1] * ny) + m.turn[2][2] * nz;
+		const float across = psr_choose(m.perspective, (mx * x + my * y) + mz * z, mz), facing = -across;
+		const int is_beyond = z > m.near_z;
+		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
+		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
+		const float texel = w / m.focal, floor = least * w;
+		const float slope = texel * w / psr_choose(facing > floor, facing, floor);
+		at->u[i] = x * m.focal / w + m.half_width;
+		at->v[i] = y * m.focal / w + m.half_height;
+		at->z[i] = z;
+		at->texel[i] = texel;
+		at->du[i] = mx * slope;
+		at->dv[i] = my * slope;
+		at->cover[i] = 0;
+		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
+		n_facing += facing > 0;
+		n += at->is_here[i];
+	}
+	*n_here = n;
+	return n_facing != 0;
+}
+
+static inline float magnitude(float x)
+{
+	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
+}
+
+static inline float clamp_cell(float x, float most)
+{
+	x = psr_choose(x > -1, x, -1); /* NaN is none */
+	return psr_choose(x < most, x, most);
+}
+
+/* Adds the coverage of each place by one level, bilinear among four cells ([G] 4.6). A cell covers what lies behind it: its depth is
+ * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
+ * a cell from its centre in both directions, less a bias of a texel. */
+static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
+{
+	const float size = (float)(1 << k), inverse = 1 / size;
+	const float half = size * map->slope_bias, bias = size * map->texel_bias, slack = map->slack;
+	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
+	const float *cells = map->level[k].z + map->level[k].stride + 1;
+	const int32_t stride = (int32_t)map->level[k].stride;
+	for (uint32_t i = 0; i < n; i++) {
+		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x), y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
+		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y), cell = cy * stride + cx;
+		const float fx = x - (float)cx, fy = y - (float)cy;
+		const float du = at->du[i] * size, dv = at->dv[i] * size;
+		const float least = (at->z[i] - slack) - ((magnitude(at->du[i]) + magnitude(at->dv[i])) * half + at->texel[i] * bias);
+		const float z00 = least - (fx * du + fy * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
+		const float c00 = psr_where(cells[cell] < z00, (1 - fx) * (1 - fy));
+		const float c10 = psr_where(cells[cell + 1] < z10, fx * (1 - fy));
+		const float c01 = psr_where(cells[cell + stride] < z01, (1 - fx) * fy);
+		const float c11 = psr_where(cells[cell + stride + 1] < z11, fx * fy);
+		at->cover[i] += (c00 + c11) + (c10 + c01);
+	}
+}
+
+static int strip_shadow(const struct strip *strip, const struct shadow_light *shadow, float *reaches)
+{
+	struct shadow_place at;
+	int is_lit = 0;
+	for (uint32_t i = 0; i < strip->n; i++)
+		reaches[i] = 1;
+	for (uint32_t f = 0; f < shadow->n_maps; f++) {
+		const struct shadow_map *map = &shadow->map[f];
+		uint32_t n_here;
+		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1, &n_here);
+		if (!is_lit)
+			return 0;
+		if (!n_here)
+			continue;
+		for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++)
+			if (map->levels >> k & 1)
+				shadow_cover(&at, map, k, strip->n);
+		for (uint32_t i = 0; i < strip->n; i++) {
+			const float left = 1 - at.cover[i];
+			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, left), reaches[i]);
+		}
+	}
+	return is_lit;
+}
