@@ -6,7 +6,7 @@
 /* Samples of a strip as one map sees them. */
 struct shadow_place {
 	float u[STRIP], v[STRIP], z[STRIP]; /* texels of level 0, and z' */
-	float texel[STRIP];                 /* its width there */
+	float bias[STRIP];                  /* for a cell of one texel; grows with it */
 	float du[STRIP], dv[STRIP];         /* what z' of the sample's plane gains by a texel */
 	uint8_t is_here[STRIP];             /* in the map, and lit if nothing is before it */
 	float cover[STRIP];
@@ -16,6 +16,15 @@ struct shadow_place {
  * (n.(x, y, 1)), which is z'^2 n_x / -(n.q); from afar it is n_x / -n_z. A surface that the light meets at less than 0.6
  * degrees is taken for one that it meets so. */
 #define GRAZING 0.01f
+
+/* Stored normals are off by up to this angle, so that slopes are by it times 1 / cos^2 of the angle to the light, and samples of a
+ * cell are up to 1.5 cells away in both directions. */
+#define NORMAL_BIAS (1.5f * 1.41421356f * BACK_SINE)
+
+static inline float magnitude(float x)
+{
+	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
+}
 
 /* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something of. */
 static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face, uint32_t *n_here)
@@ -36,13 +45,13 @@ static int shadow_locate(struct shadow_place *at, const struct strip *s, const s
 		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
 		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
 		const float texel = w / m.focal, floor = least * w;
-		const float slope = texel * w / psr_choose(facing > floor, facing, floor);
+		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep, secant = m.scale * steep;
 		at->u[i] = x * m.focal / w + m.half_width;
 		at->v[i] = y * m.focal / w + m.half_height;
 		at->z[i] = z;
-		at->texel[i] = texel;
 		at->du[i] = mx * slope;
 		at->dv[i] = my * slope;
+		at->bias[i] = (magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * (m.texel_bias + NORMAL_BIAS * secant * secant);
 		at->cover[i] = 0;
 		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
 		n_facing += facing > 0;
@@ -50,11 +59,6 @@ static int shadow_locate(struct shadow_place *at, const struct strip *s, const s
 	}
 	*n_here = n;
 	return n_facing != 0;
-}
-
-static inline float magnitude(float x)
-{
-	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
 }
 
 static inline float clamp_cell(float x, float most)
@@ -69,7 +73,7 @@ static inline float clamp_cell(float x, float most)
 static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
 {
 	const float size = (float)(1 << k), inverse = 1 / size;
-	const float half = size * map->slope_bias, bias = size * map->texel_bias, slack = map->slack;
+	const float slack = map->slack;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
 	const float *cells = map->level[k].z + map->level[k].stride + 1;
 	const int32_t stride = (int32_t)map->level[k].stride;
@@ -78,7 +82,7 @@ static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, 
 		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y), cell = cy * stride + cx;
 		const float fx = x - (float)cx, fy = y - (float)cy;
 		const float du = at->du[i] * size, dv = at->dv[i] * size;
-		const float least = (at->z[i] - slack) - ((magnitude(at->du[i]) + magnitude(at->dv[i])) * half + at->texel[i] * bias);
+		const float least = (at->z[i] - slack) - at->bias[i] * size;
 		const float z00 = least - (fx * du + fy * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
 		const float c00 = psr_where(cells[cell] < z00, (1 - fx) * (1 - fy));
 		const float c10 = psr_where(cells[cell + 1] < z10, fx * (1 - fy));
