@@ -129,7 +129,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	rc = cull_blocks(bins, simd, plan, pool, &report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(err, rc, "too many blocks for a shadow map");
-	drawer->word = grow_huge(drawer->word, &drawer->word_size, (area + WARP_PADDING) * sizeof *drawer->word);
+	drawer->word = grow_huge(drawer->word, &drawer->word_size, area * sizeof *drawer->word);
 	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
 	clear_band(&d);
