@@ -1,5 +1,6 @@
 /* How much of a light reaches the samples of a strip, by shadow maps ([G] 7.3.1), as plain loops, which the compiler turns
  * into vectors; compiled once for each ISA. */
+#include <string.h>
 #include "base/maths.h"
 #include "simd/simd.h"
 
@@ -30,7 +31,7 @@ static inline float magnitude(float x)
 static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face, uint32_t *n_here)
 {
 	const struct shadow_map m = *map;
-	const float least = GRAZING * m.scale;
+	const float least = GRAZING * m.scale, unit = 1 / m.focal;
 	uint32_t n_facing = 0, n = 0;
 	for (uint32_t i = 0; i < s->n; i++) {
 		const float px = s->px[i], py = s->py[i], pz = s->pz[i], nx = s->nx[i], ny = s->ny[i], nz = s->nz[i];
@@ -44,10 +45,10 @@ static int shadow_locate(struct shadow_place *at, const struct strip *s, const s
 		const int is_beyond = z > m.near_z;
 		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
 		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
-		const float texel = w / m.focal, floor = least * w;
+		const float texel = w * unit, scale = m.focal / w, floor = least * w;
 		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep, secant = m.scale * steep;
-		at->u[i] = x * m.focal / w + m.half_width;
-		at->v[i] = y * m.focal / w + m.half_height;
+		at->u[i] = x * scale + m.half_width;
+		at->v[i] = y * scale + m.half_height;
 		at->z[i] = z;
 		at->du[i] = mx * slope;
 		at->dv[i] = my * slope;
@@ -67,27 +68,49 @@ static inline float clamp_cell(float x, float most)
 	return psr_choose(x < most, x, most);
 }
 
+/* Two cells side by side. */
+static inline uint64_t load_pair(const float *cells)
+{
+	uint64_t pair;
+	memcpy(&pair, cells, sizeof pair);
+	return pair;
+}
+
+static inline float cover_of(uint64_t pair, int shift, float z, float part)
+{
+	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) < z, part);
+}
+
 /* Adds the coverage of each place by one level, bilinear among four cells ([G] 4.6). A cell covers what lies behind it: its depth is
  * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
- * a cell from its centre in both directions, less a bias of a texel. */
+ * a cell from its centre in both directions, less a bias of a texel. Loads are apart from arithmetic, of which the compiler
+ * makes vectors. */
 static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
 {
-	const float size = (float)(1 << k), inverse = 1 / size;
-	const float slack = map->slack;
+	const float size = (float)(1 << k), inverse = 1 / size, slack = map->slack;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
-	const float *cells = map->level[k].z + map->level[k].stride + 1;
 	const int32_t stride = (int32_t)map->level[k].stride;
+	const float *upper = map->level[k].z + stride + 1, *lower = upper + stride;
+	float fx[STRIP], fy[STRIP];
+	int32_t cell[STRIP];
+	uint64_t pair[2][STRIP];
 	for (uint32_t i = 0; i < n; i++) {
 		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x), y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
-		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y), cell = cy * stride + cx;
-		const float fx = x - (float)cx, fy = y - (float)cy;
-		const float du = at->du[i] * size, dv = at->dv[i] * size;
+		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y);
+		cell[i] = cy * stride + cx;
+		fx[i] = x - (float)cx;
+		fy[i] = y - (float)cy;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		pair[0][i] = load_pair(upper + cell[i]);
+		pair[1][i] = load_pair(lower + cell[i]);
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
 		const float least = (at->z[i] - slack) - at->bias[i] * size;
-		const float z00 = least - (fx * du + fy * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
-		const float c00 = psr_where(cells[cell] < z00, (1 - fx) * (1 - fy));
-		const float c10 = psr_where(cells[cell + 1] < z10, fx * (1 - fy));
-		const float c01 = psr_where(cells[cell + stride] < z01, (1 - fx) * fy);
-		const float c11 = psr_where(cells[cell + stride + 1] < z11, fx * fy);
+		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
+		const float c00 = cover_of(pair[0][i], 0, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, z10, x * (1 - y));
+		const float c01 = cover_of(pair[1][i], 0, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, z11, x * y);
 		at->cover[i] += (c00 + c11) + (c10 + c01);
 	}
 }
