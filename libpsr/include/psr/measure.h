@@ -53,8 +53,8 @@ int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth 
                                uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads, struct psr_error *err);
 
 /* A frame with no ambient and one light that casts shadows against the same frame whose light casts none, and both against shadow rays, 4x4
- * a pixel, which are stopped by either side of a face. Pixels are compared that show the object whole and are lit without
- * shadows: by at least a twentieth, linear, and at over 6 degrees to every face seen in them. */
+ * a pixel, which are stopped by either side of a face. Pixels are compared that are lit without shadows, by at least a
+ * twentieth, linear, and whose 5x5 neighbourhood shows nothing but faces that the light meets at over 6 degrees. */
 #define PSR_SHADOW_WRONG 0.5 /* of the light without shadows */
 struct psr_shadow_accuracy {
 	uint64_t n_compared, n_shadow; /* n_shadow: less than half of their rays reach the light */
