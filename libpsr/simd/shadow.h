@@ -52,7 +52,7 @@ static int shadow_locate(struct shadow_place *at, const struct strip *s, const s
 		at->z[i] = z;
 		at->du[i] = mx * slope;
 		at->dv[i] = my * slope;
-		at->bias[i] = (magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * (m.texel_bias + NORMAL_BIAS * secant * secant);
+		at->bias[i] = (magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
 		at->cover[i] = 0;
 		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
 		n_facing += facing > 0;
@@ -76,18 +76,20 @@ static inline uint64_t load_pair(const float *cells)
 	return pair;
 }
 
-static inline float cover_of(uint64_t pair, int shift, float z, float part)
+static inline float cover_of(uint64_t pair, int shift, float scale, float offset, float z, float part)
 {
-	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) < z, part);
+	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) * scale + offset < z, part);
 }
 
-/* Adds the coverage of each place by one level, bilinear among four cells ([G] 4.6). A cell covers what lies behind it: its depth is
+/* Raises the coverage of each place to that by one level, bilinear among four cells ([G] 4.6). A cell covers what lies behind it: its depth is
  * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
- * a cell from its centre in both directions, less a bias of a texel. Loads are apart from arithmetic, of which the compiler
+ * a cell from its centre in both directions, less a bias of a cell's width at the cell's own
+ * depth. Loads are apart from arithmetic, of which the compiler
  * makes vectors. */
 static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
 {
-	const float size = (float)(1 << k), inverse = 1 / size, slack = map->slack;
+	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
+	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
 	const int32_t stride = (int32_t)map->level[k].stride;
 	const float *upper = map->level[k].z + stride + 1, *lower = upper + stride;
@@ -107,11 +109,12 @@ static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, 
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
-		const float least = (at->z[i] - slack) - at->bias[i] * size;
+		const float least = at->z[i] - at->bias[i] * size;
 		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
-		const float c00 = cover_of(pair[0][i], 0, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, z10, x * (1 - y));
-		const float c01 = cover_of(pair[1][i], 0, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, z11, x * y);
-		at->cover[i] += (c00 + c11) + (c10 + c01);
+		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
+		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
+		const float cover = (c00 + c11) + (c10 + c01);
+		at->cover[i] = psr_choose(cover > at->cover[i], cover, at->cover[i]);
 	}
 }
 
@@ -133,8 +136,9 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 			if (map->levels >> k & 1)
 				shadow_cover(&at, map, k, strip->n);
 		for (uint32_t i = 0; i < strip->n; i++) {
-			const float left = 1 - at.cover[i];
-			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, left), reaches[i]);
+			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too wide. */
+			const float left = 2 - 2 * at.cover[i];
+			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, psr_choose(left < 1, left, 1)), reaches[i]);
 		}
 	}
 	return is_lit;

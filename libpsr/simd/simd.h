@@ -203,8 +203,8 @@ struct shadow_light {
 	struct shadow_map map[SHADOW_FACES];
 };
 
-/* How much of a light reaches each sample of a strip with positions: 1 less the coverage by what is nearer to the light. 0: no
- * sample faces the light, and `reaches` has no value. */
+/* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of what is
+ * nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
 typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
 
 /* ---- gaps ([G] 4.6) ---- */

@@ -185,6 +185,38 @@ static void a_coarse_square_casts_without_leaks(void **state)
 	check_edges(&COARSE, &SUN, reach_of(cell));
 }
 
+/* A lamp just above the square, whose cells are of many sizes there: nothing comes through where levels meet. The square's spacing
+ * is thrice as wide on the floor, and cells at most twice that. */
+static void levels_meet_without_leaks(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 8; i++) {
+		struct shape_options square = COARSE;
+		struct psr_light light = LAMP;
+		square.resolution = 24 + 16 * (uint32_t)i;
+		light.position[0] = -0.3 + 0.1 * i;
+		light.position[1] = 0.05 * i;
+		light.position[2] = 0.75;
+		const double cell = 2 * 3 * 0.4 * 2 / square.resolution, reach = reach_of(cell);
+		struct stage s;
+		stage_init(&s, &square, &light);
+		uint8_t *dark = draw_dark(&s), *got = draw(&s, NULL);
+		unsigned n_dark = 0, n_leaks = 0;
+		for (int p = 0; p < PIXELS; p++) {
+			const double x = (p % SIDE + 0.5 - SIDE / 2) * 2.9 / SIDE, y = (SIDE / 2 - p / SIDE - 0.5) * 2.9 / SIDE;
+			if (fabs(x) > HALF_FLOOR - 0.02 || fabs(y) > HALF_FLOOR - 0.02 || inside_shadow(&light, x, y) < reach)
+				continue;
+			n_dark++;
+			n_leaks += memcmp(got + 3 * p, dark + 3 * p, 3) != 0;
+		}
+		if (n_leaks || n_dark < 1000)
+			fail_msg("a square of %u: %u of %u pixels are lit", square.resolution, n_leaks, n_dark);
+		free(dark);
+		free(got);
+		stage_fini(&s);
+	}
+}
+
 /* Whatever the light's angle, down to 2.3 degrees above it. */
 static void a_plane_does_not_shadow_itself(void **state)
 {
@@ -380,6 +412,7 @@ int main(void)
 		cmocka_unit_test(a_spot_s_shadow_is_where_it_should_be),
 		cmocka_unit_test(a_lamp_amid_the_scene_casts_around),
 		cmocka_unit_test(a_coarse_square_casts_without_leaks),
+		cmocka_unit_test(levels_meet_without_leaks),
 		cmocka_unit_test(a_plane_does_not_shadow_itself),
 		cmocka_unit_test(a_sphere_does_not_shadow_itself),
 		cmocka_unit_test(threads_and_instructions_change_no_byte),
