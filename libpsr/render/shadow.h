@@ -16,8 +16,8 @@ struct shadow; /* the maps, and what drawing them takes */
 int shadow_prepare(struct shadow **shadow, const struct simd *simd, struct plan *plan, struct bins *bins,
                    const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report, struct psr_error *err);
 
-/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, a third
- * more; while one is drawn, 8 bytes more a texel of the largest. */
+/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, up to
+ * two thirds more; while one is drawn, 8 bytes more a texel of the largest. */
 #define SHADOW_TEXELS (16u << 20)
 #define SHADOW_SIDE 2048 /* at most */
 

@@ -15,6 +15,7 @@ struct drawing {
 	const struct bins *bins;
 	struct shadow_drawer *drawer;
 	struct psr_zstack stack;
+	const struct shadow_map *map;
 	float *cells; /* of level 0 */
 	uint32_t stride;
 	_Atomic uint64_t n_samples;
@@ -65,10 +66,38 @@ static void clear_band(const struct drawing *d)
 		d->cells[(size_t)y * d->stride] = d->cells[(size_t)(y + 1) * d->stride - 1] = INFINITY;
 }
 
+static int has_seam(const struct shadow_map *map, int k)
+{
+	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
+}
+
+/* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in it, as far as
+ * these exist. */
+static void make_seams(int k, void *userdata)
+{
+	const struct drawing *d = userdata;
+	const struct shadow_map *map = d->map;
+	if (!has_seam(map, k))
+		return;
+	const uint32_t stride = map->level[k].stride, finer = map->level[k - 1].stride;
+	const uint32_t height = d->stack.level[k].height, finer_height = d->stack.level[k - 1].height;
+	float *to = d->cells + (map->level[k].seam - map->level[0].z);
+	for (uint32_t j = 0; j < height; j++)
+		for (uint32_t i = 0; i < stride; i++) {
+			float z = map->level[k].z[(size_t)j * stride + i];
+			for (uint32_t y = j ? 2 * j - 1 : 0; y <= 2 * j && y < finer_height; y++)
+				for (uint32_t x = i ? 2 * i - 1 : 0; x <= 2 * i && x < finer; x++) {
+					const float own = map->level[k - 1].z[(size_t)y * finer + x];
+					z = own < z ? own : z;
+				}
+			to[(size_t)j * stride + i] = z;
+		}
+}
+
 static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t levels)
 {
 	const uint32_t width = kept->fit.width, height = kept->fit.height;
-	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1];
+	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1], seam[PSR_MAX_DEPTH_LEVEL + 1];
 	kept->map.levels = levels | 1;
 	d->stack = (struct psr_zstack){ .width = width, .height = height, .levels = levels & ~1u, .word = d->drawer->word };
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
@@ -81,6 +110,9 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 		first[k] = n;
 		if (kept->map.levels >> k & 1)
 			n += (size_t)(cells_x + 2) * (cells_y + 2);
+		seam[k] = n;
+		if (has_seam(&kept->map, k))
+			n += (size_t)(cells_x + 2) * (cells_y + 2);
 	}
 	kept->cells = grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
 	if (!kept->cells)
@@ -88,9 +120,11 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		float *z = kept->map.levels >> k & 1 ? kept->cells + first[k] : NULL;
 		kept->map.level[k].z = z;
+		kept->map.level[k].seam = has_seam(&kept->map, k) ? kept->cells + seam[k] : NULL;
 		d->stack.level[k].z = k ? z : NULL;
 	}
 	d->cells = kept->cells;
+	d->map = &kept->map;
 	d->stride = kept->map.level[0].stride;
 	return PSR_OK;
 }
@@ -134,6 +168,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
 	clear_band(&d);
 	psr_pool_for(pool, (int)(plan->tiles_x * plan->tiles_y), draw_tile, &d);
+	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
 	note_plan(kept, plan);
 	kept->is_drawn = 1;
 	*n_samples += d.n_samples;

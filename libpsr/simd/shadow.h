@@ -81,18 +81,17 @@ static inline float cover_of(uint64_t pair, int shift, float scale, float offset
 	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) * scale + offset < z, part);
 }
 
-/* Raises the coverage of each place to that by one level, bilinear among four cells ([G] 4.6). A cell covers what lies behind it: its depth is
+/* Coverage of each place by cells of level k, bilinear among four of them ([G] 4.6). A cell covers what lies behind it: its depth is
  * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
- * a cell from its centre in both directions, less a bias of a cell's width at the cell's own
- * depth. Loads are apart from arithmetic, of which the compiler
- * makes vectors. */
-static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
+ * a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth. Loads are apart from
+ * arithmetic, of which the compiler makes vectors. */
+static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells, int k, uint32_t n)
 {
 	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
 	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
 	const int32_t stride = (int32_t)map->level[k].stride;
-	const float *upper = map->level[k].z + stride + 1, *lower = upper + stride;
+	const float *upper = cells + stride + 1, *lower = upper + stride;
 	float fx[STRIP], fy[STRIP];
 	int32_t cell[STRIP];
 	uint64_t pair[2][STRIP];
@@ -113,9 +112,29 @@ static void shadow_cover(struct shadow_place *at, const struct shadow_map *map, 
 		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
 		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
 		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
-		const float cover = (c00 + c11) + (c10 + c01);
-		at->cover[i] = psr_choose(cover > at->cover[i], cover, at->cover[i]);
+		cover[i] = (c00 + c11) + (c10 + c01);
 	}
+}
+
+/* Raises the coverage of each place to that by one level. A surface may pass from blocks of one level to those of the next, and then
+ * neither covers it whole ([G] 9.1.2): where the coarser one covers a part, what counts is the coverage by the coarser cells
+ * that either level fills. */
+static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
+{
+	float cover[STRIP], seam[STRIP];
+	uint32_t n_partial = 0;
+	shadow_cover(cover, at, map, map->level[k].z, k, n);
+	if (map->level[k].seam) {
+		for (uint32_t i = 0; i < n; i++)
+			n_partial += (cover[i] > 0) & (cover[i] < 1);
+		if (n_partial) {
+			shadow_cover(seam, at, map, map->level[k].seam, k, n);
+			for (uint32_t i = 0; i < n; i++)
+				cover[i] = psr_choose((cover[i] > 0) & (seam[i] > cover[i]), seam[i], cover[i]);
+		}
+	}
+	for (uint32_t i = 0; i < n; i++)
+		at->cover[i] = psr_choose(cover[i] > at->cover[i], cover[i], at->cover[i]);
 }
 
 static int strip_shadow(const struct strip *strip, const struct shadow_light *shadow, float *reaches)
@@ -134,7 +153,7 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 			continue;
 		for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++)
 			if (map->levels >> k & 1)
-				shadow_cover(&at, map, k, strip->n);
+				shadow_raise(&at, map, k, strip->n);
 		for (uint32_t i = 0; i < strip->n; i++) {
 			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too wide. */
 			const float left = 2 - 2 * at.cover[i];

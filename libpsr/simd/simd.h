@@ -190,6 +190,7 @@ struct shadow_map {
 	uint32_t levels; /* bit k: level k is in use */
 	struct {
 		const float *z;
+		const float *seam; /* the nearest of the cell and of the finer level's four in it; NULL where that is not in use */
 		uint32_t stride;
 		float most_x, most_y; /* greatest places, in cells, at which four cells lie around */
 	} level[PSR_MAX_DEPTH_LEVEL + 1];
