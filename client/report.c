@@ -57,20 +57,21 @@ static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
 static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
 {
 	static const char *const stages[] = { "",      "plan", "cull",   "warp",  "gaps", "resolve",
-		                                  "shade", "fill", "encode", "queue", "total" };
+		                                  "shade", "fill", "encode", "queue", "total", "shadow" };
 	static const char *const values[] = { "samples_warped", "blocks_drawn", "blocks",       "pixels_covered",
-		                                  "pixels_filled",  "samples",      "depth_levels", "lights" };
+		                                  "pixels_filled",  "samples",      "depth_levels", "lights",
+		                                  "shadow_maps",    "shadow_maps_drawn" };
 	cJSON *times = cJSON_AddObjectToObject(to, "stages"), *counts = cJSON_AddObjectToObject(to, "counts");
 
 	for (unsigned i = 0; i < end->n_entries; i++) {
 		const struct psr_msg_report_entry *entry = &end->entry[i];
 
-		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_TOTAL) {
+		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_SHADOW) {
 			cJSON *stage = cJSON_AddObjectToObject(times, stages[entry->id]);
 
 			cJSON_AddNumberToObject(stage, "ms", (double)entry->ns / 1e6);
 			cJSON_AddNumberToObject(stage, "count", (double)entry->count);
-		} else if (entry->id >= PSR_WIRE_REPORT_SAMPLES_WARPED && entry->id <= PSR_WIRE_REPORT_LIGHTS) {
+		} else if (entry->id >= PSR_WIRE_REPORT_SAMPLES_WARPED && entry->id <= PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN) {
 			cJSON_AddNumberToObject(counts, values[entry->id - PSR_WIRE_REPORT_SAMPLES_WARPED], (double)entry->count);
 		}
 	}

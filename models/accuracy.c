@@ -43,7 +43,17 @@ static void print_color_text(const struct psr_color_accuracy *c)
 	       PSR_COLOR_WRONG, c->n_wrong, 100 * fraction(c->n_wrong, c->n_compared), c->n_compared, c->mean);
 }
 
-static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color, struct psr_error *err)
+static void print_shadow_text(const struct psr_shadow_accuracy *s)
+{
+	printf("shadow: light more than %.0f %% off       %" PRIu64 " (%.4f %%) of %" PRIu64 " pixels, %" PRIu64 " of them in shadow; mean %.4f\n",
+	       100 * PSR_SHADOW_WRONG, s->n_wrong, 100 * fraction(s->n_wrong, s->n_compared), s->n_compared, s->n_shadow, s->mean);
+	printf("  on the wrong side of an edge       %" PRIu64 ", by p99 %.2f, max %.2f pixels\n", s->n_misplaced, s->seam_p99,
+	       s->seam_max);
+}
+
+/* color and shadow may be NULL. */
+static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color, const struct psr_shadow_accuracy *shadow,
+                      struct psr_error *err)
 {
 	cJSON *root = cJSON_CreateObject();
 
@@ -62,6 +72,15 @@ static int print_json(const struct psr_accuracy *a, const struct psr_color_accur
 		cJSON_AddNumberToObject(root, "color_compared", (double)color->n_compared);
 		cJSON_AddNumberToObject(root, "color_wrong", (double)color->n_wrong);
 		cJSON_AddNumberToObject(root, "color_mean", color->mean);
+	}
+	if (shadow != NULL) {
+		cJSON_AddNumberToObject(root, "shadow_compared", (double)shadow->n_compared);
+		cJSON_AddNumberToObject(root, "shadow_in_shadow", (double)shadow->n_shadow);
+		cJSON_AddNumberToObject(root, "shadow_wrong", (double)shadow->n_wrong);
+		cJSON_AddNumberToObject(root, "shadow_misplaced", (double)shadow->n_misplaced);
+		cJSON_AddNumberToObject(root, "shadow_mean", shadow->mean);
+		cJSON_AddNumberToObject(root, "shadow_seam_p99", shadow->seam_p99);
+		cJSON_AddNumberToObject(root, "shadow_seam_max", shadow->seam_max);
 	}
 	return json_print(root, err);
 }
@@ -99,9 +118,34 @@ static int measure_color(struct psr_color_accuracy *out, struct psr_truth *truth
 	return code;
 }
 
+/* The frames with and without shadows, and their light. */
+struct shadow_frames {
+	const char *shadowed, *lit; /* NULL: none */
+	struct psr_light light;
+};
+
+static int measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
+                          const struct shadow_frames *frames, int n_threads, struct psr_error *err)
+{
+	uint32_t width, height, lit_width, lit_height;
+	uint8_t *shadowed = NULL, *lit = NULL;
+	int code = ppm_read(&shadowed, &width, &height, frames->shadowed, err);
+
+	if (code == PSR_OK)
+		code = ppm_read(&lit, &lit_width, &lit_height, frames->lit, err);
+	if (code == PSR_OK && (width != lit_width || height != lit_height))
+		code = psr_fail(err, PSR_ERR_ARG, "%s and %s are of different sizes", frames->shadowed, frames->lit);
+	if (code == PSR_OK)
+		code = psr_accuracy_measure_shadow(out, truth, camera, &frames->light, width, height, shadowed, lit, n_threads, err);
+	free(shadowed);
+	free(lit);
+	return code;
+}
+
 /* color_path may be NULL. */
-static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, const char *source, const char *frame,
-                   const char *color_path, const struct psr_camera *camera, double spacing, struct psr_error *err)
+static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, struct psr_shadow_accuracy *shadow, const char *source,
+                   const char *frame, const char *color_path, const struct shadow_frames *shadow_frames,
+                   const struct psr_camera *camera, double spacing, struct psr_error *err)
 {
 	struct psr_build_options options;
 	struct psr_mesh *mesh = NULL;
@@ -119,6 +163,8 @@ static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, con
 		code = psr_accuracy_measure(a, truth, camera, width, height, depth, spacing, options.n_threads, err);
 	if (code == PSR_OK && color_path != NULL)
 		code = measure_color(color, truth, camera, color_path, options.n_threads, err);
+	if (code == PSR_OK && shadow_frames->shadowed != NULL)
+		code = measure_shadow(shadow, truth, camera, shadow_frames, options.n_threads, err);
 	psr_truth_destroy(truth);
 	psr_mesh_destroy(mesh);
 	free(depth);
@@ -148,14 +194,23 @@ int cmd_accuracy(int argc, char **argv)
 	struct psr_accuracy accuracy;
 	struct psr_error err;
 	struct psr_color_accuracy color_accuracy;
+	struct psr_shadow_accuracy shadow_accuracy;
+	struct shadow_frames shadow = { .light = { .kind = PSR_LIGHT_DIRECTIONAL } };
 	const char *frame = NULL, *color = NULL;
 	double fov = 0, spacing = 0;
-	int eye = 0, target = 0, up = 0, seen_fov = 0, seen_spacing = 0, seen_ortho = 0, json = 0, n_operands, code;
+	int sun = 0, lamp = 0, eye = 0, target = 0, up = 0, seen_fov = 0, seen_spacing = 0, seen_ortho = 0, json = 0, n_operands, code;
 	const struct psr_opt opts[] = {
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame, .arg = "FRAME.pfm",
 		  .help = "the frame's depth, as psr shot --depth writes it" },
 		{ .name = "color", .type = PSR_OPT_STRING, .value = &color, .arg = "FRAME.ppm",
 		  .help = "its colours as well, drawn with --ambient 1 and no light" },
+		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
+		  .help = "shadows as well: drawn with --ambient 0 and one light, which casts them" },
+		{ .name = "lit", .type = PSR_OPT_STRING, .value = &shadow.lit, .arg = "FRAME.ppm", .help = "the same without `shadow`" },
+		{ .name = "sun", .type = PSR_OPT_VEC3, .value = shadow.light.direction, .arg = "X,Y,Z",
+		  .help = "where that light goes, if it is directional", .seen = &sun },
+		{ .name = "lamp", .type = PSR_OPT_VEC3, .value = shadow.light.position, .arg = "X,Y,Z",
+		  .help = "or where it is, if it is a point or a spot", .seen = &lamp },
 		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera.eye, .arg = "X,Y,Z", .help = "the frame's camera",
 		  .seen = &eye },
 		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera.target, .arg = "X,Y,Z", .help = "where it looks",
@@ -195,17 +250,22 @@ int cmd_accuracy(int argc, char **argv)
 	if (code == PSR_OK)
 		code = check_arguments(frame, n_operands, (eye != 0) | (target != 0) << 1 | (up != 0) << 2, seen_fov,
 		                       seen_ortho, seen_spacing, &err);
+	if (code == PSR_OK && (!shadow.shadowed != !shadow.lit || (shadow.shadowed != NULL && !sun == !lamp)))
+		code = psr_fail(&err, PSR_ERR_ARG, "--shadow, --lit and one of --sun and --lamp belong together");
 	if (code == PSR_OK) {
+		shadow.light.kind = lamp ? PSR_LIGHT_POINT : PSR_LIGHT_DIRECTIONAL;
 		camera.kind = seen_ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
 		camera.fov_y = fov * RADIANS;
-		code = measure(&accuracy, &color_accuracy, argv[1], frame, color, &camera, spacing, &err);
+		code = measure(&accuracy, &color_accuracy, &shadow_accuracy, argv[1], frame, color, &shadow, &camera, spacing, &err);
 	}
 	if (code == PSR_OK && json)
-		code = print_json(&accuracy, color ? &color_accuracy : NULL, &err);
+		code = print_json(&accuracy, color ? &color_accuracy : NULL, shadow.shadowed ? &shadow_accuracy : NULL, &err);
 	else if (code == PSR_OK)
 		print_text(&accuracy);
 	if (code == PSR_OK && !json && color)
 		print_color_text(&color_accuracy);
+	if (code == PSR_OK && !json && shadow.shadowed)
+		print_shadow_text(&shadow_accuracy);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
 	return code == PSR_OK ? check_bounds(&accuracy, &bounds) : psr_cli_fail(PROGRAM, &err);

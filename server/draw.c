@@ -64,10 +64,12 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	};
 
 	for (int i = 0; i < PSR_N_STAGES; i++)
-		add_entry(end, stage_id[i], report->ns[i], report->count[i]);
+		if (i != PSR_STAGE_SHADOW)
+			add_entry(end, stage_id[i], report->ns[i], report->count[i]);
 	add_entry(end, PSR_WIRE_REPORT_ENCODE, encode_ns, rect_bytes);
 	add_entry(end, PSR_WIRE_REPORT_QUEUE, queue_ns, d->n_waiting);
 	add_entry(end, PSR_WIRE_REPORT_TOTAL, total_ns, (uint64_t)psr_pool_threads(d->pool));
+	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS_DRAWN, 0, report->n_blocks_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS, 0, report->n_blocks);
@@ -76,6 +78,8 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES, 0, report->n_samples);
 	add_entry(end, PSR_WIRE_REPORT_DEPTH_LEVELS, 0, (uint64_t)__builtin_popcount(report->levels));
 	add_entry(end, PSR_WIRE_REPORT_LIGHTS, 0, d->scene->scene.n_lights);
+	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS, 0, report->n_shadow_maps);
+	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN, 0, report->n_shadow_maps_drawn);
 }
 
 static struct outq_chunk *encode_begin(const struct drawing *d, const struct codec_result *coded)

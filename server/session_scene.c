@@ -55,15 +55,13 @@ static int add_instance(struct scene *scene, const struct session *session, cons
 	return PSR_OK;
 }
 
-static int add_light(struct scene *scene, const struct psr_msg_light *msg, struct psr_error *err)
+static void add_light(struct scene *scene, const struct psr_msg_light *msg)
 {
-	uint32_t number = scene->scene.n_lights++;
-	struct psr_light *light = &scene->light[number];
+	struct psr_light *light = &scene->light[scene->scene.n_lights++];
 
-	if (msg->flags & PSR_WIRE_LIGHT_SHADOW)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "light %" PRIu32 " casts shadows, which this server does not draw", number);
 	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
 	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
+	light->casts_shadow = (msg->flags & PSR_WIRE_LIGHT_SHADOW) != 0;
 	memcpy(light->position, msg->position, sizeof light->position);
 	memcpy(light->direction, msg->direction, sizeof light->direction);
 	for (int k = 0; k < 3; k++)
@@ -71,7 +69,6 @@ static int add_light(struct scene *scene, const struct psr_msg_light *msg, struc
 	light->outer = msg->outer;
 	light->inner = msg->inner;
 	light->reference = msg->reference;
-	return PSR_OK;
 }
 
 int scene_create(struct scene **out, const struct session *session, struct catalogue *catalogue,
@@ -94,7 +91,7 @@ int scene_create(struct scene **out, const struct session *session, struct catal
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
 		code = add_instance(scene, session, &msg->instance[i], err);
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
-		code = add_light(scene, &msg->light[i], err);
+		add_light(scene, &msg->light[i]);
 	if (code != PSR_OK) {
 		scene_unref(scene);
 		return code;

@@ -99,6 +99,61 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 	return 0;
 }
 
+/* Both ways, since a face lets rays through from its back. */
+static int is_between(const struct psr_truth *truth, const double from[3], const double to_light[3], double length)
+{
+	const double off = 1e-4;
+	struct ray ray = { { 0 }, { 0 } };
+	struct ray_hit hit;
+
+	if (length <= 2 * off)
+		return 0;
+	v3d_add_scaled(ray.origin, from, off, to_light);
+	memcpy(ray.direction, to_light, sizeof ray.direction);
+	ray_scene_trace_near(truth->scene, &ray, 1, 0, length - off, &hit);
+	if (hit.prim != RAY_NONE)
+		return 1;
+	v3d_add_scaled(ray.origin, from, length, to_light);
+	v3d_scale(ray.direction, to_light, -1);
+	ray_scene_trace_near(truth->scene, &ray, 1, 0, length - off, &hit);
+	return hit.prim != RAY_NONE;
+}
+
+void truth_light(const struct psr_truth *truth, const struct view *view, double near_z, const struct psr_light *light,
+                 const double (*place)[2], int n, struct truth_light *out)
+{
+	struct ray ray[RUN] = { { { 0 }, { 0 } } };
+	struct ray_hit hit[RUN];
+
+	for (int i = 0; i < n; i++)
+		inner_ray(truth, view, place[i][0], place[i][1], &ray[i]);
+	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
+	for (int i = 0; i < n; i++) {
+		double point[3], to_light[3], length = 4, facing = 0, seen = 0;
+		const float *normal;
+
+		out[i] = (struct truth_light){ -2, 0 };
+		if (hit[i].prim == RAY_NONE)
+			continue;
+		normal = ray_scene_normal(truth->scene, hit[i].prim);
+		v3d_add_scaled(point, ray[i].origin, hit[i].t, ray[i].direction);
+		if (light->kind == PSR_LIGHT_DIRECTIONAL) {
+			v3d_scale(to_light, light->direction, -1);
+			v3d_normalize(to_light, to_light);
+		} else {
+			for (int k = 0; k < 3; k++)
+				to_light[k] = (light->position[k] - truth->origin[k]) / truth->scale - point[k];
+			length = v3d_normalize(to_light, to_light);
+		}
+		for (int k = 0; k < 3; k++) {
+			facing += (double)normal[k] * to_light[k];
+			seen += (double)normal[k] * ray[i].direction[k];
+		}
+		out[i].facing = seen > 0 ? -facing : facing;
+		out[i].is_shadowed = out[i].facing > 0 && is_between(truth, point, to_light, length);
+	}
+}
+
 static void put_normal(const struct job *job, const struct ray *ray, const struct ray_hit *hit, float normal[3])
 {
 	const float *n = ray_scene_normal(job->truth->scene, hit->prim);

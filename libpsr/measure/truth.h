@@ -9,6 +9,15 @@
 int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
                  int side);
 
+/* What n rays through places of the picture (x, y in pixels) meet first, and how much of a light gets there: facing is the cosine
+ * between the face's normal, on the side that is seen, and the light; -2 where nothing is met. */
+struct truth_light {
+	double facing;
+	int is_shadowed;
+};
+void truth_light(const struct psr_truth *truth, const struct view *view, double near_z, const struct psr_light *light,
+                 const double (*place)[2], int n, struct truth_light *out);
+
 /* Distance from a point of the world to the nearest point of the mesh, or `most` if that is less. */
 double truth_distance(const struct psr_truth *truth, const double point[3], double most);
 

@@ -12,8 +12,9 @@ static const struct {
 	[PSR_EFFECT_FILL] = { "fill", { "", "", "no pixel's weight is below 1", "", "" } },
 	[PSR_EFFECT_TWO_SIDED] = { "two-sided", { "", "", "no block in view is two-sided", "", "" } },
 	[PSR_EFFECT_SPECULAR] = { "specular", { "", "", "no sample in view is specular, or no light shines", "", "" } },
-	[PSR_EFFECT_POSITIONS] = { "positions", { "", "", "no light is near", "", "" } },
-	[PSR_EFFECT_TABLE] = { "table", { "", "", "no light shines", "a light is near, or a block in view is two-sided",
+	[PSR_EFFECT_POSITIONS] = { "positions", { "", "", "no light is near or casts shadows", "", "" } },
+	[PSR_EFFECT_SHADOWS] = { "shadows", { "", "", "no light that casts any reaches what is in view", "", "" } },
+	[PSR_EFFECT_TABLE] = { "table", { "", "", "no light shines", "a light is near or casts shadows, or a block in view is two-sided",
 	                                  "too few lights and pixels, or several instances" } },
 };
 

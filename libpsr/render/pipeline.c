@@ -8,12 +8,14 @@
 #include "base/srgb.h"
 #include "psr/direction.h"
 #include "render/render.h"
+#include "render/shadow.h"
 
 
 struct psr_renderer {
 	const struct simd *simd;
 	struct plan plan;
 	struct bins bins;
+	struct shadow *shadow;    /* NULL until a light casts one */
 	struct fill fill;
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
@@ -49,7 +51,7 @@ static uint64_t now_ns(void)
 
 const char *psr_stage_name(enum psr_stage stage)
 {
-	static const char *const names[PSR_N_STAGES] = { "plan", "cull", "warp", "gaps", "resolve", "shade", "fill" };
+	static const char *const names[PSR_N_STAGES] = { "plan", "shadow", "cull", "warp", "gaps", "resolve", "shade", "fill" };
 	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
 }
 
@@ -109,6 +111,7 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	if (!r)
 		return;
 	plan_clear(&r->plan);
+	shadow_destroy(r->shadow);
 	bins_clear(&r->bins);
 	fill_clear(&r->fill);
 	psr_free_huge(r->pixels, r->pixels_size);
@@ -119,7 +122,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->lit_size + r->counters_size + bins_bytes(&r->bins);
+	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->lit_size + r->counters_size + bins_bytes(&r->bins) +
+	       shadow_bytes(r->shadow);
 }
 
 static void *grow_huge(void *memory, size_t *capacity, size_t size)
@@ -247,6 +251,12 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		return rc;
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
 	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
+	start = end;
+
+	rc = shadow_prepare(&r->shadow, r->simd, &r->plan, &r->bins, scene, pool, report, err);
+	if (rc)
+		return rc;
+	report->ns[PSR_STAGE_SHADOW] = (end = now_ns()) - start;
 	start = end;
 
 	rc = cull_blocks(&r->bins, r->simd, &r->plan, pool, report);

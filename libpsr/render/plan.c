@@ -38,16 +38,14 @@ static void view_make(struct view *view, const struct psr_camera *camera)
 	memcpy(view->eye, camera->eye, sizeof view->eye);
 }
 
-/* Centre of an instance's inner coordinates relative to the eye, and inner units in world units. */
-static double instance_center(double center[3], double rotation[3][3], const struct psr_instance *instance,
-                              const double eye[3])
+double plan_place(double center[3], double rotation[3][3], const struct psr_instance *instance, const double from[3])
 {
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	double turned[3];
 	rotation_matrix(rotation, instance->rotation);
 	m3d_apply(turned, (const double(*)[3])rotation, info->origin);
 	for (int i = 0; i < 3; i++)
-		center[i] = instance->translation[i] - eye[i] + instance->scale * turned[i];
+		center[i] = instance->translation[i] - from[i] + instance->scale * turned[i];
 	return instance->scale * info->scale;
 }
 
@@ -57,7 +55,7 @@ static int scene_exponent(const struct psr_scene *scene)
 	double far = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		double center[3], rotation[3][3];
-		double scale = instance_center(center, rotation, &scene->instance[i], scene->camera.eye);
+		double scale = plan_place(center, rotation, &scene->instance[i], scene->camera.eye);
 		far = fmax(far, v3d_length(center) + scale);
 	}
 	int exponent = 0;
@@ -130,7 +128,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
                           const struct plan *plan, const struct view *view, double focal)
 {
 	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
-	double world = instance_center(center, rotation, instance, view->eye), scale = world * view->scale;
+	double world = plan_place(center, rotation, instance, view->eye), scale = world * view->scale;
 	struct cull_view *cull = &out->cull;
 
 	*cull = (struct cull_view){
@@ -231,6 +229,9 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		return psr_fail(err, rc, "no memory for a scene of %u instances", scene->n_instances);
 
 	view_make(&view, camera);
+	memcpy(plan->frame, view.axis, sizeof plan->frame);
+	memcpy(plan->eye, view.eye, sizeof plan->eye);
+	plan->shadow = NULL;
 	plan->width = settings->width;
 	plan->height = settings->height;
 	plan->tiles_x = (plan->width + TILE_WIDTH - 1) / TILE_WIDTH;

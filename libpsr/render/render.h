@@ -37,6 +37,8 @@ struct plan {
 	struct strip_view view;    /* needs is filled by the cull */
 	struct strip_light *light;
 	float axis[3][3];          /* right, down and forward in the world */
+	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
+	double frame[3][3], eye[3]; /* the same as doubles, and where the camera is */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
 	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are empty
@@ -49,6 +51,9 @@ struct plan {
 
 int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err);
 void plan_clear(struct plan *plan);
+
+/* Centre of an instance's inner coordinates relative to a point, its rotation, and inner units in world units. */
+double plan_place(double center[3], double rotation[3][3], const struct psr_instance *instance, const double from[3]);
 
 /* Instance that a slot belongs to; the slot must be below n_slots. */
 uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);

@@ -56,6 +56,15 @@ void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr
 	psr_pool_for(pool, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
 }
 
+static void add_light(const struct simd *simd, const struct plan *plan, struct strip *strip, uint32_t l)
+{
+	float reaches[STRIP];
+	if (!plan->shadow || !plan->shadow[l].n_maps)
+		simd->strip_light(strip, &plan->light[l], NULL);
+	else if (simd->strip_shadow(strip, &plan->shadow[l], reaches))
+		simd->strip_light(strip, &plan->light[l], reaches);
+}
+
 _Static_assert(STRIP == TILE_WIDTH, "a strip lies in one tile");
 
 void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
@@ -79,7 +88,7 @@ void shade_row(const struct simd *simd, const struct plan *plan, const struct sh
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
 			middle = is_timed ? now_ns() : 0;
 			for (uint32_t l = 0; l < plan->n_lights && !(plan->view.lit && !strip.is_specular); l++)
-				simd->strip_light(&strip, &plan->light[l], NULL);
+				add_light(simd, plan, &strip, l);
 			simd->strip_color(&strip);
 			counts->n_pixels += strip.n;
 			counts->n_specular += strip.is_specular ? strip.n : 0;

@@ -60,7 +60,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		const float y0 = edge_of(cy - grown, is_perspective, z0, z1) * v.focal + half_height - guard;
 		const float y1 = edge_of(cy + grown, is_perspective, z1, z0) * v.focal + half_height + guard;
 		out->is_left[i] = (uint8_t)((z1 > v.near_z) & (x1 >= 0) & (y1 >= 0) & (x0 < v.width) & (y0 < v.height));
-		out->is_mixed[i] = !(flags[i] & PSR_BLOCK_TWO_SIDED);
+		out->is_mixed[i] = (uint8_t)(!(flags[i] & PSR_BLOCK_TWO_SIDED) & !v.both_sides);
 		out->level[i] = (uint8_t)level;
 		out->x0[i] = pixel_within(x0, most_x);
 		out->x1[i] = pixel_within(x1, most_x);

@@ -26,6 +26,7 @@ struct cull_view {
 	float spacing;        /* greatest distance of neighbours at level 0, camera space */
 	float eye[3];         /* inner coordinates; orthographic: unit vector to the viewer instead */
 	int perspective;
+	int both_sides;       /* nothing is culled for how it faces: what casts shadows does so with its back, too */
 	float focal, near_z, width, height;
 	int with_cones;
 };
@@ -104,7 +105,7 @@ typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 
 enum strip_needs {
 	STRIP_TWO_SIDED = 1, /* some block in view is two-sided */
-	STRIP_POSITION = 2,  /* some light is near */
+	STRIP_POSITION = 2,  /* some light is near, or casts shadows */
 	STRIP_LIGHTS = 8,    /* some light shines */
 	STRIP_SPECULAR = 4,  /* highlights are looked for whether any sample is specular or not */
 };
@@ -174,6 +175,39 @@ typedef void strip_write_fn(const struct strip *strip, const struct strip_target
 /* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
 typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int exponent);
 
+/* ---- shadows ([G] 7.3.1) ---- */
+
+/* A map: for each level k in use the nearest z' in cells of 2^k texels, +inf where nothing is, with a guard band of one cell. Lengths
+ * are the map's own units, of which the camera's are `scale`. */
+struct shadow_map {
+	int perspective;
+	float turn[3][3], move[3]; /* camera space to the map's: turn p + move */
+	float scale;
+	float focal, half_width, half_height, near_z;
+	/* A place is compared by how its plane falls within slope_bias cells of a cell's centre, less texel_bias widths of a cell,
+	 * less slack: half a cell, a cell, and what rounding takes. */
+	float slope_bias, texel_bias, slack;
+	uint32_t levels; /* bit k: level k is in use */
+	struct {
+		const float *z;
+		const float *seam; /* the nearest of the cell and of the finer level's four in it; NULL where that is not in use */
+		uint32_t stride;
+		float most_x, most_y; /* greatest places, in cells, at which four cells lie around */
+	} level[PSR_MAX_DEPTH_LEVEL + 1];
+};
+
+#define SHADOW_FACES 6
+
+/* Of one light: no map if it casts none, one, or some faces of a cube about it. */
+struct shadow_light {
+	uint32_t n_maps;
+	struct shadow_map map[SHADOW_FACES];
+};
+
+/* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of what is
+ * nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
+typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
+
 /* ---- gaps ([G] 4.6) ---- */
 
 #define GAPS_WIDTH 128 /* a multiple of the coarsest cell */
@@ -240,6 +274,7 @@ struct simd {
 	warp_fn *warp;
 	strip_list_fn *strip_list;
 	strip_resolve_fn *strip_resolve;
+	strip_shadow_fn *strip_shadow;
 	strip_light_fn *strip_light;
 	strip_lit_fn *strip_lit;
 	strip_color_fn *strip_color;

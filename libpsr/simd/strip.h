@@ -33,21 +33,33 @@ static const struct warp_instance *instance_of(const struct strip_view *view, ui
 	return &view->instance[low];
 }
 
-/* Where samples are, from their lattices: as the warp computes it, brought back from the picture to the camera's axes. */
-static void locate(struct strip *strip, const struct strip_view *view, const struct warp_instance *in, uint32_t i)
+/* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one block. */
+static void locate(struct strip *strip, const struct warp_instance *in, uint32_t first, uint32_t end)
 {
-	const uint32_t sample = strip->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
+	float *const to[3] = { strip->px, strip->py, strip->pz };
 	struct warp_block b;
-	float at[3];
-	warp_block_make(&b, in, strip->id[i] / PSR_BLOCK_SAMPLES);
-	const uint64_t below = b.mask & ((UINT64_C(1) << sample) - 1);
-	const float depth = (float)b.depth[__builtin_popcountll(below)];
-	for (int a = 0; a < 3; a++)
-		at[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + (float)b.scale * b.lattice->col[a][c]) + depth * b.unit[a];
-	const float w = view->perspective ? at[2] : 1;
-	strip->px[i] = (at[0] - view->half_width * w) / view->focal;
-	strip->py[i] = (at[1] - view->half_height * w) / view->focal;
-	strip->pz[i] = at[2];
+	warp_block_make(&b, in, strip->id[first] / PSR_BLOCK_SAMPLES);
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t sample = strip->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
+		if (strip->id[i] - sample != b.id)
+			warp_block_make(&b, in, strip->id[i] / PSR_BLOCK_SAMPLES);
+		const uint64_t below = b.mask & ((UINT64_C(1) << sample) - 1);
+		const float depth = (float)b.depth[__builtin_popcountll(below)], scale = (float)b.scale;
+		for (int a = 0; a < 3; a++)
+			to[a][i] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c]) + depth * b.unit[a];
+	}
+}
+
+/* Brings them back from the picture to the camera's axes. */
+static void bring_back(struct strip *strip, const struct strip_view *view)
+{
+	const float half_width = view->half_width, half_height = view->half_height, focal = view->focal;
+	const int perspective = view->perspective;
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const float w = psr_choose(perspective, strip->pz[i], 1);
+		strip->px[i] = (strip->px[i] - half_width * w) / focal;
+		strip->py[i] = (strip->py[i] - half_height * w) / focal;
+	}
 }
 
 /* Finds the attributes of samples first .. end - 1, all of one instance, and asks for them; reads them later. */
@@ -65,8 +77,7 @@ static void find_attributes(struct strip *strip, const struct strip_view *view, 
 		for (uint32_t i = first; i < end; i++)
 			strip->two_sided[i] = b->flags[strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot] & PSR_BLOCK_TWO_SIDED;
 	if (view->needs & STRIP_POSITION)
-		for (uint32_t i = first; i < end; i++)
-			locate(strip, view, in, i);
+		locate(strip, in, first, end);
 }
 
 static void turn_normals(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
@@ -164,6 +175,8 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		}
 		return;
 	}
+	if (view->needs & STRIP_POSITION)
+		bring_back(strip, view);
 	for (uint32_t k = 0; k < n_runs; k++)
 		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
 	for (uint32_t i = 0; i < n; i++) {

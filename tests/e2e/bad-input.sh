@@ -89,8 +89,6 @@ done
 many=()
 for i in $(seq 33); do many+=(--light "dir:0,-1,$i"); done
 refuses "33 lights" 5 "32 lights at most" shot "${many[@]}" --hash
-refuses "a shadow that this server does not draw" 4 "draws no shadows.*leave .shadow. out" \
-	shot --light dir:0,-1,0,shadow --hash
 for codec in png jpeg jpeg:0 jpeg:101 jpeg:x ''; do
 	refuses "--codec '$codec'" 2 "'$codec' is no codec" shot --codec "$codec" --hash
 done

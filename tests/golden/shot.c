@@ -63,6 +63,7 @@ static void make_light(struct psr_light *light, const struct psr_msg_light *wire
 {
 	light->kind = wire->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
 	              : wire->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
+	light->casts_shadow = (wire->flags & PSR_WIRE_LIGHT_SHADOW) != 0;
 	memcpy(light->position, wire->position, sizeof light->position);
 	memcpy(light->direction, wire->direction, sizeof light->direction);
 	for (int k = 0; k < 3; k++)

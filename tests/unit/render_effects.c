@@ -83,6 +83,7 @@ static void case_make(struct case_of *c, uint32_t which)
 	for (uint32_t i = 0; i < c->scene.n_lights; i++) {
 		struct psr_light *l = &c->light[i];
 		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(next(&seed) % 3);
+		l->casts_shadow = (which + i) % 3 == 0;
 		for (int k = 0; k < 3; k++) {
 			l->direction[k] = between(&seed, -1, 1);
 			l->position[k] = info->origin[k] + between(&seed, -3, 3) * info->scale;

@@ -37,7 +37,7 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
+	assert_int_equal(welcome.capabilities, PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
 	                                       PSR_CAP_WORDS | PSR_CAP_BLOCK);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
@@ -129,14 +129,40 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 18);
-	for (int i = 0; i < 10; i++)
+	assert_int_equal(end.n_entries, 21);
+	for (int i = 0; i < 11; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
-	for (int i = 10; i < 18; i++)
-		assert_int_equal(end.entry[i].id, i - 10 + 32);
+	for (int i = 11; i < 21; i++)
+		assert_int_equal(end.entry[i].id, i - 11 + 32);
 	assert_int_equal(end.entry[9].count, 2);
-	assert_int_equal(end.entry[15].count, PLATE_SAMPLES);
+	assert_int_equal(end.entry[16].count, PLATE_SAMPLES);
 	peer_close(&p);
+}
+
+static void a_light_that_casts_shadows_gets_a_map(void **state)
+{
+	struct psr_msg_scene *scene = malloc(sizeof *scene);
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_frame_end end;
+
+	(void)state;
+	assert_non_null(scene);
+	peer_begin(&p, &psrd, "plate");
+	scene_default(scene, 1);
+	scene->n_lights = 1;
+	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .intensity = 1, .direction = { 0, 0, -1 },
+		                                      .color = { 255, 255, 255 } };
+	for (unsigned casts = 0; casts < 2; casts++) {
+		scene->light[0].flags = casts ? PSR_WIRE_LIGHT_SHADOW : 0;
+		peer_send_scene(&p, scene);
+		peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+		assert_int_equal(end.entry[10].id, PSR_WIRE_REPORT_SHADOW);
+		assert_int_equal(end.entry[10].count > 0, casts);
+		assert_int_equal(end.entry[19].id, PSR_WIRE_REPORT_SHADOW_MAPS);
+		assert_int_equal(end.entry[19].count, casts);
+	}
+	peer_close(&p);
+	free(scene);
 }
 
 static void many_frames_at_once_are_all_answered_alike(void **state)
@@ -359,12 +385,10 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "view"));
 	scene_default(scene, 1);
-	scene->n_lights = 1;
-	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .flags = PSR_WIRE_LIGHT_SHADOW,
-		                                      .intensity = 1, .direction = { 0, -1, 0 } };
+	scene->instance[0].representation = PSR_WIRE_REP_OCTREE;
 	peer_send_scene(&p, scene);
 	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "shadow"));
+	assert_non_null(strstr(text, "representation"));
 	/* The scene that failed has left its slot empty. */
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_NOT_FOUND, NULL);
 	peer_close(&p);
@@ -496,6 +520,7 @@ int main(void)
 		cmocka_unit_test(list_names_the_model_and_its_state),
 		cmocka_unit_test(raw_planes_have_the_hashes_of_the_end),
 		cmocka_unit_test(the_report_has_every_entry_in_order),
+		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(ping_is_answered),

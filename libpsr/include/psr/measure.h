@@ -52,6 +52,22 @@ struct psr_color_accuracy {
 int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
                                uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads, struct psr_error *err);
 
+/* A frame with no ambient and one light that casts shadows against the same frame whose light casts none, and both against shadow rays, 4x4
+ * a pixel, which are stopped by either side of a face. Pixels are compared that are lit without shadows, by at least a
+ * twentieth, linear, and whose 5x5 neighbourhood shows nothing but faces that the light meets at over 6 degrees. */
+#define PSR_SHADOW_WRONG 0.5 /* of the light without shadows */
+struct psr_shadow_accuracy {
+	uint64_t n_compared, n_shadow; /* n_shadow: less than half of their rays reach the light */
+	uint64_t n_wrong;              /* light differs by more than PSR_SHADOW_WRONG */
+	uint64_t n_misplaced;          /* in shadow where it should be lit, or lit where it should not, by halves */
+	double mean;                   /* difference of light, 0..1 */
+	double seam_p99, seam_max;     /* pixels from a misplaced one to the nearest place that should be as it is; up to PSR_SHADOW_FAR */
+};
+#define PSR_SHADOW_FAR 16
+int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
+                                const struct psr_light *light, uint32_t width, uint32_t height, const uint8_t *shadowed,
+                                const uint8_t *lit, int n_threads, struct psr_error *err);
+
 #ifdef __cplusplus
 }
 #endif

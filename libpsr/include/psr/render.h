@@ -37,6 +37,7 @@ enum psr_effect {
 	PSR_EFFECT_TWO_SIDED, /* count: pixels whose normals may be turned to the eye */
 	PSR_EFFECT_SPECULAR,  /* count: pixels whose highlights are looked for */
 	PSR_EFFECT_POSITIONS, /* count: pixels whose samples' positions are worked out */
+	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
 	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
 	PSR_N_EFFECTS
 };
@@ -61,6 +62,7 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 
 enum psr_stage {
 	PSR_STAGE_PLAN,    /* count: instances */
+	PSR_STAGE_SHADOW,  /* count: samples drawn into the shadow maps that were made for this frame */
 	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
 	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
 	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
@@ -80,6 +82,8 @@ struct psr_report {
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */
 	uint32_t n_clamped;           /* blocks that wanted a level beyond PSR_MAX_DEPTH_LEVEL: holes are possible there */
+	uint32_t n_shadow_maps;       /* in use */
+	uint32_t n_shadow_maps_drawn; /* of these made for this frame; the others were kept from frames before */
 	struct {
 		uint64_t count;
 		enum psr_why why;

@@ -20,6 +20,7 @@ enum psr_light_kind { PSR_LIGHT_DIRECTIONAL, PSR_LIGHT_POINT, PSR_LIGHT_SPOT };
 
 struct psr_light {
 	enum psr_light_kind kind;
+	int casts_shadow;    /* 1: what is behind something is not lit; else 0. In presets 0 */
 	double position[3];  /* point, spot; world */
 	double direction[3]; /* directional, spot: where the light goes; any length but 0 */
 	double color[3];     /* linear, intensity included, >= 0 */

@@ -2,6 +2,7 @@
 #include "simd/gaps.h"
 #include "simd/kernels.h"
 #include "simd/cull.h"
+#include "simd/shadow.h"
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
@@ -12,6 +13,7 @@ const struct simd simd_avx2 = {
 	.warp = warp_avx2,
 	.strip_list = strip_list,
 	.strip_resolve = strip_resolve,
+	.strip_shadow = strip_shadow,
 	.strip_light = strip_light,
 	.strip_lit = strip_lit,
 	.strip_color = strip_color,

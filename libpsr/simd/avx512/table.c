@@ -3,6 +3,7 @@
 #include "simd/kernels.h"
 #define STRIP_LIST_IS_ELSEWHERE
 #include "simd/cull.h"
+#include "simd/shadow.h"
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
@@ -13,6 +14,7 @@ const struct simd simd_avx512 = {
 	.warp = warp_avx512,
 	.strip_list = strip_list_avx512,
 	.strip_resolve = strip_resolve,
+	.strip_shadow = strip_shadow,
 	.strip_light = strip_light,
 	.strip_lit = strip_lit,
 	.strip_color = strip_color,

@@ -434,6 +434,7 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_ENCODE = 8,  /* bytes of all RECT data of the frame */
 	PSR_WIRE_REPORT_QUEUE = 9,   /* time waited before work started; frames of all clients waiting when it came */
 	PSR_WIRE_REPORT_TOTAL = 10,  /* from the start of plan to the end of encode; threads of the server's pool */
+	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
 	/* values only, ns is 0: */
 	PSR_WIRE_REPORT_SAMPLES_WARPED = 32, /* all samples of the blocks drawn */
 	PSR_WIRE_REPORT_BLOCKS_DRAWN = 33,   /* after culling */
@@ -443,6 +444,8 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_SAMPLES = 37,        /* of all instances of the scene */
 	PSR_WIRE_REPORT_DEPTH_LEVELS = 38,   /* level buffers in use */
 	PSR_WIRE_REPORT_LIGHTS = 39,
+	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
+	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
 };
 struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
 

@@ -1,0 +1,199 @@
+#include <math.h>
+#include <stdatomic.h>
+#include <string.h>
+#include "base/mem.h"
+#include "base/vec.h"
+#include "render/shadow.h"
+
+/* In cells: the least that a plane must fall within them, and a cell's width. Samples that are half a cell from its centre in both
+ * directions need the half; the width makes up for normals that are not the surface's own. */
+#define SLOPE_BIAS 0.5
+#define TEXEL_BIAS 1.0
+
+struct drawing {
+	const struct simd *simd;
+	const struct bins *bins;
+	struct shadow_drawer *drawer;
+	struct psr_zstack stack;
+	const struct shadow_map *map;
+	float *cells; /* of level 0 */
+	uint32_t stride;
+	_Atomic uint64_t n_samples;
+};
+
+static void *grow_huge(void *memory, size_t *capacity, size_t size)
+{
+	if (memory && size <= *capacity)
+		return memory;
+	psr_free_huge(memory, *capacity);
+	memory = psr_alloc_huge(size);
+	*capacity = memory ? size : 0;
+	return memory;
+}
+
+static void clear_cells(float *cells, size_t n)
+{
+	for (size_t i = 0; i < n; i++)
+		cells[i] = INFINITY;
+}
+
+/* A tile where no block is costs no warp, unless cells of its levels are to be cleared. */
+static void draw_tile(int tile, void *userdata)
+{
+	struct drawing *d = userdata;
+	const struct plan *plan = &d->drawer->plan;
+	const uint32_t x0 = (uint32_t)tile % plan->tiles_x * TILE_WIDTH, y0 = (uint32_t)tile / plan->tiles_x * TILE_HEIGHT;
+	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
+	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
+	if (!is_empty)
+		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, (uint32_t)tile).n_inside);
+	for (uint32_t y = y0; y < y0 + TILE_HEIGHT && y < plan->height; y++) {
+		float *to = d->cells + (size_t)(y + 1) * d->stride + x0 + 1;
+		if (is_empty)
+			clear_cells(to, width);
+		else
+			d->simd->depth_row(to, d->stack.word + (size_t)y * plan->width + x0, width, 0);
+	}
+}
+
+/* Level 0 has a guard band as the others do; no sample falls into it. */
+static void clear_band(const struct drawing *d)
+{
+	const uint32_t height = d->stack.height + 2;
+	clear_cells(d->cells, d->stride);
+	clear_cells(d->cells + (size_t)(height - 1) * d->stride, d->stride);
+	for (uint32_t y = 1; y + 1 < height; y++)
+		d->cells[(size_t)y * d->stride] = d->cells[(size_t)(y + 1) * d->stride - 1] = INFINITY;
+}
+
+static int has_seam(const struct shadow_map *map, int k)
+{
+	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
+}
+
+/* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in it, as far as
+ * these exist. */
+static void make_seams(int k, void *userdata)
+{
+	const struct drawing *d = userdata;
+	const struct shadow_map *map = d->map;
+	if (!has_seam(map, k))
+		return;
+	const uint32_t stride = map->level[k].stride, finer = map->level[k - 1].stride;
+	const uint32_t height = d->stack.level[k].height, finer_height = d->stack.level[k - 1].height;
+	float *to = d->cells + (map->level[k].seam - map->level[0].z);
+	for (uint32_t j = 0; j < height; j++)
+		for (uint32_t i = 0; i < stride; i++) {
+			float z = map->level[k].z[(size_t)j * stride + i];
+			for (uint32_t y = j ? 2 * j - 1 : 0; y <= 2 * j && y < finer_height; y++)
+				for (uint32_t x = i ? 2 * i - 1 : 0; x <= 2 * i && x < finer; x++) {
+					const float own = map->level[k - 1].z[(size_t)y * finer + x];
+					z = own < z ? own : z;
+				}
+			to[(size_t)j * stride + i] = z;
+		}
+}
+
+static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t levels)
+{
+	const uint32_t width = kept->fit.width, height = kept->fit.height;
+	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1], seam[PSR_MAX_DEPTH_LEVEL + 1];
+	kept->map.levels = levels | 1;
+	d->stack = (struct psr_zstack){ .width = width, .height = height, .levels = levels & ~1u, .word = d->drawer->word };
+	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		const uint32_t cells_x = (width + (1u << k) - 1) >> k, cells_y = (height + (1u << k) - 1) >> k;
+		d->stack.level[k].width = cells_x + 2;
+		d->stack.level[k].height = cells_y + 2;
+		kept->map.level[k].stride = cells_x + 2;
+		kept->map.level[k].most_x = (float)cells_x - 0.5f;
+		kept->map.level[k].most_y = (float)cells_y - 0.5f;
+		first[k] = n;
+		if (kept->map.levels >> k & 1)
+			n += (size_t)(cells_x + 2) * (cells_y + 2);
+		seam[k] = n;
+		if (has_seam(&kept->map, k))
+			n += (size_t)(cells_x + 2) * (cells_y + 2);
+	}
+	kept->cells = grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
+	if (!kept->cells)
+		return PSR_ERR_MEMORY;
+	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		float *z = kept->map.levels >> k & 1 ? kept->cells + first[k] : NULL;
+		kept->map.level[k].z = z;
+		kept->map.level[k].seam = has_seam(&kept->map, k) ? kept->cells + seam[k] : NULL;
+		d->stack.level[k].z = k ? z : NULL;
+	}
+	d->cells = kept->cells;
+	d->map = &kept->map;
+	d->stride = kept->map.level[0].stride;
+	return PSR_OK;
+}
+
+static void note_plan(struct shadow_kept *kept, const struct plan *plan)
+{
+	memcpy(kept->axis, plan->frame, sizeof kept->axis);
+	memcpy(kept->eye, plan->eye, sizeof kept->eye);
+	kept->exponent = plan->exponent;
+	kept->map.perspective = plan->perspective;
+	kept->map.focal = plan->focal;
+	kept->map.near_z = plan->near_z;
+	kept->map.half_width = plan->view.half_width;
+	kept->map.half_height = plan->view.half_height;
+}
+
+int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct simd *simd, struct bins *bins,
+                    const struct psr_scene *scene, struct psr_pool *pool, uint64_t *n_samples, struct psr_error *err)
+{
+	const size_t area = (size_t)kept->fit.width * kept->fit.height;
+	struct psr_settings settings;
+	struct psr_scene seen = *scene;
+	struct psr_report report = { 0 };
+	struct plan *plan = &drawer->plan;
+	struct drawing d = { .simd = simd, .bins = bins, .drawer = drawer };
+	seen.camera = kept->fit.camera;
+	seen.n_lights = 0;
+	kept->is_drawn = 0;
+	psr_settings_default(&settings, kept->fit.width, kept->fit.height);
+	settings.cull_tests = 0;
+	int rc = plan_make(plan, &seen, &settings, err);
+	if (rc)
+		return rc;
+	for (uint32_t i = 0; i < plan->n_instances; i++)
+		plan->instance[i].cull.both_sides = 1;
+	rc = cull_blocks(bins, simd, plan, pool, &report);
+	if (rc == PSR_ERR_LIMIT)
+		return psr_fail(err, rc, "too many blocks for a shadow map");
+	drawer->word = grow_huge(drawer->word, &drawer->word_size, area * sizeof *drawer->word);
+	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
+	clear_band(&d);
+	psr_pool_for(pool, (int)(plan->tiles_x * plan->tiles_y), draw_tile, &d);
+	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
+	note_plan(kept, plan);
+	kept->is_drawn = 1;
+	*n_samples += d.n_samples;
+	return PSR_OK;
+}
+
+void shadow_map_bind(struct shadow_map *out, const struct shadow_kept *kept, const struct plan *plan)
+{
+	const double scale = ldexp(1, plan->exponent - kept->exponent);
+	double turn[3][3], move[3];
+	*out = kept->map;
+	for (int a = 0; a < 3; a++)
+		for (int b = 0; b < 3; b++)
+			turn[a][b] = v3d_dot(kept->axis[a], plan->frame[b]) * scale;
+	v3d_sub(move, plan->eye, kept->eye);
+	m3d_apply(move, (const double(*)[3])kept->axis, move);
+	v3d_scale(move, move, ldexp(1, -kept->exponent));
+	for (int a = 0; a < 3; a++) {
+		v3f_set(out->turn[a], (float)turn[a][0], (float)turn[a][1], (float)turn[a][2]);
+		out->move[a] = (float)move[a];
+	}
+	out->scale = (float)scale;
+	/* Coordinates are up to 1 in both units, and each of some eight steps may be off by half of their last bit. */
+	const double rounding = 4 * 0x1p-23 * (1 + scale);
+	out->slack = (float)rounding;
+	out->slope_bias = (float)SLOPE_BIAS;
+	out->texel_bias = (float)TEXEL_BIAS;
+}

@@ -1,0 +1,164 @@
+/* How much of a light reaches the samples of a strip, by shadow maps ([G] 7.3.1), as plain loops, which the compiler turns
+ * into vectors; compiled once for each ISA. */
+#include <string.h>
+#include "base/maths.h"
+#include "simd/simd.h"
+
+/* Samples of a strip as one map sees them. */
+struct shadow_place {
+	float u[STRIP], v[STRIP], z[STRIP]; /* texels of level 0, and z' */
+	float bias[STRIP];                  /* for a cell of one texel; grows with it */
+	float du[STRIP], dv[STRIP];         /* what z' of the sample's plane gains by a texel */
+	uint8_t is_here[STRIP];             /* in the map, and lit if nothing is before it */
+	float cover[STRIP];
+};
+
+/* The plane of a sample at q with normal n holds all p with n.p = n.q. With p = (x z', y z', z') in perspective dz'/dx = -z' n_x /
+ * (n.(x, y, 1)), which is z'^2 n_x / -(n.q); from afar it is n_x / -n_z. A surface that the light meets at less than 0.6
+ * degrees is taken for one that it meets so. */
+#define GRAZING 0.01f
+
+/* Stored normals are off by up to this angle, so that slopes are by it times 1 / cos^2 of the angle to the light, and samples of a
+ * cell are up to 1.5 cells away in both directions. */
+#define NORMAL_BIAS (1.5f * 1.41421356f * BACK_SINE)
+
+static inline float magnitude(float x)
+{
+	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
+}
+
+/* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something of. */
+static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face, uint32_t *n_here)
+{
+	const struct shadow_map m = *map;
+	const float least = GRAZING * m.scale, unit = 1 / m.focal;
+	uint32_t n_facing = 0, n = 0;
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float px = s->px[i], py = s->py[i], pz = s->pz[i], nx = s->nx[i], ny = s->ny[i], nz = s->nz[i];
+		const float x = ((m.turn[0][0] * px + m.turn[0][1] * py) + m.turn[0][2] * pz) + m.move[0];
+		const float y = ((m.turn[1][0] * px + m.turn[1][1] * py) + m.turn[1][2] * pz) + m.move[1];
+		const float z = ((m.turn[2][0] * px + m.turn[2][1] * py) + m.turn[2][2] * pz) + m.move[2];
+		const float mx = (m.turn[0][0] * nx + m.turn[0][1] * ny) + m.turn[0][2] * nz;
+		const float my = (m.turn[1][0] * nx + m.turn[1][1] * ny) + m.turn[1][2] * nz;
+		const float mz = (m.turn[2][0] * nx + m.turn[2][1] * ny) + m.turn[2][2] * nz;
+		const float across = psr_choose(m.perspective, (mx * x + my * y) + mz * z, mz), facing = -across;
+		const int is_beyond = z > m.near_z;
+		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
+		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
+		const float texel = w * unit, scale = m.focal / w, floor = least * w;
+		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep, secant = m.scale * steep;
+		at->u[i] = x * scale + m.half_width;
+		at->v[i] = y * scale + m.half_height;
+		at->z[i] = z;
+		at->du[i] = mx * slope;
+		at->dv[i] = my * slope;
+		at->bias[i] = (magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
+		at->cover[i] = 0;
+		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
+		n_facing += facing > 0;
+		n += at->is_here[i];
+	}
+	*n_here = n;
+	return n_facing != 0;
+}
+
+static inline float clamp_cell(float x, float most)
+{
+	x = psr_choose(x > -1, x, -1); /* NaN is none */
+	return psr_choose(x < most, x, most);
+}
+
+/* Two cells side by side. */
+static inline uint64_t load_pair(const float *cells)
+{
+	uint64_t pair;
+	memcpy(&pair, cells, sizeof pair);
+	return pair;
+}
+
+static inline float cover_of(uint64_t pair, int shift, float scale, float offset, float z, float part)
+{
+	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) * scale + offset < z, part);
+}
+
+/* Coverage of each place by cells of level k, bilinear among four of them ([G] 4.6). A cell covers what lies behind it: its depth is
+ * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
+ * a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth. Loads are apart from
+ * arithmetic, of which the compiler makes vectors. */
+static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells, int k, uint32_t n)
+{
+	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
+	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
+	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
+	const int32_t stride = (int32_t)map->level[k].stride;
+	const float *upper = cells + stride + 1, *lower = upper + stride;
+	float fx[STRIP], fy[STRIP];
+	int32_t cell[STRIP];
+	uint64_t pair[2][STRIP];
+	for (uint32_t i = 0; i < n; i++) {
+		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x), y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
+		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y);
+		cell[i] = cy * stride + cx;
+		fx[i] = x - (float)cx;
+		fy[i] = y - (float)cy;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		pair[0][i] = load_pair(upper + cell[i]);
+		pair[1][i] = load_pair(lower + cell[i]);
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
+		const float least = at->z[i] - at->bias[i] * size;
+		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
+		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
+		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
+		cover[i] = (c00 + c11) + (c10 + c01);
+	}
+}
+
+/* Raises the coverage of each place to that by one level. A surface may pass from blocks of one level to those of the next, and then
+ * neither covers it whole ([G] 9.1.2): where the coarser one covers a part, what counts is the coverage by the coarser cells
+ * that either level fills. */
+static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
+{
+	float cover[STRIP], seam[STRIP];
+	uint32_t n_partial = 0;
+	shadow_cover(cover, at, map, map->level[k].z, k, n);
+	if (map->level[k].seam) {
+		for (uint32_t i = 0; i < n; i++)
+			n_partial += (cover[i] > 0) & (cover[i] < 1);
+		if (n_partial) {
+			shadow_cover(seam, at, map, map->level[k].seam, k, n);
+			for (uint32_t i = 0; i < n; i++)
+				cover[i] = psr_choose((cover[i] > 0) & (seam[i] > cover[i]), seam[i], cover[i]);
+		}
+	}
+	for (uint32_t i = 0; i < n; i++)
+		at->cover[i] = psr_choose(cover[i] > at->cover[i], cover[i], at->cover[i]);
+}
+
+static int strip_shadow(const struct strip *strip, const struct shadow_light *shadow, float *reaches)
+{
+	struct shadow_place at;
+	int is_lit = 0;
+	for (uint32_t i = 0; i < strip->n; i++)
+		reaches[i] = 1;
+	for (uint32_t f = 0; f < shadow->n_maps; f++) {
+		const struct shadow_map *map = &shadow->map[f];
+		uint32_t n_here;
+		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1, &n_here);
+		if (!is_lit)
+			return 0;
+		if (!n_here)
+			continue;
+		for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++)
+			if (map->levels >> k & 1)
+				shadow_raise(&at, map, k, strip->n);
+		for (uint32_t i = 0; i < strip->n; i++) {
+			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too wide. */
+			const float left = 2 - 2 * at.cover[i];
+			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, psr_choose(left < 1, left, 1)), reaches[i]);
+		}
+	}
+	return is_lit;
+}
