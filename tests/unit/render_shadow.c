@@ -37,11 +37,22 @@ struct stage {
 #define HALF_SQUARE 0.28
 #define HEIGHT 0.5
 
+/* Squares by resolution, which take most of the time to build. */
+static struct psr_model *squares[257];
+
+static struct psr_model *square_of(const struct shape_options *options)
+{
+	struct psr_model **square = &squares[options->resolution];
+	if (!*square)
+		*square = shape_build(options, 0);
+	return psr_model_ref(*square);
+}
+
 static void stage_init(struct stage *s, const struct shape_options *square, const struct psr_light *light)
 {
 	memset(s, 0, sizeof *s);
-	s->floor = shape_build(&FINE, 0);
-	s->square = shape_build(square, 0);
+	s->floor = square_of(&FINE);
+	s->square = square_of(square);
 	s->instance[0] = (struct psr_instance){ s->floor, { 0, 0, 0, 1 }, { 0, 0, 0 }, 2 };
 	s->instance[1] = (struct psr_instance){ s->square, { 0, 1, 0, 0 }, { 0, 0, HEIGHT }, 0.4 };
 	s->light[0] = *light;
@@ -420,5 +431,8 @@ int main(void)
 		cmocka_unit_test(lights_that_change_nothing_have_no_map),
 		cmocka_unit_test(memory_is_bounded),
 	};
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	const int n_failed = cmocka_run_group_tests(tests, NULL, NULL);
+	for (int i = 0; i <= 256; i++)
+		psr_model_unref(squares[i]);
+	return n_failed;
 }
