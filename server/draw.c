@@ -80,6 +80,8 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_LIGHTS, 0, d->scene->scene.n_lights);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS, 0, report->n_shadow_maps);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN, 0, report->n_shadow_maps_drawn);
+	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
+		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }
 
 static struct outq_chunk *encode_begin(const struct drawing *d, const struct codec_result *coded)

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <xxhash.h>
+#include "psr/render.h"
 #include "server_fixture.h"
 
 static char folder[PATH_MAX];
@@ -129,11 +130,16 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 21);
+	assert_int_equal(end.n_entries, 21 + PSR_N_EFFECTS);
 	for (int i = 0; i < 11; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
 	for (int i = 11; i < 21; i++)
 		assert_int_equal(end.entry[i].id, i - 11 + 32);
+	for (int i = 21; i < 21 + PSR_N_EFFECTS; i++) {
+		assert_int_equal(end.entry[i].id, i - 21 + PSR_WIRE_REPORT_EFFECTS);
+		assert_true(end.entry[i].ns == PSR_WHY_RAN || end.entry[i].count == 0);
+	}
+	assert_int_equal(end.entry[21 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
 	assert_int_equal(end.entry[9].count, 2);
 	assert_int_equal(end.entry[16].count, PLATE_SAMPLES);
 	peer_close(&p);

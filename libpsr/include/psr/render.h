@@ -26,7 +26,8 @@ enum psr_cull_test {
 	PSR_CULL_ALL = 7
 };
 
-/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. */
+/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. The protocol has the numbers of
+ * effects and reasons, too. */
 enum psr_effect {
 	PSR_EFFECT_CONES,     /* count: blocks tested */
 	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
@@ -49,6 +50,7 @@ enum psr_why {
 	PSR_WHY_COST,    /* it would cost more than it saves, and changes nothing */
 };
 const char *psr_effect_name(enum psr_effect effect); /* "specular" */
+const char *psr_effect_counts(enum psr_effect effect); /* what its count counts: "pixels looked at for highlights" */
 /* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
 

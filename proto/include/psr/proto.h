@@ -446,6 +446,7 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_LIGHTS = 39,
 	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
 	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
+	PSR_WIRE_REPORT_EFFECTS = 64, /* and the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
 
