@@ -65,7 +65,7 @@ enum psr_cap {
 	PSR_CAP_BASE = 1 << 2,         /* frames as changes to a base */
 	PSR_CAP_TIME_BUDGET = 1 << 3,
 	PSR_CAP_ERROR_BOUND = 1 << 4,
-	PSR_CAP_SETTINGS = 1 << 5,     /* settings other than scale 1, spacing_px 1 */
+	PSR_CAP_SETTINGS = 1 << 5,     /* settings of a scale other than 1 */
 	PSR_CAP_SHADOWS = 1 << 6,
 	PSR_CAP_DEPTH_U16 = 1 << 7,    /* depth formats U16 and U16_HALF */
 	PSR_CAP_NORMAL = 1 << 8,
