@@ -10,16 +10,18 @@
 #include "scene.h"
 
 #define SIDE 1024
-#define N_FRAMES 48
+#define N_FRAMES 24
 #define MOST_LIGHTS 16
 #define MOST_INSTANCES 64
 
 enum kind { PLAIN, SHINY, TWO_SIDED, LEVEL_1, LEVEL_2, N_KINDS };
+enum shadow { NO_SHADOW, KEPT_SHADOW, NEW_SHADOW };
 
 struct look {
 	enum kind kind;
 	uint32_t n_lights;
 	enum psr_light_kind light;
+	enum shadow shadow;
 	uint32_t n_small;        /* so many of an eighth of the size in the place of one */
 	double zoom;             /* 0: 1 */
 	unsigned without_tests;  /* enum psr_cull_test */
@@ -40,6 +42,12 @@ static const struct row {
 	{ "lights", "one point light", { .n_lights = 1, .light = PSR_LIGHT_POINT }, { .n_lights = 0 } },
 	{ "lights", "point lights 2 to 8", { .n_lights = 8, .light = PSR_LIGHT_POINT }, { .n_lights = 1, .light = PSR_LIGHT_POINT } },
 	{ "lights", "one spot light", { .n_lights = 1, .light = PSR_LIGHT_SPOT }, { .n_lights = 0 } },
+	{ "shadows", "a directional light's, kept", { .n_lights = 1, .shadow = KEPT_SHADOW }, { .n_lights = 1 } },
+	{ "shadows", "a directional light's, new", { .n_lights = 1, .shadow = NEW_SHADOW }, { .n_lights = 1 } },
+	{ "shadows", "a spot light's, kept", { .n_lights = 1, .light = PSR_LIGHT_SPOT, .shadow = KEPT_SHADOW },
+	  { .n_lights = 1, .light = PSR_LIGHT_SPOT } },
+	{ "shadows", "a point light's, kept", { .n_lights = 1, .light = PSR_LIGHT_POINT, .shadow = KEPT_SHADOW },
+	  { .n_lights = 1, .light = PSR_LIGHT_POINT } },
 	{ "instances", "a second, of an eighth of the size", { .n_lights = 1, .n_small = 2 }, { .n_lights = 1, .n_small = 1 } },
 	{ "instances", "3 to 8", { .n_lights = 1, .n_small = 8 }, { .n_lights = 1, .n_small = 2 } },
 	{ "instances", "9 to 64", { .n_lights = 1, .n_small = 64 }, { .n_lights = 1, .n_small = 8 } },
@@ -97,6 +105,7 @@ static void set_lights(struct stage *stage, const struct scene_film *film)
 
 		*light = film->light;
 		light->kind = stage->look->light;
+		light->casts_shadow = stage->look->shadow != NO_SHADOW;
 		for (int k = 0; k < 3; k++)
 			light->color[k] = color;
 		if (i > 0) {
@@ -122,6 +131,8 @@ static void scene(struct psr_scene *out, int frame, const void *userdata)
 	out->n_instances = stage->look->n_small > 0 ? stage->look->n_small : 1;
 	out->light = stage->light;
 	out->n_lights = stage->look->n_lights;
+	if (stage->look->shadow == NEW_SHADOW)
+		stage->light[0].direction[0] = 0.55 + 1e-4 * frame;
 }
 
 static void prepare(struct stage *stage, struct price_side *side, const struct look *look, struct psr_model *const model[N_KINDS],
@@ -156,7 +167,10 @@ static void measure(struct price *price, const struct row *row, struct psr_model
 static void print_row(const struct row *row, const struct price *one, const struct price *all)
 {
 	cJSON *item = report_add(report_array("effects"));
+	double sum = 0;
 
+	for (int s = 0; s < PSR_N_STAGES; s++)
+		sum += one->stage_ms[s];
 	printf("%-34s %8.2f %+8.2f %+6.0f %% | %8.2f %+8.2f %+6.0f %% |", row->name, one->ms, one->more_ms,
 	       100 * one->more_ms / (one->ms - one->more_ms), all->ms, all->more_ms, 100 * all->more_ms / (all->ms - all->more_ms));
 	report_text(item, "group", row->group);
@@ -166,8 +180,8 @@ static void print_row(const struct row *row, const struct price *one, const stru
 	report_number(item, "ms_all", all->ms);
 	report_number(item, "more_all", all->more_ms);
 	for (int s = 0; s < PSR_N_STAGES; s++) {
-		printf(" %7.2f", one->stage_ms[s]);
-		report_number(item, psr_stage_name((enum psr_stage)s), one->stage_ms[s]);
+		printf(" %6.1f%%", 100 * one->stage_ms[s] / sum);
+		report_number(item, psr_stage_name((enum psr_stage)s), one->stage_ms[s] / sum);
 	}
 	puts("");
 	fflush(stdout);
@@ -176,7 +190,7 @@ static void print_row(const struct row *row, const struct price *one, const stru
 static void print_head(const struct effects *effects, const struct scene_film *film)
 {
 	printf("What effects cost: the %s at %dx%d, half covered, %.2f pixels between samples; ms a frame, and how many more than "
-	       "without\nthe effect: medians of %d pairs of frames, drawn in turn while the camera swings. Of one thread processor time.\n",
+	       "without\nthe effect: medians of %d pairs of frames, drawn in turn while the camera swings. Of one thread processor time,\nand which part of it each stage takes.\n",
 	       effects->name, SIDE, SIDE, film->magnification, N_FRAMES);
 	printf("%-34s %26s | %20d threads |", "", "1 thread", effects->n_threads);
 	for (int s = 0; s < PSR_N_STAGES; s++)
