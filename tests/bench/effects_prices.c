@@ -40,7 +40,8 @@ static const struct row {
 	{ "lights", "lights 9 to 16", { .n_lights = 16 }, { .n_lights = 8 } },
 	{ "lights", "highlights of lights 2 to 16", { .n_lights = 16, .kind = SHINY }, { .n_lights = 1, .kind = SHINY } },
 	{ "lights", "one point light", { .n_lights = 1, .light = PSR_LIGHT_POINT }, { .n_lights = 0 } },
-	{ "lights", "point lights 2 to 8", { .n_lights = 8, .light = PSR_LIGHT_POINT }, { .n_lights = 1, .light = PSR_LIGHT_POINT } },
+	{ "lights", "point lights 2 to 8", { .n_lights = 8, .light = PSR_LIGHT_POINT },
+	  { .n_lights = 1, .light = PSR_LIGHT_POINT } },
 	{ "lights", "one spot light", { .n_lights = 1, .light = PSR_LIGHT_SPOT }, { .n_lights = 0 } },
 	{ "shadows", "a directional light's, kept", { .n_lights = 1, .shadow = KEPT_SHADOW }, { .n_lights = 1 } },
 	{ "shadows", "a directional light's, new", { .n_lights = 1, .shadow = NEW_SHADOW }, { .n_lights = 1 } },
@@ -48,7 +49,8 @@ static const struct row {
 	  { .n_lights = 1, .light = PSR_LIGHT_SPOT } },
 	{ "shadows", "a point light's, kept", { .n_lights = 1, .light = PSR_LIGHT_POINT, .shadow = KEPT_SHADOW },
 	  { .n_lights = 1, .light = PSR_LIGHT_POINT } },
-	{ "instances", "a second, of an eighth of the size", { .n_lights = 1, .n_small = 2 }, { .n_lights = 1, .n_small = 1 } },
+	{ "instances", "a second, of an eighth of the size", { .n_lights = 1, .n_small = 2 },
+	  { .n_lights = 1, .n_small = 1 } },
 	{ "instances", "3 to 8", { .n_lights = 1, .n_small = 8 }, { .n_lights = 1, .n_small = 2 } },
 	{ "instances", "9 to 64", { .n_lights = 1, .n_small = 64 }, { .n_lights = 1, .n_small = 8 } },
 	{ "samples apart", "1.2 times nearer", { .n_lights = 1, .zoom = 1.2 }, { .n_lights = 1 } },
@@ -72,7 +74,7 @@ struct stage {
 	struct psr_light light[MOST_LIGHTS];
 };
 
-/* The model with other attributes and flags of its blocks. */
+/* The model without highlights and back faces, or with one of them. */
 static struct psr_model *variant(const struct psr_model *model, enum kind kind)
 {
 	const uint64_t gloss = UINT64_C(0x60) << 56 | UINT64_C(0x8410) << 40; /* exponent 64, half of the light */
@@ -83,9 +85,9 @@ static struct psr_model *variant(const struct psr_model *model, enum kind kind)
 	struct psr_error err;
 
 	for (uint32_t i = 0; i < blocks.n_blocks; i++)
-		flags[i] = (uint8_t)(blocks.flags[i] | (kind == TWO_SIDED ? PSR_BLOCK_TWO_SIDED : 0));
+		flags[i] = (uint8_t)((blocks.flags[i] & ~PSR_BLOCK_TWO_SIDED) | (kind == TWO_SIDED ? PSR_BLOCK_TWO_SIDED : 0));
 	for (uint64_t i = 0; i < blocks.n_samples; i++)
-		attr[i] = kind == SHINY ? (blocks.attr[i] & 0xffffffffff) | gloss : blocks.attr[i];
+		attr[i] = (blocks.attr[i] & 0xffffffffff) | (kind == SHINY ? gloss : 0);
 	blocks.flags = flags;
 	blocks.attr = attr;
 	if (psr_model_create(&out, psr_model_info(model), &blocks, NULL, &err) != PSR_OK)
@@ -135,8 +137,8 @@ static void scene(struct psr_scene *out, int frame, const void *userdata)
 		stage->light[0].direction[0] = 0.55 + 1e-4 * frame;
 }
 
-static void prepare(struct stage *stage, struct price_side *side, const struct look *look, struct psr_model *const model[N_KINDS],
-                    const struct scene_film *film)
+static void prepare(struct stage *stage, struct price_side *side, const struct look *look,
+                    struct psr_model *const model[N_KINDS], const struct scene_film *film)
 {
 	stage->look = look;
 	stage->film = *film;
@@ -152,8 +154,8 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 	side->userdata = stage;
 }
 
-static void measure(struct price *price, const struct row *row, struct psr_model *const model[N_KINDS], const struct scene_film *film,
-                    int n_threads)
+static void measure(struct price *price, const struct row *row, struct psr_model *const model[N_KINDS],
+                    const struct scene_film *film, int n_threads)
 {
 	struct stage *stage = report_alloc(2, sizeof *stage);
 	struct price_side with, without;
@@ -172,7 +174,8 @@ static void print_row(const struct row *row, const struct price *one, const stru
 	for (int s = 0; s < PSR_N_STAGES; s++)
 		sum += one->stage_ms[s];
 	printf("%-34s %8.2f %+8.2f %+6.0f %% | %8.2f %+8.2f %+6.0f %% |", row->name, one->ms, one->more_ms,
-	       100 * one->more_ms / (one->ms - one->more_ms), all->ms, all->more_ms, 100 * all->more_ms / (all->ms - all->more_ms));
+	       100 * one->more_ms / (one->ms - one->more_ms), all->ms, all->more_ms,
+	       100 * all->more_ms / (all->ms - all->more_ms));
 	report_text(item, "group", row->group);
 	report_text(item, "effect", row->name);
 	report_number(item, "ms_one", one->ms);
@@ -190,7 +193,8 @@ static void print_row(const struct row *row, const struct price *one, const stru
 static void print_head(const struct effects *effects, const struct scene_film *film)
 {
 	printf("What effects cost: the %s at %dx%d, half covered, %.2f pixels between samples; ms a frame, and how many more than "
-	       "without\nthe effect: medians of %d pairs of frames, drawn in turn while the camera swings. Of one thread processor time,\nand which part of it each stage takes.\n",
+	       "without\nthe effect: medians of %d pairs of frames, drawn in turn while the camera swings. Of one thread processor time,\n"
+	       "and which part of it each stage takes.\n",
 	       effects->name, SIDE, SIDE, film->magnification, N_FRAMES);
 	printf("%-34s %26s | %20d threads |", "", "1 thread", effects->n_threads);
 	for (int s = 0; s < PSR_N_STAGES; s++)
@@ -237,11 +241,10 @@ void effects_prices(const struct effects *effects)
 	struct price one, all;
 	const char *group = "";
 
-	model[PLAIN] = effects->model;
-	model[SHINY] = variant(effects->model, SHINY);
-	model[TWO_SIDED] = variant(effects->model, TWO_SIDED);
-	model[LEVEL_1] = scene_level(effects->model, 1);
-	model[LEVEL_2] = scene_level(effects->model, 2);
+	for (int k = PLAIN; k <= TWO_SIDED; k++)
+		model[k] = variant(effects->model, (enum kind)k);
+	model[LEVEL_1] = scene_level(model[PLAIN], 1);
+	model[LEVEL_2] = scene_level(model[PLAIN], 2);
 	scene_film_init(&film, &picture, effects->model, effects->aim);
 	print_head(effects, &film);
 	measure(&one, &base, model, &film, 1);
@@ -256,6 +259,6 @@ void effects_prices(const struct effects *effects)
 		print_row(&rows[i], &one, &all);
 	}
 	plot(effects);
-	for (int k = SHINY; k < N_KINDS; k++)
+	for (int k = PLAIN; k < N_KINDS; k++)
 		psr_model_unref(model[k]);
 }

@@ -142,10 +142,11 @@ void effects_spacing(const struct effects *effects)
 	const struct price_side usual = { .settings = settings, .scene = scene, .userdata = &truth.film };
 	settings.spacing = spacing[0];
 	draw(&finest, &truth, &settings);
-	printf("\nWhat accuracy costs: the %s at %dx%d, %.2f pixels between samples of the finest level; one light, 1 thread; PSNR over the "
-	       "pixels\nthat the object fills, of sRGB codes: to the mesh by %d rays a pixel, and to spacing %g\n%8s %9s %9s %9s %14s %10s %11s\n",
-	       effects->name, SIDE, SIDE, truth.film.magnification, RAYS * RAYS, spacing[0], "spacing", "ms", "of that", "samples,", "a covered",
-	       "PSNR to", "PSNR to");
+	printf("\nWhat accuracy costs: the %s at %dx%d, %.2f pixels between samples of the finest level; one light, 1 thread; PSNR "
+	       "over the\npixels that the object fills, of sRGB codes: to the mesh by %d rays a pixel, and to spacing %g\n"
+	       "%8s %9s %9s %9s %14s %10s %11s\n",
+	       effects->name, SIDE, SIDE, truth.film.magnification, RAYS * RAYS, spacing[0], "spacing", "ms", "of that",
+	       "samples,", "a covered", "PSNR to", "PSNR to");
 	printf("%8s %9s %9s %9s %14s %10s %8s %g\n", "pixels", "", "at 1", "millions", "pixel", "the truth", "spacing", spacing[0]);
 	for (size_t i = 0; i < sizeof spacing / sizeof spacing[0]; i++) {
 		cJSON *item = report_add(report_array("spacing"));
@@ -189,8 +190,8 @@ static void gaps_row(const struct truth *truth, const char *name, double magnifi
 	settings.gap_method = method;
 	draw(&drawn, truth, &settings);
 	scene(&seen, 0, &truth->film);
-	if (psr_accuracy_measure(&accuracy, truth->rays, &seen.camera, SIDE, SIDE, drawn.depth, psr_model_info(truth->film.model)->spacing,
-	                         truth->n_threads, &err) != PSR_OK)
+	if (psr_accuracy_measure(&accuracy, truth->rays, &seen.camera, SIDE, SIDE, drawn.depth,
+	                         psr_model_info(truth->film.model)->spacing, truth->n_threads, &err) != PSR_OK)
 		report_die("the truth", err.text);
 	const double db = psnr(truth, drawn.rgb, NULL);
 
@@ -213,9 +214,9 @@ void effects_gaps(const struct effects *effects)
 {
 	struct truth truth;
 
-	printf("\nGaps by bilinear coverage and by opaque squares ([G] 4.6): one level of the %s at %dx%d; holes and pixels drawn outside of "
-	       "the\nsilhouette against the mesh, PSNR as above\n%-8s %6s %-9s %9s %8s %9s %9s %10s\n", effects->name, SIDE, SIDE, "", "magni-", "",
-	       "partial", "filled", "holes", "outside", "PSNR to");
+	printf("\nGaps by bilinear coverage and by opaque squares ([G] 4.6): one level of the %s at %dx%d; holes and pixels drawn "
+	       "outside of the\nsilhouette against the mesh, PSNR as above\n%-8s %6s %-9s %9s %8s %9s %9s %10s\n", effects->name, SIDE, SIDE,
+	       "", "magni-", "", "partial", "filled", "holes", "outside", "PSNR to");
 	printf("%-8s %6s %-9s %9s %8s %9s %9s %10s\n", "model", "fied", "method", "pixels", "pixels", "", "", "the truth");
 	for (unsigned level = 1; level <= 2; level++) {
 		struct psr_model *model = scene_level(effects->model, level);

@@ -52,7 +52,8 @@ static double draw(struct drawer *drawer, int frame)
 	return clock_ms(drawer) - start;
 }
 
-void price_measure(struct price *out, const struct price_side *with, const struct price_side *without, int n_frames, int n_threads)
+void price_measure(struct price *out, const struct price_side *with, const struct price_side *without, int n_frames,
+                   int n_threads)
 {
 	double *ms = report_alloc((size_t)n_frames * (2 + PSR_N_STAGES), sizeof *ms);
 	double *more = ms + n_frames, *stage = more + n_frames;

@@ -21,6 +21,7 @@ struct price {
 };
 
 /* n_frames pairs, after one that is not counted; each side has a renderer of its own. */
-void price_measure(struct price *out, const struct price_side *with, const struct price_side *without, int n_frames, int n_threads);
+void price_measure(struct price *out, const struct price_side *with, const struct price_side *without, int n_frames,
+                   int n_threads);
 
 #endif
