@@ -171,6 +171,7 @@ endif
 
 BENCH      := $(BUILD)/tests/bench/model
 FRAMES     := $(BUILD)/tests/bench/frames
+EFFECTS    := $(BUILD)/tests/bench/effects
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
@@ -204,10 +205,13 @@ FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare emb
 	peer peer_order pictures plot report scene thesis warp))
 $(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+EFFECTS_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child effects effects_prices effects_quality isolate level ours price report scene))
+$(EFFECTS): $(EFFECTS_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: test-bin check bench bench-model bench-simd
+.PHONY: test-bin check bench bench-effects bench-model bench-simd
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -240,6 +244,9 @@ bench: deps ## bench: install what is missing, build, time frames beside llvmpip
 	$(Q).ci/deps $(DEPS_BENCH)
 	$(Q)$(MAKE) --no-print-directory compile $(FRAMES)
 	$(Q)$(FRAMES) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched) $(only)
+
+bench-effects: compile $(EFFECTS) ## bench-effects: what a light, a highlight, a shadow, an instance, ... costs, one by one; table and picture
+	$(Q)$(EFFECTS) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched)
 
 bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "effects.h"
 #include "lib/outfile.h"
 #include "report.h"
 
@@ -123,6 +124,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
 	cJSON_AddNumberToObject(ms, "total", (double)facts->total_ns / 1e6);
 	add_stages(report, event->end);
+	effects_add(report, event->end);
 	add_planes(report, event);
 	if (event->end->planes >> PSR_WIRE_PLANE_DEPTH & 1) {
 		const double range[2] = { event->begin->depth_min, event->begin->depth_max };

@@ -5,6 +5,7 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
+#include "effects.h"
 #include "preset.h"
 #include "psr.h"
 #include "report.h"
@@ -21,7 +22,7 @@ struct shot {
 	struct psr_camera_wish camera;
 	struct preset_wish preset;
 	double fov, ortho, ambient;
-	int has_fov, has_ortho, has_ambient, hash;
+	int has_fov, has_ortho, has_ambient, hash, effects;
 	uint8_t background[3];
 	int64_t timeout;
 	struct psr_msg_frame frame;
@@ -117,13 +118,16 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		{ "hash", 0, PSR_OPT_FLAG, &shot->hash, NULL,
 		  "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`.", 0, 0, NULL,
 		  NULL },
+		{ "effects", 0, PSR_OPT_FLAG, &shot->effects, NULL,
+		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0, 0, NULL,
+		  NULL },
 		PSR_OPT_TIMEOUT(shot->timeout),
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
 		"psr shot --model NAME [--server ADDR] [--size WxH] [camera, lights] -o FILE [--plane PLANE | --show STAGE] "
 		"[--depth FILE] "
-		"[--report FILE] [--hash]",
+		"[--report FILE] [--hash] [--effects]",
 		"Asks a server for one picture of a model and writes it to a file. Prints nothing but what was asked for.",
 		opts,
 		footer,
@@ -156,8 +160,8 @@ static int check(struct shot *shot, struct psr_error *err)
 
 	if (shot->model == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--model NAME is missing; `psr list` shows the names");
-	if (shot->output == NULL && shot->depth == NULL && shot->report == NULL && !shot->hash)
-		return psr_fail(err, PSR_ERR_ARG, "nothing was asked for; say -o FILE, --depth, --report or --hash");
+	if (shot->output == NULL && shot->depth == NULL && shot->report == NULL && !shot->hash && !shot->effects)
+		return psr_fail(err, PSR_ERR_ARG, "nothing was asked for; say -o FILE, --depth, --report, --hash or --effects");
 	if (w == 0 || h == 0)
 		return psr_fail(err, PSR_ERR_ARG, "--size: a picture of %ux%u has no pixels", w, h);
 	if (w > PSR_WIRE_MAX_SIDE || h > PSR_WIRE_MAX_SIDE || (uint64_t)w * h > PSR_WIRE_MAX_PIXELS)
@@ -242,6 +246,10 @@ static int write_files(const struct shot *shot, const struct shot_facts *facts, 
 		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
 			if (event->end->planes >> plane & 1)
 				printf("%s %016" PRIx64 "\n", psr_plane_name(plane), event->end->hash[plane]);
+		code = psr_flush_output(err);
+	}
+	if (code == PSR_OK && shot->effects) {
+		effects_print(event->end);
 		code = psr_flush_output(err);
 	}
 	if (code == PSR_OK && isatty(STDERR_FILENO))

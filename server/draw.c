@@ -48,6 +48,11 @@ static void make_camera(struct psr_camera *camera, const struct psr_msg_camera *
 	camera->near_z = wire->near_z;
 }
 
+static double spacing_of(const struct psr_msg_frame *request)
+{
+	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings.spacing_px : 1;
+}
+
 static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
 {
 	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
@@ -80,6 +85,8 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_LIGHTS, 0, d->scene->scene.n_lights);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS, 0, report->n_shadow_maps);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN, 0, report->n_shadow_maps_drawn);
+	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
+		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }
 
 static struct outq_chunk *encode_begin(const struct drawing *d, const struct codec_result *coded)
@@ -90,7 +97,7 @@ static struct outq_chunk *encode_begin(const struct drawing *d, const struct cod
 		.color_codec = request->color_codec, .color_quality = request->color_quality,
 		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
 		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
-		.settings = { .scale = 1, .spacing_px = 1 },
+		.settings = { .scale = 1, .spacing_px = spacing_of(request) },
 		.depth_min = coded->depth_min, .depth_max = coded->depth_max, .camera = request->camera,
 	};
 	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
@@ -198,6 +205,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 
 	make_camera(&scene.camera, &d->request.camera);
 	psr_settings_default(&settings, d->request.width, d->request.height);
+	settings.spacing = spacing_of(&d->request);
 	code = reserve_pixels(worker, d, &picture, err);
 	if (code == PSR_OK)
 		code = psr_render(worker->renderer, &scene, &settings, d->pool, &picture, err);

@@ -211,8 +211,8 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server keeps no %s; ask with budget 0",
 		                frame->budget == PSR_WIRE_BUDGET_TIME ? "time budgets" : "error bounds");
-	if (frame->budget == PSR_WIRE_BUDGET_SETTINGS && (frame->settings.scale != 1 || frame->settings.spacing_px != 1))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server draws with scale 1 and spacing 1 only");
+	if (frame->budget == PSR_WIRE_BUDGET_SETTINGS && frame->settings.scale != 1)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server draws with scale 1 only, not %u", frame->settings.scale);
 	if (frame->base != 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server sends no changes to a base: base takes 0, not %" PRIu32,
 		                frame->base);

@@ -192,10 +192,10 @@ static struct cluster_view {
 }
 
 /* Rises with the level among clusters that fit a pixel, falls with it among those that do not, which are all below. */
-static uint32_t score_of(const struct plan_instance *in, const struct psr_cluster *k, float group_stretch)
+static uint32_t score_of(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k, float group_stretch)
 {
 	const uint32_t max_levels = 32;
-	int fits = fits_pixel(group_stretch * in->cull.spacing * (float)(1u << k->level));
+	int fits = fits_pixel(group_stretch * in->cull.spacing * (float)(1u << k->level) * plan->finer);
 	return fits ? max_levels + k->level : max_levels - 1 - k->level;
 }
 
@@ -217,18 +217,18 @@ static void choose_levels(struct bins *bins, const struct plan *plan)
 		}
 		for (uint32_t k = 0; k < b->n_clusters; k++) {
 			struct cull_group *g = &group[b->cluster[k].group];
-			const uint32_t score = score_of(in, &b->cluster[k], g->stretch);
+			const uint32_t score = score_of(plan, in, &b->cluster[k], g->stretch);
 			g->score = score > g->score ? score : g->score;
 		}
 	}
 }
 
-static int is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
+static int is_chosen(const struct bins *bins, const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k)
 {
 	if (in->cull.blocks->n_levels == 1)
 		return 1;
 	const struct cull_group *g = &bins->group[in->first_group + k->group];
-	return score_of(in, k, g->stretch) == g->score;
+	return score_of(plan, in, k, g->stretch) == g->score;
 }
 
 static void count_chunk(int i, void *userdata)
@@ -247,7 +247,7 @@ static void count_chunk(int i, void *userdata)
 		const struct psr_cluster *cluster = &in->cull.blocks->cluster[chunk->first_cluster + k];
 		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
-		if (!is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
+		if (!is_chosen(cull->bins, plan, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk->n_tested += cluster->n_blocks;
 		for (uint32_t at = 0; at < cluster->n_blocks; at += CULL_BATCH) {

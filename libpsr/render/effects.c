@@ -23,6 +23,24 @@ const char *psr_effect_name(enum psr_effect effect)
 	return (unsigned)effect < PSR_N_EFFECTS ? effects[effect].name : "?";
 }
 
+const char *psr_effect_counts(enum psr_effect effect)
+{
+	static const char *const counts[PSR_N_EFFECTS] = {
+		[PSR_EFFECT_CONES] = "blocks tested",
+		[PSR_EFFECT_MASKS] = "blocks that only their mask culls",
+		[PSR_EFFECT_OCCLUSION] = "blocks left out, once in each tile",
+		[PSR_EFFECT_FACING] = "blocks whose samples were asked one by one",
+		[PSR_EFFECT_LEVELS] = "depth buffers beside the picture's own",
+		[PSR_EFFECT_FILL] = "pixels whose color changed",
+		[PSR_EFFECT_TWO_SIDED] = "pixels whose normals may be turned to the eye",
+		[PSR_EFFECT_SPECULAR] = "pixels looked at for highlights",
+		[PSR_EFFECT_POSITIONS] = "pixels whose positions were worked out",
+		[PSR_EFFECT_SHADOWS] = "shadow maps in use",
+		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
+	};
+	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] ? counts[effect] : "?";
+}
+
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why)
 {
 	return (unsigned)effect < PSR_N_EFFECTS && (unsigned)why <= PSR_WHY_COST ? effects[effect].why[why] : "?";

@@ -13,7 +13,7 @@ _Static_assert(TILE_WIDTH % GAPS_WIDTH == 0 && TILE_HEIGHT % BRICK == 0, "what g
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
                              uint32_t y1, uint16_t *weight, uint8_t *bricks)
 {
-	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, weight };
+	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, weight, plan->opaque_cells };
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	struct gaps_counts total = { 0, 0, 0 };
 	for (uint32_t y = y0; y < y1; y += BRICK)

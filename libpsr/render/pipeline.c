@@ -62,6 +62,8 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 	settings->cull_tests = PSR_CULL_ALL;
 	settings->is_full = 0;
 	settings->gap_threshold = 3;
+	settings->gap_method = PSR_GAPS_BILINEAR;
+	settings->spacing = 1;
 }
 
 static int validate(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
@@ -76,6 +78,10 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 		return psr_fail(err, PSR_ERR_ARG, "there are no tests %#x to cull by", settings->cull_tests);
 	if (!(settings->gap_threshold >= 0 && settings->gap_threshold <= 64))
 		return psr_fail(err, PSR_ERR_ARG, "gap threshold %g is not within 0..64 pixels", settings->gap_threshold);
+	if (settings->gap_method != PSR_GAPS_BILINEAR && settings->gap_method != PSR_GAPS_OPAQUE)
+		return psr_fail(err, PSR_ERR_ARG, "there is no method %d to find gaps by", (int)settings->gap_method);
+	if (!(settings->spacing >= 1.0 / 64 && settings->spacing <= 64))
+		return psr_fail(err, PSR_ERR_ARG, "a spacing of %g is not within 1/64..64 pixels", settings->spacing);
 	return psr_scene_validate(scene, err);
 }
 

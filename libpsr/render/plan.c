@@ -239,6 +239,8 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;
+	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
+	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);

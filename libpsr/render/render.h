@@ -25,6 +25,8 @@ struct plan {
 	int perspective;
 	unsigned cull_tests;
 	int is_full;
+	int opaque_cells;          /* PSR_GAPS_OPAQUE */
+	float finer;               /* than a pixel the samples are to be: 1 / settings' spacing */
 	int exponent;              /* everything here is world * 2^-exponent, relative to the eye */
 	double tangent[2];         /* of half the angles that the picture spans; perspective */
 	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
@@ -64,8 +66,8 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 
 /* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
 
-/* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel wherever a sphere of the
- * group reaches, so that its blocks need no depth buffer but the picture's; the finest if there is none. */
+/* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel (or what the settings say) wherever a
+ * sphere of the group reaches, so that its blocks need no depth buffer but the picture's; the finest if there is none. */
 struct cull_group {
 	float stretch;  /* greatest of its clusters: pixels that a unit of camera space can be stretched to */
 	uint32_t score; /* of the cluster that is drawn */

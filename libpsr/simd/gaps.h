@@ -181,6 +181,23 @@ static int cover_level(const struct gaps_target *t, const struct gaps_tile *tile
 	return has_cells;
 }
 
+/* The same by opaque squares. */
+static int cover_opaque(const struct gaps_target *t, const struct gaps_tile *tile, int k)
+{
+	const struct psr_zstack *stack = t->stack;
+	int has_cells = 0;
+	for (uint32_t y = 0; y < tile->height; y++) {
+		const float *cell = stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
+		const float *z = &tile->z[y + 1][TILE_LEFT];
+		uint16_t *weight = t->weight + (size_t)(tile->y0 + y) * stack->width + tile->x0;
+		for (uint32_t x = 0; x < tile->width; x++) {
+			has_cells |= cell[x >> k] < INFINITY;
+			weight[x] = cell[x >> k] * t->scale[k] + t->offset[k] < z[x] ? 0 : weight[x];
+		}
+	}
+	return has_cells;
+}
+
 /* Samples of level 0 leave no pixel out but for rounding, and then a single one: the guard takes pixels that lie behind at
  * least seven of their eight neighbours, where those are one surface: within one threshold of each other, since deep in a
  * crevice there may be anything; but within that of a coarser level where the pixel is empty, since what is seen through a
@@ -241,7 +258,7 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 			t->weight[(size_t)y * stride + x] = GAPS_WHOLE;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 		if (t->stack->levels >> k & 1)
-			has_cells |= cover_level(t, &tile, k);
+			has_cells |= t->opaque_cells ? cover_opaque(t, &tile, k) : cover_level(t, &tile, k);
 	for (uint32_t y = 0; y < tile.height; y++)
 		counts.n_pinholes += guard_row(t, &tile, y, t->weight + (size_t)(y0 + y) * stride + x0);
 

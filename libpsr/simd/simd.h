@@ -219,6 +219,7 @@ struct gaps_target {
 	const struct psr_zstack *stack;
 	const float *scale, *offset; /* by level */
 	uint16_t *weight;            /* stack->width * stack->height */
+	int opaque_cells;            /* a cell covers its own pixels, whole, and no others */
 };
 
 struct gaps_counts {

@@ -58,31 +58,11 @@ static void prepare(struct job *job, const struct part *part, struct psr_model *
 	job->n_threads = part->n_threads;
 }
 
-/* n instances on a square grid in the plane of the picture, in the room of one. */
+/* n instances in the room of one. */
 static void spread(struct job *job, const struct psr_model *model, uint32_t n)
 {
-	const struct psr_model_info *info = psr_model_info(model);
-	const uint32_t across = (uint32_t)ceil(sqrt((double)n));
-	struct psr_camera camera;
-	double forward[3], right[3], down[3], place[3];
-
-	scene_film_camera(&camera, &job->film, 0);
-	v3d_sub(forward, camera.target, camera.eye);
-	v3d_normalize(forward, forward);
-	v3d_cross(right, forward, camera.up);
-	v3d_normalize(right, right);
-	v3d_cross(down, forward, right);
 	job->n_instances = n;
-	for (uint32_t i = 0; i < n; i++) {
-		struct psr_instance *in = &job->instance[i];
-		const double x = (2.0 * (i % across) + 1) / across - 1, y = (2.0 * (i / across) + 1) / across - 1;
-
-		*in = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1.0 / across };
-		v3d_add_scaled(place, camera.target, x * info->scale, right);
-		v3d_add_scaled(place, place, y * info->scale, down);
-		for (int k = 0; k < 3; k++)
-			in->translation[k] = place[k] - in->scale * (info->box_min[k] + info->box_max[k]) / 2;
-	}
+	scene_spread(job->instance, &job->film, model, n);
 }
 
 static cJSON *add(const char *series, double x, const struct job *job)

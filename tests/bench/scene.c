@@ -129,3 +129,29 @@ void scene_film_magnify(struct scene_film *film, double magnification)
 	film->zoom *= magnification / film->magnification;
 	film->magnification = magnification_of(film);
 }
+
+void scene_spread(struct psr_instance *out, const struct scene_film *film, const struct psr_model *model, uint32_t n)
+{
+	const struct psr_model_info *info = psr_model_info(model);
+	const uint32_t across = (uint32_t)ceil(sqrt((double)n));
+	struct psr_camera camera;
+	double forward[3], right[3], down[3], place[3];
+
+	scene_film_camera(&camera, film, 0);
+	v3d_sub(forward, camera.target, camera.eye);
+	v3d_normalize(forward, forward);
+	v3d_cross(right, forward, camera.up);
+	v3d_normalize(right, right);
+	v3d_cross(down, forward, right);
+	for (uint32_t i = 0; i < n; i++) {
+		const double x = (2.0 * (i % across) + 1) / across - 1, y = (2.0 * (i / across) + 1) / across - 1;
+
+		out[i] = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1.0 / across };
+		for (int k = 0; k < 3; k++)
+			place[k] = (info->box_min[k] + info->box_max[k]) / 2;
+		v3d_add_scaled(place, place, x * info->scale, right);
+		v3d_add_scaled(place, place, y * info->scale, down);
+		for (int k = 0; k < 3; k++)
+			out[i].translation[k] = place[k] - out[i].scale * (info->box_min[k] + info->box_max[k]) / 2;
+	}
+}

@@ -49,4 +49,7 @@ void scene_film_camera(struct psr_camera *camera, const struct scene_film *film,
 void scene_film_frame(struct psr_scene *scene, const struct scene_film *film, int frame);
 #define SCENE_AMBIENT 0.15
 
+/* n instances of a model on a square grid in the plane of the film's first picture, in the room of the film's one. */
+void scene_spread(struct psr_instance *out, const struct scene_film *film, const struct psr_model *model, uint32_t n);
+
 #endif

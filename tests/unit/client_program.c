@@ -20,6 +20,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 #include "psr/proto.h"
+#include "psr/render.h"
 
 #define MAX_SIDE 64
 
@@ -64,9 +65,12 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 	struct psr_msg_frame_end end = { .is_final = 1,
 		                             .planes = asked->planes,
 		                             .error_px = 1.5,
-		                             .n_entries = 2,
+		                             .n_entries = 5,
 		                             .entry = { { PSR_WIRE_REPORT_WARP, 2000000, 77 },
-		                                        { PSR_WIRE_REPORT_TOTAL, 3000000, 2 } } };
+		                                        { PSR_WIRE_REPORT_TOTAL, 3000000, 2 },
+		                                        { PSR_WIRE_REPORT_EFFECTS + PSR_EFFECT_LEVELS, PSR_WHY_RAN, 3 },
+		                                        { PSR_WIRE_REPORT_EFFECTS + PSR_EFFECT_SPECULAR, PSR_WHY_NOTHING, 0 },
+		                                        { 127, 1, 0 } } };
 	uint8_t rgb[3 * MAX_SIDE * MAX_SIDE];
 	float depth[MAX_SIDE * MAX_SIDE];
 	uint8_t weight[MAX_SIDE * MAX_SIDE];
@@ -488,6 +492,27 @@ static void report_has_the_numbers_of_the_frame(void **state)
 	cJSON_Delete(report);
 }
 
+static void report_says_which_effects_ran_and_why_others_did_not(void **state)
+{
+	static char text[1 << 16];
+	cJSON *report, *effects;
+
+	(void)state;
+	assert_int_equal(psr("shot --model cube --size 20x10 --report r.json --effects"), 0);
+	assert_string_equal(out, "levels     ran: 3 depth buffers beside the picture's own\n"
+	                         "specular   left out: no sample in view is specular, or no light shines\n");
+	read_back("r.json", text, sizeof text);
+	report = cJSON_Parse(text);
+	effects = cJSON_GetObjectItem(report, "effects");
+	assert_int_equal(cJSON_GetArraySize(effects), 2);
+	assert_true(cJSON_IsTrue(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "levels"), "ran")));
+	assert_int_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "levels"), "count")->valueint, 3);
+	assert_true(cJSON_IsFalse(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "specular"), "ran")));
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "specular"), "why")->valuestring,
+	                    "no sample in view is specular, or no light shines");
+	cJSON_Delete(report);
+}
+
 static void failures_have_their_exit_status_and_leave_no_file(void **state)
 {
 	static const struct {
@@ -588,6 +613,7 @@ int main(void)
 		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
 		cmocka_unit_test(shot_writes_planes_and_paints_stages),
 		cmocka_unit_test(report_has_the_numbers_of_the_frame),
+		cmocka_unit_test(report_says_which_effects_ran_and_why_others_did_not),
 		cmocka_unit_test(failures_have_their_exit_status_and_leave_no_file),
 		cmocka_unit_test(bench_counts_frames_and_fails_if_one_failed),
 		cmocka_unit_test(help_and_version_work_without_a_server),

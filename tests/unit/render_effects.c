@@ -322,6 +322,30 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 	free(frame.rgb);
 }
 
+static void effects_have_the_protocols_numbers(void **state)
+{
+	(void)state;
+	char line[512];
+	unsigned n = 0;
+	FILE *file = fopen("proto/PROTOCOL.md", "r");
+	assert_non_null(file);
+	while (fgets(line, sizeof line, file))
+		if (strcmp(line, "| id | effect | count |\n") == 0)
+			break;
+	while (fgets(line, sizeof line, file) && line[0] == '|') {
+		unsigned id;
+		char name[32];
+		if (sscanf(line, "| %u | %31[a-z-]", &id, name) != 2)
+			continue;
+		assert_int_equal(id, 64 + n);
+		assert_string_equal(name, psr_effect_name((enum psr_effect)n));
+		assert_string_not_equal(psr_effect_counts((enum psr_effect)n), "?");
+		n++;
+	}
+	fclose(file);
+	assert_int_equal(n, PSR_N_EFFECTS);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -332,6 +356,7 @@ int main(void)
 		cmocka_unit_test(every_effect_says_why_it_was_left_out),
 		cmocka_unit_test(frames_do_not_depend_on_the_frame_before),
 		cmocka_unit_test(a_moving_camera_takes_no_more_memory),
+		cmocka_unit_test(effects_have_the_protocols_numbers),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }

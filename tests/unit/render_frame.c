@@ -496,6 +496,12 @@ static void the_door_refuses_what_is_out_of_range(void **state)
 	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
 	psr_settings_default(&settings, 100000, 100000);
 	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_LIMIT);
+	psr_settings_default(&settings, 10, 10);
+	settings.spacing = 0;
+	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
+	psr_settings_default(&settings, 10, 10);
+	settings.gap_method = (enum psr_gap_method)7;
+	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
 	psr_renderer_destroy(renderer);
 	psr_model_unref(model);
 }

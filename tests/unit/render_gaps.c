@@ -104,7 +104,9 @@ static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stac
 		if (!(stack->levels >> k & 1))
 			continue;
 		int32_t cover = coverage(plan, stack, x, y, k, z, covers);
-		if (k > 1 && (stack->levels >> (k - 1) & 1) && cover > 0 && cover < WEIGHT_ONE)
+		if (plan->opaque_cells)
+			cover = covers(plan, stack, k, (int32_t)(x >> k) + 1, (int32_t)(y >> k) + 1, z) ? WEIGHT_ONE : 0;
+		else if (k > 1 && (stack->levels >> (k - 1) & 1) && cover > 0 && cover < WEIGHT_ONE)
 			cover = coverage(plan, stack, x, y, k, z, covers_either);
 		most = cover > most ? cover : most;
 	}
@@ -165,14 +167,15 @@ static void strew(struct psr_zstack *stack, uint32_t strewn)
 					stack->level[k].z[i] = 80 + 0.01f * (float)draw(3000);
 }
 
-static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn, const struct simd *simd)
+static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn, int opaque_cells, const struct simd *simd)
 {
-	const struct plan plan = plan_of((int)draw(2));
+	struct plan plan = plan_of((int)draw(2));
 	struct psr_zstack stack = stack_make(width, height, levels);
 	const uint32_t bricks_x = (width + BRICK - 1) / BRICK, bricks_y = (height + BRICK - 1) / BRICK;
 	uint16_t *weight = malloc((size_t)width * height * 2);
 	uint8_t *bricks = malloc((size_t)bricks_x * bricks_y), *expected = calloc(bricks_x, bricks_y);
 	uint32_t n_partial = 0, n_marked = 0, n_pinholes = 0;
+	plan.opaque_cells = opaque_cells;
 	strew(&stack, strewn);
 	/* In two parts: rows do not see which call they are of. */
 	const uint32_t half = (bricks_y / 2) * BRICK;
@@ -199,19 +202,30 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 	stack_free(&stack);
 }
 
-static void weights_are_those_of_single_pixels(void **state)
+static void compare_all(int opaque_cells)
 {
 	static const uint32_t size[][2] = { { 1, 1 }, { 2, 1 }, { 1, 5 }, { 31, 33 }, { 128, 32 }, { 129, 65 }, { 300, 140 } };
-	(void)state;
 	for (int isa = 0; isa < PSR_N_ISAS; isa++) {
 		const struct simd *simd = simd_of((enum psr_isa)isa);
 		seed = 99;
 		for (size_t s = 0; simd && s < sizeof size / sizeof *size; s++) {
 			static const uint32_t levels[] = { 0, 2, 6, 0xc, 0x20, 0x8a, 0xfe, 0x80 };
 			for (size_t l = 0; l < sizeof levels / sizeof *levels; l++)
-				compare(size[s][0], size[s][1], levels[l], l % 2 ? 8 : 128, simd);
+				compare(size[s][0], size[s][1], levels[l], l % 2 ? 8 : 128, opaque_cells, simd);
 		}
 	}
+}
+
+static void weights_are_those_of_single_pixels(void **state)
+{
+	(void)state;
+	compare_all(0);
+}
+
+static void opaque_squares_cover_their_own_pixels_whole(void **state)
+{
+	(void)state;
+	compare_all(1);
 }
 
 /* ---- the guard ---- */
@@ -317,6 +331,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(weights_are_those_of_single_pixels),
+		cmocka_unit_test(opaque_squares_cover_their_own_pixels_whole),
 		cmocka_unit_test(a_pinhole_is_closed_before_background_and_before_a_surface),
 		cmocka_unit_test(one_of_eight_neighbors_may_be_another_pinhole),
 		cmocka_unit_test(slits_edges_and_corners_are_left_alone),

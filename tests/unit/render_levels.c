@@ -79,6 +79,8 @@ struct choice {
 	int n_drawn[GROUPS], level[GROUPS], depth_level[GROUPS];
 };
 
+static double asked_spacing = 1; /* of the settings */
+
 /* Culls a scene and takes apart which clusters each of its instances draws. */
 static void choose(const struct psr_scene *scene, uint32_t side, struct psr_pool *pool, struct choice *choice)
 {
@@ -89,6 +91,7 @@ static void choose(const struct psr_scene *scene, uint32_t side, struct psr_pool
 	uint32_t n_clusters = psr_model_blocks(model)->n_clusters;
 
 	psr_settings_default(&settings, side, side);
+	settings.spacing = asked_spacing;
 	assert_int_equal(plan_make(&plan, scene, &settings, NULL), PSR_OK);
 	assert_int_equal(cull_blocks(&bins, simd_get(), &plan, pool, &report), PSR_OK);
 	memset(choice, 0, scene->n_instances * sizeof *choice);
@@ -215,6 +218,36 @@ static void orthographic_pictures_choose_by_magnification_alone(void **state)
 	}
 }
 
+static void a_greater_spacing_chooses_as_a_smaller_picture_does(void **state)
+{
+	static const double spacing[] = { 1.0 / 64, 0.25, 0.5, 0.7, 1, 1.41, 2, 4, 64 };
+	struct psr_instance instance;
+	struct choice choice;
+
+	(void)state;
+	for (int l = 0; l < LEVELS; l++) {
+		struct psr_scene scene = scene_at(&instance, 3, 0);
+
+		scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
+		scene.camera.ortho_height = 256 * (double)SPACING * (1 << l);
+		for (size_t s = 0; s < sizeof spacing / sizeof spacing[0]; s++) {
+			asked_spacing = spacing[s];
+			choose(&scene, 256, NULL, &choice);
+			for (int g = 0; g < GROUPS; g++) {
+				const int group = GROUPS - 1 - g;
+
+				if (choice.n_drawn[group] == 0)
+					continue;
+				assert_int_equal(choice.level[group], expected_level(levels_of[g], 1024.0 / (1 << l) / spacing[s]));
+				/* Cells of the depth buffer are as large as the distance that was allowed. */
+				assert_int_equal(choice.depth_level[group], choice.level[group] > l ? choice.level[group] - l : 0);
+			}
+			assert_int_equal(choice.n_drawn[2], 1); /* the middle one is always in view */
+		}
+	}
+	asked_spacing = 1;
+}
+
 static void instances_choose_for_themselves_whatever_the_threads(void **state)
 {
 	struct psr_instance instance[3];
@@ -284,6 +317,7 @@ int main(void)
 		cmocka_unit_test(one_cluster_of_each_group_is_drawn_and_it_is_the_coarsest_that_fits_a_pixel),
 		cmocka_unit_test(a_group_never_gets_finer_with_distance),
 		cmocka_unit_test(orthographic_pictures_choose_by_magnification_alone),
+		cmocka_unit_test(a_greater_spacing_chooses_as_a_smaller_picture_does),
 		cmocka_unit_test(instances_choose_for_themselves_whatever_the_threads),
 		cmocka_unit_test(the_picture_has_samples_of_the_chosen_clusters_only),
 	};

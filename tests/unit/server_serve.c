@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <xxhash.h>
+#include "psr/render.h"
 #include "server_fixture.h"
 
 static char folder[PATH_MAX];
@@ -129,11 +130,16 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 21);
+	assert_int_equal(end.n_entries, 21 + PSR_N_EFFECTS);
 	for (int i = 0; i < 11; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
 	for (int i = 11; i < 21; i++)
 		assert_int_equal(end.entry[i].id, i - 11 + 32);
+	for (int i = 21; i < 21 + PSR_N_EFFECTS; i++) {
+		assert_int_equal(end.entry[i].id, i - 21 + PSR_WIRE_REPORT_EFFECTS);
+		assert_true(end.entry[i].ns == PSR_WHY_RAN || end.entry[i].count == 0);
+	}
+	assert_int_equal(end.entry[21 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
 	assert_int_equal(end.entry[9].count, 2);
 	assert_int_equal(end.entry[16].count, PLATE_SAMPLES);
 	peer_close(&p);
@@ -163,6 +169,29 @@ static void a_light_that_casts_shadows_gets_a_map(void **state)
 	}
 	peer_close(&p);
 	free(scene);
+}
+
+static void the_spacing_of_the_settings_is_kept_and_returned(void **state)
+{
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_frame_begin begin;
+	struct psr_message message;
+	char text[PSR_ERROR_TEXT];
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = 2.5 };
+	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
+	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
+	assert_true(begin.settings.scale == 1 && begin.settings.spacing_px == 2.5);
+	do
+		assert_true(peer_next(&p, &message));
+	while (message.type != PSR_MSG_FRAME_END);
+	frame.settings.scale = 2;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
+	assert_non_null(strstr(text, "scale 1"));
+	peer_close(&p);
 }
 
 static void many_frames_at_once_are_all_answered_alike(void **state)
@@ -521,6 +550,7 @@ int main(void)
 		cmocka_unit_test(raw_planes_have_the_hashes_of_the_end),
 		cmocka_unit_test(the_report_has_every_entry_in_order),
 		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
+		cmocka_unit_test(the_spacing_of_the_settings_is_kept_and_returned),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(ping_is_answered),

@@ -26,7 +26,8 @@ enum psr_cull_test {
 	PSR_CULL_ALL = 7
 };
 
-/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. */
+/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. The protocol has the numbers of
+ * effects and reasons, too. */
 enum psr_effect {
 	PSR_EFFECT_CONES,     /* count: blocks tested */
 	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
@@ -49,14 +50,25 @@ enum psr_why {
 	PSR_WHY_COST,    /* it would cost more than it saves, and changes nothing */
 };
 const char *psr_effect_name(enum psr_effect effect); /* "specular" */
+const char *psr_effect_counts(enum psr_effect effect); /* what its count counts: "pixels looked at for highlights" */
 /* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
+
+/* How cells of the depth buffers cover the pixels behind them ([G] 4.6). */
+enum psr_gap_method {
+	PSR_GAPS_BILINEAR, /* by the distance to the cells' centres */
+	PSR_GAPS_OPAQUE    /* whole, as opaque squares: the simplest, kept for comparison */
+};
 
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
 	int is_full;            /* 1: nothing is left out that could be; the same bytes, later. For proofs and benchmarks */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
+	enum psr_gap_method gap_method; /* bilinear by default */
+	/* The greatest distance between neighbouring samples that is good enough, in pixels: drawn is the coarsest level that
+	 * keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
+	double spacing;
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
 

@@ -65,7 +65,7 @@ enum psr_cap {
 	PSR_CAP_BASE = 1 << 2,         /* frames as changes to a base */
 	PSR_CAP_TIME_BUDGET = 1 << 3,
 	PSR_CAP_ERROR_BOUND = 1 << 4,
-	PSR_CAP_SETTINGS = 1 << 5,     /* settings other than scale 1, spacing_px 1 */
+	PSR_CAP_SETTINGS = 1 << 5,     /* settings of a scale other than 1 */
 	PSR_CAP_SHADOWS = 1 << 6,
 	PSR_CAP_DEPTH_U16 = 1 << 7,    /* depth formats U16 and U16_HALF */
 	PSR_CAP_NORMAL = 1 << 8,
@@ -446,6 +446,7 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_LIGHTS = 39,
 	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
 	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
+	PSR_WIRE_REPORT_EFFECTS = 64, /* and the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
 
