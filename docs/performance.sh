@@ -1,0 +1,25 @@
+#!/bin/bash
+# Runs the benchmarks of docs/performance.md (all of them, or those named) and puts their tables into it. Wants a machine
+# that does nothing else.
+set -eu
+cd "$(dirname "$0")/.."
+build=${BUILD:-build/release}
+page=docs/performance.md
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+[ $# -gt 0 ] || set -- dragon engine teapot table-8.2 figure-7.4 growth warp effects kernels
+for part; do
+	echo "bench $part" >&2
+	case $part in
+	effects) make --no-print-directory bench-effects ;;
+	kernels) make --no-print-directory bench-simd ;;
+	*) make --no-print-directory bench only="$part" ;;
+	esac 2>/dev/null | sed "/^make/d;/^Numbers in/d;/^ *$/{N;/^ *\n *$/D}" >"$work/table"
+	awk -v begin="<!-- bench $part -->" -v table="$work/table" '
+		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
+		inside && /^<!-- end -->$/ { inside = 0 }
+		!inside { print }
+	' $page >"$work/page"
+	cat "$work/page" >$page
+done
