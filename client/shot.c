@@ -24,7 +24,7 @@ struct shot {
 	double fov, ortho, ambient;
 	int has_fov, has_ortho, has_ambient, hash, effects;
 	uint8_t background[3];
-	int64_t timeout;
+	int64_t timeout, passes;
 	struct psr_msg_frame frame;
 	struct psr_msg_scene scene;
 };
@@ -100,6 +100,8 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  NULL },
 		{ "codec", 0, PSR_OPT_STRING, &shot->codec_text, "CODEC",
 		  "How colour travels: jpeg:Q (quality of 1 to 100), lossless, or raw.", 0, 0, NULL, NULL },
+		{ "passes", 0, PSR_OPT_INT, &shot->passes, "N",
+		  "Anti-aliasing: refine the picture in N passes, of 2x2, 4x4, ... sub-pixels a pixel; servers may stop earlier.", 0, 16, NULL, NULL },
 		{ "output", 'o', PSR_OPT_STRING, &shot->output, "FILE",
 		  "The picture; its ending is the format: .png, .ppm, or any that OpenImageIO writes.", 0, 0, NULL, NULL },
 		{ "plane", 0, PSR_OPT_STRING, &shot->plane_text, "PLANE",
@@ -209,6 +211,7 @@ static int prepare(struct shot *shot, struct psr_client *client, const struct ps
 		return code;
 	frame->width = shot->size[0];
 	frame->height = shot->size[1];
+	frame->pass_limit = (uint16_t)shot->passes;
 	frame->planes = shot->show != NULL ? show_planes(shot->show) : 1u << shot->plane;
 	if (shot->depth != NULL)
 		frame->planes |= 1 << PSR_WIRE_PLANE_DEPTH;
@@ -278,7 +281,9 @@ static int draw(struct shot *shot, struct psr_client *client, struct shot_facts 
 		code = psr_client_frame(client, &shot->frame, &id, err);
 	if (code != PSR_OK)
 		return code;
-	code = psr_client_wait(client, timeout_ms, &event, err);
+	do
+		code = psr_client_wait(client, timeout_ms, &event, err);
+	while (code > 0 && event.type == PSR_EVENT_FRAME && !event.end->is_final);
 	if (code < 0)
 		return code;
 	if (code == 0)

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "accuracy_passes.h"
 #include "json.h"
 #include "pfm.h"
 #include "ppm.h"
@@ -10,6 +11,7 @@
 #include "psr/cli.h"
 #include "psr/measure.h"
 #include "psr/mesh.h"
+#include "psr/render.h"
 
 #define PROGRAM "psr-model accuracy"
 #define RADIANS (3.14159265358979323846 / 180)
@@ -196,7 +198,10 @@ int cmd_accuracy(int argc, char **argv)
 	struct psr_color_accuracy color_accuracy;
 	struct psr_shadow_accuracy shadow_accuracy;
 	struct shadow_frames shadow = { .light = { .kind = PSR_LIGHT_DIRECTIONAL } };
-	const char *frame = NULL, *color = NULL;
+	const char *frame = NULL, *color = NULL, *model = NULL;
+	double magnification = 1;
+	int64_t n_passes = 0;
+	int seen_passes = 0;
 	double fov = 0, spacing = 0;
 	int sun = 0, lamp = 0, eye = 0, target = 0, up = 0, seen_fov = 0, seen_spacing = 0, seen_ortho = 0, json = 0, n_operands, code;
 	const struct psr_opt opts[] = {
@@ -233,12 +238,19 @@ int cmd_accuracy(int argc, char **argv)
 		{ .name = "max-outside", .type = PSR_OPT_INT, .value = &bounds.outside, .arg = "N",
 		  .help = "fail if more pixels are drawn over a pixel outside of the silhouette", .min = 0, .max = 1 << 26,
 		  .seen = &bounds.has_outside },
+		{ .name = "passes", .type = PSR_OPT_INT, .value = &n_passes, .arg = "N",
+		  .help = "instead of a frame: draw a still of the model in passes 0 to N, and compare each with the truth", .min = 0,
+		  .max = PSR_MAX_PASS, .seen = &seen_passes },
+		{ .name = "model", .type = PSR_OPT_STRING, .value = &model, .arg = "FILE.psr", .help = "the model, for --passes" },
+		{ .name = "magnification", .type = PSR_OPT_REAL, .value = &magnification, .arg = "M",
+		  .help = "pixels between its samples, for --passes", .min = 0.01, .max = 64 },
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object" },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
-		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]",
+		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]\n"
+		         "       psr-model accuracy SOURCE --model FILE.psr --passes N [--magnification M]",
 		.summary = "Compares the depth (and the colours) of a frame with the ray-traced mesh that its model was built from.",
 		.opts = opts,
 		.footer = "Exit codes: 0 ok, 1 a bound is broken, 2 usage, 3 file or system, 4 bad data, 5 over a limit.",
@@ -247,6 +259,13 @@ int cmd_accuracy(int argc, char **argv)
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
 		return 0;
+	if (code == PSR_OK && seen_passes) {
+		if (n_operands != 1 || model == NULL)
+			code = psr_fail(&err, PSR_ERR_ARG, "--passes needs one source file, and --model FILE.psr made from it");
+		else
+			code = accuracy_passes(argv[1], model, magnification, (unsigned)n_passes, &err);
+		return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
+	}
 	if (code == PSR_OK)
 		code = check_arguments(frame, n_operands, (eye != 0) | (target != 0) << 1 | (up != 0) << 2, seen_fov,
 		                       seen_ortho, seen_spacing, &err);

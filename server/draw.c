@@ -8,6 +8,7 @@
 
 struct draw_worker {
 	struct psr_renderer *renderer;
+	struct psr_refiner *refiner; /* NULL until a pass above 0 is drawn */
 	uint8_t *pixels; /* of all planes */
 	uint64_t capacity;
 };
@@ -27,6 +28,7 @@ void draw_worker_destroy(struct draw_worker *worker)
 {
 	if (worker == NULL)
 		return;
+	psr_refiner_destroy(worker->refiner);
 	psr_renderer_destroy(worker->renderer);
 	psr_free(worker->pixels);
 	free(worker);
@@ -34,7 +36,9 @@ void draw_worker_destroy(struct draw_worker *worker)
 
 uint64_t draw_worker_bytes(const struct draw_worker *worker)
 {
-	return psr_renderer_bytes(worker->renderer) + worker->capacity;
+	const uint64_t refiner = worker->refiner != NULL ? psr_refiner_bytes(worker->refiner) : 0;
+
+	return psr_renderer_bytes(worker->renderer) + refiner + worker->capacity;
 }
 
 static void make_camera(struct psr_camera *camera, const struct psr_msg_camera *wire)
@@ -93,7 +97,7 @@ static struct outq_chunk *encode_begin(const struct drawing *d, const struct cod
 {
 	const struct psr_msg_frame *request = &d->request;
 	const struct psr_msg_frame_begin begin = {
-		.width = request->width, .height = request->height, .planes = request->planes,
+		.pass = (uint16_t)d->pass, .width = request->width, .height = request->height, .planes = request->planes,
 		.color_codec = request->color_codec, .color_quality = request->color_quality,
 		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
 		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
@@ -193,22 +197,45 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	return PSR_OK;
 }
 
+unsigned draw_last_pass(const struct psr_msg_frame *request)
+{
+	return request->pass_limit < PSR_MAX_PASS ? request->pass_limit : PSR_MAX_PASS;
+}
+
+static int is_abandoned(void *userdata)
+{
+	struct drawing *d = userdata;
+
+	return atomic_load(&d->is_abandoned);
+}
+
+static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct psr_scene *scene, struct psr_frame *picture,
+                     struct psr_error *err)
+{
+	struct psr_settings settings;
+
+	psr_settings_default(&settings, d->request.width, d->request.height);
+	settings.spacing = spacing_of(&d->request);
+	if (d->pass == 0)
+		return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
+	if (worker->refiner == NULL && psr_refiner_create(&worker->refiner, worker->renderer) != PSR_OK)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
+	return psr_refine(worker->refiner, scene, &settings, d->pass, d->pool, is_abandoned, d, picture, err);
+}
+
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
 {
 	struct psr_scene scene = d->scene->scene;
-	struct psr_settings settings;
 	struct psr_frame picture = { 0 };
 	struct codec_result coded;
-	struct psr_msg_frame_end end = { .is_final = 1, .planes = d->request.planes };
+	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass, .planes = d->request.planes };
 	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
 	int code;
 
 	make_camera(&scene.camera, &d->request.camera);
-	psr_settings_default(&settings, d->request.width, d->request.height);
-	settings.spacing = spacing_of(&d->request);
 	code = reserve_pixels(worker, d, &picture, err);
 	if (code == PSR_OK)
-		code = psr_render(worker->renderer, &scene, &settings, d->pool, &picture, err);
+		code = draw_pass(d, worker, &scene, &picture, err);
 	if (code != PSR_OK)
 		return code;
 	if (atomic_load(&d->is_abandoned))

@@ -1,4 +1,4 @@
-/* One frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any thread. */
+/* One pass of a frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any thread. */
 #ifndef PSRD_DRAW_H
 #define PSRD_DRAW_H
 
@@ -22,12 +22,16 @@ struct drawing {
 	struct codec *codec;
 	uint32_t id;
 	struct psr_msg_frame request; /* checked */
+	unsigned pass, last_pass;
 	struct scene *scene;
-	uint64_t arrived_us;          /* loop_clock_us() when the request came */
+	uint64_t arrived_us;          /* loop_clock_us() when the request came, or the pass before was done */
 	uint64_t n_waiting;           /* frames that were waiting then */
 	atomic_int is_abandoned;      /* set from outside: nobody wants the answer any more */
 	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */
 };
+
+/* The last pass that a request gets. */
+unsigned draw_last_pass(const struct psr_msg_frame *request);
 
 /* CANCELLED if it was abandoned on the way; what the renderer and the encoder say. */
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);

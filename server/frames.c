@@ -111,6 +111,28 @@ static void take_out_running(struct conn *conn, struct frame *frame)
 	*at = frame->next;
 }
 
+static void add_turn(struct frames *frames, struct conn *conn)
+{
+	if (conn->has_turn)
+		return;
+	conn->has_turn = 1;
+	conn->next_turn = NULL;
+	*frames->last_turn = conn;
+	frames->last_turn = &conn->next_turn;
+}
+
+/* Behind what its connection has asked for before. */
+static void add_waiting(struct frames *frames, struct conn *conn, struct frame *frame)
+{
+	frame->drawing.arrived_us = loop_clock_us();
+	frame->drawing.n_waiting = frames->n_waiting;
+	frame->next = NULL;
+	*conn->last_waiting = frame;
+	conn->last_waiting = &frame->next;
+	frames->n_waiting++;
+	add_turn(frames, conn);
+}
+
 static void on_done(void *userdata)
 {
 	struct frame *frame = userdata;
@@ -127,24 +149,23 @@ static void on_done(void *userdata)
 			session_refuse(conn, frame->drawing.id, 0, frame->code, frame->error.text);
 		} else if (conn->state == CONN_OPEN) {
 			server->stats.frames++;
-			conn->session.n_open--;
 			outq_push(&conn->out, frame->drawing.answer, server->loop.now_us);
 			frame->drawing.answer = NULL;
+			if (frame->drawing.pass < frame->drawing.last_pass && !server->is_draining) {
+				frame->drawing.pass++;
+				add_waiting(server->frames, conn, frame);
+				frame = NULL;
+			} else if (frame->drawing.pass < frame->drawing.last_pass) {
+				session_refuse(conn, frame->drawing.id, 0, PSR_ERR_CANCELLED, "the server ends");
+			} else {
+				conn->session.n_open--;
+			}
 		}
 		conn_flush(conn);
 	}
-	destroy_frame(frame);
+	if (frame != NULL)
+		destroy_frame(frame);
 	frames_pump(server->frames);
-}
-
-static void add_turn(struct frames *frames, struct conn *conn)
-{
-	if (conn->has_turn)
-		return;
-	conn->has_turn = 1;
-	conn->next_turn = NULL;
-	*frames->last_turn = conn;
-	frames->last_turn = &conn->next_turn;
 }
 
 static struct conn *take_turn(struct frames *frames)
@@ -248,16 +269,12 @@ void frames_ask(struct frames *frames, struct conn *conn, uint32_t id, const str
 	frame->drawing.id = id;
 	frame->drawing.request = *request;
 	frame->drawing.scene = scene_ref(scene);
-	frame->drawing.arrived_us = loop_clock_us();
-	frame->drawing.n_waiting = frames->n_waiting;
+	frame->drawing.last_pass = draw_last_pass(request);
 	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
 		if (request->planes >> plane & 1)
 			frame->reserved += n * psr_plane_pixel_bytes(plane, request->depth_format);
 	frame->note = (struct loop_note){ .fn = on_done, .userdata = frame };
-	*conn->last_waiting = frame;
-	conn->last_waiting = &frame->next;
-	frames->n_waiting++;
-	add_turn(frames, conn);
+	add_waiting(frames, conn, frame);
 	frames_pump(frames);
 }
 

@@ -205,8 +205,8 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 	if (frame->planes & 1u << PSR_WIRE_PLANE_DEPTH && frame->depth_format != PSR_WIRE_DEPTH_F32)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server sends depth as f32 only (format 1), not as format %u",
 		                frame->depth_format);
-	if (frame->pass_limit > 0)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not refine: pass_limit takes 0, not %u",
+	if (frame->pass_limit > 0 && frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server refines colour and depth; other planes take pass_limit 0, not %u",
 		                frame->pass_limit);
 	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server keeps no %s; ask with budget 0",

@@ -5,10 +5,11 @@
 #include <xxhash.h>
 #include "internal.h"
 
-void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked)
+void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked, uint16_t pass)
 {
 	memset(assembly, 0, sizeof *assembly);
 	assembly->asked = *asked;
+	assembly->pass = pass;
 }
 
 void client_assembly_fini(struct client_assembly *assembly)
@@ -47,7 +48,7 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 
 	if (assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
-	if (begin->pass != 0 || begin->base != 0 || begin->width != asked->width || begin->height != asked->height
+	if (begin->pass != assembly->pass || begin->base != 0 || begin->width != asked->width || begin->height != asked->height
 	    || begin->planes != asked->planes || begin->color_codec != asked->color_codec
 	    || begin->color_quality != asked->color_quality || begin->depth_format != asked->depth_format
 	    || begin->depth_codec != asked->depth_codec || begin->data_codec != asked->data_codec)
@@ -169,7 +170,7 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 	if (!assembly->has_begun || assembly->open.total != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended a frame %s",
 		                assembly->has_begun ? "within a rectangle" : "that it had not begun");
-	if (end->pass != 0 || !end->is_final || end->planes != assembly->asked.planes)
+	if (end->pass != assembly->pass || (end->pass == assembly->asked.pass_limit && !end->is_final) || end->planes != assembly->asked.planes)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
 	*checked = 0;
 	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {

@@ -194,12 +194,15 @@ static int on_frame_end(struct psr_client *client, struct client_frame *frame, c
 
 	if (code == PSR_OK)
 		code = client_assembly_end(&frame->assembly, &client->end, &checked, &why);
-	if (code == PSR_ERR_FORMAT)
+	if (code == PSR_ERR_FORMAT && client->end.is_final)
 		return end_frame_failed(frame, event, &why);
 	if (code != PSR_OK)
 		return broke(client, &why);
 	client->done = frame->assembly;
-	memset(&frame->assembly, 0, sizeof frame->assembly);
+	if (client->end.is_final)
+		memset(&frame->assembly, 0, sizeof frame->assembly);
+	else
+		client_assembly_init(&frame->assembly, &client->done.asked, (uint16_t)(client->done.pass + 1));
 	event->type = PSR_EVENT_FRAME;
 	event->id = frame->id;
 	event->picture = &client->done.picture;
@@ -208,7 +211,9 @@ static int on_frame_end(struct psr_client *client, struct client_frame *frame, c
 	event->bytes = frame->bytes;
 	event->latency_ns = client_now_ns() - frame->sent_ns;
 	event->checked = checked;
-	frame->id = 0;
+	frame->bytes = 0;
+	if (client->end.is_final)
+		frame->id = 0;
 	return 1;
 }
 

@@ -45,13 +45,14 @@ struct client_assembly {
 	struct psr_msg_frame_begin begin;
 	struct psr_picture picture;
 	int has_begun;
+	uint16_t pass;        /* that must come */
 	unsigned lossy;       /* planes of which a rectangle came by JPEG or reduced */
 	uint8_t *pieces;      /* of the rectangle that is coming in pieces; grows with what has come */
 	size_t n_pieces, pieces_capacity;
 	struct psr_msg_rect open; /* that rectangle; total 0: none */
 };
 /* Takes over nothing; the picture and its pieces are freed by fini. Memory for pixels is taken at BEGIN. */
-void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked);
+void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked, uint16_t pass);
 void client_assembly_fini(struct client_assembly *assembly);
 int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg_frame_begin *begin,
                           struct psr_error *err);

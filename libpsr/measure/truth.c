@@ -66,7 +66,7 @@ void psr_truth_destroy(struct psr_truth *truth)
 }
 
 /* World to inner coordinates; t becomes z' / scale. */
-static void inner_ray(const struct psr_truth *truth, const struct view *view, double x, double y, struct ray *ray)
+void truth_ray(const struct psr_truth *truth, const struct view *view, double x, double y, struct ray *ray)
 {
 	view_ray(view, x, y, ray->origin, ray->direction);
 	for (int k = 0; k < 3; k++)
@@ -90,7 +90,7 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 
 	for (int j = 0; j < side; j++) {
 		for (int i = 0; i < side; i++)
-			inner_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
+			truth_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
 		ray_scene_trace(truth->scene, ray, side, near_z / truth->scale, hit);
 		for (int i = 0; i < side; i++)
 			if (hit[i].prim != RAY_NONE)
@@ -126,7 +126,7 @@ void truth_light(const struct psr_truth *truth, const struct view *view, double 
 	struct ray_hit hit[RUN];
 
 	for (int i = 0; i < n; i++)
-		inner_ray(truth, view, place[i][0], place[i][1], &ray[i]);
+		truth_ray(truth, view, place[i][0], place[i][1], &ray[i]);
 	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
 	for (int i = 0; i < n; i++) {
 		double point[3], to_light[3], length = 4, facing = 0, seen = 0;
@@ -152,6 +152,20 @@ void truth_light(const struct psr_truth *truth, const struct view *view, double 
 		out[i].facing = seen > 0 ? -facing : facing;
 		out[i].is_shadowed = out[i].facing > 0 && is_between(truth, point, to_light, length);
 	}
+}
+
+void truth_trace(const struct psr_truth *truth, const struct ray *ray, int n, double near_z, struct ray_hit *hit)
+{
+	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
+}
+
+uint64_t truth_attr(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit)
+{
+	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
+	double back[3];
+	v3d_normalize(back, ray->direction);
+	const float facing[3] = { (float)-back[0], (float)-back[1], (float)-back[2] };
+	return surface_attr(&truth->surface, &place, 0, facing);
 }
 
 static void put_normal(const struct job *job, const struct ray *ray, const struct ray_hit *hit, float normal[3])
@@ -186,7 +200,7 @@ static void draw_row(int row, void *userdata)
 		size_t at = (size_t)row * job->n_columns + first;
 
 		for (uint32_t i = 0; i < n; i++)
-			inner_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
+			truth_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
 		ray_scene_trace(job->truth->scene, ray, (int)n, job->near_z / job->truth->scale, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			int is_met = hit[i].prim != RAY_NONE;

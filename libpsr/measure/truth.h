@@ -2,6 +2,7 @@
 #ifndef PSR_MEASURE_TRUTH_H
 #define PSR_MEASURE_TRUTH_H
 
+#include "../sample/ray.h"
 #include "psr/measure.h"
 #include "view.h"
 
@@ -17,6 +18,12 @@ struct truth_light {
 };
 void truth_light(const struct psr_truth *truth, const struct view *view, double near_z, const struct psr_light *light,
                  const double (*place)[2], int n, struct truth_light *out);
+
+/* The ray through a place in the picture, in the mesh's inner coordinates; what rays meet from near_z on (world units); and the
+ * attributes of that place, unfiltered, as psr/model.h has them. */
+void truth_ray(const struct psr_truth *truth, const struct view *view, double x, double y, struct ray *ray);
+void truth_trace(const struct psr_truth *truth, const struct ray *ray, int n, double near_z, struct ray_hit *hit);
+uint64_t truth_attr(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit);
 
 /* Distance from a point of the world to the nearest point of the mesh, or `most` if that is less. */
 double truth_distance(const struct psr_truth *truth, const double point[3], double most);

@@ -25,7 +25,7 @@ struct cull_chunk {
 #define SCREEN_SIDE (1 << SCREEN_SPLITS)
 #define SCREEN_RANGES (SCREEN_SIDE * (SCREEN_SIDE + 1) / 2)
 struct screen_masks {
-	float scale[2]; /* regions a pixel */
+	float left, top, scale[2]; /* of the frame in the picture, pixels; regions a pixel */
 	uint64_t range[SCREEN_RANGES * SCREEN_RANGES][2];
 };
 
@@ -70,7 +70,7 @@ static int sphere_extent(const struct plan *plan, const float c[3], float r, flo
 		interval(c[0], r, z0, z1, &x0, &x1);
 		interval(c[1], r, z0, z1, &y0, &y1);
 	}
-	float half_w = (float)plan->width / 2, half_h = (float)plan->height / 2;
+	const float half_w = (float)plan->center[0], half_h = (float)plan->center[1];
 	guard += 2;
 	out->x0 = x0 * plan->focal + half_w - guard;
 	out->x1 = x1 * plan->focal + half_w + guard;
@@ -119,8 +119,10 @@ static void masks_make(struct screen_masks *masks, const struct plan *plan, cons
 		for (uint32_t node = node_of(0, 0); node < 2u << 2 * SCREEN_SPLITS; node++)
 			region[node][triangle >> 6] = UINT64_C(1) << (triangle & 63);
 	}
-	masks->scale[0] = (float)SCREEN_SIDE / (float)plan->width;
-	masks->scale[1] = (float)SCREEN_SIDE / (float)plan->height;
+	masks->left = (float)plan->window.left;
+	masks->top = (float)plan->window.top;
+	masks->scale[0] = (float)SCREEN_SIDE / (float)plan->window.picture_width;
+	masks->scale[1] = (float)SCREEN_SIDE / (float)plan->window.picture_height;
 	memset(masks->range, 0, sizeof masks->range);
 	for (uint32_t x1 = 0; x1 < SCREEN_SIDE; x1++)
 		for (uint32_t x0 = 0; x0 <= x1; x0++)
@@ -132,16 +134,16 @@ static void masks_make(struct screen_masks *masks, const struct plan *plan, cons
 								region[node_of(x0 + r % (x1 - x0 + 1), y0 + r / (x1 - x0 + 1))][w];
 }
 
-static inline uint32_t region_of(uint16_t pixel, float scale)
+static inline uint32_t region_of(float pixel, float scale)
 {
-	const uint32_t region = (uint32_t)((float)pixel * scale);
+	const uint32_t region = pixel > 0 ? (uint32_t)(pixel * scale) : 0;
 	return region < SCREEN_SIDE ? region : SCREEN_SIDE - 1;
 }
 
 static int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block, const struct cull_hit *hit)
 {
-	const uint32_t x = range_of(region_of(hit->x0, masks->scale[0]), region_of(hit->x1, masks->scale[0]));
-	const uint32_t y = range_of(region_of(hit->y0, masks->scale[1]), region_of(hit->y1, masks->scale[1]));
+	const uint32_t x = range_of(region_of(hit->x0 + masks->left, masks->scale[0]), region_of(hit->x1 + masks->left, masks->scale[0]));
+	const uint32_t y = range_of(region_of(hit->y0 + masks->top, masks->scale[1]), region_of(hit->y1 + masks->top, masks->scale[1]));
 	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[x * SCREEN_RANGES + y];
 	return !((own[0] & seen[0]) | (own[1] & seen[1]));
 }
@@ -387,7 +389,9 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 			depth_error = chunk->depth_error;
 	}
 	report->error_bound = 0.5 + (double)depth_error;
-	if (plan->is_full)
+	if (plan->with_splats)
+		report->levels &= 1;
+	else if (plan->is_full)
 		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
 	note_tests(plan, report, n_masked, n_mixed);
 	return PSR_OK;

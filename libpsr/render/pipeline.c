@@ -59,8 +59,10 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 {
 	settings->width = width;
 	settings->height = height;
+	settings->window = (struct psr_window){ 0, 0, 0, 0 };
 	settings->cull_tests = PSR_CULL_ALL;
 	settings->is_full = 0;
+	settings->with_splats = 0;
 	settings->gap_threshold = 3;
 	settings->gap_method = PSR_GAPS_BILINEAR;
 	settings->spacing = 1;
@@ -74,6 +76,12 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 	if (w > PSR_MAX_SIDE || h > PSR_MAX_SIDE || (uint64_t)w * h > PSR_MAX_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u is too large: at most %d a side and %u pixels", w, h,
 		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
+	const struct psr_window *window = &settings->window;
+	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE ||
+	    !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE || window->top < -PSR_MAX_SIDE ||
+	    window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
+		return psr_fail(err, PSR_ERR_ARG, "there is no window at (%d, %d) of a picture of %ux%u", (int)window->left,
+		                (int)window->top, window->picture_width, window->picture_height);
 	if (settings->cull_tests & ~(unsigned)PSR_CULL_ALL)
 		return psr_fail(err, PSR_ERR_ARG, "there are no tests %#x to cull by", settings->cull_tests);
 	if (!(settings->gap_threshold >= 0 && settings->gap_threshold <= 64))
@@ -240,7 +248,7 @@ static void warp_one(int tile, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	r->tile[tile] = (struct warp_counts){ 0, 0, 0 };
 	if (!is_empty || !r->is_clean[tile])
-		r->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
+		r->tile[tile] = (r->plan.with_splats ? splat_tile : warp_tile)(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 	r->is_clean[tile] = (uint8_t)is_empty;
 }
 

@@ -94,7 +94,7 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
                          const double center[3], const struct plan *plan, double focal)
 {
 	const double dx = projection->spacing, dy = dx * 0.86602540378443864676;
-	const double half[3] = { plan->width / 2.0, plan->height / 2.0, 0 };
+	const double half[3] = { plan->center[0], plan->center[1], 0 };
 	double column[4][3]; /* in camera space: a unit of projection space's x, y, z, and its origin */
 	for (int k = 0; k < 3; k++)
 		m3d_apply(column[k], (const double(*)[3])to_camera, (const double[3]){ projection->axis[k][0], projection->axis[k][1], projection->axis[k][2] });
@@ -120,7 +120,7 @@ static void sight_make(struct warp_instance *out, double turn[3][3], const struc
 		const double across = turn[0][k] / focal, down = turn[1][k] / focal, forward = turn[2][k];
 		out->du[k] = (float)(plan->perspective ? across : 0);
 		out->dv[k] = (float)(plan->perspective ? down : 0);
-		out->d0[k] = (float)(plan->perspective ? forward - across * plan->width / 2.0 - down * plan->height / 2.0 : forward);
+		out->d0[k] = (float)(plan->perspective ? forward - across * plan->center[0] - down * plan->center[1] : forward);
 	}
 }
 
@@ -135,6 +135,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.blocks = warp->blocks, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
 		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
+		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
 	};
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
@@ -234,6 +235,11 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->shadow = NULL;
 	plan->width = settings->width;
 	plan->height = settings->height;
+	plan->window = settings->window;
+	if (plan->window.picture_width == 0)
+		plan->window = (struct psr_window){ plan->width, plan->height, 0, 0 };
+	plan->center[0] = plan->window.picture_width / 2.0 - plan->window.left;
+	plan->center[1] = plan->window.picture_height / 2.0 - plan->window.top;
 	plan->tiles_x = (plan->width + TILE_WIDTH - 1) / TILE_WIDTH;
 	plan->tiles_y = (plan->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
@@ -242,6 +248,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
 	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
+	plan->with_splats = settings->with_splats;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 
@@ -249,11 +256,11 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	if (plan->perspective) {
 		double s, c;
 		psr_sincos(camera->fov_y / 2, &s, &c);
-		focal = plan->height / 2.0 * c / s;
-		plan->tangent[0] = plan->width / 2.0 / focal;
+		focal = plan->window.picture_height / 2.0 * c / s;
+		plan->tangent[0] = plan->window.picture_width / 2.0 / focal;
 		plan->tangent[1] = s / c;
 	} else {
-		focal = plan->height / (camera->ortho_height * view.scale);
+		focal = plan->window.picture_height / (camera->ortho_height * view.scale);
 	}
 	plan->focal = (float)focal;
 	plan->near_z = (float)(camera->near_z * view.scale);
@@ -272,7 +279,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 		instance_make(&plan->instance[i], &plan->warp[i], &scene->instance[i], plan, &view, focal);
 	plan->view = (struct strip_view){
 		.instance = plan->warp, .n_instances = plan->n_instances, .direction_word = psr_direction_words(),
-		.half_width = (float)(plan->width / 2.0), .half_height = (float)(plan->height / 2.0),
+		.half_width = (float)plan->center[0], .half_height = (float)plan->center[1],
 		.focal = plan->focal, .perspective = plan->perspective,
 	};
 	for (uint32_t l = 0; l < scene->n_lights; l++) {

@@ -22,7 +22,10 @@ struct plan_instance {
 
 struct plan {
 	uint32_t width, height, tiles_x, tiles_y;
+	struct psr_window window;  /* of the picture; that of the whole if the settings have none */
+	double center[2];          /* pixels from the frame's corner to where the view axis meets it */
 	int perspective;
+	int with_splats;
 	unsigned cull_tests;
 	int is_full;
 	int opaque_cells;          /* PSR_GAPS_OPAQUE */
@@ -117,6 +120,11 @@ struct warp_counts {
 /* Clears a tile and draws its blocks. */
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
                              uint32_t tile);
+
+/* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
+ * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */
+struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
+                              uint32_t tile);
 
 /* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 

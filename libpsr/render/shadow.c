@@ -64,7 +64,7 @@ static int can_cast(const struct psr_light *light)
 /* Whether a sphere of camera space may be in the picture. */
 static int in_view(const struct plan *plan, const float c[3], float r)
 {
-	const float half[2] = { (float)plan->width / 2, (float)plan->height / 2 };
+	const float half[2] = { (float)plan->window.picture_width / 2, (float)plan->window.picture_height / 2 };
 	if (!(c[2] + r > plan->near_z))
 		return 0;
 	for (int a = 0; a < 2; a++) {
@@ -135,7 +135,8 @@ static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
  * maps of the scene, in view or not. */
 static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 {
-	uint32_t side = plan->width > plan->height ? plan->width : plan->height;
+	const uint32_t w = plan->window.picture_width, h = plan->window.picture_height;
+	uint32_t side = w > h ? w : h;
 	side = side < 64 ? 64 : side > SHADOW_SIDE ? SHADOW_SIDE : side;
 	while ((uint64_t)n_maps * side * side > SHADOW_TEXELS)
 		side -= 16;

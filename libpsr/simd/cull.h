@@ -27,7 +27,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 	const int16_t *sphere_x = b->sphere_x + first, *sphere_y = b->sphere_y + first, *sphere_z = b->sphere_z + first;
 	const uint16_t *sphere_r = b->sphere_r + first;
 	const uint8_t *flags = b->flags + first;
-	const float half_width = v.width / 2, half_height = v.height / 2;
+	const float half_width = v.center_x, half_height = v.center_y;
 	const float most_x = v.width - 1, most_y = v.height - 1;
 	const int is_perspective = v.perspective;
 

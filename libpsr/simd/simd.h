@@ -28,6 +28,7 @@ struct cull_view {
 	int perspective;
 	int both_sides;       /* nothing is culled for how it faces: what casts shadows does so with its back, too */
 	float focal, near_z, width, height;
+	float center_x, center_y; /* pixels: where the view axis meets the picture */
 	int with_cones;
 };
 
@@ -135,7 +136,7 @@ struct strip_view {
 	uint32_t n_instances;
 	const uint64_t *direction_word;
 	const float (*lit)[4]; /* by normal: what strips without highlights get in the place of lights; NULL: no such table */
-	float half_width, half_height, focal; /* pixels */
+	float half_width, half_height, focal; /* pixels; the former to where the view axis meets the picture */
 	int perspective;
 	unsigned needs; /* enum strip_needs */
 };

@@ -18,6 +18,8 @@ static void random_view(struct check *c, struct cull_view *view, const struct ps
 	}
 	view->width = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
 	view->height = (float)(1 + check_below(c, check_one_in(c, 2) ? PSR_MAX_SIDE : 700));
+	view->center_x = check_plain_or_any(c, is_spoilt, 0, 700);
+	view->center_y = check_plain_or_any(c, is_spoilt, 0, 700);
 	view->with_cones = !check_one_in(c, 4);
 }
 

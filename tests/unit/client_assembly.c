@@ -72,7 +72,7 @@ static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 	asked->depth_format = PSR_WIRE_DEPTH_F32;
 	asked->depth_codec = PSR_CODEC_ZSTD;
 	asked->data_codec = wanted >> 2 ? PSR_CODEC_ZSTD : 0;
-	client_assembly_init(&trial->assembly, asked);
+	client_assembly_init(&trial->assembly, asked, 0);
 	begin.planes = asked->planes;
 	begin.color_codec = asked->color_codec;
 	begin.color_quality = asked->color_quality;
@@ -419,12 +419,12 @@ static void another_frame_than_asked_is_refused(void **state)
 	bad[5].base = 1;
 	bad[6].depth_format = PSR_WIRE_DEPTH_F32;
 	for (int i = 0; i < 7; i++) {
-		client_assembly_init(&assembly, &asked);
+		client_assembly_init(&assembly, &asked, 0);
 		assert_int_equal(client_assembly_begin(&assembly, &bad[i], NULL), PSR_ERR_PROTOCOL);
 		assert_null(assembly.picture.rgb);
 		client_assembly_fini(&assembly);
 	}
-	client_assembly_init(&assembly, &asked);
+	client_assembly_init(&assembly, &asked, 0);
 	assert_int_equal(
 		client_assembly_end(&assembly, &(struct psr_msg_frame_end){ .is_final = 1, .planes = 1 }, &checked, NULL),
 		PSR_ERR_PROTOCOL);

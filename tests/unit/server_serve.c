@@ -38,7 +38,7 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
+	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
 	                                       PSR_CAP_WORDS | PSR_CAP_BLOCK);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
@@ -391,10 +391,6 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	(void)state;
 	assert_non_null(scene);
 	peer_begin(&p, &psrd, "plate");
-	frame.pass_limit = 1;
-	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "refine"));
-	frame = frame_default(64, 64);
 	frame.color_codec = PSR_CODEC_PNG;
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "PNG"));

@@ -68,6 +68,15 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_trut
                                 const struct psr_light *light, uint32_t width, uint32_t height, const uint8_t *shadowed,
                                 const uint8_t *lit, int n_threads, struct psr_error *err);
 
+/* What a still of the mesh at the world's origin must show ([G] 9.1.1): the mean of side x side rays a pixel in linear light, each
+ * lit by ambient and Phong without shadows, over the scene's background; the scene's instances are not looked at. rgb: sRGB, 3 bytes a
+ * pixel; covered: 1 where a ray meets the mesh. side: 1..32. UNSUPPORTED unless all lights are directional. */
+int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint32_t width, uint32_t height, uint32_t side,
+                    int n_threads, uint8_t *rgb, uint8_t *covered, struct psr_error *err);
+
+/* Peak signal to noise of the covered pixels, in dB, by their sRGB codes; +inf if they are the same. */
+double psr_still_psnr(const uint8_t *rgb, const uint8_t *truth, const uint8_t *covered, uint64_t n_pixels);
+
 #ifdef __cplusplus
 }
 #endif

@@ -60,10 +60,21 @@ enum psr_gap_method {
 	PSR_GAPS_OPAQUE    /* whole, as opaque squares: the simplest, kept for comparison */
 };
 
+/* A part of a larger picture: pixel (0, 0) of the frame is (left, top) there. It may reach beyond the picture, and shows what a
+ * larger one would. */
+struct psr_window {
+	uint32_t picture_width, picture_height; /* up to PSR_MAX_PICTURE_SIDE; 0: the frame is the whole picture */
+	int32_t left, top;                      /* -PSR_MAX_SIDE..PSR_MAX_PICTURE_SIDE */
+};
+#define PSR_MAX_PICTURE_SIDE (1 << 20)
+
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
+	struct psr_window window;
 	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
 	int is_full;            /* 1: nothing is left out that could be; the same bytes, later. For proofs and benchmarks */
+	int with_splats;        /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on the
+	                         * surface that close the gaps themselves: for pixels finer than samples */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 	enum psr_gap_method gap_method; /* bilinear by default */
 	/* The greatest distance between neighbouring samples that is good enough, in pixels: drawn is the coarsest level that
@@ -158,6 +169,31 @@ struct psr_zstack {
 int psr_warp(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
              struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err);
 int psr_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+               struct psr_error *err);
+
+/* ---- refinement ([G] 9.1.1): the anti-aliased still of a camera that rests ---- */
+
+#define PSR_MAX_PASS 4
+
+/* Draws passes with a renderer of the caller's, which must outlive it. */
+struct psr_refiner;
+int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer);
+void psr_refiner_destroy(struct psr_refiner *refiner); /* NULL is fine */
+uint64_t psr_refiner_bytes(const struct psr_refiner *refiner); /* without the renderer's; independent of the picture's size */
+
+/* Asked between the windows of a pass; anything but 0 ends it. */
+typedef int psr_refine_cancelled_fn(void *userdata);
+
+/* Pass 0 is the frame of psr_render. Pass p draws the picture with 2^p x 2^p sub-pixels a pixel, for which blocks choose
+ * levels and depth buffers, so that samples no longer fill whole pixels, and gives each pixel the mean of its sub-pixels'
+ * light and the least of their depths. The finer picture is drawn in windows, so that memory does not grow with the pass.
+ *
+ * A pass is a function of scene, settings and p alone. settings->window must be that of a whole picture. Times and
+ * counts are of all windows together: they count sub-pixels, and blocks and samples once in every window that draws them.
+ * is_cancelled may be NULL. ARG or LIMIT for what the door refuses, MEMORY, CANCELLED; UNSUPPORTED for planes other than colour and
+ * depth in passes above 0. */
+int psr_refine(struct psr_refiner *refiner, const struct psr_scene *scene, const struct psr_settings *settings, unsigned pass,
+               struct psr_pool *pool, psr_refine_cancelled_fn *is_cancelled, void *userdata, struct psr_frame *frame,
                struct psr_error *err);
 
 #ifdef __cplusplus
