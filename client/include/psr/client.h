@@ -67,8 +67,8 @@ int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stat
 int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scene, uint32_t *id,
                      struct psr_error *err);
 
-/* Queues a FRAME in view 0: planes that the server offers, depth as f32, without budget, refinement or base (else
- * UNSUPPORTED). BUSY when WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME or FAILED. */
+/* Queues a FRAME in view 0: planes that the server offers, depth as f32, without refinement, base, or budget of time or
+ * error (else UNSUPPORTED). BUSY when WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME or FAILED. */
 int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *frame, uint32_t *id,
                      struct psr_error *err);
 
