@@ -12,7 +12,8 @@
 #define SIDE 1024
 #define N_FRAMES 24
 #define MOST_LIGHTS 16
-#define MOST_INSTANCES 64
+#define MOST_INSTANCES 64 /* 8 x 8 */
+#define MIDDLE (3 * 8 + 3)
 
 enum kind { PLAIN, SHINY, TWO_SIDED, LEVEL_1, LEVEL_2, N_KINDS };
 enum shadow { NO_SHADOW, KEPT_SHADOW, NEW_SHADOW };
@@ -144,7 +145,18 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 	stage->film = *film;
 	stage->film.zoom *= look->zoom > 0 ? look->zoom : 1;
 	stage->film.model = stage->model = model[look->kind];
-	scene_spread(stage->instance, &stage->film, stage->model, look->n_small > 0 ? MOST_INSTANCES : 1);
+	if (look->n_small > 0) { /* all of the room is in the picture, and the first are in its middle */
+		struct psr_instance grid[MOST_INSTANCES];
+
+		stage->film.zoom = 1;
+		memset(stage->film.aim, 0, sizeof stage->film.aim);
+		scene_spread(grid, &stage->film, stage->model, MOST_INSTANCES);
+		for (int i = 0; i < MOST_INSTANCES; i++)
+			stage->instance[i] = grid[(i + MIDDLE) % MOST_INSTANCES];
+	} else {
+		stage->instance[0] = stage->film.instance;
+		stage->instance[0].model = stage->model;
+	}
 	set_lights(stage, film);
 	psr_settings_default(&side->settings, SIDE, SIDE);
 	side->settings.cull_tests &= ~look->without_tests;
