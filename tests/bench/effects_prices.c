@@ -239,7 +239,7 @@ static void plot(const struct effects *effects)
 	const int n = cJSON_GetArraySize(array);
 
 	fprintf(file, "set terminal pngcairo size 900,%d background 'white'\nset output '%s/effects.png'\n"
-	        "set title 'What effects cost: the %s at %dx%d, half covered, 1 thread'\nset xlabel 'ms more than without'\n"
+	        "set title 'the %s at %dx%d, 1 thread'\nset xlabel 'ms more than without'\n"
 	        "set xrange [%d:%d]\nset yrange [%d:-1]\nset grid xtics\nset style fill solid 0.8\nunset key\nset ytics (",
 	        120 + 20 * n, effects->out, effects->name, SIDE, SIDE, LEAST_BAR, MOST_BAR, n);
 	cJSON_ArrayForEach(item, array) {
