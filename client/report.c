@@ -115,6 +115,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	add_model(report, facts);
 	cJSON_AddItemToObject(report, "size", cJSON_CreateDoubleArray(size, 2));
 	add_camera(report, &event->begin->camera);
+	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
 	cJSON_AddStringToObject(report, "codec", facts->codec);
 	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
 	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);

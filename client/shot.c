@@ -21,7 +21,7 @@ struct shot {
 	uint32_t size[2];
 	struct psr_camera_wish camera;
 	struct preset_wish preset;
-	double fov, ortho, ambient;
+	double fov, ortho, ambient, spacing;
 	int has_fov, has_ortho, has_ambient, hash, effects;
 	uint8_t background[3];
 	int64_t timeout, passes;
@@ -98,6 +98,9 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  &shot->has_ambient },
 		{ "background", 0, PSR_OPT_COLOR, shot->background, "#rrggbb", "The colour where nothing is.", 0, 0, NULL,
 		  NULL },
+		{ "spacing", 0, PSR_OPT_REAL, &shot->spacing, "PX",
+		  "The greatest distance between neighbouring samples that is good enough, pixels: less is finer and slower.", 0, 0,
+		  NULL, NULL },
 		{ "codec", 0, PSR_OPT_STRING, &shot->codec_text, "CODEC",
 		  "How colour travels: jpeg:Q (quality of 1 to 100), lossless, or raw.", 0, 0, NULL, NULL },
 		{ "passes", 0, PSR_OPT_INT, &shot->passes, "N",
@@ -186,6 +189,8 @@ static int check(struct shot *shot, struct psr_error *err)
 		if (fabs(shot->camera.eye[i]) > PSR_WIRE_MAX_LENGTH || fabs(shot->camera.target[i]) > PSR_WIRE_MAX_LENGTH
 		    || fabs(shot->camera.up[i]) > PSR_WIRE_MAX_LENGTH)
 			return psr_fail(err, PSR_ERR_ARG, "--eye, --target, --up: coordinates are at most 1e30");
+	if (!(shot->spacing >= 1.0 / 64 && shot->spacing <= 64))
+		return psr_fail(err, PSR_ERR_ARG, "--spacing: %g is out of range; it takes 1/64 to 64 pixels", shot->spacing);
 	if (psr_codec_parse(&shot->frame.color_codec, &shot->frame.color_quality, shot->codec_text, err) != PSR_OK)
 		return PSR_ERR_ARG;
 	code = check_output(shot, err);
@@ -209,6 +214,10 @@ static int prepare(struct shot *shot, struct psr_client *client, const struct ps
 		code = preset_apply(&shot->preset, client, opened->handle, &frame->camera, scene, (int)shot->timeout * 1000, err);
 	if (code != PSR_OK)
 		return code;
+	if (shot->spacing != 1) {
+		frame->budget = PSR_WIRE_BUDGET_SETTINGS;
+		frame->settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = shot->spacing };
+	}
 	frame->width = shot->size[0];
 	frame->height = shot->size[1];
 	frame->pass_limit = (uint16_t)shot->passes;
@@ -319,6 +328,7 @@ int psr_shot_main(int argc, char **argv)
 		shot->camera.eye[i] = shot->camera.target[i] = shot->camera.up[i] = NAN; /* so that --help shows no default */
 	shot->fov = 35;
 	shot->ortho = NAN;
+	shot->spacing = 1;
 	shot->ambient = DEFAULT_AMBIENT;
 	memcpy(shot->background, "\x20\x24\x28", 3);
 	shot->timeout = PSR_DEFAULT_TIMEOUT;

@@ -12,7 +12,8 @@
 #define SIDE 1024
 #define N_FRAMES 24
 #define MOST_LIGHTS 16
-#define MOST_INSTANCES 64
+#define MOST_INSTANCES 64 /* 8 x 8 */
+#define MIDDLE (3 * 8 + 3)
 
 enum kind { PLAIN, SHINY, TWO_SIDED, LEVEL_1, LEVEL_2, N_KINDS };
 enum shadow { NO_SHADOW, KEPT_SHADOW, NEW_SHADOW };
@@ -144,7 +145,18 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 	stage->film = *film;
 	stage->film.zoom *= look->zoom > 0 ? look->zoom : 1;
 	stage->film.model = stage->model = model[look->kind];
-	scene_spread(stage->instance, &stage->film, stage->model, look->n_small > 0 ? MOST_INSTANCES : 1);
+	if (look->n_small > 0) { /* all of the room is in the picture, and the first are in its middle */
+		struct psr_instance grid[MOST_INSTANCES];
+
+		stage->film.zoom = 1;
+		memset(stage->film.aim, 0, sizeof stage->film.aim);
+		scene_spread(grid, &stage->film, stage->model, MOST_INSTANCES);
+		for (int i = 0; i < MOST_INSTANCES; i++)
+			stage->instance[i] = grid[(i + MIDDLE) % MOST_INSTANCES];
+	} else {
+		stage->instance[0] = stage->film.instance;
+		stage->instance[0].model = stage->model;
+	}
 	set_lights(stage, film);
 	psr_settings_default(&side->settings, SIDE, SIDE);
 	side->settings.cull_tests &= ~look->without_tests;
@@ -202,6 +214,15 @@ static void print_head(const struct effects *effects, const struct scene_film *f
 	puts("");
 }
 
+static const char *text_of(const cJSON *item, const char *name)
+{
+	return cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, name));
+}
+
+/* Bars, of which those beyond the ends are cut; numbers beside them are whole. */
+#define LEAST_BAR (-10)
+#define MOST_BAR 34
+
 static void plot(const struct effects *effects)
 {
 	char path[4096];
@@ -209,21 +230,32 @@ static void plot(const struct effects *effects)
 	const cJSON *array = report_array("effects"), *item;
 	struct child_use use;
 	FILE *file;
+	int at = 0;
 
 	snprintf(path, sizeof path, "%s/effects.gnuplot", effects->out);
 	file = fopen(path, "w");
 	if (file == NULL)
 		report_die(path, "cannot be written");
-	fprintf(file, "set terminal pngcairo size 1000,700 background 'white'\nset output '%s/effects.png'\n"
-	        "set title 'What effects cost: the %s at %dx%d, half covered'\nset ylabel 'ms more than without'\n"
-	        "set style data histograms\nset style fill solid 0.8\nset boxwidth 0.9\nset grid ytics\nset xtics rotate by -50\n"
-	        "set key top left\nset rmargin 16\nplot '-' using 2:xtic(1) title '1 thread', '-' using 2 title '%d threads'\n",
-	        effects->out, effects->name, SIDE, SIDE, effects->n_threads);
-	for (int all = 0; all < 2; all++) {
-		cJSON_ArrayForEach(item, array)
-			fprintf(file, "\"%s: %s\" %.4f\n", cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, "group")),
-			        cJSON_GetStringValue(cJSON_GetObjectItemCaseSensitive(item, "effect")),
-			        cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(item, all ? "more_all" : "more_one")));
+	const int n = cJSON_GetArraySize(array);
+
+	fprintf(file, "set terminal pngcairo size 900,%d background 'white'\nset output '%s/effects.png'\n"
+	        "set title 'the %s at %dx%d, 1 thread'\nset xlabel 'ms more than without'\n"
+	        "set xrange [%d:%d]\nset yrange [%d:-1]\nset grid xtics\nset style fill solid 0.8\nunset key\nset ytics (",
+	        120 + 20 * n, effects->out, effects->name, SIDE, SIDE, LEAST_BAR, MOST_BAR, n);
+	cJSON_ArrayForEach(item, array) {
+		fprintf(file, "%s\"%s: %s\" %d", at > 0 ? ", " : "", text_of(item, "group"), text_of(item, "effect"), at);
+		at++;
+	}
+	fputs(")\nplot '-' using ($1/2):2:($1/2):(0.4) with boxxyerror linecolor rgb '#4070a0', "
+	      "'-' using ($1):2:3 with labels left offset 0.5,0\n", file);
+	for (int labels = 0; labels < 2; labels++) {
+		at = 0;
+		cJSON_ArrayForEach(item, array) {
+			const double more = cJSON_GetNumberValue(cJSON_GetObjectItemCaseSensitive(item, "more_one"));
+			const double shown = fmin(fmax(more, LEAST_BAR), MOST_BAR - 4);
+
+			fprintf(file, "%.4f %d %+.2f\n", labels ? fmax(shown, 0) : shown, at++, more);
+		}
 		fputs("e\n", file);
 	}
 	if (fclose(file) != 0)

@@ -136,7 +136,7 @@ void effects_spacing(const struct effects *effects)
 	struct drawn finest, drawn;
 	struct psr_settings settings;
 
-	film_make(&truth.film, effects->model, 0.3);
+	film_make(&truth.film, effects->model, 0.26);
 	truth_make(&truth, effects->source, effects->n_threads);
 	psr_settings_default(&settings, SIDE, SIDE);
 	const struct price_side usual = { .settings = settings, .scene = scene, .userdata = &truth.film };

@@ -72,6 +72,7 @@ done
 for height in 0 -1 nan 1e99; do
 	refuses "--ortho $height" 2 "--ortho: " shot --ortho $height --hash
 done
+refuses "a spacing of nothing" 2 "--spacing: 0 is out of range" shot --spacing 0 --hash
 refuses "both kinds of camera" 2 "--fov and --ortho exclude" shot --fov 30 --ortho 1 --hash
 for pixels in 0x0 0x100 100x0 -1x5 12 axb 10x10x10 99999999999x2 ''; do
 	refuses "--size '$pixels'" 2 "--size: .*$pixels" shot --size "$pixels" --hash
