@@ -21,7 +21,7 @@ static int run(struct figures *figures, const char *name, const char *file, cons
 	rc = figure_compare(figures, &sheet, &model, look, way, n_ways);
 	if (rc == PSR_OK)
 		rc = figure_sheet_write(&sheet, figures, file);
-	figure_sheet_fini(&sheet);
+	figure_sheet_drop(&sheet, 0);
 	figure_model_fini(&model);
 	return rc;
 }

@@ -111,7 +111,8 @@ void figure_frame_fini(struct figure_frame *frame)
 
 static int draw(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot, int has_gaps)
 {
-	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth };
+	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth,
+		                    .weight = frame->weight };
 	struct psr_zstack *stack;
 	int rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &to.report, figures->err);
 

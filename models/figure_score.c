@@ -43,6 +43,13 @@ static void add_pixel(struct figure_score *score, const struct figure_frame *fra
 	}
 }
 
+void figure_score_colors(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth)
+{
+	for (uint32_t y = 0; y < truth->height; y++)
+		for (uint32_t x = 0; x < truth->width; x++)
+			add_pixel(score, frame, truth, x, y);
+}
+
 int figure_score_add(struct figure_score *score, struct figures *figures, const struct figure_model *model,
                      const struct figure_shot *shot, const struct figure_frame *frame, const struct figure_truth *truth)
 {
@@ -54,9 +61,7 @@ int figure_score_add(struct figure_score *score, struct figures *figures, const 
 		return rc;
 	score->n_holes += accuracy.n_holes;
 	score->n_outside += accuracy.n_outside_drawn;
-	for (uint32_t y = 0; y < truth->height; y++)
-		for (uint32_t x = 0; x < truth->width; x++)
-			add_pixel(score, frame, truth, x, y);
+	figure_score_colors(score, frame, truth);
 	return PSR_OK;
 }
 

@@ -49,7 +49,7 @@ int figure_run_set(struct figures *figures)
 		rc = show_one(figures, &sheet, generators[i].name);
 	if (rc == PSR_OK)
 		rc = figure_sheet_write(&sheet, figures, "set");
-	figure_sheet_fini(&sheet);
+	figure_sheet_drop(&sheet, 0);
 	return rc;
 }
 
@@ -115,7 +115,7 @@ static int run(struct figures *figures, const char *const *name, const struct fi
 	}
 	if (rc == PSR_OK)
 		rc = figure_sheet_write(&sheet, figures, file);
-	figure_sheet_fini(&sheet);
+	figure_sheet_drop(&sheet, 0);
 	return rc;
 }
 

@@ -28,11 +28,10 @@ int figure_sheet_add(struct figure_sheet *sheet, const uint8_t *rgb, uint32_t st
 	return PSR_OK;
 }
 
-void figure_sheet_fini(struct figure_sheet *sheet)
+void figure_sheet_drop(struct figure_sheet *sheet, uint32_t n_cells)
 {
-	for (uint32_t i = 0; i < sheet->n_cells; i++)
-		free(sheet->cell[i]);
-	sheet->n_cells = 0;
+	while (sheet->n_cells > n_cells)
+		free(sheet->cell[--sheet->n_cells]);
 }
 
 static void paste(uint8_t *to, const png_image *image, const struct figure_sheet *sheet, uint32_t i)
@@ -66,7 +65,7 @@ int figure_sheet_write(struct figure_sheet *sheet, const struct figures *figures
 			rc = psr_fail(figures->err, PSR_ERR_IO, "%.200s cannot be written: %s", path, image.message);
 	}
 	free(rgb);
-	figure_sheet_fini(sheet);
+	figure_sheet_drop(sheet, 0);
 	return rc;
 }
 
@@ -79,27 +78,34 @@ static int largest(const uint8_t *a, const uint8_t *b)
 	return most;
 }
 
-void figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth)
+static uint64_t gain_at(const uint8_t *a, const uint8_t *b, const uint8_t *right)
 {
-	uint32_t most = 0;
+	const int gain = largest(a, right) - largest(b, right);
+
+	return gain > UNLIKE ? (uint64_t)(gain * gain) : 0;
+}
+
+uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth)
+{
+	uint64_t most = 0;
 
 	part->x = part->y = 0;
 	for (uint32_t top = 0; top + part->height <= truth->height; top += STEP)
 		for (uint32_t left = 0; left + part->width <= truth->width; left += STEP) {
-			uint32_t n = 0;
+			uint64_t gain = 0;
 
 			for (uint32_t y = top; y < top + part->height; y++)
 				for (uint32_t x = left; x < left + part->width; x++) {
 					const size_t at = (size_t)y * truth->width + x;
-					const uint8_t *right = truth->rgb + 3 * at;
 
 					if (truth->n_met[at] == truth->side * truth->side)
-						n += largest(a + 3 * at, right) > largest(b + 3 * at, right) + UNLIKE;
+						gain += gain_at(a + 3 * at, b + 3 * at, truth->rgb + 3 * at);
 				}
-			if (n > most) {
-				most = n;
+			if (gain > most) {
+				most = gain;
 				part->x = left;
 				part->y = top;
 			}
 		}
+	return most;
 }

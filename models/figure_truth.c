@@ -106,7 +106,7 @@ static void light_place(const struct job *job, const struct place *place, int is
 
 		if (!(facing > 0 && amount > 0))
 			continue;
-		if (FIGURE_CASTS_SHADOW(&scene->light[l])
+		if (scene->light[l].casts_shadow
 		    && (v3d_dot(place->face, to_light) <= 0 || is_shadowed(job->model, place, to_light, distance)))
 			continue;
 		const double shine = pow(fmin(fmax(mirror, 0), 1), place->exponent);

@@ -12,10 +12,10 @@
 #define WORST 8
 #define SHOWN 8           /* times a difference is magnified in the picture */
 
-enum { MAGNIFICATION, PSNR, SAMPLES, DRAWN, OURS, TRUTH, BEYOND, N_COLUMNS };
+enum { MAGNIFICATION, PSNR, INSIDE, SAMPLES, DRAWN, OURS, TRUTH, BEYOND, N_COLUMNS };
 
 static const struct study_column columns[N_COLUMNS] = {
-	{ "magnification", "magnification", 4 }, { "PSNR dB", "psnr", 2 }, { "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
+	{ "magnification", "magnification", 4 }, { "PSNR dB", "psnr", 2 }, { "inside", "inside", 2 }, { "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
 	{ "change", "ours", 2 }, { "truth's", "truth", 2 }, { "beyond", "beyond", 2 },
 };
 
@@ -23,12 +23,13 @@ static const struct study_column columns[N_COLUMNS] = {
 static const struct study_kind kind = {
 	.name = "zoom",
 	.plot = "set multiplot layout 3,1\nset logscale x 2\nset xrange [4:0.0625]\nset grid\nset lmargin 9\nset style data lines\n"
-	        "set format x ''\nset ylabel 'dB'\nset key bottom left\nplot $table using 3:4 title 'PSNR of covered pixels' lw 2\n"
+	        "set format x ''\nset ylabel 'dB'\nset key bottom left\nplot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
+	        "'' using 3:5 title 'of those inside' lw 2\n"
 	        "set ylabel 'samples'\nset key top left\nset yrange [0:*]\n"
-	        "plot $table using 3:5 title 'warped a covered pixel' lw 2\n"
+	        "plot $table using 3:6 title 'warped a covered pixel' lw 2\n"
 	        "set format x '%g'\nset xlabel 'magnification'\nset ylabel 'codes'\n"
-	        "plot $table using 3:7 title 'change from frame to frame' lw 2, '' using 3:8 title 'of the truth' lw 2, "
-	        "'' using 3:9 title 'beyond it' lw 2\nunset multiplot\n",
+	        "plot $table using 3:8 title 'change from frame to frame' lw 2, '' using 3:9 title 'of the truth' lw 2, "
+	        "'' using 3:10 title 'beyond it' lw 2\nunset multiplot\n",
 };
 
 struct zoom {
@@ -85,18 +86,13 @@ static int draw_frame(struct figures *figures, struct zoom *zoom, int i, int to)
 
 static void score_frame(double *row, const struct zoom *zoom, int i)
 {
-	uint64_t square = 0, n = 0;
+	struct figure_score score = { .n_met = 0 };
 	const struct psr_report *report = &zoom->frame[1].report;
 
-	for (size_t at = 0; at < (size_t)SIDE * SIDE; at++)
-		for (size_t c = 3 * at; zoom->truth[1].n_met[at] && c < 3 * at + 3; c++) {
-			const int d = zoom->frame[1].rgb[c] - zoom->truth[1].rgb[c];
-
-			square += (uint64_t)(d * d);
-			n += c == 3 * at;
-		}
+	figure_score_colors(&score, &zoom->frame[1], &zoom->truth[1]);
 	row[MAGNIFICATION] = magnification_of(i);
-	row[PSNR] = figure_psnr(square, n);
+	row[PSNR] = figure_psnr(score.square, score.n_met);
+	row[INSIDE] = figure_psnr(score.inside_square, score.n_inside);
 	row[SAMPLES] = (double)report->count[PSR_STAGE_WARP] / (double)report->n_covered;
 	row[DRAWN] = (double)report->n_samples_drawn;
 }
@@ -154,7 +150,7 @@ static void print(const struct study_table *table, const int order[FRAMES])
 	double sum[2] = { 0, 0 };
 	int n[2] = { 0, 0 };
 
-	printf("%-6s %13s %8s %14s %8s %8s %8s %8s\n", "frame", "magnification", "PSNR dB", "samples/pixel", "change", "truth's",
+	printf("%-6s %13s %8s %8s %14s %8s %8s %8s %8s\n", "frame", "magnification", "PSNR dB", "inside", "samples/pixel", "change", "truth's",
 	       "beyond", "");
 	for (int k = 0; k < FRAMES; k++) {
 		const int i = k < WORST ? order[k] : k - WORST;
@@ -164,7 +160,7 @@ static void print(const struct study_table *table, const int order[FRAMES])
 			printf("every eighth:\n");
 		if (k >= WORST && i % 8)
 			continue;
-		printf("%-6d %13.4f %8.2f %14.2f %8.2f %8.2f %8.2f %s\n", i, row[MAGNIFICATION], row[PSNR], row[SAMPLES], row[OURS], row[TRUTH],
+		printf("%-6d %13.4f %8.2f %8.2f %14.2f %8.2f %8.2f %8.2f %s\n", i, row[MAGNIFICATION], row[PSNR], row[INSIDE], row[SAMPLES], row[OURS], row[TRUTH],
 		       row[BEYOND], changes_level(table, i) ? "levels change" : "");
 	}
 	for (int i = 1; i < FRAMES; i++) {
@@ -196,7 +192,8 @@ static int show_difference(struct figures *figures, struct figure_sheet *sheet, 
 /* The step at `i`: before, after, and the difference; above ours, below the truth's. */
 static int show_step(struct figures *figures, struct zoom *zoom, int i)
 {
-	const struct figure_part whole = { 0, 0, SIDE, SIDE, 1 };
+	const uint32_t side = magnification_of(i) < 0.25 ? SIDE / 4 : magnification_of(i) < 0.5 ? SIDE / 2 : SIDE;
+	const struct figure_part whole = { (SIDE - side) / 2, (SIDE - side) / 2, side, side, SIDE / side };
 	struct figure_sheet sheet;
 	int rc = draw_frame(figures, zoom, i - 1, 0);
 
@@ -214,7 +211,7 @@ static int show_step(struct figures *figures, struct zoom *zoom, int i)
 	}
 	if (rc == PSR_OK)
 		rc = figure_sheet_write(&sheet, figures, "zoom");
-	figure_sheet_fini(&sheet);
+	figure_sheet_drop(&sheet, 0);
 	return rc;
 }
 

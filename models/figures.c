@@ -12,8 +12,10 @@ static const struct figure_kind {
 	int (*run)(struct figures *figures);
 } kinds[] = {
 	{ "gaps", "figure 4.9", "methods of finding gaps", figure_run_gaps },
+	{ "fill", "figure 4.11", "gaps before and after they are filled", figure_run_fill },
 	{ "threshold", "figure 7.2", "the depth threshold", figure_run_threshold },
 	{ "highlights", "figure 7.3", "specular highlights", figure_run_highlights },
+	{ "shadows", "figure 7.4", "two directional lights and a spot", figure_run_shadows },
 	{ "backs", "figure 7.6", "samples that face away", figure_run_backs },
 	{ "set", "figure 8.1", "the fourteen models", figure_run_set },
 	{ "edges", "figure 9.1", "rough edges and passes over sub-pixels", figure_run_edges },

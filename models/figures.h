@@ -53,6 +53,7 @@ struct figure_frame {
 	uint32_t width, height;
 	uint8_t *rgb;
 	float *depth;
+	uint8_t *weight; /* NULL unless the caller has set it, who frees it */
 	struct psr_report report;
 };
 int figure_frame_init(struct figure_frame *frame, uint32_t width, uint32_t height, struct psr_error *err);
@@ -64,8 +65,6 @@ figure_draw_fn figure_draw;         /* as it is */
 figure_draw_fn figure_draw_no_gaps; /* level buffers are emptied after the warp, so that they cover no pixel */
 
 /* ---- figure_truth.c: the same by rays ---- */
-
-#define FIGURE_CASTS_SHADOW(light) 0
 
 struct figure_truth {
 	uint32_t width, height, side; /* side * side rays a pixel */
@@ -90,6 +89,8 @@ struct figure_score {
 
 int figure_score_add(struct figure_score *score, struct figures *figures, const struct figure_model *model,
                      const struct figure_shot *shot, const struct figure_frame *frame, const struct figure_truth *truth);
+/* The same of the colours alone. */
+void figure_score_colors(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth);
 void figure_score_print_head(const char *first);
 void figure_score_print(const char *label, const struct figure_score *score);
 double figure_psnr(uint64_t square, uint64_t n_pixels);
@@ -113,12 +114,14 @@ void figure_sheet_init(struct figure_sheet *sheet, uint32_t columns, const struc
 int figure_sheet_add(struct figure_sheet *sheet, const uint8_t *rgb, uint32_t stride, const struct figure_part *part,
                      struct psr_error *err);
 
-/* Writes NAME.png into the folder and frees the cells; frees them in any case. */
-int figure_sheet_write(struct figure_sheet *sheet, const struct figures *figures, const char *name);
-void figure_sheet_fini(struct figure_sheet *sheet);
+void figure_sheet_drop(struct figure_sheet *sheet, uint32_t n_cells); /* frees all but the first n_cells */
 
-/* Moves the part to where `a` is further from the truth than `b` in most pixels that the object covers wholly. */
-void figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth);
+/* Writes NAME.png into the folder and drops all cells, in any case. IO, MEMORY. */
+int figure_sheet_write(struct figure_sheet *sheet, const struct figures *figures, const char *name);
+
+/* Moves the part to where `a` is further from the truth than `b`, by the most, in pixels that the object covers wholly; returns
+ * by how much. */
+uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth);
 
 /* ---- figure_compare.c: ways to draw, each against the truth ---- */
 
@@ -129,12 +132,12 @@ struct figure_way {
 };
 
 #define FIGURE_MOST_WAYS 5
-#define FIGURE_FIND UINT32_MAX /* as part.x: where the first way is worse than the last one */
+#define FIGURE_FIND UINT32_MAX /* as part.x: where, in whichever view, the first way is worst beside the last one */
 
 struct figure_look {
 	double magnification;
 	uint32_t width, height, rays; /* rays * rays a pixel */
-	const double (*view)[3];      /* the first one is shown */
+	const double (*view)[3];      /* the first one is shown, unless a part is to be found */
 	int n_views;
 	struct figure_part part;
 	void (*prepare)(struct figure_shot *shot, const struct figure_model *model); /* changes the shot; or NULL */
@@ -147,9 +150,10 @@ int figure_compare(struct figures *figures, struct figure_sheet *sheet, const st
 /* ---- the figures ---- */
 
 int figure_run_gaps(struct figures *figures);
+int figure_run_fill(struct figures *figures);
 int figure_run_threshold(struct figures *figures);
 int figure_run_highlights(struct figures *figures);
-int figure_run_lights(struct figures *figures);
+int figure_run_shadows(struct figures *figures);
 int figure_run_backs(struct figures *figures);
 int figure_run_set(struct figures *figures);
 int figure_run_edges(struct figures *figures);
