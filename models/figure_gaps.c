@@ -26,10 +26,20 @@ static int run(struct figures *figures, const char *name, const char *file, cons
 	return rc;
 }
 
+static int draw_opaque(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
+{
+	struct figure_shot other = *shot;
+
+	other.scene.instance = &other.instance;
+	other.settings.gap_method = PSR_GAPS_OPAQUE;
+	return figure_draw(frame, figures, &other);
+}
+
 int figure_run_gaps(struct figures *figures)
 {
 	static const struct figure_way way[] = {
 		{ "gaps are left", figure_draw_no_gaps, NULL },
+		{ "opaque squares", draw_opaque, NULL },
 		{ "bilinear coverage", figure_draw, NULL },
 	};
 	const struct figure_look look = { 2, 512, 512, 4, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 96, 96, 3 }, NULL };

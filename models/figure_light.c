@@ -52,7 +52,7 @@ int figure_run_highlights(struct figures *figures)
 {
 	static const double view[][3] = { { 0.2, 0.3, 1 }, { -0.2, -0.3, 1 }, { 0.1, 0.8, 0.5 } };
 	static const struct figure_way way[] = { { "balls", figure_draw, NULL } };
-	const struct figure_look look = { 1, 480, 480, 4, view, 3, { 0, 120, 480, 240, 1 }, light_twice };
+	const struct figure_look look = { 0.9, 480, 480, 4, view, 3, { 0, 120, 480, 240, 1 }, light_twice };
 	struct figure_model model;
 	int rc = figure_model_load(&model, figures, "balls", make_balls, 480);
 
@@ -126,15 +126,15 @@ int figure_run_shadows(struct figures *figures)
 
 #define SIDES 128
 
-/* As thin as a sample and a half. */
+/* About as thin as samples are apart. */
 static void make_coin_of(struct shape *shape, int two_sided)
 {
 	const struct shape_material red = { "red", 0xc04030, 0, 0.6, two_sided }, blue = { "blue", 0x3060c0, 0, 0.6, two_sided };
 	const uint32_t a = shape_material(shape, &red), b = shape_material(shape, &blue);
 	const struct surface_profile piece[] = {
-		surface_line(0, -0.006, 0.8, -0.006, 4, b),
-		surface_line(0.8, -0.006, 0.8, 0.006, 1, b),
-		surface_line(0.8, 0.006, 0, 0.006, 4, a),
+		surface_line(0, -0.0035, 0.8, -0.0035, 4, b),
+		surface_line(0.8, -0.0035, 0.8, 0.0035, 1, b),
+		surface_line(0.8, 0.0035, 0, 0.0035, 4, a),
 	};
 
 	surface_lathe(shape, piece, sizeof piece / sizeof *piece, SIDES);
@@ -171,15 +171,25 @@ static void make_tube_both(struct shape *shape)
 	make_tube_of(shape, 1);
 }
 
+/* Masks would cull most backs. */
+static int draw_unculled(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
+{
+	struct figure_shot other = *shot;
+
+	other.scene.instance = &other.instance;
+	other.settings.cull_tests = 0;
+	return figure_draw(frame, figures, &other);
+}
+
 int figure_run_backs(struct figures *figures)
 {
 	static const double above[FIGURE_VIEWS][3] = {
 		{ 0.3, 0.35, 1 }, { 0.3, 0.9, 0.6 }, { 1, 0.2, 0.4 }, { -0.5, -0.6, 0.5 }, { -1, 0.5, -1 }, { 0.2, -1, -0.7 },
 	};
-	const struct figure_look close = { 3, 512, 512, 2, above, FIGURE_VIEWS, { FIGURE_FIND, 0, 64, 64, 5 }, NULL };
+	const struct figure_look close = { 3, 512, 512, 2, above, FIGURE_VIEWS, { FIGURE_FIND, 0, 176, 128, 2 }, NULL };
 	const struct figure_look whole = { 1, 256, 256, 4, above + 1, 1, { 0, 0, 256, 256, 1 }, NULL };
 	struct figure_model model[4];
-	struct figure_way way[] = { { "coin, backs drawn as well", figure_draw, &model[1] }, { "coin, backs left out", figure_draw, NULL } };
+	struct figure_way way[] = { { "coin, backs drawn as well", draw_unculled, &model[1] }, { "coin, backs left out", draw_unculled, NULL } };
 	const struct figure_way both = { "tube that is two-sided", figure_draw, NULL }, one = { "tube that is one-sided", figure_draw, NULL };
 	struct figure_sheet sheet;
 	int rc;
