@@ -6,6 +6,8 @@
 #include "generators.h"
 #include "libpsr/base/srgb.h"
 
+#define SET_MAGNIFICATION 0.9 /* so that none is cut off */
+
 static int show_one(struct figures *figures, struct figure_sheet *sheet, const char *name)
 {
 	const struct figure_part whole = { 0, 0, 256, 256, 1 };
@@ -20,7 +22,7 @@ static int show_one(struct figures *figures, struct figure_sheet *sheet, const c
 		return rc;
 	rc = figure_frame_init(&frame, 256, 256, figures->err);
 	for (int v = 0; rc == PSR_OK && v < FIGURE_VIEWS; v++) {
-		figure_shot_init(&shot, &model, figure_view[v], 1, 256, 256);
+		figure_shot_init(&shot, &model, figure_view[v], SET_MAGNIFICATION, 256, 256);
 		rc = figure_truth_draw(&truth, figures, &model, &shot, 4);
 		if (rc == PSR_OK)
 			rc = figure_draw(&frame, figures, &shot);
