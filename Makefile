@@ -89,7 +89,7 @@ endif
 L_CODEC  := -lturbojpeg
 L_BUILD  := -lembree3 -lassimp -ldraco -lpng -lcjson -lstdc++
 
-.PHONY: all demo studies test test-all models models-all install help clean deps compile
+.PHONY: all demo figures studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -257,6 +257,11 @@ bench-simd: $(SIMD_TESTS) ## bench-simd: nanoseconds a sample (pixel, ...) of ea
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
 	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
 	$(Q)BUILD=$(BUILD) docs/demo.sh
+
+figures: deps ## figures: install what is missing, build, draw the thesis's figures beside the ray-traced truth, renew docs/figures.md (minutes)
+	$(Q).ci/deps $(DEPS_STUDY)
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/figures.sh
 
 studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
 	$(Q).ci/deps $(DEPS_STUDY)

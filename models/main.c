@@ -14,6 +14,7 @@ static const struct command {
 	{ "make", "generate a model of the standard set as glTF", cmd_make },
 	{ "accuracy", "compare a model's pictures with ray-traced ones", cmd_accuracy },
 	{ "study", "repeat a study of the thesis: tables and plots", cmd_study },
+	{ "figures", "draw the thesis's figures, beside the truth", cmd_figures },
 };
 
 #define N_COMMANDS (sizeof commands / sizeof commands[0])

@@ -10,6 +10,7 @@
 #include "sample/greedy.h"
 #include "sample/greedy_warp.h"
 #include "sample/ray.h"
+#include "shape.h"
 #include "study_trials.h"
 
 /* ---- study_table.c: what a study found ---- */
@@ -56,6 +57,8 @@ struct study_model {
 
 /* A generator's name (psr-model make), or a file, which has a dot or a slash in its name. */
 int study_model_load(struct study_model *model, const char *name, struct psr_error *err);
+/* The shape that `make` makes. */
+int study_model_make(struct study_model *model, const char *name, void (*make)(struct shape *), struct psr_error *err);
 void study_model_fini(struct study_model *model);
 
 /* ---- study.c ---- */

@@ -34,32 +34,21 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 	return code;
 }
 
-static int generate(struct psr_mesh **mesh, const char *name, struct psr_error *err)
+static int generate(struct psr_mesh **mesh, const char *name, void (*make)(struct shape *), struct psr_error *err)
 {
-	const struct generator *generator = generator_find(name, err);
 	struct shape shape;
 	int code;
 
-	if (generator == NULL)
-		return err->code;
 	shape_init(&shape);
-	generator->make(&shape);
-	code = import_shape(mesh, &shape, generator->name, err);
+	make(&shape);
+	code = import_shape(mesh, &shape, name, err);
 	shape_fini(&shape);
 	return code;
 }
 
-int study_model_load(struct study_model *model, const char *name, struct psr_error *err)
+/* What follows from the mesh. `code` says whether there is one. */
+static int prepare(struct study_model *model, int code, struct psr_error *err)
 {
-	const char *slash = strrchr(name, '/');
-	int code;
-
-	memset(model, 0, sizeof *model);
-	snprintf(model->name, sizeof model->name, "%s", slash != NULL ? slash + 1 : name);
-	if (strpbrk(name, "./") != NULL)
-		code = psr_mesh_import(&model->mesh, name, err);
-	else
-		code = generate(&model->mesh, name, err);
 	if (code == PSR_OK)
 		code = door_check_mesh(model->mesh, err);
 	if (code == PSR_OK)
@@ -71,6 +60,27 @@ int study_model_load(struct study_model *model, const char *name, struct psr_err
 	if (code != PSR_OK)
 		study_model_fini(model);
 	return code;
+}
+
+int study_model_load(struct study_model *model, const char *name, struct psr_error *err)
+{
+	const char *slash = strrchr(name, '/');
+	const struct generator *generator;
+
+	if (strpbrk(name, "./") == NULL) {
+		generator = generator_find(name, err);
+		return generator != NULL ? study_model_make(model, generator->name, generator->make, err) : err->code;
+	}
+	memset(model, 0, sizeof *model);
+	snprintf(model->name, sizeof model->name, "%s", slash != NULL ? slash + 1 : name);
+	return prepare(model, psr_mesh_import(&model->mesh, name, err), err);
+}
+
+int study_model_make(struct study_model *model, const char *name, void (*make)(struct shape *), struct psr_error *err)
+{
+	memset(model, 0, sizeof *model);
+	snprintf(model->name, sizeof model->name, "%s", name);
+	return prepare(model, generate(&model->mesh, name, make, err), err);
 }
 
 void study_model_fini(struct study_model *model)

@@ -1,0 +1,25 @@
+#!/bin/bash
+# Draws the figures of docs/figures.md (all of them, or those named) into docs/figures and puts their tables into the page.
+set -eu
+cd "$(dirname "$0")/.."
+build=${BUILD:-build/release}
+model=$build/bin/psr-model
+keep=$build/figures-models
+page=docs/figures.md
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+mkdir -p docs/figures "$keep"
+# Models of another sampler are of no use.
+find "$keep" -name '*.psr' ! -newer "$build/lib/libpsr-build.a" -delete
+
+[ $# -gt 0 ] || set -- gaps fill threshold highlights shadows backs set edges interfaces thin zoom
+for figure; do
+	echo "figure $figure" >&2
+	"$model" figures "$figure" --keep "$keep" --out docs/figures >"$work/table"
+	awk -v begin="<!-- figure $figure -->" -v table="$work/table" '
+		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
+		inside && /^<!-- end -->$/ { inside = 0 }
+		!inside { print }
+	' $page >"$work/page"
+	cat "$work/page" >$page
+done
