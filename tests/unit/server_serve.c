@@ -241,6 +241,66 @@ static void cancelled_frames_end_once(void **state)
 	peer_close(&p);
 }
 
+static void passes_rise_to_the_final_one(void **state)
+{
+	struct psr_msg_frame frame = frame_default(200, 120);
+	struct psr_msg_frame_end end;
+	uint64_t hash[3];
+	uint32_t id;
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	hash[0] = end.hash[PSR_WIRE_PLANE_COLOR];
+	frame.pass_limit = 2;
+	id = peer_ask_frame(&p, &frame);
+	for (unsigned pass = 0; pass <= 2; pass++) {
+		assert_true(peer_expect_frame(&p, id, &end) > 0);
+		assert_int_equal(end.pass, pass);
+		assert_int_equal(end.is_final, pass == 2);
+		if (pass == 0)
+			assert_true(end.hash[PSR_WIRE_PLANE_COLOR] == hash[0]);
+		else
+			assert_true(end.hash[PSR_WIRE_PLANE_COLOR] != hash[pass - 1]);
+		hash[pass] = end.hash[PSR_WIRE_PLANE_COLOR];
+	}
+	frame = frame_default(32, 32); /* the id has ended: nothing else of it comes */
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	peer_close(&p);
+}
+
+/* Whatever pass it is in: 1,000 x 1,000 pixels in 16 x 16 sub-pixels take far longer than the first. */
+static void refinement_is_cancelled_at_once(void **state)
+{
+	struct psr_msg_frame frame = frame_default(1000, 1000);
+	struct psr_msg_frame_end end;
+	struct psr_message message;
+	uint32_t id;
+	int n_final = 0;
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	frame.pass_limit = 4;
+	id = peer_ask_frame(&p, &frame);
+	peer_expect_frame(&p, id, &end);
+	assert_int_equal(end.is_final, 0);
+	assert_int_equal(psr_msg_cancel_encode(&p.buf, id, 0, NULL), PSR_OK);
+	peer_send(&p);
+	do {
+		assert_true(peer_next(&p, &message));
+		assert_int_equal(message.id, id);
+		if (message.type == PSR_MSG_FRAME_END) {
+			assert_int_equal(psr_msg_frame_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
+			n_final += end.is_final;
+		}
+	} while (message.type != PSR_MSG_CANCELLED);
+	assert_int_equal(n_final, 0);
+	frame = frame_default(32, 32);
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	assert_int_equal(end.is_final, 1);
+	peer_close(&p);
+}
+
 static void ping_is_answered(void **state)
 {
 	struct psr_msg_ping ping = { .token = UINT64_C(0xfedcba9876543210) };
@@ -549,6 +609,8 @@ int main(void)
 		cmocka_unit_test(the_spacing_of_the_settings_is_kept_and_returned),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
+		cmocka_unit_test(passes_rise_to_the_final_one),
+		cmocka_unit_test(refinement_is_cancelled_at_once),
 		cmocka_unit_test(ping_is_answered),
 		cmocka_unit_test(stats_count_what_happened),
 		cmocka_unit_test(wrong_magic_is_closed_unanswered),
