@@ -50,7 +50,8 @@ static void still_make(struct still *s, const struct psr_model *model, uint32_t 
 	memset(s, 0, sizeof *s);
 	s->instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	s->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
-	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light, .n_lights = 1, .ambient = { 0.1, 0.1, 0.1 } };
+	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light, .n_lights = 1,
+		                           .ambient = { 0.1, 0.1, 0.1 } };
 	psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
 	psr_settings_default(&s->settings, width, height);
 	s->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc((size_t)width * height * 3),
@@ -91,10 +92,10 @@ static double area_of(const struct still *s)
 	return area;
 }
 
-/* The disc's area is known. A pixel or splat that is met although its centre is not covered grows it by a rim: of half the diagonal of a
- * sub-pixel at most by the samples' own pixels, and by what splats reach beyond the rim. Where a sphere turns away its splats are within their
- * slope's limit of edge-on: they rise by at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere's own curve, which falls;
- * no more than a quarter of a step. A step is `pixels` pixels here. */
+/* The disc's area is known. A rim grows it: of half the diagonal of a sub-pixel at most, since samples keep those that they
+ * are in, and of what splats reach beyond the disc. Where a sphere turns away, splats are within their slope's limit of
+ * edge-on: they rise by at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere, which falls; no more than
+ * a quarter of a step. A step is `pixels` pixels here. */
 static void the_area_of_a_sphere_converges(void **state)
 {
 	struct still s;
@@ -157,9 +158,9 @@ static void threads_and_instruction_sets_draw_the_same_bytes(void **state)
 	still_clear(&other);
 }
 
-/* A pixel's sub-pixels are the same whether a window's border is near or not: 512 x 256 x 4 fill one window, twice as many pixels of the same
- * size need nine. What a window rounds otherwise is a sample's place by some 2^-12 of a sub-pixel, so that hardly one in a thousand samples
- * falls into another sub-pixel, which changes a pixel by a sixteenth of what is seen beside it. */
+/* A pixel's sub-pixels are the same whether a window's border is near or not: 512 x 256 x 4 fill one window, twice as many
+ * pixels of the same size need nine. What a window rounds otherwise is a sample's place by some 2^-12 of a sub-pixel, so
+ * that hardly one sample in a thousand falls into another, which changes a pixel by a sixteenth of what is seen beside it. */
 static void windows_have_no_seams(void **state)
 {
 	struct still one, nine;
