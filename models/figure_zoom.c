@@ -23,11 +23,11 @@ static const struct study_column columns[N_COLUMNS] = {
 static const struct study_kind kind = {
 	.name = "zoom",
 	.plot = "set multiplot layout 3,1\nset logscale x 2\nset xrange [4:0.0625]\nset grid\nset lmargin 9\nset style data lines\n"
-	        "set format x ''\nset ylabel 'dB'\nset key bottom left\nplot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
+	        "set format x ''\nset ylabel 'dB'\nset ytics 4\nset key bottom left\nplot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
 	        "'' using 3:5 title 'of those inside' lw 2\n"
-	        "set ylabel 'samples'\nset key top left\nset yrange [0:*]\n"
+	        "set ylabel 'samples'\nset ytics 20\nset key top left\nset yrange [0:*]\n"
 	        "plot $table using 3:6 title 'warped a covered pixel' lw 2\n"
-	        "set format x '%g'\nset xlabel 'magnification'\nset ylabel 'codes'\n"
+	        "set format x '%g'\nset xlabel 'magnification'\nset ylabel 'codes'\nset yrange [0:30]\nset ytics 10\nset key top right horizontal\n"
 	        "plot $table using 3:8 title 'change from frame to frame' lw 2, '' using 3:9 title 'of the truth' lw 2, "
 	        "'' using 3:10 title 'beyond it' lw 2\nunset multiplot\n",
 };
