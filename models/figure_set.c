@@ -46,12 +46,15 @@ int figure_run_set(struct figures *figures)
 	struct figure_sheet sheet;
 	int rc = PSR_OK;
 
-	figure_sheet_init(&sheet, 5, &whole);
+	figure_sheet_init(&sheet, 4, &whole);
 	figure_score_print_head("model");
-	for (size_t i = 0; rc == PSR_OK && i < n_generators; i++)
+	for (size_t i = 0; rc == PSR_OK && i < n_generators; i++) {
 		rc = show_one(figures, &sheet, generators[i].name);
+		if (rc == PSR_OK && i + 1 == n_generators / 2)
+			rc = figure_sheet_write(&sheet, figures, "set-1");
+	}
 	if (rc == PSR_OK)
-		rc = figure_sheet_write(&sheet, figures, "set");
+		rc = figure_sheet_write(&sheet, figures, "set-2");
 	figure_sheet_drop(&sheet, 0);
 	return rc;
 }
@@ -113,8 +116,8 @@ static int draw_refined(struct figure_frame *frame, struct figures *figures, con
 }
 
 /* Rows of pictures, a model each. */
-static int run(struct figures *figures, const char *const *name, const struct figure_part *part, int n_models, const char *file,
-               struct figure_look look, const struct figure_way *way, int n_ways)
+static int run(struct figures *figures, const char *const *name, const struct figure_part *part, int n_models,
+               const char *file, struct figure_look look, const struct figure_way *way, int n_ways)
 {
 	struct figure_sheet sheet;
 	struct figure_model model;
@@ -145,8 +148,8 @@ int figure_run_edges(struct figures *figures)
 		{ "2x2 sub-pixels", draw_twice, NULL },
 		{ "refined, pass 3", draw_refined, NULL },
 	};
-	const struct figure_look look = { .magnification = 0.5, .width = 128, .height = 128, .rays = 16, .view = figure_view,
-		                              .n_views = FIGURE_VIEWS };
+	const struct figure_look look = { .magnification = 0.5, .width = 128, .height = 128, .rays = 16,
+		                              .view = figure_view, .n_views = FIGURE_VIEWS };
 
 	return run(figures, name, part, 2, "edges", look, way, sizeof way / sizeof *way);
 }
