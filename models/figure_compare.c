@@ -24,8 +24,8 @@ static int is_better(struct compared *c, struct figure_part *part, const struct 
 	return 1;
 }
 
-static int show(struct figures *figures, struct figure_sheet *sheet, struct compared *c, const struct figure_look *look, int view,
-                int n_ways)
+static int show(struct figures *figures, struct figure_sheet *sheet, struct compared *c, const struct figure_look *look,
+                int view, int n_ways)
 {
 	struct figure_part part = look->part;
 	int rc = PSR_OK;
@@ -41,7 +41,8 @@ static int show(struct figures *figures, struct figure_sheet *sheet, struct comp
 }
 
 static int compare_view(struct figures *figures, struct compared *c, const struct figure_model *model,
-                        const struct figure_look *look, const double toward[3], const struct figure_way *way, int n_ways)
+                        const struct figure_look *look, const double toward[3], const struct figure_way *way,
+                        int n_ways)
 {
 	struct figure_shot shot;
 	int rc;

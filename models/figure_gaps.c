@@ -62,7 +62,8 @@ int figure_run_threshold(struct figures *figures)
 		{ "threshold 0", draw_no_threshold, NULL },
 		{ "threshold of 3 pixels", figure_draw, NULL },
 	};
-	const struct figure_look look = { 2, 512, 512, 4, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 128, 128, 3 }, NULL };
+	const struct figure_look look = { 2, 512, 512, 4, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 128, 128, 3 },
+		                              NULL };
 
 	return run(figures, "toybird", "threshold", &look, way, sizeof way / sizeof *way);
 }
@@ -78,7 +79,8 @@ static int is_before(const struct psr_zstack *stack, int k, uint32_t i, uint32_t
 	return (double)stack->level[k].z[(size_t)j * stack->level[k].width + i] * scale < (double)z;
 }
 
-static int covers(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, float z, const double *scale, int with_finer)
+static int covers(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, float z, const double *scale,
+                  int with_finer)
 {
 	if (is_before(stack, k, i, j, z, scale[k]))
 		return 1;
@@ -89,7 +91,8 @@ static int covers(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j,
 	return 0;
 }
 
-static double coverage(const struct psr_zstack *stack, int k, uint32_t x, uint32_t y, float z, const double *scale, int with_finer)
+static double coverage(const struct psr_zstack *stack, int k, uint32_t x, uint32_t y, float z, const double *scale,
+                       int with_finer)
 {
 	const double u = (x + 0.5) / (1 << k) + 0.5, v = (y + 0.5) / (1 << k) + 0.5;
 	const uint32_t i = (uint32_t)u, j = (uint32_t)v;
@@ -161,7 +164,8 @@ static int draw_open(struct figure_frame *frame, struct figures *figures, const 
 	if (rc == PSR_OK && (cover.closed == NULL || cover.thesis == NULL))
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for weights");
 	if (rc == PSR_OK)
-		rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &report, figures->err);
+		rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &report,
+		              figures->err);
 	if (rc == PSR_OK) {
 		find_weights(&cover, stack, shot);
 		rc = figure_draw_no_gaps(&raw, figures, shot);
@@ -182,7 +186,8 @@ int figure_run_interfaces(struct figures *figures)
 		{ "the greatest coverage of a level", draw_open, NULL },
 		{ "both levels' cells counted", figure_draw, NULL },
 	};
-	const struct figure_look look = { 3, 1024, 1024, 2, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 64, 64, 4 }, NULL };
+	const struct figure_look look = { 3, 1024, 1024, 2, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 64, 64, 4 },
+		                              NULL };
 
 	return run(figures, "dragon", "interfaces", &look, way, sizeof way / sizeof *way);
 }

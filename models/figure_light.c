@@ -87,7 +87,8 @@ static void light_stage(struct figure_shot *shot, const struct figure_model *mod
 
 	shot->scene.n_lights = 3;
 	for (int i = 0; i < 3; i++) {
-		shot->light[i] = (struct psr_light){ .kind = i < 2 ? PSR_LIGHT_DIRECTIONAL : PSR_LIGHT_SPOT, .casts_shadow = 1 };
+		shot->light[i] = (struct psr_light){ .kind = i < 2 ? PSR_LIGHT_DIRECTIONAL : PSR_LIGHT_SPOT };
+		shot->light[i].casts_shadow = 1;
 		v3d_set(shot->light[i].direction, direction[i][0], direction[i][1], direction[i][2]);
 		v3d_set(shot->light[i].color, color[i][0], color[i][1], color[i][2]);
 	}
@@ -110,7 +111,10 @@ static int draw_no_shadows(struct figure_frame *frame, struct figures *figures, 
 int figure_run_shadows(struct figures *figures)
 {
 	static const double view[][3] = { { 0.5, 0.7, 1 }, { -0.8, 0.6, 0.7 }, { 0.2, 1, 0.1 } };
-	static const struct figure_way way[] = { { "without shadows", draw_no_shadows, NULL }, { "with shadows", figure_draw, NULL } };
+	static const struct figure_way way[] = {
+		{ "without shadows", draw_no_shadows, NULL },
+		{ "with shadows", figure_draw, NULL },
+	};
 	const struct figure_look look = { 1, 384, 384, 4, view, 3, { 0, 64, 384, 256, 1 }, light_stage };
 	struct figure_model model;
 	int rc = figure_model_load(&model, figures, "stage", make_floor, 384);
@@ -129,7 +133,8 @@ int figure_run_shadows(struct figures *figures)
 /* About as thin as samples are apart. */
 static void make_coin_of(struct shape *shape, int two_sided)
 {
-	const struct shape_material red = { "red", 0xc04030, 0, 0.6, two_sided }, blue = { "blue", 0x3060c0, 0, 0.6, two_sided };
+	const struct shape_material red = { "red", 0xc04030, 0, 0.6, two_sided };
+	const struct shape_material blue = { "blue", 0x3060c0, 0, 0.6, two_sided };
 	const uint32_t a = shape_material(shape, &red), b = shape_material(shape, &blue);
 	const struct surface_profile piece[] = {
 		surface_line(0, -0.0035, 0.8, -0.0035, 4, b),
@@ -142,7 +147,8 @@ static void make_coin_of(struct shape *shape, int two_sided)
 
 static void make_tube_of(struct shape *shape, int two_sided)
 {
-	const struct shape_material red = { "red", 0xb04030, 0, 0.6, two_sided }, blue = { "blue", 0x3050a0, 0, 0.6, two_sided };
+	const struct shape_material red = { "red", 0xb04030, 0, 0.6, two_sided };
+	const struct shape_material blue = { "blue", 0x3050a0, 0, 0.6, two_sided };
 	const uint32_t a = shape_material(shape, &red), b = shape_material(shape, &blue);
 	struct surface_profile piece[4];
 
@@ -189,8 +195,12 @@ int figure_run_backs(struct figures *figures)
 	const struct figure_look close = { 3, 512, 512, 2, above, FIGURE_VIEWS, { FIGURE_FIND, 0, 176, 128, 2 }, NULL };
 	const struct figure_look whole = { 1, 256, 256, 4, above + 1, 1, { 0, 0, 256, 256, 1 }, NULL };
 	struct figure_model model[4];
-	struct figure_way way[] = { { "coin, backs drawn as well", draw_unculled, &model[1] }, { "coin, backs left out", draw_unculled, NULL } };
-	const struct figure_way both = { "tube that is two-sided", figure_draw, NULL }, one = { "tube that is one-sided", figure_draw, NULL };
+	const struct figure_way way[] = {
+		{ "coin, backs drawn as well", draw_unculled, &model[1] },
+		{ "coin, backs left out", draw_unculled, NULL },
+	};
+	const struct figure_way both = { "tube that is two-sided", figure_draw, NULL };
+	const struct figure_way one = { "tube that is one-sided", figure_draw, NULL };
 	struct figure_sheet sheet;
 	int rc;
 

@@ -12,8 +12,8 @@ const double figure_view[FIGURE_VIEWS][3] = {
 	{ 0.5, 0.4, 1 }, { -0.9, 0.7, 0.6 }, { 0.3, -0.35, -1 }, { 1, 0.1, -0.4 }, { -0.6, 1, -0.7 }, { -1, -0.2, 0.8 },
 };
 
-int figure_model_load(struct figure_model *model, struct figures *figures, const char *name, void (*make)(struct shape *),
-                      uint32_t resolution)
+int figure_model_load(struct figure_model *model, struct figures *figures, const char *name,
+                      void (*make)(struct shape *), uint32_t resolution)
 {
 	const struct psr_model_info *info;
 	int rc;
@@ -64,8 +64,8 @@ static void light_over_shoulder(struct psr_light *light, const double forward[3]
 	v3d_set(light->color, 1, 1, 1);
 }
 
-void figure_shot_init(struct figure_shot *shot, const struct figure_model *model, const double toward[3], double magnification,
-                      uint32_t width, uint32_t height)
+void figure_shot_init(struct figure_shot *shot, const struct figure_model *model, const double toward[3],
+                      double magnification, uint32_t width, uint32_t height)
 {
 	const double away = DISTANCE * model->source.scale;
 	struct psr_camera *camera = &shot->scene.camera;
@@ -94,7 +94,9 @@ int figure_frame_init(struct figure_frame *frame, uint32_t width, uint32_t heigh
 {
 	const size_t n = (size_t)width * height;
 
-	*frame = (struct figure_frame){ .width = width, .height = height, .rgb = malloc(3 * n), .depth = malloc(n * sizeof(float)) };
+	*frame = (struct figure_frame){ .width = width, .height = height };
+	frame->rgb = malloc(3 * n);
+	frame->depth = malloc(n * sizeof *frame->depth);
 	if (frame->rgb != NULL && frame->depth != NULL)
 		return PSR_OK;
 	figure_frame_fini(frame);
@@ -114,7 +116,8 @@ static int draw(struct figure_frame *frame, struct figures *figures, const struc
 	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth,
 		                    .weight = frame->weight };
 	struct psr_zstack *stack;
-	int rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &to.report, figures->err);
+	int rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &to.report,
+	                  figures->err);
 
 	for (int k = 1; rc == PSR_OK && !has_gaps && k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const size_t n = (size_t)stack->level[k].width * stack->level[k].height;

@@ -15,8 +15,8 @@ static int is_inside(const struct figure_truth *truth, uint32_t x, uint32_t y)
 	return 1;
 }
 
-static void add_pixel(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth, uint32_t x,
-                      uint32_t y)
+static void add_pixel(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth,
+                      uint32_t x, uint32_t y)
 {
 	const size_t at = (size_t)y * truth->width + x;
 	const int inside = is_inside(truth, x, y);
@@ -54,8 +54,8 @@ int figure_score_add(struct figure_score *score, struct figures *figures, const 
                      const struct figure_shot *shot, const struct figure_frame *frame, const struct figure_truth *truth)
 {
 	struct psr_accuracy accuracy;
-	int rc = psr_accuracy_measure(&accuracy, model->truth, &shot->scene.camera, frame->width, frame->height, frame->depth,
-	                              model->spacing, figures->study.n_threads, figures->err);
+	int rc = psr_accuracy_measure(&accuracy, model->truth, &shot->scene.camera, frame->width, frame->height,
+	                              frame->depth, model->spacing, figures->study.n_threads, figures->err);
 
 	if (rc != PSR_OK)
 		return rc;
@@ -72,8 +72,8 @@ double figure_psnr(uint64_t square, uint64_t n_pixels)
 
 void figure_score_print_head(const char *first)
 {
-	printf("%-34s %8s %9s %8s %9s %9s  %8s %7s %11s\n", first, "holes", "a million", "outside", "a million", "missing", "PSNR dB",
-	       "inside", "difference");
+	printf("%-34s %8s %9s %8s %9s %9s  %8s %7s %11s\n", first, "holes", "a million", "outside", "a million", "missing",
+	       "PSNR dB", "inside", "difference");
 }
 
 static double million(uint64_t n, uint64_t all)
@@ -84,7 +84,8 @@ static double million(uint64_t n, uint64_t all)
 void figure_score_print(const char *label, const struct figure_score *s)
 {
 	printf("%-34s %8" PRIu64 " %9.1f %8" PRIu64 " %9.1f %9.1f  %8.2f %7.2f %11.2f\n", label, s->n_holes,
-	       million(s->n_holes, s->n_inside), s->n_outside, million(s->n_outside, s->n_met), million(s->n_missing, s->n_half),
-	       figure_psnr(s->square, s->n_met), figure_psnr(s->inside_square, s->n_inside),
+	       million(s->n_holes, s->n_inside), s->n_outside, million(s->n_outside, s->n_met),
+	       million(s->n_missing, s->n_half), figure_psnr(s->square, s->n_met),
+	       figure_psnr(s->inside_square, s->n_inside),
 	       s->n_inside ? (double)s->difference / (double)s->n_inside : 0);
 }

@@ -7,6 +7,7 @@
 #include "libpsr/base/srgb.h"
 
 #define SET_MAGNIFICATION 0.9 /* so that none is cut off */
+#define PASS 3
 
 static int show_one(struct figures *figures, struct figure_sheet *sheet, const char *name)
 {
@@ -45,12 +46,15 @@ int figure_run_set(struct figures *figures)
 	struct figure_sheet sheet;
 	int rc = PSR_OK;
 
-	figure_sheet_init(&sheet, 5, &whole);
+	figure_sheet_init(&sheet, 4, &whole);
 	figure_score_print_head("model");
-	for (size_t i = 0; rc == PSR_OK && i < n_generators; i++)
+	for (size_t i = 0; rc == PSR_OK && i < n_generators; i++) {
 		rc = show_one(figures, &sheet, generators[i].name);
+		if (rc == PSR_OK && i + 1 == n_generators / 2)
+			rc = figure_sheet_write(&sheet, figures, "set-1");
+	}
 	if (rc == PSR_OK)
-		rc = figure_sheet_write(&sheet, figures, "set");
+		rc = figure_sheet_write(&sheet, figures, "set-2");
 	figure_sheet_drop(&sheet, 0);
 	return rc;
 }
@@ -97,9 +101,23 @@ static int draw_twice(struct figure_frame *frame, struct figures *figures, const
 	return rc;
 }
 
+/* The last pass but one of a still. */
+static int draw_refined(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
+{
+	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth };
+	struct psr_refiner *refiner = NULL;
+	int rc;
+
+	if (psr_refiner_create(&refiner, figures->renderer) != PSR_OK)
+		return psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for passes");
+	rc = psr_refine(refiner, &shot->scene, &shot->settings, PASS, figures->study.pool, NULL, NULL, &to, figures->err);
+	psr_refiner_destroy(refiner);
+	return rc;
+}
+
 /* Rows of pictures, a model each. */
-static int run(struct figures *figures, const char *const *name, const struct figure_part *part, int n_models, const char *file,
-               struct figure_look look, const struct figure_way *way, int n_ways)
+static int run(struct figures *figures, const char *const *name, const struct figure_part *part, int n_models,
+               const char *file, struct figure_look look, const struct figure_way *way, int n_ways)
 {
 	struct figure_sheet sheet;
 	struct figure_model model;
@@ -127,10 +145,11 @@ int figure_run_edges(struct figures *figures)
 	static const struct figure_part part[] = { { 0, 0, 128, 128, 2 }, { 0, 0, 128, 128, 2 } };
 	static const struct figure_way way[] = {
 		{ "one pass", figure_draw, NULL },
-		{ "2x2 sub-pixels, from the warp on", draw_twice, NULL },
+		{ "2x2 sub-pixels", draw_twice, NULL },
+		{ "refined, pass 3", draw_refined, NULL },
 	};
-	const struct figure_look look = { .magnification = 0.5, .width = 128, .height = 128, .rays = 16, .view = figure_view,
-		                              .n_views = FIGURE_VIEWS };
+	const struct figure_look look = { .magnification = 0.5, .width = 128, .height = 128, .rays = 16,
+		                              .view = figure_view, .n_views = FIGURE_VIEWS };
 
 	return run(figures, name, part, 2, "edges", look, way, sizeof way / sizeof *way);
 }
@@ -141,7 +160,7 @@ int figure_run_thin(struct figures *figures)
 	static const struct figure_part part[] = { { 64, 64, 96, 96, 3 }, { 80, 60, 96, 96, 3 }, { 80, 80, 96, 96, 3 } };
 	static const struct figure_way way[] = {
 		{ "one pass", figure_draw, NULL },
-		{ "2x2 sub-pixels", draw_twice, NULL },
+		{ "refined, pass 3", draw_refined, NULL },
 	};
 	const struct figure_look look = { .magnification = 1, .width = 256, .height = 256, .rays = 8, .view = figure_view,
 		                              .n_views = FIGURE_VIEWS };

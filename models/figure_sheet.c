@@ -10,7 +10,9 @@
 
 void figure_sheet_init(struct figure_sheet *sheet, uint32_t columns, const struct figure_part *part)
 {
-	*sheet = (struct figure_sheet){ .columns = columns, .width = part->width * part->zoom, .height = part->height * part->zoom };
+	*sheet = (struct figure_sheet){ .columns = columns };
+	sheet->width = part->width * part->zoom;
+	sheet->height = part->height * part->zoom;
 }
 
 int figure_sheet_add(struct figure_sheet *sheet, const uint8_t *rgb, uint32_t stride, const struct figure_part *part,
@@ -36,7 +38,8 @@ void figure_sheet_drop(struct figure_sheet *sheet, uint32_t n_cells)
 
 static void paste(uint8_t *to, const png_image *image, const struct figure_sheet *sheet, uint32_t i)
 {
-	const uint32_t left = i % sheet->columns * (sheet->width + GUTTER), top = i / sheet->columns * (sheet->height + GUTTER);
+	const uint32_t left = i % sheet->columns * (sheet->width + GUTTER);
+	const uint32_t top = i / sheet->columns * (sheet->height + GUTTER);
 
 	for (uint32_t y = 0; y < sheet->height; y++)
 		memcpy(to + 3 * ((size_t)(top + y) * image->width + left), sheet->cell[i] + (size_t)3 * y * sheet->width,
@@ -85,7 +88,8 @@ static uint64_t gain_at(const uint8_t *a, const uint8_t *b, const uint8_t *right
 	return gain > UNLIKE ? (uint64_t)(gain * gain) : 0;
 }
 
-uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth)
+uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b,
+                          const struct figure_truth *truth)
 {
 	uint64_t most = 0;
 

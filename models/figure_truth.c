@@ -27,8 +27,8 @@ static double linear(uint32_t code, uint32_t most)
 	return (double)psr_srgb_to_linear[(code * 255 + most / 2) / most];
 }
 
-static void look_up(struct place *place, const struct figure_model *model, const struct ray *ray, const struct ray_hit *hit,
-                    uint64_t *attr)
+static void look_up(struct place *place, const struct figure_model *model, const struct ray *ray,
+                    const struct ray_hit *hit, uint64_t *attr)
 {
 	const struct surface_place at = { hit->prim, hit->is_back, hit->u, hit->v };
 	const float *face = ray_scene_normal(model->source.scene, hit->prim);
@@ -54,7 +54,8 @@ static void look_up(struct place *place, const struct figure_model *model, const
 	place->exponent = exp2(PSR_ATTR_EXPONENT(*attr) / 16.0);
 }
 
-/* How much of a light gets to the place but for what stands between; where it comes from, and how far, in inner units. */
+/* How much of a light gets to the place but for what stands between; where it comes from, and how far away that
+ * is, in inner units. */
 static double light_amount(const struct psr_light *light, const struct figure_model *model, const struct place *place,
                            double to_light[3], double *distance)
 {
@@ -81,7 +82,8 @@ static double light_amount(const struct psr_light *light, const struct figure_mo
 	return amount;
 }
 
-static int is_shadowed(const struct figure_model *model, const struct place *place, const double to_light[3], double distance)
+static int is_shadowed(const struct figure_model *model, const struct place *place, const double to_light[3],
+                       double distance)
 {
 	struct ray ray;
 	uint8_t is_occluded;
@@ -138,7 +140,8 @@ static void draw_pixel(const struct job *job, uint32_t x, uint32_t y)
 
 		for (uint32_t i = 0; i < n; i++)
 			aim(job, x + ((first + i) % side + 0.5) / side, y + ((first + i) / side + 0.5) / side, &ray[i]);
-		ray_scene_trace(job->model->source.scene, ray, (int)n, job->scene->camera.near_z / job->model->source.scale, hit);
+		ray_scene_trace(job->model->source.scene, ray, (int)n,
+		                job->scene->camera.near_z / job->model->source.scale, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			double light[3] = { job->scene->background[0], job->scene->background[1], job->scene->background[2] };
 			struct place place;

@@ -10,24 +10,29 @@
 #define SIDE 256
 #define RAYS 4
 #define WORST 8
+#define BESIDE 4          /* steps before and after one that changes levels */
 #define SHOWN 8           /* times a difference is magnified in the picture */
 
 enum { MAGNIFICATION, PSNR, INSIDE, SAMPLES, DRAWN, OURS, TRUTH, BEYOND, N_COLUMNS };
 
 static const struct study_column columns[N_COLUMNS] = {
-	{ "magnification", "magnification", 4 }, { "PSNR dB", "psnr", 2 }, { "inside", "inside", 2 }, { "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
+	{ "magnification", "magnification", 4 }, { "PSNR dB", "psnr", 2 }, { "inside", "inside", 2 },
+	{ "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
 	{ "change", "ours", 2 }, { "truth's", "truth", 2 }, { "beyond", "beyond", 2 },
 };
 
 /* Columns of $table: 3 + the table's. */
 static const struct study_kind kind = {
 	.name = "zoom",
-	.plot = "set multiplot layout 3,1\nset logscale x 2\nset xrange [4:0.0625]\nset grid\nset lmargin 9\nset style data lines\n"
-	        "set format x ''\nset ylabel 'dB'\nset key bottom left\nplot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
+	.plot = "set multiplot layout 3,1\nset logscale x 2\nset xrange [4:0.0625]\nset grid\nset lmargin 9\n"
+	        "set style data lines\n"
+	        "set format x ''\nset ylabel 'dB'\nset ytics 4\nset key bottom left\n"
+	        "plot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
 	        "'' using 3:5 title 'of those inside' lw 2\n"
-	        "set ylabel 'samples'\nset key top left\nset yrange [0:*]\n"
+	        "set ylabel 'samples'\nset ytics 20\nset key top left\nset yrange [0:*]\n"
 	        "plot $table using 3:6 title 'warped a covered pixel' lw 2\n"
 	        "set format x '%g'\nset xlabel 'magnification'\nset ylabel 'codes'\n"
+	        "set yrange [0:30]\nset ytics 10\nset key top right horizontal\n"
 	        "plot $table using 3:8 title 'change from frame to frame' lw 2, '' using 3:9 title 'of the truth' lw 2, "
 	        "'' using 3:10 title 'beyond it' lw 2\nunset multiplot\n",
 };
@@ -134,6 +139,14 @@ static int changes_level(const struct study_table *table, int i)
 	return i > 0 && *study_at(table, i, 0, DRAWN) < 0.8 * *study_at(table, i - 1, 0, DRAWN);
 }
 
+static int is_beside(const struct study_table *table, int i)
+{
+	for (int k = i - BESIDE; k <= i + BESIDE; k++)
+		if (k > 0 && k < FRAMES && changes_level(table, k))
+			return 1;
+	return 0;
+}
+
 static void rank(int order[FRAMES], const struct study_table *table)
 {
 	for (int i = 1; i < FRAMES; i++) {
@@ -147,28 +160,31 @@ static void rank(int order[FRAMES], const struct study_table *table)
 
 static void print(const struct study_table *table, const int order[FRAMES])
 {
-	double sum[2] = { 0, 0 };
-	int n[2] = { 0, 0 };
+	double sum[3] = { 0, 0, 0 };
+	int n[3] = { 0, 0, 0 };
 
-	printf("%-6s %13s %8s %8s %14s %8s %8s %8s %8s\n", "frame", "magnification", "PSNR dB", "inside", "samples/pixel", "change", "truth's",
-	       "beyond", "");
+	printf("%-6s %13s %8s %8s %14s %8s %8s %8s\n", "frame", "magnification", "PSNR dB", "inside", "samples/pixel", "change",
+	       "truth's", "beyond");
 	for (int k = 0; k < FRAMES; k++) {
 		const int i = k < WORST ? order[k] : k - WORST;
 		const double *row = study_at(table, i, 0, 0);
 
 		if (k == WORST)
 			printf("every eighth:\n");
-		if (k >= WORST && i % 8)
+		if (k >= WORST && i % 8 != 1)
 			continue;
-		printf("%-6d %13.4f %8.2f %8.2f %14.2f %8.2f %8.2f %8.2f %s\n", i, row[MAGNIFICATION], row[PSNR], row[INSIDE], row[SAMPLES], row[OURS], row[TRUTH],
-		       row[BEYOND], changes_level(table, i) ? "levels change" : "");
+		printf("%-6d %13.4f %8.2f %8.2f %14.2f %8.2f %8.2f %8.2f%s\n", i, row[MAGNIFICATION], row[PSNR], row[INSIDE], row[SAMPLES],
+		       row[OURS], row[TRUTH], row[BEYOND], changes_level(table, i) ? " levels change" : "");
 	}
 	for (int i = 1; i < FRAMES; i++) {
-		sum[changes_level(table, i)] += *study_at(table, i, 0, BEYOND);
-		n[changes_level(table, i)]++;
+		const int kind_of = changes_level(table, i) ? 0 : is_beside(table, i) ? 1 : 2;
+
+		sum[kind_of] += *study_at(table, i, 0, BEYOND);
+		n[kind_of]++;
 	}
-	printf("\nbeyond the truth's change, mean: %.2f codes in %d steps that change levels, %.2f in the other %d\n",
-	       sum[1] / n[1], n[1], sum[0] / n[0], n[0]);
+	printf("\nbeyond the truth's change, mean: %.2f codes in the %d steps that change levels, %.2f in the %d around them,\n"
+	       "%.2f in the other %d\n",
+	       sum[0] / n[0], n[0], sum[1] / n[1], n[1], sum[2] / n[2], n[2]);
 }
 
 static int show_difference(struct figures *figures, struct figure_sheet *sheet, const uint8_t *a, const uint8_t *b,

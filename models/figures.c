@@ -72,7 +72,8 @@ int cmd_figures(int argc, char **argv)
 	int64_t n_threads;
 	const struct psr_opt opts[] = {
 		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "print the figures and what they show" },
-		{ .name = "out", .type = PSR_OPT_STRING, .value = &figures.out, .arg = "DIR", .help = "put the pictures into this folder" },
+		{ .name = "out", .type = PSR_OPT_STRING, .value = &figures.out, .arg = "DIR",
+		  .help = "put the pictures into this folder" },
 		{ .name = "keep", .type = PSR_OPT_STRING, .value = &figures.study.keep, .arg = "DIR",
 		  .help = "keep the models that are built in this folder, and read those that are there" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",

@@ -28,8 +28,8 @@ struct figure_model {
 };
 
 /* The generator of this name, or, unless NULL, a shape that `make` makes, which is kept under the name. */
-int figure_model_load(struct figure_model *model, struct figures *figures, const char *name, void (*make)(struct shape *),
-                      uint32_t resolution);
+int figure_model_load(struct figure_model *model, struct figures *figures, const char *name,
+                      void (*make)(struct shape *), uint32_t resolution);
 void figure_model_fini(struct figure_model *model);
 
 /* What is drawn. The scene points into it: it must not move. */
@@ -42,8 +42,8 @@ struct figure_shot {
 
 /* Looks from `toward` (any length) at the middle of the model, a light over the left shoulder; `magnification` is the
  * number of pixels between samples of level 0 there. */
-void figure_shot_init(struct figure_shot *shot, const struct figure_model *model, const double toward[3], double magnification,
-                      uint32_t width, uint32_t height);
+void figure_shot_init(struct figure_shot *shot, const struct figure_model *model, const double toward[3],
+                      double magnification, uint32_t width, uint32_t height);
 
 /* Six directions that have little in common. */
 #define FIGURE_VIEWS 6
@@ -88,9 +88,11 @@ struct figure_score {
 };
 
 int figure_score_add(struct figure_score *score, struct figures *figures, const struct figure_model *model,
-                     const struct figure_shot *shot, const struct figure_frame *frame, const struct figure_truth *truth);
+                     const struct figure_shot *shot, const struct figure_frame *frame,
+                     const struct figure_truth *truth);
 /* The same of the colours alone. */
-void figure_score_colors(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth);
+void figure_score_colors(struct figure_score *score, const struct figure_frame *frame,
+                         const struct figure_truth *truth);
 void figure_score_print_head(const char *first);
 void figure_score_print(const char *label, const struct figure_score *score);
 double figure_psnr(uint64_t square, uint64_t n_pixels);
@@ -119,9 +121,10 @@ void figure_sheet_drop(struct figure_sheet *sheet, uint32_t n_cells); /* frees a
 /* Writes NAME.png into the folder and drops all cells, in any case. IO, MEMORY. */
 int figure_sheet_write(struct figure_sheet *sheet, const struct figures *figures, const char *name);
 
-/* Moves the part to where `a` is further from the truth than `b`, by the most, in pixels that the object covers wholly; returns
- * by how much. */
-uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b, const struct figure_truth *truth);
+/* Moves the part to where `a` is further from the truth than `b`, by the most, in pixels that the object covers wholly;
+ * returns by how much. */
+uint64_t figure_part_find(struct figure_part *part, const uint8_t *a, const uint8_t *b,
+                          const struct figure_truth *truth);
 
 /* ---- figure_compare.c: ways to draw, each against the truth ---- */
 
