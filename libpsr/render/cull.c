@@ -79,8 +79,10 @@ static int sphere_extent(const struct plan *plan, const float c[3], float r, flo
 	return out->x1 >= 0 && out->y1 >= 0 && out->x0 < (float)plan->width && out->y0 < (float)plan->height;
 }
 
-/* Pixels that a length across the surface at the sphere can be stretched to: |d(x'/z')| <= |p| |dp| / z'^2, which is
- * [G] (7.9) with the true stretch off the axis in the place of the distance alone. */
+/* Pixels that a length across the surface can be stretched to where it lies in the sphere: |d(x'/z')| <= |p| |dp| / z'^2, which
+ * is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the angle between p and the
+ * axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound it, the latter as far from the
+ * centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees, only |p| and z' do. */
 static inline float stretch(const struct plan *plan, const float c[3], float r)
 {
 	if (!plan->perspective)
@@ -88,8 +90,13 @@ static inline float stretch(const struct plan *plan, const float c[3], float r)
 	float z = c[2] - r;
 	if (!(z > plan->near_z))
 		z = plan->near_z;
-	float distance = __builtin_sqrtf(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + r;
-	return plan->focal * distance / (z * z);
+	const float side2 = c[0] * c[0] + c[1] * c[1], distance2 = side2 + c[2] * c[2];
+	const float most = plan->focal * (__builtin_sqrtf(distance2) + r) / (z * z);
+	if (!(distance2 > r * r))
+		return most;
+	const float cosine = (c[2] * __builtin_sqrtf(distance2 - r * r) - __builtin_sqrtf(side2) * r) / distance2;
+	const float sharp = cosine > 0 ? plan->focal / (z * cosine) : most;
+	return sharp < most ? sharp : most;
 }
 
 /* Whether samples at this distance in pixels need no depth buffer but the picture's, as the kernel has it. */

@@ -38,11 +38,15 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 		const float cy = ((v.center_m[1][0] * x + v.center_m[1][1] * y) + v.center_m[1][2] * z) + v.center_m[1][3];
 		const float cz = ((v.center_m[2][0] * x + v.center_m[2][1] * y) + v.center_m[2][2] * z) + v.center_m[2][3];
 
-		/* Pixels that a length across the surface at the sphere can be stretched to: |d(x'/z')| <= |p| |dp| / z'^2, which
-		 * is [G] (7.9) with the true stretch off the axis in the place of the distance alone. */
+		/* Pixels that a length across the surface at the sphere can be stretched to, as stretch() of render/cull.c has it
+		 * for clusters. */
 		const float front = cz - r, near = psr_choose(front > v.near_z, front, v.near_z);
-		const float distance = __builtin_sqrtf((cx * cx + cy * cy) + cz * cz) + r;
-		const float stretch = psr_choose(is_perspective, v.focal * distance / (near * near), v.focal);
+		const float side2 = cx * cx + cy * cy, distance2 = side2 + cz * cz, rim2 = distance2 - r * r;
+		const float most = v.focal * (__builtin_sqrtf(distance2) + r) / (near * near);
+		const float cosine = (cz * __builtin_sqrtf(psr_where(rim2 > 0, rim2)) - __builtin_sqrtf(side2) * r) / distance2;
+		const float sharp = v.focal / (near * cosine);
+		const int is_sharp = (rim2 > 0) & (cosine > 0) & (sharp < most);
+		const float stretch = psr_choose(is_perspective, psr_choose(is_sharp, sharp, most), v.focal);
 
 		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding
 		 * does not double the cells of a picture drawn at just the magnification that a level is made for. */

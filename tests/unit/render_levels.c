@@ -159,8 +159,9 @@ static void one_cluster_of_each_group_is_drawn_and_it_is_the_coarsest_that_fits_
 		for (int g = 0; g < GROUPS; g++) {
 			int group = GROUPS - 1 - g;
 			double x = (double)(g - 2) * 0.25 + (double)RADIUS - scene.camera.eye[0], y = (double)RADIUS, r = 1.42 * y;
-			double pixels = side / 2.0 / tan(0.6) * (sqrt(x * x + y * y + distance * distance) + r)
-			                / ((distance - r) * (distance - r));
+			/* 1 / (z cos theta), at the least z and the greatest angle from the axis that the sphere reaches. */
+			double d = sqrt(x * x + y * y + distance * distance), widest = acos(distance / d) + asin(r / d);
+			double pixels = side / 2.0 / tan(0.6) / ((distance - r) * cos(widest));
 
 			assert_true(choice.n_drawn[group] == 1 || (distance < 1 && choice.n_drawn[group] == 0));
 			if (choice.n_drawn[group] == 0 || is_near_a_limit(pixels))
