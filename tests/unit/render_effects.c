@@ -13,6 +13,11 @@
 #include "tests/unit/lib/shapes.h"
 
 #define MODELS 6
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#define CASES 20 /* they take their time */
+#else
+#define CASES 60
+#endif
 
 static struct psr_model *models[MODELS];
 static const char *const names[MODELS] = { "teapot", "wheel", "top", "sphere", "square", "matt sphere" };
@@ -141,7 +146,7 @@ static void assert_same(const struct drawn *a, const struct drawn *b, uint32_t w
 static void leaving_out_changes_no_byte(void **state)
 {
 	(void)state;
-	for (uint32_t which = 0; which < 60; which++) {
+	for (uint32_t which = 0; which < CASES; which++) {
 		struct case_of c;
 		struct drawn lean, full;
 		case_make(&c, which);
@@ -157,7 +162,7 @@ static void leaving_out_changes_no_byte(void **state)
 static void tests_of_blocks_change_no_byte(void **state)
 {
 	(void)state;
-	for (uint32_t which = 0; which < 40; which++) {
+	for (uint32_t which = 0; which < CASES * 2 / 3; which++) {
 		struct case_of c;
 		struct drawn all, some;
 		case_make(&c, which);
@@ -252,7 +257,7 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 static void every_effect_says_why_it_was_left_out(void **state)
 {
 	(void)state;
-	for (uint32_t which = 0; which < 60; which++) {
+	for (uint32_t which = 0; which < CASES; which++) {
 		struct case_of c;
 		struct drawn d;
 		case_make(&c, which);
@@ -274,7 +279,7 @@ static void frames_do_not_depend_on_the_frame_before(void **state)
 	struct psr_renderer *renderer;
 	struct psr_error err;
 	assert_int_equal(psr_renderer_create(&renderer), 0);
-	for (uint32_t i = 0; i < 90; i++) {
+	for (uint32_t i = 0; i < CASES * 3 / 2; i++) {
 		const uint32_t which = i / 3 * 7 % 60;
 		struct case_of c;
 		struct drawn alone, next_one;
