@@ -16,10 +16,5 @@ find "$keep" -name '*.psr' ! -newer "$build/lib/libpsr-build.a" -delete
 for figure; do
 	echo "figure $figure" >&2
 	"$model" figures "$figure" --keep "$keep" --out docs/figures >"$work/table"
-	awk -v begin="<!-- figure $figure -->" -v table="$work/table" '
-		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
-		inside && /^<!-- end -->$/ { inside = 0 }
-		!inside { print }
-	' $page >"$work/page"
-	cat "$work/page" >$page
+	docs/put-table.sh $page "figure $figure" "$work/table"
 done

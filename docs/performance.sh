@@ -16,10 +16,5 @@ for part; do
 	kernels) make --no-print-directory bench-simd ;;
 	*) make --no-print-directory bench only="$part" ;;
 	esac 2>/dev/null | sed "/^make/d;/^Numbers in/d;/^ *$/{N;/^ *\n *$/D}" >"$work/table"
-	awk -v begin="<!-- bench $part -->" -v table="$work/table" '
-		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
-		inside && /^<!-- end -->$/ { inside = 0 }
-		!inside { print }
-	' $page >"$work/page"
-	cat "$work/page" >$page
+	docs/put-table.sh $page "bench $part" "$work/table"
 done

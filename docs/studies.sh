@@ -15,10 +15,5 @@ for study; do
 	grep -q "(studies/$study.svg)" $page && plot=(--plot "$work/$study.svg")
 	"$model" study "$study" --keep "$work" "${plot[@]}" >"$work/table"
 	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/
-	awk -v begin="<!-- study $study -->" -v table="$work/table" '
-		$0 == begin { print; print "```text"; while ((getline line < table) > 0) print line; print "```"; inside = 1; next }
-		inside && /^<!-- end -->$/ { inside = 0 }
-		!inside { print }
-	' $page >"$work/page"
-	cat "$work/page" >$page
+	docs/put-table.sh $page "study $study" "$work/table"
 done

@@ -64,3 +64,13 @@ void psr_free_huge(void *memory, size_t n_bytes)
 	assert(failed == 0);
 	(void)failed;
 }
+
+void *psr_grow_huge(void *memory, size_t *capacity, size_t n_bytes)
+{
+	if (memory != NULL && n_bytes <= *capacity)
+		return memory;
+	psr_free_huge(memory, *capacity);
+	memory = psr_alloc_huge(n_bytes);
+	*capacity = memory != NULL ? n_bytes : 0;
+	return memory;
+}

@@ -2,14 +2,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "psr/direction.h"
 #include "render/render.h"
 #include "render/shadow.h"
-
 
 struct psr_renderer {
 	const struct simd *simd;
@@ -41,13 +39,6 @@ struct psr_renderer {
 	size_t counters_size;
 	uint8_t srgb[65536];      /* of 16-bit linear light */
 };
-
-static uint64_t now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
 
 const char *psr_stage_name(enum psr_stage stage)
 {
@@ -140,16 +131,6 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 	       shadow_bytes(r->shadow);
 }
 
-static void *grow_huge(void *memory, size_t *capacity, size_t size)
-{
-	if (memory && size <= *capacity)
-		return memory;
-	psr_free_huge(memory, *capacity);
-	memory = psr_alloc_huge(size);
-	*capacity = memory ? size : 0;
-	return memory;
-}
-
 static void *grow(void *memory, size_t *capacity, size_t size)
 {
 	if (memory && size <= *capacity)
@@ -191,7 +172,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + cells * 4 + n_bricks);
+	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
 	r->counters = grow(r->counters, &r->counters_size, n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)

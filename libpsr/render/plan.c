@@ -271,7 +271,6 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->n_instances = scene->n_instances;
 	plan->n_lights = 0;
 	for (int i = 0; i < 3; i++) {
-		v3f_set(plan->axis[i], (float)view.axis[i][0], (float)view.axis[i][1], (float)view.axis[i][2]);
 		plan->ambient[i] = (float)scene->ambient[i];
 		plan->background[i] = light16(scene->background[i]);
 	}

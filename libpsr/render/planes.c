@@ -35,8 +35,8 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 	simd->strip_resolve(strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < strip->n; i++)
 		for (int a = 0; a < 3; a++)
-			to[3 * strip->x[i] + a] = to_steps((plan->axis[0][a] * strip->nx[i] + plan->axis[1][a] * strip->ny[i]) +
-			                                   plan->axis[2][a] * strip->nz[i]);
+			to[3 * strip->x[i] + a] = to_steps(((float)plan->frame[0][a] * strip->nx[i] + (float)plan->frame[1][a] * strip->ny[i]) +
+			                                   (float)plan->frame[2][a] * strip->nz[i]);
 }
 
 static void put_instances(const struct plan *plan, uint32_t *to, const struct strip *strip, uint32_t n)

@@ -4,9 +4,17 @@
 
 #include <stdatomic.h>
 #include <stdint.h>
+#include <time.h>
 #include "psr/pool.h"
 #include "psr/render.h"
 #include "simd/simd.h"
+
+static inline uint64_t now_ns(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
+}
 
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 
@@ -41,9 +49,8 @@ struct plan {
 	struct warp_instance *warp; /* what warping knows of each */
 	struct strip_view view;    /* needs is filled by the cull */
 	struct strip_light *light;
-	float axis[3][3];          /* right, down and forward in the world */
 	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
-	double frame[3][3], eye[3]; /* the same as doubles, and where the camera is */
+	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
 	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are empty

@@ -1,15 +1,7 @@
-#include <time.h>
 #include "psr/direction.h"
 #include "render/render.h"
 
 #define TIMED_EVERY 16 /* strips: clocks cost, too */
-
-static uint64_t now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
 
 /* Whether any of the bricks of a part of row y is wanted in linear light. Pixels of weight 0 are filled later, whatever they
  * get here. */

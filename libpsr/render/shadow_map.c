@@ -21,16 +21,6 @@ struct drawing {
 	_Atomic uint64_t n_samples;
 };
 
-static void *grow_huge(void *memory, size_t *capacity, size_t size)
-{
-	if (memory && size <= *capacity)
-		return memory;
-	psr_free_huge(memory, *capacity);
-	memory = psr_alloc_huge(size);
-	*capacity = memory ? size : 0;
-	return memory;
-}
-
 static void clear_cells(float *cells, size_t n)
 {
 	for (size_t i = 0; i < n; i++)
@@ -114,7 +104,7 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 		if (has_seam(&kept->map, k))
 			n += (size_t)(cells_x + 2) * (cells_y + 2);
 	}
-	kept->cells = grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
+	kept->cells = psr_grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
 	if (!kept->cells)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
@@ -163,7 +153,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	rc = cull_blocks(bins, simd, plan, pool, &report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(err, rc, "too many blocks for a shadow map");
-	drawer->word = grow_huge(drawer->word, &drawer->word_size, area * sizeof *drawer->word);
+	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size, area * sizeof *drawer->word);
 	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
 	clear_band(&d);

@@ -42,27 +42,31 @@ struct occlusion {
 	int is_known;
 };
 
-/* Stable, by the upper bits of depth, which are in order for floats above 0. */
+/* In order for depths above 0; what begins at the eye or behind it is nearest. */
+static uint32_t depth_of(const struct bins *bins, uint32_t entry)
+{
+	const float near = bins->hit[bins->entry[entry].hit].near;
+	return near > 0 ? psr_bits_from_float(near) : 0;
+}
+
+/* Stable, by the upper bits of depth. */
 static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
 {
 	uint32_t low = UINT32_MAX, high = 0, count[KEYS + 1] = { 0 };
 	for (uint32_t e = begin; e < end; e++) {
-		const float near = bins->hit[bins->entry[e].hit].near;
-		const uint32_t bits = near > 0 ? psr_bits_from_float(near) : 0;
-		low = bits < low ? bits : low;
-		high = bits > high ? bits : high;
+		const uint32_t depth = depth_of(bins, e);
+		low = depth < low ? depth : low;
+		high = depth > high ? depth : high;
 	}
 	int shift = 0;
 	while ((high - low) >> shift >= KEYS)
 		shift++;
-#define KEY_OF(e) (((bins->hit[bins->entry[e].hit].near > 0 ? psr_bits_from_float(bins->hit[bins->entry[e].hit].near) : 0) - low) >> shift)
 	for (uint32_t e = begin; e < end; e++)
-		count[KEY_OF(e) + 1]++;
+		count[((depth_of(bins, e) - low) >> shift) + 1]++;
 	for (int k = 0; k < KEYS; k++)
 		count[k + 1] += count[k];
 	for (uint32_t e = begin; e < end; e++)
-		bins->order[begin + count[KEY_OF(e)]++] = e;
-#undef KEY_OF
+		bins->order[begin + count[(depth_of(bins, e) - low) >> shift]++] = e;
 }
 
 /* Whether all pixels that the block can change are nearer already. A block that lowers cells of level k changes what is seen

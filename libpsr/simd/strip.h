@@ -7,8 +7,7 @@
 /* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
 #define CONSTANT_FLAGS inline __attribute__((always_inline))
 
-#ifndef STRIP_LIST_IS_ELSEWHERE
-static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+static inline void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	uint32_t n = 0;
 	for (uint32_t x = 0; x < n_pixels; x++) {
@@ -18,7 +17,6 @@ static void strip_list(struct strip *strip, const uint64_t *word, const uint16_t
 	}
 	strip->n = n;
 }
-#endif
 
 static const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
 {

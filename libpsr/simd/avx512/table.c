@@ -1,28 +1,3 @@
-#include "simd/fill.h"
-#include "simd/gaps.h"
-#include "simd/kernels.h"
-#define STRIP_LIST_IS_ELSEWHERE
-#include "simd/cull.h"
-#include "simd/shadow.h"
-#include "simd/strip.h"
-#include "simd/warp_clear.h"
+#include "simd/table.h"
 
-const struct simd simd_avx512 = {
-	.cull = cull,
-	.warp_far = warp_far,
-	.warp_clear = warp_clear,
-	.warp = warp_avx512,
-	.strip_list = strip_list_avx512,
-	.strip_resolve = strip_resolve,
-	.strip_shadow = strip_shadow,
-	.strip_light = strip_light,
-	.strip_lit = strip_lit,
-	.strip_color = strip_color,
-	.strip_write = strip_write,
-	.depth_row = depth_row,
-	.gaps = gaps,
-	.fill_pull = fill_pull,
-	.fill_push = fill_push,
-	.fill_push_picture = fill_push_picture,
-	.fill_depths = fill_depths,
-};
+const struct simd simd_avx512 = SIMD_TABLE(warp_avx512, strip_list_avx512);
