@@ -196,7 +196,7 @@ $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/f
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
-$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c) $(LIB)/libpsr.a
+$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c server/wire.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)

@@ -3,6 +3,7 @@
 #include "base/mem.h"
 #include "draw.h"
 #include "loop.h"
+#include "wire.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -39,17 +40,6 @@ uint64_t draw_worker_bytes(const struct draw_worker *worker)
 	const uint64_t refiner = worker->refiner != NULL ? psr_refiner_bytes(worker->refiner) : 0;
 
 	return psr_renderer_bytes(worker->renderer) + refiner + worker->capacity;
-}
-
-static void make_camera(struct psr_camera *camera, const struct psr_msg_camera *wire)
-{
-	memcpy(camera->eye, wire->eye, sizeof camera->eye);
-	memcpy(camera->target, wire->target, sizeof camera->target);
-	memcpy(camera->up, wire->up, sizeof camera->up);
-	camera->kind = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
-	camera->fov_y = camera->kind == PSR_CAMERA_PERSPECTIVE ? wire->extent : 0;
-	camera->ortho_height = camera->kind == PSR_CAMERA_ORTHOGRAPHIC ? wire->extent : 0;
-	camera->near_z = wire->near_z;
 }
 
 static double spacing_of(const struct psr_msg_frame *request)
@@ -232,7 +222,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
 	int code;
 
-	make_camera(&scene.camera, &d->request.camera);
+	wire_to_camera(&scene.camera, &d->request.camera);
 	code = reserve_pixels(worker, d, &picture, err);
 	if (code == PSR_OK)
 		code = draw_pass(d, worker, &scene, &picture, err);

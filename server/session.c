@@ -7,8 +7,8 @@
 #include "opener.h"
 #include "server.h"
 #include "session.h"
-#include "session_preset.h"
 #include "session_scene.h"
+#include "wire.h"
 
 int session_init(struct session *session, uint32_t max_handles)
 {
@@ -125,9 +125,9 @@ static void send_presets(struct conn *conn, uint32_t id, uint32_t number)
 
 		buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
 		if (is_camera)
-			preset_from_camera(&msg, &presets->camera[i]);
+			wire_from_camera(&msg, &presets->camera[i]);
 		else
-			preset_from_light(&msg, &presets->light[i - presets->n_cameras]);
+			wire_from_light(&msg, &presets->light[i - presets->n_cameras]);
 		if (psr_msg_preset_encode(&buf, id, &msg, NULL) != PSR_OK)
 			continue;
 		conn_send(conn, &buf);

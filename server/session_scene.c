@@ -5,7 +5,7 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "session_scene.h"
-
+#include "wire.h"
 
 struct scene *scene_ref(struct scene *scene)
 {
@@ -55,22 +55,6 @@ static int add_instance(struct scene *scene, const struct session *session, cons
 	return PSR_OK;
 }
 
-static void add_light(struct scene *scene, const struct psr_msg_light *msg)
-{
-	struct psr_light *light = &scene->light[scene->scene.n_lights++];
-
-	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
-	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
-	light->casts_shadow = (msg->flags & PSR_WIRE_LIGHT_SHADOW) != 0;
-	memcpy(light->position, msg->position, sizeof light->position);
-	memcpy(light->direction, msg->direction, sizeof light->direction);
-	for (int k = 0; k < 3; k++)
-		light->color[k] = (double)psr_srgb_to_linear[msg->color[k]] * msg->intensity;
-	light->outer = msg->outer;
-	light->inner = msg->inner;
-	light->reference = msg->reference;
-}
-
 int scene_create(struct scene **out, const struct session *session, struct catalogue *catalogue,
                  const struct psr_msg_scene *msg, struct psr_error *err)
 {
@@ -91,7 +75,7 @@ int scene_create(struct scene **out, const struct session *session, struct catal
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
 		code = add_instance(scene, session, &msg->instance[i], err);
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
-		add_light(scene, &msg->light[i]);
+		wire_to_light(&scene->light[scene->scene.n_lights++], &msg->light[i]);
 	if (code != PSR_OK) {
 		scene_unref(scene);
 		return code;

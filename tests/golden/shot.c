@@ -5,6 +5,7 @@
 #include "base/srgb.h"
 #include "psr/cli.h"
 #include "psr/client.h"
+#include "server/wire.h"
 #include "tests/golden/shot.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
@@ -48,31 +49,6 @@ static int parse_words(struct words *words, struct shot *shot, int argc, char **
 	return psr_cli_parse(&cli, argc, argv, NULL, err);
 }
 
-static void make_camera(struct psr_camera *camera, const struct psr_msg_camera *wire)
-{
-	memcpy(camera->eye, wire->eye, sizeof camera->eye);
-	memcpy(camera->target, wire->target, sizeof camera->target);
-	memcpy(camera->up, wire->up, sizeof camera->up);
-	camera->kind = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
-	camera->fov_y = camera->kind == PSR_CAMERA_PERSPECTIVE ? wire->extent : 0;
-	camera->ortho_height = camera->kind == PSR_CAMERA_ORTHOGRAPHIC ? wire->extent : 0;
-	camera->near_z = wire->near_z;
-}
-
-static void make_light(struct psr_light *light, const struct psr_msg_light *wire)
-{
-	light->kind = wire->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
-	              : wire->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
-	light->casts_shadow = (wire->flags & PSR_WIRE_LIGHT_SHADOW) != 0;
-	memcpy(light->position, wire->position, sizeof light->position);
-	memcpy(light->direction, wire->direction, sizeof light->direction);
-	for (int k = 0; k < 3; k++)
-		light->color[k] = (double)psr_srgb_to_linear[wire->color[k]] * wire->intensity;
-	light->outer = wire->outer;
-	light->inner = wire->inner;
-	light->reference = wire->reference;
-}
-
 static int make_scene(struct shot *shot, struct words *words, struct psr_error *err)
 {
 	const struct psr_model_info *info = psr_model_info(shot->instance.model);
@@ -86,9 +62,9 @@ static int make_scene(struct shot *shot, struct words *words, struct psr_error *
 		return rc;
 	if (!words->n_lights && !words->has_ambient)
 		psr_light_key(&words->light[words->n_lights++], &camera);
-	make_camera(&shot->scene.camera, &camera);
+	wire_to_camera(&shot->scene.camera, &camera);
 	for (uint32_t i = 0; i < words->n_lights; i++)
-		make_light(&shot->light[i], &words->light[i]);
+		wire_to_light(&shot->light[i], &words->light[i]);
 	shot->scene.instance = &shot->instance;
 	shot->scene.n_instances = 1;
 	shot->scene.light = shot->light;

@@ -1,8 +1,35 @@
 #include <string.h>
 #include "base/srgb.h"
-#include "session_preset.h"
+#include "wire.h"
 
-void preset_from_camera(struct psr_msg_preset *msg, const struct psr_preset_camera *preset)
+void wire_to_camera(struct psr_camera *camera, const struct psr_msg_camera *msg)
+{
+	const int is_perspective = msg->kind == PSR_WIRE_CAMERA_PERSPECTIVE;
+
+	memcpy(camera->eye, msg->eye, sizeof camera->eye);
+	memcpy(camera->target, msg->target, sizeof camera->target);
+	memcpy(camera->up, msg->up, sizeof camera->up);
+	camera->kind = is_perspective ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = is_perspective ? msg->extent : 0;
+	camera->ortho_height = is_perspective ? 0 : msg->extent;
+	camera->near_z = msg->near_z;
+}
+
+void wire_to_light(struct psr_light *light, const struct psr_msg_light *msg)
+{
+	light->kind = msg->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? PSR_LIGHT_DIRECTIONAL
+	              : msg->kind == PSR_WIRE_LIGHT_POINT ? PSR_LIGHT_POINT : PSR_LIGHT_SPOT;
+	light->casts_shadow = (msg->flags & PSR_WIRE_LIGHT_SHADOW) != 0;
+	memcpy(light->position, msg->position, sizeof light->position);
+	memcpy(light->direction, msg->direction, sizeof light->direction);
+	for (int k = 0; k < 3; k++)
+		light->color[k] = (double)psr_srgb_to_linear[msg->color[k]] * msg->intensity;
+	light->outer = msg->outer;
+	light->inner = msg->inner;
+	light->reference = msg->reference;
+}
+
+void wire_from_camera(struct psr_msg_preset *msg, const struct psr_preset_camera *preset)
 {
 	const struct psr_camera *from = &preset->camera;
 	struct psr_msg_camera *to = &msg->camera;
@@ -31,7 +58,7 @@ static void color_and_intensity(struct psr_msg_light *to, const double color[3])
 	to->intensity = most < PSR_WIRE_MAX_INTENSITY ? most : PSR_WIRE_MAX_INTENSITY;
 }
 
-void preset_from_light(struct psr_msg_preset *msg, const struct psr_preset_light *preset)
+void wire_from_light(struct psr_msg_preset *msg, const struct psr_preset_light *preset)
 {
 	const struct psr_light *from = &preset->light;
 	struct psr_msg_light *to = &msg->light;
