@@ -5,14 +5,15 @@
 #include "base/maths.h"
 #include "simd/simd.h"
 
-#define TILE_STRIDE (GAPS_WIDTH + 32) /* a column of neighbours on each side, and aligned rows */
-#define TILE_LEFT 16
+#define GAPS_STRIDE (GAPS_WIDTH + 32) /* a column of neighbors on each side, and aligned rows */
+#define GAPS_LEFT 16
 #define MAX_CELLS (GAPS_WIDTH / 2 + 2)
 #define MAX_SPREAD (GAPS_WIDTH + 2 * (1 << PSR_MAX_DEPTH_LEVEL))
 
-/* Depths of a piece of the picture and of the pixels around it. */
+/* Depths of a piece of the picture and of the pixels around it; what is not in the picture is at infinity. Loops are over all
+ * GAPS_WIDTH columns. */
 struct gaps_tile {
-	_Alignas(64) float z[GAPS_BRICK + 2][TILE_STRIDE];
+	_Alignas(64) float z[GAPS_BRICK + 2][GAPS_STRIDE];
 	int32_t has_samples[GAPS_BRICK + 2]; /* by row */
 	uint32_t x0, y0, width, height;
 };
@@ -22,12 +23,14 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 	const uint32_t first = tile->x0 ? tile->x0 - 1 : 0;
 	const uint32_t end = tile->x0 + tile->width < stack->width ? tile->x0 + tile->width + 1 : stack->width;
 	for (uint32_t i = 0; i < tile->height + 2; i++) {
-		float *z = &tile->z[i][TILE_LEFT];
+		float *z = &tile->z[i][GAPS_LEFT];
 		int32_t has_samples = 0;
-		z[-1] = z[tile->width] = INFINITY;
+		z[-1] = INFINITY;
+		for (uint32_t x = tile->width; x <= GAPS_WIDTH; x++)
+			z[x] = INFINITY;
 		tile->has_samples[i] = 0;
 		if (tile->y0 + i < 1 || tile->y0 + i > stack->height) {
-			for (uint32_t x = 0; x < tile->width; x++)
+			for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 				z[x] = INFINITY;
 			continue;
 		}
@@ -35,9 +38,9 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 		float *to = z + first - tile->x0;
 		for (uint32_t x = 0; x < end - first; x++)
 			to[x] = psr_float_from_bits((uint32_t)(word[x] >> 32));
-		for (uint32_t x = 0; x < end - first; x++)
-			has_samples |= to[x] < INFINITY;
-		tile->has_samples[i] = has_samples;
+		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+			has_samples |= z[x] < INFINITY;
+		tile->has_samples[i] = has_samples | (z[-1] < INFINITY) | (z[GAPS_WIDTH] < INFINITY);
 	}
 }
 
@@ -77,9 +80,8 @@ static void find_limits(struct limits *to, const struct gaps_target *t, int k, u
 	to->has_either = 0;
 	if (has_any)
 		spread(to->own, n, k);
-	else
-		for (uint32_t x = 0; x < MAX_SPREAD; x++)
-			to->own[x] = INFINITY;
+	for (uint32_t x = has_any ? n << k : 0; x < GAPS_WIDTH + (2u << k); x++)
+		to->own[x] = INFINITY;
 }
 
 static void find_either(struct limits *to, const struct gaps_target *t, int k)
@@ -108,140 +110,156 @@ static void find_either(struct limits *to, const struct gaps_target *t, int k)
 		}
 	}
 	spread(to->either, n, k);
+	for (uint32_t x = n << k; x < GAPS_WIDTH + (2u << k); x++)
+		to->either[x] = INFINITY;
 }
 
-/* Where pixels stand between the centres of a level's cells, in units of a half pixel. */
-struct between {
-	int32_t left[GAPS_WIDTH], right[GAPS_WIDTH]; /* shares of the cell on either side: they add up to 2^(k+1) */
+/* A level, as a row of pixels sees it. */
+struct gaps_level {
+	struct limits limits[2], *upper, *lower;
+	float left[GAPS_WIDTH], right[GAPS_WIDTH]; /* shares of the cell on either side, half pixels: they add up to 2^(k+1) */
 };
 
-/* Bilinear coverage of a row of pixels; upper and lower limits begin with the left neighbours of the first pixel. */
-static void cover_row(int32_t *cover, const float *z, const float *upper, const float *lower, const struct between *at, int k,
-                      int32_t fy, uint32_t n)
+static void begin_level(struct gaps_level *level, int k)
 {
-	const uint32_t step = 1u << k;
-	const int32_t rest = (2 << k) - fy, up = k < 3 ? 6 - 2 * k : 0, down = k > 3 ? 2 * k - 6 : 0;
-	for (uint32_t x = 0; x < n; x++) {
-		const int32_t above = (upper[x] < z[x] ? at->left[x] : 0) + (upper[x + step] < z[x] ? at->right[x] : 0);
-		const int32_t below = (lower[x] < z[x] ? at->left[x] : 0) + (lower[x + step] < z[x] ? at->right[x] : 0);
-		cover[x] = (above * rest + below * fy) << up >> down;
+	level->upper = &level->limits[0];
+	level->lower = &level->limits[1];
+	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
+		const int32_t right = (int32_t)((2 * x + 1 + (1u << k)) & ((2u << k) - 1));
+		level->right[x] = (float)right;
+		level->left[x] = (float)((2 << k) - right);
 	}
 }
 
-/* Lowers weights by the coverage of level k; returns whether there was anything to cover them.
+/* Bilinear coverage of a row of pixels; upper and lower limits begin with the left neighbors of the first pixel. Shares are
+ * whole numbers, and their products multiples of a power of two that fit a float. */
+static inline void cover_row(int32_t *cover, const float *z, const float *upper, const float *lower, const struct gaps_level *level,
+                             int k, int32_t fy)
+{
+	const uint32_t step = 1u << k;
+	const float unit = (float)GAPS_WHOLE / (float)(4 << 2 * k), below = (float)fy * unit, above = (float)((2 << k) - fy) * unit;
+	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
+		const float left = level->left[x], right = level->right[x], depth = z[x];
+		const float high = psr_where(upper[x] < depth, left) + psr_where(upper[x + step] < depth, right);
+		const float low = psr_where(lower[x] < depth, left) + psr_where(lower[x + step] < depth, right);
+		cover[x] = (int32_t)(high * above + low * below);
+	}
+}
+
+/* Lowers the weights of row y by the coverage of level k; returns whether there was anything to cover them.
  *
- * A surface may pass from blocks of one level to blocks of the next within a pixel's neighbourhood, and then neither
+ * A surface may pass from blocks of one level to blocks of the next within a pixel's neighborhood, and then neither
  * level covers it whole ([G] 9.1.2). Where the coarser one covers a part of a pixel, what counts is the coverage by
  * the coarser cells that either level fills: not the sum, which would take weight twice where blocks of both levels
  * hold the same surface. */
-static int cover_level(const struct gaps_target *t, const struct gaps_tile *tile, int k)
+static int cover_level(int32_t *weight, struct gaps_level *level, const struct gaps_target *t, const struct gaps_tile *tile, int k,
+                       uint32_t y)
 {
 	const int has_finer = k > 1 && (t->stack->levels >> (k - 1) & 1);
-	const uint32_t half = 1u << (k - 1), n = tile->width;
-	const uint32_t i = tile->x0 >> k, n_cells = ((n - 1 + half) >> k) + 2;
-	struct limits limits[2], *upper = &limits[0], *lower = &limits[1];
-	struct between at;
-	int32_t cover[GAPS_WIDTH], either[GAPS_WIDTH];
-	int has_cells = 0;
-
+	const uint32_t half = 1u << (k - 1), i = tile->x0 >> k, n_cells = ((tile->width - 1 + half) >> k) + 2;
+	const uint32_t from_top = 2 * (tile->y0 + y) + 1 + (1u << k); /* a cell further down: not below 0 */
+	const uint32_t j = from_top >> (k + 1);
+	const int32_t fy = (int32_t)(from_top & ((2u << k) - 1));
+	const float *z = &tile->z[y + 1][GAPS_LEFT];
+	_Alignas(64) int32_t cover[GAPS_WIDTH], either[GAPS_WIDTH];
+	if (y == 0)
+		find_limits(level->lower, t, k, i, j, n_cells);
+	if (y == 0 || fy == 1) {
+		struct limits *was = level->upper;
+		level->upper = level->lower;
+		level->lower = was;
+		find_limits(level->lower, t, k, i, j + 1, n_cells);
+	}
+	struct limits *upper = level->upper, *lower = level->lower;
+	if (upper->is_empty && lower->is_empty)
+		return 0;
+	cover_row(cover, z, upper->own + half, lower->own + half, level, k, fy);
+	if (has_finer) {
+		find_either(upper, t, k);
+		find_either(lower, t, k);
+		cover_row(either, z, upper->either + half, lower->either + half, level, k, fy);
+		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+			cover[x] = cover[x] > 0 && cover[x] < GAPS_WHOLE ? either[x] : cover[x];
+	}
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
-		at.right[x] = (int32_t)((2 * x + 1 + (1u << k)) & ((2u << k) - 1));
-		at.left[x] = (2 << k) - at.right[x];
+		const int32_t left = GAPS_WHOLE - cover[x];
+		weight[x] = left < weight[x] ? left : weight[x];
 	}
-	for (uint32_t y = 0; y < tile->height; y++) {
-		const uint32_t from_top = 2 * (tile->y0 + y) + 1 + (1u << k); /* a cell further down: not below 0 */
-		const uint32_t j = from_top >> (k + 1);
-		const int32_t fy = (int32_t)(from_top & ((2u << k) - 1));
-		if (y == 0)
-			find_limits(lower, t, k, i, j, n_cells);
-		if (y == 0 || fy == 1) {
-			struct limits *was = upper;
-			upper = lower;
-			lower = was;
-			find_limits(lower, t, k, i, j + 1, n_cells);
-		}
-		if (upper->is_empty && lower->is_empty)
-			continue;
-		has_cells = 1;
-		const float *z = &tile->z[y + 1][TILE_LEFT];
-		uint16_t *weight = t->weight + (size_t)(tile->y0 + y) * t->stack->width + tile->x0;
-		cover_row(cover, z, upper->own + half, lower->own + half, &at, k, fy, n);
-		if (has_finer) {
-			find_either(upper, t, k);
-			find_either(lower, t, k);
-			cover_row(either, z, upper->either + half, lower->either + half, &at, k, fy, n);
-			for (uint32_t x = 0; x < n; x++)
-				cover[x] = cover[x] > 0 && cover[x] < GAPS_WHOLE ? either[x] : cover[x];
-		}
-		for (uint32_t x = 0; x < n; x++) {
-			const int32_t left = GAPS_WHOLE - cover[x], was = weight[x];
-			weight[x] = (uint16_t)(left < was ? left : was);
-		}
-	}
-	return has_cells;
+	return 1;
 }
 
 /* The same by opaque squares. */
-static int cover_opaque(const struct gaps_target *t, const struct gaps_tile *tile, int k)
+static int cover_opaque(int32_t *weight, const struct gaps_target *t, const struct gaps_tile *tile, int k, uint32_t y)
 {
 	const struct psr_zstack *stack = t->stack;
+	const float *cell = stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
+	const float *z = &tile->z[y + 1][GAPS_LEFT];
 	int has_cells = 0;
-	for (uint32_t y = 0; y < tile->height; y++) {
-		const float *cell = stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
-		const float *z = &tile->z[y + 1][TILE_LEFT];
-		uint16_t *weight = t->weight + (size_t)(tile->y0 + y) * stack->width + tile->x0;
-		for (uint32_t x = 0; x < tile->width; x++) {
-			has_cells |= cell[x >> k] < INFINITY;
-			weight[x] = cell[x >> k] * t->scale[k] + t->offset[k] < z[x] ? 0 : weight[x];
-		}
+	for (uint32_t x = 0; x < tile->width; x++) {
+		has_cells |= cell[x >> k] < INFINITY;
+		weight[x] = cell[x >> k] * t->scale[k] + t->offset[k] < z[x] ? 0 : weight[x];
 	}
 	return has_cells;
 }
 
 /* Samples of level 0 leave no pixel out but for rounding, and then a single one: the guard takes pixels that lie behind at
- * least seven of their eight neighbours, where those are one surface: within one threshold of each other, since deep in a
+ * least seven of their eight neighbors, where those are one surface: within one threshold of each other, since deep in a
  * crevice there may be anything; but within that of a coarser level where the pixel is empty, since what is seen through a
  * model is seldom one pixel wide. */
 #define ALIKE 1
 #define ALIKE_BEFORE_NOTHING 4
+#define GUARD_RUN 32
 
-static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *tile, uint32_t y, uint16_t *weight)
+static uint32_t guard_run(int32_t *weight, const struct gaps_target *t, const float *above, const float *own, const float *below)
 {
 	const float scale = t->scale[1], offset = t->offset[1];
 	const float alike = t->scale[ALIKE], alike_offset = t->offset[ALIKE];
 	const float nothing = t->scale[ALIKE_BEFORE_NOTHING], nothing_offset = t->offset[ALIKE_BEFORE_NOTHING];
-	const float *above = &tile->z[y][TILE_LEFT], *own = above + TILE_STRIDE, *below = own + TILE_STRIDE;
-	uint32_t n_pinholes = 0;
-
-	if (!(tile->has_samples[y] | tile->has_samples[y + 2]))
-		return 0;
-	/* Most rows have none: one of the two beside it lies before a pinhole, and one of those above and below. Where cells cover
-	 * the pixel already, nothing is left to take. */
-	for (uint32_t x = 0; x < tile->width; x++) {
-		const float side = own[(int32_t)x - 1] < own[x + 1] ? own[(int32_t)x - 1] : own[x + 1];
-		const float line = above[x] < below[x] ? above[x] : below[x];
-		const float later = side < line ? line : side;
-		n_pinholes |= (later * scale + offset < own[x]) & (weight[x] > 0);
-	}
-	if (!n_pinholes)
-		return 0;
-	n_pinholes = 0;
-	for (uint32_t x = 0; x < tile->width; x++) {
-		const int32_t left = (int32_t)x - 1, right = (int32_t)x + 1;
-		const float z[8] = { above[left], above[x], above[right], own[left], own[right], below[left], below[x], below[right] };
+	int32_t n_pinholes = 0;
+	for (int x = 0; x < GUARD_RUN; x++) {
+		const float z[8] = { above[x - 1], above[x], above[x + 1], own[x - 1], own[x + 1], below[x - 1], below[x], below[x + 1] };
 		float nearest = INFINITY, farthest = 0;
 		int32_t n_before = 0;
 		for (int i = 0; i < 8; i++) {
 			const int32_t is_before = z[i] * scale + offset < own[x];
-			const float seen = is_before ? z[i] : 0;
+			const float seen = psr_where(is_before, z[i]);
 			n_before += is_before;
 			nearest = z[i] < nearest ? z[i] : nearest;
 			farthest = seen > farthest ? seen : farthest;
 		}
 		const float limit = nearest * alike + alike_offset, limit_before_nothing = nearest * nothing + nothing_offset;
-		const int32_t is_pinhole = (weight[x] > 0) & (n_before >= 7) & (farthest <= (own[x] < INFINITY ? limit : limit_before_nothing));
+		const int32_t is_alike = farthest <= psr_choose(own[x] < INFINITY, limit, limit_before_nothing);
+		const int32_t is_pinhole = (weight[x] > 0) & (n_before >= 7) & is_alike;
 		weight[x] = is_pinhole ? 0 : weight[x];
-		n_pinholes += (uint32_t)is_pinhole;
+		n_pinholes += is_pinhole;
+	}
+	return (uint32_t)n_pinholes;
+}
+
+/* Most runs have none: one of the two beside it lies before a pinhole, and one of those above and below. Where cells cover
+ * the pixel already, nothing is left to take. */
+static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps_target *t, const float *above, const float *own,
+                                        const float *below)
+{
+	const float scale = t->scale[1], offset = t->offset[1];
+	int32_t is_near = 0;
+	for (int x = 0; x < GUARD_RUN; x++) {
+		const float side = own[x - 1] < own[x + 1] ? own[x - 1] : own[x + 1], line = above[x] < below[x] ? above[x] : below[x];
+		const float later = side < line ? line : side;
+		is_near |= (later * scale + offset < own[x]) & (weight[x] > 0);
+	}
+	return is_near;
+}
+
+static uint32_t guard_row(int32_t *weight, const struct gaps_target *t, const struct gaps_tile *tile, uint32_t y)
+{
+	uint32_t n_pinholes = 0;
+	if (!(tile->has_samples[y] | tile->has_samples[y + 2]))
+		return 0;
+	for (uint32_t x = 0; x < tile->width; x += GUARD_RUN) {
+		const float *above = &tile->z[y][GAPS_LEFT + x], *own = above + GAPS_STRIDE, *below = own + GAPS_STRIDE;
+		if (may_have_pinholes(weight + x, t, above, own, below))
+			n_pinholes += guard_run(weight + x, t, above, own, below);
 	}
 	return n_pinholes;
 }
@@ -249,34 +267,44 @@ static uint32_t guard_row(const struct gaps_target *t, const struct gaps_tile *t
 static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1, uint8_t *marks)
 {
 	struct gaps_tile tile = { .x0 = x0, .y0 = y0, .width = x1 - x0, .height = y1 - y0 };
+	struct gaps_level level[PSR_MAX_DEPTH_LEVEL + 1];
 	struct gaps_counts counts = { 0, 0, 0 };
-	const uint32_t stride = t->stack->width;
-	int has_cells = 0;
+	_Alignas(64) int32_t is_marked[GAPS_WIDTH] = { 0 }, n_partial[GAPS_WIDTH] = { 0 };
 	load_depths(&tile, t->stack);
-	for (uint32_t y = y0; y < y1; y++)
-		for (uint32_t x = x0; x < x1; x++)
-			t->weight[(size_t)y * stride + x] = GAPS_WHOLE;
-	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL && !t->opaque_cells; k++)
 		if (t->stack->levels >> k & 1)
-			has_cells |= t->opaque_cells ? cover_opaque(t, &tile, k) : cover_level(t, &tile, k);
-	for (uint32_t y = 0; y < tile.height; y++)
-		counts.n_pinholes += guard_row(t, &tile, y, t->weight + (size_t)(y0 + y) * stride + x0);
-
-	memset(marks, 0, GAPS_WIDTH / GAPS_BRICK);
-	for (uint32_t brick = 0; (has_cells || counts.n_pinholes) && brick < GAPS_WIDTH / GAPS_BRICK; brick++) {
-		const uint32_t first = brick * GAPS_BRICK, end = first + GAPS_BRICK < tile.width ? first + GAPS_BRICK : tile.width;
-		uint32_t is_marked = 0;
-		for (uint32_t y = 0; y < tile.height; y++) {
-			const uint16_t *weight = t->weight + (size_t)(y0 + y) * stride + x0;
-			const float *z = &tile.z[y + 1][TILE_LEFT];
-			for (uint32_t x = first; x < end; x++) {
-				const uint32_t is_partial = weight[x] < GAPS_WHOLE;
-				is_marked |= is_partial;
-				counts.n_partial += is_partial & (z[x] < INFINITY);
-			}
+			begin_level(&level[k], k);
+	for (uint32_t y = 0; y < tile.height; y++) {
+		uint16_t *to = t->weight + (size_t)(y0 + y) * t->stack->width + x0;
+		const float *z = &tile.z[y + 1][GAPS_LEFT];
+		_Alignas(64) int32_t weight[GAPS_WIDTH];
+		int is_less = 0;
+		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+			weight[x] = GAPS_WHOLE;
+		for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+			if (t->stack->levels >> k & 1)
+				is_less |= t->opaque_cells ? cover_opaque(weight, t, &tile, k, y) : cover_level(weight, &level[k], t, &tile, k, y);
+		const uint32_t n_pinholes = guard_row(weight, t, &tile, y);
+		counts.n_pinholes += n_pinholes;
+		for (uint32_t x = 0; x < tile.width; x++)
+			to[x] = (uint16_t)weight[x];
+		if (!is_less && !n_pinholes)
+			continue;
+		for (uint32_t x = 0; x < tile.width; x++) {
+			const int32_t is_partial = weight[x] < GAPS_WHOLE;
+			is_marked[x] |= is_partial;
+			n_partial[x] += is_partial & (z[x] < INFINITY);
 		}
-		marks[brick] = (uint8_t)is_marked;
-		counts.n_marked += is_marked;
+	}
+	for (uint32_t brick = 0; brick < GAPS_WIDTH / GAPS_BRICK; brick++) {
+		int32_t is_any = 0, n = 0;
+		for (uint32_t x = brick * GAPS_BRICK; x < (brick + 1) * GAPS_BRICK; x++) {
+			is_any |= is_marked[x];
+			n += n_partial[x];
+		}
+		marks[brick] = (uint8_t)is_any;
+		counts.n_marked += (uint32_t)is_any;
+		counts.n_partial += (uint32_t)n;
 	}
 	return counts;
 }
