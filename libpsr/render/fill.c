@@ -132,12 +132,12 @@ static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 	return fill->brick_top + 1;
 }
 
-/* The end of a run of bricks of row `by` with the same value as bx in a map. */
-static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by)
+/* The end of a run of bricks of row `by`, of which all have more than `least` in a map. */
+static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by, int least)
 {
 	const uint8_t *row = map + (size_t)by * fill->bricks_x;
 	uint32_t end = bx + 1;
-	while (end < fill->bricks_x && end - bx < FILL_RUN && row[end] == row[bx])
+	while (end < fill->bricks_x && end - bx < FILL_RUN && row[end] > least)
 		end++;
 	return end;
 }
@@ -146,11 +146,12 @@ void fill_look(struct fill *fill, uint32_t row)
 {
 	const uint8_t *bricks = fill->picture.bricks + (size_t)row * fill->bricks_x;
 	uint8_t *whole = fill->whole + (size_t)row * fill->bricks_x;
+	memset(whole, 0, fill->bricks_x);
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = run_end(fill, fill->picture.bricks, bx, row);
-		memset(whole + bx, 0, end - bx);
+		end = bx + 1;
 		if (!bricks[bx])
 			continue;
+		end = run_end(fill, fill->picture.bricks, bx, row, 0);
 		fill_pull_bricks(fill, bx, end, row, fill->brick_top, FILL_WEIGHTS_UNTIL_WHOLE);
 		for (uint32_t b = bx; b < end; b++)
 			whole[b] = (uint8_t)whole_level(fill, b, row);
@@ -239,8 +240,11 @@ const uint8_t *fill_wants(struct fill *fill)
 			fill->needs[i] = fill->whole[i] ? greatest_around(fill, fill->whole, bx, by) : 0;
 			fill->is_coarse |= fill->whole[i] > fill->brick_top;
 		}
-	for (size_t i = 0; i < n_bricks; i++)
+	fill->needed = 0;
+	for (size_t i = 0; i < n_bricks; i++) {
 		fill->needs[i] = fill->needs[i] > fill->brick_top ? (uint8_t)fill->brick_top : fill->needs[i];
+		fill->needed = fill->needs[i] > fill->needed ? fill->needs[i] : fill->needed;
+	}
 	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
 		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++)
 			fill->wants[i] = greatest_around(fill, fill->needs, bx, by);
@@ -253,8 +257,26 @@ void fill_pull(struct fill *fill, uint32_t row)
 {
 	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = run_end(fill, fill->wants, bx, row);
-		fill_pull_bricks(fill, bx, end, row, wants[bx], FILL_COLORS);
+		int level = 0;
+		end = wants[bx] ? run_end(fill, fill->wants, bx, row, 0) : bx + 1;
+		for (uint32_t b = bx; b < end; b++)
+			level = wants[b] > level ? wants[b] : level;
+		fill_pull_bricks(fill, bx, end, row, level, FILL_COLORS);
+	}
+}
+
+/* Cells of a level below brick_top: those that no pixel needs, too, of bricks where some are, maybe from cells that hold anything. */
+static void push_level_row(int i, void *userdata)
+{
+	struct fill *fill = userdata;
+	const uint8_t *wants = fill->wants + (size_t)i * fill->bricks_x;
+	const int level = fill->pushed;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = bx + 1;
+		if (wants[bx] <= level)
+			continue;
+		end = run_end(fill, fill->wants, bx, (uint32_t)i, level);
+		fill_push_level(fill, bx, end, (uint32_t)i, level);
 	}
 }
 
@@ -263,9 +285,11 @@ static void push_row(int i, void *userdata)
 	struct fill *fill = userdata;
 	const uint8_t *needs = fill->needs + (size_t)i * fill->bricks_x;
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = run_end(fill, fill->needs, bx, (uint32_t)i);
-		if (needs[bx])
-			fill_push_bricks(fill, bx, end, (uint32_t)i, needs[bx]);
+		end = bx + 1;
+		if (!needs[bx])
+			continue;
+		end = run_end(fill, fill->needs, bx, (uint32_t)i, 0);
+		fill_push_bricks(fill, bx, end, (uint32_t)i);
 	}
 }
 
@@ -309,6 +333,8 @@ void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repo
 {
 	if (fill->is_coarse)
 		run_coarse(fill);
+	for (fill->pushed = fill->needed - 1; fill->pushed > 0; fill->pushed--)
+		psr_pool_for(pool, (int)fill->bricks_y, push_level_row, fill);
 	psr_pool_for(pool, (int)fill->bricks_y, push_row, fill);
 	report->count[PSR_STAGE_FILL] += fill->n_changed;
 	report->n_filled += fill->n_filled;

@@ -72,62 +72,17 @@ void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 	}
 }
 
-/* Cells of levels 1..5 that bricks are pushed through, so that what bricks share stays as it was pulled. They reach a
- * cell beyond the bricks; a row's border is there to be read and written, and never used. */
-#define BORDER 2
-#define STRIDE(level) (FILL_RUN * (BRICK >> (level)) + 2 * BORDER + 1)
-#define AREA(level) (STRIDE(level) * ((BRICK >> (level)) + 2))
-
-struct scratch {
-	struct fill_level level[FILL_BRICK_LEVELS + 1];
-	uint16_t values[4 * (AREA(1) + AREA(2) + AREA(3) + AREA(4) + AREA(5))];
-	float z[AREA(1) + AREA(2) + AREA(3) + AREA(4) + AREA(5)];
-};
-
-static void copy_cells(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
+void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
 {
-	for (int i = 0; i < BORDER - 1; i++)
-		to[i] = outside;
-	memcpy(to + BORDER - 1, from, n * sizeof *to);
-	for (int i = 0; i < BORDER; i++)
-		to[BORDER - 1 + n + (uint32_t)i] = outside;
-}
-
-/* What was pulled, with the cells around it. */
-static void load_level(struct scratch *scratch, const struct fill *fill, int l, uint32_t bx0, uint32_t bx1, uint32_t by)
-{
-	const struct fill_level *from = &fill->level[l];
-	struct fill_level *to = &scratch->level[l];
-	const uint32_t side = BRICK >> l, x0 = bx0 * side, n = least_of(bx1 * side, from->width) - x0 + 2;
-	size_t first = 0;
-	for (int i = 1; i < l; i++)
-		first += (size_t)AREA(i);
-	*to = (struct fill_level){ .width = n - 2, .height = least_of((by + 1) * side, from->height) - by * side,
-		                       .left = (int32_t)x0 - BORDER, .top = (int32_t)(by * side) - 1, .stride = n + 2 * BORDER - 1 };
-	const size_t area = (size_t)to->stride * (to->height + 2);
-	uint16_t *values = scratch->values + 4 * first;
-	to->cell = (struct fill_row){ values, values + area, values + 2 * area, values + 3 * area, scratch->z + first };
-	for (uint32_t y = 0; y < to->height + 2; y++) {
-		const struct fill_row in = fill_row_at(from, (int32_t)x0 - 1, to->top + (int32_t)y);
-		const struct fill_row out = fill_row_at(to, to->left, to->top + (int32_t)y);
-		copy_cells(out.r, in.r, n, 0);
-		copy_cells(out.g, in.g, n, 0);
-		copy_cells(out.b, in.b, n, 0);
-		copy_cells(out.weight, in.weight, n, WEIGHT_ONE);
-		memcpy(out.z + BORDER - 1, in.z, n * sizeof *out.z);
-		out.z[0] = out.z[n + BORDER - 1] = out.z[n + BORDER] = NAN;
-	}
-}
-
-static void push_level(const struct fill *fill, const struct scratch *scratch, int l)
-{
-	const struct fill_level *to = &scratch->level[l], *from = to + 1;
-	const float scale = fill_scale(fill->plan, l + 1), offset = fill_offset(fill->plan, l + 1);
-	for (int32_t y = to->top; y < to->top + (int32_t)to->height + 2; y++) {
-		const int32_t parent = y >> 1, x = from->left + 1;
-		const struct fill_row row = fill_row_at(to, 2 * x, y), own = fill_row_at(from, x, parent);
+	const struct fill_level *to = &fill->level[level], *from = to + 1;
+	const uint32_t side = BRICK >> level, x0 = bx0 * side, x1 = least_of(bx1 * side, to->width);
+	const uint32_t y1 = least_of((by + 1) * side, to->height);
+	const float scale = fill_scale(fill->plan, level + 1), offset = fill_offset(fill->plan, level + 1);
+	for (uint32_t y = by * side; y < y1; y++) {
+		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
+		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		fill->simd->fill_push(&row, &own, &beside, from->width + 2, scale, offset);
+		fill->simd->fill_push(&row, &own, &beside, (x1 - x0 + 1) / 2, scale, offset);
 	}
 }
 
@@ -150,34 +105,28 @@ static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n
 	return n_places;
 }
 
-void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by)
 {
 	const struct fill_picture *p = &fill->picture;
-	const uint32_t width = p->stack->width, x0 = bx0 * BRICK, n = least_of(bx1 * BRICK, width) - x0;
+	const struct fill_level *from = &fill->level[1];
+	const uint32_t width = p->stack->width, x0 = bx0 * BRICK, n = least_of(bx1 * BRICK, width) - x0, n_cells = (n + 1) / 2;
 	const uint32_t y1 = least_of((by + 1) * BRICK, p->stack->height);
 	const float scale = fill_scale(fill->plan, 1), offset = fill_offset(fill->plan, 1);
 	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
 	uint16_t place[FILL_WIDTH + 1];
-	struct scratch scratch;
 	struct picture_row pixels, filled;
 	const struct fill_row row = { filled.r, filled.g, filled.b, NULL, filled.z };
 
-	for (int l = level; l >= 1; l--) {
-		load_level(&scratch, fill, l, bx0, bx1, by);
-		if (l < level)
-			push_level(fill, &scratch, l);
-	}
-	const struct fill_level *from = &scratch.level[1];
 	for (uint32_t y = by * BRICK; y < y1; y++) {
 		const size_t first = (size_t)y * width + x0;
 		const uint32_t n_places = list_partial(place, p->weight + first, n);
 		if (!n_places)
 			continue;
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
-		const struct fill_row was = picture_row_at(&pixels, fill, x0, y, 2 * from->width, 0, 1);
+		const struct fill_row was = picture_row_at(&pixels, fill, x0, y, 2 * n_cells, 0, 1);
 		const struct fill_row own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		fill->simd->fill_push_picture(&row, &was, &own, &beside, from->width, scale, offset);
+		fill->simd->fill_push_picture(&row, &was, &own, &beside, n_cells, scale, offset);
 		for (uint32_t i = 0; i < n_places; i++) {
 			const uint32_t at = place[i];
 			if (p->rgb) {

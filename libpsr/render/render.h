@@ -209,6 +209,8 @@ struct fill {
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* some brick needs levels beyond brick_top */
+	int needed;       /* the greatest of `needs` */
+	int pushed;       /* the level that is being pushed */
 	void *storage;
 	size_t storage_size;
 	/* The picture under way. */
@@ -252,8 +254,11 @@ enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weigh
 /* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
 void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
 
-/* Fills their pixels, of which none needs more than `level`. */
-void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+/* Makes their cells of a level whole, from those of the next. */
+void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+
+/* Fills their pixels, FILL_RUN bricks at most, from level 1. */
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by);
 
 /* ---- for tests: a renderer that calls other kernels ---- */
 

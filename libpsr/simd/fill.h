@@ -1,169 +1,327 @@
-/* Pull and push of rows ([G] 4.7). Plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+/* Pull and push of rows ([G] 4.7), FILL_BLOCK coarser cells at a time. Plain loops of constant length, which the compiler turns
+ * into vectors; compiled once for each ISA. */
 #include <math.h>
+#include <stddef.h>
+#include <string.h>
 #include "base/maths.h"
 #include "simd/simd.h"
 
-/* One channel of coarser cells: what children of weight above 0 add, a share in 256 of each, and where that is more than a
- * whole weight, divided by it: sum * 256 / divisor, rounded down. The estimate is at most 1 below: sums are less than 2^18, thus
- * floats, quotients less than 2^16; `inverse` is up to 2^-20 too small and a product rounds by 2^-24, together less than 2^-3. */
-static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint16_t *lower, const uint16_t *share,
-                                const uint16_t *divisor, const float *inverse, uint32_t n)
+#define FILL_BLOCK 16
+
+/* Cells 2x and 2x + 1, the former in the lower half, as vectors take them: bytes are little-endian. */
+static inline uint32_t pair_at(const uint16_t *values, uint32_t x)
 {
-	for (uint32_t x = 0; x < n; x++) {
-		const uint32_t a = (uint32_t)upper[2 * x] * share[x] >> 8;
-		const uint32_t b = (uint32_t)upper[2 * x + 1] * share[FILL_WIDTH + x] >> 8;
-		const uint32_t c = (uint32_t)lower[2 * x] * share[2 * FILL_WIDTH + x] >> 8;
-		const uint32_t d = (uint32_t)lower[2 * x + 1] * share[3 * FILL_WIDTH + x] >> 8;
-		const int32_t sum = (int32_t)(a + b + c + d), by = divisor[x];
-		const int32_t quotient = (int32_t)((float)sum * inverse[x]);
-		to[x] = (uint16_t)(quotient + (256 * sum - quotient * by >= by));
-	}
+	uint32_t pair;
+	memcpy(&pair, values + 2 * x, sizeof pair);
+	return pair;
 }
 
-/* The four children of each of n cells, apart. */
-struct children {
-	float z[4][FILL_WIDTH];
-	int32_t weight[4][FILL_WIDTH];
+/* value * share >> 8 of a share of 0..256, within 16 bits. */
+static inline uint16_t part_of(uint16_t value, uint16_t share)
+{
+	const uint16_t all = (uint16_t) - (share >> 8), factor = (uint16_t)(share << 8);
+	return (uint16_t)((value & all) | (uint16_t)((uint32_t)value * factor >> 16));
+}
+
+/* What n cells of a row, at most 2 * FILL_BLOCK, are copied to where there is not a whole block of them. */
+struct block_row {
+	uint16_t r[2 * FILL_BLOCK + 2], g[2 * FILL_BLOCK + 2], b[2 * FILL_BLOCK + 2], weight[2 * FILL_BLOCK + 2];
+	float z[2 * FILL_BLOCK + 2];
 };
 
-static inline void load_children(struct children *to, int first, const struct fill_row *from, uint32_t n)
+static inline struct fill_row row_from(const struct fill_row *row, ptrdiff_t x)
 {
-	const float *z = from->z;
-	const uint16_t *weight = from->weight;
-	for (uint32_t x = 0; x < n; x++) {
-		to->z[first][x] = z[2 * x];
-		to->z[first + 1][x] = z[2 * x + 1];
+	struct fill_row from = { NULL, NULL, NULL, row->weight ? row->weight + x : NULL, row->z + x };
+	if (row->r) {
+		from.r = row->r + x;
+		from.g = row->g + x;
+		from.b = row->b + x;
 	}
-	for (uint32_t x = 0; x < n; x++) {
-		to->weight[first][x] = weight[2 * x];
-		to->weight[first + 1][x] = weight[2 * x + 1];
+	return from;
+}
+
+static void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
+{
+	for (uint32_t i = 0; i < 2 * FILL_BLOCK + 2; i++)
+		to[i] = outside;
+	memcpy(to, from, n * sizeof *to);
+}
+
+/* ---- pull ---- */
+
+/* What children add to a cell: a share in 256 of each, and the inverse of what the sum is divided by. */
+struct pull_shares {
+	uint16_t upper[2 * FILL_BLOCK], lower[2 * FILL_BLOCK];
+	int32_t divisor[FILL_BLOCK];
+	float inverse[FILL_BLOCK];
+};
+
+/* One channel of coarser cells: what children of weight above 0 add, and where that is more than a whole weight, divided by it:
+ * sum * 256 / divisor, rounded down. The estimate is at most 1 below: sums are less than 2^18, thus floats, quotients less than
+ * 2^16; `inverse` is up to 2^-20 too small and a product rounds by 2^-24, together less than 2^-3. */
+static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint16_t *lower, const struct pull_shares *shares)
+{
+	uint16_t above[2 * FILL_BLOCK], below[2 * FILL_BLOCK];
+	int32_t value[FILL_BLOCK];
+	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
+		above[x] = part_of(upper[x], shares->upper[x]);
+		below[x] = part_of(lower[x], shares->lower[x]);
 	}
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const uint32_t two = pair_at(above, x), others = pair_at(below, x);
+		const int32_t sum = (int32_t)((two & 0xffff) + (two >> 16) + (others & 0xffff) + (others >> 16)), by = shares->divisor[x];
+		const int32_t quotient = (int32_t)((float)sum * shares->inverse[x]);
+		value[x] = quotient + (256 * sum - quotient * by >= by);
+	}
+	for (uint32_t x = 0; x < FILL_BLOCK; x++)
+		to[x] = (uint16_t)value[x];
+}
+
+/* Weights and depths; returns the least weight. */
+static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_shares *shares, uint16_t *weight, float *z,
+                                                                  const struct fill_row *upper, const struct fill_row *lower,
+                                                                  int is_picture, float scale, float offset)
+{
+	float depth[4][FILL_BLOCK];
+	int32_t sums[FILL_BLOCK];
+	uint32_t above[FILL_BLOCK], below[FILL_BLOCK];
+	int32_t least = GAPS_WHOLE;
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		depth[0][x] = upper->z[2 * x];
+		depth[1][x] = upper->z[2 * x + 1];
+		depth[2][x] = lower->z[2 * x];
+		depth[3][x] = lower->z[2 * x + 1];
+	}
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const uint32_t two = pair_at(upper->weight, x), others = pair_at(lower->weight, x);
+		const int32_t w[4] = { (int32_t)(two & 0xffff), (int32_t)(two >> 16), (int32_t)(others & 0xffff), (int32_t)(others >> 16) };
+		float nearest = INFINITY, sum_z = 0;
+		int32_t sum = 0;
+		uint32_t share[4];
+		for (int i = 0; i < 4; i++) { /* what is NaN is nearer than nothing */
+			const float own = psr_choose(w[i] > 0, depth[i][x], INFINITY);
+			nearest = own < nearest ? own : nearest;
+		}
+		const float limit = nearest * scale + offset;
+		for (int i = 0; i < 4; i++) {
+			const int32_t own = w[i] & -(depth[i][x] <= limit);
+			sum_z += psr_where(own > 0, (float)own * depth[i][x]);
+			sum += own;
+			share[i] = is_picture ? (uint32_t)own : 256u & (0u - (uint32_t)(own > 0));
+		}
+		z[x] = psr_choose(sum > 0, sum_z / (float)sum, INFINITY);
+		above[x] = share[0] | share[1] << 16;
+		below[x] = share[2] | share[3] << 16;
+		sums[x] = sum;
+		least = sum < least ? sum : least;
+	}
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		weight[x] = (uint16_t)(sums[x] < GAPS_WHOLE ? sums[x] : GAPS_WHOLE);
+		shares->divisor[x] = sums[x] > GAPS_WHOLE ? sums[x] : GAPS_WHOLE;
+		shares->inverse[x] = (256 - 0x1p-12f) / (float)shares->divisor[x];
+	}
+	memcpy(shares->upper, above, sizeof above);
+	memcpy(shares->lower, below, sizeof below);
+	return least;
+}
+
+static inline __attribute__((always_inline)) int32_t pull_block(const struct fill_row *to, const struct fill_row *upper,
+                                                                const struct fill_row *lower, int is_picture, float scale,
+                                                                float offset)
+{
+	struct pull_shares shares;
+	uint16_t weight[FILL_BLOCK];
+	float z[FILL_BLOCK];
+	const int32_t least = pull_weights(&shares, weight, z, upper, lower, is_picture, scale, offset);
+	memcpy(to->weight, weight, sizeof weight);
+	memcpy(to->z, z, sizeof z);
+	if (to->r) {
+		pull_channel(to->r, upper->r, lower->r, &shares);
+		pull_channel(to->g, upper->g, lower->g, &shares);
+		pull_channel(to->b, upper->b, lower->b, &shares);
+	}
+	return least;
+}
+
+/* With whole cells beyond them. */
+static struct fill_row copy_row(struct block_row *to, const struct fill_row *from, uint32_t n)
+{
+	copy_values(to->weight, from->weight, n, GAPS_WHOLE);
+	for (uint32_t i = 0; i < 2 * FILL_BLOCK + 2; i++)
+		to->z[i] = 0;
+	memcpy(to->z, from->z, n * sizeof *to->z);
+	if (!from->r)
+		return (struct fill_row){ NULL, NULL, NULL, to->weight, to->z };
+	copy_values(to->r, from->r, n, 0);
+	copy_values(to->g, from->g, n, 0);
+	copy_values(to->b, from->b, n, 0);
+	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
+}
+
+static void copy_back(const struct fill_row *to, const struct block_row *from, uint32_t n)
+{
+	if (to->weight)
+		memcpy(to->weight, from->weight, n * sizeof *to->weight);
+	memcpy(to->z, from->z, n * sizeof *to->z);
+	if (!to->r)
+		return;
+	memcpy(to->r, from->r, n * sizeof *to->r);
+	memcpy(to->g, from->g, n * sizeof *to->g);
+	memcpy(to->b, from->b, n * sizeof *to->b);
+}
+
+static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill_row *to, const struct fill_row *upper,
+                                                               const struct fill_row *lower, uint32_t n, int is_picture, float scale,
+                                                               float offset)
+{
+	int32_t least = GAPS_WHOLE;
+	for (uint32_t x = 0; x < n; x += FILL_BLOCK) {
+		struct fill_row out = row_from(to, x), above = row_from(upper, 2 * x), below = row_from(lower, 2 * x);
+		struct block_row rows[3];
+		const uint32_t rest = n - x;
+		if (rest < FILL_BLOCK) {
+			out = (struct fill_row){ to->r ? rows[0].r : NULL, rows[0].g, rows[0].b, rows[0].weight, rows[0].z };
+			above = copy_row(&rows[1], &above, 2 * rest);
+			below = copy_row(&rows[2], &below, 2 * rest);
+		}
+		const int32_t weight = pull_block(&out, &above, &below, is_picture, scale, offset);
+		least = weight < least ? weight : least;
+		if (rest < FILL_BLOCK) {
+			out = row_from(to, x);
+			copy_back(&out, &rows[0], rest);
+		}
+	}
+	return (uint16_t)least;
 }
 
 static uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                           int is_picture, float scale, float offset)
 {
-	struct children child;
-	uint16_t share[4 * FILL_WIDTH], divisor[FILL_WIDTH];
-	float inverse[FILL_WIDTH];
-	int32_t sum[FILL_WIDTH], least = GAPS_WHOLE;
-	load_children(&child, 0, upper, n);
-	load_children(&child, 2, lower, n);
-	for (uint32_t x = 0; x < n; x++) {
-		float nearest = INFINITY, z = 0;
-		int32_t w = 0;
-		for (int i = 0; i < 4; i++) { /* what is NaN is nearer than nothing */
-			const float own = child.weight[i][x] ? child.z[i][x] : INFINITY;
-			nearest = own < nearest ? own : nearest;
-		}
-		const float limit = nearest * scale + offset;
-		for (int i = 0; i < 4; i++) {
-			const int32_t is_near = child.z[i][x] <= limit, own = is_near ? child.weight[i][x] : 0;
-			const float product = (float)own * child.z[i][x];
-			z += own ? product : 0;
-			w += own;
-			child.weight[i][x] = own;
-		}
-		z /= (float)w;
-		to->z[x] = w ? z : INFINITY;
-		sum[x] = w;
-		least = w < least ? w : least;
-	}
-	for (uint32_t x = 0; x < n; x++) {
-		to->weight[x] = (uint16_t)(sum[x] < GAPS_WHOLE ? sum[x] : GAPS_WHOLE);
-		divisor[x] = (uint16_t)(sum[x] > GAPS_WHOLE ? sum[x] : GAPS_WHOLE);
-	}
-	for (int i = 0; i < 4 && to->r; i++)
-		for (uint32_t x = 0; x < n; x++)
-			share[i * FILL_WIDTH + x] = (uint16_t)(child.weight[i][x] && !is_picture ? 256 : child.weight[i][x]);
-	if (to->r) {
-		for (uint32_t x = 0; x < n; x++)
-			inverse[x] = (256 - 0x1p-12f) / (float)divisor[x];
-		pull_channel(to->r, upper->r, lower->r, share, divisor, inverse, n);
-		pull_channel(to->g, upper->g, lower->g, share, divisor, inverse, n);
-		pull_channel(to->b, upper->b, lower->b, share, divisor, inverse, n);
-	}
-	return (uint16_t)least;
+	return is_picture ? pull_row(to, upper, lower, n, 1, scale, offset) : pull_row(to, upper, lower, n, 0, scale, offset);
 }
 
-/* What a finer cell takes from its parent, from the parent's neighbour to its own side and from that above or below, and
- * the inverse of the sum. */
-struct shares {
-	int32_t own[2][FILL_WIDTH], side[2][FILL_WIDTH], beside[2][FILL_WIDTH];
-	float inverse[2][FILL_WIDTH];
+/* ---- push ---- */
+
+/* What finer cells take from their parents, from the parents' neighbors to their own side and from those above or below: all or
+ * nothing of each, the parents' twice; and the inverse of the sum of these shares. */
+struct push_shares {
+	uint32_t own[FILL_BLOCK], side[FILL_BLOCK], beside[FILL_BLOCK];
+	float inverse[FILL_BLOCK];
 };
 
 /* For cells on the side of their parents that `step` leads to. */
-static inline void share_parents(struct shares *to, float *z, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                                 int right, float scale, float offset)
+static inline void share_parents(struct push_shares *to, float *z, const float *own, const float *side, const float *beside,
+                                 float scale, float offset)
 {
-	const int32_t step = right ? 1 : -1;
-	for (uint32_t x = 0; x < n; x++) {
-		const float a = own->z[x], b = own->z[(int32_t)x + step], c = beside->z[x];
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const float a = own[x], b = side[x], c = beside[x];
 		float nearest = a < INFINITY ? a : INFINITY;
 		nearest = b < nearest ? b : nearest;
 		nearest = c < nearest ? c : nearest;
 		const float limit = nearest * scale + offset;
-		const int32_t ua = a <= limit ? 2 : 0, ub = b <= limit ? 1 : 0, uc = c <= limit ? 1 : 0, u = ua + ub + uc;
-		to->own[right][x] = ua;
-		to->side[right][x] = ub;
-		to->beside[right][x] = uc;
-		to->inverse[right][x] = u == 1 ? 1.0f : u == 2 ? 0.5f : u == 3 ? 1.0f / 3 : 0.25f;
-		z[x] = (((ua ? 2 * a : 0) + (ub ? b : 0)) + (uc ? c : 0)) / (float)u;
+		const int32_t ua = a <= limit, ub = b <= limit, uc = c <= limit, u = 2 * ua + ub + uc;
+		to->own[x] = 0u - (uint32_t)ua;
+		to->side[x] = 0u - (uint32_t)ub;
+		to->beside[x] = 0u - (uint32_t)uc;
+		to->inverse[x] = psr_choose(u == 1, 1.0f, psr_choose(u == 2, 0.5f, psr_choose(u == 3, 1.0f / 3, 0.25f)));
+		z[x] = ((psr_where(ua, 2 * a) + psr_where(ub, b)) + psr_where(uc, c)) / (float)u;
 	}
 }
 
 /* Sums are below 2^18 and quotients below 2^16, so that quotients are off by less than 1/100, and their fractions are quarters
  * or thirds: an eighth more never reaches the next whole number, and always the own one. */
-static inline int32_t interpolate(const struct shares *s, int right, uint32_t x, int32_t own, int32_t side, int32_t beside)
+static inline uint32_t interpolate(const struct push_shares *s, uint32_t x, uint32_t own, uint32_t side, uint32_t beside)
 {
-	const int32_t sum = own * s->own[right][x] + side * s->side[right][x] + beside * s->beside[right][x];
-	return (int32_t)((float)sum * s->inverse[right][x] + 0.125f);
+	const int32_t sum = (int32_t)(2 * (own & s->own[x]) + (side & s->side[x]) + (beside & s->beside[x]));
+	return (uint32_t)(int32_t)((float)sum * s->inverse[x] + 0.125f);
 }
 
 /* Cells of a share of 256 in `was` and of the rest from their parents. */
 static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *own,
-                                const uint16_t *beside, const struct shares *s, uint32_t n, int is_picture)
+                                const uint16_t *beside, const struct push_shares *left, const struct push_shares *right,
+                                int is_picture)
 {
-	for (uint32_t x = 0; x < n; x++) {
-		const int32_t wl = weight[2 * x], wr = weight[2 * x + 1], el = is_picture ? wl : 256, er = is_picture ? wr : 256;
-		const int32_t l = interpolate(s, 0, x, own[x], own[(int32_t)x - 1], beside[x]);
-		const int32_t r = interpolate(s, 1, x, own[x], own[x + 1], beside[x]);
-		to[2 * x] = (uint16_t)((was[2 * x] * el >> 8) + (l * (GAPS_WHOLE - wl) >> 8));
-		to[2 * x + 1] = (uint16_t)((was[2 * x + 1] * er >> 8) + (r * (GAPS_WHOLE - wr) >> 8));
+	uint32_t pair[FILL_BLOCK];
+	uint16_t both[2 * FILL_BLOCK], value[2 * FILL_BLOCK];
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const uint32_t l = interpolate(left, x, own[x], *(own + x - 1), beside[x]);
+		const uint32_t r = interpolate(right, x, own[x], own[x + 1], beside[x]);
+		pair[x] = l | r << 16;
+	}
+	memcpy(both, pair, sizeof both);
+	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
+		const uint16_t w = weight[x], rest = (uint16_t)(GAPS_WHOLE - w);
+		value[x] = (uint16_t)((is_picture ? part_of(was[x], w) : was[x]) + part_of(both[x], rest));
+	}
+	memcpy(to, value, sizeof value);
+}
+
+static inline int has_partial(const uint16_t *weight)
+{
+	uint16_t rest = 0;
+	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++)
+		rest |= weight[x] ^ GAPS_WHOLE;
+	return rest != 0;
+}
+
+static inline __attribute__((always_inline)) void push_block(const struct fill_row *to, const struct fill_row *was,
+                                                             const struct fill_row *own, const struct fill_row *beside,
+                                                             int is_picture, float scale, float offset)
+{
+	struct push_shares left, right;
+	float z[2][FILL_BLOCK], both[2 * FILL_BLOCK];
+	share_parents(&left, z[0], own->z, own->z - 1, beside->z, scale, offset);
+	share_parents(&right, z[1], own->z, own->z + 1, beside->z, scale, offset);
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		both[2 * x] = z[0][x];
+		both[2 * x + 1] = z[1][x];
+	}
+	for (uint32_t x = 0; x < 2 * FILL_BLOCK && !is_picture; x++)
+		both[x] = psr_choose(was->weight[x] < GAPS_WHOLE / 2, both[x], was->z[x]);
+	memcpy(to->z, both, sizeof both);
+	push_channel(to->r, was->r, was->weight, own->r, beside->r, &left, &right, is_picture);
+	push_channel(to->g, was->g, was->weight, own->g, beside->g, &left, &right, is_picture);
+	push_channel(to->b, was->b, was->weight, own->b, beside->b, &left, &right, is_picture);
+}
+
+static inline __attribute__((always_inline)) void push_row(const struct fill_row *to, const struct fill_row *was,
+                                                           const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                                                           int is_picture, float scale, float offset)
+{
+	for (uint32_t x = 0; x < n; x += FILL_BLOCK) {
+		struct fill_row out = row_from(to, 2 * x), in = row_from(was, 2 * x);
+		struct fill_row parents = row_from(own, x), neighbors = row_from(beside, x);
+		struct block_row rows[4];
+		const uint32_t rest = n - x;
+		if (rest < FILL_BLOCK) {
+			in = copy_row(&rows[0], &in, 2 * rest);
+			parents = row_from(own, (ptrdiff_t)x - 1);
+			parents = copy_row(&rows[1], &parents, rest + 2);
+			parents = row_from(&parents, 1);
+			neighbors = copy_row(&rows[2], &neighbors, rest);
+			out = (struct fill_row){ rows[3].r, rows[3].g, rows[3].b, NULL, rows[3].z };
+		}
+		if (!has_partial(in.weight))
+			continue;
+		push_block(&out, &in, &parents, &neighbors, is_picture, scale, offset);
+		if (rest < FILL_BLOCK) {
+			out = row_from(to, 2 * x);
+			out.weight = NULL;
+			copy_back(&out, &rows[3], 2 * rest);
+		}
 	}
 }
 
 static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
                       float offset)
 {
-	struct shares s;
-	float z[2][FILL_WIDTH];
-	share_parents(&s, z[0], own, beside, n, 0, scale, offset);
-	share_parents(&s, z[1], own, beside, n, 1, scale, offset);
-	for (uint32_t x = 0; x < n; x++) {
-		to->z[2 * x] = to->weight[2 * x] < GAPS_WHOLE / 2 ? z[0][x] : to->z[2 * x];
-		to->z[2 * x + 1] = to->weight[2 * x + 1] < GAPS_WHOLE / 2 ? z[1][x] : to->z[2 * x + 1];
-	}
-	push_channel(to->r, to->r, to->weight, own->r, beside->r, &s, n, 0);
-	push_channel(to->g, to->g, to->weight, own->g, beside->g, &s, n, 0);
-	push_channel(to->b, to->b, to->weight, own->b, beside->b, &s, n, 0);
+	push_row(to, to, own, beside, n, 0, scale, offset);
 }
 
 static void fill_push_picture(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
                               const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
-	struct shares s;
-	float z[2][FILL_WIDTH];
-	share_parents(&s, z[0], own, beside, n, 0, scale, offset);
-	share_parents(&s, z[1], own, beside, n, 1, scale, offset);
-	for (uint32_t x = 0; x < n; x++) {
-		to->z[2 * x] = z[0][x];
-		to->z[2 * x + 1] = z[1][x];
-	}
-	push_channel(to->r, was->r, was->weight, own->r, beside->r, &s, n, 1);
-	push_channel(to->g, was->g, was->weight, own->g, beside->g, &s, n, 1);
-	push_channel(to->b, was->b, was->weight, own->b, beside->b, &s, n, 1);
+	push_row(to, was, own, beside, n, 1, scale, offset);
 }
 
 static void fill_depths(float *z, const uint64_t *word, uint32_t n)

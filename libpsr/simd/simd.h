@@ -256,8 +256,8 @@ typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *
 typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
                           float scale, float offset);
 
-/* The same for pixels that stay as they are in `was`, whose z is not read: `to` receives their colours and, whatever their
- * weight is, the depths that are interpolated. */
+/* The same for pixels that stay as they are in `was`, whose z has no meaning: `to` receives the colors of those of weight below
+ * GAPS_WHOLE and, whatever their weight is, the depths that are interpolated; of others it may receive anything. */
 typedef void fill_push_picture_fn(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
                                   const struct fill_row *beside, uint32_t n, float scale, float offset);
 
