@@ -92,10 +92,11 @@ static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n
 	const uint64_t whole = UINT64_C(0x0001000100010001) * WEIGHT_ONE;
 	uint32_t n_places = 0;
 	for (uint32_t x = 0, end; x < n; x = end) {
-		uint64_t eight[2] = { whole, whole };
+		uint64_t eight[2] = { 0, 0 };
 		end = least_of(x + 8, n);
-		memcpy(eight, weight + x, (end - x) * sizeof *weight);
-		if (((eight[0] ^ whole) | (eight[1] ^ whole)) == 0)
+		if (end - x == 8)
+			memcpy(eight, weight + x, sizeof eight);
+		if (eight[0] == whole && eight[1] == whole)
 			continue;
 		for (uint32_t i = x; i < end; i++) {
 			place[n_places] = (uint16_t)i;

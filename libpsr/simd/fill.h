@@ -29,15 +29,10 @@ struct block_row {
 	float z[2 * FILL_BLOCK + 2];
 };
 
-static inline struct fill_row row_from(const struct fill_row *row, ptrdiff_t x)
+static inline __attribute__((always_inline)) struct fill_row row_from(struct fill_row row, ptrdiff_t x, int has_colors, int has_weight)
 {
-	struct fill_row from = { NULL, NULL, NULL, row->weight ? row->weight + x : NULL, row->z + x };
-	if (row->r) {
-		from.r = row->r + x;
-		from.g = row->g + x;
-		from.b = row->b + x;
-	}
-	return from;
+	return (struct fill_row){ has_colors ? row.r + x : NULL, has_colors ? row.g + x : NULL, has_colors ? row.b + x : NULL,
+		                      has_weight ? row.weight + x : NULL, row.z + x };
 }
 
 static void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
@@ -79,21 +74,21 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 
 /* Weights and depths; returns the least weight. */
 static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_shares *shares, uint16_t *weight, float *z,
-                                                                  const struct fill_row *upper, const struct fill_row *lower,
-                                                                  int is_picture, float scale, float offset)
+                                                                  struct fill_row upper, struct fill_row lower, int is_picture,
+                                                                  float scale, float offset)
 {
 	float depth[4][FILL_BLOCK];
 	int32_t sums[FILL_BLOCK];
 	uint32_t above[FILL_BLOCK], below[FILL_BLOCK];
 	int32_t least = GAPS_WHOLE;
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
-		depth[0][x] = upper->z[2 * x];
-		depth[1][x] = upper->z[2 * x + 1];
-		depth[2][x] = lower->z[2 * x];
-		depth[3][x] = lower->z[2 * x + 1];
+		depth[0][x] = upper.z[2 * x];
+		depth[1][x] = upper.z[2 * x + 1];
+		depth[2][x] = lower.z[2 * x];
+		depth[3][x] = lower.z[2 * x + 1];
 	}
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
-		const uint32_t two = pair_at(upper->weight, x), others = pair_at(lower->weight, x);
+		const uint32_t two = pair_at(upper.weight, x), others = pair_at(lower.weight, x);
 		const int32_t w[4] = { (int32_t)(two & 0xffff), (int32_t)(two >> 16), (int32_t)(others & 0xffff), (int32_t)(others >> 16) };
 		float nearest = INFINITY, sum_z = 0;
 		int32_t sum = 0;
@@ -125,71 +120,67 @@ static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_sh
 	return least;
 }
 
-static inline __attribute__((always_inline)) int32_t pull_block(const struct fill_row *to, const struct fill_row *upper,
-                                                                const struct fill_row *lower, int is_picture, float scale,
-                                                                float offset)
+static inline __attribute__((always_inline)) int32_t pull_block(struct fill_row to, struct fill_row upper, struct fill_row lower,
+                                                                int has_colors, int is_picture, float scale, float offset)
 {
 	struct pull_shares shares;
 	uint16_t weight[FILL_BLOCK];
 	float z[FILL_BLOCK];
 	const int32_t least = pull_weights(&shares, weight, z, upper, lower, is_picture, scale, offset);
-	memcpy(to->weight, weight, sizeof weight);
-	memcpy(to->z, z, sizeof z);
-	if (to->r) {
-		pull_channel(to->r, upper->r, lower->r, &shares);
-		pull_channel(to->g, upper->g, lower->g, &shares);
-		pull_channel(to->b, upper->b, lower->b, &shares);
+	memcpy(to.weight, weight, sizeof weight);
+	memcpy(to.z, z, sizeof z);
+	if (has_colors) {
+		pull_channel(to.r, upper.r, lower.r, &shares);
+		pull_channel(to.g, upper.g, lower.g, &shares);
+		pull_channel(to.b, upper.b, lower.b, &shares);
 	}
 	return least;
 }
 
 /* With whole cells beyond them. */
-static struct fill_row copy_row(struct block_row *to, const struct fill_row *from, uint32_t n)
+static struct fill_row copy_row(struct block_row *to, struct fill_row from, uint32_t n, int has_colors)
 {
-	copy_values(to->weight, from->weight, n, GAPS_WHOLE);
-	for (uint32_t i = 0; i < 2 * FILL_BLOCK + 2; i++)
-		to->z[i] = 0;
-	memcpy(to->z, from->z, n * sizeof *to->z);
-	if (!from->r)
-		return (struct fill_row){ NULL, NULL, NULL, to->weight, to->z };
-	copy_values(to->r, from->r, n, 0);
-	copy_values(to->g, from->g, n, 0);
-	copy_values(to->b, from->b, n, 0);
+	copy_values(to->weight, from.weight, n, GAPS_WHOLE);
+	memset(to->z, 0, sizeof to->z);
+	memcpy(to->z, from.z, n * sizeof *to->z);
+	if (has_colors) {
+		copy_values(to->r, from.r, n, 0);
+		copy_values(to->g, from.g, n, 0);
+		copy_values(to->b, from.b, n, 0);
+	}
 	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
 }
 
-static void copy_back(const struct fill_row *to, const struct block_row *from, uint32_t n)
+static void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors, int has_weight)
 {
-	if (to->weight)
-		memcpy(to->weight, from->weight, n * sizeof *to->weight);
-	memcpy(to->z, from->z, n * sizeof *to->z);
-	if (!to->r)
-		return;
-	memcpy(to->r, from->r, n * sizeof *to->r);
-	memcpy(to->g, from->g, n * sizeof *to->g);
-	memcpy(to->b, from->b, n * sizeof *to->b);
+	memcpy(to.z, from->z, n * sizeof *to.z);
+	if (has_weight)
+		memcpy(to.weight, from->weight, n * sizeof *to.weight);
+	if (has_colors) {
+		memcpy(to.r, from->r, n * sizeof *to.r);
+		memcpy(to.g, from->g, n * sizeof *to.g);
+		memcpy(to.b, from->b, n * sizeof *to.b);
+	}
 }
 
-static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill_row *to, const struct fill_row *upper,
-                                                               const struct fill_row *lower, uint32_t n, int is_picture, float scale,
-                                                               float offset)
+static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row to, struct fill_row upper, struct fill_row lower,
+                                                               uint32_t n, int has_colors, int is_picture, float scale, float offset)
 {
 	int32_t least = GAPS_WHOLE;
-	for (uint32_t x = 0; x < n; x += FILL_BLOCK) {
-		struct fill_row out = row_from(to, x), above = row_from(upper, 2 * x), below = row_from(lower, 2 * x);
-		struct block_row rows[3];
-		const uint32_t rest = n - x;
-		if (rest < FILL_BLOCK) {
-			out = (struct fill_row){ to->r ? rows[0].r : NULL, rows[0].g, rows[0].b, rows[0].weight, rows[0].z };
-			above = copy_row(&rows[1], &above, 2 * rest);
-			below = copy_row(&rows[2], &below, 2 * rest);
-		}
-		const int32_t weight = pull_block(&out, &above, &below, is_picture, scale, offset);
+	uint32_t x = 0;
+	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
+		const int32_t weight = pull_block(row_from(to, x, has_colors, 1), row_from(upper, 2 * x, has_colors, 1),
+		                                  row_from(lower, 2 * x, has_colors, 1), has_colors, is_picture, scale, offset);
 		least = weight < least ? weight : least;
-		if (rest < FILL_BLOCK) {
-			out = row_from(to, x);
-			copy_back(&out, &rows[0], rest);
-		}
+	}
+	if (x < n) {
+		struct block_row rows[3];
+		const struct fill_row out = { rows[0].r, rows[0].g, rows[0].b, rows[0].weight, rows[0].z };
+		const struct fill_row above = copy_row(&rows[1], row_from(upper, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
+		const struct fill_row below = copy_row(&rows[2], row_from(lower, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
+		const int32_t weight = pull_block(out, above, below, has_colors, is_picture, scale, offset);
+		least = weight < least ? weight : least;
+		copy_back(row_from(to, x, has_colors, 1), &rows[0], n - x, has_colors, 1);
 	}
 	return (uint16_t)least;
 }
@@ -197,7 +188,9 @@ static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill
 static uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                           int is_picture, float scale, float offset)
 {
-	return is_picture ? pull_row(to, upper, lower, n, 1, scale, offset) : pull_row(to, upper, lower, n, 0, scale, offset);
+	if (!to->r)
+		return pull_row(*to, *upper, *lower, n, 0, 0, scale, offset);
+	return is_picture ? pull_row(*to, *upper, *lower, n, 1, 1, scale, offset) : pull_row(*to, *upper, *lower, n, 1, 0, scale, offset);
 }
 
 /* ---- push ---- */
@@ -264,64 +257,55 @@ static inline int has_partial(const uint16_t *weight)
 	return rest != 0;
 }
 
-static inline __attribute__((always_inline)) void push_block(const struct fill_row *to, const struct fill_row *was,
-                                                             const struct fill_row *own, const struct fill_row *beside,
-                                                             int is_picture, float scale, float offset)
+static inline __attribute__((always_inline)) void push_block(struct fill_row to, struct fill_row was, struct fill_row own,
+                                                             struct fill_row beside, int is_picture, float scale, float offset)
 {
 	struct push_shares left, right;
 	float z[2][FILL_BLOCK], both[2 * FILL_BLOCK];
-	share_parents(&left, z[0], own->z, own->z - 1, beside->z, scale, offset);
-	share_parents(&right, z[1], own->z, own->z + 1, beside->z, scale, offset);
+	share_parents(&left, z[0], own.z, own.z - 1, beside.z, scale, offset);
+	share_parents(&right, z[1], own.z, own.z + 1, beside.z, scale, offset);
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		both[2 * x] = z[0][x];
 		both[2 * x + 1] = z[1][x];
 	}
 	for (uint32_t x = 0; x < 2 * FILL_BLOCK && !is_picture; x++)
-		both[x] = psr_choose(was->weight[x] < GAPS_WHOLE / 2, both[x], was->z[x]);
-	memcpy(to->z, both, sizeof both);
-	push_channel(to->r, was->r, was->weight, own->r, beside->r, &left, &right, is_picture);
-	push_channel(to->g, was->g, was->weight, own->g, beside->g, &left, &right, is_picture);
-	push_channel(to->b, was->b, was->weight, own->b, beside->b, &left, &right, is_picture);
+		both[x] = psr_choose(was.weight[x] < GAPS_WHOLE / 2, both[x], was.z[x]);
+	memcpy(to.z, both, sizeof both);
+	push_channel(to.r, was.r, was.weight, own.r, beside.r, &left, &right, is_picture);
+	push_channel(to.g, was.g, was.weight, own.g, beside.g, &left, &right, is_picture);
+	push_channel(to.b, was.b, was.weight, own.b, beside.b, &left, &right, is_picture);
 }
 
-static inline __attribute__((always_inline)) void push_row(const struct fill_row *to, const struct fill_row *was,
-                                                           const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                                                           int is_picture, float scale, float offset)
+static inline __attribute__((always_inline)) void push_row(struct fill_row to, struct fill_row was, struct fill_row own,
+                                                           struct fill_row beside, uint32_t n, int is_picture, float scale,
+                                                           float offset)
 {
-	for (uint32_t x = 0; x < n; x += FILL_BLOCK) {
-		struct fill_row out = row_from(to, 2 * x), in = row_from(was, 2 * x);
-		struct fill_row parents = row_from(own, x), neighbors = row_from(beside, x);
+	uint32_t x = 0;
+	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK)
+		if (has_partial(was.weight + 2 * x))
+			push_block(row_from(to, 2 * x, 1, 0), row_from(was, 2 * x, 1, 1), row_from(own, x, 1, 0), row_from(beside, x, 1, 0),
+			           is_picture, scale, offset);
+	if (x < n) {
 		struct block_row rows[4];
-		const uint32_t rest = n - x;
-		if (rest < FILL_BLOCK) {
-			in = copy_row(&rows[0], &in, 2 * rest);
-			parents = row_from(own, (ptrdiff_t)x - 1);
-			parents = copy_row(&rows[1], &parents, rest + 2);
-			parents = row_from(&parents, 1);
-			neighbors = copy_row(&rows[2], &neighbors, rest);
-			out = (struct fill_row){ rows[3].r, rows[3].g, rows[3].b, NULL, rows[3].z };
-		}
-		if (!has_partial(in.weight))
-			continue;
-		push_block(&out, &in, &parents, &neighbors, is_picture, scale, offset);
-		if (rest < FILL_BLOCK) {
-			out = row_from(to, 2 * x);
-			out.weight = NULL;
-			copy_back(&out, &rows[3], 2 * rest);
-		}
+		const struct fill_row in = copy_row(&rows[0], row_from(was, 2 * x, 1, 1), 2 * (n - x), 1);
+		const struct fill_row parents = copy_row(&rows[1], row_from(own, (ptrdiff_t)x - 1, 1, 1), n - x + 2, 1);
+		const struct fill_row neighbors = copy_row(&rows[2], row_from(beside, x, 1, 1), n - x, 1);
+		const struct fill_row out = { rows[3].r, rows[3].g, rows[3].b, rows[3].weight, rows[3].z };
+		push_block(out, in, row_from(parents, 1, 1, 1), neighbors, is_picture, scale, offset);
+		copy_back(row_from(to, 2 * x, 1, 0), &rows[3], 2 * (n - x), 1, 0);
 	}
 }
 
 static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
                       float offset)
 {
-	push_row(to, to, own, beside, n, 0, scale, offset);
+	push_row(*to, *to, *own, *beside, n, 0, scale, offset);
 }
 
 static void fill_push_picture(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
                               const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
-	push_row(to, was, own, beside, n, 1, scale, offset);
+	push_row(*to, *was, *own, *beside, n, 1, scale, offset);
 }
 
 static void fill_depths(float *z, const uint64_t *word, uint32_t n)
