@@ -37,7 +37,7 @@ struct psr_renderer {
 	uint32_t clean_width, clean_height, clean_levels;
 	void *counters;
 	size_t counters_size;
-	uint8_t srgb[65536];      /* of 16-bit linear light */
+	uint8_t srgb[65536 + SRGB_PADDING]; /* of 16-bit linear light */
 };
 
 const char *psr_stage_name(enum psr_stage stage)
@@ -305,9 +305,10 @@ static void shade_one(int row, void *userdata)
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
 	struct shade_counts counts = { 0, 0, 0, 0 };
-	for (uint32_t y = (uint32_t)row * BRICK; y < row_end(plan, row); y++) {
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(plan, row);
+	shade_rows(r->simd, plan, &r->target, r->stack.word, r->weight, y0, y1, &counts);
+	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
-		shade_row(r->simd, plan, &r->target, r->stack.word + first, r->weight + first, y, &counts);
 		if (r->frame->depth)
 			r->simd->depth_row(r->frame->depth + first, r->stack.word + first, plan->width, r->stack.exponent);
 		if (r->has_planes)

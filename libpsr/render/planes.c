@@ -25,25 +25,28 @@ static int16_t to_steps(float n)
 	return (int16_t)(clamped + (clamped < 0 ? -0.5f : 0.5f));
 }
 
-static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip *strip, uint32_t n)
+static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip_pixels *pixels, uint32_t n)
 {
 	struct strip_view view = plan->view;
+	struct strip strip;
 	view.lit = NULL; /* with a table of light normals are not looked for */
 	memset(to, 0, 3 * n * sizeof *to);
-	if (!strip->n)
+	if (!pixels->n)
 		return;
-	simd->strip_resolve(strip, &view, plan->ambient);
-	for (uint32_t i = 0; i < strip->n; i++)
+	strip.pixels = pixels;
+	simd->strip_find(pixels, &view);
+	simd->strip_resolve(&strip, &view, plan->ambient);
+	for (uint32_t i = 0; i < strip.n; i++)
 		for (int a = 0; a < 3; a++)
-			to[3 * strip->x[i] + a] = to_steps(((float)plan->frame[0][a] * strip->nx[i] + (float)plan->frame[1][a] * strip->ny[i]) +
-			                                   (float)plan->frame[2][a] * strip->nz[i]);
+			to[3 * pixels->x[i] + a] = to_steps(((float)plan->frame[0][a] * strip.nx[i] + (float)plan->frame[1][a] * strip.ny[i]) +
+			                                    (float)plan->frame[2][a] * strip.nz[i]);
 }
 
-static void put_instances(const struct plan *plan, uint32_t *to, const struct strip *strip, uint32_t n)
+static void put_instances(const struct plan *plan, uint32_t *to, const struct strip_pixels *pixels, uint32_t n)
 {
 	memset(to, 0xff, n * sizeof *to);
-	for (uint32_t i = 0; i < strip->n; i++)
-		to[strip->x[i]] = plan_find_instance(plan, strip->id[i] / PSR_BLOCK_SAMPLES);
+	for (uint32_t i = 0; i < pixels->n; i++)
+		to[pixels->x[i]] = plan_find_instance(plan, pixels->id[i] / PSR_BLOCK_SAMPLES);
 }
 
 /* What the cull says of one block: it is asked again, so that frames without this plane keep nothing of it. */
@@ -60,16 +63,16 @@ static void describe(uint8_t to[3], const struct simd *simd, const struct plan *
 	        : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;
 }
 
-static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip *strip,
+static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip_pixels *pixels,
                        uint32_t n)
 {
 	uint8_t last[3] = { 0, 0, 0 };
 	memset(to, 0xff, 3 * n);
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint32_t slot = strip->id[i] / PSR_BLOCK_SAMPLES;
-		if (i == 0 || slot != strip->id[i - 1] / PSR_BLOCK_SAMPLES)
+	for (uint32_t i = 0; i < pixels->n; i++) {
+		const uint32_t slot = pixels->id[i] / PSR_BLOCK_SAMPLES;
+		if (i == 0 || slot != pixels->id[i - 1] / PSR_BLOCK_SAMPLES)
 			describe(last, simd, plan, slot);
-		memcpy(to + 3 * strip->x[i], last, 3);
+		memcpy(to + 3 * pixels->x[i], last, 3);
 	}
 }
 
@@ -77,8 +80,8 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
                 const uint16_t *weight, uint32_t y)
 {
 	const size_t row = (size_t)y * plan->width;
-	struct strip strip;
-	strip.y = y;
+	struct strip_pixels pixels;
+	pixels.y = y;
 	for (uint32_t x = 0; x < plan->width; x += STRIP) {
 		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
 		const size_t first = row + x;
@@ -88,13 +91,13 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 			put_weights(frame->weight + first, weight + x, n);
 		if (!frame->normal && !frame->id && !frame->block)
 			continue;
-		strip.x0 = x;
-		simd->strip_list(&strip, word + x, weight + x, n);
+		pixels.x0 = x;
+		simd->strip_list(&pixels, word + x, weight + x, n);
 		if (frame->normal)
-			put_normals(simd, plan, frame->normal + 3 * first, &strip, n);
+			put_normals(simd, plan, frame->normal + 3 * first, &pixels, n);
 		if (frame->id)
-			put_instances(plan, frame->id + first, &strip, n);
+			put_instances(plan, frame->id + first, &pixels, n);
 		if (frame->block)
-			put_blocks(simd, plan, frame->block + 3 * first, &strip, n);
+			put_blocks(simd, plan, frame->block + 3 * first, &pixels, n);
 	}
 }

@@ -159,14 +159,15 @@ void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr
 
 struct shade_target {
 	uint8_t *rgb;         /* sRGB, 3 * width * height, or NULL */
-	const uint8_t *srgb;  /* 8 bits of 16-bit linear light */
-	uint16_t *r, *g, *b;  /* linear light, width * height: written in bricks that are wanted, and maybe in others */
+	const uint8_t *srgb;  /* 8 bits of 16-bit linear light, and SRGB_PADDING */
+	uint16_t *r, *g, *b;  /* linear light, width * height: written in bricks that are wanted */
 	const uint8_t *wants; /* one byte a brick, as of fill_wants; NULL: none */
 };
 
-/* Gives the pixels of row y their colours: samples of weight above 0, lit, and the background where none is. */
-void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
-               const uint16_t *weight, uint32_t y, struct shade_counts *counts);
+/* Gives the pixels of rows y0..y1-1, at least one, their colours: samples of weight above 0, lit, and the background where
+ * none is. `word` and `weight` are of the whole picture. Adds to the counts. */
+void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
+                const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts);
 
 /* ---- planes: what else is known of a row's pixels ---- */
 

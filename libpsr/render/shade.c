@@ -3,17 +3,6 @@
 
 #define TIMED_EVERY 16 /* strips: clocks cost, too */
 
-/* Whether any of the bricks of a part of row y is wanted in linear light. Pixels of weight 0 are filled later, whatever they
- * get here. */
-static int is_wanted(const struct plan *plan, const uint8_t *wants, uint32_t x, uint32_t y, uint32_t n)
-{
-	const uint8_t *row = wants + (size_t)(y / BRICK) * ((plan->width + BRICK - 1) / BRICK);
-	for (uint32_t b = x / BRICK; b <= (x + n - 1) / BRICK; b++)
-		if (row[b])
-			return 1;
-	return 0;
-}
-
 /* A table costs as much as lighting so many pixels; it saves nothing where there are few lights to add up. */
 #define TABLE_LIGHTS 3
 #define TABLE_PIXELS (8 * PSR_DIRECTIONS)
@@ -58,37 +47,76 @@ static void add_light(const struct simd *simd, const struct plan *plan, struct s
 }
 
 _Static_assert(STRIP == TILE_WIDTH, "a strip lies in one tile");
+_Static_assert(STRIP_BRICK == BRICK, "what is wanted is counted in bricks");
 
-void shade_row(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
-               const uint16_t *weight, uint32_t y, struct shade_counts *counts)
+struct shading {
+	const struct simd *simd;
+	const struct plan *plan;
+	const struct shade_target *target;
+	const uint64_t *word;
+	const uint16_t *weight;
+};
+
+/* Lists the samples of a strip, and asks the memory for them. */
+static void begin_strip(struct strip_pixels *pixels, const struct shading *s, uint32_t x, uint32_t y)
 {
-	struct strip_target part = { plan->width, target->rgb, target->srgb, NULL, NULL, NULL,
-		                         { plan->background[0], plan->background[1], plan->background[2] } };
+	const struct plan *plan = s->plan;
+	const uint32_t left = plan->width - x;
+	const size_t first = (size_t)y * plan->width + x;
+	pixels->x0 = x;
+	pixels->y = y;
+	if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
+		s->simd->strip_list(pixels, NULL, NULL, 0);
+	else
+		s->simd->strip_list(pixels, s->word + first, s->weight + first, left < STRIP ? left : STRIP);
+	if (pixels->n)
+		s->simd->strip_find(pixels, &plan->view);
+}
+
+static void light_strip(struct strip *strip, const struct shading *s)
+{
+	const struct plan *plan = s->plan;
+	for (uint32_t l = 0; l < plan->n_lights && !(plan->view.lit && !strip->is_specular); l++)
+		add_light(s->simd, plan, strip, l);
+	s->simd->strip_color(strip);
+}
+
+static void write_strip(const struct strip *strip, const struct shading *s)
+{
+	const struct plan *plan = s->plan;
+	const struct shade_target *target = s->target;
+	const uint32_t x = strip->pixels->x0, y = strip->pixels->y, left = plan->width - x;
+	const uint8_t *wants = target->wants;
+	if (wants)
+		wants += (size_t)(y / BRICK) * ((plan->width + BRICK - 1) / BRICK) + x / BRICK;
+	const struct strip_target to = { plan->width, target->rgb, target->srgb, wants, target->r, target->g, target->b,
+		                             { plan->background[0], plan->background[1], plan->background[2] } };
+	s->simd->strip_write(strip, &to, left < STRIP ? left : STRIP);
+}
+
+void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
+                const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts)
+{
+	const struct shading shading = { simd, plan, target, word, weight };
+	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
+	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
-	strip.y = y;
-	for (uint32_t x = 0; x < plan->width; x += STRIP) {
-		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
-		const int keeps_linear = target->wants && is_wanted(plan, target->wants, x, y, n);
-		strip.x0 = x;
-		if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
-			strip.n = 0;
-		else
-			simd->strip_list(&strip, word + x, weight + x, n);
-		const int is_timed = (x / STRIP + y) % TIMED_EVERY == 0;
-		uint64_t start = is_timed ? now_ns() : 0, middle = start;
-		if (strip.n) {
+	begin_strip(&pixels[0], &shading, 0, y0);
+	for (uint32_t i = 0; i < n; i++) {
+		const int is_timed = (i % per_row + i / per_row) % TIMED_EVERY == 0;
+		const uint64_t start = is_timed ? now_ns() : 0;
+		strip.pixels = &pixels[i % 2];
+		if (i + 1 < n)
+			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
+		if (strip.pixels->n)
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
-			middle = is_timed ? now_ns() : 0;
-			for (uint32_t l = 0; l < plan->n_lights && !(plan->view.lit && !strip.is_specular); l++)
-				add_light(simd, plan, &strip, l);
-			simd->strip_color(&strip);
+		const uint64_t middle = is_timed ? now_ns() : 0;
+		if (strip.pixels->n) {
+			light_strip(&strip, &shading);
 			counts->n_pixels += strip.n;
 			counts->n_specular += strip.is_specular ? strip.n : 0;
 		}
-		part.r = keeps_linear ? target->r : NULL;
-		part.g = keeps_linear ? target->g : NULL;
-		part.b = keeps_linear ? target->b : NULL;
-		simd->strip_write(&strip, &part, n);
+		write_strip(&strip, &shading);
 		if (is_timed) {
 			counts->resolve_ns += middle - start;
 			counts->shade_ns += now_ns() - middle;

@@ -111,15 +111,23 @@ enum strip_needs {
 	STRIP_SPECULAR = 4,  /* highlights are looked for whether any sample is specular or not */
 };
 
-/* The covered pixels of a part of a row. Everything is in camera space; colours are linear. */
-struct strip {
-	uint32_t n, x0, y;       /* pixel i is (x0 + x[i], y) */
-	int is_specular;         /* some sample is, or the view wants it so */
+/* The covered pixels of a part of a row: pixel i is (x0 + x[i], y). */
+struct strip_pixels {
+	uint32_t n, x0, y;
+	uint32_t covered[STRIP / 32]; /* bit x % 32 of covered[x / 32]: one of them has this x */
 	uint16_t x[STRIP + STRIP_PADDING];
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
+	const uint64_t *at[STRIP];          /* attributes */
+	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
+};
+
+/* Their samples. Everything is in camera space; colours are linear. */
+struct strip {
+	const struct strip_pixels *pixels;
+	uint32_t n;              /* as pixels->n, where that is not 0 */
+	int is_specular;         /* some sample is, or the view wants it so */
 	uint64_t attr[STRIP];
 	uint64_t normal_word[STRIP];
-	uint8_t two_sided[STRIP]; /* with STRIP_TWO_SIDED */
 	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
 	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
 	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
@@ -150,9 +158,14 @@ struct strip_light {
 	float color[3];
 };
 
-/* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): x, id, n. */
-typedef void strip_list_fn(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n);
-/* Attributes, normals, colours and what else is needed of the samples listed; clears the light to `ambient` and no highlight. */
+/* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): covered, x,
+ * id, n. */
+typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
+/* Where their attributes are, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks are. It is worth while to
+ * find those of one strip before another one is resolved. */
+typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
+/* Attributes, normals, colours and what else is needed of strip->pixels, at least one, which are found; clears the light to
+ * `ambient` and no highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
@@ -163,14 +176,20 @@ typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const 
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 
+#define STRIP_BRICK 32 /* pixels that are wanted in linear light, or not, together */
+
 struct strip_target {
 	uint32_t width;
 	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
-	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
-	uint16_t *r, *g, *b;    /* linear light, or NULL */
+	const uint8_t *srgb;    /* 8 bits of 16-bit linear light; readable for SRGB_PADDING bytes beyond the last */
+	const uint8_t *wants;   /* one byte for each STRIP_BRICK pixels of the part: 0 if not in linear light. NULL: none is */
+	uint16_t *r, *g, *b;    /* linear light; where pixels are not wanted, nothing is written */
 	uint16_t background[3]; /* linear */
 };
-/* Colours of the n pixels of the part of the row: those of the strip's samples, elsewhere the background. */
+
+#define SRGB_PADDING 3
+
+/* Colours of the n pixels of the part of the row: those of the samples of strip->pixels, if any, elsewhere the background. */
 typedef void strip_write_fn(const struct strip *strip, const struct strip_target *target, uint32_t n);
 
 /* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
@@ -275,6 +294,7 @@ struct simd {
 	warp_clear_fn *warp_clear;
 	warp_fn *warp;
 	strip_list_fn *strip_list;
+	strip_find_fn *strip_find;
 	strip_resolve_fn *strip_resolve;
 	strip_shadow_fn *strip_shadow;
 	strip_light_fn *strip_light;

@@ -3,44 +3,51 @@
 #include "base/maths.h"
 #include "base/srgb.h"
 #include "simd/block.h"
+#include "simd/instance.h"
 
 /* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
 #define CONSTANT_FLAGS inline __attribute__((always_inline))
 
-static inline void strip_list(struct strip *strip, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	uint32_t n = 0;
+	memset(p->covered, 0, sizeof p->covered);
 	for (uint32_t x = 0; x < n_pixels; x++) {
-		strip->x[n] = (uint16_t)x;
-		strip->id[n] = (uint32_t)word[x];
-		n += word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
+		const uint32_t is_covered = word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
+		p->x[n] = (uint16_t)x;
+		p->id[n] = (uint32_t)word[x];
+		p->covered[x / 32] |= is_covered << x % 32;
+		n += is_covered;
 	}
-	strip->n = n;
+	p->n = n;
 }
 
-static const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
+static inline void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
-	uint32_t low = 0, high = view->n_instances;
-	while (high - low > 1) {
-		const uint32_t middle = (low + high) / 2;
-		if (view->instance[middle].first_slot <= slot)
-			low = middle;
-		else
-			high = middle;
+	for (uint32_t i = 0, end; i < p->n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i);
+		const struct psr_blocks *b = in->blocks;
+		for (; i < end; i++) {
+			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
+			const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
+			p->at[i] = b->attr + psr_blocks_attr_first(b, block) + __builtin_popcountll(below);
+			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b->flags[block] & PSR_BLOCK_TWO_SIDED : 0;
+			__builtin_prefetch(p->at[i]);
+		}
 	}
-	return &view->instance[low];
 }
 
 /* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one block. */
 static void locate(struct strip *strip, const struct warp_instance *in, uint32_t first, uint32_t end)
 {
 	float *const to[3] = { strip->px, strip->py, strip->pz };
+	const uint32_t *id = strip->pixels->id;
 	struct warp_block b;
-	warp_block_make(&b, in, strip->id[first] / PSR_BLOCK_SAMPLES);
+	warp_block_make(&b, in, id[first] / PSR_BLOCK_SAMPLES);
 	for (uint32_t i = first; i < end; i++) {
-		const uint32_t sample = strip->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
-		if (strip->id[i] - sample != b.id)
-			warp_block_make(&b, in, strip->id[i] / PSR_BLOCK_SAMPLES);
+		const uint32_t sample = id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
+		if (id[i] - sample != b.id)
+			warp_block_make(&b, in, id[i] / PSR_BLOCK_SAMPLES);
 		const uint64_t below = b.mask & ((UINT64_C(1) << sample) - 1);
 		const float depth = (float)b.depth[__builtin_popcountll(below)], scale = (float)b.scale;
 		for (int a = 0; a < 3; a++)
@@ -60,24 +67,6 @@ static void bring_back(struct strip *strip, const struct strip_view *view)
 	}
 }
 
-/* Finds the attributes of samples first .. end - 1, all of one instance, and asks for them; reads them later. */
-static void find_attributes(struct strip *strip, const struct strip_view *view, const struct warp_instance *in, uint32_t first,
-                            uint32_t end, const uint64_t **at)
-{
-	const struct psr_blocks *b = in->blocks;
-	for (uint32_t i = first; i < end; i++) {
-		const uint32_t block = strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = strip->id[i] % PSR_BLOCK_SAMPLES;
-		const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-		at[i] = b->attr + psr_blocks_attr_first(b, block) + __builtin_popcountll(below);
-		__builtin_prefetch(at[i]);
-	}
-	if (view->needs & STRIP_TWO_SIDED)
-		for (uint32_t i = first; i < end; i++)
-			strip->two_sided[i] = b->flags[strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot] & PSR_BLOCK_TWO_SIDED;
-	if (view->needs & STRIP_POSITION)
-		locate(strip, in, first, end);
-}
-
 static void turn_normals(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
 {
 	for (uint32_t i = first; i < end; i++) {
@@ -92,9 +81,10 @@ static void turn_normals(struct strip *strip, const float m[3][3], uint32_t firs
 static void look(struct strip *strip, const struct strip_view *view)
 {
 	const float scale = view->perspective ? 1 / view->focal : 0;
-	const float y = ((float)strip->y + 0.5f - view->half_height) * scale;
+	const struct strip_pixels *p = strip->pixels;
+	const float y = ((float)p->y + 0.5f - view->half_height) * scale;
 	for (uint32_t i = 0; i < strip->n; i++) {
-		const float x = ((float)(int32_t)(strip->x0 + strip->x[i]) + 0.5f - view->half_width) * scale;
+		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) * scale;
 		const float unit = -1 / __builtin_sqrtf((x * x + y * y) + 1);
 		strip->vx[i] = x * unit;
 		strip->vy[i] = y * unit;
@@ -136,29 +126,17 @@ static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
 
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
-	const uint64_t *at[STRIP];
-	const struct warp_instance *run[STRIP];
-	uint32_t run_first[STRIP + 1], n_runs = 0;
-	const uint32_t n = strip->n;
-	for (uint32_t i = 0; i < n; n_runs++) {
-		const struct warp_instance *in = instance_of(view, strip->id[i] / PSR_BLOCK_SAMPLES);
-		const uint32_t first = i;
-		run[n_runs] = in;
-		run_first[n_runs] = first;
-		while (i < n && strip->id[i] / PSR_BLOCK_SAMPLES - in->first_slot < in->blocks->n_blocks)
-			i++;
-		find_attributes(strip, view, in, first, i, at);
-	}
-	run_first[n_runs] = n;
-
+	const struct strip_pixels *p = strip->pixels;
+	const uint32_t n = p->n;
 	uint64_t all = 0, common = ~UINT64_C(0);
 	for (uint32_t i = 0; i < n; i++) {
-		const uint64_t attr = *at[i];
+		const uint64_t attr = *p->at[i];
 		strip->attr[i] = attr;
 		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
 		all |= attr;
 		common &= attr;
 	}
+	strip->n = n;
 	strip->is_specular = (PSR_ATTR_SPECULAR(all) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
 	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
 		read_diffuse(strip, 1);
@@ -173,10 +151,14 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		}
 		return;
 	}
+	for (uint32_t first = 0, end; first < n; first = end) {
+		const struct warp_instance *in = instance_run(&end, p, view, first);
+		turn_normals(strip, in->turn, first, end);
+		if (view->needs & STRIP_POSITION)
+			locate(strip, in, first, end);
+	}
 	if (view->needs & STRIP_POSITION)
 		bring_back(strip, view);
-	for (uint32_t k = 0; k < n_runs; k++)
-		turn_normals(strip, run[k]->turn, run_first[k], run_first[k + 1]);
 	for (uint32_t i = 0; i < n; i++) {
 		strip->lr[i] = ambient[0];
 		strip->lg[i] = ambient[1];
@@ -187,7 +169,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	if (view->needs & STRIP_TWO_SIDED)
 		for (uint32_t i = 0; i < n; i++) {
 			const float g = (strip->nx[i] * strip->vx[i] + strip->ny[i] * strip->vy[i]) + strip->nz[i] * strip->vz[i];
-			const float turn = psr_choose((strip->two_sided[i] != 0) & (g < 0), -1, 1);
+			const float turn = psr_choose((p->two_sided[i] != 0) & (g < 0), -1, 1);
 			strip->nx[i] *= turn;
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
@@ -330,35 +312,41 @@ static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uin
 	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
 }
 
-static void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
+static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
-	const size_t first = (size_t)strip->y * target->width + strip->x0;
-	const uint16_t r = target->background[0], g = target->background[1], b = target->background[2];
+	const uint16_t *const from[3] = { strip->r, strip->g, strip->b };
+	uint16_t *const to[3] = { target->r, target->g, target->b };
+	const struct strip_pixels *p = strip->pixels;
+	const size_t first = (size_t)p->y * target->width + p->x0;
+	for (int c = 0; c < 3; c++) {
+		uint16_t row[STRIP];
+		for (uint32_t x = 0; x < n; x++)
+			row[x] = target->background[c];
+		for (uint32_t i = 0; i < p->n; i++)
+			row[p->x[i]] = from[c][i];
+		for (uint32_t x = 0; x < n; x += STRIP_BRICK)
+			if (target->wants[x / STRIP_BRICK])
+				memcpy(to[c] + first + x, row + x, 2 * (n - x < STRIP_BRICK ? n - x : STRIP_BRICK));
+	}
+}
+
+static inline void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const struct strip_pixels *p = strip->pixels;
 	if (target->rgb) {
-		const uint32_t empty = pixel_of(target->srgb, r, g, b);
-		uint8_t *to = target->rgb + 3 * first;
+		const uint16_t *empty = target->background;
+		uint8_t *to = target->rgb + 3 * ((size_t)p->y * target->width + p->x0);
 		uint32_t pixel[STRIP];
 		for (uint32_t x = 0; x < n; x++)
-			pixel[x] = empty;
-		for (uint32_t i = 0; i < strip->n; i++)
-			pixel[strip->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
+			pixel[x] = pixel_of(target->srgb, empty[0], empty[1], empty[2]);
+		for (uint32_t i = 0; i < p->n; i++)
+			pixel[p->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
 		for (uint32_t x = 0; x + 1 < n; x++) /* the fourth byte is the next pixel's */
 			memcpy(to + 3 * (size_t)x, &pixel[x], 4);
 		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
 	}
-	if (!target->r)
-		return;
-	for (uint32_t x = 0; x < n; x++)
-		target->r[first + x] = r;
-	for (uint32_t x = 0; x < n; x++)
-		target->g[first + x] = g;
-	for (uint32_t x = 0; x < n; x++)
-		target->b[first + x] = b;
-	for (uint32_t i = 0; i < strip->n; i++) {
-		target->r[first + strip->x[i]] = strip->r[i];
-		target->g[first + strip->x[i]] = strip->g[i];
-		target->b[first + strip->x[i]] = strip->b[i];
-	}
+	if (target->wants)
+		write_linear(strip, target, n);
 }
 
 /* By two factors, since one of them may be beyond a float: exact unless the result is. */

@@ -1,6 +1,7 @@
 /* strip_light, strip_lit, strip_color, strip_write and depth_row: 1 to STRIP samples, lights of each kind, any numbers. */
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 #include "base/maths.h"
 #include "psr/direction.h"
 #include "tests/simd/lib/check.h"
@@ -145,18 +146,27 @@ static void bench_color(struct check *c)
 static void write_pixels(struct check *c, uint32_t width, uint32_t height, int has_rgb, int has_linear)
 {
 	struct strip *strip = check_in(c, 1, sizeof *strip);
+	struct strip_pixels *p = check_in(c, 1, sizeof *p);
 	struct strip_target *to = check_in(c, 1, sizeof *to);
 	const size_t area = (size_t)width * height;
 
-	strip->x0 = STRIP * check_below(c, (width + STRIP - 1) / STRIP);
-	strip->y = check_below(c, height);
-	const uint32_t n = width - strip->x0 < STRIP ? width - strip->x0 : STRIP;
-	strip->n = 0;
-	for (uint32_t x = check_below(c, 3); x < n; x += check_one_in(c, 6) ? 1 + check_below(c, 40) : 1)
-		strip->x[strip->n++] = (uint16_t)x;
+	p->x0 = STRIP * check_below(c, (width + STRIP - 1) / STRIP);
+	p->y = check_below(c, height);
+	const uint32_t n = width - p->x0 < STRIP ? width - p->x0 : STRIP;
+	p->n = 0;
+	memset(p->covered, 0, sizeof p->covered);
+	for (uint32_t x = check_below(c, 3); x < n; x += check_one_in(c, 6) ? 1 + check_below(c, 40) : 1) {
+		p->covered[x / 32] |= 1u << x % 32;
+		p->x[p->n++] = (uint16_t)x;
+	}
+	strip->pixels = p;
 	to->width = width;
-	to->srgb = check_in(c, 65536, 1);
+	to->srgb = check_in(c, 65536 + SRGB_PADDING, 1);
 	to->rgb = has_rgb ? check_out(c, area, 3) : NULL;
+	uint8_t *wants = has_linear ? check_in(c, (n + STRIP_BRICK - 1) / STRIP_BRICK, 1) : NULL;
+	for (uint32_t i = 0; wants && i < (n + STRIP_BRICK - 1) / STRIP_BRICK; i++)
+		wants[i] = (uint8_t)check_below(c, 3);
+	to->wants = wants;
 	to->r = has_linear ? check_out(c, area, 2) : NULL;
 	to->g = has_linear ? check_out(c, area, 2) : NULL;
 	to->b = has_linear ? check_out(c, area, 2) : NULL;

@@ -1,4 +1,4 @@
-/* strip_list and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
+/* strip_list, strip_find and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
 #include <stddef.h>
 #include <string.h>
 #include "psr/direction.h"
@@ -16,7 +16,7 @@ static void settle(struct strip *strip)
 
 static void list_pixels(struct check *c, uint32_t n, int is_weighted, uint32_t empty_one_in)
 {
-	struct strip *strip = check_out(c, 1, sizeof *strip);
+	struct strip_pixels *p = check_out(c, 1, sizeof *p);
 	uint64_t *word = check_in(c, n, sizeof *word);
 	uint16_t *weight = is_weighted ? check_in(c, n, sizeof *weight) : NULL;
 
@@ -29,11 +29,11 @@ static void list_pixels(struct check *c, uint32_t n, int is_weighted, uint32_t e
 	}
 	check_units(c, n);
 	while (check_next(c)) {
-		c->simd->strip_list(strip, word, weight, n);
+		c->simd->strip_list(p, word, weight, n);
 		if (c->is_bench)
 			continue;
-		memset(strip->x + strip->n, 0, sizeof strip->x - strip->n * sizeof *strip->x);
-		memset(strip->id + strip->n, 0, sizeof strip->id - strip->n * sizeof *strip->id);
+		memset(p->x + p->n, 0, sizeof p->x - p->n * sizeof *p->x);
+		memset(p->id + p->n, 0, sizeof p->id - p->n * sizeof *p->id);
 	}
 }
 
@@ -78,19 +78,19 @@ static void random_instance(struct check *c, struct warp_instance *in, const str
 }
 
 /* The covered pixels of a row, runs of a few instances. */
-static void random_strip(struct check *c, struct strip *strip, const struct strip_view *view, uint32_t n)
+static void random_pixels(struct check *c, struct strip_pixels *p, const struct strip_view *view, uint32_t n)
 {
 	uint32_t x = 0, in = 0;
-	strip->n = 0;
-	strip->x0 = STRIP * check_below(c, PSR_MAX_SIDE / STRIP);
-	strip->y = check_below(c, PSR_MAX_SIDE);
-	for (; x < STRIP && strip->n < n; x += 1 + (n < STRIP && check_one_in(c, 5))) {
+	p->n = 0;
+	p->x0 = STRIP * check_below(c, PSR_MAX_SIDE / STRIP);
+	p->y = check_below(c, PSR_MAX_SIDE);
+	for (; x < STRIP && p->n < n; x += 1 + (n < STRIP && check_one_in(c, 5))) {
 		if (check_one_in(c, 20))
 			in = check_below(c, view->n_instances);
 		const struct psr_blocks *b = view->instance[in].blocks;
 		const uint32_t block = check_below(c, b->n_blocks);
-		strip->x[strip->n] = (uint16_t)x;
-		strip->id[strip->n++] = (view->instance[in].first_slot + block) * PSR_BLOCK_SAMPLES + valid_sample(c, b->mask[block]);
+		p->x[p->n] = (uint16_t)x;
+		p->id[p->n++] = (view->instance[in].first_slot + block) * PSR_BLOCK_SAMPLES + valid_sample(c, b->mask[block]);
 	}
 }
 
@@ -99,6 +99,7 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	const uint32_t n_instances = 1 + check_below(c, MAX_INSTANCES);
 	struct warp_instance *instance = check_in(c, n_instances, sizeof *instance);
 	struct strip_view *view = check_in(c, 1, sizeof *view);
+	struct strip_pixels *pixels = check_out(c, 1, sizeof *pixels);
 	struct strip *strip = check_out(c, 1, sizeof *strip);
 	float *ambient = check_in(c, 3, sizeof *ambient);
 	struct psr_blocks blocks;
@@ -123,9 +124,11 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	};
 	for (int k = 0; k < 3; k++)
 		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
-	random_strip(c, strip, view, n);
-	check_units(c, strip->n);
+	random_pixels(c, pixels, view, n);
+	strip->pixels = pixels;
+	check_units(c, pixels->n);
 	while (check_next(c)) {
+		c->simd->strip_find(pixels, view);
 		c->simd->strip_resolve(strip, view, ambient);
 		if (!c->is_bench)
 			settle(strip);
@@ -151,10 +154,10 @@ int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "strip_list: random rows", random_lists, 2000, NULL },
-		{ "strip_resolve: random samples", random_resolve, 1000, NULL },
-		{ "strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
+		{ "strip_find, strip_resolve: random samples", random_resolve, 1000, NULL },
+		{ "strip_find, strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
-		{ "strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
+		{ "strip_find and strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }
