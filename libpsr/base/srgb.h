@@ -8,6 +8,8 @@
 #include <stdint.h>
 
 extern const float psr_srgb_to_linear[256]; /* correctly rounded; 0 -> 0, 255 -> 1 */
+/* The same for codes of 5 and 6 bits: of the nearest code of 8. */
+extern const float psr_srgb5_to_linear[32], psr_srgb6_to_linear[64];
 
 /* The code whose c is nearest to that of `linear`, a half upwards; clamped to 0..255, NaN gives 0. The inverse of the
  * table above. */

@@ -35,8 +35,9 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 		return;
 	strip.pixels = pixels;
 	simd->strip_find(pixels, &view);
+	simd->strip_read(&strip, &view);
 	simd->strip_resolve(&strip, &view, plan->ambient);
-	for (uint32_t i = 0; i < strip.n; i++)
+	for (uint32_t i = 0; i < pixels->n; i++)
 		for (int a = 0; a < 3; a++)
 			to[3 * pixels->x[i] + a] = to_steps(((float)plan->frame[0][a] * strip.nx[i] + (float)plan->frame[1][a] * strip.ny[i]) +
 			                                    (float)plan->frame[2][a] * strip.nz[i]);

@@ -108,13 +108,15 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 		strip.pixels = &pixels[i % 2];
 		if (i + 1 < n)
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
-		if (strip.pixels->n)
+		if (strip.pixels->n) {
+			simd->strip_read(&strip, &plan->view);
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
+		}
 		const uint64_t middle = is_timed ? now_ns() : 0;
 		if (strip.pixels->n) {
 			light_strip(&strip, &shading);
-			counts->n_pixels += strip.n;
-			counts->n_specular += strip.is_specular ? strip.n : 0;
+			counts->n_pixels += strip.pixels->n;
+			counts->n_specular += strip.is_specular ? strip.pixels->n : 0;
 		}
 		write_strip(&strip, &shading);
 		if (is_timed) {

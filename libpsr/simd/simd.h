@@ -124,7 +124,7 @@ struct strip_pixels {
 /* Their samples. Everything is in camera space; colours are linear. */
 struct strip {
 	const struct strip_pixels *pixels;
-	uint32_t n;              /* as pixels->n, where that is not 0 */
+	uint32_t n;              /* pixels->n, and up to a multiple of STRIP_PADDING: the last sample is repeated */
 	int is_specular;         /* some sample is, or the view wants it so */
 	uint64_t attr[STRIP];
 	uint64_t normal_word[STRIP];
@@ -161,11 +161,13 @@ struct strip_light {
 /* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): covered, x,
  * id, n. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
-/* Where their attributes are, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks are. It is worth while to
- * find those of one strip before another one is resolved. */
+/* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks are. Repeats
+ * the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before another one is read. */
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
-/* Attributes, normals, colours and what else is needed of strip->pixels, at least one, which are found; clears the light to
- * `ambient` and no highlight. */
+/* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
+typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
+/* What else is needed of samples that are read: turned normals, positions, lines of sight. Clears the light to `ambient` and no
+ * highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
@@ -295,6 +297,7 @@ struct simd {
 	warp_fn *warp;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;
+	strip_read_fn *strip_read;
 	strip_resolve_fn *strip_resolve;
 	strip_shadow_fn *strip_shadow;
 	strip_light_fn *strip_light;

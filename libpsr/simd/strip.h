@@ -1,12 +1,9 @@
-/* Strips, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+/* Samples of strips and their pixels, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
 #include <string.h>
 #include "base/maths.h"
 #include "base/srgb.h"
 #include "simd/block.h"
-#include "simd/instance.h"
-
-/* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
-#define CONSTANT_FLAGS inline __attribute__((always_inline))
+#include "simd/strip_parts.h"
 
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
@@ -24,8 +21,9 @@ static inline void strip_list(struct strip_pixels *p, const uint64_t *word, cons
 
 static inline void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
-	for (uint32_t i = 0, end; i < p->n;) {
-		const struct warp_instance *in = instance_run(&end, p, view, i);
+	const uint32_t n = p->n;
+	for (uint32_t i = 0, end; i < n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks *b = in->blocks;
 		for (; i < end; i++) {
 			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
@@ -35,6 +33,56 @@ static inline void strip_find(struct strip_pixels *p, const struct strip_view *v
 			__builtin_prefetch(p->at[i]);
 		}
 	}
+	repeat_last(p);
+}
+
+/* Colours, from the attributes: often the same in the whole strip. */
+static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
+		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
+	}
+}
+
+static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint64_t attr = is_one ? first : strip->attr[i];
+		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
+		strip->sr[i] = psr_srgb5_to_linear[specular & 31];
+		strip->sg[i] = psr_srgb6_to_linear[specular >> 5 & 63];
+		strip->sb[i] = psr_srgb5_to_linear[specular >> 11];
+		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
+	}
+}
+
+static inline void strip_read(struct strip *strip, const struct strip_view *view)
+{
+	const struct strip_pixels *p = strip->pixels;
+	const uint32_t n = strip_whole(p->n);
+	uint64_t all = 0, common = ~UINT64_C(0);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint64_t attr = *p->at[i];
+		strip->attr[i] = attr;
+		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
+		all |= attr;
+		common &= attr;
+	}
+	strip->n = n;
+	strip->is_specular = strip_wants_highlights(view, all);
+	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
+		read_diffuse(strip, 1);
+	else
+		read_diffuse(strip, 0);
+	if (strip->is_specular && all >> 40 == common >> 40)
+		read_specular(strip, 1);
+	else if (strip->is_specular)
+		read_specular(strip, 0);
 }
 
 /* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one block. */
@@ -67,17 +115,6 @@ static void bring_back(struct strip *strip, const struct strip_view *view)
 	}
 }
 
-static void turn_normals(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
-{
-	for (uint32_t i = first; i < end; i++) {
-		const uint64_t word = strip->normal_word[i];
-		const float x = (float)(int16_t)word, y = (float)(int16_t)(word >> 16), z = (float)(int16_t)(word >> 32);
-		strip->nx[i] = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * (1 / 32767.0f);
-		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
-		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);
-	}
-}
-
 static void look(struct strip *strip, const struct strip_view *view)
 {
 	const float scale = view->perspective ? 1 / view->focal : 0;
@@ -92,56 +129,10 @@ static void look(struct strip *strip, const struct strip_view *view)
 	}
 }
 
-/* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
-static const float exponent_root[16] = {
-	1.0f,        1.04427378f, 1.09050773f, 1.13878863f, 1.18920712f, 1.24185781f, 1.29683955f, 1.35425555f,
-	1.41421356f, 1.47682615f, 1.54221083f, 1.61049033f, 1.68179283f, 1.75625216f, 1.83400809f, 1.91520656f,
-};
-
-/* Colours, from the attributes: often the same in the whole strip. */
-static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
-{
-	const uint64_t first = strip->attr[0];
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
-		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
-		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
-		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
-	}
-}
-
-static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
-{
-	const uint64_t first = strip->attr[0];
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint64_t attr = is_one ? first : strip->attr[i];
-		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
-		strip->sr[i] = psr_srgb_to_linear[((specular & 31) * 255 + 15) / 31];
-		strip->sg[i] = psr_srgb_to_linear[((specular >> 5 & 63) * 255 + 31) / 63];
-		strip->sb[i] = psr_srgb_to_linear[((specular >> 11) * 255 + 15) / 31];
-		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
-		strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
-	}
-}
-
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
-	const uint32_t n = p->n;
-	uint64_t all = 0, common = ~UINT64_C(0);
-	for (uint32_t i = 0; i < n; i++) {
-		const uint64_t attr = *p->at[i];
-		strip->attr[i] = attr;
-		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
-		all |= attr;
-		common &= attr;
-	}
-	strip->n = n;
-	strip->is_specular = (PSR_ATTR_SPECULAR(all) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
-	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
-		read_diffuse(strip, 1);
-	else
-		read_diffuse(strip, 0);
+	const uint32_t n = strip->n;
 	if (view->lit && !strip->is_specular) {
 		for (uint32_t i = 0; i < n; i++) {
 			const float *lit = view->lit[PSR_ATTR_NORMAL(strip->attr[i])];
@@ -152,7 +143,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		return;
 	}
 	for (uint32_t first = 0, end; first < n; first = end) {
-		const struct warp_instance *in = instance_run(&end, p, view, first);
+		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 		turn_normals(strip, in->turn, first, end);
 		if (view->needs & STRIP_POSITION)
 			locate(strip, in, first, end);
@@ -166,6 +157,9 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	}
 	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
 		look(strip, view);
+	if (strip->is_specular)
+		for (uint32_t i = 0; i < n; i++)
+			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
 	if (view->needs & STRIP_TWO_SIDED)
 		for (uint32_t i = 0; i < n; i++) {
 			const float g = (strip->nx[i] * strip->vx[i] + strip->ny[i] * strip->vy[i]) + strip->nz[i] * strip->vz[i];
@@ -174,106 +168,6 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
 		}
-	if (strip->is_specular && all >> 40 == common >> 40)
-		read_specular(strip, 1);
-	else if (strip->is_specular)
-		read_specular(strip, 0);
-}
-
-/* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
-static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
-{
-	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
-	const float diffuse = psr_where(facing > 0, facing) * amount;
-	s->lr[i] += color[0] * diffuse;
-	s->lg[i] += color[1] * diffuse;
-	s->lb[i] += color[2] * diffuse;
-	if (is_specular) {
-		const float normal_view = (s->nx[i] * s->vx[i] + s->ny[i] * s->vy[i]) + s->nz[i] * s->vz[i];
-		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
-		const float mirror = 2 * facing * normal_view - light_view;
-		const float least = psr_where(mirror > 0, mirror), clamped = psr_choose(least < 1, least, 1);
-		const float power = psr_power(clamped, s->exponent[i]);
-		const float highlight = psr_where(facing > 0, power) * amount;
-		s->hr[i] += color[0] * highlight;
-		s->hg[i] += color[1] * highlight;
-		s->hb[i] += color[2] * highlight;
-	}
-}
-
-static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
-                                     int is_specular)
-{
-	const struct strip_light l = *light;
-	for (uint32_t i = 0; i < s->n; i++)
-		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
-}
-
-static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
-                              int is_specular, int is_spot)
-{
-	const struct strip_light l = *light;
-	for (uint32_t i = 0; i < s->n; i++) {
-		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
-		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
-		const float x = dx / distance, y = dy / distance, z = dz / distance;
-		const float falling = l.reference2 / distance2; /* a light in a sample itself is not to be infinite */
-		float amount = psr_choose(l.reference2 > 0, psr_choose(falling < 0x1p60f, falling, 0x1p60f), 1);
-		if (is_spot) { /* a smooth edge: 3 t^2 - 2 t^3 */
-			const float c = -((x * l.axis[0] + y * l.axis[1]) + z * l.axis[2]);
-			const float t = (c - l.cos_outer) / (l.cos_inner - l.cos_outer);
-			const float edge = psr_choose(c < l.cos_inner, t * t * (3 - 2 * t), 1);
-			amount = psr_where(c > l.cos_outer, amount * edge);
-		}
-		amount = psr_where(distance2 > 0, amount) * (is_partial ? reaches[i] : 1);
-		reflect(s, i, is_specular, l.color, amount, x, y, z);
-	}
-}
-
-static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
-                            int is_specular)
-{
-	if (light->kind == PSR_LIGHT_DIRECTIONAL)
-		light_directional(strip, light, reaches, is_partial, is_specular);
-	else if (light->kind == PSR_LIGHT_SPOT)
-		light_near(strip, light, reaches, is_partial, is_specular, 1);
-	else
-		light_near(strip, light, reaches, is_partial, is_specular, 0);
-}
-
-static void strip_light(struct strip *strip, const struct strip_light *light, const float *reaches)
-{
-	if (strip->is_specular && reaches)
-		light_by(strip, light, reaches, 1, 1);
-	else if (strip->is_specular)
-		light_by(strip, light, NULL, 0, 1);
-	else if (reaches)
-		light_by(strip, light, reaches, 1, 0);
-	else
-		light_by(strip, light, NULL, 0, 0);
-}
-
-static void strip_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
-                      const float ambient[3], uint32_t first, uint32_t n)
-{
-	struct strip strip;
-	strip.n = n;
-	strip.is_specular = 0;
-	for (uint32_t i = 0; i < n; i++) {
-		strip.normal_word[i] = view->direction_word[first + i];
-		strip.lr[i] = ambient[0];
-		strip.lg[i] = ambient[1];
-		strip.lb[i] = ambient[2];
-	}
-	turn_normals(&strip, view->instance->turn, 0, n);
-	for (uint32_t l = 0; l < n_lights; l++)
-		strip_light(&strip, &light[l], NULL);
-	for (uint32_t i = 0; i < n; i++) {
-		lit[first + i][0] = strip.lr[i];
-		lit[first + i][1] = strip.lg[i];
-		lit[first + i][2] = strip.lb[i];
-		lit[first + i][3] = 0;
-	}
 }
 
 static inline uint16_t light16(float linear)

@@ -1,4 +1,4 @@
-/* strip_list, strip_find and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
+/* strip_list, strip_find, strip_read and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
 #include <stddef.h>
 #include <string.h>
 #include "psr/direction.h"
@@ -129,6 +129,7 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	check_units(c, pixels->n);
 	while (check_next(c)) {
 		c->simd->strip_find(pixels, view);
+		c->simd->strip_read(strip, view);
 		c->simd->strip_resolve(strip, view, ambient);
 		if (!c->is_bench)
 			settle(strip);
@@ -154,10 +155,10 @@ int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "strip_list: random rows", random_lists, 2000, NULL },
-		{ "strip_find, strip_resolve: random samples", random_resolve, 1000, NULL },
-		{ "strip_find, strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
+		{ "strip_find, strip_read, strip_resolve: random samples", random_resolve, 1000, NULL },
+		{ "strip_find, strip_read, strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
-		{ "strip_find and strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
+		{ "strip_find, strip_read, strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }

@@ -1,3 +1,5 @@
 #include "simd/table.h"
 
-const struct simd simd_avx2 = SIMD_TABLE(warp_avx2, strip_list, strip_find, strip_write);
+#define AS_LOOPS(kernel) kernel
+
+const struct simd simd_avx2 = SIMD_TABLE(warp_avx2, AS_LOOPS);

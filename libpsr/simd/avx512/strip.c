@@ -1,6 +1,7 @@
 #include <immintrin.h>
+#include "base/srgb.h"
 #include "psr/direction.h"
-#include "simd/instance.h"
+#include "simd/strip_parts.h"
 #include "simd/kernels.h"
 
 /* The n lowest bits, of which there are `most`, below 64. */
@@ -69,7 +70,7 @@ static inline __m512i find_attributes(const struct psr_blocks *b, __mmask8 k, __
 void strip_find_avx512(struct strip_pixels *p, const struct strip_view *view)
 {
 	for (uint32_t first = 0, end; first < p->n; first = end) {
-		const struct warp_instance *in = instance_run(&end, p, view, first);
+		const struct warp_instance *in = instance_run(&end, p, view, first, p->n);
 		const struct psr_blocks *b = in->blocks;
 		for (uint32_t i = first; i < end; i += 8) {
 			const __mmask8 k = (__mmask8)lowest(end - i, 8);
@@ -86,6 +87,103 @@ void strip_find_avx512(struct strip_pixels *p, const struct strip_view *view)
 				_mm_prefetch((const char *)p->at[j], _MM_HINT_T0);
 		}
 	}
+	repeat_last(p);
+}
+
+/* ---- read ---- */
+
+/* Attributes and normals; *all, *common: or-ed and and-ed. */
+static void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
+{
+	__m512i some = _mm512_setzero_si512(), each = _mm512_set1_epi64(-1);
+	for (uint32_t i = 0; i < strip->n; i += 8) {
+		const __m512i attr = _mm512_i64gather_epi64(_mm512_loadu_si512(strip->pixels->at + i), NULL, 1);
+		const __m256i normal = _mm256_and_si256(_mm512_cvtepi64_epi32(attr), _mm256_set1_epi32(PSR_DIRECTIONS - 1));
+		_mm512_storeu_si512(strip->attr + i, attr);
+		_mm512_storeu_si512(strip->normal_word + i, _mm512_i32gather_epi64(normal, view->direction_word, 8));
+		some = _mm512_or_si512(some, attr);
+		each = _mm512_and_si512(each, attr);
+	}
+	*all = (uint64_t)_mm512_reduce_or_epi64(some);
+	*common = (uint64_t)_mm512_reduce_and_epi64(each);
+}
+
+static void fill_floats(float *to, uint32_t n, float value)
+{
+	for (uint32_t i = 0; i < n; i += 16)
+		_mm512_storeu_ps(to + i, _mm512_set1_ps(value));
+}
+
+static inline __m512 linear_of(__m512i word, int shift)
+{
+	const __m512i code = _mm512_and_si512(_mm512_srli_epi32(word, (unsigned)shift), _mm512_set1_epi32(0xff));
+	return _mm512_i32gather_ps(code, psr_srgb_to_linear, 4);
+}
+
+/* The half of each of 16 attributes that the permutation names. */
+static inline __m512i halves_of(const uint64_t *attr, __m512i which)
+{
+	return _mm512_permutex2var_epi32(_mm512_loadu_si512(attr), which, _mm512_loadu_si512(attr + 8));
+}
+
+static void read_diffuse(struct strip *strip)
+{
+	const __m512i lower = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+	const __m512i upper = _mm512_add_epi32(lower, _mm512_set1_epi32(1));
+	for (uint32_t i = 0; i < strip->n; i += 16) {
+		const __m512i low = halves_of(strip->attr + i, lower), high = halves_of(strip->attr + i, upper);
+		_mm512_storeu_ps(strip->dr + i, linear_of(low, 16));
+		_mm512_storeu_ps(strip->dg + i, linear_of(low, 24));
+		_mm512_storeu_ps(strip->db + i, linear_of(high, 0));
+	}
+}
+
+/* Tables of 32 and 64 floats, in registers. */
+static inline __m512 look_up_5(const __m512 table[2], __m512i index)
+{
+	return _mm512_permutex2var_ps(table[0], index, table[1]);
+}
+
+static inline __m512 look_up_6(const __m512 table[4], __m512i index)
+{
+	const __mmask16 is_upper = _mm512_test_epi32_mask(index, _mm512_set1_epi32(32));
+	return _mm512_mask_blend_ps(is_upper, look_up_5(table, index), look_up_5(table + 2, index));
+}
+
+static void read_specular(struct strip *strip)
+{
+	const __m512i upper = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+	const __m512 five[2] = { _mm512_loadu_ps(psr_srgb5_to_linear), _mm512_loadu_ps(psr_srgb5_to_linear + 16) };
+	const __m512 six[4] = { _mm512_loadu_ps(psr_srgb6_to_linear), _mm512_loadu_ps(psr_srgb6_to_linear + 16),
+		                    _mm512_loadu_ps(psr_srgb6_to_linear + 32), _mm512_loadu_ps(psr_srgb6_to_linear + 48) };
+	const __m512 root = _mm512_loadu_ps(exponent_root);
+	for (uint32_t i = 0; i < strip->n; i += 16) {
+		const __m512i high = halves_of(strip->attr + i, upper); /* blue, then specular, then the exponent, 8, 16 and 8 bits */
+		const __m512i power = _mm512_slli_epi32(_mm512_srli_epi32(high, 28), 23);
+		const __m512 exponent = _mm512_permutexvar_ps(_mm512_srli_epi32(high, 24), root);
+		_mm512_storeu_ps(strip->sr + i, look_up_5(five, _mm512_srli_epi32(high, 8)));
+		_mm512_storeu_ps(strip->sg + i, look_up_6(six, _mm512_srli_epi32(high, 13)));
+		_mm512_storeu_ps(strip->sb + i, look_up_5(five, _mm512_srli_epi32(high, 19)));
+		_mm512_storeu_ps(strip->exponent + i, _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(exponent), power)));
+	}
+}
+
+void strip_read_avx512(struct strip *strip, const struct strip_view *view)
+{
+	uint64_t all, common;
+	strip->n = strip_whole(strip->pixels->n);
+	read_attributes(&all, &common, strip, view);
+	strip->is_specular = strip_wants_highlights(view, all);
+	const uint32_t diffuse = PSR_ATTR_DIFFUSE(all);
+	if (diffuse != PSR_ATTR_DIFFUSE(common)) {
+		read_diffuse(strip);
+	} else {
+		fill_floats(strip->dr, strip->n, psr_srgb_to_linear[diffuse & 0xff]);
+		fill_floats(strip->dg, strip->n, psr_srgb_to_linear[diffuse >> 8 & 0xff]);
+		fill_floats(strip->db, strip->n, psr_srgb_to_linear[diffuse >> 16]);
+	}
+	if (strip->is_specular)
+		read_specular(strip);
 }
 
 /* ---- write ---- */

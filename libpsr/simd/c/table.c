@@ -1,3 +1,5 @@
 #include "simd/table.h"
 
-const struct simd simd_c = SIMD_TABLE(warp_c, strip_list, strip_find, strip_write);
+#define AS_LOOPS(kernel) kernel
+
+const struct simd simd_c = SIMD_TABLE(warp_c, AS_LOOPS);

@@ -1,0 +1,99 @@
+/* Light on strips, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+#include "base/maths.h"
+#include "simd/strip_parts.h"
+
+/* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
+static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
+{
+	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
+	const float diffuse = psr_where(facing > 0, facing) * amount;
+	s->lr[i] += color[0] * diffuse;
+	s->lg[i] += color[1] * diffuse;
+	s->lb[i] += color[2] * diffuse;
+	if (is_specular) {
+		const float normal_view = (s->nx[i] * s->vx[i] + s->ny[i] * s->vy[i]) + s->nz[i] * s->vz[i];
+		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
+		const float mirror = 2 * facing * normal_view - light_view;
+		const float least = psr_where(mirror > 0, mirror), clamped = psr_choose(least < 1, least, 1);
+		const float power = psr_power(clamped, s->exponent[i]);
+		const float highlight = psr_where(facing > 0, power) * amount;
+		s->hr[i] += color[0] * highlight;
+		s->hg[i] += color[1] * highlight;
+		s->hb[i] += color[2] * highlight;
+	}
+}
+
+static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+                                     int is_specular)
+{
+	const struct strip_light l = *light;
+	for (uint32_t i = 0; i < s->n; i++)
+		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
+}
+
+static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
+                              int is_specular, int is_spot)
+{
+	const struct strip_light l = *light;
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
+		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
+		const float x = dx / distance, y = dy / distance, z = dz / distance;
+		const float falling = l.reference2 / distance2; /* a light in a sample itself is not to be infinite */
+		float amount = psr_choose(l.reference2 > 0, psr_choose(falling < 0x1p60f, falling, 0x1p60f), 1);
+		if (is_spot) { /* a smooth edge: 3 t^2 - 2 t^3 */
+			const float c = -((x * l.axis[0] + y * l.axis[1]) + z * l.axis[2]);
+			const float t = (c - l.cos_outer) / (l.cos_inner - l.cos_outer);
+			const float edge = psr_choose(c < l.cos_inner, t * t * (3 - 2 * t), 1);
+			amount = psr_where(c > l.cos_outer, amount * edge);
+		}
+		amount = psr_where(distance2 > 0, amount) * (is_partial ? reaches[i] : 1);
+		reflect(s, i, is_specular, l.color, amount, x, y, z);
+	}
+}
+
+static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
+                            int is_specular)
+{
+	if (light->kind == PSR_LIGHT_DIRECTIONAL)
+		light_directional(strip, light, reaches, is_partial, is_specular);
+	else if (light->kind == PSR_LIGHT_SPOT)
+		light_near(strip, light, reaches, is_partial, is_specular, 1);
+	else
+		light_near(strip, light, reaches, is_partial, is_specular, 0);
+}
+
+static void strip_light(struct strip *strip, const struct strip_light *light, const float *reaches)
+{
+	if (strip->is_specular && reaches)
+		light_by(strip, light, reaches, 1, 1);
+	else if (strip->is_specular)
+		light_by(strip, light, NULL, 0, 1);
+	else if (reaches)
+		light_by(strip, light, reaches, 1, 0);
+	else
+		light_by(strip, light, NULL, 0, 0);
+}
+
+static void strip_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
+                      const float ambient[3], uint32_t first, uint32_t n)
+{
+	struct strip strip;
+	strip.n = n;
+	strip.is_specular = 0;
+	for (uint32_t i = 0; i < n; i++) {
+		strip.normal_word[i] = view->direction_word[first + i];
+		strip.lr[i] = ambient[0];
+		strip.lg[i] = ambient[1];
+		strip.lb[i] = ambient[2];
+	}
+	turn_normals(&strip, view->instance->turn, 0, n);
+	for (uint32_t l = 0; l < n_lights; l++)
+		strip_light(&strip, &light[l], NULL);
+	for (uint32_t i = 0; i < n; i++) {
+		lit[first + i][0] = strip.lr[i];
+		lit[first + i][1] = strip.lg[i];
+		lit[first + i][2] = strip.lb[i];
+		lit[first + i][3] = 0;
+	}
+}

@@ -1,0 +1,73 @@
+/* What all variants of the kernels of strips share. */
+#ifndef PSR_SIMD_STRIP_PARTS_H
+#define PSR_SIMD_STRIP_PARTS_H
+
+#include "simd/simd.h"
+
+/* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
+#define CONSTANT_FLAGS inline __attribute__((always_inline))
+
+static inline uint32_t strip_whole(uint32_t n)
+{
+	return (n + STRIP_PADDING - 1) / STRIP_PADDING * STRIP_PADDING;
+}
+
+static inline void repeat_last(struct strip_pixels *p)
+{
+	for (uint32_t i = p->n; i < strip_whole(p->n); i++) {
+		p->x[i] = p->x[p->n - 1];
+		p->id[i] = p->id[p->n - 1];
+		p->at[i] = p->at[p->n - 1];
+		p->two_sided[i] = p->two_sided[p->n - 1];
+	}
+}
+
+/* `all`: attributes of a strip, or-ed. */
+static inline int strip_wants_highlights(const struct strip_view *view, uint64_t all)
+{
+	return (PSR_ATTR_SPECULAR(all) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
+}
+
+/* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
+static const float exponent_root[16] = {
+	1.0f,        1.04427378f, 1.09050773f, 1.13878863f, 1.18920712f, 1.24185781f, 1.29683955f, 1.35425555f,
+	1.41421356f, 1.47682615f, 1.54221083f, 1.61049033f, 1.68179283f, 1.75625216f, 1.83400809f, 1.91520656f,
+};
+
+static inline const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
+{
+	uint32_t low = 0, high = view->n_instances;
+	while (high - low > 1) {
+		const uint32_t middle = (low + high) / 2;
+		if (view->instance[middle].first_slot <= slot)
+			low = middle;
+		else
+			high = middle;
+	}
+	return &view->instance[low];
+}
+
+/* The instance of sample `first`, and in *end where the run of its samples ends, at n at the latest. */
+static inline const struct warp_instance *instance_run(uint32_t *end, const struct strip_pixels *p,
+                                                       const struct strip_view *view, uint32_t first, uint32_t n)
+{
+	const struct warp_instance *in = instance_of(view, p->id[first] / PSR_BLOCK_SAMPLES);
+	uint32_t i = view->n_instances > 1 ? first + 1 : n;
+	while (i < n && p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot < in->blocks->n_blocks)
+		i++;
+	*end = i;
+	return in;
+}
+
+static inline void turn_normals(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
+{
+	for (uint32_t i = first; i < end; i++) {
+		const uint64_t word = strip->normal_word[i];
+		const float x = (float)(int16_t)word, y = (float)(int16_t)(word >> 16), z = (float)(int16_t)(word >> 32);
+		strip->nx[i] = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * (1 / 32767.0f);
+		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
+		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);
+	}
+}
+
+#endif
