@@ -115,7 +115,7 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 	for (uint32_t y = 0; y < stack->height; y++)
 		for (uint32_t x = 0; x < stack->width; x++) {
 			const size_t at = (size_t)y * stack->width + x;
-			const float z = psr_float_from_bits((uint32_t)(stack->word[at] >> 32));
+			const float z = psr_float_from_bits((uint32_t)(psr_zstack_row(stack, y)[x] >> 32));
 			double thesis = 0, closed = 0;
 
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {

@@ -273,6 +273,11 @@ static void count_chunk(int i, void *userdata)
 	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
 }
 
+static inline int is_at_border(const struct plan *plan, const struct cull_hit *hit)
+{
+	return hit->x0 == 0 || hit->y0 == 0 || hit->x1 == plan->width - 1 || hit->y1 == plan->height - 1;
+}
+
 static void fill_chunk(int i, void *userdata)
 {
 	const struct cull *cull = userdata;
@@ -280,7 +285,10 @@ static void fill_chunk(int i, void *userdata)
 	uint32_t *next = cull->bins->count + (size_t)i * cull->n_tiles;
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
-		const struct bin_entry entry = { hit->slot, hit->instance, hit->level, hit->is_mixed, chunk->first_hit + h };
+		const struct bin_entry entry = {
+			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed & 1,
+			.at_border = is_at_border(cull->plan, hit), .hit = chunk->first_hit + h,
+		};
 		for (uint32_t y = hit->y0 / TILE_HEIGHT; y <= hit->y1 / TILE_HEIGHT; y++)
 			for (uint32_t x = hit->x0 / TILE_WIDTH; x <= hit->x1 / TILE_WIDTH; x++)
 				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;

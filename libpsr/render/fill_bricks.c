@@ -16,7 +16,7 @@ static struct fill_row picture_row_at(struct picture_row *to, const struct fill 
 	const uint32_t width = p->stack->width, n_inside = y >= p->stack->height ? 0 : x + n > width ? width - x : n;
 	const size_t first = (size_t)y * width + x;
 	if (n_inside && has_depths)
-		fill->simd->fill_depths(to->z, p->stack->word + first, n_inside);
+		fill->simd->fill_depths(to->z, psr_zstack_row(p->stack, y) + x, n_inside);
 	if (n_inside == n && has_colors)
 		return (struct fill_row){ p->r + first, p->g + first, p->b + first, p->weight + first, to->z };
 	if (n_inside == n)

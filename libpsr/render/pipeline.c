@@ -159,9 +159,11 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	const size_t area = (size_t)w * h;
 	struct psr_zstack *stack = &r->stack;
 	const size_t rows = n_rows(&r->plan), n_bricks = rows * ((w + BRICK - 1) / BRICK);
-	size_t cells = 0;
+	size_t n_words, cells = 0;
 
 	stack->width = w;
+	stack->gap = warp_gap(w);
+	n_words = (size_t)(w + stack->gap) * h;
 	stack->height = h;
 	stack->levels = levels & ~1u;
 	stack->exponent = r->plan.exponent;
@@ -172,7 +174,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		if (stack->levels >> k & 1)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
-	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, area * (8 + 4 * 2) + cells * 4 + n_bricks);
+	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, n_words * 8 + area * 4 * 2 + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
 	r->counters = grow(r->counters, &r->counters_size, n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
@@ -184,7 +186,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	r->is_clean = r->is_quiet + n_tiles;
 
 	stack->word = r->pixels;
-	float *next = (float *)(stack->word + area);
+	float *next = (float *)(stack->word + n_words);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
 		if (stack->level[k].z)
@@ -306,13 +308,14 @@ static void shade_one(int row, void *userdata)
 	const struct plan *plan = &r->plan;
 	struct shade_counts counts = { 0, 0, 0, 0 };
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(plan, row);
-	shade_rows(r->simd, plan, &r->target, r->stack.word, r->weight, y0, y1, &counts);
+	shade_rows(r->simd, plan, &r->target, &r->stack, r->weight, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
+		const uint64_t *word = psr_zstack_row(&r->stack, y);
 		if (r->frame->depth)
-			r->simd->depth_row(r->frame->depth + first, r->stack.word + first, plan->width, r->stack.exponent);
+			r->simd->depth_row(r->frame->depth + first, word, plan->width, r->stack.exponent);
 		if (r->has_planes)
-			planes_row(r->simd, plan, r->frame, r->stack.word + first, r->weight + first, y);
+			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
 	}
 	r->shade[row] = counts;
 	if (r->target.wants)

@@ -124,6 +124,10 @@ struct warp_counts {
 	int with_occlusion;
 };
 
+/* Words to be left between the rows of a picture: so many that pixels one below the other differ in the lower 12 bits of their
+ * addresses, by which a core tells a load from the stores before it, and lie in different sets of its first cache. */
+uint32_t warp_gap(uint32_t width);
+
 /* Clears a tile and draws its blocks. */
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
                              uint32_t tile);
@@ -165,9 +169,9 @@ struct shade_target {
 };
 
 /* Gives the pixels of rows y0..y1-1, at least one, their colours: samples of weight above 0, lit, and the background where
- * none is. `word` and `weight` are of the whole picture. Adds to the counts. */
-void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
-                const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts);
+ * none is. `weight` is of the whole picture. Adds to the counts. */
+void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
+                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts);
 
 /* ---- planes: what else is known of a row's pixels ---- */
 

@@ -53,7 +53,7 @@ struct shading {
 	const struct simd *simd;
 	const struct plan *plan;
 	const struct shade_target *target;
-	const uint64_t *word;
+	const struct psr_zstack *stack;
 	const uint16_t *weight;
 };
 
@@ -62,13 +62,13 @@ static void begin_strip(struct strip_pixels *pixels, const struct shading *s, ui
 {
 	const struct plan *plan = s->plan;
 	const uint32_t left = plan->width - x;
-	const size_t first = (size_t)y * plan->width + x;
 	pixels->x0 = x;
 	pixels->y = y;
 	if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
 		s->simd->strip_list(pixels, NULL, NULL, 0);
 	else
-		s->simd->strip_list(pixels, s->word + first, s->weight + first, left < STRIP ? left : STRIP);
+		s->simd->strip_list(pixels, psr_zstack_row(s->stack, y) + x, s->weight + (size_t)y * plan->width + x,
+		                    left < STRIP ? left : STRIP);
 	if (pixels->n)
 		s->simd->strip_find(pixels, &plan->view);
 }
@@ -94,10 +94,10 @@ static void write_strip(const struct strip *strip, const struct shading *s)
 	s->simd->strip_write(strip, &to, left < STRIP ? left : STRIP);
 }
 
-void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target, const uint64_t *word,
-                const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts)
+void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
+                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts)
 {
-	const struct shading shading = { simd, plan, target, word, weight };
+	const struct shading shading = { simd, plan, target, stack, weight };
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;

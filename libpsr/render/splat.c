@@ -30,7 +30,7 @@ struct splat {
 static inline void lower(const struct splat_target *t, int32_t x, int32_t y, float z, uint32_t id)
 {
 	const uint64_t word = (uint64_t)psr_bits_from_float(z) << 32 | id;
-	uint64_t *at = &t->word[(size_t)y * t->stride + (size_t)x];
+	uint64_t *at = &t->word[(size_t)(y - t->y0) * t->stride + (size_t)(x - t->x0)];
 	*at = word < *at ? word : *at;
 }
 
@@ -148,12 +148,13 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
                               uint32_t tile)
 {
 	const uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
-	struct warp_target target = { .word = stack->word, .stride = stack->width };
+	struct warp_target target = { .stride = stack->width + stack->gap };
 	struct warp_counts counts = { 0, 0, 0 };
 	target.x0 = (int32_t)(tx * TILE_WIDTH);
 	target.y0 = (int32_t)(ty * TILE_HEIGHT);
 	target.x1 = tx + 1 == plan->tiles_x ? (int32_t)plan->width : target.x0 + TILE_WIDTH;
 	target.y1 = ty + 1 == plan->tiles_y ? (int32_t)plan->height : target.y0 + TILE_HEIGHT;
+	target.word = psr_zstack_row(stack, (uint32_t)target.y0) + target.x0;
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan, target.word, target.stride, target.x0, target.y0, target.x1, target.y1 };
 	for (uint32_t e = bins->tile_begin[tile]; e < bins->tile_begin[tile + 1]; e++)

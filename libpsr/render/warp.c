@@ -2,6 +2,12 @@
 #include "psr/direction.h"
 #include "render/render.h"
 
+uint32_t warp_gap(uint32_t width)
+{
+	const uint32_t page = 4096 / sizeof(uint64_t), line = 64 / sizeof(uint64_t), beyond = (width + line) % page;
+	return beyond < 2 * line ? 2 * line - beyond : 0;
+}
+
 static void target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile)
 {
 	t->instance = plan->warp;
@@ -9,10 +15,10 @@ static void target_make(struct warp_target *t, const struct plan *plan, const st
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
 	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
-	t->word = stack->word;
-	t->stride = stack->width;
+	t->stride = stack->width + stack->gap;
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);
+	t->word = psr_zstack_row(stack, (uint32_t)t->y0) + t->x0;
 	int last_x = tx + 1 == plan->tiles_x, last_y = ty + 1 == plan->tiles_y;
 	t->x1 = last_x ? (int32_t)plan->width : t->x0 + TILE_WIDTH;
 	t->y1 = last_y ? (int32_t)plan->height : t->y0 + TILE_HEIGHT;
@@ -126,14 +132,59 @@ static struct warp_counts warp_near_to_far(const struct simd *simd, const struct
 	return counts;
 }
 
+/* The level above 0 that most blocks of a tile have; 0 if none has any. */
+static int most_frequent_level(const struct bin_entry *entry, uint32_t n)
+{
+	uint32_t count[PSR_MAX_DEPTH_LEVEL + 1] = { 0 };
+	int most = 0;
+	for (uint32_t e = 0; e < n; e++)
+		count[entry[e].level] += !entry[e].at_border;
+	count[0] = 0;
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+		most = count[k] > count[most] ? k : most;
+	return most;
+}
+
+/* Cells of one level are taken from the words after its blocks were drawn as those without cells are, and before any others. */
+static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *target, uint32_t levels, const struct bin_entry *entry,
+                             uint32_t n)
+{
+	const int first = most_frequent_level(entry, n);
+	uint64_t n_inside = 0;
+	simd->warp_clear(target, first ? levels & ~(1u << first) : levels);
+	for (int turn = 0; turn < 2; turn++) {
+		struct bin_entry some[256];
+		uint32_t n_some = 0;
+		for (uint32_t e = 0; e < n; e++) {
+			const int is_first = entry[e].level == first && !entry[e].at_border;
+			if (is_first == turn)
+				continue;
+			some[n_some] = entry[e];
+			some[n_some].level = turn ? entry[e].level : 0;
+			if (++n_some == sizeof some / sizeof some[0]) {
+				n_inside += simd->warp(target, some, n_some);
+				n_some = 0;
+			}
+		}
+		n_inside += simd->warp(target, some, n_some);
+		if (turn == 0 && first)
+			simd->warp_cells(target, first);
+	}
+	return n_inside;
+}
+
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
                              uint32_t tile)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;
+	struct warp_counts counts = { 0, 0, 0 };
 	target_make(&target, plan, stack, tile);
-	simd->warp_clear(&target, stack->levels);
-	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full))
-		return warp_near_to_far(simd, bins, &target, begin, end);
-	return (struct warp_counts){ simd->warp(&target, bins->entry + begin, end - begin), 0, 0 };
+	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {
+		simd->warp_clear(&target, stack->levels);
+		counts = warp_near_to_far(simd, bins, &target, begin, end);
+	} else {
+		counts.n_inside = warp_in_turn(simd, &target, stack->levels, bins->entry + begin, end - begin);
+	}
+	return counts;
 }

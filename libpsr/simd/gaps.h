@@ -34,7 +34,7 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 				z[x] = INFINITY;
 			continue;
 		}
-		const uint64_t *word = stack->word + (size_t)(tile->y0 + i - 1) * stack->width + first;
+		const uint64_t *word = psr_zstack_row(stack, (uint32_t)(tile->y0 + i - 1)) + first;
 		float *to = z + first - tile->x0;
 		for (uint32_t x = 0; x < end - first; x++)
 			to[x] = psr_float_from_bits((uint32_t)(word[x] >> 32));

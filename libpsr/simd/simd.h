@@ -71,7 +71,8 @@ struct bin_entry {
 	uint32_t slot;
 	uint16_t instance;
 	uint8_t level;    /* of the depth buffer that fits the block */
-	uint8_t is_mixed; /* some of its samples may face away */
+	uint8_t is_mixed : 1;  /* some of its samples may face away */
+	uint8_t at_border : 1; /* it may reach beyond the picture */
 	uint32_t hit;     /* index in bins->hit */
 };
 
@@ -82,7 +83,7 @@ struct warp_target {
 	const uint32_t *direction; /* psr_direction_tens() */
 	float near_z;
 	int perspective;
-	uint64_t *word; /* of the whole picture; other tiles' are left alone, even by writing what is there */
+	uint64_t *word; /* that of (x0, y0); what is between rows is left alone */
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
 	struct warp_cells {
@@ -98,6 +99,10 @@ typedef uint64_t warp_fn(const struct warp_target *target, const struct bin_entr
 
 /* Makes a tile empty: words, and cells of the levels of the bit mask. */
 typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
+
+/* The cells of a level from the tile's words, of which each then has the least z' of its pixels: what lowering them sample by sample
+ * gives where all that was drawn belongs to that level. Those of the guard band become empty. */
+typedef void warp_cells_fn(const struct warp_target *target, int level);
 
 /* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */
 
@@ -294,6 +299,7 @@ struct simd {
 	cull_fn *cull;
 	warp_far_fn *warp_far;
 	warp_clear_fn *warp_clear;
+	warp_cells_fn *warp_cells;
 	warp_fn *warp;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;

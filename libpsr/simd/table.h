@@ -13,6 +13,7 @@
 	.cull = cull,                                  \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
+	.warp_cells = warp_cells,                      \
 	.warp = warp_kernel,                           \
 	.strip_list = STRIP_KERNEL(strip_list),        \
 	.strip_find = STRIP_KERNEL(strip_find),        \

@@ -1,12 +1,14 @@
 /* Plain loops, which the compiler turns into vectors; compiled once for each ISA. */
 #include <math.h>
+#include <string.h>
 #include "simd/simd.h"
 
 static void warp_clear(const struct warp_target *t, uint32_t levels)
 {
-	for (int32_t y = t->y0; y < t->y1; y++) {
+	const int32_t width = t->x1 - t->x0, height = t->y1 - t->y0;
+	for (int32_t y = 0; y < height; y++) {
 		uint64_t *word = t->word + (size_t)y * t->stride;
-		for (int32_t x = t->x0; x < t->x1; x++)
+		for (int32_t x = 0; x < width; x++)
 			word[x] = PSR_WORD_EMPTY;
 	}
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
@@ -21,13 +23,46 @@ static void warp_clear(const struct warp_target *t, uint32_t levels)
 	}
 }
 
+/* To each place of `to` the lesser of two of `from`. */
+static inline void halve(uint32_t *restrict to, const uint32_t *restrict from, int32_t n)
+{
+	for (int32_t i = 0; i < n; i++)
+		to[i] = from[2 * i] < from[2 * i + 1] ? from[2 * i] : from[2 * i + 1];
+}
+
+static void warp_cells(const struct warp_target *t, int level)
+{
+	const struct warp_cells *c = &t->cells[level];
+	const int32_t width = t->x1 - t->x0, side = 1 << level, n = (width + side - 1) >> level;
+	const uint32_t empty = (uint32_t)(PSR_WORD_EMPTY >> 32);
+	uint32_t *cells = (uint32_t *)c->z;
+	for (int32_t y = c->y0; y < c->y1; y += side) {
+		uint32_t column[2][TILE_WIDTH];
+		for (int32_t x = 0; x < TILE_WIDTH; x++)
+			column[0][x] = empty;
+		for (int32_t v = y > t->y0 ? y : t->y0; v < y + side && v < t->y1; v++) {
+			const uint64_t *word = t->word + (size_t)(v - t->y0) * t->stride;
+			for (int32_t x = 0; x < width; x++) {
+				const uint32_t z = (uint32_t)(word[x] >> 32);
+				column[0][x] = z < column[0][x] ? z : column[0][x];
+			}
+		}
+		for (int k = 1; k <= level; k++)
+			halve(column[k & 1], column[~k & 1], TILE_WIDTH >> k);
+		uint32_t *row = cells + (size_t)((y >> level) + 1) * c->stride + 1;
+		for (int32_t x = c->x0 >> level; x < c->x1 >> level; x++)
+			row[x] = empty;
+		memcpy(row + (t->x0 >> level), column[level & 1], (size_t)n * sizeof *row);
+	}
+}
+
 static void warp_far(const struct warp_target *t, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)])
 {
 	for (int32_t y = t->y0; y < t->y1; y += FAR_SIDE) {
 		const int32_t y1 = y + FAR_SIDE < t->y1 ? y + FAR_SIDE : t->y1, n = t->x1 - t->x0;
 		uint32_t *to = far + (y - t->y0) / FAR_SIDE * (TILE_WIDTH / FAR_SIDE), column[TILE_WIDTH] = { 0 };
 		for (int32_t v = y; v < y1; v++) {
-			const uint64_t *word = t->word + (size_t)v * t->stride + (size_t)t->x0;
+			const uint64_t *word = t->word + (size_t)(v - t->y0) * t->stride;
 			for (int32_t x = 0; x < n; x++) {
 				const uint32_t z = (uint32_t)(word[x] >> 32);
 				column[x] = column[x] > z ? column[x] : z;

@@ -296,9 +296,11 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 		for (int i = 0; i < 512 * 512; i++) {
 			const struct psr_cluster *k;
 
-			if (stack->word[i] == PSR_WORD_EMPTY)
+			const uint64_t word = psr_zstack_row(stack, (uint32_t)i / 512)[i % 512];
+
+			if (word == PSR_WORD_EMPTY)
 				continue;
-			k = &cluster[(uint32_t)stack->word[i] / 64];
+			k = &cluster[(uint32_t)word / 64];
 			assert_int_equal(k->level, choice.level[k->group]);
 			n_pixels[k->group]++;
 		}

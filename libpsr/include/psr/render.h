@@ -156,7 +156,8 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
  * the next psr_warp; `scene` must stay as it was. */
 struct psr_zstack {
 	uint32_t width, height;
-	uint64_t *word;     /* width * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY */
+	uint32_t gap;       /* words between a row's last and the next row's first */
+	uint64_t *word;     /* (width + gap) * height: bits of the float z' << 32 | sample id; PSR_WORD_EMPTY */
 	uint32_t levels;    /* bit k: level[k] is in use, 1 <= k <= PSR_MAX_DEPTH_LEVEL */
 	struct {
 		float *z;       /* plain minimum of z' a cell, +inf where nothing is; a guard band of one cell on each side */
@@ -165,6 +166,11 @@ struct psr_zstack {
 	int exponent;       /* z' here is world z' * 2^-exponent: no stage knows an absolute length */
 };
 #define PSR_WORD_EMPTY UINT64_C(0x7f800000ffffffff)
+
+static inline uint64_t *psr_zstack_row(const struct psr_zstack *stack, uint32_t y)
+{
+	return stack->word + (size_t)y * (stack->width + stack->gap);
+}
 
 int psr_warp(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
              struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err);

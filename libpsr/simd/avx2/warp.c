@@ -24,10 +24,10 @@ static inline __m256 axis_of(__m256 rows, __m256 columns, __m256i r, __m256i c, 
 	return _mm256_add_ps(place, _mm256_mul_ps(depth, _mm256_set1_ps(unit)));
 }
 
-static inline __m256 clamp_pixel(__m256 u)
+/* What does not fit, and NaN, becomes INT32_MIN, which is outside of every picture. */
+static inline __m256i floor_int(__m256 u)
 {
-	const float far = 2.0f * PSR_MAX_SIDE;
-	return _mm256_min_ps(_mm256_max_ps(u, _mm256_set1_ps(-far)), _mm256_set1_ps(far));
+	return _mm256_cvttps_epi32(_mm256_floor_ps(u));
 }
 
 static inline __m256 sight_axis(const struct warp_instance *in, int k, __m256 u, __m256 v)
@@ -148,8 +148,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		const __m256 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
 		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
 		const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
-		const __m256 u = clamp_pixel(_mm256_mul_ps(x1, inverse)), v = clamp_pixel(_mm256_mul_ps(y1, inverse));
-		const __m256i pixel_u = _mm256_cvttps_epi32(_mm256_floor_ps(u)), pixel_v = _mm256_cvttps_epi32(_mm256_floor_ps(v));
+		const __m256 u = _mm256_mul_ps(x1, inverse), v = _mm256_mul_ps(y1, inverse);
+		const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
 
 		const __m256i valid = _mm256_cmpgt_epi32(_mm256_set1_epi32(n - 8 * g), lane);
 		__m256i k = _mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
@@ -158,8 +158,10 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		if (entry->level)
 			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
 		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
-		const __m256i line = _mm256_mullo_epi32(pixel_v, _mm256_set1_epi32((int)t->stride));
-		list_words(words, k, _mm256_add_epi32(line, pixel_u), _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id)), z1);
+		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
+		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
+		const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x);
+		list_words(words, k, at, _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id)), z1);
 	}
 }
 

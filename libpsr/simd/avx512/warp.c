@@ -21,13 +21,7 @@ static inline __m512 axis_of(__m512 rows, __m512 columns, __m512i r, __m512i c, 
 	return _mm512_add_ps(place, _mm512_mul_ps(depth, _mm512_set1_ps(unit)));
 }
 
-/* MAXPS and MINPS return their second operand if the first is NaN. */
-static inline __m512 clamp_pixel(__m512 u)
-{
-	const float far = 2.0f * PSR_MAX_SIDE;
-	return _mm512_min_ps(_mm512_max_ps(u, _mm512_set1_ps(-far)), _mm512_set1_ps(far));
-}
-
+/* What does not fit, and NaN, becomes INT32_MIN, which is outside of every picture. */
 static inline __m512i floor_int(__m512 u)
 {
 	return _mm512_cvt_roundps_epi32(u, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
@@ -80,15 +74,21 @@ static inline void list_cells(struct cells *list, const struct warp_cells *cells
 	list->n += (uint32_t)__builtin_popcount(k);
 }
 
-static inline void list_words(struct words *list, __mmask16 k, __m512i at, __m512i id, __m512 z)
+/* Words of the lanes of k, from element n of the list on; returns where they end. Most often all samples of a block that is not mixed are
+ * listed, and nothing needs to be moved together. */
+static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, __m512i at, __m512i id, __m512i z)
 {
 	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
-	const __m512i high = _mm512_add_epi32(low, _mm512_set1_epi32(8));
-	const __m512i own = _mm512_maskz_compress_epi32(k, id), bits = _mm512_maskz_compress_epi32(k, _mm512_castps_si512(z));
-	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
-	_mm512_storeu_si512(list->word + list->n, _mm512_permutex2var_epi32(own, low, bits));
-	_mm512_storeu_si512(list->word + list->n + 8, _mm512_permutex2var_epi32(own, high, bits));
-	list->n += (uint32_t)__builtin_popcount(k);
+	const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+	if (is_mixed | (k & (k + 1))) {
+		at = _mm512_maskz_compress_epi32(k, at);
+		id = _mm512_maskz_compress_epi32(k, id);
+		z = _mm512_maskz_compress_epi32(k, z);
+	}
+	_mm512_storeu_si512(list->at + n, at);
+	_mm512_storeu_si512(list->word + n, _mm512_permutex2var_epi32(id, low, z));
+	_mm512_storeu_si512(list->word + n + 8, _mm512_permutex2var_epi32(id, high, z));
+	return n + (uint32_t)__builtin_popcount(k);
 }
 
 static const uint8_t ordinals[64] = {
@@ -99,37 +99,47 @@ static const uint8_t ordinals[64] = {
 static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
+	const int level = entry->level, is_mixed = entry->is_mixed, perspective = t->perspective;
+	const __m512i x0 = _mm512_set1_epi32(t->x0), width = _mm512_set1_epi32(t->x1 - t->x0);
+	const __m512i y0 = _mm512_set1_epi32(t->y0), height = _mm512_set1_epi32(t->y1 - t->y0);
+	const __m512i stride = _mm512_set1_epi32((int)t->stride);
+	const __m512 near_z = _mm512_set1_ps(t->near_z);
+	uint32_t n_words = words->n;
 	_Alignas(64) uint8_t sample[64];
 	struct warp_block b;
 
 	warp_block_make(&b, in, entry->slot);
-	const int n = __builtin_popcountll(b.mask), n_groups = (n + 15) / 16;
+	const int n = __builtin_popcountll(b.mask);
+	const __m512i id = _mm512_set1_epi32((int)b.id);
 	_mm512_store_si512(sample, _mm512_maskz_compress_epi8(b.mask, _mm512_loadu_si512(ordinals)));
 	const __m512 row_x = rows_of(&b, 0), row_y = rows_of(&b, 1), row_z = rows_of(&b, 2);
 	const __m512 col_x = columns_of(&b, 0), col_y = columns_of(&b, 1), col_z = columns_of(&b, 2);
 
-	for (int g = 0; g < n_groups; g++) {
-		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(sample + 16 * g)));
+	for (int i = 0; i < n; i += 16) {
+		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(sample + i)));
 		const __m512i r = _mm512_srli_epi32(s, 3), c = _mm512_and_si512(s, _mm512_set1_epi32(7));
-		const __m256i raw = _mm256_loadu_si256((const __m256i *)(b.depth + 16 * g));
+		const __m256i raw = _mm256_loadu_si256((const __m256i *)(b.depth + i));
 		const __m512 depth = _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(raw));
 		const __m512 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
 		const __m512 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
 		const __m512 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
-		const __m512 one = _mm512_set1_ps(1), inverse = t->perspective ? _mm512_div_ps(one, z1) : one;
-		const __m512 u = clamp_pixel(_mm512_mul_ps(x1, inverse)), v = clamp_pixel(_mm512_mul_ps(y1, inverse));
+		const __m512 one = _mm512_set1_ps(1), inverse = perspective ? _mm512_div_ps(one, z1) : one;
+		const __m512 u = _mm512_mul_ps(x1, inverse), v = _mm512_mul_ps(y1, inverse);
 		const __m512i pixel_u = floor_int(u), pixel_v = floor_int(v);
 
-		__mmask16 k = (__mmask16)_bzhi_u32(0xffff, (uint32_t)(n - 16 * g));
-		k = _mm512_mask_cmp_ps_mask(k, z1, _mm512_set1_ps(t->near_z), _CMP_GT_OQ);
-		if (entry->is_mixed)
-			k &= (__mmask16)~faces_away(t, in, b.attr + 16 * g, k, u, v);
-		if (entry->level)
-			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
-		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
-		const __m512i line = _mm512_mullo_epi32(pixel_v, _mm512_set1_epi32((int)t->stride));
-		list_words(words, k, _mm512_add_epi32(line, pixel_u), _mm512_add_epi32(s, _mm512_set1_epi32((int)b.id)), z1);
+		__mmask16 k = (__mmask16)_bzhi_u32(0xffff, (uint32_t)(n - i));
+		k = _mm512_mask_cmp_ps_mask(k, z1, near_z, _CMP_GT_OQ);
+		if (is_mixed)
+			k &= (__mmask16)~faces_away(t, in, b.attr + i, k, u, v);
+		if (level)
+			list_cells(cells, &t->cells[level], level, k, pixel_u, pixel_v, z1);
+		const __m512i x = _mm512_sub_epi32(pixel_u, x0), y = _mm512_sub_epi32(pixel_v, y0);
+		const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x);
+		k = _mm512_mask_cmplt_epu32_mask(k, x, width);
+		k = _mm512_mask_cmplt_epu32_mask(k, y, height);
+		n_words = list_words(words, n_words, is_mixed, k, at, _mm512_add_epi32(s, id), _mm512_castps_si512(z1));
 	}
+	words->n = n_words;
 }
 
 uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)

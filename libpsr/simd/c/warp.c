@@ -54,7 +54,7 @@ static uint64_t warp_one(const struct warp_target *t, const struct bin_entry *en
 			continue;
 		if (inside(pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1)) {
 			const uint64_t word = (uint64_t)psr_bits_from_float(z1) << 32 | (b.id + sample);
-			uint64_t *at = &t->word[(size_t)pixel_v * t->stride + (size_t)pixel_u];
+			uint64_t *at = &t->word[(size_t)(pixel_v - t->y0) * t->stride + (size_t)(pixel_u - t->x0)];
 			*at = word < *at ? word : *at;
 			n_inside++;
 		}
