@@ -60,13 +60,9 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 5 * n_bricks +
 	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
-	if (size > fill->storage_size) {
-		psr_free(fill->storage);
-		fill->storage = psr_alloc_array(size, 1);
-		fill->storage_size = fill->storage ? size : 0;
-		if (!fill->storage)
-			return PSR_ERR_MEMORY;
-	}
+	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
+	if (!fill->storage)
+		return PSR_ERR_MEMORY;
 	float *z = fill->storage;
 	uint16_t *values = (uint16_t *)(z + cells);
 	uint32_t w = width, h = height;
@@ -110,7 +106,7 @@ int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *pl
 
 void fill_clear(struct fill *fill)
 {
-	psr_free(fill->storage);
+	psr_free_huge(fill->storage, fill->storage_size);
 	memset(fill, 0, sizeof *fill);
 }
 

@@ -249,10 +249,10 @@ static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_
 	memcpy(to, value, sizeof value);
 }
 
-static inline int has_partial(const uint16_t *weight)
+static inline int has_partial(const uint16_t *weight, uint32_t n)
 {
 	uint16_t rest = 0;
-	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++)
+	for (uint32_t x = 0; x < n; x++)
 		rest |= weight[x] ^ GAPS_WHOLE;
 	return rest != 0;
 }
@@ -282,10 +282,10 @@ static inline __attribute__((always_inline)) void push_row(struct fill_row to, s
 {
 	uint32_t x = 0;
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK)
-		if (has_partial(was.weight + 2 * x))
+		if (has_partial(was.weight + 2 * x, 2 * FILL_BLOCK))
 			push_block(row_from(to, 2 * x, 1, 0), row_from(was, 2 * x, 1, 1), row_from(own, x, 1, 0), row_from(beside, x, 1, 0),
 			           is_picture, scale, offset);
-	if (x < n) {
+	if (x < n && has_partial(was.weight + 2 * x, 2 * (n - x))) {
 		struct block_row rows[4];
 		const struct fill_row in = copy_row(&rows[0], row_from(was, 2 * x, 1, 1), 2 * (n - x), 1);
 		const struct fill_row parents = copy_row(&rows[1], row_from(own, (ptrdiff_t)x - 1, 1, 1), n - x + 2, 1);
