@@ -249,6 +249,41 @@ const uint8_t *fill_wants(struct fill *fill)
 	return fill->wants;
 }
 
+static void push_level(struct fill *fill, uint32_t row, int level, int is_early)
+{
+	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = bx + 1;
+		if (wants[bx] <= level)
+			continue;
+		end = run_end(fill, fill->wants, bx, row, level);
+		fill_push_level(fill, bx, end, row, level, is_early);
+	}
+}
+
+static void push_level_row(int i, void *userdata)
+{
+	struct fill *fill = userdata;
+	push_level(fill, (uint32_t)i, fill->pushed, 0);
+}
+
+static void push_pixels(struct fill *fill, uint32_t row, int is_early)
+{
+	const uint8_t *needs = fill->needs + (size_t)row * fill->bricks_x;
+	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		end = bx + 1;
+		if (!needs[bx])
+			continue;
+		end = run_end(fill, fill->needs, bx, row, 0);
+		fill_push_bricks(fill, bx, end, row, is_early);
+	}
+}
+
+static void push_row(int i, void *userdata)
+{
+	push_pixels(userdata, (uint32_t)i, 0);
+}
+
 void fill_pull(struct fill *fill, uint32_t row)
 {
 	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
@@ -259,34 +294,9 @@ void fill_pull(struct fill *fill, uint32_t row)
 			level = wants[b] > level ? wants[b] : level;
 		fill_pull_bricks(fill, bx, end, row, level, FILL_COLORS);
 	}
-}
-
-/* Cells of a level below brick_top: those that no pixel needs, too, of bricks where some are, maybe from cells that hold anything. */
-static void push_level_row(int i, void *userdata)
-{
-	struct fill *fill = userdata;
-	const uint8_t *wants = fill->wants + (size_t)i * fill->bricks_x;
-	const int level = fill->pushed;
-	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = bx + 1;
-		if (wants[bx] <= level)
-			continue;
-		end = run_end(fill, fill->wants, bx, (uint32_t)i, level);
-		fill_push_level(fill, bx, end, (uint32_t)i, level);
-	}
-}
-
-static void push_row(int i, void *userdata)
-{
-	struct fill *fill = userdata;
-	const uint8_t *needs = fill->needs + (size_t)i * fill->bricks_x;
-	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
-		end = bx + 1;
-		if (!needs[bx])
-			continue;
-		end = run_end(fill, fill->needs, bx, (uint32_t)i, 0);
-		fill_push_bricks(fill, bx, end, (uint32_t)i);
-	}
+	for (int l = fill->needed - 1; l > 0; l--)
+		push_level(fill, row, l, 1);
+	push_pixels(fill, row, 1);
 }
 
 /* The single cell at the top has nothing above it: what it holds becomes whole, or the background if it is empty. */
@@ -297,6 +307,7 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 	const uint32_t w = cell.weight[0];
 	for (int k = 0; k < 3; k++)
 		*rgb[k] = (uint16_t)(w ? *rgb[k] * (uint32_t)WEIGHT_ONE / w : plan->background[k]);
+	cell.weight[0] = WEIGHT_ONE;
 }
 
 /* The levels of which a brick has less than a cell: all of their cells, since they are few; those that find_coarse did not

@@ -72,13 +72,19 @@ void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 	}
 }
 
-void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level)
+/* Rows that look at no cells of the bricks above and below. */
+static struct rows { uint32_t first, end; } rows_of(uint32_t by, uint32_t side, uint32_t height, int is_early)
+{
+	return (struct rows){ by * side + (is_early ? 1 : 0), least_of((by + 1) * side - (is_early ? 1 : 0), height) };
+}
+
+void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early)
 {
 	const struct fill_level *to = &fill->level[level], *from = to + 1;
 	const uint32_t side = BRICK >> level, x0 = bx0 * side, x1 = least_of(bx1 * side, to->width);
-	const uint32_t y1 = least_of((by + 1) * side, to->height);
+	const struct rows rows = rows_of(by, side, to->height, is_early);
 	const float scale = fill_scale(fill->plan, level + 1), offset = fill_offset(fill->plan, level + 1);
-	for (uint32_t y = by * side; y < y1; y++) {
+	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
 		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
@@ -86,64 +92,50 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	}
 }
 
-/* The places of weights below one, in order; the list has room for one more. */
-static uint32_t list_partial(uint16_t *place, const uint16_t *weight, uint32_t n)
-{
-	const uint64_t whole = UINT64_C(0x0001000100010001) * WEIGHT_ONE;
-	uint32_t n_places = 0;
-	for (uint32_t x = 0, end; x < n; x = end) {
-		uint64_t eight[2] = { 0, 0 };
-		end = least_of(x + 8, n);
-		if (end - x == 8)
-			memcpy(eight, weight + x, sizeof eight);
-		if (eight[0] == whole && eight[1] == whole)
-			continue;
-		for (uint32_t i = x; i < end; i++) {
-			place[n_places] = (uint16_t)i;
-			n_places += weight[i] < WEIGHT_ONE;
-		}
-	}
-	return n_places;
-}
-
-void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by)
+/* Gives pixels their colors and depths, and makes them whole. */
+static void write_pixels(struct fill *fill, size_t first, const uint16_t *place, uint32_t n_places, const struct fill_row *row)
 {
 	const struct fill_picture *p = &fill->picture;
+	const uint8_t *srgb = p->srgb;
+	const uint16_t *r = row->r, *g = row->g, *b = row->b;
+	uint16_t *weight = p->weight + first;
+	uint8_t *rgb = p->rgb + 3 * first;
+	uint32_t n_filled = 0, n_moved = 0;
+	for (uint32_t i = 0; i < n_places && p->rgb; i++) {
+		const uint32_t at = place[i];
+		rgb[3 * at] = srgb[r[at]];
+		rgb[3 * at + 1] = srgb[g[at]];
+		rgb[3 * at + 2] = srgb[b[at]];
+	}
+	for (uint32_t i = 0; i < n_places && p->depth; i++)
+		if (weight[place[i]] < WEIGHT_ONE / 2)
+			p->depth[first + place[i]] = ldexpf(row->z[place[i]], p->stack->exponent);
+	for (uint32_t i = 0; i < n_places; i++) {
+		n_filled += (weight[place[i]] == 0) & (row->z[place[i]] < INFINITY);
+		n_moved += weight[place[i]] < WEIGHT_ONE / 2;
+		weight[place[i]] = WEIGHT_ONE;
+	}
+	atomic_fetch_add_explicit(&fill->n_changed, n_places, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_filled, n_filled, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_moved, n_moved, memory_order_relaxed);
+}
+
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int is_early)
+{
 	const struct fill_level *from = &fill->level[1];
-	const uint32_t width = p->stack->width, x0 = bx0 * BRICK, n = least_of(bx1 * BRICK, width) - x0, n_cells = (n + 1) / 2;
-	const uint32_t y1 = least_of((by + 1) * BRICK, p->stack->height);
+	const uint32_t width = fill->width, x0 = bx0 * BRICK, n_cells = (least_of(bx1 * BRICK, width) - x0 + 1) / 2;
+	const struct rows rows = rows_of(by, BRICK, fill->height, is_early);
 	const float scale = fill_scale(fill->plan, 1), offset = fill_offset(fill->plan, 1);
-	uint64_t n_changed = 0, n_filled = 0, n_moved = 0;
 	uint16_t place[FILL_WIDTH + 1];
 	struct picture_row pixels, filled;
 	const struct fill_row row = { filled.r, filled.g, filled.b, NULL, filled.z };
-
-	for (uint32_t y = by * BRICK; y < y1; y++) {
-		const size_t first = (size_t)y * width + x0;
-		const uint32_t n_places = list_partial(place, p->weight + first, n);
-		if (!n_places)
-			continue;
+	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
 		const struct fill_row was = picture_row_at(&pixels, fill, x0, y, 2 * n_cells, 0, 1);
 		const struct fill_row own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		fill->simd->fill_push_picture(&row, &was, &own, &beside, n_cells, scale, offset);
-		for (uint32_t i = 0; i < n_places; i++) {
-			const uint32_t at = place[i];
-			if (p->rgb) {
-				uint8_t *rgb = p->rgb + 3 * (first + at);
-				rgb[0] = p->srgb[row.r[at]];
-				rgb[1] = p->srgb[row.g[at]];
-				rgb[2] = p->srgb[row.b[at]];
-			}
-			n_filled += (was.weight[at] == 0) & (row.z[at] < INFINITY);
-			n_moved += was.weight[at] < WEIGHT_ONE / 2;
-			if (p->depth && was.weight[at] < WEIGHT_ONE / 2)
-				p->depth[first + at] = ldexpf(row.z[at], p->stack->exponent);
-		}
-		n_changed += n_places;
+		const uint32_t n_places = fill->simd->fill_push_picture(&row, place, &was, &own, &beside, n_cells, scale, offset);
+		if (n_places)
+			write_pixels(fill, (size_t)y * width + x0, place, n_places, &row);
 	}
-	atomic_fetch_add_explicit(&fill->n_changed, n_changed, memory_order_relaxed);
-	atomic_fetch_add_explicit(&fill->n_filled, n_filled, memory_order_relaxed);
-	atomic_fetch_add_explicit(&fill->n_moved, n_moved, memory_order_relaxed);
 }

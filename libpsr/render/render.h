@@ -196,7 +196,7 @@ struct fill_level {
  * fill_wants names. */
 struct fill_picture {
 	const struct psr_zstack *stack;
-	uint16_t *weight;
+	uint16_t *weight;      /* of pixels that are filled it becomes WEIGHT_ONE */
 	const uint8_t *bricks; /* as gaps_rows marks them */
 	uint16_t *r, *g, *b;
 	const uint8_t *srgb;   /* 8 bits of 16-bit linear light */
@@ -237,7 +237,8 @@ void fill_look(struct fill *fill, uint32_t row);
 /* 2. What that takes from others: one byte a brick, not 0 where the 16-bit colours of the brick's pixels are needed. */
 const uint8_t *fill_wants(struct fill *fill);
 
-/* 3. Coarser levels from the row's colours, where they are needed. */
+/* 3. Coarser levels from the row's colours, where they are needed; and what the next step does, for the pixels for which that is
+ * enough. */
 void fill_pull(struct fill *fill, uint32_t row);
 
 /* 4. Gives every pixel of weight below WEIGHT_ONE its color and, where the weight is below a half, its depth, and touches no
@@ -259,11 +260,12 @@ enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weigh
 /* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
 void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
 
-/* Makes their cells of a level whole, from those of the next. */
-void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+/* Makes their cells of a level whole, from those of the next: early those that look at nothing but whole cells of these and the
+ * bricks beside them, then the others. */
+void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
 
-/* Fills their pixels, FILL_RUN bricks at most, from level 1. */
-void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by);
+/* The same for their pixels, of FILL_RUN bricks at most. */
+void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int is_early);
 
 /* ---- for tests: a renderer that calls other kernels ---- */
 

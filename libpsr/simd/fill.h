@@ -6,8 +6,6 @@
 #include "base/maths.h"
 #include "simd/simd.h"
 
-#define FILL_BLOCK 16
-
 /* Cells 2x and 2x + 1, the former in the lower half, as vectors take them: bytes are little-endian. */
 static inline uint32_t pair_at(const uint16_t *values, uint32_t x)
 {
@@ -229,8 +227,8 @@ static inline uint32_t interpolate(const struct push_shares *s, uint32_t x, uint
 	return (uint32_t)(int32_t)((float)sum * s->inverse[x] + 0.125f);
 }
 
-/* Cells of a share of 256 in `was` and of the rest from their parents. */
-static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *own,
+/* Cells whose turn it is: of a share of 256 in `was` and of the rest from their parents. */
+static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *turn, const uint16_t *own,
                                 const uint16_t *beside, const struct push_shares *left, const struct push_shares *right,
                                 int is_picture)
 {
@@ -244,9 +242,27 @@ static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_
 	memcpy(both, pair, sizeof both);
 	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
 		const uint16_t w = weight[x], rest = (uint16_t)(GAPS_WHOLE - w);
-		value[x] = (uint16_t)((is_picture ? part_of(was[x], w) : was[x]) + part_of(both[x], rest));
+		value[x] = (uint16_t)((is_picture ? part_of(was[x], w) : was[x]) + (part_of(both[x], rest) & turn[x]));
 	}
 	memcpy(to, value, sizeof value);
+}
+
+/* Whose turn it is: cells that are not whole and whose parents are. Masks; returns whether there are any. */
+static inline int find_turn(uint16_t *turn, const uint16_t *weight, const uint16_t *own, const uint16_t *beside)
+{
+	uint32_t ready[FILL_BLOCK];
+	uint16_t any = 0;
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const uint32_t both = (own[x] == GAPS_WHOLE) & (beside[x] == GAPS_WHOLE);
+		const uint32_t left = both & (*(own + x - 1) == GAPS_WHOLE), right = both & (own[x + 1] == GAPS_WHOLE);
+		ready[x] = left * 0xffff | right * 0xffff0000;
+	}
+	memcpy(turn, ready, sizeof ready);
+	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
+		turn[x] &= (uint16_t)-(weight[x] < GAPS_WHOLE);
+		any |= turn[x];
+	}
+	return any != 0;
 }
 
 static inline int has_partial(const uint16_t *weight, uint32_t n)
@@ -257,55 +273,99 @@ static inline int has_partial(const uint16_t *weight, uint32_t n)
 	return rest != 0;
 }
 
-static inline __attribute__((always_inline)) void push_block(struct fill_row to, struct fill_row was, struct fill_row own,
-                                                             struct fill_row beside, int is_picture, float scale, float offset)
+/* Returns whether it is any cell's turn; then it is so for those that are not 0 in `turn`. */
+static inline __attribute__((always_inline)) int push_block(struct fill_row to, uint16_t *turn, struct fill_row was,
+                                                            struct fill_row own, struct fill_row beside, int is_picture, float scale,
+                                                            float offset)
 {
 	struct push_shares left, right;
 	float z[2][FILL_BLOCK], both[2 * FILL_BLOCK];
+	uint16_t weight[2 * FILL_BLOCK];
+	if (!find_turn(turn, was.weight, own.weight, beside.weight))
+		return 0;
 	share_parents(&left, z[0], own.z, own.z - 1, beside.z, scale, offset);
 	share_parents(&right, z[1], own.z, own.z + 1, beside.z, scale, offset);
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		both[2 * x] = z[0][x];
 		both[2 * x + 1] = z[1][x];
 	}
-	for (uint32_t x = 0; x < 2 * FILL_BLOCK && !is_picture; x++)
-		both[x] = psr_choose(was.weight[x] < GAPS_WHOLE / 2, both[x], was.z[x]);
+	push_channel(to.r, was.r, was.weight, turn, own.r, beside.r, &left, &right, is_picture);
+	push_channel(to.g, was.g, was.weight, turn, own.g, beside.g, &left, &right, is_picture);
+	push_channel(to.b, was.b, was.weight, turn, own.b, beside.b, &left, &right, is_picture);
+	if (!is_picture) {
+		for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++)
+			both[x] = psr_choose((was.weight[x] < GAPS_WHOLE / 2) & (turn[x] != 0), both[x], was.z[x]);
+		for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++)
+			weight[x] = (uint16_t)((was.weight[x] & ~turn[x]) | (GAPS_WHOLE & turn[x]));
+		memcpy(to.weight, weight, sizeof weight);
+	}
 	memcpy(to.z, both, sizeof both);
-	push_channel(to.r, was.r, was.weight, own.r, beside.r, &left, &right, is_picture);
-	push_channel(to.g, was.g, was.weight, own.g, beside.g, &left, &right, is_picture);
-	push_channel(to.b, was.b, was.weight, own.b, beside.b, &left, &right, is_picture);
+	return 1;
 }
 
-static inline __attribute__((always_inline)) void push_row(struct fill_row to, struct fill_row was, struct fill_row own,
-                                                           struct fill_row beside, uint32_t n, int is_picture, float scale,
-                                                           float offset)
+/* Blocks of a row, the last of which may be copies: what push_block takes. */
+struct push_rows {
+	struct fill_row to, was, own, beside;
+	struct block_row copy[4];
+};
+
+static void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside, uint32_t n)
 {
-	uint32_t x = 0;
-	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK)
-		if (has_partial(was.weight + 2 * x, 2 * FILL_BLOCK))
-			push_block(row_from(to, 2 * x, 1, 0), row_from(was, 2 * x, 1, 1), row_from(own, x, 1, 0), row_from(beside, x, 1, 0),
-			           is_picture, scale, offset);
-	if (x < n && has_partial(was.weight + 2 * x, 2 * (n - x))) {
-		struct block_row rows[4];
-		const struct fill_row in = copy_row(&rows[0], row_from(was, 2 * x, 1, 1), 2 * (n - x), 1);
-		const struct fill_row parents = copy_row(&rows[1], row_from(own, (ptrdiff_t)x - 1, 1, 1), n - x + 2, 1);
-		const struct fill_row neighbors = copy_row(&rows[2], row_from(beside, x, 1, 1), n - x, 1);
-		const struct fill_row out = { rows[3].r, rows[3].g, rows[3].b, rows[3].weight, rows[3].z };
-		push_block(out, in, row_from(parents, 1, 1, 1), neighbors, is_picture, scale, offset);
-		copy_back(row_from(to, 2 * x, 1, 0), &rows[3], 2 * (n - x), 1, 0);
-	}
+	to->was = copy_row(&to->copy[0], was, 2 * n, 1);
+	to->own = row_from(copy_row(&to->copy[1], row_from(own, -1, 1, 1), n + 2, 1), 1, 1, 1);
+	to->beside = copy_row(&to->copy[2], beside, n, 1);
+	to->to = (struct fill_row){ to->copy[3].r, to->copy[3].g, to->copy[3].b, to->copy[3].weight, to->copy[3].z };
 }
 
 static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
                       float offset)
 {
-	push_row(*to, *to, *own, *beside, n, 0, scale, offset);
+	const struct fill_row cells = *to, parents = *own, others = *beside;
+	uint16_t turn[2 * FILL_BLOCK];
+	uint32_t x = 0;
+	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
+		const struct fill_row was = row_from(cells, 2 * x, 1, 1);
+		if (has_partial(was.weight, 2 * FILL_BLOCK))
+			push_block(was, turn, was, row_from(parents, x, 1, 1), row_from(others, x, 1, 1), 0, scale, offset);
+	}
+	if (x < n && has_partial(cells.weight + 2 * x, 2 * (n - x))) {
+		struct push_rows rows;
+		copy_rows(&rows, row_from(cells, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n - x);
+		if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 0, scale, offset))
+			copy_back(row_from(cells, 2 * x, 1, 1), &rows.copy[3], 2 * (n - x), 1, 1);
+	}
 }
 
-static void fill_push_picture(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
-                              const struct fill_row *beside, uint32_t n, float scale, float offset)
+static uint32_t list_turn(uint16_t *place, const uint16_t *turn, uint32_t first, uint32_t n)
 {
-	push_row(*to, *was, *own, *beside, n, 1, scale, offset);
+	uint32_t n_places = 0;
+	for (uint32_t x = 0; x < n; x++) {
+		place[n_places] = (uint16_t)(first + x);
+		n_places += turn[x] & 1;
+	}
+	return n_places;
+}
+
+static uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, const struct fill_row *was, const struct fill_row *own,
+                                  const struct fill_row *beside, uint32_t n, float scale, float offset)
+{
+	const struct fill_row out = *to, in = *was, parents = *own, others = *beside;
+	uint16_t turn[2 * FILL_BLOCK];
+	uint32_t x = 0, n_places = 0;
+	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK)
+		if (has_partial(in.weight + 2 * x, 2 * FILL_BLOCK) &&
+		    push_block(row_from(out, 2 * x, 1, 0), turn, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1),
+		               row_from(others, x, 1, 1), 1, scale, offset))
+			n_places += list_turn(place + n_places, turn, 2 * x, 2 * FILL_BLOCK);
+	if (x < n && has_partial(in.weight + 2 * x, 2 * (n - x))) {
+		struct push_rows rows;
+		copy_rows(&rows, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n - x);
+		if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 1, scale, offset)) {
+			copy_back(row_from(out, 2 * x, 1, 0), &rows.copy[3], 2 * (n - x), 1, 0);
+			n_places += list_turn(place + n_places, turn, 2 * x, 2 * (n - x));
+		}
+	}
+	return n_places;
 }
 
 static void fill_depths(float *z, const uint64_t *word, uint32_t n)

@@ -277,15 +277,19 @@ struct fill_row {
 typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                               int is_picture, float scale, float offset);
 
-/* Makes cells to[0..2n-1] whole, from whole cells of the coarser level: own[0..n-1] holds their parents, of which [-1] and [n]
- * count, too, and beside[0..n-1] the parents' neighbours above or below. Depths change where the weight is below a half. */
+#define FILL_BLOCK 16 /* a push works on as many parents together */
+
+/* Makes those of the cells to[0..2n-1] whole that are not, and whose parents are, with the neighbors that they look at: own[0..n-1]
+ * holds the parents, of which [-1] and [n] count, too, and beside[0..n-1] the parents' neighbors above or below. Depths change
+ * where the weight was below a half. */
 typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
                           float scale, float offset);
 
-/* The same for pixels that stay as they are in `was`, whose z has no meaning: `to` receives the colors of those of weight below
- * GAPS_WHOLE and, whatever their weight is, the depths that are interpolated; of others it may receive anything. */
-typedef void fill_push_picture_fn(const struct fill_row *to, const struct fill_row *was, const struct fill_row *own,
-                                  const struct fill_row *beside, uint32_t n, float scale, float offset);
+/* The same for pixels, in `was`, which stay as they are and whose z has no meaning. Lists the places, 0..2n-1, of those that would
+ * become whole, with room for one more; `to` has their colors and, whatever their weights are, the depths that are interpolated,
+ * and elsewhere anything. Returns how many there are. */
+typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place, const struct fill_row *was, const struct fill_row *own,
+                                      const struct fill_row *beside, uint32_t n, float scale, float offset);
 
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);

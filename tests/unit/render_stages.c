@@ -175,9 +175,11 @@ static struct psr_report fill_once(struct picture *p, const uint8_t *table, uint
 	struct plan plan = flat_plan();
 	const struct psr_zstack stack = { .width = SIDE, .height = SIDE, .word = p->word };
 	const uint8_t brick = 1;
-	const struct fill_picture picture = { &stack, p->weight, &brick, p->r, p->g, p->b, table, rgb, p->depth };
+	uint16_t weight[SIDE * SIDE]; /* that become whole */
+	const struct fill_picture picture = { &stack, weight, &brick, p->r, p->g, p->b, table, rgb, p->depth };
 	struct fill fill = { .top = 0 };
 	struct psr_report report = { .n_filled = 0 };
+	memcpy(weight, p->weight, sizeof weight);
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		p->r[i] = p->g[i] = p->b[i] = p->grey[i];
 		p->word[i] = (uint64_t)psr_bits_from_float(p->z[i]) << 32 | 0xffffffff;
