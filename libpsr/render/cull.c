@@ -19,20 +19,11 @@ struct cull_chunk {
 	float depth_error; /* greatest half step of depth, in pixels */
 };
 
-/* The masks of the screen's regions, for one instance ([G] 6.3: 4x4 regions). In the place of the smallest node of a tree that
- * holds a block there is one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
-#define SCREEN_SPLITS 2
-#define SCREEN_SIDE (1 << SCREEN_SPLITS)
-#define SCREEN_RANGES (SCREEN_SIDE * (SCREEN_SIDE + 1) / 2)
+/* The masks of the screen's regions, for one instance ([G] 6.3). In the place of the smallest node of a tree that holds a block there is
+ * one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
 struct screen_masks {
-	float left, top, scale[2]; /* of the frame in the picture, pixels; regions a pixel */
 	uint64_t range[SCREEN_RANGES * SCREEN_RANGES][2];
 };
-
-static inline uint32_t range_of(uint32_t first, uint32_t last)
-{
-	return last * (last + 1) / 2 + first;
-}
 
 struct cull {
 	struct bins *bins;
@@ -79,26 +70,6 @@ static int sphere_extent(const struct plan *plan, const float c[3], float r, flo
 	return out->x1 >= 0 && out->y1 >= 0 && out->x0 < (float)plan->width && out->y0 < (float)plan->height;
 }
 
-/* Pixels that a length across the surface can be stretched to where it lies in the sphere: |d(x'/z')| <= |p| |dp| / z'^2, which
- * is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the angle between p and the
- * axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound it, the latter as far from the
- * centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees, only |p| and z' do. */
-static inline float stretch(const struct plan *plan, const float c[3], float r)
-{
-	if (!plan->perspective)
-		return plan->focal;
-	float z = c[2] - r;
-	if (!(z > plan->near_z))
-		z = plan->near_z;
-	const float side2 = c[0] * c[0] + c[1] * c[1], distance2 = side2 + c[2] * c[2];
-	const float most = plan->focal * (__builtin_sqrtf(distance2) + r) / (z * z);
-	if (!(distance2 > r * r))
-		return most;
-	const float cosine = (c[2] * __builtin_sqrtf(distance2 - r * r) - __builtin_sqrtf(side2) * r) / distance2;
-	const float sharp = cosine > 0 ? plan->focal / (z * cosine) : most;
-	return sharp < most ? sharp : most;
-}
-
 /* Whether samples at this distance in pixels need no depth buffer but the picture's, as the kernel has it. */
 static inline int fits_pixel(float pixels)
 {
@@ -126,62 +97,67 @@ static void masks_make(struct screen_masks *masks, const struct plan *plan, cons
 		for (uint32_t node = node_of(0, 0); node < 2u << 2 * SCREEN_SPLITS; node++)
 			region[node][triangle >> 6] = UINT64_C(1) << (triangle & 63);
 	}
-	masks->left = (float)plan->window.left;
-	masks->top = (float)plan->window.top;
-	masks->scale[0] = (float)SCREEN_SIDE / (float)plan->window.picture_width;
-	masks->scale[1] = (float)SCREEN_SIDE / (float)plan->window.picture_height;
 	memset(masks->range, 0, sizeof masks->range);
-	for (uint32_t x1 = 0; x1 < SCREEN_SIDE; x1++)
-		for (uint32_t x0 = 0; x0 <= x1; x0++)
-			for (uint32_t y1 = 0; y1 < SCREEN_SIDE; y1++)
-				for (uint32_t y0 = 0; y0 <= y1; y0++)
-					for (uint32_t r = 0; r < (x1 - x0 + 1) * (y1 - y0 + 1); r++)
+	for (int x1 = 0; x1 < SCREEN_SIDE; x1++)
+		for (int x0 = 0; x0 <= x1; x0++)
+			for (int y1 = 0; y1 < SCREEN_SIDE; y1++)
+				for (int y0 = 0; y0 <= y1; y0++)
+					for (int r = 0; r < (x1 - x0 + 1) * (y1 - y0 + 1); r++)
 						for (int w = 0; w < 2; w++)
-							masks->range[range_of(x0, x1) * SCREEN_RANGES + range_of(y0, y1)][w] |=
-								region[node_of(x0 + r % (x1 - x0 + 1), y0 + r / (x1 - x0 + 1))][w];
+							masks->range[screen_range(x0, x1) * SCREEN_RANGES + screen_range(y0, y1)][w] |=
+								region[node_of((uint32_t)(x0 + r % (x1 - x0 + 1)), (uint32_t)(y0 + r / (x1 - x0 + 1)))][w];
 }
 
-static inline uint32_t region_of(float pixel, float scale)
+static inline int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block, uint32_t range)
 {
-	const uint32_t region = pixel > 0 ? (uint32_t)(pixel * scale) : 0;
-	return region < SCREEN_SIDE ? region : SCREEN_SIDE - 1;
-}
-
-static int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block, const struct cull_hit *hit)
-{
-	const uint32_t x = range_of(region_of(hit->x0 + masks->left, masks->scale[0]), region_of(hit->x1 + masks->left, masks->scale[0]));
-	const uint32_t y = range_of(region_of(hit->y0 + masks->top, masks->scale[1]), region_of(hit->y1 + masks->top, masks->scale[1]));
-	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[x * SCREEN_RANGES + y];
+	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[range];
 	return !((own[0] & seen[0]) | (own[1] & seen[1]));
 }
 
-/* Takes over what a batch says of its blocks. */
-static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, const struct cull_batch *batch, uint32_t first,
-                                   uint32_t n, struct cull_hit *hit)
+/* Ones of a word, without a call where the machine that this is compiled for need not have the instruction. */
+static inline uint32_t count_bits(uint64_t word)
 {
-	const struct plan_instance *in = &cull->plan->instance[chunk->instance];
+	word -= word >> 1 & UINT64_C(0x5555555555555555);
+	word = (word & UINT64_C(0x3333333333333333)) + (word >> 2 & UINT64_C(0x3333333333333333));
+	word = (word + (word >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
+}
+
+/* Takes over what a batch says of its blocks. */
+static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, uint32_t *count, const struct cull_batch *batch,
+                                   uint32_t first, uint32_t n, struct cull_hit *hit)
+{
+	const struct plan *plan = cull->plan;
+	const struct plan_instance *in = &plan->instance[chunk->instance];
 	const struct screen_masks *masks = in->masks == PSR_WHY_RAN ? &cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
+	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
 		if (!batch->is_left[i])
 			continue;
-		const int is_clamped = batch->level[i] > PSR_MAX_DEPTH_LEVEL;
-		*hit = (struct cull_hit){
-			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
-			.level = is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i], .is_mixed = batch->is_mixed[i],
-			.x0 = (uint16_t)batch->x0[i], .x1 = (uint16_t)batch->x1[i],
-			.y0 = (uint16_t)batch->y0[i], .y1 = (uint16_t)batch->y1[i],
-		};
-		if (masks && mask_culls(masks, b, block, hit)) {
+		if (masks && mask_culls(masks, b, block, (uint32_t)batch->range[i])) {
 			chunk->n_masked++;
 			continue;
 		}
+		const int is_clamped = batch->level[i] > PSR_MAX_DEPTH_LEVEL;
+		*hit = (struct cull_hit){
+			.slot = in->first_slot + block, .instance = (uint16_t)chunk->instance, .near = batch->near[i],
+			.level = (uint8_t)(is_clamped ? PSR_MAX_DEPTH_LEVEL : batch->level[i]), .is_mixed = batch->is_mixed[i] & 1,
+			.x0 = (uint16_t)batch->x0[i], .x1 = (uint16_t)batch->x1[i],
+			.y0 = (uint16_t)batch->y0[i], .y1 = (uint16_t)batch->y1[i],
+			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
+			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
+		};
+		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
+		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
+			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
+				count[y * plan->tiles_x + x]++;
 		chunk->levels |= 1u << hit->level;
 		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
-		chunk->n_samples += (uint32_t)__builtin_popcountll(b->mask[block]);
+		chunk->n_samples += count_bits(b->mask[block]);
 		if (batch->depth_error[i] > chunk->depth_error)
 			chunk->depth_error = batch->depth_error[i];
 		hit++;
@@ -220,7 +196,7 @@ static void choose_levels(struct bins *bins, const struct plan *plan)
 		memset(group, 0, b->n_clusters * sizeof *group);
 		for (uint32_t k = 0; k < b->n_clusters; k++) {
 			const struct cluster_view v = view_cluster(in, &b->cluster[k]);
-			const float s = stretch(plan, v.c, v.r);
+			const float s = cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r);
 			float *most = &group[b->cluster[k].group].stretch;
 			*most = s > *most ? s : *most;
 		}
@@ -263,19 +239,10 @@ static void count_chunk(int i, void *userdata)
 			const uint32_t n = cluster->n_blocks - at < CULL_BATCH ? cluster->n_blocks - at : CULL_BATCH;
 			struct cull_batch batch;
 			cull->simd->cull(&batch, &in->cull, cluster->first_block + at, n);
-			hit = take_batch(cull, chunk, &batch, cluster->first_block + at, n, hit);
+			hit = take_batch(cull, chunk, count, &batch, cluster->first_block + at, n, hit);
 		}
 	}
-	for (const struct cull_hit *h = cull->bins->hit + chunk->first_hit; h < hit; h++)
-		for (uint32_t y = h->y0 / TILE_HEIGHT; y <= h->y1 / TILE_HEIGHT; y++)
-			for (uint32_t x = h->x0 / TILE_WIDTH; x <= h->x1 / TILE_WIDTH; x++)
-				count[y * plan->tiles_x + x]++;
 	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
-}
-
-static inline int is_at_border(const struct plan *plan, const struct cull_hit *hit)
-{
-	return hit->x0 == 0 || hit->y0 == 0 || hit->x1 == plan->width - 1 || hit->y1 == plan->height - 1;
 }
 
 static void fill_chunk(int i, void *userdata)
@@ -286,11 +253,11 @@ static void fill_chunk(int i, void *userdata)
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
-			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed & 1,
-			.at_border = is_at_border(cull->plan, hit), .hit = chunk->first_hit + h,
+			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
+			.at_border = hit->at_border, .hit = chunk->first_hit + h,
 		};
-		for (uint32_t y = hit->y0 / TILE_HEIGHT; y <= hit->y1 / TILE_HEIGHT; y++)
-			for (uint32_t x = hit->x0 / TILE_WIDTH; x <= hit->x1 / TILE_WIDTH; x++)
+		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
+			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
 				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;
 	}
 }

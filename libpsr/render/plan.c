@@ -136,7 +136,10 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
-		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
+		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0, .with_splats = plan->with_splats,
+		.region_from = { (float)plan->window.left, (float)plan->window.top },
+		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
+		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
 	};
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
 	m3d_apply(camera_center, view->axis, center);

@@ -89,7 +89,9 @@ struct cull_hit {
 	float near;                 /* no sample's z' is less */
 	uint16_t x0, x1, y0, y1;    /* pixels, inclusive, with the guard band */
 	uint16_t instance;
-	uint8_t level, is_mixed;
+	uint8_t level;
+	uint8_t is_mixed : 1, at_border : 1; /* as of bin_entry */
+	uint8_t tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
 };
 
 struct bins {

@@ -5,6 +5,7 @@
 #define PSR_SIMD_SIMD_H
 
 #include <stdint.h>
+#include "base/maths.h"
 #include "psr/isa.h"
 #include "psr/render.h"
 
@@ -29,15 +30,46 @@ struct cull_view {
 	int both_sides;       /* nothing is culled for how it faces: what casts shadows does so with its back, too */
 	float focal, near_z, width, height;
 	float center_x, center_y; /* pixels: where the view axis meets the picture */
-	int with_cones;
+	int with_cones, with_splats;
+	/* What visibility masks are tested against ([G] 6.3: 4x4 regions of the picture): region a of a pixel is region_scale[a] times
+	 * the pixel's place plus region_from[a]. */
+	float region_from[2], region_scale[2];
 };
+
+/* Pixels that a length across the surface can be stretched to where it lies in a sphere: |d(x'/z')| <= |p| |dp| / z'^2, which
+ * is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the angle between p and the
+ * axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound it, the latter as far from the
+ * centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees, only |p| and z' do. */
+static inline float cull_stretch(const struct cull_view *v, float cx, float cy, float cz, float r)
+{
+	const float front = cz - r, near = psr_choose(front > v->near_z, front, v->near_z);
+	const float side2 = cx * cx + cy * cy, distance2 = side2 + cz * cz, rim2 = distance2 - r * r;
+	const float reach = __builtin_sqrtf(distance2) + r;
+	const float cosine = cz * __builtin_sqrtf(psr_where(rim2 > 0, rim2)) - __builtin_sqrtf(side2) * r; /* times distance2 */
+	const int is_sharp = (rim2 > 0) & (cosine > 0) & (distance2 * near < reach * cosine);
+	const float stretch = v->focal * psr_choose(is_sharp, distance2, reach) / (near * psr_choose(is_sharp, cosine, near));
+	return psr_choose(v->perspective, stretch, v->focal);
+}
+
+#define SCREEN_SPLITS 2
+#define SCREEN_SIDE (1 << SCREEN_SPLITS)
+#define SCREEN_RANGES (SCREEN_SIDE * (SCREEN_SIDE + 1) / 2)
+
+/* Index of a range of regions among the SCREEN_RANGES of an axis. */
+static inline int32_t screen_range(int32_t first, int32_t last)
+{
+	return last * (last + 1) / 2 + first;
+}
 
 #define CULL_BATCH 64
 struct cull_batch {
-	uint8_t is_left[CULL_BATCH];  /* 0: nothing of the block can show, and the rest says nothing */
-	uint8_t is_mixed[CULL_BATCH]; /* some of its samples may face away */
-	uint8_t level[CULL_BATCH];    /* of the depth buffer that fits; PSR_MAX_DEPTH_LEVEL + 1 and more do not exist */
+	int32_t is_left[CULL_BATCH];  /* 0: nothing of the block can show, and the rest says nothing; else 1 */
+	int32_t is_mixed[CULL_BATCH]; /* 1: some of its samples may face away */
+	int32_t level[CULL_BATCH];    /* of the depth buffer that fits; PSR_MAX_DEPTH_LEVEL + 1 and more do not exist */
 	int32_t x0[CULL_BATCH], x1[CULL_BATCH], y0[CULL_BATCH], y1[CULL_BATCH]; /* pixels, inclusive, with the guard band */
+	/* Tiles, inclusive, that a sample can fall into or, with splats, a splat can reach; of the border's those that own the guard band. */
+	int32_t tile_x0[CULL_BATCH], tile_x1[CULL_BATCH], tile_y0[CULL_BATCH], tile_y1[CULL_BATCH];
+	int32_t range[CULL_BATCH];     /* of regions that the pixels lie in: screen_range of x, times SCREEN_RANGES, plus that of y */
 	float near[CULL_BATCH];        /* no sample's z' is less */
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels */
 };

@@ -21,6 +21,11 @@ static void random_view(struct check *c, struct cull_view *view, const struct ps
 	view->center_x = check_plain_or_any(c, is_spoilt, 0, 700);
 	view->center_y = check_plain_or_any(c, is_spoilt, 0, 700);
 	view->with_cones = !check_one_in(c, 4);
+	view->with_splats = check_one_in(c, 4);
+	for (int a = 0; a < 2; a++) {
+		view->region_from[a] = check_plain_or_any(c, is_spoilt, -700, 700);
+		view->region_scale[a] = check_plain_or_any(c, is_spoilt, 0, 0.1);
+	}
 }
 
 /* What is said of blocks that are not left, and what is left of the batch, has no meaning. */
@@ -32,7 +37,8 @@ static void settle(struct cull_batch *out, uint32_t n)
 		if (i >= n)
 			out->is_left[i] = 0;
 		out->is_mixed[i] = out->level[i] = 0;
-		out->x0[i] = out->x1[i] = out->y0[i] = out->y1[i] = 0;
+		out->x0[i] = out->x1[i] = out->y0[i] = out->y1[i] = out->range[i] = 0;
+		out->tile_x0[i] = out->tile_x1[i] = out->tile_y0[i] = out->tile_y1[i] = 0;
 		out->near[i] = out->depth_error[i] = 0;
 	}
 	check_settle(out->near, CULL_BATCH);
