@@ -58,7 +58,7 @@ static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
 static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
 {
 	static const char *const stages[] = { "",      "plan", "cull",   "warp",  "gaps", "resolve",
-		                                  "shade", "fill", "encode", "queue", "total", "shadow" };
+		                                  "shade", "fill", "encode", "queue", "total", "shadow", "smooth" };
 	static const char *const values[] = { "samples_warped", "blocks_drawn", "blocks",       "pixels_covered",
 		                                  "pixels_filled",  "samples",      "depth_levels", "lights",
 		                                  "shadow_maps",    "shadow_maps_drawn" };
@@ -67,7 +67,7 @@ static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
 	for (unsigned i = 0; i < end->n_entries; i++) {
 		const struct psr_msg_report_entry *entry = &end->entry[i];
 
-		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_SHADOW) {
+		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_SMOOTH) {
 			cJSON *stage = cJSON_AddObjectToObject(times, stages[entry->id]);
 
 			cJSON_AddNumberToObject(stage, "ms", (double)entry->ns / 1e6);
@@ -116,6 +116,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	cJSON_AddItemToObject(report, "size", cJSON_CreateDoubleArray(size, 2));
 	add_camera(report, &event->begin->camera);
 	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
+	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.is_smooth);
 	cJSON_AddStringToObject(report, "codec", facts->codec);
 	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
 	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);

@@ -22,7 +22,7 @@ struct shot {
 	struct psr_camera_wish camera;
 	struct preset_wish preset;
 	double fov, ortho, ambient, spacing;
-	int has_fov, has_ortho, has_ambient, hash, effects;
+	int has_fov, has_ortho, has_ambient, hash, effects, is_smooth;
 	uint8_t background[3];
 	int64_t timeout, passes;
 	struct psr_msg_frame frame;
@@ -101,6 +101,10 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		{ "spacing", 0, PSR_OPT_REAL, &shot->spacing, "PX",
 		  "The greatest distance between neighbouring samples that is good enough, pixels: less is finer and slower.", 0, 0,
 		  NULL, NULL },
+		{ "smooth", 0, PSR_OPT_FLAG, &shot->is_smooth, NULL,
+		  "Anti-aliasing at a fifth of a frame's time: edges are blended with what is behind them, and pixels with their "
+		  "neighbours of the same surface.",
+		  0, 0, NULL, NULL },
 		{ "codec", 0, PSR_OPT_STRING, &shot->codec_text, "CODEC",
 		  "How colour travels: jpeg:Q (quality of 1 to 100), lossless, or raw.", 0, 0, NULL, NULL },
 		{ "passes", 0, PSR_OPT_INT, &shot->passes, "N",
@@ -215,9 +219,11 @@ static int prepare(struct shot *shot, struct psr_client *client, const struct ps
 		code = preset_apply(&shot->preset, client, opened->handle, &frame->camera, scene, (int)shot->timeout * 1000, err);
 	if (code != PSR_OK)
 		return code;
-	if (shot->spacing != 1) {
+	if (shot->spacing != 1 || shot->is_smooth) {
 		frame->budget = PSR_WIRE_BUDGET_SETTINGS;
-		frame->settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = shot->spacing };
+		frame->settings.scale = 1;
+		frame->settings.is_smooth = shot->is_smooth != 0;
+		frame->settings.spacing_px = shot->spacing;
 	}
 	frame->width = shot->size[0];
 	frame->height = shot->size[1];

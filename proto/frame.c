@@ -52,7 +52,8 @@ int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
 static void layout_settings(struct wire *w, struct psr_msg_settings *m)
 {
 	wire_u8(w, &m->scale);
-	wire_reserved(w, 7);
+	wire_u8(w, &m->is_smooth);
+	wire_reserved(w, 6);
 	wire_f64(w, &m->spacing_px, 1);
 }
 
@@ -60,6 +61,8 @@ static int check_settings(const struct psr_msg_settings *m, struct psr_error *er
 {
 	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
 		return psr_fail(err, PSR_ERR_ARG, "the scale of the settings is %u: it must be 1, 2 or 4", m->scale);
+	if (check_integer("the smoothing of the settings", m->is_smooth, 0, 1, err))
+		return PSR_ERR_ARG;
 	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
 }
 
@@ -134,7 +137,7 @@ static void layout_frame(struct wire *w, void *p)
 
 static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
 {
-	int no_settings = m->settings.scale == 0 && m->settings.spacing_px == 0;
+	int no_settings = m->settings.scale == 0 && !m->settings.is_smooth && m->settings.spacing_px == 0;
 
 	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_SETTINGS, err) ||
 	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||

@@ -42,9 +42,12 @@ uint64_t draw_worker_bytes(const struct draw_worker *worker)
 	return psr_renderer_bytes(worker->renderer) + refiner + worker->capacity;
 }
 
-static double spacing_of(const struct psr_msg_frame *request)
+/* Resolved. */
+static struct psr_msg_settings settings_of(const struct psr_msg_frame *request)
 {
-	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings.spacing_px : 1;
+	const struct psr_msg_settings usual = { .scale = 1, .spacing_px = 1 };
+
+	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings : usual;
 }
 
 static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
@@ -63,12 +66,13 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	};
 
 	for (int i = 0; i < PSR_N_STAGES; i++)
-		if (i != PSR_STAGE_SHADOW)
+		if (stage_id[i])
 			add_entry(end, stage_id[i], report->ns[i], report->count[i]);
 	add_entry(end, PSR_WIRE_REPORT_ENCODE, encode_ns, rect_bytes);
 	add_entry(end, PSR_WIRE_REPORT_QUEUE, queue_ns, d->n_waiting);
 	add_entry(end, PSR_WIRE_REPORT_TOTAL, total_ns, (uint64_t)psr_pool_threads(d->pool));
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
+	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS_DRAWN, 0, report->n_blocks_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS, 0, report->n_blocks);
@@ -91,7 +95,7 @@ static struct outq_chunk *encode_begin(const struct drawing *d, const struct cod
 		.color_codec = request->color_codec, .color_quality = request->color_quality,
 		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
 		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
-		.settings = { .scale = 1, .spacing_px = spacing_of(request) },
+		.settings = settings_of(request),
 		.depth_min = coded->depth_min, .depth_max = coded->depth_max, .camera = request->camera,
 	};
 	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
@@ -202,10 +206,12 @@ static int is_abandoned(void *userdata)
 static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct psr_scene *scene, struct psr_frame *picture,
                      struct psr_error *err)
 {
+	const struct psr_msg_settings asked = settings_of(&d->request);
 	struct psr_settings settings;
 
 	psr_settings_default(&settings, d->request.width, d->request.height);
-	settings.spacing = spacing_of(&d->request);
+	settings.spacing = asked.spacing_px;
+	settings.is_smooth = asked.is_smooth;
 	if (d->pass == 0)
 		return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
 	if (worker->refiner == NULL && psr_refiner_create(&worker->refiner, worker->renderer) != PSR_OK)

@@ -16,6 +16,7 @@ static const struct {
 	[PSR_EFFECT_SHADOWS] = { "shadows", { "", "", "no light that casts any reaches what is in view", "", "" } },
 	[PSR_EFFECT_TABLE] = { "table", { "", "", "no light shines", "a light is near or casts shadows, or a block in view is two-sided",
 	                                  "too few lights and pixels, or several instances" } },
+	[PSR_EFFECT_SMOOTH] = { "smooth", { "", "the settings leave it out", "no colour is wanted", "", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -37,6 +38,7 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_POSITIONS] = "pixels whose positions were worked out",
 		[PSR_EFFECT_SHADOWS] = "shadow maps in use",
 		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
+		[PSR_EFFECT_SMOOTH] = "pixels at edges",
 	};
 	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] ? counts[effect] : "?";
 }

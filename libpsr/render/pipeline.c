@@ -15,11 +15,13 @@ struct psr_renderer {
 	struct bins bins;
 	struct shadow *shadow;    /* NULL until a light casts one */
 	struct fill fill;
+	struct smooth smooth;
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
 	int has_planes;           /* it wants more than colour and depth */
 	struct shade_target target;
+	float *depth;             /* where its depths go, or NULL */
 	/* All of a pixel, in one piece of memory: words, levels, linear colours by channel, weights. */
 	void *pixels;
 	size_t pixels_size;
@@ -42,7 +44,8 @@ struct psr_renderer {
 
 const char *psr_stage_name(enum psr_stage stage)
 {
-	static const char *const names[PSR_N_STAGES] = { "plan", "shadow", "cull", "warp", "gaps", "resolve", "shade", "fill" };
+	static const char *const names[PSR_N_STAGES] = { "plan", "shadow", "cull", "warp", "gaps", "resolve", "shade", "fill",
+		                                              "smooth" };
 	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
 }
 
@@ -57,6 +60,7 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 	settings->gap_threshold = 3;
 	settings->gap_method = PSR_GAPS_BILINEAR;
 	settings->spacing = 1;
+	settings->is_smooth = 0;
 }
 
 static int validate(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
@@ -119,6 +123,7 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	shadow_destroy(r->shadow);
 	bins_clear(&r->bins);
 	fill_clear(&r->fill);
+	smooth_clear(&r->smooth);
 	psr_free_huge(r->pixels, r->pixels_size);
 	psr_free(r->lit);
 	psr_free(r->counters);
@@ -127,8 +132,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->pixels_size + r->lit_size + r->counters_size + bins_bytes(&r->bins) +
-	       shadow_bytes(r->shadow);
+	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size + r->lit_size +
+	       r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
 static void *grow(void *memory, size_t *capacity, size_t size)
@@ -312,8 +317,8 @@ static void shade_one(int row, void *userdata)
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
 		const uint64_t *word = psr_zstack_row(&r->stack, y);
-		if (r->frame->depth)
-			r->simd->depth_row(r->frame->depth + first, word, plan->width, r->stack.exponent);
+		if (r->depth)
+			r->simd->depth_row(r->depth + first, word, plan->width, r->stack.exponent);
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
 	}
@@ -352,9 +357,17 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	r->frame = frame;
 	r->has_planes = frame->normal || frame->id || frame->block || frame->weight || frame->words;
 
-	r->target = (struct shade_target){ frame->rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
-	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2],
-		                                  r->srgb, frame->rgb, frame->depth };
+	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb ? PSR_WHY_RAN : PSR_WHY_NOTHING;
+	uint8_t *rgb = frame->rgb;
+	r->depth = frame->depth;
+	if (smooth == PSR_WHY_RAN) {
+		if (smooth_begin(&r->smooth, &r->plan, frame->depth))
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for smoothing a picture of %ux%u", r->plan.width, r->plan.height);
+		rgb = r->smooth.rgb;
+		r->depth = r->smooth.depth;
+	}
+	r->target = (struct shade_target){ rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
+	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, rgb, r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
 	const int n = (int)n_rows(&r->plan);
@@ -386,8 +399,13 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	start = end;
 	if (n_marked)
 		fill_push(&r->fill, pool, report);
-	report->ns[PSR_STAGE_FILL] += now_ns() - start;
+	report->ns[PSR_STAGE_FILL] += (end = now_ns()) - start;
+	start = end;
 	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
+	if (smooth == PSR_WHY_RAN)
+		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
+	report->ns[PSR_STAGE_SMOOTH] = now_ns() - start;
+	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
 	return PSR_OK;
 }
 

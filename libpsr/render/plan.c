@@ -252,6 +252,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
 	plan->with_splats = settings->with_splats;
+	plan->is_smooth = settings->is_smooth;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 

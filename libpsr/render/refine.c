@@ -126,6 +126,7 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 	const int is_last_x = width - left <= WINDOW_WIDTH, is_last_y = height - top <= WINDOW_HEIGHT;
 	struct psr_settings window = *settings;
 	window.with_splats = 1;
+	window.is_smooth = 0;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;

@@ -34,6 +34,7 @@ struct plan {
 	double center[2];          /* pixels from the frame's corner to where the view axis meets it */
 	int perspective;
 	int with_splats;
+	int is_smooth;
 	unsigned cull_tests;
 	int is_full;
 	int opaque_cells;          /* PSR_GAPS_OPAQUE */
@@ -268,6 +269,24 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 
 /* The same for their pixels, of FILL_RUN bricks at most. */
 void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int is_early);
+
+/* ---- smooth: anti-aliasing ([G] 9.1.1) ---- */
+
+/* A picture before it is smoothed: 3 * width * height, and its depths in world units. */
+struct smooth {
+	uint8_t *rgb;
+	float *depth;
+	void *storage;
+	size_t storage_size;
+	_Atomic uint64_t n_edges; /* of the picture under way */
+};
+
+/* Room for a picture, and for its depths, which are elsewhere unless `depth` is NULL. */
+int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth);
+void smooth_clear(struct smooth *smooth);
+
+/* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
+uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool, uint8_t *rgb);
 
 /* ---- for tests: a renderer that calls other kernels ---- */
 

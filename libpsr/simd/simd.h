@@ -326,6 +326,25 @@ typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
 
+/* ---- smooth ([G] 9.1.1) ---- */
+
+#define SMOOTH_WIDTH 256
+
+/* A picture that is done, and one of the same size that it goes to. What is behind a pixel is beyond scale * z' + offset of it. */
+struct smooth_target {
+	const uint8_t *from; /* sRGB, 3 bytes a pixel */
+	uint8_t *to;
+	const float *depth;  /* z', +inf where nothing is */
+	uint32_t width, height;
+	float scale, offset;
+};
+
+/* The pixels x0 <= x < x1, y0 <= y < y1, of which SMOOTH_WIDTH at most are side by side: each becomes the mean of itself, four times,
+ * and of those of its four neighbours that are of the same surface. An edge lets through what is behind it: an eighth of the mean
+ * of the neighbours there for each diagonal one and two for each other one, which count once and twice in that mean, six eighths
+ * at most. Neighbours in front count nothing. Means are of squares of codes. Returns how many pixels have a neighbour behind. */
+typedef uint32_t smooth_fn(const struct smooth_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);
+
 /* The greatest z' of each 8x8 pixels of a tile, as bits: far[y / 8 * (TILE_WIDTH / 8) + x / 8]; those of +inf where a pixel is
  * empty. */
 #define FAR_SIDE 8
@@ -352,6 +371,7 @@ struct simd {
 	fill_push_fn *fill_push;
 	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;
+	smooth_fn *smooth;
 };
 
 extern const struct simd simd_c, simd_avx2, simd_avx512;

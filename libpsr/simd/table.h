@@ -6,6 +6,7 @@
 #include "simd/kernels.h"
 #include "simd/light.h"
 #include "simd/shadow.h"
+#include "simd/smooth.h"
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
@@ -30,4 +31,5 @@
 	.fill_push = fill_push,                        \
 	.fill_push_picture = fill_push_picture,        \
 	.fill_depths = fill_depths,                    \
+	.smooth = smooth,                              \
 }

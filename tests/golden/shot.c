@@ -42,6 +42,7 @@ static int parse_words(struct words *words, struct shot *shot, int argc, char **
 		{ .name = "ortho", .type = PSR_OPT_REAL, .value = &words->ortho, .seen = &words->has_ortho },
 		{ .name = "light", .type = PSR_OPT_CALL, .value = words, .call = on_light },
 		{ .name = "ambient", .type = PSR_OPT_REAL, .value = &words->ambient, .seen = &words->has_ambient },
+		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &shot->is_smooth },
 		{ .name = "background", .type = PSR_OPT_COLOR, .value = words->background },
 		{ .name = NULL },
 	};

@@ -10,6 +10,7 @@
 struct shot {
 	char name[SHOT_NAME_BYTES], model[SHOT_NAME_BYTES];
 	uint32_t size[2];
+	int is_smooth;
 	struct psr_scene scene; /* of instance and light below: the shot must stay where it is */
 	struct psr_instance instance;
 	struct psr_light light[SHOT_MAX_LIGHTS];

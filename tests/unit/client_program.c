@@ -60,8 +60,10 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 		                                 .depth_format = asked->depth_format,
 		                                 .depth_codec = asked->depth_codec,
 		                                 .data_codec = asked->data_codec,
-		                                 .settings = { 1, asked->budget == PSR_WIRE_BUDGET_SETTINGS ? asked->settings.spacing_px : 1 },
+		                                 .settings = { .scale = 1, .spacing_px = 1 },
 		                                 .camera = asked->camera };
+	if (asked->budget == PSR_WIRE_BUDGET_SETTINGS)
+		begin.settings = asked->settings;
 	struct psr_msg_frame_end end = { .is_final = 1,
 		                             .planes = asked->planes,
 		                             .error_px = 1.5,
@@ -498,12 +500,13 @@ static void report_says_which_effects_ran_and_why_others_did_not(void **state)
 	cJSON *report, *effects;
 
 	(void)state;
-	assert_int_equal(psr("shot --model cube --size 20x10 --spacing 0.5 --report r.json --effects"), 0);
+	assert_int_equal(psr("shot --model cube --size 20x10 --spacing 0.5 --smooth --report r.json --effects"), 0);
 	assert_string_equal(out, "levels     ran: 3 depth buffers beside the picture's own\n"
 	                         "specular   left out: no sample in view is specular, or no light shines\n");
 	read_back("r.json", text, sizeof text);
 	report = cJSON_Parse(text);
 	assert_true(cJSON_GetObjectItem(report, "spacing_px")->valuedouble == 0.5);
+	assert_true(cJSON_IsTrue(cJSON_GetObjectItem(report, "smooth")));
 	effects = cJSON_GetObjectItem(report, "effects");
 	assert_int_equal(cJSON_GetArraySize(effects), 2);
 	assert_true(cJSON_IsTrue(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "levels"), "ran")));

@@ -160,7 +160,7 @@ static void put_frame(struct peer *p, uint32_t id, uint64_t hash_error, void (*b
 {
 	struct psr_msg_frame asked = request();
 	struct psr_msg_frame_begin begin = {
-		.width = SIDE, .height = SIDE, .planes = 1, .settings = { 1, 1 }, .camera = asked.camera
+		.width = SIDE, .height = SIDE, .planes = 1, .settings = { .scale = 1, .spacing_px = 1 }, .camera = asked.camera
 	};
 	static uint8_t rgb[3 * SIDE * SIDE];
 	const uint32_t half = 3 * SIDE * SIDE / 2;
@@ -724,7 +724,7 @@ static void send_rectangles_for_ever(struct peer *p)
 {
 	struct psr_msg_frame asked = request();
 	struct psr_msg_frame_begin begin = {
-		.width = SIDE, .height = SIDE, .planes = 1, .settings = { 1, 1 }, .camera = asked.camera
+		.width = SIDE, .height = SIDE, .planes = 1, .settings = { .scale = 1, .spacing_px = 1 }, .camera = asked.camera
 	};
 	static const uint8_t data[3];
 	const struct psr_msg_rect rect = { 0, PSR_CODEC_RAW, 1, 0, 0, 1, 1, 3, 0, 3, data };

@@ -141,6 +141,7 @@ static void make_frame(struct psr_msg_frame *m)
 		m->error_bound_px = 1e-3 + unit();
 	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
 		m->settings.scale = (uint8_t)(1u << below(3));
+		m->settings.is_smooth = (uint8_t)below(2);
 		m->settings.spacing_px = 1.0 / 64 + 63 * unit();
 	}
 	m->base = below(1000);
@@ -165,6 +166,7 @@ static void make_begin(struct psr_msg_frame_begin *m)
 	m->base = f.base;
 	m->base_pass = f.base ? (uint16_t)below(9) : 0;
 	m->settings.scale = 4;
+	m->settings.is_smooth = 1;
 	m->settings.spacing_px = 64;
 	m->depth_min = fabs(length()) * 1e-2;
 	m->depth_max = m->depth_min * (1 + unit());

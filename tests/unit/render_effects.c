@@ -109,6 +109,7 @@ static void case_make(struct case_of *c, uint32_t which)
 	camera->fov_y = between(&seed, 0.2, 1.5);
 	camera->ortho_height = between(&seed, 0.5, 4) * info->scale;
 	psr_settings_default(&c->settings, 64 + next(&seed) % 600, 64 + next(&seed) % 500);
+	c->settings.is_smooth = which % 4 == 1;
 }
 
 struct drawn {

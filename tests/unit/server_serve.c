@@ -130,18 +130,18 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 21 + PSR_N_EFFECTS);
-	for (int i = 0; i < 11; i++)
+	assert_int_equal(end.n_entries, 22 + PSR_N_EFFECTS);
+	for (int i = 0; i < 12; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
-	for (int i = 11; i < 21; i++)
-		assert_int_equal(end.entry[i].id, i - 11 + 32);
-	for (int i = 21; i < 21 + PSR_N_EFFECTS; i++) {
-		assert_int_equal(end.entry[i].id, i - 21 + PSR_WIRE_REPORT_EFFECTS);
+	for (int i = 12; i < 22; i++)
+		assert_int_equal(end.entry[i].id, i - 12 + 32);
+	for (int i = 22; i < 22 + PSR_N_EFFECTS; i++) {
+		assert_int_equal(end.entry[i].id, i - 22 + PSR_WIRE_REPORT_EFFECTS);
 		assert_true(end.entry[i].ns == PSR_WHY_RAN || end.entry[i].count == 0);
 	}
-	assert_int_equal(end.entry[21 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
+	assert_int_equal(end.entry[22 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
 	assert_int_equal(end.entry[9].count, 2);
-	assert_int_equal(end.entry[16].count, PLATE_SAMPLES);
+	assert_int_equal(end.entry[17].count, PLATE_SAMPLES);
 	peer_close(&p);
 }
 
@@ -164,14 +164,14 @@ static void a_light_that_casts_shadows_gets_a_map(void **state)
 		peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
 		assert_int_equal(end.entry[10].id, PSR_WIRE_REPORT_SHADOW);
 		assert_int_equal(end.entry[10].count > 0, casts);
-		assert_int_equal(end.entry[19].id, PSR_WIRE_REPORT_SHADOW_MAPS);
-		assert_int_equal(end.entry[19].count, casts);
+		assert_int_equal(end.entry[20].id, PSR_WIRE_REPORT_SHADOW_MAPS);
+		assert_int_equal(end.entry[20].count, casts);
 	}
 	peer_close(&p);
 	free(scene);
 }
 
-static void the_spacing_of_the_settings_is_kept_and_returned(void **state)
+static void settings_are_kept_and_returned(void **state)
 {
 	struct psr_msg_frame frame = frame_default(64, 48);
 	struct psr_msg_frame_begin begin;
@@ -181,10 +181,10 @@ static void the_spacing_of_the_settings_is_kept_and_returned(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
-	frame.settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = 2.5 };
+	frame.settings = (struct psr_msg_settings){ .scale = 1, .is_smooth = 1, .spacing_px = 2.5 };
 	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
 	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
-	assert_true(begin.settings.scale == 1 && begin.settings.spacing_px == 2.5);
+	assert_true(begin.settings.scale == 1 && begin.settings.is_smooth && begin.settings.spacing_px == 2.5);
 	do
 		assert_true(peer_next(&p, &message));
 	while (message.type != PSR_MSG_FRAME_END);
@@ -606,7 +606,7 @@ int main(void)
 		cmocka_unit_test(raw_planes_have_the_hashes_of_the_end),
 		cmocka_unit_test(the_report_has_every_entry_in_order),
 		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
-		cmocka_unit_test(the_spacing_of_the_settings_is_kept_and_returned),
+		cmocka_unit_test(settings_are_kept_and_returned),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(passes_rise_to_the_final_one),

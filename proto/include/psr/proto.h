@@ -347,6 +347,7 @@ enum psr_wire_budget {
 
 struct psr_msg_settings { /* resolved settings: with them a frame is a pure function of models and request */
 	uint8_t scale;       /* drawn at 1/scale of the size in each direction and enlarged: 1, 2 or 4 */
+	uint8_t is_smooth;   /* 1: edges are blended with what is behind, and pixels with those of their surface; else 0 */
 	double spacing_px;   /* greatest distance of neighbouring samples, pixels: 1 is [G]'s adequate one; 2^-6..2^6 */
 };
 
@@ -435,6 +436,7 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_QUEUE = 9,   /* time waited before work started; frames of all clients waiting when it came */
 	PSR_WIRE_REPORT_TOTAL = 10,  /* from the start of plan to the end of encode; threads of the server's pool */
 	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
+	PSR_WIRE_REPORT_SMOOTH = 12, /* pixels at edges */
 	/* values only, ns is 0: */
 	PSR_WIRE_REPORT_SAMPLES_WARPED = 32, /* all samples of the blocks drawn */
 	PSR_WIRE_REPORT_BLOCKS_DRAWN = 33,   /* after culling */

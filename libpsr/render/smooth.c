@@ -1,0 +1,65 @@
+#include <math.h>
+#include <string.h>
+#include "base/mem.h"
+#include "render/render.h"
+
+#define EDGE 3.0 /* pixel widths from one pixel to the next, as for gaps ([G] 7.2) */
+
+struct smoothing {
+	struct smooth *smooth;
+	const struct simd *simd;
+	const struct plan *plan;
+	struct smooth_target target;
+};
+
+int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth)
+{
+	const size_t area = (size_t)plan->width * plan->height, depths = depth ? 0 : area * sizeof *depth;
+	smooth->storage = psr_grow_huge(smooth->storage, &smooth->storage_size, depths + 3 * area);
+	if (!smooth->storage)
+		return PSR_ERR_MEMORY;
+	smooth->depth = depth ? depth : smooth->storage;
+	smooth->rgb = (uint8_t *)smooth->storage + depths;
+	return PSR_OK;
+}
+
+void smooth_clear(struct smooth *smooth)
+{
+	psr_free_huge(smooth->storage, smooth->storage_size);
+}
+
+/* A row of bricks, of which each lies in one tile. Where nothing is, the picture is the background. */
+static void smooth_row(int row, void *userdata)
+{
+	struct smoothing *s = userdata;
+	const struct plan *plan = s->plan;
+	const struct smooth_target *t = &s->target;
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = y0 + BRICK < plan->height ? y0 + BRICK : plan->height;
+	uint64_t n_edges = 0;
+	for (uint32_t x0 = 0; x0 < plan->width; x0 += TILE_WIDTH) {
+		const uint32_t x1 = x0 + TILE_WIDTH < plan->width ? x0 + TILE_WIDTH : plan->width;
+		if (!plan->is_quiet || !plan->is_quiet[y0 / TILE_HEIGHT * plan->tiles_x + x0 / TILE_WIDTH]) {
+			n_edges += s->simd->smooth(t, x0, x1, y0, y1);
+			continue;
+		}
+		for (uint32_t y = y0; y < y1; y++) {
+			const size_t first = 3 * ((size_t)y * plan->width + x0);
+			memcpy(t->to + first, t->from + first, 3 * (size_t)(x1 - x0));
+		}
+	}
+	atomic_fetch_add_explicit(&s->smooth->n_edges, n_edges, memory_order_relaxed);
+}
+_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_HEIGHT % BRICK == 0, "");
+
+uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool, uint8_t *rgb)
+{
+	const float step = (float)(EDGE / (double)plan->focal);
+	struct smoothing smoothing = { smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, 1 + step, 0 } };
+	if (!plan->perspective) {
+		smoothing.target.scale = 1;
+		smoothing.target.offset = ldexpf(step, plan->exponent);
+	}
+	atomic_store(&smooth->n_edges, 0);
+	psr_pool_for(pool, (int)((plan->height + BRICK - 1) / BRICK), smooth_row, &smoothing);
+	return atomic_load(&smooth->n_edges);
+}

@@ -1,0 +1,231 @@
+/* Anti-aliasing of a frame by its own pixels ([G] 9.1.1). */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/srgb.h"
+#include "psr/pool.h"
+#include "psr/render.h"
+#include "render/render.h"
+#include "tests/unit/lib/shapes.h"
+
+#define SIDE 7
+
+/* A picture of SIDE x SIDE pixels: '#' white and near, '.' black and `step` behind, ' ' black and nothing. */
+static uint32_t smooth(uint8_t light[SIDE][SIDE], const char *const *row, float step)
+{
+	uint8_t from[SIDE][SIDE][3], to[SIDE][SIDE][3];
+	float depth[SIDE][SIDE];
+	const struct smooth_target target = { from[0][0], to[0][0], depth[0], SIDE, SIDE, 1, 0.03f };
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++) {
+			memset(from[y][x], row[y][x] == '#' ? 255 : 0, 3);
+			depth[y][x] = row[y][x] == '#' ? 1 : row[y][x] == '.' ? 1 + step : INFINITY;
+		}
+	const uint32_t n_edges = simd_get()->smooth(&target, 0, SIDE, 0, SIDE);
+	for (int y = 0; y < SIDE; y++)
+		for (int x = 0; x < SIDE; x++)
+			light[y][x] = to[y][x][1];
+	return n_edges;
+}
+
+/* The code whose square is this share of white's. */
+static int white(double share)
+{
+	return (int)(255 * sqrt(share) + 0.5);
+}
+
+static void an_edge_lets_half_of_what_is_behind_through(void **state)
+{
+	static const char *const beside_nothing[SIDE] = { "###    ", "###    ", "###    ", "###    ", "###    ", "###    ", "###    " };
+	static const char *const beside_far[SIDE] = { "###....", "###....", "###....", "###....", "###....", "###....", "###...." };
+	uint8_t light[SIDE][SIDE];
+	(void)state;
+	for (int is_far = 0; is_far < 2; is_far++) {
+		assert_int_equal(smooth(light, is_far ? beside_far : beside_nothing, 0.1f), SIDE);
+		for (int y = 1; y < SIDE - 1; y++) {
+			assert_int_equal(light[y][1], 255);
+			assert_int_equal(light[y][2], white(0.5)); /* a neighbour beside and two aslant are behind: 2 + 1 + 1 of 8 */
+			assert_int_equal(light[y][3], 0);          /* what is in front does not come through what is behind */
+		}
+		assert_int_equal(light[0][2], white(5 / 8.0)); /* at the picture's border there are fewer neighbours */
+	}
+}
+
+static void corners_and_lines_keep_a_quarter_at_least(void **state)
+{
+	static const char *const row[SIDE] = { "       ", " #     ", "       ", "    ###", "  #####", "  ###  ", "  ###  " };
+	uint8_t light[SIDE][SIDE];
+	(void)state;
+	smooth(light, row, 0);
+	assert_int_equal(light[1][1], white(0.25)); /* 12 of 8 */
+	assert_int_equal(light[4][2], white(0.25)); /* 2 + 2 + 1 + 1 + 1, of two sides and what is between */
+	assert_int_equal(light[3][4], white(0.25));
+	assert_int_equal(light[4][4], white(6 / 8.0)); /* of two edges that turn inwards, 1 each */
+}
+
+/* 0.03 is the threshold: a surface may fall by that much from one pixel to the next. Then a pixel counts four times, and each of
+ * those beside it once. */
+static void neighbours_of_a_surface_are_averaged(void **state)
+{
+	static const char *const row[SIDE] = { "#######", "#######", "#######", "###.###", "#######", "#######", "#######" };
+	uint8_t light[SIDE][SIDE];
+	(void)state;
+	assert_int_equal(smooth(light, row, 0.02f), 0);
+	assert_int_equal(light[3][3], white(4 / 8.0));
+	assert_int_equal(light[3][2], white(7 / 8.0));
+	assert_int_equal(light[2][3], white(7 / 8.0));
+	assert_int_equal(light[2][2], 255);
+	assert_int_equal(smooth(light, row, 0.04f), 8);
+	assert_int_equal(light[3][3], 0);
+	assert_int_equal(light[3][2], white(6 / 8.0));
+	assert_int_equal(light[2][2], white(7 / 8.0));
+}
+
+struct drawn {
+	struct psr_scene scene;
+	struct psr_instance instance;
+	struct psr_light light;
+	struct psr_settings settings;
+	struct psr_frame frame;
+};
+
+static void scene_make(struct drawn *d, const struct psr_model *model, uint32_t width, uint32_t height)
+{
+	const struct psr_model_info *info = psr_model_info(model);
+	memset(d, 0, sizeof *d);
+	d->instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	d->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
+	d->scene = (struct psr_scene){ .instance = &d->instance, .n_instances = 1, .light = &d->light, .n_lights = 1,
+		                           .background = { 0.2, 0.1, 0 } };
+	psr_camera_frame(&d->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
+	psr_settings_default(&d->settings, width, height);
+	const size_t area = (size_t)width * height;
+	d->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc(3 * area), .depth = malloc(4 * area),
+		                           .normal = malloc(6 * area), .words = malloc(8 * area), .weight = malloc(area) };
+}
+
+static void draw(struct drawn *d, int is_smooth, struct psr_pool *pool)
+{
+	struct psr_renderer *renderer;
+	struct psr_error err;
+	d->settings.is_smooth = is_smooth;
+	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	if (psr_render(renderer, &d->scene, &d->settings, pool, &d->frame, &err))
+		fail_msg("%s", err.text);
+	psr_renderer_destroy(renderer);
+}
+
+static void release(struct drawn *d)
+{
+	free(d->frame.rgb);
+	free(d->frame.depth);
+	free(d->frame.normal);
+	free(d->frame.words);
+	free(d->frame.weight);
+}
+
+static void only_color_changes_and_alike_for_any_threads_and_planes(void **state)
+{
+	const uint32_t sizes[][2] = { { 160, 120 }, { 600, 450 } };
+	struct psr_model *model;
+	struct psr_error err;
+	struct psr_pool *pool;
+	(void)state;
+	assert_int_equal(psr_model_read(&model, "tests/golden/wheel.psr", &err), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+	for (int i = 0; i < 2; i++) {
+		const uint32_t width = sizes[i][0], height = sizes[i][1];
+		const size_t area = (size_t)width * height;
+		struct drawn plain, one;
+		scene_make(&plain, model, width, height);
+		scene_make(&one, model, width, height);
+		draw(&plain, 0, NULL);
+		draw(&one, 1, NULL);
+		assert_memory_not_equal(plain.frame.rgb, one.frame.rgb, 3 * area);
+		assert_memory_equal(plain.frame.depth, one.frame.depth, 4 * area);
+		assert_memory_equal(plain.frame.normal, one.frame.normal, 6 * area);
+		assert_memory_equal(plain.frame.words, one.frame.words, 8 * area);
+		assert_memory_equal(plain.frame.weight, one.frame.weight, area);
+		assert_int_equal(plain.frame.report.effect[PSR_EFFECT_SMOOTH].why, PSR_WHY_OFF);
+		assert_int_equal(one.frame.report.effect[PSR_EFFECT_SMOOTH].why, PSR_WHY_RAN);
+		assert_true(one.frame.report.count[PSR_STAGE_SMOOTH] > 0);
+		float *depth = plain.frame.depth;
+		plain.frame.depth = NULL; /* depths that only smoothing asks for */
+		draw(&plain, 1, pool);
+		plain.frame.depth = depth;
+		assert_memory_equal(plain.frame.rgb, one.frame.rgb, 3 * area);
+		assert_int_equal(plain.frame.report.count[PSR_STAGE_SMOOTH], one.frame.report.count[PSR_STAGE_SMOOTH]);
+		uint8_t *rgb = plain.frame.rgb;
+		plain.frame.rgb = NULL;
+		draw(&plain, 1, NULL);
+		plain.frame.rgb = rgb;
+		assert_int_equal(plain.frame.report.effect[PSR_EFFECT_SMOOTH].why, PSR_WHY_NOTHING);
+		release(&plain);
+		release(&one);
+	}
+	psr_pool_destroy(pool);
+	psr_model_unref(model);
+}
+
+/* Light of a white, unlit sphere before black: of pixels' squares, which differ from the disc's part of them. */
+static double error_of(const struct drawn *d, double radius)
+{
+	const uint32_t side = d->frame.width;
+	double sum = 0;
+	for (uint32_t y = 0; y < side; y++)
+		for (uint32_t x = 0; x < side; x++) {
+			int n = 0;
+			for (int i = 0; i < 64; i++)
+				n += hypot(x + (i % 8 + 0.5) / 8 - side / 2.0, y + (i / 8 + 0.5) / 8 - side / 2.0) <= radius;
+			sum += pow((double)psr_srgb_to_linear[d->frame.rgb[3 * (y * side + x)]] - n / 64.0, 2);
+		}
+	return sum;
+}
+
+/* A rim pixel is full where its coverage is anything from 0 to 1, and so off by 1/3 in the mean square; half of it would be by 1/12,
+ * and what its neighbours tell makes that no worse. Samples that miss a pixel of little coverage leave less to gain: three times. */
+static void the_rim_of_a_sphere_is_three_times_as_true(void **state)
+{
+	const struct shape_options options = { .resolution = 256, .diffuse = 0xffffff, .unlit = 1, .cones = 1, .scale = 1 };
+	struct psr_model *sphere = shape_build(&options, 0.9);
+	struct drawn d;
+	(void)state;
+	for (int is_perspective = 0; is_perspective < 2; is_perspective++) {
+		scene_make(&d, sphere, 160, 160);
+		memset(d.scene.background, 0, sizeof d.scene.background);
+		double radius = 0.9 / 2.5 * 160;
+		if (is_perspective) {
+			double distance = 0;
+			for (int k = 0; k < 3; k++)
+				distance += pow(d.scene.camera.eye[k] - d.scene.camera.target[k], 2);
+			const double tangent = 0.9 / sqrt(distance - 0.9 * 0.9); /* of the angle at which the sphere's outline is seen */
+			radius = 80 * tangent / tan(0.3);
+		} else {
+			d.scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
+			d.scene.camera.ortho_height = 2.5;
+		}
+		draw(&d, 0, NULL);
+		const double plain = error_of(&d, radius);
+		draw(&d, 1, NULL);
+		assert_true(3 * error_of(&d, radius) <= plain);
+		release(&d);
+	}
+	psr_model_unref(sphere);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(an_edge_lets_half_of_what_is_behind_through),
+		cmocka_unit_test(corners_and_lines_keep_a_quarter_at_least),
+		cmocka_unit_test(neighbours_of_a_surface_are_averaged),
+		cmocka_unit_test(only_color_changes_and_alike_for_any_threads_and_planes),
+		cmocka_unit_test(the_rim_of_a_sphere_is_three_times_as_true),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
