@@ -11,8 +11,9 @@
 #define MOST_SLOPE 0.7f
 /* Of a disc whose sample has no neighbours on either side, along that line: what it lies on is narrower than a step. */
 #define NARROW 0.5f
-/* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest shows. */
-#define RIM_DEPTH 0.25f
+/* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest shows.
+ * Measured. */
+#define RIM_DEPTH 1.0f
 
 struct splat_target {
 	const struct plan *plan;
