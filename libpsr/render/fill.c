@@ -57,14 +57,15 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		h = (h + 1) / 2;
 		cells += (size_t)(w + 2) * (h + 2);
 	}
-	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + 5 * n_bricks +
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + (sizeof *fill->left + 5) * n_bricks +
 	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
 	if (!fill->storage)
 		return PSR_ERR_MEMORY;
 	float *z = fill->storage;
-	uint16_t *values = (uint16_t *)(z + cells);
+	fill->left = (uint32_t *)(z + cells);
+	uint16_t *values = (uint16_t *)(fill->left + n_bricks);
 	uint32_t w = width, h = height;
 	for (int l = 1; l <= top; l++) {
 		w = (w + 1) / 2;
@@ -238,6 +239,7 @@ const uint8_t *fill_wants(struct fill *fill)
 		}
 	fill->needed = 0;
 	for (size_t i = 0; i < n_bricks; i++) {
+		fill->left[i] = fill->needs[i] ? UINT32_MAX : 0;
 		fill->needs[i] = fill->needs[i] > fill->brick_top ? (uint8_t)fill->brick_top : fill->needs[i];
 		fill->needed = fill->needs[i] > fill->needed ? fill->needs[i] : fill->needed;
 	}

@@ -129,12 +129,15 @@ void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 	uint16_t place[FILL_WIDTH + 1];
 	struct picture_row pixels, filled;
 	const struct fill_row row = { filled.r, filled.g, filled.b, NULL, filled.z };
+	uint32_t *left = fill->left + (size_t)by * fill->bricks_x + bx0;
+	_Static_assert(BRICK == 32 && FILL_BLOCK * 2 == BRICK, "a bit a row, and a block is a brick wide");
 	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
 		const struct fill_row was = picture_row_at(&pixels, fill, x0, y, 2 * n_cells, 0, 1);
 		const struct fill_row own = fill_row_at(from, x, parent);
 		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		const uint32_t n_places = fill->simd->fill_push_picture(&row, place, &was, &own, &beside, n_cells, scale, offset);
+		const uint32_t n_places = fill->simd->fill_push_picture(&row, place, left, 1u << y % BRICK, &was, &own, &beside,
+		                                                        n_cells, scale, offset);
 		if (n_places)
 			write_pixels(fill, (size_t)y * width + x0, place, n_places, &row);
 	}

@@ -213,6 +213,7 @@ struct fill {
 	uint32_t width, height, bricks_x, bricks_y;
 	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
 	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
+	uint32_t *left;   /* by brick, a bit a row: pixels may be left that are not whole */
 	uint8_t *wants;   /* by brick: how many levels are pulled from it */
 	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
 	size_t coarse_first[FILL_LEVELS], n_coarse;

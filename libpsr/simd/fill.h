@@ -336,33 +336,44 @@ static void fill_push(const struct fill_row *to, const struct fill_row *own, con
 	}
 }
 
-static uint32_t list_turn(uint16_t *place, const uint16_t *turn, uint32_t first, uint32_t n)
+/* Lists the block's pixels whose turn it is; takes its bit out where no other is left. */
+static uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn, const uint16_t *weight, uint32_t first,
+                           uint32_t n)
 {
-	uint32_t n_places = 0;
+	uint32_t n_places = 0, n_partial = 0;
 	for (uint32_t x = 0; x < n; x++) {
 		place[n_places] = (uint16_t)(first + x);
 		n_places += turn[x] & 1;
+		n_partial += weight[x] < GAPS_WHOLE;
 	}
+	*left &= ~(n_places == n_partial ? bit : 0);
 	return n_places;
 }
 
-static uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, const struct fill_row *was, const struct fill_row *own,
-                                  const struct fill_row *beside, uint32_t n, float scale, float offset)
+static uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
+                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
 	const struct fill_row out = *to, in = *was, parents = *own, others = *beside;
 	uint16_t turn[2 * FILL_BLOCK];
-	uint32_t x = 0, n_places = 0;
-	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK)
-		if (has_partial(in.weight + 2 * x, 2 * FILL_BLOCK) &&
-		    push_block(row_from(out, 2 * x, 1, 0), turn, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1),
-		               row_from(others, x, 1, 1), 1, scale, offset))
-			n_places += list_turn(place + n_places, turn, 2 * x, 2 * FILL_BLOCK);
-	if (x < n && has_partial(in.weight + 2 * x, 2 * (n - x))) {
-		struct push_rows rows;
-		copy_rows(&rows, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n - x);
-		if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 1, scale, offset)) {
-			copy_back(row_from(out, 2 * x, 1, 0), &rows.copy[3], 2 * (n - x), 1, 0);
-			n_places += list_turn(place + n_places, turn, 2 * x, 2 * (n - x));
+	uint32_t n_places = 0;
+	for (uint32_t x = 0; x < n; x += FILL_BLOCK, left++) {
+		const uint32_t n_block = n - x < FILL_BLOCK ? n - x : FILL_BLOCK;
+		const uint16_t *weight = in.weight + 2 * x;
+		if (!(*left & bit))
+			continue;
+		if (!has_partial(weight, 2 * n_block)) {
+			*left &= ~bit;
+		} else if (n_block == FILL_BLOCK) {
+			if (push_block(row_from(out, 2 * x, 1, 0), turn, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1),
+			               row_from(others, x, 1, 1), 1, scale, offset))
+				n_places += list_block(place + n_places, left, bit, turn, weight, 2 * x, 2 * FILL_BLOCK);
+		} else {
+			struct push_rows rows;
+			copy_rows(&rows, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n_block);
+			if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 1, scale, offset)) {
+				copy_back(row_from(out, 2 * x, 1, 0), &rows.copy[3], 2 * n_block, 1, 0);
+				n_places += list_block(place + n_places, left, bit, turn, weight, 2 * x, 2 * n_block);
+			}
 		}
 	}
 	return n_places;

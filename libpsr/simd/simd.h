@@ -317,11 +317,13 @@ typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *
 typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
                           float scale, float offset);
 
-/* The same for pixels, in `was`, which stay as they are and whose z has no meaning. Lists the places, 0..2n-1, of those that would
- * become whole, with room for one more; `to` has their colors and, whatever their weights are, the depths that are interpolated,
- * and elsewhere anything. Returns how many there are. */
-typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place, const struct fill_row *was, const struct fill_row *own,
-                                      const struct fill_row *beside, uint32_t n, float scale, float offset);
+/* The same for pixels, in `was`, which stay as they are and whose z has no meaning: in those blocks i of FILL_BLOCK parents whose
+ * left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the places, 0..2n-1, of those that
+ * would become whole, with room for one more; `to` has their colors and, whatever their weights are, the depths that are
+ * interpolated, and elsewhere anything. Returns how many there are. */
+typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
+                                      const struct fill_row *was, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                                      float scale, float offset);
 
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
