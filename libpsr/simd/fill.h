@@ -33,7 +33,7 @@ static inline __attribute__((always_inline)) struct fill_row row_from(struct fil
 		                      has_weight ? row.weight + x : NULL, row.z + x };
 }
 
-static void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
+static inline void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
 {
 	for (uint32_t i = 0; i < 2 * FILL_BLOCK + 2; i++)
 		to[i] = outside;
@@ -136,7 +136,7 @@ static inline __attribute__((always_inline)) int32_t pull_block(struct fill_row 
 }
 
 /* With whole cells beyond them. */
-static struct fill_row copy_row(struct block_row *to, struct fill_row from, uint32_t n, int has_colors)
+static inline struct fill_row copy_row(struct block_row *to, struct fill_row from, uint32_t n, int has_colors)
 {
 	copy_values(to->weight, from.weight, n, GAPS_WHOLE);
 	memset(to->z, 0, sizeof to->z);
@@ -149,7 +149,7 @@ static struct fill_row copy_row(struct block_row *to, struct fill_row from, uint
 	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
 }
 
-static void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors, int has_weight)
+static inline void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors, int has_weight)
 {
 	memcpy(to.z, from->z, n * sizeof *to.z);
 	if (has_weight)
@@ -183,7 +183,7 @@ static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row t
 	return (uint16_t)least;
 }
 
-static uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
+static inline uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
                           int is_picture, float scale, float offset)
 {
 	if (!to->r)
@@ -309,7 +309,7 @@ struct push_rows {
 	struct block_row copy[4];
 };
 
-static void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside, uint32_t n)
+static inline void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside, uint32_t n)
 {
 	to->was = copy_row(&to->copy[0], was, 2 * n, 1);
 	to->own = row_from(copy_row(&to->copy[1], row_from(own, -1, 1, 1), n + 2, 1), 1, 1, 1);
@@ -317,7 +317,7 @@ static void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row
 	to->to = (struct fill_row){ to->copy[3].r, to->copy[3].g, to->copy[3].b, to->copy[3].weight, to->copy[3].z };
 }
 
-static void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
+static inline void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
                       float offset)
 {
 	const struct fill_row cells = *to, parents = *own, others = *beside;
@@ -337,7 +337,7 @@ static void fill_push(const struct fill_row *to, const struct fill_row *own, con
 }
 
 /* Lists the block's pixels whose turn it is; takes its bit out where no other is left. */
-static uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn, const uint16_t *weight, uint32_t first,
+static inline uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn, const uint16_t *weight, uint32_t first,
                            uint32_t n)
 {
 	uint32_t n_places = 0, n_partial = 0;
@@ -350,7 +350,7 @@ static uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const 
 	return n_places;
 }
 
-static uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
+static inline uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
                                   const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
 	const struct fill_row out = *to, in = *was, parents = *own, others = *beside;

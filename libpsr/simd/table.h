@@ -1,5 +1,5 @@
 /* The loops, and the table of one instruction set, for c/, avx2/ and avx512/. Arguments: the kernel that warps, and a macro that
- * names the variant of kernels of strips that an instruction set may have written by hand. */
+ * names the variant of those kernels that an instruction set may have written by hand. */
 #include "simd/cull.h"
 #include "simd/fill.h"
 #include "simd/gaps.h"
@@ -10,26 +10,26 @@
 #include "simd/strip.h"
 #include "simd/warp_clear.h"
 
-#define SIMD_TABLE(warp_kernel, STRIP_KERNEL) { \
+#define SIMD_TABLE(warp_kernel, KERNEL) { \
 	.cull = cull,                                  \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
 	.warp_cells = warp_cells,                      \
 	.warp = warp_kernel,                           \
-	.strip_list = STRIP_KERNEL(strip_list),        \
-	.strip_find = STRIP_KERNEL(strip_find),        \
-	.strip_read = STRIP_KERNEL(strip_read),        \
+	.strip_list = KERNEL(strip_list),              \
+	.strip_find = KERNEL(strip_find),              \
+	.strip_read = KERNEL(strip_read),              \
 	.strip_resolve = strip_resolve,                \
 	.strip_shadow = strip_shadow,                  \
 	.strip_light = strip_light,                    \
 	.strip_lit = strip_lit,                        \
 	.strip_color = strip_color,                    \
-	.strip_write = STRIP_KERNEL(strip_write),      \
+	.strip_write = KERNEL(strip_write),            \
 	.depth_row = depth_row,                        \
 	.gaps = gaps,                                  \
-	.fill_pull = fill_pull,                        \
-	.fill_push = fill_push,                        \
-	.fill_push_picture = fill_push_picture,        \
+	.fill_pull = KERNEL(fill_pull),                \
+	.fill_push = KERNEL(fill_push),                \
+	.fill_push_picture = KERNEL(fill_push_picture),\
 	.fill_depths = fill_depths,                    \
 	.smooth = smooth,                              \
 }

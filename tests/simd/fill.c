@@ -70,17 +70,20 @@ static void push(struct check *c, uint32_t n, int is_picture, int is_spoilt)
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
 	const uint32_t n_blocks = (n + FILL_BLOCK - 1) / FILL_BLOCK, bit = 1u << check_below(c, 32);
 	uint16_t *place = check_out(c, 2 * (size_t)n + 1, sizeof *place);
-	uint32_t *left = check_out(c, n_blocks, sizeof *left);
+	uint32_t *left = check_out(c, n_blocks, sizeof *left), n_places = 0;
 	for (uint32_t i = 0; i < n_blocks; i++)
 		left[i] |= c->is_bench ? bit : 0;
 	check_units(c, 2 * n);
 	while (check_next(c)) {
 		if (is_picture)
-			check_result(c, c->simd->fill_push_picture(&to, place, left, bit, &was, &own, &beside, n, scale, offset));
+			n_places = c->simd->fill_push_picture(&to, place, left, bit, &was, &own, &beside, n, scale, offset);
 		else
 			c->simd->fill_push(&to, &own, &beside, n, scale, offset);
-		if (!c->is_bench)
-			check_settle(to.z, 2 * (size_t)n);
+		check_result(c, n_places);
+		if (c->is_bench)
+			continue;
+		check_settle(to.z, 2 * (size_t)n);
+		memset(place + n_places, 0, (2 * (size_t)n + 1 - n_places) * sizeof *place); /* no places */
 	}
 }
 

@@ -1,0 +1,281 @@
+/* Pull and push of rows, 16 coarser cells and their 32 children at a time; the last ones by masks. */
+#include <immintrin.h>
+#include <math.h>
+#include "simd/kernels.h"
+
+#define PARENTS 16
+
+/* Bits 2i and 2i + 1 from bits i of two masks. */
+static inline __mmask32 interleave(__mmask16 left, __mmask16 right)
+{
+	return _pdep_u32(left, 0x55555555) | _pdep_u32(right, 0xaaaaaaaa);
+}
+
+/* A share of 0..256 in 256 of 16-bit values. */
+struct share {
+	__m512i factor;
+	__mmask32 all;
+};
+
+static inline struct share share_of(__m512i share)
+{
+	return (struct share){ _mm512_slli_epi16(share, 8), _mm512_cmpeq_epi16_mask(share, _mm512_set1_epi16(GAPS_WHOLE)) };
+}
+
+static inline __m512i part_of(__m512i value, struct share share)
+{
+	return _mm512_mask_mov_epi16(_mm512_mulhi_epu16(value, share.factor), share.all, value);
+}
+
+static inline __m512i load_children(__mmask32 k, const uint16_t *from)
+{
+	return _mm512_maskz_loadu_epi16(k, from);
+}
+
+static inline __m512i load_parents(__mmask16 k, const uint16_t *from)
+{
+	return _mm512_cvtepu16_epi32(_mm256_maskz_loadu_epi16(k, from));
+}
+
+/* ---- pull ---- */
+
+struct pull_shares {
+	struct share upper, lower;   /* from the picture */
+	__mmask32 above, below;      /* from a level: all or nothing */
+	__m512 divisor, inverse;
+};
+
+/* As pull_channel of fill.h; the remainder of a division is whole and less than 2^24 in size, and thus a float. */
+static inline void pull_channel(uint16_t *to, __mmask16 k, __mmask32 kk, const uint16_t *upper, const uint16_t *lower,
+                                const struct pull_shares *s, int is_picture)
+{
+	const __m512i low = _mm512_set1_epi32(0xffff);
+	const __m512i above = is_picture ? part_of(load_children(kk, upper), s->upper) : load_children(s->above & kk, upper);
+	const __m512i below = is_picture ? part_of(load_children(kk, lower), s->lower) : load_children(s->below & kk, lower);
+	const __m512i left = _mm512_add_epi32(_mm512_and_si512(above, low), _mm512_and_si512(below, low));
+	const __m512i right = _mm512_add_epi32(_mm512_srli_epi32(above, 16), _mm512_srli_epi32(below, 16));
+	const __m512 sum = _mm512_cvtepi32_ps(_mm512_add_epi32(left, right));
+	const __m512i quotient = _mm512_cvttps_epi32(_mm512_mul_ps(sum, s->inverse));
+	const __m512 rest = _mm512_fnmadd_ps(_mm512_cvtepi32_ps(quotient), s->divisor, _mm512_mul_ps(sum, _mm512_set1_ps(256)));
+	const __mmask16 is_more = _mm512_cmp_ps_mask(rest, s->divisor, _CMP_GE_OQ);
+	const __m512i value = _mm512_mask_add_epi32(quotient, is_more, quotient, _mm512_set1_epi32(1));
+	_mm256_mask_storeu_epi16(to, k, _mm512_cvtepi32_epi16(value));
+}
+
+static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill_row *to, const struct fill_row *upper,
+                                                               const struct fill_row *lower, uint32_t n, int has_colors,
+                                                               int is_picture, float scale, float offset)
+{
+	const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+	const __m512i odd = _mm512_add_epi32(even, _mm512_set1_epi32(1)), low = _mm512_set1_epi32(0xffff);
+	const __m512i whole = _mm512_set1_epi32(GAPS_WHOLE);
+	const __m512 nothing = _mm512_set1_ps(INFINITY);
+	__m512i least = whole;
+	for (uint32_t x = 0; x < n; x += PARENTS) {
+		const __mmask16 k = (__mmask16)_bzhi_u32(0xffff, n - x < PARENTS ? n - x : PARENTS);
+		const __mmask32 kk = interleave(k, k);
+		__m512 z[4], nearest = nothing, sum_z = _mm512_setzero_ps();
+		__m512i w[4], sum = _mm512_setzero_si512();
+		__mmask16 near[4];
+		for (int i = 0; i < 2; i++) {
+			const struct fill_row *row = i ? lower : upper;
+			const __m512 a = _mm512_maskz_loadu_ps((__mmask16)kk, row->z + 2 * x);
+			const __m512 b = _mm512_maskz_loadu_ps((__mmask16)(kk >> 16), row->z + 2 * x + 16);
+			const __m512i weight = load_children(kk, row->weight + 2 * x);
+			z[2 * i] = _mm512_permutex2var_ps(a, even, b);
+			z[2 * i + 1] = _mm512_permutex2var_ps(a, odd, b);
+			w[2 * i] = _mm512_and_si512(weight, low);
+			w[2 * i + 1] = _mm512_srli_epi32(weight, 16);
+		}
+		for (int i = 0; i < 4; i++) {
+			near[i] = _mm512_test_epi32_mask(w[i], w[i]);
+			nearest = _mm512_mask_min_ps(nearest, near[i], z[i], nearest);
+		}
+		const __m512 limit = _mm512_add_ps(_mm512_mul_ps(nearest, _mm512_set1_ps(scale)), _mm512_set1_ps(offset));
+		for (int i = 0; i < 4; i++) {
+			near[i] = _mm512_mask_cmp_ps_mask(near[i], z[i], limit, _CMP_LE_OQ);
+			sum_z = _mm512_mask_add_ps(sum_z, near[i], sum_z, _mm512_mul_ps(_mm512_cvtepi32_ps(w[i]), z[i]));
+			sum = _mm512_mask_add_epi32(sum, near[i], sum, w[i]);
+		}
+		least = _mm512_mask_min_epi32(least, k, least, sum);
+		const __m512 depth = _mm512_mask_div_ps(nothing, _mm512_test_epi32_mask(sum, sum), sum_z, _mm512_cvtepi32_ps(sum));
+		_mm512_mask_storeu_ps(to->z + x, k, depth);
+		_mm256_mask_storeu_epi16(to->weight + x, k, _mm512_cvtepi32_epi16(_mm512_min_epi32(sum, whole)));
+		if (!has_colors)
+			continue;
+		struct pull_shares s;
+		for (int i = 0; i < 4; i++)
+			w[i] = _mm512_maskz_mov_epi32(near[i], w[i]);
+		s.upper = share_of(_mm512_or_si512(w[0], _mm512_slli_epi32(w[1], 16)));
+		s.lower = share_of(_mm512_or_si512(w[2], _mm512_slli_epi32(w[3], 16)));
+		s.above = interleave(near[0], near[1]);
+		s.below = interleave(near[2], near[3]);
+		s.divisor = _mm512_cvtepi32_ps(_mm512_max_epi32(sum, whole));
+		s.inverse = _mm512_div_ps(_mm512_set1_ps(256 - 0x1p-12f), s.divisor);
+		pull_channel(to->r + x, k, kk, upper->r + 2 * x, lower->r + 2 * x, &s, is_picture);
+		pull_channel(to->g + x, k, kk, upper->g + 2 * x, lower->g + 2 * x, &s, is_picture);
+		pull_channel(to->b + x, k, kk, upper->b + 2 * x, lower->b + 2 * x, &s, is_picture);
+	}
+	return (uint16_t)_mm512_reduce_min_epi32(least);
+}
+
+uint16_t fill_pull_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
+                          int is_picture, float scale, float offset)
+{
+	if (!to->r)
+		return pull_row(to, upper, lower, n, 0, 0, scale, offset);
+	return is_picture ? pull_row(to, upper, lower, n, 1, 1, scale, offset) : pull_row(to, upper, lower, n, 1, 0, scale, offset);
+}
+
+/* ---- push ---- */
+
+/* What children on one side take from their parents, from the parents' neighbors to that side and from those above or below. */
+struct push_shares {
+	__mmask16 own, side, beside;
+	__m512 inverse, z;
+};
+
+static inline struct push_shares share_parents(__m512 own, __m512 side, __m512 beside, __m512 scale, __m512 offset)
+{
+	const __m512 one = _mm512_set1_ps(1);
+	const __m512 inverses = _mm512_setr_ps(0.25f, 1, 0.5f, 1.0f / 3, 0.25f, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
+	struct push_shares s;
+	const __m512 nearest = _mm512_min_ps(beside, _mm512_min_ps(side, _mm512_min_ps(own, _mm512_set1_ps(INFINITY))));
+	const __m512 limit = _mm512_add_ps(_mm512_mul_ps(nearest, scale), offset);
+	s.own = _mm512_cmp_ps_mask(own, limit, _CMP_LE_OQ);
+	s.side = _mm512_cmp_ps_mask(side, limit, _CMP_LE_OQ);
+	s.beside = _mm512_cmp_ps_mask(beside, limit, _CMP_LE_OQ);
+	__m512 n = _mm512_maskz_mov_ps(s.own, _mm512_set1_ps(2)), z = _mm512_maskz_add_ps(s.own, own, own);
+	n = _mm512_mask_add_ps(n, s.side, n, one);
+	z = _mm512_mask_add_ps(z, s.side, z, side);
+	n = _mm512_mask_add_ps(n, s.beside, n, one);
+	z = _mm512_mask_add_ps(z, s.beside, z, beside);
+	s.inverse = _mm512_permutexvar_ps(_mm512_cvttps_epi32(n), inverses);
+	s.z = _mm512_div_ps(z, n);
+	return s;
+}
+
+static inline __m512i interpolate(const struct push_shares *s, __m512i own, __m512i side, __m512i beside)
+{
+	__m512i sum = _mm512_maskz_slli_epi32(s->own, own, 1);
+	sum = _mm512_mask_add_epi32(sum, s->side, sum, side);
+	sum = _mm512_mask_add_epi32(sum, s->beside, sum, beside);
+	const __m512 value = _mm512_mul_ps(_mm512_cvtepi32_ps(sum), s->inverse);
+	return _mm512_cvttps_epi32(_mm512_add_ps(value, _mm512_set1_ps(0.125f)));
+}
+
+/* 32 cells or pixels under way. */
+struct push {
+	__mmask16 k;
+	__mmask32 kk, turn;
+	__m512i weight;
+	struct push_shares left, right;
+	struct share own, rest;
+};
+
+/* Whose turn it is; k and kk are set. */
+static inline void find_turn(struct push *p, const uint16_t *weight, const uint16_t *own, const uint16_t *beside)
+{
+	const __m256i whole = _mm256_set1_epi16(GAPS_WHOLE);
+	p->weight = _mm512_maskz_loadu_epi16(p->kk, weight);
+	p->turn = _mm512_mask_cmplt_epu16_mask(p->kk, p->weight, _mm512_set1_epi16(GAPS_WHOLE));
+	if (!p->turn)
+		return;
+	const __mmask16 both = _mm256_mask_cmpeq_epi16_mask(_mm256_cmpeq_epi16_mask(_mm256_maskz_loadu_epi16(p->k, own), whole),
+	                                                    _mm256_maskz_loadu_epi16(p->k, beside), whole);
+	const __mmask16 left = _mm256_mask_cmpeq_epi16_mask(both, _mm256_maskz_loadu_epi16(p->k, own - 1), whole);
+	const __mmask16 right = _mm256_mask_cmpeq_epi16_mask(both, _mm256_maskz_loadu_epi16(p->k, own + 1), whole);
+	p->turn &= interleave(left, right);
+}
+
+static inline void find_shares(struct push *p, const float *own, const float *beside, float scale, float offset)
+{
+	const __m512 by = _mm512_set1_ps(scale), plus = _mm512_set1_ps(offset);
+	const __m512 a = _mm512_maskz_loadu_ps(p->k, own), c = _mm512_maskz_loadu_ps(p->k, beside);
+	p->left = share_parents(a, _mm512_maskz_loadu_ps(p->k, own - 1), c, by, plus);
+	p->right = share_parents(a, _mm512_maskz_loadu_ps(p->k, own + 1), c, by, plus);
+	p->own = share_of(p->weight);
+	p->rest = share_of(_mm512_sub_epi16(_mm512_set1_epi16(GAPS_WHOLE), p->weight));
+}
+
+/* What parents give to a channel of those whose turn it is. */
+static inline __m512i push_channel(const struct push *p, const uint16_t *own, const uint16_t *beside)
+{
+	const __m512i a = load_parents(p->k, own), c = load_parents(p->k, beside);
+	const __m512i left = interpolate(&p->left, a, load_parents(p->k, own - 1), c);
+	const __m512i right = interpolate(&p->right, a, load_parents(p->k, own + 1), c);
+	return _mm512_maskz_mov_epi16(p->turn, part_of(_mm512_or_si512(left, _mm512_slli_epi32(right, 16)), p->rest));
+}
+
+static inline void push_cells(const struct push *p, uint16_t *cell, const uint16_t *own, const uint16_t *beside)
+{
+	const __m512i value = _mm512_add_epi16(load_children(p->turn, cell), push_channel(p, own, beside));
+	_mm512_mask_storeu_epi16(cell, p->turn, value);
+}
+
+static inline void push_pixels(const struct push *p, uint16_t *to, const uint16_t *was, const uint16_t *own, const uint16_t *beside)
+{
+	const __m512i value = _mm512_add_epi16(part_of(load_children(p->kk, was), p->own), push_channel(p, own, beside));
+	_mm512_mask_storeu_epi16(to, p->kk, value);
+}
+
+static inline void push_depths(const struct push *p, float *to, __mmask32 k)
+{
+	const __m512i first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+	const __m512i second = _mm512_add_epi32(first, _mm512_set1_epi32(8));
+	_mm512_mask_storeu_ps(to, (__mmask16)k, _mm512_permutex2var_ps(p->left.z, first, p->right.z));
+	_mm512_mask_storeu_ps(to + 16, (__mmask16)(k >> 16), _mm512_permutex2var_ps(p->left.z, second, p->right.z));
+}
+
+static inline void set_masks(struct push *p, uint32_t n)
+{
+	p->k = (__mmask16)_bzhi_u32(0xffff, n < PARENTS ? n : PARENTS);
+	p->kk = interleave(p->k, p->k);
+}
+
+void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
+                      float offset)
+{
+	for (uint32_t x = 0; x < n; x += PARENTS) {
+		struct push p;
+		set_masks(&p, n - x);
+		find_turn(&p, to->weight + 2 * x, own->weight + x, beside->weight + x);
+		if (!p.turn)
+			continue;
+		find_shares(&p, own->z + x, beside->z + x, scale, offset);
+		push_cells(&p, to->r + 2 * x, own->r + x, beside->r + x);
+		push_cells(&p, to->g + 2 * x, own->g + x, beside->g + x);
+		push_cells(&p, to->b + 2 * x, own->b + x, beside->b + x);
+		push_depths(&p, to->z + 2 * x, _mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
+		_mm512_mask_storeu_epi16(to->weight + 2 * x, p.turn, _mm512_set1_epi16(GAPS_WHOLE));
+	}
+}
+
+uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
+                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale, float offset)
+{
+	_Alignas(64) static const uint16_t column[32] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
+		                                              22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
+	uint32_t n_places = 0;
+	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
+		struct push p;
+		if (!(*left & bit))
+			continue;
+		set_masks(&p, n - x);
+		find_turn(&p, was->weight + 2 * x, own->weight + x, beside->weight + x);
+		const __mmask32 partial = _mm512_mask_cmplt_epu16_mask(p.kk, p.weight, _mm512_set1_epi16(GAPS_WHOLE));
+		*left &= ~(partial == p.turn ? bit : 0);
+		if (!p.turn)
+			continue;
+		find_shares(&p, own->z + x, beside->z + x, scale, offset);
+		push_pixels(&p, to->r + 2 * x, was->r + 2 * x, own->r + x, beside->r + x);
+		push_pixels(&p, to->g + 2 * x, was->g + 2 * x, own->g + x, beside->g + x);
+		push_pixels(&p, to->b + 2 * x, was->b + 2 * x, own->b + x, beside->b + x);
+		push_depths(&p, to->z + 2 * x, p.kk);
+		const uint32_t n_turn = (uint32_t)__builtin_popcount(p.turn);
+		const __m512i columns = _mm512_add_epi16(_mm512_load_si512(column), _mm512_set1_epi16((short)(2 * x)));
+		_mm512_mask_storeu_epi16(place + n_places, _bzhi_u32(UINT32_MAX, n_turn), _mm512_maskz_compress_epi16(p.turn, columns));
+		n_places += n_turn;
+	}
+	return n_places;
+}
