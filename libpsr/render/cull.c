@@ -263,15 +263,11 @@ static void fill_chunk(int i, void *userdata)
 }
 
 /* Room for n elements, and a quarter more, so that the next frame's will do; what was there is gone. */
-static void *grow(void *array, size_t *capacity, size_t n, size_t size)
+static void *room_for(void *array, size_t *capacity, size_t n, size_t size)
 {
-	if (n <= *capacity && array)
+	if (array && n * size <= *capacity)
 		return array;
-	psr_free(array);
-	n += n / 4;
-	array = psr_alloc_array(n, size);
-	*capacity = array ? n : 0;
-	return array;
+	return psr_grow_huge(array, capacity, (n + n / 4 + 1) * size);
 }
 
 static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int store)
@@ -308,8 +304,8 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 			return PSR_ERR_LIMIT;
 	}
 	bins->tile_begin[cull->n_tiles] = (uint32_t)total;
-	bins->entry = grow(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
-	bins->order = grow(bins->order, &bins->order_capacity, total, sizeof *bins->order);
+	bins->entry = room_for(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
+	bins->order = room_for(bins->order, &bins->order_capacity, total, sizeof *bins->order);
 	return bins->entry && bins->order ? PSR_OK : PSR_ERR_MEMORY;
 }
 
@@ -333,12 +329,12 @@ static void note_tests(const struct plan *plan, struct psr_report *report, uint6
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
 {
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
-	bins->chunk = grow(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
-	bins->hit = grow(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
-	bins->group = grow(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
-	bins->count = grow(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
-	bins->tile_begin = grow(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
-	bins->masks = grow(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
+	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
+	bins->hit = room_for(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
+	bins->group = room_for(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
+	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
+	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
+	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
 	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
 		return PSR_ERR_MEMORY;
 	make_chunks(bins, plan, 1);
@@ -381,21 +377,19 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 
 size_t bins_bytes(const struct bins *bins)
 {
-	return bins->entry_capacity * sizeof *bins->entry + bins->chunk_capacity * sizeof *bins->chunk +
-	       bins->hit_capacity * sizeof *bins->hit + bins->order_capacity * sizeof *bins->order +
-	       bins->masks_capacity * sizeof *bins->masks + bins->group_capacity * sizeof *bins->group +
-	       bins->count_capacity * sizeof *bins->count + bins->tile_capacity * sizeof *bins->tile_begin;
+	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity + bins->masks_capacity +
+	       bins->group_capacity + bins->count_capacity + bins->tile_capacity;
 }
 
 void bins_clear(struct bins *bins)
 {
-	psr_free(bins->entry);
-	psr_free(bins->tile_begin);
-	psr_free(bins->chunk);
-	psr_free(bins->hit);
-	psr_free(bins->order);
-	psr_free(bins->masks);
-	psr_free(bins->group);
-	psr_free(bins->count);
+	psr_free_huge(bins->entry, bins->entry_capacity);
+	psr_free_huge(bins->tile_begin, bins->tile_capacity);
+	psr_free_huge(bins->chunk, bins->chunk_capacity);
+	psr_free_huge(bins->hit, bins->hit_capacity);
+	psr_free_huge(bins->order, bins->order_capacity);
+	psr_free_huge(bins->masks, bins->masks_capacity);
+	psr_free_huge(bins->group, bins->group_capacity);
+	psr_free_huge(bins->count, bins->count_capacity);
 	memset(bins, 0, sizeof *bins);
 }

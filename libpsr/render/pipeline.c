@@ -125,8 +125,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	fill_clear(&r->fill);
 	smooth_clear(&r->smooth);
 	psr_free_huge(r->pixels, r->pixels_size);
-	psr_free(r->lit);
-	psr_free(r->counters);
+	psr_free_huge(r->lit, r->lit_size);
+	psr_free_huge(r->counters, r->counters_size);
 	free(r);
 }
 
@@ -134,16 +134,6 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
 	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size + r->lit_size +
 	       r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
-}
-
-static void *grow(void *memory, size_t *capacity, size_t size)
-{
-	if (memory && size <= *capacity)
-		return memory;
-	psr_free(memory);
-	memory = psr_alloc_array(size, 1);
-	*capacity = memory ? size : 0;
-	return memory;
 }
 
 static uint32_t n_rows(const struct plan *plan)
@@ -181,7 +171,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	}
 	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, n_words * 8 + area * 4 * 2 + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
-	r->counters = grow(r->counters, &r->counters_size, n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
+	r->counters = psr_grow_huge(r->counters, &r->counters_size, n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
 		return PSR_ERR_MEMORY;
 	r->tile = r->counters;
@@ -387,7 +377,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 
 	const enum psr_why table = r->plan.is_full ? PSR_WHY_OFF : shade_wants_table(&r->plan);
 	if (table == PSR_WHY_RAN) {
-		r->lit = grow(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
+		r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
 		if (!r->lit)
 			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
 		shade_tabulate(r->simd, &r->plan, pool, r->lit);

@@ -191,13 +191,9 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
 	size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light) +
 	              scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
-	if (size > plan->storage_size) {
-		psr_free(plan->storage);
-		plan->storage = psr_alloc_array(size, 1);
-		plan->storage_size = plan->storage ? size : 0;
-		if (!plan->storage)
-			return PSR_ERR_MEMORY;
-	}
+	plan->storage = psr_grow_huge(plan->storage, &plan->storage_size, size + 1);
+	if (!plan->storage)
+		return PSR_ERR_MEMORY;
 	struct warp_lattice *lattice = plan->storage;
 	plan->instance = (struct plan_instance *)(lattice + n_projections);
 	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
@@ -302,7 +298,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 
 void plan_clear(struct plan *plan)
 {
-	psr_free(plan->storage);
+	psr_free_huge(plan->storage, plan->storage_size);
 	memset(plan, 0, sizeof *plan);
 }
 

@@ -95,7 +95,7 @@ struct cull_hit {
 	uint8_t tile_x0, tile_x1, tile_y0, tile_y1; /* inclusive */
 };
 
-struct bins {
+struct bins { /* capacities are in bytes */
 	struct bin_entry *entry;
 	size_t entry_capacity;
 	uint32_t *tile_begin;    /* n_tiles + 1 */
