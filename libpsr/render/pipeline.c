@@ -327,10 +327,11 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 		all.resolve_ns += r->shade[i].resolve_ns;
 		all.shade_ns += r->shade[i].shade_ns;
 	}
-	const unsigned needs = r->plan.view.needs;
-	effect_note(report, PSR_EFFECT_TWO_SIDED, needs & STRIP_TWO_SIDED ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_pixels);
-	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_pixels);
-	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : PSR_WHY_NOTHING, all.n_specular);
+	const unsigned needs = r->frame->rgb ? r->plan.view.needs : 0;
+	const enum psr_why none = r->frame->rgb ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	effect_note(report, PSR_EFFECT_TWO_SIDED, needs & STRIP_TWO_SIDED ? PSR_WHY_RAN : none, all.n_pixels);
+	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : none, all.n_pixels);
+	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : none, all.n_specular);
 	const double spent = (double)(all.resolve_ns + all.shade_ns);
 	report->n_covered = report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = all.n_pixels;
 	report->ns[PSR_STAGE_RESOLVE] = spent > 0 ? (uint64_t)((double)all.resolve_ns / spent * (double)wall) : 0;
@@ -375,7 +376,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
 	start = end;
 
-	const enum psr_why table = r->plan.is_full ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+	const enum psr_why table = r->plan.is_full || !frame->rgb ? PSR_WHY_OFF : shade_wants_table(&r->plan);
 	if (table == PSR_WHY_RAN) {
 		r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
 		if (!r->lit)

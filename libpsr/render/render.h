@@ -172,7 +172,7 @@ struct shade_target {
 };
 
 /* Gives the pixels of rows y0..y1-1, at least one, their colours: samples of weight above 0, lit, and the background where
- * none is. `weight` is of the whole picture. Adds to the counts. */
+ * none is; without rgb, counts samples alone. `weight` is of the whole picture. Adds to the counts. */
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
                 const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts);
 

@@ -27,7 +27,8 @@ struct tabulating {
 static void tabulate_part(int part, void *userdata)
 {
 	const struct tabulating *t = userdata;
-	t->simd->strip_lit(t->lit, &t->plan->view, t->plan->light, t->plan->n_lights, t->plan->ambient, (uint32_t)part * STRIP, STRIP);
+	const struct plan *plan = t->plan;
+	t->simd->strip_lit(t->lit, &plan->view, plan->light, plan->n_lights, plan->ambient, (uint32_t)part * STRIP, STRIP);
 }
 
 void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
@@ -46,7 +47,7 @@ static void add_light(const struct simd *simd, const struct plan *plan, struct s
 		simd->strip_light(strip, &plan->light[l], reaches);
 }
 
-_Static_assert(STRIP == TILE_WIDTH, "a strip lies in one tile");
+_Static_assert(TILE_WIDTH % STRIP == 0, "a strip lies in one tile");
 _Static_assert(STRIP_BRICK == BRICK, "what is wanted is counted in bricks");
 
 struct shading {
@@ -57,8 +58,8 @@ struct shading {
 	const uint16_t *weight;
 };
 
-/* Lists the samples of a strip, and asks the memory for them. */
-static void begin_strip(struct strip_pixels *pixels, const struct shading *s, uint32_t x, uint32_t y)
+/* Lists the samples of a strip, and returns their number. */
+static uint32_t list_strip(struct strip_pixels *pixels, const struct shading *s, uint32_t x, uint32_t y)
 {
 	const struct plan *plan = s->plan;
 	const uint32_t left = plan->width - x;
@@ -69,8 +70,13 @@ static void begin_strip(struct strip_pixels *pixels, const struct shading *s, ui
 	else
 		s->simd->strip_list(pixels, psr_zstack_row(s->stack, y) + x, s->weight + (size_t)y * plan->width + x,
 		                    left < STRIP ? left : STRIP);
-	if (pixels->n)
-		s->simd->strip_find(pixels, &plan->view);
+	return pixels->n;
+}
+
+static void begin_strip(struct strip_pixels *pixels, const struct shading *s, uint32_t x, uint32_t y)
+{
+	if (list_strip(pixels, s, x, y))
+		s->simd->strip_find(pixels, &s->plan->view);
 }
 
 static void light_strip(struct strip *strip, const struct shading *s)
@@ -101,6 +107,11 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
+	if (!target->rgb) {
+		for (uint32_t i = 0; i < n; i++)
+			counts->n_pixels += list_strip(&pixels[0], &shading, i % per_row * STRIP, y0 + i / per_row);
+		return;
+	}
 	begin_strip(&pixels[0], &shading, 0, y0);
 	for (uint32_t i = 0; i < n; i++) {
 		const int is_timed = (i % per_row + i / per_row) % TIMED_EVERY == 0;

@@ -198,13 +198,14 @@ struct strip_light {
 /* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): covered, x,
  * id, n. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
-/* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks are. Repeats
- * the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before another one is read. */
+/* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks
+ * are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before another
+ * one is read. */
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
-/* What else is needed of samples that are read: turned normals, positions, lines of sight. Clears the light to `ambient` and no
- * highlight. */
+/* What else is needed of samples that are read: turned normals, positions, lines of sight. Clears the light to `ambient`
+ * and no highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */

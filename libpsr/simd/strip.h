@@ -1,4 +1,5 @@
-/* Samples of strips and their pixels, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+/* Samples of strips and their pixels, as plain loops, which the compiler turns into vectors; compiled once for each
+ * ISA. */
 #include <string.h>
 #include "base/maths.h"
 #include "base/srgb.h"
@@ -85,7 +86,8 @@ static inline void strip_read(struct strip *strip, const struct strip_view *view
 		read_specular(strip, 0);
 }
 
-/* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one block. */
+/* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one
+ * block. */
 static void locate(struct strip *strip, const struct warp_instance *in, uint32_t first, uint32_t end)
 {
 	float *const to[3] = { strip->px, strip->py, strip->pz };

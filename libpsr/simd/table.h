@@ -1,5 +1,5 @@
-/* The loops, and the table of one instruction set, for c/, avx2/ and avx512/. Arguments: the kernel that warps, and a macro that
- * names the variant of those kernels that an instruction set may have written by hand. */
+/* The loops, and the table of one instruction set, for c/, avx2/ and avx512/. Arguments: the kernel that warps, and a
+ * macro that names the variant of those kernels that an instruction set may have written by hand. */
 #include "simd/cull.h"
 #include "simd/fill.h"
 #include "simd/gaps.h"

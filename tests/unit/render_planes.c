@@ -63,7 +63,7 @@ static void stage_clear(struct stage *s)
 		psr_model_unref(s->model[i]);
 }
 
-static struct planes *draw(const struct psr_scene *scene, int has_planes, int n_threads)
+static struct planes *draw_what(const struct psr_scene *scene, int has_color, int has_planes, int n_threads)
 {
 	struct planes *p = calloc(1, sizeof *p);
 	struct psr_renderer *renderer;
@@ -72,7 +72,7 @@ static struct planes *draw(const struct psr_scene *scene, int has_planes, int n_
 	struct psr_error err;
 
 	assert_non_null(p);
-	struct psr_frame frame = { .width = WIDTH, .height = HEIGHT, .rgb = p->rgb, .depth = p->depth };
+	struct psr_frame frame = { .width = WIDTH, .height = HEIGHT, .rgb = has_color ? p->rgb : NULL, .depth = p->depth };
 	if (has_planes) {
 		frame.normal = p->normal;
 		frame.id = p->id;
@@ -91,6 +91,11 @@ static struct planes *draw(const struct psr_scene *scene, int has_planes, int n_
 	p->report = frame.report;
 	memset(p->report.ns, 0, sizeof p->report.ns);
 	return p;
+}
+
+static struct planes *draw(const struct psr_scene *scene, int has_planes, int n_threads)
+{
+	return draw_what(scene, 1, has_planes, n_threads);
 }
 
 static int is_seen(const struct planes *p, int i)
@@ -385,6 +390,27 @@ static void an_empty_scene_is_background_in_every_plane(void **state)
 	stage_clear(&s);
 }
 
+static void without_color_the_other_planes_are_the_same_and_nothing_is_shaded(void **state)
+{
+	struct stage s;
+
+	(void)state;
+	stage_make(&s);
+	struct planes *all = draw(&s.scene, 1, 1), *bare = draw_what(&s.scene, 0, 1, 1);
+	assert_memory_equal(bare->depth, all->depth, sizeof all->depth);
+	assert_memory_equal(bare->normal, all->normal, sizeof all->normal);
+	assert_memory_equal(bare->id, all->id, sizeof all->id);
+	assert_memory_equal(bare->block, all->block, sizeof all->block);
+	assert_memory_equal(bare->weight, all->weight, sizeof all->weight);
+	assert_memory_equal(bare->words, all->words, sizeof all->words);
+	assert_int_equal(bare->report.n_covered, all->report.n_covered);
+	assert_int_equal(all->report.effect[PSR_EFFECT_TWO_SIDED].why, PSR_WHY_RAN);
+	assert_int_equal(bare->report.effect[PSR_EFFECT_TWO_SIDED].why, PSR_WHY_OFF);
+	free(all);
+	free(bare);
+	stage_clear(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -395,6 +421,7 @@ int main(void)
 		cmocka_unit_test(the_depth_level_of_a_block_is_that_of_its_magnification),
 		cmocka_unit_test(weights_count_what_the_report_counts),
 		cmocka_unit_test(planes_change_neither_colors_nor_depth_and_no_thread_or_isa_changes_them),
+		cmocka_unit_test(without_color_the_other_planes_are_the_same_and_nothing_is_shaded),
 		cmocka_unit_test(an_empty_scene_is_background_in_every_plane),
 	};
 

@@ -122,7 +122,7 @@ struct psr_report {
 
 struct psr_frame {
 	uint32_t width, height;
-	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed */
+	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed; NULL to leave it out, and nothing is lit then */
 	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out */
 	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour and
 	 * depth may have been filled in. */

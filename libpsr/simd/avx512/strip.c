@@ -10,6 +10,8 @@ static inline uint64_t lowest(uint32_t n, uint32_t most)
 	return (UINT64_C(1) << (n < most ? n : most)) - 1;
 }
 
+#define AHEAD (2 * STRIP) /* words: those of the strip after the next */
+
 void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	const __m512i empty = _mm512_set1_epi64((long long)PSR_WORD_EMPTY);
@@ -19,13 +21,16 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 	_mm256_storeu_si256((__m256i *)p->covered, _mm256_setzero_si256());
 	for (uint32_t first = 0; first < n_pixels; first += 16) {
 		__mmask16 k = (__mmask16)lowest(n_pixels - first, 16);
+		_mm_prefetch((const char *)(word + first + AHEAD), _MM_HINT_T0);
+		_mm_prefetch((const char *)(word + first + AHEAD + 8), _MM_HINT_T0);
 		const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)k, word + first);
 		const __m512i high = _mm512_maskz_loadu_epi64((__mmask8)(k >> 8), word + first + 8);
-		const __mmask16 has_word = (__mmask16)(_mm512_cmpneq_epi64_mask(low, empty) | _mm512_cmpneq_epi64_mask(high, empty) << 8);
+		const __mmask8 has_low = _mm512_cmpneq_epi64_mask(low, empty), has_high = _mm512_cmpneq_epi64_mask(high, empty);
 		if (weight)
 			k = _mm256_mask_test_epi16_mask(k, _mm256_maskz_loadu_epi16(k, weight + first), _mm256_set1_epi16(-1));
-		k &= has_word;
-		const __m512i id = _mm512_inserti64x4(_mm512_castsi256_si512(_mm512_cvtepi64_epi32(low)), _mm512_cvtepi64_epi32(high), 1);
+		k &= (__mmask16)(has_low | has_high << 8);
+		const __m512i low_id = _mm512_castsi256_si512(_mm512_cvtepi64_epi32(low));
+		const __m512i id = _mm512_inserti64x4(low_id, _mm512_cvtepi64_epi32(high), 1);
 		_mm512_storeu_si512(p->id + n, _mm512_maskz_compress_epi32(k, id));
 		_mm256_storeu_si256((__m256i *)(p->x + n), _mm512_cvtepi32_epi16(_mm512_maskz_compress_epi32(k, x)));
 		covered[first / 16] = k;
@@ -37,12 +42,17 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 
 /* ---- find ---- */
 
+static CONSTANT_FLAGS __m256i gather_u32(__mmask8 k, const void *from, __m256i index, const int scale)
+{
+	return _mm256_mmask_i32gather_epi32(_mm256_setzero_si256(), k, index, from, scale);
+}
+
 /* Elements of arrays of bytes or of 16 bits, by the aligned words that they are in: no page is touched that has none of them. */
 static inline __m256i gather_u16(__mmask8 k, const uint16_t *from, __m256i index)
 {
 	const uintptr_t odd = (uintptr_t)from / sizeof *from % 2;
 	const __m256i at = _mm256_add_epi32(index, _mm256_set1_epi32((int)odd));
-	const __m256i word = _mm256_mmask_i32gather_epi32(_mm256_setzero_si256(), k, _mm256_srli_epi32(at, 1), from - odd, 4);
+	const __m256i word = gather_u32(k, from - odd, _mm256_srli_epi32(at, 1), 4);
 	const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(at, _mm256_set1_epi32(1)), 4);
 	return _mm256_and_si256(_mm256_srlv_epi32(word, shift), _mm256_set1_epi32(0xffff));
 }
@@ -51,7 +61,7 @@ static inline __m256i gather_u8(__mmask8 k, const uint8_t *from, __m256i index)
 {
 	const uintptr_t odd = (uintptr_t)from % 4;
 	const __m256i at = _mm256_add_epi32(index, _mm256_set1_epi32((int)odd));
-	const __m256i word = _mm256_mmask_i32gather_epi32(_mm256_setzero_si256(), k, _mm256_srli_epi32(at, 2), from - odd, 4);
+	const __m256i word = gather_u32(k, from - odd, _mm256_srli_epi32(at, 2), 4);
 	const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(at, _mm256_set1_epi32(3)), 3);
 	return _mm256_srlv_epi32(word, shift);
 }
@@ -60,24 +70,27 @@ static inline __m256i gather_u8(__mmask8 k, const uint8_t *from, __m256i index)
 static inline __m512i find_attributes(const struct psr_blocks *b, __mmask8 k, __m256i block, __m256i sample)
 {
 	_Static_assert(PSR_RUN_BLOCKS == 1 << 10 && sizeof *b->run == 8, "indices into runs");
-	const __m256i run = _mm256_mmask_i32gather_epi32(_mm256_setzero_si256(), k, _mm256_srli_epi32(block, 10), &b->run->attr_first, 8);
+	const __m256i run = gather_u32(k, &b->run->attr_first, _mm256_srli_epi32(block, 10), 8);
 	const __m256i first = _mm256_add_epi32(run, gather_u16(k, b->attr_offset, block));
 	const __m512i mask = _mm512_mask_i32gather_epi64(_mm512_setzero_si512(), k, block, b->mask, 8);
-	const __m512i below = _mm512_andnot_si512(_mm512_sllv_epi64(_mm512_set1_epi64(-1), _mm512_cvtepu32_epi64(sample)), mask);
-	return _mm512_add_epi64(_mm512_cvtepu32_epi64(first), _mm512_popcnt_epi64(below));
+	const __m512i from = _mm512_sllv_epi64(_mm512_set1_epi64(-1), _mm512_cvtepu32_epi64(sample));
+	return _mm512_add_epi64(_mm512_cvtepu32_epi64(first), _mm512_popcnt_epi64(_mm512_andnot_si512(from, mask)));
 }
 
 void strip_find_avx512(struct strip_pixels *p, const struct strip_view *view)
 {
+	const __m256i in_block = _mm256_set1_epi32(PSR_BLOCK_SAMPLES - 1);
 	for (uint32_t first = 0, end; first < p->n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, p->n);
 		const struct psr_blocks *b = in->blocks;
+		const __m256i first_slot = _mm256_set1_epi32((int)in->first_slot);
+		const __m512i attributes = _mm512_set1_epi64((long long)(uintptr_t)b->attr);
 		for (uint32_t i = first; i < end; i += 8) {
 			const __mmask8 k = (__mmask8)lowest(end - i, 8);
 			const __m256i id = _mm256_loadu_si256((const __m256i *)(p->id + i));
-			const __m256i block = _mm256_sub_epi32(_mm256_srli_epi32(id, 6), _mm256_set1_epi32((int)in->first_slot));
-			const __m512i index = find_attributes(b, k, block, _mm256_and_si256(id, _mm256_set1_epi32(PSR_BLOCK_SAMPLES - 1)));
-			const __m512i at = _mm512_add_epi64(_mm512_set1_epi64((long long)(uintptr_t)b->attr), _mm512_slli_epi64(index, 3));
+			const __m256i block = _mm256_sub_epi32(_mm256_srli_epi32(id, 6), first_slot);
+			const __m512i index = find_attributes(b, k, block, _mm256_and_si256(id, in_block));
+			const __m512i at = _mm512_add_epi64(attributes, _mm512_slli_epi64(index, 3));
 			__m256i flags = _mm256_setzero_si256();
 			_mm512_mask_storeu_epi64(p->at + i, k, at);
 			if (view->needs & STRIP_TWO_SIDED)
