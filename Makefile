@@ -99,7 +99,7 @@ compile: $(PROGRAMS)
 $(BUILD)/libpsr/simd/c/%.o: ISA := -O3 -fno-trapping-math
 $(BUILD)/libpsr/simd/avx2/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
 $(BUILD)/libpsr/simd/avx512/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
-	-mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vbmi2 -mavx512vpopcntdq
+	-mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vbmi2
 
 $(BUILD)/%.c.o: %.c
 	@mkdir -p $(@D)

@@ -39,7 +39,7 @@ struct psr_renderer {
 	uint32_t clean_width, clean_height, clean_levels;
 	void *counters;
 	size_t counters_size;
-	uint8_t srgb[65536 + SRGB_PADDING]; /* of 16-bit linear light */
+	uint8_t srgb[65536];      /* of 16-bit linear light */
 };
 
 const char *psr_stage_name(enum psr_stage stage)

@@ -166,7 +166,7 @@ void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr
 
 struct shade_target {
 	uint8_t *rgb;         /* sRGB, 3 * width * height, or NULL */
-	const uint8_t *srgb;  /* 8 bits of 16-bit linear light, and SRGB_PADDING */
+	const uint8_t *srgb;  /* 8 bits of 16-bit linear light */
 	uint16_t *r, *g, *b;  /* linear light, width * height: written in bricks that are wanted */
 	const uint8_t *wants; /* one byte a brick, as of fill_wants; NULL: none */
 };

@@ -7,7 +7,6 @@
 warp_fn warp_c, warp_avx2, warp_avx512;
 /* The others of these: strip.h, fill.h. */
 strip_list_fn strip_list_avx512;
-strip_find_fn strip_find_avx512;
 strip_read_fn strip_read_avx512;
 strip_write_fn strip_write_avx512;
 fill_pull_fn fill_pull_avx512;

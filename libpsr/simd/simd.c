@@ -46,8 +46,7 @@ static int has(enum psr_isa isa)
 	case PSR_ISA_AVX512:
 		return avx2 && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
 		       __builtin_cpu_supports("avx512dq") && __builtin_cpu_supports("avx512vl") &&
-		       __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2") &&
-		       __builtin_cpu_supports("avx512vpopcntdq");
+		       __builtin_cpu_supports("avx512vbmi") && __builtin_cpu_supports("avx512vbmi2");
 	default:
 		break;
 	}

@@ -221,13 +221,11 @@ typedef void strip_color_fn(struct strip *strip);
 struct strip_target {
 	uint32_t width;
 	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
-	const uint8_t *srgb;    /* 8 bits of 16-bit linear light; readable for SRGB_PADDING bytes beyond the last */
+	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
 	const uint8_t *wants;   /* one byte for each STRIP_BRICK pixels of the part: 0 if not in linear light. NULL: none is */
 	uint16_t *r, *g, *b;    /* linear light; where pixels are not wanted, nothing is written */
 	uint16_t background[3]; /* linear */
 };
-
-#define SRGB_PADDING 3
 
 /* Colours of the n pixels of the part of the row: those of the samples of strip->pixels, if any, elsewhere the background. */
 typedef void strip_write_fn(const struct strip *strip, const struct strip_target *target, uint32_t n);

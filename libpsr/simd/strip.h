@@ -20,17 +20,17 @@ static inline void strip_list(struct strip_pixels *p, const uint64_t *word, cons
 	p->n = n;
 }
 
-static inline void strip_find(struct strip_pixels *p, const struct strip_view *view)
+static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
 	for (uint32_t i = 0, end; i < n;) {
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
-		const struct psr_blocks *b = in->blocks;
+		const struct psr_blocks b = *in->blocks;
 		for (; i < end; i++) {
 			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
-			const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
-			p->at[i] = b->attr + psr_blocks_attr_first(b, block) + __builtin_popcountll(below);
-			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b->flags[block] & PSR_BLOCK_TWO_SIDED : 0;
+			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);
+			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
+			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
 			__builtin_prefetch(p->at[i]);
 		}
 	}
@@ -64,18 +64,8 @@ static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
 
 static inline void strip_read(struct strip *strip, const struct strip_view *view)
 {
-	const struct strip_pixels *p = strip->pixels;
-	const uint32_t n = strip_whole(p->n);
-	uint64_t all = 0, common = ~UINT64_C(0);
-	for (uint32_t i = 0; i < n; i++) {
-		const uint64_t attr = *p->at[i];
-		strip->attr[i] = attr;
-		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
-		all |= attr;
-		common &= attr;
-	}
-	strip->n = n;
-	strip->is_specular = strip_wants_highlights(view, all);
+	uint64_t all, common;
+	read_attributes(&all, &common, strip, view);
 	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
 		read_diffuse(strip, 1);
 	else

@@ -22,10 +22,23 @@ static inline void repeat_last(struct strip_pixels *p)
 	}
 }
 
-/* `all`: attributes of a strip, or-ed. */
-static inline int strip_wants_highlights(const struct strip_view *view, uint64_t all)
+/* Attributes, normals, n and is_specular. *all and *common: attributes, or-ed and and-ed. */
+static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
 {
-	return (PSR_ATTR_SPECULAR(all) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
+	const struct strip_pixels *p = strip->pixels;
+	const uint32_t n = strip_whole(p->n);
+	uint64_t some = 0, each = ~UINT64_C(0);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint64_t attr = *p->at[i];
+		strip->attr[i] = attr;
+		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
+		some |= attr;
+		each &= attr;
+	}
+	strip->n = n;
+	strip->is_specular = (PSR_ATTR_SPECULAR(some) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
+	*all = some;
+	*common = each;
 }
 
 /* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */

@@ -17,7 +17,7 @@
 	.warp_cells = warp_cells,                      \
 	.warp = warp_kernel,                           \
 	.strip_list = KERNEL(strip_list),              \
-	.strip_find = KERNEL(strip_find),              \
+	.strip_find = strip_find,                      \
 	.strip_read = KERNEL(strip_read),              \
 	.strip_resolve = strip_resolve,                \
 	.strip_shadow = strip_shadow,                  \

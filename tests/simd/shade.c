@@ -161,7 +161,7 @@ static void write_pixels(struct check *c, uint32_t width, uint32_t height, int h
 	}
 	strip->pixels = p;
 	to->width = width;
-	to->srgb = check_in(c, 65536 + SRGB_PADDING, 1);
+	to->srgb = check_in(c, 65536, 1);
 	to->rgb = has_rgb ? check_out(c, area, 3) : NULL;
 	uint8_t *wants = has_linear ? check_in(c, (n + STRIP_BRICK - 1) / STRIP_BRICK, 1) : NULL;
 	for (uint32_t i = 0; wants && i < (n + STRIP_BRICK - 1) / STRIP_BRICK; i++)

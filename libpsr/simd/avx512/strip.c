@@ -1,6 +1,5 @@
 #include <immintrin.h>
 #include "base/srgb.h"
-#include "psr/direction.h"
 #include "simd/strip_parts.h"
 #include "simd/kernels.h"
 
@@ -40,86 +39,7 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 	p->n = n;
 }
 
-/* ---- find ---- */
-
-static CONSTANT_FLAGS __m256i gather_u32(__mmask8 k, const void *from, __m256i index, const int scale)
-{
-	return _mm256_mmask_i32gather_epi32(_mm256_setzero_si256(), k, index, from, scale);
-}
-
-/* Elements of arrays of bytes or of 16 bits, by the aligned words that they are in: no page is touched that has none of them. */
-static inline __m256i gather_u16(__mmask8 k, const uint16_t *from, __m256i index)
-{
-	const uintptr_t odd = (uintptr_t)from / sizeof *from % 2;
-	const __m256i at = _mm256_add_epi32(index, _mm256_set1_epi32((int)odd));
-	const __m256i word = gather_u32(k, from - odd, _mm256_srli_epi32(at, 1), 4);
-	const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(at, _mm256_set1_epi32(1)), 4);
-	return _mm256_and_si256(_mm256_srlv_epi32(word, shift), _mm256_set1_epi32(0xffff));
-}
-
-static inline __m256i gather_u8(__mmask8 k, const uint8_t *from, __m256i index)
-{
-	const uintptr_t odd = (uintptr_t)from % 4;
-	const __m256i at = _mm256_add_epi32(index, _mm256_set1_epi32((int)odd));
-	const __m256i word = gather_u32(k, from - odd, _mm256_srli_epi32(at, 2), 4);
-	const __m256i shift = _mm256_slli_epi32(_mm256_and_si256(at, _mm256_set1_epi32(3)), 3);
-	return _mm256_srlv_epi32(word, shift);
-}
-
-/* Indices of the attributes of samples i .. i + 7, of those in k. */
-static inline __m512i find_attributes(const struct psr_blocks *b, __mmask8 k, __m256i block, __m256i sample)
-{
-	_Static_assert(PSR_RUN_BLOCKS == 1 << 10 && sizeof *b->run == 8, "indices into runs");
-	const __m256i run = gather_u32(k, &b->run->attr_first, _mm256_srli_epi32(block, 10), 8);
-	const __m256i first = _mm256_add_epi32(run, gather_u16(k, b->attr_offset, block));
-	const __m512i mask = _mm512_mask_i32gather_epi64(_mm512_setzero_si512(), k, block, b->mask, 8);
-	const __m512i from = _mm512_sllv_epi64(_mm512_set1_epi64(-1), _mm512_cvtepu32_epi64(sample));
-	return _mm512_add_epi64(_mm512_cvtepu32_epi64(first), _mm512_popcnt_epi64(_mm512_andnot_si512(from, mask)));
-}
-
-void strip_find_avx512(struct strip_pixels *p, const struct strip_view *view)
-{
-	const __m256i in_block = _mm256_set1_epi32(PSR_BLOCK_SAMPLES - 1);
-	for (uint32_t first = 0, end; first < p->n; first = end) {
-		const struct warp_instance *in = instance_run(&end, p, view, first, p->n);
-		const struct psr_blocks *b = in->blocks;
-		const __m256i first_slot = _mm256_set1_epi32((int)in->first_slot);
-		const __m512i attributes = _mm512_set1_epi64((long long)(uintptr_t)b->attr);
-		for (uint32_t i = first; i < end; i += 8) {
-			const __mmask8 k = (__mmask8)lowest(end - i, 8);
-			const __m256i id = _mm256_loadu_si256((const __m256i *)(p->id + i));
-			const __m256i block = _mm256_sub_epi32(_mm256_srli_epi32(id, 6), first_slot);
-			const __m512i index = find_attributes(b, k, block, _mm256_and_si256(id, in_block));
-			const __m512i at = _mm512_add_epi64(attributes, _mm512_slli_epi64(index, 3));
-			__m256i flags = _mm256_setzero_si256();
-			_mm512_mask_storeu_epi64(p->at + i, k, at);
-			if (view->needs & STRIP_TWO_SIDED)
-				flags = _mm256_and_si256(gather_u8(k, b->flags, block), _mm256_set1_epi32(PSR_BLOCK_TWO_SIDED));
-			_mm256_mask_cvtepi32_storeu_epi8(p->two_sided + i, k, flags);
-			for (uint32_t j = i; j < i + 8 && j < end; j++)
-				_mm_prefetch((const char *)p->at[j], _MM_HINT_T0);
-		}
-	}
-	repeat_last(p);
-}
-
 /* ---- read ---- */
-
-/* Attributes and normals; *all, *common: or-ed and and-ed. */
-static void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
-{
-	__m512i some = _mm512_setzero_si512(), each = _mm512_set1_epi64(-1);
-	for (uint32_t i = 0; i < strip->n; i += 8) {
-		const __m512i attr = _mm512_i64gather_epi64(_mm512_loadu_si512(strip->pixels->at + i), NULL, 1);
-		const __m256i normal = _mm256_and_si256(_mm512_cvtepi64_epi32(attr), _mm256_set1_epi32(PSR_DIRECTIONS - 1));
-		_mm512_storeu_si512(strip->attr + i, attr);
-		_mm512_storeu_si512(strip->normal_word + i, _mm512_i32gather_epi64(normal, view->direction_word, 8));
-		some = _mm512_or_si512(some, attr);
-		each = _mm512_and_si512(each, attr);
-	}
-	*all = (uint64_t)_mm512_reduce_or_epi64(some);
-	*common = (uint64_t)_mm512_reduce_and_epi64(each);
-}
 
 static void fill_floats(float *to, uint32_t n, float value)
 {
@@ -127,27 +47,13 @@ static void fill_floats(float *to, uint32_t n, float value)
 		_mm512_storeu_ps(to + i, _mm512_set1_ps(value));
 }
 
-static inline __m512 linear_of(__m512i word, int shift)
-{
-	const __m512i code = _mm512_and_si512(_mm512_srli_epi32(word, (unsigned)shift), _mm512_set1_epi32(0xff));
-	return _mm512_i32gather_ps(code, psr_srgb_to_linear, 4);
-}
-
-/* The half of each of 16 attributes that the permutation names. */
-static inline __m512i halves_of(const uint64_t *attr, __m512i which)
-{
-	return _mm512_permutex2var_epi32(_mm512_loadu_si512(attr), which, _mm512_loadu_si512(attr + 8));
-}
-
 static void read_diffuse(struct strip *strip)
 {
-	const __m512i lower = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
-	const __m512i upper = _mm512_add_epi32(lower, _mm512_set1_epi32(1));
-	for (uint32_t i = 0; i < strip->n; i += 16) {
-		const __m512i low = halves_of(strip->attr + i, lower), high = halves_of(strip->attr + i, upper);
-		_mm512_storeu_ps(strip->dr + i, linear_of(low, 16));
-		_mm512_storeu_ps(strip->dg + i, linear_of(low, 24));
-		_mm512_storeu_ps(strip->db + i, linear_of(high, 0));
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint32_t diffuse = PSR_ATTR_DIFFUSE(strip->attr[i]);
+		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
 	}
 }
 
@@ -171,7 +77,9 @@ static void read_specular(struct strip *strip)
 		                    _mm512_loadu_ps(psr_srgb6_to_linear + 32), _mm512_loadu_ps(psr_srgb6_to_linear + 48) };
 	const __m512 root = _mm512_loadu_ps(exponent_root);
 	for (uint32_t i = 0; i < strip->n; i += 16) {
-		const __m512i high = halves_of(strip->attr + i, upper); /* blue, then specular, then the exponent, 8, 16 and 8 bits */
+		/* From the lowest bit on 8 of blue, 16 specular and 8 of the exponent. */
+		const __m512i low_attr = _mm512_loadu_si512(strip->attr + i), high_attr = _mm512_loadu_si512(strip->attr + i + 8);
+		const __m512i high = _mm512_permutex2var_epi32(low_attr, upper, high_attr);
 		const __m512i power = _mm512_slli_epi32(_mm512_srli_epi32(high, 28), 23);
 		const __m512 exponent = _mm512_permutexvar_ps(_mm512_srli_epi32(high, 24), root);
 		_mm512_storeu_ps(strip->sr + i, look_up_5(five, _mm512_srli_epi32(high, 8)));
@@ -184,9 +92,7 @@ static void read_specular(struct strip *strip)
 void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 {
 	uint64_t all, common;
-	strip->n = strip_whole(strip->pixels->n);
 	read_attributes(&all, &common, strip, view);
-	strip->is_specular = strip_wants_highlights(view, all);
 	const uint32_t diffuse = PSR_ATTR_DIFFUSE(all);
 	if (diffuse != PSR_ATTR_DIFFUSE(common)) {
 		read_diffuse(strip);
@@ -201,24 +107,6 @@ void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 
 /* ---- write ---- */
 
-/* The 16 first elements of an array that lanes are for, 8 bits for 16 each. */
-static inline __m512i codes_of(const uint8_t *srgb, __mmask16 lanes, const uint16_t *light)
-{
-	const __m512i index = _mm512_cvtepu16_epi32(_mm256_maskz_loadu_epi16(lanes, light));
-	const __m512i word = _mm512_mask_i32gather_epi32(_mm512_setzero_si512(), lanes, index, srgb, 1);
-	return _mm512_and_si512(word, _mm512_set1_epi32(0xff));
-}
-
-/* Sample i on are those of the pixels in k. */
-static inline __m512i pixels_of(const struct strip *strip, const uint8_t *srgb, uint32_t i, __mmask16 k, __m512i empty)
-{
-	const __mmask16 lanes = (__mmask16)lowest((uint32_t)__builtin_popcount(k), 16);
-	const __m512i r = codes_of(srgb, lanes, strip->r + i), g = codes_of(srgb, lanes, strip->g + i);
-	const __m512i b = codes_of(srgb, lanes, strip->b + i);
-	const __m512i rgb = _mm512_or_si512(_mm512_or_si512(r, _mm512_slli_epi32(g, 8)), _mm512_slli_epi32(b, 16));
-	return _mm512_mask_expand_epi32(empty, k, rgb);
-}
-
 static inline void write_linear(uint16_t *to, const uint16_t *from, __mmask32 k, uint16_t background, uint32_t n)
 {
 	const __mmask32 lanes = (__mmask32)lowest((uint32_t)__builtin_popcount(k), 32);
@@ -231,28 +119,43 @@ static const uint8_t first_three[64] = {
 	32, 33, 34, 36, 37, 38, 40, 41, 42, 44, 45, 46, 48, 49, 50, 52, 53, 54, 56, 57, 58, 60, 61, 62,
 };
 
+static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uint16_t b)
+{
+	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
+}
+
+/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table look-ups one by
+ * one are faster than gathers. */
+static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const uint16_t *dark = target->background;
+	const __m512i pack = _mm512_loadu_si512(first_three);
+	const __m512i empty = _mm512_set1_epi32((int)pixel_of(target->srgb, dark[0], dark[1], dark[2]));
+	uint32_t pixel[STRIP + 16], n_written = 0;
+	for (uint32_t i = 0; i < strip->pixels->n; i++)
+		pixel[i] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
+	for (uint32_t x = 0; x < n; x += 16) {
+		const __mmask16 k = (__mmask16)(strip->pixels->covered[x / 32] >> x % 32);
+		const __m512i row = _mm512_mask_expand_epi32(empty, k, _mm512_loadu_si512(pixel + n_written));
+		_mm512_mask_storeu_epi8(to + 3 * x, lowest(3 * (n - x), 48), _mm512_permutexvar_epi8(pack, row));
+		n_written += (uint32_t)__builtin_popcount(k);
+	}
+}
+
 void strip_write_avx512(const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
-	const size_t first = (size_t)strip->pixels->y * target->width + strip->pixels->x0;
+	const struct strip_pixels *p = strip->pixels;
+	const size_t first = (size_t)p->y * target->width + p->x0;
 	const uint16_t *dark = target->background;
-	const uint8_t *srgb = target->srgb;
-	const __m512i pack = _mm512_loadu_si512(first_three);
-	const __m512i empty = _mm512_set1_epi32(srgb[dark[0]] | srgb[dark[1]] << 8 | srgb[dark[2]] << 16);
-	for (uint32_t x = 0, i = 0; x < n; x += STRIP_BRICK) {
-		const uint32_t k = strip->pixels->covered[x / 32], left = n - x;
-		if (target->wants && target->wants[x / STRIP_BRICK]) {
-			write_linear(target->r + first + x, strip->r + i, k, dark[0], left);
-			write_linear(target->g + first + x, strip->g + i, k, dark[1], left);
-			write_linear(target->b + first + x, strip->b + i, k, dark[2], left);
+	if (target->rgb)
+		write_rgb(target->rgb + 3 * first, strip, target, n);
+	for (uint32_t x = 0, i = 0; target->wants && x < n; x += STRIP_BRICK) {
+		const uint32_t k = p->covered[x / 32];
+		if (target->wants[x / STRIP_BRICK]) {
+			write_linear(target->r + first + x, strip->r + i, k, dark[0], n - x);
+			write_linear(target->g + first + x, strip->g + i, k, dark[1], n - x);
+			write_linear(target->b + first + x, strip->b + i, k, dark[2], n - x);
 		}
-		for (uint32_t half = 0; half < 2 && 16 * half < left && target->rgb; half++) {
-			const __mmask16 own = (__mmask16)(k >> 16 * half);
-			const __m512i pixel = own ? pixels_of(strip, srgb, i, own, empty) : empty;
-			_mm512_mask_storeu_epi8(target->rgb + 3 * (first + x + 16 * half), lowest(3 * (left - 16 * half), 48),
-			                        _mm512_permutexvar_epi8(pack, pixel));
-			i += (uint32_t)__builtin_popcount(own);
-		}
-		if (!target->rgb)
-			i += (uint32_t)__builtin_popcount(k);
+		i += (uint32_t)__builtin_popcount(k);
 	}
 }
