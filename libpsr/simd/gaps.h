@@ -9,6 +9,7 @@
 #define GAPS_LEFT 16
 #define MAX_CELLS (GAPS_WIDTH / 2 + 2)
 #define MAX_SPREAD (GAPS_WIDTH + 2 * (1 << PSR_MAX_DEPTH_LEVEL))
+#define SPREAD_RUN 16 /* values that are repeated together: arrays have room for as many more */
 
 /* Depths of a piece of the picture and of the pixels around it; what is not in the picture is at infinity. Loops are over all
  * GAPS_WIDTH columns. */
@@ -18,26 +19,26 @@ struct gaps_tile {
 	uint32_t x0, y0, width, height;
 };
 
+static inline float depth_of(uint64_t word)
+{
+	return psr_float_from_bits((uint32_t)(word >> 32));
+}
+
 static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 {
-	const uint32_t first = tile->x0 ? tile->x0 - 1 : 0;
-	const uint32_t end = tile->x0 + tile->width < stack->width ? tile->x0 + tile->width + 1 : stack->width;
 	for (uint32_t i = 0; i < tile->height + 2; i++) {
 		float *z = &tile->z[i][GAPS_LEFT];
 		int32_t has_samples = 0;
-		z[-1] = INFINITY;
-		for (uint32_t x = tile->width; x <= GAPS_WIDTH; x++)
+		const int is_inside = tile->y0 + i >= 1 && tile->y0 + i <= stack->height;
+		const uint64_t *word = stack->word + (is_inside ? (size_t)(tile->y0 + i - 1) * stack->width : 0) + tile->x0;
+		const uint32_t n = is_inside ? tile->width : 0;
+		for (uint32_t x = 0; x < n; x++)
+			z[x] = depth_of(word[x]);
+		for (uint32_t x = n; x <= GAPS_WIDTH; x++)
 			z[x] = INFINITY;
-		tile->has_samples[i] = 0;
-		if (tile->y0 + i < 1 || tile->y0 + i > stack->height) {
-			for (uint32_t x = 0; x < GAPS_WIDTH; x++)
-				z[x] = INFINITY;
-			continue;
-		}
-		const uint64_t *word = psr_zstack_row(stack, (uint32_t)(tile->y0 + i - 1)) + first;
-		float *to = z + first - tile->x0;
-		for (uint32_t x = 0; x < end - first; x++)
-			to[x] = psr_float_from_bits((uint32_t)(word[x] >> 32));
+		z[-1] = is_inside && tile->x0 ? depth_of(*(word - 1)) : INFINITY;
+		if (is_inside && tile->x0 + n < stack->width)
+			z[n] = depth_of(word[n]);
 		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 			has_samples |= z[x] < INFINITY;
 		tile->has_samples[i] = has_samples | (z[-1] < INFINITY) | (z[GAPS_WIDTH] < INFINITY);
@@ -47,30 +48,38 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 /* What lies beyond these depths is covered by the cells of a row, `own`; `either`: by the cells or the four cells of the next
  * finer level in each. Repeated for each pixel. */
 struct limits {
-	float own[MAX_SPREAD], either[MAX_SPREAD];
+	float own[MAX_SPREAD + 2 * SPREAD_RUN], either[MAX_SPREAD + 2 * SPREAD_RUN];
 	uint32_t i, j, n; /* cells from (i, j), which counts from the guard band's corner */
 	int32_t is_empty, has_either;
 };
 
-/* Repeats each of n values 2^k times. */
-static void spread(float *values, uint32_t n, int k)
+static inline void repeat(float *to, const float *from, uint32_t n)
 {
-	float once[MAX_SPREAD / 2];
-	for (; k > 0; k--, n *= 2) {
-		for (uint32_t i = 0; i < n; i++)
-			once[i] = values[i];
-		for (uint32_t i = 0; i < n; i++)
-			values[2 * i] = values[2 * i + 1] = once[i];
+	for (uint32_t first = 0; first < n; first += SPREAD_RUN)
+		for (uint32_t i = first; i < first + SPREAD_RUN; i++)
+			to[2 * i] = to[2 * i + 1] = from[i];
+}
+
+/* Repeats each of n values 2^k times. */
+static void spread(float *to, const float *from, uint32_t n, int k)
+{
+	float some[2][MAX_SPREAD / 2 + 2 * SPREAD_RUN];
+	for (; k > 1; k--, n *= 2) {
+		float *twice = some[k & 1];
+		repeat(twice, from, n);
+		from = twice;
 	}
+	repeat(to, from, n);
 }
 
 static void find_limits(struct limits *to, const struct gaps_target *t, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	const float *cell = t->stack->level[k].z + (size_t)j * t->stack->level[k].width + i;
 	const float scale = t->scale[k], offset = t->offset[k];
+	float once[MAX_CELLS + SPREAD_RUN];
 	int32_t has_any = 0;
 	for (uint32_t c = 0; c < n; c++) {
-		to->own[c] = cell[c] * scale + offset;
+		once[c] = cell[c] * scale + offset;
 		has_any |= cell[c] < INFINITY;
 	}
 	to->i = i;
@@ -79,7 +88,7 @@ static void find_limits(struct limits *to, const struct gaps_target *t, int k, u
 	to->is_empty = !has_any;
 	to->has_either = 0;
 	if (has_any)
-		spread(to->own, n, k);
+		spread(to->own, once, n, k);
 	for (uint32_t x = has_any ? n << k : 0; x < GAPS_WIDTH + (2u << k); x++)
 		to->own[x] = INFINITY;
 }
@@ -92,24 +101,24 @@ static void find_either(struct limits *to, const struct gaps_target *t, int k)
 	/* The finer level has no cell where 2 i - 1 is below 0, and may have none at its other end. */
 	const uint32_t before = to->i ? 0 : 1, u0 = 2 * to->i + before - 1, most = 2 * n - before;
 	const uint32_t n_children = width - u0 < most ? width - u0 : most;
-	float children[2 * MAX_CELLS];
+	float children[2 * MAX_CELLS], once[MAX_CELLS + SPREAD_RUN];
 	if (to->has_either)
 		return;
 	to->has_either = 1;
 	children[0] = children[2 * n - 1] = INFINITY;
 	const float *cell = stack->level[k].z + (size_t)to->j * stack->level[k].width + to->i;
 	for (uint32_t c = 0; c < n; c++)
-		to->either[c] = cell[c] * t->scale[k] + t->offset[k];
+		once[c] = cell[c] * t->scale[k] + t->offset[k];
 	for (uint32_t v = to->j ? 2 * to->j - 1 : 0; v <= 2 * to->j && v < height; v++) {
 		const float *fine = stack->level[k - 1].z + (size_t)v * width + u0;
 		for (uint32_t c = 0; c < n_children; c++)
 			children[before + c] = fine[c] * scale + offset;
 		for (uint32_t c = 0; c < n; c++) {
 			const float a = children[2 * c], b = children[2 * c + 1], two = a < b ? a : b;
-			to->either[c] = two < to->either[c] ? two : to->either[c];
+			once[c] = two < once[c] ? two : once[c];
 		}
 	}
-	spread(to->either, n, k);
+	spread(to->either, once, n, k);
 	for (uint32_t x = n << k; x < GAPS_WIDTH + (2u << k); x++)
 		to->either[x] = INFINITY;
 }
