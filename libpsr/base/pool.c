@@ -218,6 +218,15 @@ void psr_pool_destroy(struct psr_pool *pool)
 	free(pool);
 }
 
+void psr_pool_wake(struct psr_pool *pool)
+{
+	if (pool == NULL || pool->n_workers == 0)
+		return;
+	pthread_mutex_lock(&pool->mutex);
+	offer(pool);
+	pthread_mutex_unlock(&pool->mutex);
+}
+
 int psr_pool_threads(const struct psr_pool *pool)
 {
 	return pool != NULL ? pool->n_threads : 1;

@@ -9,7 +9,10 @@
 /* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second
  * writes the bins where the counts say, in canonical order whatever the threads did. */
 
-#define CHUNK_BLOCKS 2048
+/* Blocks of a chunk: so many that there are some tens of chunks for threads to share. */
+#define LEAST_CHUNK 256
+#define MOST_CHUNK 2048
+#define MANY_CHUNKS 64
 
 struct cull_chunk {
 	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
@@ -272,6 +275,8 @@ static void *room_for(void *array, size_t *capacity, size_t n, size_t size)
 
 static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int store)
 {
+	const uint32_t share = plan->n_slots / MANY_CHUNKS, least = share > LEAST_CHUNK ? share : LEAST_CHUNK;
+	const uint32_t most = least < MOST_CHUNK ? least : MOST_CHUNK;
 	uint32_t n = 0;
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
@@ -279,7 +284,7 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 			uint32_t first = k, size = 0;
 			do
 				size += blocks->cluster[k++].n_blocks;
-			while (k < blocks->n_clusters && size + blocks->cluster[k].n_blocks <= CHUNK_BLOCKS);
+			while (k < blocks->n_clusters && size + blocks->cluster[k].n_blocks <= most);
 			if (store)
 				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = first, .n_clusters = k - first,
 					                                  .first_hit = plan->instance[i].first_slot +

@@ -236,6 +236,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	int rc = validate(scene, settings, err);
 	if (rc)
 		return rc;
+	psr_pool_wake(pool);
 	memset(report, 0, sizeof *report);
 	uint64_t start = now_ns(), end;
 	rc = plan_make(&r->plan, scene, settings, err);

@@ -67,26 +67,32 @@ static void descend(struct screen *screen, unsigned triangle, int node, int dept
 void screen_make(struct screen *screen, int n, const double frame[3][3], const double tangent[2], int level)
 {
 	static const double sides[4][2] = { { 1, 0 }, { -1, 0 }, { 0, 1 }, { 0, -1 } };
+	double corner[3][3];
 	const struct region whole = { { -tangent[0], -tangent[1] }, { tangent[0], tangent[1] } };
 
 	screen->n = n;
 	memset(screen->mask, 0, (size_t)(2 << 2 * n) * sizeof *screen->mask);
+	/* Octants are mirrored. */
 	for (unsigned t = 0; t < 8u << 2 * level; t++) {
+		const unsigned octant = t & 7, one = t >> 3;
 		struct part part[2] = { { .n = 3 } };
-		double corner[3][3];
 		int last = 0;
 
-		psr_direction_corners(level, t, corner);
+		if (octant == 0)
+			psr_direction_corners(level, one, corner);
 		for (int i = 0; i < 3; i++) {
-			v3d_scale(corner[i], corner[i], -1); /* from the eye */
-			m3d_apply(part[0].corner[i], frame, corner[i]);
+			double from_eye[3];
+
+			for (int k = 0; k < 3; k++)
+				from_eye[k] = octant >> k & 1 ? corner[i][k] : -corner[i][k];
+			m3d_apply(part[0].corner[i], frame, from_eye);
 		}
-		for (int i = 0; i < 4; i++, last ^= 1) {
+		for (int i = 0; i < 4 && part[last].n > 0; i++, last ^= 1) {
 			double plane[3] = { sides[i][0], sides[i][1], tangent[i / 2] };
 
 			clip(&part[last ^ 1], &part[last], plane);
 		}
-		descend(screen, t, 1, 0, &whole, &part[last]);
+		descend(screen, octant << 2 * level | one, 1, 0, &whole, &part[last]);
 	}
 }
 

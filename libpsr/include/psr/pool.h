@@ -22,6 +22,9 @@ void psr_pool_destroy(struct psr_pool *pool);
 
 int psr_pool_threads(const struct psr_pool *pool); /* 1 for NULL */
 
+/* Says that a loop comes in some microseconds: sleeping threads wake meanwhile. NULL is fine. */
+void psr_pool_wake(struct psr_pool *pool);
+
 /* Calls fn(i, userdata) once for each i in 0..n-1, in any order, on any thread, and returns when all are done.
  * A NULL pool runs them in the caller, in order. May be called from inside a job; not from inside a loop. */
 void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata);
