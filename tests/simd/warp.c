@@ -1,4 +1,4 @@
-/* warp, warp_clear and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
+/* warp, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -44,14 +44,15 @@ static void make_picture(struct check *c, struct picture *p, uint32_t width, uin
 	p->height = height;
 	p->levels = levels & 0xfe;
 	t->direction = psr_direction_tens();
-	t->stride = width;
+	t->stride = width + (check_one_in(c, 2) ? check_below(c, 20) : 0);
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);
 	t->x1 = is_last_x ? (int32_t)width : t->x0 + TILE_WIDTH;
 	t->y1 = is_last_y ? (int32_t)height : t->y0 + TILE_HEIGHT;
-	t->word = check_out(c, (size_t)width * height, sizeof *t->word);
-	for (size_t i = 0; i < (size_t)width * height; i++)
-		t->word[i] = (uint64_t)psr_bits_from_float(random_depth(c)) << 32 | check_u32(c);
+	uint64_t *word = check_out(c, (size_t)t->stride * height, sizeof *word);
+	for (size_t i = 0; i < (size_t)t->stride * height; i++)
+		word[i] = (uint64_t)psr_bits_from_float(random_depth(c)) << 32 | check_u32(c);
+	t->word = word + (size_t)t->y0 * t->stride + (size_t)t->x0;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(p->levels >> k & 1))
 			continue;
@@ -231,6 +232,16 @@ static void random_clear(struct check *c)
 		c->simd->warp_clear(&p.target, p.levels);
 }
 
+static void random_cells(struct check *c)
+{
+	struct picture p;
+	random_picture(c, &p);
+	while (check_next(c))
+		for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+			if (p.levels >> k & 1)
+				c->simd->warp_cells(&p.target, k);
+}
+
 static void random_far(struct check *c)
 {
 	struct picture p;
@@ -272,6 +283,15 @@ static void bench_far(struct check *c)
 		c->simd->warp_far(&p.target, far);
 }
 
+static void bench_cells(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
+	check_units(c, TILE_WIDTH * TILE_HEIGHT);
+	while (check_next(c))
+		c->simd->warp_cells(&p.target, 1);
+}
+
 static void bench_clear(struct check *c)
 {
 	struct picture p;
@@ -290,11 +310,13 @@ int main(int argc, char **argv)
 		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
 		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
 		{ "warp_clear: random tiles and levels", random_clear, 400, NULL },
+		{ "warp_cells: random tiles and levels", random_cells, 400, NULL },
 		{ "warp_far: random tiles", random_far, 400, NULL },
 		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
 		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
 		{ "warp, full blocks, depth levels 1 and 2", bench_levels, 0, "sample" },
 		{ "warp_clear, a tile", bench_clear, 0, "pixel" },
+		{ "warp_cells, a tile", bench_cells, 0, "pixel" },
 		{ "warp_far, a tile", bench_far, 0, "pixel" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

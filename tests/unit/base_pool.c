@@ -106,6 +106,25 @@ static void append(void *userdata)
 	pthread_mutex_unlock(&one_chain.mutex);
 }
 
+static void loops_after_a_wake_are_whole(void **state)
+{
+	(void)state;
+	psr_pool_wake(NULL);
+	for (int with_jobs = 0; with_jobs <= 1; with_jobs++) {
+		struct psr_pool *pool = make(3, with_jobs);
+		struct tally *t = calloc(1, sizeof *t);
+
+		for (int round = 1; round <= 100; round++) {
+			psr_pool_wake(pool);
+			psr_pool_for(pool, N, count, t);
+			for (int i = 0; i < N; i++)
+				assert_int_equal(t->plain[i], round);
+		}
+		psr_pool_destroy(pool);
+		free(t);
+	}
+}
+
 static void jobs_run_in_order_and_destroy_waits_for_all(void **state)
 {
 	struct psr_pool *pool = make(1, 1);
@@ -344,6 +363,7 @@ int main(void)
 		cmocka_unit_test(thread_counts_outside_of_the_range_are_refused),
 		cmocka_unit_test(null_pool_runs_the_loop_in_order),
 		cmocka_unit_test(every_index_runs_once_with_any_number_of_threads),
+		cmocka_unit_test(loops_after_a_wake_are_whole),
 		cmocka_unit_test(jobs_run_in_order_and_destroy_waits_for_all),
 		cmocka_unit_test(frames_with_loops_all_finish_however_busy_the_workers),
 		cmocka_unit_test(caller_finishes_its_loop_alone_when_all_workers_are_busy),
