@@ -182,6 +182,7 @@ L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib'
 # Tests keep their assertions in every configuration. What builds their models is not under test, and would take most of
 # the sanitizers' time.
 $(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
+$(BUILD)/tests/simd/forms.c.o: CFLAGS += -O3 -fno-trapping-math
 $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 
 $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsrtest.a $(A)

@@ -152,6 +152,8 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 	const int first = most_frequent_level(entry, n);
 	uint64_t n_inside = 0;
 	simd->warp_clear(target, first ? levels & ~(1u << first) : levels);
+	if (first == 0)
+		return simd->warp(target, entry, n);
 	for (int turn = 0; turn < 2; turn++) {
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
@@ -167,7 +169,7 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 			}
 		}
 		n_inside += simd->warp(target, some, n_some);
-		if (turn == 0 && first)
+		if (turn == 0)
 			simd->warp_cells(target, first);
 	}
 	return n_inside;

@@ -15,6 +15,11 @@ struct warp_block {
 	uint32_t id;
 };
 
+/* Its lattice's terms of row and column, [G] (7.5)'s p, q and r. */
+struct warp_terms {
+	float row[3][8], col[3][8];
+};
+
 static inline void warp_block_make(struct warp_block *out, const struct warp_instance *in, uint32_t slot)
 {
 	const struct psr_blocks *b = in->blocks;
@@ -35,6 +40,21 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 	out->attr = b->attr + first;
 	out->mask = b->mask[block];
 	out->id = slot * PSR_BLOCK_SAMPLES;
+}
+
+static inline void warp_terms_make(struct warp_terms *out, const struct warp_block *b)
+{
+	for (int a = 0; a < 3; a++)
+		for (int i = 0; i < 8; i++) {
+			out->row[a][i] = (float)(b->origin[a] + b->scale * b->lattice->row[a][i]);
+			out->col[a][i] = (float)b->scale * b->lattice->col[a][i];
+		}
+}
+
+/* Axis a of the sample of row r and column c: (7.6)'s x', y' or z'. */
+static inline float warp_axis(const struct warp_terms *terms, const struct warp_block *b, int a, uint32_t r, uint32_t c, float depth)
+{
+	return (terms->row[a][r] + terms->col[a][c]) + depth * b->unit[a];
 }
 
 #endif

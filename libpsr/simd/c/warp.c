@@ -32,21 +32,16 @@ static uint64_t warp_one(const struct warp_target *t, const struct bin_entry *en
 	const struct warp_instance *in = &t->instance[entry->instance];
 	const struct warp_cells *cells = entry->level ? &t->cells[entry->level] : NULL;
 	struct warp_block b;
-	float row[3][8], col[3][8];
+	struct warp_terms terms;
 	uint64_t n_inside = 0;
 
 	warp_block_make(&b, in, entry->slot);
-	for (int a = 0; a < 3; a++)
-		for (int i = 0; i < 8; i++) {
-			row[a][i] = (float)(b.origin[a] + b.scale * b.lattice->row[a][i]);
-			col[a][i] = (float)b.scale * b.lattice->col[a][i];
-		}
+	warp_terms_make(&terms, &b);
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float depth = (float)*b.depth;
-		const float x1 = (row[0][r] + col[0][c]) + depth * b.unit[0];
-		const float y1 = (row[1][r] + col[1][c]) + depth * b.unit[1];
-		const float z1 = (row[2][r] + col[2][c]) + depth * b.unit[2];
+		const float x1 = warp_axis(&terms, &b, 0, r, c, depth), y1 = warp_axis(&terms, &b, 1, r, c, depth);
+		const float z1 = warp_axis(&terms, &b, 2, r, c, depth);
 		const float inverse = t->perspective ? 1.0f / z1 : 1.0f;
 		const float u = clamp_pixel(x1 * inverse), v = clamp_pixel(y1 * inverse);
 		const int32_t pixel_u = psr_floor_int(u), pixel_v = psr_floor_int(v);
