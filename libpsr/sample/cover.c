@@ -160,7 +160,9 @@ int cover_is_near(const struct cover *cover, const float p[3], const float n[3],
 			float d[3];
 
 			v3f_sub(d, point->position, p);
-			if (v3f_dot(d, d) <= radius2 && (point->two_sided || v3f_dot(direction[point->normal], n) > 0.6f))
+			if (v3f_dot(d, d) <= radius2 && v3f_dot(direction[point->normal], n) > 0.6f)
+				return 1;
+			if (point->two_sided && cover_is_sheet_near(point->position, p, n, (float)radius))
 				return 1;
 		}
 	}

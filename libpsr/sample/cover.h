@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include "../base/vec.h"
 
 struct cover_point {
 	float position[3];
@@ -38,5 +39,17 @@ int cover_around(const struct cover *cover, const float p[3], double radius, uin
 
 /* Whether a point that faces like n lies within radius <= ds of p. */
 int cover_is_near(const struct cover *cover, const float p[3], const float n[3], double radius);
+
+/* The same of one sample on a sheet that is sampled once for both sides, n its normal: what is across the sheet counts half,
+ * as pixels see it foreshortened. */
+static inline int cover_is_sheet_near(const float sample[3], const float p[3], const float n[3], float radius)
+{
+	float d[3], across, distance2;
+
+	v3f_sub(d, sample, p);
+	across = v3f_dot(d, n);
+	distance2 = v3f_dot(d, d);
+	return across * across <= radius * radius && distance2 - 0.4f * across * across <= radius * radius;
+}
 
 #endif

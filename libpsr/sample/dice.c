@@ -6,11 +6,14 @@
 #include "offer.h"
 #include "psr/direction.h"
 #include "psr/error.h"
+#include "spots.h"
 #include "texture.h"
+#include "thin_cover.h"
 
 /* Primitives are diced as in [G] 9.2.1 and [Cook87], though only to test what is there: places on them are this many pixels
  * apart. */
 #define STEP 0.33
+#define THIN_STEP 0.25 /* on what is thin, at the finest level, which is to be adequate */
 
 /* Where between the lines of such a grid they are, by round: what is smaller than a step shows in one of them. */
 static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
@@ -18,44 +21,45 @@ static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
 
 #define CHEAP 7 /* an offer that opens no block, by what offers cost */
 
-struct list {
-	struct surface_spot *spot;
-	size_t n, capacity;
+/* What was found of some primitives. */
+struct chunk {
+	struct spots thin, rest;
+	struct spot_cells cells; /* that have a place on something thin, whose other sides need no test */
 	int failed;
 };
 
-static void add_spot(struct list *list, const struct surface_spot *spot)
-{
-	if (list->n == list->capacity) {
-		size_t capacity = list->capacity != 0 ? 2 * list->capacity : 64;
-		struct surface_spot *grown = realloc(list->spot, capacity * sizeof *grown);
-
-		if (grown == NULL) {
-			list->failed = 1;
-			return;
-		}
-		list->spot = grown;
-		list->capacity = capacity;
-	}
-	list->spot[list->n++] = *spot;
-}
-
 struct job {
 	const struct level *level;
-	struct list *list; /* of each chunk */
+	struct chunk *chunk;
 	uint32_t n_prims;
 	int round;
 };
 
+static double step_of(const struct level *level, int is_thin)
+{
+	return (is_thin && level->finer == NULL ? THIN_STEP : STEP) * level->ds;
+}
+
+/* On what is narrow, samples are chosen only after it was tested: no triangle of them is to be looked for. */
+static int is_covered(const struct level *level, const struct surface_spot *spot)
+{
+	if ((level->sides[spot->surface & ~SHEET_BACK] & SIDE_NARROW) != 0)
+		return cover_is_near(&level->cover, spot->p, spot->n, LEVEL_NEAR * level->ds);
+	return offer_is_covered(level, spot);
+}
+
 /* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for until
  * more was seen. */
-static void test_place(const struct job *job, uint32_t prim, const float p[3], struct list *list)
+static void test_place(const struct job *job, uint32_t prim, const float p[3], struct chunk *chunk)
 {
 	const struct level *level = job->level;
 	uint8_t sides = level->sides[prim];
 	const float *front = ray_scene_normal(level->scene, prim);
-	int is_two_sided = level_material(level, prim)->two_sided != 0, is_side_seen = 0;
+	int is_two_sided = level_material(level, prim)->two_sided != 0, is_side_seen = 0, is_thin = level_is_thin(level, prim);
+	int rc = PSR_OK;
 
+	if (is_thin && spot_cells_has(&chunk->cells, p))
+		return;
 	for (int back = 0; back <= is_two_sided; back++) {
 		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
 		struct surface_spot spot = { .surface = prim | (back ? SHEET_BACK : 0) };
@@ -67,18 +71,21 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		is_side_seen = seen_is(&level->seen, spot.p, spot.n);
-		if (is_side_seen && !offer_is_covered(level, &spot))
-			add_spot(list, &spot);
+		is_side_seen = (is_thin && (sides & seen) != 0) || seen_is(&level->seen, spot.p, spot.n);
+		if (is_side_seen && is_thin)
+			rc = spot_cells_add(&chunk->cells, p);
+		if (rc == PSR_OK && is_side_seen && !is_covered(level, &spot))
+			rc = spots_add(is_thin ? &chunk->thin : &chunk->rest, &spot);
+		chunk->failed |= rc != PSR_OK;
 	}
 }
 
-static void dice_triangle(const struct job *job, uint32_t prim, struct list *list)
+static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *chunk)
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS];
 	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns;
-	double corner[3][3], side[3], e[3], height, foot, step = STEP * level->ds;
+	double corner[3][3], side[3], e[3], height, foot, step = step_of(level, level_is_thin(level, prim));
 
 	ray_scene_corners(level->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
@@ -114,13 +121,13 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct list *lis
 				continue;
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);
-			test_place(job, prim, p, list);
+			test_place(job, prim, p, chunk);
 		}
 	}
 }
 
 /* A disc: the crossings of a square grid around its centre. */
-static void dice_disc(const struct job *job, uint32_t prim, struct list *list)
+static void dice_disc(const struct job *job, uint32_t prim, struct chunk *chunk)
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS] - 0.5;
@@ -142,7 +149,7 @@ static void dice_disc(const struct job *job, uint32_t prim, struct list *list)
 				continue;
 			for (int a = 0; a < 3; a++)
 				p[a] = (float)(center[a] + x * frame[0][a] + y * frame[1][a]);
-			test_place(job, prim, p, list);
+			test_place(job, prim, p, chunk);
 		}
 	}
 }
@@ -154,17 +161,20 @@ static void dice_chunk(int i, void *userdata)
 	struct job *job = userdata;
 	const struct psr_mesh *mesh = job->level->mesh;
 	uint32_t end = ((uint32_t)i + 1) * CHUNK < job->n_prims ? ((uint32_t)i + 1) * CHUNK : job->n_prims;
+	struct chunk *chunk = &job->chunk[i];
 
-	for (uint32_t prim = (uint32_t)i * CHUNK; prim < end; prim++) {
+	chunk->failed = spot_cells_init(&chunk->cells, step_of(job->level, 1)) != PSR_OK;
+	for (uint32_t prim = (uint32_t)i * CHUNK; prim < end && !chunk->failed; prim++) {
 		const float *n = ray_scene_normal(job->level->scene, prim);
 
 		if (n[0] == 0 && n[1] == 0 && n[2] == 0)
 			continue;
 		if (prim < mesh->n_triangles)
-			dice_triangle(job, prim, &job->list[i]);
+			dice_triangle(job, prim, chunk);
 		else
-			dice_disc(job, prim, &job->list[i]);
+			dice_disc(job, prim, chunk);
 	}
+	spot_cells_fini(&chunk->cells);
 }
 
 /* Places for which offers are found at once, by all threads. */
@@ -230,33 +240,36 @@ static int cover_spots(struct level *level, struct surface_spot *spot, size_t *n
 	return rc;
 }
 
-static int join_lists(const struct list *list, int n_lists, struct surface_spot **spot, size_t *n)
+static size_t join_spots(const struct job *job, int n_chunks, int are_thin, struct surface_spot *spot)
 {
-	*n = 0;
-	for (int i = 0; i < n_lists; i++) {
-		if (list[i].failed)
-			return PSR_ERR_MEMORY;
-		*n += list[i].n;
+	size_t n = 0;
+
+	for (int i = 0; i < n_chunks; i++) {
+		const struct spots *spots = are_thin ? &job->chunk[i].thin : &job->chunk[i].rest;
+
+		if (spot != NULL && spots->n != 0)
+			memcpy(spot + n, spots->spot, spots->n * sizeof *spot);
+		n += spots->n;
 	}
-	*spot = psr_alloc_array(*n, sizeof **spot);
-	if (*spot == NULL)
-		return PSR_ERR_MEMORY;
-	*n = 0;
-	for (int i = 0; i < n_lists; *n += list[i].n, i++)
-		if (list[i].n != 0)
-			memcpy(*spot + *n, list[i].spot, list[i].n * sizeof **spot);
-	return PSR_OK;
+	return n;
 }
 
-/* First what blocks that are there can cover; then new ones are opened, those first that most of the rest could use. */
-static int cover_lists(struct level *level, const struct list *list, int n_lists)
+/* First what is thin; then what blocks that are there can cover; then new ones are opened, those first that most of the rest
+ * could use. */
+static int cover_chunks(struct level *level, const struct job *job, int n_chunks)
 {
-	struct surface_spot *spot = NULL;
-	size_t n;
-	int rc = join_lists(list, n_lists, &spot, &n);
+	size_t n = join_spots(job, n_chunks, 1, NULL);
+	struct surface_spot *spot = psr_alloc_array(n + join_spots(job, n_chunks, 0, NULL), sizeof *spot);
+	int rc = spot != NULL ? PSR_OK : PSR_ERR_MEMORY;
 
-	if (rc == PSR_OK)
+	if (rc == PSR_OK && n != 0) {
+		join_spots(job, n_chunks, 1, spot);
+		rc = thin_cover(level, spot, &n);
+	}
+	if (rc == PSR_OK) {
+		n += join_spots(job, n_chunks, 0, spot + n);
 		rc = cover_spots(level, spot, &n, CHEAP);
+	}
 	if (rc == PSR_OK)
 		rc = cover_spots(level, spot, &n, INFINITY);
 	psr_free(spot);
@@ -268,14 +281,19 @@ int dice_surface(struct level *level, int round)
 	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points, .round = round };
 	int n_chunks = (int)((job.n_prims + CHUNK - 1) / CHUNK), rc = PSR_OK;
 
-	job.list = calloc((size_t)n_chunks, sizeof *job.list);
-	if (job.list == NULL)
+	job.chunk = calloc((size_t)n_chunks, sizeof *job.chunk);
+	if (job.chunk == NULL)
 		return PSR_ERR_MEMORY;
 	psr_pool_for(level->pool, n_chunks, dice_chunk, &job);
-	rc = cover_lists(level, job.list, n_chunks);
 	for (int i = 0; i < n_chunks; i++)
-		free(job.list[i].spot);
-	free(job.list);
+		rc = job.chunk[i].failed ? PSR_ERR_MEMORY : rc;
+	if (rc == PSR_OK)
+		rc = cover_chunks(level, &job, n_chunks);
+	for (int i = 0; i < n_chunks; i++) {
+		free(job.chunk[i].thin.spot);
+		free(job.chunk[i].rest.spot);
+	}
+	free(job.chunk);
 	return rc;
 }
 

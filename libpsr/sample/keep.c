@@ -96,7 +96,7 @@ int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3
 	return (level->sides[prim] & both) == both || (seen_is(&level->seen, p, back) && seen_is(&level->seen, p, n));
 }
 
-static void mark_kept(struct level *level, const struct level_ref *ref)
+void keep_mark(struct level *level, const struct level_ref *ref)
 {
 	struct patch *patch = &level->sheets[ref->projection].patch[ref->at.patch];
 
@@ -111,7 +111,7 @@ int keep_sample(struct level *level, struct level_ref ref)
 	if ((level->sheets[ref.projection].patch[ref.at.patch].kept >> ref.at.sample & 1) != 0)
 		return PSR_OK;
 	make_point(level, &ref, &point);
-	mark_kept(level, &ref);
+	keep_mark(level, &ref);
 	return cover_add(&level->cover, &point);
 }
 
@@ -133,6 +133,23 @@ static void make_chunk(int i, void *userdata)
 		make_point(job->level, &job->ref[k], &job->point[k]);
 }
 
+int keep_samples(struct level *level, const struct level_ref *ref, uint32_t n)
+{
+	struct job job = { .level = level, .ref = ref, .n = n };
+	int rc = PSR_OK;
+
+	job.point = psr_alloc_array(n, sizeof *job.point);
+	if (job.point == NULL)
+		return PSR_ERR_MEMORY;
+	psr_pool_for(level->pool, (int)((n + CHUNK - 1) / CHUNK), make_chunk, &job);
+	for (uint32_t i = 0; rc == PSR_OK && i < n; i++) {
+		keep_mark(level, &ref[i]);
+		rc = cover_add(&level->cover, &job.point[i]);
+	}
+	psr_free(job.point);
+	return rc;
+}
+
 static uint32_t list_owned(struct level *level, struct level_ref *ref)
 {
 	uint32_t n = 0;
@@ -149,24 +166,13 @@ static uint32_t list_owned(struct level *level, struct level_ref *ref)
 
 int keep_owned(struct level *level)
 {
-	struct job job = { .level = level, .n = list_owned(level, NULL) };
-	struct level_ref *ref = psr_alloc_array(job.n, sizeof *ref);
-	int rc = PSR_OK;
+	struct level_ref *ref = psr_alloc_array(list_owned(level, NULL), sizeof *ref);
+	int rc;
 
-	job.ref = ref;
-	job.point = psr_alloc_array(job.n, sizeof *job.point);
-	if (ref == NULL || job.point == NULL)
-		rc = PSR_ERR_MEMORY;
-	if (rc == PSR_OK) {
-		list_owned(level, ref);
-		psr_pool_for(level->pool, (int)((job.n + CHUNK - 1) / CHUNK), make_chunk, &job);
-	}
-	for (uint32_t i = 0; rc == PSR_OK && i < job.n; i++) {
-		mark_kept(level, &ref[i]);
-		rc = cover_add(&level->cover, &job.point[i]);
-	}
+	if (ref == NULL)
+		return PSR_ERR_MEMORY;
+	rc = keep_samples(level, ref, list_owned(level, ref));
 	psr_free(ref);
-	psr_free(job.point);
 	return rc;
 }
 

@@ -4,6 +4,7 @@
 #include "../base/mem.h"
 #include "level.h"
 #include "psr/error.h"
+#include "thin_cover.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
 #define FIELD_PIXELS 3
@@ -40,6 +41,7 @@ static int prepare(struct level *level)
 	if (rc == PSR_OK) {
 		memset(level->sides, 0, n_prims);
 		thin_mark(level);
+		thin_mark_narrow(level);
 	}
 	if (rc == PSR_OK)
 		rc = field_init(&level->field, FIELD_PIXELS * level->ds);

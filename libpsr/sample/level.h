@@ -21,8 +21,10 @@
 #include "texture.h"
 
 /* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same plain
- * material, as of needles and leaves. A sample there stands for the other side, too. */
-enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16 };
+ * material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: so is what is thin and
+ * narrower than half a pixel. */
+enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16,
+            SIDE_NARROW = 32 };
 
 struct level {
 	const struct psr_mesh *mesh;
@@ -67,6 +69,10 @@ int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3
 /* Keeps what is owned, or a single sample. MEMORY. */
 int keep_owned(struct level *level);
 int keep_sample(struct level *level, struct level_ref ref);
+int keep_samples(struct level *level, const struct level_ref *ref, uint32_t n); /* none of them is kept yet, or only marked */
+
+/* Marks a sample as kept, which keep_samples() is to follow. */
+void keep_mark(struct level *level, const struct level_ref *ref);
 
 /* After more was seen: which samples are of thin sheets. */
 void keep_look_again(struct level *level);
@@ -75,6 +81,9 @@ struct surface_spot {
 	float p[3], n[3];  /* n: unit, on the side that counts */
 	uint32_t surface;  /* as in struct sheet_sample */
 };
+
+/* A kept sample within as many pixels is in every pixel that has the place in its middle. */
+#define LEVEL_NEAR 0.5
 
 /* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
  * greater. MEMORY. */

@@ -141,7 +141,8 @@ static void mark_seen(int i, void *userdata)
 	}
 }
 
-/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled. */
+/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and on what is narrow,
+ * samples are chosen where places are tested. */
 static void drop_hidden(int i, void *userdata)
 {
 	struct level *level = userdata;
@@ -159,7 +160,7 @@ static void drop_hidden(int i, void *userdata)
 
 			if (is_both)
 				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_seen(level, sheets, p, s, 1));
-			if (!is_kept)
+			if (!is_kept || (level->sides[surface & ~SHEET_BACK] & SIDE_NARROW) != 0)
 				patch->owned &= ~(UINT64_C(1) << s);
 		}
 	}
