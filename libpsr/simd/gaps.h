@@ -30,7 +30,7 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 		float *z = &tile->z[i][GAPS_LEFT];
 		int32_t has_samples = 0;
 		const int is_inside = tile->y0 + i >= 1 && tile->y0 + i <= stack->height;
-		const uint64_t *word = stack->word + (is_inside ? (size_t)(tile->y0 + i - 1) * stack->width : 0) + tile->x0;
+		const uint64_t *word = psr_zstack_row(stack, is_inside ? tile->y0 + i - 1 : 0) + tile->x0;
 		const uint32_t n = is_inside ? tile->width : 0;
 		for (uint32_t x = 0; x < n; x++)
 			z[x] = depth_of(word[x]);
