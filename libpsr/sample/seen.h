@@ -18,10 +18,10 @@ struct seen {
 int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
 
 /* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what 64 of
- * them met at most one in `enough` places had not been seen by any earlier one, or until there were 1,024. MEMORY. */
+ * them met at most one in `enough` places had not been seen by any earlier one, or until there were 512. MEMORY. */
 #define SEEN_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
 #define SEEN_LEAST_VIEWS 64
-#define SEEN_MOST_VIEWS 1024
+#define SEEN_MOST_VIEWS 512
 int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
 void seen_fini(struct seen *seen);
 

@@ -6,7 +6,7 @@
 #include "psr/error.h"
 #include "thin_choose.h"
 
-#define MOST_MOVE 0.5 /* pixels */
+#define MOST_MOVE 0.4 /* pixels */
 #define MOST_GAIN 64  /* places that a candidate covers; more count as so many */
 #define NOBODY UINT32_MAX
 
