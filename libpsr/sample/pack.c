@@ -177,7 +177,8 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and those that the samples are drawn by. */
+/* The cone holds the normals of the faces, and those that the samples are drawn by. A block that is seen from both sides has
+ * none. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
@@ -185,7 +186,7 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 	int8_t axis[3];
 	int n = 0;
 
-	for (uint64_t left = block->part; left != 0; left &= left - 1) {
+	for (uint64_t left = block->two_sided ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SHEET_BACK);
 
