@@ -22,8 +22,8 @@ struct cull_chunk {
 	float depth_error; /* greatest half step of depth, in pixels */
 };
 
-/* The masks of the screen's regions, for one instance ([G] 6.3). In the place of the smallest node of a tree that holds a block there is
- * one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
+/* The masks of the screen's regions, for one instance ([G] 6.3). In the place of the smallest node of a tree that
+ * holds a block there is one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
 struct screen_masks {
 	uint64_t range[SCREEN_RANGES * SCREEN_RANGES][2];
 };
@@ -105,13 +105,14 @@ static void masks_make(struct screen_masks *masks, const struct plan *plan, cons
 		for (int x0 = 0; x0 <= x1; x0++)
 			for (int y1 = 0; y1 < SCREEN_SIDE; y1++)
 				for (int y0 = 0; y0 <= y1; y0++)
-					for (int r = 0; r < (x1 - x0 + 1) * (y1 - y0 + 1); r++)
+					for (int r = 0, across = x1 - x0 + 1; r < across * (y1 - y0 + 1); r++)
 						for (int w = 0; w < 2; w++)
 							masks->range[screen_range(x0, x1) * SCREEN_RANGES + screen_range(y0, y1)][w] |=
-								region[node_of((uint32_t)(x0 + r % (x1 - x0 + 1)), (uint32_t)(y0 + r / (x1 - x0 + 1)))][w];
+								region[node_of((uint32_t)(x0 + r % across), (uint32_t)(y0 + r / across))][w];
 }
 
-static inline int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block, uint32_t range)
+static inline int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block,
+                             uint32_t range)
 {
 	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[range];
 	return !((own[0] & seen[0]) | (own[1] & seen[1]));
@@ -127,8 +128,8 @@ static inline uint32_t count_bits(uint64_t word)
 }
 
 /* Takes over what a batch says of its blocks. */
-static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, uint32_t *count, const struct cull_batch *batch,
-                                   uint32_t first, uint32_t n, struct cull_hit *hit)
+static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, uint32_t *count,
+                                   const struct cull_batch *batch, uint32_t first, uint32_t n, struct cull_hit *hit)
 {
 	const struct plan *plan = cull->plan;
 	const struct plan_instance *in = &plan->instance[chunk->instance];
@@ -337,7 +338,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = room_for(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
 	bins->group = room_for(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
-	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles, sizeof *bins->count);
+	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles,
+	                       sizeof *bins->count);
 	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
 	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
 	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
@@ -382,8 +384,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 
 size_t bins_bytes(const struct bins *bins)
 {
-	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity + bins->masks_capacity +
-	       bins->group_capacity + bins->count_capacity + bins->tile_capacity;
+	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity +
+	       bins->masks_capacity + bins->group_capacity + bins->count_capacity + bins->tile_capacity;
 }
 
 void bins_clear(struct bins *bins)

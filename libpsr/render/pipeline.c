@@ -171,7 +171,8 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	}
 	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, n_words * 8 + area * 4 * 2 + cells * 4 + n_bricks);
 	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
-	r->counters = psr_grow_huge(r->counters, &r->counters_size, n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
+	r->counters = psr_grow_huge(r->counters, &r->counters_size,
+	                            n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
 		return PSR_ERR_MEMORY;
 	r->tile = r->counters;

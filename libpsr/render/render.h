@@ -127,8 +127,9 @@ struct warp_counts {
 	int with_occlusion;
 };
 
-/* Words to be left between the rows of a picture: so many that pixels one below the other differ in the lower 12 bits of their
- * addresses, by which a core tells a load from the stores before it, and lie in different sets of its first cache. */
+/* Words to be left between the rows of a picture: so many that pixels one below the other differ in the lower 12 bits
+ * of their addresses, by which a core tells a load from the stores before it, and lie in different sets of its first
+ * cache. */
 uint32_t warp_gap(uint32_t width);
 
 /* Clears a tile and draws its blocks. */

@@ -145,9 +145,10 @@ static int most_frequent_level(const struct bin_entry *entry, uint32_t n)
 	return most;
 }
 
-/* Cells of one level are taken from the words after its blocks were drawn as those without cells are, and before any others. */
-static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *target, uint32_t levels, const struct bin_entry *entry,
-                             uint32_t n)
+/* Cells of one level are taken from the words after its blocks were drawn as those without cells are, and before any
+ * others. */
+static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *target, uint32_t levels,
+                             const struct bin_entry *entry, uint32_t n)
 {
 	const int first = most_frequent_level(entry, n);
 	uint64_t n_inside = 0;

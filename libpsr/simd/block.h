@@ -52,7 +52,8 @@ static inline void warp_terms_make(struct warp_terms *out, const struct warp_blo
 }
 
 /* Axis a of the sample of row r and column c: (7.6)'s x', y' or z'. */
-static inline float warp_axis(const struct warp_terms *terms, const struct warp_block *b, int a, uint32_t r, uint32_t c, float depth)
+static inline float warp_axis(const struct warp_terms *terms, const struct warp_block *b, int a, uint32_t r, uint32_t c,
+                              float depth)
 {
 	return (terms->row[a][r] + terms->col[a][c]) + depth * b->unit[a];
 }

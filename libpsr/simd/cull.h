@@ -27,8 +27,8 @@ static inline int32_t region_of(int32_t pixel, float from, float scale)
 	return (int32_t)psr_choose(low < most, low, most);
 }
 
-/* What the long loops work on is of 32 bits, since with narrower numbers the compiler takes several vectors at a time, for which there are
- * not enough registers; and of whole vectors, since most clusters are smaller than a batch. */
+/* What the long loops work on is of 32 bits, since with narrower numbers the compiler takes several vectors at a
+ * time, for which there are not enough registers; and of whole vectors, since most clusters are smaller than a batch. */
 #define LANES 16
 struct widened {
 	float x[CULL_BATCH], y[CULL_BATCH], z[CULL_BATCH], r[CULL_BATCH];
@@ -63,7 +63,8 @@ static void widen_cones(struct widened *restrict to, const struct psr_blocks *b,
 	}
 }
 
-static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view, const struct widened *restrict b, uint32_t n)
+static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view,
+                            const struct widened *restrict b, uint32_t n)
 {
 	const struct cull_view v = *view;
 	const float half_width = v.center_x, half_height = v.center_y;
@@ -121,7 +122,8 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 	}
 }
 
-static void cull_by_cones(struct cull_batch *restrict out, const struct cull_view *view, const struct widened *restrict b, uint32_t n)
+static void cull_by_cones(struct cull_batch *restrict out, const struct cull_view *view,
+                          const struct widened *restrict b, uint32_t n)
 {
 	const int is_perspective = view->perspective;
 	const float eye_x = view->eye[0], eye_y = view->eye[1], eye_z = view->eye[2];

@@ -31,24 +31,26 @@ struct cull_view {
 	float focal, near_z, width, height;
 	float center_x, center_y; /* pixels: where the view axis meets the picture */
 	int with_cones, with_splats;
-	/* What visibility masks are tested against ([G] 6.3: 4x4 regions of the picture): region a of a pixel is region_scale[a] times
-	 * the pixel's place plus region_from[a]. */
+	/* What visibility masks are tested against ([G] 6.3: 4x4 regions of the picture): region a of a pixel is
+	 * region_scale[a] times the pixel's place plus region_from[a]. */
 	float region_from[2], region_scale[2];
 };
 
-/* Pixels that a length across the surface can be stretched to where it lies in a sphere: |d(x'/z')| <= |p| |dp| / z'^2, which
- * is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the angle between p and the
- * axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound it, the latter as far from the
- * centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees, only |p| and z' do. */
+/* Pixels that a length across the surface can be stretched to where it lies in a sphere: |d(x'/z')| <= |p| |dp| /
+ * z'^2, which is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the
+ * angle between p and the axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound
+ * it, the latter as far from the centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees,
+ * only |p| and z' do. */
 static inline float cull_stretch(const struct cull_view *v, float cx, float cy, float cz, float r)
 {
 	const float front = cz - r, near = psr_choose(front > v->near_z, front, v->near_z);
 	const float side2 = cx * cx + cy * cy, distance2 = side2 + cz * cz, rim2 = distance2 - r * r;
 	const float reach = __builtin_sqrtf(distance2) + r;
-	const float cosine = cz * __builtin_sqrtf(psr_where(rim2 > 0, rim2)) - __builtin_sqrtf(side2) * r; /* times distance2 */
+	/* The cosine times distance2. */
+	const float cosine = cz * __builtin_sqrtf(psr_where(rim2 > 0, rim2)) - __builtin_sqrtf(side2) * r;
 	const int is_sharp = (rim2 > 0) & (cosine > 0) & (distance2 * near < reach * cosine);
-	const float stretch = v->focal * psr_choose(is_sharp, distance2, reach) / (near * psr_choose(is_sharp, cosine, near));
-	return psr_choose(v->perspective, stretch, v->focal);
+	const float above = psr_choose(is_sharp, distance2, reach), below = near * psr_choose(is_sharp, cosine, near);
+	return psr_choose(v->perspective, v->focal * above / below, v->focal);
 }
 
 #define SCREEN_SPLITS 2
@@ -67,9 +69,11 @@ struct cull_batch {
 	int32_t is_mixed[CULL_BATCH]; /* 1: some of its samples may face away */
 	int32_t level[CULL_BATCH];    /* of the depth buffer that fits; PSR_MAX_DEPTH_LEVEL + 1 and more do not exist */
 	int32_t x0[CULL_BATCH], x1[CULL_BATCH], y0[CULL_BATCH], y1[CULL_BATCH]; /* pixels, inclusive, with the guard band */
-	/* Tiles, inclusive, that a sample can fall into or, with splats, a splat can reach; of the border's those that own the guard band. */
+	/* Tiles, inclusive, that a sample can fall into or, with splats, a splat can reach; of the border's those that
+	 * own the guard band. */
 	int32_t tile_x0[CULL_BATCH], tile_x1[CULL_BATCH], tile_y0[CULL_BATCH], tile_y1[CULL_BATCH];
-	int32_t range[CULL_BATCH];     /* of regions that the pixels lie in: screen_range of x, times SCREEN_RANGES, plus that of y */
+	/* Of regions that the pixels lie in: screen_range of x, times SCREEN_RANGES, plus that of y. */
+	int32_t range[CULL_BATCH];
 	float near[CULL_BATCH];        /* no sample's z' is less */
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels */
 };
@@ -79,14 +83,14 @@ typedef void cull_fn(struct cull_batch *out, const struct cull_view *view, uint3
 
 /* ---- warp ([G] 7.1, 7.2) ---- */
 
-/* The lattice of one projection in the picture of a frame, at level 0; at level l all but `origin` is 2^l times as long,
- * exactly. Axis a is u z', v z' or z' (without z' if orthographic). A sample of row r and column c at depth z is at
- * origin + (8 block row + r) down + (8 block column + c + (r & 1) / 2) step + z along.
+/* The lattice of one projection in the picture of a frame, at level 0; at level l all but `origin` is 2^l times as
+ * long, exactly. Axis a is u z', v z' or z' (without z' if orthographic). A sample of row r and column c at depth z
+ * is at origin + (8 block row + r) down + (8 block column + c + (r & 1) / 2) step + z along.
  *
- * Of [G]'s forms this is the incremental one, (7.6): p, q and r are the terms of row and column, looked up and not accumulated,
- * so that no rounding adds up along a row and holes cost nothing. A row's term is a double until it is the block's, so that
- * places are as exact where the eye is near. All projections use it: (7.6') is no faster, and off by pixels where A_zz is
- * near 0 (tests/simd/forms --bench). */
+ * Of [G]'s forms this is the incremental one, (7.6): p, q and r are the terms of row and column, looked up and not
+ * accumulated, so that no rounding adds up along a row and holes cost nothing. A row's term is a double until it is
+ * the block's, so that places are as exact where the eye is near. All projections use it: (7.6') is no faster, and
+ * off by pixels where A_zz is near 0 (tests/simd/forms --bench). */
 struct warp_lattice {
 	double origin[3], step[3], down[3], along[3];
 	double row[3][8]; /* r * down + (r & 1) / 2 * step */
@@ -136,8 +140,8 @@ typedef uint64_t warp_fn(const struct warp_target *target, const struct bin_entr
 /* Makes a tile empty: words, and cells of the levels of the bit mask. */
 typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 
-/* The cells of a level from the tile's words, of which each then has the least z' of its pixels: what lowering them sample by sample
- * gives where all that was drawn belongs to that level. Those of the guard band become empty. */
+/* The cells of a level from the tile's words, of which each then has the least z' of its pixels: what lowering them
+ * sample by sample gives where all that was drawn belongs to that level. Those of the guard band become empty. */
 typedef void warp_cells_fn(const struct warp_target *target, int level);
 
 /* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */

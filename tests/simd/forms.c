@@ -1,6 +1,6 @@
-/* The forms of the warp's arithmetic that [G] 7.1 gives, beside the one that frames run: each is as far from doubles as its
- * roundings allow, and no further. With --bench: nanoseconds a sample by instruction set, and errors by how obliquely a
- * projection is seen. */
+/* The forms of the warp's arithmetic that [G] 7.1 gives, beside the one that frames run: each is as far from doubles
+ * as its roundings allow, and no further. With --bench: nanoseconds a sample by instruction set, and errors by how
+ * obliquely a projection is seen. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -172,10 +172,13 @@ BODY looked_up_optimized(struct places *restrict out, const struct job *restrict
 	float depth[SAMPLES];
 	widen(depth, job->depth);
 	for (int i = 0; i < 8; i++) {
-		double row[3], col[3];
-		reduce(row, (const double[3]){ b->origin[0] + job->lattice.row[0][i], b->origin[1] + job->lattice.row[1][i],
-		                               b->origin[2] + job->lattice.row[2][i] }, along);
-		reduce(col, (const double[3]){ i * job->lattice.step[0], i * job->lattice.step[1], i * job->lattice.step[2] }, along);
+		double row[3], col[3], from[3];
+		for (int a = 0; a < 3; a++)
+			from[a] = b->origin[a] + job->lattice.row[a][i];
+		reduce(row, from, along);
+		for (int a = 0; a < 3; a++)
+			from[a] = i * job->lattice.step[a];
+		reduce(col, from, along);
 		for (int a = 0; a < 3; a++) {
 			terms.row[a][i] = (float)row[a];
 			terms.col[a][i] = (float)col[a];
@@ -193,11 +196,11 @@ BODY looked_up_optimized(struct places *restrict out, const struct job *restrict
 	}
 }
 
-#define FORMS_OF(isa, attributes)                                                                                       \
-	attributes static void direct_##isa(struct places *o, const struct job *j) { direct(o, j); }                        \
-	attributes static void incremental_##isa(struct places *o, const struct job *j) { incremental(o, j); }              \
-	attributes static void optimized_##isa(struct places *o, const struct job *j) { optimized(o, j); }                  \
-	attributes static void looked_up_##isa(struct places *o, const struct job *j) { looked_up(o, j); }                  \
+#define FORMS_OF(isa, attributes) \
+	attributes static void direct_##isa(struct places *o, const struct job *j) { direct(o, j); } \
+	attributes static void incremental_##isa(struct places *o, const struct job *j) { incremental(o, j); } \
+	attributes static void optimized_##isa(struct places *o, const struct job *j) { optimized(o, j); } \
+	attributes static void looked_up_##isa(struct places *o, const struct job *j) { looked_up(o, j); } \
 	attributes static void both_##isa(struct places *o, const struct job *j) { looked_up_optimized(o, j); }
 #define TABLE_OF(isa) { direct_##isa, incremental_##isa, optimized_##isa, looked_up_##isa, both_##isa }
 
@@ -254,8 +257,8 @@ static void random_job(struct job *job, int is_near)
 	job->bias = floor(random_between(-0.55, 0.55) * 16384) / 16384;
 	job->step = 0x1p-24;
 	for (int a = 0; is_near && a < 3; a++)
-		center[a] = (a == 2 ? 1.0 / 16 : 0) - to_camera[a][0] * job->col * job->dx - to_camera[a][1] * job->row * job->dy -
-		            to_camera[a][2] * job->bias;
+		center[a] = (a == 2 ? 1.0 / 16 : 0) - to_camera[a][0] * job->col * job->dx -
+		            to_camera[a][1] * job->row * job->dy - to_camera[a][2] * job->bias;
 	for (int a = 0; a < 3; a++) {
 		const double scale = a < 2 ? focal : 1, half = a < 2 ? PICTURE / 2 : 0;
 		l->step[a] = job->dx * (scale * to_camera[a][0] + half * to_camera[2][0]);
@@ -276,7 +279,8 @@ static void random_job(struct job *job, int is_near)
 		job->by_column[8 * (i & 7) + (i >> 3)] = job->depth[i] = (uint16_t)random_between(0, 65536);
 }
 
-/* What a sum of terms and its errors are made of, in doubles: roundings, of 2^-24 of the terms' sum of magnitudes each. */
+/* What a sum of terms and its errors are made of, in doubles: roundings, of 2^-24 of the terms' sum of magnitudes
+ * each. */
 struct sum {
 	double value, size;
 };
@@ -312,9 +316,9 @@ static struct sum axis_of(const struct job *job, enum form form, int a, int r, i
 	return sum;
 }
 
-/* Roundings that a term meets on its way into x', y' or z', at most. Direct: y twice, a coefficient, a product and three
- * sums. Incremental: a coefficient, seven sums down the rows, seven along one, and that of depth. Looked up: a row or column
- * and two sums; of depth a coefficient, a product and a sum. */
+/* Roundings that a term meets on its way into x', y' or z', at most. Direct: y twice, a coefficient, a product and
+ * three sums. Incremental: a coefficient, seven sums down the rows, seven along one, and that of depth. Looked up: a
+ * row or column and two sums; of depth a coefficient, a product and a sum. */
 static const double roundings[N_FORMS] = { 7, 16, 16, 3, 3 };
 
 struct error {
@@ -395,8 +399,9 @@ static int run_bench(void)
 	struct places places;
 	for (int j = 0; j < JOBS; j++)
 		random_job(&job[j], 0);
-	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in pixels of a picture\n"
-	       "of %g, of projections at |A_zz| of 1/2 and more, 1/16 to 1/2, and less; and of the first seen from %g times as near\n",
+	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in pixels of a\n"
+	       "picture of %g, by |A_zz| of the projection: from 1/2, from 1/16, less; and of the first seen from %g times\n"
+	       "as near\n",
 	       PICTURE, DISTANCE * 16);
 	for (int form = 0; form < N_FORMS; form++) {
 		double most[4] = { 0, 0, 0, 0 };

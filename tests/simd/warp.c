@@ -1,4 +1,5 @@
-/* warp, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level of the depth buffer. */
+/* warp, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level
+ * of the depth buffer. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"

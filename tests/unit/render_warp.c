@@ -99,7 +99,8 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 	psr_renderer_destroy(renderer);
 }
 
-/* Whole in the picture and cut off by its borders, where cells of the guard band count; levels alone and side by side in a tile. */
+/* Whole in the picture and cut off by its borders, where cells of the guard band count; levels alone and side by side
+ * in a tile. */
 static void tiles_and_turns_give_what_all_samples_give(void **state)
 {
 	static const uint32_t side[][2] = { { 512, 512 }, { 301, 199 }, { 1020, 130 } };

@@ -74,9 +74,10 @@ static inline void list_cells(struct cells *list, const struct warp_cells *cells
 	list->n += (uint32_t)__builtin_popcount(k);
 }
 
-/* Words of the lanes of k, from element n of the list on; returns where they end. Most often all samples of a block that is not mixed are
- * listed, and nothing needs to be moved together. */
-static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, __m512i at, __m512i id, __m512i z)
+/* Words of the lanes of k, from element n of the list on; returns where they end. Most often all samples of a block
+ * that is not mixed are listed, and nothing needs to be moved together. */
+static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, __m512i at,
+                                  __m512i id, __m512i z)
 {
 	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 	const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
