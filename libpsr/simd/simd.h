@@ -146,7 +146,7 @@ typedef void warp_cells_fn(const struct warp_target *target, int level);
 
 /* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */
 
-#define STRIP 256
+#define STRIP 128
 #define STRIP_PADDING 16 /* elements that listing may write beyond the last */
 
 enum strip_needs {
@@ -173,7 +173,7 @@ struct strip {
 	int is_specular;         /* some sample is, or the view wants it so */
 	uint64_t attr[STRIP];
 	uint64_t normal_word[STRIP];
-	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
+	float px[STRIP], py[STRIP], pz[STRIP]; /* where they are located */
 	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
 	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
 	float dr[STRIP], dg[STRIP], db[STRIP];
@@ -212,9 +212,11 @@ typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, co
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
-/* What else is needed of samples that are read: turned normals, positions, lines of sight. Clears the light to `ambient`
- * and no highlight. */
+/* What else is needed of samples that are read: turned normals, lines of sight. Clears the light to `ambient` and no
+ * highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
+/* Where samples that are read are, from their lattices, as the warp computes it. */
+typedef void strip_locate_fn(struct strip *strip, const struct strip_view *view);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
 typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
@@ -369,6 +371,7 @@ struct simd {
 	strip_find_fn *strip_find;
 	strip_read_fn *strip_read;
 	strip_resolve_fn *strip_resolve;
+	strip_locate_fn *strip_locate;
 	strip_shadow_fn *strip_shadow;
 	strip_light_fn *strip_light;
 	strip_lit_fn *strip_lit;

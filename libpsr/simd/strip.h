@@ -32,6 +32,8 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
 			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
 			__builtin_prefetch(p->at[i]);
+			if (view->needs & STRIP_POSITION)
+				__builtin_prefetch(b.depth + (p->at[i] - b.attr));
 		}
 	}
 	repeat_last(p);
@@ -76,37 +78,6 @@ static inline void strip_read(struct strip *strip, const struct strip_view *view
 		read_specular(strip, 0);
 }
 
-/* Where samples are, from their lattices, as the warp computes it: in the picture. Pixels side by side are often of one
- * block. */
-static void locate(struct strip *strip, const struct warp_instance *in, uint32_t first, uint32_t end)
-{
-	float *const to[3] = { strip->px, strip->py, strip->pz };
-	const uint32_t *id = strip->pixels->id;
-	struct warp_block b;
-	warp_block_make(&b, in, id[first] / PSR_BLOCK_SAMPLES);
-	for (uint32_t i = first; i < end; i++) {
-		const uint32_t sample = id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
-		if (id[i] - sample != b.id)
-			warp_block_make(&b, in, id[i] / PSR_BLOCK_SAMPLES);
-		const uint64_t below = b.mask & ((UINT64_C(1) << sample) - 1);
-		const float depth = (float)b.depth[__builtin_popcountll(below)], scale = (float)b.scale;
-		for (int a = 0; a < 3; a++)
-			to[a][i] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c]) + depth * b.unit[a];
-	}
-}
-
-/* Brings them back from the picture to the camera's axes. */
-static void bring_back(struct strip *strip, const struct strip_view *view)
-{
-	const float half_width = view->half_width, half_height = view->half_height, focal = view->focal;
-	const int perspective = view->perspective;
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const float w = psr_choose(perspective, strip->pz[i], 1);
-		strip->px[i] = (strip->px[i] - half_width * w) / focal;
-		strip->py[i] = (strip->py[i] - half_height * w) / focal;
-	}
-}
-
 static void look(struct strip *strip, const struct strip_view *view)
 {
 	const float scale = view->perspective ? 1 / view->focal : 0;
@@ -137,11 +108,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 		turn_normals(strip, in->turn, first, end);
-		if (view->needs & STRIP_POSITION)
-			locate(strip, in, first, end);
 	}
-	if (view->needs & STRIP_POSITION)
-		bring_back(strip, view);
 	for (uint32_t i = 0; i < n; i++) {
 		strip->lr[i] = ambient[0];
 		strip->lg[i] = ambient[1];
@@ -160,6 +127,27 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
 		}
+}
+
+static inline void strip_locate(struct strip *s, const struct strip_view *view)
+{
+	const struct strip_pixels *p = s->pixels;
+	float *const to[3] = { s->px, s->py, s->pz };
+	for (uint32_t i = 0, end; i < s->n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, s->n);
+		struct warp_block b;
+		warp_block_make(&b, in, p->id[i] / PSR_BLOCK_SAMPLES);
+		for (; i < end; i++) {
+			const uint32_t sample = p->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
+			if (p->id[i] - sample != b.id)
+				warp_block_make(&b, in, p->id[i] / PSR_BLOCK_SAMPLES);
+			const float depth = (float)b.depth[p->at[i] - b.attr], scale = (float)b.scale;
+			const struct warp_lattice *l = b.lattice;
+			for (int a = 0; a < 3; a++)
+				to[a][i] = ((float)(b.origin[a] + b.scale * l->row[a][r]) + scale * l->col[a][c]) + depth * b.unit[a];
+		}
+	}
+	bring_back(s, view);
 }
 
 static inline uint16_t light16(float linear)

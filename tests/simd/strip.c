@@ -1,4 +1,4 @@
-/* strip_list, strip_find, strip_read and strip_resolve: rows of 1 to STRIP pixels, one instance or some. */
+/* strip_list, strip_find, strip_read, strip_resolve and strip_locate: rows of 1 to STRIP pixels, one instance or some. */
 #include <stddef.h>
 #include <string.h>
 #include "psr/direction.h"
@@ -131,6 +131,8 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 		c->simd->strip_find(pixels, view);
 		c->simd->strip_read(strip, view);
 		c->simd->strip_resolve(strip, view, ambient);
+		if (needs & STRIP_POSITION)
+			c->simd->strip_locate(strip, view);
 		if (!c->is_bench)
 			settle(strip);
 	}
@@ -151,14 +153,20 @@ static void bench_resolve(struct check *c)
 	resolve(c, STRIP, 0, 0);
 }
 
+static void bench_locate(struct check *c)
+{
+	resolve(c, STRIP, STRIP_POSITION, 0);
+}
+
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
 		{ "strip_list: random rows", random_lists, 2000, NULL },
-		{ "strip_find, strip_read, strip_resolve: random samples", random_resolve, 1000, NULL },
-		{ "strip_find, strip_read, strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
+		{ "strip_find, strip_read, strip_resolve, strip_locate: random samples", random_resolve, 1000, NULL },
+		{ "strip_find, strip_read, strip_resolve, strip_locate: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
 		{ "strip_find, strip_read, strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
+		{ "the same, and strip_locate", bench_locate, 0, "sample" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }

@@ -13,7 +13,7 @@
 #include "render/block.h"
 #include "tests/unit/lib/shapes.h"
 
-#define WIDTH 531 /* strips of 256, 256, 19 */
+#define WIDTH 531 /* strips of 128, 128, 128, 128, 19 */
 #define HEIGHT 503
 #define PIXELS (WIDTH * HEIGHT)
 

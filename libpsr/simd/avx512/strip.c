@@ -1,4 +1,5 @@
 #include <immintrin.h>
+#include <string.h>
 #include "base/srgb.h"
 #include "simd/strip_parts.h"
 #include "simd/kernels.h"
@@ -17,7 +18,7 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 	__m512i x = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 	uint16_t *covered = (uint16_t *)p->covered;
 	uint32_t n = 0;
-	_mm256_storeu_si256((__m256i *)p->covered, _mm256_setzero_si256());
+	memset(p->covered, 0, sizeof p->covered);
 	for (uint32_t first = 0; first < n_pixels; first += 16) {
 		__mmask16 k = (__mmask16)lowest(n_pixels - first, 16);
 		_mm_prefetch((const char *)(word + first + AHEAD), _MM_HINT_T0);
