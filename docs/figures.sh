@@ -12,7 +12,7 @@ mkdir -p docs/figures "$keep"
 # Models of another sampler are of no use.
 find "$keep" -name '*.psr' ! -newer "$build/lib/libpsr-build.a" -delete
 
-[ $# -gt 0 ] || set -- gaps fill threshold highlights shadows backs set edges interfaces thin zoom
+[ $# -gt 0 ] || set -- gaps fill threshold highlights shadows backs set edges interfaces thin stills zoom
 for figure; do
 	echo "figure $figure" >&2
 	"$model" figures "$figure" --keep "$keep" --out docs/figures >"$work/table"

@@ -101,6 +101,16 @@ static int draw_twice(struct figure_frame *frame, struct figures *figures, const
 	return rc;
 }
 
+static int draw_smooth(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
+{
+	struct figure_shot other = *shot;
+
+	other.scene.instance = &other.instance;
+	other.scene.light = other.light;
+	other.settings.is_smooth = 1;
+	return figure_draw(frame, figures, &other);
+}
+
 /* The last pass but one of a still. */
 static int draw_refined(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
 {
@@ -145,6 +155,7 @@ int figure_run_edges(struct figures *figures)
 	static const struct figure_part part[] = { { 0, 0, 128, 128, 2 }, { 0, 0, 128, 128, 2 } };
 	static const struct figure_way way[] = {
 		{ "one pass", figure_draw, NULL },
+		{ "smooth", draw_smooth, NULL },
 		{ "2x2 sub-pixels", draw_twice, NULL },
 		{ "refined, pass 3", draw_refined, NULL },
 	};
@@ -160,6 +171,7 @@ int figure_run_thin(struct figures *figures)
 	static const struct figure_part part[] = { { 64, 64, 96, 96, 3 }, { 80, 60, 96, 96, 3 }, { 80, 80, 96, 96, 3 } };
 	static const struct figure_way way[] = {
 		{ "one pass", figure_draw, NULL },
+		{ "smooth", draw_smooth, NULL },
 		{ "refined, pass 3", draw_refined, NULL },
 	};
 	const struct figure_look look = { .magnification = 1, .width = 256, .height = 256, .rays = 8, .view = figure_view,

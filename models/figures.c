@@ -21,6 +21,7 @@ static const struct figure_kind {
 	{ "edges", "figure 9.1", "rough edges and passes over sub-pixels", figure_run_edges },
 	{ "interfaces", "figure 9.3", "interfaces between levels of the depth buffer", figure_run_interfaces },
 	{ "thin", "figure 9.4", "thin structures", figure_run_thin },
+	{ "stills", "section 9.1.1", "stills: resolution of the model, and passes", figure_run_stills },
 	{ "zoom", "section 9.1", "a zoom: error and popping, frame by frame", figure_run_zoom },
 };
 #define N_KINDS (sizeof kinds / sizeof *kinds)
@@ -59,7 +60,7 @@ static int run_figure(struct figures *figures, const struct figure_kind *kind)
 static void print_list(void)
 {
 	for (size_t i = 0; i < N_KINDS; i++)
-		printf("%-12s  [G] %-11s  %s\n", kinds[i].name, kinds[i].figure, kinds[i].what);
+		printf("%-12s  [G] %-13s  %s\n", kinds[i].name, kinds[i].figure, kinds[i].what);
 }
 
 int cmd_figures(int argc, char **argv)

@@ -162,6 +162,7 @@ int figure_run_set(struct figures *figures);
 int figure_run_edges(struct figures *figures);
 int figure_run_interfaces(struct figures *figures);
 int figure_run_thin(struct figures *figures);
+int figure_run_stills(struct figures *figures);
 int figure_run_zoom(struct figures *figures);
 
 #endif

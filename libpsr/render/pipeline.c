@@ -296,6 +296,8 @@ static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	r->gaps[row] = gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+	if (r->plan.with_splats)
+		r->gaps[row].n_marked += splat_close(&r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 	fill_look(&r->fill, (uint32_t)row);
 }
 

@@ -141,6 +141,12 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
                               uint32_t tile);
 
+/* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's threshold, where
+ * one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its brick. Of rows y0..y1-1, after
+ * gaps_rows. Returns how many there are. */
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1, uint16_t *weight,
+                     uint8_t *bricks);
+
 /* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 
 #define BRICK GAPS_BRICK /* pixels a side; bricks are numbered in rows, those at the border may be cut off */

@@ -1,3 +1,4 @@
+#include <math.h>
 #include "base/maths.h"
 #include "base/vec.h"
 #include "psr/direction.h"
@@ -161,4 +162,50 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	for (uint32_t e = bins->tile_begin[tile]; e < bins->tile_begin[tile + 1]; e++)
 		counts.n_inside += draw_block(&t, &bins->entry[e]);
 	return counts;
+}
+
+/* ---- holes between discs ---- */
+
+#define REACH 8 /* pixels */
+
+static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
+{
+	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
+		return NAN;
+	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
+}
+
+/* Whether what is before the pixel meets it in all eight directions, and is one surface. */
+static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
+{
+	static const int8_t way[8][2] = { { -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 } };
+	const float z = depth_at(stack, x, y);
+	float nearest = INFINITY, farthest = 0;
+	for (int w = 0; w < 8; w++) {
+		int is_met = 0;
+		for (int i = 1; i <= REACH && !is_met; i++) {
+			const float other = depth_at(stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
+			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
+			nearest = is_met && other < nearest ? other : nearest;
+			farthest = is_met && other > farthest ? other : farthest;
+		}
+		if (!is_met)
+			return 0;
+	}
+	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
+}
+
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1, uint16_t *weight,
+                     uint8_t *bricks)
+{
+	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
+	uint32_t n_closed = 0;
+	for (uint32_t y = y0; y < y1; y++)
+		for (uint32_t x = 0; x < stack->width; x++)
+			if (weight[(size_t)y * stack->width + x] && is_enclosed(plan, stack, x, y)) {
+				weight[(size_t)y * stack->width + x] = 0;
+				bricks[y / BRICK * bricks_x + x / BRICK] = 1;
+				n_closed++;
+			}
+	return n_closed;
 }

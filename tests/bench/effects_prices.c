@@ -26,7 +26,7 @@ struct look {
 	uint32_t n_small;        /* so many of an eighth of the size in the place of one */
 	double zoom;             /* 0: 1 */
 	unsigned without_tests;  /* enum psr_cull_test */
-	int is_full, has_depth;
+	int is_full, has_depth, is_smooth;
 };
 
 static const struct row {
@@ -58,6 +58,7 @@ static const struct row {
 	{ "samples apart", "twice as far", { .n_lights = 1, .kind = LEVEL_1 }, { .n_lights = 1 } },
 	{ "samples apart", "four times as far", { .n_lights = 1, .kind = LEVEL_2 }, { .n_lights = 1 } },
 	{ "surfaces", "two-sided", { .n_lights = 1, .kind = TWO_SIDED }, { .n_lights = 1 } },
+	{ "anti-aliasing", "smooth", { .n_lights = 1, .is_smooth = 1 }, { .n_lights = 1 } },
 	{ "planes", "depth", { .n_lights = 1, .has_depth = 1 }, { .n_lights = 1 } },
 	{ "not left out", "no cones", { .n_lights = 1, .without_tests = PSR_CULL_CONES }, { .n_lights = 1 } },
 	{ "not left out", "no masks", { .n_lights = 1, .without_tests = PSR_CULL_MASKS }, { .n_lights = 1 } },
@@ -161,6 +162,7 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 	psr_settings_default(&side->settings, SIDE, SIDE);
 	side->settings.cull_tests &= ~look->without_tests;
 	side->settings.is_full = look->is_full;
+	side->settings.is_smooth = look->is_smooth;
 	side->has_depth = look->has_depth;
 	side->scene = scene;
 	side->userdata = stage;

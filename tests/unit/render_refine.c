@@ -256,6 +256,39 @@ static void the_door_refuses_what_is_no_still(void **state)
 	still_clear(&s);
 }
 
+/* A hole of 5 x 5 pixels in a surface, one that shows another surface far behind, and a notch at the surface's end. */
+static void holes_between_discs_are_closed_and_notches_are_not(void **state)
+{
+	enum { WIDTH = 80, HEIGHT = 40 };
+	static const struct { uint32_t x, y; float z; } places[] = { { 10, 10, INFINITY }, { 30, 20, 9 }, { 55, 10, INFINITY } };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
+	uint64_t *word = malloc(WIDTH * HEIGHT * sizeof *word);
+	uint16_t weight[WIDTH * HEIGHT];
+	uint8_t bricks[6] = { 0 };
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word };
+
+	(void)state;
+	assert_non_null(word);
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const uint32_t x = i % WIDTH, y = i / WIDTH;
+		float z = x < 60 ? 2 : INFINITY;
+		for (size_t p = 0; p < sizeof places / sizeof *places; p++)
+			z = x - places[p].x < 5 && y - places[p].y < 5 ? places[p].z : z;
+		uint32_t bits;
+		memcpy(&bits, &z, sizeof bits);
+		word[i] = (uint64_t)bits << 32;
+		weight[i] = WEIGHT_ONE;
+	}
+	assert_int_equal(splat_close(&plan, &stack, 0, BRICK, weight, bricks), 2 * 25);
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const uint32_t x = i % WIDTH, y = i / WIDTH;
+		const int is_hole = (x - places[0].x < 5 && y - places[0].y < 5) || (x - places[1].x < 5 && y - places[1].y < 5);
+		assert_int_equal(weight[i], is_hole ? 0 : WEIGHT_ONE);
+	}
+	assert_true(bricks[0] && bricks[1] && !bricks[2]);
+	free(word);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -266,6 +299,7 @@ int main(void)
 		cmocka_unit_test(depth_is_that_of_the_nearest_sub_pixel),
 		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
+		cmocka_unit_test(holes_between_discs_are_closed_and_notches_are_not),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }
