@@ -166,12 +166,12 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 
 /* ---- holes between discs ---- */
 
-#define REACH 8 /* pixels */
+#define REACH 8 /* pixels, a power of two */
 
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
 	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
-		return NAN;
+		return INFINITY;
 	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
 }
 
@@ -195,17 +195,39 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
 }
 
+/* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
+static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, uint32_t n)
+{
+	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
+	for (uint32_t i = 0; i < n + 2 * REACH; i++)
+		nearest[i] = z[i] = depth_at(stack, (int64_t)x + i - REACH, y);
+	for (uint32_t step = 1, left = n + 2 * REACH; step < REACH; step *= 2) {
+		left -= step;
+		for (uint32_t i = 0; i < left; i++)
+			nearest[i] = nearest[i] < nearest[i + step] ? nearest[i] : nearest[i + step];
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
+		is_between[i] = farther * plan->gap_scale[1] + plan->gap_offset[1] < z[i + REACH];
+	}
+}
+
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1, uint16_t *weight,
                      uint8_t *bricks)
 {
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
+	uint8_t is_between[TILE_WIDTH];
 	uint32_t n_closed = 0;
 	for (uint32_t y = y0; y < y1; y++)
-		for (uint32_t x = 0; x < stack->width; x++)
-			if (weight[(size_t)y * stack->width + x] && is_enclosed(plan, stack, x, y)) {
+		for (uint32_t x = 0; x < stack->width; x++) {
+			const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
+			if (x % TILE_WIDTH == 0)
+				find_between(is_between, plan, stack, x, y, n);
+			if (is_between[x % TILE_WIDTH] && weight[(size_t)y * stack->width + x] && is_enclosed(plan, stack, x, y)) {
 				weight[(size_t)y * stack->width + x] = 0;
 				bricks[y / BRICK * bricks_x + x / BRICK] = 1;
 				n_closed++;
 			}
+		}
 	return n_closed;
 }

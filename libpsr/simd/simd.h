@@ -351,7 +351,7 @@ struct smooth_target {
 };
 
 /* The pixels x0 <= x < x1, y0 <= y < y1, of which SMOOTH_WIDTH at most are side by side: each becomes the mean of itself, four times,
- * and of those of its four neighbours that are of the same surface. An edge lets through what is behind it: an eighth of the mean
+ * and of its four neighbours, in the place of which it stands itself where they are not of the same surface. An edge lets through what is behind it: an eighth of the mean
  * of the neighbours there for each diagonal one and two for each other one, which count once and twice in that mean, six eighths
  * at most. Neighbours in front count nothing. Means are of squares of codes. Returns how many pixels have a neighbour behind. */
 typedef uint32_t smooth_fn(const struct smooth_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);

@@ -83,14 +83,14 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 		};
 		const int32_t sides = behind.above + behind.below + behind.left + behind.right;
 		const int32_t corners = behind.corner[0] + behind.corner[1] + behind.corner[2] + behind.corner[3];
-		const int32_t near = 4 - (same.above + same.below + same.left + same.right);
+		const int32_t others = 4 + (same.above + same.below + same.left + same.right);
 		const int32_t edges = -(2 * sides + corners), through = edges < MOST_BEHIND ? edges : MOST_BEHIND;
-		const float share = (float)(8 - through) / (float)(8 * near);
+		const float share = (float)(8 - through) * (1 / 64.0f);
 		const float rest = (float)through / (float)(8 * (edges ? edges : 1));
 		int32_t code[3];
 		for (int c = 0; c < 3; c++) {
 			const int32_t *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
-			const float front = (float)(4 * o[0] + add_sides(a, o, b, &same));
+			const float front = (float)((4 + others) * o[0] + add_sides(a, o, b, &same));
 			const float back = (float)(2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind));
 			code[c] = (int32_t)(__builtin_sqrtf(front * share + back * rest) + 0.5f);
 		}
