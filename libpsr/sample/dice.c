@@ -55,8 +55,8 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 	const struct level *level = job->level;
 	uint8_t sides = level->sides[prim];
 	const float *front = ray_scene_normal(level->scene, prim);
-	int is_two_sided = level_material(level, prim)->two_sided != 0, is_side_seen = 0, is_thin = level_is_thin(level, prim);
-	int rc = PSR_OK;
+	int is_two_sided = level_material(level, prim)->two_sided != 0, is_thin = level_is_thin(level, prim);
+	int is_side_seen = 0, rc = PSR_OK;
 
 	if (is_thin && spot_cells_has(&chunk->cells, p))
 		return;

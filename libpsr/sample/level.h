@@ -20,8 +20,8 @@
 #include "surface.h"
 #include "texture.h"
 
-/* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same plain
- * material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: so is what is thin and
+/* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same
+ * plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: it is thin, and
  * narrower than half a pixel. */
 enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16,
             SIDE_NARROW = 32 };

@@ -141,8 +141,8 @@ static void mark_seen(int i, void *userdata)
 	}
 }
 
-/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and on what is narrow,
- * samples are chosen where places are tested. */
+/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and samples of
+ * what is narrow are chosen when places are tested. */
 static void drop_hidden(int i, void *userdata)
 {
 	struct level *level = userdata;

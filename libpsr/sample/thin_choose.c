@@ -25,7 +25,8 @@ int thin_candidates_add(struct thin_candidates *list, const struct thin_candidat
 	return PSR_OK;
 }
 
-int thin_candidates_move(struct thin_candidates *list, const struct level *level, const struct surface_spot *spot, unsigned q)
+int thin_candidates_move(struct thin_candidates *list, const struct level *level, const struct surface_spot *spot,
+                         unsigned q)
 {
 	const struct sheets *sheets = &level->sheets[q];
 	struct thin_candidate candidate = { .ref = { q, { SHEET_NONE, 0 } }, .surface = spot->surface };
