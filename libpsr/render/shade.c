@@ -122,8 +122,6 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 		if (strip.pixels->n) {
 			simd->strip_read(&strip, &plan->view);
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
-			if (plan->view.needs & STRIP_POSITION)
-				simd->strip_locate(&strip, &plan->view);
 		}
 		const uint64_t middle = is_timed ? now_ns() : 0;
 		if (strip.pixels->n) {

@@ -8,7 +8,6 @@ warp_fn warp_c, warp_avx2, warp_avx512;
 /* The others of these: strip.h, fill.h. */
 strip_list_fn strip_list_avx512;
 strip_read_fn strip_read_avx512;
-strip_locate_fn strip_locate_avx512;
 strip_write_fn strip_write_avx512;
 fill_pull_fn fill_pull_avx512;
 fill_push_fn fill_push_avx512;

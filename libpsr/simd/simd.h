@@ -159,6 +159,7 @@ enum strip_needs {
 /* The covered pixels of a part of a row: pixel i is (x0 + x[i], y). */
 struct strip_pixels {
 	uint32_t n, x0, y;
+	const uint64_t *word;         /* of the part; not NULL where n is not 0 */
 	uint32_t covered[STRIP / 32]; /* bit x % 32 of covered[x / 32]: one of them has this x */
 	uint16_t x[STRIP + STRIP_PADDING];
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
@@ -173,7 +174,7 @@ struct strip {
 	int is_specular;         /* some sample is, or the view wants it so */
 	uint64_t attr[STRIP];
 	uint64_t normal_word[STRIP];
-	float px[STRIP], py[STRIP], pz[STRIP]; /* where they are located */
+	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
 	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
 	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
 	float dr[STRIP], dg[STRIP], db[STRIP];
@@ -203,8 +204,8 @@ struct strip_light {
 	float color[3];
 };
 
-/* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): covered, x,
- * id, n. */
+/* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): n,
+ * word, covered, x, id. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
 /* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks
  * are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before another
@@ -212,11 +213,9 @@ typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, co
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
-/* What else is needed of samples that are read: turned normals, lines of sight. Clears the light to `ambient` and no
- * highlight. */
+/* What else is needed of samples that are read: turned normals, lines of sight, and with STRIP_POSITION positions, at the
+ * centre of the pixel and the depth of its word. Clears the light to `ambient` and no highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
-/* Where samples that are read are, from their lattices, as the warp computes it. */
-typedef void strip_locate_fn(struct strip *strip, const struct strip_view *view);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
 typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
@@ -371,7 +370,6 @@ struct simd {
 	strip_find_fn *strip_find;
 	strip_read_fn *strip_read;
 	strip_resolve_fn *strip_resolve;
-	strip_locate_fn *strip_locate;
 	strip_shadow_fn *strip_shadow;
 	strip_light_fn *strip_light;
 	strip_lit_fn *strip_lit;

@@ -3,7 +3,6 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/srgb.h"
-#include "simd/block.h"
 #include "simd/strip_parts.h"
 
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
@@ -18,6 +17,7 @@ static inline void strip_list(struct strip_pixels *p, const uint64_t *word, cons
 		n += is_covered;
 	}
 	p->n = n;
+	p->word = word;
 }
 
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
@@ -32,8 +32,6 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
 			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
 			__builtin_prefetch(p->at[i]);
-			if (view->needs & STRIP_POSITION)
-				__builtin_prefetch(b.depth + (p->at[i] - b.attr));
 		}
 	}
 	repeat_last(p);
@@ -78,6 +76,21 @@ static inline void strip_read(struct strip *strip, const struct strip_view *view
 		read_specular(strip, 0);
 }
 
+/* A sample is less than a pixel from the centre of the one that shows it, and the centre is what a ray would meet. */
+static void locate(struct strip *strip, const struct strip_view *view)
+{
+	const struct strip_pixels *p = strip->pixels;
+	const float y = ((float)p->y + 0.5f - view->half_height) / view->focal;
+	for (uint32_t i = 0; i < strip->n; i++)
+		strip->pz[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) / view->focal;
+		const float w = psr_choose(view->perspective, strip->pz[i], 1);
+		strip->px[i] = x * w;
+		strip->py[i] = y * w;
+	}
+}
+
 static void look(struct strip *strip, const struct strip_view *view)
 {
 	const float scale = view->perspective ? 1 / view->focal : 0;
@@ -114,6 +127,8 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		strip->lg[i] = ambient[1];
 		strip->lb[i] = ambient[2];
 	}
+	if (view->needs & STRIP_POSITION)
+		locate(strip, view);
 	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
 		look(strip, view);
 	if (strip->is_specular)
@@ -127,27 +142,6 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
 		}
-}
-
-static inline void strip_locate(struct strip *s, const struct strip_view *view)
-{
-	const struct strip_pixels *p = s->pixels;
-	float *const to[3] = { s->px, s->py, s->pz };
-	for (uint32_t i = 0, end; i < s->n;) {
-		const struct warp_instance *in = instance_run(&end, p, view, i, s->n);
-		struct warp_block b;
-		warp_block_make(&b, in, p->id[i] / PSR_BLOCK_SAMPLES);
-		for (; i < end; i++) {
-			const uint32_t sample = p->id[i] % PSR_BLOCK_SAMPLES, r = sample >> 3, c = sample & 7;
-			if (p->id[i] - sample != b.id)
-				warp_block_make(&b, in, p->id[i] / PSR_BLOCK_SAMPLES);
-			const float depth = (float)b.depth[p->at[i] - b.attr], scale = (float)b.scale;
-			const struct warp_lattice *l = b.lattice;
-			for (int a = 0; a < 3; a++)
-				to[a][i] = ((float)(b.origin[a] + b.scale * l->row[a][r]) + scale * l->col[a][c]) + depth * b.unit[a];
-		}
-	}
-	bring_back(s, view);
 }
 
 static inline uint16_t light16(float linear)

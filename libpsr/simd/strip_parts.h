@@ -2,7 +2,6 @@
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
-#include "base/maths.h"
 #include "simd/simd.h"
 
 /* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
@@ -81,18 +80,6 @@ static inline void turn_normals(struct strip *strip, const float m[3][3], uint32
 		strip->nx[i] = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * (1 / 32767.0f);
 		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
 		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);
-	}
-}
-
-/* Positions in the picture to those in the camera's axes. */
-static inline void bring_back(struct strip *strip, const struct strip_view *view)
-{
-	const float half_width = view->half_width, half_height = view->half_height, focal = view->focal;
-	const int perspective = view->perspective;
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const float w = psr_choose(perspective, strip->pz[i], 1);
-		strip->px[i] = (strip->px[i] - half_width * w) / focal;
-		strip->py[i] = (strip->py[i] - half_height * w) / focal;
 	}
 }
 

@@ -20,7 +20,6 @@
 	.strip_find = strip_find,                      \
 	.strip_read = KERNEL(strip_read),              \
 	.strip_resolve = strip_resolve,                \
-	.strip_locate = STRIP_KERNEL(strip_locate),    \
 	.strip_shadow = strip_shadow,                  \
 	.strip_light = strip_light,                    \
 	.strip_lit = strip_lit,                        \

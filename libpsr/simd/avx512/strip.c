@@ -38,6 +38,7 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 		x = _mm512_add_epi32(x, _mm512_set1_epi32(16));
 	}
 	p->n = n;
+	p->word = word;
 }
 
 /* ---- read ---- */
