@@ -27,8 +27,10 @@ static void piece(struct check *c, uint32_t width, uint32_t height, uint32_t lev
 	stack->width = width;
 	stack->height = height;
 	stack->levels = levels & 0xfe;
-	stack->word = check_in(c, area, sizeof *stack->word);
-	for (size_t i = 0; i < area; i++)
+	stack->gap = check_one_in(c, 2) ? check_below(c, 20) : 0;
+	const size_t n_words = (size_t)(width + stack->gap) * height;
+	stack->word = check_in(c, n_words, sizeof *stack->word);
+	for (size_t i = 0; i < n_words; i++)
 		stack->word[i] = (uint64_t)psr_bits_from_float(random_depth(c, numbers)) << 32 | check_u32(c);
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		scale[k] = 1 + (check_one_in(c, 2) ? threshold * (float)(1 << k) : 0);

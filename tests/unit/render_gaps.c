@@ -75,7 +75,7 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
 	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
 		return INFINITY;
-	return psr_float_from_bits((uint32_t)(stack->word[(size_t)y * stack->width + (size_t)x] >> 32));
+	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
 }
 
 static int is_pinhole(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
@@ -121,10 +121,11 @@ static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stac
 
 static struct psr_zstack stack_make(uint32_t width, uint32_t height, uint32_t levels)
 {
-	struct psr_zstack stack = { .width = width, .height = height, .levels = levels };
-	stack.word = malloc((size_t)width * height * 8);
-	for (size_t i = 0; i < (size_t)width * height; i++)
-		stack.word[i] = PSR_WORD_EMPTY;
+	struct psr_zstack stack = { .width = width, .height = height, .gap = 3, .levels = levels };
+	const size_t stride = width + stack.gap;
+	stack.word = malloc(stride * height * 8);
+	for (size_t i = 0; i < stride * height; i++)
+		stack.word[i] = i % stride < width ? PSR_WORD_EMPTY : 0; /* between rows lies what no pixel may be taken for */
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack.level[k].width = ((width + (1u << k) - 1) >> k) + 2;
 		stack.level[k].height = ((height + (1u << k) - 1) >> k) + 2;
@@ -147,7 +148,7 @@ static void stack_free(struct psr_zstack *stack)
 
 static void set_depth(struct psr_zstack *stack, uint32_t x, uint32_t y, float z)
 {
-	stack->word[(size_t)y * stack->width + x] = (uint64_t)psr_bits_from_float(z) << 32 | 1;
+	psr_zstack_row(stack, y)[x] = (uint64_t)psr_bits_from_float(z) << 32 | 1;
 }
 
 /* A few surfaces, in pieces of a few pixels' width, with single pixels of others strewn in; cells likewise. */
@@ -251,7 +252,7 @@ static struct psr_zstack wall(void)
 
 static void empty(struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
-	stack->word[(size_t)y * stack->width + x] = PSR_WORD_EMPTY;
+	psr_zstack_row(stack, y)[x] = PSR_WORD_EMPTY;
 }
 
 static void a_pinhole_is_closed_before_background_and_before_a_surface(void **state)
