@@ -25,7 +25,8 @@ static int16_t to_steps(float n)
 	return (int16_t)(clamped + (clamped < 0 ? -0.5f : 0.5f));
 }
 
-static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip_pixels *pixels, uint32_t n)
+static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip_pixels *pixels,
+                        uint32_t n)
 {
 	struct strip_view view = plan->view;
 	struct strip strip;
@@ -38,9 +39,11 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 	simd->strip_read(&strip, &view);
 	simd->strip_resolve(&strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < pixels->n; i++)
-		for (int a = 0; a < 3; a++)
-			to[3 * pixels->x[i] + a] = to_steps(((float)plan->frame[0][a] * strip.nx[i] + (float)plan->frame[1][a] * strip.ny[i]) +
-			                                    (float)plan->frame[2][a] * strip.nz[i]);
+		for (int a = 0; a < 3; a++) {
+			const float right = (float)plan->frame[0][a], down = (float)plan->frame[1][a], forward = (float)plan->frame[2][a];
+			const float world = (right * strip.nx[i] + down * strip.ny[i]) + forward * strip.nz[i];
+			to[3 * pixels->x[i] + a] = to_steps(world);
+		}
 }
 
 static void put_instances(const struct plan *plan, uint32_t *to, const struct strip_pixels *pixels, uint32_t n)

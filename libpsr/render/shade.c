@@ -101,7 +101,8 @@ static void write_strip(const struct strip *strip, const struct shading *s)
 }
 
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
-                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts)
+                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
+                struct shade_counts *counts)
 {
 	const struct shading shading = { simd, plan, target, stack, weight };
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;

@@ -3,7 +3,8 @@
 #include "simd/strip_parts.h"
 
 /* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
-static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount, float x, float y, float z)
+static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount,
+                                   float x, float y, float z)
 {
 	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
 	const float diffuse = psr_where(facing > 0, facing) * amount;
@@ -23,16 +24,16 @@ static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular,
 	}
 }
 
-static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
-                                     int is_specular)
+static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip_light *light, const float *reaches,
+                                             int is_partial, int is_specular)
 {
 	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++)
 		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
 }
 
-static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches, int is_partial,
-                              int is_specular, int is_spot)
+static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches,
+                                      int is_partial, int is_specular, int is_spot)
 {
 	const struct strip_light l = *light;
 	for (uint32_t i = 0; i < s->n; i++) {
@@ -52,8 +53,8 @@ static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light 
 	}
 }
 
-static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches, int is_partial,
-                            int is_specular)
+static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches,
+                                    int is_partial, int is_specular)
 {
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
 		light_directional(strip, light, reaches, is_partial, is_specular);
@@ -75,8 +76,8 @@ static void strip_light(struct strip *strip, const struct strip_light *light, co
 		light_by(strip, light, NULL, 0, 0);
 }
 
-static void strip_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
-                      const float ambient[3], uint32_t first, uint32_t n)
+static void strip_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light,
+                      uint32_t n_lights, const float ambient[3], uint32_t first, uint32_t n)
 {
 	struct strip strip;
 	strip.n = n;

@@ -1,4 +1,5 @@
-/* strip_light, strip_lit, strip_color, strip_write and depth_row: 1 to STRIP samples, lights of each kind, any numbers. */
+/* strip_light, strip_lit, strip_color, strip_write and depth_row: 1 to STRIP samples, lights of each kind, any
+ * numbers. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>

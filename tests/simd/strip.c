@@ -166,7 +166,7 @@ int main(int argc, char **argv)
 	static const struct check_test tests[] = {
 		{ "strip_list: random rows", random_lists, 2000, NULL },
 		{ "strip_find, strip_read, strip_resolve: random samples", random_resolve, 1000, NULL },
-		{ "strip_find, strip_read, strip_resolve: infinite, huge, denormal and no numbers", spoilt_resolve, 1000, NULL },
+		{ "strip_find, strip_read, strip_resolve: any numbers", spoilt_resolve, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
 		{ "strip_find, strip_read, strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
 		{ "the same, with positions", bench_positions, 0, "sample" },

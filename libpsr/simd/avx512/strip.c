@@ -80,14 +80,14 @@ static void read_specular(struct strip *strip)
 	const __m512 root = _mm512_loadu_ps(exponent_root);
 	for (uint32_t i = 0; i < strip->n; i += 16) {
 		/* From the lowest bit on 8 of blue, 16 specular and 8 of the exponent. */
-		const __m512i low_attr = _mm512_loadu_si512(strip->attr + i), high_attr = _mm512_loadu_si512(strip->attr + i + 8);
-		const __m512i high = _mm512_permutex2var_epi32(low_attr, upper, high_attr);
+		const __m512i attr = _mm512_loadu_si512(strip->attr + i), next = _mm512_loadu_si512(strip->attr + i + 8);
+		const __m512i high = _mm512_permutex2var_epi32(attr, upper, next);
 		const __m512i power = _mm512_slli_epi32(_mm512_srli_epi32(high, 28), 23);
 		const __m512 exponent = _mm512_permutexvar_ps(_mm512_srli_epi32(high, 24), root);
 		_mm512_storeu_ps(strip->sr + i, look_up_5(five, _mm512_srli_epi32(high, 8)));
 		_mm512_storeu_ps(strip->sg + i, look_up_6(six, _mm512_srli_epi32(high, 13)));
 		_mm512_storeu_ps(strip->sb + i, look_up_5(five, _mm512_srli_epi32(high, 19)));
-		_mm512_storeu_ps(strip->exponent + i, _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(exponent), power)));
+		_mm512_storeu_si512(strip->exponent + i, _mm512_add_epi32(_mm512_castps_si512(exponent), power));
 	}
 }
 
@@ -126,8 +126,8 @@ static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uin
 	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
 }
 
-/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table look-ups one by
- * one are faster than gathers. */
+/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table look-ups
+ * one by one are faster than gathers. */
 static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
 	const uint16_t *dark = target->background;
