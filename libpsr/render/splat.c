@@ -1,4 +1,5 @@
 #include <math.h>
+#include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
 #include "psr/direction.h"
@@ -199,8 +200,20 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, uint32_t n)
 {
 	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
-	for (uint32_t i = 0; i < n + 2 * REACH; i++)
-		nearest[i] = z[i] = depth_at(stack, (int64_t)x + i - REACH, y);
+	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
+	const uint64_t *word = psr_zstack_row(stack, y) + x;
+	int has_any = 0;
+	for (uint32_t i = 0; i < REACH; i++)
+		nearest[i] = nearest[n + REACH + i] = z[i] = z[n + REACH + i] = INFINITY;
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t bits = (uint32_t)(word[(int32_t)i - REACH] >> 32);
+		nearest[i] = z[i] = psr_float_from_bits(bits);
+		has_any |= bits < (uint32_t)(PSR_WORD_EMPTY >> 32);
+	}
+	if (!has_any) {
+		memset(is_between, 0, n);
+		return;
+	}
 	for (uint32_t step = 1, left = n + 2 * REACH; step < REACH; step *= 2) {
 		left -= step;
 		for (uint32_t i = 0; i < left; i++)
