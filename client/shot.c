@@ -102,7 +102,7 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  "The greatest distance between neighbouring samples that is good enough, pixels: less is finer and slower.", 0, 0,
 		  NULL, NULL },
 		{ "smooth", 0, PSR_OPT_FLAG, &shot->is_smooth, NULL,
-		  "Anti-aliasing at a fifth of a frame's time: edges are blended with what is behind them, and pixels with their "
+		  "Anti-aliasing at a third of a frame's time: edges are blended with what is behind them, and pixels with their "
 		  "neighbours of the same surface.",
 		  0, 0, NULL, NULL },
 		{ "codec", 0, PSR_OPT_STRING, &shot->codec_text, "CODEC",

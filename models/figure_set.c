@@ -171,7 +171,6 @@ int figure_run_thin(struct figures *figures)
 	static const struct figure_part part[] = { { 64, 64, 96, 96, 3 }, { 80, 60, 96, 96, 3 }, { 80, 80, 96, 96, 3 } };
 	static const struct figure_way way[] = {
 		{ "one pass", figure_draw, NULL },
-		{ "smooth", draw_smooth, NULL },
 		{ "refined, pass 3", draw_refined, NULL },
 	};
 	const struct figure_look look = { .magnification = 1, .width = 256, .height = 256, .rays = 8, .view = figure_view,

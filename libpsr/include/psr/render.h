@@ -81,7 +81,7 @@ struct psr_settings {
 	/* The greatest distance between neighbouring samples that is good enough, in pixels: drawn is the coarsest level that
 	 * keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
 	double spacing;
-	/* 1: anti-aliasing of the frame ([G] 9.1.1), at a fifth of its time. A pixel at an edge, which any sample fills, is blended with
+	/* 1: anti-aliasing of the frame ([G] 9.1.1), at a third of its time. A pixel at an edge, which any sample fills, is blended with
 	 * what is behind the edge, by how many of its eight neighbours are there; others with the neighbours of their surface, since
 	 * a pixel shows one of the samples that fall into it. Only colour changes. 0 by default; passes above 0 do without. */
 	int is_smooth;
