@@ -91,8 +91,8 @@ int figure_run_stills(struct figures *figures)
 
 	if (rc == PSR_OK && psr_refiner_create(&still.refiner, figures->renderer) != PSR_OK)
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for passes");
-	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-10s %10s %5s |", RAYS * RAYS, SIDE, SIDE,
-	       figures->study.n_threads, "", "model's", "pixels");
+	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-10s %10s %5s |", RAYS * RAYS,
+	       SIDE, SIDE, figures->study.n_threads, "", "model's", "pixels");
 	for (int i = 0; i < 2 + PSR_MAX_PASS; i++)
 		printf(" %6s %6s", "dB", "ms");
 	printf("\n%-10s %10s %5s | %13s %13s", "", "resolution", "apart", "one pass", "smooth");

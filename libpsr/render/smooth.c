@@ -51,10 +51,13 @@ static void smooth_row(int row, void *userdata)
 }
 _Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_HEIGHT % BRICK == 0, "");
 
-uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool, uint8_t *rgb)
+uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                        uint8_t *rgb)
 {
 	const float step = (float)(EDGE / (double)plan->focal);
-	struct smoothing smoothing = { smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, 1 + step, 0 } };
+	struct smoothing smoothing = {
+		smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, 1 + step, 0 },
+	};
 	if (!plan->perspective) {
 		smoothing.target.scale = 1;
 		smoothing.target.offset = ldexpf(step, plan->exponent);

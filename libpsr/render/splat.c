@@ -179,7 +179,9 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 /* Whether what is before the pixel meets it in all eight directions, and is one surface. */
 static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
-	static const int8_t way[8][2] = { { -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 } };
+	static const int8_t way[8][2] = {
+		{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
+	};
 	const float z = depth_at(stack, x, y);
 	float nearest = INFINITY, farthest = 0;
 	for (int w = 0; w < 8; w++) {
@@ -197,7 +199,8 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 }
 
 /* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, uint32_t n)
+static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y,
+                         uint32_t n)
 {
 	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
 	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;

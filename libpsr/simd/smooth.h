@@ -67,8 +67,8 @@ static inline int32_t is_same(float z, float limit, float other, float others_li
 }
 
 /* Returns how many pixels have a neighbour behind. */
-static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *restrict up, const struct smooth_row *restrict own,
-                              const struct smooth_row *restrict down, uint32_t n)
+static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *restrict up,
+                              const struct smooth_row *restrict own, const struct smooth_row *restrict down, uint32_t n)
 {
 	uint32_t n_edges = 0;
 	for (uint32_t i = 1; i <= n; i++) {

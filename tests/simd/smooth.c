@@ -3,7 +3,8 @@
 #include <string.h>
 #include "tests/simd/lib/check.h"
 
-static void smooth(struct check *c, uint32_t width, uint32_t height, uint32_t x0, uint32_t n, uint32_t y0, uint32_t rows, int is_any)
+static void smooth(struct check *c, uint32_t width, uint32_t height, uint32_t x0, uint32_t n, uint32_t y0,
+                   uint32_t rows, int is_any)
 {
 	const size_t area = (size_t)width * height;
 	uint8_t *from = check_in(c, area, 3), *to = check_out(c, area, 3);

@@ -41,8 +41,10 @@ static int white(double share)
 
 static void an_edge_lets_half_of_what_is_behind_through(void **state)
 {
-	static const char *const beside_nothing[SIDE] = { "###    ", "###    ", "###    ", "###    ", "###    ", "###    ", "###    " };
-	static const char *const beside_far[SIDE] = { "###....", "###....", "###....", "###....", "###....", "###....", "###...." };
+	static const char *const beside_nothing[SIDE] = { "###    ", "###    ", "###    ", "###    ", "###    ", "###    ",
+		                                            "###    " };
+	static const char *const beside_far[SIDE] = { "###....", "###....", "###....", "###....", "###....", "###....",
+		                                        "###...." };
 	uint8_t light[SIDE][SIDE];
 	(void)state;
 	for (int is_far = 0; is_far < 2; is_far++) {
@@ -68,8 +70,8 @@ static void corners_and_lines_keep_a_quarter_at_least(void **state)
 	assert_int_equal(light[4][4], white(6 / 8.0)); /* of two edges that turn inwards, 1 each */
 }
 
-/* 0.03 is the threshold: a surface may fall by that much from one pixel to the next. Then a pixel counts four times, and each of
- * those beside it once. */
+/* 0.03 is the threshold: a surface may fall by that much from one pixel to the next. Then a pixel counts four times, and
+ * each of those beside it once. */
 static void neighbours_of_a_surface_are_averaged(void **state)
 {
 	static const char *const row[SIDE] = { "#######", "#######", "#######", "###.###", "#######", "#######", "#######" };
@@ -187,8 +189,9 @@ static double error_of(const struct drawn *d, double radius)
 	return sum;
 }
 
-/* A rim pixel is full where its coverage is anything from 0 to 1, and so off by 1/3 in the mean square; half of it would be by 1/12,
- * and what its neighbours tell makes that no worse. Samples that miss a pixel of little coverage leave less to gain: three times. */
+/* A rim pixel is full where its coverage is anything from 0 to 1, and so off by 1/3 in the mean square; half of it would be
+ * by 1/12, and what its neighbours tell makes that no worse. Samples that miss a pixel of little coverage leave less to
+ * gain: three times. */
 static void the_rim_of_a_sphere_is_three_times_as_true(void **state)
 {
 	const struct shape_options options = { .resolution = 256, .diffuse = 0xffffff, .unlit = 1, .cones = 1, .scale = 1 };
