@@ -25,9 +25,8 @@ static int compare_owners(const struct place *x, const struct place *y)
 	return x->block != y->block ? (x->block < y->block ? -1 : 1) : (int)x->sample - (int)y->sample;
 }
 
-static int compare_places(const void *a, const void *b)
+static int compare_places(const struct place *x, const struct place *y)
 {
-	const struct place *x = a, *y = b;
 	float p = x->center[x->axis], q = y->center[y->axis];
 
 	return p != q ? (p < q ? -1 : 1) : compare_owners(x, y);
@@ -40,6 +39,42 @@ static int compare_groups(const void *a, const void *b)
 	if (x->block == y->block && x->group != y->group)
 		return x->group < y->group ? -1 : 1;
 	return compare_owners(x, y);
+}
+
+static void swap_places(struct place *a, struct place *b)
+{
+	struct place kept = *a;
+
+	*a = *b;
+	*b = kept;
+}
+
+/* Puts the first `middle` places of their order in front, in any order (Hoare's quickselect). */
+static void part_places(struct place *place, uint32_t n, uint32_t middle)
+{
+	while (n > 1) {
+		uint32_t low = 0, high = n - 1;
+		const struct place pivot = place[(n - 1) / 2];
+
+		for (;;) {
+			while (compare_places(&place[low], &pivot) < 0)
+				low++;
+			while (compare_places(&place[high], &pivot) > 0)
+				high--;
+			if (low >= high)
+				break;
+			swap_places(&place[low++], &place[high--]);
+		}
+		if (middle <= high) {
+			n = high + 1;
+		} else {
+			place += high + 1;
+			middle -= high + 1;
+			n -= high + 1;
+		}
+		if (middle == 0)
+			break;
+	}
 }
 
 /* Halves along the longest side of the box of the centres, until a part is small enough. */
@@ -66,7 +101,7 @@ static void cut(struct draft *draft, struct place *place, uint32_t n, uint32_t m
 		axis = max[k] - min[k] > max[axis] - min[axis] ? k : axis;
 	for (uint32_t i = 0; i < n; i++)
 		place[i].axis = axis;
-	qsort(place, n, sizeof *place, compare_places);
+	part_places(place, n, n / 2);
 	cut(draft, place, n / 2, most);
 	cut(draft, place + n / 2, n - n / 2, most);
 }

@@ -1,4 +1,5 @@
 #include <math.h>
+#include <stdatomic.h>
 #include <stdlib.h>
 #include "cell.h"
 #include "group.h"
@@ -129,18 +130,21 @@ struct split {
 	uint32_t first, end; /* blocks */
 	struct group_blocks *chunk;
 	int *rc;
+	uint32_t most;    /* blocks of them all; */
+	atomic_uint n;    /* once there are more, the rest is not looked at */
 };
 
 #define CHUNK 256
 
 static void split_chunk(int i, void *userdata)
 {
-	const struct split *split = userdata;
+	struct split *split = userdata;
 	uint32_t first = split->first + (uint32_t)i * CHUNK, end = split->end - first < CHUNK ? split->end : first + CHUNK;
 	struct parts parts = { NULL, 0, 0 };
 
-	for (uint32_t b = first; b < end && split->rc[i] == PSR_OK; b++)
+	for (uint32_t b = first; b < end && split->rc[i] == PSR_OK && atomic_load(&split->n) <= split->most; b++)
 		split->rc[i] = split_block(&split->chunk[i], split->draft, &split->draft->block[b], split->map, &parts);
+	atomic_fetch_add(&split->n, split->chunk[i].n);
 	free(parts.part);
 }
 
@@ -172,7 +176,7 @@ int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned
                        uint32_t n_pieces, struct psr_pool *pool)
 {
 	struct cover map;
-	struct split split = { .draft = draft, .map = &map, .first = n_finest };
+	struct split split = { .draft = draft, .map = &map, .first = n_finest, .most = blocks->most - blocks->n };
 	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
 
 	while (split.first < draft->n_blocks && draft->block[split.first].level < level)
