@@ -7,8 +7,9 @@
  * are averaged only those count that are not behind the nearest by more than a cell's threshold. A near edge's colour
  * thus is not mixed with the background's before it fills a hole, and depths are filled along with colours.
  *
- * A cell whose weight is whole needs nothing from above, and a cell above whole cells is whole. So a brick needs the levels up to
- * the first that is whole in it and in the eight bricks around, which hold all that its pixels and their ancestors look at. */
+ * A cell whose weight is whole needs nothing from above, and a cell above whole cells is whole. So a brick needs the
+ * levels up to the first that is whole in it and in the eight bricks around, which hold all that its pixels and their
+ * ancestors look at. */
 
 float fill_scale(const struct plan *plan, int level)
 {
@@ -191,12 +192,13 @@ static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 	const struct fill_row upper = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y));
 	const struct fill_row lower = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y + 1));
 	to.r = to.g = to.b = NULL;
-	if (fill->simd->fill_pull(&to, &upper, &lower, 1, 0, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) < WEIGHT_ONE / 2)
+	if (fill->simd->fill_pull(&to, &upper, &lower, 1, 0, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) <
+	    WEIGHT_ONE / 2)
 		fill_note_depth(fill, l);
 }
 
-/* Which bricks and coarse cells those need that are not whole at the bricks' own level, up to where all that is needed is
- * whole, or to the top. */
+/* Which bricks and coarse cells those need that are not whole at the bricks' own level, up to where all that is needed
+ * is whole, or to the top. */
 static void find_coarse(struct fill *fill)
 {
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
@@ -312,8 +314,8 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 	cell.weight[0] = WEIGHT_ONE;
 }
 
-/* The levels of which a brick has less than a cell: all of their cells, since they are few; those that find_coarse did not
- * pull hold anything, and nothing reads them. */
+/* The levels of which a brick has less than a cell: all of their cells, since they are few; those that find_coarse did
+ * not pull hold anything, and nothing reads them. */
 static void run_coarse(struct fill *fill)
 {
 	for (int l = fill->brick_top; l < fill->top; l++) {

@@ -9,8 +9,8 @@ struct picture_row {
 };
 
 /* Pixel (x, y) and the n - 1 to the right of it; without depths or colours where they are not asked for. */
-static struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y, uint32_t n,
-                                      int has_depths, int has_colors)
+static struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
+                                      uint32_t n, int has_depths, int has_colors)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = p->stack->width, n_inside = y >= p->stack->height ? 0 : x + n > width ? width - x : n;
@@ -93,7 +93,8 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 }
 
 /* Gives pixels their colors and depths, and makes them whole. */
-static void write_pixels(struct fill *fill, size_t first, const uint16_t *place, uint32_t n_places, const struct fill_row *row)
+static void write_pixels(struct fill *fill, size_t first, const uint16_t *place, uint32_t n_places,
+                         const struct fill_row *row)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint8_t *srgb = p->srgb;

@@ -1,5 +1,5 @@
-/* Pull and push of rows ([G] 4.7), FILL_BLOCK coarser cells at a time. Plain loops of constant length, which the compiler turns
- * into vectors; compiled once for each ISA. */
+/* Pull and push of rows ([G] 4.7), FILL_BLOCK coarser cells at a time. Plain loops of constant length, which the
+ * compiler turns into vectors; compiled once for each ISA. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -17,7 +17,7 @@ static inline uint32_t pair_at(const uint16_t *values, uint32_t x)
 /* value * share >> 8 of a share of 0..256, within 16 bits. */
 static inline uint16_t part_of(uint16_t value, uint16_t share)
 {
-	const uint16_t all = (uint16_t) - (share >> 8), factor = (uint16_t)(share << 8);
+	const uint16_t all = (uint16_t)-(share >> 8), factor = (uint16_t)(share << 8);
 	return (uint16_t)((value & all) | (uint16_t)((uint32_t)value * factor >> 16));
 }
 
@@ -27,10 +27,11 @@ struct block_row {
 	float z[2 * FILL_BLOCK + 2];
 };
 
-static inline __attribute__((always_inline)) struct fill_row row_from(struct fill_row row, ptrdiff_t x, int has_colors, int has_weight)
+static inline __attribute__((always_inline)) struct fill_row row_from(struct fill_row row, ptrdiff_t x, int has_colors,
+                                                                      int has_weight)
 {
-	return (struct fill_row){ has_colors ? row.r + x : NULL, has_colors ? row.g + x : NULL, has_colors ? row.b + x : NULL,
-		                      has_weight ? row.weight + x : NULL, row.z + x };
+	return (struct fill_row){ has_colors ? row.r + x : NULL, has_colors ? row.g + x : NULL,
+		                      has_colors ? row.b + x : NULL, has_weight ? row.weight + x : NULL, row.z + x };
 }
 
 static inline void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
@@ -49,10 +50,12 @@ struct pull_shares {
 	float inverse[FILL_BLOCK];
 };
 
-/* One channel of coarser cells: what children of weight above 0 add, and where that is more than a whole weight, divided by it:
- * sum * 256 / divisor, rounded down. The estimate is at most 1 below: sums are less than 2^18, thus floats, quotients less than
- * 2^16; `inverse` is up to 2^-20 too small and a product rounds by 2^-24, together less than 2^-3. */
-static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint16_t *lower, const struct pull_shares *shares)
+/* One channel of coarser cells: what children of weight above 0 add, and where that is more than a whole weight,
+ * divided by it: sum * 256 / divisor, rounded down. The estimate is at most 1 below: sums are less than 2^18, thus
+ * floats, quotients less than 2^16; `inverse` is up to 2^-20 too small and a product rounds by 2^-24, together less
+ * than 2^-3. */
+static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint16_t *lower,
+                                const struct pull_shares *shares)
 {
 	uint16_t above[2 * FILL_BLOCK], below[2 * FILL_BLOCK];
 	int32_t value[FILL_BLOCK];
@@ -62,7 +65,8 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 	}
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const uint32_t two = pair_at(above, x), others = pair_at(below, x);
-		const int32_t sum = (int32_t)((two & 0xffff) + (two >> 16) + (others & 0xffff) + (others >> 16)), by = shares->divisor[x];
+		const int32_t sum = (int32_t)((two & 0xffff) + (two >> 16) + (others & 0xffff) + (others >> 16));
+		const int32_t by = shares->divisor[x];
 		const int32_t quotient = (int32_t)((float)sum * shares->inverse[x]);
 		value[x] = quotient + (256 * sum - quotient * by >= by);
 	}
@@ -71,9 +75,10 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 }
 
 /* Weights and depths; returns the least weight. */
-static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_shares *shares, uint16_t *weight, float *z,
-                                                                  struct fill_row upper, struct fill_row lower, int is_picture,
-                                                                  float scale, float offset)
+static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_shares *shares, uint16_t *weight,
+                                                                  float *z, struct fill_row upper,
+                                                                  struct fill_row lower, int is_picture, float scale,
+                                                                  float offset)
 {
 	float depth[4][FILL_BLOCK];
 	int32_t sums[FILL_BLOCK];
@@ -87,7 +92,8 @@ static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_sh
 	}
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const uint32_t two = pair_at(upper.weight, x), others = pair_at(lower.weight, x);
-		const int32_t w[4] = { (int32_t)(two & 0xffff), (int32_t)(two >> 16), (int32_t)(others & 0xffff), (int32_t)(others >> 16) };
+		const int32_t w[4] = { (int32_t)(two & 0xffff), (int32_t)(two >> 16), (int32_t)(others & 0xffff),
+			                   (int32_t)(others >> 16) };
 		float nearest = INFINITY, sum_z = 0;
 		int32_t sum = 0;
 		uint32_t share[4];
@@ -118,8 +124,9 @@ static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_sh
 	return least;
 }
 
-static inline __attribute__((always_inline)) int32_t pull_block(struct fill_row to, struct fill_row upper, struct fill_row lower,
-                                                                int has_colors, int is_picture, float scale, float offset)
+static inline __attribute__((always_inline)) int32_t pull_block(struct fill_row to, struct fill_row upper,
+                                                                struct fill_row lower, int has_colors, int is_picture,
+                                                                float scale, float offset)
 {
 	struct pull_shares shares;
 	uint16_t weight[FILL_BLOCK];
@@ -149,7 +156,8 @@ static inline struct fill_row copy_row(struct block_row *to, struct fill_row fro
 	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
 }
 
-static inline void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors, int has_weight)
+static inline void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors,
+                             int has_weight)
 {
 	memcpy(to.z, from->z, n * sizeof *to.z);
 	if (has_weight)
@@ -161,8 +169,9 @@ static inline void copy_back(struct fill_row to, const struct block_row *from, u
 	}
 }
 
-static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row to, struct fill_row upper, struct fill_row lower,
-                                                               uint32_t n, int has_colors, int is_picture, float scale, float offset)
+static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row to, struct fill_row upper,
+                                                               struct fill_row lower, uint32_t n, int has_colors,
+                                                               int is_picture, float scale, float offset)
 {
 	int32_t least = GAPS_WHOLE;
 	uint32_t x = 0;
@@ -174,8 +183,10 @@ static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row t
 	if (x < n) {
 		struct block_row rows[3];
 		const struct fill_row out = { rows[0].r, rows[0].g, rows[0].b, rows[0].weight, rows[0].z };
-		const struct fill_row above = copy_row(&rows[1], row_from(upper, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
-		const struct fill_row below = copy_row(&rows[2], row_from(lower, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
+		const struct fill_row above =
+			copy_row(&rows[1], row_from(upper, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
+		const struct fill_row below =
+			copy_row(&rows[2], row_from(lower, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
 		const int32_t weight = pull_block(out, above, below, has_colors, is_picture, scale, offset);
 		least = weight < least ? weight : least;
 		copy_back(row_from(to, x, has_colors, 1), &rows[0], n - x, has_colors, 1);
@@ -183,26 +194,27 @@ static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row t
 	return (uint16_t)least;
 }
 
-static inline uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
-                          int is_picture, float scale, float offset)
+static inline uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                                 uint32_t n, int is_picture, float scale, float offset)
 {
 	if (!to->r)
 		return pull_row(*to, *upper, *lower, n, 0, 0, scale, offset);
-	return is_picture ? pull_row(*to, *upper, *lower, n, 1, 1, scale, offset) : pull_row(*to, *upper, *lower, n, 1, 0, scale, offset);
+	return is_picture ? pull_row(*to, *upper, *lower, n, 1, 1, scale, offset)
+	                  : pull_row(*to, *upper, *lower, n, 1, 0, scale, offset);
 }
 
 /* ---- push ---- */
 
-/* What finer cells take from their parents, from the parents' neighbors to their own side and from those above or below: all or
- * nothing of each, the parents' twice; and the inverse of the sum of these shares. */
+/* What finer cells take from their parents, from the parents' neighbors to their own side and from those above or
+ * below: all or nothing of each, the parents' twice; and the inverse of the sum of these shares. */
 struct push_shares {
 	uint32_t own[FILL_BLOCK], side[FILL_BLOCK], beside[FILL_BLOCK];
 	float inverse[FILL_BLOCK];
 };
 
 /* For cells on the side of their parents that `step` leads to. */
-static inline void share_parents(struct push_shares *to, float *z, const float *own, const float *side, const float *beside,
-                                 float scale, float offset)
+static inline void share_parents(struct push_shares *to, float *z, const float *own, const float *side,
+                                 const float *beside, float scale, float offset)
 {
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const float a = own[x], b = side[x], c = beside[x];
@@ -219,18 +231,19 @@ static inline void share_parents(struct push_shares *to, float *z, const float *
 	}
 }
 
-/* Sums are below 2^18 and quotients below 2^16, so that quotients are off by less than 1/100, and their fractions are quarters
- * or thirds: an eighth more never reaches the next whole number, and always the own one. */
-static inline uint32_t interpolate(const struct push_shares *s, uint32_t x, uint32_t own, uint32_t side, uint32_t beside)
+/* Sums are below 2^18 and quotients below 2^16, so that quotients are off by less than 1/100, and their fractions are
+ * quarters or thirds: an eighth more never reaches the next whole number, and always the own one. */
+static inline uint32_t interpolate(const struct push_shares *s, uint32_t x, uint32_t own, uint32_t side,
+                                   uint32_t beside)
 {
 	const int32_t sum = (int32_t)(2 * (own & s->own[x]) + (side & s->side[x]) + (beside & s->beside[x]));
 	return (uint32_t)(int32_t)((float)sum * s->inverse[x] + 0.125f);
 }
 
 /* Cells whose turn it is: of a share of 256 in `was` and of the rest from their parents. */
-static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *turn, const uint16_t *own,
-                                const uint16_t *beside, const struct push_shares *left, const struct push_shares *right,
-                                int is_picture)
+static inline void push_channel(uint16_t *to, const uint16_t *was, const uint16_t *weight, const uint16_t *turn,
+                                const uint16_t *own, const uint16_t *beside, const struct push_shares *left,
+                                const struct push_shares *right, int is_picture)
 {
 	uint32_t pair[FILL_BLOCK];
 	uint16_t both[2 * FILL_BLOCK], value[2 * FILL_BLOCK];
@@ -275,8 +288,8 @@ static inline int has_partial(const uint16_t *weight, uint32_t n)
 
 /* Returns whether it is any cell's turn; then it is so for those that are not 0 in `turn`. */
 static inline __attribute__((always_inline)) int push_block(struct fill_row to, uint16_t *turn, struct fill_row was,
-                                                            struct fill_row own, struct fill_row beside, int is_picture, float scale,
-                                                            float offset)
+                                                            struct fill_row own, struct fill_row beside, int is_picture,
+                                                            float scale, float offset)
 {
 	struct push_shares left, right;
 	float z[2][FILL_BLOCK], both[2 * FILL_BLOCK];
@@ -309,7 +322,8 @@ struct push_rows {
 	struct block_row copy[4];
 };
 
-static inline void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside, uint32_t n)
+static inline void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside,
+                             uint32_t n)
 {
 	to->was = copy_row(&to->copy[0], was, 2 * n, 1);
 	to->own = row_from(copy_row(&to->copy[1], row_from(own, -1, 1, 1), n + 2, 1), 1, 1, 1);
@@ -317,8 +331,8 @@ static inline void copy_rows(struct push_rows *to, struct fill_row was, struct f
 	to->to = (struct fill_row){ to->copy[3].r, to->copy[3].g, to->copy[3].b, to->copy[3].weight, to->copy[3].z };
 }
 
-static inline void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
-                      float offset)
+static inline void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside,
+                             uint32_t n, float scale, float offset)
 {
 	const struct fill_row cells = *to, parents = *own, others = *beside;
 	uint16_t turn[2 * FILL_BLOCK];
@@ -337,8 +351,8 @@ static inline void fill_push(const struct fill_row *to, const struct fill_row *o
 }
 
 /* Lists the block's pixels whose turn it is; takes its bit out where no other is left. */
-static inline uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn, const uint16_t *weight, uint32_t first,
-                           uint32_t n)
+static inline uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn,
+                                  const uint16_t *weight, uint32_t first, uint32_t n)
 {
 	uint32_t n_places = 0, n_partial = 0;
 	for (uint32_t x = 0; x < n; x++) {
@@ -350,8 +364,9 @@ static inline uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit,
 	return n_places;
 }
 
-static inline uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
-                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale, float offset)
+static inline uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
+                                         const struct fill_row *was, const struct fill_row *own,
+                                         const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
 	const struct fill_row out = *to, in = *was, parents = *own, others = *beside;
 	uint16_t turn[2 * FILL_BLOCK];

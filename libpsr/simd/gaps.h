@@ -1,5 +1,5 @@
-/* Coverage of pixels by cells ([G] 4.6), and the guard against pinholes. Plain loops, which the compiler turns into vectors;
- * compiled once for each ISA. */
+/* Coverage of pixels by cells ([G] 4.6), and the guard against pinholes. Plain loops, which the compiler turns into
+ * vectors; compiled once for each ISA. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -11,8 +11,8 @@
 #define MAX_SPREAD (GAPS_WIDTH + 2 * (1 << PSR_MAX_DEPTH_LEVEL))
 #define SPREAD_RUN 16 /* values that are repeated together: arrays have room for as many more */
 
-/* Depths of a piece of the picture and of the pixels around it; what is not in the picture is at infinity. Loops are over all
- * GAPS_WIDTH columns. */
+/* Depths of a piece of the picture and of the pixels around it; what is not in the picture is at infinity. Loops are
+ * over all GAPS_WIDTH columns. */
 struct gaps_tile {
 	_Alignas(64) float z[GAPS_BRICK + 2][GAPS_STRIDE];
 	int32_t has_samples[GAPS_BRICK + 2]; /* by row */
@@ -45,8 +45,8 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 	}
 }
 
-/* What lies beyond these depths is covered by the cells of a row, `own`; `either`: by the cells or the four cells of the next
- * finer level in each. Repeated for each pixel. */
+/* What lies beyond these depths is covered by the cells of a row, `own`; `either`: by the cells or the four cells of
+ * the next finer level in each. Repeated for each pixel. */
 struct limits {
 	float own[MAX_SPREAD + 2 * SPREAD_RUN], either[MAX_SPREAD + 2 * SPREAD_RUN];
 	uint32_t i, j, n; /* cells from (i, j), which counts from the guard band's corner */
@@ -126,7 +126,8 @@ static void find_either(struct limits *to, const struct gaps_target *t, int k)
 /* A level, as a row of pixels sees it. */
 struct gaps_level {
 	struct limits limits[2], *upper, *lower;
-	float left[GAPS_WIDTH], right[GAPS_WIDTH]; /* shares of the cell on either side, half pixels: they add up to 2^(k+1) */
+	float left[GAPS_WIDTH],
+		right[GAPS_WIDTH]; /* shares of the cell on either side, half pixels: they add up to 2^(k+1) */
 };
 
 static void begin_level(struct gaps_level *level, int k)
@@ -140,13 +141,14 @@ static void begin_level(struct gaps_level *level, int k)
 	}
 }
 
-/* Bilinear coverage of a row of pixels; upper and lower limits begin with the left neighbors of the first pixel. Shares are
- * whole numbers, and their products multiples of a power of two that fit a float. */
-static inline void cover_row(int32_t *cover, const float *z, const float *upper, const float *lower, const struct gaps_level *level,
-                             int k, int32_t fy)
+/* Bilinear coverage of a row of pixels; upper and lower limits begin with the left neighbors of the first pixel. Shares
+ * are whole numbers, and their products multiples of a power of two that fit a float. */
+static inline void cover_row(int32_t *cover, const float *z, const float *upper, const float *lower,
+                             const struct gaps_level *level, int k, int32_t fy)
 {
 	const uint32_t step = 1u << k;
-	const float unit = (float)GAPS_WHOLE / (float)(4 << 2 * k), below = (float)fy * unit, above = (float)((2 << k) - fy) * unit;
+	const float unit = (float)GAPS_WHOLE / (float)(4 << 2 * k), below = (float)fy * unit,
+				above = (float)((2 << k) - fy) * unit;
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
 		const float left = level->left[x], right = level->right[x], depth = z[x];
 		const float high = psr_where(upper[x] < depth, left) + psr_where(upper[x + step] < depth, right);
@@ -161,8 +163,8 @@ static inline void cover_row(int32_t *cover, const float *z, const float *upper,
  * level covers it whole ([G] 9.1.2). Where the coarser one covers a part of a pixel, what counts is the coverage by
  * the coarser cells that either level fills: not the sum, which would take weight twice where blocks of both levels
  * hold the same surface. */
-static int cover_level(int32_t *weight, struct gaps_level *level, const struct gaps_target *t, const struct gaps_tile *tile, int k,
-                       uint32_t y)
+static int cover_level(int32_t *weight, struct gaps_level *level, const struct gaps_target *t,
+                       const struct gaps_tile *tile, int k, uint32_t y)
 {
 	const int has_finer = k > 1 && (t->stack->levels >> (k - 1) & 1);
 	const uint32_t half = 1u << (k - 1), i = tile->x0 >> k, n_cells = ((tile->width - 1 + half) >> k) + 2;
@@ -201,7 +203,8 @@ static int cover_level(int32_t *weight, struct gaps_level *level, const struct g
 static int cover_opaque(int32_t *weight, const struct gaps_target *t, const struct gaps_tile *tile, int k, uint32_t y)
 {
 	const struct psr_zstack *stack = t->stack;
-	const float *cell = stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
+	const float *cell =
+		stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
 	const float *z = &tile->z[y + 1][GAPS_LEFT];
 	int has_cells = 0;
 	for (uint32_t x = 0; x < tile->width; x++) {
@@ -211,22 +214,24 @@ static int cover_opaque(int32_t *weight, const struct gaps_target *t, const stru
 	return has_cells;
 }
 
-/* Samples of level 0 leave no pixel out but for rounding, and then a single one: the guard takes pixels that lie behind at
- * least seven of their eight neighbors, where those are one surface: within one threshold of each other, since deep in a
- * crevice there may be anything; but within that of a coarser level where the pixel is empty, since what is seen through a
- * model is seldom one pixel wide. */
+/* Samples of level 0 leave no pixel out but for rounding, and then a single one: the guard takes pixels that lie behind
+ * at least seven of their eight neighbors, where those are one surface: within one threshold of each other, since deep
+ * in a crevice there may be anything; but within that of a coarser level where the pixel is empty, since what is seen
+ * through a model is seldom one pixel wide. */
 #define ALIKE 1
 #define ALIKE_BEFORE_NOTHING 4
 #define GUARD_RUN 32
 
-static uint32_t guard_run(int32_t *weight, const struct gaps_target *t, const float *above, const float *own, const float *below)
+static uint32_t guard_run(int32_t *weight, const struct gaps_target *t, const float *above, const float *own,
+                          const float *below)
 {
 	const float scale = t->scale[1], offset = t->offset[1];
 	const float alike = t->scale[ALIKE], alike_offset = t->offset[ALIKE];
 	const float nothing = t->scale[ALIKE_BEFORE_NOTHING], nothing_offset = t->offset[ALIKE_BEFORE_NOTHING];
 	int32_t n_pinholes = 0;
 	for (int x = 0; x < GUARD_RUN; x++) {
-		const float z[8] = { above[x - 1], above[x], above[x + 1], own[x - 1], own[x + 1], below[x - 1], below[x], below[x + 1] };
+		const float z[8] = { above[x - 1], above[x],     above[x + 1], own[x - 1],
+			                 own[x + 1],   below[x - 1], below[x],     below[x + 1] };
 		float nearest = INFINITY, farthest = 0;
 		int32_t n_before = 0;
 		for (int i = 0; i < 8; i++) {
@@ -245,15 +250,16 @@ static uint32_t guard_run(int32_t *weight, const struct gaps_target *t, const fl
 	return (uint32_t)n_pinholes;
 }
 
-/* Most runs have none: one of the two beside it lies before a pinhole, and one of those above and below. Where cells cover
- * the pixel already, nothing is left to take. */
-static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps_target *t, const float *above, const float *own,
-                                        const float *below)
+/* Most runs have none: one of the two beside it lies before a pinhole, and one of those above and below. Where cells
+ * cover the pixel already, nothing is left to take. */
+static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps_target *t, const float *above,
+                                        const float *own, const float *below)
 {
 	const float scale = t->scale[1], offset = t->offset[1];
 	int32_t is_near = 0;
 	for (int x = 0; x < GUARD_RUN; x++) {
-		const float side = own[x - 1] < own[x + 1] ? own[x - 1] : own[x + 1], line = above[x] < below[x] ? above[x] : below[x];
+		const float side = own[x - 1] < own[x + 1] ? own[x - 1] : own[x + 1],
+					line = above[x] < below[x] ? above[x] : below[x];
 		const float later = side < line ? line : side;
 		is_near |= (later * scale + offset < own[x]) & (weight[x] > 0);
 	}
@@ -273,7 +279,8 @@ static uint32_t guard_row(int32_t *weight, const struct gaps_target *t, const st
 	return n_pinholes;
 }
 
-static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1, uint8_t *marks)
+static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1,
+                               uint8_t *marks)
 {
 	struct gaps_tile tile = { .x0 = x0, .y0 = y0, .width = x1 - x0, .height = y1 - y0 };
 	struct gaps_level level[PSR_MAX_DEPTH_LEVEL + 1];
@@ -292,7 +299,8 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 			weight[x] = GAPS_WHOLE;
 		for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 			if (t->stack->levels >> k & 1)
-				is_less |= t->opaque_cells ? cover_opaque(weight, t, &tile, k, y) : cover_level(weight, &level[k], t, &tile, k, y);
+				is_less |= t->opaque_cells ? cover_opaque(weight, t, &tile, k, y)
+				                           : cover_level(weight, &level[k], t, &tile, k, y);
 		const uint32_t n_pinholes = guard_row(weight, t, &tile, y);
 		counts.n_pinholes += n_pinholes;
 		for (uint32_t x = 0; x < tile.width; x++)

@@ -50,13 +50,16 @@ static inline void pull_channel(uint16_t *to, __mmask16 k, __mmask32 kk, const u
                                 const struct pull_shares *s, int is_picture)
 {
 	const __m512i low = _mm512_set1_epi32(0xffff);
-	const __m512i above = is_picture ? part_of(load_children(kk, upper), s->upper) : load_children(s->above & kk, upper);
-	const __m512i below = is_picture ? part_of(load_children(kk, lower), s->lower) : load_children(s->below & kk, lower);
+	const __m512i above =
+		is_picture ? part_of(load_children(kk, upper), s->upper) : load_children(s->above & kk, upper);
+	const __m512i below =
+		is_picture ? part_of(load_children(kk, lower), s->lower) : load_children(s->below & kk, lower);
 	const __m512i left = _mm512_add_epi32(_mm512_and_si512(above, low), _mm512_and_si512(below, low));
 	const __m512i right = _mm512_add_epi32(_mm512_srli_epi32(above, 16), _mm512_srli_epi32(below, 16));
 	const __m512 sum = _mm512_cvtepi32_ps(_mm512_add_epi32(left, right));
 	const __m512i quotient = _mm512_cvttps_epi32(_mm512_mul_ps(sum, s->inverse));
-	const __m512 rest = _mm512_fnmadd_ps(_mm512_cvtepi32_ps(quotient), s->divisor, _mm512_mul_ps(sum, _mm512_set1_ps(256)));
+	const __m512 rest =
+		_mm512_fnmadd_ps(_mm512_cvtepi32_ps(quotient), s->divisor, _mm512_mul_ps(sum, _mm512_set1_ps(256)));
 	const __mmask16 is_more = _mm512_cmp_ps_mask(rest, s->divisor, _CMP_GE_OQ);
 	const __m512i value = _mm512_mask_add_epi32(quotient, is_more, quotient, _mm512_set1_epi32(1));
 	_mm256_mask_storeu_epi16(to, k, _mm512_cvtepi32_epi16(value));
@@ -98,7 +101,8 @@ static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill
 			sum = _mm512_mask_add_epi32(sum, near[i], sum, w[i]);
 		}
 		least = _mm512_mask_min_epi32(least, k, least, sum);
-		const __m512 depth = _mm512_mask_div_ps(nothing, _mm512_test_epi32_mask(sum, sum), sum_z, _mm512_cvtepi32_ps(sum));
+		const __m512 depth =
+			_mm512_mask_div_ps(nothing, _mm512_test_epi32_mask(sum, sum), sum_z, _mm512_cvtepi32_ps(sum));
 		_mm512_mask_storeu_ps(to->z + x, k, depth);
 		_mm256_mask_storeu_epi16(to->weight + x, k, _mm512_cvtepi32_epi16(_mm512_min_epi32(sum, whole)));
 		if (!has_colors)
@@ -119,17 +123,19 @@ static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill
 	return (uint16_t)_mm512_reduce_min_epi32(least);
 }
 
-uint16_t fill_pull_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
-                          int is_picture, float scale, float offset)
+uint16_t fill_pull_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                          uint32_t n, int is_picture, float scale, float offset)
 {
 	if (!to->r)
 		return pull_row(to, upper, lower, n, 0, 0, scale, offset);
-	return is_picture ? pull_row(to, upper, lower, n, 1, 1, scale, offset) : pull_row(to, upper, lower, n, 1, 0, scale, offset);
+	return is_picture ? pull_row(to, upper, lower, n, 1, 1, scale, offset)
+	                  : pull_row(to, upper, lower, n, 1, 0, scale, offset);
 }
 
 /* ---- push ---- */
 
-/* What children on one side take from their parents, from the parents' neighbors to that side and from those above or below. */
+/* What children on one side take from their parents, from the parents' neighbors to that side and from those above or
+ * below. */
 struct push_shares {
 	__mmask16 own, side, beside;
 	__m512 inverse, z;
@@ -181,8 +187,9 @@ static inline void find_turn(struct push *p, const uint16_t *weight, const uint1
 	p->turn = _mm512_mask_cmplt_epu16_mask(p->kk, p->weight, _mm512_set1_epi16(GAPS_WHOLE));
 	if (!p->turn)
 		return;
-	const __mmask16 both = _mm256_mask_cmpeq_epi16_mask(_mm256_cmpeq_epi16_mask(_mm256_maskz_loadu_epi16(p->k, own), whole),
-	                                                    _mm256_maskz_loadu_epi16(p->k, beside), whole);
+	const __mmask16 both =
+		_mm256_mask_cmpeq_epi16_mask(_mm256_cmpeq_epi16_mask(_mm256_maskz_loadu_epi16(p->k, own), whole),
+	                                 _mm256_maskz_loadu_epi16(p->k, beside), whole);
 	const __mmask16 left = _mm256_mask_cmpeq_epi16_mask(both, _mm256_maskz_loadu_epi16(p->k, own - 1), whole);
 	const __mmask16 right = _mm256_mask_cmpeq_epi16_mask(both, _mm256_maskz_loadu_epi16(p->k, own + 1), whole);
 	p->turn &= interleave(left, right);
@@ -213,7 +220,8 @@ static inline void push_cells(const struct push *p, uint16_t *cell, const uint16
 	_mm512_mask_storeu_epi16(cell, p->turn, value);
 }
 
-static inline void push_pixels(const struct push *p, uint16_t *to, const uint16_t *was, const uint16_t *own, const uint16_t *beside)
+static inline void push_pixels(const struct push *p, uint16_t *to, const uint16_t *was, const uint16_t *own,
+                               const uint16_t *beside)
 {
 	const __m512i value = _mm512_add_epi16(part_of(load_children(p->kk, was), p->own), push_channel(p, own, beside));
 	_mm512_mask_storeu_epi16(to, p->kk, value);
@@ -233,8 +241,8 @@ static inline void set_masks(struct push *p, uint32_t n)
 	p->kk = interleave(p->k, p->k);
 }
 
-void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
-                      float offset)
+void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
+                      float scale, float offset)
 {
 	for (uint32_t x = 0; x < n; x += PARENTS) {
 		struct push p;
@@ -246,16 +254,18 @@ void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, con
 		push_cells(&p, to->r + 2 * x, own->r + x, beside->r + x);
 		push_cells(&p, to->g + 2 * x, own->g + x, beside->g + x);
 		push_cells(&p, to->b + 2 * x, own->b + x, beside->b + x);
-		push_depths(&p, to->z + 2 * x, _mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
+		push_depths(&p, to->z + 2 * x,
+		            _mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
 		_mm512_mask_storeu_epi16(to->weight + 2 * x, p.turn, _mm512_set1_epi16(GAPS_WHOLE));
 	}
 }
 
-uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit, const struct fill_row *was,
-                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale, float offset)
+uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
+                                  const struct fill_row *was, const struct fill_row *own, const struct fill_row *beside,
+                                  uint32_t n, float scale, float offset)
 {
-	_Alignas(64) static const uint16_t column[32] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
-		                                              22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
+	_Alignas(64) static const uint16_t column[32] = { 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
+		                                              16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
 	uint32_t n_places = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
@@ -274,7 +284,8 @@ uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, ui
 		push_depths(&p, to->z + 2 * x, p.kk);
 		const uint32_t n_turn = (uint32_t)__builtin_popcount(p.turn);
 		const __m512i columns = _mm512_add_epi16(_mm512_load_si512(column), _mm512_set1_epi16((short)(2 * x)));
-		_mm512_mask_storeu_epi16(place + n_places, _bzhi_u32(UINT32_MAX, n_turn), _mm512_maskz_compress_epi16(p.turn, columns));
+		_mm512_mask_storeu_epi16(place + n_places, _bzhi_u32(UINT32_MAX, n_turn),
+		                         _mm512_maskz_compress_epi16(p.turn, columns));
 		n_places += n_turn;
 	}
 	return n_places;
