@@ -305,8 +305,9 @@ static void shade_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
-	struct shade_counts counts = { 0, 0, 0, 0 };
+	struct shade_counts counts = { 0 };
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(plan, row);
+	const uint64_t start = now_ns();
 	shade_rows(r->simd, plan, &r->target, &r->stack, r->weight, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
@@ -316,30 +317,41 @@ static void shade_one(int row, void *userdata)
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
 	}
-	r->shade[row] = counts;
+	const uint64_t middle = now_ns();
 	if (r->target.wants)
 		fill_pull(&r->fill, (uint32_t)row);
+	counts.row_ns = middle - start;
+	counts.fill_ns = now_ns() - middle;
+	r->shade[row] = counts;
 }
 
-/* Wall time of the two stages that run together, divided as their own clocks say. */
+static uint64_t part_of(uint64_t wall, uint64_t one, uint64_t other)
+{
+	return one ? (uint64_t)((double)one / (double)(one + other) * (double)wall) : 0;
+}
+
+/* Wall time of the three stages that run together, divided as their own clocks say. */
 static void report_shading(const struct psr_renderer *r, struct psr_report *report, uint64_t wall)
 {
-	struct shade_counts all = { 0, 0, 0, 0 };
+	struct shade_counts all = { 0 };
 	for (uint32_t i = 0; i < n_rows(&r->plan); i++) {
 		all.n_pixels += r->shade[i].n_pixels;
 		all.n_specular += r->shade[i].n_specular;
 		all.resolve_ns += r->shade[i].resolve_ns;
 		all.shade_ns += r->shade[i].shade_ns;
+		all.row_ns += r->shade[i].row_ns;
+		all.fill_ns += r->shade[i].fill_ns;
 	}
 	const unsigned needs = r->frame->rgb ? r->plan.view.needs : 0;
 	const enum psr_why none = r->frame->rgb ? PSR_WHY_NOTHING : PSR_WHY_OFF;
 	effect_note(report, PSR_EFFECT_TWO_SIDED, needs & STRIP_TWO_SIDED ? PSR_WHY_RAN : none, all.n_pixels);
 	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : none, all.n_pixels);
 	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : none, all.n_specular);
-	const double spent = (double)(all.resolve_ns + all.shade_ns);
+	const uint64_t fill_ns = part_of(wall, all.fill_ns, all.row_ns);
 	report->n_covered = report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = all.n_pixels;
-	report->ns[PSR_STAGE_RESOLVE] = spent > 0 ? (uint64_t)((double)all.resolve_ns / spent * (double)wall) : 0;
-	report->ns[PSR_STAGE_SHADE] = wall - report->ns[PSR_STAGE_RESOLVE];
+	report->ns[PSR_STAGE_FILL] += fill_ns;
+	report->ns[PSR_STAGE_RESOLVE] = part_of(wall - fill_ns, all.resolve_ns, all.shade_ns);
+	report->ns[PSR_STAGE_SHADE] = wall - fill_ns - report->ns[PSR_STAGE_RESOLVE];
 }
 
 static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,

@@ -165,6 +165,7 @@ struct shade_counts {
 	uint64_t n_pixels;   /* shaded */
 	uint64_t n_specular; /* of these with highlights looked for */
 	uint64_t resolve_ns, shade_ns; /* of a part of the strips */
+	uint64_t row_ns, fill_ns;      /* of all that is done to a row of bricks, and of what fill does then */
 };
 
 /* Diffuse light by normal ([B] 4.1): PSR_DIRECTIONS rows; and whether that is worth while. */
