@@ -193,11 +193,8 @@ static void look_for_offers(int i, void *userdata)
 {
 	struct window *window = userdata;
 
-	for (int k = i * PART; k < (i + 1) * PART && k < window->n; k++) {
-		window->is_covered[k] = (uint8_t)offer_is_covered(window->level, &window->spot[k]);
-		if (!window->is_covered[k])
-			offer_find(window->level, &window->spot[k], &window->offers[k]);
-	}
+	for (int k = i * PART; k < (i + 1) * PART && k < window->n; k++)
+		window->is_covered[k] = (uint8_t)offer_look(window->level, &window->spot[k], &window->offers[k]);
 }
 
 /* In a fixed order, one at a time. What costs more than `most` is left, and asked for. */

@@ -99,6 +99,15 @@ static void give_away(struct level *level, unsigned projection, uint32_t p, int 
 	sheets->patch[p].owned = 0;
 }
 
+/* A sample that is left alone in a block: dicing finds what covers its place. */
+static void drop_single(struct level *level)
+{
+	for (unsigned i = 0; i < level->n_projections; i++)
+		for (uint32_t p = 0; p < level->sheets[i].n_patches; p++)
+			if (__builtin_popcountll(level->sheets[i].patch[p].owned) == 1)
+				level->sheets[i].patch[p].owned = 0;
+}
+
 void merge_patches(struct level *level)
 {
 	for (int round = 0; round < N_ROUNDS; round++) {
@@ -111,4 +120,5 @@ void merge_patches(struct level *level)
 			}
 		}
 	}
+	drop_single(level);
 }

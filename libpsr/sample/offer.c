@@ -15,13 +15,19 @@
 
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
-#define DEAD_PATCH 12 /* a new block costs as much as this many samples more in one that is there */
 
 /* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half a
  * pixel. */
 #define HIT 1.5f
 #define SNAP 3
 #define MOST_SNAP 0.55
+
+/* What a new block costs; and what a moved sample costs more in a projection that faces the place worse than three others,
+ * as it sticks out further from what it stands for. At coarser levels moving comes before new blocks. */
+#define NEW_BLOCK 12
+#define NEW_COARSE_BLOCK 16
+#define WANTED 4.0f /* and up to this more, the fewer places want it */
+#define SNAP_ASIDE 4
 
 struct tries {
 	unsigned projection[OFFER_TRIES];
@@ -53,18 +59,19 @@ static void list_tries(const struct level *level, const struct surface_spot *spo
 }
 
 struct corner {
+	struct lattice_point at;
 	struct sheet_ref ref;
 	float position[3], distance2;
 	int is_kept;
 };
 
 /* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no patch. */
-static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot, struct corner corner[3])
+static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot, struct corner corner[3],
+                         float projected[3])
 {
 	const struct sheets *sheets = &level->sheets[q];
 	struct lattice_point at[3];
 	struct sheet_ref ref[3];
-	float projected[3];
 	int is_thin = level_is_thin(level, spot->surface);
 
 	level_project(&sheets->projection, spot->p, projected);
@@ -75,6 +82,7 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 		float d[3], n[3];
 		uint32_t surface;
 
+		c->at = at[i];
 		c->ref = ref[i];
 		if (c->ref.patch == SHEET_NONE)
 			continue;
@@ -111,42 +119,65 @@ static int is_triangle(const struct level *level, const struct surface_spot *spo
 	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * level->ds * level->ds) * v3f_dot(n, n);
 }
 
-int offer_is_covered(const struct level *level, const struct surface_spot *spot)
-{
+/* What was found out about a spot: of each try the corners around it, and it in the space of that projection. */
+struct look {
 	struct tries tries;
+	int n; /* tries of which this is known */
+	struct corner corner[OFFER_TRIES][3];
+	float projected[OFFER_TRIES][3];
+};
 
-	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
-		return 1;
-	list_tries(level, spot, &tries);
-	for (int i = 0; i < tries.n && i < OFFER_TRIANGLES; i++) {
-		struct corner corner[3];
+static void look_next(const struct level *level, const struct surface_spot *spot, struct look *look)
+{
+	find_corners(level, look->tries.projection[look->n], spot, look->corner[look->n], look->projected[look->n]);
+	look->n++;
+}
 
-		find_corners(level, tries.projection[i], spot, corner);
+/* Whether a spot is on a triangle of kept samples. */
+static int is_on_kept(const struct level *level, const struct surface_spot *spot, struct look *look)
+{
+	list_tries(level, spot, &look->tries);
+	look->n = 0;
+	while (look->n < look->tries.n && look->n < OFFER_TRIANGLES) {
+		const struct corner *corner = look->corner[look->n];
+
+		look_next(level, spot, look);
 		if (is_triangle(level, spot, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
 			return 1;
 	}
 	return 0;
 }
 
-static void find_snaps(const struct level *level, unsigned q, const struct surface_spot *spot, struct offers *offers)
+int offer_is_covered(const struct level *level, const struct surface_spot *spot)
 {
+	struct look look;
+
+	return cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds) || is_on_kept(level, spot, &look);
+}
+
+/* Moved to the corners that try i found. */
+static void find_snaps(const struct level *level, int i, const struct surface_spot *spot, const struct look *look,
+                       struct offers *offers)
+{
+	const struct corner *corner = look->corner[i];
+	const unsigned q = look->tries.projection[i];
 	const struct sheets *sheets = &level->sheets[q];
-	struct lattice_point at[3];
-	float p[3], n[3];
+	const float *p = look->projected[i];
+	const float aside = level->finer == NULL && i >= OFFER_TRIANGLES ? SNAP_ASIDE : 0;
+	float n[3];
 
-	level_project(&sheets->projection, spot->p, p);
 	level_project(&sheets->projection, spot->n, n);
-	sheets_triangle(sheets, (double)p[0], (double)p[1], at);
 	for (int k = 0; k < 3; k++) {
-		double x, y, dx, dy, dz, distance;
+		double x, y, dx, dy, dz, distance2;
 
-		sheets_point(sheets, at[k].row, at[k].col, &x, &y);
+		sheets_point(sheets, corner[k].at.row, corner[k].at.col, &x, &y);
 		dx = x - (double)p[0];
 		dy = y - (double)p[1];
 		dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
-		distance = sqrt(dx * dx + dy * dy + dz * dz) / level->ds;
-		if (distance <= MOST_SNAP)
-			offers->snap[offers->n_snaps++] = (struct offer_snap){ q, SNAP + 24 * (float)distance, p[2] + (float)dz, at[k] };
+		distance2 = (dx * dx + dy * dy + dz * dz) / (level->ds * level->ds);
+		if (distance2 <= MOST_SNAP * MOST_SNAP)
+			offers->snap[offers->n_snaps++] = (struct offer_snap){ q, SNAP + aside + 24 * sqrtf((float)distance2),
+				                                                   p[2] + (float)dz, corner[k].at };
 	}
 }
 
@@ -155,19 +186,18 @@ static const struct patch *patch_of(const struct level *level, unsigned projecti
 	return &level->sheets[projection].patch[ref.patch];
 }
 
-void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+static void find(const struct level *level, const struct surface_spot *spot, struct look *look, struct offers *offers)
 {
-	struct tries tries;
 	float least = INFINITY;
 
 	offers->n_triangles = offers->n_hits = offers->n_snaps = 0;
-	list_tries(level, spot, &tries);
-	/* Hits of others cannot cost less than one in a block that is there, and these stay. */
-	for (int i = 0; i < tries.n && (i < OFFER_TRIANGLES || HIT + (float)i / 2 < least); i++) {
-		unsigned q = tries.projection[i];
-		struct corner corner[3];
+	/* Offers of others cannot cost less than a hit in a block that is there, and such hits stay. */
+	for (int i = 0; i < look->tries.n && (i < OFFER_TRIANGLES || HIT + (float)i / 2 < least); i++) {
+		unsigned q = look->tries.projection[i];
+		const struct corner *corner = look->corner[i];
 
-		find_corners(level, q, spot, corner);
+		if (i == look->n)
+			look_next(level, spot, look);
 		if (i < OFFER_TRIANGLES && is_triangle(level, spot, corner))
 			offers->triangle[offers->n_triangles++] =
 				(struct offer){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
@@ -184,9 +214,26 @@ void offer_find(const struct level *level, const struct surface_spot *spot, stru
 			if (cost < least && patch_of(level, q, corner[k].ref)->is_alive)
 				least = cost;
 		}
-		if (i < OFFER_TRIANGLES)
-			find_snaps(level, q, spot, offers);
+		find_snaps(level, i, spot, look, offers);
 	}
+}
+
+int offer_look(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+{
+	struct look look;
+
+	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds) || is_on_kept(level, spot, &look))
+		return 1;
+	find(level, spot, &look, offers);
+	return 0;
+}
+
+void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+{
+	struct look look = { .n = 0 };
+
+	list_tries(level, spot, &look.tries);
+	find(level, spot, &look, offers);
 }
 
 static int is_kept(const struct level *level, const struct offer *offer, int corner)
@@ -207,12 +254,17 @@ int offer_is_superfluous(const struct level *level, const struct surface_spot *s
 	return 0;
 }
 
+static float block_cost(const struct level *level)
+{
+	return level->finer == NULL ? NEW_BLOCK : NEW_COARSE_BLOCK;
+}
+
 /* A patch of which nothing is kept yet costs a block, shared by all places that could use it. */
 static float opening_cost(const struct level *level, unsigned projection, struct sheet_ref ref)
 {
 	const struct patch *patch = patch_of(level, projection, ref);
 
-	return patch->is_alive ? 0 : DEAD_PATCH + 4.0f / (float)(1 + patch->n_wanted);
+	return patch->is_alive ? 0 : block_cost(level) + WANTED / (float)(1 + patch->n_wanted);
 }
 
 /* The triangle that lacks least. */
@@ -268,7 +320,7 @@ static const struct offer_snap *best_snap(const struct level *level, const struc
 
 		if (cost < *least
 		    && sheets_room(&level->sheets[snap->projection], snap->at, snap->z, is_sheet).patch == SHEET_NONE)
-			cost += DEAD_PATCH;
+			cost += block_cost(level) + WANTED;
 		if (cost < *least) {
 			*least = cost;
 			best = snap;

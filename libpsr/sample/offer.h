@@ -8,7 +8,7 @@
 #include "level.h"
 
 #define OFFER_TRIES 10    /* projections, by how well they face a place: of these */
-#define OFFER_TRIANGLES 3 /* so many are asked for triangles and moved samples */
+#define OFFER_TRIANGLES 3 /* so many are asked for triangles */
 
 /* Lattice points of one projection; what there costs beside new blocks. */
 struct offer {
@@ -27,7 +27,7 @@ struct offers {
 	int n_triangles, n_hits, n_snaps;
 	struct offer triangle[OFFER_TRIANGLES]; /* small ones on which the place is; */
 	struct offer hit[3 * OFFER_TRIES];      /* ref[0]: within half a pixel; */
-	struct offer_snap snap[3 * OFFER_TRIANGLES];
+	struct offer_snap snap[3 * OFFER_TRIES];
 	/* all by how well their projections face the place */
 };
 
@@ -36,6 +36,9 @@ int offer_is_covered(const struct level *level, const struct surface_spot *spot)
 
 /* Any number of threads may look. */
 void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers);
+
+/* The same of a place that is not covered; returns 1 of one that is, without offers. */
+int offer_look(const struct level *level, const struct surface_spot *spot, struct offers *offers);
 
 /* The same as offer_is_covered() if the level has no new hits since the offers were found. */
 int offer_is_superfluous(const struct level *level, const struct surface_spot *spot, const struct offers *offers);

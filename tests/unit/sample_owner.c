@@ -60,7 +60,7 @@ static void places_of_a_sphere_belong_to_who_faces_them(void **state)
 /* What a sample stands for: a cell of its lattice, as large as it is on the surface. The sum is the whole area when
  * each place is owned once. Where owners meet, gap or overlap is no wider than a pixel: 32 regions of area 4 pi 0.9^2
  * / 32, taken for round, have borders of 32 in all, each of them two regions'. Of these few would make blocks of less
- * than a quarter: merged. */
+ * than a quarter: merged; and none a block of a single sample. */
 static void places_of_a_sphere_are_owned_once(void **state)
 {
 	struct level_set set;
@@ -78,6 +78,7 @@ static void places_of_a_sphere_are_owned_once(void **state)
 
 			assert_int_equal(patch->owned & ~patch->mask, 0);
 			assert_int_equal(patch->owned & ~patch->kept, 0);
+			assert_int_not_equal(__builtin_popcountll(patch->owned), 1);
 			n_blocks += patch->owned != 0;
 			n_few += patch->owned != 0 && __builtin_popcountll(patch->owned) < 16;
 			for (uint64_t left = patch->owned; left != 0; left &= left - 1) {
