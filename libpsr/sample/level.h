@@ -60,8 +60,8 @@ unsigned owner_of(const struct level *level, const float p[3], const float n[3])
 /* Sets `seen` and `owned` of all patches, after tracing. MEMORY. */
 int owner_mark(struct level *level);
 
-/* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well; what is then alone
- * in its patch is owned no more. */
+/* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well; what is
+ * then alone in its patch is owned no more. */
 void merge_patches(struct level *level);
 
 /* keep.c: whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */

@@ -22,8 +22,8 @@
 #define SNAP 3
 #define MOST_SNAP 0.55
 
-/* What a new block costs; and what a moved sample costs more in a projection that faces the place worse than three others,
- * as it sticks out further from what it stands for. At coarser levels moving comes before new blocks. */
+/* What a new block costs; and what a moved sample costs more in a projection that faces the place worse than three
+ * others: many of these would show in colors and distances. At coarser levels moving comes before new blocks. */
 #define NEW_BLOCK 12
 #define NEW_COARSE_BLOCK 16
 #define WANTED 4.0f /* and up to this more, the fewer places want it */
@@ -66,8 +66,8 @@ struct corner {
 };
 
 /* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no patch. */
-static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot, struct corner corner[3],
-                         float projected[3])
+static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot,
+                         struct corner corner[3], float projected[3])
 {
 	const struct sheets *sheets = &level->sheets[q];
 	struct lattice_point at[3];
