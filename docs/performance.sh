@@ -15,6 +15,6 @@ for part; do
 	effects) make --no-print-directory bench-effects ;;
 	kernels) make --no-print-directory bench-simd ;;
 	*) make --no-print-directory bench only="$part" ;;
-	esac 2>/dev/null | sed "/^make/d;/^Numbers in/d;/^ *$/{N;/^ *\n *$/D}" >"$work/table"
+	esac 2>/dev/null | sed "/^make/d;/^  \(CC\|CXX\|AR\|LD\) /d;/^Numbers in/d;/^ *$/{N;/^ *\n *$/D}" >"$work/table"
 	docs/put-table.sh $page "bench $part" "$work/table"
 done
