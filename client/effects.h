@@ -5,7 +5,8 @@
 #include <cjson/cJSON.h>
 #include "psr/proto.h"
 
-/* Adds "effects" with a member each: "ran", and "count" or "why". Effects that this program does not know are skipped. */
+/* Adds "effects" with a member each: "ran", and "count" or "why". Effects that this program does not know are
+ * skipped. */
 void effects_add(cJSON *to, const struct psr_msg_frame_end *end);
 
 /* The same on standard output, a line each. */

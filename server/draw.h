@@ -1,4 +1,5 @@
-/* One pass of a frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any thread. */
+/* One pass of a frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any
+ * thread. */
 #ifndef PSRD_DRAW_H
 #define PSRD_DRAW_H
 

@@ -6,8 +6,9 @@
 #include <assimp/scene.h>
 #include "assimp_io.h"
 
-/* Fills *out with the material's first texture of a type; leaves it as it is where there is none, or its file is missing
- * (with a warning). uv_source[set] is the scene's set of coordinates for the mesh's set, -1 while it is free. */
+/* Fills *out with the material's first texture of a type; leaves it as it is where there is none, or its file is
+ * missing (with a warning). uv_source[set] is the scene's set of coordinates for the mesh's set, -1 while it is
+ * free. */
 int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct aiScene *scene,
                    const struct aiMaterial *m, enum aiTextureType type, int uv_source[PSR_UV_SETS],
                    struct psr_error *err);

@@ -21,8 +21,8 @@ struct cloud {
 	uint32_t n, k;              /* points, and neighbours of each: 1..CLOUD_NEIGHBOURS, less than n; 0 if n is 1 */
 	double middle[3], unit;     /* of the file's coordinates; unit is 1 if all points are one */
 	struct cloud_point *point;  /* n */
-	uint32_t *near;             /* n * k slots: the k nearest of each point, itself left out, nearest first; of equally far
-	                             * ones the one that stands first in the file */
+	uint32_t *near; /* n * k slots: the k nearest of each point, itself left out, nearest first; of equally far
+	                 * ones the one that stands first in the file */
 	float (*normal)[3];         /* n, unit length */
 	uint8_t *is_given;          /* n: the normal is the file's */
 	float *radius;              /* n, in units */
@@ -38,9 +38,9 @@ void cloud_tree_nearest(struct cloud *cloud);
 
 /* cloud_plane.c: normals where none is given, as the direction in which a point and its neighbours extend least, of
  * either sign ([Hoppe et al. 1992, "Surface Reconstruction from Unorganized Points"] 3.1), and radii: the distance to
- * the farthest corner of the point's cell in the Voronoi diagram of its neighbours, seen along the normal. Discs of exactly
- * these radii cover a flat sampling, however uneven. Where the cells are open (an edge, a wire) the open side does not
- * count; a point that is far from others than those are from theirs is held to twice their radius. */
+ * the farthest corner of the point's cell in the Voronoi diagram of its neighbours, seen along the normal. Discs of
+ * exactly these radii cover a flat sampling, however uneven. Where the cells are open (an edge, a wire) the open side
+ * does not count; a point that is far from others than those are from theirs is held to twice their radius. */
 void cloud_planes(struct cloud *cloud);
 
 /* cloud_orient.c: turns the normals that are not given so that neighbours agree, along a minimal spanning tree of the

@@ -44,8 +44,8 @@ enum {
 	IMPORT_HAS_COLOR = 8,
 };
 
-/* Adds vertices (all 0, color 1,1,1,1) and triangles (all 0) at the end. uv, tangent and color exist from the first call
- * whose `has`, a sum of IMPORT_HAS_*, asks for them. LIMIT, MEMORY. */
+/* Adds vertices (all 0, color 1,1,1,1) and triangles (all 0) at the end. uv, tangent and color exist from the first
+ * call whose `has`, a sum of IMPORT_HAS_*, asks for them. LIMIT, MEMORY. */
 int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_triangles, unsigned has,
                      struct psr_error *err);
 
@@ -53,8 +53,8 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
  * and a normal of 0,0,0 are filled in before the mesh is handed over. LIMIT, MEMORY. */
 int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_color, struct psr_error *err);
 
-/* The arrays that exist with an element a vertex: where the pointer is (a float (**)[3] or the like), and the bytes of an
- * element; position and normal come first. Returns how many. */
+/* The arrays that exist with an element a vertex: where the pointer is (a float (**)[3] or the like), and the bytes of
+ * an element; position and normal come first. Returns how many. */
 #define IMPORT_MAX_COLUMNS (4 + PSR_UV_SETS)
 struct import_column {
 	void *array;
@@ -72,8 +72,8 @@ int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, stru
                                                                                                      * on failure too */
 
 /* presets.c: adds what a client can ask for by name. A name is made printable, short enough (cut at a character) and
- * unlike the others of its kind; "" becomes "camera 1" or "light 1", and so on. Beyond PSR_MAX_PRESETS nothing is added,
- * with a warning. MEMORY. */
+ * unlike the others of its kind; "" becomes "camera 1" or "light 1", and so on. Beyond PSR_MAX_PRESETS nothing is
+ * added, with a warning. MEMORY. */
 int import_mesh_add_camera(struct import_mesh *im, const char *name, const struct psr_camera *camera,
                            struct psr_error *err);
 int import_mesh_add_light(struct import_mesh *im, const char *name, const struct psr_light *light,
@@ -90,8 +90,8 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
  * they are, their normals get unit length or stay 0. */
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err);
 
-/* duplicates.c: drops each triangle that has the positions, the winding and the material of one before it; returns their
- * number in *n_dropped. No index is out of range. MEMORY. */
+/* duplicates.c: drops each triangle that has the positions, the winding and the material of one before it; returns
+ * their number in *n_dropped. No index is out of range. MEMORY. */
 int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, struct psr_error *err);
 
 /* material.c: puts factors and transforms that are not finite, or out of range, right; drops images that no material
@@ -108,8 +108,8 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves t
  * split: the others come at the end. MEMORY, LIMIT. */
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 
-/* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one place,
- * then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
+/* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one
+ * place, then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
 /* path.c. Strings and bytes that are returned belong to the caller (free). */
@@ -120,14 +120,14 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err); 
  * outside. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
 
-/* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT, UNSUPPORTED,
- * LIMIT, MEMORY, and what opening the module returns. */
+/* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT,
+ * UNSUPPORTED, LIMIT, MEMORY, and what opening the module returns. */
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
 
-/* image_png.c: the most common kind by libpng, without the module, which takes a quarter of a second to open: PNG of 8 bits,
- * RGB with or without alpha, not interlaced. The same pixels. 0 if it is another kind, over a limit or broken: then *out is
- * not touched, and the module says what it is. */
+/* image_png.c: the most common kind by libpng, without the module, which takes a quarter of a second to open: PNG of 8
+ * bits, RGB with or without alpha, not interlaced. The same pixels. 0 if it is another kind, over a limit or broken:
+ * then *out is not touched, and the module says what it is. */
 int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, uint64_t max_pixels);
 
 /* The readers. `bytes` is the source file itself; all leave an unfinished mesh in im. */

@@ -41,7 +41,8 @@ struct ply_header {
 	struct ply_property property[PLY_MAX_PROPERTIES];
 	struct ply_name texture;            /* of "comment TextureFile NAME"; n is 0 if there is none */
 	size_t body;                        /* where the rows begin */
-	unsigned odd_line;                  /* the first one that begins with no word of a header, and is passed over; or 0 */
+	unsigned odd_line;                  /* the first one that begins with no word of a header, and is passed over;
+	                                     * or 0 */
 };
 
 /* Elements and properties of one element have names of their own, and the file is long enough for as many rows as are

@@ -6,8 +6,8 @@
 #include "psr/pool.h"
 #include "truth.h"
 
-/* Rays a side over the nine pixels of a neighbourhood: 4x4 in each, and where they meet nothing 20x20, since samples find
- * slivers of a tenth of a pixel (the rim of a cut-out) as well as anything else. */
+/* Rays a side over the nine pixels of a neighbourhood: 4x4 in each, and where they meet nothing 20x20, since samples
+ * find slivers of a tenth of a pixel (the rim of a cut-out) as well as anything else. */
 #define OUTSIDE_SIDE 12
 #define OUTSIDE_FINE_SIDE 60
 
@@ -205,7 +205,8 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 }
 
 int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                         uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads, struct psr_error *err)
+                         uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads,
+                         struct psr_error *err)
 {
 	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
 		                 .depth = depth };

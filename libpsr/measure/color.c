@@ -20,7 +20,8 @@ static int largest_difference(const uint8_t *a, const uint8_t *b)
 }
 
 /* Difference from the most similar truth of the 3x3 neighbourhood; -1 unless all nine pixels are of the object. */
-static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x, uint32_t y)
+static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x,
+                         uint32_t y)
 {
 	const uint8_t *own = rgb + 3 * ((size_t)y * width + x);
 	int least = 255;
@@ -78,7 +79,8 @@ static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth
 }
 
 int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                               uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads, struct psr_error *err)
+                               uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads,
+                               struct psr_error *err)
 {
 	size_t n = (size_t)width * height;
 	float *depth = psr_alloc_array(n, sizeof *depth), *ray_depth = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_depth);

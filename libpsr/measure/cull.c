@@ -198,7 +198,8 @@ void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struc
 		v3f_set(lens.frame[k], (float)eye->frame[k][0], (float)eye->frame[k][1], (float)eye->frame[k][2]);
 	}
 	if (words != 0)
-		screen_make(&set->screen, choice->n, eye->frame, (const double[2]){ eye->tangent, eye->tangent }, choice->level);
+		screen_make(&set->screen, choice->n, eye->frame, (const double[2]){ eye->tangent, eye->tangent },
+		            choice->level);
 	for (uint32_t b = 0; b < set->n_blocks; b++) {
 		float center[3], v[3], c[3], r;
 

@@ -67,7 +67,8 @@ static int part_init(struct part *part, const struct psr_blocks *all)
 static void add_block(struct part *part, const struct psr_blocks *all, uint32_t b)
 {
 	struct psr_blocks *blocks = &part->blocks;
-	uint32_t to = blocks->n_blocks++, from = psr_blocks_attr_first(all, b), n = (uint32_t)__builtin_popcountll(all->mask[b]);
+	uint32_t to = blocks->n_blocks++, from = psr_blocks_attr_first(all, b),
+			 n = (uint32_t)__builtin_popcountll(all->mask[b]);
 
 	part->center[0][to] = all->sphere_x[b];
 	part->center[1][to] = all->sphere_y[b];

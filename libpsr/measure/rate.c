@@ -46,7 +46,8 @@ static int make_rays(struct rays *rays)
 		psr_direction_frame(z, frame);
 		for (int b = 0; b < 4 * reach * reach; b++) {
 			for (int s = 0; s < RUN; s++) {
-				int row = SIDE * (b / (2 * reach) - reach) + s / SIDE, col = SIDE * (b % (2 * reach) - reach) + s % SIDE;
+				int row = SIDE * (b / (2 * reach) - reach) + s / SIDE,
+					col = SIDE * (b % (2 * reach) - reach) + s % SIDE;
 				double x = (col + (row & 1) / 2.0) * step, y = row * row_height;
 
 				if (x * x + y * y > 1)

@@ -23,7 +23,9 @@ struct measure {
 
 static double grey(const uint8_t rgb[3])
 {
-	return ((double)psr_srgb_to_linear[rgb[0]] + (double)psr_srgb_to_linear[rgb[1]] + (double)psr_srgb_to_linear[rgb[2]]) / 3;
+	return ((double)psr_srgb_to_linear[rgb[0]] + (double)psr_srgb_to_linear[rgb[1]] +
+	        (double)psr_srgb_to_linear[rgb[2]]) /
+	       3;
 }
 
 static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y)
@@ -61,7 +63,8 @@ static void measure_row(int y, void *userdata)
 /* Frames show an edge of the object up to some pixels off: what is dark there says nothing of shadows. */
 static int is_compared(const struct measure *m, uint32_t x, uint32_t y)
 {
-	if (m->got[(size_t)y * m->width + x] < 0 || x < APART || y < APART || x + APART >= m->width || y + APART >= m->height)
+	if (m->got[(size_t)y * m->width + x] < 0 || x < APART || y < APART || x + APART >= m->width ||
+	    y + APART >= m->height)
 		return 0;
 	for (uint32_t v = y - APART; v <= y + APART; v++)
 		for (uint32_t u = x - APART; u <= x + APART; u++)
@@ -125,9 +128,10 @@ static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 	return PSR_OK;
 }
 
-int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                                const struct psr_light *light, uint32_t width, uint32_t height, const uint8_t *shadowed,
-                                const uint8_t *lit, int n_threads, struct psr_error *err)
+int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth,
+                                const struct psr_camera *camera, const struct psr_light *light, uint32_t width,
+                                uint32_t height, const uint8_t *shadowed, const uint8_t *lit, int n_threads,
+                                struct psr_error *err)
 {
 	struct measure m = { .truth = truth, .light = light, .near_z = camera->near_z, .width = width, .height = height,
 		                 .shadowed = shadowed, .lit = lit };

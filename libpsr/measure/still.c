@@ -35,7 +35,8 @@ static void light_place(const struct still *still, uint64_t attr, const double d
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 	const double normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
 	const uint32_t diffuse = PSR_ATTR_DIFFUSE(attr), specular = PSR_ATTR_SPECULAR(attr);
-	const double highlight[3] = { linear_of(specular & 31, 31), linear_of(specular >> 5 & 63, 63), linear_of(specular >> 11, 31) };
+	const double highlight[3] = { linear_of(specular & 31, 31), linear_of(specular >> 5 & 63, 63),
+		                          linear_of(specular >> 11, 31) };
 	double to_eye[3];
 	v3d_normalize(to_eye, direction);
 	v3d_scale(to_eye, to_eye, -1);
@@ -48,7 +49,8 @@ static void light_place(const struct still *still, uint64_t attr, const double d
 			continue;
 		const double shine = pow(fmin(fmax(mirror, 0), 1), exp2(PSR_ATTR_EXPONENT(attr) / 16.0));
 		for (int c = 0; c < 3; c++)
-			light[c] += scene->light[l].color[c] * (linear_of(diffuse >> 8 * c & 255, 255) * facing + highlight[c] * shine);
+			light[c] +=
+				scene->light[l].color[c] * (linear_of(diffuse >> 8 * c & 255, 255) * facing + highlight[c] * shine);
 	}
 	for (int c = 0; c < 3; c++)
 		light[c] = fmin(light[c], 1);
@@ -65,7 +67,8 @@ static void draw_pixel(const struct still *still, uint32_t x, uint32_t y)
 		struct ray ray[RUN];
 		struct ray_hit hit[RUN];
 		for (uint32_t i = 0; i < n; i++)
-			truth_ray(still->truth, &still->view, x + ((first + i) % side + 0.5) / side, y + ((first + i) / side + 0.5) / side, &ray[i]);
+			truth_ray(still->truth, &still->view, x + ((first + i) % side + 0.5) / side,
+			          y + ((first + i) / side + 0.5) / side, &ray[i]);
 		truth_trace(still->truth, ray, (int)n, still->scene->camera.near_z, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			double light[3] = { still->scene->background[0], still->scene->background[1], still->scene->background[2] };
@@ -87,8 +90,8 @@ static void draw_row(int y, void *userdata)
 		draw_pixel(still, x, (uint32_t)y);
 }
 
-int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint32_t width, uint32_t height, uint32_t side,
-                    int n_threads, uint8_t *rgb, uint8_t *covered, struct psr_error *err)
+int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint32_t width, uint32_t height,
+                    uint32_t side, int n_threads, uint8_t *rgb, uint8_t *covered, struct psr_error *err)
 {
 	struct still still = { .truth = truth, .scene = scene, .side = side, .rgb = rgb, .covered = covered };
 	struct psr_pool *pool;

@@ -181,7 +181,8 @@ static struct cluster_view {
 }
 
 /* Rises with the level among clusters that fit a pixel, falls with it among those that do not, which are all below. */
-static uint32_t score_of(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k, float group_stretch)
+static uint32_t score_of(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k,
+                         float group_stretch)
 {
 	const uint32_t max_levels = 32;
 	int fits = fits_pixel(group_stretch * in->cull.spacing * (float)(1u << k->level) * plan->finer);
@@ -212,7 +213,8 @@ static void choose_levels(struct bins *bins, const struct plan *plan)
 	}
 }
 
-static int is_chosen(const struct bins *bins, const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k)
+static int is_chosen(const struct bins *bins, const struct plan *plan, const struct plan_instance *in,
+                     const struct psr_cluster *k)
 {
 	if (in->cull.blocks->n_levels == 1)
 		return 1;
@@ -332,7 +334,8 @@ static void note_tests(const struct plan *plan, struct psr_report *report, uint6
 	            (uint64_t)__builtin_popcount(report->levels & ~1u));
 }
 
-int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report)
+int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
+                struct psr_report *report)
 {
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
 	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);

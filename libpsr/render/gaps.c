@@ -8,10 +8,11 @@ static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t 
 			weight[(size_t)y * stride + x] = WEIGHT_ONE;
 }
 
-_Static_assert(TILE_WIDTH % GAPS_WIDTH == 0 && TILE_HEIGHT % BRICK == 0, "what gaps are looked for in lies in one tile");
+_Static_assert(TILE_WIDTH % GAPS_WIDTH == 0 && TILE_HEIGHT % BRICK == 0,
+               "what gaps are looked for in lies in one tile");
 
-struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
-                             uint32_t y1, uint16_t *weight, uint8_t *bricks)
+struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
+                             uint32_t y0, uint32_t y1, uint16_t *weight, uint8_t *bricks)
 {
 	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, weight, plan->opaque_cells };
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;

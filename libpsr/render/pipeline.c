@@ -33,7 +33,8 @@ struct psr_renderer {
 	struct shade_counts *shade;
 	float (*lit)[4];          /* diffuse light by normal */
 	size_t lit_size;
-	/* One a tile: quiet as plan.is_quiet; clean if words and cells are empty since an earlier frame of the same layout. */
+	/* One a tile: quiet as plan.is_quiet; clean if words and cells are empty since an earlier frame of the same
+	 * layout. */
 	uint8_t *is_quiet, *is_clean;
 	const void *clean_pixels; /* the layout: where, how large, and with which levels */
 	uint32_t clean_width, clean_height, clean_levels;
@@ -44,8 +45,8 @@ struct psr_renderer {
 
 const char *psr_stage_name(enum psr_stage stage)
 {
-	static const char *const names[PSR_N_STAGES] = { "plan", "shadow", "cull", "warp", "gaps", "resolve", "shade", "fill",
-		                                              "smooth" };
+	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
+		                                             "resolve", "shade",  "fill", "smooth" };
 	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
 }
 
@@ -73,8 +74,8 @@ static int validate(const struct psr_scene *scene, const struct psr_settings *se
 		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
 	const struct psr_window *window = &settings->window;
 	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE ||
-	    !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE || window->top < -PSR_MAX_SIDE ||
-	    window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
+	    !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE ||
+	    window->top < -PSR_MAX_SIDE || window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "there is no window at (%d, %d) of a picture of %ux%u", (int)window->left,
 		                (int)window->top, window->picture_width, window->picture_height);
 	if (settings->cull_tests & ~(unsigned)PSR_CULL_ALL)
@@ -132,8 +133,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size + r->lit_size +
-	       r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
+	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
+	       r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
 static uint32_t n_rows(const struct plan *plan)
@@ -227,12 +228,14 @@ static void warp_one(int tile, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	r->tile[tile] = (struct warp_counts){ 0, 0, 0 };
 	if (!is_empty || !r->is_clean[tile])
-		r->tile[tile] = (r->plan.with_splats ? splat_tile : warp_tile)(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
+		r->tile[tile] =
+			(r->plan.with_splats ? splat_tile : warp_tile)(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
 	r->is_clean[tile] = (uint8_t)is_empty;
 }
 
 static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
-                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
+                      struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
 	if (rc)
@@ -274,8 +277,8 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		n_occluded += r->tile[t].n_occluded;
 		with_occlusion |= r->tile[t].with_occlusion;
 	}
-	effect_note(report, PSR_EFFECT_OCCLUSION,
-	            with_occlusion ? PSR_WHY_RAN : settings->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF, n_occluded);
+	const enum psr_why no_occlusion = settings->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF;
+	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);
 	report->ns[PSR_STAGE_WARP] = now_ns() - start;
 	r->report = *report;
 	*stack = &r->stack;
@@ -295,9 +298,11 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	r->gaps[row] = gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+	r->gaps[row] =
+		gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 	if (r->plan.with_splats)
-		r->gaps[row].n_marked += splat_close(&r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+		r->gaps[row].n_marked +=
+			splat_close(&r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 	fill_look(&r->fill, (uint32_t)row);
 }
 
@@ -354,8 +359,35 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	report->ns[PSR_STAGE_SHADE] = wall - fill_ns - report->ns[PSR_STAGE_RESOLVE];
 }
 
-static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
-                        struct psr_error *err)
+/* Returns how many bricks have a weight below 1. */
+static uint32_t find_gaps(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+{
+	const int n = (int)n_rows(&r->plan);
+	uint32_t n_marked = 0;
+	psr_pool_for(pool, n, gaps_one, r);
+	for (int i = 0; i < n; i++) {
+		n_marked += r->gaps[i].n_marked;
+		report->count[PSR_STAGE_GAPS] += r->gaps[i].n_partial;
+	}
+	return n_marked;
+}
+
+static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+{
+	const enum psr_why why = r->plan.is_full || !r->frame->rgb ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+	effect_note(report, PSR_EFFECT_TABLE, why, PSR_DIRECTIONS);
+	if (why != PSR_WHY_RAN)
+		return PSR_OK;
+	r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
+	if (!r->lit)
+		return PSR_ERR_MEMORY;
+	shade_tabulate(r->simd, &r->plan, pool, r->lit);
+	r->plan.view.lit = (const float(*)[4])r->lit;
+	return PSR_OK;
+}
+
+static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool,
+                        struct psr_frame *frame, struct psr_error *err)
 {
 	if (stack != &r->stack || frame->width != stack->width || frame->height != stack->height)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack is not this renderer's, or of another size than the frame");
@@ -369,22 +401,18 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	r->depth = frame->depth;
 	if (smooth == PSR_WHY_RAN) {
 		if (smooth_begin(&r->smooth, &r->plan, frame->depth))
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for smoothing a picture of %ux%u", r->plan.width, r->plan.height);
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for smoothing a picture of %ux%u", r->plan.width,
+			                r->plan.height);
 		rgb = r->smooth.rgb;
 		r->depth = r->smooth.depth;
 	}
 	r->target = (struct shade_target){ rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
-	const struct fill_picture picture = { stack, r->weight, r->bricks, r->rgb[0], r->rgb[1], r->rgb[2], r->srgb, rgb, r->depth };
+	const struct fill_picture picture = { stack,     r->weight, r->bricks, r->rgb[0], r->rgb[1],
+		                                  r->rgb[2], r->srgb,   rgb,       r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	const int n = (int)n_rows(&r->plan);
-	uint32_t n_marked = 0;
 	uint64_t start = now_ns(), end;
-	psr_pool_for(pool, n, gaps_one, r);
-	for (int i = 0; i < n; i++) {
-		n_marked += r->gaps[i].n_marked;
-		report->count[PSR_STAGE_GAPS] += r->gaps[i].n_partial;
-	}
+	const uint32_t n_marked = find_gaps(r, pool, report);
 	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
 	start = end;
 	if (n_marked)
@@ -392,16 +420,9 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
 	start = end;
 
-	const enum psr_why table = r->plan.is_full || !frame->rgb ? PSR_WHY_OFF : shade_wants_table(&r->plan);
-	if (table == PSR_WHY_RAN) {
-		r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
-		if (!r->lit)
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
-		shade_tabulate(r->simd, &r->plan, pool, r->lit);
-		r->plan.view.lit = (const float(*)[4])r->lit;
-	}
-	effect_note(report, PSR_EFFECT_TABLE, table, PSR_DIRECTIONS);
-	psr_pool_for(pool, n, shade_one, r);
+	if (tabulate(r, pool, report))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
+	psr_pool_for(pool, (int)n_rows(&r->plan), shade_one, r);
 	report_shading(r, report, (end = now_ns()) - start);
 	start = end;
 	if (n_marked)

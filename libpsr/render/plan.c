@@ -97,7 +97,8 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 	const double half[3] = { plan->center[0], plan->center[1], 0 };
 	double column[4][3]; /* in camera space: a unit of projection space's x, y, z, and its origin */
 	for (int k = 0; k < 3; k++)
-		m3d_apply(column[k], (const double(*)[3])to_camera, (const double[3]){ projection->axis[k][0], projection->axis[k][1], projection->axis[k][2] });
+		m3d_apply(column[k], (const double(*)[3])to_camera,
+		          (const double[3]){ projection->axis[k][0], projection->axis[k][1], projection->axis[k][2] });
 	memcpy(column[3], center, sizeof column[3]);
 	double *to[4] = { out->step, out->down, out->along, out->origin };
 	const double length[4] = { dx, dy, 1, 1 };
@@ -220,7 +221,8 @@ static uint16_t light16(double linear)
 	return (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
 }
 
-int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings,
+              struct psr_error *err)
 {
 	const struct psr_camera *camera = &scene->camera;
 	struct view view;

@@ -40,7 +40,8 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 	simd->strip_resolve(&strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < pixels->n; i++)
 		for (int a = 0; a < 3; a++) {
-			const float right = (float)plan->frame[0][a], down = (float)plan->frame[1][a], forward = (float)plan->frame[2][a];
+			const float right = (float)plan->frame[0][a], down = (float)plan->frame[1][a],
+						forward = (float)plan->frame[2][a];
 			const float world = (right * strip.nx[i] + down * strip.ny[i]) + forward * strip.nz[i];
 			to[3 * pixels->x[i] + a] = to_steps(world);
 		}

@@ -5,14 +5,15 @@
 #include "base/srgb.h"
 #include "render/render.h"
 
-/* Windows begin at multiples of the coarsest cell, so that cells are those of the whole picture, and of what is drawn a margin
- * is not used: holes that reach across a window's border are filled from both of its sides. */
+/* Windows begin at multiples of the coarsest cell, so that cells are those of the whole picture, and of what is drawn a
+ * margin is not used: holes that reach across a window's border are filled from both of its sides. */
 #define WINDOW_WIDTH 2048
 #define WINDOW_HEIGHT 1024
 #define MARGIN 64
 #define STEP_X (WINDOW_WIDTH - 2 * MARGIN)
 #define STEP_Y (WINDOW_HEIGHT - 2 * MARGIN)
-_Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MAX_DEPTH_LEVEL) == 0, "cells stay where they are");
+_Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MAX_DEPTH_LEVEL) == 0,
+               "cells stay where they are");
 _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
 
 struct psr_refiner {
@@ -72,7 +73,8 @@ static void average_row(int row, void *userdata)
 	const uint32_t side = 1u << part->pass, y = part->y0 + (uint32_t)row;
 	const uint32_t half = 1u << (2 * part->pass - 1);
 	for (uint32_t x = part->x0; x < part->x1; x++) {
-		const size_t first = (size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
+		const size_t first =
+			(size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
 		const size_t at = (size_t)y * part->frame->width + x;
 		uint32_t sum[3] = { half, half, half };
 		for (uint32_t j = 0; j < side; j++) {
@@ -118,8 +120,9 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 }
 
 /* Draws the window of column i and row j of windows, and averages what of it is used. */
-static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings, unsigned pass,
-                       uint32_t i, uint32_t j, struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
+static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                       unsigned pass, uint32_t i, uint32_t j, struct psr_pool *pool, struct psr_frame *frame,
+                       struct psr_error *err)
 {
 	const uint32_t width = settings->width << pass, height = settings->height << pass;
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
@@ -131,7 +134,10 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;
 
-	struct psr_frame fine = { .width = window.width, .height = window.height, .rgb = r->rgb, .depth = frame->depth ? r->depth : NULL };
+	struct psr_frame fine = { .width = window.width,
+		                      .height = window.height,
+		                      .rgb = r->rgb,
+		                      .depth = frame->depth ? r->depth : NULL };
 	const int rc = psr_render(r->renderer, scene, &window, pool, &fine, err);
 	if (rc)
 		return rc;

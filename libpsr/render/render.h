@@ -54,15 +54,16 @@ struct plan {
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
-	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are empty
-	 * and weights are whole there. */
+	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are
+	 * empty and weights are whole there. */
 	const uint8_t *is_quiet;
 	uint64_t n_samples;
 	void *storage;             /* of all arrays */
 	size_t storage_size;
 };
 
-int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err);
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings,
+              struct psr_error *err);
 void plan_clear(struct plan *plan);
 
 /* Centre of an instance's inner coordinates relative to a point, its rotation, and inner units in world units. */
@@ -77,8 +78,9 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 
 /* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
 
-/* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel (or what the settings say) wherever a
- * sphere of the group reaches, so that its blocks need no depth buffer but the picture's; the finest if there is none. */
+/* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel (or what the settings
+ * say) wherever a sphere of the group reaches, so that its blocks need no depth buffer but the picture's; the finest if
+ * there is none. */
 struct cull_group {
 	float stretch;  /* greatest of its clusters: pixels that a unit of camera space can be stretched to */
 	uint32_t score; /* of the cluster that is drawn */
@@ -115,7 +117,8 @@ struct bins { /* capacities are in bytes */
 };
 
 /* Also notes in plan->view what the blocks that are left need. */
-int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool, struct psr_report *report);
+int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
+                struct psr_report *report);
 size_t bins_bytes(const struct bins *bins);
 void bins_clear(struct bins *bins);
 
@@ -133,31 +136,32 @@ struct warp_counts {
 uint32_t warp_gap(uint32_t width);
 
 /* Clears a tile and draws its blocks. */
-struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
-                             uint32_t tile);
+struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                             struct psr_zstack *stack, uint32_t tile);
 
 /* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
  * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */
-struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
-                              uint32_t tile);
+struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                              struct psr_zstack *stack, uint32_t tile);
 
-/* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's threshold, where
- * one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its brick. Of rows y0..y1-1, after
- * gaps_rows. Returns how many there are. */
-uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1, uint16_t *weight,
-                     uint8_t *bricks);
+/* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's
+ * threshold, where one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its
+ * brick. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1,
+                     uint16_t *weight, uint8_t *bricks);
 
 /* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 
 #define BRICK GAPS_BRICK /* pixels a side; bricks are numbered in rows, those at the border may be cut off */
 
-/* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 - coverage), by
- * what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A pinhole has weight 0: a
- * pixel that at least seven of its eight neighbours are before by more than level 1's threshold, where those are one surface
- * (within level 1's threshold of each other, or level 4's where the pixel is empty). Sets bricks[i] to 1 where brick i has a
- * weight below WEIGHT_ONE, else to 0. `weight` and `bricks` are of the whole picture. A pure function of words and cells. */
-struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack, uint32_t y0,
-                             uint32_t y1, uint16_t *weight, uint8_t *bricks);
+/* Weights of rows y0..y1-1, of which y0 is a multiple of BRICK and y1 is, too, or the height: WEIGHT_ONE * (1 -
+ * coverage), by what is nearer than the pixel by more than the level's threshold; empty pixels are at infinity. A
+ * pinhole has weight 0: a pixel that at least seven of its eight neighbours are before by more than level 1's
+ * threshold, where those are one surface (within level 1's threshold of each other, or level 4's where the pixel is
+ * empty). Sets bricks[i] to 1 where brick i has a weight below WEIGHT_ONE, else to 0. `weight` and `bricks` are of the
+ * whole picture. A pure function of words and cells. */
+struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
+                             uint32_t y0, uint32_t y1, uint16_t *weight, uint8_t *bricks);
 
 /* ---- shade: words to linear colours ([G] 7.3) ---- */
 
@@ -179,14 +183,16 @@ struct shade_target {
 	const uint8_t *wants; /* one byte a brick, as of fill_wants; NULL: none */
 };
 
-/* Gives the pixels of rows y0..y1-1, at least one, their colours: samples of weight above 0, lit, and the background where
- * none is; without rgb, counts samples alone. `weight` is of the whole picture. Adds to the counts. */
+/* Gives the pixels of rows y0..y1-1, at least one, their colours: samples of weight above 0, lit, and the background
+ * where none is; without rgb, counts samples alone. `weight` is of the whole picture. Adds to the counts. */
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
-                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1, struct shade_counts *counts);
+                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
+                struct shade_counts *counts);
 
 /* ---- planes: what else is known of a row's pixels ---- */
 
-/* Writes those of the planes normal, id, block, weight and words that the frame has, before the fill changes weights. */
+/* Writes those of the planes normal, id, block, weight and words that the frame has, before the fill changes
+ * weights. */
 void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
                 const uint16_t *weight, uint32_t y);
 
@@ -203,8 +209,8 @@ struct fill_level {
 	struct fill_row cell;
 };
 
-/* What is filled. The linear colours r, g, b of pixels with weight above 0, the background's too, are valid in all bricks that
- * fill_wants names. */
+/* What is filled. The linear colours r, g, b of pixels with weight above 0, the background's too, are valid in all
+ * bricks that fill_wants names. */
 struct fill_picture {
 	const struct psr_zstack *stack;
 	uint16_t *weight;      /* of pixels that are filled it becomes WEIGHT_ONE */
@@ -249,12 +255,12 @@ void fill_look(struct fill *fill, uint32_t row);
 /* 2. What that takes from others: one byte a brick, not 0 where the 16-bit colours of the brick's pixels are needed. */
 const uint8_t *fill_wants(struct fill *fill);
 
-/* 3. Coarser levels from the row's colours, where they are needed; and what the next step does, for the pixels for which that is
- * enough. */
+/* 3. Coarser levels from the row's colours, where they are needed; and what the next step does, for the pixels for
+ * which that is enough. */
 void fill_pull(struct fill *fill, uint32_t row);
 
-/* 4. Gives every pixel of weight below WEIGHT_ONE its color and, where the weight is below a half, its depth, and touches no
- * other pixel of rgb and depth. Adds the counts and the error bound of the stage to the report. */
+/* 4. Gives every pixel of weight below WEIGHT_ONE its color and, where the weight is below a half, its depth, and
+ * touches no other pixel of rgb and depth. Adds the counts and the error bound of the stage to the report. */
 void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
 
 /* -- between fill.c and fill_bricks.c -- */
@@ -272,8 +278,8 @@ enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weigh
 /* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
 void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
 
-/* Makes their cells of a level whole, from those of the next: early those that look at nothing but whole cells of these and the
- * bricks beside them, then the others. */
+/* Makes their cells of a level whole, from those of the next: early those that look at nothing but whole cells of these
+ * and the bricks beside them, then the others. */
 void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
 
 /* The same for their pixels, of FILL_RUN bricks at most. */
@@ -295,7 +301,8 @@ int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth);
 void smooth_clear(struct smooth *smooth);
 
 /* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
-uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool, uint8_t *rgb);
+uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                        uint8_t *rgb);
 
 /* ---- for tests: a renderer that calls other kernels ---- */
 

@@ -77,7 +77,8 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 		double p[3];
 		for (int i = 0; i < 3; i++)
 			p[i] = corner >> i & 1 ? half[i] : -half[i];
-		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1], z = v3d_dot(p, forward);
+		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
+			   z = v3d_dot(p, forward);
 		extent = fmax(extent, fmax(x, y));
 		distance = fmax(distance, fmax(x, y) * margin - z);
 		deepest = fmax(deepest, -z);

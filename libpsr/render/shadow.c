@@ -80,14 +80,16 @@ static int in_view(const struct plan *plan, const float c[3], float r)
 static int in_cone(const struct strip_light *light, double outer, const float c[3], float r)
 {
 	double to[3], axis[3], s, cosine;
-	v3d_set(to, (double)c[0] - (double)light->position[0], (double)c[1] - (double)light->position[1], (double)c[2] - (double)light->position[2]);
+	v3d_set(to, (double)c[0] - (double)light->position[0], (double)c[1] - (double)light->position[1],
+	        (double)c[2] - (double)light->position[2]);
 	v3d_set(axis, (double)light->axis[0], (double)light->axis[1], (double)light->axis[2]);
 	const double along = v3d_dot(to, axis), across2 = v3d_dot(to, to) - along * along;
 	psr_sincos(outer, &s, &cosine);
 	return sqrt(fmax(across2, 0)) * cosine - along * s <= (double)r;
 }
 
-/* Instances fit the unit sphere of their inner coordinates; a hundredth makes up for rounding. p is the plan's number of the light. */
+/* Instances fit the unit sphere of their inner coordinates; a hundredth makes up for rounding. p is the plan's number
+ * of the light. */
 static int reaches_view(const struct plan *plan, const struct psr_light *light, uint32_t p)
 {
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
@@ -127,12 +129,12 @@ static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 {
 	const struct psr_camera *p = &a->camera, *q = &b->camera;
 	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0 &&
-	       memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0 && p->kind == q->kind &&
-	       p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
+	       memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0 &&
+	       p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
 }
 
-/* Texels a side: as many as the picture's greater side has pixels, within what all maps may have together. Their number is that of
- * maps of the scene, in view or not. */
+/* Texels a side: as many as the picture's greater side has pixels, within what all maps may have together. Their number
+ * is that of maps of the scene, in view or not. */
 static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 {
 	const uint32_t w = plan->window.picture_width, h = plan->window.picture_height;
@@ -177,8 +179,9 @@ static int is_planned(const struct plan *plan, const struct psr_light *light)
 }
 
 /* Light l of the scene, p of the plan: draws what is not there. */
-static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct simd *simd, const struct plan *plan, struct bins *bins,
-                         const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
+static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct simd *simd,
+                         const struct plan *plan, struct bins *bins, const struct psr_scene *scene,
+                         struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
 {
 	struct shadow_light *light = &shadow->light[p];
 	const int is_needed = plan->is_full || reaches_view(plan, &scene->light[l], p);
@@ -186,7 +189,8 @@ static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const st
 	for (uint32_t f = 0; f < light->n_maps; f++) {
 		struct shadow_kept *kept = &shadow->kept[l][f];
 		if (!kept->is_drawn) {
-			int rc = shadow_map_draw(kept, &shadow->drawer, simd, bins, scene, pool, &report->count[PSR_STAGE_SHADOW], err);
+			int rc =
+				shadow_map_draw(kept, &shadow->drawer, simd, bins, scene, pool, &report->count[PSR_STAGE_SHADOW], err);
 			if (rc)
 				return rc;
 			report->n_shadow_maps_drawn++;
@@ -198,7 +202,8 @@ static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const st
 }
 
 int shadow_prepare(struct shadow **out, const struct simd *simd, struct plan *plan, struct bins *bins,
-                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
+                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report,
+                   struct psr_error *err)
 {
 	int n_casting = 0, has_changed;
 	for (uint32_t l = 0; l < scene->n_lights; l++)
@@ -222,7 +227,8 @@ int shadow_prepare(struct shadow **out, const struct simd *simd, struct plan *pl
 		if (rc)
 			return rc;
 	}
-	effect_note(report, PSR_EFFECT_SHADOWS, report->n_shadow_maps ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->n_shadow_maps);
+	effect_note(report, PSR_EFFECT_SHADOWS, report->n_shadow_maps ? PSR_WHY_RAN : PSR_WHY_NOTHING,
+	            report->n_shadow_maps);
 	if (report->n_shadow_maps) {
 		plan->shadow = shadow->light;
 		plan->view.needs |= STRIP_POSITION;

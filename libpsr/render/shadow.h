@@ -1,8 +1,8 @@
 /* Shadows: which lights of a scene need maps, maps that fit them, and maps kept from frame to frame ([G] 7.3.1).
  *
- * A map is a picture of depths from a light, drawn like every picture: culled, warped, with level buffers where samples are
- * further apart than texels. It depends on light, instances, models and the picture's size, never on the camera, so that it
- * is the same whether it is drawn now or was kept. */
+ * A map is a picture of depths from a light, drawn like every picture: culled, warped, with level buffers where samples
+ * are further apart than texels. It depends on light, instances, models and the picture's size, never on the camera, so
+ * that it is the same whether it is drawn now or was kept. */
 #ifndef PSR_RENDER_SHADOW_H
 #define PSR_RENDER_SHADOW_H
 
@@ -10,14 +10,15 @@
 
 struct shadow; /* the maps, and what drawing them takes */
 
-/* Gives plan->shadow the maps of those lights that cast shadows, have a colour and reach an instance in view, and notes what
- * shading needs. Draws what is not there yet. *shadow is made when the first light needs it. `bins` is free to be used. MEMORY,
- * LIMIT. */
+/* Gives plan->shadow the maps of those lights that cast shadows, have a colour and reach an instance in view, and notes
+ * what shading needs. Draws what is not there yet. *shadow is made when the first light needs it. `bins` is free to be
+ * used. MEMORY, LIMIT. */
 int shadow_prepare(struct shadow **shadow, const struct simd *simd, struct plan *plan, struct bins *bins,
-                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report, struct psr_error *err);
+                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report,
+                   struct psr_error *err);
 
-/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, up to
- * two thirds more; while one is drawn, 8 bytes more a texel of the largest. */
+/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, up
+ * to two thirds more; while one is drawn, 8 bytes more a texel of the largest. */
 #define SHADOW_TEXELS (16u << 20)
 #define SHADOW_SIDE 2048 /* at most */
 
@@ -39,9 +40,10 @@ struct shadow_bounds {
 void shadow_bounds_make(struct shadow_bounds *bounds, const struct psr_scene *scene);
 
 /* Cameras of the maps of a light, at most SHADOW_FACES, with at most `side` texels a side: one whose picture holds all
- * instances, or as much as the cone of a spot, or the faces of a cube about the light that see instances. Returns how many. */
-uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light, const struct psr_scene *scene,
-                          const struct shadow_bounds *bounds, uint32_t side);
+ * instances, or as much as the cone of a spot, or the faces of a cube about the light that see instances. Returns how
+ * many. */
+uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light,
+                          const struct psr_scene *scene, const struct shadow_bounds *bounds, uint32_t side);
 
 /* ---- map: one of them, drawn ---- */
 

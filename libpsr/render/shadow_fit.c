@@ -116,13 +116,15 @@ static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *
 	v3d_cross(axis[1], axis[2], axis[0]);
 	for (int a = 0; a < 3; a++)
 		scene_range(scene, axis[a], &low[a], &high[a]);
-	const double width = high[0] - low[0], height = high[1] - low[1], most = fmax(fmax(width, height), 1e-6 * bounds->radius);
+	const double width = high[0] - low[0], height = high[1] - low[1],
+				 most = fmax(fmax(width, height), 1e-6 * bounds->radius);
 	const double texel = fmax(most / (side - 2 * MARGIN), bounds->spacing);
 	fit->width = clamp_side(ceil(width / texel) + 2 * MARGIN, side);
 	fit->height = clamp_side(ceil(height / texel) + 2 * MARGIN, side);
 	v3d_set(camera->eye, 0, 0, 0);
 	for (int a = 0; a < 3; a++)
-		v3d_add_scaled(camera->eye, camera->eye, a < 2 ? low[a] / 2 + high[a] / 2 : low[2] - bounds->radius / 8, axis[a]);
+		v3d_add_scaled(camera->eye, camera->eye, a < 2 ? low[a] / 2 + high[a] / 2 : low[2] - bounds->radius / 8,
+		               axis[a]);
 	v3d_add_scaled(camera->target, camera->eye, bounds->radius, axis[2]);
 	camera->kind = PSR_CAMERA_ORTHOGRAPHIC;
 	camera->fov_y = camera->near_z = 0;
@@ -131,8 +133,8 @@ static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *
 }
 
 /* A square picture that reaches as far as `tangent` around the axis at least. */
-static void fit_square(struct shadow_fit *fit, const double position[3], const double axis[3], double tangent, double distance,
-                       const struct shadow_bounds *bounds, uint32_t side)
+static void fit_square(struct shadow_fit *fit, const double position[3], const double axis[3], double tangent,
+                       double distance, const struct shadow_bounds *bounds, uint32_t side)
 {
 	struct psr_camera *camera = &fit->camera;
 	const double adequate = 2 * tangent * distance / bounds->spacing + 2 * MARGIN;
@@ -145,7 +147,8 @@ static void fit_square(struct shadow_fit *fit, const double position[3], const d
 	camera->fov_y = 2 * angle_of(tangent * fit->width / (fit->width - 2 * MARGIN));
 }
 
-/* Whether instances' sphere, at `to` from the light, reaches into the pyramid of a face, and a spot's cone does, too. */
+/* Whether instances' sphere, at `to` from the light, reaches into the pyramid of a face, and a spot's cone does,
+ * too. */
 static int face_sees(const double face[3], const double to[3], double radius, const struct psr_light *light)
 {
 	for (int k = 0; k < 3; k++)
@@ -162,8 +165,8 @@ static int face_sees(const double face[3], const double to[3], double radius, co
 	return 1;
 }
 
-static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light, const double to[3], double distance,
-                         const struct shadow_bounds *bounds, uint32_t side)
+static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light, const double to[3],
+                         double distance, const struct shadow_bounds *bounds, uint32_t side)
 {
 	uint32_t n = 0;
 	for (int f = 0; f < SHADOW_FACES; f++) {
@@ -175,8 +178,8 @@ static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_l
 	return n;
 }
 
-uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light, const struct psr_scene *scene,
-                          const struct shadow_bounds *bounds, uint32_t side)
+uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light,
+                          const struct psr_scene *scene, const struct shadow_bounds *bounds, uint32_t side)
 {
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
 		return fit_directional(fit, light, scene, bounds, side);

@@ -5,8 +5,8 @@
 #include "base/vec.h"
 #include "render/shadow.h"
 
-/* In cells: the least that a plane must fall within them, and a cell's width. Samples that are half a cell from its centre in both
- * directions need the half; the width makes up for normals that are not the surface's own. */
+/* In cells: the least that a plane must fall within them, and a cell's width. Samples that are half a cell from its
+ * centre in both directions need the half; the width makes up for normals that are not the surface's own. */
 #define SLOPE_BIAS 0.5
 #define TEXEL_BIAS 1.0
 
@@ -61,8 +61,8 @@ static int has_seam(const struct shadow_map *map, int k)
 	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
 }
 
-/* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in it, as far as
- * these exist. */
+/* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in
+ * it, as far as these exist. */
 static void make_seams(int k, void *userdata)
 {
 	const struct drawing *d = userdata;

@@ -8,13 +8,14 @@
 
 /* Steps of the lattice: no point of an equilateral one is further than 1/sqrt(3) from a sample. */
 #define RADIUS 0.6f
-/* Of the tangent plane against the projection's. Projections own what they see at less than 50 degrees, and normals of steeper
- * places are mostly those of a texture or of something smaller than the disc; steps would stick out. Measured. */
+/* Of the tangent plane against the projection's. Projections own what they see at less than 50 degrees, and normals of
+ * steeper places are mostly those of a texture or of something smaller than the disc; steps would stick out.
+ * Measured. */
 #define MOST_SLOPE 0.7f
 /* Of a disc whose sample has no neighbours on either side, along that line: what it lies on is narrower than a step. */
 #define NARROW 0.5f
-/* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest shows.
- * Measured. */
+/* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest
+ * shows. Measured. */
 #define RIM_DEPTH 1.0f
 
 struct splat_target {
@@ -47,7 +48,8 @@ static inline int32_t within(float x, int32_t low, int32_t high)
 static int draw_splat(const struct splat_target *t, const struct splat *s)
 {
 	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1];
-	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]), extent_y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
+	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
+				extent_y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
 	const float area = a[0] * b[1] - a[1] * b[0];
 	if (extent_x <= s->most && extent_y <= s->most && area != 0) {
 		const float p_x = b[1] / area, p_y = -b[0] / area, q_x = -a[1] / area, q_y = a[0] / area;
@@ -74,7 +76,8 @@ static inline int may_have(uint64_t mask, int row, int col)
 	return ((row | col) & ~7) != 0 || (mask >> (8 * row + col) & 1);
 }
 
-/* How much of the radius along the rows, and across them, is covered: in odd rows samples are half a step to the right. */
+/* How much of the radius along the rows, and across them, is covered: in odd rows samples are half a step to the
+ * right. */
 static void find_neighbors(float share[2], uint64_t mask, uint32_t sample)
 {
 	const int r = (int)(sample >> 3), c = (int)(sample & 7), left = c - 1 + (r & 1);
@@ -102,7 +105,8 @@ static void find_slope(float slope[2], const float n[3], const struct psr_projec
 static uint64_t draw_block(const struct splat_target *t, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
-	const struct psr_projection *projection = &in->blocks->projection[in->blocks->block_projection[entry->slot - in->first_slot]];
+	const struct psr_projection *projection =
+		&in->blocks->projection[in->blocks->block_projection[entry->slot - in->first_slot]];
 	const float (*normals)[3] = psr_direction_table();
 	const int perspective = t->plan->perspective;
 	struct warp_block b;
@@ -116,13 +120,15 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 		radius[1][a] = RADIUS * scale * (float)b.lattice->down[a] / 0.866025404f;
 		along[a] = RADIUS * step * (float)b.lattice->along[a];
 	}
-	struct splat s = { .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale, .most = (float)(2 << entry->level) };
+	struct splat s = { .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,
+		               .most = (float)(2 << entry->level) };
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
 		float p[3], d[3], slope[2], share[2];
 		for (int a = 0; a < 3; a++)
-			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c]) + depth * b.unit[a];
+			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c]) +
+			       depth * b.unit[a];
 		if (!(p[2] > t->plan->near_z))
 			continue;
 		const float inverse = perspective ? 1 / p[2] : 1;
@@ -147,8 +153,8 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 	return n_inside;
 }
 
-struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
-                              uint32_t tile)
+struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                              struct psr_zstack *stack, uint32_t tile)
 {
 	const uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
 	struct warp_target target = { .stride = stack->width + stack->gap };
@@ -199,8 +205,8 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 }
 
 /* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y,
-                         uint32_t n)
+static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x,
+                         uint32_t y, uint32_t n)
 {
 	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
 	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
@@ -228,8 +234,8 @@ static void find_between(uint8_t *is_between, const struct plan *plan, const str
 	}
 }
 
-uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1, uint16_t *weight,
-                     uint8_t *bricks)
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1,
+                     uint16_t *weight, uint8_t *bricks)
 {
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	uint8_t is_between[TILE_WIDTH];

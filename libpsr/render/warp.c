@@ -75,8 +75,8 @@ static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
 		bins->order[begin + count[(depth_of(bins, e) - low) >> shift]++] = e;
 }
 
-/* Whether all pixels that the block can change are nearer already. A block that lowers cells of level k changes what is seen
- * through them up to two cells away, which must be in this tile, too. */
+/* Whether all pixels that the block can change are nearer already. A block that lowers cells of level k changes what is
+ * seen through them up to two cells away, which must be in this tile, too. */
 static int is_occluded(const struct occlusion *o, const struct warp_target *t, const struct cull_hit *hit)
 {
 	const int32_t grown = hit->level ? 2 << hit->level : 0;
@@ -97,8 +97,8 @@ static int is_occluded(const struct occlusion *o, const struct warp_target *t, c
 	return 1;
 }
 
-static struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins, const struct warp_target *target,
-                                           uint32_t begin, uint32_t end)
+static struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins,
+                                           const struct warp_target *target, uint32_t begin, uint32_t end)
 {
 	struct warp_counts counts = { 0, 0, 1 };
 	struct occlusion occlusion = { .is_known = 0 };
@@ -176,8 +176,8 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 	return n_inside;
 }
 
-struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins, struct psr_zstack *stack,
-                             uint32_t tile)
+struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
+                             struct psr_zstack *stack, uint32_t tile)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;

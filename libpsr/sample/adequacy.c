@@ -124,7 +124,8 @@ static int is_hit(const struct trial *trial, const struct cover_point *point, fl
 static int is_any_hit(const struct level *level, const struct trial *trial, double radius)
 {
 	double cosine = trial->cosine > 0.03 ? trial->cosine : 0.03;
-	float half = (float)(level->ds / 2), tolerance = (float)(level->ds * (1 + 1.5 * sqrt(1 - cosine * cosine) / cosine));
+	float half = (float)(level->ds / 2),
+		  tolerance = (float)(level->ds * (1 + 1.5 * sqrt(1 - cosine * cosine) / cosine));
 	uint32_t first[COVER_MOST_AROUND];
 	int n_cells = cover_around(&level->cover, trial->spot.p, radius, first);
 
@@ -305,8 +306,8 @@ int adequacy_measure(struct adequacy *out, const struct level *level, uint64_t s
 
 #define MOST_ROUNDS 7
 
-/* What a view found that none of those before had seen is seldom alone: it is put down as seen, views look for more of that
- * kind, and the surface is diced again. */
+/* What a view found that none of those before had seen is seldom alone: it is put down as seen, views look for more of
+ * that kind, and the surface is diced again. */
 static int add_missing(struct level *level, const struct adequacy *found, int round)
 {
 	uint64_t n_unseen = 0;
@@ -319,7 +320,8 @@ static int add_missing(struct level *level, const struct adequacy *found, int ro
 	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
 		const struct surface_spot *spot = &found->spot[i];
 
-		level->sides[spot->surface & ~SHEET_BACK] |= (spot->surface & SHEET_BACK) != 0 ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN;
+		level->sides[spot->surface & ~SHEET_BACK] |=
+			(spot->surface & SHEET_BACK) != 0 ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN;
 		rc = seen_add(&level->seen, spot->p, spot->n);
 		if (rc == PSR_OK)
 			rc = dice_cover(level, spot);

@@ -6,9 +6,10 @@
 #include <stdint.h>
 #include "level.h"
 
-/* Pixels are drawn at random: a place on the surface, with the probability of its projected area, a view that sees it, and a
- * grid with a pixel's middle there. Such a pixel is missing when no kept sample that faces the view falls into it at the
- * depth of the place, or before it. What stands before the place, and would cover the pixel in a frame, does not count. */
+/* Pixels are drawn at random: a place on the surface, with the probability of its projected area, a view that sees it,
+ * and a grid with a pixel's middle there. Such a pixel is missing when no kept sample that faces the view falls into it
+ * at the depth of the place, or before it. What stands before the place, and would cover the pixel in a frame, does not
+ * count. */
 struct adequacy {
 	uint64_t n_trials, n_missing;
 	struct surface_spot *spot; /* the places of those that are missing; free() it */

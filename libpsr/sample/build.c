@@ -89,7 +89,8 @@ static int check_samples(struct build *build, const struct level *level)
 {
 	if (level->cover.n_points != 0)
 		return PSR_OK;
-	return psr_fail(build->err, PSR_ERR_ARG, "no ray meets the mesh: all of it is transparent, turned away or too thin");
+	return psr_fail(build->err, PSR_ERR_ARG,
+	                "no ray meets the mesh: all of it is transparent, turned away or too thin");
 }
 
 static int make_level(struct build *build, struct level *level)
@@ -131,8 +132,12 @@ static int make_levels(struct build *build)
 	build->draft.projection = build->projection;
 	build->draft.ds = 2.0 / build->options->resolution;
 	for (; rc == PSR_OK && build->n_levels_done < build->n_levels; build->n_levels_done++) {
-		struct level level = { .mesh = build->mesh, .scene = build->scene, .surface = &build->surface, .pool = build->pool,
-			                   .ds = build->draft.ds * (double)(1u << build->n_levels_done), .cosine = (float)cosine,
+		struct level level = { .mesh = build->mesh,
+			                   .scene = build->scene,
+			                   .surface = &build->surface,
+			                   .pool = build->pool,
+			                   .ds = build->draft.ds * (double)(1u << build->n_levels_done),
+			                   .cosine = (float)cosine,
 			                   .n_projections = N_PROJECTIONS };
 
 		if (build->n_levels_done > 0) {

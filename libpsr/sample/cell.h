@@ -1,12 +1,13 @@
-/* The number of a cubic cell, and where it goes in a table: all of its bits count, so that cells in a row of any direction spread
- * (the last step of MurmurHash3, Appleby 2011). */
+/* The number of a cubic cell, and where it goes in a table: all of its bits count, so that cells in a row of any
+ * direction spread (the last step of MurmurHash3, Appleby 2011). */
 #ifndef PSR_SAMPLE_CELL_H
 #define PSR_SAMPLE_CELL_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* x rounded down, of what an int can hold. As fast as truncation, where floor() takes a dozen instructions before SSE4.1. */
+/* x rounded down, of what an int can hold. As fast as truncation, where floor() takes a dozen instructions before
+ * SSE4.1. */
 static inline int cell_floor(double x)
 {
 	int i = (int)x;

@@ -144,5 +144,6 @@ int cone_culls(const struct psr_blocks *blocks, uint32_t block, const float eye[
 		length2 += d * d;
 		axis2 += axis[k] * axis[k];
 	}
-	return g / sqrtf(axis2) > ((float)blocks->cone_sine[block] / 255 + BACK_SINE) * sqrtf(length2) + r * (1 + BACK_SINE);
+	return g / sqrtf(axis2) >
+	       ((float)blocks->cone_sine[block] / 255 + BACK_SINE) * sqrtf(length2) + r * (1 + BACK_SINE);
 }

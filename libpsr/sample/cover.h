@@ -40,8 +40,9 @@ int cover_around(const struct cover *cover, const float p[3], double radius, uin
 /* Whether a point that faces like n lies within radius <= ds of p. */
 int cover_is_near(const struct cover *cover, const float p[3], const float n[3], double radius);
 
-/* The same of one sample on a sheet that is sampled once for both sides, whose normal at p is n: along the sheet as far as
- * radius, and across it, too, as pixels see that foreshortened; between, where 0.6 across^2 + along^2 <= radius^2. */
+/* The same of one sample on a sheet that is sampled once for both sides, whose normal at p is n: along the sheet as far
+ * as radius, and across it, too, as pixels see that foreshortened; between, where 0.6 across^2 + along^2 <=
+ * radius^2. */
 static inline int cover_is_sheet_near(const float sample[3], const float p[3], const float n[3], float radius)
 {
 	float d[3], across, distance2;

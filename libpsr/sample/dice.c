@@ -10,8 +10,8 @@
 #include "texture.h"
 #include "thin_cover.h"
 
-/* Primitives are diced as in [G] 9.2.1 and [Cook87], though only to test what is there: places on them are this many pixels
- * apart. */
+/* Primitives are diced as in [G] 9.2.1 and [Cook87], though only to test what is there: places on them are this many
+ * pixels apart. */
 #define STEP 0.33
 #define THIN_STEP 0.25 /* on what is thin, at the finest level, which is to be adequate */
 
@@ -48,8 +48,8 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 	return offer_is_covered(level, spot);
 }
 
-/* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for until
- * more was seen. */
+/* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for
+ * until more was seen. */
 static void test_place(const struct job *job, uint32_t prim, const float p[3], struct chunk *chunk)
 {
 	const struct level *level = job->level;
@@ -133,7 +133,8 @@ static void dice_disc(const struct job *job, uint32_t prim, struct chunk *chunk)
 	const double shift = SHIFT[job->round % N_SHIFTS] - 0.5;
 	const struct psr_mesh *mesh = level->mesh;
 	const float *n = ray_scene_normal(level->scene, prim);
-	double radius = (double)mesh->point_radius[prim - mesh->n_triangles] / level->surface->scale, step = STEP * level->ds;
+	double radius = (double)mesh->point_radius[prim - mesh->n_triangles] / level->surface->scale,
+		   step = STEP * level->ds;
 	int reach = (int)(radius / step);
 	double center[3], frame[3][3], normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
 
@@ -251,8 +252,8 @@ static size_t join_spots(const struct job *job, int n_chunks, int are_thin, stru
 	return n;
 }
 
-/* First what is thin; then what blocks that are there can cover; then new ones are opened, those first that most of the rest
- * could use. */
+/* First what is thin; then what blocks that are there can cover; then new ones are opened, those first that most of the
+ * rest could use. */
 static int cover_chunks(struct level *level, const struct job *job, int n_chunks)
 {
 	size_t n = join_spots(job, n_chunks, 1, NULL);

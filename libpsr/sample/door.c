@@ -93,6 +93,7 @@ int door_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radiu
 	*radius = reach * (1 + 0x1p-20);
 	if (!isnormal(*radius) || *radius * *radius == 0 || !isfinite(*radius * *radius))
 		return psr_fail(err, PSR_ERR_ARG,
-		                "the mesh has a radius of %g: it must have an extent, and one whose square is a number", *radius);
+		                "the mesh has a radius of %g: it must have an extent, and one whose square is a number",
+		                *radius);
 	return PSR_OK;
 }

@@ -16,7 +16,8 @@ void draft_position(const struct draft *draft, const struct draft_block *block, 
 {
 	const struct psr_projection *p = &draft->projection[block->projection];
 	double spacing = (double)p->spacing * (double)(1u << block->level), inner[3];
-	int row = PSR_BLOCK_SIDE * block->row + (int)(s / PSR_BLOCK_SIDE), col = PSR_BLOCK_SIDE * block->col + (int)(s % PSR_BLOCK_SIDE);
+	int row = PSR_BLOCK_SIDE * block->row + (int)(s / PSR_BLOCK_SIDE),
+		col = PSR_BLOCK_SIDE * block->col + (int)(s % PSR_BLOCK_SIDE);
 
 	sheets_inner(p, (col + (row & 1) / 2.0) * spacing, row * 0.86602540378443864676 * spacing,
 	             (double)draft_sample(draft, block, s)->z, inner);
@@ -97,7 +98,8 @@ static void set_attributes(struct draft *draft, const struct level *level, uint3
 int draft_add(struct draft *draft, const struct level *level)
 {
 	uint32_t **block_of = calloc(level->n_projections, sizeof *block_of);
-	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(level), (uint64_t)draft->n_samples + level->cover.n_points);
+	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(level),
+	                 (uint64_t)draft->n_samples + level->cover.n_points);
 
 	if (block_of == NULL)
 		return PSR_ERR_MEMORY;

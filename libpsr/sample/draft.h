@@ -1,4 +1,5 @@
-/* What is kept of a level, without what it was chosen from; and the pieces of the object that its levels are cut into. */
+/* What is kept of a level, without what it was chosen from; and the pieces of the object that its levels are cut
+ * into. */
 #ifndef PSR_SAMPLE_DRAFT_H
 #define PSR_SAMPLE_DRAFT_H
 
@@ -35,22 +36,23 @@ void draft_fini(struct draft *draft);
 /* Adds the next level. MEMORY, LIMIT. */
 int draft_add(struct draft *draft, const struct level *level);
 
-/* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has all
- * samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different levels
- * meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they share do
- * not cost too much: where surfaces lie all through each other (leaves), that may be one group. The same whatever the
- * threads. MEMORY. */
+/* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has
+ * all samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different
+ * levels meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they
+ * share do not cost too much: where surfaces lie all through each other (leaves), that may be one group. The same
+ * whatever the threads. MEMORY. */
 int draft_group(struct draft *draft, struct psr_pool *pool);
 
-/* join.c: makes one block of all that have the same level, group, projection and place on the lattice, are seen from as many sides,
- * and have no lattice point in common, as long as it is not too deep: sheets that were apart when all of their hits were
- * there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
+/* join.c: makes one block of all that have the same level, group, projection and place on the lattice, are seen from as
+ * many sides, and have no lattice point in common, as long as it is not too deep: sheets that were apart when all of
+ * their hits were there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
 int draft_join(struct draft *draft);
 
 /* Inner coordinates of sample s of a block. */
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);
 
-static inline const struct draft_sample *draft_sample(const struct draft *draft, const struct draft_block *block, unsigned s)
+static inline const struct draft_sample *draft_sample(const struct draft *draft, const struct draft_block *block,
+                                                      unsigned s)
 {
 	uint64_t below = block->mask & ((UINT64_C(1) << s) - 1);
 

@@ -207,7 +207,8 @@ static int cut_finest(struct group_blocks *blocks, struct draft *draft, uint32_t
 }
 
 /* The blocks of all levels, for groups of at most so many samples. */
-static int make_blocks(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most, struct psr_pool *pool)
+static int make_blocks(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most,
+                       struct psr_pool *pool)
 {
 	uint32_t n_pieces;
 	int rc;
@@ -219,7 +220,8 @@ static int make_blocks(struct group_blocks *blocks, struct draft *draft, uint32_
 	n_pieces = blocks->n;
 	for (uint32_t b = n_finest; rc == PSR_OK && draft->n_groups == 1 && b < draft->n_blocks; b++)
 		rc = group_add(blocks, &draft->block[b]);
-	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && !blocks->is_over && level < draft->n_levels; level++)
+	for (unsigned level = 1; rc == PSR_OK && draft->n_groups > 1 && !blocks->is_over && level < draft->n_levels;
+	     level++)
 		rc = group_split(blocks, draft, level, n_finest, n_pieces, pool);
 	return rc;
 }

@@ -4,8 +4,8 @@
 #include "draft.h"
 #include "psr/error.h"
 
-/* Blocks that are together as deep as a patch may be are joined, and no deeper ones: their spheres would hold little else
- * than air. */
+/* Blocks that are together as deep as a patch may be are joined, and no deeper ones: their spheres would hold little
+ * else than air. */
 #define JOIN_STEPS SHEET_PATCH_STEPS
 
 struct piece {
@@ -80,8 +80,8 @@ static uint32_t join_place(const struct draft *draft, struct piece *piece, uint3
 }
 
 /* Returns where the samples of the next block go. */
-static uint32_t copy_samples(const struct draft *draft, const struct piece *piece, uint32_t to, struct draft_block *block,
-                             struct draft_sample *sample, uint32_t first)
+static uint32_t copy_samples(const struct draft *draft, const struct piece *piece, uint32_t to,
+                             struct draft_block *block, struct draft_sample *sample, uint32_t first)
 {
 	block->part = block->mask;
 	block->first = first;
@@ -96,7 +96,8 @@ static uint32_t copy_samples(const struct draft *draft, const struct piece *piec
 	return first;
 }
 
-static void join_pieces(struct draft *draft, struct piece *piece, struct draft_block *block, struct draft_sample *sample)
+static void join_pieces(struct draft *draft, struct piece *piece, struct draft_block *block,
+                        struct draft_sample *sample)
 {
 	uint32_t n_blocks = 0, n_samples = 0;
 

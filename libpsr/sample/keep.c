@@ -8,8 +8,8 @@
 
 #define MOST_BLENDED 64
 
-/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance. 0 if there are none,
- * and then `attr` is not touched. */
+/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance. 0 if there are
+ * none, and then `attr` is not touched. */
 static int blend(const struct level *level, const float p[3], const float n[3], const float facing[3], uint64_t *attr)
 {
 	const struct cover *finer = level->finer;
@@ -37,8 +37,8 @@ static int blend(const struct level *level, const float p[3], const float n[3], 
 	return count != 0;
 }
 
-/* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal further
- * than this from its face's, as smoothing makes them at creases, would open the crease in views along it. */
+/* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal
+ * further than this from its face's, as smoothing makes them at creases, would open the crease in views along it. */
 #define LEAST_AGREEMENT 0.94f /* 20 degrees */
 
 static uint64_t agree(uint64_t attr, const float face[3])
@@ -179,7 +179,8 @@ int keep_owned(struct level *level)
 static void look_again(int i, void *userdata)
 {
 	struct level *level = userdata;
-	uint32_t end = (uint32_t)(i + 1) * CHUNK < level->cover.n_points ? (uint32_t)(i + 1) * CHUNK : level->cover.n_points;
+	uint32_t end =
+		(uint32_t)(i + 1) * CHUNK < level->cover.n_points ? (uint32_t)(i + 1) * CHUNK : level->cover.n_points;
 
 	for (uint32_t k = (uint32_t)i * CHUNK; k < end; k++) {
 		struct cover_point *point = &level->cover.point[k];

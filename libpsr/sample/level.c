@@ -48,7 +48,8 @@ static int prepare(struct level *level)
 	if (rc == PSR_OK)
 		rc = cover_init(&level->cover, level->ds);
 	if (rc == PSR_OK)
-		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen) : seen_init(&level->seen, level->ds);
+		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen)
+		                               : seen_init(&level->seen, level->ds);
 	if (rc == PSR_OK && level->finer_seen == NULL)
 		rc = seen_look(&level->seen, level->scene, SEEN_ENOUGH, level->pool);
 	return rc;

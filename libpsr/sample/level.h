@@ -1,10 +1,10 @@
 /* One level of a model under construction: the object, sampled at one resolution, and what of it is kept.
  *
- * Selection of blocks goes beyond [G] 5.2. There, blocks are added wherever projections, taken one after the other, still
- * show a hole. Here every place of the surface is owned by the projection that faces it best; a block keeps what its
- * projection owns; and then places all over the surface are tested one by one, and what they lack is added. A place is
- * covered when it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3: some of its corners is
- * in whichever pixel is centred there), or within half a pixel of a kept sample. */
+ * Selection of blocks goes beyond [G] 5.2. There, blocks are added wherever projections, taken one after the other,
+ * still show a hole. Here every place of the surface is owned by the projection that faces it best; a block keeps what
+ * its projection owns; and then places all over the surface are tested one by one, and what they lack is added. A place
+ * is covered when it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3: some of its
+ * corners is in whichever pixel is centred there), or within half a pixel of a kept sample. */
 #ifndef PSR_SAMPLE_LEVEL_H
 #define PSR_SAMPLE_LEVEL_H
 
@@ -70,7 +70,8 @@ int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3
 /* Keeps what is owned, or a single sample. MEMORY. */
 int keep_owned(struct level *level);
 int keep_sample(struct level *level, struct level_ref ref);
-int keep_samples(struct level *level, const struct level_ref *ref, uint32_t n); /* none of them is kept yet, or only marked */
+int keep_samples(struct level *level, const struct level_ref *ref, uint32_t n); /* none of them is kept yet, or only
+                                                                                 * marked */
 
 /* Marks a sample as kept, which keep_samples() is to follow. */
 void keep_mark(struct level *level, const struct level_ref *ref);
@@ -86,15 +87,15 @@ struct surface_spot {
 /* A kept sample within as many pixels is in every pixel that has the place in its middle. */
 #define LEVEL_NEAR 0.5
 
-/* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0 or
- * greater. MEMORY. */
+/* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0
+ * or greater. MEMORY. */
 int dice_surface(struct level *level, int round);
 
 /* Adds samples so that a place is covered. MEMORY. */
 int dice_cover(struct level *level, const struct surface_spot *spot);
 
-/* level.c: traces all projections, of spacing projection[i].spacing, and keeps an adequate sampling. on_progress is called
- * with 0..n_projections / 2 + 4 done; may be NULL. MEMORY; level_fini() either way. */
+/* level.c: traces all projections, of spacing projection[i].spacing, and keeps an adequate sampling. on_progress is
+ * called with 0..n_projections / 2 + 4 done; may be NULL. MEMORY; level_fini() either way. */
 int level_make(struct level *level, const struct psr_projection *projection,
                void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata);
 void level_fini(struct level *level);

@@ -6,18 +6,19 @@
 /* A kept sample within half a pixel is in every pixel that has the place in its middle. */
 #define NEAR 0.5
 
-/* [G] 4.3 wants sides of at most a pixel; a twentieth is forgiven, as the middle of such a triangle is 0.6 pixels from its
- * corners at most, and a pixel reaches 0.5 to 0.71. */
+/* [G] 4.3 wants sides of at most a pixel; a twentieth is forgiven, as the middle of such a triangle is 0.6 pixels from
+ * its corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
-/* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another one. */
+/* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another
+ * one. */
 #define OFF_TRIANGLE 0.4
 
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 
-/* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half a
- * pixel. */
+/* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half
+ * a pixel. */
 #define HIT 1.5f
 #define SNAP 3
 #define MOST_SNAP 0.55
@@ -65,7 +66,8 @@ struct corner {
 	int is_kept;
 };
 
-/* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no patch. */
+/* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no
+ * patch. */
 static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot,
                          struct corner corner[3], float projected[3])
 {
@@ -306,8 +308,8 @@ static const struct offer *best_hit(const struct level *level, const struct offe
 	return best;
 }
 
-/* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face, by
- * what a sample may be off at most. */
+/* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face,
+ * by what a sample may be off at most. */
 static const struct offer_snap *best_snap(const struct level *level, const struct surface_spot *spot,
                                           const struct offers *offers, float *least)
 {
@@ -340,7 +342,8 @@ static int keep_snapped(struct level *level, const struct surface_spot *spot, co
 	return keep_sample(level, ref);
 }
 
-int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most, int *is_left)
+int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most,
+               int *is_left)
 {
 	float least = INFINITY;
 	const struct offer *triangle = best_triangle(level, offers, &least), *hit = best_hit(level, offers, &least);

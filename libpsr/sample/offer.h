@@ -1,6 +1,6 @@
-/* What could cover a place of the surface, and what that costs, in samples: a lattice triangle, a single hit, or a sample that
- * is moved to a lattice point. Finding offers changes nothing, so that threads can look for many places at once; taking
- * them is for one place after the other, as what one adds may cover the next. */
+/* What could cover a place of the surface, and what that costs, in samples: a lattice triangle, a single hit, or a
+ * sample that is moved to a lattice point. Finding offers changes nothing, so that threads can look for many places at
+ * once; taking them is for one place after the other, as what one adds may cover the next. */
 #ifndef PSR_SAMPLE_OFFER_H
 #define PSR_SAMPLE_OFFER_H
 
@@ -43,8 +43,10 @@ int offer_look(const struct level *level, const struct surface_spot *spot, struc
 /* The same as offer_is_covered() if the level has no new hits since the offers were found. */
 int offer_is_superfluous(const struct level *level, const struct surface_spot *spot, const struct offers *offers);
 
-/* Keeps what covers a place at the least cost; *is_left tells that this is above `most`, and nothing was kept. MEMORY. */
-int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most, int *is_left);
+/* Keeps what covers a place at the least cost; *is_left tells that this is above `most`, and nothing was kept.
+ * MEMORY. */
+int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most,
+               int *is_left);
 
 /* Counts a place for each patch that could cover it: of those that are not kept yet, the most wanted are opened. */
 void offer_ask(struct level *level, const struct offers *offers);

@@ -68,7 +68,8 @@ static void projection_box(const struct draft *draft, const struct draft_block *
 	}
 }
 
-static void middle_of(const struct psr_projection *projection, const double min[3], const double max[3], double middle[3])
+static void middle_of(const struct psr_projection *projection, const double min[3], const double max[3],
+                      double middle[3])
 {
 	sheets_inner(projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, middle);
 }
@@ -113,8 +114,10 @@ static void sort_blocks(struct pack *pack)
 	qsort(pack->order, draft->n_blocks, sizeof *pack->order, compare_order);
 }
 
-/* Depths as 16 bits from the multiple of 2^-14 before them on, in the least step, a power of two, that reaches them all. */
-static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min, double max)
+/* Depths as 16 bits from the multiple of 2^-14 before them on, in the least step, a power of two, that reaches them
+ * all. */
+static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min,
+                     double max)
 {
 	double bias = floor(min * 0x1p14), range = max - bias * 0x1p-14;
 	unsigned shift = 14 + (PSR_BLOCK_DEPTH >> 3);
@@ -138,8 +141,8 @@ static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct dr
  * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
  * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
  * half a step more, 1.79 < 2. */
-static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, const double min[3],
-                        const double max[3])
+static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block,
+                        const double min[3], const double max[3])
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
 	const struct psr_blocks depths = { .depth_bias = pack->depth_bias, .flags = pack->flags };
@@ -177,8 +180,8 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and those that the samples are drawn by. A block that is seen from both sides has
- * none. */
+/* The cone holds the normals of the faces, and those that the samples are drawn by. A block that is seen from both
+ * sides has none. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
@@ -255,7 +258,8 @@ static void bound_cluster(const struct psr_blocks *blocks, struct psr_cluster *c
 
 static int is_new_cluster(const struct pack *pack, uint32_t i)
 {
-	return i == 0 || pack->order[i].group != pack->order[i - 1].group || pack->order[i].level != pack->order[i - 1].level;
+	return i == 0 || pack->order[i].group != pack->order[i - 1].group ||
+	       pack->order[i].level != pack->order[i - 1].level;
 }
 
 static void count_clusters(struct pack *pack)

@@ -4,8 +4,8 @@
 #include "projection.h"
 #include "psr/direction.h"
 
-/* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which would
- * be as far from one direction as from the next. */
+/* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which
+ * would be as far from one direction as from the next. */
 static const double TURN[3][3] = {
 	{ 0.9744706, -0.1910647, 0.1184155 },
 	{ 0.2079117, 0.9657151, -0.1552459 },

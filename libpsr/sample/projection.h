@@ -1,8 +1,8 @@
 /* The directions from which an object is sampled.
  *
  * [G] 5.1 takes the centres of the 32 triangles of the sphere subdivided once: some normals are 32.4 degrees from the
- * nearest. The 12 corners of an icosahedron with the 20 middles of its faces are as many, and no normal is further than 22.6
- * degrees: within the tolerance of 25 that [G] 4.4 wants. */
+ * nearest. The 12 corners of an icosahedron with the 20 middles of its faces are as many, and no normal is further
+ * than 22.6 degrees: within the tolerance of 25 that [G] 4.4 wants. */
 #ifndef PSR_SAMPLE_PROJECTION_H
 #define PSR_SAMPLE_PROJECTION_H
 

@@ -96,7 +96,8 @@ static int attach_discs(struct ray_scene *scene)
 	return rc;
 }
 
-/* Corners once more beside each other, as a hit reads all of them: from the vertices they would be four cache misses. */
+/* Corners once more beside each other, as a hit reads all of them: from the vertices they would be four cache
+ * misses. */
 static int make_triangles(struct ray_scene *scene)
 {
 	const struct psr_mesh *mesh = scene->mesh;
@@ -171,9 +172,8 @@ int ray_scene_create(struct ray_scene **out, const struct psr_mesh *mesh, const 
 	if (rc != PSR_OK) {
 		ray_scene_destroy(scene);
 		return rc == PSR_ERR_MEMORY
-		               ? psr_fail(err, rc, "no memory for the ray tracer's tree of %llu primitives", (unsigned long long)n)
-		               : psr_fail(err, rc, "the ray tracer does not start: Embree error %d",
-		                          (int)rtcGetDeviceError(NULL));
+		           ? psr_fail(err, rc, "no memory for the ray tracer's tree of %llu primitives", (unsigned long long)n)
+		           : psr_fail(err, rc, "the ray tracer does not start: Embree error %d", (int)rtcGetDeviceError(NULL));
 	}
 	*out = scene;
 	return PSR_OK;

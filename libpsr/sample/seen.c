@@ -44,7 +44,8 @@ static uint64_t coarser_key(uint64_t key)
 
 enum found { NO_ROOM, OLD, NEW };
 
-/* From any thread. What is marked as recent is as good as new. To find that there is no room takes a walk through all of it. */
+/* From any thread. What is marked as recent is as good as new. To find that there is no room takes a walk through all
+ * of it. */
 static enum found insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 {
 	const uint64_t plain = key & ~RECENT;
@@ -53,7 +54,8 @@ static enum found insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
 		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
 
-		if (old == FREE && __atomic_compare_exchange_n(&seen->table[i], &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+		if (old == FREE &&
+		    __atomic_compare_exchange_n(&seen->table[i], &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
 			__atomic_fetch_add(n_new, 1, __ATOMIC_RELAXED);
 			return NEW;
 		}

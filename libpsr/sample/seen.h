@@ -1,4 +1,5 @@
-/* Which parts of the surface can be seen from outside: views from all around mark what they meet, as [G] 6.3 marks blocks. */
+/* Which parts of the surface can be seen from outside: views from all around mark what they meet, as [G] 6.3 marks
+ * blocks. */
 #ifndef PSR_SAMPLE_SEEN_H
 #define PSR_SAMPLE_SEEN_H
 
@@ -12,13 +13,15 @@ struct seen {
 	size_t size;      /* a power of two */
 	uint64_t n_cells;
 	unsigned n_views; /* looked along so far */
-	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not matter */
+	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not
+	                   * matter */
 };
 
 int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
 
-/* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what 64 of
- * them met at most one in `enough` places had not been seen by any earlier one, or until there were 512. MEMORY. */
+/* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what
+ * 64 of them met at most one in `enough` places had not been seen by any earlier one, or until there were 512.
+ * MEMORY. */
 #define SEEN_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
 #define SEEN_LEAST_VIEWS 64
 #define SEEN_MOST_VIEWS 512

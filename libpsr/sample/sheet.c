@@ -30,7 +30,8 @@ static uint32_t *head_of(const struct sheets *sheets, int col, int row)
 
 	col += sheets->reach;
 	row += sheets->reach;
-	return col < 0 || row < 0 || col >= side || row >= side ? NULL : &sheets->head[(size_t)row * (size_t)side + (size_t)col];
+	return col < 0 || row < 0 || col >= side || row >= side ? NULL
+	                                                        : &sheets->head[(size_t)row * (size_t)side + (size_t)col];
 }
 
 void sheets_link(struct sheets *sheets, uint32_t p)
@@ -185,7 +186,8 @@ void sheets_position(const struct sheets *sheets, struct sheet_ref ref, float po
 	const struct patch *patch = &sheets->patch[ref.patch];
 	double x, y, inner[3];
 
-	sheets_point(sheets, SIDE * patch->row + (int)(ref.sample / SIDE), SIDE * patch->col + (int)(ref.sample % SIDE), &x, &y);
+	sheets_point(sheets, SIDE * patch->row + (int)(ref.sample / SIDE), SIDE * patch->col + (int)(ref.sample % SIDE), &x,
+	             &y);
 	sheets_inner(&sheets->projection, x, y, (double)sheets->sample[ref.patch][ref.sample].z, inner);
 	v3f_set(position, (float)inner[0], (float)inner[1], (float)inner[2]);
 }

@@ -1,8 +1,9 @@
-/* One orthographic projection of the object, sampled through all of its layers on the equilateral lattice ([G] 4.4, 5.1).
+/* One orthographic projection of the object, sampled through all of its layers on the equilateral lattice
+ * ([G] 4.4, 5.1).
  *
- * [G] keeps the first hit of each ray. Here every hit that faces the projection is kept, so that what a surface hides is
- * sampled from its own best side too. The hits of a lattice block are put together into patches of at most one a lattice
- * point: what may become a block of the model. */
+ * [G] keeps the first hit of each ray. Here every hit that faces the projection is kept, so that what a surface hides
+ * is sampled from its own best side too. The hits of a lattice block are put together into patches of at most one a
+ * lattice point: what may become a block of the model. */
 #ifndef PSR_SAMPLE_SHEET_H
 #define PSR_SAMPLE_SHEET_H
 
@@ -62,10 +63,12 @@ struct sheets {
 	uint64_t n_rays, n_hits; /* n_rays: 0 of what is behind others */
 };
 
-/* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z and
- * the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes whatever the number of threads. MEMORY. */
-int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
-                 const uint8_t *sides, const struct psr_projection *projection, struct psr_pool *pool);
+/* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z
+ * and the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes
+ * whatever the number of threads. MEMORY. */
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene,
+                 const struct psr_mesh *mesh, const uint8_t *sides, const struct psr_projection *projection,
+                 struct psr_pool *pool);
 void sheets_fini(struct sheets *sheets);
 
 /* Projection space x and y of lattice point (row, column). */

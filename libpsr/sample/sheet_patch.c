@@ -118,7 +118,8 @@ static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit
 	uint32_t p = wanted;
 
 	if ((row->patch[p].mask & bit) != 0)
-		for (p = first; p < row->n && ((row->patch[p].mask & bit) != 0 || row->patch[p].two_sided != hit->two_sided); p++)
+		for (p = first; p < row->n && ((row->patch[p].mask & bit) != 0 || row->patch[p].two_sided != hit->two_sided);
+		     p++)
 			;
 	if (p == row->n) {
 		if (row->n == row->capacity && grow_row(row) != PSR_OK)

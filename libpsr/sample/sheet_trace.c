@@ -24,8 +24,8 @@ struct strip {
 };
 
 struct job {
-	struct sheets *sheets[2]; /* the second one's lattice is the first one's, looked at from behind: column c of row r is
-	                             column -c - (r & 1) there; NULL if nobody asks for it */
+	struct sheets *sheets[2]; /* the second one's lattice is the first one's, looked at from behind: column c of row r
+	                             is column -c - (r & 1) there; NULL if nobody asks for it */
 	const struct ray_scene *scene;
 	const struct psr_mesh *mesh;
 	const uint8_t *sides;
@@ -107,7 +107,8 @@ static int trace_columns(const struct job *job, struct strip strip[2], int row, 
 		for (int i = 0; rc == PSR_OK && i < end - first; i++) {
 			s->first[(row & (SIDE - 1)) * s->n_columns + first + i + s->n_columns / 2] = s->n;
 			if (is_of[i] >= 0)
-				rc = add_hits(job, s, &batch.hit[end_of_ray][is_of[i] * SHEET_LAYERS], batch.n_hits[end_of_ray][is_of[i]]);
+				rc = add_hits(job, s, &batch.hit[end_of_ray][is_of[i] * SHEET_LAYERS],
+				              batch.n_hits[end_of_ray][is_of[i]]);
 		}
 	}
 	return rc;
@@ -127,7 +128,8 @@ static int trace_strip(const struct job *job, struct strip strip[2], int block_r
 }
 
 /* The patches of a lattice block: of the rays' own projection, or of the one behind. */
-static int make_block(const struct strip *strip, struct patch_row *row, int col, int block_row, int is_behind, float step)
+static int make_block(const struct strip *strip, struct patch_row *row, int col, int block_row, int is_behind,
+                      float step)
 {
 	struct block_hits h = { .n = 0 };
 
@@ -229,8 +231,9 @@ static int finish(struct sheets *sheets, struct patch_row *row, int rc)
 	return rc;
 }
 
-int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene, const struct psr_mesh *mesh,
-                 const uint8_t *sides, const struct psr_projection *projection, struct psr_pool *pool)
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene,
+                 const struct psr_mesh *mesh, const uint8_t *sides, const struct psr_projection *projection,
+                 struct psr_pool *pool)
 {
 	struct job job = { .sheets = { sheets, behind }, .scene = scene, .mesh = mesh, .sides = sides };
 	struct psr_projection turned = *projection;

@@ -29,10 +29,10 @@ struct surface_place {
 };
 
 /* What textures say is filtered over a circle in the tangent plane, of this diameter in inner units ([G] 5.1, figure
- * 5.2b; filter.h), 0 for the place alone; colours of alpha-tested materials by their alpha. Vertex colours and normals are
- * interpolated, and normal maps turn the normal and spread the highlight (normal.h, material.h). The normal is on the side
- * that was met, bent as far as it must be to face the unit vector `facing`, so that a sample is never shaded as a back in
- * the view that found it. */
+ * 5.2b; filter.h), 0 for the place alone; colours of alpha-tested materials by their alpha. Vertex colours and normals
+ * are interpolated, and normal maps turn the normal and spread the highlight (normal.h, material.h). The normal is on
+ * the side that was met, bent as far as it must be to face the unit vector `facing`, so that a sample is never shaded
+ * as a back in the view that found it. */
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3]);
 

@@ -8,7 +8,10 @@
 #define BATCH 64
 
 /* Where a triangle is looked through: its middle, and near its corners. */
-static const double PLACE[4][3] = { { 1.0 / 3, 1.0 / 3, 1.0 / 3 }, { 0.8, 0.1, 0.1 }, { 0.1, 0.8, 0.1 }, { 0.1, 0.1, 0.8 } };
+static const double PLACE[4][3] = { { 1.0 / 3, 1.0 / 3, 1.0 / 3 },
+	                                { 0.8, 0.1, 0.1 },
+	                                { 0.1, 0.8, 0.1 },
+	                                { 0.1, 0.1, 0.8 } };
 #define N_PLACES 4
 
 /* From the far side of what is just THICKNESS thick, outwards. */
@@ -66,7 +69,8 @@ static void mark_chunk(int i, void *userdata)
 
 			if (level->finer_sides != NULL && (level->finer_sides[prim] & SIDE_THIN) != 0)
 				level->sides[prim] |= SIDE_THIN;
-			else if (level->surface->is_plain[texture_material(level->mesh, prim)] && (n[0] != 0 || n[1] != 0 || n[2] != 0))
+			else if (level->surface->is_plain[texture_material(level->mesh, prim)] &&
+			         (n[0] != 0 || n[1] != 0 || n[2] != 0))
 				part.prim[part.n++] = prim;
 		}
 		for (int k = 0; k < N_PLACES && part.n != 0; k++)

@@ -1,5 +1,5 @@
-/* Which samples stand for the thin things in a cube of space: of all that may be kept there, the ones that cover most of
- * the places that lack one come first (the greedy algorithm for set cover: Chvatal 1979). */
+/* Which samples stand for the thin things in a cube of space: of all that may be kept there, the ones that cover most
+ * of the places that lack one come first (the greedy algorithm for set cover: Chvatal 1979). */
 #ifndef PSR_SAMPLE_THIN_CHOOSE_H
 #define PSR_SAMPLE_THIN_CHOOSE_H
 

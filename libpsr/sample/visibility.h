@@ -12,12 +12,12 @@
 /* Masks of all blocks, whatever their level: bit t of a block is set iff one of its samples is seen from some direction
  * in triangle t (level 2 of psr/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
  *
- * As in [G] the blocks of a level are drawn orthographically, at about a sample a pixel, without those samples that face
- * away, as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a triangle,
- * those on its sides being shared with its neighbours. Since a normal that faces any direction of a triangle faces one
- * of its corners, only occlusion is left to chance; and there a sample counts as seen unless it is behind the farthest
- * of the 25 pixels around it. (Four times the directions set 2 in 100 more bits; OR-ing whole neighbouring triangles
- * in loses a third of the culling, and neither makes a difference to visibility_lost.)
+ * As in [G] the blocks of a level are drawn orthographically, at about a sample a pixel, without those samples that
+ * face away, as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a
+ * triangle, those on its sides being shared with its neighbours. Since a normal that faces any direction of a triangle
+ * faces one of its corners, only occlusion is left to chance; and there a sample counts as seen unless it is behind the
+ * farthest of the 25 pixels around it. (Four times the directions set 2 in 100 more bits; OR-ing whole neighbouring
+ * triangles in loses a third of the culling, and neither makes a difference to visibility_lost.)
  *
  * `blocks` needs all arrays but cones and masks. The same masks whatever the number of threads. MEMORY. */
 int visibility_masks(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2]);

@@ -147,8 +147,8 @@ static void aim(struct vpicture *picture, const struct vpoints *points, const do
 	}
 }
 
-/* Pixels and heights of samples: a fixed number, so that the compiler does four at a time. Indices of pixels are below 2^24
- * and thus exact in floats, which every CPU can multiply so. */
+/* Pixels and heights of samples: a fixed number, so that the compiler does four at a time. Indices of pixels are below
+ * 2^24 and thus exact in floats, which every CPU can multiply so. */
 static void project(const struct vpicture *picture, const struct vpoints *points, uint32_t first,
                     int32_t at[restrict CHUNK], float height[restrict CHUNK])
 {
@@ -175,8 +175,8 @@ static float least(float a, float b)
 	return a < b ? a : b;
 }
 
-/* out[i]: smallest of those within VPICTURE_REACH strides of in[i], where all of them are in 0..n-1. A fixed number at a time,
- * as above. */
+/* out[i]: smallest of those within VPICTURE_REACH strides of in[i], where all of them are in 0..n-1. A fixed number at
+ * a time, as above. */
 static void least_around(float *restrict out, const float *restrict in, int n, int stride)
 {
 	const int end = n - 2 * stride;
@@ -219,7 +219,8 @@ void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const
 			project(picture, points, first, at, height);
 			for (uint32_t k = 0; k < n; k++) {
 				const uint8_t faces = picture->faces[points->normal[first + k]];
-				const float h0 = (faces & 1) != 0 ? height[k] : -INFINITY, h1 = (faces & 2) != 0 ? -height[k] : -INFINITY;
+				const float h0 = (faces & 1) != 0 ? height[k] : -INFINITY,
+							h1 = (faces & 2) != 0 ? -height[k] : -INFINITY;
 				float *nearest = &picture->nearest[2 * at[k]];
 
 				assert(at[k] > picture->side && at[k] < picture->side * (picture->side - 1) - 1);

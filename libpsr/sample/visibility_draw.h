@@ -39,8 +39,8 @@ struct vpicture {
 	float scale, offset[2];                 /* pixel = scale * coordinate + offset */
 	float frame[3][3];                      /* rows: right, up, towards end 0 */
 	uint8_t faces[PSR_DIRECTIONS + 1];      /* bit e: a normal faces end e */
-	/* Heights along the axis, negated for end 1, so that greater ones are nearer, two a pixel: of what is nearest to either
-	 * end, -INFINITY where nothing is; and the least of all within VPICTURE_REACH columns, then rows, too. */
+	/* Heights along the axis, negated for end 1, so that greater ones are nearer, two a pixel: of what is nearest to
+	 * either end, -INFINITY where nothing is; and the least of all within VPICTURE_REACH columns, then rows, too. */
 	float *nearest, *row, *farthest;
 };
 

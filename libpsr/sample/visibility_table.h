@@ -15,8 +15,8 @@ struct visibility_table {
 	uint8_t *index; /* as psr/model.h has it */
 };
 
-/* Fills the table, and visibility_first of the runs, from a mask a block. The stored mask of a block has all bits of its
- * own, so that culling stays conservative; as few samples as possible are drawn because of the others. They do not
+/* Fills the table, and visibility_first of the runs, from a mask a block. The stored mask of a block has all bits of
+ * its own, so that culling stays conservative; as few samples as possible are drawn because of the others. They do not
  * count where the block's cone culls it anyway. Blocks are joined greedily with those that follow them, which are near,
  * as the blocks of a cluster are in Morton order; then each takes the best mask of its run.
  *

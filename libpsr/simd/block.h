@@ -31,7 +31,8 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 	float bias, step;
 	psr_blocks_depth(b, block, &bias, &step);
 	for (int a = 0; a < 3; a++) {
-		out->origin[a] = lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + (double)bias * lattice->along[a];
+		out->origin[a] =
+			lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + (double)bias * lattice->along[a];
 		out->unit[a] = (float)lattice->along[a] * step;
 	}
 	out->scale = scale;

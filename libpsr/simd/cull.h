@@ -1,10 +1,11 @@
-/* Blocks against frustum and cones, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+/* Blocks against frustum and cones, as plain loops, which the compiler turns into vectors; compiled once for each
+ * ISA. */
 #include <string.h>
 #include "base/maths.h"
 #include "simd/simd.h"
 
-/* How a block faces, by its visibility cone ([G] 6.4): with d from the eye to the sphere's centre, at the angle theta from
- * the cone's axis, a normal n within alpha of that and a sample x within r of the centre, n . (x - eye) is between
+/* How a block faces, by its visibility cone ([G] 6.4): with d from the eye to the sphere's centre, at the angle theta
+ * from the cone's axis, a normal n within alpha of that and a sample x within r of the centre, n . (x - eye) is between
  * |d| cos(theta + alpha) - r and |d| cos(theta - alpha) + r, and |x - eye| within r of |d|. The slack makes up for
  * rounding, and for normals in 10 bits, which are off by sqrt(3) / 1022 at most. */
 #define CONE_SLACK 0.0027f
@@ -28,7 +29,8 @@ static inline int32_t region_of(int32_t pixel, float from, float scale)
 }
 
 /* What the long loops work on is of 32 bits, since with narrower numbers the compiler takes several vectors at a
- * time, for which there are not enough registers; and of whole vectors, since most clusters are smaller than a batch. */
+ * time, for which there are not enough registers; and of whole vectors, since most clusters are smaller than a
+ * batch. */
 #define LANES 16
 struct widened {
 	float x[CULL_BATCH], y[CULL_BATCH], z[CULL_BATCH], r[CULL_BATCH];
@@ -79,8 +81,8 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 		const float cz = ((v.center_m[2][0] * x + v.center_m[2][1] * y) + v.center_m[2][2] * z) + v.center_m[2][3];
 		const float stretch = cull_stretch(&v, cx, cy, cz, r);
 
-		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that rounding
-		 * does not double the cells of a picture drawn at just the magnification that a level is made for. */
+		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that
+		 * rounding does not double the cells of a picture drawn at just the magnification that a level is made for. */
 		const float spacing = v.spacing * psr_float_from_bits((uint32_t)(127 + (flags & PSR_BLOCK_LEVEL)) << 23);
 		const float pixels = stretch * spacing * (1 - 0x1p-12f); /* no number where 0 meets infinity */
 		const int32_t bits = (int32_t)psr_bits_from_float(psr_choose(pixels < 0x1p100f, pixels, 0x1p100f));

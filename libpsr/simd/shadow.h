@@ -1,5 +1,5 @@
-/* How much of a light reaches the samples of a strip, by shadow maps ([G] 7.3.1), as plain loops, which the compiler turns
- * into vectors; compiled once for each ISA. */
+/* How much of a light reaches the samples of a strip, by shadow maps ([G] 7.3.1), as plain loops, which the compiler
+ * turns into vectors; compiled once for each ISA. */
 #include <string.h>
 #include "base/maths.h"
 #include "simd/simd.h"
@@ -13,13 +13,13 @@ struct shadow_place {
 	float cover[STRIP];
 };
 
-/* The plane of a sample at q with normal n holds all p with n.p = n.q. With p = (x z', y z', z') in perspective dz'/dx = -z' n_x /
- * (n.(x, y, 1)), which is z'^2 n_x / -(n.q); from afar it is n_x / -n_z. A surface that the light meets at less than 0.6
- * degrees is taken for one that it meets so. */
+/* The plane of a sample at q with normal n holds all p with n.p = n.q. With p = (x z', y z', z') in perspective dz'/dx
+ * = -z' n_x / (n.(x, y, 1)), which is z'^2 n_x / -(n.q); from afar it is n_x / -n_z. A surface that the light meets at
+ * less than 0.6 degrees is taken for one that it meets so. */
 #define GRAZING 0.01f
 
-/* Stored normals are off by up to this angle, so that slopes are by it times 1 / cos^2 of the angle to the light, and samples of a
- * cell are up to 1.5 cells away in both directions. */
+/* Stored normals are off by up to this angle, so that slopes are by it times 1 / cos^2 of the angle to the light, and
+ * samples of a cell are up to 1.5 cells away in both directions. */
 #define NORMAL_BIAS (1.5f * 1.41421356f * BACK_SINE)
 
 static inline float magnitude(float x)
@@ -27,8 +27,10 @@ static inline float magnitude(float x)
 	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
 }
 
-/* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something of. */
-static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face, uint32_t *n_here)
+/* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something
+ * of. */
+static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face,
+                         uint32_t *n_here)
 {
 	const struct shadow_map m = *map;
 	const float least = GRAZING * m.scale, unit = 1 / m.focal;
@@ -46,13 +48,15 @@ static int shadow_locate(struct shadow_place *at, const struct strip *s, const s
 		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
 		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
 		const float texel = w * unit, scale = m.focal / w, floor = least * w;
-		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep, secant = m.scale * steep;
+		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep,
+					secant = m.scale * steep;
 		at->u[i] = x * scale + m.half_width;
 		at->v[i] = y * scale + m.half_height;
 		at->z[i] = z;
 		at->du[i] = mx * slope;
 		at->dv[i] = my * slope;
-		at->bias[i] = (magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
+		at->bias[i] =
+			(magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
 		at->cover[i] = 0;
 		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
 		n_facing += facing > 0;
@@ -81,11 +85,12 @@ static inline float cover_of(uint64_t pair, int shift, float scale, float offset
 	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) * scale + offset < z, part);
 }
 
-/* Coverage of each place by cells of level k, bilinear among four of them ([G] 4.6). A cell covers what lies behind it: its depth is
- * that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in the same cell, half
- * a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth. Loads are apart from
- * arithmetic, of which the compiler makes vectors. */
-static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells, int k, uint32_t n)
+/* Coverage of each place by cells of level k, bilinear among four of them ([G] 4.6). A cell covers what lies behind it:
+ * its depth is that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in
+ * the same cell, half a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth.
+ * Loads are apart from arithmetic, of which the compiler makes vectors. */
+static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells,
+                         int k, uint32_t n)
 {
 	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
 	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
@@ -96,7 +101,8 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 	int32_t cell[STRIP];
 	uint64_t pair[2][STRIP];
 	for (uint32_t i = 0; i < n; i++) {
-		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x), y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
+		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x),
+					y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
 		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y);
 		cell[i] = cy * stride + cx;
 		fx[i] = x - (float)cx;
@@ -110,15 +116,17 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
 		const float least = at->z[i] - at->bias[i] * size;
 		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
-		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)), c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
-		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y), c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
+		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)),
+					c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
+		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y),
+					c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
 		cover[i] = (c00 + c11) + (c10 + c01);
 	}
 }
 
-/* Raises the coverage of each place to that by one level. A surface may pass from blocks of one level to those of the next, and then
- * neither covers it whole ([G] 9.1.2): where the coarser one covers a part, what counts is the coverage by the coarser cells
- * that either level fills. */
+/* Raises the coverage of each place to that by one level. A surface may pass from blocks of one level to those of the
+ * next, and then neither covers it whole ([G] 9.1.2): where the coarser one covers a part, what counts is the coverage
+ * by the coarser cells that either level fills. */
 static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
 {
 	float cover[STRIP], seam[STRIP];
@@ -155,7 +163,8 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 			if (map->levels >> k & 1)
 				shadow_raise(&at, map, k, strip->n);
 		for (uint32_t i = 0; i < strip->n; i++) {
-			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too wide. */
+			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too
+			 * wide. */
 			const float left = 2 - 2 * at.cover[i];
 			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, psr_choose(left < 1, left, 1)), reaches[i]);
 		}

@@ -38,8 +38,8 @@ void psr_isa_cap(enum psr_isa most)
 static int has(enum psr_isa isa)
 {
 #ifdef __x86_64__
-	const int avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
-	                 __builtin_cpu_supports("popcnt");
+	const int avx2 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi") &&
+	                 __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("popcnt");
 	switch (isa) {
 	case PSR_ISA_AVX2:
 		return avx2;

@@ -10,9 +10,9 @@
 #include "psr/render.h"
 
 /* A sample of a one-sided block faces away when its normal (psr_direction_tens) is more than this sine beyond
- * perpendicular: what normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they are left out
- * when they are warped, before they hide what is behind them, so that open one-sided surfaces are seen through
- * from their backs. */
+ * perpendicular: what normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they
+ * are left out when they are warped, before they hide what is behind them, so that open one-sided surfaces are seen
+ * through from their backs. */
 #define BACK_SINE 0.0125f
 
 #define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
@@ -133,8 +133,8 @@ struct warp_target {
 	} cells[PSR_MAX_DEPTH_LEVEL + 1];
 };
 
-/* Lowers words, and the cells of entries with a level above 0, to the samples of the entries' blocks that fall into the tile,
- * lie beyond near_z and do not face away. Returns how many samples fell into the tile. */
+/* Lowers words, and the cells of entries with a level above 0, to the samples of the entries' blocks that fall into the
+ * tile, lie beyond near_z and do not face away. Returns how many samples fell into the tile. */
 typedef uint64_t warp_fn(const struct warp_target *target, const struct bin_entry *entry, uint32_t n);
 
 /* Makes a tile empty: words, and cells of the levels of the bit mask. */
@@ -189,7 +189,8 @@ struct strip_view {
 	const struct warp_instance *instance;
 	uint32_t n_instances;
 	const uint64_t *direction_word;
-	const float (*lit)[4]; /* by normal: what strips without highlights get in the place of lights; NULL: no such table */
+	const float (*lit)[4]; /* by normal: what strips without highlights get in the place of lights; NULL: no such
+	                        * table */
 	float half_width, half_height, focal; /* pixels; the former to where the view axis meets the picture */
 	int perspective;
 	unsigned needs; /* enum strip_needs */
@@ -208,20 +209,20 @@ struct strip_light {
  * word, covered, x, id. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
 /* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks
- * are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before another
- * one is read. */
+ * are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before
+ * another one is read. */
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
-/* What else is needed of samples that are read: turned normals, lines of sight, and with STRIP_POSITION positions, at the
- * centre of the pixel and the depth of its word. Clears the light to `ambient` and no highlight. */
+/* What else is needed of samples that are read: turned normals, lines of sight, and with STRIP_POSITION positions, at
+ * the centre of the pixel and the depth of its word. Clears the light to `ambient` and no highlight. */
 typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
 /* Adds what a light gives: Phong's diffuse (N.L) and, if any sample is specular, (R.V)^n. How much of the light reaches
  * each sample is 0..1; NULL: all of it. */
 typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
 /* Light by normal, as strip_light gives it, of normals first .. first + n - 1; n at most STRIP. */
-typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
-                          const float ambient[3], uint32_t first, uint32_t n);
+typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_light *light,
+                          uint32_t n_lights, const float ambient[3], uint32_t first, uint32_t n);
 /* Colours of 16 bits from light and colours of samples; unlit ones keep their diffuse colour. */
 typedef void strip_color_fn(struct strip *strip);
 
@@ -231,12 +232,14 @@ struct strip_target {
 	uint32_t width;
 	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
 	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
-	const uint8_t *wants;   /* one byte for each STRIP_BRICK pixels of the part: 0 if not in linear light. NULL: none is */
+	const uint8_t *wants;   /* one byte for each STRIP_BRICK pixels of the part: 0 if not in linear light. NULL:
+	                         * none is */
 	uint16_t *r, *g, *b;    /* linear light; where pixels are not wanted, nothing is written */
 	uint16_t background[3]; /* linear */
 };
 
-/* Colours of the n pixels of the part of the row: those of the samples of strip->pixels, if any, elsewhere the background. */
+/* Colours of the n pixels of the part of the row: those of the samples of strip->pixels, if any, elsewhere the
+ * background. */
 typedef void strip_write_fn(const struct strip *strip, const struct strip_target *target, uint32_t n);
 
 /* World depths of a row: z' of words, 2^exponent times as much; +inf where nothing is. */
@@ -244,20 +247,21 @@ typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int ex
 
 /* ---- shadows ([G] 7.3.1) ---- */
 
-/* A map: for each level k in use the nearest z' in cells of 2^k texels, +inf where nothing is, with a guard band of one cell. Lengths
- * are the map's own units, of which the camera's are `scale`. */
+/* A map: for each level k in use the nearest z' in cells of 2^k texels, +inf where nothing is, with a guard band of one
+ * cell. Lengths are the map's own units, of which the camera's are `scale`. */
 struct shadow_map {
 	int perspective;
 	float turn[3][3], move[3]; /* camera space to the map's: turn p + move */
 	float scale;
 	float focal, half_width, half_height, near_z;
-	/* A place is compared by how its plane falls within slope_bias cells of a cell's centre, less texel_bias widths of a cell,
-	 * less slack: half a cell, a cell, and what rounding takes. */
+	/* A place is compared by how its plane falls within slope_bias cells of a cell's centre, less texel_bias widths of
+	 * a cell, less slack: half a cell, a cell, and what rounding takes. */
 	float slope_bias, texel_bias, slack;
 	uint32_t levels; /* bit k: level k is in use */
 	struct {
 		const float *z;
-		const float *seam; /* the nearest of the cell and of the finer level's four in it; NULL where that is not in use */
+		const float *seam; /* the nearest of the cell and of the finer level's four in it; NULL where that is not in
+		                    * use */
 		uint32_t stride;
 		float most_x, most_y; /* greatest places, in cells, at which four cells lie around */
 	} level[PSR_MAX_DEPTH_LEVEL + 1];
@@ -271,8 +275,8 @@ struct shadow_light {
 	struct shadow_map map[SHADOW_FACES];
 };
 
-/* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of what is
- * nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
+/* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of
+ * what is nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
 typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
 
 /* ---- gaps ([G] 4.6) ---- */
@@ -295,9 +299,10 @@ struct gaps_counts {
 	uint32_t n_marked;   /* bricks with a weight below 1 */
 };
 
-/* Weights of the pixels x0 <= x < x1, y0 <= y < y1: 0..GAPS_WHOLE, of the share that no cell nearer than the pixel covers, and 0
- * for pinholes. x0 is a multiple of GAPS_WIDTH, x1 at most GAPS_WIDTH more; y0 a multiple of GAPS_BRICK, y1 at most GAPS_BRICK
- * more. Sets marks[i] to whether brick i of the GAPS_WIDTH / GAPS_BRICK side by side has a weight below GAPS_WHOLE. */
+/* Weights of the pixels x0 <= x < x1, y0 <= y < y1: 0..GAPS_WHOLE, of the share that no cell nearer than the pixel
+ * covers, and 0 for pinholes. x0 is a multiple of GAPS_WIDTH, x1 at most GAPS_WIDTH more; y0 a multiple of GAPS_BRICK,
+ * y1 at most GAPS_BRICK more. Sets marks[i] to whether brick i of the GAPS_WIDTH / GAPS_BRICK side by side has a weight
+ * below GAPS_WHOLE. */
 typedef struct gaps_counts gaps_fn(const struct gaps_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1,
                                    uint8_t *marks);
 
@@ -305,33 +310,33 @@ typedef struct gaps_counts gaps_fn(const struct gaps_target *target, uint32_t x0
 
 #define FILL_WIDTH 256 /* cells of a row at most, in one call */
 
-/* Cells side by side. Colours are premultiplied with the weight, but in the picture itself. Outside of the picture z is NaN,
- * nearer than nothing and farther than nothing, and the weight GAPS_WHOLE. */
+/* Cells side by side. Colours are premultiplied with the weight, but in the picture itself. Outside of the picture z is
+ * NaN, nearer than nothing and farther than nothing, and the weight GAPS_WHOLE. */
 struct fill_row {
 	uint16_t *r, *g, *b, *weight; /* r, g, b: NULL where only weights and depths matter */
 	float *z;
 };
 
-/* Cells to[0..n-1] from cells upper[0..2n-1] and lower[0..2n-1]: of those that have a weight, the ones that are not beyond
- * scale * z + offset of the nearest. Returns the least weight. */
-typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower, uint32_t n,
-                              int is_picture, float scale, float offset);
+/* Cells to[0..n-1] from cells upper[0..2n-1] and lower[0..2n-1]: of those that have a weight, the ones that are not
+ * beyond scale * z + offset of the nearest. Returns the least weight. */
+typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                              uint32_t n, int is_picture, float scale, float offset);
 
 #define FILL_BLOCK 16 /* a push works on as many parents together */
 
-/* Makes those of the cells to[0..2n-1] whole that are not, and whose parents are, with the neighbors that they look at: own[0..n-1]
- * holds the parents, of which [-1] and [n] count, too, and beside[0..n-1] the parents' neighbors above or below. Depths change
- * where the weight was below a half. */
-typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                          float scale, float offset);
+/* Makes those of the cells to[0..2n-1] whole that are not, and whose parents are, with the neighbors that they look at:
+ * own[0..n-1] holds the parents, of which [-1] and [n] count, too, and beside[0..n-1] the parents' neighbors above or
+ * below. Depths change where the weight was below a half. */
+typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside,
+                          uint32_t n, float scale, float offset);
 
-/* The same for pixels, in `was`, which stay as they are and whose z has no meaning: in those blocks i of FILL_BLOCK parents whose
- * left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the places, 0..2n-1, of those that
- * would become whole, with room for one more; `to` has their colors and, whatever their weights are, the depths that are
- * interpolated, and elsewhere anything. Returns how many there are. */
+/* The same for pixels, in `was`, which stay as they are and whose z has no meaning: in those blocks i of FILL_BLOCK
+ * parents whose left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the places,
+ * 0..2n-1, of those that would become whole, with room for one more; `to` has their colors and, whatever their weights
+ * are, the depths that are interpolated, and elsewhere anything. Returns how many there are. */
 typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
-                                      const struct fill_row *was, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                                      float scale, float offset);
+                                      const struct fill_row *was, const struct fill_row *own,
+                                      const struct fill_row *beside, uint32_t n, float scale, float offset);
 
 /* z' of n words. */
 typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
@@ -340,7 +345,8 @@ typedef void fill_depths_fn(float *z, const uint64_t *word, uint32_t n);
 
 #define SMOOTH_WIDTH 256
 
-/* A picture that is done, and one of the same size that it goes to. What is behind a pixel is beyond scale * z' + offset of it. */
+/* A picture that is done, and one of the same size that it goes to. What is behind a pixel is beyond scale * z' +
+ * offset of it. */
 struct smooth_target {
 	const uint8_t *from; /* sRGB, 3 bytes a pixel */
 	uint8_t *to;
@@ -349,16 +355,18 @@ struct smooth_target {
 	float scale, offset;
 };
 
-/* The pixels x0 <= x < x1, y0 <= y < y1, of which SMOOTH_WIDTH at most are side by side: each becomes the mean of itself, four times,
- * and of its four neighbours, in the place of which it stands itself where they are not of the same surface. An edge lets through what is behind it: an eighth of the mean
- * of the neighbours there for each diagonal one and two for each other one, which count once and twice in that mean, six eighths
- * at most. Neighbours in front count nothing. Means are of squares of codes. Returns how many pixels have a neighbour behind. */
+/* The pixels x0 <= x < x1, y0 <= y < y1, of which SMOOTH_WIDTH at most are side by side: each becomes the mean of
+ * itself, four times, and of its four neighbours, in the place of which it stands itself where they are not of the same
+ * surface. An edge lets through what is behind it: an eighth of the mean of the neighbours there for each diagonal one
+ * and two for each other one, which count once and twice in that mean, six eighths at most. Neighbours in front count
+ * nothing. Means are of squares of codes. Returns how many pixels have a neighbour behind. */
 typedef uint32_t smooth_fn(const struct smooth_target *target, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1);
 
-/* The greatest z' of each 8x8 pixels of a tile, as bits: far[y / 8 * (TILE_WIDTH / 8) + x / 8]; those of +inf where a pixel is
- * empty. */
+/* The greatest z' of each 8x8 pixels of a tile, as bits: far[y / 8 * (TILE_WIDTH / 8) + x / 8]; those of +inf where a
+ * pixel is empty. */
 #define FAR_SIDE 8
-typedef void warp_far_fn(const struct warp_target *target, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)]);
+typedef void warp_far_fn(const struct warp_target *target,
+                         uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)]);
 
 struct simd {
 	cull_fn *cull;

@@ -78,8 +78,11 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 			{ -(up->z[i - 1] > limit), -(up->z[i + 1] > limit), -(down->z[i - 1] > limit), -(down->z[i + 1] > limit) },
 		};
 		const struct smooth_masks same = {
-			is_same(z, limit, up->z[i], up->limit[i]), is_same(z, limit, down->z[i], down->limit[i]),
-			is_same(z, limit, own->z[i - 1], own->limit[i - 1]), is_same(z, limit, own->z[i + 1], own->limit[i + 1]), { 0 },
+			is_same(z, limit, up->z[i], up->limit[i]),
+			is_same(z, limit, down->z[i], down->limit[i]),
+			is_same(z, limit, own->z[i - 1], own->limit[i - 1]),
+			is_same(z, limit, own->z[i + 1], own->limit[i + 1]),
+			{ 0 },
 		};
 		const int32_t sides = behind.above + behind.below + behind.left + behind.right;
 		const int32_t corners = behind.corner[0] + behind.corner[1] + behind.corner[2] + behind.corner[3];

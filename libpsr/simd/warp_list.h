@@ -1,7 +1,7 @@
-/* What falls into a tile, of many blocks: words, depths of cells, and the places that they go to. They are computed first and
- * stored after, so that the long way from a block's head to its words is walked for several blocks at a time; and stored a
- * quarter of the list apart in turn, since samples that follow each other often fall into one pixel, and a store must not wait
- * for the one just before. */
+/* What falls into a tile, of many blocks: words, depths of cells, and the places that they go to. They are computed
+ * first and stored after, so that the long way from a block's head to its words is walked for several blocks at a time;
+ * and stored a quarter of the list apart in turn, since samples that follow each other often fall into one pixel, and a
+ * store must not wait for the one just before. */
 #ifndef PSR_SIMD_WARP_LIST_H
 #define PSR_SIMD_WARP_LIST_H
 
@@ -54,10 +54,12 @@ static inline void lower_cells(const struct warp_target *t, struct cells *list)
 #undef LOWER
 #undef LOWER_ALL
 
-typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry);
+typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t,
+                           const struct bin_entry *entry);
 
 /* The warp, by what lists a block; room for one more block is there whenever it is called. */
-static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *list_block, const struct warp_target *target,
+static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *list_block,
+                                                              const struct warp_target *target,
                                                               const struct bin_entry *entry, uint32_t n)
 {
 	struct words words;

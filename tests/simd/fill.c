@@ -1,5 +1,5 @@
-/* fill_pull, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty ones, and outside of the
- * picture. */
+/* fill_pull, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty
+ * ones, and outside of the picture. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"

@@ -1,4 +1,5 @@
-/* gaps: pieces of pictures of all sizes with every set of level buffers; surfaces with holes, pinholes and any numbers. */
+/* gaps: pieces of pictures of all sizes with every set of level buffers; surfaces with holes, pinholes and any
+ * numbers. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"

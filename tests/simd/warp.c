@@ -58,7 +58,8 @@ static void make_picture(struct check *c, struct picture *p, uint32_t width, uin
 		if (!(p->levels >> k & 1))
 			continue;
 		struct warp_cells *cells = &t->cells[k];
-		const uint32_t side = 1u << k, cells_x = (width + side - 1) / side + 2, cells_y = (height + side - 1) / side + 2;
+		const uint32_t side = 1u << k, cells_x = (width + side - 1) / side + 2,
+					   cells_y = (height + side - 1) / side + 2;
 		cells->stride = cells_x;
 		cells->x0 = tx ? t->x0 : -(1 << k);
 		cells->y0 = ty ? t->y0 : -(1 << k);
@@ -85,7 +86,8 @@ static void complete_lattice(struct warp_lattice *lattice)
 		}
 }
 
-/* A sample's step is `step` pixels, and the lattice lies in the tile or near it, before the eye or on both sides of it. */
+/* A sample's step is `step` pixels, and the lattice lies in the tile or near it, before the eye or on both sides of
+ * it. */
 static void random_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t, double step)
 {
 	const double u = check_real(c, t->x0 - 20, t->x1 + 20), v = check_real(c, t->y0 - 20, t->y1 + 20);
@@ -157,7 +159,8 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 	t->perspective = check_one_in(c, 4) ? 0 : 1;
 	t->near_z = numbers == SPOILT && check_one_in(c, 3) ? fabsf(check_float(c)) : 0x1p-14f;
 	t->near_z = t->near_z > 0 ? t->near_z : 0x1p-149f;
-	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS, n_samples);
+	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS,
+	             n_samples);
 	const uint32_t last_slot = (1u << 26) - 1 - n_instances * blocks.n_blocks;
 	const uint32_t first_slot = check_one_in(c, 3) ? last_slot : check_below(c, last_slot);
 	for (uint32_t i = 0; i < n_instances; i++) {
@@ -180,8 +183,10 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 		int level = (int)check_below(c, PSR_MAX_DEPTH_LEVEL + 1);
 		while (level && !(p->levels >> level & 1))
 			level--;
-		entry[e] = (struct bin_entry){ .slot = instance[i].first_slot + check_below(c, blocks.n_blocks), .instance = (uint16_t)i,
-			                       .level = (uint8_t)level, .is_mixed = (uint8_t)check_below(c, 2) };
+		entry[e] = (struct bin_entry){ .slot = instance[i].first_slot + check_below(c, blocks.n_blocks),
+			                           .instance = (uint16_t)i,
+			                           .level = (uint8_t)level,
+			                           .is_mixed = (uint8_t)check_below(c, 2) };
 	}
 	check_units(c, (uint64_t)n_entries * n_samples);
 	while (check_next(c))

@@ -25,8 +25,13 @@ static const char *const names[MODELS] = { "teapot", "wheel", "top", "sphere", "
 static int open_models(void **state)
 {
 	(void)state;
-	const struct shape_options shiny = { .resolution = 96, .diffuse = 0x6090c0, .specular = 0x8410, .exponent = 80, .cones = 1,
-		                                 .scale = 3, .origin = { 5, -2, 1 } };
+	const struct shape_options shiny = { .resolution = 96,
+		                                 .diffuse = 0x6090c0,
+		                                 .specular = 0x8410,
+		                                 .exponent = 80,
+		                                 .cones = 1,
+		                                 .scale = 3,
+		                                 .origin = { 5, -2, 1 } };
 	const struct shape_options leaf = { .resolution = 64, .diffuse = 0x20ff20, .two_sided = 1, .scale = 1 };
 	const struct shape_options matt = { .resolution = 128, .diffuse = 0xc0c0c0, .scale = 1 };
 	struct psr_error err;
@@ -75,10 +80,15 @@ static void case_make(struct case_of *c, uint32_t which)
 	const struct psr_model *first = models[which % MODELS];
 	const struct psr_model_info *info = psr_model_info(first);
 	memset(c, 0, sizeof *c);
-	c->scene = (struct psr_scene){ .instance = c->instance, .n_instances = which % 3 == 2 ? 3 : 1, .light = c->light,
-		                           .n_lights = next(&seed) % 6, .ambient = { 0.1, 0.2, 0.1 }, .background = { 0.2, 0, 0.5 } };
+	c->scene = (struct psr_scene){ .instance = c->instance,
+		                           .n_instances = which % 3 == 2 ? 3 : 1,
+		                           .light = c->light,
+		                           .n_lights = next(&seed) % 6,
+		                           .ambient = { 0.1, 0.2, 0.1 },
+		                           .background = { 0.2, 0, 0.5 } };
 	for (uint32_t i = 0; i < c->scene.n_instances; i++) {
-		c->instance[i] = (struct psr_instance){ i ? models[next(&seed) % MODELS] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
+		c->instance[i] =
+			(struct psr_instance){ i ? models[next(&seed) % MODELS] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
 		for (int k = 0; k < 3 && i; k++)
 			c->instance[i].translation[k] = between(&seed, -info->scale, info->scale);
 		if (i) /* a third of a turn about a diagonal */
@@ -191,8 +201,8 @@ static void count_light(struct strip *strip, const struct strip_light *light, co
 	simd_c.strip_light(strip, light, reaches);
 }
 
-static void count_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light, uint32_t n_lights,
-                      const float ambient[3], uint32_t first, uint32_t n)
+static void count_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light,
+                      uint32_t n_lights, const float ambient[3], uint32_t first, uint32_t n)
 {
 	calls.lit++;
 	simd_c.strip_lit(lit, view, light, n_lights, ambient, first, n);
@@ -240,7 +250,9 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 	c.scene.n_instances = 1;
 	psr_settings_default(&c.settings, 640, 480);
 	for (int i = 0; i < 5; i++)
-		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { i - 2, -1, -1 }, .color = { 0.3, 0.3, 0.3 } };
+		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL,
+			                             .direction = { i - 2, -1, -1 },
+			                             .color = { 0.3, 0.3, 0.3 } };
 	c.scene.n_lights = 5;
 	draw(&d, &c, &c.settings, &simd);
 	assert_int_equal(calls.lit, 32768 / STRIP);
@@ -314,7 +326,8 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 	struct psr_frame frame = { .width = 320, .height = 240, .rgb = malloc(3 * 320 * 240) };
 	assert_int_equal(psr_renderer_create(&renderer), 0);
 	for (int i = 0; i < 40; i++) {
-		const double *middle = psr_model_info(c.instance[0].model)->origin, scale = psr_model_info(c.instance[0].model)->scale;
+		const double *middle = psr_model_info(c.instance[0].model)->origin,
+					 scale = psr_model_info(c.instance[0].model)->scale;
 		c.scene.camera.eye[0] = middle[0] + 3 * scale * sin(i * 0.01);
 		c.scene.camera.eye[1] = middle[1];
 		c.scene.camera.eye[2] = middle[2] + 3 * scale * cos(i * 0.01);

@@ -33,7 +33,10 @@ static uint64_t draw(const struct view *view, const struct psr_model *model, dou
 	const struct psr_instance instance = { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = unit };
 	const struct psr_light light[2] = {
 		{ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -1.5 }, .color = { 0.3, 0.3, 0.3 } },
-		{ .kind = PSR_LIGHT_POINT, .position = { 2 * unit, unit, 2 * unit }, .color = { 0.7, 0.6, 0.5 }, .reference = 2 * unit },
+		{ .kind = PSR_LIGHT_POINT,
+		  .position = { 2 * unit, unit, 2 * unit },
+		  .color = { 0.7, 0.6, 0.5 },
+		  .reference = 2 * unit },
 	};
 	const struct psr_scene scene = {
 		.instance = &instance, .n_instances = 1, .light = light, .n_lights = 2, .ambient = { 0.1, 0.1, 0.1 },
@@ -41,7 +44,10 @@ static uint64_t draw(const struct view *view, const struct psr_model *model, dou
 			    .ortho_height = view->ortho_height * unit },
 	};
 	const size_t n = (size_t)view->width * view->height;
-	struct psr_frame frame = { .width = view->width, .height = view->height, .rgb = malloc(3 * n), .depth = malloc(4 * n) };
+	struct psr_frame frame = { .width = view->width,
+		                       .height = view->height,
+		                       .rgb = malloc(3 * n),
+		                       .depth = malloc(4 * n) };
 	struct psr_renderer *renderer;
 	struct psr_settings settings;
 	struct psr_pool *pool;
@@ -64,7 +70,11 @@ static uint64_t draw(const struct view *view, const struct psr_model *model, dou
 
 static struct psr_model *sphere(void)
 {
-	const struct shape_options o = { .resolution = 96, .diffuse = 0x6090c0, .specular = 0xffff, .exponent = 80, .scale = 1 };
+	const struct shape_options o = { .resolution = 96,
+		                             .diffuse = 0x6090c0,
+		                             .specular = 0xffff,
+		                             .exponent = 80,
+		                             .scale = 1 };
 	return shape_build(&o, 0.9);
 }
 
@@ -79,7 +89,8 @@ static void set_environment(int rounding, unsigned flush)
 }
 
 /* In a process of its own, so that tables made at first use are made there, too. */
-static uint64_t draw_in(const struct psr_model *model, const struct view *view, double unit, int rounding, unsigned flush)
+static uint64_t draw_in(const struct psr_model *model, const struct view *view, double unit, int rounding,
+                        unsigned flush)
 {
 	int ends[2], status;
 	uint64_t hash = 0;
@@ -161,7 +172,8 @@ static void a_frame_leaves_the_callers_environment_as_it_was(void **state)
 	psr_model_unref(model);
 }
 
-/* Tiles of a single column or row stand beside others, which other threads draw at the same time. The sphere fills them all. */
+/* Tiles of a single column or row stand beside others, which other threads draw at the same time. The sphere fills them
+ * all. */
 static void threads_do_not_show_where_tiles_are_narrow(void **state)
 {
 	static const uint32_t size[][2] = { { 257, 140 }, { 263, 129 }, { 513, 131 }, { 17, 300 } };

@@ -135,8 +135,8 @@ static struct plan plan_of(int perspective)
 	return plan;
 }
 
-/* Surfaces at a few depths over the background; of `holes` in 256 pixels the weight is 0, of `partial` it is anything. `whole`
- * in 8 bricks are left alone. Wide pictures have nothing at all in the middle of their left half. */
+/* Surfaces at a few depths over the background; of `holes` in 256 pixels the weight is 0, of `partial` it is anything.
+ * `whole` in 8 bricks are left alone. Wide pictures have nothing at all in the middle of their left half. */
 static struct picture picture_make(uint32_t width, uint32_t height, uint32_t holes, uint32_t partial, uint32_t whole,
                                    const struct plan *plan)
 {
@@ -145,8 +145,14 @@ static struct picture picture_make(uint32_t width, uint32_t height, uint32_t hol
 	struct picture p = { .area = area, .stack = { .width = width, .height = height, .exponent = -3 } };
 	uint8_t *bricks = calloc(n_bricks, 1), *is_left = calloc(n_bricks, 1);
 	p.stack.word = malloc(area * 8);
-	p.fill = (struct fill_picture){ .weight = malloc(area * 2), .bricks = bricks, .r = malloc(area * 2), .g = malloc(area * 2),
-		                            .b = malloc(area * 2), .srgb = srgb, .rgb = malloc(3 * area), .depth = malloc(area * 4) };
+	p.fill = (struct fill_picture){ .weight = malloc(area * 2),
+		                            .bricks = bricks,
+		                            .r = malloc(area * 2),
+		                            .g = malloc(area * 2),
+		                            .b = malloc(area * 2),
+		                            .srgb = srgb,
+		                            .rgb = malloc(3 * area),
+		                            .depth = malloc(area * 4) };
 	for (uint32_t i = 0; i < n_bricks; i++)
 		is_left[i] = draw(8) < whole;
 	for (uint32_t y = 0; y < height; y++)
@@ -194,7 +200,9 @@ static struct dense dense_make(const struct picture *p)
 		d.cell[l] = calloc((size_t)d.width[l] * d.height[l], sizeof **d.cell);
 	for (size_t i = 0; i < p->area; i++) {
 		const uint32_t w = p->fill.weight[i];
-		d.cell[0][i] = (struct cell){ { p->fill.r[i] * w / WEIGHT_ONE, p->fill.g[i] * w / WEIGHT_ONE, p->fill.b[i] * w / WEIGHT_ONE }, w,
+		d.cell[0][i] = (struct cell){ { p->fill.r[i] * w / WEIGHT_ONE, p->fill.g[i] * w / WEIGHT_ONE,
+			                            p->fill.b[i] * w / WEIGHT_ONE },
+			                          w,
 			                          psr_float_from_bits((uint32_t)(p->stack.word[i] >> 32)) };
 	}
 	return d;
@@ -212,8 +220,8 @@ static void spoil(const struct picture *p, const uint8_t *wants)
 		}
 }
 
-static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t partial, uint32_t whole, const struct simd *simd,
-                    struct fill *fill)
+static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t partial, uint32_t whole,
+                    const struct simd *simd, struct fill *fill)
 {
 	const struct plan plan = plan_of((int)draw(2));
 	struct picture p = picture_make(width, height, holes, partial, whole, &plan);
@@ -242,8 +250,9 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 		}
 		for (size_t k = 0; k < 3; k++)
 			if (p.fill.rgb[3 * i + k] != srgb[c->rgb[k]])
-				fail_msg("%ux%u, pixel (%u, %u): colour %u is %u and should be %u", width, height, (unsigned)(i % width),
-				         (unsigned)(i / width), (unsigned)k, p.fill.rgb[3 * i + k], srgb[c->rgb[k]]);
+				fail_msg("%ux%u, pixel (%u, %u): colour %u is %u and should be %u", width, height,
+				         (unsigned)(i % width), (unsigned)(i / width), (unsigned)k, p.fill.rgb[3 * i + k],
+				         srgb[c->rgb[k]]);
 		assert_true(p.fill.depth[i] == (weights[i] < WEIGHT_ONE / 2 ? ldexpf(c->z, p.stack.exponent) : -1));
 		n_changed++;
 		n_filled += weights[i] == 0 && c->z < INFINITY;
@@ -273,8 +282,9 @@ static void for_each_isa(void (*check)(const struct simd *simd, struct fill *fil
 
 static void check_sizes(const struct simd *simd, struct fill *fill)
 {
-	static const uint32_t size[][2] = { { 1, 1 }, { 1, 2 }, { 3, 1 }, { 16, 16 }, { 31, 33 }, { 32, 32 }, { 64, 64 }, { 65, 1 },
-		                                { 1, 70 }, { 97, 55 }, { 256, 40 }, { 257, 64 }, { 300, 131 }, { 511, 96 }, { 513, 33 } };
+	static const uint32_t size[][2] = { { 1, 1 },    { 1, 2 },    { 3, 1 },     { 16, 16 },  { 31, 33 },
+		                                { 32, 32 },  { 64, 64 },  { 65, 1 },    { 1, 70 },   { 97, 55 },
+		                                { 256, 40 }, { 257, 64 }, { 300, 131 }, { 511, 96 }, { 513, 33 } };
 	for (size_t i = 0; i < sizeof size / sizeof *size; i++) {
 		compare(size[i][0], size[i][1], 60, 60, 0, simd, fill);
 		compare(size[i][0], size[i][1], 4, 4, 4, simd, fill);

@@ -29,7 +29,10 @@ static struct psr_camera perspective(double x, double y, double z, double fov_de
 
 static struct psr_camera orthographic(double x, double y, double z, double height)
 {
-	return (struct psr_camera){ .eye = { x, y, z }, .up = { 0, 1, 0 }, .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = height };
+	return (struct psr_camera){ .eye = { x, y, z },
+		                        .up = { 0, 1, 0 },
+		                        .kind = PSR_CAMERA_ORTHOGRAPHIC,
+		                        .ortho_height = height };
 }
 
 static void draw(struct picture *p, const struct psr_scene *scene, uint32_t w, uint32_t h, int n_threads)
@@ -81,8 +84,8 @@ static double sphere_depth(const struct psr_camera *camera, double u, double v, 
 	return d >= 0 ? (distance - sqrt(d)) / a : INFINITY;
 }
 
-/* Every pixel whose truth is there all over itself and `reach` pixels around must be drawn, within the range of the depths
- * there, grown by `slack`; every pixel with no truth in that neighbourhood must be empty. */
+/* Every pixel whose truth is there all over itself and `reach` pixels around must be drawn, within the range of the
+ * depths there, grown by `slack`; every pixel with no truth in that neighbourhood must be empty. */
 static void check_sphere(const struct psr_camera *camera, uint32_t side, double reach, double slack)
 {
 	struct psr_model *model = shape_build(&GREY, 0.95);
@@ -127,8 +130,8 @@ static void sphere_at_magnification_one_has_no_holes(void **state)
 static void magnified_sphere_is_filled(void **state)
 {
 	(void)state;
-	/* At level k a cell has 2^k pixels: edges grow by so much at most ([G] 4.6), and a filled pixel's depth is that of samples
-	 * within two cells. */
+	/* At level k a cell has 2^k pixels: edges grow by so much at most ([G] 4.6), and a filled pixel's depth is that of
+	 * samples within two cells. */
 	struct psr_camera camera = orthographic(0, 0, 4, 2);
 	check_sphere(&camera, 200, 2, 0.02);
 	check_sphere(&camera, 512, 4, 0.02);
@@ -143,7 +146,10 @@ static void ambient_one_gives_the_flat_diffuse_colour(void **state)
 	(void)state;
 	struct psr_model *model = shape_build(&GREY, 0.95);
 	struct psr_instance instance = place(model);
-	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 }, .background = { 1, 0, 0 },
+	struct psr_scene scene = { .instance = &instance,
+		                       .n_instances = 1,
+		                       .ambient = { 1, 1, 1 },
+		                       .background = { 1, 0, 0 },
 		                       .camera = perspective(0, 0, 5, 24) };
 	struct picture p;
 	draw(&p, &scene, 300, 200, 1);
@@ -187,7 +193,11 @@ static void threads_draw_the_same_bytes(void **state)
 	instance[2].rotation[3] = cos(0.3);
 	struct psr_light light[2] = {
 		{ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -1, -1 }, .color = { 0.7, 0.7, 0.7 } },
-		{ .kind = PSR_LIGHT_SPOT, .position = { 3, 3, 3 }, .direction = { -1, -1, -1 }, .color = { 1, 1, 0 }, .inner = 0.2,
+		{ .kind = PSR_LIGHT_SPOT,
+		  .position = { 3, 3, 3 },
+		  .direction = { -1, -1, -1 },
+		  .color = { 1, 1, 0 },
+		  .inner = 0.2,
 		  .outer = 0.4 },
 	};
 	struct psr_scene scene = { .instance = instance, .n_instances = 3, .light = light, .n_lights = 2,
@@ -223,7 +233,11 @@ static void scaling_the_world_by_a_power_of_two_changes_no_colour(void **state)
 		for (int k = 0; k < 3; k++)
 			here.position[k] *= s;
 		here.reference *= s;
-		struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &here, .n_lights = 1, .camera = camera };
+		struct psr_scene scene = { .instance = &instance,
+			                       .n_instances = 1,
+			                       .light = &here,
+			                       .n_lights = 1,
+			                       .camera = camera };
 		struct picture p;
 		draw(&p, &scene, 200, 150, 1);
 		if (i < 0) {
@@ -328,7 +342,9 @@ static void cones_cull_the_back_of_a_solid_and_change_no_pixel(void **state)
 			o.cones = cones;
 			struct psr_model *model = shape_build(&o, 0.95);
 			struct psr_instance instance = place(model);
-			struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -1, -1 }, .color = { 1, 1, 1 } };
+			struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL,
+				                       .direction = { -1, -1, -1 },
+				                       .color = { 1, 1, 1 } };
 			struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
 				                       .camera = i % 2 ? orthographic(0, i, 4, 2) : perspective(1, 2 - i, 5, 30) };
 			draw(cones ? &with : &without, &scene, 128, 128, 1);
@@ -336,7 +352,8 @@ static void cones_cull_the_back_of_a_solid_and_change_no_pixel(void **state)
 		}
 		assert_true(same(&without, &with));
 		assert_int_equal(without.frame.report.n_blocks_drawn, without.frame.report.n_blocks);
-		assert_in_range(with.frame.report.n_blocks_drawn, with.frame.report.n_blocks * 2 / 5, with.frame.report.n_blocks * 3 / 4);
+		assert_in_range(with.frame.report.n_blocks_drawn, with.frame.report.n_blocks * 2 / 5,
+		                with.frame.report.n_blocks * 3 / 4);
 		release(&without);
 		release(&with);
 	}
@@ -404,7 +421,8 @@ static void lights_follow_phong(void **state)
 		double facing = fmax(0, L[2]), side = sqrt(1 - L[2] * L[2]); /* N = V = z, so R.V = N.L */
 		double light = facing > 0 ? 0.3 * amount : 0;
 		double diffuse = (double)psr_srgb_to_linear[0x40] * facing, specular = pow(facing, 16);
-		/* The stored normal is off by up to 0.7 degrees, R by twice that, and the sample by a pixel; half a code at the end. */
+		/* The stored normal is off by up to 0.7 degrees, R by twice that, and the sample by a pixel; half a code at the
+		 * end. */
 		double turn = 0.0125, slack = light * (turn * side + 16 * 2 * turn * specular * side / L[2] * 1.1) + 0.002;
 		double expect = light * (diffuse + specular), got = (double)psr_srgb_to_linear[pixel(&p, 50, 50) & 255];
 		if (fabs(got - expect) > slack)
@@ -426,7 +444,10 @@ static void hard_cameras_draw_something_or_nothing(void **state)
 	static const uint32_t sizes[][2] = { { 1, 1 }, { 3, 500 }, { 257, 129 }, { 2000, 2 } };
 	for (unsigned i = 0; i < sizeof cameras / sizeof *cameras; i++)
 		for (unsigned k = 0; k < 4; k++) {
-			struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 }, .camera = cameras[i] };
+			struct psr_scene scene = { .instance = &instance,
+				                       .n_instances = 1,
+				                       .ambient = { 1, 1, 1 },
+				                       .camera = cameras[i] };
 			struct picture p;
 			draw(&p, &scene, sizes[k][0], sizes[k][1], 1);
 			for (uint32_t at = 0; at < sizes[k][0] * sizes[k][1]; at++)

@@ -1,5 +1,5 @@
-/* Gaps in vectors against one pixel after the other, on random stacks, for every ISA that the machine has; and the guard
- * against pinholes on surfaces made by hand. */
+/* Gaps in vectors against one pixel after the other, on random stacks, for every ISA that the machine has; and the
+ * guard against pinholes on surfaces made by hand. */
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
@@ -33,8 +33,8 @@ static struct plan plan_of(int perspective)
 
 /* ---- one pixel after the other ---- */
 
-/* The square of cell centres in which the centre of a pixel lies begins at cell (i, j), counted with the guard band; the pixel
- * is at (fx, fy) of 2^(k + 1). Positions are in half pixels, so that centres are whole numbers. */
+/* The square of cell centres in which the centre of a pixel lies begins at cell (i, j), counted with the guard band;
+ * the pixel is at (fx, fy) of 2^(k + 1). Positions are in half pixels, so that centres are whole numbers. */
 static int32_t square_of(uint32_t pixel, int k, int32_t *fraction)
 {
 	const int32_t at = 2 * (int32_t)pixel + 1 - (1 << k);
@@ -96,7 +96,8 @@ static int is_pinhole(const struct plan *plan, const struct psr_zstack *stack, u
 	return n >= 7 && farthest <= nearest * plan->gap_scale[alike] + plan->gap_offset[alike];
 }
 
-static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, uint32_t *n_pinholes)
+static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y,
+                          uint32_t *n_pinholes)
 {
 	const float z = depth_at(stack, x, y);
 	int32_t most = 0;
@@ -168,7 +169,8 @@ static void strew(struct psr_zstack *stack, uint32_t strewn)
 					stack->level[k].z[i] = 80 + 0.01f * (float)draw(3000);
 }
 
-static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn, int opaque_cells, const struct simd *simd)
+static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn, int opaque_cells,
+                    const struct simd *simd)
 {
 	struct plan plan = plan_of((int)draw(2));
 	struct psr_zstack stack = stack_make(width, height, levels);
@@ -205,7 +207,9 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 
 static void compare_all(int opaque_cells)
 {
-	static const uint32_t size[][2] = { { 1, 1 }, { 2, 1 }, { 1, 5 }, { 31, 33 }, { 128, 32 }, { 129, 65 }, { 300, 140 } };
+	static const uint32_t size[][2] = {
+		{ 1, 1 }, { 2, 1 }, { 1, 5 }, { 31, 33 }, { 128, 32 }, { 129, 65 }, { 300, 140 }
+	};
 	for (int isa = 0; isa < PSR_N_ISAS; isa++) {
 		const struct simd *simd = simd_of((enum psr_isa)isa);
 		seed = 99;

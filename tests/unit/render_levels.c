@@ -22,8 +22,8 @@ static const uint32_t levels_of[GROUPS] = { 0x1f, 0x15, 0x0a, 0x01, 0x10 };
 static struct psr_cluster cluster[MAX_CLUSTERS];
 static struct psr_model *model;
 
-/* Blocks of all levels begin at the same corner: level 4, 8 * 16 samples wide, is an eighth of a unit. Groups stand side
- * by side in the plane z = 0, a quarter of a unit apart, and face +z. */
+/* Blocks of all levels begin at the same corner: level 4, 8 * 16 samples wide, is an eighth of a unit. Groups stand
+ * side by side in the plane z = 0, a quarter of a unit apart, and face +z. */
 static int setup(void **state)
 {
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
@@ -33,8 +33,13 @@ static int setup(void **state)
 	static int16_t col[MAX_CLUSTERS], row[MAX_CLUSTERS];
 	static uint8_t number[MAX_CLUSTERS], flags[MAX_CLUSTERS];
 	static uint64_t mask[MAX_CLUSTERS], attr[64 * MAX_CLUSTERS];
-	struct psr_model_info info = { .scale = 1, .box_min = { -1, -1, 0 }, .box_max = { 1, 1, 0 }, .spacing = (double)SPACING,
-		                           .tolerance = 0.4, .resolution = 1024, .builder = "test" };
+	struct psr_model_info info = { .scale = 1,
+		                           .box_min = { -1, -1, 0 },
+		                           .box_max = { 1, 1, 0 },
+		                           .spacing = (double)SPACING,
+		                           .tolerance = 0.4,
+		                           .resolution = 1024,
+		                           .builder = "test" };
 	struct psr_blocks blocks = { .n_projections = 1, .n_levels = LEVELS, .projection = &projection, .cluster = cluster,
 		                         .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z, .sphere_r = r,
 		                         .block_projection = number, .col = col, .row = row, .flags = flags, .depth_bias = bias,

@@ -40,8 +40,12 @@ static void stage_make(struct stage *s)
 	const double c = cos(0.35), h = sin(0.35); /* half of the angle that the square is turned by */
 
 	for (int i = 0; i < 3; i++) {
-		const struct shape_options o = { .resolution = 64, .diffuse = 0x6090c0, .scale = 1.5, .origin = { 0.25, -0.5, 1 },
-			                             .two_sided = i == 1, .cones = 1 };
+		const struct shape_options o = { .resolution = 64,
+			                             .diffuse = 0x6090c0,
+			                             .scale = 1.5,
+			                             .origin = { 0.25, -0.5, 1 },
+			                             .two_sided = i == 1,
+			                             .cones = 1 };
 		s->model[i] = shape_build(&o, i == 1 ? 0 : 0.9);
 		s->instance[i] = (struct psr_instance){ .model = s->model[i], .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	}
@@ -183,7 +187,8 @@ static void words_name_the_sample_that_falls_into_the_pixel(void **state)
 		rotate(world, s.instance[k].rotation, object);
 		for (int a = 0; a < 3; a++)
 			for (int b = 0; b < 3; b++)
-				at[a] += axis[a][b] * (s.instance[k].translation[b] + s.instance[k].scale * world[b] - s.scene.camera.eye[b]);
+				at[a] += axis[a][b] *
+				         (s.instance[k].translation[b] + s.instance[k].scale * world[b] - s.scene.camera.eye[b]);
 		assert_true(fabs(at[2] - z) < 1e-5 * z);
 		assert_true(fabs(at[0] / at[2] * focal + WIDTH / 2.0 - (i % WIDTH + 0.5)) < 0.51);
 		assert_true(fabs(at[1] / at[2] * focal + HEIGHT / 2.0 - (i / WIDTH + 0.5)) < 0.51);

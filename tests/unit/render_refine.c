@@ -49,7 +49,8 @@ static void still_make(struct still *s, const struct psr_model *model, uint32_t 
 
 	memset(s, 0, sizeof *s);
 	s->instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
-	s->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
+	s->light =
+		(struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
 	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light, .n_lights = 1,
 		                           .ambient = { 0.1, 0.1, 0.1 } };
 	psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
@@ -79,7 +80,8 @@ static int same_frames(const struct still *a, const struct still *b)
 {
 	const size_t n = (size_t)a->frame.width * a->frame.height;
 
-	return memcmp(a->frame.rgb, b->frame.rgb, 3 * n) == 0 && memcmp(a->frame.depth, b->frame.depth, n * sizeof(float)) == 0;
+	return memcmp(a->frame.rgb, b->frame.rgb, 3 * n) == 0 &&
+	       memcmp(a->frame.depth, b->frame.depth, n * sizeof(float)) == 0;
 }
 
 /* What a white, unlit sphere before black covers, in pixels: the mean light is the covered share. */
@@ -92,10 +94,10 @@ static double area_of(const struct still *s)
 	return area;
 }
 
-/* The disc's area is known. A rim grows it: of half the diagonal of a sub-pixel at most, since samples keep those that they
- * are in, and of what splats reach beyond the disc. Where a sphere turns away, splats are within their slope's limit of
- * edge-on: they rise by at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere, which falls; no more than
- * a quarter of a step. A step is `pixels` pixels here. */
+/* The disc's area is known. A rim grows it: of half the diagonal of a sub-pixel at most, since samples keep those that
+ * they are in, and of what splats reach beyond the disc. Where a sphere turns away, splats are within their slope's
+ * limit of edge-on: they rise by at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere, which falls; no
+ * more than a quarter of a step. A step is `pixels` pixels here. */
 static void the_area_of_a_sphere_converges(void **state)
 {
 	struct still s;
@@ -158,9 +160,10 @@ static void threads_and_instruction_sets_draw_the_same_bytes(void **state)
 	still_clear(&other);
 }
 
-/* A pixel's sub-pixels are the same whether a window's border is near or not: 512 x 256 x 4 fill one window, twice as many
- * pixels of the same size need nine. What a window rounds otherwise is a sample's place by some 2^-12 of a sub-pixel, so
- * that hardly one sample in a thousand falls into another, which changes a pixel by a sixteenth of what is seen beside it. */
+/* A pixel's sub-pixels are the same whether a window's border is near or not: 512 x 256 x 4 fill one window, twice as
+ * many pixels of the same size need nine. What a window rounds otherwise is a sample's place by some 2^-12 of a
+ * sub-pixel, so that hardly one sample in a thousand falls into another, which changes a pixel by a sixteenth of what
+ * is seen beside it. */
 static void windows_have_no_seams(void **state)
 {
 	struct still one, nine;
@@ -176,7 +179,8 @@ static void windows_have_no_seams(void **state)
 	refine(&nine, 2, NULL);
 	for (uint32_t y = 0; y < 256; y++)
 		for (uint32_t x = 0; x < 512; x++) {
-			const uint8_t *a = one.frame.rgb + 3 * (y * 512 + x), *b = nine.frame.rgb + 3 * ((y + 128) * 1024 + x + 256);
+			const uint8_t *a = one.frame.rgb + 3 * (y * 512 + x),
+						  *b = nine.frame.rgb + 3 * ((y + 128) * 1024 + x + 256);
 			int most = 0;
 
 			for (int c = 0; c < 3; c++)
@@ -202,8 +206,8 @@ static void depth_is_that_of_the_nearest_sub_pixel(void **state)
 		s.scene.camera.eye[k] = k == 2 ? 3 : 0;
 	memset(s.scene.camera.target, 0, sizeof s.scene.camera.target);
 	refine(&s, 3, NULL);
-	/* The sphere's front is at 3 - 0.9, and within a pixel of 0.025 about the middle falls by 0.025^2 / 2 / 0.9; depth steps and the
-	 * rims of splats add some 2^-14 and a quarter of a step of the lattice. */
+	/* The sphere's front is at 3 - 0.9, and within a pixel of 0.025 about the middle falls by 0.025^2 / 2 / 0.9; depth
+	 * steps and the rims of splats add some 2^-14 and a quarter of a step of the lattice. */
 	const float z = s.frame.depth[50 * 100 + 50];
 	assert_true(fabsf(z - 2.1f) <= 0.0004f + 0x1p-14f + 0.25f * (float)psr_model_info(sphere)->spacing);
 	assert_true(isinf(s.frame.depth[0]));
@@ -225,7 +229,8 @@ static void a_pass_ends_between_windows_when_nobody_waits(void **state)
 
 	(void)state;
 	still_make(&s, sphere, 560, 300);
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 2, NULL, count_down, &left, &s.frame, &err), PSR_ERR_CANCELLED);
+	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 2, NULL, count_down, &left, &s.frame, &err),
+	                 PSR_ERR_CANCELLED);
 	assert_int_equal(left, -1);
 	left = 4;
 	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 2, NULL, count_down, &left, &s.frame, &err), PSR_OK);
@@ -240,7 +245,8 @@ static void the_door_refuses_what_is_no_still(void **state)
 
 	(void)state;
 	still_make(&s, sphere, 64, 64);
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, PSR_MAX_PASS + 1, NULL, NULL, NULL, &s.frame, &err), PSR_ERR_LIMIT);
+	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, PSR_MAX_PASS + 1, NULL, NULL, NULL, &s.frame, &err),
+	                 PSR_ERR_LIMIT);
 	s.frame.width = 32;
 	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 1, NULL, NULL, NULL, &s.frame, &err), PSR_ERR_ARG);
 	s.frame.width = 64;
@@ -260,7 +266,10 @@ static void the_door_refuses_what_is_no_still(void **state)
 static void holes_between_discs_are_closed_and_notches_are_not(void **state)
 {
 	enum { WIDTH = 80, HEIGHT = 40 };
-	static const struct { uint32_t x, y; float z; } places[] = { { 10, 10, INFINITY }, { 30, 20, 9 }, { 55, 10, INFINITY } };
+	static const struct {
+		uint32_t x, y;
+		float z;
+	} places[] = { { 10, 10, INFINITY }, { 30, 20, 9 }, { 55, 10, INFINITY } };
 	const struct plan plan = { .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
 	uint64_t *word = malloc(WIDTH * HEIGHT * sizeof *word);
 	uint16_t weight[WIDTH * HEIGHT];
@@ -282,7 +291,8 @@ static void holes_between_discs_are_closed_and_notches_are_not(void **state)
 	assert_int_equal(splat_close(&plan, &stack, 0, BRICK, weight, bricks), 2 * 25);
 	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
 		const uint32_t x = i % WIDTH, y = i / WIDTH;
-		const int is_hole = (x - places[0].x < 5 && y - places[0].y < 5) || (x - places[1].x < 5 && y - places[1].y < 5);
+		const int is_hole =
+			(x - places[0].x < 5 && y - places[0].y < 5) || (x - places[1].x < 5 && y - places[1].y < 5);
 		assert_int_equal(weight[i], is_hole ? 0 : WEIGHT_ONE);
 	}
 	assert_true(bricks[0] && bricks[1] && !bricks[2]);

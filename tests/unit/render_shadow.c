@@ -18,13 +18,20 @@ static const struct shape_options FINE = { .resolution = 256, .diffuse = 0xc0c0c
 static const struct shape_options COARSE = { .resolution = 24, .diffuse = 0xc0c0c0, .scale = 1 };
 
 static const struct psr_light SUN = { .direction = { 0.35, 0.2, -1 }, .color = { 0.6, 0.6, 0.6 }, .casts_shadow = 1 };
-static const struct psr_light SPOT = { .kind = PSR_LIGHT_SPOT, .position = { -0.6, -0.4, 2.5 }, .direction = { 0.3, 0.2, -1 },
-	                                   .color = { 0.6, 0.6, 0.6 }, .casts_shadow = 1, .inner = 0.45, .outer = 0.5 };
-static const struct psr_light LAMP = { .kind = PSR_LIGHT_POINT, .position = { 0.1, -0.2, 1.1 }, .color = { 0.6, 0.6, 0.6 },
+static const struct psr_light SPOT = { .kind = PSR_LIGHT_SPOT,
+	                                   .position = { -0.6, -0.4, 2.5 },
+	                                   .direction = { 0.3, 0.2, -1 },
+	                                   .color = { 0.6, 0.6, 0.6 },
+	                                   .casts_shadow = 1,
+	                                   .inner = 0.45,
+	                                   .outer = 0.5 };
+static const struct psr_light LAMP = { .kind = PSR_LIGHT_POINT,
+	                                   .position = { 0.1, -0.2, 1.1 },
+	                                   .color = { 0.6, 0.6, 0.6 },
 	                                   .casts_shadow = 1 };
 
-/* A floor in z = 0 with half sides of 1.4, and a square of half side 0.28 at z = 0.5 that shows the floor its front, so that the
- * camera above sees through it: what casts shadows does so from behind, too. */
+/* A floor in z = 0 with half sides of 1.4, and a square of half side 0.28 at z = 0.5 that shows the floor its front, so
+ * that the camera above sees through it: what casts shadows does so from behind, too. */
 struct stage {
 	struct psr_model *floor, *square;
 	struct psr_instance instance[2];
@@ -58,7 +65,10 @@ static void stage_init(struct stage *s, const struct shape_options *square, cons
 	s->light[0] = *light;
 	s->scene = (struct psr_scene){ .instance = s->instance, .n_instances = 2, .light = s->light, .n_lights = 1,
 		                           .ambient = { 0.1, 0.1, 0.1 } };
-	s->scene.camera = (struct psr_camera){ .eye = { 0, 0, 4 }, .up = { 0, 1, 0 }, .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = 2.9 };
+	s->scene.camera = (struct psr_camera){ .eye = { 0, 0, 4 },
+		                                   .up = { 0, 1, 0 },
+		                                   .kind = PSR_CAMERA_ORTHOGRAPHIC,
+		                                   .ortho_height = 2.9 };
 	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
 }
 
@@ -116,7 +126,8 @@ static double inside_shadow(const struct psr_light *l, double x, double y)
 	return (HALF_SQUARE - fmax(fabs(from[0]), fabs(from[1]))) / (1 - t);
 }
 
-/* Every pixel further than `reach` from the analytic edge is as lit or as dark as without the square, or without the light. */
+/* Every pixel further than `reach` from the analytic edge is as lit or as dark as without the square, or without the
+ * light. */
 static void check_edges(const struct shape_options *square, const struct psr_light *light, double reach)
 {
 	struct stage s;
@@ -142,8 +153,8 @@ static void check_edges(const struct shape_options *square, const struct psr_lig
 	stage_fini(&s);
 }
 
-/* Width on the floor of a texel of the light's map for this picture. The axis is never further than `tilt` from the floor's
- * normal, which widens it by less than 1 / cos^2 there. */
+/* Width on the floor of a texel of the light's map for this picture. The axis is never further than `tilt` from the
+ * floor's normal, which widens it by less than 1 / cos^2 there. */
 static double texel_on_floor(const struct psr_light *light)
 {
 	struct stage s;
@@ -160,9 +171,9 @@ static double texel_on_floor(const struct psr_light *light)
 	return 2 * tan(c->fov_y / 2) / fit[0].height * 2 * light->position[2];
 }
 
-/* A texel that the square's samples fall into is within half a texel of it on each axis, and bilinear weights reach a texel further:
- * 1.5 texels of the map outside, its diagonal 1.5 sqrt(2). Inside, texels that are within the square altogether have a sample
- * each: as much. A sample of the floor is anywhere in its pixel: 0.71 pixels. */
+/* A texel that the square's samples fall into is within half a texel of it on each axis, and bilinear weights reach a
+ * texel further: 1.5 texels of the map outside, its diagonal 1.5 sqrt(2). Inside, texels that are within the square
+ * altogether have a sample each: as much. A sample of the floor is anywhere in its pixel: 0.71 pixels. */
 static double reach_of(double texel)
 {
 	return 1.5 * sqrt(2) * texel + 0.71 * 2.9 / SIDE;
@@ -196,8 +207,8 @@ static void a_coarse_square_casts_without_leaks(void **state)
 	check_edges(&COARSE, &SUN, reach_of(cell));
 }
 
-/* A lamp just above the square, whose cells are of many sizes there: nothing comes through where levels meet. The square's spacing
- * is twice as wide on the floor, and cells at most twice that. */
+/* A lamp just above the square, whose cells are of many sizes there: nothing comes through where levels meet. The
+ * square's spacing is twice as wide on the floor, and cells at most twice that. */
 static void levels_meet_without_leaks(void **state)
 {
 	(void)state;
@@ -260,8 +271,8 @@ static void a_plane_does_not_shadow_itself(void **state)
 	}
 }
 
-/* A sphere shadows itself nowhere but where its stored normals, 0.7 degrees off, say that it is lit though it is not: there it has at
- * most 0.0125 of the light, and as much is allowed to be missing. */
+/* A sphere shadows itself nowhere but where its stored normals, 0.7 degrees off, say that it is lit though it is not:
+ * there it has at most 0.0125 of the light, and as much is allowed to be missing. */
 static void a_sphere_does_not_shadow_itself(void **state)
 {
 	(void)state;

@@ -51,7 +51,8 @@ static void an_edge_lets_half_of_what_is_behind_through(void **state)
 		assert_int_equal(smooth(light, is_far ? beside_far : beside_nothing, 0.1f), SIDE);
 		for (int y = 1; y < SIDE - 1; y++) {
 			assert_int_equal(light[y][1], 255);
-			assert_int_equal(light[y][2], white(0.5)); /* a neighbour beside and two aslant are behind: 2 + 1 + 1 of 8 */
+			assert_int_equal(light[y][2], white(0.5)); /* a neighbour beside and two aslant are behind: 2 + 1 + 1 of
+			                                            * 8 */
 			assert_int_equal(light[y][3], 0);          /* what is in front does not come through what is behind */
 		}
 		assert_int_equal(light[0][2], white(5 / 8.0)); /* at the picture's border there are fewer neighbours */
@@ -60,7 +61,9 @@ static void an_edge_lets_half_of_what_is_behind_through(void **state)
 
 static void corners_and_lines_keep_a_quarter_at_least(void **state)
 {
-	static const char *const row[SIDE] = { "       ", " #     ", "       ", "    ###", "  #####", "  ###  ", "  ###  " };
+	static const char *const row[SIDE] = {
+		"       ", " #     ", "       ", "    ###", "  #####", "  ###  ", "  ###  "
+	};
 	uint8_t light[SIDE][SIDE];
 	(void)state;
 	smooth(light, row, 0);
@@ -70,11 +73,13 @@ static void corners_and_lines_keep_a_quarter_at_least(void **state)
 	assert_int_equal(light[4][4], white(6 / 8.0)); /* of two edges that turn inwards, 1 each */
 }
 
-/* 0.03 is the threshold: a surface may fall by that much from one pixel to the next. Then a pixel counts four times, and
- * each of those beside it once. */
+/* 0.03 is the threshold: a surface may fall by that much from one pixel to the next. Then a pixel counts four times,
+ * and each of those beside it once. */
 static void neighbours_of_a_surface_are_averaged(void **state)
 {
-	static const char *const row[SIDE] = { "#######", "#######", "#######", "###.###", "#######", "#######", "#######" };
+	static const char *const row[SIDE] = {
+		"#######", "#######", "#######", "###.###", "#######", "#######", "#######"
+	};
 	uint8_t light[SIDE][SIDE];
 	(void)state;
 	assert_int_equal(smooth(light, row, 0.02f), 0);
@@ -101,7 +106,8 @@ static void scene_make(struct drawn *d, const struct psr_model *model, uint32_t 
 	const struct psr_model_info *info = psr_model_info(model);
 	memset(d, 0, sizeof *d);
 	d->instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
-	d->light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
+	d->light =
+		(struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
 	d->scene = (struct psr_scene){ .instance = &d->instance, .n_instances = 1, .light = &d->light, .n_lights = 1,
 		                           .background = { 0.2, 0.1, 0 } };
 	psr_camera_frame(&d->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
@@ -189,9 +195,9 @@ static double error_of(const struct drawn *d, double radius)
 	return sum;
 }
 
-/* A rim pixel is full where its coverage is anything from 0 to 1, and so off by 1/3 in the mean square; half of it would be
- * by 1/12, and what its neighbours tell makes that no worse. Samples that miss a pixel of little coverage leave less to
- * gain: three times. */
+/* A rim pixel is full where its coverage is anything from 0 to 1, and so off by 1/3 in the mean square; half of it
+ * would be by 1/12, and what its neighbours tell makes that no worse. Samples that miss a pixel of little coverage
+ * leave less to gain: three times. */
 static void the_rim_of_a_sphere_is_three_times_as_true(void **state)
 {
 	const struct shape_options options = { .resolution = 256, .diffuse = 0xffffff, .unlit = 1, .cones = 1, .scale = 1 };
@@ -206,7 +212,8 @@ static void the_rim_of_a_sphere_is_three_times_as_true(void **state)
 			double distance = 0;
 			for (int k = 0; k < 3; k++)
 				distance += pow(d.scene.camera.eye[k] - d.scene.camera.target[k], 2);
-			const double tangent = 0.9 / sqrt(distance - 0.9 * 0.9); /* of the angle at which the sphere's outline is seen */
+			const double tangent = 0.9 / sqrt(distance - 0.9 * 0.9); /* of the angle at which the sphere's outline
+			                                                          * is seen */
 			radius = 80 * tangent / tan(0.3);
 		} else {
 			d.scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;

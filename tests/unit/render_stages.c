@@ -11,7 +11,8 @@
 
 #define SIDE 16
 
-/* A plan for pictures of SIDE x SIDE, orthographic, one unit a pixel: thresholds are 3 units at level 1, 6 at level 2. */
+/* A plan for pictures of SIDE x SIDE, orthographic, one unit a pixel: thresholds are 3 units at level 1, 6 at level
+ * 2. */
 static struct plan flat_plan(void)
 {
 	struct plan plan = { .width = SIDE, .height = SIDE, .focal = 1, .background = { 100, 200, 300 } };
@@ -127,7 +128,8 @@ static void levels_are_not_summed(void **state)
 	assert_int_equal(weight_at(&s, 4, 4), fine < coarse ? fine : coarse);
 }
 
-/* [G] 9.1.2: a surface whose left half is in level 1 and whose right half is in level 2 covers all that is behind it. */
+/* [G] 9.1.2: a surface whose left half is in level 1 and whose right half is in level 2 covers all that is behind
+ * it. */
 static void a_seam_between_levels_is_closed(void **state)
 {
 	(void)state;
@@ -243,7 +245,8 @@ static void a_hole_gets_a_half_a_quarter_and_a_quarter(void **state)
 	struct picture p;
 	for (uint32_t i = 0; i < SIDE * SIDE; i++)
 		paint(&p, i % SIDE, i / SIDE, (uint16_t)(1000 * (i % SIDE) + 100 * (i / SIDE)), WEIGHT_ONE, 100);
-	uint32_t parent = (4400 + 5400 + 4500) / 3, right = (6400 + 7400 + 6500 + 7500) / 4, below = (4600 + 5600 + 4700 + 5700) / 4;
+	uint32_t parent = (4400 + 5400 + 4500) / 3, right = (6400 + 7400 + 6500 + 7500) / 4,
+			 below = (4600 + 5600 + 4700 + 5700) / 4;
 	paint(&p, 5, 5, 0, 0, 500);
 	fill_picture(&p);
 	assert_int_equal(color_at(&p, 5, 5, 0), (2 * parent + right + below) / 4);
@@ -251,7 +254,8 @@ static void a_hole_gets_a_half_a_quarter_and_a_quarter(void **state)
 	paint(&p, 5, 5, 9000, WEIGHT_ONE / 2, 100);
 	fill_picture(&p);
 	parent = (4400 + 5400 + 4500 + 9000 / 2) * 2 / 7;
-	assert_in_range(color_at(&p, 5, 5, 0), 4500 + (2 * parent + right + below) / 8 - 2, 4500 + (2 * parent + right + below) / 8 + 2);
+	assert_in_range(color_at(&p, 5, 5, 0), 4500 + (2 * parent + right + below) / 8 - 2,
+	                4500 + (2 * parent + right + below) / 8 + 2);
 }
 
 static void a_hole_takes_the_near_surface_not_the_far_one(void **state)

@@ -68,8 +68,9 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
                      struct psr_error *err);
 
 /* Queues a FRAME in view 0: planes that the server offers, depth as f32, without base, or budget of time or error (else
- * UNSUPPORTED). BUSY when WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME with end->is_final, or FAILED;
- * with a pass_limit above 0 (UNSUPPORTED unless the server refines) FRAMEs of its earlier passes come before. */
+ * UNSUPPORTED). BUSY when WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME with
+ * end->is_final, or FAILED; with a pass_limit above 0 (UNSUPPORTED unless the server refines) FRAMEs of its earlier
+ * passes come before. */
 int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *frame, uint32_t *id,
                      struct psr_error *err);
 

@@ -38,10 +38,10 @@ void *psr_picture_plane(const struct psr_picture *picture, unsigned plane);
 int psr_picture_write_color(const struct psr_picture *picture, const char *path, struct psr_error *err);
 int psr_picture_write_depth(const struct psr_picture *picture, const char *path, struct psr_error *err);
 
-/* One plane, which the picture has. Every plane goes to .npy as it is: NumPy's array of (height, width) or (height, width, 3)
- * little-endian numbers, rows from the top. Otherwise colour and depth go where the calls above put them; of normals and
- * weights a picture to look at is written as if it were colour: 255 (n + 1) / 2 as red, green and blue, black without a sample;
- * grey. Ids, words and blocks take no other format than .npy. */
+/* One plane, which the picture has. Every plane goes to .npy as it is: NumPy's array of (height, width) or (height,
+ * width, 3) little-endian numbers, rows from the top. Otherwise colour and depth go where the calls above put them; of
+ * normals and weights a picture to look at is written as if it were colour: 255 (n + 1) / 2 as red, green and blue,
+ * black without a sample; grey. Ids, words and blocks take no other format than .npy. */
 int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err);
 
 /* The colours in which n normals are written. */

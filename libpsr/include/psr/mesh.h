@@ -15,8 +15,9 @@
 extern "C" {
 #endif
 
-/* 8 bits a channel, RGBA, not premultiplied; row 0 is the top. Whether its colours are sRGB-coded or linear is up to the
- * texture that uses it: base, emissive, specular-glossiness and vertex colours' textures are coded, the rest is linear. */
+/* 8 bits a channel, RGBA, not premultiplied; row 0 is the top. Whether its colours are sRGB-coded or linear is up to
+ * the texture that uses it: base, emissive, specular-glossiness and vertex colours' textures are coded, the rest is
+ * linear. */
 struct psr_image {
 	uint32_t width, height;
 	uint8_t *rgba; /* width * height * 4 */
@@ -36,8 +37,8 @@ struct psr_texture {
 
 enum psr_alpha { PSR_ALPHA_OPAQUE, PSR_ALPHA_MASK, PSR_ALPHA_BLEND };
 
-/* glTF 2.0's material (its section 3.9), which other formats are translated to. Factors are linear. A texture multiplies
- * its factor, channel by channel, unless said otherwise. */
+/* glTF 2.0's material (its section 3.9), which other formats are translated to. Factors are linear. A texture
+ * multiplies its factor, channel by channel, unless said otherwise. */
 struct psr_material {
 	float base_color[4];
 	struct psr_texture base_texture;        /* alpha too; of specular-glossiness: the diffuse texture */
@@ -49,8 +50,8 @@ struct psr_material {
 	float occlusion_strength;               /* 0..1 */
 	struct psr_texture normal_texture;      /* linear; tangent space, 0..255 is -1..1, +y is up (towards -v) */
 	float normal_scale;
-	int is_specular_glossiness;             /* KHR_materials_pbrSpecularGlossiness: base is diffuse, these are read, metallic
-	                                         * and roughness are not */
+	int is_specular_glossiness; /* KHR_materials_pbrSpecularGlossiness: base is diffuse, these are read, metallic
+	                             * and roughness are not */
 	float specular[3], glossiness;
 	struct psr_texture specular_texture;    /* RGB: specular, coded; A: glossiness, linear */
 	float alpha_cutoff;                     /* MASK: below it there is nothing */
@@ -62,21 +63,25 @@ struct psr_material {
 /* A material that is white, rough, not metallic, opaque, one-sided, without textures. */
 void psr_material_default(struct psr_material *material);
 
-/* Faces, and points of a cloud. Primitive i is triangle i, or from n_triangles on the disc around point i - n_triangles. */
+/* Faces, and points of a cloud. Primitive i is triangle i, or from n_triangles on the disc around point i -
+ * n_triangles. */
 struct psr_mesh {
 	uint32_t n_vertices, n_triangles, n_points, n_materials, n_images;
 	double (*position)[3];          /* n_vertices, finite */
-	float (*normal)[3];             /* n_vertices, unit length; 0,0,0 where the source has none: the face's own is taken */
-	float (*tangent)[4];            /* n_vertices, unit length and handedness (+-1), as in glTF; 0,0,0,0 where the source has
-	                                 * none; or NULL: made of uv */
-	float (*uv[PSR_UV_SETS])[2];    /* n_vertices, or NULL; v grows downwards, (0,0) is the image's top left, as in glTF */
+	float (*normal)[3];             /* n_vertices, unit length; 0,0,0 where the source has none: the face's own is
+	                                 * taken */
+	float (*tangent)[4]; /* n_vertices, unit length and handedness (+-1), as in glTF; 0,0,0,0 where the source has
+	                      * none; or NULL: made of uv */
+	float (*uv[PSR_UV_SETS])[2];    /* n_vertices, or NULL; v grows downwards, (0,0) is the image's top left, as in
+	                                 * glTF */
 	float (*color)[4];              /* n_vertices, linear RGBA, multiplies the base colour; or NULL */
 	uint32_t (*triangle)[3];        /* n_triangles, each index < n_vertices, counter-clockwise seen from the front */
 	uint32_t *triangle_material;    /* n_triangles, < n_materials */
 
 	double (*point)[3];             /* n_points, finite; NULL if there are none, like the rest of them */
 	float (*point_normal)[3];       /* unit length */
-	float *point_radius;            /* > 0: a disc of this radius, perpendicular to the normal, takes the point's place */
+	float *point_radius;            /* > 0: a disc of this radius, perpendicular to the normal, takes the point's
+	                                 * place */
 	float (*point_color)[4];        /* linear RGBA, multiplies the base colour; or NULL */
 	uint32_t *point_material;       /* < n_materials; without textures */
 
@@ -93,12 +98,11 @@ struct psr_mesh {
 	char warning[PSR_ERROR_TEXT];   /* one sentence for a person, or "" */
 };
 
-/* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through Assimp;
- * images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of them (UNSUPPORTED
- * if it is missing).
- * The result is validated as the comments above promise, has at least one triangle or point, and belongs to the caller.
- * NOT_FOUND, IO, FORMAT (with the place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Never crashes on bad
- * input, throws nothing, reads nothing outside of the file's own folder. */
+/* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through
+ * Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of them
+ * (UNSUPPORTED if it is missing). The result is validated as the comments above promise, has at least one triangle or
+ * point, and belongs to the caller. NOT_FOUND, IO, FORMAT (with the place), UNSUPPORTED (names the extension), LIMIT,
+ * MEMORY. Never crashes on bad input, throws nothing, reads nothing outside of the file's own folder. */
 int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err);
 
 void psr_mesh_destroy(struct psr_mesh *mesh); /* NULL is fine */

@@ -31,9 +31,10 @@ struct psr_projection {
 
 /* A byte a block. */
 enum psr_block_flag {
-	PSR_BLOCK_LEVEL = 7,         /* these bits are the level, 0 the finest */
-	PSR_BLOCK_DEPTH = 15 << 3,   /* these times an eighth are n: the step of its depths is 2^-(14 + n) */
-	PSR_BLOCK_TWO_SIDED = 1 << 7 /* seen from its back it is shaded with its normals turned; else it is not seen ([G] 7.3.2) */
+	PSR_BLOCK_LEVEL = 7,       /* these bits are the level, 0 the finest */
+	PSR_BLOCK_DEPTH = 15 << 3, /* these times an eighth are n: the step of its depths is 2^-(14 + n) */
+	PSR_BLOCK_TWO_SIDED = 1 << 7 /* seen from its back it is shaded with its normals turned; else it is not seen ([G]
+	                              * 7.3.2) */
 };
 
 /* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */
@@ -72,9 +73,9 @@ struct psr_blocks {
 	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
-	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block, its faces' and its samples', are within
-	 * an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x, cone_y, cone_z); the greatest
-	 * magnitude of these is 127. */
+	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block, its faces' and its samples', are
+	 * within an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x, cone_y, cone_z); the
+	 * greatest magnitude of these is 127. */
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
 	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
@@ -145,15 +146,17 @@ struct psr_model_info {
 	double origin[3]; /* object coordinates of the inner origin */
 	double scale;     /* object units an inner unit; > 0 */
 	double box_min[3], box_max[3]; /* of the samples, object coordinates */
-	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object units */
+	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object
+	                   * units */
 	double tolerance; /* angle of [G] 4.4, radians */
 	uint32_t resolution; /* >= 1; target resolution: pixels across the unit sphere at magnification 1 */
 
-	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of the
-	 * surface, at the target resolution, seen from a random direction, this many have no sample of it. 0 of 0: not measured. */
+	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of
+	 * the surface, at the target resolution, seen from a random direction, this many have no sample of it. 0 of 0: not
+	 * measured. */
 	uint64_t n_trials, n_missing;
-	/* Out of as many pixels that hold a sample, in views from random places, this many hold one whose block cones or masks
-	 * would cull, though a ray from the eye reaches it. */
+	/* Out of as many pixels that hold a sample, in views from random places, this many hold one whose block cones or
+	 * masks would cull, though a ray from the eye reaches it. */
 	uint64_t n_lost;
 	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };

@@ -21,13 +21,14 @@ extern "C" {
  * the same bytes. */
 enum psr_cull_test {
 	PSR_CULL_CONES = 1,     /* [G] 6.4 */
-	PSR_CULL_MASKS = 2,     /* [G] 6.3: from outside of a model's unit sphere, if it was measured to lose nothing by them */
+	PSR_CULL_MASKS = 2,     /* [G] 6.3: from outside of a model's unit sphere, if it was measured to lose nothing by
+	                         * them */
 	PSR_CULL_OCCLUSION = 4, /* what is drawn nearer, where many samples fall into a tile */
 	PSR_CULL_ALL = 7
 };
 
-/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. The protocol has the numbers of
- * effects and reasons, too. */
+/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. The protocol has the
+ * numbers of effects and reasons, too. */
 enum psr_effect {
 	PSR_EFFECT_CONES,     /* count: blocks tested */
 	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
@@ -61,8 +62,8 @@ enum psr_gap_method {
 	PSR_GAPS_OPAQUE    /* whole, as opaque squares: the simplest, kept for comparison */
 };
 
-/* A part of a larger picture: pixel (0, 0) of the frame is (left, top) there. It may reach beyond the picture, and shows what a
- * larger one would. */
+/* A part of a larger picture: pixel (0, 0) of the frame is (left, top) there. It may reach beyond the picture, and
+ * shows what a larger one would. */
 struct psr_window {
 	uint32_t picture_width, picture_height; /* up to PSR_MAX_PICTURE_SIDE; 0: the frame is the whole picture */
 	int32_t left, top;                      /* -PSR_MAX_SIDE..PSR_MAX_PICTURE_SIDE */
@@ -74,16 +75,17 @@ struct psr_settings {
 	struct psr_window window;
 	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
 	int is_full;            /* 1: nothing is left out that could be; the same bytes, later. For proofs and benchmarks */
-	int with_splats;        /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on the
-	                         * surface that close the gaps themselves: for pixels finer than samples */
+	int with_splats; /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on
+	                  * the surface that close the gaps themselves: for pixels finer than samples */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 	enum psr_gap_method gap_method; /* bilinear by default */
-	/* The greatest distance between neighbouring samples that is good enough, in pixels: drawn is the coarsest level that
-	 * keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
+	/* The greatest distance between neighbouring samples that is good enough, in pixels: drawn is the coarsest level
+	 * that keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
 	double spacing;
-	/* 1: anti-aliasing of the frame ([G] 9.1.1), at a third of its time. A pixel at an edge, which any sample fills, is blended with
-	 * what is behind the edge, by how many of its eight neighbours are there; others with the neighbours of their surface, since
-	 * a pixel shows one of the samples that fall into it. Only colour changes. 0 by default; passes above 0 do without. */
+	/* 1: anti-aliasing of the frame ([G] 9.1.1), at a third of its time. A pixel at an edge, which any sample fills, is
+	 * blended with what is behind the edge, by how many of its eight neighbours are there; others with the neighbours
+	 * of their surface, since a pixel shows one of the samples that fall into it. Only colour changes. 0 by default;
+	 * passes above 0 do without. */
 	int is_smooth;
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
@@ -106,7 +108,8 @@ struct psr_report {
 	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together and divide it by their own clocks */
 	uint64_t count[PSR_N_STAGES];
 	uint64_t n_blocks, n_samples; /* of all instances, all levels */
-	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those blocks */
+	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those
+	                                           * blocks */
 	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
 	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */
@@ -122,20 +125,22 @@ struct psr_report {
 
 struct psr_frame {
 	uint32_t width, height;
-	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed; NULL to leave it out, and nothing is lit then */
+	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed; NULL to leave it out, and nothing is lit
+	                   * then */
 	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out */
-	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour and
-	 * depth may have been filled in. */
-	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is two-sided;
-	                   * 0, 0, 0 without a sample */
+	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour
+	 * and depth may have been filled in. */
+	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is
+	                   * two-sided; 0, 0, 0 without a sample */
 	uint32_t *id;     /* width * height, index of its instance; UINT32_MAX without a sample */
 	uint8_t *block;   /* 3 * width * height: of its block the model's level, the level k of the depth buffer, and enum
 	                   * psr_facing; 255, 255, 255 without a sample */
 	/* Of the stages before, NULL to leave it out: */
 	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where nothing is and nothing
 	                   * covers */
-	uint64_t *words;  /* width * height, as warped: bits of the float z' in world units << 32 | sample id; PSR_WORD_EMPTY.
-	                   * The sample id is 64 * (block, counted over all instances' models) + place in the block */
+	uint64_t *words;  /* width * height, as warped: bits of the float z' in world units << 32 | sample id;
+	                   * PSR_WORD_EMPTY. The sample id is 64 * (block, counted over all instances' models) + place in
+	                   * the block */
 	struct psr_report report;
 };
 
@@ -191,22 +196,24 @@ int psr_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct p
 struct psr_refiner;
 int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer);
 void psr_refiner_destroy(struct psr_refiner *refiner); /* NULL is fine */
-uint64_t psr_refiner_bytes(const struct psr_refiner *refiner); /* without the renderer's; independent of the picture's size */
+uint64_t psr_refiner_bytes(const struct psr_refiner *refiner); /* without the renderer's; independent of the
+                                                                * picture's size */
 
 /* Asked between the windows of a pass; anything but 0 ends it. */
 typedef int psr_refine_cancelled_fn(void *userdata);
 
-/* Pass 0 is the frame of psr_render. Pass p draws the picture with 2^p x 2^p sub-pixels a pixel, for which blocks choose
- * levels and depth buffers, so that samples no longer fill whole pixels, and gives each pixel the mean of its sub-pixels'
- * light and the least of their depths. The finer picture is drawn in windows, so that memory does not grow with the pass.
+/* Pass 0 is the frame of psr_render. Pass p draws the picture with 2^p x 2^p sub-pixels a pixel, for which blocks
+ * choose levels and depth buffers, so that samples no longer fill whole pixels, and gives each pixel the mean of its
+ * sub-pixels' light and the least of their depths. The finer picture is drawn in windows, so that memory does not grow
+ * with the pass.
  *
  * A pass is a function of scene, settings and p alone. settings->window must be that of a whole picture. Times and
- * counts are of all windows together: they count sub-pixels, and blocks and samples once in every window that draws them.
- * is_cancelled may be NULL. ARG or LIMIT for what the door refuses, MEMORY, CANCELLED; UNSUPPORTED for planes other than colour and
- * depth in passes above 0. */
-int psr_refine(struct psr_refiner *refiner, const struct psr_scene *scene, const struct psr_settings *settings, unsigned pass,
-               struct psr_pool *pool, psr_refine_cancelled_fn *is_cancelled, void *userdata, struct psr_frame *frame,
-               struct psr_error *err);
+ * counts are of all windows together: they count sub-pixels, and blocks and samples once in every window that draws
+ * them. is_cancelled may be NULL. ARG or LIMIT for what the door refuses, MEMORY, CANCELLED; UNSUPPORTED for planes
+ * other than colour and depth in passes above 0. */
+int psr_refine(struct psr_refiner *refiner, const struct psr_scene *scene, const struct psr_settings *settings,
+               unsigned pass, struct psr_pool *pool, psr_refine_cancelled_fn *is_cancelled, void *userdata,
+               struct psr_frame *frame, struct psr_error *err);
 
 #ifdef __cplusplus
 }

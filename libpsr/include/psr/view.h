@@ -24,9 +24,10 @@ struct psr_light {
 	double position[3];  /* point, spot; world */
 	double direction[3]; /* directional, spot: where the light goes; any length but 0 */
 	double color[3];     /* linear, intensity included, >= 0 */
-	double inner, outer; /* spot: half angles from the axis, radians, 0 <= inner <= outer <= pi, outer > 0: full light inside of
-	                      * inner, none outside of outer */
-	double reference;    /* point, spot: distance at which the intensity holds, falling with the square beyond; 0: does not fall */
+	double inner, outer; /* spot: half angles from the axis, radians, 0 <= inner <= outer <= pi, outer > 0: full light
+	                      * inside of inner, none outside of outer */
+	double reference;    /* point, spot: distance at which the intensity holds, falling with the square beyond; 0:
+	                      * does not fall */
 };
 
 /* What the source file names a camera or a light; positions are in the coordinates of the mesh or model that has it. */

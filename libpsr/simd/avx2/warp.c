@@ -8,7 +8,8 @@ static inline __m256 rows_of(const struct warp_block *b, int a)
 	__m128 part[2];
 	for (int h = 0; h < 2; h++) {
 		const __m256d row = _mm256_loadu_pd(b->lattice->row[a] + 4 * h);
-		part[h] = _mm256_cvtpd_ps(_mm256_add_pd(_mm256_set1_pd(b->origin[a]), _mm256_mul_pd(_mm256_set1_pd(b->scale), row)));
+		part[h] =
+			_mm256_cvtpd_ps(_mm256_add_pd(_mm256_set1_pd(b->origin[a]), _mm256_mul_pd(_mm256_set1_pd(b->scale), row)));
 	}
 	return _mm256_set_m128(part[1], part[0]);
 }
@@ -32,13 +33,15 @@ static inline __m256i floor_int(__m256 u)
 
 static inline __m256 sight_axis(const struct warp_instance *in, int k, __m256 u, __m256 v)
 {
-	const __m256 across = _mm256_mul_ps(u, _mm256_set1_ps(in->du[k])), down = _mm256_mul_ps(v, _mm256_set1_ps(in->dv[k]));
+	const __m256 across = _mm256_mul_ps(u, _mm256_set1_ps(in->du[k])),
+				 down = _mm256_mul_ps(v, _mm256_set1_ps(in->dv[k]));
 	return _mm256_add_ps(_mm256_add_ps(across, down), _mm256_set1_ps(in->d0[k]));
 }
 
 static inline __m256 dot(const __m256 a[3], const __m256 b[3])
 {
-	return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])), _mm256_mul_ps(a[2], b[2]));
+	return _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(a[0], b[0]), _mm256_mul_ps(a[1], b[1])),
+	                     _mm256_mul_ps(a[2], b[2]));
 }
 
 /* Masks here have all bits of a lane set or none. Only the attributes of lanes of `valid` are read. */
@@ -50,7 +53,8 @@ static inline __m256i faces_away(const struct warp_target *t, const struct warp_
 	const __m256 low = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr, low_mask));
 	const __m256 high = _mm256_castsi256_ps(_mm256_maskload_epi64((const long long *)attr + 4, high_mask));
 	const __m256i a = _mm256_permute4x64_epi64(_mm256_castps_si256(_mm256_shuffle_ps(low, high, 0x88)), 0xd8);
-	const __m256i normal = _mm256_i32gather_epi32((const int *)t->direction, _mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), 4);
+	const __m256i normal =
+		_mm256_i32gather_epi32((const int *)t->direction, _mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), 4);
 	__m256 n[3], d[3];
 	for (int i = 0; i < 3; i++) {
 		n[i] = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(normal, 22 - 10 * i), 22));
@@ -64,7 +68,8 @@ static inline __m256i faces_away(const struct warp_target *t, const struct warp_
 /* Lanes with first <= a < end. */
 static inline __m256i within(__m256i a, int32_t first, int32_t end)
 {
-	return _mm256_andnot_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(first), a), _mm256_cmpgt_epi32(_mm256_set1_epi32(end), a));
+	return _mm256_andnot_si256(_mm256_cmpgt_epi32(_mm256_set1_epi32(first), a),
+	                           _mm256_cmpgt_epi32(_mm256_set1_epi32(end), a));
 }
 
 static inline __m256i inside(__m256i k, __m256i u, __m256i v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
@@ -80,7 +85,8 @@ static inline uint32_t bits_of(__m256i k)
 /* The order that brings the lanes of a mask to the front. */
 static inline __m256i front_of(uint32_t bits)
 {
-	const uint64_t lanes = _pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
+	const uint64_t lanes =
+		_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
 	return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)lanes));
 }
 
@@ -89,11 +95,12 @@ static inline void store(void *to, __m256i value)
 	_mm256_storeu_si256(to, value);
 }
 
-static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __m256i k, __m256i u, __m256i v,
-                              __m256 z)
+static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __m256i k, __m256i u,
+                              __m256i v, __m256 z)
 {
 	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32(level);
-	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one), y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
+	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one),
+				  y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
 	const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)cells->stride)), x);
 	const uint32_t bits = bits_of(inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1));
 	const __m256i front = front_of(bits);
@@ -120,14 +127,16 @@ static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 	uint32_t n = 0;
 	for (uint64_t row = 0; row < 8; row++) {
 		const uint64_t bits = mask >> 8 * row & 0xff;
-		const uint64_t columns = _pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
+		const uint64_t columns =
+			_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
 		const uint64_t numbers = columns + row * UINT64_C(0x0808080808080808);
 		memcpy(sample + n, &numbers, sizeof numbers);
 		n += (uint32_t)__builtin_popcountll(bits);
 	}
 }
 
-static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry)
+static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
+                              const struct bin_entry *entry)
 {
 	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
 	const struct warp_instance *in = &t->instance[entry->instance];
@@ -143,7 +152,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 	for (int g = 0; g < n_groups; g++) {
 		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(sample + 8 * g)));
 		const __m256i r = _mm256_srli_epi32(s, 3), c = s; /* the low three bits count */
-		const __m256 depth = _mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(b.depth + 8 * g))));
+		const __m256 depth =
+			_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(b.depth + 8 * g))));
 		const __m256 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
 		const __m256 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
 		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
@@ -152,7 +162,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
 
 		const __m256i valid = _mm256_cmpgt_epi32(_mm256_set1_epi32(n - 8 * g), lane);
-		__m256i k = _mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
+		__m256i k =
+			_mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
 		if (entry->is_mixed)
 			k = _mm256_andnot_si256(faces_away(t, in, b.attr + 8 * g, valid, u, v), k);
 		if (entry->level)

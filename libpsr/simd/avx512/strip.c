@@ -126,8 +126,8 @@ static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uin
 	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
 }
 
-/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table look-ups
- * one by one are faster than gathers. */
+/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table
+ * look-ups one by one are faster than gathers. */
 static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
 	const uint16_t *dark = target->background;

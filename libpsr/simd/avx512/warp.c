@@ -29,13 +29,15 @@ static inline __m512i floor_int(__m512 u)
 
 static inline __m512 sight_axis(const struct warp_instance *in, int k, __m512 u, __m512 v)
 {
-	const __m512 across = _mm512_mul_ps(u, _mm512_set1_ps(in->du[k])), down = _mm512_mul_ps(v, _mm512_set1_ps(in->dv[k]));
+	const __m512 across = _mm512_mul_ps(u, _mm512_set1_ps(in->du[k])),
+				 down = _mm512_mul_ps(v, _mm512_set1_ps(in->dv[k]));
 	return _mm512_add_ps(_mm512_add_ps(across, down), _mm512_set1_ps(in->d0[k]));
 }
 
 static inline __m512 dot(const __m512 a[3], const __m512 b[3])
 {
-	return _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(a[0], b[0]), _mm512_mul_ps(a[1], b[1])), _mm512_mul_ps(a[2], b[2]));
+	return _mm512_add_ps(_mm512_add_ps(_mm512_mul_ps(a[0], b[0]), _mm512_mul_ps(a[1], b[1])),
+	                     _mm512_mul_ps(a[2], b[2]));
 }
 
 /* Of the lanes of k, those whose samples face away. */
@@ -62,11 +64,12 @@ static inline __mmask16 inside(__mmask16 k, __m512i u, __m512i v, int32_t x0, in
 	return _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(v, _mm512_set1_epi32(y0)), _mm512_set1_epi32(y1 - y0));
 }
 
-static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __mmask16 k, __m512i u, __m512i v,
-                              __m512 z)
+static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __mmask16 k, __m512i u,
+                              __m512i v, __m512 z)
 {
 	const __m512i one = _mm512_set1_epi32(1), by = _mm512_set1_epi32(level);
-	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one), y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
+	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one),
+				  y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
 	const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride)), x);
 	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
 	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
@@ -93,11 +96,13 @@ static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, 
 }
 
 static const uint8_t ordinals[64] = {
-	0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31,
-	32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43, 44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
+	0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21,
+	22, 23, 24, 25, 26, 27, 28, 29, 30, 31, 32, 33, 34, 35, 36, 37, 38, 39, 40, 41, 42, 43,
+	44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
 };
 
-static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t, const struct bin_entry *entry)
+static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
+                              const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
 	const int level = entry->level, is_mixed = entry->is_mixed, perspective = t->perspective;

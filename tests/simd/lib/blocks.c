@@ -17,7 +17,8 @@ static uint64_t random_mask(struct check *c, uint32_t n)
 	return mask;
 }
 
-void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections, uint32_t n_samples)
+void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections,
+                  uint32_t n_samples)
 {
 	const uint32_t n_runs = (n_blocks + PSR_RUN_BLOCKS - 1) / PSR_RUN_BLOCKS;
 	struct psr_run *run = check_in(c, n_runs, sizeof *run);
@@ -42,11 +43,26 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 		n += (uint32_t)__builtin_popcountll(mask[b]);
 	}
 	*blocks = (struct psr_blocks){
-		.n_blocks = n_blocks, .n_projections = n_projections, .n_samples = n, .run = run, .block_projection = projection,
-		.col = col, .row = row, .flags = flags, .depth_bias = bias, .mask = mask,
-		.sphere_x = check_in(c, n_blocks, 2), .sphere_y = check_in(c, n_blocks, 2), .sphere_z = check_in(c, n_blocks, 2),
-		.sphere_r = check_in(c, n_blocks, 2), .cone_x = check_in(c, n_blocks, 1), .cone_y = check_in(c, n_blocks, 1),
-		.cone_z = check_in(c, n_blocks, 1), .cone_sine = check_in(c, n_blocks, 1),
-		.attr_offset = offset, .depth = check_in(c, n + DEPTH_PADDING, 2), .attr = check_in(c, n, 8),
+		.n_blocks = n_blocks,
+		.n_projections = n_projections,
+		.n_samples = n,
+		.run = run,
+		.block_projection = projection,
+		.col = col,
+		.row = row,
+		.flags = flags,
+		.depth_bias = bias,
+		.mask = mask,
+		.sphere_x = check_in(c, n_blocks, 2),
+		.sphere_y = check_in(c, n_blocks, 2),
+		.sphere_z = check_in(c, n_blocks, 2),
+		.sphere_r = check_in(c, n_blocks, 2),
+		.cone_x = check_in(c, n_blocks, 1),
+		.cone_y = check_in(c, n_blocks, 1),
+		.cone_z = check_in(c, n_blocks, 1),
+		.cone_sine = check_in(c, n_blocks, 1),
+		.attr_offset = offset,
+		.depth = check_in(c, n + DEPTH_PADDING, 2),
+		.attr = check_in(c, n, 8),
 	};
 }

@@ -6,6 +6,7 @@
 #include "tests/simd/lib/check.h"
 
 /* n_samples of each block: 1..64, or 0 for any. */
-void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections, uint32_t n_samples);
+void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections,
+                  uint32_t n_samples);
 
 #endif

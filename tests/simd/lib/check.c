@@ -68,7 +68,8 @@ float check_float(struct check *c)
 	};
 	switch (check_below(c, 4)) {
 	case 0:
-		return psr_float_from_bits(special[check_below(c, sizeof special / sizeof special[0])] | (check_u32(c) & 1u << 31));
+		return psr_float_from_bits(special[check_below(c, sizeof special / sizeof special[0])] |
+		                           (check_u32(c) & 1u << 31));
 	case 1:
 		return psr_float_from_bits(check_u32(c));
 	default:
