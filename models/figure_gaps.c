@@ -186,7 +186,7 @@ int figure_run_interfaces(struct figures *figures)
 		{ "the greatest coverage of a level", draw_open, NULL },
 		{ "both levels' cells counted", figure_draw, NULL },
 	};
-	const struct figure_look look = { 3, 1024, 1024, 2, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 64, 64, 4 },
+	const struct figure_look look = { 1.8, 1024, 1024, 2, figure_view, FIGURE_VIEWS, { FIGURE_FIND, 0, 64, 64, 4 },
 		                              NULL };
 
 	return run(figures, "dragon", "interfaces", &look, way, sizeof way / sizeof *way);
