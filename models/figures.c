@@ -26,18 +26,16 @@ static const struct figure_kind {
 };
 #define N_KINDS (sizeof kinds / sizeof *kinds)
 
+static const char *name_of(int i)
+{
+	return kinds[i].name;
+}
+
 static const struct figure_kind *find_kind(const char *name, struct psr_error *err)
 {
-	char names[256] = "";
-	size_t used = 0;
+	int i = study_find_name("figure", name, (int)N_KINDS, name_of, err);
 
-	for (size_t i = 0; i < N_KINDS; i++)
-		if (strcmp(kinds[i].name, name) == 0)
-			return &kinds[i];
-	for (size_t i = 0; i < N_KINDS && used < sizeof names; i++)
-		used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", kinds[i].name);
-	psr_fail(err, PSR_ERR_ARG, "there is no figure '%.64s'; there are: %s", name, names);
-	return NULL;
+	return i < 0 ? NULL : &kinds[i];
 }
 
 static int run_figure(struct figures *figures, const struct figure_kind *kind)

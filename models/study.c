@@ -79,18 +79,29 @@ static void clear_bar(const struct study *study)
 		fprintf(stderr, "\r%*s\r", 48, "");
 }
 
-static const struct study_kind *find_kind(const char *name, struct psr_error *err)
+int study_find_name(const char *what, const char *name, int n, const char *(*name_of)(int), struct psr_error *err)
 {
 	char names[256] = "";
 	size_t used = 0;
 
-	for (int i = 0; i < n_study_kinds; i++)
-		if (strcmp(study_kinds[i].name, name) == 0)
-			return &study_kinds[i];
-	for (int i = 0; i < n_study_kinds && used < sizeof names; i++)
-		used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", study_kinds[i].name);
-	psr_fail(err, PSR_ERR_ARG, "there is no study '%.64s'; there are: %s", name, names);
-	return NULL;
+	for (int i = 0; i < n; i++)
+		if (strcmp(name_of(i), name) == 0)
+			return i;
+	for (int i = 0; i < n && used < sizeof names; i++)
+		used += (size_t)snprintf(names + used, sizeof names - used, "%s%s", i == 0 ? "" : ", ", name_of(i));
+	return psr_fail(err, PSR_ERR_ARG, "there is no %s '%.64s'; there are: %s", what, name, names);
+}
+
+static const char *name_of(int i)
+{
+	return study_kinds[i].name;
+}
+
+static const struct study_kind *find_kind(const char *name, struct psr_error *err)
+{
+	int i = study_find_name("study", name, n_study_kinds, name_of, err);
+
+	return i < 0 ? NULL : &study_kinds[i];
 }
 
 static int load_model(struct study *study, const char *name)

@@ -89,6 +89,9 @@ struct study_kind {
 extern const struct study_kind study_kinds[];
 extern const int n_study_kinds;
 
+/* Which of n names it is; ARG, with all of them in the sentence, if it is none. what: "study". */
+int study_find_name(const char *what, const char *name, int n, const char *(*name_of)(int), struct psr_error *err);
+
 /* One step of `total` is done. */
 void study_step(struct study *study, const char *what);
 

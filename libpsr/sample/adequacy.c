@@ -7,6 +7,7 @@
 #include "area.h"
 #include "psr/direction.h"
 #include "psr/error.h"
+#include "spots.h"
 #include "texture.h"
 
 #define CHUNK 4096
@@ -43,8 +44,7 @@ static void draw_direction(struct random *r, double d[3])
 
 struct chunk {
 	uint64_t n_trials;
-	struct surface_spot *missing;
-	size_t n_missing, capacity;
+	struct spots missing;
 	int failed;
 };
 
@@ -162,21 +162,6 @@ static void look_at(const struct level *level, const struct trial *trial, int n,
 		is_visible[i] = !is_hidden[i];
 }
 
-static int add_missing_spot(struct chunk *chunk, const struct surface_spot *spot)
-{
-	if (chunk->n_missing == chunk->capacity) {
-		size_t capacity = chunk->capacity != 0 ? 2 * chunk->capacity : 16;
-		struct surface_spot *grown = realloc(chunk->missing, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		chunk->missing = grown;
-		chunk->capacity = capacity;
-	}
-	chunk->missing[chunk->n_missing++] = *spot;
-	return PSR_OK;
-}
-
 static int run_batch(const struct level *level, struct chunk *chunk, const struct trial *trial, int n)
 {
 	uint8_t is_visible[BATCH];
@@ -184,7 +169,7 @@ static int run_batch(const struct level *level, struct chunk *chunk, const struc
 	look_at(level, trial, n, is_visible);
 	for (int i = 0; i < n; i++) {
 		chunk->n_trials += is_visible[i];
-		if (is_visible[i] && is_missing(level, &trial[i]) && add_missing_spot(chunk, &trial[i].spot) != PSR_OK)
+		if (is_visible[i] && is_missing(level, &trial[i]) && spots_add(&chunk->missing, &trial[i].spot) != PSR_OK)
 			return PSR_ERR_MEMORY;
 	}
 	return PSR_OK;
@@ -238,14 +223,14 @@ static int join_chunks(struct adequacy *out, struct chunk *chunk, int n_chunks)
 		if (chunk[i].failed)
 			return PSR_ERR_MEMORY;
 		out->n_trials += chunk[i].n_trials;
-		out->n_missing += chunk[i].n_missing;
+		out->n_missing += chunk[i].missing.n;
 	}
 	out->spot = malloc((out->n_missing + 1) * sizeof *out->spot);
 	if (out->spot == NULL)
 		return PSR_ERR_MEMORY;
-	for (int i = 0; i < n_chunks; n += chunk[i].n_missing, i++)
-		if (chunk[i].n_missing != 0)
-			memcpy(out->spot + n, chunk[i].missing, chunk[i].n_missing * sizeof *out->spot);
+	for (int i = 0; i < n_chunks; n += chunk[i].missing.n, i++)
+		if (chunk[i].missing.n != 0)
+			memcpy(out->spot + n, chunk[i].missing.spot, chunk[i].missing.n * sizeof *out->spot);
 	return PSR_OK;
 }
 
@@ -256,7 +241,7 @@ static int are_too_many(const struct chunk *chunk, int n_done, int n_chunks)
 
 	for (int i = 0; i < n_done; i++) {
 		n_trials += chunk[i].n_trials;
-		n_missing += chunk[i].n_missing;
+		n_missing += chunk[i].missing.n;
 	}
 	return FEW * n_missing * (uint64_t)n_done >= n_trials * (uint64_t)n_chunks;
 }
@@ -293,7 +278,7 @@ static int measure(struct adequacy *out, const struct level *level, uint64_t see
 		rc = join_chunks(out, job.chunk, run_chunks(&job, n_chunks, can_stop));
 	}
 	for (int i = 0; job.chunk != NULL && i < n_chunks; i++)
-		free(job.chunk[i].missing);
+		free(job.chunk[i].missing.spot);
 	free(job.chunk);
 	psr_free(area);
 	return rc;

@@ -37,18 +37,6 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 	repeat_last(p);
 }
 
-/* Colours, from the attributes: often the same in the whole strip. */
-static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
-{
-	const uint64_t first = strip->attr[0];
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
-		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
-		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
-		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
-	}
-}
-
 static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
 {
 	const uint64_t first = strip->attr[0];
@@ -173,11 +161,6 @@ static void strip_color(struct strip *strip)
 		strip_color_by(strip, 1);
 	else
 		strip_color_by(strip, 0);
-}
-
-static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uint16_t b)
-{
-	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
 }
 
 static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)

@@ -2,6 +2,7 @@
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
+#include "base/srgb.h"
 #include "simd/simd.h"
 
 /* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
@@ -39,6 +40,18 @@ static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip
 	strip->is_specular = (PSR_ATTR_SPECULAR(some) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
 	*all = some;
 	*common = each;
+}
+
+/* Colours, from the attributes: often the same in the whole strip. */
+static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
+		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
+	}
 }
 
 /* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
@@ -81,6 +94,11 @@ static inline void turn_normals(struct strip *strip, const float m[3][3], uint32
 		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
 		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);
 	}
+}
+
+static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uint16_t b)
+{
+	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
 }
 
 #endif

@@ -49,16 +49,6 @@ static void fill_floats(float *to, uint32_t n, float value)
 		_mm512_storeu_ps(to + i, _mm512_set1_ps(value));
 }
 
-static void read_diffuse(struct strip *strip)
-{
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint32_t diffuse = PSR_ATTR_DIFFUSE(strip->attr[i]);
-		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
-		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
-		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
-	}
-}
-
 /* Tables of 32 and 64 floats, in registers. */
 static inline __m512 look_up_5(const __m512 table[2], __m512i index)
 {
@@ -97,7 +87,7 @@ void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 	read_attributes(&all, &common, strip, view);
 	const uint32_t diffuse = PSR_ATTR_DIFFUSE(all);
 	if (diffuse != PSR_ATTR_DIFFUSE(common)) {
-		read_diffuse(strip);
+		read_diffuse(strip, 0);
 	} else {
 		fill_floats(strip->dr, strip->n, psr_srgb_to_linear[diffuse & 0xff]);
 		fill_floats(strip->dg, strip->n, psr_srgb_to_linear[diffuse >> 8 & 0xff]);
@@ -120,11 +110,6 @@ static const uint8_t first_three[64] = {
 	0,  1,  2,  4,  5,  6,  8,  9,  10, 12, 13, 14, 16, 17, 18, 20, 21, 22, 24, 25, 26, 28, 29, 30,
 	32, 33, 34, 36, 37, 38, 40, 41, 42, 44, 45, 46, 48, 49, 50, 52, 53, 54, 56, 57, 58, 60, 61, 62,
 };
-
-static inline uint32_t pixel_of(const uint8_t *srgb, uint16_t r, uint16_t g, uint16_t b)
-{
-	return (uint32_t)srgb[r] | (uint32_t)srgb[g] << 8 | (uint32_t)srgb[b] << 16;
-}
 
 /* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table
  * look-ups one by one are faster than gathers. */
