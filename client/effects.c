@@ -6,7 +6,8 @@
 #define LARGEST_WHY 1000 /* of no effect */
 
 /* The next entry of an effect that is known, from *at on; NULL: there is none. */
-static const struct psr_msg_report_entry *next(const struct psr_msg_frame_end *end, unsigned *at, enum psr_effect *effect)
+static const struct psr_msg_report_entry *next(const struct psr_msg_frame_end *end, unsigned *at,
+                                               enum psr_effect *effect)
 {
 	while (*at < end->n_entries) {
 		const struct psr_msg_report_entry *entry = &end->entry[(*at)++];

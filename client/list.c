@@ -105,8 +105,9 @@ int psr_list_main(int argc, char **argv)
 	int json = 0, code;
 	const struct psr_opt opts[] = {
 		PSR_OPT_SERVER(server),
-		{ "json", 0, PSR_OPT_FLAG, &json, NULL, 
-		  "Print an array of objects: name, state, bytes, content_id; of presets: kind, type, name.", 0, 0, NULL, NULL },
+		{ "json", 0, PSR_OPT_FLAG, &json, NULL,
+		  "Print an array of objects: name, state, bytes, content_id; of presets: kind, type, name.", 0, 0, NULL,
+		  NULL },
 		{ "presets", 'p', PSR_OPT_STRING, &model, "NAME",
 		  "Instead, the cameras and lights that came with this model, which is opened for it.", 0, 0, NULL, NULL },
 		PSR_OPT_TIMEOUT(timeout),

@@ -89,32 +89,34 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  "Orthographic instead, with a picture of this height in the units of the source file.", 0, 0, NULL,
 		  &shot->has_ortho },
 		{ "camera", 0, PSR_OPT_STRING, &shot->preset.camera, "NAME",
-		  "A camera that came with the model, in the place of all of these; `psr list --presets` shows them.", 0, 0, NULL,
-		  NULL },
+		  "A camera that came with the model, in the place of all of these; `psr list --presets` shows them.", 0, 0,
+		  NULL, NULL },
 		{ "light", 'l', PSR_OPT_CALL, shot, "LIGHT", "A light, see below; repeatable.", 0, 0, on_light, NULL },
-		{ "lights", 0, PSR_OPT_STRING, &shot->lights, "model", "All lights that came with the model.", 0, 0, NULL, NULL },
+		{ "lights", 0, PSR_OPT_STRING, &shot->lights, "model", "All lights that came with the model.", 0, 0, NULL,
+		  NULL },
 		{ "ambient", 0, PSR_OPT_REAL, &shot->ambient, "A",
 		  "Light from everywhere; 1 without a --light shows the flat diffuse colour.", 0, PSR_WIRE_MAX_INTENSITY, NULL,
 		  &shot->has_ambient },
 		{ "background", 0, PSR_OPT_COLOR, shot->background, "#rrggbb", "The colour where nothing is.", 0, 0, NULL,
 		  NULL },
 		{ "spacing", 0, PSR_OPT_REAL, &shot->spacing, "PX",
-		  "The greatest distance between neighbouring samples that is good enough, pixels: less is finer and slower.", 0, 0,
-		  NULL, NULL },
+		  "The greatest distance between neighbouring samples that is good enough, pixels: less is finer and slower.",
+		  0, 0, NULL, NULL },
 		{ "smooth", 0, PSR_OPT_FLAG, &shot->is_smooth, NULL,
-		  "Anti-aliasing at a third of a frame's time: edges are blended with what is behind them, and pixels with their "
-		  "neighbours of the same surface.",
+		  "Anti-aliasing for about a quarter of a frame's time: edges are blended with what is behind them, and pixels "
+		  "with their neighbours of the same surface.",
 		  0, 0, NULL, NULL },
 		{ "codec", 0, PSR_OPT_STRING, &shot->codec_text, "CODEC",
 		  "How colour travels: jpeg:Q (quality of 1 to 100), lossless, or raw.", 0, 0, NULL, NULL },
 		{ "passes", 0, PSR_OPT_INT, &shot->passes, "N",
-		  "Anti-aliasing: refine the picture in N passes, of 2x2, 4x4, ... sub-pixels a pixel; servers may stop earlier.",
+		  "Anti-aliasing: refine the picture in N passes, of 2x2, 4x4, ... sub-pixels a pixel; servers may stop "
+		  "earlier.",
 		  0, 16, NULL, NULL },
 		{ "output", 'o', PSR_OPT_STRING, &shot->output, "FILE",
 		  "The picture; its ending is the format: .png, .ppm, or any that OpenImageIO writes.", 0, 0, NULL, NULL },
 		{ "plane", 0, PSR_OPT_STRING, &shot->plane_text, "PLANE",
-		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block (levels, "
-		  "facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
+		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block "
+		  "(levels, facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
 		  0, 0, NULL, NULL },
 		{ "show", 0, PSR_OPT_STRING, &shot->show_text, "STAGE",
 		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
@@ -129,8 +131,8 @@ static int parse(struct shot *shot, int argc, char **argv, struct psr_error *err
 		  "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`.", 0, 0, NULL,
 		  NULL },
 		{ "effects", 0, PSR_OPT_FLAG, &shot->effects, NULL,
-		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0, 0, NULL,
-		  NULL },
+		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0,
+		  0, NULL, NULL },
 		PSR_OPT_TIMEOUT(shot->timeout),
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
@@ -154,7 +156,8 @@ static int check_output(struct shot *shot, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "--show paints a picture; -o FILE says where");
 	for (shot->plane = 0; shot->plane_text != NULL && strcmp(psr_plane_name(shot->plane), shot->plane_text) != 0;)
 		if (++shot->plane == PSR_WIRE_PLANES)
-			return psr_fail(err, PSR_ERR_ARG, "--plane takes color, depth, normal, id, weight, words or block, not '%.40s'",
+			return psr_fail(err, PSR_ERR_ARG,
+			                "--plane takes color, depth, normal, id, weight, words or block, not '%.40s'",
 			                shot->plane_text);
 	if (shot->show_text != NULL) {
 		shot->show = show_find(shot->show_text, err);
@@ -179,9 +182,11 @@ static int check(struct shot *shot, struct psr_error *err)
 		                h, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
 	if (shot->preset.camera != NULL && (shot->camera.has_eye || shot->camera.has_target || shot->camera.has_up
 	                                    || shot->has_fov || shot->has_ortho))
-		return psr_fail(err, PSR_ERR_ARG, "--camera is a whole camera; it excludes --eye, --target, --up, --fov and --ortho");
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--camera is a whole camera; it excludes --eye, --target, --up, --fov and --ortho");
 	if (shot->lights != NULL && strcmp(shot->lights, "model") != 0)
-		return psr_fail(err, PSR_ERR_ARG, "--lights takes 'model', not '%.40s'; --light is for one light", shot->lights);
+		return psr_fail(err, PSR_ERR_ARG, "--lights takes 'model', not '%.40s'; --light is for one light",
+		                shot->lights);
 	shot->preset.all_lights = shot->lights != NULL;
 	if (shot->has_fov && shot->has_ortho)
 		return psr_fail(err, PSR_ERR_ARG, "--fov and --ortho exclude each other");
@@ -216,7 +221,8 @@ static int prepare(struct shot *shot, struct psr_client *client, const struct ps
 	code = psr_camera_complete(&frame->camera, &shot->camera, opened->box_min, opened->box_max,
 	                           (double)shot->size[0] / shot->size[1], err);
 	if (code == PSR_OK)
-		code = preset_apply(&shot->preset, client, opened->handle, &frame->camera, scene, (int)shot->timeout * 1000, err);
+		code =
+			preset_apply(&shot->preset, client, opened->handle, &frame->camera, scene, (int)shot->timeout * 1000, err);
 	if (code != PSR_OK)
 		return code;
 	if (shot->spacing != 1 || shot->is_smooth) {

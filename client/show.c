@@ -254,8 +254,8 @@ const struct show *show_find(const char *name, struct psr_error *err)
 	for (size_t i = 0; i < sizeof shows / sizeof shows[0]; i++)
 		if (strcmp(name, shows[i].name) == 0)
 			return &shows[i];
-	psr_fail(err, PSR_ERR_ARG, "--show takes blocks, samples, cull, levels, normals, weights, holes or depth, not '%.40s'",
-	         name);
+	psr_fail(err, PSR_ERR_ARG,
+	         "--show takes blocks, samples, cull, levels, normals, weights, holes or depth, not '%.40s'", name);
 	return NULL;
 }
 
@@ -275,7 +275,8 @@ int show_write(const struct show *show, const struct psr_event *event, const cha
 	int code = PSR_OK;
 
 	if (canvas.rgb == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width, picture->height);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width,
+		                picture->height);
 	for (int a = 0; a < 3; a++)
 		length = hypot(length, camera->target[a] - camera->eye[a]);
 	for (int a = 0; a < 3; a++)

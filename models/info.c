@@ -81,8 +81,8 @@ static void print_share(const char *label, uint64_t n, uint64_t n_trials, const 
 	if (n_trials == 0)
 		printf("%s not measured\n", label);
 	else
-		printf("%s %s of %s pixels of the visible surface %s (%.2g %%)\n", label, grouped(part, n), grouped(all, n_trials),
-		       what, ratio((double)n, (double)n_trials) * 100);
+		printf("%s %s of %s pixels of the visible surface %s (%.2g %%)\n", label, grouped(part, n),
+		       grouped(all, n_trials), what, ratio((double)n, (double)n_trials) * 100);
 }
 
 static const char *camera_kind(const struct psr_camera *camera)

@@ -6,7 +6,8 @@
 #include <string.h>
 #include "psr/render.h"
 
-static int read_picture(FILE *file, uint8_t **out, uint32_t *width, uint32_t *height, const char *path, struct psr_error *err)
+static int read_picture(FILE *file, uint8_t **out, uint32_t *width, uint32_t *height, const char *path,
+                        struct psr_error *err)
 {
 	unsigned w, h, most;
 	char end;

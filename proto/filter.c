@@ -40,7 +40,8 @@ static inline void store(uint8_t *p, uint64_t v, unsigned b)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
 
-/* Byte k of component i stands at k * n + i of its row. All of this is inlined once for each b: plain loads are left. */
+/* Byte k of component i stands at k * n + i of its row. All of this is inlined once for each b: plain loads
+ * are left. */
 static inline void split(uint8_t *out, uint64_t d, size_t n, unsigned b)
 {
 #pragma GCC unroll 8

@@ -76,7 +76,8 @@ int builder_find_program(char path[PATH_MAX], struct psr_error *err)
 			return PSR_OK;
 		folder += length + (folder[length] == ':');
 	}
-	return psr_fail(err, PSR_ERR_NOT_FOUND, "psr-model, which builds models from sources, is neither beside psrd nor in "
+	return psr_fail(err, PSR_ERR_NOT_FOUND,
+	                "psr-model, which builds models from sources, is neither beside psrd nor in "
 	                "PATH; install it there, or put a .psr file into the models folder");
 }
 

@@ -126,12 +126,16 @@ int catalogue_reserve(struct catalogue *catalogue, uint64_t bytes, const char *n
 	const double mb = 1e-6;
 
 	if (bytes > catalogue->max_bytes)
-		return psr_fail(err, PSR_ERR_LIMIT, "model %s needs %.1f MB of memory; this server holds models of %.1f MB at most "
-		                "(--max-memory)", name, (double)bytes * mb, (double)catalogue->max_bytes * mb);
+		return psr_fail(err, PSR_ERR_LIMIT,
+		                "model %s needs %.1f MB of memory; this server holds models of %.1f MB at most "
+		                "(--max-memory)",
+		                name, (double)bytes * mb, (double)catalogue->max_bytes * mb);
 	if (!make_room(catalogue, bytes))
-		return psr_fail(err, PSR_ERR_LIMIT, "model %s needs %.1f MB of memory, and models in use hold %.1f of the %.1f MB "
-		                "that there are (--max-memory); close others, or try again later", name, (double)bytes * mb,
-		                (double)(catalogue->bytes + catalogue->reserved) * mb, (double)catalogue->max_bytes * mb);
+		return psr_fail(err, PSR_ERR_LIMIT,
+		                "model %s needs %.1f MB of memory, and models in use hold %.1f of the %.1f MB "
+		                "that there are (--max-memory); close others, or try again later",
+		                name, (double)bytes * mb, (double)(catalogue->bytes + catalogue->reserved) * mb,
+		                (double)catalogue->max_bytes * mb);
 	catalogue->reserved += bytes;
 	return PSR_OK;
 }

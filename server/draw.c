@@ -203,8 +203,8 @@ static int is_abandoned(void *userdata)
 	return atomic_load(&d->is_abandoned);
 }
 
-static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct psr_scene *scene, struct psr_frame *picture,
-                     struct psr_error *err)
+static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct psr_scene *scene,
+                     struct psr_frame *picture, struct psr_error *err)
 {
 	const struct psr_msg_settings asked = settings_of(&d->request);
 	struct psr_settings settings;
@@ -224,7 +224,8 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	struct psr_scene scene = d->scene->scene;
 	struct psr_frame picture = { 0 };
 	struct codec_result coded;
-	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass, .planes = d->request.planes };
+	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
+		                             .planes = d->request.planes };
 	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
 	int code;
 

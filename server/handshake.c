@@ -11,12 +11,18 @@ static void welcome(struct conn *conn)
 	const struct options *options = conn->server->options;
 	double idle_ms = options->idle_timeout * 1000;
 	const struct psr_msg_welcome msg = {
-		.major = PSR_PROTO_MAJOR, .minor = PSR_PROTO_MINOR,
-		.capabilities = PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
-		                PSR_CAP_BLOCK,
-		.max_message = PSR_WIRE_MAX_MESSAGE, .max_side = PSR_WIRE_MAX_SIDE, .max_pixels = (uint32_t)options->max_pixels,
-		.max_instances = PSR_WIRE_MAX_INSTANCES, .max_lights = PSR_WIRE_MAX_LIGHTS, .max_scenes = PSR_WIRE_MAX_SCENES,
-		.max_open = (uint32_t)options->max_open, .max_models = (uint32_t)options->max_handles,
+		.major = PSR_PROTO_MAJOR,
+		.minor = PSR_PROTO_MINOR,
+		.capabilities = PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL |
+		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK,
+		.max_message = PSR_WIRE_MAX_MESSAGE,
+		.max_side = PSR_WIRE_MAX_SIDE,
+		.max_pixels = (uint32_t)options->max_pixels,
+		.max_instances = PSR_WIRE_MAX_INSTANCES,
+		.max_lights = PSR_WIRE_MAX_LIGHTS,
+		.max_scenes = PSR_WIRE_MAX_SCENES,
+		.max_open = (uint32_t)options->max_open,
+		.max_models = (uint32_t)options->max_handles,
 		.idle_timeout_ms = options->idle_timeout > 0 && idle_ms < 1 ? 1 : (uint32_t)idle_ms,
 		.server = "psrd " PSR_VERSION,
 	};

@@ -42,7 +42,8 @@ static int split(char host[LISTEN_NAME], char port[16], const char *text, const 
 		text++;
 		n -= 2;
 	} else if (n > 0 && memchr(text, ':', n) != NULL) {
-		return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: an IPv6 address stands in brackets, as [::1]:7447", address);
+		return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: an IPv6 address stands in brackets, as [::1]:7447",
+		                address);
 	}
 	if (n == 0 || n >= LISTEN_NAME || colon[1] == '\0' || strlen(colon + 1) > 5
 	    || strspn(colon + 1, "0123456789") != strlen(colon + 1) || atoi(colon + 1) > 65535)
@@ -97,9 +98,11 @@ static int open_tcp(struct listener *listeners, int max, int *n, const char *tex
 	for (struct addrinfo *info = list; info != NULL; info = info->ai_next) {
 		if (!is_loopback(info->ai_addr)) {
 			freeaddrinfo(list);
-			return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: not a loopback address, and this psrd has neither encryption "
+			return psr_fail(err, PSR_ERR_ARG,
+			                "--listen %.200s: not a loopback address, and this psrd has neither encryption "
 			                "nor tokens; listen on 127.0.0.1 and let clients come through "
-			                "`ssh -L 7447:127.0.0.1:7447 HOST`, or on unix:PATH", address);
+			                "`ssh -L 7447:127.0.0.1:7447 HOST`, or on unix:PATH",
+			                address);
 		}
 	}
 	*n = 0;

@@ -24,7 +24,8 @@ void opening_load(void *userdata)
 	if (o->code == PSR_OK)
 		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
 	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
-		o->code = psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
+		o->code =
+			psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
 	post(o);
 }
 

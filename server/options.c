@@ -65,16 +65,17 @@ static int set_defaults(struct options *options)
 static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int seen[MAX_OPTIONS])
 {
 	const struct psr_opt opts[] = {
-		{ .name = "listen", .letter = 'l', .type = PSR_OPT_CALL, .value = o, .arg = "ADDR:PORT|unix:PATH", .call = on_listen,
-		  .help = "Where to serve; repeatable. Port 0 is any free one, IPv6 stands in brackets, tcp:// may stand before."
-		          " TCP serves loopback addresses only. [" OPTIONS_LISTEN_DEFAULT "]" },
+		{ .name = "listen", .letter = 'l', .type = PSR_OPT_CALL, .value = o, .arg = "ADDR:PORT|unix:PATH",
+		  .call = on_listen,
+		  .help = "Where to serve; repeatable. Port 0 is any free one, IPv6 stands in brackets, tcp:// may stand"
+		          " before. TCP serves loopback addresses only. [" OPTIONS_LISTEN_DEFAULT "]" },
 		{ .name = "models", .letter = 'm', .type = PSR_OPT_STRING, .value = &o->models, .arg = "DIR",
 		  .help = "Folder of models: .psr files, and sources that are built on first use. Required." },
 		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
 		  .help = "Threads that draw and encode; as many frames are drawn at once." },
 		{ .name = "isa", .type = PSR_OPT_STRING, .value = &o->isa, .arg = "NAME",
-		  .help = "The widest instructions that draw: c (what any processor of the kind has), avx2 or avx512. Frames are the"
-		          " same bytes with each; what the machine has is the default." },
+		  .help = "The widest instructions that draw: c (what any processor of the kind has), avx2 or avx512. Frames"
+		          " are the same bytes with each; what the machine has is the default." },
 		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
 		  .help = "Where models built from sources are kept." },
 		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
@@ -127,7 +128,8 @@ static int read_config(char **out, const char *path, struct psr_error *err)
 	size_t n;
 
 	if (file == NULL)
-		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "--config %s: %s", path, strerror(errno));
+		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "--config %s: %s", path,
+		                strerror(errno));
 	text = malloc(MAX_CONFIG + 1);
 	if (text == NULL) {
 		fclose(file);

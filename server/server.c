@@ -224,7 +224,8 @@ static int start_parts(struct server *server, struct psr_error *err)
 	    || psr_pool_create(&server->io, IO_THREADS, 1) != PSR_OK || codec_create(&server->codec) != PSR_OK
 	    || frames_create(&server->frames, server) != PSR_OK || opener_create(&server->opener, server) != PSR_OK
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64, options->threads);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64,
+		                options->threads);
 	return PSR_OK;
 }
 

@@ -52,7 +52,8 @@ void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *mode
 	int code;
 
 	if (session->n_handles >= max || session->last_handle == UINT32_MAX) {
-		snprintf(text, sizeof text, "%" PRIu32 " models are open on this connection, there are no more; CLOSE some", max);
+		snprintf(text, sizeof text, "%" PRIu32 " models are open on this connection, there are no more; CLOSE some",
+		         max);
 		session_refuse(conn, id, 0, PSR_ERR_LIMIT, text);
 		return;
 	}
@@ -197,16 +198,18 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 	if (view != 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server has no views: FRAME takes view 0, not %u", view);
 	if (n_pixels > (uint64_t)server->options->max_pixels)
-		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %" PRIu32 "x%" PRIu32 " has %" PRIu64 " pixels; this server draws "
-		                "%" PRId64 " at most (--max-pixels)", frame->width, frame->height, n_pixels,
-		                server->options->max_pixels);
+		return psr_fail(err, PSR_ERR_LIMIT,
+		                "a frame of %" PRIu32 "x%" PRIu32 " has %" PRIu64 " pixels; this server draws "
+		                "%" PRId64 " at most (--max-pixels)",
+		                frame->width, frame->height, n_pixels, server->options->max_pixels);
 	if (frame->color_codec == PSR_CODEC_PNG)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not send PNG; ask for raw, JPEG or zstd");
 	if (frame->planes & 1u << PSR_WIRE_PLANE_DEPTH && frame->depth_format != PSR_WIRE_DEPTH_F32)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server sends depth as f32 only (format 1), not as format %u",
 		                frame->depth_format);
 	if (frame->pass_limit > 0 && frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server refines colour and depth; other planes take pass_limit 0, not %u",
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "this server refines colour and depth; other planes take pass_limit 0, not %u",
 		                frame->pass_limit);
 	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server keeps no %s; ask with budget 0",
@@ -328,7 +331,8 @@ int session_take(struct conn *conn, const struct psr_message *message, struct ps
 
 	if (is_request(message->type)) {
 		if (message->id <= conn->session.last_id)
-			return psr_fail(err, PSR_ERR_PROTOCOL, "%s has id %" PRIu32 ", but ids rise and %" PRIu32 " was there before",
+			return psr_fail(err, PSR_ERR_PROTOCOL,
+			                "%s has id %" PRIu32 ", but ids rise and %" PRIu32 " was there before",
 			                psr_msg_name(message->type), message->id, conn->session.last_id);
 		conn->session.last_id = message->id;
 	}

@@ -35,13 +35,15 @@ static int add_instance(struct scene *scene, const struct session *session, cons
 	double norm = 0;
 
 	if (msg->representation != PSR_WIRE_REP_AUTO && msg->representation != PSR_WIRE_REP_BLOCKS)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "instance %" PRIu32 " asks for representation %u; this server draws blocks "
-		                "(1, or 0 for automatic)", number, msg->representation);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "instance %" PRIu32 " asks for representation %u; this server draws blocks "
+		                "(1, or 0 for automatic)",
+		                number, msg->representation);
 	while (i < session->n_handles && session->handle[i].number != msg->handle)
 		i++;
 	if (i == session->n_handles)
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it",
-		                number, msg->handle);
+		return psr_fail(err, PSR_ERR_NOT_FOUND,
+		                "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it", number, msg->handle);
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];
 	norm = sqrt(norm);

@@ -100,8 +100,8 @@ int spawn_start(pid_t *pid, int *fd3, int *error_fd, const char *const *argv, co
 	if (plan.failure != 0) {
 		close(three[0]);
 		close(errors[0]);
-		return psr_fail(err, plan.failure == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s cannot be started: %s", argv[0],
-		                strerror(plan.failure));
+		return psr_fail(err, plan.failure == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s cannot be started: %s",
+		                argv[0], strerror(plan.failure));
 	}
 	fcntl(three[0], F_SETFL, O_NONBLOCK);
 	fcntl(errors[0], F_SETFL, O_NONBLOCK);

@@ -48,10 +48,10 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 
 	if (assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
-	if (begin->pass != assembly->pass || begin->base != 0 || begin->width != asked->width || begin->height != asked->height
-	    || begin->planes != asked->planes || begin->color_codec != asked->color_codec
-	    || begin->color_quality != asked->color_quality || begin->depth_format != asked->depth_format
-	    || begin->depth_codec != asked->depth_codec || begin->data_codec != asked->data_codec)
+	if (begin->pass != assembly->pass || begin->base != 0 || begin->width != asked->width ||
+	    begin->height != asked->height || begin->planes != asked->planes || begin->color_codec != asked->color_codec ||
+	    begin->color_quality != asked->color_quality || begin->depth_format != asked->depth_format ||
+	    begin->depth_codec != asked->depth_codec || begin->data_codec != asked->data_codec)
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server began another frame (%" PRIu32 "x%" PRIu32 ") than the one asked "
 		                "for (%" PRIu32 "x%" PRIu32 ")",
@@ -170,7 +170,8 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 	if (!assembly->has_begun || assembly->open.total != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended a frame %s",
 		                assembly->has_begun ? "within a rectangle" : "that it had not begun");
-	if (end->pass != assembly->pass || (end->pass == assembly->asked.pass_limit && !end->is_final) || end->planes != assembly->asked.planes)
+	if (end->pass != assembly->pass || (end->pass == assembly->asked.pass_limit && !end->is_final) ||
+	    end->planes != assembly->asked.planes)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
 	*checked = 0;
 	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
@@ -181,7 +182,8 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 		hash = XXH64(psr_picture_plane(picture, plane), n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
 		if (hash != end->hash[plane])
 			return psr_fail(err, PSR_ERR_FORMAT,
-			                "the %s plane of a frame is damaged: its hash is %016" PRIx64 ", the server drew %016" PRIx64,
+			                "the %s plane of a frame is damaged: its hash is %016" PRIx64
+			                ", the server drew %016" PRIx64,
 			                plane == PSR_WIRE_PLANE_COLOR ? "colour" : psr_plane_name(plane), hash, end->hash[plane]);
 		*checked |= 1u << plane;
 	}

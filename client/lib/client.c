@@ -267,7 +267,8 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
 			                psr_plane_name(plane));
 	if (asked->pass_limit > 0 && !(client->welcome.capabilities & PSR_CAP_REFINE))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not refine frames (%s)", client->address, client->welcome.server);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not refine frames (%s)", client->address,
+		                client->welcome.server);
 	code = psr_msg_frame_encode(&client->out, client->next_id, 0, asked, err);
 	*id = client->next_id;
 	code = finish_request(client, start, code, "request", err);

@@ -103,7 +103,8 @@ int client_decode(struct client_decoder *decoder, struct psr_picture *picture, c
 	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	int code;
 	uint32_t width = (rect->w + rect->scale - 1u) / rect->scale, height = (rect->h + rect->scale - 1u) / rect->scale;
-	size_t pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32), raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
+	const size_t pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
+	const size_t raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
 	uint8_t *plane = psr_picture_plane(picture, rect->plane), *to = plane + rect->y * pitch + rect->x * pixel;
 
 	assert(plane != NULL);

@@ -76,7 +76,8 @@ static int write_colored(const struct psr_picture *picture, unsigned plane, cons
 	int code;
 
 	if (colored.rgb == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width, picture->height);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width,
+		                picture->height);
 	if (plane == PSR_WIRE_PLANE_NORMAL)
 		psr_picture_color_normals(colored.rgb, picture->normal, n);
 	else

@@ -152,8 +152,10 @@ int psr_client_presets(struct psr_client *client, uint32_t handle, struct psr_ms
 	int code;
 
 	if (!(client->welcome.capabilities & PSR_CAP_PRESETS))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server tells no cameras and lights of models (capability bit "
-		                "19)", client->address);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "%s: this server tells no cameras and lights of models (capability bit "
+		                "19)",
+		                client->address);
 	code = start_control(client, PSR_MSG_PRESETS, err);
 	if (code != PSR_OK)
 		return code;

@@ -16,8 +16,8 @@ void psr_free(void *memory); /* NULL is fine */
 void *psr_alloc_huge(size_t n_bytes) __attribute__((warn_unused_result));
 void psr_free_huge(void *memory, size_t n_bytes);
 
-/* Room for n_bytes in `memory`, which has *capacity of them or is NULL with 0; what was there is gone if it had less, and
- * then also on failure, with NULL and a capacity of 0. */
+/* Room for n_bytes in `memory`, which has *capacity of them or is NULL with 0; what was there is gone if it had less,
+ * and then also on failure, with NULL and a capacity of 0. */
 void *psr_grow_huge(void *memory, size_t *capacity, size_t n_bytes) __attribute__((warn_unused_result));
 
 #endif

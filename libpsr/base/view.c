@@ -46,7 +46,8 @@ int view_check_camera(const struct psr_camera *camera, struct psr_error *err)
 			return psr_fail(err, PSR_ERR_ARG, "field of view of %g radians is not within 1e-6..3.14159", camera->fov_y);
 	} else if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC) {
 		if (!(camera->ortho_height >= 1e-30 && camera->ortho_height <= MAX_LENGTH))
-			return psr_fail(err, PSR_ERR_ARG, "orthographic height of %g is not within 1e-30..1e30", camera->ortho_height);
+			return psr_fail(err, PSR_ERR_ARG, "orthographic height of %g is not within 1e-30..1e30",
+			                camera->ortho_height);
 	} else {
 		return psr_fail(err, PSR_ERR_ARG, "unknown kind %d", (int)camera->kind);
 	}

@@ -10,8 +10,8 @@ int view_is_point(const double v[3]);
 /* Components from 0 to 1e9. */
 int view_is_light(const double v[3]);
 
-/* What psr/view.h promises, and limits that keep arithmetic in range. Fields that the kind does not use are not read. ARG; the text
- * begins with what is wrong, not with whose it is. */
+/* What psr/view.h promises, and limits that keep arithmetic in range. Fields that the kind does not use are not read.
+ * ARG; the text begins with what is wrong, not with whose it is. */
 int view_check_camera(const struct psr_camera *camera, struct psr_error *err);
 int view_check_light(const struct psr_light *light, struct psr_error *err);
 

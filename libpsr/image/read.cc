@@ -105,7 +105,8 @@ int decode(uint8_t **out, uint32_t size[2], const uint8_t *bytes, size_t n_bytes
 
 	if (!in || !in->supports("ioproxy") || !in->set_ioproxy(&reader)) {
 		OIIO::geterror();
-		return fail(problem, PSR_ERR_UNSUPPORTED, std::string("OpenImageIO has no reader for ") + format + " in memory");
+		return fail(problem, PSR_ERR_UNSUPPORTED,
+		            std::string("OpenImageIO has no reader for ") + format + " in memory");
 	}
 	config.attribute("oiio:UnassociatedAlpha", 1);
 	if (!in->open(std::string("memory.") + format, spec, config))

@@ -21,8 +21,8 @@ const int max_depth = 64;
 /* Keys whose value is an index or a count (or an array of them); tinygltf would cut a larger number to 32 bits. */
 const std::set<std::string> integer_keys = {
 	"buffer", "bufferView", "byteStride", "count", "componentType", "indices", "material", "mode", "mesh", "skin",
-	"scene", "source", "sampler", "index", "texCoord", "children", "nodes", "wrapS", "wrapT", "magFilter", "minFilter", "joints",
-	"inverseBindMatrices", "camera", "light",
+	"scene", "source", "sampler", "index", "texCoord", "children", "nodes", "wrapS", "wrapT", "magFilter", "minFilter",
+	"joints", "inverseBindMatrices", "camera", "light",
 };
 
 uint32_t u32(const uint8_t *p)

@@ -44,8 +44,8 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 	int rc;
 
 	if (format == NULL)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: not an image of a known format (PNG, JPEG, WebP, TIFF, TGA, ...)",
-		                name);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "%s: not an image of a known format (PNG, JPEG, WebP, TIFF, TGA, ...)", name);
 	if (strcmp(format, "png") == 0 && import_image_plain_png(out, bytes, n_bytes, max_pixels))
 		return PSR_OK;
 	rc = image_module_open(&module, &why);

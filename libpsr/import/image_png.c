@@ -38,13 +38,14 @@ static int is_plain(png_structp png, png_infop info, uint64_t max_pixels)
 	const uint32_t width = png_get_image_width(png, info), height = png_get_image_height(png, info);
 	const int kind = png_get_color_type(png, info);
 
-	return png_get_bit_depth(png, info) == 8 && (kind == PNG_COLOR_TYPE_RGB || kind == PNG_COLOR_TYPE_RGB_ALPHA)
-	       && png_get_interlace_type(png, info) == PNG_INTERLACE_NONE && !png_get_valid(png, info, PNG_INFO_tRNS)
-	       && width <= IMPORT_MAX_IMAGE_SIDE && height <= IMPORT_MAX_IMAGE_SIDE && (uint64_t)width * height <= max_pixels;
+	return png_get_bit_depth(png, info) == 8 && (kind == PNG_COLOR_TYPE_RGB || kind == PNG_COLOR_TYPE_RGB_ALPHA) &&
+	       png_get_interlace_type(png, info) == PNG_INTERLACE_NONE && !png_get_valid(png, info, PNG_INFO_tRNS) &&
+	       width <= IMPORT_MAX_IMAGE_SIDE && height <= IMPORT_MAX_IMAGE_SIDE && (uint64_t)width * height <= max_pixels;
 }
 
 /* What a jump must not lose stands in *out. */
-static int read_plain(struct psr_image *out, png_structp png, png_infop info, struct source *source, uint64_t max_pixels)
+static int read_plain(struct psr_image *out, png_structp png, png_infop info, struct source *source,
+                      uint64_t max_pixels)
 {
 	if (setjmp(png_jmpbuf(png)) != 0)
 		return 0;

@@ -94,8 +94,9 @@ static int check_records(const struct las *las, uint64_t header, uint32_t n, int
 			*is_laz = 1;
 		at += VLR_HEADER;
 		if (length > las->first - at)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: variable length record %u, of %llu bytes, reaches into the points",
-			                las->path, i, (unsigned long long)length);
+			return psr_fail(err, PSR_ERR_FORMAT,
+			                "%s: variable length record %u, of %llu bytes, reaches into the points", las->path, i,
+			                (unsigned long long)length);
 		at += length;
 	}
 	return PSR_OK;
@@ -120,9 +121,10 @@ static int check_points(struct las *las, struct psr_error *err)
 		                las->record, las->format, formats[las->format].size);
 	room = (las->n_bytes - las->first) / las->record;
 	if (las->n_points > room)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: the LAS header speaks of %llu points, but the file has room for only %llu; is it cut short?",
-		                las->path, (unsigned long long)las->n_points, (unsigned long long)room);
+		return psr_fail(
+			err, PSR_ERR_FORMAT,
+			"%s: the LAS header speaks of %llu points, but the file has room for only %llu; is it cut short?",
+			las->path, (unsigned long long)las->n_points, (unsigned long long)room);
 	if (las->n_points == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header speaks of no points", las->path);
 	return PSR_OK;

@@ -329,10 +329,11 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 	if (rc != PSR_OK)
 		return rc;
 	if (mesh->n_triangles == 0 && mesh->n_points == 0)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: no triangle and no point to draw (%u faces without area, twice there or not finite, and %u "
-		                "lines and points were left out)",
-		                im->path, mesh->n_dropped_triangles, mesh->n_dropped_primitives);
+		return psr_fail(
+			err, PSR_ERR_FORMAT,
+			"%s: no triangle and no point to draw (%u faces without area, twice there or not finite, and %u "
+			"lines and points were left out)",
+			im->path, mesh->n_dropped_triangles, mesh->n_dropped_primitives);
 	if (mesh->n_points > 0) {
 		rc = import_cloud_finish(im, err);
 		if (rc != PSR_OK)

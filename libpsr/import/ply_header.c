@@ -105,8 +105,8 @@ static int read_format(struct ply_header *h, const struct text *t, const struct 
 	if (h->format != PLY_NO_FORMAT)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second format", t->path, t->line);
 	if (l->n_words == 3 && !ply_name_is(&l->word[2], "1.0"))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: line %u: PLY of version %.*s; only 1.0 is known", t->path, t->line,
-		                shown(&l->word[2]), l->word[2].at);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: line %u: PLY of version %.*s; only 1.0 is known", t->path,
+		                t->line, shown(&l->word[2]), l->word[2].at);
 	if (l->n_words == 3 && ply_name_is(&l->word[1], "ascii"))
 		h->format = PLY_ASCII;
 	else if (l->n_words == 3 && ply_name_is(&l->word[1], "binary_little_endian"))
@@ -115,8 +115,8 @@ static int read_format(struct ply_header *h, const struct text *t, const struct 
 		h->format = PLY_BIG;
 	else
 		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: line %u: the format is none of ascii, binary_little_endian, binary_big_endian 1.0", t->path,
-		                t->line);
+		                "%s: line %u: the format is none of ascii, binary_little_endian, binary_big_endian 1.0",
+		                t->path, t->line);
 	return PSR_OK;
 }
 
@@ -150,14 +150,17 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 	if (h->n_elements == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a property before any element", t->path, t->line);
 	if (h->n_properties == PLY_MAX_PROPERTIES)
-		return psr_fail(err, PSR_ERR_LIMIT, "%s: line %u: more than %d properties", t->path, t->line, PLY_MAX_PROPERTIES);
+		return psr_fail(err, PSR_ERR_LIMIT, "%s: line %u: more than %d properties", t->path, t->line,
+		                PLY_MAX_PROPERTIES);
 	if (l->n_words != n_words)
 		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: line %u: neither \"property TYPE NAME\" nor \"property list TYPE TYPE NAME\"", t->path, t->line);
+		                "%s: line %u: neither \"property TYPE NAME\" nor \"property list TYPE TYPE NAME\"", t->path,
+		                t->line);
 	for (unsigned i = is_list ? 2 : 1; i + 1 < n_words; i++)
 		if (parse_type(&l->word[i]) == PLY_NO_TYPE)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: \"%.*s\" is not a type of PLY (char, uchar, ..., double)",
-			                t->path, t->line, shown(&l->word[i]), l->word[i].at);
+			return psr_fail(err, PSR_ERR_FORMAT,
+			                "%s: line %u: \"%.*s\" is not a type of PLY (char, uchar, ..., double)", t->path, t->line,
+			                shown(&l->word[i]), l->word[i].at);
 	p->count_type = is_list ? parse_type(&l->word[2]) : PLY_NO_TYPE;
 	p->type = parse_type(&l->word[n_words - 2]);
 	p->name = l->word[n_words - 1];
@@ -166,8 +169,8 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 	e = &h->element[h->n_elements - 1];
 	for (unsigned i = e->first_property; i < h->n_properties; i++)
 		if (h->property[i].name.n == p->name.n && memcmp(h->property[i].name.at, p->name.at, p->name.n) == 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second property \"%.*s\" of \"%.*s\"", t->path, t->line,
-			                shown(&p->name), p->name.at, shown(&e->name), e->name.at);
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second property \"%.*s\" of \"%.*s\"", t->path,
+			                t->line, shown(&p->name), p->name.at, shown(&e->name), e->name.at);
 	h->n_properties++;
 	e->n_properties++;
 	return PSR_OK;
@@ -198,11 +201,12 @@ static int check_counts(const struct ply_header *h, const char *path, size_t n_b
 		if (least == 0)
 			continue;
 		if (e->n_rows > left / least)
-			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: line %u: the header speaks of %llu elements \"%.*s\", but the file has only %llu bytes "
-			                "for them; is it cut short?",
-			                path, e->line, (unsigned long long)e->n_rows, shown(&e->name), e->name.at,
-			                (unsigned long long)(n_bytes - h->body));
+			return psr_fail(
+				err, PSR_ERR_FORMAT,
+				"%s: line %u: the header speaks of %llu elements \"%.*s\", but the file has only %llu bytes "
+				"for them; is it cut short?",
+				path, e->line, (unsigned long long)e->n_rows, shown(&e->name), e->name.at,
+				(unsigned long long)(n_bytes - h->body));
 		left -= e->n_rows * least;
 	}
 	return PSR_OK;

@@ -12,7 +12,8 @@ int ply_rows_init(struct ply_rows *rows, const char *path, const struct ply_head
 	rows->header = header;
 	rows->cursor = (struct ply_cursor){ bytes, bytes + header->body, bytes + n_bytes, header->format, (locale_t)0 };
 	rows->cursor.locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-	return rows->cursor.locale == (locale_t)0 ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path) : PSR_OK;
+	return rows->cursor.locale == (locale_t)0 ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path)
+	                                          : PSR_OK;
 }
 
 void ply_rows_fini(struct ply_rows *rows)

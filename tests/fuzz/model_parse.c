@@ -1,6 +1,6 @@
-/* Any bytes as a .psr file, plain or packed: as they are, and with their hashes put right, since no mutation would come past those.
- * Properties: what is taken obeys the rules that readers rely on, and the same model made again from its arrays is
- * taken too and holds the same. */
+/* Any bytes as a .psr file, plain or packed: as they are, and with their hashes put right, since no mutation would come
+ * past those. Properties: what is taken obeys the rules that readers rely on, and the same model made again from its
+ * arrays is taken too and holds the same. */
 #include <stdlib.h>
 #include "../../libpsr/model/pack.h"
 

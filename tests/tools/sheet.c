@@ -67,7 +67,8 @@ int main(int argc, char **argv)
 		die("no memory", argv[2]);
 	memset(rgb, 0xff, PNG_IMAGE_SIZE(out));
 	for (uint32_t i = 0; i < n; i++) {
-		paste_half(&picture[i], rgb + 3 * ((size_t)(i / columns) * h * out.width + (size_t)(i % columns) * w), out.width);
+		paste_half(&picture[i], rgb + 3 * ((size_t)(i / columns) * h * out.width + (size_t)(i % columns) * w),
+		           out.width);
 		free(picture[i].rgb);
 	}
 	if (!png_image_write_to_file(&out, argv[2], 1, rgb, 0, NULL))

@@ -185,13 +185,15 @@ static void normals_and_weights_are_pictures_to_look_at(void **state)
 {
 	static const int16_t normal[3 * W * H] = { 32767, 0, -32767, -128, 128, 129, [12] = 0, -32767, 0 };
 	static const uint8_t weight[W * H] = { 0, 255, 7 };
-	const struct psr_picture data = { .width = W, .height = H, .normal = (int16_t *)normal, .weight = (uint8_t *)weight };
+	const struct psr_picture data = { .width = W, .height = H, .normal = (int16_t *)normal,
+	                                  .weight = (uint8_t *)weight };
 	uint8_t bytes[256];
 
 	(void)state;
 	assert_int_equal(psr_picture_write_plane(&data, PSR_WIRE_PLANE_NORMAL, in_folder("n.ppm"), NULL), PSR_OK);
 	assert_int_equal(read_all(name, (char *)bytes, sizeof bytes), 11 + 3 * W * H);
-	assert_memory_equal(bytes + 11, ((const uint8_t[]){ 255, 128, 0, 127, 128, 128, 0, 0, 0, 0, 0, 0, 128, 0, 128 }), 15);
+	assert_memory_equal(bytes + 11, ((const uint8_t[]){ 255, 128, 0, 127, 128, 128, 0, 0, 0, 0, 0, 0, 128, 0, 128 }),
+	                    15);
 	assert_int_equal(psr_picture_write_plane(&data, PSR_WIRE_PLANE_WEIGHT, in_folder("w.ppm"), NULL), PSR_OK);
 	read_all(name, (char *)bytes, sizeof bytes);
 	assert_memory_equal(bytes + 11, "\0\0\0\xff\xff\xff\x07\x07\x07\0\0\0", 12);

@@ -621,7 +621,8 @@ static void huge_length(struct peer *p)
 
 /* ---- presets ---- */
 
-static int presets_lie; /* 0: one light more than there can be; 1: END counts another number; 2: they are of no request */
+/* 0: one light more than there can be; 1: END counts another number; 2: they are of no request. */
+static int presets_lie;
 
 static void serve_wrong_presets(struct peer *p)
 {

@@ -206,7 +206,8 @@ static void maps_of_metal_and_roughness_become_one(void **state)
 }
 
 #define SOURCE(id, n, stride, names, numbers) \
-	"<source id='" id "'><float_array id='" id "a' count='" n "'>" numbers "</float_array><technique_common><accessor " \
+	"<source id='" id "'><float_array id='" id "a' count='" n "'>" numbers \
+	"</float_array><technique_common><accessor " \
 	"source='#" id "a' count='3' stride='" stride "'>" names "</accessor></technique_common></source>"
 #define XYZ "<param name='X' type='float'/><param name='Y' type='float'/><param name='Z' type='float'/>"
 #define ST "<param name='S' type='float'/><param name='T' type='float'/>"
@@ -227,7 +228,8 @@ static void a_collada_material_may_use_two_sets_of_coordinates(void **state)
 	           "<asset><up_axis>Y_UP</up_axis></asset><library_images>" IMAGE("one", "one.bmp") IMAGE("two", "two.bmp")
 	           "</library_images><library_effects><effect id='e'><profile_COMMON>" PARAMS("one") PARAMS("two")
 	           "<technique sid='t'><phong><emission><texture texture='twos' texcoord='UV1'/></emission>"
-	           "<diffuse><texture texture='ones' texcoord='UV0'/></diffuse></phong></technique></profile_COMMON></effect>"
+	           "<diffuse><texture texture='ones' texcoord='UV0'/></diffuse></phong></technique>"
+	           "</profile_COMMON></effect>"
 	           "</library_effects><library_materials><material id='m'><instance_effect url='#e'/></material>"
 	           "</library_materials><library_geometries><geometry id='g'><mesh>"
 	           SOURCE("p", "9", "3", XYZ, "0 0 0 1 0 0 0 1 0") SOURCE("u", "6", "2", ST, "0 0 1 0 0 1")

@@ -268,7 +268,8 @@ static void deformations_that_lie_are_refused(void **state)
 	             "{'children':[1]}],'scenes':[{'nodes':[0]}]", PSR_ERR_FORMAT, "part of a cycle");
 	refuse_built(&b, "'meshes':[{'primitives':[{'attributes':{'POSITION':0,'JOINTS_0':2,'WEIGHTS_0':4}}]}],"
 	             "'skins':[{'joints':[1,1]}]," NODE, PSR_ERR_FORMAT, "16 components, expected 4");
-	refuse_built(&b, "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':4}]}],'weights':[1]}]",
+	refuse_built(&b,
+	             "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':4}]}],'weights':[1]}]",
 	             PSR_ERR_FORMAT, "targets[0].POSITION has 2 elements where the primitive has 3");
 	refuse_built(&b, "'meshes':[{'primitives':[{'attributes':{'POSITION':0},'targets':[{'POSITION':99}]}],"
 	             "'weights':[1]}]", PSR_ERR_FORMAT, "accessor 99");
@@ -290,10 +291,12 @@ static void endless_morph_targets_are_refused(void **state)
 
 	assert_non_null(json);
 	assert_non_null(bin);
-	at += sprintf(at, "{'asset':{'version':'2.0'},'buffers':[{'byteLength':%zu,'uri':'many.bin'}],'bufferViews':["
-	              "{'buffer':0,'byteLength':%zu}],'accessors':[{'bufferView':0,'componentType':5126,'type':'VEC3',"
-	              "'count':%zu},{'bufferView':0,'componentType':5126,'type':'VEC3','count':%zu}],'meshes':[{'weights':[",
-	              12 * n_vertices, 12 * n_vertices, n_vertices, n_vertices);
+	at +=
+		sprintf(at,
+	            "{'asset':{'version':'2.0'},'buffers':[{'byteLength':%zu,'uri':'many.bin'}],'bufferViews':["
+	            "{'buffer':0,'byteLength':%zu}],'accessors':[{'bufferView':0,'componentType':5126,'type':'VEC3',"
+	            "'count':%zu},{'bufferView':0,'componentType':5126,'type':'VEC3','count':%zu}],'meshes':[{'weights':[",
+	            12 * n_vertices, 12 * n_vertices, n_vertices, n_vertices);
 	for (size_t i = 0; i < n_targets; i++)
 		at += sprintf(at, "%s1e-9", i > 0 ? "," : "");
 	at += sprintf(at, "],'primitives':[{'attributes':{'POSITION':0},'targets':[");

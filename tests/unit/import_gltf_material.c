@@ -7,7 +7,8 @@
 #include <math.h>
 #include "import_gltf_build.h"
 
-/* Accessors 1 and 2 are TEXCOORD_0 and _1, 3 is NORMAL, 4 is another set; views 5 and 6 are images of 4 x 1 and 8 x 1. */
+/* Accessors 1 and 2 are TEXCOORD_0 and _1, 3 is NORMAL, 4 is another set; views 5 and 6 are images of 4 x 1
+ * and 8 x 1. */
 static void put_textured(struct built *b)
 {
 	static const float uv[6] = { 0, 0, 1, 0, 0, 1 }, other_uv[6] = { 0.5, 0, 1, 0.5, 0, 1 };
@@ -252,7 +253,8 @@ static void textures_that_change_nothing_are_not_read(void **state)
 	refuse_built(&b, DRAWN "'materials':[{'normalTexture':{'index':77}}]", PSR_ERR_FORMAT,
 	             "materials[0].normalTexture: texture 77 does not exist");
 	refuse_built(&b, "'textures':[{'source':0,'sampler':3}],'images':[{'bufferView':5}],'materials':["
-	             "{'normalTexture':{'index':0}}],'meshes':[{'primitives':[{'attributes':{'POSITION':0},'material':0}]}]",
+	             "{'normalTexture':{'index':0}}],'meshes':["
+	             "{'primitives':[{'attributes':{'POSITION':0},'material':0}]}]",
 	             PSR_ERR_FORMAT, "sampler 3 does not exist");
 }
 

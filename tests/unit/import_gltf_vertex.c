@@ -125,7 +125,8 @@ static void colors_of_every_kind_are_the_same(void **state)
 static void what_a_primitive_lacks_is_neutral(void **state)
 {
 	(void)state;
-	static const float color[12] = { 0.5, 0.5, 0.5, 1, 0.5, 0.5, 0.5, 1, 0.5, 0.5, 0.5, 1 }, uv[6] = { 1, 2, 3, 4, 5, 6 };
+	static const float color[12] = { 0.5, 0.5, 0.5, 1, 0.5, 0.5, 0.5, 1, 0.5, 0.5, 0.5, 1 };
+	static const float uv[6] = { 1, 2, 3, 4, 5, 6 };
 	static const float normal[9] = { 0, 0, 1, 0, 0, 1, 0, 0, 1 }, tangent[12] = { 1, 0, 0, 1, 1, 0, 0, 1, 1, 0, 0, 1 };
 	struct built b;
 

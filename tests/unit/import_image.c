@@ -102,7 +102,8 @@ static void alpha_is_not_premultiplied(void **state)
 	free(image.rgba);
 }
 
-static size_t make_png(uint8_t *out, size_t size, uint32_t width, uint32_t height, png_uint_32 format, const void *pixels)
+static size_t make_png(uint8_t *out, size_t size, uint32_t width, uint32_t height, png_uint_32 format,
+                       const void *pixels)
 {
 	png_image image = { .version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = format };
 	png_alloc_size_t n = size;

@@ -112,7 +112,8 @@ static void every_type_reads_the_same_in_every_format(void **state)
 {
 	(void)state;
 	static const char *const type[] = { "char", "uchar", "short", "ushort", "int", "uint", "float", "double" };
-	static const char *const new_type[] = { "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64" };
+	static const char *const new_type[] = { "int8",  "uint8",  "int16",   "uint16",
+		                                    "int32", "uint32", "float32", "float64" };
 	static const double position[4][3] = { { 0, 0, 0 }, { 100, 0, 0 }, { 0, 100, 0 }, { 0, 0, 100 } };
 	static const unsigned face[4][3] = { { 0, 2, 1 }, { 0, 1, 3 }, { 0, 3, 2 }, { 1, 2, 3 } };
 	static struct file f;
@@ -287,7 +288,8 @@ static void lines_may_end_in_any_way(void **state)
 			f.n = 0;
 			f.format = format;
 			text(&f, "ply%sformat  %s 1.0%s", e, format_name[format], e);
-			text(&f, "element vertex 3%s\tproperty char x%sproperty char y %sproperty char z%send_header%s", e, e, e, e, e);
+			text(&f, "element vertex 3%s\tproperty char x%sproperty char y %sproperty char z%send_header%s", e, e, e, e,
+			     e);
 			/* in binary the first byte is a newline's code */
 			for (int i = 0; i < 9; i++) {
 				put(&f, "char", 10 + i * i % 7);
@@ -464,7 +466,8 @@ static void normals_and_texture_coordinates_come_along(void **state)
 		snprintf(ply, sizeof ply,
 		         ASCII_HEADER "element vertex 4\n" XYZ "property float nx\nproperty float ny\nproperty float nz\n"
 		                      "property float %s\nproperty float %s\nelement face 2\n" LIST END
-		                      "0 0 0 0 0 2 0 0\n1 0 0 0 0 1 1 0\n1 1 0 0 3 4 1 0.75\n0 1 0 0 0 1 0 1\n3 0 1 2\n3 0 2 3\n",
+		                      "0 0 0 0 0 2 0 0\n1 0 0 0 0 1 1 0\n1 1 0 0 3 4 1 0.75\n"
+		                  "0 1 0 0 0 1 0 1\n3 0 1 2\n3 0 2 3\n",
 		         name[k][0], name[k][1]);
 		struct psr_mesh *m = accept_text(ply);
 		const uint32_t *v = m->triangle[0];
@@ -546,7 +549,8 @@ static void headers_that_lie_are_refused(void **state)
 		{ ASCII_HEADER "element face 0\n" LIST END, PSR_ERR_FORMAT, "no element vertex" },
 		{ ASCII_HEADER "element vertex 1\n" XYZ "element face 1\nproperty int vertex_indices\n" END "1 2 3\n4\n",
 		  PSR_ERR_FORMAT, "line 7: the element \"face\" has no list of vertex_indices" },
-		{ ASCII_HEADER "element vertex 99999999999999999999999\n" XYZ END "1 2 3\n", PSR_ERR_FORMAT, "line 3: the header" },
+		{ ASCII_HEADER "element vertex 99999999999999999999999\n" XYZ END "1 2 3\n", PSR_ERR_FORMAT,
+		  "line 3: the header" },
 		{ ASCII_HEADER "element vertex 3\n" XYZ END "1 2 3\n1 2 3\n", PSR_ERR_FORMAT, "3 elements \"vertex\"" },
 		{ ASCII_HEADER "element vertex 0\n" XYZ END, PSR_ERR_FORMAT, "no triangle and no point" },
 	};

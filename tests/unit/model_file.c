@@ -84,7 +84,8 @@ static void assert_same(const struct psr_model *model, int with_optional)
 		}
 		assert_int_equal((uintptr_t)section_array(spec, b) % FILE_ALIGNMENT, 0);
 		assert_ptr_not_equal(section_array(spec, b), section_array(spec, a));
-		assert_memory_equal(section_array(spec, b), section_array(spec, a), spec->item_bytes * section_items(spec, &content));
+		assert_memory_equal(section_array(spec, b), section_array(spec, a),
+		                    spec->item_bytes * section_items(spec, &content));
 	}
 	assert_int_equal(presets->n_cameras, with_optional ? 2 : 0);
 	assert_int_equal(presets->n_lights, with_optional ? 3 : 0);

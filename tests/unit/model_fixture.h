@@ -1,5 +1,5 @@
-/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks with three visibility masks,
- * two cameras, three lights. */
+/* A small model with everything in it: two projections, two levels, three clusters in two groups, six blocks with three
+ * visibility masks, two cameras, three lights. */
 #ifndef MODEL_FIXTURE_H
 #define MODEL_FIXTURE_H
 

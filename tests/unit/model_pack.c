@@ -262,8 +262,9 @@ static void a_flipped_bit_of_a_packed_file_is_noticed(void **state)
 
 			packed[i] ^= (uint8_t)(1 << bit);
 			code = parse(packed, n_packed, &err);
-			assert_true(code == PSR_ERR_FORMAT || (code == PSR_ERR_VERSION && (i == HEADER_MAJOR || i == HEADER_MAJOR + 1
-			            || (i >= HEADER_PACKING && i < HEADER_PACKING + 4))));
+			assert_true(code == PSR_ERR_FORMAT ||
+			            (code == PSR_ERR_VERSION && (i == HEADER_MAJOR || i == HEADER_MAJOR + 1 ||
+			                                         (i >= HEADER_PACKING && i < HEADER_PACKING + 4))));
 			packed[i] ^= (uint8_t)(1 << bit);
 		}
 	}

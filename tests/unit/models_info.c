@@ -136,7 +136,8 @@ static void text_names_samples_and_content_id(void **state)
 	assert_int_equal(samples, FIXTURE_SAMPLES);
 	assert_non_null(strstr(text, "\ncontent id "));
 	assert_non_null(strstr(text, "\nadequacy          3 of 1,000,000 pixels of the visible surface miss (0.0003 %)\n"));
-	assert_non_null(strstr(text, "\nculling loss      1 of 1,000,000 pixels of the visible surface are lost (0.0001 %)\n"));
+	assert_non_null(
+		strstr(text, "\nculling loss      1 of 1,000,000 pixels of the visible surface are lost (0.0001 %)\n"));
 	assert_non_null(strstr(text, "\n  perspective     front\n  orthographic    S\303\274dwand\n"));
 	assert_non_null(strstr(text, "\n  level 1         36 samples in 1 blocks\n"));
 	assert_non_null(strstr(text, " of all levels, all overhead included; "));

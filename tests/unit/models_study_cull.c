@@ -8,7 +8,8 @@
 #include "models/study.h"
 #include "sample_meshes.h"
 
-/* A study of a ball at a low resolution. Its rays are in the coordinates of its model: it is about the origin, and 1. */
+/* A study of a ball at a low resolution. Its rays are in the coordinates of its model: it is about the origin,
+ * and 1. */
 static struct study run(const char *name, struct study_model *model, int (*study_run)(struct study *))
 {
 	static const double zero[3];
@@ -76,7 +77,8 @@ static void a_model_that_the_thesis_has_not_stands_alone(void **state)
 static void more_bits_cull_no_less(void **state)
 {
 	static const char *const labels[] = { "neither", "8 bits", "32 bits", "128 bits", "512 bits",
-		                                  "cones", "cones, 8 bits", "cones, 32 bits", "cones, 128 bits", "cones, 512 bits" };
+		                                  "cones", "cones, 8 bits", "cones, 32 bits", "cones, 128 bits",
+	                                      "cones, 512 bits" };
 	struct study_model model = { 0 };
 	struct study study = run("ball", &model, study_run_masks);
 

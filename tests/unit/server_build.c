@@ -138,7 +138,8 @@ static void a_damaged_cache_is_built_again(void **state)
 static void progress_is_passed_on_and_never_goes_back(void **state)
 {
 	static const uint16_t stages[] = { PSR_PROGRESS_WAITING, PSR_PROGRESS_IMPORT, PSR_PROGRESS_IMPORT,
-		                               PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SELECT, PSR_PROGRESS_LOAD };
+		                               PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SAMPLE, PSR_PROGRESS_SELECT,
+		                               PSR_PROGRESS_LOAD };
 	static const uint64_t done[] = { 0, 0, 1, 1, 4, 5, 0 };
 	struct psr_message message;
 	struct psr_msg_progress progress;
@@ -263,7 +264,8 @@ static void builds_beyond_max_builds_wait(void **state)
 		waits.fd = q.fd;
 		if (max == 1)
 			assert_int_equal(poll(&waits, 1, 300), 0);
-		for (int i = 0; max == 2 && i < 2; i++) /* its start, and the first word of the script, which has logged by then */
+		/* Its start, and the first word of the script, which has logged by then. */
+		for (int i = 0; max == 2 && i < 2; i++)
 			peer_expect(&q, &message, PSR_MSG_PROGRESS, q.id);
 		peer_close(&p);
 		peer_close(&q);

@@ -296,7 +296,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(scanning_again_keeps_what_did_not_change, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_longest_unused_makes_room_and_the_used_stay, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(keys_change_with_what_a_model_is_made_of, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(other_models_and_neighbours_of_glb_and_las_do_not_change_keys, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(other_models_and_neighbours_of_glb_and_las_do_not_change_keys, set_up,
+		                                tear_down),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

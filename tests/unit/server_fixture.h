@@ -61,7 +61,8 @@ static inline void file_write(const char *folder, const char *name, const void *
  * 'front', and lights 'lamp', 'dim' (too narrow a spot for the wire) and 'sun'. */
 static inline struct psr_model *plate_create(uint32_t rgb)
 {
-	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, .spacing = 1.0f / 64 };
+	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
+		                                        .spacing = 1.0f / 64 };
 	static struct psr_cluster cluster = { .radius = 1, .n_blocks = PLATE_BLOCKS };
 	static int16_t x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS];
 	static const struct psr_run run;

@@ -38,8 +38,9 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT |
-	                                       PSR_CAP_WORDS | PSR_CAP_BLOCK);
+	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS |
+	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
+	                                           PSR_CAP_BLOCK);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -112,7 +113,8 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	}
 	assert_int_equal(psr_msg_frame_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
 	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
-		assert_true(XXH64(planes[plane], n_pixels * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0) == end.hash[plane]);
+		assert_true(XXH64(planes[plane], n_pixels * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0) ==
+		            end.hash[plane]);
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
 		n_plate += rgb[3 * i] == 0xc0 && rgb[3 * i + 1] == 0x40 && rgb[3 * i + 2] == 0x20;
 	/* The plate is wider than the picture, which shows 4 tan(0.3) of its plane in height; 0.866 are covered. At either
@@ -156,7 +158,9 @@ static void a_light_that_casts_shadows_gets_a_map(void **state)
 	peer_begin(&p, &psrd, "plate");
 	scene_default(scene, 1);
 	scene->n_lights = 1;
-	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .intensity = 1, .direction = { 0, 0, -1 },
+	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL,
+		                                      .intensity = 1,
+		                                      .direction = { 0, 0, -1 },
 		                                      .color = { 255, 255, 255 } };
 	for (unsigned casts = 0; casts < 2; casts++) {
 		scene->light[0].flags = casts ? PSR_WIRE_LIGHT_SHADOW : 0;

@@ -409,8 +409,8 @@ unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format);
 
 const char *psr_plane_name(unsigned plane); /* "color", "depth", "normal", "id", "weight", "words", "block" */
 
-/* The bytes of a pixel of a plane (depth: F32) that a picture has where no rectangle came: 8 of them, of which the plane has
- * the first. Colour has FRAME_BEGIN's background instead. */
+/* The bytes of a pixel of a plane (depth: F32) that a picture has where no rectangle came: 8 of them, of which the
+ * plane has the first. Colour has FRAME_BEGIN's background instead. */
 const uint8_t *psr_plane_background(unsigned plane);
 
 uint64_t psr_plane_capability(unsigned plane); /* of enum psr_cap, what offers the plane; 0: every server does */

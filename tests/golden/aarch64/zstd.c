@@ -1,4 +1,5 @@
-/* In the place of libzstd, which is not there for other machines than this one: packed models are neither opened nor made. */
+/* In the place of libzstd, which is not there for other machines than this one: packed models are neither opened nor
+ * made. */
 #include <zstd.h>
 
 ZSTD_DCtx *ZSTD_createDCtx(void)

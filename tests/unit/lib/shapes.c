@@ -58,8 +58,8 @@ static struct sample trace(const double axis[3][3], double x, double y, double r
 	return s;
 }
 
-static void add_block(struct arrays *a, const struct shape_options *o, int p, const double axis[3][3], double dx, int col,
-                      int row, double radius)
+static void add_block(struct arrays *a, const struct shape_options *o, int p, const double axis[3][3], double dx,
+                      int col, int row, double radius)
 {
 	struct sample s[64];
 	double low = INFINITY, high = -INFINITY;
@@ -134,8 +134,9 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 			continue;
 		a->depth[a->n_samples] = (uint16_t)((s[i].depth - low) * (double)(1u << shift) + 0.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
-		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 | (uint64_t)o->diffuse << 16 |
-		                          (uint64_t)o->specular << 40 | (uint64_t)o->exponent << 56;
+		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 |
+		                          (uint64_t)o->diffuse << 16 | (uint64_t)o->specular << 40 |
+		                          (uint64_t)o->exponent << 56;
 	}
 }
 
@@ -171,8 +172,11 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		blocks.cone_z = a.cone[2];
 		blocks.cone_sine = a.cone_sine;
 	}
-	struct psr_model_info info = { .scale = o->scale, .spacing = ds * o->scale, .tolerance = 25 * 3.14159265358979 / 180,
-		                           .resolution = o->resolution, .builder = "test" };
+	struct psr_model_info info = { .scale = o->scale,
+		                           .spacing = ds * o->scale,
+		                           .tolerance = 25 * 3.14159265358979 / 180,
+		                           .resolution = o->resolution,
+		                           .builder = "test" };
 	for (int k = 0; k < 3; k++) {
 		info.origin[k] = o->origin[k];
 		info.box_min[k] = o->origin[k] - o->scale;
