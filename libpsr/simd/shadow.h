@@ -2,14 +2,18 @@
  * turns into vectors; compiled once for each ISA. */
 #include <string.h>
 #include "base/maths.h"
-#include "simd/simd.h"
+#include "simd/strip_parts.h"
 
-/* Samples of a strip as one map sees them. */
+#define GROUP STRIP_PADDING /* samples that are looked up, or not, together */
+
+/* Groups of samples as one map sees them; those of which it has nothing to say are left out. */
 struct shadow_place {
+	size_t n;
+	uint8_t first[STRIP / GROUP];       /* of each group, in the strip */
+	int32_t is_here[STRIP];             /* in the map, and lit if nothing is before it */
 	float u[STRIP], v[STRIP], z[STRIP]; /* texels of level 0, and z' */
 	float bias[STRIP];                  /* for a cell of one texel; grows with it */
 	float du[STRIP], dv[STRIP];         /* what z' of the sample's plane gains by a texel */
-	uint8_t is_here[STRIP];             /* in the map, and lit if nothing is before it */
 	float cover[STRIP];
 };
 
@@ -27,43 +31,65 @@ static inline float magnitude(float x)
 	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
 }
 
-/* Places the samples, and says whether any of them faces the light. *n_here: how many the map has to say something
- * of. */
-static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face,
-                         uint32_t *n_here)
+/* Places a group; *n_facing: its samples that face the light. Returns how many the map has to say something of. */
+static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n_facing, const struct strip *s,
+                                            size_t first, const struct shadow_map *map, int perspective, int is_face)
 {
 	const struct shadow_map m = *map;
 	const float least = GRAZING * m.scale, unit = 1 / m.focal;
-	uint32_t n_facing = 0, n = 0;
-	for (uint32_t i = 0; i < s->n; i++) {
-		const float px = s->px[i], py = s->py[i], pz = s->pz[i], nx = s->nx[i], ny = s->ny[i], nz = s->nz[i];
+	uint32_t n_front = 0, n_here = 0;
+	for (size_t i = 0; i < GROUP; i++) {
+		const size_t from = first + i, to = at->n + i;
+		const float px = s->px[from], py = s->py[from], pz = s->pz[from];
+		const float nx = s->nx[from], ny = s->ny[from], nz = s->nz[from];
 		const float x = ((m.turn[0][0] * px + m.turn[0][1] * py) + m.turn[0][2] * pz) + m.move[0];
 		const float y = ((m.turn[1][0] * px + m.turn[1][1] * py) + m.turn[1][2] * pz) + m.move[1];
 		const float z = ((m.turn[2][0] * px + m.turn[2][1] * py) + m.turn[2][2] * pz) + m.move[2];
 		const float mx = (m.turn[0][0] * nx + m.turn[0][1] * ny) + m.turn[0][2] * nz;
 		const float my = (m.turn[1][0] * nx + m.turn[1][1] * ny) + m.turn[1][2] * nz;
 		const float mz = (m.turn[2][0] * nx + m.turn[2][1] * ny) + m.turn[2][2] * nz;
-		const float across = psr_choose(m.perspective, (mx * x + my * y) + mz * z, mz), facing = -across;
+		const float facing = -(perspective ? (mx * x + my * y) + mz * z : mz);
 		const int is_beyond = z > m.near_z;
-		const int is_inside = (is_face == 0) | ((z >= x) & (z >= -x) & (z >= y) & (z >= -y));
-		const float w = psr_choose(m.perspective, psr_choose(is_beyond, z, m.near_z), 1);
+		const int is_inside = is_face ? (z >= x) & (z >= -x) & (z >= y) & (z >= -y) : 1;
+		const float w = perspective ? psr_choose(is_beyond, z, m.near_z) : 1;
 		const float texel = w * unit, scale = m.focal / w, floor = least * w;
 		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep,
 					secant = m.scale * steep;
-		at->u[i] = x * scale + m.half_width;
-		at->v[i] = y * scale + m.half_height;
-		at->z[i] = z;
-		at->du[i] = mx * slope;
-		at->dv[i] = my * slope;
-		at->bias[i] =
-			(magnitude(at->du[i]) + magnitude(at->dv[i])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
-		at->cover[i] = 0;
-		at->is_here[i] = (uint8_t)((facing > 0) & is_beyond & is_inside);
-		n_facing += facing > 0;
-		n += at->is_here[i];
+		const int32_t is_here = (facing > 0) & is_beyond & is_inside;
+		at->u[to] = x * scale + m.half_width;
+		at->v[to] = y * scale + m.half_height;
+		at->z[to] = z;
+		at->du[to] = mx * slope;
+		at->dv[to] = my * slope;
+		at->bias[to] =
+			(magnitude(at->du[to]) + magnitude(at->dv[to])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
+		at->cover[to] = 0;
+		at->is_here[to] = is_here;
+		n_front += facing > 0;
+		n_here += (uint32_t)is_here;
 	}
-	*n_here = n;
+	*n_facing += n_front;
+	return n_here;
+}
+
+static CONSTANT_FLAGS int locate_by(struct shadow_place *at, const struct strip *s, const struct shadow_map *map,
+                                    int perspective, int is_face)
+{
+	uint32_t n_facing = 0;
+	at->n = 0;
+	for (size_t first = 0; first < s->n; first += GROUP) {
+		at->first[at->n / GROUP] = (uint8_t)first;
+		at->n += locate_group(at, &n_facing, s, first, map, perspective, is_face) ? GROUP : 0;
+	}
 	return n_facing != 0;
+}
+
+/* Places the samples, and says whether any of them faces the light. */
+static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face)
+{
+	if (!map->perspective)
+		return locate_by(at, s, map, 0, 0);
+	return is_face ? locate_by(at, s, map, 1, 1) : locate_by(at, s, map, 1, 0);
 }
 
 static inline float clamp_cell(float x, float most)
@@ -90,8 +116,9 @@ static inline float cover_of(uint64_t pair, int shift, float scale, float offset
  * the same cell, half a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth.
  * Loads are apart from arithmetic, of which the compiler makes vectors. */
 static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells,
-                         int k, uint32_t n)
+                         int k)
 {
+	const size_t n = at->n / GROUP * GROUP;
 	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
 	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
@@ -100,19 +127,19 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 	float fx[STRIP], fy[STRIP];
 	int32_t cell[STRIP];
 	uint64_t pair[2][STRIP];
-	for (uint32_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < n; i++) {
 		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x),
 					y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
 		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y);
-		cell[i] = cy * stride + cx;
+		cell[i] = (cy * stride + cx) & -at->is_here[i]; /* the others are looked up where that costs least */
 		fx[i] = x - (float)cx;
 		fy[i] = y - (float)cy;
 	}
-	for (uint32_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < n; i++) {
 		pair[0][i] = load_pair(upper + cell[i]);
 		pair[1][i] = load_pair(lower + cell[i]);
 	}
-	for (uint32_t i = 0; i < n; i++) {
+	for (size_t i = 0; i < n; i++) {
 		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
 		const float least = at->z[i] - at->bias[i] * size;
 		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
@@ -127,21 +154,22 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 /* Raises the coverage of each place to that by one level. A surface may pass from blocks of one level to those of the
  * next, and then neither covers it whole ([G] 9.1.2): where the coarser one covers a part, what counts is the coverage
  * by the coarser cells that either level fills. */
-static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, int k, uint32_t n)
+static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, int k)
 {
+	const size_t n = at->n / GROUP * GROUP;
 	float cover[STRIP], seam[STRIP];
 	uint32_t n_partial = 0;
-	shadow_cover(cover, at, map, map->level[k].z, k, n);
+	shadow_cover(cover, at, map, map->level[k].z, k);
 	if (map->level[k].seam) {
-		for (uint32_t i = 0; i < n; i++)
+		for (size_t i = 0; i < n; i++)
 			n_partial += (cover[i] > 0) & (cover[i] < 1);
 		if (n_partial) {
-			shadow_cover(seam, at, map, map->level[k].seam, k, n);
-			for (uint32_t i = 0; i < n; i++)
+			shadow_cover(seam, at, map, map->level[k].seam, k);
+			for (size_t i = 0; i < n; i++)
 				cover[i] = psr_choose((cover[i] > 0) & (seam[i] > cover[i]), seam[i], cover[i]);
 		}
 	}
-	for (uint32_t i = 0; i < n; i++)
+	for (size_t i = 0; i < n; i++)
 		at->cover[i] = psr_choose(cover[i] > at->cover[i], cover[i], at->cover[i]);
 }
 
@@ -153,21 +181,20 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 		reaches[i] = 1;
 	for (uint32_t f = 0; f < shadow->n_maps; f++) {
 		const struct shadow_map *map = &shadow->map[f];
-		uint32_t n_here;
-		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1, &n_here);
+		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1);
 		if (!is_lit)
 			return 0;
-		if (!n_here)
-			continue;
-		for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++)
+		for (int k = 0; at.n && k <= PSR_MAX_DEPTH_LEVEL; k++)
 			if (map->levels >> k & 1)
-				shadow_raise(&at, map, k, strip->n);
-		for (uint32_t i = 0; i < strip->n; i++) {
-			/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are too
-			 * wide. */
-			const float left = 2 - 2 * at.cover[i];
-			reaches[i] = psr_choose(at.is_here[i] != 0, psr_where(left > 0, psr_choose(left < 1, left, 1)), reaches[i]);
-		}
+				shadow_raise(&at, map, k);
+		for (size_t g = 0; g < at.n; g += GROUP)
+			for (size_t i = 0; i < GROUP; i++) {
+				/* Cells that an edge goes through count as covered. Doubling what is left takes half of what they are
+				 * too wide. */
+				const float left = 2 - 2 * at.cover[g + i], light = psr_where(left > 0, psr_choose(left < 1, left, 1));
+				float *to = reaches + at.first[g / GROUP] + i;
+				*to = psr_choose(at.is_here[g + i], light, *to);
+			}
 	}
 	return is_lit;
 }
