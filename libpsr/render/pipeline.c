@@ -228,8 +228,9 @@ static void warp_one(int tile, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	r->tile[tile] = (struct warp_counts){ 0, 0, 0 };
 	if (!is_empty || !r->is_clean[tile])
-		r->tile[tile] =
-			(r->plan.with_splats ? splat_tile : warp_tile)(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile);
+		r->tile[tile] = r->plan.with_splats
+		                    ? splat_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile)
+		                    : warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile, NULL);
 	r->is_clean[tile] = (uint8_t)is_empty;
 }
 

@@ -135,9 +135,12 @@ struct warp_counts {
  * cache. */
 uint32_t warp_gap(uint32_t width);
 
-/* Clears a tile and draws its blocks. */
+/* Clears a tile and draws its blocks. Its words are the stack's, or, where `own` is not NULL, WARP_OWN_WORDS there in
+ * rows WARP_OWN_STRIDE apart, for who needs no others: they stay in a cache. Cells are the stack's always. */
+#define WARP_OWN_STRIDE (TILE_WIDTH + 8)
+#define WARP_OWN_WORDS (WARP_OWN_STRIDE * TILE_HEIGHT)
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                             struct psr_zstack *stack, uint32_t tile);
+                             struct psr_zstack *stack, uint32_t tile, uint64_t *own);
 
 /* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
  * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */

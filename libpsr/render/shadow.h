@@ -18,7 +18,7 @@ int shadow_prepare(struct shadow **shadow, const struct simd *simd, struct plan 
                    struct psr_error *err);
 
 /* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, up
- * to two thirds more; while one is drawn, 8 bytes more a texel of the largest. */
+ * to two thirds more. */
 #define SHADOW_TEXELS (16u << 20)
 #define SHADOW_SIDE 2048 /* at most */
 
@@ -60,7 +60,7 @@ struct shadow_kept {
 /* What drawing takes, for one map after the other. */
 struct shadow_drawer {
 	struct plan plan;
-	uint64_t *word;
+	uint64_t *word; /* of a tile, for each thread */
 	size_t word_size;
 };
 

@@ -18,6 +18,7 @@ struct drawing {
 	const struct shadow_map *map;
 	float *cells; /* of level 0 */
 	uint32_t stride;
+	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_samples;
 };
 
@@ -27,23 +28,32 @@ static void clear_cells(float *cells, size_t n)
 		cells[i] = INFINITY;
 }
 
-/* A tile where no block is costs no warp, unless cells of its levels are to be cleared. */
-static void draw_tile(int tile, void *userdata)
+/* A tile where no block is costs no warp, unless cells of its levels are to be cleared. `own` are words for it. */
+static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 {
-	struct drawing *d = userdata;
 	const struct plan *plan = &d->drawer->plan;
-	const uint32_t x0 = (uint32_t)tile % plan->tiles_x * TILE_WIDTH, y0 = (uint32_t)tile / plan->tiles_x * TILE_HEIGHT;
+	const uint32_t x0 = tile % plan->tiles_x * TILE_WIDTH, y0 = tile / plan->tiles_x * TILE_HEIGHT;
 	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
 	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
 	if (!is_empty)
-		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, (uint32_t)tile).n_inside);
+		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, tile, own).n_inside);
 	for (uint32_t y = y0; y < y0 + TILE_HEIGHT && y < plan->height; y++) {
 		float *to = d->cells + (size_t)(y + 1) * d->stride + x0 + 1;
 		if (is_empty)
 			clear_cells(to, width);
 		else
-			d->simd->depth_row(to, d->stack.word + (size_t)y * plan->width + x0, width, 0);
+			d->simd->depth_row(to, own + (size_t)(y - y0) * WARP_OWN_STRIDE, width, 0);
 	}
+}
+
+/* One tile after the other, in the same words. */
+static void draw_some(int part, void *userdata)
+{
+	struct drawing *d = userdata;
+	const uint32_t n_tiles = d->drawer->plan.tiles_x * d->drawer->plan.tiles_y;
+	uint64_t *own = d->drawer->word + (size_t)part * WARP_OWN_WORDS;
+	for (uint32_t tile; (tile = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
+		draw_tile(d, tile, own);
 }
 
 /* Level 0 has a guard band as the others do; no sample falls into it. */
@@ -89,7 +99,7 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 	const uint32_t width = kept->fit.width, height = kept->fit.height;
 	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1], seam[PSR_MAX_DEPTH_LEVEL + 1];
 	kept->map.levels = levels | 1;
-	d->stack = (struct psr_zstack){ .width = width, .height = height, .levels = levels & ~1u, .word = d->drawer->word };
+	d->stack = (struct psr_zstack){ .width = width, .height = height, .levels = levels & ~1u };
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const uint32_t cells_x = (width + (1u << k) - 1) >> k, cells_y = (height + (1u << k) - 1) >> k;
 		d->stack.level[k].width = cells_x + 2;
@@ -134,7 +144,7 @@ static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct simd *simd, struct bins *bins,
                     const struct psr_scene *scene, struct psr_pool *pool, uint64_t *n_samples, struct psr_error *err)
 {
-	const size_t area = (size_t)kept->fit.width * kept->fit.height;
+	const int n_parts = psr_pool_threads(pool);
 	struct psr_settings settings;
 	struct psr_scene seen = *scene;
 	struct psr_report report = { 0 };
@@ -153,11 +163,12 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	rc = cull_blocks(bins, simd, plan, pool, &report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(err, rc, "too many blocks for a shadow map");
-	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size, area * sizeof *drawer->word);
+	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size,
+	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
 	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
 	clear_band(&d);
-	psr_pool_for(pool, (int)(plan->tiles_x * plan->tiles_y), draw_tile, &d);
+	psr_pool_for(pool, n_parts, draw_some, &d);
 	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
 	note_plan(kept, plan);
 	kept->is_drawn = 1;

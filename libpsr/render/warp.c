@@ -8,17 +8,19 @@ uint32_t warp_gap(uint32_t width)
 	return beyond < 2 * line ? 2 * line - beyond : 0;
 }
 
-static void target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile)
+/* The tile's words are where the picture has them, unless `own` has room for them. */
+static void target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile,
+                        uint64_t *own)
 {
 	t->instance = plan->warp;
 	t->direction = psr_direction_tens();
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
 	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
-	t->stride = stack->width + stack->gap;
+	t->stride = own ? WARP_OWN_STRIDE : stack->width + stack->gap;
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);
-	t->word = psr_zstack_row(stack, (uint32_t)t->y0) + t->x0;
+	t->word = own ? own : psr_zstack_row(stack, (uint32_t)t->y0) + t->x0;
 	int last_x = tx + 1 == plan->tiles_x, last_y = ty + 1 == plan->tiles_y;
 	t->x1 = last_x ? (int32_t)plan->width : t->x0 + TILE_WIDTH;
 	t->y1 = last_y ? (int32_t)plan->height : t->y0 + TILE_HEIGHT;
@@ -177,12 +179,12 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 }
 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                             struct psr_zstack *stack, uint32_t tile)
+                             struct psr_zstack *stack, uint32_t tile, uint64_t *own)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
-	target_make(&target, plan, stack, tile);
+	target_make(&target, plan, stack, tile, own);
 	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {
 		simd->warp_clear(&target, stack->levels);
 		counts = warp_near_to_far(simd, bins, &target, begin, end);
