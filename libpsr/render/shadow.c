@@ -36,6 +36,7 @@ void shadow_destroy(struct shadow *shadow)
 			drop(&shadow->kept[l][f]);
 	plan_clear(&shadow->drawer.plan);
 	psr_free_huge(shadow->drawer.word, shadow->drawer.word_size);
+	psr_free_huge(shadow->drawer.cells, shadow->drawer.cells_size);
 	free(shadow->placed);
 	free(shadow);
 }
@@ -44,7 +45,8 @@ uint64_t shadow_bytes(const struct shadow *shadow)
 {
 	if (!shadow)
 		return 0;
-	uint64_t n = sizeof *shadow + shadow->drawer.plan.storage_size + shadow->drawer.word_size;
+	const struct shadow_drawer *drawer = &shadow->drawer;
+	uint64_t n = sizeof *shadow + drawer->plan.storage_size + drawer->word_size + drawer->cells_size;
 	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
 		for (int f = 0; f < SHADOW_FACES; f++)
 			n += shadow->kept[l][f].cells_size;

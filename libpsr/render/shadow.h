@@ -62,6 +62,8 @@ struct shadow_drawer {
 	struct plan plan;
 	uint64_t *word; /* of a tile, for each thread */
 	size_t word_size;
+	float *cells; /* as a map's, before they are sunk */
+	size_t cells_size;
 };
 
 /* Draws kept->fit; adds the samples to *n_samples. On failure the map is left not drawn. */

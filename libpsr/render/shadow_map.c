@@ -10,13 +10,16 @@
 #define SLOPE_BIAS 0.5
 #define TEXEL_BIAS 1.0
 
+#define SINK_PARTS 16
+
 struct drawing {
 	const struct simd *simd;
 	const struct bins *bins;
 	struct shadow_drawer *drawer;
 	struct psr_zstack stack;
 	const struct shadow_map *map;
-	float *cells; /* of level 0 */
+	float *cells; /* the drawer's: of level 0, and of the others where the map has them */
+	float *kept_cells; /* the map's, in the same order */
 	uint32_t stride;
 	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_samples;
@@ -71,6 +74,12 @@ static int has_seam(const struct shadow_map *map, int k)
 	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
 }
 
+/* Where the drawer has what is to be sunk into these cells of the map. */
+static float *drawn(const struct drawing *d, const float *cells)
+{
+	return d->cells + (cells - d->map->level[0].z);
+}
+
 /* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in
  * it, as far as these exist. */
 static void make_seams(int k, void *userdata)
@@ -81,17 +90,42 @@ static void make_seams(int k, void *userdata)
 		return;
 	const uint32_t stride = map->level[k].stride, finer = map->level[k - 1].stride;
 	const uint32_t height = d->stack.level[k].height, finer_height = d->stack.level[k - 1].height;
-	float *to = d->cells + (map->level[k].seam - map->level[0].z);
+	const float *own = drawn(d, map->level[k].z), *fine = drawn(d, map->level[k - 1].z);
+	float *to = drawn(d, map->level[k].seam);
 	for (uint32_t j = 0; j < height; j++)
 		for (uint32_t i = 0; i < stride; i++) {
-			float z = map->level[k].z[(size_t)j * stride + i];
+			float z = own[(size_t)j * stride + i];
 			for (uint32_t y = j ? 2 * j - 1 : 0; y <= 2 * j && y < finer_height; y++)
 				for (uint32_t x = i ? 2 * i - 1 : 0; x <= 2 * i && x < finer; x++) {
-					const float own = map->level[k - 1].z[(size_t)y * finer + x];
-					z = own < z ? own : z;
+					const float part = fine[(size_t)y * finer + x];
+					z = part < z ? part : z;
 				}
 			to[(size_t)j * stride + i] = z;
 		}
+}
+
+static void sink_rows(const struct drawing *d, const float *cells, int k, uint32_t begin, uint32_t end)
+{
+	const uint32_t stride = d->map->level[k].stride, last = d->stack.level[k].height - 1;
+	const float *from = drawn(d, cells);
+	float *to = d->kept_cells + (cells - d->map->level[0].z);
+	for (uint32_t j = begin; j < end; j++) {
+		const float *own = from + (size_t)j * stride, *above = j ? own - stride : own;
+		d->simd->shadow_sink(to + (size_t)j * stride, above, own, j < last ? own + stride : own, stride);
+	}
+}
+
+static void sink_part(int part, void *userdata)
+{
+	const struct drawing *d = userdata;
+	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		const uint32_t height = d->stack.level[k].height;
+		const uint32_t begin = height * (uint32_t)part / SINK_PARTS, end = height * ((uint32_t)part + 1) / SINK_PARTS;
+		if (d->map->level[k].z)
+			sink_rows(d, d->map->level[k].z, k, begin, end);
+		if (d->map->level[k].seam)
+			sink_rows(d, d->map->level[k].seam, k, begin, end);
+	}
 }
 
 static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t levels)
@@ -114,16 +148,19 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 		if (has_seam(&kept->map, k))
 			n += (size_t)(cells_x + 2) * (cells_y + 2);
 	}
+	struct shadow_drawer *drawer = d->drawer;
 	kept->cells = psr_grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
-	if (!kept->cells)
+	drawer->cells = psr_grow_huge(drawer->cells, &drawer->cells_size, n * sizeof *drawer->cells);
+	if (!kept->cells || !drawer->cells)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		float *z = kept->map.levels >> k & 1 ? kept->cells + first[k] : NULL;
-		kept->map.level[k].z = z;
+		const int is_used = kept->map.levels >> k & 1;
+		kept->map.level[k].z = is_used ? kept->cells + first[k] : NULL;
 		kept->map.level[k].seam = has_seam(&kept->map, k) ? kept->cells + seam[k] : NULL;
-		d->stack.level[k].z = k ? z : NULL;
+		d->stack.level[k].z = k && is_used ? drawer->cells + first[k] : NULL;
 	}
-	d->cells = kept->cells;
+	d->cells = drawer->cells;
+	d->kept_cells = kept->cells;
 	d->map = &kept->map;
 	d->stride = kept->map.level[0].stride;
 	return PSR_OK;
@@ -170,6 +207,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	clear_band(&d);
 	psr_pool_for(pool, n_parts, draw_some, &d);
 	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
+	psr_pool_for(pool, SINK_PARTS, sink_part, &d);
 	note_plan(kept, plan);
 	kept->is_drawn = 1;
 	*n_samples += d.n_samples;

@@ -198,3 +198,20 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 	}
 	return is_lit;
 }
+
+static inline float steady(float before, float here, float after)
+{
+	const float a = here - before, b = after - here, fall = magnitude(a), next = magnitude(b);
+	return psr_where((a > 0) == (b > 0), psr_choose(fall < next, fall, next));
+}
+
+static void shadow_sink(float *restrict to, const float *above, const float *own, const float *below, uint32_t n)
+{
+	to[0] = own[0];
+	for (uint32_t i = 1; i < n - 1; i++) {
+		const float here = own[i];
+		const float fall = steady(own[i - 1], here, own[i + 1]) + steady(above[i], here, below[i]);
+		to[i] = psr_choose(here < __builtin_inff(), here + fall, here);
+	}
+	to[n - 1] = own[n - 1];
+}

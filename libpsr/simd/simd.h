@@ -247,8 +247,8 @@ typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int ex
 
 /* ---- shadows ([G] 7.3.1) ---- */
 
-/* A map: for each level k in use the nearest z' in cells of 2^k texels, +inf where nothing is, with a guard band of one
- * cell. Lengths are the map's own units, of which the camera's are `scale`. */
+/* A map: for each level k in use the nearest z' in cells of 2^k texels, sunk, +inf where nothing is, with a guard band of
+ * one cell. Lengths are the map's own units, of which the camera's are `scale`. */
 struct shadow_map {
 	int perspective;
 	float turn[3][3], move[3]; /* camera space to the map's: turn p + move */
@@ -260,7 +260,7 @@ struct shadow_map {
 	uint32_t levels; /* bit k: level k is in use */
 	struct {
 		const float *z;
-		const float *seam; /* the nearest of the cell and of the finer level's four in it; NULL where that is not in
+		const float *seam; /* sunk, the nearest of the cell and of the finer level's four in it; NULL where that is not in
 		                    * use */
 		uint32_t stride;
 		float most_x, most_y; /* greatest places, in cells, at which four cells lie around */
@@ -278,6 +278,12 @@ struct shadow_light {
 /* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of
  * what is nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
 typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
+
+/* Moves the depths of a row of cells, but for the first and the last, away from the light by what their surface falls
+ * within a cell; the n cells above and below are given, too. In each direction that is the lesser of the differences to
+ * the two neighbors, and 0 where these differ in sign, at an edge. A cell has its nearest sample, which where two faces
+ * meet lies before the other face, though neither shadows the other. */
+typedef void shadow_sink_fn(float *restrict to, const float *above, const float *own, const float *below, uint32_t n);
 
 /* ---- gaps ([G] 4.6) ---- */
 
@@ -379,6 +385,7 @@ struct simd {
 	strip_read_fn *strip_read;
 	strip_resolve_fn *strip_resolve;
 	strip_shadow_fn *strip_shadow;
+	shadow_sink_fn *shadow_sink;
 	strip_light_fn *strip_light;
 	strip_lit_fn *strip_lit;
 	strip_color_fn *strip_color;

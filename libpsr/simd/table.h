@@ -21,6 +21,7 @@
 	.strip_read = KERNEL(strip_read),              \
 	.strip_resolve = strip_resolve,                \
 	.strip_shadow = strip_shadow,                  \
+	.shadow_sink = shadow_sink,                    \
 	.strip_light = strip_light,                    \
 	.strip_lit = strip_lit,                        \
 	.strip_color = strip_color,                    \

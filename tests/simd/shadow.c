@@ -1,4 +1,4 @@
-/* strip_shadow: some samples, one map or two, of any levels, any numbers. */
+/* strip_shadow: some samples, one map or two, of any levels, any numbers. shadow_sink: rows of any length. */
 #include <math.h>
 #include <stddef.h>
 #include <string.h>
@@ -103,6 +103,36 @@ static void bench_two_levels(struct check *c)
 	shadow(c, STRIP, 1, 3, 0);
 }
 
+static void sink(struct check *c, uint32_t n, int is_spoilt)
+{
+	const float *row[3];
+	float *to = check_out(c, n, sizeof *to);
+
+	for (int j = 0; j < 3; j++)
+		row[j] = random_cells(c, n, is_spoilt);
+	check_units(c, n);
+	while (check_next(c)) {
+		c->simd->shadow_sink(to, row[0], row[1], row[2], n);
+		if (!c->is_bench)
+			check_settle(to, n);
+	}
+}
+
+static void random_sink(struct check *c)
+{
+	sink(c, 3 + check_below(c, 200), 0);
+}
+
+static void spoilt_sink(struct check *c)
+{
+	sink(c, 3 + check_below(c, 200), 1);
+}
+
+static void bench_sink(struct check *c)
+{
+	sink(c, 1024, 0);
+}
+
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
@@ -110,6 +140,9 @@ int main(int argc, char **argv)
 		{ "strip_shadow: infinite, huge, denormal and no numbers", spoilt_shadow, 1000, NULL },
 		{ "strip_shadow, a map of one level", bench_one_level, 0, "sample" },
 		{ "strip_shadow, levels 0 and 1", bench_two_levels, 0, "sample" },
+		{ "shadow_sink: random depths", random_sink, 1000, NULL },
+		{ "shadow_sink: infinite, huge, denormal and no numbers", spoilt_sink, 1000, NULL },
+		{ "shadow_sink", bench_sink, 0, "cell" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
 }
