@@ -17,8 +17,8 @@ int shadow_prepare(struct shadow **shadow, const struct simd *simd, struct plan 
                    const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report,
                    struct psr_error *err);
 
-/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 4 bytes and, where level buffers are in use, up
- * to two thirds more. */
+/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 2 bytes and, where level buffers are in use, up
+ * to two thirds more; 4 bytes more a texel, and up to two thirds more, of the largest. */
 #define SHADOW_TEXELS (16u << 20)
 #define SHADOW_SIDE 2048 /* at most */
 
@@ -30,6 +30,7 @@ void shadow_destroy(struct shadow *shadow);         /* NULL is fine */
 struct shadow_fit {
 	struct psr_camera camera;
 	uint32_t width, height;
+	double nearest, farthest; /* z' of instances is between them */
 };
 
 /* What fitting needs of a scene: a sphere about all instances, and the least distance of samples. */
@@ -53,7 +54,7 @@ struct shadow_kept {
 	double axis[3][3], eye[3]; /* of its camera, as a plan has them */
 	int exponent;
 	struct shadow_map map;     /* all but what depends on the picture's camera */
-	float *cells;
+	uint16_t *cells;
 	size_t cells_size;
 };
 
@@ -62,7 +63,7 @@ struct shadow_drawer {
 	struct plan plan;
 	uint64_t *word; /* of a tile, for each thread */
 	size_t word_size;
-	float *cells; /* as a map's, before they are sunk */
+	float *cells; /* depths of a map's, in the same order */
 	size_t cells_size;
 };
 

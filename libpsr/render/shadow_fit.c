@@ -129,6 +129,8 @@ static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *
 	camera->kind = PSR_CAMERA_ORTHOGRAPHIC;
 	camera->fov_y = camera->near_z = 0;
 	camera->ortho_height = texel * fit->height;
+	fit->nearest = 0;
+	fit->farthest = high[2] - low[2] + bounds->radius / 4;
 	return 1;
 }
 
@@ -145,6 +147,11 @@ static void fit_square(struct shadow_fit *fit, const double position[3], const d
 	camera->kind = PSR_CAMERA_PERSPECTIVE;
 	camera->ortho_height = camera->near_z = 0;
 	camera->fov_y = 2 * angle_of(tangent * fit->width / (fit->width - 2 * MARGIN));
+	double to[3];
+	v3d_sub(to, bounds->center, position);
+	const double along = v3d_dot(axis, to), reach = bounds->radius * 1.01;
+	fit->nearest = fmax(along - reach, 0);
+	fit->farthest = fmax(along + reach, 0.01 * reach);
 }
 
 /* Whether instances' sphere, at `to` from the light, reaches into the pyramid of a face, and a spot's cone does,

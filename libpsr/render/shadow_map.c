@@ -19,7 +19,7 @@ struct drawing {
 	struct psr_zstack stack;
 	const struct shadow_map *map;
 	float *cells; /* the drawer's: of level 0, and of the others where the map has them */
-	float *kept_cells; /* the map's, in the same order */
+	uint16_t *kept_cells; /* the map's, in the same order */
 	uint32_t stride;
 	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_samples;
@@ -74,8 +74,8 @@ static int has_seam(const struct shadow_map *map, int k)
 	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
 }
 
-/* Where the drawer has what is to be sunk into these cells of the map. */
-static float *drawn(const struct drawing *d, const float *cells)
+/* Where the drawer has the depths of these cells of the map. */
+static float *drawn(const struct drawing *d, const uint16_t *cells)
 {
 	return d->cells + (cells - d->map->level[0].z);
 }
@@ -104,14 +104,15 @@ static void make_seams(int k, void *userdata)
 		}
 }
 
-static void sink_rows(const struct drawing *d, const float *cells, int k, uint32_t begin, uint32_t end)
+static void sink_rows(const struct drawing *d, const uint16_t *cells, int k, uint32_t begin, uint32_t end)
 {
 	const uint32_t stride = d->map->level[k].stride, last = d->stack.level[k].height - 1;
 	const float *from = drawn(d, cells);
-	float *to = d->kept_cells + (cells - d->map->level[0].z);
+	uint16_t *to = d->kept_cells + (cells - d->map->level[0].z);
 	for (uint32_t j = begin; j < end; j++) {
 		const float *own = from + (size_t)j * stride, *above = j ? own - stride : own;
-		d->simd->shadow_sink(to + (size_t)j * stride, above, own, j < last ? own + stride : own, stride);
+		d->simd->shadow_sink(to + (size_t)j * stride, above, own, j < last ? own + stride : own, stride, d->map->from,
+		                     d->map->step);
 	}
 }
 
@@ -176,6 +177,8 @@ static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 	kept->map.near_z = plan->near_z;
 	kept->map.half_width = plan->view.half_width;
 	kept->map.half_height = plan->view.half_height;
+	kept->map.from = (float)ldexp(kept->fit.nearest, -plan->exponent);
+	kept->map.step = (float)ldexp((kept->fit.farthest - kept->fit.nearest) / SHADOW_EMPTY, -plan->exponent);
 }
 
 int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct simd *simd, struct bins *bins,
@@ -204,11 +207,11 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
 	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
+	note_plan(kept, plan);
 	clear_band(&d);
 	psr_pool_for(pool, n_parts, draw_some, &d);
 	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
 	psr_pool_for(pool, SINK_PARTS, sink_part, &d);
-	note_plan(kept, plan);
 	kept->is_drawn = 1;
 	*n_samples += d.n_samples;
 	return PSR_OK;

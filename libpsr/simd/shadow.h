@@ -99,34 +99,35 @@ static inline float clamp_cell(float x, float most)
 }
 
 /* Two cells side by side. */
-static inline uint64_t load_pair(const float *cells)
+static inline uint32_t load_pair(const uint16_t *cells)
 {
-	uint64_t pair;
+	uint32_t pair;
 	memcpy(&pair, cells, sizeof pair);
 	return pair;
 }
 
-static inline float cover_of(uint64_t pair, int shift, float scale, float offset, float z, float part)
+static inline float cover_of(uint32_t cell, float step, float from, float z, float part)
 {
-	return psr_where(psr_float_from_bits((uint32_t)(pair >> shift)) * scale + offset < z, part);
+	return psr_where(((float)(int32_t)cell * step + from < z) & (cell != SHADOW_EMPTY), part);
 }
 
 /* Coverage of each place by cells of level k, bilinear among four of them ([G] 4.6). A cell covers what lies behind it:
  * its depth is that of the nearest sample anywhere in it, and compared with the least that the place's own plane has in
  * the same cell, half a cell from its centre in both directions, less a bias of a cell's width at the cell's own depth.
  * Loads are apart from arithmetic, of which the compiler makes vectors. */
-static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map, const float *cells,
-                         int k)
+static void shadow_cover(float *cover, const struct shadow_place *at, const struct shadow_map *map,
+                         const uint16_t *cells, int k)
 {
 	const size_t n = at->n / GROUP * GROUP;
 	const float size = (float)(1 << k), inverse = 1 / size, bias = size * map->texel_bias / map->focal;
-	const float scale = map->perspective ? 1 + bias : 1, offset = (map->perspective ? 0 : bias) + map->slack;
+	const float scale = map->perspective ? 1 + bias : 1, step = map->step * scale;
+	const float from = (map->perspective ? 0 : bias) + map->slack + map->from * scale;
 	const float most_x = map->level[k].most_x, most_y = map->level[k].most_y;
 	const int32_t stride = (int32_t)map->level[k].stride;
-	const float *upper = cells + stride + 1, *lower = upper + stride;
+	const uint16_t *upper = cells + stride + 1, *lower = upper + stride;
 	float fx[STRIP], fy[STRIP];
 	int32_t cell[STRIP];
-	uint64_t pair[2][STRIP];
+	uint32_t pair[2][STRIP];
 	for (size_t i = 0; i < n; i++) {
 		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x),
 					y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
@@ -143,10 +144,10 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 		const float du = at->du[i] * size, dv = at->dv[i] * size, x = fx[i], y = fy[i];
 		const float least = at->z[i] - at->bias[i] * size;
 		const float z00 = least - (x * du + y * dv), z10 = z00 + du, z01 = z00 + dv, z11 = z10 + dv;
-		const float c00 = cover_of(pair[0][i], 0, scale, offset, z00, (1 - x) * (1 - y)),
-					c10 = cover_of(pair[0][i], 32, scale, offset, z10, x * (1 - y));
-		const float c01 = cover_of(pair[1][i], 0, scale, offset, z01, (1 - x) * y),
-					c11 = cover_of(pair[1][i], 32, scale, offset, z11, x * y);
+		const float c00 = cover_of(pair[0][i] & 0xffff, step, from, z00, (1 - x) * (1 - y)),
+					c10 = cover_of(pair[0][i] >> 16, step, from, z10, x * (1 - y));
+		const float c01 = cover_of(pair[1][i] & 0xffff, step, from, z01, (1 - x) * y),
+					c11 = cover_of(pair[1][i] >> 16, step, from, z11, x * y);
 		cover[i] = (c00 + c11) + (c10 + c01);
 	}
 }
@@ -205,13 +206,22 @@ static inline float steady(float before, float here, float after)
 	return psr_where((a > 0) == (b > 0), psr_choose(fall < next, fall, next));
 }
 
-static void shadow_sink(float *restrict to, const float *above, const float *own, const float *below, uint32_t n)
+static inline uint16_t cell_of(float z, float from, float per_step)
 {
-	to[0] = own[0];
+	const float steps = (z - from) * per_step, least = psr_where(steps > 0, steps);
+	const int32_t up = (int32_t)psr_choose(least < SHADOW_EMPTY - 2, least, SHADOW_EMPTY - 2) + 1;
+	return (uint16_t)(z < __builtin_inff() ? up : SHADOW_EMPTY);
+}
+
+static void shadow_sink(uint16_t *restrict to, const float *above, const float *own, const float *below, uint32_t n,
+                        float from, float step)
+{
+	const float per_step = 1 / step;
+	to[0] = cell_of(own[0], from, per_step);
 	for (uint32_t i = 1; i < n - 1; i++) {
 		const float here = own[i];
 		const float fall = steady(own[i - 1], here, own[i + 1]) + steady(above[i], here, below[i]);
-		to[i] = psr_choose(here < __builtin_inff(), here + fall, here);
+		to[i] = cell_of(psr_choose(here < __builtin_inff(), here + fall, here), from, per_step);
 	}
-	to[n - 1] = own[n - 1];
+	to[n - 1] = cell_of(own[n - 1], from, per_step);
 }

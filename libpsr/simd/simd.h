@@ -247,8 +247,10 @@ typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int ex
 
 /* ---- shadows ([G] 7.3.1) ---- */
 
-/* A map: for each level k in use the nearest z' in cells of 2^k texels, sunk, +inf where nothing is, with a guard band of
- * one cell. Lengths are the map's own units, of which the camera's are `scale`. */
+/* A map: for each level k in use the nearest z' in cells of 2^k texels, sunk, with a guard band of one cell. Cells hold
+ * steps beyond `from`, rounded up, or SHADOW_EMPTY. Lengths are the map's own units, of which the camera's are
+ * `scale`. */
+#define SHADOW_EMPTY 0xffff
 struct shadow_map {
 	int perspective;
 	float turn[3][3], move[3]; /* camera space to the map's: turn p + move */
@@ -257,11 +259,12 @@ struct shadow_map {
 	/* A place is compared by how its plane falls within slope_bias cells of a cell's centre, less texel_bias widths of
 	 * a cell, less slack: half a cell, a cell, and what rounding takes. */
 	float slope_bias, texel_bias, slack;
+	float from, step;
 	uint32_t levels; /* bit k: level k is in use */
 	struct {
-		const float *z;
-		const float *seam; /* sunk, the nearest of the cell and of the finer level's four in it; NULL where that is not in
-		                    * use */
+		const uint16_t *z;
+		const uint16_t *seam; /* of the nearest of the cell and of the finer level's four in it; NULL where that is not
+		                       * in use */
 		uint32_t stride;
 		float most_x, most_y; /* greatest places, in cells, at which four cells lie around */
 	} level[PSR_MAX_DEPTH_LEVEL + 1];
@@ -279,11 +282,12 @@ struct shadow_light {
  * what is nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
 typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
 
-/* Moves the depths of a row of cells, but for the first and the last, away from the light by what their surface falls
- * within a cell; the n cells above and below are given, too. In each direction that is the lesser of the differences to
- * the two neighbors, and 0 where these differ in sign, at an edge. A cell has its nearest sample, which where two faces
- * meet lies before the other face, though neither shadows the other. */
-typedef void shadow_sink_fn(float *restrict to, const float *above, const float *own, const float *below, uint32_t n);
+/* Makes n cells of a map of their depths, of which those above and below are given, too: all but the first and the last
+ * sink, away from the light, by what their surface falls within a cell. In each direction that is the lesser of the
+ * differences to the two neighbors, and 0 where these differ in sign, at an edge. A cell has its nearest sample, which
+ * where two faces meet lies before the other face, though neither shadows the other. */
+typedef void shadow_sink_fn(uint16_t *restrict to, const float *above, const float *own, const float *below, uint32_t n,
+                            float from, float step);
 
 /* ---- gaps ([G] 4.6) ---- */
 

@@ -4,13 +4,13 @@
 #include <string.h>
 #include "tests/simd/lib/check.h"
 
-/* Cells of a level or of its seam: of mostly plain depths, and some where nothing is. */
-static const float *random_cells(struct check *c, uint32_t n, int is_spoilt)
+/* Cells of a level or of its seam, some of which are empty. */
+static const uint16_t *random_cells(struct check *c, uint32_t n)
 {
-	float *z = check_in(c, n, sizeof *z);
+	uint16_t *cells = check_in(c, n, sizeof *cells);
 	for (uint32_t i = 0; i < n; i++)
-		z[i] = check_one_in(c, 4) ? INFINITY : check_plain_or_any(c, is_spoilt, 0.5, 3);
-	return z;
+		cells[i] = (uint16_t)(check_one_in(c, 4) ? SHADOW_EMPTY : check_below(c, SHADOW_EMPTY + 1));
+	return cells;
 }
 
 static void random_map(struct check *c, struct shadow_map *map, uint32_t levels, int is_spoilt)
@@ -31,6 +31,8 @@ static void random_map(struct check *c, struct shadow_map *map, uint32_t levels,
 	map->slope_bias = check_plain_or_any(c, is_spoilt, 0, 1);
 	map->texel_bias = check_plain_or_any(c, is_spoilt, 0, 2);
 	map->slack = check_plain_or_any(c, is_spoilt, 0, 0.001);
+	map->from = check_plain_or_any(c, is_spoilt, 0, 1);
+	map->step = check_plain_or_any(c, is_spoilt, 0, 3.0 / SHADOW_EMPTY);
 	map->levels = levels;
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const uint32_t cells_x = (width + (1u << k) - 1) >> k, cells_y = (height + (1u << k) - 1) >> k;
@@ -39,9 +41,9 @@ static void random_map(struct check *c, struct shadow_map *map, uint32_t levels,
 		map->level[k].most_x = (float)cells_x - 0.5f;
 		map->level[k].most_y = (float)cells_y - 0.5f;
 		if (levels >> k & 1)
-			map->level[k].z = random_cells(c, n, is_spoilt);
+			map->level[k].z = random_cells(c, n);
 		if (k && levels >> k & 1 && levels >> (k - 1) & 1)
-			map->level[k].seam = random_cells(c, n, is_spoilt);
+			map->level[k].seam = random_cells(c, n);
 	}
 }
 
@@ -105,17 +107,18 @@ static void bench_two_levels(struct check *c)
 
 static void sink(struct check *c, uint32_t n, int is_spoilt)
 {
-	const float *row[3];
-	float *to = check_out(c, n, sizeof *to);
+	const float from = check_plain_or_any(c, is_spoilt, 0, 1), step = check_plain_or_any(c, is_spoilt, 1e-6, 1e-4);
+	float *row[3];
+	uint16_t *to = check_out(c, n, sizeof *to);
 
-	for (int j = 0; j < 3; j++)
-		row[j] = random_cells(c, n, is_spoilt);
-	check_units(c, n);
-	while (check_next(c)) {
-		c->simd->shadow_sink(to, row[0], row[1], row[2], n);
-		if (!c->is_bench)
-			check_settle(to, n);
+	for (int j = 0; j < 3; j++) {
+		row[j] = check_in(c, n, sizeof *row[j]);
+		for (uint32_t i = 0; i < n; i++)
+			row[j][i] = check_one_in(c, 4) ? INFINITY : check_plain_or_any(c, is_spoilt, 0.5, 3);
 	}
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->shadow_sink(to, row[0], row[1], row[2], n, from, step);
 }
 
 static void random_sink(struct check *c)

@@ -448,9 +448,9 @@ static void memory_is_bounded(void **state)
 		s.scene.n_lights = n;
 		assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
 		assert_true(frame.report.n_shadow_maps >= 5 * n);
-		/* Cells of all levels, the guard bands of up to 192 maps among them, those of the largest map once more, and what
+		/* Cells of all levels, the guard bands of up to 192 maps among them, the depths of the largest map, and what
 		 * is kept of lights and instances, words of a tile, and entries of tiles. */
-		const uint64_t cells = SHADOW_TEXELS * UINT64_C(4) * 5 / 3, bands = 193 * 15 * 4 * UINT64_C(2048) * 4;
+		const uint64_t cells = SHADOW_TEXELS * UINT64_C(2) * 5 / 3, bands = 194 * 15 * 4 * UINT64_C(2048) * 2;
 		const uint64_t drawn = SHADOW_SIDE * SHADOW_SIDE * UINT64_C(4) * 5 / 3, rest = 4u << 20;
 		assert_true(psr_renderer_bytes(s.renderer) - before <= cells + bands + drawn + rest);
 	}
