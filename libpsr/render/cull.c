@@ -251,6 +251,27 @@ static void count_chunk(int i, void *userdata)
 	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
 }
 
+/* What a block draws, and what its cells cover, is within two cells of its pixels: most often in the parts of the four
+ * corners. */
+static void mark_parts(uint8_t *is_quiet, const struct plan *plan, const struct cull_hit *hit)
+{
+	const int32_t reach = 2 << hit->level, most_x = (int32_t)plan->parts_x - 1, most_y = (int32_t)plan->parts_y - 1;
+	const int32_t left = hit->x0 - reach, right = (hit->x1 + reach) / PART_WIDTH;
+	const int32_t top = hit->y0 - reach, bottom = (hit->y1 + reach) / PART_HEIGHT;
+	const int32_t x0 = (left > 0 ? left : 0) / PART_WIDTH, x1 = right < most_x ? right : most_x;
+	const int32_t y0 = (top > 0 ? top : 0) / PART_HEIGHT, y1 = bottom < most_y ? bottom : most_y;
+	uint8_t *first = is_quiet + (size_t)y0 * plan->parts_x, *last = is_quiet + (size_t)y1 * plan->parts_x;
+	__atomic_store_n(&first[x0], 0, __ATOMIC_RELAXED);
+	__atomic_store_n(&first[x1], 0, __ATOMIC_RELAXED);
+	__atomic_store_n(&last[x0], 0, __ATOMIC_RELAXED);
+	__atomic_store_n(&last[x1], 0, __ATOMIC_RELAXED);
+	if (x1 - x0 <= 1 && y1 - y0 <= 1)
+		return;
+	for (; first <= last; first += plan->parts_x)
+		for (int32_t x = x0; x <= x1; x++)
+			__atomic_store_n(&first[x], 0, __ATOMIC_RELAXED);
+}
+
 static void fill_chunk(int i, void *userdata)
 {
 	const struct cull *cull = userdata;
@@ -262,6 +283,7 @@ static void fill_chunk(int i, void *userdata)
 			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
 			.at_border = hit->at_border, .hit = chunk->first_hit + h,
 		};
+		mark_parts(cull->bins->is_quiet, cull->plan, hit);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
 				cull->bins->entry[next[y * cull->plan->tiles_x + x]++] = entry;
@@ -344,9 +366,12 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles,
 	                       sizeof *bins->count);
 	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
+	bins->is_quiet = room_for(bins->is_quiet, &bins->quiet_capacity, plan->parts_x * plan->parts_y, 1);
 	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
-	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin)
+	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin ||
+	    !bins->is_quiet)
 		return PSR_ERR_MEMORY;
+	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
 	make_chunks(bins, plan, 1);
 	choose_levels(bins, plan);
 	for (uint32_t i = 0; i < plan->n_instances; i++)
@@ -388,13 +413,15 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 size_t bins_bytes(const struct bins *bins)
 {
 	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity +
-	       bins->masks_capacity + bins->group_capacity + bins->count_capacity + bins->tile_capacity;
+	       bins->masks_capacity + bins->group_capacity + bins->count_capacity + bins->tile_capacity +
+	       bins->quiet_capacity;
 }
 
 void bins_clear(struct bins *bins)
 {
 	psr_free_huge(bins->entry, bins->entry_capacity);
 	psr_free_huge(bins->tile_begin, bins->tile_capacity);
+	psr_free_huge(bins->is_quiet, bins->quiet_capacity);
 	psr_free_huge(bins->chunk, bins->chunk_capacity);
 	psr_free_huge(bins->hit, bins->hit_capacity);
 	psr_free_huge(bins->order, bins->order_capacity);

@@ -8,8 +8,8 @@ static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t 
 			weight[(size_t)y * stride + x] = WEIGHT_ONE;
 }
 
-_Static_assert(TILE_WIDTH % GAPS_WIDTH == 0 && TILE_HEIGHT % BRICK == 0,
-               "what gaps are looked for in lies in one tile");
+_Static_assert(PART_WIDTH % GAPS_WIDTH == 0 && PART_HEIGHT % BRICK == 0,
+               "what gaps are looked for in lies in one part");
 
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
                              uint32_t y0, uint32_t y1, uint16_t *weight, uint8_t *bricks)
@@ -23,7 +23,7 @@ struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, c
 			const uint32_t brick_y1 = y + BRICK < y1 ? y + BRICK : y1;
 			uint8_t marks[GAPS_WIDTH / BRICK] = { 0 };
 			struct gaps_counts counts = { 0, 0, 0 };
-			if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
+			if (plan_is_quiet(plan, x, y))
 				make_whole(weight, stack->width, x, x1, y, brick_y1);
 			else
 				counts = simd->gaps(&target, x, x1, y, brick_y1, marks);

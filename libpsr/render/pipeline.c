@@ -33,9 +33,9 @@ struct psr_renderer {
 	struct shade_counts *shade;
 	float (*lit)[4];          /* diffuse light by normal */
 	size_t lit_size;
-	/* One a tile: quiet as plan.is_quiet; clean if words and cells are empty since an earlier frame of the same
-	 * layout. */
-	uint8_t *is_quiet, *is_clean;
+	/* One a part of the picture: 1 where words are empty since an earlier frame of the same layout; so are the cells of
+	 * a tile of which all parts are clean. */
+	uint8_t *is_clean;
 	const void *clean_pixels; /* the layout: where, how large, and with which levels */
 	uint32_t clean_width, clean_height, clean_levels;
 	void *counters;
@@ -171,16 +171,16 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 			cells += (size_t)stack->level[k].width * stack->level[k].height;
 	}
 	r->pixels = psr_grow_huge(r->pixels, &r->pixels_size, n_words * 8 + area * 4 * 2 + cells * 4 + n_bricks);
-	size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
+	const size_t n_tiles = (size_t)r->plan.tiles_x * r->plan.tiles_y;
+	const size_t n_parts = (size_t)r->plan.parts_x * r->plan.parts_y;
 	r->counters = psr_grow_huge(r->counters, &r->counters_size,
-	                            n_tiles * (sizeof *r->tile + 2) + rows * (sizeof *r->gaps + sizeof *r->shade));
+	                            n_tiles * sizeof *r->tile + n_parts + rows * (sizeof *r->gaps + sizeof *r->shade));
 	if (!r->pixels || !r->counters)
 		return PSR_ERR_MEMORY;
 	r->tile = r->counters;
 	r->shade = (struct shade_counts *)(r->tile + n_tiles);
 	r->gaps = (struct gaps_counts *)(r->shade + rows);
-	r->is_quiet = (uint8_t *)(r->gaps + rows);
-	r->is_clean = r->is_quiet + n_tiles;
+	r->is_clean = (uint8_t *)(r->gaps + rows);
 
 	stack->word = r->pixels;
 	float *next = (float *)(stack->word + n_words);
@@ -194,7 +194,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 		r->rgb[k] = r->weight + (size_t)(k + 1) * area;
 	r->bricks = (uint8_t *)(r->rgb[2] + area);
 	if (r->clean_pixels != r->pixels || r->clean_width != w || r->clean_height != h || r->clean_levels != stack->levels)
-		memset(r->is_clean, 0, n_tiles);
+		memset(r->is_clean, 0, n_parts);
 	r->clean_pixels = r->pixels;
 	r->clean_width = w;
 	r->clean_height = h;
@@ -202,36 +202,17 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	return PSR_OK;
 }
 
-static int is_drawn(const struct psr_renderer *r, uint32_t x, uint32_t y)
-{
-	const uint32_t tile = y * r->plan.tiles_x + x;
-	return r->bins.tile_begin[tile + 1] > r->bins.tile_begin[tile];
-}
-
-static void find_quiet(struct psr_renderer *r)
-{
-	const uint32_t reach = r->stack.levels ? 1 : 0; /* tiles: no cell is larger */
-	for (uint32_t y = 0; y < r->plan.tiles_y; y++)
-		for (uint32_t x = 0; x < r->plan.tiles_x; x++) {
-			int is_quiet = 1;
-			for (uint32_t v = y > reach ? y - reach : 0; v <= y + reach && v < r->plan.tiles_y; v++)
-				for (uint32_t u = x > reach ? x - reach : 0; u <= x + reach && u < r->plan.tiles_x; u++)
-					is_quiet &= !is_drawn(r, u, v);
-			r->is_quiet[y * r->plan.tiles_x + x] = (uint8_t)is_quiet;
-		}
-	r->plan.is_quiet = r->is_quiet;
-}
-
 static void warp_one(int tile, void *userdata)
 {
 	struct psr_renderer *r = userdata;
+	const struct plan *plan = &r->plan;
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
+	const uint32_t clean = warp_parts(plan, r->is_clean, (uint32_t)tile);
 	r->tile[tile] = (struct warp_counts){ 0, 0, 0 };
-	if (!is_empty || !r->is_clean[tile])
-		r->tile[tile] = r->plan.with_splats
-		                    ? splat_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile)
-		                    : warp_tile(r->simd, &r->plan, &r->bins, &r->stack, (uint32_t)tile, NULL);
-	r->is_clean[tile] = (uint8_t)is_empty;
+	if (!is_empty || clean != ALL_PARTS)
+		r->tile[tile] = plan->with_splats
+		                    ? splat_tile(r->simd, plan, &r->bins, &r->stack, (uint32_t)tile, clean)
+		                    : warp_tile(r->simd, plan, &r->bins, &r->stack, (uint32_t)tile, clean, NULL);
 }
 
 static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
@@ -263,9 +244,9 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	if (rc || prepare_buffers(r, report->levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
 	if (r->plan.is_full)
-		memset(r->is_clean, 0, (size_t)r->plan.tiles_x * r->plan.tiles_y);
+		memset(r->is_clean, 0, (size_t)r->plan.parts_x * r->plan.parts_y);
 	else
-		find_quiet(r);
+		r->plan.is_quiet = r->bins.is_quiet;
 	report->ns[PSR_STAGE_CULL] = (end = now_ns()) - start;
 	start = end;
 
@@ -273,6 +254,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	uint64_t n_occluded = 0;
 	int with_occlusion = 0;
 	psr_pool_for(pool, n_tiles, warp_one, r);
+	memcpy(r->is_clean, r->bins.is_quiet, (size_t)r->plan.parts_x * r->plan.parts_y);
 	for (int t = 0; t < n_tiles; t++) {
 		report->count[PSR_STAGE_WARP] += r->tile[t].n_inside;
 		n_occluded += r->tile[t].n_occluded;

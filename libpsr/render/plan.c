@@ -243,6 +243,8 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->center[1] = plan->window.picture_height / 2.0 - plan->window.top;
 	plan->tiles_x = (plan->width + TILE_WIDTH - 1) / TILE_WIDTH;
 	plan->tiles_y = (plan->height + TILE_HEIGHT - 1) / TILE_HEIGHT;
+	plan->parts_x = (plan->width + PART_WIDTH - 1) / PART_WIDTH;
+	plan->parts_y = (plan->height + PART_HEIGHT - 1) / PART_HEIGHT;
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;

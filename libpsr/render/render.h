@@ -29,7 +29,7 @@ struct plan_instance {
 };
 
 struct plan {
-	uint32_t width, height, tiles_x, tiles_y;
+	uint32_t width, height, tiles_x, tiles_y, parts_x, parts_y;
 	struct psr_window window;  /* of the picture; that of the whole if the settings have none */
 	double center[2];          /* pixels from the frame's corner to where the view axis meets it */
 	int perspective;
@@ -54,8 +54,8 @@ struct plan {
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
 	float ambient[3];
 	uint16_t background[3];    /* linear, 16 bits */
-	/* One a tile, or NULL: 1 where no block is drawn, nor in the tiles around it if level buffers are in use: words are
-	 * empty and weights are whole there. */
+	/* One a part of the picture, parts_x in a row, or NULL: 1 where words are empty and weights are whole, since no
+	 * block's samples are drawn there, nor so near that their cells cover anything of it. */
 	const uint8_t *is_quiet;
 	uint64_t n_samples;
 	void *storage;             /* of all arrays */
@@ -102,6 +102,8 @@ struct bins { /* capacities are in bytes */
 	size_t entry_capacity;
 	uint32_t *tile_begin;    /* n_tiles + 1 */
 	size_t tile_capacity;
+	uint8_t *is_quiet;       /* as plan.is_quiet */
+	size_t quiet_capacity;
 	struct cull_chunk *chunk;
 	size_t chunk_capacity;
 	struct cull_hit *hit;    /* one a block that is left, by chunk */
@@ -135,17 +137,26 @@ struct warp_counts {
  * cache. */
 uint32_t warp_gap(uint32_t width);
 
-/* Clears a tile and draws its blocks. Its words are the stack's, or, where `own` is not NULL, WARP_OWN_WORDS there in
- * rows WARP_OWN_STRIDE apart, for who needs no others: they stay in a cache. Cells are the stack's always. */
+static inline int plan_is_quiet(const struct plan *plan, uint32_t x, uint32_t y)
+{
+	return plan->is_quiet && plan->is_quiet[y / PART_HEIGHT * plan->parts_x + x / PART_WIDTH];
+}
+
+/* The bits of a tile's parts that are 1 in a map of the picture's parts, and of those outside of the picture. */
+uint32_t warp_parts(const struct plan *plan, const uint8_t *map, uint32_t tile);
+
+/* Clears a tile but for parts that are clean, by bits, and draws its blocks. Its words are the stack's, or, where `own`
+ * is not NULL, WARP_OWN_WORDS there in rows WARP_OWN_STRIDE apart, for who needs no others: they stay in a cache. Cells
+ * are the stack's always. */
 #define WARP_OWN_STRIDE (TILE_WIDTH + 8)
 #define WARP_OWN_WORDS (WARP_OWN_STRIDE * TILE_HEIGHT)
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                             struct psr_zstack *stack, uint32_t tile, uint64_t *own);
+                             struct psr_zstack *stack, uint32_t tile, uint32_t clean, uint64_t *own);
 
 /* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
  * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                              struct psr_zstack *stack, uint32_t tile);
+                              struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
 /* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's
  * threshold, where one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its

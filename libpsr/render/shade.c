@@ -47,7 +47,7 @@ static void add_light(const struct simd *simd, const struct plan *plan, struct s
 		simd->strip_light(strip, &plan->light[l], reaches);
 }
 
-_Static_assert(TILE_WIDTH % STRIP == 0, "a strip lies in one tile");
+_Static_assert(PART_WIDTH % STRIP == 0, "a strip lies in one part");
 _Static_assert(STRIP_BRICK == BRICK, "what is wanted is counted in bricks");
 
 struct shading {
@@ -65,7 +65,7 @@ static uint32_t list_strip(struct strip_pixels *pixels, const struct shading *s,
 	const uint32_t left = plan->width - x;
 	pixels->x0 = x;
 	pixels->y = y;
-	if (plan->is_quiet && plan->is_quiet[y / TILE_HEIGHT * plan->tiles_x + x / TILE_WIDTH])
+	if (plan_is_quiet(plan, x, y))
 		s->simd->strip_list(pixels, NULL, NULL, 0);
 	else
 		s->simd->strip_list(pixels, psr_zstack_row(s->stack, y) + x, s->weight + (size_t)y * plan->width + x,

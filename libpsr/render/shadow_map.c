@@ -39,7 +39,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
 	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
 	if (!is_empty)
-		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, tile, own).n_inside);
+		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, tile, 0, own).n_inside);
 	for (uint32_t y = y0; y < y0 + TILE_HEIGHT && y < plan->height; y++) {
 		float *to = d->cells + (size_t)(y + 1) * d->stride + x0 + 1;
 		if (is_empty)

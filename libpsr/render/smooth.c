@@ -38,7 +38,7 @@ static void smooth_row(int row, void *userdata)
 	uint64_t n_edges = 0;
 	for (uint32_t x0 = 0; x0 < plan->width; x0 += TILE_WIDTH) {
 		const uint32_t x1 = x0 + TILE_WIDTH < plan->width ? x0 + TILE_WIDTH : plan->width;
-		if (!plan->is_quiet || !plan->is_quiet[y0 / TILE_HEIGHT * plan->tiles_x + x0 / TILE_WIDTH]) {
+		if (!plan_is_quiet(plan, x0, y0) || !plan_is_quiet(plan, x1 - 1, y0)) {
 			n_edges += s->simd->smooth(t, x0, x1, y0, y1);
 			continue;
 		}
@@ -49,7 +49,7 @@ static void smooth_row(int row, void *userdata)
 	}
 	atomic_fetch_add_explicit(&s->smooth->n_edges, n_edges, memory_order_relaxed);
 }
-_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_HEIGHT % BRICK == 0, "");
+_Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_WIDTH <= 2 * PART_WIDTH && TILE_HEIGHT % BRICK == 0, "");
 
 uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                         uint8_t *rgb)

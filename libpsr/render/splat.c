@@ -154,7 +154,7 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 }
 
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                              struct psr_zstack *stack, uint32_t tile)
+                              struct psr_zstack *stack, uint32_t tile, uint32_t clean)
 {
 	const uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
 	struct warp_target target = { .stride = stack->width + stack->gap };
@@ -163,6 +163,7 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	target.y0 = (int32_t)(ty * TILE_HEIGHT);
 	target.x1 = tx + 1 == plan->tiles_x ? (int32_t)plan->width : target.x0 + TILE_WIDTH;
 	target.y1 = ty + 1 == plan->tiles_y ? (int32_t)plan->height : target.y0 + TILE_HEIGHT;
+	target.clean = clean;
 	target.word = psr_zstack_row(stack, (uint32_t)target.y0) + target.x0;
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan, target.word, target.stride, target.x0, target.y0, target.x1, target.y1 };

@@ -38,6 +38,17 @@ static void target_make(struct warp_target *t, const struct plan *plan, const st
 	}
 }
 
+uint32_t warp_parts(const struct plan *plan, const uint8_t *map, uint32_t tile)
+{
+	const uint32_t x0 = tile % plan->tiles_x * TILE_WIDTH, y0 = tile / plan->tiles_x * TILE_HEIGHT;
+	uint32_t bits = ALL_PARTS;
+	for (uint32_t y = 0; y < TILE_HEIGHT && y0 + y < plan->height; y += PART_HEIGHT)
+		for (uint32_t x = 0; x < TILE_WIDTH && x0 + x < plan->width; x += PART_WIDTH)
+			if (!map[(y0 + y) / PART_HEIGHT * plan->parts_x + (x0 + x) / PART_WIDTH])
+				bits &= ~part_bit(x, y);
+	return bits;
+}
+
 /* ---- occlusion: near to far, what the tile already hides is left out ---- */
 
 #define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel, below which looking costs what it saves */
@@ -179,12 +190,14 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 }
 
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                             struct psr_zstack *stack, uint32_t tile, uint64_t *own)
+                             struct psr_zstack *stack, uint32_t tile, uint32_t clean, uint64_t *own)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
 	target_make(&target, plan, stack, tile, own);
+	target.clean = clean;
+	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {
 		simd->warp_clear(&target, stack->levels);
 		counts = warp_near_to_far(simd, bins, &target, begin, end);

@@ -18,6 +18,17 @@
 #define TILE_WIDTH 256  /* words of a tile fit L2 with room to spare */
 #define TILE_HEIGHT 128 /* a multiple of the coarsest cell, so that every cell belongs to one tile */
 
+/* What is known to be empty is known by part of a tile. */
+#define PART_WIDTH 128
+#define PART_HEIGHT 32
+#define ALL_PARTS ((1u << TILE_HEIGHT / PART_HEIGHT * (TILE_WIDTH / PART_WIDTH)) - 1)
+
+/* The bit of the part at pixel (x, y) of a tile. */
+static inline uint32_t part_bit(uint32_t x, uint32_t y)
+{
+	return 1u << (y / PART_HEIGHT * (TILE_WIDTH / PART_WIDTH) + x / PART_WIDTH);
+}
+
 /* ---- cull ([G] 6.1, 6.4) ---- */
 
 struct cull_view {
@@ -126,6 +137,8 @@ struct warp_target {
 	uint64_t *word; /* that of (x0, y0); what is between rows is left alone */
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
+	uint32_t clean; /* bits of parts whose words are empty before the tile is cleared */
+	uint32_t bare;  /* bits of parts where nothing is drawn */
 	struct warp_cells {
 		float *z;
 		uint32_t stride, first;
@@ -137,11 +150,12 @@ struct warp_target {
  * tile, lie beyond near_z and do not face away. Returns how many samples fell into the tile. */
 typedef uint64_t warp_fn(const struct warp_target *target, const struct bin_entry *entry, uint32_t n);
 
-/* Makes a tile empty: words, and cells of the levels of the bit mask. */
+/* Makes a tile empty: words but those of clean parts, and cells of the levels of the bit mask. */
 typedef void warp_clear_fn(const struct warp_target *target, uint32_t levels);
 
-/* The cells of a level from the tile's words, of which each then has the least z' of its pixels: what lowering them
- * sample by sample gives where all that was drawn belongs to that level. Those of the guard band become empty. */
+/* The cells of a level from the tile's words, of which each then has the least z' of its pixels, without those of bare
+ * parts: what lowering them sample by sample gives where all that was drawn belongs to that level. Those of the guard
+ * band become empty. */
 typedef void warp_cells_fn(const struct warp_target *target, int level);
 
 /* ---- strips: samples that are resolved and shaded together ([G] 7.3) ---- */

@@ -3,13 +3,24 @@
 #include <string.h>
 #include "simd/simd.h"
 
+/* Whether the part at pixel (x, y) of the tile is among those of the bits. */
+static inline int is_part(uint32_t bits, int32_t x, int32_t y)
+{
+	return bits && bits & part_bit((uint32_t)x, (uint32_t)y);
+}
+
 static void warp_clear(const struct warp_target *t, uint32_t levels)
 {
 	const int32_t width = t->x1 - t->x0, height = t->y1 - t->y0;
 	for (int32_t y = 0; y < height; y++) {
 		uint64_t *word = t->word + (size_t)y * t->stride;
-		for (int32_t x = 0; x < width; x++)
-			word[x] = PSR_WORD_EMPTY;
+		for (int32_t x0 = 0; x0 < width; x0 += PART_WIDTH) {
+			const int32_t x1 = x0 + PART_WIDTH < width ? x0 + PART_WIDTH : width;
+			if (is_part(t->clean, x0, y))
+				continue;
+			for (int32_t x = x0; x < x1; x++)
+				word[x] = PSR_WORD_EMPTY;
+		}
 	}
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(levels >> k & 1))
@@ -42,9 +53,14 @@ static void warp_cells(const struct warp_target *t, int level)
 			column[0][x] = empty;
 		for (int32_t v = y > t->y0 ? y : t->y0; v < y + side && v < t->y1; v++) {
 			const uint64_t *word = t->word + (size_t)(v - t->y0) * t->stride;
-			for (int32_t x = 0; x < width; x++) {
-				const uint32_t z = (uint32_t)(word[x] >> 32);
-				column[0][x] = z < column[0][x] ? z : column[0][x];
+			for (int32_t x0 = 0; x0 < width; x0 += PART_WIDTH) {
+				const int32_t x1 = x0 + PART_WIDTH < width ? x0 + PART_WIDTH : width;
+				if (is_part(t->bare, x0, v - t->y0))
+					continue;
+				for (int32_t x = x0; x < x1; x++) {
+					const uint32_t z = (uint32_t)(word[x] >> 32);
+					column[0][x] = z < column[0][x] ? z : column[0][x];
+				}
 			}
 		}
 		for (int k = 1; k <= level; k++)

@@ -234,6 +234,7 @@ static void random_clear(struct check *c)
 {
 	struct picture p;
 	random_picture(c, &p);
+	p.target.clean = check_u32(c) & ALL_PARTS;
 	while (check_next(c))
 		c->simd->warp_clear(&p.target, p.levels);
 }
@@ -242,6 +243,7 @@ static void random_cells(struct check *c)
 {
 	struct picture p;
 	random_picture(c, &p);
+	p.target.bare = check_u32(c) & ALL_PARTS;
 	while (check_next(c))
 		for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 			if (p.levels >> k & 1)
@@ -315,8 +317,8 @@ int main(int argc, char **argv)
 		{ "warp: infinite, huge, denormal and no numbers", spoilt_numbers, 1500, NULL },
 		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
 		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
-		{ "warp_clear: random tiles and levels", random_clear, 400, NULL },
-		{ "warp_cells: random tiles and levels", random_cells, 400, NULL },
+		{ "warp_clear: random tiles, clean parts and levels", random_clear, 400, NULL },
+		{ "warp_cells: random tiles, bare parts and levels", random_cells, 400, NULL },
 		{ "warp_far: random tiles", random_far, 400, NULL },
 		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
 		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
