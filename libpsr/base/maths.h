@@ -47,10 +47,11 @@ static inline int32_t psr_floor_int(float x)
  *
  * log2 x = e + log2 m with m in [sqrt 1/2, sqrt 2), as an odd series in s = (m - 1) / (m + 1): exact at x = 1,
  * where large exponents need it; 2^t by its series on [-1/2, 1/2]. Truncation errors: 2 s^13 / 13 / ln 2 < 2e-11
- * (s <= 0.172), (ln 2 / 2)^8 / 8! < 6e-9. */
-static inline float psr_power(float x, float y)
+ * (s <= 0.172), (ln 2 / 2)^8 / 8! < 6e-9.
+ *
+ * In two halves, for loops of their own: y log2 x, or -60 where the result is 0, and the power of two. */
+static inline float psr_power_exponent(float x, float y)
 {
-	/* Choices are made at the end, so that a loop over this becomes vectors. */
 	uint32_t bits = psr_bits_from_float(x);
 	int32_t e = (int32_t)((bits - 0x3f3504f3u) >> 23 << 23) >> 23;
 	float m = psr_float_from_bits(bits - ((uint32_t)e << 23));
@@ -63,10 +64,14 @@ static inline float psr_power(float x, float y)
 	p = p * q + 0.96179669f;            /* 2 / (3 ln 2) */
 	p = p * q + 2.88539008f;            /* 2 / ln 2 */
 	float power = ((float)e + s * p) * y;
-	float t = psr_choose(power > -60.0f, power, -60.0f);
+	return psr_choose((power > -60.0f) & (bits >= 0x00800000), power, -60.0f);
+}
+
+static inline float psr_power_of_two(float t)
+{
 	int32_t n = psr_floor_int(t + 0.5f);
 	float f = t - (float)n;
-	p = 1.5252733e-5f;                  /* (ln 2)^7 / 7! */
+	float p = 1.5252733e-5f;            /* (ln 2)^7 / 7! */
 	p = p * f + 1.5403530e-4f;
 	p = p * f + 1.3333558e-3f;
 	p = p * f + 9.6181291e-3f;
@@ -75,7 +80,12 @@ static inline float psr_power(float x, float y)
 	p = p * f + 6.9314718e-1f;
 	p = p * f + 1.0f;
 	float result = p * psr_float_from_bits((uint32_t)(n + 127) << 23);
-	return psr_where((power > -60.0f) & (bits >= 0x00800000), result);
+	return psr_where(t > -60.0f, result);
+}
+
+static inline float psr_power(float x, float y)
+{
+	return psr_power_of_two(psr_power_exponent(x, y));
 }
 
 #endif

@@ -2,8 +2,27 @@
 #include "base/maths.h"
 #include "simd/strip_parts.h"
 
+/* Of a strip: R.V, and how much of the light makes a highlight. */
+struct highlights {
+	float cosine[STRIP], amount[STRIP];
+};
+
+/* In short loops, so that a core has several turns of the long chains of operations under way. */
+static void add_highlights(struct strip *s, const struct highlights *h, const float color[3])
+{
+	float exponent[STRIP];
+	for (uint32_t i = 0; i < s->n; i++)
+		exponent[i] = psr_power_exponent(h->cosine[i], s->exponent[i]);
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float highlight = psr_power_of_two(exponent[i]) * h->amount[i];
+		s->hr[i] += color[0] * highlight;
+		s->hg[i] += color[1] * highlight;
+		s->hb[i] += color[2] * highlight;
+	}
+}
+
 /* What arrives of a light is times N.L, where that is above 0; the highlight is (R.V)^n with R = 2 (N.L) N - L. */
-static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular, const float color[3], float amount,
+static CONSTANT_FLAGS void reflect(struct strip *s, struct highlights *h, uint32_t i, int is_specular, const float color[3], float amount,
                                    float x, float y, float z)
 {
 	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
@@ -15,12 +34,9 @@ static CONSTANT_FLAGS void reflect(struct strip *s, uint32_t i, int is_specular,
 		const float normal_view = (s->nx[i] * s->vx[i] + s->ny[i] * s->vy[i]) + s->nz[i] * s->vz[i];
 		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
 		const float mirror = 2 * facing * normal_view - light_view;
-		const float least = psr_where(mirror > 0, mirror), clamped = psr_choose(least < 1, least, 1);
-		const float power = psr_power(clamped, s->exponent[i]);
-		const float highlight = psr_where(facing > 0, power) * amount;
-		s->hr[i] += color[0] * highlight;
-		s->hg[i] += color[1] * highlight;
-		s->hb[i] += color[2] * highlight;
+		const float least = psr_where(mirror > 0, mirror);
+		h->cosine[i] = psr_choose(least < 1, least, 1);
+		h->amount[i] = psr_where(facing > 0, amount);
 	}
 }
 
@@ -28,14 +44,19 @@ static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip
                                              int is_partial, int is_specular)
 {
 	const struct strip_light l = *light;
+	struct highlights h;
 	for (uint32_t i = 0; i < s->n; i++)
-		reflect(s, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1], l.to_light[2]);
+		reflect(s, &h, i, is_specular, l.color, is_partial ? reaches[i] : 1, l.to_light[0], l.to_light[1],
+		        l.to_light[2]);
+	if (is_specular)
+		add_highlights(s, &h, l.color);
 }
 
 static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light *light, const float *reaches,
                                       int is_partial, int is_specular, int is_spot)
 {
 	const struct strip_light l = *light;
+	struct highlights h;
 	for (uint32_t i = 0; i < s->n; i++) {
 		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
 		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
@@ -49,8 +70,10 @@ static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light 
 			amount = psr_where(c > l.cos_outer, amount * edge);
 		}
 		amount = psr_where(distance2 > 0, amount) * (is_partial ? reaches[i] : 1);
-		reflect(s, i, is_specular, l.color, amount, x, y, z);
+		reflect(s, &h, i, is_specular, l.color, amount, x, y, z);
 	}
+	if (is_specular)
+		add_highlights(s, &h, l.color);
 }
 
 static CONSTANT_FLAGS void light_by(struct strip *strip, const struct strip_light *light, const float *reaches,
