@@ -25,7 +25,8 @@ struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y
 {
 	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
 	const struct fill_row *cell = &level->cell;
-	return (struct fill_row){ cell->r + at, cell->g + at, cell->b + at, cell->weight + at, cell->z + at };
+	return (struct fill_row){ cell->r + at, cell->g + at, cell->b + at, cell->weight + at, cell->z + at,
+		                      cell->near + at };
 }
 
 void fill_note_depth(struct fill *fill, int level)
@@ -58,7 +59,7 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		h = (h + 1) / 2;
 		cells += (size_t)(w + 2) * (h + 2);
 	}
-	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t)) + (sizeof *fill->left + 5) * n_bricks +
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t) + 1) + (sizeof *fill->left + 6) * n_bricks +
 	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
@@ -67,18 +68,21 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 	float *z = fill->storage;
 	fill->left = (uint32_t *)(z + cells);
 	uint16_t *values = (uint16_t *)(fill->left + n_bricks);
+	uint8_t *near = (uint8_t *)(values + 4 * cells);
 	uint32_t w = width, h = height;
 	for (int l = 1; l <= top; l++) {
 		w = (w + 1) / 2;
 		h = (h + 1) / 2;
 		const size_t area = (size_t)(w + 2) * (h + 2);
 		fill->level[l] = (struct fill_level){ .width = w, .height = h, .left = -1, .top = -1, .stride = w + 2,
-			.cell = { values, values + area, values + 2 * area, values + 3 * area, z } };
+			.cell = { values, values + area, values + 2 * area, values + 3 * area, z, near } };
 		clear_level(&fill->level[l], area);
 		z += area;
 		values += 4 * area;
+		near += area;
 	}
-	fill->whole = (uint8_t *)values;
+	fill->pulled = near;
+	fill->whole = fill->pulled + n_bricks;
 	fill->needs = fill->whole + n_bricks;
 	fill->wants = fill->needs + n_bricks;
 	fill->coarse = fill->wants + n_bricks;
@@ -135,7 +139,7 @@ static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx
 {
 	const uint8_t *row = map + (size_t)by * fill->bricks_x;
 	uint32_t end = bx + 1;
-	while (end < fill->bricks_x && end - bx < FILL_RUN && row[end] > least)
+	while (end < fill->bricks_x && row[end] > least)
 		end++;
 	return end;
 }
@@ -144,13 +148,18 @@ void fill_look(struct fill *fill, uint32_t row)
 {
 	const uint8_t *bricks = fill->picture.bricks + (size_t)row * fill->bricks_x;
 	uint8_t *whole = fill->whole + (size_t)row * fill->bricks_x;
+	uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
 	memset(whole, 0, fill->bricks_x);
+	memset(pulled, 0, fill->bricks_x);
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
+		int level = 1;
 		end = bx + 1;
 		if (!bricks[bx])
 			continue;
 		end = run_end(fill, fill->picture.bricks, bx, row, 0);
-		fill_pull_bricks(fill, bx, end, row, fill->brick_top, FILL_WEIGHTS_UNTIL_WHOLE);
+		while (fill_pull_weights(fill, bx, end, row, level) < WEIGHT_ONE && level < fill->brick_top)
+			level++;
+		memset(pulled + bx, level, end - bx);
 		for (uint32_t b = bx; b < end; b++)
 			whole[b] = (uint8_t)whole_level(fill, b, row);
 	}
@@ -181,18 +190,19 @@ static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 		return;
 	*state |= FILL_PULLED;
 	if (l == fill->brick_top) {
-		fill->wants[(size_t)y * fill->bricks_x + x] = (uint8_t)l;
-		fill_pull_bricks(fill, x, x + 1, y, l, FILL_WEIGHTS);
+		const size_t brick = (size_t)y * fill->bricks_x + x;
+		fill->wants[brick] = (uint8_t)l;
+		while (fill->pulled[brick] < l)
+			fill_pull_weights(fill, x, x + 1, y, ++fill->pulled[brick]);
 		return;
 	}
 	for (uint32_t v = 2 * y; v <= 2 * y + 1 && v < fill->level[l - 1].height; v++)
 		for (uint32_t u = 2 * x; u <= 2 * x + 1 && u < fill->level[l - 1].width; u++)
 			pull_tree(fill, l - 1, u, v);
-	struct fill_row to = fill_row_at(&fill->level[l], (int32_t)x, (int32_t)y);
+	const struct fill_row to = fill_row_at(&fill->level[l], (int32_t)x, (int32_t)y);
 	const struct fill_row upper = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y));
 	const struct fill_row lower = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y + 1));
-	to.r = to.g = to.b = NULL;
-	if (fill->simd->fill_pull(&to, &upper, &lower, 1, 0, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) <
+	if (fill->simd->fill_pull_weights(&to, &upper, &lower, 1, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) <
 	    WEIGHT_ONE / 2)
 		fill_note_depth(fill, l);
 }
@@ -274,18 +284,36 @@ static void push_level_row(int i, void *userdata)
 static void push_pixels(struct fill *fill, uint32_t row, int is_early)
 {
 	const uint8_t *needs = fill->needs + (size_t)row * fill->bricks_x;
+	struct fill_counts counts = { 0, 0, 0 };
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		end = bx + 1;
 		if (!needs[bx])
 			continue;
 		end = run_end(fill, fill->needs, bx, row, 0);
-		fill_push_bricks(fill, bx, end, row, is_early);
+		fill_push_bricks(fill, &counts, bx, end, row, is_early);
 	}
+	atomic_fetch_add_explicit(&fill->n_changed, counts.n_changed, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_filled, counts.n_filled, memory_order_relaxed);
+	atomic_fetch_add_explicit(&fill->n_moved, counts.n_moved, memory_order_relaxed);
 }
 
 static void push_row(int i, void *userdata)
 {
 	push_pixels(userdata, (uint32_t)i, 0);
+}
+
+/* Weights and depths of bricks bx0..bx1-1 at a level, where they are not pulled so far. */
+static void complete_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t row, int level)
+{
+	const uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
+	for (uint32_t bx = bx0, end; bx < bx1; bx = end) {
+		end = bx + 1;
+		if (pulled[bx] >= level)
+			continue;
+		while (end < bx1 && pulled[end] < level)
+			end++;
+		fill_pull_weights(fill, bx, end, row, level);
+	}
 }
 
 void fill_pull(struct fill *fill, uint32_t row)
@@ -296,7 +324,10 @@ void fill_pull(struct fill *fill, uint32_t row)
 		end = wants[bx] ? run_end(fill, fill->wants, bx, row, 0) : bx + 1;
 		for (uint32_t b = bx; b < end; b++)
 			level = wants[b] > level ? wants[b] : level;
-		fill_pull_bricks(fill, bx, end, row, level, FILL_COLORS);
+		for (int l = 1; l <= level; l++) {
+			complete_weights(fill, bx, end, row, l);
+			fill_pull_colors(fill, bx, end, row, l);
+		}
 	}
 	for (int l = fill->needed - 1; l > 0; l--)
 		push_level(fill, row, l, 1);
@@ -323,8 +354,9 @@ static void run_coarse(struct fill *fill)
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const struct fill_row row = fill_row_at(to, 0, y), upper = fill_row_at(from, 0, 2 * y);
 			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
-			fill->simd->fill_pull(&row, &upper, &lower, to->width, 0, fill_scale(fill->plan, l + 1),
-			                      fill_offset(fill->plan, l + 1));
+			fill->simd->fill_pull_weights(&row, &upper, &lower, to->width, fill_scale(fill->plan, l + 1),
+			                              fill_offset(fill->plan, l + 1));
+			fill->simd->fill_pull_colors(&row, &upper, &lower, to->width, 0);
 		}
 	}
 	finish_top(&fill->level[fill->top], fill->plan);

@@ -239,6 +239,7 @@ struct fill {
 	struct fill_level level[FILL_LEVELS]; /* of 1..top, the single cell */
 	int top, brick_top;                   /* brick_top: the coarsest that bricks are pulled to by themselves */
 	uint32_t width, height, bricks_x, bricks_y;
+	uint8_t *pulled;  /* by brick: up to which level weights and depths are pulled */
 	uint8_t *whole;   /* by brick: the finest level whose cells are whole there; brick_top + 1: none; 0: not marked */
 	uint8_t *needs;   /* by brick that is marked: the greatest of `whole` around it */
 	uint32_t *left;   /* by brick, a bit a row: pixels may be left that are not whole */
@@ -255,7 +256,7 @@ struct fill {
 	const struct plan *plan;
 	struct fill_picture picture;
 	_Atomic int deepest; /* coarsest level with a cell of weight below a half, which has a coarser one's depth */
-	_Atomic uint64_t n_changed, n_filled, n_moved; /* pixels; moved: of another depth than their own */
+	_Atomic uint64_t n_changed, n_filled, n_moved; /* as of fill_counts */
 };
 
 /* A picture is filled in four steps. Those by row of bricks are for any thread, in any order; each step begins when the
@@ -279,25 +280,31 @@ void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repo
 
 /* -- between fill.c and fill_bricks.c -- */
 
-#define FILL_RUN (FILL_WIDTH / BRICK) /* bricks side by side that are worked on together */
-
 struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y);
 float fill_scale(const struct plan *plan, int level); /* of the threshold among cells of `level` */
 float fill_offset(const struct plan *plan, int level);
 void fill_note_depth(struct fill *fill, int level);
 
 enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
-enum fill_what { FILL_COLORS, FILL_WEIGHTS, FILL_WEIGHTS_UNTIL_WHOLE }; /* weights and depths, without colours */
+/* Pulls weights and depths of bricks bx0..bx1-1 of brick row `by` to a level, from the one before; returns the least
+ * weight. */
+uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
 
-/* Pulls bricks bx0..bx1-1, FILL_RUN at most, of brick row `by` up to a level. */
-void fill_pull_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, enum fill_what what);
+/* Then their colours. */
+void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
 
 /* Makes their cells of a level whole, from those of the next: early those that look at nothing but whole cells of these
  * and the bricks beside them, then the others. */
 void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
 
-/* The same for their pixels, of FILL_RUN bricks at most. */
-void fill_push_bricks(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int is_early);
+/* Pixels; moved: of another depth than their own. */
+struct fill_counts {
+	uint32_t n_changed, n_filled, n_moved;
+};
+
+/* The same for their pixels. Adds to the counts. */
+void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx0, uint32_t bx1, uint32_t by,
+                      int is_early);
 
 /* ---- smooth: anti-aliasing ([G] 9.1.1) ---- */
 

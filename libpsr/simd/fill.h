@@ -27,13 +27,6 @@ struct block_row {
 	float z[2 * FILL_BLOCK + 2];
 };
 
-static inline __attribute__((always_inline)) struct fill_row row_from(struct fill_row row, ptrdiff_t x, int has_colors,
-                                                                      int has_weight)
-{
-	return (struct fill_row){ has_colors ? row.r + x : NULL, has_colors ? row.g + x : NULL,
-		                      has_colors ? row.b + x : NULL, has_weight ? row.weight + x : NULL, row.z + x };
-}
-
 static inline void copy_values(uint16_t *to, const uint16_t *from, uint32_t n, uint16_t outside)
 {
 	for (uint32_t i = 0; i < 2 * FILL_BLOCK + 2; i++)
@@ -74,29 +67,26 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 		to[x] = (uint16_t)value[x];
 }
 
-/* Weights and depths; returns the least weight. */
-static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_shares *shares, uint16_t *weight,
-                                                                  float *z, struct fill_row upper,
-                                                                  struct fill_row lower, int is_picture, float scale,
-                                                                  float offset)
+/* FILL_BLOCK cells, from those whose depths and weights these are; returns the least weight. */
+static inline int32_t pull_weights(uint16_t *weight, float *z, uint8_t *near, const float *upper_z,
+                                   const float *lower_z, const uint16_t *upper, const uint16_t *lower, float scale,
+                                   float offset)
 {
-	float depth[4][FILL_BLOCK];
-	int32_t sums[FILL_BLOCK];
-	uint32_t above[FILL_BLOCK], below[FILL_BLOCK];
+	float depth[4][FILL_BLOCK], mean[FILL_BLOCK];
+	int32_t sums[FILL_BLOCK], bits[FILL_BLOCK];
 	int32_t least = GAPS_WHOLE;
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
-		depth[0][x] = upper.z[2 * x];
-		depth[1][x] = upper.z[2 * x + 1];
-		depth[2][x] = lower.z[2 * x];
-		depth[3][x] = lower.z[2 * x + 1];
+		depth[0][x] = upper_z[2 * x];
+		depth[1][x] = upper_z[2 * x + 1];
+		depth[2][x] = lower_z[2 * x];
+		depth[3][x] = lower_z[2 * x + 1];
 	}
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
-		const uint32_t two = pair_at(upper.weight, x), others = pair_at(lower.weight, x);
+		const uint32_t two = pair_at(upper, x), others = pair_at(lower, x);
 		const int32_t w[4] = { (int32_t)(two & 0xffff), (int32_t)(two >> 16), (int32_t)(others & 0xffff),
 			                   (int32_t)(others >> 16) };
 		float nearest = INFINITY, sum_z = 0;
-		int32_t sum = 0;
-		uint32_t share[4];
+		int32_t sum = 0, is_near = 0;
 		for (int i = 0; i < 4; i++) { /* what is NaN is nearer than nothing */
 			const float own = psr_choose(w[i] > 0, depth[i][x], INFINITY);
 			nearest = own < nearest ? own : nearest;
@@ -106,104 +96,142 @@ static inline __attribute__((always_inline)) int32_t pull_weights(struct pull_sh
 			const int32_t own = w[i] & -(depth[i][x] <= limit);
 			sum_z += psr_where(own > 0, (float)own * depth[i][x]);
 			sum += own;
-			share[i] = is_picture ? (uint32_t)own : 256u & (0u - (uint32_t)(own > 0));
+			is_near |= (own > 0) << i;
 		}
-		z[x] = psr_choose(sum > 0, sum_z / (float)sum, INFINITY);
-		above[x] = share[0] | share[1] << 16;
-		below[x] = share[2] | share[3] << 16;
+		mean[x] = psr_choose(sum > 0, sum_z / (float)sum, INFINITY);
 		sums[x] = sum;
+		bits[x] = is_near;
 		least = sum < least ? sum : least;
 	}
-	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+	for (uint32_t x = 0; x < FILL_BLOCK; x++)
 		weight[x] = (uint16_t)(sums[x] < GAPS_WHOLE ? sums[x] : GAPS_WHOLE);
-		shares->divisor[x] = sums[x] > GAPS_WHOLE ? sums[x] : GAPS_WHOLE;
-		shares->inverse[x] = (256 - 0x1p-12f) / (float)shares->divisor[x];
+	for (uint32_t x = 0; x < FILL_BLOCK; x++)
+		near[x] = (uint8_t)bits[x];
+	memcpy(z, mean, sizeof mean);
+	return least;
+}
+
+/* What children of weights `upper` and `lower` add to cells. */
+static inline __attribute__((always_inline)) void find_shares(struct pull_shares *shares, const uint8_t *near,
+                                                              const uint16_t *upper, const uint16_t *lower,
+                                                              int is_picture)
+{
+	uint32_t above[FILL_BLOCK], below[FILL_BLOCK];
+	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
+		const uint32_t bits = near[x], left = 0x0000ffff, right = 0xffff0000;
+		const uint32_t two = (left & (0u - (bits & 1))) | (right & (0u - (bits >> 1 & 1)));
+		const uint32_t others = (left & (0u - (bits >> 2 & 1))) | (right & (0u - (bits >> 3)));
+		const uint32_t w = pair_at(upper, x) & two, v = pair_at(lower, x) & others;
+		const int32_t sum = (int32_t)((w & 0xffff) + (w >> 16) + (v & 0xffff) + (v >> 16));
+		const int32_t by = sum > GAPS_WHOLE ? sum : GAPS_WHOLE;
+		above[x] = is_picture ? w : two & (GAPS_WHOLE | GAPS_WHOLE << 16);
+		below[x] = is_picture ? v : others & (GAPS_WHOLE | GAPS_WHOLE << 16);
+		shares->divisor[x] = by;
+		shares->inverse[x] = (256 - 0x1p-12f) / (float)by;
 	}
 	memcpy(shares->upper, above, sizeof above);
 	memcpy(shares->lower, below, sizeof below);
-	return least;
 }
 
-static inline __attribute__((always_inline)) int32_t pull_block(struct fill_row to, struct fill_row upper,
-                                                                struct fill_row lower, int has_colors, int is_picture,
-                                                                float scale, float offset)
+/* Cell x of a row, and those to the right of it. */
+static inline struct fill_row row_from(struct fill_row row, ptrdiff_t x)
 {
-	struct pull_shares shares;
-	uint16_t weight[FILL_BLOCK];
-	float z[FILL_BLOCK];
-	const int32_t least = pull_weights(&shares, weight, z, upper, lower, is_picture, scale, offset);
-	memcpy(to.weight, weight, sizeof weight);
-	memcpy(to.z, z, sizeof z);
-	if (has_colors) {
-		pull_channel(to.r, upper.r, lower.r, &shares);
-		pull_channel(to.g, upper.g, lower.g, &shares);
-		pull_channel(to.b, upper.b, lower.b, &shares);
-	}
-	return least;
+	return (struct fill_row){ row.r + x, row.g + x, row.b + x, row.weight + x, row.z + x, NULL };
 }
 
-/* With whole cells beyond them. */
-static inline struct fill_row copy_row(struct block_row *to, struct fill_row from, uint32_t n, int has_colors)
+/* Copies what a block needs of the last cells of a row: n weights and depths, and whole cells beyond them. */
+static inline void copy_weights(struct block_row *to, const struct fill_row *from, uint32_t x, uint32_t n)
 {
-	copy_values(to->weight, from.weight, n, GAPS_WHOLE);
+	copy_values(to->weight, from->weight + x, n, GAPS_WHOLE);
 	memset(to->z, 0, sizeof to->z);
-	memcpy(to->z, from.z, n * sizeof *to->z);
-	if (has_colors) {
-		copy_values(to->r, from.r, n, 0);
-		copy_values(to->g, from.g, n, 0);
-		copy_values(to->b, from.b, n, 0);
-	}
-	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z };
+	memcpy(to->z, from->z + x, n * sizeof *to->z);
 }
 
-static inline void copy_back(struct fill_row to, const struct block_row *from, uint32_t n, int has_colors,
-                             int has_weight)
+static inline uint16_t fill_pull_weights(const struct fill_row *to, const struct fill_row *upper,
+                                         const struct fill_row *lower, uint32_t n, float scale, float offset)
 {
-	memcpy(to.z, from->z, n * sizeof *to.z);
-	if (has_weight)
-		memcpy(to.weight, from->weight, n * sizeof *to.weight);
-	if (has_colors) {
-		memcpy(to.r, from->r, n * sizeof *to.r);
-		memcpy(to.g, from->g, n * sizeof *to.g);
-		memcpy(to.b, from->b, n * sizeof *to.b);
-	}
-}
-
-static inline __attribute__((always_inline)) uint16_t pull_row(struct fill_row to, struct fill_row upper,
-                                                               struct fill_row lower, uint32_t n, int has_colors,
-                                                               int is_picture, float scale, float offset)
-{
-	int32_t least = GAPS_WHOLE;
+	const struct fill_row out = *to, above = *upper, below = *lower;
+	int32_t least = GAPS_WHOLE, some;
 	uint32_t x = 0;
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
-		const int32_t weight = pull_block(row_from(to, x, has_colors, 1), row_from(upper, 2 * x, has_colors, 1),
-		                                  row_from(lower, 2 * x, has_colors, 1), has_colors, is_picture, scale, offset);
-		least = weight < least ? weight : least;
+		some = pull_weights(out.weight + x, out.z + x, out.near + x, above.z + 2 * x, below.z + 2 * x,
+		                    above.weight + 2 * x, below.weight + 2 * x, scale, offset);
+		least = some < least ? some : least;
 	}
 	if (x < n) {
 		struct block_row rows[3];
-		const struct fill_row out = { rows[0].r, rows[0].g, rows[0].b, rows[0].weight, rows[0].z };
-		const struct fill_row above =
-			copy_row(&rows[1], row_from(upper, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
-		const struct fill_row below =
-			copy_row(&rows[2], row_from(lower, 2 * x, has_colors, 1), 2 * (n - x), has_colors);
-		const int32_t weight = pull_block(out, above, below, has_colors, is_picture, scale, offset);
-		least = weight < least ? weight : least;
-		copy_back(row_from(to, x, has_colors, 1), &rows[0], n - x, has_colors, 1);
+		uint8_t near[FILL_BLOCK];
+		copy_weights(&rows[1], &above, 2 * x, 2 * (n - x));
+		copy_weights(&rows[2], &below, 2 * x, 2 * (n - x));
+		some = pull_weights(rows[0].weight, rows[0].z, near, rows[1].z, rows[2].z, rows[1].weight, rows[2].weight,
+		                    scale, offset);
+		least = some < least ? some : least;
+		memcpy(out.weight + x, rows[0].weight, (n - x) * sizeof *out.weight);
+		memcpy(out.z + x, rows[0].z, (n - x) * sizeof *out.z);
+		memcpy(out.near + x, near, n - x);
 	}
 	return (uint16_t)least;
 }
 
-static inline uint16_t fill_pull(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
-                                 uint32_t n, int is_picture, float scale, float offset)
+static inline __attribute__((always_inline)) void pull_row(const struct fill_row *to, const struct fill_row *upper,
+                                                           const struct fill_row *lower, uint32_t n, int is_picture)
 {
-	if (!to->r)
-		return pull_row(*to, *upper, *lower, n, 0, 0, scale, offset);
-	return is_picture ? pull_row(*to, *upper, *lower, n, 1, 1, scale, offset)
-	                  : pull_row(*to, *upper, *lower, n, 1, 0, scale, offset);
+	uint16_t *const out[3] = { to->r, to->g, to->b };
+	const uint16_t *const above[3] = { upper->r, upper->g, upper->b }, *const below[3] = { lower->r, lower->g, lower->b };
+	struct pull_shares shares;
+	uint32_t x = 0;
+	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
+		find_shares(&shares, to->near + x, upper->weight + 2 * x, lower->weight + 2 * x, is_picture);
+		for (int i = 0; i < 3; i++)
+			pull_channel(out[i] + x, above[i] + 2 * x, below[i] + 2 * x, &shares);
+	}
+	if (x < n) {
+		const uint32_t left = n - x;
+		struct block_row rows[2];
+		uint16_t values[FILL_BLOCK];
+		uint8_t near[FILL_BLOCK] = { 0 };
+		memcpy(near, to->near + x, left);
+		copy_values(rows[0].weight, upper->weight + 2 * x, 2 * left, 0);
+		copy_values(rows[1].weight, lower->weight + 2 * x, 2 * left, 0);
+		find_shares(&shares, near, rows[0].weight, rows[1].weight, is_picture);
+		for (int i = 0; i < 3; i++) {
+			copy_values(rows[0].r, above[i] + 2 * x, 2 * left, 0);
+			copy_values(rows[1].r, below[i] + 2 * x, 2 * left, 0);
+			pull_channel(values, rows[0].r, rows[1].r, &shares);
+			memcpy(out[i] + x, values, left * sizeof *values);
+		}
+	}
+}
+
+static inline void fill_pull_colors(const struct fill_row *to, const struct fill_row *upper,
+                                    const struct fill_row *lower, uint32_t n, int is_picture)
+{
+	if (is_picture)
+		pull_row(to, upper, lower, n, 1);
+	else
+		pull_row(to, upper, lower, n, 0);
 }
 
 /* ---- push ---- */
+
+/* With whole cells beyond them. */
+static inline struct fill_row copy_row(struct block_row *to, struct fill_row from, uint32_t n)
+{
+	copy_weights(to, &from, 0, n);
+	copy_values(to->r, from.r, n, 0);
+	copy_values(to->g, from.g, n, 0);
+	copy_values(to->b, from.b, n, 0);
+	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z, NULL };
+}
+
+static inline void copy_back(struct fill_row to, const struct block_row *from, uint32_t n)
+{
+	memcpy(to.z, from->z, n * sizeof *to.z);
+	memcpy(to.weight, from->weight, n * sizeof *to.weight);
+	memcpy(to.r, from->r, n * sizeof *to.r);
+	memcpy(to.g, from->g, n * sizeof *to.g);
+	memcpy(to.b, from->b, n * sizeof *to.b);
+}
 
 /* What finer cells take from their parents, from the parents' neighbors to their own side and from those above or
  * below: all or nothing of each, the parents' twice; and the inverse of the sum of these shares. */
@@ -325,10 +353,11 @@ struct push_rows {
 static inline void copy_rows(struct push_rows *to, struct fill_row was, struct fill_row own, struct fill_row beside,
                              uint32_t n)
 {
-	to->was = copy_row(&to->copy[0], was, 2 * n, 1);
-	to->own = row_from(copy_row(&to->copy[1], row_from(own, -1, 1, 1), n + 2, 1), 1, 1, 1);
-	to->beside = copy_row(&to->copy[2], beside, n, 1);
-	to->to = (struct fill_row){ to->copy[3].r, to->copy[3].g, to->copy[3].b, to->copy[3].weight, to->copy[3].z };
+	to->was = copy_row(&to->copy[0], was, 2 * n);
+	to->own = row_from(copy_row(&to->copy[1], row_from(own, -1), n + 2), 1);
+	to->beside = copy_row(&to->copy[2], beside, n);
+	to->to = (struct fill_row){ to->copy[3].r, to->copy[3].g, to->copy[3].b, to->copy[3].weight, to->copy[3].z,
+		                      NULL };
 }
 
 static inline void fill_push(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside,
@@ -338,37 +367,51 @@ static inline void fill_push(const struct fill_row *to, const struct fill_row *o
 	uint16_t turn[2 * FILL_BLOCK];
 	uint32_t x = 0;
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
-		const struct fill_row was = row_from(cells, 2 * x, 1, 1);
+		const struct fill_row was = row_from(cells, 2 * x);
 		if (has_partial(was.weight, 2 * FILL_BLOCK))
-			push_block(was, turn, was, row_from(parents, x, 1, 1), row_from(others, x, 1, 1), 0, scale, offset);
+			push_block(was, turn, was, row_from(parents, x), row_from(others, x), 0, scale, offset);
 	}
 	if (x < n && has_partial(cells.weight + 2 * x, 2 * (n - x))) {
 		struct push_rows rows;
-		copy_rows(&rows, row_from(cells, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n - x);
+		copy_rows(&rows, row_from(cells, 2 * x), row_from(parents, x), row_from(others, x), n - x);
 		if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 0, scale, offset))
-			copy_back(row_from(cells, 2 * x, 1, 1), &rows.copy[3], 2 * (n - x), 1, 1);
+			copy_back(row_from(cells, 2 * x), &rows.copy[3], 2 * (n - x));
 	}
 }
 
-/* Lists the block's pixels whose turn it is; takes its bit out where no other is left. */
-static inline uint32_t list_block(uint16_t *place, uint32_t *left, uint32_t bit, const uint16_t *turn,
-                                  const uint16_t *weight, uint32_t first, uint32_t n)
+/* Lists the block's pixels whose turn it is, `n_places` after those of blocks before; takes its bit out where no other
+ * is left. Returns how many are listed now. */
+static inline uint32_t list_block(struct fill_places *places, uint32_t n_places, uint32_t *left, uint32_t bit,
+                                  const uint16_t *turn, const uint16_t *weight, const struct block_row *row,
+                                  uint32_t first, uint32_t n)
 {
-	uint32_t n_places = 0, n_partial = 0;
+	uint16_t *at = places->at + n_places;
+	uint32_t n_turn = 0, n_partial = 0;
 	for (uint32_t x = 0; x < n; x++) {
-		place[n_places] = (uint16_t)(first + x);
-		n_places += turn[x] & 1;
+		at[n_turn] = (uint16_t)x;
+		n_turn += turn[x] & 1;
 		n_partial += weight[x] < GAPS_WHOLE;
 	}
-	*left &= ~(n_places == n_partial ? bit : 0);
-	return n_places;
+	*left &= ~(n_turn == n_partial ? bit : 0);
+	for (uint32_t i = 0; i < n_turn; i++) {
+		const uint32_t x = at[i], to = n_places + i;
+		places->at[to] = (uint16_t)(first + x);
+		places->weight[to] = weight[x];
+		places->r[to] = row->r[x];
+		places->g[to] = row->g[x];
+		places->b[to] = row->b[x];
+		places->z[to] = row->z[x];
+	}
+	return n_places + n_turn;
 }
 
-static inline uint32_t fill_push_picture(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
+static inline uint32_t fill_push_picture(struct fill_places *places, uint32_t *left, uint32_t bit,
                                          const struct fill_row *was, const struct fill_row *own,
                                          const struct fill_row *beside, uint32_t n, float scale, float offset)
 {
-	const struct fill_row out = *to, in = *was, parents = *own, others = *beside;
+	const struct fill_row in = *was, parents = *own, others = *beside;
+	struct block_row row;
+	const struct fill_row out = { row.r, row.g, row.b, NULL, row.z, NULL };
 	uint16_t turn[2 * FILL_BLOCK];
 	uint32_t n_places = 0;
 	for (uint32_t x = 0; x < n; x += FILL_BLOCK, left++) {
@@ -378,18 +421,19 @@ static inline uint32_t fill_push_picture(const struct fill_row *to, uint16_t *pl
 			continue;
 		if (!has_partial(weight, 2 * n_block)) {
 			*left &= ~bit;
-		} else if (n_block == FILL_BLOCK) {
-			if (push_block(row_from(out, 2 * x, 1, 0), turn, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1),
-			               row_from(others, x, 1, 1), 1, scale, offset))
-				n_places += list_block(place + n_places, left, bit, turn, weight, 2 * x, 2 * FILL_BLOCK);
+			continue;
+		}
+		int is_turn;
+		if (n_block == FILL_BLOCK) {
+			is_turn = push_block(out, turn, row_from(in, 2 * x), row_from(parents, x),
+			                     row_from(others, x), 1, scale, offset);
 		} else {
 			struct push_rows rows;
-			copy_rows(&rows, row_from(in, 2 * x, 1, 1), row_from(parents, x, 1, 1), row_from(others, x, 1, 1), n_block);
-			if (push_block(rows.to, turn, rows.was, rows.own, rows.beside, 1, scale, offset)) {
-				copy_back(row_from(out, 2 * x, 1, 0), &rows.copy[3], 2 * n_block, 1, 0);
-				n_places += list_block(place + n_places, left, bit, turn, weight, 2 * x, 2 * n_block);
-			}
+			copy_rows(&rows, row_from(in, 2 * x), row_from(parents, x), row_from(others, x), n_block);
+			is_turn = push_block(out, turn, rows.was, rows.own, rows.beside, 1, scale, offset);
 		}
+		if (is_turn)
+			n_places = list_block(places, n_places, left, bit, turn, weight, &row, 2 * x, 2 * n_block);
 	}
 	return n_places;
 }

@@ -9,7 +9,8 @@ warp_fn warp_c, warp_avx2, warp_avx512;
 strip_list_fn strip_list_avx512;
 strip_read_fn strip_read_avx512;
 strip_write_fn strip_write_avx512;
-fill_pull_fn fill_pull_avx512;
+fill_pull_weights_fn fill_pull_weights_avx512;
+fill_pull_colors_fn fill_pull_colors_avx512;
 fill_push_fn fill_push_avx512;
 fill_push_picture_fn fill_push_picture_avx512;
 

@@ -332,19 +332,24 @@ typedef struct gaps_counts gaps_fn(const struct gaps_target *target, uint32_t x0
 
 /* ---- fill ([G] 4.7, appendix) ---- */
 
-#define FILL_WIDTH 256 /* cells of a row at most, in one call */
+#define FILL_WIDTH 256 /* parents of pixels at most, in one fill_push_picture */
 
 /* Cells side by side. Colours are premultiplied with the weight, but in the picture itself. Outside of the picture z is
  * NaN, nearer than nothing and farther than nothing, and the weight GAPS_WHOLE. */
 struct fill_row {
-	uint16_t *r, *g, *b, *weight; /* r, g, b: NULL where only weights and depths matter */
+	uint16_t *r, *g, *b, *weight; /* each NULL where it does not matter */
 	float *z;
+	uint8_t *near; /* bit 2 j + i: child i of row j counts: it has a weight, and is not beyond the others */
 };
 
-/* Cells to[0..n-1] from cells upper[0..2n-1] and lower[0..2n-1]: of those that have a weight, the ones that are not
- * beyond scale * z + offset of the nearest. Returns the least weight. */
-typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
-                              uint32_t n, int is_picture, float scale, float offset);
+/* Weights, depths and `near` of cells to[0..n-1] from cells upper[0..2n-1] and lower[0..2n-1]: of those that have a
+ * weight, the ones that are not beyond scale * z + offset of the nearest. Returns the least weight. */
+typedef uint16_t fill_pull_weights_fn(const struct fill_row *to, const struct fill_row *upper,
+                                      const struct fill_row *lower, uint32_t n, float scale, float offset);
+
+/* Colours of cells that have `near`, from the same cells' colours and weights. */
+typedef void fill_pull_colors_fn(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                                 uint32_t n, int is_picture);
 
 #define FILL_BLOCK 16 /* a push works on as many parents together */
 
@@ -354,11 +359,17 @@ typedef uint16_t fill_pull_fn(const struct fill_row *to, const struct fill_row *
 typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside,
                           uint32_t n, float scale, float offset);
 
+/* Pixels that become whole: where they are in their row, the weights that they had, and what they get. */
+#define FILL_PLACES (2 * FILL_WIDTH + 2 * FILL_BLOCK) /* room for a block more than there can be */
+struct fill_places {
+	uint16_t at[FILL_PLACES], weight[FILL_PLACES], r[FILL_PLACES], g[FILL_PLACES], b[FILL_PLACES];
+	float z[FILL_PLACES]; /* interpolated, whatever the weight was */
+};
+
 /* The same for pixels, in `was`, which stay as they are and whose z has no meaning: in those blocks i of FILL_BLOCK
- * parents whose left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the places,
- * 0..2n-1, of those that would become whole, with room for one more; `to` has their colors and, whatever their weights
- * are, the depths that are interpolated, and elsewhere anything. Returns how many there are. */
-typedef uint32_t fill_push_picture_fn(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
+ * parents whose left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the pixels
+ * that would become whole, and returns how many there are; anything may stand beyond them. */
+typedef uint32_t fill_push_picture_fn(struct fill_places *places, uint32_t *left, uint32_t bit,
                                       const struct fill_row *was, const struct fill_row *own,
                                       const struct fill_row *beside, uint32_t n, float scale, float offset);
 
@@ -410,7 +421,8 @@ struct simd {
 	strip_write_fn *strip_write;
 	depth_row_fn *depth_row;
 	gaps_fn *gaps;
-	fill_pull_fn *fill_pull;
+	fill_pull_weights_fn *fill_pull_weights;
+	fill_pull_colors_fn *fill_pull_colors;
 	fill_push_fn *fill_push;
 	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;

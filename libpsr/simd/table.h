@@ -28,7 +28,8 @@
 	.strip_write = KERNEL(strip_write),            \
 	.depth_row = depth_row,                        \
 	.gaps = gaps,                                  \
-	.fill_pull = KERNEL(fill_pull),                \
+	.fill_pull_weights = KERNEL(fill_pull_weights),\
+	.fill_pull_colors = KERNEL(fill_pull_colors),  \
 	.fill_push = KERNEL(fill_push),                \
 	.fill_push_picture = KERNEL(fill_push_picture),\
 	.fill_depths = fill_depths,                    \

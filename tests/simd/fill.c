@@ -1,5 +1,5 @@
-/* fill_pull, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells; whole, partial and empty
- * ones, and outside of the picture. */
+/* fill_pull_weights, fill_pull_colors, fill_push, fill_push_picture and fill_depths: rows of 1 to FILL_WIDTH cells;
+ * whole, partial and empty ones, and outside of the picture. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -34,77 +34,122 @@ static struct fill_row random_row(struct check *c, uint32_t n, uint32_t around, 
 	return row;
 }
 
-static void pull(struct check *c, uint32_t n, int has_colors, int is_picture, int is_spoilt)
+static void pull_weights(struct check *c, uint32_t n, int is_spoilt)
 {
-	const struct fill_row to = random_row(c, n, 0, 1, has_colors, 0);
-	const struct fill_row upper = random_row(c, 2 * n, 0, 0, has_colors, is_spoilt);
-	const struct fill_row lower = random_row(c, 2 * n, 0, 0, has_colors, is_spoilt);
+	const struct fill_row upper = random_row(c, 2 * n, 0, 0, 0, is_spoilt);
+	const struct fill_row lower = random_row(c, 2 * n, 0, 0, 0, is_spoilt);
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
+	struct fill_row to = random_row(c, n, 0, 1, 0, 0);
+	to.near = check_out(c, n, 1);
 	check_units(c, n);
 	while (check_next(c)) {
-		check_result(c, c->simd->fill_pull(&to, &upper, &lower, n, is_picture, scale, offset));
+		check_result(c, c->simd->fill_pull_weights(&to, &upper, &lower, n, scale, offset));
 		if (!c->is_bench)
 			check_settle(to.z, n);
 	}
 }
 
-static void random_pull(struct check *c)
+static void random_pull_weights(struct check *c)
 {
-	pull(c, 1 + check_below(c, FILL_WIDTH), check_below(c, 4) != 0, (int)check_below(c, 2), 0);
+	pull_weights(c, 1 + check_below(c, FILL_WIDTH), 0);
 }
 
-static void spoilt_pull(struct check *c)
+static void spoilt_pull_weights(struct check *c)
 {
-	pull(c, 1 + check_below(c, FILL_WIDTH), check_below(c, 4) != 0, (int)check_below(c, 2), 1);
+	pull_weights(c, 1 + check_below(c, FILL_WIDTH), 1);
 }
 
-static void bench_pull(struct check *c)
+static void bench_pull_weights(struct check *c)
 {
-	pull(c, FILL_WIDTH, 1, 1, 0);
+	pull_weights(c, FILL_WIDTH, 0);
 }
 
-static void push(struct check *c, uint32_t n, int is_picture, int is_spoilt)
+static void pull_colors(struct check *c, uint32_t n, int is_picture)
+{
+	const struct fill_row upper = random_row(c, 2 * n, 0, 0, 1, 0), lower = random_row(c, 2 * n, 0, 0, 1, 0);
+	struct fill_row to = random_row(c, n, 0, 1, 1, 0);
+	to.near = check_in(c, n, 1);
+	for (uint32_t i = 0; i < n; i++) { /* whatever has a weight may be near */
+		const uint16_t weight[4] = { upper.weight[2 * i], upper.weight[2 * i + 1], lower.weight[2 * i],
+			                         lower.weight[2 * i + 1] };
+		to.near[i] = 0;
+		for (int k = 0; k < 4; k++)
+			to.near[i] |= (uint8_t)((weight[k] > 0 && !check_one_in(c, 5)) << k);
+	}
+	check_units(c, n);
+	while (check_next(c))
+		c->simd->fill_pull_colors(&to, &upper, &lower, n, is_picture);
+}
+
+static void random_pull_colors(struct check *c)
+{
+	pull_colors(c, 1 + check_below(c, FILL_WIDTH), (int)check_below(c, 2));
+}
+
+static void bench_pull_colors(struct check *c)
+{
+	pull_colors(c, FILL_WIDTH, 1);
+}
+
+static void push(struct check *c, uint32_t n, int is_spoilt)
 {
 	const struct fill_row to = random_row(c, 2 * n, 0, 1, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
-	const struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt), beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	const struct fill_row beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
+	while (check_next(c)) {
+		c->simd->fill_push(&to, &own, &beside, n, scale, offset);
+		check_settle(to.z, 2 * (size_t)n);
+	}
+}
+
+/* Beyond the pixels that are listed there may be anything. */
+static void settle_places(struct fill_places *places, uint32_t n)
+{
+	uint16_t *const list[] = { places->at, places->weight, places->r, places->g, places->b };
+	for (size_t i = 0; i < sizeof list / sizeof list[0]; i++)
+		memset(list[i] + n, 0, (FILL_PLACES - n) * sizeof *list[i]);
+	memset(places->z + n, 0, (FILL_PLACES - n) * sizeof *places->z);
+	check_settle(places->z, n);
+}
+
+static void push_picture(struct check *c, uint32_t n, int is_spoilt)
+{
+	const struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
+	const struct fill_row beside = random_row(c, n, 0, 0, 1, is_spoilt);
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
 	const uint32_t n_blocks = (n + FILL_BLOCK - 1) / FILL_BLOCK, bit = 1u << check_below(c, 32);
-	uint16_t *place = check_out(c, 2 * (size_t)n + 1, sizeof *place);
-	uint32_t *left = check_out(c, n_blocks, sizeof *left), n_places = 0;
+	struct fill_places *places = check_out(c, 1, sizeof *places);
+	uint32_t *left = check_out(c, n_blocks, sizeof *left);
 	for (uint32_t i = 0; i < n_blocks; i++)
 		left[i] |= c->is_bench ? bit : 0;
 	check_units(c, 2 * n);
 	while (check_next(c)) {
-		if (is_picture)
-			n_places = c->simd->fill_push_picture(&to, place, left, bit, &was, &own, &beside, n, scale, offset);
-		else
-			c->simd->fill_push(&to, &own, &beside, n, scale, offset);
+		const uint32_t n_places =
+			c->simd->fill_push_picture(places, left, bit, &was, &own, &beside, n, scale, offset);
 		check_result(c, n_places);
-		if (c->is_bench)
-			continue;
-		check_settle(to.z, 2 * (size_t)n);
-		memset(place + n_places, 0, (2 * (size_t)n + 1 - n_places) * sizeof *place); /* no places */
+		if (!c->is_bench)
+			settle_places(places, n_places);
 	}
 }
 
 static void random_push(struct check *c)
 {
-	push(c, 1 + check_below(c, FILL_WIDTH), 0, 0);
+	push(c, 1 + check_below(c, FILL_WIDTH), 0);
 }
 
 static void spoilt_push(struct check *c)
 {
-	push(c, 1 + check_below(c, FILL_WIDTH), 0, 1);
+	push(c, 1 + check_below(c, FILL_WIDTH), 1);
 }
 
 static void random_push_picture(struct check *c)
 {
-	push(c, 1 + check_below(c, FILL_WIDTH), 1, (int)check_below(c, 2));
+	push_picture(c, 1 + check_below(c, FILL_WIDTH), (int)check_below(c, 2));
 }
 
 static void bench_push(struct check *c)
 {
-	push(c, FILL_WIDTH, 1, 0);
+	push_picture(c, FILL_WIDTH, 0);
 }
 
 static void depths(struct check *c, uint32_t n)
@@ -129,13 +174,15 @@ static void bench_depths(struct check *c)
 int main(int argc, char **argv)
 {
 	static const struct check_test tests[] = {
-		{ "fill_pull: random cells", random_pull, 2000, NULL },
-		{ "fill_pull: infinite, huge, denormal and no numbers", spoilt_pull, 2000, NULL },
+		{ "fill_pull_weights: random cells", random_pull_weights, 2000, NULL },
+		{ "fill_pull_weights: infinite, huge, denormal and no numbers", spoilt_pull_weights, 2000, NULL },
+		{ "fill_pull_colors: random cells", random_pull_colors, 2000, NULL },
 		{ "fill_push: random cells", random_push, 2000, NULL },
 		{ "fill_push: infinite, huge, denormal and no numbers", spoilt_push, 2000, NULL },
 		{ "fill_push_picture: random and spoilt pixels", random_push_picture, 2000, NULL },
 		{ "fill_depths: any words", random_depths, 500, NULL },
-		{ "fill_pull, from the picture", bench_pull, 0, "cell" },
+		{ "fill_pull_weights", bench_pull_weights, 0, "cell" },
+		{ "fill_pull_colors, from the picture", bench_pull_colors, 0, "cell" },
 		{ "fill_push_picture", bench_push, 0, "cell" },
 		{ "fill_depths", bench_depths, 0, "pixel" },
 	};

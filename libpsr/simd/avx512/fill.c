@@ -40,8 +40,8 @@ static inline __m512i load_parents(__mmask16 k, const uint16_t *from)
 /* ---- pull ---- */
 
 struct pull_shares {
-	struct share upper, lower;   /* from the picture */
-	__mmask32 above, below;      /* from a level: all or nothing */
+	struct share upper, lower; /* from the picture */
+	__mmask32 above, below;    /* from a level: all or nothing */
 	__m512 divisor, inverse;
 };
 
@@ -65,9 +65,8 @@ static inline void pull_channel(uint16_t *to, __mmask16 k, __mmask32 kk, const u
 	_mm256_mask_storeu_epi16(to, k, _mm512_cvtepi32_epi16(value));
 }
 
-static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill_row *to, const struct fill_row *upper,
-                                                               const struct fill_row *lower, uint32_t n, int has_colors,
-                                                               int is_picture, float scale, float offset)
+uint16_t fill_pull_weights_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                                  uint32_t n, float scale, float offset)
 {
 	const __m512i even = _mm512_setr_epi32(0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
 	const __m512i odd = _mm512_add_epi32(even, _mm512_set1_epi32(1)), low = _mm512_set1_epi32(0xffff);
@@ -79,6 +78,7 @@ static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill
 		const __mmask32 kk = interleave(k, k);
 		__m512 z[4], nearest = nothing, sum_z = _mm512_setzero_ps();
 		__m512i w[4], sum = _mm512_setzero_si512();
+		__m128i bits = _mm_setzero_si128();
 		__mmask16 near[4];
 		for (int i = 0; i < 2; i++) {
 			const struct fill_row *row = i ? lower : upper;
@@ -99,37 +99,48 @@ static inline __attribute__((always_inline)) uint16_t pull_row(const struct fill
 			near[i] = _mm512_mask_cmp_ps_mask(near[i], z[i], limit, _CMP_LE_OQ);
 			sum_z = _mm512_mask_add_ps(sum_z, near[i], sum_z, _mm512_mul_ps(_mm512_cvtepi32_ps(w[i]), z[i]));
 			sum = _mm512_mask_add_epi32(sum, near[i], sum, w[i]);
+			bits = _mm_or_si128(bits, _mm_maskz_set1_epi8(near[i], (char)(1 << i)));
 		}
 		least = _mm512_mask_min_epi32(least, k, least, sum);
 		const __m512 depth =
 			_mm512_mask_div_ps(nothing, _mm512_test_epi32_mask(sum, sum), sum_z, _mm512_cvtepi32_ps(sum));
 		_mm512_mask_storeu_ps(to->z + x, k, depth);
 		_mm256_mask_storeu_epi16(to->weight + x, k, _mm512_cvtepi32_epi16(_mm512_min_epi32(sum, whole)));
-		if (!has_colors)
-			continue;
+		_mm_mask_storeu_epi8(to->near + x, k, bits);
+	}
+	return (uint16_t)_mm512_reduce_min_epi32(least);
+}
+
+static inline __attribute__((always_inline)) void pull_row(const struct fill_row *to, const struct fill_row *upper,
+                                                           const struct fill_row *lower, uint32_t n, int is_picture)
+{
+	for (uint32_t x = 0; x < n; x += PARENTS) {
+		const __mmask16 k = (__mmask16)_bzhi_u32(0xffff, n - x < PARENTS ? n - x : PARENTS);
+		const __mmask32 kk = interleave(k, k);
+		const __m128i bits = _mm_maskz_loadu_epi8(k, to->near + x);
 		struct pull_shares s;
-		for (int i = 0; i < 4; i++)
-			w[i] = _mm512_maskz_mov_epi32(near[i], w[i]);
-		s.upper = share_of(_mm512_or_si512(w[0], _mm512_slli_epi32(w[1], 16)));
-		s.lower = share_of(_mm512_or_si512(w[2], _mm512_slli_epi32(w[3], 16)));
-		s.above = interleave(near[0], near[1]);
-		s.below = interleave(near[2], near[3]);
-		s.divisor = _mm512_cvtepi32_ps(_mm512_max_epi32(sum, whole));
+		s.above = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(1)), _mm_test_epi8_mask(bits, _mm_set1_epi8(2)));
+		s.below = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(4)), _mm_test_epi8_mask(bits, _mm_set1_epi8(8)));
+		const __m512i above = load_children(s.above, upper->weight + 2 * x);
+		const __m512i below = load_children(s.below, lower->weight + 2 * x);
+		const __m512i sum = _mm512_madd_epi16(_mm512_add_epi16(above, below), _mm512_set1_epi16(1));
+		s.upper = share_of(above);
+		s.lower = share_of(below);
+		s.divisor = _mm512_cvtepi32_ps(_mm512_max_epi32(sum, _mm512_set1_epi32(GAPS_WHOLE)));
 		s.inverse = _mm512_div_ps(_mm512_set1_ps(256 - 0x1p-12f), s.divisor);
 		pull_channel(to->r + x, k, kk, upper->r + 2 * x, lower->r + 2 * x, &s, is_picture);
 		pull_channel(to->g + x, k, kk, upper->g + 2 * x, lower->g + 2 * x, &s, is_picture);
 		pull_channel(to->b + x, k, kk, upper->b + 2 * x, lower->b + 2 * x, &s, is_picture);
 	}
-	return (uint16_t)_mm512_reduce_min_epi32(least);
 }
 
-uint16_t fill_pull_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
-                          uint32_t n, int is_picture, float scale, float offset)
+void fill_pull_colors_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
+                             uint32_t n, int is_picture)
 {
-	if (!to->r)
-		return pull_row(to, upper, lower, n, 0, 0, scale, offset);
-	return is_picture ? pull_row(to, upper, lower, n, 1, 1, scale, offset)
-	                  : pull_row(to, upper, lower, n, 1, 0, scale, offset);
+	if (is_picture)
+		pull_row(to, upper, lower, n, 1);
+	else
+		pull_row(to, upper, lower, n, 0);
 }
 
 /* ---- push ---- */
@@ -170,13 +181,13 @@ static inline __m512i interpolate(const struct push_shares *s, __m512i own, __m5
 	return _mm512_cvttps_epi32(_mm512_add_ps(value, _mm512_set1_ps(0.125f)));
 }
 
-/* 32 cells or pixels under way. */
+/* 32 cells under way. */
 struct push {
 	__mmask16 k;
 	__mmask32 kk, turn;
 	__m512i weight;
 	struct push_shares left, right;
-	struct share own, rest;
+	struct share rest;
 };
 
 /* Whose turn it is; k and kk are set. */
@@ -201,7 +212,6 @@ static inline void find_shares(struct push *p, const float *own, const float *be
 	const __m512 a = _mm512_maskz_loadu_ps(p->k, own), c = _mm512_maskz_loadu_ps(p->k, beside);
 	p->left = share_parents(a, _mm512_maskz_loadu_ps(p->k, own - 1), c, by, plus);
 	p->right = share_parents(a, _mm512_maskz_loadu_ps(p->k, own + 1), c, by, plus);
-	p->own = share_of(p->weight);
 	p->rest = share_of(_mm512_sub_epi16(_mm512_set1_epi16(GAPS_WHOLE), p->weight));
 }
 
@@ -218,13 +228,6 @@ static inline void push_cells(const struct push *p, uint16_t *cell, const uint16
 {
 	const __m512i value = _mm512_add_epi16(load_children(p->turn, cell), push_channel(p, own, beside));
 	_mm512_mask_storeu_epi16(cell, p->turn, value);
-}
-
-static inline void push_pixels(const struct push *p, uint16_t *to, const uint16_t *was, const uint16_t *own,
-                               const uint16_t *beside)
-{
-	const __m512i value = _mm512_add_epi16(part_of(load_children(p->kk, was), p->own), push_channel(p, own, beside));
-	_mm512_mask_storeu_epi16(to, p->kk, value);
 }
 
 static inline void push_depths(const struct push *p, float *to, __mmask32 k)
@@ -260,13 +263,61 @@ void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, con
 	}
 }
 
-uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, uint32_t *left, uint32_t bit,
-                                  const struct fill_row *was, const struct fill_row *own, const struct fill_row *beside,
-                                  uint32_t n, float scale, float offset)
+/* PARENTS pixels at most, side by side: few of a row are filled. Their parents are lanes of what is loaded from own - 1
+ * on, and from beside. */
+struct listed {
+	__m512i own, side, beside;
+	struct push_shares shares;
+	__m256i share, rest; /* of 2^16 */
+	__mmask16 is_empty;  /* the rest is all */
+};
+
+static inline __m256i half_of(__m512i values, uint32_t first)
+{
+	return first ? _mm512_extracti64x4_epi64(values, 1) : _mm512_castsi512_si256(values);
+}
+
+/* own_k, k: which lanes of those rows there are. */
+static inline struct listed find_listed(__m256i at, __m256i weight, __mmask32 own_k, __mmask16 k, const float *own,
+                                        const float *beside, float scale, float offset)
+{
+	const __m512i one = _mm512_set1_epi32(1), column = _mm512_cvtepu16_epi32(at);
+	const __m512i is_right = _mm512_and_si512(column, one);
+	const __m512 first = _mm512_maskz_loadu_ps((__mmask16)own_k, own - 1);
+	const __m512 last = _mm512_maskz_loadu_ps((__mmask16)(own_k >> 16), own + 15);
+	struct listed l;
+	l.beside = _mm512_srli_epi32(column, 1);
+	l.own = _mm512_add_epi32(l.beside, one);
+	l.side = _mm512_add_epi32(l.beside, _mm512_add_epi32(is_right, is_right));
+	l.shares = share_parents(_mm512_permutex2var_ps(first, l.own, last), _mm512_permutex2var_ps(first, l.side, last),
+	                         _mm512_permutexvar_ps(l.beside, _mm512_maskz_loadu_ps(k, beside)), _mm512_set1_ps(scale),
+	                         _mm512_set1_ps(offset));
+	l.share = _mm256_slli_epi16(weight, 8);
+	l.rest = _mm256_sub_epi16(_mm256_setzero_si256(), l.share);
+	l.is_empty = _mm256_testn_epi16_mask(weight, weight);
+	return l;
+}
+
+static inline __m512i pick(__m512i parents, __m512i lane)
+{
+	return _mm512_maskz_permutexvar_epi16(0x55555555, lane, parents);
+}
+
+static inline void push_listed(uint16_t *to, const struct listed *l, __m256i was, __m512i own, __m512i beside)
+{
+	const __m256i value = _mm512_cvtepi32_epi16(
+		interpolate(&l->shares, pick(own, l->own), pick(own, l->side), pick(beside, l->beside)));
+	const __m256i part = _mm256_mask_mov_epi16(_mm256_mulhi_epu16(value, l->rest), l->is_empty, value);
+	_mm256_storeu_si256((__m256i *)to, _mm256_add_epi16(_mm256_mulhi_epu16(was, l->share), part));
+}
+
+uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, uint32_t bit, const struct fill_row *was,
+                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
+                                  float offset)
 {
 	_Alignas(64) static const uint16_t column[32] = { 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
 		                                              16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
-	uint32_t n_places = 0;
+	uint32_t to = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
 		if (!(*left & bit))
@@ -277,16 +328,27 @@ uint32_t fill_push_picture_avx512(const struct fill_row *to, uint16_t *place, ui
 		*left &= ~(partial == p.turn ? bit : 0);
 		if (!p.turn)
 			continue;
-		find_shares(&p, own->z + x, beside->z + x, scale, offset);
-		push_pixels(&p, to->r + 2 * x, was->r + 2 * x, own->r + x, beside->r + x);
-		push_pixels(&p, to->g + 2 * x, was->g + 2 * x, own->g + x, beside->g + x);
-		push_pixels(&p, to->b + 2 * x, was->b + 2 * x, own->b + x, beside->b + x);
-		push_depths(&p, to->z + 2 * x, p.kk);
 		const uint32_t n_turn = (uint32_t)__builtin_popcount(p.turn);
-		const __m512i columns = _mm512_add_epi16(_mm512_load_si512(column), _mm512_set1_epi16((short)(2 * x)));
-		_mm512_mask_storeu_epi16(place + n_places, _bzhi_u32(UINT32_MAX, n_turn),
-		                         _mm512_maskz_compress_epi16(p.turn, columns));
-		n_places += n_turn;
+		const __mmask32 own_k = _bzhi_u32(UINT32_MAX, (n - x < PARENTS ? n - x : PARENTS) + 2);
+		const __m512i at = _mm512_maskz_compress_epi16(p.turn, _mm512_load_si512(column));
+		const __m512i weight = _mm512_maskz_compress_epi16(p.turn, p.weight);
+		const __m512i r = _mm512_maskz_compress_epi16(p.turn, load_children(p.turn, was->r + 2 * x));
+		const __m512i g = _mm512_maskz_compress_epi16(p.turn, load_children(p.turn, was->g + 2 * x));
+		const __m512i b = _mm512_maskz_compress_epi16(p.turn, load_children(p.turn, was->b + 2 * x));
+		_mm512_storeu_si512(places->at + to, _mm512_add_epi16(at, _mm512_set1_epi16((short)(2 * x))));
+		_mm512_storeu_si512(places->weight + to, weight);
+		for (uint32_t i = 0; i < n_turn; i += PARENTS) {
+			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), own_k, p.k, own->z + x,
+			                                    beside->z + x, scale, offset);
+			_mm512_storeu_ps(places->z + to + i, l.shares.z);
+			push_listed(places->r + to + i, &l, half_of(r, i), load_children(own_k, own->r + x - 1),
+			            load_children(p.k, beside->r + x));
+			push_listed(places->g + to + i, &l, half_of(g, i), load_children(own_k, own->g + x - 1),
+			            load_children(p.k, beside->g + x));
+			push_listed(places->b + to + i, &l, half_of(b, i), load_children(own_k, own->b + x - 1),
+			            load_children(p.k, beside->b + x));
+		}
+		to += n_turn;
 	}
-	return n_places;
+	return to;
 }
