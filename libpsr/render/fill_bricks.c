@@ -143,14 +143,11 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	}
 }
 
-/* Gives pixels of a row from `first` on their colors and depths, and makes them whole. */
-static void write_pixels(const struct fill_picture *p, struct fill_counts *counts, size_t first,
-                         const struct fill_places *places, uint32_t n)
+/* Gives pixels of a row from `first` on their colors and depths. */
+static void write_pixels(const struct fill_picture *p, size_t first, const struct fill_places *places, uint32_t n)
 {
 	const uint8_t *srgb = p->srgb;
-	uint16_t *weight = p->weight + first;
 	uint8_t *rgb = p->rgb + 3 * first;
-	uint32_t n_filled = 0, n_moved = 0;
 	for (uint32_t i = 0; i < n && p->rgb; i++) {
 		const uint32_t at = places->at[i];
 		rgb[3 * at] = srgb[places->r[i]];
@@ -160,15 +157,6 @@ static void write_pixels(const struct fill_picture *p, struct fill_counts *count
 	for (uint32_t i = 0; i < n && p->depth; i++)
 		if (places->weight[i] < WEIGHT_ONE / 2)
 			p->depth[first + places->at[i]] = ldexpf(places->z[i], p->stack->exponent);
-	for (uint32_t i = 0; i < n; i++)
-		weight[places->at[i]] = WEIGHT_ONE;
-	for (uint32_t i = 0; i < n; i++) {
-		n_filled += (places->weight[i] == 0) & (places->z[i] < INFINITY);
-		n_moved += places->weight[i] < WEIGHT_ONE / 2;
-	}
-	counts->n_changed += n;
-	counts->n_filled += n_filled;
-	counts->n_moved += n_moved;
 }
 
 void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx0, uint32_t bx1, uint32_t by,
@@ -184,14 +172,21 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 	_Static_assert(BRICK == 32 && FILL_BLOCK * 2 == BRICK, "a bit a row, and a block is a brick wide");
 	for (uint32_t y = rows.first; y < rows.end; y++)
 		for (uint32_t x = bx0 * BRICK; x < x1; x += FILL_PIECE) {
-			const uint32_t n_cells = (least_of(x1 - x, FILL_PIECE) + 1) / 2;
+			const uint32_t n_pixels = least_of(x1 - x, FILL_PIECE), n_cells = (n_pixels + 1) / 2;
+			const size_t first = (size_t)y * width + x;
 			const int32_t parent = (int32_t)(y >> 1), px = (int32_t)(x >> 1);
 			const struct fill_row was = picture_row_at(&pixels, fill, x, y, 2 * n_cells);
 			const struct fill_row own = fill_row_at(from, px, parent);
 			const struct fill_row beside = fill_row_at(from, px, y & 1 ? parent + 1 : parent - 1);
 			const uint32_t n = fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &own,
 			                                                 &beside, n_cells, scale, offset);
-			if (n)
-				write_pixels(&fill->picture, counts, (size_t)y * width + x, &places, n);
+			if (!n)
+				continue;
+			if (was.weight == pixels.weight)
+				memcpy(fill->picture.weight + first, was.weight, n_pixels * sizeof *was.weight);
+			write_pixels(&fill->picture, first, &places, n);
+			counts->n_changed += n;
+			counts->n_filled += places.n_filled;
+			counts->n_moved += places.n_moved;
 		}
 }

@@ -379,10 +379,10 @@ static inline void fill_push(const struct fill_row *to, const struct fill_row *o
 	}
 }
 
-/* Lists the block's pixels whose turn it is, `n_places` after those of blocks before; takes its bit out where no other
- * is left. Returns how many are listed now. */
+/* Lists the block's pixels whose turn it is, which become whole, `n_places` after those of blocks before; takes its bit
+ * out where no other is left. Returns how many are listed now. */
 static inline uint32_t list_block(struct fill_places *places, uint32_t n_places, uint32_t *left, uint32_t bit,
-                                  const uint16_t *turn, const uint16_t *weight, const struct block_row *row,
+                                  const uint16_t *turn, uint16_t *weight, const struct block_row *row,
                                   uint32_t first, uint32_t n)
 {
 	uint16_t *at = places->at + n_places;
@@ -401,6 +401,9 @@ static inline uint32_t list_block(struct fill_places *places, uint32_t n_places,
 		places->g[to] = row->g[x];
 		places->b[to] = row->b[x];
 		places->z[to] = row->z[x];
+		places->n_filled += (weight[x] == 0) & (row->z[x] < INFINITY);
+		places->n_moved += weight[x] < GAPS_WHOLE / 2;
+		weight[x] = GAPS_WHOLE;
 	}
 	return n_places + n_turn;
 }
@@ -414,9 +417,10 @@ static inline uint32_t fill_push_picture(struct fill_places *places, uint32_t *l
 	const struct fill_row out = { row.r, row.g, row.b, NULL, row.z, NULL };
 	uint16_t turn[2 * FILL_BLOCK];
 	uint32_t n_places = 0;
+	places->n_filled = places->n_moved = 0;
 	for (uint32_t x = 0; x < n; x += FILL_BLOCK, left++) {
 		const uint32_t n_block = n - x < FILL_BLOCK ? n - x : FILL_BLOCK;
-		const uint16_t *weight = in.weight + 2 * x;
+		uint16_t *weight = in.weight + 2 * x;
 		if (!(*left & bit))
 			continue;
 		if (!has_partial(weight, 2 * n_block)) {

@@ -362,13 +362,14 @@ typedef void fill_push_fn(const struct fill_row *to, const struct fill_row *own,
 /* Pixels that become whole: where they are in their row, the weights that they had, and what they get. */
 #define FILL_PLACES (2 * FILL_WIDTH + 2 * FILL_BLOCK) /* room for a block more than there can be */
 struct fill_places {
+	uint32_t n_filled, n_moved; /* with no weight before, and now before infinity; with less than half a weight before */
 	uint16_t at[FILL_PLACES], weight[FILL_PLACES], r[FILL_PLACES], g[FILL_PLACES], b[FILL_PLACES];
 	float z[FILL_PLACES]; /* interpolated, whatever the weight was */
 };
 
-/* The same for pixels, in `was`, which stay as they are and whose z has no meaning: in those blocks i of FILL_BLOCK
- * parents whose left[i] has a bit, which is taken out where all pixels are whole or would become it. Lists the pixels
- * that would become whole, and returns how many there are; anything may stand beyond them. */
+/* The same for pixels, in `was`, of which the weights alone change, and whose z has no meaning: in those blocks i of
+ * FILL_BLOCK parents whose left[i] has a bit, which is taken out where all pixels are whole or become it. Lists the
+ * pixels that become whole, and returns how many there are; anything may stand beyond them. */
 typedef uint32_t fill_push_picture_fn(struct fill_places *places, uint32_t *left, uint32_t bit,
                                       const struct fill_row *was, const struct fill_row *own,
                                       const struct fill_row *beside, uint32_t n, float scale, float offset);

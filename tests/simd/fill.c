@@ -114,8 +114,9 @@ static void settle_places(struct fill_places *places, uint32_t n)
 
 static void push_picture(struct check *c, uint32_t n, int is_spoilt)
 {
-	const struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
-	const struct fill_row beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	const struct fill_row own = random_row(c, n, 1, 0, 1, is_spoilt), beside = random_row(c, n, 0, 0, 1, is_spoilt);
+	struct fill_row was = random_row(c, 2 * n, 0, 0, 1, is_spoilt);
+	const uint16_t *weight = was.weight;
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
 	const uint32_t n_blocks = (n + FILL_BLOCK - 1) / FILL_BLOCK, bit = 1u << check_below(c, 32);
 	struct fill_places *places = check_out(c, 1, sizeof *places);
@@ -123,7 +124,9 @@ static void push_picture(struct check *c, uint32_t n, int is_spoilt)
 	for (uint32_t i = 0; i < n_blocks; i++)
 		left[i] |= c->is_bench ? bit : 0;
 	check_units(c, 2 * n);
+	was.weight = check_out(c, 2 * (size_t)n, sizeof *was.weight);
 	while (check_next(c)) {
+		memcpy(was.weight, weight, 2 * (size_t)n * sizeof *weight);
 		const uint32_t n_places =
 			c->simd->fill_push_picture(places, left, bit, &was, &own, &beside, n, scale, offset);
 		check_result(c, n_places);

@@ -317,7 +317,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 {
 	_Alignas(64) static const uint16_t column[32] = { 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
 		                                              16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
-	uint32_t to = 0;
+	uint32_t to = 0, n_filled = 0, n_moved = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
 		if (!(*left & bit))
@@ -337,9 +337,15 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		const __m512i b = _mm512_maskz_compress_epi16(p.turn, load_children(p.turn, was->b + 2 * x));
 		_mm512_storeu_si512(places->at + to, _mm512_add_epi16(at, _mm512_set1_epi16((short)(2 * x))));
 		_mm512_storeu_si512(places->weight + to, weight);
+		_mm512_mask_storeu_epi16(was->weight + 2 * x, p.turn, _mm512_set1_epi16(GAPS_WHOLE));
+		n_moved += (uint32_t)__builtin_popcount(
+			_mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
 		for (uint32_t i = 0; i < n_turn; i += PARENTS) {
 			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), own_k, p.k, own->z + x,
 			                                    beside->z + x, scale, offset);
+			const __mmask16 listed = (__mmask16)_bzhi_u32(0xffff, n_turn - i < PARENTS ? n_turn - i : PARENTS);
+			n_filled += (uint32_t)__builtin_popcount(
+				_mm512_mask_cmp_ps_mask(l.is_empty & listed, l.shares.z, _mm512_set1_ps(INFINITY), _CMP_LT_OQ));
 			_mm512_storeu_ps(places->z + to + i, l.shares.z);
 			push_listed(places->r + to + i, &l, half_of(r, i), load_children(own_k, own->r + x - 1),
 			            load_children(p.k, beside->r + x));
@@ -350,5 +356,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		}
 		to += n_turn;
 	}
+	places->n_filled = n_filled;
+	places->n_moved = n_moved;
 	return to;
 }
