@@ -21,14 +21,6 @@ float fill_offset(const struct plan *plan, int level)
 	return plan->gap_offset[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
 }
 
-struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y)
-{
-	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
-	const struct fill_row *cell = &level->cell;
-	return (struct fill_row){ cell->r + at, cell->g + at, cell->b + at, cell->weight + at, cell->z + at,
-		                      cell->near + at };
-}
-
 void fill_note_depth(struct fill *fill, int level)
 {
 	int seen = atomic_load(&fill->deepest);
@@ -123,7 +115,7 @@ static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 		const struct fill_level *level = &fill->level[l];
 		const uint32_t side = BRICK >> l;
 		uint16_t least = WEIGHT_ONE;
-		for (uint32_t y = by * side; y < (by + 1) * side && y < level->height; y++) {
+		for (uint32_t y = by * side; y < (by + 1) * side && y < level->height && least == WEIGHT_ONE; y++) {
 			const uint16_t *weight = fill_row_at(level, 0, (int32_t)y).weight;
 			for (uint32_t x = bx * side; x < (bx + 1) * side && x < level->width; x++)
 				least = weight[x] < least ? weight[x] : least;

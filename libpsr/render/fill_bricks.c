@@ -13,7 +13,7 @@ struct picture_row {
 _Static_assert(FILL_PIECE / 2 <= FILL_WIDTH && FILL_PIECE % BRICK == 0, "");
 
 /* Pixel (x, y) and the n - 1 to the right of it, with any depths. */
-static struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
+static inline struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
                                       uint32_t n)
 {
 	const struct fill_picture *p = &fill->picture;
@@ -35,7 +35,7 @@ static struct fill_row picture_row_at(struct picture_row *to, const struct fill 
 }
 
 /* Their weights and depths. */
-static struct fill_row picture_depths_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
+static inline struct fill_row picture_depths_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
                                          uint32_t n)
 {
 	const struct fill_picture *p = &fill->picture;

@@ -280,7 +280,14 @@ void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repo
 
 /* -- between fill.c and fill_bricks.c -- */
 
-struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y);
+static inline struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y)
+{
+	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
+	const struct fill_row *cell = &level->cell;
+	return (struct fill_row){ cell->r + at,      cell->g + at, cell->b + at,
+		                      cell->weight + at, cell->z + at, cell->near + at };
+}
+
 float fill_scale(const struct plan *plan, int level); /* of the threshold among cells of `level` */
 float fill_offset(const struct plan *plan, int level);
 void fill_note_depth(struct fill *fill, int level);
