@@ -9,7 +9,7 @@ struct part {
 	struct psr_cluster *cluster;
 	struct psr_run *run;
 	uint16_t *radius, *depth, *attr_offset;
-	int16_t *center[3], *col, *row, *bias;
+	int16_t *center[3];
 	uint8_t *projection, *flags;
 	uint64_t *mask, *attr;
 	void *memory;
@@ -32,10 +32,7 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 	for (int k = 0; k < 3; k++)
 		part->center[k] = take(&at, n, sizeof *part->center[k]);
 	part->radius = take(&at, n, sizeof *part->radius);
-	part->bias = take(&at, n, sizeof *part->bias);
 	part->projection = take(&at, n, sizeof *part->projection);
-	part->col = take(&at, n, sizeof *part->col);
-	part->row = take(&at, n, sizeof *part->row);
 	part->flags = take(&at, n, sizeof *part->flags);
 	part->mask = take(&at, n, sizeof *part->mask);
 	part->attr_offset = take(&at, n, sizeof *part->attr_offset);
@@ -45,8 +42,8 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 
 static int part_init(struct part *part, const struct psr_blocks *all)
 {
-	const size_t a_block = 8 * sizeof(uint16_t) + 2 + sizeof(uint64_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t),
-	             n_arrays = 15;
+	const size_t a_block = 5 * sizeof(uint16_t) + 2 + sizeof(uint64_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t),
+	             n_arrays = 12;
 	size_t size = all->n_clusters * sizeof(struct psr_cluster) + psr_blocks_runs(all) * sizeof(struct psr_run) +
 	              all->n_blocks * a_block + all->n_samples * a_sample;
 
@@ -58,9 +55,8 @@ static int part_init(struct part *part, const struct psr_blocks *all)
 	part->blocks = (struct psr_blocks){ .n_projections = all->n_projections, .n_levels = 1,
 		.projection = all->projection, .cluster = part->cluster, .run = part->run, .sphere_x = part->center[0],
 		.sphere_y = part->center[1], .sphere_z = part->center[2], .sphere_r = part->radius,
-		.block_projection = part->projection, .col = part->col, .row = part->row, .flags = part->flags,
-		.depth_bias = part->bias, .mask = part->mask, .attr_offset = part->attr_offset,
-		.depth = part->depth, .attr = part->attr };
+		.block_projection = part->projection, .flags = part->flags, .mask = part->mask,
+		.attr_offset = part->attr_offset, .depth = part->depth, .attr = part->attr };
 	return PSR_OK;
 }
 
@@ -74,10 +70,7 @@ static void add_block(struct part *part, const struct psr_blocks *all, uint32_t 
 	part->center[1][to] = all->sphere_y[b];
 	part->center[2][to] = all->sphere_z[b];
 	part->radius[to] = all->sphere_r[b];
-	part->bias[to] = all->depth_bias[b];
 	part->projection[to] = all->block_projection[b];
-	part->col[to] = all->col[b];
-	part->row[to] = all->row[b];
 	part->flags[to] = all->flags[b];
 	part->mask[to] = all->mask[b];
 	if (to % PSR_RUN_BLOCKS == 0)

@@ -108,9 +108,9 @@ static int check_projections(const struct checker *c)
 		v3f_cross(z, p->axis[0], p->axis[1]);
 		if (!(v3f_dot(z, p->axis[2]) > 0))
 			return fail(c, "PROJ", "the axes of projection %" PRIu32 " are left-handed", i);
-		if (!is_length(p->spacing) || p->spacing == 0)
-			return fail(c, "PROJ", "the spacing of projection %" PRIu32 " is %g; it must be positive and at most %g", i,
-			            (double)p->spacing, (double)MODEL_MAX_COORDINATE);
+		if (!(p->spacing >= MODEL_LEAST_SPACING && p->spacing <= MODEL_MAX_COORDINATE))
+			return fail(c, "PROJ", "the spacing of projection %" PRIu32 " is %g; it must be from %g to %g", i,
+			            (double)p->spacing, (double)MODEL_LEAST_SPACING, (double)MODEL_MAX_COORDINATE);
 	}
 	return PSR_OK;
 }

@@ -16,13 +16,13 @@ static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uin
 static inline void block_position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
 {
 	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
-	const float dx = projection->spacing * (float)(1u << psr_blocks_level(b, block)), dy = dx * 0.866025404f;
+	const float dx = projection->spacing, dy = dx * 0.866025404f, scale = (float)(1u << psr_blocks_level(b, block));
 	const uint32_t r = sample >> 3, c = sample & 7;
-	const float x = ((float)(8 * b->col[block] + (int32_t)c) + (float)(r & 1) * 0.5f) * dx;
-	const float y = (float)(8 * b->row[block] + (int32_t)r) * dy;
-	float bias, step;
-	psr_blocks_depth(b, block, &bias, &step);
-	const float z = bias + step * (float)b->depth[block_index(b, block, sample)];
+	struct psr_place place;
+	psr_blocks_place(b, block, &place);
+	const float x = ((float)place.col + scale * ((float)c + (float)(r & 1) * 0.5f)) * dx;
+	const float y = ((float)place.row + scale * (float)r) * dy;
+	const float z = psr_place_depth(&place, b->depth[block_index(b, block, sample)]);
 	for (int a = 0; a < 3; a++)
 		p[a] = x * projection->axis[0][a] + y * projection->axis[1][a] + z * projection->axis[2][a];
 }

@@ -95,6 +95,7 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 {
 	const double dx = projection->spacing, dy = dx * 0.86602540378443864676;
 	const double half[3] = { plan->center[0], plan->center[1], 0 };
+	psr_placing_make(&out->placing, projection);
 	double column[4][3]; /* in camera space: a unit of projection space's x, y, z, and its origin */
 	for (int k = 0; k < 3; k++)
 		m3d_apply(column[k], (const double(*)[3])to_camera,

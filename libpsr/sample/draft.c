@@ -16,8 +16,7 @@ void draft_position(const struct draft *draft, const struct draft_block *block, 
 {
 	const struct psr_projection *p = &draft->projection[block->projection];
 	double spacing = (double)p->spacing * (double)(1u << block->level), inner[3];
-	int row = PSR_BLOCK_SIDE * block->row + (int)(s / PSR_BLOCK_SIDE),
-		col = PSR_BLOCK_SIDE * block->col + (int)(s % PSR_BLOCK_SIDE);
+	int row = block->row + (int)(s / PSR_BLOCK_SIDE), col = block->col + (int)(s % PSR_BLOCK_SIDE);
 
 	sheets_inner(p, (col + (row & 1) / 2.0) * spacing, row * 0.86602540378443864676 * spacing,
 	             (double)draft_sample(draft, block, s)->z, inner);
@@ -70,8 +69,8 @@ static void add_blocks(struct draft *draft, const struct level *level, uint32_t 
 
 			if (patch->kept == 0)
 				continue;
-			*block = (struct draft_block){ .projection = (uint16_t)i, .col = patch->col, .row = patch->row,
-				                           .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
+			*block = (struct draft_block){ .projection = (uint16_t)i, .col = (int16_t)(PSR_BLOCK_SIDE * patch->col),
+				                           .row = (int16_t)(PSR_BLOCK_SIDE * patch->row), .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
 				                           .first = k };
 			for (uint64_t left = patch->kept; left != 0; left &= left - 1, k++) {
 				const struct sheet_sample *sample = &sheets->sample[p][__builtin_ctzll(left)];

@@ -51,7 +51,7 @@ struct greedy_sample {
 #define GREEDY_BACK 0x80000000u
 
 struct greedy_block {
-	int16_t col, row;  /* in blocks */
+	int16_t col, row;  /* of its first lattice point */
 	uint32_t first, n; /* its samples in the view's */
 	uint8_t is_kept;
 };

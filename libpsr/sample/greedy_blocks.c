@@ -30,15 +30,16 @@ static int is_same_block(const struct key *a, const struct key *b)
 	return a->block_row == b->block_row && a->block_col == b->block_col;
 }
 
-static void make_blocks(struct greedy_view *view, const struct key *key, struct greedy_sample *sorted)
+static void make_blocks(struct greedy_view *view, const struct key *key, struct greedy_sample *sorted, int side)
 {
 	view->n_blocks = 0;
 	for (uint32_t i = 0; i < view->n_samples; i++) {
 		sorted[i] = view->sample[key[i].index];
 		sorted[i].is_kept = 0;
 		if (i == 0 || !is_same_block(&key[i], &key[i - 1]))
-			view->block[view->n_blocks++] = (struct greedy_block){ .col = (int16_t)key[i].block_col,
-				                                                   .row = (int16_t)key[i].block_row, .first = i };
+			view->block[view->n_blocks++] = (struct greedy_block){ .col = (int16_t)(side * key[i].block_col),
+				                                                   .row = (int16_t)(side * key[i].block_row),
+				                                                   .first = i };
 		view->block[view->n_blocks - 1].n++;
 	}
 }
@@ -65,7 +66,7 @@ int greedy_divide(struct greedy_view *view, int side)
 	view->block = psr_alloc_array(n_blocks, sizeof *view->block);
 	if (view->block == NULL)
 		goto failed;
-	make_blocks(view, key, sorted);
+	make_blocks(view, key, sorted, side);
 	psr_free(view->sample);
 	psr_free(key);
 	view->sample = sorted;

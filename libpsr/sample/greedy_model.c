@@ -7,7 +7,7 @@
 /* A block of a model or of a draft. */
 struct taken {
 	unsigned projection;
-	int16_t col, row;
+	int16_t col, row; /* of its first lattice point */
 	uint8_t two_sided;
 	uint64_t mask;
 };
@@ -35,8 +35,8 @@ static void take_sample(struct greedy *greedy, const struct taken *taken, unsign
 	double pitch = greedy_row_pitch(GREEDY_EQUILATERAL), x, y;
 
 	memset(sample, 0, sizeof *sample);
-	sample->col = (int16_t)(PSR_BLOCK_SIDE * taken->col + (int)(s % PSR_BLOCK_SIDE));
-	sample->row = (int16_t)(PSR_BLOCK_SIDE * taken->row + (int)(s / PSR_BLOCK_SIDE));
+	sample->col = (int16_t)(taken->col + (int)(s % PSR_BLOCK_SIDE));
+	sample->row = (int16_t)(taken->row + (int)(s / PSR_BLOCK_SIDE));
 	sample->z = z;
 	sample->attr = attr;
 	sample->two_sided = taken->two_sided;
@@ -100,17 +100,18 @@ int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "no memory for a sampling of %u blocks", blocks->n_blocks);
 	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
-		const struct taken taken = { blocks->block_projection[b], blocks->col[b], blocks->row[b],
-			                         (blocks->flags[b] & PSR_BLOCK_TWO_SIDED) != 0, blocks->mask[b] };
 		uint64_t at = psr_blocks_attr_first(blocks, b);
-		float bias, step;
+		struct psr_place place;
+		struct taken taken;
 
 		if (!is_first_level(blocks, b))
 			continue;
+		psr_blocks_place(blocks, b, &place);
+		taken = (struct taken){ blocks->block_projection[b], (int16_t)place.col, (int16_t)place.row,
+			                    (blocks->flags[b] & PSR_BLOCK_TWO_SIDED) != 0, blocks->mask[b] };
 		take_block(*out, &taken);
-		psr_blocks_depth(blocks, b, &bias, &step);
 		for (uint64_t left = taken.mask; left != 0; left &= left - 1, at++)
-			take_sample(*out, &taken, (unsigned)__builtin_ctzll(left), bias + step * (float)blocks->depth[at],
+			take_sample(*out, &taken, (unsigned)__builtin_ctzll(left), psr_place_depth(&place, blocks->depth[at]),
 			            blocks->attr[at]);
 	}
 	finish(*out, result);

@@ -88,11 +88,6 @@ static void cone(struct block *block, const struct greedy_view *view, const stru
 		v3f_add_scaled(block->apex, block->apex, apex_offset(view, from, block), block->axis);
 }
 
-static int floor_mod(int a, int b)
-{
-	return ((a % b) + b) % b;
-}
-
 static void take_block(struct greedy_warp *warp, uint16_t v, const struct greedy_view *view,
                        const struct greedy_block *from)
 {
@@ -111,7 +106,7 @@ static void take_block(struct greedy_warp *warp, uint16_t v, const struct greedy
 	memset(depth, 0, (size_t)(warp->side * warp->side) * sizeof *depth);
 	for (uint32_t i = from->first; i < from->first + from->n; i++) {
 		const struct greedy_sample *sample = &view->sample[i];
-		int r = floor_mod(sample->row, warp->side), c = floor_mod(sample->col, warp->side);
+		int r = sample->row - from->row, c = sample->col - from->col;
 
 		if (!sample->is_kept)
 			continue;
@@ -180,7 +175,7 @@ static inline __attribute__((always_inline)) void warp_block(const struct greedy
 {
 	const struct block *block = &warp->block[b];
 	const float dx = warp->spacing, dy = warp->spacing * warp->pitch, shift = warp->is_equilateral ? 0.5f : 0;
-	const float x = (float)(side * block->col) * dx, y = (float)(side * block->row) * dy;
+	const float x = (float)block->col * dx, y = (float)block->row * dy;
 	const int size = (int)warp->resolution;
 	float origin[3], down[3], step[3], along[3];
 

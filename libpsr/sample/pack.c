@@ -31,7 +31,6 @@ struct pack {
 	int8_t *cone[3];
 	uint8_t *cone_sine, *block_projection, *flags;
 	uint16_t *attr_offset, *depth;
-	int16_t *col, *row, *depth_bias;
 	uint64_t *mask, *attr;
 	uint32_t n_clusters, n_samples;
 	double box_min[3], box_max[3];
@@ -46,9 +45,9 @@ static double spacing_of(const struct draft *draft, const struct draft_block *bl
 static void place_sample(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3])
 {
 	double spacing = spacing_of(draft, block);
-	int row = PSR_BLOCK_SIDE * block->row + (int)(s / PSR_BLOCK_SIDE);
+	int row = block->row + (int)(s / PSR_BLOCK_SIDE);
 
-	p[0] = (PSR_BLOCK_SIDE * block->col + (int)(s % PSR_BLOCK_SIDE) + (row & 1) / 2.0) * spacing;
+	p[0] = (block->col + (int)(s % PSR_BLOCK_SIDE) + (row & 1) / 2.0) * spacing;
 	p[1] = row * 0.86602540378443864676 * spacing;
 	p[2] = (double)draft_sample(draft, block, s)->z;
 }
@@ -114,58 +113,87 @@ static void sort_blocks(struct pack *pack)
 	qsort(pack->order, draft->n_blocks, sizeof *pack->order, compare_order);
 }
 
-/* Depths as 16 bits from the multiple of 2^-14 before them on, in the least step, a power of two, that reaches them
- * all. */
+static void place_of(const struct pack *pack, uint32_t i, struct psr_place *place)
+{
+	const struct psr_blocks blocks = { .projection = pack->draft->projection, .sphere_x = pack->center[0],
+		                               .sphere_y = pack->center[1], .sphere_z = pack->center[2],
+		                               .block_projection = pack->block_projection, .flags = pack->flags };
+
+	psr_blocks_place(&blocks, i, place);
+}
+
+static double clamp(double x, double middle, double reach)
+{
+	return x < middle - reach ? middle - reach : x > middle + reach ? middle + reach : x;
+}
+
+/* The sphere's center: the middle of the box, which is half a column or a row off the middle of the block's window at
+ * most. It is kept from that limit as far as rounding to 2^-14 along each axis may move it, 0.87 of that, and 2^-20
+ * more, as axes are of single precision. */
+static void center_block(struct pack *pack, uint32_t i, const struct draft_block *block, const double min[3],
+                         const double max[3])
+{
+	const double spacing = spacing_of(pack->draft, block), off = 0.87 * 0x1p-14 + 0x1p-20;
+	const double pitch = 0.86602540378443864676 * spacing;
+	const double x = clamp((min[0] + max[0]) / 2, (block->col + 3.75) * spacing, spacing / 2 - off);
+	const double y = clamp((min[1] + max[1]) / 2, (block->row + 3.5) * pitch, pitch - off);
+	double center[3];
+	struct psr_place place;
+
+	sheets_inner(&pack->draft->projection[block->projection], x, y, (min[2] + max[2]) / 2, center);
+	for (int k = 0; k < 3; k++) {
+		double rounded = rint(center[k] * 0x1p14);
+
+		assert(fabs(rounded) <= INT16_MAX);
+		pack->center[k][i] = (int16_t)rounded;
+	}
+	place_of(pack, i, &place);
+	assert(place.col == (double)block->col * (1u << block->level) && place.row == (double)block->row * (1u << block->level));
+}
+
+/* Depths as 16 bits, in the least step, a power of two, that reaches them all from that of the center. */
 static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min,
                      double max)
 {
-	double bias = floor(min * 0x1p14), range = max - bias * 0x1p-14;
 	unsigned shift = 14 + (PSR_BLOCK_DEPTH >> 3);
+	struct psr_place place;
+	double middle, range;
 
-	while (range * (double)(1u << shift) > UINT16_MAX)
+	place_of(pack, i, &place);
+	middle = place.z;
+	range = max - middle > middle - min ? max - middle : middle - min;
+	while (range * (double)(1u << shift) > INT16_MAX)
 		shift--;
-	assert(fabs(bias) <= INT16_MAX && shift >= 14);
+	assert(shift >= 14);
 	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 
-		pack->depth[at] = (uint16_t)(((double)sample->z - bias * 0x1p-14) * (double)(1u << shift) + 0.5);
+		pack->depth[at] = (uint16_t)rint(((double)sample->z - middle) * (double)(1u << shift) + 32768);
 		pack->attr[at] = sample->attr;
 	}
-	pack->depth_bias[i] = (int16_t)bias;
 	pack->flags[i] |= (uint8_t)((shift - 14) << 3);
 }
 
-/* Around the middle of the box, rounded; through the samples as they will be read back, and half a step beyond.
+/* Through the samples as they will be read back, and half a step beyond.
  *
  * Both fit. A pixel ds is at most 1/4 (at resolution 8), and a sample stands on the surface, which is within the unit
  * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
  * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
  * half a step more, 1.79 < 2. */
-static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block,
-                        const double min[3], const double max[3])
+static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block)
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
-	const struct psr_blocks depths = { .depth_bias = pack->depth_bias, .flags = pack->flags };
-	double middle[3], radius = 0;
-	float bias, step;
+	struct psr_place place;
+	double radius = 0;
 
-	psr_blocks_depth(&depths, i, &bias, &step);
-	middle_of(projection, min, max, middle);
-	for (int k = 0; k < 3; k++) {
-		double rounded = rint(middle[k] * 0x1p14);
-
-		assert(fabs(rounded) <= INT16_MAX);
-		pack->center[k][i] = (int16_t)rounded;
-		middle[k] = rounded * 0x1p-14;
-	}
+	place_of(pack, i, &place);
 	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
-		float z = bias + step * (float)pack->depth[at];
 		double p[3], position[3], squared = 0;
 
 		place_sample(pack->draft, block, (unsigned)__builtin_ctzll(left), p);
-		sheets_inner(projection, p[0], p[1], (double)z, position);
+		sheets_inner(projection, p[0], p[1], (double)psr_place_depth(&place, pack->depth[at]), position);
 		for (int k = 0; k < 3; k++) {
-			double d = position[k] - middle[k];
+			double d = position[k] - pack->center[k][i] * 0x1p-14;
 
 			squared += d * d;
 			if (block->level != 0)
@@ -206,8 +234,6 @@ static void place_block(struct pack *pack, uint32_t i, const struct draft_block 
 	if (i % PSR_RUN_BLOCKS == 0)
 		pack->run[i / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = pack->n_samples };
 	pack->block_projection[i] = block->projection;
-	pack->col[i] = block->col;
-	pack->row[i] = block->row;
 	pack->flags[i] = (uint8_t)(block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
 	pack->mask[i] = block->part;
 	pack->attr_offset[i] = (uint16_t)(pack->n_samples - pack->run[i / PSR_RUN_BLOCKS].attr_first);
@@ -224,8 +250,9 @@ static void pack_blocks(struct pack *pack)
 
 		place_block(pack, i, block);
 		projection_box(pack->draft, block, min, max);
+		center_block(pack, i, block, min, max);
 		quantise(pack, i, pack->n_samples, block, min[2], max[2]);
-		bound_block(pack, i, pack->n_samples, block, min, max);
+		bound_block(pack, i, pack->n_samples, block);
 		bound_normals(pack, i, block);
 		pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
 	}
@@ -298,11 +325,8 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	}
 	ALLOC(pack->radius, n_blocks);
 	ALLOC(pack->cone_sine, n_blocks);
-	ALLOC(pack->depth_bias, n_blocks);
 	ALLOC(pack->block_projection, n_blocks);
 	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
-	ALLOC(pack->col, n_blocks);
-	ALLOC(pack->row, n_blocks);
 	ALLOC(pack->flags, n_blocks);
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
@@ -322,11 +346,8 @@ static void pack_fini(struct pack *pack)
 	}
 	psr_free(pack->radius);
 	psr_free(pack->cone_sine);
-	psr_free(pack->depth_bias);
 	psr_free(pack->block_projection);
 	psr_free(pack->depth);
-	psr_free(pack->col);
-	psr_free(pack->row);
 	psr_free(pack->flags);
 	psr_free(pack->mask);
 	psr_free(pack->attr);
@@ -381,10 +402,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_z = pack->cone[2];
 	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
-	blocks.col = pack->col;
-	blocks.row = pack->row;
 	blocks.flags = pack->flags;
-	blocks.depth_bias = pack->depth_bias;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;

@@ -5,7 +5,7 @@
 #include "simd/simd.h"
 
 struct warp_block {
-	double origin[3]; /* of its first sample, at depth bias */
+	double origin[3]; /* of its first lattice point, at depth 0 */
 	double scale;     /* 2^level */
 	float unit[3];    /* what a step of depth adds */
 	const struct warp_lattice *lattice;
@@ -26,14 +26,14 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 	const uint32_t block = slot - in->first_slot;
 	const struct warp_lattice *lattice = &in->lattice[b->block_projection[block]];
 	const double scale = (double)(1u << psr_blocks_level(b, block));
-	const double x = 8 * scale * b->col[block], y = 8 * scale * b->row[block];
 	const uint32_t first = psr_blocks_attr_first(b, block);
-	float bias, step;
-	psr_blocks_depth(b, block, &bias, &step);
+	struct psr_place place;
+	psr_placing_find(&lattice->placing, b, block, &place);
+	const double bias = place.z - 32768 * (double)place.step;
 	for (int a = 0; a < 3; a++) {
-		out->origin[a] =
-			lattice->origin[a] + x * lattice->step[a] + y * lattice->down[a] + (double)bias * lattice->along[a];
-		out->unit[a] = (float)lattice->along[a] * step;
+		const double across = place.col * lattice->step[a] + place.row * lattice->down[a];
+		out->origin[a] = (lattice->origin[a] + bias * lattice->along[a]) + across;
+		out->unit[a] = (float)lattice->along[a] * place.step;
 	}
 	out->scale = scale;
 	out->lattice = lattice;

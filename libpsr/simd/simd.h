@@ -96,7 +96,7 @@ typedef void cull_fn(struct cull_batch *out, const struct cull_view *view, uint3
 
 /* The lattice of one projection in the picture of a frame, at level 0; at level l all but `origin` is 2^l times as
  * long, exactly. Axis a is u z', v z' or z' (without z' if orthographic). A sample of row r and column c at depth z
- * is at origin + (8 block row + r) down + (8 block column + c + (r & 1) / 2) step + z along.
+ * is at origin + (row of its block + r) down + (column of its block + c + (r & 1) / 2) step + z along.
  *
  * Of [G]'s forms this is the incremental one, (7.6): p, q and r are the terms of row and column, looked up and not
  * accumulated, so that no rounding adds up along a row and holes cost nothing. A row's term is a double until it is
@@ -106,6 +106,7 @@ struct warp_lattice {
 	double origin[3], step[3], down[3], along[3];
 	double row[3][8]; /* r * down + (r & 1) / 2 * step */
 	float col[3][8];  /* c * step */
+	struct psr_placing placing;
 };
 
 struct warp_instance {

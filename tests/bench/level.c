@@ -11,7 +11,7 @@ struct level {
 	struct psr_projection *projection;
 	struct psr_cluster *cluster;
 	struct psr_run *run;
-	int16_t *sphere[3], *col, *row, *bias;
+	int16_t *sphere[3];
 	uint16_t *radius, *attr_offset, *depth;
 	uint8_t *block_projection, *flags,  *cone_sine, *visibility;
 	int8_t *cone[3];
@@ -48,9 +48,6 @@ static void allocate(struct level *to, const struct psr_blocks *room)
 		to->sphere[k] = report_alloc(n, sizeof *to->sphere[k]);
 		to->cone[k] = report_alloc(n, sizeof *to->cone[k]);
 	}
-	to->col = report_alloc(n, sizeof *to->col);
-	to->row = report_alloc(n, sizeof *to->row);
-	to->bias = report_alloc(n, sizeof *to->bias);
 	to->radius = report_alloc(n, sizeof *to->radius);
 	to->attr_offset = report_alloc(n, sizeof *to->attr_offset);
 	to->block_projection = report_alloc(n, 1);
@@ -97,11 +94,8 @@ static void add_block(struct level *to, const struct psr_blocks *from, uint32_t 
 	}
 	to->radius[j] = from->sphere_r[b];
 	to->block_projection[j] = from->block_projection[b];
-	to->col[j] = from->col[b];
-	to->row[j] = from->row[b];
 	to->flags[j] = from->flags[b] & (uint8_t)~PSR_BLOCK_LEVEL;
 	to->cone_sine[j] = from->cone_sine != NULL ? from->cone_sine[b] : 0;
-	to->bias[j] = from->depth_bias[b];
 	to->mask[j] = from->mask[b];
 	if (from->visibility_mask != NULL)
 		to->visibility[j] = share_mask(to, run, from->visibility_mask[psr_blocks_visibility(from, b)]);
@@ -145,10 +139,7 @@ static void attach(struct level *to, const struct psr_blocks *from)
 	b->sphere_z = to->sphere[2];
 	b->sphere_r = to->radius;
 	b->block_projection = to->block_projection;
-	b->col = to->col;
-	b->row = to->row;
 	b->flags = to->flags;
-	b->depth_bias = to->bias;
 	b->mask = to->mask;
 	b->attr_offset = to->attr_offset;
 	b->depth = to->depth;
@@ -168,9 +159,8 @@ static void attach(struct level *to, const struct psr_blocks *from)
 static void release(struct level *to)
 {
 	void *all[] = { to->projection, to->cluster, to->run, to->sphere[0], to->sphere[1], to->sphere[2], to->cone[0],
-		            to->cone[1], to->cone[2], to->col, to->row, to->bias, to->radius, to->attr_offset,
-		            to->block_projection, to->flags, to->cone_sine, to->visibility, to->mask, to->visible,
-		            to->depth, to->attr };
+		            to->cone[1], to->cone[2], to->radius, to->attr_offset, to->block_projection, to->flags,
+		            to->cone_sine, to->visibility, to->mask, to->visible, to->depth, to->attr };
 
 	for (size_t i = 0; i < sizeof all / sizeof all[0]; i++)
 		free(all[i]);

@@ -142,18 +142,18 @@ static void put_block(struct peer_points *out, const struct psr_blocks *b, uint3
 	const struct psr_projection *p = &b->projection[b->block_projection[i]];
 	const float dx = p->spacing * (float)(1u << psr_blocks_level(b, i)), dy = dx * 0.866025404f;
 	uint32_t k = psr_blocks_attr_first(b, i);
-	float bias, step;
+	struct psr_place place;
 
-	psr_blocks_depth(b, i, &bias, &step);
+	psr_blocks_place(b, i, &place);
 	for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
-		const int row = PSR_BLOCK_SIDE * b->row[i] + s / PSR_BLOCK_SIDE;
+		const int row = s / PSR_BLOCK_SIDE, col = s % PSR_BLOCK_SIDE;
 		float x, y, z;
 
 		if (!(b->mask[i] >> s & 1))
 			continue;
-		x = ((float)(PSR_BLOCK_SIDE * b->col[i] + s % PSR_BLOCK_SIDE) + (float)(row & 1) / 2) * dx;
-		y = (float)row * dy;
-		z = bias + step * (float)b->depth[k];
+		x = (float)place.col * p->spacing + ((float)col + (float)(row & 1) / 2) * dx;
+		y = (float)place.row * p->spacing * 0.866025404f + (float)row * dy;
+		z = psr_place_depth(&place, b->depth[k]);
 		for (int c = 0; c < 3; c++)
 			out->position[out->n][c] = x * p->axis[0][c] + y * p->axis[1][c] + z * p->axis[2][c];
 		out->attr[out->n++] = b->attr[k++];

@@ -61,7 +61,8 @@ static uint32_t valid_sample(struct check *c, uint64_t mask)
 static void random_instance(struct check *c, struct warp_instance *in, const struct psr_blocks *blocks, int is_spoilt)
 {
 	struct warp_lattice *lattice = check_in(c, MAX_PROJECTIONS, sizeof *lattice);
-	for (int p = 0; p < MAX_PROJECTIONS; p++)
+	for (int p = 0; p < MAX_PROJECTIONS; p++) {
+		psr_placing_make(&lattice[p].placing, &blocks->projection[p]);
 		for (int a = 0; a < 3; a++) {
 			lattice[p].origin[a] = (double)check_plain_or_any(c, is_spoilt, -1, 1);
 			lattice[p].step[a] = (double)check_plain_or_any(c, is_spoilt, -0.01, 0.01);
@@ -72,6 +73,7 @@ static void random_instance(struct check *c, struct warp_instance *in, const str
 				lattice[p].col[a][i] = (float)(i * lattice[p].step[a]);
 			}
 		}
+	}
 	in->blocks = blocks;
 	in->lattice = lattice;
 	for (int k = 0; k < 9; k++)

@@ -77,8 +77,9 @@ static void random_picture(struct check *c, struct picture *p)
 	make_picture(c, p, random_side(c, TILE_WIDTH), random_side(c, TILE_HEIGHT), check_u32(c) & check_u32(c));
 }
 
-static void complete_lattice(struct warp_lattice *lattice)
+static void complete_lattice(struct warp_lattice *lattice, const struct psr_projection *projection)
 {
+	psr_placing_make(&lattice->placing, projection);
 	for (int a = 0; a < 3; a++)
 		for (int i = 0; i < 8; i++) {
 			lattice->row[a][i] = i * lattice->down[a] + (i & 1) * 0.5 * lattice->step[a];
@@ -88,7 +89,8 @@ static void complete_lattice(struct warp_lattice *lattice)
 
 /* A sample's step is `step` pixels, and the lattice lies in the tile or near it, before the eye or on both sides of
  * it. */
-static void random_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t, double step)
+static void random_lattice(struct check *c, struct warp_lattice *lattice, const struct psr_projection *projection,
+                           const struct warp_target *t, double step)
 {
 	const double u = check_real(c, t->x0 - 20, t->x1 + 20), v = check_real(c, t->y0 - 20, t->y1 + 20);
 	const double z = check_real(c, check_one_in(c, 4) ? -0.1 : 0.3, 1), scale = t->perspective ? z : 1;
@@ -99,7 +101,7 @@ static void random_lattice(struct check *c, struct warp_lattice *lattice, const 
 		.down = { -down, across, check_real(c, -0.01, 0.01) },
 		.along = { check_real(c, -30, 30), check_real(c, -30, 30), check_real(c, -0.3, 0.3) },
 	};
-	complete_lattice(lattice);
+	complete_lattice(lattice, projection);
 }
 
 /* Numbers that no lattice should have, here and there. */
@@ -120,7 +122,8 @@ static void spoil_lattice(struct check *c, struct warp_lattice *lattice)
 }
 
 /* Samples on the very edges: of pixels, cells and tiles, and at near_z itself. */
-static void edge_lattice(struct check *c, struct warp_lattice *lattice, const struct warp_target *t)
+static void edge_lattice(struct check *c, struct warp_lattice *lattice, const struct psr_projection *projection,
+                         const struct warp_target *t)
 {
 	const double x = check_one_in(c, 2) ? t->x0 : t->x1, y = check_one_in(c, 2) ? t->y0 : t->y1;
 	const double z = check_one_in(c, 2) ? (double)t->near_z : exp2(check_below(c, 3));
@@ -130,7 +133,7 @@ static void edge_lattice(struct check *c, struct warp_lattice *lattice, const st
 		.origin = { (x - 4 * step) * scale, (y - 4 * step) * scale, z },
 		.step = { step * scale, 0, 0 }, .down = { 0, step * scale, 0 },
 	};
-	complete_lattice(lattice);
+	complete_lattice(lattice, projection);
 }
 
 static void random_sight(struct check *c, struct warp_instance *in, const struct warp_target *t, int is_spoilt)
@@ -167,9 +170,9 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 		struct warp_lattice *lattice = check_in(c, MAX_PROJECTIONS, sizeof *lattice);
 		for (int k = 0; k < MAX_PROJECTIONS; k++) {
 			if (numbers == EDGES)
-				edge_lattice(c, &lattice[k], t);
+				edge_lattice(c, &lattice[k], &blocks.projection[k], t);
 			else
-				random_lattice(c, &lattice[k], t, step);
+				random_lattice(c, &lattice[k], &blocks.projection[k], t, step);
 			if (numbers == SPOILT)
 				spoil_lattice(c, &lattice[k]);
 		}

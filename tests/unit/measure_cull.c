@@ -419,7 +419,7 @@ static void a_part_has_the_blocks_of_level_0_that_are_kept(void **state)
 		if (!is_kept[i] || psr_blocks_level(all, i) != 0)
 			continue;
 		assert_int_equal(index[n], i);
-		assert_true(b->mask[n] == all->mask[i] && b->sphere_x[n] == all->sphere_x[i] && b->row[n] == all->row[i]);
+		assert_true(b->mask[n] == all->mask[i] && b->sphere_x[n] == all->sphere_x[i] && b->flags[n] == all->flags[i]);
 		to = psr_blocks_attr_first(b, n);
 		from = psr_blocks_attr_first(all, i);
 		assert_memory_equal(b->attr + to, all->attr + from, n_samples * sizeof *b->attr);

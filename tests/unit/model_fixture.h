@@ -23,7 +23,6 @@ struct fixture {
 	uint8_t cone_sine[FIXTURE_BLOCKS];
 	uint8_t block_projection[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
 	uint16_t radius[FIXTURE_BLOCKS];
-	int16_t col[FIXTURE_BLOCKS], row[FIXTURE_BLOCKS], depth_bias[FIXTURE_BLOCKS];
 	uint16_t attr_offset[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
 	uint64_t mask[FIXTURE_BLOCKS], attr[FIXTURE_SAMPLES], visibility_mask[FIXTURE_MASKS][2];
 	uint8_t visibility_index[FIXTURE_BLOCKS];
@@ -73,10 +72,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->cone[i % 3][i] = 127;
 		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
 		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
-		f->depth_bias[i] = -8192; /* half a unit */
 		f->block_projection[i] = (uint8_t)(i % 2);
-		f->col[i] = (int16_t)(i - 3);
-		f->row[i] = (int16_t)(3 - i);
 		f->flags[i] = (uint8_t)(levels[i] | 6 << 3 | (i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0));
 		f->attr_offset[i] = (uint16_t)n;
 		f->visibility_index[i] = (uint8_t)(i * i % FIXTURE_MASKS);
@@ -96,8 +92,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		.n_blocks = FIXTURE_BLOCKS, .n_projections = 2, .n_clusters = 3, .n_levels = 2, .n_samples = FIXTURE_SAMPLES,
 		.projection = f->projection, .cluster = f->cluster, .run = &f->run,
 		.sphere_x = f->center[0], .sphere_y = f->center[1], .sphere_z = f->center[2], .sphere_r = f->radius,
-		.block_projection = f->block_projection, .col = f->col, .row = f->row, .flags = f->flags,
-		.depth_bias = f->depth_bias, .mask = f->mask, .attr_offset = f->attr_offset,
+		.block_projection = f->block_projection, .flags = f->flags, .mask = f->mask, .attr_offset = f->attr_offset,
 		.depth = f->depth, .attr = f->attr,
 	};
 	if (with_optional) {

@@ -142,9 +142,10 @@ static const struct violation violations[] = {
 	{ "PROJ", 0, 4, F_1_01, "PROJ: the axes of projection 0 are not orthonormal" },
 	{ "PROJ", 44, 4, 0x3c23d70a, "PROJ: the axes of projection 1 are not orthonormal" }, /* 0.01 beside (0, 1, 0) */
 	{ "PROJ", 0, 4, F_MINUS_1, "PROJ: the axes of projection 0 are left-handed" },
-	{ "PROJ", 36, 4, 0, "PROJ: the spacing of projection 0 is 0; it must be positive and at most 1024" },
-	{ "PROJ", 76, 4, F_2000, "PROJ: the spacing of projection 1 is 2000; it must be positive and at most 1024" },
-	{ "PROJ", 76, 4, F_NAN, "PROJ: the spacing of projection 1 is nan; it must be positive and at most 1024" },
+	{ "PROJ", 36, 4, 0, "PROJ: the spacing of projection 0 is 0; it must be from 6.10352e-05 to 1024" },
+	{ "PROJ", 36, 4, 0x387fffff, "PROJ: the spacing of projection 0 is 6.10352e-05; it must be from" }, /* below 2^-14 */
+	{ "PROJ", 76, 4, F_2000, "PROJ: the spacing of projection 1 is 2000; it must be from 6.10352e-05 to 1024" },
+	{ "PROJ", 76, 4, F_NAN, "PROJ: the spacing of projection 1 is nan; it must be from 6.10352e-05 to 1024" },
 	{ "CLUS", 0, 4, F_INF, "CLUS: the sphere of cluster 0 is not one" },
 	{ "CLUS", 40, 4, F_NAN, "CLUS: the sphere of cluster 1 is not one" },
 	{ "CLUS", 12, 4, F_MINUS_1, "CLUS: the sphere of cluster 0 is not one" },
@@ -198,13 +199,13 @@ static void values_at_the_edge_of_a_rule_are_taken(void **state)
 		{ "BLKS", 12, 4, 8, NULL },            /* levels that are not used */
 		{ "PROJ", 0, 4, 0x3f800001, NULL },     /* an axis of 1 + 2^-23 */
 		{ "PROJ", 36, 4, 0x44800000, NULL },    /* spacing 1024 */
+		{ "PROJ", 36, 4, 0x38800000, NULL },    /* 2^-14 */
 		{ "CLUS", 12, 4, 0, NULL },             /* radius 0 */
 		{ "CLUS", 56, 4, 2, NULL },             /* a group of its own */
 		{ "CLUS", 0, 4, 0xc4800000, NULL },     /* center -1024 */
 		{ "SPHX", 0, 2, 0x8000, NULL },         /* center -2 */
 		{ "SPHR", 0, 2, 0xffff, NULL },
 		{ "SPHR", 0, 2, 0, NULL },
-		{ "DBIA", 0, 2, 0x8000, NULL },         /* depth -2 */
 		{ "BFLG", 0, 1, 0, NULL },              /* the greatest step, one-sided */
 		{ "BFLG", 0, 1, 0xf8, NULL },           /* the least, two-sided */
 		{ "DPTH", 0, 2, 65535, NULL },          /* the deepest */
@@ -237,9 +238,9 @@ static void versions_are_refused_by_major_and_section(void **state)
 	file_put(bytes + HEADER_MINOR, 2, 7);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_OK);
 	bytes = copy_original();
-	file_put(bytes + HEADER_MAJOR, 2, 2);
+	file_put(bytes + HEADER_MAJOR, 2, 3);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 2.0, and this build reads 3.x"));
+	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 4.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
@@ -341,8 +342,8 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 896 has 160 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "5056 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 160 bytes, which reach beyond the file's end" },
+		{ NULL, 28, 4, 1, "4800 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },
@@ -393,9 +394,9 @@ static void create_refuses_what_a_file_may_not_hold(void **state)
 	f.blocks.cone_y = NULL;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
 	fixture_init(&f, 1);
-	f.blocks.row = NULL;
+	f.blocks.mask = NULL;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
-	assert_non_null(strstr(err.text, "BROW"));
+	assert_non_null(strstr(err.text, "MASK"));
 	fixture_init(&f, 0);
 	f.blocks.n_blocks = MODEL_MAX_BLOCKS + 1;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_LIMIT);

@@ -22,15 +22,14 @@ static const uint32_t levels_of[GROUPS] = { 0x1f, 0x15, 0x0a, 0x01, 0x10 };
 static struct psr_cluster cluster[MAX_CLUSTERS];
 static struct psr_model *model;
 
-/* Blocks of all levels begin at the same corner: level 4, 8 * 16 samples wide, is an eighth of a unit. Groups stand
+/* Blocks of all levels have the same middle, as near as windows of their lattices come: level 4, 8 * 16 samples wide, is an eighth of a unit. Groups stand
  * side by side in the plane z = 0, a quarter of a unit apart, and face +z. */
 static int setup(void **state)
 {
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
 	static const struct psr_run run;
-	static int16_t bias[MAX_CLUSTERS], x[MAX_CLUSTERS], y[MAX_CLUSTERS], z[MAX_CLUSTERS];
+	static int16_t x[MAX_CLUSTERS], y[MAX_CLUSTERS], z[MAX_CLUSTERS];
 	static uint16_t depth[64 * MAX_CLUSTERS], offset[MAX_CLUSTERS], r[MAX_CLUSTERS];
-	static int16_t col[MAX_CLUSTERS], row[MAX_CLUSTERS];
 	static uint8_t number[MAX_CLUSTERS], flags[MAX_CLUSTERS];
 	static uint64_t mask[MAX_CLUSTERS], attr[64 * MAX_CLUSTERS];
 	struct psr_model_info info = { .scale = 1,
@@ -42,8 +41,7 @@ static int setup(void **state)
 		                           .builder = "test" };
 	struct psr_blocks blocks = { .n_projections = 1, .n_levels = LEVELS, .projection = &projection, .cluster = cluster,
 		                         .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z, .sphere_r = r,
-		                         .block_projection = number, .col = col, .row = row, .flags = flags, .depth_bias = bias,
-		                         .mask = mask, .attr_offset = offset, .depth = depth,
+		                         .block_projection = number, .flags = flags, .mask = mask, .attr_offset = offset, .depth = depth,
 		                         .attr = attr };
 	uint32_t n = 0;
 
@@ -59,12 +57,13 @@ static int setup(void **state)
 			x[n] = (int16_t)(cluster[n].center[0] * 0x1p14f);
 			y[n] = (int16_t)(cluster[n].center[1] * 0x1p14f);
 			r[n] = (uint16_t)(cluster[n].radius * 0x1p15f);
-			col[n] = (int16_t)((g - 2) * 32 >> l);
 			flags[n] = (uint8_t)(l | PSR_BLOCK_DEPTH);
 			mask[n] = UINT64_MAX;
 			offset[n] = (uint16_t)(64 * n);
-			for (int i = 0; i < 64; i++)
+			for (int i = 0; i < 64; i++) {
+				depth[64 * n + (uint32_t)i] = 32768;
 				attr[64 * n + (uint32_t)i] = psr_direction_encode((const float[3]){ 0, 0, 1 });
+			}
 			n++;
 		}
 	}

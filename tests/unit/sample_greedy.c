@@ -163,8 +163,8 @@ static void every_sample_is_in_the_block_of_its_row_and_column(void **state)
 				n += block->n;
 				assert_true(b == 0 || block->row != block[-1].row || block->col != block[-1].col);
 				for (uint32_t i = block->first; i < n; i++) {
-					assert_int_equal(floor_div(view->sample[i].row, side), block->row);
-					assert_int_equal(floor_div(view->sample[i].col, side), block->col);
+					assert_int_equal(side * floor_div(view->sample[i].row, side), block->row);
+					assert_int_equal(side * floor_div(view->sample[i].col, side), block->col);
 				}
 			}
 			assert_int_equal(n, view->n_samples);

@@ -32,11 +32,11 @@ static void add_layer(struct draft *draft, unsigned level, int layer)
 	for (int i = 0; i < SIDE * SIDE >> 2 * level; i++) {
 		struct draft_block *block = &draft->block[draft->n_blocks++];
 
-		*block = (struct draft_block){ .level = (uint8_t)level, .col = (int16_t)(i % (SIDE >> level)),
-			                           .row = (int16_t)(i / (SIDE >> level)), .mask = UINT64_MAX, .part = UINT64_MAX,
+		*block = (struct draft_block){ .level = (uint8_t)level, .col = (int16_t)(8 * (i % (SIDE >> level))),
+			                           .row = (int16_t)(8 * (i / (SIDE >> level))), .mask = UINT64_MAX, .part = UINT64_MAX,
 			                           .first = draft->n_samples };
 		for (int s = 0; s < 64; s++) {
-			int row = 8 * block->row + s / 8, col = 8 * block->col + s % 8;
+			int row = block->row + s / 8, col = block->col + s % 8;
 
 			draft->sample[draft->n_samples++].z = depth_at((col + (row & 1) / 2.0) * spacing,
 			                                               row * 0.8660254 * spacing, layer);
@@ -187,8 +187,8 @@ static void fill_box(struct draft *draft, int n_wide, int n_deep, uint64_t *seed
 	for (int i = 0; i < n_wide * n_wide * n_deep; i++) {
 		double z = i / (n_wide * n_wide) + i % 7 / 7.0;
 
-		draft->block[draft->n_blocks++] = (struct draft_block){ .col = (int16_t)(i % n_wide), .mask = UINT64_MAX,
-			.row = (int16_t)(i / n_wide % n_wide), .part = UINT64_MAX, .first = draft->n_samples };
+		draft->block[draft->n_blocks++] = (struct draft_block){ .col = (int16_t)(8 * (i % n_wide)), .mask = UINT64_MAX,
+			.row = (int16_t)(8 * (i / n_wide % n_wide)), .part = UINT64_MAX, .first = draft->n_samples };
 		for (int s = 0; s < 64; s++)
 			draft->sample[draft->n_samples++].z = 16 * SPACING * (float)(z + meshes_random(seed));
 	}

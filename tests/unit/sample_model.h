@@ -42,17 +42,17 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 			const struct psr_projection *projection = &b->projection[b->block_projection[i]];
 			double spacing = (double)projection->spacing * (double)(1u << psr_blocks_level(b, i)), inner[3];
 			uint32_t k = psr_blocks_attr_first(b, i);
-			float bias, step;
+			struct psr_place place;
 
-			psr_blocks_depth(b, i, &bias, &step);
+			psr_blocks_place(b, i, &place);
 			for (uint64_t left = b->mask[i]; left != 0; left &= left - 1, k++, out++) {
 				int s = __builtin_ctzll(left);
-				float z = bias + step * (float)b->depth[k];
+				float z = psr_place_depth(&place, b->depth[k]);
 
 				*out = (struct model_sample){ .group = b->cluster[c].group, .level = (uint8_t)psr_blocks_level(b, i),
 					                          .two_sided = (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0,
-					                          .projection = b->block_projection[i], .row = 8 * b->row[i] + s / 8,
-					                          .col = 8 * b->col[i] + s % 8, .attr = b->attr[k] };
+					                          .projection = b->block_projection[i], .row = ((int)place.row >> psr_blocks_level(b, i)) + s / 8,
+					                          .col = ((int)place.col >> psr_blocks_level(b, i)) + s % 8, .attr = b->attr[k] };
 				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
 				             out->row * 0.86602540378443864676 * spacing, (double)z, inner);
 				v3f_set(out->p, (float)inner[0], (float)inner[1], (float)inner[2]);

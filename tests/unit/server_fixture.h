@@ -67,7 +67,6 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	static int16_t x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS];
 	static const struct psr_run run;
 	static uint16_t depth[PLATE_SAMPLES], offset[PLATE_BLOCKS], r[PLATE_BLOCKS];
-	static int16_t col[PLATE_BLOCKS], row[PLATE_BLOCKS], bias[PLATE_BLOCKS];
 	static uint8_t number[PLATE_BLOCKS], flags[PLATE_BLOCKS];
 	static uint64_t mask[PLATE_BLOCKS], attr[PLATE_SAMPLES];
 	struct psr_model_info info = {
@@ -77,8 +76,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	struct psr_blocks blocks = {
 		.n_blocks = PLATE_BLOCKS, .n_projections = 1, .n_clusters = 1, .n_levels = 1, .n_samples = PLATE_SAMPLES,
 		.projection = &projection, .cluster = &cluster, .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z,
-		.sphere_r = r, .block_projection = number, .col = col, .row = row, .flags = flags, .depth_bias = bias,
-		.mask = mask, .attr_offset = offset, .depth = depth, .attr = attr,
+		.sphere_r = r, .block_projection = number, .flags = flags, .mask = mask, .attr_offset = offset, .depth = depth, .attr = attr,
 	};
 	static const struct psr_preset_camera camera = { "front", { { 0, 0, 3 }, { 0, 0, 0 }, { 0, 1, 0 },
 		                                                        PSR_CAMERA_PERSPECTIVE, 0.5, 0, 0.25 } };
@@ -93,17 +91,17 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	const float side = 8.0f / 64, height = side * 0.8660254f;
 
 	for (int i = 0; i < PLATE_BLOCKS; i++) {
-		col[i] = (int16_t)(i % 8 - 4);
-		row[i] = (int16_t)(i / 8 - 4);
-		x[i] = (int16_t)(((float)col[i] + 0.5f) * side * 0x1p14f);
-		y[i] = (int16_t)(((float)row[i] + 0.5f) * height * 0x1p14f);
+		x[i] = (int16_t)(((float)(i % 8) - 3.5f) * side * 0x1p14f);
+		y[i] = (int16_t)(((float)(i / 8) - 3.5f) * height * 0x1p14f);
 		r[i] = (uint16_t)(side * 0x1p15f);
 		mask[i] = UINT64_MAX;
 		offset[i] = (uint16_t)(64 * i);
 		flags[i] = PSR_BLOCK_TWO_SIDED | 6 << 3;
 	}
-	for (int i = 0; i < PLATE_SAMPLES; i++)
+	for (int i = 0; i < PLATE_SAMPLES; i++) {
+		depth[i] = 32768;                                  /* that of the sphere's center */
 		attr[i] = (uint64_t)1 << 15 | (uint64_t)rgb << 16; /* unlit */
+	}
 	assert_int_equal(psr_model_create(&model, &info, &blocks, &presets, &error), PSR_OK);
 	return model;
 }

@@ -24,7 +24,7 @@ extern "C" {
  * spacing: equilateral ([G] 4.4), with every second row shifted by half a step, so that blocks are nearly square. */
 struct psr_projection {
 	float axis[3][3];
-	float spacing; /* at level 0; level l has spacing * 2^l */
+	float spacing; /* at level 0, at least 2^-14; level l has spacing * 2^l */
 };
 
 #define PSR_MAX_LEVELS 8
@@ -48,10 +48,9 @@ struct psr_run {
 #define PSR_CONE_ANY 255
 
 /* Blocks ([G] 5.1), as structures of arrays: what culling, warping and shading read is apart. Block b's lattice
- * origin is column 8 * col[b], row 8 * row[b]; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth
- * along z is bias + step * (float)depth[k] (psr_blocks_depth()), its attributes are attr[k], with k =
- * psr_blocks_attr_first() + number of lower set bits. Blocks of one cluster follow each other, and clusters are in the
- * order of their blocks, without gaps.
+ * origin is where psr_blocks_place() says; sample s = 8 * r + c of it is valid iff bit s of mask[b]; its depth along z
+ * is psr_place_depth() of depth[k], its attributes are attr[k], with k = psr_blocks_attr_first() + number of lower set
+ * bits. Blocks of one cluster follow each other, and clusters are in the order of their blocks, without gaps.
  *
  * Checked wherever a model is made or opened (docs/format.md has every rule): lengths and coordinates inside of a
  * model are finite and at most 1024, axes are orthonormal to 2^-20, counts and indices fit each other; at most
@@ -66,9 +65,7 @@ struct psr_blocks {
 	const int16_t *sphere_x, *sphere_y, *sphere_z; /* see psr_blocks_sphere() */
 	const uint16_t *sphere_r;
 	const uint8_t *block_projection;
-	const int16_t *col, *row;               /* in blocks */
 	const uint8_t *flags;                   /* enum psr_block_flag */
-	const int16_t *depth_bias;              /* see psr_blocks_depth() */
 	const uint64_t *mask;                   /* never 0 */
 	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
@@ -104,13 +101,6 @@ static inline uint32_t psr_blocks_visibility(const struct psr_blocks *blocks, ui
 	return blocks->run[block / PSR_RUN_BLOCKS].visibility_first + blocks->visibility_index[block];
 }
 
-/* Where the depths of a block begin, depth_bias / 2^14, and their step, in inner units. Both are exact. */
-static inline void psr_blocks_depth(const struct psr_blocks *blocks, uint32_t block, float *bias, float *step)
-{
-	*bias = (float)blocks->depth_bias[block] * (1.0f / 16384);
-	*step = (1.0f / 16384) / (float)(1u << ((blocks->flags[block] & PSR_BLOCK_DEPTH) >> 3));
-}
-
 /* The sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x, sphere_y,
  * sphere_z) / 2^14, its radius sphere_r / 2^15, in inner units. All are exact. */
 static inline void psr_blocks_sphere(const struct psr_blocks *blocks, uint32_t block, float center[3], float *radius)
@@ -119,6 +109,58 @@ static inline void psr_blocks_sphere(const struct psr_blocks *blocks, uint32_t b
 	center[1] = (float)blocks->sphere_y[block] * (1.0f / 16384);
 	center[2] = (float)blocks->sphere_z[block] * (1.0f / 16384);
 	*radius = (float)blocks->sphere_r[block] * (1.0f / 32768);
+}
+
+/* Where a block is on the lattice of its projection and level l, which its sphere says: of all windows of 8 x 8 lattice
+ * points that begin in an even row, its is the one whose middle is nearest to the sphere's center, 3.75 columns and 3.5
+ * rows from its first point. Depths are told from that of the center. */
+struct psr_place {
+	double col, row; /* of its first lattice point, in those of level 0: multiples of 2^l, and of twice that */
+	double z;        /* depth of the center, in inner units, */
+	float step;      /* and what a step of `depth` is, a power of two */
+};
+
+/* Columns, rows and depth of what is 2^-14 long along x, y and z: what places of one projection are found by. */
+struct psr_placing {
+	double of[3][3];
+};
+
+static inline void psr_placing_make(struct psr_placing *placing, const struct psr_projection *projection)
+{
+	const double steps = 1 / (double)projection->spacing, length[3] = { steps, steps * 1.1547005383792515, 1 };
+
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; k < 3; k++)
+			placing->of[i][k] = (double)projection->axis[i][k] * length[i] * (1.0 / 16384);
+}
+
+/* The place of a block of that projection. */
+static inline void psr_placing_find(const struct psr_placing *placing, const struct psr_blocks *blocks, uint32_t block,
+                                    struct psr_place *place)
+{
+	const double x = blocks->sphere_x[block], y = blocks->sphere_y[block], z = blocks->sphere_z[block];
+	const double (*of)[3] = placing->of;
+	const unsigned flags = blocks->flags[block], level = flags & PSR_BLOCK_LEVEL;
+	const double scale = (double)(1u << level), whole = 0x1.8p52 * scale; /* next to this, doubles are 2^level apart */
+
+	place->col = ((x * of[0][0] - 3.75 * scale) + (y * of[0][1] + z * of[0][2])) + whole - whole;
+	place->row = ((x * of[1][0] - 3.5 * scale) + (y * of[1][1] + z * of[1][2])) + 2 * whole - 2 * whole;
+	place->z = x * of[2][0] + (y * of[2][1] + z * of[2][2]);
+	place->step = 1.0f / (float)(1u << (14 + ((flags & PSR_BLOCK_DEPTH) >> 3)));
+}
+
+static inline void psr_blocks_place(const struct psr_blocks *blocks, uint32_t block, struct psr_place *place)
+{
+	struct psr_placing placing;
+
+	psr_placing_make(&placing, &blocks->projection[blocks->block_projection[block]]);
+	psr_placing_find(&placing, blocks, block, place);
+}
+
+/* Along the projection's z, in inner units. */
+static inline float psr_place_depth(const struct psr_place *place, uint16_t depth)
+{
+	return (float)(place->z + (double)place->step * (depth - 32768));
 }
 
 /* A spatial cluster at one level: blocks first_block .. first_block + n_blocks - 1. Clusters of one `group` are the

@@ -23,19 +23,19 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	const uint32_t n_runs = (n_blocks + PSR_RUN_BLOCKS - 1) / PSR_RUN_BLOCKS;
 	struct psr_run *run = check_in(c, n_runs, sizeof *run);
 	uint8_t *projection = check_in(c, n_blocks, 1), *flags = check_in(c, n_blocks, 1);
-	int16_t *col = check_in(c, n_blocks, 2), *row = check_in(c, n_blocks, 2), *bias = check_in(c, n_blocks, 2);
+	struct psr_projection *lattice = check_in(c, n_projections, sizeof *lattice);
 	uint16_t *offset = check_in(c, n_blocks, 2);
 	uint64_t *mask = check_in(c, n_blocks, 8);
 	uint32_t n = 0;
 
+	/* Spheres anywhere are within four blocks of the origin on the one, and anywhere on the other. */
+	for (uint32_t i = 0; i < n_projections; i++)
+		lattice[i] = (struct psr_projection){ { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
+			                                  check_one_in(c, 8) ? 0x1p-14f : 0x1p-4f };
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const uint32_t level = check_one_in(c, 4) ? check_below(c, PSR_MAX_LEVELS) : check_below(c, 3);
 		projection[b] = (uint8_t)check_below(c, n_projections);
 		flags[b] = (uint8_t)(level | (check_u32(c) & (PSR_BLOCK_DEPTH | PSR_BLOCK_TWO_SIDED)));
-		if (!check_one_in(c, 8)) { /* else anywhere */
-			col[b] = (int16_t)((int)check_below(c, 8) - 4);
-			row[b] = (int16_t)((int)check_below(c, 8) - 4);
-		}
 		if (b % PSR_RUN_BLOCKS == 0)
 			run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = n };
 		offset[b] = (uint16_t)(n - run[b / PSR_RUN_BLOCKS].attr_first);
@@ -47,11 +47,9 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 		.n_projections = n_projections,
 		.n_samples = n,
 		.run = run,
+		.projection = lattice,
 		.block_projection = projection,
-		.col = col,
-		.row = row,
 		.flags = flags,
-		.depth_bias = bias,
 		.mask = mask,
 		.sphere_x = check_in(c, n_blocks, 2),
 		.sphere_y = check_in(c, n_blocks, 2),

@@ -10,7 +10,7 @@
 struct arrays {
 	uint32_t n_blocks, n_samples;
 	struct psr_run *run;
-	int16_t *center[3], *col, *row, *bias;
+	int16_t *center[3];
 	uint16_t *radius, *offset, *depth;
 	int8_t *cone[3];
 	uint8_t *projection, *flags, *cone_sine;
@@ -58,8 +58,8 @@ static struct sample trace(const double axis[3][3], double x, double y, double r
 	return s;
 }
 
-static void add_block(struct arrays *a, const struct shape_options *o, int p, const double axis[3][3], double dx,
-                      int col, int row, double radius)
+static void add_block(struct arrays *a, const struct shape_options *o, const struct psr_projection *projection, int p,
+                      const double axis[3][3], double dx, int col, int row, double radius)
 {
 	struct sample s[64];
 	double low = INFINITY, high = -INFINITY;
@@ -82,10 +82,7 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	}
 	a->radius = grow(a->radius, a->n_blocks, 2);
 	a->cone_sine = grow(a->cone_sine, a->n_blocks, 1);
-	a->bias = grow(a->bias, a->n_blocks, 2);
 	a->projection = grow(a->projection, a->n_blocks, 1);
-	a->col = grow(a->col, a->n_blocks, 2);
-	a->row = grow(a->row, a->n_blocks, 2);
 	a->flags = grow(a->flags, a->n_blocks, 1);
 	a->mask = grow(a->mask, a->n_blocks, 8);
 	a->offset = grow(a->offset, a->n_blocks, 2);
@@ -116,14 +113,15 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 			least = fmin(least, v3d_dot(mean, s[i].normal));
 	least = fmax(0, least - 1e-6);
 	a->cone_sine[b] = (uint8_t)ceil(sqrt(1 - least * least) * 255);
-	a->bias[b] = (int16_t)floor(low * 0x1p14);
-	low = a->bias[b] * 0x1p-14;
-	unsigned shift = 29;
-	while ((high - low) * (double)(1u << shift) > 65535)
-		shift--;
 	a->projection[b] = (uint8_t)p;
-	a->col[b] = (int16_t)col;
-	a->row[b] = (int16_t)row;
+	a->flags[b] = 0;
+	struct psr_place place;
+	psr_blocks_place(&(struct psr_blocks){ .projection = projection, .sphere_x = a->center[0], .sphere_y = a->center[1],
+	                                       .sphere_z = a->center[2], .block_projection = a->projection,
+	                                       .flags = a->flags }, b, &place);
+	unsigned shift = 29;
+	while (fmax(high - place.z, place.z - low) * (double)(1u << shift) > 32767)
+		shift--;
 	a->flags[b] = (uint8_t)((shift - 14) << 3 | (o->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
 	a->mask[b] = mask;
 	if (b % PSR_RUN_BLOCKS == 0)
@@ -132,7 +130,7 @@ static void add_block(struct arrays *a, const struct shape_options *o, int p, co
 	for (int i = 0; i < 64; i++) {
 		if (!s[i].valid)
 			continue;
-		a->depth[a->n_samples] = (uint16_t)((s[i].depth - low) * (double)(1u << shift) + 0.5);
+		a->depth[a->n_samples] = (uint16_t)((s[i].depth - place.z) * (double)(1u << shift) + 32768.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
 		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 |
 		                          (uint64_t)o->diffuse << 16 | (uint64_t)o->specular << 40 |
@@ -156,15 +154,14 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		projection[p].spacing = (float)dx;
 		for (int row = -reach; row < reach; row++)
 			for (int col = -reach; col < reach; col++)
-				add_block(&a, o, p, (const double(*)[3])axis, dx, col, row, radius);
+				add_block(&a, o, projection, p, (const double(*)[3])axis, dx, col, row, radius);
 	}
 	struct psr_cluster cluster = { .center = { 0, 0, 0 }, .radius = 1.5f, .n_blocks = a.n_blocks };
 	struct psr_blocks blocks = {
 		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
 		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster, .run = a.run,
 		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
-		.block_projection = a.projection, .col = a.col, .row = a.row, .flags = a.flags, .depth_bias = a.bias,
-		.mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
+		.block_projection = a.projection, .flags = a.flags, .mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
 	};
 	if (o->cones) {
 		blocks.cone_x = a.cone[0];
@@ -194,7 +191,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	}
 	free(a.radius);
 	free(a.cone_sine);
-	free(a.bias); free(a.projection); free(a.depth); free(a.col); free(a.row);
+	free(a.projection); free(a.depth);
 	free(a.run); free(a.flags); free(a.mask); free(a.offset); free(a.attr);
 	return model;
 }
