@@ -4,6 +4,11 @@
 
 #include <stdint.h>
 
+struct level;
+
+/* Of the level's n_prims triangles and discs, in inner units. */
+void area_sum(const struct level *level, uint32_t n_prims, double *sum);
+
 /* The primitive that holds x, 0 <= x < sum[n - 1], n > 0: a random one by area if x is random. */
 static inline uint32_t area_find(const double *sum, uint32_t n, double x)
 {

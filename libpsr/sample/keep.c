@@ -39,20 +39,38 @@ static int blend(const struct level *level, const float p[3], const float n[3], 
 
 /* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal
  * further than this from its face's, as smoothing makes them at creases, would open the crease in views along it. */
-#define LEAST_AGREEMENT 0.94f /* 20 degrees */
+#define LEAST_AGREEMENT 0.94f       /* 20 degrees */
+#define LEAST_AGREEMENT_WIDE 0.985f /* 10, where a face is so wide that no sample beside it closes what opens */
+#define WIDE_PIXELS 3
 
-static uint64_t agree(uint64_t attr, const float face[3])
+static int is_wide(const struct level *level, uint32_t prim)
+{
+	const double least = WIDE_PIXELS * level->ds;
+	double corner[3][3], side[3][3], cross[3], longest2 = 0;
+
+	if (prim >= level->mesh->n_triangles)
+		return 0;
+	ray_scene_corners(level->scene, prim, corner);
+	for (int i = 0; i < 3; i++) {
+		v3d_sub(side[i], corner[(i + 1) % 3], corner[i]);
+		longest2 = fmax(longest2, v3d_dot(side[i], side[i]));
+	}
+	v3d_cross(cross, side[0], side[1]);
+	return v3d_dot(cross, cross) > least * least * longest2;
+}
+
+static uint64_t agree(uint64_t attr, const float face[3], float least)
 {
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 	float g = v3f_dot(n, face), aside[3], turned[3];
 
-	if (g >= LEAST_AGREEMENT)
+	if (g >= least)
 		return attr;
 	v3f_add_scaled(aside, n, -g, face);
 	if (v3f_normalize(aside, aside) == 0)
 		v3f_set(aside, 0, 0, 0);
-	v3f_scale(turned, face, LEAST_AGREEMENT);
-	v3f_add_scaled(turned, turned, sqrtf(1 - LEAST_AGREEMENT * LEAST_AGREEMENT), aside);
+	v3f_scale(turned, face, least);
+	v3f_add_scaled(turned, turned, sqrtf(1 - least * least), aside);
 	return (attr & ~(uint64_t)0x7fff) | psr_direction_encode(turned);
 }
 
@@ -74,7 +92,8 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 	level_normal(level, surface, n);
 	if (level->finer == NULL || !blend(level, point->position, n, sheets->projection.axis[2], &point->attr))
 		point->attr = agree(surface_attr(level->surface, &place, 1.4142135623730951 * level->ds,
-		                                 sheets->projection.axis[2]), n);
+		                                 sheets->projection.axis[2]), n,
+		                    is_wide(level, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT);
 	point->normal = (uint16_t)PSR_ATTR_NORMAL(point->attr);
 	point->two_sided = (uint8_t)level_is_two_sided(level, prim, point->position, n);
 	point->sample = (uint8_t)ref->at.sample;

@@ -4,6 +4,7 @@
 #include "../base/mem.h"
 #include "level.h"
 #include "psr/error.h"
+#include "seen_out.h"
 #include "thin_cover.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
@@ -52,6 +53,8 @@ static int prepare(struct level *level)
 		                               : seen_init(&level->seen, level->ds);
 	if (rc == PSR_OK && level->finer_seen == NULL)
 		rc = seen_look(&level->seen, level->scene, SEEN_ENOUGH, level->pool);
+	if (rc == PSR_OK && level->finer_seen == NULL)
+		rc = seen_look_out(level);
 	return rc;
 }
 
