@@ -48,6 +48,15 @@ static int is_covered(const struct level *level, const struct surface_spot *spot
 	return offer_is_covered(level, spot);
 }
 
+/* What is thin is tested on one of its sides, for both. */
+static int is_any_side_seen(const struct level *level, const struct surface_spot *spot)
+{
+	float back[3];
+
+	v3f_scale(back, spot->n, -1);
+	return seen_is(&level->seen, spot->p, spot->n) || seen_is(&level->seen, spot->p, back);
+}
+
 /* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for
  * until more was seen. */
 static void test_place(const struct job *job, uint32_t prim, const float p[3], struct chunk *chunk)
@@ -64,14 +73,15 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
 		struct surface_spot spot = { .surface = prim | (back ? SHEET_BACK : 0) };
 
-		if (job->round == 0 && (sides & hidden) != 0 && (sides & seen) == 0)
+		if (job->round == 0 && !is_thin && (sides & hidden) != 0 && (sides & seen) == 0)
 			continue;
 		/* What is kept for the front counts. */
 		if (back && is_side_seen && level_is_two_sided(level, prim, p, front))
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		is_side_seen = (is_thin && (sides & seen) != 0) || seen_is(&level->seen, spot.p, spot.n);
+		is_side_seen = is_thin ? (sides & seen) != 0 || is_any_side_seen(level, &spot)
+		                       : seen_is(&level->seen, spot.p, spot.n);
 		if (is_side_seen && is_thin)
 			rc = spot_cells_add(&chunk->cells, p);
 		if (rc == PSR_OK && is_side_seen && !is_covered(level, &spot))
@@ -168,7 +178,7 @@ static void dice_chunk(int i, void *userdata)
 	for (uint32_t prim = (uint32_t)i * CHUNK; prim < end && !chunk->failed; prim++) {
 		const float *n = ray_scene_normal(job->level->scene, prim);
 
-		if (n[0] == 0 && n[1] == 0 && n[2] == 0)
+		if ((n[0] == 0 && n[1] == 0 && n[2] == 0) || (job->level->sides[prim] & SIDE_BEHIND) != 0)
 			continue;
 		if (prim < mesh->n_triangles)
 			dice_triangle(job, prim, chunk);

@@ -31,7 +31,7 @@ static void step(struct steps *steps)
 		steps->on_progress(steps->done, steps->total, steps->userdata);
 }
 
-static int prepare(struct level *level)
+static int prepare(struct level *level, const struct psr_projection *projection)
 {
 	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
 	int rc;
@@ -41,7 +41,7 @@ static int prepare(struct level *level)
 	rc = level->sheets == NULL || level->sides == NULL ? PSR_ERR_MEMORY : PSR_OK;
 	if (rc == PSR_OK) {
 		memset(level->sides, 0, n_prims);
-		thin_mark(level);
+		thin_mark(level, projection);
 		thin_mark_narrow(level);
 	}
 	if (rc == PSR_OK)
@@ -61,7 +61,7 @@ static int prepare(struct level *level)
 static int trace(struct level *level, const struct psr_projection *projection, struct steps *steps)
 {
 	double started = now();
-	int rc = prepare(level);
+	int rc = prepare(level, projection);
 
 	step(steps);
 	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {

@@ -20,11 +20,11 @@
 #include "surface.h"
 #include "texture.h"
 
-/* What is known of a primitive's sides. SIDE_THIN: half a pixel behind all of it, at most, is another face of the same
- * plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: it is thin, and
- * narrower than half a pixel. */
+/* What is known of a primitive's sides. SIDE_THIN: 0.6 pixels behind all of it, at most, is another face
+ * of the same plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_BEHIND: of
+ * these two it is the one that needs no test. SIDE_NARROW: it is thin, and narrower than half a pixel. */
 enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16,
-            SIDE_NARROW = 32 };
+            SIDE_NARROW = 32, SIDE_BEHIND = 64 };
 
 struct level {
 	const struct psr_mesh *mesh;
@@ -51,8 +51,8 @@ struct level_ref {
 	struct sheet_ref at;
 };
 
-/* thin.c: finds what is thin. */
-void thin_mark(struct level *level);
+/* thin.c: finds what is thin, of a level that will be traced along these. */
+void thin_mark(struct level *level, const struct psr_projection *projection);
 
 /* owner.c: which projection owns a place that faces n. */
 unsigned owner_of(const struct level *level, const float p[3], const float n[3]);

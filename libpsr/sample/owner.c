@@ -160,6 +160,8 @@ static void drop_hidden(int i, void *userdata)
 
 			if (is_both)
 				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_seen(level, sheets, p, s, 1));
+			else if (level_is_thin(level, surface))
+				is_kept = is_kept || is_seen(level, sheets, p, s, 1);
 			if (!is_kept || (level->sides[surface & ~SHEET_BACK] & SIDE_NARROW) != 0)
 				patch->owned &= ~(UINT64_C(1) << s);
 		}

@@ -11,7 +11,7 @@
 #define NARROW 0.5 /* pixels */
 
 /* The finest level has to be adequate, and between places that are tested there are others. */
-#define FINEST_NEAR (0.9 * LEVEL_NEAR)
+#define FINEST_NEAR (0.85 * LEVEL_NEAR)
 
 /* Of a cube: what is in it is covered by hits in it. */
 #define SIDE_PIXELS 32

@@ -71,12 +71,12 @@ static void give_colors(struct psr_mesh *mesh)
 		mesh->color[i][i % 3] = mesh->color[i][3] = 1;
 }
 
-static void only_plates_of_half_a_pixel_and_one_look_are_thin(void **state)
+static void only_plates_below_0_6_pixels_and_of_one_look_are_thin(void **state)
 {
 	(void)state;
 	assert_int_equal(thin_of_plate(0.3, NULL), 4);
-	assert_int_equal(thin_of_plate(0.49, NULL), 4);
-	assert_int_equal(thin_of_plate(0.51, NULL), 0);
+	assert_int_equal(thin_of_plate(0.59, NULL), 4);
+	assert_int_equal(thin_of_plate(0.61, NULL), 0);
 	assert_int_equal(thin_of_plate(3, NULL), 0);
 	assert_int_equal(thin_of_plate(0.3, give_back_another_material), 0);
 	assert_int_equal(thin_of_plate(0.3, give_texture), 0);
@@ -156,7 +156,7 @@ static void threads_do_not_change_a_sample_of_needles(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(only_plates_of_half_a_pixel_and_one_look_are_thin),
+		cmocka_unit_test(only_plates_below_0_6_pixels_and_of_one_look_are_thin),
 		cmocka_unit_test(bodies_and_sheets_are_not_thin),
 		cmocka_unit_test(needles_are_seen_from_all_around_with_fewer_samples),
 		cmocka_unit_test(threads_do_not_change_a_sample_of_needles),
