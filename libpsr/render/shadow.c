@@ -164,7 +164,7 @@ static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, con
 		shadow->n_maps[l] = n;
 		for (uint32_t f = 0; f < SHADOW_FACES; f++) {
 			struct shadow_kept *kept = &shadow->kept[l][f];
-			if (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height)
+			if (kept->cells && (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height))
 				drop(kept);
 			if (f < n && (has_changed || !same_fit(&kept->fit, &fit[f]))) {
 				kept->is_drawn = 0;

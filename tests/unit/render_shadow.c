@@ -300,8 +300,8 @@ static void a_sphere_does_not_shadow_itself(void **state)
 }
 
 /* A wall that stands on the floor and is nearly along the light, which shines on both. Its samples are as much nearer
- * than the floor's, in the texel that both share, as the wall is steep. The camera is above, and near; where a pixel may show a sample of the wall, whose own is less than
- * a pixel beside it, nothing is said. */
+ * than the floor's, in the texel that both share, as the wall is steep. The camera is above, and near; where a pixel may
+ * show a sample of the wall, whose own is less than a pixel beside it, nothing is said. */
 static void faces_that_meet_do_not_shadow_each_other(void **state)
 {
 	(void)state;
