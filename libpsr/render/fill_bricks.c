@@ -14,7 +14,7 @@ _Static_assert(FILL_PIECE / 2 <= FILL_WIDTH && FILL_PIECE % BRICK == 0, "");
 
 /* Pixel (x, y) and the n - 1 to the right of it, with any depths. */
 static inline struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
-                                      uint32_t n)
+                                             uint32_t n)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = fill->width, n_inside = y >= fill->height ? 0 : x + n > width ? width - x : n;
@@ -36,17 +36,17 @@ static inline struct fill_row picture_row_at(struct picture_row *to, const struc
 
 /* Their weights and depths. */
 static inline struct fill_row picture_depths_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
-                                         uint32_t n)
+                                                uint32_t n)
 {
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = fill->width, n_inside = y >= fill->height ? 0 : x + n > width ? width - x : n;
-	uint16_t *weight = p->weight + (size_t)y * width + x;
+	const size_t first = (size_t)y * width + x;
 	if (n_inside)
 		fill->simd->fill_depths(to->z, psr_zstack_row(p->stack, y) + x, n_inside);
 	if (n_inside == n)
-		return (struct fill_row){ NULL, NULL, NULL, weight, to->z, NULL };
+		return (struct fill_row){ NULL, NULL, NULL, p->weight + first, to->z, NULL };
 	if (n_inside)
-		memcpy(to->weight, weight, n_inside * sizeof *to->weight);
+		memcpy(to->weight, p->weight + first, n_inside * sizeof *to->weight);
 	for (uint32_t i = n_inside; i < n; i++) {
 		to->z[i] = NAN;
 		to->weight[i] = WEIGHT_ONE;
