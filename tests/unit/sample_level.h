@@ -27,8 +27,6 @@ static inline void level_set_open(struct level_set *set, struct psr_mesh *mesh, 
 {
 	static const double zero[3];
 
-	double sum = 0;
-
 	memset(set, 0, sizeof *set);
 	set->mesh = mesh;
 	assert(ray_scene_create(&set->scene, mesh, zero, 1, NULL) == PSR_OK);
@@ -39,16 +37,7 @@ static inline void level_set_open(struct level_set *set, struct psr_mesh *mesh, 
 		                         .ds = 2.0 / resolution, .cosine = (float)cos(TOLERANCE),
 		                         .n_projections = N_PROJECTIONS };
 	set->area = malloc((mesh->n_triangles + 1) * sizeof *set->area);
-	for (uint32_t i = 0; i < mesh->n_triangles; i++) {
-		double c[3][3], a[3], b[3], cross[3];
-
-		ray_scene_corners(set->scene, i, c);
-		v3d_sub(a, c[1], c[0]);
-		v3d_sub(b, c[2], c[0]);
-		v3d_cross(cross, a, b);
-		sum += v3d_length(cross) / 2;
-		set->area[i] = sum;
-	}
+	area_sum(&set->level, mesh->n_triangles, set->area);
 }
 
 static inline void level_set_make(struct level_set *set, struct psr_mesh *mesh, uint32_t resolution, int n_threads)
