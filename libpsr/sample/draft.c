@@ -70,7 +70,8 @@ static void add_blocks(struct draft *draft, const struct level *level, uint32_t 
 			if (patch->kept == 0)
 				continue;
 			*block = (struct draft_block){ .projection = (uint16_t)i, .col = (int16_t)(PSR_BLOCK_SIDE * patch->col),
-				                           .row = (int16_t)(PSR_BLOCK_SIDE * patch->row), .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
+				                           .row = (int16_t)(PSR_BLOCK_SIDE * patch->row),
+				                           .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
 				                           .first = k };
 			for (uint64_t left = patch->kept; left != 0; left &= left - 1, k++) {
 				const struct sheet_sample *sample = &sheets->sample[p][__builtin_ctzll(left)];

@@ -168,8 +168,8 @@ static void center_window(struct window *w)
 }
 
 /* Returns where the samples of the next block go. */
-static uint32_t copy_samples(const struct draft *draft, const struct piece *piece, uint32_t i, struct draft_block *block,
-                             struct draft_sample *sample, uint32_t first)
+static uint32_t copy_samples(const struct draft *draft, const struct piece *piece, uint32_t i,
+                             struct draft_block *block, struct draft_sample *sample, uint32_t first)
 {
 	struct window w = piece[i].window;
 

@@ -148,7 +148,8 @@ static void center_block(struct pack *pack, uint32_t i, const struct draft_block
 		pack->center[k][i] = (int16_t)rounded;
 	}
 	place_of(pack, i, &place);
-	assert(place.col == (double)block->col * (1u << block->level) && place.row == (double)block->row * (1u << block->level));
+	assert(place.col == (double)block->col * (1u << block->level));
+	assert(place.row == (double)block->row * (1u << block->level));
 }
 
 /* Depths as 16 bits, in the least step, a power of two, that reaches them all from that of the center. */

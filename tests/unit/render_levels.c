@@ -22,8 +22,8 @@ static const uint32_t levels_of[GROUPS] = { 0x1f, 0x15, 0x0a, 0x01, 0x10 };
 static struct psr_cluster cluster[MAX_CLUSTERS];
 static struct psr_model *model;
 
-/* Blocks of all levels have the same middle, as near as windows of their lattices come: level 4, 8 * 16 samples wide, is an eighth of a unit. Groups stand
- * side by side in the plane z = 0, a quarter of a unit apart, and face +z. */
+/* Blocks of all levels have the same middle, as near as windows of their lattices come: level 4, 8 * 16 samples wide, is
+ * an eighth of a unit. Groups stand side by side in the plane z = 0, a quarter of a unit apart, and face +z. */
 static int setup(void **state)
 {
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
@@ -41,7 +41,8 @@ static int setup(void **state)
 		                           .builder = "test" };
 	struct psr_blocks blocks = { .n_projections = 1, .n_levels = LEVELS, .projection = &projection, .cluster = cluster,
 		                         .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z, .sphere_r = r,
-		                         .block_projection = number, .flags = flags, .mask = mask, .attr_offset = offset, .depth = depth,
+		                         .block_projection = number, .flags = flags, .mask = mask, .attr_offset = offset,
+		                         .depth = depth,
 		                         .attr = attr };
 	uint32_t n = 0;
 

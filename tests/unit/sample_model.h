@@ -51,7 +51,8 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 
 				*out = (struct model_sample){ .group = b->cluster[c].group, .level = (uint8_t)psr_blocks_level(b, i),
 					                          .two_sided = (b->flags[i] & PSR_BLOCK_TWO_SIDED) != 0,
-					                          .projection = b->block_projection[i], .row = ((int)place.row >> psr_blocks_level(b, i)) + s / 8,
+					                          .projection = b->block_projection[i],
+					                          .row = ((int)place.row >> psr_blocks_level(b, i)) + s / 8,
 					                          .col = ((int)place.col >> psr_blocks_level(b, i)) + s % 8, .attr = b->attr[k] };
 				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
 				             out->row * 0.86602540378443864676 * spacing, (double)z, inner);

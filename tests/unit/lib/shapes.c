@@ -161,7 +161,8 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 		.n_blocks = a.n_blocks, .n_projections = PSR_PROJECTIONS, .n_clusters = 1, .n_levels = 1,
 		.n_samples = a.n_samples, .projection = projection, .cluster = &cluster, .run = a.run,
 		.sphere_x = a.center[0], .sphere_y = a.center[1], .sphere_z = a.center[2], .sphere_r = a.radius,
-		.block_projection = a.projection, .flags = a.flags, .mask = a.mask, .attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
+		.block_projection = a.projection, .flags = a.flags, .mask = a.mask,
+		.attr_offset = a.offset, .depth = a.depth, .attr = a.attr,
 	};
 	if (o->cones) {
 		blocks.cone_x = a.cone[0];
