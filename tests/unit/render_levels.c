@@ -42,8 +42,7 @@ static int setup(void **state)
 	struct psr_blocks blocks = { .n_projections = 1, .n_levels = LEVELS, .projection = &projection, .cluster = cluster,
 		                         .run = &run, .sphere_x = x, .sphere_y = y, .sphere_z = z, .sphere_r = r,
 		                         .block_projection = number, .flags = flags, .mask = mask, .attr_offset = offset,
-		                         .depth = depth,
-		                         .attr = attr };
+		                         .depth = depth, .attr = attr };
 	uint32_t n = 0;
 
 	(void)state;
