@@ -20,9 +20,10 @@
 #include "surface.h"
 #include "texture.h"
 
-/* What is known of a primitive's sides. SIDE_THIN: 0.6 pixels behind all of it, at most, is another face
- * of the same plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_BEHIND: of
- * these two it is the one that needs no test. SIDE_NARROW: it is thin, and narrower than half a pixel. */
+/* What is known of a primitive's sides. SIDE_THIN: 0.6 pixels behind all of it, at most, is another face of the same
+ * plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: it is thin, and
+ * narrower than half a pixel. SIDE_BEHIND: it is thin and not narrow, and its places need no test, as those on its
+ * other side have one. */
 enum side { SIDE_FRONT_SEEN = 1, SIDE_BACK_SEEN = 2, SIDE_FRONT_HIDDEN = 4, SIDE_BACK_HIDDEN = 8, SIDE_THIN = 16,
             SIDE_NARROW = 32, SIDE_BEHIND = 64 };
 

@@ -60,12 +60,15 @@ int thin_candidates_move(struct thin_candidates *list, const struct level *level
 	return thin_candidates_add(list, &candidate);
 }
 
-/* Places by cells twice as wide as the radius. */
+/* Places by cells twice as wide as the radius: those of a cell stand together, as each is looked at by many. */
 struct grid {
-	const struct surface_spot *spot;
 	double radius;
-	size_t size;          /* a power of two */
-	uint32_t *head, *next; /* places */
+	size_t size;     /* of the table of cells, a power of two */
+	uint32_t *first; /* by cell, and the end: */
+	struct place {
+		float p[3], n[3];
+		uint32_t spot;
+	} *place;
 };
 
 static void cell_of(const struct grid *grid, const float p[3], double shift, int at[3])
@@ -79,25 +82,38 @@ static size_t slot_of(const struct grid *grid, const int at[3])
 	return cell_place(cell_key(at[0], at[1], at[2]), grid->size);
 }
 
+static size_t slot_of_place(const struct grid *grid, const float p[3])
+{
+	int at[3];
+
+	cell_of(grid, p, 0, at);
+	return slot_of(grid, at);
+}
+
+static void put_place(struct grid *grid, const struct surface_spot *spot, uint32_t i)
+{
+	struct place *place = &grid->place[--grid->first[slot_of_place(grid, spot->p)]];
+
+	memcpy(place->p, spot->p, sizeof place->p);
+	memcpy(place->n, spot->n, sizeof place->n);
+	place->spot = i;
+}
+
 static int make_grid(struct grid *grid, const struct surface_spot *spot, size_t n, double radius)
 {
-	*grid = (struct grid){ .spot = spot, .radius = radius, .size = 64 };
+	*grid = (struct grid){ .radius = radius, .size = 64 };
 	while (grid->size < 2 * n)
 		grid->size *= 2;
-	grid->head = malloc((grid->size + n) * sizeof *grid->head);
-	if (grid->head == NULL)
+	grid->first = calloc(grid->size + 1, sizeof *grid->first);
+	grid->place = malloc(n * sizeof *grid->place + 1);
+	if (grid->first == NULL || grid->place == NULL)
 		return PSR_ERR_MEMORY;
-	grid->next = grid->head + grid->size;
-	memset(grid->head, 0xff, grid->size * sizeof *grid->head);
-	for (size_t i = 0; i < n; i++) {
-		int at[3];
-		size_t slot;
-
-		cell_of(grid, spot[i].p, 0, at);
-		slot = slot_of(grid, at);
-		grid->next[i] = grid->head[slot];
-		grid->head[slot] = (uint32_t)i;
-	}
+	for (size_t i = 0; i < n; i++)
+		grid->first[slot_of_place(grid, spot[i].p)]++;
+	for (size_t slot = 0; slot < grid->size; slot++)
+		grid->first[slot + 1] += grid->first[slot];
+	for (size_t i = n; i-- > 0;)
+		put_place(grid, &spot[i], (uint32_t)i);
 	return PSR_OK;
 }
 
@@ -123,9 +139,9 @@ static int add_cover(struct covers *covers, uint32_t spot)
 
 static int look_into(const struct grid *grid, size_t slot, const float position[3], struct covers *covers)
 {
-	for (uint32_t i = grid->head[slot]; i != NOBODY; i = grid->next[i])
-		if (cover_is_sheet_near(position, grid->spot[i].p, grid->spot[i].n, (float)grid->radius)
-		    && add_cover(covers, i) != PSR_OK)
+	for (uint32_t i = grid->first[slot]; i < grid->first[slot + 1]; i++)
+		if (cover_is_sheet_near(position, grid->place[i].p, grid->place[i].n, (float)grid->radius)
+		    && add_cover(covers, grid->place[i].spot) != PSR_OK)
 			return PSR_ERR_MEMORY;
 	return PSR_OK;
 }
@@ -167,7 +183,7 @@ static void choose(struct thin_candidates *list, const struct covers *covers, ui
 
 	memset(head, 0xff, sizeof head);
 	for (uint32_t i = list->n; i-- > 0;) {
-		unsigned gain = gain_of(&list->candidate[i], covers, is_covered);
+		uint32_t n = list->candidate[i].end - list->candidate[i].first, gain = n < MOST_GAIN ? n : MOST_GAIN;
 
 		next[i] = head[gain];
 		head[gain] = i;
@@ -208,7 +224,7 @@ static void leave_chosen(struct thin_candidates *list, struct surface_spot *spot
 int thin_choose(struct thin_candidates *list, struct surface_spot *spot, size_t *n, double radius)
 {
 	struct covers covers = { NULL, 0, 0 };
-	struct grid grid = { .head = NULL };
+	struct grid grid = { .first = NULL };
 	uint32_t *next = malloc((size_t)list->n * sizeof *next + 1);
 	uint8_t *is_covered = calloc(*n + 1, 1);
 	int rc = next == NULL || is_covered == NULL ? PSR_ERR_MEMORY : make_grid(&grid, spot, *n, radius);
@@ -219,7 +235,8 @@ int thin_choose(struct thin_candidates *list, struct surface_spot *spot, size_t 
 		choose(list, &covers, is_covered, next);
 		leave_chosen(list, spot, n, is_covered);
 	}
-	free(grid.head);
+	free(grid.first);
+	free(grid.place);
 	free(covers.spot);
 	free(next);
 	free(is_covered);

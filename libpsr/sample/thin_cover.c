@@ -266,7 +266,7 @@ static void mark_narrow(int i, void *userdata)
 		}
 		v3d_cross(cross, side[0], side[1]);
 		if (v3d_length(cross) < NARROW * level->ds * longest)
-			level->sides[prim] |= SIDE_NARROW;
+			level->sides[prim] = (uint8_t)((level->sides[prim] | SIDE_NARROW) & ~SIDE_BEHIND);
 	}
 }
 

@@ -5,7 +5,8 @@
 #include <stddef.h>
 #include "level.h"
 
-/* Marks primitives that are thin and narrower than half a pixel, too: SIDE_NARROW. After thin_mark(). */
+/* Marks primitives that are thin and narrower than half a pixel, too: SIDE_NARROW. All sides of these are tested, as
+ * none stands for the others when seen from aside. After thin_mark(). */
 void thin_mark_narrow(struct level *level);
 
 /* Covers n places on thin primitives; those that nothing covers stay, in front. The same samples whatever the number of
