@@ -54,8 +54,25 @@ static inline void lower_cells(const struct warp_target *t, struct cells *list)
 #undef LOWER
 #undef LOWER_ALL
 
+/* Blocks that are made ready together: one after the other, each would wait for what it reads. */
+#define BLOCKS 16
+
+/* Also asks the memory for the samples' depths and, where some may face away, attributes. */
+static inline void make_blocks(struct warp_block *blocks, const struct warp_target *t, const struct bin_entry *entry,
+                               uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		struct warp_block *b = &blocks[i];
+		warp_block_make(b, &t->instance[entry[i].instance], entry[i].slot);
+		for (uint32_t k = 0; k < PSR_BLOCK_SAMPLES; k += 64 / sizeof *b->depth)
+			__builtin_prefetch(b->depth + k);
+		for (uint32_t k = 0; entry[i].is_mixed && k < PSR_BLOCK_SAMPLES; k += 64 / sizeof *b->attr)
+			__builtin_prefetch(b->attr + k);
+	}
+}
+
 typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t,
-                           const struct bin_entry *entry);
+                           const struct bin_entry *entry, const struct warp_block *block);
 
 /* The warp, by what lists a block; room for one more block is there whenever it is called. */
 static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *list_block,
@@ -64,9 +81,12 @@ static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *lis
 {
 	struct words words;
 	struct cells cells;
+	struct warp_block blocks[BLOCKS];
 	uint64_t n_inside = 0;
 	words.n = cells.n = cells.level = 0;
 	for (uint32_t e = 0; e < n; e++) {
+		if (e % BLOCKS == 0)
+			make_blocks(blocks, target, entry + e, n - e < BLOCKS ? n - e : BLOCKS);
 		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
 			n_inside += words.n;
 			lower_words(target->word, &words);
@@ -75,7 +95,7 @@ static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *lis
 			lower_cells(target, &cells);
 			cells.level = entry[e].level;
 		}
-		list_block(&words, &cells, target, &entry[e]);
+		list_block(&words, &cells, target, &entry[e], &blocks[e % BLOCKS]);
 	}
 	n_inside += words.n;
 	lower_words(target->word, &words);

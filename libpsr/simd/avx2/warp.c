@@ -136,27 +136,25 @@ static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 }
 
 static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
-                              const struct bin_entry *entry)
+                              const struct bin_entry *entry, const struct warp_block *block)
 {
 	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
 	const struct warp_instance *in = &t->instance[entry->instance];
 	uint8_t sample[64 + 8];
-	struct warp_block b;
 
-	warp_block_make(&b, in, entry->slot);
-	const int n = __builtin_popcountll(b.mask), n_groups = (n + 7) / 8;
-	list_samples(sample, b.mask);
-	const __m256 row_x = rows_of(&b, 0), row_y = rows_of(&b, 1), row_z = rows_of(&b, 2);
-	const __m256 col_x = columns_of(&b, 0), col_y = columns_of(&b, 1), col_z = columns_of(&b, 2);
+	const int n = __builtin_popcountll(block->mask), n_groups = (n + 7) / 8;
+	list_samples(sample, block->mask);
+	const __m256 row_x = rows_of(block, 0), row_y = rows_of(block, 1), row_z = rows_of(block, 2);
+	const __m256 col_x = columns_of(block, 0), col_y = columns_of(block, 1), col_z = columns_of(block, 2);
 
 	for (int g = 0; g < n_groups; g++) {
 		const __m256i s = _mm256_cvtepu8_epi32(_mm_loadl_epi64((const __m128i *)(sample + 8 * g)));
 		const __m256i r = _mm256_srli_epi32(s, 3), c = s; /* the low three bits count */
 		const __m256 depth =
-			_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(b.depth + 8 * g))));
-		const __m256 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
-		const __m256 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
-		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
+			_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(_mm_loadu_si128((const __m128i *)(block->depth + 8 * g))));
+		const __m256 x1 = axis_of(row_x, col_x, r, c, depth, block->unit[0]);
+		const __m256 y1 = axis_of(row_y, col_y, r, c, depth, block->unit[1]);
+		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, block->unit[2]);
 		const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
 		const __m256 u = _mm256_mul_ps(x1, inverse), v = _mm256_mul_ps(y1, inverse);
 		const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
@@ -165,14 +163,14 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		__m256i k =
 			_mm256_and_si256(valid, _mm256_castps_si256(_mm256_cmp_ps(z1, _mm256_set1_ps(t->near_z), _CMP_GT_OQ)));
 		if (entry->is_mixed)
-			k = _mm256_andnot_si256(faces_away(t, in, b.attr + 8 * g, valid, u, v), k);
+			k = _mm256_andnot_si256(faces_away(t, in, block->attr + 8 * g, valid, u, v), k);
 		if (entry->level)
 			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
 		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
 		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
 		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
 		const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x);
-		list_words(words, k, at, _mm256_add_epi32(s, _mm256_set1_epi32((int)b.id)), z1);
+		list_words(words, k, at, _mm256_add_epi32(s, _mm256_set1_epi32((int)block->id)), z1);
 	}
 }
 

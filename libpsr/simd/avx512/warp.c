@@ -102,7 +102,7 @@ static const uint8_t ordinals[64] = {
 };
 
 static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
-                              const struct bin_entry *entry)
+                              const struct bin_entry *entry, const struct warp_block *block)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
 	const int level = entry->level, is_mixed = entry->is_mixed, perspective = t->perspective;
@@ -112,23 +112,21 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 	const __m512 near_z = _mm512_set1_ps(t->near_z);
 	uint32_t n_words = words->n;
 	_Alignas(64) uint8_t sample[64];
-	struct warp_block b;
 
-	warp_block_make(&b, in, entry->slot);
-	const int n = __builtin_popcountll(b.mask);
-	const __m512i id = _mm512_set1_epi32((int)b.id);
-	_mm512_store_si512(sample, _mm512_maskz_compress_epi8(b.mask, _mm512_loadu_si512(ordinals)));
-	const __m512 row_x = rows_of(&b, 0), row_y = rows_of(&b, 1), row_z = rows_of(&b, 2);
-	const __m512 col_x = columns_of(&b, 0), col_y = columns_of(&b, 1), col_z = columns_of(&b, 2);
+	const int n = __builtin_popcountll(block->mask);
+	const __m512i id = _mm512_set1_epi32((int)block->id);
+	_mm512_store_si512(sample, _mm512_maskz_compress_epi8(block->mask, _mm512_loadu_si512(ordinals)));
+	const __m512 row_x = rows_of(block, 0), row_y = rows_of(block, 1), row_z = rows_of(block, 2);
+	const __m512 col_x = columns_of(block, 0), col_y = columns_of(block, 1), col_z = columns_of(block, 2);
 
 	for (int i = 0; i < n; i += 16) {
 		const __m512i s = _mm512_cvtepu8_epi32(_mm_load_si128((const __m128i *)(sample + i)));
 		const __m512i r = _mm512_srli_epi32(s, 3), c = _mm512_and_si512(s, _mm512_set1_epi32(7));
-		const __m256i raw = _mm256_loadu_si256((const __m256i *)(b.depth + i));
+		const __m256i raw = _mm256_loadu_si256((const __m256i *)(block->depth + i));
 		const __m512 depth = _mm512_cvtepi32_ps(_mm512_cvtepu16_epi32(raw));
-		const __m512 x1 = axis_of(row_x, col_x, r, c, depth, b.unit[0]);
-		const __m512 y1 = axis_of(row_y, col_y, r, c, depth, b.unit[1]);
-		const __m512 z1 = axis_of(row_z, col_z, r, c, depth, b.unit[2]);
+		const __m512 x1 = axis_of(row_x, col_x, r, c, depth, block->unit[0]);
+		const __m512 y1 = axis_of(row_y, col_y, r, c, depth, block->unit[1]);
+		const __m512 z1 = axis_of(row_z, col_z, r, c, depth, block->unit[2]);
 		const __m512 one = _mm512_set1_ps(1), inverse = perspective ? _mm512_div_ps(one, z1) : one;
 		const __m512 u = _mm512_mul_ps(x1, inverse), v = _mm512_mul_ps(y1, inverse);
 		const __m512i pixel_u = floor_int(u), pixel_v = floor_int(v);
@@ -136,7 +134,7 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		__mmask16 k = (__mmask16)_bzhi_u32(0xffff, (uint32_t)(n - i));
 		k = _mm512_mask_cmp_ps_mask(k, z1, near_z, _CMP_GT_OQ);
 		if (is_mixed)
-			k &= (__mmask16)~faces_away(t, in, b.attr + i, k, u, v);
+			k &= (__mmask16)~faces_away(t, in, block->attr + i, k, u, v);
 		if (level)
 			list_cells(cells, &t->cells[level], level, k, pixel_u, pixel_v, z1);
 		const __m512i x = _mm512_sub_epi32(pixel_u, x0), y = _mm512_sub_epi32(pixel_v, y0);
