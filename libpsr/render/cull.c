@@ -33,6 +33,7 @@ struct cull {
 	const struct simd *simd;
 	const struct plan *plan;
 	uint32_t n_chunks, n_tiles;
+	uint32_t stride; /* of counts, by chunk: whole lines, so that threads that count write none in common */
 };
 
 /* A sphere in camera space, and the pixels that it can touch. */
@@ -226,29 +227,37 @@ static void count_chunk(int i, void *userdata)
 {
 	const struct cull *cull = userdata;
 	const struct plan *plan = cull->plan;
-	struct cull_chunk *chunk = &cull->bins->chunk[i];
-	const struct plan_instance *in = &plan->instance[chunk->instance];
-	uint32_t *count = cull->bins->count + (size_t)i * cull->n_tiles;
-	struct cull_hit *hit = cull->bins->hit + chunk->first_hit;
+	struct cull_chunk chunk = cull->bins->chunk[i];
+	const struct plan_instance *in = &plan->instance[chunk.instance];
+	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
+	struct cull_hit *hit = cull->bins->hit + chunk.first_hit;
 	/* Whatever level a cluster's blocks get, their guard is at most that of the coarsest. */
 	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
 
 	memset(count, 0, cull->n_tiles * sizeof *count);
-	for (uint32_t k = 0; k < chunk->n_clusters; k++) {
-		const struct psr_cluster *cluster = &in->cull.blocks->cluster[chunk->first_cluster + k];
+	for (uint32_t k = 0; k < chunk.n_clusters; k++) {
+		const struct psr_cluster *cluster = &in->cull.blocks->cluster[chunk.first_cluster + k];
 		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
 		if (!is_chosen(cull->bins, plan, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
-		chunk->n_tested += cluster->n_blocks;
+		chunk.n_tested += cluster->n_blocks;
 		for (uint32_t at = 0; at < cluster->n_blocks; at += CULL_BATCH) {
 			const uint32_t n = cluster->n_blocks - at < CULL_BATCH ? cluster->n_blocks - at : CULL_BATCH;
 			struct cull_batch batch;
 			cull->simd->cull(&batch, &in->cull, cluster->first_block + at, n);
-			hit = take_batch(cull, chunk, count, &batch, cluster->first_block + at, n, hit);
+			hit = take_batch(cull, &chunk, count, &batch, cluster->first_block + at, n, hit);
 		}
 	}
-	chunk->n_hits = (uint32_t)(hit - (cull->bins->hit + chunk->first_hit));
+	chunk.n_hits = (uint32_t)(hit - (cull->bins->hit + chunk.first_hit));
+	cull->bins->chunk[i] = chunk;
+}
+
+/* Most often it is marked already, and threads that only look share its line. */
+static inline void mark(uint8_t *is_quiet)
+{
+	if (__atomic_load_n(is_quiet, __ATOMIC_RELAXED))
+		__atomic_store_n(is_quiet, 0, __ATOMIC_RELAXED);
 }
 
 /* What a block draws, and what its cells cover, is within two cells of its pixels: most often in the parts of the four
@@ -261,22 +270,22 @@ static void mark_parts(uint8_t *is_quiet, const struct plan *plan, const struct 
 	const int32_t x0 = (left > 0 ? left : 0) / PART_WIDTH, x1 = right < most_x ? right : most_x;
 	const int32_t y0 = (top > 0 ? top : 0) / PART_HEIGHT, y1 = bottom < most_y ? bottom : most_y;
 	uint8_t *first = is_quiet + (size_t)y0 * plan->parts_x, *last = is_quiet + (size_t)y1 * plan->parts_x;
-	__atomic_store_n(&first[x0], 0, __ATOMIC_RELAXED);
-	__atomic_store_n(&first[x1], 0, __ATOMIC_RELAXED);
-	__atomic_store_n(&last[x0], 0, __ATOMIC_RELAXED);
-	__atomic_store_n(&last[x1], 0, __ATOMIC_RELAXED);
+	mark(&first[x0]);
+	mark(&first[x1]);
+	mark(&last[x0]);
+	mark(&last[x1]);
 	if (x1 - x0 <= 1 && y1 - y0 <= 1)
 		return;
 	for (; first <= last; first += plan->parts_x)
 		for (int32_t x = x0; x <= x1; x++)
-			__atomic_store_n(&first[x], 0, __ATOMIC_RELAXED);
+			mark(&first[x]);
 }
 
 static void fill_chunk(int i, void *userdata)
 {
 	const struct cull *cull = userdata;
 	const struct cull_chunk *chunk = &cull->bins->chunk[i];
-	uint32_t *next = cull->bins->count + (size_t)i * cull->n_tiles;
+	uint32_t *next = cull->bins->count + (size_t)i * cull->stride;
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
@@ -326,7 +335,7 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	for (uint32_t t = 0; t < cull->n_tiles; t++) {
 		bins->tile_begin[t] = (uint32_t)total;
 		for (uint32_t i = 0; i < cull->n_chunks; i++) {
-			uint32_t *count = &bins->count[(size_t)i * cull->n_tiles + t], n = *count;
+			uint32_t *count = &bins->count[(size_t)i * cull->stride + t], n = *count;
 			*count = (uint32_t)total;
 			total += n;
 		}
@@ -359,11 +368,12 @@ static void note_tests(const struct plan *plan, struct psr_report *report, uint6
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
                 struct psr_report *report)
 {
-	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), plan->tiles_x * plan->tiles_y };
+	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
+	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
 	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = room_for(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
 	bins->group = room_for(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
-	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.n_tiles,
+	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.stride,
 	                       sizeof *bins->count);
 	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
 	bins->is_quiet = room_for(bins->is_quiet, &bins->quiet_capacity, plan->parts_x * plan->parts_y, 1);
