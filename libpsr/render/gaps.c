@@ -1,11 +1,14 @@
+#include <string.h>
 #include "render/render.h"
 
 /* Nothing is drawn near: whole weights, and no look at the words. */
 static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
+	uint16_t whole[GAPS_WIDTH];
+	for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+		whole[x] = WEIGHT_ONE;
 	for (uint32_t y = y0; y < y1; y++)
-		for (uint32_t x = x0; x < x1; x++)
-			weight[(size_t)y * stride + x] = WEIGHT_ONE;
+		memcpy(weight + (size_t)y * stride + x0, whole, (x1 - x0) * sizeof *weight);
 }
 
 _Static_assert(PART_WIDTH % GAPS_WIDTH == 0 && PART_HEIGHT % BRICK == 0,
