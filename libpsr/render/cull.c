@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
@@ -328,11 +329,18 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 	return n;
 }
 
+static int compare_keys(const void *a, const void *b)
+{
+	const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+	return (x > y) - (x < y);
+}
+
 /* Turns the counts into the places where each chunk writes its entries of each tile. */
 static int place_entries(struct bins *bins, const struct cull *cull)
 {
 	uint64_t total = 0;
 	for (uint32_t t = 0; t < cull->n_tiles; t++) {
+		const uint64_t begin = total;
 		bins->tile_begin[t] = (uint32_t)total;
 		for (uint32_t i = 0; i < cull->n_chunks; i++) {
 			uint32_t *count = &bins->count[(size_t)i * cull->stride + t], n = *count;
@@ -341,7 +349,9 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 		}
 		if (total > UINT32_MAX)
 			return PSR_ERR_LIMIT;
+		bins->by_work[t] = (UINT32_MAX - (total - begin)) << 32 | t;
 	}
+	qsort(bins->by_work, cull->n_tiles, sizeof *bins->by_work, compare_keys);
 	bins->tile_begin[cull->n_tiles] = (uint32_t)total;
 	bins->entry = room_for(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
 	bins->order = room_for(bins->order, &bins->order_capacity, total, sizeof *bins->order);
@@ -376,10 +386,11 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.stride,
 	                       sizeof *bins->count);
 	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
+	bins->by_work = room_for(bins->by_work, &bins->by_work_capacity, cull.n_tiles, sizeof *bins->by_work);
 	bins->is_quiet = room_for(bins->is_quiet, &bins->quiet_capacity, plan->parts_x * plan->parts_y, 1);
 	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
 	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin ||
-	    !bins->is_quiet)
+	    !bins->by_work || !bins->is_quiet)
 		return PSR_ERR_MEMORY;
 	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
 	make_chunks(bins, plan, 1);
@@ -424,13 +435,14 @@ size_t bins_bytes(const struct bins *bins)
 {
 	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity +
 	       bins->masks_capacity + bins->group_capacity + bins->count_capacity + bins->tile_capacity +
-	       bins->quiet_capacity;
+	       bins->by_work_capacity + bins->quiet_capacity;
 }
 
 void bins_clear(struct bins *bins)
 {
 	psr_free_huge(bins->entry, bins->entry_capacity);
 	psr_free_huge(bins->tile_begin, bins->tile_capacity);
+	psr_free_huge(bins->by_work, bins->by_work_capacity);
 	psr_free_huge(bins->is_quiet, bins->quiet_capacity);
 	psr_free_huge(bins->chunk, bins->chunk_capacity);
 	psr_free_huge(bins->hit, bins->hit_capacity);

@@ -202,17 +202,17 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	return PSR_OK;
 }
 
-static void warp_one(int tile, void *userdata)
+static void warp_one(int i, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	const struct plan *plan = &r->plan;
+	const uint32_t tile = (uint32_t)r->bins.by_work[i];
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
-	const uint32_t clean = warp_parts(plan, r->is_clean, (uint32_t)tile);
+	const uint32_t clean = warp_parts(plan, r->is_clean, tile);
 	r->tile[tile] = (struct warp_counts){ 0, 0, 0 };
 	if (!is_empty || clean != ALL_PARTS)
-		r->tile[tile] = plan->with_splats
-		                    ? splat_tile(r->simd, plan, &r->bins, &r->stack, (uint32_t)tile, clean)
-		                    : warp_tile(r->simd, plan, &r->bins, &r->stack, (uint32_t)tile, clean, NULL);
+		r->tile[tile] = plan->with_splats ? splat_tile(r->simd, plan, &r->bins, &r->stack, tile, clean)
+		                                  : warp_tile(r->simd, plan, &r->bins, &r->stack, tile, clean, NULL);
 }
 
 static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,

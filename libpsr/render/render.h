@@ -102,6 +102,9 @@ struct bins { /* capacities are in bytes */
 	size_t entry_capacity;
 	uint32_t *tile_begin;    /* n_tiles + 1 */
 	size_t tile_capacity;
+	uint64_t *by_work;       /* tiles, in the lower halves: those of most entries first, since the last that are begun
+	                          * are what threads wait for */
+	size_t by_work_capacity;
 	uint8_t *is_quiet;       /* as plan.is_quiet */
 	size_t quiet_capacity;
 	struct cull_chunk *chunk;

@@ -55,8 +55,8 @@ static void draw_some(int part, void *userdata)
 	struct drawing *d = userdata;
 	const uint32_t n_tiles = d->drawer->plan.tiles_x * d->drawer->plan.tiles_y;
 	uint64_t *own = d->drawer->word + (size_t)part * WARP_OWN_WORDS;
-	for (uint32_t tile; (tile = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
-		draw_tile(d, tile, own);
+	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
+		draw_tile(d, (uint32_t)d->bins->by_work[i], own);
 }
 
 /* Level 0 has a guard band as the others do; no sample falls into it. */
