@@ -7,7 +7,7 @@
 #include "render/render.h"
 #include "render/screen.h"
 
-/* Two passes over chunks of clusters: the first decides, block by block, and counts for each tile; the second
+/* Two passes over chunks of blocks: the first decides, block by block, and counts for each tile; the second
  * writes the bins where the counts say, in canonical order whatever the threads did. */
 
 /* Blocks of a chunk: so many that there are some tens of chunks for threads to share. */
@@ -16,7 +16,7 @@
 #define MANY_CHUNKS 64
 
 struct cull_chunk {
-	uint32_t instance, first_cluster, n_clusters, first_hit, n_hits;
+	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
 	uint8_t flags; /* of all blocks that are left, OR-ed */
 	uint64_t n_samples;
@@ -236,18 +236,23 @@ static void count_chunk(int i, void *userdata)
 	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
 
 	memset(count, 0, cull->n_tiles * sizeof *count);
-	for (uint32_t k = 0; k < chunk.n_clusters; k++) {
-		const struct psr_cluster *cluster = &in->cull.blocks->cluster[chunk.first_cluster + k];
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t chunk_end = chunk.first_block + chunk.n_blocks;
+	for (uint32_t k = chunk.first_cluster; k < b->n_clusters && b->cluster[k].first_block < chunk_end; k++) {
+		const struct psr_cluster *cluster = &b->cluster[k];
+		const uint32_t cluster_end = cluster->first_block + cluster->n_blocks;
+		const uint32_t end = cluster_end < chunk_end ? cluster_end : chunk_end;
+		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
 		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
 		if (!is_chosen(cull->bins, plan, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
-		chunk.n_tested += cluster->n_blocks;
-		for (uint32_t at = 0; at < cluster->n_blocks; at += CULL_BATCH) {
-			const uint32_t n = cluster->n_blocks - at < CULL_BATCH ? cluster->n_blocks - at : CULL_BATCH;
+		chunk.n_tested += end - first;
+		for (uint32_t n; first < end; first += n) {
 			struct cull_batch batch;
-			cull->simd->cull(&batch, &in->cull, cluster->first_block + at, n);
-			hit = take_batch(cull, &chunk, count, &batch, cluster->first_block + at, n, hit);
+			n = end - first < CULL_BATCH ? end - first : CULL_BATCH;
+			cull->simd->cull(&batch, &in->cull, first, n);
+			hit = take_batch(cull, &chunk, count, &batch, first, n, hit);
 		}
 	}
 	chunk.n_hits = (uint32_t)(hit - (cull->bins->hit + chunk.first_hit));
@@ -315,15 +320,15 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 	uint32_t n = 0;
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
-		for (uint32_t k = 0; k < blocks->n_clusters; n++) {
-			uint32_t first = k, size = 0;
-			do
-				size += blocks->cluster[k++].n_blocks;
-			while (k < blocks->n_clusters && size + blocks->cluster[k].n_blocks <= most);
+		uint32_t k = 0;
+		for (uint32_t first = 0; first < blocks->n_blocks; first += most, n++) {
+			const uint32_t left = blocks->n_blocks - first;
+			while (blocks->cluster[k].first_block + blocks->cluster[k].n_blocks <= first)
+				k++;
 			if (store)
-				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = first, .n_clusters = k - first,
-					                                  .first_hit = plan->instance[i].first_slot +
-					                                               blocks->cluster[first].first_block };
+				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = k, .first_block = first,
+					                                  .n_blocks = left < most ? left : most,
+					                                  .first_hit = plan->instance[i].first_slot + first };
 		}
 	}
 	return n;
