@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
@@ -182,46 +183,57 @@ static struct cluster_view {
 	return v;
 }
 
-/* Rises with the level among clusters that fit a pixel, falls with it among those that do not, which are all below. */
-static uint32_t score_of(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k,
-                         float group_stretch)
+/* The least z' that the blocks' spheres of a cluster reach. */
+static float nearest_of(const struct plan_instance *in, const struct psr_cluster *k)
 {
-	const uint32_t max_levels = 32;
-	int fits = fits_pixel(group_stretch * in->cull.spacing * (float)(1u << k->level) * plan->finer);
-	return fits ? max_levels + k->level : max_levels - 1 - k->level;
+	const struct psr_blocks *b = in->cull.blocks;
+	const int16_t *x = b->sphere_x + k->first_block, *y = b->sphere_y + k->first_block, *z = b->sphere_z + k->first_block;
+	const uint16_t *r = b->sphere_r + k->first_block;
+	const float *m = in->cull.center_m[2], half = 0.5f * in->cull.scale;
+	float nearest = INFINITY;
+	for (uint32_t i = 0; i < k->n_blocks; i++) {
+		const float front = ((m[0] * x[i] + m[1] * y[i]) + m[2] * z[i]) - half * r[i];
+		nearest = front < nearest ? front : nearest;
+	}
+	return nearest * (1.0f / 16384) + m[3];
 }
 
-/* Serial, since it costs no more than some nanoseconds a cluster, which has many blocks. */
+/* Whether samples are surely at most a pixel apart, or what the settings say, all over the cluster. Its sphere is held
+ * against that first: it reaches nearer than anything in it, by half of its radius where it holds a whole model. */
+static int fits_cluster(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k)
+{
+	const struct cluster_view v = view_cluster(in, k);
+	const float spacing = in->cull.spacing * (float)(1u << k->level) * plan->finer;
+	if (fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2] - v.r) * spacing))
+		return 1;
+	if (!plan->perspective || !fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2]) * spacing))
+		return 0;
+	return fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, nearest_of(in, k)) * spacing);
+}
+
+/* Of each group the coarsest cluster that fits, or the finest if none does: looked for from coarse to fine. Serial,
+ * since it costs no more than some nanoseconds a cluster, but for those that are just at the limit. */
 static void choose_levels(struct bins *bins, const struct plan *plan)
 {
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct plan_instance *in = &plan->instance[i];
 		const struct psr_blocks *b = in->cull.blocks;
 		struct cull_group *group = bins->group + in->first_group;
-		if (b->n_levels == 1)
-			continue;
 		memset(group, 0, b->n_clusters * sizeof *group);
-		for (uint32_t k = 0; k < b->n_clusters; k++) {
-			const struct cluster_view v = view_cluster(in, &b->cluster[k]);
-			const float s = cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r);
-			float *most = &group[b->cluster[k].group].stretch;
-			*most = s > *most ? s : *most;
-		}
-		for (uint32_t k = 0; k < b->n_clusters; k++) {
-			struct cull_group *g = &group[b->cluster[k].group];
-			const uint32_t score = score_of(plan, in, &b->cluster[k], g->stretch);
-			g->score = score > g->score ? score : g->score;
-		}
+		for (unsigned level = b->n_levels; level-- > 0;)
+			for (uint32_t k = 0; k < b->n_clusters; k++) {
+				struct cull_group *g = &group[b->cluster[k].group];
+				if (b->cluster[k].level != level || g->fits)
+					continue;
+				g->level = (uint8_t)level;
+				g->fits = level > 0 && fits_cluster(plan, in, &b->cluster[k]);
+			}
 	}
 }
 
-static int is_chosen(const struct bins *bins, const struct plan *plan, const struct plan_instance *in,
-                     const struct psr_cluster *k)
+static int is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
 {
-	if (in->cull.blocks->n_levels == 1)
-		return 1;
-	const struct cull_group *g = &bins->group[in->first_group + k->group];
-	return score_of(plan, in, k, g->stretch) == g->score;
+	return bins->group[in->first_group + k->group].level == k->level;
 }
 
 static void count_chunk(int i, void *userdata)
@@ -245,7 +257,7 @@ static void count_chunk(int i, void *userdata)
 		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
 		const struct cluster_view v = view_cluster(in, cluster);
 		struct extent e;
-		if (!is_chosen(cull->bins, plan, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
+		if (!is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk.n_tested += end - first;
 		for (uint32_t n; first < end; first += n) {

@@ -79,11 +79,10 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 /* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
 
 /* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel (or what the settings
- * say) wherever a sphere of the group reaches, so that its blocks need no depth buffer but the picture's; the finest if
- * there is none. */
+ * say) as near as its blocks reach, so that they need no depth buffer but the picture's; the finest if there is none. */
 struct cull_group {
-	float stretch;  /* greatest of its clusters: pixels that a unit of camera space can be stretched to */
-	uint32_t score; /* of the cluster that is drawn */
+	uint8_t level; /* of the cluster that is drawn */
+	uint8_t fits;
 };
 
 /* A block that is left, and where it may show. */

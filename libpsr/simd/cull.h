@@ -79,7 +79,7 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 		const float cx = ((v.center_m[0][0] * x + v.center_m[0][1] * y) + v.center_m[0][2] * z) + v.center_m[0][3];
 		const float cy = ((v.center_m[1][0] * x + v.center_m[1][1] * y) + v.center_m[1][2] * z) + v.center_m[1][3];
 		const float cz = ((v.center_m[2][0] * x + v.center_m[2][1] * y) + v.center_m[2][2] * z) + v.center_m[2][3];
-		const float stretch = cull_stretch(&v, cx, cy, cz, r);
+		const float stretch = cull_stretch(&v, cx, cy, cz, r, cz - r);
 
 		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent; a part in 4096 is forgiven, so that
 		 * rounding does not double the cells of a picture drawn at just the magnification that a level is made for. */

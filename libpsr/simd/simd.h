@@ -51,10 +51,10 @@ struct cull_view {
  * z'^2, which is [G] (7.9) with the true stretch off the axis in the place of the distance alone. With theta the
  * angle between p and the axis that is 1 / (z' cos theta): the least z' and the greatest theta of the sphere bound
  * it, the latter as far from the centre's as the sphere's rim is. Seen from within the sphere, or beyond 90 degrees,
- * only |p| and z' do. */
-static inline float cull_stretch(const struct cull_view *v, float cx, float cy, float cz, float r)
+ * only |p| and z' do. `front`: the least z' of what is in the sphere, c_z - r if no more is known. */
+static inline float cull_stretch(const struct cull_view *v, float cx, float cy, float cz, float r, float front)
 {
-	const float front = cz - r, near = psr_choose(front > v->near_z, front, v->near_z);
+	const float near = psr_choose(front > v->near_z, front, v->near_z);
 	const float side2 = cx * cx + cy * cy, distance2 = side2 + cz * cz, rim2 = distance2 - r * r;
 	const float reach = __builtin_sqrtf(distance2) + r;
 	/* The cosine times distance2. */
