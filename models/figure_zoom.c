@@ -13,12 +13,15 @@
 #define BESIDE 4          /* steps before and after one that changes levels */
 #define SHOWN 8           /* times a difference is magnified in the picture */
 
-enum { MAGNIFICATION, PSNR, INSIDE, SAMPLES, DRAWN, OURS, TRUTH, BEYOND, N_COLUMNS };
+enum { MAGNIFICATION, SAMPLES, DRAWN, TRUTH, PLAIN, N_COLUMNS = PLAIN + 8 };
+/* Columns of plain frames, from PLAIN on, and as many of smooth ones behind them. */
+enum { PSNR, INSIDE, CHANGE, BEYOND, SMOOTH };
 
 static const struct study_column columns[N_COLUMNS] = {
-	{ "magnification", "magnification", 4 }, { "PSNR dB", "psnr", 2 }, { "inside", "inside", 2 },
-	{ "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
-	{ "change", "ours", 2 }, { "truth's", "truth", 2 }, { "beyond", "beyond", 2 },
+	{ "magnification", "magnification", 4 }, { "samples/pixel", "samples", 2 }, { "drawn", "drawn", 0 },
+	{ "truth's", "truth", 2 }, { "PSNR dB", "psnr", 2 }, { "inside", "inside", 2 }, { "change", "ours", 2 },
+	{ "beyond", "beyond", 2 }, { "PSNR dB", "psnr_smooth", 2 }, { "inside", "inside_smooth", 2 },
+	{ "change", "ours_smooth", 2 }, { "beyond", "beyond_smooth", 2 },
 };
 
 /* Columns of $table: 3 + the table's. */
@@ -27,19 +30,20 @@ static const struct study_kind kind = {
 	.plot = "set multiplot layout 3,1\nset logscale x 2\nset xrange [4:0.0625]\nset grid\nset lmargin 9\n"
 	        "set style data lines\n"
 	        "set format x ''\nset ylabel 'dB'\nset ytics 4\nset key bottom left\n"
-	        "plot $table using 3:4 title 'PSNR of all covered pixels' lw 2, "
-	        "'' using 3:5 title 'of those inside' lw 2\n"
+	        "plot $table using 3:7 title 'PSNR of all covered pixels' lw 2, "
+	        "'' using 3:8 title 'of those inside' lw 2, '' using 3:11 title 'smooth: all' lw 2, "
+	        "'' using 3:12 title 'smooth: inside' lw 2\n"
 	        "set ylabel 'samples'\nset ytics 20\nset key top left\nset yrange [0:*]\n"
-	        "plot $table using 3:6 title 'warped a covered pixel' lw 2\n"
+	        "plot $table using 3:4 title 'warped a covered pixel' lw 2\n"
 	        "set format x '%g'\nset xlabel 'magnification'\nset ylabel 'codes'\n"
 	        "set yrange [0:30]\nset ytics 10\nset key top right horizontal\n"
-	        "plot $table using 3:8 title 'change from frame to frame' lw 2, '' using 3:9 title 'of the truth' lw 2, "
-	        "'' using 3:10 title 'beyond it' lw 2\nunset multiplot\n",
+	        "plot $table using 3:9 title 'change from frame to frame' lw 2, '' using 3:6 title 'of the truth' lw 2, "
+	        "'' using 3:10 title 'beyond it' lw 2, '' using 3:14 title 'smooth: beyond it' lw 2\nunset multiplot\n",
 };
 
 struct zoom {
 	struct figure_model model;
-	struct figure_frame frame[2];
+	struct figure_frame frame[2][2]; /* plain and smooth ones: the one before, and this one */
 	struct figure_truth truth[2];
 };
 
@@ -60,56 +64,70 @@ static double magnification_of(int i)
 /* Pixels that the object covers wholly in both frames. */
 static void compare_step(double *row, const struct zoom *zoom)
 {
-	uint64_t n = 0, ours = 0, truth = 0, beyond = 0;
+	uint64_t n = 0, truth = 0, ours[2] = { 0, 0 }, beyond[2] = { 0, 0 };
 
 	for (size_t at = 0; at < (size_t)SIDE * SIDE; at++) {
-		int a, b;
+		int b;
 
 		if (zoom->truth[0].n_met[at] < RAYS * RAYS || zoom->truth[1].n_met[at] < RAYS * RAYS)
 			continue;
-		a = largest(zoom->frame[0].rgb + 3 * at, zoom->frame[1].rgb + 3 * at);
 		b = largest(zoom->truth[0].rgb + 3 * at, zoom->truth[1].rgb + 3 * at);
 		n++;
-		ours += (uint64_t)a;
 		truth += (uint64_t)b;
-		beyond += a > b ? (uint64_t)(a - b) : 0;
+		for (int way = 0; way < 2; way++) {
+			int a = largest(zoom->frame[way][0].rgb + 3 * at, zoom->frame[way][1].rgb + 3 * at);
+
+			ours[way] += (uint64_t)a;
+			beyond[way] += a > b ? (uint64_t)(a - b) : 0;
+		}
 	}
-	row[OURS] = (double)ours / (double)n;
 	row[TRUTH] = (double)truth / (double)n;
-	row[BEYOND] = (double)beyond / (double)n;
+	for (int way = 0; way < 2; way++) {
+		row[PLAIN + way * SMOOTH + CHANGE] = (double)ours[way] / (double)n;
+		row[PLAIN + way * SMOOTH + BEYOND] = (double)beyond[way] / (double)n;
+	}
 }
 
 static int draw_frame(struct figures *figures, struct zoom *zoom, int i, int to)
 {
 	struct figure_shot shot;
-	int rc;
+	int rc = PSR_OK;
 
 	figure_shot_init(&shot, &zoom->model, figure_view[0], magnification_of(i), SIDE, SIDE);
-	rc = figure_draw(&zoom->frame[to], figures, &shot);
+	for (int way = 0; rc == PSR_OK && way < 2; way++) {
+		shot.settings.is_smooth = way;
+		rc = figure_draw(&zoom->frame[way][to], figures, &shot);
+	}
 	return rc == PSR_OK ? figure_truth_draw(&zoom->truth[to], figures, &zoom->model, &shot, RAYS) : rc;
 }
 
 static void score_frame(double *row, const struct zoom *zoom, int i)
 {
-	struct figure_score score = { .n_met = 0 };
-	const struct psr_report *report = &zoom->frame[1].report;
+	const struct psr_report *report = &zoom->frame[0][1].report;
 
-	figure_score_colors(&score, &zoom->frame[1], &zoom->truth[1]);
 	row[MAGNIFICATION] = magnification_of(i);
-	row[PSNR] = figure_psnr(score.square, score.n_met);
-	row[INSIDE] = figure_psnr(score.inside_square, score.n_inside);
 	row[SAMPLES] = (double)report->count[PSR_STAGE_WARP] / (double)report->n_covered;
 	row[DRAWN] = (double)report->n_samples_drawn;
+	for (int way = 0; way < 2; way++) {
+		struct figure_score score = { .n_met = 0 };
+
+		figure_score_colors(&score, &zoom->frame[way][1], &zoom->truth[1]);
+		row[PLAIN + way * SMOOTH + PSNR] = figure_psnr(score.square, score.n_met);
+		row[PLAIN + way * SMOOTH + INSIDE] = figure_psnr(score.inside_square, score.n_inside);
+	}
 }
 
 static void swap(struct zoom *zoom)
 {
-	const struct figure_frame frame = zoom->frame[0];
 	const struct figure_truth truth = zoom->truth[0];
 
-	zoom->frame[0] = zoom->frame[1];
+	for (int way = 0; way < 2; way++) {
+		const struct figure_frame frame = zoom->frame[way][0];
+
+		zoom->frame[way][0] = zoom->frame[way][1];
+		zoom->frame[way][1] = frame;
+	}
 	zoom->truth[0] = zoom->truth[1];
-	zoom->frame[1] = frame;
 	zoom->truth[1] = truth;
 }
 
@@ -152,39 +170,54 @@ static void rank(int order[FRAMES], const struct study_table *table)
 	for (int i = 1; i < FRAMES; i++) {
 		int at = i - 1;
 
-		for (; at > 0 && *study_at(table, order[at - 1], 0, BEYOND) < *study_at(table, i, 0, BEYOND); at--)
+		for (; at > 0 && *study_at(table, order[at - 1], 0, PLAIN + BEYOND) < *study_at(table, i, 0, PLAIN + BEYOND); at--)
 			order[at] = order[at - 1];
 		order[at] = i;
 	}
 }
 
-static void print(const struct study_table *table, const int order[FRAMES])
+static void print_row(const struct study_table *table, int i)
 {
-	double sum[3] = { 0, 0, 0 };
+	const double *row = study_at(table, i, 0, 0);
+
+	printf("%-6d %8.4f %8.2f %8.2f", i, row[MAGNIFICATION], row[SAMPLES], row[TRUTH]);
+	for (const double *way = row + PLAIN; way < row + N_COLUMNS; way += SMOOTH)
+		printf(" | %8.2f %8.2f %8.2f %8.2f", way[PSNR], way[INSIDE], way[CHANGE], way[BEYOND]);
+	printf("%s\n", changes_level(table, i) ? " levels change" : "");
+}
+
+static void print_means(const struct study_table *table)
+{
+	static const char *const step[] = { "that change levels", "around them", "others" };
+	double sum[3][3] = { { 0 } };
 	int n[3] = { 0, 0, 0 };
 
-	printf("%-6s %13s %8s %8s %14s %8s %8s %8s\n", "frame", "magnification", "PSNR dB", "inside", "samples/pixel", "change",
-	       "truth's", "beyond");
-	for (int k = 0; k < FRAMES; k++) {
-		const int i = k < WORST ? order[k] : k - WORST;
-		const double *row = study_at(table, i, 0, 0);
-
-		if (k == WORST)
-			printf("every eighth:\n");
-		if (k >= WORST && i % 8 != 1)
-			continue;
-		printf("%-6d %13.4f %8.2f %8.2f %14.2f %8.2f %8.2f %8.2f%s\n", i, row[MAGNIFICATION], row[PSNR], row[INSIDE], row[SAMPLES],
-		       row[OURS], row[TRUTH], row[BEYOND], changes_level(table, i) ? " levels change" : "");
-	}
 	for (int i = 1; i < FRAMES; i++) {
 		const int kind_of = changes_level(table, i) ? 0 : is_beside(table, i) ? 1 : 2;
 
-		sum[kind_of] += *study_at(table, i, 0, BEYOND);
 		n[kind_of]++;
+		sum[kind_of][0] += *study_at(table, i, 0, TRUTH);
+		for (int way = 0; way < 2; way++)
+			sum[kind_of][1 + way] += *study_at(table, i, 0, PLAIN + way * SMOOTH + BEYOND);
 	}
-	printf("\nbeyond the truth's change, mean: %.2f codes in the %d steps that change levels, %.2f in the %d around them,\n"
-	       "%.2f in the other %d\n",
-	       sum[0] / n[0], n[0], sum[1] / n[1], n[1], sum[2] / n[2], n[2]);
+	printf("\nmean, codes                  truth's change   beyond it   smooth\n");
+	for (int k = 0; k < 3; k++)
+		printf("%3d steps %-18s %14.2f %11.2f %8.2f\n", n[k], step[k], sum[k][0] / n[k], sum[k][1] / n[k], sum[k][2] / n[k]);
+}
+
+static void print(const struct study_table *table, const int order[FRAMES])
+{
+	printf("%-6s %8s %8s %8s | plain: %28s | smooth\n%-6s %8s %8s %8s", "", "", "samples", "truth's", "", "frame", "magn.",
+	       "a pixel", "change");
+	for (int way = 0; way < 2; way++)
+		printf(" | %8s %8s %8s %8s", "PSNR dB", "inside", "change", "beyond");
+	printf("\n");
+	for (int k = 0; k < WORST; k++)
+		print_row(table, order[k]);
+	printf("every eighth:\n");
+	for (int i = 1; i < FRAMES; i += 8)
+		print_row(table, i);
+	print_means(table);
 }
 
 static int show_difference(struct figures *figures, struct figure_sheet *sheet, const uint8_t *a, const uint8_t *b,
@@ -217,11 +250,11 @@ static int show_step(struct figures *figures, struct zoom *zoom, int i)
 	if (rc == PSR_OK)
 		rc = draw_frame(figures, zoom, i, 1);
 	for (int k = 0; rc == PSR_OK && k < 4; k++) {
-		const uint8_t *rgb = k < 2 ? zoom->frame[k].rgb : zoom->truth[k - 2].rgb;
+		const uint8_t *rgb = k < 2 ? zoom->frame[0][k].rgb : zoom->truth[k - 2].rgb;
 
 		rc = figure_sheet_add(&sheet, rgb, SIDE, &whole, figures->err);
 		if (rc == PSR_OK && k == 1)
-			rc = show_difference(figures, &sheet, zoom->frame[0].rgb, zoom->frame[1].rgb, &whole);
+			rc = show_difference(figures, &sheet, zoom->frame[0][0].rgb, zoom->frame[0][1].rgb, &whole);
 		if (rc == PSR_OK && k == 3)
 			rc = show_difference(figures, &sheet, zoom->truth[0].rgb, zoom->truth[1].rgb, &whole);
 	}
@@ -240,8 +273,8 @@ int figure_run_zoom(struct figures *figures)
 
 	memset(&zoom, 0, sizeof zoom);
 	rc = figure_model_load(&zoom.model, figures, "toybird", NULL, 256);
-	for (int k = 0; rc == PSR_OK && k < 2; k++)
-		rc = figure_frame_init(&zoom.frame[k], SIDE, SIDE, figures->err);
+	for (int k = 0; rc == PSR_OK && k < 4; k++)
+		rc = figure_frame_init(&zoom.frame[k / 2][k % 2], SIDE, SIDE, figures->err);
 	if (rc == PSR_OK)
 		rc = study_table_init(table, "frame", columns, N_COLUMNS, FRAMES, 1, figures->err);
 	if (rc == PSR_OK)
@@ -258,7 +291,8 @@ int figure_run_zoom(struct figures *figures)
 		rc = study_plot(&figures->study, path, figures->err);
 	study_table_fini(table);
 	for (int k = 0; k < 2; k++) {
-		figure_frame_fini(&zoom.frame[k]);
+		figure_frame_fini(&zoom.frame[0][k]);
+		figure_frame_fini(&zoom.frame[1][k]);
 		figure_truth_fini(&zoom.truth[k]);
 	}
 	figure_model_fini(&zoom.model);

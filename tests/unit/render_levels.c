@@ -24,7 +24,7 @@ static struct psr_model *model;
 
 /* Blocks of all levels have the same middle, as near as windows of their lattices come: level 4, 8 * 16 samples wide, is
  * an eighth of a unit. Groups stand side by side in the plane z = 0, a quarter of a unit apart, and face +z. */
-static int setup(void **state)
+static int make_model(float cluster_radius)
 {
 	static const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, SPACING };
 	static const struct psr_run run;
@@ -45,18 +45,17 @@ static int setup(void **state)
 		                         .depth = depth, .attr = attr };
 	uint32_t n = 0;
 
-	(void)state;
 	/* Level by level, so that a group's clusters do not follow each other. */
 	for (int l = LEVELS - 1; l >= 0; l--) {
 		for (int g = 0; g < GROUPS; g++) {
 			if (!(levels_of[g] >> l & 1))
 				continue;
 			cluster[n] = (struct psr_cluster){ .center = { (float)(g - 2) * 0.25f + RADIUS, RADIUS, 0 },
-				                               .radius = 1.42f * RADIUS, .first_block = n, .n_blocks = 1,
+				                               .radius = cluster_radius, .first_block = n, .n_blocks = 1,
 				                               .group = (uint32_t)(GROUPS - 1 - g), .level = (uint8_t)l };
 			x[n] = (int16_t)(cluster[n].center[0] * 0x1p14f);
 			y[n] = (int16_t)(cluster[n].center[1] * 0x1p14f);
-			r[n] = (uint16_t)(cluster[n].radius * 0x1p15f);
+			r[n] = (uint16_t)(1.42f * RADIUS * 0x1p15f);
 			flags[n] = (uint8_t)(l | PSR_BLOCK_DEPTH);
 			mask[n] = UINT64_MAX;
 			offset[n] = (uint16_t)(64 * n);
@@ -70,6 +69,12 @@ static int setup(void **state)
 	blocks.n_blocks = blocks.n_clusters = n;
 	blocks.n_samples = 64 * n;
 	return psr_model_create(&model, &info, &blocks, NULL, NULL);
+}
+
+static int setup(void **state)
+{
+	(void)state;
+	return make_model(1.42f * RADIUS);
 }
 
 static int teardown(void **state)
@@ -181,6 +186,36 @@ static void one_cluster_of_each_group_is_drawn_and_it_is_the_coarsest_that_fits_
 	}
 	for (int l = 0; l < LEVELS; l++)
 		assert_true(seen[l] > 0);
+}
+
+static void levels_are_chosen_by_how_near_blocks_reach_whatever_the_sphere_around_them(void **state)
+{
+	const double side = 512, radius = 0.75, reach = 1.42 * (double)RADIUS;
+	int n_coarser = 0;
+	struct psr_instance instance;
+	struct choice choice;
+
+	psr_model_unref(model);
+	assert_int_equal(make_model((float)radius), PSR_OK);
+	for (double distance = 2; distance < 40; distance *= 1.05) {
+		const struct psr_scene scene = scene_at(&instance, distance, 1.2);
+
+		choose(&scene, (uint32_t)side, NULL, &choice);
+		for (int g = 0; g < GROUPS; g++) {
+			double x = (double)(g - 2) * 0.25 + (double)RADIUS, y = (double)RADIUS;
+			double d = sqrt(x * x + y * y + distance * distance);
+			double cosine = cos(acos(distance / d) + asin(radius / d)), focal = side / 2 / tan(0.6);
+			double pixels = focal / ((distance - reach) * cosine), by_sphere = focal / ((distance - radius) * cosine);
+
+			if (is_near_a_limit(pixels))
+				continue;
+			assert_int_equal(choice.level[GROUPS - 1 - g], expected_level(levels_of[g], pixels));
+			n_coarser += expected_level(levels_of[g], pixels) > expected_level(levels_of[g], by_sphere);
+		}
+	}
+	assert_true(n_coarser > 0);
+	psr_model_unref(model);
+	assert_int_equal(setup(state), PSR_OK);
 }
 
 static void a_group_never_gets_finer_with_distance(void **state)
@@ -322,6 +357,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(one_cluster_of_each_group_is_drawn_and_it_is_the_coarsest_that_fits_a_pixel),
+		cmocka_unit_test(levels_are_chosen_by_how_near_blocks_reach_whatever_the_sphere_around_them),
 		cmocka_unit_test(a_group_never_gets_finer_with_distance),
 		cmocka_unit_test(orthographic_pictures_choose_by_magnification_alone),
 		cmocka_unit_test(a_greater_spacing_chooses_as_a_smaller_picture_does),
