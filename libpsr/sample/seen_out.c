@@ -9,13 +9,14 @@
 #include "texture.h"
 
 #define PLACE_AREA 2.25 /* square pixels: a place for each cell of what was seen */
-#define BATCH 64
-#define BATCHES 4 /* of rays from a side of a place: what fewer miss shows in one view of several hundred */
+#define BATCH 64  /* rays from a side of each place, */
+#define AGAIN 3   /* and so many times as many near what they found: what fewer miss shows in one of several hundred */
+#define AROUND 2  /* times that cells are made twice as wide, to tell what is near that: 6 pixels */
 #define NEAR 3    /* times that cells are made twice as wide, to tell what is near: 12 pixels */
 #define CHUNK 4096
 
 struct chunk {
-	struct spots spots;
+	struct spots open, shut; /* from which rays got outside, and from which none did so far */
 	int failed;
 };
 
@@ -25,7 +26,8 @@ struct job {
 	double step;        /* of area, from place to place */
 	uint32_t n_prims;
 	uint64_t n_places;
-	struct seen near; /* what was seen, in wider cells */
+	struct seen near;   /* what was seen, in wider cells */
+	struct seen around; /* what rays got outside from */
 	struct chunk *chunk;
 };
 
@@ -57,12 +59,12 @@ static void draw_view(uint64_t *state, const float n[3], double view[3])
 }
 
 /* Looked at from outside, as one-sided faces let rays through that come from behind them. */
-static int is_open(const struct level *level, const struct surface_spot *spot, uint64_t *state)
+static int is_open(const struct level *level, const struct surface_spot *spot, int batches, uint64_t *state)
 {
 	struct ray ray[BATCH];
 	uint8_t is_hidden[BATCH];
 
-	for (int batch = 0; batch < BATCHES; batch++) {
+	for (int batch = 0; batch < batches; batch++) {
 		for (int i = 0; i < BATCH; i++) {
 			double view[3];
 
@@ -109,7 +111,7 @@ static int look_at(const struct job *job, uint32_t prim, uint64_t *state, struct
 			spot.n[k] = is_back ? -n[k] : n[k];
 		}
 		if (!seen_is(&level->seen, spot.p, spot.n) && seen_is(&job->near, spot.p, spot.n)
-		    && is_open(level, &spot, state) && spots_add(&chunk->spots, &spot) != PSR_OK)
+		    && spots_add(is_open(level, &spot, 1, state) ? &chunk->open : &chunk->shut, &spot) != PSR_OK)
 			return PSR_ERR_MEMORY;
 	}
 	return PSR_OK;
@@ -132,29 +134,69 @@ static void look_at_chunk(int i, void *userdata)
 	}
 }
 
-static int add_chunks(struct level *level, const struct chunk *chunk, int n_chunks)
+/* What is open shows from all of its neighborhood: there it is looked more closely. */
+static void look_again(int i, void *userdata)
+{
+	const struct job *job = userdata;
+	struct chunk *chunk = &job->chunk[i];
+	uint64_t state = ~(uint64_t)i * UINT64_C(0x632be59bd9b4e019);
+
+	chunk->open.n = 0;
+	for (size_t k = 0; k < chunk->shut.n && !chunk->failed; k++) {
+		const struct surface_spot *spot = &chunk->shut.spot[k];
+
+		if (seen_is(&job->around, spot->p, spot->n) && !seen_is(&job->level->seen, spot->p, spot->n)
+		    && is_open(job->level, spot, AGAIN, &state))
+			chunk->failed = spots_add(&chunk->open, spot) != PSR_OK;
+	}
+}
+
+static int add_open(struct seen *seen, const struct chunk *chunk, int n_chunks)
 {
 	int rc = PSR_OK;
 
 	for (int i = 0; rc == PSR_OK && i < n_chunks; i++) {
 		rc = chunk[i].failed ? PSR_ERR_MEMORY : PSR_OK;
-		for (uint64_t k = 0; rc == PSR_OK && k < chunk[i].spots.n; k++)
-			rc = seen_add(&level->seen, chunk[i].spots.spot[k].p, chunk[i].spots.spot[k].n);
+		for (size_t k = 0; rc == PSR_OK && k < chunk[i].open.n; k++)
+			rc = seen_add(seen, chunk[i].open.spot[k].p, chunk[i].open.spot[k].n);
 	}
 	return rc;
 }
 
-static int find_near(struct seen *near, const struct seen *seen)
+/* Cells made twice as wide so many times. seen_fini() either way. */
+static int widen(struct seen *wide, const struct seen *seen, int times)
 {
-	int rc = seen_coarsen(near, seen);
+	int rc = seen_coarsen(wide, seen);
 
-	for (int i = 1; rc == PSR_OK && i < NEAR; i++) {
-		struct seen finer = *near;
+	for (int i = 1; rc == PSR_OK && i < times; i++) {
+		struct seen finer = *wide;
 
-		rc = seen_coarsen(near, &finer);
+		rc = seen_coarsen(wide, &finer);
 		seen_fini(&finer);
 	}
 	return rc;
+}
+
+static int look_twice(struct level *level, struct job *job, int n_chunks)
+{
+	struct seen open = { .table = NULL };
+	int rc = widen(&job->near, &level->seen, NEAR);
+
+	if (rc == PSR_OK)
+		psr_pool_for(level->pool, n_chunks, look_at_chunk, job);
+	if (rc == PSR_OK)
+		rc = add_open(&level->seen, job->chunk, n_chunks);
+	if (rc == PSR_OK)
+		rc = seen_init(&open, level->ds);
+	if (rc == PSR_OK)
+		rc = add_open(&open, job->chunk, n_chunks);
+	if (rc == PSR_OK)
+		rc = widen(&job->around, &open, AROUND);
+	seen_fini(&open);
+	if (rc != PSR_OK)
+		return rc;
+	psr_pool_for(level->pool, n_chunks, look_again, job);
+	return add_open(&level->seen, job->chunk, n_chunks);
 }
 
 int seen_look_out(struct level *level)
@@ -170,18 +212,15 @@ int seen_look_out(struct level *level)
 		job.step = area[job.n_prims - 1] / (double)job.n_places;
 		n_chunks = (int)((job.n_places + CHUNK - 1) / CHUNK);
 		job.chunk = calloc((size_t)n_chunks, sizeof *job.chunk);
-		rc = job.chunk == NULL ? PSR_ERR_MEMORY : PSR_OK;
+		rc = job.chunk == NULL ? PSR_ERR_MEMORY : look_twice(level, &job, n_chunks);
 	}
-	if (rc == PSR_OK)
-		rc = find_near(&job.near, &level->seen);
-	if (rc == PSR_OK) {
-		psr_pool_for(level->pool, n_chunks, look_at_chunk, &job);
-		rc = add_chunks(level, job.chunk, n_chunks);
+	for (int i = 0; job.chunk != NULL && i < n_chunks; i++) {
+		free(job.chunk[i].open.spot);
+		free(job.chunk[i].shut.spot);
 	}
-	for (int i = 0; job.chunk != NULL && i < n_chunks; i++)
-		free(job.chunk[i].spots.spot);
 	free(job.chunk);
 	seen_fini(&job.near);
+	seen_fini(&job.around);
 	psr_free(area);
 	return rc;
 }
