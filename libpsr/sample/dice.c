@@ -14,6 +14,7 @@
  * pixels apart. */
 #define STEP 0.33
 #define THIN_STEP 0.25 /* on what is thin, at the finest level, which is to be adequate */
+#define SMALL 3 /* columns of places: a triangle of a pixel, of whose places those in other cells are enough, above that level */
 
 /* Where between the lines of such a grid they are, by round: what is smaller than a step shows in one of them. */
 static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
@@ -24,7 +25,8 @@ static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
 /* What was found of some primitives. */
 struct chunk {
 	struct spots thin, rest;
-	struct spot_cells cells; /* that have a place on something thin, whose other sides need no test */
+	struct spot_cells thin_cells; /* that have a place on something thin, whose other sides need no test; */
+	struct spot_cells rest_cells; /* and one on a triangle as small as a step */
 	int failed;
 };
 
@@ -58,16 +60,17 @@ static int is_any_side_seen(const struct level *level, const struct surface_spot
 }
 
 /* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for
- * until more was seen. */
-static void test_place(const struct job *job, uint32_t prim, const float p[3], struct chunk *chunk)
+ * until more was seen. is_only: of a triangle as small as a step, of which one place in a cell is enough. */
+static void test_place(const struct job *job, uint32_t prim, const float p[3], int is_only, struct chunk *chunk)
 {
+	static const float NO_WAY[3] = { 0, 0, 0 };
 	const struct level *level = job->level;
 	uint8_t sides = level->sides[prim];
 	const float *front = ray_scene_normal(level->scene, prim);
 	int is_two_sided = level_material(level, prim)->two_sided != 0, is_thin = level_is_thin(level, prim);
 	int is_side_seen = 0, rc = PSR_OK;
 
-	if (is_thin && spot_cells_has(&chunk->cells, p))
+	if (is_thin && spot_cells_has(&chunk->thin_cells, p, NO_WAY))
 		return;
 	for (int back = 0; back <= is_two_sided; back++) {
 		uint8_t seen = back ? SIDE_BACK_SEEN : SIDE_FRONT_SEEN, hidden = back ? SIDE_BACK_HIDDEN : SIDE_FRONT_HIDDEN;
@@ -80,10 +83,16 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], s
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
+		if (is_only && !is_thin && spot_cells_has(&chunk->rest_cells, p, spot.n)) {
+			is_side_seen = 1;
+			continue;
+		}
 		is_side_seen = is_thin ? (sides & seen) != 0 || is_any_side_seen(level, &spot)
 		                       : seen_is(&level->seen, spot.p, spot.n);
 		if (is_side_seen && is_thin)
-			rc = spot_cells_add(&chunk->cells, p);
+			rc = spot_cells_add(&chunk->thin_cells, p, NO_WAY);
+		else if (is_side_seen && is_only)
+			rc = spot_cells_add(&chunk->rest_cells, p, spot.n);
 		if (rc == PSR_OK && is_side_seen && !is_covered(level, &spot))
 			rc = spots_add(is_thin ? &chunk->thin : &chunk->rest, &spot);
 		chunk->failed |= rc != PSR_OK;
@@ -94,7 +103,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS];
-	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns;
+	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns, is_only;
 	double corner[3][3], side[3], e[3], height, foot, step = step_of(level, level_is_thin(level, prim));
 
 	ray_scene_corners(level->scene, prim, corner);
@@ -115,6 +124,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 	foot = v3d_dot(ab, ac) / (side[longest] * side[longest]);
 	n_columns = (int)ceil(side[longest] / step);
 	n_columns = n_columns > 1 ? n_columns : 1;
+	is_only = n_columns <= SMALL && level->finer != NULL;
 	for (int col = 0; col < n_columns; col++) {
 		double x = (col + shift) / n_columns, top = x < foot ? x / foot : (1 - x) / (1 - foot);
 		int n = (int)ceil(height * top / step);
@@ -131,7 +141,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 				continue;
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);
-			test_place(job, prim, p, chunk);
+			test_place(job, prim, p, is_only, chunk);
 		}
 	}
 }
@@ -160,7 +170,7 @@ static void dice_disc(const struct job *job, uint32_t prim, struct chunk *chunk)
 				continue;
 			for (int a = 0; a < 3; a++)
 				p[a] = (float)(center[a] + x * frame[0][a] + y * frame[1][a]);
-			test_place(job, prim, p, chunk);
+			test_place(job, prim, p, 0, chunk);
 		}
 	}
 }
@@ -174,7 +184,8 @@ static void dice_chunk(int i, void *userdata)
 	uint32_t end = ((uint32_t)i + 1) * CHUNK < job->n_prims ? ((uint32_t)i + 1) * CHUNK : job->n_prims;
 	struct chunk *chunk = &job->chunk[i];
 
-	chunk->failed = spot_cells_init(&chunk->cells, step_of(job->level, 1)) != PSR_OK;
+	chunk->failed = spot_cells_init(&chunk->thin_cells, step_of(job->level, 1)) != PSR_OK
+	                || spot_cells_init(&chunk->rest_cells, STEP * job->level->ds) != PSR_OK;
 	for (uint32_t prim = (uint32_t)i * CHUNK; prim < end && !chunk->failed; prim++) {
 		const float *n = ray_scene_normal(job->level->scene, prim);
 
@@ -185,7 +196,8 @@ static void dice_chunk(int i, void *userdata)
 		else
 			dice_disc(job, prim, chunk);
 	}
-	spot_cells_fini(&chunk->cells);
+	spot_cells_fini(&chunk->thin_cells);
+	spot_cells_fini(&chunk->rest_cells);
 }
 
 /* Places for which offers are found at once, by all threads. */

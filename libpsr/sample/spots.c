@@ -1,3 +1,4 @@
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cell.h"
@@ -45,10 +46,18 @@ void spot_cells_fini(struct spot_cells *cells)
 	*cells = (struct spot_cells){ .width = 0 };
 }
 
-static uint64_t key_of(const struct spot_cells *cells, const float p[3])
+/* 20 bits an axis, and the way: 0 is none. */
+static uint64_t key_of(const struct spot_cells *cells, const float p[3], const float n[3])
 {
-	return cell_key(cell_floor((double)p[0] / cells->width), cell_floor((double)p[1] / cells->width),
-	                cell_floor((double)p[2] / cells->width));
+	int axis = 0;
+	uint64_t key;
+
+	for (int k = 1; k < 3; k++)
+		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
+	key = n[axis] == 0 ? 0 : (uint64_t)(1 + 2 * axis + (n[axis] < 0));
+	for (int k = 0; k < 3; k++)
+		key = key << 20 | (uint64_t)(cell_floor((double)p[k] / cells->width) & 0xfffff);
+	return key;
 }
 
 static uint64_t *find(const struct spot_cells *cells, uint64_t key)
@@ -60,15 +69,15 @@ static uint64_t *find(const struct spot_cells *cells, uint64_t key)
 	return &cells->key[i];
 }
 
-int spot_cells_has(const struct spot_cells *cells, const float p[3])
+int spot_cells_has(const struct spot_cells *cells, const float p[3], const float n[3])
 {
-	return *find(cells, key_of(cells, p)) != FREE;
+	return *find(cells, key_of(cells, p, n)) != FREE;
 }
 
-int spot_cells_add(struct spot_cells *cells, const float p[3])
+int spot_cells_add(struct spot_cells *cells, const float p[3], const float n[3])
 {
 	struct spot_cells old = *cells;
-	uint64_t key = key_of(cells, p), *at = find(cells, key);
+	uint64_t key = key_of(cells, p, n), *at = find(cells, key);
 
 	if (*at == key)
 		return PSR_OK;

@@ -1,4 +1,4 @@
-/* Lists of places of the surface; and which small cells of space have one. */
+/* Lists of places of the surface; and which small cells of space have one that faces one of six ways. */
 #ifndef PSR_SAMPLE_SPOTS_H
 #define PSR_SAMPLE_SPOTS_H
 
@@ -21,7 +21,9 @@ struct spot_cells {
 
 int spot_cells_init(struct spot_cells *cells, double width); /* MEMORY; spot_cells_fini() either way */
 void spot_cells_fini(struct spot_cells *cells);
-int spot_cells_has(const struct spot_cells *cells, const float p[3]); /* whether there is one in p's cell */
-int spot_cells_add(struct spot_cells *cells, const float p[3]);       /* MEMORY */
+
+/* Whether there is one in p's cell that faces about like n; n: 0,0,0 for those that stand for all sides. */
+int spot_cells_has(const struct spot_cells *cells, const float p[3], const float n[3]);
+int spot_cells_add(struct spot_cells *cells, const float p[3], const float n[3]); /* MEMORY */
 
 #endif

@@ -156,8 +156,9 @@ static void across_a_sheet_a_sample_reaches_further_than_a_ball(void **state)
 	}
 }
 
-static void cells_remember_places_on_both_sides_of_0(void **state)
+static void cells_remember_places_on_both_sides_of_0_by_the_way_that_they_face(void **state)
 {
+	static const float WAY[3][3] = { { 0, 0, 0 }, { 0.1f, -0.9f, 0.2f }, { 0.1f, 0.9f, 0.2f } };
 	struct spot_cells cells;
 
 	(void)state;
@@ -166,11 +167,13 @@ static void cells_remember_places_on_both_sides_of_0(void **state)
 		const float p[3] = { (float)i * 0.5f + 0.1f, -0.1f, 0.1f }, beside[3] = { (float)i * 0.5f + 0.3f, -0.1f, 0.1f };
 		const float here[3] = { (float)i * 0.5f + 0.2f, -0.2f, 0.2f };
 
-		assert_int_equal(spot_cells_has(&cells, p), 0);
-		assert_int_equal(spot_cells_add(&cells, p), PSR_OK);
-		assert_int_equal(spot_cells_has(&cells, p), 1);
-		assert_int_equal(spot_cells_has(&cells, here), 1);
-		assert_int_equal(spot_cells_has(&cells, beside), 0);
+		for (int way = 0; way < 3; way++) {
+			assert_int_equal(spot_cells_has(&cells, p, WAY[way]), 0);
+			assert_int_equal(spot_cells_add(&cells, p, WAY[way]), PSR_OK);
+			assert_int_equal(spot_cells_has(&cells, p, WAY[way]), 1);
+			assert_int_equal(spot_cells_has(&cells, here, WAY[way]), 1);
+			assert_int_equal(spot_cells_has(&cells, beside, WAY[way]), 0);
+		}
 	}
 	spot_cells_fini(&cells);
 }
@@ -182,7 +185,7 @@ int main(void)
 		cmocka_unit_test(one_candidate_is_chosen_where_one_covers_all),
 		cmocka_unit_test(nothing_is_chosen_of_nothing),
 		cmocka_unit_test(across_a_sheet_a_sample_reaches_further_than_a_ball),
-		cmocka_unit_test(cells_remember_places_on_both_sides_of_0),
+		cmocka_unit_test(cells_remember_places_on_both_sides_of_0_by_the_way_that_they_face),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
