@@ -3,6 +3,7 @@
 #include "../base/mem.h"
 #include "../base/vec.h"
 #include "area.h"
+#include "psr/direction.h"
 #include "psr/error.h"
 #include "seen_out.h"
 #include "spots.h"
@@ -32,28 +33,29 @@ struct job {
 };
 
 /* SplitMix64 (Steele, Lea, Flood 2014), by counter. */
-static double draw(uint64_t *state)
+static uint64_t draw_bits(uint64_t *state)
 {
 	uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
 
 	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
 	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+	return z ^ z >> 31;
+}
+
+static double draw(uint64_t *state)
+{
+	return (double)(draw_bits(state) >> 11) * 0x1p-53;
 }
 
 /* Towards where a side of a surface shows, as often as it looks large from there: a point of the unit sphere around n,
- * added to n. */
-static void draw_view(uint64_t *state, const float n[3], double view[3])
+ * added to n. One in each of BATCH parts of the sphere, in an order in which the next is near. */
+static void draw_view(uint64_t *state, int part, const float n[3], double view[3])
 {
-	double length2;
+	const unsigned n_drawn = PSR_DIRECTIONS / BATCH, drawn = (unsigned)(draw_bits(state) % n_drawn);
+	const float *direction = psr_direction_table()[(unsigned)part * n_drawn + drawn];
 
-	do {
-		v3d_set(view, 2 * draw(state) - 1, 2 * draw(state) - 1, 2 * draw(state) - 1);
-		length2 = v3d_dot(view, view);
-	} while (!(length2 <= 1 && length2 > 1e-4));
-	v3d_scale(view, view, 1 / sqrt(length2));
 	for (int k = 0; k < 3; k++)
-		view[k] += (double)n[k];
+		view[k] = (double)direction[k] + (double)n[k];
 	if (v3d_normalize(view, view) < 1e-3)
 		v3d_set(view, (double)n[0], (double)n[1], (double)n[2]);
 }
@@ -68,7 +70,7 @@ static int is_open(const struct level *level, const struct surface_spot *spot, i
 		for (int i = 0; i < BATCH; i++) {
 			double view[3];
 
-			draw_view(state, spot->n, view);
+			draw_view(state, i, spot->n, view);
 			for (int k = 0; k < 3; k++) {
 				ray[i].origin[k] = (double)spot->p[k] + 3 * view[k];
 				ray[i].direction[k] = -view[k];
