@@ -14,7 +14,9 @@
  * pixels apart. */
 #define STEP 0.33
 #define THIN_STEP 0.25 /* on what is thin, at the finest level, which is to be adequate */
-#define SMALL 3 /* columns of places: a triangle of a pixel, of whose places those in other cells are enough, above that level */
+
+/* Columns of places on a triangle as large as a pixel: at coarser levels, of such ones' places one a cell is enough. */
+#define SMALL 3
 
 /* Where between the lines of such a grid they are, by round: what is smaller than a step shows in one of them. */
 static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
@@ -26,7 +28,7 @@ static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
 struct chunk {
 	struct spots thin, rest;
 	struct spot_cells thin_cells; /* that have a place on something thin, whose other sides need no test; */
-	struct spot_cells rest_cells; /* and one on a triangle as small as a step */
+	struct spot_cells rest_cells; /* and one on a small triangle */
 	int failed;
 };
 
@@ -60,8 +62,8 @@ static int is_any_side_seen(const struct level *level, const struct surface_spot
 }
 
 /* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for
- * until more was seen. is_only: of a triangle as small as a step, of which one place in a cell is enough. */
-static void test_place(const struct job *job, uint32_t prim, const float p[3], int is_only, struct chunk *chunk)
+ * until more was seen. is_small: at a coarser level, on a triangle of which one place in a cell is enough. */
+static void test_place(const struct job *job, uint32_t prim, const float p[3], int is_small, struct chunk *chunk)
 {
 	static const float NO_WAY[3] = { 0, 0, 0 };
 	const struct level *level = job->level;
@@ -83,7 +85,7 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], i
 			continue;
 		v3f_set(spot.p, p[0], p[1], p[2]);
 		v3f_scale(spot.n, front, back ? -1 : 1);
-		if (is_only && !is_thin && spot_cells_has(&chunk->rest_cells, p, spot.n)) {
+		if (is_small && !is_thin && spot_cells_has(&chunk->rest_cells, p, spot.n)) {
 			is_side_seen = 1;
 			continue;
 		}
@@ -91,7 +93,7 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], i
 		                       : seen_is(&level->seen, spot.p, spot.n);
 		if (is_side_seen && is_thin)
 			rc = spot_cells_add(&chunk->thin_cells, p, NO_WAY);
-		else if (is_side_seen && is_only)
+		else if (is_side_seen && is_small)
 			rc = spot_cells_add(&chunk->rest_cells, p, spot.n);
 		if (rc == PSR_OK && is_side_seen && !is_covered(level, &spot))
 			rc = spots_add(is_thin ? &chunk->thin : &chunk->rest, &spot);
@@ -103,7 +105,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 {
 	const struct level *level = job->level;
 	const double shift = SHIFT[job->round % N_SHIFTS];
-	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns, is_only;
+	int can_be_absent = level_material(level, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns, is_small;
 	double corner[3][3], side[3], e[3], height, foot, step = step_of(level, level_is_thin(level, prim));
 
 	ray_scene_corners(level->scene, prim, corner);
@@ -124,7 +126,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 	foot = v3d_dot(ab, ac) / (side[longest] * side[longest]);
 	n_columns = (int)ceil(side[longest] / step);
 	n_columns = n_columns > 1 ? n_columns : 1;
-	is_only = n_columns <= SMALL && level->finer != NULL;
+	is_small = n_columns <= SMALL && level->finer != NULL;
 	for (int col = 0; col < n_columns; col++) {
 		double x = (col + shift) / n_columns, top = x < foot ? x / foot : (1 - x) / (1 - foot);
 		int n = (int)ceil(height * top / step);
@@ -141,7 +143,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 				continue;
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);
-			test_place(job, prim, p, is_only, chunk);
+			test_place(job, prim, p, is_small, chunk);
 		}
 	}
 }
