@@ -20,8 +20,8 @@
 #define GREEDY_MOST_SHIFTS 4
 
 /* A block costs this in our file, and its validity mask a bit a lane; a valid sample 16 bits of depth and 64 of
- * attributes: sphere 8, projection 1, place 4, level and flags 1, where depths begin 2, first attribute 2,
- * cone 4, visibility mask 5, of which 4 are its part of the table. */
+ * attributes: sphere 8 (which says its place, too), projection 1, level and flags 1, first attribute 2, cone 4,
+ * visibility mask 5, of which 4 are its part of the table. */
 #define GREEDY_BLOCK_BYTES 21
 #define GREEDY_SAMPLE_BYTES 10
 
