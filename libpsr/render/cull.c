@@ -440,11 +440,9 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 			depth_error = chunk->depth_error;
 	}
 	report->error_bound = 0.5 + (double)depth_error;
-	if (plan->with_splats) {
-		for (plan->reach = 1; plan->reach < SPLAT_REACH && (uint32_t)plan->reach <= report->levels / 2;)
-			plan->reach *= 2;
+	if (plan->with_splats)
 		report->levels &= 1;
-	} else if (plan->is_full)
+	else if (plan->is_full)
 		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
 	note_tests(plan, report, n_masked, n_mixed);
 	return PSR_OK;

@@ -49,7 +49,6 @@ struct plan {
 	struct plan_instance *instance;
 	struct warp_instance *warp; /* what warping knows of each */
 	struct strip_view view;    /* needs is filled by the cull */
-	int reach;                 /* with_splats: how far from a gap its discs may be, pixels; filled by the cull */
 	struct strip_light *light;
 	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
@@ -80,8 +79,7 @@ void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why
 /* ---- cull: one level of each group of clusters, blocks in view, sorted into tiles ([G] 6.1) ---- */
 
 /* Of a group of clusters, drawn is that of the coarsest level whose spacing is at most a pixel (or what the settings
- * say) as near as its blocks reach, so that they need no depth buffer but the picture's; the finest if there is
- * none. */
+ * say) as near as its blocks reach, so that they need no depth buffer but the picture's; the finest if there is none. */
 struct cull_group {
 	uint8_t level; /* of the cluster that is drawn */
 	uint8_t fits;
@@ -162,11 +160,9 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
-#define SPLAT_REACH 8 /* greatest plan->reach, the least power of two that samples are not further apart than */
-
 /* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's
- * threshold, where one surface, however steep, is within plan->reach of it in each of eight directions, gets weight 0
- * and marks its brick. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
+ * threshold, where one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its
+ * brick. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1,
                      uint16_t *weight, uint8_t *bricks);
 

@@ -174,7 +174,7 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 
 /* ---- holes between discs ---- */
 
-#define REACH SPLAT_REACH
+#define REACH 8 /* pixels, a power of two */
 
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
@@ -183,29 +183,24 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
 }
 
-/* Whether what is before the pixel meets it in all eight directions, and is one surface: between what is met to either
- * side the pixel is at a depth, which is the same along all four lines, however steep the surface is. */
+/* Whether what is before the pixel meets it in all eight directions, and is one surface. */
 static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
 {
-	static const int8_t way[4][2] = { { 1, 0 }, { 0, 1 }, { 1, 1 }, { 1, -1 } };
+	static const int8_t way[8][2] = {
+		{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
+	};
 	const float z = depth_at(stack, x, y);
 	float nearest = INFINITY, farthest = 0;
-	for (int w = 0; w < 4; w++) {
-		float met[2], far[2];
-		for (int side = 0; side < 2; side++) {
-			const int dx = side ? way[w][0] : -way[w][0], dy = side ? way[w][1] : -way[w][1];
-			int i = 1, is_met = 0;
-			for (; i <= plan->reach && !is_met; i++) {
-				met[side] = depth_at(stack, (int64_t)x + i * dx, (int64_t)y + i * dy);
-				is_met = met[side] * plan->gap_scale[1] + plan->gap_offset[1] < z;
-			}
-			if (!is_met)
-				return 0;
-			far[side] = (float)(i - 1);
+	for (int w = 0; w < 8; w++) {
+		int is_met = 0;
+		for (int i = 1; i <= REACH && !is_met; i++) {
+			const float other = depth_at(stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
+			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
+			nearest = is_met && other < nearest ? other : nearest;
+			farthest = is_met && other > farthest ? other : farthest;
 		}
-		const float between = (met[0] * far[1] + met[1] * far[0]) / (far[0] + far[1]);
-		nearest = between < nearest ? between : nearest;
-		farthest = between > farthest ? between : farthest;
+		if (!is_met)
+			return 0;
 	}
 	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
 }

@@ -10,7 +10,6 @@
 #include "base/srgb.h"
 #include "psr/pool.h"
 #include "psr/render.h"
-#include "base/maths.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -271,7 +270,7 @@ static void holes_between_discs_are_closed_and_notches_are_not(void **state)
 		uint32_t x, y;
 		float z;
 	} places[] = { { 10, 10, INFINITY }, { 30, 20, 9 }, { 55, 10, INFINITY } };
-	const struct plan plan = { .reach = SPLAT_REACH, .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
 	uint64_t *word = malloc(WIDTH * HEIGHT * sizeof *word);
 	uint16_t weight[WIDTH * HEIGHT];
 	uint8_t bricks[6] = { 0 };
@@ -300,33 +299,6 @@ static void holes_between_discs_are_closed_and_notches_are_not(void **state)
 	free(word);
 }
 
-/* Depth rises by a third and more from one side of the hole to the other. */
-static void holes_in_steep_surfaces_are_closed_where_samples_are_so_far_apart(void **state)
-{
-	enum { SIDE = BRICK, FIRST = 10, HOLE = 5 };
-	struct plan plan = { .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
-	uint64_t word[SIDE * SIDE];
-	struct psr_zstack stack = { .width = SIDE, .height = SIDE, .word = word };
-
-	(void)state;
-	for (uint32_t i = 0; i < SIDE * SIDE; i++) {
-		const uint32_t x = i % SIDE, y = i / SIDE;
-		const int is_hole = x - FIRST < HOLE && y - FIRST < HOLE;
-
-		word[i] = is_hole ? PSR_WORD_EMPTY : (uint64_t)psr_bits_from_float(2 + 0.3f * (float)y) << 32;
-	}
-	for (plan.reach = 1; plan.reach <= SPLAT_REACH; plan.reach *= 2) {
-		uint16_t weight[SIDE * SIDE];
-		uint8_t bricks[1] = { 0 };
-
-		for (uint32_t i = 0; i < SIDE * SIDE; i++)
-			weight[i] = WEIGHT_ONE;
-		/* Its middle is three pixels from what is around it, its corners are five. */
-		assert_int_equal(splat_close(&plan, &stack, 0, SIDE, weight, bricks),
-		                 plan.reach < 3 ? 0 : plan.reach < 5 ? 9 : HOLE * HOLE);
-	}
-}
-
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -338,7 +310,6 @@ int main(void)
 		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
 		cmocka_unit_test(holes_between_discs_are_closed_and_notches_are_not),
-		cmocka_unit_test(holes_in_steep_surfaces_are_closed_where_samples_are_so_far_apart),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }
