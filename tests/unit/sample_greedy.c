@@ -419,7 +419,7 @@ static void counts_agree_with_what_is_kept(void **state)
 	options.side = 4;
 	assert_int_equal(greedy_select(greedy, &options, &result, NULL), PSR_OK);
 	assert_int_equal(result.n_lanes, 16 * result.n_blocks);
-	assert_int_equal(result.n_bytes, 10 * result.n_samples + (27 + 2) * result.n_blocks);
+	assert_int_equal(result.n_bytes, 10 * result.n_samples + (21 + 2) * result.n_blocks);
 	point = calloc(result.n_samples + 1, sizeof *point);
 	greedy_points(greedy, point);
 	for (uint64_t i = 0; i < result.n_samples; i++)
