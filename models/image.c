@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "random.h"
+#include "base/random.h"
 
 static double mix(double a, double b, double t)
 {

@@ -3,7 +3,7 @@
 
 #include <math.h>
 #include "base/vec.h"
-#include "random.h"
+#include "base/random.h"
 #include "surfaces.h"
 #include "sweep.h"
 

@@ -7,7 +7,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "psr/direction.h"
-#include "random.h"
+#include "base/random.h"
 #include "sample/area.h"
 #include "sample/greedy_parts.h"
 

@@ -4,7 +4,7 @@
 #include <math.h>
 #include "base/vec.h"
 #include "image.h"
-#include "random.h"
+#include "base/random.h"
 #include "surfaces.h"
 #include "sweep.h"
 

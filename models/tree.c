@@ -3,7 +3,7 @@
 #include "generators.h"
 
 #include "base/vec.h"
-#include "random.h"
+#include "base/random.h"
 #include "sweep.h"
 
 #define PRIMITIVES 26438 /* the trunk's roots and the mound included */

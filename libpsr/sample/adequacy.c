@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "../base/mem.h"
+#include "../base/random.h"
 #include "../base/vec.h"
 #include "adequacy.h"
 #include "area.h"
@@ -17,26 +18,13 @@
 #define FARTHEST 4    /* pixels around a place in which its surface is looked for, at grazing angles */
 #define BACK 0.0125f  /* as the renderer's: what faces away by less than normals are quantised to still counts */
 
-/* SplitMix64 (Steele, Lea, Flood 2014): a stream a trial. */
-struct random {
-	uint64_t state;
-};
-
-static double draw(struct random *r)
-{
-	uint64_t z = r->state += UINT64_C(0x9e3779b97f4a7c15);
-
-	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
-}
-
-static void draw_direction(struct random *r, double d[3])
+static void draw_direction(uint64_t *random, double d[3])
 {
 	double length2;
 
 	do {
-		v3d_set(d, 2 * draw(r) - 1, 2 * draw(r) - 1, 2 * draw(r) - 1);
+		for (int k = 0; k < 3; k++)
+			d[k] = random_in(random, -1, 1);
 		length2 = v3d_dot(d, d);
 	} while (!(length2 <= 1 && length2 > 1e-4));
 	v3d_scale(d, d, 1 / sqrt(length2));
@@ -67,23 +55,23 @@ struct trial {
 /* 0: this draw is no trial. */
 static int draw_trial(const struct job *job, uint64_t index, struct trial *trial)
 {
-	struct random r = { (job->seed << 40) + index * UINT64_C(0x632be59bd9b4e019) };
+	uint64_t random = (job->seed << 40) + index * UINT64_C(0x632be59bd9b4e019);
 	const struct level *level = job->level;
-	uint32_t prim = area_find(job->area, job->n_prims, draw(&r) * job->area[job->n_prims - 1]);
+	uint32_t prim = area_find(job->area, job->n_prims, random_in(&random, 0, job->area[job->n_prims - 1]));
 	const float *n = ray_scene_normal(level->scene, prim);
-	double u = draw(&r), v = draw(&r), p[3], along, aside[3], up[3];
+	double u = random_in(&random, 0, 1), v = random_in(&random, 0, 1), p[3], along, aside[3], up[3];
 	int is_back;
 
 	if (u + v > 1) {
 		u = 1 - u;
 		v = 1 - v;
 	}
-	draw_direction(&r, trial->view);
-	draw_direction(&r, aside);
+	draw_direction(&random, trial->view);
+	draw_direction(&random, aside);
 	along = trial->view[0] * (double)n[0] + trial->view[1] * (double)n[1] + trial->view[2] * (double)n[2];
 	is_back = along < 0;
 	trial->cosine = fabs(along);
-	if ((is_back && !level_material(level, prim)->two_sided) || draw(&r) > trial->cosine)
+	if ((is_back && !level_material(level, prim)->two_sided) || random_in(&random, 0, 1) > trial->cosine)
 		return 0;
 	if (prim < level->mesh->n_triangles) {
 		double corner[3][3];

@@ -1,7 +1,7 @@
-/* The generators' own random numbers (SplitMix64): the same everywhere, as long as no expression
- * draws two of them. Seed it with any number. */
-#ifndef MODELS_RANDOM_H
-#define MODELS_RANDOM_H
+/* Random numbers that are the same everywhere, as long as no expression draws two of them: SplitMix64 (Steele, Lea,
+ * Flood 2014). Seed it with any number. */
+#ifndef PSR_BASE_RANDOM_H
+#define PSR_BASE_RANDOM_H
 
 #include <stdint.h>
 
