@@ -23,13 +23,17 @@ void draw_wish_fini(struct draw_wish *wish)
 	scene_wish_fini(&wish->scene);
 }
 
-void draw_add_scene_options(struct optlist *list, struct draw_wish *wish)
+void draw_add_model_options(struct optlist *list, struct draw_wish *wish)
 {
 	const struct psr_opt server[] = { PSR_OPT_SERVER(wish->server) };
 
 	optlist_heading(list, "What stands in the picture", NULL);
 	scene_add_model_options(list, &wish->scene);
 	OPTLIST_ADD(list, server);
+}
+
+void draw_add_picture_options(struct optlist *list, struct draw_wish *wish)
+{
 	optlist_heading(list, "Camera", "Without any of these the whole model is in the picture, seen from its front, a little "
 	                "from the right and from above.");
 	view_add_options(list, &wish->view);

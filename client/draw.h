@@ -28,7 +28,8 @@ void draw_wish_init(struct draw_wish *wish, const char *program);
 void draw_wish_fini(struct draw_wish *wish);
 
 /* Options of both commands, group by group. */
-void draw_add_scene_options(struct optlist *list, struct draw_wish *wish);
+void draw_add_model_options(struct optlist *list, struct draw_wish *wish);
+void draw_add_picture_options(struct optlist *list, struct draw_wish *wish); /* camera, light, quality */
 void draw_add_file_options(struct optlist *list, struct draw_wish *wish); /* depth, report, sheet */
 void draw_add_developer_options(struct optlist *list, struct draw_wish *wish);
 

@@ -38,11 +38,12 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		footer,
 	};
 
+	draw_add_model_options(&list, wish);
 	optlist_heading(&list, "Files", NULL);
 	OPTLIST_ADD(&list, output);
 	draw_add_file_options(&list, wish);
 	OPTLIST_ADD(&list, series);
-	draw_add_scene_options(&list, wish);
+	draw_add_picture_options(&list, wish);
 	draw_add_developer_options(&list, wish);
 	return psr_cli_parse(&cli, argc, argv, NULL, err);
 }

@@ -37,10 +37,11 @@ static int parse(struct draw_wish *wish, int64_t *n_frames, int argc, char **arg
 		footer,
 	};
 
+	draw_add_model_options(&list, wish);
 	optlist_heading(&list, "Files", NULL);
 	OPTLIST_ADD(&list, opts);
 	draw_add_file_options(&list, wish);
-	draw_add_scene_options(&list, wish);
+	draw_add_picture_options(&list, wish);
 	draw_add_developer_options(&list, wish);
 	code = psr_cli_parse(&cli, argc, argv, NULL, err);
 	if (code != PSR_OK)

@@ -167,7 +167,7 @@ static int place_camera(struct psr_camera *framed, const struct psr_camera_wish 
 	double arm[3];
 
 	if (!(v3d_length(up) > 0))
-		return psr_fail(err, PSR_ERR_ARG, "up 0,0,0 is no direction");
+		return psr_fail(err, PSR_ERR_ARG, "up 0,0,0 is 0, which is no direction");
 	if (wish->has_angles)
 		frame_angles(framed, wish, up, box_min, box_max, aspect);
 	else
