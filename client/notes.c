@@ -6,6 +6,7 @@
 
 #define ROUGH 1.5 /* pixels between samples: what is finer nobody sees */
 #define GRID 16
+#define MOST 8192 /* that psr-model builds */
 #define DRAFT 2  /* pixels: who asks for such a spacing wants no better */
 #define STEP 128  /* of advised resolutions */
 
@@ -179,7 +180,11 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 	if (model != NULL && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
-		fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n", program,
-		        model->name, model->opened.resolution, fmin(resolution, 8192));
+		if (resolution <= MOST)
+			fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n",
+			        program, model->name, model->opened.resolution, resolution);
+		else
+			fprintf(stderr, "%s: %s is sampled for %u pixels; from so near its edges look rough\n", program, model->name,
+			        model->opened.resolution);
 	}
 }
