@@ -105,26 +105,19 @@ double notes_magnification(const struct scene *scene, uint32_t i, const struct p
 }
 
 /* Of a picture in which nothing is. */
-static const char *why_empty(const struct scene *scene, const struct psr_msg_camera *camera, uint32_t height)
+static const char *why_empty(const struct scene *scene, const struct psr_msg_camera *camera)
 {
-	double middle[3], seen[3], size, p[3];
 	int n_before = 0;
 
-	v3d_sub(p, scene->box_max, scene->box_min);
-	size = v3d_length(p);
 	for (int corner = 0; corner < 8; corner++) {
+		double p[3], seen[3];
+
 		corner_of(p, scene->box_min, scene->box_max, corner);
 		project(seen, camera, p);
 		n_before += seen[2] > camera->near_z;
 	}
-	v3d_add(middle, scene->box_min, scene->box_max);
-	v3d_scale(middle, middle, 0.5);
-	project(seen, camera, middle);
-	if (n_before == 0)
-		return "the camera looks away from it; say --target, or leave --eye out";
-	if (size < pixel_at(camera, seen[2], height))
-		return "it is so far away that it is smaller than a pixel; move --eye nearer, or leave it out";
-	return "the camera looks past it; say --target, or leave --eye out";
+	return n_before == 0 ? "the camera looks away from it; say --target, or leave --eye out"
+	                     : "the camera looks past it; say --target, or leave --eye out";
 }
 
 static int is_empty(const struct psr_msg_frame_end *end)
@@ -143,7 +136,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 	notes->n_pictures++;
 	if (is_empty(event->end)) {
 		notes->n_empty++;
-		notes->why_empty = why_empty(scene, camera, asked->height);
+		notes->why_empty = why_empty(scene, camera);
 	}
 	if (event->end->pass < asked->pass_limit) {
 		notes->least_pass = notes->n_fewer_passes == 0 || event->end->pass < notes->least_pass ? event->end->pass
