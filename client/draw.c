@@ -222,7 +222,7 @@ int draw(struct draw_wish *wish, struct psr_error *err)
 	if (code == PSR_OK)
 		code = sink_finish(&job->sink, run(job, err), err);
 	else
-		free(job->sink.end);
+		free(job->sink.hashes);
 	psr_client_close(job->client);
 	scene_close(job->scene);
 	views_fini(&job->views);

@@ -125,7 +125,9 @@ int sink_take(uint32_t k, const struct psr_event *event, void *userdata, struct 
 	if (code != PSR_OK)
 		return code;
 	notes_add(&sink->notes, sink->scene, sink->frame, event);
-	sink->end[k] = *event->end;
+	sink->hashes[k].planes = event->end->planes;
+	memcpy(sink->hashes[k].hash, event->end->hash, sizeof sink->hashes[k].hash);
+	sink->end = *event->end;
 	sink->n_done++;
 	print_progress(sink, event);
 	return PSR_OK;
@@ -135,15 +137,15 @@ static int print_facts(const struct sink *sink, struct psr_error *err)
 {
 	for (uint32_t k = 0; k < sink->n && sink->wish->hash; k++) {
 		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
-			if (!(sink->end[k].planes >> plane & 1))
+			if (!(sink->hashes[k].planes >> plane & 1))
 				continue;
 			if (sink->n > 1)
 				printf("%u ", k + 1);
-			printf("%s %016" PRIx64 "\n", psr_plane_name(plane), sink->end[k].hash[plane]);
+			printf("%s %016" PRIx64 "\n", psr_plane_name(plane), sink->hashes[k].hash[plane]);
 		}
 	}
 	if (sink->wish->effects)
-		effects_print(&sink->end[0]);
+		effects_print(&sink->end);
 	return psr_flush_output(err);
 }
 
@@ -159,6 +161,6 @@ int sink_finish(struct sink *sink, int code, struct psr_error *err)
 		code = print_facts(sink, err);
 	if (code == PSR_OK)
 		notes_print(&sink->notes, sink->wish->program, sink->frame);
-	free(sink->end);
+	free(sink->hashes);
 	return code;
 }

@@ -23,7 +23,11 @@ struct sink {
 	/* while it runs */
 	struct notes notes;
 	uint32_t n_done;
-	struct psr_msg_frame_end *end; /* n, for --hash */
+	struct sink_hashes { /* n, for --hash */
+		uint32_t planes;
+		uint64_t hash[PSR_WIRE_PLANES];
+	} *hashes;
+	struct psr_msg_frame_end end; /* of the last one, for --effects */
 	struct sheet sheet;
 	struct psr_animation *animation;
 	uint32_t n_shown;              /* pictures that the animation has */

@@ -122,7 +122,7 @@ int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, stru
 		code = sheet_check(&sink->sheet, n, wish->quality.size[0], wish->quality.size[1], err);
 	if (code == PSR_OK)
 		code = check_stdout(wish, err);
-	if (code == PSR_OK && (sink->end = calloc(n, sizeof *sink->end)) == NULL)
+	if (code == PSR_OK && (sink->hashes = calloc(n, sizeof *sink->hashes)) == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for %u pictures", n);
 	return code;
 }
