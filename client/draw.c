@@ -27,7 +27,7 @@ void draw_add_model_options(struct optlist *list, struct draw_wish *wish)
 {
 	const struct psr_opt server[] = { PSR_OPT_SERVER(wish->server) };
 
-	optlist_heading(list, "What stands in the picture", NULL);
+	optlist_heading(list, "Models and server", NULL);
 	scene_add_model_options(list, &wish->scene);
 	OPTLIST_ADD(list, server);
 }

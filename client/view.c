@@ -49,7 +49,7 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 	const struct psr_opt opts[] = {
 		{ "view", 0, PSR_OPT_STRING, &wish->view, "SIDE",
 		  "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without any of these "
-		  "options. Without perspective where --ortho is said, too.", 0, 0, NULL, NULL },
+		  "options. It has perspective unless --ortho is said, too. psr shot draws a picture of each of front,left,top.", 0, 0, NULL, NULL },
 		{ "azimuth", 0, PSR_OPT_REAL, &camera->azimuth, "DEG",
 		  "Degrees around the model: 0 is its front, 90 its right side, 180 its back.", -1e6, 1e6, NULL,
 		  &wish->has_azimuth },

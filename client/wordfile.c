@@ -16,11 +16,17 @@ static int read_all(char **text, const char *path, struct psr_error *err)
 		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO,
 		                "cannot read %.300s: %s", path, strerror(errno));
 	do {
-		char *grown = capacity < MAX_BYTES ? realloc(*text, (capacity = capacity == 0 ? 4096 : 2 * capacity) + 1) : NULL;
+		char *grown;
 
-		if (grown == NULL) {
+		if (capacity == MAX_BYTES) {
 			fclose(file);
 			return psr_fail(err, PSR_ERR_LIMIT, "%.300s has more than %u MB", path, MAX_BYTES >> 20);
+		}
+		capacity = capacity == 0 ? 4096 : 2 * capacity;
+		grown = realloc(*text, capacity + 1);
+		if (grown == NULL) {
+			fclose(file);
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory to read %.300s", path);
 		}
 		*text = grown;
 		errno = 0;

@@ -139,6 +139,16 @@ check "and is to the right of it a quarter later" awk -v eye="$(array "$work/tur
 		x = t[1] + (6 - t[3]); z = t[3] - (5 - t[1])
 		exit !((e[1] - x) ^ 2 + (e[2] - 4) ^ 2 + (e[3] - z) ^ 2 < 1e-24)
 	}'
+has_tty() { script -qec true /dev/null >/dev/null 2>&1 </dev/null; } # some containers have no /dev/pts
+if has_tty; then
+	script -qec "psr turntable --server $server --size $size --model teapot --frames 3 -o $work/tty_%d.png" /dev/null \
+		>"$work/tty" 2>&1 </dev/null
+	check "a terminal sees how far it is" grep -q "picture 3 of 3" "$work/tty"
+else
+	skip "a terminal sees how far it is" "there are no pseudo-terminals here"
+fi
+turntable --model teapot --quality draft --frames 3 -o "$work/tty_%d.png" >"$work/quiet" 2>&1
+check "a pipe does not" test ! -s "$work/quiet"
 refuses "a turntable of two views" 2 "a turntable has one view" turntable --model teapot --view front,top -o "$work/x_%d.png"
 
 # --- standard output ---
