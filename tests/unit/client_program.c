@@ -413,6 +413,23 @@ static void shot_takes_cameras_and_lights_of_the_model(void **state)
 	assert_true(scene.light[0].intensity == 1);
 }
 
+static void cameras_and_lights_of_a_model_move_with_it(void **state)
+{
+	static const double lamp[3] = { 4, 4, 2 }, eye[3] = { 8, 2, 3 };
+	static struct psr_msg_scene scene;
+	cJSON *report, *camera;
+
+	(void)state;
+	report = draw_for_camera("shot --instance cube,rotate=Y:90,at=1,2,3 --size 20x10 --camera front --report p.json "
+	                         "--light 'preset:the lamp'", &scene);
+	camera = cJSON_GetObjectItem(report, "camera");
+	for (int i = 0; i < 3; i++) { /* turned, 1,2,3 is 3,2,-1 and 0,0,7 is 7,0,0; some roundings of 8 * 2^-53 */
+		assert_true(fabs(scene.light[0].position[i] - lamp[i]) < 1e-14);
+		assert_true(fabs(cJSON_GetArrayItem(cJSON_GetObjectItem(camera, "eye"), i)->valuedouble - eye[i]) < 1e-14);
+	}
+	cJSON_Delete(report);
+}
+
 static void shot_writes_what_was_asked_for_and_prints_nothing(void **state)
 {
 	png_image image = { .version = PNG_IMAGE_VERSION };
@@ -641,6 +658,7 @@ int main(void)
 		cmocka_unit_test(list_prints_a_table_and_json),
 		cmocka_unit_test(list_prints_cameras_and_lights_of_a_model),
 		cmocka_unit_test(shot_takes_cameras_and_lights_of_the_model),
+		cmocka_unit_test(cameras_and_lights_of_a_model_move_with_it),
 		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
 		cmocka_unit_test(shot_writes_planes_and_paints_stages),
 		cmocka_unit_test(report_has_the_numbers_of_the_frame),
