@@ -381,7 +381,8 @@ static void add_chunk(struct chunks *c, const char *type, const uint8_t *data, u
 
 	put_u32(to, n);
 	memcpy(to + 4, type, 4);
-	memcpy(to + 8, data, n);
+	if (n > 0)
+		memcpy(to + 8, data, n);
 	put_u32(to + 8 + n, crc_of(to + 4, n + 4));
 	c->n_still += n + 12;
 }
