@@ -20,8 +20,6 @@ extern "C" {
 #define IMPORT_MAX_IMAGE_SIDE 16384
 #define IMPORT_MAX_PIXELS (UINT64_C(1) << 28) /* of all images of one mesh */
 #define IMPORT_MAX_MATERIALS 65536
-/* Normals made for files without: smooth where faces meet below 60 degrees. */
-#define IMPORT_CREASE_COSINE 0.5
 #define IMPORT_GRAY 0.6f      /* linear; of what has no color */
 #define IMPORT_ROUGHNESS 0.5f /* of surfaces without a material */
 
@@ -29,11 +27,12 @@ extern "C" {
 struct import_mesh {
 	struct psr_mesh *mesh;
 	const char *path; /* of the source file, for error texts; the caller's */
+	struct psr_import_options options;
 	uint64_t vertex_capacity, triangle_capacity, point_capacity;
 	uint64_t n_pixels;
 };
 
-int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err);
+int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err); /* with the default options */
 void import_mesh_fini(struct import_mesh *im);
 
 /* What vertices may have beside a position and a normal. */
