@@ -5,6 +5,7 @@
 #ifndef PSR_IMPORT_H
 #define PSR_IMPORT_H
 
+#include <locale.h>
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/mesh.h"
@@ -118,6 +119,10 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err); 
 /* The resolved path of `name`, which is absolute or relative to `folder`. NOT_FOUND; UNSUPPORTED when it leads
  * outside. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
+
+/* number.c: a word of text as the nearest double; 0 if it is no number. "nan", "inf" and what C writes are; `locale` is
+ * "C". */
+int import_number(double *x, const uint8_t *word, size_t n, locale_t locale);
 
 /* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT,
  * UNSUPPORTED, LIMIT, MEMORY, and what opening the module returns. */
