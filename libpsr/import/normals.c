@@ -8,6 +8,7 @@
 /* Faces lie in one plane if their normals differ by less than 0.1 degrees (1 minus the cosine): what six digits leave
  * of a triangle whose height is a 3000th of its distance from the origin. */
 #define FLAT 1.5e-6
+#define LONE 1.01 /* of its own area: a triangle that lies in no flat part but with slivers */
 
 /* Corners (3 * triangle + corner) around each point: corner[start[p] .. start[p + 1]), in the order of triangles. */
 struct fan {
@@ -17,7 +18,7 @@ struct fan {
 	uint8_t *wanted;    /* triangles whose vertices have no normals yet */
 	double (*face)[3];  /* unit normals; 0 for a triangle without area */
 	uint32_t *flat;     /* of each triangle: another one of its flat part, the part's own one of itself */
-	double *area;       /* of the flat part, at its own triangle */
+	double *area;       /* twice that of the flat part, at its own triangle */
 };
 
 static void fan_fini(struct fan *fan)
@@ -75,6 +76,17 @@ static void join_flat(struct fan *fan, uint32_t a, uint32_t b)
 	fan->flat[a > b ? a : b] = a > b ? b : a;
 }
 
+static double twice_area(const struct psr_mesh *mesh, uint32_t t)
+{
+	const uint32_t *v = mesh->triangle[t];
+	double e[3], f[3], n[3];
+
+	v3d_sub(e, mesh->position[v[1]], mesh->position[v[0]]);
+	v3d_sub(f, mesh->position[v[2]], mesh->position[v[0]]);
+	v3d_cross(n, e, f);
+	return v3d_length(n);
+}
+
 /* Triangles that lie in one plane and touch are one part, however they were cut. */
 static void find_flats(struct fan *fan, const struct psr_mesh *mesh)
 {
@@ -87,15 +99,8 @@ static void find_flats(struct fan *fan, const struct psr_mesh *mesh)
 			for (uint64_t k = first; k < i; k++)
 				join_flat(fan, (uint32_t)(fan->corner[i] / 3), (uint32_t)(fan->corner[k] / 3));
 	}
-	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
-		const uint32_t *v = mesh->triangle[t];
-		double e[3], f[3], n[3];
-
-		v3d_sub(e, mesh->position[v[1]], mesh->position[v[0]]);
-		v3d_sub(f, mesh->position[v[2]], mesh->position[v[0]]);
-		v3d_cross(n, e, f);
-		fan->area[flat_of(fan, t)] += v3d_length(n);
-	}
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		fan->area[flat_of(fan, t)] += twice_area(mesh, t);
 }
 
 static int has_normals(const struct psr_mesh *mesh, const uint32_t v[3])
@@ -181,6 +186,7 @@ static void take_ring(struct ring *ring, struct fan *fan, const struct psr_mesh 
 		memcpy(ring->corner[i].face, fan->face[t], sizeof fan->face[t]);
 		corner_share(ring->corner[i].share, mesh, at);
 		ring->corner[i].area = fan->area[flat_of(fan, t)];
+		ring->corner[i].is_flat = ring->corner[i].area > LONE * twice_area(mesh, t);
 	}
 }
 

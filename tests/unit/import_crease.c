@@ -331,6 +331,44 @@ static void a_coarse_sphere_is_smooth(void **state)
 	psr_mesh_destroy(m);
 }
 
+/* Six sides of 42 degrees, which meet at 39; each of one triangle, or of two. */
+static struct psr_mesh *import_pyramid(int is_cut)
+{
+	static const double top[3] = { 0, 0, 0.78 };
+
+	n_soup = 0;
+	for (int i = 0; i < 6; i++) {
+		double a[3], b[3], middle[3];
+
+		on_circle(a, 1, 0, i, 6);
+		on_circle(b, 1, 0, i + 1, 6);
+		for (int c = 0; c < 3; c++)
+			middle[c] = (a[c] + b[c]) / 2;
+		add(a, is_cut ? middle : b, top);
+		if (is_cut)
+			add(middle, b, top);
+	}
+	return import_soup(default_crease());
+}
+
+static void a_step_is_an_edge_between_flat_parts_and_none_between_single_triangles(void **state)
+{
+	(void)state;
+	struct psr_mesh *rough = import_pyramid(0), *flat = import_pyramid(1);
+
+	assert_int_equal(rough->n_vertices, 6 + 1);
+	/* a side's two halves share all normals, but for what the positions' floats leave of them */
+	for (uint32_t t = 0; t < flat->n_triangles; t++)
+		for (int c = 0; c < 3; c++) {
+			double face[3];
+
+			face_normal(face, flat, t);
+			assert_true(cosine(normal_at(flat, t, c), face) > 1 - 1e-6);
+		}
+	psr_mesh_destroy(rough);
+	psr_mesh_destroy(flat);
+}
+
 static void normals_that_a_file_brings_are_kept_at_any_crease(void **state)
 {
 	(void)state;
@@ -377,6 +415,7 @@ int main(void)
 		cmocka_unit_test(eight_sides_of_45_degrees_are_edges_by_default),
 		cmocka_unit_test(the_tip_of_a_flat_cone_stays_pointed),
 		cmocka_unit_test(a_coarse_sphere_is_smooth),
+		cmocka_unit_test(a_step_is_an_edge_between_flat_parts_and_none_between_single_triangles),
 		cmocka_unit_test(normals_that_a_file_brings_are_kept_at_any_crease),
 		cmocka_unit_test(options_outside_of_their_ranges_are_refused),
 	};
