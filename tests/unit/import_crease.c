@@ -143,7 +143,7 @@ static void assert_top_is_flat(void)
 static void a_plate_stays_flat_around_a_chamfered_hole(void **state)
 {
 	(void)state;
-	static const double chamfer[3][2] = { { 4, -2 }, { 4, -1 }, { 5, 0 } }, shallow[3][2] = { { 4, -2 }, { 4, -0.3 }, { 5, 0 } };
+	static const double chamfer[3][2] = { { 5, 0 }, { 4, -1 }, { 4, -2 } }, shallow[3][2] = { { 5, 0 }, { 4, -0.3 }, { 4, -2 } };
 
 	n_soup = 0;
 	plate_top(5, 48);
@@ -158,13 +158,14 @@ static void a_plate_stays_flat_around_a_chamfered_hole(void **state)
 static void a_plate_stays_flat_beside_a_fillet(void **state)
 {
 	(void)state;
-	double profile[10][2] = { { 4, -2 } };
+	double profile[10][2] = { { 5, 0 } };
 
-	for (int k = 0; k <= 8; k++) {
-		profile[1 + k][0] = 5 - cos(M_PI / 2 * k / 8);
-		profile[1 + k][1] = k == 8 ? 0.0 : sin(M_PI / 2 * k / 8) - 1;
+	for (int k = 1; k <= 8; k++) {
+		profile[k][0] = 5 - sin(M_PI / 2 * k / 8);
+		profile[k][1] = cos(M_PI / 2 * k / 8) - 1;
 	}
-	profile[9][0] = 5;
+	profile[9][0] = 4;
+	profile[9][1] = -2;
 	n_soup = 0;
 	plate_top(5, 48);
 	revolve((const double(*)[2])profile, 10, 48);
