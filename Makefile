@@ -8,7 +8,7 @@ V ?= 0
 VERSION := 0.1.0
 
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
-	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
+	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels
 DEPS_STUDY := gnuplot-nox
 DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev

@@ -158,7 +158,7 @@ static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, str
 
 	psr_build_options_default(&options);
 	if (code == PSR_OK)
-		code = psr_mesh_import(&mesh, source, err);
+		code = psr_mesh_import(&mesh, source, NULL, err);
 	if (code == PSR_OK)
 		code = psr_truth_create(&truth, mesh, err);
 	if (code == PSR_OK)

@@ -96,8 +96,8 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 
-static int build(const char *in, const char *out, struct psr_build_options *options, int is_packed, int quiet,
-                 struct psr_error *err)
+static int build(const char *in, const char *out, const struct psr_import_options *import,
+                 struct psr_build_options *options, int is_packed, int quiet, struct psr_error *err)
 {
 	struct progress *progress = options->userdata;
 	struct psr_mesh *mesh = NULL;
@@ -106,7 +106,7 @@ static int build(const char *in, const char *out, struct psr_build_options *opti
 	int code;
 
 	on_progress("import", 0, 1, progress);
-	code = psr_mesh_import(&mesh, in, err);
+	code = psr_mesh_import(&mesh, in, import, err);
 	if (code == PSR_OK)
 		code = psr_model_build(&model, mesh, options, &report, err);
 	if (code == PSR_OK) {
@@ -133,6 +133,7 @@ static int check_progress_fd(int64_t fd, struct psr_error *err)
 
 int cmd_build(int argc, char **argv)
 {
+	struct psr_import_options import;
 	struct psr_build_options options;
 	struct progress progress = { .fd = -1 };
 	struct psr_error err;
@@ -140,7 +141,7 @@ int cmd_build(int argc, char **argv)
 	char *made = NULL;
 	int quiet = 0, is_packed = 0, n_operands, code;
 	int64_t resolution, n_threads, fd = -1;
-	double tolerance;
+	double tolerance, crease;
 	const struct psr_opt opts[] = {
 		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &out, .arg = "OUT.psr",
 		  .help = "where the model goes; without it beside IN, with .psr for its suffix" },
@@ -151,6 +152,9 @@ int cmd_build(int argc, char **argv)
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = options.up, .arg = "X,Y,Z",
 		  .help = "the way up of the object in its file, for pictures without a camera; 0,0,0: what files of this kind "
 		          "have, +z for LAS, STL and survey coordinates, +y for the others" },
+		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
+		  .help = "edges stay sharp where faces meet at a greater angle, in files without normals of their own; "
+		          "180: all edges are rounded", .min = 0, .max = 180 },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
 		  .help = "compress the file, to a third or half of its size; opening it unpacks it into memory" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
@@ -167,9 +171,11 @@ int cmd_build(int argc, char **argv)
 		.footer = FORMATS,
 	};
 
+	psr_import_options_default(&import);
 	psr_build_options_default(&options);
 	resolution = options.resolution;
 	tolerance = options.tolerance / RADIANS;
+	crease = import.crease / RADIANS;
 	n_threads = options.n_threads;
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
@@ -182,7 +188,8 @@ int cmd_build(int argc, char **argv)
 		return psr_cli_fail(PROGRAM, &err);
 	options.resolution = (uint32_t)resolution;
 	options.tolerance = tolerance * RADIANS;
-	options.n_threads = (int)n_threads;
+	options.n_threads = import.n_threads = (int)n_threads;
+	import.crease = crease * RADIANS;
 	options.on_progress = on_progress;
 	options.userdata = &progress;
 	progress.fd = (int)fd;
@@ -191,7 +198,7 @@ int cmd_build(int argc, char **argv)
 	if (out == NULL && made == NULL)
 		code = psr_fail(&err, PSR_ERR_MEMORY, "no memory for a file name");
 	else
-		code = build(argv[1], out != NULL ? out : made, &options, is_packed, quiet, &err);
+		code = build(argv[1], out != NULL ? out : made, &import, &options, is_packed, quiet, &err);
 	free(made);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");

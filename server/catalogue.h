@@ -23,7 +23,8 @@ struct catalogue_file {
 	char *path;
 	int is_source;           /* has to be built first */
 	int is_nested;           /* in a subfolder */
-	uint64_t bytes, device, inode;
+	uint64_t bytes;          /* with those of the files that a source names */
+	uint64_t device, inode;
 	int64_t modified_ns;
 };
 

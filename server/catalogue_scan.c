@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include "catalogue.h"
 #include "log.h"
+#include "parts.h"
 
 /* In order of preference. */
 static const char *const endings[] = {
@@ -85,12 +86,18 @@ static int consider(struct list *list, const char *file_name, char *path, const 
 		.modified_ns = (int64_t)status->st_mtim.tv_sec * 1000000000 + status->st_mtim.tv_nsec,
 	};
 
+	struct parts parts;
+
 	if (stem <= PSR_WIRE_MAX_NAME)
 		memcpy(file.name, file_name, stem);
 	if (!is_clean(file.name)) {
 		log_warn("%s: passed over: its name is not UTF-8 of 1 to 255 bytes without control characters", path);
 		free(path);
 		return PSR_OK;
+	}
+	if (file.is_source) {
+		parts_find(&parts, path);
+		file.bytes += parts.bytes;
 	}
 	if (add(list, &file) != PSR_OK) {
 		free(path);

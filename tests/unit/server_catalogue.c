@@ -285,6 +285,85 @@ static void other_models_and_neighbours_of_glb_and_las_do_not_change_keys(void *
 	assert_string_equal(las, next);
 }
 
+/* ---- parts ---- */
+
+/* A GLB of this JSON and no buffer. */
+static void make_glb(const char *name, const char *json)
+{
+	uint8_t bytes[256] = "glTF\x02";
+	const size_t n = strlen(json);
+
+	assert_true(n < sizeof bytes - 20);
+	bytes[8] = (uint8_t)(20 + n);
+	bytes[12] = (uint8_t)n;
+	memcpy(bytes + 16, "JSON", 4);
+	memcpy(bytes + 20, json, n);
+	file_write(folder, name, bytes, 20 + n);
+}
+
+static void textures_that_a_glb_or_a_ply_names_change_its_key(void **state)
+{
+	static const char ply[] = "ply\nformat ascii 1.0\ncomment TextureFile t.png\nend_header\n";
+	static const char plain[] = "ply\nformat ascii 1.0\ncomment t.png\nend_header\ncomment TextureFile t.png\n";
+	static const struct {
+		const char *name;
+		int names_it;
+	} file[] = { { "m/out.glb", 1 }, { "m/in.glb", 0 }, { "m/out.ply", 1 }, { "m/in.ply", 0 } };
+	char before[4][CATALOGUE_KEY], after[CATALOGUE_KEY];
+
+	(void)state;
+	file_write(folder, "builder", "1", 1);
+	make_folder("m");
+	file_write(folder, "m/t.png", "t", 1);
+	make_glb("m/out.glb", "{\"images\":[{\"uri\" : \"t.png\"}]}");
+	make_glb("m/in.glb", "{\"images\":[{\"uri\":\"data:image/png;base64,AA\"}]}");
+	file_write(folder, "m/out.ply", ply, sizeof ply - 1);
+	file_write(folder, "m/in.ply", plain, sizeof plain - 1);
+	for (size_t i = 0; i < 4; i++)
+		find_key(before[i], file[i].name);
+	file_write(folder, "m/t.png", "tt", 2);
+	for (size_t i = 0; i < 4; i++) {
+		find_key(after, file[i].name);
+		if ((strcmp(before[i], after) != 0) != file[i].names_it)
+			fail_msg("%s: the key %s", file[i].name, file[i].names_it ? "stays" : "changes");
+	}
+}
+
+static void expect_bytes(const char *name, uint64_t bytes)
+{
+	struct catalogue_entry *entry = catalogue_find(&catalogue, name);
+
+	assert_non_null(entry);
+	if (entry->file.bytes != bytes)
+		fail_msg("%s has %ju bytes, not %ju", name, (uintmax_t)entry->file.bytes, (uintmax_t)bytes);
+}
+
+static void the_size_of_a_source_is_that_of_all_its_parts(void **state)
+{
+	static const char gltf[] = "{\"buffers\":[{\"uri\":\"a%20b.bin\"},{\"uri\":\"data:;base64,AAAA\"}],\"images\":"
+	                           "[{\"uri\":\"textures\\/t.png\"},{\"uri\":\"textures/t.png\"},{\"uri\":\"gone.png\"},"
+	                           "{\"uri\":\"../builder\"}]}";
+	static const char obj[] = "# scan\nmtllib o.mtl\r\nv 0 0 0\n", mtl[] = "newmtl a\n\tmap_Kd -s 1 1 1 textures\\t.png\nbump b c.png\n";
+	static const char ply[] = "ply\ncomment TextureFile b c.png\nend_header\n";
+
+	(void)state;
+	file_write(folder, "builder", "12345", 5);
+	make_folder("textures");
+	file_write(folder, "a b.bin", "1234567", 7);
+	file_write(folder, "b c.png", "123", 3);
+	file_write(folder, "textures/t.png", "12345678901", 11);
+	file_write(folder, "g.gltf", gltf, sizeof gltf - 1);
+	file_write(folder, "o.obj", obj, sizeof obj - 1);
+	file_write(folder, "o.mtl", mtl, sizeof mtl - 1);
+	file_write(folder, "p.ply", ply, sizeof ply - 1);
+	file_write(folder, "s.stl", "1234", 4);
+	scan();
+	expect_bytes("g", sizeof gltf - 1 + 7 + 11);
+	expect_bytes("o", sizeof obj - 1 + sizeof mtl - 1 + 11 + 3);
+	expect_bytes("p", sizeof ply - 1 + 3);
+	expect_bytes("s", 4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -298,6 +377,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(keys_change_with_what_a_model_is_made_of, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(other_models_and_neighbours_of_glb_and_las_do_not_change_keys, set_up,
 		                                tear_down),
+		cmocka_unit_test_setup_teardown(textures_that_a_glb_or_a_ply_names_change_its_key, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_size_of_a_source_is_that_of_all_its_parts, set_up, tear_down),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
