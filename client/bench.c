@@ -41,8 +41,8 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 	};
 	const struct psr_cli cli = {
 		"psr bench --model NAME [--server ADDR] [--clients N] [--seconds S] [models, camera, light, quality] [--json]",
-		"Measures how many pictures a server draws: N connections whose cameras fly around the model, each asking for the "
-		"next picture when one has come. Latency is the time from asking to the decoded picture.",
+		"Measures how many pictures a server draws: N connections whose cameras fly around the model, each asking for "
+		"the next picture when one has come. Latency is the time from asking to the decoded picture.",
 		list.opt,
 		SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
 	};
@@ -50,7 +50,8 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 
 	optlist_heading(&list, "Load", NULL);
 	OPTLIST_ADD(&list, load);
-	optlist_heading(&list, "What is drawn", "The defaults are those of psr shot but for --size and --codec: smoothing is "
+	optlist_heading(&list, "What is drawn",
+	                "The defaults are those of psr shot but for --size and --codec: smoothing is "
 	                "on, too.");
 	scene_add_model_options(&list, &options->scene);
 	view_add_options(&list, &options->view);

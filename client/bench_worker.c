@@ -57,8 +57,8 @@ static int warm_up(struct bench_worker *worker, struct psr_error *err)
 	struct psr_event event;
 	uint32_t id;
 
-	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->scene.instance[0].model, timeout_ms,
-	                          err);
+	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->scene.instance[0].model,
+	                          timeout_ms, err);
 	if (code == PSR_OK && options->n_inflight > psr_client_welcome(worker->client)->max_open)
 		code = psr_fail(err, PSR_ERR_LIMIT, "--inflight: %s takes %u requests at a time", options->server,
 		                psr_client_welcome(worker->client)->max_open);

@@ -34,7 +34,8 @@ void draw_add_model_options(struct optlist *list, struct draw_wish *wish)
 
 void draw_add_picture_options(struct optlist *list, struct draw_wish *wish)
 {
-	optlist_heading(list, "Camera", "Without any of these the whole model is in the picture, seen from its front, a little "
+	optlist_heading(list, "Camera",
+	                "Without any of these the whole model is in the picture, seen from its front, a little "
 	                "from the right and from above.");
 	view_add_options(list, &wish->view);
 	optlist_heading(list, "Light", NULL);
@@ -49,8 +50,9 @@ void draw_add_file_options(struct optlist *list, struct draw_wish *wish)
 		{ "sheet", 0, PSR_OPT_SIZE, wish->sheet, "COLSxROWS",
 		  "All pictures on one contact sheet, row by row; --size is that of each.", 0, 0, NULL, &wish->has_sheet },
 		{ "depth", 0, PSR_OPT_STRING, &wish->depth, "FILE",
-		  "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. .pfm, .exr "
-		  "or .tif.", 0, 0, NULL, NULL },
+		  "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. .pfm, "
+		  ".exr or .tif.",
+		  0, 0, NULL, NULL },
 		{ "report", 0, PSR_OPT_STRING, &wish->report, "FILE",
 		  "All about the picture as JSON: request, times, counts, hashes. - is standard output.", 0, 0, NULL, NULL },
 	};
@@ -103,7 +105,8 @@ static int check_replay(struct job *job, struct psr_error *err)
 
 	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
 	    || quality->n_said || quality->has_spacing || quality->has_passes || wish->has_sheet)
-		return psr_fail(err, PSR_ERR_ARG, "--replay repeats a whole picture; it excludes all options that say what is in "
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--replay repeats a whole picture; it excludes all options that say what is in "
 		                "it");
 	code = replay_read(&job->replay, wish->replay, err);
 	if (code == PSR_OK)

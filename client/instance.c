@@ -29,7 +29,8 @@ static int parse_rotation(struct psr_msg_instance *place, const char *text, cons
 		axis[(text[0] | 32) - 'x'] = 1;
 		at++;
 	} else if (psr_parse_vec3(text, axis, &at, NULL) != PSR_OK) {
-		return psr_fail(err, PSR_ERR_ARG, "rotate is AXIS:DEG, such as rotate=Y:90 or rotate=1,1,0:45, not '%.40s'", text);
+		return psr_fail(err, PSR_ERR_ARG, "rotate is AXIS:DEG, such as rotate=Y:90 or rotate=1,1,0:45, not '%.40s'",
+		                text);
 	}
 	if (*at != ':' || psr_parse_real(at + 1, &degrees, end, NULL) != PSR_OK)
 		return psr_fail(err, PSR_ERR_ARG, "rotate=%.40s: behind the axis come a colon and degrees, such as rotate=Y:90",
@@ -94,7 +95,8 @@ int instance_parse(struct instance_wish *wish, const char *text, struct psr_erro
 		if (code != PSR_OK)
 			return code;
 	}
-	return *at == '\0' ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "'%.40s' does not belong to an instance, which is " FORM, at);
+	return *at == '\0' ? PSR_OK
+	                   : psr_fail(err, PSR_ERR_ARG, "'%.40s' does not belong to an instance, which is " FORM, at);
 }
 
 void instance_rotate(double out[3], const struct psr_msg_instance *place, const double v[3])

@@ -139,17 +139,18 @@ int psr_list_main(int argc, char **argv)
 		PSR_OPT_SERVER(server),
 		{ "json", 0, PSR_OPT_FLAG, &json, NULL,
 		  "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of presets "
-		  "with kind, type and name.", 0, 0, NULL,
-		  NULL },
+		  "with kind, type and name.",
+		  0, 0, NULL, NULL },
 		{ "presets", 'p', PSR_OPT_STRING, &model, "NAME",
-		  "Instead of models, the cameras and lights in the file of this one, for --camera and --light preset:NAME.", 0, 0, NULL, NULL },
+		  "Instead of models, the cameras and lights in the file of this one, for --camera and --light preset:NAME.", 0,
+		  0, NULL, NULL },
 		PSR_OPT_TIMEOUT(timeout),
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
 		"psr list [--server ADDR] [--presets NAME] [--json]",
-		"Lists the models of a server: ready (a model file), loaded (in the server's memory), source (built when a picture "
-		"first asks for it), failed (cannot be served; the reason stands beside it).",
+		"Lists the models of a server: ready (a model file), loaded (in the server's memory), source (built when a "
+		"picture first asks for it), failed (cannot be served; the reason stands beside it).",
 		opts,
 		PSR_EXIT_CODES,
 	};

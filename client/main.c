@@ -43,6 +43,7 @@ int main(int argc, char **argv)
 	if (name == NULL)
 		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot, turntable and bench, and --help");
 	else
-		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable and bench, and --help", name);
+		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable and bench, and --help",
+		         name);
 	return psr_cli_fail("psr", &err);
 }

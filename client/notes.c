@@ -177,7 +177,7 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 			fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n",
 			        program, model->name, model->opened.resolution, resolution);
 		else
-			fprintf(stderr, "%s: %s is sampled for %u pixels; from so near its edges look rough\n", program, model->name,
-			        model->opened.resolution);
+			fprintf(stderr, "%s: %s is sampled for %u pixels; from so near its edges look rough\n", program,
+			        model->name, model->opened.resolution);
 	}
 }

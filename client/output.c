@@ -27,8 +27,8 @@ int output_is_numbered(int *is_numbered, const char *name, struct psr_error *err
 			continue;
 		}
 		if (n == 0 || *is_numbered)
-			return psr_fail(err, PSR_ERR_ARG, "'%.200s': one %%d or %%03d stands for the number of a picture, %%%% for a %%",
-			                name);
+			return psr_fail(err, PSR_ERR_ARG,
+			                "'%.200s': one %%d or %%03d stands for the number of a picture, %%%% for a %%", name);
 		*is_numbered = 1;
 		at += n;
 	}
@@ -61,8 +61,8 @@ int sheet_check(const struct sheet *sheet, uint32_t n_pictures, uint32_t width, 
 	if (n == 0)
 		return psr_fail(err, PSR_ERR_ARG, "--sheet: %ux%u has no place for a picture", sheet->columns, sheet->rows);
 	if (n < n_pictures)
-		return psr_fail(err, PSR_ERR_ARG, "--sheet: %ux%u has places for %llu pictures, and there are %u", sheet->columns,
-		                sheet->rows, (unsigned long long)n, n_pictures);
+		return psr_fail(err, PSR_ERR_ARG, "--sheet: %ux%u has places for %llu pictures, and there are %u",
+		                sheet->columns, sheet->rows, (unsigned long long)n, n_pictures);
 	if (n > MAX_SHEET_PIXELS || n * width * height > MAX_SHEET_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "--sheet: %ux%u pictures of %ux%u pixels are more than %u pixels; choose a "
 		                "smaller --size", sheet->columns, sheet->rows, width, height, MAX_SHEET_PIXELS);

@@ -28,8 +28,9 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		{ "size", 0, PSR_OPT_SIZE, wish->size, "WxH", "Width and height of the picture in pixels.", 0, 0, NULL,
 		  &wish->n_said },
 		{ "quality", 'q', PSR_OPT_STRING, &wish->name, "NAME",
-		  "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth as print, for "
-		  "a picture to keep; it takes about a hundred times as long.", 0, 0, NULL, &wish->n_said },
+		  "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth as "
+		  "print, for a picture to keep; it takes about a hundred times as long.",
+		  0, 0, NULL, &wish->n_said },
 		{ "spacing", 0, PSR_OPT_REAL, &wish->spacing, "PX",
 		  "Detail, in the place of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster.", 0, 0, NULL,
 		  &wish->has_spacing },
@@ -39,8 +40,9 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		{ "no-smooth", 0, PSR_OPT_FLAG, &wish->is_plain, NULL,
 		  "No smoothing: edges of pixel steps, a quarter less time.", 0, 0, NULL, &wish->n_said },
 		{ "passes", 0, PSR_OPT_INT, &wish->passes, "N",
-		  "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times as long; 2 "
-		  "draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one before.", 0, PSR_MAX_PASS, NULL, &wish->has_passes },
+		  "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times as long; "
+		  "2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one before.",
+		  0, PSR_MAX_PASS, NULL, &wish->has_passes },
 		{ "codec", 0, PSR_OPT_STRING, &wish->codec, "CODEC",
 		  "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw.", 0, 0, NULL,
 		  &wish->n_said },

@@ -73,8 +73,10 @@ static int finish(const struct reader *reader, struct psr_error *err)
 {
 	if (reader->missing == NULL)
 		return PSR_OK;
-	return psr_fail(err, PSR_ERR_FORMAT, "--replay: 'request' in the report has no usable '%s'; psr shot --report writes "
-	                "such files", reader->missing);
+	return psr_fail(err, PSR_ERR_FORMAT,
+	                "--replay: 'request' in the report has no usable '%s'; psr shot --report writes "
+	                "such files",
+	                reader->missing);
 }
 
 int replay_read(cJSON **report, const char *path, struct psr_error *err)
@@ -94,8 +96,10 @@ int replay_read(cJSON **report, const char *path, struct psr_error *err)
 		*report = cJSON_ParseWithLength(text, n);
 	free(text);
 	if (*report == NULL || cJSON_GetObjectItemCaseSensitive(*report, "request") == NULL)
-		return psr_fail(err, PSR_ERR_FORMAT, "--replay: %.300s is no report of psr shot --report: it is not JSON, or has no "
-		                "'request'", path);
+		return psr_fail(err, PSR_ERR_FORMAT,
+		                "--replay: %.300s is no report of psr shot --report: it is not JSON, or has no "
+		                "'request'",
+		                path);
 	return PSR_OK;
 }
 
@@ -172,8 +176,10 @@ static int check_models(const struct scene *scene, const cJSON *models, struct p
 			for (int k = 0; k < 16; k++)
 				snprintf(id + 2 * k, 3, "%02x", scene->model[i].opened.content_id[k]);
 			if (strcmp(scene->model[i].name, name) == 0 && strcmp(id, expected) != 0)
-				return psr_fail(err, PSR_ERR_VERSION, "--replay: the server has another model %.200s than the report's: its "
-				                "content id is %s, not %.40s", name, id, expected);
+				return psr_fail(err, PSR_ERR_VERSION,
+				                "--replay: the server has another model %.200s than the report's: its "
+				                "content id is %s, not %.40s",
+				                name, id, expected);
 		}
 	}
 	return finish(&reader, err);
@@ -233,7 +239,8 @@ int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_er
 	frame->settings.is_smooth = (uint8_t)get_flag(&reader, request, "smooth");
 	frame->pass_limit = (uint16_t)get_number(&reader, request, "passes", 0, 16);
 	read_planes(&reader, frame, request);
-	if (psr_codec_parse(&frame->color_codec, &frame->color_quality, get_string(&reader, request, "codec"), err) != PSR_OK)
+	if (psr_codec_parse(&frame->color_codec, &frame->color_quality, get_string(&reader, request, "codec"), err)
+	    != PSR_OK)
 		return PSR_ERR_FORMAT;
 	return finish(&reader, err);
 }

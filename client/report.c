@@ -48,7 +48,8 @@ static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
 	json_add_numbers(camera, "eye", wire->eye, 3);
 	json_add_numbers(camera, "target", wire->target, 3);
 	json_add_numbers(camera, "up", wire->up, 3);
-	json_add_number(camera, is_perspective ? "fov_deg" : "height", is_perspective ? wire->extent / DEGREE : wire->extent);
+	json_add_number(camera, is_perspective ? "fov_deg" : "height",
+	                is_perspective ? wire->extent / DEGREE : wire->extent);
 	json_add_number(camera, "near", wire->near_z);
 }
 

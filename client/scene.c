@@ -96,7 +96,8 @@ static int get_presets(struct scene *scene, const struct scene_wish *wish, struc
 
 	if (!(psr_client_welcome(client)->capabilities & PSR_CAP_PRESETS))
 		return PSR_OK;
-	code = psr_client_presets(client, scene->model[0].opened.handle, &scene->preset, &scene->n_presets, timeout_ms, err);
+	code =
+		psr_client_presets(client, scene->model[0].opened.handle, &scene->preset, &scene->n_presets, timeout_ms, err);
 	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++) {
 		struct psr_msg_preset *preset = &scene->preset[i];
 

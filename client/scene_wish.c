@@ -66,12 +66,14 @@ static int on_light(const char *text, void *userdata, struct psr_error *err)
 static void add_instances(struct optlist *list, struct scene_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "model", 'm', PSR_OPT_CALL, wish, "NAME", "A model, by its name in `psr list`, where its file puts it. "
-		  "Repeat it to see several models in one picture.", 0, 0, on_model, &wish->n_said },
+		{ "model", 'm', PSR_OPT_CALL, wish, "NAME",
+		  "A model, by its name in `psr list`, where its file puts it. "
+		  "Repeat it to see several models in one picture.",
+		  0, 0, on_model, &wish->n_said },
 		{ "instance", 0, PSR_OPT_CALL, wish, "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]",
-		  "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of its file, "
-		  "S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it.", 0, 0, on_instance,
-		  &wish->n_said },
+		  "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of its "
+		  "file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it.",
+		  0, 0, on_instance, &wish->n_said },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -81,8 +83,9 @@ void scene_add_model_options(struct optlist *list, struct scene_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ "scene", 0, PSR_OPT_STRING, &wish->file, "FILE",
-		  "Models and lights from a text file of words such as instance=teapot,at=1,0,0 light=dir:-1,-2,-1 shadows: the "
-		  "options of this command without dashes. # begins a comment.", 0, 0, NULL, &wish->n_said },
+		  "Models and lights from a text file of words such as instance=teapot,at=1,0,0 light=dir:-1,-2,-1 shadows: "
+		  "the options of this command without dashes. # begins a comment.",
+		  0, 0, NULL, &wish->n_said },
 	};
 
 	add_instances(list, wish);
@@ -99,8 +102,9 @@ void scene_add_light_options(struct optlist *list, struct scene_wish *wish)
 		{ "shadows", 0, PSR_OPT_FLAG, &wish->is_shadowed, NULL,
 		  "Every light casts shadows, also the one that is there without --light.", 0, 0, NULL, &wish->n_said },
 		{ "ambient", 0, PSR_OPT_REAL, &wish->ambient, "A",
-		  "Brightness of the light from everywhere: more lifts dark sides; 1 without a --light shows colours without any "
-		  "shading.", 0, PSR_WIRE_MAX_INTENSITY, NULL, &wish->has_ambient },
+		  "Brightness of the light from everywhere: more lifts dark sides; 1 without a --light shows colours without "
+		  "any shading.",
+		  0, PSR_WIRE_MAX_INTENSITY, NULL, &wish->has_ambient },
 		{ "background", 0, PSR_OPT_COLOR, wish->background, "#rrggbb", "The colour where nothing is.", 0, 0, NULL,
 		  &wish->n_said },
 	};

@@ -20,13 +20,15 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 	struct optlist list = { .n = 0 };
 	const struct psr_opt output[] = {
 		{ "output", 'o', PSR_OPT_STRING, &wish->output, "FILE",
-		  "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard output, as PNG. "
-		  "Several pictures are numbered by %d or %03d in the name.", 0, 0, NULL, NULL },
+		  "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard output, as "
+		  "PNG. Several pictures are numbered by %d or %03d in the name.",
+		  0, 0, NULL, NULL },
 	};
 	const struct psr_opt series[] = {
 		{ "cameras", 0, PSR_OPT_STRING, &wish->cameras, "FILE",
-		  "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options of a camera "
-		  "without dashes. # begins a comment.", 0, 0, NULL, NULL },
+		  "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options of a "
+		  "camera without dashes. # begins a comment.",
+		  0, 0, NULL, NULL },
 		{ "replay", 0, PSR_OPT_STRING, &wish->replay, "REPORT",
 		  "The picture that wrote this report, with the same bytes; only files are to be named.", 0, 0, NULL, NULL },
 	};

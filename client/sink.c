@@ -75,7 +75,8 @@ static int hold(struct sink *sink, uint32_t k, const struct psr_picture *picture
 		sink->held[i].k = k;
 		return PSR_OK;
 	}
-	return psr_fail(err, PSR_ERR_MEMORY, "no memory to hold a picture of %ux%u pixels", picture->width, picture->height);
+	return psr_fail(err, PSR_ERR_MEMORY, "no memory to hold a picture of %ux%u pixels", picture->width,
+	                picture->height);
 }
 
 static int animate(struct sink *sink, uint32_t k, const struct psr_picture *picture, struct psr_error *err)

@@ -14,11 +14,13 @@ static int check_stdout(const struct draw_wish *wish, struct psr_error *err)
 	int n = is_stdout(wish->output) + is_stdout(wish->depth) + is_stdout(wish->report);
 
 	if (n > 1)
-		return psr_fail(err, PSR_ERR_ARG, "-o -, --depth - and --report - exclude each other: there is one standard output");
+		return psr_fail(err, PSR_ERR_ARG,
+		                "-o -, --depth - and --report - exclude each other: there is one standard output");
 	if (n > 0 && (wish->hash || wish->effects))
 		return psr_fail(err, PSR_ERR_ARG, "--hash and --effects print on standard output, where - sends a file");
 	if ((is_stdout(wish->output) || is_stdout(wish->depth)) && isatty(STDOUT_FILENO))
-		return psr_fail(err, PSR_ERR_ARG, "-: standard output is a terminal, which cannot show a picture's bytes; send them "
+		return psr_fail(err, PSR_ERR_ARG,
+		                "-: standard output is a terminal, which cannot show a picture's bytes; send them "
 		                "to a file or a program");
 	return PSR_OK;
 }
@@ -64,10 +66,13 @@ static int choose_kind(struct sink *sink, struct psr_error *err)
 		sink->kind = is_numbered ? SINK_NUMBERED : wish->n_turn > 0 ? SINK_ANIMATION : SINK_FILE;
 	}
 	if (sink->kind == SINK_FILE && sink->n > 1)
-		return psr_fail(err, PSR_ERR_ARG, "'%.200s' is one file for %u pictures; number them, as in 'a_%%02d.png', or put "
-		                "them on a contact sheet with --sheet COLSxROWS", wish->output, sink->n);
+		return psr_fail(err, PSR_ERR_ARG,
+		                "'%.200s' is one file for %u pictures; number them, as in 'a_%%02d.png', or put "
+		                "them on a contact sheet with --sheet COLSxROWS",
+		                wish->output, sink->n);
 	if ((sink->kind == SINK_SHEET || sink->kind == SINK_ANIMATION) && !is_plain)
-		return psr_fail(err, PSR_ERR_ARG, "--plane and --show write pictures of their own: number them, as in 'a_%%02d.png'");
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--plane and --show write pictures of their own: number them, as in 'a_%%02d.png'");
 	return PSR_OK;
 }
 
@@ -80,8 +85,8 @@ static int check_numbered(int *is_numbered, const struct sink *sink, const char 
 	if (output_is_numbered(is_numbered, name, err) != PSR_OK)
 		return PSR_ERR_ARG;
 	if (!*is_numbered && sink->n > 1)
-		return psr_fail(err, PSR_ERR_ARG, "%s '%.200s' is one file for %u pictures; number them, as in 'a_%%02d%s'", option,
-		                name, sink->n, strcmp(option, "--depth") == 0 ? ".exr" : ".json");
+		return psr_fail(err, PSR_ERR_ARG, "%s '%.200s' is one file for %u pictures; number them, as in 'a_%%02d%s'",
+		                option, name, sink->n, strcmp(option, "--depth") == 0 ? ".exr" : ".json");
 	return PSR_OK;
 }
 

@@ -20,8 +20,9 @@ static int parse(struct draw_wish *wish, int64_t *n_frames, int argc, char **arg
 	int has_frames = 0, code;
 	const struct psr_opt opts[] = {
 		{ "output", 'o', PSR_OPT_STRING, &wish->output, "FILE",
-		  "'a_%02d.png': a file each picture, numbered from 1. a.png, a.gif or - (standard output): one animation, which "
-		  "browsers play. With --sheet: one picture.", 0, 0, NULL, NULL },
+		  "'a_%02d.png': a file each picture, numbered from 1. a.png, a.gif or - (standard output): one animation, "
+		  "which browsers play. With --sheet: one picture.",
+		  0, 0, NULL, NULL },
 		{ "frames", 'n', PSR_OPT_INT, n_frames, "N",
 		  "Pictures a turn: 48 or more for an animation that moves evenly. A contact sheet has as many as fit.", 1,
 		  MAX_FRAMES, NULL, &has_frames },
@@ -30,9 +31,9 @@ static int parse(struct draw_wish *wish, int64_t *n_frames, int argc, char **arg
 	};
 	const struct psr_cli cli = {
 		"psr turntable --model NAME [--server ADDR] [--frames N] [models, camera, light, quality] -o FILE",
-		"Draws a model from all sides: the camera goes once around it, to its right at first, and the model stays in the "
-		"picture. The camera's options say where it begins. Lights of --light stay with the model; the one that is there "
-		"without stays with the camera.",
+		"Draws a model from all sides: the camera goes once around it, to its right at first, and the model stays in "
+		"the picture. The camera's options say where it begins. Lights of --light stay with the model; the one that is "
+		"there without stays with the camera.",
 		list.opt,
 		footer,
 	};

@@ -48,8 +48,10 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 	struct psr_camera_wish *camera = &wish->camera;
 	const struct psr_opt opts[] = {
 		{ "view", 0, PSR_OPT_STRING, &wish->view, "SIDE",
-		  "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without any of these "
-		  "options. It has perspective unless --ortho is said, too. psr shot draws a picture of each of front,left,top.", 0, 0, NULL, NULL },
+		  "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without any of "
+		  "these options. It has perspective unless --ortho is said, too. psr shot draws a picture of each of "
+		  "front,left,top.",
+		  0, 0, NULL, NULL },
 		{ "azimuth", 0, PSR_OPT_REAL, &camera->azimuth, "DEG",
 		  "Degrees around the model: 0 is its front, 90 its right side, 180 its back.", -1e6, 1e6, NULL,
 		  &wish->has_azimuth },
@@ -62,14 +64,16 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 		  "As a zoom lens: 1 shows the whole model, 2 its middle (or --target) twice as large.", 1e-6, 1e6, NULL,
 		  &wish->has_zoom },
 		{ "fov", 0, PSR_OPT_REAL, &wish->fov, "DEG",
-		  "Angle of view from the top edge to the bottom edge, degrees: smaller is flatter, as from farther away.", 0, 0,
-		  NULL, &wish->has_fov },
+		  "Angle of view from the top edge to the bottom edge, degrees: smaller is flatter, as from farther away.", 0,
+		  0, NULL, &wish->has_fov },
 		{ "ortho", 0, PSR_OPT_CALL, wish, "HEIGHT",
-		  "No perspective: parallel lines stay so. The picture is HEIGHT units of the model high; `fit` shows all of it.",
+		  "No perspective: parallel lines stay so. The picture is HEIGHT units of the model high; `fit` shows all of "
+		  "it.",
 		  0, 0, on_ortho, &wish->has_ortho },
 		{ "up", 0, PSR_OPT_VEC3, camera->up, "X,Y,Z",
 		  "The direction that is up in the picture. Without it: that of the model's file, usually 0,1,0, or 0,0,1 for "
-		  "scans, CAD and clouds. Say it where a model lies on its side.", 0, 0, NULL, &camera->has_up },
+		  "scans, CAD and clouds. Say it where a model lies on its side.",
+		  0, 0, NULL, &camera->has_up },
 		{ "eye", 0, PSR_OPT_VEC3, camera->eye, "X,Y,Z",
 		  "Where the camera is, in the model's coordinates, instead of the angles above.", 0, 0, NULL,
 		  &camera->has_eye },
@@ -77,7 +81,8 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 		  "The point in the middle of the picture; without it the middle of the model.", 0, 0, NULL,
 		  &camera->has_target },
 		{ "camera", 0, PSR_OPT_STRING, &wish->preset, "NAME",
-		  "A camera that came with the first model, in the place of all of these; `psr list --presets NAME` shows them.",
+		  "A camera that came with the first model, in the place of all of these; `psr list --presets NAME` shows "
+		  "them.",
 		  0, 0, NULL, NULL },
 	};
 
@@ -125,18 +130,21 @@ static int check_view(struct view_wish *wish, struct psr_error *err)
 
 	others.preset = NULL;
 	if (wish->preset != NULL && view_is_said(&others))
-		return psr_fail(err, PSR_ERR_ARG, "--camera is a whole camera; it excludes --eye, --target, --up, --fov, --ortho, "
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--camera is a whole camera; it excludes --eye, --target, --up, --fov, --ortho, "
 		                "--view, --azimuth, --elevation, --roll and --zoom");
 	if (wish->view != NULL && (has_angle || wish->camera.has_eye))
-		return psr_fail(err, PSR_ERR_ARG, "--view excludes --azimuth, --elevation and --eye: it says where the camera is");
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--view excludes --azimuth, --elevation and --eye: it says where the camera is");
 	if (wish->camera.has_eye && has_angle)
 		return psr_fail(err, PSR_ERR_ARG, "--eye excludes --azimuth and --elevation: both say where the camera is");
 	if (wish->has_fov && wish->has_ortho)
 		return psr_fail(err, PSR_ERR_ARG, "--fov and --ortho exclude each other");
 	if (wish->view != NULL && find_side(wish, err) != PSR_OK)
 		return PSR_ERR_ARG;
-	wish->camera.has_angles = !wish->camera.has_eye
-	                          && (has_angle || wish->has_roll || (wish->view != NULL && strcmp(wish->view, "home") != 0));
+	wish->camera.has_angles =
+		!wish->camera.has_eye
+		&& (has_angle || wish->has_roll || (wish->view != NULL && strcmp(wish->view, "home") != 0));
 	wish->camera.fov_y = wish->has_ortho ? 0 : wish->fov * DEGREE;
 	return check_ranges(wish, err);
 }

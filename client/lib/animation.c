@@ -23,8 +23,8 @@ static int choose(const struct image_module **module, const char *path, struct p
 	if (strcmp(path, OUTFILE_STDOUT) == 0 || strcasecmp(ending, "png") == 0 || strcasecmp(ending, "apng") == 0)
 		return PSR_OK;
 	if (ending[0] == '\0')
-		return psr_fail(err, PSR_ERR_ARG, "'%.300s' needs an ending that says the format of the animation: .png or .gif",
-		                path);
+		return psr_fail(err, PSR_ERR_ARG,
+		                "'%.300s' needs an ending that says the format of the animation: .png or .gif", path);
 	code = image_module_open(module, &why);
 	if (code != PSR_OK)
 		return psr_fail(err, code, "only .png is written as an animation: %s", why.text);

@@ -13,7 +13,8 @@
 
 #define N 2000
 #define MARGIN 1.06
-#define EPS 1e-12 /* coordinates up to 100 and distances up to 1e5 of them: some roundings of 1e7 * 2^-53 of a picture */
+#define EPS                                                                                                            \
+	1e-12 /* coordinates up to 100 and distances up to 1e5 of them: some roundings of 1e7 * 2^-53 of a picture */
 
 static uint64_t state;
 
@@ -193,10 +194,12 @@ static void what_a_person_says_is_up_wins_over_the_model(void **unused)
 	(void)unused;
 	complete(&camera, (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 } });
 	assert_way(camera.up, 0, 0, 1);
-	complete(&camera, (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 }, .has_up = 1, .up = { 0, 3, 0 } });
+	complete(&camera,
+	         (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 }, .has_up = 1, .up = { 0, 3, 0 } });
 	assert_way(camera.up, 0, 1, 0);
 	/* An eye above looks along the natural up: the back is up then. */
-	complete(&camera, (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 }, .has_eye = 1, .eye = { 0, 0, 9 } });
+	complete(&camera,
+	         (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 }, .has_eye = 1, .eye = { 0, 0, 9 } });
 	assert_way(camera.up, 0, 1, 0);
 }
 
@@ -208,7 +211,9 @@ static void zoom_enlarges_and_roll_turns(void **unused)
 
 	(void)unused;
 	for (int is_ortho = 0; is_ortho < 2; is_ortho++) {
-		struct psr_camera_wish wish = { .has_eye = 1, .eye = { 0, 0, 20 }, .fov_y = is_ortho ? 0 : 0.5, .ortho_height = 9 };
+		struct psr_camera_wish wish = {
+			.has_eye = 1, .eye = { 0, 0, 20 }, .fov_y = is_ortho ? 0 : 0.5, .ortho_height = 9
+		};
 
 		complete(&camera, wish);
 		project(plain, &camera, 1, corner);

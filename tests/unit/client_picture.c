@@ -402,7 +402,8 @@ static void check_still(struct chunks *c, const uint8_t *expected)
 }
 
 /* One chunk of an animation of three frames. */
-static void check_chunk(struct chunks *c, const uint8_t *data, const char *type, uint32_t n, uint8_t frames[][3 * W * H])
+static void check_chunk(struct chunks *c, const uint8_t *data, const char *type, uint32_t n,
+                        uint8_t frames[][3 * W * H])
 {
 	if (memcmp(type, "acTL", 4) == 0) {
 		assert_true(n == 8 && get_u32(data) == 3 && get_u32(data + 4) == 0);

@@ -339,7 +339,8 @@ static void list_prints_a_table_and_json(void **state)
 	list = cJSON_Parse(out);
 	assert_int_equal(cJSON_GetArraySize(list), 3);
 	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 2), "state")->valuestring, "source");
-	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 1), "error")->valuestring, "face 7 has no vertex 8");
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 1), "error")->valuestring, "face 7 has no vertex "
+	                                                                                            "8");
 	assert_true(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 0), "bytes")->valuedouble == 2500000);
 	cJSON_Delete(list);
 }
@@ -612,7 +613,8 @@ static void a_server_that_stops_at_an_earlier_pass_is_told_of(void **state)
 {
 	(void)state;
 	assert_int_equal(psr("shot --model cube --size 20x10 --passes 2 --hash"), 0);
-	assert_string_equal(err, "psr shot: the server stopped at pass 0 of 2: the picture is less smooth than asked for\n");
+	assert_string_equal(err, "psr shot: the server stopped at pass 0 of 2: the picture is less smooth than asked "
+	                         "for\n");
 	assert_int_equal(psr("turntable --frames 3 --model cube --size 20x10 --passes 2 --hash"), 0);
 	assert_string_equal(err, "psr turntable: the server stopped at pass 0 of 2: the picture is less smooth than asked "
 	                         "for\n");
@@ -641,7 +643,8 @@ static void bench_counts_frames_and_fails_if_one_failed(void **state)
 
 static void help_and_version_work_without_a_server(void **state)
 {
-	static const char *const all[] = { "--help", "list --help", "shot --help", "turntable --help", "bench --help", "--version" };
+	static const char *const all[] = { "--help",           "list --help",  "shot --help",
+		                               "turntable --help", "bench --help", "--version" };
 
 	(void)state;
 	for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
