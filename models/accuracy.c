@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -251,11 +252,13 @@ static int print(const struct result *result, const struct frame *frame, int has
 
 int cmd_accuracy(int argc, char **argv)
 {
-	struct frame frame = { .camera = { .kind = PSR_CAMERA_PERSPECTIVE } };
-	struct accuracy_bounds bounds = { 0 };
+	/* NAN: not given, which --help shows as no default. */
+	struct frame frame = { .camera = { .eye = { NAN }, .target = { NAN }, .up = { NAN }, .ortho_height = NAN },
+		                   .fov = NAN, .spacing = NAN };
+	struct accuracy_bounds bounds = { .holes = NAN, .distance = NAN, .outside = NAN };
 	struct result result;
 	struct psr_error err;
-	struct shadow_frames shadow = { .light = { .kind = PSR_LIGHT_DIRECTIONAL } };
+	struct shadow_frames shadow = { .light = { .position = { NAN }, .direction = { NAN } } };
 	const char *model = NULL;
 	double magnification = 1;
 	int64_t n_passes = 0;
@@ -292,7 +295,7 @@ int cmd_accuracy(int argc, char **argv)
 		{ .name = "max-distance", .type = PSR_OPT_REAL, .value = &bounds.distance, .arg = "D",
 		  .help = "FAIL if more than 1 pixel in 1,000 is further than D spacings from the surface; if not given, one spacing, or"
 		          " one pixel where pixels are wider.", .min = 0, .max = 1e30, .seen = &bounds.has_distance },
-		{ .name = "max-outside", .type = PSR_OPT_INT, .value = &bounds.outside, .arg = "N",
+		{ .name = "max-outside", .type = PSR_OPT_REAL, .value = &bounds.outside, .arg = "N",
 		  .help = "FAIL if more than N pixels are drawn more than a pixel outside of the silhouette; 1 in 1,000 of the object's"
 		          " if not given.", .min = 0, .max = 1 << 26, .seen = &bounds.has_outside },
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,

@@ -10,7 +10,7 @@
 struct accuracy_bounds {
 	double holes;    /* fraction of the pixels inside */
 	double distance; /* spacings */
-	int64_t outside; /* pixels */
+	double outside;  /* pixels */
 	int has_holes, has_distance, has_outside;
 };
 
