@@ -332,7 +332,8 @@ static int explain(struct psr_error *error, const struct build *build, const str
 
 	if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
 		return psr_fail(error, PSR_ERR_LIMIT, "%s: the build was stopped: it needed more than %llu s of processor time "
-		                "(--build-time), or the machine's memory", name, (unsigned long long)limits->cpu_seconds);
+		                "(--build-time), or the machine's memory; a lower --max-resolution takes less of both", name,
+		                (unsigned long long)limits->cpu_seconds);
 	if (WIFSIGNALED(status))
 		return psr_fail(error, PSR_ERR_FORMAT, "%s: psr-model crashed on it (signal %d)", name, WTERMSIG(status));
 	psr_fail(error, PSR_ERR_INTERNAL, "%s: %.400s", name,
