@@ -61,14 +61,17 @@ static int prepare(struct bench_worker *worker, const struct psr_msg_opened *ope
 static int warm_up(struct bench_worker *worker, struct psr_error *err)
 {
 	const struct bench_options *options = worker->options;
+	const uint32_t *size = options->size;
 	int timeout_ms = (int)options->timeout * 1000, code;
 	struct psr_msg_opened opened;
 	struct psr_event event;
 	uint32_t id;
 
 	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->model, timeout_ms, err);
-	if (code == PSR_OK)
+	if (code == PSR_OK) {
+		psr_client_set_resolution(worker->client, size[0] > size[1] ? size[0] : size[1]);
 		code = psr_client_open(worker->client, options->model, NULL, NULL, timeout_ms, &opened, err);
+	}
 	if (code == PSR_OK && options->n_inflight > psr_client_welcome(worker->client)->max_open)
 		code = psr_fail(err, PSR_ERR_LIMIT, "--inflight: %s takes %u requests at a time", options->server,
 		                psr_client_welcome(worker->client)->max_open);

@@ -293,6 +293,7 @@ static int draw(struct shot *shot, struct psr_client *client, struct shot_facts 
 	uint32_t id;
 
 	clock_gettime(CLOCK_MONOTONIC, &start);
+	psr_client_set_resolution(client, shot->size[0] > shot->size[1] ? shot->size[0] : shot->size[1]);
 	code = psr_client_open(client, shot->model, psr_progress_draw, &line, timeout_ms, &opened, err);
 	psr_progress_end(&line);
 	if (code == PSR_OK)
