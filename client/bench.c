@@ -19,7 +19,10 @@ static int check(struct bench_options *options, struct psr_error *err)
 	options->view.view = NULL; /* its angles stand in the wish */
 	views_fini(&views);
 	options->frame.planes = 1 << PSR_WIRE_PLANE_COLOR;
-	return code == PSR_OK ? quality_apply(&options->frame, &options->quality, err) : code;
+	if (code == PSR_OK)
+		code = quality_apply(&options->frame, &options->quality, err);
+	options->scene.pixels = view_pixels(&options->view, &options->frame);
+	return code;
 }
 
 static int parse(struct bench_options *options, int *json, int argc, char **argv, struct psr_error *err)

@@ -7,6 +7,7 @@
 struct instance_wish {
 	char model[PSR_WIRE_MAX_NAME + 1];
 	struct psr_msg_instance place; /* without its handle */
+	uint32_t pixels; /* what psr_client_set_resolution() is told of its model; 0: what the scene says */
 };
 
 /* NAME[,at=X,Y,Z][,scale=S][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z; rotations happen one after the other, in

@@ -65,6 +65,7 @@ static void add_scene(cJSON *to, const struct scene *scene)
 		id_text(id, scene->model[i].opened.content_id);
 		cJSON_AddStringToObject(item, "name", scene->model[i].name);
 		cJSON_AddStringToObject(item, "content_id", id);
+		cJSON_AddNumberToObject(item, "resolution", scene->model[i].opened.resolution);
 		cJSON_AddItemToArray(models, item);
 	}
 	for (uint32_t i = 0; i < scene->msg.n_instances; i++) {

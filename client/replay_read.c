@@ -124,8 +124,10 @@ int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *
 	{
 		struct instance_wish *to = &wish->instance[wish->n_instances++];
 		const int k = (int)get_number(&reader, item, "model", 0, n_models - 1);
+		const cJSON *model = cJSON_GetArrayItem(models, k);
 
-		snprintf(to->model, sizeof to->model, "%s", get_string(&reader, cJSON_GetArrayItem(models, k), "name"));
+		snprintf(to->model, sizeof to->model, "%s", get_string(&reader, model, "name"));
+		to->pixels = (uint32_t)get_number(&reader, model, "resolution", 1, UINT32_MAX);
 		get_numbers(&reader, to->place.rotation, item, "rotation", 4);
 		get_numbers(&reader, to->place.translation, item, "translation", 3);
 		to->place.scale = get_number(&reader, item, "scale", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);

@@ -18,13 +18,15 @@ void scene_close(struct scene *scene)
 	free(scene);
 }
 
-static int open_model(struct scene_model *model, struct psr_client *client, int is_quiet, int timeout_ms,
-                      struct psr_error *err)
+static int open_model(struct scene_model *model, struct psr_client *client, uint32_t pixels, int is_quiet,
+                      int timeout_ms, struct psr_error *err)
 {
 	struct psr_progress_line line = { 0 };
-	int code = psr_client_open(client, model->name, is_quiet ? NULL : psr_progress_draw, &line, timeout_ms,
-	                           &model->opened, err);
+	int code;
 
+	psr_client_set_resolution(client, pixels);
+	code = psr_client_open(client, model->name, is_quiet ? NULL : psr_progress_draw, &line, timeout_ms, &model->opened,
+	                       err);
 	psr_progress_end(&line);
 	return code == PSR_ERR_NOT_FOUND ? suggest_model(client, model->name, timeout_ms, err) : code;
 }
@@ -33,7 +35,7 @@ static int open_models(struct scene *scene, const struct scene_wish *wish, struc
                        struct psr_error *err)
 {
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
-		uint32_t k = 0;
+		uint32_t k = 0, pixels = wish->instance[i].pixels;
 		int code;
 
 		while (k < scene->n_models && strcmp(scene->model[k].name, wish->instance[i].model) != 0)
@@ -42,7 +44,8 @@ static int open_models(struct scene *scene, const struct scene_wish *wish, struc
 		if (k < scene->n_models)
 			continue;
 		strcpy(scene->model[k].name, wish->instance[i].model);
-		code = open_model(&scene->model[k], client, wish->is_quiet, timeout_ms, err);
+		code = open_model(&scene->model[k], client, pixels != 0 ? pixels : wish->pixels, wish->is_quiet, timeout_ms,
+		                  err);
 		if (code != PSR_OK)
 			return code;
 		scene->n_models++;

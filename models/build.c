@@ -143,30 +143,40 @@ int cmd_build(int argc, char **argv)
 	int64_t resolution, n_threads, fd = -1;
 	double tolerance, crease;
 	const struct psr_opt opts[] = {
+		{ .name = "The model", .type = PSR_OPT_HEADING },
 		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &out, .arg = "OUT.psr",
-		  .help = "where the model goes; without it beside IN, with .psr for its suffix" },
-		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "RES",
-		  .help = "pixels across the model at which it is sampled without holes", .min = 8, .max = 8192 },
-		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
-		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
+		  .help = "The file to write. If not given: IN's name with .psr for its ending." },
+		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
+		  .help = "Use about twice the height of the pictures that you want. Larger pictures show rough edges; twice the figure"
+		          " takes four times the memory.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = options.up, .arg = "X,Y,Z",
-		  .help = "the way up of the object in its file, for pictures without a camera; 0,0,0: what files of this kind "
-		          "have, +z for LAS, STL and survey coordinates, +y for the others" },
+		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
+		          " usual for the format, +z for LAS, STL and survey coordinates, +y for the others." },
 		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
-		  .help = "edges stay sharp where faces meet at a greater angle, in files without normals of their own; "
-		          "180: all edges are rounded", .min = 0, .max = 180 },
+		  .help = "Edges stay sharp where faces meet at a greater angle, in files that bring no directions of shading"
+		          " (normals). Lower it where edges look rounded; raise it where a smooth surface shows facets.",
+		  .min = 0, .max = 180 },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
-		  .help = "compress the file, to a third or half of its size; opening it unpacks it into memory" },
+		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
+		          " memory for all of it." },
+		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
-		  .help = "threads to use; the result does not depend on it", .min = 1, .max = 256 },
+		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
+		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet,
+		  .help = "Prints errors only: no progress, no warnings of what is left out, no summary." },
+		{ .name = "For developers", .type = PSR_OPT_HEADING },
+		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
+		  .help = "The greatest angle between a surface and the plane of the projection that samples it; docs/studies.md"
+		          " shows what it changes.", .min = 0.01, .max = 60 },
 		{ .name = "progress-fd", .type = PSR_OPT_INT, .value = &fd, .arg = "FD",
-		  .help = "write lines \"STAGE DONE TOTAL\" to this descriptor; -1: nowhere", .min = -1, .max = 1 << 20 },
-		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet, .help = "print errors only" },
+		  .help = "Writes lines \"STAGE DONE TOTAL\" to this open descriptor, for a program that waits; -1: nowhere.",
+		  .min = -1, .max = 1 << 20 },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [options]",
-		.summary = "Samples a mesh or a cloud of points into a .psr model.",
+		.summary = "Turns a mesh or a scan into a .psr model, which psrd draws. psrd builds models itself when they are first"
+		           " asked for; build one here to choose how fine it is.",
 		.opts = opts,
 		.footer = FORMATS,
 	};

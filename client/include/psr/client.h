@@ -46,6 +46,11 @@ uint64_t psr_client_bytes_received(const struct psr_client *client);
 int psr_client_list(struct psr_client *client, struct psr_msg_list_entry **entries, uint32_t *n_entries,
                     int timeout_ms, struct psr_error *err);
 
+/* The greater side of the pictures that models opened from now on are for, in pixels (what is above 16384 counts as
+ * 16384): a server that has to build a model builds one that is fine enough for them, up to its own limit; OPENED says
+ * the resolution. 0, as at first: not known, and the server has its way. Servers that do not take it are not told. */
+void psr_client_set_resolution(struct psr_client *client, uint32_t pixels);
+
 /* Opens a model, which the server may have to build first: that can take minutes, in which on_progress (may be NULL) is
  * told how far it is. A server that does not even answer PING within timeout_ms is given up (CONNECTION). NOT_FOUND,
  * FORMAT and so on as the server has it. */
