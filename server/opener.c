@@ -289,19 +289,17 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	return o;
 }
 
-/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of the few that
- * there are from --resolution to --max-resolution the first that is no less. So a source has few models in the cache,
- * whatever clients ask for, and which one a client gets depends on nothing else. */
+/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of --resolution, its
+ * doubles, and --max-resolution, the first that has nine tenths of them. So a source has few models in the cache,
+ * whatever clients ask for; which one a client gets depends on nothing else; and a model's own resolution asks for it. */
 static uint32_t find_resolution(const struct options *options, uint32_t pixels)
 {
-	const uint32_t least = (uint32_t)options->resolution, most = (uint32_t)options->max_resolution;
-	uint32_t step = 256;
+	const uint32_t most = (uint32_t)options->max_resolution;
+	uint32_t step = (uint32_t)options->resolution;
 
-	if (pixels <= least)
-		return least;
-	while (step < pixels) /* 256, 384, 512, 768, 1024, ... */
-		step = (step & (step - 1)) == 0 ? step / 2 * 3 : step / 3 * 4;
-	return step < most ? step : most;
+	while (step < most && 10 * step < 9 * pixels)
+		step *= 2;
+	return step < most && pixels != most ? step : most;
 }
 
 void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const struct psr_msg_open *msg)

@@ -53,7 +53,7 @@ static char *find_cache(void)
 static int set_defaults(struct options *options)
 {
 	*options = (struct options){
-		.threads = count_cores(), .resolution = 512, .max_resolution = 1536,
+		.threads = count_cores(), .resolution = 768, .max_resolution = 1536,
 		.max_clients = 64, .max_open = 64, .max_handles = 64, .max_builds = 1,
 		.max_pixels = INT64_C(16) << 20,
 		.max_memory = INT64_C(4) << 30, .max_queue = INT64_C(32) << 20, .build_memory = INT64_C(16) << 30,

@@ -139,15 +139,16 @@ static void pictures_choose_the_resolution_of_a_build(void **state)
 	static const struct {
 		uint32_t asked;
 		const char *built;
-	} cases[] = { { 0, " -r 512 " }, { 1, NULL }, { 512, NULL }, { 513, " -r 768 " }, { 640, NULL }, { 769, " -r 1024 " },
-		          { 1920, " -r 1536 " }, { 1280, NULL }, { 16384, NULL }, { 1000, NULL } };
+	} cases[] = { { 0, " -r 300 " }, { 1, NULL }, { 300, NULL }, { 333, NULL }, { 334, " -r 600 " }, { 666, NULL },
+		          { 1000, " -r 1200 " }, { 1333, NULL }, { 1334, " -r 1536 " }, { 16384, NULL }, { 1536, NULL },
+		          { 1200, NULL }, { 600, NULL } };
 	struct psr_msg_opened opened;
 	char text[4096];
 	int n = 0;
 
 	(void)state;
 	file_write(folder, "plate.obj", "good", 4);
-	start(NULL, NULL);
+	start("--resolution", "300");
 	peer_hello(&p, &psrd, NULL);
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
 		peer_expect_opened(&p, peer_ask_open_for(&p, "plate", cases[i].asked), &opened);
@@ -164,7 +165,7 @@ static void pictures_choose_the_resolution_of_a_build(void **state)
 	expect_builds(4, 4);
 	peer_close(&p);
 	daemon_stop(&psrd);
-	start("--max-resolution", "600"); /* --resolution stays 512 */
+	start("--max-resolution", "600"); /* which is --resolution, too */
 	peer_hello(&p, &psrd, NULL);
 	peer_expect_opened(&p, peer_ask_open_for(&p, "plate", 16384), &opened);
 	expect_builds(5, 5);
@@ -399,7 +400,7 @@ static void builds_are_niced_and_limited(void **state)
 	peer_close(&p);
 	daemon_stop(&psrd);
 	assert_int_equal(count_builds(log), 1);
-	assert_string_equal(log, "build -o -r 512 --progress-fd 3 --quiet --threads 2 10 1048576 3600\n");
+	assert_string_equal(log, "build -o -r 768 --progress-fd 3 --quiet --threads 2 10 1048576 3600\n");
 	file_write(folder, "spin.stl", "spin", 4);
 	start("--build-time", "1");
 	peer_hello(&p, &psrd, NULL);
