@@ -165,12 +165,12 @@ static void pictures_choose_the_resolution_of_a_build(void **state)
 	expect_builds(4, 4);
 	peer_close(&p);
 	daemon_stop(&psrd);
-	start("--max-resolution", "600"); /* which is --resolution, too */
+	start("--max-resolution", "700"); /* which is --resolution, too */
 	peer_hello(&p, &psrd, NULL);
 	peer_expect_opened(&p, peer_ask_open_for(&p, "plate", 16384), &opened);
 	expect_builds(5, 5);
 	count_builds(text);
-	assert_non_null(strstr(text, " -r 600 "));
+	assert_non_null(strstr(text, " -r 700 "));
 	peer_close(&p);
 	daemon_stop(&psrd);
 }
@@ -243,7 +243,7 @@ static void a_build_over_a_limit_fails_at_its_resolution_alone(void **state)
 		peer_expect_open_error(&p, peer_ask_open(&p, "spin"), PSR_WIRE_LIMIT, text);
 	assert_int_equal(count_builds(log), 1); /* not tried again */
 	expect_state("spin", PSR_ENTRY_FAILED);
-	peer_expect_open_error(&p, peer_ask_open_for(&p, "spin", 700), PSR_WIRE_LIMIT, NULL);
+	peer_expect_open_error(&p, peer_ask_open_for(&p, "spin", 1700), PSR_WIRE_LIMIT, NULL);
 	assert_int_equal(count_builds(log), 2);
 	peer_close(&p);
 	daemon_stop(&psrd);
