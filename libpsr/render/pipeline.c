@@ -16,6 +16,8 @@ struct psr_renderer {
 	struct shadow *shadow;    /* NULL until a light casts one */
 	struct fill fill;
 	struct smooth smooth;
+	const struct inside *inside;
+	uint8_t *is_covered;
 	struct psr_zstack stack;
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
@@ -281,12 +283,48 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
+	struct psr_zstack stack = r->stack;
+	if (r->plan.with_splats)
+		stack.levels = 0;
 	r->gaps[row] =
-		gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+		gaps_rows(r->simd, &r->plan, &stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 	if (r->plan.with_splats)
 		r->gaps[row].n_marked +=
-			splat_close(&r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+			splat_close(&r->plan, &r->stack, r->inside, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
 	fill_look(&r->fill, (uint32_t)row);
+}
+
+static void cover_one(int row, void *userdata)
+{
+	struct psr_renderer *r = userdata;
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(&r->plan, row), width = r->plan.width;
+	gaps_rows(r->simd, &r->plan, &r->stack, y0, y1, r->weight, r->bricks);
+	for (uint32_t y = y0; y < y1; y++) {
+		const uint64_t *word = psr_zstack_row(&r->stack, y);
+		for (uint32_t x = 0; x < width; x++)
+			r->is_covered[(size_t)y * width + x] =
+				word[x] != PSR_WORD_EMPTY || r->weight[(size_t)y * width + x] < WEIGHT_ONE / 2;
+	}
+}
+
+int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                   struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err)
+{
+	struct psr_report report;
+	struct psr_zstack *stack;
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = make_stack(r, scene, settings, pool, &stack, &report, err);
+	r->is_covered = is_covered;
+	if (rc == PSR_OK)
+		psr_pool_for(pool, (int)n_rows(&r->plan), cover_one, r);
+	fesetenv(&callers);
+	return rc;
+}
+
+void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)
+{
+	r->inside = inside;
 }
 
 static void shade_one(int row, void *userdata)
