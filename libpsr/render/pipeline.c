@@ -374,7 +374,8 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : none, all.n_pixels);
 	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : none, all.n_specular);
 	const uint64_t fill_ns = part_of(wall, all.fill_ns, all.row_ns);
-	report->n_covered = report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = all.n_pixels;
+	report->n_covered = all.n_pixels;
+	report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = r->frame->rgb ? all.n_pixels : 0;
 	report->ns[PSR_STAGE_FILL] += fill_ns;
 	report->ns[PSR_STAGE_RESOLVE] = part_of(wall - fill_ns, all.resolve_ns, all.shade_ns);
 	report->ns[PSR_STAGE_SHADE] = wall - fill_ns - report->ns[PSR_STAGE_RESOLVE];
