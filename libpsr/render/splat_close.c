@@ -5,16 +5,10 @@
 #include "render/render.h"
 
 #define REACH 8 /* pixels, a power of two: no hole between discs that one surface encloses is sought further */
-/* Cells on either side of a pixel's own. A gap in a row of cells that all have samples is narrower than two of them:
- * NARROW_GAP may be one between two things, and counts inside of what the plain frame covers; about a pixel in the midst
- * of so many as WIDE_GAP there is one surface. Measured: with two in the place of three spindles of a chair grow
- * together, and 2 dB are lost. */
-#define NARROW_GAP 1
-#define WIDE_GAP 3
-/* The coarsest cells of which WIDE_GAP lie within the margin of a window. */
-#define MOST_WIDE_LEVEL 4
+/* Cells on either side of a pixel's own: a gap in a row of cells that all have samples is narrower than two of them. */
+#define GAP 1
 #define CELLS (TILE_WIDTH / 2)
-#define CELLS_AROUND (CELLS + 2 * WIDE_GAP)
+#define CELLS_AROUND (CELLS + 2 * GAP)
 
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
@@ -77,7 +71,7 @@ static void find_between(uint8_t *is_between, const struct plan *plan, const str
 
 /* A row of cells of a level, of a tile: what lies beyond these depths is behind samples of all cells around. */
 struct cell_row {
-	float narrow[CELLS], wide[CELLS];
+	float limit[CELLS];
 	uint8_t is_near[CELLS]; /* a block of this very level has samples in the cell or beside it */
 	int has_any;
 };
@@ -108,17 +102,6 @@ static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, 
 	}
 }
 
-/* The greatest value of each run of 2 side + 1. */
-static void find_greatest(float *to, const float *from, uint32_t n, uint32_t side)
-{
-	for (uint32_t c = 0; c < n; c++) {
-		float greatest = from[c];
-		for (uint32_t i = 1; i <= 2 * side; i++)
-			greatest = from[c + i] > greatest ? from[c + i] : greatest;
-		to[c] = greatest;
-	}
-}
-
 static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	const uint32_t width = stack->level[k].width;
@@ -134,34 +117,33 @@ static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, ui
 static void find_cells(struct cell_row *to, const struct plan *plan, const struct psr_zstack *stack, int k, uint32_t i,
                        uint32_t j, uint32_t n)
 {
-	float nearest[CELLS_AROUND], narrow[CELLS_AROUND], wide[CELLS_AROUND], greatest[CELLS_AROUND];
-	const uint32_t n_around = n + 2 * WIDE_GAP;
-	to->has_any = 0;
+	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
+	const uint32_t n_around = n + 2 * GAP;
 	find_own(to->is_near, stack, k, i, j, n);
+	to->has_any = 0;
 	for (uint32_t c = 0; c < n; c++)
 		to->has_any |= to->is_near[c];
 	if (!to->has_any)
 		return;
-	memset(narrow, 0, sizeof narrow);
-	memset(wide, 0, sizeof wide);
-	for (int v = -WIDE_GAP; v <= WIDE_GAP; v++) {
-		find_nearest(nearest, stack, k, (int64_t)i - WIDE_GAP, (int64_t)j + v, n_around);
+	memset(farthest, 0, sizeof farthest);
+	for (int v = -GAP; v <= GAP; v++) {
+		find_nearest(nearest, stack, k, (int64_t)i - GAP, (int64_t)j + v, n_around);
 		for (uint32_t c = 0; c < n_around; c++)
-			wide[c] = nearest[c] > wide[c] ? nearest[c] : wide[c];
-		for (uint32_t c = 0; c < n_around && v >= -NARROW_GAP && v <= NARROW_GAP; c++)
-			narrow[c] = nearest[c] > narrow[c] ? nearest[c] : narrow[c];
+			farthest[c] = nearest[c] > farthest[c] ? nearest[c] : farthest[c];
 	}
-	find_greatest(greatest, narrow + WIDE_GAP - NARROW_GAP, n, NARROW_GAP);
-	for (uint32_t c = 0; c < n; c++)
-		to->narrow[c] = greatest[c] * plan->gap_scale[k] + plan->gap_offset[k];
-	find_greatest(greatest, wide, n, WIDE_GAP);
-	for (uint32_t c = 0; c < n; c++)
-		to->wide[c] = k <= MOST_WIDE_LEVEL ? greatest[c] * plan->gap_scale[k] + plan->gap_offset[k] : INFINITY;
+	for (uint32_t c = 0; c < n; c++) {
+		float all = farthest[c];
+		for (uint32_t u = 1; u <= 2 * GAP; u++)
+			all = farthest[c + u] > all ? farthest[c + u] : all;
+		to->limit[c] = all * plan->gap_scale[k] + plan->gap_offset[k];
+	}
 }
 
 /* What is known of the pixels of a row of a tile. */
 struct row_holes {
-	uint8_t is_between[TILE_WIDTH], is_narrow[TILE_WIDTH], is_wide[TILE_WIDTH], reach[TILE_WIDTH];
+	uint8_t is_between[TILE_WIDTH]; /* what is before it is on its left and on its right */
+	uint8_t is_covered[TILE_WIDTH]; /* it lies behind samples in all cells around */
+	uint8_t reach[TILE_WIDTH];      /* the width of the cells around, as far as REACH */
 };
 
 static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, uint32_t x,
@@ -175,8 +157,7 @@ static void find_holes(struct row_holes *to, const struct cell_row *cells, const
 			continue;
 		for (uint32_t c = 0; c < n; c++) {
 			const float z = psr_float_from_bits((uint32_t)(word[c] >> 32));
-			to->is_narrow[c] |= cells[k].is_near[c >> k] & (cells[k].narrow[c >> k] < z);
-			to->is_wide[c] |= cells[k].is_near[c >> k] & (cells[k].wide[c >> k] < z);
+			to->is_covered[c] |= cells[k].is_near[c >> k] & (cells[k].limit[c >> k] < z);
 			to->reach[c] = cells[k].is_near[c >> k] ? reach : to->reach[c];
 		}
 	}
@@ -198,7 +179,7 @@ static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stac
 	find_between(holes.is_between, plan, stack, x0, y, n);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
-		if (weight[c] && (holes.is_wide[c] || (holes.is_narrow[c] && inside && is_inside(inside, x, y)) ||
+		if (weight[c] && ((holes.is_covered[c] && inside && is_inside(inside, x, y)) ||
 		                  (holes.is_between[c] && is_enclosed(plan, stack, x, y, holes.reach[c])))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
