@@ -16,9 +16,9 @@ struct psr_renderer {
 	struct shadow *shadow;    /* NULL until a light casts one */
 	struct fill fill;
 	struct smooth smooth;
-	const struct inside *inside;
-	uint8_t *is_covered;
 	struct psr_zstack stack;
+	const struct inside *inside; /* of frames with splats, or NULL */
+	uint8_t *is_covered;         /* of the call of renderer_cover in progress */
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
 	int has_planes;           /* it wants more than colour and depth */
@@ -283,14 +283,13 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(&r->plan, row);
 	struct psr_zstack stack = r->stack;
 	if (r->plan.with_splats)
-		stack.levels = 0;
-	r->gaps[row] =
-		gaps_rows(r->simd, &r->plan, &stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+		stack.levels = 0; /* discs cover for themselves */
+	r->gaps[row] = gaps_rows(r->simd, &r->plan, &stack, y0, y1, r->weight, r->bricks);
 	if (r->plan.with_splats)
-		r->gaps[row].n_marked +=
-			splat_close(&r->plan, &r->stack, r->inside, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+		r->gaps[row].n_marked += splat_close(&r->plan, &r->stack, r->inside, y0, y1, r->weight, r->bricks);
 	fill_look(&r->fill, (uint32_t)row);
 }
 

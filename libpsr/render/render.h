@@ -160,8 +160,8 @@ void warp_target_make(struct warp_target *target, const struct plan *plan, const
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              struct psr_zstack *stack, uint32_t tile, uint32_t clean, uint64_t *own);
 
-/* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
- * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */
+/* The same with splats: each sample is a disc about it, of its projection's plane brought onto the surface's, which
+ * reaches its neighbours' ([B] 3). Cells are the samples', for splat_close: of two pixels where blocks need none. */
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
@@ -173,9 +173,10 @@ struct inside {
 	unsigned pass;
 };
 
-/* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's
- * threshold, where one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its
- * brick. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
+/* Discs do not meet everywhere. Two kinds of pixels get weight 0 and mark their brick: those that are inside (NULL:
+ * nothing is known of that) and lie behind samples in each of the 3 x 3 cells about them by more than their level's
+ * threshold; and those before nothing, or behind by more than level 1's threshold, where one surface is within a cell, or
+ * some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
                      uint32_t y1, uint16_t *weight, uint8_t *bricks);
 
@@ -347,16 +348,16 @@ void smooth_clear(struct smooth *smooth);
 uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                         uint8_t *rgb);
 
-/* ---- for tests: a renderer that calls other kernels ---- */
+/* ---- for refinement: what the plain frame covers ---- */
 
-/* ---- for refinement ---- */
-
-/* Which pixels the plain frame covers: 1 where it has a sample, or cells cover at least half; width * height. */
+/* 1 where the plain frame has a sample, or cells cover at least half of a pixel; width * height. */
 int renderer_cover(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                    struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err);
 
-/* What frames with splats are inside of, from now on; NULL: nothing is known. */
+/* What frames with splats are inside of from now on; NULL: nothing is known. It must hold while they are drawn. */
 void renderer_set_inside(struct psr_renderer *renderer, const struct inside *inside);
+
+/* ---- for tests: a renderer that calls other kernels ---- */
 
 void renderer_use(struct psr_renderer *renderer, const struct simd *simd);
 

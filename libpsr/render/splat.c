@@ -80,7 +80,7 @@ static void draw_splat(const struct splat_target *t, const struct splat *s)
 		}
 }
 
-/* A block's samples by place, and how their depths differ from that of a sample in the six directions of the lattice. */
+/* Depths of a block's samples by place. */
 struct lattice_depths {
 	uint64_t mask;
 	uint16_t depth[PSR_BLOCK_SAMPLES];
@@ -134,7 +134,8 @@ static void limit_slope(float slope[2], float most)
 }
 
 /* The plane of the normal, along each of the lattice's three lines as far as depths on both sides agree with it: a
- * normal may be that of a map, or of a rounded corner. In odd rows samples are half a step to the right. Also how much of the radius along the rows, and across them, is covered. */
+ * normal may be that of a map, or of a rounded corner. In odd rows samples are half a step to the right. Also how much
+ * of the radius along the rows, and across them, is covered. */
 static void find_plane(float slope[2], float share[2], const struct lattice_depths *at, uint32_t sample,
                        const float n[3], const struct psr_projection *projection)
 {
@@ -156,7 +157,8 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 	limit_slope(slope, MOST_STEEP);
 	/* Outside of the block there may be some. */
 	const int beside = has_next[0] | has_last[0] | (c == 0) | (c == 7);
-	const int across = has_next[1] | has_next[2] | has_last[1] | has_last[2] | (r == 0) | (r == 7) | (left < 0) | (left == 7);
+	const int at_end = (r == 0) | (r == 7) | (left < 0) | (left == 7);
+	const int across = has_next[1] | has_next[2] | has_last[1] | has_last[2] | at_end;
 	share[0] = beside ? 1 : NARROW;
 	share[1] = across ? 1 : NARROW;
 }
