@@ -149,8 +149,8 @@ uint32_t warp_parts(const struct plan *plan, const uint8_t *map, uint32_t tile);
 
 /* A tile of the stack, with nothing clean or bare. Its words are where the picture has them, unless `own` has room for
  * them. */
-void warp_target_make(struct warp_target *target, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile,
-                      uint64_t *own);
+void warp_target_make(struct warp_target *target, const struct plan *plan, const struct psr_zstack *stack,
+                      uint32_t tile, uint64_t *own);
 
 /* Clears a tile but for parts that are clean, by bits, and draws its blocks. Its words are the stack's, or, where `own`
  * is not NULL, WARP_OWN_WORDS there in rows WARP_OWN_STRIDE apart, for who needs no others: they stay in a cache. Cells
@@ -175,8 +175,8 @@ struct inside {
 
 /* Discs do not meet everywhere. Two kinds of pixels get weight 0 and mark their brick: those that are inside (NULL:
  * nothing is known of that) and lie behind samples in each of the 3 x 3 cells about them by more than their level's
- * threshold; and those before nothing, or behind by more than level 1's threshold, where one surface is within a cell, or
- * some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
+ * threshold; and those before nothing, or behind by more than level 1's threshold, where one surface is within a cell,
+ * or some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
                      uint32_t y1, uint16_t *weight, uint8_t *bricks);
 

@@ -214,8 +214,8 @@ static void draw_block(const struct splat_target *t, const struct bin_entry *ent
 	}
 }
 
-/* The cells that samples fall into, by the warp; words are empty again after that. Samples that are at most a pixel apart
- * have cells of two pixels. */
+/* The cells that samples fall into, by the warp, which draws words, too. Samples that are at most a pixel apart have
+ * cells of two pixels. */
 static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
                            const struct bin_entry *entry, uint32_t n)
 {

@@ -8,8 +8,8 @@ uint32_t warp_gap(uint32_t width)
 	return beyond < 2 * line ? 2 * line - beyond : 0;
 }
 
-void warp_target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile,
-                      uint64_t *own)
+void warp_target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack,
+                      uint32_t tile, uint64_t *own)
 {
 	t->instance = plan->warp;
 	t->direction = psr_direction_tens();

@@ -125,7 +125,8 @@ static uint32_t look(struct closed *c, unsigned pass, const struct view *view, i
 
 int main(int argc, char **argv)
 {
-	struct closed c = { .side = argc > 3 ? (uint32_t)atoi(argv[3]) : 300, .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16 };
+	struct closed c = { .side = argc > 3 ? (uint32_t)atoi(argv[3]) : 300,
+		                .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16 };
 	struct psr_model *model;
 	struct psr_mesh *mesh;
 	struct psr_error err;
