@@ -217,8 +217,9 @@ static void warp_one(int i, void *userdata)
 		                                  : warp_tile(r->simd, plan, &r->bins, &r->stack, tile, clean, NULL);
 }
 
+/* Shadow maps are drawn if what the stack shows will be lit; else those of earlier frames stay as they are. */
 static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
-                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
+                      int is_lit, struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
                       struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
@@ -234,7 +235,10 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
 	start = end;
 
-	rc = shadow_prepare(&r->shadow, r->simd, &r->plan, &r->bins, scene, pool, report, err);
+	if (is_lit)
+		rc = shadow_prepare(&r->shadow, r->simd, &r->plan, &r->bins, scene, pool, report, err);
+	else
+		effect_note(report, PSR_EFFECT_SHADOWS, PSR_WHY_OFF, 0);
 	if (rc)
 		return rc;
 	report->ns[PSR_STAGE_SHADOW] = (end = now_ns()) - start;
@@ -275,7 +279,7 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 {
 	fenv_t callers;
 	set_environment(&callers);
-	const int rc = make_stack(r, scene, settings, pool, stack, report, err);
+	const int rc = make_stack(r, scene, settings, 1, pool, stack, report, err);
 	fesetenv(&callers);
 	return rc;
 }
@@ -313,7 +317,7 @@ int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const 
 	struct psr_zstack *stack;
 	fenv_t callers;
 	set_environment(&callers);
-	const int rc = make_stack(r, scene, settings, pool, &stack, &report, err);
+	const int rc = make_stack(r, scene, settings, 0, pool, &stack, &report, err);
 	r->is_covered = is_covered;
 	if (rc == PSR_OK)
 		psr_pool_for(pool, (int)n_rows(&r->plan), cover_one, r);
@@ -472,6 +476,11 @@ int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const stru
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	struct psr_zstack *stack;
-	int rc = psr_warp(r, scene, settings, pool, &stack, &frame->report, err);
-	return rc ? rc : psr_finish(r, stack, pool, frame, err);
+	fenv_t callers;
+	set_environment(&callers);
+	int rc = make_stack(r, scene, settings, frame->rgb != NULL, pool, &stack, &frame->report, err);
+	if (rc == PSR_OK)
+		rc = finish_stack(r, stack, pool, frame, err);
+	fesetenv(&callers);
+	return rc;
 }
