@@ -156,12 +156,13 @@ UNIT_LIGHT := $(filter-out $(UNIT_BUILD),$(UNIT))
 unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
 FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
 FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
-TOOLS      := $(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c))
+TOOLS_BUILD := $(BUILD)/tests/tools/closed
+TOOLS      := $(filter-out $(TOOLS_BUILD),$(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c)))
 SIMD_TESTS := $(patsubst tests/simd/%.c,$(BUILD)/tests/simd/%,$(wildcard tests/simd/*.c))
 GOLDEN     := $(BUILD)/tests/golden/frames
 TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SIMD_TESTS) $(GOLDEN)
 ifneq ($(filter release debug,$(config)),)
-TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD)
+TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD) $(TOOLS_BUILD)
 endif
 ifeq ($(config),aarch64)
 TEST_BIN   := $(GOLDEN)
@@ -203,6 +204,8 @@ $(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c s
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
+$(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_BUILD_HERE) $(L_PSR)
 
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)

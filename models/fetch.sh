@@ -41,13 +41,22 @@ manifest() {
 	6f7f3ca1abc506569466b72f2f59d49493a284e7376d7a7e23c08115ec8cec4e armadillo armadillo.off
 	a170eed4ef33ef412a72b824d791f69ea59ee5f5a7c12dc1ae9077b6eb030650 elephant elephant.off
 	94c05829a78b1ebbb6882dda0e5e263f30331ff10820a0beb61843001ad0b46d b9_training b9_training.ply
+	8d66f31c54745535811768ab1e04e580c441a6824a4a64e0accf241c3763adb7 anchor anchor.off
+	01fc9017b44a803b1130f8f5d51f0c7d8bbfa27b908f5166c498fe21e57f2284 couplingdown couplingdown.off
+	edffb263f037b023757259befd5532fccb48bdc3c35a1da2e11e235a647bd050 fandisk fandisk.off
+	0669ab781a80570cfdd2932b06a7c33f89fd855a9ddb69dc45e50082253a5a32 helmet helmet.off
+	cf159eeb12a3f3f345e57448693e9f0d115f3f6f38fd1d4519b336cede849289 lionhead lionhead.off
+	d8b13239b988d0262fbc91e88da1d314eeb1b284c327a3fe76089c2b54886ccf nefertiti nefertiti.off
+	8db85ca5041eef6d952e48f0553a25fddb42f237b80a37b7aff096b8df3aca32 rotor rotor.off
 	be80e556e664f4f78c9ffaf5a4572e3db25215d236907d9e1262150e8e36bd34 ficus ficus/ficusTree.obj
 	318e6f01022d4a5e919823f1d9991dea5bb4ec1d3260f8936f57bf7c7db280fc ficus ficus/ficusTree.mtl
 	8d820f9c92cc0a362323d2e091513c648658fae04f1f6ccd968dae7942bea036 ficus ficus/ficusTreeTexture.jpg
 	END
 }
 
-models="dragon bunny engine clearcoat armadillo elephant b9_training"
+# Each is NAME.off.
+cgal_meshes="anchor couplingdown fandisk helmet lionhead nefertiti rotor"
+models="dragon bunny engine clearcoat armadillo elephant b9_training $cgal_meshes"
 large_models="ficus"
 
 # what stands directly in the cache folder: a file, or the folder that holds a model's files
@@ -61,6 +70,7 @@ entry_of() {
 	elephant) say elephant.off ;;
 	b9_training) say b9_training.ply ;;
 	ficus) say ficus ;;
+	*) say "$1.off" ;;
 	esac
 }
 
@@ -86,10 +96,10 @@ licence_of() {
 		"Khronos' glTF sample models); Debian's assimp-testmodels lists it as BSD-3-clause with the rest of assimp." ;;
 	armadillo) say "in the data of CGAL (Debian's libcgal-demo), which names no licence of its own for it. The shape is the" \
 		"Armadillo of the Stanford 3D Scanning Repository, please give credit to it; its terms are those of dragon." ;;
-	elephant | b9_training) say "in the data of CGAL (Debian's libcgal-demo), which is GPL-3+ and LGPL-3+ and names no" \
-		"licence of its own for it." ;;
 	ficus) say "CC-BY 3.0, copyright 2014-2020 Emmanuel Puybaret / eTeks and Scopia Visual Interfaces Systems, s.l." \
 		"(http://www.scopia.es), in Debian's sweethome3d-furniture." ;;
+	*) say "in the data of CGAL (Debian's libcgal-demo), which is GPL-3+ and LGPL-3+ and names no" \
+		"licence of its own for it." ;;
 	esac
 }
 
@@ -207,6 +217,34 @@ fetch_elephant() {
 
 fetch_b9_training() {
 	from_cgal points_3/b9_training.ply "$1/b9_training.ply"
+}
+
+fetch_anchor() {
+	from_cgal meshes/anchor_dense.off "$1/anchor.off"
+}
+
+fetch_couplingdown() {
+	from_cgal meshes/couplingdown.off "$1/couplingdown.off"
+}
+
+fetch_fandisk() {
+	from_cgal meshes/fandisk.off "$1/fandisk.off"
+}
+
+fetch_helmet() {
+	from_cgal meshes/helmet.off "$1/helmet.off"
+}
+
+fetch_lionhead() {
+	from_cgal meshes/lion-head.off "$1/lionhead.off"
+}
+
+fetch_nefertiti() {
+	from_cgal meshes/nefertiti.off "$1/nefertiti.off"
+}
+
+fetch_rotor() {
+	from_cgal meshes/rotor.off "$1/rotor.off"
 }
 
 # The furniture is in a zip file within the package.

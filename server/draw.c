@@ -161,8 +161,7 @@ static void *take_plane(uint8_t **next, const struct psr_frame *picture, uint32_
 static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, struct psr_frame *picture,
                           struct psr_error *err)
 {
-	/* Colour is drawn whether it was asked for or not. */
-	uint32_t wanted = d->request.planes | 1u << PSR_WIRE_PLANE_COLOR;
+	const uint32_t wanted = d->request.planes;
 	uint64_t n = (uint64_t)d->request.width * d->request.height, bytes = 0;
 	uint8_t *next;
 

@@ -441,7 +441,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	}
 	report->error_bound = 0.5 + (double)depth_error;
 	if (plan->with_splats)
-		report->levels &= 1;
+		report->levels |= report->levels & 1 ? 2 : 0;
 	else if (plan->is_full)
 		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
 	note_tests(plan, report, n_masked, n_mixed);

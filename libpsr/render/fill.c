@@ -318,7 +318,8 @@ void fill_pull(struct fill *fill, uint32_t row)
 			level = wants[b] > level ? wants[b] : level;
 		for (int l = 1; l <= level; l++) {
 			complete_weights(fill, bx, end, row, l);
-			fill_pull_colors(fill, bx, end, row, l);
+			if (fill->picture.rgb)
+				fill_pull_colors(fill, bx, end, row, l);
 		}
 	}
 	for (int l = fill->needed - 1; l > 0; l--)
@@ -348,7 +349,8 @@ static void run_coarse(struct fill *fill)
 			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
 			fill->simd->fill_pull_weights(&row, &upper, &lower, to->width, fill_scale(fill->plan, l + 1),
 			                              fill_offset(fill->plan, l + 1));
-			fill->simd->fill_pull_colors(&row, &upper, &lower, to->width, 0);
+			if (fill->picture.rgb)
+				fill->simd->fill_pull_colors(&row, &upper, &lower, to->width, 0);
 		}
 	}
 	finish_top(&fill->level[fill->top], fill->plan);

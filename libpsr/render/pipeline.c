@@ -17,6 +17,8 @@ struct psr_renderer {
 	struct fill fill;
 	struct smooth smooth;
 	struct psr_zstack stack;
+	const struct inside *inside; /* of frames with splats, or NULL */
+	uint8_t *is_covered;         /* of the call of renderer_cover in progress */
 	struct psr_report report; /* of psr_warp, until psr_finish */
 	struct psr_frame *frame;  /* of the call in progress */
 	int has_planes;           /* it wants more than colour and depth */
@@ -215,8 +217,9 @@ static void warp_one(int i, void *userdata)
 		                                  : warp_tile(r->simd, plan, &r->bins, &r->stack, tile, clean, NULL);
 }
 
+/* Shadow maps are drawn if what the stack shows will be lit; else those of earlier frames stay as they are. */
 static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
-                      struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
+                      int is_lit, struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
                       struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
@@ -232,7 +235,10 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
 	start = end;
 
-	rc = shadow_prepare(&r->shadow, r->simd, &r->plan, &r->bins, scene, pool, report, err);
+	if (is_lit)
+		rc = shadow_prepare(&r->shadow, r->simd, &r->plan, &r->bins, scene, pool, report, err);
+	else
+		effect_note(report, PSR_EFFECT_SHADOWS, PSR_WHY_OFF, 0);
 	if (rc)
 		return rc;
 	report->ns[PSR_STAGE_SHADOW] = (end = now_ns()) - start;
@@ -273,7 +279,7 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 {
 	fenv_t callers;
 	set_environment(&callers);
-	const int rc = make_stack(r, scene, settings, pool, stack, report, err);
+	const int rc = make_stack(r, scene, settings, 1, pool, stack, report, err);
 	fesetenv(&callers);
 	return rc;
 }
@@ -281,12 +287,47 @@ int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct
 static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
-	r->gaps[row] =
-		gaps_rows(r->simd, &r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(&r->plan, row);
+	struct psr_zstack stack = r->stack;
 	if (r->plan.with_splats)
-		r->gaps[row].n_marked +=
-			splat_close(&r->plan, &r->stack, (uint32_t)row * BRICK, row_end(&r->plan, row), r->weight, r->bricks);
+		stack.levels = 0; /* discs cover for themselves */
+	r->gaps[row] = gaps_rows(r->simd, &r->plan, &stack, y0, y1, r->weight, r->bricks);
+	if (r->plan.with_splats)
+		r->gaps[row].n_marked += splat_close(&r->plan, &r->stack, r->inside, y0, y1, r->weight, r->bricks);
 	fill_look(&r->fill, (uint32_t)row);
+}
+
+static void cover_one(int row, void *userdata)
+{
+	struct psr_renderer *r = userdata;
+	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(&r->plan, row), width = r->plan.width;
+	gaps_rows(r->simd, &r->plan, &r->stack, y0, y1, r->weight, r->bricks);
+	for (uint32_t y = y0; y < y1; y++) {
+		const uint64_t *word = psr_zstack_row(&r->stack, y);
+		for (uint32_t x = 0; x < width; x++)
+			r->is_covered[(size_t)y * width + x] =
+				word[x] != PSR_WORD_EMPTY || r->weight[(size_t)y * width + x] < WEIGHT_ONE / 2;
+	}
+}
+
+int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                   struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err)
+{
+	struct psr_report report;
+	struct psr_zstack *stack;
+	fenv_t callers;
+	set_environment(&callers);
+	const int rc = make_stack(r, scene, settings, 0, pool, &stack, &report, err);
+	r->is_covered = is_covered;
+	if (rc == PSR_OK)
+		psr_pool_for(pool, (int)n_rows(&r->plan), cover_one, r);
+	fesetenv(&callers);
+	return rc;
+}
+
+void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)
+{
+	r->inside = inside;
 }
 
 static void shade_one(int row, void *userdata)
@@ -336,7 +377,8 @@ static void report_shading(const struct psr_renderer *r, struct psr_report *repo
 	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : none, all.n_pixels);
 	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : none, all.n_specular);
 	const uint64_t fill_ns = part_of(wall, all.fill_ns, all.row_ns);
-	report->n_covered = report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = all.n_pixels;
+	report->n_covered = all.n_pixels;
+	report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = r->frame->rgb ? all.n_pixels : 0;
 	report->ns[PSR_STAGE_FILL] += fill_ns;
 	report->ns[PSR_STAGE_RESOLVE] = part_of(wall - fill_ns, all.resolve_ns, all.shade_ns);
 	report->ns[PSR_STAGE_SHADE] = wall - fill_ns - report->ns[PSR_STAGE_RESOLVE];
@@ -434,6 +476,11 @@ int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const stru
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	struct psr_zstack *stack;
-	int rc = psr_warp(r, scene, settings, pool, &stack, &frame->report, err);
-	return rc ? rc : psr_finish(r, stack, pool, frame, err);
+	fenv_t callers;
+	set_environment(&callers);
+	int rc = make_stack(r, scene, settings, frame->rgb != NULL, pool, &stack, &frame->report, err);
+	if (rc == PSR_OK)
+		rc = finish_stack(r, stack, pool, frame, err);
+	fesetenv(&callers);
+	return rc;
 }

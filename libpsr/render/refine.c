@@ -12,6 +12,10 @@
 #define MARGIN 64
 #define STEP_X (WINDOW_WIDTH - 2 * MARGIN)
 #define STEP_Y (WINDOW_HEIGHT - 2 * MARGIN)
+/* Pixels. The plain frame's edges are up to a sample's distance outside of the silhouette, and what lies between two
+ * things that it shows as one ends nearer than this. Measured: with two in the place of four a wheel at 256 loses 1.7
+ * dB. */
+#define INSIDE 4
 _Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MAX_DEPTH_LEVEL) == 0,
                "cells stay where they are");
 _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
@@ -20,6 +24,8 @@ struct psr_refiner {
 	struct psr_renderer *renderer;
 	uint8_t *rgb; /* of a window, and its depths behind them */
 	float *depth;
+	uint8_t *is_inside; /* by pixel of the picture, and room for as much again */
+	size_t inside_size;
 	uint8_t srgb[65536];   /* of 16-bit linear light */
 	uint16_t linear[256];
 };
@@ -30,6 +36,11 @@ struct part {
 	struct psr_frame *frame;
 	uint32_t x0, x1, y0, left, top, stride;
 	unsigned pass;
+};
+
+struct erosion {
+	uint8_t *is_inside, *scratch;
+	uint32_t width, height;
 };
 
 int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer)
@@ -58,42 +69,54 @@ void psr_refiner_destroy(struct psr_refiner *r)
 	if (!r)
 		return;
 	psr_free(r->depth);
+	psr_free_huge(r->is_inside, r->inside_size);
 	free(r);
 }
 
 uint64_t psr_refiner_bytes(const struct psr_refiner *r)
 {
-	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3);
+	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3) + r->inside_size;
+}
+
+static void average_color(const struct part *part, size_t first, size_t at)
+{
+	const struct psr_refiner *r = part->refiner;
+	const uint32_t side = 1u << part->pass, half = 1u << (2 * part->pass - 1);
+	uint32_t sum[3] = { half, half, half };
+	for (uint32_t j = 0; j < side; j++) {
+		const uint8_t *rgb = r->rgb + 3 * (first + (size_t)j * part->stride);
+		for (uint32_t i = 0; i < side; i++)
+			for (int c = 0; c < 3; c++)
+				sum[c] += r->linear[rgb[3 * i + (uint32_t)c]];
+	}
+	for (int c = 0; c < 3; c++)
+		part->frame->rgb[3 * at + (size_t)c] = r->srgb[sum[c] >> 2 * part->pass];
+}
+
+static void find_nearest(const struct part *part, size_t first, size_t at)
+{
+	const uint32_t side = 1u << part->pass;
+	float nearest = INFINITY;
+	for (uint32_t j = 0; j < side; j++)
+		for (uint32_t i = 0; i < side; i++) {
+			const float z = part->refiner->depth[first + (size_t)j * part->stride + i];
+			nearest = z < nearest ? z : nearest;
+		}
+	part->frame->depth[at] = nearest;
 }
 
 static void average_row(int row, void *userdata)
 {
 	const struct part *part = userdata;
-	const struct psr_refiner *r = part->refiner;
 	const uint32_t side = 1u << part->pass, y = part->y0 + (uint32_t)row;
-	const uint32_t half = 1u << (2 * part->pass - 1);
 	for (uint32_t x = part->x0; x < part->x1; x++) {
 		const size_t first =
 			(size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
 		const size_t at = (size_t)y * part->frame->width + x;
-		uint32_t sum[3] = { half, half, half };
-		for (uint32_t j = 0; j < side; j++) {
-			const uint8_t *rgb = r->rgb + 3 * (first + (size_t)j * part->stride);
-			for (uint32_t i = 0; i < side; i++)
-				for (int c = 0; c < 3; c++)
-					sum[c] += r->linear[rgb[3 * i + (uint32_t)c]];
-		}
-		for (int c = 0; c < 3; c++)
-			part->frame->rgb[3 * at + (size_t)c] = r->srgb[sum[c] >> 2 * part->pass];
-		if (!part->frame->depth)
-			continue;
-		float nearest = INFINITY;
-		for (uint32_t j = 0; j < side; j++)
-			for (uint32_t i = 0; i < side; i++) {
-				const float z = r->depth[first + (size_t)j * part->stride + i];
-				nearest = z < nearest ? z : nearest;
-			}
-		part->frame->depth[at] = nearest;
+		if (part->frame->rgb)
+			average_color(part, first, at);
+		if (part->frame->depth)
+			find_nearest(part, first, at);
 	}
 }
 
@@ -136,9 +159,12 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 
 	struct psr_frame fine = { .width = window.width,
 		                      .height = window.height,
-		                      .rgb = r->rgb,
+		                      .rgb = frame->rgb ? r->rgb : NULL,
 		                      .depth = frame->depth ? r->depth : NULL };
+	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
+	renderer_set_inside(r->renderer, &inside);
 	const int rc = psr_render(r->renderer, scene, &window, pool, &fine, err);
+	renderer_set_inside(r->renderer, NULL);
 	if (rc)
 		return rc;
 	const uint32_t from_x = i ? MARGIN : 0, to_x = is_last_x ? window.width : WINDOW_WIDTH - MARGIN;
@@ -149,6 +175,50 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 	};
 	psr_pool_for(pool, (int)((to_y - from_y) >> pass), average_row, &part);
 	add_report(&frame->report, &fine.report, pass);
+	return PSR_OK;
+}
+
+/* Of a run of n pixels that lie `step` apart: each becomes 1 where all are that lie within INSIDE of it. What would lie
+ * beyond the picture does not count. */
+static void erode(uint8_t *to, const uint8_t *from, uint32_t n, size_t step)
+{
+	uint32_t n_whole = 0; /* up to here, without any that is 0 */
+	for (uint32_t x = 0; x < n + INSIDE; x++) {
+		n_whole = x >= n || from[x * step] ? n_whole + 1 : 0;
+		if (x >= INSIDE)
+			to[(x - INSIDE) * step] = n_whole >= (x < 2 * INSIDE ? x + 1 : 2 * INSIDE + 1);
+	}
+}
+
+static void erode_row(int y, void *userdata)
+{
+	const struct erosion *e = userdata;
+	const size_t first = (size_t)y * e->width;
+	erode(e->scratch + first, e->is_inside + first, e->width, 1);
+}
+
+static void erode_column(int x, void *userdata)
+{
+	const struct erosion *e = userdata;
+	erode(e->is_inside + x, e->scratch + x, e->height, e->width);
+}
+
+/* Which pixels lie well inside of what the plain frame covers: there a pass shows no background between discs. */
+static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings,
+                       struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
+{
+	const size_t area = (size_t)settings->width * settings->height;
+	const uint64_t start = now_ns();
+	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
+	if (!r->is_inside)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
+	const int rc = renderer_cover(r->renderer, scene, settings, pool, r->is_inside, err);
+	if (rc)
+		return rc;
+	struct erosion erosion = { r->is_inside, r->is_inside + area, settings->width, settings->height };
+	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
+	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
+	report->ns[PSR_STAGE_GAPS] += now_ns() - start;
 	return PSR_OK;
 }
 
@@ -175,11 +245,14 @@ int psr_refine(struct psr_refiner *r, const struct psr_scene *scene, const struc
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
+	int rc = find_inside(r, scene, settings, pool, &frame->report, err);
+	if (rc)
+		return rc;
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x; i++) {
 			if (is_cancelled && is_cancelled(userdata))
 				return psr_fail(err, PSR_ERR_CANCELLED, "nobody waits for pass %u any more", pass);
-			const int rc = draw_window(r, scene, settings, pass, i, j, pool, frame, err);
+			rc = draw_window(r, scene, settings, pass, i, j, pool, frame, err);
 			if (rc)
 				return rc;
 		}

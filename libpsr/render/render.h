@@ -147,6 +147,11 @@ static inline int plan_is_quiet(const struct plan *plan, uint32_t x, uint32_t y)
 /* The bits of a tile's parts that are 1 in a map of the picture's parts, and of those outside of the picture. */
 uint32_t warp_parts(const struct plan *plan, const uint8_t *map, uint32_t tile);
 
+/* A tile of the stack, with nothing clean or bare. Its words are where the picture has them, unless `own` has room for
+ * them. */
+void warp_target_make(struct warp_target *target, const struct plan *plan, const struct psr_zstack *stack,
+                      uint32_t tile, uint64_t *own);
+
 /* Clears a tile but for parts that are clean, by bits, and draws its blocks. Its words are the stack's, or, where `own`
  * is not NULL, WARP_OWN_WORDS there in rows WARP_OWN_STRIDE apart, for who needs no others: they stay in a cache. Cells
  * are the stack's always. */
@@ -155,16 +160,25 @@ uint32_t warp_parts(const struct plan *plan, const uint8_t *map, uint32_t tile);
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              struct psr_zstack *stack, uint32_t tile, uint32_t clean, uint64_t *own);
 
-/* The same with splats: each sample is a disc about it, of its projection's plane brought onto its tangent plane, which
- * reaches its neighbours' ([B] 3). There are no depth buffers but the picture's then. */
+/* The same with splats: each sample is a disc about it, of its projection's plane brought onto the surface's, which
+ * reaches its neighbours' ([B] 3). Cells are the samples', for splat_close: of two pixels where blocks need none. */
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
-/* Discs on a rough surface do not meet everywhere: a pixel that is before nothing, or behind by more than level 1's
- * threshold, where one surface is within some pixels of it in each of eight directions, gets weight 0 and marks its
- * brick. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
-uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1,
-                     uint16_t *weight, uint8_t *bricks);
+/* Pixels of a picture that are well inside of what its plain frame covers; the frame's pixel (0, 0) is sub-pixel (left,
+ * top) of the picture, which has 2^pass along the side of a pixel. */
+struct inside {
+	const uint8_t *is_inside; /* width in a row */
+	uint32_t width, left, top;
+	unsigned pass;
+};
+
+/* Discs do not meet everywhere. Two kinds of pixels get weight 0 and mark their brick: those that are inside (NULL:
+ * nothing is known of that) and lie behind samples in each of the 3 x 3 cells about them by more than their level's
+ * threshold; and those before nothing, or behind by more than level 1's threshold, where one surface is within a cell,
+ * or some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows. Returns how many there are. */
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
+                     uint32_t y1, uint16_t *weight, uint8_t *bricks);
 
 /* ---- gaps: weights from the level buffers, and a guard against pinholes ([G] 4.6, 9.1.2) ---- */
 
@@ -333,6 +347,15 @@ void smooth_clear(struct smooth *smooth);
 /* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
 uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                         uint8_t *rgb);
+
+/* ---- for refinement: what the plain frame covers ---- */
+
+/* 1 where the plain frame has a sample, or cells cover at least half of a pixel; width * height. */
+int renderer_cover(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
+                   struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err);
+
+/* What frames with splats are inside of from now on; NULL: nothing is known. It must hold while they are drawn. */
+void renderer_set_inside(struct psr_renderer *renderer, const struct inside *inside);
 
 /* ---- for tests: a renderer that calls other kernels ---- */
 

@@ -8,10 +8,12 @@
 
 /* Steps of the lattice: no point of an equilateral one is further than 1/sqrt(3) from a sample. */
 #define RADIUS 0.6f
-/* Of the tangent plane against the projection's. Projections own what they see at less than 50 degrees, and normals of
- * steeper places are mostly those of a texture or of something smaller than the disc; steps would stick out.
- * Measured. */
+/* Of the tangent plane against the projection's, where the lattice does not tell. Projections own what they see at less
+ * than 50 degrees, and normals of steeper places are mostly those of a texture or of something smaller than the disc;
+ * steps would stick out. Measured. */
 #define MOST_SLOPE 0.7f
+/* Of a plane on which neighbours agree, however steep a face may be that another projection would own. */
+#define MOST_STEEP 3.0f
 /* Of a disc whose sample has no neighbours on either side, along that line: what it lies on is narrower than a step. */
 #define NARROW 0.5f
 /* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest
@@ -44,73 +46,132 @@ static inline int32_t within(float x, int32_t low, int32_t high)
 	return x <= (float)low ? low : x < (float)high ? (int32_t)x : high;
 }
 
-/* Pixels whose centres are in the ellipse, and the one that its centre is in. Returns whether that is of the tile. */
-static int draw_splat(const struct splat_target *t, const struct splat *s)
+/* Shrinks a disc that reaches further than blocks are binned for. */
+static void limit_reach(struct splat *s)
+{
+	const float *a = s->radius[0], *b = s->radius[1];
+	const float x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]), y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
+	const float extent = x > y ? x : y;
+	if (extent > s->most)
+		for (int i = 0; i < 2; i++)
+			v3f_scale(s->radius[i], s->radius[i], s->most / extent);
+}
+
+/* Pixels whose centres are in the ellipse. That which the disc's own centre is in need not be: discs meet their
+ * neighbours', and one more pixel at each edge would be too much. */
+static void draw_splat(const struct splat_target *t, const struct splat *s)
 {
 	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1];
 	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
 				extent_y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
 	const float area = a[0] * b[1] - a[1] * b[0];
-	if (extent_x <= s->most && extent_y <= s->most && area != 0) {
-		const float p_x = b[1] / area, p_y = -b[0] / area, q_x = -a[1] / area, q_y = a[0] / area;
-		const int32_t x0 = within(u - extent_x, t->x0, t->x1), x1 = within(u + extent_x + 1, t->x0, t->x1);
-		const int32_t y0 = within(v - extent_y, t->y0, t->y1), y1 = within(v + extent_y + 1, t->y0, t->y1);
-		for (int32_t y = y0; y < y1; y++)
-			for (int32_t x = x0; x < x1; x++) {
-				const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
-				const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
-				const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
-				if (square <= 1 && z > t->plan->near_z)
-					lower(t, x, y, z, s->id);
-			}
-	}
-	if (!(u >= (float)t->x0 && u < (float)t->x1 && v >= (float)t->y0 && v < (float)t->y1))
+	if (!(area < 0 || area > 0))
+		return;
+	const float p_x = b[1] / area, p_y = -b[0] / area, q_x = -a[1] / area, q_y = a[0] / area;
+	const int32_t x0 = within(u - extent_x, t->x0, t->x1), x1 = within(u + extent_x + 1, t->x0, t->x1);
+	const int32_t y0 = within(v - extent_y, t->y0, t->y1), y1 = within(v + extent_y + 1, t->y0, t->y1);
+	for (int32_t y = y0; y < y1; y++)
+		for (int32_t x = x0; x < x1; x++) {
+			const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
+			const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
+			const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
+			if (square <= 1 && z > t->plan->near_z)
+				lower(t, x, y, z, s->id);
+		}
+}
+
+/* Depths of a block's samples by place. */
+struct lattice_depths {
+	uint64_t mask;
+	uint16_t depth[PSR_BLOCK_SAMPLES];
+	float rise; /* of a step of depth, in steps of the lattice */
+};
+
+static void place_depths(struct lattice_depths *to, const struct warp_block *b, float rise)
+{
+	const uint16_t *depth = b->depth;
+	to->mask = b->mask;
+	to->rise = rise;
+	for (uint64_t left = b->mask; left; left &= left - 1)
+		to->depth[__builtin_ctzll(left)] = *depth++;
+}
+
+/* Slope towards a neighbour, if the block has it. */
+static inline int slope_to(float *slope, const struct lattice_depths *at, int own, int row, int col)
+{
+	if (((row | col) & ~7) != 0 || !(at->mask >> (8 * row + col) & 1))
 		return 0;
-	lower(t, (int32_t)u, (int32_t)v, s->at[2], s->id);
+	*slope = (float)((int)at->depth[8 * row + col] - own) * at->rise;
 	return 1;
 }
 
-/* 0 if there is surely no sample; outside of the block there may be. */
-static inline int may_have(uint64_t mask, int row, int col)
+/* Slope along a line of the lattice: the normal's, as far as it is between the slopes to the neighbours before and
+ * behind. Without both of them, `safe`. */
+static inline float slope_along(int has_next, float next, int has_last, float last, float normal, float safe)
 {
-	return ((row | col) & ~7) != 0 || (mask >> (8 * row + col) & 1);
-}
-
-/* How much of the radius along the rows, and across them, is covered: in odd rows samples are half a step to the
- * right. */
-static void find_neighbors(float share[2], uint64_t mask, uint32_t sample)
-{
-	const int r = (int)(sample >> 3), c = (int)(sample & 7), left = c - 1 + (r & 1);
-	const int beside = may_have(mask, r, c - 1) | may_have(mask, r, c + 1);
-	const int across = may_have(mask, r - 1, left) | may_have(mask, r - 1, left + 1) | may_have(mask, r + 1, left) |
-	                   may_have(mask, r + 1, left + 1);
-	share[0] = beside ? 1 : NARROW;
-	share[1] = across ? 1 : NARROW;
+	const float low = next < -last ? next : -last, high = next < -last ? -last : next;
+	if (!(has_next && has_last))
+		return safe;
+	return normal > low ? normal < high ? normal : high : low;
 }
 
 /* How z of the projection rises along its x and y, on the plane of a normal. */
-static void find_slope(float slope[2], const float n[3], const struct psr_projection *projection)
+static void slope_of_normal(float slope[2], const float n[3], const struct psr_projection *projection)
 {
 	const float nz = v3f_dot(n, projection->axis[2]);
 	slope[0] = -v3f_dot(n, projection->axis[0]) / nz;
 	slope[1] = -v3f_dot(n, projection->axis[1]) / nz;
+}
+
+static void limit_slope(float slope[2], float most)
+{
 	const float length = __builtin_sqrtf(slope[0] * slope[0] + slope[1] * slope[1]);
-	if (!(length <= MOST_SLOPE)) {
+	if (!(length <= most)) {
 		const int is_vertical = !(length < 0x1p60f);
-		slope[0] = is_vertical ? 0 : slope[0] * (MOST_SLOPE / length);
-		slope[1] = is_vertical ? 0 : slope[1] * (MOST_SLOPE / length);
+		slope[0] = is_vertical ? 0 : slope[0] * (most / length);
+		slope[1] = is_vertical ? 0 : slope[1] * (most / length);
 	}
 }
 
-static uint64_t draw_block(const struct splat_target *t, const struct bin_entry *entry)
+/* The plane of the normal, along each of the lattice's three lines as far as depths on both sides agree with it: a
+ * normal may be that of a map, or of a rounded corner. In odd rows samples are half a step to the right. Also how much
+ * of the radius along the rows, and across them, is covered. */
+static void find_plane(float slope[2], float share[2], const struct lattice_depths *at, uint32_t sample,
+                       const float n[3], const struct psr_projection *projection)
+{
+	static const float half = 0.5f, high = 0.866025404f;
+	const int r = (int)(sample >> 3), c = (int)(sample & 7), own = at->depth[sample], left = c - 1 + (r & 1);
+	float normal[2], next[3] = { 0, 0, 0 }, last[3] = { 0, 0, 0 }, rise[3];
+	slope_of_normal(normal, n, projection);
+	const int has_next[3] = { slope_to(&next[0], at, own, r, c + 1), slope_to(&next[1], at, own, r + 1, left + 1),
+		                      slope_to(&next[2], at, own, r + 1, left) };
+	const int has_last[3] = { slope_to(&last[0], at, own, r, c - 1), slope_to(&last[1], at, own, r - 1, left),
+		                      slope_to(&last[2], at, own, r - 1, left + 1) };
+	const float along[3] = { normal[0], normal[0] * half + normal[1] * high, normal[1] * high - normal[0] * half };
+	limit_slope(normal, MOST_SLOPE);
+	const float safe[3] = { normal[0], normal[0] * half + normal[1] * high, normal[1] * high - normal[0] * half };
+	for (int i = 0; i < 3; i++)
+		rise[i] = slope_along(has_next[i], next[i], has_last[i], last[i], along[i], safe[i]);
+	slope[0] = (2 * rise[0] + rise[1] - rise[2]) / 3;
+	slope[1] = (rise[1] + rise[2]) / (2 * high);
+	limit_slope(slope, MOST_STEEP);
+	/* Outside of the block there may be some. */
+	const int beside = has_next[0] | has_last[0] | (c == 0) | (c == 7);
+	const int at_end = (r == 0) | (r == 7) | (left < 0) | (left == 7);
+	const int across = has_next[1] | has_next[2] | has_last[1] | has_last[2] | at_end;
+	share[0] = beside ? 1 : NARROW;
+	share[1] = across ? 1 : NARROW;
+}
+
+static void draw_block(const struct splat_target *t, const struct bin_entry *entry)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
 	const struct psr_projection *projection =
 		&in->blocks->projection[in->blocks->block_projection[entry->slot - in->first_slot]];
 	const float (*normals)[3] = psr_direction_table();
 	const int perspective = t->plan->perspective;
+	struct lattice_depths at;
 	struct warp_block b;
-	uint64_t n_inside = 0;
 	warp_block_make(&b, in, entry->slot);
 	const float scale = (float)b.scale, step = projection->spacing * scale;
 	/* Radii in the projection's plane, along x and y, and along z for a slope of 1. */
@@ -120,8 +181,9 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 		radius[1][a] = RADIUS * scale * (float)b.lattice->down[a] / 0.866025404f;
 		along[a] = RADIUS * step * (float)b.lattice->along[a];
 	}
+	place_depths(&at, &b, b.rise / (projection->spacing * (float)b.scale));
 	struct splat s = { .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,
-		               .most = (float)(2 << entry->level) };
+		               .most = (float)((1 << entry->level) + 2) };
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
@@ -137,8 +199,7 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 			d[k] = (s.at[0] * in->du[k] + s.at[1] * in->dv[k]) + in->d0[k];
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
-		find_slope(slope, n, projection);
-		find_neighbors(share, b.mask, sample);
+		find_plane(slope, share, &at, sample, n, projection);
 		for (int i = 0; i < 2; i++) {
 			float h[3];
 			for (int a = 0; a < 3; a++)
@@ -148,7 +209,26 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 			s.radius[i][2] = h[2];
 		}
 		s.id = b.id + sample;
-		n_inside += (uint64_t)draw_splat(t, &s);
+		limit_reach(&s);
+		draw_splat(t, &s);
+	}
+}
+
+/* The cells that samples fall into, by the warp, which draws words, too. Samples that are at most a pixel apart have
+ * cells of two pixels. */
+static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
+                           const struct bin_entry *entry, uint32_t n)
+{
+	uint64_t n_inside = 0;
+	simd->warp_clear(target, stack->levels);
+	for (uint32_t e = 0; e < n;) {
+		struct bin_entry some[256];
+		uint32_t n_some = 0;
+		for (; e < n && n_some < sizeof some / sizeof *some; e++, n_some++) {
+			some[n_some] = entry[e];
+			some[n_some].level = entry[e].level ? entry[e].level : 1;
+		}
+		n_inside += simd->warp(target, some, n_some);
 	}
 	return n_inside;
 }
@@ -156,101 +236,16 @@ static uint64_t draw_block(const struct splat_target *t, const struct bin_entry 
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean)
 {
-	const uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
-	struct warp_target target = { .stride = stack->width + stack->gap };
+	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_counts counts = { 0, 0, 0 };
-	target.x0 = (int32_t)(tx * TILE_WIDTH);
-	target.y0 = (int32_t)(ty * TILE_HEIGHT);
-	target.x1 = tx + 1 == plan->tiles_x ? (int32_t)plan->width : target.x0 + TILE_WIDTH;
-	target.y1 = ty + 1 == plan->tiles_y ? (int32_t)plan->height : target.y0 + TILE_HEIGHT;
+	struct warp_target target;
+	warp_target_make(&target, plan, stack, tile, NULL);
 	target.clean = clean;
-	target.word = psr_zstack_row(stack, (uint32_t)target.y0) + target.x0;
+	counts.n_inside = draw_cells(simd, &target, stack, bins->entry + begin, end - begin);
+	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan, target.word, target.stride, target.x0, target.y0, target.x1, target.y1 };
-	for (uint32_t e = bins->tile_begin[tile]; e < bins->tile_begin[tile + 1]; e++)
-		counts.n_inside += draw_block(&t, &bins->entry[e]);
+	for (uint32_t e = begin; e < end; e++)
+		draw_block(&t, &bins->entry[e]);
 	return counts;
-}
-
-/* ---- holes between discs ---- */
-
-#define REACH 8 /* pixels, a power of two */
-
-static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
-{
-	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
-		return INFINITY;
-	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
-}
-
-/* Whether what is before the pixel meets it in all eight directions, and is one surface. */
-static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y)
-{
-	static const int8_t way[8][2] = {
-		{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
-	};
-	const float z = depth_at(stack, x, y);
-	float nearest = INFINITY, farthest = 0;
-	for (int w = 0; w < 8; w++) {
-		int is_met = 0;
-		for (int i = 1; i <= REACH && !is_met; i++) {
-			const float other = depth_at(stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
-			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
-			nearest = is_met && other < nearest ? other : nearest;
-			farthest = is_met && other > farthest ? other : farthest;
-		}
-		if (!is_met)
-			return 0;
-	}
-	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
-}
-
-/* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x,
-                         uint32_t y, uint32_t n)
-{
-	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
-	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
-	const uint64_t *word = psr_zstack_row(stack, y) + x;
-	int has_any = 0;
-	for (uint32_t i = 0; i < REACH; i++)
-		nearest[i] = nearest[n + REACH + i] = z[i] = z[n + REACH + i] = INFINITY;
-	for (uint32_t i = first; i < end; i++) {
-		const uint32_t bits = (uint32_t)(word[(int32_t)i - REACH] >> 32);
-		nearest[i] = z[i] = psr_float_from_bits(bits);
-		has_any |= bits < (uint32_t)(PSR_WORD_EMPTY >> 32);
-	}
-	if (!has_any) {
-		memset(is_between, 0, n);
-		return;
-	}
-	for (uint32_t step = 1, left = n + 2 * REACH; step < REACH; step *= 2) {
-		left -= step;
-		for (uint32_t i = 0; i < left; i++)
-			nearest[i] = nearest[i] < nearest[i + step] ? nearest[i] : nearest[i + step];
-	}
-	for (uint32_t i = 0; i < n; i++) {
-		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
-		is_between[i] = farther * plan->gap_scale[1] + plan->gap_offset[1] < z[i + REACH];
-	}
-}
-
-uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, uint32_t y0, uint32_t y1,
-                     uint16_t *weight, uint8_t *bricks)
-{
-	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
-	uint8_t is_between[TILE_WIDTH];
-	uint32_t n_closed = 0;
-	for (uint32_t y = y0; y < y1; y++)
-		for (uint32_t x = 0; x < stack->width; x++) {
-			const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
-			if (x % TILE_WIDTH == 0)
-				find_between(is_between, plan, stack, x, y, n);
-			if (is_between[x % TILE_WIDTH] && weight[(size_t)y * stack->width + x] && is_enclosed(plan, stack, x, y)) {
-				weight[(size_t)y * stack->width + x] = 0;
-				bricks[y / BRICK * bricks_x + x / BRICK] = 1;
-				n_closed++;
-			}
-		}
-	return n_closed;
 }

@@ -8,9 +8,8 @@ uint32_t warp_gap(uint32_t width)
 	return beyond < 2 * line ? 2 * line - beyond : 0;
 }
 
-/* The tile's words are where the picture has them, unless `own` has room for them. */
-static void target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack, uint32_t tile,
-                        uint64_t *own)
+void warp_target_make(struct warp_target *t, const struct plan *plan, const struct psr_zstack *stack,
+                      uint32_t tile, uint64_t *own)
 {
 	t->instance = plan->warp;
 	t->direction = psr_direction_tens();
@@ -195,7 +194,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
-	target_make(&target, plan, stack, tile, own);
+	warp_target_make(&target, plan, stack, tile, own);
 	target.clean = clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {

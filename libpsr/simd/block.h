@@ -8,6 +8,7 @@ struct warp_block {
 	double origin[3]; /* of its first lattice point, at depth 0 */
 	double scale;     /* 2^level */
 	float unit[3];    /* what a step of depth adds */
+	float rise;       /* a step of depth, in inner units */
 	const struct warp_lattice *lattice;
 	const uint16_t *depth;
 	const uint64_t *attr;
@@ -36,6 +37,7 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 		out->unit[a] = (float)lattice->along[a] * place.step;
 	}
 	out->scale = scale;
+	out->rise = place.step;
 	out->lattice = lattice;
 	out->depth = b->depth + first;
 	out->attr = b->attr + first;

@@ -409,6 +409,9 @@ static void without_color_the_other_planes_are_the_same_and_nothing_is_shaded(vo
 	assert_memory_equal(bare->weight, all->weight, sizeof all->weight);
 	assert_memory_equal(bare->words, all->words, sizeof all->words);
 	assert_int_equal(bare->report.n_covered, all->report.n_covered);
+	assert_true(all->report.count[PSR_STAGE_RESOLVE] > 0 && all->report.count[PSR_STAGE_SHADE] > 0);
+	assert_int_equal(bare->report.count[PSR_STAGE_RESOLVE], 0);
+	assert_int_equal(bare->report.count[PSR_STAGE_SHADE], 0);
 	assert_int_equal(all->report.effect[PSR_EFFECT_TWO_SIDED].why, PSR_WHY_RAN);
 	assert_int_equal(bare->report.effect[PSR_EFFECT_TWO_SIDED].why, PSR_WHY_OFF);
 	free(all);

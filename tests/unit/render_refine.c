@@ -13,15 +13,17 @@
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
 
-static struct psr_model *sphere, *teapot;
+static struct psr_model *sphere, *fine_sphere, *teapot;
 
 static int open_models(void **state)
 {
 	const struct shape_options options = { .resolution = 128, .diffuse = 0xffffff, .unlit = 1, .cones = 1, .scale = 1 };
+	const struct shape_options finer = { .resolution = 512, .diffuse = 0xffffff, .unlit = 1, .cones = 1, .scale = 1 };
 	struct psr_error err;
 
 	(void)state;
 	sphere = shape_build(&options, 0.9);
+	fine_sphere = shape_build(&finer, 0.9);
 	return psr_model_read(&teapot, "tests/golden/teapot.psr", &err);
 }
 
@@ -29,6 +31,7 @@ static int close_models(void **state)
 {
 	(void)state;
 	psr_model_unref(sphere);
+	psr_model_unref(fine_sphere);
 	psr_model_unref(teapot);
 	return 0;
 }
@@ -94,14 +97,15 @@ static double area_of(const struct still *s)
 	return area;
 }
 
-/* The disc's area is known. A rim grows it: of half the diagonal of a sub-pixel at most, since samples keep those that
- * they are in, and of what splats reach beyond the disc. Where a sphere turns away, splats are within their slope's
- * limit of edge-on: they rise by at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere, which falls; no
- * more than a quarter of a step. A step is `pixels` pixels here. */
-static void the_area_of_a_sphere_converges(void **state)
+/* The disc's area is known. In pass 0 a rim grows it, of half the diagonal of a pixel at most, since samples fill those
+ * that they are in. In later passes what splats reach beyond the disc does, and half the diagonal of a sub-pixel, whose
+ * centre stands for all of it. Where a sphere turns away, splats are within their slope's limit of edge-on: they rise by
+ * at most (1 - sin(atan 0.7)) of a radius of 0.6 steps over the sphere, which falls; no more than a quarter of a step. A
+ * step is `pixels` pixels here. */
+static void the_area_of_a_sphere_is_that_of_its_disc(void **state)
 {
 	struct still s;
-	double last = INFINITY;
+	double plain = INFINITY;
 
 	(void)state;
 	still_make(&s, sphere, 160, 160);
@@ -114,8 +118,103 @@ static void the_area_of_a_sphere_converges(void **state)
 		const double error = fabs(area_of(&s) - truth);
 		const double rim = 0.71 / (1 << pass) + (pass ? 0.25 * pixels : 0);
 		assert_true(error <= 2 * 3.14159265358979323846 * radius * rim);
-		assert_true(error < last);
-		last = error;
+		assert_true(pass == 0 || error < plain);
+		plain = pass == 0 ? error : plain;
+	}
+	still_clear(&s);
+}
+
+/* The area of the sub-pixels whose centres are on a disc in the middle, in pixels. */
+static double area_by_centers(const struct still *s, unsigned pass, double radius)
+{
+	const double side = s->frame.width * (double)(1u << pass);
+	uint64_t n = 0;
+
+	for (uint32_t y = 0; y < (uint32_t)side; y++)
+		for (uint32_t x = 0; x < (uint32_t)side; x++)
+			n += hypot(x + 0.5 - side / 2, y + 0.5 - side / 2) <= radius * (1u << pass);
+	return (double)n / (double)(1u << 2 * pass);
+}
+
+/* Between the centres of sub-pixels on the disc, and on one that is a quarter of a step of the lattice larger (above):
+ * a sub-pixel is lit if a splat covers its centre, and not because a sample lies in it. The averages are of 8 bits: half
+ * a code of the rim's light, of which no code is steeper than 1/110. */
+static void samples_finer_than_sub_pixels_do_not_widen_edges(void **state)
+{
+	struct still s;
+
+	(void)state;
+	still_make(&s, fine_sphere, 160, 160);
+	s.scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
+	s.scene.camera.ortho_height = 2.5;
+	const double pixel = 2.5 / 160, radius = 0.9 / pixel, rim = 0.25 * psr_model_info(fine_sphere)->spacing / pixel;
+	for (unsigned pass = 1; pass <= 2; pass++) {
+		const double codes = 2 * 3.14159265358979323846 * radius * 1.5 * 0.5 / 110;
+		refine(&s, pass, NULL);
+		assert_true(area_of(&s) >= area_by_centers(&s, pass, radius) - codes);
+		assert_true(area_of(&s) <= area_by_centers(&s, pass, radius + rim) + codes);
+	}
+	still_clear(&s);
+}
+
+/* Pixels four or more inside of what pass 0 covers have the same colour before any background. */
+static void no_background_shows_through_a_surface(void **state)
+{
+	enum { SIDE = 150, INSIDE = 4 }; /* at which the golden teapot's samples are a pixel apart, or little more */
+	struct still s;
+	uint8_t *red = malloc(3 * SIDE * SIDE);
+
+	(void)state;
+	still_make(&s, teapot, SIDE, SIDE);
+	float *plain = malloc(SIDE * SIDE * sizeof *plain);
+	refine(&s, 0, NULL);
+	memcpy(plain, s.frame.depth, SIDE * SIDE * sizeof *plain);
+	for (unsigned pass = 0; pass <= PSR_MAX_PASS; pass++) {
+		uint32_t n_inside = 0;
+		for (int k = 0; k < 3; k++)
+			s.scene.background[k] = k == 0;
+		refine(&s, pass, NULL);
+		memcpy(red, s.frame.rgb, 3 * SIDE * SIDE);
+		for (int k = 0; k < 3; k++)
+			s.scene.background[k] = k == 2;
+		refine(&s, pass, NULL);
+		for (int y = INSIDE; y < SIDE - INSIDE; y++)
+			for (int x = INSIDE; x < SIDE - INSIDE; x++) {
+				int is_inside = 1;
+				for (int i = 0; i < (2 * INSIDE + 1) * (2 * INSIDE + 1); i++)
+					is_inside &= isfinite(plain[(y - INSIDE + i / (2 * INSIDE + 1)) * SIDE + x - INSIDE +
+					                            i % (2 * INSIDE + 1)]) != 0;
+				n_inside += (uint32_t)is_inside;
+				if (is_inside)
+					assert_memory_equal(red + 3 * (y * SIDE + x), s.frame.rgb + 3 * (y * SIDE + x), 3);
+			}
+		assert_true(n_inside > 1000);
+	}
+	free(plain);
+	free(red);
+	still_clear(&s);
+}
+
+static void depth_alone_is_refined_and_pays_for_no_color(void **state)
+{
+	struct still s;
+
+	(void)state;
+	still_make(&s, teapot, 200, 150);
+	for (unsigned pass = 0; pass <= 2; pass++) {
+		float *all = malloc(200 * 150 * sizeof *all);
+		uint8_t *rgb = s.frame.rgb;
+		refine(&s, pass, NULL);
+		assert_true(s.frame.report.count[PSR_STAGE_RESOLVE] > 0 && s.frame.report.count[PSR_STAGE_SHADE] > 0);
+		memcpy(all, s.frame.depth, 200 * 150 * sizeof *all);
+		memset(s.frame.depth, 0, 200 * 150 * sizeof *all);
+		s.frame.rgb = NULL;
+		refine(&s, pass, NULL);
+		s.frame.rgb = rgb;
+		assert_memory_equal(s.frame.depth, all, 200 * 150 * sizeof *all);
+		assert_int_equal(s.frame.report.count[PSR_STAGE_RESOLVE], 0);
+		assert_int_equal(s.frame.report.count[PSR_STAGE_SHADE], 0);
+		free(all);
 	}
 	still_clear(&s);
 }
@@ -262,54 +361,111 @@ static void the_door_refuses_what_is_no_still(void **state)
 	still_clear(&s);
 }
 
-/* A hole of 5 x 5 pixels in a surface, one that shows another surface far behind, and a notch at the surface's end. */
-static void holes_between_discs_are_closed_and_notches_are_not(void **state)
+/* A surface with a sample in each cell of 8 x 8 pixels, and in it holes: of 5 x 5 pixels, one of which shows another
+ * surface far behind, a crack of 3 pixels, open at its end, and a slot of three cells without samples. A notch at the
+ * surface's end. */
+static void holes_between_discs_are_closed_and_slots_and_notches_are_not(void **state)
 {
-	enum { WIDTH = 80, HEIGHT = 40 };
+	enum { WIDTH = 160, HEIGHT = 160, LEVEL = 3, CELLS = WIDTH / 8 + 2 };
 	static const struct {
-		uint32_t x, y;
+		uint32_t x, y, width, height, is_closed;
 		float z;
-	} places[] = { { 10, 10, INFINITY }, { 30, 20, 9 }, { 55, 10, INFINITY } };
-	const struct plan plan = { .gap_scale = { [1] = 1.03f, [4] = 1.24f } };
+	} places[] = {
+		{ 42, 44, 5, 5, 1, INFINITY }, { 60, 52, 5, 5, 1, 9 },         { 64, 76, WIDTH, 3, 0, INFINITY },
+		{ 64, 120, 24, 24, 0, INFINITY }, { 115, 20, 5, 5, 0, INFINITY },
+	};
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [LEVEL] = 1.12f, [4] = 1.24f } };
 	uint64_t *word = malloc(WIDTH * HEIGHT * sizeof *word);
-	uint16_t weight[WIDTH * HEIGHT];
-	uint8_t bricks[6] = { 0 };
-	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word };
+	uint16_t *weight = malloc(WIDTH * HEIGHT * sizeof *weight);
+	float *cell = malloc(CELLS * CELLS * sizeof *cell);
+	uint8_t bricks[WIDTH / BRICK * HEIGHT / BRICK] = { 0 };
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << LEVEL };
 
 	(void)state;
-	assert_non_null(word);
+	assert_true(word && weight && cell);
+	stack.level[LEVEL].z = cell;
+	stack.level[LEVEL].width = stack.level[LEVEL].height = CELLS;
 	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
 		const uint32_t x = i % WIDTH, y = i / WIDTH;
-		float z = x < 60 ? 2 : INFINITY;
+		float z = x < 120 ? 2 : INFINITY;
 		for (size_t p = 0; p < sizeof places / sizeof *places; p++)
-			z = x - places[p].x < 5 && y - places[p].y < 5 ? places[p].z : z;
+			z = x - places[p].x < places[p].width && y - places[p].y < places[p].height && x < 120 ? places[p].z : z;
 		uint32_t bits;
 		memcpy(&bits, &z, sizeof bits);
-		word[i] = (uint64_t)bits << 32;
+		word[i] = (uint64_t)bits << 32 | (z < INFINITY ? 0 : 0xffffffff);
 		weight[i] = WEIGHT_ONE;
 	}
-	assert_int_equal(splat_close(&plan, &stack, 0, BRICK, weight, bricks), 2 * 25);
+	for (uint32_t i = 0; i < CELLS * CELLS; i++) {
+		const uint32_t x = (i % CELLS - 1) * 8, y = (i / CELLS - 1) * 8;
+		cell[i] = x < 120 && y < HEIGHT && !(x - 64 < 24 && y - 120 < 24) ? 2 : INFINITY;
+	}
+	uint32_t n_closed = 0;
+	for (uint32_t y = 0; y < HEIGHT; y += BRICK)
+		n_closed += splat_close(&plan, &stack, NULL, y, y + BRICK, weight, bricks);
 	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
 		const uint32_t x = i % WIDTH, y = i / WIDTH;
-		const int is_hole =
-			(x - places[0].x < 5 && y - places[0].y < 5) || (x - places[1].x < 5 && y - places[1].y < 5);
-		assert_int_equal(weight[i], is_hole ? 0 : WEIGHT_ONE);
+		int is_closed = 0;
+		for (size_t p = 0; p < sizeof places / sizeof *places; p++)
+			if (x - places[p].x < places[p].width && y - places[p].y < places[p].height && x < 120)
+				is_closed = (int)places[p].is_closed;
+		/* The crack's own end is enclosed as far as a hole is looked across. */
+		if (!(y - 76 < 3 && x - 64 < 8))
+			assert_int_equal(weight[i], is_closed ? 0 : WEIGHT_ONE);
 	}
-	assert_true(bricks[0] && bricks[1] && !bricks[2]);
+	assert_in_range(n_closed, 2 * 25, 2 * 25 + 3 * 8);
+	assert_true(bricks[WIDTH / BRICK + 1] && !bricks[4]);
 	free(word);
+	free(weight);
+	free(cell);
+}
+
+/* Such a crack is closed where the plain frame covers all around, and nowhere else. */
+static void cracks_are_closed_inside_of_the_plain_frame(void **state)
+{
+	enum { WIDTH = 64, HEIGHT = 32, CELLS_X = WIDTH / 8 + 2, CELLS_Y = HEIGHT / 8 + 2 };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [3] = 1.12f, [4] = 1.24f } };
+	uint64_t word[WIDTH * HEIGHT];
+	uint16_t weight[WIDTH * HEIGHT];
+	float cell[CELLS_X * CELLS_Y];
+	uint8_t bricks[2], is_inside[WIDTH / 8 * HEIGHT / 8];
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
+	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
+
+	(void)state;
+	stack.level[3].z = cell;
+	stack.level[3].width = CELLS_X;
+	stack.level[3].height = CELLS_Y;
+	for (uint32_t i = 0; i < CELLS_X * CELLS_Y; i++)
+		cell[i] = 2;
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const float z = 2;
+		uint32_t bits;
+		memcpy(&bits, &z, sizeof bits);
+		word[i] = i / WIDTH == 12 ? PSR_WORD_EMPTY : (uint64_t)bits << 32;
+		weight[i] = WEIGHT_ONE;
+	}
+	for (uint32_t i = 0; i < sizeof is_inside; i++)
+		is_inside[i] = i % (WIDTH / 8) < 4;
+	assert_int_equal(splat_close(&plan, &stack, &inside, 0, HEIGHT, weight, bricks), WIDTH / 2);
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+		assert_int_equal(weight[i], i / WIDTH == 12 && i % WIDTH < WIDTH / 2 ? 0 : WEIGHT_ONE);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(the_area_of_a_sphere_converges),
+		cmocka_unit_test(the_area_of_a_sphere_is_that_of_its_disc),
+		cmocka_unit_test(samples_finer_than_sub_pixels_do_not_widen_edges),
+		cmocka_unit_test(no_background_shows_through_a_surface),
+		cmocka_unit_test(depth_alone_is_refined_and_pays_for_no_color),
 		cmocka_unit_test(pass_0_is_the_plain_frame),
 		cmocka_unit_test(threads_and_instruction_sets_draw_the_same_bytes),
 		cmocka_unit_test(windows_have_no_seams),
 		cmocka_unit_test(depth_is_that_of_the_nearest_sub_pixel),
 		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
-		cmocka_unit_test(holes_between_discs_are_closed_and_notches_are_not),
+		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
+		cmocka_unit_test(cracks_are_closed_inside_of_the_plain_frame),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }

@@ -428,6 +428,27 @@ static void lights_that_change_nothing_have_no_map(void **state)
 	stage_fini(&s);
 }
 
+static void without_color_there_are_no_maps_and_those_of_frames_before_are_kept(void **state)
+{
+	(void)state;
+	struct stage s;
+	struct psr_settings settings;
+	struct psr_error err;
+	static uint8_t rgb[3 * 128 * 128];
+	static float depth[128 * 128];
+	stage_init(&s, &FINE, &SUN);
+	psr_settings_default(&settings, 128, 128);
+	struct psr_frame frame = { .width = 128, .height = 128, .depth = depth };
+	for (int i = 0; i < 4; i++) {
+		frame.rgb = i % 2 ? rgb : NULL;
+		assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
+		assert_int_equal(frame.report.n_shadow_maps, i % 2);
+		assert_int_equal(frame.report.n_shadow_maps_drawn, i == 1);
+		assert_int_equal(frame.report.effect[PSR_EFFECT_SHADOWS].why, i % 2 ? PSR_WHY_RAN : PSR_WHY_OFF);
+	}
+	stage_fini(&s);
+}
+
 static void memory_is_bounded(void **state)
 {
 	(void)state;
@@ -436,7 +457,8 @@ static void memory_is_bounded(void **state)
 	struct psr_error err;
 	stage_init(&s, &FINE, &LAMP);
 	psr_settings_default(&settings, 4096, 8);
-	struct psr_frame frame = { .width = settings.width, .height = settings.height };
+	static uint8_t rgb[3 * 4096 * 8];
+	struct psr_frame frame = { .width = settings.width, .height = settings.height, .rgb = rgb };
 	s.light[0].casts_shadow = 0;
 	assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
 	const uint64_t before = psr_renderer_bytes(s.renderer);
@@ -471,6 +493,7 @@ int main(void)
 		cmocka_unit_test(threads_and_instructions_change_no_byte),
 		cmocka_unit_test(maps_are_kept_while_light_and_scene_stand_still),
 		cmocka_unit_test(lights_that_change_nothing_have_no_map),
+		cmocka_unit_test(without_color_there_are_no_maps_and_those_of_frames_before_are_kept),
 		cmocka_unit_test(memory_is_bounded),
 	};
 	const int n_failed = cmocka_run_group_tests(tests, NULL, NULL);

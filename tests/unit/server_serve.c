@@ -148,6 +148,40 @@ static void the_report_has_every_entry_in_order(void **state)
 	peer_close(&p);
 }
 
+static void a_frame_without_color_is_not_lit(void **state)
+{
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_scene *scene = malloc(sizeof *scene);
+	struct psr_msg_frame_end end;
+
+	(void)state;
+	assert_non_null(scene);
+	peer_begin(&p, &psrd, "plate");
+	scene_default(scene, 1);
+	scene->n_lights = 1;
+	scene->light[0] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL,
+		                                      .flags = PSR_WIRE_LIGHT_SHADOW,
+		                                      .intensity = 1,
+		                                      .direction = { 0, 0, -1 },
+		                                      .color = { 255, 255, 255 } };
+	peer_send_scene(&p, scene);
+	for (unsigned with_color = 0; with_color < 2; with_color++) {
+		frame.planes = 1u << PSR_WIRE_PLANE_DEPTH | (with_color ? 1u << PSR_WIRE_PLANE_COLOR : 0);
+		frame.color_codec = with_color ? PSR_CODEC_ZSTD : 0;
+		frame.depth_format = PSR_WIRE_DEPTH_F32;
+		frame.depth_codec = PSR_CODEC_ZSTD;
+		peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+		for (int i = 0; i < (int)end.n_entries; i++)
+			if (end.entry[i].id == PSR_WIRE_REPORT_RESOLVE || end.entry[i].id == PSR_WIRE_REPORT_SHADE ||
+			    end.entry[i].id == PSR_WIRE_REPORT_SHADOW)
+				assert_int_equal(end.entry[i].count > 0, with_color);
+			else if (end.entry[i].id == PSR_WIRE_REPORT_PIXELS_COVERED)
+				assert_true(end.entry[i].count > 0);
+	}
+	peer_close(&p);
+	free(scene);
+}
+
 static void a_light_that_casts_shadows_gets_a_map(void **state)
 {
 	struct psr_msg_scene *scene = malloc(sizeof *scene);
@@ -633,6 +667,7 @@ int main(void)
 		cmocka_unit_test(welcome_tells_the_limits),
 		cmocka_unit_test(list_names_the_model_and_its_state),
 		cmocka_unit_test(raw_planes_have_the_hashes_of_the_end),
+		cmocka_unit_test(a_frame_without_color_is_not_lit),
 		cmocka_unit_test(the_report_has_every_entry_in_order),
 		cmocka_unit_test(a_light_that_casts_shadows_gets_a_map),
 		cmocka_unit_test(settings_are_kept_and_returned),

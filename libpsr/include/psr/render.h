@@ -96,8 +96,8 @@ enum psr_stage {
 	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
 	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
 	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
-	PSR_STAGE_RESOLVE, /* count: pixels resolved: they have a sample and weight above 0 */
-	PSR_STAGE_SHADE,   /* count: pixels shaded */
+	PSR_STAGE_RESOLVE, /* count: pixels resolved: they have a sample and weight above 0; 0 without rgb */
+	PSR_STAGE_SHADE,   /* count: pixels shaded; 0 without rgb */
 	PSR_STAGE_FILL,    /* count: pixels whose colour the fill changed */
 	PSR_STAGE_SMOOTH,  /* count: pixels at edges */
 	PSR_N_STAGES
@@ -196,16 +196,17 @@ int psr_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct p
 struct psr_refiner;
 int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer);
 void psr_refiner_destroy(struct psr_refiner *refiner); /* NULL is fine */
-uint64_t psr_refiner_bytes(const struct psr_refiner *refiner); /* without the renderer's; independent of the
-                                                                * picture's size */
+uint64_t psr_refiner_bytes(const struct psr_refiner *refiner); /* without the renderer's; two bytes a pixel of the
+                                                                * largest picture, the rest independent of its size */
 
 /* Asked between the windows of a pass; anything but 0 ends it. */
 typedef int psr_refine_cancelled_fn(void *userdata);
 
 /* Pass 0 is the frame of psr_render. Pass p draws the picture with 2^p x 2^p sub-pixels a pixel, for which blocks
  * choose levels and depth buffers, so that samples no longer fill whole pixels, and gives each pixel the mean of its
- * sub-pixels' light and the least of their depths. The finer picture is drawn in windows, so that memory does not grow
- * with the pass.
+ * sub-pixels' light and the least of their depths. What shows between samples is closed well inside of what the frame of
+ * pass 0 covers. The finer picture is drawn in windows, so that memory does not grow with the pass. Either of rgb and
+ * depth may be NULL; without rgb nothing is resolved or lit.
  *
  * A pass is a function of scene, settings and p alone. settings->window must be that of a whole picture. Times and
  * counts are of all windows together: they count sub-pixels, and blocks and samples once in every window that draws

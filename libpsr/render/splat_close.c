@@ -1,0 +1,211 @@
+/* Holes between the discs of refined pixels. */
+#include <math.h>
+#include <string.h>
+#include "base/maths.h"
+#include "render/render.h"
+
+#define REACH 8 /* pixels, a power of two: no hole between discs that one surface encloses is sought further */
+/* Cells on either side of a pixel's own: a gap in a row of cells that all have samples is narrower than two of them. */
+#define GAP 1
+#define CELLS (TILE_WIDTH / 2)
+#define CELLS_AROUND (CELLS + 2 * GAP)
+
+static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
+{
+	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
+		return INFINITY;
+	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
+}
+
+/* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
+static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
+{
+	static const int8_t way[8][2] = {
+		{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
+	};
+	const float z = depth_at(stack, x, y);
+	float nearest = INFINITY, farthest = 0;
+	for (int w = 0; w < 8; w++) {
+		int is_met = 0;
+		for (int i = 1; i <= reach && !is_met; i++) {
+			const float other = depth_at(stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
+			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
+			nearest = is_met && other < nearest ? other : nearest;
+			farthest = is_met && other > farthest ? other : farthest;
+		}
+		if (!is_met)
+			return 0;
+	}
+	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
+}
+
+/* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
+static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x,
+                         uint32_t y, uint32_t n)
+{
+	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
+	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
+	const uint64_t *word = psr_zstack_row(stack, y) + x;
+	int has_any = 0;
+	for (uint32_t i = 0; i < REACH; i++)
+		nearest[i] = nearest[n + REACH + i] = z[i] = z[n + REACH + i] = INFINITY;
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t bits = (uint32_t)(word[(int32_t)i - REACH] >> 32);
+		nearest[i] = z[i] = psr_float_from_bits(bits);
+		has_any |= bits < (uint32_t)(PSR_WORD_EMPTY >> 32);
+	}
+	if (!has_any) {
+		memset(is_between, 0, n);
+		return;
+	}
+	for (uint32_t step = 1, left = n + 2 * REACH; step < REACH; step *= 2) {
+		left -= step;
+		for (uint32_t i = 0; i < left; i++)
+			nearest[i] = nearest[i] < nearest[i + step] ? nearest[i] : nearest[i + step];
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
+		is_between[i] = farther * plan->gap_scale[1] + plan->gap_offset[1] < z[i + REACH];
+	}
+}
+
+/* A row of cells of a level, of a tile: what lies beyond these depths is behind samples of all cells around. */
+struct cell_row {
+	float limit[CELLS];
+	uint8_t is_near[CELLS]; /* a block of this very level has samples in the cell or beside it */
+	int has_any;
+};
+
+/* The nearest z' of cells from (i, j) on, counted from the guard band's corner: of their own samples, and of those of
+ * finer levels in use. Beyond the guard band there is nothing. */
+static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, int64_t i, int64_t j, uint32_t n)
+{
+	const int64_t width = stack->level[k].width, height = stack->level[k].height;
+	for (uint32_t c = 0; c < n; c++)
+		nearest[c] = INFINITY;
+	if (j < 0 || j >= height)
+		return;
+	for (uint32_t c = 0; c < n; c++)
+		if (i + c >= 0 && i + c < width)
+			nearest[c] = stack->level[k].z[j * width + i + c];
+	for (int f = k - 1; f > 0; f--) {
+		const int64_t fine_width = stack->level[f].width, fine_height = stack->level[f].height;
+		const int64_t x = (i - 1) * (1 << (k - f)) + 1, y = (j - 1) * (1 << (k - f)) + 1;
+		if (!(stack->levels >> f & 1))
+			continue;
+		for (int64_t v = y < 0 ? 0 : y; v < y + (1 << (k - f)) && v < fine_height; v++)
+			for (int64_t u = x < 0 ? 0 : x; u < x + ((int64_t)n << (k - f)) && u < fine_width; u++) {
+				float *to = &nearest[(u - x) >> (k - f)];
+				const float z = stack->level[f].z[v * fine_width + u];
+				*to = z < *to ? z : *to;
+			}
+	}
+}
+
+static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, uint32_t n)
+{
+	const uint32_t width = stack->level[k].width;
+	memset(is_near, 0, n);
+	for (uint32_t v = j - 1; v <= j + 1; v++) {
+		const float *z = stack->level[k].z + (size_t)v * width + i;
+		for (uint32_t c = 0; c < n; c++)
+			is_near[c] |= (z[(int32_t)c - 1] < INFINITY) | (z[c] < INFINITY) | (z[c + 1] < INFINITY);
+	}
+}
+
+/* The n cells from (i, j), inside of the guard band. */
+static void find_cells(struct cell_row *to, const struct plan *plan, const struct psr_zstack *stack, int k, uint32_t i,
+                       uint32_t j, uint32_t n)
+{
+	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
+	const uint32_t n_around = n + 2 * GAP;
+	find_own(to->is_near, stack, k, i, j, n);
+	to->has_any = 0;
+	for (uint32_t c = 0; c < n; c++)
+		to->has_any |= to->is_near[c];
+	if (!to->has_any)
+		return;
+	memset(farthest, 0, sizeof farthest);
+	for (int v = -GAP; v <= GAP; v++) {
+		find_nearest(nearest, stack, k, (int64_t)i - GAP, (int64_t)j + v, n_around);
+		for (uint32_t c = 0; c < n_around; c++)
+			farthest[c] = nearest[c] > farthest[c] ? nearest[c] : farthest[c];
+	}
+	for (uint32_t c = 0; c < n; c++) {
+		float all = farthest[c];
+		for (uint32_t u = 1; u <= 2 * GAP; u++)
+			all = farthest[c + u] > all ? farthest[c + u] : all;
+		to->limit[c] = all * plan->gap_scale[k] + plan->gap_offset[k];
+	}
+}
+
+/* What is known of the pixels of a row of a tile. */
+struct row_holes {
+	uint8_t is_between[TILE_WIDTH]; /* what is before it is on its left and on its right */
+	uint8_t is_covered[TILE_WIDTH]; /* it lies behind samples in all cells around */
+	uint8_t reach[TILE_WIDTH];      /* the width of the cells around, as far as REACH */
+};
+
+static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, uint32_t x,
+                       uint32_t y, uint32_t n)
+{
+	const uint64_t *word = psr_zstack_row(stack, y) + x;
+	memset(to, 0, sizeof *to);
+	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
+		const uint8_t reach = 1 << k < REACH ? (uint8_t)(1 << k) : REACH;
+		if (!(stack->levels >> k & 1) || !cells[k].has_any)
+			continue;
+		for (uint32_t c = 0; c < n; c++) {
+			const float z = psr_float_from_bits((uint32_t)(word[c] >> 32));
+			to->is_covered[c] |= cells[k].is_near[c >> k] & (cells[k].limit[c >> k] < z);
+			to->reach[c] = cells[k].is_near[c >> k] ? reach : to->reach[c];
+		}
+	}
+}
+
+static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
+{
+	const uint32_t u = (inside->left + x) >> inside->pass, v = (inside->top + y) >> inside->pass;
+	return inside->is_inside[(size_t)v * inside->width + u];
+}
+
+static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside,
+                          const struct cell_row *cells, uint32_t x0, uint32_t y, uint32_t n, uint16_t *weight,
+                          uint8_t *bricks)
+{
+	struct row_holes holes;
+	uint32_t n_closed = 0;
+	find_holes(&holes, cells, stack, x0, y, n);
+	find_between(holes.is_between, plan, stack, x0, y, n);
+	for (uint32_t c = 0; c < n; c++) {
+		const uint32_t x = x0 + c;
+		if (weight[c] && ((holes.is_covered[c] && inside && is_inside(inside, x, y)) ||
+		                  (holes.is_between[c] && is_enclosed(plan, stack, x, y, holes.reach[c])))) {
+			weight[c] = 0;
+			bricks[x / BRICK] = 1;
+			n_closed++;
+		}
+	}
+	return n_closed;
+}
+
+_Static_assert(TILE_WIDTH % (1 << PSR_MAX_DEPTH_LEVEL) == 0, "a tile's row has whole cells");
+
+uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
+                     uint32_t y1, uint16_t *weight, uint8_t *bricks)
+{
+	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
+	struct cell_row cells[PSR_MAX_DEPTH_LEVEL + 1];
+	uint32_t n_closed = 0;
+	for (uint32_t x = 0; x < stack->width; x += TILE_WIDTH) {
+		const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
+		for (uint32_t y = y0; y < y1; y++) {
+			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
+				if (stack->levels >> k & 1 && (y == y0 || y % (1u << k) == 0))
+					find_cells(&cells[k], plan, stack, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);
+			n_closed += close_row(plan, stack, inside, cells, x, y, n, weight + (size_t)y * stack->width + x,
+			                      bricks + (size_t)(y / BRICK) * bricks_x);
+		}
+	}
+	return n_closed;
+}

@@ -1,0 +1,172 @@
+/* closed MODEL.psr SOURCE [SIDE [RAYS]]: whether refined stills show what is behind a surface. Draws the model in five
+ * views and all passes on a red and on a blue background, lit by ambient light alone. Of pixels at least four pixels
+ * inside of what pass 0 covers it counts those whose colour depends on the background, and of these those of which all
+ * RAYS x RAYS rays meet the source: they are torn. Prints a line for each view; exits with 1 if any pixel is torn. */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "measure/truth.h"
+#include "psr/render.h"
+
+#define INSIDE 4
+#define VIEWS 5
+#define MOST_RAYS 64
+
+static const double direction[VIEWS][3] = {
+	{ 0.45, 0.35, 1 }, { -1, 0.25, 0.4 }, { 0.15, 1, 0.3 }, { 0.7, -0.4, -0.8 }, { -0.3, 0.05, -1 },
+};
+
+struct closed {
+	struct psr_instance instance;
+	struct psr_scene scene;
+	struct psr_settings settings;
+	struct psr_renderer *renderer;
+	struct psr_refiner *refiner;
+	struct psr_pool *pool;
+	struct psr_truth *truth;
+	struct psr_frame frame[2]; /* one a background */
+	float *depth;              /* of pass 0 */
+	uint8_t *is_inside;
+	uint32_t side, rays;
+};
+
+static void die(const char *what)
+{
+	fprintf(stderr, "closed: %s\n", what);
+	exit(3);
+}
+
+static void *room(size_t size)
+{
+	void *p = malloc(size);
+	if (!p)
+		die("no memory");
+	return p;
+}
+
+static void look_from(struct closed *c, const struct psr_model_info *info, const double from[3])
+{
+	struct psr_camera *camera = &c->scene.camera;
+	const double length = sqrt(from[0] * from[0] + from[1] * from[1] + from[2] * from[2]);
+	*camera = (struct psr_camera){ .up = { 0, fabs(from[1]) > 0.9 ? 0 : 1, fabs(from[1]) > 0.9 ? 1 : 0 },
+		                           .kind = PSR_CAMERA_PERSPECTIVE, .fov_y = 0.6 };
+	for (int k = 0; k < 3; k++) {
+		camera->target[k] = (info->box_min[k] + info->box_max[k]) / 2;
+		camera->eye[k] = camera->target[k] + from[k] / length * info->scale / sin(0.3) * 0.9;
+	}
+}
+
+static void draw(struct closed *c, unsigned pass)
+{
+	struct psr_error err;
+	for (int b = 0; b < 2; b++) {
+		for (int k = 0; k < 3; k++)
+			c->scene.background[k] = k == 2 * b;
+		c->frame[b].depth = pass ? NULL : c->depth;
+		if (psr_refine(c->refiner, &c->scene, &c->settings, pass, c->pool, NULL, NULL, &c->frame[b], &err))
+			die(err.text);
+	}
+}
+
+/* Pass 0's coverage, less INSIDE pixels at its edges. */
+static uint32_t find_inside(struct closed *c)
+{
+	const int side = (int)c->side;
+	uint32_t n = 0;
+	for (int y = 0; y < side; y++)
+		for (int x = 0; x < side; x++) {
+			int is_inside = x >= INSIDE && y >= INSIDE && x + INSIDE < side && y + INSIDE < side;
+			for (int j = -INSIDE; is_inside && j <= INSIDE; j++)
+				for (int i = -INSIDE; is_inside && i <= INSIDE; i++)
+					is_inside = isfinite(c->depth[(size_t)(y + j) * c->side + (size_t)(x + i)]);
+			c->is_inside[(size_t)y * c->side + (size_t)x] = (uint8_t)is_inside;
+			n += (uint32_t)is_inside;
+		}
+	return n;
+}
+
+/* Whether all of a pixel's rays meet the source. */
+static int is_closed(const struct closed *c, const struct view *view, uint32_t x, uint32_t y)
+{
+	for (uint32_t j = 0; j < c->rays; j++) {
+		struct ray ray[MOST_RAYS];
+		struct ray_hit hit[MOST_RAYS];
+		for (uint32_t i = 0; i < c->rays; i++)
+			truth_ray(c->truth, view, x + (i + 0.5) / c->rays, y + (j + 0.5) / c->rays, &ray[i]);
+		truth_trace(c->truth, ray, (int)c->rays, c->scene.camera.near_z, hit);
+		for (uint32_t i = 0; i < c->rays; i++)
+			if (hit[i].prim == RAY_NONE)
+				return 0;
+	}
+	return 1;
+}
+
+static uint32_t look(struct closed *c, unsigned pass, const struct view *view, int number)
+{
+	uint32_t n_dependent = 0, n_torn = 0;
+	char example[64] = "";
+	for (uint32_t y = 0; y < c->side; y++)
+		for (uint32_t x = 0; x < c->side; x++) {
+			const size_t at = (size_t)y * c->side + x;
+			if (!c->is_inside[at] || memcmp(c->frame[0].rgb + 3 * at, c->frame[1].rgb + 3 * at, 3) == 0)
+				continue;
+			n_dependent++;
+			if (!is_closed(c, view, x, y))
+				continue;
+			if (!n_torn++)
+				snprintf(example, sizeof example, ", first at %u,%u", x, y);
+		}
+	printf("view %d pass %u: %u depend on the background, %u of them torn%s\n", number, pass, n_dependent, n_torn,
+	       example);
+	return n_torn;
+}
+
+int main(int argc, char **argv)
+{
+	struct closed c = { .side = argc > 3 ? (uint32_t)atoi(argv[3]) : 300,
+		                .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16 };
+	struct psr_model *model;
+	struct psr_mesh *mesh;
+	struct psr_error err;
+	uint32_t n_torn = 0;
+	if (argc < 3 || argc > 5 || c.side < 16 || c.rays < 1 || c.rays > MOST_RAYS)
+		die("usage: closed MODEL.psr SOURCE [SIDE [RAYS]]");
+	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&mesh, argv[2], &err) ||
+	    psr_truth_create(&c.truth, mesh, &err))
+		die(err.text);
+	const size_t area = (size_t)c.side * c.side;
+	c.depth = room(area * sizeof *c.depth);
+	c.is_inside = room(area);
+	for (int b = 0; b < 2; b++)
+		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
+	if (psr_renderer_create(&c.renderer) || psr_refiner_create(&c.refiner, c.renderer) || psr_pool_create(&c.pool, 2, 0))
+		die("no memory");
+	c.instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	c.scene = (struct psr_scene){ .instance = &c.instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
+	psr_settings_default(&c.settings, c.side, c.side);
+	for (int v = 0; v < VIEWS; v++) {
+		struct view view;
+		look_from(&c, psr_model_info(model), direction[v]);
+		if (view_init(&view, &c.scene.camera, c.side, c.side, &err))
+			die(err.text);
+		for (unsigned pass = 0; pass <= PSR_MAX_PASS; pass++) {
+			draw(&c, pass);
+			if (pass == 0)
+				printf("view %d: %u pixels inside\n", v, find_inside(&c));
+			n_torn += look(&c, pass, &view, v);
+		}
+	}
+	for (int b = 0; b < 2; b++)
+		free(c.frame[b].rgb);
+	free(c.depth);
+	free(c.is_inside);
+	psr_refiner_destroy(c.refiner);
+	psr_renderer_destroy(c.renderer);
+	psr_pool_destroy(c.pool);
+	psr_truth_destroy(c.truth);
+	psr_mesh_destroy(mesh);
+	psr_model_unref(model);
+	return n_torn > 0;
+}
