@@ -11,7 +11,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
 
 #define FILE_MAGIC "\x89PSR\r\n\x1a\n"
-#define FILE_MAJOR 4
+#define FILE_MAJOR 5
 #define FILE_MINOR 0
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end, so that 64 depths may be read beyond the last one of any section */
@@ -51,7 +51,7 @@ struct section_spec {
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
-#define N_KNOWN_SECTIONS 23
+#define N_KNOWN_SECTIONS 24
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 

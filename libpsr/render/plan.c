@@ -297,7 +297,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	if (plan->n_lights)
 		plan->view.needs |= STRIP_LIGHTS;
 	if (plan->is_full)
-		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR;
+		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR | STRIP_BENT;
 	return PSR_OK;
 }
 

@@ -191,6 +191,7 @@ static uint32_t copy_samples(const struct draft *draft, const struct piece *piec
 				break;
 		}
 		sample[first++] = *draft_sample(draft, &piece[k].block, (unsigned)of);
+		block->is_bent |= piece[k].block.is_bent;
 	}
 	return first;
 }
