@@ -50,24 +50,26 @@ number() { flat "$1" | sed -n "s/.*\"$2\":\([-+0-9.eE]*\).*/\1/p"; }            
 of_model() { flat "$1" | sed -n "s/.*\"model\":{[^}]*\"$2\":\([-+0-9.eE]*\).*/\1/p"; } # file key
 stage() { flat "$1" | sed -n "s/.*\"$2\":{\"ms\":\([-+0-9.eE]*\).*/\1/p"; }        # file stage: milliseconds
 
+sum() { awk "BEGIN { print $1 + $2 }"; }
 size=640x480
-rule=$(printf '%.0s-' {1..125})
-echo "== frames of $size, JPEG q90, and $seconds s of load by 4 clients each"
-printf '%-10s %9s %6s %7s %7s %7s %7s %7s %7s %7s %7s %8s %8s %8s\n' model samples MB plan cull warp gaps resolve shade \
-	fill encode 'total ms' bytes frames/s
+rule=$(printf '%.0s-' {1..78})
+echo "== a frame of $size as JPEG: milliseconds of its stages; and $seconds s of load by 4 clients"
+printf '%-10s %8s %6s %6s %6s %6s %6s %6s %7s %8s\n' model samples cull warp shade fill code total kB frames/s
 echo "$rule"
 sheet=
 for name in teapot top pencil wheel $real; do
 	report=$out/$name.json
-	psr shot --server "$server" --model "$name" --size $size --background '#f4f4f0' --codec jpeg:90 --report "$report" \
-		-o "$out/$name.png"
-	psr shot --server "$server" --model "$name" --size 1280x960 --background '#f4f4f0' --codec lossless -o "$out/$name-large.png"
+	psr shot --server "$server" --model "$name" --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
+	psr shot --server "$server" --model "$name" --size 320x240 --background '#f4f4f0' --quality best -o "$out/$name-small.png"
 	psr bench --server "$server" --model "$name" --clients 4 --seconds "$seconds" --size $size --json >"$out/$name-bench.json"
-	printf '%-10s %9.0f %6.1f' "$name" "$(of_model "$report" samples)" \
-		"$(awk "BEGIN { print $(of_model "$report" bytes) / 1e6 }")"
-	for s in plan cull warp gaps resolve shade fill encode total; do printf ' %7.2f' "$(stage "$report" $s)"; done
-	printf '  %8.0f %8.1f\n' "$(flat "$report" | sed -n 's/.*"error_px":[^,]*,"bytes":\([0-9]*\).*/\1/p')" "$(number "$out/$name-bench.json" frames_per_s)"
-	sheet="$sheet $out/$name.png"
+	printf '%-10s %8.0f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %7.1f %8.1f\n' "$name" "$(of_model "$report" samples)" \
+		"$(sum "$(stage "$report" plan)" "$(stage "$report" cull)")" "$(stage "$report" warp)" \
+		"$(sum "$(stage "$report" resolve)" "$(stage "$report" shade)")" \
+		"$(sum "$(stage "$report" gaps)" "$(stage "$report" fill)")" \
+		"$(stage "$report" encode)" "$(stage "$report" total)" \
+		"$(flat "$report" | sed -n 's/.*"error_px":[^,]*,"bytes":\([0-9]*\).*/\1/p' | awk '{ print $1 / 1000 }')" \
+		"$(number "$out/$name-bench.json" frames_per_s)"
+	sheet="$sheet $out/$name-small.png"
 done
 echo "$rule"
 

@@ -65,7 +65,7 @@ static int make_scene(struct passes *p, struct psr_scene *scene, struct psr_inst
 	const struct psr_model_info *info = psr_model_info(p->model);
 	double distance = 0, side;
 
-	psr_camera_frame(&scene->camera, info->box_min, info->box_max, FOV, 1);
+	psr_camera_frame(&scene->camera, info->box_min, info->box_max, info->up, FOV, 1);
 	for (int i = 0; i < 3; i++)
 		distance += pow(scene->camera.target[i] - scene->camera.eye[i], 2);
 	side = 2 * sqrt(distance) * tan(FOV / 2) / info->spacing * magnification;

@@ -148,6 +148,9 @@ int cmd_build(int argc, char **argv)
 		  .help = "pixels across the model at which it is sampled without holes", .min = 8, .max = 8192 },
 		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
 		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
+		{ .name = "up", .type = PSR_OPT_VEC3, .value = options.up, .arg = "X,Y,Z",
+		  .help = "the way up of the object in its file, for pictures without a camera; 0,0,0: what files of this kind "
+		          "have, +z for LAS, STL and survey coordinates, +y for the others" },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
 		  .help = "compress the file, to a third or half of its size; opening it unpacks it into memory" },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",

@@ -118,6 +118,7 @@ static void print_text(const struct summary *s)
 	printf("spacing           %.6g\n", info->spacing);
 	printf("box               %.6g,%.6g,%.6g to %.6g,%.6g,%.6g\n", info->box_min[0], info->box_min[1], info->box_min[2],
 	       info->box_max[0], info->box_max[1], info->box_max[2]);
+	printf("up                %.6g,%.6g,%.6g\n", info->up[0], info->up[1], info->up[2]);
 	printf("origin, scale     %.6g,%.6g,%.6g  %.6g\n", info->origin[0], info->origin[1], info->origin[2], info->scale);
 	print_share("adequacy         ", info->n_missing, info->n_trials, "miss");
 	print_share("culling loss     ", info->n_lost, info->n_trials, "are lost");
@@ -170,6 +171,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	cJSON_AddNumberToObject(root, "spacing", s->info->spacing);
 	add_vec3(root, "box_min", s->info->box_min);
 	add_vec3(root, "box_max", s->info->box_max);
+	add_vec3(root, "up", s->info->up);
 	add_vec3(root, "origin", s->info->origin);
 	cJSON_AddNumberToObject(root, "scale", s->info->scale);
 	if (s->info->n_trials != 0) {

@@ -7,6 +7,7 @@
 #include "opener.h"
 #include "server.h"
 #include "session.h"
+#include "session_presets.h"
 #include "session_scene.h"
 #include "wire.h"
 
@@ -73,7 +74,7 @@ void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *mode
 	conn_send(conn, &buf);
 }
 
-static void refuse_handle(struct conn *conn, uint32_t id, uint32_t number)
+void session_refuse_handle(struct conn *conn, uint32_t id, uint32_t number)
 {
 	char text[PSR_ERROR_TEXT];
 
@@ -102,43 +103,6 @@ static void send_list(struct conn *conn, uint32_t id)
 	}
 	buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
 	if (psr_msg_list_end_encode(&buf, id, &end, NULL) == PSR_OK)
-		conn_send(conn, &buf);
-}
-
-static void send_presets(struct conn *conn, uint32_t id, uint32_t number)
-{
-	const struct session *session = &conn->session;
-	const struct psr_presets *presets = NULL;
-	struct psr_msg_presets_end end = { 0, 0 };
-	struct psr_msg_preset msg;
-	uint8_t bytes[512];
-	struct psr_buf buf;
-
-	for (uint32_t i = 0; i < session->n_handles; i++)
-		if (session->handle[i].number == number)
-			presets = psr_model_presets(session->handle[i].model->model);
-	if (presets == NULL) {
-		refuse_handle(conn, id, number);
-		return;
-	}
-	for (uint32_t i = 0; i < presets->n_cameras + presets->n_lights; i++) {
-		int is_camera = i < presets->n_cameras;
-
-		buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
-		if (is_camera)
-			wire_from_camera(&msg, &presets->camera[i]);
-		else
-			wire_from_light(&msg, &presets->light[i - presets->n_cameras]);
-		if (psr_msg_preset_encode(&buf, id, &msg, NULL) != PSR_OK)
-			continue;
-		conn_send(conn, &buf);
-		if (is_camera)
-			end.n_cameras++;
-		else
-			end.n_lights++;
-	}
-	buf = (struct psr_buf){ .data = bytes, .capacity = sizeof bytes };
-	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
 		conn_send(conn, &buf);
 }
 
@@ -173,7 +137,7 @@ static void close_handle(struct conn *conn, uint32_t id, uint32_t number)
 			return;
 		}
 	}
-	refuse_handle(conn, id, number);
+	session_refuse_handle(conn, id, number);
 }
 
 static void cancel(struct conn *conn, uint32_t id, uint16_t view)
@@ -293,7 +257,7 @@ static int take_open_id(struct conn *conn, const struct psr_message *message, st
 		if (message->type == PSR_MSG_LIST)
 			send_list(conn, message->id);
 		else if (message->type == PSR_MSG_PRESETS)
-			send_presets(conn, message->id, msg.presets.handle);
+			session_send_presets(conn, message->id, msg.presets.handle);
 		else
 			send_stats(conn, message->id);
 	}

@@ -47,5 +47,6 @@ void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *mode
 
 /* Ends any open id by an ERROR. */
 void session_refuse(struct conn *conn, uint32_t id, uint16_t view, int code, const char *text);
+void session_refuse_handle(struct conn *conn, uint32_t id, uint32_t handle);
 
 #endif

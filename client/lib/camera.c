@@ -37,10 +37,13 @@ static int is_parallel(const double a[3], const double b[3])
 int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err)
 {
+	static const double y[3] = { 0, 1, 0 };
 	struct psr_camera framed;
-	double forward[3];
+	double forward[3], axes[3][3];
 
-	psr_camera_frame(&framed, box_min, box_max, wish->fov_y, aspect);
+	if (wish->has_up && !(v3d_length(wish->up) > 0))
+		return psr_fail(err, PSR_ERR_ARG, "up 0,0,0 is no direction");
+	psr_camera_frame(&framed, box_min, box_max, wish->has_up ? wish->up : y, wish->fov_y, aspect);
 	if (wish->has_target) {
 		v3d_sub(forward, framed.eye, framed.target);
 		memcpy(framed.target, wish->target, sizeof framed.target);
@@ -52,10 +55,9 @@ int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_w
 	if (!(v3d_length(forward) > 0))
 		return psr_fail(err, PSR_ERR_ARG, "the eye %g,%g,%g is at the target%s", framed.eye[0], framed.eye[1],
 		                framed.eye[2], wish->has_target ? "" : ", the middle of the model; say --target too");
-	if (wish->has_up)
-		memcpy(framed.up, wish->up, sizeof framed.up);
-	else if (is_parallel(framed.up, forward))
-		v3d_set(framed.up, 0, 0, -1);
+	psr_camera_axes(axes, framed.up);
+	if (!wish->has_up && is_parallel(framed.up, forward))
+		v3d_scale(framed.up, axes[2], -1);
 	if (is_parallel(framed.up, forward))
 		return psr_fail(err, PSR_ERR_ARG, "up %g,%g,%g is 0 or runs along the view; choose another direction",
 		                framed.up[0], framed.up[1], framed.up[2]);

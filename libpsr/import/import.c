@@ -1,10 +1,12 @@
 #define _GNU_SOURCE
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 #include "import.h"
 
 #define SNIFF_BYTES 65536
+#define SURVEY_SIZES 10 /* of a scene, between the origin and the middle of it */
 
 static int ends_with(const char *path, const char *ending)
 {
@@ -40,6 +42,33 @@ static int is_las(const char *path, const uint8_t *bytes, size_t n_bytes)
 	return ends_with(path, ".las") || ends_with(path, ".laz") || (n_bytes >= 4 && memcmp(bytes, "LASF", 4) == 0);
 }
 
+/* Survey coordinates count from a far origin, and their z is height. */
+static int is_surveyed(const struct psr_mesh *mesh)
+{
+	double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY }, size = 0;
+
+	for (uint64_t i = 0; i < (uint64_t)mesh->n_vertices + mesh->n_points; i++) {
+		const double *p = i < mesh->n_vertices ? mesh->position[i] : mesh->point[i - mesh->n_vertices];
+
+		for (int k = 0; k < 3; k++) {
+			low[k] = fmin(low[k], p[k]);
+			high[k] = fmax(high[k], p[k]);
+		}
+	}
+	for (int k = 0; k < 3; k++)
+		size = fmax(size, high[k] - low[k]);
+	return fabs(low[0] / 2 + high[0] / 2) > SURVEY_SIZES * size || fabs(low[1] / 2 + high[1] / 2) > SURVEY_SIZES * size;
+}
+
+/* What psr/mesh.h says of `up`: files do not, but their makers agree on it. */
+static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	const int has_z = is_las(path, bytes, n_bytes) || ends_with(path, ".stl") || ends_with(path, ".amf") ||
+	                  ends_with(path, ".3mf") || (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
+
+	mesh->up[has_z ? 2 : 1] = 1;
+}
+
 int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err)
 {
 	struct import_mesh im;
@@ -66,9 +95,11 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *e
 		rc = import_las(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK)
 		rc = import_assimp(&im, bytes, n_bytes, err);
-	free(bytes);
 	if (rc == PSR_OK)
 		rc = import_mesh_finish(out, &im, err);
+	if (rc == PSR_OK)
+		find_up(*out, path, bytes, n_bytes);
+	free(bytes);
 	import_mesh_fini(&im);
 	return rc;
 }

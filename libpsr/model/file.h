@@ -47,7 +47,7 @@ struct section_spec {
 	size_t pointer; /* offset of the array's pointer in struct psr_blocks, from SECTION_FIRST_ARRAY on */
 };
 
-#define INFO_BYTES 160
+#define INFO_BYTES 184
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168

@@ -150,6 +150,7 @@ static void put_info(uint8_t *at, const struct psr_model_info *info)
 		file_put_double(at + 8 * k, info->origin[k]);
 		file_put_double(at + 32 + 8 * k, info->box_min[k]);
 		file_put_double(at + 56 + 8 * k, info->box_max[k]);
+		file_put_double(at + 160 + 8 * k, info->up[k]);
 	}
 	file_put_double(at + 24, info->scale);
 	file_put_double(at + 80, info->spacing);

@@ -271,6 +271,8 @@ int psr_model_create(struct psr_model **out, const struct psr_model_info *info, 
 	if (code != PSR_OK)
 		return code;
 	content = (struct content){ .info = *info, .blocks = *blocks };
+	if (info->up[0] == 0 && info->up[1] == 0 && info->up[2] == 0)
+		content.info.up[1] = 1;
 	if (presets != NULL)
 		content.presets = *presets;
 	bytes = file_image_make(&content, &n_bytes);

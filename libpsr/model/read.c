@@ -224,6 +224,7 @@ static int get_info(const struct reader *r, struct psr_model_info *info)
 		info->origin[k] = file_get_double(at + 8 * k);
 		info->box_min[k] = file_get_double(at + 32 + 8 * k);
 		info->box_max[k] = file_get_double(at + 56 + 8 * k);
+		info->up[k] = file_get_double(at + 160 + 8 * k);
 	}
 	info->scale = file_get_double(at + 24);
 	info->spacing = file_get_double(at + 80);

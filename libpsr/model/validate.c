@@ -60,6 +60,8 @@ static int check_info(const struct checker *c)
 		if (!isfinite(info->box_min[k]) || !isfinite(info->box_max[k]) || info->box_min[k] > info->box_max[k])
 			return fail(c, "INFO", "the box is not finite or inside out");
 	}
+	if (!(fabs(v3d_dot(info->up, info->up) - 1) <= 1e-6))
+		return fail(c, "INFO", "up is %g,%g,%g; it must have length 1", info->up[0], info->up[1], info->up[2]);
 	if (!(info->scale > 0 && isfinite(info->scale)))
 		return fail(c, "INFO", "the scale is %g; it must be positive and finite", info->scale);
 	if (!(info->spacing > 0 && isfinite(info->spacing)))

@@ -52,17 +52,34 @@ int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 	return rc;
 }
 
-void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], double fov_y,
-                      double aspect)
+void psr_camera_axes(double axes[3][3], const double up[3])
 {
-	/* The frame of a camera that looks along `forward` with +y up. */
-	static const double right[3] = { 0.9302605094190634, 0, -0.3668996928526715 };
-	static const double down[3] = { 0.11006990785580148, -0.9539392014169455, 0.2790781528257191 };
-	static const double forward[3] = { -0.35, -0.3, -0.887411967464942 };
+	v3d_normalize(axes[1], up);
+	const int first = fabs(axes[1][0]) > 0.9;
+	v3d_set(axes[0], !first, first, 0);
+	v3d_add_scaled(axes[0], axes[0], -v3d_dot(axes[0], axes[1]), axes[1]);
+	v3d_normalize(axes[0], axes[0]);
+	v3d_cross(axes[2], axes[0], axes[1]);
+}
+
+void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], const double up[3],
+                      double fov_y, double aspect)
+{
+	/* Right, down and forward of the camera, along the axes right, up and front of the object. */
+	static const double view[3][3] = {
+		{ 0.9302605094190634, 0, -0.3668996928526715 },
+		{ 0.11006990785580148, -0.9539392014169455, 0.2790781528257191 },
+		{ -0.35, -0.3, -0.887411967464942 },
+	};
 	const double margin = 1.06;
+	double axes[3][3], right[3], down[3], forward[3];
 	/* The box's corners are made to fit, not a sphere about it: most objects are far from round. */
 	double half[3], tangent[2] = { aspect, 1 }, distance = 0, extent = 0, deepest = 0;
 
+	psr_camera_axes(axes, up);
+	m3d_apply_transposed(right, axes, view[0]);
+	m3d_apply_transposed(down, axes, view[1]);
+	m3d_apply_transposed(forward, axes, view[2]);
 	for (int i = 0; i < 3; i++) {
 		camera->target[i] = box_min[i] / 2 + box_max[i] / 2;
 		half[i] = box_max[i] / 2 - box_min[i] / 2;
@@ -85,7 +102,7 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 	}
 	if (!(extent > 0))
 		extent = distance = 1;
-	v3d_set(camera->up, 0, 1, 0);
+	v3d_add_scaled(camera->up, (const double[3]){ 0, 0, 0 }, 1, axes[1]);
 	camera->kind = fov_y > 0 ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
 	camera->fov_y = fov_y > 0 ? fov_y : 0;
 	camera->ortho_height = fov_y > 0 ? 0 : 2 * extent * margin;

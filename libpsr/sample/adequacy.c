@@ -23,7 +23,7 @@ static void draw_direction(uint64_t *random, double d[3])
 	double length2;
 
 	do {
-		for (int k = 0; k < 3; k++)
+		for (int k = 2; k >= 0; k--)
 			d[k] = random_in(random, -1, 1);
 		length2 = v3d_dot(d, d);
 	} while (!(length2 <= 1 && length2 > 1e-4));

@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include "../base/maths.h"
 #include "../base/mem.h"
+#include "../base/vec.h"
 #include "adequacy.h"
 #include "door.h"
 #include "draft.h"
@@ -60,6 +61,10 @@ static int check_options(const struct psr_build_options *options, struct psr_err
 	if (!(options->tolerance > 0 && options->tolerance <= MOST_TOLERANCE))
 		return psr_fail(err, PSR_ERR_ARG, "tolerance %g is outside of 0..60 degrees",
 		                options->tolerance * 57.295779513082323);
+	for (int k = 0; k < 3; k++)
+		if (!(fabs(options->up[k]) <= 1e30))
+			return psr_fail(err, PSR_ERR_ARG, "up %g,%g,%g is not finite or too long", options->up[0], options->up[1],
+			                options->up[2]);
 	if (options->n_threads < 1 || options->n_threads > MOST_THREADS)
 		return psr_fail(err, PSR_ERR_ARG, "%d threads are outside of 1..%d", options->n_threads, MOST_THREADS);
 	return PSR_OK;
@@ -200,6 +205,7 @@ static int prepare(struct build *build)
 		rc = door_bound_mesh(build->mesh, build->info.origin, &build->info.scale, build->err);
 	if (rc != PSR_OK)
 		return rc;
+	v3d_normalize(build->info.up, v3d_length(options->up) > 0 ? options->up : build->mesh->up);
 	build->info.spacing = 2.0 / options->resolution * build->info.scale;
 	build->info.tolerance = options->tolerance;
 	build->info.resolution = options->resolution;

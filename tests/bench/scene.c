@@ -58,7 +58,7 @@ void scene_film_camera(struct psr_camera *camera, const struct scene_film *film,
 	const double turn = SWING * sin(2 * 180 * RADIANS * frame / SCENE_FRAMES), s = sin(turn), c = cos(turn);
 	double away[3], side[3];
 
-	psr_camera_frame(camera, info->box_min, info->box_max, SCENE_FOV * RADIANS,
+	psr_camera_frame(camera, info->box_min, info->box_max, info->up, SCENE_FOV * RADIANS,
 	                 (double)film->picture.width / film->picture.height);
 	v3d_sub(away, camera->eye, camera->target);
 	v3d_sub(side, info->box_max, info->box_min);

@@ -55,7 +55,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 
 	memset(f, 0, sizeof *f);
 	f->info = (struct psr_model_info){ .origin = { 500000.25, 5e6, -1e-3 }, .scale = 12.5, .box_min = { 1, 2, 3 },
-		                               .box_max = { 4, 5, 6 }, .spacing = 0.01, .tolerance = 1.2, .resolution = 256,
+		                               .box_max = { 4, 5, 6 }, .up = { 0, 0.6, 0.8 }, .spacing = 0.01, .tolerance = 1.2, .resolution = 256,
 		                               .n_trials = 1000000, .n_missing = 3, .n_lost = 1,
 		                               .builder = "test 1.0" };
 	for (int i = 0; i < 2; i++) {

@@ -317,7 +317,7 @@ static void lies_are_refused_even_under_right_hashes(void **state)
 		{ "MASK", 1, PACK_LENGTH, 4, 0, PSR_ERR_FORMAT, "of 48 bytes is packed into 0" },
 		{ "MASK", 1, PACK_LENGTH, 4, UINT32_MAX, PSR_ERR_FORMAT, "of 48 bytes is packed into 4294967295" },
 		{ "INFO", 1, PACK_LENGTH, 4, 20, PSR_ERR_FORMAT, "the chunks end at byte" },
-		{ "INFO", 1, PACK_METHOD, 1, PACK_STORED, PSR_ERR_FORMAT, "of 160 bytes is packed into" },
+		{ "INFO", 1, PACK_METHOD, 1, PACK_STORED, PSR_ERR_FORMAT, "of 184 bytes is packed into" },
 		{ "INFO", 1, PACK_METHOD, 1, PACK_XOR, PSR_ERR_FORMAT, "section INFO at byte" },
 	};
 

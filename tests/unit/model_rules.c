@@ -98,6 +98,8 @@ static const struct violation violations[] = {
 	{ "INFO", 120, 8, 1000001, "INFO: 3 pixels are missing and 1000001 lost, out of 1000000" },
 	{ "INFO", 128, 1, '\n', "INFO: byte 0 of the builder's name is not text" },
 	{ "INFO", 158, 1, 'x', "INFO: byte 30 of the builder's name is not text" },
+	{ "INFO", 160, 8, D_NAN, "INFO: up is nan,0.6,0.8; it must have length 1" },
+	{ "INFO", 168, 8, D_MINUS_1, "INFO: up is 0,-1,0.8; it must have length 1" },
 	{ "CAMS", 0, 1, 0, "CAMS: the name of camera 0 is empty" },
 	{ "CAMS", 4, 1, 0x80, "CAMS: byte 4 of the name of camera 0 is not UTF-8, or a control character" },
 	{ "CAMS", 168 + 1, 1, 0xc1, "CAMS: byte 1 of the name of camera 1 is not UTF-8, or a control character" },
@@ -240,7 +242,7 @@ static void versions_are_refused_by_major_and_section(void **state)
 	bytes = copy_original();
 	file_put(bytes + HEADER_MAJOR, 2, 3);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 4.x"));
+	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 5.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
@@ -342,7 +344,7 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 160 bytes, which reach beyond the file's end" },
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 184 bytes, which reach beyond the file's end" },
 		{ NULL, 28, 4, 1, "4800 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },

@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
+#include "base/vec.h"
 #include "psr/render.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -532,33 +533,40 @@ static void framing_shows_the_whole_box(void **state)
 	(void)state;
 	static const double low[3] = { 10, 20, 30 }, high[3] = { 14, 21, 33 };
 	static const double aspects[] = { 0.3, 1, 2.5 };
-	for (int i = 0; i < 6; i++) {
+	static const double ups[][3] = { { 0, 1, 0 }, { 0, 0, 1 }, { 2, 0, 0 }, { 0, -3, 0 }, { 0.3, -0.5, 0.7 } };
+	for (int i = 0; i < 30; i++) {
 		struct psr_camera c;
-		double aspect = aspects[i / 2], fov = i % 2 ? 0.6 : 0;
-		psr_camera_frame(&c, low, high, fov, aspect);
+		const double aspect = aspects[i / 2 % 3], fov = i % 2 ? 0.6 : 0;
+		psr_camera_frame(&c, low, high, ups[i / 6], fov, aspect);
 		double forward[3], right[3], down[3];
-		for (int k = 0; k < 3; k++)
-			forward[k] = c.target[k] - c.eye[k];
-		double n = sqrt(forward[0] * forward[0] + forward[1] * forward[1] + forward[2] * forward[2]);
-		for (int k = 0; k < 3; k++)
-			forward[k] /= n;
-		double len = sqrt(forward[0] * forward[0] + forward[2] * forward[2]);
-		right[0] = -forward[2] / len, right[1] = 0, right[2] = forward[0] / len;
-		down[0] = forward[1] * right[2] - forward[2] * right[1];
-		down[1] = forward[2] * right[0] - forward[0] * right[2];
-		down[2] = forward[0] * right[1] - forward[1] * right[0];
+		v3d_sub(forward, c.target, c.eye);
+		v3d_normalize(forward, forward);
+		v3d_cross(right, forward, c.up);
+		v3d_normalize(right, right);
+		v3d_cross(down, forward, right);
 		for (int corner = 0; corner < 8; corner++) {
-			double p[3] = { 0 }, x = 0, y = 0, z = 0;
-			for (int k = 0; k < 3; k++) {
+			double p[3];
+			for (int k = 0; k < 3; k++)
 				p[k] = (corner >> k & 1 ? high : low)[k] - c.eye[k];
-				x += p[k] * right[k];
-				y += p[k] * down[k];
-				z += p[k] * forward[k];
-			}
-			double reach = fov > 0 ? tan(fov / 2) * z : c.ortho_height / 2;
+			const double z = v3d_dot(p, forward), reach = fov > 0 ? tan(fov / 2) * z : c.ortho_height / 2;
 			assert_true(z > c.near_z);
-			assert_true(fabs(y) <= reach * (1 + 1e-12));
-			assert_true(fabs(x) <= reach * aspect * (1 + 1e-12));
+			assert_true(fabs(v3d_dot(p, down)) <= reach * (1 + 1e-12));
+			assert_true(fabs(v3d_dot(p, right)) <= reach * aspect * (1 + 1e-12));
+		}
+	}
+}
+
+static void views_from_the_front_are_what_formats_call_it(void **state)
+{
+	(void)state;
+	/* glTF looks at +z with +y up; CAD and surveys at -y with +z up. */
+	static const double up[2][3] = { { 0, 5, 0 }, { 0, 0, 0.1 } }, front[2][3] = { { 0, 0, 1 }, { 0, -1, 0 } };
+	for (int i = 0; i < 2; i++) {
+		double axes[3][3];
+		psr_camera_axes(axes, up[i]);
+		for (int k = 0; k < 3; k++) {
+			assert_true(axes[0][k] == (k == 0));
+			assert_true(axes[2][k] == front[i][k]);
 		}
 	}
 }
@@ -582,6 +590,7 @@ int main(void)
 		cmocka_unit_test(an_empty_scene_is_background),
 		cmocka_unit_test(the_door_refuses_what_is_out_of_range),
 		cmocka_unit_test(framing_shows_the_whole_box),
+		cmocka_unit_test(views_from_the_front_are_what_formats_call_it),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

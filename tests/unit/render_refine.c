@@ -53,7 +53,7 @@ static void still_make(struct still *s, const struct psr_model *model, uint32_t 
 		(struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
 	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light, .n_lights = 1,
 		                           .ambient = { 0.1, 0.1, 0.1 } };
-	psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
+	psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 	psr_settings_default(&s->settings, width, height);
 	s->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc((size_t)width * height * 3),
 		                           .depth = malloc((size_t)width * height * sizeof(float)) };

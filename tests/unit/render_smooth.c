@@ -110,7 +110,7 @@ static void scene_make(struct drawn *d, const struct psr_model *model, uint32_t 
 		(struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, -2, -3 }, .color = { 1, 0.9, 0.8 } };
 	d->scene = (struct psr_scene){ .instance = &d->instance, .n_instances = 1, .light = &d->light, .n_lights = 1,
 		                           .background = { 0.2, 0.1, 0 } };
-	psr_camera_frame(&d->scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
+	psr_camera_frame(&d->scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 	psr_settings_default(&d->settings, width, height);
 	const size_t area = (size_t)width * height;
 	d->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc(3 * area), .depth = malloc(4 * area),

@@ -75,7 +75,7 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 
 	psr_settings_default(&settings, width, height);
 	settings.cull_tests &= ~(unsigned)PSR_CULL_OCCLUSION;
-	psr_camera_frame(&scene.camera, info->box_min, info->box_max, 0.6, (double)width / height);
+	psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 	for (int i = 0; i < 3; i++)
 		scene.camera.eye[i] = scene.camera.target[i] + (scene.camera.eye[i] - scene.camera.target[i]) / nearness;
 	if (kind == PSR_CAMERA_ORTHOGRAPHIC) {

@@ -71,7 +71,7 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	static uint64_t mask[PLATE_BLOCKS], attr[PLATE_SAMPLES];
 	struct psr_model_info info = {
 		.scale = 1, .box_min = { -0.5, -0.5, 0 }, .box_max = { 0.5, 0.5, 0 }, .spacing = 1.0 / 64, .tolerance = 0.4,
-		.resolution = 128, .builder = "test",
+		.resolution = 128, .builder = "test", .up = { 0, 0, 1 },
 	};
 	struct psr_blocks blocks = {
 		.n_blocks = PLATE_BLOCKS, .n_projections = 1, .n_clusters = 1, .n_levels = 1, .n_samples = PLATE_SAMPLES,

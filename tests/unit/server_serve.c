@@ -514,7 +514,7 @@ static uint32_t ask_presets(uint32_t handle)
 static void cameras_and_lights_of_a_model_are_told(void **state)
 {
 	struct psr_msg_opened opened;
-	struct psr_msg_preset got[3];
+	struct psr_msg_preset got[4];
 	struct psr_msg_presets_end end;
 	struct psr_message message;
 	uint32_t id;
@@ -523,26 +523,31 @@ static void cameras_and_lights_of_a_model_are_told(void **state)
 	peer_hello(&p, &psrd, NULL);
 	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
 	id = ask_presets(opened.handle);
-	for (int i = 0; i < 3; i++) {
+	for (int i = 0; i < 4; i++) {
 		peer_expect(&p, &message, PSR_MSG_PRESET, id);
 		assert_int_equal(psr_msg_preset_decode(&got[i], message.payload, message.n, NULL), PSR_OK);
 	}
 	peer_expect(&p, &message, PSR_MSG_PRESETS_END, id);
 	assert_int_equal(psr_msg_presets_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
-	assert_true(end.n_cameras == 1 && end.n_lights == 2);
+	assert_true(end.n_cameras == 2 && end.n_lights == 2);
 	assert_int_equal(got[0].kind, PSR_WIRE_PRESET_CAMERA);
 	assert_string_equal(got[0].name, "front");
 	assert_int_equal(got[0].camera.kind, PSR_WIRE_CAMERA_PERSPECTIVE);
 	assert_true(got[0].camera.eye[2] == 3 && got[0].camera.up[1] == 1);
 	assert_true(got[0].camera.extent == 0.5 && got[0].camera.near_z == 0.25);
+	/* The view of the whole model, its own way up. */
+	assert_string_equal(got[1].name, "home");
+	assert_int_equal(got[1].kind, PSR_WIRE_PRESET_CAMERA);
+	assert_memory_equal(got[1].camera.up, ((const double[]){ 0, 0, 1 }), sizeof got[1].camera.up);
+	assert_true(got[1].camera.eye[1] < -1 && got[1].camera.eye[0] > 0 && got[1].camera.eye[2] > 0);
 	/* Half of the intensity in linear light is code 188; the wire's intensity ends at a million. */
-	assert_string_equal(got[1].name, "lamp");
-	assert_int_equal(got[1].light.kind, PSR_WIRE_LIGHT_POINT);
-	assert_memory_equal(got[1].light.color, ((const uint8_t[]){ 255, 188, 0 }), 3);
-	assert_true(got[1].light.intensity == 1e6 && got[1].light.reference == 1 && got[1].light.position[2] == 3);
-	assert_string_equal(got[2].name, "sun");
-	assert_memory_equal(got[2].light.color, ((const uint8_t[]){ 255, 255, 255 }), 3);
-	assert_true(got[2].light.intensity == 3 && got[2].light.direction[2] == -1);
+	assert_string_equal(got[2].name, "lamp");
+	assert_int_equal(got[2].light.kind, PSR_WIRE_LIGHT_POINT);
+	assert_memory_equal(got[2].light.color, ((const uint8_t[]){ 255, 188, 0 }), 3);
+	assert_true(got[2].light.intensity == 1e6 && got[2].light.reference == 1 && got[2].light.position[2] == 3);
+	assert_string_equal(got[3].name, "sun");
+	assert_memory_equal(got[3].light.color, ((const uint8_t[]){ 255, 255, 255 }), 3);
+	assert_true(got[3].light.intensity == 3 && got[3].light.direction[2] == -1);
 	/* Another handle, and the connection goes on. */
 	peer_expect_error(&p, ask_presets(opened.handle + 1), PSR_WIRE_NOT_FOUND, NULL);
 	ask_presets(opened.handle);

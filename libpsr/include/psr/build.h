@@ -15,11 +15,12 @@ struct psr_build_options {
 	uint32_t resolution; /* target resolution in pixels across the unit sphere ([G] 5.1), 8..8192 */
 	double tolerance;    /* angle of [G] 4.4, radians, in (0, 60 degrees] */
 	int n_threads;       /* 1..256 */
+	double up[3];        /* the way up of the object, of any length; 0, 0, 0: the mesh's */
 	/* Called from the calling thread, rarely; stage is "sample"; done <= total. May be NULL. */
 	void (*on_progress)(const char *stage, uint64_t done, uint64_t total, void *userdata);
 	void *userdata;
 };
-void psr_build_options_default(struct psr_build_options *options); /* 512, 25 degrees, all cores */
+void psr_build_options_default(struct psr_build_options *options); /* 512, 25 degrees, all cores, the mesh's up */
 
 struct psr_build_report {
 	uint64_t n_rays, n_candidates; /* of all levels; candidates: pieces of the surface that may become blocks */

@@ -88,6 +88,9 @@ struct psr_mesh {
 	struct psr_material *material;  /* at least one */
 	struct psr_image *image;
 
+	double up[3]; /* unit length: +y of glTF; +z of clouds of LAS, of STL, AMF and 3MF, and of all else at survey
+	               * coordinates, further from the origin in x or y than ten times its size; else +y */
+
 	uint32_t n_cameras, n_lights;
 	struct psr_preset_camera *camera;
 	struct psr_preset_light *light;

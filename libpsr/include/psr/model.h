@@ -202,6 +202,8 @@ struct psr_model_info {
 	double origin[3]; /* object coordinates of the inner origin */
 	double scale;     /* object units an inner unit; > 0 */
 	double box_min[3], box_max[3]; /* of the samples, object coordinates */
+	double up[3];     /* unit length: the way up of the object, for views that nobody chose; 0, 0, 0 in what
+	                   * psr_model_create() is given counts as 0, 1, 0 */
 	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object
 	                   * units */
 	double tolerance; /* angle of [G] 4.4, radians */

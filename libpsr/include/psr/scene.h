@@ -39,10 +39,15 @@ struct psr_scene {
 /* Checks all ranges above: PSR_ERR_ARG or LIMIT with a sentence that names the field. */
 int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err);
 
-/* A camera that shows the whole scene from a little to the right and above of the front (+z), at the given vertical
- * angle (radians; 0: orthographic) and aspect (width / height). */
-void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], double fov_y,
-                      double aspect);
+/* A camera that shows the whole box from a little to the right and above of the front, at the given vertical angle
+ * (radians; 0: orthographic) and aspect (width / height). `up` has any length but 0 and becomes camera->up, with
+ * length 1. Right is +x unless up is within 25 degrees of it (then +y), and the front is right x up: +z where +y is
+ * up, -y where +z is. */
+void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], const double up[3],
+                      double fov_y, double aspect);
+
+/* Those axes, orthonormal: right, up, front. */
+void psr_camera_axes(double axes[3][3], const double up[3]);
 
 #ifdef __cplusplus
 }
