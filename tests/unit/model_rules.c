@@ -351,7 +351,7 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
 		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 184 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "4800 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, 28, 4, 1, "4864 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },
