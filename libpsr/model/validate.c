@@ -234,7 +234,7 @@ static int check_traits(const struct checker *c)
 	const struct psr_blocks *b = c->blocks;
 
 	for (uint32_t i = 0; b->traits != NULL && i < b->n_blocks; i++)
-		if ((b->traits[i] & ~PSR_BLOCK_BENT) != 0)
+		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER)) != 0)
 			return fail(c, "TRTS", "block %" PRIu32 " has traits %d, of which some are unknown", i, b->traits[i]);
 	return PSR_OK;
 }

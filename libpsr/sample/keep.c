@@ -78,7 +78,7 @@ static int blend(const struct level *level, const float n[3], const float facing
 			weight[count] = w * w;
 			straight[count] = (point->attr & ~NORMAL_BITS) | point->normal;
 			found[count++] = point->attr;
-			n_bent += point->is_bent;
+			n_bent += point->traits & PSR_BLOCK_BENT;
 		}
 	}
 	if (count == 0)
@@ -88,8 +88,10 @@ static int blend(const struct level *level, const float n[3], const float facing
 	if (n_bent != 0) {
 		uint16_t own = (uint16_t)PSR_ATTR_NORMAL(blend_attr(straight, weight, count, facing));
 
-		to->is_bent = v3f_dot(direction[to->normal], direction[own]) < least_agreement(level, prim);
-		to->normal = to->is_bent ? own : to->normal;
+		if (v3f_dot(direction[to->normal], direction[own]) < least_agreement(level, prim)) {
+			to->traits |= PSR_BLOCK_BENT;
+			to->normal = own;
+		}
 	}
 	return 1;
 }
@@ -104,11 +106,21 @@ static void look(const struct level *level, const struct surface_place *place, c
 
 	word = surface_look(level->surface, place, 1.4142135623730951 * level->ds, normal);
 	to->attr = word | psr_direction_encode(normal);
-	to->is_bent = v3f_dot(normal, n) < least;
+	to->traits |= v3f_dot(normal, n) < least ? PSR_BLOCK_BENT : 0;
 	surface_face(normal, facing);
 	to->normal = agree((uint16_t)psr_direction_encode(normal), n, least);
-	if (!to->is_bent)
+	if (!(to->traits & PSR_BLOCK_BENT))
 		to->attr = word | to->normal;
+}
+
+static int is_sheer(const struct level *level, const struct surface_place *place)
+{
+	float rgba[4];
+
+	if (level_material(level, place->prim)->alpha != PSR_ALPHA_BLEND)
+		return 0;
+	texture_base_color(level->mesh, place->prim, place->u, place->v, rgba);
+	return rgba[3] < 1;
 }
 
 static void make_point(const struct level *level, const struct level_ref *ref, struct cover_point *point)
@@ -127,7 +139,7 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 	ray_locate(level->scene, &ray, prim, &place.u, &place.v);
 	sheets_position(sheets, ref->at, point->position);
 	level_normal(level, surface, n);
-	point->is_bent = 0;
+	point->traits = is_sheer(level, &place) ? PSR_BLOCK_SHEER : 0;
 	if (level->finer == NULL || !blend(level, n, sheets->projection.axis[2], prim, point))
 		look(level, &place, n, sheets->projection.axis[2], point);
 	point->two_sided = (uint8_t)level_is_two_sided(level, prim, point->position, n);

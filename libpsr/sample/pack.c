@@ -218,12 +218,12 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 	int8_t axis[3];
 	int n = 0;
 
-	for (uint64_t left = block->two_sided && !block->is_bent ? 0 : block->part; left != 0; left &= left - 1) {
+	for (uint64_t left = block->two_sided && !(block->traits & PSR_BLOCK_BENT) ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SHEET_BACK);
 
 		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
-		if (!block->is_bent)
+		if (!(block->traits & PSR_BLOCK_BENT))
 			memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
 	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);
@@ -237,7 +237,7 @@ static void place_block(struct pack *pack, uint32_t i, const struct draft_block 
 		pack->run[i / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = pack->n_samples };
 	pack->block_projection[i] = block->projection;
 	pack->flags[i] = (uint8_t)(block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
-	pack->traits[i] = block->is_bent ? PSR_BLOCK_BENT : 0;
+	pack->traits[i] = block->traits;
 	pack->mask[i] = block->part;
 	pack->attr_offset[i] = (uint16_t)(pack->n_samples - pack->run[i / PSR_RUN_BLOCKS].attr_first);
 }

@@ -72,7 +72,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->cone[i % 3][i] = 127;
 		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
 		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
-		f->traits[i] = i % 3 == 1 ? PSR_BLOCK_BENT : 0;
+		f->traits[i] = (uint8_t)(i % 4);
 		f->block_projection[i] = (uint8_t)(i % 2);
 		f->flags[i] = (uint8_t)(levels[i] | 6 << 3 | (i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0));
 		f->attr_offset[i] = (uint16_t)n;

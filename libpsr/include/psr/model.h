@@ -42,7 +42,9 @@ enum psr_block_trait {
 	/* The shading normals of some samples are far from those of their faces, so that they cannot tell how these face:
 	 * the cone tells it of the whole block. All of it is drawn unless its cone faces away; and a two-sided block is
 	 * seen from its front where the normal of the cone that is nearest to the shading normal faces the eye. */
-	PSR_BLOCK_BENT = 1
+	PSR_BLOCK_BENT = 1,
+	/* It has holes as the surface lets light through: what lies between its samples is not to be closed. */
+	PSR_BLOCK_SHEER = 2
 };
 
 /* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */

@@ -36,7 +36,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const uint32_t level = check_one_in(c, 4) ? check_below(c, PSR_MAX_LEVELS) : check_below(c, 3);
 		projection[b] = (uint8_t)check_below(c, n_projections);
-		traits[b] = (uint8_t)check_below(c, 2) * PSR_BLOCK_BENT;
+		traits[b] = (uint8_t)check_below(c, 4);
 		flags[b] = (uint8_t)(level | (check_u32(c) & (PSR_BLOCK_DEPTH | PSR_BLOCK_TWO_SIDED)));
 		if (b % PSR_RUN_BLOCKS == 0)
 			run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = n };
