@@ -162,6 +162,8 @@ static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, str
 	if (code == PSR_OK)
 		code = psr_truth_create(&truth, mesh, err);
 	if (code == PSR_OK)
+		psr_truth_stipple(truth, spacing);
+	if (code == PSR_OK)
 		code = psr_accuracy_measure(a, truth, camera, width, height, depth, spacing, options.n_threads, err);
 	if (code == PSR_OK && color_path != NULL)
 		code = measure_color(color, truth, camera, color_path, options.n_threads, err);
