@@ -181,8 +181,8 @@ struct strip_pixels {
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
 	const uint64_t *at[STRIP];          /* attributes */
 	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
-	uint32_t cone[STRIP]; /* with STRIP_BENT, of bent blocks: x, y, z and sine, from the lowest byte on; else
-	                       * STRIP_NO_CONE */
+	uint32_t has_cones;   /* whether any is of a bent block, with STRIP_BENT and where the surface's normal is needed */
+	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */
 };
 #define STRIP_NO_CONE ((uint32_t)PSR_CONE_ANY << 24)
 

@@ -28,6 +28,18 @@ static inline uint32_t cone_of(const struct psr_blocks *b, uint32_t block)
 	       (uint32_t)(uint8_t)b->cone_z[block] << 16 | (uint32_t)b->cone_sine[block] << 24;
 }
 
+static void find_cones(struct strip_pixels *p, const struct strip_view *view)
+{
+	for (uint32_t i = 0, end; i < p->n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, p->n);
+		const struct psr_blocks b = *in->blocks;
+		for (; i < end; i++) {
+			p->cone[i] = cone_of(&b, p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot);
+			p->has_cones |= p->cone[i] != STRIP_NO_CONE;
+		}
+	}
+}
+
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
@@ -39,10 +51,12 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);
 			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
 			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
-			p->cone[i] = view->needs & STRIP_BENT ? cone_of(&b, block) : STRIP_NO_CONE;
 			__builtin_prefetch(p->at[i]);
 		}
 	}
+	p->has_cones = 0;
+	if (view->needs & STRIP_BENT && view->needs & (STRIP_POSITION | STRIP_TWO_SIDED))
+		find_cones(p, view);
 	repeat_last(p);
 }
 
@@ -140,10 +154,10 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 		turn_normals(strip, in->turn, first, end);
-		if (view->needs & STRIP_BENT)
+		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
 	}
-	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !(view->needs & STRIP_BENT)) {
+	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !p->has_cones) {
 		memcpy(strip->gx, strip->nx, n * sizeof *strip->nx);
 		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
 		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
