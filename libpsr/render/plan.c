@@ -252,6 +252,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
 	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
+	plan->has_sheer = 0;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;
 	plan->exponent = scene_exponent(scene);

@@ -206,7 +206,8 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
 			nearest = is_met && other < nearest ? other : nearest;
 			farthest = is_met && other > farthest ? other : farthest;
-			is_open = is_met && is_sheer(plan, stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
+			is_open = is_met && plan->has_sheer &&
+			          is_sheer(plan, stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
 		}
 		if (!is_met || is_open)
 			return 0;
