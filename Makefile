@@ -8,7 +8,7 @@ V ?= 0
 VERSION := 0.1.0
 
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
-	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev libssl-dev
+	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev
 DEPS_TEST  := libcmocka-dev assimp-testmodels
 DEPS_STUDY := gnuplot-nox
 DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev
@@ -174,6 +174,7 @@ FRAMES     := $(BUILD)/tests/bench/frames
 EFFECTS    := $(BUILD)/tests/bench/effects
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
+CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
 L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson $(L_PSR)
 # What stands in tests/*/ finds the image module by its run path.
@@ -188,6 +189,7 @@ $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST)
 $(call unit_bin,$(filter tests/unit/server_%,$(UNIT))): $(SERVER_PARTS)
+$(call unit_bin,tests/unit/client_wish.c): $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(call unit_bin,$(filter tests/unit/models_%,$(UNIT))): $(MODEL_PARTS)

@@ -5,55 +5,71 @@
 #include "bench.h"
 #include "psr.h"
 
+static int check(struct bench_options *options, struct psr_error *err)
+{
+	struct views views = { .n = 0 };
+	int code = scene_check(&options->scene, err);
+
+	if (code == PSR_OK)
+		code = views_make(&views, &options->view, NULL, err);
+	if (code == PSR_OK && views.n == 1)
+		options->view = views.wish[0];
+	else if (code == PSR_OK)
+		code = psr_fail(err, PSR_ERR_ARG, "--view: a bench begins at one view, not at %u", views.n);
+	options->view.view = NULL; /* its angles stand in the wish */
+	views_fini(&views);
+	options->frame.planes = 1 << PSR_WIRE_PLANE_COLOR;
+	if (code == PSR_OK)
+		code = quality_apply(&options->frame, &options->quality, err);
+	options->scene.pixels = view_pixels(&options->view, &options->frame);
+	return code;
+}
+
 static int parse(struct bench_options *options, int *json, int argc, char **argv, struct psr_error *err)
 {
-	const struct psr_opt opts[] = {
-		PSR_OPT_SERVER(options->server),
-		{ "model", 'm', PSR_OPT_STRING, &options->model, "NAME", "The model, by its name in `psr list`.", 0, 0, NULL,
-		  NULL },
+	struct optlist list = { .n = 0 };
+	const struct psr_opt load[] = {
 		{ "clients", 'c', PSR_OPT_INT, &options->n_clients, "N", "Connections, each with a camera of its own.", 1,
 		  BENCH_MAX_CLIENTS, NULL, NULL },
 		{ "seconds", 't', PSR_OPT_INT, &options->seconds, "S", "How long to measure; warming up comes before.", 1,
 		  86400, NULL, NULL },
-		{ "size", 0, PSR_OPT_SIZE, options->size, "WxH", "Pixels.", 0, 0, NULL, NULL },
-		{ "codec", 0, PSR_OPT_STRING, &options->codec_text, "CODEC", "jpeg:Q (quality of 1 to 100), lossless, or raw.",
-		  0, 0, NULL, NULL },
-		{ "inflight", 0, PSR_OPT_INT, &options->n_inflight, "K", "Requests that each connection keeps under way.", 1,
+		{ "inflight", 0, PSR_OPT_INT, &options->n_inflight, "K",
+		  "Pictures that each connection asks for before the first has come: more hides a slow network.", 1,
 		  PSR_WIRE_MAX_OPEN, NULL, NULL },
+		PSR_OPT_SERVER(options->server),
+	};
+	const struct psr_opt script[] = {
 		{ "json", 0, PSR_OPT_FLAG, json, NULL, "Print one object instead of the lines.", 0, 0, NULL, NULL },
 		PSR_OPT_TIMEOUT(options->timeout),
-		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
-		"psr bench --model NAME [--server ADDR] [--clients N] [--seconds S] [--size WxH] [--json]",
-		"Loads a server: N connections whose cameras fly around the model, each asking for the next frame when one has "
-		"come. Latency is from sending a request to the decoded picture.",
-		opts,
-		PSR_EXIT_CODES,
+		"psr bench --model NAME [--server ADDR] [--clients N] [--seconds S] [models, camera, light, quality] [--json]",
+		"Measures how many pictures a server draws: N connections whose cameras fly around the model, each asking for "
+		"the next picture when one has come. Latency is the time from asking to the decoded picture.",
+		list.opt,
+		SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
 	};
-	uint32_t w, h;
-	int code = psr_cli_parse(&cli, argc, argv, NULL, err);
+	int code;
 
-	if (code != PSR_OK)
-		return code;
-	w = options->size[0];
-	h = options->size[1];
-	if (options->model == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "--model NAME is missing; `psr list` shows the names");
-	if (w == 0 || h == 0)
-		return psr_fail(err, PSR_ERR_ARG, "--size: a picture of %ux%u has no pixels", w, h);
-	if (w > PSR_WIRE_MAX_SIDE || h > PSR_WIRE_MAX_SIDE || (uint64_t)w * h > PSR_WIRE_MAX_PIXELS)
-		return psr_fail(err, PSR_ERR_LIMIT, "--size: %ux%u is too large; a side has at most %d pixels, a picture %u", w,
-		                h, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
-	return psr_codec_parse(&options->codec, &options->quality, options->codec_text, err);
+	optlist_heading(&list, "Load", NULL);
+	OPTLIST_ADD(&list, load);
+	optlist_heading(&list, "What is drawn",
+	                "The defaults are those of psr shot but for --size and --codec: smoothing is "
+	                "on, too.");
+	scene_add_model_options(&list, &options->scene);
+	view_add_options(&list, &options->view);
+	scene_add_light_options(&list, &options->scene);
+	quality_add_options(&list, &options->quality);
+	optlist_heading(&list, "For developers", NULL);
+	OPTLIST_ADD(&list, script);
+	code = psr_cli_parse(&cli, argc, argv, NULL, err);
+	return code == PSR_OK ? check(options, err) : code;
 }
 
-static void stop_all(struct bench_worker *workers, int64_t n_started, int64_t n)
+static void stop_all(struct bench_worker *workers, int64_t n_started)
 {
 	for (int64_t i = 0; i < n_started; i++)
 		pthread_join(workers[i].thread, NULL);
-	for (int64_t i = 0; i < n; i++)
-		free(workers[i].scene);
 }
 
 /* Starts all, waits until they are warm, lets them measure, waits for the end. */
@@ -69,8 +85,7 @@ static int run(struct bench_worker *workers, const struct bench_options *options
 		worker->options = options;
 		worker->gate = &gate;
 		worker->index = n_started;
-		worker->scene = calloc(1, sizeof *worker->scene);
-		if (worker->scene == NULL || pthread_create(&worker->thread, NULL, bench_worker_run, worker) != 0) {
+		if (pthread_create(&worker->thread, NULL, bench_worker_run, worker) != 0) {
 			code = psr_fail(err, PSR_ERR_MEMORY, "the system has no room for %" PRId64 " clients", n);
 			break;
 		}
@@ -84,21 +99,22 @@ static int run(struct bench_worker *workers, const struct bench_options *options
 	gate.state = code == PSR_OK ? 1 : -1;
 	pthread_cond_broadcast(&gate.changed);
 	pthread_mutex_unlock(&gate.lock);
-	stop_all(workers, n_started, n);
+	stop_all(workers, n_started);
 	return code;
 }
 
 static int print_result(const struct bench_options *options, const struct bench_result *r, int as_json,
                         struct psr_error *err)
 {
-	const double size[2] = { options->size[0], options->size[1] };
+	const struct psr_msg_frame *frame = &options->frame;
+	const double size[2] = { frame->width, frame->height };
+	const char *model = options->scene.instance[0].model, *codec = options->quality.codec;
 	cJSON *json, *latency;
 
 	if (!as_json) {
-		printf("%s %ux%u %s, %" PRId64 " clients, %" PRId64 " under way each, %" PRId64 " s\n", options->model,
-		       options->size[0], options->size[1], options->codec_text, options->n_clients, options->n_inflight,
-		       options->seconds);
-		printf("frames/s  %10.1f\n", r->frames_per_s);
+		printf("%s %ux%u %s, %" PRId64 " clients, %" PRId64 " under way each, %" PRId64 " s\n", model, frame->width,
+		       frame->height, codec, options->n_clients, options->n_inflight, options->seconds);
+		printf("frames/s  %10.1f in all, %.1f each\n", r->frames_per_s, r->frames_per_s / (double)options->n_clients);
 		printf("MB/s      %10.2f\n", r->mb_per_s);
 		printf("latency   %10.2f ms p50, %.2f p90, %.2f p99, %.2f max (%" PRIu64 " frames)\n", r->p50_ms, r->p90_ms,
 		       r->p99_ms, r->max_ms, r->n_samples);
@@ -106,14 +122,15 @@ static int print_result(const struct bench_options *options, const struct bench_
 		return psr_flush_output(err);
 	}
 	json = cJSON_CreateObject();
-	cJSON_AddStringToObject(json, "model", options->model);
+	cJSON_AddStringToObject(json, "model", model);
 	cJSON_AddItemToObject(json, "size", cJSON_CreateDoubleArray(size, 2));
-	cJSON_AddStringToObject(json, "codec", options->codec_text);
+	cJSON_AddStringToObject(json, "codec", codec);
 	cJSON_AddNumberToObject(json, "clients", (double)options->n_clients);
 	cJSON_AddNumberToObject(json, "inflight", (double)options->n_inflight);
 	cJSON_AddNumberToObject(json, "seconds", (double)options->seconds);
 	cJSON_AddNumberToObject(json, "frames", (double)r->n_frames);
 	cJSON_AddNumberToObject(json, "frames_per_s", r->frames_per_s);
+	cJSON_AddNumberToObject(json, "frames_per_s_each", r->frames_per_s / (double)options->n_clients);
 	cJSON_AddNumberToObject(json, "mb_per_s", r->mb_per_s);
 	cJSON_AddNumberToObject(json, "failed", (double)r->n_failed);
 	latency = cJSON_AddObjectToObject(json, "latency_ms");
@@ -127,19 +144,20 @@ static int print_result(const struct bench_options *options, const struct bench_
 int psr_bench_main(int argc, char **argv)
 {
 	struct bench_options options = { .server = psr_default_server(),
-		                             .codec_text = "jpeg:85",
 		                             .n_clients = 4,
 		                             .seconds = 5,
 		                             .n_inflight = 1,
-		                             .timeout = PSR_DEFAULT_TIMEOUT,
-		                             .size = { 512, 512 } };
+		                             .timeout = PSR_DEFAULT_TIMEOUT };
 	struct bench_worker *workers = NULL;
 	struct bench_result result;
 	struct psr_error err;
-	int json = 0, code = parse(&options, &json, argc, argv, &err);
+	int json = 0, code;
 
-	if (code > 0)
-		return 0;
+	scene_wish_init(&options.scene);
+	view_wish_init(&options.view);
+	quality_wish_init(&options.quality, 512, 512, "jpeg:85");
+	options.scene.is_quiet = 1;
+	code = parse(&options, &json, argc, argv, &err);
 	if (code == PSR_OK) {
 		workers = calloc((size_t)options.n_clients, sizeof *workers);
 		code = workers != NULL ? run(workers, &options, &err) : psr_fail(&err, PSR_ERR_MEMORY, "no memory");
@@ -154,6 +172,9 @@ int psr_bench_main(int argc, char **argv)
 		free(workers[i].sample_us);
 	}
 	free(workers);
+	scene_wish_fini(&options.scene);
+	if (code > 0)
+		return 0;
 	if (code != PSR_OK)
 		return psr_cli_fail("psr bench", &err);
 	return result.n_failed > 0;

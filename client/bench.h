@@ -4,16 +4,19 @@
 
 #include <pthread.h>
 #include <stdint.h>
-#include "psr/client.h"
+#include "quality.h"
+#include "view.h"
 
 #define BENCH_MAX_CLIENTS 1024
 #define BENCH_MAX_SAMPLES (1u << 24) /* of all workers; who has filled his share stops early */
 
 struct bench_options {
-	const char *server, *model, *codec_text;
+	const char *server;
 	int64_t n_clients, seconds, n_inflight, timeout;
-	uint32_t size[2];
-	uint8_t codec, quality;
+	struct scene_wish scene;
+	struct view_wish view;
+	struct quality_wish quality;
+	struct psr_msg_frame frame; /* all but the camera */
 };
 
 /* Workers wait here once they are warm, until the last is: then all start, or none if one failed. */
@@ -31,8 +34,9 @@ struct bench_worker {
 	pthread_t thread;
 	struct psr_client *client;
 	struct psr_msg_frame frame;
-	struct psr_msg_scene *scene;
-	double center[3], arm[3]; /* the camera flies around center at center + arm, turned about +Y */
+	struct scene *scene;
+	struct psr_msg_camera start; /* the camera flies around its target from here */
+	double up[3];
 	uint64_t n_asked;
 	/* results */
 	uint32_t *sample_us; /* latency of each frame asked for within the time, the bench's to free */

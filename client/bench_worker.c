@@ -1,12 +1,9 @@
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include "bench.h"
 #include "psr.h"
 
 #define FRAMES_A_TURN 120
-#define FOV (35 * 3.14159265358979323846 / 180)
 
 static uint64_t now_ns(void)
 {
@@ -20,41 +17,36 @@ static void turn_camera(struct bench_worker *worker)
 {
 	double part = (double)(worker->n_asked % FRAMES_A_TURN) / FRAMES_A_TURN
 	              + (double)worker->index / (double)worker->options->n_clients;
-	double angle = 2 * 3.14159265358979323846 * part, c = cos(angle), s = sin(angle);
-	const double *arm = worker->arm;
-	double *eye = worker->frame.camera.eye;
 
-	eye[0] = worker->center[0] + c * arm[0] + s * arm[2];
-	eye[1] = worker->center[1] + arm[1];
-	eye[2] = worker->center[2] - s * arm[0] + c * arm[2];
+	worker->frame.camera = worker->start;
+	psr_camera_turn(&worker->frame.camera, worker->up, 360 * part, worker->scene->box_min, worker->scene->box_max);
 	worker->n_asked++;
 }
 
-static int prepare(struct bench_worker *worker, const struct psr_msg_opened *opened, struct psr_error *err)
+static int prepare(struct bench_worker *worker, struct psr_error *err)
 {
 	const struct bench_options *options = worker->options;
-	const struct psr_camera_wish wish = { .fov_y = FOV };
-	struct psr_msg_frame *frame = &worker->frame;
-	struct psr_msg_scene *scene = worker->scene;
-	int code = psr_camera_complete(&frame->camera, &wish, opened->box_min, opened->box_max,
-	                               (double)options->size[0] / options->size[1], err);
+	double aspect = (double)options->frame.width / options->frame.height;
+	int code = scene_open(&worker->scene, &options->scene, worker->client, (int)options->timeout * 1000, err);
 
+	worker->frame = options->frame;
+	if (code == PSR_OK)
+		code = view_place(&worker->start, &options->view, worker->client, worker->scene, aspect, FRAMES_A_TURN, err);
 	if (code != PSR_OK)
 		return code;
-	for (int i = 0; i < 3; i++) {
-		worker->center[i] = frame->camera.target[i];
-		worker->arm[i] = frame->camera.eye[i] - frame->camera.target[i];
-	}
-	frame->width = options->size[0];
-	frame->height = options->size[1];
-	frame->planes = 1 << PSR_WIRE_PLANE_COLOR;
-	frame->color_codec = options->codec;
-	frame->color_quality = options->quality;
-	scene->ambient = 0.15;
-	scene->n_instances = scene->n_lights = 1;
-	psr_light_key(&scene->light[0], &frame->camera);
-	scene->instance[0] = (struct psr_msg_instance){ .handle = opened->handle, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	view_up(worker->up, &options->view, worker->scene);
+	scene_light(worker->scene, &worker->start);
 	return PSR_OK;
+}
+
+static int wait_for_frame(struct bench_worker *worker, struct psr_event *event, struct psr_error *err)
+{
+	int got;
+
+	do
+		got = psr_client_wait(worker->client, (int)worker->options->timeout * 1000, event, err);
+	while (got > 0 && event->type == PSR_EVENT_FRAME && !event->end->is_final);
+	return got;
 }
 
 /* Connects, opens, and draws one frame that is not counted. */
@@ -62,27 +54,25 @@ static int warm_up(struct bench_worker *worker, struct psr_error *err)
 {
 	const struct bench_options *options = worker->options;
 	int timeout_ms = (int)options->timeout * 1000, code;
-	struct psr_msg_opened opened;
 	struct psr_event event;
 	uint32_t id;
 
-	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->model, timeout_ms, err);
-	if (code == PSR_OK)
-		code = psr_client_open(worker->client, options->model, NULL, NULL, timeout_ms, &opened, err);
+	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->scene.instance[0].model,
+	                          timeout_ms, err);
 	if (code == PSR_OK && options->n_inflight > psr_client_welcome(worker->client)->max_open)
 		code = psr_fail(err, PSR_ERR_LIMIT, "--inflight: %s takes %u requests at a time", options->server,
 		                psr_client_welcome(worker->client)->max_open);
 	if (code == PSR_OK)
-		code = prepare(worker, &opened, err);
+		code = prepare(worker, err);
 	if (code == PSR_OK)
-		code = psr_client_scene(worker->client, worker->scene, NULL, err);
+		code = psr_client_scene(worker->client, &worker->scene->msg, NULL, err);
 	if (code == PSR_OK) {
 		turn_camera(worker);
 		code = psr_client_frame(worker->client, &worker->frame, &id, err);
 	}
 	if (code != PSR_OK)
 		return code;
-	code = psr_client_wait(worker->client, timeout_ms, &event, err);
+	code = wait_for_frame(worker, &event, err);
 	if (code == 0)
 		return psr_fail(err, PSR_ERR_CONNECTION, "%s: no frame within %d s", options->server, timeout_ms / 1000);
 	if (code > 0 && event.type == PSR_EVENT_FAILED)
@@ -154,7 +144,7 @@ static void measure(struct bench_worker *worker)
 		if (n_open == 0 && got > 0)
 			break;
 		if (got > 0)
-			got = psr_client_wait(worker->client, (int)options->timeout * 1000, &event, &why);
+			got = wait_for_frame(worker, &event, &why);
 		since_ns = now_ns() - start_ns;
 		if (got == 0)
 			psr_fail(&why, PSR_ERR_CONNECTION, "%s: no frame within %d s", options->server, (int)options->timeout);
@@ -193,5 +183,6 @@ void *bench_worker_run(void *userdata)
 		measure(worker);
 	psr_client_close(worker->client);
 	worker->client = NULL;
+	scene_close(worker->scene);
 	return NULL;
 }

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "preset.h"
+#include "psr.h"
 
 static const char *state_name(uint8_t state)
 {
@@ -10,7 +11,29 @@ static const char *state_name(uint8_t state)
 	return names[state < sizeof names / sizeof names[0] ? state : 0];
 }
 
-static int print_table(const struct psr_msg_list_entry *entries, uint32_t n, struct psr_error *err)
+/* Why models of state failed are not served: `why` has n texts, "" of the others. */
+static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *entries, uint32_t n,
+                        struct psr_client *client, int timeout_ms, struct psr_error *err)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		struct psr_msg_opened opened;
+		int code;
+
+		if (entries[i].state != PSR_ENTRY_FAILED)
+			continue;
+		code = psr_client_open(client, entries[i].name, NULL, NULL, timeout_ms, &opened, err);
+		if (code == PSR_OK)
+			entries[i].state = PSR_ENTRY_LOADED; /* somebody mended it */
+		else if (code == PSR_ERR_CONNECTION || code == PSR_ERR_PROTOCOL)
+			return code;
+		else
+			snprintf(why[i], sizeof why[i], "%s", err->text);
+	}
+	return PSR_OK;
+}
+
+static int print_table(const struct psr_msg_list_entry *entries, char (*why)[PSR_ERROR_TEXT], uint32_t n,
+                       struct psr_error *err)
 {
 	int width = 4;
 
@@ -19,12 +42,13 @@ static int print_table(const struct psr_msg_list_entry *entries, uint32_t n, str
 			width = (int)strlen(entries[i].name);
 	printf("%-*s  %-6s  %10s\n", width, "name", "state", "MB");
 	for (uint32_t i = 0; i < n; i++)
-		printf("%-*s  %-6s  %10.2f\n", width, entries[i].name, state_name(entries[i].state),
-		       (double)entries[i].file_bytes / 1e6);
+		printf("%-*s  %-6s  %10.2f%s%s\n", width, entries[i].name, state_name(entries[i].state),
+		       (double)entries[i].file_bytes / 1e6, why[i][0] != '\0' ? "  " : "", why[i]);
 	return psr_flush_output(err);
 }
 
-static int print_json(const struct psr_msg_list_entry *entries, uint32_t n, struct psr_error *err)
+static int print_json(const struct psr_msg_list_entry *entries, char (*why)[PSR_ERROR_TEXT], uint32_t n,
+                      struct psr_error *err)
 {
 	cJSON *all = cJSON_CreateArray();
 
@@ -38,6 +62,8 @@ static int print_json(const struct psr_msg_list_entry *entries, uint32_t n, stru
 		cJSON_AddStringToObject(one, "state", state_name(entries[i].state));
 		cJSON_AddNumberToObject(one, "bytes", (double)entries[i].file_bytes);
 		cJSON_AddStringToObject(one, "content_id", id);
+		if (why[i][0] != '\0')
+			cJSON_AddStringToObject(one, "error", why[i]);
 		cJSON_AddItemToArray(all, one);
 	}
 	return psr_print_json(all, err);
@@ -89,12 +115,18 @@ static int list_presets(struct psr_client *client, const char *model, int json, 
 static int list_models(struct psr_client *client, int json, int timeout_ms, struct psr_error *err)
 {
 	struct psr_msg_list_entry *entries = NULL;
+	char (*why)[PSR_ERROR_TEXT] = NULL;
 	uint32_t n = 0;
 	int code = psr_client_list(client, &entries, &n, timeout_ms, err);
 
+	if (code == PSR_OK && (why = calloc(n + 1, sizeof *why)) == NULL)
+		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a list of %u models", n);
 	if (code == PSR_OK)
-		code = json ? print_json(entries, n, err) : print_table(entries, n, err);
+		code = find_reasons(why, entries, n, client, timeout_ms, err);
+	if (code == PSR_OK)
+		code = json ? print_json(entries, why, n, err) : print_table(entries, why, n, err);
 	free(entries);
+	free(why);
 	return code;
 }
 
@@ -106,17 +138,19 @@ int psr_list_main(int argc, char **argv)
 	const struct psr_opt opts[] = {
 		PSR_OPT_SERVER(server),
 		{ "json", 0, PSR_OPT_FLAG, &json, NULL,
-		  "Print an array of objects: name, state, bytes, content_id; of presets: kind, type, name.", 0, 0, NULL,
-		  NULL },
+		  "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of presets "
+		  "with kind, type and name.",
+		  0, 0, NULL, NULL },
 		{ "presets", 'p', PSR_OPT_STRING, &model, "NAME",
-		  "Instead, the cameras and lights that came with this model, which is opened for it.", 0, 0, NULL, NULL },
+		  "Instead of models, the cameras and lights in the file of this one, for --camera and --light preset:NAME.", 0,
+		  0, NULL, NULL },
 		PSR_OPT_TIMEOUT(timeout),
 		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
 	};
 	const struct psr_cli cli = {
 		"psr list [--server ADDR] [--presets NAME] [--json]",
-		"Lists the models of a server: ready (a model file), loaded (in the server's memory), source (built when it is "
-		"first opened), failed (opening it says why).",
+		"Lists the models of a server: ready (a model file), loaded (in the server's memory), source (built when a "
+		"picture first asks for it), failed (cannot be served; the reason stands beside it).",
 		opts,
 		PSR_EXIT_CODES,
 	};

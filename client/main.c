@@ -8,7 +8,8 @@ static const struct {
 	const char *help;
 } commands[] = {
 	{ "list", psr_list_main, "the models that a server has" },
-	{ "shot", psr_shot_main, "one picture of a model, into a file" },
+	{ "shot", psr_shot_main, "a picture of a model, or of several, into a file" },
+	{ "turntable", psr_turntable_main, "a model from all sides: numbered pictures, an animation or a contact sheet" },
 	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
 };
 
@@ -19,7 +20,7 @@ static void print_help(void)
 	printf("usage: psr COMMAND [options]\n       psr --help | --version\n\n"
 	       "The client of psrd, which draws point-sample models and streams the pictures.\n\ncommands:\n");
 	for (size_t i = 0; i < N_COMMANDS; i++)
-		printf("  %-7s %s\n", commands[i].name, commands[i].help);
+		printf("  %-9s %s\n", commands[i].name, commands[i].help);
 	printf("\n`psr COMMAND --help` shows the options of a command.\n\n" PSR_EXIT_CODES "\n");
 }
 
@@ -40,8 +41,9 @@ int main(int argc, char **argv)
 		if (strcmp(name, commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);
 	if (name == NULL)
-		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot and bench, and --help");
+		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot, turntable and bench, and --help");
 	else
-		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot and bench, and --help", name);
+		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable and bench, and --help",
+		         name);
 	return psr_cli_fail("psr", &err);
 }

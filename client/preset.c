@@ -18,24 +18,19 @@ const char *preset_type(const struct psr_msg_preset *preset)
 	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
 }
 
-struct presets {
-	const struct psr_msg_preset *preset;
-	uint32_t n;
-};
-
 /* "there are 'a', 'b'" as far as it fits. */
-static int fail_missing(const struct presets *presets, uint8_t kind, const char *name, struct psr_error *err)
+static int fail_missing(const struct scene *scene, uint8_t kind, const char *name, struct psr_error *err)
 {
 	const char *what = kind == PSR_WIRE_PRESET_CAMERA ? "camera" : "light";
 	char names[300] = "";
 	size_t used = 0;
 
-	for (uint32_t i = 0; i < presets->n; i++) {
+	for (uint32_t i = 0; i < scene->n_presets; i++) {
 		int n;
 
-		if (presets->preset[i].kind != kind)
+		if (scene->preset[i].kind != kind)
 			continue;
-		n = snprintf(names + used, sizeof names - used, "%s'%s'", used != 0 ? ", " : "", presets->preset[i].name);
+		n = snprintf(names + used, sizeof names - used, "%s'%s'", used != 0 ? ", " : "", scene->preset[i].name);
 		if (n < 0 || (size_t)n >= sizeof names - used - sizeof ", ...") {
 			strcpy(names + used, ", ...");
 			break;
@@ -47,64 +42,66 @@ static int fail_missing(const struct presets *presets, uint8_t kind, const char 
 	return psr_fail(err, PSR_ERR_NOT_FOUND, "no %s '%.80s' came with the model; there are %s", what, name, names);
 }
 
-static const struct psr_msg_preset *find(const struct presets *presets, uint8_t kind, const char *name)
+static int check_server(const struct psr_client *client, struct psr_error *err)
 {
-	for (uint32_t i = 0; i < presets->n; i++)
-		if (presets->preset[i].kind == kind && strcmp(presets->preset[i].name, name) == 0)
-			return &presets->preset[i];
+	if (psr_client_welcome(client)->capabilities & PSR_CAP_PRESETS)
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server tells no cameras and lights of models (%s)",
+	                psr_client_welcome(client)->server);
+}
+
+static const struct psr_msg_preset *find(const struct scene *scene, uint8_t kind, const char *name)
+{
+	for (uint32_t i = 0; i < scene->n_presets; i++)
+		if (scene->preset[i].kind == kind && strcmp(scene->preset[i].name, name) == 0)
+			return &scene->preset[i];
 	return NULL;
 }
 
-static int add_all_lights(const struct presets *presets, struct psr_msg_scene *scene, struct psr_error *err)
+int preset_camera(struct psr_msg_camera *camera, const char *name, const struct psr_client *client,
+                  const struct scene *scene, struct psr_error *err)
 {
+	const struct psr_msg_preset *found = find(scene, PSR_WIRE_PRESET_CAMERA, name);
+	int code = check_server(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (found == NULL)
+		return fail_missing(scene, PSR_WIRE_PRESET_CAMERA, name, err);
+	*camera = found->camera;
+	return PSR_OK;
+}
+
+int preset_light(struct psr_msg_light *light, const char *name, const struct psr_client *client,
+                 const struct scene *scene, struct psr_error *err)
+{
+	const struct psr_msg_preset *found = find(scene, PSR_WIRE_PRESET_LIGHT, name);
+	int code = check_server(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (found == NULL)
+		return fail_missing(scene, PSR_WIRE_PRESET_LIGHT, name, err);
+	*light = found->light;
+	return PSR_OK;
+}
+
+int preset_all_lights(struct psr_msg_scene *msg, const struct psr_client *client, const struct scene *scene,
+                      struct psr_error *err)
+{
+	int code = check_server(client, err);
 	uint32_t n = 0;
 
-	for (uint32_t i = 0; i < presets->n; i++) {
-		if (presets->preset[i].kind != PSR_WIRE_PRESET_LIGHT)
+	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++) {
+		if (scene->preset[i].kind != PSR_WIRE_PRESET_LIGHT)
 			continue;
-		if (scene->n_lights == PSR_WIRE_MAX_LIGHTS)
+		if (msg->n_lights == PSR_WIRE_MAX_LIGHTS)
 			return psr_fail(err, PSR_ERR_LIMIT, "with those of the model there are more than %d lights; name some with "
 			                "--light preset:NAME", PSR_WIRE_MAX_LIGHTS);
-		scene->light[scene->n_lights++] = presets->preset[i].light;
+		msg->light[msg->n_lights++] = scene->preset[i].light;
 		n++;
 	}
-	return n != 0 ? PSR_OK : fail_missing(presets, PSR_WIRE_PRESET_LIGHT, "", err);
-}
-
-static int apply(const struct preset_wish *wish, const struct presets *presets, struct psr_msg_camera *camera,
-                 struct psr_msg_scene *scene, struct psr_error *err)
-{
-	const struct psr_msg_preset *found;
-
-	if (wish->camera != NULL) {
-		found = find(presets, PSR_WIRE_PRESET_CAMERA, wish->camera);
-		if (found == NULL)
-			return fail_missing(presets, PSR_WIRE_PRESET_CAMERA, wish->camera, err);
-		*camera = found->camera;
-	}
-	for (uint32_t i = 0; i < scene->n_lights; i++) {
-		if (wish->light[i] == NULL)
-			continue;
-		found = find(presets, PSR_WIRE_PRESET_LIGHT, wish->light[i]);
-		if (found == NULL)
-			return fail_missing(presets, PSR_WIRE_PRESET_LIGHT, wish->light[i], err);
-		scene->light[i] = found->light;
-	}
-	return wish->all_lights ? add_all_lights(presets, scene, err) : PSR_OK;
-}
-
-int preset_apply(const struct preset_wish *wish, struct psr_client *client, uint32_t handle,
-                 struct psr_msg_camera *camera, struct psr_msg_scene *scene, int timeout_ms, struct psr_error *err)
-{
-	struct psr_msg_preset *preset = NULL;
-	uint32_t n = 0;
-	int code;
-
-	if (wish->camera == NULL && !wish->has_lights && !wish->all_lights)
-		return PSR_OK;
-	code = psr_client_presets(client, handle, &preset, &n, timeout_ms, err);
-	if (code == PSR_OK)
-		code = apply(wish, &(struct presets){ preset, n }, camera, scene, err);
-	free(preset);
-	return code;
+	if (code != PSR_OK)
+		return code;
+	return n != 0 ? PSR_OK : fail_missing(scene, PSR_WIRE_PRESET_LIGHT, "", err);
 }

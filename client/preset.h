@@ -2,17 +2,15 @@
 #ifndef PSR_CLIENT_PRESET_H
 #define PSR_CLIENT_PRESET_H
 
-#include "psr.h"
+#include "scene.h"
 
-struct preset_wish {
-	const char *camera;                     /* name, or NULL */
-	const char *light[PSR_WIRE_MAX_LIGHTS]; /* name of what scene->light[i] will be, or NULL: it is there already */
-	int has_lights, all_lights;             /* any of light[] is set; all of the model's, after those */
-};
-
-/* Fills in what is wished for, from the open model. NOT_FOUND with the names that there are; LIMIT. */
-int preset_apply(const struct preset_wish *wish, struct psr_client *client, uint32_t handle,
-                 struct psr_msg_camera *camera, struct psr_msg_scene *scene, int timeout_ms, struct psr_error *err);
+/* Of the scene's first model. NOT_FOUND with the names that there are; UNSUPPORTED by an older server; LIMIT. */
+int preset_camera(struct psr_msg_camera *camera, const char *name, const struct psr_client *client,
+                  const struct scene *scene, struct psr_error *err);
+int preset_light(struct psr_msg_light *light, const char *name, const struct psr_client *client,
+                 const struct scene *scene, struct psr_error *err);
+int preset_all_lights(struct psr_msg_scene *msg, const struct psr_client *client, const struct scene *scene,
+                      struct psr_error *err); /* behind those that msg has */
 
 /* "perspective", "spot", ... */
 const char *preset_type(const struct psr_msg_preset *preset);

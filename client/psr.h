@@ -14,10 +14,10 @@
 
 #define PSR_OPT_SERVER(variable) \
 	{ "server", 's', PSR_OPT_STRING, &(variable), "ADDR", \
-	  "The server: HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH; $PSR_SERVER is the default where it is set.", \
+	  "Where psrd listens: HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH. Set $PSR_SERVER to say it once.", \
 	  0, 0, NULL, NULL }
 #define PSR_OPT_TIMEOUT(variable) \
-	{ "timeout", 0, PSR_OPT_INT, &(variable), "SECONDS", "Give a server up that does not answer for so long.", \
+	{ "timeout", 0, PSR_OPT_INT, &(variable), "SECONDS", "How long to wait for a server that says nothing.", \
 	  1, 86400, NULL, NULL }
 
 #define PSR_DEFAULT_TIMEOUT 60
@@ -25,6 +25,7 @@
 /* Each takes argv[0] = its own name and returns the exit status. */
 int psr_list_main(int argc, char **argv);
 int psr_shot_main(int argc, char **argv);
+int psr_turntable_main(int argc, char **argv);
 int psr_bench_main(int argc, char **argv);
 
 const char *psr_default_server(void); /* $PSR_SERVER, or the address that psrd listens to by default */

@@ -3,38 +3,36 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 #include "effects.h"
 #include "lib/outfile.h"
+#include "replay.h"
 #include "report.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 
-static void add_vec3(cJSON *to, const char *name, const double v[3])
-{
-	cJSON_AddItemToObject(to, name, cJSON_CreateDoubleArray(v, 3));
-}
-
 static void add_model(cJSON *to, const struct shot_facts *facts)
 {
 	static const char *const representations[] = { "", "blocks", "octree", "dpoint" };
-	const struct psr_msg_opened *opened = facts->opened;
+	const struct scene_model *first = &facts->scene->model[0];
+	const struct psr_msg_opened *opened = &first->opened;
 	cJSON *model = cJSON_AddObjectToObject(to, "model"), *list;
 	char id[33];
 
 	for (int i = 0; i < 16; i++)
 		snprintf(id + 2 * i, 3, "%02x", opened->content_id[i]);
-	cJSON_AddStringToObject(model, "name", facts->model);
+	cJSON_AddStringToObject(model, "name", first->name);
 	cJSON_AddStringToObject(model, "content_id", id);
 	cJSON_AddNumberToObject(model, "samples", (double)opened->n_samples);
 	cJSON_AddNumberToObject(model, "blocks", (double)opened->n_blocks);
 	cJSON_AddNumberToObject(model, "levels", opened->n_levels);
 	cJSON_AddNumberToObject(model, "bytes", (double)opened->bytes);
-	cJSON_AddNumberToObject(model, "spacing", opened->spacing);
+	json_add_number(model, "spacing", opened->spacing);
 	cJSON_AddNumberToObject(model, "resolution", opened->resolution);
-	cJSON_AddNumberToObject(model, "scale", opened->scale);
-	add_vec3(model, "origin", opened->origin);
-	add_vec3(model, "box_min", opened->box_min);
-	add_vec3(model, "box_max", opened->box_max);
+	json_add_number(model, "scale", opened->scale);
+	json_add_numbers(model, "origin", opened->origin, 3);
+	json_add_numbers(model, "box_min", opened->box_min, 3);
+	json_add_numbers(model, "box_max", opened->box_max, 3);
 	list = cJSON_AddArrayToObject(model, "representations");
 	for (unsigned r = 1; r < 4; r++)
 		if (opened->representations >> r & 1)
@@ -47,12 +45,12 @@ static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
 	int is_perspective = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE;
 
 	cJSON_AddStringToObject(camera, "kind", is_perspective ? "perspective" : "orthographic");
-	add_vec3(camera, "eye", wire->eye);
-	add_vec3(camera, "target", wire->target);
-	add_vec3(camera, "up", wire->up);
-	cJSON_AddNumberToObject(camera, is_perspective ? "fov_deg" : "height",
-	                        is_perspective ? wire->extent / DEGREE : wire->extent);
-	cJSON_AddNumberToObject(camera, "near", wire->near_z);
+	json_add_numbers(camera, "eye", wire->eye, 3);
+	json_add_numbers(camera, "target", wire->target, 3);
+	json_add_numbers(camera, "up", wire->up, 3);
+	json_add_number(camera, is_perspective ? "fov_deg" : "height",
+	                is_perspective ? wire->extent / DEGREE : wire->extent);
+	json_add_number(camera, "near", wire->near_z);
 }
 
 static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
@@ -104,6 +102,14 @@ static double server_ms(const struct psr_msg_frame_end *end)
 	return 0;
 }
 
+static uint64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
 static cJSON *make_report(const struct shot_facts *facts)
 {
 	static const char *const status[] = { "ok", "late", "coarse" };
@@ -117,14 +123,14 @@ static cJSON *make_report(const struct shot_facts *facts)
 	add_camera(report, &event->begin->camera);
 	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
 	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.is_smooth);
-	cJSON_AddStringToObject(report, "codec", facts->codec);
+	cJSON_AddNumberToObject(report, "pass", event->begin->pass);
 	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
 	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);
 	cJSON_AddNumberToObject(report, "bytes", (double)event->bytes);
 	ms = cJSON_AddObjectToObject(report, "ms");
 	cJSON_AddNumberToObject(ms, "server", server_ms(event->end));
 	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
-	cJSON_AddNumberToObject(ms, "total", (double)facts->total_ns / 1e6);
+	cJSON_AddNumberToObject(ms, "total", (double)(now_ns() - facts->start_ns) / 1e6);
 	add_stages(report, event->end);
 	effects_add(report, event->end);
 	add_planes(report, event);
@@ -133,6 +139,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 
 		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));
 	}
+	replay_add(report, facts->scene, facts->frame);
 	return report;
 }
 

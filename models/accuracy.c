@@ -1,9 +1,13 @@
 #include "commands.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include "accuracy_passes.h"
+#include "accuracy_report.h"
+#include "accuracy_verdict.h"
 #include "json.h"
 #include "pfm.h"
 #include "ppm.h"
@@ -16,10 +20,15 @@
 #define PROGRAM "psr-model accuracy"
 #define RADIANS (3.14159265358979323846 / 180)
 
-struct bounds {
-	double holes, distance;
-	int64_t outside;
-	int has_holes, has_distance, has_outside;
+/* The frame and how it was drawn; given says what of it options gave, which win over a report. */
+struct frame {
+	const char *depth, *color, *report;
+	struct psr_camera camera;
+	double fov, spacing, spacing_px;
+	uint32_t width, height; /* 0: as the depth has it */
+	struct {
+		int eye, target, up, fov, ortho, spacing;
+	} given;
 };
 
 static double fraction(uint64_t part, uint64_t whole)
@@ -54,8 +63,8 @@ static void print_shadow_text(const struct psr_shadow_accuracy *s)
 }
 
 /* color and shadow may be NULL. */
-static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color, const struct psr_shadow_accuracy *shadow,
-                      struct psr_error *err)
+static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color,
+                      const struct psr_shadow_accuracy *shadow, enum accuracy_verdict verdict, struct psr_error *err)
 {
 	cJSON *root = cJSON_CreateObject();
 
@@ -84,27 +93,8 @@ static int print_json(const struct psr_accuracy *a, const struct psr_color_accur
 		cJSON_AddNumberToObject(root, "shadow_seam_p99", shadow->seam_p99);
 		cJSON_AddNumberToObject(root, "shadow_seam_max", shadow->seam_max);
 	}
+	cJSON_AddStringToObject(root, "verdict", accuracy_verdict_name(verdict));
 	return json_print(root, err);
-}
-
-/* Says which bounds are broken; 1 if any is. */
-static int check_bounds(const struct psr_accuracy *a, const struct bounds *bounds)
-{
-	double holes = fraction(a->n_holes, a->n_inside);
-	int broken = 0;
-
-	if (bounds->has_holes && holes > bounds->holes)
-		broken = fprintf(stderr, PROGRAM ": %.6f of the pixels inside are holes, %.6f are allowed\n", holes,
-		                 bounds->holes);
-	if (bounds->has_distance && a->distance_p999 > bounds->distance)
-		broken = fprintf(stderr, PROGRAM ": the distance is %.4f spacings at the 99.9th percentile, %.4f is allowed\n",
-		                 a->distance_p999, bounds->distance);
-	if (bounds->has_outside && a->n_outside_drawn > (uint64_t)bounds->outside)
-		broken = fprintf(stderr, PROGRAM ": %" PRIu64 " pixels are drawn outside, %" PRId64 " are allowed\n",
-		                 a->n_outside_drawn, bounds->outside);
-	if (a->n_truth == 0)
-		broken = fprintf(stderr, PROGRAM ": the camera does not see the object\n");
-	return broken != 0;
 }
 
 static int measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
@@ -144,118 +134,208 @@ static int measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *tru
 	return code;
 }
 
-/* color_path may be NULL. */
-static int measure(struct psr_accuracy *a, struct psr_color_accuracy *color, struct psr_shadow_accuracy *shadow, const char *source,
-                   const char *frame, const char *color_path, const struct shadow_frames *shadow_frames,
-                   const struct psr_camera *camera, double spacing, struct psr_error *err)
+struct result {
+	struct psr_accuracy depth;
+	struct psr_color_accuracy color;
+	struct psr_shadow_accuracy shadow;
+	enum accuracy_verdict verdict;
+	char text[ACCURACY_TEXT];
+};
+
+static int measure(struct result *result, const char *source, const struct frame *frame,
+                   const struct shadow_frames *shadow, const struct accuracy_bounds *bounds, struct psr_error *err)
 {
+	const struct psr_camera *camera = &frame->camera;
 	struct psr_build_options options;
 	struct psr_mesh *mesh = NULL;
 	struct psr_truth *truth = NULL;
 	uint32_t width, height;
 	float *depth = NULL;
-	int code = pfm_read(&depth, &width, &height, frame, err);
+	int code = pfm_read(&depth, &width, &height, frame->depth, err);
 
 	psr_build_options_default(&options);
+	if (code == PSR_OK && frame->width > 0 && (frame->width != width || frame->height != height))
+		code = psr_fail(err, PSR_ERR_ARG, "%s has %ux%u pixels, and %s is of a frame of %ux%u: they belong to different frames",
+		                frame->depth, width, height, frame->report, frame->width, frame->height);
 	if (code == PSR_OK)
-		code = psr_mesh_import(&mesh, source, err);
+		code = psr_mesh_import(&mesh, source, NULL, err);
 	if (code == PSR_OK)
 		code = psr_truth_create(&truth, mesh, err);
 	if (code == PSR_OK)
-		psr_truth_stipple(truth, spacing);
+		psr_truth_stipple(truth, frame->spacing);
 	if (code == PSR_OK)
-		code = psr_accuracy_measure(a, truth, camera, width, height, depth, spacing, options.n_threads, err);
-	if (code == PSR_OK && color_path != NULL)
-		code = measure_color(color, truth, camera, color_path, options.n_threads, err);
-	if (code == PSR_OK && shadow_frames->shadowed != NULL)
-		code = measure_shadow(shadow, truth, camera, shadow_frames, options.n_threads, err);
+		code = psr_accuracy_measure(&result->depth, truth, camera, width, height, depth, frame->spacing, options.n_threads,
+		                            err);
+	if (code == PSR_OK && frame->color != NULL)
+		code = measure_color(&result->color, truth, camera, frame->color, options.n_threads, err);
+	if (code == PSR_OK && shadow->shadowed != NULL)
+		code = measure_shadow(&result->shadow, truth, camera, shadow, options.n_threads, err);
+	if (code == PSR_OK)
+		result->verdict = accuracy_judge(result->text, &result->depth, bounds, camera, width, height, depth,
+		                                 frame->spacing, frame->spacing_px);
 	psr_truth_destroy(truth);
 	psr_mesh_destroy(mesh);
 	free(depth);
 	return code;
 }
 
-static int check_arguments(const char *frame, int n_operands, int seen_camera, int seen_fov, int seen_ortho,
-                           int seen_spacing, struct psr_error *err)
+/* Takes from the report what no option gave. */
+static int take_report(struct frame *frame, struct psr_error *err)
+{
+	struct accuracy_report report;
+	struct psr_camera *camera = &frame->camera;
+	int code = accuracy_report_read(&report, frame->report, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (!frame->given.eye)
+		memcpy(camera->eye, report.camera.eye, sizeof camera->eye);
+	if (!frame->given.target)
+		memcpy(camera->target, report.camera.target, sizeof camera->target);
+	if (!frame->given.up)
+		memcpy(camera->up, report.camera.up, sizeof camera->up);
+	if (!frame->given.fov && !frame->given.ortho) {
+		camera->kind = report.camera.kind;
+		camera->fov_y = report.camera.fov_y;
+		camera->ortho_height = report.camera.ortho_height;
+	}
+	camera->near_z = report.camera.near_z;
+	if (!frame->given.spacing)
+		frame->spacing = report.spacing;
+	frame->spacing_px = report.spacing_px;
+	frame->width = report.width;
+	frame->height = report.height;
+	return PSR_OK;
+}
+
+static int complete(struct frame *frame, int n_operands, struct psr_error *err)
 {
 	if (n_operands != 1)
 		return psr_fail(err, PSR_ERR_ARG, "one source file is needed");
-	if (frame == NULL)
+	if (frame->depth == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--depth FRAME.pfm is needed");
-	if (seen_camera != 7)
-		return psr_fail(err, PSR_ERR_ARG, "--eye, --target and --up are needed: those of the frame");
-	if (!seen_fov == !seen_ortho)
-		return psr_fail(err, PSR_ERR_ARG, "either --fov or --ortho is needed: that of the frame");
-	if (!seen_spacing)
-		return psr_fail(err, PSR_ERR_ARG, "--spacing is needed; psr-model info prints it");
+	if (frame->given.fov && frame->given.ortho)
+		return psr_fail(err, PSR_ERR_ARG, "--fov and --ortho exclude each other");
+	frame->camera.kind = frame->given.ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
+	frame->camera.fov_y = frame->fov * RADIANS;
+	frame->spacing_px = 1;
+	if (frame->report != NULL)
+		return take_report(frame, err);
+	if (!frame->given.eye || !frame->given.target || !frame->given.up)
+		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --eye, --target and --up: those of the frame");
+	if (!frame->given.fov && !frame->given.ortho)
+		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or one of --fov and --ortho: that of the frame");
+	if (!frame->given.spacing)
+		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --spacing; psr-model info prints it");
 	return PSR_OK;
+}
+
+static int print(const struct result *result, const struct frame *frame, int has_shadow, int json, struct psr_error *err)
+{
+	int code = PSR_OK;
+
+	if (json) {
+		code = print_json(&result->depth, frame->color ? &result->color : NULL, has_shadow ? &result->shadow : NULL,
+		                  result->verdict, err);
+		if (result->verdict != ACCURACY_PASS)
+			fprintf(stderr, PROGRAM ": %s\n", result->text);
+	} else {
+		print_text(&result->depth);
+		if (frame->color != NULL)
+			print_color_text(&result->color);
+		if (has_shadow)
+			print_shadow_text(&result->shadow);
+		puts(result->text);
+	}
+	if (code == PSR_OK && fflush(stdout) != 0)
+		code = psr_fail(err, PSR_ERR_IO, "standard output cannot be written");
+	return code;
 }
 
 int cmd_accuracy(int argc, char **argv)
 {
-	struct psr_camera camera = { .kind = PSR_CAMERA_PERSPECTIVE };
-	struct bounds bounds = { 0 };
-	struct psr_accuracy accuracy;
+	/* NAN: not given, which --help shows as no default. */
+	struct frame frame = { .camera = { .eye = { NAN }, .target = { NAN }, .up = { NAN }, .ortho_height = NAN },
+		                   .fov = NAN, .spacing = NAN };
+	struct accuracy_bounds bounds = { .holes = NAN, .distance = NAN, .outside = NAN };
+	struct result result;
 	struct psr_error err;
-	struct psr_color_accuracy color_accuracy;
-	struct psr_shadow_accuracy shadow_accuracy;
-	struct shadow_frames shadow = { .light = { .kind = PSR_LIGHT_DIRECTIONAL } };
-	const char *frame = NULL, *color = NULL, *model = NULL;
+	struct shadow_frames shadow = { .light = { .position = { NAN }, .direction = { NAN } } };
+	const char *model = NULL;
 	double magnification = 1;
 	int64_t n_passes = 0;
-	int seen_passes = 0;
-	double fov = 0, spacing = 0;
-	int sun = 0, lamp = 0, eye = 0, target = 0, up = 0, seen_fov = 0, seen_spacing = 0, seen_ortho = 0, json = 0, n_operands, code;
+	int seen_passes = 0, sun = 0, lamp = 0, json = 0, n_operands, code;
 	const struct psr_opt opts[] = {
-		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame, .arg = "FRAME.pfm",
-		  .help = "the frame's depth, as psr shot --depth writes it" },
-		{ .name = "color", .type = PSR_OPT_STRING, .value = &color, .arg = "FRAME.ppm",
-		  .help = "its colours as well, drawn with --ambient 1 and no light" },
-		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
-		  .help = "shadows as well: drawn with --ambient 0 and one light, which casts them" },
-		{ .name = "lit", .type = PSR_OPT_STRING, .value = &shadow.lit, .arg = "FRAME.ppm", .help = "the same without `shadow`" },
-		{ .name = "sun", .type = PSR_OPT_VEC3, .value = shadow.light.direction, .arg = "X,Y,Z",
-		  .help = "where that light goes, if it is directional", .seen = &sun },
-		{ .name = "lamp", .type = PSR_OPT_VEC3, .value = shadow.light.position, .arg = "X,Y,Z",
-		  .help = "or where it is, if it is a point or a spot", .seen = &lamp },
-		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera.eye, .arg = "X,Y,Z", .help = "the frame's camera",
-		  .seen = &eye },
-		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera.target, .arg = "X,Y,Z", .help = "where it looks",
-		  .seen = &target },
-		{ .name = "up", .type = PSR_OPT_VEC3, .value = camera.up, .arg = "X,Y,Z", .help = "what is up in the picture",
-		  .seen = &up },
-		{ .name = "fov", .type = PSR_OPT_REAL, .value = &fov, .arg = "DEG", .help = "its vertical angle", .min = 1e-4,
-		  .max = 179.9, .seen = &seen_fov },
-		{ .name = "ortho", .type = PSR_OPT_REAL, .value = &camera.ortho_height, .arg = "HEIGHT",
-		  .help = "or its height, if it is orthographic", .min = 1e-30, .max = 1e30, .seen = &seen_ortho },
-		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &spacing, .arg = "S",
-		  .help = "distance of the model's samples, which distances are counted in", .min = 1e-30, .max = 1e30,
-		  .seen = &seen_spacing },
+		{ .name = "The frame", .type = PSR_OPT_HEADING },
+		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame.depth, .arg = "FRAME.pfm",
+		  .help = "The frame's depth: the file that psr shot --depth wrote." },
+		{ .name = "report", .type = PSR_OPT_STRING, .value = &frame.report, .arg = "FRAME.json",
+		  .help = "Its report: the file that psr shot --report wrote. Camera and spacing are taken from it." },
+		{ .name = "color", .type = PSR_OPT_STRING, .value = &frame.color, .arg = "FRAME.ppm",
+		  .help = "Compares its colours as well; the frame has to be drawn with --ambient 1 and no light." },
+		{ .name = "Without a report, or to override it", .type = PSR_OPT_HEADING,
+		  .help = "Lengths are in the units of the source file." },
+		{ .name = "eye", .type = PSR_OPT_VEC3, .value = frame.camera.eye, .arg = "X,Y,Z", .help = "Where the camera was.",
+		  .seen = &frame.given.eye },
+		{ .name = "target", .type = PSR_OPT_VEC3, .value = frame.camera.target, .arg = "X,Y,Z",
+		  .help = "What it looked at.", .seen = &frame.given.target },
+		{ .name = "up", .type = PSR_OPT_VEC3, .value = frame.camera.up, .arg = "X,Y,Z",
+		  .help = "What was up in the picture.", .seen = &frame.given.up },
+		{ .name = "fov", .type = PSR_OPT_REAL, .value = &frame.fov, .arg = "DEG",
+		  .help = "Its vertical angle of view, if it was a perspective one.", .min = 1e-4, .max = 179.9,
+		  .seen = &frame.given.fov },
+		{ .name = "ortho", .type = PSR_OPT_REAL, .value = &frame.camera.ortho_height, .arg = "HEIGHT",
+		  .help = "The height of its picture, if it was orthographic.", .min = 1e-30, .max = 1e30,
+		  .seen = &frame.given.ortho },
+		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &frame.spacing, .arg = "S",
+		  .help = "The distance between the model's samples, as psr-model info prints it; distances are counted in it.",
+		  .min = 1e-30, .max = 1e30, .seen = &frame.given.spacing },
+		{ .name = "The verdict", .type = PSR_OPT_HEADING },
 		{ .name = "max-holes", .type = PSR_OPT_REAL, .value = &bounds.holes, .arg = "F",
-		  .help = "fail if a larger fraction of the pixels inside are holes", .min = 0, .max = 1,
-		  .seen = &bounds.has_holes },
+		  .help = "FAIL if a larger fraction of the pixels inside of the silhouette are holes; 0.001 if not given.", .min = 0,
+		  .max = 1, .seen = &bounds.has_holes },
 		{ .name = "max-distance", .type = PSR_OPT_REAL, .value = &bounds.distance, .arg = "D",
-		  .help = "fail if the 99.9th percentile is over D spacings", .min = 0, .max = 1e30,
-		  .seen = &bounds.has_distance },
-		{ .name = "max-outside", .type = PSR_OPT_INT, .value = &bounds.outside, .arg = "N",
-		  .help = "fail if more pixels are drawn over a pixel outside of the silhouette", .min = 0, .max = 1 << 26,
-		  .seen = &bounds.has_outside },
+		  .help = "FAIL if more than 1 pixel in 1,000 is further than D spacings from the surface; if not given, one spacing, or"
+		          " one pixel where pixels are wider.", .min = 0, .max = 1e30, .seen = &bounds.has_distance },
+		{ .name = "max-outside", .type = PSR_OPT_REAL, .value = &bounds.outside, .arg = "N",
+		  .help = "FAIL if more than N pixels are drawn more than a pixel outside of the silhouette; 1 in 1,000 of the object's"
+		          " if not given.", .min = 0, .max = 1 << 26, .seen = &bounds.has_outside },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
+		  .help = "Prints all figures as a JSON object, with `verdict`: pass, fail or camera." },
+		{ .name = "For developers: shadows", .type = PSR_OPT_HEADING },
+		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
+		  .help = "Compares shadows as well: a frame drawn with --ambient 0 and one light, which casts them." },
+		{ .name = "lit", .type = PSR_OPT_STRING, .value = &shadow.lit, .arg = "FRAME.ppm",
+		  .help = "The same frame, whose light casts none." },
+		{ .name = "sun", .type = PSR_OPT_VEC3, .value = shadow.light.direction, .arg = "X,Y,Z",
+		  .help = "The direction of that light, if it is a dir: light.", .seen = &sun },
+		{ .name = "lamp", .type = PSR_OPT_VEC3, .value = shadow.light.position, .arg = "X,Y,Z",
+		  .help = "Its position, if it is a point: or spot: light.", .seen = &lamp },
+		{ .name = "For developers: refined stills, drawn here", .type = PSR_OPT_HEADING },
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &n_passes, .arg = "N",
-		  .help = "instead of a frame: draw a still of the model in passes 0 to N, and compare each with the truth", .min = 0,
-		  .max = PSR_MAX_PASS, .seen = &seen_passes },
-		{ .name = "model", .type = PSR_OPT_STRING, .value = &model, .arg = "FILE.psr", .help = "the model, for --passes" },
+		  .help = "Draws a still of the model in passes 0 to N, and prints how far each is from the truth, in dB, and its time.",
+		  .min = 0, .max = PSR_MAX_PASS, .seen = &seen_passes },
+		{ .name = "model", .type = PSR_OPT_STRING, .value = &model, .arg = "FILE.psr",
+		  .help = "The model that --passes draws." },
 		{ .name = "magnification", .type = PSR_OPT_REAL, .value = &magnification, .arg = "M",
-		  .help = "pixels between its samples, for --passes", .min = 0.01, .max = 64 },
-		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object" },
+		  .help = "Pixels between its samples: above 1 the still is larger than the model was made for.", .min = 0.01,
+		  .max = 64 },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
-		.usage = "psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
+		.usage = "psr-model accuracy SOURCE --depth FRAME.pfm --report FRAME.json [options]\n"
+		         "       psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
 		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]\n"
 		         "       psr-model accuracy SOURCE --model FILE.psr --passes N [--magnification M]",
-		.summary = "Compares the depth (and the colours) of a frame with the ray-traced mesh that its model was built from.",
+		.summary = "Says whether a frame shows what it should: compares its depth (and colours) with the same view of SOURCE,"
+		           " the mesh that its model was built from, ray-traced. The last line is the verdict.",
 		.opts = opts,
-		.footer = "Exit codes: 0 ok, 1 a bound is broken, 2 usage, 3 file or system, 4 bad data, 5 over a limit.",
+		.footer = "example:\n"
+		          "  psr shot --model dragon --size 512x512 -o frame.png --depth frame.pfm --report frame.json\n"
+		          "  psr-model accuracy dragon.ply --depth frame.pfm --report frame.json\n"
+		          "\n"
+		          "Exit codes: 0 PASS, 1 FAIL, 2 usage, 3 file or system, 4 bad data, or the camera seems wrong (the frame\n"
+		          "is of another view or another object), 5 over a limit.",
 	};
 
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
@@ -269,25 +349,15 @@ int cmd_accuracy(int argc, char **argv)
 		return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
 	}
 	if (code == PSR_OK)
-		code = check_arguments(frame, n_operands, (eye != 0) | (target != 0) << 1 | (up != 0) << 2, seen_fov,
-		                       seen_ortho, seen_spacing, &err);
+		code = complete(&frame, n_operands, &err);
 	if (code == PSR_OK && (!shadow.shadowed != !shadow.lit || (shadow.shadowed != NULL && !sun == !lamp)))
 		code = psr_fail(&err, PSR_ERR_ARG, "--shadow, --lit and one of --sun and --lamp belong together");
-	if (code == PSR_OK) {
-		shadow.light.kind = lamp ? PSR_LIGHT_POINT : PSR_LIGHT_DIRECTIONAL;
-		camera.kind = seen_ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
-		camera.fov_y = fov * RADIANS;
-		code = measure(&accuracy, &color_accuracy, &shadow_accuracy, argv[1], frame, color, &shadow, &camera, spacing, &err);
-	}
-	if (code == PSR_OK && json)
-		code = print_json(&accuracy, color ? &color_accuracy : NULL, shadow.shadowed ? &shadow_accuracy : NULL, &err);
-	else if (code == PSR_OK)
-		print_text(&accuracy);
-	if (code == PSR_OK && !json && color)
-		print_color_text(&color_accuracy);
-	if (code == PSR_OK && !json && shadow.shadowed)
-		print_shadow_text(&shadow_accuracy);
-	if (code == PSR_OK && fflush(stdout) != 0)
-		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
-	return code == PSR_OK ? check_bounds(&accuracy, &bounds) : psr_cli_fail(PROGRAM, &err);
+	shadow.light.kind = lamp ? PSR_LIGHT_POINT : PSR_LIGHT_DIRECTIONAL;
+	if (code == PSR_OK)
+		code = measure(&result, argv[1], &frame, &shadow, &bounds, &err);
+	if (code == PSR_OK)
+		code = print(&result, &frame, shadow.shadowed != NULL, json, &err);
+	if (code != PSR_OK)
+		return psr_cli_fail(PROGRAM, &err);
+	return result.verdict == ACCURACY_PASS ? 0 : result.verdict == ACCURACY_FAIL ? 1 : psr_exit_status(PSR_ERR_FORMAT);
 }

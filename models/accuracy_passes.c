@@ -91,7 +91,7 @@ static int load(struct passes *p, const char *source, const char *model, struct 
 	int code = psr_model_read(&p->model, model, err);
 
 	if (code == PSR_OK)
-		code = psr_mesh_import(&p->mesh, source, err);
+		code = psr_mesh_import(&p->mesh, source, NULL, err);
 	if (code == PSR_OK)
 		code = psr_truth_create(&p->truth, p->mesh, err);
 	if (code == PSR_OK && psr_renderer_create(&p->renderer) != PSR_OK)

@@ -108,8 +108,8 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 
-static int build(const char *in, const char *out, struct psr_build_options *options, int is_packed, int quiet,
-                 struct psr_error *err)
+static int build(const char *in, const char *out, const struct psr_import_options *import,
+                 struct psr_build_options *options, int is_packed, int quiet, struct psr_error *err)
 {
 	struct progress *progress = options->userdata;
 	struct psr_mesh *mesh = NULL;
@@ -118,7 +118,7 @@ static int build(const char *in, const char *out, struct psr_build_options *opti
 	int code;
 
 	on_progress("import", 0, 1, progress);
-	code = psr_mesh_import(&mesh, in, err);
+	code = psr_mesh_import(&mesh, in, import, err);
 	if (code == PSR_OK)
 		code = psr_model_build(&model, mesh, options, &report, err);
 	if (code == PSR_OK) {
@@ -146,6 +146,7 @@ static int check_progress_fd(int64_t fd, struct psr_error *err)
 
 int cmd_build(int argc, char **argv)
 {
+	struct psr_import_options import;
 	struct psr_build_options options;
 	struct progress progress = { .fd = -1 };
 	struct psr_error err;
@@ -153,36 +154,51 @@ int cmd_build(int argc, char **argv)
 	char *made = NULL;
 	int quiet = 0, is_packed = 0, n_operands, code;
 	int64_t resolution, n_threads, fd = -1;
-	double tolerance;
+	double tolerance, crease;
 	const struct psr_opt opts[] = {
+		{ .name = "The model", .type = PSR_OPT_HEADING },
 		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &out, .arg = "OUT.psr",
-		  .help = "where the model goes; without it beside IN, with .psr for its suffix" },
-		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "RES",
-		  .help = "pixels across the model at which it is sampled without holes", .min = 8, .max = 8192 },
-		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
-		  .help = "angle up to which one projection samples a surface densely enough", .min = 0.01, .max = 60 },
+		  .help = "The file to write. If not given: IN's name with .psr for its ending." },
+		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
+		  .help = "Use about twice the height of the pictures that you want. Larger pictures show rough edges; twice the figure"
+		          " takes four times the memory.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = options.up, .arg = "X,Y,Z",
-		  .help = "the way up of the object in its file, for pictures without a camera; 0,0,0: what files of this kind "
-		          "have, +z for LAS, STL and survey coordinates, +y for the others" },
+		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
+		          " usual for the format, +z for LAS, STL and survey coordinates, +y for the others." },
+		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
+		  .help = "Edges stay sharp where faces meet at a greater angle, in files that bring no directions of shading"
+		          " (normals). Lower it where edges look rounded; raise it where a smooth surface shows facets.",
+		  .min = 0, .max = 180 },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
-		  .help = "compress the file, to a third or half of its size; opening it unpacks it into memory" },
+		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
+		          " memory for all of it." },
+		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
-		  .help = "threads to use; the result does not depend on it", .min = 1, .max = 256 },
+		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
+		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet,
+		  .help = "Prints errors only: no progress, no warnings of what is left out, no summary." },
+		{ .name = "For developers", .type = PSR_OPT_HEADING },
+		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
+		  .help = "The greatest angle between a surface and the plane of the projection that samples it; docs/studies.md"
+		          " shows what it changes.", .min = 0.01, .max = 60 },
 		{ .name = "progress-fd", .type = PSR_OPT_INT, .value = &fd, .arg = "FD",
-		  .help = "write lines \"STAGE DONE TOTAL\" to this descriptor; -1: nowhere", .min = -1, .max = 1 << 20 },
-		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet, .help = "print errors only" },
+		  .help = "Writes lines \"STAGE DONE TOTAL\" to this open descriptor, for a program that waits; -1: nowhere.",
+		  .min = -1, .max = 1 << 20 },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [options]",
-		.summary = "Samples a mesh or a cloud of points into a .psr model.",
+		.summary = "Turns a mesh or a scan into a .psr model, which psrd draws. psrd builds models itself when they are first"
+		           " asked for; build one here to choose how fine it is.",
 		.opts = opts,
 		.footer = FORMATS,
 	};
 
+	psr_import_options_default(&import);
 	psr_build_options_default(&options);
 	resolution = options.resolution;
 	tolerance = options.tolerance / RADIANS;
+	crease = import.crease / RADIANS;
 	n_threads = options.n_threads;
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
@@ -195,7 +211,8 @@ int cmd_build(int argc, char **argv)
 		return psr_cli_fail(PROGRAM, &err);
 	options.resolution = (uint32_t)resolution;
 	options.tolerance = tolerance * RADIANS;
-	options.n_threads = (int)n_threads;
+	options.n_threads = import.n_threads = (int)n_threads;
+	import.crease = crease * RADIANS;
 	options.on_progress = on_progress;
 	options.userdata = &progress;
 	progress.fd = (int)fd;
@@ -204,7 +221,7 @@ int cmd_build(int argc, char **argv)
 	if (out == NULL && made == NULL)
 		code = psr_fail(&err, PSR_ERR_MEMORY, "no memory for a file name");
 	else
-		code = build(argv[1], out != NULL ? out : made, &options, is_packed, quiet, &err);
+		code = build(argv[1], out != NULL ? out : made, &import, &options, is_packed, quiet, &err);
 	free(made);
 	if (code == PSR_OK && fflush(stdout) != 0)
 		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");

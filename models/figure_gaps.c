@@ -71,7 +71,7 @@ int figure_run_threshold(struct figures *figures)
 /* ---- interfaces between levels ---- */
 
 struct cover {
-	float *closed, *thesis; /* weights: as they are, and by the maximum of the levels' coverages alone ([G] 4.6) */
+	float *closed, *greatest; /* weights: as they are, and by the greatest coverage of a level alone */
 };
 
 static int is_before(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, float z, double scale)
@@ -116,7 +116,7 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 		for (uint32_t x = 0; x < stack->width; x++) {
 			const size_t at = (size_t)y * stack->width + x;
 			const float z = psr_float_from_bits((uint32_t)(psr_zstack_row(stack, y)[x] >> 32));
-			double thesis = 0, closed = 0;
+			double greatest = 0, closed = 0;
 
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 				double one;
@@ -124,30 +124,30 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 				if (!(stack->levels >> k & 1))
 					continue;
 				one = coverage(stack, k, x, y, z, scale, 0);
-				thesis = fmax(thesis, one);
+				greatest = fmax(greatest, one);
 				if (one > 0 && one < 1 && k > 1 && (stack->levels >> (k - 1) & 1))
 					one = coverage(stack, k, x, y, z, scale, 1);
 				closed = fmax(closed, one);
 			}
-			cover->thesis[at] = (float)(1 - thesis);
+			cover->greatest[at] = (float)(1 - greatest);
 			cover->closed[at] = (float)(1 - closed);
 		}
 }
 
-/* Gives back to pixels what the thesis's rule would leave them of their own samples. */
+/* Gives back to pixels what the greatest coverage would leave them of their own samples. */
 static void open_interfaces(struct figure_frame *frame, const struct figure_frame *raw, const struct cover *cover)
 {
 	for (size_t at = 0; at < (size_t)frame->width * frame->height; at++) {
-		const float share = (cover->thesis[at] - cover->closed[at]) / (1 - cover->closed[at]);
+		const float share = (cover->greatest[at] - cover->closed[at]) / (1 - cover->closed[at]);
 
-		if (!(cover->thesis[at] > cover->closed[at]))
+		if (!(cover->greatest[at] > cover->closed[at]))
 			continue;
 		for (size_t c = 3 * at; c < 3 * at + 3; c++) {
 			const float own = psr_srgb_to_linear[raw->rgb[c]], filled = psr_srgb_to_linear[frame->rgb[c]];
 
 			frame->rgb[c] = psr_linear_to_srgb(filled + share * (own - filled));
 		}
-		if (cover->thesis[at] >= 0.5f)
+		if (cover->greatest[at] >= 0.5f)
 			frame->depth[at] = raw->depth[at];
 	}
 }
@@ -161,7 +161,7 @@ static int draw_open(struct figure_frame *frame, struct figures *figures, const 
 	struct psr_report report;
 	int rc = figure_frame_init(&raw, frame->width, frame->height, figures->err);
 
-	if (rc == PSR_OK && (cover.closed == NULL || cover.thesis == NULL))
+	if (rc == PSR_OK && (cover.closed == NULL || cover.greatest == NULL))
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for weights");
 	if (rc == PSR_OK)
 		rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &report,
@@ -176,7 +176,7 @@ static int draw_open(struct figure_frame *frame, struct figures *figures, const 
 		open_interfaces(frame, &raw, &cover);
 	figure_frame_fini(&raw);
 	free(cover.closed);
-	free(cover.thesis);
+	free(cover.greatest);
 	return rc;
 }
 

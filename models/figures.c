@@ -70,13 +70,13 @@ int cmd_figures(int argc, char **argv)
 	int list = 0, n_operands, code;
 	int64_t n_threads;
 	const struct psr_opt opts[] = {
-		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "print the figures and what they show" },
+		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "Prints the names of the figures, and what each shows." },
 		{ .name = "out", .type = PSR_OPT_STRING, .value = &figures.out, .arg = "DIR",
-		  .help = "put the pictures into this folder" },
+		  .help = "The folder that the pictures are written to." },
 		{ .name = "keep", .type = PSR_OPT_STRING, .value = &figures.study.keep, .arg = "DIR",
-		  .help = "keep the models that are built in this folder, and read those that are there" },
+		  .help = "A folder that keeps models that were built, so that another run need not build them." },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
-		  .help = "threads to use; nothing but time depends on it", .min = 1, .max = 256 },
+		  .help = "Processor cores to use; the pictures are the same.", .min = 1, .max = 256 },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

@@ -227,7 +227,7 @@ int cmd_info(int argc, char **argv)
 	struct summary summary;
 	struct psr_error err;
 	const struct psr_opt opts[] = {
-		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object" },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "Prints the same as a JSON object, for scripts." },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

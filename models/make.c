@@ -75,8 +75,8 @@ int cmd_make(int argc, char **argv)
 	struct psr_error err;
 	const struct psr_opt opts[] = {
 		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &path, .arg = "OUT",
-		  .help = "the file to write; for `all` the folder" },
-		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "print the names and what they are" },
+		  .help = "The file to write; for `all` the folder." },
+		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "Prints the names, and what each shows." },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

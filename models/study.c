@@ -218,20 +218,20 @@ int cmd_study(int argc, char **argv)
 	int list = 0, json = 0, n_operands, code;
 	int64_t resolution = 256, n_threads;
 	const struct psr_opt opts[] = {
-		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "print the studies and what they are" },
+		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "Prints the names of the studies, and what each shows." },
 		{ .name = "models", .type = PSR_OPT_STRING, .value = &models, .arg = "LIST",
-		  .help = "names of generators (psr-model make --list) and files, with commas between them;\n"
-		          "without it those that the study is made for" },
+		  .help = "The models to study: names of generators (psr-model make --list) and files, with commas between them. If not"
+		          " given: those that the study is made for." },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "RES",
-		  .help = "target resolution of the models", .min = 16, .max = 2048 },
+		  .help = "The resolution that models are built at, as of psr-model build; times grow with its square.", .min = 16, .max = 2048 },
 		{ .name = "plot", .type = PSR_OPT_STRING, .value = &plot, .arg = "FILE",
-		  .help = "draw the table with gnuplot into this .svg or .png" },
+		  .help = "Draws the table into this .svg or .png, with gnuplot, which must be installed." },
 		{ .name = "keep", .type = PSR_OPT_STRING, .value = &study.keep, .arg = "DIR",
-		  .help = "keep the models of the standard set that are built in this folder; studies that do not need the\n"
-		          "time that building takes read them there" },
+		  .help = "A folder that keeps generated models that were built, so that another run need not build them. Studies that"
+		          " time the building build them anyway." },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
-		  .help = "threads to use; only times depend on it", .min = 1, .max = 256 },
-		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "print a JSON object, with each model too" },
+		  .help = "Processor cores to use; only times depend on it.", .min = 1, .max = 256 },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json, .help = "Prints the table as a JSON object, and a row for each model." },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

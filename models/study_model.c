@@ -26,7 +26,7 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 		snprintf(path, sizeof path, "%s/%s.glb", place, name);
 		code = glb_write(path, bytes, n_bytes, err);
 		if (code == PSR_OK)
-			code = psr_mesh_import(mesh, path, err);
+			code = psr_mesh_import(mesh, path, NULL, err);
 		unlink(path);
 		rmdir(place);
 	}
@@ -73,7 +73,7 @@ int study_model_load(struct study_model *model, const char *name, struct psr_err
 	}
 	memset(model, 0, sizeof *model);
 	snprintf(model->name, sizeof model->name, "%s", slash != NULL ? slash + 1 : name);
-	return prepare(model, psr_mesh_import(&model->mesh, name, err), err);
+	return prepare(model, psr_mesh_import(&model->mesh, name, NULL, err), err);
 }
 
 int study_model_make(struct study_model *model, const char *name, void (*make)(struct shape *), struct psr_error *err)

@@ -64,7 +64,7 @@ static void layout_open(struct wire *w, void *p)
 {
 	struct psr_msg_open *m = p;
 
-	wire_reserved(w, 4);
+	wire_u32(w, &m->resolution);
 	wire_string(w, m->name, sizeof m->name);
 }
 
@@ -72,6 +72,8 @@ static int check_open(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_open *m = p;
 
+	if (check_integer("the side of the pictures", m->resolution, 0, PSR_WIRE_MAX_SIDE, err))
+		return PSR_ERR_ARG;
 	return check_name(m->name, err);
 }
 

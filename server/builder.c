@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include <errno.h>
 #include <fcntl.h>
+#include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,6 +17,7 @@
 
 struct failure {
 	char key[CATALOGUE_KEY];
+	uint32_t resolution; /* 0: every one */
 	struct psr_error error;
 };
 
@@ -23,6 +25,7 @@ struct build {
 	struct build *next;
 	struct builder *builder;
 	char key[CATALOGUE_KEY];
+	uint32_t resolution;
 	char *program, *source, *target;
 	builder_on_progress *on_progress;
 	builder_on_done *on_done;
@@ -191,7 +194,8 @@ static void watch(struct build *build, struct loop_source *source, int fd, void 
 	}
 }
 
-static void remember(struct builder *builder, const char *key, const struct psr_error *error)
+/* A coarser model may be within the limits that a finer one exceeds; what is wrong with a source is wrong at each. */
+static void remember(struct builder *builder, const struct build *build, const struct psr_error *error)
 {
 	struct failure **place = &builder->failure[builder->n_failures++ % MAX_FAILURES];
 
@@ -199,15 +203,19 @@ static void remember(struct builder *builder, const char *key, const struct psr_
 		*place = malloc(sizeof **place);
 	if (*place == NULL)
 		return;
-	memcpy((*place)->key, key, CATALOGUE_KEY);
+	memcpy((*place)->key, build->key, CATALOGUE_KEY);
+	(*place)->resolution = error->code == PSR_ERR_LIMIT ? build->resolution : 0;
 	(*place)->error = *error;
 }
 
-const struct psr_error *builder_failure(const struct builder *builder, const char *key)
+const struct psr_error *builder_failure(const struct builder *builder, const char *key, uint32_t resolution)
 {
-	for (size_t i = 0; i < MAX_FAILURES && builder->failure[i] != NULL; i++)
-		if (strcmp(builder->failure[i]->key, key) == 0)
-			return &builder->failure[i]->error;
+	for (size_t i = 0; i < MAX_FAILURES && builder->failure[i] != NULL; i++) {
+		const struct failure *failure = builder->failure[i];
+
+		if (strcmp(failure->key, key) == 0 && (failure->resolution == 0 || failure->resolution == resolution))
+			return &failure->error;
+	}
 	return NULL;
 }
 
@@ -248,10 +256,10 @@ static void finish(struct build *build, const struct psr_error *failure)
 static int run(struct build *build, struct psr_error *err)
 {
 	struct builder *builder = build->builder;
-	char threads[16];
+	char threads[16], resolution[16];
 	const char *argv[] = {
-		build->program, "build", build->source, "-o", build->target, "--progress-fd", "3", "--quiet",
-		"--threads", threads, NULL,
+		build->program, "build", build->source, "-o", build->target, "-r", resolution, "--progress-fd", "3",
+		"--quiet", "--threads", threads, NULL,
 	};
 	const struct spawn_limits limits = {
 		.memory_bytes = builder->limits.memory_bytes, .cpu_seconds = builder->limits.cpu_seconds, .nice = 10,
@@ -259,11 +267,12 @@ static int run(struct build *build, struct psr_error *err)
 	int progress_fd, error_fd, code;
 
 	snprintf(threads, sizeof threads, "%d", builder->limits.threads);
+	snprintf(resolution, sizeof resolution, "%" PRIu32, build->resolution);
 	code = spawn_start(&build->pid, &progress_fd, &error_fd, argv, &limits, err);
 	if (code != PSR_OK)
 		return code;
 	builder->n_running++;
-	log_info("build of %s started", build->source);
+	log_info("build of %s started, at %" PRIu32, build->source, build->resolution);
 	watch(build, &build->progress_source, progress_fd, on_progress_ready);
 	watch(build, &build->error_source, error_fd, on_error_ready);
 	build->progress.stage = PSR_PROGRESS_IMPORT;
@@ -287,8 +296,9 @@ static void start_waiting(struct builder *builder)
 	}
 }
 
-int builder_start(struct builder *builder, const char *program, const char *key, const char *source, const char *target,
-                  builder_on_progress *on_progress, builder_on_done *on_done, void *userdata)
+int builder_start(struct builder *builder, const char *program, const char *key, uint32_t resolution,
+                  const char *source, const char *target, builder_on_progress *on_progress,
+                  builder_on_done *on_done, void *userdata)
 {
 	struct build *build = calloc(1, sizeof *build), **at = &builder->first;
 
@@ -303,6 +313,7 @@ int builder_start(struct builder *builder, const char *program, const char *key,
 	}
 	build->builder = builder;
 	memcpy(build->key, key, CATALOGUE_KEY);
+	build->resolution = resolution;
 	build->on_progress = on_progress;
 	build->on_done = on_done;
 	build->userdata = userdata;
@@ -321,7 +332,8 @@ static int explain(struct psr_error *error, const struct build *build, const str
 
 	if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
 		return psr_fail(error, PSR_ERR_LIMIT, "%s: the build was stopped: it needed more than %llu s of processor time "
-		                "(--build-time), or the machine's memory", name, (unsigned long long)limits->cpu_seconds);
+		                "(--build-time), or the machine's memory; a lower --max-resolution takes less of both", name,
+		                (unsigned long long)limits->cpu_seconds);
 	if (WIFSIGNALED(status))
 		return psr_fail(error, PSR_ERR_FORMAT, "%s: psr-model crashed on it (signal %d)", name, WTERMSIG(status));
 	psr_fail(error, PSR_ERR_INTERNAL, "%s: %.400s", name,
@@ -363,7 +375,7 @@ void builder_reap(struct builder *builder)
 			finish(build, NULL);
 		} else {
 			if (explain(&failure, build, &builder->limits, status) != PSR_ERR_IO)
-				remember(builder, build->key, &failure);
+				remember(builder, build, &failure);
 			finish(build, &failure);
 		}
 		build = builder->first; /* who was next may have ended too */

@@ -11,6 +11,7 @@
 #include <unistd.h>
 #include <xxhash.h>
 #include "cachekey.h"
+#include "parts.h"
 
 #define MAX_NEIGHBOURS 10000
 #define MAX_DEPTH 4
@@ -41,15 +42,22 @@ static int hash_file(XXH3_state_t *state, const char *path, struct psr_error *er
 	return code;
 }
 
+/* Files of the first three formats name no others, those of the rest seldom do. */
 static int is_alone(const char *source)
 {
-	static const char *const endings[] = { ".glb", ".stl", ".ply", ".off", ".las" };
+	static const char *const endings[] = { ".stl", ".off", ".las", ".glb", ".ply" };
 	const char *dot = strrchr(source, '.');
+	struct parts parts;
+	size_t i = 0;
 
-	for (size_t i = 0; dot != NULL && i < sizeof endings / sizeof endings[0]; i++)
-		if (strcasecmp(dot, endings[i]) == 0)
-			return 1;
-	return 0;
+	while (dot != NULL && i < sizeof endings / sizeof endings[0] && strcasecmp(dot, endings[i]) != 0)
+		i++;
+	if (dot == NULL || i == sizeof endings / sizeof endings[0])
+		return 0;
+	if (i < 3)
+		return 1;
+	parts_find(&parts, source);
+	return parts.n_named == 0;
 }
 
 static int is_model(const char *name)

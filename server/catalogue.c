@@ -9,6 +9,16 @@ void catalogue_init(struct catalogue *catalogue, uint64_t max_bytes)
 	*catalogue = (struct catalogue){ .max_bytes = max_bytes };
 }
 
+static void leave_entry(struct catalogue_model *model)
+{
+	struct catalogue_model **at = &model->entry->model;
+
+	while (*at != model)
+		at = &(*at)->of_entry;
+	*at = model->of_entry;
+	model->entry = NULL;
+}
+
 static void drop(struct catalogue *catalogue, struct catalogue_model *model)
 {
 	struct catalogue_model **at = &catalogue->models;
@@ -18,21 +28,16 @@ static void drop(struct catalogue *catalogue, struct catalogue_model *model)
 		at = &(*at)->next;
 	*at = model->next;
 	if (model->entry != NULL)
-		model->entry->model = NULL;
+		leave_entry(model);
 	catalogue->bytes -= model->bytes;
 	catalogue->n_models--;
 	psr_model_unref(model->model);
 	free(model);
 }
 
-static void detach(struct catalogue *catalogue, struct catalogue_entry *entry)
+static void detach(struct catalogue *catalogue, struct catalogue_model *model)
 {
-	struct catalogue_model *model = entry->model;
-
-	if (model == NULL)
-		return;
-	entry->model = NULL;
-	model->entry = NULL;
+	leave_entry(model);
 	if (model->n_users == 0)
 		drop(catalogue, model);
 }
@@ -40,8 +45,9 @@ static void detach(struct catalogue *catalogue, struct catalogue_entry *entry)
 static void destroy_entries(struct catalogue *catalogue)
 {
 	for (size_t i = 0; i < catalogue->n; i++) {
-		detach(catalogue, &catalogue->entry[i]);
-		free(catalogue->entry[i].file.path);
+		while (catalogue->entry[i].model != NULL)
+			detach(catalogue, catalogue->entry[i].model);
+		catalogue_file_fini(&catalogue->entry[i].file);
 	}
 	free(catalogue->entry);
 	catalogue->entry = NULL;
@@ -56,7 +62,7 @@ void catalogue_fini(struct catalogue *catalogue)
 
 static int is_same_file(const struct catalogue_file *a, const struct catalogue_file *b)
 {
-	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && a->bytes == b->bytes
+	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && !a->reason == !b->reason && a->bytes == b->bytes
 	       && a->device == b->device && a->inode == b->inode && a->modified_ns == b->modified_ns;
 }
 
@@ -72,14 +78,16 @@ int catalogue_adopt(struct catalogue *catalogue, struct catalogue_listing *listi
 		struct catalogue_entry *old = catalogue_find(catalogue, listing->file[i].name);
 
 		entry[i].file = listing->file[i];
+		entry[i].has_failed = entry[i].file.is_broken || entry[i].file.reason != NULL;
 		if (old != NULL && is_same_file(&old->file, &entry[i].file)) {
 			entry[i].model = old->model;
-			if (old->model != NULL)
-				old->model->entry = &entry[i];
+			for (struct catalogue_model *model = old->model; model != NULL; model = model->of_entry) {
+				model->entry = &entry[i];
+				model->is_stale = entry[i].file.is_source;
+			}
 			old->model = NULL;
 			memcpy(entry[i].content_id, old->content_id, sizeof old->content_id);
 			entry[i].has_failed = old->has_failed;
-			entry[i].is_stale = entry[i].file.is_source;
 		}
 	}
 	destroy_entries(catalogue);
@@ -146,10 +154,19 @@ void catalogue_release(struct catalogue *catalogue, uint64_t bytes)
 	catalogue->reserved -= bytes;
 }
 
-int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
-                  struct psr_model *model, const char *key, uint64_t reserved)
+struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution)
 {
-	struct catalogue_model *added = calloc(1, sizeof *added);
+	struct catalogue_model *model = entry->model;
+
+	while (model != NULL && model->resolution != resolution)
+		model = model->of_entry;
+	return model;
+}
+
+int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
+                  struct psr_model *model, const char *key, uint32_t resolution, uint64_t reserved)
+{
+	struct catalogue_model *added = calloc(1, sizeof *added), *old;
 
 	catalogue_release(catalogue, reserved);
 	if (added == NULL) {
@@ -158,13 +175,16 @@ int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, str
 	}
 	*added = (struct catalogue_model){
 		.model = model, .entry = entry, .bytes = psr_model_bytes(model), .last_use = ++catalogue->clock, .n_users = 1,
-		.next = catalogue->models,
+		.resolution = resolution, .next = catalogue->models,
 	};
 	strncpy(added->key, key, sizeof added->key - 1);
 	if (entry != NULL) {
-		detach(catalogue, entry);
+		old = catalogue_model(entry, resolution);
+		if (old != NULL)
+			detach(catalogue, old);
+		added->of_entry = entry->model;
 		entry->model = added;
-		entry->has_failed = entry->is_stale = 0;
+		entry->has_failed = 0;
 		psr_model_content_id(model, entry->content_id);
 	}
 	catalogue->models = added;

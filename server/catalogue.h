@@ -2,8 +2,13 @@
  *
  * `dragon.psr` and `dragon.glb` are both the model `dragon`. Of several files with one name the .psr wins, then the one
  * directly in the folder, then .glb, .gltf, then the path that sorts first. A subfolder whose model files all have one
- * stem counts with that stem (clearcoat/ClearCoatTest.gltf is `ClearCoatTest`); other subfolders are passed over, and
- * so are hidden files and names that are not clean UTF-8 of 1 to 255 bytes. Names are looked up, never used as paths.
+ * stem counts with that stem (clearcoat/ClearCoatTest.gltf is `ClearCoatTest`). Names are looked up, never used as
+ * paths.
+ *
+ * What looks like a model but cannot be served is an entry with a reason: a file in a format that nothing here reads,
+ * unless a model has its name; a source whose name another source has, under its path (`scan.ply`); a subfolder of
+ * several models, under its own name; a file whose name is not clean UTF-8, with `?` in place of what is not ASCII.
+ * Hidden files and all others are passed over.
  *
  * Scanning may run on any thread; everything else belongs to the loop's. */
 #ifndef PSRD_CATALOGUE_H
@@ -23,7 +28,10 @@ struct catalogue_file {
 	char *path;
 	int is_source;           /* has to be built first */
 	int is_nested;           /* in a subfolder */
-	uint64_t bytes, device, inode;
+	int is_broken;           /* a .psr whose header shows that it cannot be read; opening it says why */
+	char *reason;            /* why it cannot be served, for people; NULL if it may be */
+	uint64_t bytes;          /* with those of the files that a source names */
+	uint64_t device, inode;
 	int64_t modified_ns;
 };
 
@@ -35,6 +43,7 @@ struct catalogue_listing { /* sorted by the bytes of the names, each name once *
 /* Reads the folder. IO, NOT_FOUND, LIMIT (too many files), MEMORY. */
 int catalogue_scan(struct catalogue_listing **out, const char *folder, struct psr_error *err);
 void catalogue_listing_destroy(struct catalogue_listing *listing); /* NULL is fine */
+void catalogue_file_fini(struct catalogue_file *file);
 
 /* Whether a file of this name is a source that psr-model can read, by its ending. */
 int catalogue_is_source(const char *file_name);
@@ -42,7 +51,10 @@ int catalogue_is_source(const char *file_name);
 struct catalogue_model { /* a model in memory; users are handles and scenes */
 	struct psr_model *model;
 	struct catalogue_entry *entry; /* NULL: no file leads here any more, gone with its last user */
+	struct catalogue_model *of_entry; /* the next one of the same entry */
 	char key[CATALOGUE_KEY];       /* of a built model, else "" */
+	uint32_t resolution;           /* that it was built at; 0: of a .psr file */
+	int is_stale;                  /* of a source that may have changed since */
 	uint64_t bytes, last_use;
 	uint32_t n_users;
 	struct catalogue_model *next;
@@ -50,10 +62,9 @@ struct catalogue_model { /* a model in memory; users are handles and scenes */
 
 struct catalogue_entry {
 	struct catalogue_file file;
-	struct catalogue_model *model; /* NULL if not in memory */
-	uint8_t content_id[16];        /* zero while not known */
+	struct catalogue_model *model; /* the last one that was read, of those in memory; a source has one a resolution */
+	uint8_t content_id[16];        /* of the last one that was read, zero while not known */
 	int has_failed;                /* the last attempt to read or build it */
-	int is_stale;                  /* a source that may have changed since its model was loaded */
 };
 
 struct catalogue {
@@ -77,9 +88,13 @@ struct catalogue_entry *catalogue_find(struct catalogue *catalogue, const char *
 int catalogue_reserve(struct catalogue *catalogue, uint64_t bytes, const char *name, struct psr_error *err);
 void catalogue_release(struct catalogue *catalogue, uint64_t bytes);
 
-/* Takes the model in, in place of its reservation, with one user. entry may be NULL. MEMORY: the model is given up. */
+/* The entry's model of this resolution (0: of a .psr file) that is in memory, or NULL. */
+struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution);
+
+/* Takes the model in, in place of its reservation and of the entry's one of this resolution, with one user. entry may be
+ * NULL. MEMORY: the model is given up. */
 int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
-                  struct psr_model *model, const char *key, uint64_t reserved);
+                  struct psr_model *model, const char *key, uint32_t resolution, uint64_t reserved);
 
 struct catalogue_model *catalogue_ref(struct catalogue *catalogue, struct catalogue_model *model);
 void catalogue_unref(struct catalogue *catalogue, struct catalogue_model *model);

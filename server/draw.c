@@ -191,11 +191,6 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	return PSR_OK;
 }
 
-unsigned draw_last_pass(const struct psr_msg_frame *request)
-{
-	return request->pass_limit < PSR_MAX_PASS ? request->pass_limit : PSR_MAX_PASS;
-}
-
 static int is_abandoned(void *userdata)
 {
 	struct drawing *d = userdata;

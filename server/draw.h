@@ -31,9 +31,6 @@ struct drawing {
 	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */
 };
 
-/* The last pass that a request gets. */
-unsigned draw_last_pass(const struct psr_msg_frame *request);
-
 /* CANCELLED if it was abandoned on the way; what the renderer and the encoder say. */
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);
 

@@ -14,7 +14,7 @@ static void welcome(struct conn *conn)
 		.major = PSR_PROTO_MAJOR,
 		.minor = PSR_PROTO_MINOR,
 		.capabilities = PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL |
-		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK,
+		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK | PSR_CAP_RESOLUTION,
 		.max_message = PSR_WIRE_MAX_MESSAGE,
 		.max_side = PSR_WIRE_MAX_SIDE,
 		.max_pixels = (uint32_t)options->max_pixels,

@@ -174,7 +174,7 @@ static void on_loaded(void *userdata)
 		end_failed(o, &o->error);
 		return;
 	}
-	if (catalogue_add(&added, catalogue, entry_of(o), model, o->key, reserved) != PSR_OK) {
+	if (catalogue_add(&added, catalogue, entry_of(o), model, o->key, o->resolution, reserved) != PSR_OK) {
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
 		return;
 	}
@@ -204,9 +204,12 @@ static void on_build_progress(const struct psr_msg_progress *progress, void *use
 static void on_built(const struct psr_error *failure, void *userdata)
 {
 	struct opening *o = userdata;
+	struct catalogue_entry *entry = entry_of(o);
 	struct stat status;
 
 	if (failure != NULL) {
+		if (entry != NULL && builder_failure(o->opener->server->builder, o->key, o->resolution) != NULL)
+			entry->has_failed = 1; /* and will, until it changes */
 		end_failed(o, failure);
 		return;
 	}
@@ -223,12 +226,12 @@ static void on_built(const struct psr_error *failure, void *userdata)
 static void build(struct opening *o)
 {
 	struct builder *builder = o->opener->server->builder;
-	const struct psr_error *failure = builder_failure(builder, o->key);
+	const struct psr_error *failure = builder_failure(builder, o->key, o->resolution);
 
 	if (failure != NULL)
 		end_failed(o, failure);
-	else if (builder_start(builder, o->program, o->key, o->file.path, o->temporary, on_build_progress, on_built, o)
-	         != PSR_OK)
+	else if (builder_start(builder, o->program, o->key, o->resolution, o->file.path, o->temporary, on_build_progress,
+	                       on_built, o) != PSR_OK)
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to build a model");
 }
 
@@ -237,6 +240,7 @@ static void on_prepared(void *userdata)
 	struct opening *o = userdata;
 	struct server *server = o->opener->server;
 	struct catalogue_entry *entry = entry_of(o);
+	struct catalogue_model *model = NULL;
 
 	o->has_job = 0;
 	if (server->is_draining) {
@@ -248,10 +252,11 @@ static void on_prepared(void *userdata)
 		end_failed(o, &o->error);
 		return;
 	}
-	if (o->file.is_source && entry != NULL && entry->model != NULL && strcmp(entry->model->key, o->key) == 0) {
-		struct catalogue_model *model = catalogue_ref(&server->catalogue, entry->model);
-
-		entry->is_stale = 0;
+	if (o->file.is_source && entry != NULL)
+		model = catalogue_model(entry, o->resolution);
+	if (model != NULL && strcmp(model->key, o->key) == 0) {
+		catalogue_ref(&server->catalogue, model);
+		model->is_stale = 0;
 		end(o, model, PSR_OK, NULL);
 		catalogue_unref(&server->catalogue, model);
 		return;
@@ -263,7 +268,7 @@ static void on_prepared(void *userdata)
 	build(o);
 }
 
-static struct opening *start(struct opener *opener, const struct catalogue_entry *entry)
+static struct opening *start(struct opener *opener, const struct catalogue_entry *entry, uint32_t resolution)
 {
 	struct opening *o = calloc(1, sizeof *o);
 
@@ -272,6 +277,7 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	o->opener = opener;
 	o->loop = &opener->server->loop;
 	o->cache = opener->server->options->cache;
+	o->resolution = resolution;
 	o->file = entry->file;
 	o->file.path = strdup(entry->file.path);
 	if (o->file.path == NULL) {
@@ -283,29 +289,52 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	return o;
 }
 
-void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const char *name)
+/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of the few that
+ * there are from --resolution to --max-resolution the first that is no less. So a source has few models in the cache,
+ * whatever clients ask for, and which one a client gets depends on nothing else. */
+static uint32_t find_resolution(const struct options *options, uint32_t pixels)
 {
-	struct catalogue_entry *entry = catalogue_find(&opener->server->catalogue, name);
+	const uint32_t least = (uint32_t)options->resolution, most = (uint32_t)options->max_resolution;
+	uint32_t step = 256;
+
+	if (pixels <= least)
+		return least;
+	while (step < pixels) /* 256, 384, 512, 768, 1024, ... */
+		step = (step & (step - 1)) == 0 ? step / 2 * 3 : step / 3 * 4;
+	return step < most ? step : most;
+}
+
+void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const struct psr_msg_open *msg)
+{
+	struct catalogue_entry *entry = catalogue_find(&opener->server->catalogue, msg->name);
+	struct catalogue_model *model;
 	struct opening *o = opener->first;
 	struct waiter *waiter;
 	char text[PSR_ERROR_TEXT];
+	uint32_t resolution;
 	int is_new;
 
 	if (entry == NULL) {
-		snprintf(text, sizeof text, "there is no model %.255s; psr list shows those that there are", name);
+		snprintf(text, sizeof text, "there is no model %.255s; psr list shows those that there are", msg->name);
 		session_refuse(conn, id, 0, PSR_ERR_NOT_FOUND, text);
 		return;
 	}
-	if (entry->model != NULL && !entry->is_stale) {
-		session_opened(conn, id, entry->model);
+	if (entry->file.reason != NULL) {
+		session_refuse(conn, id, 0, PSR_ERR_UNSUPPORTED, entry->file.reason);
 		return;
 	}
-	while (o != NULL && strcmp(o->file.path, entry->file.path) != 0)
+	resolution = entry->file.is_source ? find_resolution(opener->server->options, msg->resolution) : 0;
+	model = catalogue_model(entry, resolution);
+	if (model != NULL && !model->is_stale) {
+		session_opened(conn, id, model);
+		return;
+	}
+	while (o != NULL && (o->resolution != resolution || strcmp(o->file.path, entry->file.path) != 0))
 		o = o->next;
 	is_new = o == NULL;
 	waiter = calloc(1, sizeof *waiter);
 	if (waiter != NULL && is_new)
-		o = start(opener, entry);
+		o = start(opener, entry, resolution);
 	if (waiter == NULL || o == NULL) {
 		free(waiter);
 		session_refuse(conn, id, 0, PSR_ERR_MEMORY, "no memory to open a model");

@@ -4,6 +4,7 @@
 #define PSRD_OPENER_H
 
 #include <stdint.h>
+#include "psr/proto.h"
 
 struct conn;
 struct opener;
@@ -13,7 +14,7 @@ int opener_create(struct opener **out, struct server *server);
 void opener_destroy(struct opener *opener); /* after the io pool has ended; NULL is fine */
 
 /* Answers OPEN `id` by PROGRESS... and OPENED or ERROR, now or later. */
-void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const char *name);
+void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const struct psr_msg_open *msg);
 
 /* Stops waiting; 1 if `id` was waiting. The work goes on: who asks again finds it done. */
 int opener_cancel(struct opener *opener, struct conn *conn, uint32_t id);

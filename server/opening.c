@@ -1,11 +1,13 @@
 #define _GNU_SOURCE
 #include <errno.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "builder.h"
+#include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
 
@@ -29,32 +31,6 @@ void opening_load(void *userdata)
 	post(o);
 }
 
-static int make_folders(const char *path, struct psr_error *err)
-{
-	char *copy = strdup(path);
-
-	if (copy == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
-	for (char *at = copy + 1;; at++) {
-		if (*at == '/' || *at == '\0') {
-			char was = *at;
-
-			*at = '\0';
-			if (mkdir(copy, 0700) != 0 && errno != EEXIST) {
-				int code = psr_fail(err, PSR_ERR_IO, "the cache %s cannot be made: %s", copy, strerror(errno));
-
-				free(copy);
-				return code;
-			}
-			*at = was;
-			if (was == '\0')
-				break;
-		}
-	}
-	free(copy);
-	return PSR_OK;
-}
-
 static int prepare_source(struct opening *o)
 {
 	const char *cache = o->cache;
@@ -64,12 +40,12 @@ static int prepare_source(struct opening *o)
 	if (code == PSR_OK)
 		code = cachekey_find(o->key, o->file.path, o->program, &o->error);
 	if (code == PSR_OK)
-		code = make_folders(cache, &o->error);
+		code = cache_make(cache, &o->error);
 	if (code != PSR_OK)
 		return code;
-	if (asprintf(&o->cached, "%s/%s.psr", cache, o->key) < 0)
+	if (asprintf(&o->cached, "%s/%s-%" PRIu32 ".psr", cache, o->key, o->resolution) < 0)
 		o->cached = NULL;
-	if (asprintf(&o->temporary, "%s/%s.psr.tmp", cache, o->key) < 0)
+	if (asprintf(&o->temporary, "%s/%s-%" PRIu32 ".psr.tmp", cache, o->key, o->resolution) < 0)
 		o->temporary = NULL;
 	if (o->cached == NULL || o->temporary == NULL)
 		return psr_fail(&o->error, PSR_ERR_MEMORY, "no memory");

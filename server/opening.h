@@ -19,13 +19,14 @@ struct opening {
 	struct loop *loop;
 	const char *cache;          /* folder */
 	struct catalogue_file file; /* its path is a copy */
+	uint32_t resolution;        /* of a source: what it is built at; else 0 */
 	struct waiter *waiters;
 	struct psr_msg_progress progress;
 	struct loop_note note;
 	int has_job;
 	/* Belong to the job while one runs: */
 	char program[PATH_MAX], key[CATALOGUE_KEY];
-	char *cached, *temporary;   /* of a source: CACHE/KEY.psr, CACHE/KEY.psr.tmp */
+	char *cached, *temporary;   /* of a source: CACHE/KEY-RESOLUTION.psr, and .tmp behind it */
 	int is_cached, was_built;
 	uint64_t bytes, reserved;
 	struct psr_model *model;

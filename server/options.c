@@ -1,6 +1,7 @@
 #define _GNU_SOURCE
 #include <ctype.h>
 #include <errno.h>
+#include <inttypes.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,9 +11,11 @@
 #include "psr/cli.h"
 #include "psr/isa.h"
 
-#define MAX_OPTIONS 32
+#define MAX_OPTIONS 40
 #define MAX_CONFIG 65536
 #define MEBI 1048576.0
+#define LEAST_RESOLUTION 8   /* those of psr-model build */
+#define MOST_RESOLUTION 8192
 
 static int on_listen(const char *text, void *userdata, struct psr_error *err)
 {
@@ -50,7 +53,7 @@ static char *find_cache(void)
 static int set_defaults(struct options *options)
 {
 	*options = (struct options){
-		.threads = count_cores(),
+		.threads = count_cores(), .resolution = 512, .max_resolution = 1536,
 		.max_clients = 64, .max_open = 64, .max_handles = 64, .max_builds = 1,
 		.max_pixels = INT64_C(16) << 20,
 		.max_memory = INT64_C(4) << 30, .max_queue = INT64_C(32) << 20, .build_memory = INT64_C(16) << 30,
@@ -65,52 +68,67 @@ static int set_defaults(struct options *options)
 static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int seen[MAX_OPTIONS])
 {
 	const struct psr_opt opts[] = {
+		{ .name = "What is served, and where", .type = PSR_OPT_HEADING },
+		{ .name = "models", .letter = 'm', .type = PSR_OPT_STRING, .value = &o->models, .arg = "DIR",
+		  .help = "The folder whose models clients see: .psr files, and meshes and scans, which are built when somebody first"
+		          " asks for them. Required." },
 		{ .name = "listen", .letter = 'l', .type = PSR_OPT_CALL, .value = o, .arg = "ADDR:PORT|unix:PATH",
 		  .call = on_listen,
-		  .help = "Where to serve; repeatable. Port 0 is any free one, IPv6 stands in brackets, tcp:// may stand"
-		          " before. TCP serves loopback addresses only. [" OPTIONS_LISTEN_DEFAULT "]" },
-		{ .name = "models", .letter = 'm', .type = PSR_OPT_STRING, .value = &o->models, .arg = "DIR",
-		  .help = "Folder of models: .psr files, and sources that are built on first use. Required." },
+		  .help = "Where clients connect; repeatable. Port 0 takes any free one. IPv6 addresses stand in brackets. TCP serves"
+		          " this machine only (loopback addresses); `ssh -L` reaches it from others. [" OPTIONS_LISTEN_DEFAULT "]" },
+		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
+		  .help = "The folder where models built from meshes and scans are kept. It needs room: tens of MB a model." },
+		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
+		  .help = "A file of `name = value` lines, names as here without the dashes; the command line wins." },
+		{ .name = "verbose", .letter = 'v', .type = PSR_OPT_FLAG, .value = &o->verbose,
+		  .help = "Writes to standard error who connects, and what is loaded and built." },
+		{ .name = "version", .type = PSR_OPT_FLAG, .value = &o->version, .help = "Prints the version and exits." },
+		{ .name = "Models built from meshes and scans", .type = PSR_OPT_HEADING },
+		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &o->resolution, .arg = "PIXELS",
+		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
+		  .help = "The coarsest model that is built: sharp in pictures up to this side. Larger pictures get a finer model, see"
+		          " --max-resolution. Twice the figure takes four times the memory." },
+		{ .name = "max-resolution", .type = PSR_OPT_INT, .value = &o->max_resolution, .arg = "PIXELS",
+		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
+		  .help = "The finest model that is built. Raise it for pictures larger than this side; lower it where first pictures"
+		          " take too long. The same as --resolution: one model for all pictures." },
+		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
+		  .help = "Models that are built at the same time; others wait their turn." },
+		{ .name = "build-memory", .type = PSR_OPT_INT, .value = &o->build_memory, .arg = "BYTES", .min = 64 * MEBI,
+		  .max = 1e15, .help = "Memory (address space) that one build may take; one that needs more fails and says so." },
+		{ .name = "build-time", .type = PSR_OPT_INT, .value = &o->build_time, .arg = "SECONDS", .min = 1, .max = 1e6,
+		  .help = "Processor time that one build may take, all its threads together; one that needs more fails and says so." },
+		{ .name = "Share of the machine", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
-		  .help = "Threads that draw and encode; as many frames are drawn at once." },
+		  .help = "Processor cores that draw and build. Lower it to leave cores to other programs." },
+		{ .name = "max-memory", .type = PSR_OPT_INT, .value = &o->max_memory, .arg = "BYTES", .min = MEBI, .max = 1e15,
+		  .help = "Memory for models. Models that nobody uses make room for others; raise it if clients are refused." },
+		{ .name = "max-clients", .type = PSR_OPT_INT, .value = &o->max_clients, .arg = "N", .min = 1, .max = 65536,
+		  .help = "Clients connected at the same time; further ones are told that the server is full." },
+		{ .name = "max-pixels", .type = PSR_OPT_INT, .value = &o->max_pixels, .arg = "N", .min = 1, .max = 64 * MEBI,
+		  .help = "Pixels of the largest picture; drawing takes some tens of bytes of memory a pixel." },
+		{ .name = "For those who run many clients", .type = PSR_OPT_HEADING,
+		  .help = "The defaults serve programs that keep to the protocol." },
+		{ .name = "max-open", .type = PSR_OPT_INT, .value = &o->max_open, .arg = "N", .min = 1, .max = 64,
+		  .help = "Unanswered requests of one client; further ones are answered `busy`." },
+		{ .name = "max-handles", .type = PSR_OPT_INT, .value = &o->max_handles, .arg = "N", .min = 1, .max = 65536,
+		  .help = "Models that one client may hold open; further ones are refused." },
+		{ .name = "max-queue", .type = PSR_OPT_INT, .value = &o->max_queue, .arg = "BYTES", .min = 65536, .max = 1e12,
+		  .help = "Answers that may wait in memory for one slow client before its requests wait too; a single frame may"
+		          " exceed it." },
+		{ .name = "handshake-timeout", .type = PSR_OPT_REAL, .value = &o->handshake_timeout, .arg = "SECONDS",
+		  .min = 0.05, .max = 3600, .help = "A connection that has not introduced itself (HELLO) by then is closed." },
+		{ .name = "idle-timeout", .type = PSR_OPT_REAL, .value = &o->idle_timeout, .arg = "SECONDS",
+		  .min = 0, .max = 1e6, .help = "A client that asks for nothing for so long is disconnected; 0: never." },
+		{ .name = "slow-timeout", .type = PSR_OPT_REAL, .value = &o->slow_timeout, .arg = "SECONDS",
+		  .min = 0.05, .max = 3600, .help = "A client that reads less than 64 KiB of its answers in that time is"
+		                                     " disconnected." },
+		{ .name = "drain-timeout", .type = PSR_OPT_REAL, .value = &o->drain_timeout, .arg = "SECONDS",
+		  .min = 0, .max = 3600, .help = "How long psrd, told to end, finishes the frames under way." },
+		{ .name = "For developers", .type = PSR_OPT_HEADING },
 		{ .name = "isa", .type = PSR_OPT_STRING, .value = &o->isa, .arg = "NAME",
 		  .help = "The widest instructions that draw: c (what any processor of the kind has), avx2 or avx512. Frames"
-		          " are the same bytes with each; what the machine has is the default." },
-		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
-		  .help = "Where models built from sources are kept." },
-		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
-		  .help = "Reads `name = value` lines, names as here without the dashes; the command line wins." },
-		{ .name = "max-clients", .type = PSR_OPT_INT, .value = &o->max_clients, .arg = "N", .min = 1, .max = 65536,
-		  .help = "Connections at once; further ones are told that the server is full." },
-		{ .name = "max-open", .type = PSR_OPT_INT, .value = &o->max_open, .arg = "N", .min = 1, .max = 64,
-		  .help = "Unanswered requests of a connection; further ones are answered `busy`." },
-		{ .name = "max-handles", .type = PSR_OPT_INT, .value = &o->max_handles, .arg = "N", .min = 1, .max = 65536,
-		  .help = "Open models of a connection." },
-		{ .name = "max-pixels", .type = PSR_OPT_INT, .value = &o->max_pixels, .arg = "N", .min = 1, .max = 64 * MEBI,
-		  .help = "Pixels of a frame." },
-		{ .name = "max-memory", .type = PSR_OPT_INT, .value = &o->max_memory, .arg = "BYTES", .min = MEBI, .max = 1e15,
-		  .help = "Models in memory; those that nobody uses make room for others." },
-		{ .name = "max-queue", .type = PSR_OPT_INT, .value = &o->max_queue, .arg = "BYTES", .min = 65536, .max = 1e12,
-		  .help = "Bytes that wait for a slow reader before its requests wait too; a single frame may exceed it." },
-		{ .name = "handshake-timeout", .type = PSR_OPT_REAL, .value = &o->handshake_timeout, .arg = "SECONDS",
-		  .min = 0.05, .max = 3600, .help = "A connection that has not said HELLO by then is closed." },
-		{ .name = "idle-timeout", .type = PSR_OPT_REAL, .value = &o->idle_timeout, .arg = "SECONDS",
-		  .min = 0, .max = 1e6, .help = "A connection silent for so long, with nothing to be answered, is closed;"
-		                               " 0: never." },
-		{ .name = "slow-timeout", .type = PSR_OPT_REAL, .value = &o->slow_timeout, .arg = "SECONDS",
-		  .min = 0.05, .max = 3600, .help = "A reader that takes less than 64 KiB of what waits for it in that time is"
-		                                     " closed." },
-		{ .name = "drain-timeout", .type = PSR_OPT_REAL, .value = &o->drain_timeout, .arg = "SECONDS",
-		  .min = 0, .max = 3600, .help = "How long the end waits for frames under way and for their readers." },
-		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
-		  .help = "Sources that are built at once; others wait." },
-		{ .name = "build-memory", .type = PSR_OPT_INT, .value = &o->build_memory, .arg = "BYTES", .min = 64 * MEBI,
-		  .max = 1e15, .help = "Address space of one build." },
-		{ .name = "build-time", .type = PSR_OPT_INT, .value = &o->build_time, .arg = "SECONDS", .min = 1, .max = 1e6,
-		  .help = "Processor time of one build, all its threads together." },
-		{ .name = "verbose", .letter = 'v', .type = PSR_OPT_FLAG, .value = &o->verbose,
-		  .help = "Logs connections, models and builds on standard error." },
-		{ .name = "version", .type = PSR_OPT_FLAG, .value = &o->version, .help = "Prints the version and exits." },
+		          " are the same bytes with each; only their time differs." },
 		{ .name = NULL },
 	};
 	size_t n = sizeof opts / sizeof opts[0];
@@ -202,6 +220,22 @@ static int apply_config(const struct psr_cli *cli, const int *given, struct opti
 	return PSR_OK;
 }
 
+/* One that was not given follows the other. */
+static int check_resolutions(struct options *options, int has_least, int has_most, struct psr_error *err)
+{
+	if (options->resolution <= options->max_resolution)
+		return PSR_OK;
+	if (has_least && has_most)
+		return psr_fail(err, PSR_ERR_ARG, "--resolution %" PRId64 " is above --max-resolution %" PRId64
+		                "; the coarsest model cannot be finer than the finest", options->resolution,
+		                options->max_resolution);
+	if (has_most)
+		options->resolution = options->max_resolution;
+	else
+		options->max_resolution = options->resolution;
+	return PSR_OK;
+}
+
 int options_parse(struct options *options, int argc, char **argv, struct psr_error *err)
 {
 	enum psr_isa isa;
@@ -243,6 +277,9 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 	if (psr_isa_parse(&isa, options->isa) != PSR_OK)
 		return psr_fail(err, PSR_ERR_ARG, "--isa: there is no '%.40s'; it takes c, avx2 or avx512", options->isa);
 	psr_isa_cap(isa);
+	if (check_resolutions(options, is_given(cli.opts, seen, "resolution"), is_given(cli.opts, seen, "max-resolution"), err)
+	    != PSR_OK)
+		return PSR_ERR_ARG;
 	if (options->models == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--models DIR is missing: it names the folder of models");
 	if (options->n_listen == 0)

@@ -13,6 +13,7 @@ struct options {
 	int n_listen;
 	const char *models, *cache, *config, *isa;
 	int64_t threads;
+	int64_t resolution, max_resolution; /* that sources are built at, pixels; the first is not above the second */
 	int64_t max_clients, max_open, max_handles, max_builds;
 	int64_t max_pixels;
 	int64_t max_memory, max_queue, build_memory; /* bytes */

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "accept.h"
+#include "cache.h"
 #include "conn.h"
 #include "frames.h"
 #include "log.h"
@@ -206,6 +207,17 @@ static void destroy(struct server *server)
 	free(server);
 }
 
+/* A folder of .psr files alone needs no cache, unless somebody named one. */
+static int needs_cache(const struct server *server)
+{
+	const struct catalogue *catalogue = &server->catalogue;
+	int n_sources = 0;
+
+	for (size_t i = 0; i < catalogue->n; i++)
+		n_sources += catalogue->entry[i].file.is_source && catalogue->entry[i].file.reason == NULL;
+	return n_sources > 0 || server->options->cache != server->options->cache_default;
+}
+
 static int start_parts(struct server *server, struct psr_error *err)
 {
 	const struct options *options = server->options;
@@ -226,7 +238,7 @@ static int start_parts(struct server *server, struct psr_error *err)
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64,
 		                options->threads);
-	return PSR_OK;
+	return needs_cache(server) ? cache_check(options->cache, err) : PSR_OK;
 }
 
 int server_start(struct server **out, struct options *options, struct psr_error *err)

@@ -5,6 +5,7 @@
 #include "conn.h"
 #include "frames.h"
 #include "opener.h"
+#include "psr/render.h"
 #include "server.h"
 #include "session.h"
 #include "session_presets.h"
@@ -175,6 +176,9 @@ static int check_frame(const struct psr_msg_frame *frame, uint16_t view, const s
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "this server refines colour and depth; other planes take pass_limit 0, not %u",
 		                frame->pass_limit);
+	if (frame->pass_limit > PSR_MAX_PASS)
+		return psr_fail(err, PSR_ERR_LIMIT, "this server refines a picture in %d passes at most, not in %u", PSR_MAX_PASS,
+		                frame->pass_limit);
 	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server keeps no %s; ask with budget 0",
 		                frame->budget == PSR_WIRE_BUDGET_TIME ? "time budgets" : "error bounds");
@@ -249,7 +253,7 @@ static int take_open_id(struct conn *conn, const struct psr_message *message, st
 	}
 	session->n_open++;
 	if (message->type == PSR_MSG_OPEN) {
-		opener_open(conn->server->opener, conn, message->id, msg.open.name);
+		opener_open(conn->server->opener, conn, message->id, &msg.open);
 	} else if (message->type == PSR_MSG_FRAME) {
 		ask_frame(conn, message, &msg.frame);
 	} else {

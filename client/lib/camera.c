@@ -1,10 +1,15 @@
 #include <math.h>
 #include <string.h>
+#include "base/maths.h"
 #include "base/vec.h"
 #include "psr/client.h"
 #include "psr/scene.h"
 
 #define LEAST 1e-30 /* positive lengths on the wire */
+#define LEAST_FOV 1e-6
+#define GREATEST_FOV 3.14159
+#define MARGIN 1.06
+#define DEGREE (3.14159265358979323846 / 180)
 
 static double near_from_box(const double eye[3], const double box_min[3], const double box_max[3])
 {
@@ -34,33 +39,180 @@ static int is_parallel(const double a[3], const double b[3])
 	return v3d_length(cross) < 1e-6;
 }
 
-int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
+/* The same bits on every machine, as frames are to have. */
+static void sincos_degrees(double degrees, double *s, double *c)
+{
+	double turn = fmod(degrees, 360);
+
+	if (turn < 0)
+		turn += 360;
+	psr_sincos((turn > 180 ? 360 - turn : turn) * DEGREE, s, c);
+	if (turn > 180)
+		*s = -*s;
+}
+
+static void combine(double out[3], double k, const double a[3], double m, const double b[3])
+{
+	for (int i = 0; i < 3; i++)
+		out[i] = k * a[i] + m * b[i];
+}
+
+/* Right, up and the way to the eye. axes: right, up and front of the object. */
+static void view_axes(double view[3][3], const double axes[3][3], double azimuth, double elevation, double roll)
+{
+	double s, c, level[3], right[3], up[3];
+
+	sincos_degrees(azimuth, &s, &c);
+	combine(right, c, axes[0], -s, axes[2]);
+	combine(level, s, axes[0], c, axes[2]);
+	sincos_degrees(elevation, &s, &c);
+	combine(up, c, axes[1], -s, level);
+	combine(view[2], c, level, s, axes[1]);
+	sincos_degrees(roll, &s, &c);
+	combine(view[0], c, right, -s, up);
+	combine(view[1], c, up, s, right);
+}
+
+struct fit {
+	double distance; /* of the eye of a perspective camera */
+	double extent;   /* half the height of an orthographic picture */
+	double deepest;  /* of the box before its middle */
+};
+
+/* Enlarges `fit` so that all corners of a box of these half sides are in a picture of these tangents. */
+static void fit_box(struct fit *fit, const double half[3], const double view[3][3], const double tangent[2])
+{
+	for (int corner = 0; corner < 8; corner++) {
+		double p[3], x, y, z;
+
+		for (int i = 0; i < 3; i++)
+			p[i] = corner >> i & 1 ? half[i] : -half[i];
+		x = fabs(v3d_dot(p, view[0])) / tangent[0];
+		y = fabs(v3d_dot(p, view[1])) / tangent[1];
+		z = v3d_dot(p, view[2]);
+		fit->extent = fmax(fit->extent, fmax(x, y));
+		fit->distance = fmax(fit->distance, fmax(x, y) * MARGIN + z);
+		fit->deepest = fmax(fit->deepest, z);
+	}
+}
+
+/* What psr_camera_frame does for its one direction. */
+static void frame_angles(struct psr_camera *camera, const struct psr_camera_wish *wish, const double up[3],
+                         const double box_min[3], const double box_max[3], double aspect)
+{
+	uint32_t n_turn = wish->n_turn > 1 ? wish->n_turn : 1;
+	double axes[3][3], view[3][3], half[3], tangent[2] = { aspect, 1 };
+	struct fit fit = { 0, 0, 0 };
+
+	memset(camera, 0, sizeof *camera);
+	for (int i = 0; i < 3; i++) {
+		camera->target[i] = box_min[i] / 2 + box_max[i] / 2;
+		half[i] = box_max[i] / 2 - box_min[i] / 2;
+	}
+	if (wish->fov_y > 0) {
+		double s, c;
+
+		psr_sincos(wish->fov_y / 2, &s, &c);
+		tangent[0] *= s / c;
+		tangent[1] *= s / c;
+	}
+	psr_camera_axes(axes, up);
+	for (uint32_t k = 1; k <= n_turn; k++) { /* the last one is the camera's own */
+		view_axes(view, axes, wish->azimuth + 360.0 * (k % n_turn) / n_turn, wish->elevation, wish->roll);
+		fit_box(&fit, half, view, tangent);
+	}
+	if (!(fit.extent > 0))
+		fit.extent = fit.distance = 1;
+	camera->ortho_height = wish->fov_y > 0 ? 0 : 2 * fit.extent * MARGIN;
+	if (!(wish->fov_y > 0))
+		fit.distance = 2 * fit.deepest + fit.extent;
+	memcpy(camera->up, view[1], sizeof camera->up);
+	v3d_add_scaled(camera->eye, camera->target, fit.distance, view[2]);
+}
+
+/* Of a camera that has an eye: by its own view. */
+static void roll_camera(struct psr_camera *camera, const double forward[3], double degrees)
+{
+	double right[3], up[3], along[3], s, c;
+
+	v3d_normalize(along, forward);
+	v3d_cross(right, along, camera->up);
+	v3d_normalize(right, right);
+	v3d_cross(up, right, along);
+	sincos_degrees(degrees, &s, &c);
+	combine(camera->up, c, up, s, right);
+}
+
+static int zoom_camera(struct psr_msg_camera *camera, double zoom, struct psr_error *err)
+{
+	if (camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC) {
+		camera->extent /= zoom;
+		if (camera->extent >= LEAST && camera->extent <= PSR_WIRE_MAX_LENGTH)
+			return PSR_OK;
+		return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves a picture of a height of %g", zoom, camera->extent);
+	}
+	camera->extent = 2 * atan(tan(camera->extent / 2) / zoom);
+	if (camera->extent >= LEAST_FOV && camera->extent <= GREATEST_FOV)
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves an angle of view of %g degrees; it has to be between 0.0001 "
+	                "and 179.999", zoom, camera->extent / DEGREE);
+}
+
+/* Eye, target, up and ortho_height, without roll unless there are angles. */
+static int place_camera(struct psr_camera *framed, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err)
 {
 	static const double y[3] = { 0, 1, 0 };
-	struct psr_camera framed;
+	const double *up = wish->has_up ? wish->up : v3d_length(wish->natural_up) > 0 ? wish->natural_up : y;
+	double arm[3];
+
+	if (!(v3d_length(up) > 0))
+		return psr_fail(err, PSR_ERR_ARG, "up 0,0,0 is 0, which is no direction");
+	if (wish->has_angles)
+		frame_angles(framed, wish, up, box_min, box_max, aspect);
+	else
+		psr_camera_frame(framed, box_min, box_max, up, wish->fov_y, aspect);
+	if (wish->has_target) {
+		v3d_sub(arm, framed->eye, framed->target);
+		memcpy(framed->target, wish->target, sizeof framed->target);
+		v3d_add(framed->eye, framed->target, arm);
+	}
+	return PSR_OK;
+}
+
+/* Of a camera that has an eye or is framed without angles: its up, which must not run along its view. */
+static int turn_up(struct psr_camera *framed, const struct psr_camera_wish *wish, struct psr_error *err)
+{
 	double forward[3], axes[3][3];
 
-	if (wish->has_up && !(v3d_length(wish->up) > 0))
-		return psr_fail(err, PSR_ERR_ARG, "up 0,0,0 is no direction");
-	psr_camera_frame(&framed, box_min, box_max, wish->has_up ? wish->up : y, wish->fov_y, aspect);
-	if (wish->has_target) {
-		v3d_sub(forward, framed.eye, framed.target);
-		memcpy(framed.target, wish->target, sizeof framed.target);
-		v3d_add(framed.eye, framed.target, forward);
-	}
-	if (wish->has_eye)
-		memcpy(framed.eye, wish->eye, sizeof framed.eye);
-	v3d_sub(forward, framed.target, framed.eye);
+	v3d_sub(forward, framed->target, framed->eye);
 	if (!(v3d_length(forward) > 0))
-		return psr_fail(err, PSR_ERR_ARG, "the eye %g,%g,%g is at the target%s", framed.eye[0], framed.eye[1],
-		                framed.eye[2], wish->has_target ? "" : ", the middle of the model; say --target too");
-	psr_camera_axes(axes, framed.up);
-	if (!wish->has_up && is_parallel(framed.up, forward))
-		v3d_scale(framed.up, axes[2], -1);
-	if (is_parallel(framed.up, forward))
+		return psr_fail(err, PSR_ERR_ARG, "the eye %g,%g,%g is at the target%s", framed->eye[0], framed->eye[1],
+		                framed->eye[2], wish->has_target ? "" : ", the middle of the model; say --target too");
+	psr_camera_axes(axes, framed->up);
+	if (!wish->has_up && is_parallel(framed->up, forward))
+		for (int i = 0; i < 3; i++)
+			framed->up[i] = 0 - axes[2][i];
+	if (is_parallel(framed->up, forward))
 		return psr_fail(err, PSR_ERR_ARG, "up %g,%g,%g is 0 or runs along the view; choose another direction",
-		                framed.up[0], framed.up[1], framed.up[2]);
+		                framed->up[0], framed->up[1], framed->up[2]);
+	if (wish->roll != 0)
+		roll_camera(framed, forward, wish->roll);
+	return PSR_OK;
+}
+
+int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
+                        const double box_max[3], double aspect, struct psr_error *err)
+{
+	struct psr_camera framed;
+	int code = place_camera(&framed, wish, box_min, box_max, aspect, err);
+
+	if (code == PSR_OK && wish->has_eye)
+		memcpy(framed.eye, wish->eye, sizeof framed.eye);
+	if (code == PSR_OK && !wish->has_angles)
+		code = turn_up(&framed, wish, err);
+	if (code != PSR_OK)
+		return code;
 	memset(camera, 0, sizeof *camera);
 	memcpy(camera->eye, framed.eye, sizeof camera->eye);
 	memcpy(camera->target, framed.target, sizeof camera->target);
@@ -73,7 +225,32 @@ int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_w
 		camera->kind = PSR_WIRE_CAMERA_ORTHOGRAPHIC;
 		camera->extent = wish->ortho_height > 0 ? wish->ortho_height : framed.ortho_height;
 	}
-	return PSR_OK;
+	return wish->zoom > 0 && wish->zoom != 1 ? zoom_camera(camera, wish->zoom, err) : PSR_OK;
+}
+
+/* Rodrigues. */
+static void turn_vector(double v[3], const double axis[3], double s, double c)
+{
+	double cross[3], along = v3d_dot(axis, v);
+
+	v3d_cross(cross, axis, v);
+	for (int i = 0; i < 3; i++)
+		v[i] = c * v[i] + s * cross[i] + (1 - c) * along * axis[i];
+}
+
+void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double degrees, const double box_min[3],
+                     const double box_max[3])
+{
+	double axis[3], arm[3], s, c;
+
+	v3d_normalize(axis, up);
+	sincos_degrees(degrees, &s, &c);
+	v3d_sub(arm, camera->eye, camera->target);
+	turn_vector(arm, axis, s, c);
+	turn_vector(camera->up, axis, s, c);
+	v3d_add(camera->eye, camera->target, arm);
+	if (camera->kind == PSR_WIRE_CAMERA_PERSPECTIVE)
+		camera->near_z = near_from_box(camera->eye, box_min, box_max);
 }
 
 void psr_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera)

@@ -96,6 +96,7 @@ struct psr_client {
 	uint64_t n_received;
 	uint32_t next_id;
 	struct psr_msg_welcome welcome;
+	uint32_t resolution;          /* for OPEN */
 	struct client_decoder *decoder;
 	struct client_frame frame[PSR_WIRE_MAX_OPEN];
 	struct client_assembly done; /* of the last event */

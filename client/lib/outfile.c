@@ -41,12 +41,28 @@ static int open_temporary(struct outfile *file)
 	return fd;
 }
 
+static int open_stdout(struct outfile *file, struct psr_error *err)
+{
+	int fd = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+
+	file->path = "standard output";
+	if (fd < 0)
+		return fail_system(file, errno, err);
+	file->stream = fdopen(fd, "wb");
+	if (file->stream != NULL)
+		return PSR_OK;
+	close(fd);
+	return psr_fail(err, PSR_ERR_MEMORY, "no memory to write to standard output");
+}
+
 int outfile_open(struct outfile *file, const char *path, struct psr_error *err)
 {
 	struct stat status;
 	int fd, reason;
 
 	memset(file, 0, sizeof *file);
+	if (strcmp(path, OUTFILE_STDOUT) == 0)
+		return open_stdout(file, err);
 	file->path = path;
 	if (strlen(path) >= sizeof file->target)
 		return fail_system(file, ENAMETOOLONG, err);

@@ -6,6 +6,8 @@
 #include <stdio.h>
 #include "psr/error.h"
 
+#define OUTFILE_STDOUT "-" /* as a path: standard output */
+
 struct outfile {
 	FILE *stream;
 	char target[PATH_MAX];    /* the file itself, links followed */
@@ -14,7 +16,7 @@ struct outfile {
 	int reason;               /* errno of the first write that failed, or 0 */
 };
 
-/* Opens a temporary file beside path, with the same ending. */
+/* Opens a temporary file beside path, with the same ending; or standard output, which stays open afterwards. */
 int outfile_open(struct outfile *file, const char *path, struct psr_error *err);
 
 /* Writes n bytes; a failure is remembered, and reported by outfile_close. */

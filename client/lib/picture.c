@@ -19,6 +19,8 @@ static int choose(struct plan *plan, const char *path, int is_depth, struct psr_
 	int code;
 
 	memset(plan, 0, sizeof *plan);
+	if (strcmp(path, OUTFILE_STDOUT) == 0)
+		ending = is_depth ? "pfm" : "png";
 	if (ending[0] == '\0')
 		return psr_fail(err, PSR_ERR_ARG, "'%.300s' needs an ending that says the format, such as %s", path,
 		                is_depth ? ".pfm or .exr" : ".png");

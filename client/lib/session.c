@@ -118,11 +118,16 @@ int psr_client_list(struct psr_client *client, struct psr_msg_list_entry **entri
 	return PSR_OK;
 }
 
+void psr_client_set_resolution(struct psr_client *client, uint32_t pixels)
+{
+	client->resolution = pixels < PSR_WIRE_MAX_SIDE ? pixels : PSR_WIRE_MAX_SIDE;
+}
+
 int psr_client_open(struct psr_client *client, const char *name,
                     void (*on_progress)(const struct psr_msg_progress *progress, void *userdata), void *userdata,
                     int timeout_ms, struct psr_msg_opened *opened, struct psr_error *err)
 {
-	struct psr_msg_open msg = { "" };
+	struct psr_msg_open msg = { 0, "" };
 	int code;
 
 	if (name[0] == '\0' || strlen(name) > PSR_WIRE_MAX_NAME)
@@ -131,6 +136,8 @@ int psr_client_open(struct psr_client *client, const char *name,
 	if (code != PSR_OK)
 		return code;
 	strcpy(msg.name, name);
+	if (client->welcome.capabilities & PSR_CAP_RESOLUTION)
+		msg.resolution = client->resolution;
 	code = psr_msg_open_encode(&client->out, client->control_id, &msg, err);
 	if (code != PSR_OK)
 		return withdraw(client, code);

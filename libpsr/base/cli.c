@@ -132,6 +132,8 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 		snprintf(inner.text, sizeof inner.text, "'%.80s' is not valid", text);
 		code = opt->call(text, opt->value, &inner);
 		break;
+	case PSR_OPT_HEADING: /* find_long and find_letter give none */
+		break;
 	}
 	return code == PSR_OK ? PSR_OK : psr_fail(err, code, "--%s: %.480s", opt->name, inner.text);
 }
@@ -148,7 +150,7 @@ static int give(const struct psr_opt *opt, const char *text, struct psr_error *e
 static const struct psr_opt *find_long(const struct psr_cli *cli, const char *name, size_t length)
 {
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++)
-		if (strlen(opt->name) == length && memcmp(opt->name, name, length) == 0)
+		if (opt->type != PSR_OPT_HEADING && strlen(opt->name) == length && memcmp(opt->name, name, length) == 0)
 			return opt;
 	return NULL;
 }
@@ -161,33 +163,6 @@ static const struct psr_opt *find_letter(const struct psr_cli *cli, char letter)
 	return NULL;
 }
 
-/* Number of letters to insert, remove or change that turn a into b; both are short. */
-static size_t edit_distance(const char *a, size_t n_a, const char *b)
-{
-	size_t n_b = strlen(b), row[64];
-
-	if (n_a > 63 || n_b > 63)
-		return n_a + n_b;
-	for (size_t j = 0; j <= n_b; j++)
-		row[j] = j;
-	for (size_t i = 1; i <= n_a; i++) {
-		size_t diagonal = row[0];
-
-		row[0] = i;
-		for (size_t j = 1; j <= n_b; j++) {
-			size_t best = diagonal + (a[i - 1] != b[j - 1]);
-
-			diagonal = row[j];
-			if (row[j] + 1 < best)
-				best = row[j] + 1;
-			if (row[j - 1] + 1 < best)
-				best = row[j - 1] + 1;
-			row[j] = best;
-		}
-	}
-	return row[n_b];
-}
-
 static int fail_unknown(const struct psr_cli *cli, const char *dashes, const char *name, size_t length,
                         struct psr_error *err)
 {
@@ -196,9 +171,9 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	int shown = (int)(length < 80 ? length : 80);
 
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
-		size_t distance = edit_distance(name, length, opt->name);
+		size_t distance = psr_edit_distance(name, length, opt->name);
 
-		if (distance < least && distance < strlen(opt->name)) {
+		if (opt->type != PSR_OPT_HEADING && distance < least && distance < strlen(opt->name)) {
 			least = distance;
 			near = opt;
 		}

@@ -48,6 +48,7 @@ static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 	switch (opt->type) {
 	case PSR_OPT_FLAG:
 	case PSR_OPT_CALL:
+	case PSR_OPT_HEADING:
 		break;
 	case PSR_OPT_INT:
 		cli_number_format(text, opt->type, (double)*(const int64_t *)opt->value);
@@ -125,6 +126,15 @@ static int format_name(char *text, size_t size, const struct psr_opt *opt)
 	                opt->arg != NULL ? opt->arg : "");
 }
 
+static void print_heading(const struct psr_opt *heading)
+{
+	printf("\n%s:\n", heading->name);
+	if (heading->help != NULL) {
+		printf("  ");
+		print_wrapped(heading->help, 2, 2);
+	}
+}
+
 static void print_option(const struct psr_opt *opt, int column)
 {
 	char name[256], value[CLI_VALUE_TEXT], text[2048];
@@ -146,7 +156,7 @@ void cli_help_print(const struct psr_cli *cli)
 	int column = format_name(name, sizeof name, &help) + 2;
 
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
-		int length = format_name(name, sizeof name, opt) + 2;
+		int length = opt->type == PSR_OPT_HEADING ? 0 : format_name(name, sizeof name, opt) + 2;
 
 		if (length > column && length <= MAX_COLUMN)
 			column = length;
@@ -155,9 +165,14 @@ void cli_help_print(const struct psr_cli *cli)
 	print_wrapped(cli->usage, 7, 7);
 	putchar('\n');
 	print_wrapped(cli->summary, 0, 0);
-	printf("\noptions:\n");
-	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++)
-		print_option(opt, column);
+	if (cli->opts->type != PSR_OPT_HEADING)
+		printf("\noptions:\n");
+	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
+		if (opt->type == PSR_OPT_HEADING)
+			print_heading(opt);
+		else
+			print_option(opt, column);
+	}
 	print_option(&help, column);
 	if (cli->footer != NULL)
 		printf("\n%s\n", cli->footer);

@@ -101,3 +101,29 @@ int psr_parse_color(const char *text, uint8_t rgb[3], const char **end, struct p
 		rgb[i] = (uint8_t)(value >> (16 - 8 * i));
 	return PSR_OK;
 }
+
+size_t psr_edit_distance(const char *a, size_t n_a, const char *b)
+{
+	size_t n_b = strlen(b), row[64];
+
+	if (n_a > 63 || n_b > 63)
+		return n_a + n_b;
+	for (size_t j = 0; j <= n_b; j++)
+		row[j] = j;
+	for (size_t i = 1; i <= n_a; i++) {
+		size_t diagonal = row[0];
+
+		row[0] = i;
+		for (size_t j = 1; j <= n_b; j++) {
+			size_t best = diagonal + (a[i - 1] != b[j - 1]);
+
+			diagonal = row[j];
+			if (row[j] + 1 < best)
+				best = row[j] + 1;
+			if (row[j - 1] + 1 < best)
+				best = row[j - 1] + 1;
+			row[j] = best;
+		}
+	}
+	return row[n_b];
+}

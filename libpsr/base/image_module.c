@@ -54,7 +54,14 @@ static int load(struct image_module *module, struct psr_error *err)
 	module->read = (image_module_read *)(uintptr_t)dlsym(handle, "psr_image_module_read");
 	module->write = (image_module_write *)(uintptr_t)dlsym(handle, "psr_image_module_write");
 	module->check = (image_module_check *)(uintptr_t)dlsym(handle, "psr_image_module_check");
-	if (module->read == NULL || module->write == NULL || module->check == NULL) {
+	module->animation_check =
+		(image_module_animation_check *)(uintptr_t)dlsym(handle, "psr_image_module_animation_check");
+	module->animation_open = (image_module_animation_open *)(uintptr_t)dlsym(handle, "psr_image_module_animation_open");
+	module->animation_add = (image_module_animation_add *)(uintptr_t)dlsym(handle, "psr_image_module_animation_add");
+	module->animation_close =
+		(image_module_animation_close *)(uintptr_t)dlsym(handle, "psr_image_module_animation_close");
+	if (module->read == NULL || module->write == NULL || module->check == NULL || module->animation_check == NULL
+	    || module->animation_open == NULL || module->animation_add == NULL || module->animation_close == NULL) {
 		dlclose(handle);
 		return psr_fail(err, PSR_ERR_VERSION, "%.300s is not the image module of this version of psr", path);
 	}

@@ -7,7 +7,8 @@
 #include <stdint.h>
 #include "psr/error.h"
 
-/* The functions of the module, with C linkage: psr_image_module_read, _write, _check. They put a sentence into
+/* The functions of the module, with C linkage: psr_image_module_read, _write, _check,
+ * _animation_check, _animation_open, _animation_add, _animation_close. They put a sentence into
  * message where they fail. */
 
 /* Decodes bytes of a format, as OpenImageIO calls it, from the top left, into *rgba (free): 8 bits a channel.
@@ -24,10 +25,21 @@ typedef int image_module_write(const char *path, unsigned width, unsigned height
 /* 0 if the ending is one that it can write for such pixels, or 1. */
 typedef int image_module_check(const char *ending, int is_depth, char *message, unsigned message_size);
 
+/* Pictures that follow each other in one file: open, add n times (8-bit sRGB), close, which frees it in any case. */
+typedef int image_module_animation_check(const char *ending, char *message, unsigned message_size);
+typedef int image_module_animation_open(void **animation, const char *path, unsigned width, unsigned height, unsigned n,
+                                        double seconds, char *message, unsigned message_size);
+typedef int image_module_animation_add(void *animation, const void *pixels, char *message, unsigned message_size);
+typedef int image_module_animation_close(void *animation, char *message, unsigned message_size);
+
 struct image_module {
 	image_module_read *read;
 	image_module_write *write;
 	image_module_check *check;
+	image_module_animation_check *animation_check;
+	image_module_animation_open *animation_open;
+	image_module_animation_add *animation_add;
+	image_module_animation_close *animation_close;
 };
 
 /* Opens the file that PSR_IMAGE_MODULE names; or else the module of this installation (../lib/psr beside the

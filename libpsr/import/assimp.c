@@ -7,12 +7,14 @@
 #include "assimp_check.h"
 #include "assimp_material.h"
 #include "assimp_wall.h"
+#include "obj.h"
 #include "polygon.h"
 
 #define MAX_DEPTH 512 /* of nodes */
 
 struct walk {
 	struct assimp_io io;
+	struct obj obj; /* n is 0 for the other formats */
 	const struct aiScene *scene;
 	int *material; /* of the scene's material m without and with vertex colors: 2 m, 2 m + 1; -1: not made yet */
 	int (*uv_source)[PSR_UV_SETS];
@@ -53,15 +55,41 @@ static int cofactors(double out[3][3], const matrix m)
 	return determinant < 0.0;
 }
 
-/* One vertex of Assimp's as vertex `to` of the mesh. */
-static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct aiMesh *source, unsigned from, const matrix m,
-                       const double normals[3][3], int with_normals, const int uv_source[PSR_UV_SETS])
-{
-	const struct aiVector3D *p = &source->mVertices[from];
+/* Where a mesh goes, and room for its largest face. */
+struct target {
+	const struct aiMesh *source;
+	const struct obj *obj;
+	const double (*m)[4];
+	double normals[3][3];
+	int flip, with_normals, material;
+	const int *uv_source;
+	uint32_t first, vertex, triangle; /* the next ones */
+	unsigned (*cut)[3];
+};
 
+static void position_of(double p[3], const struct target *t, unsigned from)
+{
+	const struct aiVector3D *v = &t->source->mVertices[from];
+
+	p[0] = v->x;
+	p[1] = v->y;
+	p[2] = v->z;
+	if (t->obj->n > 0)
+		obj_position(p, t->obj, v->x, v->y);
+}
+
+/* One vertex of Assimp's as vertex `to` of the mesh. */
+static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *t, unsigned from)
+{
+	const struct aiMesh *source = t->source;
+	const double (*m)[4] = t->m;
+	double p[3];
+
+	position_of(p, t, from);
 	for (int row = 0; row < 3; row++)
-		mesh->position[to][row] = m[row][0] * p->x + m[row][1] * p->y + m[row][2] * p->z + m[row][3];
-	if (with_normals) {
+		mesh->position[to][row] = m[row][0] * p[0] + m[row][1] * p[1] + m[row][2] * p[2] + m[row][3];
+	if (t->with_normals) {
+		const double (*normals)[3] = (const double(*)[3])t->normals;
 		const struct aiVector3D *n = &source->mNormals[from];
 
 		for (int row = 0; row < 3; row++)
@@ -69,8 +97,8 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct aiMesh *
 				(float)(normals[row][0] * n->x + normals[row][1] * n->y + normals[row][2] * n->z);
 	}
 	for (int set = 0; set < PSR_UV_SETS; set++)
-		if (uv_source[set] >= 0 && source->mTextureCoords[uv_source[set]] != NULL) {
-			const struct aiVector3D *uv = &source->mTextureCoords[uv_source[set]][from];
+		if (t->uv_source[set] >= 0 && source->mTextureCoords[t->uv_source[set]] != NULL) {
+			const struct aiVector3D *uv = &source->mTextureCoords[t->uv_source[set]][from];
 
 			mesh->uv[set][to][0] = uv->x;
 			mesh->uv[set][to][1] = 1.0f - uv->y; /* Assimp's v grows upwards */
@@ -102,29 +130,13 @@ static uint64_t count_triangles(struct psr_mesh *mesh, const struct aiMesh *sour
 	return n;
 }
 
-/* Where a mesh goes, and room for its largest face. */
-struct target {
-	const struct aiMesh *source;
-	const double (*m)[4];
-	double normals[3][3];
-	int flip, with_normals, material;
-	const int *uv_source;
-	uint32_t first, vertex, triangle; /* the next ones */
-	unsigned (*cut)[3];
-};
-
 static void add_face(struct psr_mesh *mesh, struct target *t, const struct aiFace *face)
 {
 	double point[POLYGON_MAX_CLIP][3];
 	const unsigned n = face->mNumIndices;
 
-	for (unsigned i = 0; n > 3 && i < n && i < POLYGON_MAX_CLIP; i++) {
-		const struct aiVector3D *p = &t->source->mVertices[face->mIndices[i]];
-
-		point[i][0] = p->x;
-		point[i][1] = p->y;
-		point[i][2] = p->z;
-	}
+	for (unsigned i = 0; n > 3 && i < n && i < POLYGON_MAX_CLIP; i++)
+		position_of(point[i], t, face->mIndices[i]);
 	polygon_cut(t->cut, (const double(*)[3])point, n);
 	for (unsigned k = 0; k + 2 < n; k++) {
 		for (unsigned c = 0; c < 3; c++) {
@@ -133,7 +145,7 @@ static void add_face(struct psr_mesh *mesh, struct target *t, const struct aiFac
 			/* Without normals each corner is a vertex of its own until they are made. */
 			mesh->triangle[t->triangle][c] = t->with_normals ? t->first + from : t->vertex;
 			if (!t->with_normals)
-				put_vertex(mesh, t->vertex++, t->source, from, t->m, (const double(*)[3])t->normals, 0, t->uv_source);
+				put_vertex(mesh, t->vertex++, t, from);
 		}
 		mesh->triangle_material[t->triangle++] = (uint32_t)t->material;
 	}
@@ -148,7 +160,7 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	                     (unsigned)has_color;
 	unsigned most, has = has_color ? IMPORT_HAS_COLOR : 0;
 	const uint64_t n = count_triangles(mesh, source, &most);
-	struct target t = { .source = source, .m = m };
+	struct target t = { .source = source, .obj = &w->obj, .m = m };
 	int rc;
 
 	if (w->material[key] < 0)
@@ -170,7 +182,7 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	if (t.cut == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a face of %u corners", im->path, most);
 	for (unsigned i = 0; t.with_normals && i < source->mNumVertices; i++)
-		put_vertex(mesh, t.first + i, source, i, m, (const double(*)[3])t.normals, 1, t.uv_source);
+		put_vertex(mesh, t.first + i, &t, i);
 	for (unsigned f = 0; f < source->mNumFaces; f++)
 		if (source->mFaces[f].mNumIndices >= 3)
 			add_face(mesh, &t, &source->mFaces[f]);
@@ -253,14 +265,20 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 	if (rc != PSR_OK)
 		return rc;
 	memset(&w, 0, sizeof w);
-	rc = assimp_io_init(&w.io, im, bytes, n_bytes, err);
-	if (rc != PSR_OK)
-		return rc;
-	rc = read_file(&w, err);
+	rc = obj_is(im->path) ? obj_read(&w.obj, im->path, bytes, n_bytes, err) : PSR_OK;
+	if (rc == PSR_OK && w.obj.n > 0) {
+		bytes = w.obj.text;
+		n_bytes = w.obj.n_text;
+	}
+	if (rc == PSR_OK)
+		rc = assimp_io_init(&w.io, im, bytes, n_bytes, err);
+	if (rc == PSR_OK)
+		rc = read_file(&w, err);
 	if (w.scene != NULL)
 		aiReleaseImport(w.scene);
 	free(w.material);
 	free(w.uv_source);
 	assimp_io_fini(&w.io);
+	obj_fini(&w.obj);
 	return rc;
 }

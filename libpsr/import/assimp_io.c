@@ -118,7 +118,7 @@ int assimp_io_init(struct assimp_io *io, struct import_mesh *im, const uint8_t *
 	if (rc != PSR_OK)
 		return rc;
 	if (asprintf(&io->path, "%s/%s", io->folder, slash == NULL ? im->path : slash + 1) < 0) {
-		io->path = NULL;
+		io->path = NULL; /* asprintf leaves it undefined */
 		assimp_io_fini(io);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for its path", im->path);
 	}
@@ -137,4 +137,5 @@ void assimp_io_fini(struct assimp_io *io)
 	free(io->image_path);
 	free(io->folder);
 	free(io->path);
+	memset(io, 0, sizeof *io);
 }

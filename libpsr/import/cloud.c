@@ -1,13 +1,11 @@
 #include <float.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include <xxhash.h>
 #include "base/srgb.h"
 #include "cloud.h"
 
 #define EMPTY UINT32_MAX
-#define MAX_THREADS 16
 #define LONE_RADIUS 1.0f     /* of a cloud that is one point, in units of the file */
 #define LEAST_RADIUS 1e-9f   /* of the model's size: what is nearer than doubles can tell */
 
@@ -85,9 +83,8 @@ static void cloud_fini(struct cloud *cloud)
 	free(cloud->node);
 }
 
-static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh)
+static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh, int n_threads)
 {
-	long n_threads = sysconf(_SC_NPROCESSORS_ONLN);
 	int rc;
 
 	memset(cloud, 0, sizeof *cloud);
@@ -101,7 +98,7 @@ static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh)
 	rc = cloud_tree_build(cloud, (const double(*)[3])mesh->point);
 	if (rc != PSR_OK)
 		return rc;
-	return psr_pool_create(&cloud->pool, n_threads < 1 ? 1 : n_threads > MAX_THREADS ? MAX_THREADS : (int)n_threads, 0);
+	return psr_pool_create(&cloud->pool, n_threads, 0);
 }
 
 /* Slots' normals from the mesh; returns how many are missing. */
@@ -155,7 +152,7 @@ int import_cloud_finish(struct import_mesh *im, struct psr_error *err)
 		return PSR_OK;
 	}
 	if (rc == PSR_OK)
-		rc = cloud_init(&cloud, mesh);
+		rc = cloud_init(&cloud, mesh, im->options.n_threads);
 	if (rc == PSR_OK) {
 		n_missing = take_normals(&cloud, mesh);
 		cloud_tree_nearest(&cloud);

@@ -3,10 +3,31 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <unistd.h>
 #include "import.h"
 
 #define SNIFF_BYTES 65536
 #define SURVEY_SIZES 10 /* of a scene, between the origin and the middle of it */
+#define MOST_THREADS 256
+#define DEFAULT_CREASE 0.6108652381980153 /* 35 degrees */
+#define MOST_CREASE 3.1415926535897933    /* a little over pi */
+
+void psr_import_options_default(struct psr_import_options *options)
+{
+	const long n = sysconf(_SC_NPROCESSORS_ONLN);
+
+	options->crease = DEFAULT_CREASE;
+	options->n_threads = n < 1 ? 1 : n > MOST_THREADS ? MOST_THREADS : (int)n;
+}
+
+static int check_options(const struct psr_import_options *options, struct psr_error *err)
+{
+	if (!(options->crease >= 0.0 && options->crease <= MOST_CREASE))
+		return psr_fail(err, PSR_ERR_ARG, "a crease of %g radians is outside of 0..pi", options->crease);
+	if (options->n_threads < 1 || options->n_threads > MOST_THREADS)
+		return psr_fail(err, PSR_ERR_ARG, "%d threads are outside of 1..%d", options->n_threads, MOST_THREADS);
+	return PSR_OK;
+}
 
 static int ends_with(const char *path, const char *ending)
 {
@@ -69,7 +90,8 @@ static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *byte
 	mesh->up[has_z ? 2 : 1] = 1;
 }
 
-int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *err)
+int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_import_options *options,
+                    struct psr_error *err)
 {
 	struct import_mesh im;
 	uint8_t *bytes = NULL;
@@ -79,7 +101,9 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *e
 	if (out == NULL || path == NULL || path[0] == '\0')
 		return psr_fail(err, PSR_ERR_ARG, "no mesh file was named");
 	*out = NULL;
-	rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+	rc = options != NULL ? check_options(options, err) : PSR_OK;
+	if (rc == PSR_OK)
+		rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (n_bytes == 0) {
@@ -87,6 +111,8 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, struct psr_error *e
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the file is empty", path);
 	}
 	rc = import_mesh_init(&im, path, err);
+	if (options != NULL)
+		im.options = *options;
 	if (rc == PSR_OK && is_gltf(path, bytes, n_bytes))
 		rc = import_gltf(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK && is_ply(path, bytes, n_bytes))

@@ -5,6 +5,7 @@
 #ifndef PSR_IMPORT_H
 #define PSR_IMPORT_H
 
+#include <locale.h>
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/mesh.h"
@@ -20,8 +21,6 @@ extern "C" {
 #define IMPORT_MAX_IMAGE_SIDE 16384
 #define IMPORT_MAX_PIXELS (UINT64_C(1) << 28) /* of all images of one mesh */
 #define IMPORT_MAX_MATERIALS 65536
-/* Normals made for files without: smooth where faces meet below 60 degrees. */
-#define IMPORT_CREASE_COSINE 0.5
 #define IMPORT_GRAY 0.6f      /* linear; of what has no color */
 #define IMPORT_ROUGHNESS 0.5f /* of surfaces without a material */
 
@@ -29,11 +28,12 @@ extern "C" {
 struct import_mesh {
 	struct psr_mesh *mesh;
 	const char *path; /* of the source file, for error texts; the caller's */
+	struct psr_import_options options;
 	uint64_t vertex_capacity, triangle_capacity, point_capacity;
 	uint64_t n_pixels;
 };
 
-int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err);
+int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error *err); /* with the default options */
 void import_mesh_fini(struct import_mesh *im);
 
 /* What vertices may have beside a position and a normal. */
@@ -119,6 +119,10 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err); 
 /* The resolved path of `name`, which is absolute or relative to `folder`. NOT_FOUND; UNSUPPORTED when it leads
  * outside. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
+
+/* number.c: a word of text as the nearest double; 0 if it is no number. "nan", "inf" and what C writes are; `locale` is
+ * "C". */
+int import_number(double *x, const uint8_t *word, size_t n, locale_t locale);
 
 /* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT,
  * UNSUPPORTED, LIMIT, MEMORY, and what opening the module returns. */

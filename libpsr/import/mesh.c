@@ -35,6 +35,7 @@ int import_mesh_init(struct import_mesh *im, const char *path, struct psr_error 
 {
 	memset(im, 0, sizeof *im);
 	im->path = path;
+	psr_import_options_default(&im->options);
 	im->mesh = calloc(1, sizeof *im->mesh);
 	return im->mesh == NULL ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a mesh", path) : PSR_OK;
 }

@@ -1,9 +1,14 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/vec.h"
+#include "crease.h"
 #include "import.h"
 
-#define MAX_VALENCE 512 /* corners around one point beyond which each face keeps its own normal: the sum is quadratic */
+/* Faces lie in one plane if their normals differ by less than 0.1 degrees (1 minus the cosine): what six digits leave
+ * of a triangle whose height is a 3000th of its distance from the origin. */
+#define FLAT 1.5e-6
+#define LONE 1.01 /* of its own area: a triangle that lies in no flat part but with slivers */
 
 /* Corners (3 * triangle + corner) around each point: corner[start[p] .. start[p + 1]), in the order of triangles. */
 struct fan {
@@ -12,6 +17,8 @@ struct fan {
 	uint64_t *corner;
 	uint8_t *wanted;    /* triangles whose vertices have no normals yet */
 	double (*face)[3];  /* unit normals; 0 for a triangle without area */
+	uint32_t *flat;     /* of each triangle: another one of its flat part, the part's own one of itself */
+	double *area;       /* twice that of the flat part, at its own triangle */
 };
 
 static void fan_fini(struct fan *fan)
@@ -21,11 +28,8 @@ static void fan_fini(struct fan *fan)
 	free(fan->corner);
 	free(fan->wanted);
 	free(fan->face);
-}
-
-static double dot(const double a[3], const double b[3])
-{
-	return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+	free(fan->flat);
+	free(fan->area);
 }
 
 /* The corner's share in the normal: e x f / (|e|^2 |f|^2), which is exact where the vertices lie on a sphere (N. Max,
@@ -37,30 +41,66 @@ static void corner_share(double share[3], const struct psr_mesh *mesh, uint64_t 
 	const double *p = mesh->position[v[at]], *q = mesh->position[v[(at + 1) % 3]], *r = mesh->position[v[(at + 2) % 3]];
 	double e[3], f[3], weight;
 
-	for (int i = 0; i < 3; i++) {
-		e[i] = q[i] - p[i];
-		f[i] = r[i] - p[i];
-	}
-	weight = dot(e, e) * dot(f, f);
-	share[0] = e[1] * f[2] - e[2] * f[1];
-	share[1] = e[2] * f[0] - e[0] * f[2];
-	share[2] = e[0] * f[1] - e[1] * f[0];
-	for (int i = 0; i < 3; i++)
-		share[i] = weight > 0.0 && isfinite(weight) ? share[i] / weight : 0.0;
+	v3d_sub(e, q, p);
+	v3d_sub(f, r, p);
+	v3d_cross(share, e, f);
+	weight = v3d_dot(e, e) * v3d_dot(f, f);
+	v3d_scale(share, share, weight > 0.0 && isfinite(weight) ? 1.0 / weight : 0.0);
 }
 
 static void face_normals(struct fan *fan, const struct psr_mesh *mesh)
 {
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
-		double *n = fan->face[t], length;
-
 		if (!fan->wanted[t])
 			continue;
-		corner_share(n, mesh, 3 * (uint64_t)t);
-		length = sqrt(dot(n, n));
-		for (int i = 0; i < 3; i++)
-			n[i] = length > 0.0 && isfinite(length) ? n[i] / length : 0.0;
+		corner_share(fan->face[t], mesh, 3 * (uint64_t)t);
+		if (v3d_normalize(fan->face[t], fan->face[t]) == 0.0)
+			v3d_set(fan->face[t], 0.0, 0.0, 0.0);
 	}
+}
+
+/* The triangle that stands for t's flat part: its first. Halves paths. */
+static uint32_t flat_of(struct fan *fan, uint32_t t)
+{
+	while (fan->flat[t] != t)
+		t = fan->flat[t] = fan->flat[fan->flat[t]];
+	return t;
+}
+
+static void join_flat(struct fan *fan, uint32_t a, uint32_t b)
+{
+	if (1.0 - v3d_dot(fan->face[a], fan->face[b]) > FLAT)
+		return;
+	a = flat_of(fan, a);
+	b = flat_of(fan, b);
+	fan->flat[a > b ? a : b] = a > b ? b : a;
+}
+
+static double twice_area(const struct psr_mesh *mesh, uint32_t t)
+{
+	const uint32_t *v = mesh->triangle[t];
+	double e[3], f[3], n[3];
+
+	v3d_sub(e, mesh->position[v[1]], mesh->position[v[0]]);
+	v3d_sub(f, mesh->position[v[2]], mesh->position[v[0]]);
+	v3d_cross(n, e, f);
+	return v3d_length(n);
+}
+
+/* Triangles that lie in one plane and touch are one part, however they were cut. */
+static void find_flats(struct fan *fan, const struct psr_mesh *mesh)
+{
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		fan->flat[t] = t;
+	for (uint32_t p = 0; p < mesh->n_vertices; p++) {
+		const uint64_t first = fan->start[p], end = fan->start[p + 1];
+
+		for (uint64_t i = first; i < end && end - first <= CREASE_MAX_CORNERS; i++)
+			for (uint64_t k = first; k < i; k++)
+				join_flat(fan, (uint32_t)(fan->corner[i] / 3), (uint32_t)(fan->corner[k] / 3));
+	}
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		fan->area[flat_of(fan, t)] += twice_area(mesh, t);
 }
 
 static int has_normals(const struct psr_mesh *mesh, const uint32_t v[3])
@@ -86,7 +126,10 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	fan->corner = malloc((3 * (size_t)mesh->n_triangles + 1) * sizeof *fan->corner);
 	fan->wanted = malloc((size_t)mesh->n_triangles + 1);
 	fan->face = calloc((size_t)mesh->n_triangles + 1, sizeof *fan->face);
-	if (fan->start == NULL || fan->wanted == NULL || fan->corner == NULL || fan->face == NULL) {
+	fan->flat = malloc(((size_t)mesh->n_triangles + 1) * sizeof *fan->flat);
+	fan->area = calloc((size_t)mesh->n_triangles + 1, sizeof *fan->area);
+	if (fan->start == NULL || fan->wanted == NULL || fan->corner == NULL || fan->face == NULL || fan->flat == NULL ||
+	    fan->area == NULL) {
 		fan_fini(fan);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for the normals of %u triangles", im->path,
 		                mesh->n_triangles);
@@ -105,27 +148,8 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 		for (int c = 0; fan->wanted[t] && c < 3; c++)
 			fan->corner[fan->start[fan->point[mesh->triangle[t][c]] + 1]++] = 3 * (uint64_t)t + (uint64_t)c;
 	face_normals(fan, mesh);
+	find_flats(fan, mesh);
 	return PSR_OK;
-}
-
-/* A corner around the point at hand. */
-struct corner {
-	double share[3];
-	uint64_t at;
-	float normal[3];
-};
-
-static void corner_normal(float normal[3], const struct fan *fan, const struct corner *around, unsigned n, unsigned i)
-{
-	const double *face = fan->face[around[i].at / 3];
-	double sum[3] = { 0.0, 0.0, 0.0 }, length;
-
-	for (unsigned k = 0; k < n; k++)
-		for (int c = 0; c < 3 && dot(face, fan->face[around[k].at / 3]) >= IMPORT_CREASE_COSINE; c++)
-			sum[c] += around[k].share[c];
-	length = sqrt(dot(sum, sum));
-	for (int c = 0; c < 3; c++)
-		normal[c] = length > 0.0 && isfinite(length) ? (float)(sum[c] / length) : 0.0f;
 }
 
 /* A copy of vertex v at the end, for the corners that want another normal. */
@@ -143,62 +167,85 @@ static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *er
 	return PSR_OK;
 }
 
-/* Corners of one vertex with one normal go on sharing it: the first takes it, others with the same normal follow. */
-static int put_normals(struct import_mesh *im, const struct corner *around, unsigned n, const uint32_t *old,
-                       struct psr_error *err)
+/* The corners around the point at hand. */
+struct ring {
+	unsigned n;
+	uint64_t at[CREASE_MAX_CORNERS];
+	uint32_t vertex[CREASE_MAX_CORNERS]; /* before any was split */
+	struct crease_corner corner[CREASE_MAX_CORNERS];
+};
+
+static void take_ring(struct ring *ring, struct fan *fan, const struct psr_mesh *mesh, uint64_t first)
 {
-	for (unsigned i = 0; i < n; i++) {
-		uint32_t *v = &im->mesh->triangle[around[i].at / 3][around[i].at % 3];
+	for (unsigned i = 0; i < ring->n; i++) {
+		const uint64_t at = fan->corner[first + i];
+		const uint32_t t = (uint32_t)(at / 3);
+
+		ring->at[i] = at;
+		ring->vertex[i] = mesh->triangle[t][at % 3];
+		memcpy(ring->corner[i].face, fan->face[t], sizeof fan->face[t]);
+		corner_share(ring->corner[i].share, mesh, at);
+		ring->corner[i].area = fan->area[flat_of(fan, t)];
+		ring->corner[i].is_flat = ring->corner[i].area > LONE * twice_area(mesh, t);
+	}
+}
+
+/* Corners of one vertex with one normal go on sharing it: the first takes it, others with the same normal follow. */
+static int put_normals(struct import_mesh *im, const struct ring *ring, struct psr_error *err)
+{
+	for (unsigned i = 0; i < ring->n; i++) {
+		uint32_t *v = &im->mesh->triangle[ring->at[i] / 3][ring->at[i] % 3];
+		const float *normal = ring->corner[i].normal;
 		int is_first = 1, rc;
 		unsigned k;
 
 		for (k = 0; k < i; k++) {
-			if (old[k] != old[i])
+			if (ring->vertex[k] != ring->vertex[i])
 				continue;
 			is_first = 0;
-			if (memcmp(around[k].normal, around[i].normal, sizeof around[k].normal) == 0)
+			if (memcmp(ring->corner[k].normal, normal, sizeof ring->corner[k].normal) == 0)
 				break;
 		}
 		if (k < i) {
-			*v = im->mesh->triangle[around[k].at / 3][around[k].at % 3];
+			*v = im->mesh->triangle[ring->at[k] / 3][ring->at[k] % 3];
 			continue;
 		}
 		if (!is_first) {
 			rc = split_vertex(im, *v, err);
 			if (rc != PSR_OK)
 				return rc;
-			v = &im->mesh->triangle[around[i].at / 3][around[i].at % 3];
+			v = &im->mesh->triangle[ring->at[i] / 3][ring->at[i] % 3];
 			*v = im->mesh->n_vertices - 1;
 		}
-		memcpy(im->mesh->normal[*v], around[i].normal, sizeof around[i].normal);
+		memcpy(im->mesh->normal[*v], normal, sizeof ring->corner[i].normal);
 	}
 	return PSR_OK;
 }
 
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 {
-	struct corner around[MAX_VALENCE];
-	uint32_t old[MAX_VALENCE];
+	const double crease = 1.0 - cos(im->options.crease);
 	const uint32_t n_vertices = im->mesh->n_vertices;
+	struct ring *ring;
 	struct fan fan;
 	int rc = fan_init(&fan, im, err);
 
 	if (rc != PSR_OK)
 		return rc;
+	ring = malloc(sizeof *ring);
+	if (ring == NULL)
+		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for the normals of a vertex", im->path);
 	for (uint32_t p = 0; p < n_vertices && rc == PSR_OK; p++) {
 		const uint64_t first = fan.start[p], n = fan.start[p + 1] - first;
 
-		if (n > MAX_VALENCE)
+		if (n == 0 || n > CREASE_MAX_CORNERS)
 			continue;
-		for (unsigned i = 0; i < n; i++) {
-			around[i].at = fan.corner[first + i];
-			old[i] = im->mesh->triangle[around[i].at / 3][around[i].at % 3];
-			corner_share(around[i].share, im->mesh, around[i].at);
-		}
-		for (unsigned i = 0; i < n; i++)
-			corner_normal(around[i].normal, &fan, around, (unsigned)n, i);
-		rc = put_normals(im, around, (unsigned)n, old, err);
+		ring->n = (unsigned)n;
+		take_ring(ring, &fan, im->mesh, first);
+		crease_normals(ring->corner, ring->n, crease);
+		rc = put_normals(im, ring, err);
 	}
+	free(ring);
 	fan_fini(&fan);
 	return rc;
 }

@@ -4,7 +4,6 @@
 #ifndef PSR_IMPORT_PLY_H
 #define PSR_IMPORT_PLY_H
 
-#include <locale.h>
 #include "import.h"
 
 #define PLY_MAX_ELEMENTS 64

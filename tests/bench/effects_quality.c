@@ -49,7 +49,7 @@ static void truth_make(struct truth *truth, const char *source, int n_threads)
 
 	scene(&drawn, 0, &truth->film);
 	truth->n_threads = n_threads;
-	if (psr_mesh_import(&truth->mesh, source, &err) != PSR_OK || psr_truth_create(&truth->rays, truth->mesh, &err) != PSR_OK
+	if (psr_mesh_import(&truth->mesh, source, NULL, &err) != PSR_OK || psr_truth_create(&truth->rays, truth->mesh, &err) != PSR_OK
 	    || psr_truth_draw(truth->rays, &drawn.camera, SIDE, SIDE, RAYS, n_threads, depth, normal, rgb, &err) != PSR_OK)
 		report_die(source, err.text);
 	truth->light = report_alloc((size_t)SIDE * SIDE, sizeof *truth->light);

@@ -225,7 +225,7 @@ static void dragon(const char *source)
 	double ours, embree;
 
 	puts("\nThe Stanford dragon (targets: 20 s at 512, 90 s at 1024, half of Embree's own rate)");
-	if (psr_mesh_import(&mesh, source, &err) != PSR_OK || psr_ray_rate(mesh, &ours, &embree, &err) != PSR_OK)
+	if (psr_mesh_import(&mesh, source, NULL, &err) != PSR_OK || psr_ray_rate(mesh, &ours, &embree, &err) != PSR_OK)
 		die(source, err.text);
 	printf("primary rays on its %" PRIu32 " triangles, one thread: ours %.2f, Embree's packets %.2f Mray/s of CPU time: ratio "
 	       "%.2f, %s\n",

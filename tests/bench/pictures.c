@@ -233,7 +233,7 @@ static struct psr_mesh *import(const char *path)
 	struct psr_mesh *mesh;
 	struct psr_error err;
 
-	if (psr_mesh_import(&mesh, path, &err) != PSR_OK)
+	if (psr_mesh_import(&mesh, path, NULL, &err) != PSR_OK)
 		report_die(path, err.text);
 	return mesh;
 }

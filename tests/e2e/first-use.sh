@@ -114,6 +114,29 @@ is "a damaged cache is built again, and draws the same" "$second" "$(color needl
 is "by a build" 1 "$(started needle.obj)"
 check "psrd stops cleanly after a damaged cache" stop_psrd
 
+# --- as fine as pictures ask for ---
+mkdir "$work/sizes"
+needle 0.1 >"$work/sizes/needle.obj"
+needle 0.2 >"$work/sizes/twin.obj"
+cp "$work/sizes/twin.obj" "$work/sizes/twin.off"
+echo LASF >"$work/sizes/tower.laz"
+start_psrd --models "$work/sizes" --cache "$work/sizes-cache" --resolution 64 --max-resolution 300 --verbose
+fine() { # size: the resolution of the model that a picture of this size gets
+	psr shot --server "$server" --model needle --size "$1" --report "$work/report.json" 2>&1 && number "$work/report.json" resolution
+}
+is "a small picture gets the coarsest model" 64 "$(fine 48x20)"
+is "a larger one a finer model" 256 "$(fine 100x200)"
+is "a huge one the finest that is built" 300 "$(fine 4000x10)"
+is "another of a size that was there builds nothing" 256 "$(fine 256x65)"
+is "so there are three models" 3 "$(find "$work/sizes-cache" -name '*.psr' | wc -l)"
+is "a file that cannot be read is listed" failed "$(state tower)"
+refuses "and who opens it is told what to do" 4 'tower.laz: .*laszip' psr shot --server "$server" --model tower --hash
+is "of two files of one name the other is listed under its own" failed "$(state twin.off)"
+refuses "and who opens that is told to rename it" 4 'twin.obj.*rename' psr shot --server "$server" --model twin.off --hash
+check "psrd stops cleanly after that, too" stop_psrd
+refuses "a cache that cannot be written is refused at the start" 3 'cache folder /proc/psr cannot be made.*--cache DIR' \
+	timeout 30 psrd --models "$work/sizes" --cache /proc/psr --listen 127.0.0.1:0
+
 # --- without psr-model ---
 mkdir "$work/alone"
 cp "$BUILD/bin/psrd" "$work/alone"

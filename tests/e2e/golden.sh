@@ -7,6 +7,7 @@ hashes=tests/golden/hashes
 shots() {
 	while read -r name options; do
 		case $name in '' | '#'*) continue ;; esac
+		case " $options " in *" --smooth "*) ;; *) options="$options --no-smooth" ;; esac
 		# shellcheck disable=SC2086
 		hash=$(psr shot --server "$server" $options --codec lossless --depth "$work/depth.pfm" -o "$work/frame.png" --hash |
 			tr '\n' ' ')

@@ -40,7 +40,7 @@ check "its place does not matter" cmp "$models/top.psr" "$work/elsewhere.psr"
 
 # --- frames ---
 lights=(--light point:3,5,4,ref=5,color=#ffe0a0 --light dir:-1,-2,-1,intensity=0.5)
-shot() { psr shot --server "$server" --size 1920x1080 "${lights[@]}" "$@"; }
+shot() { psr shot --server "$server" --size 1920x1080 --no-smooth "${lights[@]}" "$@"; }
 frames() { # color and depth of views far, near and orthographic
 	for name in teapot top; do
 		shot --model $name --depth "$work/depth.pfm" --hash
@@ -67,7 +67,7 @@ for codec in lossless raw jpeg:1 jpeg:85 jpeg:100; do
 done
 is "so does a Unix socket" "$expected" "$(server=unix:$work/socket shot --model top --hash)"
 check "a lossless picture is written" shot --model top -o "$work/tcp.ppm"
-check "and one from the Unix socket" psr shot --server "unix:$work/socket" --size 1920x1080 "${lights[@]}" --model top \
+check "and one from the Unix socket" psr shot --server "unix:$work/socket" --size 1920x1080 --no-smooth "${lights[@]}" --model top \
 	-o "$work/unix.ppm" --codec raw
 check "they are the same file" cmp "$work/tcp.ppm" "$work/unix.ppm"
 

@@ -24,14 +24,15 @@ check_shadows() { # model sun
 	view=(--eye "$(place 1.1 1.3 1.5)" --target "$(place 0 0 0)" --up 0,1,0 --ortho "$height")
 	for suffix in '' ,shadow; do
 		light=dir:$sun$suffix
-		if ! psr shot --server "$server" --model "$model" --size ${size}x$size "${view[@]}" --codec lossless \
+		if ! psr shot --server "$server" --model "$model" --size ${size}x$size "${view[@]}" --no-smooth --codec lossless \
 			--ambient 0 --light "$light" -o "$work/frame$suffix.ppm" --depth "$work/depth.pfm" 2>"$work/err"; then
 			not_ok "$model is drawn with light $light" "$(head -n 1 "$work/err")"
 			return
 		fi
 	done
-	if ! psr-model accuracy "$source" --depth "$work/depth.pfm" "${view[@]}" --spacing "$spacing" --sun "$sun" \
-		--lit "$work/frame.ppm" --shadow "$work/frame,shadow.ppm" --json >"$json" 2>"$work/err"; then
+	psr-model accuracy "$source" --depth "$work/depth.pfm" "${view[@]}" --spacing "$spacing" --sun "$sun" \
+		--lit "$work/frame.ppm" --shadow "$work/frame,shadow.ppm" --json >"$json" 2>"$work/err"
+	if [ $? -gt 1 ]; then # 1: measured, with a depth that is not good enough; shadows have bounds of their own
 		not_ok "the shadows of $model are measured" "$(head -n 1 "$work/err")"
 		return
 	fi

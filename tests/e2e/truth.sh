@@ -8,10 +8,11 @@ place() { awk "BEGIN { printf \"%.9g,%.9g,%.9g\", $cx + $1 * $height, $cy + $2 *
 measure_view() { # model source size camera-options...
 	local model=$1 source=$2 size=$3 json=$work/accuracy.json key
 	shift 3
-	psr shot --server "$server" --model "$model" --size "${size}x$size" "$@" --codec lossless --ambient 1 \
-		-o "$work/frame.ppm" --depth "$work/depth.pfm" 2>"$work/err" &&
-		psr-model accuracy "$source" --depth "$work/depth.pfm" --color "$work/frame.ppm" "$@" --spacing "$spacing" \
-			--json >"$json" 2>"$work/err" || return 1
+	psr shot --server "$server" --model "$model" --size "${size}x$size" "$@" --no-smooth --codec lossless --ambient 1 \
+		-o "$work/frame.ppm" --depth "$work/depth.pfm" 2>"$work/err" || return 1
+	psr-model accuracy "$source" --depth "$work/depth.pfm" --color "$work/frame.ppm" "$@" --spacing "$spacing" \
+		--json >"$json" 2>"$work/err"
+	[ $? -le 1 ] || return 1 # 1: measured, and not good enough; the bounds of check_views decide
 	for key in truth inside inside_empty holes outside_drawn color_compared color_wrong; do
 		eval "sum_$key=\$((sum_$key + $(number "$json" $key)))"
 	done

@@ -223,7 +223,7 @@ static void parsers_of_parts_say_where_they_stopped(void **state)
 }
 
 /* What --help prints, caught in a file. */
-static void catch_help(char *text, size_t size)
+static void catch_help_of(const struct psr_cli *of, char *text, size_t size)
 {
 	FILE *file = tmpfile();
 	char *argv[] = { (char *)"psr", (char *)"--count", (char *)"3", (char *)"--help", NULL };
@@ -234,7 +234,7 @@ static void catch_help(char *text, size_t size)
 	fflush(stdout);
 	saved = dup(1);
 	dup2(fileno(file), 1);
-	code = psr_cli_parse(&cli, 4, argv, &n, NULL);
+	code = psr_cli_parse(of, 4, argv, &n, NULL);
 	fflush(stdout);
 	dup2(saved, 1);
 	close(saved);
@@ -243,6 +243,11 @@ static void catch_help(char *text, size_t size)
 	length = fread(text, 1, size - 1, file);
 	text[length] = '\0';
 	fclose(file);
+}
+
+static void catch_help(char *text, size_t size)
+{
+	catch_help_of(&cli, text, size);
 }
 
 static void help_is_aligned_wrapped_and_tells_the_real_defaults(void **state)
@@ -288,6 +293,29 @@ static void values_in_force_show_as_defaults(void **state)
 	assert_non_null(strstr(text, "A name. [teapot]\n"));
 }
 
+static void headings_stand_above_their_options_and_are_none(void **state)
+{
+	static int flag;
+	static const struct psr_opt opts[] = {
+		{ .name = "Colours", .type = PSR_OPT_HEADING, .help = "All of them are optional." },
+		{ .name = "red", .type = PSR_OPT_FLAG, .value = &flag, .help = "Red." },
+		{ .name = "Other", .type = PSR_OPT_HEADING },
+		{ .name = "big", .type = PSR_OPT_FLAG, .value = &flag, .help = "Big." },
+		{ .name = NULL },
+	};
+	static const struct psr_cli grouped = { "psr test", "Tests.", opts, NULL };
+	struct psr_error err;
+	char text[4096];
+
+	(void)state;
+	catch_help_of(&grouped, text, sizeof text);
+	assert_string_equal(text, "usage: psr test\n\nTests.\n\nColours:\n  All of them are optional.\n"
+	                          "      --red   Red.\n\nOther:\n      --big   Big.\n"
+	                          "      --help  Print this and exit.\n");
+	assert_int_equal(psr_cli_set(&grouped, "Other", "yes", &err), PSR_ERR_ARG);
+	assert_string_equal(err.text, "unknown option Other; --help lists what there is");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -299,6 +327,7 @@ int main(void)
 		cmocka_unit_test_setup(configuration_lines_set_the_same_options, reset),
 		cmocka_unit_test_setup(parsers_of_parts_say_where_they_stopped, reset),
 		cmocka_unit_test_setup(help_is_aligned_wrapped_and_tells_the_real_defaults, reset),
+		cmocka_unit_test_setup(headings_stand_above_their_options_and_are_none, reset),
 		cmocka_unit_test_setup(values_in_force_show_as_defaults, reset),
 	};
 

@@ -343,6 +343,149 @@ static void link_to_a_file_stays_a_link(void **state)
 	assert_true(status.st_size > 3);
 }
 
+/* ---- animations ---- */
+
+static uint32_t get_u32(const uint8_t *from)
+{
+	return (uint32_t)from[0] << 24 | (uint32_t)from[1] << 16 | (uint32_t)from[2] << 8 | from[3];
+}
+
+static void put_u32(uint8_t *to, uint32_t v)
+{
+	for (int i = 0; i < 4; i++)
+		to[i] = (uint8_t)(v >> (24 - 8 * i));
+}
+
+/* As PNG defines it. */
+static uint32_t crc_of(const uint8_t *bytes, size_t n)
+{
+	uint32_t crc = 0xffffffff;
+
+	for (size_t i = 0; i < n; i++) {
+		crc ^= bytes[i];
+		for (int k = 0; k < 8; k++)
+			crc = crc & 1 ? 0xedb88320 ^ crc >> 1 : crc >> 1;
+	}
+	return ~crc;
+}
+
+struct chunks {
+	uint8_t bytes[1 << 14], still[1 << 14]; /* a frame as a PNG of its own */
+	size_t n, n_still, n_head;              /* of signature, IHDR, sRGB */
+	uint32_t sequence, n_frames, n_controls;
+};
+
+static void add_chunk(struct chunks *c, const char *type, const uint8_t *data, uint32_t n)
+{
+	uint8_t *to = c->still + c->n_still;
+
+	put_u32(to, n);
+	memcpy(to + 4, type, 4);
+	if (n > 0)
+		memcpy(to + 8, data, n);
+	put_u32(to + 8 + n, crc_of(to + 4, n + 4));
+	c->n_still += n + 12;
+}
+
+static void check_still(struct chunks *c, const uint8_t *expected)
+{
+	png_image image = { .version = PNG_IMAGE_VERSION };
+	uint8_t got[3 * W * H];
+
+	add_chunk(c, "IEND", NULL, 0);
+	assert_true(png_image_begin_read_from_memory(&image, c->still, c->n_still));
+	assert_true(image.width == W && image.height == H);
+	image.format = PNG_FORMAT_RGB;
+	assert_true(png_image_finish_read(&image, NULL, got, 0, NULL));
+	assert_memory_equal(got, expected, sizeof got);
+	c->n_still = c->n_head;
+}
+
+/* One chunk of an animation of three frames. */
+static void check_chunk(struct chunks *c, const uint8_t *data, const char *type, uint32_t n,
+                        uint8_t frames[][3 * W * H])
+{
+	if (memcmp(type, "acTL", 4) == 0) {
+		assert_true(n == 8 && get_u32(data) == 3 && get_u32(data + 4) == 0);
+	} else if (memcmp(type, "fcTL", 4) == 0) {
+		assert_true(n == 26 && get_u32(data) == c->sequence++);
+		assert_true(get_u32(data + 4) == W && get_u32(data + 8) == H);
+		assert_true(data[20] == 0 && data[21] == 250 && data[22] * 256 + data[23] == 1000);
+		if (c->n_controls++ > 0)
+			check_still(c, frames[c->n_controls - 2]);
+	} else if (memcmp(type, "fdAT", 4) == 0) {
+		assert_true(c->n_controls > 1 && get_u32(data) == c->sequence++);
+		add_chunk(c, "IDAT", data + 4, n - 4);
+	} else if (memcmp(type, "IDAT", 4) == 0) {
+		assert_true(c->n_controls == 1);
+		add_chunk(c, "IDAT", data, n);
+	} else if (memcmp(type, "IEND", 4) == 0) {
+		check_still(c, frames[c->n_controls - 1]);
+	} else {
+		add_chunk(c, type, data, n);
+		c->n_head = c->n_still;
+	}
+}
+
+static void animation_is_a_png_whose_further_frames_are_pngs_too(void **state)
+{
+	static uint8_t frames[3][3 * W * H];
+	static struct chunks c;
+	struct psr_picture frame = picture;
+	struct psr_animation *animation;
+	char path[512];
+
+	(void)state;
+	strcpy(path, in_folder("moves.png"));
+	assert_int_equal(psr_animation_open(&animation, path, &picture, 3, 0.25, NULL), PSR_OK);
+	for (int k = 0; k < 3; k++) {
+		for (int i = 0; i < 3 * W * H; i++)
+			frames[k][i] = (uint8_t)(rgb[i] + 80 * k);
+		frame.rgb = frames[k];
+		assert_int_equal(psr_animation_add(animation, &frame, NULL), PSR_OK);
+	}
+	assert_int_equal(psr_animation_close(animation, PSR_OK, NULL), PSR_OK);
+	c.n = read_all(path, (char *)c.bytes, sizeof c.bytes);
+	memcpy(c.still, c.bytes, 8);
+	c.n_still = 8;
+	for (size_t at = 8; at < c.n; at += get_u32(c.bytes + at) + 12) {
+		uint32_t n = get_u32(c.bytes + at);
+
+		assert_true(at + n + 12 <= c.n);
+		assert_true(get_u32(c.bytes + at + 8 + n) == crc_of(c.bytes + at + 4, n + 4));
+		check_chunk(&c, c.bytes + at + 8, (const char *)c.bytes + at + 4, n, frames);
+	}
+	assert_int_equal(c.n_controls, 3);
+}
+
+static void an_animation_that_failed_leaves_the_old_file(void **state)
+{
+	struct psr_animation *animation;
+	char path[512], text[8] = "";
+
+	(void)state;
+	strcpy(path, in_folder("kept.png"));
+	write_text(path, "old");
+	assert_int_equal(psr_animation_open(&animation, path, &picture, 3, 0.25, NULL), PSR_OK);
+	assert_int_equal(psr_animation_add(animation, &picture, NULL), PSR_OK);
+	assert_int_equal(psr_animation_close(animation, PSR_ERR_CONNECTION, NULL), PSR_ERR_CONNECTION);
+	read_all(path, text, sizeof text - 1);
+	assert_string_equal(text, "old");
+}
+
+static void what_does_not_move_is_refused_as_an_animation(void **state)
+{
+	struct psr_error err;
+
+	(void)state;
+	assert_int_equal(psr_animation_check("a.PNG", NULL), PSR_OK);
+	assert_int_equal(psr_animation_check("a.apng", NULL), PSR_OK);
+	assert_int_equal(psr_animation_check("-", NULL), PSR_OK);
+	assert_int_equal(psr_animation_check("a", &err), PSR_ERR_ARG);
+	assert_non_null(strstr(err.text, ".png or .gif"));
+	assert_int_equal(psr_animation_check("a.jpg", &err), PSR_ERR_UNSUPPORTED);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -358,6 +501,9 @@ int main(void)
 		cmocka_unit_test(full_device_is_an_error),
 		cmocka_unit_test(full_disk_leaves_the_old_file),
 		cmocka_unit_test(link_to_a_file_stays_a_link),
+		cmocka_unit_test(animation_is_a_png_whose_further_frames_are_pngs_too),
+		cmocka_unit_test(an_animation_that_failed_leaves_the_old_file),
+		cmocka_unit_test(what_does_not_move_is_refused_as_an_animation),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);

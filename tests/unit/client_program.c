@@ -28,7 +28,7 @@ static char folder[96], program[512], address[64], out[1 << 16], err[1 << 16];
 static int listener;
 
 /* ---- the server: models "cube" (sound), "broken" (frames fail), "flaky" (frames fail after
- * some), "damaged" (wrong hashes), "slow" (built first) ---- */
+ * some), "damaged" (wrong hashes), "slow" (built first), "rotten" (cannot be served) ---- */
 
 struct session {
 	int fd;
@@ -111,11 +111,12 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 static void put_list(struct session *s, uint32_t id)
 {
 	const struct psr_msg_list_entry entries[] = { { PSR_ENTRY_LOADED, 2500000, { 0xab }, "cube" },
+		                                          { PSR_ENTRY_FAILED, 3000, { 0 }, "rotten" },
 		                                          { PSR_ENTRY_SOURCE, 10, { 0 }, "slow" } };
 
-	for (int i = 0; i < 2; i++)
+	for (int i = 0; i < 3; i++)
 		psr_msg_list_entry_encode(&s->buf, id, &entries[i], NULL);
-	psr_msg_list_end_encode(&s->buf, id, &(struct psr_msg_list_end){ 2 }, NULL);
+	psr_msg_list_end_encode(&s->buf, id, &(struct psr_msg_list_end){ 3 }, NULL);
 }
 
 static void put_opened(struct session *s, uint32_t id)
@@ -130,9 +131,11 @@ static void put_opened(struct session *s, uint32_t id)
 		                                          .n_levels = 1,
 		                                          .n_samples = 1000 };
 	struct psr_msg_error missing = { PSR_WIRE_NOT_FOUND, "no model of this name" };
+	struct psr_msg_error rotten = { PSR_WIRE_FORMAT, "face 7 has no vertex 8" };
 
-	if (strcmp(s->model, "nothing") == 0) {
-		psr_msg_error_encode(&s->buf, id, 0, &missing, NULL);
+	if (strcmp(s->model, "cube") != 0 && strcmp(s->model, "slow") != 0 && strcmp(s->model, "broken") != 0
+	    && strcmp(s->model, "flaky") != 0 && strcmp(s->model, "damaged") != 0) {
+		psr_msg_error_encode(&s->buf, id, 0, strcmp(s->model, "rotten") == 0 ? &rotten : &missing, NULL);
 		return;
 	}
 	if (strcmp(s->model, "slow") == 0)
@@ -167,7 +170,8 @@ static void put_presets(struct session *s, uint32_t id)
 static int answer(struct session *s, const struct psr_message *message)
 {
 	const struct psr_msg_welcome welcome = { .minor = PSR_PROTO_MINOR,
-		                                     .capabilities = PSR_CAP_PRESETS | PSR_CAP_WEIGHT | PSR_CAP_WORDS,
+		                                     .capabilities = PSR_CAP_PRESETS | PSR_CAP_WEIGHT | PSR_CAP_WORDS
+		                                                     | PSR_CAP_REFINE,
 		                                     .max_message = 65536,
 		                                     .max_side = 64,
 		                                     .max_pixels = 4096,
@@ -327,13 +331,16 @@ static void list_prints_a_table_and_json(void **state)
 
 	(void)state;
 	assert_int_equal(psr("list"), 0);
-	assert_non_null(strstr(out, "name  state           MB\n"));
-	assert_non_null(strstr(out, "cube  loaded        2.50\n"));
+	assert_non_null(strstr(out, "name    state           MB\n"));
+	assert_non_null(strstr(out, "cube    loaded        2.50\n"));
+	assert_non_null(strstr(out, "rotten  failed        0.00  face 7 has no vertex 8\n"));
 	assert_string_equal(err, "");
 	assert_int_equal(psr("list --json"), 0);
 	list = cJSON_Parse(out);
-	assert_int_equal(cJSON_GetArraySize(list), 2);
-	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 1), "state")->valuestring, "source");
+	assert_int_equal(cJSON_GetArraySize(list), 3);
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 2), "state")->valuestring, "source");
+	assert_string_equal(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 1), "error")->valuestring, "face 7 has no vertex "
+	                                                                                            "8");
 	assert_true(cJSON_GetObjectItem(cJSON_GetArrayItem(list, 0), "bytes")->valuedouble == 2500000);
 	cJSON_Delete(list);
 }
@@ -405,6 +412,23 @@ static void shot_takes_cameras_and_lights_of_the_model(void **state)
 	assert_int_equal(scene.n_lights, 1);
 	assert_int_equal(scene.light[0].kind, PSR_WIRE_LIGHT_DIRECTIONAL);
 	assert_true(scene.light[0].intensity == 1);
+}
+
+static void cameras_and_lights_of_a_model_move_with_it(void **state)
+{
+	static const double lamp[3] = { 4, 4, 2 }, eye[3] = { 8, 2, 3 };
+	static struct psr_msg_scene scene;
+	cJSON *report, *camera;
+
+	(void)state;
+	report = draw_for_camera("shot --instance cube,rotate=Y:90,at=1,2,3 --size 20x10 --camera front --report p.json "
+	                         "--light 'preset:the lamp'", &scene);
+	camera = cJSON_GetObjectItem(report, "camera");
+	for (int i = 0; i < 3; i++) { /* turned, 1,2,3 is 3,2,-1 and 0,0,7 is 7,0,0; some roundings of 8 * 2^-53 */
+		assert_true(fabs(scene.light[0].position[i] - lamp[i]) < 1e-14);
+		assert_true(fabs(cJSON_GetArrayItem(cJSON_GetObjectItem(camera, "eye"), i)->valuedouble - eye[i]) < 1e-14);
+	}
+	cJSON_Delete(report);
 }
 
 static void shot_writes_what_was_asked_for_and_prints_nothing(void **state)
@@ -548,6 +572,16 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 		{ "shot --model cube -o no/x.png --size 8x8", 3, "no/x.png" },
 		{ "shot --model cube -o x.png --light dir:0,-1,0,shadow", 4, "no shadows" },
 		{ "shot --model nothing -o x.png", 3, "no model of this name" },
+		{ "shot --model cbue -o x.png", 3, "there is no model cbue; did you mean 'cube'?" },
+		{ "shot --instance rotten,at=1,2,3 -o x.png", 4, "face 7" },
+		{ "shot --model cube --instance cube,at=1,2,3 -o x.png", 5, "there are 2 instances; the server takes 1" },
+		{ "shot --model cube -o x.png --passes 5", 2, "--passes: '5' is out of range; it takes 0 to 4" },
+		{ "shot --model cube -o x.png --quality fine", 2, "draft, good or best, not 'fine'" },
+		{ "shot --model cube -o x.png --smooth --no-smooth", 2, "exclude each other" },
+		{ "shot --model cube -o x.png --sheet 0x2", 2, "no place" },
+		{ "shot --model cube --sheet 2x2 --hash", 2, "-o FILE says where" },
+		{ "turntable --model cube --frames 2 --effects", 2, "--effects is about one picture" },
+		{ "turntable --model cube -o x.png --seconds 3600", 2, "65 seconds at most" },
 		{ "shot --model broken -o x.png --size 8x8", 7, "on fire" },
 		{ "shot --model cube -o x.png --size 65x8", 5, "on fire" },
 		{ "shot --model damaged -o x.png --size 8x8", 4, "damaged" },
@@ -575,6 +609,17 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 	}
 }
 
+static void a_server_that_stops_at_an_earlier_pass_is_told_of(void **state)
+{
+	(void)state;
+	assert_int_equal(psr("shot --model cube --size 20x10 --passes 2 --hash"), 0);
+	assert_string_equal(err, "psr shot: the server stopped at pass 0 of 2: the picture is less smooth than asked "
+	                         "for\n");
+	assert_int_equal(psr("turntable --frames 3 --model cube --size 20x10 --passes 2 --hash"), 0);
+	assert_string_equal(err, "psr turntable: the server stopped at pass 0 of 2: the picture is less smooth than asked "
+	                         "for\n");
+}
+
 static void bench_counts_frames_and_fails_if_one_failed(void **state)
 {
 	cJSON *json;
@@ -598,7 +643,8 @@ static void bench_counts_frames_and_fails_if_one_failed(void **state)
 
 static void help_and_version_work_without_a_server(void **state)
 {
-	static const char *const all[] = { "--help", "list --help", "shot --help", "bench --help", "--version" };
+	static const char *const all[] = { "--help",           "list --help",  "shot --help",
+		                               "turntable --help", "bench --help", "--version" };
 
 	(void)state;
 	for (size_t i = 0; i < sizeof all / sizeof all[0]; i++) {
@@ -615,9 +661,11 @@ int main(void)
 		cmocka_unit_test(list_prints_a_table_and_json),
 		cmocka_unit_test(list_prints_cameras_and_lights_of_a_model),
 		cmocka_unit_test(shot_takes_cameras_and_lights_of_the_model),
+		cmocka_unit_test(cameras_and_lights_of_a_model_move_with_it),
 		cmocka_unit_test(shot_writes_what_was_asked_for_and_prints_nothing),
 		cmocka_unit_test(shot_writes_planes_and_paints_stages),
 		cmocka_unit_test(report_has_the_numbers_of_the_frame),
+		cmocka_unit_test(a_server_that_stops_at_an_earlier_pass_is_told_of),
 		cmocka_unit_test(report_says_which_effects_ran_and_why_others_did_not),
 		cmocka_unit_test(failures_have_their_exit_status_and_leave_no_file),
 		cmocka_unit_test(bench_counts_frames_and_fails_if_one_failed),

@@ -113,10 +113,12 @@ static void stop(struct psr_client *client)
 	close(peer.listener);
 }
 
+static uint64_t capabilities = PSR_CAP_PRESETS;
+
 static void welcome(struct peer *p)
 {
 	const struct psr_msg_welcome msg = { .minor = PSR_PROTO_MINOR,
-		                                 .capabilities = PSR_CAP_PRESETS,
+		                                 .capabilities = capabilities,
 		                                 .max_message = 65536,
 		                                 .max_side = 16384,
 		                                 .max_pixels = 1 << 20,
@@ -518,6 +520,50 @@ static void silent_server_is_given_up_and_a_busy_one_is_not(void **state)
 	stop(client);
 }
 
+static uint32_t resolution[3]; /* that OPENs asked for */
+
+static void note_resolutions(struct peer *p)
+{
+	struct psr_msg_error refusal = { .code = PSR_WIRE_NOT_FOUND, .text = "there is no such model" };
+	struct psr_message message;
+	struct psr_msg_open open;
+
+	welcome(p);
+	for (int i = 0; i < 3; i++) {
+		uint32_t id = expect(p, PSR_MSG_OPEN, &message);
+
+		if (id == 0 || psr_msg_open_decode(&open, message.payload, message.n, NULL) != PSR_OK)
+			return;
+		resolution[i] = open.resolution;
+		psr_msg_error_encode(&p->buf, id, 0, &refusal, NULL);
+		flush(p);
+	}
+}
+
+static void resolutions_go_to_servers_that_take_them(void **state)
+{
+	static const uint32_t wanted[3] = { 0, 1920, 1000000 }, sent[3] = { 0, 1920, PSR_WIRE_MAX_SIDE };
+	struct psr_msg_opened opened;
+	struct psr_client *client;
+	struct psr_error err;
+
+	(void)state;
+	for (int takes = 0; takes <= 1; takes++) {
+		capabilities = takes ? PSR_CAP_PRESETS | PSR_CAP_RESOLUTION : PSR_CAP_PRESETS;
+		start(note_resolutions, 65536);
+		client = connected();
+		for (int i = 0; i < 3; i++) {
+			if (i > 0)
+				psr_client_set_resolution(client, wanted[i]);
+			assert_int_equal(psr_client_open(client, "m", NULL, NULL, TIMEOUT, &opened, &err), PSR_ERR_NOT_FOUND);
+		}
+		stop(client);
+		for (int i = 0; i < 3; i++)
+			assert_int_equal(resolution[i], takes ? sent[i] : 0);
+	}
+	capabilities = PSR_CAP_PRESETS;
+}
+
 static void (*between_pieces)(struct peer *);
 static uint64_t hash_error;
 
@@ -833,6 +879,7 @@ int main(void)
 		cmocka_unit_test(frames_come_in_any_order_and_one_may_fail),
 		cmocka_unit_test(no_more_requests_are_open_than_the_server_takes),
 		cmocka_unit_test(what_the_server_does_not_offer_is_refused_here),
+		cmocka_unit_test(resolutions_go_to_servers_that_take_them),
 		cmocka_unit_test(what_is_no_psrd_is_told_apart),
 		cmocka_unit_test(nobody_there_is_a_connection_error),
 		cmocka_unit_test(silent_server_is_given_up_and_a_busy_one_is_not),

@@ -233,7 +233,7 @@ static void what_is_no_mesh_is_refused(void **state)
 	refuse("points.obj", PSR_ERR_FORMAT, "");
 	assert_int_equal(mkfifo(path_of("pipe.obj"), 0600), 0);
 	refuse("pipe.obj", PSR_ERR_IO, "not a regular file");
-	assert_int_equal(psr_mesh_import(NULL, "x", NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_mesh_import(NULL, "x", NULL, NULL), PSR_ERR_ARG);
 }
 
 /* Cut anywhere they may still be meshes, but never more than that. */
@@ -253,7 +253,7 @@ static void cut_files_never_break_the_importer(void **state)
 			int rc;
 
 			write_bytes(path_of(files[i].name), files[i].text, cut);
-			rc = psr_mesh_import(&mesh, path_of(files[i].name), &err);
+			rc = psr_mesh_import(&mesh, path_of(files[i].name), NULL, &err);
 			assert_true((rc == PSR_OK) == (mesh != NULL) && rc == err.code);
 			psr_mesh_destroy(mesh);
 		}

@@ -230,7 +230,7 @@ static void too_many_instances_are_refused(void **state)
 	write_text("big.gltf", json);
 	free(bin);
 	free(json);
-	assert_int_equal(psr_mesh_import(&mesh, path_of("big.gltf"), &err), PSR_ERR_LIMIT);
+	assert_int_equal(psr_mesh_import(&mesh, path_of("big.gltf"), NULL, &err), PSR_ERR_LIMIT);
 	unlink(path_of("big.bin"));
 }
 
@@ -245,7 +245,7 @@ static void a_glb_cut_anywhere_is_refused(void **state)
 		struct psr_error err = { 0, "" };
 
 		write_bytes(path_of("cut.glb"), glb, cut);
-		if (psr_mesh_import(&mesh, path_of("cut.glb"), &err) != PSR_ERR_FORMAT)
+		if (psr_mesh_import(&mesh, path_of("cut.glb"), NULL, &err) != PSR_ERR_FORMAT)
 			fail_msg("cut at %zu: %d %s", cut, err.code, err.text);
 		assert_null(mesh);
 	}
@@ -268,7 +268,7 @@ static void import_changed(const uint8_t *glb, size_t n)
 	int rc;
 
 	write_bytes(path_of("changed.glb"), glb, n);
-	rc = psr_mesh_import(&mesh, path_of("changed.glb"), &err);
+	rc = psr_mesh_import(&mesh, path_of("changed.glb"), NULL, &err);
 	if (rc != PSR_OK) {
 		assert_true(rc < 0 && err.code == rc && err.text[0] != '\0' && mesh == NULL);
 		return;

@@ -1,9 +1,12 @@
+#define _GNU_SOURCE
 #include <stdarg.h>
 #include <stddef.h>
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <dlfcn.h>
 #include <math.h>
+#include <pthread.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -12,6 +15,18 @@
 #include "psr/model.h"
 
 static uint64_t state_of_random;
+static int n_threads_made;
+
+/* Stands before the C library's: counts. */
+int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*start)(void *), void *userdata)
+{
+	int (*real)(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
+	void *symbol = dlsym(RTLD_NEXT, "pthread_create");
+
+	memcpy(&real, &symbol, sizeof real);
+	n_threads_made++;
+	return real(thread, attributes, start, userdata);
+}
 
 static double random_unit(void)
 {
@@ -339,6 +354,42 @@ static void a_cloud_becomes_a_model(void **state)
 	psr_mesh_destroy(m);
 }
 
+static struct psr_mesh *sphere_by(int n_threads)
+{
+	enum { N = 30000 };
+	struct import_mesh im;
+
+	init(&im, N);
+	im.options.n_threads = n_threads;
+	for (uint32_t i = 0; i < N; i++)
+		sphere_point(im.mesh->point[i]);
+	n_threads_made = 0;
+	return finish(&im);
+}
+
+static void a_cloud_takes_as_many_threads_as_it_may(void **state)
+{
+	(void)state;
+	/* the caller is one of them */
+	psr_mesh_destroy(sphere_by(1));
+	assert_int_equal(n_threads_made, 0);
+	psr_mesh_destroy(sphere_by(3));
+	assert_int_equal(n_threads_made, 2);
+}
+
+static void threads_change_no_bit_of_a_cloud(void **state)
+{
+	(void)state;
+	struct psr_mesh *one = sphere_by(1), *three = sphere_by(3);
+
+	assert_int_equal(one->n_points, three->n_points);
+	assert_memory_equal(one->point, three->point, one->n_points * sizeof *one->point);
+	assert_memory_equal(one->point_normal, three->point_normal, one->n_points * sizeof *one->point_normal);
+	assert_memory_equal(one->point_radius, three->point_radius, one->n_points * sizeof *one->point_radius);
+	psr_mesh_destroy(one);
+	psr_mesh_destroy(three);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -352,6 +403,8 @@ int main(void)
 		cmocka_unit_test(normals_of_the_file_stay_and_turn_the_others),
 		cmocka_unit_test(odd_clouds_keep_the_promises),
 		cmocka_unit_test(a_cloud_becomes_a_model),
+		cmocka_unit_test(a_cloud_takes_as_many_threads_as_it_may),
+		cmocka_unit_test(threads_change_no_bit_of_a_cloud),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -74,7 +74,7 @@ static inline struct psr_mesh *import(const char *name)
 {
 	struct psr_mesh *mesh = NULL;
 	struct psr_error err = { 0, "" };
-	int rc = psr_mesh_import(&mesh, path_of(name), &err);
+	int rc = psr_mesh_import(&mesh, path_of(name), NULL, &err);
 
 	if (rc != PSR_OK)
 		fail_msg("%s", err.text);
@@ -87,7 +87,7 @@ static inline void refuse(const char *name, int code, const char *words)
 {
 	struct psr_mesh *mesh = (struct psr_mesh *)&code;
 	struct psr_error err = { 0, "" };
-	int rc = psr_mesh_import(&mesh, path_of(name), &err);
+	int rc = psr_mesh_import(&mesh, path_of(name), NULL, &err);
 
 	if (rc != code || strstr(err.text, words) == NULL || strstr(err.text, name) == NULL)
 		fail_msg("expected %d with \"%s\", got %d: %s", code, words, rc, err.text);

@@ -270,7 +270,7 @@ static void draco_gives_positions_normals_and_colors(void **state)
 	struct psr_mesh *m;
 	struct psr_error err = { 0, "" };
 
-	if (psr_mesh_import(&m, "tests/data/import/quad_draco.glb", &err) != PSR_OK)
+	if (psr_mesh_import(&m, "tests/data/import/quad_draco.glb", NULL, &err) != PSR_OK)
 		fail_msg("%s", err.text);
 	assert_square(m);
 	assert_box(m, 0, 0, 0, 1, 1, 0);

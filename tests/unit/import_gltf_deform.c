@@ -307,7 +307,7 @@ static void endless_morph_targets_are_refused(void **state)
 	write_text("many.gltf", json);
 	free(bin);
 	free(json);
-	assert_int_equal(psr_mesh_import(&mesh, path_of("many.gltf"), &err), PSR_ERR_LIMIT);
+	assert_int_equal(psr_mesh_import(&mesh, path_of("many.gltf"), NULL, &err), PSR_ERR_LIMIT);
 	assert_non_null(strstr(err.text, "too many morph targets"));
 }
 

@@ -25,7 +25,7 @@ static struct psr_mesh *import_model(const char *name)
 	snprintf(path, sizeof path, "%s/%s", models_folder(), name);
 	if (access(models_folder(), R_OK) != 0)
 		skip();
-	if (psr_mesh_import(&mesh, path, &err) != PSR_OK)
+	if (psr_mesh_import(&mesh, path, NULL, &err) != PSR_OK)
 		fail_msg("%s", err.text);
 	return mesh;
 }
@@ -54,7 +54,7 @@ static int read_one(const char *path, const struct stat *st, int type, struct FT
 	(void)st, (void)ftw;
 	if (type != FTW_F || end == NULL || (strcmp(end, ".gltf") != 0 && strcmp(end, ".glb") != 0))
 		return 0;
-	rc = psr_mesh_import(&mesh, path, &err);
+	rc = psr_mesh_import(&mesh, path, NULL, &err);
 	if (rc != PSR_OK) {
 		n_refused++;
 		assert_null(mesh);

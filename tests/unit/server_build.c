@@ -13,9 +13,9 @@ static struct peer p, q;
 
 static const char script[] =
 	"#!/bin/sh\n"
-	"# psr-model build SOURCE -o TARGET --progress-fd 3 --quiet --threads N\n"
+	"# psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N\n"
 	"here=${0%/*}\n"
-	"echo \"$1 $3 $5 $6 $7 $8 $9 $(nice) $(ulimit -v) $(ulimit -t)\" >> $here/log\n"
+	"echo \"$1 $3 $5 $6 $7 $8 $9 ${10} ${11} $(nice) $(ulimit -v) $(ulimit -t)\" >> $here/log\n"
 	"echo 'import 1 1' >&3\n"
 	"echo 'rays 1 4' >&3\n"
 	"echo 'nonsense' >&3\n"
@@ -118,6 +118,193 @@ static void a_source_is_built_once_for_all_and_cached(void **state)
 	daemon_stop(&psrd);
 }
 
+/* How often the daemon has built so far, and the models in its cache. */
+static void expect_builds(int n, int n_cached)
+{
+	char text[4096], command[2 * PATH_MAX];
+	FILE *pipe;
+	int n_files = 0;
+
+	assert_int_equal(count_builds(text), n);
+	snprintf(command, sizeof command, "ls '%s'/cache/deep | wc -l", bin);
+	pipe = popen(command, "r");
+	assert_non_null(pipe);
+	assert_int_equal(fscanf(pipe, "%d", &n_files), 1);
+	pclose(pipe);
+	assert_int_equal(n_files, n_cached);
+}
+
+static void pictures_choose_the_resolution_of_a_build(void **state)
+{
+	static const struct {
+		uint32_t asked;
+		const char *built;
+	} cases[] = { { 0, " -r 512 " }, { 1, NULL }, { 512, NULL }, { 513, " -r 768 " }, { 640, NULL }, { 769, " -r 1024 " },
+		          { 1920, " -r 1536 " }, { 1280, NULL }, { 16384, NULL }, { 1000, NULL } };
+	struct psr_msg_opened opened;
+	char text[4096];
+	int n = 0;
+
+	(void)state;
+	file_write(folder, "plate.obj", "good", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+		peer_expect_opened(&p, peer_ask_open_for(&p, "plate", cases[i].asked), &opened);
+		n += cases[i].built != NULL;
+		assert_int_equal(count_builds(text), n);
+		if (cases[i].built != NULL && strstr(text, cases[i].built) == NULL)
+			fail_msg("%u: no '%s' in %s", cases[i].asked, cases[i].built, text);
+	}
+	for (uint32_t asked = 1; asked < 16384; asked += 401) /* whatever is asked, the cache does not grow */
+		psr_msg_open_encode(&p.buf, ++p.id, &(struct psr_msg_open){ .resolution = asked, .name = "plate" }, NULL);
+	peer_send(&p);
+	for (uint32_t asked = 1, id = p.id - 16383 / 401; asked < 16384; asked += 401, id++)
+		peer_expect_opened(&p, id, &opened);
+	expect_builds(4, 4);
+	peer_close(&p);
+	daemon_stop(&psrd);
+	start("--max-resolution", "600"); /* --resolution stays 512 */
+	peer_hello(&p, &psrd, NULL);
+	peer_expect_opened(&p, peer_ask_open_for(&p, "plate", 16384), &opened);
+	expect_builds(5, 5);
+	count_builds(text);
+	assert_non_null(strstr(text, " -r 600 "));
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void pictures_beyond_the_protocol_cost_the_request(void **state)
+{
+	uint8_t bytes[] = { 0x17, 0, 0, 0, 0x13, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0xff, 0xff, 1, 0, 'x' };
+	struct psr_msg_opened opened;
+
+	(void)state;
+	file_write(folder, "plate.obj", "good", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	peer_write(&p, bytes, sizeof bytes);
+	peer_expect_error(&p, 1, PSR_WIRE_ARG, NULL);
+	p.id = 1;
+	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void a_bad_source_fails_once_for_all_resolutions(void **state)
+{
+	char log[4096], text[PSR_ERROR_TEXT];
+
+	(void)state;
+	file_write(folder, "plate.ply", "bad", 3);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	for (uint32_t asked = 0; asked <= 2048; asked += 512) {
+		peer_expect_open_error(&p, peer_ask_open_for(&p, "plate", asked), PSR_WIRE_FORMAT, text);
+		assert_non_null(strstr(text, "vertex 7 is not finite"));
+	}
+	assert_int_equal(count_builds(log), 1);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void expect_state(const char *name, unsigned state)
+{
+	struct psr_message message;
+	struct psr_msg_list_entry entry;
+	int n = 0;
+
+	assert_int_equal(psr_msg_list_encode(&p.buf, ++p.id, NULL), PSR_OK);
+	peer_send(&p);
+	for (;;) {
+		assert_true(peer_next(&p, &message));
+		if (message.type == PSR_MSG_LIST_END)
+			break;
+		assert_int_equal(psr_msg_list_entry_decode(&entry, message.payload, message.n, NULL), PSR_OK);
+		if (strcmp(entry.name, name) == 0) {
+			assert_int_equal(entry.state, state);
+			n++;
+		}
+	}
+	assert_int_equal(n, 1);
+}
+
+static void a_build_over_a_limit_fails_at_its_resolution_alone(void **state)
+{
+	char text[PSR_ERROR_TEXT], log[4096];
+
+	(void)state;
+	file_write(folder, "spin.stl", "spin", 4);
+	start("--build-time", "1");
+	peer_hello(&p, &psrd, NULL);
+	expect_state("spin", PSR_ENTRY_SOURCE);
+	for (int i = 0; i < 2; i++)
+		peer_expect_open_error(&p, peer_ask_open(&p, "spin"), PSR_WIRE_LIMIT, text);
+	assert_int_equal(count_builds(log), 1); /* not tried again */
+	expect_state("spin", PSR_ENTRY_FAILED);
+	peer_expect_open_error(&p, peer_ask_open_for(&p, "spin", 700), PSR_WIRE_LIMIT, NULL);
+	assert_int_equal(count_builds(log), 2);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+static void files_that_cannot_be_served_are_listed_and_refused_with_a_reason(void **state)
+{
+	char text[PSR_ERROR_TEXT], log[4096];
+
+	(void)state;
+	file_write(folder, "tower.laz", "LASF", 4);
+	file_write(folder, "old.psr", "junk", 4);
+	file_write(folder, "twin.obj", "good", 4);
+	file_write(folder, "twin.ply", "good", 4);
+	start(NULL, NULL);
+	peer_hello(&p, &psrd, NULL);
+	expect_state("tower", PSR_ENTRY_FAILED);
+	expect_state("old", PSR_ENTRY_FAILED);
+	expect_state("twin", PSR_ENTRY_SOURCE);
+	expect_state("twin.ply", PSR_ENTRY_FAILED);
+	peer_expect_error(&p, peer_ask_open(&p, "tower"), PSR_WIRE_UNSUPPORTED, text); /* at once, without progress */
+	assert_non_null(strstr(text, "laszip -i IN.laz -o OUT.las"));
+	assert_null(strstr(text, folder));
+	peer_expect_error(&p, peer_ask_open(&p, "twin.ply"), PSR_WIRE_UNSUPPORTED, text);
+	assert_non_null(strstr(text, "twin.obj"));
+	peer_expect_open_error(&p, peer_ask_open(&p, "old"), PSR_WIRE_FORMAT, text);
+	assert_non_null(strstr(text, "no .psr file"));
+	assert_int_equal(count_builds(log), 0);
+	peer_close(&p);
+	daemon_stop(&psrd);
+}
+
+/* psrd with this cache ends by itself, with status 3 and without READY; its words are in psrd.log. */
+static void expect_no_start(const char *cache)
+{
+	char program[PATH_MAX + 16], byte;
+	const char *argv[] = { program, "--listen", "127.0.0.1:0", "--models", folder, "--cache", cache, NULL };
+
+	snprintf(program, sizeof program, "%s/psrd", bin);
+	daemon_spawn(&psrd, argv);
+	assert_int_equal(read(psrd.output, &byte, 1), 0);
+	assert_int_equal(daemon_wait(&psrd), 3);
+	if (cache[0] != '\0')
+		assert_non_null(strstr(psrd.log, cache));
+	assert_non_null(strstr(psrd.log, "--cache DIR"));
+}
+
+static void a_cache_that_cannot_be_written_is_refused_before_ready(void **state)
+{
+	char file[PATH_MAX + 16], below[PATH_MAX + 32];
+
+	(void)state;
+	file_write(folder, "plate.obj", "good", 4);
+	snprintf(file, sizeof file, "%s/psr-model", bin);
+	snprintf(below, sizeof below, "%s/cache", file);
+	expect_no_start(file);       /* a file */
+	assert_non_null(strstr(psrd.log, "Not a directory"));
+	expect_no_start(below);      /* below a file */
+	expect_no_start("/proc/psr"); /* where nobody may write, root included */
+	expect_no_start("");
+}
+
 static void a_damaged_cache_is_built_again(void **state)
 {
 	char text[4096], command[2 * PATH_MAX];
@@ -212,7 +399,7 @@ static void builds_are_niced_and_limited(void **state)
 	peer_close(&p);
 	daemon_stop(&psrd);
 	assert_int_equal(count_builds(log), 1);
-	assert_string_equal(log, "build -o --progress-fd 3 --quiet --threads 2 10 1048576 3600\n");
+	assert_string_equal(log, "build -o -r 512 --progress-fd 3 --quiet --threads 2 10 1048576 3600\n");
 	file_write(folder, "spin.stl", "spin", 4);
 	start("--build-time", "1");
 	peer_hello(&p, &psrd, NULL);
@@ -329,6 +516,13 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(a_source_is_built_once_for_all_and_cached, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_damaged_cache_is_built_again, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(pictures_choose_the_resolution_of_a_build, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(pictures_beyond_the_protocol_cost_the_request, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_bad_source_fails_once_for_all_resolutions, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_build_over_a_limit_fails_at_its_resolution_alone, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(files_that_cannot_be_served_are_listed_and_refused_with_a_reason, set_up,
+		                                tear_down),
+		cmocka_unit_test_setup_teardown(a_cache_that_cannot_be_written_is_refused_before_ready, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(progress_is_passed_on_and_never_goes_back, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_failed_build_says_why_and_is_remembered, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_crash_costs_only_the_build, set_up, tear_down),

@@ -58,16 +58,33 @@ static void expect_path(const char *name, const char *ending)
 	assert_string_equal(entry->file.path + strlen(folder) + 1, ending);
 }
 
+static void expect_reason(const char *name, const char *part)
+{
+	struct catalogue_entry *entry = catalogue_find(&catalogue, name);
+
+	assert_non_null(entry);
+	assert_true(entry->has_failed);
+	assert_non_null(entry->file.reason);
+	if (strstr(entry->file.reason, part) == NULL)
+		fail_msg("'%s' does not say '%s'", entry->file.reason, part);
+}
+
 /* Puts a model into the catalogue as if it had been read; the caller is its one user. */
-static struct catalogue_model *load(const char *name)
+static struct catalogue_model *load_at(const char *name, uint32_t resolution)
 {
 	struct catalogue_model *model;
 	struct psr_model *plate = plate_create(0);
 	uint64_t bytes = psr_model_bytes(plate);
 
 	assert_int_equal(catalogue_reserve(&catalogue, bytes, name, NULL), PSR_OK);
-	assert_int_equal(catalogue_add(&model, &catalogue, catalogue_find(&catalogue, name), plate, "", bytes), PSR_OK);
+	assert_int_equal(catalogue_add(&model, &catalogue, catalogue_find(&catalogue, name), plate, "", resolution, bytes),
+	                 PSR_OK);
 	return model;
+}
+
+static struct catalogue_model *load(const char *name)
+{
+	return load_at(name, 0);
 }
 
 static void names_are_stems_and_the_psr_wins(void **state)
@@ -83,9 +100,10 @@ static void names_are_stems_and_the_psr_wins(void **state)
 	make("two.dots.stl");
 	make("scan.LAS");
 	scan();
-	assert_int_equal(catalogue.n, 4);
+	assert_int_equal(catalogue.n, 5);
 	expect_path("dragon", "dragon.psr");
 	expect_path("bunny", "bunny.GLB");
+	expect_reason("bunny.obj", "bunny.obj: another file, bunny.GLB, is the model `bunny`");
 	expect_path("two.dots", "two.dots.stl");
 	assert_false(catalogue_find(&catalogue, "dragon")->file.is_source);
 	assert_true(catalogue_find(&catalogue, "bunny")->file.is_source);
@@ -128,19 +146,91 @@ static void subfolders_with_one_model_count(void **state)
 	make_folder("copy");
 	make("copy/top.glb");
 	scan();
-	assert_int_equal(catalogue.n, 2);
+	assert_int_equal(catalogue.n, 4);
 	expect_path("ClearCoatTest", "clearcoat/ClearCoatTest.gltf");
 	expect_path("top", "top.obj");
+	expect_reason("copy/top.glb", "another file, top.obj, is the model `top`");
+	expect_reason("many", "many: the folder holds several models");
 }
 
-static void names_that_are_no_text_are_passed_over(void **state)
+static void what_cannot_be_read_is_named_with_what_to_do(void **state)
+{
+	(void)state;
+	make("scan.laz");
+	make("Tower.copc.laz");
+	make("part.STEP");
+	make("statue.e57");
+	make("all.tar.gz");
+	make_folder("cad");
+	make("cad/lever.igs");
+	make("cad/drawing.png");
+	scan();
+	assert_int_equal(catalogue.n, 6);
+	expect_reason("scan", "scan.laz: psr reads no compressed LAS (LAZ); unpack it with \"laszip");
+	expect_reason("Tower", "LAZ");
+	expect_reason("part", "part.STEP: psr reads no exact CAD surfaces");
+	expect_reason("statue", "pdal translate");
+	expect_reason("all", "all.tar.gz: this is an archive");
+	expect_reason("lever", "cad/lever.igs: psr reads no exact CAD surfaces");
+}
+
+static void what_belongs_to_models_is_no_entry(void **state)
+{
+	static const char *const files[] = {
+		"README.md", "LICENSE", "notes.txt", "wood.png", "wood.jpg", "scan.mtl", "scene.bin", "dragon.psr~", ".laz", "x.json",
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof files / sizeof files[0]; i++)
+		make(files[i]);
+	make_folder("textures");
+	make("textures/stone.jpg");
+	scan();
+	assert_int_equal(catalogue.n, 0);
+}
+
+static void what_was_converted_is_the_model(void **state)
+{
+	(void)state;
+	make("scan.laz");
+	make("scan.las");
+	make("part.step");
+	make("part.psr");
+	make_folder("engine");
+	make("engine/engine.gltf");
+	make("engine/source.blend");
+	make("engine/all.zip");
+	scan();
+	assert_int_equal(catalogue.n, 3);
+	expect_path("scan", "scan.las");
+	expect_path("part", "part.psr");
+	expect_path("engine", "engine/engine.gltf");
+}
+
+static void a_psr_file_with_a_bad_header_has_failed_at_once(void **state)
+{
+	(void)state;
+	make("old.psr");
+	plate_write(folder, "plate.psr", 0);
+	scan();
+	assert_true(catalogue_find(&catalogue, "old")->has_failed);
+	assert_false(catalogue_find(&catalogue, "plate")->has_failed);
+	plate_write(folder, "old.psr", 0);
+	scan();
+	assert_false(catalogue_find(&catalogue, "old")->has_failed);
+}
+
+static void names_that_are_no_text_are_shown_as_what_to_rename(void **state)
 {
 	(void)state;
 	make("bad\xff.psr");
 	make("line\nbreak.psr");
 	make("good.psr");
 	scan();
-	assert_int_equal(catalogue.n, 1);
+	assert_int_equal(catalogue.n, 3);
+	expect_path("good", "good.psr");
+	expect_reason("bad?.psr", "is not UTF-8");
+	expect_reason("line?break.psr", "is not UTF-8");
 }
 
 static void a_missing_folder_is_an_error(void **state)
@@ -216,6 +306,40 @@ static void the_longest_unused_makes_room_and_the_used_stay(void **state)
 	catalogue_unref(&catalogue, c);
 }
 
+static void a_source_has_a_model_a_resolution(void **state)
+{
+	struct catalogue_model *coarse, *fine, *again;
+	struct catalogue_entry *entry;
+
+	(void)state;
+	make("a.obj");
+	scan();
+	coarse = load_at("a", 512);
+	fine = load_at("a", 1024);
+	entry = catalogue_find(&catalogue, "a");
+	assert_ptr_equal(catalogue_model(entry, 512), coarse);
+	assert_ptr_equal(catalogue_model(entry, 1024), fine);
+	assert_null(catalogue_model(entry, 768));
+	scan(); /* nothing changed but, maybe, what lies beside it */
+	entry = catalogue_find(&catalogue, "a");
+	assert_ptr_equal(catalogue_model(entry, 512), coarse);
+	assert_true(coarse->is_stale);
+	assert_true(fine->is_stale);
+	again = load_at("a", 512); /* it had changed */
+	assert_ptr_equal(catalogue_model(entry, 512), again);
+	assert_null(coarse->entry);
+	assert_ptr_equal(catalogue_model(entry, 1024), fine);
+	assert_int_equal(catalogue.n_models, 3);
+	catalogue_unref(&catalogue, coarse); /* gone with its last user */
+	assert_int_equal(catalogue.n_models, 2);
+	catalogue_unref(&catalogue, fine);
+	catalogue.max_bytes = 2 * fine->bytes;
+	catalogue_unref(&catalogue, load("a")); /* the longest unused of an entry's models makes room */
+	assert_null(catalogue_model(entry, 1024));
+	assert_ptr_equal(catalogue_model(entry, 512), again);
+	catalogue_unref(&catalogue, again);
+}
+
 /* ---- keys ---- */
 
 static void find_key(char key[CATALOGUE_KEY], const char *source)
@@ -285,19 +409,105 @@ static void other_models_and_neighbours_of_glb_and_las_do_not_change_keys(void *
 	assert_string_equal(las, next);
 }
 
+/* ---- parts ---- */
+
+/* A GLB of this JSON and no buffer. */
+static void make_glb(const char *name, const char *json)
+{
+	uint8_t bytes[256] = "glTF\x02";
+	const size_t n = strlen(json);
+
+	assert_true(n < sizeof bytes - 20);
+	bytes[8] = (uint8_t)(20 + n);
+	bytes[12] = (uint8_t)n;
+	memcpy(bytes + 16, "JSON", 4);
+	memcpy(bytes + 20, json, n);
+	file_write(folder, name, bytes, 20 + n);
+}
+
+static void textures_that_a_glb_or_a_ply_names_change_its_key(void **state)
+{
+	static const char ply[] = "ply\nformat ascii 1.0\ncomment TextureFile t.png\nend_header\n";
+	static const char plain[] = "ply\nformat ascii 1.0\ncomment t.png\nend_header\ncomment TextureFile t.png\n";
+	static const struct {
+		const char *name;
+		int names_it;
+	} file[] = { { "m/out.glb", 1 }, { "m/in.glb", 0 }, { "m/out.ply", 1 }, { "m/in.ply", 0 } };
+	char before[4][CATALOGUE_KEY], after[CATALOGUE_KEY];
+
+	(void)state;
+	file_write(folder, "builder", "1", 1);
+	make_folder("m");
+	file_write(folder, "m/t.png", "t", 1);
+	make_glb("m/out.glb", "{\"images\":[{\"uri\" : \"t.png\"}]}");
+	make_glb("m/in.glb", "{\"images\":[{\"uri\":\"data:image/png;base64,AA\"}]}");
+	file_write(folder, "m/out.ply", ply, sizeof ply - 1);
+	file_write(folder, "m/in.ply", plain, sizeof plain - 1);
+	for (size_t i = 0; i < 4; i++)
+		find_key(before[i], file[i].name);
+	file_write(folder, "m/t.png", "tt", 2);
+	for (size_t i = 0; i < 4; i++) {
+		find_key(after, file[i].name);
+		if ((strcmp(before[i], after) != 0) != file[i].names_it)
+			fail_msg("%s: the key %s", file[i].name, file[i].names_it ? "stays" : "changes");
+	}
+}
+
+static void expect_bytes(const char *name, uint64_t bytes)
+{
+	struct catalogue_entry *entry = catalogue_find(&catalogue, name);
+
+	assert_non_null(entry);
+	if (entry->file.bytes != bytes)
+		fail_msg("%s has %ju bytes, not %ju", name, (uintmax_t)entry->file.bytes, (uintmax_t)bytes);
+}
+
+static void the_size_of_a_source_is_that_of_all_its_parts(void **state)
+{
+	static const char gltf[] = "{\"buffers\":[{\"uri\":\"a%20b.bin\"},{\"uri\":\"data:;base64,AAAA\"}],\"images\":"
+	                           "[{\"uri\":\"textures\\/t.png\"},{\"uri\":\"textures/t.png\"},{\"uri\":\"gone.png\"},"
+	                           "{\"uri\":\"../builder\"}]}";
+	static const char obj[] = "# scan\nmtllib o.mtl\r\nv 0 0 0\n", mtl[] = "newmtl a\n\tmap_Kd -s 1 1 1 textures\\t.png\nbump b c.png\n";
+	static const char ply[] = "ply\ncomment TextureFile b c.png\nend_header\n";
+
+	(void)state;
+	file_write(folder, "builder", "12345", 5);
+	make_folder("textures");
+	file_write(folder, "a b.bin", "1234567", 7);
+	file_write(folder, "b c.png", "123", 3);
+	file_write(folder, "textures/t.png", "12345678901", 11);
+	file_write(folder, "g.gltf", gltf, sizeof gltf - 1);
+	file_write(folder, "o.obj", obj, sizeof obj - 1);
+	file_write(folder, "o.mtl", mtl, sizeof mtl - 1);
+	file_write(folder, "p.ply", ply, sizeof ply - 1);
+	file_write(folder, "s.stl", "1234", 4);
+	scan();
+	expect_bytes("g", sizeof gltf - 1 + 7 + 11);
+	expect_bytes("o", sizeof obj - 1 + sizeof mtl - 1 + 11 + 3);
+	expect_bytes("p", sizeof ply - 1 + 3);
+	expect_bytes("s", 4);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(names_are_stems_and_the_psr_wins, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_list_is_sorted_by_bytes, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(subfolders_with_one_model_count, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(names_that_are_no_text_are_passed_over, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(names_that_are_no_text_are_shown_as_what_to_rename, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(what_cannot_be_read_is_named_with_what_to_do, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(what_belongs_to_models_is_no_entry, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(what_was_converted_is_the_model, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_psr_file_with_a_bad_header_has_failed_at_once, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_source_has_a_model_a_resolution, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_missing_folder_is_an_error, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(scanning_again_keeps_what_did_not_change, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(the_longest_unused_makes_room_and_the_used_stay, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(keys_change_with_what_a_model_is_made_of, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(other_models_and_neighbours_of_glb_and_las_do_not_change_keys, set_up,
 		                                tear_down),
+		cmocka_unit_test_setup_teardown(textures_that_a_glb_or_a_ply_names_change_its_key, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(the_size_of_a_source_is_that_of_all_its_parts, set_up, tear_down),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

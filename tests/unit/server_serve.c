@@ -7,6 +7,7 @@
 #include <cmocka.h>
 #include <xxhash.h>
 #include "psr/render.h"
+#include "psr/render.h"
 #include "server_fixture.h"
 
 static char folder[PATH_MAX];
@@ -38,7 +39,7 @@ static void welcome_tells_the_limits(void **state)
 
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
-	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS |
+	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_RESOLUTION | PSR_CAP_PRESETS |
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
 	                                           PSR_CAP_BLOCK);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
@@ -269,6 +270,25 @@ static void passes_rise_to_the_final_one(void **state)
 		hash[pass] = end.hash[PSR_WIRE_PLANE_COLOR];
 	}
 	frame = frame_default(32, 32); /* the id has ended: nothing else of it comes */
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	peer_close(&p);
+}
+
+static void passes_beyond_the_last_are_refused(void **state)
+{
+	struct psr_msg_frame frame = frame_default(32, 32);
+	struct psr_msg_frame_end end;
+	char text[PSR_ERROR_TEXT], most[32];
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	frame.pass_limit = PSR_MAX_PASS + 1;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_LIMIT, text);
+	snprintf(most, sizeof most, "in %d passes at most", PSR_MAX_PASS);
+	assert_non_null(strstr(text, most));
+	frame.pass_limit = UINT16_MAX;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_LIMIT, NULL);
+	frame.pass_limit = 0; /* the connection goes on */
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
 	peer_close(&p);
 }
@@ -619,6 +639,7 @@ int main(void)
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
 		cmocka_unit_test(passes_rise_to_the_final_one),
+		cmocka_unit_test(passes_beyond_the_last_are_refused),
 		cmocka_unit_test(refinement_is_cancelled_at_once),
 		cmocka_unit_test(ping_is_answered),
 		cmocka_unit_test(stats_count_what_happened),

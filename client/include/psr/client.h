@@ -46,6 +46,11 @@ uint64_t psr_client_bytes_received(const struct psr_client *client);
 int psr_client_list(struct psr_client *client, struct psr_msg_list_entry **entries, uint32_t *n_entries,
                     int timeout_ms, struct psr_error *err);
 
+/* The greater side of the pictures that models opened from now on are for, in pixels (what is above 16384 counts as
+ * 16384): a server that has to build a model builds one that is fine enough for them, up to its own limit; OPENED says
+ * the resolution. 0, as at first: not known, and the server has its way. Servers that do not take it are not told. */
+void psr_client_set_resolution(struct psr_client *client, uint32_t pixels);
+
 /* Opens a model, which the server may have to build first: that can take minutes, in which on_progress (may be NULL) is
  * told how far it is. A server that does not even answer PING within timeout_ms is given up (CONNECTION). NOT_FOUND,
  * FORMAT and so on as the server has it. */
@@ -114,18 +119,36 @@ int psr_codec_parse(uint8_t *codec, uint8_t *quality, const char *text, struct p
 
 /* What a person said about the camera. */
 struct psr_camera_wish {
-	int has_eye, has_target, has_up;
+	int has_eye, has_target, has_up, has_angles;
 	double eye[3], target[3], up[3];
+	double natural_up[3]; /* of the model, in the place of `up` if nobody said that; 0, 0, 0: +Y */
+	double azimuth, elevation; /* has_angles: degrees about the up vector from the front to the right, and above the
+	                            * horizon; the whole box is in the picture then. psr_camera_axes() says which way is
+	                            * front */
+	double roll;         /* degrees by which the camera is turned clockwise about its view */
+	double zoom;         /* as a lens has it: 2 shows everything twice as large; 0: not said, 1 */
+	uint32_t n_turn;     /* the box is to stay in the picture at so many equal turns about the up vector (see
+	                      * psr_camera_turn); 0 and 1: as it is. Has no use with an eye */
 	double fov_y;        /* radians; 0: orthographic */
 	double ortho_height; /* world units; 0: as tall as the box needs */
 };
 
+/* Where the azimuth and the elevation are for which nobody asked, degrees. */
+#define PSR_CAMERA_AZIMUTH 21.5246
+#define PSR_CAMERA_ELEVATION 17.4576
+
 /* Completes it: nothing said gives psr_camera_frame's; an eye alone looks at the middle of the box; a target alone is
- * seen from that camera's side. Without an up it is +Y, or -Z where the view runs along Y. near_z is 1/1000 of the way
- * to the far end of the box, but half of the way to its near end at most when the eye is outside (orthographic: 0).
- * ARG: eye and target are the same point, up runs along the view. */
+ * seen from that camera's side. A natural up that runs along the view gives way to the back (-Z where +Y is up). near_z
+ * is 1/1000 of the way to the far end of the box, but half of the way to its near end at most when the eye is outside
+ * (orthographic: 0).
+ * ARG: eye and target are the same point, up runs along the view, the zoom leaves no angle that the protocol has. */
 int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err);
+
+/* Turns eye and up by `degrees` about the axis `up` (any length but 0) through the target, counter-clockwise seen from
+ * where up points to. Perspective: near_z is chosen anew. */
+void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double degrees, const double box_min[3],
+                     const double box_max[3]);
 
 /* The light of pictures for which nobody asked for one: directional, white, from behind the camera, above it and to its
  * left. */

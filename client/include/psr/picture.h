@@ -31,6 +31,7 @@ void *psr_picture_plane(const struct psr_picture *picture, unsigned plane);
  * writes come from the module psr-image-oiio.so, which is loaded on the first such call: colour as 8-bit sRGB, or
  * linear where the format holds light (.exr, .hdr), depth as one channel `Z` of floats (.exr, .tif).
  *
+ * The path "-" is standard output: colour as PNG, depth as PFM.
  * A regular file is written under a temporary name beside `path` and renamed: `path` is either what it was or the whole
  * new picture. Devices and pipes are written in place. Both sides are at least 1 pixel.
  * ARG: no or an unfit ending; NOT_FOUND: no such folder; UNSUPPORTED: the module is missing, or does not know the
@@ -46,6 +47,17 @@ int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, c
 
 /* The colours in which n normals are written. */
 void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n);
+
+/* An animation of pictures of one size, which plays for ever, `seconds` (at most 65) a picture: .png and .apng (APNG),
+ * also to "-", and what OpenImageIO writes with several pictures in a file, of which .gif moves. Errors as above.
+ * add: n_frames times, in their order. close: renames the file if code is PSR_OK and all was written; returns code, or
+ * what failed. NULL is fine. */
+struct psr_animation;
+int psr_animation_open(struct psr_animation **out, const char *path, const struct psr_picture *first, uint32_t n_frames,
+                       double seconds, struct psr_error *err);
+int psr_animation_add(struct psr_animation *animation, const struct psr_picture *picture, struct psr_error *err);
+int psr_animation_close(struct psr_animation *animation, int code, struct psr_error *err);
+int psr_animation_check(const char *path, struct psr_error *err);
 
 /* What the calls above would refuse at once: the ending, and a missing module. */
 int psr_picture_check_color(const char *path, struct psr_error *err);

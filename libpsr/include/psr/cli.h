@@ -20,6 +20,7 @@ enum psr_opt_type {
 	PSR_OPT_SIZE,   /* uint32_t[2], "WxH", each within min..max */
 	PSR_OPT_COLOR,  /* uint8_t[3], "#rrggbb" */
 	PSR_OPT_CALL,   /* int (*)(const char *text, void *userdata, struct psr_error *): repeatable, own syntax */
+	PSR_OPT_HEADING, /* no option: --help prints `name` above those that follow, and `help` (may be NULL) below it */
 };
 
 struct psr_opt {
@@ -53,6 +54,10 @@ int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, s
 int psr_parse_vec3(const char *text, double v[3], const char **end, struct psr_error *err);
 int psr_parse_color(const char *text, uint8_t rgb[3], const char **end, struct psr_error *err);
 int psr_parse_real(const char *text, double *v, const char **end, struct psr_error *err);
+
+/* Number of letters to insert, remove or change that turn the first n_a bytes of `a` into `b`; n_a + strlen(b) where
+ * one of them has more than 63. */
+size_t psr_edit_distance(const char *a, size_t n_a, const char *b);
 
 /* Prints "PROGRAM: text" to standard error and returns the exit status for err->code. */
 int psr_cli_fail(const char *program, const struct psr_error *err);

@@ -80,6 +80,7 @@ enum psr_cap {
 	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
 	PSR_CAP_PAUSE = 1 << 18,
 	PSR_CAP_PRESETS = 1 << 19,
+	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN says for which pictures */
 	PSR_CAP_BLOCK = 1 << 20,
 };
 
@@ -224,7 +225,11 @@ int psr_msg_list_end_encode(struct psr_buf *out, uint32_t id, const struct psr_m
                             struct psr_error *err);
 int psr_msg_list_end_decode(struct psr_msg_list_end *msg, const uint8_t *payload, size_t n, struct psr_error *err);
 
-struct psr_msg_open { char name[PSR_WIRE_MAX_NAME + 1]; }; /* not empty */
+struct psr_msg_open {
+	uint32_t resolution;               /* 0..16384: the greater side of the pictures that it is opened for, pixels; 0: not
+	                                    * known. Not 0 only towards a server with PSR_CAP_RESOLUTION */
+	char name[PSR_WIRE_MAX_NAME + 1];  /* not empty */
+};
 int psr_msg_open_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_open *msg, struct psr_error *err);
 int psr_msg_open_decode(struct psr_msg_open *msg, const uint8_t *payload, size_t n, struct psr_error *err);
 

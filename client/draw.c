@@ -1,0 +1,241 @@
+#include "draw.h"
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "psr.h"
+#include "replay.h"
+#include "series.h"
+#include "sink.h"
+
+void draw_wish_init(struct draw_wish *wish, const char *program)
+{
+	memset(wish, 0, sizeof *wish);
+	wish->program = program;
+	wish->server = psr_default_server();
+	wish->timeout = PSR_DEFAULT_TIMEOUT;
+	scene_wish_init(&wish->scene);
+	view_wish_init(&wish->view);
+	quality_wish_init(&wish->quality, 800, 600, "lossless");
+}
+
+void draw_wish_fini(struct draw_wish *wish)
+{
+	scene_wish_fini(&wish->scene);
+}
+
+void draw_add_model_options(struct optlist *list, struct draw_wish *wish)
+{
+	const struct psr_opt server[] = { PSR_OPT_SERVER(wish->server) };
+
+	optlist_heading(list, "Models and server", NULL);
+	scene_add_model_options(list, &wish->scene);
+	OPTLIST_ADD(list, server);
+}
+
+void draw_add_picture_options(struct optlist *list, struct draw_wish *wish)
+{
+	optlist_heading(list, "Camera",
+	                "Without any of these the whole model is in the picture, seen from its front, a little "
+	                "from the right and from above.");
+	view_add_options(list, &wish->view);
+	optlist_heading(list, "Light", NULL);
+	scene_add_light_options(list, &wish->scene);
+	optlist_heading(list, "Quality", NULL);
+	quality_add_options(list, &wish->quality);
+}
+
+void draw_add_file_options(struct optlist *list, struct draw_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ "sheet", 0, PSR_OPT_SIZE, wish->sheet, "COLSxROWS",
+		  "All pictures on one contact sheet, row by row; --size is that of each.", 0, 0, NULL, &wish->has_sheet },
+		{ "depth", 0, PSR_OPT_STRING, &wish->depth, "FILE",
+		  "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. .pfm, "
+		  ".exr or .tif.",
+		  0, 0, NULL, NULL },
+		{ "report", 0, PSR_OPT_STRING, &wish->report, "FILE",
+		  "All about the picture as JSON: request, times, counts, hashes. - is standard output.", 0, 0, NULL, NULL },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
+void draw_add_developer_options(struct optlist *list, struct draw_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ "plane", 0, PSR_OPT_STRING, &wish->plane_text, "PLANE",
+		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block "
+		  "(levels, facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
+		  0, 0, NULL, NULL },
+		{ "show", 0, PSR_OPT_STRING, &wish->show_text, "STAGE",
+		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
+		  "holes or depth.",
+		  0, 0, NULL, NULL },
+		{ "hash", 0, PSR_OPT_FLAG, &wish->hash, NULL,
+		  "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`.", 0, 0, NULL,
+		  NULL },
+		{ "effects", 0, PSR_OPT_FLAG, &wish->effects, NULL,
+		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0,
+		  0, NULL, NULL },
+		PSR_OPT_TIMEOUT(wish->timeout),
+	};
+
+	optlist_heading(list, "For developers", NULL);
+	OPTLIST_ADD(list, opts);
+}
+
+/* ---- drawing ---- */
+
+struct job {
+	struct draw_wish *wish;
+	struct views views;
+	cJSON *replay;
+	struct psr_msg_frame frame;
+	struct sink sink;
+	struct psr_client *client;
+	struct scene *scene;
+	struct psr_msg_camera *camera; /* sink.n */
+};
+
+static int check_replay(struct job *job, struct psr_error *err)
+{
+	const struct draw_wish *wish = job->wish;
+	const struct quality_wish *quality = &wish->quality;
+	int code;
+
+	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
+	    || quality->n_said || quality->has_spacing || quality->has_passes || wish->has_sheet)
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--replay repeats a whole picture; it excludes all options that say what is in "
+		                "it");
+	code = replay_read(&job->replay, wish->replay, err);
+	if (code == PSR_OK)
+		code = replay_wish(&job->wish->scene, job->replay, err);
+	return code == PSR_OK ? replay_frame(&job->frame, job->replay, err) : code;
+}
+
+static int check(struct job *job, struct psr_error *err)
+{
+	struct draw_wish *wish = job->wish;
+	int code;
+
+	if (wish->replay != NULL) {
+		code = check_replay(job, err);
+	} else {
+		code = scene_check(&wish->scene, err);
+		if (code == PSR_OK)
+			code = views_make(&job->views, &wish->view, wish->cameras, err);
+		if (code == PSR_OK)
+			code = quality_apply(&job->frame, &wish->quality, err);
+		if (code == PSR_OK && wish->n_turn > 0 && job->views.n != 1)
+			code = psr_fail(err, PSR_ERR_ARG, "--view: a turntable has one view, not %u", job->views.n);
+	}
+	if (code == PSR_OK)
+		code = sink_check(&job->sink, wish, wish->n_turn > 0 ? (uint32_t)wish->n_turn : wish->replay ? 1 : job->views.n,
+		                  err);
+	return code == PSR_OK ? psr_address_check(wish->server, err) : code;
+}
+
+/* Codecs of the planes that are asked for. */
+static void choose_codecs(struct psr_msg_frame *frame)
+{
+	if (!(frame->planes & 1 << PSR_WIRE_PLANE_COLOR))
+		frame->color_codec = frame->color_quality = 0;
+	if (frame->planes & 1 << PSR_WIRE_PLANE_DEPTH) {
+		frame->depth_format = PSR_WIRE_DEPTH_F32;
+		frame->depth_codec = PSR_CODEC_ZSTD;
+	}
+	if (frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+		frame->data_codec = PSR_CODEC_ZSTD;
+}
+
+static int place_cameras(struct job *job, struct psr_error *err)
+{
+	const struct draw_wish *wish = job->wish;
+	const double aspect = (double)job->frame.width / job->frame.height;
+	uint32_t n = job->sink.n, n_turn = (uint32_t)wish->n_turn;
+	double up[3];
+	int code = PSR_OK;
+
+	job->camera = calloc(n, sizeof *job->camera);
+	if (job->camera == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u cameras", n);
+	if (job->replay != NULL) {
+		job->camera[0] = job->frame.camera;
+		return PSR_OK;
+	}
+	for (uint32_t k = 0; k < job->views.n && code == PSR_OK; k++)
+		code = view_place(&job->camera[k], &job->views.wish[k], job->client, job->scene, aspect, n_turn, err);
+	if (code != PSR_OK || n_turn == 0)
+		return code;
+	view_up(up, &job->views.wish[0], job->scene);
+	for (uint32_t k = 1; k < n; k++) {
+		job->camera[k] = job->camera[0];
+		psr_camera_turn(&job->camera[k], up, 360.0 * k / n_turn, job->scene->box_min, job->scene->box_max);
+	}
+	return PSR_OK;
+}
+
+static uint64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+static int run(struct job *job, struct psr_error *err)
+{
+	struct draw_wish *wish = job->wish;
+	struct sink *sink = &job->sink;
+	int timeout_ms = (int)wish->timeout * 1000, code;
+	uint64_t start_ns = now_ns();
+	struct series series;
+
+	for (uint32_t k = 0; k < job->views.n; k++) {
+		const uint32_t pixels = view_pixels(&job->views.wish[k], &job->frame);
+
+		wish->scene.pixels = pixels > wish->scene.pixels ? pixels : wish->scene.pixels;
+	}
+	code = psr_client_connect(&job->client, wish->server, PSR_PROGRAM, wish->scene.instance[0].model, timeout_ms, err);
+	if (code == PSR_OK)
+		code = scene_open(&job->scene, &wish->scene, job->client, timeout_ms, err);
+	if (code == PSR_OK && job->replay != NULL)
+		code = replay_scene(job->scene, job->replay, err);
+	if (code == PSR_OK)
+		code = place_cameras(job, err);
+	if (code != PSR_OK)
+		return code;
+	if (job->replay == NULL || wish->output != NULL || wish->depth != NULL)
+		job->frame.planes |= sink_planes(sink);
+	choose_codecs(&job->frame);
+	sink->scene = job->scene;
+	sink->frame = &job->frame;
+	sink->server = psr_client_welcome(job->client)->server;
+	sink->start_ns = start_ns;
+	series = (struct series){ job->client, job->scene, &job->frame, job->camera, sink->n, wish->server, timeout_ms,
+		                      sink_take, sink };
+	return series_run(&series, err);
+}
+
+int draw(struct draw_wish *wish, struct psr_error *err)
+{
+	struct job *job = calloc(1, sizeof *job);
+	int code;
+
+	if (job == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
+	job->wish = wish;
+	code = check(job, err);
+	if (code == PSR_OK)
+		code = sink_finish(&job->sink, run(job, err), err);
+	else
+		free(job->sink.hashes);
+	psr_client_close(job->client);
+	scene_close(job->scene);
+	views_fini(&job->views);
+	cJSON_Delete(job->replay);
+	free(job->camera);
+	free(job);
+	return code;
+}

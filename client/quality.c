@@ -1,0 +1,87 @@
+#include "quality.h"
+#include <string.h>
+#include "psr/render.h"
+
+static const struct {
+	const char *name;
+	double spacing;
+	int is_smooth, passes;
+} qualities[] = {
+	{ "draft", 2, 0, 0 },
+	{ "good", 1, 1, 0 },
+	{ "best", 1, 1, 3 },
+};
+
+void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec)
+{
+	memset(wish, 0, sizeof *wish);
+	wish->size[0] = width;
+	wish->size[1] = height;
+	wish->name = "good";
+	wish->spacing = 1;
+	wish->codec = codec;
+}
+
+void quality_add_options(struct optlist *list, struct quality_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ "size", 0, PSR_OPT_SIZE, wish->size, "WxH", "Width and height of the picture in pixels.", 0, 0, NULL,
+		  &wish->n_said },
+		{ "quality", 'q', PSR_OPT_STRING, &wish->name, "NAME",
+		  "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth as "
+		  "print, for a picture to keep; it takes about a hundred times as long.",
+		  0, 0, NULL, &wish->n_said },
+		{ "spacing", 0, PSR_OPT_REAL, &wish->spacing, "PX",
+		  "Detail, in the place of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster.", 0, 0, NULL,
+		  &wish->has_spacing },
+		{ "smooth", 0, PSR_OPT_FLAG, &wish->is_smooth, NULL,
+		  "Quick smoothing for moving pictures, also with --quality draft; --passes for final ones.", 0, 0, NULL,
+		  &wish->n_said },
+		{ "no-smooth", 0, PSR_OPT_FLAG, &wish->is_plain, NULL,
+		  "No smoothing: edges of pixel steps, a quarter less time.", 0, 0, NULL, &wish->n_said },
+		{ "passes", 0, PSR_OPT_INT, &wish->passes, "N",
+		  "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times as long; "
+		  "2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one before.",
+		  0, PSR_MAX_PASS, NULL, &wish->has_passes },
+		{ "codec", 0, PSR_OPT_STRING, &wish->codec, "CODEC",
+		  "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw.", 0, 0, NULL,
+		  &wish->n_said },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
+static int check_size(uint32_t w, uint32_t h, struct psr_error *err)
+{
+	if (w == 0 || h == 0)
+		return psr_fail(err, PSR_ERR_ARG, "--size: a picture of %ux%u has no pixels", w, h);
+	if (w > PSR_WIRE_MAX_SIDE || h > PSR_WIRE_MAX_SIDE || (uint64_t)w * h > PSR_WIRE_MAX_PIXELS)
+		return psr_fail(err, PSR_ERR_LIMIT, "--size: %ux%u is too large; a side has at most %d pixels, a picture %u", w,
+		                h, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
+	return PSR_OK;
+}
+
+int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err)
+{
+	size_t i = 0, n = sizeof qualities / sizeof qualities[0];
+	int code = check_size(wish->size[0], wish->size[1], err);
+
+	if (code != PSR_OK)
+		return code;
+	while (i < n && strcmp(qualities[i].name, wish->name) != 0)
+		i++;
+	if (i == n)
+		return psr_fail(err, PSR_ERR_ARG, "--quality takes draft, good or best, not '%.40s'", wish->name);
+	if (wish->is_smooth && wish->is_plain)
+		return psr_fail(err, PSR_ERR_ARG, "--smooth and --no-smooth exclude each other");
+	if (!(wish->spacing >= 1.0 / 64 && wish->spacing <= 64))
+		return psr_fail(err, PSR_ERR_ARG, "--spacing: %g is out of range; it takes 1/64 to 64", wish->spacing);
+	frame->width = wish->size[0];
+	frame->height = wish->size[1];
+	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
+	frame->settings.scale = 1;
+	frame->settings.spacing_px = wish->has_spacing ? wish->spacing : qualities[i].spacing;
+	frame->settings.is_smooth = (uint8_t)(wish->is_smooth || (qualities[i].is_smooth && !wish->is_plain));
+	frame->pass_limit = (uint16_t)(wish->has_passes ? wish->passes : qualities[i].passes);
+	return psr_codec_parse(&frame->color_codec, &frame->color_quality, wish->codec, err);
+}

@@ -1,0 +1,120 @@
+#include "replay.h"
+#include <stdio.h>
+#include <string.h>
+
+static const char *const light_kinds[] = { "", "directional", "point", "spot" };
+static const char *const camera_kinds[] = { "", "perspective", "orthographic" };
+
+void json_add_number(cJSON *to, const char *name, double v)
+{
+	char text[32];
+
+	snprintf(text, sizeof text, "%.17g", v);
+	cJSON_AddRawToObject(to, name, text);
+}
+
+void json_add_numbers(cJSON *to, const char *name, const double *v, int n)
+{
+	cJSON *array = cJSON_AddArrayToObject(to, name);
+	char text[32];
+
+	for (int i = 0; i < n; i++) {
+		snprintf(text, sizeof text, "%.17g", v[i]);
+		cJSON_AddItemToArray(array, cJSON_CreateRaw(text));
+	}
+}
+
+static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
+{
+	char text[8];
+
+	snprintf(text, sizeof text, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
+	cJSON_AddStringToObject(to, name, text);
+}
+
+static void id_text(char text[33], const uint8_t id[16])
+{
+	for (int i = 0; i < 16; i++)
+		snprintf(text + 2 * i, 3, "%02x", id[i]);
+}
+
+static void add_light(cJSON *to, const struct psr_msg_light *light)
+{
+	cJSON *item = cJSON_CreateObject();
+
+	cJSON_AddStringToObject(item, "kind", light_kinds[light->kind]);
+	cJSON_AddBoolToObject(item, "shadow", (light->flags & PSR_WIRE_LIGHT_SHADOW) != 0);
+	add_color(item, "color", light->color);
+	json_add_number(item, "intensity", light->intensity);
+	json_add_numbers(item, "position", light->position, 3);
+	json_add_numbers(item, "direction", light->direction, 3);
+	json_add_number(item, "inner", light->inner);
+	json_add_number(item, "outer", light->outer);
+	json_add_number(item, "reference", light->reference);
+	cJSON_AddItemToArray(to, item);
+}
+
+static void add_scene(cJSON *to, const struct scene *scene)
+{
+	cJSON *models = cJSON_AddArrayToObject(to, "models"), *instances = cJSON_AddArrayToObject(to, "instances");
+	cJSON *lights = cJSON_AddArrayToObject(to, "lights"), *item;
+	char id[33];
+
+	for (uint32_t i = 0; i < scene->n_models; i++) {
+		item = cJSON_CreateObject();
+		id_text(id, scene->model[i].opened.content_id);
+		cJSON_AddStringToObject(item, "name", scene->model[i].name);
+		cJSON_AddStringToObject(item, "content_id", id);
+		cJSON_AddNumberToObject(item, "resolution", scene->model[i].opened.resolution);
+		cJSON_AddItemToArray(models, item);
+	}
+	for (uint32_t i = 0; i < scene->msg.n_instances; i++) {
+		const struct psr_msg_instance *place = &scene->msg.instance[i];
+
+		item = cJSON_CreateObject();
+		cJSON_AddNumberToObject(item, "model", scene->model_of[i]);
+		json_add_numbers(item, "rotation", place->rotation, 4);
+		json_add_numbers(item, "translation", place->translation, 3);
+		json_add_number(item, "scale", place->scale);
+		cJSON_AddItemToArray(instances, item);
+	}
+	for (uint32_t i = 0; i < scene->msg.n_lights; i++)
+		add_light(lights, &scene->msg.light[i]);
+	json_add_number(to, "ambient", scene->msg.ambient);
+	add_color(to, "background", scene->msg.background);
+}
+
+static void add_codec(cJSON *to, const struct psr_msg_frame *frame)
+{
+	char codec[16] = "lossless";
+
+	if (frame->color_codec == PSR_CODEC_JPEG)
+		snprintf(codec, sizeof codec, "jpeg:%u", frame->color_quality);
+	else if (frame->color_codec == PSR_CODEC_RAW)
+		strcpy(codec, "raw");
+	cJSON_AddStringToObject(to, "codec", codec);
+}
+
+void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_frame *frame)
+{
+	cJSON *request = cJSON_AddObjectToObject(report, "request"), *camera, *planes;
+	const double size[2] = { frame->width, frame->height };
+
+	add_scene(request, scene);
+	camera = cJSON_AddObjectToObject(request, "camera");
+	cJSON_AddStringToObject(camera, "kind", camera_kinds[frame->camera.kind]);
+	json_add_numbers(camera, "eye", frame->camera.eye, 3);
+	json_add_numbers(camera, "target", frame->camera.target, 3);
+	json_add_numbers(camera, "up", frame->camera.up, 3);
+	json_add_number(camera, "extent", frame->camera.extent);
+	json_add_number(camera, "near", frame->camera.near_z);
+	json_add_numbers(request, "size", size, 2);
+	json_add_number(request, "spacing_px", frame->settings.spacing_px);
+	cJSON_AddBoolToObject(request, "smooth", frame->settings.is_smooth);
+	cJSON_AddNumberToObject(request, "passes", frame->pass_limit);
+	planes = cJSON_AddArrayToObject(request, "planes");
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		if (frame->planes >> plane & 1)
+			cJSON_AddItemToArray(planes, cJSON_CreateString(psr_plane_name(plane)));
+	add_codec(request, frame);
+}

@@ -1,0 +1,248 @@
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "replay.h"
+
+#define MAX_BYTES (16 << 20)
+
+/* Members of a report. The first that is missing or of another kind is kept. */
+struct reader {
+	const char *missing;
+};
+
+static const cJSON *get(struct reader *reader, const cJSON *from, const char *name)
+{
+	const cJSON *item = cJSON_GetObjectItemCaseSensitive(from, name);
+
+	if (item == NULL && reader->missing == NULL)
+		reader->missing = name;
+	return item;
+}
+
+static double get_number(struct reader *reader, const cJSON *from, const char *name, double least, double most)
+{
+	const cJSON *item = get(reader, from, name);
+	double v = item != NULL && cJSON_IsNumber(item) ? item->valuedouble : NAN;
+
+	if (v >= least && v <= most)
+		return v;
+	if (reader->missing == NULL)
+		reader->missing = name;
+	return least;
+}
+
+static void get_numbers(struct reader *reader, double *to, const cJSON *from, const char *name, int n)
+{
+	const cJSON *array = get(reader, from, name);
+
+	for (int i = 0; i < n; i++) {
+		const cJSON *item = cJSON_GetArrayItem(array, i);
+
+		if (item != NULL && cJSON_IsNumber(item))
+			to[i] = item->valuedouble;
+		else if (reader->missing == NULL)
+			reader->missing = name;
+	}
+}
+
+static const char *get_string(struct reader *reader, const cJSON *from, const char *name)
+{
+	const cJSON *item = get(reader, from, name);
+
+	if (item != NULL && cJSON_IsString(item))
+		return item->valuestring;
+	if (reader->missing == NULL)
+		reader->missing = name;
+	return "";
+}
+
+static int get_flag(struct reader *reader, const cJSON *from, const char *name)
+{
+	return cJSON_IsTrue(get(reader, from, name));
+}
+
+static void get_color(struct reader *reader, uint8_t rgb[3], const cJSON *from, const char *name)
+{
+	if (psr_parse_color(get_string(reader, from, name), rgb, NULL, NULL) != PSR_OK && reader->missing == NULL)
+		reader->missing = name;
+}
+
+static int finish(const struct reader *reader, struct psr_error *err)
+{
+	if (reader->missing == NULL)
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_FORMAT,
+	                "--replay: 'request' in the report has no usable '%s'; psr shot --report writes "
+	                "such files",
+	                reader->missing);
+}
+
+int replay_read(cJSON **report, const char *path, struct psr_error *err)
+{
+	FILE *file = fopen(path, "rb");
+	char *text = file != NULL ? malloc(MAX_BYTES) : NULL;
+	size_t n = 0;
+
+	*report = NULL;
+	if (file == NULL)
+		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "cannot read %.300s: %s", path,
+		                strerror(errno));
+	if (text != NULL)
+		n = fread(text, 1, MAX_BYTES, file);
+	fclose(file);
+	if (text != NULL && n < MAX_BYTES)
+		*report = cJSON_ParseWithLength(text, n);
+	free(text);
+	if (*report == NULL || cJSON_GetObjectItemCaseSensitive(*report, "request") == NULL)
+		return psr_fail(err, PSR_ERR_FORMAT,
+		                "--replay: %.300s is no report of psr shot --report: it is not JSON, or has no "
+		                "'request'",
+		                path);
+	return PSR_OK;
+}
+
+static const cJSON *request_of(const cJSON *report)
+{
+	return cJSON_GetObjectItemCaseSensitive(report, "request");
+}
+
+int replay_wish(struct scene_wish *wish, const cJSON *report, struct psr_error *err)
+{
+	struct reader reader = { NULL };
+	const cJSON *models = get(&reader, request_of(report), "models");
+	const cJSON *instances = get(&reader, request_of(report), "instances"), *item;
+	int n = cJSON_GetArraySize(instances), n_models = cJSON_GetArraySize(models);
+
+	if (n < 1 || n > PSR_WIRE_MAX_INSTANCES || n_models < 1)
+		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report has %d instances of %d models", n, n_models);
+	wish->instance = calloc((size_t)n, sizeof *wish->instance);
+	if (wish->instance == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %d instances", n);
+	cJSON_ArrayForEach(item, instances)
+	{
+		struct instance_wish *to = &wish->instance[wish->n_instances++];
+		const int k = (int)get_number(&reader, item, "model", 0, n_models - 1);
+		const cJSON *model = cJSON_GetArrayItem(models, k);
+
+		snprintf(to->model, sizeof to->model, "%s", get_string(&reader, model, "name"));
+		to->pixels = (uint32_t)get_number(&reader, model, "resolution", 1, UINT32_MAX);
+		get_numbers(&reader, to->place.rotation, item, "rotation", 4);
+		get_numbers(&reader, to->place.translation, item, "translation", 3);
+		to->place.scale = get_number(&reader, item, "scale", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
+	}
+	return finish(&reader, err);
+}
+
+static uint8_t find_kind(struct reader *reader, const cJSON *from, const char *const *kinds, int n)
+{
+	const char *kind = get_string(reader, from, "kind");
+
+	for (int i = 0; i < n; i++)
+		if (strcmp(kind, kinds[i]) == 0)
+			return (uint8_t)(i + 1);
+	if (reader->missing == NULL)
+		reader->missing = "kind";
+	return 0;
+}
+
+static void read_light(struct reader *reader, struct psr_msg_light *light, const cJSON *from)
+{
+	static const char *const kinds[] = { "directional", "point", "spot" };
+
+	memset(light, 0, sizeof *light);
+	light->kind = find_kind(reader, from, kinds, 3);
+	light->flags = get_flag(reader, from, "shadow") ? PSR_WIRE_LIGHT_SHADOW : 0;
+	get_color(reader, light->color, from, "color");
+	light->intensity = get_number(reader, from, "intensity", 0, PSR_WIRE_MAX_INTENSITY);
+	get_numbers(reader, light->position, from, "position", 3);
+	get_numbers(reader, light->direction, from, "direction", 3);
+	light->inner = get_number(reader, from, "inner", 0, 4);
+	light->outer = get_number(reader, from, "outer", 0, 4);
+	light->reference = get_number(reader, from, "reference", 0, PSR_WIRE_MAX_LENGTH);
+}
+
+static int check_models(const struct scene *scene, const cJSON *models, struct psr_error *err)
+{
+	struct reader reader = { NULL };
+	const cJSON *item;
+
+	cJSON_ArrayForEach(item, models)
+	{
+		const char *name = get_string(&reader, item, "name"), *expected = get_string(&reader, item, "content_id");
+
+		for (uint32_t i = 0; i < scene->n_models; i++) {
+			char id[33];
+
+			for (int k = 0; k < 16; k++)
+				snprintf(id + 2 * k, 3, "%02x", scene->model[i].opened.content_id[k]);
+			if (strcmp(scene->model[i].name, name) == 0 && strcmp(id, expected) != 0)
+				return psr_fail(err, PSR_ERR_VERSION,
+				                "--replay: the server has another model %.200s than the report's: its "
+				                "content id is %s, not %.40s",
+				                name, id, expected);
+		}
+	}
+	return finish(&reader, err);
+}
+
+int replay_scene(struct scene *scene, const cJSON *report, struct psr_error *err)
+{
+	struct reader reader = { NULL };
+	const cJSON *request = request_of(report), *lights = get(&reader, request, "lights"), *item;
+	struct psr_msg_scene *msg = &scene->msg;
+	int code = check_models(scene, get(&reader, request, "models"), err);
+
+	if (code != PSR_OK)
+		return code;
+	if (cJSON_GetArraySize(lights) > PSR_WIRE_MAX_LIGHTS)
+		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report has more than %d lights", PSR_WIRE_MAX_LIGHTS);
+	scene->has_key_light = 0;
+	msg->n_lights = 0;
+	cJSON_ArrayForEach(item, lights)
+		read_light(&reader, &msg->light[msg->n_lights++], item);
+	msg->ambient = get_number(&reader, request, "ambient", 0, PSR_WIRE_MAX_INTENSITY);
+	get_color(&reader, msg->background, request, "background");
+	return finish(&reader, err);
+}
+
+static void read_planes(struct reader *reader, struct psr_msg_frame *frame, const cJSON *request)
+{
+	const cJSON *item, *planes = get(reader, request, "planes");
+
+	cJSON_ArrayForEach(item, planes)
+		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+			if (cJSON_IsString(item) && strcmp(item->valuestring, psr_plane_name(plane)) == 0)
+				frame->planes |= 1u << plane;
+}
+
+int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_error *err)
+{
+	static const char *const kinds[] = { "perspective", "orthographic" };
+	struct reader reader = { NULL };
+	const cJSON *request = request_of(report), *camera = get(&reader, request, "camera");
+	double size[2] = { 0, 0 };
+
+	get_numbers(&reader, size, request, "size", 2);
+	if (!(size[0] >= 1 && size[0] <= PSR_WIRE_MAX_SIDE && size[1] >= 1 && size[1] <= PSR_WIRE_MAX_SIDE))
+		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report's size is no size of a picture");
+	frame->width = (uint32_t)size[0];
+	frame->height = (uint32_t)size[1];
+	frame->camera.kind = find_kind(&reader, camera, kinds, 2);
+	get_numbers(&reader, frame->camera.eye, camera, "eye", 3);
+	get_numbers(&reader, frame->camera.target, camera, "target", 3);
+	get_numbers(&reader, frame->camera.up, camera, "up", 3);
+	frame->camera.extent = get_number(&reader, camera, "extent", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
+	frame->camera.near_z = get_number(&reader, camera, "near", 0, PSR_WIRE_MAX_LENGTH);
+	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
+	frame->settings.scale = 1;
+	frame->settings.spacing_px = get_number(&reader, request, "spacing_px", 1.0 / 64, 64);
+	frame->settings.is_smooth = (uint8_t)get_flag(&reader, request, "smooth");
+	frame->pass_limit = (uint16_t)get_number(&reader, request, "passes", 0, 16);
+	read_planes(&reader, frame, request);
+	if (psr_codec_parse(&frame->color_codec, &frame->color_quality, get_string(&reader, request, "codec"), err)
+	    != PSR_OK)
+		return PSR_ERR_FORMAT;
+	return finish(&reader, err);
+}

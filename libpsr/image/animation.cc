@@ -1,0 +1,116 @@
+// The image module's animations: formats of OpenImageIO that hold several pictures. The contract stands in
+// base/image_module.h.
+#include <OpenImageIO/imageio.h>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <string>
+#include <vector>
+
+extern "C" {
+#include "base/image_module.h"
+}
+
+namespace {
+
+int fail(char *message, unsigned size, const std::string &text)
+{
+	std::string clean = text;
+
+	for (char &c : clean)
+		if (static_cast<unsigned char>(c) < 32)
+			c = ' ';
+	std::snprintf(message, size, "%s", clean.c_str());
+	return 1;
+}
+
+struct Animation {
+	std::unique_ptr<OIIO::ImageOutput> out;
+	std::string path;
+	std::vector<OIIO::ImageSpec> specs; // of each picture; all alike
+	std::size_t n_added = 0;
+};
+
+int check(const std::string &ending, char *message, unsigned size)
+{
+	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
+
+	if (!out)
+		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
+	if (std::string(out->format_name()) != "gif")
+		return fail(message, size, std::string("the format ") + out->format_name()
+		            + " does not move; use .png or .gif, or number the pictures: 'a_%03d." + ending + "'");
+	return 0;
+}
+
+int open(void **animation, const char *path, unsigned width, unsigned height, unsigned n, double seconds, char *message,
+         unsigned size)
+{
+	auto made = std::make_unique<Animation>();
+	OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, OIIO::TypeDesc::UINT8);
+
+	spec.attribute("oiio:ColorSpace", "sRGB");
+	spec.attribute("oiio:Movie", 1);
+	spec.attribute("FramesPerSecond", static_cast<float>(1 / seconds));
+	made->out = OIIO::ImageOutput::create(path);
+	made->path = path;
+	made->specs.assign(n, spec);
+	if (!made->out)
+		return fail(message, size, OIIO::geterror());
+	if (!made->out->open(path, static_cast<int>(n), made->specs.data()))
+		return fail(message, size, made->out->geterror());
+	*animation = made.release();
+	return 0;
+}
+
+int add(Animation *a, const void *pixels, char *message, unsigned size)
+{
+	if (a->n_added > 0 && !a->out->open(a->path, a->specs[0], OIIO::ImageOutput::AppendSubimage))
+		return fail(message, size, a->out->geterror());
+	a->n_added++;
+	return a->out->write_image(OIIO::TypeDesc::UINT8, pixels) ? 0 : fail(message, size, a->out->geterror());
+}
+
+int close(Animation *a, char *message, unsigned size)
+{
+	std::unique_ptr<Animation> owned(a);
+
+	return owned->out->close() ? 0 : fail(message, size, owned->out->geterror());
+}
+
+template <typename F> int guard(char *message, unsigned size, F function)
+{
+	try {
+		return function();
+	} catch (const std::exception &e) {
+		return fail(message, size, e.what());
+	} catch (...) {
+		return fail(message, size, "OpenImageIO failed");
+	}
+}
+
+}
+
+#define EXPORT extern "C" __attribute__((visibility("default")))
+
+EXPORT int psr_image_module_animation_check(const char *ending, char *message, unsigned size)
+{
+	return guard(message, size, [&] { return check(ending, message, size); });
+}
+
+EXPORT int psr_image_module_animation_open(void **animation, const char *path, unsigned width, unsigned height,
+                                           unsigned n, double seconds, char *message, unsigned size)
+{
+	return guard(message, size, [&] { return open(animation, path, width, height, n, seconds, message, size); });
+}
+
+EXPORT int psr_image_module_animation_add(void *animation, const void *pixels, char *message, unsigned size)
+{
+	return guard(message, size, [&] { return add(static_cast<Animation *>(animation), pixels, message, size); });
+}
+
+EXPORT int psr_image_module_animation_close(void *animation, char *message, unsigned size)
+{
+	return guard(message, size, [&] { return close(static_cast<Animation *>(animation), message, size); });
+}

@@ -1,0 +1,19 @@
+/* The report of a frame, as `psr shot --report` writes it: how the frame was drawn. */
+#ifndef MODELS_ACCURACY_REPORT_H
+#define MODELS_ACCURACY_REPORT_H
+
+#include <stdint.h>
+#include "psr/error.h"
+#include "psr/scene.h"
+
+struct accuracy_report {
+	struct psr_camera camera;
+	double spacing;        /* of the model's samples, units of the source file */
+	double spacing_px;     /* that the frame asked for */
+	uint32_t width, height;
+};
+
+/* NOT_FOUND, IO; FORMAT: no such report; UNSUPPORTED: of a picture of several models, or of one that was moved; MEMORY. */
+int accuracy_report_read(struct accuracy_report *out, const char *path, struct psr_error *err);
+
+#endif

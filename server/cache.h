@@ -1,0 +1,13 @@
+/* The folder of built models. */
+#ifndef PSRD_CACHE_H
+#define PSRD_CACHE_H
+
+#include "psr/error.h"
+
+/* Makes the folder, and those above it, where they are not there (mode 0700). IO, MEMORY. */
+int cache_make(const char *folder, struct psr_error *err);
+
+/* The same, and writes a file there, which it removes. IO: says why it cannot, and what to do. */
+int cache_check(const char *folder, struct psr_error *err);
+
+#endif
