@@ -162,6 +162,8 @@ static int measure(struct result *result, const char *source, const struct frame
 	if (code == PSR_OK)
 		code = psr_truth_create(&truth, mesh, err);
 	if (code == PSR_OK)
+		psr_truth_stipple(truth, frame->spacing);
+	if (code == PSR_OK)
 		code = psr_accuracy_measure(&result->depth, truth, camera, width, height, depth, frame->spacing, options.n_threads,
 		                            err);
 	if (code == PSR_OK && frame->color != NULL)

@@ -82,6 +82,18 @@ static void warn(const struct psr_mesh *mesh)
 		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " points and lines were left out\n", mesh->n_dropped_primitives);
 }
 
+static void warn_of_sheer(const struct psr_model *model)
+{
+	const struct psr_blocks *blocks = psr_model_blocks(model);
+	uint32_t n = 0;
+
+	for (uint32_t b = 0; b < blocks->n_blocks; b++)
+		n += (psr_blocks_traits(blocks, b) & PSR_BLOCK_SHEER) != 0;
+	if (n != 0)
+		fprintf(stderr, PROGRAM ": warning: surfaces that are partly transparent are drawn as a pattern of holes, %" PRIu32
+		        " of %" PRIu32 " blocks; --passes makes their mean right\n", n, blocks->n_blocks);
+}
+
 static void summarize(const char *out, const struct psr_mesh *mesh, const struct psr_model *model,
                       const struct psr_build_report *report)
 {
@@ -117,6 +129,7 @@ static int build(const char *in, const char *out, const struct psr_import_option
 		clear_bar();
 	if (code == PSR_OK && !quiet) {
 		warn(mesh);
+		warn_of_sheer(model);
 		summarize(out, mesh, model, &report);
 	}
 	psr_model_unref(model);

@@ -18,7 +18,7 @@ struct summary {
 	uint64_t bytes, file_bytes;
 	int is_packed;
 	const struct psr_presets *presets;
-	uint32_t level_blocks[PSR_MAX_LEVELS];
+	uint32_t level_blocks[PSR_MAX_LEVELS], n_bent, n_sheer;
 	uint64_t level_samples[PSR_MAX_LEVELS];
 };
 
@@ -51,6 +51,8 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 		unsigned level = psr_blocks_level(summary->blocks, b);
 
 		summary->level_blocks[level]++;
+		summary->n_bent += (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_BENT) != 0;
+		summary->n_sheer += (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_SHEER) != 0;
 		summary->level_samples[level] += (uint64_t)__builtin_popcountll(summary->blocks->mask[b]);
 	}
 }
@@ -140,6 +142,11 @@ static void print_text(const struct summary *s)
 	       ratio((double)s->bytes, (double)blocks->n_samples), ratio((double)s->file_bytes, (double)blocks->n_samples));
 	printf("samples a block   %.1f of %d valid\n", ratio((double)blocks->n_samples, blocks->n_blocks),
 	       PSR_BLOCK_SAMPLES);
+	if (s->n_bent != 0)
+		printf("bent blocks       %" PRIu32 ", whose shading normals are far from those of their faces\n", s->n_bent);
+	if (s->n_sheer != 0)
+		printf("sheer blocks      %" PRIu32 ", of surfaces that are partly transparent, drawn as a pattern of holes\n",
+		       s->n_sheer);
 }
 
 static void add_vec3(cJSON *root, const char *name, const double v[3])
@@ -200,6 +207,8 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		cJSON_AddNumberToObject(part, "levels", blocks->n_levels);
 		cJSON_AddNumberToObject(part, "bytes_per_sample", ratio((double)s->bytes, (double)blocks->n_samples));
 		cJSON_AddNumberToObject(part, "file_bytes_per_sample", ratio((double)s->file_bytes, (double)blocks->n_samples));
+		cJSON_AddNumberToObject(part, "bent", s->n_bent);
+		cJSON_AddNumberToObject(part, "sheer", s->n_sheer);
 		cJSON_AddNumberToObject(part, "samples_per_block", ratio((double)blocks->n_samples, blocks->n_blocks));
 		counts = cJSON_AddArrayToObject(part, "level_blocks");
 		for (uint32_t l = 0; l < blocks->n_levels; l++)

@@ -20,7 +20,8 @@ static int is_away(const struct psr_blocks *blocks, uint32_t block, uint32_t sam
 	const float v[3] = { (float)to_eye[0], (float)to_eye[1], (float)to_eye[2] };
 	const float *normal = psr_direction_table()[PSR_ATTR_NORMAL(block_attr(blocks, block, sample))];
 
-	return (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) == 0 && faces_away(v3f_dot(normal, v), v);
+	return (blocks->flags[block] & PSR_BLOCK_TWO_SIDED) == 0
+	       && (psr_blocks_traits(blocks, block) & PSR_BLOCK_BENT) == 0 && faces_away(v3f_dot(normal, v), v);
 }
 
 /* A ray of unit direction from the eye, so that it meets fronts as the eye does, and how far away the sample is; 0 if

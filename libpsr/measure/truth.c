@@ -6,6 +6,7 @@
 #include "../base/vec.h"
 #include "../sample/door.h"
 #include "../sample/ray.h"
+#include "../sample/stipple.h"
 #include "../sample/surface.h"
 #include "psr/model.h"
 #include "psr/pool.h"
@@ -29,6 +30,11 @@ struct job {
 	float (*normal)[3];
 	uint8_t *rgb;
 };
+
+void psr_truth_stipple(struct psr_truth *truth, double spacing)
+{
+	ray_scene_stipple(truth->scene, STIPPLE_PIXELS * spacing / truth->scale);
+}
 
 int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err)
 {

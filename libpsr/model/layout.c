@@ -34,6 +34,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("CONY", 0, COUNT_BLOCKS, 1, cone_y),
 	ARRAY("CONZ", 0, COUNT_BLOCKS, 1, cone_z),
 	ARRAY("CONS", 0, COUNT_BLOCKS, 1, cone_sine),
+	ARRAY("TRTS", 0, COUNT_BLOCKS, 1, traits),
 	ARRAY("VISI", 0, COUNT_BLOCKS, 1, visibility_index),
 	ARRAY("VISM", 0, COUNT_MASKS, 16, visibility_mask),
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),

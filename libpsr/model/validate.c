@@ -229,6 +229,16 @@ static int check_cones(const struct checker *c)
 	return PSR_OK;
 }
 
+static int check_traits(const struct checker *c)
+{
+	const struct psr_blocks *b = c->blocks;
+
+	for (uint32_t i = 0; b->traits != NULL && i < b->n_blocks; i++)
+		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER)) != 0)
+			return fail(c, "TRTS", "block %" PRIu32 " has traits %d, of which some are unknown", i, b->traits[i]);
+	return PSR_OK;
+}
+
 static int check_presets(const struct checker *c)
 {
 	struct psr_error err = { 0 };
@@ -241,7 +251,7 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 {
 	static int (*const checks[])(const struct checker *) = {
 		check_info, check_counts, check_presets, check_projections, check_clusters, check_heads, check_cones,
-		check_visibility,
+		check_traits, check_visibility,
 	};
 	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;

@@ -19,7 +19,7 @@
 struct cull_chunk {
 	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
-	uint8_t flags; /* of all blocks that are left, OR-ed */
+	uint8_t flags, traits; /* of all blocks that are left, OR-ed */
 	uint64_t n_samples;
 	float depth_error; /* greatest half step of depth, in pixels */
 };
@@ -164,6 +164,7 @@ static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *c
 		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
+		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
 		chunk->n_samples += count_bits(b->mask[block]);
 		if (batch->depth_error[i] > chunk->depth_error)
 			chunk->depth_error = batch->depth_error[i];
@@ -433,6 +434,9 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 		report->levels |= chunk->levels;
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
+		plan->has_sheer |= (chunk->traits & PSR_BLOCK_SHEER) != 0;
+		if (chunk->traits & PSR_BLOCK_BENT)
+			plan->view.needs |= STRIP_BENT;
 		report->n_clamped += chunk->n_clamped;
 		n_masked += chunk->n_masked;
 		n_mixed += chunk->n_mixed;

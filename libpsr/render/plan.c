@@ -252,6 +252,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
 	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
+	plan->has_sheer = 0;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;
 	plan->exponent = scene_exponent(scene);
@@ -297,7 +298,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr
 	if (plan->n_lights)
 		plan->view.needs |= STRIP_LIGHTS;
 	if (plan->is_full)
-		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR;
+		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR | STRIP_BENT;
 	return PSR_OK;
 }
 

@@ -48,7 +48,8 @@ struct plan {
 	uint32_t n_instances, n_lights, n_slots, n_groups;
 	struct plan_instance *instance;
 	struct warp_instance *warp; /* what warping knows of each */
-	struct strip_view view;    /* needs is filled by the cull */
+	struct strip_view view;    /* needs is filled by the cull, */
+	int has_sheer;             /* and this: some block that is left is sheer */
 	struct strip_light *light;
 	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */

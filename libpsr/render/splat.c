@@ -214,10 +214,17 @@ static void draw_block(const struct splat_target *t, const struct bin_entry *ent
 	}
 }
 
+/* Whether holes between its samples are meant. */
+static int is_sheer(const struct plan *plan, const struct bin_entry *entry)
+{
+	const struct plan_instance *in = &plan->instance[entry->instance];
+	return (psr_blocks_traits(in->cull.blocks, entry->slot - in->first_slot) & PSR_BLOCK_SHEER) != 0;
+}
+
 /* The cells that samples fall into, by the warp, which draws words, too. Samples that are at most a pixel apart have
- * cells of two pixels. */
-static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
-                           const struct bin_entry *entry, uint32_t n)
+ * cells of two pixels; those of sheer blocks have none, and close nothing. */
+static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                           const struct psr_zstack *stack, const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
 	simd->warp_clear(target, stack->levels);
@@ -226,7 +233,7 @@ static uint64_t draw_cells(const struct simd *simd, const struct warp_target *ta
 		uint32_t n_some = 0;
 		for (; e < n && n_some < sizeof some / sizeof *some; e++, n_some++) {
 			some[n_some] = entry[e];
-			some[n_some].level = entry[e].level ? entry[e].level : 1;
+			some[n_some].level = is_sheer(plan, &entry[e]) ? 0 : entry[e].level ? entry[e].level : 1;
 		}
 		n_inside += simd->warp(target, some, n_some);
 	}
@@ -241,7 +248,7 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	struct warp_target target;
 	warp_target_make(&target, plan, stack, tile, NULL);
 	target.clean = clean;
-	counts.n_inside = draw_cells(simd, &target, stack, bins->entry + begin, end - begin);
+	counts.n_inside = draw_cells(simd, plan, &target, stack, bins->entry + begin, end - begin);
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan, target.word, target.stride, target.x0, target.y0, target.x1, target.y1 };

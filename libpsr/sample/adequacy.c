@@ -76,7 +76,7 @@ static int draw_trial(const struct job *job, uint64_t index, struct trial *trial
 	if (prim < level->mesh->n_triangles) {
 		double corner[3][3];
 
-		if (texture_is_absent(level->mesh, prim, u, v))
+		if (ray_scene_is_absent(level->scene, prim, u, v))
 			return 0;
 		ray_scene_corners(level->scene, prim, corner);
 		for (int k = 0; k < 3; k++)

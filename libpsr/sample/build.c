@@ -14,6 +14,7 @@
 #include "psr/build.h"
 #include "psr/pool.h"
 #include "ray.h"
+#include "stipple.h"
 
 #define LEAST_RESOLUTION 8
 #define MOST_RESOLUTION 8192
@@ -106,6 +107,7 @@ static int make_level(struct build *build, struct level *level)
 	memcpy(projection, build->projection, sizeof projection);
 	for (int i = 0; i < N_PROJECTIONS; i++)
 		projection[i].spacing *= (float)(1u << build->n_levels_done);
+	ray_scene_stipple(build->scene, STIPPLE_PIXELS * level->ds);
 	rc = level_make(level, projection, report_step, build);
 	if (rc == PSR_OK)
 		rc = check_samples(build, level);
@@ -191,6 +193,7 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		if (rc != PSR_OK)
 			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
 	}
+	ray_scene_stipple(build->scene, STIPPLE_PIXELS * build->draft.ds); /* that of level 0, by which losses are judged */
 	if (rc == PSR_OK)
 		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
 	return rc;

@@ -10,6 +10,7 @@ struct cover_point {
 	float position[3];
 	uint16_t normal;     /* psr/direction.h: what is turned away from the viewer does not count, */
 	uint8_t two_sided;   /* unless this is set */
+	uint8_t traits;      /* psr/model.h. Bent: `attr` has another normal, which is shaded and does not tell facing */
 	uint8_t sample;      /* whose it is: projection, patch, sample */
 	uint32_t projection, patch;
 	uint32_t next;       /* of the same cell */

@@ -139,7 +139,7 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 			w[(longest + 2) % 3] = t;
 			w[(longest + 1) % 3] = x - t * foot;
 			w[longest] = 1 - x - t * (1 - foot);
-			if (can_be_absent && texture_is_absent(level->mesh, prim, w[1], w[2]))
+			if (can_be_absent && ray_scene_is_absent(level->scene, prim, w[1], w[2]))
 				continue;
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)(w[0] * corner[0][k] + w[1] * corner[1][k] + w[2] * corner[2][k]);

@@ -91,6 +91,7 @@ static void set_attributes(struct draft *draft, const struct level *level, uint3
 		struct draft_block *block = &draft->block[block_of[point->projection][point->patch]];
 
 		block->two_sided |= point->two_sided;
+		block->traits |= point->traits;
 		draft->sample[draft_sample(draft, block, point->sample) - draft->sample].attr = point->attr;
 	}
 }

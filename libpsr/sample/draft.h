@@ -15,7 +15,7 @@ struct draft_sample {
 struct draft_block {
 	uint16_t projection;
 	int16_t col, row; /* of its first lattice point; row is even */
-	uint8_t level, two_sided;
+	uint8_t level, two_sided, traits;
 	uint32_t group;   /* of blocks */
 	uint64_t mask;    /* of what is there, */
 	uint64_t part;    /* what the group needs */

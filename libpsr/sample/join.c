@@ -61,7 +61,9 @@ static int compare_lattices(const struct draft_block *a, const struct draft_bloc
 		return a->group < b->group ? -1 : 1;
 	if (a->projection != b->projection)
 		return a->projection < b->projection ? -1 : 1;
-	return (int)a->two_sided - (int)b->two_sided;
+	if (a->two_sided != b->two_sided)
+		return (int)a->two_sided - (int)b->two_sided;
+	return (a->traits & PSR_BLOCK_SHEER) - (b->traits & PSR_BLOCK_SHEER);
 }
 
 static int compare_pieces(const void *a, const void *b)
@@ -191,6 +193,7 @@ static uint32_t copy_samples(const struct draft *draft, const struct piece *piec
 				break;
 		}
 		sample[first++] = *draft_sample(draft, &piece[k].block, (unsigned)of);
+		block->traits |= piece[k].block.traits;
 	}
 	return first;
 }

@@ -8,40 +8,14 @@
 
 #define MOST_BLENDED 64
 
-/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance. 0 if there are
- * none, and then `attr` is not touched. */
-static int blend(const struct level *level, const float p[3], const float n[3], const float facing[3], uint64_t *attr)
-{
-	const struct cover *finer = level->finer;
-	const float (*direction)[3] = psr_direction_table();
-	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
-	uint64_t found[MOST_BLENDED];
-	uint32_t first[COVER_MOST_AROUND];
-	int n_cells = cover_around(finer, p, level->ds, first), count = 0;
-
-	for (int c = 0; c < n_cells; c++) {
-		for (uint32_t i = first[c]; i != COVER_NONE; i = finer->point[i].next) {
-			const struct cover_point *point = &finer->point[i];
-			float d[3], w, g = v3f_dot(direction[point->normal], n);
-
-			v3f_sub(d, point->position, p);
-			w = 1 - v3f_dot(d, d) / reach2;
-			if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
-				continue;
-			weight[count] = w * w;
-			found[count++] = point->attr;
-		}
-	}
-	if (count != 0)
-		*attr = blend_attr(found, weight, count, facing);
-	return count != 0;
-}
-
 /* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal
- * further than this from its face's, as smoothing makes them at creases, would open the crease in views along it. */
+ * further than this from its face's, as normal maps and smoothing at creases make them, would open the surface in views
+ * along it. Such a sample is bent: how it faces is told by a normal that is as near as this, and shaded is its own. */
 #define LEAST_AGREEMENT 0.94f       /* 20 degrees */
 #define LEAST_AGREEMENT_WIDE 0.985f /* 10, where a face is so wide that no sample beside it closes what opens */
 #define WIDE_PIXELS 3
+
+#define NORMAL_BITS UINT64_C(0x7fff)
 
 static int is_wide(const struct level *level, uint32_t prim)
 {
@@ -59,19 +33,94 @@ static int is_wide(const struct level *level, uint32_t prim)
 	return v3d_dot(cross, cross) > least * least * longest2;
 }
 
-static uint64_t agree(uint64_t attr, const float face[3], float least)
+static float least_agreement(const struct level *level, uint32_t prim)
 {
-	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
+	return is_wide(level, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT;
+}
+
+/* The normal that is nearest to `normal` of those within a cosine of a face's. */
+static uint16_t agree(uint16_t normal, const float face[3], float least)
+{
+	const float *n = psr_direction_table()[normal];
 	float g = v3f_dot(n, face), aside[3], turned[3];
 
 	if (g >= least)
-		return attr;
+		return normal;
 	v3f_add_scaled(aside, n, -g, face);
 	if (v3f_normalize(aside, aside) == 0)
 		v3f_set(aside, 0, 0, 0);
 	v3f_scale(turned, face, least);
 	v3f_add_scaled(turned, turned, sqrtf(1 - least * least), aside);
-	return (attr & ~(uint64_t)0x7fff) | psr_direction_encode(turned);
+	return (uint16_t)psr_direction_encode(turned);
+}
+
+/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance: the normal that
+ * tells how they face is a mean, too. 0 if there are none, and then nothing of `to` is touched. */
+static int blend(const struct level *level, const float n[3], const float facing[3], uint32_t prim,
+                 struct cover_point *to)
+{
+	const struct cover *finer = level->finer;
+	const float (*direction)[3] = psr_direction_table(), *p = to->position;
+	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
+	uint64_t found[MOST_BLENDED], straight[MOST_BLENDED];
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(finer, p, level->ds, first), count = 0, n_bent = 0;
+
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = finer->point[i].next) {
+			const struct cover_point *point = &finer->point[i];
+			float d[3], w, g = v3f_dot(direction[point->normal], n);
+
+			v3f_sub(d, point->position, p);
+			w = 1 - v3f_dot(d, d) / reach2;
+			if (!(w > 0) || count == MOST_BLENDED || !(g > 0.1f || (point->two_sided && g < -0.1f)))
+				continue;
+			weight[count] = w * w;
+			straight[count] = (point->attr & ~NORMAL_BITS) | point->normal;
+			found[count++] = point->attr;
+			n_bent += point->traits & PSR_BLOCK_BENT;
+		}
+	}
+	if (count == 0)
+		return 0;
+	to->attr = blend_attr(found, weight, count, facing);
+	to->normal = (uint16_t)PSR_ATTR_NORMAL(to->attr);
+	if (n_bent != 0) {
+		uint16_t own = (uint16_t)PSR_ATTR_NORMAL(blend_attr(straight, weight, count, facing));
+
+		if (v3f_dot(direction[to->normal], direction[own]) < least_agreement(level, prim)) {
+			to->traits |= PSR_BLOCK_BENT;
+			to->normal = own;
+		}
+	}
+	return 1;
+}
+
+/* Attributes of the place itself. */
+static void look(const struct level *level, const struct surface_place *place, const float n[3], const float facing[3],
+                 struct cover_point *to)
+{
+	const float least = least_agreement(level, place->prim);
+	uint64_t word;
+	float normal[3];
+
+	word = surface_look(level->surface, place, 1.4142135623730951 * level->ds, normal);
+	to->attr = word | psr_direction_encode(normal);
+	to->traits |= v3f_dot(normal, n) < least ? PSR_BLOCK_BENT : 0;
+	surface_face(normal, facing);
+	to->normal = agree((uint16_t)psr_direction_encode(normal), n, least);
+	if (!(to->traits & PSR_BLOCK_BENT))
+		to->attr = word | to->normal;
+}
+
+static int is_sheer(const struct level *level, const struct surface_place *place)
+{
+	float rgba[4];
+
+	if (level_material(level, place->prim)->alpha != PSR_ALPHA_BLEND)
+		return 0;
+	texture_base_color(level->mesh, place->prim, place->u, place->v, rgba);
+	return rgba[3] < 1;
 }
 
 static void make_point(const struct level *level, const struct level_ref *ref, struct cover_point *point)
@@ -90,11 +139,9 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 	ray_locate(level->scene, &ray, prim, &place.u, &place.v);
 	sheets_position(sheets, ref->at, point->position);
 	level_normal(level, surface, n);
-	if (level->finer == NULL || !blend(level, point->position, n, sheets->projection.axis[2], &point->attr))
-		point->attr = agree(surface_attr(level->surface, &place, 1.4142135623730951 * level->ds,
-		                                 sheets->projection.axis[2]), n,
-		                    is_wide(level, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT);
-	point->normal = (uint16_t)PSR_ATTR_NORMAL(point->attr);
+	point->traits = is_sheer(level, &place) ? PSR_BLOCK_SHEER : 0;
+	if (level->finer == NULL || !blend(level, n, sheets->projection.axis[2], prim, point))
+		look(level, &place, n, sheets->projection.axis[2], point);
 	point->two_sided = (uint8_t)level_is_two_sided(level, prim, point->position, n);
 	point->sample = (uint8_t)ref->at.sample;
 	point->projection = ref->projection;

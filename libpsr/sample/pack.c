@@ -29,7 +29,7 @@ struct pack {
 	int16_t *center[3];
 	uint16_t *radius;
 	int8_t *cone[3];
-	uint8_t *cone_sine, *block_projection, *flags;
+	uint8_t *cone_sine, *block_projection, *flags, *traits;
 	uint16_t *attr_offset, *depth;
 	uint64_t *mask, *attr;
 	uint32_t n_clusters, n_samples;
@@ -209,8 +209,8 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and those that the samples are drawn by. A block that is seen from both
- * sides has none. */
+/* The cone holds the normals of the faces, and those that the samples are drawn by, if it is not told by the cone alone
+ * how they face. A block that is seen from both sides needs one only if it is bent. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
@@ -218,12 +218,13 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 	int8_t axis[3];
 	int n = 0;
 
-	for (uint64_t left = block->two_sided ? 0 : block->part; left != 0; left &= left - 1) {
+	for (uint64_t left = block->two_sided && !(block->traits & PSR_BLOCK_BENT) ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SHEET_BACK);
 
 		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
-		memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
+		if (!(block->traits & PSR_BLOCK_BENT))
+			memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
 	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);
 	for (int k = 0; k < 3; k++)
@@ -236,6 +237,7 @@ static void place_block(struct pack *pack, uint32_t i, const struct draft_block 
 		pack->run[i / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = pack->n_samples };
 	pack->block_projection[i] = block->projection;
 	pack->flags[i] = (uint8_t)(block->level | (block->two_sided ? PSR_BLOCK_TWO_SIDED : 0));
+	pack->traits[i] = block->traits;
 	pack->mask[i] = block->part;
 	pack->attr_offset[i] = (uint16_t)(pack->n_samples - pack->run[i / PSR_RUN_BLOCKS].attr_first);
 }
@@ -329,6 +331,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->block_projection, n_blocks);
 	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
 	ALLOC(pack->flags, n_blocks);
+	ALLOC(pack->traits, n_blocks);
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
 	ALLOC(pack->attr_offset, n_blocks);
@@ -350,6 +353,7 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->block_projection);
 	psr_free(pack->depth);
 	psr_free(pack->flags);
+	psr_free(pack->traits);
 	psr_free(pack->mask);
 	psr_free(pack->attr);
 	psr_free(pack->attr_offset);
@@ -383,6 +387,15 @@ static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct v
 	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
+static int has_traits(const struct pack *pack)
+{
+	uint8_t any = 0;
+
+	for (uint32_t i = 0; i < pack->draft->n_blocks; i++)
+		any |= pack->traits[i];
+	return any != 0;
+}
+
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
                       struct pack *pack, struct psr_pool *pool, struct psr_error *err)
 {
@@ -404,6 +417,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.flags = pack->flags;
+	blocks.traits = has_traits(pack) ? pack->traits : NULL;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;

@@ -1,6 +1,7 @@
 #include <math.h>
 #include "../base/vec.h"
 #include "ray_tree.h"
+#include "stipple.h"
 #include "texture.h"
 
 /* Where the ray meets the primitive that the tree found: in its plane, drawn into the triangle, as the tree rounds its
@@ -76,12 +77,34 @@ static const struct psr_material *material_of(const struct psr_mesh *mesh, uint3
 	return &mesh->material[texture_material(mesh, prim)];
 }
 
-static int disc_is_absent(const struct psr_mesh *mesh, uint32_t point, const struct psr_material *material)
+void ray_scene_stipple(struct ray_scene *scene, double cell)
 {
-	float alpha = material->base_color[3] * (mesh->point_color != NULL ? mesh->point_color[point][3] : 1);
+	scene->cell = cell;
+}
 
-	return material->alpha != PSR_ALPHA_OPAQUE
-	       && alpha < (material->alpha == PSR_ALPHA_MASK ? material->alpha_cutoff : 0.5f);
+static int is_open(const struct ray_scene *scene, uint32_t prim, double u, double v, float opacity)
+{
+	double p[3], corner[3][3];
+
+	if (ray_is_disc(scene, prim)) {
+		ray_scene_center(scene, prim, p);
+	} else {
+		ray_scene_corners(scene, prim, corner);
+		for (int k = 0; k < 3; k++)
+			p[k] = (1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k];
+	}
+	return stipple_is_open(opacity, p, scene->cell);
+}
+
+int ray_scene_is_absent(const struct ray_scene *scene, uint32_t prim, double u, double v)
+{
+	const struct psr_material *material = material_of(scene->mesh, prim);
+	float rgba[4];
+
+	if (material->alpha != PSR_ALPHA_BLEND || !(scene->cell > 0))
+		return texture_is_absent(scene->mesh, prim, u, v);
+	texture_base_color(scene->mesh, prim, u, v, rgba);
+	return is_open(scene, prim, u, v, rgba[3]);
 }
 
 /* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but
@@ -108,13 +131,11 @@ static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, 
 
 int ray_hit_lets_through(const struct ray_scene *scene, const struct ray_hit *hit)
 {
-	const struct psr_mesh *mesh = scene->mesh;
-	const struct psr_material *material = material_of(mesh, hit->prim);
+	const struct psr_material *material = material_of(scene->mesh, hit->prim);
 
 	if (hit->is_back && !material->two_sided)
 		return 1;
-	return ray_is_disc(scene, hit->prim) ? disc_is_absent(mesh, hit->prim - mesh->n_triangles, material)
-	                                     : texture_is_absent(mesh, hit->prim, hit->u, hit->v);
+	return ray_scene_is_absent(scene, hit->prim, hit->u, hit->v);
 }
 
 static void filter(const struct RTCFilterFunctionNArguments *args)

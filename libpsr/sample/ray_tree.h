@@ -14,6 +14,7 @@ enum { RAY_TRIANGLES, RAY_DISCS };
 struct ray_scene {
 	const struct psr_mesh *mesh;
 	double origin[3], shrink; /* inner = (object - origin) * shrink */
+	double cell; /* of the pattern of BLEND surfaces (stipple.h), inner units; 0: none */
 	double (*corner)[3][3]; /* of the triangles, inner coordinates; */
 	float (*normal)[3]; /* and their unit normals */
 	int lets_through;   /* whether any material may let a ray through */

@@ -97,7 +97,7 @@ static int look_at(const struct job *job, uint32_t prim, uint64_t *state, struct
 			u = 1 - u;
 			v = 1 - v;
 		}
-		if (texture_is_absent(level->mesh, prim, u, v))
+		if (ray_scene_is_absent(level->scene, prim, u, v))
 			return PSR_OK;
 		ray_scene_corners(level->scene, prim, corner);
 		for (int k = 0; k < 3; k++)

@@ -220,13 +220,12 @@ static uint64_t colored_word(const struct surface *surface, const struct surface
 	return material_word(material, &values);
 }
 
-uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
-                      const float facing[3])
+uint64_t surface_look(const struct surface *surface, const struct surface_place *place, double diameter,
+                      float normal[3])
 {
 	const struct psr_mesh *mesh = surface->mesh;
 	uint32_t i = texture_material(mesh, place->prim);
 	const float *point_normal;
-	float normal[3];
 	uint64_t word;
 
 	if (place->prim < mesh->n_triangles) {
@@ -242,6 +241,15 @@ uint64_t surface_attr(const struct surface *surface, const struct surface_place 
 	}
 	if (place->is_back)
 		v3f_scale(normal, normal, -1);
+	return word;
+}
+
+uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
+                      const float facing[3])
+{
+	float normal[3];
+	uint64_t word = surface_look(surface, place, diameter, normal);
+
 	surface_face(normal, facing);
 	return word | psr_direction_encode(normal);
 }

@@ -36,6 +36,10 @@ struct surface_place {
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3]);
 
+/* The same without a normal, which is *normal, as it is shaded, whichever way it faces. */
+uint64_t surface_look(const struct surface *surface, const struct surface_place *place, double diameter,
+                      float normal[3]);
+
 /* Bends a unit normal as far as it must be for a sample to face `facing`, however it is quantised. */
 void surface_face(float normal[3], const float facing[3]);
 

@@ -47,6 +47,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 			length2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
 			reach2 = length2 > reach2 ? length2 : reach2;
 			points->normal[k] = (blocks->flags[b] & PSR_BLOCK_TWO_SIDED) != 0
+			                                    || (psr_blocks_traits(blocks, b) & PSR_BLOCK_BENT) != 0
 			                            ? PSR_DIRECTIONS
 			                            : (uint16_t)PSR_ATTR_NORMAL(blocks->attr[k]);
 		}

@@ -71,12 +71,22 @@ static void to_eye_from(const struct eye *eye, const float p[3], float v[3])
 		v[k] = (float)(eye->is_perspective ? eye->place[k] - (double)p[k] : eye->frame[2][k]);
 }
 
+static int cone_says(const struct psr_blocks *blocks, uint32_t block, const struct eye *eye)
+{
+	float place[3];
+
+	for (int i = 0; i < 3; i++)
+		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->frame[2][i]);
+	return cone_culls(blocks, block, place, eye->is_perspective);
+}
+
 static int is_away(const struct vpoints *points, uint32_t block, uint32_t k, const float v[3])
 {
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(points->blocks->attr[k])];
 	float g = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
 
-	if ((points->blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0)
+	if ((points->blocks->flags[block] & PSR_BLOCK_TWO_SIDED) != 0
+	    || (psr_blocks_traits(points->blocks, block) & PSR_BLOCK_BENT) != 0)
 		return 0;
 	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
@@ -96,6 +106,8 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 		uint32_t block = job->level->block[i], first = psr_blocks_attr_first(b, block);
 		uint32_t end = first + (uint32_t)__builtin_popcountll(b->mask[block]);
 
+		if ((psr_blocks_traits(b, block) & PSR_BLOCK_BENT) != 0 && cone_says(b, block, eye))
+			continue; /* all of it faces away */
 		for (uint32_t k = first; k < end; k++) {
 			const float p[3] = { job->points->x[k], job->points->y[k], job->points->z[k] };
 			float v[3], u[2], depth;
@@ -127,11 +139,7 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 	float v[3];
 	unsigned triangle;
 
-	float place[3];
-
-	for (int i = 0; i < 3; i++)
-		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->frame[2][i]);
-	if (cone_culls(b, block, place, eye->is_perspective))
+	if (cone_says(b, block, eye))
 		return 1;
 	if (b->visibility_mask == NULL)
 		return 0;

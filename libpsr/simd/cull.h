@@ -35,7 +35,7 @@ static inline int32_t region_of(int32_t pixel, float from, float scale)
 struct widened {
 	float x[CULL_BATCH], y[CULL_BATCH], z[CULL_BATCH], r[CULL_BATCH];
 	float axis_x[CULL_BATCH], axis_y[CULL_BATCH], axis_z[CULL_BATCH];
-	int32_t flags[CULL_BATCH], cone_sine[CULL_BATCH];
+	int32_t flags[CULL_BATCH], cone_sine[CULL_BATCH], is_bent[CULL_BATCH];
 };
 
 static void widen(struct widened *restrict to, const struct psr_blocks *b, uint32_t first, uint32_t n)
@@ -63,6 +63,10 @@ static void widen_cones(struct widened *restrict to, const struct psr_blocks *b,
 		to->axis_z[i] = z[i];
 		to->cone_sine[i] = sine[i];
 	}
+	if (!b->traits)
+		return;
+	for (uint32_t i = 0; i < n; i++)
+		to->is_bent[i] = b->traits[first + i] & PSR_BLOCK_BENT;
 }
 
 static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view,
@@ -127,7 +131,7 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 static void cull_by_cones(struct cull_batch *restrict out, const struct cull_view *view,
                           const struct widened *restrict b, uint32_t n)
 {
-	const int is_perspective = view->perspective;
+	const int is_perspective = view->perspective, with_cones = view->with_cones;
 	const float eye_x = view->eye[0], eye_y = view->eye[1], eye_z = view->eye[2];
 	for (uint32_t i = 0; i < n; i++) {
 		const float ax = b->axis_x[i], ay = b->axis_y[i], az = b->axis_z[i], r = psr_where(is_perspective, b->r[i]);
@@ -141,11 +145,12 @@ static void cull_by_cones(struct cull_batch *restrict out, const struct cull_vie
 		const float sine = (float)b->cone_sine[i] * (1.0f / 255), cosine = __builtin_sqrtf(1 - sine * sine);
 		const float least = g * cosine - across * sine, most = g * cosine + across * sine;
 		const float slack = axis * (CONE_SLACK * length + r);
-		const int has_cone = (b->cone_sine[i] != PSR_CONE_ANY) & out->is_mixed[i];
+		const int is_bent = b->is_bent[i];
+		const int has_cone = (b->cone_sine[i] != PSR_CONE_ANY) & out->is_mixed[i] & (with_cones | is_bent);
 		const int is_away = least > axis * BACK_SINE * (length + r) + slack;
 		const int faces_eye = most + slack <= axis * BACK_SINE * (length - r);
 		out->is_left[i] &= !(has_cone & is_away);
-		out->is_mixed[i] &= !(has_cone & faces_eye);
+		out->is_mixed[i] &= !((has_cone & faces_eye) | is_bent);
 	}
 }
 
@@ -156,7 +161,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 	memset(&blocks, 0, sizeof blocks);
 	widen(&blocks, view->blocks, first, n);
 	cull_by_frustum(out, view, &blocks, whole);
-	if (view->blocks->cone_sine && view->with_cones) {
+	if (view->blocks->cone_sine && (view->with_cones || view->blocks->traits)) {
 		widen_cones(&blocks, view->blocks, first, n);
 		cull_by_cones(out, view, &blocks, whole);
 	}

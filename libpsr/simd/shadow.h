@@ -31,9 +31,10 @@ static inline float magnitude(float x)
 	return psr_float_from_bits(psr_bits_from_float(x) & 0x7fffffff);
 }
 
-/* Places a group; *n_facing: its samples that face the light. Returns how many the map has to say something of. */
-static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n_facing, const struct strip *s,
-                                            size_t first, const struct shadow_map *map, int perspective, int is_face)
+/* Places a group; *n_facing: its samples that face the light; the others it does not reach. Returns how many the map
+ * has to say something of. */
+static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n_facing, float *reaches,
+                                            const struct strip *s, size_t first, const struct shadow_map *map, int perspective, int is_face)
 {
 	const struct shadow_map m = *map;
 	const float least = GRAZING * m.scale, unit = 1 / m.focal;
@@ -41,7 +42,7 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n
 	for (size_t i = 0; i < GROUP; i++) {
 		const size_t from = first + i, to = at->n + i;
 		const float px = s->px[from], py = s->py[from], pz = s->pz[from];
-		const float nx = s->nx[from], ny = s->ny[from], nz = s->nz[from];
+		const float nx = s->gx[from], ny = s->gy[from], nz = s->gz[from];
 		const float x = ((m.turn[0][0] * px + m.turn[0][1] * py) + m.turn[0][2] * pz) + m.move[0];
 		const float y = ((m.turn[1][0] * px + m.turn[1][1] * py) + m.turn[1][2] * pz) + m.move[1];
 		const float z = ((m.turn[2][0] * px + m.turn[2][1] * py) + m.turn[2][2] * pz) + m.move[2];
@@ -65,6 +66,7 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n
 			(magnitude(at->du[to]) + magnitude(at->dv[to])) * m.slope_bias + texel * NORMAL_BIAS * secant * secant;
 		at->cover[to] = 0;
 		at->is_here[to] = is_here;
+		reaches[from] = psr_where(facing > 0, 1);
 		n_front += facing > 0;
 		n_here += (uint32_t)is_here;
 	}
@@ -72,24 +74,24 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n
 	return n_here;
 }
 
-static CONSTANT_FLAGS int locate_by(struct shadow_place *at, const struct strip *s, const struct shadow_map *map,
+static CONSTANT_FLAGS int locate_by(struct shadow_place *at, float *reaches, const struct strip *s, const struct shadow_map *map,
                                     int perspective, int is_face)
 {
 	uint32_t n_facing = 0;
 	at->n = 0;
 	for (size_t first = 0; first < s->n; first += GROUP) {
 		at->first[at->n / GROUP] = (uint8_t)first;
-		at->n += locate_group(at, &n_facing, s, first, map, perspective, is_face) ? GROUP : 0;
+		at->n += locate_group(at, &n_facing, reaches, s, first, map, perspective, is_face) ? GROUP : 0;
 	}
 	return n_facing != 0;
 }
 
 /* Places the samples, and says whether any of them faces the light. */
-static int shadow_locate(struct shadow_place *at, const struct strip *s, const struct shadow_map *map, int is_face)
+static int shadow_locate(struct shadow_place *at, float *reaches, const struct strip *s, const struct shadow_map *map, int is_face)
 {
 	if (!map->perspective)
-		return locate_by(at, s, map, 0, 0);
-	return is_face ? locate_by(at, s, map, 1, 1) : locate_by(at, s, map, 1, 0);
+		return locate_by(at, reaches, s, map, 0, 0);
+	return is_face ? locate_by(at, reaches, s, map, 1, 1) : locate_by(at, reaches, s, map, 1, 0);
 }
 
 static inline float clamp_cell(float x, float most)
@@ -177,12 +179,11 @@ static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, 
 static int strip_shadow(const struct strip *strip, const struct shadow_light *shadow, float *reaches)
 {
 	struct shadow_place at;
+	float others[STRIP]; /* what faces the light does so in all of its maps */
 	int is_lit = 0;
-	for (uint32_t i = 0; i < strip->n; i++)
-		reaches[i] = 1;
 	for (uint32_t f = 0; f < shadow->n_maps; f++) {
 		const struct shadow_map *map = &shadow->map[f];
-		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1);
+		is_lit |= shadow_locate(&at, f ? others : reaches, strip, map, shadow->n_maps > 1);
 		if (!is_lit)
 			return 0;
 		for (int k = 0; at.n && k <= PSR_MAX_DEPTH_LEVEL; k++)

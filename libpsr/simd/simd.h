@@ -169,6 +169,7 @@ enum strip_needs {
 	STRIP_POSITION = 2,  /* some light is near, or casts shadows */
 	STRIP_LIGHTS = 8,    /* some light shines */
 	STRIP_SPECULAR = 4,  /* highlights are looked for whether any sample is specular or not */
+	STRIP_BENT = 16,     /* some block in view is bent */
 };
 
 /* The covered pixels of a part of a row: pixel i is (x0 + x[i], y). */
@@ -180,7 +181,10 @@ struct strip_pixels {
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
 	const uint64_t *at[STRIP];          /* attributes */
 	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
+	uint32_t has_cones;   /* whether any is of a bent block, with STRIP_BENT and where the surface's normal is needed */
+	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */
 };
+#define STRIP_NO_CONE ((uint32_t)PSR_CONE_ANY << 24)
 
 /* Their samples. Everything is in camera space; colours are linear. */
 struct strip {
@@ -191,6 +195,9 @@ struct strip {
 	uint64_t normal_word[STRIP];
 	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
 	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
+	/* With STRIP_POSITION and STRIP_TWO_SIDED the normal of the surface, by which shadows and sides go: the same, or in
+	 * a bent block the nearest to it that the block's cone holds. */
+	float gx[STRIP], gy[STRIP], gz[STRIP];
 	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
 	float dr[STRIP], dg[STRIP], db[STRIP];
 	float sr[STRIP], sg[STRIP], sb[STRIP], exponent[STRIP]; /* where any sample is specular */
@@ -223,8 +230,8 @@ struct strip_light {
 /* Lists the pixels of a part of a row, at most STRIP, that have a word and a weight above 0 (NULL: all have): n,
  * word, covered, x, id. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
-/* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED what their blocks
- * are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before
+/* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED and STRIP_BENT
+ * what their blocks are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before
  * another one is read. */
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
@@ -294,7 +301,8 @@ struct shadow_light {
 };
 
 /* How much of a light reaches each sample of a strip with positions: 2 - 2 times the greatest coverage by a level of
- * what is nearer to the light, at most 1. 0: no sample faces the light, and `reaches` has no value. */
+ * what is nearer to the light, at most 1, and nothing where the surface faces away. 0: no sample faces the light, and
+ * `reaches` has no value. */
 typedef int strip_shadow_fn(const struct strip *strip, const struct shadow_light *shadow, float *reaches);
 
 /* Makes n cells of a map of their depths, of which those above and below are given, too: all but the first and the last

@@ -20,6 +20,26 @@ static inline void strip_list(struct strip_pixels *p, const uint64_t *word, cons
 	p->word = word;
 }
 
+static inline uint32_t cone_of(const struct psr_blocks *b, uint32_t block)
+{
+	if (!(psr_blocks_traits(b, block) & PSR_BLOCK_BENT))
+		return STRIP_NO_CONE;
+	return (uint32_t)(uint8_t)b->cone_x[block] | (uint32_t)(uint8_t)b->cone_y[block] << 8 |
+	       (uint32_t)(uint8_t)b->cone_z[block] << 16 | (uint32_t)b->cone_sine[block] << 24;
+}
+
+static void find_cones(struct strip_pixels *p, const struct strip_view *view)
+{
+	for (uint32_t i = 0, end; i < p->n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, p->n);
+		const struct psr_blocks b = *in->blocks;
+		for (; i < end; i++) {
+			p->cone[i] = cone_of(&b, p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot);
+			p->has_cones |= p->cone[i] != STRIP_NO_CONE;
+		}
+	}
+}
+
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
@@ -34,6 +54,9 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 			__builtin_prefetch(p->at[i]);
 		}
 	}
+	p->has_cones = 0;
+	if (view->needs & STRIP_BENT && view->needs & (STRIP_POSITION | STRIP_TWO_SIDED))
+		find_cones(p, view);
 	repeat_last(p);
 }
 
@@ -93,6 +116,28 @@ static void look(struct strip *strip, const struct strip_view *view)
 	}
 }
 
+/* Normals of the surface: what is outside of a cone is moved straight to its rim. */
+static void straighten(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
+{
+	const struct strip_pixels *p = strip->pixels;
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t cone = p->cone[i], code = cone >> 24;
+		const float x = (float)(int8_t)cone, y = (float)(int8_t)(cone >> 8), z = (float)(int8_t)(cone >> 16);
+		const float unit = 1 / __builtin_sqrtf((x * x + y * y) + z * z);
+		const float ax = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * unit;
+		const float ay = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * unit;
+		const float az = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * unit;
+		const float nx = strip->nx[i], ny = strip->ny[i], nz = strip->nz[i];
+		const float sine = (float)(int32_t)code * (1.0f / 255), rim = __builtin_sqrtf(1 - sine * sine);
+		const float c = (nx * ax + ny * ay) + nz * az, square = 1 - c * c, least = 1e-12f;
+		const float across = sine / __builtin_sqrtf(psr_choose(square > least, square, least)), along = rim - c * across;
+		const int is_outside = (code != PSR_CONE_ANY) & (c < rim);
+		strip->gx[i] = psr_choose(is_outside, ax * along + nx * across, nx);
+		strip->gy[i] = psr_choose(is_outside, ay * along + ny * across, ny);
+		strip->gz[i] = psr_choose(is_outside, az * along + nz * across, nz);
+	}
+}
+
 static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
@@ -109,6 +154,13 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
 		turn_normals(strip, in->turn, first, end);
+		if (p->has_cones)
+			straighten(strip, in->turn, first, end);
+	}
+	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !p->has_cones) {
+		memcpy(strip->gx, strip->nx, n * sizeof *strip->nx);
+		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
+		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		strip->lr[i] = ambient[0];
@@ -124,11 +176,14 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
 	if (view->needs & STRIP_TWO_SIDED)
 		for (uint32_t i = 0; i < n; i++) {
-			const float g = (strip->nx[i] * strip->vx[i] + strip->ny[i] * strip->vy[i]) + strip->nz[i] * strip->vz[i];
+			const float g = (strip->gx[i] * strip->vx[i] + strip->gy[i] * strip->vy[i]) + strip->gz[i] * strip->vz[i];
 			const float turn = psr_choose((p->two_sided[i] != 0) & (g < 0), -1, 1);
 			strip->nx[i] *= turn;
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
+			strip->gx[i] *= turn;
+			strip->gy[i] *= turn;
+			strip->gz[i] *= turn;
 		}
 }
 

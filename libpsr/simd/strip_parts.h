@@ -20,6 +20,8 @@ static inline void repeat_last(struct strip_pixels *p)
 		p->id[i] = p->id[p->n - 1];
 		p->at[i] = p->at[p->n - 1];
 		p->two_sided[i] = p->two_sided[p->n - 1];
+		if (p->has_cones)
+			p->cone[i] = p->cone[p->n - 1];
 	}
 }
 

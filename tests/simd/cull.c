@@ -53,7 +53,7 @@ static void batch(struct check *c, uint32_t n_blocks, uint32_t n, int has_cones,
 
 	check_blocks(c, &blocks, n_blocks, 1, 1);
 	if (!has_cones)
-		blocks.cone_x = blocks.cone_y = blocks.cone_z = NULL, blocks.cone_sine = NULL;
+		blocks.cone_x = blocks.cone_y = blocks.cone_z = NULL, blocks.cone_sine = blocks.traits = NULL;
 	random_view(c, view, &blocks, is_spoilt);
 	const uint32_t first = check_below(c, n_blocks - n + 1);
 	check_units(c, n);

@@ -145,12 +145,12 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 
 static void random_resolve(struct check *c)
 {
-	resolve(c, 1 + check_below(c, STRIP), check_below(c, 16), 0);
+	resolve(c, 1 + check_below(c, STRIP), check_below(c, 32), 0);
 }
 
 static void spoilt_resolve(struct check *c)
 {
-	resolve(c, 1 + check_below(c, STRIP), check_below(c, 16), 1);
+	resolve(c, 1 + check_below(c, STRIP), check_below(c, 32), 1);
 }
 
 static void bench_resolve(struct check *c)

@@ -20,7 +20,7 @@ struct fixture {
 	int16_t center[3][FIXTURE_BLOCKS];
 	struct psr_run run;
 	int8_t cone[3][FIXTURE_BLOCKS];
-	uint8_t cone_sine[FIXTURE_BLOCKS];
+	uint8_t cone_sine[FIXTURE_BLOCKS], traits[FIXTURE_BLOCKS];
 	uint8_t block_projection[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
 	uint16_t radius[FIXTURE_BLOCKS];
 	uint16_t attr_offset[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
@@ -72,6 +72,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->cone[i % 3][i] = 127;
 		f->cone[(i + 1) % 3][i] = (int8_t)(20 * i);
 		f->cone_sine[i] = i == 4 ? PSR_CONE_ANY : (uint8_t)(50 * i);
+		f->traits[i] = (uint8_t)(i % 4);
 		f->block_projection[i] = (uint8_t)(i % 2);
 		f->flags[i] = (uint8_t)(levels[i] | 6 << 3 | (i % 3 == 0 ? PSR_BLOCK_TWO_SIDED : 0));
 		f->attr_offset[i] = (uint16_t)n;
@@ -114,6 +115,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->blocks.cone_y = f->cone[1];
 		f->blocks.cone_z = f->cone[2];
 		f->blocks.cone_sine = f->cone_sine;
+		f->blocks.traits = f->traits;
 		f->blocks.n_masks = FIXTURE_MASKS;
 		f->blocks.visibility_index = f->visibility_index;
 		f->blocks.visibility_mask = (const uint64_t(*)[2])f->visibility_mask;

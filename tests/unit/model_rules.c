@@ -177,6 +177,7 @@ static const struct violation violations[] = {
 	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
 	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
 	{ "CONZ", 0, 1, 0x80, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 128 instead of 127" },
+	{ "TRTS", 2, 1, 4, "TRTS: block 2 has traits 4, of which some are unknown" },
 };
 
 static void each_violated_rule_is_refused_by_its_name(void **state)
@@ -298,6 +299,11 @@ static void masks_need_their_indices_and_their_number(void **state)
 		assert_non_null(strstr(err.text, "only some are there"));
 	}
 	fixture_init(&f, 1);
+	f.blocks.cone_x = f.blocks.cone_y = f.blocks.cone_z = NULL;
+	f.blocks.cone_sine = NULL;
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
+	assert_non_null(strstr(err.text, "traits and no cones"));
+	fixture_init(&f, 1);
 	f.run.visibility_first = 1;
 	f.visibility_index[5] = FIXTURE_MASKS - 1;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
@@ -319,7 +325,7 @@ static void every_required_section_is_missed(void **state)
 		file_put(entry_of(bytes, section_table[k].type) + ENTRY_FLAGS, 2, 0);
 		memcpy(entry_of(bytes, section_table[k].type), "GONE", 4);
 		/* Of the optional ones a cone needs its four parts, a mask both; the others stand for themselves. */
-		if (k == SECTION_CAMERAS || k == SECTION_LIGHTS)
+		if (k == SECTION_CAMERAS || k == SECTION_LIGHTS || strcmp(section_table[k].type, "TRTS") == 0)
 			expected = PSR_OK;
 		assert_int_equal(parse_sealed(bytes, n_bytes, &err), expected);
 		if (section_table[k].flags & ENTRY_REQUIRED)
@@ -345,7 +351,7 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
 		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 184 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "4800 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, 28, 4, 1, "4864 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },

@@ -3,6 +3,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <math.h>
 #include <cjson/cJSON.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -101,7 +102,9 @@ static void json_tells_what_the_model_holds(void **state)
 	assert_true(number(blocks, "samples") == FIXTURE_SAMPLES && number(blocks, "blocks") == FIXTURE_BLOCKS);
 	assert_true(number(blocks, "projections") == 2 && number(blocks, "clusters") == 3 && number(blocks, "levels") == 2);
 	assert_true(number(blocks, "samples_per_block") == (double)FIXTURE_SAMPLES / FIXTURE_BLOCKS);
-	assert_true(number(blocks, "bytes_per_sample") == number(root, "bytes") / FIXTURE_SAMPLES);
+	/* Numbers are written with 15 digits at least: within half a unit of the last one. */
+	assert_true(fabs(number(blocks, "bytes_per_sample") * FIXTURE_SAMPLES / number(root, "bytes") - 1) < 1e-14);
+	assert_true(number(blocks, "bent") == 3 && number(blocks, "sheer") == 2);
 	assert_int_equal(cJSON_GetArraySize(levels), 2);
 	assert_int_equal(cJSON_GetArrayItem(levels, 0)->valueint, 5);
 	assert_int_equal(cJSON_GetArrayItem(levels, 1)->valueint, 1);

@@ -37,6 +37,16 @@ enum psr_block_flag {
 	                              * 7.3.2) */
 };
 
+/* What is so of few models' blocks: a byte a block, in models that have any. */
+enum psr_block_trait {
+	/* The shading normals of some samples are far from those of their faces, so that they cannot tell how these face:
+	 * the cone tells it of the whole block. All of it is drawn unless its cone faces away; and a two-sided block is
+	 * seen from its front where the normal of the cone that is nearest to the shading normal faces the eye. */
+	PSR_BLOCK_BENT = 1,
+	/* It has holes as the surface lets light through: what lies between its samples is not to be closed. */
+	PSR_BLOCK_SHEER = 2
+};
+
 /* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */
 #define PSR_RUN_BLOCKS 1024
 
@@ -70,11 +80,12 @@ struct psr_blocks {
 	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
 	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
-	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block, its faces' and its samples', are
-	 * within an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x, cone_y, cone_z); the
-	 * greatest magnitude of these is 127. */
+	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block's faces, and but in a bent block
+	 * those of its samples, are within an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x,
+	 * cone_y, cone_z); the greatest magnitude of these is 127. */
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
+	const uint8_t *traits;                  /* enum psr_block_trait; not without cones */
 	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
 	const uint64_t (*visibility_mask)[2];   /* 128 bits, one a triangle of directions; many blocks share one */
 };
@@ -87,6 +98,11 @@ static inline uint32_t psr_blocks_runs(const struct psr_blocks *blocks)
 static inline unsigned psr_blocks_level(const struct psr_blocks *blocks, uint32_t block)
 {
 	return blocks->flags[block] & PSR_BLOCK_LEVEL;
+}
+
+static inline unsigned psr_blocks_traits(const struct psr_blocks *blocks, uint32_t block)
+{
+	return blocks->traits != NULL ? blocks->traits[block] : 0;
 }
 
 /* Index of a block's first sample. */

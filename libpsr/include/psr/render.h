@@ -146,7 +146,8 @@ struct psr_frame {
 
 /* What the cull knew of a block that is drawn ([G] 6.4, 7.3.2). */
 enum psr_facing {
-	PSR_FACING_EYE,       /* its cone faces the eye, and so do all of its samples */
+	PSR_FACING_EYE,       /* its cone faces the eye, and so do all of its samples; or it is bent, and not all of it
+	                       * faces away */
 	PSR_FACING_MIXED,     /* some may face away: each was asked */
 	PSR_FACING_TWO_SIDED, /* none was asked */
 };

@@ -26,6 +26,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	struct psr_projection *lattice = check_in(c, n_projections, sizeof *lattice);
 	uint16_t *offset = check_in(c, n_blocks, 2);
 	uint64_t *mask = check_in(c, n_blocks, 8);
+	uint8_t *traits = check_in(c, n_blocks, 1);
 	uint32_t n = 0;
 
 	/* Spheres anywhere are within four blocks of the origin on the one, and anywhere on the other. */
@@ -35,6 +36,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 	for (uint32_t b = 0; b < n_blocks; b++) {
 		const uint32_t level = check_one_in(c, 4) ? check_below(c, PSR_MAX_LEVELS) : check_below(c, 3);
 		projection[b] = (uint8_t)check_below(c, n_projections);
+		traits[b] = (uint8_t)check_below(c, 4);
 		flags[b] = (uint8_t)(level | (check_u32(c) & (PSR_BLOCK_DEPTH | PSR_BLOCK_TWO_SIDED)));
 		if (b % PSR_RUN_BLOCKS == 0)
 			run[b / PSR_RUN_BLOCKS] = (struct psr_run){ .attr_first = n };
@@ -59,6 +61,7 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 		.cone_y = check_in(c, n_blocks, 1),
 		.cone_z = check_in(c, n_blocks, 1),
 		.cone_sine = check_in(c, n_blocks, 1),
+		.traits = check_one_in(c, 2) ? traits : NULL,
 		.attr_offset = offset,
 		.depth = check_in(c, n + DEPTH_PADDING, 2),
 		.attr = check_in(c, n, 8),
