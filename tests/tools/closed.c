@@ -133,7 +133,7 @@ int main(int argc, char **argv)
 	uint32_t n_torn = 0;
 	if (argc < 3 || argc > 5 || c.side < 16 || c.rays < 1 || c.rays > MOST_RAYS)
 		die("usage: closed MODEL.psr SOURCE [SIDE [RAYS]]");
-	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&mesh, argv[2], &err) ||
+	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&mesh, argv[2], NULL, &err) ||
 	    psr_truth_create(&c.truth, mesh, &err))
 		die(err.text);
 	const size_t area = (size_t)c.side * c.side;
