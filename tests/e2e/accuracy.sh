@@ -25,7 +25,7 @@ view() { # model source label camera-options...
 	local inside holes stray empty p999
 	inside=$(number "$json" inside) holes=$(number "$json" holes) stray=$(number "$json" outside_drawn)
 	empty=$(number "$json" inside_empty) p999=$(number "$json" distance_p999)
-	printf '# %-9s %-21s %6d pixels inside, %2d holes, %2d of them empty, %2d drawn outside, distance p50 %.2f p99 %.2f p99.9 %.2f, colour off %d\n' \
+	printf '# %-9s %-21s %6d inside %2d holes (%d empty) %2d outside  p50 %.2f p99 %.2f p99.9 %.2f  colour %3d\n' \
 		"$model" "$label" "$inside" "$holes" "$empty" "$stray" \
 		"$(number "$json" distance_p50)" "$(number "$json" distance_p99)" "$p999" "$(number "$json" color_wrong)"
 	check "$model $label: $allowed in 10000 or fewer are drawn more than a pixel outside of the silhouette" \
