@@ -1,7 +1,8 @@
 /* closed MODEL.psr SOURCE [SIDE [RAYS]]: whether refined stills show what is behind a surface. Draws the model in five
  * views and all passes on a red and on a blue background, lit by ambient light alone. Of pixels at least four pixels
- * inside of what pass 0 covers it counts those whose colour depends on the background, and of these those of which all
- * RAYS x RAYS rays meet the source: they are torn. Prints a line for each view; exits with 1 if any pixel is torn. */
+ * inside of what pass 0 covers, blended surfaces apart, it counts those whose colour depends on the background, and of
+ * these those of which all RAYS x RAYS rays meet the source: they are torn. Prints a line for each view; exits with 1
+ * if any pixel is torn. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -25,10 +26,11 @@ struct closed {
 	struct psr_renderer *renderer;
 	struct psr_refiner *refiner;
 	struct psr_pool *pool;
+	struct psr_mesh *mesh;
 	struct psr_truth *truth;
 	struct psr_frame frame[2]; /* one a background */
 	float *depth;              /* of pass 0 */
-	uint8_t *is_inside;
+	uint8_t *is_solid, *is_inside;
 	uint32_t side, rays;
 };
 
@@ -70,7 +72,29 @@ static void draw(struct closed *c, unsigned pass)
 	}
 }
 
-/* Pass 0's coverage, less INSIDE pixels at its edges. */
+/* Whether a ray ended on a surface that nothing is to show through: a blended one has holes. */
+static int is_stopped(const struct psr_mesh *mesh, uint32_t prim)
+{
+	const uint32_t *material = prim < mesh->n_triangles ? mesh->triangle_material : mesh->point_material;
+	return prim != RAY_NONE &&
+	       mesh->material[material[prim < mesh->n_triangles ? prim : prim - mesh->n_triangles]].alpha != PSR_ALPHA_BLEND;
+}
+
+/* Pixels that pass 0 covers, and whose middle is not on a blended surface. */
+static void find_solid(struct closed *c, const struct view *view)
+{
+	for (uint32_t y = 0; y < c->side; y++)
+		for (uint32_t x = 0; x < c->side; x++) {
+			const size_t at = (size_t)y * c->side + x;
+			struct ray ray;
+			struct ray_hit hit;
+			truth_ray(c->truth, view, x + 0.5, y + 0.5, &ray);
+			truth_trace(c->truth, &ray, 1, c->scene.camera.near_z, &hit);
+			c->is_solid[at] = isfinite(c->depth[at]) && (hit.prim == RAY_NONE || is_stopped(c->mesh, hit.prim));
+		}
+}
+
+/* Those, less INSIDE pixels at their edges. */
 static uint32_t find_inside(struct closed *c)
 {
 	const int side = (int)c->side;
@@ -80,24 +104,25 @@ static uint32_t find_inside(struct closed *c)
 			int is_inside = x >= INSIDE && y >= INSIDE && x + INSIDE < side && y + INSIDE < side;
 			for (int j = -INSIDE; is_inside && j <= INSIDE; j++)
 				for (int i = -INSIDE; is_inside && i <= INSIDE; i++)
-					is_inside = isfinite(c->depth[(size_t)(y + j) * c->side + (size_t)(x + i)]);
+					is_inside = c->is_solid[(size_t)(y + j) * c->side + (size_t)(x + i)];
 			c->is_inside[(size_t)y * c->side + (size_t)x] = (uint8_t)is_inside;
 			n += (uint32_t)is_inside;
 		}
 	return n;
 }
 
-/* Whether all of a pixel's rays meet the source. */
+/* Whether all rays through a pixel, and half a pixel around it, are stopped by the source: what samples a pixel apart
+ * know of an edge is where it is to half a pixel. */
 static int is_closed(const struct closed *c, const struct view *view, uint32_t x, uint32_t y)
 {
 	for (uint32_t j = 0; j < c->rays; j++) {
 		struct ray ray[MOST_RAYS];
 		struct ray_hit hit[MOST_RAYS];
 		for (uint32_t i = 0; i < c->rays; i++)
-			truth_ray(c->truth, view, x + (i + 0.5) / c->rays, y + (j + 0.5) / c->rays, &ray[i]);
+			truth_ray(c->truth, view, x - 0.5 + (2 * i + 1.0) / c->rays, y - 0.5 + (2 * j + 1.0) / c->rays, &ray[i]);
 		truth_trace(c->truth, ray, (int)c->rays, c->scene.camera.near_z, hit);
 		for (uint32_t i = 0; i < c->rays; i++)
-			if (hit[i].prim == RAY_NONE)
+			if (!is_stopped(c->mesh, hit[i].prim))
 				return 0;
 	}
 	return 1;
@@ -128,16 +153,16 @@ int main(int argc, char **argv)
 	struct closed c = { .side = argc > 3 ? (uint32_t)atoi(argv[3]) : 300,
 		                .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16 };
 	struct psr_model *model;
-	struct psr_mesh *mesh;
 	struct psr_error err;
 	uint32_t n_torn = 0;
 	if (argc < 3 || argc > 5 || c.side < 16 || c.rays < 1 || c.rays > MOST_RAYS)
 		die("usage: closed MODEL.psr SOURCE [SIDE [RAYS]]");
-	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&mesh, argv[2], NULL, &err) ||
-	    psr_truth_create(&c.truth, mesh, &err))
+	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&c.mesh, argv[2], NULL, &err) ||
+	    psr_truth_create(&c.truth, c.mesh, &err))
 		die(err.text);
 	const size_t area = (size_t)c.side * c.side;
 	c.depth = room(area * sizeof *c.depth);
+	c.is_solid = room(area);
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
 		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
@@ -153,20 +178,23 @@ int main(int argc, char **argv)
 			die(err.text);
 		for (unsigned pass = 0; pass <= PSR_MAX_PASS; pass++) {
 			draw(&c, pass);
-			if (pass == 0)
+			if (pass == 0) {
+				find_solid(&c, &view);
 				printf("view %d: %u pixels inside\n", v, find_inside(&c));
+			}
 			n_torn += look(&c, pass, &view, v);
 		}
 	}
 	for (int b = 0; b < 2; b++)
 		free(c.frame[b].rgb);
 	free(c.depth);
+	free(c.is_solid);
 	free(c.is_inside);
 	psr_refiner_destroy(c.refiner);
 	psr_renderer_destroy(c.renderer);
 	psr_pool_destroy(c.pool);
 	psr_truth_destroy(c.truth);
-	psr_mesh_destroy(mesh);
+	psr_mesh_destroy(c.mesh);
 	psr_model_unref(model);
 	return n_torn > 0;
 }
