@@ -188,6 +188,9 @@ static int take_report(struct frame *frame, struct psr_error *err)
 
 	if (code != PSR_OK)
 		return code;
+	if (report.is_smooth && frame->color != NULL)
+		return psr_fail(err, PSR_ERR_ARG, "--color: %s says that the frame was smoothed, which blends colours; draw it with "
+		                "psr shot --no-smooth", frame->report);
 	if (!frame->given.eye)
 		memcpy(camera->eye, report.camera.eye, sizeof camera->eye);
 	if (!frame->given.target)

@@ -111,6 +111,7 @@ int accuracy_report_read(struct accuracy_report *out, const char *path, struct p
 		                "compares pictures of one model where its source has it", path);
 	out->width = (uint32_t)size[0];
 	out->height = (uint32_t)size[1];
+	out->is_smooth = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(report, "smooth"));
 	cJSON_Delete(report);
 	return code;
 }

@@ -11,6 +11,7 @@ struct accuracy_report {
 	double spacing;        /* of the model's samples, units of the source file */
 	double spacing_px;     /* that the frame asked for */
 	uint32_t width, height;
+	int is_smooth;
 };
 
 /* NOT_FOUND, IO; FORMAT: no such report; UNSUPPORTED: of a picture of several models, or of one that was moved; MEMORY. */

@@ -37,6 +37,14 @@ gives "a refined picture passes" 0 '^PASS: ' judge
 cp "$work/report.json" "$work/good.json"
 cp "$work/depth.pfm" "$work/good.pfm"
 
+# colours
+check "smoothed colours are drawn" draw --size 128x128 --ambient 1 -o "$work/frame.ppm"
+refuses "smoothed colours are not compared" 2 '--color: .*was smoothed.*--no-smooth' judge --color "$work/frame.ppm"
+check "plain colours are drawn" draw --size 128x128 --ambient 1 --no-smooth -o "$work/frame.ppm"
+gives "and compared" 0 '^PASS: ' judge --color "$work/frame.ppm"
+cp "$work/good.json" "$work/report.json"
+cp "$work/good.pfm" "$work/depth.pfm"
+
 # options win over the report
 gives "a stricter bound fails" 1 '^FAIL: .*\(0\.00 may be\)' judge --max-distance 0
 gives "an eye of the command line is taken" 4 '^the camera seems wrong: ' judge --eye 300,0,0
