@@ -21,7 +21,8 @@ static int check(struct bench_options *options, struct psr_error *err)
 	options->frame.planes = 1 << PSR_WIRE_PLANE_COLOR;
 	if (code == PSR_OK)
 		code = quality_apply(&options->frame, &options->quality, err);
-	options->scene.pixels = view_pixels(&options->view, &options->frame);
+	options->scene.pixels =
+		options->frame.width > options->frame.height ? options->frame.width : options->frame.height;
 	return code;
 }
 

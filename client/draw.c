@@ -192,11 +192,7 @@ static int run(struct job *job, struct psr_error *err)
 	uint64_t start_ns = now_ns();
 	struct series series;
 
-	for (uint32_t k = 0; k < job->views.n; k++) {
-		const uint32_t pixels = view_pixels(&job->views.wish[k], &job->frame);
-
-		wish->scene.pixels = pixels > wish->scene.pixels ? pixels : wish->scene.pixels;
-	}
+	wish->scene.pixels = job->frame.width > job->frame.height ? job->frame.width : job->frame.height;
 	code = psr_client_connect(&job->client, wish->server, PSR_PROGRAM, wish->scene.instance[0].model, timeout_ms, err);
 	if (code == PSR_OK)
 		code = scene_open(&job->scene, &wish->scene, job->client, timeout_ms, err);

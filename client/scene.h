@@ -21,7 +21,7 @@ struct scene_wish {
 	const char *file;
 	char *file_text; /* strings above point into it */
 	int n_said;   /* options given */
-	uint32_t pixels; /* the greater side of the pictures, times their zoom */
+	uint32_t pixels; /* the greater side of the pictures */
 	int is_quiet; /* no progress on the terminal */
 };
 

@@ -229,14 +229,6 @@ void views_fini(struct views *views)
 
 /* ---- in a scene ---- */
 
-uint32_t view_pixels(const struct view_wish *wish, const struct psr_msg_frame *frame)
-{
-	const uint32_t side = frame->width > frame->height ? frame->width : frame->height;
-	const double pixels = ceil(side * fmax(wish->camera.zoom, 1));
-
-	return pixels < PSR_WIRE_MAX_SIDE ? (uint32_t)pixels : PSR_WIRE_MAX_SIDE;
-}
-
 void view_up(double up[3], const struct view_wish *wish, const struct scene *scene)
 {
 	static const double y[3] = { 0, 1, 0 };

@@ -38,9 +38,6 @@ void views_fini(struct views *views);
 int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
                const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err);
 
-/* What psr_client_set_resolution() is told of the models in its picture. */
-uint32_t view_pixels(const struct view_wish *wish, const struct psr_msg_frame *frame);
-
 /* The way up for turning about: --up, the model's own, or +Y. */
 void view_up(double up[3], const struct view_wish *wish, const struct scene *scene);
 
