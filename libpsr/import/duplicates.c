@@ -26,7 +26,7 @@ int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, str
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t n_slots = 16;
 	uint32_t *first_of, *slot, kept = 0;
-	int rc = import_mesh_groups(&first_of, im, 0, err);
+	int rc = import_mesh_groups(&first_of, im, IMPORT_SAME_POSITION, err);
 
 	if (rc != PSR_OK)
 		return rc;

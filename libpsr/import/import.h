@@ -99,9 +99,11 @@ int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, str
 void import_material_tidy(struct psr_material *material);
 int import_mesh_drop_images(struct import_mesh *im, struct psr_error *err);
 
-/* weld.c: *first_of[v] is the first vertex at v's position, or with everything the same if `whole`; the caller
- * frees. */
-int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int whole, struct psr_error *err);
+/* weld.c: *first_of[v] is the first vertex that is the same as v: at its position; nearly there, to within 2^-22 of the
+ * mesh's longest side (some that are as near count as apart); or with everything the same. The caller frees. */
+enum import_same { IMPORT_SAME_POSITION, IMPORT_SAME_NEARLY, IMPORT_SAME_ALL };
+int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum import_same same,
+                       struct psr_error *err);
 int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves the others unused */
 
 /* normals.c: smooth vertex normals for the triangles whose vertices have none. A vertex whose corners need several is

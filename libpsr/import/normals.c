@@ -119,7 +119,7 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	int rc;
 
 	memset(fan, 0, sizeof *fan);
-	rc = import_mesh_groups(&fan->point, im, 0, err);
+	rc = import_mesh_groups(&fan->point, im, IMPORT_SAME_NEARLY, err);
 	if (rc != PSR_OK)
 		return rc;
 	fan->start = calloc((size_t)mesh->n_vertices + 2, sizeof *fan->start);

@@ -116,6 +116,7 @@ struct ply_vertices {
 
 int ply_vertices_read(struct ply_vertices *vertices, struct ply_rows *rows, struct psr_error *err);
 void ply_vertices_fini(struct ply_vertices *vertices);
+int ply_vertices_are_one_color(const struct ply_vertices *vertices); /* 0 if they have none */
 
 /* 0 if the element has no colors. */
 int ply_colors_find(struct ply_colors *colors, const struct ply_header *header, const struct ply_element *element);

@@ -32,10 +32,10 @@ static void put_vertex(const struct target *t, uint32_t to, uint32_t from, const
 	} else if (v->uv != NULL) {
 		memcpy(mesh->uv[0][to], v->uv[from], sizeof v->uv[from]);
 	}
-	if (v->color != NULL)
-		memcpy(mesh->color[to], v->color[from], sizeof v->color[from]);
-	else if (t->has_colors)
+	if (t->has_colors)
 		memcpy(mesh->color[to], t->color, sizeof t->color);
+	else if (v->color != NULL)
+		memcpy(mesh->color[to], v->color[from], sizeof v->color[from]);
 }
 
 static int reserve(struct target *t, uint64_t n, struct psr_error *err)
@@ -113,8 +113,9 @@ static int target_init(struct target *t, struct import_mesh *im, struct ply_rows
 	t->rows = rows;
 	t->vertices = vertices;
 	t->material = material;
-	/* Colors of vertices are finer than those of faces, where a file has both. */
-	t->has_colors = vertices->color == NULL && ply_colors_find(&t->colors, rows->header, rows->element);
+	/* Where a file has both, colors of vertices are finer, unless the writer only filled them in. */
+	t->has_colors = (vertices->color == NULL || ply_vertices_are_one_color(vertices)) &&
+	                ply_colors_find(&t->colors, rows->header, rows->element);
 	t->is_shared = !t->has_colors && uv->property < 0;
 	t->has = (vertices->uv != NULL || uv->property >= 0 ? IMPORT_HAS_UV0 : 0u) |
 	         (vertices->color != NULL || t->has_colors ? IMPORT_HAS_COLOR : 0u);

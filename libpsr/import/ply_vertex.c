@@ -111,6 +111,14 @@ static void put_vertex(struct ply_vertices *out, uint32_t at, const struct roles
 		ply_colors_get(out->color[at], &roles->colors, rows);
 }
 
+int ply_vertices_are_one_color(const struct ply_vertices *vertices)
+{
+	for (uint32_t i = 1; vertices->color != NULL && i < vertices->n; i++)
+		if (memcmp(vertices->color[i], vertices->color[0], sizeof vertices->color[0]) != 0)
+			return 0;
+	return vertices->color != NULL;
+}
+
 int ply_vertices_read(struct ply_vertices *out, struct ply_rows *rows, struct psr_error *err)
 {
 	const uint64_t n = rows->element->n_rows;

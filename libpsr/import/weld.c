@@ -1,3 +1,4 @@
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
@@ -6,28 +7,61 @@
 #define EMPTY UINT32_MAX
 #define MAX_KEY 128
 
-/* What makes vertices the same: the position, or everything. Adding 0 makes one zero of the two. */
-static size_t key_of(const struct import_column *column, int n_columns, uint32_t v, uint8_t key[MAX_KEY])
+/* Positions that were computed in single precision, the pole of a ball from every side, say, differ by a few of its
+ * roundings; nothing of this part of the mesh's size can be seen. */
+#define NEARLY 0x1p-22
+
+struct keys {
+	struct import_column column[IMPORT_MAX_COLUMNS];
+	int n_columns;
+	double low[3], step; /* step 0: positions count as they are */
+};
+
+/* Non-finite positions are there until repair.c drops them. */
+static void find_step(struct keys *keys, const struct psr_mesh *mesh)
+{
+	double most = 0;
+
+	for (int c = 0; c < 3; c++) {
+		double low = INFINITY, high = -INFINITY;
+
+		for (uint32_t v = 0; v < mesh->n_vertices; v++) {
+			if (!isfinite(mesh->position[v][c]))
+				continue;
+			low = fmin(low, mesh->position[v][c]);
+			high = fmax(high, mesh->position[v][c]);
+		}
+		keys->low[c] = low;
+		most = fmax(most, high - low);
+	}
+	keys->step = isfinite(most) ? NEARLY * most : 0;
+}
+
+/* What makes vertices the same. Adding 0 makes one zero of the two. */
+static size_t key_of(const struct keys *keys, uint32_t v, uint8_t key[MAX_KEY])
 {
 	double position[3];
 	size_t n = sizeof position;
 
-	memcpy(position, import_column_at(&column[0], v), sizeof position);
-	for (int c = 0; c < 3; c++)
+	memcpy(position, import_column_at(&keys->column[0], v), sizeof position);
+	for (int c = 0; c < 3; c++) {
+		if (keys->step > 0)
+			position[c] = rint((position[c] - keys->low[c]) / keys->step);
 		position[c] += 0.0;
+	}
 	memcpy(key, position, n);
-	for (int i = 1; i < n_columns; i++) {
-		memcpy(key + n, import_column_at(&column[i], v), column[i].size);
-		n += column[i].size;
+	for (int i = 1; i < keys->n_columns; i++) {
+		memcpy(key + n, import_column_at(&keys->column[i], v), keys->column[i].size);
+		n += keys->column[i].size;
 	}
 	return n;
 }
 
-int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int whole, struct psr_error *err)
+int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum import_same same,
+                       struct psr_error *err)
 {
-	struct import_column column[IMPORT_MAX_COLUMNS];
 	const struct psr_mesh *mesh = im->mesh;
-	const int n_columns = import_vertex_columns(column, im->mesh);
+	struct keys keys = { .step = 0 };
 	uint64_t n_slots = 16, mask;
 	uint32_t *slot, *first;
 
@@ -41,14 +75,19 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, int wh
 		free(first);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to join %u vertices", im->path, mesh->n_vertices);
 	}
+	keys.n_columns = import_vertex_columns(keys.column, im->mesh);
+	if (same != IMPORT_SAME_ALL)
+		keys.n_columns = 1;
+	if (same == IMPORT_SAME_NEARLY)
+		find_step(&keys, mesh);
 	memset(slot, 0xff, n_slots * sizeof *slot);
 	for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 		uint8_t key[MAX_KEY], other[MAX_KEY];
-		size_t n = key_of(column, whole ? n_columns : 1, v, key);
+		size_t n = key_of(&keys, v, key);
 		uint64_t at = XXH64(key, n, 0) & mask;
 
 		while (slot[at] != EMPTY) {
-			key_of(column, whole ? n_columns : 1, slot[at], other);
+			key_of(&keys, slot[at], other);
 			if (memcmp(key, other, n) == 0)
 				break;
 			at = (at + 1) & mask;
@@ -66,7 +105,7 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err)
 {
 	struct psr_mesh *mesh = im->mesh;
 	uint32_t *first;
-	int rc = import_mesh_groups(&first, im, 1, err);
+	int rc = import_mesh_groups(&first, im, IMPORT_SAME_ALL, err);
 
 	if (rc != PSR_OK)
 		return rc;

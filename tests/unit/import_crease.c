@@ -332,6 +332,31 @@ static void a_coarse_sphere_is_smooth(void **state)
 	psr_mesh_destroy(m);
 }
 
+/* Programs compute the pole of a ball once for each meridian, and sin(pi) is no 0. */
+static void a_sphere_is_smooth_whose_poles_differ_by_roundings(void **state)
+{
+	(void)state;
+	const double radius = sin(M_PI);
+	double from[3], to[3], pole[3], ring = sin(M_PI / 6), z = cos(M_PI / 6);
+
+	assert_true(radius > 0);
+	n_soup = 0;
+	for (int end = -1; end <= 1; end += 2)
+		for (int i = 0; i < 12; i++) {
+			on_circle(pole, radius, end, i, 12);
+			on_circle(from, ring, end * z, i, 12);
+			on_circle(to, ring, end * z, i + 1, 12);
+			add(pole, end > 0 ? from : to, end > 0 ? to : from);
+		}
+	struct psr_mesh *m = import_soup(default_crease());
+
+	/* Shares of 12 corners that are alike all around leave nothing but floats' roundings. */
+	for (uint32_t v = 0; v < m->n_vertices; v++)
+		if (fabs(m->position[v][2]) > 0.99)
+			assert_true(fabsf(m->normal[v][2]) > 1 - 1e-6f);
+	psr_mesh_destroy(m);
+}
+
 /* Six sides of 42 degrees, which meet at 39; each of one triangle, or of two. */
 static struct psr_mesh *import_pyramid(int is_cut)
 {
@@ -416,6 +441,7 @@ int main(void)
 		cmocka_unit_test(eight_sides_of_45_degrees_are_edges_by_default),
 		cmocka_unit_test(the_tip_of_a_flat_cone_stays_pointed),
 		cmocka_unit_test(a_coarse_sphere_is_smooth),
+		cmocka_unit_test(a_sphere_is_smooth_whose_poles_differ_by_roundings),
 		cmocka_unit_test(a_step_is_an_edge_between_flat_parts_and_none_between_single_triangles),
 		cmocka_unit_test(normals_that_a_file_brings_are_kept_at_any_crease),
 		cmocka_unit_test(options_outside_of_their_ranges_are_refused),

@@ -428,6 +428,27 @@ static void colors_of_vertices_are_linear_light(void **state)
 			}
 }
 
+/* As MeshLab writes what was painted by faces: its vertices are white, all of them. */
+static void colors_of_faces_count_where_vertices_have_one_color(void **state)
+{
+	(void)state;
+	for (int differ = 0; differ < 2; differ++) {
+		char ply[1024];
+
+		snprintf(ply, sizeof ply,
+		         ASCII_HEADER "element vertex 3\n" XYZ "property uchar red\nproperty uchar green\nproperty uchar blue\n"
+		                      "element face 1\n" LIST
+		                      "property uchar red\nproperty uchar green\nproperty uchar blue\n" END
+		                      "0 0 0 255 255 255\n1 0 0 255 255 255\n1 1 0 255 255 %d\n3 0 1 2 255 0 0\n",
+		         differ ? 0 : 255);
+		struct psr_mesh *m = accept_text(ply);
+
+		for (int c = 0; c < 3; c++)
+			assert_true(m->color[m->triangle[0][c]][1] == (differ ? 1.0f : 0.0f));
+		psr_mesh_destroy(m);
+	}
+}
+
 static void colors_of_faces_split_their_vertices(void **state)
 {
 	(void)state;
@@ -662,6 +683,7 @@ int main(void)
 		cmocka_unit_test(faces_may_come_before_vertices),
 		cmocka_unit_test(strips_turn_every_other_triangle_and_start_anew),
 		cmocka_unit_test(colors_of_vertices_are_linear_light),
+		cmocka_unit_test(colors_of_faces_count_where_vertices_have_one_color),
 		cmocka_unit_test(colors_of_faces_split_their_vertices),
 		cmocka_unit_test(normals_and_texture_coordinates_come_along),
 		cmocka_unit_test(a_missing_texture_is_left_out_with_a_warning),
