@@ -451,6 +451,41 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 		assert_int_equal(weight[i], i / WIDTH == 12 && i % WIDTH < WIDTH / 2 ? 0 : WEIGHT_ONE);
 }
 
+/* Where samples are magnified, cells about a crack may have none, and what is before nothing on one side of a surface's
+ * end stays so. The surface is x < 48, and row 12 its crack; everything is inside. */
+static void cracks_of_magnified_samples_are_closed_beside_empty_cells(void **state)
+{
+	enum { WIDTH = 64, HEIGHT = 32, CELLS_X = WIDTH / 8 + 2, CELLS_Y = HEIGHT / 8 + 2, END = 48 };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [3] = 1.12f, [4] = 1.24f } };
+	uint64_t word[WIDTH * HEIGHT];
+	float cell[CELLS_X * CELLS_Y];
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
+
+	(void)state;
+	stack.level[3].z = cell;
+	stack.level[3].width = CELLS_X;
+	stack.level[3].height = CELLS_Y;
+	for (uint32_t i = 0; i < CELLS_X * CELLS_Y; i++)
+		cell[i] = i / CELLS_X == 2 && i % CELLS_X <= END / 8 ? 2 : INFINITY; /* the row of cells that has the crack */
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const float z = 2;
+		uint32_t bits;
+		memcpy(&bits, &z, sizeof bits);
+		word[i] = i / WIDTH == 12 || i % WIDTH >= END ? PSR_WORD_EMPTY : (uint64_t)bits << 32;
+	}
+	for (unsigned pass = 1; pass <= 2; pass++) { /* a cell is four pixels of the picture wide, and two */
+		uint16_t weight[WIDTH * HEIGHT];
+		uint8_t bricks[2], is_inside[WIDTH / 2 * HEIGHT / 2];
+		const struct inside inside = { is_inside, WIDTH >> pass, 0, 0, pass };
+		memset(is_inside, 1, sizeof is_inside);
+		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+			weight[i] = WEIGHT_ONE;
+		splat_close(&plan, &stack, &inside, 0, HEIGHT, weight, bricks);
+		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+			assert_int_equal(weight[i], pass == 1 && i / WIDTH == 12 && i % WIDTH < END ? 0 : WEIGHT_ONE);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -466,6 +501,7 @@ int main(void)
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
 		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
 		cmocka_unit_test(cracks_are_closed_inside_of_the_plain_frame),
+		cmocka_unit_test(cracks_of_magnified_samples_are_closed_beside_empty_cells),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }
