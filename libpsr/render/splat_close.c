@@ -180,8 +180,8 @@ struct row_holes {
 	uint8_t across[TILE_WIDTH];     /* and as far as MOST_ACROSS, where samples are magnified; else 0 */
 };
 
-static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, unsigned pass,
-                       uint32_t x, uint32_t y, uint32_t n)
+static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack,
+                       unsigned pass, uint32_t x, uint32_t y, uint32_t n)
 {
 	const uint64_t *word = psr_zstack_row(stack, y) + x;
 	memset(to, 0, sizeof *to);
