@@ -7,8 +7,15 @@
 #define REACH 8 /* pixels, a power of two: no hole between discs that one surface encloses is sought further */
 /* Cells on either side of a pixel's own: a gap in a row of cells that all have samples is narrower than two of them. */
 #define GAP 1
+/* Pixels, on either side of one before nothing, of magnified samples: what is used of a window has as many about it. */
+#define MOST_ACROSS 64
 #define CELLS (TILE_WIDTH / 2)
 #define CELLS_AROUND (CELLS + 2 * GAP)
+
+/* Each and its opposite. */
+static const int8_t way[8][2] = {
+	{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
+};
 
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
@@ -28,9 +35,6 @@ static int is_sheer(const struct plan *plan, const struct psr_zstack *stack, int
 /* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
 static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
 {
-	static const int8_t way[8][2] = {
-		{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
-	};
 	const float z = depth_at(stack, x, y);
 	float nearest = INFINITY, farthest = 0;
 	for (int w = 0; w < 8; w++) {
@@ -47,6 +51,25 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 			return 0;
 	}
 	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
+}
+
+static int is_met(const struct psr_zstack *stack, uint32_t x, uint32_t y, const int8_t *step, int reach)
+{
+	for (int i = 1; i <= reach; i++)
+		if (depth_at(stack, (int64_t)x + i * step[0], (int64_t)y + i * step[1]) < INFINITY)
+			return 1;
+	return 0;
+}
+
+/* Whether the pixel is before nothing, and something is within `reach` pixels in two opposite directions. */
+static int is_crossed(const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
+{
+	if (depth_at(stack, x, y) < INFINITY)
+		return 0;
+	for (int w = 0; w < 8; w += 2)
+		if (is_met(stack, x, y, way[w], reach) && is_met(stack, x, y, way[w + 1], reach))
+			return 1;
+	return 0;
 }
 
 /* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
@@ -154,21 +177,25 @@ struct row_holes {
 	uint8_t is_between[TILE_WIDTH]; /* what is before it is on its left and on its right */
 	uint8_t is_covered[TILE_WIDTH]; /* it lies behind samples in all cells around */
 	uint8_t reach[TILE_WIDTH];      /* the width of the cells around, as far as REACH */
+	uint8_t across[TILE_WIDTH];     /* and as far as MOST_ACROSS, where samples are magnified; else 0 */
 };
 
-static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, uint32_t x,
-                       uint32_t y, uint32_t n)
+static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack,
+                       unsigned pass, uint32_t x, uint32_t y, uint32_t n)
 {
 	const uint64_t *word = psr_zstack_row(stack, y) + x;
 	memset(to, 0, sizeof *to);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const uint8_t reach = 1 << k < REACH ? (uint8_t)(1 << k) : REACH;
+		const uint8_t width = 1 << k < MOST_ACROSS ? (uint8_t)(1 << k) : MOST_ACROSS;
+		const uint8_t across = k > (int)pass + 1 ? width : 0; /* cells are wider than two pixels of the picture */
 		if (!(stack->levels >> k & 1) || !cells[k].has_any)
 			continue;
 		for (uint32_t c = 0; c < n; c++) {
 			const float z = psr_float_from_bits((uint32_t)(word[c] >> 32));
 			to->is_covered[c] |= cells[k].is_near[c >> k] & (cells[k].limit[c >> k] < z);
 			to->reach[c] = cells[k].is_near[c >> k] ? reach : to->reach[c];
+			to->across[c] = cells[k].is_near[c >> k] ? across : to->across[c];
 		}
 	}
 }
@@ -179,17 +206,23 @@ static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
 	return inside->is_inside[(size_t)v * inside->width + u];
 }
 
+/* Whether the pixel, which is well inside of the plain frame, lies in a crack. */
+static int is_crack(const struct row_holes *holes, const struct psr_zstack *stack, uint32_t c, uint32_t x, uint32_t y)
+{
+	return holes->is_covered[c] || (holes->across[c] && is_crossed(stack, x, y, holes->across[c]));
+}
+
 static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside,
                           const struct cell_row *cells, uint32_t x0, uint32_t y, uint32_t n, uint16_t *weight,
                           uint8_t *bricks)
 {
 	struct row_holes holes;
 	uint32_t n_closed = 0;
-	find_holes(&holes, cells, stack, x0, y, n);
+	find_holes(&holes, cells, stack, inside ? inside->pass : 0, x0, y, n);
 	find_between(holes.is_between, plan, stack, x0, y, n);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
-		if (weight[c] && ((holes.is_covered[c] && inside && is_inside(inside, x, y)) ||
+		if (weight[c] && ((inside && is_inside(inside, x, y) && is_crack(&holes, stack, c, x, y)) ||
 		                  (holes.is_between[c] && is_enclosed(plan, stack, x, y, holes.reach[c])))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;

@@ -419,6 +419,45 @@ static void holes_between_discs_are_closed_and_slots_and_notches_are_not(void **
 	free(cell);
 }
 
+/* Seen 45 degrees from the side, a square is a rectangle. A sample of the square reaches 0.6 steps of its projection, and
+ * a step that is at most 37 degrees from the square is 1.25 spacings long on it. Samples are at most a step inside of
+ * the sides: 0.4 steps are short of them at most. A sub-pixel's centre stands for half its diagonal besides. Discs
+ * across tilted normals would leave the square open. */
+static void discs_lie_on_the_plane_of_their_neighbors_whatever_the_normals(void **state)
+{
+	enum { SIDE = 160 };
+	const double degree = 3.14159265358979323846 / 180, tilt[] = { 0, 40 * degree, -40 * degree, 60 * degree };
+
+	(void)state;
+	for (size_t t = 0; t < sizeof tilt / sizeof *tilt; t++) {
+		const struct shape_options options = { .resolution = 128, .diffuse = 0xffffff, .unlit = 1, .two_sided = 1,
+			                                   .cones = 1, .scale = 1, .tilt = tilt[t] };
+		struct psr_model *square = shape_build(&options, 0);
+		struct still s;
+		still_make(&s, square, SIDE, SIDE);
+		s.scene.camera = (struct psr_camera){ .eye = { 3, 0, 3 }, .up = { 0, 1, 0 }, .kind = PSR_CAMERA_ORTHOGRAPHIC,
+			                                  .ortho_height = 2.5 };
+		const double pixel = 2.5 / SIDE, reach = 1.25 * 0.6 * psr_model_info(square)->spacing;
+		for (unsigned pass = 1; pass <= 3; pass++) {
+			const double sub = 0.71 * pixel / (1 << pass), half_x = 0.7 * sqrt(0.5), half_y = 0.7;
+			const double outer_x = half_x + reach * sqrt(0.5) + sub, outer_y = half_y + reach + sub;
+			uint32_t n_open = 0, n_beyond = 0;
+			refine(&s, pass, NULL);
+			for (uint32_t i = 0; i < SIDE * SIDE; i++) {
+				const double x = fabs((i % SIDE + 0.5) * pixel - 1.25), y = fabs((i / SIDE + 0.5) * pixel - 1.25);
+				const double half = pixel / 2;
+				const double inner_x = 2 * half_x - outer_x, inner_y = 2 * half_y - outer_y;
+				n_open += x < inner_x - half && y < inner_y - half && s.frame.rgb[3 * i] < 255;
+				n_beyond += (x > outer_x + half || y > outer_y + half) && s.frame.rgb[3 * i] > 0;
+			}
+			assert_int_equal(n_open, 0);
+			assert_int_equal(n_beyond, 0);
+		}
+		still_clear(&s);
+		psr_model_unref(square);
+	}
+}
+
 /* Such a crack is closed where the plain frame covers all around, and nowhere else. */
 static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 {
@@ -451,6 +490,41 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 		assert_int_equal(weight[i], i / WIDTH == 12 && i % WIDTH < WIDTH / 2 ? 0 : WEIGHT_ONE);
 }
 
+/* Where samples are magnified, cells about a crack may have none, and what is before nothing on one side of a surface's
+ * end stays so. The surface is x < 48, and row 12 its crack; everything is inside. */
+static void cracks_of_magnified_samples_are_closed_beside_empty_cells(void **state)
+{
+	enum { WIDTH = 64, HEIGHT = 32, CELLS_X = WIDTH / 8 + 2, CELLS_Y = HEIGHT / 8 + 2, END = 48 };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [3] = 1.12f, [4] = 1.24f } };
+	uint64_t word[WIDTH * HEIGHT];
+	float cell[CELLS_X * CELLS_Y];
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
+
+	(void)state;
+	stack.level[3].z = cell;
+	stack.level[3].width = CELLS_X;
+	stack.level[3].height = CELLS_Y;
+	for (uint32_t i = 0; i < CELLS_X * CELLS_Y; i++)
+		cell[i] = i / CELLS_X == 2 && i % CELLS_X <= END / 8 ? 2 : INFINITY; /* the row of cells that has the crack */
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const float z = 2;
+		uint32_t bits;
+		memcpy(&bits, &z, sizeof bits);
+		word[i] = i / WIDTH == 12 || i % WIDTH >= END ? PSR_WORD_EMPTY : (uint64_t)bits << 32;
+	}
+	for (unsigned pass = 1; pass <= 2; pass++) { /* a cell is four pixels of the picture wide, and two */
+		uint16_t weight[WIDTH * HEIGHT];
+		uint8_t bricks[2], is_inside[WIDTH / 2 * HEIGHT / 2];
+		const struct inside inside = { is_inside, WIDTH >> pass, 0, 0, pass };
+		memset(is_inside, 1, sizeof is_inside);
+		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+			weight[i] = WEIGHT_ONE;
+		splat_close(&plan, &stack, &inside, 0, HEIGHT, weight, bricks);
+		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
+			assert_int_equal(weight[i], pass == 1 && i / WIDTH == 12 && i % WIDTH < END ? 0 : WEIGHT_ONE);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -465,7 +539,9 @@ int main(void)
 		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
 		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
+		cmocka_unit_test(discs_lie_on_the_plane_of_their_neighbors_whatever_the_normals),
 		cmocka_unit_test(cracks_are_closed_inside_of_the_plain_frame),
+		cmocka_unit_test(cracks_of_magnified_samples_are_closed_beside_empty_cells),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }

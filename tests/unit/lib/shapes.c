@@ -54,7 +54,6 @@ static struct sample trace(const double axis[3][3], double x, double y, double r
 	for (int k = 0; k < 3; k++)
 		p[k] = x * axis[0][k] + y * axis[1][k] + s.depth * axis[2][k];
 	s.valid = fabs(p[0]) <= 0.7 && fabs(p[1]) <= 0.7;
-	v3d_set(s.normal, 0, 0, 1);
 	return s;
 }
 
@@ -67,6 +66,8 @@ static void add_block(struct arrays *a, const struct shape_options *o, const str
 	for (int i = 0; i < 64; i++) {
 		int r = 8 * row + i / 8, c = 8 * col + i % 8;
 		s[i] = trace(axis, (c + (r & 1) * 0.5) * dx, r * dx * sqrt(0.75), radius);
+		if (radius <= 0)
+			v3d_set(s[i].normal, sin(o->tilt), 0, cos(o->tilt));
 		if (!s[i].valid)
 			continue;
 		mask |= UINT64_C(1) << i;

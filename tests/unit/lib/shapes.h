@@ -12,6 +12,7 @@ struct shape_options {
 	int two_sided, unlit;
 	int cones;             /* with [G] 6.4's visibility cones */
 	double origin[3], scale;
+	double tilt; /* radians about y, of the square's normals, as a map of normals does; its samples stay in the plane */
 };
 
 /* A sphere of the given radius (at most 1) about the inner origin, seen from outside; or, with radius 0, the square of
