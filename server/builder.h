@@ -2,10 +2,10 @@
  *
  *   psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N
  *
- * niced, with limits of address space and processor time, ended with the daemon. psr-model is the one beside psrd's own
- * executable, else the first in PATH. Lines "stage done total" on descriptor 3 become progress, the last line on
- * standard error becomes the text of a failure. Failures of the source (not of the system) are remembered by key, those of a limit
- * by key and resolution.
+ * niced, with limits of address space and processor time, ended with the daemon. psr-model is the one beside psrd's
+ * own executable, else the first in PATH. Lines "stage done total" on descriptor 3 become progress, the last line on
+ * standard error becomes the text of a failure. Failures of the source (not of the system) are remembered by key,
+ * those of a limit by key and resolution.
  *
  * All functions belong to the loop's thread. */
 #ifndef PSRD_BUILDER_H

@@ -289,9 +289,10 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	return o;
 }
 
-/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of --resolution, its
- * doubles, and --max-resolution, the first that has nine tenths of them. So a source has few models in the cache,
- * whatever clients ask for; which one a client gets depends on nothing else; and a model's own resolution asks for it. */
+/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of --resolution,
+ * its doubles, and --max-resolution, the first that has nine tenths of them. So a source has few models in the cache,
+ * whatever clients ask for; which one a client gets depends on nothing else; and a model's own resolution asks for
+ * it. */
 static uint32_t find_resolution(const struct options *options, uint32_t pixels)
 {
 	const uint32_t most = (uint32_t)options->max_resolution;

@@ -14,15 +14,14 @@ struct crease_corner {
 
 /* `crease` is 1 minus the cosine of the angle up to which faces are smooth, 0..2. n <= CREASE_MAX_CORNERS.
  *
- * Faces that differ by less belong together, directly or through others. Where neither is flat, as on a scan, they do up
- * to 1.7 times that angle: there a step tells of noise and of coarse triangles as often as of an edge.
+ * Faces that differ by less belong together, directly or through others. Where neither is flat, as on a scan, they do
+ * up to 1.7 times that angle: there a step tells of noise and of coarse triangles as often as of an edge.
  *
- * They share one normal where the surface is regular: where no face is further from that normal than 1.7 times the widest
- * step between neighbours, and than the angle up to which they belong together; 0.6 times the crease angle always will
- * do. Elsewhere (at the tip of a cone, or at the end of an edge that fades out) each corner takes only the faces that
- * near its own. A flat part that is much larger than the others keeps its normal, for the strips that round off its rim
- * touch it along a tangent.
- */
+ * They share one normal where the surface is regular: where no face is further from that normal than 1.7 times the
+ * widest step between neighbours, and than the angle up to which they belong together; 0.6 times the crease angle
+ * always will do. Elsewhere (at the tip of a cone, or at the end of an edge that fades out) each corner takes only
+ * the faces that are near its own. A flat part that is much larger than the others keeps its normal, for the strips
+ * that round off its rim touch it along a tangent. */
 void crease_normals(struct crease_corner *corner, unsigned n, double crease);
 
 #endif

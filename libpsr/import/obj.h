@@ -1,5 +1,5 @@
-/* OBJ's vertices in doubles. Assimp reads them as floats, which lose the triangles of a scan at survey coordinates. So it
- * gets a text whose vertices are numbered: each line "v ..." says a place in a table of what the file says. */
+/* OBJ's vertices in doubles. Assimp reads them as floats, which lose the triangles of a scan at survey coordinates.
+ * So it gets a text whose vertices are numbered: each line "v ..." says a place in a table of what the file says. */
 #ifndef PSR_IMPORT_OBJ_H
 #define PSR_IMPORT_OBJ_H
 

@@ -236,7 +236,8 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 		return psr_fail(err, PSR_ERR_ARG, "the builder's name is longer than %zu bytes", sizeof info->builder - 1);
 	/* The other counts are no larger: the validator says so, once the image stands. */
 	if (blocks->n_blocks > MODEL_MAX_BLOCKS || blocks->n_projections > MODEL_MAX_PROJECTIONS
-	    || blocks->n_clusters > blocks->n_blocks || blocks->n_masks > blocks->n_blocks || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
+	    || blocks->n_clusters > blocks->n_blocks || blocks->n_masks > blocks->n_blocks
+	    || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
 		return psr_fail(err, PSR_ERR_LIMIT, "a model of %" PRIu32 " blocks, %" PRIu32 " projections, %" PRIu32
 		                " clusters and %" PRIu64 " samples is over the limits", blocks->n_blocks, blocks->n_projections,
 		                blocks->n_clusters, blocks->n_samples);

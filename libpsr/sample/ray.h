@@ -2,11 +2,11 @@
  * psr/mesh.h. Everything here is in the inner coordinates of a model: object = origin + scale * inner.
  *
  * Surfaces are seen as glTF asks: rays go on through the backs of one-sided faces, through texels of MASK materials
- * below the cutoff, and through BLEND ones below one half, or in proportion (ray_scene_stipple). What a ray meets is found in float by a tree, and where it
- * meets it is computed in double from the primitive, so that a hit has the same bits wherever the same one is found.
- * The tree is built by one thread and walked by the same instructions on every CPU with AVX2: the same primitive is
- * found whatever the threads. Of faces that coincide the tree's order chooses one; and a ray that goes through a vertex
- * to within the rounding of a float may slip between its faces. */
+ * below the cutoff, and through BLEND ones below one half, or in proportion (ray_scene_stipple). What a ray meets is
+ * found in float by a tree, and where it meets it is computed in double from the primitive, so that a hit has the
+ * same bits wherever the same one is found. The tree is built by one thread and walked by the same instructions on
+ * every CPU with AVX2: the same primitive is found whatever the threads. Of faces that coincide the tree's order
+ * chooses one; and a ray that goes through a vertex to within the rounding of a float may slip between its faces. */
 #ifndef PSR_SAMPLE_RAY_H
 #define PSR_SAMPLE_RAY_H
 

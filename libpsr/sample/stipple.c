@@ -4,8 +4,8 @@
 
 /* Samples are drawn as wide as they are apart, which takes some of every hole, in proportion to the perimeter between
  * cells that are there and cells that are not, which goes with share * (1 - share). So fewer cells are there than the
- * opacity says: opacity = share + GROWTH * share * (1 - share). Measured with panes of 0.25, 0.5 and 0.75 in passes 1 to
- * 3, at magnifications of 0.5 to 2.7: opacities of 0.27, 0.51 and 0.74. */
+ * opacity says: opacity = share + GROWTH * share * (1 - share). Measured with panes of 0.25, 0.5 and 0.75 in passes 1
+ * to 3, at magnifications of 0.5 to 2.7: opacities of 0.27, 0.51 and 0.74. */
 #define GROWTH 0.6f
 
 static float share_of(float opacity)

@@ -7,9 +7,9 @@
  * and 0.97, with 3 as by 0.39, 0.66 and 0.92. */
 #define STIPPLE_PIXELS 3.0
 
-/* Whether a surface of this opacity, 0..1, is open at place p. Space is cut into cubes of this side, each of which has a
- * threshold: neighbours' are far apart, so that surfaces of any slope are open in proportion all over. 0 and less are
- * open everywhere, 1 and more nowhere. */
+/* Whether a surface of this opacity, 0..1, is open at place p. Space is cut into cubes of this side, each of which
+ * has a threshold: neighbours' are far apart, so that surfaces of any slope are open in proportion all over. 0 and
+ * less are open everywhere, 1 and more nowhere. */
 int stipple_is_open(float opacity, const double p[3], double cell);
 
 #endif

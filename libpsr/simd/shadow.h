@@ -34,7 +34,8 @@ static inline float magnitude(float x)
 /* Places a group; *n_facing: its samples that face the light; the others it does not reach. Returns how many the map
  * has to say something of. */
 static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n_facing, float *reaches,
-                                            const struct strip *s, size_t first, const struct shadow_map *map, int perspective, int is_face)
+                                            const struct strip *s, size_t first, const struct shadow_map *map,
+                                            int perspective, int is_face)
 {
 	const struct shadow_map m = *map;
 	const float least = GRAZING * m.scale, unit = 1 / m.focal;
@@ -74,8 +75,8 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, uint32_t *n
 	return n_here;
 }
 
-static CONSTANT_FLAGS int locate_by(struct shadow_place *at, float *reaches, const struct strip *s, const struct shadow_map *map,
-                                    int perspective, int is_face)
+static CONSTANT_FLAGS int locate_by(struct shadow_place *at, float *reaches, const struct strip *s,
+                                    const struct shadow_map *map, int perspective, int is_face)
 {
 	uint32_t n_facing = 0;
 	at->n = 0;
@@ -87,7 +88,8 @@ static CONSTANT_FLAGS int locate_by(struct shadow_place *at, float *reaches, con
 }
 
 /* Places the samples, and says whether any of them faces the light. */
-static int shadow_locate(struct shadow_place *at, float *reaches, const struct strip *s, const struct shadow_map *map, int is_face)
+static int shadow_locate(struct shadow_place *at, float *reaches, const struct strip *s, const struct shadow_map *map,
+                         int is_face)
 {
 	if (!map->perspective)
 		return locate_by(at, reaches, s, map, 0, 0);

@@ -231,8 +231,8 @@ struct strip_light {
  * word, covered, x, id. */
 typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
 /* Where their attributes are, of at least one, for which it asks the memory, and with STRIP_TWO_SIDED and STRIP_BENT
- * what their blocks are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of one strip before
- * another one is read. */
+ * what their blocks are. Repeats the last one up to a multiple of STRIP_PADDING. It is worth while to find those of
+ * one strip before another one is read. */
 typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
 /* n, is_specular, attributes, their normals and colours, of strip->pixels, which are found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);

@@ -108,10 +108,11 @@ struct psr_import_options {
 void psr_import_options_default(struct psr_import_options *options); /* 35 degrees, all cores */
 
 /* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through
- * Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of them
- * (UNSUPPORTED if it is missing). Options of NULL are the defaults. The result is validated as the comments above promise, has at least one triangle or
- * point, and belongs to the caller. ARG, NOT_FOUND, IO, FORMAT (with the place), UNSUPPORTED (names the extension), LIMIT,
- * MEMORY. Never crashes on bad input, throws nothing, reads nothing outside of the file's own folder. */
+ * Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of
+ * them (UNSUPPORTED if it is missing). Options of NULL are the defaults. The result is validated as the comments
+ * above promise, has at least one triangle or point, and belongs to the caller. ARG, NOT_FOUND, IO, FORMAT (with the
+ * place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Never crashes on bad input, throws nothing, reads nothing
+ * outside of the file's own folder. */
 int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_import_options *options,
                     struct psr_error *err);
 

@@ -205,9 +205,9 @@ typedef int psr_refine_cancelled_fn(void *userdata);
 
 /* Pass 0 is the frame of psr_render. Pass p draws the picture with 2^p x 2^p sub-pixels a pixel, for which blocks
  * choose levels and depth buffers, so that samples no longer fill whole pixels, and gives each pixel the mean of its
- * sub-pixels' light and the least of their depths. What shows between samples is closed well inside of what the frame of
- * pass 0 covers. The finer picture is drawn in windows, so that memory does not grow with the pass. Either of rgb and
- * depth may be NULL; without rgb nothing is resolved or lit.
+ * sub-pixels' light and the least of their depths. What shows between samples is closed well inside of what the frame
+ * of pass 0 covers. The finer picture is drawn in windows, so that memory does not grow with the pass. Either of rgb
+ * and depth may be NULL; without rgb nothing is resolved or lit.
  *
  * A pass is a function of scene, settings and p alone. settings->window must be that of a whole picture. Times and
  * counts are of all windows together: they count sub-pixels, and blocks and samples once in every window that draws
