@@ -33,7 +33,7 @@ static void write_line(const char *format, va_list args)
 			line[i] = '?';
 	line[n++] = '\n';
 	if (write(STDERR_FILENO, line, n) < 0)
-		return;
+		return; /* nobody is left to be told, and no client is to notice */
 }
 
 void log_info(const char *format, ...)

@@ -22,11 +22,11 @@ view() { # model source label camera-options...
 		not_ok "$model $label is measured" "$(head -n 1 "$work/err")"
 		return
 	fi
-	local inside holes stray empty p999
+	local inside holes stray p999
 	inside=$(number "$json" inside) holes=$(number "$json" holes) stray=$(number "$json" outside_drawn)
-	empty=$(number "$json" inside_empty) p999=$(number "$json" distance_p999)
-	printf '# %-9s %-21s %6d inside %2d holes (%d empty) %2d outside  p50 %.2f p99 %.2f p99.9 %.2f  colour %3d\n' \
-		"$model" "$label" "$inside" "$holes" "$empty" "$stray" \
+	p999=$(number "$json" distance_p999)
+	printf '# %-9s %-20s %5d inside %d holes %d outside p50 %.2f p99 %.2f p99.9 %.2f colour %3d\n' \
+		"$model" "$label" "$inside" "$holes" "$stray" \
 		"$(number "$json" distance_p50)" "$(number "$json" distance_p99)" "$p999" "$(number "$json" color_wrong)"
 	check "$model $label: $allowed in 10000 or fewer are drawn more than a pixel outside of the silhouette" \
 		[ $((stray * 10000)) -le $((inside * allowed)) ]
