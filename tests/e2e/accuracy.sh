@@ -25,7 +25,7 @@ view() { # model source label camera-options...
 	local inside holes stray p999
 	inside=$(number "$json" inside) holes=$(number "$json" holes) stray=$(number "$json" outside_drawn)
 	p999=$(number "$json" distance_p999)
-	printf '# %-9s %-20s %5d inside %d holes %d outside p50 %.2f p99 %.2f p99.9 %.2f colour %3d\n' \
+	printf '# %-9s %-21s %5d inside %d holes %d outside p50 %.2f p99 %.2f p99.9 %.2f off %3d\n' \
 		"$model" "$label" "$inside" "$holes" "$stray" \
 		"$(number "$json" distance_p50)" "$(number "$json" distance_p99)" "$p999" "$(number "$json" color_wrong)"
 	check "$model $label: $allowed in 10000 or fewer are drawn more than a pixel outside of the silhouette" \
