@@ -1,10 +1,9 @@
 /* APNG, version 1.0: a PNG whose IDAT is the first frame; further ones are fdAT chunks. libpng compresses each frame as
  * a picture of its own, of which the data is taken. */
-#include <png.h>
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
-#include "picture.h"
+#include "png.h"
 
 #define PNG_SIGNATURE 8
 #define MILLISECONDS 1000
@@ -18,28 +17,6 @@ struct apng {
 	uint8_t *data;        /* a frame as a PNG */
 	size_t n_data, capacity;
 };
-
-static void on_error(png_structp png, png_const_charp message)
-{
-	psr_fail(png_get_error_ptr(png), PSR_ERR_IO, "libpng: %s", message);
-	longjmp(png_jmpbuf(png), 1);
-}
-
-static void on_warning(png_structp png, png_const_charp message)
-{
-	(void)png;
-	(void)message;
-}
-
-static void on_write(png_structp png, png_bytep data, size_t n)
-{
-	outfile_write(png_get_io_ptr(png), data, n);
-}
-
-static void on_flush(png_structp png)
-{
-	(void)png;
-}
 
 static void put_u32(uint8_t *to, uint32_t v)
 {
@@ -58,11 +35,9 @@ int apng_open(struct apng **out, struct outfile *file, const struct psr_picture 
 	struct apng *apng = calloc(1, sizeof *apng);
 	uint8_t control[8];
 
-	if (apng != NULL) {
-		apng->png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &apng->why, on_error, on_warning);
-		apng->info = apng->png != NULL ? png_create_info_struct(apng->png) : NULL;
-	}
-	if (apng == NULL || apng->info == NULL) {
+	if (apng != NULL)
+		apng->png = png_writer_create(&apng->info, &apng->why);
+	if (apng == NULL || apng->png == NULL) {
 		apng_close(apng, 0, err);
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory to write an animation");
 	}
@@ -75,11 +50,7 @@ int apng_open(struct apng **out, struct outfile *file, const struct psr_picture 
 		apng_close(apng, 0, NULL);
 		return code;
 	}
-	png_set_write_fn(apng->png, file, on_write, on_flush);
-	png_set_IHDR(apng->png, apng->info, first->width, first->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-	             PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-	png_set_sRGB(apng->png, apng->info, PNG_sRGB_INTENT_PERCEPTUAL);
-	png_write_info(apng->png, apng->info);
+	png_writer_begin(apng->png, apng->info, file, png_write_outfile, first);
 	png_write_chunk(apng->png, (png_const_bytep)"acTL", control, sizeof control);
 	*out = apng;
 	return PSR_OK;
@@ -102,32 +73,6 @@ static void on_frame_write(png_structp png, png_bytep data, size_t n)
 	}
 	memcpy(apng->data + apng->n_data, data, n);
 	apng->n_data += n;
-}
-
-static int compress_frame(struct apng *apng, const struct psr_picture *picture, struct psr_error *err)
-{
-	struct psr_error why = { .code = PSR_OK };
-	png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &why, on_error, on_warning);
-	png_infop info = png != NULL ? png_create_info_struct(png) : NULL;
-
-	apng->n_data = 0;
-	if (info == NULL) {
-		png_destroy_write_struct(&png, NULL);
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory to write an animation");
-	}
-	if (setjmp(png_jmpbuf(png)) != 0) {
-		png_destroy_write_struct(&png, &info);
-		return psr_fail(err, why.code, "%s", why.text);
-	}
-	png_set_write_fn(png, apng, on_frame_write, on_flush);
-	png_set_IHDR(png, info, picture->width, picture->height, 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
-	             PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-	png_write_info(png, info);
-	for (uint32_t y = 0; y < picture->height; y++)
-		png_write_row(png, picture->rgb + (size_t)y * picture->width * 3);
-	png_write_end(png, info);
-	png_destroy_write_struct(&png, &info);
-	return PSR_OK;
 }
 
 static void write_control(struct apng *apng, const struct psr_picture *picture)
@@ -157,8 +102,10 @@ static void write_data(struct apng *apng, uint8_t *data, uint32_t n)
 
 int apng_add(struct apng *apng, const struct psr_picture *picture, struct psr_error *err)
 {
-	int code = compress_frame(apng, picture, err);
+	int code;
 
+	apng->n_data = 0;
+	code = png_encode(apng, on_frame_write, picture, err);
 	if (code != PSR_OK)
 		return code;
 	if (setjmp(png_jmpbuf(apng->png)) != 0)

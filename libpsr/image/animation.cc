@@ -8,22 +8,12 @@
 #include <string>
 #include <vector>
 
+#include "fail.h"
 extern "C" {
 #include "base/image_module.h"
 }
 
 namespace {
-
-int fail(char *message, unsigned size, const std::string &text)
-{
-	std::string clean = text;
-
-	for (char &c : clean)
-		if (static_cast<unsigned char>(c) < 32)
-			c = ' ';
-	std::snprintf(message, size, "%s", clean.c_str());
-	return 1;
-}
 
 struct Animation {
 	std::unique_ptr<OIIO::ImageOutput> out;

@@ -1,0 +1,20 @@
+// What the image module's writers have in common.
+#ifndef PSR_IMAGE_FAIL_H
+#define PSR_IMAGE_FAIL_H
+
+#include <cstdio>
+#include <string>
+
+// Leaves the text without control characters in a caller's message of `size` bytes. Returns 1, a writer's failure.
+inline int fail(char *message, unsigned size, const std::string &text)
+{
+	std::string clean = text;
+
+	for (char &c : clean)
+		if (static_cast<unsigned char>(c) < 32)
+			c = ' ';
+	std::snprintf(message, size, "%s", clean.c_str());
+	return 1;
+}
+
+#endif
