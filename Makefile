@@ -57,21 +57,23 @@ say = $(if $(filter 1,$(V)),,@printf '  %-5s %s\n' $(1) $(2))
 
 # --- what is made of what -------------------------------------------------------------------------------------------
 
+# The objects of all sources under some folders (tree), of some patterns (objs).
+tree = $(patsubst %,$(BUILD)/%.o,$(sort $(shell find $(1) -name '*.c' -o -name '*.cc')))
 objs = $(patsubst %,$(BUILD)/%.o,$(sort $(wildcard $(1))))
 
 SIMD_O         := $(call objs,libpsr/simd/*.c libpsr/simd/c/*.c)
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
 endif
-LIBPSR_O       := $(call objs,libpsr/base/*.c libpsr/model/*.c libpsr/render/*.c) $(SIMD_O)
-LIBPSR_BUILD_O := $(call objs,libpsr/import/*.c libpsr/import/*.cc libpsr/sample/*.c libpsr/measure/*.c)
-IMAGE_O        := $(call objs,libpsr/image/*.cc)
-PROTO_O        := $(call objs,proto/*.c)
-CLIENT_LIB_O   := $(call objs,client/lib/*.c)
-PSRD_O         := $(call objs,server/*.c)
-PSR_O          := $(call objs,client/*.c)
-MODEL_O        := $(call objs,models/*.c)
-TEST_LIB_O     := $(call objs,tests/unit/lib/*.c)
+LIBPSR_O       := $(call tree,libpsr/base libpsr/model libpsr/render) $(SIMD_O)
+LIBPSR_BUILD_O := $(call tree,libpsr/import libpsr/surface libpsr/ray libpsr/sample libpsr/measure)
+IMAGE_O        := $(call tree,libpsr/image)
+PROTO_O        := $(call tree,proto)
+CLIENT_LIB_O   := $(call tree,client/lib)
+PSRD_O         := $(call tree,server)
+PSR_O          := $(filter-out $(CLIENT_LIB_O),$(call tree,client))
+MODEL_O        := $(call tree,models)
+TEST_LIB_O     := $(call tree,tests/unit/lib)
 SIMD_TEST_O    := $(call objs,tests/simd/lib/*.c)
 
 LIB := $(BUILD)/lib
@@ -112,10 +114,10 @@ $(BUILD)/%.cc.o: %.cc
 	$(Q)$(CXX) $(CXXFLAGS_ALL) -c $< -o $@
 
 # Other people's code, compiled once for all configurations and not held to our warnings.
-$(BUILD)/libpsr/import/third_%.cc.o: build/third/third_%.cc.o
+$(BUILD)/libpsr/import/gltf/third_%.cc.o: build/third/third_%.cc.o
 	@mkdir -p $(@D)
 	@cp $< $@
-build/third/third_%.cc.o: libpsr/import/third_%.cc
+build/third/third_%.cc.o: libpsr/import/gltf/third_%.cc
 	@mkdir -p $(@D)
 	$(call say,CXX,$<)
 	$(Q)$(CXX) -std=c++17 -O2 -g -fPIC -w $(INC) -c $< -o $@
@@ -150,8 +152,9 @@ $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 
 # --- tests ----------------------------------------------------------------------------------------------------------
 
-UNIT       := $(sort $(wildcard tests/unit/*.c))
-UNIT_BUILD := $(filter tests/unit/import_% tests/unit/sample_% tests/unit/measure_% tests/unit/models_%,$(UNIT))
+# What a unit test links depends on its folder.
+UNIT       := $(filter-out tests/unit/lib/%,$(sort $(wildcard tests/unit/*/*.c)))
+UNIT_BUILD := $(filter $(foreach room,import sample measure models study,tests/unit/$(room)/%),$(UNIT))
 UNIT_LIGHT := $(filter-out $(UNIT_BUILD),$(UNIT))
 unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
 FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
@@ -179,7 +182,7 @@ CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
 L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson $(L_PSR)
 # What stands in tests/*/ finds the image module by its run path.
-L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib'
+L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
 
 # Tests keep their assertions in every configuration. What builds their models is not under test, and would take most of
 # the sanitizers' time.
@@ -189,18 +192,18 @@ $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 
 $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST)
-$(call unit_bin,$(filter tests/unit/server_%,$(UNIT))): $(SERVER_PARTS)
-$(call unit_bin,tests/unit/client_wish.c): $(CLIENT_PARTS)
+$(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
+$(call unit_bin,tests/unit/client/wish.c): $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
-$(call unit_bin,$(filter tests/unit/models_%,$(UNIT))): $(MODEL_PARTS)
+$(call unit_bin,$(filter tests/unit/models/% tests/unit/study/%,$(UNIT))): $(MODEL_PARTS)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
 	$(link) $(L_TEST)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
-$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c server/wire.c) $(LIB)/libpsr.a
+$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c server/frames/wire.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
@@ -211,10 +214,10 @@ $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/l
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
 	peer peer_order pictures plot report scene thesis warp))
-$(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 EFFECTS_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child effects effects_prices effects_quality isolate level ours price report scene))
-$(EFFECTS): $(EFFECTS_O) $(addprefix $(BUILD)/server/,codec.c.o outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(EFFECTS): $(EFFECTS_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math

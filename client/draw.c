@@ -3,9 +3,9 @@
 #include <string.h>
 #include <time.h>
 #include "psr.h"
-#include "replay.h"
-#include "series.h"
-#include "sink.h"
+#include "client/replay/replay.h"
+#include "client/output/series.h"
+#include "client/output/sink.h"
 
 void draw_wish_init(struct draw_wish *wish, const char *program)
 {

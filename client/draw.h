@@ -2,10 +2,10 @@
 #ifndef PSR_CLIENT_DRAW_H
 #define PSR_CLIENT_DRAW_H
 
-#include "output.h"
-#include "quality.h"
-#include "show.h"
-#include "view.h"
+#include "client/output/output.h"
+#include "client/scene/quality.h"
+#include "client/output/show.h"
+#include "client/scene/view.h"
 
 struct draw_wish {
 	const char *program; /* "psr shot", for messages */

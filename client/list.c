@@ -1,7 +1,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "preset.h"
+#include "client/scene/preset.h"
 #include "psr.h"
 
 static const char *state_name(uint8_t state)

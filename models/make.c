@@ -5,8 +5,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include "generators.h"
-#include "glb.h"
+#include "models/shapes/generators.h"
+#include "models/shapes/glb.h"
 #include "psr/cli.h"
 
 /* Triangles as drawn, every instance counted. */

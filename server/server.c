@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "accept.h"
-#include "cache.h"
-#include "conn.h"
-#include "frames.h"
+#include "server/net/accept.h"
+#include "server/models/cache.h"
+#include "server/net/conn.h"
+#include "server/frames/frames.h"
 #include "log.h"
-#include "opener.h"
+#include "server/models/opener.h"
 #include "psr/isa.h"
 #include "server.h"
 

@@ -2,11 +2,11 @@
 #ifndef PSRD_SERVER_H
 #define PSRD_SERVER_H
 
-#include "builder.h"
-#include "catalogue.h"
-#include "codec.h"
-#include "listen.h"
-#include "loop.h"
+#include "server/models/builder.h"
+#include "server/models/catalogue.h"
+#include "server/frames/codec.h"
+#include "server/net/listen.h"
+#include "server/net/loop.h"
 #include "options.h"
 #include "psr/pool.h"
 #include "psr/proto.h"

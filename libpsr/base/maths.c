@@ -1,4 +1,4 @@
-#include "base/maths.h"
+#include "maths.h"
 
 #define HALF_PI 1.57079632679489661923
 

@@ -110,7 +110,7 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err); /* leaves t
  * split: the others come at the end. MEMORY, LIMIT. */
 int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 
-/* cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one
+/* import/cloud/cloud.c: called by import_mesh_finish where there are points, which are finite: drops all but one of those at one
  * place, then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
@@ -126,12 +126,12 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
  * "C". */
 int import_number(double *x, const uint8_t *word, size_t n, locale_t locale);
 
-/* image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT,
+/* import/image/image.c: decodes by magic (TGA, which has none, by the ending of `name`), through base/image_module.h. FORMAT,
  * UNSUPPORTED, LIMIT, MEMORY, and what opening the module returns. */
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
                         uint64_t max_pixels, struct psr_error *err);
 
-/* image_png.c: the most common kind by libpng, without the module, which takes a quarter of a second to open: PNG of 8
+/* import/image/image_png.c: the most common kind by libpng, without the module, which takes a quarter of a second to open: PNG of 8
  * bits, RGB with or without alpha, not interlaced. The same pixels. 0 if it is another kind, over a limit or broken:
  * then *out is not touched, and the module says what it is. */
 int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, uint64_t max_pixels);

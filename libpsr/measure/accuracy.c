@@ -1,8 +1,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/mem.h"
-#include "../base/vec.h"
+#include "base/mem.h"
+#include "base/vec.h"
 #include "psr/pool.h"
 #include "truth.h"
 

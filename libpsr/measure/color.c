@@ -1,8 +1,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/mem.h"
-#include "../base/srgb.h"
+#include "base/mem.h"
+#include "base/srgb.h"
 #include "psr/measure.h"
 
 #define RAYS 4 /* along the side of a pixel */

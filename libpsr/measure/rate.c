@@ -2,10 +2,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include "../base/mem.h"
-#include "../base/vec.h"
-#include "../sample/door.h"
-#include "../sample/ray_tree.h"
+#include "base/mem.h"
+#include "base/vec.h"
+#include "surface/validate.h"
+#include "ray/tree.h"
 #include "psr/direction.h"
 #include "rate.h"
 

@@ -1,10 +1,10 @@
 #include <math.h>
 #include <stdlib.h>
-#include "../base/mem.h"
-#include "../base/srgb.h"
-#include "../base/vec.h"
-#include "../sample/ray.h"
-#include "../sample/surface.h"
+#include "base/mem.h"
+#include "base/srgb.h"
+#include "base/vec.h"
+#include "ray/ray.h"
+#include "surface/surface.h"
 #include "psr/direction.h"
 #include "psr/measure.h"
 #include "psr/model.h"

@@ -2,12 +2,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "../base/mem.h"
-#include "../base/vec.h"
-#include "../sample/door.h"
-#include "../sample/ray.h"
-#include "../sample/stipple.h"
-#include "../sample/surface.h"
+#include "base/mem.h"
+#include "base/vec.h"
+#include "surface/validate.h"
+#include "ray/ray.h"
+#include "surface/stipple.h"
+#include "surface/surface.h"
 #include "psr/model.h"
 #include "psr/pool.h"
 

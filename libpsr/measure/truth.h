@@ -2,7 +2,7 @@
 #ifndef PSR_MEASURE_TRUTH_H
 #define PSR_MEASURE_TRUTH_H
 
-#include "../sample/ray.h"
+#include "ray/ray.h"
 #include "psr/measure.h"
 #include "view.h"
 

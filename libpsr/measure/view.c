@@ -1,6 +1,6 @@
 #include "view.h"
-#include "../base/maths.h"
-#include "../base/vec.h"
+#include "base/maths.h"
+#include "base/vec.h"
 #include "psr/render.h"
 
 int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height,

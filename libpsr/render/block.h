@@ -3,7 +3,7 @@
 #define PSR_RENDER_BLOCK_H
 
 #include "psr/direction.h"
-#include "render/render.h"
+#include "render.h"
 
 /* Index of a valid sample's depth and attributes. */
 static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uint32_t sample)

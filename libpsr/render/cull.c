@@ -5,8 +5,8 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "psr/direction.h"
-#include "render/render.h"
-#include "render/screen.h"
+#include "render.h"
+#include "screen.h"
 
 /* Two passes over chunks of blocks: the first decides, block by block, and counts for each tile; the second
  * writes the bins where the counts say, in canonical order whatever the threads did. */

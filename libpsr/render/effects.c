@@ -1,4 +1,4 @@
-#include "render/render.h"
+#include "render.h"
 
 static const struct {
 	const char *name, *why[PSR_WHY_COST + 1];

@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render/render.h"
+#include "render.h"
 
 /* Beyond the paper, both phases know depth: what shines through a hole is whatever is nearest, so among the pixels that
  * are averaged only those count that are not behind the nearest by more than a cell's threshold. A near edge's colour

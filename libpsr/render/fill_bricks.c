@@ -1,6 +1,6 @@
 #include <math.h>
 #include <string.h>
-#include "render/render.h"
+#include "render.h"
 
 #define FILL_PIECE 256 /* pixels of a row that are worked on together. Rows are gone through from end to end before the
                         * next: in shorter steps memory is not fetched ahead, and a pull takes a quarter more */

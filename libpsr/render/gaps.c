@@ -1,5 +1,5 @@
 #include <string.h>
-#include "render/render.h"
+#include "render.h"
 
 /* Nothing is drawn near: whole weights, and no look at the words. */
 static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)

@@ -6,8 +6,8 @@
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "psr/direction.h"
-#include "render/render.h"
-#include "render/shadow.h"
+#include "render.h"
+#include "shadow.h"
 
 struct psr_renderer {
 	const struct simd *simd;

@@ -4,7 +4,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "psr/direction.h"
-#include "render/render.h"
+#include "render.h"
 
 /* z' below this part of the scene's extent is not drawn when the request names no near distance. */
 #define AUTO_NEAR (1.0 / 16384)

@@ -1,5 +1,5 @@
 #include <string.h>
-#include "render/render.h"
+#include "render.h"
 
 static void put_words(const struct simd *simd, const struct plan *plan, uint64_t *to, const uint64_t *word, uint32_t n)
 {

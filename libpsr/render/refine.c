@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "render/render.h"
+#include "render.h"
 
 /* Windows begin at multiples of the coarsest cell, so that cells are those of the whole picture, and of what is drawn a
  * margin is not used: holes that reach across a window's border are filled from both of its sides. */

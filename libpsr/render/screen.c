@@ -1,4 +1,4 @@
-#include "render/screen.h"
+#include "screen.h"
 
 #include <assert.h>
 #include <math.h>

@@ -1,5 +1,5 @@
 #include "psr/direction.h"
-#include "render/render.h"
+#include "render.h"
 
 #define TIMED_EVERY 16 /* strips: clocks cost, too */
 

@@ -4,7 +4,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
-#include "render/shadow.h"
+#include "shadow.h"
 
 /* All that maps depend on of an instance. */
 struct placed {

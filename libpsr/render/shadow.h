@@ -6,7 +6,7 @@
 #ifndef PSR_RENDER_SHADOW_H
 #define PSR_RENDER_SHADOW_H
 
-#include "render/render.h"
+#include "render.h"
 
 struct shadow; /* the maps, and what drawing them takes */
 

@@ -2,7 +2,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
-#include "render/shadow.h"
+#include "shadow.h"
 
 #define HALF_PI 1.57079632679489661923
 #define MARGIN 3        /* texels on each side: four cells lie around every place that is lit */

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "render/shadow.h"
+#include "shadow.h"
 
 /* In cells: the least that a plane must fall within them, and a cell's width. Samples that are half a cell from its
  * centre in both directions need the half; the width makes up for normals that are not the surface's own. */

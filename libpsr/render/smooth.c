@@ -1,7 +1,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render/render.h"
+#include "render.h"
 
 #define EDGE 3.0 /* pixel widths from one pixel to the next, as for gaps ([G] 7.2) */
 

@@ -3,7 +3,7 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "psr/direction.h"
-#include "render/block.h"
+#include "block.h"
 #include "simd/block.h"
 
 /* Steps of the lattice: no point of an equilateral one is further than 1/sqrt(3) from a sample. */

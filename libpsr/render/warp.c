@@ -1,6 +1,6 @@
 #include "base/maths.h"
 #include "psr/direction.h"
-#include "render/render.h"
+#include "render.h"
 
 uint32_t warp_gap(uint32_t width)
 {

@@ -3,18 +3,18 @@
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
-#include "../base/maths.h"
-#include "../base/mem.h"
-#include "../base/vec.h"
-#include "adequacy.h"
-#include "door.h"
-#include "draft.h"
-#include "pack.h"
-#include "projection.h"
+#include "base/maths.h"
+#include "base/mem.h"
+#include "base/vec.h"
+#include "sample/mend/adequacy.h"
+#include "surface/validate.h"
+#include "sample/levels/draft.h"
+#include "sample/pack/pack.h"
+#include "sample/project/projection.h"
 #include "psr/build.h"
 #include "psr/pool.h"
-#include "ray.h"
-#include "stipple.h"
+#include "ray/ray.h"
+#include "surface/stipple.h"
 
 #define LEAST_RESOLUTION 8
 #define MOST_RESOLUTION 8192

@@ -1,11 +1,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include "../base/mem.h"
+#include "base/mem.h"
 #include "level.h"
 #include "psr/error.h"
-#include "seen_out.h"
-#include "thin_cover.h"
+#include "sample/visible/look_out.h"
+#include "sample/thin/cover.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
 #define FIELD_PIXELS 3

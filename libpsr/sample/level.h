@@ -9,16 +9,16 @@
 #define PSR_SAMPLE_LEVEL_H
 
 #include <stdint.h>
-#include "cover.h"
-#include "field.h"
-#include "projection.h"
+#include "sample/own/kept.h"
+#include "sample/own/field.h"
+#include "sample/project/projection.h"
 #include "psr/mesh.h"
 #include "psr/pool.h"
-#include "ray.h"
-#include "seen.h"
-#include "sheet.h"
-#include "surface.h"
-#include "texture.h"
+#include "ray/ray.h"
+#include "sample/visible/visible_set.h"
+#include "sample/project/sheet.h"
+#include "surface/surface.h"
+#include "surface/texture.h"
 
 /* What is known of a primitive's sides. SIDE_THIN: 0.6 pixels behind all of it, at most, is another face of the same
  * plain material, as of needles and leaves. A sample there stands for the other side, too. SIDE_NARROW: it is thin, and
@@ -52,20 +52,20 @@ struct level_ref {
 	struct sheet_ref at;
 };
 
-/* thin.c: finds what is thin, of a level that will be traced along these. */
+/* sample/thin/mark.c: finds what is thin, of a level that will be traced along these. */
 void thin_mark(struct level *level, const struct psr_projection *projection);
 
-/* owner.c: which projection owns a place that faces n. */
+/* sample/own/owner.c: which projection owns a place that faces n. */
 unsigned owner_of(const struct level *level, const float p[3], const float n[3]);
 
 /* Sets `seen` and `owned` of all patches, after tracing. MEMORY. */
 int owner_mark(struct level *level);
 
-/* merge.c: gives what patches that own less than a quarter of a block own to others that see it as well; what is
+/* sample/own/merge.c: gives what patches that own less than a quarter of a block own to others that see it as well; what is
  * then alone in its patch is owned no more. */
 void merge_patches(struct level *level);
 
-/* keep.c: whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */
+/* sample/own/keep.c: whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */
 int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3], const float n[3]);
 
 /* Keeps what is owned, or a single sample. MEMORY. */
@@ -88,7 +88,7 @@ struct surface_spot {
 /* A kept sample within as many pixels is in every pixel that has the place in its middle. */
 #define LEVEL_NEAR 0.5
 
-/* dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0
+/* sample/mend/dice.c: tests places all over the surface, a third of a pixel apart, and adds what they lack; others in each round, 0
  * or greater. MEMORY. */
 int dice_surface(struct level *level, int round);
 

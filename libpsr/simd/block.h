@@ -2,7 +2,7 @@
 #ifndef PSR_SIMD_BLOCK_H
 #define PSR_SIMD_BLOCK_H
 
-#include "simd/simd.h"
+#include "simd.h"
 
 struct warp_block {
 	double origin[3]; /* of its first lattice point, at depth 0 */

@@ -2,7 +2,7 @@
  * ISA. */
 #include <string.h>
 #include "base/maths.h"
-#include "simd/simd.h"
+#include "simd.h"
 
 /* How a block faces, by its visibility cone ([G] 6.4): with d from the eye to the sphere's centre, at the angle theta
  * from the cone's axis, a normal n within alpha of that and a sample x within r of the centre, n . (x - eye) is between

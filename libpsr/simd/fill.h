@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 #include "base/maths.h"
-#include "simd/simd.h"
+#include "simd.h"
 
 /* Cells 2x and 2x + 1, the former in the lower half, as vectors take them: bytes are little-endian. */
 static inline uint32_t pair_at(const uint16_t *values, uint32_t x)

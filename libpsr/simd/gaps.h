@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
-#include "simd/simd.h"
+#include "simd.h"
 
 #define GAPS_STRIDE (GAPS_WIDTH + 32) /* a column of neighbors on each side, and aligned rows */
 #define GAPS_LEFT 16

@@ -2,7 +2,7 @@
 #ifndef PSR_SIMD_KERNELS_H
 #define PSR_SIMD_KERNELS_H
 
-#include "simd/simd.h"
+#include "simd.h"
 
 warp_fn warp_c, warp_avx2, warp_avx512;
 /* The others of these: strip.h, fill.h. */

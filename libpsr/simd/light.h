@@ -1,6 +1,6 @@
 /* Light on strips, as plain loops, which the compiler turns into vectors; compiled once for each ISA. */
 #include "base/maths.h"
-#include "simd/strip_parts.h"
+#include "strip_parts.h"
 
 /* Of a strip: R.V, and how much of the light makes a highlight. */
 struct highlights {

@@ -2,7 +2,7 @@
  * turns into vectors; compiled once for each ISA. */
 #include <string.h>
 #include "base/maths.h"
-#include "simd/strip_parts.h"
+#include "strip_parts.h"
 
 #define GROUP STRIP_PADDING /* samples that are looked up, or not, together */
 

@@ -1,7 +1,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-#include "simd/simd.h"
+#include "simd.h"
 
 static const char *const names[PSR_N_ISAS] = { "c", "avx2", "avx512" };
 static atomic_int cap = -1; /* not asked for yet */

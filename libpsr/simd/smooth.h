@@ -2,7 +2,7 @@
  * each ISA. */
 #include <math.h>
 #include <string.h>
-#include "simd/simd.h"
+#include "simd.h"
 
 #define MOST_BEHIND 6 /* of eight parts, so that what is a pixel wide does not vanish */
 

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/srgb.h"
-#include "simd/strip_parts.h"
+#include "strip_parts.h"
 
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {

@@ -3,7 +3,7 @@
 #define PSR_SIMD_STRIP_PARTS_H
 
 #include "base/srgb.h"
-#include "simd/simd.h"
+#include "simd.h"
 
 /* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
 #define CONSTANT_FLAGS inline __attribute__((always_inline))

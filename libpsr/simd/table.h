@@ -1,14 +1,14 @@
 /* The loops, and the table of one instruction set, for c/, avx2/ and avx512/. Arguments: the kernel that warps, and a
  * macro that names the variant of those kernels that an instruction set may have written by hand. */
-#include "simd/cull.h"
-#include "simd/fill.h"
-#include "simd/gaps.h"
-#include "simd/kernels.h"
-#include "simd/light.h"
-#include "simd/shadow.h"
-#include "simd/smooth.h"
-#include "simd/strip.h"
-#include "simd/warp_clear.h"
+#include "cull.h"
+#include "fill.h"
+#include "gaps.h"
+#include "kernels.h"
+#include "light.h"
+#include "shadow.h"
+#include "smooth.h"
+#include "strip.h"
+#include "warp_clear.h"
 
 #define SIMD_TABLE(warp_kernel, KERNEL) { \
 	.cull = cull,                                  \

@@ -1,7 +1,7 @@
 /* Plain loops, which the compiler turns into vectors; compiled once for each ISA. */
 #include <math.h>
 #include <string.h>
-#include "simd/simd.h"
+#include "simd.h"
 
 /* Whether the part at pixel (x, y) of the tile is among those of the bits. */
 static inline int is_part(uint32_t bits, int32_t x, int32_t y)

@@ -5,7 +5,7 @@
 #ifndef PSR_SIMD_WARP_LIST_H
 #define PSR_SIMD_WARP_LIST_H
 
-#include "simd/block.h"
+#include "block.h"
 
 #define LIST 512
 struct words {

@@ -4,8 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "effects.h"
-#include "libpsr/base/srgb.h"
-#include "libpsr/base/vec.h"
+#include "base/srgb.h"
+#include "base/vec.h"
 #include "price.h"
 #include "psr/measure.h"
 #include "report.h"

@@ -8,7 +8,7 @@
 #ifdef __SSE__
 #include <pmmintrin.h>
 #endif
-#include "libpsr/base/srgb.h"
+#include "base/srgb.h"
 #include "psr/pool.h"
 #include "report.h"
 

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "isolate.h"
-#include "libpsr/base/vec.h"
+#include "base/vec.h"
 #include "ours.h"
 #include "parts.h"
 #include "report.h"

@@ -9,8 +9,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "libpsr/base/vec.h"
-#include "libpsr/sample/material.h"
+#include "base/vec.h"
+#include "surface/material.h"
 #include "psr/direction.h"
 #include "report.h"
 

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "child.h"
-#include "libpsr/measure/rate.h"
+#include "measure/rate.h"
 #include "psr/mesh.h"
 #include "psr/model.h"
 

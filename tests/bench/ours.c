@@ -5,7 +5,7 @@
 #include "psr/build.h"
 #include "psr/proto.h"
 #include "report.h"
-#include "server/codec.h"
+#include "server/frames/codec.h"
 
 #define MAX_FRAMES 512
 #define N_WARM 3

@@ -3,8 +3,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "libpsr/base/vec.h"
-#include "libpsr/sample/material.h"
+#include "base/vec.h"
+#include "surface/material.h"
 #include "psr/direction.h"
 #include "report.h"
 

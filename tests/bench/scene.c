@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include "child.h"
 #include "isolate.h"
-#include "libpsr/base/vec.h"
+#include "base/vec.h"
 #include "ours.h"
 #include "report.h"
 

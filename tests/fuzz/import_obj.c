@@ -1,6 +1,6 @@
 /* The text that Assimp gets in the place of an OBJ: as many vertices as were read, numbered in their order. */
 #include <string.h>
-#include "import/obj.h"
+#include "import/assimp/obj.h"
 #include "import_check.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)

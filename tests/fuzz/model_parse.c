@@ -2,7 +2,7 @@
  * past those. Properties: what is taken obeys the rules that readers rely on, and the same model made again from its
  * arrays is taken too and holds the same. */
 #include <stdlib.h>
-#include "../../libpsr/model/pack.h"
+#include "model/pack.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 

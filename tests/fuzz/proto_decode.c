@@ -2,7 +2,7 @@
  * splits; what a decoder takes encodes to the very bytes that it came from. */
 #include <stdlib.h>
 #include <string.h>
-#include "../unit/proto_table.h"
+#include "tests/unit/proto/table.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 

@@ -8,7 +8,7 @@
 #include <xxhash.h>
 #include "psr/isa.h"
 #include "simd/simd.h"
-#include "tests/golden/shot.h"
+#include "shot.h"
 
 #define FOLDER "tests/golden"
 #define MAX_SHOTS 256

@@ -5,8 +5,8 @@
 #include "base/srgb.h"
 #include "psr/cli.h"
 #include "psr/client.h"
-#include "server/wire.h"
-#include "tests/golden/shot.h"
+#include "server/frames/wire.h"
+#include "shot.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 #define MAX_WORDS 32

@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
-#include "psr/picture.h"
+#include "picture.h"
 #include "psr/proto.h"
 
 #ifdef __cplusplus

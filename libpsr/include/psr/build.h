@@ -3,9 +3,9 @@
 #define PSR_BUILD_H
 
 #include <stdint.h>
-#include "psr/error.h"
-#include "psr/mesh.h"
-#include "psr/model.h"
+#include "error.h"
+#include "mesh.h"
+#include "model.h"
 
 #ifdef __cplusplus
 extern "C" {

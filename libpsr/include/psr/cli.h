@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "psr/error.h"
+#include "error.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -5,7 +5,7 @@
 #ifndef PSR_ISA_H
 #define PSR_ISA_H
 
-#include "psr/error.h"
+#include "error.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -3,9 +3,9 @@
 #define PSR_MEASURE_H
 
 #include <stdint.h>
-#include "psr/error.h"
-#include "psr/mesh.h"
-#include "psr/scene.h"
+#include "error.h"
+#include "mesh.h"
+#include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {

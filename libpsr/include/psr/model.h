@@ -8,8 +8,8 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "psr/error.h"
-#include "psr/view.h"
+#include "error.h"
+#include "view.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -5,9 +5,9 @@
 #define PSR_RENDER_H
 
 #include <stdint.h>
-#include "psr/error.h"
-#include "psr/pool.h"
-#include "psr/scene.h"
+#include "error.h"
+#include "pool.h"
+#include "scene.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -7,9 +7,9 @@
 #define PSR_SCENE_H
 
 #include <stdint.h>
-#include "psr/error.h"
-#include "psr/model.h"
-#include "psr/view.h"
+#include "error.h"
+#include "model.h"
+#include "view.h"
 
 #ifdef __cplusplus
 extern "C" {

@@ -1,5 +1,5 @@
 #include <string.h>
-#include "tests/simd/lib/blocks.h"
+#include "blocks.h"
 
 #define DEPTH_PADDING 64 /* what psr/model.h promises beyond the last depth */
 

@@ -3,7 +3,7 @@
 #define TESTS_SIMD_BLOCKS_H
 
 #include "psr/model.h"
-#include "tests/simd/lib/check.h"
+#include "check.h"
 
 /* n_samples of each block: 1..64, or 0 for any. */
 void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks, uint32_t n_projections,

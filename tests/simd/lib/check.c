@@ -9,7 +9,7 @@
 #include <time.h>
 #include <unistd.h>
 #include "base/maths.h"
-#include "tests/simd/lib/check.h"
+#include "check.h"
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 #define TRIALS_SHARE 8 /* sanitizers make each trial as many times slower */

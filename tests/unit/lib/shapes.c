@@ -5,7 +5,7 @@
 #include <string.h>
 #include "base/vec.h"
 #include "psr/direction.h"
-#include "tests/unit/lib/shapes.h"
+#include "shapes.h"
 
 struct arrays {
 	uint32_t n_blocks, n_samples;

@@ -1,0 +1,60 @@
+/* The parts of psr bench: workers that ask for frames, and what they measured. */
+#ifndef PSR_CLIENT_BENCH_BENCH_H
+#define PSR_CLIENT_BENCH_BENCH_H
+
+#include <pthread.h>
+#include <stdint.h>
+#include "client/scene/quality.h"
+#include "client/scene/view.h"
+
+#define BENCH_MAX_CLIENTS 1024
+#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers; who has filled his share stops early */
+
+struct bench_options {
+	const char *server;
+	int64_t n_clients, seconds, n_inflight, timeout;
+	struct scene_wish scene;
+	struct view_wish view;
+	struct quality_wish quality;
+	struct psr_msg_frame frame; /* all but the camera */
+};
+
+/* Workers wait here once they are warm, until the last is: then all start, or none if one failed. */
+struct bench_gate {
+	pthread_mutex_t lock;
+	pthread_cond_t changed;
+	int64_t n_ready;
+	int state; /* 0 closed, 1 measure, -1 go home */
+};
+
+struct bench_worker {
+	const struct bench_options *options;
+	struct bench_gate *gate;
+	int64_t index;
+	pthread_t thread;
+	struct psr_client *client;
+	struct psr_msg_frame frame;
+	struct scene *scene;
+	struct psr_msg_camera start; /* the camera flies around its target from here */
+	double up[3];
+	uint64_t n_asked;
+	/* results */
+	uint32_t *sample_us; /* latency of each frame asked for within the time, the bench's to free */
+	size_t n_samples, samples_capacity;
+	uint64_t n_frames, n_bytes; /* that came within the time */
+	uint64_t n_failed, elapsed_ns;
+	int setup_code;             /* not PSR_OK: it never came to measure */
+	struct psr_error first_error; /* code 0: none */
+};
+
+void *bench_worker_run(void *worker);
+
+struct bench_result {
+	double frames_per_s, mb_per_s;
+	uint64_t n_frames, n_samples, n_failed;
+	double p50_ms, p90_ms, p99_ms, max_ms; /* 0 without samples */
+};
+/* Sorts all samples together; MEMORY. */
+int bench_sum(struct bench_result *result, const struct bench_worker *workers, int64_t n, struct psr_error *err);
+
+#endif

@@ -1,0 +1,164 @@
+#include <cjson/cJSON.h>
+#include <inttypes.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "client/scene/effects.h"
+#include "client/lib/outfile.h"
+#include "client/replay/replay.h"
+#include "report.h"
+
+#define DEGREE (3.14159265358979323846 / 180)
+
+static void add_model(cJSON *to, const struct shot_facts *facts)
+{
+	static const char *const representations[] = { "", "blocks", "octree", "dpoint" };
+	const struct scene_model *first = &facts->scene->model[0];
+	const struct psr_msg_opened *opened = &first->opened;
+	cJSON *model = cJSON_AddObjectToObject(to, "model"), *list;
+	char id[33];
+
+	for (int i = 0; i < 16; i++)
+		snprintf(id + 2 * i, 3, "%02x", opened->content_id[i]);
+	cJSON_AddStringToObject(model, "name", first->name);
+	cJSON_AddStringToObject(model, "content_id", id);
+	cJSON_AddNumberToObject(model, "samples", (double)opened->n_samples);
+	cJSON_AddNumberToObject(model, "blocks", (double)opened->n_blocks);
+	cJSON_AddNumberToObject(model, "levels", opened->n_levels);
+	cJSON_AddNumberToObject(model, "bytes", (double)opened->bytes);
+	json_add_number(model, "spacing", opened->spacing);
+	cJSON_AddNumberToObject(model, "resolution", opened->resolution);
+	json_add_number(model, "scale", opened->scale);
+	json_add_numbers(model, "origin", opened->origin, 3);
+	json_add_numbers(model, "box_min", opened->box_min, 3);
+	json_add_numbers(model, "box_max", opened->box_max, 3);
+	list = cJSON_AddArrayToObject(model, "representations");
+	for (unsigned r = 1; r < 4; r++)
+		if (opened->representations >> r & 1)
+			cJSON_AddItemToArray(list, cJSON_CreateString(representations[r]));
+}
+
+static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
+{
+	cJSON *camera = cJSON_AddObjectToObject(to, "camera");
+	int is_perspective = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE;
+
+	cJSON_AddStringToObject(camera, "kind", is_perspective ? "perspective" : "orthographic");
+	json_add_numbers(camera, "eye", wire->eye, 3);
+	json_add_numbers(camera, "target", wire->target, 3);
+	json_add_numbers(camera, "up", wire->up, 3);
+	json_add_number(camera, is_perspective ? "fov_deg" : "height",
+	                is_perspective ? wire->extent / DEGREE : wire->extent);
+	json_add_number(camera, "near", wire->near_z);
+}
+
+static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
+{
+	static const char *const stages[] = { "",      "plan", "cull",   "warp",  "gaps", "resolve",
+		                                  "shade", "fill", "encode", "queue", "total", "shadow", "smooth" };
+	static const char *const values[] = { "samples_warped", "blocks_drawn", "blocks",       "pixels_covered",
+		                                  "pixels_filled",  "samples",      "depth_levels", "lights",
+		                                  "shadow_maps",    "shadow_maps_drawn" };
+	cJSON *times = cJSON_AddObjectToObject(to, "stages"), *counts = cJSON_AddObjectToObject(to, "counts");
+
+	for (unsigned i = 0; i < end->n_entries; i++) {
+		const struct psr_msg_report_entry *entry = &end->entry[i];
+
+		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_SMOOTH) {
+			cJSON *stage = cJSON_AddObjectToObject(times, stages[entry->id]);
+
+			cJSON_AddNumberToObject(stage, "ms", (double)entry->ns / 1e6);
+			cJSON_AddNumberToObject(stage, "count", (double)entry->count);
+		} else if (entry->id >= PSR_WIRE_REPORT_SAMPLES_WARPED && entry->id <= PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN) {
+			cJSON_AddNumberToObject(counts, values[entry->id - PSR_WIRE_REPORT_SAMPLES_WARPED], (double)entry->count);
+		}
+	}
+}
+
+static void add_planes(cJSON *to, const struct psr_event *event)
+{
+	cJSON *planes = cJSON_AddArrayToObject(to, "planes"), *hashes = cJSON_AddObjectToObject(to, "hashes");
+	cJSON *checked = cJSON_AddArrayToObject(to, "checked");
+
+	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		char hash[17];
+
+		if (!(event->end->planes >> plane & 1))
+			continue;
+		snprintf(hash, sizeof hash, "%016" PRIx64, event->end->hash[plane]);
+		cJSON_AddItemToArray(planes, cJSON_CreateString(psr_plane_name(plane)));
+		cJSON_AddStringToObject(hashes, psr_plane_name(plane), hash);
+		if (event->checked >> plane & 1)
+			cJSON_AddItemToArray(checked, cJSON_CreateString(psr_plane_name(plane)));
+	}
+}
+
+static double server_ms(const struct psr_msg_frame_end *end)
+{
+	for (unsigned i = 0; i < end->n_entries; i++)
+		if (end->entry[i].id == PSR_WIRE_REPORT_TOTAL)
+			return (double)end->entry[i].ns / 1e6;
+	return 0;
+}
+
+static uint64_t now_ns(void)
+{
+	struct timespec now;
+
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
+}
+
+static cJSON *make_report(const struct shot_facts *facts)
+{
+	static const char *const status[] = { "ok", "late", "coarse" };
+	const struct psr_event *event = facts->event;
+	const double size[2] = { event->picture->width, event->picture->height };
+	cJSON *report = cJSON_CreateObject(), *ms;
+
+	cJSON_AddStringToObject(report, "server", facts->server);
+	add_model(report, facts);
+	cJSON_AddItemToObject(report, "size", cJSON_CreateDoubleArray(size, 2));
+	add_camera(report, &event->begin->camera);
+	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
+	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.is_smooth);
+	cJSON_AddNumberToObject(report, "pass", event->begin->pass);
+	cJSON_AddStringToObject(report, "status", status[event->end->status < 3 ? event->end->status : 0]);
+	cJSON_AddNumberToObject(report, "error_px", event->end->error_px);
+	cJSON_AddNumberToObject(report, "bytes", (double)event->bytes);
+	ms = cJSON_AddObjectToObject(report, "ms");
+	cJSON_AddNumberToObject(ms, "server", server_ms(event->end));
+	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
+	cJSON_AddNumberToObject(ms, "total", (double)(now_ns() - facts->start_ns) / 1e6);
+	add_stages(report, event->end);
+	effects_add(report, event->end);
+	add_planes(report, event);
+	if (event->end->planes >> PSR_WIRE_PLANE_DEPTH & 1) {
+		const double range[2] = { event->begin->depth_min, event->begin->depth_max };
+
+		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));
+	}
+	replay_add(report, facts->scene, facts->frame);
+	return report;
+}
+
+int report_write(const struct shot_facts *facts, const char *path, struct psr_error *err)
+{
+	struct outfile file;
+	cJSON *report = make_report(facts);
+	char *text = cJSON_Print(report);
+	int code = PSR_OK;
+
+	cJSON_Delete(report);
+	if (text == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the report");
+	code = outfile_open(&file, path, err);
+	if (code == PSR_OK) {
+		outfile_write(&file, text, strlen(text));
+		outfile_write(&file, "\n", 1);
+		code = outfile_close(&file, PSR_OK, err);
+	}
+	free(text);
+	return code;
+}

@@ -1,0 +1,23 @@
+/* Frames of one scene over one connection, several under way at a time. */
+#ifndef PSR_CLIENT_OUTPUT_SERIES_H
+#define PSR_CLIENT_OUTPUT_SERIES_H
+
+#include "client/scene/scene.h"
+
+struct series {
+	struct psr_client *client;
+	struct scene *scene;                 /* its key light follows the camera */
+	const struct psr_msg_frame *frame;   /* all but the camera */
+	const struct psr_msg_camera *camera; /* n of them */
+	uint32_t n;
+	const char *server; /* address, for messages */
+	int timeout_ms;     /* of the longest silence */
+	/* Frame k is whole; what the event points to is valid during the call. Any order of k. */
+	int (*on_frame)(uint32_t k, const struct psr_event *event, void *userdata, struct psr_error *err);
+	void *userdata;
+};
+
+/* PSR_OK once all have come; else what failed first: a frame, the connection, on_frame. */
+int series_run(struct series *series, struct psr_error *err);
+
+#endif

@@ -1,0 +1,24 @@
+/* How well pictures are drawn: size, detail, smoothing, passes, and how colour travels. */
+#ifndef PSR_CLIENT_SCENE_QUALITY_H
+#define PSR_CLIENT_SCENE_QUALITY_H
+
+#include "client/optlist.h"
+#include "psr/client.h"
+
+struct quality_wish {
+	uint32_t size[2];
+	const char *name; /* draft, good, best */
+	double spacing;
+	int64_t passes;
+	int is_smooth, is_plain, has_spacing, has_passes;
+	const char *codec;
+	int n_said; /* options given */
+};
+
+void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec);
+void quality_add_options(struct optlist *list, struct quality_wish *wish);
+
+/* Checks it and puts it into the request: size, settings, passes, and the codec of colour. ARG, LIMIT. */
+int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
+
+#endif

@@ -1,0 +1,79 @@
+/* What stands in a picture, and the light: options, scene files, and the scene that a server gets. */
+#ifndef PSR_CLIENT_SCENE_SCENE_H
+#define PSR_CLIENT_SCENE_SCENE_H
+
+#include "instance.h"
+#include "client/optlist.h"
+#include "psr/client.h"
+
+#define SCENE_AMBIENT 0.15
+
+struct scene_wish {
+	struct instance_wish *instance;
+	uint32_t n_instances;
+	struct psr_msg_light light[PSR_WIRE_MAX_LIGHTS];
+	const char *preset_light[PSR_WIRE_MAX_LIGHTS]; /* name of what light[i] will be, or NULL: it is there already */
+	uint32_t n_lights;
+	const char *lights_of; /* "model": all of the model's, after those */
+	double ambient;
+	uint8_t background[3];
+	int is_shadowed, has_ambient;
+	const char *file;
+	char *file_text; /* strings above point into it */
+	int n_said;   /* options given */
+	uint32_t pixels; /* the greater side of the pictures */
+	int is_quiet; /* no progress on the terminal */
+};
+
+void scene_wish_init(struct scene_wish *wish);
+void scene_wish_fini(struct scene_wish *wish);
+
+/* --model, --instance, --scene. Options point into *wish. */
+void scene_add_model_options(struct optlist *list, struct scene_wish *wish);
+void scene_add_light_options(struct optlist *list, struct scene_wish *wish);
+
+/* Reads the scene file, and checks what the options could not. */
+int scene_check(struct scene_wish *wish, struct psr_error *err);
+
+#define SCENE_LIGHT_HELP \
+	"A light is one of\n" \
+	"  dir:X,Y,Z[,...]                  X,Y,Z is the direction in which the light travels\n" \
+	"  point:X,Y,Z[,...]                X,Y,Z is its position\n" \
+	"  spot:X,Y,Z:TX,TY,TZ:ANGLE[,...]  position, the point it shines at, half the angle of its cone in\n" \
+	"                                   degrees; the light is full within 0.9 of it\n" \
+	"  preset:NAME                      a light that came with the first model (`psr list --presets`)\n" \
+	"and, but for the last, followed by any of color=#rrggbb (white), intensity=I (1), shadow, and for\n" \
+	"point and spot ref=R: the distance at which the intensity holds, falling with its square; without it\n" \
+	"the light does not fall.\n" \
+	"Without --light, --lights and --ambient there is one white light from the upper left behind the\n" \
+	"camera, which moves with the camera, and ambient 0.15.\n"
+
+struct scene_model {
+	char name[PSR_WIRE_MAX_NAME + 1];
+	struct psr_msg_opened opened;
+};
+
+/* A scene on a connection. */
+struct scene {
+	struct psr_msg_scene msg;
+	int has_key_light;            /* light[0] is scene_light's */
+	int is_key_shadowed;
+	double box_min[3], box_max[3]; /* of all instances, in their places */
+	double up[3];                 /* natural, of the first instance in its place; 0, 0, 0: not known */
+	struct scene_model *model;    /* each once */
+	uint32_t n_models;
+	uint32_t *model_of;           /* by instance */
+	struct psr_msg_preset *preset; /* of the first model, in its place */
+	uint32_t n_presets;
+};
+
+/* Opens the models, with their progress on the terminal, and asks for cameras and lights of the first. NOT_FOUND with
+ * the name that was probably meant. */
+int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_client *client, int timeout_ms,
+               struct psr_error *err);
+void scene_close(struct scene *scene); /* NULL is fine */
+
+/* Puts the light in its place that moves with the camera: whether the scene has one. */
+int scene_light(struct scene *scene, const struct psr_msg_camera *camera);
+
+#endif

@@ -1,0 +1,44 @@
+/* Cameras, as options and camera files have them. */
+#ifndef PSR_CLIENT_SCENE_VIEW_H
+#define PSR_CLIENT_SCENE_VIEW_H
+
+#include "client/optlist.h"
+#include "psr/client.h"
+#include "scene.h"
+
+struct view_wish {
+	struct psr_camera_wish camera;
+	double fov; /* degrees */
+	int has_fov, has_ortho, has_azimuth, has_elevation, has_roll, has_zoom;
+	const char *view;   /* front, ..., or NULL */
+	const char *preset; /* name of a camera of the model, or NULL */
+};
+
+void view_wish_init(struct view_wish *wish);
+void view_add_options(struct optlist *list, struct view_wish *wish);
+
+/* Whether any option of a camera was given. */
+int view_is_said(const struct view_wish *wish);
+
+/* The cameras of a command line: one, or one for each of --view front,left,... or for each line of a file, which says
+ * what the command line has not. */
+struct views {
+	struct view_wish *wish;
+	uint32_t n;
+	char *text; /* strings of the wishes point into it */
+};
+
+#define VIEWS_MAX 100000
+
+/* Makes them of `wish` and checks them. `file` may be NULL. ARG, LIMIT, and what wordfile_read says. */
+int views_make(struct views *views, const struct view_wish *wish, const char *file, struct psr_error *err);
+void views_fini(struct views *views);
+
+/* The camera in a scene. n_turn: at how many equal turns the scene is to be in the picture, or 0. */
+int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
+               const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err);
+
+/* The way up for turning about: --up, the model's own, or +Y. */
+void view_up(double up[3], const struct view_wish *wish, const struct scene *scene);
+
+#endif

@@ -1,0 +1,120 @@
+#include <stdlib.h>
+#include <string.h>
+#include "base/mem.h"
+#include "base/vec.h"
+#include "draft.h"
+#include "psr/error.h"
+
+void draft_fini(struct draft *draft)
+{
+	free(draft->block);
+	free(draft->sample);
+	memset(draft, 0, sizeof *draft);
+}
+
+void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3])
+{
+	const struct psr_projection *p = &draft->projection[block->projection];
+	double spacing = (double)p->spacing * (double)(1u << block->level), inner[3];
+	int row = block->row + (int)(s / PSR_BLOCK_SIDE), col = block->col + (int)(s % PSR_BLOCK_SIDE);
+
+	sheets_inner(p, (col + (row & 1) / 2.0) * spacing, row * 0.86602540378443864676 * spacing,
+	             (double)draft_sample(draft, block, s)->z, inner);
+	v3f_set(position, (float)inner[0], (float)inner[1], (float)inner[2]);
+}
+
+static int reserve(struct draft *draft, uint64_t n_blocks, uint64_t n_samples)
+{
+	if (n_blocks > UINT32_MAX / 2 || n_samples > UINT32_MAX / 2)
+		return PSR_ERR_LIMIT;
+	if (n_blocks > draft->block_capacity) {
+		struct draft_block *block = realloc(draft->block, n_blocks * sizeof *block);
+
+		if (block == NULL)
+			return PSR_ERR_MEMORY;
+		draft->block = block;
+		draft->block_capacity = (uint32_t)n_blocks;
+	}
+	if (n_samples > draft->sample_capacity) {
+		struct draft_sample *sample = realloc(draft->sample, n_samples * sizeof *sample);
+
+		if (sample == NULL)
+			return PSR_ERR_MEMORY;
+		draft->sample = sample;
+		draft->sample_capacity = (uint32_t)n_samples;
+	}
+	return PSR_OK;
+}
+
+static uint32_t count_kept(const struct level *level)
+{
+	uint32_t n = 0;
+
+	for (unsigned i = 0; i < level->n_projections; i++)
+		for (uint32_t p = 0; p < level->sheets[i].n_patches; p++)
+			n += level->sheets[i].patch[p].kept != 0;
+	return n;
+}
+
+/* Sets block_of[i][p], the number of a patch's block. */
+static void add_blocks(struct draft *draft, const struct level *level, uint32_t *const *block_of)
+{
+	for (unsigned i = 0; i < level->n_projections; i++) {
+		const struct sheets *sheets = &level->sheets[i];
+
+		for (uint32_t p = 0; p < sheets->n_patches; p++) {
+			const struct patch *patch = &sheets->patch[p];
+			struct draft_block *block = &draft->block[draft->n_blocks];
+			uint32_t k = draft->n_samples;
+
+			if (patch->kept == 0)
+				continue;
+			*block = (struct draft_block){ .projection = (uint16_t)i, .col = (int16_t)(PSR_BLOCK_SIDE * patch->col),
+				                           .row = (int16_t)(PSR_BLOCK_SIDE * patch->row),
+				                           .level = (uint8_t)draft->n_levels, .mask = patch->kept, .part = patch->kept,
+				                           .first = k };
+			for (uint64_t left = patch->kept; left != 0; left &= left - 1, k++) {
+				const struct sheet_sample *sample = &sheets->sample[p][__builtin_ctzll(left)];
+
+				draft->sample[k] = (struct draft_sample){ sample->z, sample->surface, 0 };
+			}
+			draft->n_samples = k;
+			block_of[i][p] = draft->n_blocks++;
+		}
+	}
+}
+
+static void set_attributes(struct draft *draft, const struct level *level, uint32_t *const *block_of)
+{
+	for (uint32_t i = 0; i < level->cover.n_points; i++) {
+		const struct cover_point *point = &level->cover.point[i];
+		struct draft_block *block = &draft->block[block_of[point->projection][point->patch]];
+
+		block->two_sided |= point->two_sided;
+		block->traits |= point->traits;
+		draft->sample[draft_sample(draft, block, point->sample) - draft->sample].attr = point->attr;
+	}
+}
+
+int draft_add(struct draft *draft, const struct level *level)
+{
+	uint32_t **block_of = calloc(level->n_projections, sizeof *block_of);
+	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(level),
+	                 (uint64_t)draft->n_samples + level->cover.n_points);
+
+	if (block_of == NULL)
+		return PSR_ERR_MEMORY;
+	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
+		block_of[i] = psr_alloc_array(level->sheets[i].n_patches, sizeof **block_of);
+		rc = block_of[i] == NULL ? PSR_ERR_MEMORY : PSR_OK;
+	}
+	if (rc == PSR_OK) {
+		add_blocks(draft, level, block_of);
+		set_attributes(draft, level, block_of);
+		draft->n_levels++;
+	}
+	for (unsigned i = 0; i < level->n_projections; i++)
+		psr_free(block_of[i]);
+	free(block_of);
+	return rc;
+}

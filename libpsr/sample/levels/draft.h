@@ -1,0 +1,62 @@
+/* What is kept of a level, without what it was chosen from; and the pieces of the object that its levels are cut
+ * into. */
+#ifndef PSR_SAMPLE_LEVELS_DRAFT_H
+#define PSR_SAMPLE_LEVELS_DRAFT_H
+
+#include <stdint.h>
+#include "sample/level.h"
+
+struct draft_sample {
+	float z;
+	uint32_t surface; /* as in struct sheet_sample */
+	uint64_t attr;
+};
+
+struct draft_block {
+	uint16_t projection;
+	int16_t col, row; /* of its first lattice point; row is even */
+	uint8_t level, two_sided, traits;
+	uint32_t group;   /* of blocks */
+	uint64_t mask;    /* of what is there, */
+	uint64_t part;    /* what the group needs */
+	uint32_t first;   /* of its samples, one for each bit of mask */
+};
+
+struct draft {
+	unsigned n_levels;
+	const struct psr_projection *projection; /* of level 0 */
+	double ds;                               /* of level 0 */
+	uint32_t n_blocks, block_capacity, n_samples, sample_capacity, n_groups;
+	struct draft_block *block;
+	struct draft_sample *sample;
+};
+
+void draft_fini(struct draft *draft);
+
+/* Adds the next level. MEMORY, LIMIT. */
+int draft_add(struct draft *draft, const struct level *level);
+
+/* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has
+ * all samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different
+ * levels meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they
+ * share do not cost too much: where surfaces lie all through each other (leaves), that may be one group. The same
+ * whatever the threads. MEMORY. */
+int draft_group(struct draft *draft, struct psr_pool *pool);
+
+/* join.c: makes one block of all that have the same level, group, projection and place on the lattice, are seen from as
+ * many sides, and have no lattice point in common, as long as it is not too deep: sheets that were apart when all of
+ * their hits were there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
+int draft_join(struct draft *draft);
+
+/* Inner coordinates of sample s of a block. */
+void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);
+
+static inline const struct draft_sample *draft_sample(const struct draft *draft, const struct draft_block *block,
+                                                      unsigned s)
+{
+	uint64_t below = block->mask & ((UINT64_C(1) << s) - 1);
+
+	return &draft->sample[block->first + (uint32_t)__builtin_popcountll(below)];
+}
+
+#endif

@@ -1,0 +1,20 @@
+/* The blocks of a draft's groups, as they are made. */
+#ifndef PSR_SAMPLE_LEVELS_GROUP_H
+#define PSR_SAMPLE_LEVELS_GROUP_H
+
+#include "draft.h"
+
+struct group_blocks {
+	struct draft_block *block;
+	uint32_t n, capacity, most;
+	int is_over; /* there would be more */
+};
+
+int group_add(struct group_blocks *blocks, const struct draft_block *block); /* MEMORY */
+
+/* Adds the blocks of a coarse level, for each group those samples that it needs. blocks->block[0..n_pieces-1] are those
+ * of the finest level, which the draft has n_finest of before they are cut. MEMORY. */
+int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
+                uint32_t n_pieces, struct psr_pool *pool);
+
+#endif

@@ -1,0 +1,192 @@
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include "base/cell.h"
+#include "group.h"
+#include "psr/error.h"
+
+#define CELLS 4 /* that a coarse pixel is wide */
+#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
+#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
+
+/* Which groups have fine samples in each cell of a coarse level: points of a cover, one a group and cell. */
+static int map_groups(struct cover *map, const struct draft *draft, const struct group_blocks *finest, uint32_t n)
+{
+	for (uint32_t b = 0; b < n; b++) {
+		const struct draft_block *block = &finest->block[b];
+
+		for (uint64_t left = block->part; left != 0; left &= left - 1) {
+			struct cover_point point = { .patch = block->group };
+			uint32_t i;
+			int at[3];
+
+			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
+			for (int k = 0; k < 3; k++)
+				at[k] = cell_floor((double)point.position[k] / map->ds);
+			i = cover_cell(map, at);
+			while (i != COVER_NONE && map->point[i].patch != block->group)
+				i = map->point[i].next;
+			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
+				return PSR_ERR_MEMORY;
+		}
+	}
+	return PSR_OK;
+}
+
+/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
+struct part {
+	uint32_t group;
+	uint64_t mask;
+};
+
+struct parts {
+	struct part *part;
+	uint32_t n, capacity;
+};
+
+static int add_part(struct parts *parts, uint32_t group, unsigned s)
+{
+	uint32_t i = 0;
+
+	while (i < parts->n && parts->part[i].group != group)
+		i++;
+	if (i == parts->capacity) {
+		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
+		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		parts->part = grown;
+		parts->capacity = capacity;
+	}
+	if (i == parts->n)
+		parts->part[parts->n++] = (struct part){ group, 0 };
+	parts->part[i].mask |= UINT64_C(1) << s;
+	return PSR_OK;
+}
+
+/* From p to the nearest place of a point's cell. */
+static double distance2(const struct cover *map, const struct cover_point *point, const float p[3])
+{
+	double sum = 0;
+
+	for (int k = 0; k < 3; k++) {
+		double low = floor((double)point->position[k] / map->ds) * map->ds, x = (double)p[k];
+		double away = x < low ? low - x : x > low + map->ds ? x - low - map->ds : 0;
+
+		sum += away * away;
+	}
+	return sum;
+}
+
+/* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
+static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+{
+	uint32_t first[COVER_MOST_AROUND];
+	int n_cells = cover_around(map, p, reach, first), n = 0;
+
+	for (int c = 0; c < n_cells; c++) {
+		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next) {
+			if (distance2(map, &map->point[i], p) > reach * reach)
+				continue;
+			if (add_part(parts, map->point[i].patch, s) != PSR_OK)
+				return PSR_ERR_MEMORY;
+			n++;
+		}
+	}
+	return n;
+}
+
+static int split_block(struct group_blocks *blocks, const struct draft *draft, const struct draft_block *block,
+                       const struct cover *map, struct parts *parts)
+{
+	int rc = PSR_OK;
+
+	parts->n = 0;
+	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
+		unsigned s = (unsigned)__builtin_ctzll(left);
+		float p[3];
+		int n;
+
+		draft_position(draft, block, s, p);
+		n = find_groups(map, p, REACH * map->ds, s, parts);
+		if (n == 0)
+			n = find_groups(map, p, FAR * map->ds, s, parts);
+		rc = n < 0 ? n : PSR_OK;
+	}
+	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
+		struct draft_block part = *block;
+
+		part.group = parts->part[i].group;
+		part.part = parts->part[i].mask;
+		rc = group_add(blocks, &part);
+	}
+	return rc;
+}
+
+struct split {
+	const struct draft *draft;
+	const struct cover *map;
+	uint32_t first, end; /* blocks */
+	struct group_blocks *chunk;
+	int *rc;
+	uint32_t most;    /* blocks of them all; */
+	atomic_uint n;    /* once there are more, the rest is not looked at */
+};
+
+#define CHUNK 256
+
+static void split_chunk(int i, void *userdata)
+{
+	struct split *split = userdata;
+	uint32_t first = split->first + (uint32_t)i * CHUNK, end = split->end - first < CHUNK ? split->end : first + CHUNK;
+	struct parts parts = { NULL, 0, 0 };
+
+	for (uint32_t b = first; b < end && split->rc[i] == PSR_OK && atomic_load(&split->n) <= split->most; b++)
+		split->rc[i] = split_block(&split->chunk[i], split->draft, &split->draft->block[b], split->map, &parts);
+	atomic_fetch_add(&split->n, split->chunk[i].n);
+	free(parts.part);
+}
+
+/* Blocks of one level, first..end - 1, each by itself, so that any thread may; in their order. */
+static int split_blocks(struct group_blocks *blocks, struct split *split, struct psr_pool *pool)
+{
+	int n = (int)((split->end - split->first + CHUNK - 1) / CHUNK), rc = PSR_OK;
+
+	split->chunk = calloc((size_t)n + 1, sizeof *split->chunk);
+	split->rc = calloc((size_t)n + 1, sizeof *split->rc);
+	if (split->chunk == NULL || split->rc == NULL)
+		rc = PSR_ERR_MEMORY;
+	for (int i = 0; rc == PSR_OK && i < n; i++)
+		split->chunk[i].most = UINT32_MAX;
+	if (rc == PSR_OK)
+		psr_pool_for(pool, n, split_chunk, split);
+	for (int i = 0; split->chunk != NULL && i < n; i++) {
+		rc = rc != PSR_OK ? rc : split->rc[i];
+		for (uint32_t k = 0; rc == PSR_OK && k < split->chunk[i].n; k++)
+			rc = group_add(blocks, &split->chunk[i].block[k]);
+		free(split->chunk[i].block);
+	}
+	free(split->chunk);
+	free(split->rc);
+	return rc;
+}
+
+int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
+                       uint32_t n_pieces, struct psr_pool *pool)
+{
+	struct cover map;
+	struct split split = { .draft = draft, .map = &map, .first = n_finest, .most = blocks->most - blocks->n };
+	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
+
+	while (split.first < draft->n_blocks && draft->block[split.first].level < level)
+		split.first++;
+	for (split.end = split.first; split.end < draft->n_blocks && draft->block[split.end].level == level;)
+		split.end++;
+	if (rc == PSR_OK)
+		rc = map_groups(&map, draft, blocks, n_pieces);
+	if (rc == PSR_OK)
+		rc = split_blocks(blocks, &split, pool);
+	cover_fini(&map);
+	return rc;
+}

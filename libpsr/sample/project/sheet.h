@@ -1,0 +1,123 @@
+/* One orthographic projection of the object, sampled through all of its layers on the equilateral lattice
+ * ([G] 4.4, 5.1).
+ *
+ * [G] keeps the first hit of each ray. Here every hit that faces the projection is kept, so that what a surface hides
+ * is sampled from its own best side too. The hits of a lattice block are put together into patches of at most one a
+ * lattice point: what may become a block of the model. */
+#ifndef PSR_SAMPLE_PROJECT_SHEET_H
+#define PSR_SAMPLE_PROJECT_SHEET_H
+
+#include <stdint.h>
+#include "psr/model.h"
+#include "psr/pool.h"
+#include "ray/ray.h"
+
+#define SHEET_BACK 0x80000000u /* in a sample's surface: met from the back */
+#define SHEET_NONE UINT32_MAX
+
+/* Cosine of the steepest angle at which hits are kept: 72 degrees. */
+#define SHEET_LEAST_COSINE 0.3f
+
+/* Neighbours on the lattice whose depths differ by more steps than this are not taken for one surface. */
+#define SHEET_STEPS 2.5f
+
+/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide. */
+#define SHEET_PATCH_STEPS 24
+
+struct sheet_sample {
+	float z;          /* along the projection's z, inner units */
+	uint32_t surface; /* primitive, and SHEET_BACK */
+};
+
+/* What is looked for most comes first. */
+struct patch {
+	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
+	float low, high;    /* z of hits is within */
+	int16_t col, row;   /* in blocks */
+	uint64_t mask;      /* hits; */
+	uint64_t kept;
+	uint8_t two_sided;  /* of what may count for both of its sides; or of the rest */
+	uint8_t is_alive;   /* some of it is kept */
+	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
+	uint64_t first;     /* of the hits, the first of their rays: nothing hides them; */
+	uint64_t seen;      /* those that are known to be visible, */
+	uint64_t hidden;    /* and known to be hidden; */
+	uint64_t owned;     /* those that this projection faces best */
+};
+
+/* Puts a hit into a patch that has none at s yet. */
+static inline void patch_put(struct patch *patch, unsigned s, float z)
+{
+	patch->low = patch->mask == 0 || z < patch->low ? z : patch->low;
+	patch->high = patch->mask == 0 || z > patch->high ? z : patch->high;
+	patch->mask |= UINT64_C(1) << s;
+}
+
+struct sheets {
+	struct psr_projection projection; /* spacing: that of this level */
+	int reach;                        /* lattice blocks on each side of the origin, along rows and columns */
+	uint32_t *head;                   /* (2 reach)^2: first patch of a lattice block, SHEET_NONE */
+	uint32_t n_patches, capacity;
+	struct patch *patch;
+	struct sheet_sample (*sample)[PSR_BLOCK_SAMPLES];
+	uint64_t n_rays, n_hits; /* n_rays: 0 of what is behind others */
+};
+
+/* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z
+ * and the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes
+ * whatever the number of threads. MEMORY. */
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene,
+                 const struct psr_mesh *mesh, const uint8_t *sides, const struct psr_projection *projection,
+                 struct psr_pool *pool);
+void sheets_fini(struct sheets *sheets);
+
+/* Projection space x and y of lattice point (row, column). */
+static inline void sheets_point(const struct sheets *sheets, int row, int col, double *x, double *y)
+{
+	double spacing = (double)sheets->projection.spacing;
+
+	*x = (col + (row & 1) / 2.0) * spacing;
+	*y = row * 0.86602540378443864676 * spacing;
+}
+
+/* The ray that looks for samples at x, y; z = SHEET_START - t. */
+#define SHEET_START 2.0
+void sheets_ray(const struct psr_projection *projection, double x, double y, struct ray *ray);
+
+/* Rows and columns of the lattice triangle that holds projection space x, y. */
+struct lattice_point {
+	int row, col;
+};
+void sheets_triangle(const struct sheets *sheets, double x, double y, struct lattice_point corner[3]);
+
+struct sheet_ref {
+	uint32_t patch; /* SHEET_NONE: there is none */
+	uint32_t sample;
+};
+
+/* The hit at a lattice point that is nearest in depth to z, and within reach of it. */
+struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
+
+/* The same for the corners of a lattice triangle. */
+void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
+                         struct sheet_ref found[3]);
+
+/* A living patch that has nothing at a lattice point, and samples of these sides not far from this depth; or none. */
+struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);
+
+/* A sample that no ray found, put at a lattice point: into a patch with room, or into a new one. MEMORY. */
+int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
+               struct sheet_ref *out);
+
+/* Puts the last patch of `patch` into the list of its lattice block. */
+void sheets_link(struct sheets *sheets, uint32_t patch);
+
+void sheets_position(const struct sheets *sheets, struct sheet_ref ref, float position[3]);
+
+static inline void sheets_inner(const struct psr_projection *p, double x, double y, double z, double inner[3])
+{
+	for (int k = 0; k < 3; k++)
+		inner[k] = x * (double)p->axis[0][k] + y * (double)p->axis[1][k] + z * (double)p->axis[2][k];
+}
+
+#endif

@@ -1,0 +1,98 @@
+/* What the files of the greedy modeller share (greedy.h). */
+#ifndef PSR_MODELS_STUDIES_GREEDY_PARTS_H
+#define PSR_MODELS_STUDIES_GREEDY_PARTS_H
+
+#include "greedy.h"
+#include "psr/direction.h"
+
+/* ---- greedy.c ---- */
+
+/* Fills in all of the result but the times and the first pass. */
+void greedy_count(const struct greedy *greedy, struct greedy_result *result);
+
+/* ---- views.c ---- */
+
+/* Frames and spacing of all views, and how many they are. */
+void greedy_make_views(struct greedy *greedy);
+
+/* ---- scan.c ---- */
+
+/* Traces a view, of which no sample is there yet; or of every `stride` rows and columns of 8x8 blocks only one.
+ * MEMORY. */
+int greedy_trace(struct greedy *greedy, int view, int stride);
+void greedy_forget(struct greedy_view *view); /* its samples and blocks */
+
+/* Distance of the lattice's rows, as a part of its spacing. */
+double greedy_row_pitch(enum greedy_lattice lattice);
+
+/* ---- blocks.c ---- */
+
+/* Orders a view's samples into blocks of this side; none is kept. MEMORY. */
+int greedy_divide(struct greedy_view *view, int side);
+
+/* ---- look.c: S of [G] 5.2, warped orthographically at the target resolution ---- */
+
+struct greedy_seen {
+	float x, y, z; /* in the frame of a view: z grows towards the viewer */
+};
+
+static inline struct greedy_seen greedy_project(const float axis[3][3], const float p[3])
+{
+	return (struct greedy_seen){ axis[0][0] * p[0] + axis[0][1] * p[1] + axis[0][2] * p[2],
+		                         axis[1][0] * p[0] + axis[1][1] * p[1] + axis[1][2] * p[2],
+		                         axis[2][0] * p[0] + axis[2][1] * p[1] + axis[2][2] * p[2] };
+}
+
+/* A pixel grid laid over a view, turned about z and shifted, that holds the whole unit sphere. */
+struct greedy_grid {
+	float cosine, sine, shift[2]; /* cosine and sine times pixels a unit; shift includes the middle */
+	uint32_t side;                /* pixels, of a square */
+};
+
+/* Test 0 <= test < n_rotations * n_shifts of the sixteen of [G] 5.2; n_shifts by n_shifts count as shifts of a test. */
+void greedy_grid_init(struct greedy_grid *grid, int test, int n_shifts, double ds);
+
+static inline uint32_t greedy_pixel(const struct greedy_grid *grid, const struct greedy_seen *p)
+{
+	uint32_t u = (uint32_t)(grid->cosine * p->x + grid->sine * p->y + grid->shift[0]);
+	uint32_t v = (uint32_t)(grid->cosine * p->y - grid->sine * p->x + grid->shift[1]);
+
+	return v * grid->side + u;
+}
+
+/* Whether each of the quantised normals is turned to the viewer of this frame. */
+struct greedy_facing {
+	uint64_t bit[PSR_DIRECTIONS / 64];
+};
+void greedy_facing_init(struct greedy_facing *facing, const float axis[3][3]);
+
+static inline int greedy_counts(const struct greedy_facing *facing, const struct greedy_sample *sample)
+{
+	uint32_t n = PSR_ATTR_NORMAL(sample->attr);
+
+	return sample->two_sided || (facing->bit[n / 64] >> n % 64 & 1) != 0;
+}
+
+/* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a
+ * surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
+float greedy_depth_tolerance(float cosine, double ds);
+
+/* Which samples of a view may choose blocks. */
+struct greedy_strictness {
+	float least_cosine;  /* those seen at this cosine or more */
+	float lenient_below; /* those seen at less are forgiven half a pixel */
+	int kept_only;       /* those of blocks that are kept */
+};
+
+/* Marks in is_missed the blocks of a view that have a sample that the kept samples of all other views, and of none of
+ * this one, lack in one of the first n_tests tests. MEMORY. */
+int greedy_find_missed(const struct greedy *greedy, int view, const struct greedy_select_options *options,
+                       struct greedy_strictness strictness, int n_tests, uint8_t *is_missed);
+
+/* ---- prune.c ---- */
+
+/* Goes through what is kept, blocks or single samples, from the worst seen to the best, and drops what no test of any
+ * view needs. MEMORY. */
+int greedy_prune(struct greedy *greedy, const struct greedy_select_options *options, int is_by_sample);
+
+#endif

@@ -1,0 +1,37 @@
+/* One pass of a frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any
+ * thread. */
+#ifndef PSRD_DRAW_H
+#define PSRD_DRAW_H
+
+#include <stdatomic.h>
+#include <stdint.h>
+#include "codec.h"
+#include "server/net/outq.h"
+#include "psr/error.h"
+#include "psr/pool.h"
+#include "psr/proto.h"
+#include "server/session/session.h"
+
+struct draw_worker; /* buffers of one frame at a time, kept from frame to frame */
+
+struct draw_worker *draw_worker_create(void); /* NULL without memory */
+void draw_worker_destroy(struct draw_worker *worker);
+uint64_t draw_worker_bytes(const struct draw_worker *worker);
+
+struct drawing {
+	struct psr_pool *pool;
+	struct codec *codec;
+	uint32_t id;
+	struct psr_msg_frame request; /* checked */
+	unsigned pass, last_pass;
+	struct scene *scene;
+	uint64_t arrived_us;          /* loop_clock_us() when the request came, or the pass before was done */
+	uint64_t n_waiting;           /* frames that were waiting then */
+	atomic_int is_abandoned;      /* set from outside: nobody wants the answer any more */
+	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */
+};
+
+/* CANCELLED if it was abandoned on the way; what the renderer and the encoder say. */
+int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);
+
+#endif

@@ -1,0 +1,71 @@
+#include <string.h>
+#include "server/net/conn.h"
+#include "session.h"
+#include "presets.h"
+#include "server/frames/wire.h"
+
+#define HOME_CAMERA "home"
+#define HOME_FOV 0.6108652381980153 /* 35 degrees, as the client's */
+
+/* What the protocol cannot hold is not sent. */
+static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_preset *msg, uint32_t *n_sent)
+{
+	uint8_t bytes[512];
+	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+
+	if (psr_msg_preset_encode(&buf, id, msg, NULL) != PSR_OK)
+		return;
+	conn_send(conn, &buf);
+	++*n_sent;
+}
+
+/* The view that shows the whole model, its own way up, unless the file has a camera of this name. */
+static int make_home(struct psr_preset_camera *home, const struct psr_model *model)
+{
+	const struct psr_presets *presets = psr_model_presets(model);
+	const struct psr_model_info *info = psr_model_info(model);
+
+	if (presets->n_cameras == PSR_MAX_PRESETS)
+		return 0;
+	for (uint32_t i = 0; i < presets->n_cameras; i++)
+		if (strcmp(presets->camera[i].name, HOME_CAMERA) == 0)
+			return 0;
+	*home = (struct psr_preset_camera){ .name = HOME_CAMERA };
+	psr_camera_frame(&home->camera, info->box_min, info->box_max, info->up, HOME_FOV, 1);
+	return 1;
+}
+
+void session_send_presets(struct conn *conn, uint32_t id, uint32_t number)
+{
+	const struct session *session = &conn->session;
+	const struct psr_model *model = NULL;
+	const struct psr_presets *presets;
+	struct psr_msg_presets_end end = { 0, 0 };
+	struct psr_preset_camera home;
+	struct psr_msg_preset msg;
+	uint8_t bytes[64];
+	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+
+	for (uint32_t i = 0; i < session->n_handles; i++)
+		if (session->handle[i].number == number)
+			model = session->handle[i].model->model;
+	if (model == NULL) {
+		session_refuse_handle(conn, id, number);
+		return;
+	}
+	presets = psr_model_presets(model);
+	for (uint32_t i = 0; i < presets->n_cameras; i++) {
+		wire_from_camera(&msg, &presets->camera[i]);
+		send_preset(conn, id, &msg, &end.n_cameras);
+	}
+	if (make_home(&home, model)) {
+		wire_from_camera(&msg, &home);
+		send_preset(conn, id, &msg, &end.n_cameras);
+	}
+	for (uint32_t i = 0; i < presets->n_lights; i++) {
+		wire_from_light(&msg, &presets->light[i]);
+		send_preset(conn, id, &msg, &end.n_lights);
+	}
+	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
+		conn_send(conn, &buf);
+}

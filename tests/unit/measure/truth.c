@@ -1,0 +1,143 @@
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include "base/srgb.h"
+#include "psr/measure.h"
+#include "tests/unit/sample/meshes.h"
+
+#define W 48
+#define H 32
+
+static const double zero[3];
+
+static struct psr_camera camera_from(double x, double y, double z)
+{
+	return (struct psr_camera){ .eye = { x, y, z }, .up = { 0, 1, 0 }, .kind = PSR_CAMERA_PERSPECTIVE, .fov_y = 0.8 };
+}
+
+static struct psr_truth *open_truth(const struct psr_mesh *mesh)
+{
+	struct psr_truth *truth = NULL;
+
+	assert_int_equal(psr_truth_create(&truth, mesh, NULL), PSR_OK);
+	return truth;
+}
+
+/* Depth is along the axis and not along the ray: the same all over a square that faces the eye. */
+static void a_facing_square_has_one_depth(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(1);
+	struct psr_truth *truth;
+	struct psr_camera camera = camera_from(0, 0, 3);
+	float depth[W * H], normal[W * H][3];
+	uint8_t rgb[3 * W * H];
+	double focal = H / 2.0 / tan(0.4);
+
+	(void)state;
+	mesh->material->base_color[0] = 0.5f;
+	truth = open_truth(mesh);
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 2, depth, normal, rgb, NULL), PSR_OK);
+	for (int y = 0; y < H; y++) {
+		for (int x = 0; x < W; x++) {
+			int i = y * W + x;
+			int is_met = fabs((x + 0.5 - W / 2) * 3 / focal) < 1 && fabs((y + 0.5 - H / 2) * 3 / focal) < 1;
+
+			if (!is_met) {
+				assert_true(isinf(depth[i]));
+				continue;
+			}
+			assert_true(fabsf(depth[i] - 3) <= 0x1p-22f);
+			assert_true(normal[i][0] == 0 && normal[i][1] == 0 && normal[i][2] == 1);
+			assert_int_equal(rgb[3 * i], psr_linear_to_srgb(0.5f));
+			assert_int_equal(rgb[3 * i + 1], 255);
+		}
+	}
+	psr_truth_destroy(truth);
+	meshes_free(mesh);
+}
+
+/* Seen from +z, +x is right and +y is up. */
+static void pictures_are_not_mirrored(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(2);
+	struct psr_truth *truth;
+	struct psr_camera camera = camera_from(0, 0, 3);
+	float depth[W * H];
+
+	(void)state;
+	camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
+	camera.ortho_height = 2.5;
+	/* Keep the quarter with x > 0, y > 0. */
+	memmove(mesh->triangle, mesh->triangle + 6, 2 * sizeof *mesh->triangle);
+	mesh->n_triangles = 2;
+	truth = open_truth(mesh);
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 1, depth, NULL, NULL, NULL), PSR_OK);
+	for (int i = 0; i < W * H; i++) {
+		double x = (i % W + 0.5 - W / 2) * 2.5 / H, y = -(i / W + 0.5 - H / 2) * 2.5 / H;
+
+		assert_int_equal(isfinite(depth[i]) != 0, x > 0 && x < 1 && y > 0 && y < 1);
+	}
+	psr_truth_destroy(truth);
+	meshes_free(mesh);
+}
+
+/* A finely divided sphere of radius 1 differs from the exact one by (pi / 400)^2 / 2 = 3e-5, times 1 / cos at
+ * 60 degrees from the middle. */
+static void spheres_have_their_depths_and_normals(void **state)
+{
+	struct psr_mesh *mesh = meshes_sphere(400, zero, 1);
+	struct psr_truth *truth = open_truth(mesh);
+	struct psr_camera camera = camera_from(2, 1, 4);
+	float depth[4 * W * H], normal[4 * W * H][3];
+	double distance = sqrt(21), near_z = distance - 1;
+
+	(void)state;
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 2, 2, depth, normal, NULL, NULL), PSR_OK);
+	for (int i = 0; i < 4 * W * H; i++) {
+		double x = (i % (2 * W) + 0.5 - W) / W, y = (i / (2 * W) + 0.5 - H) / H;
+		double px = x * tan(0.4) * W / H, py = y * tan(0.4), squared = px * px + py * py + 1;
+		double inside = distance * distance - squared * (distance * distance - 1), z;
+
+		if (inside < 0.25 * squared) /* not within 60 degrees */
+			continue;
+		z = (distance - sqrt(inside)) / squared;
+		assert_true(z >= near_z - 1e-9);
+		assert_true(fabs((double)depth[i] - z) < 1e-4);
+		assert_true((double)normal[i][0] * 2 + (double)normal[i][1] + (double)normal[i][2] * 4 > 0);
+	}
+	psr_truth_destroy(truth);
+	meshes_free(mesh);
+}
+
+static void bad_pictures_are_refused(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(1);
+	struct psr_truth *truth = open_truth(mesh);
+	struct psr_camera camera = camera_from(0, 0, 3);
+	float depth[W * H];
+
+	(void)state;
+	assert_int_equal(psr_truth_draw(truth, &camera, 0, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(truth, &camera, 1 << 20, 1 << 20, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_LIMIT);
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 0, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 0, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	camera.eye[2] = NAN;
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	psr_truth_destroy(truth);
+	psr_truth_destroy(NULL);
+	meshes_free(mesh);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_facing_square_has_one_depth),
+		cmocka_unit_test(pictures_are_not_mirrored),
+		cmocka_unit_test(spheres_have_their_depths_and_normals),
+		cmocka_unit_test(bad_pictures_are_refused),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
