@@ -1,5 +1,6 @@
 #!/bin/bash
-# Documents: lines fit a page, links lead somewhere, the map and decisions are short, and the index has every decision.
+# Documents: lines fit a page, links lead somewhere, the map and decisions are short, the index has every decision, and
+# wide tables fold.
 . "$(dirname "$0")/lib.sh"
 
 MOST_COLUMNS=100
@@ -49,9 +50,31 @@ not_in_index() { # decision...
 	done
 }
 
+# Twenty columns of two rows after a label: 189 columns of text.
+wide_table() {
+	local row
+	for row in one another; do
+		printf '%-9s' "$row"
+		for i in $(seq 20); do printf ' %8s' "$row$i"; done
+		echo
+	done
+}
+lost_words() { # table: words that fold.awk leaves out
+	local word
+	for word in $(cat "$1"); do
+		awk -f docs/fold.awk "$1" | grep -qw "$word" || echo "$word"
+	done
+}
+
 check "there are documents" test ${#pages[@]} -gt 0
 none "no line of a document has more than $MOST_COLUMNS columns" long_lines "${pages[@]}"
 none "every relative link of a document leads to a file" dead_links "${pages[@]}"
 none "docs/architecture.md has at most $MOST_MAP lines" long_pages $MOST_MAP docs/architecture.md
 none "a decision has at most $MOST_DECISION lines" long_pages $MOST_DECISION docs/decisions/[0-9]*.md
 none "the index of decisions has every one" not_in_index docs/decisions/[0-9]*.md
+
+wide_table >"$work/table"
+awk -f docs/fold.awk "$work/table" >"$work/folded"
+none "a table that is folded fits a page" long_lines "$work/folded"
+none "and has all of its columns" lost_words "$work/table"
+check "with the first column in each part" test "$(grep -c '^another ' "$work/folded")" -gt 1
