@@ -320,13 +320,13 @@ static int collect(struct codec_result *out, const struct job *job, int n_strips
 	return code;
 }
 
-int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool, uint32_t id, uint16_t view,
-                 const struct psr_msg_frame *request, const struct psr_frame *frame, const uint8_t background[3],
-                 struct psr_error *err)
+int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool,
+                 const struct codec_answer *answer, const struct psr_frame *frame, struct psr_error *err)
 {
+	const struct psr_msg_frame *request = answer->request;
 	struct job job = {
-		.codec = codec, .id = id, .view = view, .width = frame->width, .height = frame->height,
-		.background = background, .hash = out->hash,
+		.codec = codec, .id = answer->id, .view = answer->view, .width = frame->width, .height = frame->height,
+		.background = answer->background, .hash = out->hash,
 	};
 	int n_strips = 0, code;
 

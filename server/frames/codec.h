@@ -28,10 +28,15 @@ struct codec_result {
 	double depth_min, depth_max; /* of the finite depths, both 0 if there are none */
 };
 
-/* Encodes the planes that `request` asks for, all of which the frame has, as answers to `id`. On failure (MEMORY,
- * INTERNAL) nothing is kept. */
-int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool, uint32_t id, uint16_t view,
-                 const struct psr_msg_frame *request, const struct psr_frame *frame, const uint8_t background[3],
-                 struct psr_error *err);
+struct codec_answer {
+	uint32_t id; /* of the request, */
+	uint16_t view;
+	const struct psr_msg_frame *request; /* whose planes the frame has */
+	const uint8_t *background;           /* RGB */
+};
+
+/* Encodes the planes of the request as its answer. MEMORY, INTERNAL: nothing is kept. */
+int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool,
+                 const struct codec_answer *answer, const struct psr_frame *frame, struct psr_error *err);
 
 #endif

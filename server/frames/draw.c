@@ -217,6 +217,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 {
 	struct psr_scene scene = d->scene->scene;
 	struct psr_frame picture = { 0 };
+	const struct codec_answer answer = { .id = d->id, .request = &d->request, .background = d->scene->background };
 	struct codec_result coded;
 	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
 		                             .planes = d->request.planes };
@@ -232,8 +233,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	if (atomic_load(&d->is_abandoned))
 		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
 	drawn_us = loop_clock_us();
-	code = codec_encode(&coded, d->codec, d->pool, d->id, 0, &d->request, &picture,
-	                    d->scene->background, err);
+	code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
 	if (code != PSR_OK)
 		return code;
 	end_us = loop_clock_us();

@@ -163,29 +163,29 @@ struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uin
 	return model;
 }
 
-int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
-                  struct psr_model *model, const char *key, uint32_t resolution, uint64_t reserved)
+int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, const struct catalogue_loaded *loaded)
 {
+	struct catalogue_entry *entry = loaded->entry;
 	struct catalogue_model *added = calloc(1, sizeof *added), *old;
 
-	catalogue_release(catalogue, reserved);
+	catalogue_release(catalogue, loaded->reserved);
 	if (added == NULL) {
-		psr_model_unref(model);
+		psr_model_unref(loaded->model);
 		return PSR_ERR_MEMORY;
 	}
 	*added = (struct catalogue_model){
-		.model = model, .entry = entry, .bytes = psr_model_bytes(model), .last_use = ++catalogue->clock, .n_users = 1,
-		.resolution = resolution, .next = catalogue->models,
+		.model = loaded->model, .entry = entry, .bytes = psr_model_bytes(loaded->model),
+		.last_use = ++catalogue->clock, .n_users = 1, .resolution = loaded->resolution, .next = catalogue->models,
 	};
-	strncpy(added->key, key, sizeof added->key - 1);
+	strncpy(added->key, loaded->key, sizeof added->key - 1);
 	if (entry != NULL) {
-		old = catalogue_model(entry, resolution);
+		old = catalogue_model(entry, loaded->resolution);
 		if (old != NULL)
 			detach(catalogue, old);
 		added->of_entry = entry->model;
 		entry->model = added;
 		entry->has_failed = 0;
-		psr_model_content_id(model, entry->content_id);
+		psr_model_content_id(loaded->model, entry->content_id);
 	}
 	catalogue->models = added;
 	catalogue->bytes += added->bytes;

@@ -91,10 +91,17 @@ void catalogue_release(struct catalogue *catalogue, uint64_t bytes);
 /* The entry's model of this resolution (0: of a .psr file) that is in memory, or NULL. */
 struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uint32_t resolution);
 
-/* Takes the model in, in place of its reservation and of the entry's one of this resolution, with one user. entry may
- * be NULL. MEMORY: the model is given up. */
-int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
-                  struct psr_model *model, const char *key, uint32_t resolution, uint64_t reserved);
+struct catalogue_loaded {
+	struct catalogue_entry *entry; /* NULL: none any more */
+	struct psr_model *model;       /* a reference, which catalogue_add() takes */
+	const char *key;               /* of a built model, else "" */
+	uint32_t resolution;           /* 0: of a .psr file */
+	uint64_t reserved;             /* bytes reserved for it */
+};
+
+/* Takes the model in, in place of its reservation and of the entry's model of this resolution; *out is one user's
+ * reference. MEMORY: the model is released. */
+int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, const struct catalogue_loaded *loaded);
 
 struct catalogue_model *catalogue_ref(struct catalogue *catalogue, struct catalogue_model *model);
 void catalogue_unref(struct catalogue *catalogue, struct catalogue_model *model);
