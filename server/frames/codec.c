@@ -34,7 +34,7 @@ struct plane {
 struct strip {
 	struct outq_chunk *chunk;
 	uint64_t data_bytes;
-	double depth_min, depth_max; /* min > max if there are none */
+	double depth_min, depth_max; /* min > max: no finite depth */
 	int code;
 };
 
@@ -132,7 +132,7 @@ static int is_background(const struct plane *plane, const uint8_t *pixels, size_
 {
 	const uint8_t *empty = plane->number == PSR_WIRE_PLANE_COLOR ? background : psr_plane_background(plane->number);
 
-	/* One pixel is compared, then each with the one before it. */
+	/* The strip is background if its first pixel is, and each equals the one before. */
 	return memcmp(pixels, empty, plane->pixel_bytes) == 0
 	       && memcmp(pixels, pixels + plane->pixel_bytes, (n - 1) * plane->pixel_bytes) == 0;
 }
@@ -152,7 +152,7 @@ static void find_depth_range(struct strip *strip, const uint8_t *pixels, size_t 
 	strip->depth_max = (double)most;
 }
 
-/* RECTs of one coded strip, in one chunk. */
+/* The RECTs of a coded strip, in one chunk. */
 static int put_rects(struct strip *strip, const struct job *job, const struct plane *plane, unsigned codec, uint32_t y,
                      uint32_t rows, const uint8_t *data, size_t total)
 {
@@ -247,7 +247,7 @@ static int encode_strip(struct strip *strip, const struct job *job, const struct
 	return code;
 }
 
-/* The hashes come first in the loop: each is one long piece of work. */
+/* Hashes come first: each is one long job, which should not start last. */
 static void run(int i, void *userdata)
 {
 	struct job *job = userdata;

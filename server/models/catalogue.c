@@ -62,7 +62,8 @@ void catalogue_fini(struct catalogue *catalogue)
 
 static int is_same_file(const struct catalogue_file *a, const struct catalogue_file *b)
 {
-	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && !a->reason == !b->reason && a->bytes == b->bytes
+	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && !a->reason == !b->reason
+	       && a->bytes == b->bytes
 	       && a->device == b->device && a->inode == b->inode && a->modified_ns == b->modified_ns;
 }
 
@@ -110,7 +111,7 @@ struct catalogue_entry *catalogue_find(struct catalogue *catalogue, const char *
 	return bsearch(name, catalogue->entry, catalogue->n, sizeof *catalogue->entry, compare_name);
 }
 
-/* Drops what nobody uses, the longest unused first, until `bytes` more fit; whether they do. */
+/* Drops unused models, the least recently used first, until `bytes` more fit. 1: they fit. */
 static int make_room(struct catalogue *catalogue, uint64_t bytes)
 {
 	for (;;) {

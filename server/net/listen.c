@@ -32,7 +32,7 @@ static int fail_system(struct psr_error *err, const char *address, const char *w
 	return psr_fail(err, code, "--listen %.200s: %s: %s", address, what, strerror(errno));
 }
 
-/* Splits ADDR:PORT at the last colon, brackets taken off. */
+/* Splits ADDR:PORT at the last colon, and removes brackets. */
 static int split(char host[LISTEN_NAME], char port[16], const char *text, const char *address, struct psr_error *err)
 {
 	const char *colon = strrchr(text, ':');
@@ -116,7 +116,7 @@ static int open_tcp(struct listener *listeners, int max, int *n, const char *tex
 	}
 	freeaddrinfo(list);
 	if (*n > 0 && code != PSR_ERR_BUSY)
-		return PSR_OK; /* a host name with an address that this machine lacks (::1) still has the other */
+		return PSR_OK; /* one address of a host name is enough: a machine may lack ::1 */
 	while (*n > 0)
 		listen_close(&listeners[--*n]);
 	return code;
