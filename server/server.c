@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "server/net/accept.h"
 #include "server/models/cache.h"
 #include "server/net/conn.h"
@@ -302,7 +303,7 @@ void server_fill_stats(const struct server *server, struct psr_msg_stats_reply *
 {
 	const struct server_stats *stats = &server->stats;
 	const struct psr_msg_stat all[] = {
-		{ PSR_STAT_UPTIME_US, loop_clock_us() - stats->start_us },
+		{ PSR_STAT_UPTIME_US, clock_ns() / 1000 - stats->start_us },
 		{ PSR_STAT_CONNECTIONS, server->n_conns },
 		{ PSR_STAT_CONNECTIONS_TOTAL, stats->connections_total },
 		{ PSR_STAT_MODELS, server->catalogue.n_models },

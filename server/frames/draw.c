@@ -1,5 +1,6 @@
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
 #include "server/net/loop.h"
@@ -220,7 +221,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	struct codec_result coded;
 	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
 		                             .planes = d->request.planes };
-	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
+	uint64_t start_ns = clock_ns(), drawn_ns, end_ns;
 	int code;
 
 	wire_to_camera(&scene.camera, &d->request.camera);
@@ -231,15 +232,15 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 		return code;
 	if (atomic_load(&d->is_abandoned))
 		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
-	drawn_us = loop_clock_us();
+	drawn_ns = clock_ns();
 	code = codec_encode(&coded, d->codec, d->pool, d->id, 0, &d->request, &picture,
 	                    d->scene->background, err);
 	if (code != PSR_OK)
 		return code;
-	end_us = loop_clock_us();
+	end_ns = clock_ns();
 	end.error_px = picture.report.error_bound;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
-	fill_report(&end, d, &picture.report, (end_us - drawn_us) * 1000, coded.rect_bytes,
-	            (start_us - d->arrived_us) * 1000, (end_us - start_us) * 1000);
+	fill_report(&end, d, &picture.report, end_ns - drawn_ns, coded.rect_bytes,
+	            start_ns - d->arrived_ns, end_ns - start_ns);
 	return join_answer(d, &coded, &end, err);
 }

@@ -1,6 +1,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "server/net/conn.h"
 #include "draw.h"
 #include "frames.h"
@@ -124,7 +125,7 @@ static void add_turn(struct frames *frames, struct conn *conn)
 /* Behind what its connection has asked for before. */
 static void add_waiting(struct frames *frames, struct conn *conn, struct frame *frame)
 {
-	frame->drawing.arrived_us = loop_clock_us();
+	frame->drawing.arrived_ns = clock_ns();
 	frame->drawing.n_waiting = frames->n_waiting;
 	frame->next = NULL;
 	*conn->last_waiting = frame;
