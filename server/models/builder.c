@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "builder.h"
 #include "server/log.h"
 #include "spawn.h"
@@ -219,14 +220,11 @@ const struct psr_error *builder_failure(const struct builder *builder, const cha
 	return NULL;
 }
 
-/* A child that was killed leaves what it was writing, under the name that psr_model_write gives it. */
 static void remove_remains(const struct build *build)
 {
-	char path[PATH_MAX];
-
 	unlink(build->target);
-	if (build->pid != 0 && snprintf(path, sizeof path, "%s.%ld-0.tmp", build->target, (long)build->pid) < PATH_MAX)
-		unlink(path);
+	if (build->pid != 0)
+		outfile_remove_remains(build->target, build->pid);
 }
 
 static void start_waiting(struct builder *builder);
