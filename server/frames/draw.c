@@ -1,5 +1,6 @@
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
 #include "server/net/loop.h"
@@ -55,8 +56,8 @@ static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, u
 	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
 }
 
-struct times { /* loop_clock_us() */
-	uint64_t start_us, drawn_us, end_us;
+struct times { /* clock_ns() */
+	uint64_t start_ns, drawn_ns, end_ns;
 };
 
 static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, const struct psr_report *report,
@@ -72,9 +73,9 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	for (int i = 0; i < PSR_N_STAGES; i++)
 		if (stage_id[i])
 			add_entry(end, stage_id[i], report->ns[i], report->count[i]);
-	add_entry(end, PSR_WIRE_REPORT_ENCODE, (times->end_us - times->drawn_us) * 1000, rect_bytes);
-	add_entry(end, PSR_WIRE_REPORT_QUEUE, (times->start_us - d->arrived_us) * 1000, d->n_waiting);
-	add_entry(end, PSR_WIRE_REPORT_TOTAL, (times->end_us - times->start_us) * 1000, (uint64_t)psr_pool_threads(d->pool));
+	add_entry(end, PSR_WIRE_REPORT_ENCODE, times->end_ns - times->drawn_ns, rect_bytes);
+	add_entry(end, PSR_WIRE_REPORT_QUEUE, times->start_ns - d->arrived_ns, d->n_waiting);
+	add_entry(end, PSR_WIRE_REPORT_TOTAL, times->end_ns - times->start_ns, (uint64_t)psr_pool_threads(d->pool));
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
@@ -225,7 +226,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	struct codec_result coded;
 	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
 		                             .planes = d->request.planes };
-	struct times times = { .start_us = loop_clock_us() };
+	struct times times = { .start_ns = clock_ns() };
 	int code;
 
 	wire_to_camera(&scene.camera, &d->request.camera);
@@ -236,11 +237,11 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 		return code;
 	if (atomic_load(&d->is_abandoned))
 		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
-	times.drawn_us = loop_clock_us();
+	times.drawn_ns = clock_ns();
 	code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
 	if (code != PSR_OK)
 		return code;
-	times.end_us = loop_clock_us();
+	times.end_ns = clock_ns();
 	end.error_px = picture.report.error_bound;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
 	fill_report(&end, d, &picture.report, &times, coded.rect_bytes);

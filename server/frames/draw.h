@@ -25,7 +25,7 @@ struct drawing {
 	struct psr_msg_frame request; /* checked */
 	unsigned pass, last_pass;
 	struct scene *scene;
-	uint64_t arrived_us;          /* loop_clock_us() when the request came, or the pass before was done */
+	uint64_t arrived_ns;          /* clock_ns() when the request came, or the pass before was done */
 	uint64_t n_waiting;           /* frames that waited then */
 	atomic_int is_abandoned;      /* set by the loop: nobody wants the answer any more */
 	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */

@@ -1,6 +1,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "check.h"
 #include "draw.h"
 #include "frames.h"
@@ -150,7 +151,7 @@ static void remove_turn(struct frames *frames, struct flow *flow)
 /* Behind the flow's earlier requests. */
 static void add_waiting(struct frames *frames, struct flow *flow, struct frame *frame)
 {
-	frame->drawing.arrived_us = loop_clock_us();
+	frame->drawing.arrived_ns = clock_ns();
 	frame->drawing.n_waiting = frames->n_waiting;
 	frame->next = NULL;
 	*flow->last_waiting = frame;

@@ -2,13 +2,13 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <limits.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "builder.h"
 #include "server/log.h"
 #include "spawn.h"
@@ -190,14 +190,11 @@ const struct psr_error *builder_failure(const struct builder *builder, const cha
 	return NULL;
 }
 
-/* A killed child leaves its unfinished file, named as psr_model_write() does. */
 static void remove_remains(const struct build *build)
 {
-	char path[PATH_MAX];
-
 	unlink(build->job.target);
-	if (build->pid != 0 && snprintf(path, sizeof path, "%s.%ld-0.tmp", build->job.target, (long)build->pid) < PATH_MAX)
-		unlink(path);
+	if (build->pid != 0)
+		outfile_remove_remains(build->job.target, build->pid);
 }
 
 static void start_waiting(struct builder *builder);

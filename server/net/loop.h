@@ -52,7 +52,6 @@ void loop_remove(struct loop *loop, struct loop_source *source); /* no callback 
 void loop_set_ticking(struct loop *loop, int on); /* on_tick every LOOP_TICK_US */
 
 void loop_post(struct loop *loop, struct loop_note *note); /* any thread: fn(userdata) runs in the loop, in order */
-uint64_t loop_clock_us(void);                              /* any thread: CLOCK_MONOTONIC */
 
 int loop_run(struct loop *loop, struct psr_error *err); /* until loop_stop; IO */
 void loop_stop(struct loop *loop);

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "answers.h"
+#include "base/clock.h"
 
 int answer_opened(struct session *session, uint32_t id, struct catalogue_model *model, struct psr_error *err)
 {
@@ -66,7 +67,7 @@ void answer_stats(struct session *session, uint32_t id)
 	const struct sessions *all = session->all;
 	const struct frames_stats *frames = frames_stats(all->frames);
 	const struct psr_msg_stat stats[] = {
-		{ PSR_STAT_UPTIME_US, loop_clock_us() - all->start_us },
+		{ PSR_STAT_UPTIME_US, clock_ns() / 1000 - all->start_us },
 		{ PSR_STAT_CONNECTIONS, all->conns->n },
 		{ PSR_STAT_CONNECTIONS_TOTAL, all->conns->n_ever },
 		{ PSR_STAT_MODELS, all->catalogue->n_models },

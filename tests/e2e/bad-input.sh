@@ -119,7 +119,7 @@ refuses "no model" 2 "--model NAME is missing" psr shot --server "$server" --has
 echo "what was there" >"$work/old.png"
 refuses "an unknown model, over an old picture" 3 "no model nosuch" shot --model nosuch -o "$work/old.png"
 check "a failed shot leaves the old picture" grep -q "what was there" "$work/old.png"
-check "nothing temporary is left beside it" bash -c "! ls -A $work | grep -v '^psrd.log$' | grep -E 'tmp|a\.(png|pfm|exr|xyz|json)'"
+check "nothing temporary is left beside it" bash -c "! ls -A $work | grep -v '^psrd.log$' | grep -E '^\.psr-|tmp|a\.(png|pfm|exr|xyz|json)'"
 
 # --- servers that are none ---
 refuses "a port where nobody listens" 6 "cannot connect to 127.0.0.1:1: " psr list --server 127.0.0.1:1
