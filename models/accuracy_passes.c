@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-#include "ppm.h"
+#include "base/clock.h"
+#include "base/netpbm.h"
 #include "psr/build.h"
 #include "psr/measure.h"
 #include "psr/mesh.h"
@@ -26,14 +26,6 @@ struct passes {
 	uint8_t *truth_rgb, *covered, *rgb;
 	uint32_t side;
 };
-
-static uint64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
 
 /* The light of `psr shot`: from the upper left behind the camera. */
 static void make_light(struct psr_light *light, const struct psr_camera *camera)
@@ -114,10 +106,10 @@ static int draw_passes(struct passes *p, const struct psr_scene *scene, unsigned
 		uint64_t least = UINT64_MAX;
 
 		for (int trial = 0; code == PSR_OK && trial < TRIALS; trial++) {
-			uint64_t start = now_ns(), ns;
+			uint64_t start = clock_ns(), ns;
 
 			code = psr_refine(p->refiner, scene, &settings, pass, p->pool, NULL, NULL, &frame, err);
-			ns = now_ns() - start;
+			ns = clock_ns() - start;
 			least = ns < least ? ns : least;
 		}
 		if (code == PSR_OK)

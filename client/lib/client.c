@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "internal.h"
 
 int client_create(struct psr_client **out, int fd, const char *address, struct psr_error *err)
@@ -163,7 +164,7 @@ int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event
 			return 1;
 		if (got < 0)
 			break;
-		if (has_read && client_now_ns() >= deadline_ns) /* a server that never stops sending */
+		if (has_read && clock_ns() >= deadline_ns) /* a server that never stops sending */
 			return 0;
 		flush_output(client);
 		got = fill_input(client);
@@ -277,6 +278,6 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 	client_assembly_init(&frame->assembly, asked, 0);
 	frame->id = *id;
 	frame->bytes = 0;
-	frame->sent_ns = client_now_ns();
+	frame->sent_ns = clock_ns();
 	return PSR_OK;
 }

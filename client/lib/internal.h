@@ -17,12 +17,11 @@ struct client_address {
 };
 int client_address_parse(struct client_address *address, const char *text, struct psr_error *err);
 
-/* A connected, non-blocking socket. deadline_ns: of client_now_ns(). */
+/* A connected, non-blocking socket. deadline_ns: of clock_ns(). */
 int client_socket_connect(int *out, const char *address, uint64_t deadline_ns, struct psr_error *err);
 
 /* ---- clock ---- */
 
-uint64_t client_now_ns(void); /* monotonic */
 uint64_t client_deadline_ns(int timeout_ms); /* UINT64_MAX for -1 */
 
 /* poll(2) on one descriptor until the deadline: 1 ready, 0 time over, IO. */

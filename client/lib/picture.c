@@ -55,7 +55,7 @@ static int write_picture(const struct psr_picture *picture, const char *path, in
 	int code = choose(&plan, path, is_depth, err);
 
 	if (code == PSR_OK)
-		code = outfile_open(&file, path, err);
+		code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code != PSR_OK)
 		return code;
 	if (plan.write != NULL)

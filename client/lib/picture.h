@@ -2,7 +2,7 @@
 #ifndef PSR_CLIENT_PICTURE_H
 #define PSR_CLIENT_PICTURE_H
 
-#include "outfile.h"
+#include "base/outfile.h"
 #include "psr/picture.h"
 
 int picture_write_png(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);

@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "client/scene/effects.h"
-#include "client/lib/outfile.h"
+#include "base/outfile.h"
 #include "client/replay/replay.h"
 #include "report.h"
 
@@ -102,14 +102,6 @@ static double server_ms(const struct psr_msg_frame_end *end)
 	return 0;
 }
 
-static uint64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 static cJSON *make_report(const struct shot_facts *facts)
 {
 	static const char *const status[] = { "ok", "late", "coarse" };
@@ -130,7 +122,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	ms = cJSON_AddObjectToObject(report, "ms");
 	cJSON_AddNumberToObject(ms, "server", server_ms(event->end));
 	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
-	cJSON_AddNumberToObject(ms, "total", (double)(now_ns() - facts->start_ns) / 1e6);
+	cJSON_AddNumberToObject(ms, "total", (double)(clock_ns() - facts->start_ns) / 1e6);
 	add_stages(report, event->end);
 	effects_add(report, event->end);
 	add_planes(report, event);
@@ -153,7 +145,7 @@ int report_write(const struct shot_facts *facts, const char *path, struct psr_er
 	cJSON_Delete(report);
 	if (text == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the report");
-	code = outfile_open(&file, path, err);
+	code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code == PSR_OK) {
 		outfile_write(&file, text, strlen(text));
 		outfile_write(&file, "\n", 1);

@@ -5,7 +5,7 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <time.h>
+#include "clock.h"
 #include "psr/error.h"
 #include "psr/pool.h"
 
@@ -103,17 +103,15 @@ static void pause_briefly(void)
  * is what a worker spins for at most. */
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
-	struct timespec start, now;
+	const uint64_t start = clock_ns();
 
-	clock_gettime(CLOCK_MONOTONIC, &start);
 	do {
 		for (int i = 0; i < 64; i++) {
 			if (atomic_load_explicit(&pool->n_offers, memory_order_acquire) != n_offers)
 				return 1;
 			pause_briefly();
 		}
-		clock_gettime(CLOCK_MONOTONIC, &now);
-	} while ((now.tv_sec - start.tv_sec) * 1000000000L + now.tv_nsec - start.tv_nsec < SPIN_NS);
+	} while (clock_ns() - start < SPIN_NS);
 	return 0;
 }
 

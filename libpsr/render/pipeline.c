@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
@@ -227,12 +228,12 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		return rc;
 	psr_pool_wake(pool);
 	memset(report, 0, sizeof *report);
-	uint64_t start = now_ns(), end;
+	uint64_t start = clock_ns(), end;
 	rc = plan_make(&r->plan, scene, settings, err);
 	if (rc)
 		return rc;
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
-	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_PLAN] = (end = clock_ns()) - start;
 	start = end;
 
 	if (is_lit)
@@ -241,7 +242,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		effect_note(report, PSR_EFFECT_SHADOWS, PSR_WHY_OFF, 0);
 	if (rc)
 		return rc;
-	report->ns[PSR_STAGE_SHADOW] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_SHADOW] = (end = clock_ns()) - start;
 	start = end;
 
 	rc = cull_blocks(&r->bins, r->simd, &r->plan, pool, report);
@@ -253,7 +254,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		memset(r->is_clean, 0, (size_t)r->plan.parts_x * r->plan.parts_y);
 	else
 		r->plan.is_quiet = r->bins.is_quiet;
-	report->ns[PSR_STAGE_CULL] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_CULL] = (end = clock_ns()) - start;
 	start = end;
 
 	const int n_tiles = (int)(r->plan.tiles_x * r->plan.tiles_y);
@@ -268,7 +269,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	}
 	const enum psr_why no_occlusion = settings->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF;
 	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);
-	report->ns[PSR_STAGE_WARP] = now_ns() - start;
+	report->ns[PSR_STAGE_WARP] = clock_ns() - start;
 	r->report = *report;
 	*stack = &r->stack;
 	return PSR_OK;
@@ -336,7 +337,7 @@ static void shade_one(int row, void *userdata)
 	const struct plan *plan = &r->plan;
 	struct shade_counts counts = { 0 };
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(plan, row);
-	const uint64_t start = now_ns();
+	const uint64_t start = clock_ns();
 	shade_rows(r->simd, plan, &r->target, &r->stack, r->weight, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
@@ -346,11 +347,11 @@ static void shade_one(int row, void *userdata)
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
 	}
-	const uint64_t middle = now_ns();
+	const uint64_t middle = clock_ns();
 	if (r->target.wants)
 		fill_pull(&r->fill, (uint32_t)row);
 	counts.row_ns = middle - start;
-	counts.fill_ns = now_ns() - middle;
+	counts.fill_ns = clock_ns() - middle;
 	r->shade[row] = counts;
 }
 
@@ -436,28 +437,28 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		                                  r->rgb[2], r->srgb,   rgb,       r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	uint64_t start = now_ns(), end;
+	uint64_t start = clock_ns(), end;
 	const uint32_t n_marked = find_gaps(r, pool, report);
-	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_GAPS] = (end = clock_ns()) - start;
 	start = end;
 	if (n_marked)
 		r->target.wants = fill_wants(&r->fill);
-	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_FILL] = (end = clock_ns()) - start;
 	start = end;
 
 	if (tabulate(r, pool, report))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
 	psr_pool_for(pool, (int)n_rows(&r->plan), shade_one, r);
-	report_shading(r, report, (end = now_ns()) - start);
+	report_shading(r, report, (end = clock_ns()) - start);
 	start = end;
 	if (n_marked)
 		fill_push(&r->fill, pool, report);
-	report->ns[PSR_STAGE_FILL] += (end = now_ns()) - start;
+	report->ns[PSR_STAGE_FILL] += (end = clock_ns()) - start;
 	start = end;
 	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	if (smooth == PSR_WHY_RAN)
 		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
-	report->ns[PSR_STAGE_SMOOTH] = now_ns() - start;
+	report->ns[PSR_STAGE_SMOOTH] = clock_ns() - start;
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
 	return PSR_OK;
 }

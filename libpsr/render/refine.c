@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "render.h"
@@ -208,7 +209,7 @@ static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, con
                        struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
 {
 	const size_t area = (size_t)settings->width * settings->height;
-	const uint64_t start = now_ns();
+	const uint64_t start = clock_ns();
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
 	if (!r->is_inside)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
@@ -218,7 +219,7 @@ static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, con
 	struct erosion erosion = { r->is_inside, r->is_inside + area, settings->width, settings->height };
 	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
 	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
-	report->ns[PSR_STAGE_GAPS] += now_ns() - start;
+	report->ns[PSR_STAGE_GAPS] += clock_ns() - start;
 	return PSR_OK;
 }
 

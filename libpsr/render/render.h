@@ -4,17 +4,9 @@
 
 #include <stdatomic.h>
 #include <stdint.h>
-#include <time.h>
 #include "psr/pool.h"
 #include "psr/render.h"
 #include "simd/simd.h"
-
-static inline uint64_t now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
 
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 

@@ -1,7 +1,7 @@
 #include "price.h"
 
 #include <stdlib.h>
-#include <time.h>
+#include "base/clock.h"
 #include "report.h"
 
 struct drawer {
@@ -33,10 +33,7 @@ static void end(struct drawer *drawer)
 
 static double clock_ms(const struct drawer *drawer)
 {
-	struct timespec t;
-
-	clock_gettime(drawer->pool != NULL ? CLOCK_MONOTONIC : CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+	return (double)(drawer->pool != NULL ? clock_ns() : clock_thread_ns()) * 1e-6;
 }
 
 static double draw(struct drawer *drawer, int frame)

@@ -1,17 +1,14 @@
+#include "base/clock.h"
 #include "report.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 static cJSON *root;
 
 double report_ms(void)
 {
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+	return (double)clock_ns() * 1e-6;
 }
 
 static int compare(const void *a, const void *b)

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "psr/isa.h"
 #include "simd/block.h"
 
@@ -370,24 +370,17 @@ static int run_tests(void)
 	return failed;
 }
 
-static double seconds(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static double ns_a_sample(form_fn *form, const struct job *job)
 {
 	struct places places;
 	double best = INFINITY;
 	for (int round = 0; round < 40; round++) {
-		const double start = seconds();
+		const double start = clock_seconds();
 		for (int j = 0; j < JOBS; j++) {
 			form(&places, &job[j]);
 			__asm__ volatile("" : : "r"(&places) : "memory");
 		}
-		best = fmin(best, (seconds() - start) * 1e9 / JOBS / SAMPLES);
+		best = fmin(best, (clock_seconds() - start) * 1e9 / JOBS / SAMPLES);
 	}
 	return best;
 }

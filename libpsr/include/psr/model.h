@@ -250,7 +250,7 @@ int psr_model_create(struct psr_model **out, const struct psr_model_info *info, 
                      const struct psr_presets *presets, struct psr_error *err);
 
 /* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. Only
- * regular files are replaced. IO (disk full, ...), MEMORY. */
+ * regular files are replaced. NOT_FOUND (no such folder), IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
 
 /* The same, packed: sections compressed, chunk by chunk. psr_model_read and _map open such a file too, into anonymous

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "check.h"
 
@@ -22,13 +22,6 @@
 
 static const struct check *current; /* for what a fault prints */
 static const char *current_claim;
-
-static double now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec * 1e9 + (double)t.tv_nsec;
-}
 
 /* xorshift64*: the same numbers everywhere. */
 uint64_t check_u64(struct check *c)
@@ -189,7 +182,7 @@ static int advance(struct check *c)
 
 int check_next(struct check *c)
 {
-	const double ended = now_ns();
+	const uint64_t ended = clock_ns();
 	if (!c->is_started) {
 		for (int i = 0; i < c->n_buffers; i++)
 			if (c->buffer[i].before)
@@ -197,7 +190,7 @@ int check_next(struct check *c)
 		c->is_started = 1;
 		advance(c);
 	} else {
-		const double ns = ended - c->started_ns;
+		const double ns = (double)(ended - c->started_ns);
 		c->spent_ns += ns;
 		c->best_ns[c->isa] = ns < c->best_ns[c->isa] ? ns : c->best_ns[c->isa];
 		if (!c->is_bench)
@@ -209,7 +202,7 @@ int check_next(struct check *c)
 				memcpy(c->buffer[i].data, c->buffer[i].before, c->buffer[i].size);
 	}
 	c->result = 0;
-	c->started_ns = now_ns();
+	c->started_ns = clock_ns();
 	return 1;
 }
 
@@ -265,11 +258,12 @@ static int check_one(struct check *c, const struct check_test *test, int number)
 }
 
 /* What reading the clock twice takes. */
-static double clock_ns(void)
+static double clock_cost(void)
 {
 	double best = INFINITY;
 	for (int i = 0; i < 1000; i++) {
-		const double start = now_ns(), ns = now_ns() - start;
+		const uint64_t start = clock_ns();
+		const double ns = (double)(clock_ns() - start);
 		best = ns < best ? ns : best;
 	}
 	return best;
@@ -277,7 +271,7 @@ static double clock_ns(void)
 
 static void bench_one(struct check *c, const struct check_test *test)
 {
-	const double clock = clock_ns();
+	const double clock = clock_cost();
 	begin(c, 1, 1);
 	test->run(c);
 	release(c);
