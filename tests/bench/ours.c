@@ -60,10 +60,11 @@ static double encode(struct bench *bench)
 		.planes = 1u << PSR_WIRE_PLANE_COLOR, .color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
 	};
 	static const uint8_t background[3];
+	const struct codec_answer answer = { .id = 1, .request = &request, .background = background };
 	struct codec_result result;
 	struct psr_error err;
 
-	if (codec_encode(&result, bench->codec, bench->pool, 1, 0, &request, &bench->frame, background, &err) != PSR_OK)
+	if (codec_encode(&result, bench->codec, bench->pool, &answer, &bench->frame, &err) != PSR_OK)
 		report_die("codec", err.text);
 	outq_chunks_destroy(result.first);
 	return (double)result.rect_bytes;

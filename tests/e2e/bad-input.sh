@@ -156,7 +156,7 @@ for address in 0.0.0.0:0 8.8.8.8:0 '[::]:0'; do
 done
 refuses "a port out of range" 2 "--listen 127.0.0.1:99999" daemon --listen 127.0.0.1:99999
 refuses "a socket in a folder that is not there" 3 "unix:$work/nosuch/s" daemon --listen "unix:$work/nosuch/s"
-refuses "a socket where a file is" 2 "unix:$work/old.png: a file that is no socket" daemon --listen "unix:$work/old.png"
+refuses "a socket where a file is" 2 "unix:$work/old.png: exists and is not a socket" daemon --listen "unix:$work/old.png"
 check "and the file is still there" grep -q "what was there" "$work/old.png"
 refuses "a models folder that is not there" 3 "$work/nosuch: " daemon --models "$work/nosuch"
 refuses "a models folder that is a file" 3 "$work/old.png: " daemon --models "$work/old.png"

@@ -5,7 +5,7 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "scene.h"
-#include "server/frames/wire.h"
+#include "wire.h"
 
 struct scene *scene_ref(struct scene *scene)
 {
@@ -27,10 +27,11 @@ void scene_unref(struct scene *scene)
 	free(scene);
 }
 
-static int add_instance(struct scene *scene, const struct session *session, const struct psr_msg_instance *msg,
+static int add_instance(struct scene *scene, const struct handles *handles, const struct psr_msg_instance *msg,
                         struct psr_error *err)
 {
-	uint32_t number = scene->scene.n_instances, i = 0;
+	struct catalogue_model *model = handles_find(handles, msg->handle);
+	uint32_t number = scene->scene.n_instances;
 	struct psr_instance *instance = &scene->instance[number];
 	double norm = 0;
 
@@ -39,26 +40,24 @@ static int add_instance(struct scene *scene, const struct session *session, cons
 		                "instance %" PRIu32 " asks for representation %u; this server draws blocks "
 		                "(1, or 0 for automatic)",
 		                number, msg->representation);
-	while (i < session->n_handles && session->handle[i].number != msg->handle)
-		i++;
-	if (i == session->n_handles)
+	if (model == NULL)
 		return psr_fail(err, PSR_ERR_NOT_FOUND,
 		                "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it", number, msg->handle);
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];
 	norm = sqrt(norm);
-	instance->model = session->handle[i].model->model;
+	instance->model = model->model;
 	for (int k = 0; k < 4; k++)
 		instance->rotation[k] = msg->rotation[k] / norm;
 	memcpy(instance->translation, msg->translation, sizeof instance->translation);
 	instance->scale = msg->scale;
-	scene->model[number] = catalogue_ref(scene->catalogue, session->handle[i].model);
+	scene->model[number] = catalogue_ref(scene->catalogue, model);
 	scene->scene.n_instances++;
 	return PSR_OK;
 }
 
-int scene_create(struct scene **out, const struct session *session, struct catalogue *catalogue,
-                 const struct psr_msg_scene *msg, struct psr_error *err)
+int scene_create(struct scene **out, const struct handles *handles, const struct psr_msg_scene *msg,
+                 struct psr_error *err)
 {
 	struct scene *scene;
 	int code = PSR_OK;
@@ -69,13 +68,13 @@ int scene_create(struct scene **out, const struct session *session, struct catal
 	if (scene == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
 	scene->n_refs = 1;
-	scene->catalogue = catalogue;
+	scene->catalogue = handles->catalogue;
 	scene->instance = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->instance);
 	scene->model = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->model);
 	if (scene->instance == NULL || scene->model == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
-		code = add_instance(scene, session, &msg->instance[i], err);
+		code = add_instance(scene, handles, &msg->instance[i], err);
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
 		wire_to_light(&scene->light[scene->scene.n_lights++], &msg->light[i]);
 	if (code != PSR_OK) {
