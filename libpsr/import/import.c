@@ -4,6 +4,7 @@
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
+#include "base/infile.h"
 #include "import.h"
 
 #define SNIFF_BYTES 65536
@@ -103,7 +104,7 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 	*out = NULL;
 	rc = options != NULL ? check_options(options, err) : PSR_OK;
 	if (rc == PSR_OK)
-		rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+		rc = infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (n_bytes == 0) {
