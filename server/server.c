@@ -233,8 +233,8 @@ static int start_parts(struct server *server, struct psr_error *err)
 		return code;
 	catalogue_init(&server->catalogue, (uint64_t)options->max_memory);
 	if (catalogue_adopt(&server->catalogue, listing) != PSR_OK
-	    || psr_pool_create(&server->pool, (int)options->threads, 1) != PSR_OK
-	    || psr_pool_create(&server->io, IO_THREADS, 1) != PSR_OK || codec_create(&server->codec) != PSR_OK
+	    || psr_pool_create_for_jobs(&server->pool, (int)options->threads, NULL) != PSR_OK
+	    || psr_pool_create_for_jobs(&server->io, IO_THREADS, NULL) != PSR_OK || codec_create(&server->codec) != PSR_OK
 	    || frames_create(&server->frames, server) != PSR_OK || opener_create(&server->opener, server) != PSR_OK
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64,

@@ -8,7 +8,7 @@
 #include "server/net/listen.h"
 #include "server/net/loop.h"
 #include "options.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/proto.h"
 
 #define SERVER_SPARE_CLIENTS 16 /* connections beyond --max-clients that are told so */

@@ -2,7 +2,7 @@
 #include <string.h>
 #include "picture.h"
 
-int picture_write_ppm(struct outfile *file, const struct psr_picture *picture, struct psr_error *err)
+int picture_write_ppm(struct outfile *file, const struct psr_frame *picture, struct psr_error *err)
 {
 	char header[64];
 	int n = snprintf(header, sizeof header, "P6\n%u %u\n255\n", picture->width, picture->height);
@@ -13,7 +13,7 @@ int picture_write_ppm(struct outfile *file, const struct psr_picture *picture, s
 	return PSR_OK;
 }
 
-int picture_write_pfm(struct outfile *file, const struct psr_picture *picture, struct psr_error *err)
+int picture_write_pfm(struct outfile *file, const struct psr_frame *picture, struct psr_error *err)
 {
 	char header[64];
 	int n = snprintf(header, sizeof header, "Pf\n%u %u\n-1.0\n", picture->width, picture->height);
