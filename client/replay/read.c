@@ -205,7 +205,7 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 	const cJSON *item, *planes = get(reader, request, "planes");
 
 	cJSON_ArrayForEach(item, planes)
-		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 			if (cJSON_IsString(item) && strcmp(item->valuestring, psr_plane_name(plane)) == 0)
 				frame->planes |= 1u << plane;
 }

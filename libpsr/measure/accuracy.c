@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "truth.h"
 
 /* Rays a side over the nine pixels of a neighbourhood: 4x4 in each, and where they meet nothing 20x20, since samples
@@ -195,7 +195,7 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	rc = psr_truth_draw(truth, camera, m->width, m->height, 1, n_threads, m->truth_depth, m->truth_normal, NULL, err);
 	if (rc != PSR_OK)
 		return rc;
-	rc = psr_pool_create(&pool, n_threads, 0);
+	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
 	psr_pool_for(pool, (int)m->height, measure_row, m);

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "truth.h"
 
 #define RAYS 4 /* along the side of a pixel */
@@ -143,7 +143,7 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_trut
 		return rc;
 	m.expected = psr_alloc_array((size_t)width * height, sizeof *m.expected);
 	m.got = psr_alloc_array((size_t)width * height, sizeof *m.got);
-	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, n_threads, 0) != PSR_OK) {
+	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, n_threads, NULL) != PSR_OK) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	} else {
 		psr_pool_for(pool, (int)height, measure_row, &m);

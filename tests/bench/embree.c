@@ -9,7 +9,7 @@
 #include <pmmintrin.h>
 #endif
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "report.h"
 
 #define N 16    /* a packet: 4 x 4 pixels */
@@ -259,7 +259,7 @@ void embree_measure(struct peer_result *out, const struct scene_film *film, cons
 	struct psr_pool *pool;
 	double begin = report_ms(), ms[SCENE_FRAMES];
 
-	if (psr_pool_create(&pool, n_threads, 0) != PSR_OK)
+	if (psr_pool_create(&pool, n_threads, NULL) != PSR_OK)
 		report_die("threads", "cannot be started");
 	build(t, mesh, n_threads);
 	t->has_shadow = has_shadow;

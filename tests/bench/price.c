@@ -20,7 +20,7 @@ static void begin(struct drawer *drawer, const struct price_side *side, struct p
 	drawer->frame.height = side->settings.height;
 	drawer->frame.rgb = report_alloc(area, 3);
 	drawer->frame.depth = side->has_depth ? report_alloc(area, sizeof(float)) : NULL;
-	if (psr_renderer_create(&drawer->renderer) != PSR_OK)
+	if (psr_renderer_create(&drawer->renderer, NULL) != PSR_OK)
 		report_die("psr", "cannot be started");
 }
 
@@ -57,7 +57,7 @@ void price_measure(struct price *out, const struct price_side *with, const struc
 	struct psr_pool *pool = NULL;
 	struct drawer a, b;
 
-	if (n_threads > 1 && psr_pool_create(&pool, n_threads, 0) != PSR_OK)
+	if (n_threads > 1 && psr_pool_create(&pool, n_threads, NULL) != PSR_OK)
 		report_die("psr", "cannot be started");
 	begin(&a, with, pool);
 	begin(&b, without, pool);

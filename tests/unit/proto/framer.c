@@ -91,7 +91,7 @@ static void any_split_gives_the_same_messages(void **state)
 	for (size_t i = 0; i < sizeof data; i++)
 		data[i] = (uint8_t)random_below(256);
 	for (uint32_t i = 0; i < 200; i++) {
-		struct psr_msg_rect rect = { .plane = PSR_WIRE_PLANE_COLOR, .codec = PSR_CODEC_ZSTD, .scale = 1, .w = 640,
+		struct psr_msg_rect rect = { .plane = PSR_PLANE_COLOR, .codec = PSR_CODEC_ZSTD, .scale = 1, .w = 640,
 			.h = 128, .total = 100000, .data = data };
 
 		sizes[i] = rect.bytes = i % 10 == 9 ? PSR_WIRE_MAX_RECT_DATA : 1 + random_below(3000);

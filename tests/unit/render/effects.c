@@ -133,7 +133,7 @@ static void draw(struct drawn *d, const struct case_of *c, const struct psr_sett
 	const size_t area = (size_t)settings->width * settings->height;
 	d->frame = (struct psr_frame){ .width = settings->width, .height = settings->height, .rgb = malloc(3 * area),
 		                           .depth = malloc(4 * area) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (simd)
 		renderer_use(renderer, simd);
 	if (psr_render(renderer, &c->scene, settings, NULL, &d->frame, &err))
@@ -291,7 +291,7 @@ static void frames_do_not_depend_on_the_frame_before(void **state)
 	(void)state;
 	struct psr_renderer *renderer;
 	struct psr_error err;
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	for (uint32_t i = 0; i < CASES * 3 / 2; i++) {
 		const uint32_t which = i / 3 * 7 % 60;
 		struct case_of c;
@@ -324,7 +324,7 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 	c.scene.n_instances = 1;
 	psr_settings_default(&c.settings, 320, 240);
 	struct psr_frame frame = { .width = 320, .height = 240, .rgb = malloc(3 * 320 * 240) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	for (int i = 0; i < 40; i++) {
 		const double *middle = psr_model_info(c.instance[0].model)->origin,
 					 scale = psr_model_info(c.instance[0].model)->scale;
