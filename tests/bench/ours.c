@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include "base/stats.h"
 #include "psr/build.h"
 #include "psr/proto.h"
 #include "report.h"
@@ -96,11 +97,11 @@ static void summarize(struct ours_result *out, struct series *series)
 
 	for (size_t i = 0; i < sizeof sum / sizeof sum[0]; i++)
 		*sum[i] /= n;
-	out->ms = report_median(series->ms, out->n_frames);
-	out->ms_encoded = report_median(series->ms_encoded, out->n_frames);
+	out->ms = stats_median(series->ms, (size_t)out->n_frames);
+	out->ms_encoded = stats_median(series->ms_encoded, (size_t)out->n_frames);
 	for (int s = 0; s < PSR_N_STAGES; s++) {
 		out->count[s] /= n;
-		out->stage_ms[s] = report_median(series->stage_ms[s], out->n_frames);
+		out->stage_ms[s] = stats_median(series->stage_ms[s], (size_t)out->n_frames);
 	}
 }
 
