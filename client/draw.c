@@ -139,13 +139,13 @@ static int check(struct job *job, struct psr_error *err)
 /* Codecs of the planes that are asked for. */
 static void choose_codecs(struct psr_msg_frame *frame)
 {
-	if (!(frame->planes & 1 << PSR_WIRE_PLANE_COLOR))
+	if (!(frame->planes & 1 << PSR_PLANE_COLOR))
 		frame->color_codec = frame->color_quality = 0;
-	if (frame->planes & 1 << PSR_WIRE_PLANE_DEPTH) {
+	if (frame->planes & 1 << PSR_PLANE_DEPTH) {
 		frame->depth_format = PSR_WIRE_DEPTH_F32;
 		frame->depth_codec = PSR_CODEC_ZSTD;
 	}
-	if (frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+	if (frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
 		frame->data_codec = PSR_CODEC_ZSTD;
 }
 

@@ -86,7 +86,7 @@ static int load(struct passes *p, const char *source, const char *model, struct 
 		code = psr_mesh_import(&p->mesh, source, NULL, err);
 	if (code == PSR_OK)
 		code = psr_truth_create(&p->truth, p->mesh, err);
-	if (code == PSR_OK && psr_renderer_create(&p->renderer) != PSR_OK)
+	if (code == PSR_OK && psr_renderer_create(&p->renderer, NULL) != PSR_OK)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	if (code == PSR_OK && psr_refiner_create(&p->refiner, p->renderer) != PSR_OK)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
@@ -132,7 +132,7 @@ static int measure(struct passes *p, const char *source, const char *model, doub
 	if (code == PSR_OK)
 		code = make_scene(p, &scene, &instance, &light, magnification, err);
 	if (code == PSR_OK)
-		code = psr_pool_create(&p->pool, options.n_threads, 0);
+		code = psr_pool_create(&p->pool, options.n_threads, NULL);
 	if (code != PSR_OK)
 		return code;
 	p->rgb = malloc((size_t)p->side * p->side * 7);

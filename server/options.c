@@ -1,12 +1,12 @@
 #define _GNU_SOURCE
 #include <ctype.h>
-#include <errno.h>
 #include <inttypes.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "base/infile.h"
 #include "options.h"
 #include "psr/cli.h"
 #include "psr/isa.h"
@@ -139,33 +139,12 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		table[i].seen = &seen[i];
 }
 
-static int read_config(char **out, const char *path, struct psr_error *err)
+static int read_config(char **text, const char *path, struct psr_error *err)
 {
-	FILE *file = fopen(path, "re");
-	char *text;
-	size_t n;
+	struct psr_error why;
+	int code = infile_read_text(text, path, MAX_CONFIG, &why);
 
-	if (file == NULL)
-		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "--config %s: %s", path,
-		                strerror(errno));
-	text = malloc(MAX_CONFIG + 1);
-	if (text == NULL) {
-		fclose(file);
-		return psr_fail(err, PSR_ERR_MEMORY, "--config %s: no memory", path);
-	}
-	n = fread(text, 1, MAX_CONFIG + 1, file);
-	if (ferror(file) || n > MAX_CONFIG || memchr(text, '\0', n) != NULL) {
-		int failed = ferror(file);
-
-		fclose(file);
-		free(text);
-		return failed ? psr_fail(err, PSR_ERR_IO, "--config %s: %s", path, strerror(errno))
-		              : psr_fail(err, PSR_ERR_ARG, "--config %s: not a text file of at most 64 KiB", path);
-	}
-	fclose(file);
-	text[n] = '\0';
-	*out = text;
-	return PSR_OK;
+	return code == PSR_OK ? code : psr_fail(err, code, "--config %s", why.text);
 }
 
 static char *trim(char *text)

@@ -224,8 +224,8 @@ static int create_parts(struct server *server)
 		.memory_bytes = (uint64_t)options->build_memory, .cpu_seconds = (uint64_t)options->build_time,
 	};
 
-	if (psr_pool_create(&server->pool, (int)options->threads, 1) != PSR_OK
-	    || psr_pool_create(&server->io, IO_THREADS, 1) != PSR_OK || codec_create(&server->codec) != PSR_OK
+	if (psr_pool_create_for_jobs(&server->pool, (int)options->threads, NULL) != PSR_OK
+	    || psr_pool_create_for_jobs(&server->io, IO_THREADS, NULL) != PSR_OK || codec_create(&server->codec) != PSR_OK
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	if (frames_create(&server->frames, &(struct frames_parts){

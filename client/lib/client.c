@@ -260,10 +260,10 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address, client->welcome.max_open);
 	if (asked->base != 0 || (asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS)
 	    || asked->color_codec > PSR_CODEC_ZSTD
-	    || (asked->planes >> PSR_WIRE_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
+	    || (asked->planes >> PSR_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "this client asks for planes, depth as float, without budgets of time or error, or base");
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (asked->planes >> plane & 1 && psr_plane_capability(plane) & ~client->welcome.capabilities)
 			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
 			                psr_plane_name(plane));

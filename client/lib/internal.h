@@ -34,7 +34,7 @@ int client_decoder_create(struct client_decoder **out);
 void client_decoder_destroy(struct client_decoder *decoder);
 
 /* rect has passed client_assembly_rect's checks; data holds all rect->total bytes of it. PROTOCOL or MEMORY. */
-int client_decode(struct client_decoder *decoder, struct psr_picture *picture, const struct psr_msg_rect *rect,
+int client_decode(struct client_decoder *decoder, struct psr_frame *picture, const struct psr_msg_rect *rect,
                   const uint8_t *data, struct psr_error *err);
 
 /* ---- assembly.c: one frame from BEGIN to END; no sockets ---- */
@@ -42,7 +42,7 @@ int client_decode(struct client_decoder *decoder, struct psr_picture *picture, c
 struct client_assembly {
 	struct psr_msg_frame asked;
 	struct psr_msg_frame_begin begin;
-	struct psr_picture picture;
+	struct psr_frame picture;
 	int has_begun;
 	uint16_t pass;        /* that must come */
 	unsigned lossy;       /* planes of which a rectangle came by JPEG or reduced */

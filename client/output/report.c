@@ -81,7 +81,7 @@ static void add_planes(cJSON *to, const struct psr_event *event)
 	cJSON *planes = cJSON_AddArrayToObject(to, "planes"), *hashes = cJSON_AddObjectToObject(to, "hashes");
 	cJSON *checked = cJSON_AddArrayToObject(to, "checked");
 
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		char hash[17];
 
 		if (!(event->end->planes >> plane & 1))
@@ -126,7 +126,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	add_stages(report, event->end);
 	effects_add(report, event->end);
 	add_planes(report, event);
-	if (event->end->planes >> PSR_WIRE_PLANE_DEPTH & 1) {
+	if (event->end->planes >> PSR_PLANE_DEPTH & 1) {
 		const double range[2] = { event->begin->depth_min, event->begin->depth_max };
 
 		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));

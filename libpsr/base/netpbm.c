@@ -2,7 +2,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "netpbm.h"
-#include "psr/render.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "rows are written as they are");
 
@@ -109,21 +108,25 @@ int pfm_read(float **depth, uint32_t *width, uint32_t *height, const char *path,
 	return PSR_OK;
 }
 
-void ppm_write(struct outfile *file, const uint8_t *rgb, uint32_t width, uint32_t height)
+int ppm_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err)
 {
 	char header[64];
-	int n = snprintf(header, sizeof header, "P6\n%u %u\n255\n", width, height);
+	int n = snprintf(header, sizeof header, "P6\n%u %u\n255\n", frame->width, frame->height);
 
+	(void)err;
 	outfile_write(file, header, (size_t)n);
-	outfile_write(file, rgb, (size_t)width * height * 3);
+	outfile_write(file, frame->rgb, (size_t)frame->width * frame->height * 3);
+	return PSR_OK;
 }
 
-void pfm_write(struct outfile *file, const float *depth, uint32_t width, uint32_t height)
+int pfm_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err)
 {
 	char header[64];
-	int n = snprintf(header, sizeof header, "Pf\n%u %u\n-1.0\n", width, height);
+	int n = snprintf(header, sizeof header, "Pf\n%u %u\n-1.0\n", frame->width, frame->height);
 
+	(void)err;
 	outfile_write(file, header, (size_t)n);
-	for (uint32_t y = height; y-- > 0;)
-		outfile_write(file, depth + (size_t)y * width, width * sizeof *depth);
+	for (uint32_t y = frame->height; y-- > 0;)
+		outfile_write(file, frame->depth + (size_t)y * frame->width, frame->width * sizeof *frame->depth);
+	return PSR_OK;
 }

@@ -5,17 +5,16 @@
 
 #include <stdint.h>
 #include "outfile.h"
+#include "psr/frame.h"
 
-/* 3 bytes a pixel, in memory of malloc(). NOT_FOUND, IO, FORMAT, LIMIT (sides and pixels of psr/render.h), MEMORY. */
+/* 3 bytes a pixel, in memory of malloc(). NOT_FOUND, IO, FORMAT, LIMIT (sides and pixels of psr/frame.h), MEMORY. */
 int ppm_read(uint8_t **rgb, uint32_t *width, uint32_t *height, const char *path, struct psr_error *err);
 
 /* The same of a picture of one channel. */
 int pfm_read(float **depth, uint32_t *width, uint32_t *height, const char *path, struct psr_error *err);
 
-/* outfile_close() reports failures. */
-void ppm_write(struct outfile *file, const uint8_t *rgb, uint32_t width, uint32_t height);
-
-/* Little-endian; infinity is kept. */
-void pfm_write(struct outfile *file, const float *depth, uint32_t width, uint32_t height);
+/* Write the frame's colour, and its depth (little-endian). outfile_close() reports failures; these return PSR_OK. */
+int ppm_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
+int pfm_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
 
 #endif

@@ -99,12 +99,12 @@ static void set_environment(fenv_t *callers)
 	fesetenv(FE_DFL_ENV);
 }
 
-int psr_renderer_create(struct psr_renderer **out)
+int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	fenv_t callers;
 	if (!r)
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	set_environment(&callers);
 	for (int i = 0; i < 65536; i++)

@@ -4,7 +4,7 @@
 
 #include <stdatomic.h>
 #include <stdint.h>
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/render.h"
 #include "simd/simd.h"
 

@@ -13,7 +13,7 @@
 #include "sample/own/field.h"
 #include "sample/project/projection.h"
 #include "psr/mesh.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 #include "sample/visible/visible_set.h"
 #include "sample/project/sheet.h"

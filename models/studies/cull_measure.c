@@ -174,7 +174,7 @@ static int measure_init(struct measure *m, int has_truth)
 	         || (has_truth && m->n_seen == NULL) || m->frame.rgb == NULL;
 	for (int i = 0; i < m->n_choices && !failed; i++)
 		failed = (m->is_kept[i] = psr_alloc_array(m->set->n_blocks, 1)) == NULL;
-	return failed || psr_renderer_create(&m->renderer) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
+	return failed || psr_renderer_create(&m->renderer, NULL) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 static void measure_fini(struct measure *m)

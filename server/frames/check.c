@@ -15,10 +15,10 @@ int frame_check(const struct psr_msg_frame *frame, uint16_t view, int64_t max_pi
 		                frame->width, frame->height, n_pixels, max_pixels);
 	if (frame->color_codec == PSR_CODEC_PNG)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not send PNG; ask for raw, JPEG or zstd");
-	if (frame->planes & 1u << PSR_WIRE_PLANE_DEPTH && frame->depth_format != PSR_WIRE_DEPTH_F32)
+	if (frame->planes & 1u << PSR_PLANE_DEPTH && frame->depth_format != PSR_WIRE_DEPTH_F32)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server sends depth as f32 only (format 1), not as format %u",
 		                frame->depth_format);
-	if (frame->pass_limit > 0 && frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+	if (frame->pass_limit > 0 && frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "this server refines colour and depth; other planes take pass_limit 0, not %u",
 		                frame->pass_limit);

@@ -54,7 +54,7 @@ struct job {
 	uint16_t view;
 	uint32_t width, height;
 	const uint8_t *background;
-	struct plane plane[PSR_WIRE_PLANES];
+	struct plane plane[PSR_N_PLANES];
 	int n_planes;
 	struct strip *strip;
 	uint64_t *hash;
@@ -140,7 +140,7 @@ static int reserve(struct encoder *e, size_t n)
 
 static int is_background(const struct plane *plane, const uint8_t *pixels, size_t n, const uint8_t background[3])
 {
-	const uint8_t *empty = plane->number == PSR_WIRE_PLANE_COLOR ? background : psr_plane_background(plane->number);
+	const uint8_t *empty = plane->number == PSR_PLANE_COLOR ? background : psr_plane_background(plane->number);
 
 	/* The strip is background if its first pixel is, and each equals the one before. */
 	return memcmp(pixels, empty, plane->pixel_bytes) == 0
@@ -235,7 +235,7 @@ static int encode_strip(struct strip *strip, const struct job *job, const struct
 	struct encoder *e;
 	int code = PSR_OK;
 
-	if (plane->number == PSR_WIRE_PLANE_DEPTH)
+	if (plane->number == PSR_PLANE_DEPTH)
 		find_depth_range(strip, rows.pixels, n_pixels);
 	if (is_background(plane, rows.pixels, n_pixels, job->background))
 		return PSR_OK;
@@ -286,22 +286,10 @@ static void add_plane(struct job *job, unsigned number, const void *pixels, unsi
 	job->n_planes++;
 }
 
-static const void *pixels_of(const struct psr_frame *frame, unsigned plane)
-{
-	const void *const pixels[PSR_WIRE_PLANES] = {
-		[PSR_WIRE_PLANE_COLOR] = frame->rgb, [PSR_WIRE_PLANE_DEPTH] = frame->depth,
-		[PSR_WIRE_PLANE_NORMAL] = frame->normal, [PSR_WIRE_PLANE_ID] = frame->id,
-		[PSR_WIRE_PLANE_WEIGHT] = frame->weight, [PSR_WIRE_PLANE_WORDS] = frame->words,
-		[PSR_WIRE_PLANE_BLOCK] = frame->block,
-	};
-
-	return pixels[plane];
-}
-
 static unsigned codec_of(const struct psr_msg_frame *request, unsigned plane)
 {
-	return plane == PSR_WIRE_PLANE_COLOR ? request->color_codec
-	       : plane == PSR_WIRE_PLANE_DEPTH ? request->depth_codec : request->data_codec;
+	return plane == PSR_PLANE_COLOR ? request->color_codec
+	       : plane == PSR_PLANE_DEPTH ? request->depth_codec : request->data_codec;
 }
 
 static int collect(struct codec_result *out, const struct job *job, int n_strips)
@@ -341,9 +329,9 @@ int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool 
 	int n_strips = 0, code;
 
 	memset(out, 0, sizeof *out);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (request->planes >> plane & 1)
-			add_plane(&job, plane, pixels_of(frame, plane), codec_of(request, plane), request->color_quality);
+			add_plane(&job, plane, psr_frame_plane(frame, plane), codec_of(request, plane), request->color_quality);
 	assert(job.n_planes > 0);
 	for (int i = 0; i < job.n_planes; i++)
 		n_strips += job.plane[i].n_strips;

@@ -9,7 +9,7 @@
 #include <stdint.h>
 #include "server/net/outq.h"
 #include "psr/error.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/proto.h"
 #include "psr/render.h"
 
@@ -24,7 +24,7 @@ void codec_destroy(struct codec *codec); /* NULL is fine */
 struct codec_result {
 	struct outq_chunk *first; /* RECT messages in order; the caller's; NULL: all background */
 	uint64_t rect_bytes;      /* of RECT data */
-	uint64_t hash[PSR_WIRE_PLANES];
+	uint64_t hash[PSR_N_PLANES];
 	double depth_min, depth_max; /* of the finite depths; both 0: there are none */
 };
 

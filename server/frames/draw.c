@@ -3,7 +3,6 @@
 #include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
-#include "server/net/loop.h"
 #include "wire.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
@@ -19,7 +18,7 @@ struct draw_worker *draw_worker_create(void)
 {
 	struct draw_worker *worker = calloc(1, sizeof *worker);
 
-	if (worker != NULL && psr_renderer_create(&worker->renderer) != PSR_OK) {
+	if (worker != NULL && psr_renderer_create(&worker->renderer, NULL) != PSR_OK) {
 		free(worker);
 		return NULL;
 	}
@@ -170,7 +169,7 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	uint64_t n = (uint64_t)d->request.width * d->request.height, bytes = 0;
 	uint8_t *next;
 
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (wanted >> plane & 1)
 			bytes += n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	if (bytes > worker->capacity) {
@@ -185,13 +184,13 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	picture->width = d->request.width;
 	picture->height = d->request.height;
 	next = worker->pixels; /* those of the longest components first, so that each is aligned */
-	picture->words = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WORDS);
-	picture->depth = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_DEPTH);
-	picture->id = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_ID);
-	picture->normal = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_NORMAL);
-	picture->weight = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WEIGHT);
-	picture->block = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_BLOCK);
-	picture->rgb = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_COLOR);
+	picture->words = take_plane(&next, picture, wanted, PSR_PLANE_WORDS);
+	picture->depth = take_plane(&next, picture, wanted, PSR_PLANE_DEPTH);
+	picture->id = take_plane(&next, picture, wanted, PSR_PLANE_ID);
+	picture->normal = take_plane(&next, picture, wanted, PSR_PLANE_NORMAL);
+	picture->weight = take_plane(&next, picture, wanted, PSR_PLANE_WEIGHT);
+	picture->block = take_plane(&next, picture, wanted, PSR_PLANE_BLOCK);
+	picture->rgb = take_plane(&next, picture, wanted, PSR_PLANE_COLOR);
 	return PSR_OK;
 }
 

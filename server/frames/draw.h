@@ -8,7 +8,7 @@
 #include "codec.h"
 #include "server/net/outq.h"
 #include "psr/error.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/proto.h"
 #include "scene.h"
 

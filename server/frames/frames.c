@@ -298,7 +298,7 @@ void frames_ask(struct frames *frames, struct flow *flow, const struct psr_messa
 	frame->drawing.request = *request;
 	frame->drawing.scene = scene_ref(scene);
 	frame->drawing.last_pass = request->pass_limit;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (request->planes >> plane & 1)
 			frame->reserved += n * psr_plane_pixel_bytes(plane, request->depth_format);
 	frame->note = (struct loop_note){ .fn = on_done, .userdata = frame };

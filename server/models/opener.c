@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include "base/pool.h"
 #include "opening.h"
 #include "server/log.h"
 

@@ -107,7 +107,7 @@ static void draw(struct drawn *out, const struct truth *truth, const struct psr_
 	out->rgb = frame.rgb = report_alloc((size_t)SIDE * SIDE, 3);
 	out->depth = frame.depth = report_alloc((size_t)SIDE * SIDE, sizeof(float));
 	scene(&drawn, 0, &truth->film);
-	if (psr_renderer_create(&renderer) != PSR_OK || psr_render(renderer, &drawn, settings, NULL, &frame, &err) != PSR_OK)
+	if (psr_renderer_create(&renderer, NULL) != PSR_OK || psr_render(renderer, &drawn, settings, NULL, &frame, &err) != PSR_OK)
 		report_die("psr_render", "fails");
 	out->report = frame.report;
 	psr_renderer_destroy(renderer);

@@ -11,19 +11,6 @@ double report_ms(void)
 	return (double)clock_ns() * 1e-6;
 }
 
-static int compare(const void *a, const void *b)
-{
-	const double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-double report_median(double *value, int n)
-{
-	qsort(value, (size_t)n, sizeof *value, compare);
-	return (value[(n - 1) / 2] + value[n / 2]) / 2;
-}
-
 double report_ratio(double a, double b)
 {
 	return b == 0 ? 0 : a / b;

@@ -166,7 +166,7 @@ int main(int argc, char **argv)
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
 		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
-	if (psr_renderer_create(&c.renderer) || psr_refiner_create(&c.refiner, c.renderer) || psr_pool_create(&c.pool, 2, 0))
+	if (psr_renderer_create(&c.renderer, NULL) || psr_refiner_create(&c.refiner, c.renderer) || psr_pool_create(&c.pool, 2, NULL))
 		die("no memory");
 	c.instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	c.scene = (struct psr_scene){ .instance = &c.instance, .n_instances = 1, .ambient = { 1, 1, 1 } };

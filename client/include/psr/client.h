@@ -10,7 +10,6 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
-#include "picture.h"
 #include "psr/proto.h"
 
 #ifdef __cplusplus
@@ -88,7 +87,7 @@ struct psr_event {
 	enum psr_event_type type;
 	uint32_t id;
 	/* FRAME; pointers are valid until the next call with this client: */
-	const struct psr_picture *picture;
+	const struct psr_frame *picture;
 	const struct psr_msg_frame_begin *begin;
 	const struct psr_msg_frame_end *end;
 	uint64_t bytes;      /* of the frame's messages, headers included */

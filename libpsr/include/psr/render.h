@@ -6,6 +6,7 @@
 
 #include <stdint.h>
 #include "error.h"
+#include "frame.h"
 #include "pool.h"
 #include "scene.h"
 
@@ -13,8 +14,6 @@
 extern "C" {
 #endif
 
-#define PSR_MAX_SIDE 16384
-#define PSR_MAX_PIXELS (64u << 20)
 #define PSR_MAX_DEPTH_LEVEL 7 /* the coarsest level buffer has cells of 2^7 pixels */
 
 /* What may leave out blocks that cannot show, beside the frustum. All are conservative: without any of them a frame has
@@ -26,35 +25,6 @@ enum psr_cull_test {
 	PSR_CULL_OCCLUSION = 4, /* what is drawn nearer, where many samples fall into a tile */
 	PSR_CULL_ALL = 7
 };
-
-/* What a frame is asked to do only where it can change a pixel, or saves more than it costs. The protocol has the
- * numbers of effects and reasons, too. */
-enum psr_effect {
-	PSR_EFFECT_CONES,     /* count: blocks tested */
-	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
-	PSR_EFFECT_OCCLUSION, /* count: blocks left out, once in each tile that they touch */
-	PSR_EFFECT_FACING,    /* count: blocks some of whose samples may face away, which are asked one by one */
-	PSR_EFFECT_LEVELS,    /* count: depth buffers beside the picture's own */
-	PSR_EFFECT_FILL,      /* count: pixels whose colour changed */
-	PSR_EFFECT_TWO_SIDED, /* count: pixels whose normals may be turned to the eye */
-	PSR_EFFECT_SPECULAR,  /* count: pixels whose highlights are looked for */
-	PSR_EFFECT_POSITIONS, /* count: pixels whose samples' positions are worked out */
-	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
-	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
-	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with what is behind */
-	PSR_N_EFFECTS
-};
-enum psr_why {
-	PSR_WHY_RAN,
-	PSR_WHY_OFF,     /* the settings leave it out */
-	PSR_WHY_NOTHING, /* nothing in view calls for it */
-	PSR_WHY_VOID,    /* it would not hold here */
-	PSR_WHY_COST,    /* it would cost more than it saves, and changes nothing */
-};
-const char *psr_effect_name(enum psr_effect effect); /* "specular" */
-const char *psr_effect_counts(enum psr_effect effect); /* what its count counts: "pixels looked at for highlights" */
-/* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
-const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
 
 /* How cells of the depth buffers cover the pixels behind them ([G] 4.6). */
 enum psr_gap_method {
@@ -90,71 +60,9 @@ struct psr_settings {
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
 
-enum psr_stage {
-	PSR_STAGE_PLAN,    /* count: instances */
-	PSR_STAGE_SHADOW,  /* count: samples drawn into the shadow maps that were made for this frame */
-	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
-	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
-	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
-	PSR_STAGE_RESOLVE, /* count: pixels resolved: they have a sample and weight above 0; 0 without rgb */
-	PSR_STAGE_SHADE,   /* count: pixels shaded; 0 without rgb */
-	PSR_STAGE_FILL,    /* count: pixels whose colour the fill changed */
-	PSR_STAGE_SMOOTH,  /* count: pixels at edges */
-	PSR_N_STAGES
-};
-const char *psr_stage_name(enum psr_stage stage); /* "warp" */
-
-struct psr_report {
-	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together and divide it by their own clocks */
-	uint64_t count[PSR_N_STAGES];
-	uint64_t n_blocks, n_samples; /* of all instances, all levels */
-	uint64_t n_blocks_drawn, n_samples_drawn; /* of the levels that are drawn, after culling; all samples of those
-	                                           * blocks */
-	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
-	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
-	uint32_t levels;              /* bit k: level buffer k was in use */
-	uint32_t n_clamped;           /* blocks that wanted a level beyond PSR_MAX_DEPTH_LEVEL: holes are possible there */
-	uint32_t n_shadow_maps;       /* in use */
-	uint32_t n_shadow_maps_drawn; /* of these made for this frame; the others were kept from frames before */
-	struct {
-		uint64_t count;
-		enum psr_why why;
-	} effect[PSR_N_EFFECTS];
-	double error_bound;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
-};
-
-struct psr_frame {
-	uint32_t width, height;
-	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed; NULL to leave it out, and nothing is lit
-	                   * then */
-	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out */
-	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour
-	 * and depth may have been filled in. */
-	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is
-	                   * two-sided; 0, 0, 0 without a sample */
-	uint32_t *id;     /* width * height, index of its instance; UINT32_MAX without a sample */
-	uint8_t *block;   /* 3 * width * height: of its block the model's level, the level k of the depth buffer, and enum
-	                   * psr_facing; 255, 255, 255 without a sample */
-	/* Of the stages before, NULL to leave it out: */
-	uint8_t *weight;  /* width * height, round(255 * weight) before the fill ([G] 4.6); 255 where nothing is and nothing
-	                   * covers */
-	uint64_t *words;  /* width * height, as warped: bits of the float z' in world units << 32 | sample id;
-	                   * PSR_WORD_EMPTY. The sample id is 64 * (block, counted over all instances' models) + place in
-	                   * the block */
-	struct psr_report report;
-};
-
-/* What the cull knew of a block that is drawn ([G] 6.4, 7.3.2). */
-enum psr_facing {
-	PSR_FACING_EYE,       /* its cone faces the eye, and so do all of its samples; or it is bent, and not all of it
-	                       * faces away */
-	PSR_FACING_MIXED,     /* some may face away: each was asked */
-	PSR_FACING_TWO_SIDED, /* none was asked */
-};
-
 struct psr_renderer; /* buffers for one frame at a time; kept from frame to frame */
 
-int psr_renderer_create(struct psr_renderer **out);
+int psr_renderer_create(struct psr_renderer **out, struct psr_error *err); /* MEMORY */
 void psr_renderer_destroy(struct psr_renderer *renderer); /* NULL is fine */
 uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 

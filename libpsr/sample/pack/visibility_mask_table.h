@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 #include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 /* A run has one mask for this many of its blocks, rounded up; so an index has eight bits at most. */
 #define VISIBILITY_SHARE 4

@@ -9,7 +9,7 @@
 
 #include <stdint.h>
 #include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 #define SHEET_BACK 0x80000000u /* in a sample's surface: met from the back */

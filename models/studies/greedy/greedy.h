@@ -11,7 +11,7 @@
 #include "psr/error.h"
 #include "psr/mesh.h"
 #include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 #define GREEDY_MOST_VIEWS 320

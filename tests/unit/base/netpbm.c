@@ -139,20 +139,21 @@ static void pfm_lies_in_the_header_are_refused(void **state)
 
 static void what_was_written_is_read_back(void **state)
 {
-	static const uint8_t pixels[12] = { 0, 1, 2, 13, 10, 32, 255, 254, 253, 7, 8, 9 };
-	static const float depths[4] = { 1, INFINITY, -0.5f, 1e-30f };
+	static uint8_t pixels[12] = { 0, 1, 2, 13, 10, 32, 255, 254, 253, 7, 8, 9 };
+	static float depths[4] = { 1, INFINITY, -0.5f, 1e-30f };
+	const struct psr_frame frame = { .width = 2, .height = 2, .rgb = pixels, .depth = depths };
 	struct outfile file;
 
 	(void)state;
 	assert_int_equal(outfile_open(&file, path, OUTFILE_PLAIN, NULL), PSR_OK);
-	ppm_write(&file, pixels, 2, 2);
+	assert_int_equal(ppm_write_frame(&file, &frame, NULL), PSR_OK);
 	assert_int_equal(outfile_close(&file, PSR_OK, NULL), PSR_OK);
 	assert_int_equal(ppm_read(&rgb, &width, &height, path, NULL), PSR_OK);
 	assert_true(width == 2 && height == 2);
 	assert_memory_equal(rgb, pixels, sizeof pixels);
 	free(rgb);
 	assert_int_equal(outfile_open(&file, path, OUTFILE_PLAIN, NULL), PSR_OK);
-	pfm_write(&file, depths, 2, 2);
+	assert_int_equal(pfm_write_frame(&file, &frame, NULL), PSR_OK);
 	assert_int_equal(outfile_close(&file, PSR_OK, NULL), PSR_OK);
 	assert_int_equal(pfm_read(&depth, &width, &height, path, NULL), PSR_OK);
 	assert_true(width == 2 && height == 2);

@@ -55,8 +55,8 @@ static uint64_t draw(const struct view *view, const struct psr_model *model, dou
 	psr_settings_default(&settings, view->width, view->height);
 	assert_non_null(frame.rgb);
 	assert_non_null(frame.depth);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, view->n_threads, 0), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, view->n_threads, NULL), PSR_OK);
 	if (psr_render(renderer, &scene, &settings, pool, &frame, &err))
 		fail_msg("%s", err.text);
 	assert_true(frame.report.n_covered > 0);

@@ -44,9 +44,9 @@ static void draw(struct picture *p, const struct psr_scene *scene, uint32_t w, u
 	struct psr_error err;
 	psr_settings_default(&settings, w, h);
 	p->frame = (struct psr_frame){ .width = w, .height = h, .rgb = malloc(3 * w * h), .depth = malloc(4 * w * h) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (n_threads > 1)
-		assert_int_equal(psr_pool_create(&pool, n_threads, 0), 0);
+		assert_int_equal(psr_pool_create(&pool, n_threads, 0), NULL);
 	if (psr_render(renderer, scene, &settings, pool, &p->frame, &err))
 		fail_msg("%s", err.text);
 	psr_pool_destroy(pool);
@@ -513,7 +513,7 @@ static void the_door_refuses_what_is_out_of_range(void **state)
 	struct psr_renderer *renderer;
 	struct psr_settings settings;
 	struct psr_frame frame = { .width = 0 };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	psr_settings_default(&settings, 0, 10);
 	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
 	psr_settings_default(&settings, 100000, 100000);

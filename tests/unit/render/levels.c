@@ -301,7 +301,7 @@ static void instances_choose_for_themselves_whatever_the_threads(void **state)
 		instance[i].translation[2] = -3.0 * i * i;
 	}
 	scene.n_instances = 3;
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	choose(&scene, 512, NULL, one);
 	choose(&scene, 512, pool, four);
 	psr_pool_destroy(pool);
@@ -323,7 +323,7 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 
 	(void)state;
 	psr_settings_default(&settings, 512, 512);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	for (double distance = 1.2; distance < 12; distance *= 1.3) {
 		struct psr_scene scene = scene_at(&instance, distance, 1.2);
 		struct psr_report report = { 0 };

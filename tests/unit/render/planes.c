@@ -85,9 +85,9 @@ static struct planes *draw_what(const struct psr_scene *scene, int has_color, in
 		frame.words = p->words;
 	}
 	psr_settings_default(&settings, WIDTH, HEIGHT);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	if (n_threads > 1)
-		assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
+		assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
 	if (psr_render(renderer, scene, &settings, pool, &frame, &err) != PSR_OK)
 		fail_msg("%s", err.text);
 	psr_pool_destroy(pool);

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/render.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
@@ -60,7 +60,7 @@ static void still_make(struct still *s, const struct psr_model *model, uint32_t 
 	psr_settings_default(&s->settings, width, height);
 	s->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc((size_t)width * height * 3),
 		                           .depth = malloc((size_t)width * height * sizeof(float)) };
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
 	assert_int_equal(psr_refiner_create(&s->refiner, s->renderer), PSR_OK);
 }
 
@@ -244,7 +244,7 @@ static void threads_and_instruction_sets_draw_the_same_bytes(void **state)
 	(void)state;
 	still_make(&s, teapot, 560, 300);
 	still_make(&other, teapot, 560, 300);
-	assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	renderer_use(s.renderer, simd_of(PSR_ISA_C));
 	refine(&s, 2, NULL);
 	for (size_t i = 0; i < 3; i++) {

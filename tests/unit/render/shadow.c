@@ -69,7 +69,7 @@ static void stage_init(struct stage *s, const struct shape_options *square, cons
 		                                   .up = { 0, 1, 0 },
 		                                   .kind = PSR_CAMERA_ORTHOGRAPHIC,
 		                                   .ortho_height = 2.9 };
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
 }
 
 static void stage_fini(struct stage *s)
@@ -344,7 +344,7 @@ static void threads_and_instructions_change_no_byte(void **state)
 			s.light[l] = *lights[l];
 		s.scene.n_lights = 3;
 		if (i >= PSR_N_ISAS)
-			assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+			assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 		uint8_t *rgb = draw(&s, pool);
 		if (first)
 			assert_memory_equal(rgb, first, 3 * PIXELS);
@@ -367,7 +367,7 @@ static void check_drawn(struct stage *s, uint32_t n_maps, uint32_t n_drawn)
 	assert_int_equal(s->report.n_shadow_maps_drawn, n_drawn);
 	assert_int_equal(s->report.count[PSR_STAGE_SHADOW] > 0, n_drawn > 0);
 	struct psr_renderer *old = s->renderer;
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
 	uint8_t *fresh = draw(s, NULL);
 	assert_int_equal(s->report.n_shadow_maps_drawn, n_maps);
 	assert_memory_equal(kept, fresh, 3 * PIXELS);

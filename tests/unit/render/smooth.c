@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/render.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
@@ -122,7 +122,7 @@ static void draw(struct drawn *d, int is_smooth, struct psr_pool *pool)
 	struct psr_renderer *renderer;
 	struct psr_error err;
 	d->settings.is_smooth = is_smooth;
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	if (psr_render(renderer, &d->scene, &d->settings, pool, &d->frame, &err))
 		fail_msg("%s", err.text);
 	psr_renderer_destroy(renderer);
@@ -145,7 +145,7 @@ static void only_color_changes_and_alike_for_any_threads_and_planes(void **state
 	struct psr_pool *pool;
 	(void)state;
 	assert_int_equal(psr_model_read(&model, "tests/golden/wheel.psr", &err), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	for (int i = 0; i < 2; i++) {
 		const uint32_t width = sizes[i][0], height = sizes[i][1];
 		const size_t area = (size_t)width * height;

@@ -82,7 +82,7 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 		scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
 		scene.camera.ortho_height = info->scale * 2 / nearness;
 	}
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(psr_warp(renderer, &scene, &settings, NULL, &stack, &report, &err), PSR_OK);
 	warp_plainly(&plain, stack, &scene, &settings);
 	for (uint32_t y = 0; y < height; y++)

@@ -54,7 +54,7 @@ static int draw(const struct psr_model *model, const struct view *view, uint8_t 
 	v3d_scale(light.direction, view->to_light, -1);
 	psr_settings_default(&settings, SIDE, SIDE);
 	settings.cull_tests = cull_tests;
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
 	psr_renderer_destroy(renderer);
 	for (int i = 0; i < SIDE * SIDE; i++)

@@ -4,7 +4,7 @@
 
 #include "base/vec.h"
 #include "psr/direction.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "surface/area.h"
 #include "sample/level.h"
 #include "sample/project/projection.h"

@@ -105,7 +105,7 @@ static double opacity_of(const struct psr_model *model, unsigned pass)
 	scene.camera = (struct psr_camera){ .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = SIDE * pixel,
 		                                .eye = { 0, 0, 4 }, .up = { 0, 1, 0 } };
 	psr_settings_default(&settings, SIDE, SIDE);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	assert_int_equal(psr_refiner_create(&refiner, renderer), PSR_OK);
 	assert_int_equal(psr_refine(refiner, &scene, &settings, pass, NULL, NULL, NULL, &frame, NULL), PSR_OK);
 	psr_refiner_destroy(refiner);
