@@ -12,7 +12,7 @@
 #include "server/frames/frames.h"
 #include "log.h"
 #include "server/models/opener.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "server.h"
 
 #define IO_THREADS 2

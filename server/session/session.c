@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "model/blocks.h"
 #include "server/net/conn.h"
 #include "server/frames/frames.h"
 #include "server/models/opener.h"

@@ -10,8 +10,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "surface/material.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "report.h"
 
 #define N_WARM 2

@@ -3,7 +3,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "tests/unit/sample/meshes.h"
 
 #define SIDE 64
