@@ -11,8 +11,8 @@
 #include "base/netpbm.h"
 #include "json.h"
 #include "psr/build.h"
-#include "psr/cli.h"
-#include "psr/measure.h"
+#include "base/cli.h"
+#include "measure/measure.h"
 #include "psr/mesh.h"
 #include "psr/render.h"
 
