@@ -1,14 +1,13 @@
-/* What is kept of a level, without what it was chosen from; and the pieces of the object that its levels are cut
- * into. */
+/* The kept samples of all levels in blocks, and the pieces of the object that levels are cut into. */
 #ifndef PSR_SAMPLE_LEVELS_DRAFT_H
 #define PSR_SAMPLE_LEVELS_DRAFT_H
 
-#include <stdint.h>
-#include "sample/level.h"
+#include "sample/own/kept.h"
+#include "sample/project/sheet.h"
 
 struct draft_sample {
 	float z;
-	uint32_t surface; /* as in struct sheet_sample */
+	uint32_t surface; /* sampling.h */
 	uint64_t attr;
 };
 
@@ -33,8 +32,8 @@ struct draft {
 
 void draft_fini(struct draft *draft);
 
-/* Adds the next level. MEMORY, LIMIT. */
-int draft_add(struct draft *draft, const struct level *level);
+/* Adds the next level: kept samples of the sheets of all projections. MEMORY, LIMIT. */
+int draft_add(struct draft *draft, const struct sheets *sheets, const struct kept *kept);
 
 /* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has
  * all samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different

@@ -70,7 +70,7 @@ static void projection_box(const struct draft *draft, const struct draft_block *
 static void middle_of(const struct psr_projection *projection, const double min[3], const double max[3],
                       double middle[3])
 {
-	sheets_inner(projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, middle);
+	projection_inner(projection, (min[0] + max[0]) / 2, (min[1] + max[1]) / 2, (min[2] + max[2]) / 2, middle);
 }
 
 static uint64_t morton(const double center[3])
@@ -140,7 +140,7 @@ static void center_block(struct pack *pack, uint32_t i, const struct draft_block
 	double center[3];
 	struct psr_place place;
 
-	sheets_inner(&pack->draft->projection[block->projection], x, y, (min[2] + max[2]) / 2, center);
+	projection_inner(&pack->draft->projection[block->projection], x, y, (min[2] + max[2]) / 2, center);
 	for (int k = 0; k < 3; k++) {
 		double rounded = rint(center[k] * 0x1p14);
 
@@ -192,7 +192,7 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 		double p[3], position[3], squared = 0;
 
 		place_sample(pack->draft, block, (unsigned)__builtin_ctzll(left), p);
-		sheets_inner(projection, p[0], p[1], (double)psr_place_depth(&place, pack->depth[at]), position);
+		projection_inner(projection, p[0], p[1], (double)psr_place_depth(&place, pack->depth[at]), position);
 		for (int k = 0; k < 3; k++) {
 			double d = position[k] - pack->center[k][i] * 0x1p-14;
 
@@ -220,9 +220,9 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 
 	for (uint64_t left = block->two_sided && !(block->traits & PSR_BLOCK_BENT) ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
-		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SHEET_BACK);
+		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SURFACE_BACK);
 
-		v3f_scale(normal[n++], front, (sample->surface & SHEET_BACK) != 0 ? -1 : 1);
+		v3f_scale(normal[n++], front, (sample->surface & SURFACE_BACK) != 0 ? -1 : 1);
 		if (!(block->traits & PSR_BLOCK_BENT))
 			memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
