@@ -1,16 +1,15 @@
-/* The order of the steps by which one level of a model is made, each of which writes what stands beside it and reads
- * what stands above. Rooms include those before them only:
+/* The order of the steps that make one level of a model. Each folder of sample/ is a step: it writes what stands in
+ * brackets, reads what the steps above wrote, and includes nothing of those below (tests/e2e/rooms.sh).
  *
- *   base, simd, model, render, surface, ray   what is below the sampler
- *   project    which primitives are thin (thin); the hits of 32 projections (sheets)       [G] 4.4, 5.1
- *   visible    which parts of the surface can be seen (visible, sides)
- *   own        which projection keeps a place (field, ownership); kept samples (kept)      [G] 5.2
- *   thin       samples of needles and leaves, into kept
- *   mend       places that kept samples miss, and samples for these, into kept             [G] 4.2, 4.3
- *   levels     blocks of all levels, cut into groups (struct draft)                        [G] 4.6
- *   pack       cones, masks, the arrays of a model                                         [G] 6.3, 6.4
+ *   project    finds what is thin (thin) and traces 32 projections (sheets)               [G] 4.4, 5.1
+ *   visible    finds which parts of the surface can be seen (visible, sides)
+ *   own        gives each place to a projection (field, ownership), keeps samples (kept)  [G] 5.2
+ *   thin       keeps samples of needles and leaves
+ *   mend       finds places that kept samples miss, and keeps samples for them            [G] 4.2, 4.3
+ *   levels     makes blocks of all levels, cut into groups (struct draft)                 [G] 4.6
+ *   pack       makes cones, masks, and the arrays of a model                              [G] 6.3, 6.4
  *
- * build.c knows the order of levels. */
+ * level.c alone knows the order up to mend, build.c that of the rest. */
 #ifndef PSR_SAMPLE_LEVEL_H
 #define PSR_SAMPLE_LEVEL_H
 

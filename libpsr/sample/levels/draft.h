@@ -7,7 +7,7 @@
 
 struct draft_sample {
 	float z;
-	uint32_t surface; /* sampling.h */
+	uint32_t surface; /* a side: surface.h */
 	uint64_t attr;
 };
 

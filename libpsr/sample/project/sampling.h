@@ -11,9 +11,6 @@
 #include "surface/texture.h"
 #include "thin.h"
 
-/* A side of a primitive: its number, and SURFACE_BACK of its back. */
-#define SURFACE_BACK 0x80000000u
-
 struct sampling {
 	const struct psr_mesh *mesh;
 	const struct ray_scene *scene;

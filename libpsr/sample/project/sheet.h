@@ -25,7 +25,7 @@
 
 struct sheet_sample {
 	float z;          /* along the projection's z, inner units */
-	uint32_t surface; /* sampling.h */
+	uint32_t surface; /* a side: surface.h */
 };
 
 /* What searches read comes first. */

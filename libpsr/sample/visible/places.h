@@ -7,7 +7,7 @@
 
 struct place {
 	float p[3], n[3]; /* n: unit, on the side that counts */
-	uint32_t surface; /* sampling.h */
+	uint32_t surface; /* a side: surface.h */
 };
 
 struct places {
