@@ -166,6 +166,7 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 {
 	const struct psr_presets presets = { build->mesh->n_cameras, build->mesh->n_lights, build->mesh->camera,
 		                                 build->mesh->light };
+	struct pack_source source = { NULL, &build->draft, &presets, build->pool };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)
@@ -182,8 +183,9 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
 	}
 	ray_scene_stipple(build->scene, STIPPLE_PIXELS * build->draft.ds); /* that of level 0, by which losses are judged */
+	source.scene = build->scene;
 	if (rc == PSR_OK)
-		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
+		rc = pack_model(out, &build->info, &source, build->err);
 	return rc;
 }
 

@@ -6,7 +6,7 @@
  *   own        gives each place to a projection (field, ownership), keeps samples (kept)  [G] 5.2
  *   thin       keeps samples of needles and leaves
  *   mend       finds places that kept samples miss, and keeps samples for them            [G] 4.2, 4.3
- *   levels     makes blocks of all levels, cut into groups (struct draft)                 [G] 4.6
+ *   levels     makes blocks of all levels, cut into groups (struct draft)
  *   pack       makes cones, masks, and the arrays of a model                              [G] 6.3, 6.4
  *
  * level.c alone knows the order up to mend, build.c that of the rest. */

@@ -12,14 +12,22 @@ void draft_fini(struct draft *draft)
 	memset(draft, 0, sizeof *draft);
 }
 
+void draft_project(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3])
+{
+	double spacing = draft_spacing(draft, block);
+	int row = block->row + (int)(s / PSR_BLOCK_SIDE);
+
+	p[0] = (block->col + (int)(s % PSR_BLOCK_SIDE) + (row & 1) / 2.0) * spacing;
+	p[1] = row * 0.86602540378443864676 * spacing;
+	p[2] = (double)draft_sample(draft, block, s)->z;
+}
+
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3])
 {
-	const struct psr_projection *p = &draft->projection[block->projection];
-	double spacing = (double)p->spacing * (double)(1u << block->level), inner[3];
-	int row = block->row + (int)(s / PSR_BLOCK_SIDE), col = block->col + (int)(s % PSR_BLOCK_SIDE);
+	double p[3], inner[3];
 
-	projection_inner(p, (col + (row & 1) / 2.0) * spacing, row * 0.86602540378443864676 * spacing,
-	             (double)draft_sample(draft, block, s)->z, inner);
+	draft_project(draft, block, s, p);
+	projection_inner(&draft->projection[block->projection], p[0], p[1], p[2], inner);
 	v3f_set(position, (float)inner[0], (float)inner[1], (float)inner[2]);
 }
 

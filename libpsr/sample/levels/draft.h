@@ -47,7 +47,13 @@ int draft_group(struct draft *draft, struct psr_pool *pool);
  * their hits were there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
 int draft_join(struct draft *draft);
 
-/* Inner coordinates of sample s of a block. */
+static inline double draft_spacing(const struct draft *draft, const struct draft_block *block)
+{
+	return (double)draft->projection[block->projection].spacing * (double)(1u << block->level);
+}
+
+/* Sample s of a block, in the space of its projection and in inner coordinates. */
+void draft_project(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3]);
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);
 
 static inline const struct draft_sample *draft_sample(const struct draft *draft, const struct draft_block *block,

@@ -78,6 +78,7 @@ struct batch {
 static int trace_columns(const struct job *job, struct strip strip[2], int row, int first, int end)
 {
 	static _Thread_local struct batch batch;
+	struct ray_hits hits[2];
 	int n = 0, is_of[BATCH], rc = PSR_OK;
 
 	for (int i = 0; i < end - first; i++) {
@@ -89,8 +90,10 @@ static int trace_columns(const struct job *job, struct strip strip[2], int row, 
 			sheets_ray(&job->sheets[0]->projection, x, y, &batch.ray[n++]);
 	}
 	strip->n_rays += (uint64_t)n;
-	ray_scene_trace_ends(job->sampling->scene, batch.ray, n, 2 * SHEET_START, SHEET_LAYERS, batch.hit[0], batch.n_hits[0],
-	                     job->sheets[1] != NULL ? batch.hit[1] : NULL, batch.n_hits[1]);
+	for (int k = 0; k < 2; k++)
+		hits[k] = (struct ray_hits){ SHEET_LAYERS, batch.hit[k], batch.n_hits[k] };
+	ray_scene_trace_ends(job->sampling->scene, batch.ray, n, 2 * SHEET_START, &hits[0],
+	                     job->sheets[1] != NULL ? &hits[1] : NULL);
 	for (int end_of_ray = 0; end_of_ray < 2 && job->sheets[end_of_ray] != NULL; end_of_ray++) {
 		struct strip *s = &strip[end_of_ray];
 
