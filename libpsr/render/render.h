@@ -50,6 +50,7 @@ struct plan {
 	struct warp_instance *warp; /* what warping knows of each */
 	struct strip_view view;    /* needs is filled by the cull, */
 	int has_sheer;             /* and this: some block that is left is sheer */
+	int is_shadow;             /* it draws a shadow map, in which sheer blocks are there or not */
 	struct strip_light *light;
 	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
@@ -166,6 +167,14 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
+/* Lowers words of a tile to the discs of blocks, of what lies beyond and before these depths; 0 of `beyond` and infinity
+ * of `before` leave nothing out. All three have the target's stride. */
+void splat_layer(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
+                 const float *beyond, const float *before);
+
+/* How much further away a block's discs count as at their rims than in their planes, in z': a step of its lattice. */
+float splat_rim(const struct plan_instance *in, uint32_t block);
+
 /* Pixels of a picture that are well inside of what its plain frame covers; the frame's pixel (0, 0) is sub-pixel (left,
  * top) of the picture, which has 2^pass along the side of a pixel. */
 struct inside {
@@ -221,6 +230,11 @@ struct shade_target {
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
                 const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
                 struct shade_counts *counts);
+
+/* Lights the samples of n words, STRIP at most, which begin at pixel (x, y) and at a whole strip. Colours are those of
+ * pixels->x in strip->r, g and b. Returns how many there are. */
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t x, uint32_t y,
+                    uint32_t n, struct strip_pixels *pixels, struct strip *strip);
 
 /* ---- planes: what else is known of a row's pixels ---- */
 
@@ -350,6 +364,37 @@ void smooth_clear(struct smooth *smooth);
 /* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
 uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                         uint8_t *rgb);
+
+/* ---- sheer: surfaces that let a part of the light through, over the finished picture ---- */
+
+struct sheer {
+	void *storage;
+	float *depth;
+	size_t storage_size, depth_size;
+};
+
+/* Moves the sheer entries of a tile behind its other ones, which alone are warped, and returns the first. In a shadow map
+ * those that keep back half of the light or more are like others, and the rest casts none. */
+uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
+
+/* A picture without sheer surfaces: sRGB or NULL, and its depths in world units. */
+struct sheer_picture {
+	uint8_t *rgb;
+	const uint8_t *srgb; /* 8 bits of 16-bit linear light */
+	float *depth;
+	int exponent; /* of the stack */
+};
+
+/* Room for its depths, where nobody else has any. NULL: there is no memory. */
+float *sheer_depths(struct sheer *sheer, const struct plan *plan);
+
+/* Draws its sheer surfaces over it, the nearest of a pixel over those behind it, eight at most: each keeps back as much
+ * of what is behind it as its opacity says. The depth becomes that of the nearest one where these keep back half of the
+ * light, or where nothing is behind them. *n_pixels: pixels with any. A pure function of picture, plan and bins.
+ * MEMORY. */
+int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
+               const struct sheer_picture *picture, struct psr_pool *pool, uint64_t *n_pixels);
+void sheer_clear(struct sheer *sheer);
 
 /* ---- for refinement: what the plain frame covers ---- */
 

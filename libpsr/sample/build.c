@@ -107,7 +107,6 @@ static int make_level(struct build *build, struct level *level)
 	memcpy(projection, build->projection, sizeof projection);
 	for (int i = 0; i < N_PROJECTIONS; i++)
 		projection[i].spacing *= (float)(1u << build->n_levels_done);
-	ray_scene_stipple(build->scene, STIPPLE_PIXELS * level->ds);
 	rc = level_make(level, projection, report_step, build);
 	if (rc == PSR_OK)
 		rc = check_samples(build, level);
@@ -184,6 +183,7 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		return rc;
 	if (surface_init(&build->surface, build->mesh, build->info.scale) != PSR_OK)
 		return psr_fail(build->err, PSR_ERR_MEMORY, "no memory for the mesh's textures");
+	ray_scene_stipple(build->scene, STIPPLE_PIXELS * 2.0 / build->options->resolution);
 	projection_list(build->projection, 2.0 / build->options->resolution, build->options->tolerance);
 	rc = make_levels(build);
 	if (rc == PSR_OK && draft_group(&build->draft, build->pool) != PSR_OK)
@@ -193,9 +193,8 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		if (rc != PSR_OK)
 			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
 	}
-	ray_scene_stipple(build->scene, STIPPLE_PIXELS * build->draft.ds); /* that of level 0, by which losses are judged */
 	if (rc == PSR_OK)
-		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
+		rc = pack_model(out, &build->info, &presets, build->scene, &build->surface, &build->draft, build->pool, build->err);
 	return rc;
 }
 

@@ -22,6 +22,7 @@ struct order {
 
 struct pack {
 	const struct ray_scene *scene;
+	const struct surface *surface;
 	const struct draft *draft;
 	struct order *order;
 	struct psr_cluster *cluster;
@@ -29,7 +30,7 @@ struct pack {
 	int16_t *center[3];
 	uint16_t *radius;
 	int8_t *cone[3];
-	uint8_t *cone_sine, *block_projection, *flags, *traits;
+	uint8_t *cone_sine, *block_projection, *flags, *traits, *opacity;
 	uint16_t *attr_offset, *depth;
 	uint64_t *mask, *attr;
 	uint32_t n_clusters, n_samples;
@@ -231,6 +232,28 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		pack->cone[k][i] = axis[k];
 }
 
+/* Of a sample of a sheer block, filtered as its attributes are. */
+static uint8_t find_opacity(const struct pack *pack, const struct draft_block *block, unsigned s)
+{
+	uint32_t surface = draft_sample(pack->draft, block, s)->surface;
+	struct surface_place place = { .prim = surface & ~SHEET_BACK, .is_back = (surface & SHEET_BACK) != 0 };
+	double p[3], pixel = pack->draft->ds * (double)(1u << block->level);
+	struct ray ray;
+
+	place_sample(pack->draft, block, s, p);
+	sheets_ray(&pack->draft->projection[block->projection], p[0], p[1], &ray);
+	ray_locate(pack->scene, &ray, place.prim, &place.u, &place.v);
+	return (uint8_t)(surface_opacity(pack->surface, &place, 1.4142135623730951 * pixel) * 255 + 0.5f);
+}
+
+static void find_opacities(struct pack *pack, uint32_t at, const struct draft_block *block)
+{
+	for (uint64_t left = block->part; left != 0; left &= left - 1, at++)
+		pack->opacity[at] = (block->traits & PSR_BLOCK_SHEER) != 0
+		                            ? find_opacity(pack, block, (unsigned)__builtin_ctzll(left))
+		                            : PSR_OPAQUE;
+}
+
 static void place_block(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	if (i % PSR_RUN_BLOCKS == 0)
@@ -257,6 +280,7 @@ static void pack_blocks(struct pack *pack)
 		quantise(pack, i, pack->n_samples, block, min[2], max[2]);
 		bound_block(pack, i, pack->n_samples, block);
 		bound_normals(pack, i, block);
+		find_opacities(pack, pack->n_samples, block);
 		pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
 	}
 }
@@ -334,6 +358,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->traits, n_blocks);
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
+	ALLOC(pack->opacity, n_samples);
 	ALLOC(pack->attr_offset, n_blocks);
 	ALLOC(pack->run, n_blocks / PSR_RUN_BLOCKS + 1);
 #undef ALLOC
@@ -356,6 +381,7 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->traits);
 	psr_free(pack->mask);
 	psr_free(pack->attr);
+	psr_free(pack->opacity);
 	psr_free(pack->attr_offset);
 	psr_free(pack->run);
 }
@@ -387,13 +413,14 @@ static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct v
 	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
-static int has_traits(const struct pack *pack)
+/* Of all blocks, OR-ed. */
+static uint8_t find_traits(const struct pack *pack)
 {
 	uint8_t any = 0;
 
 	for (uint32_t i = 0; i < pack->draft->n_blocks; i++)
 		any |= pack->traits[i];
-	return any != 0;
+	return any;
 }
 
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
@@ -417,7 +444,8 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.flags = pack->flags;
-	blocks.traits = has_traits(pack) ? pack->traits : NULL;
+	blocks.traits = find_traits(pack) != 0 ? pack->traits : NULL;
+	blocks.opacity = (find_traits(pack) & PSR_BLOCK_SHEER) != 0 ? pack->opacity : NULL;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;
@@ -437,9 +465,10 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 }
 
 int pack_model(struct psr_model **out, struct psr_model_info *info, const struct psr_presets *presets,
-               const struct ray_scene *scene, const struct draft *draft, struct psr_pool *pool, struct psr_error *err)
+               const struct ray_scene *scene, const struct surface *surface, const struct draft *draft,
+               struct psr_pool *pool, struct psr_error *err)
 {
-	struct pack pack = { .scene = scene, .draft = draft };
+	struct pack pack = { .scene = scene, .surface = surface, .draft = draft };
 	uint64_t n_samples = count_samples(draft);
 	int rc;
 

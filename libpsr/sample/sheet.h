@@ -39,7 +39,7 @@ struct patch {
 	uint8_t two_sided;  /* of what may count for both of its sides; or of the rest */
 	uint8_t is_alive;   /* some of it is kept */
 	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
-	uint64_t first;     /* of the hits, the first of their rays: nothing hides them; */
+	uint64_t first;     /* of the hits, the first of their rays but for what one sees through: nothing hides them; */
 	uint64_t seen;      /* those that are known to be visible, */
 	uint64_t hidden;    /* and known to be hidden; */
 	uint64_t owned;     /* those that this projection faces best */

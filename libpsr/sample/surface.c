@@ -244,6 +244,24 @@ uint64_t surface_look(const struct surface *surface, const struct surface_place 
 	return word;
 }
 
+float surface_opacity(const struct surface *surface, const struct surface_place *place, double diameter)
+{
+	const struct psr_mesh *mesh = surface->mesh;
+	const struct psr_material *material = &mesh->material[texture_material(mesh, place->prim)];
+	struct spot spot = { .surface = surface, .place = place, .material = material,
+		                 .radius = diameter / 2 * surface->scale };
+	double share, jacobian[2][2];
+	float rgba[4], texel[4];
+
+	if (material->alpha != PSR_ALPHA_BLEND)
+		return 1;
+	texture_plain_color(mesh, place->prim, place->u, place->v, rgba);
+	if (place->prim >= mesh->n_triangles)
+		return rgba[3];
+	spot.has_area = normal_plane(mesh, place->prim, &spot.plane);
+	return look_up(&spot, &material->base_texture, MIP_COVERED, texel, &share, jacobian) ? rgba[3] * texel[3] : rgba[3];
+}
+
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3])
 {
