@@ -96,9 +96,47 @@ static void set_attributes(struct draft *draft, const struct level *level, uint3
 	}
 }
 
+static int has_sheer(const struct draft *draft, uint32_t first)
+{
+	uint8_t any = 0;
+
+	for (uint32_t i = first; i < draft->n_blocks; i++)
+		any |= draft->block[i].traits;
+	return (any & PSR_BLOCK_SHEER) != 0;
+}
+
+/* Makes two blocks, of the same samples, of each one from `first` on that has both sheer ones and others. */
+static int part_sheer(struct draft *draft, const struct level *level, uint32_t *const *block_of, uint32_t first)
+{
+	uint32_t n_blocks = draft->n_blocks - first;
+	uint64_t *sheer = psr_alloc_array(n_blocks, sizeof *sheer);
+	int rc = sheer != NULL ? reserve(draft, (uint64_t)draft->n_blocks + n_blocks, 0) : PSR_ERR_MEMORY;
+
+	if (rc == PSR_OK)
+		memset(sheer, 0, n_blocks * sizeof *sheer);
+	for (uint32_t i = 0; rc == PSR_OK && i < level->cover.n_points; i++) {
+		const struct cover_point *point = &level->cover.point[i];
+
+		if ((point->traits & PSR_BLOCK_SHEER) != 0)
+			sheer[block_of[point->projection][point->patch] - first] |= UINT64_C(1) << point->sample;
+	}
+	for (uint32_t i = 0; rc == PSR_OK && i < n_blocks; i++) {
+		struct draft_block *block = &draft->block[first + i];
+
+		if (sheer[i] == 0 || sheer[i] == block->part)
+			continue;
+		draft->block[draft->n_blocks] = *block;
+		draft->block[draft->n_blocks++].part = sheer[i];
+		block->part &= ~sheer[i];
+		block->traits &= (uint8_t)~PSR_BLOCK_SHEER;
+	}
+	psr_free(sheer);
+	return rc;
+}
+
 int draft_add(struct draft *draft, const struct level *level)
 {
-	uint32_t **block_of = calloc(level->n_projections, sizeof *block_of);
+	uint32_t **block_of = calloc(level->n_projections, sizeof *block_of), first = draft->n_blocks;
 	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(level),
 	                 (uint64_t)draft->n_samples + level->cover.n_points);
 
@@ -111,6 +149,7 @@ int draft_add(struct draft *draft, const struct level *level)
 	if (rc == PSR_OK) {
 		add_blocks(draft, level, block_of);
 		set_attributes(draft, level, block_of);
+		rc = has_sheer(draft, first) ? part_sheer(draft, level, block_of, first) : PSR_OK;
 		draft->n_levels++;
 	}
 	for (unsigned i = 0; i < level->n_projections; i++)
