@@ -138,7 +138,7 @@ void psr_renderer_destroy(struct psr_renderer *r)
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
 	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
-	       r->sheer.storage_size + r->sheer.depth_size + r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
+	       sheer_bytes(&r->sheer) + r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
 static uint32_t n_rows(const struct plan *plan)

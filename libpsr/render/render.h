@@ -167,10 +167,10 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
-/* Lowers words of a tile to the discs of blocks, of what lies beyond and before these depths; 0 of `beyond` and infinity
- * of `before` leave nothing out. All three have the target's stride. */
-void splat_layer(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
-                 const float *beyond, const float *before);
+/* Lists the discs of blocks in the place of drawing them: what of them lies in the tile, whose stride its places have. */
+struct sheer_list;
+void splat_list(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
+                struct sheer_list *list);
 
 /* How much further away a block's discs count as at their rims than in their planes, in z': a step of its lattice. */
 float splat_rim(const struct plan_instance *in, uint32_t block);
@@ -368,10 +368,37 @@ uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const st
 /* ---- sheer: surfaces that let a part of the light through, over the finished picture ---- */
 
 struct sheer {
-	void *storage;
+	struct sheer_tile *tile; /* one a thread that has drawn any */
+	int n_tiles;
 	float *depth;
-	size_t storage_size, depth_size;
+	size_t depth_size;
 };
+
+/* What a tile's blocks show, all of it: by place, words from the nearest on. */
+struct sheer_list {
+	const float *before; /* z' of what hides what is behind it */
+	uint32_t *first;     /* SHEER_END: there is none */
+	struct sheer_word {
+		uint64_t word;
+		uint32_t next;
+	} *word;
+	uint32_t n, capacity;
+	int failed;          /* there was no memory */
+};
+#define SHEER_END UINT32_MAX
+
+int sheer_grow(struct sheer_list *list);
+
+static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
+{
+	uint32_t *link = &list->first[at];
+	if (list->n == list->capacity && sheer_grow(list))
+		return;
+	while (*link != SHEER_END && list->word[*link].word < word)
+		link = &list->word[*link].next;
+	list->word[list->n] = (struct sheer_word){ word, *link };
+	*link = list->n++;
+}
 
 /* Moves the sheer entries of a tile behind its other ones, which alone are warped, and returns the first. In a shadow map
  * those that keep back half of the light or more are like others, and the rest casts none. */
@@ -395,6 +422,7 @@ float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool, uint64_t *n_pixels);
 void sheer_clear(struct sheer *sheer);
+uint64_t sheer_bytes(const struct sheer *sheer);
 
 /* ---- for refinement: what the plain frame covers ---- */
 

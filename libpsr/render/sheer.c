@@ -1,7 +1,7 @@
 /* Surfaces that let a part of the light through: layer by layer, from the nearest on, over the finished picture. */
 #include <math.h>
 #include <stdatomic.h>
-#include <string.h>
+#include <stdlib.h>
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
@@ -17,7 +17,9 @@
 #define LAYER_STEPS 3.0f
 
 /* A tile's layers, in rows WARP_OWN_STRIDE apart. */
-struct layers {
+struct sheer_tile {
+	struct sheer_list list;
+	uint32_t next[WARP_OWN_WORDS]; /* of the list */
 	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
 	float beyond[WARP_OWN_WORDS];  /* z' where it ends */
 	float before[WARP_OWN_WORDS];  /* z' of the picture without */
@@ -33,10 +35,11 @@ struct drawing {
 	const struct plan *plan;
 	const struct bins *bins;
 	const struct sheer_picture *picture;
-	struct layers *layers; /* one a thread */
+	struct sheer_tile *tile; /* one a thread */
 	float to_world[2], to_stack[2]; /* by two factors, since one of them may be beyond a float */
 	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_pixels;
+	atomic_int failed;
 };
 
 /* Pixels of a tile: columns from its left edge, and rows. */
@@ -103,11 +106,12 @@ static size_t place_of(const struct area *area, uint32_t y)
 	return (size_t)(y - area->y0) * WARP_OWN_STRIDE;
 }
 
-static void begin_layers(struct layers *l, const struct drawing *d, const struct area *area)
+static void begin_layers(struct sheer_tile *l, const struct drawing *d, const struct area *area)
 {
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
 		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
+			l->next[at] = SHEER_END;
 			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
 			l->beyond[at] = 0;
 			l->first[at] = INFINITY;
@@ -118,7 +122,7 @@ static void begin_layers(struct layers *l, const struct drawing *d, const struct
 }
 
 /* A pixel of the layer, of this colour. */
-static void add_pixel(struct layers *l, const struct plan *plan, size_t at, uint32_t id, const uint16_t color[3])
+static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, uint32_t id, const uint16_t color[3])
 {
 	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, id / PSR_BLOCK_SAMPLES)];
 	const struct psr_blocks *b = in->cull.blocks;
@@ -133,8 +137,21 @@ static void add_pixel(struct layers *l, const struct plan *plan, size_t at, uint
 	l->beyond[at] = l->through[at] < LEAST_THROUGH ? INFINITY : z + LAYER_STEPS * splat_rim(in, block);
 }
 
+/* The nearest words beyond the layers before. */
+static void find_layer(struct sheer_tile *l, const struct area *area)
+{
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
+			uint32_t i = l->next[at];
+			while (i != SHEER_END && !(psr_float_from_bits((uint32_t)(l->list.word[i].word >> 32)) > l->beyond[at]))
+				i = l->list.word[i].next;
+			l->next[at] = i;
+			l->word[at] = i != SHEER_END ? l->list.word[i].word : PSR_WORD_EMPTY;
+		}
+}
+
 /* Returns how many pixels the layer has. */
-static uint64_t add_layer(struct layers *l, const struct drawing *d, const struct area *area)
+static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const struct area *area)
 {
 	uint64_t n_pixels = 0;
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
@@ -157,7 +174,7 @@ static uint8_t mix(const uint8_t *srgb, float light, float through, uint8_t code
 	return srgb[(int32_t)((mixed < 1 ? mixed : 1) * 65535 + 0.5f)];
 }
 
-static uint64_t end_layers(const struct layers *l, const struct drawing *d, const struct area *area)
+static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, const struct area *area)
 {
 	const struct sheer_picture *p = d->picture;
 	uint64_t n_pixels = 0;
@@ -175,7 +192,19 @@ static uint64_t end_layers(const struct layers *l, const struct drawing *d, cons
 	return n_pixels;
 }
 
-static void draw_tile(struct drawing *d, uint32_t tile, struct layers *l)
+int sheer_grow(struct sheer_list *list)
+{
+	const uint32_t capacity = list->capacity < UINT32_MAX / 2 ? 2 * list->capacity + 65536 : 0;
+	struct sheer_word *grown = capacity ? realloc(list->word, capacity * sizeof *grown) : NULL;
+	list->failed |= !grown;
+	if (!grown)
+		return PSR_ERR_MEMORY;
+	list->word = grown;
+	list->capacity = capacity;
+	return PSR_OK;
+}
+
+static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 {
 	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
 	const struct psr_zstack stack = { .levels = 0 };
@@ -186,10 +215,16 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct layers *l)
 	find_area(&area, d, tile, begin, end);
 	begin_layers(l, d, &area);
 	warp_target_make(&target, d->plan, &stack, tile, l->word);
-	target.clean = target.bare = 0;
+	l->list.before = l->before;
+	l->list.first = l->next;
+	l->list.n = 0;
+	splat_list(d->plan, d->bins->entry + begin, end - begin, &target, &l->list);
+	if (l->list.failed) {
+		atomic_store(&d->failed, 1);
+		return;
+	}
 	for (int layer = 0; layer < MOST_LAYERS; layer++) {
-		d->simd->warp_clear(&target, 0);
-		splat_layer(d->plan, d->bins->entry + begin, end - begin, &target, l->beyond, l->before);
+		find_layer(l, &area);
 		if (!add_layer(l, d, &area))
 			break;
 	}
@@ -201,7 +236,7 @@ static void draw_some(int part, void *userdata)
 	struct drawing *d = userdata;
 	const uint32_t n_tiles = d->plan->tiles_x * d->plan->tiles_y;
 	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
-		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->layers[part]);
+		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
 }
 
 /* Exact unless the result is beyond a float. */
@@ -212,20 +247,31 @@ static void find_factors(float factor[2], int exponent)
 	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - clamped / 2) << 23);
 }
 
+static int make_tiles(struct sheer *sheer, int n)
+{
+	struct sheer_tile *tile = realloc(sheer->tile, (size_t)n * sizeof *tile);
+	if (!tile)
+		return PSR_ERR_MEMORY;
+	for (int i = sheer->n_tiles; i < n; i++)
+		tile[i].list = (struct sheer_list){ .n = 0 };
+	sheer->tile = tile;
+	sheer->n_tiles = n;
+	return PSR_OK;
+}
+
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool, uint64_t *n_pixels)
 {
 	const int n_parts = psr_pool_threads(pool);
 	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture };
-	sheer->storage = psr_grow_huge(sheer->storage, &sheer->storage_size, (size_t)n_parts * sizeof *d.layers);
-	if (!sheer->storage)
+	if (n_parts > sheer->n_tiles && make_tiles(sheer, n_parts))
 		return PSR_ERR_MEMORY;
-	d.layers = sheer->storage;
+	d.tile = sheer->tile;
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
 	psr_pool_for(pool, n_parts, draw_some, &d);
 	*n_pixels = d.n_pixels;
-	return PSR_OK;
+	return d.failed ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 float *sheer_depths(struct sheer *sheer, const struct plan *plan)
@@ -237,6 +283,16 @@ float *sheer_depths(struct sheer *sheer, const struct plan *plan)
 
 void sheer_clear(struct sheer *sheer)
 {
-	psr_free_huge(sheer->storage, sheer->storage_size);
+	for (int i = 0; i < sheer->n_tiles; i++)
+		free(sheer->tile[i].list.word);
+	free(sheer->tile);
 	psr_free_huge(sheer->depth, sheer->depth_size);
+}
+
+uint64_t sheer_bytes(const struct sheer *sheer)
+{
+	uint64_t n = sheer->depth_size + (uint64_t)sheer->n_tiles * sizeof *sheer->tile;
+	for (int i = 0; i < sheer->n_tiles; i++)
+		n += sheer->tile[i].list.capacity * sizeof *sheer->tile[i].list.word;
+	return n;
 }

@@ -25,7 +25,7 @@ struct splat_target {
 	uint64_t *word;
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
-	const float *beyond, *before; /* of layers, by word: between what z' they lie */
+	struct sheer_list *list; /* of all that is drawn, in the place of words; or NULL */
 };
 
 /* An ellipse of the picture: its centre, two conjugate radii, and how depth rises along these and to the rim. */
@@ -58,19 +58,20 @@ static void limit_reach(struct splat *s)
 			v3f_scale(s->radius[i], s->radius[i], s->most / extent);
 }
 
-/* Whether a place of a disc belongs to the layer: beyond the layers before, and before what hides all, by the disc's
- * plane, though half of what is added at a rim behind that. */
-static inline int is_in_layer(const struct splat_target *t, const struct splat *s, int32_t x, int32_t y, float z,
+/* A place of a disc is listed if its plane there is before what hides all, or behind that by half of what is added at a
+ * rim: what lies on a surface is not lost in it. */
+static inline void list_place(const struct splat_target *t, const struct splat *s, int32_t x, int32_t y, float z,
                               float square)
 {
-	const size_t at = (size_t)(y - t->y0) * t->stride + (size_t)(x - t->x0);
-	return z > t->beyond[at] && z - (square + 0.5f) * s->rim < t->before[at];
+	const uint32_t at = (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0);
+	if (z - (square + 0.5f) * s->rim < t->list->before[at])
+		sheer_add(t->list, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id);
 }
 
 /* Pixels whose centres are in the ellipse. That which the disc's own centre is in need not be: discs meet their
  * neighbours', and one more pixel at each edge would be too much. */
 static inline __attribute__((always_inline)) void draw_splat(const struct splat_target *t, const struct splat *s,
-                                                             int in_layer)
+                                                             int is_listed)
 {
 	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1];
 	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
@@ -86,7 +87,11 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 			const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
 			const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
 			const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
-			if (square <= 1 && z > t->plan->near_z && (!in_layer || is_in_layer(t, s, x, y, z, square)))
+			if (!(square <= 1 && z > t->plan->near_z))
+				continue;
+			if (is_listed)
+				list_place(t, s, x, y, z, square);
+			else
 				lower(t, x, y, z, s->id);
 		}
 }
@@ -175,7 +180,7 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 }
 
 static inline __attribute__((always_inline)) void draw_block(const struct splat_target *t,
-                                                             const struct bin_entry *entry, int in_layer)
+                                                             const struct bin_entry *entry, int is_listed)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
 	const struct psr_projection *projection =
@@ -222,7 +227,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		}
 		s.id = b.id + sample;
 		limit_reach(&s);
-		draw_splat(t, &s, in_layer);
+		draw_splat(t, &s, is_listed);
 	}
 }
 
@@ -257,17 +262,17 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
-		                            target.x1, target.y1,   NULL,          NULL };
+		                            target.x1, target.y1,   NULL };
 	for (uint32_t e = begin; e < end; e++)
 		draw_block(&t, &bins->entry[e], 0);
 	return counts;
 }
 
-void splat_layer(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
-                 const float *beyond, const float *before)
+void splat_list(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
+                struct sheer_list *list)
 {
-	const struct splat_target t = { plan,       target->word, target->stride, target->x0, target->y0,
-		                            target->x1, target->y1,   beyond,         before };
+	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
+		                            target->x1, target->y1, list };
 	for (uint32_t e = 0; e < n; e++)
 		draw_block(&t, &entry[e], 1);
 }
