@@ -167,9 +167,9 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
-/* Lists the discs of blocks in the place of drawing them: what of them lies in the tile, whose stride its places have. */
+/* Lists the discs of a block in the place of drawing them: what of them lies in the tile, whose stride places have. */
 struct sheer_list;
-void splat_list(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
+void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
                 struct sheer_list *list);
 
 /* How much further away a block's discs count as at their rims than in their planes, in z': a step of its lattice. */
@@ -387,6 +387,7 @@ struct sheer_list {
 };
 #define SHEER_END UINT32_MAX
 
+/* Room for more. MEMORY, which the list notes, too. */
 int sheer_grow(struct sheer_list *list);
 
 static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
@@ -403,6 +404,11 @@ static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word
 /* Moves the sheer entries of a tile behind its other ones, which alone are warped, and returns the first. In a shadow map
  * those that keep back half of the light or more are like others, and the rest casts none. */
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
+
+/* Adds blocks of a tile: samples in pixels where they are a pixel apart at most and the picture has no splats, else
+ * discs. */
+void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
+                       const struct warp_target *target);
 
 /* A picture without sheer surfaces: sRGB or NULL, and its depths in world units. */
 struct sheer_picture {

@@ -5,6 +5,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
+#include "base/vec.h"
 #include "render/block.h"
 #include "render/render.h"
 
@@ -12,9 +13,11 @@
 #define MOST_LAYERS 8
 /* Light that is left, below which nothing further is looked for: less than half a code of 8 bits anywhere. */
 #define LEAST_THROUGH (1.0f / 8192)
-/* Steps of the lattice that a layer is thick. Of the discs of one surface that overlap at a pixel, one may be nearer than
- * the next by its rim, a step, and as much by its slope. */
+/* Steps of the lattice that a layer is thick, across the surface. Of the discs of one surface that overlap at a pixel,
+ * one may be nearer than the next by its rim, a step, and as much by its slope. Along the line of sight it is as much
+ * thicker as the surface is steep, up to ten times at silhouettes. */
 #define LAYER_STEPS 3.0f
+#define LEAST_COSINE 0.1f
 
 /* A tile's layers, in rows WARP_OWN_STRIDE apart. */
 struct sheer_tile {
@@ -121,20 +124,36 @@ static void begin_layers(struct sheer_tile *l, const struct drawing *d, const st
 	}
 }
 
-/* A pixel of the layer, of this colour. */
-static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, uint32_t id, const uint16_t color[3])
+/* Of a layer, in z', at a sample of the instance that shows at a pixel. */
+static float thickness_of(const struct warp_instance *in, uint64_t attr, uint32_t x, uint32_t y, float rim)
 {
-	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, id / PSR_BLOCK_SAMPLES)];
+	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)], u = (float)x + 0.5f, v = (float)y + 0.5f;
+	float d[3];
+	for (int k = 0; k < 3; k++)
+		d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
+	const float cosine = __builtin_fabsf(v3f_dot(n, d)) / __builtin_sqrtf(v3f_dot(d, d));
+	return LAYER_STEPS * rim / (cosine > LEAST_COSINE ? cosine : LEAST_COSINE);
+}
+
+/* Pixel (x, y) of the layer, of this colour. */
+static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, uint32_t id, uint32_t x, uint32_t y,
+                      const uint16_t color[3])
+{
+	const uint32_t i = plan_find_instance(plan, id / PSR_BLOCK_SAMPLES);
+	const struct plan_instance *in = &plan->instance[i];
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot;
-	const uint32_t opacity = b->opacity[block_index(b, block, id % PSR_BLOCK_SAMPLES)];
+	const size_t sample = block_index(b, block, id % PSR_BLOCK_SAMPLES);
+	const uint32_t opacity = b->opacity[sample];
 	const float z = psr_float_from_bits((uint32_t)(l->word[at] >> 32)), back = (float)opacity * (1.0f / PSR_OPAQUE);
 	const float share = l->through[at] * back;
 	for (int c = 0; c < 3; c++)
 		l->light[c][at] += share * ((float)color[c] * (1.0f / 65535));
 	l->through[at] = opacity == PSR_OPAQUE ? 0 : l->through[at] - share;
 	l->first[at] = z < l->first[at] ? z : l->first[at];
-	l->beyond[at] = l->through[at] < LEAST_THROUGH ? INFINITY : z + LAYER_STEPS * splat_rim(in, block);
+	l->beyond[at] = l->through[at] < LEAST_THROUGH
+	                        ? INFINITY
+	                        : z + thickness_of(&plan->warp[i], b->attr[sample], x, y, splat_rim(in, block));
 }
 
 /* The nearest words beyond the layers before. */
@@ -161,7 +180,8 @@ static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const s
 			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, area->x0 + x, y, n, &l->pixels, &l->strip);
 			for (uint32_t i = 0; i < n_found; i++) {
 				const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
-				add_pixel(l, d->plan, first + l->pixels.x[i], l->pixels.id[i], color);
+				const uint32_t at = l->pixels.x[i];
+				add_pixel(l, d->plan, first + at, l->pixels.id[i], area->x0 + x + at, y, color);
 			}
 			n_pixels += n_found;
 		}
@@ -192,18 +212,6 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, 
 	return n_pixels;
 }
 
-int sheer_grow(struct sheer_list *list)
-{
-	const uint32_t capacity = list->capacity < UINT32_MAX / 2 ? 2 * list->capacity + 65536 : 0;
-	struct sheer_word *grown = capacity ? realloc(list->word, capacity * sizeof *grown) : NULL;
-	list->failed |= !grown;
-	if (!grown)
-		return PSR_ERR_MEMORY;
-	list->word = grown;
-	list->capacity = capacity;
-	return PSR_OK;
-}
-
 static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 {
 	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
@@ -218,7 +226,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	l->list.before = l->before;
 	l->list.first = l->next;
 	l->list.n = 0;
-	splat_list(d->plan, d->bins->entry + begin, end - begin, &target, &l->list);
+	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
 	if (l->list.failed) {
 		atomic_store(&d->failed, 1);
 		return;

@@ -268,13 +268,12 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	return counts;
 }
 
-void splat_list(const struct plan *plan, const struct bin_entry *entry, uint32_t n, const struct warp_target *target,
+void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
                 struct sheer_list *list)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
 		                            target->x1, target->y1, list };
-	for (uint32_t e = 0; e < n; e++)
-		draw_block(&t, &entry[e], 1);
+	draw_block(&t, entry, 1);
 }
 
 float splat_rim(const struct plan_instance *in, uint32_t block)
