@@ -222,6 +222,40 @@ static void a_wall_hides_the_pane_behind_it(void **state)
 	psr_model_unref(model);
 }
 
+static void assert_opacities(const struct psr_blocks *blocks, int of_sheer)
+{
+	for (uint32_t b = 0; b < blocks->n_blocks; b++)
+		for (int s = 0; s < __builtin_popcountll(blocks->mask[b]); s++)
+			assert_int_equal(blocks->opacity[psr_blocks_attr_first(blocks, b) + (uint32_t)s],
+			                 psr_blocks_is_sheer(blocks, b) ? of_sheer : PSR_OPAQUE);
+}
+
+/* A decal less than a step before its wall, which rays find in the same windows of the lattice. Pictures tell but for two
+ * steps about its edges, to which discs reach. */
+static void a_decal_changes_nothing_of_the_wall_beside_it(void **state)
+{
+	static const struct square set[] = { { 0, 1, 0, 1 }, { 0.008, 0.3, 2, 0.5f } };
+	static struct picture picture;
+	struct psr_model *model = build_squares(set, 2);
+	const double spacing = psr_model_info(model)->spacing, pixel = spacing / 0.8;
+
+	(void)state;
+	assert_opacities(psr_model_blocks(model), 128);
+	for (unsigned pass = 0; pass <= 1; pass++) {
+		draw(&picture, model, &(struct shot){ 0.8, 0, pass, 0, 3, NULL });
+		for (int y = 0; y < SIDE; y++)
+			for (int x = 0; x < SIDE; x++) {
+				const double u = fabs(x + 0.5 - SIDE / 2) * pixel, v = fabs(y + 0.5 - SIDE / 2) * pixel;
+				const double most = u > v ? u : v, red = psr_srgb_to_linear[picture.rgb[3 * (y * SIDE + x)]];
+
+				if (most > 0.9 || fabs(most - 0.3) < 2 * spacing)
+					continue;
+				assert_float_equal(red, most < 0.3 ? 0.5 : 1, (1.5 * 2.28 + 2 * 0.5) / 255);
+			}
+	}
+	psr_model_unref(model);
+}
+
 /* A closed box: all that is in it is seen through it, from inside of the model's hull. */
 static void what_is_in_a_case_of_glass_is_seen(void **state)
 {
@@ -319,13 +353,10 @@ static void only_what_lets_light_through_has_opacities(void **state)
 		const struct psr_blocks *blocks = psr_model_blocks(model);
 		uint32_t n = 0;
 
-		for (uint32_t b = 0; b < blocks->n_blocks; b++) {
-			const uint32_t first = psr_blocks_attr_first(blocks, b);
-
+		for (uint32_t b = 0; b < blocks->n_blocks; b++)
 			n += psr_blocks_is_sheer(blocks, b) != 0;
-			for (int s = 0; blocks->opacity != NULL && s < __builtin_popcountll(blocks->mask[b]); s++)
-				assert_int_equal(blocks->opacity[first + (uint32_t)s], psr_blocks_is_sheer(blocks, b) ? 128 : PSR_OPAQUE);
-		}
+		if (blocks->opacity != NULL)
+			assert_opacities(blocks, 128);
 		assert_int_equal(blocks->opacity != NULL, i == 0);
 		assert_int_equal(n != 0, i == 0);
 		assert_true(n < blocks->n_blocks);
@@ -342,6 +373,7 @@ int main(void)
 		cmocka_unit_test(behind_two_panes_what_both_let_through_is_left),
 		cmocka_unit_test(before_nothing_the_background_is_seen_through_a_pane),
 		cmocka_unit_test(a_wall_hides_the_pane_behind_it),
+		cmocka_unit_test(a_decal_changes_nothing_of_the_wall_beside_it),
 		cmocka_unit_test(what_is_in_a_case_of_glass_is_seen),
 		cmocka_unit_test(a_pane_has_the_depth_of_what_shows_most),
 		cmocka_unit_test(pictures_have_the_same_bits_by_any_threads_and_instructions),
