@@ -223,8 +223,10 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	find_area(&area, d, tile, begin, end);
 	begin_layers(l, d, &area);
 	warp_target_make(&target, d->plan, &stack, tile, l->word);
-	l->list.before = l->before;
-	l->list.first = l->next;
+	target.y0 = (int32_t)area.low_y;
+	target.y1 = (int32_t)area.high_y;
+	l->list.before = l->before + place_of(&area, area.low_y);
+	l->list.first = l->next + place_of(&area, area.low_y);
 	l->list.n = 0;
 	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
 	if (l->list.failed) {

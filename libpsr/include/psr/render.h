@@ -128,9 +128,10 @@ struct psr_frame {
 	uint32_t width, height;
 	uint8_t *rgb;     /* 3 * width * height, sRGB, rows top-down, packed; NULL to leave it out, and nothing is lit
 	                   * then */
-	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out */
-	/* Of the sample that a pixel shows, each NULL to leave it out. Where the weight is 0 there is none, though colour
-	 * and depth may have been filled in. */
+	float *depth;     /* width * height, z' in world units, +inf where nothing is; NULL to leave it out. Of surfaces
+	                   * that let light through, the nearest's where they keep back half of it, or are before nothing */
+	/* Of the sample that a pixel shows behind all such surfaces, each NULL to leave it out. Where the weight is 0 there
+	 * is none, though colour and depth may have been filled in. */
 	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is
 	                   * two-sided; 0, 0, 0 without a sample */
 	uint32_t *id;     /* width * height, index of its instance; UINT32_MAX without a sample */
