@@ -177,7 +177,8 @@ struct inside {
 
 /* Discs do not meet everywhere. Two kinds of pixels get weight 0 and mark their brick: those that are inside (NULL:
  * nothing is known of that) and lie behind samples in each of the 3 x 3 cells about them by more than their level's
- * threshold, or before nothing and within a cell, or 64 pixels, of something in two opposite directions where cells
+ * threshold, in a gap as narrow as a crack between such samples unless these are magnified; or before nothing and
+ * within a cell, or 64 pixels, of something in two opposite directions where cells
  * are wider than two pixels of the picture; and those before nothing, or behind by more than level 1's threshold,
  * where one surface is within a cell, or some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows.
  * Returns how many there are. */
