@@ -1,4 +1,4 @@
-/* The parts of psr bench: workers that ask for frames, and what they measured. */
+/* psr bench: workers that ask for frames, each on a thread and connection of its own, and their figures. */
 #ifndef PSR_CLIENT_BENCH_BENCH_H
 #define PSR_CLIENT_BENCH_BENCH_H
 
@@ -54,7 +54,8 @@ struct bench_result {
 	uint64_t n_frames, n_samples, n_failed;
 	double p50_ms, p90_ms, p99_ms, max_ms; /* 0 without samples */
 };
-/* Sorts all samples together; MEMORY. */
-int bench_sum(struct bench_result *result, const struct bench_worker *workers, int64_t n, struct psr_error *err);
+
+/* Runs all workers for the time. Workers that failed meanwhile are told on standard error. */
+int bench_run(struct bench_result *result, const struct bench_options *options, struct psr_error *err);
 
 #endif

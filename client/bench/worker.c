@@ -1,7 +1,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "bench.h"
-#include "client/psr.h"
+#include "client/cli/cli.h"
 
 #define FRAMES_A_TURN 120
 
@@ -23,7 +23,7 @@ static int prepare(struct bench_worker *worker, struct psr_error *err)
 
 	worker->frame = options->frame;
 	if (code == PSR_OK)
-		code = view_place(&worker->start, &options->view, worker->client, worker->scene, aspect, FRAMES_A_TURN, err);
+		code = view_place(&worker->start, &options->view, worker->scene, aspect, FRAMES_A_TURN, err);
 	if (code != PSR_OK)
 		return code;
 	view_up(worker->up, &options->view, worker->scene);

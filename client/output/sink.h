@@ -2,15 +2,30 @@
 #ifndef PSR_CLIENT_OUTPUT_SINK_H
 #define PSR_CLIENT_OUTPUT_SINK_H
 
-#include "client/draw.h"
+#include "client/cli/optlist.h"
 #include "notes.h"
+#include "output.h"
+#include "show.h"
 
 #define SINK_HELD 8 /* pictures that came before their turn: fewer than a series has under way */
+
+struct sink_wish {
+	const char *program; /* "psr shot", for messages */
+	const char *output, *depth, *report, *plane_text, *show_text;
+	uint32_t sheet[2];   /* columns and rows */
+	int hash, effects, has_sheet;
+	int64_t n_turn;      /* pictures of a turntable; 0: it is none */
+	double seconds;      /* a turn of an animation */
+};
+
+/* Options of shot and turntable. */
+void sink_add_file_options(struct optlist *list, struct sink_wish *wish);
+void sink_add_developer_options(struct optlist *list, struct sink_wish *wish);
 
 enum sink_kind { SINK_NONE, SINK_FILE, SINK_NUMBERED, SINK_SHEET, SINK_ANIMATION };
 
 struct sink {
-	const struct draw_wish *wish;
+	const struct sink_wish *wish;
 	const struct scene *scene;
 	const struct psr_msg_frame *frame;
 	uint32_t n; /* pictures */
@@ -34,8 +49,9 @@ struct sink {
 	struct { uint32_t k; uint8_t *rgb; } held[SINK_HELD];
 };
 
-/* What of `wish` can be refused before anything is drawn; chooses kind, show, plane. */
-int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, struct psr_error *err);
+/* For n pictures of this width and height: chooses kind, show and plane, and refuses before anything is drawn. */
+int sink_check(struct sink *sink, const struct sink_wish *wish, uint32_t n, const uint32_t size[2],
+               struct psr_error *err);
 
 /* Planes that the files need: bits of enum psr_plane. */
 uint32_t sink_planes(const struct sink *sink);

@@ -5,10 +5,6 @@
 #include <cjson/cJSON.h>
 #include "client/scene/scene.h"
 
-/* Numbers that read back as the same double. */
-void json_add_number(cJSON *to, const char *name, double v);
-void json_add_numbers(cJSON *to, const char *name, const double *v, int n);
-
 /* Adds "request": models, instances, lights, camera, size, settings, passes, planes, codec. */
 void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_frame *frame);
 

@@ -2,7 +2,7 @@
 #ifndef PSR_CLIENT_SCENE_QUALITY_H
 #define PSR_CLIENT_SCENE_QUALITY_H
 
-#include "client/optlist.h"
+#include "client/cli/optlist.h"
 #include "psr/client.h"
 
 struct quality_wish {

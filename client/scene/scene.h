@@ -3,7 +3,7 @@
 #define PSR_CLIENT_SCENE_SCENE_H
 
 #include "instance.h"
-#include "client/optlist.h"
+#include "client/cli/optlist.h"
 #include "psr/client.h"
 
 #define SCENE_AMBIENT 0.15
@@ -55,6 +55,7 @@ struct scene_model {
 
 /* A scene on a connection. */
 struct scene {
+	struct psr_client *client;
 	struct psr_msg_scene msg;
 	int has_key_light;            /* light[0] is scene_light's */
 	int is_key_shadowed;

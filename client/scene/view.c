@@ -237,13 +237,19 @@ void view_up(double up[3], const struct view_wish *wish, const struct scene *sce
 	memcpy(up, wish->camera.has_up ? wish->camera.up : has_natural ? scene->up : y, sizeof y);
 }
 
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
-               const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err)
+int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
+               uint32_t n_turn, struct psr_error *err)
 {
 	struct psr_camera_wish placed = wish->camera;
+	const struct psr_msg_preset *preset;
+	int code;
 
-	if (wish->preset != NULL)
-		return preset_camera(camera, wish->preset, client, scene, err);
+	if (wish->preset != NULL) {
+		code = preset_find(&preset, scene, PSR_WIRE_PRESET_CAMERA, wish->preset, err);
+		if (code == PSR_OK)
+			*camera = preset->camera;
+		return code;
+	}
 	memcpy(placed.natural_up, scene->up, sizeof placed.natural_up);
 	if (n_turn > 1 && !placed.has_eye) {
 		placed.has_angles = 1;

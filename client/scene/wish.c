@@ -1,7 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "preset.h"
-#include "client/psr.h"
+#include "client/cli/cli.h"
 #include "scene.h"
 
 void scene_wish_init(struct scene_wish *wish)

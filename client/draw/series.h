@@ -1,6 +1,6 @@
 /* Frames of one scene over one connection, several under way at a time. */
-#ifndef PSR_CLIENT_OUTPUT_SERIES_H
-#define PSR_CLIENT_OUTPUT_SERIES_H
+#ifndef PSR_CLIENT_DRAW_SERIES_H
+#define PSR_CLIENT_DRAW_SERIES_H
 
 #include "client/scene/scene.h"
 

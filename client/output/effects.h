@@ -1,6 +1,6 @@
 /* What a server says of a frame's effects: which ran, and why the others were left out. */
-#ifndef PSR_CLIENT_SCENE_EFFECTS_H
-#define PSR_CLIENT_SCENE_EFFECTS_H
+#ifndef PSR_CLIENT_OUTPUT_EFFECTS_H
+#define PSR_CLIENT_OUTPUT_EFFECTS_H
 
 #include <cjson/cJSON.h>
 #include "psr/proto.h"

@@ -1,6 +1,6 @@
 #include <string.h>
 #include "base/infile.h"
-#include "client/optlist.h"
+#include "optlist.h"
 
 #define MAX_BYTES (16u << 20)
 

@@ -1,8 +1,7 @@
-/* What the subcommands of psr share. */
-#ifndef PSR_CLIENT_PSR_H
-#define PSR_CLIENT_PSR_H
+/* What every subcommand says and does at the command line. */
+#ifndef PSR_CLIENT_CLI_CLI_H
+#define PSR_CLIENT_CLI_CLI_H
 
-#include <cjson/cJSON.h>
 #include "psr/cli.h"
 #include "psr/client.h"
 
@@ -22,12 +21,6 @@
 
 #define PSR_DEFAULT_TIMEOUT 60
 
-/* Each takes argv[0] = its own name and returns the exit status. */
-int psr_list_main(int argc, char **argv);
-int psr_shot_main(int argc, char **argv);
-int psr_turntable_main(int argc, char **argv);
-int psr_bench_main(int argc, char **argv);
-
 const char *psr_default_server(void); /* $PSR_SERVER, or the address that psrd listens to by default */
 
 /* A build or load that the server reports, as one line on standard error; nothing unless that is a terminal. For
@@ -37,11 +30,5 @@ struct psr_progress_line {
 };
 void psr_progress_draw(const struct psr_msg_progress *progress, void *userdata);
 void psr_progress_end(struct psr_progress_line *line);
-
-/* Prints `json` (which it frees) on standard output. */
-int psr_print_json(cJSON *json, struct psr_error *err);
-
-/* Flushes standard output: IO if not all of it could be written. */
-int psr_flush_output(struct psr_error *err);
 
 #endif

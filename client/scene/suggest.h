@@ -1,6 +1,6 @@
 /* What a person may have meant. */
-#ifndef PSR_CLIENT_SUGGEST_H
-#define PSR_CLIENT_SUGGEST_H
+#ifndef PSR_CLIENT_SCENE_SUGGEST_H
+#define PSR_CLIENT_SCENE_SUGGEST_H
 
 #include <stddef.h>
 #include "psr/client.h"

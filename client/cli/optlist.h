@@ -1,6 +1,6 @@
 /* Tables of options that several commands put together from the same parts. */
-#ifndef PSR_CLIENT_OPTLIST_H
-#define PSR_CLIENT_OPTLIST_H
+#ifndef PSR_CLIENT_CLI_OPTLIST_H
+#define PSR_CLIENT_CLI_OPTLIST_H
 
 #include "psr/cli.h"
 
