@@ -12,8 +12,8 @@
 #include "base/outfile.h"
 #include "base/json.h"
 #include "psr/build.h"
-#include "psr/cli.h"
-#include "psr/measure.h"
+#include "base/cli.h"
+#include "measure/measure.h"
 #include "psr/mesh.h"
 #include "psr/render.h"
 

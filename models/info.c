@@ -3,10 +3,10 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include "base/cli.h"
 #include "base/json.h"
 #include "base/outfile.h"
-#include "psr/cli.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 

@@ -8,7 +8,7 @@
 #include "base/outfile.h"
 #include "models/shapes/generators.h"
 #include "models/shapes/glb.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 /* Triangles as drawn, every instance counted. */
 static uint64_t count_triangles(const struct shape *shape)

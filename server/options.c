@@ -8,8 +8,8 @@
 #include <unistd.h>
 #include "base/infile.h"
 #include "options.h"
-#include "psr/cli.h"
-#include "psr/isa.h"
+#include "base/cli.h"
+#include "simd/isa.h"
 
 #define MAX_OPTIONS 40
 #define MAX_CONFIG 65536

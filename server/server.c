@@ -6,7 +6,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "log.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "server.h"
 #include "server/models/cache.h"
 #include "server/net/accept.h"

@@ -2,7 +2,7 @@
 #ifndef PSR_CLIENT_CLI_CLI_H
 #define PSR_CLIENT_CLI_CLI_H
 
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/client.h"
 
 #define PSR_PROGRAM "psr " PSR_VERSION

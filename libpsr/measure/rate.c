@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "surface/validate.h"
 #include "ray/tree.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "rate.h"
 
 #define ACROSS 512

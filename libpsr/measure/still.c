@@ -5,9 +5,9 @@
 #include "base/vec.h"
 #include "ray/ray.h"
 #include "surface/surface.h"
-#include "psr/direction.h"
-#include "psr/measure.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "measure.h"
+#include "model/blocks.h"
 #include "base/pool.h"
 #include "truth.h"
 

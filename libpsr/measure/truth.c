@@ -8,7 +8,7 @@
 #include "ray/ray.h"
 #include "surface/stipple.h"
 #include "surface/surface.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "base/pool.h"
 
 #define MOST_SIDE 64

@@ -6,7 +6,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render.h"
 #include "shadow.h"
 
@@ -18,9 +18,10 @@ struct psr_renderer {
 	struct fill fill;
 	struct smooth smooth;
 	struct psr_zstack stack;
+	struct refiner *refiner;
 	const struct inside *inside; /* of frames with splats, or NULL */
 	uint8_t *is_covered;         /* of the call of renderer_cover in progress */
-	struct psr_report report; /* of psr_warp, until psr_finish */
+	struct psr_report report; /* of renderer_warp, until renderer_finish */
 	struct psr_frame *frame;  /* of the call in progress */
 	int has_planes;           /* it wants more than colour and depth */
 	struct shade_target target;
@@ -46,28 +47,7 @@ struct psr_renderer {
 	uint8_t srgb[65536];      /* of 16-bit linear light */
 };
 
-const char *psr_stage_name(enum psr_stage stage)
-{
-	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
-		                                             "resolve", "shade",  "fill", "smooth" };
-	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
-}
-
-void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height)
-{
-	settings->width = width;
-	settings->height = height;
-	settings->window = (struct psr_window){ 0, 0, 0, 0 };
-	settings->cull_tests = PSR_CULL_ALL;
-	settings->is_full = 0;
-	settings->with_splats = 0;
-	settings->gap_threshold = 3;
-	settings->gap_method = PSR_GAPS_BILINEAR;
-	settings->spacing = 1;
-	settings->is_smooth = 0;
-}
-
-static int validate(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
+static int validate(const struct psr_scene *scene, const struct render_settings *settings, struct psr_error *err)
 {
 	uint32_t w = settings->width, h = settings->height;
 	if (w < 1 || h < 1)
@@ -119,10 +99,16 @@ void renderer_use(struct psr_renderer *r, const struct simd *simd)
 	r->simd = simd;
 }
 
+struct refiner **renderer_refiner(struct psr_renderer *r)
+{
+	return &r->refiner;
+}
+
 void psr_renderer_destroy(struct psr_renderer *r)
 {
 	if (!r)
 		return;
+	refiner_destroy(r->refiner);
 	plan_clear(&r->plan);
 	shadow_destroy(r->shadow);
 	bins_clear(&r->bins);
@@ -136,7 +122,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
+	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
+	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
 	       r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
@@ -219,7 +206,7 @@ static void warp_one(int i, void *userdata)
 }
 
 /* Shadow maps are drawn if what the stack shows will be lit; else those of earlier frames stay as they are. */
-static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                       int is_lit, struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
                       struct psr_error *err)
 {
@@ -275,7 +262,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	return PSR_OK;
 }
 
-int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
              struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
 {
 	fenv_t callers;
@@ -311,7 +298,7 @@ static void cover_one(int row, void *userdata)
 	}
 }
 
-int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                    struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err)
 {
 	struct psr_report report;
@@ -463,7 +450,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	return PSR_OK;
 }
 
-int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
                struct psr_error *err)
 {
 	fenv_t callers;
@@ -473,7 +460,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	return rc;
 }
 
-int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	struct psr_zstack *stack;

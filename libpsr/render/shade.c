@@ -1,5 +1,5 @@
 #include "base/clock.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render.h"
 
 #define TIMED_EVERY 16 /* strips: clocks cost, too */

@@ -12,6 +12,7 @@
 #include "sample/own/kept.h"
 #include "sample/own/field.h"
 #include "sample/project/projection.h"
+#include "model/blocks.h"
 #include "psr/mesh.h"
 #include "base/pool.h"
 #include "ray/ray.h"

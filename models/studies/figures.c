@@ -3,7 +3,7 @@
 #include <string.h>
 #include "models/commands.h"
 #include "psr/build.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define PROGRAM "psr-model figures"
 

@@ -8,7 +8,7 @@
 #include "models/shapes/generators.h"
 #include "base/json.h"
 #include "psr/build.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define PROGRAM "psr-model study"
 #define MOST_MODELS 64

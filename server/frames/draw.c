@@ -9,7 +9,6 @@
 
 struct draw_worker {
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner; /* NULL until a pass above 0 is drawn */
 	uint8_t *pixels; /* of all planes */
 	uint64_t capacity;
 };
@@ -29,7 +28,6 @@ void draw_worker_destroy(struct draw_worker *worker)
 {
 	if (worker == NULL)
 		return;
-	psr_refiner_destroy(worker->refiner);
 	psr_renderer_destroy(worker->renderer);
 	psr_free(worker->pixels);
 	free(worker);
@@ -37,9 +35,7 @@ void draw_worker_destroy(struct draw_worker *worker)
 
 uint64_t draw_worker_bytes(const struct draw_worker *worker)
 {
-	const uint64_t refiner = worker->refiner != NULL ? psr_refiner_bytes(worker->refiner) : 0;
-
-	return psr_renderer_bytes(worker->renderer) + refiner + worker->capacity;
+	return psr_renderer_bytes(worker->renderer) + worker->capacity;
 }
 
 /* Resolved. */
@@ -210,11 +206,10 @@ static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct
 	psr_settings_default(&settings, d->request.width, d->request.height);
 	settings.spacing = asked.spacing_px;
 	settings.is_smooth = asked.is_smooth;
-	if (d->pass == 0)
-		return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
-	if (worker->refiner == NULL && psr_refiner_create(&worker->refiner, worker->renderer) != PSR_OK)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
-	return psr_refine(worker->refiner, scene, &settings, d->pass, d->pool, is_abandoned, d, picture, err);
+	settings.pass = d->pass;
+	settings.is_cancelled = is_abandoned;
+	settings.userdata = d;
+	return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
 }
 
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)

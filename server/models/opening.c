@@ -9,6 +9,7 @@
 #include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
+#include "model/blocks.h"
 
 static void post(struct opening *o)
 {

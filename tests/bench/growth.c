@@ -8,6 +8,7 @@
 #include "ours.h"
 #include "parts.h"
 #include "report.h"
+#include "model/blocks.h"
 
 #define SIDE 1024
 #define FEWEST_SAMPLES 1e5

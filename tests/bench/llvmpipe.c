@@ -11,8 +11,9 @@
 #include <string.h>
 #include "base/stats.h"
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "surface/material.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "report.h"
 
 #define N_WARM 2

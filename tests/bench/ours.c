@@ -6,6 +6,7 @@
 #include "psr/build.h"
 #include "psr/proto.h"
 #include "report.h"
+#include "render/stages.h"
 #include "server/frames/codec.h"
 
 #define MAX_FRAMES 512
@@ -17,7 +18,7 @@ struct bench {
 	struct psr_renderer *renderer;
 	struct codec *codec;
 	struct psr_frame frame;
-	struct psr_settings settings;
+	struct render_settings settings;
 };
 
 int ours_threads(void)
@@ -34,7 +35,7 @@ static void bench_init(struct bench *bench, uint32_t width, uint32_t height, int
 	if (psr_pool_create(&bench->pool, n_threads, NULL) != PSR_OK || psr_renderer_create(&bench->renderer, NULL) != PSR_OK
 	    || codec_create(&bench->codec) != PSR_OK)
 		report_die("psr", "cannot be started");
-	psr_settings_default(&bench->settings, width, height);
+	render_settings_default(&bench->settings, width, height);
 	bench->frame = (struct psr_frame){ .width = width, .height = height,
 		                               .rgb = report_alloc((size_t)width * height, 3) };
 }
@@ -51,7 +52,7 @@ static void draw(struct bench *bench, const struct psr_scene *scene)
 {
 	struct psr_error err;
 
-	if (psr_render(bench->renderer, scene, &bench->settings, bench->pool, &bench->frame, &err) != PSR_OK)
+	if (renderer_draw(bench->renderer, scene, &bench->settings, bench->pool, &bench->frame, &err) != PSR_OK)
 		report_die("psr_render", err.text);
 }
 

@@ -45,7 +45,7 @@ static double draw(struct drawer *drawer, int frame)
 
 	drawer->side->scene(&scene, frame, drawer->side->userdata);
 	start = clock_ms(drawer);
-	if (psr_render(drawer->renderer, &scene, &drawer->side->settings, drawer->pool, &drawer->frame, &err) != PSR_OK)
+	if (renderer_draw(drawer->renderer, &scene, &drawer->side->settings, drawer->pool, &drawer->frame, &err) != PSR_OK)
 		report_die("psr_render", err.text);
 	return clock_ms(drawer) - start;
 }

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "simd/simd.h"
 #include "shot.h"
 

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "simd/block.h"
 
 #define JOBS 256

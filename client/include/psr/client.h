@@ -151,7 +151,7 @@ void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double d
 
 /* The light of pictures for which nobody asked for one: directional, white, from behind the camera, above it and to its
  * left. */
-void psr_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera);
+void client_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera);
 
 #ifdef __cplusplus
 }

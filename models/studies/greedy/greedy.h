@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/mesh.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "base/pool.h"
 #include "ray/ray.h"
 

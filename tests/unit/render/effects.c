@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/random.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -61,7 +61,7 @@ struct case_of {
 	struct psr_instance instance[3];
 	struct psr_light light[5];
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 };
 
 static void case_make(struct case_of *c, uint32_t which)
@@ -108,7 +108,7 @@ static void case_make(struct case_of *c, uint32_t which)
 	camera->kind = random_below(&seed, 4) ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
 	camera->fov_y = random_in(&seed, 0.2, 1.5);
 	camera->ortho_height = random_in(&seed, 0.5, 4) * info->scale;
-	psr_settings_default(&c->settings, 64 + random_below(&seed, 600), 64 + random_below(&seed, 500));
+	render_settings_default(&c->settings, 64 + random_below(&seed, 600), 64 + random_below(&seed, 500));
 	c->settings.is_smooth = which % 4 == 1;
 }
 
@@ -116,7 +116,7 @@ struct drawn {
 	struct psr_frame frame;
 };
 
-static void draw(struct drawn *d, const struct case_of *c, const struct psr_settings *settings, const struct simd *simd)
+static void draw(struct drawn *d, const struct case_of *c, const struct render_settings *settings, const struct simd *simd)
 {
 	struct psr_renderer *renderer;
 	struct psr_error err;
@@ -126,7 +126,7 @@ static void draw(struct drawn *d, const struct case_of *c, const struct psr_sett
 	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (simd)
 		renderer_use(renderer, simd);
-	if (psr_render(renderer, &c->scene, settings, NULL, &d->frame, &err))
+	if (renderer_draw(renderer, &c->scene, settings, NULL, &d->frame, &err))
 		fail_msg("%s", err.text);
 	psr_renderer_destroy(renderer);
 }
@@ -238,7 +238,7 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 	struct simd simd = counting();
 	case_make(&c, 5);
 	c.scene.n_instances = 1;
-	psr_settings_default(&c.settings, 640, 480);
+	render_settings_default(&c.settings, 640, 480);
 	for (int i = 0; i < 5; i++)
 		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL,
 			                             .direction = { i - 2, -1, -1 },
@@ -289,12 +289,12 @@ static void frames_do_not_depend_on_the_frame_before(void **state)
 		case_make(&c, which);
 		for (int k = 0; k < 3; k++) /* thrice the same picture, its object somewhere else, and out of it at last */
 			c.scene.camera.target[k] += (i % 3) * psr_model_info(c.instance[0].model)->scale;
-		psr_settings_default(&c.settings, 700, 300);
+		render_settings_default(&c.settings, 700, 300);
 		draw(&alone, &c, &c.settings, NULL);
 		next_one.frame = alone.frame;
 		next_one.frame.rgb = malloc(3 * 700 * 300);
 		next_one.frame.depth = malloc(4 * 700 * 300);
-		if (psr_render(renderer, &c.scene, &c.settings, NULL, &next_one.frame, &err))
+		if (renderer_draw(renderer, &c.scene, &c.settings, NULL, &next_one.frame, &err))
 			fail_msg("%s", err.text);
 		assert_same(&alone, &next_one, which, "the frame before");
 		release(&alone);
@@ -312,7 +312,7 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 	uint64_t bytes = 0;
 	case_make(&c, 3);
 	c.scene.n_instances = 1;
-	psr_settings_default(&c.settings, 320, 240);
+	render_settings_default(&c.settings, 320, 240);
 	struct psr_frame frame = { .width = 320, .height = 240, .rgb = malloc(3 * 320 * 240) };
 	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	for (int i = 0; i < 40; i++) {
@@ -321,7 +321,7 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 		c.scene.camera.eye[0] = middle[0] + 3 * scale * sin(i * 0.01);
 		c.scene.camera.eye[1] = middle[1];
 		c.scene.camera.eye[2] = middle[2] + 3 * scale * cos(i * 0.01);
-		if (psr_render(renderer, &c.scene, &c.settings, NULL, &frame, &err))
+		if (renderer_draw(renderer, &c.scene, &c.settings, NULL, &frame, &err))
 			fail_msg("%s", err.text);
 		if (i == 0)
 			bytes = psr_renderer_bytes(renderer);

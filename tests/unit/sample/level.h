@@ -3,7 +3,7 @@
 #define TESTS_SAMPLE_LEVEL_H
 
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "base/pool.h"
 #include "surface/area.h"
 #include "sample/level.h"

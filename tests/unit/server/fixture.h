@@ -19,7 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include "base/clock.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "psr/proto.h"
 
 #define PATIENCE_MS 20000 /* for what must happen; nothing that passes waits so long */

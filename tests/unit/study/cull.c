@@ -7,7 +7,7 @@
 #include "models/studies/cull.h"
 #include "models/studies/cull_part.h"
 #include "psr/build.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "sample/pack/visibility_mask.h"
 #include "tests/unit/sample/meshes.h"
 
@@ -359,15 +359,15 @@ static void draw(const struct psr_model *model, const struct cull_eye *eye, uint
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
 	struct psr_frame frame = { .width = RESOLUTION, .height = RESOLUTION, .rgb = rgb, .depth = depth };
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 
 	scene.camera = (struct psr_camera){ .fov_y = 2 * atan(eye->tangent) };
 	memcpy(scene.camera.eye, eye->place, sizeof eye->place);
 	v3d_add(scene.camera.target, eye->place, eye->frame[2]);
 	v3d_scale(scene.camera.up, eye->frame[1], -1);
-	psr_settings_default(&settings, RESOLUTION, RESOLUTION);
+	render_settings_default(&settings, RESOLUTION, RESOLUTION);
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
-	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
 	psr_renderer_destroy(renderer);
 }
 

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "surface/validate.h"
 #include "models/studies/greedy/parts.h"
 #include "models/studies/greedy/warp.h"

@@ -2,14 +2,10 @@
  *
  * The best that the machine has is used, unless PSR_ISA in the environment (c, avx2 or avx512; other words are passed
  * over) or a call caps it. */
-#ifndef PSR_ISA_H
-#define PSR_ISA_H
+#ifndef PSR_SIMD_ISA_H
+#define PSR_SIMD_ISA_H
 
-#include "error.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "psr/error.h"
 
 enum psr_isa {
 	PSR_ISA_C,      /* what the compiler makes of C for any machine of the kind */
@@ -32,7 +28,4 @@ int psr_isa_parse(enum psr_isa *out, const char *name);
 /* ARG with a sentence if PSR_ISA holds a word that is no name: what programs look at when they start. */
 int psr_isa_check_environment(struct psr_error *err);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -1,15 +1,11 @@
 /* Accuracy: the ray-traced truth of a mesh, and how a frame's depth differs from it. */
-#ifndef PSR_MEASURE_H
-#define PSR_MEASURE_H
+#ifndef PSR_MEASURE_MEASURE_H
+#define PSR_MEASURE_MEASURE_H
 
 #include <stdint.h>
-#include "error.h"
-#include "mesh.h"
-#include "scene.h"
-
-#ifdef __cplusplus
-extern "C" {
-#endif
+#include "psr/error.h"
+#include "psr/mesh.h"
+#include "psr/scene.h"
 
 /* A mesh behind a ray tracer; visible surfaces are those that the sampler sees: alpha cut-outs and the backs of
  * one-sided faces let rays through. */
@@ -90,7 +86,4 @@ int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint
 /* Peak signal to noise of the covered pixels, in dB, by their sRGB codes; +inf if they are the same. */
 double psr_still_psnr(const uint8_t *rgb, const uint8_t *truth, const uint8_t *covered, uint64_t n_pixels);
 
-#ifdef __cplusplus
-}
-#endif
 #endif

@@ -11,14 +11,10 @@
  *   children: 0 = (bc, ca, ab), 1 = (a, ab, ca), 2 = (ab, b, bc), 3 = (ca, bc, c), where ab is the midpoint of a and b
  *
  * Only additions, multiplications, true division and sqrt in double: the same table on every machine. */
-#ifndef PSR_DIRECTION_H
-#define PSR_DIRECTION_H
+#ifndef PSR_BASE_DIRECTION_H
+#define PSR_BASE_DIRECTION_H
 
 #include <stdint.h>
-
-#ifdef __cplusplus
-extern "C" {
-#endif
 
 #define PSR_DIRECTIONS 32768
 #define PSR_MASK_TRIANGLES 128
@@ -46,7 +42,4 @@ void psr_direction_corners(int level, unsigned index, double corner[3][3]);
 /* Right-handed orthonormal frame whose z is `dir` (unit length): rows x, y, z. The lattices of projections use it. */
 void psr_direction_frame(const double dir[3], double frame[3][3]);
 
-#ifdef __cplusplus
-}
-#endif
 #endif
