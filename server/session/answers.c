@@ -1,9 +1,9 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
+#include "answers.h"
 #include "base/clock.h"
 #include "model/blocks.h"
-#include "answers.h"
 
 int answer_opened(struct session *session, uint32_t id, struct catalogue_model *model, struct psr_error *err)
 {

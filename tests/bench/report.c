@@ -105,7 +105,7 @@ void report_print_targets(void)
 	cJSON_ArrayForEach(item, list) {
 		const int met = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(item, "met"));
 
-		printf("%-68s %9.4g %-6s %s %6g: %s\n", text_of(item, "what"), number_of(item, "value"), text_of(item, "unit"),
+		printf("%-48s %9.4g %-6s %s %6g: %s\n", text_of(item, "what"), number_of(item, "value"), text_of(item, "unit"),
 		       text_of(item, "kind"), number_of(item, "bound"), met ? "met" : "missed");
 		n++;
 		n_met += met;

@@ -272,14 +272,16 @@ static void bench_one(struct check *c, const struct check_test *test)
 	begin(c, 1, 1);
 	test->run(c);
 	release(c);
-	printf("%-44s", test->claim);
+	printf("%-39s", test->claim);
 	for (int i = 0; i < PSR_N_ISAS; i++) {
 		const double ns = (c->best_ns[i] - clock) / c->units;
-		if (c->best_ns[i] < INFINITY)
-			printf("  %6s %7.3f ns %6.1f M/s %4.1fx", psr_isa_name((enum psr_isa)i), ns, 1e3 / ns,
-			       (c->best_ns[PSR_ISA_C] - clock) / (c->best_ns[i] - clock));
+		if (c->best_ns[i] == INFINITY)
+			continue;
+		printf("  %s %6.3f", psr_isa_name((enum psr_isa)i), ns);
+		if (i != PSR_ISA_C)
+			printf(" %4.1fx", (c->best_ns[PSR_ISA_C] - clock) / (c->best_ns[i] - clock));
 	}
-	printf("  (a %s)\n", test->unit);
+	printf("  ns a %s\n", test->unit);
 }
 
 int check_main(int argc, char **argv, const struct check_test *tests, size_t n_tests)
