@@ -31,17 +31,17 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 {
 	struct optlist list = { .n = 0 };
 	const struct psr_opt load[] = {
-		{ "clients", 'c', PSR_OPT_INT, &options->n_clients, "N", "Connections, each with a camera of its own.", 1,
-		  BENCH_MAX_CLIENTS, NULL, NULL },
-		{ "seconds", 't', PSR_OPT_INT, &options->seconds, "S", "How long to measure; warming up comes before.", 1,
-		  86400, NULL, NULL },
-		{ "inflight", 0, PSR_OPT_INT, &options->n_inflight, "K",
-		  "Pictures that each connection asks for before the first has come: more hides a slow network.", 1,
-		  PSR_WIRE_MAX_OPEN, NULL, NULL },
+		{ .name = "clients", .letter = 'c', .type = PSR_OPT_INT, .value = &options->n_clients, .arg = "N", .min = 1,
+		  .max = BENCH_MAX_CLIENTS, .help = "Connections, each with a camera of its own." },
+		{ .name = "seconds", .letter = 't', .type = PSR_OPT_INT, .value = &options->seconds, .arg = "S", .min = 1,
+		  .max = 86400, .help = "How long to measure; warming up comes before." },
+		{ .name = "inflight", .type = PSR_OPT_INT, .value = &options->n_inflight, .arg = "K", .min = 1,
+		  .max = PSR_WIRE_MAX_OPEN,
+		  .help = "Pictures that each connection asks for before the first has come: more hides a slow network." },
 		PSR_OPT_SERVER(options->server),
 	};
 	const struct psr_opt script[] = {
-		{ "json", 0, PSR_OPT_FLAG, json, NULL, "Print one object instead of the lines.", 0, 0, NULL, NULL },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = json, .help = "Print one object instead of the lines." },
 		PSR_OPT_TIMEOUT(options->timeout),
 	};
 	const struct psr_cli cli = {

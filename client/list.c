@@ -138,15 +138,14 @@ int psr_list_main(int argc, char **argv)
 	int json = 0, code;
 	const struct psr_opt opts[] = {
 		PSR_OPT_SERVER(server),
-		{ "json", 0, PSR_OPT_FLAG, &json, NULL,
-		  "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of presets "
-		  "with kind, type and name.",
-		  0, 0, NULL, NULL },
-		{ "presets", 'p', PSR_OPT_STRING, &model, "NAME",
-		  "Instead of models, the cameras and lights in the file of this one, for --camera and --light preset:NAME.", 0,
-		  0, NULL, NULL },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
+		  .help = "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of "
+		          "presets with kind, type and name." },
+		{ .name = "presets", .letter = 'p', .type = PSR_OPT_STRING, .value = &model, .arg = "NAME",
+		  .help = "Instead of models, the cameras and lights in the file of this one, for --camera and --light "
+		          "preset:NAME." },
 		PSR_OPT_TIMEOUT(timeout),
-		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
+		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
 		"psr list [--server ADDR] [--presets NAME] [--json]",

@@ -20,16 +20,14 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 {
 	struct optlist list = { .n = 0 };
 	const struct psr_opt files[] = {
-		{ "output", 'o', PSR_OPT_STRING, &wish->sink.output, "FILE",
-		  "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard output, as "
-		  "PNG. Several pictures are numbered by %d or %03d in the name.",
-		  0, 0, NULL, NULL },
-		{ "cameras", 0, PSR_OPT_STRING, &wish->cameras, "FILE",
-		  "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options of a "
-		  "camera without dashes. # begins a comment.",
-		  0, 0, NULL, NULL },
-		{ "replay", 0, PSR_OPT_STRING, &wish->replay, "REPORT",
-		  "The picture that wrote this report, with the same bytes; only files are to be named.", 0, 0, NULL, NULL },
+		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &wish->sink.output, .arg = "FILE",
+		  .help = "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard "
+		          "output, as PNG. Several pictures are numbered by %d or %03d in the name." },
+		{ .name = "cameras", .type = PSR_OPT_STRING, .value = &wish->cameras, .arg = "FILE",
+		  .help = "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options "
+		          "of a camera without dashes. # begins a comment." },
+		{ .name = "replay", .type = PSR_OPT_STRING, .value = &wish->replay, .arg = "REPORT",
+		  .help = "The picture that wrote this report, with the same bytes; only files are to be named." },
 	};
 	const struct psr_cli cli = {
 		"psr shot --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",

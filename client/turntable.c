@@ -21,15 +21,15 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 	struct sink_wish *sink = &wish->sink;
 	int has_frames = 0, code;
 	const struct psr_opt files[] = {
-		{ "output", 'o', PSR_OPT_STRING, &sink->output, "FILE",
-		  "'a_%02d.png': a file each picture, numbered from 1. a.png, a.gif or - (standard output): one animation, "
-		  "which browsers play. With --sheet: one picture.",
-		  0, 0, NULL, NULL },
-		{ "frames", 'n', PSR_OPT_INT, &sink->n_turn, "N",
-		  "Pictures a turn: 48 or more for an animation that moves evenly. A contact sheet has as many as fit.", 1,
-		  MAX_FRAMES, NULL, &has_frames },
-		{ "seconds", 0, PSR_OPT_REAL, &sink->seconds, "S", "How long a turn of an animation takes.", 0.02, 3600, NULL,
-		  NULL },
+		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &sink->output, .arg = "FILE",
+		  .help = "'a_%02d.png': a file each picture, numbered from 1. a.png, a.gif or - (standard output): one "
+		          "animation, which browsers play. With --sheet: one picture." },
+		{ .name = "frames", .letter = 'n', .type = PSR_OPT_INT, .value = &sink->n_turn, .arg = "N", .min = 1,
+		  .max = MAX_FRAMES, .seen = &has_frames,
+		  .help = "Pictures a turn: 48 or more for an animation that moves evenly. A contact sheet has as many as "
+		          "fit." },
+		{ .name = "seconds", .type = PSR_OPT_REAL, .value = &sink->seconds, .arg = "S", .min = 0.02, .max = 3600,
+		  .help = "How long a turn of an animation takes." },
 	};
 	const struct psr_cli cli = {
 		"psr turntable --model NAME [--server ADDR] [--frames N] [models, camera, light, quality] -o FILE",

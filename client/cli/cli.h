@@ -12,12 +12,12 @@
 	"6 server or connection, 7 a defect of psr"
 
 #define PSR_OPT_SERVER(variable) \
-	{ "server", 's', PSR_OPT_STRING, &(variable), "ADDR", \
-	  "Where psrd listens: HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH. Set $PSR_SERVER to say it once.", \
-	  0, 0, NULL, NULL }
+	{ .name = "server", .letter = 's', .type = PSR_OPT_STRING, .value = &(variable), .arg = "ADDR", \
+	  .help = "Where psrd listens: HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH. Set $PSR_SERVER to say it " \
+	          "once." }
 #define PSR_OPT_TIMEOUT(variable) \
-	{ "timeout", 0, PSR_OPT_INT, &(variable), "SECONDS", "How long to wait for a server that says nothing.", \
-	  1, 86400, NULL, NULL }
+	{ .name = "timeout", .type = PSR_OPT_INT, .value = &(variable), .arg = "SECONDS", .min = 1, .max = 86400, \
+	  .help = "How long to wait for a server that says nothing." }
 
 #define PSR_DEFAULT_TIMEOUT 60
 

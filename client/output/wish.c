@@ -7,14 +7,13 @@
 void sink_add_file_options(struct optlist *list, struct sink_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "sheet", 0, PSR_OPT_SIZE, wish->sheet, "COLSxROWS",
-		  "All pictures on one contact sheet, row by row; --size is that of each.", 0, 0, NULL, &wish->has_sheet },
-		{ "depth", 0, PSR_OPT_STRING, &wish->depth, "FILE",
-		  "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. .pfm, "
-		  ".exr or .tif.",
-		  0, 0, NULL, NULL },
-		{ "report", 0, PSR_OPT_STRING, &wish->report, "FILE",
-		  "All about the picture as JSON: request, times, counts, hashes. - is standard output.", 0, 0, NULL, NULL },
+		{ .name = "sheet", .type = PSR_OPT_SIZE, .value = wish->sheet, .arg = "COLSxROWS", .seen = &wish->has_sheet,
+		  .help = "All pictures on one contact sheet, row by row; --size is that of each." },
+		{ .name = "depth", .type = PSR_OPT_STRING, .value = &wish->depth, .arg = "FILE",
+		  .help = "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. "
+		          ".pfm, .exr or .tif." },
+		{ .name = "report", .type = PSR_OPT_STRING, .value = &wish->report, .arg = "FILE",
+		  .help = "All about the picture as JSON: request, times, counts, hashes. - is standard output." },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -23,20 +22,18 @@ void sink_add_file_options(struct optlist *list, struct sink_wish *wish)
 void sink_add_developer_options(struct optlist *list, struct sink_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "plane", 0, PSR_OPT_STRING, &wish->plane_text, "PLANE",
-		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block "
-		  "(levels, facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
-		  0, 0, NULL, NULL },
-		{ "show", 0, PSR_OPT_STRING, &wish->show_text, "STAGE",
-		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
-		  "holes or depth.",
-		  0, 0, NULL, NULL },
-		{ "hash", 0, PSR_OPT_FLAG, &wish->hash, NULL,
-		  "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`.", 0, 0, NULL,
-		  NULL },
-		{ "effects", 0, PSR_OPT_FLAG, &wish->effects, NULL,
-		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0,
-		  0, NULL, NULL },
+		{ .name = "plane", .type = PSR_OPT_STRING, .value = &wish->plane_text, .arg = "PLANE",
+		  .help = "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or "
+		          "block (levels, facing). All go to .npy; color, normal and weight to pictures, depth as with "
+		          "--depth." },
+		{ .name = "show", .type = PSR_OPT_STRING, .value = &wish->show_text, .arg = "STAGE",
+		  .help = "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, "
+		          "weights, holes or depth." },
+		{ .name = "hash", .type = PSR_OPT_FLAG, .value = &wish->hash,
+		  .help = "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`." },
+		{ .name = "effects", .type = PSR_OPT_FLAG, .value = &wish->effects,
+		  .help = "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below "
+		          "1`." },
 	};
 
 	OPTLIST_ADD(list, opts);

@@ -47,7 +47,7 @@ static int check_server(const struct scene *scene, struct psr_error *err)
 
 	if (welcome->capabilities & PSR_CAP_PRESETS)
 		return PSR_OK;
-	return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server tells no cameras and lights of models (%s)", welcome->server);
+	return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not tell the cameras and lights of models", welcome->server);
 }
 
 int preset_find(const struct psr_msg_preset **out, const struct scene *scene, uint8_t kind, const char *name,
