@@ -14,7 +14,7 @@ static const char *state_name(uint8_t state)
 	return names[state < sizeof names / sizeof names[0] ? state : 0];
 }
 
-/* Why models of state failed are not served: `why` has n texts, "" of the others. */
+/* Fills in why[i] of each model that failed; the others keep "". */
 static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *entries, uint32_t n,
                         struct psr_client *client, int timeout_ms, struct psr_error *err)
 {
@@ -26,7 +26,7 @@ static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *
 			continue;
 		code = psr_client_open(client, entries[i].name, NULL, NULL, timeout_ms, &opened, err);
 		if (code == PSR_OK)
-			entries[i].state = PSR_ENTRY_LOADED; /* somebody mended it */
+			entries[i].state = PSR_ENTRY_LOADED; /* mended meanwhile */
 		else if (code == PSR_ERR_CONNECTION || code == PSR_ERR_PROTOCOL)
 			return code;
 		else

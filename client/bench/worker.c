@@ -93,7 +93,7 @@ static void note_error(struct bench_worker *worker, uint64_t n_failed, const str
 		worker->first_error = *why;
 }
 
-/* 0 when its share of the samples is used up. */
+/* 0: its share of the samples is used up. */
 static int add_sample(struct bench_worker *worker, uint64_t latency_ns)
 {
 	size_t share = BENCH_MAX_SAMPLES / (size_t)worker->options->n_clients;

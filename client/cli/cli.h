@@ -23,8 +23,8 @@
 
 const char *psr_default_server(void); /* $PSR_SERVER, or the address that psrd listens to by default */
 
-/* A build or load that the server reports, as one line on standard error; nothing unless that is a terminal. For
- * psr_client_open; userdata is a struct psr_progress_line, zero at first. */
+/* Shows a build or load on one line of standard error, if that is a terminal. For psr_client_open(); userdata: a
+ * struct psr_progress_line, zeroed. */
 struct psr_progress_line {
 	int is_drawn;
 };

@@ -79,7 +79,6 @@ static int check(struct job *job, struct psr_error *err)
 	return code == PSR_OK ? psr_address_check(wish->server, err) : code;
 }
 
-/* Codecs of the planes that are asked for. */
 static void choose_codecs(struct psr_msg_frame *frame)
 {
 	if (!(frame->planes & 1 << PSR_PLANE_COLOR))

@@ -7,7 +7,7 @@
 #include "output.h"
 #include "show.h"
 
-#define SINK_HELD 8 /* pictures that came before their turn: fewer than a series has under way */
+#define SINK_HELD 8 /* pictures ahead of their turn; a series has fewer under way */
 
 struct sink_wish {
 	const char *program; /* "psr shot", for messages */
@@ -53,13 +53,14 @@ struct sink {
 int sink_check(struct sink *sink, const struct sink_wish *wish, uint32_t n, const uint32_t size[2],
                struct psr_error *err);
 
-/* Planes that the files need: bits of enum psr_plane. */
+/* Planes of the files: bits of enum psr_plane. */
 uint32_t sink_planes(const struct sink *sink);
 
-/* For a series: picture k. */
+/* Takes picture k of a series. */
 int sink_take(uint32_t k, const struct psr_event *event, void *sink, struct psr_error *err);
 
-/* Ends it; the files are whole, and hashes and notes printed, if code is PSR_OK. Returns code, or what failed. */
+/* Completes the files and prints hashes and notes if code is PSR_OK; else drops them. Returns code, or the first
+ * error. */
 int sink_finish(struct sink *sink, int code, struct psr_error *err);
 
 #endif

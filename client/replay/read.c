@@ -8,7 +8,7 @@
 
 #define MAX_BYTES (16 << 20)
 
-/* Members of a report. The first that is missing or of another kind is kept. */
+/* Reads members of a report, and notes the first that is missing or of a wrong type. */
 struct reader {
 	const char *missing;
 };

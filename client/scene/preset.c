@@ -17,7 +17,7 @@ const char *preset_type(const struct psr_msg_preset *preset)
 	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
 }
 
-/* "there are 'a', 'b'" as far as it fits. */
+/* Lists the names as far as they fit. */
 static int fail_missing(const struct scene *scene, uint8_t kind, const char *name, struct psr_error *err)
 {
 	const char *what = kind == PSR_WIRE_PRESET_CAMERA ? "camera" : "light";
@@ -37,8 +37,8 @@ static int fail_missing(const struct scene *scene, uint8_t kind, const char *nam
 		used += (size_t)n;
 	}
 	if (names[0] == '\0')
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "the model came without %ss", what);
-	return psr_fail(err, PSR_ERR_NOT_FOUND, "no %s '%.80s' came with the model; there are %s", what, name, names);
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "the model has no %ss", what);
+	return psr_fail(err, PSR_ERR_NOT_FOUND, "the model has no %s '%.80s'; it has %s", what, name, names);
 }
 
 static int check_server(const struct scene *scene, struct psr_error *err)

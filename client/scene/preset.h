@@ -1,4 +1,4 @@
-/* Cameras and lights that came with a model, where command lines name them. */
+/* Cameras and lights of a model, by name. */
 #ifndef PSR_CLIENT_SCENE_PRESET_H
 #define PSR_CLIENT_SCENE_PRESET_H
 
@@ -15,7 +15,7 @@ int preset_all_lights(struct psr_msg_scene *msg, const struct scene *scene, stru
 /* "perspective", "spot", ... */
 const char *preset_type(const struct psr_msg_preset *preset);
 
-/* What a light option says of a preset: the name after "preset:", or NULL. */
+/* The name after "preset:" in a light option, or NULL. */
 const char *preset_of_light(const char *text);
 
 #endif

@@ -6,7 +6,7 @@
 #include "scene.h"
 #include "suggest.h"
 
-#define HOME "home" /* camera whose up vector is the model's natural one */
+#define HOME "home" /* the camera whose up is the model's natural one */
 
 void scene_close(struct scene *scene)
 {
