@@ -564,7 +564,7 @@ static void failures_have_their_exit_status_and_leave_no_file(void **state)
 		{ "shot --model cube -o x.png --camera front --fov 30", 2, "excludes --eye" },
 		{ "shot --model cube -o x.png --camera back", 3,
 		  "the model has no camera 'back'; it has 'front', 'plan'" },
-		{ "shot --model cube -o x.png --light preset:moon", 3, "there are 'sun', 'the lamp'" },
+		{ "shot --model cube -o x.png --light preset:moon", 3, "no light 'moon'; it has 'sun', 'the lamp'" },
 		{ "shot --model slow -o x.png --camera front", 3, "the model has no cameras" },
 		{ "shot --model slow -o x.png --lights model", 3, "the model has no lights" },
 		{ "shot --model cube -o x.png --lights all", 2, "takes 'model', not 'all'" },
