@@ -24,30 +24,20 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
 }
 
-/* Whether holes beside a pixel's sample are meant. */
-static int is_sheer(const struct plan *plan, const struct psr_zstack *stack, int64_t x, int64_t y)
-{
-	const uint32_t slot = (uint32_t)psr_zstack_row(stack, (uint32_t)y)[x] / PSR_BLOCK_SAMPLES;
-	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];
-	return (psr_blocks_traits(in->cull.blocks, slot - in->first_slot) & PSR_BLOCK_SHEER) != 0;
-}
-
 /* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
 static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
 {
 	const float z = depth_at(stack, x, y);
 	float nearest = INFINITY, farthest = 0;
 	for (int w = 0; w < 8; w++) {
-		int is_met = 0, is_open = 0;
+		int is_met = 0;
 		for (int i = 1; i <= reach && !is_met; i++) {
 			const float other = depth_at(stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
 			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
 			nearest = is_met && other < nearest ? other : nearest;
 			farthest = is_met && other > farthest ? other : farthest;
-			is_open = is_met && plan->has_sheer &&
-			          is_sheer(plan, stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
 		}
-		if (!is_met || is_open)
+		if (!is_met)
 			return 0;
 	}
 	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
