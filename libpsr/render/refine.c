@@ -47,11 +47,11 @@ int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer)
 {
 	const size_t area = (size_t)WINDOW_WIDTH * WINDOW_HEIGHT;
 	struct psr_refiner *r = calloc(1, sizeof *r);
-	if (!r)
+	if (r == NULL)
 		return PSR_ERR_MEMORY;
 	r->renderer = renderer;
 	r->depth = psr_alloc_array(area, sizeof *r->depth + 3);
-	if (!r->depth) {
+	if (r->depth == NULL) {
 		free(r);
 		return PSR_ERR_MEMORY;
 	}
@@ -66,7 +66,7 @@ int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer)
 
 void psr_refiner_destroy(struct psr_refiner *r)
 {
-	if (!r)
+	if (r == NULL)
 		return;
 	psr_free(r->depth);
 	psr_free_huge(r->is_inside, r->inside_size);
@@ -151,16 +151,18 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
 	const int is_last_x = width - left <= WINDOW_WIDTH, is_last_y = height - top <= WINDOW_HEIGHT;
 	struct psr_settings window = *settings;
+	struct psr_frame fine;
+
 	window.with_splats = 1;
 	window.is_smooth = 0;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;
 
-	struct psr_frame fine = { .width = window.width,
-		                      .height = window.height,
-		                      .rgb = frame->rgb ? r->rgb : NULL,
-		                      .depth = frame->depth ? r->depth : NULL };
+	fine = (struct psr_frame){ .width = window.width,
+		                       .height = window.height,
+		                       .rgb = frame->rgb != NULL ? r->rgb : NULL,
+		                       .depth = frame->depth != NULL ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
 	renderer_set_inside(r->renderer, &inside);
 	const int rc = psr_render(r->renderer, scene, &window, pool, &fine, err);
@@ -209,13 +211,15 @@ static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, con
 {
 	const size_t area = (size_t)settings->width * settings->height;
 	const uint64_t start = now_ns();
+	struct erosion erosion;
+
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
-	if (!r->is_inside)
+	if (r->is_inside == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
 	const int rc = renderer_cover(r->renderer, scene, settings, pool, r->is_inside, err);
 	if (rc)
 		return rc;
-	struct erosion erosion = { r->is_inside, r->is_inside + area, settings->width, settings->height };
+	erosion = (struct erosion){ r->is_inside, r->is_inside + area, settings->width, settings->height };
 	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
 	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
 	report->ns[PSR_STAGE_GAPS] += now_ns() - start;
@@ -231,21 +235,24 @@ int psr_refine(struct psr_refiner *r, const struct psr_scene *scene, const struc
                struct psr_pool *pool, psr_refine_cancelled_fn *is_cancelled, void *userdata, struct psr_frame *frame,
                struct psr_error *err)
 {
+	int rc;
+
 	if (pass > PSR_MAX_PASS)
 		return psr_fail(err, PSR_ERR_LIMIT, "there is no pass %u, only passes up to %d", pass, PSR_MAX_PASS);
 	if (settings->window.picture_width)
 		return psr_fail(err, PSR_ERR_ARG, "only whole pictures are refined");
-	if (pass == 0 || settings->width == 0 || settings->height == 0 || settings->width > PSR_MAX_SIDE ||
-	    settings->height > PSR_MAX_SIDE)
+	if (pass == 0 || settings->width == 0 || settings->height == 0 || settings->width > PSR_MAX_SIDE
+	    || settings->height > PSR_MAX_SIDE)
 		return psr_render(r->renderer, scene, settings, pool, frame, err);
 	if (frame->width != settings->width || frame->height != settings->height)
 		return psr_fail(err, PSR_ERR_ARG, "the frame is of another size than the settings");
-	if (frame->normal || frame->id || frame->block || frame->weight || frame->words)
+	if (frame->normal != NULL || frame->id != NULL || frame->block != NULL || frame->weight != NULL
+	    || frame->words != NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "only colour and depth are refined, no other planes");
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
-	int rc = find_inside(r, scene, settings, pool, &frame->report, err);
+	rc = find_inside(r, scene, settings, pool, &frame->report, err);
 	if (rc)
 		return rc;
 	for (uint32_t j = 0; j < n_y; j++)

@@ -44,8 +44,8 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 			is_met = other * plan->gap_scale[1] + plan->gap_offset[1] < z;
 			nearest = is_met && other < nearest ? other : nearest;
 			farthest = is_met && other > farthest ? other : farthest;
-			is_open = is_met && plan->has_sheer &&
-			          is_sheer(plan, stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
+			is_open = is_met && plan->has_sheer
+			          && is_sheer(plan, stack, (int64_t)x + i * way[w][0], (int64_t)y + i * way[w][1]);
 		}
 		if (!is_met || is_open)
 			return 0;
@@ -222,8 +222,8 @@ static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stac
 	find_between(holes.is_between, plan, stack, x0, y, n);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
-		if (weight[c] && ((inside && is_inside(inside, x, y) && is_crack(&holes, stack, c, x, y)) ||
-		                  (holes.is_between[c] && is_enclosed(plan, stack, x, y, holes.reach[c])))) {
+		if (weight[c] && ((inside && is_inside(inside, x, y) && is_crack(&holes, stack, c, x, y))
+		                  || (holes.is_between[c] && is_enclosed(plan, stack, x, y, holes.reach[c])))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
 			n_closed++;

@@ -107,7 +107,8 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 	const struct sampling *sampling = job->sampling;
 	const double shift = SHIFT[job->round % N_SHIFTS];
 	int can_be_absent = sampling_material(sampling, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns, is_small;
-	double corner[3][3], side[3], e[3], height, foot, step = step_of(sampling, sampling_is_thin(sampling, prim));
+	double corner[3][3], side[3], e[3], ab[3], ac[3], cross[3], height, foot;
+	const double step = step_of(sampling, sampling_is_thin(sampling, prim));
 
 	ray_scene_corners(sampling->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
@@ -116,11 +117,8 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 		longest = side[i] > side[longest] ? i : longest;
 	}
 	/* The longest side is the base: from corner `longest` to the next. */
-	const double *a = corner[longest], *b = corner[(longest + 1) % 3], *c = corner[(longest + 2) % 3];
-	double ab[3], ac[3], cross[3];
-
-	v3d_sub(ab, b, a);
-	v3d_sub(ac, c, a);
+	v3d_sub(ab, corner[(longest + 1) % 3], corner[longest]);
+	v3d_sub(ac, corner[(longest + 2) % 3], corner[longest]);
 	v3d_cross(cross, ab, ac);
 	height = v3d_length(cross) / side[longest];
 	/* Columns stand on it, as high as the triangle is there: one that is thinner than a step is tested all along. */
