@@ -160,7 +160,7 @@ static void dice_disc(const struct job *job, uint32_t prim, struct chunk *chunk)
 	double center[3], basis[3][3], normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
 
 	v3d_normalize(normal, normal);
-	psr_direction_frame(normal, basis);
+	psr_direction_basis(normal, basis);
 	ray_scene_center(sampling->scene, prim, center);
 	for (int i = -reach; i <= reach; i++) {
 		for (int k = -reach; k <= reach; k++) {

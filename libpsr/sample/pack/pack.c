@@ -144,21 +144,21 @@ static uint64_t count_samples(const struct draft *draft)
 }
 
 /* Masks, and what culling by them and by cones loses. */
-static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_table *table,
+static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_mask_table *table,
                           struct psr_model_info *info, struct psr_pool *pool)
 {
 	uint64_t (*mask)[2] = psr_alloc_array(blocks->n_blocks, sizeof *mask);
-	int rc = mask != NULL ? visibility_masks(blocks, pool, mask) : PSR_ERR_MEMORY;
+	int rc = mask != NULL ? visibility_mask_make(blocks, pool, mask) : PSR_ERR_MEMORY;
 
-	if (rc == PSR_OK && !visibility_is_full(blocks->n_blocks, (const uint64_t(*)[2])mask))
-		rc = visibility_table_make(table, blocks, (const uint64_t(*)[2])mask, pack->run, pool);
+	if (rc == PSR_OK && !visibility_mask_is_full(blocks->n_blocks, (const uint64_t(*)[2])mask))
+		rc = visibility_mask_table_make(table, blocks, (const uint64_t(*)[2])mask, pack->run, pool);
 	psr_free(mask);
 	if (rc != PSR_OK)
 		return rc;
 	blocks->n_masks = table->n_masks;
 	blocks->visibility_mask = (const uint64_t(*)[2])table->mask;
 	blocks->visibility_index = table->index;
-	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
+	return visibility_mask_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
 static int has_traits(const struct pack *pack)
@@ -173,7 +173,7 @@ static int has_traits(const struct pack *pack)
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct pack_source *source,
                       struct pack *pack, struct psr_error *err)
 {
-	struct visibility_table table = { 0 };
+	struct visibility_mask_table table = { 0 };
 	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
 		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
 		                         .n_samples = pack->n_samples };
@@ -206,7 +206,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 		psr_fail(err, rc, "no memory for the visibility masks of %u blocks", blocks.n_blocks);
 	else
 		rc = psr_model_create(out, info, &blocks, source->presets, err);
-	visibility_table_fini(&table);
+	visibility_mask_table_fini(&table);
 	return rc;
 }
 

@@ -120,21 +120,23 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and those that the samples are drawn by, if it is not told by the cone alone
- * how they face. A block that is seen from both sides needs one only if it is bent. */
+/* The cone holds the normals of the faces, and unless the block is bent those of the samples, by which the renderer
+ * draws. A block that is seen from both sides needs one only if it is bent: no sample of a bent block is left out by
+ * itself. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
 	float normal[2 * PSR_BLOCK_SAMPLES][3];
+	const int is_bent = block->traits & PSR_BLOCK_BENT;
 	int8_t axis[3];
 	int n = 0;
 
-	for (uint64_t left = block->two_sided && !(block->traits & PSR_BLOCK_BENT) ? 0 : block->part; left != 0; left &= left - 1) {
+	for (uint64_t left = block->two_sided && !is_bent ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SURFACE_BACK);
 
 		v3f_scale(normal[n++], front, (sample->surface & SURFACE_BACK) != 0 ? -1 : 1);
-		if (!(block->traits & PSR_BLOCK_BENT))
+		if (!is_bent)
 			memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
 	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);

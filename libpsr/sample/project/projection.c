@@ -53,7 +53,7 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 
 		m3d_apply(turned, (const double(*)[3])turn, direction[i]);
 		v3d_normalize(turned, turned);
-		psr_direction_frame(turned, basis);
+		psr_direction_basis(turned, basis);
 		for (int k = 0; k < 9; k++)
 			list[i].axis[k / 3][k % 3] = (float)basis[k / 3][k % 3];
 		list[i].spacing = (float)(ds * cosine);

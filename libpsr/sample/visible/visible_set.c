@@ -153,7 +153,7 @@ static int look_along(struct look *look, struct visible_set *set, struct psr_poo
 		double direction[3];
 
 		psr_direction_center(VIEW_LEVEL, view, direction);
-		psr_direction_frame(direction, look->basis[k]);
+		psr_direction_basis(direction, look->basis[k]);
 	}
 	do {
 		look->n_new = look->n_hits = look->n_unseen = 0;
