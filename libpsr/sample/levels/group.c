@@ -1,6 +1,6 @@
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
+#include "base/array.h"
 #include "base/vec.h"
 #include "group.h"
 #include "psr/error.h"
@@ -165,15 +165,8 @@ int group_add(struct group_blocks *blocks, const struct draft_block *block)
 		blocks->is_over = 1;
 		return PSR_OK;
 	}
-	if (blocks->n == blocks->capacity) {
-		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
-		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		blocks->block = grown;
-		blocks->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(blocks->block, blocks->n, blocks->capacity))
+		return PSR_ERR_MEMORY;
 	blocks->block[blocks->n++] = *block;
 	return PSR_OK;
 }

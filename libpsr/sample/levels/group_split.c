@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include "base/array.h"
 #include "base/cell.h"
 #include "base/grid.h"
 #include "group.h"
@@ -31,15 +32,8 @@ static int map_group(struct map *map, uint32_t group, const float p[3])
 		i = map->mapped[i].next;
 	if (i != GRID_NONE)
 		return PSR_OK;
-	if (map->n == map->capacity) {
-		uint32_t capacity = map->capacity != 0 ? map->capacity + map->capacity / 2 : 4096;
-		struct mapped *grown = realloc(map->mapped, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		map->mapped = grown;
-		map->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(map->mapped, map->n, map->capacity))
+		return PSR_ERR_MEMORY;
 	map->mapped[map->n] = (struct mapped){ { p[0], p[1], p[2] }, group, GRID_NONE };
 	if (grid_put(&map->grid, p, map->n, &map->mapped[map->n].next) != PSR_OK)
 		return PSR_ERR_MEMORY;
@@ -80,15 +74,8 @@ static int add_part(struct parts *parts, uint32_t group, unsigned s)
 
 	while (i < parts->n && parts->part[i].group != group)
 		i++;
-	if (i == parts->capacity) {
-		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
-		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		parts->part = grown;
-		parts->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(parts->part, i, parts->capacity))
+		return PSR_ERR_MEMORY;
 	if (i == parts->n)
 		parts->part[parts->n++] = (struct part){ group, 0 };
 	parts->part[i].mask |= UINT64_C(1) << s;

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "psr/error.h"
 #include "sheet_patch.h"
 
@@ -57,21 +58,11 @@ static void connect(struct block_hits *h, float reach)
 	}
 }
 
-static int grow_row(struct patch_row *row)
+static int has_room(struct patch_row *row)
 {
-	uint32_t capacity = row->capacity != 0 ? 2 * row->capacity : 32;
-	struct patch *patch = realloc(row->patch, capacity * sizeof *patch);
-	void *sample;
+	uint32_t capacity = row->capacity;
 
-	if (patch != NULL)
-		row->patch = patch;
-	sample = realloc(row->sample, capacity * sizeof *row->sample);
-	if (sample != NULL)
-		row->sample = sample;
-	if (patch == NULL || sample == NULL)
-		return PSR_ERR_MEMORY;
-	row->capacity = capacity;
-	return PSR_OK;
+	return ARRAY_ROOM(row->patch, row->n, capacity) && ARRAY_ROOM(row->sample, row->n, row->capacity);
 }
 
 struct sheet {
@@ -122,7 +113,7 @@ static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit
 		     p++)
 			;
 	if (p == row->n) {
-		if (row->n == row->capacity && grow_row(row) != PSR_OK)
+		if (!has_room(row))
 			return PSR_ERR_MEMORY;
 		row->patch[p] = row->patch[wanted];
 		row->patch[p].mask = row->patch[p].first = 0;
@@ -159,7 +150,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 				break;
 		}
 		if (p == row->n) {
-			if (row->n == row->capacity && grow_row(row) != PSR_OK)
+			if (!has_room(row))
 				return PSR_ERR_MEMORY;
 			memset(&row->patch[p], 0, sizeof row->patch[p]);
 			memset(row->sample[p], 0, sizeof row->sample[p]);

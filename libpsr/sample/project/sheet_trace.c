@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "sheet_patch.h"
@@ -46,15 +47,8 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 {
 	const float *z_axis = job->sheets[0]->projection.axis[2];
 
-	if (strip->n + (size_t)n_hits > strip->capacity) {
-		size_t capacity = 2 * strip->capacity + 4096;
-		struct strip_hit *grown = realloc(strip->hit, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		strip->hit = grown;
-		strip->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(strip->hit, strip->n + (size_t)n_hits, strip->capacity))
+		return PSR_ERR_MEMORY;
 	for (int k = 0; k < n_hits; k++) {
 		uint32_t prim = ray_hit[k].prim;
 

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "base/cell.h"
 #include "base/table.h"
 #include "base/vec.h"
@@ -14,15 +15,8 @@
 
 int thin_candidates_add(struct thin_candidates *list, const struct thin_candidate *candidate)
 {
-	if (list->n == list->capacity) {
-		uint32_t capacity = list->capacity != 0 ? 2 * list->capacity : 4096;
-		struct thin_candidate *grown = realloc(list->candidate, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		list->candidate = grown;
-		list->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(list->candidate, list->n, list->capacity))
+		return PSR_ERR_MEMORY;
 	list->candidate[list->n++] = *candidate;
 	return PSR_OK;
 }
@@ -115,15 +109,8 @@ struct covers {
 
 static int add_cover(struct covers *covers, uint32_t place)
 {
-	if (covers->n == covers->capacity) {
-		uint32_t capacity = covers->capacity != 0 ? 2 * covers->capacity : 65536;
-		uint32_t *grown = realloc(covers->place, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		covers->place = grown;
-		covers->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(covers->place, covers->n, covers->capacity))
+		return PSR_ERR_MEMORY;
 	covers->place[covers->n++] = place;
 	return PSR_OK;
 }
