@@ -1,8 +1,8 @@
 #include <math.h>
 #include "base/vec.h"
-#include "tree.h"
 #include "surface/stipple.h"
 #include "surface/texture.h"
+#include "tree.h"
 
 /* Where the ray meets the primitive that the tree found: in its plane, drawn into the triangle, as the tree rounds its
  * edges outwards. An edge-on triangle has no such point; it keeps what the tree says. */

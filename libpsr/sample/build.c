@@ -194,7 +194,7 @@ static int prepare(struct build *build)
 	build->info.tolerance = options->tolerance;
 	build->info.resolution = options->resolution;
 	snprintf(build->info.builder, sizeof build->info.builder, "psr %s", PSR_VERSION);
-	rc = psr_pool_create(&build->pool, options->n_threads, 0);
+	rc = psr_pool_create(&build->pool, options->n_threads, NULL);
 	return rc == PSR_OK ? rc : psr_fail(build->err, rc, "%d threads cannot be started", options->n_threads);
 }
 

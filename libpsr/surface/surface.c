@@ -1,11 +1,11 @@
 #include <string.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "filter.h"
 #include "material.h"
 #include "mip.h"
 #include "normal.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 #include "surface.h"
 #include "texture.h"

@@ -1,4 +1,4 @@
-/* What the surface of a mesh looks like, as the attribute words of psr/model.h. */
+/* What the surface of a mesh looks like, as the attribute words of model/blocks.h. */
 #ifndef PSR_SURFACE_SURFACE_H
 #define PSR_SURFACE_SURFACE_H
 

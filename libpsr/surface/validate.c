@@ -1,7 +1,7 @@
 #include <math.h>
 #include "base/vec.h"
-#include "validate.h"
 #include "surface.h"
+#include "validate.h"
 
 static int check_materials(const struct psr_mesh *mesh, struct psr_error *err)
 {

@@ -6,7 +6,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "base/random.h"
 #include "ray/area.h"
 #include "models/studies/greedy/parts.h"

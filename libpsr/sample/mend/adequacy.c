@@ -1,11 +1,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "adequacy.h"
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/random.h"
 #include "base/vec.h"
-#include "adequacy.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 #include "ray/area.h"
 

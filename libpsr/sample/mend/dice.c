@@ -1,10 +1,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/vec.h"
 #include "candidates.h"
 #include "dice.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 #include "sample/visible/sides.h"
 

@@ -1,8 +1,8 @@
 #include <math.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "keep.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 #include "sample/visible/sides.h"
 #include "surface/blend.h"

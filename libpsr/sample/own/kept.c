@@ -1,6 +1,6 @@
 #include "base/array.h"
+#include "base/direction.h"
 #include "kept.h"
-#include "psr/direction.h"
 #include "psr/error.h"
 
 int kept_init(struct kept *kept, double ds)

@@ -7,13 +7,13 @@
 
 struct kept_sample {
 	float position[3];
-	uint16_t normal;     /* psr/direction.h: what is turned away from the viewer does not count, */
+	uint16_t normal;     /* base/direction.h: what is turned away from the viewer does not count, */
 	uint8_t two_sided;   /* unless this is set */
-	uint8_t traits;      /* psr/model.h. Bent: `attr` has another normal, which is shaded and does not tell facing */
+	uint8_t traits;      /* model/blocks.h. Bent: `attr` has another normal, which is shaded and does not tell facing */
 	uint8_t sample;      /* of this patch: */
 	uint32_t projection, patch;
 	uint32_t next;       /* of the same cell */
-	uint64_t attr;       /* psr/model.h */
+	uint64_t attr;       /* model/blocks.h */
 };
 
 struct kept {

@@ -1,6 +1,6 @@
 #include "base/vec.h"
-#include "render/render.h"
 #include "cone.h"
+#include "render/render.h"
 
 /* Normals and axis are rounded to floats: their product is off by some 2^-22. */
 #define SLACK 0x1p-20

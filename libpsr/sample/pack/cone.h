@@ -3,7 +3,7 @@
 #define PSR_SAMPLE_PACK_CONE_H
 
 #include <stdint.h>
-#include "psr/model.h"
+#include "model/blocks.h"
 
 /* The smallest cap that holds n >= 0 unit normals: its axis, a unit vector, and the cosine of the angle from there to
  * its rim, rounded downwards. The cosine is -1, and the axis of no meaning, if no cap smaller than a hemisphere holds
@@ -15,7 +15,7 @@
  * true: from inside the cone the surface at no sample is seen from its front. */
 void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine);
 
-/* The same as psr/model.h has it: the axis so long that its greatest component is 127 and the others rounded, which
+/* The same as model/blocks.h has it: the axis so long that its greatest component is 127 and the others rounded, which
  * turns it by up to 0.32 degrees (half a unit in two components of a vector of 127 or more); around that a cap that
  * still holds the normals, its sine rounded upwards. So the sine is at most 1/255 + 0.0056 + 0.0014 above that of the
  * smallest cap: a step, the turn, and 2^-20 of the cosine for roundings. Culling compares sines, and the cosine of a

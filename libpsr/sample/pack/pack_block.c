@@ -1,10 +1,10 @@
 #include <assert.h>
 #include <math.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/vec.h"
 #include "cone.h"
 #include "pack_block.h"
-#include "psr/direction.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
 #define SLACK 0x1p-21

@@ -4,13 +4,13 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "psr/direction.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "base/direction.h"
+#include "base/pool.h"
+#include "model/blocks.h"
 #include "ray/ray.h"
 
 /* Masks of all blocks of all levels: bit t is set iff one of the block's samples is seen from some direction in triangle t
- * (level 2 of psr/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
+ * (level 2 of base/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
  *
  * As in [G] the blocks of a level are drawn orthographically, at about a sample a pixel, without samples that face away.
  * The 1,026 directions are the corners of the triangles of level 4, 15 a triangle: a normal that faces any direction of a

@@ -2,8 +2,8 @@
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render/block.h"
 #include "psr/error.h"
+#include "render/block.h"
 #include "visibility_mask_draw.h"
 
 #define MOST_SIDE 4000 /* its square is below 2^24, with margins */

@@ -4,8 +4,8 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "render/render.h"
 #include "cone.h"
+#include "render/render.h"
 #include "visibility_mask.h"
 #include "visibility_mask_draw.h"
 

@@ -1,8 +1,8 @@
 #include <stdatomic.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "cone.h"
-#include "psr/direction.h"
 #include "visibility_mask_table.h"
 
 #define TRIANGLE_LEVEL 2

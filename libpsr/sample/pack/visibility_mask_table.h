@@ -3,8 +3,8 @@
 #define PSR_SAMPLE_PACK_VISIBILITY_MASK_TABLE_H
 
 #include <stdint.h>
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
+#include "model/blocks.h"
 
 /* Blocks a mask in a run, rounded up: an index has eight bits at most. */
 #define VISIBILITY_MASK_SHARE 4
@@ -12,7 +12,7 @@
 struct visibility_mask_table {
 	uint32_t n_masks;
 	uint64_t (*mask)[2];
-	uint8_t *index; /* as psr/model.h has it */
+	uint8_t *index; /* as model/blocks.h has it */
 };
 
 /* Fills the table, and visibility_first of the runs, from a mask a block. A block's stored mask has all bits of its own,

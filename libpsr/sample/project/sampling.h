@@ -3,9 +3,9 @@
 #define PSR_SAMPLE_PROJECT_SAMPLING_H
 
 #include <stdint.h>
-#include "psr/mesh.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "projection.h"
+#include "psr/mesh.h"
 #include "ray/ray.h"
 #include "surface/surface.h"
 #include "surface/texture.h"

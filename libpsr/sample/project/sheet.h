@@ -8,7 +8,7 @@
 #define PSR_SAMPLE_PROJECT_SHEET_H
 
 #include <stdint.h>
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "ray/ray.h"
 #include "sampling.h"
 

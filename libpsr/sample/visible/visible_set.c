@@ -1,6 +1,6 @@
 #include <math.h>
 #include "base/cell.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "visible_set.h"
 

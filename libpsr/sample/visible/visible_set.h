@@ -3,8 +3,8 @@
 #ifndef PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 #define PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 
+#include "base/pool.h"
 #include "base/table.h"
-#include "psr/pool.h"
 #include "ray/ray.h"
 
 struct visible_set {

@@ -3,7 +3,7 @@
 #define TESTS_SAMPLE_LEVEL_H
 
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "ray/area.h"
 #include "sample/level.h"
 #include "meshes.h"
@@ -28,7 +28,7 @@ static inline void level_set_open(struct level_set *set, struct psr_mesh *mesh, 
 	set->mesh = mesh;
 	assert(ray_scene_create(&set->scene, mesh, zero, 1, NULL) == PSR_OK);
 	assert(surface_init(&set->surface, mesh, 1) == PSR_OK);
-	assert(psr_pool_create(&set->pool, n_threads, 0) == PSR_OK);
+	assert(psr_pool_create(&set->pool, n_threads, NULL) == PSR_OK);
 	set->level.sampling = (struct sampling){ .mesh = mesh, .scene = set->scene, .surface = &set->surface,
 		                                     .pool = set->pool, .ds = 2.0 / resolution };
 	projection_list(set->level.sampling.projection, 2.0 / resolution, TOLERANCE);

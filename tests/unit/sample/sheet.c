@@ -28,7 +28,7 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 		projection.axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 	traced->mesh = mesh;
 	assert_int_equal(ray_scene_create(&traced->scene, mesh, zero, 1, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
 	traced->sampling = (struct sampling){ .mesh = mesh, .scene = traced->scene, .pool = pool };
 	assert_int_equal(sheets_trace(&traced->sheets, NULL, &traced->sampling, &projection), PSR_OK);
 	traced->sampling.pool = NULL;
@@ -204,7 +204,7 @@ static void both_sides_are_traced_at_once(void **state)
 		turned.axis[0][k] = -turned.axis[0][k];
 		turned.axis[2][k] = -turned.axis[2][k];
 	}
-	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
 	traced.sampling.pool = pool;
 	assert_int_equal(sheets_trace(&front, &behind, &traced.sampling, &traced.sheets.projection), PSR_OK);
 	assert_int_equal(sheets_trace(&alone, NULL, &traced.sampling, &turned), PSR_OK);
