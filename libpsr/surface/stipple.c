@@ -2,10 +2,9 @@
 #include <stdint.h>
 #include "stipple.h"
 
-/* Samples are drawn as wide as they are apart, which takes some of every hole, in proportion to the perimeter between
- * cells that are there and cells that are not, which goes with share * (1 - share). So fewer cells are there than the
- * opacity says: opacity = share + GROWTH * share * (1 - share). Measured with panes of 0.25, 0.5 and 0.75 in passes 1
- * to 3, at magnifications of 0.5 to 2.7: opacities of 0.27, 0.51 and 0.74. */
+/* Samples are drawn as wide as they are apart, which narrows holes in proportion to their perimeter, share * (1 -
+ * share). So fewer cells are solid than the opacity says: opacity = share + GROWTH * share * (1 - share). Panes of
+ * 0.25, 0.5 and 0.75 measure 0.27, 0.51 and 0.74 in passes 1 to 3 at magnifications of 0.5 to 2.7. */
 #define GROWTH 0.6f
 
 static float share_of(float opacity)
@@ -19,7 +18,7 @@ int stipple_is_open(float opacity, const double p[3], double cell)
 {
 	/* Multiples of the powers of 1 / 1.2207440846, the root of x^4 = x + 1, spread evenly along all three axes. */
 	static const uint64_t step[3] = { 3518319155, 2882110345, 2360945575 };
-	/* Faces of built things lie on round coordinates, which cells are not to begin at. */
+	/* Faces of built things lie on round coordinates: cells do not begin there. */
 	static const double offset[3] = { 0.3719, 0.6143, 0.2357 };
 	uint64_t sum = 0;
 

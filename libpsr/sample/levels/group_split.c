@@ -8,8 +8,8 @@
 #include "psr/error.h"
 
 #define CELLS 4 /* that a coarse pixel is wide */
-#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
-#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
+#define REACH 3 /* cells: no sample farther away covers a place ([G] 4.3: a pixel's corner is 0.71 pixels away) */
+#define FAR 4   /* for samples with nothing in REACH: moved ones are half a pixel off */
 
 /* Which groups have fine samples in each cell of a coarse level. */
 struct map {
@@ -57,7 +57,7 @@ static int map_groups(struct map *map, const struct draft *draft, const struct g
 	return PSR_OK;
 }
 
-/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
+/* The samples of a coarse block that each group around needs: at the coarsest level there may be hundreds. */
 struct part {
 	uint32_t group;
 	uint64_t mask;
@@ -148,7 +148,7 @@ struct split {
 	struct group_blocks *chunk;
 	int *rc;
 	uint32_t most;    /* blocks of them all; */
-	atomic_uint n;    /* once there are more, the rest is not looked at */
+	atomic_uint n;    /* once there are more, the rest is skipped */
 };
 
 #define CHUNK 256
@@ -165,7 +165,7 @@ static void split_chunk(int i, void *userdata)
 	free(parts.part);
 }
 
-/* Blocks of one level, first..end - 1, each by itself, so that any thread may; in their order. */
+/* Blocks first..end - 1, of one level, by all threads, into their order. */
 static int split_blocks(struct group_blocks *blocks, struct split *split, struct psr_pool *pool)
 {
 	int n = (int)((split->end - split->first + CHUNK - 1) / CHUNK), rc = PSR_OK;

@@ -1,4 +1,4 @@
-/* How samples come to be kept: the one way in for all steps. */
+/* Keeps samples: the one way in for all steps. */
 #ifndef PSR_SAMPLE_OWN_KEEP_H
 #define PSR_SAMPLE_OWN_KEEP_H
 

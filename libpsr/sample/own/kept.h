@@ -32,8 +32,8 @@ int kept_add(struct kept *kept, const struct kept_sample *sample); /* sets `next
 /* Whether a sample covers a place p that faces like n: it is within radius <= ds and faces like n, too. */
 int kept_covers(const struct kept *kept, const float p[3], const float n[3], double radius);
 
-/* The same of one sample on a sheet that is sampled once for both sides, whose normal at p is n: along the sheet as far
- * as radius, and across it, too, as pixels see that foreshortened; between, where 0.6 across^2 + along^2 <=
+/* The same of one sample on a sheet that is sampled once for both sides, whose normal at p is n: along the sheet as
+ * far as radius, and across it, too, as pixels see that foreshortened; between, where 0.6 across^2 + along^2 <=
  * radius^2. */
 static inline int kept_covers_sheet(const float sample[3], const float p[3], const float n[3], float radius)
 {

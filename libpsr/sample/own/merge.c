@@ -2,8 +2,8 @@
 #include "owner.h"
 
 /* Patches that own fewer samples than this give them away, fewest first, to projections that face them at an angle of
- * at least this cosine: a block costs as much as some ten samples. Beyond the tolerance angle samples lie further apart
- * than they should: mending adds what is missing then, which for few samples is less than a block. */
+ * at least this cosine: a block costs as much as some ten samples. Beyond the tolerance angle samples lie further
+ * apart than they should: mending adds what is missing then, which for few samples is less than a block. */
 static const struct {
 	int least;
 	float cosine;

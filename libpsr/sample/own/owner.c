@@ -139,8 +139,8 @@ static void mark_hidden(int i, void *userdata)
 	}
 }
 
-/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and samples of
- * what is narrow are chosen when places are tested. */
+/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and samples
+ * of what is narrow are chosen when places are tested. */
 static void drop_hidden(int i, void *userdata)
 {
 	const struct job *job = userdata;

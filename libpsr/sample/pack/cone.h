@@ -9,10 +9,10 @@
  * its rim, rounded downwards. The cosine is -1, and the axis of no meaning, if no cap smaller than a hemisphere holds
  * them.
  *
- * The renderer leaves out samples whose *stored* normals face away (render/warp.c), and culls a block if every normal of
- * its cap faces away from the eye at every place within its sphere. So a cap holds all stored normals, as they are read
- * back: culling then changes no bit of any frame. It holds the *geometric* normals, too, so that [G] 6.4's statement is
- * true: from inside the cone the surface at no sample is seen from its front. */
+ * The renderer leaves out samples whose *stored* normals face away (render/warp.c), and culls a block if every normal
+ * of its cap faces away from the eye at every place within its sphere. So a cap holds all stored normals, as they are
+ * read back: culling then changes no bit of any frame. It holds the *geometric* normals, too, so that [G] 6.4's
+ * statement is true: from inside the cone the surface at no sample is seen from its front. */
 void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine);
 
 /* The same as model/blocks.h has it: the axis so long that its greatest component is 127 and the others rounded, which

@@ -89,9 +89,9 @@ static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct dr
 /* Through the samples as they will be read back, and half a step beyond.
  *
  * Both fit. A pixel ds is at most 1/4 (at resolution 8), and a sample stands on the surface, which is within the unit
- * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
- * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
- * half a step more, 1.79 < 2. */
+ * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which
+ * makes 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375
+ * deep: with half a step more, 1.79 < 2. */
 static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block)
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];

@@ -176,8 +176,8 @@ static float least(float a, float b)
 	return a < b ? a : b;
 }
 
-/* out[i]: the smallest within MASK_PICTURE_REACH strides of in[i], where all of these are in 0..n-1. A fixed number at a
- * time, as above. */
+/* out[i]: the smallest within MASK_PICTURE_REACH strides of in[i], where all of these are in 0..n-1. A fixed number at
+ * a time, as above. */
 static void least_around(float *restrict out, const float *restrict in, int n, int stride)
 {
 	const int end = n - 2 * stride;

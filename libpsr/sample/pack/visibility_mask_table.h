@@ -15,10 +15,10 @@ struct visibility_mask_table {
 	uint8_t *index; /* as model/blocks.h has it */
 };
 
-/* Fills the table, and visibility_first of the runs, from a mask a block. A block's stored mask has all bits of its own,
- * so culling stays conservative, and adds as few drawn samples as possible; directions from which the block's cone culls
- * it do not count. Blocks are joined greedily with those that follow them, which are near in Morton order; then each
- * takes the best mask of its run.
+/* Fills the table, and visibility_first of the runs, from a mask a block. A block's stored mask has all bits of its
+ * own, so culling stays conservative, and adds as few drawn samples as possible; directions from which the block's
+ * cone culls it do not count. Blocks are joined greedily with those that follow them, which are near in Morton order;
+ * then each takes the best mask of its run.
  *
  * `blocks` needs all arrays but masks. The same table whatever the number of threads. MEMORY, and then the table is
  * empty. */

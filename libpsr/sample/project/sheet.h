@@ -20,7 +20,8 @@
 /* Neighbours on the lattice whose depths differ by more steps than this are not taken for one surface. */
 #define SHEET_STEPS 2.5f
 
-/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide. */
+/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide.
+ * */
 #define SHEET_PATCH_STEPS 24
 
 struct sheet_sample {
