@@ -143,7 +143,7 @@ static uint64_t count_samples(const struct draft *draft)
 	return n;
 }
 
-/* Masks, and what culling by them and by cones loses. */
+/* Makes masks, and measures the loss of culling by them and by cones. */
 static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_mask_table *table,
                           struct psr_model_info *info, struct psr_pool *pool)
 {

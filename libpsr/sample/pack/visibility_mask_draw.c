@@ -194,7 +194,7 @@ static void least_around(float *restrict out, const float *restrict in, int n, i
 	}
 }
 
-/* Numbers of a row are two a pixel: those of an end are two apart. */
+/* A row has two numbers a pixel, one for each end. */
 static void spread(const struct mask_picture *picture)
 {
 	const int n = 2 * picture->side * picture->side;

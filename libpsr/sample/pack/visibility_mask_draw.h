@@ -12,7 +12,7 @@
 struct mask_points {
 	const struct psr_blocks *blocks;
 	float *x, *y, *z;
-	uint16_t *normal; /* PSR_DIRECTIONS: that of a two-sided block, which faces everybody */
+	uint16_t *normal; /* PSR_DIRECTIONS: of a two-sided block, which faces all views */
 	float reach;      /* from the origin */
 };
 
@@ -30,10 +30,10 @@ struct mask_level {
 int mask_level_init(struct mask_level *level, const struct mask_points *points, unsigned which); /* MEMORY */
 void mask_level_fini(struct mask_level *level);
 
-/* Pixels around a sample among which there may be one through which it is seen. */
+/* A sample may be seen through a pixel so many pixels away. */
 #define MASK_PICTURE_REACH 2
 
-/* Square pixels, seen from both ends of an axis: from its end 0 and, through the same pixels, from its end 1. */
+/* A square picture along an axis, from its end 0 and, through the same pixels, from its end 1. */
 struct mask_picture {
 	int side;
 	float scale, offset[2];                 /* pixel = scale * coordinate + offset */
@@ -45,7 +45,7 @@ struct mask_picture {
 	float *nearest, *row, *farthest;
 };
 
-/* Pixels a little greater than the level's spacing, or greater ones if those were too many. MEMORY. */
+/* Pixels are a little greater than the level's spacing, or greater if they were too many. MEMORY. */
 int mask_picture_init(struct mask_picture *picture, const struct mask_points *points, const struct mask_level *level);
 void mask_picture_fini(struct mask_picture *picture);
 

@@ -91,7 +91,7 @@ static int is_away(const struct mask_points *points, uint32_t block, uint32_t k,
 	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* A sample a pixel for whatever is nearest. */
+/* Draws the nearest sample of each pixel. */
 static void draw(const struct job *job, const struct eye *eye, struct picture *picture)
 {
 	const struct psr_blocks *b = job->points->blocks;
@@ -219,7 +219,7 @@ static int look_at(struct job *job, uint64_t n_trials, struct psr_pool *pool, ui
 		atomic_store(&job->next, 0);
 		psr_pool_for(pool, psr_pool_threads(pool), draw_views, job);
 		for (int i = 0; i < BATCH && !atomic_load(&job->failed); i++) {
-			if (job->n_seen[i] > n_left) { /* the views after it are drawn again, too, and not counted */
+			if (job->n_seen[i] > n_left) { /* later views are drawn again, and not counted */
 				job->limit = n_left;
 				atomic_store(&job->next, i);
 				draw_views(0, job);

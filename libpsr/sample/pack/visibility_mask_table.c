@@ -8,16 +8,16 @@
 #define TRIANGLE_LEVEL 2
 #define N_CORNERS 66
 #define MOST_MASKS (PSR_RUN_BLOCKS / VISIBILITY_MASK_SHARE)
-#define NEAR 8 /* groups after one, of which the best is joined */
+#define NEAR 8 /* groups after one, the best of which joins it */
 #define NONE UINT32_MAX
 
-/* Blocks that share a mask, in the list of those that are left. */
+/* Blocks that share a mask, in a list of such groups. */
 struct group {
-	uint64_t seen[2];                  /* the mask: directions from which one of them is seen */
-	uint64_t hidden[2];                /* those from which culling one of them depends on its mask */
-	uint32_t lost[PSR_MASK_TRIANGLES]; /* samples of these, for each direction that is hidden and not seen */
+	uint64_t seen[2];                  /* the mask: directions from which one of the blocks is seen */
+	uint64_t hidden[2];                /* directions from which culling a block depends on its mask */
+	uint32_t lost[PSR_MASK_TRIANGLES]; /* samples of hidden blocks, for each direction that is not seen */
 	uint32_t previous, next;
-	uint32_t other, cost; /* the best of the next ones to join, and how many samples times directions it loses */
+	uint32_t other, cost; /* the best of the next groups to join; its loss in samples times directions */
 };
 
 struct corners {

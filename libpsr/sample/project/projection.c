@@ -4,8 +4,8 @@
 #include "base/vec.h"
 #include "projection.h"
 
-/* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which
- * would be as far from one direction as from the next. */
+/* Turned a little: built things have normals along the axes and halfway between, as far from one direction as from the
+ * next. */
 static const double TURN[3][3] = {
 	{ 0.9744706, -0.1910647, 0.1184155 },
 	{ 0.2079117, 0.9657151, -0.1552459 },
@@ -42,7 +42,7 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 	double direction[N_PROJECTIONS][3], turn[3][3], sine, cosine;
 	int n = list_directions(direction);
 
-	/* The rows above are rounded: made orthonormal again. */
+	/* The rows of TURN are rounded: this makes them orthonormal. */
 	v3d_normalize(turn[0], TURN[0]);
 	v3d_cross(turn[2], turn[0], TURN[1]);
 	v3d_normalize(turn[2], turn[2]);

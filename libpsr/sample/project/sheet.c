@@ -75,7 +75,7 @@ static const uint32_t *head_at(const struct sheets *sheets, struct lattice_point
 	return head_of(sheets, at.col >> 3, at.row >> 3);
 }
 
-/* Of patch p, for a sample, if it is nearer than what was found before. */
+/* Takes the sample of patch p if it is nearer than the one found before. */
 static inline void look_at(const struct sheets *sheets, uint32_t p, float z, float *reach, struct sheet_ref *found)
 {
 	float d;

@@ -16,7 +16,7 @@ static int root_of(struct block_hits *h, int i)
 	return i;
 }
 
-/* Joins the hits of two neighbouring lattice points that may be one surface: each with the nearest in depth. */
+/* Joins each hit of a lattice point with its neighbour's nearest in depth, if they may be one surface. */
 static void join(struct block_hits *h, int a, int b, float reach)
 {
 	for (int i = h->first_of[a]; i < h->first_of[a + 1]; i++) {
@@ -101,8 +101,7 @@ static int compare_sheets(const void *a, const void *b)
 	return x->low != y->low ? (x->low < y->low ? -1 : 1) : (int)x->root - (int)y->root;
 }
 
-/* A sheet may pass over a lattice point more than once (a spiral): hits that find their place taken start a patch of
- * their own. */
+/* A sheet may pass over a lattice point twice (a spiral): such hits start a patch of their own. */
 static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit *hit, uint32_t wanted)
 {
 	uint64_t bit = UINT64_C(1) << hit->at;
@@ -140,7 +139,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 	for (int i = 0; i < n_sheets; i++) {
 		uint32_t p = first;
 
-		/* The first patch with room for all of it that stays shallow. */
+		/* The first patch with room for the whole sheet that stays shallow. */
 		for (; p < row->n; p++) {
 			float top = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
 			float bottom = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
@@ -163,7 +162,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 		}
 		low[p - first] = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
 		high[p - first] = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
-		/* Reserve the places, so that no later sheet takes them; the hits themselves follow. */
+		/* Reserves the places; the hits follow. */
 		row->patch[p].mask |= sheet[i].mask;
 		patch_of[sheet[i].root] = (uint16_t)(p - first);
 	}

@@ -10,7 +10,7 @@
 #include "sample/own/kept.h"
 
 #define MOST_MOVE 0.4 /* pixels */
-#define MOST_GAIN 64  /* places that a candidate covers; more count as so many */
+#define MOST_GAIN 64  /* places that a candidate covers, at most */
 #define NOBODY UINT32_MAX
 
 int thin_candidates_add(struct thin_candidates *list, const struct thin_candidate *candidate)
@@ -55,7 +55,7 @@ int thin_candidates_move(struct thin_candidates *list, const struct sheets *shee
 	return thin_candidates_add(list, &candidate);
 }
 
-/* Places by cells twice as wide as the radius: those of a cell stand together, as each is looked at by many. */
+/* Places sorted by cells twice as wide as the radius. */
 struct near_places {
 	double radius;
 	size_t size;     /* slots for cells, a power of two */
@@ -102,7 +102,7 @@ static int sort_places(struct near_places *near, const struct place *place, size
 	return PSR_OK;
 }
 
-/* Which places candidates cover, one after the other. */
+/* The places that each candidate covers, one candidate after the other. */
 struct covers {
 	uint32_t *place, n, capacity;
 };
@@ -124,7 +124,7 @@ static int look_into(const struct near_places *near, size_t slot, const float po
 	return PSR_OK;
 }
 
-/* In the eight cells around. Two of them may have one slot, which is looked into once. */
+/* In the eight cells around, some of which may share a slot. */
 static int find_covered(const struct near_places *near, struct thin_candidate *candidate, struct covers *covers)
 {
 	size_t slot[8];
@@ -155,7 +155,7 @@ static unsigned gain_of(const struct thin_candidate *candidate, const struct cov
 	return gain < MOST_GAIN ? gain : MOST_GAIN;
 }
 
-/* Lists by gain, which is looked up again when its turn comes: it only falls. Chosen ones get `first` NOBODY. */
+/* Lists by gain, which only falls: it is counted again when its turn comes. Chosen candidates get `first` NOBODY. */
 static void choose(struct thin_candidates *list, const struct covers *covers, uint8_t *is_covered, uint32_t *next)
 {
 	uint32_t head[MOST_GAIN + 1], after;

@@ -1,5 +1,4 @@
-/* Looks from the surface outwards for what views from all around do not meet: nooks and slots show from few
- * directions. */
+/* Looks from the surface outwards, for nooks and slots that show from few directions. */
 #ifndef PSR_SAMPLE_VISIBLE_LOOK_OUT_H
 #define PSR_SAMPLE_VISIBLE_LOOK_OUT_H
 
