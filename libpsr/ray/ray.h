@@ -2,10 +2,10 @@
  * coordinates of a model: object = origin + scale * inner.
  *
  * As glTF asks, rays pass through the backs of one-sided faces, through texels of MASK materials below the cutoff, and
- * through BLEND ones below one half, or in proportion (ray_scene_stipple). A tree finds the primitive in float; where
- * the ray meets it is computed in double. One thread builds the tree and AVX2 walks it, so that threads and CPUs do
- * not matter. Of faces that coincide the tree's order chooses one; a ray through a vertex, to the rounding of a float,
- * may slip between its faces. */
+ * through BLEND ones below one half, or in proportion (ray_scene_stipple): all hits of a ray then have BLEND ones,
+ * too, of any opacity. A tree finds the primitive in float; where the ray meets it is computed in double. One thread
+ * builds the tree and AVX2 walks it, so that threads and CPUs do not matter. Of faces that coincide the tree's order
+ * chooses one; a ray through a vertex, to the rounding of a float, may slip between its faces. */
 #ifndef PSR_RAY_RAY_H
 #define PSR_RAY_RAY_H
 
@@ -32,12 +32,15 @@ int ray_scene_create(struct ray_scene **out, const struct psr_mesh *mesh, const 
                      struct psr_error *err);
 void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 
-/* Gives BLEND surfaces holes in proportion to their transparency, in cells of this side in inner units
- * (surface/stipple.h). Nobody may trace at the time. */
+/* From now on the first hits of rays pass BLEND surfaces in proportion to their transparency, by a pattern of cells of
+ * this side in inner units (surface/stipple.h). Nobody may trace at the time. */
 void ray_scene_stipple(struct ray_scene *scene, double cell);
 
 /* Whether alpha makes a place of a primitive transparent. Its texture is filtered as for magnification. */
 int ray_scene_is_absent(const struct ray_scene *scene, uint32_t prim, double u, double v);
+
+/* Whether what is at this place of a primitive lets a part of the light through. */
+int ray_scene_is_sheer(const struct ray_scene *scene, uint32_t prim, double u, double v);
 
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);

@@ -41,6 +41,9 @@ uint64_t surface_attr(const struct surface *surface, const struct surface_place 
 uint64_t surface_look(const struct surface *surface, const struct surface_place *place, double diameter,
                       float normal[3]);
 
+/* The opacity of a place, 0..1, filtered likewise; 1 of materials that are not BLEND. */
+float surface_opacity(const struct surface *surface, const struct surface_place *place, double diameter);
+
 /* Bends a unit normal until it faces `facing`, however it is quantised. */
 void surface_face(float normal[3], const float facing[3]);
 
