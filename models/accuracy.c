@@ -5,9 +5,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "accuracy_passes.h"
-#include "accuracy_report.h"
-#include "accuracy_verdict.h"
+#include "accuracy/passes.h"
+#include "accuracy/report.h"
+#include "accuracy/verdict.h"
 #include "json.h"
 #include "pfm.h"
 #include "ppm.h"

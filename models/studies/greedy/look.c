@@ -53,13 +53,6 @@ void greedy_facing_init(struct greedy_facing *facing, const float axis[3][3])
 		facing->bit[n / 64] |= (uint64_t)(greedy_project(axis, normal[n]).z > 0) << n % 64;
 }
 
-float greedy_depth_tolerance(float cosine, double ds)
-{
-	float c = cosine > 0.03f ? cosine : 0.03f;
-
-	return (float)ds * (1 + 1.5f * sqrtf(1 - c * c) / c);
-}
-
 static void look_at_view(int v, void *userdata)
 {
 	struct look *look = userdata;
@@ -98,7 +91,7 @@ static void take_candidates(struct look *look, struct greedy_strictness strictne
 				continue;
 			candidate->seen = greedy_project(view->projection.axis, sample->position);
 			candidate->least_z = candidate->seen.z
-			                     - tolerance * greedy_depth_tolerance(sample->cosine, look->greedy->ds);
+			                     - tolerance * trials_depth_tolerance(sample->cosine, look->greedy->ds);
 			candidate->is_lenient = sample->cosine < strictness.lenient_below;
 			candidate->block = b;
 			look->n_candidates++;

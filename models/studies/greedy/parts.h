@@ -1,6 +1,6 @@
 /* What the files of the greedy modeller share (greedy.h). */
-#ifndef PSR_MODELS_STUDIES_GREEDY_PARTS_H
-#define PSR_MODELS_STUDIES_GREEDY_PARTS_H
+#ifndef MODELS_STUDIES_GREEDY_PARTS_H
+#define MODELS_STUDIES_GREEDY_PARTS_H
 
 #include "greedy.h"
 #include "psr/direction.h"
@@ -72,10 +72,6 @@ static inline int greedy_counts(const struct greedy_facing *facing, const struct
 
 	return sample->two_sided || (facing->bit[n / 64] >> n % 64 & 1) != 0;
 }
-
-/* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a
- * surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
-float greedy_depth_tolerance(float cosine, double ds);
 
 /* Which samples of a view may choose blocks. */
 struct greedy_strictness {

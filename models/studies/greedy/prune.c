@@ -47,7 +47,7 @@ static void ask(struct prune *prune, int v)
 		table->need[i] = -INFINITY;
 	for (uint32_t i = 0; i < view->n_samples; i++) {
 		struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
-		float least = seen.z - tolerance * greedy_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
+		float least = seen.z - tolerance * trials_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
 
 		for (int t = 0; t < prune->n_tests; t++) {
 			float *need = &table->need[(size_t)t * prune->n_pixels + greedy_pixel(&prune->grid[t], &seen)];
@@ -235,12 +235,9 @@ int greedy_prune(struct greedy *greedy, const struct greedy_select_options *opti
 	if (rc == PSR_OK) {
 		psr_pool_for(greedy->pool, greedy->n_views, fill_table, &prune);
 		list_units(&prune, is_by_sample);
-		for (size_t i = 0; i < prune.n_units; i++) {
+		for (size_t i = 0; i < prune.n_units; i++)
 			if (!is_needed(&prune, &prune.unit[i]))
 				drop(greedy, &prune.unit[i]);
-			if (options->on_progress != NULL && i % 1024 == 0)
-				options->on_progress(i, prune.n_units, options->userdata);
-		}
 	}
 	prune_fini(&prune);
 	return rc;

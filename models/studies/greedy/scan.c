@@ -1,7 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "parts.h"
@@ -14,7 +14,6 @@
 struct row {
 	uint32_t n;
 	struct greedy_sample *sample;
-	uint64_t n_rays;
 	int failed;
 };
 
@@ -72,7 +71,6 @@ static void trace_run(struct row *row, const struct job *job, const int *col, in
 		}
 	}
 	ray_scene_trace(job->greedy->scene, ray, n, 0, hit);
-	row->n_rays += (uint64_t)n;
 	for (int i = 0; i < n; i++) {
 		struct greedy_sample *sample = &row->sample[row->n];
 
@@ -116,7 +114,7 @@ static void trace_row(int i, void *userdata)
 	trace_run(row, job, col, n, lattice_row);
 }
 
-static int join_rows(struct greedy_view *view, const struct job *job, uint64_t *n_rays)
+static int join_rows(struct greedy_view *view, const struct job *job)
 {
 	size_t n = 0;
 
@@ -124,7 +122,6 @@ static int join_rows(struct greedy_view *view, const struct job *job, uint64_t *
 		if (job->row[i].failed)
 			return PSR_ERR_MEMORY;
 		n += job->row[i].n;
-		*n_rays += job->row[i].n_rays;
 	}
 	view->sample = psr_alloc_array(n, sizeof *view->sample);
 	if (view->sample == NULL)
@@ -150,7 +147,7 @@ int greedy_trace(struct greedy *greedy, int view, int stride)
 		rc = PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
 		psr_pool_for(greedy->pool, 2 * job.reach + 1, trace_row, &job);
-		rc = join_rows(&greedy->view[view], &job, &greedy->n_rays);
+		rc = join_rows(&greedy->view[view], &job);
 	}
 	for (int i = 0; job.row != NULL && i <= 2 * job.reach; i++)
 		psr_free(job.row[i].sample);
@@ -202,19 +199,11 @@ static int note_sides(struct greedy *greedy)
 	return PSR_OK;
 }
 
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct ray_scene *scene, double scale,
                   const struct greedy_scan_options *options, struct psr_pool *pool, struct psr_error *err)
 {
 	struct greedy *greedy = calloc(1, sizeof *greedy);
-	double started = now();
+	double started = clock_seconds();
 	int rc = PSR_OK;
 
 	if (greedy == NULL)
@@ -226,7 +215,7 @@ int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct
 		rc = greedy_trace(greedy, v, 1);
 	if (rc == PSR_OK)
 		rc = note_sides(greedy);
-	greedy->seconds_scan = now() - started;
+	greedy->seconds_scan = clock_seconds() - started;
 	if (rc != PSR_OK) {
 		greedy_destroy(greedy);
 		return psr_fail(err, rc, "no memory for the samples of all projections at resolution %u; use a lower one",

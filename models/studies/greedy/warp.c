@@ -1,9 +1,7 @@
-#include "warp.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
@@ -265,14 +263,6 @@ static void draw(struct greedy_warp *warp, const struct matrix *matrix, const fl
 #undef DRAW
 }
 
-static double processor_time(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_time *time, struct psr_error *err)
 {
 	struct matrix *matrix = psr_alloc_array((size_t)warp->n_views, sizeof *matrix);
@@ -295,13 +285,13 @@ int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_t
 		}
 		make_matrices(warp, frame, matrix);
 		for (int i = 0; i < N_REPETITIONS; i++) {
-			double started;
+			uint64_t started;
 
 			for (size_t k = 0; k < (size_t)warp->resolution * warp->resolution; k++)
 				warp->word[k] = EMPTY;
-			started = processor_time();
+			started = clock_thread_ns();
 			draw(warp, matrix, eye);
-			best = fmin(best, processor_time() - started);
+			best = fmin(best, (double)(clock_thread_ns() - started) * 1e-9);
 		}
 		total += best;
 	}

@@ -4,8 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/vec.h"
-#include "models/studies/cull.h"
-#include "models/studies/cull_part.h"
+#include "models/studies/cull/cull.h"
 #include "psr/build.h"
 #include "psr/render.h"
 #include "sample/pack/visibility_mask.h"
@@ -43,8 +42,8 @@ static struct object make_object(struct psr_mesh *mesh, int finest)
 	assert_int_equal(ray_scene_create(&o.scene, mesh, info->origin, info->scale, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&o.pool, N_THREADS, 0), PSR_OK);
 	assert_int_equal(cull_set_create(&o.set, o.model, finest, o.pool, NULL), PSR_OK);
-	o.blocks = psr_model_blocks(cull_set_base(o.set));
-	assert_int_equal(o.blocks->n_blocks, cull_set_n_blocks(o.set));
+	o.blocks = psr_model_blocks(o.set->base);
+	assert_int_equal(o.blocks->n_blocks, o.set->n_blocks);
 	o.is_kept = calloc(o.blocks->n_blocks, 1);
 	o.n_seen = calloc(o.blocks->n_blocks, 1);
 	return o;
@@ -385,9 +384,9 @@ static void a_part_that_cones_leave_has_the_same_picture(void **state)
 
 		cull_eye_place(&eye, which, 1);
 		cull_set_test(o.set, &eye, &cones, o.is_kept);
-		assert_int_equal(cull_part(&part, cull_set_base(o.set), o.is_kept, NULL, NULL), PSR_OK);
+		assert_int_equal(cull_part(&part, o.set->base, o.is_kept, NULL, NULL), PSR_OK);
 		assert_true(psr_model_blocks(part)->n_blocks < o.blocks->n_blocks);
-		draw(cull_set_base(o.set), &eye, rgb[0], depth[0]);
+		draw(o.set->base, &eye, rgb[0], depth[0]);
 		draw(part, &eye, rgb[1], depth[1]);
 		assert_memory_equal(rgb[0], rgb[1], sizeof rgb[0]);
 		assert_memory_equal(depth[0], depth[1], sizeof depth[0]);

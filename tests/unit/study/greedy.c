@@ -10,7 +10,6 @@
 #include "psr/direction.h"
 #include "surface/validate.h"
 #include "models/studies/greedy/parts.h"
-#include "models/studies/greedy/warp.h"
 #include "tests/unit/sample/meshes.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
@@ -211,7 +210,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 				struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
 
 				n += z[greedy_pixel(&grid, &seen)]
-				     < seen.z - greedy_depth_tolerance(view->sample[i].cosine, greedy->ds);
+				     < seen.z - trials_depth_tolerance(view->sample[i].cosine, greedy->ds);
 			}
 			free(z);
 		}
@@ -412,7 +411,7 @@ static void counts_agree_with_what_is_kept(void **state)
 	struct greedy *greedy = scan(&object, 32, GREEDY_SQUARE, GREEDY_THESIS, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
-	struct greedy_point *point;
+	struct trials_sample *point;
 
 	(void)state;
 	greedy_select_default(&options);
@@ -421,7 +420,7 @@ static void counts_agree_with_what_is_kept(void **state)
 	assert_int_equal(result.n_lanes, 16 * result.n_blocks);
 	assert_int_equal(result.n_bytes, 10 * result.n_samples + (21 + 2) * result.n_blocks);
 	point = calloc(result.n_samples + 1, sizeof *point);
-	greedy_points(greedy, point);
+	greedy_samples(greedy, point);
 	for (uint64_t i = 0; i < result.n_samples; i++)
 		assert_true(v3f_length(point[i].position) > 0.1f);
 	assert_true(v3f_length(point[result.n_samples].position) == 0);

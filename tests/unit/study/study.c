@@ -9,7 +9,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "models/studies/study.h"
+#include "models/studies/lib/study.h"
 #include "psr/direction.h"
 #include "tests/unit/sample/meshes.h"
 
@@ -73,7 +73,7 @@ static void a_table_is_printed_in_columns(void **state)
 struct ball {
 	struct psr_mesh *mesh;
 	struct ray_scene *scene;
-	struct study_trials *trials;
+	struct trials *trials;
 };
 
 static struct ball make_ball(double radius)
@@ -82,21 +82,21 @@ static struct ball make_ball(double radius)
 	struct ball ball = { .mesh = meshes_sphere(32, center, radius) };
 
 	assert_int_equal(ray_scene_create(&ball.scene, ball.mesh, origin, 1, NULL), PSR_OK);
-	assert_int_equal(study_trials_create(&ball.trials, ball.mesh, ball.scene, 20, 300, NULL), PSR_OK);
+	assert_int_equal(trials_create(&ball.trials, ball.mesh, ball.scene, 20, 300, NULL), PSR_OK);
 	return ball;
 }
 
 static void ball_fini(struct ball *ball)
 {
-	study_trials_destroy(ball->trials);
+	trials_destroy(ball->trials);
 	ray_scene_destroy(ball->scene);
 	meshes_free(ball->mesh);
 }
 
 /* Points on a sphere, on a spiral of equal areas. */
-static struct greedy_point *spiral(size_t n, double radius, int is_inside_out)
+static struct trials_sample *spiral(size_t n, double radius, int is_inside_out)
 {
-	struct greedy_point *point = calloc(n + 1, sizeof *point);
+	struct trials_sample *point = calloc(n + 1, sizeof *point);
 
 	for (size_t i = 0; i < n; i++) {
 		double z = 1 - (2 * (double)i + 1) / (double)n, a = 2.399963229728653 * (double)i, r = sqrt(1 - z * z);
@@ -111,11 +111,11 @@ static struct greedy_point *spiral(size_t n, double radius, int is_inside_out)
 	return point;
 }
 
-static uint64_t missing(const struct ball *ball, const struct greedy_point *point, size_t n, double ds)
+static uint64_t missing(const struct ball *ball, const struct trials_sample *point, size_t n, double ds)
 {
 	uint64_t n_trials, n_missing;
 
-	assert_int_equal(study_trials_run(ball->trials, point, n, ds, NULL, &n_trials, &n_missing), PSR_OK);
+	assert_int_equal(trials_run(ball->trials, point, n, ds, NULL, &n_trials, &n_missing), PSR_OK);
 	assert_int_equal(n_trials, 20 * 300);
 	return n_missing;
 }
@@ -127,7 +127,7 @@ static void trials_find_holes_and_only_holes(void **state)
 {
 	struct ball ball = make_ball(0.9);
 	double ds = 1.0 / 32, spacing = 0.9 * sqrt(4 * 3.14159265358979323846 / 60000);
-	struct greedy_point *dense = spiral(60000, 0.9, 0), *sparse = spiral(6000, 0.9, 0);
+	struct trials_sample *dense = spiral(60000, 0.9, 0), *sparse = spiral(6000, 0.9, 0);
 
 	(void)state;
 	assert_true(1.5 * spacing < 0.667 * ds);
@@ -143,7 +143,7 @@ static void samples_that_face_away_or_lie_deeper_fill_no_pixel(void **state)
 {
 	struct ball ball = make_ball(0.9);
 	double ds = 1.0 / 64;
-	struct greedy_point *inside_out = spiral(120000, 0.9, 1), *deep = spiral(120000, 0.5, 0);
+	struct trials_sample *inside_out = spiral(120000, 0.9, 1), *deep = spiral(120000, 0.5, 0);
 
 	(void)state;
 	/* The far side, now turned to the viewer, is 1.8 c behind a place seen at cosine c, where ds (1 + 1.5 / c) is
