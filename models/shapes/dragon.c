@@ -169,8 +169,7 @@ static void head(struct shape *shape)
 
 void make_dragon(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	skin(shape);
 	crest(shape);
 	head(shape);

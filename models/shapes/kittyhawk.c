@@ -145,8 +145,6 @@ static void blade_at(double u, double v, double p[3], const void *context)
 
 static void propellers(struct shape *shape)
 {
-	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
-
 	for (int side = -1; side <= 1; side += 2) {
 		double y = LOW_Y + 0.95, z = 1.75 * side, c, s;
 		const double hub[3] = { -1.15, y, z };
@@ -161,7 +159,7 @@ static void propellers(struct shape *shape)
 		uint32_t first = shape->n_vertices;
 		shape->current = SPRUCE;
 		sweep_ball(shape, (const double[3]){ 0, 0, 0 }, (const double[3]){ 0.07, 0.09, 0.09 }, 16, 24);
-		shape_move(shape, first, straight, hub);
+		shape_shift(shape, first, hub);
 		rod(shape, WIRES, 0.02, -1.15, y, z, -0.3, y, z);
 		for (int leg = -1; leg <= 1; leg += 2) {
 			for (int way = -1; way <= 1; way += 2)
@@ -209,8 +207,7 @@ void make_kittyhawk(struct shape *shape)
 		{ 0.1, LOW_Y + GAP, CHORD, SPAN / 2, 0.025, 0.09, DROOP },
 	};
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	wing(shape, &wings[0], 320);
 	wing(shape, &wings[1], 320);
 	cell(shape);

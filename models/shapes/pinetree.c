@@ -71,8 +71,7 @@ static void place_twig(struct shape *shape, uint32_t part, const double at[3], c
 }
 
 static void branch(struct shape *shape, double height, double length, double turn, const uint32_t twig[2],
-                   uint32_t cone,
-                   uint64_t *random)
+                   uint32_t cone, uint64_t *random)
 {
 	double c, s, path[13][3], radius[13], rise = 0.1 + 0.3 * height / HEIGHT;
 	int n = 2 + (int)(length * 8);
@@ -95,10 +94,8 @@ static void branch(struct shape *shape, double height, double length, double tur
 			at[j] = path[k][j] + (path[k + 1][j] - path[k][j]) * rest;
 		v3d_set(out, c - spread * s, random_in(random, -0.1, 0.25), -s - spread * c);
 		place_twig(shape, twig[t > 0.8], at, out, size);
-		if (i == n / 2 && random_next(random) % 3 == 0) {
-			static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
-			shape_place(shape, cone, straight, at);
-		}
+		if (i == n / 2 && random_next(random) % 3 == 0)
+			shape_place(shape, cone, shape_straight, at);
 	}
 }
 
@@ -109,8 +106,7 @@ void make_pinetree(struct shape *shape)
 	uint64_t random = 77;
 	double path[25][3], radius[25];
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape->current = EARTH;
 	sweep_ball(shape, mound, mound_half, 20, 48);
 	for (int i = 0; i <= 24; i++) {

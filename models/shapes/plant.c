@@ -146,8 +146,7 @@ void make_plant(struct shape *shape)
 	uint32_t leaf[3], blossom;
 	uint64_t random = 1903;
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, LEAF, 128, image_leaf(128, 0x3f7d33, 0xa9c46c));
 	pot(shape);
 	leaf_parts(shape, leaf);

@@ -218,8 +218,7 @@ static void sails(struct shape *shape)
 
 void make_sailboat(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, DECK, 128, image_planks(128, 0xc79a63, 0x3c2a1c, 4));
 	hull(shape);
 	fittings(shape);

@@ -40,15 +40,6 @@ void sweep_along(struct shape *shape, uint32_t first, const double a[3], const d
 	shape_move(shape, first, turn, a);
 }
 
-static struct shape_vertex *new_grid(struct shape *shape, uint32_t rows, uint32_t cols)
-{
-	struct shape_vertex *grid = calloc((size_t)rows * cols, sizeof *grid);
-
-	if (grid == NULL)
-		shape->failed = 1;
-	return grid;
-}
-
 static int is_pole(const struct shape_vertex *row, uint32_t n_cols)
 {
 	for (uint32_t j = 1; j < n_cols; j++) {
@@ -104,7 +95,7 @@ void sweep_band(struct shape *shape, const struct shape_vertex *grid, uint32_t n
                 uint32_t last, int wrap_rows)
 {
 	uint32_t n = last - first + 1;
-	struct shape_vertex *band = new_grid(shape, n_rows, n);
+	struct shape_vertex *band = shape_grid_alloc(shape, n_rows, n);
 
 	if (band == NULL)
 		return;
@@ -120,7 +111,7 @@ void sweep_surface(struct shape *shape, sweep_function *at, const void *context,
                    int wrap_u)
 {
 	uint32_t rows = quads_v + 1, cols = wrap_u ? quads_u : quads_u + 1, first = shape->n_vertices;
-	struct shape_vertex *grid = new_grid(shape, rows, cols);
+	struct shape_vertex *grid = shape_grid_alloc(shape, rows, cols);
 
 	if (grid == NULL)
 		return;
@@ -168,7 +159,7 @@ static void put_cap(struct shape_vertex *rows, uint32_t sides, const double cent
 void sweep_tube(struct shape *shape, const double (*path)[3], const double *radius, uint32_t n, uint32_t sides)
 {
 	uint32_t low = radius[0] > 0 ? CAP : 0, high = radius[n - 1] > 0 ? CAP : 0;
-	struct shape_vertex *grid = new_grid(shape, low + n + high, sides);
+	struct shape_vertex *grid = shape_grid_alloc(shape, low + n + high, sides);
 	double x[3] = { 0, 0, 0 }, tangent[3], turn[3][3];
 
 	if (grid == NULL)
@@ -244,7 +235,7 @@ void sweep_block(struct shape *shape, const double center[3], const double half[
 void sweep_ball(struct shape *shape, const double center[3], const double half[3], uint32_t rows, uint32_t cols)
 {
 	uint32_t first = shape->n_vertices;
-	struct shape_vertex *grid = new_grid(shape, rows + 1, cols);
+	struct shape_vertex *grid = shape_grid_alloc(shape, rows + 1, cols);
 	const double m[3][3] = { { half[0], 0, 0 }, { 0, half[1], 0 }, { 0, 0, half[2] } };
 	double c, s, across, up;
 

@@ -97,7 +97,7 @@ static void feathers(struct shape *shape)
 			double low[3] = { 0, half[1] * 0.8, 0 };
 			shape->current = i == 1 ? COMB : WING;
 			sweep_ball(shape, origin, half, 32, 40);
-			shape_move(shape, first, (const double[3][3]){ { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, low);
+			shape_shift(shape, first, low);
 			sweep_along(shape, first, from, to);
 		}
 	}
@@ -165,8 +165,7 @@ static void string(struct shape *shape)
 
 void make_toybird(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	body(shape);
 	head(shape);
 	feathers(shape);

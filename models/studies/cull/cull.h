@@ -83,7 +83,9 @@ struct cull_truth {
 	double blocks, samples; /* share that no ray finds */
 };
 
-/* figures[i] for choice[i]; truth and wrong if scene is given, else 0. Shares are the same whatever the number of
+#define CULL_MOST_CHOICES 16
+
+/* figures[i] for choice[i], n_choices <= CULL_MOST_CHOICES; truth and wrong if scene is given, else 0. Shares are the same whatever the number of
  * threads. Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from
  * models that have just the blocks that are kept. MEMORY. */
 int cull_measure(struct cull_set *set, const struct ray_scene *scene, const struct cull_views *views,

@@ -1,5 +1,5 @@
+#include <assert.h>
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
@@ -14,27 +14,25 @@ struct measure {
 	struct cull_set *set;
 	const struct cull_choice *choice;
 	int n_choices;
-	uint8_t **is_kept, *n_seen; /* of each choice; of each block */
-	double *test, *draw;        /* seconds, the least of all rounds, of each choice */
-	double frustum;             /* of the frustum alone */
-	struct psr_model **part;
+	uint8_t *is_kept[CULL_MOST_CHOICES], *spare, *n_seen;    /* of each block */
+	double test[CULL_MOST_CHOICES], draw[CULL_MOST_CHOICES]; /* seconds, the least of all rounds */
+	double frustum;                                          /* of the frustum alone */
 	struct psr_renderer *renderer;
 	struct psr_frame frame;
 	struct psr_error *err;
 };
 
-static double seconds_since(uint64_t thread_ns)
+static void take_least(double *seconds, uint64_t started)
 {
-	return (double)(clock_thread_ns() - thread_ns) * 1e-9;
+	*seconds = fmin(*seconds, (double)(clock_thread_ns() - started) * 1e-9);
 }
 
-static double time_test(struct measure *m, const struct cull_eye *eye, const struct cull_choice *choice,
-                        uint8_t *is_kept)
+static void time_test(struct measure *m, const struct cull_eye *eye, const struct cull_choice *choice, double *seconds)
 {
 	const uint64_t started = clock_thread_ns();
 
-	cull_set_test(m->set, eye, choice, is_kept);
-	return seconds_since(started);
+	cull_set_test(m->set, eye, choice, m->spare);
+	take_least(seconds, started);
 }
 
 static int time_draw(struct measure *m, const struct cull_eye *eye, const struct psr_model *model, double *seconds)
@@ -55,7 +53,7 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	psr_settings_default(&settings, m->frame.width, m->frame.height);
 	started = clock_thread_ns();
 	rc = psr_render(m->renderer, &scene, &settings, NULL, &m->frame, m->err);
-	*seconds = fmin(*seconds, seconds_since(started));
+	take_least(seconds, started);
 	return rc;
 }
 
@@ -63,30 +61,28 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 static int time_view(struct measure *m, const struct cull_eye *eye)
 {
 	static const struct cull_choice frustum = { 0, CULL_NO_MASK, 0 };
-	uint8_t *spare = psr_alloc_array(m->set->n_blocks, 1);
-	int rc = spare != NULL ? PSR_OK : psr_fail(m->err, PSR_ERR_MEMORY, "no memory for a study of culling");
+	struct psr_model *part[CULL_MOST_CHOICES] = { NULL };
+	int rc = PSR_OK;
 
 	m->frustum = INFINITY;
 	for (int i = 0; i < m->n_choices && rc == PSR_OK; i++) {
-		m->test[i] = m->draw[i] = INFINITY;
-		if (memchr(m->is_kept[i], 1, m->set->n_blocks) == NULL)
-			m->draw[i] = 0; /* there is nothing to draw */
-		else
-			rc = cull_part(&m->part[i], m->set->base, m->is_kept[i], NULL, m->err);
+		const int is_empty = memchr(m->is_kept[i], 1, m->set->n_blocks) == NULL;
+
+		m->test[i] = INFINITY;
+		m->draw[i] = is_empty ? 0 : INFINITY;
+		if (!is_empty)
+			rc = cull_part(&part[i], m->set->base, m->is_kept[i], NULL, m->err);
 	}
 	for (int round = 0; round < ROUNDS && rc == PSR_OK; round++) {
-		m->frustum = fmin(m->frustum, time_test(m, eye, &frustum, spare));
+		time_test(m, eye, &frustum, &m->frustum);
 		for (int i = 0; i < m->n_choices && rc == PSR_OK; i++) {
-			m->test[i] = fmin(m->test[i], time_test(m, eye, &m->choice[i], spare));
-			if (m->part[i] != NULL)
-				rc = time_draw(m, eye, m->part[i], &m->draw[i]);
+			time_test(m, eye, &m->choice[i], &m->test[i]);
+			if (part[i] != NULL)
+				rc = time_draw(m, eye, part[i], &m->draw[i]);
 		}
 	}
-	for (int i = 0; i < m->n_choices; i++) {
-		psr_model_unref(m->part[i]);
-		m->part[i] = NULL;
-	}
-	psr_free(spare);
+	for (int i = 0; i < m->n_choices; i++)
+		psr_model_unref(part[i]);
 	return rc;
 }
 
@@ -154,32 +150,24 @@ static int run_views(struct measure *m, const struct ray_scene *scene, const str
 
 static int measure_init(struct measure *m, int has_truth)
 {
-	uint32_t side = psr_model_info(m->set->base)->resolution;
+	const uint32_t resolution = psr_model_info(m->set->base)->resolution, n = m->set->n_blocks;
 	int failed;
 
-	side = side < PSR_MAX_SIDE / 2 ? side : PSR_MAX_SIDE / 2;
-	m->frame.width = m->frame.height = side;
-	m->is_kept = calloc((size_t)m->n_choices, sizeof *m->is_kept);
-	m->part = calloc((size_t)m->n_choices, sizeof *m->part);
-	m->test = calloc((size_t)m->n_choices, sizeof *m->test);
-	m->draw = calloc((size_t)m->n_choices, sizeof *m->draw);
-	m->n_seen = has_truth ? psr_alloc_array(m->set->n_blocks, 1) : NULL;
-	m->frame.rgb = psr_alloc_array((size_t)side * side, 3);
-	failed = m->is_kept == NULL || m->part == NULL || m->test == NULL || m->draw == NULL
-	         || (has_truth && m->n_seen == NULL) || m->frame.rgb == NULL;
-	for (int i = 0; i < m->n_choices && !failed; i++)
-		failed = (m->is_kept[i] = psr_alloc_array(m->set->n_blocks, 1)) == NULL;
+	m->frame.width = m->frame.height = resolution < PSR_MAX_SIDE / 2 ? resolution : PSR_MAX_SIDE / 2;
+	m->frame.rgb = psr_alloc_array((size_t)m->frame.width * m->frame.width, 3);
+	m->spare = psr_alloc_array(n, 1);
+	m->n_seen = has_truth ? psr_alloc_array(n, 1) : NULL;
+	failed = m->frame.rgb == NULL || m->spare == NULL || (has_truth && m->n_seen == NULL);
+	for (int i = 0; i < m->n_choices; i++)
+		failed |= (m->is_kept[i] = psr_alloc_array(n, 1)) == NULL;
 	return failed || psr_renderer_create(&m->renderer) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 static void measure_fini(struct measure *m)
 {
-	for (int i = 0; i < m->n_choices && m->is_kept != NULL; i++)
+	for (int i = 0; i < m->n_choices; i++)
 		psr_free(m->is_kept[i]);
-	free(m->is_kept);
-	free(m->part);
-	free(m->test);
-	free(m->draw);
+	psr_free(m->spare);
 	psr_free(m->n_seen);
 	psr_free(m->frame.rgb);
 	psr_renderer_destroy(m->renderer);
@@ -190,8 +178,10 @@ int cull_measure(struct cull_set *set, const struct ray_scene *scene, const stru
                  struct cull_truth *truth, struct psr_error *err)
 {
 	struct measure m = { .set = set, .choice = choice, .n_choices = n_choices, .err = err };
-	int rc = measure_init(&m, scene != NULL);
+	int rc;
 
+	assert(n_choices <= CULL_MOST_CHOICES);
+	rc = measure_init(&m, scene != NULL);
 	if (rc != PSR_OK)
 		psr_fail(err, rc, "no memory for a study of culling");
 	memset(figures, 0, (size_t)n_choices * sizeof *figures);

@@ -5,7 +5,6 @@
 #include <stdint.h>
 #include "models/studies/lib/study.h"
 #include "psr/measure.h"
-#include "surface/surface.h"
 
 /* ---- scene.c: models, cameras, frames ---- */
 
@@ -13,7 +12,6 @@ struct figure_model {
 	struct study_model source;
 	struct psr_model *model;
 	struct psr_truth *truth;
-	struct surface surface;
 	double center[3], spacing; /* of the box; world units */
 };
 

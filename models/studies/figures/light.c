@@ -47,15 +47,14 @@ int figure_highlights(struct study *study)
 static void make_floor(struct shape *shape)
 {
 	static const struct shape_material material = { "floor", 0xb8b4a8, 0, 0.8, 0 };
-	static const double half[3] = { 2.1, 0.05, 1.6 }, turn[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
-		move[3] = { 0.3, -0.05, 0 };
+	static const double half[3] = { 2.1, 0.05, 1.6 }, move[3] = { 0.3, -0.05, 0 };
 	uint32_t first;
 
 	make_toybird(shape);
 	first = shape->n_vertices;
 	shape_material(shape, &material);
 	surface_box(shape, half);
-	shape_move(shape, first, turn, move);
+	shape_shift(shape, first, move);
 }
 
 /* [G] figure 7.4: two directional lights and a spot. */
@@ -125,25 +124,11 @@ static void make_tube_of(struct shape *shape, int two_sided)
 	surface_lathe(shape, piece, 4, SIDES);
 }
 
-static void make_coin(struct shape *shape)
-{
-	make_coin_of(shape, 0);
-}
-
-static void make_coin_both(struct shape *shape)
-{
-	make_coin_of(shape, 1);
-}
-
-static void make_tube(struct shape *shape)
-{
-	make_tube_of(shape, 0);
-}
-
-static void make_tube_both(struct shape *shape)
-{
-	make_tube_of(shape, 1);
-}
+#define BOTH(name) \
+	static void make_##name(struct shape *shape) { make_##name##_of(shape, 0); } \
+	static void make_##name##_both(struct shape *shape) { make_##name##_of(shape, 1); }
+BOTH(coin)
+BOTH(tube)
 
 /* Masks would cull most backs. */
 static void take_culling_away(struct figure_shot *shot)

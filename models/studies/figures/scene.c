@@ -27,8 +27,6 @@ int figure_model_load(struct figure_model *model, struct study *study, const cha
 	rc = study_build(&model->model, NULL, study, &model->source);
 	if (rc == PSR_OK)
 		rc = psr_truth_create(&model->truth, model->source.mesh, study->err);
-	if (rc == PSR_OK && surface_init(&model->surface, model->source.mesh, model->source.scale) != PSR_OK)
-		rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for the textures of %s", name);
 	if (rc != PSR_OK) {
 		figure_model_fini(model);
 		return rc;
@@ -42,7 +40,6 @@ int figure_model_load(struct figure_model *model, struct study *study, const cha
 
 void figure_model_fini(struct figure_model *model)
 {
-	surface_fini(&model->surface);
 	psr_truth_destroy(model->truth);
 	psr_model_unref(model->model);
 	study_model_fini(&model->source);

@@ -3,7 +3,7 @@
 #include "figures.h"
 #include "base/srgb.h"
 #include "base/vec.h"
-#include "measure/view.h"
+#include "measure/truth.h"
 #include "psr/direction.h"
 
 #define RUN 64   /* rays traced together */
@@ -20,6 +20,7 @@ struct place {
 	double point[3], normal[3], to_eye[3]; /* the point in inner coordinates */
 	double diffuse[3], specular[3], exponent;
 	double face[3];                        /* the face's normal, on the side that was met */
+	int is_unlit;
 };
 
 static double linear(uint32_t code, uint32_t most)
@@ -28,30 +29,26 @@ static double linear(uint32_t code, uint32_t most)
 }
 
 static void look_up(struct place *place, const struct figure_model *model, const struct ray *ray,
-                    const struct ray_hit *hit, uint64_t *attr)
+                    const struct ray_hit *hit)
 {
-	const struct surface_place at = { hit->prim, hit->is_back, hit->u, hit->v };
 	const float *face = ray_scene_normal(model->source.scene, hit->prim);
-	float facing[3];
+	const uint64_t attr = truth_attr(model->truth, ray, hit);
+	const float *normal = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
+	const uint32_t diffuse = PSR_ATTR_DIFFUSE(attr), specular = PSR_ATTR_SPECULAR(attr);
 
 	v3d_normalize(place->to_eye, ray->direction);
 	v3d_scale(place->to_eye, place->to_eye, -1);
 	v3d_add_scaled(place->point, ray->origin, hit->t, ray->direction);
 	for (int k = 0; k < 3; k++) {
-		facing[k] = (float)place->to_eye[k];
 		place->face[k] = hit->is_back ? -(double)face[k] : (double)face[k];
-	}
-	*attr = surface_attr(&model->surface, &at, 0, facing);
-	const float *normal = psr_direction_table()[PSR_ATTR_NORMAL(*attr)];
-	const uint32_t diffuse = PSR_ATTR_DIFFUSE(*attr), specular = PSR_ATTR_SPECULAR(*attr);
-	for (int k = 0; k < 3; k++) {
 		place->normal[k] = (double)normal[k];
 		place->diffuse[k] = linear(diffuse >> 8 * k & 255, 255);
 	}
 	place->specular[0] = linear(specular & 31, 31);
 	place->specular[1] = linear(specular >> 5 & 63, 63);
 	place->specular[2] = linear(specular >> 11, 31);
-	place->exponent = exp2(PSR_ATTR_EXPONENT(*attr) / 16.0);
+	place->exponent = exp2(PSR_ATTR_EXPONENT(attr) / 16.0);
+	place->is_unlit = PSR_ATTR_UNLIT(attr) != 0;
 }
 
 /* How much of a light gets to the place but for what stands between; where it comes from, and how far away that
@@ -94,13 +91,13 @@ static int is_shadowed(const struct figure_model *model, const struct place *pla
 	return is_occluded;
 }
 
-static void light_place(const struct job *job, const struct place *place, int is_unlit, double light[3])
+static void light_place(const struct job *job, const struct place *place, double light[3])
 {
 	const struct psr_scene *scene = job->scene;
 
 	for (int c = 0; c < 3; c++)
-		light[c] = place->diffuse[c] * (is_unlit ? 1 : scene->ambient[c]);
-	for (uint32_t l = 0; l < scene->n_lights && !is_unlit; l++) {
+		light[c] = place->diffuse[c] * (place->is_unlit ? 1 : scene->ambient[c]);
+	for (uint32_t l = 0; l < scene->n_lights && !place->is_unlit; l++) {
 		double to_light[3], distance;
 		const double amount = light_amount(&scene->light[l], job->model, place, to_light, &distance);
 		const double facing = v3d_dot(place->normal, to_light);
@@ -119,13 +116,6 @@ static void light_place(const struct job *job, const struct place *place, int is
 		light[c] = fmin(light[c], 1);
 }
 
-static void aim(const struct job *job, double x, double y, struct ray *ray)
-{
-	view_ray(&job->view, x, y, ray->origin, ray->direction);
-	for (int k = 0; k < 3; k++)
-		ray->origin[k] = (ray->origin[k] - job->model->source.origin[k]) / job->model->source.scale;
-}
-
 static void draw_pixel(const struct job *job, uint32_t x, uint32_t y)
 {
 	const uint32_t rays = job->truth->rays, all = rays * rays;
@@ -139,17 +129,16 @@ static void draw_pixel(const struct job *job, uint32_t x, uint32_t y)
 		struct ray_hit hit[RUN];
 
 		for (uint32_t i = 0; i < n; i++)
-			aim(job, x + ((first + i) % rays + 0.5) / rays, y + ((first + i) / rays + 0.5) / rays, &ray[i]);
-		ray_scene_trace(job->model->source.scene, ray, (int)n,
-		                job->scene->camera.near_z / job->model->source.scale, hit);
+			truth_ray(job->model->truth, &job->view, x + ((first + i) % rays + 0.5) / rays,
+			          y + ((first + i) / rays + 0.5) / rays, &ray[i]);
+		truth_trace(job->model->truth, ray, (int)n, job->scene->camera.near_z, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			double light[3] = { job->scene->background[0], job->scene->background[1], job->scene->background[2] };
 			struct place place;
-			uint64_t attr;
 
 			if (hit[i].prim != RAY_NONE) {
-				look_up(&place, job->model, &ray[i], &hit[i], &attr);
-				light_place(job, &place, PSR_ATTR_UNLIT(attr) != 0, light);
+				look_up(&place, job->model, &ray[i], &hit[i]);
+				light_place(job, &place, light);
 				n_met++;
 			}
 			v3d_add(sum, sum, light);

@@ -24,6 +24,8 @@ void greedy_forget(struct greedy_view *view); /* its samples and blocks */
 
 /* Distance of the lattice's rows, as a part of its spacing. */
 double greedy_row_pitch(enum greedy_lattice lattice);
+/* By how much of the spacing a row stands to the right. */
+double greedy_shift(enum greedy_lattice lattice, int row);
 
 /* ---- blocks.c ---- */
 

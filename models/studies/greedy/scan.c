@@ -30,6 +30,11 @@ double greedy_row_pitch(enum greedy_lattice lattice)
 	return lattice == GREEDY_EQUILATERAL ? 0.86602540378443864676 : 1;
 }
 
+double greedy_shift(enum greedy_lattice lattice, int row)
+{
+	return lattice == GREEDY_EQUILATERAL ? (row & 1) / 2.0 : 0;
+}
+
 static int is_left_out(int i, int stride)
 {
 	return stride > 1 && ((i + STRIDE_SIDE * 4096) / STRIDE_SIDE) % stride != 0;
@@ -55,16 +60,15 @@ static void take_hit(const struct job *job, struct greedy_sample *sample, const 
 static void trace_run(struct row *row, const struct job *job, const int *col, int n, int lattice_row)
 {
 	const struct psr_projection *p = job->projection;
-	double spacing = (double)p->spacing, x[RUN];
-	double y = lattice_row * greedy_row_pitch(job->greedy->options.lattice) * spacing;
-	double shift = job->greedy->options.lattice == GREEDY_EQUILATERAL ? (lattice_row & 1) / 2.0 : 0;
+	const enum greedy_lattice lattice = job->greedy->options.lattice;
+	double spacing = (double)p->spacing, x[RUN], y = lattice_row * greedy_row_pitch(lattice) * spacing;
 	struct ray ray[RUN];
 	struct ray_hit hit[RUN];
 
 	if (n <= 0)
 		return;
 	for (int i = 0; i < n; i++) {
-		x[i] = (col[i] + shift) * spacing;
+		x[i] = (col[i] + greedy_shift(lattice, lattice_row)) * spacing;
 		for (int k = 0; k < 3; k++) {
 			ray[i].origin[k] = x[i] * (double)p->axis[0][k] + y * (double)p->axis[1][k] + START * (double)p->axis[2][k];
 			ray[i].direction[k] = -(double)p->axis[2][k];
@@ -86,10 +90,10 @@ static void trace_run(struct row *row, const struct job *job, const int *col, in
 static void trace_row(int i, void *userdata)
 {
 	struct job *job = userdata;
+	const enum greedy_lattice lattice = job->greedy->options.lattice;
 	struct row *row = &job->row[i];
-	double spacing = (double)job->projection->spacing;
-	double y = (i - job->reach) * greedy_row_pitch(job->greedy->options.lattice) * spacing, half;
 	int lattice_row = i - job->reach, col[RUN], n = 0, most;
+	double spacing = (double)job->projection->spacing, y = lattice_row * greedy_row_pitch(lattice) * spacing, half;
 
 	if (y * y >= 1 || is_left_out(lattice_row, job->stride))
 		return;
@@ -101,7 +105,7 @@ static void trace_row(int i, void *userdata)
 		return;
 	}
 	for (int c = -most; c <= most; c++) {
-		double x = c + (job->greedy->options.lattice == GREEDY_EQUILATERAL ? (lattice_row & 1) / 2.0 : 0);
+		double x = c + greedy_shift(lattice, lattice_row);
 
 		if (x * x > half * half || is_left_out(c, job->stride))
 			continue;
@@ -134,6 +138,12 @@ static int join_rows(struct greedy_view *view, const struct job *job)
 	return PSR_OK;
 }
 
+static void mark_sides(const struct greedy *greedy, struct greedy_view *view)
+{
+	for (uint32_t i = 0; i < view->n_samples; i++)
+		view->sample[i].two_sided = greedy->is_two_sided[view->sample[i].surface & ~GREEDY_BACK];
+}
+
 int greedy_trace(struct greedy *greedy, int view, int stride)
 {
 	struct surface surface;
@@ -153,11 +163,8 @@ int greedy_trace(struct greedy *greedy, int view, int stride)
 		psr_free(job.row[i].sample);
 	free(job.row);
 	surface_fini(&surface);
-	for (uint32_t i = 0; rc == PSR_OK && greedy->is_two_sided != NULL && i < greedy->view[view].n_samples; i++) {
-		struct greedy_sample *sample = &greedy->view[view].sample[i];
-
-		sample->two_sided = greedy->is_two_sided[sample->surface & ~GREEDY_BACK];
-	}
+	if (rc == PSR_OK && greedy->is_two_sided != NULL)
+		mark_sides(greedy, &greedy->view[view]);
 	return rc;
 }
 
@@ -189,13 +196,8 @@ static int note_sides(struct greedy *greedy)
 	for (size_t i = 0; i < n; i++)
 		seen[i] = seen[i] == (FRONT | BACK);
 	greedy->is_two_sided = seen;
-	for (int v = 0; v < greedy->n_views; v++) {
-		for (uint32_t i = 0; i < greedy->view[v].n_samples; i++) {
-			struct greedy_sample *sample = &greedy->view[v].sample[i];
-
-			sample->two_sided = seen[sample->surface & ~GREEDY_BACK];
-		}
-	}
+	for (int v = 0; v < greedy->n_views; v++)
+		mark_sides(greedy, &greedy->view[v]);
 	return PSR_OK;
 }
 

@@ -32,17 +32,12 @@ static void take_sample(struct greedy *greedy, const struct taken *taken, unsign
 	struct greedy_view *view = &greedy->view[taken->projection];
 	const struct psr_projection *p = &view->projection;
 	struct greedy_sample *sample = &view->sample[view->n_samples++];
-	double pitch = greedy_row_pitch(GREEDY_EQUILATERAL), x, y;
+	const int col = taken->col + (int)(s % PSR_BLOCK_SIDE), row = taken->row + (int)(s / PSR_BLOCK_SIDE);
+	const double x = (col + greedy_shift(GREEDY_EQUILATERAL, row)) * (double)p->spacing;
+	const double y = row * greedy_row_pitch(GREEDY_EQUILATERAL) * (double)p->spacing;
 
-	memset(sample, 0, sizeof *sample);
-	sample->col = (int16_t)(taken->col + (int)(s % PSR_BLOCK_SIDE));
-	sample->row = (int16_t)(taken->row + (int)(s / PSR_BLOCK_SIDE));
-	sample->z = z;
-	sample->attr = attr;
-	sample->two_sided = taken->two_sided;
-	sample->is_kept = 1;
-	x = (sample->col + (sample->row & 1) / 2.0) * (double)p->spacing;
-	y = sample->row * pitch * (double)p->spacing;
+	*sample = (struct greedy_sample){ .col = (int16_t)col, .row = (int16_t)row, .z = z, .attr = attr,
+		                              .two_sided = taken->two_sided, .is_kept = 1 };
 	for (int k = 0; k < 3; k++)
 		sample->position[k] = (float)(x * (double)p->axis[0][k] + y * (double)p->axis[1][k]
 		                              + (double)sample->z * (double)p->axis[2][k]);

@@ -1,12 +1,9 @@
 #include <errno.h>
 #include <math.h>
-#include <spawn.h>
+#include <signal.h>
 #include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
 #include "study.h"
-
-extern char **environ;
 
 static int terminal_of(const char **terminal, const char *path, struct psr_error *err)
 {
@@ -57,52 +54,26 @@ static void write_program(FILE *to, const struct study *study, const char *termi
 	fprintf(to, "EOD\n%s\n", study->kind->plot);
 }
 
-static int run_gnuplot(FILE *program, struct psr_error *err)
-{
-	char *argv[] = { "gnuplot", NULL };
-	posix_spawn_file_actions_t actions;
-	pid_t child;
-	int rc, status = 0;
-
-	if (posix_spawn_file_actions_init(&actions) != 0)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory to start gnuplot");
-	rc = posix_spawn_file_actions_adddup2(&actions, fileno(program), STDIN_FILENO);
-	if (rc == 0)
-		rc = posix_spawnp(&child, argv[0], &actions, NULL, argv, environ);
-	posix_spawn_file_actions_destroy(&actions);
-	if (rc == ENOENT)
-		return psr_fail(err, PSR_ERR_NOT_FOUND,
-		                "gnuplot, which draws plots, is not installed; install the package gnuplot-nox");
-	if (rc != 0)
-		return psr_fail(err, PSR_ERR_IO, "gnuplot cannot be started: %s", strerror(rc));
-	while (waitpid(child, &status, 0) < 0)
-		if (errno != EINTR)
-			return psr_fail(err, PSR_ERR_IO, "gnuplot was lost: %s", strerror(errno));
-	if (!WIFEXITED(status) || WEXITSTATUS(status) == 127)
-		return psr_fail(err, PSR_ERR_IO, "gnuplot, of the package gnuplot-nox, cannot be run");
-	if (WEXITSTATUS(status) != 0)
-		return psr_fail(err, PSR_ERR_IO, "gnuplot failed; its message stands above");
-	return PSR_OK;
-}
-
 int study_plot(const struct study *study, const char *path, struct psr_error *err)
 {
 	const char *terminal = NULL;
-	FILE *program;
-	int rc = terminal_of(&terminal, path, err);
+	FILE *gnuplot;
+	int status, rc = terminal_of(&terminal, path, err);
 
 	if (rc != PSR_OK)
 		return rc;
 	if (study->kind->plot == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--plot: '%s' is a table without a plot", study->kind->name);
-	program = tmpfile();
-	if (program == NULL)
-		return psr_fail(err, PSR_ERR_IO, "cannot make a temporary file for gnuplot's program: %s", strerror(errno));
-	write_program(program, study, terminal, path);
-	if (fflush(program) != 0 || lseek(fileno(program), 0, SEEK_SET) != 0)
-		rc = psr_fail(err, PSR_ERR_IO, "gnuplot's program cannot be written: %s", strerror(errno));
-	else
-		rc = run_gnuplot(program, err);
-	fclose(program);
-	return rc;
+	signal(SIGPIPE, SIG_IGN); /* where there is no gnuplot */
+	gnuplot = popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot", "w");
+	if (gnuplot == NULL)
+		return psr_fail(err, PSR_ERR_IO, "gnuplot cannot be started: %s", strerror(errno));
+	write_program(gnuplot, study, terminal, path);
+	status = pclose(gnuplot);
+	if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
+		return psr_fail(err, PSR_ERR_NOT_FOUND,
+		                "gnuplot, which draws plots, is not installed; install the package gnuplot-nox");
+	if (status != 0)
+		return psr_fail(err, PSR_ERR_IO, "gnuplot failed; its message stands above");
+	return PSR_OK;
 }

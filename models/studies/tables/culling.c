@@ -3,7 +3,7 @@
 #include "tables.h"
 
 #define N_VIEWS 24
-#define MOST_CHOICES 10
+#define N_MASKS 10
 
 enum { CULLED, SAMPLES, HIDDEN, WRONG, TEST, FRAME, SPEEDUP, GAIN, N_COLUMNS };
 
@@ -53,7 +53,7 @@ static int run_choices(struct study *study, const struct cull_choice *choice, in
 	study->total = study->n_models;
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 		struct cull_set *set = NULL;
-		struct cull_figures figures[MOST_CHOICES];
+		struct cull_figures figures[CULL_MOST_CHOICES];
 		struct cull_truth truth;
 
 		rc = culling_set(&set, study, &study->model[m], finest);
@@ -69,23 +69,23 @@ static int run_choices(struct study *study, const struct cull_choice *choice, in
 
 int table_masks(struct study *study)
 {
-	static const char *const label[MOST_CHOICES] = {
+	static const char *const label[N_MASKS] = {
 		"neither", "8 bits", "32 bits", "128 bits", "512 bits",
 		"cones", "cones, 8 bits", "cones, 32 bits", "cones, 128 bits", "cones, 512 bits",
 	};
-	struct cull_choice choice[MOST_CHOICES];
-	int rc = study_table_init(&study->table, "tests", columns, GAIN, MOST_CHOICES, study->n_models, study->err);
+	struct cull_choice choice[N_MASKS];
+	int rc = study_table_init(&study->table, "tests", columns, GAIN, N_MASKS, study->n_models, study->err);
 
-	for (int i = 0; rc == PSR_OK && i < MOST_CHOICES; i++) {
+	for (int i = 0; rc == PSR_OK && i < N_MASKS; i++) {
 		choice[i] = (struct cull_choice){ .cones = i >= 5, .level = i % 5 + CULL_NO_MASK, .n = CULL_THESIS_N };
 		study_label(&study->table, i, "%s", label[i]);
 	}
-	return rc == PSR_OK ? run_choices(study, choice, MOST_CHOICES, CULL_FINEST) : rc;
+	return rc == PSR_OK ? run_choices(study, choice, N_MASKS, CULL_FINEST) : rc;
 }
 
 int table_subdivision(struct study *study)
 {
-	struct cull_choice choice[MOST_CHOICES];
+	struct cull_choice choice[SCREEN_MOST + 1];
 	const int n = SCREEN_MOST + 1;
 	int rc = study_table_init(&study->table, "screen", columns, N_COLUMNS, n, study->n_models, study->err);
 
