@@ -8,7 +8,7 @@ int json_print(cJSON *json, struct psr_error *err)
 
 	cJSON_Delete(json);
 	if (text == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the answer was written as JSON");
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory to print JSON");
 	puts(text);
 	cJSON_free(text);
 	return PSR_OK;

@@ -33,7 +33,7 @@ void shape_fini(struct shape *shape)
 int shape_check(const struct shape *shape, struct psr_error *err)
 {
 	if (shape->failed)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the mesh was made");
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the mesh");
 	return PSR_OK;
 }
 

@@ -1,5 +1,5 @@
-/* The studies of [G] 6.5 and table 8.3: what frustum, visibility cones and visibility masks cull, what that saves, and
- * what rays find to be visible. Only level 0 of a model takes part; everything is in its inner coordinates. */
+/* The studies of [G] 6.5 and table 8.3: frustum, visibility cones and visibility masks cull blocks; this counts and
+ * times them, and finds the visible samples by rays. Only level 0 of a model takes part, in its inner coordinates. */
 #ifndef MODELS_STUDIES_CULL_CULL_H
 #define MODELS_STUDIES_CULL_CULL_H
 
@@ -54,9 +54,9 @@ int cull_set_create(struct cull_set **out, const struct psr_model *model, int fi
                     struct psr_error *err);
 void cull_set_destroy(struct cull_set *set); /* NULL is fine */
 
-/* is_kept[b] = 1 for blocks that stay: their spheres are not wholly outside of one side of the frustum ([G] 6.1), the
- * cone does not turn them away (6.4, cone_culls), and their mask has a bit in common with that of the smallest node of
- * the screen's tree that holds their sphere (6.3). Uses buffers of the set: one thread at a time. */
+/* Sets is_kept[b] to 1 for a block whose sphere reaches into each side of the frustum ([G] 6.1), whose cone does not
+ * turn it away (6.4, cone_culls), and whose mask has a bit in common with the mask of the smallest node of the screen's
+ * tree that holds its sphere (6.3); to 0 for the others. Uses buffers of the set: one thread at a time. */
 void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struct cull_choice *choice,
                    uint8_t *is_kept);
 
@@ -69,15 +69,15 @@ void cull_set_look(const struct cull_set *set, const struct ray_scene *scene, co
 struct cull_views {
 	int n;
 	double zoom;
-	int is_timed; /* frames are drawn and tests are timed, which wants zoom 1 */
+	int is_timed; /* draws frames and times tests; needs zoom 1 */
 };
 
 /* Over all views; shares are of all blocks (samples) of level 0. */
 struct cull_figures {
-	double blocks, samples;  /* share that is culled */
-	double wrong;            /* share of blocks that are culled though rays find them */
+	double blocks, samples;  /* culled share */
+	double wrong;            /* share of blocks that tests cull though rays find a sample */
 	double test_seconds;     /* a view: of testing all blocks, screen's masks included, frustum included */
-	double frame_seconds;    /* a view: drawing what is kept, and what the tests take longer than the frustum alone */
+	double frame_seconds;    /* a view: drawing the kept blocks, and testing beyond the frustum */
 };
 struct cull_truth {
 	double blocks, samples; /* share that no ray finds */
@@ -85,9 +85,9 @@ struct cull_truth {
 
 #define CULL_MOST_CHOICES 16
 
-/* figures[i] for choice[i], n_choices <= CULL_MOST_CHOICES; truth and wrong if scene is given, else 0. Shares are the same whatever the number of
- * threads. Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from
- * models that have just the blocks that are kept. MEMORY. */
+/* figures[i] for choice[i], n_choices <= CULL_MOST_CHOICES; truth and wrong are 0 without a scene. Threads change no
+ * share. Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from
+ * models of the kept blocks alone. MEMORY. */
 int cull_measure(struct cull_set *set, const struct ray_scene *scene, const struct cull_views *views,
                  const struct cull_choice *choice, int n_choices, struct psr_pool *pool, struct cull_figures *figures,
                  struct cull_truth *truth, struct psr_error *err);

@@ -23,8 +23,8 @@ static int is_away(const struct psr_blocks *blocks, uint32_t block, uint32_t sam
 	       && (psr_blocks_traits(blocks, block) & PSR_BLOCK_BENT) == 0 && faces_away(v3f_dot(normal, v), v);
 }
 
-/* A ray of unit direction from the eye, so that it meets fronts as the eye does, and how far away the sample is; 0 if
- * that is not in the picture or faces away. */
+/* Aims a ray of unit direction from the eye, which meets fronts as the eye does, and finds the sample's distance.
+ * Returns 0 for a sample outside of the picture or facing away. */
 static int aim(struct ray *ray, double *distance, const struct job *job, uint32_t block, uint32_t sample)
 {
 	const struct cull_eye *eye = job->eye;

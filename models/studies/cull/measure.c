@@ -57,7 +57,7 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	return rc;
 }
 
-/* Choices take turns, so that what else the machine does meets them all. */
+/* Choices take turns, so that other work on the machine slows all of them. */
 static int time_view(struct measure *m, const struct cull_eye *eye)
 {
 	static const struct cull_choice frustum = { 0, CULL_NO_MASK, 0 };
@@ -86,7 +86,7 @@ static int time_view(struct measure *m, const struct cull_eye *eye)
 	return rc;
 }
 
-/* Adds up what a view shows: numbers of blocks and samples for now. */
+/* Adds up numbers of blocks and samples; finish() makes shares of them. */
 static void count_view(const struct measure *m, struct cull_figures *figures, struct cull_truth *truth)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(m->set->base);

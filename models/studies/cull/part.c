@@ -15,15 +15,16 @@ struct part {
 	void *memory;
 };
 
-static void *take(char **at, size_t n, size_t size)
+static void *take(uintptr_t *at, size_t n, size_t size)
 {
-	void *array = *at;
+	void *array = (void *)*at;
 
 	*at += (n * size + PSR_ALIGNMENT - 1) / PSR_ALIGNMENT * PSR_ALIGNMENT;
 	return array;
 }
 
-static void place_arrays(struct part *part, char *at, const struct psr_blocks *all)
+/* Returns where the last one ends. */
+static uintptr_t place_arrays(struct part *part, uintptr_t at, const struct psr_blocks *all)
 {
 	size_t n = all->n_blocks;
 
@@ -38,20 +39,15 @@ static void place_arrays(struct part *part, char *at, const struct psr_blocks *a
 	part->attr_offset = take(&at, n, sizeof *part->attr_offset);
 	part->attr = take(&at, all->n_samples, sizeof *part->attr);
 	part->depth = take(&at, all->n_samples, sizeof *part->depth);
+	return at;
 }
 
 static int part_init(struct part *part, const struct psr_blocks *all)
 {
-	const size_t a_block = 5 * sizeof(uint16_t) + 2 + sizeof(uint64_t), a_sample = sizeof(uint64_t) + sizeof(uint16_t),
-	             n_arrays = 12;
-	size_t size = all->n_clusters * sizeof(struct psr_cluster) + psr_blocks_runs(all) * sizeof(struct psr_run) +
-	              all->n_blocks * a_block + all->n_samples * a_sample;
-
-	memset(part, 0, sizeof *part);
-	part->memory = psr_alloc_array(size + n_arrays * PSR_ALIGNMENT, 1);
+	part->memory = psr_alloc_array(place_arrays(part, 0, all), 1);
 	if (part->memory == NULL)
 		return PSR_ERR_MEMORY;
-	place_arrays(part, part->memory, all);
+	place_arrays(part, (uintptr_t)part->memory, all);
 	part->blocks = (struct psr_blocks){ .n_projections = all->n_projections, .n_levels = 1,
 		.projection = all->projection, .cluster = part->cluster, .run = part->run, .sphere_x = part->center[0],
 		.sphere_y = part->center[1], .sphere_z = part->center[2], .sphere_r = part->radius,
@@ -122,7 +118,7 @@ int cull_part(struct psr_model **out, const struct psr_model *model, const uint8
 	info.spacing /= info.scale;
 	info.scale = 1;
 	rc = part.blocks.n_blocks != 0 ? psr_model_create(out, &info, &part.blocks, NULL, err)
-	                               : psr_fail(err, PSR_ERR_ARG, "a part of a model without any block");
+	                               : psr_fail(err, PSR_ERR_ARG, "a part of a model needs a block; none is kept");
 	psr_free(part.memory);
 	return rc;
 }

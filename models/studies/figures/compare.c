@@ -9,7 +9,7 @@ struct compared {
 	uint64_t gain;
 };
 
-/* Shows the view in place of the one before, if it is to be. */
+/* Shows the first view, or the one that gains most, in place of the one before. */
 static int show(struct study *study, struct figure_sheet *sheet, struct compared *c, const struct figure_look *look,
                 struct figure_part part, int view)
 {

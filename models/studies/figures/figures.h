@@ -15,8 +15,8 @@ struct figure_model {
 	double center[3], spacing; /* of the box; world units */
 };
 
-/* The generator of this name, or, unless NULL, a shape that `make` makes, which is kept under the name. Zeroed, and
- * nothing to free, if it fails. */
+/* Loads the generator of this name, or, unless NULL, the shape that `make` makes; both are kept under the name. On
+ * failure *model is zeroed, with nothing to free. */
 int figure_model_load(struct figure_model *model, struct study *study, const char *name,
                       void (*make)(struct shape *), uint32_t resolution);
 void figure_model_fini(struct figure_model *model); /* a zeroed one is fine */
@@ -35,7 +35,7 @@ void figure_shot_init(struct figure_shot *shot, const struct figure_model *model
                       double magnification, uint32_t side);
 void figure_shot_copy(struct figure_shot *to, const struct figure_shot *from);
 
-/* Six directions that have little in common. */
+/* Six directions, far apart. */
 #define FIGURE_VIEWS 6
 extern const double figure_view[FIGURE_VIEWS][3];
 
@@ -43,7 +43,7 @@ struct figure_frame {
 	uint32_t side;
 	uint8_t *rgb;
 	float *depth;
-	uint8_t *weight; /* NULL unless the caller has set it, who frees it */
+	uint8_t *weight; /* NULL; or the caller's own, to be filled */
 	struct psr_report report;
 };
 int figure_frame_init(struct figure_frame *frame, uint32_t side, struct psr_error *err);
@@ -123,7 +123,7 @@ struct figure_way {
 	const char *label;
 	void (*change)(struct figure_shot *shot); /* before it is drawn; or NULL */
 	figure_draw_fn *draw;                     /* NULL: figure_draw */
-	const struct figure_model *model;         /* what is drawn, if that is not what the truth is of; or NULL */
+	const struct figure_model *model;         /* to draw in place of the model of the truth; or NULL */
 };
 
 #define FIGURE_MOST_WAYS 5
@@ -136,10 +136,10 @@ struct figure_look {
 	const double (*view)[3]; /* the first one is shown, unless a part is to be found */
 	int n_views;
 	void (*prepare)(struct figure_shot *shot, const struct figure_model *model); /* changes the shot; or NULL */
-	int has_no_truth;        /* which is not shown, then */
+	int has_no_truth;        /* 1: the sheet leaves the truth out */
 };
 
-/* Prints the score of each way, over all views, and adds what they show to the sheet, the truth as the last one. */
+/* Prints the score of each way over all views, and adds their pictures to the sheet, then the truth. */
 int figure_compare(struct study *study, struct figure_sheet *sheet, const struct figure_model *model,
                    const struct figure_look *look, const struct figure_part *part, const struct figure_way *way);
 

@@ -1,5 +1,4 @@
 #include <stdlib.h>
-#include <string.h>
 #include "base/mem.h"
 #include "sample/levels/draft.h"
 #include "parts.h"
@@ -11,11 +10,6 @@ struct taken {
 	uint8_t two_sided;
 	uint64_t mask;
 };
-
-static int is_first_level(const struct psr_blocks *blocks, uint32_t b)
-{
-	return psr_blocks_level(blocks, b) == 0;
-}
 
 static void take_block(struct greedy *greedy, const struct taken *taken)
 {
@@ -43,63 +37,64 @@ static void take_sample(struct greedy *greedy, const struct taken *taken, unsign
 		                              + (double)sample->z * (double)p->axis[2][k]);
 }
 
-/* n_blocks and n_samples: of each projection. MEMORY. */
-static int create(struct greedy **out, const struct psr_projection *projection, unsigned n, const uint32_t *n_blocks,
-                  const uint32_t *n_samples, uint32_t resolution)
+/* Blocks and samples of each projection. */
+struct counts {
+	uint32_t n_blocks[GREEDY_MOST_VIEWS], n_samples[GREEDY_MOST_VIEWS];
+};
+
+static void count_block(struct counts *counts, unsigned projection, uint64_t mask)
+{
+	counts->n_blocks[projection]++;
+	counts->n_samples[projection] += (uint32_t)__builtin_popcountll(mask);
+}
+
+/* Without blocks, but with memory for them. MEMORY. */
+static int create(struct greedy **out, const struct psr_projection *projection, unsigned n, const struct counts *counts,
+                  uint32_t resolution, struct psr_error *err)
 {
 	struct greedy *greedy = calloc(1, sizeof *greedy);
+	int failed = greedy == NULL;
 
-	if (greedy == NULL)
-		return PSR_ERR_MEMORY;
-	greedy->options.resolution = resolution;
-	greedy->ds = 2.0 / resolution;
-	greedy->side = PSR_BLOCK_SIDE;
-	greedy->n_views = (int)n;
-	for (unsigned v = 0; v < n; v++) {
+	for (unsigned v = 0; !failed && v < n; v++) {
 		struct greedy_view *view = &greedy->view[v];
 
 		view->projection = projection[v];
-		view->sample = psr_alloc_array(n_samples[v], sizeof *view->sample);
-		view->block = psr_alloc_array(n_blocks[v], sizeof *view->block);
-		if (view->sample == NULL || view->block == NULL) {
-			greedy_destroy(greedy);
-			return PSR_ERR_MEMORY;
-		}
+		view->sample = psr_alloc_array(counts->n_samples[v], sizeof *view->sample);
+		view->block = psr_alloc_array(counts->n_blocks[v], sizeof *view->block);
+		greedy->n_views = (int)v + 1;
+		failed = view->sample == NULL || view->block == NULL;
 	}
+	if (failed) {
+		greedy_destroy(greedy);
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a sampling of %u projections", n);
+	}
+	greedy->options.resolution = resolution;
+	greedy->ds = 2.0 / resolution;
+	greedy->side = PSR_BLOCK_SIDE;
 	*out = greedy;
 	return PSR_OK;
-}
-
-static void finish(const struct greedy *greedy, struct greedy_result *result)
-{
-	memset(result, 0, sizeof *result);
-	greedy_count(greedy, result);
 }
 
 int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err)
 {
-	uint32_t n_blocks[GREEDY_MOST_VIEWS] = { 0 }, n_samples[GREEDY_MOST_VIEWS] = { 0 };
+	struct counts counts = { { 0 }, { 0 } };
 	int rc;
 
+	*result = (struct greedy_result){ .n_blocks = 0 };
 	if (blocks->n_projections > GREEDY_MOST_VIEWS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a model of %u projections is over the limit of %d", blocks->n_projections,
 		                GREEDY_MOST_VIEWS);
-	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
-		if (!is_first_level(blocks, b))
-			continue;
-		n_blocks[blocks->block_projection[b]]++;
-		n_samples[blocks->block_projection[b]] += (uint32_t)__builtin_popcountll(blocks->mask[b]);
-	}
-	rc = create(out, blocks->projection, blocks->n_projections, n_blocks, n_samples, resolution);
-	if (rc != PSR_OK)
-		return psr_fail(err, rc, "no memory for a sampling of %u blocks", blocks->n_blocks);
-	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
+	for (uint32_t b = 0; b < blocks->n_blocks; b++)
+		if (psr_blocks_level(blocks, b) == 0)
+			count_block(&counts, blocks->block_projection[b], blocks->mask[b]);
+	rc = create(out, blocks->projection, blocks->n_projections, &counts, resolution, err);
+	for (uint32_t b = 0; rc == PSR_OK && b < blocks->n_blocks; b++) {
 		uint64_t at = psr_blocks_attr_first(blocks, b);
 		struct psr_place place;
 		struct taken taken;
 
-		if (!is_first_level(blocks, b))
+		if (psr_blocks_level(blocks, b) != 0)
 			continue;
 		psr_blocks_place(blocks, b, &place);
 		taken = (struct taken){ blocks->block_projection[b], (int16_t)place.col, (int16_t)place.row,
@@ -109,24 +104,22 @@ int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint
 			take_sample(*out, &taken, (unsigned)__builtin_ctzll(left), psr_place_depth(&place, blocks->depth[at]),
 			            blocks->attr[at]);
 	}
-	finish(*out, result);
-	return PSR_OK;
+	if (rc == PSR_OK)
+		greedy_count(*out, result);
+	return rc;
 }
 
 int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n_projections, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err)
 {
-	uint32_t n_blocks[GREEDY_MOST_VIEWS] = { 0 }, n_samples[GREEDY_MOST_VIEWS] = { 0 };
+	struct counts counts = { { 0 }, { 0 } };
 	int rc;
 
-	for (uint32_t b = 0; b < draft->n_blocks; b++) {
-		n_blocks[draft->block[b].projection]++;
-		n_samples[draft->block[b].projection] += (uint32_t)__builtin_popcountll(draft->block[b].mask);
-	}
-	rc = create(out, draft->projection, n_projections, n_blocks, n_samples, resolution);
-	if (rc != PSR_OK)
-		return psr_fail(err, rc, "no memory for a sampling of %u blocks", draft->n_blocks);
-	for (uint32_t b = 0; b < draft->n_blocks; b++) {
+	*result = (struct greedy_result){ .n_blocks = 0 };
+	for (uint32_t b = 0; b < draft->n_blocks; b++)
+		count_block(&counts, draft->block[b].projection, draft->block[b].mask);
+	rc = create(out, draft->projection, n_projections, &counts, resolution, err);
+	for (uint32_t b = 0; rc == PSR_OK && b < draft->n_blocks; b++) {
 		const struct draft_block *block = &draft->block[b];
 		const struct taken taken = { block->projection, block->col, block->row, block->two_sided, block->mask };
 
@@ -138,6 +131,7 @@ int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n
 			take_sample(*out, &taken, s, sample->z, sample->attr);
 		}
 	}
-	finish(*out, result);
-	return PSR_OK;
+	if (rc == PSR_OK)
+		greedy_count(*out, result);
+	return rc;
 }

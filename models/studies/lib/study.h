@@ -1,4 +1,4 @@
-/* What tables (../tables) and figures (../figures) of the thesis's studies ([G] 4 to 9) share. */
+/* Shared by the tables (../tables) and figures (../figures) of the thesis's studies ([G] 4 to 9). */
 #ifndef MODELS_STUDIES_LIB_STUDY_H
 #define MODELS_STUDIES_LIB_STUDY_H
 

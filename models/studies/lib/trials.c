@@ -5,7 +5,6 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
-#include "base/vec.h"
 #include "psr/direction.h"
 #include "base/random.h"
 #include "surface/area.h"
@@ -19,7 +18,8 @@
 #define FARTHEST 4.0f   /* pixels before a place within which its surface may stand, at grazing angles */
 
 struct trial {
-	float x, y, z, cosine; /* in the frame of the view */
+	struct trials_seen seen;
+	float cosine;
 };
 
 struct trial_view {
@@ -88,9 +88,7 @@ static void try_places(struct trials *trials, struct trial_view *view, const dou
 		if (next_real(trials) > (double)cosine || hit[i].prim == RAY_NONE
 		    || (hit[i].prim != prim[i] && fabs(hit[i].t - AWAY) > 1e-6))
 			continue;
-		trial->x = v3f_dot(view->axis[0], p);
-		trial->y = v3f_dot(view->axis[1], p);
-		trial->z = v3f_dot(view->axis[2], p);
+		trial->seen = trials_project(view->axis, p);
 		trial->cosine = cosine;
 		view->n++;
 	}
@@ -180,10 +178,6 @@ float trials_depth_tolerance(float cosine, double ds)
 	return (float)ds * (1 + 1.5f * sqrtf(1 - c * c) / c);
 }
 
-struct spot {
-	float x, y, z;
-};
-
 struct run {
 	const struct trials *trials;
 	const struct trials_sample *sample;
@@ -196,7 +190,7 @@ struct run {
 /* What a view sees of the points, sorted into cells of a pixel's size. */
 struct field {
 	uint32_t side, *first; /* side * side + 1 */
-	struct spot *spot;
+	struct trials_seen *spot;
 };
 
 static uint32_t cell_of(float x, double ds, uint32_t side)
@@ -215,15 +209,14 @@ static void field_make(struct field *field, const struct run *run, const struct 
 	for (int pass = 0; pass < 2; pass++) {
 		for (size_t i = 0; i < run->n_samples; i++) {
 			const struct trials_sample *sample = &run->sample[i];
-			struct spot spot;
+			struct trials_seen spot;
 			size_t cell;
 
 			if (pass == 0)
 				counts[i] = sample->two_sided || v3f_dot(view->axis[2], normal[sample->normal]) > -BACK;
 			if (!counts[i])
 				continue;
-			spot = (struct spot){ v3f_dot(view->axis[0], sample->position), v3f_dot(view->axis[1], sample->position),
-				                  v3f_dot(view->axis[2], sample->position) };
+			spot = trials_project(view->axis, sample->position);
 			cell = (size_t)cell_of(spot.y, run->ds, field->side) * field->side + cell_of(spot.x, run->ds, field->side);
 			if (pass == 0)
 				field->first[cell]++;
@@ -238,17 +231,18 @@ static void field_make(struct field *field, const struct run *run, const struct 
 static int is_hit(const struct field *field, const struct trial *trial, double ds)
 {
 	float reach = fminf(0.75f / fmaxf(trial->cosine, 0.1f), FARTHEST);
-	float half = (float)(ds / 2), least = trial->z - trials_depth_tolerance(trial->cosine, ds);
-	float most = trial->z + reach * (float)ds;
-	uint32_t u = cell_of(trial->x, ds, field->side), v = cell_of(trial->y, ds, field->side);
+	const struct trials_seen *seen = &trial->seen;
+	float half = (float)(ds / 2), least = seen->z - trials_depth_tolerance(trial->cosine, ds);
+	float most = seen->z + reach * (float)ds;
+	uint32_t u = cell_of(seen->x, ds, field->side), v = cell_of(seen->y, ds, field->side);
 
 	for (uint32_t row = v - 1; row <= v + 1; row++) {
 		uint32_t from = field->first[row * field->side + u - 1], to = field->first[row * field->side + u + 2];
 
 		for (uint32_t i = from; i < to; i++) {
-			const struct spot *spot = &field->spot[i];
+			const struct trials_seen *spot = &field->spot[i];
 
-			if (fabsf(spot->x - trial->x) <= half && fabsf(spot->y - trial->y) <= half && spot->z >= least
+			if (fabsf(spot->x - seen->x) <= half && fabsf(spot->y - seen->y) <= half && spot->z >= least
 			    && spot->z <= most)
 				return 1;
 		}

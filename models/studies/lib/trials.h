@@ -1,8 +1,8 @@
-/* Adequacy ([G] 4.2) of any set of samples: what `psr-model info` prints of a model, for selections that no model can
- * hold. */
+/* Adequacy ([G] 4.2) of any set of samples. `psr-model info` prints it of a model; selections here are no models. */
 #ifndef MODELS_STUDIES_LIB_TRIALS_H
 #define MODELS_STUDIES_LIB_TRIALS_H
 
+#include "base/vec.h"
 #include "psr/error.h"
 #include "psr/mesh.h"
 #include "psr/pool.h"
@@ -14,6 +14,16 @@ struct trials_sample {
 	uint16_t normal; /* psr/direction.h */
 	uint8_t two_sided;
 };
+
+/* A place in the frame of a view: z grows towards the viewer. */
+struct trials_seen {
+	float x, y, z;
+};
+
+static inline struct trials_seen trials_project(const float axis[3][3], const float p[3])
+{
+	return (struct trials_seen){ v3f_dot(axis[0], p), v3f_dot(axis[1], p), v3f_dot(axis[2], p) };
+}
 
 /* Random places of a mesh's surface that are seen from random directions, weighted by projected area; the same for
  * the same mesh. Around each a pixel of a randomly turned grid (sample/mend/adequacy.h). */

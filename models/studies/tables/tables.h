@@ -1,4 +1,4 @@
-/* The tables of the studies, and what several of them share. */
+/* The tables, and what several of them use. */
 #ifndef MODELS_STUDIES_TABLES_TABLES_H
 #define MODELS_STUDIES_TABLES_TABLES_H
 

@@ -122,7 +122,7 @@ static void samples_stand_on_the_lattice_and_on_the_surface(void **state)
 			assert_true(view->n_samples > 100);
 			for (uint32_t i = 0; i < view->n_samples; i++) {
 				const struct greedy_sample *s = &view->sample[i];
-				struct greedy_seen seen = greedy_project(view->projection.axis, s->position);
+				struct trials_seen seen = trials_project(view->projection.axis, s->position);
 				double p[3] = { (double)s->position[0], (double)s->position[1], (double)s->position[2] };
 				double shift = lattice == GREEDY_SQUARE ? 0 : (s->row & 1) / 2.0;
 
@@ -197,7 +197,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 
 				for (uint32_t b = 0; b < from->n_blocks; b++) {
 					for (uint32_t i = from->block[b].first; i < from->block[b].first + from->block[b].n; i++) {
-						struct greedy_seen seen = greedy_project(view->projection.axis, from->sample[i].position);
+						struct trials_seen seen = trials_project(view->projection.axis, from->sample[i].position);
 						uint32_t at = greedy_pixel(&grid, &seen);
 
 						if (from->sample[i].is_kept && &from->block[b] != but
@@ -207,7 +207,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 				}
 			}
 			for (uint32_t i = 0; i < view->n_samples; i++) {
-				struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
+				struct trials_seen seen = trials_project(view->projection.axis, view->sample[i].position);
 
 				n += z[greedy_pixel(&grid, &seen)]
 				     < seen.z - trials_depth_tolerance(view->sample[i].cosine, greedy->ds);
