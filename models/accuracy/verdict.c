@@ -23,18 +23,19 @@ static int compare_floats(const void *a, const void *b)
 
 /* World width of a pixel at the 99th percentile of what is drawn, and how many pixels are; a few wild depths do not
  * count, and the other bounds see them. */
-static double find_pixel(uint64_t *n_drawn, const struct psr_camera *camera, uint32_t width, uint32_t height,
-                         const float *depth)
+static double find_pixel(uint64_t *n_drawn, const struct accuracy_frame *frame)
 {
-	float *drawn = malloc(sizeof *drawn * width * height);
+	const struct psr_camera *camera = frame->camera;
+	const size_t n = (size_t)frame->width * frame->height;
+	float *drawn = malloc(sizeof *drawn * n);
 	double z = 0;
 
 	*n_drawn = 0;
-	for (size_t i = 0; i < (size_t)width * height; i++) {
-		if (!isfinite(depth[i]))
+	for (size_t i = 0; i < n; i++) {
+		if (!isfinite(frame->depth[i]))
 			continue;
 		if (drawn != NULL)
-			drawn[*n_drawn] = depth[i];
+			drawn[*n_drawn] = frame->depth[i];
 		++*n_drawn;
 	}
 	if (drawn != NULL && *n_drawn > 0) {
@@ -42,7 +43,7 @@ static double find_pixel(uint64_t *n_drawn, const struct psr_camera *camera, uin
 		z = (double)drawn[(size_t)(0.99 * (double)(*n_drawn - 1))];
 	}
 	free(drawn);
-	return (camera->kind == PSR_CAMERA_PERSPECTIVE ? 2 * tan(camera->fov_y / 2) * z : camera->ortho_height) / height;
+	return (camera->kind == PSR_CAMERA_PERSPECTIVE ? 2 * tan(camera->fov_y / 2) * z : camera->ortho_height) / frame->height;
 }
 
 static enum accuracy_verdict fail_camera(char text[ACCURACY_TEXT], const struct psr_accuracy *a, uint64_t n_drawn,
@@ -64,12 +65,10 @@ static enum accuracy_verdict fail_camera(char text[ACCURACY_TEXT], const struct 
 }
 
 enum accuracy_verdict accuracy_judge(char text[ACCURACY_TEXT], const struct psr_accuracy *a,
-                                     const struct accuracy_bounds *bounds, const struct psr_camera *camera,
-                                     uint32_t width, uint32_t height, const float *depth, double spacing,
-                                     double spacing_px)
+                                     const struct accuracy_bounds *bounds, const struct accuracy_frame *frame)
 {
 	uint64_t n_drawn;
-	double pixel = find_pixel(&n_drawn, camera, width, height, depth), allowed = fmax(1, spacing_px * pixel / spacing);
+	double allowed = fmax(1, frame->spacing_px * find_pixel(&n_drawn, frame) / frame->spacing);
 	const struct limits limits = {
 		.holes = bounds->has_holes ? bounds->holes : PART,
 		.distance = bounds->has_distance ? bounds->distance : allowed,

@@ -55,14 +55,13 @@ static void wing(struct shape *shape, const struct wing *w, uint32_t along)
 	sweep_surface(shape, wing_at, w, along, 64, 1);
 }
 
-static void rod(struct shape *shape, uint32_t material, double radius, double ax, double ay, double az, double bx,
-                double by, double bz)
+/* ends: x, y, z of both. */
+static void rod_between(struct shape *shape, uint32_t material, double radius, const double ends[6])
 {
-	const double a[3] = { ax, ay, az }, b[3] = { bx, by, bz };
-
 	shape->current = material;
-	surface_rod(shape, a, radius, b, radius, material == WIRES ? 8 : 16);
+	surface_rod(shape, ends, radius, ends + 3, radius, material == WIRES ? 8 : 16);
 }
+#define rod(shape, material, radius, ...) rod_between(shape, material, radius, (const double[6]){ __VA_ARGS__ })
 
 /* Struts in two rows; wires cross each cell in front and behind, and each pair of struts from front to back. */
 static void cell(struct shape *shape)
@@ -116,10 +115,10 @@ static void tail_and_canard(struct shape *shape)
 static void skids(struct shape *shape)
 {
 	for (int side = -1; side <= 1; side += 2) {
-		const double a[3] = { -1.6, 0.03, 0.7 * side }, b[3] = { 2.5, 0.03, 0.7 * side },
-			c[3] = { 3.3, LOW_Y + 0.6, 0.7 * side };
+		const double runner[3][3] = { { -1.6, 0.03, 0.7 * side }, { 2.5, 0.03, 0.7 * side },
+			{ 3.3, LOW_Y + 0.6, 0.7 * side } };
 		shape->current = SPRUCE;
-		sweep_bend(shape, a, b, c, 0.03, 48, 16);
+		sweep_bend(shape, runner, 0.03, 48, 16);
 		rod(shape, SPRUCE, 0.018, -0.55, 0.04, 0.7 * side, -0.55, LOW_Y, 0.7 * side);
 		rod(shape, SPRUCE, 0.018, 0.8, 0.09, 0.7 * side, 0.8, LOW_Y, 0.7 * side);
 		rod(shape, WIRES, WIRE, -0.55, 0.04, 0.7 * side, 0.8, LOW_Y, 0.7 * side);

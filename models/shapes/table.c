@@ -127,6 +127,7 @@ static void fruit(struct shape *shape)
 		{ { { 0.04, 0 }, { 0.04, 0.04 }, { 0.01, 0.042 }, { 0, 0.026 } }, 0, 1, 16, APPLE },
 	};
 	static const double round[3] = { 0.038, 0.037, 0.038 };
+	static const double stalk[3][3] = { { 0, 0.02, 0 }, { 0, 0.035, 0 }, { 0.006, 0.046, 0 } };
 	uint64_t random = 3;
 
 	for (int i = 0; i < 5; i++) {
@@ -141,8 +142,7 @@ static void fruit(struct shape *shape)
 		}
 		surface_lathe(shape, apple, 2, 48);
 		shape->current = STALK;
-		sweep_bend(shape, (const double[3]){ 0, 0.02, 0 }, (const double[3]){ 0, 0.035, 0 },
-		           (const double[3]){ 0.006, 0.046, 0 }, 0.0012, 8, 8);
+		sweep_bend(shape, stalk, 0.0012, 8, 8);
 		sweep_along(shape, first, center, tip);
 	}
 }

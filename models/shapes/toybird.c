@@ -40,6 +40,7 @@ static void body_at(double u, double v, double p[3])
 static void body(struct shape *shape)
 {
 	static struct shape_vertex grid[(ROWS + 1) * COLS];
+	static const struct sweep_grid all = { grid, ROWS + 1, COLS, 0 };
 
 	for (uint32_t i = 0; i < (ROWS + 1) * COLS; i++)
 		body_at((double)(i % COLS) / COLS, (double)(i / COLS) / ROWS, grid[i].p);
@@ -50,10 +51,10 @@ static void body(struct shape *shape)
 	sweep_normals(grid, ROWS + 1, COLS, 0, 1);
 	/* half a turn is the upper side; the belly is a third of the girth */
 	shape->current = BODY;
-	sweep_band(shape, grid, ROWS + 1, COLS, 0, COLS * 7 / 12, 0);
-	sweep_band(shape, grid, ROWS + 1, COLS, COLS * 11 / 12, COLS, 0);
+	sweep_band(shape, &all, 0, COLS * 7 / 12);
+	sweep_band(shape, &all, COLS * 11 / 12, COLS);
 	shape->current = BELLY;
-	sweep_band(shape, grid, ROWS + 1, COLS, COLS * 7 / 12, COLS * 11 / 12, 0);
+	sweep_band(shape, &all, COLS * 7 / 12, COLS * 11 / 12);
 }
 
 static void head(struct shape *shape)

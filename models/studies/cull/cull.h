@@ -66,10 +66,14 @@ void cull_set_test(struct cull_set *set, const struct cull_eye *eye, const struc
 void cull_set_look(const struct cull_set *set, const struct ray_scene *scene, const struct cull_eye *eye,
                    struct psr_pool *pool, uint8_t *n_seen);
 
+#define CULL_MOST_CHOICES 16
+
 struct cull_views {
 	int n;
 	double zoom;
 	int is_timed; /* draws frames and times tests; needs zoom 1 */
+	const struct cull_choice *choice;
+	int n_choices; /* up to CULL_MOST_CHOICES */
 };
 
 /* Over all views; shares are of all blocks (samples) of level 0. */
@@ -79,17 +83,15 @@ struct cull_figures {
 	double test_seconds;     /* a view: of testing all blocks, screen's masks included, frustum included */
 	double frame_seconds;    /* a view: drawing the kept blocks, and testing beyond the frustum */
 };
-struct cull_truth {
+struct cull_result {
 	double blocks, samples; /* share that no ray finds */
+	struct cull_figures figures[CULL_MOST_CHOICES]; /* of each choice */
 };
 
-#define CULL_MOST_CHOICES 16
-
-/* figures[i] for choice[i], n_choices <= CULL_MOST_CHOICES; truth and wrong are 0 without a scene. Threads change no
- * share. Times are of one thread, the least of three: the renderer draws each view at the model's resolution, from
- * models of the kept blocks alone. MEMORY. */
-int cull_measure(struct cull_set *set, const struct ray_scene *scene, const struct cull_views *views,
-                 const struct cull_choice *choice, int n_choices, struct psr_pool *pool, struct cull_figures *figures,
-                 struct cull_truth *truth, struct psr_error *err);
+/* Without a scene the shares that rays find, and `wrong`, are 0. Threads change no share. Times are of one thread, the
+ * least of three: the renderer draws each view at the model's resolution, from models of the kept blocks alone.
+ * MEMORY. */
+int cull_measure(struct cull_result *out, struct cull_set *set, const struct ray_scene *scene,
+                 const struct cull_views *views, struct psr_pool *pool, struct psr_error *err);
 
 #endif

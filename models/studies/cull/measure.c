@@ -12,7 +12,7 @@
 
 struct measure {
 	struct cull_set *set;
-	const struct cull_choice *choice;
+	const struct cull_views *views;
 	int n_choices;
 	uint8_t *is_kept[CULL_MOST_CHOICES], *spare, *n_seen;    /* of each block */
 	double test[CULL_MOST_CHOICES], draw[CULL_MOST_CHOICES]; /* seconds, the least of all rounds */
@@ -76,7 +76,7 @@ static int time_view(struct measure *m, const struct cull_eye *eye)
 	for (int round = 0; round < ROUNDS && rc == PSR_OK; round++) {
 		time_test(m, eye, &frustum, &m->frustum);
 		for (int i = 0; i < m->n_choices && rc == PSR_OK; i++) {
-			time_test(m, eye, &m->choice[i], &m->test[i]);
+			time_test(m, eye, &m->views->choice[i], &m->test[i]);
 			if (part[i] != NULL)
 				rc = time_draw(m, eye, part[i], &m->draw[i]);
 		}
@@ -87,7 +87,7 @@ static int time_view(struct measure *m, const struct cull_eye *eye)
 }
 
 /* Adds up numbers of blocks and samples; finish() makes shares of them. */
-static void count_view(const struct measure *m, struct cull_figures *figures, struct cull_truth *truth)
+static void count_view(const struct measure *m, struct cull_result *out)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(m->set->base);
 
@@ -95,55 +95,53 @@ static void count_view(const struct measure *m, struct cull_figures *figures, st
 		int n = __builtin_popcountll(blocks->mask[b]);
 
 		if (m->n_seen != NULL) {
-			truth->blocks += m->n_seen[b] == 0;
-			truth->samples += n - m->n_seen[b];
+			out->blocks += m->n_seen[b] == 0;
+			out->samples += n - m->n_seen[b];
 		}
 		for (int i = 0; i < m->n_choices; i++) {
 			if (m->is_kept[i][b])
 				continue;
-			figures[i].blocks++;
-			figures[i].samples += n;
-			figures[i].wrong += m->n_seen != NULL && m->n_seen[b] != 0;
+			out->figures[i].blocks++;
+			out->figures[i].samples += n;
+			out->figures[i].wrong += m->n_seen != NULL && m->n_seen[b] != 0;
 		}
 	}
 }
 
-static void finish(const struct measure *m, int n_views, struct cull_figures *figures, struct cull_truth *truth)
+static void finish(const struct measure *m, struct cull_result *out)
 {
 	const struct psr_blocks *blocks = psr_model_blocks(m->set->base);
+	const int n_views = m->views->n;
 	double n_blocks = (double)n_views * blocks->n_blocks, n_samples = (double)n_views * (double)blocks->n_samples;
 
-	for (int i = 0; i < m->n_choices; i++) {
-		figures[i].blocks /= n_blocks;
-		figures[i].samples /= n_samples;
-		figures[i].wrong /= n_blocks;
-		figures[i].test_seconds /= n_views;
-		figures[i].frame_seconds /= n_views;
+	for (struct cull_figures *figures = out->figures; figures < out->figures + m->n_choices; figures++) {
+		figures->blocks /= n_blocks;
+		figures->samples /= n_samples;
+		figures->wrong /= n_blocks;
+		figures->test_seconds /= n_views;
+		figures->frame_seconds /= n_views;
 	}
-	truth->blocks /= n_blocks;
-	truth->samples /= n_samples;
+	out->blocks /= n_blocks;
+	out->samples /= n_samples;
 }
 
-static int run_views(struct measure *m, const struct ray_scene *scene, const struct cull_views *views,
-                     struct psr_pool *pool, struct cull_figures *figures, struct cull_truth *truth)
+static int run_view(struct measure *m, const struct ray_scene *scene, int view, struct psr_pool *pool,
+                    struct cull_result *out)
 {
+	struct cull_eye eye;
 	int rc = PSR_OK;
 
-	for (int v = 0; v < views->n && rc == PSR_OK; v++) {
-		struct cull_eye eye;
-
-		cull_eye_place(&eye, (uint32_t)v, views->zoom);
-		for (int i = 0; i < m->n_choices; i++)
-			cull_set_test(m->set, &eye, &m->choice[i], m->is_kept[i]);
-		if (scene != NULL)
-			cull_set_look(m->set, scene, &eye, pool, m->n_seen);
-		count_view(m, figures, truth);
-		if (views->is_timed)
-			rc = time_view(m, &eye);
-		for (int i = 0; i < m->n_choices && views->is_timed && rc == PSR_OK; i++) {
-			figures[i].test_seconds += m->test[i];
-			figures[i].frame_seconds += m->draw[i] + (m->test[i] - m->frustum);
-		}
+	cull_eye_place(&eye, (uint32_t)view, m->views->zoom);
+	for (int i = 0; i < m->n_choices; i++)
+		cull_set_test(m->set, &eye, &m->views->choice[i], m->is_kept[i]);
+	if (scene != NULL)
+		cull_set_look(m->set, scene, &eye, pool, m->n_seen);
+	count_view(m, out);
+	if (m->views->is_timed)
+		rc = time_view(m, &eye);
+	for (int i = 0; i < m->n_choices && m->views->is_timed && rc == PSR_OK; i++) {
+		out->figures[i].test_seconds += m->test[i];
+		out->figures[i].frame_seconds += m->draw[i] + (m->test[i] - m->frustum);
 	}
 	return rc;
 }
@@ -173,23 +171,21 @@ static void measure_fini(struct measure *m)
 	psr_renderer_destroy(m->renderer);
 }
 
-int cull_measure(struct cull_set *set, const struct ray_scene *scene, const struct cull_views *views,
-                 const struct cull_choice *choice, int n_choices, struct psr_pool *pool, struct cull_figures *figures,
-                 struct cull_truth *truth, struct psr_error *err)
+int cull_measure(struct cull_result *out, struct cull_set *set, const struct ray_scene *scene,
+                 const struct cull_views *views, struct psr_pool *pool, struct psr_error *err)
 {
-	struct measure m = { .set = set, .choice = choice, .n_choices = n_choices, .err = err };
+	struct measure m = { .set = set, .views = views, .n_choices = views->n_choices, .err = err };
 	int rc;
 
-	assert(n_choices <= CULL_MOST_CHOICES);
+	assert(views->n_choices <= CULL_MOST_CHOICES);
+	*out = (struct cull_result){ .blocks = 0 };
 	rc = measure_init(&m, scene != NULL);
 	if (rc != PSR_OK)
 		psr_fail(err, rc, "no memory for a study of culling");
-	memset(figures, 0, (size_t)n_choices * sizeof *figures);
-	memset(truth, 0, sizeof *truth);
+	for (int v = 0; v < views->n && rc == PSR_OK; v++)
+		rc = run_view(&m, scene, v, pool, out);
 	if (rc == PSR_OK)
-		rc = run_views(&m, scene, views, pool, figures, truth);
-	if (rc == PSR_OK)
-		finish(&m, views->n, figures, truth);
+		finish(&m, out);
 	measure_fini(&m);
 	return rc;
 }

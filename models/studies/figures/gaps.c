@@ -47,25 +47,33 @@ struct cover {
 	float *closed, *greatest; /* weights: as they are, and by the greatest coverage of a level alone */
 };
 
-static int is_before(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, float z, double scale)
+/* The level buffers, and by how much a cell of level k must be in front of a pixel to cover it. */
+struct levels {
+	const struct psr_zstack *stack;
+	double scale[PSR_MAX_DEPTH_LEVEL + 1];
+};
+
+static int is_before(const struct levels *levels, int k, uint32_t i, uint32_t j, float z)
 {
-	return (double)stack->level[k].z[(size_t)j * stack->level[k].width + i] * scale < (double)z;
+	const struct psr_zstack *stack = levels->stack;
+
+	return (double)stack->level[k].z[(size_t)j * stack->level[k].width + i] * levels->scale[k] < (double)z;
 }
 
-static int covers(const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, float z, const double *scale,
-                  int with_finer)
+static int covers(const struct levels *levels, int k, uint32_t i, uint32_t j, float z, int with_finer)
 {
-	if (is_before(stack, k, i, j, z, scale[k]))
+	const struct psr_zstack *stack = levels->stack;
+
+	if (is_before(levels, k, i, j, z))
 		return 1;
 	for (uint32_t v = j ? 2 * j - 1 : 0; with_finer && v <= 2 * j && v < stack->level[k - 1].height; v++)
 		for (uint32_t u = i ? 2 * i - 1 : 0; u <= 2 * i && u < stack->level[k - 1].width; u++)
-			if (is_before(stack, k - 1, u, v, z, scale[k - 1]))
+			if (is_before(levels, k - 1, u, v, z))
 				return 1;
 	return 0;
 }
 
-static double coverage(const struct psr_zstack *stack, int k, uint32_t x, uint32_t y, float z, const double *scale,
-                       int with_finer)
+static double coverage(const struct levels *levels, int k, uint32_t x, uint32_t y, float z, int with_finer)
 {
 	const double u = (x + 0.5) / (1 << k) + 0.5, v = (y + 0.5) / (1 << k) + 0.5;
 	const uint32_t i = (uint32_t)u, j = (uint32_t)v;
@@ -73,7 +81,7 @@ static double coverage(const struct psr_zstack *stack, int k, uint32_t x, uint32
 	double sum = 0;
 
 	for (uint32_t c = 0; c < 4; c++)
-		if (covers(stack, k, i + (c & 1), j + (c >> 1), z, scale, with_finer))
+		if (covers(levels, k, i + (c & 1), j + (c >> 1), z, with_finer))
 			sum += (c & 1 ? fu : 1 - fu) * (c >> 1 ? fv : 1 - fv);
 	return sum;
 }
@@ -81,10 +89,10 @@ static double coverage(const struct psr_zstack *stack, int k, uint32_t x, uint32
 static void find_weights(struct cover *cover, const struct psr_zstack *stack, const struct figure_shot *shot)
 {
 	const double focal = shot->settings.height / 2.0 / tan(shot->scene.camera.fov_y / 2);
-	double scale[PSR_MAX_DEPTH_LEVEL + 1];
+	struct levels levels = { .stack = stack };
 
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++)
-		scale[k] = 1 + shot->settings.gap_threshold * (1 << k) / 2 / focal;
+		levels.scale[k] = 1 + shot->settings.gap_threshold * (1 << k) / 2 / focal;
 	for (uint32_t y = 0; y < stack->height; y++)
 		for (uint32_t x = 0; x < stack->width; x++) {
 			const size_t at = (size_t)y * stack->width + x;
@@ -96,10 +104,10 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 
 				if (!(stack->levels >> k & 1))
 					continue;
-				one = coverage(stack, k, x, y, z, scale, 0);
+				one = coverage(&levels, k, x, y, z, 0);
 				greatest = fmax(greatest, one);
 				if (one > 0 && one < 1 && k > 1 && (stack->levels >> (k - 1) & 1))
-					one = coverage(stack, k, x, y, z, scale, 1);
+					one = coverage(&levels, k, x, y, z, 1);
 				closed = fmax(closed, one);
 			}
 			cover->greatest[at] = (float)(1 - greatest);

@@ -247,7 +247,7 @@ int figure_zoom(struct study *study)
 	for (int k = 0; rc == PSR_OK && k < 4; k++)
 		rc = figure_frame_init(&zoom.frame[k / 2][k % 2], SIDE, study->err);
 	if (rc == PSR_OK)
-		rc = study_table_init(table, "frame", columns, N_COLUMNS, FRAMES, 1, study->err);
+		rc = study_table_init(table, (struct study_form){ "frame", columns, N_COLUMNS }, FRAMES, 1, study->err);
 	if (rc == PSR_OK)
 		rc = walk(study, &zoom);
 	if (rc == PSR_OK) {

@@ -12,7 +12,7 @@
 #include "psr/mesh.h"
 #include "psr/model.h"
 #include "psr/pool.h"
-#include "models/studies/lib/trials.h"
+#include "models/studies/lib/study.h"
 #include "ray/ray.h"
 
 #define GREEDY_MOST_VIEWS 320
@@ -85,10 +85,10 @@ struct greedy {
 	double seconds_scan;
 };
 
-/* Traces every projection but the scouts. mesh, scene (of that mesh, with this scale) and pool must outlive it; pool
- * may be NULL. MEMORY. */
-int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct ray_scene *scene, double scale,
-                  const struct greedy_scan_options *options, struct psr_pool *pool, struct psr_error *err);
+/* Traces every projection but the scouts. The model, of which it reads mesh, scene and scale, and the pool, which may be
+ * NULL, must outlive it. MEMORY. */
+int greedy_create(struct greedy **out, const struct study_model *model, const struct greedy_scan_options *options,
+                  struct psr_pool *pool, struct psr_error *err);
 void greedy_destroy(struct greedy *greedy); /* NULL is fine */
 
 struct greedy_select_options {

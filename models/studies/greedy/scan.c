@@ -201,8 +201,8 @@ static int note_sides(struct greedy *greedy)
 	return PSR_OK;
 }
 
-int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct ray_scene *scene, double scale,
-                  const struct greedy_scan_options *options, struct psr_pool *pool, struct psr_error *err)
+int greedy_create(struct greedy **out, const struct study_model *model, const struct greedy_scan_options *options,
+                  struct psr_pool *pool, struct psr_error *err)
 {
 	struct greedy *greedy = calloc(1, sizeof *greedy);
 	double started = clock_seconds();
@@ -210,8 +210,8 @@ int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct
 
 	if (greedy == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a sampling");
-	*greedy = (struct greedy){ .mesh = mesh, .scene = scene, .pool = pool, .options = *options, .scale = scale,
-		                       .ds = 2.0 / options->resolution };
+	*greedy = (struct greedy){ .mesh = model->mesh, .scene = model->scene, .pool = pool, .options = *options,
+		                       .scale = model->scale, .ds = 2.0 / options->resolution };
 	greedy_make_views(greedy);
 	for (int v = 0; rc == PSR_OK && v < greedy->n_views - greedy->n_scouts; v++)
 		rc = greedy_trace(greedy, v, 1);

@@ -31,9 +31,15 @@ struct study_table {
 	double *value;
 };
 
+struct study_form {
+	const char *first;
+	const struct study_column *column;
+	int n_columns;
+};
+
 /* Every value is NAN, every label empty. MEMORY. */
-int study_table_init(struct study_table *table, const char *first, const struct study_column *column, int n_columns,
-                     int n_rows, int n_models, struct psr_error *err);
+int study_table_init(struct study_table *table, struct study_form form, int n_rows, int n_models,
+                     struct psr_error *err);
 void study_table_fini(struct study_table *table);
 double *study_at(const struct study_table *table, int row, int model, int column);
 

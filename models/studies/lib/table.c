@@ -5,14 +5,14 @@
 #include <string.h>
 #include "study.h"
 
-int study_table_init(struct study_table *table, const char *first, const struct study_column *column, int n_columns,
-                     int n_rows, int n_models, struct psr_error *err)
+int study_table_init(struct study_table *table, struct study_form form, int n_rows, int n_models,
+                     struct psr_error *err)
 {
-	size_t n = (size_t)n_rows * (size_t)n_models * (size_t)n_columns;
+	size_t n = (size_t)n_rows * (size_t)n_models * (size_t)form.n_columns;
 
-	assert(n_columns <= STUDY_MOST_COLUMNS);
-	*table = (struct study_table){ .first = first, .column = column, .n_columns = n_columns, .n_rows = n_rows,
-		                           .n_models = n_models };
+	assert(form.n_columns <= STUDY_MOST_COLUMNS);
+	*table = (struct study_table){ .first = form.first, .column = form.column, .n_columns = form.n_columns,
+		                           .n_rows = n_rows, .n_models = n_models };
 	table->label = calloc((size_t)n_rows, sizeof *table->label);
 	table->value = calloc(n, sizeof *table->value);
 	if (table->label == NULL || table->value == NULL) {

@@ -183,7 +183,7 @@ struct run {
 	const struct trials_sample *sample;
 	size_t n_samples;
 	double ds;
-	uint64_t n_trials, n_missing;
+	struct trials_count *count;
 	int failed;
 };
 
@@ -266,21 +266,20 @@ static void run_view(int v, void *userdata)
 		field_make(&field, run, view, counts);
 		for (int i = 0; i < view->n; i++)
 			n_missing += !is_hit(&field, &view->trial[i], run->ds);
-		__atomic_fetch_add(&run->n_missing, n_missing, __ATOMIC_RELAXED);
-		__atomic_fetch_add(&run->n_trials, (uint64_t)view->n, __ATOMIC_RELAXED);
+		__atomic_fetch_add(&run->count->n_missing, n_missing, __ATOMIC_RELAXED);
+		__atomic_fetch_add(&run->count->n_trials, (uint64_t)view->n, __ATOMIC_RELAXED);
 	}
 	psr_free(field.first);
 	psr_free(field.spot);
 	psr_free(counts);
 }
 
-int trials_run(const struct trials *trials, const struct trials_sample *sample, size_t n_samples, double ds,
-               struct psr_pool *pool, uint64_t *n_trials, uint64_t *n_missing)
+int trials_run(struct trials_count *count, const struct trials *trials, const struct trials_sample *sample,
+               size_t n_samples, double ds, struct psr_pool *pool)
 {
-	struct run run = { .trials = trials, .sample = sample, .n_samples = n_samples, .ds = ds };
+	struct run run = { .trials = trials, .sample = sample, .n_samples = n_samples, .ds = ds, .count = count };
 
+	*count = (struct trials_count){ 0, 0 };
 	psr_pool_for(pool, trials->n_views, run_view, &run);
-	*n_trials = run.n_trials;
-	*n_missing = run.n_missing;
 	return run.failed ? PSR_ERR_MEMORY : PSR_OK;
 }

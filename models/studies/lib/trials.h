@@ -37,8 +37,11 @@ void trials_destroy(struct trials *trials); /* NULL is fine */
 
 /* A trial is missing if no sample that faces its view falls into its pixel, of side ds, in front of or behind the
  * place by no more than its surface may rise or fall within the pixel. pool may be NULL. MEMORY. */
-int trials_run(const struct trials *trials, const struct trials_sample *sample, size_t n_samples, double ds,
-               struct psr_pool *pool, uint64_t *n_trials, uint64_t *n_missing);
+struct trials_count {
+	uint64_t n_trials, n_missing;
+};
+int trials_run(struct trials_count *count, const struct trials *trials, const struct trials_sample *sample,
+               size_t n_samples, double ds, struct psr_pool *pool);
 
 /* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a
  * surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */

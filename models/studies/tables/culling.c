@@ -30,12 +30,13 @@ int culling_set(struct cull_set **out, const struct study *study, const struct s
 	return rc;
 }
 
-static void put(double *value, int has_gain, const struct cull_figures *figures, const struct cull_truth *truth,
-                const struct cull_figures *base)
+static void put(double *value, int has_gain, const struct cull_result *result, int choice)
 {
+	const struct cull_figures *figures = &result->figures[choice], *base = &result->figures[0];
+
 	value[CULLED] = 100 * figures->blocks;
 	value[SAMPLES] = 100 * figures->samples;
-	value[HIDDEN] = 100 * truth->blocks;
+	value[HIDDEN] = 100 * result->blocks;
 	value[WRONG] = 100 * figures->wrong;
 	value[TEST] = 1e6 * figures->test_seconds;
 	value[FRAME] = 1e6 * figures->frame_seconds;
@@ -47,20 +48,19 @@ static void put(double *value, int has_gain, const struct cull_figures *figures,
 /* A row for each choice; the first is what others are compared with. */
 static int run_choices(struct study *study, const struct cull_choice *choice, int n, int finest)
 {
-	const struct cull_views views = { .n = N_VIEWS, .zoom = 1, .is_timed = 1 };
+	const struct cull_views views = { N_VIEWS, 1, 1, choice, n };
 	int rc = PSR_OK;
 
 	study->total = study->n_models;
 	for (int m = 0; rc == PSR_OK && m < study->n_models; m++) {
 		struct cull_set *set = NULL;
-		struct cull_figures figures[CULL_MOST_CHOICES];
-		struct cull_truth truth;
+		struct cull_result result;
 
 		rc = culling_set(&set, study, &study->model[m], finest);
 		if (rc == PSR_OK)
-			rc = cull_measure(set, study->model[m].scene, &views, choice, n, study->pool, figures, &truth, study->err);
+			rc = cull_measure(&result, set, study->model[m].scene, &views, study->pool, study->err);
 		for (int i = 0; rc == PSR_OK && i < n; i++)
-			put(study_at(&study->table, i, m, 0), study->table.n_columns > GAIN, &figures[i], &truth, &figures[0]);
+			put(study_at(&study->table, i, m, 0), study->table.n_columns > GAIN, &result, i);
 		cull_set_destroy(set);
 		study_step(study, study->model[m].name);
 	}
@@ -74,7 +74,8 @@ int table_masks(struct study *study)
 		"cones", "cones, 8 bits", "cones, 32 bits", "cones, 128 bits", "cones, 512 bits",
 	};
 	struct cull_choice choice[N_MASKS];
-	int rc = study_table_init(&study->table, "tests", columns, GAIN, N_MASKS, study->n_models, study->err);
+	const struct study_form form = { "tests", columns, GAIN };
+	int rc = study_table_init(&study->table, form, N_MASKS, study->n_models, study->err);
 
 	for (int i = 0; rc == PSR_OK && i < N_MASKS; i++) {
 		choice[i] = (struct cull_choice){ .cones = i >= 5, .level = i % 5 + CULL_NO_MASK, .n = CULL_THESIS_N };
@@ -87,7 +88,8 @@ int table_subdivision(struct study *study)
 {
 	struct cull_choice choice[SCREEN_MOST + 1];
 	const int n = SCREEN_MOST + 1;
-	int rc = study_table_init(&study->table, "screen", columns, N_COLUMNS, n, study->n_models, study->err);
+	const struct study_form form = { "screen", columns, N_COLUMNS };
+	int rc = study_table_init(&study->table, form, n, study->n_models, study->err);
 
 	for (int i = 0; rc == PSR_OK && i < n; i++) {
 		choice[i] = (struct cull_choice){ .cones = 1, .level = CULL_THESIS_LEVEL, .n = i };

@@ -27,15 +27,15 @@ int selection_missing(double *missing, const struct study *study, const struct s
                       const struct greedy *greedy, const struct greedy_result *result)
 {
 	struct trials_sample *sample = psr_alloc_array(result->n_samples, sizeof *sample);
-	uint64_t n_trials = 0, n_missing = 0;
+	struct trials_count count = { 0, 0 };
 	int rc = PSR_ERR_MEMORY;
 
 	if (sample != NULL) {
 		greedy_samples(greedy, sample);
-		rc = trials_run(model->trials, sample, result->n_samples, greedy->ds, study->pool, &n_trials, &n_missing);
+		rc = trials_run(&count, model->trials, sample, result->n_samples, greedy->ds, study->pool);
 	}
 	psr_free(sample);
-	*missing = n_trials != 0 ? 1e4 * (double)n_missing / (double)n_trials : 0;
+	*missing = count.n_trials != 0 ? 1e4 * (double)count.n_missing / (double)count.n_trials : 0;
 	return rc == PSR_OK ? rc : psr_fail(study->err, rc, "no memory to measure adequacy");
 }
 
@@ -58,7 +58,8 @@ int selections_start(struct selections *s, struct study *study, const char *firs
 	*s = (struct selections){ study, calloc((size_t)study->total, sizeof *s->warp) };
 	if (s->warp == NULL)
 		return psr_fail(study->err, PSR_ERR_MEMORY, "no memory for %d rows", n_rows);
-	return study_table_init(&study->table, first, columns, N_COLUMNS, n_rows, study->n_models, study->err);
+	return study_table_init(&study->table, (struct study_form){ first, columns, N_COLUMNS }, n_rows, study->n_models,
+	                        study->err);
 }
 
 int selections_put(struct selections *s, int row, int model, const struct greedy *greedy,
@@ -83,14 +84,13 @@ int selections_put(struct selections *s, int row, int model, const struct greedy
 
 int selection_scan(struct greedy **greedy, struct study *study, int model, const struct selection *selection)
 {
-	const struct study_model *m = &study->model[model];
 	const struct greedy_scan_options options = { study->resolution,
 		                                         (selection->degrees > 0 ? selection->degrees : 25) * RADIANS,
 		                                         selection->lattice, selection->directions };
 
 	greedy_destroy(*greedy);
 	*greedy = NULL;
-	return greedy_create(greedy, m->mesh, m->scene, m->scale, &options, study->pool, study->err);
+	return greedy_create(greedy, &study->model[model], &options, study->pool, study->err);
 }
 
 static int is_same_scan(const struct selection *a, const struct selection *b)

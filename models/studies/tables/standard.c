@@ -13,7 +13,8 @@ struct thesis {
 static int run(struct study *study, const struct study_column *column, int n_columns, const struct thesis thesis[14],
                int (*put)(struct study *study, int row))
 {
-	int rc = study_table_init(&study->table, "model", column, n_columns, study->n_models, 1, study->err);
+	const struct study_form form = { "model", column, n_columns };
+	int rc = study_table_init(&study->table, form, study->n_models, 1, study->err);
 
 	study->total = study->n_models;
 	for (int row = 0; rc == PSR_OK && row < study->n_models; row++) {
@@ -114,29 +115,28 @@ static int put_culling(struct study *study, int row)
 		{ 1, CULL_NO_MASK, 0 }, { 0, CULL_THESIS_LEVEL, CULL_THESIS_N }, { 1, CULL_THESIS_LEVEL, CULL_THESIS_N },
 		{ 0, CULL_NO_MASK, 0 },
 	};
-	const struct cull_views whole = { .n = N_VIEWS, .zoom = 1 }, part = { .n = N_VIEWS, .zoom = ZOOM };
+	const struct cull_views whole = { N_VIEWS, 1, 0, choice, 3 }, part = { N_VIEWS, ZOOM, 0, choice, 4 };
 	const struct study_model *model = &study->model[row];
 	double *value = study_at(&study->table, row, 0, 0);
-	struct cull_figures figures[4];
-	struct cull_truth truth;
+	struct cull_result result;
 	struct cull_set *set = NULL;
 	int rc = culling_set(&set, study, model, CULL_THESIS_LEVEL);
 
 	if (rc == PSR_OK)
-		rc = cull_measure(set, model->scene, &whole, choice, 3, study->pool, figures, &truth, study->err);
+		rc = cull_measure(&result, set, model->scene, &whole, study->pool, study->err);
 	if (rc == PSR_OK) {
 		for (int i = 0; i < 3; i++)
-			value[CONE + i] = 100 * figures[i].blocks;
-		value[BLOCKS_HIDDEN] = 100 * truth.blocks;
-		value[BOTH_SAMPLES] = 100 * figures[2].samples;
-		value[SAMPLES_HIDDEN] = 100 * truth.samples;
-		value[BOTH_WRONG] = 100 * figures[2].wrong;
-		rc = cull_measure(set, model->scene, &part, choice, 4, study->pool, figures, &truth, study->err);
+			value[CONE + i] = 100 * result.figures[i].blocks;
+		value[BLOCKS_HIDDEN] = 100 * result.blocks;
+		value[BOTH_SAMPLES] = 100 * result.figures[2].samples;
+		value[SAMPLES_HIDDEN] = 100 * result.samples;
+		value[BOTH_WRONG] = 100 * result.figures[2].wrong;
+		rc = cull_measure(&result, set, model->scene, &part, study->pool, study->err);
 	}
 	if (rc == PSR_OK) {
-		value[FRUSTUM] = 100 * figures[3].blocks;
-		value[FRUSTUM_BOTH] = 100 * figures[2].blocks;
-		value[FRUSTUM_HIDDEN] = 100 * truth.blocks;
+		value[FRUSTUM] = 100 * result.figures[3].blocks;
+		value[FRUSTUM_BOTH] = 100 * result.figures[2].blocks;
+		value[FRUSTUM_HIDDEN] = 100 * result.blocks;
 	}
 	cull_set_destroy(set);
 	return rc;

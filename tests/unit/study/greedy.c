@@ -14,19 +14,13 @@
 
 #define DEGREES (180 / 3.14159265358979323846)
 
-struct object {
-	struct psr_mesh *mesh;
-	struct ray_scene *scene;
-	double origin[3], scale;
-};
-
 /* Two spheres that hide each other in part. */
-static struct object two_spheres(void)
+static struct study_model two_spheres(void)
 {
 	const double a[3] = { 0, 0, 0 }, b[3] = { 1.5, 0.4, 0.3 };
 	struct psr_mesh *first = meshes_sphere(24, a, 1), *second = meshes_sphere(24, b, 0.6);
 	struct psr_mesh *mesh = meshes_new(2 * first->n_vertices, 2 * first->n_triangles);
-	struct object object = { .mesh = mesh };
+	struct study_model object = { .mesh = mesh };
 
 	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
 		const struct psr_mesh *from = i < first->n_vertices ? first : second;
@@ -45,19 +39,19 @@ static struct object two_spheres(void)
 	return object;
 }
 
-static void object_fini(struct object *object)
+static void object_fini(struct study_model *object)
 {
 	ray_scene_destroy(object->scene);
 	meshes_free(object->mesh);
 }
 
-static struct greedy *scan(const struct object *object, uint32_t resolution, enum greedy_lattice lattice,
+static struct greedy *scan(const struct study_model *object, uint32_t resolution, enum greedy_lattice lattice,
                            enum greedy_directions directions, struct psr_pool *pool)
 {
 	const struct greedy_scan_options options = { resolution, 25 / DEGREES, lattice, directions };
 	struct greedy *greedy = NULL;
 
-	assert_int_equal(greedy_create(&greedy, object->mesh, object->scene, object->scale, &options, pool, NULL), PSR_OK);
+	assert_int_equal(greedy_create(&greedy, object, &options, pool, NULL), PSR_OK);
 	return greedy;
 }
 
@@ -79,7 +73,7 @@ static double covering_angle(const struct greedy *greedy, int n_views)
 
 static void no_normal_is_further_from_a_direction_than_is_said(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *thesis = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 	struct greedy *icosahedral = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 
@@ -96,7 +90,7 @@ static void no_normal_is_further_from_a_direction_than_is_said(void **state)
 
 static void every_projection_is_followed_by_its_opposite(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 
 	(void)state;
@@ -108,7 +102,7 @@ static void every_projection_is_followed_by_its_opposite(void **state)
 
 static void samples_stand_on_the_lattice_and_on_the_surface(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 
 	(void)state;
 	for (int lattice = GREEDY_EQUILATERAL; lattice <= GREEDY_SQUARE; lattice++) {
@@ -145,7 +139,7 @@ static int floor_div(int a, int b)
 
 static void every_sample_is_in_the_block_of_its_row_and_column(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 
 	(void)state;
@@ -220,7 +214,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 
 static void the_first_pass_leaves_no_sample_uncovered(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
@@ -255,7 +249,7 @@ static uint8_t *kept_blocks(const struct greedy *greedy, size_t *n)
 
 static void the_second_pass_only_removes_blocks(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result first, both;
@@ -283,7 +277,7 @@ static void the_second_pass_only_removes_blocks(void **state)
 
 static void selection_by_score_covers_everything_and_keeps_nothing_that_is_not_needed(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 24, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
@@ -310,7 +304,7 @@ static void selection_by_score_covers_everything_and_keeps_nothing_that_is_not_n
 
 static void dropping_samples_uncovers_nothing(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result all, some;
@@ -330,7 +324,7 @@ static void dropping_samples_uncovers_nothing(void **state)
 
 static void a_sheet_seen_from_one_side_does_not_cover_its_other_side(void **state)
 {
-	struct object object = { .mesh = meshes_square(4) };
+	struct study_model object = { .mesh = meshes_square(4) };
 	struct greedy_select_options options;
 	struct greedy_result facing, both;
 	struct greedy *greedy;
@@ -371,7 +365,7 @@ static void a_sheet_seen_from_one_side_does_not_cover_its_other_side(void **stat
 
 static void threads_and_what_came_before_change_nothing(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct psr_pool *pool = NULL;
 	struct greedy *one, *four;
 	struct greedy_select_options options;
@@ -407,7 +401,7 @@ static void threads_and_what_came_before_change_nothing(void **state)
 
 static void counts_agree_with_what_is_kept(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_SQUARE, GREEDY_THESIS, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
@@ -433,7 +427,7 @@ static void counts_agree_with_what_is_kept(void **state)
 static void cones_cull_less_than_the_far_side(void **state)
 {
 	const double center[3] = { 0 };
-	struct object object = { .mesh = meshes_sphere(48, center, 1) };
+	struct study_model object = { .mesh = meshes_sphere(48, center, 1) };
 	struct greedy_select_options options;
 	struct greedy_result result;
 	struct greedy_warp_time time;

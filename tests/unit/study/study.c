@@ -14,13 +14,14 @@
 #include "tests/unit/sample/meshes.h"
 
 static const struct study_column two[] = { { "size", "size", 1 }, { "ratio", "ratio", 3 } };
+static const struct study_form form = { "row", two, 2 };
 
 static void a_mean_leaves_out_what_is_not_known(void **state)
 {
 	struct study_table table;
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 3, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 3, NULL), PSR_OK);
 	assert_true(isnan(study_mean(&table, 0, 0)));
 	*study_at(&table, 0, 0, 0) = 1;
 	*study_at(&table, 0, 2, 0) = 5;
@@ -35,7 +36,7 @@ static void ratios_are_made_model_by_model(void **state)
 	struct study_table table;
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 2, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 2, NULL), PSR_OK);
 	*study_at(&table, 0, 0, 0) = 1;
 	*study_at(&table, 0, 1, 0) = 20;
 	*study_at(&table, 1, 0, 0) = 2;
@@ -54,7 +55,7 @@ static void a_table_is_printed_in_columns(void **state)
 	FILE *to = open_memstream(&text, &n);
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 1, NULL), PSR_OK);
 	strcpy(table.label[0], "first");
 	strcpy(table.label[1], "2nd");
 	*study_at(&table, 0, 0, 0) = 123456.78;
@@ -113,11 +114,11 @@ static struct trials_sample *spiral(size_t n, double radius, int is_inside_out)
 
 static uint64_t missing(const struct ball *ball, const struct trials_sample *point, size_t n, double ds)
 {
-	uint64_t n_trials, n_missing;
+	struct trials_count count;
 
-	assert_int_equal(trials_run(ball->trials, point, n, ds, NULL, &n_trials, &n_missing), PSR_OK);
-	assert_int_equal(n_trials, 20 * 300);
-	return n_missing;
+	assert_int_equal(trials_run(&count, ball->trials, point, n, ds, NULL), PSR_OK);
+	assert_int_equal(count.n_trials, 20 * 300);
+	return count.n_missing;
 }
 
 /* Points of a spiral have a neighbour within sqrt(4 pi / n) * 1.2 in every direction: with sides of triangles of two
@@ -171,7 +172,7 @@ static void plots_say_what_is_wrong(void **state)
 	struct psr_error err;
 
 	(void)state;
-	assert_int_equal(study_table_init(&study.table, "row", two, 2, 1, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&study.table, form, 1, 1, NULL), PSR_OK);
 	assert_int_equal(study_plot(&study, "picture.gif", &err), PSR_ERR_ARG);
 	assert_non_null(strstr(err.text, ".svg"));
 	assert_int_equal(study_plot(&study, "pic\nture.svg", &err), PSR_ERR_ARG);
@@ -207,7 +208,7 @@ static void the_program_for_gnuplot_has_the_whole_table(void **state)
 	fprintf(file, "#!/bin/sh\ncat >%s\n", said);
 	fclose(file);
 	assert_int_equal(chmod(tool, 0700), 0);
-	assert_int_equal(study_table_init(&study.table, "row", two, 2, 2, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&study.table, form, 2, 1, NULL), PSR_OK);
 	strcpy(study.table.label[0], "25");
 	strcpy(study.table.label[1], "two words");
 	*study_at(&study.table, 0, 0, 0) = 1.5;
