@@ -8,8 +8,8 @@
 #include "ray/ray.h"
 #include "surface/stipple.h"
 #include "surface/surface.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 
 #define MOST_SIDE 64
 #define RUN 64 /* rays traced together */
@@ -238,7 +238,7 @@ int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uin
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are outside of 1..%d", side, MOST_SIDE);
-	rc = psr_pool_create(&pool, n_threads, 0);
+	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
 	job.n_columns = width * side;

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render.h"
 #include "screen.h"
 

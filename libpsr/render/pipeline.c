@@ -2,10 +2,11 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render.h"
 #include "shadow.h"
 
@@ -17,9 +18,10 @@ struct psr_renderer {
 	struct fill fill;
 	struct smooth smooth;
 	struct psr_zstack stack;
+	struct refiner *refiner;
 	const struct inside *inside; /* of frames with splats, or NULL */
 	uint8_t *is_covered;         /* of the call of renderer_cover in progress */
-	struct psr_report report; /* of psr_warp, until psr_finish */
+	struct psr_report report; /* of renderer_warp, until renderer_finish */
 	struct psr_frame *frame;  /* of the call in progress */
 	int has_planes;           /* it wants more than colour and depth */
 	struct shade_target target;
@@ -45,28 +47,7 @@ struct psr_renderer {
 	uint8_t srgb[65536];      /* of 16-bit linear light */
 };
 
-const char *psr_stage_name(enum psr_stage stage)
-{
-	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
-		                                             "resolve", "shade",  "fill", "smooth" };
-	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
-}
-
-void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height)
-{
-	settings->width = width;
-	settings->height = height;
-	settings->window = (struct psr_window){ 0, 0, 0, 0 };
-	settings->cull_tests = PSR_CULL_ALL;
-	settings->is_full = 0;
-	settings->with_splats = 0;
-	settings->gap_threshold = 3;
-	settings->gap_method = PSR_GAPS_BILINEAR;
-	settings->spacing = 1;
-	settings->is_smooth = 0;
-}
-
-static int validate(const struct psr_scene *scene, const struct psr_settings *settings, struct psr_error *err)
+static int validate(const struct psr_scene *scene, const struct render_settings *settings, struct psr_error *err)
 {
 	uint32_t w = settings->width, h = settings->height;
 	if (w < 1 || h < 1)
@@ -98,12 +79,12 @@ static void set_environment(fenv_t *callers)
 	fesetenv(FE_DFL_ENV);
 }
 
-int psr_renderer_create(struct psr_renderer **out)
+int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	fenv_t callers;
 	if (!r)
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	set_environment(&callers);
 	for (int i = 0; i < 65536; i++)
@@ -118,10 +99,16 @@ void renderer_use(struct psr_renderer *r, const struct simd *simd)
 	r->simd = simd;
 }
 
+struct refiner **renderer_refiner(struct psr_renderer *r)
+{
+	return &r->refiner;
+}
+
 void psr_renderer_destroy(struct psr_renderer *r)
 {
 	if (!r)
 		return;
+	refiner_destroy(r->refiner);
 	plan_clear(&r->plan);
 	shadow_destroy(r->shadow);
 	bins_clear(&r->bins);
@@ -135,7 +122,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
+	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
+	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
 	       r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
@@ -218,7 +206,7 @@ static void warp_one(int i, void *userdata)
 }
 
 /* Shadow maps are drawn if what the stack shows will be lit; else those of earlier frames stay as they are. */
-static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                       int is_lit, struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report,
                       struct psr_error *err)
 {
@@ -227,12 +215,12 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		return rc;
 	psr_pool_wake(pool);
 	memset(report, 0, sizeof *report);
-	uint64_t start = now_ns(), end;
+	uint64_t start = clock_ns(), end;
 	rc = plan_make(&r->plan, scene, settings, err);
 	if (rc)
 		return rc;
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
-	report->ns[PSR_STAGE_PLAN] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_PLAN] = (end = clock_ns()) - start;
 	start = end;
 
 	if (is_lit)
@@ -241,7 +229,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		effect_note(report, PSR_EFFECT_SHADOWS, PSR_WHY_OFF, 0);
 	if (rc)
 		return rc;
-	report->ns[PSR_STAGE_SHADOW] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_SHADOW] = (end = clock_ns()) - start;
 	start = end;
 
 	rc = cull_blocks(&r->bins, r->simd, &r->plan, pool, report);
@@ -253,7 +241,7 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 		memset(r->is_clean, 0, (size_t)r->plan.parts_x * r->plan.parts_y);
 	else
 		r->plan.is_quiet = r->bins.is_quiet;
-	report->ns[PSR_STAGE_CULL] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_CULL] = (end = clock_ns()) - start;
 	start = end;
 
 	const int n_tiles = (int)(r->plan.tiles_x * r->plan.tiles_y);
@@ -268,13 +256,13 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
 	}
 	const enum psr_why no_occlusion = settings->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF;
 	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);
-	report->ns[PSR_STAGE_WARP] = now_ns() - start;
+	report->ns[PSR_STAGE_WARP] = clock_ns() - start;
 	r->report = *report;
 	*stack = &r->stack;
 	return PSR_OK;
 }
 
-int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
              struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
 {
 	fenv_t callers;
@@ -310,7 +298,7 @@ static void cover_one(int row, void *userdata)
 	}
 }
 
-int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_cover(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                    struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err)
 {
 	struct psr_report report;
@@ -336,7 +324,7 @@ static void shade_one(int row, void *userdata)
 	const struct plan *plan = &r->plan;
 	struct shade_counts counts = { 0 };
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = row_end(plan, row);
-	const uint64_t start = now_ns();
+	const uint64_t start = clock_ns();
 	shade_rows(r->simd, plan, &r->target, &r->stack, r->weight, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
@@ -346,11 +334,11 @@ static void shade_one(int row, void *userdata)
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
 	}
-	const uint64_t middle = now_ns();
+	const uint64_t middle = clock_ns();
 	if (r->target.wants)
 		fill_pull(&r->fill, (uint32_t)row);
 	counts.row_ns = middle - start;
-	counts.fill_ns = now_ns() - middle;
+	counts.fill_ns = clock_ns() - middle;
 	r->shade[row] = counts;
 }
 
@@ -436,33 +424,33 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		                                  r->rgb[2], r->srgb,   rgb,       r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	uint64_t start = now_ns(), end;
+	uint64_t start = clock_ns(), end;
 	const uint32_t n_marked = find_gaps(r, pool, report);
-	report->ns[PSR_STAGE_GAPS] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_GAPS] = (end = clock_ns()) - start;
 	start = end;
 	if (n_marked)
 		r->target.wants = fill_wants(&r->fill);
-	report->ns[PSR_STAGE_FILL] = (end = now_ns()) - start;
+	report->ns[PSR_STAGE_FILL] = (end = clock_ns()) - start;
 	start = end;
 
 	if (tabulate(r, pool, report))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
 	psr_pool_for(pool, (int)n_rows(&r->plan), shade_one, r);
-	report_shading(r, report, (end = now_ns()) - start);
+	report_shading(r, report, (end = clock_ns()) - start);
 	start = end;
 	if (n_marked)
 		fill_push(&r->fill, pool, report);
-	report->ns[PSR_STAGE_FILL] += (end = now_ns()) - start;
+	report->ns[PSR_STAGE_FILL] += (end = clock_ns()) - start;
 	start = end;
 	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	if (smooth == PSR_WHY_RAN)
 		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
-	report->ns[PSR_STAGE_SMOOTH] = now_ns() - start;
+	report->ns[PSR_STAGE_SMOOTH] = clock_ns() - start;
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
 	return PSR_OK;
 }
 
-int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
                struct psr_error *err)
 {
 	fenv_t callers;
@@ -472,7 +460,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	return rc;
 }
 
-int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	struct psr_zstack *stack;

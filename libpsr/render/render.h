@@ -4,17 +4,9 @@
 
 #include <stdatomic.h>
 #include <stdint.h>
-#include <time.h>
-#include "psr/pool.h"
-#include "psr/render.h"
+#include "base/pool.h"
+#include "stages.h"
 #include "simd/simd.h"
-
-static inline uint64_t now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
 
 #define WEIGHT_ONE 256  /* weights are 0..256 */
 
@@ -63,7 +55,7 @@ struct plan {
 	size_t storage_size;
 };
 
-int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings,
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
               struct psr_error *err);
 void plan_clear(struct plan *plan);
 
@@ -354,7 +346,7 @@ uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const st
 /* ---- for refinement: what the plain frame covers ---- */
 
 /* 1 where the plain frame has a sample, or cells cover at least half of a pixel; width * height. */
-int renderer_cover(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_cover(struct psr_renderer *renderer, const struct psr_scene *scene, const struct render_settings *settings,
                    struct psr_pool *pool, uint8_t *is_covered, struct psr_error *err);
 
 /* What frames with splats are inside of from now on; NULL: nothing is known. It must hold while they are drawn. */

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 /* A triangle within a rectangle has 7 corners at most; where rounding doubles some, there are more. */
 #define MOST_CORNERS 24

@@ -185,7 +185,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
                     const struct psr_scene *scene, struct psr_pool *pool, uint64_t *n_samples, struct psr_error *err)
 {
 	const int n_parts = psr_pool_threads(pool);
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_scene seen = *scene;
 	struct psr_report report = { 0 };
 	struct plan *plan = &drawer->plan;
@@ -193,7 +193,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	seen.camera = kept->fit.camera;
 	seen.n_lights = 0;
 	kept->is_drawn = 0;
-	psr_settings_default(&settings, kept->fit.width, kept->fit.height);
+	render_settings_default(&settings, kept->fit.width, kept->fit.height);
 	settings.cull_tests = 0;
 	int rc = plan_make(plan, &seen, &settings, err);
 	if (rc)

@@ -1,5 +1,5 @@
 #include "base/maths.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render.h"
 
 uint32_t warp_gap(uint32_t width)

@@ -12,7 +12,7 @@
 #include "sample/pack/pack.h"
 #include "sample/project/projection.h"
 #include "psr/build.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 #include "surface/stipple.h"
 
@@ -213,7 +213,7 @@ static int prepare(struct build *build)
 	build->info.tolerance = options->tolerance;
 	build->info.resolution = options->resolution;
 	snprintf(build->info.builder, sizeof build->info.builder, "psr %s", PSR_VERSION);
-	rc = psr_pool_create(&build->pool, options->n_threads, 0);
+	rc = psr_pool_create(&build->pool, options->n_threads, NULL);
 	return rc == PSR_OK ? rc : psr_fail(build->err, rc, "%d threads cannot be started", options->n_threads);
 }
 

@@ -6,8 +6,10 @@
 
 #include <stdint.h>
 #include "base/maths.h"
-#include "psr/isa.h"
+#include "isa.h"
+#include "model/blocks.h"
 #include "psr/render.h"
+#include "zstack.h"
 
 /* A sample of a one-sided block faces away when its normal (psr_direction_tens) is more than this sine beyond
  * perpendicular: what normals are quantised to. [G] 7.3.2 gives such samples weight 0 when they are shaded; here they

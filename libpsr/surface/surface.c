@@ -5,7 +5,7 @@
 #include "material.h"
 #include "mip.h"
 #include "normal.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "surface.h"
 #include "texture.h"

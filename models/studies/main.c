@@ -7,8 +7,8 @@
 #include "models/json.h"
 #include "models/shapes/generators.h"
 #include "psr/build.h"
-#include "psr/cli.h"
-#include "psr/isa.h"
+#include "base/cli.h"
+#include "simd/isa.h"
 #include "tables/tables.h"
 
 #define MOST_MODELS 64
@@ -206,10 +206,10 @@ static int run_table(struct study *study, const char *models, const char *plot, 
 
 static int run_figure(struct study *study)
 {
-	int rc = psr_renderer_create(&study->renderer);
+	int rc = psr_renderer_create(&study->renderer, study->err);
 
 	if (rc != PSR_OK)
-		return psr_fail(study->err, rc, "no memory for a renderer");
+		return rc;
 	printf("%s ([G] %s)\n\n", study->kind->what, study->kind->figure);
 	rc = study->kind->run(study);
 	psr_renderer_destroy(study->renderer);
@@ -290,7 +290,7 @@ int main(int argc, char **argv)
 	study.resolution = (uint32_t)resolution;
 	study.n_threads = (int)n_threads;
 	study.has_bar = isatty(STDERR_FILENO);
-	if (code == PSR_OK && (code = psr_pool_create(&study.pool, study.n_threads, 0)) != PSR_OK)
+	if (code == PSR_OK && (code = psr_pool_create(&study.pool, study.n_threads, NULL)) != PSR_OK)
 		psr_fail(&err, code, "%d threads cannot be started", study.n_threads);
 	if (code == PSR_OK)
 		code = is_figure ? run_figure(&study) : run_table(&study, models, plot, json);

@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "adequacy.h"
 #include "surface/area.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "places.h"
 #include "surface/texture.h"

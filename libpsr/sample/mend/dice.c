@@ -4,7 +4,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "candidates.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "places.h"
 #include "surface/texture.h"

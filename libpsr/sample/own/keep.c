@@ -3,7 +3,7 @@
 #include "base/vec.h"
 #include "surface/blend.h"
 #include "sample/level.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 
 #define MOST_BLENDED 64

@@ -5,7 +5,7 @@
 #include "base/vec.h"
 #include "base/cell.h"
 #include "kept.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 
 #define FREE UINT64_MAX

@@ -1,7 +1,7 @@
 #include <string.h>
 #include "base/vec.h"
 #include "sample/level.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 
 /* A projection that sees the face itself at over 50 degrees does not own it, however the surface around it lies. */

@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "cone.h"
 #include "pack.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "visibility_mask.h"
 #include "visibility_mask_table.h"
 

@@ -5,7 +5,7 @@
 #include "sample/levels/draft.h"
 #include "psr/error.h"
 #include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 /* A cluster for each group and level, coarse levels first; in a cluster blocks are in the order of the Morton code of
  * their centres. Depths are quantised. The box of info is filled in; the rest of it must be set. MEMORY, LIMIT. */

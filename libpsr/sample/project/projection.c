@@ -2,7 +2,7 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "projection.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 /* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which
  * would be as far from one direction as from the next. */

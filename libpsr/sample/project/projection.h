@@ -6,7 +6,7 @@
 #ifndef PSR_SAMPLE_PROJECT_PROJECTION_H
 #define PSR_SAMPLE_PROJECT_PROJECTION_H
 
-#include "psr/model.h"
+#include "model/blocks.h"
 
 #define N_PROJECTIONS 32
 

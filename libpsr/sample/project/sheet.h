@@ -8,8 +8,8 @@
 #define PSR_SAMPLE_PROJECT_SHEET_H
 
 #include <stdint.h>
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 #define SHEET_BACK 0x80000000u /* in a sample's surface: met from the back */

@@ -3,7 +3,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "surface/area.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "look_out.h"
 #include "sample/mend/places.h"

@@ -5,7 +5,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 struct seen {

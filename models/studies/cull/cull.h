@@ -6,8 +6,8 @@
 #include <stdint.h>
 #include "ray/ray.h"
 #include "render/screen.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 
 #define CULL_NO_MASK (-1)
 #define CULL_FINEST 3 /* level of the triangles of directions: 512 of them */

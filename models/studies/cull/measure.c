@@ -5,7 +5,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "cull.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "psr/scene.h"
 
 #define ROUNDS 3
@@ -41,7 +41,7 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .color = { 0.8, 0.8, 0.8 } };
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
 		                       .ambient = { 0.2, 0.2, 0.2 } };
-	struct psr_settings settings;
+	struct render_settings settings;
 	uint64_t started;
 	int rc;
 
@@ -50,9 +50,9 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	v3d_add(scene.camera.target, eye->place, eye->frame[2]);
 	v3d_scale(scene.camera.up, eye->frame[1], -1);
 	v3d_sub(light.direction, eye->frame[2], eye->frame[0]);
-	psr_settings_default(&settings, m->frame.width, m->frame.height);
+	render_settings_default(&settings, m->frame.width, m->frame.height);
 	started = clock_thread_ns();
-	rc = psr_render(m->renderer, &scene, &settings, NULL, &m->frame, m->err);
+	rc = renderer_draw(m->renderer, &scene, &settings, NULL, &m->frame, m->err);
 	take_least(seconds, started);
 	return rc;
 }
@@ -158,7 +158,7 @@ static int measure_init(struct measure *m, int has_truth)
 	failed = m->frame.rgb == NULL || m->spare == NULL || (has_truth && m->n_seen == NULL);
 	for (int i = 0; i < m->n_choices; i++)
 		failed |= (m->is_kept[i] = psr_alloc_array(n, 1)) == NULL;
-	return failed || psr_renderer_create(&m->renderer) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
+	return failed || psr_renderer_create(&m->renderer, NULL) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 static void measure_fini(struct measure *m)

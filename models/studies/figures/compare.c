@@ -1,7 +1,7 @@
 #include "figures.h"
 
 struct compared {
-	struct figure_frame frame[FIGURE_MOST_WAYS]; /* of the view under way */
+	struct psr_frame frame[FIGURE_MOST_WAYS]; /* of the view under way */
 	struct figure_truth truth;
 	struct figure_score score[FIGURE_MOST_WAYS];
 	int n_ways;
@@ -64,7 +64,7 @@ int figure_compare(struct study *study, struct figure_sheet *sheet, const struct
 	int rc = PSR_OK;
 
 	while (rc == PSR_OK && way[c.n_ways].label != NULL)
-		rc = figure_frame_init(&c.frame[c.n_ways++], look->side, study->err);
+		rc = psr_frame_alloc(&c.frame[c.n_ways++], look->side, look->side, FIGURE_PLANES, study->err);
 	for (int v = 0; rc == PSR_OK && v < look->n_views; v++) {
 		rc = compare_view(study, &c, model, look, look->view[v], way);
 		if (rc == PSR_OK)
@@ -73,7 +73,7 @@ int figure_compare(struct study *study, struct figure_sheet *sheet, const struct
 	for (int w = 0; w < c.n_ways; w++) {
 		if (rc == PSR_OK)
 			figure_score_print(way[w].label, &c.score[w]);
-		figure_frame_fini(&c.frame[w]);
+		psr_frame_free(&c.frame[w]);
 	}
 	figure_truth_fini(&c.truth);
 	return rc;

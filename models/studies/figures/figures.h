@@ -4,7 +4,8 @@
 
 #include <stdint.h>
 #include "models/studies/lib/study.h"
-#include "psr/measure.h"
+#include "measure/measure.h"
+#include "render/stages.h"
 
 /* ---- scene.c: models, cameras, frames ---- */
 
@@ -24,7 +25,7 @@ void figure_model_fini(struct figure_model *model); /* a zeroed one is fine */
 /* What is drawn. The scene points into it: copy it by figure_shot_copy(). */
 struct figure_shot {
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_instance instance;
 	struct psr_light light[4];
 };
@@ -39,17 +40,9 @@ void figure_shot_copy(struct figure_shot *to, const struct figure_shot *from);
 #define FIGURE_VIEWS 6
 extern const double figure_view[FIGURE_VIEWS][3];
 
-struct figure_frame {
-	uint32_t side;
-	uint8_t *rgb;
-	float *depth;
-	uint8_t *weight; /* NULL; or the caller's own, to be filled */
-	struct psr_report report;
-};
-int figure_frame_init(struct figure_frame *frame, uint32_t side, struct psr_error *err);
-void figure_frame_fini(struct figure_frame *frame);
+#define FIGURE_PLANES (1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH) /* of a frame, to psr_frame_alloc() */
 
-typedef int figure_draw_fn(struct figure_frame *frame, struct study *study, const struct figure_shot *shot);
+typedef int figure_draw_fn(struct psr_frame *frame, struct study *study, const struct figure_shot *shot);
 
 figure_draw_fn figure_draw;         /* as it is */
 figure_draw_fn figure_draw_no_gaps; /* level buffers are emptied after the warp, so that they cover no pixel */
@@ -78,10 +71,10 @@ struct figure_score {
 };
 
 int figure_score_add(struct figure_score *score, struct study *study, const struct figure_model *model,
-                     const struct figure_shot *shot, const struct figure_frame *frame,
+                     const struct figure_shot *shot, const struct psr_frame *frame,
                      const struct figure_truth *truth);
 /* The same of the colours alone. */
-void figure_score_colors(struct figure_score *score, const struct figure_frame *frame,
+void figure_score_colors(struct figure_score *score, const struct psr_frame *frame,
                          const struct figure_truth *truth);
 void figure_score_print_head(const char *first);
 void figure_score_print(const char *label, const struct figure_score *score);

@@ -12,7 +12,7 @@
 
 struct filling {
 	struct figure_model model;
-	struct figure_frame before, after;
+	struct psr_frame before, after;
 	struct figure_truth truth;
 	struct figure_score score[2]; /* before, after */
 	uint64_t n_samples, n_gaps;   /* pixels with a sample; whose weight is below 1 */
@@ -73,12 +73,11 @@ int figure_fill(struct study *study)
 	int rc = figure_model_load(&f.model, study, "toybird", NULL, 256);
 
 	if (rc == PSR_OK)
-		rc = figure_frame_init(&f.before, SIDE, study->err);
+		rc = psr_frame_alloc(&f.before, SIDE, SIDE, FIGURE_PLANES, study->err);
 	if (rc == PSR_OK)
-		rc = figure_frame_init(&f.after, SIDE, study->err);
-	f.after.weight = malloc(PIXELS);
+		rc = psr_frame_alloc(&f.after, SIDE, SIDE, FIGURE_PLANES | 1u << PSR_PLANE_WEIGHT, study->err);
 	f.weights = malloc(3 * PIXELS);
-	if (rc == PSR_OK && (f.after.weight == NULL || f.weights == NULL))
+	if (rc == PSR_OK && f.weights == NULL)
 		rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for weights");
 	for (int v = FIGURE_VIEWS - 1; rc == PSR_OK && v >= 0; v--)
 		rc = draw_view(study, &f, figure_view[v]);
@@ -91,10 +90,9 @@ int figure_fill(struct study *study)
 		printf("\n%.1f %% of the pixels that have a sample are gaps, wholly or in part.\n",
 		       100.0 * (double)f.n_gaps / (double)f.n_samples);
 	}
-	free(f.after.weight);
 	free(f.weights);
-	figure_frame_fini(&f.before);
-	figure_frame_fini(&f.after);
+	psr_frame_free(&f.before);
+	psr_frame_free(&f.after);
 	figure_truth_fini(&f.truth);
 	figure_model_fini(&f.model);
 	return rc;

@@ -116,9 +116,9 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 }
 
 /* Gives back to pixels what the greatest coverage would leave them of their own samples. */
-static void open_interfaces(struct figure_frame *frame, const struct figure_frame *raw, const struct cover *cover)
+static void open_interfaces(struct psr_frame *frame, const struct psr_frame *raw, const struct cover *cover)
 {
-	for (size_t at = 0; at < (size_t)frame->side * frame->side; at++) {
+	for (size_t at = 0; at < (size_t)frame->width * frame->width; at++) {
 		const float share = (cover->greatest[at] - cover->closed[at]) / (1 - cover->closed[at]);
 
 		if (!(cover->greatest[at] > cover->closed[at]))
@@ -133,19 +133,19 @@ static void open_interfaces(struct figure_frame *frame, const struct figure_fram
 	}
 }
 
-static int draw_open(struct figure_frame *frame, struct study *study, const struct figure_shot *shot)
+static int draw_open(struct psr_frame *frame, struct study *study, const struct figure_shot *shot)
 {
-	const size_t n = (size_t)frame->side * frame->side;
+	const size_t n = (size_t)frame->width * frame->width;
 	struct cover cover = { malloc(n * sizeof(float)), malloc(n * sizeof(float)) };
-	struct figure_frame raw = { .side = 0 };
+	struct psr_frame raw = { .width = 0 };
 	struct psr_zstack *stack;
 	struct psr_report report;
-	int rc = figure_frame_init(&raw, frame->side, study->err);
+	int rc = psr_frame_alloc(&raw, frame->width, frame->width, FIGURE_PLANES, study->err);
 
 	if (rc == PSR_OK && (cover.closed == NULL || cover.greatest == NULL))
 		rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for weights");
 	if (rc == PSR_OK)
-		rc = psr_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &report, study->err);
+		rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &report, study->err);
 	if (rc == PSR_OK) {
 		find_weights(&cover, stack, shot);
 		rc = figure_draw_no_gaps(&raw, study, shot);
@@ -154,7 +154,7 @@ static int draw_open(struct figure_frame *frame, struct study *study, const stru
 		rc = figure_draw(frame, study, shot);
 	if (rc == PSR_OK)
 		open_interfaces(frame, &raw, &cover);
-	figure_frame_fini(&raw);
+	psr_frame_free(&raw);
 	free(cover.closed);
 	free(cover.greatest);
 	return rc;

@@ -69,7 +69,7 @@ void figure_shot_init(struct figure_shot *shot, const struct figure_model *model
 	double unit[3], forward[3];
 
 	memset(shot, 0, sizeof *shot);
-	psr_settings_default(&shot->settings, side, side);
+	render_settings_default(&shot->settings, side, side);
 	shot->instance = (struct psr_instance){ .model = model->model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	shot->scene.instance = &shot->instance;
 	shot->scene.n_instances = 1;
@@ -94,33 +94,11 @@ void figure_shot_copy(struct figure_shot *to, const struct figure_shot *from)
 	to->scene.light = to->light;
 }
 
-int figure_frame_init(struct figure_frame *frame, uint32_t side, struct psr_error *err)
+static int draw(struct psr_frame *frame, struct study *study, const struct figure_shot *shot, int has_gaps)
 {
-	const size_t n = (size_t)side * side;
-
-	*frame = (struct figure_frame){ .side = side };
-	frame->rgb = malloc(3 * n);
-	frame->depth = malloc(n * sizeof *frame->depth);
-	if (frame->rgb != NULL && frame->depth != NULL)
-		return PSR_OK;
-	figure_frame_fini(frame);
-	return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %ux%u", side, side);
-}
-
-void figure_frame_fini(struct figure_frame *frame)
-{
-	free(frame->rgb);
-	free(frame->depth);
-	frame->rgb = NULL;
-	frame->depth = NULL;
-}
-
-static int draw(struct figure_frame *frame, struct study *study, const struct figure_shot *shot, int has_gaps)
-{
-	struct psr_frame to = { .width = frame->side, .height = frame->side, .rgb = frame->rgb, .depth = frame->depth,
-		                    .weight = frame->weight };
 	struct psr_zstack *stack;
-	int rc = psr_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &to.report, study->err);
+	int rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &frame->report,
+	                       study->err);
 
 	for (int k = 1; rc == PSR_OK && !has_gaps && k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const size_t n = (size_t)stack->level[k].width * stack->level[k].height;
@@ -128,18 +106,15 @@ static int draw(struct figure_frame *frame, struct study *study, const struct fi
 		for (size_t i = 0; (stack->levels >> k & 1) && i < n; i++)
 			stack->level[k].z[i] = INFINITY;
 	}
-	if (rc == PSR_OK)
-		rc = psr_finish(study->renderer, stack, study->pool, &to, study->err);
-	frame->report = to.report;
-	return rc;
+	return rc == PSR_OK ? renderer_finish(study->renderer, stack, study->pool, frame, study->err) : rc;
 }
 
-int figure_draw(struct figure_frame *frame, struct study *study, const struct figure_shot *shot)
+int figure_draw(struct psr_frame *frame, struct study *study, const struct figure_shot *shot)
 {
 	return draw(frame, study, shot, 1);
 }
 
-int figure_draw_no_gaps(struct figure_frame *frame, struct study *study, const struct figure_shot *shot)
+int figure_draw_no_gaps(struct psr_frame *frame, struct study *study, const struct figure_shot *shot)
 {
 	return draw(frame, study, shot, 0);
 }

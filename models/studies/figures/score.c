@@ -24,7 +24,7 @@ int figure_difference(const uint8_t *a, const uint8_t *b)
 	return most;
 }
 
-static void add_pixel(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth,
+static void add_pixel(struct figure_score *score, const struct psr_frame *frame, const struct figure_truth *truth,
                       uint32_t x, uint32_t y)
 {
 	const size_t at = (size_t)y * truth->side + x;
@@ -39,7 +39,7 @@ static void add_pixel(struct figure_score *score, const struct figure_frame *fra
 	score->square += square;
 	if (2 * truth->n_met[at] >= truth->rays * truth->rays) {
 		score->n_half++;
-		score->n_missing += !isfinite(frame->depth[at]);
+		score->n_missing += frame->depth != NULL && !isfinite(frame->depth[at]);
 	}
 	if (inside) {
 		score->n_inside++;
@@ -48,7 +48,7 @@ static void add_pixel(struct figure_score *score, const struct figure_frame *fra
 	}
 }
 
-void figure_score_colors(struct figure_score *score, const struct figure_frame *frame, const struct figure_truth *truth)
+void figure_score_colors(struct figure_score *score, const struct psr_frame *frame, const struct figure_truth *truth)
 {
 	for (uint32_t y = 0; y < truth->side; y++)
 		for (uint32_t x = 0; x < truth->side; x++)
@@ -56,10 +56,10 @@ void figure_score_colors(struct figure_score *score, const struct figure_frame *
 }
 
 int figure_score_add(struct figure_score *score, struct study *study, const struct figure_model *model,
-                     const struct figure_shot *shot, const struct figure_frame *frame, const struct figure_truth *truth)
+                     const struct figure_shot *shot, const struct psr_frame *frame, const struct figure_truth *truth)
 {
 	struct psr_accuracy accuracy;
-	int rc = psr_accuracy_measure(&accuracy, model->truth, &shot->scene.camera, frame->side, frame->side,
+	int rc = psr_accuracy_measure(&accuracy, model->truth, &shot->scene.camera, frame->width, frame->width,
 	                              frame->depth, model->spacing, study->n_threads, study->err);
 
 	if (rc != PSR_OK)
@@ -77,7 +77,7 @@ double figure_psnr(uint64_t square, uint64_t n_pixels)
 
 void figure_score_print_head(const char *first)
 {
-	printf("%-34s %8s %9s %8s %9s %9s  %8s %7s %11s\n", first, "holes", "a million", "outside", "a million", "missing",
+	printf("%-32s %6s %8s %7s %8s %8s %7s %6s %10s\n", first, "holes", "/million", "outside", "/million", "missing",
 	       "PSNR dB", "inside", "difference");
 }
 
@@ -88,7 +88,7 @@ static double million(uint64_t n, uint64_t all)
 
 void figure_score_print(const char *label, const struct figure_score *s)
 {
-	printf("%-34s %8" PRIu64 " %9.1f %8" PRIu64 " %9.1f %9.1f  %8.2f %7.2f %11.2f\n", label, s->n_holes,
+	printf("%-32s %6" PRIu64 " %8.1f %7" PRIu64 " %8.1f %8.1f %7.2f %6.2f %10.2f\n", label, s->n_holes,
 	       million(s->n_holes, s->n_inside), s->n_outside, million(s->n_outside, s->n_met),
 	       million(s->n_missing, s->n_half), figure_psnr(s->square, s->n_met),
 	       figure_psnr(s->inside_square, s->n_inside),

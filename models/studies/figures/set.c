@@ -33,17 +33,17 @@ int figure_set(struct study *study)
 
 /* ---- edges ---- */
 
-static void average(struct figure_frame *to, const struct figure_frame *fine)
+static void average(struct psr_frame *to, const struct psr_frame *fine)
 {
-	const uint32_t n = fine->side / to->side;
+	const uint32_t n = fine->width / to->width;
 
-	for (size_t at = 0; at < (size_t)to->side * to->side; at++) {
-		const size_t first = at / to->side * n * fine->side + at % to->side * n;
+	for (size_t at = 0; at < (size_t)to->width * to->width; at++) {
+		const size_t first = at / to->width * n * fine->width + at % to->width * n;
 		float sum[3] = { 0, 0, 0 };
 
 		to->depth[at] = INFINITY;
 		for (uint32_t i = 0; i < n * n; i++) {
-			const size_t from = first + i / n * fine->side + i % n;
+			const size_t from = first + i / n * fine->width + i % n;
 
 			to->depth[at] = fminf(to->depth[at], fine->depth[from]);
 			for (size_t c = 0; c < 3; c++)
@@ -55,20 +55,20 @@ static void average(struct figure_frame *to, const struct figure_frame *fine)
 }
 
 /* [G] 9.1.1: at double the resolution. */
-static int draw_twice(struct figure_frame *frame, struct study *study, const struct figure_shot *shot)
+static int draw_twice(struct psr_frame *frame, struct study *study, const struct figure_shot *shot)
 {
 	struct figure_shot other;
-	struct figure_frame fine;
-	int rc = figure_frame_init(&fine, 2 * frame->side, study->err);
+	struct psr_frame fine;
+	int rc = psr_frame_alloc(&fine, 2 * frame->width, 2 * frame->width, FIGURE_PLANES, study->err);
 
 	if (rc != PSR_OK)
 		return rc;
 	figure_shot_copy(&other, shot);
-	other.settings.width = other.settings.height = fine.side;
+	other.settings.width = other.settings.height = fine.width;
 	rc = figure_draw(&fine, study, &other);
 	if (rc == PSR_OK)
 		average(frame, &fine);
-	figure_frame_fini(&fine);
+	psr_frame_free(&fine);
 	return rc;
 }
 
@@ -78,16 +78,16 @@ static void make_smooth(struct figure_shot *shot)
 }
 
 /* The last pass but one of a still. */
-static int draw_refined(struct figure_frame *frame, struct study *study, const struct figure_shot *shot)
+static int draw_refined(struct psr_frame *frame, struct study *study, const struct figure_shot *shot)
 {
-	struct psr_frame to = { .width = frame->side, .height = frame->side, .rgb = frame->rgb, .depth = frame->depth };
-	struct psr_refiner *refiner = NULL;
-	int rc;
+	struct render_settings settings = shot->settings;
+	struct refiner *refiner = NULL;
+	int rc = refiner_create(&refiner, study->renderer, study->err);
 
-	if (psr_refiner_create(&refiner, study->renderer) != PSR_OK)
-		return psr_fail(study->err, PSR_ERR_MEMORY, "no memory for passes");
-	rc = psr_refine(refiner, &shot->scene, &shot->settings, PASS, study->pool, NULL, NULL, &to, study->err);
-	psr_refiner_destroy(refiner);
+	settings.pass = PASS;
+	if (rc == PSR_OK)
+		rc = refiner_draw(refiner, &shot->scene, &settings, study->pool, frame, study->err);
+	refiner_destroy(refiner);
 	return rc;
 }
 

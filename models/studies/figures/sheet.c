@@ -1,4 +1,3 @@
-#include <png.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,36 +35,34 @@ void figure_sheet_drop(struct figure_sheet *sheet, uint32_t n_cells)
 		free(sheet->cell[--sheet->n_cells]);
 }
 
-static void paste(uint8_t *to, const png_image *image, const struct figure_sheet *sheet, uint32_t i)
+static void paste(const struct psr_frame *to, const struct figure_sheet *sheet, uint32_t i)
 {
 	const uint32_t left = i % sheet->columns * (sheet->width + GUTTER);
 	const uint32_t top = i / sheet->columns * (sheet->height + GUTTER);
 
 	for (uint32_t y = 0; y < sheet->height; y++)
-		memcpy(to + 3 * ((size_t)(top + y) * image->width + left), sheet->cell[i] + (size_t)3 * y * sheet->width,
+		memcpy(to->rgb + 3 * ((size_t)(top + y) * to->width + left), sheet->cell[i] + (size_t)3 * y * sheet->width,
 		       (size_t)3 * sheet->width);
 }
 
 static int write_sheet(const struct figure_sheet *sheet, const struct study *study, const char *name)
 {
 	const uint32_t rows = (sheet->n_cells + sheet->columns - 1) / sheet->columns;
-	png_image image = { .version = PNG_IMAGE_VERSION, .format = PNG_FORMAT_RGB,
-		                .width = sheet->columns * (sheet->width + GUTTER) - GUTTER,
-		                .height = rows * (sheet->height + GUTTER) - GUTTER };
-	uint8_t *rgb = malloc(PNG_IMAGE_SIZE(image));
+	struct psr_frame frame;
 	char path[1024];
-	int rc = PSR_OK;
+	int rc;
 
-	if (rgb == NULL)
-		return psr_fail(study->err, PSR_ERR_MEMORY, "no memory for a sheet of pictures");
-	memset(rgb, 0xff, PNG_IMAGE_SIZE(image));
-	for (uint32_t i = 0; i < sheet->n_cells; i++)
-		paste(rgb, &image, sheet, i);
 	if (snprintf(path, sizeof path, "%s/%s.png", study->out, name) >= (int)sizeof path)
-		rc = psr_fail(study->err, PSR_ERR_ARG, "--out: the folder's name is too long");
-	else if (!png_image_write_to_file(&image, path, 0, rgb, 0, NULL))
-		rc = psr_fail(study->err, PSR_ERR_IO, "%.200s cannot be written: %s", path, image.message);
-	free(rgb);
+		return psr_fail(study->err, PSR_ERR_ARG, "--out: the folder's name is too long");
+	rc = psr_frame_alloc(&frame, sheet->columns * (sheet->width + GUTTER) - GUTTER,
+	                     rows * (sheet->height + GUTTER) - GUTTER, 1u << PSR_PLANE_COLOR, study->err);
+	if (rc != PSR_OK)
+		return rc;
+	memset(frame.rgb, 0xff, (size_t)3 * frame.width * frame.height);
+	for (uint32_t i = 0; i < sheet->n_cells; i++)
+		paste(&frame, sheet, i);
+	rc = psr_image_write(&frame, path, study->err);
+	psr_frame_free(&frame);
 	return rc;
 }
 

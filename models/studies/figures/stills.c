@@ -10,30 +10,30 @@
 
 struct still {
 	struct study *study;
-	struct psr_refiner *refiner;
-	struct figure_frame frame;
+	struct refiner *refiner;
+	struct psr_frame frame;
 	struct figure_truth truth;
 	struct figure_shot shot;
 };
 
 static int show_pass(struct still *still, unsigned pass, int is_smooth)
 {
-	struct psr_frame to = { .width = SIDE, .height = SIDE, .rgb = still->frame.rgb };
 	struct figure_score score = { .n_met = 0 };
 	double least = INFINITY;
 
 	still->shot.settings.is_smooth = is_smooth;
+	still->shot.settings.pass = pass;
 	for (int trial = 0; trial < TRIALS; trial++) {
 		const uint64_t start = clock_ns();
-		const int rc = psr_refine(still->refiner, &still->shot.scene, &still->shot.settings, pass, still->study->pool,
-		                          NULL, NULL, &to, still->study->err);
+		const int rc = refiner_draw(still->refiner, &still->shot.scene, &still->shot.settings, still->study->pool,
+		                            &still->frame, still->study->err);
 
 		if (rc != PSR_OK)
 			return rc;
 		least = fmin(least, (double)(clock_ns() - start) * 1e-6);
 	}
 	figure_score_colors(&score, &still->frame, &still->truth);
-	printf(" %6.2f %6.1f", figure_psnr(score.square, score.n_met), least);
+	printf(" %5.2f %6.1f", figure_psnr(score.square, score.n_met), least);
 	return PSR_OK;
 }
 
@@ -41,7 +41,7 @@ static int show_row(struct still *still, const char *name, uint32_t resolution)
 {
 	int rc;
 
-	printf("%-10s %10u %5.2f |", name, resolution, (double)SIDE / resolution);
+	printf("%-6s %5u %5.2f |", name, resolution, (double)SIDE / resolution);
 	rc = show_pass(still, 0, 0);
 	if (rc == PSR_OK)
 		rc = show_pass(still, 0, 1);
@@ -78,22 +78,22 @@ int figure_stills(struct study *study)
 {
 	static const char *const name[] = { "teapot", "dragon", "wheel" };
 	struct still still = { .study = study };
-	int rc = figure_frame_init(&still.frame, SIDE, study->err);
+	int rc = psr_frame_alloc(&still.frame, SIDE, SIDE, 1u << PSR_PLANE_COLOR, study->err);
 
-	if (rc == PSR_OK && psr_refiner_create(&still.refiner, study->renderer) != PSR_OK)
-		rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for passes");
-	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-10s %10s %5s |", RAYS * RAYS,
-	       SIDE, SIDE, study->n_threads, "", "model's", "pixels");
+	if (rc == PSR_OK)
+		rc = refiner_create(&still.refiner, study->renderer, study->err);
+	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-6s %5s %5s |", RAYS * RAYS,
+	       SIDE, SIDE, study->n_threads, "", "model", "px");
 	for (int i = 0; i < 2 + PSR_MAX_PASS; i++)
-		printf(" %6s %6s", "dB", "ms");
-	printf("\n%-10s %10s %5s | %13s %13s", "", "resolution", "apart", "one pass", "smooth");
+		printf(" %5s %6s", "dB", "ms");
+	printf("\n%-6s %5s %5s | %12s %12s", "", "res.", "apart", "one pass", "smooth");
 	for (int pass = 1; pass <= PSR_MAX_PASS; pass++)
-		printf("     pass %d    ", pass);
+		printf("%12s%d", "pass ", pass);
 	puts("");
 	for (size_t m = 0; rc == PSR_OK && m < sizeof name / sizeof *name; m++)
 		rc = show_object(&still, name[m]);
-	psr_refiner_destroy(still.refiner);
+	refiner_destroy(still.refiner);
 	figure_truth_fini(&still.truth);
-	figure_frame_fini(&still.frame);
+	psr_frame_free(&still.frame);
 	return rc;
 }

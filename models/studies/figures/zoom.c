@@ -42,7 +42,7 @@ const char figure_zoom_plot[] =
 /* Picture i is in slot i & 1, beside the one before. */
 struct zoom {
 	struct figure_model model;
-	struct figure_frame frame[2][2]; /* plain and smooth ones */
+	struct psr_frame frame[2][2]; /* plain and smooth ones */
 	struct figure_truth truth[2];
 };
 
@@ -154,10 +154,10 @@ static void print_row(const struct study_table *table, int i)
 {
 	const double *row = study_at(table, i, 0, 0);
 
-	printf("%-6d %8.4f %8.2f %8.2f", i, row[MAGNIFICATION], row[SAMPLES], row[TRUTH]);
+	printf("%-5d %7.4f %7.2f %7.2f", i, row[MAGNIFICATION], row[SAMPLES], row[TRUTH]);
 	for (const double *way = row + PLAIN; way < row + N_COLUMNS; way += SMOOTH)
-		printf(" | %8.2f %8.2f %8.2f %8.2f", way[PSNR], way[INSIDE], way[CHANGE], way[BEYOND]);
-	printf("%s\n", changes_level(table, i) ? " levels change" : "");
+		printf(" | %7.2f %7.2f %7.2f %7.2f", way[PSNR], way[INSIDE], way[CHANGE], way[BEYOND]);
+	printf("%s\n", changes_level(table, i) ? " *" : "");
 }
 
 static void print_means(const struct study_table *table)
@@ -174,17 +174,17 @@ static void print_means(const struct study_table *table)
 		for (int way = 0; way < 2; way++)
 			sum[kind_of][1 + way] += *study_at(table, i, 0, PLAIN + way * SMOOTH + BEYOND);
 	}
-	printf("\nmean, codes                  truth's change   beyond it   smooth\n");
+	printf("*: levels change\n\nmean, codes                  truth's change   beyond it   smooth\n");
 	for (int k = 0; k < 3; k++)
 		printf("%3d steps %-18s %14.2f %11.2f %8.2f\n", n[k], step[k], sum[k][0] / n[k], sum[k][1] / n[k], sum[k][2] / n[k]);
 }
 
 static void print(const struct study_table *table, const int order[FRAMES])
 {
-	printf("%-6s %8s %8s %8s | plain: %28s | smooth\n%-6s %8s %8s %8s", "", "", "samples", "truth's", "", "frame", "magn.",
+	printf("%-5s %7s %7s %7s | plain: %24s | smooth\n%-5s %7s %7s %7s", "", "", "samples", "truth's", "", "frame", "magn.",
 	       "a pixel", "change");
 	for (int way = 0; way < 2; way++)
-		printf(" | %8s %8s %8s %8s", "PSNR dB", "inside", "change", "beyond");
+		printf(" | %7s %7s %7s %7s", "PSNR dB", "inside", "change", "beyond");
 	printf("\n");
 	for (int k = 0; k < WORST; k++)
 		print_row(table, order[k]);
@@ -245,7 +245,7 @@ int figure_zoom(struct study *study)
 	char path[1024];
 
 	for (int k = 0; rc == PSR_OK && k < 4; k++)
-		rc = figure_frame_init(&zoom.frame[k / 2][k % 2], SIDE, study->err);
+		rc = psr_frame_alloc(&zoom.frame[k / 2][k % 2], SIDE, SIDE, FIGURE_PLANES, study->err);
 	if (rc == PSR_OK)
 		rc = study_table_init(table, (struct study_form){ "frame", columns, N_COLUMNS }, FRAMES, 1, study->err);
 	if (rc == PSR_OK)
@@ -261,8 +261,8 @@ int figure_zoom(struct study *study)
 		rc = study_plot(study, path, study->err);
 	study_table_fini(table);
 	for (int k = 0; k < 2; k++) {
-		figure_frame_fini(&zoom.frame[0][k]);
-		figure_frame_fini(&zoom.frame[1][k]);
+		psr_frame_free(&zoom.frame[0][k]);
+		psr_frame_free(&zoom.frame[1][k]);
 		figure_truth_fini(&zoom.truth[k]);
 	}
 	figure_model_fini(&zoom.model);

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "models/shapes/generators.h"
 #include "models/shapes/glb.h"
 #include "psr/build.h"
@@ -24,7 +25,7 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 		code = psr_fail(err, PSR_ERR_IO, "%s: cannot make a folder there for %s.glb; set TMPDIR to one", place, name);
 	else if (code == PSR_OK) {
 		snprintf(path, sizeof path, "%s/%s.glb", place, name);
-		code = glb_write(path, bytes, n_bytes, err);
+		code = outfile_save(path, OUTFILE_DURABLE, bytes, n_bytes, err);
 		if (code == PSR_OK)
 			code = psr_mesh_import(mesh, path, NULL, err);
 		unlink(path);

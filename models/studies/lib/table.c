@@ -80,21 +80,27 @@ static const char *cell(char text[32], const struct study_table *table, int row,
 	return text;
 }
 
+#define PAGE_COLUMNS 100
+
 void study_table_print(const struct study_table *table, FILE *to)
 {
-	int width[STUDY_MOST_COLUMNS + 1] = { 0 }; /* of column c: width[c + 1] */
+	int width[STUDY_MOST_COLUMNS + 1] = { 0 }, all = 0, gap; /* of column c: width[c + 1] */
 	char text[32];
 
-	for (int row = -1; row < table->n_rows; row++)
-		for (int c = -1; c < table->n_columns; c++) {
+	for (int c = -1; c < table->n_columns; c++) {
+		for (int row = -1; row < table->n_rows; row++) {
 			const int n = (int)strlen(cell(text, table, row, c));
 
 			width[c + 1] = n > width[c + 1] ? n : width[c + 1];
 		}
+		all += width[c + 1];
+	}
+	/* One space between columns where that fits a page and two do not. */
+	gap = all + 2 * table->n_columns > PAGE_COLUMNS && all + table->n_columns <= PAGE_COLUMNS ? 1 : 2;
 	for (int row = -1; row < table->n_rows; row++) {
 		fprintf(to, "%-*s", width[0], cell(text, table, row, -1));
 		for (int c = 0; c < table->n_columns; c++)
-			fprintf(to, "  %*s", width[c + 1], cell(text, table, row, c));
+			fprintf(to, "%*s", gap + width[c + 1], cell(text, table, row, c));
 		fputc('\n', to);
 	}
 }

@@ -5,7 +5,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "base/random.h"
 #include "surface/area.h"
 

@@ -5,7 +5,7 @@
 #include "base/vec.h"
 #include "psr/error.h"
 #include "psr/mesh.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 /* A sample, in inner units (psr/model.h). */

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "model.h"
 
 #define RESOLUTION 128 /* levels of 128 and 64 */

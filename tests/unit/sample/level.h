@@ -3,8 +3,8 @@
 #define TESTS_SAMPLE_LEVEL_H
 
 #include "base/vec.h"
-#include "psr/direction.h"
-#include "psr/pool.h"
+#include "base/direction.h"
+#include "base/pool.h"
 #include "surface/area.h"
 #include "sample/level.h"
 #include "sample/project/projection.h"

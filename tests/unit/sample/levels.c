@@ -5,7 +5,7 @@
 #include <cmocka.h>
 #include <stdio.h>
 #include "base/srgb.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "model.h"
 
 #define RESOLUTION 256 /* levels of 256, 128 and 64 */

@@ -23,7 +23,7 @@ static void look_at(struct looked *looked, struct psr_mesh *mesh, double ds, int
 
 	looked->mesh = mesh;
 	assert_int_equal(ray_scene_create(&looked->scene, mesh, zero, 1, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
 	assert_int_equal(seen_init(&looked->seen, ds), PSR_OK);
 	assert_int_equal(seen_look(&looked->seen, looked->scene, SEEN_ENOUGH, pool), PSR_OK);
 	psr_pool_destroy(pool);
@@ -218,7 +218,7 @@ static void looking_ends_soon_where_nothing_hides(void **state)
 	assert_in_range(soup.seen.n_views, 2 * ball.seen.n_views, SEEN_MOST_VIEWS);
 	/* Asked again it goes on with other views. */
 	n_views = ball.seen.n_views;
-	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
 	assert_int_equal(seen_look(&ball.seen, ball.scene, SEEN_ENOUGH, pool), PSR_OK);
 	assert_int_equal(ball.seen.n_views, n_views + SEEN_LEAST_VIEWS);
 	psr_pool_destroy(pool);

@@ -27,7 +27,7 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 		projection.axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 	traced->mesh = mesh;
 	assert_int_equal(ray_scene_create(&traced->scene, mesh, zero, 1, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
 	assert_int_equal(sheets_trace(&traced->sheets, NULL, traced->scene, mesh, NULL, &projection, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
@@ -201,7 +201,7 @@ static void both_sides_are_traced_at_once(void **state)
 		turned.axis[0][k] = -turned.axis[0][k];
 		turned.axis[2][k] = -turned.axis[2][k];
 	}
-	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
 	assert_int_equal(sheets_trace(&front, &behind, traced.scene, mesh, NULL, &traced.sheets.projection, pool), PSR_OK);
 	assert_int_equal(sheets_trace(&alone, NULL, traced.scene, mesh, NULL, &turned, pool), PSR_OK);
 	assert_memory_equal(behind.projection.axis, turned.axis, sizeof turned.axis);

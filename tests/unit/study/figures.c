@@ -41,7 +41,7 @@ static int set_up(void **state)
 
 	assert_non_null(f);
 	f->study = (struct study){ .err = &f->err, .n_threads = 1 };
-	assert_int_equal(psr_renderer_create(&f->study.renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&f->study.renderer, NULL), PSR_OK);
 	assert_int_equal(figure_model_load(&f->model, &f->study, "plates", make_plates, 64), PSR_OK);
 	figure_shot_init(&f->shot, &f->model, toward, 1, SIDE);
 	*state = f;
@@ -125,9 +125,9 @@ static void the_truth_scores_no_error(void **state)
 {
 	struct fixture *f = *state;
 	struct figure_score score = { .n_met = 0 };
-	struct figure_frame frame;
+	struct psr_frame frame;
 
-	assert_int_equal(figure_frame_init(&frame, SIDE, &f->err), PSR_OK);
+	assert_int_equal(psr_frame_alloc(&frame, SIDE, SIDE, FIGURE_PLANES, &f->err), PSR_OK);
 	draw(f);
 	assert_int_equal(figure_draw(&frame, &f->study, &f->shot), PSR_OK);
 	memcpy(frame.rgb, f->truth.rgb, 3 * SIDE * SIDE);
@@ -138,7 +138,7 @@ static void the_truth_scores_no_error(void **state)
 	frame.rgb[3 * first_whole(f) + 1] ^= 4;
 	figure_score_colors(&score, &frame, &f->truth);
 	assert_int_equal(score.square, 16);
-	figure_frame_fini(&frame);
+	psr_frame_free(&frame);
 }
 
 static void a_part_is_found_where_the_first_way_is_worse(void **state)

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "surface/validate.h"
 #include "models/studies/greedy/parts.h"
 #include "tests/unit/sample/meshes.h"
@@ -374,7 +374,7 @@ static void threads_and_what_came_before_change_nothing(void **state)
 	size_t n, m;
 
 	(void)state;
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	one = scan(&object, 48, GREEDY_EQUILATERAL, GREEDY_CORNERS, NULL);
 	four = scan(&object, 48, GREEDY_EQUILATERAL, GREEDY_CORNERS, pool);
 	assert_int_equal(one->n_views, 290);
