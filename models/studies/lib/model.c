@@ -39,9 +39,9 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 static int prepare(struct study_model *model, int code, struct psr_error *err)
 {
 	if (code == PSR_OK)
-		code = door_check_mesh(model->mesh, err);
+		code = validate_mesh(model->mesh, err);
 	if (code == PSR_OK)
-		code = door_bound_mesh(model->mesh, model->origin, &model->scale, err);
+		code = validate_bound_mesh(model->mesh, model->origin, &model->scale, err);
 	if (code == PSR_OK)
 		code = ray_scene_create(&model->scene, model->mesh, model->origin, model->scale, err);
 	if (code == PSR_OK)

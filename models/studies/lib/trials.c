@@ -7,7 +7,7 @@
 #include "base/mem.h"
 #include "base/direction.h"
 #include "base/random.h"
-#include "surface/area.h"
+#include "ray/area.h"
 
 #define PI 3.14159265358979323846
 #define SEED UINT64_C(0x5053525354554459)
@@ -114,26 +114,6 @@ static int make_view(struct trials *trials, struct trial_view *view, int n)
 	return PSR_OK;
 }
 
-static int sum_areas(struct trials *trials)
-{
-	double sum = 0;
-
-	trials->area = psr_alloc_array(trials->mesh->n_triangles, sizeof *trials->area);
-	if (trials->area == NULL)
-		return PSR_ERR_MEMORY;
-	for (uint32_t i = 0; i < trials->mesh->n_triangles; i++) {
-		double corner[3][3], e1[3], e2[3], n[3];
-
-		ray_scene_corners(trials->scene, i, corner);
-		v3d_sub(e1, corner[1], corner[0]);
-		v3d_sub(e2, corner[2], corner[0]);
-		v3d_cross(n, e1, e2);
-		sum += v3d_length(n) / 2;
-		trials->area[i] = sum;
-	}
-	return PSR_OK;
-}
-
 int trials_create(struct trials **out, const struct psr_mesh *mesh, const struct ray_scene *scene, int n_views,
                   int n_a_view, struct psr_error *err)
 {
@@ -147,7 +127,10 @@ int trials_create(struct trials **out, const struct psr_mesh *mesh, const struct
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for trials");
 	*trials = (struct trials){ .mesh = mesh, .scene = scene, .random = SEED, .n_views = n_views };
 	trials->view = calloc((size_t)n_views, sizeof *trials->view);
-	rc = trials->view == NULL ? PSR_ERR_MEMORY : sum_areas(trials);
+	trials->area = psr_alloc_array((size_t)mesh->n_triangles + mesh->n_points, sizeof *trials->area);
+	rc = trials->view == NULL || trials->area == NULL ? PSR_ERR_MEMORY : PSR_OK;
+	if (rc == PSR_OK)
+		area_sum(scene, mesh, 1, trials->area); /* only triangles are tried: their sums need no scale */
 	for (int v = 0; rc == PSR_OK && v < n_views; v++)
 		rc = make_view(trials, &trials->view[v], n_a_view);
 	if (rc != PSR_OK) {

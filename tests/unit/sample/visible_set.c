@@ -13,7 +13,7 @@
 struct looked {
 	struct psr_mesh *mesh;
 	struct ray_scene *scene;
-	struct seen seen;
+	struct visible_set visible;
 };
 
 static void look_at(struct looked *looked, struct psr_mesh *mesh, double ds, int n_threads)
@@ -24,14 +24,14 @@ static void look_at(struct looked *looked, struct psr_mesh *mesh, double ds, int
 	looked->mesh = mesh;
 	assert_int_equal(ray_scene_create(&looked->scene, mesh, zero, 1, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
-	assert_int_equal(seen_init(&looked->seen, ds), PSR_OK);
-	assert_int_equal(seen_look(&looked->seen, looked->scene, SEEN_ENOUGH, pool), PSR_OK);
+	assert_int_equal(visible_set_init(&looked->visible, ds), PSR_OK);
+	assert_int_equal(visible_set_look(&looked->visible, looked->scene, VISIBLE_ENOUGH, pool), PSR_OK);
 	psr_pool_destroy(pool);
 }
 
 static void look_away(struct looked *looked)
 {
-	seen_fini(&looked->seen);
+	visible_set_fini(&looked->visible);
 	ray_scene_destroy(looked->scene);
 	meshes_free(looked->mesh);
 }
@@ -54,8 +54,8 @@ static void count_sides(const struct looked *looked, double half, int *n, int *n
 				p[(axis + 2) % 3] = (float)b;
 				v3f_scale(back, normal, -1);
 				*n += 1;
-				*n_outside += seen_is(&looked->seen, p, normal);
-				*n_inside += seen_is(&looked->seen, p, back);
+				*n_outside += visible_set_has(&looked->visible, p, normal);
+				*n_inside += visible_set_has(&looked->visible, p, back);
 			}
 		}
 	}
@@ -129,8 +129,8 @@ static void holes_of_a_mask_are_looked_through(void **state)
 	mesh->material->alpha_cutoff = 0.5f;
 	mesh->material->base_texture.is_nearest = 1;
 	look_at(&looked, mesh, DS, 2);
-	assert_true(seen_is(&looked.seen, solid, up));
-	assert_false(seen_is(&looked.seen, hole, up));
+	assert_true(visible_set_has(&looked.visible, solid, up));
+	assert_false(visible_set_has(&looked.visible, hole, up));
 	look_away(&looked);
 }
 
@@ -144,8 +144,8 @@ static void what_is_seen_does_not_depend_on_threads(void **state)
 	(void)state;
 	for (int i = 0; i < 3; i++) {
 		look_at(&looked[i], meshes_sphere(20, (const double[3]){ 0, 0, 0 }, 1), 2.0 / 256, i + 1);
-		assert_int_equal(looked[i].seen.n_views, looked[0].seen.n_views);
-		assert_int_equal(looked[i].seen.n_cells, looked[0].seen.n_cells);
+		assert_int_equal(looked[i].visible.n_views, looked[0].visible.n_views);
+		assert_int_equal(looked[i].visible.table.n, looked[0].visible.table.n);
 	}
 	for (int i = 0; i < 200000; i++) {
 		float p[3], n[3];
@@ -158,9 +158,9 @@ static void what_is_seen_does_not_depend_on_threads(void **state)
 		if (v3f_normalize(n, n) == 0 || v3f_normalize(p, p) == 0)
 			continue;
 		v3f_scale(p, p, (float)(0.97 + 0.05 * meshes_random(&seed)));
-		is_seen = seen_is(&looked[0].seen, p, n);
-		assert_int_equal(seen_is(&looked[1].seen, p, n), is_seen);
-		assert_int_equal(seen_is(&looked[2].seen, p, n), is_seen);
+		is_seen = visible_set_has(&looked[0].visible, p, n);
+		assert_int_equal(visible_set_has(&looked[1].visible, p, n), is_seen);
+		assert_int_equal(visible_set_has(&looked[2].visible, p, n), is_seen);
 		n_seen += is_seen;
 	}
 	assert_in_range(n_seen, 20000, 180000);
@@ -181,11 +181,11 @@ static void what_is_added_is_seen(void **state)
 
 		/* Clear of the sphere. */
 		v3f_set(p, 0.7f + 0.2f * (float)meshes_random(&seed), (float)meshes_random(&seed), (float)meshes_random(&seed));
-		assert_int_equal(seen_add(&looked.seen, p, up), PSR_OK);
-		assert_true(seen_is(&looked.seen, p, up));
+		assert_int_equal(visible_set_add(&looked.visible, p, up), PSR_OK);
+		assert_true(visible_set_has(&looked.visible, p, up));
 		v3f_set(p, -p[0], -p[1], -p[2]);
-		assert_false(seen_is(&looked.seen, p, up));
-		assert_false(seen_is(&looked.seen, p, down));
+		assert_false(visible_set_has(&looked.visible, p, up));
+		assert_false(visible_set_has(&looked.visible, p, down));
 	}
 	look_away(&looked);
 }
@@ -214,13 +214,13 @@ static void looking_ends_soon_where_nothing_hides(void **state)
 	(void)state;
 	look_at(&ball, meshes_sphere(20, (const double[3]){ 0, 0, 0 }, 0.9), DS, 2);
 	look_at(&soup, make_soup(3000, 0.2), DS, 2);
-	assert_int_equal(soup.seen.n_views % SEEN_LEAST_VIEWS, 0);
-	assert_in_range(soup.seen.n_views, 2 * ball.seen.n_views, SEEN_MOST_VIEWS);
+	assert_int_equal(soup.visible.n_views % VISIBLE_LEAST_VIEWS, 0);
+	assert_in_range(soup.visible.n_views, 2 * ball.visible.n_views, VISIBLE_MOST_VIEWS);
 	/* Asked again it goes on with other views. */
-	n_views = ball.seen.n_views;
+	n_views = ball.visible.n_views;
 	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
-	assert_int_equal(seen_look(&ball.seen, ball.scene, SEEN_ENOUGH, pool), PSR_OK);
-	assert_int_equal(ball.seen.n_views, n_views + SEEN_LEAST_VIEWS);
+	assert_int_equal(visible_set_look(&ball.visible, ball.scene, VISIBLE_ENOUGH, pool), PSR_OK);
+	assert_int_equal(ball.visible.n_views, n_views + VISIBLE_LEAST_VIEWS);
 	psr_pool_destroy(pool);
 	look_away(&ball);
 	look_away(&soup);
@@ -230,15 +230,15 @@ static void looking_ends_soon_where_nothing_hides(void **state)
 static void what_is_seen_is_seen_of_coarser_cells(void **state)
 {
 	struct psr_mesh *mesh = make_soup(200, 0.04);
-	struct seen coarse, coarser;
+	struct visible_set coarse, coarser;
 	struct looked looked;
 	uint64_t seed = 10;
 	int n_seen = 0;
 
 	(void)state;
 	look_at(&looked, mesh, DS, 2);
-	assert_int_equal(seen_coarsen(&coarse, &looked.seen), PSR_OK);
-	assert_int_equal(seen_coarsen(&coarser, &coarse), PSR_OK);
+	assert_int_equal(visible_set_coarsen(&coarse, &looked.visible), PSR_OK);
+	assert_int_equal(visible_set_coarsen(&coarser, &coarse), PSR_OK);
 	for (int i = 0; i < 300000; i++) {
 		float p[3], n[3];
 
@@ -246,15 +246,15 @@ static void what_is_seen_is_seen_of_coarser_cells(void **state)
 			p[k] = (float)(1.3 * meshes_random(&seed) - 0.65);
 			n[k] = (float)(2 * meshes_random(&seed) - 1);
 		}
-		if (v3f_normalize(n, n) == 0 || !seen_is(&looked.seen, p, n))
+		if (v3f_normalize(n, n) == 0 || !visible_set_has(&looked.visible, p, n))
 			continue;
 		n_seen++;
-		assert_true(seen_is(&coarse, p, n));
-		assert_true(seen_is(&coarser, p, n));
+		assert_true(visible_set_has(&coarse, p, n));
+		assert_true(visible_set_has(&coarser, p, n));
 	}
 	assert_in_range(n_seen, 3000, 200000);
-	seen_fini(&coarse);
-	seen_fini(&coarser);
+	visible_set_fini(&coarse);
+	visible_set_fini(&coarser);
 	look_away(&looked);
 }
 

@@ -7,7 +7,7 @@
 #include "level.h"
 
 #define RESOLUTION 128
-#define FEW_VIEWS 2 /* seen_look() ends as soon as half of what it met had been seen */
+#define FEW_VIEWS 2 /* visible_set_look() ends as soon as half of what it met had been seen */
 
 /* n triangles of about `size`, anywhere. */
 static struct psr_mesh *make_soup(uint32_t n, double size)
@@ -27,8 +27,8 @@ static struct psr_mesh *make_soup(uint32_t n, double size)
 static void look(struct level_set *set, struct psr_mesh *mesh, int n_threads)
 {
 	level_set_open(set, mesh, RESOLUTION, n_threads);
-	assert_int_equal(seen_init(&set->level.seen, set->level.ds), PSR_OK);
-	assert_int_equal(seen_look(&set->level.seen, set->scene, FEW_VIEWS, set->pool), PSR_OK);
+	assert_int_equal(visible_set_init(&set->level.visible, set->level.sampling.ds), PSR_OK);
+	assert_int_equal(visible_set_look(&set->level.visible, set->scene, FEW_VIEWS, set->pool), PSR_OK);
 }
 
 /* The middle of the inscribed circle of a triangle, on its front, and how many of 1,024 rays from all over its hemisphere reach it. */
@@ -61,7 +61,7 @@ static int count_open(const struct level_set *set, uint32_t prim, float p[3], ui
 			ray.origin[k] = (double)p[k] + 3 * d[k];
 			ray.direction[k] = -d[k];
 		}
-		ray_scene_occluded(set->scene, &ray, 1, 3 - 0.01 * set->level.ds, &is_hidden);
+		ray_scene_occluded(set->scene, &ray, 1, 3 - 0.01 * set->level.sampling.ds, &is_hidden);
 		n_open += !is_hidden;
 	}
 	return n_open;
@@ -78,7 +78,7 @@ static int is_wide(const struct level_set *set, uint32_t prim)
 		around += v3d_length(side[i]);
 	}
 	v3d_cross(cross, side[0], side[1]);
-	return v3d_length(cross) / around > 2.2 * set->level.ds;
+	return v3d_length(cross) / around > 2.2 * set->level.sampling.ds;
 }
 
 /* At least 4 in 100 rays get out: that none of 64 does has a probability of 0.073. Places are drawn at random, 4 in the
@@ -97,15 +97,15 @@ static void what_views_missed_and_is_open_is_seen(void **state)
 	look(&set, make_soup(4000, 0.35), 2);
 	uint8_t *is_missed = calloc(set.mesh->n_triangles, 1);
 	for (uint32_t i = 0; i < set.mesh->n_triangles; i++) {
-		is_missed[i] = is_wide(&set, i) && count_open(&set, i, p, &seed) > 40 && !seen_is(&set.level.seen, p, ray_scene_normal(set.scene, i));
+		is_missed[i] = is_wide(&set, i) && count_open(&set, i, p, &seed) > 40 && !visible_set_has(&set.level.visible, p, ray_scene_normal(set.scene, i));
 		n_missed += is_missed[i];
 	}
-	assert_int_equal(seen_look_out(&set.level), PSR_OK);
+	assert_int_equal(look_out(&set.level.visible, &set.level.sampling), PSR_OK);
 	for (uint32_t i = 0; i < set.mesh->n_triangles; i++) {
 		if (!is_missed[i])
 			continue;
 		count_open(&set, i, p, &seed);
-		n_left += !seen_is(&set.level.seen, p, ray_scene_normal(set.scene, i));
+		n_left += !visible_set_has(&set.level.visible, p, ray_scene_normal(set.scene, i));
 	}
 	print_message("# views missed %d open places, %d are left\n", n_missed, n_left);
 	assert_true(n_missed > 30);
@@ -123,8 +123,8 @@ static void inside_of_a_closed_box_stays_unseen(void **state)
 	(void)state;
 	mesh->material->two_sided = 1;
 	look(&set, mesh, 2);
-	assert_int_equal(seen_look_out(&set.level), PSR_OK);
-	assert_false(seen_is(&set.level.seen, inside, down));
+	assert_int_equal(look_out(&set.level.visible, &set.level.sampling), PSR_OK);
+	assert_false(visible_set_has(&set.level.visible, inside, down));
 	level_set_close(&set);
 }
 
@@ -135,12 +135,12 @@ static void what_is_found_does_not_depend_on_threads(void **state)
 	(void)state;
 	for (int i = 0; i < 2; i++) {
 		look(&set[i], make_soup(1000, 0.3), i + 1);
-		const uint64_t before = set[i].level.seen.n_cells;
-		assert_int_equal(seen_look_out(&set[i].level), PSR_OK);
-		assert_true(set[i].level.seen.n_cells > before);
+		const uint64_t before = set[i].level.visible.table.n;
+		assert_int_equal(look_out(&set[i].level.visible, &set[i].level.sampling), PSR_OK);
+		assert_true(set[i].level.visible.table.n > before);
 	}
-	assert_int_equal(set[0].level.seen.n_cells, set[1].level.seen.n_cells);
-	assert_int_equal(set[0].level.seen.size, set[1].level.seen.size);
+	assert_int_equal(set[0].level.visible.table.n, set[1].level.visible.table.n);
+	assert_int_equal(set[0].level.visible.table.size, set[1].level.visible.table.size);
 	for (int i = 0; i < 2; i++)
 		level_set_close(&set[i]);
 }
