@@ -3,6 +3,7 @@
 #include <string.h>
 #include "base/clock.h"
 #include "psr.h"
+#include "client/lib/camera.h"
 #include "client/replay/replay.h"
 #include "client/output/series.h"
 #include "client/output/sink.h"
@@ -94,7 +95,7 @@ struct job {
 	struct sink sink;
 	struct psr_client *client;
 	struct scene *scene;
-	struct psr_msg_camera *camera; /* sink.n */
+	struct psr_camera *camera; /* sink.n */
 };
 
 static int check_replay(struct job *job, struct psr_error *err)

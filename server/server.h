@@ -9,7 +9,7 @@
 #include "server/net/loop.h"
 #include "options.h"
 #include "base/pool.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 #define SERVER_SPARE_CLIENTS 16 /* connections beyond --max-clients that are told so */
 

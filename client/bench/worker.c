@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "bench.h"
+#include "client/lib/camera.h"
 #include "client/psr.h"
 
 #define FRAMES_A_TURN 120

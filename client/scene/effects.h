@@ -3,7 +3,7 @@
 #define PSR_CLIENT_SCENE_EFFECTS_H
 
 #include <cjson/cJSON.h>
-#include "psr/proto.h"
+#include "psr/message.h"
 
 /* Adds "effects" with a member each: "ran", and "count" or "why". Effects that this program does not know are
  * skipped. */

@@ -13,7 +13,7 @@ const char *preset_of_light(const char *text)
 const char *preset_type(const struct psr_msg_preset *preset)
 {
 	if (preset->kind == PSR_WIRE_PRESET_CAMERA)
-		return preset->camera.kind == PSR_WIRE_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
+		return preset->camera.kind == PSR_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
 	return preset->light.kind == PSR_WIRE_LIGHT_DIRECTIONAL ? "directional"
 	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
 }
@@ -58,7 +58,7 @@ static const struct psr_msg_preset *find(const struct scene *scene, uint8_t kind
 	return NULL;
 }
 
-int preset_camera(struct psr_msg_camera *camera, const char *name, const struct psr_client *client,
+int preset_camera(struct psr_camera *camera, const char *name, const struct psr_client *client,
                   const struct scene *scene, struct psr_error *err)
 {
 	const struct psr_msg_preset *found = find(scene, PSR_WIRE_PRESET_CAMERA, name);

@@ -5,7 +5,7 @@
 #include "scene.h"
 
 /* Of the scene's first model. NOT_FOUND with the names that there are; UNSUPPORTED by an older server; LIMIT. */
-int preset_camera(struct psr_msg_camera *camera, const char *name, const struct psr_client *client,
+int preset_camera(struct psr_camera *camera, const char *name, const struct psr_client *client,
                   const struct scene *scene, struct psr_error *err);
 int preset_light(struct psr_msg_light *light, const char *name, const struct psr_client *client,
                  const struct scene *scene, struct psr_error *err);

@@ -2,6 +2,7 @@
 #ifndef PSR_CLIENT_SCENE_VIEW_H
 #define PSR_CLIENT_SCENE_VIEW_H
 
+#include "client/lib/camera.h"
 #include "client/optlist.h"
 #include "psr/client.h"
 #include "scene.h"
@@ -35,7 +36,7 @@ int views_make(struct views *views, const struct view_wish *wish, const char *fi
 void views_fini(struct views *views);
 
 /* The camera in a scene. n_turn: at how many equal turns the scene is to be in the picture, or 0. */
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
+int view_place(struct psr_camera *camera, const struct view_wish *wish, const struct psr_client *client,
                const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err);
 
 /* The way up for turning about: --up, the model's own, or +Y. */

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "preset.h"
+#include "client/lib/camera.h"
 #include "client/psr.h"
 #include "scene.h"
 

@@ -31,7 +31,7 @@ struct psr_window {
 
 struct render_settings {
 	uint32_t width, height; /* these five as in struct psr_settings */
-	double spacing;
+	double spacing_px;
 	int is_smooth;
 	unsigned pass;          /* read by refiner_draw() only */
 	int (*is_cancelled)(void *userdata);

@@ -4,7 +4,6 @@
 #include "base/mem.h"
 #include "draw.h"
 #include "server/net/loop.h"
-#include "wire.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -201,7 +200,7 @@ static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct
 	struct psr_settings settings;
 
 	psr_settings_default(&settings, d->request.width, d->request.height);
-	settings.spacing = asked.spacing_px;
+	settings.spacing_px = asked.spacing_px;
 	settings.is_smooth = asked.is_smooth;
 	settings.pass = d->pass;
 	settings.is_cancelled = is_abandoned;
@@ -219,7 +218,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	uint64_t start_ns = clock_ns(), drawn_ns, end_ns;
 	int code;
 
-	wire_to_camera(&scene.camera, &d->request.camera);
+	scene.camera = d->request.camera;
 	code = reserve_pixels(worker, d, &picture, err);
 	if (code == PSR_OK)
 		code = draw_pass(d, worker, &scene, &picture, err);
@@ -233,7 +232,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	if (code != PSR_OK)
 		return code;
 	end_ns = clock_ns();
-	end.error_px = picture.report.error_bound;
+	end.error_px = picture.report.error_px;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
 	fill_report(&end, d, &picture.report, end_ns - drawn_ns, coded.rect_bytes,
 	            start_ns - d->arrived_ns, end_ns - start_ns);

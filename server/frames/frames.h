@@ -7,7 +7,7 @@
 #define PSRD_FRAMES_H
 
 #include <stdint.h>
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "server/session/session.h"
 
 struct conn;

@@ -4,7 +4,7 @@
 #define PSRD_OPENER_H
 
 #include <stdint.h>
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 struct conn;
 struct opener;

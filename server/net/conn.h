@@ -4,7 +4,7 @@
 
 #include "loop.h"
 #include "outq.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "server/session/session.h"
 
 struct frame;

@@ -2,7 +2,7 @@
 #ifndef PSRD_HANDSHAKE_H
 #define PSRD_HANDSHAKE_H
 
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 struct conn;
 

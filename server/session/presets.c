@@ -2,12 +2,11 @@
 #include "server/net/conn.h"
 #include "session.h"
 #include "presets.h"
-#include "server/frames/wire.h"
 
 #define HOME_CAMERA "home"
 #define HOME_FOV 0.6108652381980153 /* 35 degrees, as the client's */
 
-/* What the protocol cannot hold is not sent. */
+/* A preset that the protocol cannot hold is not sent. */
 static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_preset *msg, uint32_t *n_sent)
 {
 	uint8_t bytes[512];
@@ -17,6 +16,23 @@ static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_pre
 		return;
 	conn_send(conn, &buf);
 	++*n_sent;
+}
+
+static void send_camera(struct conn *conn, uint32_t id, const struct psr_preset_camera *preset, uint32_t *n_sent)
+{
+	struct psr_msg_preset msg = { .kind = PSR_WIRE_PRESET_CAMERA, .camera = preset->camera };
+
+	memcpy(msg.name, preset->name, sizeof preset->name);
+	send_preset(conn, id, &msg, n_sent);
+}
+
+static void send_light(struct conn *conn, uint32_t id, const struct psr_preset_light *preset, uint32_t *n_sent)
+{
+	struct psr_msg_preset msg = { .kind = PSR_WIRE_PRESET_LIGHT };
+
+	psr_msg_light_set(&msg.light, &preset->light);
+	memcpy(msg.name, preset->name, sizeof preset->name);
+	send_preset(conn, id, &msg, n_sent);
 }
 
 /* The view that shows the whole model, its own way up, unless the file has a camera of this name. */
@@ -42,7 +58,6 @@ void session_send_presets(struct conn *conn, uint32_t id, uint32_t number)
 	const struct psr_presets *presets;
 	struct psr_msg_presets_end end = { 0, 0 };
 	struct psr_preset_camera home;
-	struct psr_msg_preset msg;
 	uint8_t bytes[64];
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
 
@@ -54,18 +69,12 @@ void session_send_presets(struct conn *conn, uint32_t id, uint32_t number)
 		return;
 	}
 	presets = psr_model_presets(model);
-	for (uint32_t i = 0; i < presets->n_cameras; i++) {
-		wire_from_camera(&msg, &presets->camera[i]);
-		send_preset(conn, id, &msg, &end.n_cameras);
-	}
-	if (make_home(&home, model)) {
-		wire_from_camera(&msg, &home);
-		send_preset(conn, id, &msg, &end.n_cameras);
-	}
-	for (uint32_t i = 0; i < presets->n_lights; i++) {
-		wire_from_light(&msg, &presets->light[i]);
-		send_preset(conn, id, &msg, &end.n_lights);
-	}
+	for (uint32_t i = 0; i < presets->n_cameras; i++)
+		send_camera(conn, id, &presets->camera[i], &end.n_cameras);
+	if (make_home(&home, model))
+		send_camera(conn, id, &home, &end.n_cameras);
+	for (uint32_t i = 0; i < presets->n_lights; i++)
+		send_light(conn, id, &presets->light[i], &end.n_lights);
 	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
 		conn_send(conn, &buf);
 }

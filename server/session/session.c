@@ -11,7 +11,6 @@
 #include "session.h"
 #include "presets.h"
 #include "scene.h"
-#include "server/frames/wire.h"
 
 int session_init(struct session *session, uint32_t max_handles)
 {

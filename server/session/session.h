@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 #include "server/models/catalogue.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "psr/scene.h"
 
 struct conn;

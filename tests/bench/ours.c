@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "psr/build.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "report.h"
 #include "render/stages.h"
 #include "server/frames/codec.h"

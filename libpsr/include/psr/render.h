@@ -20,7 +20,7 @@ struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	/* The greatest distance between neighbouring samples that is good enough, in pixels: the renderer draws the
 	 * coarsest level that keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
-	double spacing;
+	double spacing_px;
 	/* 1: anti-aliasing in one pass ([G] 9.1.1), at a third of the frame's time. A pixel at an edge is blended with the
 	 * surface behind it, by how many of its eight neighbours are there; others with the neighbours of their own
 	 * surface. Only colour changes. 0 by default; passes above 0 ignore it. */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 static void color_is_byte_differences_in_place(void **state)
 {
