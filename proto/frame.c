@@ -32,7 +32,7 @@ int check_camera(const struct psr_camera *m, struct psr_error *err)
 	double f[3], u[3], n_f, n_u;
 
 	if (m->kind != PSR_CAMERA_PERSPECTIVE && m->kind != PSR_CAMERA_ORTHOGRAPHIC)
-		return psr_fail(err, PSR_ERR_ARG, "the camera's kind is %d: on the wire it must be 1, perspective, or 2, orthographic",
+		return psr_fail(err, PSR_ERR_ARG, "the camera's kind is %d: it must be 1 (perspective) or 2 (orthographic)",
 		                (int)m->kind + 1);
 	if (check_lengths("the camera's eye", m->eye, 3, err) || check_lengths("the camera's target", m->target, 3, err) ||
 	    check_lengths("the camera's up", m->up, 3, err))

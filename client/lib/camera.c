@@ -149,7 +149,8 @@ static int zoom_camera(struct psr_camera *camera, double zoom, struct psr_error 
 		camera->ortho_height /= zoom;
 		if (camera->ortho_height >= LEAST && camera->ortho_height <= PSR_WIRE_MAX_LENGTH)
 			return PSR_OK;
-		return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves a picture of a height of %g", zoom, camera->ortho_height);
+		return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves a picture of a height of %g", zoom,
+		                camera->ortho_height);
 	}
 	camera->fov_y = 2 * atan(tan(camera->fov_y / 2) / zoom);
 	if (camera->fov_y >= LEAST_FOV && camera->fov_y <= GREATEST_FOV)

@@ -15,8 +15,9 @@ void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_
 
 void render_settings_default(struct render_settings *settings, uint32_t width, uint32_t height)
 {
-	*settings = (struct render_settings){ .width = width,         .height = height,   .spacing_px = 1,
-		                                  .cull_tests = PSR_CULL_ALL, .gap_threshold = 3, .gap_method = PSR_GAPS_BILINEAR };
+	*settings = (struct render_settings){ .width = width, .height = height, .spacing_px = 1,
+		                                  .cull_tests = PSR_CULL_ALL, .gap_threshold = 3,
+		                                  .gap_method = PSR_GAPS_BILINEAR };
 }
 
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *asked,

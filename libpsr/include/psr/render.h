@@ -42,8 +42,8 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 
 /* Draws the frame's planes that are not NULL; they are the caller's (psr_frame_alloc()), of the size of the settings.
  * pool: NULL for the caller's thread alone. frame->report tells times and counts; of a pass above 0 they are of all
- * sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for planes other than colour
- * and depth in passes above 0. */
+ * sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for planes other than
+ * colour and depth in passes above 0. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 

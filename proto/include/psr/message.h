@@ -24,8 +24,8 @@ extern "C" {
 #define PSR_WIRE_MAX_LENGTH 1e30       /* magnitude of a coordinate or length; positive lengths are at least 1e-30 */
 #define PSR_WIRE_MAX_INTENSITY 1e6
 
-/* What a server offers (WELCOME) or a client understands (HELLO); unknown bits are ignored. Every server offers view 0, colour as raw, JPEG or zstd,
- * depth as float, raw or zstd, blocks, lights without shadows. */
+/* What a server offers (WELCOME) or a client understands (HELLO); unknown bits are ignored. Every server offers
+ * view 0, colour as raw, JPEG or zstd, depth as float, raw or zstd, blocks, lights without shadows. */
 enum psr_cap {
 	PSR_CAP_VIEWS = 1 << 0,        /* views > 0: supersession, window of unacknowledged frames, ACK */
 	PSR_CAP_REFINE = 1 << 1,       /* pass_limit > 0 */
