@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
-#include "ppm.h"
+#include "base/netpbm.h"
 #include "psr/build.h"
 #include "measure/measure.h"
 #include "psr/mesh.h"

@@ -51,7 +51,7 @@ int psr_animation_open(struct psr_animation **out, const char *path, const struc
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for an animation");
 	code = choose(&animation->module, path, err);
 	if (code == PSR_OK)
-		code = outfile_open(&animation->file, path, err);
+		code = outfile_open(&animation->file, path, OUTFILE_PLAIN, err);
 	if (code != PSR_OK) {
 		free(animation);
 		return code;

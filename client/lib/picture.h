@@ -39,11 +39,6 @@ int psr_animation_add(struct psr_animation *animation, const struct psr_frame *f
 int psr_animation_close(struct psr_animation *animation, int code, struct psr_error *err);
 int psr_animation_check(const char *path, struct psr_error *err);
 
-/* ---- portable.c ---- */
-
-int picture_write_ppm(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
-int picture_write_pfm(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
-
 /* ---- apng.c: the file is the caller's, and stays open ---- */
 
 struct apng;

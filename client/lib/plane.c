@@ -36,7 +36,7 @@ static int write_npy(const struct psr_frame *picture, unsigned plane, const char
 	struct outfile file;
 	char header[128];
 	size_t n = npy_header(header, picture, plane);
-	int code = outfile_open(&file, path, err);
+	int code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 
 	if (code != PSR_OK)
 		return code;

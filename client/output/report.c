@@ -145,7 +145,7 @@ int report_write(const struct shot_facts *facts, const char *path, struct psr_er
 	cJSON_Delete(report);
 	if (text == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the report");
-	code = outfile_open(&file, path, err);
+	code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code == PSR_OK) {
 		outfile_write(&file, text, strlen(text));
 		outfile_write(&file, "\n", 1);

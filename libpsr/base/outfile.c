@@ -6,6 +6,8 @@
 #include <unistd.h>
 #include "outfile.h"
 
+#define MAX_TRIES 1000
+
 const char *outfile_ending(const char *path)
 {
 	const char *name = strrchr(path, '/'), *dot;
@@ -21,16 +23,23 @@ static int fail_system(const struct outfile *file, int reason, struct psr_error 
 	                "cannot write %.300s: %s", file->path, strerror(reason));
 }
 
-/* The first free name `.STEM.PID-N.ENDING` in the target's folder. */
+/* FOLDER/.psr-PID-N.ENDING, short so that it fits wherever the target's name does. */
+static int name_temporary(char name[PATH_MAX], const char *target, pid_t pid, int n)
+{
+	const char *slash = strrchr(target, '/'), *ending = outfile_ending(target);
+	int folder = slash == NULL ? 0 : (int)(slash + 1 - target);
+
+	return snprintf(name, PATH_MAX, "%.*s.psr-%ld-%d%s%s", folder, target, (long)pid, n, ending[0] != '\0' ? "." : "",
+	                ending) < PATH_MAX;
+}
+
+/* The first free name; mkstemp() would ignore the umask. */
 static int open_temporary(struct outfile *file)
 {
-	const char *slash = strrchr(file->target, '/'), *ending = outfile_ending(file->target);
-	int folder = slash == NULL ? 0 : (int)(slash + 1 - file->target), fd = -1;
+	int fd = -1;
 
-	for (int n = 0; n < 1000 && fd < 0; n++) {
-		if (snprintf(file->temporary, sizeof file->temporary, "%.*s.psr-%ld-%d%s%s", folder, file->target,
-		             (long)getpid(), n, ending[0] != '\0' ? "." : "", ending)
-		    >= (int)sizeof file->temporary) {
+	for (int n = 0; n < MAX_TRIES && fd < 0; n++) {
+		if (!name_temporary(file->temporary, file->target, getpid(), n)) {
 			errno = ENAMETOOLONG;
 			return -1;
 		}
@@ -41,53 +50,49 @@ static int open_temporary(struct outfile *file)
 	return fd;
 }
 
-static int open_stdout(struct outfile *file, struct psr_error *err)
+static int open_target(struct outfile *file)
 {
-	int fd = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
+	struct stat status;
 
-	file->path = "standard output";
-	if (fd < 0)
+	if (stat(file->target, &status) != 0 || S_ISREG(status.st_mode))
+		return open_temporary(file);
+	errno = EISDIR;
+	return S_ISDIR(status.st_mode) ? -1 : open(file->target, O_WRONLY | O_CLOEXEC);
+}
+
+static int attach_stream(struct outfile *file, int fd, struct psr_error *err)
+{
+	if (fd < 0) {
+		file->temporary[0] = '\0';
 		return fail_system(file, errno, err);
+	}
 	file->stream = fdopen(fd, "wb");
 	if (file->stream != NULL)
 		return PSR_OK;
 	close(fd);
-	return psr_fail(err, PSR_ERR_MEMORY, "no memory to write to standard output");
+	if (file->temporary[0] != '\0')
+		unlink(file->temporary);
+	return psr_fail(err, PSR_ERR_MEMORY, "no memory to write %.300s", file->path);
 }
 
-int outfile_open(struct outfile *file, const char *path, struct psr_error *err)
+int outfile_open(struct outfile *file, const char *path, enum outfile_kind kind, struct psr_error *err)
 {
 	struct stat status;
-	int fd, reason;
 
 	memset(file, 0, sizeof *file);
-	if (strcmp(path, OUTFILE_STDOUT) == 0)
-		return open_stdout(file, err);
+	file->kind = kind;
 	file->path = path;
+	if (kind == OUTFILE_PLAIN && strcmp(path, OUTFILE_STDOUT) == 0) {
+		file->path = "standard output";
+		return attach_stream(file, fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3), err);
+	}
 	if (strlen(path) >= sizeof file->target)
 		return fail_system(file, ENAMETOOLONG, err);
+	if (kind == OUTFILE_DURABLE && stat(path, &status) == 0 && !S_ISREG(status.st_mode))
+		return psr_fail(err, PSR_ERR_IO, "cannot write %.300s: it is not a regular file, and is left as it is", path);
 	if (realpath(path, file->target) == NULL)
 		strcpy(file->target, path);
-	if (stat(file->target, &status) == 0 && !S_ISREG(status.st_mode)) {
-		if (S_ISDIR(status.st_mode))
-			return fail_system(file, EISDIR, err);
-		fd = open(file->target, O_WRONLY | O_CLOEXEC);
-	} else {
-		fd = open_temporary(file);
-	}
-	if (fd < 0) {
-		reason = errno;
-		file->temporary[0] = '\0';
-		return fail_system(file, reason, err);
-	}
-	file->stream = fdopen(fd, "wb");
-	if (file->stream == NULL) {
-		close(fd);
-		if (file->temporary[0] != '\0')
-			unlink(file->temporary);
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory to write %.300s", path);
-	}
-	return PSR_OK;
+	return attach_stream(file, open_target(file), err);
 }
 
 void outfile_write(struct outfile *file, const void *data, size_t n)
@@ -101,8 +106,28 @@ const char *outfile_name(const struct outfile *file)
 	return file->temporary[0] != '\0' ? file->temporary : file->path;
 }
 
+/* So that the new name survives a power cut. Some file systems cannot sync folders, and say so with EINVAL. */
+static int sync_folder(struct outfile *file, struct psr_error *err)
+{
+	char *slash = strrchr(file->target, '/');
+	int fd, failed;
+
+	strcpy(slash == NULL ? file->target : slash + 1, ".");
+	fd = open(file->target, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	failed = fd < 0 || (fsync(fd) != 0 && errno != EINVAL);
+	if (failed)
+		psr_fail(err, PSR_ERR_IO, "%.300s is written, but a power cut may lose it: cannot sync its folder: %s",
+		         file->path, strerror(errno));
+	if (fd >= 0)
+		close(fd);
+	return failed ? PSR_ERR_IO : PSR_OK;
+}
+
 int outfile_close(struct outfile *file, int code, struct psr_error *err)
 {
+	if (code == PSR_OK && file->reason == 0 && file->kind == OUTFILE_DURABLE
+	    && (fflush(file->stream) != 0 || fsync(fileno(file->stream)) != 0))
+		file->reason = errno;
 	if (fclose(file->stream) != 0 && file->reason == 0)
 		file->reason = errno;
 	if (code == PSR_OK && file->reason != 0)
@@ -113,5 +138,26 @@ int outfile_close(struct outfile *file, int code, struct psr_error *err)
 		code = fail_system(file, errno, err);
 	if (code != PSR_OK)
 		unlink(file->temporary);
+	else if (file->kind == OUTFILE_DURABLE)
+		code = sync_folder(file, err);
 	return code;
+}
+
+int outfile_save(const char *path, enum outfile_kind kind, const void *data, size_t n, struct psr_error *err)
+{
+	struct outfile file;
+	int code = outfile_open(&file, path, kind, err);
+
+	if (code != PSR_OK)
+		return code;
+	outfile_write(&file, data, n);
+	return outfile_close(&file, PSR_OK, err);
+}
+
+void outfile_remove_remains(const char *path, pid_t pid)
+{
+	char name[PATH_MAX];
+
+	for (int n = 0; n < MAX_TRIES && name_temporary(name, path, pid, n) && unlink(name) == 0; n++)
+		;
 }

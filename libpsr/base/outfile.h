@@ -1,35 +1,48 @@
-/* Files that are either what they were or the whole new content. */
-#ifndef PSR_CLIENT_OUTFILE_H
-#define PSR_CLIENT_OUTFILE_H
+/* The writer of every file. It writes beside the path and renames when all is written: the path holds either what it
+ * held before or the whole new content. */
+#ifndef PSR_BASE_OUTFILE_H
+#define PSR_BASE_OUTFILE_H
 
 #include <limits.h>
 #include <stdio.h>
+#include <sys/types.h>
 #include "psr/error.h"
 
-#define OUTFILE_STDOUT "-" /* as a path: standard output */
+#define OUTFILE_STDOUT "-"
+
+enum outfile_kind {
+	OUTFILE_PLAIN,   /* "-" is standard output; devices and pipes are written in place */
+	OUTFILE_DURABLE, /* replaces regular files only; file and name survive a power cut */
+};
 
 struct outfile {
 	FILE *stream;
+	enum outfile_kind kind;
 	char target[PATH_MAX];    /* the file itself, links followed */
-	char temporary[PATH_MAX]; /* "" when a device or pipe is written in place */
-	const char *path;         /* as the person said it */
+	char temporary[PATH_MAX]; /* "": written in place */
+	const char *path;         /* the caller's */
 	int reason;               /* errno of the first write that failed, or 0 */
 };
 
-/* Opens a temporary file beside path, with the same ending; or standard output, which stays open afterwards. */
-int outfile_open(struct outfile *file, const char *path, struct psr_error *err);
+/* The path must outlive the file. NOT_FOUND: no such folder; IO, MEMORY. */
+int outfile_open(struct outfile *file, const char *path, enum outfile_kind kind, struct psr_error *err);
 
-/* Writes n bytes; a failure is remembered, and reported by outfile_close. */
+/* outfile_close() reports failures. */
 void outfile_write(struct outfile *file, const void *data, size_t n);
 
-/* Where another writer may put the content instead of outfile_write. */
+/* Where another writer may put the content instead: a file with the path's ending. */
 const char *outfile_name(const struct outfile *file);
 
-/* Closes and, if code is PSR_OK and all was written, renames; otherwise removes the temporary file. Returns code, or
- * IO. */
+/* Renames if code is PSR_OK and all was written; else removes the temporary file. Returns code, or IO. */
 int outfile_close(struct outfile *file, int code, struct psr_error *err);
 
-/* The ending of a path without its dot, "" if it has none. */
+/* Opens, writes n bytes, closes. */
+int outfile_save(const char *path, enum outfile_kind kind, const void *data, size_t n, struct psr_error *err);
+
+/* Removes the temporary files of `path` that a killed process left. */
+void outfile_remove_remains(const char *path, pid_t pid);
+
+/* The ending of a path without its dot; "" without one. */
 const char *outfile_ending(const char *path);
 
 #endif

@@ -74,7 +74,7 @@ int psr_image_write(const struct psr_frame *frame, const char *path, struct psr_
 
 	if (frame->rgb == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "the frame has no colour to write to %.300s; draw PSR_PLANE_COLOR", path);
-	code = outfile_open(&file, path, err);
+	code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code != PSR_OK)
 		return code;
 	return outfile_close(&file, png_write_frame(&file, frame, err), err);

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include "base/infile.h"
 #include "base/pool.h"
 #include "import.h"
 
@@ -101,7 +102,7 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 	*out = NULL;
 	rc = options != NULL ? check_options(options, err) : PSR_OK;
 	if (rc == PSR_OK)
-		rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+		rc = infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (n_bytes == 0) {

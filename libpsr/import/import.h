@@ -114,8 +114,7 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
  * place, then fills in radii and normals where they are 0. Outwards or upwards, as far as it can be told. MEMORY. */
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
-/* path.c. Strings and bytes that are returned belong to the caller (free). */
-int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err);
+/* path.c. The strings belong to the caller (free). */
 int import_path_folder(char **folder, const char *path, struct psr_error *err); /* resolved, no slash at the end */
 
 /* The resolved path of `name`, which is absolute or relative to `folder`. NOT_FOUND; UNSUPPORTED when it leads

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/mem.h"
+#include "base/stats.h"
 #include "base/vec.h"
 #include "base/pool.h"
 #include "truth.h"
@@ -141,21 +142,6 @@ static void measure_row(int y, void *userdata)
 		measure_pixel(m, x, (uint32_t)y, &m->row[y]);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-/* The smallest distance that at least this part of all does not exceed. */
-static double percentile(const double *sorted, uint64_t n, double part)
-{
-	uint64_t rank = (uint64_t)ceil(part * (double)n);
-
-	return n == 0 ? 0 : sorted[rank > 0 ? rank - 1 : 0];
-}
-
 static void add_up(struct psr_accuracy *out, const struct measure *m)
 {
 	uint64_t n = 0;
@@ -172,11 +158,11 @@ static void add_up(struct psr_accuracy *out, const struct measure *m)
 	for (size_t i = 0; i < (size_t)m->width * m->height; i++)
 		if (m->distance[i] >= 0)
 			m->distance[n++] = m->distance[i];
-	qsort(m->distance, n, sizeof *m->distance, compare_doubles);
-	out->distance_p50 = percentile(m->distance, n, 0.5);
-	out->distance_p99 = percentile(m->distance, n, 0.99);
-	out->distance_p999 = percentile(m->distance, n, 0.999);
-	out->distance_max = percentile(m->distance, n, 1);
+	stats_sort(m->distance, n);
+	out->distance_p50 = stats_percentile(m->distance, n, 0.5);
+	out->distance_p99 = stats_percentile(m->distance, n, 0.99);
+	out->distance_p999 = stats_percentile(m->distance, n, 0.999);
+	out->distance_max = stats_percentile(m->distance, n, 1);
 }
 
 static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth,

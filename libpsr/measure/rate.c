@@ -103,10 +103,10 @@ int psr_ray_rate(const struct psr_mesh *mesh, double *ours, double *embree, stru
 	struct ray_scene *scene = NULL;
 	double center[3], radius, best[2] = { INFINITY, INFINITY };
 	uint64_t n_hits = 0;
-	int rc = door_check_mesh(mesh, err);
+	int rc = validate_mesh(mesh, err);
 
 	if (rc == PSR_OK)
-		rc = door_bound_mesh(mesh, center, &radius, err);
+		rc = validate_bound_mesh(mesh, center, &radius, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_create(&scene, mesh, center, radius, err);
 	if (rc == PSR_OK && make_rays(&rays) != PSR_OK)

@@ -39,7 +39,7 @@ void psr_truth_stipple(struct psr_truth *truth, double spacing)
 int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err)
 {
 	struct psr_truth *truth;
-	int rc = door_check_mesh(mesh, err);
+	int rc = validate_mesh(mesh, err);
 
 	if (rc != PSR_OK)
 		return rc;
@@ -47,7 +47,7 @@ int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct
 	if (truth == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the ray tracer");
 	truth->mesh = mesh;
-	rc = door_bound_mesh(mesh, truth->origin, &truth->scale, err);
+	rc = validate_bound_mesh(mesh, truth->origin, &truth->scale, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_create(&truth->scene, mesh, truth->origin, truth->scale, err);
 	if (rc == PSR_OK)

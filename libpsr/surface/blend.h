@@ -4,7 +4,7 @@
 
 #include <stdint.h>
 
-/* The attribute word (psr/model.h) that stands for n >= 1 of them in the given proportion: weights are finite, >= 0,
+/* The attribute word (model/blocks.h) that stands for n >= 1 of them in the given proportion: weights are finite, >= 0,
  * and not all 0. Sums are in double and in the order of the arguments.
  *
  * Where unlit ones have more than half of the weight the result is unlit and the mean of those; else they are left

@@ -18,7 +18,7 @@ struct material_values {
 /* The factors alone. */
 void material_values_default(struct material_values *values, const struct psr_material *material);
 
-/* Everything of an attribute word (psr/model.h) but its normal.
+/* Everything of an attribute word (model/blocks.h) but its normal.
  *
  * Metallic-roughness: diffuse = base * (1 - metallic / 2), since there are no surroundings that a metal could mirror:
  * half of its colour stands for them. F0 = 0.04 + (base - 0.04) * metallic.

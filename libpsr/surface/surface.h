@@ -1,9 +1,12 @@
-/* What the surface of a mesh looks like, as the attribute words of psr/model.h. */
+/* What the surface of a mesh looks like, as the attribute words of model/blocks.h. */
 #ifndef PSR_SURFACE_SURFACE_H
 #define PSR_SURFACE_SURFACE_H
 
 #include <stdint.h>
 #include "psr/mesh.h"
+
+/* A side of a primitive is its number, and this bit for its back. */
+#define SURFACE_BACK 0x80000000u
 
 struct mip;
 

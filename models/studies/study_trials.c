@@ -8,7 +8,7 @@
 #include "base/vec.h"
 #include "base/direction.h"
 #include "base/random.h"
-#include "surface/area.h"
+#include "ray/area.h"
 #include "models/studies/greedy/parts.h"
 
 #define PI 3.14159265358979323846

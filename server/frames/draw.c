@@ -3,7 +3,6 @@
 #include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
-#include "server/net/loop.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -51,8 +50,12 @@ static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, u
 	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
 }
 
+struct times { /* clock_ns() */
+	uint64_t start_ns, drawn_ns, end_ns;
+};
+
 static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, const struct psr_report *report,
-                        uint64_t encode_ns, uint64_t rect_bytes, uint64_t queue_ns, uint64_t total_ns)
+                        const struct times *times, uint64_t rect_bytes)
 {
 	static const unsigned stage_id[PSR_N_STAGES] = {
 		[PSR_STAGE_PLAN] = PSR_WIRE_REPORT_PLAN, [PSR_STAGE_CULL] = PSR_WIRE_REPORT_CULL,
@@ -64,9 +67,9 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	for (int i = 0; i < PSR_N_STAGES; i++)
 		if (stage_id[i])
 			add_entry(end, stage_id[i], report->ns[i], report->count[i]);
-	add_entry(end, PSR_WIRE_REPORT_ENCODE, encode_ns, rect_bytes);
-	add_entry(end, PSR_WIRE_REPORT_QUEUE, queue_ns, d->n_waiting);
-	add_entry(end, PSR_WIRE_REPORT_TOTAL, total_ns, (uint64_t)psr_pool_threads(d->pool));
+	add_entry(end, PSR_WIRE_REPORT_ENCODE, times->end_ns - times->drawn_ns, rect_bytes);
+	add_entry(end, PSR_WIRE_REPORT_QUEUE, times->start_ns - d->arrived_ns, d->n_waiting);
+	add_entry(end, PSR_WIRE_REPORT_TOTAL, times->end_ns - times->start_ns, (uint64_t)psr_pool_threads(d->pool));
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
@@ -212,10 +215,11 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 {
 	struct psr_scene scene = d->scene->scene;
 	struct psr_frame picture = { 0 };
+	const struct codec_answer answer = { .id = d->id, .request = &d->request, .background = d->scene->background };
 	struct codec_result coded;
 	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
 		                             .planes = d->request.planes };
-	uint64_t start_ns = clock_ns(), drawn_ns, end_ns;
+	struct times times = { .start_ns = clock_ns() };
 	int code;
 
 	scene.camera = d->request.camera;
@@ -226,15 +230,13 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 		return code;
 	if (atomic_load(&d->is_abandoned))
 		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
-	drawn_ns = clock_ns();
-	code = codec_encode(&coded, d->codec, d->pool, d->id, 0, &d->request, &picture,
-	                    d->scene->background, err);
+	times.drawn_ns = clock_ns();
+	code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
 	if (code != PSR_OK)
 		return code;
-	end_ns = clock_ns();
+	times.end_ns = clock_ns();
 	end.error_px = picture.report.error_px;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
-	fill_report(&end, d, &picture.report, end_ns - drawn_ns, coded.rect_bytes,
-	            start_ns - d->arrived_ns, end_ns - start_ns);
+	fill_report(&end, d, &picture.report, &times, coded.rect_bytes);
 	return join_answer(d, &coded, &end, err);
 }

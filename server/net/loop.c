@@ -138,7 +138,7 @@ void loop_post(struct loop *loop, struct loop_note *note)
 	pthread_mutex_lock(&loop->mutex);
 	*loop->last_note = note;
 	loop->last_note = &note->next;
-	/* Under the mutex: once the loop has taken the note it may end, and close the descriptor. */
+	/* Under the mutex: the loop may end once it has the note, and close the descriptor. */
 	while (write(loop->wake.fd, &one, sizeof one) < 0 && errno == EINTR)
 		;
 	pthread_mutex_unlock(&loop->mutex);

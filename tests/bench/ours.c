@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include "base/stats.h"
 #include "psr/build.h"
 #include "proto/proto.h"
 #include "report.h"
@@ -61,10 +62,11 @@ static double encode(struct bench *bench)
 		.planes = 1u << PSR_PLANE_COLOR, .color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
 	};
 	static const uint8_t background[3];
+	const struct codec_answer answer = { .id = 1, .request = &request, .background = background };
 	struct codec_result result;
 	struct psr_error err;
 
-	if (codec_encode(&result, bench->codec, bench->pool, 1, 0, &request, &bench->frame, background, &err) != PSR_OK)
+	if (codec_encode(&result, bench->codec, bench->pool, &answer, &bench->frame, &err) != PSR_OK)
 		report_die("codec", err.text);
 	outq_chunks_destroy(result.first);
 	return (double)result.rect_bytes;
@@ -96,11 +98,11 @@ static void summarize(struct ours_result *out, struct series *series)
 
 	for (size_t i = 0; i < sizeof sum / sizeof sum[0]; i++)
 		*sum[i] /= n;
-	out->ms = report_median(series->ms, out->n_frames);
-	out->ms_encoded = report_median(series->ms_encoded, out->n_frames);
+	out->ms = stats_median(series->ms, (size_t)out->n_frames);
+	out->ms_encoded = stats_median(series->ms_encoded, (size_t)out->n_frames);
 	for (int s = 0; s < PSR_N_STAGES; s++) {
 		out->count[s] /= n;
-		out->stage_ms[s] = report_median(series->stage_ms[s], out->n_frames);
+		out->stage_ms[s] = stats_median(series->stage_ms[s], (size_t)out->n_frames);
 	}
 }
 

@@ -2,6 +2,7 @@
 
 #include <stdlib.h>
 #include "base/clock.h"
+#include "base/stats.h"
 #include "report.h"
 
 struct drawer {
@@ -73,10 +74,10 @@ void price_measure(struct price *out, const struct price_side *with, const struc
 			stage[s * n_frames + i] = (double)a.frame.report.ns[s] * 1e-6;
 	}
 	out->report = a.frame.report;
-	out->ms = report_median(ms, n_frames);
-	out->more_ms = report_median(more, n_frames);
+	out->ms = stats_median(ms, (size_t)n_frames);
+	out->more_ms = stats_median(more, (size_t)n_frames);
 	for (int s = 0; s < PSR_N_STAGES; s++)
-		out->stage_ms[s] = report_median(stage + s * n_frames, n_frames);
+		out->stage_ms[s] = stats_median(stage + s * n_frames, (size_t)n_frames);
 	end(&a);
 	end(&b);
 	psr_pool_destroy(pool);

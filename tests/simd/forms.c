@@ -392,9 +392,9 @@ static int run_bench(void)
 	struct places places;
 	for (int j = 0; j < JOBS; j++)
 		random_job(&job[j], 0);
-	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in pixels of a\n"
-	       "picture of %g, by |A_zz| of the projection: from 1/2, from 1/16, less; and of the first seen from %g\n"
-	       "times as near\n",
+	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in\n"
+	       "pixels of a picture of %g, by |A_zz| of the projection: from 1/2, from 1/16, less; and of the\n"
+	       "first seen from %g times as near\n",
 	       PICTURE, DISTANCE * 16);
 	for (int form = 0; form < N_FORMS; form++) {
 		double most[4] = { 0, 0, 0, 0 };

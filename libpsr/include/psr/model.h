@@ -56,7 +56,7 @@ struct psr_presets {
 };
 
 /* Writes a temporary file beside `path`, syncs and renames it: `path` is the old file or the whole new one. Replaces
- * regular files only. IO (disk full, ...), MEMORY. */
+ * regular files only. NOT_FOUND (no such folder), IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
 
 /* The same, packed: sections compressed, chunk by chunk. psr_model_read and _map open such a file too, into anonymous

@@ -18,7 +18,7 @@
  * sample is seen from its front, whatever is done with shading normals. */
 void cone_bound(const float (*normal)[3], int n, float axis[3], float *cosine);
 
-/* The same as psr/model.h has it: the axis so long that its greatest component is 127 and the others rounded, which
+/* The same as model/blocks.h has it: the axis so long that its greatest component is 127 and the others rounded, which
  * turns it by up to 0.32 degrees (half a unit in two components of a vector of 127 or more); around that a cap that
  * still holds the normals, its sine rounded upwards. So the sine is at most 1/255 + 0.0056 + 0.0014 above that of the
  * smallest cap: a step, the turn, and 2^-20 of the cosine for roundings. The sine and not the cosine, because the sine

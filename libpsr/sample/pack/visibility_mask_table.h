@@ -12,7 +12,7 @@
 struct visibility_table {
 	uint32_t n_masks;
 	uint64_t (*mask)[2];
-	uint8_t *index; /* as psr/model.h has it */
+	uint8_t *index; /* as model/blocks.h has it */
 };
 
 /* Fills the table, and visibility_first of the runs, from a mask a block. The stored mask of a block has all bits of

@@ -11,6 +11,7 @@
 #include <turbojpeg.h>
 #include <xxhash.h>
 #include <zstd.h>
+#include "base/random.h"
 #include "client/lib/internal.h"
 
 #define W 37
@@ -28,12 +29,11 @@ struct trial {
 	struct psr_error err;
 };
 
-static uint32_t random_state = 1;
+static uint64_t random_state = 1;
 
 static uint32_t next_random(uint32_t below)
 {
-	random_state = random_state * 1664525u + 1013904223u;
-	return (uint32_t)((uint64_t)(random_state >> 8) * below >> 24);
+	return random_below(&random_state, below);
 }
 
 static int set_up(void **state)

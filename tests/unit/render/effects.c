@@ -8,6 +8,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/random.h"
 #include "render/stages.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
@@ -63,62 +64,51 @@ struct case_of {
 	struct render_settings settings;
 };
 
-static uint32_t next(uint32_t *seed)
-{
-	*seed = *seed * 1664525u + 1013904223u;
-	return *seed >> 8;
-}
-
-static double between(uint32_t *seed, double low, double high)
-{
-	return low + (high - low) * (next(seed) % 65536) / 65536.0;
-}
-
 static void case_make(struct case_of *c, uint32_t which)
 {
-	uint32_t seed = which * 2654435761u + 1;
+	uint64_t seed = which;
 	const struct psr_model *first = models[which % MODELS];
 	const struct psr_model_info *info = psr_model_info(first);
 	memset(c, 0, sizeof *c);
 	c->scene = (struct psr_scene){ .instance = c->instance,
 		                           .n_instances = which % 3 == 2 ? 3 : 1,
 		                           .light = c->light,
-		                           .n_lights = next(&seed) % 6,
+		                           .n_lights = random_below(&seed, 6),
 		                           .ambient = { 0.1, 0.2, 0.1 },
 		                           .background = { 0.2, 0, 0.5 } };
 	for (uint32_t i = 0; i < c->scene.n_instances; i++) {
 		c->instance[i] =
-			(struct psr_instance){ i ? models[next(&seed) % MODELS] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
+			(struct psr_instance){ i ? models[random_below(&seed, MODELS)] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
 		for (int k = 0; k < 3 && i; k++)
-			c->instance[i].translation[k] = between(&seed, -info->scale, info->scale);
+			c->instance[i].translation[k] = random_in(&seed, -info->scale, info->scale);
 		if (i) /* a third of a turn about a diagonal */
 			for (int k = 0; k < 4; k++)
 				c->instance[i].rotation[k] = 0.5;
 	}
 	for (uint32_t i = 0; i < c->scene.n_lights; i++) {
 		struct psr_light *l = &c->light[i];
-		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(next(&seed) % 3);
+		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(random_below(&seed, 3));
 		l->casts_shadow = (which + i) % 3 == 0;
 		for (int k = 0; k < 3; k++) {
-			l->direction[k] = between(&seed, -1, 1);
-			l->position[k] = info->origin[k] + between(&seed, -3, 3) * info->scale;
-			l->color[k] = i == 3 ? 0 : between(&seed, 0, 1);
+			l->direction[k] = random_in(&seed, -1, 1);
+			l->position[k] = info->origin[k] + random_in(&seed, -3, 3) * info->scale;
+			l->color[k] = i == 3 ? 0 : random_in(&seed, 0, 1);
 		}
-		l->outer = between(&seed, 0.2, 1);
+		l->outer = random_in(&seed, 0.2, 1);
 		l->inner = l->outer * 0.7;
 	}
 	struct psr_camera *camera = &c->scene.camera;
-	const double distance = between(&seed, which % 7 == 6 ? 0.3 : 1.2, 5) * info->scale;
-	double direction[3] = { between(&seed, -1, 1), between(&seed, -1, 1), between(&seed, 0.1, 1) };
+	const double distance = random_in(&seed, which % 7 == 6 ? 0.3 : 1.2, 5) * info->scale;
+	double direction[3] = { random_in(&seed, -1, 1), random_in(&seed, -1, 1), random_in(&seed, 0.1, 1) };
 	for (int k = 0; k < 3; k++) {
 		camera->target[k] = info->origin[k];
 		camera->eye[k] = info->origin[k] + direction[k] * distance;
 	}
 	camera->up[1] = 1;
-	camera->kind = next(&seed) % 4 ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
-	camera->fov_y = between(&seed, 0.2, 1.5);
-	camera->ortho_height = between(&seed, 0.5, 4) * info->scale;
-	render_settings_default(&c->settings, 64 + next(&seed) % 600, 64 + next(&seed) % 500);
+	camera->kind = random_below(&seed, 4) ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = random_in(&seed, 0.2, 1.5);
+	camera->ortho_height = random_in(&seed, 0.5, 4) * info->scale;
+	render_settings_default(&c->settings, 64 + random_below(&seed, 600), 64 + random_below(&seed, 500));
 	c->settings.is_smooth = which % 4 == 1;
 }
 

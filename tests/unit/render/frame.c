@@ -46,7 +46,7 @@ static void draw(struct picture *p, const struct psr_scene *scene, uint32_t w, u
 	p->frame = (struct psr_frame){ .width = w, .height = h, .rgb = malloc(3 * w * h), .depth = malloc(4 * w * h) };
 	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (n_threads > 1)
-		assert_int_equal(psr_pool_create(&pool, n_threads, 0), NULL);
+		assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
 	if (renderer_draw(renderer, scene, &settings, pool, &p->frame, &err))
 		fail_msg("%s", err.text);
 	psr_pool_destroy(pool);

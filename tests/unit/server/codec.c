@@ -80,12 +80,13 @@ static struct codec_result encode(unsigned color_codec, unsigned quality, unsign
 		.weight = in[PSR_PLANE_WEIGHT], .words = (uint64_t *)in[PSR_PLANE_WORDS],
 		.block = in[PSR_PLANE_BLOCK],
 	};
+	const struct codec_answer answer = { .id = 9, .request = &request, .background = background };
 	struct codec_result result;
 	struct psr_error error = { 0 };
 	struct codec *codec;
 
 	assert_int_equal(codec_create(&codec), PSR_OK);
-	assert_int_equal(codec_encode(&result, codec, pool, 9, 0, &request, &frame, background, &error), PSR_OK);
+	assert_int_equal(codec_encode(&result, codec, pool, &answer, &frame, &error), PSR_OK);
 	codec_destroy(codec);
 	return result;
 }
