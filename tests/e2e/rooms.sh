@@ -6,8 +6,8 @@
 cat >"$work/rooms" <<'END'
 libpsr/include
 libpsr/base
-libpsr/simd
 libpsr/model
+libpsr/simd
 libpsr/render
 libpsr/import/import.h
 libpsr/import/image
