@@ -209,7 +209,7 @@ $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/f
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
-$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c server/frames/wire.c) $(LIB)/libpsr.a
+$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c proto/light.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
@@ -290,7 +290,7 @@ studies: deps ## studies: install what is missing, build, repeat the thesis's st
 deps:
 	@.ci/deps $(DEPS_BUILD)
 
-install: compile ## install: programs, library, headers, man pages under DESTDIR/PREFIX
+install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
 	install $(addprefix $(BIN)/,psrd psr psr-model) $(DESTDIR)$(PREFIX)/bin
@@ -298,7 +298,8 @@ install: compile ## install: programs, library, headers, man pages under DESTDIR
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
-	sed 's|@PREFIX@|$(PREFIX)|;s|@VERSION@|$(VERSION)|' docs/psr.pc.in > $(DESTDIR)$(PREFIX)/lib/pkgconfig/psr.pc
+	for pc in psr psr-client psr-build; do sed 's|@PREFIX@|$(PREFIX)|;s|@VERSION@|$(VERSION)|' docs/pkgconfig/$$pc.pc.in \
+	  > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$pc.pc || exit 1; done
 
 clean: ## clean: remove everything that was built
 	rm -rf build

@@ -24,7 +24,7 @@ static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *
 
 		if (entries[i].state != PSR_ENTRY_FAILED)
 			continue;
-		code = psr_client_open(client, entries[i].name, NULL, NULL, timeout_ms, &opened, err);
+		code = psr_client_open(client, entries[i].name, timeout_ms, &opened, err);
 		if (code == PSR_OK)
 			entries[i].state = PSR_ENTRY_LOADED; /* mended meanwhile */
 		else if (code == PSR_ERR_CONNECTION || code == PSR_ERR_PROTOCOL)
@@ -98,8 +98,11 @@ static int list_presets(struct psr_client *client, const char *model, int json, 
 	struct psr_msg_preset *presets = NULL;
 	struct psr_msg_opened opened;
 	uint32_t n = 0;
-	int code = psr_client_open(client, model, psr_progress_draw, &line, timeout_ms, &opened, err);
+	int code;
 
+	psr_client_on_progress(client, psr_progress_draw, &line);
+	code = psr_client_open(client, model, timeout_ms, &opened, err);
+	psr_client_on_progress(client, NULL, NULL);
 	psr_progress_end(&line);
 	if (code == PSR_OK)
 		code = psr_client_presets(client, opened.handle, &presets, &n, timeout_ms, err);

@@ -1,15 +1,24 @@
 #include <math.h>
 #include "wire.h"
 
-void layout_camera(struct wire *w, struct psr_msg_camera *m)
+/* Kinds count from 1 on the wire; one field is the angle or the height. */
+void layout_camera(struct wire *w, struct psr_camera *m)
 {
-	wire_u8(w, &m->kind);
+	uint8_t kind = (uint8_t)(m->kind + 1);
+	double extent = m->kind == PSR_CAMERA_PERSPECTIVE ? m->fov_y : m->ortho_height;
+
+	wire_u8(w, &kind);
 	wire_reserved(w, 7);
 	wire_f64(w, m->eye, 3);
 	wire_f64(w, m->target, 3);
 	wire_f64(w, m->up, 3);
-	wire_f64(w, &m->extent, 1);
+	wire_f64(w, &extent, 1);
 	wire_f64(w, &m->near_z, 1);
+	if (w->writing)
+		return;
+	m->kind = (enum psr_camera_kind)(kind - 1);
+	m->fov_y = m->kind == PSR_CAMERA_PERSPECTIVE ? extent : 0;
+	m->ortho_height = m->kind == PSR_CAMERA_PERSPECTIVE ? 0 : extent;
 }
 
 static double length(const double v[3])
@@ -17,13 +26,15 @@ static double length(const double v[3])
 	return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
+int check_camera(const struct psr_camera *m, struct psr_error *err)
 {
 	const double least = 1 / PSR_WIRE_MAX_LENGTH;
 	double f[3], u[3], n_f, n_u;
 
-	if (check_integer("the camera's kind", m->kind, PSR_WIRE_CAMERA_PERSPECTIVE, PSR_WIRE_CAMERA_ORTHOGRAPHIC, err) ||
-	    check_lengths("the camera's eye", m->eye, 3, err) || check_lengths("the camera's target", m->target, 3, err) ||
+	if (m->kind != PSR_CAMERA_PERSPECTIVE && m->kind != PSR_CAMERA_ORTHOGRAPHIC)
+		return psr_fail(err, PSR_ERR_ARG, "the camera's kind is %d: it must be 1 (perspective) or 2 (orthographic)",
+		                (int)m->kind + 1);
+	if (check_lengths("the camera's eye", m->eye, 3, err) || check_lengths("the camera's target", m->target, 3, err) ||
 	    check_lengths("the camera's up", m->up, 3, err))
 		return PSR_ERR_ARG;
 	for (int i = 0; i < 3; i++)
@@ -44,9 +55,9 @@ int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "the camera's up points along its view: turn it aside");
 	if (check_range("the camera's near distance", m->near_z, 0, PSR_WIRE_MAX_LENGTH, err))
 		return PSR_ERR_ARG;
-	if (m->kind == PSR_WIRE_CAMERA_PERSPECTIVE)
-		return check_range("the camera's field of view (radians)", m->extent, 1e-6, 3.14159, err);
-	return check_positive("the height of the camera's picture", m->extent, err);
+	if (m->kind == PSR_CAMERA_PERSPECTIVE)
+		return check_range("the camera's field of view (radians)", m->fov_y, 1e-6, 3.14159, err);
+	return check_positive("the height of the camera's picture", m->ortho_height, err);
 }
 
 static void layout_settings(struct wire *w, struct psr_msg_settings *m)

@@ -2,7 +2,7 @@
 #ifndef PSR_PROTO_WIRE_H
 #define PSR_PROTO_WIRE_H
 
-#include "psr/proto.h"
+#include "proto.h"
 
 /* While writing, `at` goes on counting behind `room`, and nothing is written there. While reading, fields behind the
  * end are 0. The first thing that is wrong stays in code, what and where. */
@@ -50,8 +50,8 @@ int check_integer(const char *what, uint64_t v, uint64_t min, uint64_t max, stru
 int check_zero(const char *what, int all_zero, struct psr_error *err);
 
 /* Parts of more than one message: their layouts, and what they may say. */
-void layout_camera(struct wire *w, struct psr_msg_camera *camera); /* 96 bytes */
-int check_camera(const struct psr_msg_camera *camera, struct psr_error *err);
+void layout_camera(struct wire *w, struct psr_camera *camera); /* 96 bytes */
+int check_camera(const struct psr_camera *camera, struct psr_error *err);
 void layout_light(struct wire *w, struct psr_msg_light *light); /* 88 bytes */
 int check_light(const struct psr_msg_light *light, struct psr_error *err);
 

@@ -35,7 +35,7 @@ struct bench_worker {
 	struct psr_client *client;
 	struct psr_msg_frame frame;
 	struct scene *scene;
-	struct psr_msg_camera start; /* the camera flies around its target from here */
+	struct psr_camera start; /* the camera flies around its target from here */
 	double up[3];
 	uint64_t n_asked;
 	/* results */

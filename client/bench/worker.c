@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "bench.h"
 #include "client/cli/cli.h"
+#include "client/lib/camera.h"
 
 #define FRAMES_A_TURN 120
 

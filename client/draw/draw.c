@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "client/cli/cli.h"
+#include "client/lib/camera.h"
 #include "client/replay/replay.h"
 #include "draw.h"
 #include "series.h"
@@ -36,7 +37,7 @@ struct job {
 	struct sink sink;
 	struct psr_client *client;
 	struct scene *scene;
-	struct psr_msg_camera *camera; /* sink.n */
+	struct psr_camera *camera; /* sink.n */
 };
 
 static int check_replay(struct job *job, struct psr_error *err)

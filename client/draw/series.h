@@ -8,7 +8,7 @@ struct series {
 	struct psr_client *client;
 	struct scene *scene;                 /* its key light follows the camera */
 	const struct psr_msg_frame *frame;   /* all but the camera */
-	const struct psr_msg_camera *camera; /* n of them */
+	const struct psr_camera *camera; /* n of them */
 	uint32_t n;
 	const char *server; /* address, for messages */
 	int timeout_ms;     /* of the longest silence */

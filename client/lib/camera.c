@@ -2,7 +2,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
-#include "psr/client.h"
+#include "camera.h"
 #include "psr/scene.h"
 
 #define LEAST 1e-30 /* positive lengths on the wire */
@@ -143,19 +143,20 @@ static void roll_camera(struct psr_camera *camera, const double forward[3], doub
 	combine(camera->up, c, up, s, right);
 }
 
-static int zoom_camera(struct psr_msg_camera *camera, double zoom, struct psr_error *err)
+static int zoom_camera(struct psr_camera *camera, double zoom, struct psr_error *err)
 {
-	if (camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC) {
-		camera->extent /= zoom;
-		if (camera->extent >= LEAST && camera->extent <= PSR_WIRE_MAX_LENGTH)
+	if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC) {
+		camera->ortho_height /= zoom;
+		if (camera->ortho_height >= LEAST && camera->ortho_height <= PSR_WIRE_MAX_LENGTH)
 			return PSR_OK;
-		return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves a picture of a height of %g", zoom, camera->extent);
+		return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves a picture of a height of %g", zoom,
+		                camera->ortho_height);
 	}
-	camera->extent = 2 * atan(tan(camera->extent / 2) / zoom);
-	if (camera->extent >= LEAST_FOV && camera->extent <= GREATEST_FOV)
+	camera->fov_y = 2 * atan(tan(camera->fov_y / 2) / zoom);
+	if (camera->fov_y >= LEAST_FOV && camera->fov_y <= GREATEST_FOV)
 		return PSR_OK;
 	return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves an angle of view of %g degrees; it has to be between 0.0001 "
-	                "and 179.999", zoom, camera->extent / DEGREE);
+	                "and 179.999", zoom, camera->fov_y / DEGREE);
 }
 
 /* Eye, target, up and ortho_height, without roll unless there are angles. */
@@ -201,7 +202,7 @@ static int turn_up(struct psr_camera *framed, const struct psr_camera_wish *wish
 	return PSR_OK;
 }
 
-int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
+int psr_camera_complete(struct psr_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err)
 {
 	struct psr_camera framed;
@@ -218,12 +219,12 @@ int psr_camera_complete(struct psr_msg_camera *camera, const struct psr_camera_w
 	memcpy(camera->target, framed.target, sizeof camera->target);
 	memcpy(camera->up, framed.up, sizeof camera->up);
 	if (wish->fov_y > 0) {
-		camera->kind = PSR_WIRE_CAMERA_PERSPECTIVE;
-		camera->extent = wish->fov_y;
+		camera->kind = PSR_CAMERA_PERSPECTIVE;
+		camera->fov_y = wish->fov_y;
 		camera->near_z = near_from_box(camera->eye, box_min, box_max);
 	} else {
-		camera->kind = PSR_WIRE_CAMERA_ORTHOGRAPHIC;
-		camera->extent = wish->ortho_height > 0 ? wish->ortho_height : framed.ortho_height;
+		camera->kind = PSR_CAMERA_ORTHOGRAPHIC;
+		camera->ortho_height = wish->ortho_height > 0 ? wish->ortho_height : framed.ortho_height;
 	}
 	return wish->zoom > 0 && wish->zoom != 1 ? zoom_camera(camera, wish->zoom, err) : PSR_OK;
 }
@@ -238,7 +239,7 @@ static void turn_vector(double v[3], const double axis[3], double s, double c)
 		v[i] = c * v[i] + s * cross[i] + (1 - c) * along * axis[i];
 }
 
-void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double degrees, const double box_min[3],
+void psr_camera_turn(struct psr_camera *camera, const double up[3], double degrees, const double box_min[3],
                      const double box_max[3])
 {
 	double axis[3], arm[3], s, c;
@@ -249,23 +250,15 @@ void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double d
 	turn_vector(arm, axis, s, c);
 	turn_vector(camera->up, axis, s, c);
 	v3d_add(camera->eye, camera->target, arm);
-	if (camera->kind == PSR_WIRE_CAMERA_PERSPECTIVE)
+	if (camera->kind == PSR_CAMERA_PERSPECTIVE)
 		camera->near_z = near_from_box(camera->eye, box_min, box_max);
 }
 
-void client_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera)
+void client_light_key(struct psr_msg_light *light, const struct psr_camera *camera)
 {
-	double forward[3], right[3], up[3];
+	struct psr_light key;
 
-	memset(light, 0, sizeof *light);
-	memset(light->color, 255, sizeof light->color);
-	light->kind = PSR_WIRE_LIGHT_DIRECTIONAL;
-	light->intensity = 1;
-	v3d_sub(forward, camera->target, camera->eye);
-	v3d_normalize(forward, forward);
-	v3d_cross(right, forward, camera->up);
-	v3d_normalize(right, right);
-	v3d_cross(up, right, forward);
-	for (int i = 0; i < 3; i++)
-		light->direction[i] = forward[i] + 0.5 * right[i] - 0.6 * up[i];
+	psr_light_key(&key, camera);
+	*light = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .color = { 255, 255, 255 }, .intensity = 1 };
+	memcpy(light->direction, key.direction, sizeof light->direction);
 }

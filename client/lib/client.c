@@ -1,4 +1,5 @@
 #include <errno.h>
+#include <inttypes.h>
 #include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -76,6 +77,13 @@ static int fail_broken(const struct psr_client *client, struct psr_error *err)
 const struct psr_msg_welcome *psr_client_welcome(const struct psr_client *client)
 {
 	return &client->welcome;
+}
+
+int psr_client_fd(const struct psr_client *client, short *events)
+{
+	if (events != NULL)
+		*events = (short)(POLLIN | (client->out.size > 0 ? POLLOUT : 0));
+	return client->fd;
 }
 
 uint64_t psr_client_bytes_received(const struct psr_client *client)
@@ -280,4 +288,34 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 	frame->bytes = 0;
 	frame->sent_ns = clock_ns();
 	return PSR_OK;
+}
+
+int psr_client_cancel(struct psr_client *client, uint32_t id, struct psr_error *err)
+{
+	size_t i = 0;
+	int code;
+
+	if (client->broken.code != PSR_OK)
+		return fail_broken(client, err);
+	while (i < PSR_WIRE_MAX_OPEN && (id == 0 || client->frame[i].id != id))
+		i++;
+	if (i == PSR_WIRE_MAX_OPEN)
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "no frame %" PRIu32 " is under way", id);
+	code = psr_msg_cancel_encode(&client->out, id, 0, err);
+	if (code == PSR_ERR_MEMORY)
+		return psr_fail(err, PSR_ERR_BUSY, "%s waits for the server to take what was sent before", client->address);
+	flush_output(client);
+	return code;
+}
+
+int psr_client_close_model(struct psr_client *client, uint32_t handle, struct psr_error *err)
+{
+	const struct psr_msg_close msg = { .handle = handle };
+	size_t start = client->out.size;
+	int code = start_request(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	code = psr_msg_close_encode(&client->out, client->next_id, &msg, err);
+	return finish_request(client, start, code, "request", err);
 }

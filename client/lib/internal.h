@@ -2,6 +2,7 @@
 #ifndef PSR_CLIENT_INTERNAL_H
 #define PSR_CLIENT_INTERNAL_H
 
+#include "proto/proto.h"
 #include "psr/client.h"
 
 #define CLIENT_IN_BYTES (4 * PSR_WIRE_MAX_MESSAGE)
@@ -96,6 +97,8 @@ struct psr_client {
 	uint32_t next_id;
 	struct psr_msg_welcome welcome;
 	uint32_t resolution;          /* for OPEN */
+	void (*on_progress)(const struct psr_msg_progress *progress, void *userdata);
+	void *userdata;
 	struct client_decoder *decoder;
 	struct client_frame frame[PSR_WIRE_MAX_OPEN];
 	struct client_assembly done; /* of the last event */

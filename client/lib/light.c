@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/cli.h"
-#include "psr/client.h"
+#include "camera.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 

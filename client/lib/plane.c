@@ -3,7 +3,7 @@
 #include <string.h>
 #include <strings.h>
 #include "picture.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 /* ---- .npy, version 1.0: a magic, a Python dictionary padded so that the data is aligned, the data ---- */
 

@@ -123,9 +123,15 @@ void psr_client_set_resolution(struct psr_client *client, uint32_t pixels)
 	client->resolution = pixels < PSR_WIRE_MAX_SIDE ? pixels : PSR_WIRE_MAX_SIDE;
 }
 
-int psr_client_open(struct psr_client *client, const char *name,
-                    void (*on_progress)(const struct psr_msg_progress *progress, void *userdata), void *userdata,
-                    int timeout_ms, struct psr_msg_opened *opened, struct psr_error *err)
+void psr_client_on_progress(struct psr_client *client,
+                            void (*fn)(const struct psr_msg_progress *progress, void *userdata), void *userdata)
+{
+	client->on_progress = fn;
+	client->userdata = userdata;
+}
+
+int psr_client_open(struct psr_client *client, const char *name, int timeout_ms, struct psr_msg_opened *opened,
+                    struct psr_error *err)
 {
 	struct psr_msg_open msg = { 0, "" };
 	int code;
@@ -143,8 +149,8 @@ int psr_client_open(struct psr_client *client, const char *name,
 		return withdraw(client, code);
 	do {
 		code = next_answer(client, timeout_ms, err);
-		if (code == PSR_OK && client->answer == CLIENT_ANSWER_PROGRESS && on_progress != NULL)
-			on_progress(&client->progress, userdata);
+		if (code == PSR_OK && client->answer == CLIENT_ANSWER_PROGRESS && client->on_progress != NULL)
+			client->on_progress(&client->progress, client->userdata);
 	} while (code == PSR_OK && client->answer != CLIENT_ANSWER_OPENED);
 	if (code == PSR_OK)
 		*opened = client->opened;

@@ -3,7 +3,7 @@
 #define PSR_CLIENT_OUTPUT_EFFECTS_H
 
 #include <cjson/cJSON.h>
-#include "psr/proto.h"
+#include "psr/message.h"
 
 /* Adds "effects" with a member each: "ran", and "count" or "why". Skips effects that this program does not know. */
 void effects_add(cJSON *to, const struct psr_msg_frame_end *end);

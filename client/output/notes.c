@@ -11,7 +11,7 @@
 #define STEP 128  /* of advised resolutions */
 
 /* p in the frame of the camera: right, up, forward. */
-static void project(double out[3], const struct psr_msg_camera *camera, const double p[3])
+static void project(double out[3], const struct psr_camera *camera, const double p[3])
 {
 	double forward[3], right[3], up[3], arm[3];
 
@@ -25,11 +25,11 @@ static void project(double out[3], const struct psr_msg_camera *camera, const do
 }
 
 /* World units of a pixel at depth z. */
-static double pixel_at(const struct psr_msg_camera *camera, double z, uint32_t height)
+static double pixel_at(const struct psr_camera *camera, double z, uint32_t height)
 {
-	if (camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC)
-		return camera->extent / height;
-	return 2 * z * tan(camera->extent / 2) / height;
+	if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
+		return camera->ortho_height / height;
+	return 2 * z * tan(camera->fov_y / 2) / height;
 }
 
 static void corner_of(double out[3], const double box_min[3], const double box_max[3], int corner)
@@ -39,16 +39,16 @@ static void corner_of(double out[3], const double box_min[3], const double box_m
 }
 
 /* Whether a point in the frame of the camera is inside of the picture. */
-static int is_in_picture(const struct psr_msg_camera *camera, const double seen[3], double aspect)
+static int is_in_picture(const struct psr_camera *camera, const double seen[3], double aspect)
 {
-	double half = camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC ? camera->extent / 2 : seen[2] * tan(camera->extent / 2);
+	double half = camera->kind == PSR_CAMERA_ORTHOGRAPHIC ? camera->ortho_height / 2 : seen[2] * tan(camera->fov_y / 2);
 
 	return seen[2] >= camera->near_z && seen[2] > 0 && fabs(seen[1]) <= half && fabs(seen[0]) <= half * aspect;
 }
 
 /* Depth of the nearest visible point of a grid on the faces of the model's box, whose nearest corner is often outside
  * of the picture. INFINITY: none is visible. */
-static double nearest_depth(const struct scene *scene, uint32_t instance, const struct psr_msg_camera *camera,
+static double nearest_depth(const struct scene *scene, uint32_t instance, const struct psr_camera *camera,
                             double aspect)
 {
 	const struct psr_msg_opened *opened = &scene->model[scene->model_of[instance]].opened;
@@ -74,7 +74,7 @@ static double nearest_depth(const struct scene *scene, uint32_t instance, const 
 }
 
 /* A lower bound of the same; 0: the box reaches behind the camera. */
-static double depth_before(const struct scene *scene, uint32_t instance, const struct psr_msg_camera *camera)
+static double depth_before(const struct scene *scene, uint32_t instance, const struct psr_camera *camera)
 {
 	const struct psr_msg_opened *opened = &scene->model[scene->model_of[instance]].opened;
 	double depth = INFINITY, p[3], seen[3];
@@ -88,7 +88,7 @@ static double depth_before(const struct scene *scene, uint32_t instance, const s
 	return fmax(depth, 0);
 }
 
-static double apart_at(const struct scene *scene, uint32_t i, const struct psr_msg_camera *camera, double z,
+static double apart_at(const struct scene *scene, uint32_t i, const struct psr_camera *camera, double z,
                        uint32_t height)
 {
 	const struct psr_msg_opened *opened = &scene->model[scene->model_of[i]].opened;
@@ -96,7 +96,7 @@ static double apart_at(const struct scene *scene, uint32_t i, const struct psr_m
 	return opened->spacing * scene->msg.instance[i].scale / pixel_at(camera, z, height);
 }
 
-double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_msg_camera *camera, uint32_t width,
+double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_camera *camera, uint32_t width,
                            uint32_t height)
 {
 	double z = nearest_depth(scene, i, camera, (double)width / height);
@@ -104,7 +104,7 @@ double notes_magnification(const struct scene *scene, uint32_t i, const struct p
 	return z < INFINITY ? apart_at(scene, i, camera, z, height) : 0;
 }
 
-static const char *why_empty(const struct scene *scene, const struct psr_msg_camera *camera)
+static const char *why_empty(const struct scene *scene, const struct psr_camera *camera)
 {
 	int n_before = 0;
 
@@ -130,7 +130,7 @@ static int is_empty(const struct psr_msg_frame_end *end)
 void notes_add(struct notes *notes, const struct scene *scene, const struct psr_msg_frame *asked,
                const struct psr_event *event)
 {
-	const struct psr_msg_camera *camera = &event->begin->camera;
+	const struct psr_camera *camera = &event->begin->camera;
 
 	notes->n_pictures++;
 	if (is_empty(event->end)) {

@@ -19,7 +19,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 void notes_print(const struct notes *notes, const char *program, const struct psr_msg_frame *asked);
 
 /* Pixels between neighbouring samples of instance i at its nearest visible part; 0: it is not visible. */
-double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_msg_camera *camera, uint32_t width,
+double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_camera *camera, uint32_t width,
                            uint32_t height);
 
 #endif

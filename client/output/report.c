@@ -37,18 +37,18 @@ static void add_model(cJSON *to, const struct shot_facts *facts)
 			cJSON_AddItemToArray(list, cJSON_CreateString(representations[r]));
 }
 
-static void add_camera(cJSON *to, const struct psr_msg_camera *wire)
+static void add_camera(cJSON *to, const struct psr_camera *from)
 {
 	cJSON *camera = cJSON_AddObjectToObject(to, "camera");
-	int is_perspective = wire->kind == PSR_WIRE_CAMERA_PERSPECTIVE;
+	int is_perspective = from->kind == PSR_CAMERA_PERSPECTIVE;
 
 	cJSON_AddStringToObject(camera, "kind", is_perspective ? "perspective" : "orthographic");
-	json_add_numbers(camera, "eye", wire->eye, 3);
-	json_add_numbers(camera, "target", wire->target, 3);
-	json_add_numbers(camera, "up", wire->up, 3);
+	json_add_numbers(camera, "eye", from->eye, 3);
+	json_add_numbers(camera, "target", from->target, 3);
+	json_add_numbers(camera, "up", from->up, 3);
 	json_add_number(camera, is_perspective ? "fov_deg" : "height",
-	                is_perspective ? wire->extent / DEGREE : wire->extent);
-	json_add_number(camera, "near", wire->near_z);
+	                is_perspective ? from->fov_y / DEGREE : from->ortho_height);
+	json_add_number(camera, "near", from->near_z);
 }
 
 static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)

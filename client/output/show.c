@@ -229,7 +229,7 @@ static void paint_depth(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 		memcpy(rgb, BACKGROUND, 3);
 		return;
 	}
-	if (canvas->begin->camera.kind == PSR_WIRE_CAMERA_PERSPECTIVE) {
+	if (canvas->begin->camera.kind == PSR_CAMERA_PERSPECTIVE) {
 		z = 1 / z;
 		near = 1 / near;
 		far = 1 / far;
@@ -267,7 +267,7 @@ uint32_t show_planes(const struct show *show)
 int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err)
 {
 	const struct psr_frame *picture = event->picture;
-	const struct psr_msg_camera *camera = &event->begin->camera;
+	const struct psr_camera *camera = &event->begin->camera;
 	size_t n = (size_t)picture->width * picture->height;
 	struct canvas canvas = { .picture = picture, .begin = event->begin, .rgb = malloc(3 * n) };
 	struct psr_frame painted = { .width = picture->width, .height = picture->height, .rgb = canvas.rgb };

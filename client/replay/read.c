@@ -5,6 +5,7 @@
 #include "base/infile.h"
 #include "base/json.h"
 #include "replay.h"
+#include "client/lib/camera.h"
 
 #define MAX_BYTES (16 << 20)
 
@@ -222,11 +223,12 @@ int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_er
 		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report's size is no size of a picture");
 	frame->width = (uint32_t)size[0];
 	frame->height = (uint32_t)size[1];
-	frame->camera.kind = find_kind(&reader, camera, kinds, 2);
+	frame->camera.kind = find_kind(&reader, camera, kinds, 2) == 2 ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
 	get_numbers(&reader, frame->camera.eye, camera, "eye", 3);
 	get_numbers(&reader, frame->camera.target, camera, "target", 3);
 	get_numbers(&reader, frame->camera.up, camera, "up", 3);
-	frame->camera.extent = get_number(&reader, camera, "extent", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
+	*(frame->camera.kind == PSR_CAMERA_PERSPECTIVE ? &frame->camera.fov_y : &frame->camera.ortho_height) =
+		get_number(&reader, camera, "extent", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
 	frame->camera.near_z = get_number(&reader, camera, "near", 0, PSR_WIRE_MAX_LENGTH);
 	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
 	frame->settings.scale = 1;

@@ -4,7 +4,7 @@
 #include "replay.h"
 
 static const char *const light_kinds[] = { "", "directional", "point", "spot" };
-static const char *const camera_kinds[] = { "", "perspective", "orthographic" };
+static const char *const camera_kinds[] = { "perspective", "orthographic" };
 
 static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 {
@@ -81,7 +81,8 @@ void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_f
 	json_add_numbers(camera, "eye", frame->camera.eye, 3);
 	json_add_numbers(camera, "target", frame->camera.target, 3);
 	json_add_numbers(camera, "up", frame->camera.up, 3);
-	json_add_number(camera, "extent", frame->camera.extent);
+	json_add_number(camera, "extent",
+	                frame->camera.kind == PSR_CAMERA_PERSPECTIVE ? frame->camera.fov_y : frame->camera.ortho_height);
 	json_add_number(camera, "near", frame->camera.near_z);
 	json_add_numbers(request, "size", size, 2);
 	json_add_number(request, "spacing_px", frame->settings.spacing_px);

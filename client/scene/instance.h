@@ -2,7 +2,7 @@
 #ifndef PSR_CLIENT_SCENE_INSTANCE_H
 #define PSR_CLIENT_SCENE_INSTANCE_H
 
-#include "psr/proto.h"
+#include "psr/message.h"
 
 struct instance_wish {
 	char model[PSR_WIRE_MAX_NAME + 1];

@@ -12,7 +12,7 @@ const char *preset_of_light(const char *text)
 const char *preset_type(const struct psr_msg_preset *preset)
 {
 	if (preset->kind == PSR_WIRE_PRESET_CAMERA)
-		return preset->camera.kind == PSR_WIRE_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
+		return preset->camera.kind == PSR_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
 	return preset->light.kind == PSR_WIRE_LIGHT_DIRECTIONAL ? "directional"
 	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
 }

@@ -1,5 +1,6 @@
 #include "quality.h"
 #include <string.h>
+#include "client/lib/camera.h"
 #include "psr/render.h"
 
 static const struct {

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "client/cli/cli.h"
 #include "preset.h"
+#include "client/lib/camera.h"
 #include "scene.h"
 #include "suggest.h"
 
@@ -24,8 +25,9 @@ static int open_model(struct scene_model *model, struct psr_client *client, int 
 	struct psr_progress_line line = { 0 };
 	int code;
 
-	code = psr_client_open(client, model->name, is_quiet ? NULL : psr_progress_draw, &line, timeout_ms, &model->opened,
-	                       err);
+	psr_client_on_progress(client, is_quiet ? NULL : psr_progress_draw, &line);
+	code = psr_client_open(client, model->name, timeout_ms, &model->opened, err);
+	psr_client_on_progress(client, NULL, NULL);
 	psr_progress_end(&line);
 	return code == PSR_ERR_NOT_FOUND ? suggest_model(client, model->name, timeout_ms, err) : code;
 }
@@ -71,7 +73,7 @@ static void place_instances(struct scene *scene, const struct scene_wish *wish)
 
 static void place_preset(struct psr_msg_preset *preset, const struct psr_msg_instance *place)
 {
-	struct psr_msg_camera *camera = &preset->camera;
+	struct psr_camera *camera = &preset->camera;
 	struct psr_msg_light *light = &preset->light;
 
 	if (preset->kind == PSR_WIRE_PRESET_CAMERA) {
@@ -79,8 +81,8 @@ static void place_preset(struct psr_msg_preset *preset, const struct psr_msg_ins
 		instance_apply(camera->target, place, camera->target);
 		instance_rotate(camera->up, place, camera->up);
 		camera->near_z *= place->scale;
-		if (camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC)
-			camera->extent *= place->scale;
+		if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
+			camera->ortho_height *= place->scale;
 		return;
 	}
 	if (light->kind != PSR_WIRE_LIGHT_DIRECTIONAL)
@@ -168,7 +170,7 @@ int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_cli
 	return code;
 }
 
-int scene_light(struct scene *scene, const struct psr_msg_camera *camera)
+int scene_light(struct scene *scene, const struct psr_camera *camera)
 {
 	if (!scene->has_key_light)
 		return 0;

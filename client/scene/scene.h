@@ -74,6 +74,6 @@ int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_cli
 void scene_close(struct scene *scene); /* NULL is fine */
 
 /* Moves the key light with the camera. Returns whether the scene has one. */
-int scene_light(struct scene *scene, const struct psr_msg_camera *camera);
+int scene_light(struct scene *scene, const struct psr_camera *camera);
 
 #endif

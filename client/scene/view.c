@@ -232,7 +232,7 @@ void view_up(double up[3], const struct view_wish *wish, const struct scene *sce
 	memcpy(up, wish->camera.has_up ? wish->camera.up : has_natural ? scene->up : y, sizeof y);
 }
 
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
+int view_place(struct psr_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
                uint32_t n_turn, struct psr_error *err)
 {
 	struct psr_camera_wish placed = wish->camera;

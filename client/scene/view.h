@@ -3,6 +3,7 @@
 #define PSR_CLIENT_SCENE_VIEW_H
 
 #include "client/cli/optlist.h"
+#include "client/lib/camera.h"
 #include "psr/client.h"
 #include "scene.h"
 
@@ -35,7 +36,7 @@ int views_make(struct views *views, const struct view_wish *wish, const char *fi
 void views_fini(struct views *views);
 
 /* Places the camera in the scene. n_turn: the scene stays in the picture at so many equal turns; 0: no turns. */
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
+int view_place(struct psr_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
                uint32_t n_turn, struct psr_error *err);
 
 /* The axis of turns: --up, the model's natural up, or +Y. */

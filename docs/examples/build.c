@@ -1,13 +1,12 @@
-/* build MODEL.psr: builds a model of arrays, a cushion of 64 x 64 squares in red, and writes it.
- * cc build.c $(pkg-config --cflags --libs psr-build) -lm -o build */
-#include <math.h>
+/* build MODEL.psr: builds a model of arrays, a red pyramid.
+ * cc build.c $(pkg-config --cflags --libs psr-build) -o build */
 #include <stdio.h>
+#include <string.h>
 #include <psr/build.h>
 
-#define N 64
-
-static double position[(N + 1) * (N + 1)][3];
-static uint32_t triangle[2 * N * N][3];
+static const double point[5][3] = { { -1, 0, -1 }, { 1, 0, -1 }, { 1, 0, 1 }, { -1, 0, 1 }, { 0, 1.5, 0 } };
+static const uint32_t face[6][3] = { { 3, 2, 4 }, { 2, 1, 4 }, { 1, 0, 4 }, { 0, 3, 4 }, { 0, 1, 2 }, { 0, 2, 3 } };
+static const float red[4] = { 0.8f, 0.02f, 0.02f, 1 };
 
 int main(int argc, char **argv)
 {
@@ -15,11 +14,19 @@ int main(int argc, char **argv)
 	struct psr_model *model = NULL;
 	struct psr_build_options options;
 	struct psr_error err;
-	uint32_t n = 0;
+	int code = argc == 2 ? psr_mesh_create(&mesh, point, 5, face, 6, &err)
+	                     : psr_fail(&err, PSR_ERR_ARG, "usage: build MODEL.psr");
 
-	for (uint32_t i = 0; i < (N + 1) * (N + 1); i++) {
-		const double x = i % (N + 1) * 2.0 / N - 1, z = i / (N + 1) * 2.0 / N - 1;
-
-		position[i][0] = x, position[i][1] = 0.5 * cos(x) * cos(z), position[i][2] = z;
-	}
+	psr_build_options_default(&options);
+	if (code == PSR_OK)
+		memcpy(mesh->material[0].base_color, red, sizeof red);
+	if (code == PSR_OK)
+		code = psr_model_build(&model, mesh, &options, NULL, &err);
+	if (code == PSR_OK)
+		code = psr_model_write(model, argv[1], &err);
+	if (code != PSR_OK)
+		fprintf(stderr, "%s\n", err.text);
+	psr_model_unref(model);
+	psr_mesh_destroy(mesh);
+	return psr_exit_status(code);
 }

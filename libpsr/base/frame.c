@@ -1,5 +1,4 @@
 #include <assert.h>
-#include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
@@ -51,11 +50,10 @@ int psr_frame_alloc(struct psr_frame *frame, uint32_t width, uint32_t height, un
 		return psr_fail(err, PSR_ERR_ARG, "the planes of a frame are %#x: bits 0 to %d are known, and one is needed",
 		                planes, PSR_N_PLANES - 1);
 	if (width == 0 || height == 0)
-		return psr_fail(err, PSR_ERR_ARG, "a frame of %" PRIu32 "x%" PRIu32 " pixels: both sides need at least 1", width,
-		                height);
+		return psr_fail(err, PSR_ERR_ARG, "a frame of %ux%u pixels: both sides need at least 1", width, height);
 	if (width > PSR_MAX_SIDE || height > PSR_MAX_SIDE || (uint64_t)width * height > PSR_MAX_PIXELS)
-		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %" PRIu32 "x%" PRIu32 " pixels: a side has at most %d, all of it %u",
-		                width, height, PSR_MAX_SIDE, PSR_MAX_PIXELS);
+		return psr_fail(err, PSR_ERR_LIMIT, "a frame of %ux%u pixels: a side has at most %d, all of it %u", width, height,
+		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
 	frame->width = width;
 	frame->height = height;
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
@@ -63,7 +61,7 @@ int psr_frame_alloc(struct psr_frame *frame, uint32_t width, uint32_t height, un
 
 		if (pixels == NULL && planes >> plane & 1) {
 			psr_frame_free(frame);
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %" PRIu32 "x%" PRIu32 " pixels", width, height);
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %ux%u pixels", width, height);
 		}
 		memcpy((char *)frame + planes_of[plane].offset, &pixels, sizeof pixels);
 	}

@@ -18,6 +18,12 @@ int psr_mesh_create(struct psr_mesh **out, const double (*position)[3], uint32_t
 		memcpy(im.mesh->triangle, triangle, n_triangles * sizeof *triangle);
 	}
 	if (rc == PSR_OK)
+		rc = import_mesh_repair(&im, err); /* checks the indices that the next two follow */
+	if (rc == PSR_OK)
+		rc = import_mesh_smooth(&im, err);
+	if (rc == PSR_OK)
+		rc = import_mesh_weld(&im, err);
+	if (rc == PSR_OK)
 		rc = import_mesh_finish(out, &im, err);
 	if (rc == PSR_OK)
 		(*out)->up[1] = 1;

@@ -20,7 +20,7 @@ void truth_light(const struct psr_truth *truth, const struct view *view, double 
                  const double (*place)[2], int n, struct truth_light *out);
 
 /* The ray through a place in the picture, in the mesh's inner coordinates; what rays meet from near_z on (world units);
- * and the attributes of that place, unfiltered, as psr/model.h has them. */
+ * and the attributes of that place, unfiltered, as model/blocks.h has them. */
 void truth_ray(const struct psr_truth *truth, const struct view *view, double x, double y, struct ray *ray);
 void truth_trace(const struct psr_truth *truth, const struct ray *ray, int n, double near_z, struct ray_hit *hit);
 uint64_t truth_attr(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit);

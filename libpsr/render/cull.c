@@ -449,7 +449,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 		if (chunk->depth_error > depth_error)
 			depth_error = chunk->depth_error;
 	}
-	report->error_bound = 0.5 + (double)depth_error;
+	report->error_px = 0.5 + (double)depth_error;
 	if (plan->with_splats)
 		report->levels |= report->levels & 1 ? 2 : 0;
 	else if (plan->is_full)

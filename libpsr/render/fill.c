@@ -380,5 +380,5 @@ void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repo
 	report->count[PSR_STAGE_FILL] += fill->n_changed;
 	report->n_filled += fill->n_filled;
 	if (fill->n_moved)
-		report->error_bound += (double)(2 << fill->deepest);
+		report->error_px += (double)(2 << fill->deepest);
 }

@@ -68,8 +68,8 @@ static int validate(const struct psr_scene *scene, const struct render_settings 
 		return psr_fail(err, PSR_ERR_ARG, "gap threshold %g is not within 0..64 pixels", settings->gap_threshold);
 	if (settings->gap_method != PSR_GAPS_BILINEAR && settings->gap_method != PSR_GAPS_OPAQUE)
 		return psr_fail(err, PSR_ERR_ARG, "there is no method %d to find gaps by", (int)settings->gap_method);
-	if (!(settings->spacing >= 1.0 / 64 && settings->spacing <= 64))
-		return psr_fail(err, PSR_ERR_ARG, "a spacing of %g is not within 1/64..64 pixels", settings->spacing);
+	if (!(settings->spacing_px >= 1.0 / 64 && settings->spacing_px <= 64))
+		return psr_fail(err, PSR_ERR_ARG, "a spacing of %g is not within 1/64..64 pixels", settings->spacing_px);
 	return psr_scene_validate(scene, err);
 }
 

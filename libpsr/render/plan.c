@@ -254,7 +254,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
-	plan->finer = (float)(1 / settings->spacing);
+	plan->finer = (float)(1 / settings->spacing_px);
 	plan->is_quiet = NULL;
 	plan->has_sheer = plan->is_shadow = 0;
 	plan->with_splats = settings->with_splats;

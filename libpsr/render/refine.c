@@ -140,7 +140,7 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 			sum->effect[e].why = one->effect[e].why;
 		sum->effect[e].count += one->effect[e].count;
 	}
-	sum->error_bound = fmax(sum->error_bound, ldexp(one->error_bound, -(int)pass));
+	sum->error_px = fmax(sum->error_px, ldexp(one->error_px, -(int)pass));
 }
 
 /* Draws the window of column i and row j of windows, and averages what of it is used. */

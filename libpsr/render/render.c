@@ -10,13 +10,14 @@ const char *psr_stage_name(enum psr_stage stage)
 
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height)
 {
-	*settings = (struct psr_settings){ .width = width, .height = height, .spacing = 1 };
+	*settings = (struct psr_settings){ .width = width, .height = height, .spacing_px = 1 };
 }
 
 void render_settings_default(struct render_settings *settings, uint32_t width, uint32_t height)
 {
-	*settings = (struct render_settings){ .width = width,         .height = height,   .spacing = 1,
-		                                  .cull_tests = PSR_CULL_ALL, .gap_threshold = 3, .gap_method = PSR_GAPS_BILINEAR };
+	*settings = (struct render_settings){ .width = width, .height = height, .spacing_px = 1,
+		                                  .cull_tests = PSR_CULL_ALL, .gap_threshold = 3,
+		                                  .gap_method = PSR_GAPS_BILINEAR };
 }
 
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *asked,
@@ -25,7 +26,7 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 	struct refiner **refiner = renderer_refiner(renderer);
 	struct render_settings settings;
 	render_settings_default(&settings, asked->width, asked->height);
-	settings.spacing = asked->spacing;
+	settings.spacing_px = asked->spacing_px;
 	settings.is_smooth = asked->is_smooth;
 	settings.pass = asked->pass;
 	settings.is_cancelled = asked->is_cancelled;

@@ -31,7 +31,7 @@ struct psr_window {
 
 struct render_settings {
 	uint32_t width, height; /* these five as in struct psr_settings */
-	double spacing;
+	double spacing_px;
 	int is_smooth;
 	unsigned pass;          /* read by refiner_draw() only */
 	int (*is_cancelled)(void *userdata);
@@ -51,12 +51,12 @@ void render_settings_default(struct render_settings *settings, uint32_t width, u
 int renderer_draw(struct psr_renderer *renderer, const struct psr_scene *scene, const struct render_settings *settings,
                   struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 
-/* The same in two halves. renderer_warp() leaves words and level buffers in the renderer's z-stack, which holds until the
- * next call; renderer_finish() does gaps, resolve, shade and fill on it, with the scene unchanged. */
+/* The same in two halves. renderer_warp() leaves words and level buffers in the renderer's z-stack, which holds until
+ * the next call; renderer_finish() does gaps, resolve, shade and fill on it, with the scene unchanged. */
 int renderer_warp(struct psr_renderer *renderer, const struct psr_scene *scene, const struct render_settings *settings,
-             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err);
-int renderer_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
-               struct psr_error *err);
+                  struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err);
+int renderer_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct psr_pool *pool,
+                    struct psr_frame *frame, struct psr_error *err);
 
 /* ---- refinement ([G] 9.1.1): the anti-aliased still of a camera that rests ---- */
 

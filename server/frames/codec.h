@@ -10,7 +10,7 @@
 #include "server/net/outq.h"
 #include "psr/error.h"
 #include "base/pool.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "psr/render.h"
 
 #define CODEC_STRIP_ROWS 128

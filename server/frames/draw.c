@@ -3,7 +3,6 @@
 #include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
-#include "wire.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -204,7 +203,7 @@ static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct
 	struct psr_settings settings;
 
 	psr_settings_default(&settings, d->request.width, d->request.height);
-	settings.spacing = asked.spacing_px;
+	settings.spacing_px = asked.spacing_px;
 	settings.is_smooth = asked.is_smooth;
 	settings.pass = d->pass;
 	settings.is_cancelled = is_abandoned;
@@ -223,7 +222,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	struct times times = { .start_ns = clock_ns() };
 	int code;
 
-	wire_to_camera(&scene.camera, &d->request.camera);
+	scene.camera = d->request.camera;
 	code = reserve_pixels(worker, d, &picture, err);
 	if (code == PSR_OK)
 		code = draw_pass(d, worker, &scene, &picture, err);
@@ -236,7 +235,7 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 	if (code != PSR_OK)
 		return code;
 	times.end_ns = clock_ns();
-	end.error_px = picture.report.error_bound;
+	end.error_px = picture.report.error_px;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
 	fill_report(&end, d, &picture.report, &times, coded.rect_bytes);
 	return join_answer(d, &coded, &end, err);

@@ -9,7 +9,7 @@
 #include "server/net/outq.h"
 #include "psr/error.h"
 #include "base/pool.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "scene.h"
 
 struct draw_worker; /* buffers of one frame at a time, kept from frame to frame */

@@ -9,7 +9,7 @@
 #include "codec.h"
 #include "scene.h"
 #include "server/net/conn.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 struct frame;
 struct frames;

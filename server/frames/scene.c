@@ -5,7 +5,6 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "scene.h"
-#include "wire.h"
 
 struct scene *scene_ref(struct scene *scene)
 {
@@ -76,7 +75,7 @@ int scene_create(struct scene **out, const struct handles *handles, const struct
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
 		code = add_instance(scene, handles, &msg->instance[i], err);
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
-		wire_to_light(&scene->light[scene->scene.n_lights++], &msg->light[i]);
+		psr_msg_light_get(&scene->light[scene->scene.n_lights++], &msg->light[i]);
 	if (code != PSR_OK) {
 		scene_unref(scene);
 		return code;

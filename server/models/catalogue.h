@@ -18,7 +18,7 @@
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/model.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 #define CATALOGUE_MAX_FILES 65536
 #define CATALOGUE_KEY 33 /* 32 hexadecimal digits and the NUL */

@@ -6,7 +6,7 @@
 #include "builder.h"
 #include "catalogue.h"
 #include "server/net/loop.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 struct opener;
 

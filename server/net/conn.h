@@ -6,7 +6,7 @@
 
 #include "loop.h"
 #include "outq.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 #define CONN_SPARE 16 /* connections beyond the limit that are told so */
 

@@ -1,6 +1,5 @@
 #include <string.h>
 #include "answers.h"
-#include "server/frames/wire.h"
 
 #define HOME_CAMERA "home"
 #define HOME_FOV 0.6108652381980153 /* 35 degrees, as the client's */
@@ -15,6 +14,23 @@ static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_pre
 		return;
 	conn_send(conn, &buf);
 	++*n_sent;
+}
+
+static void send_camera(struct conn *conn, uint32_t id, const struct psr_preset_camera *preset, uint32_t *n_sent)
+{
+	struct psr_msg_preset msg = { .kind = PSR_WIRE_PRESET_CAMERA, .camera = preset->camera };
+
+	memcpy(msg.name, preset->name, sizeof preset->name);
+	send_preset(conn, id, &msg, n_sent);
+}
+
+static void send_light(struct conn *conn, uint32_t id, const struct psr_preset_light *preset, uint32_t *n_sent)
+{
+	struct psr_msg_preset msg = { .kind = PSR_WIRE_PRESET_LIGHT };
+
+	psr_msg_light_set(&msg.light, &preset->light);
+	memcpy(msg.name, preset->name, sizeof preset->name);
+	send_preset(conn, id, &msg, n_sent);
 }
 
 static int make_home(struct psr_preset_camera *home, const struct psr_model *model)
@@ -38,7 +54,6 @@ void answer_presets(struct session *session, uint32_t id, uint32_t handle)
 	const struct psr_presets *presets;
 	struct psr_msg_presets_end end = { 0, 0 };
 	struct psr_preset_camera home;
-	struct psr_msg_preset msg;
 	uint8_t bytes[64];
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
 
@@ -47,18 +62,12 @@ void answer_presets(struct session *session, uint32_t id, uint32_t handle)
 		return;
 	}
 	presets = psr_model_presets(found->model);
-	for (uint32_t i = 0; i < presets->n_cameras; i++) {
-		wire_from_camera(&msg, &presets->camera[i]);
-		send_preset(session->conn, id, &msg, &end.n_cameras);
-	}
-	if (make_home(&home, found->model)) {
-		wire_from_camera(&msg, &home);
-		send_preset(session->conn, id, &msg, &end.n_cameras);
-	}
-	for (uint32_t i = 0; i < presets->n_lights; i++) {
-		wire_from_light(&msg, &presets->light[i]);
-		send_preset(session->conn, id, &msg, &end.n_lights);
-	}
+	for (uint32_t i = 0; i < presets->n_cameras; i++)
+		send_camera(session->conn, id, &presets->camera[i], &end.n_cameras);
+	if (make_home(&home, found->model))
+		send_camera(session->conn, id, &home, &end.n_cameras);
+	for (uint32_t i = 0; i < presets->n_lights; i++)
+		send_light(session->conn, id, &presets->light[i], &end.n_lights);
 	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
 		conn_send(session->conn, &buf);
 }

@@ -140,7 +140,7 @@ void effects_spacing(const struct effects *effects)
 	truth_make(&truth, effects->source, effects->n_threads);
 	render_settings_default(&settings, SIDE, SIDE);
 	const struct price_side usual = { .settings = settings, .scene = scene, .userdata = &truth.film };
-	settings.spacing = spacing[0];
+	settings.spacing_px = spacing[0];
 	draw(&finest, &truth, &settings);
 	printf("\nWhat accuracy costs: the %s at %dx%d, %.2f pixels between samples of the finest level; one light, 1 thread; PSNR "
 	       "over the\npixels that the object fills, of sRGB codes: to the mesh by %d rays a pixel, and to spacing %g\n"
@@ -153,7 +153,7 @@ void effects_spacing(const struct effects *effects)
 		struct price_side side = usual;
 		struct price price;
 
-		side.settings.spacing = settings.spacing = spacing[i];
+		side.settings.spacing_px = settings.spacing_px = spacing[i];
 		price_measure(&price, &side, &usual, N_FRAMES, 1);
 		draw(&drawn, &truth, &settings);
 		const double samples = (double)drawn.report.n_samples_drawn;

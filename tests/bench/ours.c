@@ -4,7 +4,7 @@
 #include <string.h>
 #include "base/stats.h"
 #include "psr/build.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "report.h"
 #include "render/stages.h"
 #include "server/frames/codec.h"

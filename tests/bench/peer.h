@@ -26,7 +26,7 @@ void peer_mesh_fini(struct peer_mesh *mesh);
 struct peer_points {
 	uint64_t n;
 	float (*position)[3];
-	uint64_t *attr; /* as in psr/model.h */
+	uint64_t *attr; /* as in model/blocks.h */
 };
 /* The samples of the levels that psr_render draws in frame 0 of a film, before anything is culled. */
 void peer_points_init(struct peer_points *out, const struct scene_film *film);

@@ -4,8 +4,9 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "base/cli.h"
+#include "client/lib/camera.h"
 #include "psr/client.h"
-#include "server/frames/wire.h"
+#include "proto/proto.h"
 #include "shot.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
@@ -53,7 +54,7 @@ static int parse_words(struct words *words, struct shot *shot, int argc, char **
 static int make_scene(struct shot *shot, struct words *words, struct psr_error *err)
 {
 	const struct psr_model_info *info = psr_model_info(shot->instance.model);
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	words->wish.fov_y = words->has_ortho ? 0 : words->fov * DEGREE;
 	words->wish.ortho_height = words->has_ortho ? words->ortho : 0;
@@ -63,9 +64,9 @@ static int make_scene(struct shot *shot, struct words *words, struct psr_error *
 		return rc;
 	if (!words->n_lights && !words->has_ambient)
 		client_light_key(&words->light[words->n_lights++], &camera);
-	wire_to_camera(&shot->scene.camera, &camera);
+	shot->scene.camera = camera;
 	for (uint32_t i = 0; i < words->n_lights; i++)
-		wire_to_light(&shot->light[i], &words->light[i]);
+		psr_msg_light_get(&shot->light[i], &words->light[i]);
 	shot->scene.instance = &shot->instance;
 	shot->scene.n_instances = 1;
 	shot->scene.light = shot->light;

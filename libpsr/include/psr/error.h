@@ -1,8 +1,8 @@
 /* Error codes and error texts, shared by every part.
  *
- * Functions that can fail return an int: PSR_OK or one of the negative codes below. Those whose failure a person
- * has to read about take a last parameter `struct psr_error *err`, which may be NULL; on failure it holds the code
- * and one sentence that says what was wrong, where, and what to do. On success it is left alone. */
+ * A function that can fail returns an int: PSR_OK or one of the negative codes below. Its last parameter `struct
+ * psr_error *err` may be NULL; on failure it gets the code and one sentence that says what was wrong, where, and what
+ * to do. Success leaves it alone. A failing call leaves nothing to free: *out is as it was, or NULL. */
 #ifndef PSR_ERROR_H
 #define PSR_ERROR_H
 
@@ -16,9 +16,9 @@ enum psr_err {
 	PSR_ERR_MEMORY = -2,      /* an allocation failed */
 	PSR_ERR_IO = -3,          /* the system refused to read or write: permission, disk full, ... */
 	PSR_ERR_NOT_FOUND = -4,   /* no such file, no such model */
-	PSR_ERR_FORMAT = -5,      /* bytes that are not what they claim to be: corrupt, truncated */
+	PSR_ERR_FORMAT = -5,      /* corrupt or truncated bytes */
 	PSR_ERR_VERSION = -6,     /* a file or a peer of a version that this build does not speak */
-	PSR_ERR_UNSUPPORTED = -7, /* well-formed, but asks for what is not there */
+	PSR_ERR_UNSUPPORTED = -7, /* well-formed, but asks for a feature that is not there */
 	PSR_ERR_LIMIT = -8,       /* over a documented limit */
 	PSR_ERR_BUSY = -9,        /* too much is open already; try again */
 	PSR_ERR_CANCELLED = -10,  /* given up on request */

@@ -1,4 +1,4 @@
-/* A mesh in memory: what the importers make and the sampler reads.
+/* A mesh in memory: importers and psr_mesh_create() make it, psr_model_build() reads it.
  *
  * Everything is flattened: node hierarchies and instances are resolved, faces are triangles, positions are in the
  * coordinates of the source file (right-handed, +Y up for glTF; as written for everything else) and stay doubles until
@@ -95,7 +95,7 @@ struct psr_mesh {
 	struct psr_preset_camera *camera;
 	struct psr_preset_light *light;
 
-	/* What was repaired or left out while importing, for the report; never silent. */
+	/* Repairs while importing. */
 	uint32_t n_dropped_triangles;   /* degenerate, twice there, or with a vertex that is not finite */
 	uint32_t n_dropped_primitives;  /* lines, and points that are not finite */
 	char warning[PSR_ERROR_TEXT];   /* one sentence for a person, or "" */
@@ -109,8 +109,8 @@ void psr_import_options_default(struct psr_import_options *options); /* 35 degre
 
 /* Reads any supported file: .gltf and .glb through tinygltf, .ply and .las by readers of our own, all else through
  * Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is opened for the first of
- * them (UNSUPPORTED if it is missing). Options of NULL are the defaults. The result is validated as the comments
- * above promise, has at least one triangle or point, and belongs to the caller. ARG, NOT_FOUND, IO, FORMAT (with the
+ * them (UNSUPPORTED if it is missing). Options of NULL are the defaults. The mesh keeps the promises above, has at
+ * least one triangle or point, and belongs to the caller (psr_mesh_destroy()). ARG, NOT_FOUND, IO, FORMAT (with the
  * place), UNSUPPORTED (names the extension), LIMIT, MEMORY. Never crashes on bad input, throws nothing, reads nothing
  * outside of the file's own folder. */
 int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_import_options *options,
@@ -118,8 +118,8 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 
 /* A mesh of the caller's arrays, which are copied: triangles counter-clockwise seen from the front, +Y up, one white
  * rough material, normals as import computes them (smooth up to 35 degrees). Broken triangles are left out, see
- * n_dropped_triangles. The mesh is the caller's, to change and to destroy. FORMAT: an index out of range, or no triangle
- * with an area; LIMIT, MEMORY. */
+ * n_dropped_triangles. The mesh is the caller's, to change and to destroy. FORMAT: an index out of range, or no
+ * triangle with an area; LIMIT, MEMORY. */
 int psr_mesh_create(struct psr_mesh **out, const double (*position)[3], uint32_t n_vertices,
                     const uint32_t (*triangle)[3], uint32_t n_triangles, struct psr_error *err);
 

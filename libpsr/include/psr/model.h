@@ -19,45 +19,44 @@ struct psr_model_info {
 	double origin[3]; /* object coordinates of the inner origin */
 	double scale;     /* object units an inner unit; > 0 */
 	double box_min[3], box_max[3]; /* of the samples, object coordinates */
-	double up[3];     /* unit length: the way up of the object, for views that nobody chose; 0, 0, 0 in what
-	                   * psr_model_create() is given counts as 0, 1, 0 */
+	double up[3];     /* unit length: the way up of the object, for the default view */
 	double spacing;   /* greatest distance of neighbouring samples on the surface at level 0 (ds of [G] 4.4), object
 	                   * units */
 	double tolerance; /* angle of [G] 4.4, radians */
 	uint32_t resolution; /* >= 1; target resolution: pixels across the unit sphere at magnification 1 */
 
 	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of
-	 * the surface, at the target resolution, seen from a random direction, this many have no sample of it. 0 of 0: not
+	 * the surface, at the target resolution, seen from a random direction, n_missing have no sample. 0 of 0: not
 	 * measured. */
 	uint64_t n_trials, n_missing;
-	/* Out of as many pixels that hold a sample, in views from random places, this many hold one whose block cones or
-	 * masks would cull, though a ray from the eye reaches it. */
+	/* Of as many pixels that hold a sample, in views from random places, n_lost hold one whose block the cones or masks
+	 * would cull, though a ray from the eye reaches it. */
 	uint64_t n_lost;
 	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };
 
 struct psr_model;
 
-/* Opens a .psr file. `map` keeps the file mapped and reads it in place; `read` copies it into anonymous memory first
- * (huge pages where the system has them), so that a file that shrinks later does no harm: what a daemon wants. Both
- * check every count, offset, index and hash before anything is followed. NOT_FOUND, IO, FORMAT, VERSION, UNSUPPORTED (a
+/* Opens a .psr file; psr_model_unref() lets go of the model. `map` reads the file in place, which must not shrink
+ * meanwhile; `read` copies it into memory first (huge pages where the system has them), as a daemon needs it. Both
+ * check every count, offset, index and hash before they follow any. NOT_FOUND, IO, FORMAT, VERSION, UNSUPPORTED (a
  * required section that this build does not know, or no representation that it does), MEMORY. */
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
-/* Bytes of memory that psr_model_read() of this file will take, by its header: more than the file has, if it is packed.
+/* Bytes of memory that psr_model_read() of this file takes, by its header: more than the file has, if it is packed.
  * Errors as of psr_model_read(), as far as the header shows them. */
 int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
 
-/* Cameras and lights of the source file, in object coordinates. */
+/* Cameras and lights of the source file, in object coordinates; the model's own. */
 struct psr_presets {
 	uint32_t n_cameras, n_lights; /* each at most PSR_MAX_PRESETS */
 	const struct psr_preset_camera *camera;
 	const struct psr_preset_light *light;
 };
 
-/* Writes to a temporary file beside `path`, syncs and renames: `path` is either the old file or the whole new one. Only
- * regular files are replaced. NOT_FOUND (no such folder), IO (disk full, ...), MEMORY. */
+/* Writes a temporary file beside `path`, syncs and renames it: `path` is the old file or the whole new one. Replaces
+ * regular files only. NOT_FOUND (no such folder), IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
 
 /* The same, packed: sections compressed, chunk by chunk. psr_model_read and _map open such a file too, into anonymous
@@ -72,7 +71,7 @@ const struct psr_presets *psr_model_presets(const struct psr_model *model); /* n
 
 /* XXH128 of the section table (types, versions, lengths, hashes): the same bytes of content, the same id. */
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);
-/* Size of the file that it was opened from, 0 if it was none; *is_packed says which kind. */
+/* Size of the file that it was opened from, 0 without one; *is_packed tells whether the file is packed. */
 uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed);
 uint64_t psr_model_bytes(const struct psr_model *model); /* memory that it holds, all overhead included */
 

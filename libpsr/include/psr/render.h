@@ -20,7 +20,7 @@ struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
 	/* The greatest distance between neighbouring samples that is good enough, in pixels: the renderer draws the
 	 * coarsest level that keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
-	double spacing;
+	double spacing_px;
 	/* 1: anti-aliasing in one pass ([G] 9.1.1), at a third of the frame's time. A pixel at an edge is blended with the
 	 * surface behind it, by how many of its eight neighbours are there; others with the neighbours of their own
 	 * surface. Only colour changes. 0 by default; passes above 0 ignore it. */
@@ -42,8 +42,8 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 
 /* Draws the frame's planes that are not NULL; they are the caller's (psr_frame_alloc()), of the size of the settings.
  * pool: NULL for the caller's thread alone. frame->report tells times and counts; of a pass above 0 they are of all
- * sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for planes other than colour
- * and depth in passes above 0. */
+ * sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for planes other than
+ * colour and depth in passes above 0. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 

@@ -66,7 +66,7 @@ struct psr_report {
 		uint64_t count;
 		enum psr_why why;
 	} effect[PSR_N_EFFECTS];
-	double error_bound;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
+	double error_px;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
 };
 
 #ifdef __cplusplus

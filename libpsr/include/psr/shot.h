@@ -14,7 +14,7 @@ extern "C" {
 #endif
 
 struct psr_shot {
-	struct psr_settings settings;    /* size and quality */
+	struct psr_settings settings;    /* size and quality; smooth edges */
 	unsigned planes;                 /* 1 << enum psr_plane, OR-ed; colour */
 	const struct psr_camera *camera; /* the caller's; NULL: the whole model is in the picture, see psr_camera_frame() */
 	double fov_y;                    /* of that camera: 35 degrees in radians; 0: orthographic */

@@ -13,14 +13,14 @@ struct psr_camera {
 	enum psr_camera_kind kind;
 	double fov_y;        /* perspective: full vertical angle, radians, 1e-6..3.14159 */
 	double ortho_height; /* orthographic: world units from the top edge of the picture to its bottom, > 0 */
-	double near_z;       /* nothing nearer is drawn; world units; 0: chosen from the scene */
+	double near_z;       /* world units; surfaces nearer than this are not drawn; 0: chosen from the scene */
 };
 
 enum psr_light_kind { PSR_LIGHT_DIRECTIONAL, PSR_LIGHT_POINT, PSR_LIGHT_SPOT };
 
 struct psr_light {
 	enum psr_light_kind kind;
-	int casts_shadow;    /* 1: what is behind something is not lit; else 0. In presets 0 */
+	int casts_shadow;    /* 1: surfaces stop its light; 0: it shines through. In presets 0 */
 	double position[3];  /* point, spot; world */
 	double direction[3]; /* directional, spot: where the light goes; any length but 0 */
 	double color[3];     /* linear, intensity included, >= 0 */
@@ -30,7 +30,7 @@ struct psr_light {
 	                      * does not fall */
 };
 
-/* What the source file names a camera or a light; positions are in the coordinates of the mesh or model that has it. */
+/* A camera or light of a source file, in the coordinates of the mesh or model that has it. */
 #define PSR_NAME_BYTES 64
 struct psr_preset_camera {
 	char name[PSR_NAME_BYTES]; /* UTF-8, never empty, no two alike */

@@ -3,7 +3,7 @@
  * Every projection is sampled once on its lattice; then any number of selections, with any block side, can be made of
  * these samples. One departure from [G] 5.2: the truth of a test view is its projection's own samples, 1.4 a pixel,
  * instead of rays traced anew through the pixels of each of the sixteen grids. Lengths are inner units
- * (psr/model.h). */
+ * (model/blocks.h). */
 #ifndef MODELS_STUDIES_GREEDY_GREEDY_H
 #define MODELS_STUDIES_GREEDY_GREEDY_H
 
@@ -27,7 +27,7 @@
 #define GREEDY_SAMPLE_BYTES 10
 
 enum greedy_lattice {
-	GREEDY_EQUILATERAL, /* as psr/model.h has it */
+	GREEDY_EQUILATERAL, /* as model/blocks.h has it */
 	GREEDY_SQUARE,      /* x = col * spacing, y = row * spacing. The spacing is ds cos(tolerance) here too: it is the
 	                     * tolerance angle that makes it as dense as it must be ([G] 5.3, figure 5.7) */
 };
@@ -45,7 +45,7 @@ struct greedy_sample {
 	float cosine;         /* of the angle between geometric normal and projection; 0..1 */
 	int16_t col, row;     /* of the lattice */
 	uint32_t surface;     /* primitive, and GREEDY_BACK */
-	uint64_t attr;        /* psr/model.h */
+	uint64_t attr;        /* model/blocks.h */
 	uint8_t two_sided;    /* of a primitive that is seen from both sides */
 	uint8_t is_kept;
 };

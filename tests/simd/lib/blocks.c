@@ -1,7 +1,7 @@
 #include <string.h>
 #include "blocks.h"
 
-#define DEPTH_PADDING 64 /* what psr/model.h promises beyond the last depth */
+#define DEPTH_PADDING 64 /* what model/blocks.h promises beyond the last depth */
 
 /* Of the given number of bits, wherever they are: runs, rows and scattered ones. */
 static uint64_t random_mask(struct check *c, uint32_t n)

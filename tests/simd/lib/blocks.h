@@ -1,4 +1,4 @@
-/* Random blocks as the rules of psr/model.h allow them, in buffers of exactly their size. */
+/* Random blocks as the rules of model/blocks.h allow them, in buffers of exactly their size. */
 #ifndef TESTS_SIMD_BLOCKS_H
 #define TESTS_SIMD_BLOCKS_H
 

@@ -36,8 +36,10 @@ static struct psr_pool *make(int n_threads, int with_jobs)
 {
 	struct psr_pool *pool = NULL;
 
-	assert_int_equal(with_jobs ? psr_pool_create_for_jobs(&pool, n_threads, NULL) : psr_pool_create(&pool, n_threads, NULL),
-	                 PSR_OK);
+	const int code = with_jobs ? psr_pool_create_for_jobs(&pool, n_threads, NULL)
+	                           : psr_pool_create(&pool, n_threads, NULL);
+
+	assert_int_equal(code, PSR_OK);
 	return pool;
 }
 

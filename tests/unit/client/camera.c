@@ -8,6 +8,7 @@
 #include <string.h>
 #include "base/random.h"
 #include "base/vec.h"
+#include "client/lib/camera.h"
 #include "psr/client.h"
 #include "psr/scene.h"
 
@@ -42,7 +43,7 @@ static void random_direction(double v[3])
 }
 
 /* Where a point is in the picture: 1 and -1 are its edges. */
-static void project(double out[2], const struct psr_msg_camera *camera, double aspect, const double p[3])
+static void project(double out[2], const struct psr_camera *camera, double aspect, const double p[3])
 {
 	double forward[3], right[3], up[3], arm[3], half;
 
@@ -53,14 +54,14 @@ static void project(double out[2], const struct psr_msg_camera *camera, double a
 	v3d_cross(up, right, forward);
 	v3d_sub(arm, p, camera->eye);
 	assert_true(v3d_dot(arm, forward) > camera->near_z);
-	half = camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC ? camera->extent / 2
-	                                                    : v3d_dot(arm, forward) * tan(camera->extent / 2);
+	half = camera->kind == PSR_CAMERA_ORTHOGRAPHIC ? camera->ortho_height / 2
+	                                                    : v3d_dot(arm, forward) * tan(camera->fov_y / 2);
 	out[0] = v3d_dot(arm, right) / (half * aspect);
 	out[1] = v3d_dot(arm, up) / half;
 }
 
 /* The farthest that a corner is from the middle of the picture. */
-static double extent_of(const struct psr_msg_camera *camera, double aspect, const double box_min[3],
+static double extent_of(const struct psr_camera *camera, double aspect, const double box_min[3],
                         const double box_max[3])
 {
 	double most = 0;
@@ -94,7 +95,7 @@ static void every_corner_is_in_the_picture_whatever_the_way_up_and_the_angles(vo
 	for (uint64_t seed = 1; seed <= N; seed++) {
 		double low[3], high[3], aspect, most;
 		struct psr_camera_wish wish;
-		struct psr_msg_camera camera;
+		struct psr_camera camera;
 		struct psr_error err;
 
 		state = seed;
@@ -117,7 +118,7 @@ static void it_is_at_every_turn_of_a_turntable(void **unused)
 	for (uint64_t seed = 1; seed <= N / 10; seed++) {
 		double low[3], high[3], most = 0;
 		struct psr_camera_wish wish;
-		struct psr_msg_camera camera;
+		struct psr_camera camera;
 		const double *up;
 
 		state = seed;
@@ -128,7 +129,7 @@ static void it_is_at_every_turn_of_a_turntable(void **unused)
 		up = wish.has_up ? wish.up : wish.natural_up;
 		assert_int_equal(psr_camera_complete(&camera, &wish, low, high, 1.5, NULL), PSR_OK);
 		for (uint32_t k = 0; k < wish.n_turn; k++) {
-			struct psr_msg_camera turned = camera;
+			struct psr_camera turned = camera;
 
 			psr_camera_turn(&turned, up, 360.0 * k / wish.n_turn, low, high);
 			most = fmax(most, extent_of(&turned, 1.5, low, high));
@@ -140,7 +141,7 @@ static void it_is_at_every_turn_of_a_turntable(void **unused)
 
 static const double box_min[3] = { -1, -2, -3 }, box_max[3] = { 1, 2, 3 };
 
-static void complete(struct psr_msg_camera *camera, struct psr_camera_wish wish)
+static void complete(struct psr_camera *camera, struct psr_camera_wish wish)
 {
 	assert_int_equal(psr_camera_complete(camera, &wish, box_min, box_max, 1, NULL), PSR_OK);
 }
@@ -157,7 +158,7 @@ static void assert_way(const double v[3], double x, double y, double z)
 
 static void azimuth_0_is_the_front_90_the_right_side_and_elevation_90_the_top(void **unused)
 {
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	(void)unused;
 	complete(&camera, (struct psr_camera_wish){ .has_angles = 1, .fov_y = 0.5 });
@@ -177,7 +178,7 @@ static void azimuth_0_is_the_front_90_the_right_side_and_elevation_90_the_top(vo
 
 static void the_default_angles_are_those_of_the_default_view(void **unused)
 {
-	struct psr_msg_camera plain, angles;
+	struct psr_camera plain, angles;
 
 	(void)unused;
 	complete(&plain, (struct psr_camera_wish){ .fov_y = 0.5 });
@@ -189,7 +190,7 @@ static void the_default_angles_are_those_of_the_default_view(void **unused)
 
 static void what_a_person_says_is_up_wins_over_the_model(void **unused)
 {
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	(void)unused;
 	complete(&camera, (struct psr_camera_wish){ .fov_y = 0.5, .natural_up = { 0, 0, 1 } });
@@ -206,7 +207,7 @@ static void what_a_person_says_is_up_wins_over_the_model(void **unused)
 static void zoom_enlarges_and_roll_turns(void **unused)
 {
 	static const double corner[3] = { 1, 2, 3 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 	double plain[2], zoomed[2], rolled[2];
 
 	(void)unused;
@@ -233,7 +234,7 @@ static void zoom_enlarges_and_roll_turns(void **unused)
 static void a_zoom_beyond_all_angles_is_refused(void **unused)
 {
 	struct psr_camera_wish wish = { .fov_y = 0.5, .zoom = 1e6 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 	struct psr_error err;
 
 	(void)unused;
@@ -243,7 +244,7 @@ static void a_zoom_beyond_all_angles_is_refused(void **unused)
 
 static void a_turn_is_an_azimuth(void **unused)
 {
-	struct psr_msg_camera turned, asked;
+	struct psr_camera turned, asked;
 	static const double up[3] = { 0, 0, 2 };
 
 	(void)unused;

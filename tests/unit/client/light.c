@@ -6,6 +6,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
+#include "client/lib/camera.h"
+#include "proto/proto.h"
 #include "psr/client.h"
 
 #define PI 3.14159265358979323846
@@ -151,13 +153,13 @@ static const double box_min[3] = { -1, 0, -1 }, box_max[3] = { 3, 2, 1 };
 static void eye_alone_looks_at_the_middle(void **state)
 {
 	const struct psr_camera_wish wish = { .has_eye = 1, .eye = { 10, 1, 0 }, .fov_y = 0.5 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	(void)state;
 	assert_int_equal(psr_camera_complete(&camera, &wish, box_min, box_max, 1, NULL), PSR_OK);
 	assert_true(camera.target[0] == 1 && camera.target[1] == 1 && camera.target[2] == 0);
 	assert_true(camera.up[0] == 0 && camera.up[1] == 1 && camera.up[2] == 0);
-	assert_true(camera.extent == 0.5);
+	assert_true(camera.fov_y == 0.5);
 	/* the farthest corner is 11, 1, 1 away, the nearest point 7 */
 	assert_true(fabs(camera.near_z - 1e-3 * sqrt(123)) < 1e-15);
 }
@@ -165,7 +167,7 @@ static void eye_alone_looks_at_the_middle(void **state)
 static void near_stays_before_a_box_that_is_close(void **state)
 {
 	const struct psr_camera_wish wish = { .has_eye = 1, .eye = { 3.001, 1, 0 }, .fov_y = 0.5 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	(void)state;
 	assert_int_equal(psr_camera_complete(&camera, &wish, box_min, box_max, 1, NULL), PSR_OK);
@@ -175,7 +177,7 @@ static void near_stays_before_a_box_that_is_close(void **state)
 static void up_turns_where_the_view_runs_along_it(void **state)
 {
 	struct psr_camera_wish wish = { .has_eye = 1, .eye = { 1, 10, 0 }, .fov_y = 0.5 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 	struct psr_error err;
 
 	(void)state;
@@ -194,7 +196,7 @@ static void target_alone_moves_the_framed_camera(void **state)
 {
 	const struct psr_camera_wish none = { .fov_y = 0.5 },
 								 wish = { .has_target = 1, .target = { 5, 6, 7 }, .fov_y = 0.5 };
-	struct psr_msg_camera framed, camera;
+	struct psr_camera framed, camera;
 
 	(void)state;
 	assert_int_equal(psr_camera_complete(&framed, &none, box_min, box_max, 2, NULL), PSR_OK);
@@ -205,7 +207,7 @@ static void target_alone_moves_the_framed_camera(void **state)
 }
 
 /* Of a corner of the box above the middle of the picture, along its vertical. */
-static double height_in_picture(const struct psr_msg_camera *camera, int corner)
+static double height_in_picture(const struct psr_camera *camera, int corner)
 {
 	double forward[3], up[3], length, along = 0, height = 0;
 
@@ -225,19 +227,19 @@ static double height_in_picture(const struct psr_msg_camera *camera, int corner)
 static void orthographic_height_is_taken_or_framed(void **state)
 {
 	const struct psr_camera_wish framed = { .fov_y = 0 }, wish = { .ortho_height = 7 };
-	struct psr_msg_camera camera;
+	struct psr_camera camera;
 
 	(void)state;
 	assert_int_equal(psr_camera_complete(&camera, &wish, box_min, box_max, 1, NULL), PSR_OK);
-	assert_true(camera.kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC && camera.extent == 7 && camera.near_z == 0);
+	assert_true(camera.kind == PSR_CAMERA_ORTHOGRAPHIC && camera.ortho_height == 7 && camera.near_z == 0);
 	assert_int_equal(psr_camera_complete(&camera, &framed, box_min, box_max, 1, NULL), PSR_OK);
 	for (int corner = 0; corner < 8; corner++)
-		assert_true(fabs(height_in_picture(&camera, corner)) <= camera.extent / 2);
+		assert_true(fabs(height_in_picture(&camera, corner)) <= camera.ortho_height / 2);
 }
 
 static void key_light_comes_from_the_upper_left_behind_the_camera(void **state)
 {
-	struct psr_msg_camera camera = { .kind = PSR_WIRE_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 } };
+	struct psr_camera camera = { .kind = PSR_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 } };
 	struct psr_msg_light light;
 
 	(void)state;

@@ -16,7 +16,7 @@
 #include <dirent.h>
 #include <unistd.h>
 #include "client/lib/picture.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 #define W 5
 #define H 3

@@ -19,7 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 #include <xxhash.h>
-#include "psr/proto.h"
+#include "proto/proto.h"
 #include "psr/render.h"
 
 #define MAX_SIDE 64
@@ -149,9 +149,9 @@ static void put_presets(struct session *s, uint32_t id)
 {
 	static const struct psr_msg_preset presets[4] = {
 		{ .kind = PSR_WIRE_PRESET_CAMERA, .name = "front",
-		  .camera = { PSR_WIRE_CAMERA_PERSPECTIVE, { 0, 0, 7 }, { 0, 0, 0 }, { 0, 1, 0 }, 0.5, 0.25 } },
+		  .camera = { { 0, 0, 7 }, { 0, 0, 0 }, { 0, 1, 0 }, PSR_CAMERA_PERSPECTIVE, 0.5, 0, 0.25 } },
 		{ .kind = PSR_WIRE_PRESET_CAMERA, .name = "plan",
-		  .camera = { PSR_WIRE_CAMERA_ORTHOGRAPHIC, { 0, 9, 0 }, { 0, 0, 0 }, { 0, 0, -1 }, 4, 0 } },
+		  .camera = { { 0, 9, 0 }, { 0, 0, 0 }, { 0, 0, -1 }, PSR_CAMERA_ORTHOGRAPHIC, 0, 4, 0 } },
 		{ .kind = PSR_WIRE_PRESET_LIGHT, .name = "sun",
 		  .light = { .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .color = { 255, 240, 200 }, .intensity = 3,
 		             .direction = { 0, -1, 0 } } },

@@ -14,6 +14,8 @@
 #include <time.h>
 #include <unistd.h>
 #include <xxhash.h>
+#include "client/lib/camera.h"
+#include "proto/proto.h"
 #include "psr/client.h"
 
 #define SIDE 24
@@ -151,8 +153,8 @@ static struct psr_msg_frame request(void)
 {
 	struct psr_msg_frame frame = { .width = SIDE, .height = SIDE, .planes = 1, .color_codec = PSR_CODEC_RAW };
 
-	frame.camera = (struct psr_msg_camera){
-		.kind = PSR_WIRE_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 }, .extent = 0.5, .near_z = 0.1
+	frame.camera = (struct psr_camera){
+		.kind = PSR_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 }, .fov_y = 0.5, .near_z = 0.1
 	};
 	return frame;
 }
@@ -278,7 +280,8 @@ static void session_works_for_any_split_of_the_bytes(void **state)
 		assert_int_equal(n, 2);
 		assert_string_equal(entries[1].name, "dragon");
 		free(entries);
-		assert_int_equal(psr_client_open(client, "bunny", count_progress, &n_progress, TIMEOUT, &opened, &err), PSR_OK);
+		psr_client_on_progress(client, count_progress, &n_progress);
+		assert_int_equal(psr_client_open(client, "bunny", TIMEOUT, &opened, &err), PSR_OK);
 		assert_int_equal(opened.handle, 7);
 		assert_int_equal(n_progress, 1);
 		assert_int_equal(psr_client_presets(client, 7, &presets, &n, TIMEOUT, &err), PSR_OK);
@@ -510,13 +513,13 @@ static void silent_server_is_given_up_and_a_busy_one_is_not(void **state)
 	(void)state;
 	start(hold_open, 65536);
 	client = connected();
-	assert_int_equal(psr_client_open(client, "m", NULL, NULL, 60, &opened, &err), PSR_ERR_CONNECTION);
-	assert_int_equal(psr_client_open(client, "m", NULL, NULL, 60, &opened, &err), PSR_ERR_CONNECTION);
+	assert_int_equal(psr_client_open(client, "m", 60, &opened, &err), PSR_ERR_CONNECTION);
+	assert_int_equal(psr_client_open(client, "m", 60, &opened, &err), PSR_ERR_CONNECTION);
 	stop(client);
 	start(answer_pings_for_a_while, 65536);
 	client = connected();
 	/* three PINGs at half of the time each: it lasts 1.5 times as long as a silence may */
-	assert_int_equal(psr_client_open(client, "m", NULL, NULL, 400, &opened, &err), PSR_OK);
+	assert_int_equal(psr_client_open(client, "m", 400, &opened, &err), PSR_OK);
 	stop(client);
 }
 
@@ -555,7 +558,7 @@ static void resolutions_go_to_servers_that_take_them(void **state)
 		for (int i = 0; i < 3; i++) {
 			if (i > 0)
 				psr_client_set_resolution(client, wanted[i]);
-			assert_int_equal(psr_client_open(client, "m", NULL, NULL, TIMEOUT, &opened, &err), PSR_ERR_NOT_FOUND);
+			assert_int_equal(psr_client_open(client, "m", TIMEOUT, &opened, &err), PSR_ERR_NOT_FOUND);
 		}
 		stop(client);
 		for (int i = 0; i < 3; i++)

@@ -286,8 +286,8 @@ static void samples_are_as_far_apart_as_the_nearest_part_of_the_box_in_the_pictu
 	static struct scene scene;
 	struct scene_model model = { .opened = { .box_min = { -1, -1, -1 }, .box_max = { 1, 1, 1 }, .spacing = 0.01 } };
 	uint32_t model_of = 0;
-	struct psr_msg_camera camera = { .kind = PSR_WIRE_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 },
-		                             .extent = 2 * atan(0.5), .near_z = 0.1 };
+	struct psr_camera camera = { .kind = PSR_CAMERA_PERSPECTIVE, .eye = { 0, 0, 5 }, .up = { 0, 1, 0 },
+		                             .fov_y = 2 * atan(0.5), .near_z = 0.1 };
 	double apart;
 
 	(void)state;

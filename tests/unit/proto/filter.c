@@ -7,7 +7,7 @@
 #include <string.h>
 #include <cmocka.h>
 #include "base/random.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 static void color_is_byte_differences_in_place(void **state)
 {

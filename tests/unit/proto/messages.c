@@ -106,14 +106,15 @@ static void make_scene(struct psr_msg_scene *m)
 	}
 }
 
-static void make_camera(struct psr_msg_camera *m)
+static void make_camera(struct psr_camera *m)
 {
-	m->kind = (uint8_t)(1 + below(2));
+	m->kind = below(2) ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
 	lengths(m->eye);
 	for (int i = 0; i < 3; i++)
 		m->target[i] = m->eye[i] * (i == 0 ? 3 : 1);
 	m->up[1] = length();
-	m->extent = m->kind == PSR_WIRE_CAMERA_PERSPECTIVE ? 1e-6 + 3 * unit() : fabs(length());
+	m->fov_y = m->kind == PSR_CAMERA_PERSPECTIVE ? 1e-6 + 3 * unit() : 0;
+	m->ortho_height = m->kind == PSR_CAMERA_PERSPECTIVE ? 0 : fabs(length());
 	m->near_z = below(2) ? fabs(length()) : 0;
 }
 
@@ -305,7 +306,7 @@ static void random_messages_come_back(void **state)
 static int encode_frame_with(size_t offset, double value, struct psr_error *err)
 {
 	struct psr_msg_frame m = { .width = 640, .height = 480, .planes = 1,
-		.camera = { PSR_WIRE_CAMERA_PERSPECTIVE, { 0, 0, 5 }, { 0, 0, 0 }, { 0, 1, 0 }, 1, 0.1 } };
+		.camera = { { 0, 0, 5 }, { 0, 0, 0 }, { 0, 1, 0 }, PSR_CAMERA_PERSPECTIVE, 1, 0, 0.1 } };
 	struct psr_buf out = { bytes, 0, sizeof bytes };
 
 	memcpy((uint8_t *)&m + offset, &value, sizeof value);
@@ -318,7 +319,7 @@ static void doubles_of_a_camera_are_bounded(void **state)
 	const struct { size_t offset; double good, bad; } rows[] = {
 		{ CAM(eye), 1e30, 1.0000001e30 }, { CAM(eye[0]), -1e30, -INFINITY }, { CAM(eye[2]), 1e-30, 0 },
 		{ CAM(target), 0, NAN }, { CAM(target[2]), 4.999, 5 }, { CAM(up[1]), 1e-30, 9e-31 },
-		{ CAM(up[1]), -1e30, -NAN }, { CAM(extent), 1e-6, 9.99e-7 }, { CAM(extent), 3.14159, 3.1416 },
+		{ CAM(up[1]), -1e30, -NAN }, { CAM(fov_y), 1e-6, 9.99e-7 }, { CAM(fov_y), 3.14159, 3.1416 },
 		{ CAM(near_z), 0, -1e-300 }, { CAM(near_z), 1e30, INFINITY },
 	};
 
@@ -336,7 +337,7 @@ static void doubles_of_a_camera_are_bounded(void **state)
 static int encode_size(uint32_t width, uint32_t height)
 {
 	struct psr_msg_frame m = { .width = width, .height = height, .planes = 1,
-		.camera = { PSR_WIRE_CAMERA_PERSPECTIVE, { 0, 0, 5 }, { 0, 0, 0 }, { 0, 1, 0 }, 1, 0.1 } };
+		.camera = { { 0, 0, 5 }, { 0, 0, 0 }, { 0, 1, 0 }, PSR_CAMERA_PERSPECTIVE, 1, 0, 0.1 } };
 	struct psr_buf out = { bytes, 0, sizeof bytes };
 
 	return psr_msg_frame_encode(&out, 1, 0, &m, NULL);

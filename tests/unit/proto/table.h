@@ -3,7 +3,7 @@
 #define PROTO_TABLE_H
 
 #include <stddef.h>
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 union proto_any {
 	struct psr_msg_hello hello;
@@ -30,7 +30,8 @@ union proto_any {
 	struct psr_msg_stats_reply stats_reply;
 };
 
-enum proto_kind { F_END, F_U8, F_U16, F_U32, F_U64, F_F64, F_TEXT, F_HEX, F_LIST, F_DATA };
+/* F_KIND and F_EXTENT are of a struct psr_camera: its kind, counted from 1, and the angle or height that goes with it. */
+enum proto_kind { F_END, F_U8, F_U16, F_U32, F_U64, F_F64, F_TEXT, F_HEX, F_LIST, F_DATA, F_KIND, F_EXTENT };
 
 struct proto_field {
 	const char *name; /* as in vectors.txt: "camera.eye", or the list's name */
@@ -129,8 +130,9 @@ static const struct proto_field fields_scene[] = { AT(scene, slot, F_U16), AT(sc
 	AT(scene, ambient, F_F64), ARRAY(scene, background, F_U8, 3), AT(scene, n_instances, F_U16),
 	AT(scene, n_lights, F_U16), LIST(scene, instance, PSR_WIRE_MAX_INSTANCES, fields_instance, instance),
 	LIST(scene, light, PSR_WIRE_MAX_LIGHTS, fields_light, light), END };
-#define CAMERA(type) AT(type, camera.kind, F_U8), ARRAY(type, camera.eye, F_F64, 3), \
-	ARRAY(type, camera.target, F_F64, 3), ARRAY(type, camera.up, F_F64, 3), AT(type, camera.extent, F_F64), \
+#define CAMERA(type) { "camera.kind", F_KIND, offsetof(struct psr_msg_##type, camera), 1, NULL, 0 }, ARRAY(type, camera.eye, F_F64, 3), \
+	ARRAY(type, camera.target, F_F64, 3), ARRAY(type, camera.up, F_F64, 3), \
+	{ "camera.extent", F_EXTENT, offsetof(struct psr_msg_##type, camera), 1, NULL, 0 }, \
 	AT(type, camera.near_z, F_F64)
 #define PICTURE(type) AT(type, width, F_U32), AT(type, height, F_U32), AT(type, planes, F_U32), \
 	AT(type, color_codec, F_U8), AT(type, color_quality, F_U8), AT(type, depth_format, F_U8), \

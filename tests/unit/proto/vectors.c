@@ -65,6 +65,18 @@ static void set_value(struct vector *v, const struct proto_field *f, uint8_t *at
 		v->msg.rect.data = v->data;
 		return;
 	}
+	if (f->kind == F_KIND || f->kind == F_EXTENT) {
+		struct psr_camera *camera = (struct psr_camera *)(void *)at;
+		const double value = strtod(text, NULL);
+
+		if (f->kind == F_KIND)
+			camera->kind = (enum psr_camera_kind)(value - 1);
+		else if (camera->kind == PSR_CAMERA_PERSPECTIVE)
+			camera->fov_y = value;
+		else
+			camera->ortho_height = value;
+		return;
+	}
 	for (unsigned i = 0; i < f->n; i++, text = end) {
 		uint64_t u;
 

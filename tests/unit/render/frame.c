@@ -519,7 +519,7 @@ static void the_door_refuses_what_is_out_of_range(void **state)
 	render_settings_default(&settings, 100000, 100000);
 	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_LIMIT);
 	render_settings_default(&settings, 10, 10);
-	settings.spacing = 0;
+	settings.spacing_px = 0;
 	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
 	render_settings_default(&settings, 10, 10);
 	settings.gap_method = (enum psr_gap_method)7;

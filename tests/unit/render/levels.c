@@ -100,7 +100,7 @@ static void choose(const struct psr_scene *scene, uint32_t side, struct psr_pool
 	uint32_t n_clusters = psr_model_blocks(model)->n_clusters;
 
 	render_settings_default(&settings, side, side);
-	settings.spacing = asked_spacing;
+	settings.spacing_px = asked_spacing;
 	assert_int_equal(plan_make(&plan, scene, &settings, NULL), PSR_OK);
 	assert_int_equal(cull_blocks(&bins, simd_get(), &plan, pool, &report), PSR_OK);
 	memset(choice, 0, scene->n_instances * sizeof *choice);

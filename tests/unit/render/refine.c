@@ -341,6 +341,30 @@ static void a_pass_ends_between_windows_when_nobody_waits(void **state)
 	still_clear(&s);
 }
 
+static void the_public_call_draws_passes_too(void **state)
+{
+	struct psr_settings settings;
+	struct still s, same;
+	struct psr_error err;
+
+	(void)state;
+	still_make(&s, sphere, 80, 60);
+	still_make(&same, sphere, 80, 60);
+	psr_settings_default(&settings, 80, 60);
+	for (settings.pass = 0; settings.pass <= 2; settings.pass++) {
+		const uint64_t before = psr_renderer_bytes(same.renderer);
+
+		refine(&s, settings.pass, NULL);
+		assert_int_equal(psr_render(same.renderer, &same.scene, &settings, NULL, &same.frame, &err), PSR_OK);
+		assert_true(same_frames(&s, &same));
+		assert_int_equal(psr_renderer_bytes(same.renderer) > before + refiner_bytes(s.refiner) / 2, settings.pass == 1);
+	}
+	settings.pass = PSR_MAX_PASS + 1;
+	assert_int_equal(psr_render(same.renderer, &same.scene, &settings, NULL, &same.frame, &err), PSR_ERR_LIMIT);
+	still_clear(&s);
+	still_clear(&same);
+}
+
 static void the_door_refuses_what_is_no_still(void **state)
 {
 	struct still s;
@@ -606,6 +630,7 @@ int main(void)
 		cmocka_unit_test(windows_have_no_seams),
 		cmocka_unit_test(depth_is_that_of_the_nearest_sub_pixel),
 		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
+		cmocka_unit_test(the_public_call_draws_passes_too),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
 		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
 		cmocka_unit_test(discs_lie_on_the_plane_of_their_neighbors_whatever_the_normals),

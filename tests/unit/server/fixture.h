@@ -20,7 +20,7 @@
 #include <unistd.h>
 #include "base/clock.h"
 #include "model/blocks.h"
-#include "psr/proto.h"
+#include "proto/proto.h"
 
 #define PATIENCE_MS 20000 /* for what must happen; nothing that passes waits so long */
 
@@ -434,7 +434,7 @@ static inline struct psr_msg_frame frame_default(uint32_t width, uint32_t height
 {
 	return (struct psr_msg_frame){
 		.width = width, .height = height, .planes = 1, .color_codec = PSR_CODEC_ZSTD,
-		.camera = { .kind = PSR_WIRE_CAMERA_PERSPECTIVE, .eye = { 0, 0, 2 }, .up = { 0, 1, 0 }, .extent = 0.6,
+		.camera = { .kind = PSR_CAMERA_PERSPECTIVE, .eye = { 0, 0, 2 }, .up = { 0, 1, 0 }, .fov_y = 0.6,
 		            .near_z = 0.01 },
 	};
 }

@@ -219,7 +219,7 @@ static void a_reader_that_stops_is_dropped_and_costs_others_nothing(void **state
 	daemon_start(&psrd, folder, more);
 	peer_begin(&p, &psrd, "plate");
 	frame.color_codec = PSR_CODEC_RAW;
-	frame.camera.extent = 0.1; /* all plate: nothing is left out as background */
+	frame.camera.fov_y = 0.1; /* all plate: nothing is left out as background */
 	for (int i = 0; i < 64; i++)
 		peer_ask_frame(&p, &frame);
 	expect_serves(&psrd, "plate");
@@ -477,7 +477,7 @@ static void the_end_does_not_wait_for_readers_that_stopped(void **state)
 	start("--drain-timeout", "0.5", NULL, NULL);
 	peer_begin(&p, &psrd, "plate");
 	frame.color_codec = PSR_CODEC_RAW;
-	frame.camera.extent = 0.1;
+	frame.camera.fov_y = 0.1;
 	peer_ask_frame(&p, &frame);
 	while (stat_of(&psrd, PSR_STAT_FRAMES) == 0)
 		usleep(5000);

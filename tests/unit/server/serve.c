@@ -92,7 +92,7 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
 	assert_true(fabs(begin.depth_min - 2) < 1e-3 && fabs(begin.depth_max - 2) < 1e-3);
 	assert_memory_equal(begin.camera.eye, frame.camera.eye, sizeof begin.camera.eye);
-	assert_true(begin.camera.extent == frame.camera.extent && begin.camera.near_z == frame.camera.near_z);
+	assert_true(begin.camera.fov_y == frame.camera.fov_y && begin.camera.near_z == frame.camera.near_z);
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		const unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 		const uint8_t *empty = plane == PSR_PLANE_COLOR ? begin.background : psr_plane_background(plane);
@@ -586,9 +586,9 @@ static void cameras_and_lights_of_a_model_are_told(void **state)
 	assert_true(end.n_cameras == 2 && end.n_lights == 2);
 	assert_int_equal(got[0].kind, PSR_WIRE_PRESET_CAMERA);
 	assert_string_equal(got[0].name, "front");
-	assert_int_equal(got[0].camera.kind, PSR_WIRE_CAMERA_PERSPECTIVE);
+	assert_int_equal(got[0].camera.kind, PSR_CAMERA_PERSPECTIVE);
 	assert_true(got[0].camera.eye[2] == 3 && got[0].camera.up[1] == 1);
-	assert_true(got[0].camera.extent == 0.5 && got[0].camera.near_z == 0.25);
+	assert_true(got[0].camera.fov_y == 0.5 && got[0].camera.near_z == 0.25);
 	/* The view of the whole model, its own way up. */
 	assert_string_equal(got[1].name, "home");
 	assert_int_equal(got[1].kind, PSR_WIRE_PRESET_CAMERA);

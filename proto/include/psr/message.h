@@ -1,0 +1,267 @@
+/* The messages between a client and psrd that psr/client.h takes and gives, as structs. proto/PROTOCOL.md tells what
+ * they mean and which bytes they are. Coordinates and lengths are of magnitude 1e30 at most, positive lengths at least
+ * 1e-30. */
+#ifndef PSR_MESSAGE_H
+#define PSR_MESSAGE_H
+
+#include <stdint.h>
+#include "psr/frame.h"
+#include "psr/view.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PSR_WIRE_MAX_NAME 255          /* bytes of UTF-8 */
+#define PSR_WIRE_MAX_SIDE 16384        /* pixels */
+#define PSR_WIRE_MAX_PIXELS 67108864u  /* 64 Mpixel */
+#define PSR_WIRE_MAX_INSTANCES 1024
+#define PSR_WIRE_MAX_LIGHTS 32
+#define PSR_WIRE_MAX_SCENES 16         /* slots 0..15 */
+#define PSR_WIRE_MAX_OPEN 64           /* open ids of view 0 */
+#define PSR_WIRE_MAX_REPORT 64
+#define PSR_WIRE_MAX_STATS 64
+#define PSR_WIRE_MAX_LENGTH 1e30       /* magnitude of a coordinate or length; positive lengths are at least 1e-30 */
+#define PSR_WIRE_MAX_INTENSITY 1e6
+
+/* What a server offers (WELCOME) or a client understands (HELLO); unknown bits are ignored. Every server offers
+ * view 0, colour as raw, JPEG or zstd, depth as float, raw or zstd, blocks, lights without shadows. */
+enum psr_cap {
+	PSR_CAP_VIEWS = 1 << 0,        /* views > 0: supersession, window of unacknowledged frames, ACK */
+	PSR_CAP_REFINE = 1 << 1,       /* pass_limit > 0 */
+	PSR_CAP_BASE = 1 << 2,         /* frames as changes to a base */
+	PSR_CAP_TIME_BUDGET = 1 << 3,
+	PSR_CAP_ERROR_BOUND = 1 << 4,
+	PSR_CAP_SETTINGS = 1 << 5,     /* settings of a scale other than 1 */
+	PSR_CAP_SHADOWS = 1 << 6,
+	PSR_CAP_DEPTH_U16 = 1 << 7,    /* depth formats U16 and U16_HALF */
+	PSR_CAP_NORMAL = 1 << 8,
+	PSR_CAP_ID = 1 << 9,
+	PSR_CAP_WEIGHT = 1 << 10,
+	PSR_CAP_WORDS = 1 << 11,
+	PSR_CAP_PNG = 1 << 12,
+	PSR_CAP_OCTREE = 1 << 13,
+	PSR_CAP_DPOINT = 1 << 14,
+	PSR_CAP_APPEND = 1 << 15,      /* SCENE with PSR_WIRE_SCENE_APPEND */
+	PSR_CAP_BUILD = 1 << 16,       /* OPEN builds source files */
+	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
+	PSR_CAP_PAUSE = 1 << 18,
+	PSR_CAP_PRESETS = 1 << 19,
+	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN says for which pictures */
+	PSR_CAP_BLOCK = 1 << 20,
+};
+
+/* ---- the session ---- */
+
+struct psr_msg_welcome { /* server -> client, answers HELLO; id 0 */
+	uint16_t major, minor;
+	uint64_t capabilities;
+	uint32_t max_message;    /* 1024..65536 */
+	uint32_t max_side;       /* these are the server's own limits, at least 1, at most those of this header */
+	uint32_t max_pixels;
+	uint32_t max_instances;
+	uint32_t max_lights;
+	uint32_t max_scenes;
+	uint32_t max_open;
+	uint32_t max_models;     /* open handles of a connection */
+	uint32_t idle_timeout_ms; /* a connection silent for so long is closed; 0: never */
+	char server[PSR_WIRE_MAX_NAME + 1]; /* name and version */
+};
+
+/* ---- models ---- */
+
+enum psr_entry_state {
+	PSR_ENTRY_READY = 1,   /* a model file */
+	PSR_ENTRY_LOADED = 2,  /* the same, in the server's memory now */
+	PSR_ENTRY_SOURCE = 3,  /* a source file: OPEN builds it first */
+	PSR_ENTRY_FAILED = 4,  /* could not be built or read; OPEN says why */
+};
+struct psr_msg_list_entry { /* one a model, sorted by the names' bytes */
+	uint8_t state;
+	uint64_t file_bytes;
+	uint8_t content_id[16]; /* zero if not known yet */
+	char name[PSR_WIRE_MAX_NAME + 1];
+};
+
+enum psr_progress_stage {
+	PSR_PROGRESS_WAITING = 0, PSR_PROGRESS_IMPORT = 1, PSR_PROGRESS_SAMPLE = 2, PSR_PROGRESS_SELECT = 3,
+	PSR_PROGRESS_WRITE = 4, PSR_PROGRESS_LOAD = 5,
+};
+struct psr_msg_progress { /* any number before OPENED; stages never go back */
+	uint16_t stage;
+	uint64_t done, total; /* in units of the stage; total 0: not known, then done only rises; else done <= total */
+};
+
+enum psr_wire_rep { PSR_WIRE_REP_AUTO = 0, PSR_WIRE_REP_BLOCKS = 1, PSR_WIRE_REP_OCTREE = 2, PSR_WIRE_REP_DPOINT = 3 };
+struct psr_msg_opened {
+	uint32_t handle;          /* not 0; of this connection */
+	uint32_t representations; /* bit r: has representation r of enum psr_wire_rep; not 0, bit 0 is 0 */
+	uint8_t content_id[16];
+	double box_min[3], box_max[3]; /* of the samples, object coordinates (those of the source file) */
+	double origin[3];
+	double scale;             /* object units an inner unit; > 0 */
+	double spacing;           /* of samples at the finest level, object units; > 0 */
+	uint32_t resolution;      /* target resolution: pixels across the unit sphere at magnification 1; >= 1 */
+	uint32_t n_levels;        /* >= 1 */
+	uint64_t n_samples, n_blocks, bytes; /* bytes: in the server's memory */
+};
+
+/* ---- scenes ---- */
+
+struct psr_msg_instance { /* world = translation + scale * rotate(rotation, object) */
+	uint32_t handle;
+	uint8_t representation;   /* enum psr_wire_rep */
+	double rotation[4];       /* x, y, z, w; | |q|^2 - 1 | <= 1e-6; receivers normalise it */
+	double translation[3];
+	double scale;             /* 1e-30..1e30 */
+};
+
+enum psr_wire_light_kind { PSR_WIRE_LIGHT_DIRECTIONAL = 1, PSR_WIRE_LIGHT_POINT = 2, PSR_WIRE_LIGHT_SPOT = 3 };
+enum psr_wire_light_flag { PSR_WIRE_LIGHT_SHADOW = 1 };
+struct psr_msg_light { /* a field that the kind does not use is 0 */
+	uint8_t kind;
+	uint8_t flags;
+	uint8_t color[3];         /* sRGB */
+	double intensity;         /* 0..1e6, multiplies the linear colour */
+	double position[3];       /* point, spot: world */
+	double direction[3];      /* directional, spot: the way the light travels, away from it; length >= 1e-30 */
+	double inner, outer;      /* spot: half angles, radians, 0 <= inner <= outer, 1e-6 <= outer <= pi: full
+	                           * inside of inner, none outside of outer */
+	double reference;         /* point, spot: distance at which intensity holds, falling with the square; 0: it does
+	                           * not fall */
+};
+
+/* APPEND adds to what the slot holds instead of replacing it (PSR_CAP_APPEND). */
+enum psr_wire_scene_flag { PSR_WIRE_SCENE_APPEND = 1 };
+struct psr_msg_scene {
+	uint16_t slot;            /* 0..15, chosen by the client; replaces what the slot held */
+	uint16_t flags;
+	double ambient;           /* 0..1e6: light from everywhere, times diffuse colour */
+	uint8_t background[3];    /* sRGB */
+	uint16_t n_instances, n_lights;
+	struct psr_msg_instance instance[PSR_WIRE_MAX_INSTANCES];
+	struct psr_msg_light light[PSR_WIRE_MAX_LIGHTS];
+}; /* about 80 KiB */
+
+/* ---- cameras and lights that came with a model ---- */
+
+#define PSR_WIRE_MAX_PRESETS 256 /* of each kind */
+
+enum psr_wire_preset_kind { PSR_WIRE_PRESET_CAMERA = 1, PSR_WIRE_PRESET_LIGHT = 2 };
+struct psr_msg_preset { /* object coordinates; the part that the kind has no use for is 0 */
+	uint8_t kind;
+	struct psr_camera camera;
+	struct psr_msg_light light;          /* flags 0 */
+	char name[PSR_WIRE_MAX_NAME + 1];    /* not empty */
+};
+
+/* ---- frames ---- */
+
+enum psr_codec { PSR_CODEC_RAW = 0, PSR_CODEC_JPEG = 1, PSR_CODEC_ZSTD = 2, PSR_CODEC_PNG = 3 };
+enum psr_wire_depth_format { PSR_WIRE_DEPTH_F32 = 1, PSR_WIRE_DEPTH_U16 = 2, PSR_WIRE_DEPTH_U16_HALF = 3 };
+enum psr_wire_budget {
+	PSR_WIRE_BUDGET_NONE = 0, PSR_WIRE_BUDGET_TIME = 1, PSR_WIRE_BUDGET_ERROR = 2, PSR_WIRE_BUDGET_SETTINGS = 3,
+};
+
+struct psr_msg_settings { /* resolved settings: with them a frame is a pure function of models and request */
+	uint8_t scale;       /* drawn at 1/scale of the size in each direction and enlarged: 1, 2 or 4 */
+	uint8_t is_smooth;   /* 1: edges are blended with what is behind, and pixels with those of their surface; else 0 */
+	double spacing_px;   /* greatest distance of neighbouring samples, pixels: 1 is [G]'s adequate one; 2^-6..2^6 */
+};
+
+struct psr_msg_frame { /* client -> server */
+	uint16_t slot;           /* scene */
+	uint16_t pass_limit;     /* highest pass wanted; 0: one frame, no refinement */
+	uint32_t width, height;  /* 1..16384 each, at most 64 Mpixel */
+	uint32_t planes;         /* 1 << enum psr_plane, whose values are those on the wire; not 0 */
+	uint8_t color_codec;     /* fields of planes that are not asked for are 0 */
+	uint8_t color_quality;   /* JPEG: 1..100; else 0 */
+	uint8_t depth_format;
+	uint8_t depth_codec;     /* raw or zstd */
+	uint8_t data_codec;      /* of normal, id, weight, words, block: raw or zstd */
+	uint8_t budget;          /* enum psr_wire_budget: exactly one of the next three counts, the others are 0 */
+	uint64_t time_budget_us; /* TIME: 1..2^53-1, from the start of work on the frame to its END in the output queue */
+	double error_bound_px;   /* ERROR: of the geometric error, > 0 */
+	struct psr_msg_settings settings; /* SETTINGS */
+	uint32_t base;           /* id of an acknowledged frame of this view that the client still holds, or 0; that it is
+	                          * below the request's id, and 0 in view 0, is the receiver's to check */
+	struct psr_camera camera;
+};
+
+struct psr_msg_frame_begin { /* server -> client */
+	uint16_t pass;           /* 0, 1, ... rising within an id */
+	uint32_t width, height, planes; /* as asked */
+	uint8_t color_codec, color_quality, depth_format, depth_codec, data_codec; /* as asked */
+	uint8_t background[3];   /* of pixels without a rectangle, when there is no base */
+	uint32_t base;           /* 0: no base, else (base, base_pass) is what the rectangles go on top of */
+	uint16_t base_pass;
+	struct psr_msg_settings settings; /* resolved */
+	double depth_min, depth_max; /* of the finite depths of this frame, both 0 if there are none; the range of
+	                              * PSR_WIRE_DEPTH_U16* */
+	struct psr_camera camera;    /* as asked */
+};
+
+enum psr_wire_frame_status {
+	PSR_WIRE_FRAME_OK = 0,          /* drawn as asked */
+	PSR_WIRE_FRAME_LATE = 1,        /* the time budget was not kept */
+	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound could not be reached with these models */
+};
+
+enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
+	PSR_WIRE_REPORT_PLAN = 1,    /* instances of the scene */
+	PSR_WIRE_REPORT_CULL = 2,    /* blocks tested */
+	PSR_WIRE_REPORT_WARP = 3,    /* samples that fell into the picture */
+	PSR_WIRE_REPORT_GAPS = 4,    /* pixels with a sample whose weight is below 1 */
+	PSR_WIRE_REPORT_RESOLVE = 5, /* pixels resolved: they have a sample and weight above 0 */
+	PSR_WIRE_REPORT_SHADE = 6,   /* pixels shaded */
+	PSR_WIRE_REPORT_FILL = 7,    /* pixels whose colour the fill changed */
+	PSR_WIRE_REPORT_ENCODE = 8,  /* bytes of all RECT data of the frame */
+	PSR_WIRE_REPORT_QUEUE = 9,   /* time waited before work started; frames of all clients waiting when it came */
+	PSR_WIRE_REPORT_TOTAL = 10,  /* from the start of plan to the end of encode; threads of the server's pool */
+	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
+	PSR_WIRE_REPORT_SMOOTH = 12, /* pixels at edges */
+	/* values only, ns is 0: */
+	PSR_WIRE_REPORT_SAMPLES_WARPED = 32, /* all samples of the blocks drawn */
+	PSR_WIRE_REPORT_BLOCKS_DRAWN = 33,   /* after culling */
+	PSR_WIRE_REPORT_BLOCKS = 34,         /* of all instances of the scene */
+	PSR_WIRE_REPORT_PIXELS_COVERED = 35, /* weight above 0 before the fill */
+	PSR_WIRE_REPORT_PIXELS_FILLED = 36,  /* of weight 0 that the fill gave a colour */
+	PSR_WIRE_REPORT_SAMPLES = 37,        /* of all instances of the scene */
+	PSR_WIRE_REPORT_DEPTH_LEVELS = 38,   /* level buffers in use */
+	PSR_WIRE_REPORT_LIGHTS = 39,
+	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
+	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
+	PSR_WIRE_REPORT_EFFECTS = 64, /* and the effect's number, see PROTOCOL.md; ns is the reason's number */
+};
+struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
+
+struct psr_msg_frame_end { /* server -> client */
+	uint16_t pass;             /* that of BEGIN */
+	uint8_t is_final;          /* 1: the id ends here; else 0 */
+	uint8_t status;            /* enum psr_wire_frame_status */
+	double error_px;           /* bound on the geometric error of this frame, pixels, >= 0 */
+	uint32_t planes;           /* those of BEGIN: which hashes follow */
+	uint64_t hash[PSR_N_PLANES]; /* by plane; XXH64, seed 0, before the codec; 0 where the plane is absent */
+	uint16_t n_entries;
+	struct psr_msg_report_entry entry[PSR_WIRE_MAX_REPORT]; /* ids rising */
+};
+
+/* ---- statistics ---- */
+
+enum psr_stat_id { /* of the whole server since its start */
+	PSR_STAT_UPTIME_US = 1, PSR_STAT_CONNECTIONS = 2, PSR_STAT_CONNECTIONS_TOTAL = 3, PSR_STAT_MODELS = 4,
+	PSR_STAT_MODEL_BYTES = 5, PSR_STAT_FRAMES = 6, PSR_STAT_FRAMES_FAILED = 7, PSR_STAT_FRAMES_WAITING = 8,
+	PSR_STAT_BYTES_SENT = 9, PSR_STAT_BYTES_RECEIVED = 10, PSR_STAT_FRAMES_SUPERSEDED = 11,
+	PSR_STAT_FRAMES_CANCELLED = 12, PSR_STAT_THREADS = 13,
+	PSR_STAT_DROPPED_PEERS = 14, /* connections that the server closed for an error or a limit */
+};
+struct psr_msg_stat { uint16_t id; uint64_t value; };
+struct psr_msg_stats_reply {
+	uint16_t n_stats;
+	struct psr_msg_stat stat[PSR_WIRE_MAX_STATS]; /* ids rising; unknown ones are skipped by receivers */
+};
+
+#ifdef __cplusplus
+}
+#endif
+#endif
