@@ -38,15 +38,19 @@ server/session
 server
 client/include
 client/lib
-client/cli client/psr.h client/optlist client/suggest
+client/cli
 client/scene
 client/replay
-client/output client/draw.h
-client/bench
+client/output
+client/draw
+client/bench/
 client
 models/shapes
-models/json models/commands.h
+models/commands.h
+models/accuracy/
+models/studies/lib
 models/studies/greedy
+models/studies/cull
 models/studies
 models
 END
