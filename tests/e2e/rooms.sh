@@ -38,16 +38,21 @@ server/session
 server
 client/include
 client/lib
-client/cli client/psr.h client/optlist client/suggest
+client/cli
 client/scene
 client/replay
-client/output client/draw.h
-client/bench
+client/output
+client/draw/
+client/bench/
 client
 models/shapes
-models/json models/commands.h
+models/studies/lib
+models/studies/cull
 models/studies/greedy
+models/studies/figures
+models/studies/tables
 models/studies
+models/accuracy/
 models
 END
 
