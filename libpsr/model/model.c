@@ -249,6 +249,8 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
 	if (blocks->traits != NULL && n_cones == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the model's blocks have traits and no cones, by which bent blocks face");
+	if (blocks->opacity != NULL && blocks->traits == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "the model's samples have opacities, and its blocks no traits");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
 		return psr_fail(err, PSR_ERR_ARG, "of visibility masks, their number and their indices only some are there");
 	if (presets == NULL)

@@ -296,6 +296,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
 	if (blocks->traits && !blocks->cone_x)
 		return bad(r, "section TRTS is there without CONX, CONY, CONZ and CONS, by which bent blocks face");
+	if (blocks->opacity && !blocks->traits)
+		return bad(r, "section OPAC is there without TRTS, which says what blocks have opacities");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
 		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS only some are there");
 	return PSR_OK;

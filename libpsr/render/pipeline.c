@@ -17,6 +17,7 @@ struct psr_renderer {
 	struct shadow *shadow;    /* NULL until a light casts one */
 	struct fill fill;
 	struct smooth smooth;
+	struct sheer sheer;
 	struct psr_zstack stack;
 	struct refiner *refiner;
 	const struct inside *inside; /* of frames with splats, or NULL */
@@ -114,6 +115,7 @@ void psr_renderer_destroy(struct psr_renderer *r)
 	bins_clear(&r->bins);
 	fill_clear(&r->fill);
 	smooth_clear(&r->smooth);
+	sheer_clear(&r->sheer);
 	psr_free_huge(r->pixels, r->pixels_size);
 	psr_free_huge(r->lit, r->lit_size);
 	psr_free_huge(r->counters, r->counters_size);
@@ -124,7 +126,7 @@ uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
 	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
 	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->pixels_size +
-	       r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
+	       sheer_bytes(&r->sheer) + r->lit_size + r->counters_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
 static uint32_t n_rows(const struct plan *plan)
@@ -399,6 +401,18 @@ static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_re
 	return PSR_OK;
 }
 
+static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+{
+	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, r->stack.exponent };
+	const int is_wanted = r->frame->rgb || r->frame->depth, is_drawn = is_wanted && r->plan.has_sheer;
+	const enum psr_why why = is_drawn ? PSR_WHY_RAN : is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	uint64_t n_pixels = 0;
+	if (is_drawn && sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool, &n_pixels))
+		return PSR_ERR_MEMORY;
+	effect_note(report, PSR_EFFECT_SHEER, why, n_pixels);
+	return PSR_OK;
+}
+
 static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool,
                         struct psr_frame *frame, struct psr_error *err)
 {
@@ -419,6 +433,11 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		rgb = r->smooth.rgb;
 		r->depth = r->smooth.depth;
 	}
+	if (r->plan.has_sheer && frame->rgb && !r->depth)
+		r->depth = sheer_depths(&r->sheer, &r->plan);
+	if (r->plan.has_sheer && frame->rgb && !r->depth)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the depths of a picture of %ux%u", r->plan.width,
+		                r->plan.height);
 	r->target = (struct shade_target){ rgb, r->srgb, r->rgb[0], r->rgb[1], r->rgb[2], NULL };
 	const struct fill_picture picture = { stack,     r->weight, r->bricks, r->rgb[0], r->rgb[1],
 		                                  r->rgb[2], r->srgb,   rgb,       r->depth };
@@ -445,8 +464,14 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	if (smooth == PSR_WHY_RAN)
 		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
-	report->ns[PSR_STAGE_SMOOTH] = clock_ns() - start;
+	end = clock_ns();
+	report->ns[PSR_STAGE_SMOOTH] = end - start;
+	start = end;
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
+	if (add_sheer(r, pool, report))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for what one sees through, in a picture of %ux%u", r->plan.width,
+		                r->plan.height);
+	report->ns[PSR_STAGE_SHADE] += clock_ns() - start;
 	return PSR_OK;
 }
 

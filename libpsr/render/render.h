@@ -42,6 +42,7 @@ struct plan {
 	struct warp_instance *warp; /* what warping knows of each */
 	struct strip_view view;    /* needs is filled by the cull, */
 	int has_sheer;             /* and this: some block that is left is sheer */
+	int is_shadow;             /* it draws a shadow map, in which sheer blocks are there or not */
 	struct strip_light *light;
 	const struct shadow_light *shadow; /* one a light, or NULL: none casts any in this picture. Not the plan's own */
 	double frame[3][3], eye[3]; /* right, down and forward in the world, and where the camera is */
@@ -158,6 +159,14 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
+/* Lists the discs of a block in the place of drawing them: what of them lies in the tile, whose stride places have. */
+struct sheer_list;
+void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
+                struct sheer_list *list);
+
+/* How much further away a block's discs count as at their rims than in their planes, in z': a step of its lattice. */
+float splat_rim(const struct plan_instance *in, uint32_t block);
+
 /* Pixels of a picture that are well inside of what its plain frame covers; the frame's pixel (0, 0) is sub-pixel (left,
  * top) of the picture, which has 2^pass along the side of a pixel. */
 struct inside {
@@ -168,7 +177,8 @@ struct inside {
 
 /* Discs do not meet everywhere. Two kinds of pixels get weight 0 and mark their brick: those that are inside (NULL:
  * nothing is known of that) and lie behind samples in each of the 3 x 3 cells about them by more than their level's
- * threshold, or before nothing and within a cell, or 64 pixels, of something in two opposite directions where cells
+ * threshold, in a gap as narrow as a crack between such samples unless these are magnified; or before nothing and
+ * within a cell, or 64 pixels, of something in two opposite directions where cells
  * are wider than two pixels of the picture; and those before nothing, or behind by more than level 1's threshold,
  * where one surface is within a cell, or some pixels, in each of eight directions. Of rows y0..y1-1, after gaps_rows.
  * Returns how many there are. */
@@ -213,6 +223,11 @@ struct shade_target {
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
                 const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
                 struct shade_counts *counts);
+
+/* Lights the samples of n words, STRIP at most, which begin at pixel (x, y) and at a whole strip. Colours are those of
+ * pixels->x in strip->r, g and b. Returns how many there are. */
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t x, uint32_t y,
+                    uint32_t n, struct strip_pixels *pixels, struct strip *strip);
 
 /* ---- planes: what else is known of a row's pixels ---- */
 
@@ -342,6 +357,71 @@ void smooth_clear(struct smooth *smooth);
 /* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
 uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
                         uint8_t *rgb);
+
+/* ---- sheer: surfaces that let a part of the light through, over the finished picture ---- */
+
+struct sheer {
+	struct sheer_tile *tile; /* one a thread that has drawn any */
+	int n_tiles;
+	float *depth;
+	size_t depth_size;
+};
+
+/* What a tile's blocks show, all of it: by place, words from the nearest on. */
+struct sheer_list {
+	const float *before; /* z' of what hides what is behind it */
+	uint32_t *first;     /* SHEER_END: there is none */
+	struct sheer_word {
+		uint64_t word;
+		uint32_t next;
+	} *word;
+	uint32_t n, capacity;
+	int failed;          /* there was no memory */
+};
+#define SHEER_END UINT32_MAX
+
+/* Room for more. MEMORY, which the list notes, too. */
+int sheer_grow(struct sheer_list *list);
+
+static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
+{
+	uint32_t *link = &list->first[at];
+	if (list->n == list->capacity && sheer_grow(list))
+		return;
+	while (*link != SHEER_END && list->word[*link].word < word)
+		link = &list->word[*link].next;
+	list->word[list->n] = (struct sheer_word){ word, *link };
+	*link = list->n++;
+}
+
+/* Moves the sheer entries of a tile behind its other ones, which alone are warped, and returns the first. In a shadow map
+ * those that keep back half of the light or more are like others, and the rest casts none. */
+uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
+
+/* Adds blocks of a tile: samples in pixels where they are a pixel apart at most and the picture has no splats, else
+ * discs. */
+void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
+                       const struct warp_target *target);
+
+/* A picture without sheer surfaces: sRGB or NULL, and its depths in world units. */
+struct sheer_picture {
+	uint8_t *rgb;
+	const uint8_t *srgb; /* 8 bits of 16-bit linear light */
+	float *depth;
+	int exponent; /* of the stack */
+};
+
+/* Room for its depths, where nobody else has any. NULL: there is no memory. */
+float *sheer_depths(struct sheer *sheer, const struct plan *plan);
+
+/* Draws its sheer surfaces over it, the nearest of a pixel over those behind it, eight at most: each keeps back as much
+ * of what is behind it as its opacity says. The depth becomes that of the nearest one where these keep back half of the
+ * light, or where nothing is behind them. *n_pixels: pixels with any. A pure function of picture, plan and bins.
+ * MEMORY. */
+int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
+               const struct sheer_picture *picture, struct psr_pool *pool, uint64_t *n_pixels);
+void sheer_clear(struct sheer *sheer);
+uint64_t sheer_bytes(const struct sheer *sheer);
 
 /* ---- for refinement: what the plain frame covers ---- */
 

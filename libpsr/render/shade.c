@@ -101,6 +101,23 @@ static void write_strip(const struct strip *strip, const struct shading *s)
 	s->simd->strip_write(strip, &to, left < STRIP ? left : STRIP);
 }
 
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t x, uint32_t y,
+                    uint32_t n, struct strip_pixels *pixels, struct strip *strip)
+{
+	const struct shading shading = { simd, plan, NULL, NULL, NULL };
+	pixels->x0 = x;
+	pixels->y = y;
+	strip->pixels = pixels;
+	simd->strip_list(pixels, word, NULL, n);
+	if (!pixels->n)
+		return 0;
+	simd->strip_find(pixels, &plan->view);
+	simd->strip_read(strip, &plan->view);
+	simd->strip_resolve(strip, &plan->view, plan->ambient);
+	light_strip(strip, &shading);
+	return pixels->n;
+}
+
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
                 const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
                 struct shade_counts *counts)

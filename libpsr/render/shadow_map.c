@@ -198,6 +198,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	int rc = plan_make(plan, &seen, &settings, err);
 	if (rc)
 		return rc;
+	plan->is_shadow = 1;
 	for (uint32_t i = 0; i < plan->n_instances; i++)
 		plan->instance[i].cull.both_sides = 1;
 	rc = cull_blocks(bins, simd, plan, pool, &report);

@@ -191,7 +191,7 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              struct psr_zstack *stack, uint32_t tile, uint32_t clean, uint64_t *own)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
+	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
 	warp_target_make(&target, plan, stack, tile, own);
