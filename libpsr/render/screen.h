@@ -17,7 +17,7 @@ struct screen {
 };
 
 /* For an eye whose rays go through (x * tangent[0], y * tangent[1], 1) for screen point x, y, in the frame with rows
- * right, down, forward; triangles are those of level `level` of psr/direction.h. */
+ * right, down, forward; triangles are those of level `level` of base/direction.h. */
 void screen_make(struct screen *screen, int n, const double frame[3][3], const double tangent[2], int level);
 
 /* The smallest node that holds a rectangle of the screen. */

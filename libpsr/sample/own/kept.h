@@ -7,7 +7,7 @@
 
 struct kept_sample {
 	float position[3];
-	uint16_t normal;     /* psr/direction.h: what is turned away from the viewer does not count, */
+	uint16_t normal;     /* base/direction.h: what is turned away from the viewer does not count, */
 	uint8_t two_sided;   /* unless this is set */
 	uint8_t traits;      /* model/blocks.h. Bent: `attr` has another normal, which is shaded and does not tell facing */
 	uint8_t sample;      /* of this patch: */

@@ -10,7 +10,7 @@
 #include "ray/ray.h"
 
 /* Masks of all blocks, whatever their level: bit t of a block is set iff one of its samples is seen from some direction
- * in triangle t (level 2 of psr/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
+ * in triangle t (level 2 of base/direction.h; bit t & 63 of word t >> 6), from outside of the convex hull of the object.
  *
  * As in [G] the blocks of a level are drawn orthographically, at about a sample a pixel, without those samples that
  * face away, as the renderer leaves them out. The 1,026 directions are the corners of the triangles of level 4: 15 a

@@ -136,7 +136,7 @@ struct draft;
 int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n_projections, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
 
-/* The kept samples, in the order of views, blocks and samples: position, normal (psr/direction.h) and two-sidedness,
+/* The kept samples, in the order of views, blocks and samples: position, normal (base/direction.h) and two-sidedness,
  * all of n_samples of the result. */
 struct greedy_point {
 	float position[3];
