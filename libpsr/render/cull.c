@@ -58,10 +58,15 @@ static inline void interval(float c, float r, float z0, float z1, float *low, fl
 /* 0 if nothing of the sphere can be in the picture grown by `guard` pixels. Two more pixels make up for rounding. */
 static int sphere_extent(const struct plan *plan, const float c[3], float r, float guard, struct extent *out)
 {
+	float x0, x1, y0, y1;
+
 	r *= 1.0001f;
 	if (!(c[2] + r > plan->near_z))
 		return 0;
-	float x0 = c[0] - r, x1 = c[0] + r, y0 = c[1] - r, y1 = c[1] + r;
+	x0 = c[0] - r;
+	x1 = c[0] + r;
+	y0 = c[1] - r;
+	y1 = c[1] + r;
 	if (plan->perspective) {
 		float z0 = c[2] - r > plan->near_z ? c[2] - r : plan->near_z, z1 = c[2] + r;
 		interval(c[0], r, z0, z1, &x0, &x1);
@@ -398,6 +403,9 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
+	uint64_t n_masked = 0, n_mixed = 0;
+	float depth_error = 0;
+
 	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
 	bins->hit = room_for(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
 	bins->group = room_for(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
@@ -407,8 +415,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	bins->by_work = room_for(bins->by_work, &bins->by_work_capacity, cull.n_tiles, sizeof *bins->by_work);
 	bins->is_quiet = room_for(bins->is_quiet, &bins->quiet_capacity, plan->parts_x * plan->parts_y, 1);
 	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
-	if (!bins->masks || !bins->chunk || !bins->hit || !bins->group || !bins->count || !bins->tile_begin ||
-	    !bins->by_work || !bins->is_quiet)
+	if (bins->masks == NULL || bins->chunk == NULL || bins->hit == NULL || bins->group == NULL || bins->count == NULL
+	    || bins->tile_begin == NULL || bins->by_work == NULL || bins->is_quiet == NULL)
 		return PSR_ERR_MEMORY;
 	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
 	make_chunks(bins, plan, 1);
@@ -417,13 +425,11 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 		if (plan->instance[i].masks == PSR_WHY_RAN)
 			masks_make(&bins->masks[i], plan, &plan->instance[i]);
 	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
-	int rc = place_entries(bins, &cull);
+	const int rc = place_entries(bins, &cull);
 	if (rc)
 		return rc;
 	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
 
-	float depth_error = 0;
-	uint64_t n_masked = 0, n_mixed = 0;
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
 	for (uint32_t i = 0; i < cull.n_chunks; i++) {

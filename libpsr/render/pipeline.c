@@ -57,9 +57,9 @@ static int validate(const struct psr_scene *scene, const struct render_settings 
 		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u is too large: at most %d a side and %u pixels", w, h,
 		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
 	const struct psr_window *window = &settings->window;
-	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE ||
-	    !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE ||
-	    window->top < -PSR_MAX_SIDE || window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
+	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE
+	    || !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE
+	    || window->top < -PSR_MAX_SIDE || window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "there is no window at (%d, %d) of a picture of %ux%u", (int)window->left,
 		                (int)window->top, window->picture_width, window->picture_height);
 	if (settings->cull_tests & ~(unsigned)PSR_CULL_ALL)
@@ -84,7 +84,7 @@ int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	fenv_t callers;
-	if (!r)
+	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	set_environment(&callers);
@@ -107,7 +107,7 @@ struct refiner **renderer_refiner(struct psr_renderer *r)
 
 void psr_renderer_destroy(struct psr_renderer *r)
 {
-	if (!r)
+	if (r == NULL)
 		return;
 	refiner_destroy(r->refiner);
 	plan_clear(&r->plan);
@@ -148,6 +148,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	struct psr_zstack *stack = &r->stack;
 	const size_t rows = n_rows(&r->plan), n_bricks = rows * ((w + BRICK - 1) / BRICK);
 	size_t n_words, cells = 0;
+	float *next;
 
 	stack->width = w;
 	stack->gap = warp_gap(w);
@@ -167,7 +168,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	const size_t n_parts = (size_t)r->plan.parts_x * r->plan.parts_y;
 	r->counters = psr_grow_huge(r->counters, &r->counters_size,
 	                            n_tiles * sizeof *r->tile + n_parts + rows * (sizeof *r->gaps + sizeof *r->shade));
-	if (!r->pixels || !r->counters)
+	if (r->pixels == NULL || r->counters == NULL)
 		return PSR_ERR_MEMORY;
 	r->tile = r->counters;
 	r->shade = (struct shade_counts *)(r->tile + n_tiles);
@@ -175,7 +176,7 @@ static int prepare_buffers(struct psr_renderer *r, uint32_t levels)
 	r->is_clean = (uint8_t *)(r->gaps + rows);
 
 	stack->word = r->pixels;
-	float *next = (float *)(stack->word + n_words);
+	next = (float *)(stack->word + n_words);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		stack->level[k].z = stack->levels >> k & 1 ? next : NULL;
 		if (stack->level[k].z)
@@ -213,11 +214,13 @@ static int make_stack(struct psr_renderer *r, const struct psr_scene *scene, con
                       struct psr_error *err)
 {
 	int rc = validate(scene, settings, err);
+	uint64_t start, end;
+
 	if (rc)
 		return rc;
 	psr_pool_wake(pool);
 	memset(report, 0, sizeof *report);
-	uint64_t start = clock_ns(), end;
+	start = clock_ns();
 	rc = plan_make(&r->plan, scene, settings, err);
 	if (rc)
 		return rc;
@@ -331,7 +334,7 @@ static void shade_one(int row, void *userdata)
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
 		const uint64_t *word = psr_zstack_row(&r->stack, y);
-		if (r->depth)
+		if (r->depth != NULL)
 			r->simd->depth_row(r->depth + first, word, plan->width, r->stack.exponent);
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, r->weight + first, y);
@@ -394,7 +397,7 @@ static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_re
 	if (why != PSR_WHY_RAN)
 		return PSR_OK;
 	r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
-	if (!r->lit)
+	if (r->lit == NULL)
 		return PSR_ERR_MEMORY;
 	shade_tabulate(r->simd, &r->plan, pool, r->lit);
 	r->plan.view.lit = (const float(*)[4])r->lit;
@@ -416,12 +419,15 @@ static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_r
 static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool,
                         struct psr_frame *frame, struct psr_error *err)
 {
+	uint64_t start, end;
+
 	if (stack != &r->stack || frame->width != stack->width || frame->height != stack->height)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack is not this renderer's, or of another size than the frame");
-	struct psr_report *report = &frame->report;
+	struct psr_report *const report = &frame->report;
 	*report = r->report;
 	r->frame = frame;
-	r->has_planes = frame->normal || frame->id || frame->block || frame->weight || frame->words;
+	r->has_planes = frame->normal != NULL || frame->id != NULL || frame->block != NULL || frame->weight != NULL
+	                || frame->words != NULL;
 
 	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb ? PSR_WHY_RAN : PSR_WHY_NOTHING;
 	uint8_t *rgb = frame->rgb;
@@ -443,7 +449,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		                                  r->rgb[2], r->srgb,   rgb,       r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &picture))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	uint64_t start = clock_ns(), end;
+	start = clock_ns();
 	const uint32_t n_marked = find_gaps(r, pool, report);
 	report->ns[PSR_STAGE_GAPS] = (end = clock_ns()) - start;
 	start = end;
@@ -490,8 +496,10 @@ int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const s
 {
 	struct psr_zstack *stack;
 	fenv_t callers;
+	int rc;
+
 	set_environment(&callers);
-	int rc = make_stack(r, scene, settings, frame->rgb != NULL, pool, &stack, &frame->report, err);
+	rc = make_stack(r, scene, settings, frame->rgb != NULL, pool, &stack, &frame->report, err);
 	if (rc == PSR_OK)
 		rc = finish_stack(r, stack, pool, frame, err);
 	fesetenv(&callers);

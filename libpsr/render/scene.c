@@ -9,9 +9,10 @@
 
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
-	if (!instance->model || !psr_model_blocks(instance->model))
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: its model has no blocks", i);
 	double q = 0;
+
+	if (instance->model == NULL || psr_model_blocks(instance->model) == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: its model has no blocks", i);
 	for (int k = 0; k < 4; k++)
 		q += instance->rotation[k] * instance->rotation[k];
 	if (!(fabs(q - 1) <= 1e-6))
@@ -25,17 +26,19 @@ static int validate_instance(const struct psr_instance *instance, unsigned i, st
 
 int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 {
+	struct psr_error what = { 0 };
+	uint64_t n_blocks = 0;
+	int rc;
+
 	if (scene->n_instances > PSR_MAX_INSTANCES)
 		return psr_fail(err, PSR_ERR_LIMIT, "%u instances, at most %d", scene->n_instances, PSR_MAX_INSTANCES);
 	if (scene->n_lights > PSR_MAX_LIGHTS)
 		return psr_fail(err, PSR_ERR_LIMIT, "%u lights, at most %d", scene->n_lights, PSR_MAX_LIGHTS);
 	if (!view_is_light(scene->ambient) || !view_is_light(scene->background))
 		return psr_fail(err, PSR_ERR_ARG, "ambient and background must be within 0..1e9");
-	struct psr_error what = { 0 };
-	int rc = view_check_camera(&scene->camera, &what);
+	rc = view_check_camera(&scene->camera, &what);
 	if (rc)
 		return psr_fail(err, rc, "camera: %s", what.text);
-	uint64_t n_blocks = 0;
 	for (unsigned i = 0; !rc && i < scene->n_instances; i++) {
 		rc = validate_instance(&scene->instance[i], i, err);
 		if (!rc)
@@ -95,7 +98,7 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 		double p[3];
 		for (int i = 0; i < 3; i++)
 			p[i] = corner >> i & 1 ? half[i] : -half[i];
-		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
+		const double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
 			   z = v3d_dot(p, forward);
 		extent = fmax(extent, fmax(x, y));
 		distance = fmax(distance, fmax(x, y) * margin - z);

@@ -126,7 +126,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
-	if (!target->rgb) {
+	if (target->rgb == NULL) {
 		for (uint32_t i = 0; i < n; i++)
 			counts->n_pixels += list_strip(&pixels[0], &shading, i % per_row * STRIP, y0 + i / per_row);
 		return;

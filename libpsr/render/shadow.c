@@ -29,7 +29,7 @@ static void drop(struct shadow_kept *kept)
 
 void shadow_destroy(struct shadow *shadow)
 {
-	if (!shadow)
+	if (shadow == NULL)
 		return;
 	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
 		for (int f = 0; f < SHADOW_FACES; f++)
@@ -43,7 +43,7 @@ void shadow_destroy(struct shadow *shadow)
 
 uint64_t shadow_bytes(const struct shadow *shadow)
 {
-	if (!shadow)
+	if (shadow == NULL)
 		return 0;
 	const struct shadow_drawer *drawer = &shadow->drawer;
 	uint64_t n = sizeof *shadow + drawer->plan.storage_size + drawer->word_size + drawer->cells_size;
@@ -130,9 +130,9 @@ static int note_instances(struct shadow *shadow, const struct psr_scene *scene, 
 static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 {
 	const struct psr_camera *p = &a->camera, *q = &b->camera;
-	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0 &&
-	       memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0 &&
-	       p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
+	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0
+	       && memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0
+	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
 }
 
 /* Texels a side: as many as the picture's greater side has pixels, within what all maps may have together. Their number
@@ -218,14 +218,14 @@ int shadow_prepare(struct shadow **out, const struct simd *simd, struct plan *pl
 	}
 	if (!*out)
 		*out = calloc(1, sizeof **out);
-	struct shadow *shadow = *out;
+	struct shadow *const shadow = *out;
 	if (!shadow || note_instances(shadow, scene, &has_changed))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for shadow maps");
 	fit_lights(shadow, scene, plan, has_changed);
 	for (uint32_t l = 0, p = 0; l < scene->n_lights; l++) {
 		if (!is_planned(plan, &scene->light[l]))
 			continue;
-		int rc = prepare_light(shadow, l, p++, simd, plan, bins, scene, pool, report, err);
+		const int rc = prepare_light(shadow, l, p++, simd, plan, bins, scene, pool, report, err);
 		if (rc)
 			return rc;
 	}

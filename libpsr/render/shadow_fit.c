@@ -139,6 +139,7 @@ static void fit_square(struct shadow_fit *fit, const double position[3], const d
                        double distance, const struct shadow_bounds *bounds, uint32_t side)
 {
 	struct psr_camera *camera = &fit->camera;
+	double to[3];
 	const double adequate = 2 * tangent * distance / bounds->spacing + 2 * MARGIN;
 	fit->width = fit->height = clamp_side(ceil(adequate), side);
 	memcpy(camera->eye, position, sizeof camera->eye);
@@ -147,7 +148,6 @@ static void fit_square(struct shadow_fit *fit, const double position[3], const d
 	camera->kind = PSR_CAMERA_PERSPECTIVE;
 	camera->ortho_height = camera->near_z = 0;
 	camera->fov_y = 2 * angle_of(tangent * fit->width / (fit->width - 2 * MARGIN));
-	double to[3];
 	v3d_sub(to, bounds->center, position);
 	const double along = v3d_dot(axis, to), reach = bounds->radius * 1.01;
 	fit->nearest = fmax(along - reach, 0);
@@ -188,9 +188,10 @@ static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_l
 uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light,
                           const struct psr_scene *scene, const struct shadow_bounds *bounds, uint32_t side)
 {
+	double to[3], axis[3], s, c, widest;
+
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
 		return fit_directional(fit, light, scene, bounds, side);
-	double to[3], s, c, widest;
 	v3d_sub(to, bounds->center, light->position);
 	const double away = v3d_length(to), distance = fmax(away, bounds->radius), r = bounds->radius * 1.0001;
 	const double sphere = away > r ? r / sqrt(away * away - r * r) : INFINITY; /* tangents of half angles */
@@ -203,7 +204,6 @@ uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_
 	}
 	if (fmin(sphere, cone) > widest)
 		return fit_cube(fit, light, to, distance, bounds, side);
-	double axis[3];
 	v3d_normalize(axis, sphere < cone ? to : light->direction);
 	fit_square(fit, light->position, axis, fmin(sphere, cone), distance, bounds, side);
 	return 1;

@@ -149,7 +149,7 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 		if (has_seam(&kept->map, k))
 			n += (size_t)(cells_x + 2) * (cells_y + 2);
 	}
-	struct shadow_drawer *drawer = d->drawer;
+	struct shadow_drawer *const drawer = d->drawer;
 	kept->cells = psr_grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
 	drawer->cells = psr_grow_huge(drawer->cells, &drawer->cells_size, n * sizeof *drawer->cells);
 	if (!kept->cells || !drawer->cells)
@@ -190,12 +190,14 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	struct psr_report report = { 0 };
 	struct plan *plan = &drawer->plan;
 	struct drawing d = { .simd = simd, .bins = bins, .drawer = drawer };
+	int rc;
+
 	seen.camera = kept->fit.camera;
 	seen.n_lights = 0;
 	kept->is_drawn = 0;
 	render_settings_default(&settings, kept->fit.width, kept->fit.height);
 	settings.cull_tests = 0;
-	int rc = plan_make(plan, &seen, &settings, err);
+	rc = plan_make(plan, &seen, &settings, err);
 	if (rc)
 		return rc;
 	plan->is_shadow = 1;

@@ -15,18 +15,18 @@ void warp_target_make(struct warp_target *t, const struct plan *plan, const stru
 	t->direction = psr_direction_tens();
 	t->near_z = plan->near_z;
 	t->perspective = plan->perspective;
-	uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
+	const uint32_t tx = tile % plan->tiles_x, ty = tile / plan->tiles_x;
 	t->stride = own ? WARP_OWN_STRIDE : stack->width + stack->gap;
 	t->x0 = (int32_t)(tx * TILE_WIDTH);
 	t->y0 = (int32_t)(ty * TILE_HEIGHT);
 	t->word = own ? own : psr_zstack_row(stack, (uint32_t)t->y0) + t->x0;
-	int last_x = tx + 1 == plan->tiles_x, last_y = ty + 1 == plan->tiles_y;
+	const int last_x = tx + 1 == plan->tiles_x, last_y = ty + 1 == plan->tiles_y;
 	t->x1 = last_x ? (int32_t)plan->width : t->x0 + TILE_WIDTH;
 	t->y1 = last_y ? (int32_t)plan->height : t->y0 + TILE_HEIGHT;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(stack->levels >> k & 1))
 			continue;
-		struct warp_cells *c = &t->cells[k];
+		struct warp_cells *const c = &t->cells[k];
 		c->z = stack->level[k].z;
 		c->stride = stack->level[k].width;
 		c->x0 = tx ? t->x0 : -(1 << k);
@@ -71,12 +71,13 @@ static uint32_t depth_of(const struct bins *bins, uint32_t entry)
 static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
 {
 	uint32_t low = UINT32_MAX, high = 0, count[KEYS + 1] = { 0 };
+	int shift = 0;
+
 	for (uint32_t e = begin; e < end; e++) {
 		const uint32_t depth = depth_of(bins, e);
 		low = depth < low ? depth : low;
 		high = depth > high ? depth : high;
 	}
-	int shift = 0;
 	while ((high - low) >> shift >= KEYS)
 		shift++;
 	for (uint32_t e = begin; e < end; e++)
