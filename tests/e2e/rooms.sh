@@ -42,7 +42,7 @@ client/cli client/psr.h client/optlist client/suggest
 client/scene
 client/replay
 client/output client/draw.h
-client/bench
+client/bench/
 client
 models/shapes
 models/json models/commands.h
