@@ -72,7 +72,9 @@ PROTO_O        := $(call tree,proto)
 CLIENT_LIB_O   := $(call tree,client/lib)
 PSRD_O         := $(call tree,server)
 PSR_O          := $(filter-out $(CLIENT_LIB_O),$(call tree,client))
-MODEL_O        := $(call tree,models)
+SHAPES_O       := $(call tree,models/shapes)
+MODEL_O        := $(call objs,models/*.c) $(call tree,models/accuracy) $(SHAPES_O)
+STUDY_O        := $(call tree,models/studies) $(SHAPES_O)
 TEST_LIB_O     := $(call tree,tests/unit/lib)
 SIMD_TEST_O    := $(call objs,tests/simd/lib/*.c)
 
@@ -81,7 +83,7 @@ BIN := $(BUILD)/bin
 A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 PROGRAMS := $(BIN)/psrd $(BIN)/psr
 ifneq ($(filter release debug,$(config)),)
-PROGRAMS += $(BIN)/psr-model $(LIB)/psr-image-oiio.so
+PROGRAMS += $(BIN)/psr-model $(BIN)/psr-study $(LIB)/psr-image-oiio.so
 endif
 
 L_PSR    := -lpng -lzstd -lxxhash -lm -ldl
@@ -143,7 +145,9 @@ $(BIN)/psrd: $(PSRD_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
 $(BIN)/psr: $(PSR_O) $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
-$(BIN)/psr-model: $(MODEL_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(BIN)/psr-model: $(MODEL_O)
+$(BIN)/psr-study: $(STUDY_O)
+$(BIN)/psr-model $(BIN)/psr-study: $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD) $(L_PSR)
 $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 	@mkdir -p $(@D)
@@ -180,6 +184,7 @@ EFFECTS    := $(BUILD)/tests/bench/effects
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
+STUDY_PARTS  := $(filter-out $(BUILD)/models/studies/main.c.o,$(STUDY_O))
 L_TEST := -lcmocka $(L_CODEC) -lcjson $(L_PSR)
 # What stands in tests/*/ finds the image module by its run path.
 L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
@@ -196,7 +201,8 @@ $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
 $(call unit_bin,tests/unit/client/wish.c): $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
-$(call unit_bin,$(filter tests/unit/models/% tests/unit/study/%,$(UNIT))): $(MODEL_PARTS)
+$(call unit_bin,$(filter tests/unit/models/%,$(UNIT))): $(MODEL_PARTS)
+$(call unit_bin,$(filter tests/unit/study/%,$(UNIT))): $(STUDY_PARTS)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
 	$(link) $(L_TEST)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
@@ -287,7 +293,7 @@ deps:
 install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
-	install $(BIN)/* $(DESTDIR)$(PREFIX)/bin
+	install $(addprefix $(BIN)/,psrd psr psr-model) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr

@@ -3,7 +3,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 build=${BUILD:-build/release}
-model=$build/bin/psr-model
+program=$build/bin/psr-study
 keep=$build/figures-models
 page=docs/figures.md
 work=$(mktemp -d)
@@ -15,6 +15,6 @@ find "$keep" -name '*.psr' ! -newer "$build/lib/libpsr-build.a" -delete
 [ $# -gt 0 ] || set -- gaps fill threshold highlights shadows backs set edges interfaces thin stills zoom
 for figure; do
 	echo "figure $figure" >&2
-	"$model" figures "$figure" --keep "$keep" --out docs/figures >"$work/table"
+	"$program" "$figure" --keep "$keep" --out docs/figures >"$work/table"
 	docs/put-table.sh $page "figure $figure" "$work/table"
 done

@@ -2,7 +2,7 @@
 # Runs the studies of docs/studies.md (all of them, or those named), puts their tables into it and their plots beside it.
 set -eu
 cd "$(dirname "$0")/.."
-model=${BUILD:-build/release}/bin/psr-model
+program=${BUILD:-build/release}/bin/psr-study
 page=docs/studies.md
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -13,7 +13,7 @@ for study; do
 	echo "study $study" >&2
 	plot=()
 	grep -q "(studies/$study.svg)" $page && plot=(--plot "$work/$study.svg")
-	"$model" study "$study" --keep "$work" "${plot[@]}" >"$work/table"
+	"$program" "$study" --keep "$work" "${plot[@]}" >"$work/table"
 	[ ${#plot[@]} -eq 0 ] || mv "$work/$study.svg" docs/studies/
 	docs/put-table.sh $page "study $study" "$work/table"
 done

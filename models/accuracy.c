@@ -5,9 +5,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "accuracy_passes.h"
-#include "accuracy_report.h"
-#include "accuracy_verdict.h"
+#include "accuracy/passes.h"
+#include "accuracy/report.h"
+#include "accuracy/verdict.h"
 #include "base/netpbm.h"
 #include "base/outfile.h"
 #include "base/json.h"
@@ -171,8 +171,9 @@ static int measure(struct result *result, const char *source, const struct frame
 	if (code == PSR_OK && shadow->shadowed != NULL)
 		code = measure_shadow(&result->shadow, truth, camera, shadow, options.n_threads, err);
 	if (code == PSR_OK)
-		result->verdict = accuracy_judge(result->text, &result->depth, bounds, camera, width, height, depth,
-		                                 frame->spacing, frame->spacing_px);
+		result->verdict = accuracy_judge(result->text, &result->depth, bounds,
+		                                 &(struct accuracy_frame){ camera, width, height, depth, frame->spacing,
+		                                                           frame->spacing_px });
 	psr_truth_destroy(truth);
 	psr_mesh_destroy(mesh);
 	free(depth);

@@ -109,26 +109,32 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 
-static int build(const char *in, const char *out, const struct psr_import_options *import,
-                 struct psr_build_options *options, int is_packed, int quiet, struct psr_error *err)
+/* What options ask for. */
+struct wish {
+	struct psr_import_options import;
+	struct psr_build_options build;
+	int is_packed, quiet;
+};
+
+static int build(const char *in, const char *out, const struct wish *wish, struct psr_error *err)
 {
-	struct progress *progress = options->userdata;
+	struct progress *progress = wish->build.userdata;
 	struct psr_mesh *mesh = NULL;
 	struct psr_model *model = NULL;
 	struct psr_build_report report;
 	int code;
 
 	on_progress("import", 0, 1, progress);
-	code = psr_mesh_import(&mesh, in, import, err);
+	code = psr_mesh_import(&mesh, in, &wish->import, err);
 	if (code == PSR_OK)
-		code = psr_model_build(&model, mesh, options, &report, err);
+		code = psr_model_build(&model, mesh, &wish->build, &report, err);
 	if (code == PSR_OK) {
 		on_progress("write", 0, 1, progress);
-		code = is_packed ? psr_model_write_packed(model, out, err) : psr_model_write(model, out, err);
+		code = wish->is_packed ? psr_model_write_packed(model, out, err) : psr_model_write(model, out, err);
 	}
 	if (progress->has_bar)
 		clear_bar();
-	if (code == PSR_OK && !quiet) {
+	if (code == PSR_OK && !wish->quiet) {
 		warn(mesh);
 		warn_of_sheer(model);
 		summarize(out, mesh, model, &report);
@@ -147,13 +153,12 @@ static int check_progress_fd(int64_t fd, struct psr_error *err)
 
 int cmd_build(int argc, char **argv)
 {
-	struct psr_import_options import;
-	struct psr_build_options options;
+	struct wish wish = { .quiet = 0 };
 	struct progress progress = { .fd = -1 };
 	struct psr_error err;
 	const char *out = NULL;
 	char *made = NULL;
-	int quiet = 0, is_packed = 0, n_operands, code;
+	int n_operands, code;
 	int64_t resolution, n_threads, fd = -1;
 	double tolerance, crease;
 	const struct psr_opt opts[] = {
@@ -163,20 +168,20 @@ int cmd_build(int argc, char **argv)
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
 		  .help = "Use about twice the height of the pictures that you want. Larger pictures show rough edges; twice the figure"
 		          " takes four times the memory.", .min = 8, .max = 8192 },
-		{ .name = "up", .type = PSR_OPT_VEC3, .value = options.up, .arg = "X,Y,Z",
+		{ .name = "up", .type = PSR_OPT_VEC3, .value = wish.build.up, .arg = "X,Y,Z",
 		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
 		          " usual for the format, +z for LAS, STL and survey coordinates, +y for the others." },
 		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
 		  .help = "Edges stay sharp where faces meet at a greater angle, in files that bring no directions of shading"
 		          " (normals). Lower it where edges look rounded; raise it where a smooth surface shows facets.",
 		  .min = 0, .max = 180 },
-		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &is_packed,
+		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &wish.is_packed,
 		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
 		          " memory for all of it." },
 		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
-		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &quiet,
+		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &wish.quiet,
 		  .help = "Prints errors only: no progress, no warnings of what is left out, no summary." },
 		{ .name = "For developers", .type = PSR_OPT_HEADING },
 		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
@@ -195,12 +200,12 @@ int cmd_build(int argc, char **argv)
 		.footer = FORMATS,
 	};
 
-	psr_import_options_default(&import);
-	psr_build_options_default(&options);
-	resolution = options.resolution;
-	tolerance = options.tolerance / RADIANS;
-	crease = import.crease / RADIANS;
-	n_threads = options.n_threads;
+	psr_import_options_default(&wish.import);
+	psr_build_options_default(&wish.build);
+	resolution = wish.build.resolution;
+	tolerance = wish.build.tolerance / RADIANS;
+	crease = wish.import.crease / RADIANS;
+	n_threads = wish.build.n_threads;
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
 		return 0;
@@ -210,19 +215,19 @@ int cmd_build(int argc, char **argv)
 		code = check_progress_fd(fd, &err);
 	if (code != PSR_OK)
 		return psr_cli_fail(PROGRAM, &err);
-	options.resolution = (uint32_t)resolution;
-	options.tolerance = tolerance * RADIANS;
-	options.n_threads = import.n_threads = (int)n_threads;
-	import.crease = crease * RADIANS;
-	options.on_progress = on_progress;
-	options.userdata = &progress;
+	wish.build.resolution = (uint32_t)resolution;
+	wish.build.tolerance = tolerance * RADIANS;
+	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
+	wish.import.crease = crease * RADIANS;
+	wish.build.on_progress = on_progress;
+	wish.build.userdata = &progress;
 	progress.fd = (int)fd;
-	progress.has_bar = !quiet && isatty(STDERR_FILENO);
+	progress.has_bar = !wish.quiet && isatty(STDERR_FILENO);
 	made = out == NULL ? default_output(argv[1]) : NULL;
 	if (out == NULL && made == NULL)
 		code = psr_fail(&err, PSR_ERR_MEMORY, "no memory for a file name");
 	else
-		code = build(argv[1], out != NULL ? out : made, &import, &options, is_packed, quiet, &err);
+		code = build(argv[1], out != NULL ? out : made, &wish, &err);
 	free(made);
 	if (code == PSR_OK)
 		code = outfile_flush_stdout(&err);

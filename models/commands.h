@@ -7,7 +7,5 @@ int cmd_build(int argc, char **argv);
 int cmd_info(int argc, char **argv);
 int cmd_make(int argc, char **argv);
 int cmd_accuracy(int argc, char **argv);
-int cmd_study(int argc, char **argv);
-int cmd_figures(int argc, char **argv);
 
 #endif

@@ -62,14 +62,10 @@ large_models="ficus"
 # what stands directly in the cache folder: a file, or the folder that holds a model's files
 entry_of() {
 	case $1 in
-	dragon) say dragon.ply ;;
+	dragon | b9_training) say "$1.ply" ;;
 	bunny) say bunny.obj ;;
 	engine) say engine.glb ;;
-	clearcoat) say clearcoat ;;
-	armadillo) say armadillo.off ;;
-	elephant) say elephant.off ;;
-	b9_training) say b9_training.ply ;;
-	ficus) say ficus ;;
+	clearcoat | ficus) say "$1" ;;
 	*) say "$1.off" ;;
 	esac
 }
@@ -197,54 +193,21 @@ fetch_clearcoat() {
 	done
 }
 
-# from_cgal FILE OUT: a file of the data that the package holds as one archive
-from_cgal() {
+# fetch_cgal MODEL FOLDER: from the data that the package holds as one archive
+fetch_cgal() {
 	data=$tmp/libcgal-demo/usr/share/doc/libcgal-dev/data.tar.gz
+	case $1 in
+	anchor) file=meshes/anchor_dense.off ;;
+	b9_training) file=points_3/b9_training.ply ;;
+	elephant) file=meshes/refined_elephant.off ;;
+	lionhead) file=meshes/lion-head.off ;;
+	*) file=meshes/$1.off ;;
+	esac
 	get_deb libcgal-demo || return 1
-	gzip -dc "$data" 2>/dev/null | tar -xO -f - "data/$1" >"$2" 2>/dev/null || {
-		reason="Debian's package libcgal-demo does not hold data/$1"
+	gzip -dc "$data" 2>/dev/null | tar -xO -f - "data/$file" >"$2/$(entry_of "$1")" 2>/dev/null || {
+		reason="Debian's package libcgal-demo does not hold data/$file"
 		return 1
 	}
-}
-
-fetch_armadillo() {
-	from_cgal meshes/armadillo.off "$1/armadillo.off"
-}
-
-fetch_elephant() {
-	from_cgal meshes/refined_elephant.off "$1/elephant.off"
-}
-
-fetch_b9_training() {
-	from_cgal points_3/b9_training.ply "$1/b9_training.ply"
-}
-
-fetch_anchor() {
-	from_cgal meshes/anchor_dense.off "$1/anchor.off"
-}
-
-fetch_couplingdown() {
-	from_cgal meshes/couplingdown.off "$1/couplingdown.off"
-}
-
-fetch_fandisk() {
-	from_cgal meshes/fandisk.off "$1/fandisk.off"
-}
-
-fetch_helmet() {
-	from_cgal meshes/helmet.off "$1/helmet.off"
-}
-
-fetch_lionhead() {
-	from_cgal meshes/lion-head.off "$1/lionhead.off"
-}
-
-fetch_nefertiti() {
-	from_cgal meshes/nefertiti.off "$1/nefertiti.off"
-}
-
-fetch_rotor() {
-	from_cgal meshes/rotor.off "$1/rotor.off"
 }
 
 # The furniture is in a zip file within the package.
@@ -273,6 +236,14 @@ from_deb() {
 		reason="Debian's package $1 does not hold $2"
 		return 1
 	}
+}
+
+# fetch MODEL FOLDER
+fetch() {
+	case $1 in
+	dragon | bunny | engine | clearcoat | ficus) "fetch_$1" "$2" ;;
+	*) fetch_cgal "$1" "$2" ;;
+	esac
 }
 
 # publish MODEL: from the temporary folder to its place by renaming; both are in one file system
@@ -329,7 +300,7 @@ for model in $models; do
 		say "$model: present at $cache/$(main_file_of "$model")"
 	else
 		reason="the cache folder cannot be written"
-		if ! "fetch_$model" "$tmp/new"; then
+		if ! fetch "$model" "$tmp/new"; then
 			complain "$model: skipped: $reason"
 			[ $require = no ] || status=1
 			continue

@@ -13,22 +13,15 @@ static const struct command {
 	{ "info", "check a .psr file and say what is in it", cmd_info },
 	{ "make", "generate one of fourteen models to try things with, as glTF", cmd_make },
 	{ "accuracy", "say whether a picture is right, beside the ray-traced mesh", cmd_accuracy },
-	/* for developers: */
-	{ "study", "repeat a study of Grossman's thesis: tables and plots", cmd_study },
-	{ "figures", "draw the thesis's figures, beside the ray-traced truth", cmd_figures },
 };
 
-#define FIRST_FOR_DEVELOPERS 4
 #define N_COMMANDS (sizeof commands / sizeof commands[0])
 
 static void print_usage(FILE *to)
 {
 	fputs("usage: psr-model COMMAND [arguments]\n\nMakes, checks and measures the models that psrd draws.\n\n", to);
-	for (size_t i = 0; i < N_COMMANDS; i++) {
-		if (i == FIRST_FOR_DEVELOPERS)
-			fputs("\nfor developers:\n", to);
+	for (size_t i = 0; i < N_COMMANDS; i++)
 		fprintf(to, "  %-10s %s\n", commands[i].name, commands[i].summary);
-	}
 	fputs("\npsr-model COMMAND --help says more; psr-model --version prints the version.\n"
 	      "Exit codes: 0 ok, 1 a check failed, 2 usage, 3 file or system, 4 bad data, 5 over a limit, 7 internal.\n",
 	      to);

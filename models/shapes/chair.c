@@ -152,8 +152,7 @@ static void back(struct shape *shape)
 
 void make_chair(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, WOOD, 128, image_wood(128, 0x6e4022, 0xb57b45, 11));
 	seat(shape);
 	legs(shape);

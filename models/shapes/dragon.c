@@ -78,6 +78,7 @@ static double relief(uint32_t row, uint32_t col)
 static void skin(struct shape *shape)
 {
 	static struct shape_vertex grid[ROWS * COLS];
+	static const struct sweep_grid all = { grid, ROWS, COLS, 1 };
 	double p[3], along[3], out[3], side[3], c, s;
 
 	for (uint32_t row = 0; row < ROWS; row++) {
@@ -96,7 +97,7 @@ static void skin(struct shape *shape)
 	for (uint32_t col = 0; col < SCALES_AROUND; col++) {
 		shape->current = col >= BELLY_FROM && col < BELLY_TO ? BELLY : col < 2 || col >= SCALES_AROUND - 2
 			? SCALE_DARK : SCALE;
-		sweep_band(shape, grid, ROWS, COLS, col * STEPS, (col + 1) * STEPS, 1);
+		sweep_band(shape, &all, col * STEPS, (col + 1) * STEPS);
 	}
 }
 
@@ -152,7 +153,7 @@ static void head(struct shape *shape)
 			radius[i] = 0.085 * b;
 		}
 		sweep_tube(shape, (const double (*)[3])path, radius, 25, 24);
-		sweep_bend(shape, whisker[0], whisker[1], whisker[2], 0.012, 32, 10);
+		sweep_bend(shape, whisker, 0.012, 32, 10);
 		for (int i = 0; i < 5; i++) {
 			const double root[3] = { (0.2 - 0.022 * i * i * 0.4) * x, -0.02 + 0.012 * i, -0.36 - 0.1 * i };
 			const double tip[3] = { root[0] * 0.95, root[1] - 0.16 + 0.015 * i, root[2] - 0.02 };
@@ -169,8 +170,7 @@ static void head(struct shape *shape)
 
 void make_dragon(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	skin(shape);
 	crest(shape);
 	head(shape);

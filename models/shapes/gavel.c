@@ -101,8 +101,7 @@ static void handle(struct shape *shape)
 
 void make_gavel(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, WALNUT, 128, image_wood(128, 0x3c2012, 0x8a552f, 5));
 	shape_image(shape, BLOCK, 128, image_wood(128, 0x5a3219, 0xa86f3e, 6));
 	block(shape);

@@ -56,7 +56,7 @@ static int sorted_init(struct glb_sorted *sorted, const struct shape *shape)
 	return PSR_OK;
 }
 
-/* Places are there only if there are pictures. */
+/* Only shapes with pictures have places. */
 static void make_layout(struct glb_layout *layout, const struct shape *shape, const struct glb_sorted *sorted)
 {
 	/* shape.c keeps counts below 2^26, so all of this fits 32 bits */
@@ -148,7 +148,7 @@ int glb_encode(uint8_t **bytes, size_t *n_bytes, const struct shape *shape, cons
 		*bytes = file;
 		*n_bytes = (size_t)28 + padded + layout.bytes;
 	} else {
-		psr_fail(err, code, "out of memory while '%s' was written as glTF", name);
+		psr_fail(err, code, "no memory to write '%s' as glTF", name);
 	}
 	cJSON_free(json);
 	sorted_fini(&sorted);

@@ -1,4 +1,4 @@
-/* What the parts of the GLB writer share. */
+/* Shared by the parts of the GLB writer. */
 #ifndef MODELS_GLB_PARTS_H
 #define MODELS_GLB_PARTS_H
 

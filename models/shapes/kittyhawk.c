@@ -55,14 +55,13 @@ static void wing(struct shape *shape, const struct wing *w, uint32_t along)
 	sweep_surface(shape, wing_at, w, along, 64, 1);
 }
 
-static void rod(struct shape *shape, uint32_t material, double radius, double ax, double ay, double az, double bx,
-                double by, double bz)
+/* ends: x, y, z of both. */
+static void rod_between(struct shape *shape, uint32_t material, double radius, const double ends[6])
 {
-	const double a[3] = { ax, ay, az }, b[3] = { bx, by, bz };
-
 	shape->current = material;
-	surface_rod(shape, a, radius, b, radius, material == WIRES ? 8 : 16);
+	surface_rod(shape, ends, radius, ends + 3, radius, material == WIRES ? 8 : 16);
 }
+#define rod(shape, material, radius, ...) rod_between(shape, material, radius, (const double[6]){ __VA_ARGS__ })
 
 /* Struts in two rows; wires cross each cell in front and behind, and each pair of struts from front to back. */
 static void cell(struct shape *shape)
@@ -116,10 +115,10 @@ static void tail_and_canard(struct shape *shape)
 static void skids(struct shape *shape)
 {
 	for (int side = -1; side <= 1; side += 2) {
-		const double a[3] = { -1.6, 0.03, 0.7 * side }, b[3] = { 2.5, 0.03, 0.7 * side },
-			c[3] = { 3.3, LOW_Y + 0.6, 0.7 * side };
+		const double runner[3][3] = { { -1.6, 0.03, 0.7 * side }, { 2.5, 0.03, 0.7 * side },
+			{ 3.3, LOW_Y + 0.6, 0.7 * side } };
 		shape->current = SPRUCE;
-		sweep_bend(shape, a, b, c, 0.03, 48, 16);
+		sweep_bend(shape, runner, 0.03, 48, 16);
 		rod(shape, SPRUCE, 0.018, -0.55, 0.04, 0.7 * side, -0.55, LOW_Y, 0.7 * side);
 		rod(shape, SPRUCE, 0.018, 0.8, 0.09, 0.7 * side, 0.8, LOW_Y, 0.7 * side);
 		rod(shape, WIRES, WIRE, -0.55, 0.04, 0.7 * side, 0.8, LOW_Y, 0.7 * side);
@@ -145,8 +144,6 @@ static void blade_at(double u, double v, double p[3], const void *context)
 
 static void propellers(struct shape *shape)
 {
-	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
-
 	for (int side = -1; side <= 1; side += 2) {
 		double y = LOW_Y + 0.95, z = 1.75 * side, c, s;
 		const double hub[3] = { -1.15, y, z };
@@ -161,7 +158,7 @@ static void propellers(struct shape *shape)
 		uint32_t first = shape->n_vertices;
 		shape->current = SPRUCE;
 		sweep_ball(shape, (const double[3]){ 0, 0, 0 }, (const double[3]){ 0.07, 0.09, 0.09 }, 16, 24);
-		shape_move(shape, first, straight, hub);
+		shape_shift(shape, first, hub);
 		rod(shape, WIRES, 0.02, -1.15, y, z, -0.3, y, z);
 		for (int leg = -1; leg <= 1; leg += 2) {
 			for (int way = -1; way <= 1; way += 2)
@@ -209,8 +206,7 @@ void make_kittyhawk(struct shape *shape)
 		{ 0.1, LOW_Y + GAP, CHORD, SPAN / 2, 0.025, 0.09, DROOP },
 	};
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	wing(shape, &wings[0], 320);
 	wing(shape, &wings[1], 320);
 	cell(shape);

@@ -158,8 +158,7 @@ void make_pencil(struct shape *shape)
 	static const double lie[3][3] = { { 0, 1, 0 }, { 1, 0, 0 }, { 0, 0, -1 } }, lift[3] = { 0, 0.39 + 0.022, 0 };
 	struct outline outline[AROUND];
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	make_outline(outline);
 	sharpened_body(shape, outline);
 	ferrule_and_eraser(shape);

@@ -70,8 +70,12 @@ static void place_twig(struct shape *shape, uint32_t part, const double at[3], c
 	shape_place(shape, part, turn, at);
 }
 
-static void branch(struct shape *shape, double height, double length, double turn, const uint32_t twig[2],
-                   uint32_t cone,
+/* What branches carry. */
+struct parts {
+	uint32_t twig[2], cone;
+};
+
+static void branch(struct shape *shape, double height, double length, double turn, const struct parts *parts,
                    uint64_t *random)
 {
 	double c, s, path[13][3], radius[13], rise = 0.1 + 0.3 * height / HEIGHT;
@@ -94,23 +98,20 @@ static void branch(struct shape *shape, double height, double length, double tur
 		for (int j = 0; j < 3; j++)
 			at[j] = path[k][j] + (path[k + 1][j] - path[k][j]) * rest;
 		v3d_set(out, c - spread * s, random_in(random, -0.1, 0.25), -s - spread * c);
-		place_twig(shape, twig[t > 0.8], at, out, size);
-		if (i == n / 2 && random_next(random) % 3 == 0) {
-			static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
-			shape_place(shape, cone, straight, at);
-		}
+		place_twig(shape, parts->twig[t > 0.8], at, out, size);
+		if (i == n / 2 && random_next(random) % 3 == 0)
+			shape_place(shape, parts->cone, shape_straight, at);
 	}
 }
 
 void make_pinetree(struct shape *shape)
 {
 	static const double mound[3] = { 0, 0, 0 }, mound_half[3] = { 0.55, 0.12, 0.55 };
-	uint32_t twig[2], cone;
+	struct parts parts;
 	uint64_t random = 77;
 	double path[25][3], radius[25];
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape->current = EARTH;
 	sweep_ball(shape, mound, mound_half, 20, 48);
 	for (int i = 0; i <= 24; i++) {
@@ -120,9 +121,9 @@ void make_pinetree(struct shape *shape)
 	}
 	shape->current = BARK;
 	sweep_tube(shape, (const double (*)[3])path, radius, 25, 24);
-	twig[0] = twig_part(shape, 1, NEEDLES_OLD);
-	twig[1] = twig_part(shape, 2, NEEDLES_NEW);
-	cone = cone_part(shape);
+	parts.twig[0] = twig_part(shape, 1, NEEDLES_OLD);
+	parts.twig[1] = twig_part(shape, 2, NEEDLES_NEW);
+	parts.cone = cone_part(shape);
 	for (int i = 0; i < WHORLS; i++) {
 		double t = (double)i / WHORLS, height = 0.75 + (HEIGHT - 0.95) * t,
 			length = 1.85 * (1 - t) * (1 - 0.15 * t) + 0.06;
@@ -130,10 +131,10 @@ void make_pinetree(struct shape *shape)
 		double start = random_in(&random, 0, 1);
 		for (int j = 0; j < n; j++) {
 			double reach = length * random_in(&random, 0.85, 1.1), off = random_in(&random, -0.03, 0.03);
-			branch(shape, height + random_in(&random, -0.06, 0.06), reach, start + (double)j / n + off, twig, cone,
+			branch(shape, height + random_in(&random, -0.06, 0.06), reach, start + (double)j / n + off, &parts,
 			       &random);
 		}
 	}
 	const double top[3] = { -0.02, HEIGHT - 0.25, 0 }, up[3] = { 0, 1, 0 };
-	place_twig(shape, twig[1], top, up, 0.3);
+	place_twig(shape, parts.twig[1], top, up, 0.3);
 }

@@ -131,13 +131,13 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 		place(shape, leaf[kind], path[at], out, random_in(random, 0.3, 0.46) * (1 - 0.05 * i));
 	}
 	if (number < BLOSSOMS) {
-		const double top[3] = { path[20][0], path[20][1] + 0.24, path[20][2] };
-		const double bent[3] = { path[20][0], path[20][1] + 0.12, path[20][2] };
+		const double x = path[20][0], y = path[20][1], z = path[20][2];
+		const double stalk[3][3] = { { x, y, z }, { x, y + 0.12, z }, { x, y + 0.24, z } };
 		const double tilt[3] = { 0.95, random_in(random, -0.3, 0.3), 0.1 };
 		double out[3];
 		v3d_normalize(out, tilt);
-		sweep_bend(shape, path[20], bent, top, 0.006, 12, 8);
-		place(shape, blossom, top, out, 0.13);
+		sweep_bend(shape, stalk, 0.006, 12, 8);
+		place(shape, blossom, stalk[2], out, 0.13);
 	}
 }
 
@@ -146,8 +146,7 @@ void make_plant(struct shape *shape)
 	uint32_t leaf[3], blossom;
 	uint64_t random = 1903;
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, LEAF, 128, image_leaf(128, 0x3f7d33, 0xa9c46c));
 	pot(shape);
 	leaf_parts(shape, leaf);

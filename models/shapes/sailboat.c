@@ -71,6 +71,7 @@ static void deck_at(uint32_t j, double v, double p[3])
 static void hull(struct shape *shape)
 {
 	static struct shape_vertex grid[(ALONG + 1) * (ACROSS + 1)], deck[(ALONG + 1) * (ACROSS + 1)];
+	static const struct sweep_grid all = { grid, ALONG + 1, ACROSS + 1, 0 };
 	struct shape_vertex transom[2 * (ACROSS + 1)], stem[2 * (ACROSS + 1)];
 	static const struct {
 		uint32_t last, material;
@@ -102,7 +103,7 @@ static void hull(struct shape *shape)
 	sweep_normals(deck, ALONG + 1, ACROSS + 1, 0, 0);
 	for (uint32_t band = 0; band < sizeof bands / sizeof bands[0]; band++) {
 		shape->current = bands[band].material;
-		sweep_band(shape, grid, ALONG + 1, ACROSS + 1, first, bands[band].last, 0);
+		sweep_band(shape, &all, first, bands[band].last);
 		first = bands[band].last;
 	}
 	shape->current = DECK;
@@ -129,7 +130,7 @@ static void fittings(struct shape *shape)
 	shape->current = WOOD;
 	sweep_block(shape, rudder, rudder_half, 0.03);
 	sweep_block(shape, bench, bench_half, 0.03);
-	sweep_bend(shape, tiller[0], tiller[1], tiller[2], 0.03, 16, 16);
+	sweep_bend(shape, tiller, 0.03, 16, 16);
 	shape->current = GLASS;
 	for (int i = 0; i < 6; i++) {
 		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.045 };
@@ -218,8 +219,7 @@ static void sails(struct shape *shape)
 
 void make_sailboat(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, DECK, 128, image_planks(128, 0xc79a63, 0x3c2a1c, 4));
 	hull(shape);
 	fittings(shape);

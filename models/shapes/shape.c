@@ -5,6 +5,8 @@
 #include <string.h>
 #include "base/vec.h"
 
+const double shape_straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
+
 #define MAX_ROOM (1u << 26) /* elements; no generator comes near it */
 
 void shape_init(struct shape *shape)
@@ -31,7 +33,7 @@ void shape_fini(struct shape *shape)
 int shape_check(const struct shape *shape, struct psr_error *err)
 {
 	if (shape->failed)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while the mesh was made");
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the mesh");
 	return PSR_OK;
 }
 
@@ -61,6 +63,12 @@ uint32_t shape_material(struct shape *shape, const struct shape_material *materi
 	shape->material[shape->n_materials] = *material;
 	shape->current = shape->n_materials;
 	return shape->n_materials++;
+}
+
+void shape_materials(struct shape *shape, const struct shape_material *material, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++)
+		shape_material(shape, &material[i]);
 }
 
 void shape_image(struct shape *shape, uint32_t material, uint32_t size, uint8_t *rgb)
@@ -161,6 +169,14 @@ void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c)
 	shape->n_triangles++;
 }
 
+struct shape_vertex *shape_grid_alloc(struct shape *shape, uint32_t rows, uint32_t cols)
+{
+	struct shape_vertex *grid = calloc((size_t)rows * cols, sizeof *grid);
+
+	shape->failed |= grid == NULL;
+	return grid;
+}
+
 void shape_grid(struct shape *shape, const struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows,
                 int wrap_cols)
 {
@@ -219,6 +235,11 @@ void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], co
 	}
 }
 
+void shape_shift(struct shape *shape, uint32_t first, const double move[3])
+{
+	shape_move(shape, first, shape_straight, move);
+}
+
 void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3])
 {
 	double p[3], n[3], cofactor[3][3];
@@ -243,48 +264,4 @@ void shape_map(struct shape *shape, uint32_t first, const double u[4], const dou
 		shape->uv[i][0] = (float)(v3d_dot(u, p) + u[3]);
 		shape->uv[i][1] = (float)(v3d_dot(v, p) + v[3]);
 	}
-}
-
-/* number[v] of those vertices that `stamp` marks with `mark` is their index in flat. */
-static void flatten_part(struct shape *flat, const struct shape *shape, uint32_t part, uint32_t mark, uint32_t *stamp,
-                         uint32_t *number)
-{
-	uint32_t corner[3];
-
-	for (uint32_t t = 0; t < shape->n_triangles; t++) {
-		if (shape->triangle_part[t] != part)
-			continue;
-		for (int k = 0; k < 3; k++) {
-			uint32_t v = shape->triangle[t][k];
-			if (stamp[v] != mark) {
-				struct shape_vertex vertex;
-				get_vertex(shape, v, vertex.p, vertex.n);
-				stamp[v] = mark;
-				number[v] = shape_vertex(flat, &vertex);
-			}
-			corner[k] = number[v];
-		}
-		flat->current = shape->triangle_material[t];
-		shape_triangle(flat, corner[0], corner[1], corner[2]);
-	}
-}
-
-void shape_flatten(struct shape *flat, const struct shape *shape)
-{
-	uint32_t *stamp = calloc((size_t)shape->n_vertices + 1, sizeof *stamp);
-	uint32_t *number = malloc(((size_t)shape->n_vertices + 1) * sizeof *number);
-
-	flat->failed |= shape->failed || stamp == NULL || number == NULL;
-	for (uint32_t m = 0; m < shape->n_materials; m++)
-		shape_material(flat, &shape->material[m]);
-	if (!flat->failed)
-		flatten_part(flat, shape, 0, 1, stamp, number);
-	for (uint32_t i = 0; i < shape->n_instances && !flat->failed; i++) {
-		const struct shape_instance *instance = &shape->instance[i];
-		uint32_t first = flat->n_vertices;
-		flatten_part(flat, shape, instance->part, i + 2, stamp, number);
-		shape_transform(flat, first, instance->m, instance->move);
-	}
-	free(stamp);
-	free(number);
 }

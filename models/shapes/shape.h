@@ -64,6 +64,8 @@ int shape_check(const struct shape *shape, struct psr_error *err);
 /* Returns the index of the new material and makes it current. */
 uint32_t shape_material(struct shape *shape, const struct shape_material *material);
 
+void shape_materials(struct shape *shape, const struct shape_material *material, uint32_t n);
+
 /* The material's picture, which the shape owns from now on (NULL: none could be had). At most SHAPE_MAX_IMAGES. */
 void shape_image(struct shape *shape, uint32_t material, uint32_t size, uint8_t *rgb);
 
@@ -73,14 +75,14 @@ uint32_t shape_part(struct shape *shape);
 /* Draws `part` once more, under m x + move; det m > 0. The numbers are rounded to multiples of 10^-6. */
 void shape_place(struct shape *shape, uint32_t part, const double m[3][3], const double move[3]);
 
-/* Adds to `flat`, which is initialised and empty, the whole shape in one part, without pictures. */
-void shape_flatten(struct shape *flat, const struct shape *shape);
-
 /* Returns the index of the new vertex. */
 uint32_t shape_vertex(struct shape *shape, const struct shape_vertex *vertex);
 
 /* Triangles with two corners at the same place (the poles of a surface) are left out. */
 void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c);
+
+/* Zeroed vertices of a grid, to be freed; NULL, and `failed` is set, without memory. */
+struct shape_vertex *shape_grid_alloc(struct shape *shape, uint32_t rows, uint32_t cols);
 
 /* A grid of n_rows x n_cols vertices, row after row. Outside is where (next column - this) x (next row - this) points.
  * `wrap_rows`, `wrap_cols`: the last one is joined to the first. */
@@ -93,7 +95,10 @@ void shape_fan(struct shape *shape, const double center[3], const double normal[
 /* Turns (rows of an orthonormal matrix of determinant 1) and then moves the vertices from `first` on. */
 void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], const double move[3]);
 
-/* The same for any m with det m > 0; the normals become those of the moved surface. */
+void shape_shift(struct shape *shape, uint32_t first, const double move[3]); /* without a turn */
+extern const double shape_straight[3][3];                                    /* no turn */
+
+/* The same as shape_move for any m with det m > 0; the normals become those of the moved surface. */
 void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3]);
 
 /* Where the vertices from `first` on lie in their picture, v downwards: u . (x, y, z, 1) and v . (x, y, z, 1). */

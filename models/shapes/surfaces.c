@@ -88,19 +88,10 @@ static void lathe_piece(struct shape *shape, const struct surface_profile *piece
 	shape_grid(shape, grid, piece->steps + 1, n, 0, 1);
 }
 
-static struct shape_vertex *new_grid(struct shape *shape, uint32_t rows, uint32_t cols)
-{
-	struct shape_vertex *grid = malloc((size_t)rows * cols * sizeof *grid);
-
-	if (grid == NULL)
-		shape->failed = 1;
-	return grid;
-}
-
 void surface_lathe(struct shape *shape, const struct surface_profile *pieces, uint32_t n_pieces, uint32_t n)
 {
 	for (uint32_t i = 0; i < n_pieces; i++) {
-		struct shape_vertex *grid = new_grid(shape, pieces[i].steps + 1, n);
+		struct shape_vertex *grid = shape_grid_alloc(shape, pieces[i].steps + 1, n);
 		if (grid == NULL)
 			return;
 		lathe_piece(shape, &pieces[i], n, grid);
@@ -127,7 +118,7 @@ void surface_rod(struct shape *shape, const double a[3], double ra, const double
 
 void surface_torus(struct shape *shape, double major, double minor, double y, uint32_t n_major, uint32_t n_minor)
 {
-	struct shape_vertex *grid = new_grid(shape, n_minor, n_major), *v = grid;
+	struct shape_vertex *grid = shape_grid_alloc(shape, n_minor, n_major), *v = grid;
 	double c, s, minor_c, minor_s;
 
 	if (grid == NULL)
@@ -180,7 +171,7 @@ static void patch_side(const double control[4][4][3], int along_rows, uint32_t i
 
 void surface_patch(struct shape *shape, const double control[4][4][3], uint32_t rows, uint32_t cols)
 {
-	struct shape_vertex *grid = new_grid(shape, rows + 1, cols + 1), *v = grid;
+	struct shape_vertex *grid = shape_grid_alloc(shape, rows + 1, cols + 1), *v = grid;
 	double at[4][3], across[4][3], by_row[3], by_col[3], mixed[3];
 
 	if (grid == NULL)

@@ -40,15 +40,6 @@ void sweep_along(struct shape *shape, uint32_t first, const double a[3], const d
 	shape_move(shape, first, turn, a);
 }
 
-static struct shape_vertex *new_grid(struct shape *shape, uint32_t rows, uint32_t cols)
-{
-	struct shape_vertex *grid = calloc((size_t)rows * cols, sizeof *grid);
-
-	if (grid == NULL)
-		shape->failed = 1;
-	return grid;
-}
-
 static int is_pole(const struct shape_vertex *row, uint32_t n_cols)
 {
 	for (uint32_t j = 1; j < n_cols; j++) {
@@ -100,19 +91,18 @@ void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, 
 	}
 }
 
-void sweep_band(struct shape *shape, const struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, uint32_t first,
-                uint32_t last, int wrap_rows)
+void sweep_band(struct shape *shape, const struct sweep_grid *grid, uint32_t first, uint32_t last)
 {
 	uint32_t n = last - first + 1;
-	struct shape_vertex *band = new_grid(shape, n_rows, n);
+	struct shape_vertex *band = shape_grid_alloc(shape, grid->n_rows, n);
 
 	if (band == NULL)
 		return;
-	for (uint32_t i = 0; i < n_rows; i++) {
+	for (uint32_t i = 0; i < grid->n_rows; i++) {
 		for (uint32_t j = 0; j < n; j++)
-			band[(size_t)i * n + j] = grid[(size_t)i * n_cols + (first + j) % n_cols];
+			band[(size_t)i * n + j] = grid->vertex[(size_t)i * grid->n_cols + (first + j) % grid->n_cols];
 	}
-	shape_grid(shape, band, n_rows, n, wrap_rows, 0);
+	shape_grid(shape, band, grid->n_rows, n, grid->wrap_rows, 0);
 	free(band);
 }
 
@@ -120,7 +110,7 @@ void sweep_surface(struct shape *shape, sweep_function *at, const void *context,
                    int wrap_u)
 {
 	uint32_t rows = quads_v + 1, cols = wrap_u ? quads_u : quads_u + 1, first = shape->n_vertices;
-	struct shape_vertex *grid = new_grid(shape, rows, cols);
+	struct shape_vertex *grid = shape_grid_alloc(shape, rows, cols);
 
 	if (grid == NULL)
 		return;
@@ -135,67 +125,75 @@ void sweep_surface(struct shape *shape, sweep_function *at, const void *context,
 	free(grid);
 }
 
-/* A ring of the tube; counter-clockwise around the tangent. */
-static void put_ring(struct shape_vertex *row, uint32_t sides, const double center[3], const double tangent[3],
-                     const double x[3], double radius)
+/* A ring of the tube; x is at right angles to the tangent. */
+struct ring {
+	uint32_t sides;
+	double center[3], tangent[3], x[3], radius;
+};
+
+/* Counter-clockwise around the tangent. */
+static void put_ring(struct shape_vertex *row, const struct ring *ring)
 {
 	double y[3], c, s;
 
-	v3d_cross(y, tangent, x);
-	for (uint32_t j = 0; j < sides; j++) {
-		surface_turn(j, sides, &c, &s);
-		v3d_add_scaled(row[j].p, center, radius * c, x);
-		v3d_add_scaled(row[j].p, row[j].p, radius * s, y);
+	v3d_cross(y, ring->tangent, ring->x);
+	for (uint32_t j = 0; j < ring->sides; j++) {
+		surface_turn(j, ring->sides, &c, &s);
+		v3d_add_scaled(row[j].p, ring->center, ring->radius * c, ring->x);
+		v3d_add_scaled(row[j].p, row[j].p, ring->radius * s, y);
 		/* a pole's places are the same to the last bit */
-		if (radius == 0)
-			v3d_set(row[j].p, center[0], center[1], center[2]);
+		if (ring->radius == 0)
+			v3d_set(row[j].p, ring->center[0], ring->center[1], ring->center[2]);
 	}
 }
 
-/* The rows of a round end beyond `center`, the outermost, a point, first (sign -1) or last. */
-static void put_cap(struct shape_vertex *rows, uint32_t sides, const double center[3], const double tangent[3],
-                    const double x[3], double radius, int sign)
+/* The rows of a round end beyond the ring, the outermost, a point, first (sign -1) or last. */
+static void put_cap(struct shape_vertex *rows, const struct ring *ring, int sign)
 {
-	double at[3], c, s;
+	struct ring row = *ring;
+	double c, s;
 
 	for (uint32_t k = 0; k < CAP; k++) {
 		surface_turn(sign < 0 ? k : k + 1, 4 * CAP, &c, &s);
-		v3d_add_scaled(at, center, radius * (sign < 0 ? -c : s), tangent);
-		put_ring(rows + (size_t)k * sides, sides, at, tangent, x, radius * (sign < 0 ? s : c));
+		v3d_add_scaled(row.center, ring->center, ring->radius * (sign < 0 ? -c : s), ring->tangent);
+		row.radius = ring->radius * (sign < 0 ? s : c);
+		put_ring(rows + (size_t)k * ring->sides, &row);
 	}
 }
 
 void sweep_tube(struct shape *shape, const double (*path)[3], const double *radius, uint32_t n, uint32_t sides)
 {
 	uint32_t low = radius[0] > 0 ? CAP : 0, high = radius[n - 1] > 0 ? CAP : 0;
-	struct shape_vertex *grid = new_grid(shape, low + n + high, sides);
-	double x[3] = { 0, 0, 0 }, tangent[3], turn[3][3];
+	struct shape_vertex *grid = shape_grid_alloc(shape, low + n + high, sides);
+	struct ring ring = { .sides = sides };
+	double turn[3][3];
 
 	if (grid == NULL)
 		return;
 	for (uint32_t i = 0; i < n; i++) {
-		v3d_sub(tangent, path[i + 1 < n ? i + 1 : i], path[i > 0 ? i - 1 : i]);
-		v3d_normalize(tangent, tangent);
+		v3d_sub(ring.tangent, path[i + 1 < n ? i + 1 : i], path[i > 0 ? i - 1 : i]);
+		v3d_normalize(ring.tangent, ring.tangent);
 		if (i == 0) {
-			sweep_frame(tangent, turn);
-			v3d_set(x, turn[0][0], turn[1][0], turn[2][0]);
+			sweep_frame(ring.tangent, turn);
+			v3d_set(ring.x, turn[0][0], turn[1][0], turn[2][0]);
 		}
 		/* carried along the path without a twist */
-		v3d_add_scaled(x, x, -v3d_dot(x, tangent), tangent);
-		v3d_normalize(x, x);
-		put_ring(grid + (size_t)(low + i) * sides, sides, path[i], tangent, x, radius[i]);
+		v3d_add_scaled(ring.x, ring.x, -v3d_dot(ring.x, ring.tangent), ring.tangent);
+		v3d_normalize(ring.x, ring.x);
+		v3d_set(ring.center, path[i][0], path[i][1], path[i][2]);
+		ring.radius = radius[i];
+		put_ring(grid + (size_t)(low + i) * sides, &ring);
 		if (i == 0 && low)
-			put_cap(grid, sides, path[i], tangent, x, radius[i], -1);
+			put_cap(grid, &ring, -1);
 		if (i == n - 1 && high)
-			put_cap(grid + (size_t)(low + n) * sides, sides, path[i], tangent, x, radius[i], 1);
+			put_cap(grid + (size_t)(low + n) * sides, &ring, 1);
 	}
 	sweep_normals(grid, low + n + high, sides, 0, 1);
 	shape_grid(shape, grid, low + n + high, sides, 0, 1);
 	free(grid);
 }
 
-void sweep_bend(struct shape *shape, const double a[3], const double b[3], const double c[3], double radius, uint32_t n,
-                uint32_t sides)
+void sweep_bend(struct shape *shape, const double curve[3][3], double radius, uint32_t n, uint32_t sides)
 {
 	double path[64][3], radii[64];
 
@@ -203,7 +201,7 @@ void sweep_bend(struct shape *shape, const double a[3], const double b[3], const
 	for (uint32_t i = 0; i < n; i++) {
 		double t = (double)i / (n - 1), s = 1 - t;
 		for (int k = 0; k < 3; k++)
-			path[i][k] = s * s * a[k] + 2 * s * t * b[k] + t * t * c[k];
+			path[i][k] = s * s * curve[0][k] + 2 * s * t * curve[1][k] + t * t * curve[2][k];
 		radii[i] = radius;
 	}
 	sweep_tube(shape, (const double (*)[3])path, radii, n, sides);
@@ -244,7 +242,7 @@ void sweep_block(struct shape *shape, const double center[3], const double half[
 void sweep_ball(struct shape *shape, const double center[3], const double half[3], uint32_t rows, uint32_t cols)
 {
 	uint32_t first = shape->n_vertices;
-	struct shape_vertex *grid = new_grid(shape, rows + 1, cols);
+	struct shape_vertex *grid = shape_grid_alloc(shape, rows + 1, cols);
 	const double m[3][3] = { { half[0], 0, 0 }, { 0, half[1], 0 }, { 0, 0, half[2] } };
 	double c, s, across, up;
 

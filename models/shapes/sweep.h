@@ -18,9 +18,14 @@ void sweep_along(struct shape *shape, uint32_t first, const double a[3], const d
  * that is one point has one normal, unless it is a sharp tip. */
 void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows, int wrap_cols);
 
-/* The columns first..last of a grid, a piece of it; last may be n_cols, which is column 0. */
-void sweep_band(struct shape *shape, const struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, uint32_t first,
-                uint32_t last, int wrap_rows);
+struct sweep_grid {
+	const struct shape_vertex *vertex; /* row after row */
+	uint32_t n_rows, n_cols;
+	int wrap_rows;
+};
+
+/* Adds the columns first..last of a grid, a piece of it; last may be n_cols, which is column 0. */
+void sweep_band(struct shape *shape, const struct sweep_grid *grid, uint32_t first, uint32_t last);
 
 /* The place at u (along a row) and v (from the first to the last row), both in 0..1. */
 typedef void sweep_function(double u, double v, double p[3], const void *context);
@@ -33,9 +38,8 @@ void sweep_surface(struct shape *shape, sweep_function *at, const void *context,
 /* A tube of `sides` sides around an open path of n >= 2 places with round ends; a radius of 0 at an end is a point. */
 void sweep_tube(struct shape *shape, const double (*path)[3], const double *radius, uint32_t n, uint32_t sides);
 
-/* One of constant radius around the quadratic Bezier curve a, b, c. */
-void sweep_bend(struct shape *shape, const double a[3], const double b[3], const double c[3], double radius, uint32_t n,
-                uint32_t sides);
+/* One of constant radius around a quadratic Bezier curve. */
+void sweep_bend(struct shape *shape, const double curve[3][3], double radius, uint32_t n, uint32_t sides);
 
 /* A box with rounded edges: |x| <= half[0] and so on around `center`, 0 < radius < half. */
 void sweep_block(struct shape *shape, const double center[3], const double half[3], double radius);

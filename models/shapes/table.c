@@ -45,7 +45,6 @@ static void frame(struct shape *shape)
 
 static void leg(struct shape *shape, double x, double z)
 {
-	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
 	const struct surface_profile pieces[] = {
 		surface_line(0, 0, 0.018, 0, 1, LEG),
 		{ { { 0.018, 0 }, { 0.03, 0.02 }, { 0.03, 0.05 }, { 0.02, 0.07 } }, 0, 1, 10, LEG },
@@ -58,7 +57,7 @@ static void leg(struct shape *shape, double x, double z)
 	uint32_t first = shape->n_vertices;
 
 	surface_lathe(shape, pieces, sizeof pieces / sizeof pieces[0], 48);
-	shape_move(shape, first, straight, move);
+	shape_shift(shape, first, move);
 	sweep_block(shape, center, half, 0.005);
 }
 
@@ -102,8 +101,7 @@ static void cloth(struct shape *shape)
 
 static void bowl(struct shape *shape)
 {
-	static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
-		move[3] = { 0.12, TOP_Y + 0.004, 0.02 };
+	static const double move[3] = { 0.12, TOP_Y + 0.004, 0.02 };
 	const struct surface_profile pieces[] = {
 		surface_line(0, 0, 0.05, 0, 1, BOWL),
 		surface_line(0.05, 0, 0.05, 0.01, 1, BOWL),
@@ -114,7 +112,7 @@ static void bowl(struct shape *shape)
 	uint32_t first = shape->n_vertices;
 
 	surface_lathe(shape, pieces, sizeof pieces / sizeof pieces[0], 96);
-	shape_move(shape, first, straight, move);
+	shape_shift(shape, first, move);
 }
 
 /* Apples have dimples and stalks, oranges are round. */
@@ -129,6 +127,7 @@ static void fruit(struct shape *shape)
 		{ { { 0.04, 0 }, { 0.04, 0.04 }, { 0.01, 0.042 }, { 0, 0.026 } }, 0, 1, 16, APPLE },
 	};
 	static const double round[3] = { 0.038, 0.037, 0.038 };
+	static const double stalk[3][3] = { { 0, 0.02, 0 }, { 0, 0.035, 0 }, { 0.006, 0.046, 0 } };
 	uint64_t random = 3;
 
 	for (int i = 0; i < 5; i++) {
@@ -143,16 +142,14 @@ static void fruit(struct shape *shape)
 		}
 		surface_lathe(shape, apple, 2, 48);
 		shape->current = STALK;
-		sweep_bend(shape, (const double[3]){ 0, 0.02, 0 }, (const double[3]){ 0, 0.035, 0 },
-		           (const double[3]){ 0.006, 0.046, 0 }, 0.0012, 8, 8);
+		sweep_bend(shape, stalk, 0.0012, 8, 8);
 		sweep_along(shape, first, center, tip);
 	}
 }
 
 void make_table(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape_image(shape, TOP, 128, image_planks(128, 0xb98a55, 0x4a2f18, 8));
 	shape_image(shape, CLOTH, 32, image_checker(32, 0xf3efe4, 0xa8322c));
 	frame(shape);

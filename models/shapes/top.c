@@ -26,8 +26,7 @@ static const struct shape_material materials[N_MATERIALS] = {
 
 void make_top(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	const struct surface_profile pieces[] = {
 		{ TIP, 0, 1, 10, STEEL },
 		surface_line(0.075, 0.12, 0.1, 0.12, 1, STEEL),

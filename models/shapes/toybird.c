@@ -40,6 +40,7 @@ static void body_at(double u, double v, double p[3])
 static void body(struct shape *shape)
 {
 	static struct shape_vertex grid[(ROWS + 1) * COLS];
+	static const struct sweep_grid all = { grid, ROWS + 1, COLS, 0 };
 
 	for (uint32_t i = 0; i < (ROWS + 1) * COLS; i++)
 		body_at((double)(i % COLS) / COLS, (double)(i / COLS) / ROWS, grid[i].p);
@@ -50,10 +51,10 @@ static void body(struct shape *shape)
 	sweep_normals(grid, ROWS + 1, COLS, 0, 1);
 	/* half a turn is the upper side; the belly is a third of the girth */
 	shape->current = BODY;
-	sweep_band(shape, grid, ROWS + 1, COLS, 0, COLS * 7 / 12, 0);
-	sweep_band(shape, grid, ROWS + 1, COLS, COLS * 11 / 12, COLS, 0);
+	sweep_band(shape, &all, 0, COLS * 7 / 12);
+	sweep_band(shape, &all, COLS * 11 / 12, COLS);
 	shape->current = BELLY;
-	sweep_band(shape, grid, ROWS + 1, COLS, COLS * 7 / 12, COLS * 11 / 12, 0);
+	sweep_band(shape, &all, COLS * 7 / 12, COLS * 11 / 12);
 }
 
 static void head(struct shape *shape)
@@ -97,7 +98,7 @@ static void feathers(struct shape *shape)
 			double low[3] = { 0, half[1] * 0.8, 0 };
 			shape->current = i == 1 ? COMB : WING;
 			sweep_ball(shape, origin, half, 32, 40);
-			shape_move(shape, first, (const double[3][3]){ { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, low);
+			shape_shift(shape, first, low);
 			sweep_along(shape, first, from, to);
 		}
 	}
@@ -165,8 +166,7 @@ static void string(struct shape *shape)
 
 void make_toybird(struct shape *shape)
 {
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	body(shape);
 	head(shape);
 	feathers(shape);

@@ -114,8 +114,7 @@ void make_tree(struct shape *shape)
 	static double twigs[MAX_TWIGS][2][3];
 	struct grower g = { .shape = shape, .random = 26438, .twig = twigs };
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	shape->current = GRASS;
 	sweep_ball(shape, mound, mound_half, 24, 64);
 	shape->current = BARK;

@@ -112,11 +112,10 @@ static void reflectors(struct shape *shape)
 
 	shape->current = REFLECTOR;
 	for (int sign = -1; sign <= 1; sign += 2) {
-		static const double straight[3][3] = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } };
 		const double move[3] = { sign * 0.66, 0, 0 };
 		uint32_t first = shape->n_vertices;
 		surface_box(shape, half);
-		shape_move(shape, first, straight, move);
+		shape_shift(shape, first, move);
 	}
 }
 
@@ -125,8 +124,7 @@ void make_wheel(struct shape *shape)
 	static const double stand[3][3] = { { 1, 0, 0 }, { 0, 0, -1 }, { 0, 1, 0 } };
 	static const double lift[3] = { 0, TIRE_RADIUS + TIRE, 0 };
 
-	for (int i = 0; i < N_MATERIALS; i++)
-		shape_material(shape, &materials[i]);
+	shape_materials(shape, materials, N_MATERIALS);
 	tire_and_rim(shape);
 	hub(shape);
 	for (uint32_t i = 0; i < SPOKES; i++)

@@ -2,7 +2,7 @@
 
 #include <assert.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "parts.h"
@@ -24,14 +24,6 @@ void greedy_select_default(struct greedy_select_options *options)
 	options->is_facing = 1;
 	options->depth_tolerance = 1;
 	options->second_pass = 1;
-}
-
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
 static void keep(struct greedy_view *view, struct greedy_block *block, int is_kept)
@@ -67,11 +59,6 @@ static int start(struct greedy *greedy, int side)
 	return job.failed ? PSR_ERR_MEMORY : PSR_OK;
 }
 
-static int count_tests(const struct greedy_select_options *options)
-{
-	return options->n_rotations * options->n_shifts;
-}
-
 /* Adds the blocks that S lacks, or, of those that are there, removes what it does not need. */
 static int visit(struct greedy *greedy, int v, const struct greedy_select_options *options,
                  struct greedy_strictness strictness)
@@ -82,7 +69,7 @@ static int visit(struct greedy *greedy, int v, const struct greedy_select_option
 
 	if (is_missed == NULL)
 		return PSR_ERR_MEMORY;
-	rc = greedy_find_missed(greedy, v, options, strictness, count_tests(options), is_missed);
+	rc = greedy_find_missed(greedy, v, options, strictness, options->n_rotations * options->n_shifts, is_missed);
 	for (uint32_t b = 0; rc == PSR_OK && b < view->n_blocks; b++) {
 		int was_kept = view->block[b].is_kept;
 
@@ -119,23 +106,16 @@ static int visit_scout(struct greedy *greedy, int v, const struct greedy_select_
 	return rc == PSR_OK ? visit(greedy, v, options, strictness) : rc;
 }
 
-struct run {
-	struct greedy *greedy;
-	const struct greedy_select_options *options;
-	int done, total;
-};
+typedef int visit_fn(struct greedy *greedy, int v, const struct greedy_select_options *options,
+                     struct greedy_strictness strictness);
 
-static int run_pass(struct run *run, int from, int to, struct greedy_strictness strictness,
-                    int (*visit_one)(struct greedy *greedy, int v, const struct greedy_select_options *options,
-                                     struct greedy_strictness strictness))
+static int run_pass(struct greedy *greedy, const struct greedy_select_options *options, int from, int to,
+                    struct greedy_strictness strictness, visit_fn *visit_one)
 {
 	int rc = PSR_OK;
 
-	for (int v = from; rc == PSR_OK && v < to; v++) {
-		rc = visit_one(run->greedy, v, run->options, strictness);
-		if (run->options->on_progress != NULL)
-			run->options->on_progress((uint64_t)++run->done, (uint64_t)run->total, run->options->userdata);
-	}
+	for (int v = from; rc == PSR_OK && v < to; v++)
+		rc = visit_one(greedy, v, options, strictness);
 	return rc;
 }
 
@@ -145,22 +125,18 @@ static int run_passes(struct greedy *greedy, const struct greedy_select_options 
 	const struct greedy_strictness all = { .lenient_below = options->forgives_outlines ? OUTLINE_COSINE : 0 };
 	const struct greedy_strictness second = { .lenient_below = all.lenient_below, .kept_only = 1 };
 	int n_views = greedy->n_views - greedy->n_scouts, rc = PSR_OK;
-	struct run run = { greedy, options, 0, 0 };
 
-	run.total = options->second_pass ? greedy->n_views : 0;
-	if (!options->goes_on)
-		run.total += n_views * (1 + !!options->is_strict_first) + greedy->n_scouts;
 	if (!options->goes_on && options->is_strict_first)
-		rc = run_pass(&run, 0, n_views, strict, visit);
+		rc = run_pass(greedy, options, 0, n_views, strict, visit);
 	if (!options->goes_on && rc == PSR_OK)
-		rc = run_pass(&run, 0, n_views, all, visit);
+		rc = run_pass(greedy, options, 0, n_views, all, visit);
 	if (!options->goes_on && rc == PSR_OK)
-		rc = run_pass(&run, n_views, greedy->n_views, all, visit_scout);
+		rc = run_pass(greedy, options, n_views, greedy->n_views, all, visit_scout);
 	for (int v = 0; v < greedy->n_views; v++)
 		for (uint32_t b = 0; b < greedy->view[v].n_blocks; b++)
 			result->n_first_pass += greedy->view[v].block[b].is_kept;
 	if (rc == PSR_OK && options->second_pass)
-		rc = run_pass(&run, 0, greedy->n_views, second, visit);
+		rc = run_pass(greedy, options, 0, greedy->n_views, second, visit);
 	return rc;
 }
 
@@ -194,7 +170,7 @@ void greedy_count(const struct greedy *greedy, struct greedy_result *result)
 int greedy_select(struct greedy *greedy, const struct greedy_select_options *options, struct greedy_result *result,
                   struct psr_error *err)
 {
-	double started = now();
+	double started = clock_seconds();
 	int rc;
 
 	assert(options->side >= 4 && options->side <= GREEDY_MOST_SIDE);
@@ -213,11 +189,11 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 		return psr_fail(err, rc, "no memory to select blocks at resolution %u; use a lower one",
 		                greedy->options.resolution);
 	greedy_count(greedy, result);
-	result->seconds = now() - started;
+	result->seconds = clock_seconds() - started;
 	return PSR_OK;
 }
 
-void greedy_points(const struct greedy *greedy, struct greedy_point *point)
+void greedy_samples(const struct greedy *greedy, struct trials_sample *to)
 {
 	for (int v = 0; v < greedy->n_views; v++) {
 		for (uint32_t i = 0; i < greedy->view[v].n_samples; i++) {
@@ -225,10 +201,10 @@ void greedy_points(const struct greedy *greedy, struct greedy_point *point)
 
 			if (!sample->is_kept)
 				continue;
-			memcpy(point->position, sample->position, sizeof point->position);
-			point->normal = (uint16_t)PSR_ATTR_NORMAL(sample->attr);
-			point->two_sided = sample->two_sided;
-			point++;
+			memcpy(to->position, sample->position, sizeof to->position);
+			to->normal = (uint16_t)PSR_ATTR_NORMAL(sample->attr);
+			to->two_sided = sample->two_sided;
+			to++;
 		}
 	}
 }

@@ -4,14 +4,15 @@
  * these samples. One departure from [G] 5.2: the truth of a test view is its projection's own samples, 1.4 a pixel,
  * instead of rays traced anew through the pixels of each of the sixteen grids. Lengths are inner units
  * (model/blocks.h). */
-#ifndef PSR_MODELS_STUDIES_GREEDY_GREEDY_H
-#define PSR_MODELS_STUDIES_GREEDY_GREEDY_H
+#ifndef MODELS_STUDIES_GREEDY_GREEDY_H
+#define MODELS_STUDIES_GREEDY_GREEDY_H
 
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/mesh.h"
 #include "model/blocks.h"
 #include "base/pool.h"
+#include "models/studies/lib/study.h"
 #include "ray/ray.h"
 
 #define GREEDY_MOST_VIEWS 320
@@ -81,14 +82,13 @@ struct greedy {
 	int n_views, n_scouts;      /* scouts are the last n_scouts of the views, without samples until they are needed */
 	struct greedy_view view[GREEDY_MOST_VIEWS];
 	uint8_t *is_two_sided;      /* by primitives */
-	uint64_t n_rays;
 	double seconds_scan;
 };
 
-/* Traces every projection but the scouts. mesh, scene (of that mesh, with this scale) and pool must outlive it; pool
- * may be NULL. MEMORY. */
-int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct ray_scene *scene, double scale,
-                  const struct greedy_scan_options *options, struct psr_pool *pool, struct psr_error *err);
+/* Traces every projection but the scouts. The model, of which it reads mesh, scene and scale, and the pool, which may be
+ * NULL, must outlive it. MEMORY. */
+int greedy_create(struct greedy **out, const struct study_model *model, const struct greedy_scan_options *options,
+                  struct psr_pool *pool, struct psr_error *err);
 void greedy_destroy(struct greedy *greedy); /* NULL is fine */
 
 struct greedy_select_options {
@@ -106,8 +106,6 @@ struct greedy_select_options {
 	int by_score;              /* [G] 9.2.2 instead of both passes: all blocks from the worst to the best by the
 	                            * deviation of their normals from the projection, each dropped that no test view needs */
 	int drops_samples;         /* [G] 9.2.3, at the end: the same with single samples */
-	void (*on_progress)(uint64_t done, uint64_t total, void *userdata); /* may be NULL */
-	void *userdata;
 };
 
 /* The thesis's: 8, four by four, facing, second pass. */
@@ -130,19 +128,32 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
 
-/* The same of what the sampler drafts (sample/levels/draft.h), which has one level and these projections, GREEDY_MOST_VIEWS at most.
- * MEMORY. */
+/* The same of a draft (sample/levels/draft.h) of one level and these projections, GREEDY_MOST_VIEWS at most. MEMORY. */
 struct draft;
 int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n_projections, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
 
-/* The kept samples, in the order of views, blocks and samples: position, normal (base/direction.h) and two-sidedness,
- * all of n_samples of the result. */
-struct greedy_point {
-	float position[3];
-	uint16_t normal;
-	uint8_t two_sided;
+/* The kept samples, in the order of views, blocks and samples: n_samples of the result. */
+void greedy_samples(const struct greedy *greedy, struct trials_sample *sample);
+
+/* ---- warp.c: what warping a selection costs ([G] 7.1), for block sides and lattices that the renderer does not have.
+ *
+ * A loop in the manner of the renderer's: perspective frames at magnification 1, blocks outside of their visibility
+ * cones ([G] 6.4, about the mean normal) left out, a set-up for each of the others, a row and a lane at a time, the
+ * minimum of 64-bit words. Neither level buffers nor tiles nor the test of single normals are in it. ---- */
+
+struct greedy_warp;
+
+/* Copies what is kept. MEMORY. */
+int greedy_warp_create(struct greedy_warp **out, const struct greedy *greedy, struct psr_error *err);
+void greedy_warp_destroy(struct greedy_warp *warp); /* NULL is fine */
+
+struct greedy_warp_time {
+	double seconds; /* of this thread's processor time, a frame; the least of some repetitions */
+	double culled;  /* fraction of the blocks that cones left out */
 };
-void greedy_points(const struct greedy *greedy, struct greedy_point *point);
+
+/* Frames of options.resolution^2 pixels from n_frames directions, evenly spread. MEMORY. */
+int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_time *time, struct psr_error *err);
 
 #endif

@@ -9,7 +9,7 @@
 
 /* A sample of the view under test, as a test wants it. */
 struct candidate {
-	struct greedy_seen seen;
+	struct trials_seen seen;
 	float least_z;  /* a picture with less at this place misses it, */
 	int is_lenient; /* unless, with this, it has the same surface within half a pixel more */
 	uint32_t block;
@@ -20,7 +20,7 @@ struct look {
 	const struct greedy_select_options *options;
 	int view;
 	struct greedy_facing facing;
-	struct greedy_seen *seen; /* of each view's kept samples those that count, from first[view] on */
+	struct trials_seen *seen; /* of each view's kept samples those that count, from first[view] on */
 	size_t first[GREEDY_MOST_VIEWS];
 	uint32_t n_seen[GREEDY_MOST_VIEWS];
 	struct candidate *candidate;
@@ -50,14 +50,7 @@ void greedy_facing_init(struct greedy_facing *facing, const float axis[3][3])
 
 	memset(facing, 0, sizeof *facing);
 	for (uint32_t n = 0; n < PSR_DIRECTIONS; n++)
-		facing->bit[n / 64] |= (uint64_t)(greedy_project(axis, normal[n]).z > 0) << n % 64;
-}
-
-float greedy_depth_tolerance(float cosine, double ds)
-{
-	float c = cosine > 0.03f ? cosine : 0.03f;
-
-	return (float)ds * (1 + 1.5f * sqrtf(1 - c * c) / c);
+		facing->bit[n / 64] |= (uint64_t)(trials_project(axis, normal[n]).z > 0) << n % 64;
 }
 
 static void look_at_view(int v, void *userdata)
@@ -74,7 +67,7 @@ static void look_at_view(int v, void *userdata)
 			const struct greedy_sample *sample = &view->sample[i];
 
 			if (sample->is_kept && (!look->options->is_facing || greedy_counts(&look->facing, sample)))
-				look->seen[look->first[v] + n++] = greedy_project(axis, sample->position);
+				look->seen[look->first[v] + n++] = trials_project(axis, sample->position);
 		}
 	}
 	look->n_seen[v] = n;
@@ -96,9 +89,9 @@ static void take_candidates(struct look *look, struct greedy_strictness strictne
 
 			if (sample->cosine < strictness.least_cosine)
 				continue;
-			candidate->seen = greedy_project(view->projection.axis, sample->position);
+			candidate->seen = trials_project(view->projection.axis, sample->position);
 			candidate->least_z = candidate->seen.z
-			                     - tolerance * greedy_depth_tolerance(sample->cosine, look->greedy->ds);
+			                     - tolerance * trials_depth_tolerance(sample->cosine, look->greedy->ds);
 			candidate->is_lenient = sample->cosine < strictness.lenient_below;
 			candidate->block = b;
 			look->n_candidates++;
@@ -143,7 +136,7 @@ static void test_view(int test, void *userdata)
 	for (size_t i = 0; i < (size_t)grid.side * grid.side; i++)
 		z[i] = -INFINITY;
 	for (int v = 0; v < look->greedy->n_views; v++) {
-		const struct greedy_seen *seen = look->seen + look->first[v];
+		const struct trials_seen *seen = look->seen + look->first[v];
 
 		for (uint32_t i = 0; i < look->n_seen[v]; i++) {
 			float *pixel = &z[greedy_pixel(&grid, &seen[i])];

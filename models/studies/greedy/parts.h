@@ -1,6 +1,6 @@
-/* What the files of the greedy modeller share (greedy.h). */
-#ifndef PSR_MODELS_STUDIES_GREEDY_PARTS_H
-#define PSR_MODELS_STUDIES_GREEDY_PARTS_H
+/* Shared by the files of the greedy modeller (greedy.h). */
+#ifndef MODELS_STUDIES_GREEDY_PARTS_H
+#define MODELS_STUDIES_GREEDY_PARTS_H
 
 #include "greedy.h"
 #include "base/direction.h"
@@ -24,6 +24,8 @@ void greedy_forget(struct greedy_view *view); /* its samples and blocks */
 
 /* Distance of the lattice's rows, as a part of its spacing. */
 double greedy_row_pitch(enum greedy_lattice lattice);
+/* By how much of the spacing a row stands to the right. */
+double greedy_shift(enum greedy_lattice lattice, int row);
 
 /* ---- blocks.c ---- */
 
@@ -31,17 +33,6 @@ double greedy_row_pitch(enum greedy_lattice lattice);
 int greedy_divide(struct greedy_view *view, int side);
 
 /* ---- look.c: S of [G] 5.2, warped orthographically at the target resolution ---- */
-
-struct greedy_seen {
-	float x, y, z; /* in the frame of a view: z grows towards the viewer */
-};
-
-static inline struct greedy_seen greedy_project(const float axis[3][3], const float p[3])
-{
-	return (struct greedy_seen){ axis[0][0] * p[0] + axis[0][1] * p[1] + axis[0][2] * p[2],
-		                         axis[1][0] * p[0] + axis[1][1] * p[1] + axis[1][2] * p[2],
-		                         axis[2][0] * p[0] + axis[2][1] * p[1] + axis[2][2] * p[2] };
-}
 
 /* A pixel grid laid over a view, turned about z and shifted, that holds the whole unit sphere. */
 struct greedy_grid {
@@ -52,7 +43,7 @@ struct greedy_grid {
 /* Test 0 <= test < n_rotations * n_shifts of the sixteen of [G] 5.2; n_shifts by n_shifts count as shifts of a test. */
 void greedy_grid_init(struct greedy_grid *grid, int test, int n_shifts, double ds);
 
-static inline uint32_t greedy_pixel(const struct greedy_grid *grid, const struct greedy_seen *p)
+static inline uint32_t greedy_pixel(const struct greedy_grid *grid, const struct trials_seen *p)
 {
 	uint32_t u = (uint32_t)(grid->cosine * p->x + grid->sine * p->y + grid->shift[0]);
 	uint32_t v = (uint32_t)(grid->cosine * p->y - grid->sine * p->x + grid->shift[1]);
@@ -72,10 +63,6 @@ static inline int greedy_counts(const struct greedy_facing *facing, const struct
 
 	return sample->two_sided || (facing->bit[n / 64] >> n % 64 & 1) != 0;
 }
-
-/* Distance behind a sample, along the view, within which another one of its pixel may be of the same surface: a
- * surface at an angle a to the view falls by tan a a pixel, and two points of a pixel are up to 1.42 pixels apart. */
-float greedy_depth_tolerance(float cosine, double ds);
 
 /* Which samples of a view may choose blocks. */
 struct greedy_strictness {

@@ -29,7 +29,7 @@ struct prune {
 	size_t n_units;
 	uint16_t **taken;    /* counts that a unit under trial has been taken from */
 	size_t n_taken;
-	struct greedy_seen *seen; /* of a unit's samples in one view */
+	struct trials_seen *seen; /* of a unit's samples in one view */
 };
 
 static int sees(const struct prune *prune, const struct table *table, const struct greedy_sample *sample)
@@ -46,8 +46,8 @@ static void ask(struct prune *prune, int v)
 	for (size_t i = 0; i < (size_t)prune->n_tests * prune->n_pixels; i++)
 		table->need[i] = -INFINITY;
 	for (uint32_t i = 0; i < view->n_samples; i++) {
-		struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
-		float least = seen.z - tolerance * greedy_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
+		struct trials_seen seen = trials_project(view->projection.axis, view->sample[i].position);
+		float least = seen.z - tolerance * trials_depth_tolerance(view->sample[i].cosine, prune->greedy->ds);
 
 		for (int t = 0; t < prune->n_tests; t++) {
 			float *need = &table->need[(size_t)t * prune->n_pixels + greedy_pixel(&prune->grid[t], &seen)];
@@ -75,11 +75,11 @@ static void fill_table(int v, void *userdata)
 		const struct greedy_view *from = &prune->greedy->view[w];
 
 		for (uint32_t i = 0; i < from->n_samples; i++) {
-			struct greedy_seen seen;
+			struct trials_seen seen;
 
 			if (!sees(prune, table, &from->sample[i]))
 				continue;
-			seen = greedy_project(axis, from->sample[i].position);
+			seen = trials_project(axis, from->sample[i].position);
 			for (int t = 0; t < prune->n_tests; t++) {
 				size_t at = (size_t)t * prune->n_pixels + greedy_pixel(&prune->grid[t], &seen);
 
@@ -101,7 +101,7 @@ static int take_out(struct prune *prune, const struct unit *unit, int v)
 		return 1;
 	for (uint32_t i = unit->first; i < unit->first + unit->n; i++)
 		if (sees(prune, table, &sample[i]))
-			prune->seen[n++] = greedy_project(axis, sample[i].position);
+			prune->seen[n++] = trials_project(axis, sample[i].position);
 	for (int t = 0; t < prune->n_tests; t++) {
 		for (uint32_t i = 0; i < n; i++) {
 			size_t at = (size_t)t * prune->n_pixels + greedy_pixel(&prune->grid[t], &prune->seen[i]);
@@ -235,12 +235,9 @@ int greedy_prune(struct greedy *greedy, const struct greedy_select_options *opti
 	if (rc == PSR_OK) {
 		psr_pool_for(greedy->pool, greedy->n_views, fill_table, &prune);
 		list_units(&prune, is_by_sample);
-		for (size_t i = 0; i < prune.n_units; i++) {
+		for (size_t i = 0; i < prune.n_units; i++)
 			if (!is_needed(&prune, &prune.unit[i]))
 				drop(greedy, &prune.unit[i]);
-			if (options->on_progress != NULL && i % 1024 == 0)
-				options->on_progress(i, prune.n_units, options->userdata);
-		}
 	}
 	prune_fini(&prune);
 	return rc;

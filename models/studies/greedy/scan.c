@@ -1,7 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "parts.h"
@@ -14,7 +14,6 @@
 struct row {
 	uint32_t n;
 	struct greedy_sample *sample;
-	uint64_t n_rays;
 	int failed;
 };
 
@@ -29,6 +28,11 @@ struct job {
 double greedy_row_pitch(enum greedy_lattice lattice)
 {
 	return lattice == GREEDY_EQUILATERAL ? 0.86602540378443864676 : 1;
+}
+
+double greedy_shift(enum greedy_lattice lattice, int row)
+{
+	return lattice == GREEDY_EQUILATERAL ? (row & 1) / 2.0 : 0;
 }
 
 static int is_left_out(int i, int stride)
@@ -56,23 +60,21 @@ static void take_hit(const struct job *job, struct greedy_sample *sample, const 
 static void trace_run(struct row *row, const struct job *job, const int *col, int n, int lattice_row)
 {
 	const struct psr_projection *p = job->projection;
-	double spacing = (double)p->spacing, x[RUN];
-	double y = lattice_row * greedy_row_pitch(job->greedy->options.lattice) * spacing;
-	double shift = job->greedy->options.lattice == GREEDY_EQUILATERAL ? (lattice_row & 1) / 2.0 : 0;
+	const enum greedy_lattice lattice = job->greedy->options.lattice;
+	double spacing = (double)p->spacing, x[RUN], y = lattice_row * greedy_row_pitch(lattice) * spacing;
 	struct ray ray[RUN];
 	struct ray_hit hit[RUN];
 
 	if (n <= 0)
 		return;
 	for (int i = 0; i < n; i++) {
-		x[i] = (col[i] + shift) * spacing;
+		x[i] = (col[i] + greedy_shift(lattice, lattice_row)) * spacing;
 		for (int k = 0; k < 3; k++) {
 			ray[i].origin[k] = x[i] * (double)p->axis[0][k] + y * (double)p->axis[1][k] + START * (double)p->axis[2][k];
 			ray[i].direction[k] = -(double)p->axis[2][k];
 		}
 	}
 	ray_scene_trace(job->greedy->scene, ray, n, 0, hit);
-	row->n_rays += (uint64_t)n;
 	for (int i = 0; i < n; i++) {
 		struct greedy_sample *sample = &row->sample[row->n];
 
@@ -88,10 +90,10 @@ static void trace_run(struct row *row, const struct job *job, const int *col, in
 static void trace_row(int i, void *userdata)
 {
 	struct job *job = userdata;
+	const enum greedy_lattice lattice = job->greedy->options.lattice;
 	struct row *row = &job->row[i];
-	double spacing = (double)job->projection->spacing;
-	double y = (i - job->reach) * greedy_row_pitch(job->greedy->options.lattice) * spacing, half;
 	int lattice_row = i - job->reach, col[RUN], n = 0, most;
+	double spacing = (double)job->projection->spacing, y = lattice_row * greedy_row_pitch(lattice) * spacing, half;
 
 	if (y * y >= 1 || is_left_out(lattice_row, job->stride))
 		return;
@@ -103,7 +105,7 @@ static void trace_row(int i, void *userdata)
 		return;
 	}
 	for (int c = -most; c <= most; c++) {
-		double x = c + (job->greedy->options.lattice == GREEDY_EQUILATERAL ? (lattice_row & 1) / 2.0 : 0);
+		double x = c + greedy_shift(lattice, lattice_row);
 
 		if (x * x > half * half || is_left_out(c, job->stride))
 			continue;
@@ -116,7 +118,7 @@ static void trace_row(int i, void *userdata)
 	trace_run(row, job, col, n, lattice_row);
 }
 
-static int join_rows(struct greedy_view *view, const struct job *job, uint64_t *n_rays)
+static int join_rows(struct greedy_view *view, const struct job *job)
 {
 	size_t n = 0;
 
@@ -124,7 +126,6 @@ static int join_rows(struct greedy_view *view, const struct job *job, uint64_t *
 		if (job->row[i].failed)
 			return PSR_ERR_MEMORY;
 		n += job->row[i].n;
-		*n_rays += job->row[i].n_rays;
 	}
 	view->sample = psr_alloc_array(n, sizeof *view->sample);
 	if (view->sample == NULL)
@@ -135,6 +136,12 @@ static int join_rows(struct greedy_view *view, const struct job *job, uint64_t *
 		view->n_samples += job->row[i].n;
 	}
 	return PSR_OK;
+}
+
+static void mark_sides(const struct greedy *greedy, struct greedy_view *view)
+{
+	for (uint32_t i = 0; i < view->n_samples; i++)
+		view->sample[i].two_sided = greedy->is_two_sided[view->sample[i].surface & ~GREEDY_BACK];
 }
 
 int greedy_trace(struct greedy *greedy, int view, int stride)
@@ -150,17 +157,14 @@ int greedy_trace(struct greedy *greedy, int view, int stride)
 		rc = PSR_ERR_MEMORY;
 	if (rc == PSR_OK) {
 		psr_pool_for(greedy->pool, 2 * job.reach + 1, trace_row, &job);
-		rc = join_rows(&greedy->view[view], &job, &greedy->n_rays);
+		rc = join_rows(&greedy->view[view], &job);
 	}
 	for (int i = 0; job.row != NULL && i <= 2 * job.reach; i++)
 		psr_free(job.row[i].sample);
 	free(job.row);
 	surface_fini(&surface);
-	for (uint32_t i = 0; rc == PSR_OK && greedy->is_two_sided != NULL && i < greedy->view[view].n_samples; i++) {
-		struct greedy_sample *sample = &greedy->view[view].sample[i];
-
-		sample->two_sided = greedy->is_two_sided[sample->surface & ~GREEDY_BACK];
-	}
+	if (rc == PSR_OK && greedy->is_two_sided != NULL)
+		mark_sides(greedy, &greedy->view[view]);
 	return rc;
 }
 
@@ -192,41 +196,28 @@ static int note_sides(struct greedy *greedy)
 	for (size_t i = 0; i < n; i++)
 		seen[i] = seen[i] == (FRONT | BACK);
 	greedy->is_two_sided = seen;
-	for (int v = 0; v < greedy->n_views; v++) {
-		for (uint32_t i = 0; i < greedy->view[v].n_samples; i++) {
-			struct greedy_sample *sample = &greedy->view[v].sample[i];
-
-			sample->two_sided = seen[sample->surface & ~GREEDY_BACK];
-		}
-	}
+	for (int v = 0; v < greedy->n_views; v++)
+		mark_sides(greedy, &greedy->view[v]);
 	return PSR_OK;
 }
 
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
-int greedy_create(struct greedy **out, const struct psr_mesh *mesh, const struct ray_scene *scene, double scale,
-                  const struct greedy_scan_options *options, struct psr_pool *pool, struct psr_error *err)
+int greedy_create(struct greedy **out, const struct study_model *model, const struct greedy_scan_options *options,
+                  struct psr_pool *pool, struct psr_error *err)
 {
 	struct greedy *greedy = calloc(1, sizeof *greedy);
-	double started = now();
+	double started = clock_seconds();
 	int rc = PSR_OK;
 
 	if (greedy == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a sampling");
-	*greedy = (struct greedy){ .mesh = mesh, .scene = scene, .pool = pool, .options = *options, .scale = scale,
-		                       .ds = 2.0 / options->resolution };
+	*greedy = (struct greedy){ .mesh = model->mesh, .scene = model->scene, .pool = pool, .options = *options,
+		                       .scale = model->scale, .ds = 2.0 / options->resolution };
 	greedy_make_views(greedy);
 	for (int v = 0; rc == PSR_OK && v < greedy->n_views - greedy->n_scouts; v++)
 		rc = greedy_trace(greedy, v, 1);
 	if (rc == PSR_OK)
 		rc = note_sides(greedy);
-	greedy->seconds_scan = now() - started;
+	greedy->seconds_scan = clock_seconds() - started;
 	if (rc != PSR_OK) {
 		greedy_destroy(greedy);
 		return psr_fail(err, rc, "no memory for the samples of all projections at resolution %u; use a lower one",

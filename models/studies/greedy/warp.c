@@ -1,9 +1,7 @@
-#include "warp.h"
-
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
@@ -41,51 +39,44 @@ struct matrix {
 	float m[3][4];
 };
 
-/* t0 of [G] (6.7): the apex lies behind all of the samples' tangent planes. */
-static float apex_offset(const struct greedy_view *view, const struct greedy_block *from, const struct block *block)
+/* A block's kept samples. */
+struct kept {
+	uint32_t n;
+	const struct greedy_sample *sample[GREEDY_MOST_SIDE * GREEDY_MOST_SIDE];
+};
+
+static const float *normal_of(const struct greedy_sample *sample)
 {
-	const float (*direction)[3] = psr_direction_table();
-	float least = INFINITY;
-
-	for (uint32_t i = from->first; i < from->first + from->n; i++) {
-		const float *normal = direction[PSR_ATTR_NORMAL(view->sample[i].attr)];
-		float away[3];
-
-		v3f_sub(away, view->sample[i].position, block->apex);
-		if (view->sample[i].is_kept)
-			least = fminf(least, v3f_dot(away, normal) / v3f_dot(block->axis, normal));
-	}
-	return least;
+	return psr_direction_table()[PSR_ATTR_NORMAL(sample->attr)];
 }
 
-static void cone(struct block *block, const struct greedy_view *view, const struct greedy_block *from)
+static void cone(struct block *block, const struct kept *kept)
 {
-	const float (*direction)[3] = psr_direction_table();
-	float normal[3] = { 0 }, least = 1;
-	uint32_t n = 0;
+	float normal[3] = { 0 }, least = 1, offset = INFINITY;
+	int is_two_sided = 0;
 
 	v3f_set(block->apex, 0, 0, 0);
-	for (uint32_t i = from->first; i < from->first + from->n; i++) {
-		if (!view->sample[i].is_kept)
-			continue;
-		v3f_add(normal, normal, direction[PSR_ATTR_NORMAL(view->sample[i].attr)]);
-		v3f_add(block->apex, block->apex, view->sample[i].position);
-		n++;
+	for (uint32_t i = 0; i < kept->n; i++) {
+		v3f_add(normal, normal, normal_of(kept->sample[i]));
+		v3f_add(block->apex, block->apex, kept->sample[i]->position);
+		is_two_sided |= kept->sample[i]->two_sided;
 	}
-	v3f_scale(block->apex, block->apex, 1 / (float)n);
+	v3f_scale(block->apex, block->apex, 1 / (float)kept->n);
 	v3f_normalize(block->axis, normal);
-	block->cone = 0;
-	for (uint32_t i = from->first; i < from->first + from->n; i++) {
-		if (!view->sample[i].is_kept)
-			continue;
-		least = fminf(least, v3f_dot(block->axis, direction[PSR_ATTR_NORMAL(view->sample[i].attr)]));
-		if (view->sample[i].two_sided)
-			block->cone = 2;
+	for (uint32_t i = 0; i < kept->n; i++)
+		least = fminf(least, v3f_dot(block->axis, normal_of(kept->sample[i])));
+	block->cone = !is_two_sided && least > 0 ? sqrtf(fmaxf(1 - least * least, 0)) : 2;
+	if (block->cone == 2)
+		return;
+	/* t0 of [G] (6.7): the apex lies behind all of the samples' tangent planes. */
+	for (uint32_t i = 0; i < kept->n; i++) {
+		const float *n = normal_of(kept->sample[i]);
+		float away[3];
+
+		v3f_sub(away, kept->sample[i]->position, block->apex);
+		offset = fminf(offset, v3f_dot(away, n) / v3f_dot(block->axis, n));
 	}
-	if (block->cone == 0)
-		block->cone = least > 0 ? sqrtf(fmaxf(1 - least * least, 0)) : 2;
-	if (block->cone < 2)
-		v3f_add_scaled(block->apex, block->apex, apex_offset(view, from, block), block->axis);
+	v3f_add_scaled(block->apex, block->apex, offset, block->axis);
 }
 
 static void take_block(struct greedy_warp *warp, uint16_t v, const struct greedy_view *view,
@@ -96,7 +87,9 @@ static void take_block(struct greedy_warp *warp, uint16_t v, const struct greedy
 	uint32_t *mask = warp->mask + b * (size_t)warp->side;
 	uint16_t *depth = warp->depth + b * (size_t)(warp->side * warp->side);
 	float min = INFINITY, max = -INFINITY;
+	struct kept kept;
 
+	kept.n = 0;
 	for (uint32_t i = from->first; i < from->first + from->n; i++) {
 		min = fminf(min, view->sample[i].z);
 		max = fmaxf(max, view->sample[i].z);
@@ -110,10 +103,11 @@ static void take_block(struct greedy_warp *warp, uint16_t v, const struct greedy
 
 		if (!sample->is_kept)
 			continue;
+		kept.sample[kept.n++] = sample;
 		mask[r] |= UINT32_C(1) << c;
 		depth[r * warp->side + c] = block->step > 0 ? (uint16_t)((sample->z - min) / block->step) : 0;
 	}
-	cone(block, view, from);
+	cone(block, &kept);
 }
 
 int greedy_warp_create(struct greedy_warp **out, const struct greedy *greedy, struct psr_error *err)
@@ -265,14 +259,6 @@ static void draw(struct greedy_warp *warp, const struct matrix *matrix, const fl
 #undef DRAW
 }
 
-static double processor_time(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_time *time, struct psr_error *err)
 {
 	struct matrix *matrix = psr_alloc_array((size_t)warp->n_views, sizeof *matrix);
@@ -295,13 +281,13 @@ int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_t
 		}
 		make_matrices(warp, frame, matrix);
 		for (int i = 0; i < N_REPETITIONS; i++) {
-			double started;
+			uint64_t started;
 
 			for (size_t k = 0; k < (size_t)warp->resolution * warp->resolution; k++)
 				warp->word[k] = EMPTY;
-			started = processor_time();
+			started = clock_thread_ns();
 			draw(warp, matrix, eye);
-			best = fmin(best, processor_time() - started);
+			best = fmin(best, (double)(clock_thread_ns() - started) * 1e-9);
 		}
 		total += best;
 	}

@@ -15,6 +15,54 @@
 #include "models/shapes/sweep.h"
 #include "models/shapes/teapot.h"
 
+/* number[v] of those vertices that `stamp` marks with `mark` is their index in flat. */
+static void flatten_part(struct shape *flat, const struct shape *shape, uint32_t part, uint32_t mark, uint32_t *stamp,
+                         uint32_t *number)
+{
+	uint32_t corner[3];
+
+	for (uint32_t t = 0; t < shape->n_triangles; t++) {
+		if (shape->triangle_part[t] != part)
+			continue;
+		for (int k = 0; k < 3; k++) {
+			uint32_t v = shape->triangle[t][k];
+			if (stamp[v] != mark) {
+				struct shape_vertex vertex;
+				for (int j = 0; j < 3; j++) {
+					vertex.p[j] = (double)shape->position[v][j];
+					vertex.n[j] = (double)shape->normal[v][j];
+				}
+				stamp[v] = mark;
+				number[v] = shape_vertex(flat, &vertex);
+			}
+			corner[k] = number[v];
+		}
+		flat->current = shape->triangle_material[t];
+		shape_triangle(flat, corner[0], corner[1], corner[2]);
+	}
+}
+
+/* Adds to `flat`, which is initialised and empty, the whole shape in one part, without pictures. */
+static void flatten(struct shape *flat, const struct shape *shape)
+{
+	uint32_t *stamp = calloc((size_t)shape->n_vertices + 1, sizeof *stamp);
+	uint32_t *number = malloc(((size_t)shape->n_vertices + 1) * sizeof *number);
+
+	flat->failed |= shape->failed || stamp == NULL || number == NULL;
+	for (uint32_t m = 0; m < shape->n_materials; m++)
+		shape_material(flat, &shape->material[m]);
+	if (!flat->failed)
+		flatten_part(flat, shape, 0, 1, stamp, number);
+	for (uint32_t i = 0; i < shape->n_instances && !flat->failed; i++) {
+		const struct shape_instance *instance = &shape->instance[i];
+		uint32_t first = flat->n_vertices;
+		flatten_part(flat, shape, instance->part, i + 2, stamp, number);
+		shape_transform(flat, first, instance->m, instance->move);
+	}
+	free(stamp);
+	free(number);
+}
+
 /* A generated shape with its instances as triangles of their own. */
 static void make_flat(struct shape *flat, const struct generator *generator)
 {
@@ -24,7 +72,7 @@ static void make_flat(struct shape *flat, const struct generator *generator)
 	generator->make(&shape);
 	assert_int_equal(shape_check(&shape, NULL), PSR_OK);
 	shape_init(flat);
-	shape_flatten(flat, &shape);
+	flatten(flat, &shape);
 	assert_int_equal(shape_check(flat, NULL), PSR_OK);
 	shape_fini(&shape);
 }
@@ -423,7 +471,7 @@ static void instances_are_moved_and_keep_their_normals(void **state)
 	uint32_t part = shape_part(&shape);
 	sweep_ball(&shape, center, half, 16, 16);
 	shape_place(&shape, part, m, move);
-	shape_flatten(&flat, &shape);
+	flatten(&flat, &shape);
 	assert_int_equal(flat.n_triangles, shape.n_triangles);
 	for (uint32_t i = 0; i < flat.n_vertices; i++) {
 		const float *p = flat.position[i], *n = flat.normal[i];

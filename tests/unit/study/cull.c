@@ -4,8 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/vec.h"
-#include "models/studies/cull.h"
-#include "models/studies/cull_part.h"
+#include "models/studies/cull/cull.h"
 #include "psr/build.h"
 #include "render/stages.h"
 #include "sample/pack/visibility_mask.h"
@@ -43,8 +42,8 @@ static struct object make_object(struct psr_mesh *mesh, int finest)
 	assert_int_equal(ray_scene_create(&o.scene, mesh, info->origin, info->scale, NULL), PSR_OK);
 	assert_int_equal(psr_pool_create(&o.pool, N_THREADS, NULL), PSR_OK);
 	assert_int_equal(cull_set_create(&o.set, o.model, finest, o.pool, NULL), PSR_OK);
-	o.blocks = psr_model_blocks(cull_set_base(o.set));
-	assert_int_equal(o.blocks->n_blocks, cull_set_n_blocks(o.set));
+	o.blocks = psr_model_blocks(o.set->base);
+	assert_int_equal(o.blocks->n_blocks, o.set->n_blocks);
 	o.is_kept = calloc(o.blocks->n_blocks, 1);
 	o.n_seen = calloc(o.blocks->n_blocks, 1);
 	return o;
@@ -196,19 +195,19 @@ static void an_eye_that_looks_away_sees_nothing(void **state)
  * outline is, and of what the frustum leaves out rays find nothing. */
 static void the_frustum_culls_what_is_not_in_the_picture(void **state)
 {
-	const struct cull_views whole = { .n = N_EYES, .zoom = 1 }, part = { .n = N_EYES, .zoom = 4 };
+	const struct cull_views whole = { N_EYES, 1, 0, &frustum, 1 }, part = { N_EYES, 4, 0, &frustum, 1 };
 	struct object o = make_object(ball(0, 0, 0, 1), 2);
-	struct cull_figures figures;
-	struct cull_truth truth;
+	struct cull_result result;
+	const struct cull_figures *figures = result.figures;
 
 	(void)state;
-	assert_int_equal(cull_measure(o.set, o.scene, &whole, &frustum, 1, o.pool, &figures, &truth, NULL), PSR_OK);
-	assert_true(figures.blocks == 0 && figures.samples == 0);
-	assert_true(truth.blocks > 0.4 && truth.samples > 0.6); /* (1 + 1 / 2.92) / 2 = 0.67 of a ball is hidden */
-	assert_int_equal(cull_measure(o.set, o.scene, &part, &frustum, 1, o.pool, &figures, &truth, NULL), PSR_OK);
-	assert_true(figures.blocks > 0.5);
-	assert_true(figures.wrong == 0);
-	assert_true(truth.samples > 1 - 1.5 / 16);
+	assert_int_equal(cull_measure(&result, o.set, o.scene, &whole, o.pool, NULL), PSR_OK);
+	assert_true(figures->blocks == 0 && figures->samples == 0);
+	assert_true(result.blocks > 0.4 && result.samples > 0.6); /* (1 + 1 / 2.92) / 2 = 0.67 of a ball is hidden */
+	assert_int_equal(cull_measure(&result, o.set, o.scene, &part, o.pool, NULL), PSR_OK);
+	assert_true(figures->blocks > 0.5);
+	assert_true(figures->wrong == 0);
+	assert_true(result.samples > 1 - 1.5 / 16);
 	drop_object(&o);
 }
 
@@ -289,14 +288,14 @@ static struct psr_mesh *seven_balls(void)
 static void no_block_that_a_ray_finds_is_culled_by_its_cone(void **state)
 {
 	struct object o = make_object(seven_balls(), 0);
-	const struct cull_views views = { .n = 8 * N_EYES, .zoom = 1 };
-	struct cull_figures figures;
-	struct cull_truth truth;
+	const struct cull_views views = { 8 * N_EYES, 1, 0, &cones, 1 };
+	struct cull_result result;
+	const struct cull_figures *figures = result.figures;
 
 	(void)state;
-	assert_int_equal(cull_measure(o.set, o.scene, &views, &cones, 1, o.pool, &figures, &truth, NULL), PSR_OK);
-	assert_true(figures.wrong == 0);
-	assert_true(figures.blocks > 0.3 && figures.blocks < truth.blocks);
+	assert_int_equal(cull_measure(&result, o.set, o.scene, &views, o.pool, NULL), PSR_OK);
+	assert_true(figures->wrong == 0);
+	assert_true(figures->blocks > 0.3 && figures->blocks < result.blocks);
 	drop_object(&o);
 }
 
@@ -305,19 +304,19 @@ static void no_block_that_a_ray_finds_is_culled_by_its_cone(void **state)
 static void masks_lose_no_pixel_and_hardly_a_block(void **state)
 {
 	struct object o = make_object(seven_balls(), CULL_FINEST);
-	const struct cull_views views = { .n = 2 * N_EYES, .zoom = 1 };
 	struct cull_choice choice[16];
-	struct cull_figures figures[16];
-	struct cull_truth truth;
+	const struct cull_views views = { 2 * N_EYES, 1, 0, choice, 16 };
+	struct cull_result result;
+	const struct cull_figures *figures = result.figures;
 	uint64_t n_lost = 1;
 
 	(void)state;
 	for (int i = 0; i < 16; i++)
 		choice[i] = (struct cull_choice){ .cones = i & 1, .level = i / 4, .n = i / 2 % 2 * 3 };
-	assert_int_equal(cull_measure(o.set, o.scene, &views, choice, 16, o.pool, figures, &truth, NULL), PSR_OK);
+	assert_int_equal(cull_measure(&result, o.set, o.scene, &views, o.pool, NULL), PSR_OK);
 	for (int i = 0; i < 16; i++) {
 		assert_true(figures[i].wrong < 1e-3);
-		assert_true(figures[i].blocks <= truth.blocks);
+		assert_true(figures[i].blocks <= result.blocks);
 		if (i % 2 == 1) /* cones add to masks */
 			assert_true(figures[i].blocks >= figures[i - 1].blocks);
 		if (i / 2 % 2 == 1) /* a finer screen culls no less: masks of nodes are within their parents' */
@@ -335,18 +334,19 @@ static void shares_do_not_depend_on_threads_and_times_are_there(void **state)
 {
 	struct object o = make_object(seven_balls(), 2);
 	const struct cull_choice choice[] = { frustum, cones, masks, both };
-	const struct cull_views timed = { .n = 3, .zoom = 1, .is_timed = 1 }, untimed = { .n = 3, .zoom = 1 };
-	struct cull_figures a[4], b[4];
-	struct cull_truth truth[2];
+	const struct cull_views timed = { 3, 1, 1, choice, 4 }, untimed = { 3, 1, 0, choice, 4 };
+	struct cull_result a, b;
 
 	(void)state;
-	assert_int_equal(cull_measure(o.set, o.scene, &timed, choice, 4, o.pool, a, &truth[0], NULL), PSR_OK);
-	assert_int_equal(cull_measure(o.set, o.scene, &untimed, choice, 4, NULL, b, &truth[1], NULL), PSR_OK);
-	assert_memory_equal(&truth[0], &truth[1], sizeof truth[0]);
+	assert_int_equal(cull_measure(&a, o.set, o.scene, &timed, o.pool, NULL), PSR_OK);
+	assert_int_equal(cull_measure(&b, o.set, o.scene, &untimed, NULL, NULL), PSR_OK);
+	assert_true(a.blocks == b.blocks && a.samples == b.samples);
 	for (int i = 0; i < 4; i++) {
-		assert_true(a[i].blocks == b[i].blocks && a[i].samples == b[i].samples && a[i].wrong == b[i].wrong);
-		assert_true(a[i].test_seconds > 0 && a[i].frame_seconds > 0);
-		assert_true(b[i].test_seconds == 0 && b[i].frame_seconds == 0);
+		const struct cull_figures *x = &a.figures[i], *y = &b.figures[i];
+
+		assert_true(x->blocks == y->blocks && x->samples == y->samples && x->wrong == y->wrong);
+		assert_true(x->test_seconds > 0 && x->frame_seconds > 0);
+		assert_true(y->test_seconds == 0 && y->frame_seconds == 0);
 	}
 	drop_object(&o);
 }
@@ -385,9 +385,9 @@ static void a_part_that_cones_leave_has_the_same_picture(void **state)
 
 		cull_eye_place(&eye, which, 1);
 		cull_set_test(o.set, &eye, &cones, o.is_kept);
-		assert_int_equal(cull_part(&part, cull_set_base(o.set), o.is_kept, NULL, NULL), PSR_OK);
+		assert_int_equal(cull_part(&part, o.set->base, o.is_kept, NULL, NULL), PSR_OK);
 		assert_true(psr_model_blocks(part)->n_blocks < o.blocks->n_blocks);
-		draw(cull_set_base(o.set), &eye, rgb[0], depth[0]);
+		draw(o.set->base, &eye, rgb[0], depth[0]);
 		draw(part, &eye, rgb[1], depth[1]);
 		assert_memory_equal(rgb[0], rgb[1], sizeof rgb[0]);
 		assert_memory_equal(depth[0], depth[1], sizeof depth[0]);

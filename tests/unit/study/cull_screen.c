@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/vec.h"
-#include "models/studies/cull.h"
+#include "models/studies/cull/cull.h"
 #include "base/direction.h"
 #include "tests/unit/sample/meshes.h"
 

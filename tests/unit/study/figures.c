@@ -6,7 +6,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "models/studies/figures.h"
+#include "models/studies/figures/figures.h"
 #include "models/shapes/surfaces.h"
 
 #define SIDE 64
@@ -28,7 +28,7 @@ static void make_plates(struct shape *shape)
 
 struct fixture {
 	struct psr_error err;
-	struct figures figures;
+	struct study study;
 	struct figure_model model;
 	struct figure_shot shot;
 	struct figure_truth truth;
@@ -40,10 +40,10 @@ static int set_up(void **state)
 	struct fixture *f = calloc(1, sizeof *f);
 
 	assert_non_null(f);
-	f->figures = (struct figures){ .err = &f->err, .study = { .err = &f->err, .n_threads = 1 } };
-	assert_int_equal(psr_renderer_create(&f->figures.renderer, NULL), PSR_OK);
-	assert_int_equal(figure_model_load(&f->model, &f->figures, "plates", make_plates, 64), PSR_OK);
-	figure_shot_init(&f->shot, &f->model, toward, 1, SIDE, SIDE);
+	f->study = (struct study){ .err = &f->err, .n_threads = 1 };
+	assert_int_equal(psr_renderer_create(&f->study.renderer, NULL), PSR_OK);
+	assert_int_equal(figure_model_load(&f->model, &f->study, "plates", make_plates, 64), PSR_OK);
+	figure_shot_init(&f->shot, &f->model, toward, 1, SIDE);
 	*state = f;
 	return 0;
 }
@@ -54,14 +54,14 @@ static int tear_down(void **state)
 
 	figure_truth_fini(&f->truth);
 	figure_model_fini(&f->model);
-	psr_renderer_destroy(f->figures.renderer);
+	psr_renderer_destroy(f->study.renderer);
 	free(f);
 	return 0;
 }
 
 static void draw(struct fixture *f)
 {
-	assert_int_equal(figure_truth_draw(&f->truth, &f->figures, &f->model, &f->shot, 2), PSR_OK);
+	assert_int_equal(figure_truth_draw(&f->truth, &f->study, &f->model, &f->shot, 2), PSR_OK);
 }
 
 /* All of the colour is 0x80, so that a mean of rays has one code, too. */
@@ -125,11 +125,11 @@ static void the_truth_scores_no_error(void **state)
 {
 	struct fixture *f = *state;
 	struct figure_score score = { .n_met = 0 };
-	struct figure_frame frame;
+	struct psr_frame frame;
 
-	assert_int_equal(figure_frame_init(&frame, SIDE, SIDE, &f->err), PSR_OK);
+	assert_int_equal(psr_frame_alloc(&frame, SIDE, SIDE, FIGURE_PLANES, &f->err), PSR_OK);
 	draw(f);
-	assert_int_equal(figure_draw(&frame, &f->figures, &f->shot), PSR_OK);
+	assert_int_equal(figure_draw(&frame, &f->study, &f->shot), PSR_OK);
 	memcpy(frame.rgb, f->truth.rgb, 3 * SIDE * SIDE);
 	figure_score_colors(&score, &frame, &f->truth);
 	assert_true(score.n_met > score.n_inside && score.n_inside > 100);
@@ -138,7 +138,7 @@ static void the_truth_scores_no_error(void **state)
 	frame.rgb[3 * first_whole(f) + 1] ^= 4;
 	figure_score_colors(&score, &frame, &f->truth);
 	assert_int_equal(score.square, 16);
-	figure_frame_fini(&frame);
+	psr_frame_free(&frame);
 }
 
 static void a_part_is_found_where_the_first_way_is_worse(void **state)

@@ -10,24 +10,17 @@
 #include "base/direction.h"
 #include "surface/validate.h"
 #include "models/studies/greedy/parts.h"
-#include "models/studies/greedy/warp.h"
 #include "tests/unit/sample/meshes.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 
-struct object {
-	struct psr_mesh *mesh;
-	struct ray_scene *scene;
-	double origin[3], scale;
-};
-
 /* Two spheres that hide each other in part. */
-static struct object two_spheres(void)
+static struct study_model two_spheres(void)
 {
 	const double a[3] = { 0, 0, 0 }, b[3] = { 1.5, 0.4, 0.3 };
 	struct psr_mesh *first = meshes_sphere(24, a, 1), *second = meshes_sphere(24, b, 0.6);
 	struct psr_mesh *mesh = meshes_new(2 * first->n_vertices, 2 * first->n_triangles);
-	struct object object = { .mesh = mesh };
+	struct study_model object = { .mesh = mesh };
 
 	for (uint32_t i = 0; i < mesh->n_vertices; i++) {
 		const struct psr_mesh *from = i < first->n_vertices ? first : second;
@@ -46,19 +39,19 @@ static struct object two_spheres(void)
 	return object;
 }
 
-static void object_fini(struct object *object)
+static void object_fini(struct study_model *object)
 {
 	ray_scene_destroy(object->scene);
 	meshes_free(object->mesh);
 }
 
-static struct greedy *scan(const struct object *object, uint32_t resolution, enum greedy_lattice lattice,
+static struct greedy *scan(const struct study_model *object, uint32_t resolution, enum greedy_lattice lattice,
                            enum greedy_directions directions, struct psr_pool *pool)
 {
 	const struct greedy_scan_options options = { resolution, 25 / DEGREES, lattice, directions };
 	struct greedy *greedy = NULL;
 
-	assert_int_equal(greedy_create(&greedy, object->mesh, object->scene, object->scale, &options, pool, NULL), PSR_OK);
+	assert_int_equal(greedy_create(&greedy, object, &options, pool, NULL), PSR_OK);
 	return greedy;
 }
 
@@ -80,7 +73,7 @@ static double covering_angle(const struct greedy *greedy, int n_views)
 
 static void no_normal_is_further_from_a_direction_than_is_said(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *thesis = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 	struct greedy *icosahedral = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 
@@ -97,7 +90,7 @@ static void no_normal_is_further_from_a_direction_than_is_said(void **state)
 
 static void every_projection_is_followed_by_its_opposite(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 16, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 
 	(void)state;
@@ -109,7 +102,7 @@ static void every_projection_is_followed_by_its_opposite(void **state)
 
 static void samples_stand_on_the_lattice_and_on_the_surface(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 
 	(void)state;
 	for (int lattice = GREEDY_EQUILATERAL; lattice <= GREEDY_SQUARE; lattice++) {
@@ -123,7 +116,7 @@ static void samples_stand_on_the_lattice_and_on_the_surface(void **state)
 			assert_true(view->n_samples > 100);
 			for (uint32_t i = 0; i < view->n_samples; i++) {
 				const struct greedy_sample *s = &view->sample[i];
-				struct greedy_seen seen = greedy_project(view->projection.axis, s->position);
+				struct trials_seen seen = trials_project(view->projection.axis, s->position);
 				double p[3] = { (double)s->position[0], (double)s->position[1], (double)s->position[2] };
 				double shift = lattice == GREEDY_SQUARE ? 0 : (s->row & 1) / 2.0;
 
@@ -146,7 +139,7 @@ static int floor_div(int a, int b)
 
 static void every_sample_is_in_the_block_of_its_row_and_column(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 
 	(void)state;
@@ -198,7 +191,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 
 				for (uint32_t b = 0; b < from->n_blocks; b++) {
 					for (uint32_t i = from->block[b].first; i < from->block[b].first + from->block[b].n; i++) {
-						struct greedy_seen seen = greedy_project(view->projection.axis, from->sample[i].position);
+						struct trials_seen seen = trials_project(view->projection.axis, from->sample[i].position);
 						uint32_t at = greedy_pixel(&grid, &seen);
 
 						if (from->sample[i].is_kept && &from->block[b] != but
@@ -208,10 +201,10 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 				}
 			}
 			for (uint32_t i = 0; i < view->n_samples; i++) {
-				struct greedy_seen seen = greedy_project(view->projection.axis, view->sample[i].position);
+				struct trials_seen seen = trials_project(view->projection.axis, view->sample[i].position);
 
 				n += z[greedy_pixel(&grid, &seen)]
-				     < seen.z - greedy_depth_tolerance(view->sample[i].cosine, greedy->ds);
+				     < seen.z - trials_depth_tolerance(view->sample[i].cosine, greedy->ds);
 			}
 			free(z);
 		}
@@ -221,7 +214,7 @@ static uint64_t count_uncovered(const struct greedy *greedy, const struct greedy
 
 static void the_first_pass_leaves_no_sample_uncovered(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_THESIS, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
@@ -256,7 +249,7 @@ static uint8_t *kept_blocks(const struct greedy *greedy, size_t *n)
 
 static void the_second_pass_only_removes_blocks(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result first, both;
@@ -284,7 +277,7 @@ static void the_second_pass_only_removes_blocks(void **state)
 
 static void selection_by_score_covers_everything_and_keeps_nothing_that_is_not_needed(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 24, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
@@ -311,7 +304,7 @@ static void selection_by_score_covers_everything_and_keeps_nothing_that_is_not_n
 
 static void dropping_samples_uncovers_nothing(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	struct greedy_select_options options;
 	struct greedy_result all, some;
@@ -331,7 +324,7 @@ static void dropping_samples_uncovers_nothing(void **state)
 
 static void a_sheet_seen_from_one_side_does_not_cover_its_other_side(void **state)
 {
-	struct object object = { .mesh = meshes_square(4) };
+	struct study_model object = { .mesh = meshes_square(4) };
 	struct greedy_select_options options;
 	struct greedy_result facing, both;
 	struct greedy *greedy;
@@ -372,7 +365,7 @@ static void a_sheet_seen_from_one_side_does_not_cover_its_other_side(void **stat
 
 static void threads_and_what_came_before_change_nothing(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct psr_pool *pool = NULL;
 	struct greedy *one, *four;
 	struct greedy_select_options options;
@@ -408,11 +401,11 @@ static void threads_and_what_came_before_change_nothing(void **state)
 
 static void counts_agree_with_what_is_kept(void **state)
 {
-	struct object object = two_spheres();
+	struct study_model object = two_spheres();
 	struct greedy *greedy = scan(&object, 32, GREEDY_SQUARE, GREEDY_THESIS, NULL);
 	struct greedy_select_options options;
 	struct greedy_result result;
-	struct greedy_point *point;
+	struct trials_sample *point;
 
 	(void)state;
 	greedy_select_default(&options);
@@ -421,7 +414,7 @@ static void counts_agree_with_what_is_kept(void **state)
 	assert_int_equal(result.n_lanes, 16 * result.n_blocks);
 	assert_int_equal(result.n_bytes, 10 * result.n_samples + (21 + 2) * result.n_blocks);
 	point = calloc(result.n_samples + 1, sizeof *point);
-	greedy_points(greedy, point);
+	greedy_samples(greedy, point);
 	for (uint64_t i = 0; i < result.n_samples; i++)
 		assert_true(v3f_length(point[i].position) > 0.1f);
 	assert_true(v3f_length(point[result.n_samples].position) == 0);
@@ -434,7 +427,7 @@ static void counts_agree_with_what_is_kept(void **state)
 static void cones_cull_less_than_the_far_side(void **state)
 {
 	const double center[3] = { 0 };
-	struct object object = { .mesh = meshes_sphere(48, center, 1) };
+	struct study_model object = { .mesh = meshes_sphere(48, center, 1) };
 	struct greedy_select_options options;
 	struct greedy_result result;
 	struct greedy_warp_time time;

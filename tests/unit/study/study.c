@@ -9,18 +9,19 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "models/studies/study.h"
+#include "models/studies/lib/study.h"
 #include "base/direction.h"
 #include "tests/unit/sample/meshes.h"
 
 static const struct study_column two[] = { { "size", "size", 1 }, { "ratio", "ratio", 3 } };
+static const struct study_form form = { "row", two, 2 };
 
 static void a_mean_leaves_out_what_is_not_known(void **state)
 {
 	struct study_table table;
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 3, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 3, NULL), PSR_OK);
 	assert_true(isnan(study_mean(&table, 0, 0)));
 	*study_at(&table, 0, 0, 0) = 1;
 	*study_at(&table, 0, 2, 0) = 5;
@@ -35,7 +36,7 @@ static void ratios_are_made_model_by_model(void **state)
 	struct study_table table;
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 2, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 2, NULL), PSR_OK);
 	*study_at(&table, 0, 0, 0) = 1;
 	*study_at(&table, 0, 1, 0) = 20;
 	*study_at(&table, 1, 0, 0) = 2;
@@ -54,7 +55,7 @@ static void a_table_is_printed_in_columns(void **state)
 	FILE *to = open_memstream(&text, &n);
 
 	(void)state;
-	assert_int_equal(study_table_init(&table, "row", two, 2, 2, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&table, form, 2, 1, NULL), PSR_OK);
 	strcpy(table.label[0], "first");
 	strcpy(table.label[1], "2nd");
 	*study_at(&table, 0, 0, 0) = 123456.78;
@@ -73,7 +74,7 @@ static void a_table_is_printed_in_columns(void **state)
 struct ball {
 	struct psr_mesh *mesh;
 	struct ray_scene *scene;
-	struct study_trials *trials;
+	struct trials *trials;
 };
 
 static struct ball make_ball(double radius)
@@ -82,21 +83,21 @@ static struct ball make_ball(double radius)
 	struct ball ball = { .mesh = meshes_sphere(32, center, radius) };
 
 	assert_int_equal(ray_scene_create(&ball.scene, ball.mesh, origin, 1, NULL), PSR_OK);
-	assert_int_equal(study_trials_create(&ball.trials, ball.mesh, ball.scene, 20, 300, NULL), PSR_OK);
+	assert_int_equal(trials_create(&ball.trials, ball.mesh, ball.scene, 20, 300, NULL), PSR_OK);
 	return ball;
 }
 
 static void ball_fini(struct ball *ball)
 {
-	study_trials_destroy(ball->trials);
+	trials_destroy(ball->trials);
 	ray_scene_destroy(ball->scene);
 	meshes_free(ball->mesh);
 }
 
 /* Points on a sphere, on a spiral of equal areas. */
-static struct greedy_point *spiral(size_t n, double radius, int is_inside_out)
+static struct trials_sample *spiral(size_t n, double radius, int is_inside_out)
 {
-	struct greedy_point *point = calloc(n + 1, sizeof *point);
+	struct trials_sample *point = calloc(n + 1, sizeof *point);
 
 	for (size_t i = 0; i < n; i++) {
 		double z = 1 - (2 * (double)i + 1) / (double)n, a = 2.399963229728653 * (double)i, r = sqrt(1 - z * z);
@@ -111,13 +112,13 @@ static struct greedy_point *spiral(size_t n, double radius, int is_inside_out)
 	return point;
 }
 
-static uint64_t missing(const struct ball *ball, const struct greedy_point *point, size_t n, double ds)
+static uint64_t missing(const struct ball *ball, const struct trials_sample *point, size_t n, double ds)
 {
-	uint64_t n_trials, n_missing;
+	struct trials_count count;
 
-	assert_int_equal(study_trials_run(ball->trials, point, n, ds, NULL, &n_trials, &n_missing), PSR_OK);
-	assert_int_equal(n_trials, 20 * 300);
-	return n_missing;
+	assert_int_equal(trials_run(&count, ball->trials, point, n, ds, NULL), PSR_OK);
+	assert_int_equal(count.n_trials, 20 * 300);
+	return count.n_missing;
 }
 
 /* Points of a spiral have a neighbour within sqrt(4 pi / n) * 1.2 in every direction: with sides of triangles of two
@@ -127,7 +128,7 @@ static void trials_find_holes_and_only_holes(void **state)
 {
 	struct ball ball = make_ball(0.9);
 	double ds = 1.0 / 32, spacing = 0.9 * sqrt(4 * 3.14159265358979323846 / 60000);
-	struct greedy_point *dense = spiral(60000, 0.9, 0), *sparse = spiral(6000, 0.9, 0);
+	struct trials_sample *dense = spiral(60000, 0.9, 0), *sparse = spiral(6000, 0.9, 0);
 
 	(void)state;
 	assert_true(1.5 * spacing < 0.667 * ds);
@@ -143,7 +144,7 @@ static void samples_that_face_away_or_lie_deeper_fill_no_pixel(void **state)
 {
 	struct ball ball = make_ball(0.9);
 	double ds = 1.0 / 64;
-	struct greedy_point *inside_out = spiral(120000, 0.9, 1), *deep = spiral(120000, 0.5, 0);
+	struct trials_sample *inside_out = spiral(120000, 0.9, 1), *deep = spiral(120000, 0.5, 0);
 
 	(void)state;
 	/* The far side, now turned to the viewer, is 1.8 c behind a place seen at cosine c, where ds (1 + 1.5 / c) is
@@ -171,7 +172,7 @@ static void plots_say_what_is_wrong(void **state)
 	struct psr_error err;
 
 	(void)state;
-	assert_int_equal(study_table_init(&study.table, "row", two, 2, 1, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&study.table, form, 1, 1, NULL), PSR_OK);
 	assert_int_equal(study_plot(&study, "picture.gif", &err), PSR_ERR_ARG);
 	assert_non_null(strstr(err.text, ".svg"));
 	assert_int_equal(study_plot(&study, "pic\nture.svg", &err), PSR_ERR_ARG);
@@ -207,7 +208,7 @@ static void the_program_for_gnuplot_has_the_whole_table(void **state)
 	fprintf(file, "#!/bin/sh\ncat >%s\n", said);
 	fclose(file);
 	assert_int_equal(chmod(tool, 0700), 0);
-	assert_int_equal(study_table_init(&study.table, "row", two, 2, 2, 1, NULL), PSR_OK);
+	assert_int_equal(study_table_init(&study.table, form, 2, 1, NULL), PSR_OK);
 	strcpy(study.table.label[0], "25");
 	strcpy(study.table.label[1], "two words");
 	*study_at(&study.table, 0, 0, 0) = 1.5;
