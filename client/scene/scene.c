@@ -3,9 +3,9 @@
 #include <string.h>
 #include "client/cli/cli.h"
 #include "preset.h"
-#include "client/lib/camera.h"
 #include "scene.h"
 #include "suggest.h"
+#include "client/lib/camera.h"
 
 #define HOME "home" /* the camera whose up is the model's natural one */
 

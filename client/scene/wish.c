@@ -2,8 +2,8 @@
 #include <string.h>
 #include "preset.h"
 #include "client/cli/cli.h"
-#include "client/lib/camera.h"
 #include "scene.h"
+#include "client/lib/camera.h"
 
 void scene_wish_init(struct scene_wish *wish)
 {

@@ -62,7 +62,7 @@ static int draw(const struct psr_model *model, const struct view *view, uint8_t 
 	return n;
 }
 
-/* Stored normals are off by 1.27 degrees at most (psr/direction.h) and the map's texels by half a step of 1/127.5 in
+/* Stored normals are off by 1.27 degrees at most (base/direction.h) and the map's texels by half a step of 1/127.5 in
  * each of three components, 0.39 degrees: 0.029 radians, of which light changes by as much times at most the albedo.
  * The albedo is coded in 8 bits, and so is the picture: half a code at 188 of 255 is 0.0022 each, as linear light grows
  * by 0.0045 a code there. */

@@ -11,7 +11,7 @@
 #include "surface/material.h"
 #include "meshes.h"
 
-/* An angle that a normal may be off by its quantisation (psr/direction.h), radians. */
+/* An angle that a normal may be off by its quantisation (base/direction.h), radians. */
 #define NORMAL_ERROR 0.0222f
 
 static uint64_t word(uint32_t normal, uint32_t diffuse, uint32_t specular, uint32_t exponent)

@@ -11,7 +11,7 @@
 #include "surface/surface.h"
 #include "meshes.h"
 
-/* Quantised normals are up to this far off, radians (psr/direction.h). */
+/* Quantised normals are up to this far off, radians (base/direction.h). */
 #define NORMAL_ERROR 0.0222
 
 static const float up[3] = { 0, 0, 1 };
