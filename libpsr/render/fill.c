@@ -358,10 +358,12 @@ static void run_coarse(struct fill *fill)
 		const struct fill_level *to = &fill->level[l], *from = to + 1;
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const int32_t parent = y >> 1;
-			const struct fill_row row = fill_row_at(to, 0, y), own = fill_row_at(from, 0, parent);
-			const struct fill_row beside = fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1);
-			fill->simd->fill_push(&row, &own, &beside, from->width, fill_scale(fill->plan, l + 1),
-			                      fill_offset(fill->plan, l + 1));
+			const struct fill_row row = fill_row_at(to, 0, y);
+			const struct fill_parents parents = {
+				fill_row_at(from, 0, parent), fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1), from->width,
+				fill_scale(fill->plan, l + 1), fill_offset(fill->plan, l + 1),
+			};
+			fill->simd->fill_push(&row, &parents);
 		}
 	}
 }

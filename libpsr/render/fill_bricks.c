@@ -137,9 +137,11 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	const float scale = fill_scale(fill->plan, level + 1), offset = fill_offset(fill->plan, level + 1);
 	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
-		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), own = fill_row_at(from, x, parent);
-		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		fill->simd->fill_push(&row, &own, &beside, (x1 - x0 + 1) / 2, scale, offset);
+		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y);
+		const struct fill_parents parents = { fill_row_at(from, x, parent),
+			                                  fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1),
+			                                  (x1 - x0 + 1) / 2, scale, offset };
+		fill->simd->fill_push(&row, &parents);
 	}
 }
 
@@ -176,10 +178,11 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 			const size_t first = (size_t)y * width + x;
 			const int32_t parent = (int32_t)(y >> 1), px = (int32_t)(x >> 1);
 			const struct fill_row was = picture_row_at(&pixels, fill, x, y, 2 * n_cells);
-			const struct fill_row own = fill_row_at(from, px, parent);
-			const struct fill_row beside = fill_row_at(from, px, y & 1 ? parent + 1 : parent - 1);
-			const uint32_t n = fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &own,
-			                                                 &beside, n_cells, scale, offset);
+			const struct fill_parents parents = { fill_row_at(from, px, parent),
+				                                  fill_row_at(from, px, y & 1 ? parent + 1 : parent - 1), n_cells, scale,
+				                                  offset };
+			const uint32_t n =
+				fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &parents);
 			if (!n)
 				continue;
 			if (was.weight == pixels.weight)

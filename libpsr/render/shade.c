@@ -28,7 +28,8 @@ static void tabulate_part(int part, void *userdata)
 {
 	const struct tabulating *t = userdata;
 	const struct plan *plan = t->plan;
-	t->simd->strip_lit(t->lit, &plan->view, plan->light, plan->n_lights, plan->ambient, (uint32_t)part * STRIP, STRIP);
+	const struct strip_lights lights = { plan->light, plan->n_lights, plan->ambient };
+	t->simd->strip_lit(t->lit, &plan->view, &lights, (uint32_t)part * STRIP, STRIP);
 }
 
 void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])

@@ -110,9 +110,9 @@ static void sink_rows(const struct drawing *d, const uint16_t *cells, int k, uin
 	const float *from = drawn(d, cells);
 	uint16_t *to = d->kept_cells + (cells - d->map->level[0].z);
 	for (uint32_t j = begin; j < end; j++) {
-		const float *own = from + (size_t)j * stride, *above = j ? own - stride : own;
-		d->simd->shadow_sink(to + (size_t)j * stride, above, own, j < last ? own + stride : own, stride, d->map->from,
-		                     d->map->step);
+		const float *own = from + (size_t)j * stride;
+		const struct shadow_rows rows = { j ? own - stride : own, own, j < last ? own + stride : own };
+		d->simd->shadow_sink(to + (size_t)j * stride, &rows, stride, d->map->from, d->map->step);
 	}
 }
 

@@ -4,7 +4,7 @@
 #include "simd.h"
 
 static const char *const names[PSR_N_ISAS] = { "c", "avx2", "avx512" };
-static atomic_int cap = -1; /* not asked for yet */
+static atomic_int cap = -1; /* -1: not set */
 
 const char *psr_isa_name(enum psr_isa isa)
 {
@@ -26,7 +26,7 @@ int psr_isa_check_environment(struct psr_error *err)
 	enum psr_isa isa;
 	const char *wanted = getenv("PSR_ISA");
 	if (wanted && psr_isa_parse(&isa, wanted))
-		return psr_fail(err, PSR_ERR_ARG, "PSR_ISA is '%.40s'; it takes c, avx2 or avx512, or is left out", wanted);
+		return psr_fail(err, PSR_ERR_ARG, "PSR_ISA is '%.40s': set it to c, avx2 or avx512, or unset it", wanted);
 	return PSR_OK;
 }
 
