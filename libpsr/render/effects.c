@@ -3,26 +3,26 @@
 static const struct {
 	const char *name, *why[PSR_WHY_COST + 1];
 } effects[PSR_N_EFFECTS] = {
-	[PSR_EFFECT_CONES] = { "cones", { "", "the settings leave it out", "no model in the scene has cones", "", "" } },
+	[PSR_EFFECT_CONES] = { "cones", { "", "the settings turn it off", "no model in the scene has cones", "", "" } },
 	[PSR_EFFECT_MASKS] = { "masks",
-	                       { "", "the settings leave it out", "no model in the scene has masks",
-	                         "the eye is within a model's sphere, or the model was measured to lose something by them",
+	                       { "", "the settings turn it off", "no model in the scene has masks",
+	                         "the eye is inside a model's sphere, or masks were measured to cull visible parts",
 	                         "" } },
 	[PSR_EFFECT_OCCLUSION] = { "occlusion",
-	                           { "", "the settings leave it out", "", "", "no tile has eight samples a pixel" } },
-	[PSR_EFFECT_FACING] = { "facing", { "", "", "cones tell of all blocks in view how they face", "", "" } },
+	                           { "", "the settings turn it off", "", "", "no tile has eight samples a pixel" } },
+	[PSR_EFFECT_FACING] = { "facing", { "", "", "cones decide how all blocks in view face", "", "" } },
 	[PSR_EFFECT_LEVELS] = { "levels",
 	                        { "", "", "the samples of every block in view are within a pixel of each other", "", "" } },
 	[PSR_EFFECT_FILL] = { "fill", { "", "", "no pixel's weight is below 1", "", "" } },
 	[PSR_EFFECT_TWO_SIDED] = { "two-sided", { "", "", "no block in view is two-sided", "", "" } },
 	[PSR_EFFECT_SPECULAR] = { "specular", { "", "", "no sample in view is specular, or no light shines", "", "" } },
 	[PSR_EFFECT_POSITIONS] = { "positions", { "", "", "no light is near or casts shadows", "", "" } },
-	[PSR_EFFECT_SHADOWS] = { "shadows", { "", "", "no light that casts any reaches what is in view", "", "" } },
+	[PSR_EFFECT_SHADOWS] = { "shadows", { "", "", "no light that casts shadows reaches an instance in view", "", "" } },
 	[PSR_EFFECT_TABLE] = { "table",
 	                       { "", "", "no light shines",
 	                         "a light is near or casts shadows, or a block in view is two-sided",
 	                         "too few lights and pixels, or several instances" } },
-	[PSR_EFFECT_SMOOTH] = { "smooth", { "", "the settings leave it out", "no colour is wanted", "", "" } },
+	[PSR_EFFECT_SMOOTH] = { "smooth", { "", "the settings turn it off", "the frame has no colour", "", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -35,13 +35,13 @@ const char *psr_effect_counts(enum psr_effect effect)
 	static const char *const counts[PSR_N_EFFECTS] = {
 		[PSR_EFFECT_CONES] = "blocks tested",
 		[PSR_EFFECT_MASKS] = "blocks that only their mask culls",
-		[PSR_EFFECT_OCCLUSION] = "blocks left out, once in each tile",
-		[PSR_EFFECT_FACING] = "blocks whose samples were asked one by one",
-		[PSR_EFFECT_LEVELS] = "depth buffers beside the picture's own",
-		[PSR_EFFECT_FILL] = "pixels whose color changed",
+		[PSR_EFFECT_OCCLUSION] = "hidden blocks skipped, counted in each tile",
+		[PSR_EFFECT_FACING] = "blocks whose samples were tested one by one",
+		[PSR_EFFECT_LEVELS] = "depth buffers in addition to the picture's",
+		[PSR_EFFECT_FILL] = "pixels whose colour changed",
 		[PSR_EFFECT_TWO_SIDED] = "pixels whose normals may be turned to the eye",
-		[PSR_EFFECT_SPECULAR] = "pixels looked at for highlights",
-		[PSR_EFFECT_POSITIONS] = "pixels whose positions were worked out",
+		[PSR_EFFECT_SPECULAR] = "pixels tested for highlights",
+		[PSR_EFFECT_POSITIONS] = "pixels whose positions were computed",
 		[PSR_EFFECT_SHADOWS] = "shadow maps in use",
 		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
@@ -52,6 +52,13 @@ const char *psr_effect_counts(enum psr_effect effect)
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why)
 {
 	return (unsigned)effect < PSR_N_EFFECTS && (unsigned)why <= PSR_WHY_COST ? effects[effect].why[why] : "?";
+}
+
+const char *psr_stage_name(enum psr_stage stage)
+{
+	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
+		                                             "resolve", "shade",  "fill", "smooth" };
+	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
 }
 
 void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why why, uint64_t count)

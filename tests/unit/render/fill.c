@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
-#include "render/render.h"
+#include "render/fill.h"
 
 static uint32_t seed;
 

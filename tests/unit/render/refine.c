@@ -10,7 +10,7 @@
 #include "base/srgb.h"
 #include "psr/pool.h"
 #include "psr/render.h"
-#include "render/render.h"
+#include "render/splat.h"
 #include "tests/unit/lib/shapes.h"
 
 static struct psr_model *sphere, *fine_sphere, *teapot;

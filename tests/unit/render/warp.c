@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "psr/direction.h"
-#include "render/render.h"
+#include "render/cull.h"
+#include "render/zbuffer.h"
 
 static struct psr_model *wheel;
 
