@@ -21,7 +21,6 @@ int check_camera(const struct psr_msg_camera *m, struct psr_error *err)
 {
 	const double least = 1 / PSR_WIRE_MAX_LENGTH;
 	double f[3], u[3], n_f, n_u;
-
 	if (check_integer("the camera's kind", m->kind, PSR_WIRE_CAMERA_PERSPECTIVE, PSR_WIRE_CAMERA_ORTHOGRAPHIC, err) ||
 	    check_lengths("the camera's eye", m->eye, 3, err) || check_lengths("the camera's target", m->target, 3, err) ||
 	    check_lengths("the camera's up", m->up, 3, err))
@@ -75,7 +74,6 @@ struct picture {
 static int check_picture(const struct picture *m, struct psr_error *err)
 {
 	const uint32_t data = ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH);
-
 	if (m->width == 0 || m->height == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides need at least 1", m->width,
 		                m->height);
@@ -88,7 +86,6 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 		                PSR_WIRE_PLANES - 1);
 	if (m->planes & 1u << PSR_WIRE_PLANE_COLOR) {
 		int jpeg = m->color_codec == PSR_CODEC_JPEG;
-
 		if (check_integer("the codec of colour", m->color_codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err) ||
 		    check_integer(jpeg ? "the JPEG quality" : "the quality of a lossless codec", m->color_quality, jpeg,
 		                  jpeg ? 100 : 0, err))
@@ -114,7 +111,6 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 static void layout_frame(struct wire *w, void *p)
 {
 	struct psr_msg_frame *m = p;
-
 	wire_u16(w, &m->slot);
 	wire_u16(w, &m->pass_limit);
 	wire_u32(w, &m->width);
@@ -138,7 +134,6 @@ static void layout_frame(struct wire *w, void *p)
 static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
 {
 	int no_settings = m->settings.scale == 0 && !m->settings.is_smooth && m->settings.spacing_px == 0;
-
 	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_SETTINGS, err) ||
 	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||
 	    (m->budget != PSR_WIRE_BUDGET_ERROR && check_zero("an error bound", m->error_bound_px == 0, err)) ||
@@ -157,7 +152,6 @@ static int check_frame(const void *p, struct psr_error *err)
 	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
 		m->depth_format, m->depth_codec, m->data_codec };
 	int result;
-
 	if (check_integer("the slot of the scene", m->slot, 0, PSR_WIRE_MAX_SCENES - 1, err))
 		return PSR_ERR_ARG;
 	result = check_picture(&picture, err);
@@ -180,7 +174,6 @@ int psr_msg_frame_decode(struct psr_msg_frame *msg, const uint8_t *payload, size
 static void layout_frame_begin(struct wire *w, void *p)
 {
 	struct psr_msg_frame_begin *m = p;
-
 	wire_u16(w, &m->pass);
 	wire_u16(w, &m->base_pass);
 	wire_u32(w, &m->width);
@@ -206,7 +199,6 @@ static int check_frame_begin(const void *p, struct psr_error *err)
 	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
 		m->depth_format, m->depth_codec, m->data_codec };
 	int result = check_picture(&picture, err);
-
 	if (result != PSR_OK)
 		return result;
 	if ((m->base == 0 && check_zero("the pass of a base that is none", m->base_pass == 0, err)) ||

@@ -3,21 +3,18 @@
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format)
 {
 	static const uint8_t bytes[PSR_WIRE_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
-
 	return plane == PSR_WIRE_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
 }
 
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format)
 {
 	static const uint8_t n_components[PSR_WIRE_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
-
 	return n_components[plane] * psr_plane_component_bytes(plane, depth_format);
 }
 
 const char *psr_plane_name(unsigned plane)
 {
 	static const char *const names[PSR_WIRE_PLANES] = { "color", "depth", "normal", "id", "weight", "words", "block" };
-
 	return names[plane];
 }
 
@@ -30,7 +27,6 @@ const uint8_t *psr_plane_background(unsigned plane)
 		[PSR_WIRE_PLANE_WORDS] = { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f },
 		[PSR_WIRE_PLANE_BLOCK] = { 0xff, 0xff, 0xff },
 	};
-
 	return bytes[plane];
 }
 
@@ -41,7 +37,6 @@ uint64_t psr_plane_capability(unsigned plane)
 		[PSR_WIRE_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_WIRE_PLANE_WORDS] = PSR_CAP_WORDS,
 		[PSR_WIRE_PLANE_BLOCK] = PSR_CAP_BLOCK,
 	};
-
 	return capability[plane];
 }
 
@@ -53,7 +48,6 @@ uint64_t psr_rect_total_max(uint64_t n_pixels, unsigned pixel_bytes)
 static void layout_rect(struct wire *w, void *p)
 {
 	struct psr_msg_rect *m = p;
-
 	wire_u8(w, &m->plane);
 	wire_u8(w, &m->codec);
 	wire_u8(w, &m->scale);
@@ -72,7 +66,6 @@ static int check_rect(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_rect *m = p;
 	uint64_t n_pixels, raw;
-
 	if (check_integer("the plane of a rectangle", m->plane, 0, PSR_WIRE_PLANES - 1, err) ||
 	    check_integer("the codec of a rectangle", m->codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err))
 		return PSR_ERR_ARG;
@@ -114,7 +107,6 @@ int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t
 static void layout_frame_end(struct wire *w, void *p)
 {
 	struct psr_msg_frame_end *m = p;
-
 	wire_u16(w, &m->pass);
 	wire_u8(w, &m->is_final);
 	wire_u8(w, &m->status);
@@ -143,7 +135,6 @@ static int check_frame_end(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_frame_end *m = p;
 	uint16_t last = 0;
-
 	if (check_integer("the final mark of a frame", m->is_final, 0, 1, err) ||
 	    check_integer("the status of a frame", m->status, PSR_WIRE_FRAME_OK, PSR_WIRE_FRAME_COARSE, err) ||
 	    check_range("the error of a frame (pixels)", m->error_px, 0, PSR_WIRE_MAX_LENGTH, err))

@@ -7,7 +7,6 @@ static void layout_hello(struct wire *w, void *p)
 {
 	struct psr_msg_hello *m = p;
 	uint8_t magic[8];
-
 	memcpy(magic, PSR_HELLO_MAGIC, 8);
 	wire_bytes(w, magic, 8);
 	if (memcmp(magic, PSR_HELLO_MAGIC, 8))
@@ -34,7 +33,6 @@ int psr_msg_hello_encode(struct psr_buf *out, const struct psr_msg_hello *msg, s
 int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
 	int result;
-
 	if (n < 48)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "HELLO: the message has %zu of at least 48 bytes", n);
 	result = wire_decode(msg, PSR_MSG_HELLO, payload, n, layout_hello, NULL, err);
@@ -52,7 +50,6 @@ uint64_t psr_routing_key(const char *model_name)
 static void layout_welcome(struct wire *w, void *p)
 {
 	struct psr_msg_welcome *m = p;
-
 	wire_u16(w, &m->major);
 	wire_u16(w, &m->minor);
 	wire_reserved(w, 4);
@@ -73,7 +70,6 @@ static void layout_welcome(struct wire *w, void *p)
 static int check_welcome(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_welcome *m = p;
-
 	if (m->major != PSR_PROTO_MAJOR || m->minor != PSR_PROTO_MINOR)
 		return psr_fail(err, PSR_ERR_VERSION, "the server answers in version %u.%u of the protocol, this client speaks "
 		                "%u.%u: use programs of the same release", m->major, m->minor, PSR_PROTO_MAJOR,
@@ -104,7 +100,6 @@ int psr_msg_welcome_decode(struct psr_msg_welcome *msg, const uint8_t *payload, 
 static void layout_goodbye(struct wire *w, void *p)
 {
 	struct psr_msg_goodbye *m = p;
-
 	wire_u16(w, &m->reason);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -123,7 +118,6 @@ int psr_msg_goodbye_decode(struct psr_msg_goodbye *msg, const uint8_t *payload, 
 static void layout_ping(struct wire *w, void *p)
 {
 	struct psr_msg_ping *m = p;
-
 	wire_u64(w, &m->token);
 }
 
@@ -145,7 +139,6 @@ int psr_msg_ping_decode(struct psr_msg_ping *msg, const uint8_t *payload, size_t
 static void layout_error(struct wire *w, void *p)
 {
 	struct psr_msg_error *m = p;
-
 	wire_u16(w, &m->code);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -154,7 +147,6 @@ static void layout_error(struct wire *w, void *p)
 static int check_error(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_error *m = p;
-
 	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which is none");
 }
 
@@ -162,7 +154,6 @@ int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const 
                          struct psr_error *err)
 {
 	struct psr_msg_error clean = { .code = msg->code };
-
 	wire_clean(clean.text, msg->text, sizeof clean.text);
 	return wire_encode(out, PSR_MSG_ERROR, id, view, &clean, layout_error, check_error, err);
 }

@@ -26,7 +26,6 @@ void wire_fail(struct wire *w, int code, const char *what)
 static uint8_t *advance_out(struct wire *w, size_t n)
 {
 	size_t at = w->at;
-
 	w->at += n;
 	return w->at <= w->room ? w->out + at : NULL;
 }
@@ -34,7 +33,6 @@ static uint8_t *advance_out(struct wire *w, size_t n)
 static const uint8_t *advance_in(struct wire *w, size_t n)
 {
 	const uint8_t *p;
-
 	if (n > w->room - w->at) {
 		wire_fail(w, PSR_ERR_PROTOCOL, "the message ends too early");
 		w->at = w->room;
@@ -48,7 +46,6 @@ static const uint8_t *advance_in(struct wire *w, size_t n)
 static void put(struct wire *w, uint64_t v, unsigned n)
 {
 	uint8_t *p = advance_out(w, n);
-
 	for (unsigned i = 0; p && i < n; i++)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
@@ -57,7 +54,6 @@ static uint64_t get(struct wire *w, unsigned n)
 {
 	const uint8_t *p = advance_in(w, n);
 	uint64_t v = 0;
-
 	for (unsigned i = 0; p && i < n; i++)
 		v |= (uint64_t)p[i] << 8 * i;
 	return v;
@@ -100,7 +96,6 @@ void wire_f64(struct wire *w, double *v, int n)
 {
 	for (int i = 0; i < n; i++) {
 		uint64_t bits;
-
 		memcpy(&bits, &v[i], sizeof bits);
 		wire_u64(w, &bits);
 		if (!w->writing)
@@ -112,7 +107,6 @@ void wire_bytes(struct wire *w, uint8_t *v, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memcpy(p, v, n);
 		return;
@@ -129,7 +123,6 @@ void wire_reserved(struct wire *w, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memset(p, 0, n);
 		return;
@@ -145,7 +138,6 @@ void wire_data(struct wire *w, const uint8_t **data, uint32_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memcpy(p, *data, n);
 		return;
@@ -159,7 +151,6 @@ static size_t character(const uint8_t *p, size_t n)
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
 	size_t length = p[0] < 0x80 ? 1 : p[0] < 0xc0 ? 0 : p[0] < 0xe0 ? 2 : p[0] < 0xf0 ? 3 : p[0] < 0xf8 ? 4 : 0;
 	uint32_t c;
-
 	if (length == 0 || length > n)
 		return 0;
 	if (length == 1)
@@ -179,7 +170,6 @@ void wire_string(struct wire *w, char *text, size_t size)
 {
 	size_t length = w->writing ? strnlen(text, size) : 0;
 	uint16_t n = (uint16_t)length;
-
 	if (length >= size) {
 		wire_fail(w, PSR_ERR_ARG, "a text is not terminated");
 		return;
@@ -202,10 +192,8 @@ void wire_string(struct wire *w, char *text, size_t size)
 void wire_clean(char *out, const char *text, size_t size)
 {
 	size_t n = strnlen(text, size - 1), i = 0;
-
 	while (i < n) {
 		size_t step = character((const uint8_t *)text + i, n - i);
-
 		memcpy(out + i, step ? text + i : "?", step ? step : 1);
 		i += step ? step : 1;
 	}
@@ -219,7 +207,6 @@ int wire_encode(struct psr_buf *out, unsigned type, uint32_t id, uint16_t view, 
 	uint16_t type16 = (uint16_t)type, flags = 0;
 	uint32_t length = 0;
 	int result;
-
 	assert(out->size <= out->capacity && psr_msg_name(type));
 	result = check ? check(msg, err) : PSR_OK;
 	if (result != PSR_OK)
@@ -250,7 +237,6 @@ int wire_decode(void *msg, unsigned type, const uint8_t *payload, size_t n, wire
                 struct psr_error *err)
 {
 	struct wire w = { .in = payload, .room = n };
-
 	layout(&w, msg);
 	if (w.code == PSR_OK && w.at < n)
 		wire_fail(&w, PSR_ERR_PROTOCOL, "the message goes on behind its last field");

@@ -46,7 +46,6 @@ static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 {
 	fenv_t callers;
 	int i;
-
 	fegetenv(&callers);
 	fesetenv(FE_DFL_ENV);
 	while ((n_jobs == NULL || atomic_load_explicit(n_jobs, memory_order_relaxed) == 0)
@@ -59,7 +58,6 @@ static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 static struct loop *neediest_loop(struct psr_pool *pool)
 {
 	struct loop *best = NULL;
-
 	for (struct loop *loop = pool->loops.next; loop != &pool->loops; loop = loop->next)
 		if (atomic_load_explicit(&loop->taken, memory_order_relaxed) < loop->n
 		    && (best == NULL || loop->n_helpers < best->n_helpers))
@@ -70,7 +68,6 @@ static struct loop *neediest_loop(struct psr_pool *pool)
 static void run_job(struct psr_pool *pool)
 {
 	struct job *job = pool->first_job;
-
 	pool->first_job = job->next;
 	if (pool->first_job == NULL)
 		pool->last_job = &pool->first_job;
@@ -104,7 +101,6 @@ static void pause_briefly(void)
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
 	struct timespec start, now;
-
 	clock_gettime(CLOCK_MONOTONIC, &start);
 	do {
 		for (int i = 0; i < 64; i++) {
@@ -129,11 +125,9 @@ static void *work(void *userdata)
 	struct psr_pool *pool = userdata;
 	struct loop *loop;
 	int has_spun = 0;
-
 	pthread_mutex_lock(&pool->mutex);
 	for (;;) {
 		const unsigned n_offers = atomic_load_explicit(&pool->n_offers, memory_order_relaxed);
-
 		if (pool->first_job != NULL) {
 			run_job(pool);
 			has_spun = 0;
@@ -180,7 +174,6 @@ int psr_pool_create(struct psr_pool **out, int n_threads, int with_jobs)
 {
 	struct psr_pool *pool;
 	int n_workers = with_jobs ? n_threads : n_threads - 1;
-
 	if (n_threads < 1 || n_threads > MAX_THREADS)
 		return PSR_ERR_ARG;
 	pool = calloc(1, sizeof *pool);
@@ -235,7 +228,6 @@ int psr_pool_threads(const struct psr_pool *pool)
 void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata)
 {
 	struct loop loop = { .fn = fn, .userdata = userdata, .n = n };
-
 	/* Each thread may take one index too many before it sees the end. */
 	assert(n <= INT_MAX - MAX_THREADS - 1);
 	if (n <= 0)
@@ -272,7 +264,6 @@ void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata
 int psr_pool_submit(struct psr_pool *pool, void (*fn)(void *userdata), void *userdata)
 {
 	struct job *job;
-
 	assert(pool->with_jobs);
 	job = malloc(sizeof *job);
 	if (job == NULL)

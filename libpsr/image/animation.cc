@@ -25,7 +25,6 @@ struct Animation {
 int check(const std::string &ending, char *message, unsigned size)
 {
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
-
 	if (!out)
 		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
 	if (std::string(out->format_name()) != "gif")
@@ -65,7 +64,6 @@ int add(Animation *a, const void *pixels, char *message, unsigned size)
 int close(Animation *a, char *message, unsigned size)
 {
 	std::unique_ptr<Animation> owned(a);
-
 	return owned->out->close() ? 0 : fail(message, size, owned->out->geterror());
 }
 

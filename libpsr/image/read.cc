@@ -50,7 +50,6 @@ int fail(const problem &problem, int code, const std::string &why)
 int check_spec(const OIIO::ImageSpec &spec, uint64_t max_pixels, const problem &problem)
 {
 	const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels";
-
 	if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
 		return fail(problem, PSR_ERR_UNSUPPORTED, "not a plain picture with one to four channels");
 	if (spec.width > IMPORT_MAX_IMAGE_SIDE || spec.height > IMPORT_MAX_IMAGE_SIDE)
@@ -69,7 +68,6 @@ bool read_integers(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uin
 		return false;
 	for (size_t i = 0; i < n_pixels; i++) {
 		uint8_t *p = rgba + 4 * i, r = p[c.red], g = p[c.green], b = p[c.blue], a = c.alpha < 0 ? 255 : p[c.alpha];
-
 		p[0] = r;
 		p[1] = g;
 		p[2] = b;
@@ -81,13 +79,11 @@ bool read_integers(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uin
 bool read_floats(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uint8_t *rgba)
 {
 	std::vector<float> linear(n_pixels * (size_t)c.n);
-
 	if (!in.read_image(0, 0, 0, c.n, OIIO::TypeDesc::FLOAT, linear.data()))
 		return false;
 	for (size_t i = 0; i < n_pixels; i++) {
 		const float *p = linear.data() + i * (size_t)c.n;
 		float a = c.alpha < 0 ? 1.0f : p[c.alpha];
-
 		rgba[4 * i] = psr_linear_to_srgb(p[c.red]);
 		rgba[4 * i + 1] = psr_linear_to_srgb(p[c.green]);
 		rgba[4 * i + 2] = psr_linear_to_srgb(p[c.blue]);
@@ -141,7 +137,6 @@ extern "C" __attribute__((visibility("default"))) int psr_image_module_read(uint
                                                                             char *message, unsigned message_size)
 {
 	const problem problem = { message, message_size };
-
 	try {
 		return decode(rgba, size, bytes, n_bytes, format, max_pixels, problem);
 	} catch (const std::bad_alloc &) {

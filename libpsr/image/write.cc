@@ -21,7 +21,6 @@ namespace {
 int check(const std::string &ending, bool is_depth, char *message, unsigned size)
 {
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
-
 	if (!out)
 		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
 	if (is_depth) {
@@ -39,7 +38,6 @@ int check(const std::string &ending, bool is_depth, char *message, unsigned size
 bool is_linear(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
-
 	return name == "openexr" || name == "hdr";
 }
 
@@ -47,7 +45,6 @@ std::vector<float> linearize(const std::uint8_t *codes, std::size_t n)
 {
 	std::vector<float> linear(n);
 	float table[256];
-
 	for (int i = 0; i < 256; i++)
 		table[i] = static_cast<float>(i <= 10 ? i / 255.0 / 12.92 : std::pow((i / 255.0 + 0.055) / 1.055, 2.4));
 	for (std::size_t i = 0; i < n; i++)
@@ -59,7 +56,6 @@ std::vector<float> linearize(const std::uint8_t *codes, std::size_t n)
 bool wants_memory(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
-
 	return name != "openexr" && name != "tiff" && out.supports("ioproxy");
 }
 
@@ -67,7 +63,6 @@ int write_bytes(const char *path, const std::vector<unsigned char> &bytes, char 
 {
 	std::FILE *file = std::fopen(path, "wb");
 	int reason = file == nullptr ? errno : 0;
-
 	if (file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size())
 		reason = errno;
 	if (file != nullptr && std::fclose(file) != 0 && reason == 0)

@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "import.h"
@@ -12,10 +13,8 @@
 static int read_all(uint8_t *bytes, size_t *n_bytes, int fd)
 {
 	size_t n = 0;
-
 	while (n < *n_bytes) {
 		ssize_t got = read(fd, bytes + n, *n_bytes - n < (1u << 30) ? *n_bytes - n : (1u << 30));
-
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got < 0)
@@ -33,9 +32,8 @@ int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_
 	struct stat st;
 	uint8_t *buffer;
 	size_t n;
-	/* Opening a pipe without a writer would wait for one. */
+	/* O_NONBLOCK: opening a pipe without a writer would wait for one. */
 	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-
 	if (fd < 0)
 		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s: %s", path,
 		                strerror(errno));
@@ -45,7 +43,7 @@ int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_
 	}
 	if ((uint64_t)st.st_size > max_bytes) {
 		close(fd);
-		return psr_fail(err, PSR_ERR_LIMIT, "%s: %lld bytes, the limit is %llu", path, (long long)st.st_size,
+		return psr_fail(err, PSR_ERR_LIMIT, "%s: has %lld bytes; the limit is %llu", path, (long long)st.st_size,
 		                (unsigned long long)max_bytes);
 	}
 	n = (size_t)st.st_size;
@@ -56,7 +54,6 @@ int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_
 	}
 	if (read_all(buffer, &n, fd) != 0) {
 		int saved = errno;
-
 		free(buffer);
 		close(fd);
 		return psr_fail(err, PSR_ERR_IO, "%s: cannot read: %s", path, strerror(saved));
@@ -67,11 +64,16 @@ int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_
 	return PSR_OK;
 }
 
+int import_path_ends_with(const char *path, const char *ending)
+{
+	const size_t n = strlen(path), m = strlen(ending);
+	return n >= m && strcasecmp(path + n - m, ending) == 0;
+}
+
 int import_path_folder(char **folder, const char *path, struct psr_error *err)
 {
 	const char *slash = strrchr(path, '/');
 	char *name, *resolved;
-
 	name = slash == NULL ? strdup(".") : slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
 	if (name == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for its path", path);
@@ -89,9 +91,8 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
 {
 	size_t n = strlen(folder);
 	char *joined, *resolved;
-
 	if (name[0] == '\0')
-		return psr_fail(err, PSR_ERR_FORMAT, "names a file without a name");
+		return psr_fail(err, PSR_ERR_FORMAT, "names a file by an empty string");
 	if (name[0] == '/')
 		joined = strdup(name);
 	else if (asprintf(&joined, "%s/%s", folder, name) < 0)
@@ -101,11 +102,11 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
 	resolved = realpath(joined, NULL);
 	free(joined);
 	if (resolved == NULL)
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "names \"%s\", which cannot be found in its folder: %s", name,
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "names \"%s\", which is not in its folder: %s", name,
 		                strerror(errno));
 	if (strncmp(resolved, folder, n) != 0 || resolved[n] != '/') {
 		free(resolved);
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "names \"%s\", which lies outside of its own folder; copy it there",
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "names \"%s\", outside of its own folder; copy it into the folder",
 		                name);
 	}
 	*out = resolved;

@@ -47,12 +47,10 @@ struct neighbor {
 static int find_neighbors(const struct measure *m, uint32_t x, uint32_t y, struct neighbor neighbor[9])
 {
 	int n = 0;
-
 	for (uint32_t j = y == 0 ? 0 : y - 1; j <= y + 1 && j < m->height; j++) {
 		for (uint32_t i = x == 0 ? 0 : x - 1; i <= x + 1 && i < m->width; i++) {
 			size_t at = (size_t)j * m->width + i;
 			double origin[3], direction[3];
-
 			if (!isfinite(m->truth_depth[at]))
 				continue;
 			view_ray(&m->view, i + 0.5, j + 0.5, origin, direction);
@@ -73,7 +71,6 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 	for (int i = 0; i < n; i++) {
 		double cosine = fmin(1, neighbor[i].cosine), slope = sqrt(1 - cosine * cosine) / cosine;
 		double pixel = view_pixel(&m->view, neighbor[i].z);
-
 		if (z <= neighbor[i].z + HOLE_SPACINGS * m->spacing + SLOPE_PIXELS * pixel * slope)
 			return 0;
 	}
@@ -84,10 +81,8 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 static double distance_to(const struct measure *m, const double point[3], const struct neighbor *neighbor, int n)
 {
 	double nearest[2] = { INFINITY, INFINITY };
-
 	for (int i = 0; i < n; i++) {
 		double d[3], along, aside, footprint = view_pixel(&m->view, neighbor[i].z) / neighbor[i].cosine;
-
 		v3d_sub(d, point, neighbor[i].point);
 		along = fabs(v3d_dot(d, neighbor[i].normal));
 		aside = sqrt(fmax(0, v3d_dot(d, d) - along * along));
@@ -109,7 +104,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 	size_t at = (size_t)y * m->width + x;
 	int is_drawn = isfinite(m->depth[at]), n, is_inside;
 	struct neighbor neighbor[9];
-
 	m->distance[at] = -1;
 	n = find_neighbors(m, x, y, neighbor);
 	is_inside = n == 9;
@@ -121,7 +115,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 		count->n_outside_drawn += (uint64_t)is_outside(m, x, y);
 	if (is_drawn && n != 0) {
 		double origin[3], direction[3], point[3];
-
 		view_ray(&m->view, x + 0.5, y + 0.5, origin, direction);
 		v3d_add_scaled(point, origin, (double)m->depth[at], direction);
 		m->distance[at] = distance_to(m, point, neighbor, n) / m->spacing;
@@ -135,7 +128,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 static void measure_row(int y, void *userdata)
 {
 	const struct measure *m = userdata;
-
 	memset(&m->row[y], 0, sizeof m->row[y]);
 	for (uint32_t x = 0; x < m->width; x++)
 		measure_pixel(m, x, (uint32_t)y, &m->row[y]);
@@ -144,7 +136,6 @@ static void measure_row(int y, void *userdata)
 static int compare_doubles(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
-
 	return (x > y) - (x < y);
 }
 
@@ -152,14 +143,12 @@ static int compare_doubles(const void *a, const void *b)
 static double percentile(const double *sorted, uint64_t n, double part)
 {
 	uint64_t rank = (uint64_t)ceil(part * (double)n);
-
 	return n == 0 ? 0 : sorted[rank > 0 ? rank - 1 : 0];
 }
 
 static void add_up(struct psr_accuracy *out, const struct measure *m)
 {
 	uint64_t n = 0;
-
 	memset(out, 0, sizeof *out);
 	for (uint32_t y = 0; y < m->height; y++) {
 		out->n_truth += m->row[y].n_truth;
@@ -185,7 +174,6 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	size_t n = (size_t)m->width * m->height;
 	struct psr_pool *pool;
 	int rc;
-
 	m->truth_depth = psr_alloc_array(n, sizeof *m->truth_depth);
 	m->truth_normal = psr_alloc_array(n, sizeof *m->truth_normal);
 	m->distance = psr_alloc_array(n, sizeof *m->distance);
@@ -211,7 +199,6 @@ int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, cons
 	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
 		                 .depth = depth };
 	int rc = view_init(&m.view, camera, width, height, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (!(spacing > 0 && isfinite(spacing)))

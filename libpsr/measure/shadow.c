@@ -35,7 +35,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y)
 	double place[RAYS * RAYS][2];
 	struct truth_light light[RAYS * RAYS];
 	int n_reaching = 0;
-
 	m->expected[at] = m->got[at] = -1;
 	for (int i = 0; i < RAYS * RAYS; i++) {
 		place[i][0] = x + (i % RAYS + 0.5) / RAYS;
@@ -55,7 +54,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y)
 static void measure_row(int y, void *userdata)
 {
 	const struct measure *m = userdata;
-
 	for (uint32_t x = 0; x < m->width; x++)
 		measure_pixel(m, x, (uint32_t)y);
 }
@@ -77,12 +75,10 @@ static int is_compared(const struct measure *m, uint32_t x, uint32_t y)
 static double seam_at(const struct measure *m, uint32_t x, uint32_t y, int is_lit)
 {
 	double nearest = PSR_SHADOW_FAR;
-
 	for (int64_t j = -PSR_SHADOW_FAR; j <= PSR_SHADOW_FAR; j++)
 		for (int64_t i = -PSR_SHADOW_FAR; i <= PSR_SHADOW_FAR; i++) {
 			int64_t u = x + i, v = y + j;
 			size_t at = (size_t)(v * m->width + u);
-
 			if (u < 0 || v < 0 || u >= m->width || v >= m->height || m->expected[at] < 0)
 				continue;
 			if ((m->expected[at] >= 0.5f) == is_lit)
@@ -94,7 +90,6 @@ static double seam_at(const struct measure *m, uint32_t x, uint32_t y, int is_li
 static int compare_doubles(const void *a, const void *b)
 {
 	double x = *(const double *)a, y = *(const double *)b;
-
 	return (x > y) - (x < y);
 }
 
@@ -102,13 +97,11 @@ static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 {
 	const size_t n = (size_t)m->width * m->height;
 	double *seam = psr_alloc_array(n, sizeof *seam), sum = 0;
-
 	if (seam == NULL)
 		return PSR_ERR_MEMORY;
 	for (size_t at = 0; at < n; at++) {
 		double off = fabs((double)m->got[at] - (double)m->expected[at]);
 		int is_lit = m->got[at] >= 0.5f;
-
 		if (!is_compared(m, (uint32_t)(at % m->width), (uint32_t)(at / m->width)))
 			continue;
 		out->n_compared++;
@@ -137,7 +130,6 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_trut
 		                 .shadowed = shadowed, .lit = lit };
 	struct psr_pool *pool = NULL;
 	int rc = view_init(&m.view, camera, width, height, err);
-
 	memset(out, 0, sizeof *out);
 	if (rc != PSR_OK)
 		return rc;

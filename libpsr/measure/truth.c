@@ -40,7 +40,6 @@ int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct
 {
 	struct psr_truth *truth;
 	int rc = door_check_mesh(mesh, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	truth = calloc(1, sizeof *truth);
@@ -82,7 +81,6 @@ void truth_ray(const struct psr_truth *truth, const struct view *view, double x,
 double truth_distance(const struct psr_truth *truth, const double point[3], double most)
 {
 	double inner[3];
-
 	for (int k = 0; k < 3; k++)
 		inner[k] = (point[k] - truth->origin[k]) / truth->scale;
 	return fmin(most, truth->scale * ray_scene_distance(truth->scene, inner, most / truth->scale));
@@ -93,7 +91,6 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 {
 	struct ray ray[MOST_SIDE];
 	struct ray_hit hit[MOST_SIDE];
-
 	for (int j = 0; j < side; j++) {
 		for (int i = 0; i < side; i++)
 			truth_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
@@ -111,7 +108,6 @@ static int is_between(const struct psr_truth *truth, const double from[3], const
 	const double off = 1e-4;
 	struct ray ray = { { 0 }, { 0 } };
 	struct ray_hit hit;
-
 	if (length <= 2 * off)
 		return 0;
 	v3d_add_scaled(ray.origin, from, off, to_light);
@@ -130,14 +126,12 @@ void truth_light(const struct psr_truth *truth, const struct view *view, double 
 {
 	struct ray ray[RUN] = { { { 0 }, { 0 } } };
 	struct ray_hit hit[RUN];
-
 	for (int i = 0; i < n; i++)
 		truth_ray(truth, view, place[i][0], place[i][1], &ray[i]);
 	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
 	for (int i = 0; i < n; i++) {
 		double point[3], to_light[3], length = 4, facing = 0, seen = 0;
 		const float *normal;
-
 		out[i] = (struct truth_light){ -2, 0 };
 		if (hit[i].prim == RAY_NONE)
 			continue;
@@ -178,7 +172,6 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 {
 	const float *n = ray_scene_normal(job->truth->scene, hit->prim);
 	double facing = 0;
-
 	for (int k = 0; k < 3; k++)
 		facing += (double)n[k] * ray->direction[k];
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
@@ -190,7 +183,6 @@ static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, 
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
 	const float *normal = ray_scene_normal(truth->scene, hit->prim);
 	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, normal));
-
 	for (int c = 0; c < 3; c++)
 		rgb[c] = (uint8_t)(diffuse >> 8 * c);
 }
@@ -200,17 +192,14 @@ static void draw_row(int row, void *userdata)
 	const struct job *job = userdata;
 	struct ray ray[RUN];
 	struct ray_hit hit[RUN];
-
 	for (uint32_t first = 0; first < job->n_columns; first += RUN) {
 		uint32_t n = job->n_columns - first < RUN ? job->n_columns - first : RUN;
 		size_t at = (size_t)row * job->n_columns + first;
-
 		for (uint32_t i = 0; i < n; i++)
 			truth_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
 		ray_scene_trace(job->truth->scene, ray, (int)n, job->near_z / job->truth->scale, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			int is_met = hit[i].prim != RAY_NONE;
-
 			job->depth[at + i] = is_met ? (float)(hit[i].t * job->truth->scale) : INFINITY;
 			if (job->normal != NULL) {
 				v3f_set(job->normal[at + i], 0, 0, 0);
@@ -233,7 +222,6 @@ int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uin
 		               .rgb = rgb };
 	struct psr_pool *pool;
 	int rc = view_init(&job.view, camera, width, height, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)

@@ -9,7 +9,6 @@ int view_init(struct view *view, const struct psr_camera *camera, uint32_t width
 	const struct psr_scene scene = { .camera = *camera };
 	double sine, cosine;
 	int rc = psr_scene_validate(&scene, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (width == 0 || height == 0)
@@ -40,7 +39,6 @@ void view_ray(const struct view *view, double x, double y, double origin[3], dou
 {
 	double across = (x - view->width / 2) * view->pixel, along = (y - view->height / 2) * view->pixel;
 	double *moved = view->is_perspective ? direction : origin;
-
 	v3d_set(origin, view->eye[0], view->eye[1], view->eye[2]);
 	v3d_set(direction, view->forward[0], view->forward[1], view->forward[2]);
 	v3d_add_scaled(moved, moved, across, view->right);

@@ -18,7 +18,6 @@ static int open_temporary(char **out, const char *path, struct psr_error *err)
 	size_t size = strlen(path) + 64;
 	char *name = malloc(size);
 	int fd = -1;
-
 	if (name == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the name of a file");
 	for (int i = 0; i < MAX_TRIES && fd < 0; i++) {
@@ -39,10 +38,8 @@ static int open_temporary(char **out, const char *path, struct psr_error *err)
 static int write_all(int fd, const uint8_t *bytes, size_t n_bytes)
 {
 	size_t at = 0;
-
 	while (at < n_bytes) {
 		ssize_t done = write(fd, bytes + at, n_bytes - at);
-
 		if (done < 0 && errno != EINTR)
 			return -1;
 		if (done > 0)
@@ -57,7 +54,6 @@ static int sync_folder(const char *path)
 	const char *slash = strrchr(path, '/');
 	char *folder = slash == NULL ? strdup(".") : strndup(path, slash == path ? 1 : (size_t)(slash - path));
 	int fd, failed;
-
 	if (folder == NULL)
 		return -1;
 	fd = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -72,7 +68,6 @@ static int sync_folder(const char *path)
 static int fill(int fd, const uint8_t *bytes, size_t n_bytes)
 {
 	int failed = write_all(fd, bytes, n_bytes) != 0 || fsync(fd) != 0, reason = errno;
-
 	if (close(fd) != 0 && !failed) {
 		failed = 1;
 		reason = errno;
@@ -85,7 +80,6 @@ static int fill(int fd, const uint8_t *bytes, size_t n_bytes)
 static int check_place(const char *path, struct psr_error *err)
 {
 	struct stat st;
-
 	if (stat(path, &st) == 0 && !S_ISREG(st.st_mode))
 		return psr_fail(err, PSR_ERR_IO, "%.200s: this is not a regular file, and will not be replaced by one", path);
 	return PSR_OK;
@@ -95,7 +89,6 @@ static int write_file(const char *path, const uint8_t *bytes, size_t n_bytes, st
 {
 	char *temporary = NULL;
 	int fd, code = PSR_OK;
-
 	fd = open_temporary(&temporary, path, err);
 	if (fd < 0)
 		return fd;
@@ -117,7 +110,6 @@ int psr_model_write(const struct psr_model *model, const char *path, struct psr_
 	size_t n_bytes;
 	const uint8_t *bytes = model_image(model, &n_bytes);
 	int code = check_place(path, err);
-
 	return code == PSR_OK ? write_file(path, bytes, n_bytes, err) : code;
 }
 
@@ -127,7 +119,6 @@ int psr_model_write_packed(const struct psr_model *model, const char *path, stru
 	const uint8_t *image = model_image(model, &n_image);
 	uint8_t *bytes;
 	int code = check_place(path, err);
-
 	if (code == PSR_OK)
 		code = pack_image(&bytes, &n_bytes, &capacity, image, n_image, err);
 	if (code != PSR_OK)

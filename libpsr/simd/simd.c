@@ -26,7 +26,7 @@ int psr_isa_check_environment(struct psr_error *err)
 	enum psr_isa isa;
 	const char *wanted = getenv("PSR_ISA");
 	if (wanted && psr_isa_parse(&isa, wanted))
-		return psr_fail(err, PSR_ERR_ARG, "PSR_ISA is '%.40s': set it to c, avx2 or avx512, or unset it", wanted);
+		return psr_fail(err, PSR_ERR_ARG, "PSR_ISA is '%.40s'; it takes c, avx2 or avx512, or is left out", wanted);
 	return PSR_OK;
 }
 
