@@ -7,7 +7,7 @@ static int check_name(const char *name, struct psr_error *err)
 
 int psr_msg_list_encode(struct psr_buf *out, uint32_t id, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_LIST, id, 0, NULL, NULL, NULL, err);
+	return wire_encode(out, WIRE(LIST, NULL, NULL), id, 0, NULL, err);
 }
 
 static void layout_list_entry(struct wire *w, void *p)
@@ -32,12 +32,12 @@ static int check_list_entry(const void *p, struct psr_error *err)
 int psr_msg_list_entry_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_list_entry *msg,
                               struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_LIST_ENTRY, id, 0, msg, layout_list_entry, check_list_entry, err);
+	return wire_encode(out, WIRE(LIST_ENTRY, layout_list_entry, check_list_entry), id, 0, msg, err);
 }
 
 int psr_msg_list_entry_decode(struct psr_msg_list_entry *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_LIST_ENTRY, payload, n, layout_list_entry, check_list_entry, err);
+	return wire_decode(msg, WIRE(LIST_ENTRY, layout_list_entry, check_list_entry), payload, n, err);
 }
 
 static void layout_list_end(struct wire *w, void *p)
@@ -49,12 +49,12 @@ static void layout_list_end(struct wire *w, void *p)
 int psr_msg_list_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_list_end *msg,
                             struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_LIST_END, id, 0, msg, layout_list_end, NULL, err);
+	return wire_encode(out, WIRE(LIST_END, layout_list_end, NULL), id, 0, msg, err);
 }
 
 int psr_msg_list_end_decode(struct psr_msg_list_end *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_LIST_END, payload, n, layout_list_end, NULL, err);
+	return wire_decode(msg, WIRE(LIST_END, layout_list_end, NULL), payload, n, err);
 }
 
 static void layout_open(struct wire *w, void *p)
@@ -74,12 +74,12 @@ static int check_open(const void *p, struct psr_error *err)
 
 int psr_msg_open_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_open *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_OPEN, id, 0, msg, layout_open, check_open, err);
+	return wire_encode(out, WIRE(OPEN, layout_open, check_open), id, 0, msg, err);
 }
 
 int psr_msg_open_decode(struct psr_msg_open *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_OPEN, payload, n, layout_open, check_open, err);
+	return wire_decode(msg, WIRE(OPEN, layout_open, check_open), payload, n, err);
 }
 
 static void layout_progress(struct wire *w, void *p)
@@ -104,12 +104,12 @@ static int check_progress(const void *p, struct psr_error *err)
 int psr_msg_progress_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_progress *msg,
                             struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PROGRESS, id, 0, msg, layout_progress, check_progress, err);
+	return wire_encode(out, WIRE(PROGRESS, layout_progress, check_progress), id, 0, msg, err);
 }
 
 int psr_msg_progress_decode(struct psr_msg_progress *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PROGRESS, payload, n, layout_progress, check_progress, err);
+	return wire_decode(msg, WIRE(PROGRESS, layout_progress, check_progress), payload, n, err);
 }
 
 static void layout_opened(struct wire *w, void *p)
@@ -155,12 +155,12 @@ static int check_opened(const void *p, struct psr_error *err)
 
 int psr_msg_opened_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_opened *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_OPENED, id, 0, msg, layout_opened, check_opened, err);
+	return wire_encode(out, WIRE(OPENED, layout_opened, check_opened), id, 0, msg, err);
 }
 
 int psr_msg_opened_decode(struct psr_msg_opened *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_OPENED, payload, n, layout_opened, check_opened, err);
+	return wire_decode(msg, WIRE(OPENED, layout_opened, check_opened), payload, n, err);
 }
 
 static void layout_close(struct wire *w, void *p)
@@ -177,10 +177,10 @@ static int check_close(const void *p, struct psr_error *err)
 
 int psr_msg_close_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_close *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_CLOSE, id, 0, msg, layout_close, check_close, err);
+	return wire_encode(out, WIRE(CLOSE, layout_close, check_close), id, 0, msg, err);
 }
 
 int psr_msg_close_decode(struct psr_msg_close *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_CLOSE, payload, n, layout_close, check_close, err);
+	return wire_decode(msg, WIRE(CLOSE, layout_close, check_close), payload, n, err);
 }

@@ -2,7 +2,7 @@
 #include <stddef.h>
 #include "wire.h"
 
-/* Byte differences in place; no division into planes, as there is only one. */
+/* Byte differences in place; bytes form a single plane. */
 static void filter_bytes(uint8_t *out, const uint8_t *in, size_t row, uint32_t height, unsigned c)
 {
 	for (uint32_t y = 0; y < height; y++, in += row, out += row) {
@@ -39,8 +39,7 @@ static inline void store(uint8_t *p, uint64_t v, unsigned b)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
 
-/* Byte k of component i stands at k * n + i of its row. All of this is inlined once for each b: plain loads
- * are left. */
+/* Moves byte k of component i to k * n + i of the row. Inlined once for each b, which leaves plain loads. */
 static inline void split(uint8_t *out, uint64_t d, size_t n, unsigned b)
 {
 #pragma GCC unroll 8
@@ -57,7 +56,7 @@ static inline uint64_t join(const uint8_t *in, size_t n, unsigned b)
 	return d;
 }
 
-/* n components of b bytes a row, c of them a pixel. */
+/* n components of b bytes a row, c a pixel. */
 static inline void filter_wide(uint8_t *out, const uint8_t *in, size_t n, uint32_t height, unsigned c, unsigned b)
 {
 	for (uint32_t y = 0; y < height; y++, in += n * b, out += n * b) {

@@ -65,7 +65,7 @@ static int check_settings(const struct psr_msg_settings *m, struct psr_error *er
 	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
 }
 
-/* What a request and its FRAME_BEGIN have in common. */
+/* The fields that a request and its FRAME_BEGIN share. */
 struct picture {
 	uint32_t width, height, planes;
 	uint8_t color_codec, color_quality, depth_format, depth_codec, data_codec;
@@ -163,12 +163,12 @@ static int check_frame(const void *p, struct psr_error *err)
 int psr_msg_frame_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame *msg,
                          struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME, id, view, msg, layout_frame, check_frame, err);
+	return wire_encode(out, WIRE(FRAME, layout_frame, check_frame), id, view, msg, err);
 }
 
 int psr_msg_frame_decode(struct psr_msg_frame *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME, payload, n, layout_frame, check_frame, err);
+	return wire_decode(msg, WIRE(FRAME, layout_frame, check_frame), payload, n, err);
 }
 
 static void layout_frame_begin(struct wire *w, void *p)
@@ -212,11 +212,11 @@ static int check_frame_begin(const void *p, struct psr_error *err)
 int psr_msg_frame_begin_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_begin *msg,
                                struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME_BEGIN, id, view, msg, layout_frame_begin, check_frame_begin, err);
+	return wire_encode(out, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), id, view, msg, err);
 }
 
 int psr_msg_frame_begin_decode(struct psr_msg_frame_begin *msg, const uint8_t *payload, size_t n,
                                struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME_BEGIN, payload, n, layout_frame_begin, check_frame_begin, err);
+	return wire_decode(msg, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), payload, n, err);
 }

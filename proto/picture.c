@@ -75,7 +75,8 @@ static int check_rect(const void *p, struct psr_error *err)
 	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
 		return psr_fail(err, PSR_ERR_ARG, "the scale of a rectangle is %u: it must be 1, 2 or 4", m->scale);
 	if (m->w == 0 || m->h == 0 || m->x + m->w > PSR_WIRE_MAX_SIDE || m->y + m->h > PSR_WIRE_MAX_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "a rectangle of %u x %u pixels at %u, %u is in no picture", m->w, m->h, m->x,
+		return psr_fail(err, PSR_ERR_ARG, "a rectangle of %u x %u pixels at %u, %u is outside of every picture", m->w,
+		                m->h, m->x,
 		                m->y);
 	if ((uint32_t)m->w * m->h > PSR_WIRE_MAX_RECT_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a rectangle has %u x %u pixels, and holds at most %u", m->w, m->h,
@@ -96,12 +97,12 @@ static int check_rect(const void *p, struct psr_error *err)
 int psr_msg_rect_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_rect *msg,
                         struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_RECT, id, view, msg, layout_rect, check_rect, err);
+	return wire_encode(out, WIRE(RECT, layout_rect, check_rect), id, view, msg, err);
 }
 
 int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_RECT, payload, n, layout_rect, check_rect, err);
+	return wire_decode(msg, WIRE(RECT, layout_rect, check_rect), payload, n, err);
 }
 
 static void layout_frame_end(struct wire *w, void *p)
@@ -160,10 +161,10 @@ static int check_frame_end(const void *p, struct psr_error *err)
 int psr_msg_frame_end_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_end *msg,
                              struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME_END, id, view, msg, layout_frame_end, check_frame_end, err);
+	return wire_encode(out, WIRE(FRAME_END, layout_frame_end, check_frame_end), id, view, msg, err);
 }
 
 int psr_msg_frame_end_decode(struct psr_msg_frame_end *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME_END, payload, n, layout_frame_end, check_frame_end, err);
+	return wire_decode(msg, WIRE(FRAME_END, layout_frame_end, check_frame_end), payload, n, err);
 }

@@ -15,12 +15,12 @@ static int check_presets(const void *p, struct psr_error *err)
 
 int psr_msg_presets_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESETS, id, 0, msg, layout_presets, check_presets, err);
+	return wire_encode(out, WIRE(PRESETS, layout_presets, check_presets), id, 0, msg, err);
 }
 
 int psr_msg_presets_decode(struct psr_msg_presets *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESETS, payload, n, layout_presets, check_presets, err);
+	return wire_decode(msg, WIRE(PRESETS, layout_presets, check_presets), payload, n, err);
 }
 
 static void layout_preset(struct wire *w, void *p)
@@ -52,12 +52,12 @@ static int check_preset(const void *p, struct psr_error *err)
 
 int psr_msg_preset_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_preset *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESET, id, 0, msg, layout_preset, check_preset, err);
+	return wire_encode(out, WIRE(PRESET, layout_preset, check_preset), id, 0, msg, err);
 }
 
 int psr_msg_preset_decode(struct psr_msg_preset *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESET, payload, n, layout_preset, check_preset, err);
+	return wire_decode(msg, WIRE(PRESET, layout_preset, check_preset), payload, n, err);
 }
 
 static void layout_presets_end(struct wire *w, void *p)
@@ -79,11 +79,11 @@ static int check_presets_end(const void *p, struct psr_error *err)
 int psr_msg_presets_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets_end *msg,
                                struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESETS_END, id, 0, msg, layout_presets_end, check_presets_end, err);
+	return wire_encode(out, WIRE(PRESETS_END, layout_presets_end, check_presets_end), id, 0, msg, err);
 }
 
 int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *payload, size_t n,
                                struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESETS_END, payload, n, layout_presets_end, check_presets_end, err);
+	return wire_decode(msg, WIRE(PRESETS_END, layout_presets_end, check_presets_end), payload, n, err);
 }

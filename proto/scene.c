@@ -55,7 +55,8 @@ static int check_instance(const struct psr_msg_instance *m, struct psr_error *er
 	    check_positive("an instance's scale", m->scale, err))
 		return PSR_ERR_ARG;
 	if (!(fabs(norm - 1) <= 1e-6))
-		return psr_fail(err, PSR_ERR_ARG, "an instance's rotation (%g, %g, %g, %g) is no unit quaternion", q[0], q[1],
+		return psr_fail(err, PSR_ERR_ARG, "an instance's rotation (%g, %g, %g, %g) is not a unit quaternion", q[0],
+		                q[1],
 		                q[2], q[3]);
 	return PSR_OK;
 }
@@ -114,10 +115,10 @@ static int check_scene(const void *p, struct psr_error *err)
 
 int psr_msg_scene_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_scene *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_SCENE, id, 0, msg, layout_scene, check_scene, err);
+	return wire_encode(out, WIRE(SCENE, layout_scene, check_scene), id, 0, msg, err);
 }
 
 int psr_msg_scene_decode(struct psr_msg_scene *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_SCENE, payload, n, layout_scene, check_scene, err);
+	return wire_decode(msg, WIRE(SCENE, layout_scene, check_scene), payload, n, err);
 }

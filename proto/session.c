@@ -27,7 +27,7 @@ static void layout_hello(struct wire *w, void *p)
 
 int psr_msg_hello_encode(struct psr_buf *out, const struct psr_msg_hello *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_HELLO, 0, 0, msg, layout_hello, NULL, err);
+	return wire_encode(out, WIRE(HELLO, layout_hello, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size_t n, struct psr_error *err)
@@ -35,7 +35,7 @@ int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size
 	int result;
 	if (n < 48)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "HELLO: the message has %zu of at least 48 bytes", n);
-	result = wire_decode(msg, PSR_MSG_HELLO, payload, n, layout_hello, NULL, err);
+	result = wire_decode(msg, WIRE(HELLO, layout_hello, NULL), payload, n, err);
 	if (result == PSR_ERR_VERSION)
 		return psr_fail(err, PSR_ERR_VERSION, "the client speaks version %u.%u of the protocol, this server %u.%u: "
 		                "use programs of the same release", msg->major, msg->minor, PSR_PROTO_MAJOR, PSR_PROTO_MINOR);
@@ -89,12 +89,12 @@ static int check_welcome(const void *p, struct psr_error *err)
 
 int psr_msg_welcome_encode(struct psr_buf *out, const struct psr_msg_welcome *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_WELCOME, 0, 0, msg, layout_welcome, check_welcome, err);
+	return wire_encode(out, WIRE(WELCOME, layout_welcome, check_welcome), 0, 0, msg, err);
 }
 
 int psr_msg_welcome_decode(struct psr_msg_welcome *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_WELCOME, payload, n, layout_welcome, check_welcome, err);
+	return wire_decode(msg, WIRE(WELCOME, layout_welcome, check_welcome), payload, n, err);
 }
 
 static void layout_goodbye(struct wire *w, void *p)
@@ -107,12 +107,12 @@ static void layout_goodbye(struct wire *w, void *p)
 
 int psr_msg_goodbye_encode(struct psr_buf *out, const struct psr_msg_goodbye *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_GOODBYE, 0, 0, msg, layout_goodbye, NULL, err);
+	return wire_encode(out, WIRE(GOODBYE, layout_goodbye, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_goodbye_decode(struct psr_msg_goodbye *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_GOODBYE, payload, n, layout_goodbye, NULL, err);
+	return wire_decode(msg, WIRE(GOODBYE, layout_goodbye, NULL), payload, n, err);
 }
 
 static void layout_ping(struct wire *w, void *p)
@@ -123,17 +123,17 @@ static void layout_ping(struct wire *w, void *p)
 
 int psr_msg_ping_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PING, 0, 0, msg, layout_ping, NULL, err);
+	return wire_encode(out, WIRE(PING, layout_ping, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_pong_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PONG, 0, 0, msg, layout_ping, NULL, err);
+	return wire_encode(out, WIRE(PONG, layout_ping, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_ping_decode(struct psr_msg_ping *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PING, payload, n, layout_ping, NULL, err);
+	return wire_decode(msg, WIRE(PING, layout_ping, NULL), payload, n, err);
 }
 
 static void layout_error(struct wire *w, void *p)
@@ -147,7 +147,7 @@ static void layout_error(struct wire *w, void *p)
 static int check_error(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_error *m = p;
-	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which is none");
+	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which means no error");
 }
 
 int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_error *msg,
@@ -155,12 +155,12 @@ int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const 
 {
 	struct psr_msg_error clean = { .code = msg->code };
 	wire_clean(clean.text, msg->text, sizeof clean.text);
-	return wire_encode(out, PSR_MSG_ERROR, id, view, &clean, layout_error, check_error, err);
+	return wire_encode(out, WIRE(ERROR, layout_error, check_error), id, view, &clean, err);
 }
 
 int psr_msg_error_decode(struct psr_msg_error *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_ERROR, payload, n, layout_error, check_error, err);
+	return wire_decode(msg, WIRE(ERROR, layout_error, check_error), payload, n, err);
 }
 
 uint16_t psr_wire_error_from(int code)

@@ -1,13 +1,12 @@
-/* The number of a cubic cell, and where it goes in a table: all of its bits count, so that cells in a row of any
- * direction spread (the last step of MurmurHash3, Appleby 2011). */
+/* Numbers of cubic cells, and their hash: the last step of MurmurHash3 (Appleby 2011), which uses all bits, so that
+ * cells in a row of any direction spread over the table. */
 #ifndef PSR_BASE_CELL_H
 #define PSR_BASE_CELL_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-/* x rounded down, of what an int can hold. As fast as truncation, where floor() takes a dozen instructions before
- * SSE4.1. */
+/* Rounds down a double that fits an int. As fast as truncation; floor() takes a dozen instructions before SSE4.1. */
 static inline int cell_floor(double x)
 {
 	int i = (int)x;

@@ -18,7 +18,7 @@ static int fail_range(const struct psr_opt *opt, const char *text, struct psr_er
 	return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is out of range; it takes %s to %s", opt->name, text, least, most);
 }
 
-/* Decimal digits into *v; 0 if there are none or they do not fit. */
+/* Reads decimal digits into *v; returns 0 if there are none or the value does not fit. */
 static int read_digits(const char **text, uint64_t *v)
 {
 	const char *at = *text;
@@ -125,7 +125,7 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 		snprintf(inner.text, sizeof inner.text, "'%.80s' is not valid", text);
 		code = opt->call(text, opt->value, &inner);
 		break;
-	case PSR_OPT_HEADING: /* find_long and find_letter give none */
+	case PSR_OPT_HEADING: /* find_long and find_letter never return one */
 		break;
 	}
 	return code == PSR_OK ? PSR_OK : psr_fail(err, code, "--%s: %.480s", opt->name, inner.text);
@@ -171,10 +171,10 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	if (near != NULL)
 		return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; did you mean %s%s?", dashes, shown, name, dashes,
 		                near->name);
-	return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; --help lists what there is", dashes, shown, name);
+	return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; --help lists the options", dashes, shown, name);
 }
 
-/* Takes the option at argv[*i] and, where it has one, its value; *i ends on the last argument used. */
+/* Takes the option at argv[*i] and its value, if any; *i ends at the last argument used. */
 static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i, struct psr_error *err)
 {
 	const char *arg = argv[*i], *value = NULL;
@@ -189,7 +189,7 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 	} else {
 		opt = arg[2] == '\0' ? find_letter(cli, arg[1]) : NULL;
 		if (opt == NULL)
-			return psr_fail(err, PSR_ERR_ARG, "unknown option %.80s; --help lists what there is", arg);
+			return psr_fail(err, PSR_ERR_ARG, "unknown option %.80s; --help lists the options", arg);
 	}
 	if (opt->type == PSR_OPT_FLAG) {
 		if (value != NULL)
@@ -208,7 +208,7 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err)
 {
 	int n = 0, options_end = 0;
-	/* Help is asked for before anything is set, so that it shows the defaults. */
+	/* Help before parsing, so that it shows the defaults. */
 	for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
 		if (strcmp(argv[i], "--help") == 0) {
 			cli_help_print(cli);

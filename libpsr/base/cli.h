@@ -1,4 +1,4 @@
-/* Private to the command line's own files: what cli.c parses, cli_help.c prints. */
+/* Shared by the files of the command line: cli.c parses, cli_help.c prints. */
 #ifndef PSR_BASE_CLI_H
 #define PSR_BASE_CLI_H
 
@@ -10,7 +10,7 @@
 /* Prints the whole help on standard output. */
 void cli_help_print(const struct psr_cli *cli);
 
-/* A bound of an option as people write it: 64m for an INT of 67108864, 0.5 for a REAL. */
+/* Formats a number as people write it: 64m for an INT of 67108864, 0.5 for a REAL. */
 void cli_number_format(char text[CLI_VALUE_TEXT], enum psr_opt_type type, double value);
 
 #endif

@@ -6,7 +6,7 @@
 #include "cli.h"
 
 #define WIDTH 100
-#define MAX_COLUMN 38 /* an option's own text that reaches beyond it stands on a line of its own */
+#define MAX_COLUMN 38 /* longer option texts get a line of their own */
 
 static void format_real(char text[CLI_VALUE_TEXT], double value)
 {
@@ -41,7 +41,7 @@ void cli_number_format(char text[CLI_VALUE_TEXT], enum psr_opt_type type, double
 	snprintf(text, CLI_VALUE_TEXT, "%.0f", value);
 }
 
-/* The option's present value, "" if it has none to show: an unset string, a size of 0, a number that is not finite. */
+/* Formats the option's value; "" for an unset string, a size of 0, or a number that is not finite. */
 static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 {
 	text[0] = '\0';
@@ -85,7 +85,7 @@ static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 	}
 }
 
-/* Words of text from column `at` on, broken before WIDTH and at '\n', each further line indented by `indent`. */
+/* Prints words from column `at` on, breaking lines at WIDTH and at '\n' and indenting them by `indent`. */
 static void print_wrapped(const char *text, int at, int indent)
 {
 	int line_is_empty = 1;

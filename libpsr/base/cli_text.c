@@ -7,7 +7,7 @@
 
 #define NUMBER_TEXT 64
 
-/* Length of the decimal number that text begins with, 0 if it begins with none: no spaces, hex, inf or nan. */
+/* The length of the decimal number at the beginning of text, or 0; spaces, hex, inf and nan are not allowed. */
 static size_t number_length(const char *text)
 {
 	const char *at = text;

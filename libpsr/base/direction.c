@@ -6,7 +6,7 @@
 #include "vec.h"
 
 #define LEVELS 6
-#define N_INNER ((1 << 2 * LEVELS) / 3) /* triangles of one octant that are divided further: 1 + 4 + ... + 4^5 */
+#define N_INNER ((1 << 2 * LEVELS) / 3) /* divided triangles of one octant: 1 + 4 + ... + 4^5 */
 
 /* Of the triangles of the positive octant, level after level: for each of the children 1, 2 and 3 the plane (through
  * the origin) that cuts it off, with its normal towards the child. The other octants are mirror images. */

@@ -10,7 +10,7 @@
 #define FILE_NAME "psr-image-oiio.so"
 #define MOST_PATH (PATH_MAX + 64)
 
-/* 0: it is not beside this program. */
+/* Returns 0 if the module is not beside this program. */
 static int find_beside(char path[MOST_PATH])
 {
 	static const char *const beside[] = { "/../lib/psr/" FILE_NAME, "/../lib/" FILE_NAME };

@@ -46,7 +46,7 @@ void *psr_alloc_huge(size_t n_bytes)
 	left = whole_pages(n_bytes + slack) - head;
 	if (left > used)
 		munmap(memory + used, left - used);
-	/* A system without huge pages refuses, and ordinary ones do as well. */
+	/* May fail without harm: ordinary pages serve as well. */
 	(void)madvise(memory, n_bytes, MADV_HUGEPAGE);
 	return memory;
 }

@@ -18,14 +18,14 @@ struct job {
 	void *userdata;
 };
 
-/* Lives on its caller's stack; helpers touch it only between their count going up and down, both under the mutex. */
+/* On its caller's stack. Helpers use it only while they are counted, which changes under the mutex. */
 struct loop {
 	struct loop *next, *previous;
 	void (*fn)(int i, void *userdata);
 	void *userdata;
 	int n;
 	atomic_int n_helpers; /* changed under the mutex */
-	atomic_int taken;     /* indices given out */
+	atomic_int taken;     /* indices handed out */
 	pthread_cond_t left;
 };
 
@@ -34,14 +34,14 @@ struct psr_pool {
 	pthread_cond_t work;
 	struct job *first_job, **last_job;
 	struct loop loops; /* head of a ring */
-	atomic_int n_jobs; /* queued ones */
-	atomic_uint n_offers; /* loops and jobs ever, and the end: idle workers watch it for a while before they sleep */
+	atomic_int n_jobs; /* queued */
+	atomic_uint n_offers; /* counts loops, jobs and the end; idle workers spin on it before they sleep */
 	int n_threads, n_workers, n_asleep, with_jobs, stopping;
 	pthread_t worker[MAX_THREADS];
 };
 
-/* Whoever runs it, a function of the pool starts from the default rounding and with denormal numbers: a library that
- * sets flush-to-zero in one thread must not show in a frame. */
+/* Runs functions with the default rounding and with denormal numbers: a library that sets flush-to-zero in one thread
+ * must not change frames. */
 static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 {
 	fenv_t callers;
@@ -54,7 +54,7 @@ static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 	fesetenv(&callers);
 }
 
-/* The running loop with indices left and the fewest helpers, the oldest of several; NULL if none. */
+/* The running loop with indices left and the fewest helpers, the oldest if several; or NULL. */
 static struct loop *neediest_loop(struct psr_pool *pool)
 {
 	struct loop *best = NULL;
@@ -96,8 +96,8 @@ static void pause_briefly(void)
 #endif
 }
 
-/* A frame is a dozen loops one after the other, each well below a millisecond: waking a thread costs some 50 us, which
- * is what a worker spins for at most. */
+/* A frame is a dozen loops, each well below a millisecond, and waking a thread costs some 50 us: workers spin for as
+ * long before they sleep. */
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
 	struct timespec start, now;
@@ -151,7 +151,7 @@ static void *work(void *userdata)
 	return NULL;
 }
 
-/* Signals belong to the threads of the program; those that tell of a fault stay where it happens. */
+/* Blocks signals, which belong to the program's threads, except those of faults. */
 static int start_worker(struct psr_pool *pool)
 {
 	static const int faults[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS };
@@ -228,7 +228,7 @@ int psr_pool_threads(const struct psr_pool *pool)
 void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata)
 {
 	struct loop loop = { .fn = fn, .userdata = userdata, .n = n };
-	/* Each thread may take one index too many before it sees the end. */
+	/* Each thread may take one index beyond the end. */
 	assert(n <= INT_MAX - MAX_THREADS - 1);
 	if (n <= 0)
 		return;

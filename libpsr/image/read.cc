@@ -1,4 +1,4 @@
-// The image module's decoder: what it does, and how it fails, stands in base/image_module.h.
+// The image module's decoder. base/image_module.h has the contract.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,7 +18,7 @@ extern "C" {
 
 namespace {
 
-/* Where a decoded pixel's red, green, blue and alpha stand; alpha -1: opaque. */
+/* Channels of red, green, blue and alpha in a decoded pixel; alpha -1: opaque. */
 struct channels {
 	int n, red, green, blue, alpha;
 };
@@ -51,7 +51,7 @@ int check_spec(const OIIO::ImageSpec &spec, uint64_t max_pixels, const problem &
 {
 	const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels";
 	if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
-		return fail(problem, PSR_ERR_UNSUPPORTED, "not a plain picture with one to four channels");
+		return fail(problem, PSR_ERR_UNSUPPORTED, "not a 2D image with one to four channels");
 	if (spec.width > IMPORT_MAX_IMAGE_SIDE || spec.height > IMPORT_MAX_IMAGE_SIDE)
 		return fail(problem, PSR_ERR_LIMIT,
 		            size + ", the limit is " + std::to_string(IMPORT_MAX_IMAGE_SIDE) + " on a side");
@@ -61,7 +61,7 @@ int check_spec(const OIIO::ImageSpec &spec, uint64_t max_pixels, const problem &
 	return PSR_OK;
 }
 
-/* Integers are taken as sRGB-coded, whatever the file says, as glTF wants it; floats are linear light. */
+/* Integers are sRGB codes, whatever the file says, as in glTF; floats are linear light. */
 bool read_integers(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uint8_t *rgba)
 {
 	if (!in.read_image(0, 0, 0, c.n, OIIO::TypeDesc::UINT8, rgba, 4))
@@ -120,7 +120,7 @@ int decode(uint8_t **out, uint32_t size[2], const uint8_t *bytes, size_t n_bytes
 		return fail(problem, PSR_ERR_LIMIT, "too many pixels for an image of floats");
 	std::unique_ptr<uint8_t, decltype(&std::free)> rgba((uint8_t *)std::calloc(n_pixels, 4), &std::free);
 	if (!rgba)
-		return fail(problem, PSR_ERR_MEMORY, "no memory for its pixels");
+		return fail(problem, PSR_ERR_MEMORY, "no memory for the pixels");
 	if (!(is_float ? read_floats(*in, c, n_pixels, rgba.get()) : read_integers(*in, c, n_pixels, rgba.get())))
 		return fail(problem, PSR_ERR_FORMAT, "broken image: " + in->geterror());
 	size[0] = (uint32_t)spec.width;

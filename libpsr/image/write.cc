@@ -1,4 +1,4 @@
-// The image module's writers: all formats that OpenImageIO writes. The contract stands in base/image_module.h.
+// The image module's writers: all formats that OpenImageIO writes. base/image_module.h has the contract.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <cerrno>
@@ -22,19 +22,19 @@ int check(const std::string &ending, bool is_depth, char *message, unsigned size
 {
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
 	if (!out)
-		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
+		return fail(message, size, "OpenImageIO cannot write files with the ending ." + ending);
 	if (is_depth) {
 		static const char *const formats[] = { "openexr", "tiff", "zfile", "null" };
 		for (const char *name : formats)
 			if (name == std::string(out->format_name()))
 				return 0;
 		return fail(message, size, std::string("the format ") + out->format_name()
-		            + " cannot hold depth, which is float; use .pfm, .exr or .tif");
+		            + " cannot hold floats, which depth needs; use .pfm, .exr or .tif");
 	}
 	return 0;
 }
 
-// Formats of light, not of codes, take linear values.
+// Formats that store linear light.
 bool is_linear(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
@@ -52,7 +52,7 @@ std::vector<float> linearize(const std::uint8_t *codes, std::size_t n)
 	return linear;
 }
 
-// Some codecs (libjpeg) end the whole process when the disk is full: those that can write to memory do so first.
+// Some codecs (libjpeg) end the process when the disk is full: write to memory first where the codec can.
 bool wants_memory(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();

@@ -14,27 +14,27 @@
 /* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that
  * of a diagonal neighbour's centre, 1.42 away: on a slope they may differ by this many pixels times its tangent. */
 #define SLOPE_PIXELS 2.2
-/* Seen flatter than 85 degrees, a surface has no usable slope. */
+/* 85 degrees: surfaces seen flatter have no usable slope. */
 #define LEAST_COSINE 0.087
 
 /* [G] 7.2: within three sample spacings two depths are on one surface. */
 #define HOLE_SPACINGS 3
 
-/* In footprints of a pixel on the surface: how far a truth may lie to the side to be that of the point. */
+/* Footprints of a pixel on the surface: how far to the side the point's truth may lie. */
 #define NEAR_FOOTPRINTS 1.5
 
-/* What is further than this from the planes of its neighbours is compared with all of the mesh. */
+/* Points further than this from the planes of their neighbours are compared with the whole mesh. */
 #define WALL_SPACINGS 0.5
 
 struct measure {
 	const struct psr_truth *truth;
 	struct view view;
-	double near_z, spacing;
+	double spacing;
 	uint32_t width, height;
 	const float *depth;      /* of the frame */
 	float *truth_depth;
 	float (*truth_normal)[3];
-	double *distance;        /* a pixel each; -1: not compared */
+	double *distance;        /* by pixel; -1: not compared */
 	struct psr_accuracy *row; /* counts of each row */
 };
 
@@ -77,7 +77,7 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 	return 1;
 }
 
-/* Along the truth's normal, to the nearest of the truths beside the point; to the nearest of all if none is. */
+/* The distance along the truth's normal to the nearest truth beside the point, else to the nearest of all. */
 static double distance_to(const struct measure *m, const double point[3], const struct neighbor *neighbor, int n)
 {
 	double nearest[2] = { INFINITY, INFINITY };
@@ -95,8 +95,8 @@ static double distance_to(const struct measure *m, const double point[3], const 
 
 static int is_outside(const struct measure *m, uint32_t x, uint32_t y)
 {
-	return !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE) &&
-	       !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_FINE_SIDE);
+	return !truth_is_met(m->truth, &m->view, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE) &&
+	       !truth_is_met(m->truth, &m->view, x - 1.0, y - 1.0, 3, OUTSIDE_FINE_SIDE);
 }
 
 static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struct psr_accuracy *count)
@@ -118,7 +118,7 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 		view_ray(&m->view, x + 0.5, y + 0.5, origin, direction);
 		v3d_add_scaled(point, origin, (double)m->depth[at], direction);
 		m->distance[at] = distance_to(m, point, neighbor, n) / m->spacing;
-		/* A wall along the line of sight is met by no centre ray, yet its samples are seen at steps in depth. */
+		/* No centre ray meets a wall along the line of sight, yet its samples show at steps in depth. */
 		if (m->distance[at] > WALL_SPACINGS)
 			m->distance[at] = truth_distance(m->truth, point, m->distance[at] * m->spacing) / m->spacing;
 		count->n_compared++;
@@ -139,7 +139,7 @@ static int compare_doubles(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* The smallest distance that at least this part of all does not exceed. */
+/* The smallest distance that at least this share of all does not exceed. */
 static double percentile(const double *sorted, uint64_t n, double part)
 {
 	uint64_t rank = (uint64_t)ceil(part * (double)n);
@@ -185,7 +185,7 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 		return rc;
 	rc = psr_pool_create(&pool, n_threads, 0);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	psr_pool_for(pool, (int)m->height, measure_row, m);
 	psr_pool_destroy(pool);
 	add_up(out, m);
@@ -196,7 +196,7 @@ int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, cons
                          uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads,
                          struct psr_error *err)
 {
-	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
+	struct measure m = { .truth = truth, .spacing = spacing, .width = width, .height = height,
 		                 .depth = depth };
 	int rc = view_init(&m.view, camera, width, height, err);
 	if (rc != PSR_OK)

@@ -17,7 +17,7 @@ static int largest_difference(const uint8_t *a, const uint8_t *b)
 	return most;
 }
 
-/* Difference from the most similar truth of the 3x3 neighbourhood; -1 unless all nine pixels are of the object. */
+/* The difference from the most similar truth of the 3x3 neighbourhood; -1 unless the object fills all nine pixels. */
 static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x,
                          uint32_t y)
 {
@@ -52,7 +52,7 @@ static void add_up(struct psr_color_accuracy *out, const uint8_t *rgb, const uin
 	out->mean = out->n_compared ? (double)sum / (double)out->n_compared : 0;
 }
 
-/* The mean of the rays of each pixel in linear light; the depth of one of them, infinite if any meets nothing. */
+/* Averages the rays of each pixel in linear light; takes the depth of one of them, infinite if any meets nothing. */
 static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth, uint8_t *rgb, uint32_t width,
                     uint32_t height)
 {

@@ -28,7 +28,7 @@ static double cpu_seconds(void)
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-/* Block after block of lattices, as the sampler goes. */
+/* Blocks of lattices, in the order of the sampler. */
 static int make_rays(struct rays *rays)
 {
 	const double step = 2.0 / ACROSS, row_height = step * sqrt(3.0) / 2;

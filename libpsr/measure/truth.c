@@ -24,7 +24,6 @@ struct psr_truth {
 struct job {
 	const struct psr_truth *truth;
 	struct view view;
-	double near_z;
 	uint32_t side, n_columns;
 	float *depth;
 	float (*normal)[3];
@@ -86,15 +85,14 @@ double truth_distance(const struct psr_truth *truth, const double point[3], doub
 	return fmin(most, truth->scale * ray_scene_distance(truth->scene, inner, most / truth->scale));
 }
 
-int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
-                 int side)
+int truth_is_met(const struct psr_truth *truth, const struct view *view, double x, double y, int n, int side)
 {
 	struct ray ray[MOST_SIDE];
 	struct ray_hit hit[MOST_SIDE];
 	for (int j = 0; j < side; j++) {
 		for (int i = 0; i < side; i++)
 			truth_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
-		ray_scene_trace(truth->scene, ray, side, near_z / truth->scale, hit);
+		truth_trace(truth, ray, side, view->near_z, hit);
 		for (int i = 0; i < side; i++)
 			if (hit[i].prim != RAY_NONE)
 				return 1;
@@ -102,7 +100,7 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 	return 0;
 }
 
-/* Both ways, since a face lets rays through from its back. */
+/* Traces both ways, since rays pass faces from behind. */
 static int is_between(const struct psr_truth *truth, const double from[3], const double to_light[3], double length)
 {
 	const double off = 1e-4;
@@ -121,14 +119,14 @@ static int is_between(const struct psr_truth *truth, const double from[3], const
 	return hit.prim != RAY_NONE;
 }
 
-void truth_light(const struct psr_truth *truth, const struct view *view, double near_z, const struct psr_light *light,
+void truth_light(const struct psr_truth *truth, const struct view *view, const struct psr_light *light,
                  const double (*place)[2], int n, struct truth_light *out)
 {
 	struct ray ray[RUN] = { { { 0 }, { 0 } } };
 	struct ray_hit hit[RUN];
 	for (int i = 0; i < n; i++)
 		truth_ray(truth, view, place[i][0], place[i][1], &ray[i]);
-	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
+	truth_trace(truth, ray, n, view->near_z, hit);
 	for (int i = 0; i < n; i++) {
 		double point[3], to_light[3], length = 4, facing = 0, seen = 0;
 		const float *normal;
@@ -177,7 +175,7 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
 }
 
-/* Diffuse, unfiltered: the pixel's rays are its filter. */
+/* Unfiltered diffuse color: the rays of a pixel are its filter. */
 static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, uint8_t rgb[3])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
@@ -197,7 +195,7 @@ static void draw_row(int row, void *userdata)
 		size_t at = (size_t)row * job->n_columns + first;
 		for (uint32_t i = 0; i < n; i++)
 			truth_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
-		ray_scene_trace(job->truth->scene, ray, (int)n, job->near_z / job->truth->scale, hit);
+		truth_trace(job->truth, ray, (int)n, job->view.near_z, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			int is_met = hit[i].prim != RAY_NONE;
 			job->depth[at + i] = is_met ? (float)(hit[i].t * job->truth->scale) : INFINITY;
@@ -218,17 +216,17 @@ static void draw_row(int row, void *userdata)
 int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height,
                    uint32_t side, int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
 {
-	struct job job = { .truth = truth, .side = side, .near_z = camera->near_z, .depth = depth, .normal = normal,
+	struct job job = { .truth = truth, .side = side, .depth = depth, .normal = normal,
 		               .rgb = rgb };
 	struct psr_pool *pool;
 	int rc = view_init(&job.view, camera, width, height, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are outside of 1..%d", side, MOST_SIDE);
+		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", side, MOST_SIDE);
 	rc = psr_pool_create(&pool, n_threads, 0);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	job.n_columns = width * side;
 	psr_pool_for(pool, (int)(height * side), draw_row, &job);
 	psr_pool_destroy(pool);

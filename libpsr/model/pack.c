@@ -47,7 +47,7 @@ void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t strid
 	memcpy(chunk + n_words * stride, in + n_words * stride, n_bytes - n_words * stride);
 }
 
-/* Words of what most of a section is. */
+/* The word size of most of a section. */
 static uint32_t stride_of(const uint8_t *type)
 {
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
@@ -60,11 +60,11 @@ static uint32_t stride_of(const uint8_t *type)
 
 struct packer {
 	ZSTD_CCtx *context;
-	uint8_t *split, *packed; /* a chunk, and what it can grow to */
+	uint8_t *split, *packed; /* a chunk, and its largest packed form */
 	size_t packed_capacity;
 };
 
-/* Writes the shortest form to `out`, which has room for the chunk itself, and its entry. */
+/* Writes the shortest form to `out`, which has room for the plain chunk, and its entry. */
 static uint32_t pack_chunk(const struct packer *p, uint8_t *out, uint8_t *entry, const uint8_t *chunk, size_t n,
                            uint32_t stride)
 {
@@ -110,7 +110,7 @@ static void packer_fini(struct packer *p)
 	psr_free(p->packed);
 }
 
-/* Where the directory begins, and what follows its last byte. */
+/* Returns the end of the directory, and its beginning in *directory. */
 static uint64_t directory_end(const uint8_t *image, uint64_t *directory)
 {
 	uint64_t n_chunks = 0, n_sections = file_get(image + HEADER_N_SECTIONS, 4);
@@ -120,7 +120,7 @@ static uint64_t directory_end(const uint8_t *image, uint64_t *directory)
 	return *directory + PACK_ENTRY_BYTES * n_chunks;
 }
 
-/* Directory and chunks; from chunk `n_packed` on they are stored. Returns the size of the file. */
+/* Writes directory and chunks, stored from chunk `n_packed` on. Returns the size of the file. */
 static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8_t *image, uint64_t n_packed)
 {
 	uint64_t directory, at = directory_end(image, &directory), n = 0;
@@ -162,7 +162,7 @@ int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *
 	}
 	memcpy(bytes, image, directory);
 	size = pack_chunks_of(&packer, bytes, image, n_packed);
-	/* What repeats itself more than the reader believes has its last chunks stored. */
+	/* Beyond the ratio that the reader accepts, stores the last chunks unpacked. */
 	while (pack_max_image(size) < n_image) {
 		assert(n_packed > 0);
 		n_packed -= n_packed / 16 + 1;

@@ -2,10 +2,10 @@
 #include "base/view.h"
 #include "file.h"
 
-/* What a kind does not use is zero in files: there is no byte that no rule covers. */
+/* Unused fields are zero in files, so that rules cover every byte. */
 static void put_name(char to[PSR_NAME_BYTES], const char from[PSR_NAME_BYTES])
 {
-	/* A name without an end stays as it is: the validator refuses it. */
+	/* Copies a name without an end unchanged; the validator refuses it. */
 	size_t length = strnlen(from, PSR_NAME_BYTES);
 	memcpy(to, from, length);
 	memset(to + length, 0, PSR_NAME_BYTES - length);
@@ -48,7 +48,7 @@ void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_ligh
 	}
 }
 
-/* Length of the UTF-8 sequence of a character at s, or 0 if it is none, or of what has no picture (C0, DEL, C1). */
+/* The length of the UTF-8 character at s; 0 for other bytes and for control characters (C0, DEL, C1). */
 static size_t character_bytes(const uint8_t *s, size_t n)
 {
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
@@ -82,7 +82,7 @@ static int check_name(const char name[PSR_NAME_BYTES], const char *what, uint32_
 	return PSR_OK;
 }
 
-/* `stride` bytes from name to name. */
+/* Names are `stride` bytes apart. */
 static int check_unlike(const char *first, size_t stride, uint32_t n, const char *what, struct psr_error *err)
 {
 	for (uint32_t i = 1; i < n; i++)
@@ -104,7 +104,7 @@ static int check_cameras(const struct psr_presets *p, struct psr_error *err)
 			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": %s", i, what.text);
 		preset_put_cameras(&clean, &p->camera[i], 1);
 		if (memcmp(&clean, &p->camera[i], sizeof clean) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": bytes that it does not use are not zero", i);
+			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": unused bytes are not zero", i);
 	}
 	return check_unlike((const char *)p->camera, sizeof *p->camera, p->n_cameras, "camera", err);
 }
@@ -121,7 +121,7 @@ static int check_lights(const struct psr_presets *p, struct psr_error *err)
 			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": %s", i, what.text);
 		preset_put_lights(&clean, &p->light[i], 1);
 		if (memcmp(&clean, &p->light[i], sizeof clean) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": bytes that it does not use are not zero", i);
+			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": unused bytes are not zero", i);
 	}
 	return check_unlike((const char *)p->light, sizeof *p->light, p->n_lights, "light", err);
 }

@@ -5,7 +5,7 @@
 #include <xxhash.h>
 #include "file.h"
 
-/* What is known of an image while it is read. */
+/* An image during reading. */
 struct reader {
 	const uint8_t *bytes;
 	uint64_t n_bytes, file_size, table_end;
@@ -54,7 +54,7 @@ int file_check_header(const uint8_t *header, const char *name, struct psr_error 
 {
 	uint64_t major = file_get(header + HEADER_MAJOR, 2), minor = file_get(header + HEADER_MINOR, 2);
 	if (memcmp(header, FILE_MAGIC, 8) != 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: this is no .psr file: it does not begin as one", name);
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: not a .psr file: it begins otherwise", name);
 	if (major != FILE_MAJOR)
 		return psr_fail(err, PSR_ERR_VERSION, "%s: the file has format %" PRIu64 ".%" PRIu64
 		                ", and this build reads %d.x; build the model again or take another version of psr", name,
@@ -70,7 +70,7 @@ static int check_table(struct reader *r)
 	n_chunks = file_get(header + HEADER_N_CHUNKS, 4);
 	r->file_size = file_get(header + HEADER_FILE_SIZE, 8);
 	if (n_sections > FILE_MAX_SECTIONS)
-		return bad(r, "the header counts %" PRIu64 " sections, more than the %d there can be", n_sections,
+		return bad(r, "the header lists %" PRIu64 " sections, more than the %d there can be", n_sections,
 		           FILE_MAX_SECTIONS);
 	r->n_sections = (uint32_t)n_sections;
 	r->table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks;
@@ -91,7 +91,7 @@ static int fail_cut(const struct reader *r, const struct section *s)
 	           "); it was cut short", r->n_bytes, s->type, s->offset, s->offset + s->length);
 }
 
-/* Sections follow each other in the order of the table, each padded to FILE_ALIGNMENT, with nothing between. */
+/* Sections follow each other in the order of the table, each padded to FILE_ALIGNMENT. */
 static int check_places(const struct reader *r)
 {
 	uint64_t at = file_align(r->table_end), n_chunks = 0;
@@ -165,8 +165,7 @@ static int known_index(const uint8_t *type)
 	return -1;
 }
 
-/* Fills r->entry. What must be understood and is not is refused; optional sections of other types or versions are
- * skipped. */
+/* Fills r->entry. Refuses unknown required sections; skips optional ones of other types or versions. */
 static int sort_sections(struct reader *r)
 {
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
@@ -237,14 +236,14 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 	file_get_counts(blocks, at);
 	if (file_get(at + 28, 4) != 0)
 		return bad(r, "section BLKS: reserved bytes are not zero");
-	/* With 32-bit counts and this no product below overflows; the counts' own limits are the validator's. */
+	/* With this and 32-bit counts no product below overflows; the validator checks the limits of counts. */
 	if (blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
 		return bad(r, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", blocks->n_samples,
 		           blocks->n_blocks);
 	return PSR_OK;
 }
 
-/* How many items of that length the optional section has, 1 to PSR_MAX_PRESETS, or 0 if it is absent. */
+/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS, or 0 if it is missing. */
 static int get_presets(const struct reader *r, int known, uint32_t *n, const void **array)
 {
 	struct section s;
@@ -278,11 +277,11 @@ static int get_arrays(const struct reader *r, struct content *content)
 		memcpy((char *)blocks + spec->pointer, &array, sizeof array);
 	}
 	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
-		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
+		return bad(r, "some of the sections CONX, CONY, CONZ and CONS are missing");
 	if (blocks->traits && !blocks->cone_x)
-		return bad(r, "section TRTS is there without CONX, CONY, CONZ and CONS, by which bent blocks face");
+		return bad(r, "section TRTS needs CONX, CONY, CONZ and CONS, which are missing");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
-		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS only some are there");
+		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS some are missing");
 	return PSR_OK;
 }
 
@@ -294,7 +293,7 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	assert((uintptr_t)bytes % FILE_ALIGNMENT == 0);
 	if (n_bytes < FILE_HEADER_BYTES) {
 		if (memcmp(bytes, FILE_MAGIC, n_bytes < 8 ? n_bytes : 8) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: this is no .psr file: it does not begin as one", name);
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: not a .psr file: it begins otherwise", name);
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zu, within its header (bytes 0 to %d); it was "
 		                "cut short", name, n_bytes, FILE_HEADER_BYTES);
 	}
@@ -310,7 +309,8 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	if (code != PSR_OK)
 		return code;
 	if (r.entry[SECTION_BLOCKS] < 0)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: the file has no section BLKS, and this build draws nothing else",
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "%s: the file has no section BLKS, the only kind of samples that this build draws",
 		                name);
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
 		if (section_table[k].flags & ENTRY_REQUIRED && r.entry[k] < 0)

@@ -8,7 +8,7 @@
 #include "base/mem.h"
 #include "pack.h"
 
-/* A packed file while it is read. `head` is its beginning: header, table, hashes of chunks, directory. */
+/* A packed file during reading. `head`: header, table, hashes of chunks, directory. */
 struct unpacker {
 	const struct pack_source *source;
 	struct psr_error *err;
@@ -41,7 +41,8 @@ static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 {
 	const struct pack_source *s = u->source;
 	if (at > s->n_bytes || n > s->n_bytes - at)
-		return bad(u, "the file ends at byte %" PRIu64 ", and bytes %" PRIu64 " to %" PRIu64 " are needed; it was cut short",
+		return bad(u,
+		           "the file ends at byte %" PRIu64 ", and bytes %" PRIu64 " to %" PRIu64 " are needed; it was cut short",
 		           s->n_bytes, at, at + n);
 	if (s->fd < 0) {
 		memcpy(to, s->bytes + at, n);
@@ -66,26 +67,27 @@ static const uint8_t *entry_at(const struct unpacker *u, uint64_t i)
 	return u->head + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 }
 
-/* Everything before the first chunk, and whether its own hash is right; nothing of it has been followed before. */
+/* Reads everything before the first chunk and checks its hash, before it follows any of it. */
 static int read_head(struct unpacker *u)
 {
 	uint64_t n_chunks = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
 	int code;
 	if (packing != PACKING_ZSTD)
-		return psr_fail(u->err, PSR_ERR_VERSION, "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
+		return psr_fail(u->err, PSR_ERR_VERSION,
+		                "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
 		                "a newer psr may read it", u->source->name, packing, PACKING_ZSTD);
 	size = file_get(u->header + HEADER_PACKED_SIZE, 8);
 	u->n_image = file_get(u->header + HEADER_FILE_SIZE, 8);
 	u->n_sections = (uint32_t)file_get(u->header + HEADER_N_SECTIONS, 4);
 	if (u->n_sections > FILE_MAX_SECTIONS)
-		return bad(u, "the header counts %" PRIu32 " sections, more than the %d there can be", u->n_sections,
+		return bad(u, "the header lists %" PRIu32 " sections, more than the %d there can be", u->n_sections,
 		           FILE_MAX_SECTIONS);
 	if (size > u->source->n_bytes)
 		return bad(u, "the file ends at byte %" PRIu64 " of %" PRIu64 "; it was cut short", u->source->n_bytes, size);
 	if (size < u->source->n_bytes)
 		return bad(u, "%" PRIu64 " bytes follow the end of the file's last chunk", u->source->n_bytes - size);
 	if (u->n_image > pack_max_image(size))
-		return bad(u, "the header says that %" PRIu64 " bytes unpack to %" PRIu64 "; more than %d to 1 is not believed",
+		return bad(u, "the header says that %" PRIu64 " bytes unpack to %" PRIu64 "; the limit is %d to 1",
 		           size, u->n_image, PACK_MAX_RATIO);
 	u->table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)u->n_sections
 	               + 8 * file_get(u->header + HEADER_N_CHUNKS, 4);
@@ -105,7 +107,8 @@ static int read_head(struct unpacker *u)
 	/* At most 256 sections of 64 times the file: no product overflows. */
 	u->head_end = u->table_end + PACK_ENTRY_BYTES * n_chunks;
 	if (code == PSR_OK && u->head_end > size)
-		return bad(u, "the directory of chunks ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->head_end, size);
+		return bad(u, "the directory of chunks ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->head_end,
+		           size);
 	psr_free(u->head);
 	u->head = psr_alloc_array(u->head_end, 1);
 	if (u->head == NULL)
@@ -119,7 +122,7 @@ static int read_head(struct unpacker *u)
 	return code;
 }
 
-/* The places of sections in the image, the sizes of chunks in the file: all that is needed to follow them. */
+/* Checks the offsets of sections in the image and the sizes of chunks in the file. */
 static int check_head(const struct unpacker *u)
 {
 	const uint8_t *next = u->head + u->table_end;
@@ -135,7 +138,7 @@ static int check_head(const struct unpacker *u)
 			uint64_t packed = file_get(next + PACK_LENGTH, 4);
 			if (next[PACK_METHOD] >= PACK_N_METHODS || !pack_is_stride(next[PACK_STRIDE])
 			    || file_get(next + 6, 2) != 0)
-				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is not known", n,
+				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is unknown", n,
 				           next[PACK_METHOD], next[PACK_STRIDE]);
 			if (next[PACK_METHOD] == PACK_STORED ? packed != size : packed >= size || packed == 0)
 				return bad(u, "chunk %" PRIu64 " of %" PRIu64 " bytes is packed into %" PRIu64, n, size, packed);
@@ -179,7 +182,7 @@ static int is_blocks(const uint8_t *entry)
 	       && file_get(entry + ENTRY_LENGTH, 8) == BLOCKS_BYTES;
 }
 
-/* All chunks into the image; or, while there is no image, that of BLKS alone into `blocks`. */
+/* Unpacks all chunks into the image; or, if that is NULL, the chunk of BLKS alone into `blocks`. */
 static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t blocks[BLOCKS_BYTES])
 {
 	const uint8_t *next = u->head + u->table_end;
@@ -199,8 +202,8 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t block
 	return PSR_OK;
 }
 
-/* Known sections have the lengths that the counts in BLKS ask for, before any memory is: file_parse() says more about
- * what else may be wrong. */
+/* Compares lengths of known sections with the counts in BLKS before allocating; file_parse() reports other errors
+ * better. */
 static int check_lengths(const struct unpacker *u)
 {
 	uint8_t at[BLOCKS_BYTES] = { 0 };

@@ -7,8 +7,8 @@
 #include "base/vec.h"
 #include "file.h"
 
-/* Unit vectors in single precision: a component that went through eight roundings of 2^-24 on either side of a product
- * leaves a scalar product of two of them at most 2 * 8 * 2^-24 off. */
+/* Unit vectors in single precision: if components went through eight roundings of 2^-24 on either side of a product, a
+ * scalar product of two of them is at most 2 * 8 * 2^-24 off. */
 #define UNIT_TOLERANCE 0x1p-20f
 
 struct checker {
@@ -32,7 +32,7 @@ static int fail(const struct checker *c, const char *section, const char *format
 	return psr_fail(c->err, PSR_ERR_FORMAT, "%s: section %s: %s", c->name, section, what);
 }
 
-/* False for NaN too. */
+/* Returns 0 for NaN, too. */
 static int is_length(float v)
 {
 	return v >= 0 && v <= MODEL_MAX_COORDINATE;
@@ -212,7 +212,8 @@ static int check_cones(const struct checker *c)
 		int greatest = axis[0] > axis[1] ? axis[0] : axis[1];
 		greatest = axis[2] > greatest ? axis[2] : greatest;
 		if (greatest != 127)
-			return fail(c, "CONX, CONY, CONZ", "the greatest component of the axis of block %" PRIu32 " is %d instead of 127",
+			return fail(c, "CONX, CONY, CONZ",
+			            "the greatest component of the axis of block %" PRIu32 " is %d instead of 127",
 			            i, greatest);
 	}
 	return PSR_OK;

@@ -48,7 +48,7 @@ static int write_all(int fd, const uint8_t *bytes, size_t n_bytes)
 	return 0;
 }
 
-/* So that the new name survives a power cut. Some file systems cannot sync folders, and say so with EINVAL. */
+/* Makes the new name survive a power cut. File systems that cannot sync folders fail with EINVAL. */
 static int sync_folder(const char *path)
 {
 	const char *slash = strrchr(path, '/');
@@ -76,12 +76,12 @@ static int fill(int fd, const uint8_t *bytes, size_t n_bytes)
 	return failed ? -1 : 0;
 }
 
-/* Before any work is put into what would go there. */
+/* Fails before the work if the path cannot be written. */
 static int check_place(const char *path, struct psr_error *err)
 {
 	struct stat st;
 	if (stat(path, &st) == 0 && !S_ISREG(st.st_mode))
-		return psr_fail(err, PSR_ERR_IO, "%.200s: this is not a regular file, and will not be replaced by one", path);
+		return psr_fail(err, PSR_ERR_IO, "%.200s: exists and is not a regular file", path);
 	return PSR_OK;
 }
 
