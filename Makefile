@@ -84,12 +84,12 @@ ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(LIB)/psr-image-oiio.so
 endif
 
-L_PSR    := -lzstd -lxxhash -lm -ldl
+L_PSR    := -lpng -lzstd -lxxhash -lm -ldl
 ifeq ($(config),aarch64)
 L_PSR    := -lm
 endif
 L_CODEC  := -lturbojpeg
-L_BUILD  := -lembree3 -lassimp -ldraco -lpng -lcjson -lstdc++
+L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -lstdc++
 
 .PHONY: all demo figures studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
@@ -142,7 +142,7 @@ endef
 $(BIN)/psrd: $(PSRD_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
 $(BIN)/psr: $(PSR_O) $(A)
-	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
+	$(link) $(L_CODEC) -lcjson $(L_PSR)
 $(BIN)/psr-model: $(MODEL_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD) $(L_PSR)
 $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
@@ -180,7 +180,7 @@ EFFECTS    := $(BUILD)/tests/bench/effects
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
 MODEL_PARTS  := $(filter-out $(BUILD)/models/main.c.o,$(MODEL_O))
-L_TEST := -lcmocka $(L_CODEC) -lpng -lcjson $(L_PSR)
+L_TEST := -lcmocka $(L_CODEC) -lcjson $(L_PSR)
 # What stands in tests/*/ finds the image module by its run path.
 L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
 
@@ -206,7 +206,7 @@ $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $
 $(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c server/frames/wire.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
-	$(link) $(L_CODEC) -lpng -lcjson $(L_PSR)
+	$(link) $(L_CODEC) -lcjson $(L_PSR)
 $(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 
@@ -215,7 +215,7 @@ $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/l
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
 	peer peer_order pictures plot report scene thesis warp))
 $(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
-	$(link) -lOSMesa -lpng $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+	$(link) -lOSMesa $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 EFFECTS_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child effects effects_prices effects_quality isolate level ours price report scene))
 $(EFFECTS): $(EFFECTS_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)

@@ -1,7 +1,7 @@
 #include "draw.h"
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "psr.h"
 #include "client/replay/replay.h"
 #include "client/output/series.h"
@@ -139,13 +139,13 @@ static int check(struct job *job, struct psr_error *err)
 /* Codecs of the planes that are asked for. */
 static void choose_codecs(struct psr_msg_frame *frame)
 {
-	if (!(frame->planes & 1 << PSR_WIRE_PLANE_COLOR))
+	if (!(frame->planes & 1 << PSR_PLANE_COLOR))
 		frame->color_codec = frame->color_quality = 0;
-	if (frame->planes & 1 << PSR_WIRE_PLANE_DEPTH) {
+	if (frame->planes & 1 << PSR_PLANE_DEPTH) {
 		frame->depth_format = PSR_WIRE_DEPTH_F32;
 		frame->depth_codec = PSR_CODEC_ZSTD;
 	}
-	if (frame->planes & ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH))
+	if (frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
 		frame->data_codec = PSR_CODEC_ZSTD;
 }
 
@@ -176,20 +176,12 @@ static int place_cameras(struct job *job, struct psr_error *err)
 	return PSR_OK;
 }
 
-static uint64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
-
 static int run(struct job *job, struct psr_error *err)
 {
 	struct draw_wish *wish = job->wish;
 	struct sink *sink = &job->sink;
 	int timeout_ms = (int)wish->timeout * 1000, code;
-	uint64_t start_ns = now_ns();
+	uint64_t start_ns = clock_ns();
 	struct series series;
 
 	wish->scene.pixels = job->frame.width > job->frame.height ? job->frame.width : job->frame.height;

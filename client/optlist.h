@@ -2,7 +2,7 @@
 #ifndef PSR_CLIENT_OPTLIST_H
 #define PSR_CLIENT_OPTLIST_H
 
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define OPTLIST_MAX 80
 

@@ -3,7 +3,7 @@
 #define PSR_CLIENT_PSR_H
 
 #include <cjson/cJSON.h>
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/client.h"
 
 #define PSR_PROGRAM "psr " PSR_VERSION

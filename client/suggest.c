@@ -2,7 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include "psr/cli.h"
+#include "base/cli.h"
 
 /* A third of the letters at most, and less than would turn any name into any other. */
 static size_t most_edits(size_t length)

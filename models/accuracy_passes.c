@@ -4,10 +4,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-#include "ppm.h"
+#include "base/clock.h"
+#include "base/netpbm.h"
 #include "psr/build.h"
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "psr/mesh.h"
 #include "psr/render.h"
 
@@ -21,42 +21,10 @@ struct passes {
 	struct psr_mesh *mesh;
 	struct psr_truth *truth;
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner;
 	struct psr_pool *pool;
 	uint8_t *truth_rgb, *covered, *rgb;
 	uint32_t side;
 };
-
-static uint64_t now_ns(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (uint64_t)t.tv_sec * 1000000000u + (uint64_t)t.tv_nsec;
-}
-
-/* The light of `psr shot`: from the upper left behind the camera. */
-static void make_light(struct psr_light *light, const struct psr_camera *camera)
-{
-	double forward[3], right[3], up[3], length = 0;
-
-	for (int i = 0; i < 3; i++)
-		forward[i] = camera->target[i] - camera->eye[i];
-	for (int i = 0; i < 3; i++)
-		length += forward[i] * forward[i];
-	for (int i = 0; i < 3; i++)
-		forward[i] /= sqrt(length);
-	length = hypot(forward[0], forward[2]);
-	right[0] = -forward[2] / length;
-	right[1] = 0;
-	right[2] = forward[0] / length;
-	up[0] = right[1] * forward[2] - right[2] * forward[1];
-	up[1] = right[2] * forward[0] - right[0] * forward[2];
-	up[2] = right[0] * forward[1] - right[1] * forward[0];
-	*light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 1, 1 } };
-	for (int i = 0; i < 3; i++)
-		light->direction[i] = forward[i] + 0.5 * right[i] - 0.6 * up[i];
-}
 
 /* A square picture in which samples of the finest level are as far apart as so many pixels, at the camera's target. */
 static int make_scene(struct passes *p, struct psr_scene *scene, struct psr_instance *instance, struct psr_light *light,
@@ -74,7 +42,7 @@ static int make_scene(struct passes *p, struct psr_scene *scene, struct psr_inst
 		                magnification, side, MOST_SIDE);
 	p->side = (uint32_t)(side + 0.5);
 	*instance = (struct psr_instance){ .model = p->model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
-	make_light(light, &scene->camera);
+	psr_light_key(light, &scene->camera);
 	scene->instance = instance;
 	scene->n_instances = 1;
 	scene->light = light;
@@ -94,10 +62,8 @@ static int load(struct passes *p, const char *source, const char *model, struct 
 		code = psr_mesh_import(&p->mesh, source, NULL, err);
 	if (code == PSR_OK)
 		code = psr_truth_create(&p->truth, p->mesh, err);
-	if (code == PSR_OK && psr_renderer_create(&p->renderer) != PSR_OK)
-		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
-	if (code == PSR_OK && psr_refiner_create(&p->refiner, p->renderer) != PSR_OK)
-		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
+	if (code == PSR_OK)
+		code = psr_renderer_create(&p->renderer, err);
 	return code;
 }
 
@@ -113,11 +79,12 @@ static int draw_passes(struct passes *p, const struct psr_scene *scene, unsigned
 		struct psr_frame frame = { .width = p->side, .height = p->side, .rgb = p->rgb };
 		uint64_t least = UINT64_MAX;
 
+		settings.pass = pass;
 		for (int trial = 0; code == PSR_OK && trial < TRIALS; trial++) {
-			uint64_t start = now_ns(), ns;
+			uint64_t start = clock_ns(), ns;
 
-			code = psr_refine(p->refiner, scene, &settings, pass, p->pool, NULL, NULL, &frame, err);
-			ns = now_ns() - start;
+			code = psr_render(p->renderer, scene, &settings, p->pool, &frame, err);
+			ns = clock_ns() - start;
 			least = ns < least ? ns : least;
 		}
 		if (code == PSR_OK)
@@ -140,7 +107,7 @@ static int measure(struct passes *p, const char *source, const char *model, doub
 	if (code == PSR_OK)
 		code = make_scene(p, &scene, &instance, &light, magnification, err);
 	if (code == PSR_OK)
-		code = psr_pool_create(&p->pool, options.n_threads, 0);
+		code = psr_pool_create(&p->pool, options.n_threads, NULL);
 	if (code != PSR_OK)
 		return code;
 	p->rgb = malloc((size_t)p->side * p->side * 7);
@@ -158,7 +125,6 @@ int accuracy_passes(const char *source, const char *model, double magnification,
 	int code = measure(&p, source, model, magnification, n_passes, err);
 
 	psr_pool_destroy(p.pool);
-	psr_refiner_destroy(p.refiner);
 	psr_renderer_destroy(p.renderer);
 	psr_truth_destroy(p.truth);
 	psr_mesh_destroy(p.mesh);

@@ -1,42 +1,13 @@
 #include "accuracy_report.h"
 
 #include <cjson/cJSON.h>
-#include <errno.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 
 #define RADIANS (3.14159265358979323846 / 180)
 #define MOST_BYTES (4 << 20)
-
-static int read_text(char **out, const char *path, struct psr_error *err)
-{
-	FILE *file = fopen(path, "rbe");
-	char *text = NULL;
-	size_t n;
-
-	if (file == NULL)
-		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s: %s", path, strerror(errno));
-	text = malloc(MOST_BYTES + 1);
-	if (text == NULL) {
-		fclose(file);
-		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path);
-	}
-	n = fread(text, 1, MOST_BYTES + 1, file);
-	if (ferror(file) || n > MOST_BYTES) {
-		int failed = ferror(file);
-
-		fclose(file);
-		free(text);
-		return failed ? psr_fail(err, PSR_ERR_IO, "%s: %s", path, strerror(errno))
-		              : psr_fail(err, PSR_ERR_FORMAT, "%s: has more than 4 MiB; psr shot --report writes no such file", path);
-	}
-	fclose(file);
-	text[n] = '\0';
-	*out = text;
-	return PSR_OK;
-}
 
 /* Whether there are n finite numbers of this name; one stands alone, several in an array. */
 static int take(double *v, int n, const cJSON *object, const char *name)
@@ -94,7 +65,7 @@ int accuracy_report_read(struct accuracy_report *out, const char *path, struct p
 	char *text = NULL;
 	cJSON *report;
 	double size[2] = { 0, 0 };
-	int code = read_text(&text, path, err);
+	int code = infile_read_text(&text, path, MOST_BYTES, err);
 
 	if (code != PSR_OK)
 		return code;

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include "base/stats.h"
 
 #define PART 0.001     /* of the pixels may be wrong */
 #define CAMERA_PART 0.5
@@ -14,19 +15,12 @@ struct limits {
 	uint64_t outside;
 };
 
-static int compare_floats(const void *a, const void *b)
-{
-	float x = *(const float *)a, y = *(const float *)b;
-
-	return (x > y) - (x < y);
-}
-
 /* World width of a pixel at the 99th percentile of what is drawn, and how many pixels are; a few wild depths do not
  * count, and the other bounds see them. */
 static double find_pixel(uint64_t *n_drawn, const struct psr_camera *camera, uint32_t width, uint32_t height,
                          const float *depth)
 {
-	float *drawn = malloc(sizeof *drawn * width * height);
+	double *drawn = malloc(sizeof *drawn * width * height);
 	double z = 0;
 
 	*n_drawn = 0;
@@ -34,12 +28,12 @@ static double find_pixel(uint64_t *n_drawn, const struct psr_camera *camera, uin
 		if (!isfinite(depth[i]))
 			continue;
 		if (drawn != NULL)
-			drawn[*n_drawn] = depth[i];
+			drawn[*n_drawn] = (double)depth[i];
 		++*n_drawn;
 	}
-	if (drawn != NULL && *n_drawn > 0) {
-		qsort(drawn, *n_drawn, sizeof *drawn, compare_floats);
-		z = (double)drawn[(size_t)(0.99 * (double)(*n_drawn - 1))];
+	if (drawn != NULL) {
+		stats_sort(drawn, *n_drawn);
+		z = stats_percentile(drawn, *n_drawn, 0.99);
 	}
 	free(drawn);
 	return (camera->kind == PSR_CAMERA_PERSPECTIVE ? 2 * tan(camera->fov_y / 2) * z : camera->ortho_height) / height;

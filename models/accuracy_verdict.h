@@ -3,7 +3,7 @@
 #define MODELS_ACCURACY_VERDICT_H
 
 #include <stdint.h>
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "psr/scene.h"
 
 /* The bounds that a picture has to keep, as options give them; the others are the verdict's own. */

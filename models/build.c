@@ -8,9 +8,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "psr/build.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/mesh.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 
 #define PROGRAM "psr-model build"
 #define RADIANS (3.14159265358979323846 / 180)

@@ -4,8 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 #include "json.h"
-#include "psr/cli.h"
-#include "psr/model.h"
+#include "base/cli.h"
+#include "model/blocks.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 

@@ -1,9 +1,9 @@
 #include <stdio.h>
 #include <string.h>
 #include "commands.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/error.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 
 static const struct command {
 	const char *name, *summary;

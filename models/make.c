@@ -5,9 +5,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include "base/outfile.h"
 #include "models/shapes/generators.h"
 #include "models/shapes/glb.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 /* Triangles as drawn, every instance counted. */
 static uint64_t count_triangles(const struct shape *shape)
@@ -38,7 +39,7 @@ static int make_file(const struct generator *generator, const char *path, struct
 	generator->make(&shape);
 	code = glb_encode(&bytes, &n_bytes, &shape, generator->name, err);
 	if (code == PSR_OK)
-		code = glb_write(path, bytes, n_bytes, err);
+		code = outfile_save(path, OUTFILE_DURABLE, bytes, n_bytes, err);
 	if (code == PSR_OK)
 		printf("%s: %llu triangles, %u instances, %u materials, %.2f MB\n", path,
 		       (unsigned long long)count_triangles(&shape), shape.n_instances, shape.n_materials,

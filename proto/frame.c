@@ -73,7 +73,7 @@ struct picture {
 
 static int check_picture(const struct picture *m, struct psr_error *err)
 {
-	const uint32_t data = ~(1u << PSR_WIRE_PLANE_COLOR | 1u << PSR_WIRE_PLANE_DEPTH);
+	const uint32_t data = ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH);
 	if (m->width == 0 || m->height == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides need at least 1", m->width,
 		                m->height);
@@ -81,10 +81,10 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 	    (uint64_t)m->width * m->height > PSR_WIRE_MAX_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "the picture has %u x %u pixels: a side holds at most %d, all of it %u",
 		                m->width, m->height, PSR_WIRE_MAX_SIDE, PSR_WIRE_MAX_PIXELS);
-	if (m->planes == 0 || m->planes >> PSR_WIRE_PLANES)
+	if (m->planes == 0 || m->planes >> PSR_N_PLANES)
 		return psr_fail(err, PSR_ERR_ARG, "the planes are %#x: bits 0 to %d are known, and one is needed", m->planes,
-		                PSR_WIRE_PLANES - 1);
-	if (m->planes & 1u << PSR_WIRE_PLANE_COLOR) {
+		                PSR_N_PLANES - 1);
+	if (m->planes & 1u << PSR_PLANE_COLOR) {
 		int jpeg = m->color_codec == PSR_CODEC_JPEG;
 		if (check_integer("the codec of colour", m->color_codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err) ||
 		    check_integer(jpeg ? "the JPEG quality" : "the quality of a lossless codec", m->color_quality, jpeg,
@@ -93,7 +93,7 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 	} else if (check_zero("the codec of colour, which is not asked for,", !m->color_codec && !m->color_quality, err)) {
 		return PSR_ERR_ARG;
 	}
-	if (m->planes & 1u << PSR_WIRE_PLANE_DEPTH) {
+	if (m->planes & 1u << PSR_PLANE_DEPTH) {
 		if (check_integer("the format of depth", m->depth_format, PSR_WIRE_DEPTH_F32, PSR_WIRE_DEPTH_U16_HALF, err))
 			return PSR_ERR_ARG;
 	} else if (check_zero("the format of depth, which is not asked for,", !m->depth_format && !m->depth_codec, err)) {

@@ -2,40 +2,34 @@
 
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format)
 {
-	static const uint8_t bytes[PSR_WIRE_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
-	return plane == PSR_WIRE_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
+	static const uint8_t bytes[PSR_N_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
+	return plane == PSR_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
 }
 
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format)
 {
-	static const uint8_t n_components[PSR_WIRE_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
+	static const uint8_t n_components[PSR_N_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
 	return n_components[plane] * psr_plane_component_bytes(plane, depth_format);
-}
-
-const char *psr_plane_name(unsigned plane)
-{
-	static const char *const names[PSR_WIRE_PLANES] = { "color", "depth", "normal", "id", "weight", "words", "block" };
-	return names[plane];
 }
 
 const uint8_t *psr_plane_background(unsigned plane)
 {
-	static const uint8_t bytes[PSR_WIRE_PLANES][8] = {
-		[PSR_WIRE_PLANE_DEPTH] = { 0, 0, 0x80, 0x7f },
-		[PSR_WIRE_PLANE_ID] = { 0xff, 0xff, 0xff, 0xff },
-		[PSR_WIRE_PLANE_WEIGHT] = { 0xff },
-		[PSR_WIRE_PLANE_WORDS] = { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f },
-		[PSR_WIRE_PLANE_BLOCK] = { 0xff, 0xff, 0xff },
+	static const uint8_t bytes[PSR_N_PLANES][8] = {
+		[PSR_PLANE_DEPTH] = { 0, 0, 0x80, 0x7f },
+		[PSR_PLANE_ID] = { 0xff, 0xff, 0xff, 0xff },
+		[PSR_PLANE_WEIGHT] = { 0xff },
+		[PSR_PLANE_WORDS] = { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f },
+		[PSR_PLANE_BLOCK] = { 0xff, 0xff, 0xff },
 	};
 	return bytes[plane];
 }
 
 uint64_t psr_plane_capability(unsigned plane)
 {
-	static const uint32_t capability[PSR_WIRE_PLANES] = {
-		[PSR_WIRE_PLANE_NORMAL] = PSR_CAP_NORMAL, [PSR_WIRE_PLANE_ID] = PSR_CAP_ID,
-		[PSR_WIRE_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_WIRE_PLANE_WORDS] = PSR_CAP_WORDS,
-		[PSR_WIRE_PLANE_BLOCK] = PSR_CAP_BLOCK,
+	static const uint32_t capability[PSR_N_PLANES] = {
+		[PSR_PLANE_NORMAL] = PSR_CAP_NORMAL, [PSR_PLANE_ID] = PSR_CAP_ID,
+		[PSR_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_PLANE_WORDS] = PSR_CAP_WORDS,
+		[PSR_PLANE_BLOCK] = PSR_CAP_BLOCK,
 	};
 	return capability[plane];
 }
@@ -66,10 +60,10 @@ static int check_rect(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_rect *m = p;
 	uint64_t n_pixels, raw;
-	if (check_integer("the plane of a rectangle", m->plane, 0, PSR_WIRE_PLANES - 1, err) ||
+	if (check_integer("the plane of a rectangle", m->plane, 0, PSR_N_PLANES - 1, err) ||
 	    check_integer("the codec of a rectangle", m->codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err))
 		return PSR_ERR_ARG;
-	if (m->plane != PSR_WIRE_PLANE_COLOR && m->codec != PSR_CODEC_RAW && m->codec != PSR_CODEC_ZSTD)
+	if (m->plane != PSR_PLANE_COLOR && m->codec != PSR_CODEC_RAW && m->codec != PSR_CODEC_ZSTD)
 		return psr_fail(err, PSR_ERR_ARG, "a rectangle of plane %u has codec %u, which is for colour", m->plane,
 		                m->codec);
 	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
@@ -83,7 +77,7 @@ static int check_rect(const void *p, struct psr_error *err)
 		                PSR_WIRE_MAX_RECT_PIXELS);
 	n_pixels = (uint64_t)((m->w + m->scale - 1u) / m->scale) * ((m->h + m->scale - 1u) / m->scale);
 	raw = n_pixels * psr_plane_pixel_bytes(m->plane, PSR_WIRE_DEPTH_F32);
-	if (m->codec == PSR_CODEC_RAW && m->total != raw && !(m->plane == PSR_WIRE_PLANE_DEPTH && m->total == raw / 2))
+	if (m->codec == PSR_CODEC_RAW && m->total != raw && !(m->plane == PSR_PLANE_DEPTH && m->total == raw / 2))
 		return psr_fail(err, PSR_ERR_ARG, "a raw rectangle of %llu bytes claims %u", (unsigned long long)raw, m->total);
 	if (m->total > psr_rect_total_max(n_pixels, psr_plane_pixel_bytes(m->plane, PSR_WIRE_DEPTH_F32)))
 		return psr_fail(err, PSR_ERR_LIMIT, "a rectangle of %llu raw bytes claims %u coded ones",
@@ -115,7 +109,7 @@ static void layout_frame_end(struct wire *w, void *p)
 	wire_f64(w, &m->error_px, 1);
 	wire_u16(w, &m->n_entries);
 	wire_reserved(w, 6);
-	for (unsigned i = 0; i < PSR_WIRE_PLANES; i++) {
+	for (unsigned i = 0; i < PSR_N_PLANES; i++) {
 		if (m->planes & 1u << i)
 			wire_u64(w, &m->hash[i]);
 		else if (!w->writing)
@@ -140,9 +134,9 @@ static int check_frame_end(const void *p, struct psr_error *err)
 	    check_integer("the status of a frame", m->status, PSR_WIRE_FRAME_OK, PSR_WIRE_FRAME_COARSE, err) ||
 	    check_range("the error of a frame (pixels)", m->error_px, 0, PSR_WIRE_MAX_LENGTH, err))
 		return PSR_ERR_ARG;
-	if (m->planes == 0 || m->planes >> PSR_WIRE_PLANES)
+	if (m->planes == 0 || m->planes >> PSR_N_PLANES)
 		return psr_fail(err, PSR_ERR_ARG, "the planes of a frame are %#x: bits 0 to %d are known, and one is needed",
-		                m->planes, PSR_WIRE_PLANES - 1);
+		                m->planes, PSR_N_PLANES - 1);
 	if (m->n_entries > PSR_WIRE_MAX_REPORT)
 		return psr_fail(err, PSR_ERR_LIMIT, "a report has %u entries, and holds at most %d", m->n_entries,
 		                PSR_WIRE_MAX_REPORT);

@@ -1,7 +1,7 @@
 #include <stdio.h>
 #include "log.h"
 #include "options.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "server.h"
 
 int main(int argc, char **argv)

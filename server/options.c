@@ -1,15 +1,15 @@
 #define _GNU_SOURCE
 #include <ctype.h>
-#include <errno.h>
 #include <inttypes.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "base/infile.h"
 #include "options.h"
-#include "psr/cli.h"
-#include "psr/isa.h"
+#include "base/cli.h"
+#include "simd/isa.h"
 
 #define MAX_OPTIONS 40
 #define MAX_CONFIG 65536
@@ -70,14 +70,14 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 	const struct psr_opt opts[] = {
 		{ .name = "What is served, and where", .type = PSR_OPT_HEADING },
 		{ .name = "models", .letter = 'm', .type = PSR_OPT_STRING, .value = &o->models, .arg = "DIR",
-		  .help = "The folder whose models clients see: .psr files, and meshes and scans, which are built when somebody first"
-		          " asks for them. Required." },
+		  .help = "The folder whose models clients see: .psr files, and meshes and scans, which psrd builds at the first"
+		          " request. Required." },
 		{ .name = "listen", .letter = 'l', .type = PSR_OPT_CALL, .value = o, .arg = "ADDR:PORT|unix:PATH",
 		  .call = on_listen,
 		  .help = "Where clients connect; repeatable. Port 0 takes any free one. IPv6 addresses stand in brackets. TCP serves"
 		          " this machine only (loopback addresses); `ssh -L` reaches it from others. [" OPTIONS_LISTEN_DEFAULT "]" },
 		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
-		  .help = "The folder where models built from meshes and scans are kept. It needs room: tens of MB a model." },
+		  .help = "The folder that keeps models built from meshes and scans. It needs room: tens of MB a model." },
 		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
 		  .help = "A file of `name = value` lines, names as here without the dashes; the command line wins." },
 		{ .name = "verbose", .letter = 'v', .type = PSR_OPT_FLAG, .value = &o->verbose,
@@ -86,18 +86,18 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		{ .name = "Models built from meshes and scans", .type = PSR_OPT_HEADING },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &o->resolution, .arg = "PIXELS",
 		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
-		  .help = "The coarsest model that is built: sharp in pictures up to this side. Larger pictures get a finer model, see"
-		          " --max-resolution. Twice the figure takes four times the memory." },
+		  .help = "The coarsest model that psrd builds: sharp in pictures up to this side. Larger pictures get a finer"
+		          " model, see --max-resolution. Twice the figure takes four times the memory." },
 		{ .name = "max-resolution", .type = PSR_OPT_INT, .value = &o->max_resolution, .arg = "PIXELS",
 		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
-		  .help = "The finest model that is built. Raise it for pictures larger than this side; lower it where first pictures"
-		          " take too long. The same as --resolution: one model for all pictures." },
+		  .help = "The finest model that psrd builds. Raise it for pictures larger than this side; lower it where first"
+		          " pictures take too long. The same as --resolution: one model for all pictures." },
 		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
-		  .help = "Models that are built at the same time; others wait their turn." },
+		  .help = "Builds at the same time; others wait their turn." },
 		{ .name = "build-memory", .type = PSR_OPT_INT, .value = &o->build_memory, .arg = "BYTES", .min = 64 * MEBI,
 		  .max = 1e15, .help = "Memory (address space) that one build may take; one that needs more fails and says so." },
 		{ .name = "build-time", .type = PSR_OPT_INT, .value = &o->build_time, .arg = "SECONDS", .min = 1, .max = 1e6,
-		  .help = "Processor time that one build may take, all its threads together; one that needs more fails and says so." },
+		  .help = "Processor time that one build may take, over all its threads; one that needs more fails and says so." },
 		{ .name = "Share of the machine", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
 		  .help = "Processor cores that draw and build. Lower it to leave cores to other programs." },
@@ -139,33 +139,12 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		table[i].seen = &seen[i];
 }
 
-static int read_config(char **out, const char *path, struct psr_error *err)
+static int read_config(char **text, const char *path, struct psr_error *err)
 {
-	FILE *file = fopen(path, "re");
-	char *text;
-	size_t n;
+	struct psr_error why;
+	int code = infile_read_text(text, path, MAX_CONFIG, &why);
 
-	if (file == NULL)
-		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "--config %s: %s", path,
-		                strerror(errno));
-	text = malloc(MAX_CONFIG + 1);
-	if (text == NULL) {
-		fclose(file);
-		return psr_fail(err, PSR_ERR_MEMORY, "--config %s: no memory", path);
-	}
-	n = fread(text, 1, MAX_CONFIG + 1, file);
-	if (ferror(file) || n > MAX_CONFIG || memchr(text, '\0', n) != NULL) {
-		int failed = ferror(file);
-
-		fclose(file);
-		free(text);
-		return failed ? psr_fail(err, PSR_ERR_IO, "--config %s: %s", path, strerror(errno))
-		              : psr_fail(err, PSR_ERR_ARG, "--config %s: not a text file of at most 64 KiB", path);
-	}
-	fclose(file);
-	text[n] = '\0';
-	*out = text;
-	return PSR_OK;
+	return code == PSR_OK ? code : psr_fail(err, code, "--config %s", why.text);
 }
 
 static char *trim(char *text)

@@ -5,18 +5,34 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "server/net/accept.h"
-#include "server/models/cache.h"
-#include "server/net/conn.h"
-#include "server/frames/frames.h"
 #include "log.h"
-#include "server/models/opener.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "server.h"
+#include "server/models/cache.h"
+#include "server/net/accept.h"
+#include "server/session/session.h"
 
 #define IO_THREADS 2
 
 static const char ENDING[] = "the server is shutting down";
+
+struct server {
+	struct options *options;
+	struct loop loop;
+	struct acceptor acceptor;
+	struct conns conns;
+	struct conn_user conn_user;
+	struct psr_pool *pool;       /* draws and encodes frames */
+	struct psr_pool *io;         /* reads models and folders, hashes sources */
+	struct codec *codec;
+	struct catalogue catalogue;
+	struct builder *builder;
+	struct opener *opener;
+	struct frames *frames;
+	struct sessions sessions;
+	int is_draining, is_scanning, must_scan_again, is_ticking;
+	uint64_t drain_end_us;
+};
 
 struct scan {
 	struct server *server;
@@ -93,36 +109,41 @@ static void start_draining(struct server *server)
 		loop_stop(&server->loop);
 		return;
 	}
-	log_info("ending: %u connections, %u frames under way", server->n_conns, frames_running(server->frames));
-	server->is_draining = 1;
+	log_info("ending: %u connections, %u running frames", server->conns.n, frames_running(server->frames));
+	server->is_draining = server->conns.is_draining = 1;
 	server->drain_end_us = server->loop.now_us + to_us(server->options->drain_timeout);
-	accept_close(server);
+	accept_close(&server->acceptor);
 	builder_destroy(server->builder);
 	server->builder = NULL;
-	opener_refuse_all(server->opener, PSR_ERR_CANCELLED, ENDING);
-	for (struct conn *conn = server->conns; conn != NULL; conn = next) {
+	opener_stop(server->opener, PSR_ERR_CANCELLED, ENDING);
+	frames_stop(server->frames);
+	for (struct conn *conn = server->conns.first; conn != NULL; conn = next) {
+		struct session *session = conn->session;
+
 		next = conn->next;
-		if (conn->state == CONN_HELLO)
+		if (session == NULL)
 			conn_close(conn);
 		else
-			frames_refuse_waiting(server->frames, conn, PSR_ERR_CANCELLED, ENDING);
+			frames_refuse_waiting(server->frames, &session->flow, PSR_ERR_CANCELLED, ENDING);
 	}
 }
 
-/* Who has no frame under way hears goodbye; when nobody is left, the loop ends. */
+/* Clients without a running frame get GOODBYE; after the last one the loop ends. */
 static void go_on_draining(struct server *server)
 {
 	struct conn *next;
 
-	for (struct conn *conn = server->conns; conn != NULL; conn = next) {
+	for (struct conn *conn = server->conns.first; conn != NULL; conn = next) {
+		const struct session *session = conn->session;
+
 		next = conn->next;
-		if (conn->state == CONN_OPEN && conn->running == NULL) {
+		if (conn->state == CONN_OPEN && session->flow.running == NULL) {
 			conn_goodbye(conn, PSR_GOODBYE_SHUTDOWN, ENDING);
 			conn_flush(conn);
 		}
 	}
 	if (server->loop.now_us >= server->drain_end_us
-	    || (server->conns == NULL && frames_running(server->frames) == 0 && !server->is_scanning
+	    || (server->conns.first == NULL && frames_running(server->frames) == 0 && !server->is_scanning
 	        && !opener_is_working(server->opener)))
 		loop_stop(&server->loop);
 }
@@ -144,14 +165,9 @@ static void on_signal(int number, void *userdata)
 static void on_tick(void *userdata)
 {
 	struct server *server = userdata;
-	struct conn *next;
 
-	if (server->are_paused)
-		accept_pause(server, 0);
-	for (struct conn *conn = server->conns; conn != NULL; conn = next) {
-		next = conn->next;
-		conn_tick(conn, server->loop.now_us);
-	}
+	accept_wake(&server->acceptor);
+	conns_tick(&server->conns);
 }
 
 static void on_batch_end(void *userdata)
@@ -159,24 +175,11 @@ static void on_batch_end(void *userdata)
 	struct server *server = userdata;
 	int must_tick;
 
-	while (server->must_resume) {
-		struct conn *next;
-
-		server->must_resume = 0;
-		for (struct conn *conn = server->conns; conn != NULL; conn = next) {
-			next = conn->next;
-			conn_resume(conn);
-		}
-	}
+	conns_resume(&server->conns);
 	if (server->is_draining)
 		go_on_draining(server);
-	while (server->dead != NULL) {
-		struct conn *conn = server->dead;
-
-		server->dead = conn->next;
-		conn_destroy(conn);
-	}
-	must_tick = server->conns != NULL || server->are_paused || server->is_draining;
+	conns_end_batch(&server->conns);
+	must_tick = server->conns.first != NULL || server->acceptor.is_resting || server->is_draining;
 	if (must_tick != server->is_ticking) {
 		server->is_ticking = must_tick;
 		loop_set_ticking(&server->loop, must_tick);
@@ -187,18 +190,13 @@ static void on_batch_end(void *userdata)
 
 static void destroy(struct server *server)
 {
-	accept_close(server);
+	accept_close(&server->acceptor);
 	builder_destroy(server->builder);
-	while (server->conns != NULL)
-		conn_close(server->conns);
-	psr_pool_destroy(server->pool);
+	while (server->conns.first != NULL)
+		conn_close(server->conns.first);
+	psr_pool_destroy(server->pool); /* its jobs end before what they use goes */
 	psr_pool_destroy(server->io);
-	while (server->dead != NULL) {
-		struct conn *conn = server->dead;
-
-		server->dead = conn->next;
-		conn_destroy(conn);
-	}
+	conns_end_batch(&server->conns);
 	opener_destroy(server->opener);
 	frames_destroy(server->frames);
 	codec_destroy(server->codec);
@@ -218,27 +216,61 @@ static int needs_cache(const struct server *server)
 	return n_sources > 0 || server->options->cache != server->options->cache_default;
 }
 
-static int start_parts(struct server *server, struct psr_error *err)
+static int create_parts(struct server *server)
 {
 	const struct options *options = server->options;
 	const struct builder_limits limits = {
 		.max_builds = (int)options->max_builds, .threads = (int)options->threads,
 		.memory_bytes = (uint64_t)options->build_memory, .cpu_seconds = (uint64_t)options->build_time,
 	};
+
+	if (psr_pool_create_for_jobs(&server->pool, (int)options->threads, NULL) != PSR_OK
+	    || psr_pool_create_for_jobs(&server->io, IO_THREADS, NULL) != PSR_OK || codec_create(&server->codec) != PSR_OK
+	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	if (frames_create(&server->frames, &(struct frames_parts){
+	        .loop = &server->loop, .pool = server->pool, .codec = server->codec, .max_pixels = options->max_pixels,
+	        .max_queue = (uint64_t)options->max_queue, .on_end = sessions_on_frame_end }) != PSR_OK
+	    || opener_create(&server->opener, &(struct opener_parts){
+	        .loop = &server->loop, .io = server->io, .catalogue = &server->catalogue, .builder = server->builder,
+	        .cache = options->cache, .resolution = (uint32_t)options->resolution,
+	        .max_resolution = (uint32_t)options->max_resolution, .user = &sessions_opener_user }) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	server->sessions = (struct sessions){
+		.options = options, .conns = &server->conns, .catalogue = &server->catalogue, .opener = server->opener,
+		.frames = server->frames, .pool = server->pool, .start_us = server->loop.now_us,
+	};
+	return PSR_OK;
+}
+
+static int start_parts(struct server *server, struct psr_error *err)
+{
+	const struct options *options = server->options;
 	struct catalogue_listing *listing;
 	int code = catalogue_scan(&listing, options->models, err);
 
 	if (code != PSR_OK)
 		return code;
 	catalogue_init(&server->catalogue, (uint64_t)options->max_memory);
-	if (catalogue_adopt(&server->catalogue, listing) != PSR_OK
-	    || psr_pool_create(&server->pool, (int)options->threads, 1) != PSR_OK
-	    || psr_pool_create(&server->io, IO_THREADS, 1) != PSR_OK || codec_create(&server->codec) != PSR_OK
-	    || frames_create(&server->frames, server) != PSR_OK || opener_create(&server->opener, server) != PSR_OK
-	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
+	if (catalogue_adopt(&server->catalogue, listing) != PSR_OK || create_parts(server) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64,
 		                options->threads);
 	return needs_cache(server) ? cache_check(options->cache, err) : PSR_OK;
+}
+
+/* From here on connections can come, and wait in the listeners' backlog until the loop runs. */
+static int open_doors(struct server *server, struct psr_error *err)
+{
+	const struct options *options = server->options;
+	const struct conn_limits limits = {
+		.max_clients = (unsigned)options->max_clients, .max_queue = (uint64_t)options->max_queue,
+		.handshake_us = to_us(options->handshake_timeout), .idle_us = to_us(options->idle_timeout),
+		.slow_us = to_us(options->slow_timeout),
+	};
+
+	sessions_conn_user(&server->conn_user, &server->sessions);
+	conns_init(&server->conns, &server->loop, &limits, &server->conn_user);
+	return accept_open(&server->acceptor, &server->conns, options->listen, options->n_listen, err);
 }
 
 int server_start(struct server **out, struct options *options, struct psr_error *err)
@@ -257,15 +289,14 @@ int server_start(struct server **out, struct options *options, struct psr_error 
 	sigaddset(&signals, SIGINT);
 	sigaddset(&signals, SIGHUP);
 	sigaddset(&signals, SIGCHLD);
-	accept_raise_descriptors(options);
+	options->max_clients = accept_raise_descriptors(options->max_clients);
 	code = loop_init(&server->loop, &signals, err);
 	server->loop.on_signal = on_signal;
 	server->loop.on_tick = on_tick;
 	server->loop.on_batch_end = on_batch_end;
 	server->loop.userdata = server;
-	server->stats.start_us = server->loop.now_us;
 	if (code == PSR_OK)
-		code = accept_open(server, err);
+		code = open_doors(server, err);
 	if (code == PSR_OK)
 		code = start_parts(server, err);
 	if (code != PSR_OK) {
@@ -280,45 +311,20 @@ int server_run(struct server *server, struct psr_error *err)
 {
 	int code;
 
-	for (int i = 0; i < server->n_listeners; i++)
-		printf("READY %s\n", server->listener[i].listener.name);
+	for (int i = 0; i < server->acceptor.n; i++)
+		printf("READY %s\n", server->acceptor.listener[i].listener.name);
 	fflush(stdout);
 	log_info("serving %zu models with %d threads and %s", server->catalogue.n, psr_pool_threads(server->pool),
 	         psr_isa_name(psr_isa_get()));
 	code = loop_run(&server->loop, err);
 	if (frames_running(server->frames) > 0 || opener_is_working(server->opener) || server->is_scanning) {
-		/* Past the time that it had: what still draws or reads cannot be stopped, and nobody waits for it. */
+		/* The drain time is over: jobs that still draw or read cannot be stopped, and nobody waits for them. */
 		log_info("ended in the middle of %u frames", frames_running(server->frames));
 		builder_destroy(server->builder);
-		accept_close(server);
+		accept_close(&server->acceptor);
 		fflush(NULL);
 		_exit(psr_exit_status(code));
 	}
 	destroy(server);
 	return code;
-}
-
-void server_fill_stats(const struct server *server, struct psr_msg_stats_reply *reply)
-{
-	const struct server_stats *stats = &server->stats;
-	const struct psr_msg_stat all[] = {
-		{ PSR_STAT_UPTIME_US, loop_clock_us() - stats->start_us },
-		{ PSR_STAT_CONNECTIONS, server->n_conns },
-		{ PSR_STAT_CONNECTIONS_TOTAL, stats->connections_total },
-		{ PSR_STAT_MODELS, server->catalogue.n_models },
-		{ PSR_STAT_MODEL_BYTES, server->catalogue.bytes },
-		{ PSR_STAT_FRAMES, stats->frames },
-		{ PSR_STAT_FRAMES_FAILED, stats->frames_failed },
-		{ PSR_STAT_FRAMES_WAITING, frames_waiting(server->frames) },
-		{ PSR_STAT_BYTES_SENT, stats->bytes_sent },
-		{ PSR_STAT_BYTES_RECEIVED, stats->bytes_received },
-		{ PSR_STAT_FRAMES_SUPERSEDED, 0 },
-		{ PSR_STAT_FRAMES_CANCELLED, stats->frames_cancelled },
-		{ PSR_STAT_THREADS, (uint64_t)psr_pool_threads(server->pool) },
-		{ PSR_STAT_DROPPED_PEERS, stats->dropped_peers },
-	};
-
-	memset(reply, 0, sizeof *reply);
-	reply->n_stats = sizeof all / sizeof all[0];
-	memcpy(reply->stat, all, sizeof all);
 }

@@ -18,7 +18,7 @@ static int check(struct bench_options *options, struct psr_error *err)
 		code = psr_fail(err, PSR_ERR_ARG, "--view: a bench begins at one view, not at %u", views.n);
 	options->view.view = NULL; /* its angles stand in the wish */
 	views_fini(&views);
-	options->frame.planes = 1 << PSR_WIRE_PLANE_COLOR;
+	options->frame.planes = 1 << PSR_PLANE_COLOR;
 	if (code == PSR_OK)
 		code = quality_apply(&options->frame, &options->quality, err);
 	options->scene.pixels =

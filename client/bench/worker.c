@@ -1,17 +1,9 @@
 #include <stdlib.h>
-#include <time.h>
+#include "base/clock.h"
 #include "bench.h"
 #include "client/psr.h"
 
 #define FRAMES_A_TURN 120
-
-static uint64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 static void turn_camera(struct bench_worker *worker)
 {
@@ -123,7 +115,7 @@ static int add_sample(struct bench_worker *worker, uint64_t latency_ns)
 static void measure(struct bench_worker *worker)
 {
 	const struct bench_options *options = worker->options;
-	uint64_t start_ns = now_ns(), length_ns = (uint64_t)options->seconds * 1000000000u;
+	uint64_t start_ns = clock_ns(), length_ns = (uint64_t)options->seconds * 1000000000u;
 	int64_t n_open = 0;
 	int is_over = 0;
 
@@ -145,7 +137,7 @@ static void measure(struct bench_worker *worker)
 			break;
 		if (got > 0)
 			got = wait_for_frame(worker, &event, &why);
-		since_ns = now_ns() - start_ns;
+		since_ns = clock_ns() - start_ns;
 		if (got == 0)
 			psr_fail(&why, PSR_ERR_CONNECTION, "%s: no frame within %d s", options->server, (int)options->timeout);
 		if (got <= 0) {

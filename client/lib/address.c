@@ -11,26 +11,19 @@
 #include <sys/un.h>
 #include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "internal.h"
-
-uint64_t client_now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
-}
 
 uint64_t client_deadline_ns(int timeout_ms)
 {
-	return timeout_ms < 0 ? UINT64_MAX : client_now_ns() + (uint64_t)timeout_ms * 1000000u;
+	return timeout_ms < 0 ? UINT64_MAX : clock_ns() + (uint64_t)timeout_ms * 1000000u;
 }
 
 int client_poll(int fd, int events, uint64_t deadline_ns, struct psr_error *err)
 {
 	for (;;) {
 		struct pollfd watch = { .fd = fd, .events = (short)events };
-		uint64_t now = client_now_ns(), left = deadline_ns > now ? deadline_ns - now : 0;
+		uint64_t now = clock_ns(), left = deadline_ns > now ? deadline_ns - now : 0;
 		int wait_ms = deadline_ns == UINT64_MAX ? -1
 		              : left > 3600000000000u   ? 3600000
 		                                        : (int)((left + 999999) / 1000000);
@@ -40,7 +33,7 @@ int client_poll(int fd, int events, uint64_t deadline_ns, struct psr_error *err)
 			return 1;
 		if (n < 0 && errno != EINTR)
 			return psr_fail(err, PSR_ERR_IO, "poll: %s", strerror(errno));
-		if (n == 0 && client_now_ns() >= deadline_ns)
+		if (n == 0 && clock_ns() >= deadline_ns)
 			return 0;
 	}
 }
@@ -123,7 +116,7 @@ static int try_connect(int *out, int family, const struct sockaddr *to, socklen_
 		static const struct timespec pause = { .tv_nsec = 5000000 };
 
 		reason = errno;
-		if (family == AF_UNIX && reason == EAGAIN && client_now_ns() < deadline_ns) { /* its backlog is full */
+		if (family == AF_UNIX && reason == EAGAIN && clock_ns() < deadline_ns) { /* its backlog is full */
 			reason = 0;
 			nanosleep(&pause, NULL);
 			continue;

@@ -40,7 +40,7 @@ int psr_animation_check(const char *path, struct psr_error *err)
 	return choose(&module, path, err);
 }
 
-int psr_animation_open(struct psr_animation **out, const char *path, const struct psr_picture *first, uint32_t n_frames,
+int psr_animation_open(struct psr_animation **out, const char *path, const struct psr_frame *first, uint32_t n_frames,
                        double seconds, struct psr_error *err)
 {
 	struct psr_animation *animation = calloc(1, sizeof *animation);
@@ -51,7 +51,7 @@ int psr_animation_open(struct psr_animation **out, const char *path, const struc
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for an animation");
 	code = choose(&animation->module, path, err);
 	if (code == PSR_OK)
-		code = outfile_open(&animation->file, path, err);
+		code = outfile_open(&animation->file, path, OUTFILE_PLAIN, err);
 	if (code != PSR_OK) {
 		free(animation);
 		return code;
@@ -71,7 +71,7 @@ int psr_animation_open(struct psr_animation **out, const char *path, const struc
 	return PSR_OK;
 }
 
-int psr_animation_add(struct psr_animation *animation, const struct psr_picture *picture, struct psr_error *err)
+int psr_animation_add(struct psr_animation *animation, const struct psr_frame *picture, struct psr_error *err)
 {
 	char message[256] = "";
 

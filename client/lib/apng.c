@@ -3,7 +3,8 @@
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
-#include "png.h"
+#include "base/png.h"
+#include "picture.h"
 
 #define PNG_SIGNATURE 8
 #define MILLISECONDS 1000
@@ -29,7 +30,7 @@ static uint32_t get_u32(const uint8_t *from)
 	return (uint32_t)from[0] << 24 | (uint32_t)from[1] << 16 | (uint32_t)from[2] << 8 | from[3];
 }
 
-int apng_open(struct apng **out, struct outfile *file, const struct psr_picture *first, uint32_t n_frames,
+int apng_open(struct apng **out, struct outfile *file, const struct psr_frame *first, uint32_t n_frames,
               double seconds, struct psr_error *err)
 {
 	struct apng *apng = calloc(1, sizeof *apng);
@@ -75,7 +76,7 @@ static void on_frame_write(png_structp png, png_bytep data, size_t n)
 	apng->n_data += n;
 }
 
-static void write_control(struct apng *apng, const struct psr_picture *picture)
+static void write_control(struct apng *apng, const struct psr_frame *picture)
 {
 	uint8_t control[26] = { 0 }; /* at 0,0, replacing what was there */
 
@@ -100,7 +101,7 @@ static void write_data(struct apng *apng, uint8_t *data, uint32_t n)
 	png_write_chunk(apng->png, (png_const_bytep)"fdAT", data - 4, n + 4);
 }
 
-int apng_add(struct apng *apng, const struct psr_picture *picture, struct psr_error *err)
+int apng_add(struct apng *apng, const struct psr_frame *picture, struct psr_error *err)
 {
 	int code;
 

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <xxhash.h>
 #include "internal.h"
 
 void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked, uint16_t pass)
@@ -14,37 +13,30 @@ void client_assembly_init(struct client_assembly *assembly, const struct psr_msg
 
 void client_assembly_fini(struct client_assembly *assembly)
 {
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
-		free(psr_picture_plane(&assembly->picture, plane));
+	psr_frame_free(&assembly->picture);
 	free(assembly->pieces);
 	memset(assembly, 0, sizeof *assembly);
 }
 
-/* A plane of background; *has_failed is set if there is no memory for it. */
-static void *make_plane(const struct psr_msg_frame_begin *begin, unsigned plane, int *has_failed)
+static void fill_background(const struct psr_frame *frame, const struct psr_msg_frame_begin *begin)
 {
-	size_t pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), n = (size_t)begin->width * begin->height * pixel;
-	uint8_t *pixels;
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
+		size_t pixel = psr_plane_bytes(plane), n = (size_t)frame->width * frame->height * pixel;
+		uint8_t *pixels = psr_frame_plane(frame, plane);
 
-	if (!(begin->planes >> plane & 1))
-		return NULL;
-	pixels = malloc(n);
-	if (pixels == NULL) {
-		*has_failed = 1;
-		return NULL;
+		if (pixels == NULL)
+			continue;
+		memcpy(pixels, plane == PSR_PLANE_COLOR ? begin->background : psr_plane_background(plane), pixel);
+		for (size_t done = pixel; done < n; done *= 2)
+			memcpy(pixels + done, pixels, done < n - done ? done : n - done);
 	}
-	memcpy(pixels, plane == PSR_WIRE_PLANE_COLOR ? begin->background : psr_plane_background(plane), pixel);
-	for (size_t done = pixel; done < n; done *= 2)
-		memcpy(pixels + done, pixels, done < n - done ? done : n - done);
-	return pixels;
 }
 
 int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg_frame_begin *begin,
                           struct psr_error *err)
 {
 	const struct psr_msg_frame *asked = &assembly->asked;
-	struct psr_picture *picture = &assembly->picture;
-	int has_failed = 0;
+	int code;
 
 	if (assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
@@ -58,18 +50,10 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 		                begin->width, begin->height, asked->width, asked->height);
 	assembly->begin = *begin;
 	assembly->has_begun = 1;
-	picture->width = asked->width;
-	picture->height = asked->height;
-	picture->rgb = make_plane(begin, PSR_WIRE_PLANE_COLOR, &has_failed);
-	picture->depth = make_plane(begin, PSR_WIRE_PLANE_DEPTH, &has_failed);
-	picture->normal = make_plane(begin, PSR_WIRE_PLANE_NORMAL, &has_failed);
-	picture->id = make_plane(begin, PSR_WIRE_PLANE_ID, &has_failed);
-	picture->weight = make_plane(begin, PSR_WIRE_PLANE_WEIGHT, &has_failed);
-	picture->words = make_plane(begin, PSR_WIRE_PLANE_WORDS, &has_failed);
-	picture->block = make_plane(begin, PSR_WIRE_PLANE_BLOCK, &has_failed);
-	if (has_failed)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %" PRIu32 "x%" PRIu32 " pixels", asked->width,
-		                asked->height);
+	code = psr_frame_alloc(&assembly->picture, asked->width, asked->height, asked->planes, err);
+	if (code != PSR_OK)
+		return code;
+	fill_background(&assembly->picture, begin);
 	return PSR_OK;
 }
 
@@ -82,7 +66,7 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 
 	if (!assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle before the frame's beginning");
-	if (rect->plane >= PSR_WIRE_PLANES || !(asked->planes >> rect->plane & 1))
+	if (rect->plane >= PSR_N_PLANES || !(asked->planes >> rect->plane & 1))
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle of plane %u, which was not asked for",
 		                rect->plane);
 	if (rect->scale != 1 && rect->scale != 2 && rect->scale != 4)
@@ -92,8 +76,8 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server sent a rectangle %ux%u at %u,%u: outside of the picture of %" PRIu32 "x%" PRIu32,
 		                rect->w, rect->h, rect->x, rect->y, asked->width, asked->height);
-	wanted = rect->plane == PSR_WIRE_PLANE_COLOR ? asked->color_codec
-	         : rect->plane == PSR_WIRE_PLANE_DEPTH ? asked->depth_codec : asked->data_codec;
+	wanted = rect->plane == PSR_PLANE_COLOR ? asked->color_codec
+	         : rect->plane == PSR_PLANE_DEPTH ? asked->depth_codec : asked->data_codec;
 	if (rect->codec != PSR_CODEC_RAW && rect->codec != wanted)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle with codec %u, %u was asked for",
 		                rect->codec, wanted);
@@ -164,8 +148,7 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
                         struct psr_error *err)
 {
-	const struct psr_picture *picture = &assembly->picture;
-	size_t n = (size_t)picture->width * picture->height;
+	const struct psr_frame *picture = &assembly->picture;
 
 	if (!assembly->has_begun || assembly->open.total != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended a frame %s",
@@ -174,17 +157,17 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 	    end->planes != assembly->asked.planes)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
 	*checked = 0;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		uint64_t hash;
 
 		if (!(end->planes >> plane & 1) || assembly->lossy >> plane & 1)
 			continue;
-		hash = XXH64(psr_picture_plane(picture, plane), n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
+		hash = psr_frame_hash(picture, plane);
 		if (hash != end->hash[plane])
 			return psr_fail(err, PSR_ERR_FORMAT,
 			                "the %s plane of a frame is damaged: its hash is %016" PRIx64
 			                ", the server drew %016" PRIx64,
-			                plane == PSR_WIRE_PLANE_COLOR ? "colour" : psr_plane_name(plane), hash, end->hash[plane]);
+			                plane == PSR_PLANE_COLOR ? "colour" : psr_plane_name(plane), hash, end->hash[plane]);
 		*checked |= 1u << plane;
 	}
 	return PSR_OK;

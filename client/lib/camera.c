@@ -253,7 +253,7 @@ void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double d
 		camera->near_z = near_from_box(camera->eye, box_min, box_max);
 }
 
-void psr_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera)
+void client_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera)
 {
 	double forward[3], right[3], up[3];
 

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/socket.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "internal.h"
 
 int client_create(struct psr_client **out, int fd, const char *address, struct psr_error *err)
@@ -163,7 +164,7 @@ int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event
 			return 1;
 		if (got < 0)
 			break;
-		if (has_read && client_now_ns() >= deadline_ns) /* a server that never stops sending */
+		if (has_read && clock_ns() >= deadline_ns) /* a server that never stops sending */
 			return 0;
 		flush_output(client);
 		got = fill_input(client);
@@ -259,10 +260,10 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address, client->welcome.max_open);
 	if (asked->base != 0 || (asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS)
 	    || asked->color_codec > PSR_CODEC_ZSTD
-	    || (asked->planes >> PSR_WIRE_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
+	    || (asked->planes >> PSR_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "this client asks for planes, depth as float, without budgets of time or error, or base");
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (asked->planes >> plane & 1 && psr_plane_capability(plane) & ~client->welcome.capabilities)
 			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
 			                psr_plane_name(plane));
@@ -277,6 +278,6 @@ int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *aske
 	client_assembly_init(&frame->assembly, asked, 0);
 	frame->id = *id;
 	frame->bytes = 0;
-	frame->sent_ns = client_now_ns();
+	frame->sent_ns = clock_ns();
 	return PSR_OK;
 }

@@ -97,7 +97,7 @@ static void copy_pixels(uint8_t *to, size_t pitch, const uint8_t *from, const st
 	}
 }
 
-int client_decode(struct client_decoder *decoder, struct psr_picture *picture, const struct psr_msg_rect *rect,
+int client_decode(struct client_decoder *decoder, struct psr_frame *picture, const struct psr_msg_rect *rect,
                   const uint8_t *data, struct psr_error *err)
 {
 	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
@@ -105,7 +105,7 @@ int client_decode(struct client_decoder *decoder, struct psr_picture *picture, c
 	uint32_t width = (rect->w + rect->scale - 1u) / rect->scale, height = (rect->h + rect->scale - 1u) / rect->scale;
 	const size_t pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	const size_t raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
-	uint8_t *plane = psr_picture_plane(picture, rect->plane), *to = plane + rect->y * pitch + rect->x * pixel;
+	uint8_t *plane = psr_frame_plane(picture, rect->plane), *to = plane + rect->y * pitch + rect->x * pixel;
 
 	assert(plane != NULL);
 	if (rect->codec == PSR_CODEC_RAW) {

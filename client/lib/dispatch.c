@@ -1,6 +1,7 @@
 #include <inttypes.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "internal.h"
 
 static int broke(struct psr_client *client, const struct psr_error *why)
@@ -209,7 +210,7 @@ static int on_frame_end(struct psr_client *client, struct client_frame *frame, c
 	event->begin = &client->done.begin;
 	event->end = &client->end;
 	event->bytes = frame->bytes;
-	event->latency_ns = client_now_ns() - frame->sent_ns;
+	event->latency_ns = clock_ns() - frame->sent_ns;
 	event->checked = checked;
 	frame->bytes = 0;
 	if (client->end.is_final)

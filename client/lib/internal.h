@@ -17,12 +17,11 @@ struct client_address {
 };
 int client_address_parse(struct client_address *address, const char *text, struct psr_error *err);
 
-/* A connected, non-blocking socket. deadline_ns: of client_now_ns(). */
+/* A connected, non-blocking socket. deadline_ns: of clock_ns(). */
 int client_socket_connect(int *out, const char *address, uint64_t deadline_ns, struct psr_error *err);
 
 /* ---- clock ---- */
 
-uint64_t client_now_ns(void); /* monotonic */
 uint64_t client_deadline_ns(int timeout_ms); /* UINT64_MAX for -1 */
 
 /* poll(2) on one descriptor until the deadline: 1 ready, 0 time over, IO. */
@@ -35,7 +34,7 @@ int client_decoder_create(struct client_decoder **out);
 void client_decoder_destroy(struct client_decoder *decoder);
 
 /* rect has passed client_assembly_rect's checks; data holds all rect->total bytes of it. PROTOCOL or MEMORY. */
-int client_decode(struct client_decoder *decoder, struct psr_picture *picture, const struct psr_msg_rect *rect,
+int client_decode(struct client_decoder *decoder, struct psr_frame *picture, const struct psr_msg_rect *rect,
                   const uint8_t *data, struct psr_error *err);
 
 /* ---- assembly.c: one frame from BEGIN to END; no sockets ---- */
@@ -43,7 +42,7 @@ int client_decode(struct client_decoder *decoder, struct psr_picture *picture, c
 struct client_assembly {
 	struct psr_msg_frame asked;
 	struct psr_msg_frame_begin begin;
-	struct psr_picture picture;
+	struct psr_frame picture;
 	int has_begun;
 	uint16_t pass;        /* that must come */
 	unsigned lossy;       /* planes of which a rectangle came by JPEG or reduced */

@@ -1,7 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/client.h"
 
 #define DEGREE (3.14159265358979323846 / 180)

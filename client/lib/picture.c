@@ -1,9 +1,11 @@
 #include <string.h>
 #include <strings.h>
 #include "base/image_module.h"
+#include "base/netpbm.h"
+#include "base/png.h"
 #include "picture.h"
 
-typedef int native_writer(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);
+typedef int native_writer(struct outfile *file, const struct psr_frame *picture, struct psr_error *err);
 
 struct plan {
 	native_writer *write; /* NULL: the module does it */
@@ -28,14 +30,14 @@ static int choose(struct plan *plan, const char *path, int is_depth, struct psr_
 		if (is_depth)
 			return psr_fail(err, PSR_ERR_ARG, "'%.300s': .%.10s cannot hold depth, which is float; use .pfm or .exr",
 			                path, ending);
-		plan->write = strcasecmp(ending, "png") == 0 ? picture_write_png : picture_write_ppm;
+		plan->write = strcasecmp(ending, "png") == 0 ? png_write_frame : ppm_write_frame;
 		return PSR_OK;
 	}
 	if (strcasecmp(ending, "pfm") == 0) {
 		if (!is_depth)
 			return psr_fail(err, PSR_ERR_ARG,
 			                "'%.300s': .pfm is written for depth only; use .png, .ppm or .exr for colour", path);
-		plan->write = picture_write_pfm;
+		plan->write = pfm_write_frame;
 		return PSR_OK;
 	}
 	code = image_module_open(&module, &why);
@@ -47,7 +49,7 @@ static int choose(struct plan *plan, const char *path, int is_depth, struct psr_
 	return PSR_OK;
 }
 
-static int write_picture(const struct psr_picture *picture, const char *path, int is_depth, struct psr_error *err)
+static int write_picture(const struct psr_frame *picture, const char *path, int is_depth, struct psr_error *err)
 {
 	struct outfile file;
 	struct plan plan;
@@ -55,7 +57,7 @@ static int write_picture(const struct psr_picture *picture, const char *path, in
 	int code = choose(&plan, path, is_depth, err);
 
 	if (code == PSR_OK)
-		code = outfile_open(&file, path, err);
+		code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code != PSR_OK)
 		return code;
 	if (plan.write != NULL)
@@ -67,12 +69,12 @@ static int write_picture(const struct psr_picture *picture, const char *path, in
 	return outfile_close(&file, code, err);
 }
 
-int psr_picture_write_color(const struct psr_picture *picture, const char *path, struct psr_error *err)
+int psr_picture_write_color(const struct psr_frame *picture, const char *path, struct psr_error *err)
 {
 	return write_picture(picture, path, 0, err);
 }
 
-int psr_picture_write_depth(const struct psr_picture *picture, const char *path, struct psr_error *err)
+int psr_picture_write_depth(const struct psr_frame *picture, const char *path, struct psr_error *err)
 {
 	return write_picture(picture, path, 1, err);
 }

@@ -1,20 +1,50 @@
-/* The writers behind psr/picture.h. */
+/* Planes as files, and animations. Endings are compared without case; both sides of a picture are at least 1 pixel.
+ * "-" is standard output. A regular file holds either its old content or the whole picture; devices and pipes are
+ * written in place. Errors: ARG, an ending that does not fit or is missing; NOT_FOUND, no such folder; UNSUPPORTED, the
+ * image module is missing or does not know the ending; IO, MEMORY. */
 #ifndef PSR_CLIENT_PICTURE_H
 #define PSR_CLIENT_PICTURE_H
 
-#include "outfile.h"
-#include "psr/picture.h"
+#include "base/outfile.h"
+#include "psr/frame.h"
 
-int picture_write_png(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);
-int picture_write_ppm(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);
-int picture_write_pfm(struct outfile *file, const struct psr_picture *picture, struct psr_error *err);
+/* The file's ending chooses the format. Colour: .png and .ppm. Depth: .pfm. The image module psr-image-oiio.so, loaded
+ * on the first such call, writes all other endings of OpenImageIO: colour as 8-bit sRGB, or linear where the format
+ * holds light (.exr, .hdr); depth as one channel `Z` of floats (.exr, .tif). Standard output gets PNG and PFM. */
+int psr_picture_write_color(const struct psr_frame *frame, const char *path, struct psr_error *err);
+int psr_picture_write_depth(const struct psr_frame *frame, const char *path, struct psr_error *err);
+
+/* One plane, which the frame has. Every plane goes to .npy: NumPy's array of (height, width) or (height, width, 3)
+ * little-endian numbers, rows from the top. Otherwise colour and depth go where the calls above put them; normals and
+ * weights are painted: 255 (n + 1) / 2 as red, green and blue, black without a sample; grey. Ids, words and blocks are
+ * written as .npy only. */
+int psr_picture_write_plane(const struct psr_frame *frame, unsigned plane, const char *path, struct psr_error *err);
+
+/* Paints n normals. */
+void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n);
+
+/* The errors of the calls above that the path alone shows: the ending, and a missing module. */
+int psr_picture_check_color(const char *path, struct psr_error *err);
+int psr_picture_check_depth(const char *path, struct psr_error *err);
+int psr_picture_check_plane(unsigned plane, const char *path, struct psr_error *err);
+
+/* An animation of pictures of one size, which plays for ever, `seconds` (at most 65) a picture: .png and .apng (APNG),
+ * also to "-", and the formats of OpenImageIO with several pictures in a file, of which .gif moves.
+ * add: n_frames times, in their order. close: renames the file if code is PSR_OK and all was written; returns code, or
+ * the error of writing. NULL is fine. */
+struct psr_animation;
+int psr_animation_open(struct psr_animation **out, const char *path, const struct psr_frame *first, uint32_t n_frames,
+                       double seconds, struct psr_error *err);
+int psr_animation_add(struct psr_animation *animation, const struct psr_frame *frame, struct psr_error *err);
+int psr_animation_close(struct psr_animation *animation, int code, struct psr_error *err);
+int psr_animation_check(const char *path, struct psr_error *err);
 
 /* ---- apng.c: the file is the caller's, and stays open ---- */
 
 struct apng;
-int apng_open(struct apng **out, struct outfile *file, const struct psr_picture *first, uint32_t n_frames,
+int apng_open(struct apng **out, struct outfile *file, const struct psr_frame *first, uint32_t n_frames,
               double seconds, struct psr_error *err);
-int apng_add(struct apng *apng, const struct psr_picture *picture, struct psr_error *err);
+int apng_add(struct apng *apng, const struct psr_frame *frame, struct psr_error *err);
 int apng_close(struct apng *apng, int is_whole, struct psr_error *err); /* not whole: nothing more is written */
 
 #endif

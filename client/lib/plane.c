@@ -5,19 +5,6 @@
 #include "picture.h"
 #include "psr/proto.h"
 
-void *psr_picture_plane(const struct psr_picture *picture, unsigned plane)
-{
-	void *const pixels[PSR_WIRE_PLANES] = {
-		[PSR_WIRE_PLANE_COLOR] = picture->rgb, [PSR_WIRE_PLANE_DEPTH] = picture->depth,
-		[PSR_WIRE_PLANE_NORMAL] = picture->normal, [PSR_WIRE_PLANE_ID] = picture->id,
-		[PSR_WIRE_PLANE_WEIGHT] = picture->weight, [PSR_WIRE_PLANE_WORDS] = picture->words,
-		[PSR_WIRE_PLANE_BLOCK] = picture->block,
-	};
-
-	assert(plane < PSR_WIRE_PLANES);
-	return pixels[plane];
-}
-
 /* ---- .npy, version 1.0: a magic, a Python dictionary padded so that the data is aligned, the data ---- */
 
 static int is_npy(const char *path)
@@ -25,9 +12,9 @@ static int is_npy(const char *path)
 	return strcasecmp(outfile_ending(path), "npy") == 0;
 }
 
-static size_t npy_header(char header[128], const struct psr_picture *picture, unsigned plane)
+static size_t npy_header(char header[128], const struct psr_frame *picture, unsigned plane)
 {
-	static const char *const types[PSR_WIRE_PLANES] = { "|u1", "<f4", "<i2", "<u4", "|u1", "<u8", "|u1" };
+	static const char *const types[PSR_N_PLANES] = { "|u1", "<f4", "<i2", "<u4", "|u1", "<u8", "|u1" };
 	static const size_t start = 10; /* magic, version, length of what follows */
 	unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	int has_three = pixel != psr_plane_component_bytes(plane, PSR_WIRE_DEPTH_F32);
@@ -44,17 +31,17 @@ static size_t npy_header(char header[128], const struct psr_picture *picture, un
 	return padded;
 }
 
-static int write_npy(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err)
+static int write_npy(const struct psr_frame *picture, unsigned plane, const char *path, struct psr_error *err)
 {
 	struct outfile file;
 	char header[128];
 	size_t n = npy_header(header, picture, plane);
-	int code = outfile_open(&file, path, err);
+	int code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 
 	if (code != PSR_OK)
 		return code;
 	outfile_write(&file, header, n);
-	outfile_write(&file, psr_picture_plane(picture, plane),
+	outfile_write(&file, psr_frame_plane(picture, plane),
 	              (size_t)picture->width * picture->height * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32));
 	return outfile_close(&file, PSR_OK, err);
 }
@@ -69,16 +56,16 @@ void psr_picture_color_normals(uint8_t *rgb, const int16_t *normal, size_t n)
 			             ? 0 : (uint8_t)(((normal[c] + 32767) * 255 + 32767) / 65534);
 }
 
-static int write_colored(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err)
+static int write_colored(const struct psr_frame *picture, unsigned plane, const char *path, struct psr_error *err)
 {
 	size_t n = (size_t)picture->width * picture->height;
-	struct psr_picture colored = { .width = picture->width, .height = picture->height, .rgb = malloc(3 * n) };
+	struct psr_frame colored = { .width = picture->width, .height = picture->height, .rgb = malloc(3 * n) };
 	int code;
 
 	if (colored.rgb == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width,
 		                picture->height);
-	if (plane == PSR_WIRE_PLANE_NORMAL)
+	if (plane == PSR_PLANE_NORMAL)
 		psr_picture_color_normals(colored.rgb, picture->normal, n);
 	else
 		for (size_t i = 0; i < n; i++)
@@ -90,21 +77,21 @@ static int write_colored(const struct psr_picture *picture, unsigned plane, cons
 
 static int is_colored(unsigned plane)
 {
-	return plane == PSR_WIRE_PLANE_NORMAL || plane == PSR_WIRE_PLANE_WEIGHT;
+	return plane == PSR_PLANE_NORMAL || plane == PSR_PLANE_WEIGHT;
 }
 
 int psr_picture_check_plane(unsigned plane, const char *path, struct psr_error *err)
 {
 	if (is_npy(path))
 		return PSR_OK;
-	if (plane == PSR_WIRE_PLANE_DEPTH)
+	if (plane == PSR_PLANE_DEPTH)
 		return psr_picture_check_depth(path, err);
-	if (plane == PSR_WIRE_PLANE_COLOR || is_colored(plane))
+	if (plane == PSR_PLANE_COLOR || is_colored(plane))
 		return psr_picture_check_color(path, err);
 	return psr_fail(err, PSR_ERR_ARG, "'%.300s': the %s plane is written as .npy only", path, psr_plane_name(plane));
 }
 
-int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, const char *path, struct psr_error *err)
+int psr_picture_write_plane(const struct psr_frame *picture, unsigned plane, const char *path, struct psr_error *err)
 {
 	int code = psr_picture_check_plane(plane, path, err);
 
@@ -112,7 +99,7 @@ int psr_picture_write_plane(const struct psr_picture *picture, unsigned plane, c
 		return code;
 	if (is_npy(path))
 		return write_npy(picture, plane, path, err);
-	if (plane == PSR_WIRE_PLANE_DEPTH)
+	if (plane == PSR_PLANE_DEPTH)
 		return psr_picture_write_depth(picture, path, err);
 	return is_colored(plane) ? write_colored(picture, plane, path, err) : psr_picture_write_color(picture, path, err);
 }

@@ -69,10 +69,10 @@ int sheet_check(const struct sheet *sheet, uint32_t n_pictures, uint32_t width, 
 	return PSR_OK;
 }
 
-int sheet_add(struct sheet *sheet, uint32_t k, const struct psr_picture *picture, const uint8_t background[3],
+int sheet_add(struct sheet *sheet, uint32_t k, const struct psr_frame *picture, const uint8_t background[3],
               struct psr_error *err)
 {
-	struct psr_picture *whole = &sheet->picture;
+	struct psr_frame *whole = &sheet->picture;
 	size_t row = 3 * (size_t)picture->width, stride;
 	uint8_t *to;
 

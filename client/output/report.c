@@ -3,9 +3,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "client/scene/effects.h"
-#include "client/lib/outfile.h"
+#include "base/outfile.h"
 #include "client/replay/replay.h"
 #include "report.h"
 
@@ -81,7 +81,7 @@ static void add_planes(cJSON *to, const struct psr_event *event)
 	cJSON *planes = cJSON_AddArrayToObject(to, "planes"), *hashes = cJSON_AddObjectToObject(to, "hashes");
 	cJSON *checked = cJSON_AddArrayToObject(to, "checked");
 
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		char hash[17];
 
 		if (!(event->end->planes >> plane & 1))
@@ -100,14 +100,6 @@ static double server_ms(const struct psr_msg_frame_end *end)
 		if (end->entry[i].id == PSR_WIRE_REPORT_TOTAL)
 			return (double)end->entry[i].ns / 1e6;
 	return 0;
-}
-
-static uint64_t now_ns(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000000u + (uint64_t)now.tv_nsec;
 }
 
 static cJSON *make_report(const struct shot_facts *facts)
@@ -130,11 +122,11 @@ static cJSON *make_report(const struct shot_facts *facts)
 	ms = cJSON_AddObjectToObject(report, "ms");
 	cJSON_AddNumberToObject(ms, "server", server_ms(event->end));
 	cJSON_AddNumberToObject(ms, "frame", (double)event->latency_ns / 1e6);
-	cJSON_AddNumberToObject(ms, "total", (double)(now_ns() - facts->start_ns) / 1e6);
+	cJSON_AddNumberToObject(ms, "total", (double)(clock_ns() - facts->start_ns) / 1e6);
 	add_stages(report, event->end);
 	effects_add(report, event->end);
 	add_planes(report, event);
-	if (event->end->planes >> PSR_WIRE_PLANE_DEPTH & 1) {
+	if (event->end->planes >> PSR_PLANE_DEPTH & 1) {
 		const double range[2] = { event->begin->depth_min, event->begin->depth_max };
 
 		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));
@@ -153,7 +145,7 @@ int report_write(const struct shot_facts *facts, const char *path, struct psr_er
 	cJSON_Delete(report);
 	if (text == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the report");
-	code = outfile_open(&file, path, err);
+	code = outfile_open(&file, path, OUTFILE_PLAIN, err);
 	if (code == PSR_OK) {
 		outfile_write(&file, text, strlen(text));
 		outfile_write(&file, "\n", 1);

@@ -3,13 +3,13 @@
 #include <string.h>
 #include "show.h"
 
-#define PLANE(name) (1u << PSR_WIRE_PLANE_##name)
+#define PLANE(name) (1u << PSR_PLANE_##name)
 #define EMPTY_WORD UINT64_C(0x7f800000ffffffff)
 #define NO_SAMPLE 255 /* in the block plane */
 #define BACKGROUND "\x10\x14\x28"
 
 struct canvas {
-	const struct psr_picture *picture;
+	const struct psr_frame *picture;
 	const struct psr_msg_frame_begin *begin;
 	double forward[3];
 	uint8_t *rgb;
@@ -162,7 +162,7 @@ static void find_nearest(uint32_t *nearest, const struct canvas *canvas)
 /* Filled pixels look like the nearest sample, but darker. */
 static int paint_all_samples(const struct canvas *canvas, painter *paint)
 {
-	const struct psr_picture *picture = canvas->picture;
+	const struct psr_frame *picture = canvas->picture;
 	size_t n = (size_t)picture->width * picture->height;
 	uint32_t *nearest = malloc(n * sizeof *nearest);
 
@@ -266,11 +266,11 @@ uint32_t show_planes(const struct show *show)
 
 int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err)
 {
-	const struct psr_picture *picture = event->picture;
+	const struct psr_frame *picture = event->picture;
 	const struct psr_msg_camera *camera = &event->begin->camera;
 	size_t n = (size_t)picture->width * picture->height;
 	struct canvas canvas = { .picture = picture, .begin = event->begin, .rgb = malloc(3 * n) };
-	struct psr_picture painted = { .width = picture->width, .height = picture->height, .rgb = canvas.rgb };
+	struct psr_frame painted = { .width = picture->width, .height = picture->height, .rgb = canvas.rgb };
 	double length = 0;
 	int code = PSR_OK;
 

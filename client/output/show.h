@@ -3,12 +3,13 @@
 #define PSR_CLIENT_OUTPUT_SHOW_H
 
 #include <stdint.h>
+#include "client/lib/picture.h"
 #include "psr/client.h"
 
 struct show;
 
 const struct show *show_find(const char *name, struct psr_error *err); /* NULL: there is no such stage (ARG) */
-uint32_t show_planes(const struct show *show); /* that it is painted from: bits of enum psr_wire_plane */
+uint32_t show_planes(const struct show *show); /* that it is painted from: bits of enum psr_plane */
 
 /* Paints a frame with those planes and writes it as a colour picture. */
 int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err);

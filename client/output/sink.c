@@ -48,7 +48,7 @@ static int write_extra(struct sink *sink, uint32_t k, const struct psr_event *ev
 
 /* ---- animations take pictures in their order ---- */
 
-static int show_picture(struct sink *sink, const struct psr_picture *picture, struct psr_error *err)
+static int show_picture(struct sink *sink, const struct psr_frame *picture, struct psr_error *err)
 {
 	int code = PSR_OK;
 
@@ -61,7 +61,7 @@ static int show_picture(struct sink *sink, const struct psr_picture *picture, st
 	return code;
 }
 
-static int hold(struct sink *sink, uint32_t k, const struct psr_picture *picture, struct psr_error *err)
+static int hold(struct sink *sink, uint32_t k, const struct psr_frame *picture, struct psr_error *err)
 {
 	size_t bytes = 3 * (size_t)picture->width * picture->height;
 
@@ -79,9 +79,9 @@ static int hold(struct sink *sink, uint32_t k, const struct psr_picture *picture
 	                picture->height);
 }
 
-static int animate(struct sink *sink, uint32_t k, const struct psr_picture *picture, struct psr_error *err)
+static int animate(struct sink *sink, uint32_t k, const struct psr_frame *picture, struct psr_error *err)
 {
-	struct psr_picture next = *picture;
+	struct psr_frame next = *picture;
 	int code = k == sink->n_shown ? show_picture(sink, picture, err) : hold(sink, k, picture, err);
 
 	for (int i = 0; i < SINK_HELD && code == PSR_OK; i++) {
@@ -137,7 +137,7 @@ int sink_take(uint32_t k, const struct psr_event *event, void *userdata, struct 
 static int print_facts(const struct sink *sink, struct psr_error *err)
 {
 	for (uint32_t k = 0; k < sink->n && sink->wish->hash; k++) {
-		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+		for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 			if (!(sink->hashes[k].planes >> plane & 1))
 				continue;
 			if (sink->n > 1)

@@ -25,7 +25,7 @@ struct sink {
 	uint32_t n_done;
 	struct sink_hashes { /* n, for --hash */
 		uint32_t planes;
-		uint64_t hash[PSR_WIRE_PLANES];
+		uint64_t hash[PSR_N_PLANES];
 	} *hashes;
 	struct psr_msg_frame_end end; /* of the last one, for --effects */
 	struct sheet sheet;
@@ -37,7 +37,7 @@ struct sink {
 /* What of `wish` can be refused before anything is drawn; chooses kind, show, plane. */
 int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, struct psr_error *err);
 
-/* Planes that the files need: bits of enum psr_wire_plane. */
+/* Planes that the files need: bits of enum psr_plane. */
 uint32_t sink_planes(const struct sink *sink);
 
 /* For a series: picture k. */

@@ -34,7 +34,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 	if (wish->output == NULL && wish->show_text != NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--show paints a picture; -o FILE says where");
 	while (wish->plane_text != NULL && strcmp(psr_plane_name(sink->plane), wish->plane_text) != 0)
-		if (++sink->plane == PSR_WIRE_PLANES)
+		if (++sink->plane == PSR_N_PLANES)
 			return psr_fail(err, PSR_ERR_ARG,
 			                "--plane takes color, depth, normal, id, weight, words or block, not '%.40s'",
 			                wish->plane_text);
@@ -49,7 +49,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 static int choose_kind(struct sink *sink, struct psr_error *err)
 {
 	const struct draw_wish *wish = sink->wish;
-	int is_numbered = 0, is_plain = sink->show == NULL && sink->plane == PSR_WIRE_PLANE_COLOR;
+	int is_numbered = 0, is_plain = sink->show == NULL && sink->plane == PSR_PLANE_COLOR;
 
 	if (wish->has_sheet && wish->output == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--sheet makes one picture of several; -o FILE says where");
@@ -136,5 +136,5 @@ uint32_t sink_planes(const struct sink *sink)
 {
 	uint32_t planes = sink->show != NULL ? show_planes(sink->show) : 1u << sink->plane;
 
-	return sink->wish->depth != NULL ? planes | 1 << PSR_WIRE_PLANE_DEPTH : planes;
+	return sink->wish->depth != NULL ? planes | 1 << PSR_PLANE_DEPTH : planes;
 }

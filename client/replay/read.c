@@ -1,8 +1,8 @@
-#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 #include "replay.h"
 
 #define MAX_BYTES (16 << 20)
@@ -81,24 +81,17 @@ static int finish(const struct reader *reader, struct psr_error *err)
 
 int replay_read(cJSON **report, const char *path, struct psr_error *err)
 {
-	FILE *file = fopen(path, "rb");
-	char *text = file != NULL ? malloc(MAX_BYTES) : NULL;
-	size_t n = 0;
+	struct psr_error why;
+	char *text;
+	int code = infile_read_text(&text, path, MAX_BYTES, &why);
 
-	*report = NULL;
-	if (file == NULL)
-		return psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "cannot read %.300s: %s", path,
-		                strerror(errno));
-	if (text != NULL)
-		n = fread(text, 1, MAX_BYTES, file);
-	fclose(file);
-	if (text != NULL && n < MAX_BYTES)
-		*report = cJSON_ParseWithLength(text, n);
+	if (code != PSR_OK)
+		return psr_fail(err, code, "--replay: cannot read %s", why.text);
+	*report = cJSON_Parse(text);
 	free(text);
-	if (*report == NULL || cJSON_GetObjectItemCaseSensitive(*report, "request") == NULL)
+	if (cJSON_GetObjectItemCaseSensitive(*report, "request") == NULL)
 		return psr_fail(err, PSR_ERR_FORMAT,
-		                "--replay: %.300s is no report of psr shot --report: it is not JSON, or has no "
-		                "'request'",
+		                "--replay: %.300s is no report of psr shot --report: it is not JSON, or has no 'request'",
 		                path);
 	return PSR_OK;
 }
@@ -212,7 +205,7 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 	const cJSON *item, *planes = get(reader, request, "planes");
 
 	cJSON_ArrayForEach(item, planes)
-		for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+		for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 			if (cJSON_IsString(item) && strcmp(item->valuestring, psr_plane_name(plane)) == 0)
 				frame->planes |= 1u << plane;
 }

@@ -113,7 +113,7 @@ void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_f
 	cJSON_AddBoolToObject(request, "smooth", frame->settings.is_smooth);
 	cJSON_AddNumberToObject(request, "passes", frame->pass_limit);
 	planes = cJSON_AddArrayToObject(request, "planes");
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (frame->planes >> plane & 1)
 			cJSON_AddItemToArray(planes, cJSON_CreateString(psr_plane_name(plane)));
 	add_codec(request, frame);

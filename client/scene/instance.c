@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
 #define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]"

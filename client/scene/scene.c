@@ -172,7 +172,7 @@ int scene_light(struct scene *scene, const struct psr_msg_camera *camera)
 {
 	if (!scene->has_key_light)
 		return 0;
-	psr_light_key(&scene->msg.light[0], camera);
+	client_light_key(&scene->msg.light[0], camera);
 	if (scene->is_key_shadowed)
 		scene->msg.light[0].flags |= PSR_WIRE_LIGHT_SHADOW;
 	return 1;

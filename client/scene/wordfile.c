@@ -1,47 +1,8 @@
-#include <errno.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 #include "client/optlist.h"
 
 #define MAX_BYTES (16u << 20)
-
-static int read_all(char **text, const char *path, struct psr_error *err)
-{
-	FILE *file = fopen(path, "rb");
-	size_t n = 0, capacity = 0;
-	int reason = 0;
-
-	if (file == NULL)
-		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO,
-		                "cannot read %.300s: %s", path, strerror(errno));
-	do {
-		char *grown;
-
-		if (capacity == MAX_BYTES) {
-			fclose(file);
-			return psr_fail(err, PSR_ERR_LIMIT, "%.300s has more than %u MB", path, MAX_BYTES >> 20);
-		}
-		capacity = capacity == 0 ? 4096 : 2 * capacity;
-		grown = realloc(*text, capacity + 1);
-		if (grown == NULL) {
-			fclose(file);
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory to read %.300s", path);
-		}
-		*text = grown;
-		errno = 0;
-		n += fread(*text + n, 1, capacity - n, file);
-	} while (n == capacity);
-	if (ferror(file))
-		reason = errno != 0 ? errno : EIO;
-	fclose(file);
-	if (reason != 0)
-		return psr_fail(err, PSR_ERR_IO, "cannot read %.300s: %s", path, strerror(reason));
-	(*text)[n] = '\0';
-	if (strlen(*text) != n)
-		return psr_fail(err, PSR_ERR_ARG, "%.300s is no text: it has a byte 0", path);
-	return PSR_OK;
-}
 
 /* The next word, its quotes taken out, ended by a NUL; *at behind it. NULL: the line has no more. */
 static char *next_word(char **at, int *is_open)
@@ -83,8 +44,11 @@ int wordfile_read(char **text, const char *path, const struct psr_cli *cli, int 
                   void *userdata, struct psr_error *err)
 {
 	struct psr_error why;
-	int code = read_all(text, path, err), number = 0;
+	int code = infile_read_text(text, path, MAX_BYTES, &why), number = 0;
 	char *rest = *text;
+
+	if (code != PSR_OK)
+		return psr_fail(err, code, "cannot read %s", why.text);
 
 	while (code == PSR_OK && rest != NULL) {
 		char *line = strsep(&rest, "\n"), *at = line, *word = NULL;

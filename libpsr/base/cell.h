@@ -1,9 +1,8 @@
-/* Numbers of cubic cells, and their hash: the last step of MurmurHash3 (Appleby 2011), which uses all bits, so that
- * cells in a row of any direction spread over the table. */
+/* Cubic cells of space, and their keys in tables. */
 #ifndef PSR_BASE_CELL_H
 #define PSR_BASE_CELL_H
 
-#include <stddef.h>
+#include <math.h>
 #include <stdint.h>
 
 /* Rounds down a double that fits an int. As fast as truncation; floor() takes a dozen instructions before SSE4.1. */
@@ -14,21 +13,37 @@ static inline int cell_floor(double x)
 	return i - (x < i);
 }
 
+/* The cell of this width that holds p. */
+static inline void cell_of(const float p[3], double width, int at[3])
+{
+	for (int k = 0; k < 3; k++)
+		at[k] = cell_floor((double)p[k] / width);
+}
+
 /* 21 bits of each coordinate. */
 static inline uint64_t cell_key(int x, int y, int z)
 {
 	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
 }
 
-/* n: a power of two. */
-static inline size_t cell_place(uint64_t key, size_t n)
+/* The axis along which n is longest, and its sign: 1 to 6; 0 of no direction. */
+static inline unsigned cell_facing(const float n[3])
 {
-	key ^= key >> 33;
-	key *= UINT64_C(0xff51afd7ed558ccd);
-	key ^= key >> 33;
-	key *= UINT64_C(0xc4ceb9fe1a85ec53);
-	key ^= key >> 33;
-	return (size_t)key & (n - 1);
+	unsigned axis = 0;
+
+	for (unsigned k = 1; k < 3; k++)
+		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
+	return n[axis] != 0 ? 1 + 2 * axis + (n[axis] < 0) : 0;
+}
+
+/* Of a cell and how something in it faces: 20 bits a coordinate, and the topmost bit is 0. */
+static inline uint64_t cell_facing_key(const int at[3], unsigned facing)
+{
+	uint64_t key = facing;
+
+	for (int k = 0; k < 3; k++)
+		key = key << 20 | (uint64_t)(at[k] & 0xfffff);
+	return key;
 }
 
 #endif

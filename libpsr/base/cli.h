@@ -1,9 +1,64 @@
-/* Shared by the files of the command line: cli.c parses, cli_help.c prints. */
+/* Command lines for all programs: one table of options gives the parser, --help with the real defaults, and (for
+ * psrd) configuration files of `name = value` lines. */
 #ifndef PSR_BASE_CLI_H
 #define PSR_BASE_CLI_H
 
 #include <stddef.h>
-#include "psr/cli.h"
+#include <stdint.h>
+#include "psr/error.h"
+
+enum psr_opt_type {
+	PSR_OPT_FLAG,   /* int: set to 1 */
+	PSR_OPT_INT,    /* int64_t, within min..max; suffixes k, m, g (1024) are understood */
+	PSR_OPT_REAL,   /* double, finite, within min..max */
+	PSR_OPT_STRING, /* const char *, points into argv */
+	PSR_OPT_VEC3,   /* double[3], "x,y,z", finite */
+	PSR_OPT_SIZE,   /* uint32_t[2], "WxH", each within min..max */
+	PSR_OPT_COLOR,  /* uint8_t[3], "#rrggbb" */
+	PSR_OPT_CALL,   /* int (*)(const char *text, void *userdata, struct psr_error *): repeatable, own syntax */
+	PSR_OPT_HEADING, /* no option: --help prints `name` above those that follow, and `help` (may be NULL) below it */
+};
+
+struct psr_opt {
+	const char *name;      /* long name without the dashes; NULL ends the table */
+	char letter;           /* short name, or 0 */
+	enum psr_opt_type type;
+	void *value;           /* where it goes; its content before parsing is the default that --help prints */
+	const char *arg;       /* what --help calls the argument ("DEG"); NULL for flags */
+	const char *help;      /* one line or more ('\n'); the default is added in brackets by the table itself */
+	double min, max;       /* INT, REAL, SIZE: both 0 means unchecked */
+	int (*call)(const char *text, void *userdata, struct psr_error *err);
+	int *seen;             /* if not NULL: incremented when the option is given */
+};
+
+struct psr_cli {
+	const char *usage;           /* "psr shot --server ADDR --model NAME [options]" */
+	const char *summary;         /* what it does, a sentence or two */
+	const struct psr_opt *opts;
+	const char *footer;          /* examples, exit codes; may be NULL */
+};
+
+/* Parses argv[1..argc-1]: --name value, --name=value, -l value, flags, "--" ends options. Operands are moved to the
+ * front of argv[1..]; *n_operands says how many. Returns PSR_OK, PSR_ERR_ARG with a sentence that names the option,
+ * or 1 if --help was given (the help stands on standard output by then). */
+int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err);
+
+/* Sets one option by its name from text, as a configuration line does. */
+int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, struct psr_error *err);
+
+/* "x,y,z" -> three finite doubles; PSR_ERR_ARG otherwise. *end, if not NULL, gets the first character not used. */
+int psr_parse_vec3(const char *text, double v[3], const char **end, struct psr_error *err);
+int psr_parse_color(const char *text, uint8_t rgb[3], const char **end, struct psr_error *err);
+int psr_parse_real(const char *text, double *v, const char **end, struct psr_error *err);
+
+/* Number of letters to insert, remove or change that turn the first n_a bytes of `a` into `b`; n_a + strlen(b) where
+ * one of them has more than 63. */
+size_t psr_edit_distance(const char *a, size_t n_a, const char *b);
+
+/* Prints "PROGRAM: text" to standard error and returns the exit status for err->code. */
+int psr_cli_fail(const char *program, const struct psr_error *err);
+
+/* ---- between cli.c and cli_help.c ---- */
 
 #define CLI_VALUE_TEXT 128
 

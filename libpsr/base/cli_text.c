@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/cli.h"
+#include "cli.h"
 
 #define NUMBER_TEXT 64
 

@@ -2,7 +2,7 @@
 #include <fenv.h>
 #include <math.h>
 #include <pthread.h>
-#include "psr/direction.h"
+#include "direction.h"
 #include "vec.h"
 
 #define LEVELS 6

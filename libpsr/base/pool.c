@@ -5,9 +5,9 @@
 #include <signal.h>
 #include <stdatomic.h>
 #include <stdlib.h>
-#include <time.h>
-#include "psr/error.h"
-#include "psr/pool.h"
+#include <unistd.h>
+#include "clock.h"
+#include "pool.h"
 
 #define MAX_THREADS 256
 #define SPIN_NS 50000
@@ -100,16 +100,14 @@ static void pause_briefly(void)
  * long before they sleep. */
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
-	struct timespec start, now;
-	clock_gettime(CLOCK_MONOTONIC, &start);
+	const uint64_t start = clock_ns();
 	do {
 		for (int i = 0; i < 64; i++) {
 			if (atomic_load_explicit(&pool->n_offers, memory_order_acquire) != n_offers)
 				return 1;
 			pause_briefly();
 		}
-		clock_gettime(CLOCK_MONOTONIC, &now);
-	} while ((now.tv_sec - start.tv_sec) * 1000000000L + now.tv_nsec - start.tv_nsec < SPIN_NS);
+	} while (clock_ns() - start < SPIN_NS);
 	return 0;
 }
 
@@ -170,29 +168,51 @@ static int start_worker(struct psr_pool *pool)
 	return PSR_OK;
 }
 
-int psr_pool_create(struct psr_pool **out, int n_threads, int with_jobs)
+int psr_pool_all_cores(void)
+{
+	const long n = sysconf(_SC_NPROCESSORS_ONLN);
+
+	return n < 1 ? 1 : n > MAX_THREADS ? MAX_THREADS : (int)n;
+}
+
+static int create(struct psr_pool **out, int n_threads, int with_jobs, struct psr_error *err)
 {
 	struct psr_pool *pool;
-	int n_workers = with_jobs ? n_threads : n_threads - 1;
+	int n_workers;
+
+	if (n_threads == 0)
+		n_threads = psr_pool_all_cores();
+	n_workers = with_jobs ? n_threads : n_threads - 1;
 	if (n_threads < 1 || n_threads > MAX_THREADS)
-		return PSR_ERR_ARG;
+		return psr_fail(err, PSR_ERR_ARG, "a pool of %d threads: it has 1 to %d, or 0 for one a core", n_threads,
+		                MAX_THREADS);
 	pool = calloc(1, sizeof *pool);
 	if (pool == NULL)
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a pool of threads");
 	pthread_mutex_init(&pool->mutex, NULL);
 	pthread_cond_init(&pool->work, NULL);
 	pool->last_job = &pool->first_job;
 	pool->loops.next = pool->loops.previous = &pool->loops;
 	pool->n_threads = n_threads;
-	pool->with_jobs = with_jobs != 0;
+	pool->with_jobs = with_jobs;
 	for (int i = 0; i < n_workers; i++) {
 		if (start_worker(pool) != PSR_OK) {
 			psr_pool_destroy(pool);
-			return PSR_ERR_MEMORY;
+			return psr_fail(err, PSR_ERR_MEMORY, "the system starts no more than %d of %d threads", i, n_workers);
 		}
 	}
 	*out = pool;
 	return PSR_OK;
+}
+
+int psr_pool_create(struct psr_pool **out, int n_threads, struct psr_error *err)
+{
+	return create(out, n_threads, 0, err);
+}
+
+int psr_pool_create_for_jobs(struct psr_pool **out, int n_threads, struct psr_error *err)
+{
+	return create(out, n_threads, 1, err);
 }
 
 void psr_pool_destroy(struct psr_pool *pool)

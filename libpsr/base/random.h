@@ -20,4 +20,10 @@ static inline double random_in(uint64_t *state, double low, double high)
 	return low + (high - low) * ((double)(random_next(state) >> 11) / 9007199254740992.0);
 }
 
+/* Uniform in 0..n-1. */
+static inline uint32_t random_below(uint64_t *state, uint32_t n)
+{
+	return (uint32_t)((random_next(state) >> 32) * n >> 32);
+}
+
 #endif

@@ -3,7 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
-#include <unistd.h>
+#include "base/infile.h"
+#include "base/pool.h"
 #include "import.h"
 
 #define SNIFF_BYTES 65536
@@ -14,9 +15,8 @@
 
 void psr_import_options_default(struct psr_import_options *options)
 {
-	const long n = sysconf(_SC_NPROCESSORS_ONLN);
 	options->crease = DEFAULT_CREASE;
-	options->n_threads = n < 1 ? 1 : n > MOST_THREADS ? MOST_THREADS : (int)n;
+	options->n_threads = psr_pool_all_cores();
 }
 
 static int check_options(const struct psr_import_options *options, struct psr_error *err)
@@ -87,7 +87,7 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 	*out = NULL;
 	rc = options != NULL ? check_options(options, err) : PSR_OK;
 	if (rc == PSR_OK)
-		rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+		rc = infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (n_bytes == 0) {

@@ -123,8 +123,7 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
  * MEMORY. */
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
-/* path.c. The caller frees strings and bytes. */
-int import_file_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err);
+/* path.c. The caller frees the strings. */
 /* The folder of a file, resolved, without a slash at the end. */
 int import_path_folder(char **folder, const char *path, struct psr_error *err);
 

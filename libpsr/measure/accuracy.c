@@ -2,8 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/mem.h"
+#include "base/stats.h"
 #include "base/vec.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "truth.h"
 
 /* Rays a side over the nine pixels of a neighbourhood: 4x4 in each, and where they meet nothing 20x20, since samples
@@ -133,19 +134,6 @@ static void measure_row(int y, void *userdata)
 		measure_pixel(m, x, (uint32_t)y, &m->row[y]);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-	return (x > y) - (x < y);
-}
-
-/* The smallest distance that at least this share of all does not exceed. */
-static double percentile(const double *sorted, uint64_t n, double part)
-{
-	uint64_t rank = (uint64_t)ceil(part * (double)n);
-	return n == 0 ? 0 : sorted[rank > 0 ? rank - 1 : 0];
-}
-
 static void add_up(struct psr_accuracy *out, const struct measure *m)
 {
 	uint64_t n = 0;
@@ -161,11 +149,11 @@ static void add_up(struct psr_accuracy *out, const struct measure *m)
 	for (size_t i = 0; i < (size_t)m->width * m->height; i++)
 		if (m->distance[i] >= 0)
 			m->distance[n++] = m->distance[i];
-	qsort(m->distance, n, sizeof *m->distance, compare_doubles);
-	out->distance_p50 = percentile(m->distance, n, 0.5);
-	out->distance_p99 = percentile(m->distance, n, 0.99);
-	out->distance_p999 = percentile(m->distance, n, 0.999);
-	out->distance_max = percentile(m->distance, n, 1);
+	stats_sort(m->distance, n);
+	out->distance_p50 = stats_percentile(m->distance, n, 0.5);
+	out->distance_p99 = stats_percentile(m->distance, n, 0.99);
+	out->distance_p999 = stats_percentile(m->distance, n, 0.999);
+	out->distance_max = stats_percentile(m->distance, n, 1);
 }
 
 static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth,
@@ -183,7 +171,7 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	rc = psr_truth_draw(truth, camera, m->width, m->height, 1, n_threads, m->truth_depth, m->truth_normal, NULL, err);
 	if (rc != PSR_OK)
 		return rc;
-	rc = psr_pool_create(&pool, n_threads, 0);
+	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	psr_pool_for(pool, (int)m->height, measure_row, m);

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "psr/measure.h"
+#include "measure.h"
 
 #define RAYS 4 /* along the side of a pixel */
 

@@ -1,12 +1,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "surface/validate.h"
 #include "ray/tree.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "rate.h"
 
 #define ACROSS 512
@@ -20,13 +20,6 @@ struct rays {
 	struct ray *ray;
 	struct RTCRay8 *packet;
 };
-
-static double cpu_seconds(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 /* Blocks of lattices, in the order of the sampler. */
 static int make_rays(struct rays *rays)
@@ -67,7 +60,7 @@ static int make_rays(struct rays *rays)
 
 static double time_ours(const struct ray_scene *scene, const struct rays *rays, uint64_t *n_hits)
 {
-	double started = cpu_seconds();
+	uint64_t started = clock_thread_ns();
 	for (int i = 0; i < rays->n; i += RUN) {
 		struct ray_hit hit[RUN];
 		int n = rays->n - i < RUN ? rays->n - i : RUN;
@@ -75,14 +68,14 @@ static double time_ours(const struct ray_scene *scene, const struct rays *rays, 
 		for (int k = 0; k < n; k++)
 			*n_hits += hit[k].prim != RAY_NONE;
 	}
-	return cpu_seconds() - started;
+	return (double)(clock_thread_ns() - started) * 1e-9;
 }
 
 static double time_embree(const struct ray_scene *scene, const struct rays *rays, uint64_t *n_hits)
 {
 	static const int all[RAY_PACKET] __attribute__((aligned(32))) = { -1, -1, -1, -1, -1, -1, -1, -1 };
 	struct RTCIntersectContext context;
-	double started = cpu_seconds();
+	uint64_t started = clock_thread_ns();
 	rtcInitIntersectContext(&context);
 	context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 	for (int i = 0; i < rays->n / RAY_PACKET; i++) {
@@ -94,7 +87,7 @@ static double time_embree(const struct ray_scene *scene, const struct rays *rays
 		for (int k = 0; k < RAY_PACKET; k++)
 			*n_hits += rayhit.hit.geomID[k] != RTC_INVALID_GEOMETRY_ID;
 	}
-	return cpu_seconds() - started;
+	return (double)(clock_thread_ns() - started) * 1e-9;
 }
 
 int psr_ray_rate(const struct psr_mesh *mesh, double *ours, double *embree, struct psr_error *err)
@@ -103,9 +96,9 @@ int psr_ray_rate(const struct psr_mesh *mesh, double *ours, double *embree, stru
 	struct ray_scene *scene = NULL;
 	double center[3], radius, best[2] = { INFINITY, INFINITY };
 	uint64_t n_hits = 0;
-	int rc = door_check_mesh(mesh, err);
+	int rc = validate_mesh(mesh, err);
 	if (rc == PSR_OK)
-		rc = door_bound_mesh(mesh, center, &radius, err);
+		rc = validate_bound_mesh(mesh, center, &radius, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_create(&scene, mesh, center, radius, err);
 	if (rc == PSR_OK && make_rays(&rays) != PSR_OK)

@@ -3,7 +3,8 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
+#include "base/stats.h"
 #include "truth.h"
 
 #define RAYS 4 /* along the side of a pixel */
@@ -86,12 +87,6 @@ static double seam_at(const struct measure *m, uint32_t x, uint32_t y, int is_li
 	return nearest;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-	double x = *(const double *)a, y = *(const double *)b;
-	return (x > y) - (x < y);
-}
-
 static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 {
 	const size_t n = (size_t)m->width * m->height;
@@ -111,11 +106,9 @@ static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 			seam[out->n_misplaced++] = seam_at(m, (uint32_t)(at % m->width), (uint32_t)(at / m->width), is_lit);
 	}
 	out->mean = out->n_compared ? sum / (double)out->n_compared : 0;
-	if (out->n_misplaced) {
-		qsort(seam, out->n_misplaced, sizeof *seam, compare_doubles);
-		out->seam_p99 = seam[(size_t)(0.99 * (double)(out->n_misplaced - 1))];
-		out->seam_max = seam[out->n_misplaced - 1];
-	}
+	stats_sort(seam, out->n_misplaced);
+	out->seam_p99 = stats_percentile(seam, out->n_misplaced, 0.99);
+	out->seam_max = stats_percentile(seam, out->n_misplaced, 1);
 	psr_free(seam);
 	return PSR_OK;
 }
@@ -134,7 +127,7 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_trut
 		return rc;
 	m.expected = psr_alloc_array((size_t)width * height, sizeof *m.expected);
 	m.got = psr_alloc_array((size_t)width * height, sizeof *m.got);
-	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, n_threads, 0) != PSR_OK) {
+	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, n_threads, NULL) != PSR_OK) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	} else {
 		psr_pool_for(pool, (int)height, measure_row, &m);

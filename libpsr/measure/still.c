@@ -5,10 +5,10 @@
 #include "base/vec.h"
 #include "ray/ray.h"
 #include "surface/surface.h"
-#include "psr/direction.h"
-#include "psr/measure.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "base/direction.h"
+#include "measure.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 #include "truth.h"
 
 #define RUN 64 /* rays traced together; a multiple of every side */
@@ -106,7 +106,7 @@ int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint
 		v3d_normalize(still.to_light[l], scene->light[l].direction);
 		v3d_scale(still.to_light[l], still.to_light[l], -1);
 	}
-	rc = psr_pool_create(&pool, n_threads, 0);
+	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	psr_pool_for(pool, (int)height, draw_row, &still);

@@ -8,8 +8,8 @@
 #include "ray/ray.h"
 #include "surface/stipple.h"
 #include "surface/surface.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 
 #define MOST_SIDE 64
 #define RUN 64 /* rays traced together */
@@ -38,14 +38,14 @@ void psr_truth_stipple(struct psr_truth *truth, double spacing)
 int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err)
 {
 	struct psr_truth *truth;
-	int rc = door_check_mesh(mesh, err);
+	int rc = validate_mesh(mesh, err);
 	if (rc != PSR_OK)
 		return rc;
 	truth = calloc(1, sizeof *truth);
 	if (truth == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the ray tracer");
 	truth->mesh = mesh;
-	rc = door_bound_mesh(mesh, truth->origin, &truth->scale, err);
+	rc = validate_bound_mesh(mesh, truth->origin, &truth->scale, err);
 	if (rc == PSR_OK)
 		rc = ray_scene_create(&truth->scene, mesh, truth->origin, truth->scale, err);
 	if (rc == PSR_OK)
@@ -224,7 +224,7 @@ int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uin
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", side, MOST_SIDE);
-	rc = psr_pool_create(&pool, n_threads, 0);
+	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	job.n_columns = width * side;

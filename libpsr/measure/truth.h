@@ -3,7 +3,7 @@
 #define PSR_MEASURE_TRUTH_H
 
 #include "ray/ray.h"
-#include "psr/measure.h"
+#include "measure.h"
 #include "view.h"
 
 /* Whether any of side * side rays, spread over the n * n pixels from (x, y) on, meets the object. */

@@ -179,14 +179,16 @@ static int merge_other(const struct ray_scene *scene, const struct ray *ray, con
 	return merge(scene, &other, &list, most, hit);
 }
 
-void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, int n, double length, int most,
-                          struct ray_hit *hit, int *n_hits, struct ray_hit *other_hit, int *other_n_hits)
+void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, int n, double length,
+                          const struct ray_hits *hits, const struct ray_hits *other)
 {
-	if (other_hit == NULL) {
-		ray_scene_trace_all(scene, ray, n, most, hit, n_hits);
+	const int most = hits->most;
+
+	if (other == NULL) {
+		ray_scene_trace_all(scene, ray, n, most, hits->hit, hits->n);
 		return;
 	}
-	assert(most >= 1 && most <= RAY_MOST_HITS);
+	assert(most >= 1 && most <= RAY_MOST_HITS && most == other->most);
 	for (int i = 0; i < n; i += RAY_PACKET) {
 		int part = n - i < RAY_PACKET ? n - i : RAY_PACKET;
 		struct ray_list list[RAY_PACKET], one;
@@ -196,8 +198,8 @@ void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, 
 			size_t at = (size_t)(i + k) * (size_t)most;
 
 			choose_end(scene, &list[k], 0, length, &one);
-			n_hits[i + k] = merge(scene, &ray[i + k], &one, most, hit + at);
-			other_n_hits[i + k] = merge_other(scene, &ray[i + k], &list[k], length, most, other_hit + at);
+			hits->n[i + k] = merge(scene, &ray[i + k], &one, most, hits->hit + at);
+			other->n[i + k] = merge_other(scene, &ray[i + k], &list[k], length, most, other->hit + at);
 		}
 	}
 }

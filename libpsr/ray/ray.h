@@ -59,9 +59,14 @@ void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, i
                          int *n_hits);
 
 /* The same, and also for the rays that come along the same lines from their other ends: from origin + length *
- * direction, backwards. other_hit: NULL if nobody asks for it. */
-void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, int n, double length, int most,
-                          struct ray_hit *hit, int *n_hits, struct ray_hit *other_hit, int *other_n_hits);
+ * direction, backwards. Both have the same `most`. other: NULL if nobody asks for it. */
+struct ray_hits {
+	int most;
+	struct ray_hit *hit; /* n * most */
+	int *n;
+};
+void ray_scene_trace_ends(const struct ray_scene *scene, const struct ray *ray, int n, double length,
+                          const struct ray_hits *hits, const struct ray_hits *other);
 
 /* Whether anything is met at 0 <= t < t_max, to the rounding of a float. For rays that go all ways. Any number of
  * threads may trace at once. */

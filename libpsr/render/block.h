@@ -2,7 +2,7 @@
 #ifndef PSR_RENDER_BLOCK_H
 #define PSR_RENDER_BLOCK_H
 
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "plan.h"
 
 /* Index of a valid sample's depth and attributes. */

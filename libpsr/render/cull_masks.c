@@ -1,6 +1,6 @@
 #include <string.h>
 #include "cull.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "screen.h"
 
 /* The tree node of a region: a one, then the coordinates' bits interleaved, x first. */

@@ -54,13 +54,6 @@ const char *psr_effect_why(enum psr_effect effect, enum psr_why why)
 	return (unsigned)effect < PSR_N_EFFECTS && (unsigned)why <= PSR_WHY_COST ? effects[effect].why[why] : "?";
 }
 
-const char *psr_stage_name(enum psr_stage stage)
-{
-	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
-		                                             "resolve", "shade",  "fill", "smooth" };
-	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
-}
-
 void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why why, uint64_t count)
 {
 	report->effect[effect].why = why;

@@ -1,13 +1,14 @@
 #include <fenv.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "buffers.h"
 #include "cull.h"
 #include "fill.h"
 #include "planes.h"
-#include "psr/direction.h"
 #include "refine.h"
 #include "shadow.h"
 #include "smooth.h"
@@ -20,11 +21,12 @@ struct psr_renderer {
 	struct fill fill;
 	struct smooth smooth;
 	struct buffers buffers;
+	struct refiner *refiner; /* NULL until psr_render draws a pass above 0 */
 	float (*lit)[4]; /* diffuse light by normal */
 	size_t lit_size;
 	uint8_t srgb[65536];         /* 8 bits of 16-bit linear light */
 	const struct inside *inside; /* of frames with splats, or NULL */
-	struct psr_report report;    /* of psr_warp, until psr_finish */
+	struct psr_report report;    /* of renderer_warp, until renderer_finish */
 	/* Of the call in progress. */
 	uint8_t *is_object; /* renderer_outline's */
 	struct psr_frame *frame;
@@ -40,12 +42,12 @@ static void set_environment(fenv_t *callers)
 	fesetenv(FE_DFL_ENV);
 }
 
-int psr_renderer_create(struct psr_renderer **out)
+int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	fenv_t callers;
 	if (!r)
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	set_environment(&callers);
 	for (int i = 0; i < 65536; i++)
@@ -60,10 +62,16 @@ void renderer_use(struct psr_renderer *r, const struct simd *simd)
 	r->simd = simd;
 }
 
+struct refiner **renderer_refiner(struct psr_renderer *r)
+{
+	return &r->refiner;
+}
+
 void psr_renderer_destroy(struct psr_renderer *r)
 {
 	if (!r)
 		return;
+	refiner_destroy(r->refiner);
 	plan_clear(&r->plan);
 	shadow_destroy(r->shadow);
 	bins_clear(&r->bins);
@@ -76,7 +84,8 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	return sizeof *r + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->buffers.pixels_size +
+	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
+	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->buffers.pixels_size +
 	       r->buffers.counters_size + r->lit_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
@@ -113,10 +122,10 @@ static void warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr
 	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);
 }
 
-/* A call of psr_warp or psr_render, or a part of one. */
+/* A call of renderer_warp or psr_render, or a part of one. */
 struct call {
 	const struct psr_scene *scene;
-	const struct psr_settings *settings;
+	const struct render_settings *settings;
 	struct psr_pool *pool;
 	struct psr_report *report;
 	struct psr_error *err;
@@ -125,7 +134,7 @@ struct call {
 /* Ends a stage that began at *start. */
 static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t *start)
 {
-	const uint64_t end = now_ns();
+	const uint64_t end = clock_ns();
 	report->ns[stage] += end - *start;
 	*start = end;
 }
@@ -133,7 +142,7 @@ static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t 
 /* From the request to the z-buffer. Keeps the shadow maps of earlier frames as they are unless the frame is lit. */
 static int make_stack(struct psr_renderer *r, const struct call *call, int is_lit)
 {
-	const struct psr_settings *settings = call->settings;
+	const struct render_settings *settings = call->settings;
 	struct psr_report *report = call->report;
 	struct psr_error *err = call->err;
 	int rc = settings_validate(settings, err);
@@ -143,7 +152,7 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 		return rc;
 	psr_pool_wake(call->pool);
 	memset(report, 0, sizeof *report);
-	uint64_t start = now_ns();
+	uint64_t start = clock_ns();
 	rc = plan_make(&r->plan, call->scene, settings, err);
 	if (rc)
 		return rc;
@@ -176,7 +185,7 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	return PSR_OK;
 }
 
-int psr_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
              struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
 {
 	const struct call call = { scene, settings, pool, report, err };
@@ -224,7 +233,7 @@ static void outline_one(int row, void *userdata)
 	}
 }
 
-int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                      struct psr_pool *pool, uint8_t *is_object, struct psr_error *err)
 {
 	struct psr_report report;
@@ -251,7 +260,7 @@ static void shade_one(int row, void *userdata)
 	struct shade_counts counts = { 0 };
 	const struct buffers *b = &r->buffers;
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(plan, (uint32_t)row);
-	const uint64_t start = now_ns();
+	const uint64_t start = clock_ns();
 	shade_rows(r->simd, plan, &r->picture, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
@@ -261,11 +270,11 @@ static void shade_one(int row, void *userdata)
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, b->weight + first, y);
 	}
-	const uint64_t middle = now_ns();
+	const uint64_t middle = clock_ns();
 	if (r->picture.wants)
 		fill_pull(&r->fill, (uint32_t)row);
 	counts.row_ns = middle - start;
-	counts.fill_ns = now_ns() - middle;
+	counts.fill_ns = clock_ns() - middle;
 	b->shade[row] = counts;
 }
 
@@ -336,7 +345,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		                               b->rgb[2], r->srgb,   rgb,       r->depth };
 	if (fill_begin(&r->fill, r->simd, &r->plan, &fill))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	uint64_t start = now_ns();
+	uint64_t start = clock_ns();
 	const uint32_t n_marked = find_gaps(r, pool, report);
 	note_time(report, PSR_STAGE_GAPS, &start);
 	if (n_marked)
@@ -346,7 +355,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	if (tabulate(r, pool, report))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
 	psr_pool_for(pool, (int)n_brick_rows(&r->plan), shade_one, r);
-	const uint64_t shaded = now_ns();
+	const uint64_t shaded = clock_ns();
 	shade_report(&r->plan, b->shade, shaded - start, frame->rgb != NULL, report);
 	start = shaded;
 	if (n_marked)
@@ -360,7 +369,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	return PSR_OK;
 }
 
-int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
+int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
                struct psr_error *err)
 {
 	fenv_t callers;
@@ -370,7 +379,7 @@ int psr_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool
 	return rc;
 }
 
-int psr_render(struct psr_renderer *r, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	const struct call call = { scene, settings, pool, &frame->report, err };

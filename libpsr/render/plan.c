@@ -3,7 +3,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "plan.h"
 
 /* The near distance, as a part of the scene's extent, if the request sets none. */
@@ -222,7 +222,7 @@ static uint16_t light16(double linear)
 	return (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
 }
 
-int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings,
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
               struct psr_error *err)
 {
 	const struct psr_camera *camera = &scene->camera;

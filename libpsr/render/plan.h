@@ -48,7 +48,7 @@ struct plan {
 };
 
 /* Validated scene and settings. ARG, LIMIT, MEMORY. */
-int plan_make(struct plan *plan, const struct psr_scene *scene, const struct psr_settings *settings,
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
               struct psr_error *err);
 void plan_clear(struct plan *plan);
 

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "refine.h"
@@ -20,7 +21,7 @@ _Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MA
                "cells stay where they are");
 _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
 
-struct psr_refiner {
+struct refiner {
 	struct psr_renderer *renderer;
 	uint8_t *rgb; /* of a window, and its depths behind them */
 	float *depth;
@@ -32,7 +33,7 @@ struct psr_refiner {
 
 /* A window's part of the frame: pixels, and the first one's first sub-pixel in the window. */
 struct part {
-	const struct psr_refiner *refiner;
+	const struct refiner *refiner;
 	struct psr_frame *frame;
 	uint32_t x0, x1, y0, left, top, stride;
 	unsigned pass;
@@ -43,17 +44,17 @@ struct erosion {
 	uint32_t width, height;
 };
 
-int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer)
+int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct psr_error *err)
 {
 	const size_t area = (size_t)WINDOW_WIDTH * WINDOW_HEIGHT;
-	struct psr_refiner *r = calloc(1, sizeof *r);
+	struct refiner *r = calloc(1, sizeof *r);
 	if (!r)
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	r->renderer = renderer;
 	r->depth = psr_alloc_array(area, sizeof *r->depth + 3);
 	if (!r->depth) {
 		free(r);
-		return PSR_ERR_MEMORY;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	}
 	r->rgb = (uint8_t *)(r->depth + area);
 	for (int i = 0; i < 65536; i++)
@@ -64,7 +65,7 @@ int psr_refiner_create(struct psr_refiner **out, struct psr_renderer *renderer)
 	return PSR_OK;
 }
 
-void psr_refiner_destroy(struct psr_refiner *r)
+void refiner_destroy(struct refiner *r)
 {
 	if (!r)
 		return;
@@ -73,14 +74,14 @@ void psr_refiner_destroy(struct psr_refiner *r)
 	free(r);
 }
 
-uint64_t psr_refiner_bytes(const struct psr_refiner *r)
+uint64_t refiner_bytes(const struct refiner *r)
 {
 	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3) + r->inside_size;
 }
 
 static void average_color(const struct part *part, size_t first, size_t at)
 {
-	const struct psr_refiner *r = part->refiner;
+	const struct refiner *r = part->refiner;
 	const uint32_t side = 1u << part->pass, half = 1u << (2 * part->pass - 1);
 	uint32_t sum[3] = { half, half, half };
 	for (uint32_t j = 0; j < side; j++) {
@@ -143,14 +144,14 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 }
 
 /* Draws the window of column i and row j of windows, and averages what of it is used. */
-static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings,
-                       unsigned pass, uint32_t i, uint32_t j, struct psr_pool *pool, struct psr_frame *frame,
-                       struct psr_error *err)
+static int draw_window(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
+                       uint32_t i, uint32_t j, struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
+	const unsigned pass = settings->pass;
 	const uint32_t width = settings->width << pass, height = settings->height << pass;
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
 	const int is_last_x = width - left <= WINDOW_WIDTH, is_last_y = height - top <= WINDOW_HEIGHT;
-	struct psr_settings window = *settings;
+	struct render_settings window = *settings;
 	window.with_splats = 1;
 	window.is_smooth = 0;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
@@ -163,7 +164,7 @@ static int draw_window(struct psr_refiner *r, const struct psr_scene *scene, con
 		                      .depth = frame->depth ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
 	renderer_set_inside(r->renderer, &inside);
-	const int rc = psr_render(r->renderer, scene, &window, pool, &fine, err);
+	const int rc = renderer_draw(r->renderer, scene, &window, pool, &fine, err);
 	renderer_set_inside(r->renderer, NULL);
 	if (rc)
 		return rc;
@@ -204,11 +205,11 @@ static void erode_column(int x, void *userdata)
 }
 
 /* Which pixels lie well inside of what the plain frame covers: there a pass shows no background between discs. */
-static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings,
+static int find_inside(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
                        struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
 {
 	const size_t area = (size_t)settings->width * settings->height;
-	const uint64_t start = now_ns();
+	const uint64_t start = clock_ns();
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
 	if (!r->is_inside)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
@@ -218,7 +219,7 @@ static int find_inside(struct psr_refiner *r, const struct psr_scene *scene, con
 	struct erosion erosion = { r->is_inside, r->is_inside + area, settings->width, settings->height };
 	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
 	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
-	report->ns[PSR_STAGE_GAPS] += now_ns() - start;
+	report->ns[PSR_STAGE_GAPS] += clock_ns() - start;
 	return PSR_OK;
 }
 
@@ -227,17 +228,17 @@ static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
 	return side <= window ? 1 : 1 + (side - window + step - 1) / step;
 }
 
-int psr_refine(struct psr_refiner *r, const struct psr_scene *scene, const struct psr_settings *settings, unsigned pass,
-               struct psr_pool *pool, psr_refine_cancelled_fn *is_cancelled, void *userdata, struct psr_frame *frame,
-               struct psr_error *err)
+int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
+                 struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
+	const unsigned pass = settings->pass;
 	if (pass > PSR_MAX_PASS)
 		return psr_fail(err, PSR_ERR_LIMIT, "there is no pass %u, only passes up to %d", pass, PSR_MAX_PASS);
 	if (settings->window.picture_width)
 		return psr_fail(err, PSR_ERR_ARG, "only whole pictures are refined");
 	if (pass == 0 || settings->width == 0 || settings->height == 0 || settings->width > PSR_MAX_SIDE ||
 	    settings->height > PSR_MAX_SIDE)
-		return psr_render(r->renderer, scene, settings, pool, frame, err);
+		return renderer_draw(r->renderer, scene, settings, pool, frame, err);
 	if (frame->width != settings->width || frame->height != settings->height)
 		return psr_fail(err, PSR_ERR_ARG, "the frame is of another size than the settings");
 	if (frame->normal || frame->id || frame->block || frame->weight || frame->words)
@@ -250,9 +251,9 @@ int psr_refine(struct psr_refiner *r, const struct psr_scene *scene, const struc
 		return rc;
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x; i++) {
-			if (is_cancelled && is_cancelled(userdata))
+			if (settings->is_cancelled && settings->is_cancelled(settings->userdata))
 				return psr_fail(err, PSR_ERR_CANCELLED, "nobody waits for pass %u any more", pass);
-			rc = draw_window(r, scene, settings, pass, i, j, pool, frame, err);
+			rc = draw_window(r, scene, settings, i, j, pool, frame, err);
 			if (rc)
 				return rc;
 		}

@@ -6,7 +6,7 @@
 
 /* Draws the outline of the scene in a plain frame, width * height: 1 where a pixel has a sample, or cells cover at
  * least half of it. */
-int renderer_outline(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
+int renderer_outline(struct psr_renderer *renderer, const struct psr_scene *scene, const struct render_settings *settings,
                      struct psr_pool *pool, uint8_t *is_object, struct psr_error *err);
 
 /* Sets the pixels that frames with splats are inside of; NULL: unknown. The caller keeps them alive. */

@@ -2,6 +2,7 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "base/view.h"
+#include "model/blocks.h"
 #include "psr/scene.h"
 
 #define MAX_LENGTH 1e30
@@ -111,4 +112,17 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 		distance = 2 * deepest + extent;
 	v3d_add_scaled(camera->eye, camera->target, -distance, forward);
 	camera->near_z = (distance - deepest) / 2;
+}
+
+void psr_light_key(struct psr_light *light, const struct psr_camera *camera)
+{
+	double forward[3], right[3], up[3];
+	*light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 1, 1 } };
+	v3d_sub(forward, camera->target, camera->eye);
+	v3d_normalize(forward, forward);
+	v3d_cross(right, forward, camera->up);
+	v3d_normalize(right, right);
+	v3d_cross(up, right, forward);
+	for (int i = 0; i < 3; i++)
+		light->direction[i] = forward[i] + 0.5 * right[i] - 0.6 * up[i];
 }

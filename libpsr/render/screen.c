@@ -4,7 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 /* A triangle clipped by a rectangle has at most 7 corners; rounding may double some. */
 #define MOST_CORNERS 24

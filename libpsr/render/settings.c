@@ -1,20 +1,6 @@
 #include "render.h"
 
-void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height)
-{
-	settings->width = width;
-	settings->height = height;
-	settings->window = (struct psr_window){ 0, 0, 0, 0 };
-	settings->cull_tests = PSR_CULL_ALL;
-	settings->is_full = 0;
-	settings->with_splats = 0;
-	settings->gap_threshold = 3;
-	settings->gap_method = PSR_GAPS_BILINEAR;
-	settings->spacing = 1;
-	settings->is_smooth = 0;
-}
-
-int settings_validate(const struct psr_settings *settings, struct psr_error *err)
+int settings_validate(const struct render_settings *settings, struct psr_error *err)
 {
 	uint32_t w = settings->width, h = settings->height;
 	if (w < 1 || h < 1)

@@ -1,4 +1,5 @@
-#include "psr/direction.h"
+#include "base/direction.h"
+#include "base/clock.h"
 #include "shade.h"
 
 #define TIMED_EVERY 16 /* strips: reading the clock costs time, too */
@@ -114,7 +115,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	begin_strip(&pixels[0], &shading, 0, y0);
 	for (uint32_t i = 0; i < n; i++) {
 		const int is_timed = (i % per_row + i / per_row) % TIMED_EVERY == 0;
-		const uint64_t start = is_timed ? now_ns() : 0;
+		const uint64_t start = is_timed ? clock_ns() : 0;
 		strip.pixels = &pixels[i % 2];
 		if (i + 1 < n)
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
@@ -122,7 +123,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 			simd->strip_read(&strip, &plan->view);
 			simd->strip_resolve(&strip, &plan->view, plan->ambient);
 		}
-		const uint64_t middle = is_timed ? now_ns() : 0;
+		const uint64_t middle = is_timed ? clock_ns() : 0;
 		if (strip.pixels->n) {
 			light_strip(&strip, &shading);
 			counts->n_pixels += strip.pixels->n;
@@ -131,7 +132,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 		write_strip(&strip, &shading);
 		if (is_timed) {
 			counts->resolve_ns += middle - start;
-			counts->shade_ns += now_ns() - middle;
+			counts->shade_ns += clock_ns() - middle;
 		}
 	}
 }

@@ -184,7 +184,7 @@ static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct shadow_call *call)
 {
 	const int n_parts = psr_pool_threads(call->pool);
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_scene scene = *call->scene;
 	struct psr_report report = { 0 };
 	struct plan *plan = &drawer->plan;
@@ -192,7 +192,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	scene.camera = kept->fit.camera;
 	scene.n_lights = 0;
 	kept->is_drawn = 0;
-	psr_settings_default(&settings, kept->fit.width, kept->fit.height);
+	render_settings_default(&settings, kept->fit.width, kept->fit.height);
 	settings.cull_tests = 0;
 	int rc = plan_make(plan, &scene, &settings, call->err);
 	if (rc)

@@ -2,7 +2,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "block.h"
 #include "splat.h"
 #include "simd/block.h"

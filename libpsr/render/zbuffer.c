@@ -1,6 +1,6 @@
 #include "zbuffer.h"
 
-#include "psr/direction.h"
+#include "base/direction.h"
 
 size_t zbuffer_measure(struct psr_zstack *stack, uint32_t width, uint32_t height, uint32_t levels)
 {

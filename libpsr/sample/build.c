@@ -6,15 +6,12 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
-#include "sample/mend/adequacy.h"
-#include "surface/validate.h"
+#include "level.h"
+#include "psr/build.h"
 #include "sample/levels/draft.h"
 #include "sample/pack/pack.h"
-#include "sample/project/projection.h"
-#include "psr/build.h"
-#include "psr/pool.h"
-#include "ray/ray.h"
 #include "surface/stipple.h"
+#include "surface/validate.h"
 
 #define LEAST_RESOLUTION 8
 #define MOST_RESOLUTION 8192
@@ -28,6 +25,7 @@ struct build {
 	struct psr_pool *pool;
 	struct ray_scene *scene;
 	struct surface surface;
+	struct level level[2];                           /* that under way, and the next finer one */
 	struct psr_projection projection[N_PROJECTIONS]; /* of level 0 */
 	unsigned n_levels, n_levels_done;
 	struct draft draft;
@@ -93,33 +91,47 @@ static void report_step(unsigned done, unsigned total, void *userdata)
 
 static int check_samples(struct build *build, const struct level *level)
 {
-	if (level->cover.n_points != 0)
+	if (level->kept.n != 0)
 		return PSR_OK;
 	return psr_fail(build->err, PSR_ERR_ARG,
 	                "no ray meets the mesh: all of it is transparent, turned away or too thin");
 }
 
+static void start_level(struct build *build, struct level *level, const struct level *finer)
+{
+	const unsigned number = build->n_levels_done;
+
+	level_fini(level);
+	level->sampling = (struct sampling){ .mesh = build->mesh,
+		                                 .scene = build->scene,
+		                                 .surface = &build->surface,
+		                                 .pool = build->pool,
+		                                 .level = number,
+		                                 .ds = build->draft.ds * (double)(1u << number) };
+	memcpy(level->sampling.projection, build->projection, sizeof build->projection);
+	for (int i = 0; i < N_PROJECTIONS; i++)
+		level->sampling.projection[i].spacing *= (float)(1u << number);
+	level->finer = number > 0 ? finer : NULL;
+}
+
 static int make_level(struct build *build, struct level *level)
 {
-	struct psr_projection projection[N_PROJECTIONS];
+	const struct level_progress progress = { report_step, build };
 	int rc;
 
-	memcpy(projection, build->projection, sizeof projection);
-	for (int i = 0; i < N_PROJECTIONS; i++)
-		projection[i].spacing *= (float)(1u << build->n_levels_done);
-	ray_scene_stipple(build->scene, STIPPLE_PIXELS * level->ds);
-	rc = level_make(level, projection, report_step, build);
+	ray_scene_stipple(build->scene, STIPPLE_PIXELS * level->sampling.ds);
+	rc = level_make(level, &progress);
 	if (rc == PSR_OK)
 		rc = check_samples(build, level);
 	if (rc == PSR_OK && build->n_levels_done == 0) {
 		struct adequacy adequacy;
 
-		rc = adequacy_reach(&adequacy, level);
+		rc = level_reach(&adequacy, level);
 		build->info.n_trials = adequacy.n_trials;
 		build->info.n_missing = adequacy.n_missing;
 	}
 	if (rc == PSR_OK)
-		rc = draft_add(&build->draft, level);
+		rc = draft_add(&build->draft, level->sheets, &level->kept);
 	build->report.n_rays += level->n_rays;
 	build->report.n_candidates += level->n_patches;
 	build->report.seconds_rays += level->seconds_rays;
@@ -128,45 +140,21 @@ static int make_level(struct build *build, struct level *level)
 
 static int make_levels(struct build *build)
 {
-	struct cover finer = { 0 };
-	struct seen finer_seen = { 0 };
-	uint8_t *finer_sides = NULL;
-	double sine, cosine, started = now();
+	double started = now();
 	int rc = PSR_OK;
 
-	psr_sincos(build->options->tolerance, &sine, &cosine);
 	build->n_levels = count_levels(build->options->resolution);
 	build->draft.projection = build->projection;
 	build->draft.ds = 2.0 / build->options->resolution;
 	for (; rc == PSR_OK && build->n_levels_done < build->n_levels; build->n_levels_done++) {
-		struct level level = { .mesh = build->mesh,
-			                   .scene = build->scene,
-			                   .surface = &build->surface,
-			                   .pool = build->pool,
-			                   .ds = build->draft.ds * (double)(1u << build->n_levels_done),
-			                   .cosine = (float)cosine,
-			                   .n_projections = N_PROJECTIONS };
+		struct level *level = &build->level[build->n_levels_done % 2];
 
-		if (build->n_levels_done > 0) {
-			level.finer = &finer;
-			level.finer_seen = &finer_seen;
-			level.finer_sides = finer_sides;
-		}
-		rc = make_level(build, &level);
-		cover_fini(&finer);
-		seen_fini(&finer_seen);
-		finer = level.cover;
-		finer_seen = level.seen;
-		psr_free(finer_sides);
-		finer_sides = level.sides;
-		level.sides = NULL;
-		level.cover = (struct cover){ 0 };
-		level.seen = (struct seen){ 0 };
-		level_fini(&level);
+		start_level(build, level, &build->level[(build->n_levels_done + 1) % 2]);
+		rc = make_level(build, level);
+		level_trim(level);
 	}
-	cover_fini(&finer);
-	seen_fini(&finer_seen);
-	psr_free(finer_sides);
+	for (int i = 0; i < 2; i++)
+		level_fini(&build->level[i]);
 	build->report.seconds_select = now() - started - build->report.seconds_rays;
 	if (rc == PSR_ERR_MEMORY || rc == PSR_ERR_LIMIT)
 		return psr_fail(build->err, rc, "no memory to sample the mesh at resolution %u; use a lower one",
@@ -178,6 +166,7 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 {
 	const struct psr_presets presets = { build->mesh->n_cameras, build->mesh->n_lights, build->mesh->camera,
 		                                 build->mesh->light };
+	struct pack_source source = { NULL, &build->draft, &presets, build->pool };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)
@@ -194,18 +183,19 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
 	}
 	ray_scene_stipple(build->scene, STIPPLE_PIXELS * build->draft.ds); /* that of level 0, by which losses are judged */
+	source.scene = build->scene;
 	if (rc == PSR_OK)
-		rc = pack_model(out, &build->info, &presets, build->scene, &build->draft, build->pool, build->err);
+		rc = pack_model(out, &build->info, &source, build->err);
 	return rc;
 }
 
 static int prepare(struct build *build)
 {
 	const struct psr_build_options *options = build->options;
-	int rc = door_check_mesh(build->mesh, build->err);
+	int rc = validate_mesh(build->mesh, build->err);
 
 	if (rc == PSR_OK)
-		rc = door_bound_mesh(build->mesh, build->info.origin, &build->info.scale, build->err);
+		rc = validate_bound_mesh(build->mesh, build->info.origin, &build->info.scale, build->err);
 	if (rc != PSR_OK)
 		return rc;
 	v3d_normalize(build->info.up, v3d_length(options->up) > 0 ? options->up : build->mesh->up);
@@ -213,7 +203,7 @@ static int prepare(struct build *build)
 	build->info.tolerance = options->tolerance;
 	build->info.resolution = options->resolution;
 	snprintf(build->info.builder, sizeof build->info.builder, "psr %s", PSR_VERSION);
-	rc = psr_pool_create(&build->pool, options->n_threads, 0);
+	rc = psr_pool_create(&build->pool, options->n_threads, NULL);
 	return rc == PSR_OK ? rc : psr_fail(build->err, rc, "%d threads cannot be started", options->n_threads);
 }
 

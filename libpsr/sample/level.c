@@ -4,11 +4,15 @@
 #include "base/mem.h"
 #include "level.h"
 #include "psr/error.h"
+#include "sample/mend/mend.h"
 #include "sample/visible/look_out.h"
-#include "sample/thin/cover.h"
+#include "sample/visible/sides.h"
 
 /* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
 #define FIELD_PIXELS 3
+
+#define N_STEPS (N_PROJECTIONS / 2 + 4)
+#define MOST_ROUNDS 7
 
 static double now(void)
 {
@@ -18,100 +22,195 @@ static double now(void)
 	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
-struct steps {
-	unsigned done, total;
-	void (*on_progress)(unsigned done, unsigned total, void *userdata);
-	void *userdata;
-};
-
-static void step(struct steps *steps)
+static void report(const struct level_progress *progress, unsigned done)
 {
-	steps->done++;
-	if (steps->on_progress != NULL)
-		steps->on_progress(steps->done, steps->total, steps->userdata);
+	if (progress != NULL)
+		progress->on_step(done, N_STEPS, progress->userdata);
 }
 
-static int prepare(struct level *level, const struct psr_projection *projection)
+static struct keeper keeper_of(struct level *level)
 {
-	uint32_t n_prims = level->mesh->n_triangles + level->mesh->n_points;
+	return (struct keeper){ .sampling = &level->sampling, .visible = &level->visible, .sides = level->sides,
+		                    .finer = level->finer != NULL ? &level->finer->kept : NULL, .sheets = level->sheets,
+		                    .kept = &level->kept };
+}
+
+static int mark_thin(struct level *level)
+{
+	level->thin = psr_alloc_array(sampling_n_prims(&level->sampling), 1);
+	if (level->thin == NULL)
+		return PSR_ERR_MEMORY;
+	thin_mark(level->thin, &level->sampling, level->finer != NULL ? level->finer->thin : NULL);
+	level->sampling.thin = level->thin;
+	return PSR_OK;
+}
+
+static int look(struct level *level)
+{
+	const struct sampling *sampling = &level->sampling;
 	int rc;
 
-	level->sheets = calloc(level->n_projections, sizeof *level->sheets);
-	level->sides = psr_alloc_array(n_prims, 1);
-	rc = level->sheets == NULL || level->sides == NULL ? PSR_ERR_MEMORY : PSR_OK;
-	if (rc == PSR_OK) {
-		memset(level->sides, 0, n_prims);
-		thin_mark(level, projection);
-		thin_mark_narrow(level);
+	if (level->finer != NULL)
+		return visible_set_coarsen(&level->visible, &level->finer->visible);
+	rc = visible_set_init(&level->visible, sampling->ds);
+	if (rc == PSR_OK)
+		rc = visible_set_look(&level->visible, sampling->scene, VISIBLE_ENOUGH, sampling->pool);
+	return rc == PSR_OK ? look_out(&level->visible, sampling) : rc;
+}
+
+static int trace(struct level *level, const struct level_progress *progress)
+{
+	int rc = PSR_OK;
+
+	for (unsigned i = 0; rc == PSR_OK && i < N_PROJECTIONS; i += 2) {
+		struct sheets *sheets = &level->sheets[i];
+
+		rc = sheets_trace(sheets, sheets + 1, &level->sampling, &level->sampling.projection[i]);
+		level->n_rays += sheets->n_rays;
+		level->n_patches += sheets[0].n_patches + sheets[1].n_patches;
+		report(progress, i / 2 + 2);
 	}
-	if (rc == PSR_OK)
-		rc = field_init(&level->field, FIELD_PIXELS * level->ds);
-	if (rc == PSR_OK)
-		rc = cover_init(&level->cover, level->ds);
-	if (rc == PSR_OK)
-		rc = level->finer_seen != NULL ? seen_coarsen(&level->seen, level->finer_seen)
-		                               : seen_init(&level->seen, level->ds);
-	if (rc == PSR_OK && level->finer_seen == NULL)
-		rc = seen_look(&level->seen, level->scene, SEEN_ENOUGH, level->pool);
-	if (rc == PSR_OK && level->finer_seen == NULL)
-		rc = seen_look_out(level);
 	return rc;
 }
 
-static int trace(struct level *level, const struct psr_projection *projection, struct steps *steps)
+static int own(struct level *level)
 {
+	const struct owner_finds finds = { &level->field, &level->visible, level->sides };
+	int rc = field_init(&level->field, FIELD_PIXELS * level->sampling.ds);
+
+	return rc == PSR_OK ? owner_mark(&level->ownership, &finds, &level->sampling, level->sheets) : rc;
+}
+
+int level_own(struct level *level, const struct level_progress *progress)
+{
+	const uint32_t n_prims = sampling_n_prims(&level->sampling);
 	double started = now();
-	int rc = prepare(level, projection);
+	int rc = mark_thin(level);
 
-	step(steps);
-	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i += 2) {
-		rc = sheets_trace(&level->sheets[i], &level->sheets[i + 1], level->scene, level->mesh, level->sides,
-		                  &projection[i], level->pool);
-		level->n_rays += level->sheets[i].n_rays;
-		level->n_patches += level->sheets[i].n_patches + level->sheets[i + 1].n_patches;
-		step(steps);
-	}
+	level->sides = psr_alloc_array(n_prims, 1);
+	if (level->sides == NULL)
+		return PSR_ERR_MEMORY;
+	memset(level->sides, 0, n_prims);
+	if (rc == PSR_OK)
+		rc = look(level);
+	report(progress, 1);
+	if (rc == PSR_OK)
+		rc = trace(level, progress);
 	level->seconds_rays = now() - started;
-	return rc;
+	return rc == PSR_OK ? own(level) : rc;
 }
 
-int level_own(struct level *level, const struct psr_projection *projection)
+void level_merge(struct level *level)
 {
-	struct steps none = { 0 };
-	int rc = trace(level, projection, &none);
-
-	return rc == PSR_OK ? owner_mark(level) : rc;
+	owner_merge(&level->ownership, &level->sampling, level->sheets, &level->field);
 }
 
-int level_make(struct level *level, const struct psr_projection *projection,
-               void (*on_progress)(unsigned done, unsigned total, void *userdata), void *userdata)
+int level_keep(struct level *level)
 {
-	struct steps steps = { 0, level->n_projections / 2 + 4, on_progress, userdata };
-	int rc = trace(level, projection, &steps);
+	const struct keeper keeper = keeper_of(level);
+	int rc = kept_init(&level->kept, level->sampling.ds);
 
-	if (rc == PSR_OK)
-		rc = owner_mark(level);
-	step(&steps);
+	return rc == PSR_OK ? keep_owned(&keeper, &level->ownership) : rc;
+}
+
+int level_mend(struct level *level)
+{
+	const struct keeper keeper = keeper_of(level);
+
+	return mend_surface(&keeper, &level->field, 0);
+}
+
+int level_make(struct level *level, const struct level_progress *progress)
+{
+	int rc = level_own(level, progress);
+
+	report(progress, N_STEPS - 2);
 	if (rc == PSR_OK) {
-		merge_patches(level);
-		rc = keep_owned(level);
+		level_merge(level);
+		rc = level_keep(level);
 	}
-	step(&steps);
+	report(progress, N_STEPS - 1);
 	if (rc == PSR_OK)
-		rc = dice_surface(level, 0);
-	step(&steps);
+		rc = level_mend(level);
+	report(progress, N_STEPS);
 	return rc;
+}
+
+/* What a view found that none of those before had seen is seldom alone: it is put down as seen, views look for more of
+ * that kind, and the surface is mended again. */
+static int add_missing(struct level *level, const struct adequacy *found, int round)
+{
+	const struct keeper keeper = keeper_of(level);
+	uint64_t n_unseen = 0;
+	int rc = PSR_OK;
+
+	for (uint64_t i = 0; i < found->n_missing; i++)
+		n_unseen += !visible_set_has(&level->visible, found->place[i].p, found->place[i].n);
+	if (2 * ADEQUACY_FEW * n_unseen > found->n_trials)
+		rc = visible_set_look(&level->visible, level->sampling.scene, (uint64_t)VISIBLE_ENOUGH << 2 * round,
+		                      level->sampling.pool);
+	for (uint64_t i = 0; rc == PSR_OK && i < found->n_missing; i++) {
+		const struct place *place = &found->place[i];
+
+		sides_note(level->sides, place->surface, 1);
+		rc = visible_set_add(&level->visible, place->p, place->n);
+		if (rc == PSR_OK)
+			rc = mend_place(&keeper, &level->field, place);
+	}
+	keep_look_again(&keeper);
+	return rc == PSR_OK ? mend_surface(&keeper, &level->field, round) : rc;
+}
+
+static double share(const struct adequacy *found)
+{
+	return (double)found->n_missing / (double)(found->n_trials + 1);
+}
+
+/* Enough, or no better than two rounds ago by a fifth: the rest is what this way of looking does not find. */
+static int is_over(const struct adequacy *found, int round, double before_last)
+{
+	return ADEQUACY_FEW * found->n_missing < found->n_trials || round == MOST_ROUNDS
+	       || (round > 2 && share(found) > 0.8 * before_last);
+}
+
+int level_reach(struct adequacy *out, struct level *level)
+{
+	uint64_t n = level->kept.n / 2;
+	double before[2] = { 0, 0 };
+	int rc = PSR_OK;
+
+	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
+	for (int round = 1; rc == PSR_OK; round++) {
+		/* Of the first two, what is not enough cannot be the last. */
+		rc = adequacy_measure(out, &level->sampling, &level->kept, (uint64_t)round, n, round <= 2);
+		if (rc != PSR_OK || is_over(out, round, before[0]))
+			break;
+		before[0] = before[1];
+		before[1] = share(out);
+		rc = add_missing(level, out, round);
+		free(out->place);
+		out->place = NULL;
+	}
+	free(out->place);
+	out->place = NULL;
+	return rc;
+}
+
+void level_trim(struct level *level)
+{
+	for (int i = 0; i < N_PROJECTIONS; i++)
+		sheets_fini(&level->sheets[i]);
+	psr_free(level->sides);
+	level->sides = NULL;
+	field_fini(&level->field);
+	ownership_fini(&level->ownership);
 }
 
 void level_fini(struct level *level)
 {
-	for (unsigned i = 0; level->sheets != NULL && i < level->n_projections; i++)
-		sheets_fini(&level->sheets[i]);
-	free(level->sheets);
-	psr_free(level->sides);
-	field_fini(&level->field);
-	seen_fini(&level->seen);
-	cover_fini(&level->cover);
-	level->sheets = NULL;
-	level->sides = NULL;
+	level_trim(level);
+	psr_free(level->thin);
+	visible_set_fini(&level->visible);
+	kept_fini(&level->kept);
+	memset(level, 0, sizeof *level);
 }

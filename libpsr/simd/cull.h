@@ -3,7 +3,8 @@
 #define PSR_SIMD_CULL_H
 
 #include "base/maths.h"
-#include "psr/render.h"
+#include "model/blocks.h"
+#include "zstack.h"
 
 struct cull_view {
 	const struct psr_blocks *blocks;

@@ -2,7 +2,7 @@
 #ifndef PSR_SIMD_GAPS_H
 #define PSR_SIMD_GAPS_H
 
-#include "psr/render.h"
+#include "zstack.h"
 
 #define GAPS_WIDTH 128 /* a multiple of the coarsest cell */
 #define GAPS_BRICK 32

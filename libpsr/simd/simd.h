@@ -5,7 +5,8 @@
 #ifndef PSR_SIMD_SIMD_H
 #define PSR_SIMD_SIMD_H
 
-#include "psr/isa.h"
+#include "psr/render.h"
+#include "isa.h"
 #include "cull.h"
 #include "fill.h"
 #include "gaps.h"

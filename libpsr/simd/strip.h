@@ -2,7 +2,7 @@
 #ifndef PSR_SIMD_STRIP_H
 #define PSR_SIMD_STRIP_H
 
-#include "psr/render.h"
+#include "psr/scene.h"
 #include "warp.h"
 
 #define STRIP 128

@@ -2,8 +2,9 @@
 #ifndef PSR_SIMD_WARP_H
 #define PSR_SIMD_WARP_H
 
-#include "psr/render.h"
+#include "model/blocks.h"
 #include "tile.h"
+#include "zstack.h"
 
 /* A sample of a one-sided block faces away when its normal (psr_direction_tens) is more than this sine beyond
  * perpendicular, the quantisation error of normals. [G] 7.3.2 shades such samples with weight 0; psr drops them in the

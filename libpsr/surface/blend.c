@@ -2,8 +2,8 @@
 #include "base/vec.h"
 #include "blend.h"
 #include "material.h"
-#include "psr/direction.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "model/blocks.h"
 #include "surface.h"
 
 /* As long as the mean of opposite normals can be by their quantisation alone. */

@@ -1,7 +1,7 @@
 #include <math.h>
 #include "base/srgb.h"
 #include "material.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 
 /* A metal has no diffuse colour: it mirrors its surroundings, and here there are none. Half of its colour stands in for
  * them, or metals would be black but for highlights. */

@@ -96,14 +96,15 @@ static float made_tangent(const struct plane *plane, const double jacobian[2][2]
 	return (float)-sign;
 }
 
-void normal_map(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, const struct plane *plane,
+void normal_map(const struct psr_mesh *mesh, const struct surface_place *place, const struct plane *plane,
                 const double jacobian[2][2], const float mapped[3], float normal[3])
 {
-	float tangent[3], bitangent[3], own[3], side = given_tangent(mesh, triangle, u, v, tangent), out[3];
+	float tangent[3], bitangent[3], own[3], out[3];
+	float side = given_tangent(mesh, place->prim, place->u, place->v, tangent);
 
 	if (side == 0) {
 		side = made_tangent(plane, jacobian, tangent);
-	} else if (interpolate(mesh, triangle, u, v, own) && v3f_dot(own, normal) < 0) {
+	} else if (interpolate(mesh, place->prim, place->u, place->v, own) && v3f_dot(own, normal) < 0) {
 		side = -side;
 	}
 	v3f_add_scaled(tangent, tangent, -v3f_dot(tangent, normal), normal);

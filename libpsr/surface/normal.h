@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 #include "psr/mesh.h"
+#include "surface.h"
 
 /* A triangle's own plane: orthonormal x, y, and z the unit normal of its front (all 0 where it has no area), and its
  * sides from corner 0 as x[i], y[i] of it, in object units; y[0] = 0. */
@@ -26,7 +27,7 @@ void normal_interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u
  * The tangent is the mesh's, or where it has none that of growing s; its jacobian (of the texture, normal_jacobian)
  * tells that. The bitangent is perpendicular to both, on the side of falling t. Without an orientation (a jacobian of
  * determinant 0) nothing is changed. */
-void normal_map(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, const struct plane *plane,
+void normal_map(const struct psr_mesh *mesh, const struct surface_place *place, const struct plane *plane,
                 const double jacobian[2][2], const float mapped[3], float normal[3]);
 
 #endif

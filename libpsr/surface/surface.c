@@ -5,7 +5,7 @@
 #include "material.h"
 #include "mip.h"
 #include "normal.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "surface.h"
 #include "texture.h"
@@ -17,7 +17,7 @@
 #define NORMAL_ROUNDING (0.87 / 32767)
 
 /* A place on a triangle, and what is common to all textures there. */
-struct spot {
+struct footprint {
 	const struct surface *surface;
 	const struct surface_place *place;
 	const struct psr_material *material;
@@ -112,75 +112,76 @@ void surface_face(float normal[3], const float facing[3])
 }
 
 /* The mean of a texture over the circle, and filter_look_up()'s share; 0 if there is no texture. */
-static int look_up(const struct spot *spot, const struct psr_texture *texture, enum mip_kind kind, float out[4],
-                   double *share, double jacobian[2][2])
+static int look_up(const struct footprint *footprint, const struct psr_texture *texture, enum mip_kind kind,
+                   float out[4], double *share, double jacobian[2][2])
 {
-	const struct psr_mesh *mesh = spot->surface->mesh;
-	const struct surface_place *place = spot->place;
+	const struct psr_mesh *mesh = footprint->surface->mesh;
+	const struct surface_place *place = footprint->place;
 	double st[2], side[2][2], axes[2][2];
 
 	if (texture->image < 0 || !texture_place(mesh, texture, place->prim, place->u, place->v, st))
 		return 0;
 	memset(jacobian, 0, 4 * sizeof **jacobian);
-	if (spot->has_area) {
+	if (footprint->has_area) {
 		texture_sides(mesh, texture, place->prim, (double(*)[2])side);
-		normal_jacobian(&spot->plane, (const double(*)[2])side, jacobian);
+		normal_jacobian(&footprint->plane, (const double(*)[2])side, jacobian);
 	}
 	for (int i = 0; i < 4; i++)
-		axes[i / 2][i % 2] = jacobian[i / 2][i % 2] * spot->radius;
-	*share = filter_look_up(mip_of(spot->surface, texture->image, kind), texture, st, (const double(*)[2])axes, out);
+		axes[i / 2][i % 2] = jacobian[i / 2][i % 2] * footprint->radius;
+	*share = filter_look_up(mip_of(footprint->surface, texture->image, kind), texture, st, (const double(*)[2])axes,
+	                        out);
 	return 1;
 }
 
-static void add_base(const struct spot *spot, float base[3])
+static void add_base(const struct footprint *footprint, float base[3])
 {
-	enum mip_kind kind = base_kind(spot->material);
+	enum mip_kind kind = base_kind(footprint->material);
 	double share, jacobian[2][2];
 	float texel[4];
 
-	if (!look_up(spot, &spot->material->base_texture, kind, texel, &share, jacobian))
+	if (!look_up(footprint, &footprint->material->base_texture, kind, texel, &share, jacobian))
 		return;
 	for (int c = 0; c < 3; c++)
 		base[c] *= kind == MIP_COLOR ? texel[c] : texel[3] > 0 ? texel[c] / texel[3] : 0;
 }
 
-static void add_textures(const struct spot *spot, struct material_values *values)
+static void add_textures(const struct footprint *footprint, struct material_values *values)
 {
-	const struct psr_material *m = spot->material;
+	const struct psr_material *m = footprint->material;
 	double share, jacobian[2][2];
 	float texel[4];
 
 	if (m->is_specular_glossiness) {
-		if (look_up(spot, &m->specular_texture, MIP_COLOR, texel, &share, jacobian)) {
+		if (look_up(footprint, &m->specular_texture, MIP_COLOR, texel, &share, jacobian)) {
 			for (int c = 0; c < 3; c++)
 				values->specular[c] *= texel[c];
 			values->glossiness *= texel[3];
 		}
-	} else if (look_up(spot, &m->metallic_roughness_texture, MIP_LINEAR, texel, &share, jacobian)) {
+	} else if (look_up(footprint, &m->metallic_roughness_texture, MIP_LINEAR, texel, &share, jacobian)) {
 		values->roughness *= texel[1];
 		values->metallic *= texel[2];
 	}
-	if (look_up(spot, &m->emissive_texture, MIP_COLOR, texel, &share, jacobian))
+	if (look_up(footprint, &m->emissive_texture, MIP_COLOR, texel, &share, jacobian))
 		for (int c = 0; c < 3; c++)
 			values->emission[c] *= texel[c];
-	if (look_up(spot, &m->occlusion_texture, MIP_LINEAR, texel, &share, jacobian))
+	if (look_up(footprint, &m->occlusion_texture, MIP_LINEAR, texel, &share, jacobian))
 		values->occlusion = 1 + m->occlusion_strength * (texel[0] - 1);
 }
 
 /* Applies the normal map; returns the variance of its normals within the circle. */
-static double map_normal(const struct spot *spot, float normal[3])
+static double map_normal(const struct footprint *footprint, float normal[3])
 {
-	const struct psr_material *m = spot->material;
+	const struct psr_material *m = footprint->material;
 	double share, jacobian[2][2], length;
 	float mapped[4];
 
-	if (!look_up(spot, &m->normal_texture, MIP_NORMAL, mapped, &share, jacobian))
+	if (!look_up(footprint, &m->normal_texture, MIP_NORMAL, mapped, &share, jacobian))
 		return 0;
 	length = (double)v3f_length(mapped);
 	mapped[0] *= m->normal_scale;
 	mapped[1] *= m->normal_scale;
-	normal_map(spot->surface->mesh, spot->place->prim, spot->place->u, spot->place->v, &spot->plane,
-	           (const double(*)[2])jacobian, mapped, normal);
+	normal_map(footprint->surface->mesh, footprint->place, &footprint->plane, (const double(*)[2])jacobian, mapped,
+	           normal);
 	if (length + NORMAL_ROUNDING >= 1)
 		return 0;
 	/* The scale stretches small angles by as much. Where all cancels out no lobe is left: any number will do. */
@@ -191,19 +192,19 @@ static double map_normal(const struct spot *spot, float normal[3])
 static uint64_t textured_word(const struct surface *surface, const struct surface_place *place, double diameter,
                               const struct psr_material *material, float normal[3])
 {
-	struct spot spot = { .surface = surface, .place = place, .material = material,
+	struct footprint footprint = { .surface = surface, .place = place, .material = material,
 		                 .radius = diameter / 2 * surface->scale };
 	struct material_values values;
 	float rgba[4];
 
-	spot.has_area = normal_plane(surface->mesh, place->prim, &spot.plane);
+	footprint.has_area = normal_plane(surface->mesh, place->prim, &footprint.plane);
 	material_values_default(&values, material);
 	texture_plain_color(surface->mesh, place->prim, place->u, place->v, rgba);
 	v3f_set(values.base, rgba[0], rgba[1], rgba[2]);
-	add_base(&spot, values.base);
+	add_base(&footprint, values.base);
 	if (!material->unlit) {
-		add_textures(&spot, &values);
-		values.spread = map_normal(&spot, normal);
+		add_textures(&footprint, &values);
+		values.spread = map_normal(&footprint, normal);
 	}
 	return material_word(material, &values);
 }

@@ -5,6 +5,9 @@
 #include <stdint.h>
 #include "psr/mesh.h"
 
+/* A side of a primitive is its number, and this bit for its back. */
+#define SURFACE_BACK 0x80000000u
+
 struct mip;
 
 /* A mesh with what filtering its textures needs: their mip maps (mip.h), one for each image and use. Any number of

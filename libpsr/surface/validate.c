@@ -1,7 +1,7 @@
 #include <math.h>
 #include "base/vec.h"
 #include "validate.h"
-#include "sample/project/sheet.h"
+#include "surface.h"
 
 static int check_materials(const struct psr_mesh *mesh, struct psr_error *err)
 {
@@ -30,13 +30,13 @@ static int check_points(const struct psr_mesh *mesh, struct psr_error *err)
 	return PSR_OK;
 }
 
-int door_check_mesh(const struct psr_mesh *mesh, struct psr_error *err)
+int validate_mesh(const struct psr_mesh *mesh, struct psr_error *err)
 {
 	if (mesh->n_triangles == 0 && mesh->n_points == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the mesh has no triangles and no points");
-	if ((uint64_t)mesh->n_triangles + mesh->n_points >= SHEET_BACK)
+	if ((uint64_t)mesh->n_triangles + mesh->n_points >= SURFACE_BACK)
 		return psr_fail(err, PSR_ERR_LIMIT, "%u triangles and %u points are over the limit of %u", mesh->n_triangles,
-		                mesh->n_points, SHEET_BACK - 1);
+		                mesh->n_points, SURFACE_BACK - 1);
 	for (uint32_t i = 0; i < mesh->n_triangles; i++) {
 		for (int k = 0; k < 3; k++)
 			if (mesh->triangle[i][k] >= mesh->n_vertices)
@@ -69,7 +69,7 @@ static const double *corner_of(const struct psr_mesh *mesh, uint64_t i, double *
 	return i < n ? mesh->position[mesh->triangle[i / 3][i % 3]] : mesh->point[i - n];
 }
 
-int door_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radius, struct psr_error *err)
+int validate_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radius, struct psr_error *err)
 {
 	double min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY }, reach = 0;
 

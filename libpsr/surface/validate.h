@@ -6,10 +6,10 @@
 #include "psr/mesh.h"
 
 /* Checks what psr/mesh.h promises as far as memory and arithmetic depend on it. ARG, LIMIT. */
-int door_check_mesh(const struct psr_mesh *mesh, struct psr_error *err);
+int validate_mesh(const struct psr_mesh *mesh, struct psr_error *err);
 
 /* Middle of the bounding box of all vertices in use, and the radius of the smallest sphere about it that holds them,
  * grown by 2^-20 for rounding: origin and scale of the inner coordinates. ARG if the mesh has no extent. */
-int door_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radius, struct psr_error *err);
+int validate_bound_mesh(const struct psr_mesh *mesh, double center[3], double *radius, struct psr_error *err);
 
 #endif

@@ -1,12 +1,8 @@
 #include "glb.h"
 
 #include <cjson/cJSON.h>
-#include <errno.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "glb_parts.h"
 #include "image.h"
 
@@ -157,39 +153,4 @@ int glb_encode(uint8_t **bytes, size_t *n_bytes, const struct shape *shape, cons
 	cJSON_free(json);
 	sorted_fini(&sorted);
 	return code;
-}
-
-int glb_write(const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
-{
-	size_t room = strlen(path) + 8;
-	char *temporary = malloc(room);
-	mode_t mask;
-	int fd, done;
-	FILE *file;
-
-	if (temporary == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "out of memory while '%s' was written", path);
-	snprintf(temporary, room, "%s.XXXXXX", path);
-	fd = mkstemp(temporary);
-	file = fd < 0 ? NULL : fdopen(fd, "wb");
-	if (file == NULL) {
-		psr_fail(err, PSR_ERR_IO, "'%s' cannot be written: %s", path, strerror(errno));
-		if (fd >= 0) {
-			close(fd);
-			unlink(temporary);
-		}
-		free(temporary);
-		return PSR_ERR_IO;
-	}
-	umask(mask = umask(0));
-	done = fwrite(bytes, 1, n_bytes, file) == n_bytes && fflush(file) == 0 && fsync(fd) == 0 &&
-	       fchmod(fd, 0666 & ~mask) == 0;
-	done = fclose(file) == 0 && done;
-	done = done && rename(temporary, path) == 0;
-	if (!done) {
-		psr_fail(err, PSR_ERR_IO, "'%s' cannot be written: %s", path, strerror(errno));
-		unlink(temporary);
-	}
-	free(temporary);
-	return done ? PSR_OK : PSR_ERR_IO;
 }

@@ -13,7 +13,4 @@
  * a shape without triangles. */
 int glb_encode(uint8_t **bytes, size_t *n_bytes, const struct shape *shape, const char *name, struct psr_error *err);
 
-/* Writes a temporary file beside `path` and renames it: `path` is either the old file or the whole new one. IO. */
-int glb_write(const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
-
 #endif

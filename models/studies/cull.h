@@ -7,7 +7,7 @@
 #include "ray/ray.h"
 #include "render/screen.h"
 #include "psr/model.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 #define CULL_NO_MASK (-1)
 #define CULL_FINEST 3 /* level of the triangles of directions: 512 of them */

@@ -7,7 +7,7 @@
 #include "cull.h"
 #include "cull_part.h"
 #include "cull_set.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "psr/scene.h"
 
 #define ROUNDS 3
@@ -48,7 +48,7 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .color = { 0.8, 0.8, 0.8 } };
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
 		                       .ambient = { 0.2, 0.2, 0.2 } };
-	struct psr_settings settings;
+	struct render_settings settings;
 	double started;
 	int rc;
 
@@ -57,9 +57,9 @@ static int time_draw(struct measure *m, const struct cull_eye *eye, const struct
 	v3d_add(scene.camera.target, eye->place, eye->frame[2]);
 	v3d_scale(scene.camera.up, eye->frame[1], -1);
 	v3d_sub(light.direction, eye->frame[2], eye->frame[0]);
-	psr_settings_default(&settings, m->frame.width, m->frame.height);
+	render_settings_default(&settings, m->frame.width, m->frame.height);
 	started = cpu_seconds();
-	rc = psr_render(m->renderer, &scene, &settings, NULL, &m->frame, m->err);
+	rc = renderer_draw(m->renderer, &scene, &settings, NULL, &m->frame, m->err);
 	*seconds = fmin(*seconds, cpu_seconds() - started);
 	return rc;
 }
@@ -174,7 +174,7 @@ static int measure_init(struct measure *m, int has_truth)
 	         || (has_truth && m->n_seen == NULL) || m->frame.rgb == NULL;
 	for (int i = 0; i < m->n_choices && !failed; i++)
 		failed = (m->is_kept[i] = psr_alloc_array(m->set->n_blocks, 1)) == NULL;
-	return failed || psr_renderer_create(&m->renderer) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
+	return failed || psr_renderer_create(&m->renderer, NULL) != PSR_OK ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 static void measure_fini(struct measure *m)

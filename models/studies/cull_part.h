@@ -2,6 +2,7 @@
 #ifndef PSR_MODELS_STUDIES_CULL_PART_H
 #define PSR_MODELS_STUDIES_CULL_PART_H
 
+#include "model/blocks.h"
 #include "psr/model.h"
 
 /* The blocks of level 0 for which is_kept[b] is not 0 (all of them if is_kept is NULL), in their order, without cones

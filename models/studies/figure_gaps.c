@@ -164,7 +164,7 @@ static int draw_open(struct figure_frame *frame, struct figures *figures, const 
 	if (rc == PSR_OK && (cover.closed == NULL || cover.greatest == NULL))
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for weights");
 	if (rc == PSR_OK)
-		rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &report,
+		rc = renderer_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &report,
 		              figures->err);
 	if (rc == PSR_OK) {
 		find_weights(&cover, stack, shot);

@@ -72,7 +72,7 @@ void figure_shot_init(struct figure_shot *shot, const struct figure_model *model
 	double unit[3], forward[3];
 
 	memset(shot, 0, sizeof *shot);
-	psr_settings_default(&shot->settings, width, height);
+	render_settings_default(&shot->settings, width, height);
 	shot->instance = (struct psr_instance){ .model = model->model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	shot->scene.instance = &shot->instance;
 	shot->scene.n_instances = 1;
@@ -116,7 +116,7 @@ static int draw(struct figure_frame *frame, struct figures *figures, const struc
 	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth,
 		                    .weight = frame->weight };
 	struct psr_zstack *stack;
-	int rc = psr_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &to.report,
+	int rc = renderer_warp(figures->renderer, &shot->scene, &shot->settings, figures->study.pool, &stack, &to.report,
 	                  figures->err);
 
 	for (int k = 1; rc == PSR_OK && !has_gaps && k <= PSR_MAX_DEPTH_LEVEL; k++) {
@@ -126,7 +126,7 @@ static int draw(struct figure_frame *frame, struct figures *figures, const struc
 			stack->level[k].z[i] = INFINITY;
 	}
 	if (rc == PSR_OK)
-		rc = psr_finish(figures->renderer, stack, figures->study.pool, &to, figures->err);
+		rc = renderer_finish(figures->renderer, stack, figures->study.pool, &to, figures->err);
 	frame->report = to.report;
 	return rc;
 }

@@ -72,7 +72,7 @@ double figure_psnr(uint64_t square, uint64_t n_pixels)
 
 void figure_score_print_head(const char *first)
 {
-	printf("%-34s %8s %9s %8s %9s %9s  %8s %7s %11s\n", first, "holes", "a million", "outside", "a million", "missing",
+	printf("%-32s %6s %8s %7s %8s %8s %7s %6s %10s\n", first, "holes", "/million", "outside", "/million", "missing",
 	       "PSNR dB", "inside", "difference");
 }
 
@@ -83,7 +83,7 @@ static double million(uint64_t n, uint64_t all)
 
 void figure_score_print(const char *label, const struct figure_score *s)
 {
-	printf("%-34s %8" PRIu64 " %9.1f %8" PRIu64 " %9.1f %9.1f  %8.2f %7.2f %11.2f\n", label, s->n_holes,
+	printf("%-32s %6" PRIu64 " %8.1f %7" PRIu64 " %8.1f %8.1f %7.2f %6.2f %10.2f\n", label, s->n_holes,
 	       million(s->n_holes, s->n_inside), s->n_outside, million(s->n_outside, s->n_met),
 	       million(s->n_missing, s->n_half), figure_psnr(s->square, s->n_met),
 	       figure_psnr(s->inside_square, s->n_inside),

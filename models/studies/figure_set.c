@@ -115,13 +115,14 @@ static int draw_smooth(struct figure_frame *frame, struct figures *figures, cons
 static int draw_refined(struct figure_frame *frame, struct figures *figures, const struct figure_shot *shot)
 {
 	struct psr_frame to = { .width = frame->width, .height = frame->height, .rgb = frame->rgb, .depth = frame->depth };
-	struct psr_refiner *refiner = NULL;
-	int rc;
+	struct render_settings settings = shot->settings;
+	struct refiner *refiner = NULL;
+	int rc = refiner_create(&refiner, figures->renderer, figures->err);
 
-	if (psr_refiner_create(&refiner, figures->renderer) != PSR_OK)
-		return psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for passes");
-	rc = psr_refine(refiner, &shot->scene, &shot->settings, PASS, figures->study.pool, NULL, NULL, &to, figures->err);
-	psr_refiner_destroy(refiner);
+	settings.pass = PASS;
+	if (rc == PSR_OK)
+		rc = refiner_draw(refiner, &shot->scene, &settings, figures->study.pool, &to, figures->err);
+	refiner_destroy(refiner);
 	return rc;
 }
 

@@ -19,7 +19,7 @@ static double now_ms(void)
 
 struct still {
 	struct figures *figures;
-	struct psr_refiner *refiner;
+	struct refiner *refiner;
 	struct figure_frame frame;
 	struct figure_truth truth;
 	struct figure_shot shot;
@@ -32,17 +32,18 @@ static int show_pass(struct still *still, unsigned pass, int is_smooth)
 	double least = INFINITY;
 
 	still->shot.settings.is_smooth = is_smooth;
+	still->shot.settings.pass = pass;
 	for (int trial = 0; trial < TRIALS; trial++) {
 		const double start = now_ms();
-		const int rc = psr_refine(still->refiner, &still->shot.scene, &still->shot.settings, pass, still->figures->study.pool,
-		                          NULL, NULL, &to, still->figures->err);
+		const int rc = refiner_draw(still->refiner, &still->shot.scene, &still->shot.settings,
+		                            still->figures->study.pool, &to, still->figures->err);
 
 		if (rc != PSR_OK)
 			return rc;
 		least = fmin(least, now_ms() - start);
 	}
 	figure_score_colors(&score, &still->frame, &still->truth);
-	printf(" %6.2f %6.1f", figure_psnr(score.square, score.n_met), least);
+	printf(" %5.2f %6.1f", figure_psnr(score.square, score.n_met), least);
 	return PSR_OK;
 }
 
@@ -50,7 +51,7 @@ static int show_row(struct still *still, const char *name, uint32_t resolution)
 {
 	int rc;
 
-	printf("%-10s %10u %5.2f |", name, resolution, (double)SIDE / resolution);
+	printf("%-6s %5u %5.2f |", name, resolution, (double)SIDE / resolution);
 	rc = show_pass(still, 0, 0);
 	if (rc == PSR_OK)
 		rc = show_pass(still, 0, 1);
@@ -89,19 +90,19 @@ int figure_run_stills(struct figures *figures)
 	struct still still = { .figures = figures };
 	int rc = figure_frame_init(&still.frame, SIDE, SIDE, figures->err);
 
-	if (rc == PSR_OK && psr_refiner_create(&still.refiner, figures->renderer) != PSR_OK)
+	if (rc == PSR_OK && refiner_create(&still.refiner, figures->renderer, NULL) != PSR_OK)
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for passes");
-	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-10s %10s %5s |", RAYS * RAYS,
-	       SIDE, SIDE, figures->study.n_threads, "", "model's", "pixels");
+	printf("dB over all covered pixels, to %d rays a pixel, and ms; %dx%d, %d threads\n%-6s %5s %5s |", RAYS * RAYS,
+	       SIDE, SIDE, figures->study.n_threads, "", "model", "px");
 	for (int i = 0; i < 2 + PSR_MAX_PASS; i++)
-		printf(" %6s %6s", "dB", "ms");
-	printf("\n%-10s %10s %5s | %13s %13s", "", "resolution", "apart", "one pass", "smooth");
+		printf(" %5s %6s", "dB", "ms");
+	printf("\n%-6s %5s %5s | %12s %12s", "", "res.", "apart", "one pass", "smooth");
 	for (int pass = 1; pass <= PSR_MAX_PASS; pass++)
-		printf("     pass %d    ", pass);
+		printf("%12s%d", "pass ", pass);
 	puts("");
 	for (size_t m = 0; rc == PSR_OK && m < sizeof name / sizeof *name; m++)
 		rc = show_object(&still, name[m]);
-	psr_refiner_destroy(still.refiner);
+	refiner_destroy(still.refiner);
 	figure_truth_fini(&still.truth);
 	figure_frame_fini(&still.frame);
 	return rc;

@@ -4,7 +4,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "measure/view.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 #define RUN 64   /* rays traced together */
 #define LIFT 1e-5 /* inner units from the surface, where shadow rays begin */

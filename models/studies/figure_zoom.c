@@ -180,10 +180,10 @@ static void print_row(const struct study_table *table, int i)
 {
 	const double *row = study_at(table, i, 0, 0);
 
-	printf("%-6d %8.4f %8.2f %8.2f", i, row[MAGNIFICATION], row[SAMPLES], row[TRUTH]);
+	printf("%-5d %7.4f %7.2f %7.2f", i, row[MAGNIFICATION], row[SAMPLES], row[TRUTH]);
 	for (const double *way = row + PLAIN; way < row + N_COLUMNS; way += SMOOTH)
-		printf(" | %8.2f %8.2f %8.2f %8.2f", way[PSNR], way[INSIDE], way[CHANGE], way[BEYOND]);
-	printf("%s\n", changes_level(table, i) ? " levels change" : "");
+		printf(" | %7.2f %7.2f %7.2f %7.2f", way[PSNR], way[INSIDE], way[CHANGE], way[BEYOND]);
+	printf("%s\n", changes_level(table, i) ? " *" : "");
 }
 
 static void print_means(const struct study_table *table)
@@ -200,17 +200,17 @@ static void print_means(const struct study_table *table)
 		for (int way = 0; way < 2; way++)
 			sum[kind_of][1 + way] += *study_at(table, i, 0, PLAIN + way * SMOOTH + BEYOND);
 	}
-	printf("\nmean, codes                  truth's change   beyond it   smooth\n");
+	printf("*: levels change\n\nmean, codes                  truth's change   beyond it   smooth\n");
 	for (int k = 0; k < 3; k++)
 		printf("%3d steps %-18s %14.2f %11.2f %8.2f\n", n[k], step[k], sum[k][0] / n[k], sum[k][1] / n[k], sum[k][2] / n[k]);
 }
 
 static void print(const struct study_table *table, const int order[FRAMES])
 {
-	printf("%-6s %8s %8s %8s | plain: %28s | smooth\n%-6s %8s %8s %8s", "", "", "samples", "truth's", "", "frame", "magn.",
+	printf("%-5s %7s %7s %7s | plain: %24s | smooth\n%-5s %7s %7s %7s", "", "", "samples", "truth's", "", "frame", "magn.",
 	       "a pixel", "change");
 	for (int way = 0; way < 2; way++)
-		printf(" | %8s %8s %8s %8s", "PSNR dB", "inside", "change", "beyond");
+		printf(" | %7s %7s %7s %7s", "PSNR dB", "inside", "change", "beyond");
 	printf("\n");
 	for (int k = 0; k < WORST; k++)
 		print_row(table, order[k]);

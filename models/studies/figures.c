@@ -3,7 +3,7 @@
 #include <string.h>
 #include "models/commands.h"
 #include "psr/build.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define PROGRAM "psr-model figures"
 
@@ -40,11 +40,11 @@ static const struct figure_kind *find_kind(const char *name, struct psr_error *e
 
 static int run_figure(struct figures *figures, const struct figure_kind *kind)
 {
-	int rc = psr_pool_create(&figures->study.pool, figures->study.n_threads, 0);
+	int rc = psr_pool_create(&figures->study.pool, figures->study.n_threads, NULL);
 
 	if (rc != PSR_OK)
 		return psr_fail(figures->err, rc, "%d threads cannot be started", figures->study.n_threads);
-	if (psr_renderer_create(&figures->renderer) != PSR_OK)
+	if (psr_renderer_create(&figures->renderer, NULL) != PSR_OK)
 		rc = psr_fail(figures->err, PSR_ERR_MEMORY, "no memory for a renderer");
 	if (rc == PSR_OK) {
 		printf("%s ([G] %s)\n\n", kind->what, kind->figure);

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 #include "psr/error.h"
-#include "psr/measure.h"
-#include "psr/render.h"
+#include "measure/measure.h"
+#include "render/stages.h"
 #include "surface/surface.h"
 #include "models/shapes/shape.h"
 #include "study.h"
@@ -35,7 +35,7 @@ void figure_model_fini(struct figure_model *model);
 /* What is drawn. The scene points into it: it must not move. */
 struct figure_shot {
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_instance instance;
 	struct psr_light light[4];
 };

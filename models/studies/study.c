@@ -8,7 +8,7 @@
 #include "models/shapes/generators.h"
 #include "models/json.h"
 #include "psr/build.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 
 #define PROGRAM "psr-model study"
 #define MOST_MODELS 64
@@ -180,7 +180,7 @@ static void print_text(const struct study *study)
 
 static int run_study(struct study *study, const char *models, const char *plot, int json)
 {
-	int rc = psr_pool_create(&study->pool, study->n_threads, 0);
+	int rc = psr_pool_create(&study->pool, study->n_threads, NULL);
 
 	if (rc != PSR_OK)
 		return psr_fail(study->err, rc, "%d threads cannot be started", study->n_threads);

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include "psr/error.h"
 #include "psr/mesh.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "models/studies/greedy/greedy.h"
 #include "models/studies/greedy/warp.h"
 #include "ray/ray.h"

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "models/shapes/generators.h"
 #include "models/shapes/glb.h"
 #include "psr/build.h"
@@ -24,7 +25,7 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 		code = psr_fail(err, PSR_ERR_IO, "%s: no folder can be made there for %s.glb; set TMPDIR to one", place, name);
 	else if (code == PSR_OK) {
 		snprintf(path, sizeof path, "%s/%s.glb", place, name);
-		code = glb_write(path, bytes, n_bytes, err);
+		code = outfile_save(path, OUTFILE_DURABLE, bytes, n_bytes, err);
 		if (code == PSR_OK)
 			code = psr_mesh_import(mesh, path, NULL, err);
 		unlink(path);
@@ -50,9 +51,9 @@ static int generate(struct psr_mesh **mesh, const char *name, void (*make)(struc
 static int prepare(struct study_model *model, int code, struct psr_error *err)
 {
 	if (code == PSR_OK)
-		code = door_check_mesh(model->mesh, err);
+		code = validate_mesh(model->mesh, err);
 	if (code == PSR_OK)
-		code = door_bound_mesh(model->mesh, model->origin, &model->scale, err);
+		code = validate_bound_mesh(model->mesh, model->origin, &model->scale, err);
 	if (code == PSR_OK)
 		code = ray_scene_create(&model->scene, model->mesh, model->origin, model->scale, err);
 	if (code == PSR_OK)

@@ -68,28 +68,32 @@ static void format(char text[32], double value, int decimals)
 		snprintf(text, 32, "%.*f", decimals, value);
 }
 
+#define PAGE_COLUMNS 100
+
 void study_table_print(const struct study_table *table, FILE *to)
 {
-	size_t first = strlen(table->first), width[STUDY_MOST_COLUMNS];
+	size_t first = strlen(table->first), width[STUDY_MOST_COLUMNS], all;
 	char text[32];
 
 	for (int row = 0; row < table->n_rows; row++)
 		first = strlen(table->label[row]) > first ? strlen(table->label[row]) : first;
-	fprintf(to, "%-*s", (int)first, table->first);
+	all = first;
 	for (int c = 0; c < table->n_columns; c++) {
 		width[c] = strlen(table->column[c].name);
 		for (int row = 0; row < table->n_rows; row++) {
 			format(text, study_mean(table, row, c), table->column[c].decimals);
 			width[c] = strlen(text) > width[c] ? strlen(text) : width[c];
 		}
-		fprintf(to, "  %*s", (int)width[c], table->column[c].name);
+		all += 2 + width[c];
 	}
-	fputc('\n', to);
-	for (int row = 0; row < table->n_rows; row++) {
-		fprintf(to, "%-*s", (int)first, table->label[row]);
+	const int gap = all > PAGE_COLUMNS && all - (size_t)table->n_columns <= PAGE_COLUMNS ? 1 : 2;
+
+	for (int row = -1; row < table->n_rows; row++) {
+		fprintf(to, "%-*s", (int)first, row < 0 ? table->first : table->label[row]);
 		for (int c = 0; c < table->n_columns; c++) {
-			format(text, study_mean(table, row, c), table->column[c].decimals);
-			fprintf(to, "  %*s", (int)width[c], text);
+			if (row >= 0)
+				format(text, study_mean(table, row, c), table->column[c].decimals);
+			fprintf(to, "%*s", gap + (int)width[c], row < 0 ? table->column[c].name : text);
 		}
 		fputc('\n', to);
 	}

@@ -6,9 +6,9 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "base/random.h"
-#include "surface/area.h"
+#include "ray/area.h"
 #include "models/studies/greedy/parts.h"
 
 #define PI 3.14159265358979323846

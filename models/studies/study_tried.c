@@ -1,8 +1,6 @@
 #include <string.h>
 #include <time.h>
-#include "base/maths.h"
 #include "psr/build.h"
-#include "sample/mend/adequacy.h"
 #include "sample/levels/draft.h"
 #include "sample/level.h"
 #include "study.h"
@@ -102,17 +100,17 @@ static double now(void)
 
 /* What is kept of a level, as the others are measured. */
 static int measure_level(struct study *study, int row, int model, const struct level *level,
-                         const struct psr_projection *projection, double seconds)
+                         double seconds)
 {
-	struct draft draft = { .projection = projection, .ds = level->ds };
+	struct draft draft = { .projection = level->sampling.projection, .ds = level->sampling.ds };
 	struct greedy *greedy = NULL;
 	struct greedy_result result;
-	int rc = draft_add(&draft, level);
+	int rc = draft_add(&draft, level->sheets, &level->kept);
 
 	if (rc != PSR_OK)
 		psr_fail(study->err, rc, "no memory for a level");
 	else
-		rc = greedy_take_draft(&greedy, &draft, level->n_projections, study->resolution, &result, study->err);
+		rc = greedy_take_draft(&greedy, &draft, N_PROJECTIONS, study->resolution, &result, study->err);
 	draft_fini(&draft);
 	if (rc == PSR_OK)
 		rc = study_put(study, row, model, greedy, &result, seconds);
@@ -124,36 +122,33 @@ static int measure_level(struct study *study, int row, int model, const struct l
 static int run_steps(struct study *study, int model, const struct surface *surface, int first, int last)
 {
 	const struct study_model *m = &study->model[model];
-	struct level level = { .mesh = m->mesh, .scene = m->scene, .surface = surface, .pool = study->pool,
-		                   .ds = 2.0 / study->resolution, .n_projections = N_PROJECTIONS };
-	struct psr_projection projection[N_PROJECTIONS];
+	struct level level = { .sampling = { .mesh = m->mesh, .scene = m->scene, .surface = surface, .pool = study->pool,
+		                                 .ds = 2.0 / study->resolution } };
 	struct psr_build_options defaults;
 	struct adequacy adequacy;
-	double seconds = 0, sine, cosine;
+	double seconds = 0;
 	int rc = PSR_OK;
 
 	psr_build_options_default(&defaults);
-	psr_sincos(defaults.tolerance, &sine, &cosine);
-	level.cosine = (float)cosine;
-	projection_list(projection, level.ds, defaults.tolerance);
+	projection_list(level.sampling.projection, level.sampling.ds, defaults.tolerance);
 	for (int row = first; rc == PSR_OK && row <= last; row++) {
 		double started = now();
 
 		if (row == first)
-			rc = level_own(&level, projection);
+			rc = level_own(&level, NULL);
 		if (rc == PSR_OK && row == MERGED)
-			merge_patches(&level);
+			level_merge(&level);
 		if (rc == PSR_OK && (row == OWNED || row == MERGED))
-			rc = keep_owned(&level);
+			rc = level_keep(&level);
 		else if (rc == PSR_OK && row == DICED)
-			rc = dice_surface(&level, 0);
+			rc = level_mend(&level);
 		else if (rc == PSR_OK)
-			rc = adequacy_reach(&adequacy, &level);
+			rc = level_reach(&adequacy, &level);
 		seconds += now() - started;
 		if (rc != PSR_OK)
 			psr_fail(study->err, rc, "no memory for a level");
 		else
-			rc = measure_level(study, row, model, &level, projection, seconds);
+			rc = measure_level(study, row, model, &level, seconds);
 	}
 	level_fini(&level);
 	return rc;

@@ -34,8 +34,18 @@ struct plane {
 struct strip {
 	struct outq_chunk *chunk;
 	uint64_t data_bytes;
-	double depth_min, depth_max; /* min > max if there are none */
+	double depth_min, depth_max; /* min > max: no finite depth */
 	int code;
+};
+
+/* The rows of a plane that a strip codes, and how. */
+struct rows {
+	const struct plane *plane;
+	uint32_t y, n, width;
+	const uint8_t *pixels;
+	unsigned codec;
+	const uint8_t *data; /* coded, in the encoder's scratch or the pixels themselves */
+	size_t bytes;
 };
 
 struct job {
@@ -44,7 +54,7 @@ struct job {
 	uint16_t view;
 	uint32_t width, height;
 	const uint8_t *background;
-	struct plane plane[PSR_WIRE_PLANES];
+	struct plane plane[PSR_N_PLANES];
 	int n_planes;
 	struct strip *strip;
 	uint64_t *hash;
@@ -130,9 +140,9 @@ static int reserve(struct encoder *e, size_t n)
 
 static int is_background(const struct plane *plane, const uint8_t *pixels, size_t n, const uint8_t background[3])
 {
-	const uint8_t *empty = plane->number == PSR_WIRE_PLANE_COLOR ? background : psr_plane_background(plane->number);
+	const uint8_t *empty = plane->number == PSR_PLANE_COLOR ? background : psr_plane_background(plane->number);
 
-	/* One pixel is compared, then each with the one before it. */
+	/* The strip is background if its first pixel is, and each equals the one before. */
 	return memcmp(pixels, empty, plane->pixel_bytes) == 0
 	       && memcmp(pixels, pixels + plane->pixel_bytes, (n - 1) * plane->pixel_bytes) == 0;
 }
@@ -152,10 +162,10 @@ static void find_depth_range(struct strip *strip, const uint8_t *pixels, size_t 
 	strip->depth_max = (double)most;
 }
 
-/* RECTs of one coded strip, in one chunk. */
-static int put_rects(struct strip *strip, const struct job *job, const struct plane *plane, unsigned codec, uint32_t y,
-                     uint32_t rows, const uint8_t *data, size_t total)
+/* The RECTs of a coded strip, in one chunk. */
+static int put_rects(struct strip *strip, const struct job *job, const struct rows *rows)
 {
+	const size_t total = rows->bytes;
 	size_t n_pieces = (total + PSR_WIRE_MAX_RECT_DATA - 1) / PSR_WIRE_MAX_RECT_DATA;
 	struct outq_chunk *chunk = outq_chunk_create(total + n_pieces * RECT_HEAD);
 	struct psr_buf buf;
@@ -166,9 +176,9 @@ static int put_rects(struct strip *strip, const struct job *job, const struct pl
 	for (size_t offset = 0; offset < total; offset += PSR_WIRE_MAX_RECT_DATA) {
 		size_t bytes = total - offset < PSR_WIRE_MAX_RECT_DATA ? total - offset : PSR_WIRE_MAX_RECT_DATA;
 		const struct psr_msg_rect rect = {
-			.plane = (uint8_t)plane->number, .codec = (uint8_t)codec, .scale = 1,
-			.y = (uint16_t)y, .w = (uint16_t)job->width, .h = (uint16_t)rows,
-			.total = (uint32_t)total, .offset = (uint32_t)offset, .bytes = (uint32_t)bytes, .data = data + offset,
+			.plane = (uint8_t)rows->plane->number, .codec = (uint8_t)rows->codec, .scale = 1,
+			.y = (uint16_t)rows->y, .w = (uint16_t)rows->width, .h = (uint16_t)rows->n, .total = (uint32_t)total,
+			.offset = (uint32_t)offset, .bytes = (uint32_t)bytes, .data = rows->data + offset,
 		};
 		int code = psr_msg_rect_encode(&buf, job->id, job->view, &rect, NULL);
 
@@ -183,71 +193,71 @@ static int put_rects(struct strip *strip, const struct job *job, const struct pl
 	return PSR_OK;
 }
 
-static int encode_jpeg(struct encoder *e, const struct job *job, const struct plane *plane, const uint8_t *pixels,
-                       uint32_t rows, const uint8_t **data, size_t *n)
+static int encode_jpeg(struct encoder *e, struct rows *rows)
 {
-	int chroma = plane->quality >= CODEC_CHROMA_QUALITY ? TJSAMP_444 : TJSAMP_420;
-	unsigned long size = tjBufSize((int)job->width, (int)rows, chroma);
+	const int quality = (int)rows->plane->quality, chroma = quality >= CODEC_CHROMA_QUALITY ? TJSAMP_444 : TJSAMP_420;
+	unsigned long size = tjBufSize((int)rows->width, (int)rows->n, chroma);
 	unsigned char *at;
 
 	if (reserve(e, size) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	at = e->scratch;
-	if (tjCompress2(e->jpeg, pixels, (int)job->width, 0, (int)rows, TJPF_RGB, &at, &size, chroma, (int)plane->quality,
+	if (tjCompress2(e->jpeg, rows->pixels, (int)rows->width, 0, (int)rows->n, TJPF_RGB, &at, &size, chroma, quality,
 	                TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
 		return PSR_ERR_INTERNAL;
-	*data = e->scratch;
-	*n = size;
+	rows->data = e->scratch;
+	rows->bytes = size;
 	return PSR_OK;
 }
 
-static int encode_zstd(struct encoder *e, const struct job *job, const struct plane *plane, const uint8_t *pixels,
-                       uint32_t rows, const uint8_t **data, size_t *n)
+static int encode_zstd(struct encoder *e, struct rows *rows)
 {
-	size_t raw = (size_t)job->width * rows * plane->pixel_bytes, bound = ZSTD_compressBound(raw);
-	unsigned component = psr_plane_component_bytes(plane->number, PSR_WIRE_DEPTH_F32);
+	const unsigned pixel = rows->plane->pixel_bytes;
+	const unsigned component = psr_plane_component_bytes(rows->plane->number, PSR_WIRE_DEPTH_F32);
+	const size_t raw = (size_t)rows->width * rows->n * pixel, bound = ZSTD_compressBound(raw);
 
 	if (reserve(e, raw + bound) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	psr_filter_rows(e->scratch, pixels, job->width, rows, plane->pixel_bytes / component, component);
-	*n = ZSTD_compressCCtx(e->zstd, e->scratch + raw, bound, e->scratch, raw, ZSTD_LEVEL);
-	*data = e->scratch + raw;
-	return ZSTD_isError(*n) ? PSR_ERR_INTERNAL : PSR_OK;
+	psr_filter_rows(e->scratch, rows->pixels, rows->width, rows->n, pixel / component, component);
+	rows->bytes = ZSTD_compressCCtx(e->zstd, e->scratch + raw, bound, e->scratch, raw, ZSTD_LEVEL);
+	rows->data = e->scratch + raw;
+	return ZSTD_isError(rows->bytes) ? PSR_ERR_INTERNAL : PSR_OK;
 }
 
 static int encode_strip(struct strip *strip, const struct job *job, const struct plane *plane, int number)
 {
-	uint32_t y = (uint32_t)number * CODEC_STRIP_ROWS;
-	uint32_t rows = job->height - y < CODEC_STRIP_ROWS ? job->height - y : CODEC_STRIP_ROWS;
-	size_t n_pixels = (size_t)job->width * rows, raw = n_pixels * plane->pixel_bytes, n = raw;
-	const uint8_t *pixels = plane->pixels + (size_t)y * job->width * plane->pixel_bytes, *data = pixels;
-	unsigned codec = plane->codec;
+	const uint32_t y = (uint32_t)number * CODEC_STRIP_ROWS;
+	struct rows rows = {
+		.plane = plane, .y = y, .n = job->height - y < CODEC_STRIP_ROWS ? job->height - y : CODEC_STRIP_ROWS,
+		.width = job->width, .pixels = plane->pixels + (size_t)y * job->width * plane->pixel_bytes, .codec = plane->codec,
+	};
+	const size_t n_pixels = (size_t)rows.width * rows.n, raw = n_pixels * plane->pixel_bytes;
 	struct encoder *e;
 	int code = PSR_OK;
 
-	if (plane->number == PSR_WIRE_PLANE_DEPTH)
-		find_depth_range(strip, pixels, n_pixels);
-	if (is_background(plane, pixels, n_pixels, job->background))
+	if (plane->number == PSR_PLANE_DEPTH)
+		find_depth_range(strip, rows.pixels, n_pixels);
+	if (is_background(plane, rows.pixels, n_pixels, job->background))
 		return PSR_OK;
 	e = take_encoder(job->codec);
 	if (e == NULL)
 		return PSR_ERR_MEMORY;
-	if (codec == PSR_CODEC_JPEG)
-		code = encode_jpeg(e, job, plane, pixels, rows, &data, &n);
-	else if (codec == PSR_CODEC_ZSTD)
-		code = encode_zstd(e, job, plane, pixels, rows, &data, &n);
-	if (code == PSR_OK && codec != PSR_CODEC_RAW && n >= raw) {
-		codec = PSR_CODEC_RAW;
-		data = pixels;
-		n = raw;
+	if (rows.codec == PSR_CODEC_JPEG)
+		code = encode_jpeg(e, &rows);
+	else if (rows.codec == PSR_CODEC_ZSTD)
+		code = encode_zstd(e, &rows);
+	if (rows.codec == PSR_CODEC_RAW || rows.bytes >= raw) {
+		rows.codec = PSR_CODEC_RAW;
+		rows.data = rows.pixels;
+		rows.bytes = raw;
 	}
 	if (code == PSR_OK)
-		code = put_rects(strip, job, plane, codec, y, rows, data, n);
+		code = put_rects(strip, job, &rows);
 	put_encoder(job->codec, e);
 	return code;
 }
 
-/* The hashes come first in the loop: each is one long piece of work. */
+/* Hashes come first: each is one long job, which should not start last. */
 static void run(int i, void *userdata)
 {
 	struct job *job = userdata;
@@ -276,22 +286,10 @@ static void add_plane(struct job *job, unsigned number, const void *pixels, unsi
 	job->n_planes++;
 }
 
-static const void *pixels_of(const struct psr_frame *frame, unsigned plane)
-{
-	const void *const pixels[PSR_WIRE_PLANES] = {
-		[PSR_WIRE_PLANE_COLOR] = frame->rgb, [PSR_WIRE_PLANE_DEPTH] = frame->depth,
-		[PSR_WIRE_PLANE_NORMAL] = frame->normal, [PSR_WIRE_PLANE_ID] = frame->id,
-		[PSR_WIRE_PLANE_WEIGHT] = frame->weight, [PSR_WIRE_PLANE_WORDS] = frame->words,
-		[PSR_WIRE_PLANE_BLOCK] = frame->block,
-	};
-
-	return pixels[plane];
-}
-
 static unsigned codec_of(const struct psr_msg_frame *request, unsigned plane)
 {
-	return plane == PSR_WIRE_PLANE_COLOR ? request->color_codec
-	       : plane == PSR_WIRE_PLANE_DEPTH ? request->depth_codec : request->data_codec;
+	return plane == PSR_PLANE_COLOR ? request->color_codec
+	       : plane == PSR_PLANE_DEPTH ? request->depth_codec : request->data_codec;
 }
 
 static int collect(struct codec_result *out, const struct job *job, int n_strips)
@@ -320,20 +318,20 @@ static int collect(struct codec_result *out, const struct job *job, int n_strips
 	return code;
 }
 
-int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool, uint32_t id, uint16_t view,
-                 const struct psr_msg_frame *request, const struct psr_frame *frame, const uint8_t background[3],
-                 struct psr_error *err)
+int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool,
+                 const struct codec_answer *answer, const struct psr_frame *frame, struct psr_error *err)
 {
+	const struct psr_msg_frame *request = answer->request;
 	struct job job = {
-		.codec = codec, .id = id, .view = view, .width = frame->width, .height = frame->height,
-		.background = background, .hash = out->hash,
+		.codec = codec, .id = answer->id, .view = answer->view, .width = frame->width, .height = frame->height,
+		.background = answer->background, .hash = out->hash,
 	};
 	int n_strips = 0, code;
 
 	memset(out, 0, sizeof *out);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (request->planes >> plane & 1)
-			add_plane(&job, plane, pixels_of(frame, plane), codec_of(request, plane), request->color_quality);
+			add_plane(&job, plane, psr_frame_plane(frame, plane), codec_of(request, plane), request->color_quality);
 	assert(job.n_planes > 0);
 	for (int i = 0; i < job.n_planes; i++)
 		n_strips += job.plane[i].n_strips;

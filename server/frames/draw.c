@@ -1,15 +1,14 @@
 #include <stdlib.h>
 #include <string.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
-#include "server/net/loop.h"
 #include "wire.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
 struct draw_worker {
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner; /* NULL until a pass above 0 is drawn */
 	uint8_t *pixels; /* of all planes */
 	uint64_t capacity;
 };
@@ -18,7 +17,7 @@ struct draw_worker *draw_worker_create(void)
 {
 	struct draw_worker *worker = calloc(1, sizeof *worker);
 
-	if (worker != NULL && psr_renderer_create(&worker->renderer) != PSR_OK) {
+	if (worker != NULL && psr_renderer_create(&worker->renderer, NULL) != PSR_OK) {
 		free(worker);
 		return NULL;
 	}
@@ -29,7 +28,6 @@ void draw_worker_destroy(struct draw_worker *worker)
 {
 	if (worker == NULL)
 		return;
-	psr_refiner_destroy(worker->refiner);
 	psr_renderer_destroy(worker->renderer);
 	psr_free(worker->pixels);
 	free(worker);
@@ -37,9 +35,7 @@ void draw_worker_destroy(struct draw_worker *worker)
 
 uint64_t draw_worker_bytes(const struct draw_worker *worker)
 {
-	const uint64_t refiner = worker->refiner != NULL ? psr_refiner_bytes(worker->refiner) : 0;
-
-	return psr_renderer_bytes(worker->renderer) + refiner + worker->capacity;
+	return psr_renderer_bytes(worker->renderer) + worker->capacity;
 }
 
 /* Resolved. */
@@ -55,8 +51,12 @@ static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, u
 	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
 }
 
+struct times { /* clock_ns() */
+	uint64_t start_ns, drawn_ns, end_ns;
+};
+
 static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, const struct psr_report *report,
-                        uint64_t encode_ns, uint64_t rect_bytes, uint64_t queue_ns, uint64_t total_ns)
+                        const struct times *times, uint64_t rect_bytes)
 {
 	static const unsigned stage_id[PSR_N_STAGES] = {
 		[PSR_STAGE_PLAN] = PSR_WIRE_REPORT_PLAN, [PSR_STAGE_CULL] = PSR_WIRE_REPORT_CULL,
@@ -68,9 +68,9 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	for (int i = 0; i < PSR_N_STAGES; i++)
 		if (stage_id[i])
 			add_entry(end, stage_id[i], report->ns[i], report->count[i]);
-	add_entry(end, PSR_WIRE_REPORT_ENCODE, encode_ns, rect_bytes);
-	add_entry(end, PSR_WIRE_REPORT_QUEUE, queue_ns, d->n_waiting);
-	add_entry(end, PSR_WIRE_REPORT_TOTAL, total_ns, (uint64_t)psr_pool_threads(d->pool));
+	add_entry(end, PSR_WIRE_REPORT_ENCODE, times->end_ns - times->drawn_ns, rect_bytes);
+	add_entry(end, PSR_WIRE_REPORT_QUEUE, times->start_ns - d->arrived_ns, d->n_waiting);
+	add_entry(end, PSR_WIRE_REPORT_TOTAL, times->end_ns - times->start_ns, (uint64_t)psr_pool_threads(d->pool));
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
@@ -165,7 +165,7 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	uint64_t n = (uint64_t)d->request.width * d->request.height, bytes = 0;
 	uint8_t *next;
 
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (wanted >> plane & 1)
 			bytes += n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	if (bytes > worker->capacity) {
@@ -180,13 +180,13 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	picture->width = d->request.width;
 	picture->height = d->request.height;
 	next = worker->pixels; /* those of the longest components first, so that each is aligned */
-	picture->words = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WORDS);
-	picture->depth = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_DEPTH);
-	picture->id = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_ID);
-	picture->normal = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_NORMAL);
-	picture->weight = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_WEIGHT);
-	picture->block = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_BLOCK);
-	picture->rgb = take_plane(&next, picture, wanted, PSR_WIRE_PLANE_COLOR);
+	picture->words = take_plane(&next, picture, wanted, PSR_PLANE_WORDS);
+	picture->depth = take_plane(&next, picture, wanted, PSR_PLANE_DEPTH);
+	picture->id = take_plane(&next, picture, wanted, PSR_PLANE_ID);
+	picture->normal = take_plane(&next, picture, wanted, PSR_PLANE_NORMAL);
+	picture->weight = take_plane(&next, picture, wanted, PSR_PLANE_WEIGHT);
+	picture->block = take_plane(&next, picture, wanted, PSR_PLANE_BLOCK);
+	picture->rgb = take_plane(&next, picture, wanted, PSR_PLANE_COLOR);
 	return PSR_OK;
 }
 
@@ -206,21 +206,21 @@ static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct
 	psr_settings_default(&settings, d->request.width, d->request.height);
 	settings.spacing = asked.spacing_px;
 	settings.is_smooth = asked.is_smooth;
-	if (d->pass == 0)
-		return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
-	if (worker->refiner == NULL && psr_refiner_create(&worker->refiner, worker->renderer) != PSR_OK)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
-	return psr_refine(worker->refiner, scene, &settings, d->pass, d->pool, is_abandoned, d, picture, err);
+	settings.pass = d->pass;
+	settings.is_cancelled = is_abandoned;
+	settings.userdata = d;
+	return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
 }
 
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
 {
 	struct psr_scene scene = d->scene->scene;
 	struct psr_frame picture = { 0 };
+	const struct codec_answer answer = { .id = d->id, .request = &d->request, .background = d->scene->background };
 	struct codec_result coded;
 	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
 		                             .planes = d->request.planes };
-	uint64_t start_us = loop_clock_us(), drawn_us, end_us;
+	struct times times = { .start_ns = clock_ns() };
 	int code;
 
 	wire_to_camera(&scene.camera, &d->request.camera);
@@ -231,15 +231,13 @@ int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *
 		return code;
 	if (atomic_load(&d->is_abandoned))
 		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
-	drawn_us = loop_clock_us();
-	code = codec_encode(&coded, d->codec, d->pool, d->id, 0, &d->request, &picture,
-	                    d->scene->background, err);
+	times.drawn_ns = clock_ns();
+	code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
 	if (code != PSR_OK)
 		return code;
-	end_us = loop_clock_us();
+	times.end_ns = clock_ns();
 	end.error_px = picture.report.error_bound;
 	memcpy(end.hash, coded.hash, sizeof end.hash);
-	fill_report(&end, d, &picture.report, (end_us - drawn_us) * 1000, coded.rect_bytes,
-	            (start_us - d->arrived_us) * 1000, (end_us - start_us) * 1000);
+	fill_report(&end, d, &picture.report, &times, coded.rect_bytes);
 	return join_answer(d, &coded, &end, err);
 }

@@ -8,9 +8,9 @@
 #include "codec.h"
 #include "server/net/outq.h"
 #include "psr/error.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "psr/proto.h"
-#include "server/session/session.h"
+#include "scene.h"
 
 struct draw_worker; /* buffers of one frame at a time, kept from frame to frame */
 
@@ -25,13 +25,13 @@ struct drawing {
 	struct psr_msg_frame request; /* checked */
 	unsigned pass, last_pass;
 	struct scene *scene;
-	uint64_t arrived_us;          /* loop_clock_us() when the request came, or the pass before was done */
-	uint64_t n_waiting;           /* frames that were waiting then */
-	atomic_int is_abandoned;      /* set from outside: nobody wants the answer any more */
+	uint64_t arrived_ns;          /* clock_ns() when the request came, or the pass before was done */
+	uint64_t n_waiting;           /* frames that waited then */
+	atomic_int is_abandoned;      /* set by the loop: nobody wants the answer any more */
 	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */
 };
 
-/* CANCELLED if it was abandoned on the way; what the renderer and the encoder say. */
+/* CANCELLED: it was abandoned on the way; errors of the renderer and the encoder. */
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);
 
 #endif

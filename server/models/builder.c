@@ -8,6 +8,7 @@
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "builder.h"
 #include "server/log.h"
 #include "spawn.h"
@@ -24,12 +25,8 @@ struct failure {
 struct build {
 	struct build *next;
 	struct builder *builder;
+	struct builder_job job; /* its strings are copies, the key's is this: */
 	char key[CATALOGUE_KEY];
-	uint32_t resolution;
-	char *program, *source, *target;
-	builder_on_progress *on_progress;
-	builder_on_done *on_done;
-	void *userdata;
 	pid_t pid;              /* 0: waits for its turn */
 	struct loop_source progress_source, error_source;
 	char progress_line[LINE], error_line[LINE], last_error[LINE];
@@ -58,37 +55,11 @@ int builder_create(struct builder **out, struct loop *loop, const struct builder
 	return PSR_OK;
 }
 
-int builder_find_program(char path[PATH_MAX], struct psr_error *err)
-{
-	const char *folder = getenv("PATH");
-	char own[PATH_MAX], *slash;
-	ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
-
-	if (n > 0) {
-		own[n] = '\0';
-		slash = strrchr(own, '/');
-		if (slash != NULL && snprintf(path, PATH_MAX, "%.*s/psr-model", (int)(slash - own), own) < PATH_MAX
-		    && access(path, X_OK) == 0)
-			return PSR_OK;
-	}
-	while (folder != NULL && *folder != '\0') {
-		size_t length = strcspn(folder, ":");
-
-		if (length > 0 && snprintf(path, PATH_MAX, "%.*s/psr-model", (int)length, folder) < PATH_MAX
-		    && access(path, X_OK) == 0)
-			return PSR_OK;
-		folder += length + (folder[length] == ':');
-	}
-	return psr_fail(err, PSR_ERR_NOT_FOUND,
-	                "psr-model, which builds models from sources, is neither beside psrd nor in "
-	                "PATH; install it there, or put a .psr file into the models folder");
-}
-
 static void destroy_build(struct build *build)
 {
-	free(build->program);
-	free(build->source);
-	free(build->target);
+	free((char *)build->job.program);
+	free((char *)build->job.source);
+	free((char *)build->job.target);
 	free(build);
 }
 
@@ -134,7 +105,7 @@ static void on_progress_text(struct build *build, const char *line)
 	if (next.stage < build->progress.stage || (next.stage == build->progress.stage && done < build->progress.done))
 		return;
 	build->progress = next;
-	build->on_progress(&build->progress, build->userdata);
+	build->job.on_progress(&build->progress, build->job.userdata);
 }
 
 static void on_error_text(struct build *build, const char *line)
@@ -147,7 +118,7 @@ static void on_error_text(struct build *build, const char *line)
 		memcpy(build->last_error, line, strlen(line) + 1);
 }
 
-/* Cuts what is there into lines; one that is too long loses its end. */
+/* Reads all lines that have come; a line of over LINE bytes loses its end. */
 static void read_lines(struct build *build, struct loop_source *source, char line[LINE], size_t *used,
                        void (*on_line)(struct build *, const char *))
 {
@@ -194,7 +165,7 @@ static void watch(struct build *build, struct loop_source *source, int fd, void 
 	}
 }
 
-/* A coarser model may be within the limits that a finer one exceeds; what is wrong with a source is wrong at each. */
+/* A limit may hold at a lower resolution; a defect of the source shows at every one. */
 static void remember(struct builder *builder, const struct build *build, const struct psr_error *error)
 {
 	struct failure **place = &builder->failure[builder->n_failures++ % MAX_FAILURES];
@@ -204,7 +175,7 @@ static void remember(struct builder *builder, const struct build *build, const s
 	if (*place == NULL)
 		return;
 	memcpy((*place)->key, build->key, CATALOGUE_KEY);
-	(*place)->resolution = error->code == PSR_ERR_LIMIT ? build->resolution : 0;
+	(*place)->resolution = error->code == PSR_ERR_LIMIT ? build->job.resolution : 0;
 	(*place)->error = *error;
 }
 
@@ -219,14 +190,11 @@ const struct psr_error *builder_failure(const struct builder *builder, const cha
 	return NULL;
 }
 
-/* A child that was killed leaves what it was writing, under the name that psr_model_write gives it. */
 static void remove_remains(const struct build *build)
 {
-	char path[PATH_MAX];
-
-	unlink(build->target);
-	if (build->pid != 0 && snprintf(path, sizeof path, "%s.%ld-0.tmp", build->target, (long)build->pid) < PATH_MAX)
-		unlink(path);
+	unlink(build->job.target);
+	if (build->pid != 0)
+		outfile_remove_remains(build->job.target, build->pid);
 }
 
 static void start_waiting(struct builder *builder);
@@ -243,12 +211,12 @@ static void finish(struct build *build, const struct psr_error *failure)
 	close_pipe(build, &build->progress_source);
 	close_pipe(build, &build->error_source);
 	if (failure != NULL) {
-		log_warn("build of %s failed: %s", build->source, failure->text);
+		log_warn("build of %s failed: %s", build->job.source, failure->text);
 		remove_remains(build);
 	} else {
-		log_info("build of %s done", build->source);
+		log_info("build of %s done", build->job.source);
 	}
-	build->on_done(failure, build->userdata);
+	build->job.on_done(failure, build->job.userdata);
 	destroy_build(build);
 	start_waiting(builder);
 }
@@ -258,7 +226,7 @@ static int run(struct build *build, struct psr_error *err)
 	struct builder *builder = build->builder;
 	char threads[16], resolution[16];
 	const char *argv[] = {
-		build->program, "build", build->source, "-o", build->target, "-r", resolution, "--progress-fd", "3",
+		build->job.program, "build", build->job.source, "-o", build->job.target, "-r", resolution, "--progress-fd", "3",
 		"--quiet", "--threads", threads, NULL,
 	};
 	const struct spawn_limits limits = {
@@ -267,16 +235,16 @@ static int run(struct build *build, struct psr_error *err)
 	int progress_fd, error_fd, code;
 
 	snprintf(threads, sizeof threads, "%d", builder->limits.threads);
-	snprintf(resolution, sizeof resolution, "%" PRIu32, build->resolution);
+	snprintf(resolution, sizeof resolution, "%" PRIu32, build->job.resolution);
 	code = spawn_start(&build->pid, &progress_fd, &error_fd, argv, &limits, err);
 	if (code != PSR_OK)
 		return code;
 	builder->n_running++;
-	log_info("build of %s started, at %" PRIu32, build->source, build->resolution);
+	log_info("build of %s started, at %" PRIu32, build->job.source, build->job.resolution);
 	watch(build, &build->progress_source, progress_fd, on_progress_ready);
 	watch(build, &build->error_source, error_fd, on_error_ready);
 	build->progress.stage = PSR_PROGRESS_IMPORT;
-	build->on_progress(&build->progress, build->userdata);
+	build->job.on_progress(&build->progress, build->job.userdata);
 	return PSR_OK;
 }
 
@@ -291,33 +259,29 @@ static void start_waiting(struct builder *builder)
 		next = build->next;
 		if (build->pid == 0 && run(build, &error) != PSR_OK) {
 			finish(build, &error);
-			return; /* it has gone on with the rest */
+			return; /* finish() went on with the rest */
 		}
 	}
 }
 
-int builder_start(struct builder *builder, const char *program, const char *key, uint32_t resolution,
-                  const char *source, const char *target, builder_on_progress *on_progress,
-                  builder_on_done *on_done, void *userdata)
+int builder_start(struct builder *builder, const struct builder_job *job)
 {
 	struct build *build = calloc(1, sizeof *build), **at = &builder->first;
 
 	if (build == NULL)
 		return PSR_ERR_MEMORY;
-	build->program = strdup(program);
-	build->source = strdup(source);
-	build->target = strdup(target);
-	if (build->program == NULL || build->source == NULL || build->target == NULL) {
+	build->builder = builder;
+	build->job = *job;
+	build->job.program = strdup(job->program);
+	build->job.source = strdup(job->source);
+	build->job.target = strdup(job->target);
+	memcpy(build->key, job->key, CATALOGUE_KEY);
+	build->job.key = build->key;
+	build->progress_source.fd = build->error_source.fd = -1;
+	if (build->job.program == NULL || build->job.source == NULL || build->job.target == NULL) {
 		destroy_build(build);
 		return PSR_ERR_MEMORY;
 	}
-	build->builder = builder;
-	memcpy(build->key, key, CATALOGUE_KEY);
-	build->resolution = resolution;
-	build->on_progress = on_progress;
-	build->on_done = on_done;
-	build->userdata = userdata;
-	build->progress_source.fd = build->error_source.fd = -1;
 	while (*at != NULL)
 		at = &(*at)->next;
 	*at = build;
@@ -328,7 +292,7 @@ int builder_start(struct builder *builder, const char *program, const char *key,
 /* Exit codes are those of psr_exit_status. */
 static int explain(struct psr_error *error, const struct build *build, const struct builder_limits *limits, int status)
 {
-	const char *name = strrchr(build->source, '/') != NULL ? strrchr(build->source, '/') + 1 : build->source;
+	const char *name = strrchr(build->job.source, '/') != NULL ? strrchr(build->job.source, '/') + 1 : build->job.source;
 
 	if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
 		return psr_fail(error, PSR_ERR_LIMIT, "%s: the build was stopped: it needed more than %llu s of processor time "
@@ -378,7 +342,7 @@ void builder_reap(struct builder *builder)
 				remember(builder, build, &failure);
 			finish(build, &failure);
 		}
-		build = builder->first; /* who was next may have ended too */
+		build = builder->first; /* the next one may have ended too */
 	}
 }
 

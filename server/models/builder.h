@@ -2,16 +2,14 @@
  *
  *   psr-model build SOURCE -o TARGET -r RESOLUTION --progress-fd 3 --quiet --threads N
  *
- * niced, with limits of address space and processor time, ended with the daemon. psr-model is the one beside psrd's
- * own executable, else the first in PATH. Lines "stage done total" on descriptor 3 become progress, the last line on
- * standard error becomes the text of a failure. Failures of the source (not of the system) are remembered by key,
- * those of a limit by key and resolution.
+ * niced, with limits of address space and processor time, ended with the daemon. Lines "stage done total" on
+ * descriptor 3 become progress, the last line on standard error becomes the text of a failure. It remembers failures
+ * of a source (not of the system) by key, those of a limit by key and resolution.
  *
  * All functions belong to the loop's thread. */
 #ifndef PSRD_BUILDER_H
 #define PSRD_BUILDER_H
 
-#include <limits.h>
 #include "catalogue.h"
 #include "server/net/loop.h"
 #include "psr/error.h"
@@ -23,21 +21,25 @@ struct builder_limits {
 
 struct builder;
 
-/* progress->stage never goes back, nor does `done` within a stage. */
+/* progress->stage never falls, nor does `done` within a stage. */
 typedef void builder_on_progress(const struct psr_msg_progress *progress, void *userdata);
 typedef void builder_on_done(const struct psr_error *failure, void *userdata); /* NULL: TARGET is there */
 
 int builder_create(struct builder **out, struct loop *loop, const struct builder_limits *limits);
 void builder_destroy(struct builder *builder); /* kills what runs, calls nobody; NULL is fine */
 
-/* Path of psr-model. NOT_FOUND with a sentence. */
-int builder_find_program(char path[PATH_MAX], struct psr_error *err);
+struct builder_job {
+	const char *program, *source, *target; /* paths: psr-model, the source, the model */
+	const char *key;                       /* of the source, CATALOGUE_KEY bytes */
+	uint32_t resolution;
+	builder_on_progress *on_progress;
+	builder_on_done *on_done;
+	void *userdata;
+};
 
-/* Starts a build, or queues it behind --max-builds others. on_done comes exactly once, possibly
- * before this returns PSR_OK. MEMORY: it does not come. */
-int builder_start(struct builder *builder, const char *program, const char *key, uint32_t resolution,
-                  const char *source, const char *target, builder_on_progress *on_progress,
-                  builder_on_done *on_done, void *userdata);
+/* Starts a build, or queues it behind --max-builds others; copies the strings. Calls on_done exactly once, possibly
+ * before it returns PSR_OK. MEMORY: never calls it. */
+int builder_start(struct builder *builder, const struct builder_job *job);
 
 void builder_reap(struct builder *builder); /* on SIGCHLD */
 

@@ -4,10 +4,10 @@
 
 #include "psr/error.h"
 
-/* Makes the folder, and those above it, where they are not there (mode 0700). IO, MEMORY. */
+/* Makes the folder and its parents if they are missing (mode 0700). IO, MEMORY. */
 int cache_make(const char *folder, struct psr_error *err);
 
-/* The same, and writes a file there, which it removes. IO: says why it cannot, and what to do. */
+/* The same; then writes a file there and removes it. IO: says why it cannot, and what to do. */
 int cache_check(const char *folder, struct psr_error *err);
 
 #endif

@@ -42,7 +42,7 @@ static int hash_file(XXH3_state_t *state, const char *path, struct psr_error *er
 	return code;
 }
 
-/* Files of the first three formats name no others, those of the rest seldom do. */
+/* Files of the first three formats never name other files, the rest seldom do. */
 static int is_alone(const char *source)
 {
 	static const char *const endings[] = { ".stl", ".off", ".las", ".glb", ".ply" };

@@ -62,7 +62,8 @@ void catalogue_fini(struct catalogue *catalogue)
 
 static int is_same_file(const struct catalogue_file *a, const struct catalogue_file *b)
 {
-	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && !a->reason == !b->reason && a->bytes == b->bytes
+	return strcmp(a->path, b->path) == 0 && a->is_source == b->is_source && !a->reason == !b->reason
+	       && a->bytes == b->bytes
 	       && a->device == b->device && a->inode == b->inode && a->modified_ns == b->modified_ns;
 }
 
@@ -110,7 +111,7 @@ struct catalogue_entry *catalogue_find(struct catalogue *catalogue, const char *
 	return bsearch(name, catalogue->entry, catalogue->n, sizeof *catalogue->entry, compare_name);
 }
 
-/* Drops what nobody uses, the longest unused first, until `bytes` more fit; whether they do. */
+/* Drops unused models, the least recently used first, until `bytes` more fit. 1: they fit. */
 static int make_room(struct catalogue *catalogue, uint64_t bytes)
 {
 	for (;;) {
@@ -163,29 +164,29 @@ struct catalogue_model *catalogue_model(const struct catalogue_entry *entry, uin
 	return model;
 }
 
-int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, struct catalogue_entry *entry,
-                  struct psr_model *model, const char *key, uint32_t resolution, uint64_t reserved)
+int catalogue_add(struct catalogue_model **out, struct catalogue *catalogue, const struct catalogue_loaded *loaded)
 {
+	struct catalogue_entry *entry = loaded->entry;
 	struct catalogue_model *added = calloc(1, sizeof *added), *old;
 
-	catalogue_release(catalogue, reserved);
+	catalogue_release(catalogue, loaded->reserved);
 	if (added == NULL) {
-		psr_model_unref(model);
+		psr_model_unref(loaded->model);
 		return PSR_ERR_MEMORY;
 	}
 	*added = (struct catalogue_model){
-		.model = model, .entry = entry, .bytes = psr_model_bytes(model), .last_use = ++catalogue->clock, .n_users = 1,
-		.resolution = resolution, .next = catalogue->models,
+		.model = loaded->model, .entry = entry, .bytes = psr_model_bytes(loaded->model),
+		.last_use = ++catalogue->clock, .n_users = 1, .resolution = loaded->resolution, .next = catalogue->models,
 	};
-	strncpy(added->key, key, sizeof added->key - 1);
+	strncpy(added->key, loaded->key, sizeof added->key - 1);
 	if (entry != NULL) {
-		old = catalogue_model(entry, resolution);
+		old = catalogue_model(entry, loaded->resolution);
 		if (old != NULL)
 			detach(catalogue, old);
 		added->of_entry = entry->model;
 		entry->model = added;
 		entry->has_failed = 0;
-		psr_model_content_id(model, entry->content_id);
+		psr_model_content_id(loaded->model, entry->content_id);
 	}
 	catalogue->models = added;
 	catalogue->bytes += added->bytes;

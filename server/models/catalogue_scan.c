@@ -21,7 +21,7 @@ static const char *const endings[] = {
 struct list {
 	struct catalogue_file *file;
 	size_t n, capacity;
-	size_t n_root; /* bytes of a path before what is relative to the models folder */
+	size_t n_root; /* length of the models folder's part of a path */
 };
 
 void catalogue_file_fini(struct catalogue_file *file)
@@ -50,7 +50,7 @@ int catalogue_is_source(const char *file_name)
 	return i > 0 && i < N_ENDINGS;
 }
 
-/* Names travel in LIST_ENTRY, so whatever it takes is a name. */
+/* A valid name is one that LIST_ENTRY can carry. */
 static int is_clean(const char *name)
 {
 	struct psr_msg_open msg = { 0, "" };
@@ -71,7 +71,7 @@ static void clear(struct list *list)
 	*list = (struct list){ .n_root = list->n_root };
 }
 
-/* Takes the file; MEMORY gives it up. */
+/* Takes the file, even on MEMORY. */
 static int add(struct list *list, struct catalogue_file *file)
 {
 	if (list->n == list->capacity) {
@@ -119,7 +119,7 @@ static int is_candidate(const char *file_name)
 	return find_ending(file_name) < N_ENDINGS || formats_advice(file_name, &stem) != NULL;
 }
 
-/* A regular file with such a name; 0 or MEMORY. Takes path. */
+/* Adds a regular file. 0 or MEMORY; takes path. */
 static int consider(struct list *list, const char *file_name, char *path, const struct stat *status, int is_nested)
 {
 	size_t ending = find_ending(file_name), stem = 0;
@@ -154,7 +154,7 @@ static int consider(struct list *list, const char *file_name, char *path, const 
 
 static int read_folder(struct list *list, const char *folder, int is_nested, struct psr_error *err);
 
-/* A subfolder that holds several models, of which first and other are two, as an entry of its own; 0 or MEMORY. */
+/* Adds a subfolder of several models, `first` and `other` among them, as one entry. 0 or MEMORY. */
 static int add_folder(struct list *list, const char *path, const char *first, const char *other)
 {
 	struct catalogue_file file = { .path = strdup(path), .is_nested = 1 };
@@ -225,7 +225,7 @@ static int read_one(struct list *list, const char *folder, const char *file_name
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the models folder");
 	if (stat(path, &status) != 0) {
 		free(path);
-		return PSR_OK; /* gone between the listing and now, or a link that leads nowhere */
+		return PSR_OK; /* removed meanwhile, or a dangling link */
 	}
 	if (S_ISREG(status.st_mode) && is_candidate(file_name)) {
 		if (list->n >= CATALOGUE_MAX_FILES) {
@@ -323,7 +323,7 @@ static int settle(struct list *list)
 		n++;
 	}
 	list->n = n;
-	return n_clashes > 0 ? settle(list) : PSR_OK; /* which finds none: what has a reason clashes with nothing */
+	return n_clashes > 0 ? settle(list) : PSR_OK; /* settles at once: entries with a reason never clash */
 }
 
 int catalogue_scan(struct catalogue_listing **out, const char *folder, struct psr_error *err)

@@ -1,4 +1,4 @@
-/* Files of models that nothing here reads, and what to do with them. */
+/* Model formats that psr does not read, and what a user can do with such files. */
 #ifndef PSRD_FORMATS_H
 #define PSRD_FORMATS_H
 

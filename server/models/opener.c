@@ -3,27 +3,23 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include "builder.h"
-#include "server/net/conn.h"
-#include "server/log.h"
-#include "opener.h"
+#include "base/pool.h"
 #include "opening.h"
-#include "server/server.h"
-
-#define MAX_WAITING_PROGRESS 65536
+#include "server/log.h"
 
 struct opener {
-	struct server *server;
+	struct opener_parts parts;
+	int is_stopped;
 	struct opening *first;
 };
 
-int opener_create(struct opener **out, struct server *server)
+int opener_create(struct opener **out, const struct opener_parts *parts)
 {
 	struct opener *opener = calloc(1, sizeof *opener);
 
 	if (opener == NULL)
 		return PSR_ERR_MEMORY;
-	opener->server = server;
+	opener->parts = *parts;
 	*out = opener;
 	return PSR_OK;
 }
@@ -52,19 +48,10 @@ void opener_destroy(struct opener *opener)
 
 		opener->first = o->next;
 		if (o->reserved > 0)
-			catalogue_release(&opener->server->catalogue, o->reserved);
+			catalogue_release(opener->parts.catalogue, o->reserved);
 		destroy_opening(o);
 	}
 	free(opener);
-}
-
-static void send_progress(const struct opening *o, const struct waiter *waiter)
-{
-	uint8_t bytes[64];
-	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
-
-	if (psr_msg_progress_encode(&buf, waiter->id, &o->progress, NULL) == PSR_OK)
-		conn_send(waiter->conn, &buf);
 }
 
 static void set_progress(struct opening *o, const struct psr_msg_progress *progress)
@@ -72,12 +59,8 @@ static void set_progress(struct opening *o, const struct psr_msg_progress *progr
 	if (progress->stage < o->progress.stage)
 		return;
 	o->progress = *progress;
-	for (struct waiter *waiter = o->waiters; waiter != NULL; waiter = waiter->next) {
-		if (waiter->conn->out.size > MAX_WAITING_PROGRESS)
-			continue; /* news for a reader that takes none would only pile up */
-		send_progress(o, waiter);
-		conn_flush(waiter->conn);
-	}
+	for (struct waiter *waiter = o->waiters; waiter != NULL; waiter = waiter->next)
+		o->opener->parts.user->on_progress(waiter->client, waiter->id, progress);
 }
 
 static void unlink_opening(struct opening *o)
@@ -89,16 +72,18 @@ static void unlink_opening(struct opening *o)
 	*at = o->next;
 }
 
-/* The entry that this opening is about, if the catalogue still has it. */
+/* The opening's entry, if the catalogue still has it. */
 static struct catalogue_entry *entry_of(const struct opening *o)
 {
-	struct catalogue_entry *entry = catalogue_find(&o->opener->server->catalogue, o->file.name);
+	struct catalogue_entry *entry = catalogue_find(o->opener->parts.catalogue, o->file.name);
 
 	return entry != NULL && strcmp(entry->file.path, o->file.path) == 0 ? entry : NULL;
 }
 
 static void end(struct opening *o, struct catalogue_model *model, int code, const char *text)
 {
+	const struct opener_user *user = o->opener->parts.user;
+
 	unlink_opening(o);
 	if (model == NULL)
 		log_info("model %s: %s", o->file.name, text);
@@ -107,16 +92,15 @@ static void end(struct opening *o, struct catalogue_model *model, int code, cons
 
 		o->waiters = waiter->next;
 		if (model != NULL)
-			session_opened(waiter->conn, waiter->id, model);
+			user->on_opened(waiter->client, waiter->id, model);
 		else
-			session_refuse(waiter->conn, waiter->id, 0, code, text);
-		conn_flush(waiter->conn);
+			user->on_refused(waiter->client, waiter->id, code, text);
 		free(waiter);
 	}
 	destroy_opening(o);
 }
 
-/* What the system refuses now it may grant later; anything else is the file's fault and shows in the list. */
+/* The list shows failures of the file; the system may grant later what it refuses now. */
 static void end_failed(struct opening *o, const struct psr_error *error)
 {
 	struct catalogue_entry *entry = entry_of(o);
@@ -130,12 +114,12 @@ static void end_failed(struct opening *o, const struct psr_error *error)
 static void submit(struct opening *o, void (*job)(void *), void (*then)(void *))
 {
 	o->note = (struct loop_note){ .fn = then, .userdata = o };
-	o->has_job = psr_pool_submit(o->opener->server->io, job, o) == PSR_OK;
+	o->has_job = psr_pool_submit(o->opener->parts.io, job, o) == PSR_OK;
 	if (!o->has_job)
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
 }
 
-/* Errors name the model; folders of the server are nobody's business. */
+/* Errors name the model, and hide the server's folders. */
 static void name_error(struct opening *o)
 {
 	const char *path = o->file.is_source ? o->cached : o->file.path;
@@ -153,8 +137,9 @@ static void build(struct opening *o);
 static void on_loaded(void *userdata)
 {
 	struct opening *o = userdata;
-	struct catalogue *catalogue = &o->opener->server->catalogue;
+	struct catalogue *catalogue = o->opener->parts.catalogue;
 	struct psr_model *model = o->model;
+	struct catalogue_loaded loaded;
 	struct catalogue_model *added;
 	uint64_t reserved = o->reserved;
 
@@ -164,8 +149,8 @@ static void on_loaded(void *userdata)
 	if (o->code != PSR_OK) {
 		catalogue_release(catalogue, reserved);
 		if (o->is_cached && (o->code == PSR_ERR_FORMAT || o->code == PSR_ERR_VERSION)
-		    && !o->opener->server->is_draining) {
-			log_warn("%s is damaged, it is built again", o->cached);
+		    && !o->opener->is_stopped) {
+			log_warn("%s is damaged: building it again", o->cached);
 			o->is_cached = 0;
 			build(o);
 			return;
@@ -174,7 +159,9 @@ static void on_loaded(void *userdata)
 		end_failed(o, &o->error);
 		return;
 	}
-	if (catalogue_add(&added, catalogue, entry_of(o), model, o->key, o->resolution, reserved) != PSR_OK) {
+	loaded = (struct catalogue_loaded){ .entry = entry_of(o), .model = model, .key = o->key,
+		                                .resolution = o->resolution, .reserved = reserved };
+	if (catalogue_add(&added, catalogue, &loaded) != PSR_OK) {
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to open a model");
 		return;
 	}
@@ -185,7 +172,7 @@ static void on_loaded(void *userdata)
 
 static void load(struct opening *o)
 {
-	int code = catalogue_reserve(&o->opener->server->catalogue, o->bytes, o->file.name, &o->error);
+	int code = catalogue_reserve(o->opener->parts.catalogue, o->bytes, o->file.name, &o->error);
 
 	if (code != PSR_OK) {
 		end_failed(o, &o->error);
@@ -208,7 +195,7 @@ static void on_built(const struct psr_error *failure, void *userdata)
 	struct stat status;
 
 	if (failure != NULL) {
-		if (entry != NULL && builder_failure(o->opener->server->builder, o->key, o->resolution) != NULL)
+		if (entry != NULL && builder_failure(o->opener->parts.builder, o->key, o->resolution) != NULL)
 			entry->has_failed = 1; /* and will, until it changes */
 		end_failed(o, failure);
 		return;
@@ -225,25 +212,28 @@ static void on_built(const struct psr_error *failure, void *userdata)
 
 static void build(struct opening *o)
 {
-	struct builder *builder = o->opener->server->builder;
+	struct builder *builder = o->opener->parts.builder;
 	const struct psr_error *failure = builder_failure(builder, o->key, o->resolution);
+	const struct builder_job job = {
+		.program = o->program, .source = o->file.path, .target = o->temporary, .key = o->key,
+		.resolution = o->resolution, .on_progress = on_build_progress, .on_done = on_built, .userdata = o,
+	};
 
 	if (failure != NULL)
 		end_failed(o, failure);
-	else if (builder_start(builder, o->program, o->key, o->resolution, o->file.path, o->temporary, on_build_progress,
-	                       on_built, o) != PSR_OK)
+	else if (builder_start(builder, &job) != PSR_OK)
 		end(o, NULL, PSR_ERR_MEMORY, "no memory to build a model");
 }
 
 static void on_prepared(void *userdata)
 {
 	struct opening *o = userdata;
-	struct server *server = o->opener->server;
+	struct catalogue *catalogue = o->opener->parts.catalogue;
 	struct catalogue_entry *entry = entry_of(o);
 	struct catalogue_model *model = NULL;
 
 	o->has_job = 0;
-	if (server->is_draining) {
+	if (o->opener->is_stopped) {
 		end(o, NULL, PSR_ERR_CANCELLED, "the server is shutting down");
 		return;
 	}
@@ -255,10 +245,10 @@ static void on_prepared(void *userdata)
 	if (o->file.is_source && entry != NULL)
 		model = catalogue_model(entry, o->resolution);
 	if (model != NULL && strcmp(model->key, o->key) == 0) {
-		catalogue_ref(&server->catalogue, model);
+		catalogue_ref(catalogue, model);
 		model->is_stale = 0;
 		end(o, model, PSR_OK, NULL);
-		catalogue_unref(&server->catalogue, model);
+		catalogue_unref(catalogue, model);
 		return;
 	}
 	if (!o->file.is_source || o->is_cached) {
@@ -275,8 +265,8 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	if (o == NULL)
 		return NULL;
 	o->opener = opener;
-	o->loop = &opener->server->loop;
-	o->cache = opener->server->options->cache;
+	o->loop = opener->parts.loop;
+	o->cache = opener->parts.cache;
 	o->resolution = resolution;
 	o->file = entry->file;
 	o->file.path = strdup(entry->file.path);
@@ -289,23 +279,23 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 	return o;
 }
 
-/* The resolution at which a source is built for pictures of so many pixels, 0 if that is not known: of --resolution,
- * its doubles, and --max-resolution, the first that has nine tenths of them. So a source has few models in the cache,
- * whatever clients ask for; which one a client gets depends on nothing else; and a model's own resolution asks for
- * it. */
-static uint32_t find_resolution(const struct options *options, uint32_t pixels)
+/* The resolution of the model for pictures of so many pixels (0: unknown): of --resolution, its doubles, and
+ * --max-resolution, the first that has nine tenths of them. So the cache holds few models of a source, and which one a
+ * client gets depends on nothing else. */
+static uint32_t find_resolution(const struct opener_parts *parts, uint32_t pixels)
 {
-	const uint32_t most = (uint32_t)options->max_resolution;
-	uint32_t step = (uint32_t)options->resolution;
+	const uint32_t most = parts->max_resolution;
+	uint32_t step = parts->resolution;
 
 	while (step < most && 10 * step < 9 * pixels)
 		step *= 2;
 	return step < most && pixels != most ? step : most;
 }
 
-void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const struct psr_msg_open *msg)
+void opener_open(struct opener *opener, void *client, uint32_t id, const struct psr_msg_open *msg)
 {
-	struct catalogue_entry *entry = catalogue_find(&opener->server->catalogue, msg->name);
+	const struct opener_user *user = opener->parts.user;
+	struct catalogue_entry *entry = catalogue_find(opener->parts.catalogue, msg->name);
 	struct catalogue_model *model;
 	struct opening *o = opener->first;
 	struct waiter *waiter;
@@ -314,18 +304,18 @@ void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const st
 	int is_new;
 
 	if (entry == NULL) {
-		snprintf(text, sizeof text, "there is no model %.255s; psr list shows those that there are", msg->name);
-		session_refuse(conn, id, 0, PSR_ERR_NOT_FOUND, text);
+		snprintf(text, sizeof text, "there is no model %.255s; psr list shows all", msg->name);
+		user->on_refused(client, id, PSR_ERR_NOT_FOUND, text);
 		return;
 	}
 	if (entry->file.reason != NULL) {
-		session_refuse(conn, id, 0, PSR_ERR_UNSUPPORTED, entry->file.reason);
+		user->on_refused(client, id, PSR_ERR_UNSUPPORTED, entry->file.reason);
 		return;
 	}
-	resolution = entry->file.is_source ? find_resolution(opener->server->options, msg->resolution) : 0;
+	resolution = entry->file.is_source ? find_resolution(&opener->parts, msg->resolution) : 0;
 	model = catalogue_model(entry, resolution);
 	if (model != NULL && !model->is_stale) {
-		session_opened(conn, id, model);
+		user->on_opened(client, id, model);
 		return;
 	}
 	while (o != NULL && (o->resolution != resolution || strcmp(o->file.path, entry->file.path) != 0))
@@ -336,17 +326,17 @@ void opener_open(struct opener *opener, struct conn *conn, uint32_t id, const st
 		o = start(opener, entry, resolution);
 	if (waiter == NULL || o == NULL) {
 		free(waiter);
-		session_refuse(conn, id, 0, PSR_ERR_MEMORY, "no memory to open a model");
+		user->on_refused(client, id, PSR_ERR_MEMORY, "no memory to open a model");
 		return;
 	}
-	*waiter = (struct waiter){ .next = o->waiters, .conn = conn, .id = id };
+	*waiter = (struct waiter){ .next = o->waiters, .client = client, .id = id };
 	o->waiters = waiter;
-	send_progress(o, waiter);
+	user->on_progress(client, id, &o->progress);
 	if (is_new)
 		submit(o, opening_prepare, on_prepared);
 }
 
-static int remove_waiters(struct opener *opener, const struct conn *conn, uint32_t id, int all)
+static int remove_waiters(struct opener *opener, const void *client, uint32_t id, int all)
 {
 	int n = 0;
 
@@ -356,7 +346,7 @@ static int remove_waiters(struct opener *opener, const struct conn *conn, uint32
 		while (*at != NULL) {
 			struct waiter *waiter = *at;
 
-			if (waiter->conn == conn && (all || waiter->id == id)) {
+			if (waiter->client == client && (all || waiter->id == id)) {
 				*at = waiter->next;
 				free(waiter);
 				n++;
@@ -368,25 +358,26 @@ static int remove_waiters(struct opener *opener, const struct conn *conn, uint32
 	return n;
 }
 
-int opener_cancel(struct opener *opener, struct conn *conn, uint32_t id)
+int opener_cancel(struct opener *opener, const void *client, uint32_t id)
 {
-	return remove_waiters(opener, conn, id, 0);
+	return remove_waiters(opener, client, id, 0);
 }
 
-void opener_forget(struct opener *opener, struct conn *conn)
+void opener_forget(struct opener *opener, const void *client)
 {
-	remove_waiters(opener, conn, 0, 1);
+	remove_waiters(opener, client, 0, 1);
 }
 
-void opener_refuse_all(struct opener *opener, int code, const char *text)
+void opener_stop(struct opener *opener, int code, const char *text)
 {
+	opener->is_stopped = 1;
 	for (struct opening *o = opener->first; o != NULL; o = o->next) {
 		while (o->waiters != NULL) {
 			struct waiter waiter = *o->waiters;
 
 			free(o->waiters);
 			o->waiters = waiter.next;
-			session_refuse(waiter.conn, waiter.id, 0, code, text);
+			opener->parts.user->on_refused(waiter.client, waiter.id, code, text);
 		}
 	}
 }

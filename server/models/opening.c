@@ -6,10 +6,10 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "builder.h"
 #include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
+#include "model/blocks.h"
 
 static void post(struct opening *o)
 {
@@ -31,11 +31,38 @@ void opening_load(void *userdata)
 	post(o);
 }
 
+/* The psr-model beside psrd's own executable, else the first in PATH. */
+static int find_program(char path[PATH_MAX], struct psr_error *err)
+{
+	const char *folder = getenv("PATH");
+	char own[PATH_MAX], *slash;
+	ssize_t n = readlink("/proc/self/exe", own, sizeof own - 1);
+
+	if (n > 0) {
+		own[n] = '\0';
+		slash = strrchr(own, '/');
+		if (slash != NULL && snprintf(path, PATH_MAX, "%.*s/psr-model", (int)(slash - own), own) < PATH_MAX
+		    && access(path, X_OK) == 0)
+			return PSR_OK;
+	}
+	while (folder != NULL && *folder != '\0') {
+		size_t length = strcspn(folder, ":");
+
+		if (length > 0 && snprintf(path, PATH_MAX, "%.*s/psr-model", (int)length, folder) < PATH_MAX
+		    && access(path, X_OK) == 0)
+			return PSR_OK;
+		folder += length + (folder[length] == ':');
+	}
+	return psr_fail(err, PSR_ERR_NOT_FOUND,
+	                "psr-model, which builds models from sources, is neither beside psrd nor in "
+	                "PATH; install it there, or put a .psr file into the models folder");
+}
+
 static int prepare_source(struct opening *o)
 {
 	const char *cache = o->cache;
 	struct stat status;
-	int code = builder_find_program(o->program, &o->error);
+	int code = find_program(o->program, &o->error);
 
 	if (code == PSR_OK)
 		code = cachekey_find(o->key, o->file.path, o->program, &o->error);

@@ -1,4 +1,4 @@
-/* Private to the opener's own files: one model on its way into memory, and the two jobs of the io pool on it. */
+/* Private to opener.c and opening.c: one model on its way into memory, and its two jobs on the io pool. */
 #ifndef PSRD_OPENING_H
 #define PSRD_OPENING_H
 
@@ -9,7 +9,7 @@
 
 struct waiter {
 	struct waiter *next;
-	struct conn *conn;
+	void *client;
 	uint32_t id;
 };
 
@@ -19,7 +19,7 @@ struct opening {
 	struct loop *loop;
 	const char *cache;          /* folder */
 	struct catalogue_file file; /* its path is a copy */
-	uint32_t resolution;        /* of a source: what it is built at; else 0 */
+	uint32_t resolution;        /* that a source is built at; else 0 */
 	struct waiter *waiters;
 	struct psr_msg_progress progress;
 	struct loop_note note;

@@ -8,8 +8,8 @@
 #include <sys/stat.h>
 #include "parts.h"
 
-#define MAX_JSON (64u << 20) /* beyond, a glTF's text has its buffers within */
-#define MAX_HEAD (64u << 10) /* of a PLY or an OBJ, which name things at their beginning */
+#define MAX_JSON (64u << 20) /* a longer glTF text holds its buffers itself */
+#define MAX_HEAD (64u << 10) /* of a PLY or OBJ: they name files at their beginning */
 #define MAX_MTL (1u << 20)
 #define MAX_SEEN 4096
 
@@ -23,7 +23,7 @@ struct search {
 	uint32_t n_seen;
 };
 
-/* n bytes from `offset` on, or those that there are, with a NUL behind; NULL on failure. */
+/* Up to n bytes from `offset` on, NUL-terminated; NULL on failure. */
 static char *read_text(const char *path, uint64_t offset, size_t n, size_t *n_read)
 {
 	FILE *file = fopen(path, "rbe");
@@ -45,7 +45,7 @@ static char *read_text(const char *path, uint64_t offset, size_t n, size_t *n_re
 	return text;
 }
 
-/* Whether it is there; adds its size if it was not seen before. */
+/* Whether the file exists; adds its size the first time. */
 static int add_file(struct search *s, const char *name)
 {
 	char path[PATH_MAX];
@@ -71,7 +71,7 @@ static int digit(char c)
 	return c >= '0' && c <= '9' ? c - '0' : tolower((unsigned char)c) - 'a' + 10;
 }
 
-/* A URI, whose escapes are undone in place. */
+/* Decodes the escapes of a URI in place. */
 static void add_uri(struct search *s, char *uri)
 {
 	char *to = uri;
@@ -90,7 +90,7 @@ static void add_uri(struct search *s, char *uri)
 	add_file(s, uri);
 }
 
-/* Every "uri": "..." that holds no data itself. */
+/* Every "uri": "..." but data URIs. */
 static void search_json(struct search *s, char *text)
 {
 	for (char *at = strstr(text, "\"uri\""), *end; at != NULL; at = strstr(at, "\"uri\"")) {
@@ -130,7 +130,7 @@ static void search_gltf(struct search *s, const char *source, int is_binary)
 		length = n == 20 ? u32_at(text + 12) : 0;
 		free(text);
 		if (n < 20)
-			return; /* no GLB */
+			return; /* not a GLB */
 	}
 	text = length <= MAX_JSON ? read_text(source, is_binary ? 20 : 0, length, &n) : NULL;
 	if (text != NULL && n < MAX_JSON)
@@ -140,7 +140,7 @@ static void search_gltf(struct search *s, const char *source, int is_binary)
 	free(text);
 }
 
-/* What follows `word` on a line of *text, without the blanks around it; NULL if the text has no further one. */
+/* The trimmed rest of the next line of *text that starts with `word`; NULL: no such line. */
 static char *next_line_with(char **text, const char *word)
 {
 	while (**text != '\0') {
@@ -179,7 +179,7 @@ static void search_ply(struct search *s, const char *source)
 	free(text);
 }
 
-/* A texture's name comes last on its line, after its options. */
+/* Options come before a texture's name, which ends the line. */
 static void search_mtl(struct search *s, const char *name)
 {
 	static const char *const words[] = { "map_", "bump", "disp", "norm", "refl" };

@@ -6,11 +6,11 @@
 #include <stdint.h>
 
 struct parts {
-	uint32_t n_named; /* by the source itself, there or not; UINT32_MAX if it cannot be told */
-	uint64_t bytes;   /* of those that are there, in the source's folder or below, each once */
+	uint32_t n_named; /* named by the source, existing or not; UINT32_MAX: unknown */
+	uint64_t bytes;   /* of existing ones in the source's folder or below, each once */
 };
 
-/* Of other formats, and of files that cannot be read, 0 and 0. On any thread. */
+/* 0 and 0 for other formats and unreadable files. Any thread. */
 void parts_find(struct parts *parts, const char *source);
 
 #endif

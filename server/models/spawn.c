@@ -11,7 +11,7 @@
 
 extern char **environ;
 
-struct plan { /* all that the child reads, made before it exists */
+struct plan { /* everything that the child reads; made before the child exists */
 	const char *const *argv;
 	struct rlimit memory, cpu;
 	int nice, null_fd, error_fd, fd3;
@@ -20,7 +20,7 @@ struct plan { /* all that the child reads, made before it exists */
 	volatile int failure; /* errno of the child: it shares this memory */
 };
 
-/* Between vfork and exec the memory is the parent's: system calls only, nothing allocated, nothing locked. */
+/* Between vfork and exec the child shares the parent's memory: system calls only, no allocation, no lock. */
 static void become(struct plan *plan)
 {
 	const struct sigaction standard = { .sa_handler = SIG_DFL };
@@ -35,7 +35,7 @@ static void become(struct plan *plan)
 	setpriority(PRIO_PROCESS, 0, plan->nice);
 	setrlimit(RLIMIT_AS, &plan->memory);
 	setrlimit(RLIMIT_CPU, &plan->cpu);
-	/* fd3 and error_fd are above 3 (spawn_start sees to it), so that neither is overwritten before it is copied. */
+	/* spawn_start() keeps fd3 and error_fd above 3: dup2() overwrites neither before its turn. */
 	if (dup2(plan->null_fd, 0) < 0 || dup2(plan->null_fd, 1) < 0 || dup2(plan->error_fd, 2) < 0
 	    || dup2(plan->fd3, 3) < 0 || close_range(4, ~0u, 0) != 0) {
 		plan->failure = errno;

@@ -6,37 +6,42 @@
 #include <sys/socket.h>
 #include <unistd.h>
 #include "accept.h"
-#include "conn.h"
 #include "server/log.h"
 
 #define ACCEPT_TURN 64
 #define OTHER_DESCRIPTORS 64 /* beside connections: listeners, pipes, files, the loop's own */
 
-void accept_pause(struct server *server, int paused)
+static void set_resting(struct acceptor *acceptor, int is_resting)
 {
-	server->are_paused = paused;
-	for (int i = 0; i < server->n_listeners; i++)
-		loop_set(&server->loop, &server->listener[i].source, paused ? 0 : EPOLLIN);
+	acceptor->is_resting = is_resting;
+	for (int i = 0; i < acceptor->n; i++)
+		loop_set(acceptor->conns->loop, &acceptor->listener[i].source, is_resting ? 0 : EPOLLIN);
+}
+
+void accept_wake(struct acceptor *acceptor)
+{
+	if (acceptor->is_resting)
+		set_resting(acceptor, 0);
 }
 
 /* Without descriptors or memory the listeners rest until the next tick: epoll would report them without end. */
 static void on_connection(uint32_t events, void *userdata)
 {
-	struct server_listener *l = userdata;
-	struct server *server = l->server;
+	struct accept_source *l = userdata;
+	struct conns *conns = l->acceptor->conns;
 
 	(void)events;
 	for (int i = 0; i < ACCEPT_TURN; i++) {
 		int fd = accept4(l->listener.fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
 
 		if (fd >= 0) {
-			if (server->n_conns >= (unsigned)server->options->max_clients + SERVER_SPARE_CLIENTS)
+			if (conns->n >= conns->limits.max_clients + CONN_SPARE)
 				close(fd);
 			else
-				conn_accept(server, fd);
+				conn_accept(conns, fd);
 		} else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-			log_warn("no connection can be accepted just now: %s", strerror(errno));
-			accept_pause(server, 1);
+			log_warn("cannot accept connections for now: %s", strerror(errno));
+			set_resting(l->acceptor, 1);
 			return;
 		} else if (errno == EAGAIN || errno == EWOULDBLOCK) {
 			return;
@@ -44,35 +49,35 @@ static void on_connection(uint32_t events, void *userdata)
 	}
 }
 
-void accept_close(struct server *server)
+void accept_close(struct acceptor *acceptor)
 {
-	while (server->n_listeners > 0) {
-		struct server_listener *l = &server->listener[--server->n_listeners];
+	while (acceptor->n > 0) {
+		struct accept_source *l = &acceptor->listener[--acceptor->n];
 
-		loop_remove(&server->loop, &l->source);
+		loop_remove(acceptor->conns->loop, &l->source);
 		listen_close(&l->listener);
 	}
 }
 
-int accept_open(struct server *server, struct psr_error *err)
+int accept_open(struct acceptor *acceptor, struct conns *conns, const char *const *address, int n,
+                struct psr_error *err)
 {
-	const struct options *options = server->options;
-
-	for (int i = 0; i < options->n_listen; i++) {
+	acceptor->conns = conns;
+	for (int i = 0; i < n; i++) {
 		struct listener opened[4];
-		int n, max = OPTIONS_MAX_LISTEN - server->n_listeners;
-		int code = listen_open(opened, max < 4 ? max : 4, &n, options->listen[i], err);
+		int n_opened, max = ACCEPT_MAX - acceptor->n;
+		int code = listen_open(opened, max < 4 ? max : 4, &n_opened, address[i], err);
 
 		if (code != PSR_OK)
 			return code;
-		for (int k = 0; k < n; k++) {
-			struct server_listener *l = &server->listener[server->n_listeners++];
+		for (int k = 0; k < n_opened; k++) {
+			struct accept_source *l = &acceptor->listener[acceptor->n++];
 
 			l->listener = opened[k];
-			l->server = server;
+			l->acceptor = acceptor;
 			l->source = (struct loop_source){ .fd = l->listener.fd, .on_ready = on_connection, .userdata = l };
 			if (code == PSR_OK)
-				code = loop_add(&server->loop, &l->source, EPOLLIN, err);
+				code = loop_add(conns->loop, &l->source, EPOLLIN, err);
 		}
 		if (code != PSR_OK)
 			return code;
@@ -80,20 +85,21 @@ int accept_open(struct server *server, struct psr_error *err)
 	return PSR_OK;
 }
 
-/* As many descriptors as the system gives; fewer clients if they are too few. */
-void accept_raise_descriptors(struct options *options)
+int64_t accept_raise_descriptors(int64_t max_clients)
 {
+	const rlim_t others = CONN_SPARE + OTHER_DESCRIPTORS;
 	struct rlimit limit;
-	rlim_t wanted = (rlim_t)options->max_clients + SERVER_SPARE_CLIENTS + OTHER_DESCRIPTORS;
+	rlim_t wanted = (rlim_t)max_clients + others;
+	int64_t allowed;
 
 	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
-		return;
+		return max_clients;
 	limit.rlim_cur = wanted < limit.rlim_max ? wanted : limit.rlim_max;
 	setrlimit(RLIMIT_NOFILE, &limit);
 	if (limit.rlim_cur >= wanted)
-		return;
-	options->max_clients = limit.rlim_cur > SERVER_SPARE_CLIENTS + OTHER_DESCRIPTORS
-	                       ? (int64_t)(limit.rlim_cur - SERVER_SPARE_CLIENTS - OTHER_DESCRIPTORS) : 1;
-	log_warn("the system allows %" PRIu64 " open files (ulimit -n): --max-clients is %" PRId64 " now",
-	         (uint64_t)limit.rlim_cur, options->max_clients);
+		return max_clients;
+	allowed = limit.rlim_cur > others ? (int64_t)(limit.rlim_cur - others) : 1;
+	log_warn("the system allows %" PRIu64 " open files (ulimit -n): --max-clients is now %" PRId64,
+	         (uint64_t)limit.rlim_cur, allowed);
+	return allowed;
 }

@@ -1,16 +1,33 @@
-/* The listeners in the loop: accepting, resting when descriptors run out. */
+/* The listeners in the loop: they accept connections, and rest while the process is out of descriptors. */
 #ifndef PSRD_ACCEPT_H
 #define PSRD_ACCEPT_H
 
-#include "server/server.h"
+#include "conn.h"
+#include "listen.h"
 
-/* Opens what the options name and takes it into the loop; on failure accept_close() closes what is open. */
-int accept_open(struct server *server, struct psr_error *err);
-void accept_close(struct server *server);
+#define ACCEPT_MAX 16 /* listeners */
 
-void accept_pause(struct server *server, int paused);
+struct acceptor;
 
-/* As many descriptors as the clients need; lowers options->max_clients where the system gives fewer. */
-void accept_raise_descriptors(struct options *options);
+struct accept_source {
+	struct listener listener;
+	struct loop_source source;
+	struct acceptor *acceptor;
+};
+
+struct acceptor {
+	struct conns *conns;
+	struct accept_source listener[ACCEPT_MAX];
+	int n, is_resting;
+};
+
+/* Opens listeners at n addresses (listen.h) for `conns`. On failure accept_close() closes those that are open. */
+int accept_open(struct acceptor *acceptor, struct conns *conns, const char *const *address, int n,
+                struct psr_error *err);
+void accept_close(struct acceptor *acceptor);
+void accept_wake(struct acceptor *acceptor); /* ends the rest, if there is one: on every tick */
+
+/* Raises the limit of open files to what max_clients connections need; returns how many it allows. */
+int64_t accept_raise_descriptors(int64_t max_clients);
 
 #endif

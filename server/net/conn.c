@@ -8,29 +8,21 @@
 #include <sys/socket.h>
 #include <unistd.h>
 #include "conn.h"
-#include "server/frames/frames.h"
-#include "handshake.h"
 #include "server/log.h"
-#include "server/models/opener.h"
-#include "server/server.h"
 
 #define READ_TURN 262144  /* bytes of one connection before others have their turn */
 #define WRITE_TURN 4194304
 #define LINGER_US 2000000 /* how long the peer may take to close after the last byte */
 #define VECTORS 32
-
-static uint64_t to_us(double seconds)
-{
-	return (uint64_t)(seconds * 1e6);
-}
+#define INPUT_OPEN (2 * PSR_WIRE_MAX_MESSAGE)
 
 static int may_take(const struct conn *conn)
 {
-	return (conn->state == CONN_HELLO || conn->state == CONN_OPEN) && !conn->server->is_draining
-	       && conn->out.size <= (uint64_t)conn->server->options->max_queue;
+	return (conn->state == CONN_HELLO || conn->state == CONN_OPEN) && !conn->all->is_draining
+	       && conn->out.size <= conn->all->limits.max_queue;
 }
 
-/* Reading rests while too much waits to be written: requests of a peer that reads no answers are not taken on. */
+/* Stops reading while too much waits to be written: a peer that reads no answers gets no more requests in. */
 static void update_events(struct conn *conn)
 {
 	uint32_t events = 0;
@@ -41,37 +33,35 @@ static void update_events(struct conn *conn)
 		events |= EPOLLIN;
 	if (conn->out.size > 0)
 		events |= EPOLLOUT;
-	loop_set(&conn->server->loop, &conn->source, events);
+	loop_set(conn->all->loop, &conn->source, events);
 }
 
 void conn_close(struct conn *conn)
 {
-	struct server *server = conn->server;
+	struct conns *all = conn->all;
 
 	if (conn->state == CONN_CLOSED)
 		return;
 	log_info("connection %llu: closed after %llu bytes", (unsigned long long)conn->number,
 	         (unsigned long long)conn->out.sent);
 	conn->state = CONN_CLOSED;
-	loop_remove(&server->loop, &conn->source);
+	loop_remove(all->loop, &conn->source);
 	close(conn->fd);
 	if (conn->previous != NULL)
 		conn->previous->next = conn->next;
 	else
-		server->conns = conn->next;
+		all->first = conn->next;
 	if (conn->next != NULL)
 		conn->next->previous = conn->previous;
-	conn->next = server->dead;
-	server->dead = conn;
-	server->n_conns--;
+	conn->next = all->dead;
+	all->dead = conn;
+	all->n--;
 }
 
-void conn_destroy(struct conn *conn)
+static void destroy(struct conn *conn)
 {
 	assert(conn->state == CONN_CLOSED);
-	frames_forget(conn->server->frames, conn);
-	opener_forget(conn->server->opener, conn);
-	session_fini(&conn->session, &conn->server->catalogue);
+	conn->all->user->on_end(conn);
 	outq_fini(&conn->out);
 	free(conn->input);
 	free(conn);
@@ -99,8 +89,8 @@ void conn_flush(struct conn *conn)
 			return;
 		}
 		outq_consume(&conn->out, (size_t)n);
-		conn->server->stats.bytes_sent += (uint64_t)n;
-		conn->active_us = conn->server->loop.now_us;
+		conn->all->bytes_sent += (uint64_t)n;
+		conn->active_us = conn->all->loop->now_us;
 	}
 	if (conn->state == CONN_DRAINING && conn->out.size == 0) {
 		if (conn->has_eof) {
@@ -109,19 +99,24 @@ void conn_flush(struct conn *conn)
 		}
 		if (!conn->is_shut) {
 			conn->is_shut = 1;
-			conn->drain_us = conn->server->loop.now_us;
+			conn->drain_us = conn->all->loop->now_us;
 			shutdown(conn->fd, SHUT_WR);
 		}
 	}
 	if (!had_room && may_take(conn))
-		conn->must_resume = conn->server->must_resume = 1;
+		conn->must_resume = conn->all->must_resume = 1;
 	update_events(conn);
 }
 
 static void append(struct conn *conn, const struct psr_buf *buf)
 {
-	if (outq_append(&conn->out, buf->data, buf->size, conn->server->loop.now_us) != 0)
+	if (outq_append(&conn->out, buf->data, buf->size, conn->all->loop->now_us) != 0)
 		conn_close(conn);
+}
+
+void conn_push(struct conn *conn, struct outq_chunk *first)
+{
+	outq_push(&conn->out, first, conn->all->loop->now_us);
 }
 
 void conn_send(struct conn *conn, const struct psr_buf *buf)
@@ -141,13 +136,13 @@ void conn_send_error(struct conn *conn, uint32_t id, uint16_t view, int code, co
 		conn_send(conn, &buf);
 }
 
-/* Nothing may be written behind the last message, so nothing of what is open may be answered any more. */
+/* No open request is answered any more: nothing may follow the last message. */
 void conn_drain(struct conn *conn)
 {
 	if (conn->state == CONN_DRAINING || conn->state == CONN_CLOSED)
 		return;
 	conn->state = CONN_DRAINING;
-	conn->drain_us = conn->server->loop.now_us;
+	conn->drain_us = conn->all->loop->now_us;
 }
 
 void conn_fail(struct conn *conn, int code, const char *text)
@@ -155,7 +150,7 @@ void conn_fail(struct conn *conn, int code, const char *text)
 	if (conn->state == CONN_DRAINING || conn->state == CONN_CLOSED)
 		return;
 	log_info("connection %llu: %s", (unsigned long long)conn->number, text);
-	conn->server->stats.dropped_peers++;
+	conn->all->n_dropped++;
 	conn_send_error(conn, 0, 0, code, text);
 	conn_drain(conn);
 }
@@ -172,7 +167,7 @@ void conn_goodbye(struct conn *conn, enum psr_goodbye reason, const char *text)
 	conn_drain(conn);
 }
 
-/* All whole messages that are there. */
+/* Takes all whole messages. */
 static void take_messages(struct conn *conn)
 {
 	struct psr_message message;
@@ -180,33 +175,35 @@ static void take_messages(struct conn *conn)
 	int code = 0;
 
 	while (may_take(conn) && (code = psr_framer_next(&conn->framer, &message, &error)) > 0) {
-		if (conn->state == CONN_HELLO) {
-			handshake_take(conn, &message);
-		} else {
-			int taken = session_take(conn, &message, &error);
+		const struct conn_user *user = conn->all->user;
+		int taken = conn->state == CONN_HELLO ? user->on_hello(conn, &message, &error)
+		                                      : user->on_message(conn, &message, &error);
 
-			if (taken != PSR_OK)
-				conn_fail(conn, taken, error.text);
-		}
+		if (taken != PSR_OK)
+			conn_fail(conn, taken, error.text);
 	}
-	if (code == PSR_ERR_FORMAT) { /* no client of psr: not a byte for it */
-		conn->server->stats.dropped_peers++;
+	if (code == PSR_ERR_FORMAT) { /* not a client of psr: it gets no byte */
+		conn->all->n_dropped++;
 		conn_close(conn);
 	} else if (code < 0) {
 		conn_fail(conn, code, error.text);
 	}
 }
 
-void conn_resume(struct conn *conn)
+int conn_open(struct conn *conn)
 {
-	if (!conn->must_resume)
-		return;
-	conn->must_resume = 0;
-	take_messages(conn);
-	conn_flush(conn);
+	uint8_t *input = malloc(INPUT_OPEN);
+
+	if (input == NULL)
+		return PSR_ERR_MEMORY;
+	psr_framer_accept(&conn->framer, input, INPUT_OPEN);
+	free(conn->input);
+	conn->input = input;
+	conn->state = CONN_OPEN;
+	return PSR_OK;
 }
 
-/* What a draining connection sends is dropped. 0: nothing more is there; > 0 bytes; < 0: it has ended. */
+/* Drops the input of a draining connection. Returns the bytes; 0: none now; < 0: the peer has ended. */
 static ssize_t read_some(struct conn *conn)
 {
 	uint8_t dropped[16384], *space = dropped;
@@ -225,11 +222,11 @@ static ssize_t read_some(struct conn *conn)
 		return -1;
 	if (conn->state != CONN_DRAINING)
 		psr_framer_filled(&conn->framer, (size_t)n);
-	conn->server->stats.bytes_received += (uint64_t)n;
+	conn->all->bytes_received += (uint64_t)n;
 	return n;
 }
 
-/* A client that has closed its end gets no more answers: it cannot be told from one that is gone. */
+/* A client that closed its end gets no more answers: it looks like one that is gone. */
 static void on_readable(struct conn *conn)
 {
 	size_t total = 0;
@@ -238,7 +235,7 @@ static void on_readable(struct conn *conn)
 	while (total < READ_TURN && (conn->state == CONN_DRAINING || may_take(conn)) && (n = read_some(conn)) > 0) {
 		total += (size_t)n;
 		if (conn->state != CONN_DRAINING) {
-			conn->active_us = conn->server->loop.now_us;
+			conn->active_us = conn->all->loop->now_us;
 			take_messages(conn);
 		}
 	}
@@ -263,10 +260,10 @@ static void on_ready(uint32_t events, void *userdata)
 		on_readable(conn);
 	conn_flush(conn);
 	if (conn->out.size < before)
-		frames_pump(conn->server->frames);
+		conn->all->user->on_room(conn->all->user->userdata);
 }
 
-void conn_accept(struct server *server, int fd)
+void conn_accept(struct conns *conns, int fd)
 {
 	struct conn *conn = calloc(1, sizeof *conn);
 	const int on = 1;
@@ -278,55 +275,91 @@ void conn_accept(struct server *server, int fd)
 		close(fd);
 		return;
 	}
-	setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on); /* fails on Unix sockets, which need no such thing */
-	conn->server = server;
+	setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on); /* fails on Unix sockets, which do not need it */
+	conn->all = conns;
 	conn->fd = fd;
-	conn->number = ++server->n_numbers;
-	conn->is_surplus = server->n_conns >= (unsigned)server->options->max_clients;
-	conn->start_us = conn->active_us = server->loop.now_us;
-	conn->last_waiting = &conn->waiting;
+	conn->number = ++conns->n_ever;
+	conn->is_surplus = conns->n >= conns->limits.max_clients;
+	conn->start_us = conn->active_us = conns->loop->now_us;
 	outq_init(&conn->out);
 	psr_framer_init(&conn->framer, PSR_CLIENT, conn->input, PSR_WIRE_MAX_MESSAGE_HELLO);
 	conn->source = (struct loop_source){ .fd = fd, .on_ready = on_ready, .userdata = conn };
-	if (loop_add(&server->loop, &conn->source, EPOLLIN, NULL) != PSR_OK) {
+	if (loop_add(conns->loop, &conn->source, EPOLLIN, NULL) != PSR_OK) {
 		free(conn->input);
 		free(conn);
 		close(fd);
 		return;
 	}
-	conn->next = server->conns;
+	conn->next = conns->first;
 	if (conn->next != NULL)
 		conn->next->previous = conn;
-	server->conns = conn;
-	server->n_conns++;
-	server->stats.connections_total++;
-	log_info("connection %llu: accepted, %u there are", (unsigned long long)conn->number, server->n_conns);
+	conns->first = conn;
+	conns->n++;
+	log_info("connection %llu: accepted, %u open", (unsigned long long)conn->number, conns->n);
 }
 
-void conn_tick(struct conn *conn, uint64_t now_us)
+static void tick(struct conn *conn, uint64_t now_us)
 {
-	const struct options *options = conn->server->options;
+	const struct conn_limits *limits = &conn->all->limits;
 
 	if (conn->state == CONN_DRAINING) {
-		uint64_t patience = conn->is_shut ? LINGER_US : to_us(options->slow_timeout);
-
-		if (now_us - conn->drain_us > patience)
+		if (now_us - conn->drain_us > (conn->is_shut ? LINGER_US : limits->slow_us))
 			conn_close(conn);
-		return;
-	}
-	if (conn->state == CONN_HELLO && now_us - conn->start_us > to_us(options->handshake_timeout)) {
+	} else if (conn->state == CONN_HELLO && now_us - conn->start_us > limits->handshake_us) {
 		log_info("connection %llu: no HELLO in time", (unsigned long long)conn->number);
-		conn->server->stats.dropped_peers++;
+		conn->all->n_dropped++;
 		conn_close(conn);
-	} else if (outq_is_stalled(&conn->out, now_us, to_us(options->slow_timeout))) {
-		/* GOODBYE would wait behind what is not read. */
+	} else if (outq_is_stalled(&conn->out, now_us, limits->slow_us)) {
+		/* No GOODBYE: it would wait behind what the peer does not read. */
 		log_info("connection %llu: reads too slowly", (unsigned long long)conn->number);
-		conn->server->stats.dropped_peers++;
+		conn->all->n_dropped++;
 		conn_close(conn);
-	} else if (conn->state == CONN_OPEN && options->idle_timeout > 0 && conn->out.size == 0
-	           && conn->session.n_open == 0 && now_us > conn->active_us
-	           && now_us - conn->active_us > to_us(options->idle_timeout)) {
-		conn_goodbye(conn, PSR_GOODBYE_IDLE, "nothing was asked for long");
+	} else if (conn->state == CONN_OPEN && limits->idle_us > 0 && conn->out.size == 0
+	           && !conn->all->user->is_busy(conn) && now_us > conn->active_us
+	           && now_us - conn->active_us > limits->idle_us) {
+		conn_goodbye(conn, PSR_GOODBYE_IDLE, "no request for too long");
 		conn_flush(conn);
+	}
+}
+
+void conns_init(struct conns *conns, struct loop *loop, const struct conn_limits *limits, const struct conn_user *user)
+{
+	*conns = (struct conns){ .loop = loop, .limits = *limits, .user = user };
+}
+
+void conns_tick(struct conns *conns)
+{
+	struct conn *next;
+
+	for (struct conn *conn = conns->first; conn != NULL; conn = next) {
+		next = conn->next;
+		tick(conn, conns->loop->now_us);
+	}
+}
+
+void conns_resume(struct conns *conns)
+{
+	while (conns->must_resume) {
+		struct conn *next;
+
+		conns->must_resume = 0;
+		for (struct conn *conn = conns->first; conn != NULL; conn = next) {
+			next = conn->next;
+			if (!conn->must_resume)
+				continue;
+			conn->must_resume = 0;
+			take_messages(conn);
+			conn_flush(conn);
+		}
+	}
+}
+
+void conns_end_batch(struct conns *conns)
+{
+	while (conns->dead != NULL) {
+		struct conn *conn = conns->dead;
+
+		conns->dead = conn->next;
+		destroy(conn);
 	}
 }

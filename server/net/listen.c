@@ -32,7 +32,7 @@ static int fail_system(struct psr_error *err, const char *address, const char *w
 	return psr_fail(err, code, "--listen %.200s: %s: %s", address, what, strerror(errno));
 }
 
-/* Splits ADDR:PORT at the last colon, brackets taken off. */
+/* Splits ADDR:PORT at the last colon, and removes brackets. */
 static int split(char host[LISTEN_NAME], char port[16], const char *text, const char *address, struct psr_error *err)
 {
 	const char *colon = strrchr(text, ':');
@@ -116,13 +116,13 @@ static int open_tcp(struct listener *listeners, int max, int *n, const char *tex
 	}
 	freeaddrinfo(list);
 	if (*n > 0 && code != PSR_ERR_BUSY)
-		return PSR_OK; /* a host name with an address that this machine lacks (::1) still has the other */
+		return PSR_OK; /* one address of a host name is enough: a machine may lack ::1 */
 	while (*n > 0)
 		listen_close(&listeners[--*n]);
 	return code;
 }
 
-/* A socket file that nobody answers is what a killed daemon left. */
+/* A killed daemon leaves its socket file, and nobody answers there. */
 static int remove_stale(const struct sockaddr_un *name, const char *address, struct psr_error *err)
 {
 	struct stat status;
@@ -131,7 +131,7 @@ static int remove_stale(const struct sockaddr_un *name, const char *address, str
 	if (lstat(name->sun_path, &status) != 0)
 		return errno == ENOENT ? PSR_OK : fail_system(err, address, "cannot look there");
 	if (!S_ISSOCK(status.st_mode))
-		return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: a file that is no socket is in the way", address);
+		return psr_fail(err, PSR_ERR_ARG, "--listen %.200s: exists and is not a socket", address);
 	fd = socket(AF_UNIX, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
 	if (fd < 0)
 		return fail_system(err, address, "no socket");

@@ -11,7 +11,7 @@ struct listener {
 	int fd;                  /* non-blocking, listening */
 	char name[LISTEN_NAME];  /* as READY prints it: 127.0.0.1:41234, [::1]:41234, unix:/run/psr */
 	char path[LISTEN_NAME];  /* of a Unix socket, else "" */
-	dev_t device;            /* of the socket file, so that another daemon's is not removed */
+	dev_t device;            /* of the socket file: listen_close() removes no other daemon's */
 	ino_t inode;
 };
 

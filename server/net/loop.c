@@ -5,17 +5,9 @@
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
 #include <sys/timerfd.h>
-#include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "loop.h"
-
-uint64_t loop_clock_us(void)
-{
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return (uint64_t)now.tv_sec * 1000000 + (uint64_t)now.tv_nsec / 1000;
-}
 
 static void on_signals(uint32_t events, void *userdata)
 {
@@ -75,7 +67,7 @@ int loop_init(struct loop *loop, const sigset_t *signals, struct psr_error *err)
 	memset(loop, 0, sizeof *loop);
 	loop->signals.fd = loop->ticks.fd = loop->wake.fd = -1;
 	loop->last_note = &loop->first_note;
-	loop->now_us = loop_clock_us();
+	loop->now_us = clock_ns() / 1000;
 	pthread_mutex_init(&loop->mutex, NULL);
 	pthread_sigmask(SIG_BLOCK, signals, NULL);
 	loop->epoll_fd = epoll_create1(EPOLL_CLOEXEC);
@@ -146,7 +138,7 @@ void loop_post(struct loop *loop, struct loop_note *note)
 	pthread_mutex_lock(&loop->mutex);
 	*loop->last_note = note;
 	loop->last_note = &note->next;
-	/* Under the mutex: once the loop has taken the note it may end, and close the descriptor. */
+	/* Under the mutex: the loop may end once it has the note, and close the descriptor. */
 	while (write(loop->wake.fd, &one, sizeof one) < 0 && errno == EINTR)
 		;
 	pthread_mutex_unlock(&loop->mutex);
@@ -170,7 +162,7 @@ int loop_run(struct loop *loop, struct psr_error *err)
 
 		if (n < 0 && errno != EINTR)
 			return psr_fail(err, PSR_ERR_IO, "the event loop failed: %s", strerror(errno));
-		loop->now_us = loop_clock_us();
+		loop->now_us = clock_ns() / 1000;
 		loop->at = 0;
 		loop->n_batch = n < 0 ? 0 : n;
 		for (int i = 0; i < loop->n_batch; i++)

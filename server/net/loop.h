@@ -1,7 +1,7 @@
-/* The event loop: one thread, one epoll set; signals, the tick and other threads' notes are file descriptors of it.
+/* The event loop: one thread, one epoll set; signals, ticks and other threads' notes arrive by file descriptor.
  *
- * All functions but loop_post belong to the loop's thread. Callbacks may add and remove any source, themselves too;
- * what a source is part of must stay until on_batch_end, which is the place to free it. */
+ * All functions but loop_post() belong to the loop's thread. Callbacks may add and remove any source, their own too.
+ * The owner of a source must stay until on_batch_end, and may be freed there. */
 #ifndef PSRD_LOOP_H
 #define PSRD_LOOP_H
 
@@ -32,7 +32,7 @@ struct loop {
 	struct loop_source signals, ticks, wake;
 	pthread_mutex_t mutex;
 	struct loop_note *first_note, **last_note; /* under the mutex */
-	uint64_t now_us;        /* monotonic, of this batch */
+	uint64_t now_us;        /* monotonic; when this batch began */
 	int is_stopping;
 	struct epoll_event batch[LOOP_BATCH];
 	int at, n_batch;
@@ -42,17 +42,16 @@ struct loop {
 	void *userdata;         /* of these three */
 };
 
-/* Blocks `signals` in this thread (and those started later) and takes them as events. IO. */
+/* Blocks `signals` in this thread and later ones, and delivers them to on_signal. IO. */
 int loop_init(struct loop *loop, const sigset_t *signals, struct psr_error *err);
 void loop_fini(struct loop *loop);
 
 int loop_add(struct loop *loop, struct loop_source *source, uint32_t events, struct psr_error *err); /* IO */
 void loop_set(struct loop *loop, struct loop_source *source, uint32_t events);
-void loop_remove(struct loop *loop, struct loop_source *source); /* no event of it comes any more; does not close */
+void loop_remove(struct loop *loop, struct loop_source *source); /* no callback comes any more; fd stays open */
 void loop_set_ticking(struct loop *loop, int on); /* on_tick every LOOP_TICK_US */
 
 void loop_post(struct loop *loop, struct loop_note *note); /* any thread: fn(userdata) runs in the loop, in order */
-uint64_t loop_clock_us(void);                              /* any thread: CLOCK_MONOTONIC */
 
 int loop_run(struct loop *loop, struct psr_error *err); /* until loop_stop; IO */
 void loop_stop(struct loop *loop);

@@ -1,13 +1,11 @@
 #include <string.h>
-#include "server/net/conn.h"
-#include "session.h"
-#include "presets.h"
+#include "answers.h"
 #include "server/frames/wire.h"
 
 #define HOME_CAMERA "home"
 #define HOME_FOV 0.6108652381980153 /* 35 degrees, as the client's */
 
-/* What the protocol cannot hold is not sent. */
+/* Leaves out a preset that the protocol cannot hold. */
 static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_preset *msg, uint32_t *n_sent)
 {
 	uint8_t bytes[512];
@@ -19,7 +17,6 @@ static void send_preset(struct conn *conn, uint32_t id, const struct psr_msg_pre
 	++*n_sent;
 }
 
-/* The view that shows the whole model, its own way up, unless the file has a camera of this name. */
 static int make_home(struct psr_preset_camera *home, const struct psr_model *model)
 {
 	const struct psr_presets *presets = psr_model_presets(model);
@@ -35,10 +32,9 @@ static int make_home(struct psr_preset_camera *home, const struct psr_model *mod
 	return 1;
 }
 
-void session_send_presets(struct conn *conn, uint32_t id, uint32_t number)
+void answer_presets(struct session *session, uint32_t id, uint32_t handle)
 {
-	const struct session *session = &conn->session;
-	const struct psr_model *model = NULL;
+	const struct catalogue_model *found = handles_find(&session->handles, handle);
 	const struct psr_presets *presets;
 	struct psr_msg_presets_end end = { 0, 0 };
 	struct psr_preset_camera home;
@@ -46,26 +42,23 @@ void session_send_presets(struct conn *conn, uint32_t id, uint32_t number)
 	uint8_t bytes[64];
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
 
-	for (uint32_t i = 0; i < session->n_handles; i++)
-		if (session->handle[i].number == number)
-			model = session->handle[i].model->model;
-	if (model == NULL) {
-		session_refuse_handle(conn, id, number);
+	if (found == NULL) {
+		refuse_handle(session, id, handle);
 		return;
 	}
-	presets = psr_model_presets(model);
+	presets = psr_model_presets(found->model);
 	for (uint32_t i = 0; i < presets->n_cameras; i++) {
 		wire_from_camera(&msg, &presets->camera[i]);
-		send_preset(conn, id, &msg, &end.n_cameras);
+		send_preset(session->conn, id, &msg, &end.n_cameras);
 	}
-	if (make_home(&home, model)) {
+	if (make_home(&home, found->model)) {
 		wire_from_camera(&msg, &home);
-		send_preset(conn, id, &msg, &end.n_cameras);
+		send_preset(session->conn, id, &msg, &end.n_cameras);
 	}
 	for (uint32_t i = 0; i < presets->n_lights; i++) {
 		wire_from_light(&msg, &presets->light[i]);
-		send_preset(conn, id, &msg, &end.n_lights);
+		send_preset(session->conn, id, &msg, &end.n_lights);
 	}
 	if (psr_msg_presets_end_encode(&buf, id, &end, NULL) == PSR_OK)
-		conn_send(conn, &buf);
+		conn_send(session->conn, &buf);
 }

@@ -1,52 +1,36 @@
-/* A connection's session: messages to actions. Handles of open models, scenes, open ids. */
+/* A client's session: messages to actions. Models that it has open, scenes, unanswered requests. */
 #ifndef PSRD_SESSION_H
 #define PSRD_SESSION_H
 
-#include <stdint.h>
-#include "server/models/catalogue.h"
-#include "psr/proto.h"
-#include "psr/scene.h"
+#include "server/frames/frames.h"
+#include "server/models/opener.h"
+#include "server/options.h"
 
-struct conn;
-
-/* What a SCENE message became: immutable, shared by its slot and the frames that were asked for while it stood there.
- * Counted in the loop's thread. */
-struct scene {
-	uint32_t n_refs;
+/* What all sessions share. */
+struct sessions {
+	const struct options *options;
+	struct conns *conns;
 	struct catalogue *catalogue;
-	struct psr_scene scene;      /* camera unset */
-	uint8_t background[3];
-	struct psr_instance *instance;
-	struct catalogue_model **model; /* one an instance, each a reference */
-	struct psr_light light[PSR_WIRE_MAX_LIGHTS];
-};
-
-struct scene *scene_ref(struct scene *scene);
-void scene_unref(struct scene *scene); /* NULL is fine */
-
-struct handle {
-	uint32_t number;
-	struct catalogue_model *model; /* a reference */
+	struct opener *opener;
+	struct frames *frames;
+	struct psr_pool *pool;
+	uint64_t start_us;          /* of the daemon */
+	struct psr_msg_scene scene; /* scratch: 80 KiB */
 };
 
 struct session {
-	uint32_t last_id, n_open, last_handle;
-	struct handle *handle;
-	uint32_t n_handles;
+	struct sessions *all;
+	struct conn *conn;
+	uint32_t last_id;
+	uint32_t n_open;            /* OPEN and FRAME requests that are unanswered */
+	struct handles handles;
 	struct scene *slot[PSR_WIRE_MAX_SCENES];
+	struct flow flow;
 };
 
-int session_init(struct session *session, uint32_t max_handles); /* MEMORY */
-void session_fini(struct session *session, struct catalogue *catalogue);
-
-/* One message of an accepted client. PSR_OK, or a negative code: the peer broke the protocol. */
-int session_take(struct conn *conn, const struct psr_message *message, struct psr_error *err);
-
-/* Ends OPEN `id`: a handle and OPENED, or an ERROR if there is no handle left. */
-void session_opened(struct conn *conn, uint32_t id, struct catalogue_model *model);
-
-/* Ends any open id by an ERROR. */
-void session_refuse(struct conn *conn, uint32_t id, uint16_t view, int code, const char *text);
-void session_refuse_handle(struct conn *conn, uint32_t id, uint32_t handle);
+/* What the layers below call; userdata of the first is the struct sessions. */
+void sessions_conn_user(struct conn_user *user, struct sessions *sessions);
+extern const struct opener_user sessions_opener_user;
+void sessions_on_frame_end(struct flow *flow, uint32_t id, uint16_t view, int code, const char *text);
 
 #endif

@@ -4,16 +4,8 @@
 #include <string.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
-
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
+#include "base/clock.h"
 
 static double seconds_of(struct timeval t)
 {
@@ -23,7 +15,7 @@ static double seconds_of(struct timeval t)
 int child_run(struct child_use *use, const char *const *argv)
 {
 	struct rusage usage;
-	double start = now();
+	double start = clock_seconds();
 	int status, null;
 	pid_t pid = fork();
 
@@ -39,7 +31,7 @@ int child_run(struct child_use *use, const char *const *argv)
 	}
 	if (wait4(pid, &status, 0, &usage) != pid || !WIFEXITED(status))
 		return -1;
-	use->seconds = now() - start;
+	use->seconds = clock_seconds() - start;
 	use->cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
 	use->peak_mib = (double)usage.ru_maxrss / 1024;
 	return WEXITSTATUS(status);

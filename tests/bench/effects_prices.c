@@ -8,6 +8,7 @@
 #include "price.h"
 #include "report.h"
 #include "scene.h"
+#include "model/blocks.h"
 
 #define SIDE 1024
 #define N_FRAMES 24
@@ -159,7 +160,7 @@ static void prepare(struct stage *stage, struct price_side *side, const struct l
 		stage->instance[0].model = stage->model;
 	}
 	set_lights(stage, film);
-	psr_settings_default(&side->settings, SIDE, SIDE);
+	render_settings_default(&side->settings, SIDE, SIDE);
 	side->settings.cull_tests &= ~look->without_tests;
 	side->settings.is_full = look->is_full;
 	side->settings.is_smooth = look->is_smooth;

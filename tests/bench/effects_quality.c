@@ -7,7 +7,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "price.h"
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "report.h"
 #include "scene.h"
 
@@ -97,7 +97,7 @@ struct drawn {
 	struct psr_report report;
 };
 
-static void draw(struct drawn *out, const struct truth *truth, const struct psr_settings *settings)
+static void draw(struct drawn *out, const struct truth *truth, const struct render_settings *settings)
 {
 	struct psr_frame frame = { .width = SIDE, .height = SIDE };
 	struct psr_renderer *renderer;
@@ -107,7 +107,7 @@ static void draw(struct drawn *out, const struct truth *truth, const struct psr_
 	out->rgb = frame.rgb = report_alloc((size_t)SIDE * SIDE, 3);
 	out->depth = frame.depth = report_alloc((size_t)SIDE * SIDE, sizeof(float));
 	scene(&drawn, 0, &truth->film);
-	if (psr_renderer_create(&renderer) != PSR_OK || psr_render(renderer, &drawn, settings, NULL, &frame, &err) != PSR_OK)
+	if (psr_renderer_create(&renderer, NULL) != PSR_OK || renderer_draw(renderer, &drawn, settings, NULL, &frame, &err) != PSR_OK)
 		report_die("psr_render", "fails");
 	out->report = frame.report;
 	psr_renderer_destroy(renderer);
@@ -134,11 +134,11 @@ void effects_spacing(const struct effects *effects)
 	static const double spacing[] = { 0.5, 0.7, 1, 1.41, 2, 4 };
 	struct truth truth;
 	struct drawn finest, drawn;
-	struct psr_settings settings;
+	struct render_settings settings;
 
 	film_make(&truth.film, effects->model, 0.26);
 	truth_make(&truth, effects->source, effects->n_threads);
-	psr_settings_default(&settings, SIDE, SIDE);
+	render_settings_default(&settings, SIDE, SIDE);
 	const struct price_side usual = { .settings = settings, .scene = scene, .userdata = &truth.film };
 	settings.spacing = spacing[0];
 	draw(&finest, &truth, &settings);
@@ -180,13 +180,13 @@ static void gaps_row(const struct truth *truth, const char *name, double magnifi
 {
 	static const char *const names[] = { "bilinear", "opaque" };
 	cJSON *item = report_add(report_array("gaps"));
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_accuracy accuracy;
 	struct psr_scene seen;
 	struct drawn drawn;
 	struct psr_error err;
 
-	psr_settings_default(&settings, SIDE, SIDE);
+	render_settings_default(&settings, SIDE, SIDE);
 	settings.gap_method = method;
 	draw(&drawn, truth, &settings);
 	scene(&seen, 0, &truth->film);

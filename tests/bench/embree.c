@@ -9,7 +9,8 @@
 #include <pmmintrin.h>
 #endif
 #include "base/srgb.h"
-#include "psr/pool.h"
+#include "base/pool.h"
+#include "base/stats.h"
 #include "report.h"
 
 #define N 16    /* a packet: 4 x 4 pixels */
@@ -259,7 +260,7 @@ void embree_measure(struct peer_result *out, const struct scene_film *film, cons
 	struct psr_pool *pool;
 	double begin = report_ms(), ms[SCENE_FRAMES];
 
-	if (psr_pool_create(&pool, n_threads, 0) != PSR_OK)
+	if (psr_pool_create(&pool, n_threads, NULL) != PSR_OK)
 		report_die("threads", "cannot be started");
 	build(t, mesh, n_threads);
 	t->has_shadow = has_shadow;
@@ -276,7 +277,7 @@ void embree_measure(struct peer_result *out, const struct scene_film *film, cons
 		draw(t, pool, film, i * SCENE_FRAMES / n_frames);
 		ms[i] = report_ms() - begin;
 	}
-	out->ms = report_median(ms, n_frames);
+	out->ms = stats_median(ms, (size_t)n_frames);
 	out->n_frames = n_frames;
 	snprintf(out->what, sizeof out->what, "Embree %d.%d.%d, packets of %d",
 	         (int)rtcGetDeviceProperty(t->device, RTC_DEVICE_PROPERTY_VERSION_MAJOR),

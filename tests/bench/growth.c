@@ -8,6 +8,7 @@
 #include "ours.h"
 #include "parts.h"
 #include "report.h"
+#include "model/blocks.h"
 
 #define SIDE 1024
 #define FEWEST_SAMPLES 1e5
@@ -217,7 +218,7 @@ void growth_run(const struct part *part, const struct subject *subject)
 	struct psr_model *small;
 	char source[4096];
 
-	printf("\nHow time grows: %s at %d, %d threads, nothing encoded", subject->name,
+	printf("\nHow time grows: %s at %d, %d threads, nothing encoded\n", subject->name,
 	       subject->resolution[N_PICTURES - 1], part->n_threads);
 	samples(job, part, model);
 	pixels(job, part, model);

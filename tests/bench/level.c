@@ -2,6 +2,7 @@
 #include <string.h>
 #include "report.h"
 #include "scene.h"
+#include "model/blocks.h"
 
 #define RUN_MASKS 256
 

@@ -9,9 +9,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/stats.h"
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "surface/material.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "report.h"
 
 #define N_WARM 2
@@ -301,7 +303,7 @@ void llvmpipe_measure(struct peer_result *out, enum llvmpipe_way way, const stru
 		draw(&gl, film, i * SCENE_FRAMES / n_frames);
 		ms[i] = report_ms() - begin;
 	}
-	out->ms = report_median(ms, n_frames);
+	out->ms = stats_median(ms, (size_t)n_frames);
 	out->n_frames = n_frames;
 	OSMesaDestroyContext(gl.context);
 	free(gl.screen);

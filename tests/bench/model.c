@@ -12,7 +12,7 @@
 #include "child.h"
 #include "measure/rate.h"
 #include "psr/mesh.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 
 #define MAX_SECONDS 2.0          /* the standard set at 256, on two cores */
 #define MAX_BYTES_IN_MEMORY 12.5 /* a valid sample of all levels, all overhead included; the thesis: 95 bits */

@@ -2,9 +2,11 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include "base/stats.h"
 #include "psr/build.h"
 #include "psr/proto.h"
 #include "report.h"
+#include "render/stages.h"
 #include "server/frames/codec.h"
 
 #define MAX_FRAMES 512
@@ -16,7 +18,7 @@ struct bench {
 	struct psr_renderer *renderer;
 	struct codec *codec;
 	struct psr_frame frame;
-	struct psr_settings settings;
+	struct render_settings settings;
 };
 
 int ours_threads(void)
@@ -30,10 +32,10 @@ int ours_threads(void)
 static void bench_init(struct bench *bench, uint32_t width, uint32_t height, int n_threads)
 {
 	memset(bench, 0, sizeof *bench);
-	if (psr_pool_create(&bench->pool, n_threads, 0) != PSR_OK || psr_renderer_create(&bench->renderer) != PSR_OK
+	if (psr_pool_create(&bench->pool, n_threads, NULL) != PSR_OK || psr_renderer_create(&bench->renderer, NULL) != PSR_OK
 	    || codec_create(&bench->codec) != PSR_OK)
 		report_die("psr", "cannot be started");
-	psr_settings_default(&bench->settings, width, height);
+	render_settings_default(&bench->settings, width, height);
 	bench->frame = (struct psr_frame){ .width = width, .height = height,
 		                               .rgb = report_alloc((size_t)width * height, 3) };
 }
@@ -50,20 +52,21 @@ static void draw(struct bench *bench, const struct psr_scene *scene)
 {
 	struct psr_error err;
 
-	if (psr_render(bench->renderer, scene, &bench->settings, bench->pool, &bench->frame, &err) != PSR_OK)
+	if (renderer_draw(bench->renderer, scene, &bench->settings, bench->pool, &bench->frame, &err) != PSR_OK)
 		report_die("psr_render", err.text);
 }
 
 static double encode(struct bench *bench)
 {
 	static const struct psr_msg_frame request = {
-		.planes = 1u << PSR_WIRE_PLANE_COLOR, .color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
+		.planes = 1u << PSR_PLANE_COLOR, .color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
 	};
 	static const uint8_t background[3];
+	const struct codec_answer answer = { .id = 1, .request = &request, .background = background };
 	struct codec_result result;
 	struct psr_error err;
 
-	if (codec_encode(&result, bench->codec, bench->pool, 1, 0, &request, &bench->frame, background, &err) != PSR_OK)
+	if (codec_encode(&result, bench->codec, bench->pool, &answer, &bench->frame, &err) != PSR_OK)
 		report_die("codec", err.text);
 	outq_chunks_destroy(result.first);
 	return (double)result.rect_bytes;
@@ -95,11 +98,11 @@ static void summarize(struct ours_result *out, struct series *series)
 
 	for (size_t i = 0; i < sizeof sum / sizeof sum[0]; i++)
 		*sum[i] /= n;
-	out->ms = report_median(series->ms, out->n_frames);
-	out->ms_encoded = report_median(series->ms_encoded, out->n_frames);
+	out->ms = stats_median(series->ms, (size_t)out->n_frames);
+	out->ms_encoded = stats_median(series->ms_encoded, (size_t)out->n_frames);
 	for (int s = 0; s < PSR_N_STAGES; s++) {
 		out->count[s] /= n;
-		out->stage_ms[s] = report_median(series->stage_ms[s], out->n_frames);
+		out->stage_ms[s] = stats_median(series->stage_ms[s], (size_t)out->n_frames);
 	}
 }
 

@@ -4,8 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "surface/material.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "report.h"
 
 static void look_of(struct peer_look *out, uint64_t attr)

@@ -117,7 +117,7 @@ static void print_ratios(const struct scene_film *film, const struct cell *cell)
 static void print_ours(const struct part *part, const struct subject *subject, const struct scene_film *film,
                        const struct cell *cell)
 {
-	printf("%-24s | %8s %8s | %8s %8s | %6s %6s | ", "ours, ms", "1 thread", "JPEG", "threads", "JPEG", "kB", "MB");
+	printf("\n%-24s | %8s %8s | %8s %8s | %6s %6s | ", "ours, ms", "1 thread", "JPEG", "threads", "JPEG", "kB", "MB");
 	for (int s = 0; s < PSR_N_STAGES; s++)
 		printf(" %7s", psr_stage_name((enum psr_stage)s));
 	printf(" | %6s %7s %6s\n%-24s | %8s %8s | %8d %8s | %6s %6s |\n", "Mpt", "pt a px", "model", "", "", "q90",
@@ -138,7 +138,7 @@ static void print_ours(const struct part *part, const struct subject *subject, c
 static void print_agreement(const struct part *part, const struct subject *subject, const struct scene_film *film,
                             const struct cell *cell)
 {
-	printf("%-24s | same silhouette, %%; difference of shading, codes of 255\n%-24s |", "the same picture?", "");
+	printf("\n%-24s | same silhouette, %%; difference of shading, codes of 255\n%-24s |", "the same picture?", "");
 	for (int p = 0; p < N_PEERS; p++)
 		printf(" %22s", peer_name[p]);
 	puts("");

@@ -1,7 +1,8 @@
 #include "price.h"
 
 #include <stdlib.h>
-#include <time.h>
+#include "base/clock.h"
+#include "base/stats.h"
 #include "report.h"
 
 struct drawer {
@@ -20,7 +21,7 @@ static void begin(struct drawer *drawer, const struct price_side *side, struct p
 	drawer->frame.height = side->settings.height;
 	drawer->frame.rgb = report_alloc(area, 3);
 	drawer->frame.depth = side->has_depth ? report_alloc(area, sizeof(float)) : NULL;
-	if (psr_renderer_create(&drawer->renderer) != PSR_OK)
+	if (psr_renderer_create(&drawer->renderer, NULL) != PSR_OK)
 		report_die("psr", "cannot be started");
 }
 
@@ -33,10 +34,7 @@ static void end(struct drawer *drawer)
 
 static double clock_ms(const struct drawer *drawer)
 {
-	struct timespec t;
-
-	clock_gettime(drawer->pool != NULL ? CLOCK_MONOTONIC : CLOCK_THREAD_CPUTIME_ID, &t);
-	return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
+	return (double)(drawer->pool != NULL ? clock_ns() : clock_thread_ns()) * 1e-6;
 }
 
 static double draw(struct drawer *drawer, int frame)
@@ -47,7 +45,7 @@ static double draw(struct drawer *drawer, int frame)
 
 	drawer->side->scene(&scene, frame, drawer->side->userdata);
 	start = clock_ms(drawer);
-	if (psr_render(drawer->renderer, &scene, &drawer->side->settings, drawer->pool, &drawer->frame, &err) != PSR_OK)
+	if (renderer_draw(drawer->renderer, &scene, &drawer->side->settings, drawer->pool, &drawer->frame, &err) != PSR_OK)
 		report_die("psr_render", err.text);
 	return clock_ms(drawer) - start;
 }
@@ -60,7 +58,7 @@ void price_measure(struct price *out, const struct price_side *with, const struc
 	struct psr_pool *pool = NULL;
 	struct drawer a, b;
 
-	if (n_threads > 1 && psr_pool_create(&pool, n_threads, 0) != PSR_OK)
+	if (n_threads > 1 && psr_pool_create(&pool, n_threads, NULL) != PSR_OK)
 		report_die("psr", "cannot be started");
 	begin(&a, with, pool);
 	begin(&b, without, pool);
@@ -76,10 +74,10 @@ void price_measure(struct price *out, const struct price_side *with, const struc
 			stage[s * n_frames + i] = (double)a.frame.report.ns[s] * 1e-6;
 	}
 	out->report = a.frame.report;
-	out->ms = report_median(ms, n_frames);
-	out->more_ms = report_median(more, n_frames);
+	out->ms = stats_median(ms, (size_t)n_frames);
+	out->more_ms = stats_median(more, (size_t)n_frames);
 	for (int s = 0; s < PSR_N_STAGES; s++)
-		out->stage_ms[s] = report_median(stage + s * n_frames, n_frames);
+		out->stage_ms[s] = stats_median(stage + s * n_frames, (size_t)n_frames);
 	end(&a);
 	end(&b);
 	psr_pool_destroy(pool);

@@ -3,10 +3,10 @@
 #ifndef TESTS_BENCH_PRICE_H
 #define TESTS_BENCH_PRICE_H
 
-#include "psr/render.h"
+#include "render/stages.h"
 
 struct price_side {
-	struct psr_settings settings;
+	struct render_settings settings;
 	int has_depth; /* the plane is asked for */
 	/* The scene of frame i; it must stay until the next call. */
 	void (*scene)(struct psr_scene *scene, int frame, const void *userdata);

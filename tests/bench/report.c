@@ -1,30 +1,14 @@
+#include "base/clock.h"
 #include "report.h"
 
 #include <stdio.h>
 #include <stdlib.h>
-#include <time.h>
 
 static cJSON *root;
 
 double report_ms(void)
 {
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec * 1e3 + (double)t.tv_nsec * 1e-6;
-}
-
-static int compare(const void *a, const void *b)
-{
-	const double x = *(const double *)a, y = *(const double *)b;
-
-	return (x > y) - (x < y);
-}
-
-double report_median(double *value, int n)
-{
-	qsort(value, (size_t)n, sizeof *value, compare);
-	return (value[(n - 1) / 2] + value[n / 2]) / 2;
+	return (double)clock_ns() * 1e-6;
 }
 
 double report_ratio(double a, double b)
@@ -121,7 +105,7 @@ void report_print_targets(void)
 	cJSON_ArrayForEach(item, list) {
 		const int met = cJSON_IsTrue(cJSON_GetObjectItemCaseSensitive(item, "met"));
 
-		printf("%-68s %9.4g %-6s %s %6g: %s\n", text_of(item, "what"), number_of(item, "value"), text_of(item, "unit"),
+		printf("%-48s %9.4g %-6s %s %6g: %s\n", text_of(item, "what"), number_of(item, "value"), text_of(item, "unit"),
 		       text_of(item, "kind"), number_of(item, "bound"), met ? "met" : "missed");
 		n++;
 		n_met += met;

@@ -6,7 +6,6 @@
 #include <stdint.h>
 
 double report_ms(void);                    /* a clock */
-double report_median(double *value, int n); /* sorts them; n >= 1 */
 double report_ratio(double a, double b);   /* a / b, 0 if b is */
 
 void report_die(const char *what, const char *detail) __attribute__((noreturn));

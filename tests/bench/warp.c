@@ -3,7 +3,7 @@
 #include "isolate.h"
 #include "ours.h"
 #include "parts.h"
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "report.h"
 
 #define SIDE 1024

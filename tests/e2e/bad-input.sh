@@ -119,7 +119,7 @@ refuses "no model" 2 "--model NAME is missing" psr shot --server "$server" --has
 echo "what was there" >"$work/old.png"
 refuses "an unknown model, over an old picture" 3 "no model nosuch" shot --model nosuch -o "$work/old.png"
 check "a failed shot leaves the old picture" grep -q "what was there" "$work/old.png"
-check "nothing temporary is left beside it" bash -c "! ls -A $work | grep -v '^psrd.log$' | grep -E 'tmp|a\.(png|pfm|exr|xyz|json)'"
+check "nothing temporary is left beside it" bash -c "! ls -A $work | grep -v '^psrd.log$' | grep -E '^\.psr-|tmp|a\.(png|pfm|exr|xyz|json)'"
 
 # --- servers that are none ---
 refuses "a port where nobody listens" 6 "cannot connect to 127.0.0.1:1: " psr list --server 127.0.0.1:1
@@ -156,7 +156,7 @@ for address in 0.0.0.0:0 8.8.8.8:0 '[::]:0'; do
 done
 refuses "a port out of range" 2 "--listen 127.0.0.1:99999" daemon --listen 127.0.0.1:99999
 refuses "a socket in a folder that is not there" 3 "unix:$work/nosuch/s" daemon --listen "unix:$work/nosuch/s"
-refuses "a socket where a file is" 2 "unix:$work/old.png: a file that is no socket" daemon --listen "unix:$work/old.png"
+refuses "a socket where a file is" 2 "unix:$work/old.png: exists and is not a socket" daemon --listen "unix:$work/old.png"
 check "and the file is still there" grep -q "what was there" "$work/old.png"
 refuses "a models folder that is not there" 3 "$work/nosuch: " daemon --models "$work/nosuch"
 refuses "a models folder that is a file" 3 "$work/old.png: " daemon --models "$work/old.png"

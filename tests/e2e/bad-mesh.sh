@@ -149,4 +149,4 @@ refuses "accuracy of a depth that is not there" 3 "nosuch.pfm" limited accuracy 
 refuses "accuracy of a depth that is none" 4 "made.ply" limited accuracy made.ply --depth made.ply --eye 0,0,1 \
 	--target 0,0,0 --up 0,1,0 --fov 30 --spacing 1
 PSR_ISA=sse9 refuses "a PSR_ISA that is none" 2 "PSR_ISA is 'sse9'; it takes c, avx2 or avx512" limited make top -o a.glb
-check "nothing temporary is left" bash -c '! ls -A | grep -F .tmp'
+check "nothing temporary is left" bash -c '! ls -A | grep -F .psr-'

@@ -156,7 +156,7 @@ fi
 # --- a build that is ended while it writes: a stand-in for psr-model that stays in the middle of it ---
 mkdir "$work/stuck"
 cp "$BUILD/bin/psrd" "$work/stuck"
-printf '#!/bin/sh\necho part >"$4.$$-0.tmp"\necho "write 1 2" >&3\nexec sleep 60\n' >"$work/stuck/psr-model"
+printf '#!/bin/sh\necho part >"$(dirname "$4")/.psr-$$-0.tmp"\necho "write 1 2" >&3\nexec sleep 60\n' >"$work/stuck/psr-model"
 chmod +x "$work/stuck/psr-model"
 search=$PATH PATH=$work/stuck:$PATH
 start

@@ -15,8 +15,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 void __sanitizer_set_death_callback(void (*callback)(void)) __attribute__((weak));
@@ -207,14 +207,6 @@ static size_t mutate(uint8_t *data, size_t n)
 	}
 }
 
-static double seconds(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static double number(const char *text)
 {
 	char *end;
@@ -268,8 +260,8 @@ int main(int argc, char **argv)
 		snprintf(crash_path, sizeof crash_path, "%.*scrash-%s-corpus-%zu", folder, argv[0], name, i);
 		run(corpus[i].data, corpus[i].n);
 	}
-	start = seconds();
-	for (; budget > 0 && seconds() - start < budget; round++) {
+	start = clock_seconds();
+	for (; budget > 0 && clock_seconds() - start < budget; round++) {
 		const struct input *in;
 		size_t n;
 
@@ -283,7 +275,7 @@ int main(int argc, char **argv)
 		run(data, n);
 	}
 	printf("1..1\nok 1 - %s survives %zu files and %llu mutations in %.1f s, seed %llu\n", name, n_corpus, round,
-	       seconds() - start, seed);
+	       clock_seconds() - start, seed);
 	for (size_t i = 0; i < n_corpus; i++) {
 		free(corpus[i].name);
 		free(corpus[i].data);

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <xxhash.h>
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "simd/simd.h"
 #include "shot.h"
 
@@ -88,7 +88,7 @@ static uint32_t make_ways(struct way *ways)
 		for (int threads = 1; threads <= N_POOLS; threads++) {
 			struct way *way = &ways[n++];
 			*way = (struct way){ .isa = (enum psr_isa)isa, .n_threads = threads };
-			if (psr_renderer_create(&way->renderer) || psr_pool_create(&way->pool, threads, 0))
+			if (psr_renderer_create(&way->renderer, NULL) || psr_pool_create(&way->pool, threads, NULL))
 				stop("a renderer is made", "no memory");
 		}
 	}

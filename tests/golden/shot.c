@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/cli.h"
+#include "base/cli.h"
 #include "psr/client.h"
 #include "server/frames/wire.h"
 #include "shot.h"
@@ -62,7 +62,7 @@ static int make_scene(struct shot *shot, struct words *words, struct psr_error *
 	if (rc)
 		return rc;
 	if (!words->n_lights && !words->has_ambient)
-		psr_light_key(&words->light[words->n_lights++], &camera);
+		client_light_key(&words->light[words->n_lights++], &camera);
 	wire_to_camera(&shot->scene.camera, &camera);
 	for (uint32_t i = 0; i < words->n_lights; i++)
 		wire_to_light(&shot->light[i], &words->light[i]);

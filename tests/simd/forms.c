@@ -5,8 +5,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
-#include "psr/isa.h"
+#include "base/clock.h"
+#include "simd/isa.h"
 #include "simd/block.h"
 
 #define JOBS 256
@@ -370,24 +370,17 @@ static int run_tests(void)
 	return failed;
 }
 
-static double seconds(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
-
 static double ns_a_sample(form_fn *form, const struct job *job)
 {
 	struct places places;
 	double best = INFINITY;
 	for (int round = 0; round < 40; round++) {
-		const double start = seconds();
+		const double start = clock_seconds();
 		for (int j = 0; j < JOBS; j++) {
 			form(&places, &job[j]);
 			__asm__ volatile("" : : "r"(&places) : "memory");
 		}
-		best = fmin(best, (seconds() - start) * 1e9 / JOBS / SAMPLES);
+		best = fmin(best, (clock_seconds() - start) * 1e9 / JOBS / SAMPLES);
 	}
 	return best;
 }
@@ -399,9 +392,9 @@ static int run_bench(void)
 	struct places places;
 	for (int j = 0; j < JOBS; j++)
 		random_job(&job[j], 0);
-	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in pixels of a\n"
-	       "picture of %g, by |A_zz| of the projection: from 1/2, from 1/16, less; and of the first seen from %g\n"
-	       "times as near\n",
+	printf("\nforms of the warp ([G] 7.1), full blocks: ns a sample by instruction set; greatest error in\n"
+	       "pixels of a picture of %g, by |A_zz| of the projection: from 1/2, from 1/16, less; and of the\n"
+	       "first seen from %g times as near\n",
 	       PICTURE, DISTANCE * 16);
 	for (int form = 0; form < N_FORMS; form++) {
 		double most[4] = { 0, 0, 0, 0 };

@@ -4,7 +4,7 @@
 #include <stddef.h>
 #include <string.h>
 #include "base/maths.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "tests/simd/lib/check.h"
 
 static void settle(struct strip *strip)

@@ -2,7 +2,7 @@
 #include <stddef.h>
 #include <string.h>
 #include "base/maths.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "tests/simd/lib/blocks.h"
 
 #define MAX_INSTANCES 3
@@ -170,7 +170,7 @@ int main(int argc, char **argv)
 		{ "strip_find, strip_read, strip_resolve: random samples", random_resolve, 1000, NULL },
 		{ "strip_find, strip_read, strip_resolve: any numbers", spoilt_resolve, 1000, NULL },
 		{ "strip_list", bench_list, 0, "pixel" },
-		{ "strip_find, strip_read, strip_resolve, neither light nor two sides", bench_resolve, 0, "sample" },
+		{ "strip_find, strip_read, strip_resolve", bench_resolve, 0, "sample" },
 		{ "the same, with positions", bench_positions, 0, "sample" },
 	};
 	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);

@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "tests/simd/lib/blocks.h"
 
 #define MAX_INSTANCES 3

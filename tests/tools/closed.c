@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "measure/truth.h"
-#include "psr/render.h"
+#include "render/stages.h"
 
 #define INSIDE 4
 #define VIEWS 5
@@ -22,9 +22,9 @@ static const double direction[VIEWS][3] = {
 struct closed {
 	struct psr_instance instance;
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner;
+	struct refiner *refiner;
 	struct psr_pool *pool;
 	struct psr_mesh *mesh;
 	struct psr_truth *truth;
@@ -67,7 +67,8 @@ static void draw(struct closed *c, unsigned pass)
 		for (int k = 0; k < 3; k++)
 			c->scene.background[k] = k == 2 * b;
 		c->frame[b].depth = pass ? NULL : c->depth;
-		if (psr_refine(c->refiner, &c->scene, &c->settings, pass, c->pool, NULL, NULL, &c->frame[b], &err))
+		c->settings.pass = pass;
+		if (refiner_draw(c->refiner, &c->scene, &c->settings, c->pool, &c->frame[b], &err))
 			die(err.text);
 	}
 }
@@ -166,11 +167,11 @@ int main(int argc, char **argv)
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
 		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
-	if (psr_renderer_create(&c.renderer) || psr_refiner_create(&c.refiner, c.renderer) || psr_pool_create(&c.pool, 2, 0))
+	if (psr_renderer_create(&c.renderer, NULL) || refiner_create(&c.refiner, c.renderer, NULL) || psr_pool_create(&c.pool, 2, NULL))
 		die("no memory");
 	c.instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	c.scene = (struct psr_scene){ .instance = &c.instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
-	psr_settings_default(&c.settings, c.side, c.side);
+	render_settings_default(&c.settings, c.side, c.side);
 	for (int v = 0; v < VIEWS; v++) {
 		struct view view;
 		look_from(&c, psr_model_info(model), direction[v]);
@@ -190,7 +191,7 @@ int main(int argc, char **argv)
 	free(c.depth);
 	free(c.is_solid);
 	free(c.is_inside);
-	psr_refiner_destroy(c.refiner);
+	refiner_destroy(c.refiner);
 	psr_renderer_destroy(c.renderer);
 	psr_pool_destroy(c.pool);
 	psr_truth_destroy(c.truth);

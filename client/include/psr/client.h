@@ -10,7 +10,6 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
-#include "picture.h"
 #include "psr/proto.h"
 
 #ifdef __cplusplus
@@ -88,7 +87,7 @@ struct psr_event {
 	enum psr_event_type type;
 	uint32_t id;
 	/* FRAME; pointers are valid until the next call with this client: */
-	const struct psr_picture *picture;
+	const struct psr_frame *picture;
 	const struct psr_msg_frame_begin *begin;
 	const struct psr_msg_frame_end *end;
 	uint64_t bytes;      /* of the frame's messages, headers included */
@@ -152,7 +151,7 @@ void psr_camera_turn(struct psr_msg_camera *camera, const double up[3], double d
 
 /* The light of pictures for which nobody asked for one: directional, white, from behind the camera, above it and to its
  * left. */
-void psr_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera);
+void client_light_key(struct psr_msg_light *light, const struct psr_msg_camera *camera);
 
 #ifdef __cplusplus
 }

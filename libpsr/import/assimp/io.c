@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 #include "io.h"
 
 struct open_file {
@@ -68,7 +69,7 @@ static int open_named(struct open_file *f, struct assimp_io *io, const char *nam
 	char *path;
 	int rc = import_path_inside(&path, io->folder, name, &error);
 	if (rc == PSR_OK) {
-		rc = import_file_read(&f->owned, &f->n_bytes, path, IMPORT_MAX_FILE, &error);
+		rc = infile_read(&f->owned, &f->n_bytes, path, IMPORT_MAX_FILE, &error);
 		free(path);
 	}
 	/* Assimp also probes for optional files. */

@@ -1,6 +1,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 #include "texture.h"
 #include "import/image/image_kind.h"
 
@@ -86,7 +87,7 @@ static int find_or_add(struct assimp_io *io, struct aiString *name, struct psr_e
 		free(path);
 		return rc;
 	}
-	rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+	rc = infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 	if (rc != PSR_OK) {
 		free(path);
 		return rc;

@@ -93,7 +93,7 @@ static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh, int n_th
 	rc = cloud_tree_build(cloud, (const double(*)[3])mesh->point);
 	if (rc != PSR_OK)
 		return rc;
-	return psr_pool_create(&cloud->pool, n_threads, 0);
+	return psr_pool_create(&cloud->pool, n_threads, NULL);
 }
 
 /* Copies normals from the mesh; returns how many are missing. */

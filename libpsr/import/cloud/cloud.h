@@ -6,7 +6,7 @@
 #define PSR_IMPORT_CLOUD_CLOUD_H
 
 #include "import/import.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 #define CLOUD_NEIGHBOURS 16
 

@@ -1,5 +1,6 @@
 #include <cstdlib>
 #include <memory>
+#include "base/infile.h"
 #include "gltf.h"
 
 namespace gltf {
@@ -84,7 +85,7 @@ std::vector<uint8_t> read_uri(const source &s, const std::string &uri, const std
 
 	std::unique_ptr<char, decltype(&std::free)> path_guard(path, &std::free);
 
-	if (import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, &error) != PSR_OK)
+	if (infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, &error) != PSR_OK)
 		refuse(error.code, "%s: %s", place.c_str(), error.text);
 
 	std::unique_ptr<uint8_t, decltype(&std::free)> bytes_guard(bytes, &std::free);

@@ -1,5 +1,6 @@
 #include <stdlib.h>
 #include <string.h>
+#include "base/infile.h"
 #include "ply.h"
 
 static int load_image(int *image, struct import_mesh *im, const char *name, struct psr_error *err)
@@ -11,7 +12,7 @@ static int load_image(int *image, struct import_mesh *im, const char *name, stru
 	if (rc == PSR_OK && import_path_inside(&path, folder, name, NULL) != PSR_OK) {
 		import_mesh_warn(im, "the texture \"%.100s\" is not in the folder of the file and was left out", name);
 	} else if (rc == PSR_OK) {
-		rc = import_file_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
+		rc = infile_read(&bytes, &n_bytes, path, IMPORT_MAX_FILE, err);
 		if (rc == PSR_OK)
 			rc = *image = import_mesh_add_image(im, bytes, n_bytes, path, err);
 	}

@@ -116,6 +116,13 @@ void psr_import_options_default(struct psr_import_options *options); /* 35 degre
 int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_import_options *options,
                     struct psr_error *err);
 
+/* A mesh of the caller's arrays, which are copied: triangles counter-clockwise seen from the front, +Y up, one white
+ * rough material, normals as import computes them (smooth up to 35 degrees). Broken triangles are left out, see
+ * n_dropped_triangles. The mesh is the caller's, to change and to destroy. FORMAT: an index out of range, or no triangle
+ * with an area; LIMIT, MEMORY. */
+int psr_mesh_create(struct psr_mesh **out, const double (*position)[3], uint32_t n_vertices,
+                    const uint32_t (*triangle)[3], uint32_t n_triangles, struct psr_error *err);
+
 void psr_mesh_destroy(struct psr_mesh *mesh); /* NULL is fine */
 
 #ifdef __cplusplus

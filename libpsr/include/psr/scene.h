@@ -49,6 +49,9 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 /* Those axes, orthonormal: right, up, front. */
 void psr_camera_axes(double axes[3][3], const double up[3]);
 
+/* A white directional light from behind the camera, above it and to its left. */
+void psr_light_key(struct psr_light *light, const struct psr_camera *camera);
+
 #ifdef __cplusplus
 }
 #endif

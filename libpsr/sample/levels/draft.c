@@ -12,14 +12,22 @@ void draft_fini(struct draft *draft)
 	memset(draft, 0, sizeof *draft);
 }
 
+void draft_project(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3])
+{
+	double spacing = draft_spacing(draft, block);
+	int row = block->row + (int)(s / PSR_BLOCK_SIDE);
+
+	p[0] = (block->col + (int)(s % PSR_BLOCK_SIDE) + (row & 1) / 2.0) * spacing;
+	p[1] = row * 0.86602540378443864676 * spacing;
+	p[2] = (double)draft_sample(draft, block, s)->z;
+}
+
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3])
 {
-	const struct psr_projection *p = &draft->projection[block->projection];
-	double spacing = (double)p->spacing * (double)(1u << block->level), inner[3];
-	int row = block->row + (int)(s / PSR_BLOCK_SIDE), col = block->col + (int)(s % PSR_BLOCK_SIDE);
+	double p[3], inner[3];
 
-	sheets_inner(p, (col + (row & 1) / 2.0) * spacing, row * 0.86602540378443864676 * spacing,
-	             (double)draft_sample(draft, block, s)->z, inner);
+	draft_project(draft, block, s, p);
+	projection_inner(&draft->projection[block->projection], p[0], p[1], p[2], inner);
 	v3f_set(position, (float)inner[0], (float)inner[1], (float)inner[2]);
 }
 
@@ -46,21 +54,21 @@ static int reserve(struct draft *draft, uint64_t n_blocks, uint64_t n_samples)
 	return PSR_OK;
 }
 
-static uint32_t count_kept(const struct level *level)
+static uint32_t count_kept(const struct sheets *all)
 {
 	uint32_t n = 0;
 
-	for (unsigned i = 0; i < level->n_projections; i++)
-		for (uint32_t p = 0; p < level->sheets[i].n_patches; p++)
-			n += level->sheets[i].patch[p].kept != 0;
+	for (unsigned i = 0; i < N_PROJECTIONS; i++)
+		for (uint32_t p = 0; p < all[i].n_patches; p++)
+			n += all[i].patch[p].kept != 0;
 	return n;
 }
 
 /* Sets block_of[i][p], the number of a patch's block. */
-static void add_blocks(struct draft *draft, const struct level *level, uint32_t *const *block_of)
+static void add_blocks(struct draft *draft, const struct sheets *all, uint32_t *const *block_of)
 {
-	for (unsigned i = 0; i < level->n_projections; i++) {
-		const struct sheets *sheets = &level->sheets[i];
+	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
+		const struct sheets *sheets = &all[i];
 
 		for (uint32_t p = 0; p < sheets->n_patches; p++) {
 			const struct patch *patch = &sheets->patch[p];
@@ -84,37 +92,33 @@ static void add_blocks(struct draft *draft, const struct level *level, uint32_t 
 	}
 }
 
-static void set_attributes(struct draft *draft, const struct level *level, uint32_t *const *block_of)
+static void set_attributes(struct draft *draft, const struct kept *kept, uint32_t *const *block_of)
 {
-	for (uint32_t i = 0; i < level->cover.n_points; i++) {
-		const struct cover_point *point = &level->cover.point[i];
-		struct draft_block *block = &draft->block[block_of[point->projection][point->patch]];
+	for (uint32_t i = 0; i < kept->n; i++) {
+		const struct kept_sample *sample = &kept->sample[i];
+		struct draft_block *block = &draft->block[block_of[sample->projection][sample->patch]];
 
-		block->two_sided |= point->two_sided;
-		block->traits |= point->traits;
-		draft->sample[draft_sample(draft, block, point->sample) - draft->sample].attr = point->attr;
+		block->two_sided |= sample->two_sided;
+		block->traits |= sample->traits;
+		draft->sample[draft_sample(draft, block, sample->sample) - draft->sample].attr = sample->attr;
 	}
 }
 
-int draft_add(struct draft *draft, const struct level *level)
+int draft_add(struct draft *draft, const struct sheets *sheets, const struct kept *kept)
 {
-	uint32_t **block_of = calloc(level->n_projections, sizeof *block_of);
-	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(level),
-	                 (uint64_t)draft->n_samples + level->cover.n_points);
+	uint32_t *block_of[N_PROJECTIONS] = { NULL };
+	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(sheets), (uint64_t)draft->n_samples + kept->n);
 
-	if (block_of == NULL)
-		return PSR_ERR_MEMORY;
-	for (unsigned i = 0; rc == PSR_OK && i < level->n_projections; i++) {
-		block_of[i] = psr_alloc_array(level->sheets[i].n_patches, sizeof **block_of);
+	for (int i = 0; rc == PSR_OK && i < N_PROJECTIONS; i++) {
+		block_of[i] = psr_alloc_array(sheets[i].n_patches, sizeof **block_of);
 		rc = block_of[i] == NULL ? PSR_ERR_MEMORY : PSR_OK;
 	}
 	if (rc == PSR_OK) {
-		add_blocks(draft, level, block_of);
-		set_attributes(draft, level, block_of);
+		add_blocks(draft, sheets, block_of);
+		set_attributes(draft, kept, block_of);
 		draft->n_levels++;
 	}
-	for (unsigned i = 0; i < level->n_projections; i++)
+	for (int i = 0; i < N_PROJECTIONS; i++)
 		psr_free(block_of[i]);
-	free(block_of);
 	return rc;
 }

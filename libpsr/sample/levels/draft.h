@@ -1,14 +1,13 @@
-/* What is kept of a level, without what it was chosen from; and the pieces of the object that its levels are cut
- * into. */
+/* The kept samples of all levels in blocks, and the pieces of the object that levels are cut into. */
 #ifndef PSR_SAMPLE_LEVELS_DRAFT_H
 #define PSR_SAMPLE_LEVELS_DRAFT_H
 
-#include <stdint.h>
-#include "sample/level.h"
+#include "sample/own/kept.h"
+#include "sample/project/sheet.h"
 
 struct draft_sample {
 	float z;
-	uint32_t surface; /* as in struct sheet_sample */
+	uint32_t surface; /* a side: surface.h */
 	uint64_t attr;
 };
 
@@ -33,8 +32,8 @@ struct draft {
 
 void draft_fini(struct draft *draft);
 
-/* Adds the next level. MEMORY, LIMIT. */
-int draft_add(struct draft *draft, const struct level *level);
+/* Adds the next level: kept samples of the sheets of all projections. MEMORY, LIMIT. */
+int draft_add(struct draft *draft, const struct sheets *sheets, const struct kept *kept);
 
 /* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has
  * all samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different
@@ -48,7 +47,13 @@ int draft_group(struct draft *draft, struct psr_pool *pool);
  * their hits were there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
 int draft_join(struct draft *draft);
 
-/* Inner coordinates of sample s of a block. */
+static inline double draft_spacing(const struct draft *draft, const struct draft_block *block)
+{
+	return (double)draft->projection[block->projection].spacing * (double)(1u << block->level);
+}
+
+/* Sample s of a block, in the space of its projection and in inner coordinates. */
+void draft_project(const struct draft *draft, const struct draft_block *block, unsigned s, double p[3]);
 void draft_position(const struct draft *draft, const struct draft_block *block, unsigned s, float position[3]);
 
 static inline const struct draft_sample *draft_sample(const struct draft *draft, const struct draft_block *block,

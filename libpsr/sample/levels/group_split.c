@@ -2,6 +2,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include "base/cell.h"
+#include "base/grid.h"
 #include "group.h"
 #include "psr/error.h"
 
@@ -9,24 +10,53 @@
 #define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
 #define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
 
-/* Which groups have fine samples in each cell of a coarse level: points of a cover, one a group and cell. */
-static int map_groups(struct cover *map, const struct draft *draft, const struct group_blocks *finest, uint32_t n)
+/* Which groups have fine samples in each cell of a coarse level. */
+struct map {
+	struct grid grid;
+	struct mapped {
+		float position[3]; /* of one of them */
+		uint32_t group, next;
+	} *mapped;
+	uint32_t n, capacity;
+};
+
+static int map_group(struct map *map, uint32_t group, const float p[3])
+{
+	uint32_t i;
+	int at[3];
+
+	cell_of(p, map->grid.width, at);
+	i = grid_first(&map->grid, at);
+	while (i != GRID_NONE && map->mapped[i].group != group)
+		i = map->mapped[i].next;
+	if (i != GRID_NONE)
+		return PSR_OK;
+	if (map->n == map->capacity) {
+		uint32_t capacity = map->capacity != 0 ? map->capacity + map->capacity / 2 : 4096;
+		struct mapped *grown = realloc(map->mapped, capacity * sizeof *grown);
+
+		if (grown == NULL)
+			return PSR_ERR_MEMORY;
+		map->mapped = grown;
+		map->capacity = capacity;
+	}
+	map->mapped[map->n] = (struct mapped){ { p[0], p[1], p[2] }, group, GRID_NONE };
+	if (grid_put(&map->grid, p, map->n, &map->mapped[map->n].next) != PSR_OK)
+		return PSR_ERR_MEMORY;
+	map->n++;
+	return PSR_OK;
+}
+
+static int map_groups(struct map *map, const struct draft *draft, const struct group_blocks *finest, uint32_t n)
 {
 	for (uint32_t b = 0; b < n; b++) {
 		const struct draft_block *block = &finest->block[b];
 
 		for (uint64_t left = block->part; left != 0; left &= left - 1) {
-			struct cover_point point = { .patch = block->group };
-			uint32_t i;
-			int at[3];
+			float p[3];
 
-			draft_position(draft, block, (unsigned)__builtin_ctzll(left), point.position);
-			for (int k = 0; k < 3; k++)
-				at[k] = cell_floor((double)point.position[k] / map->ds);
-			i = cover_cell(map, at);
-			while (i != COVER_NONE && map->point[i].patch != block->group)
-				i = map->point[i].next;
-			if (i == COVER_NONE && cover_add(map, &point) != PSR_OK)
+			draft_position(draft, block, (unsigned)__builtin_ctzll(left), p);
+			if (map_group(map, block->group, p) != PSR_OK)
 				return PSR_ERR_MEMORY;
 		}
 	}
@@ -65,14 +95,14 @@ static int add_part(struct parts *parts, uint32_t group, unsigned s)
 	return PSR_OK;
 }
 
-/* From p to the nearest place of a point's cell. */
-static double distance2(const struct cover *map, const struct cover_point *point, const float p[3])
+/* From p to the nearest place of the cell that holds a position. */
+static double distance2(double width, const float position[3], const float p[3])
 {
 	double sum = 0;
 
 	for (int k = 0; k < 3; k++) {
-		double low = floor((double)point->position[k] / map->ds) * map->ds, x = (double)p[k];
-		double away = x < low ? low - x : x > low + map->ds ? x - low - map->ds : 0;
+		double low = floor((double)position[k] / width) * width, x = (double)p[k];
+		double away = x < low ? low - x : x > low + width ? x - low - width : 0;
 
 		sum += away * away;
 	}
@@ -80,16 +110,16 @@ static double distance2(const struct cover *map, const struct cover_point *point
 }
 
 /* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
-static int find_groups(const struct cover *map, const float p[3], double reach, unsigned s, struct parts *parts)
+static int find_groups(const struct map *map, const float p[3], double reach, unsigned s, struct parts *parts)
 {
-	uint32_t first[COVER_MOST_AROUND];
-	int n_cells = cover_around(map, p, reach, first), n = 0;
+	uint32_t first[GRID_MOST_AROUND];
+	int n_cells = grid_around(&map->grid, p, reach, first), n = 0;
 
 	for (int c = 0; c < n_cells; c++) {
-		for (uint32_t i = first[c]; i != COVER_NONE; i = map->point[i].next) {
-			if (distance2(map, &map->point[i], p) > reach * reach)
+		for (uint32_t i = first[c]; i != GRID_NONE; i = map->mapped[i].next) {
+			if (distance2(map->grid.width, map->mapped[i].position, p) > reach * reach)
 				continue;
-			if (add_part(parts, map->point[i].patch, s) != PSR_OK)
+			if (add_part(parts, map->mapped[i].group, s) != PSR_OK)
 				return PSR_ERR_MEMORY;
 			n++;
 		}
@@ -98,7 +128,7 @@ static int find_groups(const struct cover *map, const float p[3], double reach, 
 }
 
 static int split_block(struct group_blocks *blocks, const struct draft *draft, const struct draft_block *block,
-                       const struct cover *map, struct parts *parts)
+                       const struct map *map, struct parts *parts)
 {
 	int rc = PSR_OK;
 
@@ -109,9 +139,9 @@ static int split_block(struct group_blocks *blocks, const struct draft *draft, c
 		int n;
 
 		draft_position(draft, block, s, p);
-		n = find_groups(map, p, REACH * map->ds, s, parts);
+		n = find_groups(map, p, REACH * map->grid.width, s, parts);
 		if (n == 0)
-			n = find_groups(map, p, FAR * map->ds, s, parts);
+			n = find_groups(map, p, FAR * map->grid.width, s, parts);
 		rc = n < 0 ? n : PSR_OK;
 	}
 	for (uint32_t i = 0; rc == PSR_OK && i < parts->n; i++) {
@@ -126,7 +156,7 @@ static int split_block(struct group_blocks *blocks, const struct draft *draft, c
 
 struct split {
 	const struct draft *draft;
-	const struct cover *map;
+	const struct map *map;
 	uint32_t first, end; /* blocks */
 	struct group_blocks *chunk;
 	int *rc;
@@ -173,11 +203,11 @@ static int split_blocks(struct group_blocks *blocks, struct split *split, struct
 }
 
 int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
-                       uint32_t n_pieces, struct psr_pool *pool)
+                uint32_t n_pieces, struct psr_pool *pool)
 {
-	struct cover map;
+	struct map map = { .n = 0 };
 	struct split split = { .draft = draft, .map = &map, .first = n_finest, .most = blocks->most - blocks->n };
-	int rc = cover_init(&map, draft->ds * (double)(1u << level) / CELLS);
+	int rc = grid_init(&map.grid, draft->ds * (double)(1u << level) / CELLS);
 
 	while (split.first < draft->n_blocks && draft->block[split.first].level < level)
 		split.first++;
@@ -187,6 +217,7 @@ int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned
 		rc = map_groups(&map, draft, blocks, n_pieces);
 	if (rc == PSR_OK)
 		rc = split_blocks(blocks, &split, pool);
-	cover_fini(&map);
+	free(map.mapped);
+	grid_fini(&map.grid);
 	return rc;
 }

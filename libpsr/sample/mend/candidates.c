@@ -3,9 +3,6 @@
 #include "candidates.h"
 #include "psr/error.h"
 
-/* A kept sample within half a pixel is in every pixel that has the place in its middle. */
-#define NEAR 0.5
-
 /* [G] 4.3 wants sides of at most a pixel; a twentieth is forgiven, as the middle of such a triangle is 0.6 pixels from
  * its corners at most, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
@@ -17,39 +14,40 @@
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 
-/* What offers cost at least, in samples: a single hit covers less than a triangle; a moved sample is off by up to half
- * a pixel. */
+/* The least that candidates cost, in samples: a single hit covers less than a triangle; a moved sample is off by up to
+ * half a pixel. */
 #define HIT 1.5f
-#define SNAP 3
-#define MOST_SNAP 0.55
+#define MOVE 3
+#define MOST_MOVE 0.55
 
-/* What a new block costs; and what a moved sample costs more in a projection that faces the place worse than three
- * others: many of these would show in colors and distances. At coarser levels moving comes before new blocks. */
+/* A new block costs so much. A moved sample costs more in a projection that faces the place worse than three others:
+ * many of these would show in colors and distances. At coarser levels moving comes before new blocks. */
 #define NEW_BLOCK 12
 #define NEW_COARSE_BLOCK 16
 #define WANTED 4.0f /* and up to this more, the fewer places want it */
-#define SNAP_ASIDE 4
+#define MOVE_ASIDE 4
 
 struct tries {
-	unsigned projection[OFFER_TRIES];
+	unsigned projection[CANDIDATE_TRIES];
 	int n;
 };
 
-/* Projections by how well they face a spot. */
-static void list_tries(const struct level *level, const struct surface_spot *spot, struct tries *tries)
+/* Projections by how well they face a place. */
+static void list_tries(const struct keeper *keeper, const struct field *field, const struct place *place,
+                       struct tries *tries)
 {
-	float smooth[3], score[OFFER_TRIES];
+	float smooth[3], score[CANDIDATE_TRIES];
 
 	tries->n = 0;
-	field_normal(&level->field, spot->p, spot->n, smooth);
-	for (unsigned q = 0; q < level->n_projections; q++) {
-		const float *axis = level->sheets[q].projection.axis[2];
+	field_normal(field, place->p, place->n, smooth);
+	for (unsigned q = 0; q < N_PROJECTIONS; q++) {
+		const float *axis = keeper->sampling->projection[q].axis[2];
 		float g = v3f_dot(axis, smooth);
 		int i = tries->n;
 
-		if (v3f_dot(axis, spot->n) < LEAST_COSINE || (i == OFFER_TRIES && g <= score[OFFER_TRIES - 1]))
+		if (v3f_dot(axis, place->n) < LEAST_COSINE || (i == CANDIDATE_TRIES && g <= score[CANDIDATE_TRIES - 1]))
 			continue;
-		i = i < OFFER_TRIES ? tries->n++ : OFFER_TRIES - 1;
+		i = i < CANDIDATE_TRIES ? tries->n++ : CANDIDATE_TRIES - 1;
 		for (; i > 0 && score[i - 1] < g; i--) {
 			score[i] = score[i - 1];
 			tries->projection[i] = tries->projection[i - 1];
@@ -66,17 +64,17 @@ struct corner {
 	int is_kept;
 };
 
-/* The corners of the lattice triangle of projection q around a spot; those without a hit of its surface have no
+/* The corners of the lattice triangle of projection q around a place; those without a hit of its surface have no
  * patch. */
-static void find_corners(const struct level *level, unsigned q, const struct surface_spot *spot,
+static void find_corners(const struct keeper *keeper, unsigned q, const struct place *place,
                          struct corner corner[3], float projected[3])
 {
-	const struct sheets *sheets = &level->sheets[q];
+	const struct sheets *sheets = &keeper->sheets[q];
 	struct lattice_point at[3];
 	struct sheet_ref ref[3];
-	int is_thin = level_is_thin(level, spot->surface);
+	int is_thin = sampling_is_thin(keeper->sampling, place->surface);
 
-	level_project(&sheets->projection, spot->p, projected);
+	projection_project(&sheets->projection, place->p, projected);
 	sheets_triangle(sheets, (double)projected[0], (double)projected[1], at);
 	sheets_find_corners(sheets, at, projected[2], SHEET_STEPS * sheets->projection.spacing, ref);
 	for (int i = 0; i < 3; i++) {
@@ -89,22 +87,23 @@ static void find_corners(const struct level *level, unsigned q, const struct sur
 		if (c->ref.patch == SHEET_NONE)
 			continue;
 		surface = sheets->sample[c->ref.patch][c->ref.sample].surface;
-		level_normal(level, surface, n);
-		if (v3f_dot(n, spot->n) < LEAST_ALIKE && !(is_thin && level_is_thin(level, surface))) {
+		sampling_normal(keeper->sampling, surface, n);
+		if (v3f_dot(n, place->n) < LEAST_ALIKE && !(is_thin && sampling_is_thin(keeper->sampling, surface))) {
 			c->ref.patch = SHEET_NONE;
 			continue;
 		}
 		sheets_position(sheets, c->ref, c->position);
-		v3f_sub(d, c->position, spot->p);
+		v3f_sub(d, c->position, place->p);
 		c->distance2 = v3f_dot(d, d);
-		c->is_kept = (int)(sheets->patch[c->ref.patch].kept >> c->ref.sample & 1);
+		c->is_kept = sheets_is_kept(sheets, c->ref);
 	}
 }
 
-/* Whether the corners make a triangle that is small enough, and the spot is on it, not on something beside it. */
-static int is_triangle(const struct level *level, const struct surface_spot *spot, const struct corner corner[3])
+/* Whether the corners make a triangle that is small enough, and the place is on it, not on something beside it. */
+static int is_triangle(const struct keeper *keeper, const struct place *place, const struct corner corner[3])
 {
-	const float most = (float)(LONGEST_SIDE * LONGEST_SIDE * level->ds * level->ds);
+	const double ds = keeper->sampling->ds;
+	const float most = (float)(LONGEST_SIDE * LONGEST_SIDE * ds * ds);
 	float d[3][3], n[3], off[3], away;
 
 	for (int i = 0; i < 3; i++)
@@ -116,59 +115,66 @@ static int is_triangle(const struct level *level, const struct surface_spot *spo
 			return 0;
 	}
 	v3f_cross(n, d[0], d[1]);
-	v3f_sub(off, spot->p, corner[0].position);
+	v3f_sub(off, place->p, corner[0].position);
 	away = v3f_dot(off, n);
-	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * level->ds * level->ds) * v3f_dot(n, n);
+	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * ds * ds) * v3f_dot(n, n);
 }
 
-/* What was found out about a spot: of each try the corners around it, and it in the space of that projection. */
+/* The corners around a place in each try, and the place in the space of that projection. */
 struct look {
 	struct tries tries;
 	int n; /* tries of which this is known */
-	struct corner corner[OFFER_TRIES][3];
-	float projected[OFFER_TRIES][3];
+	struct corner corner[CANDIDATE_TRIES][3];
+	float projected[CANDIDATE_TRIES][3];
 };
 
-static void look_next(const struct level *level, const struct surface_spot *spot, struct look *look)
+static void look_next(const struct keeper *keeper, const struct place *place, struct look *look)
 {
-	find_corners(level, look->tries.projection[look->n], spot, look->corner[look->n], look->projected[look->n]);
+	find_corners(keeper, look->tries.projection[look->n], place, look->corner[look->n], look->projected[look->n]);
 	look->n++;
 }
 
-/* Whether a spot is on a triangle of kept samples. */
-static int is_on_kept(const struct level *level, const struct surface_spot *spot, struct look *look)
+static int is_near_kept(const struct keeper *keeper, const struct place *place)
 {
-	list_tries(level, spot, &look->tries);
+	return kept_covers(keeper->kept, place->p, place->n, KEPT_NEAR * keeper->sampling->ds);
+}
+
+/* Whether a place is on a triangle of kept samples. */
+static int is_on_kept(const struct keeper *keeper, const struct field *field, const struct place *place,
+                      struct look *look)
+{
+	list_tries(keeper, field, place, &look->tries);
 	look->n = 0;
-	while (look->n < look->tries.n && look->n < OFFER_TRIANGLES) {
+	while (look->n < look->tries.n && look->n < CANDIDATE_TRIANGLES) {
 		const struct corner *corner = look->corner[look->n];
 
-		look_next(level, spot, look);
-		if (is_triangle(level, spot, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
+		look_next(keeper, place, look);
+		if (is_triangle(keeper, place, corner) && corner[0].is_kept && corner[1].is_kept && corner[2].is_kept)
 			return 1;
 	}
 	return 0;
 }
 
-int offer_is_covered(const struct level *level, const struct surface_spot *spot)
+int candidates_cover(const struct keeper *keeper, const struct field *field, const struct place *place)
 {
 	struct look look;
 
-	return cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds) || is_on_kept(level, spot, &look);
+	return is_near_kept(keeper, place) || is_on_kept(keeper, field, place, &look);
 }
 
 /* Moved to the corners that try i found. */
-static void find_snaps(const struct level *level, int i, const struct surface_spot *spot, const struct look *look,
-                       struct offers *offers)
+static void find_moves(struct candidates *candidates, const struct keeper *keeper, const struct place *place,
+                       const struct look *look, int i)
 {
 	const struct corner *corner = look->corner[i];
 	const unsigned q = look->tries.projection[i];
-	const struct sheets *sheets = &level->sheets[q];
+	const struct sheets *sheets = &keeper->sheets[q];
 	const float *p = look->projected[i];
-	const float aside = level->finer == NULL && i >= OFFER_TRIANGLES ? SNAP_ASIDE : 0;
+	const double ds = keeper->sampling->ds;
+	const float aside = keeper->sampling->level == 0 && i >= CANDIDATE_TRIANGLES ? MOVE_ASIDE : 0;
 	float n[3];
 
-	level_project(&sheets->projection, spot->n, n);
+	projection_project(&sheets->projection, place->n, n);
 	for (int k = 0; k < 3; k++) {
 		double x, y, dx, dy, dz, distance2;
 
@@ -176,202 +182,198 @@ static void find_snaps(const struct level *level, int i, const struct surface_sp
 		dx = x - (double)p[0];
 		dy = y - (double)p[1];
 		dz = -(dx * (double)n[0] + dy * (double)n[1]) / (double)n[2];
-		distance2 = (dx * dx + dy * dy + dz * dz) / (level->ds * level->ds);
-		if (distance2 <= MOST_SNAP * MOST_SNAP)
-			offers->snap[offers->n_snaps++] = (struct offer_snap){ q, SNAP + aside + 24 * sqrtf((float)distance2),
-				                                                   p[2] + (float)dz, corner[k].at };
+		distance2 = (dx * dx + dy * dy + dz * dz) / (ds * ds);
+		if (distance2 <= MOST_MOVE * MOST_MOVE)
+			candidates->move[candidates->n_moves++] = (struct candidate_move){
+				q, MOVE + aside + 24 * sqrtf((float)distance2), p[2] + (float)dz, corner[k].at
+			};
 	}
 }
 
-static const struct patch *patch_of(const struct level *level, unsigned projection, struct sheet_ref ref)
+static const struct patch *patch_of(const struct keeper *keeper, unsigned projection, struct sheet_ref ref)
 {
-	return &level->sheets[projection].patch[ref.patch];
+	return &keeper->sheets[projection].patch[ref.patch];
 }
 
-static void find(const struct level *level, const struct surface_spot *spot, struct look *look, struct offers *offers)
+static void find(struct candidates *candidates, const struct keeper *keeper, const struct place *place,
+                 struct look *look)
 {
 	float least = INFINITY;
 
-	offers->n_triangles = offers->n_hits = offers->n_snaps = 0;
-	/* Offers of others cannot cost less than a hit in a block that is there, and such hits stay. */
-	for (int i = 0; i < look->tries.n && (i < OFFER_TRIANGLES || HIT + (float)i / 2 < least); i++) {
+	candidates->n_triangles = candidates->n_hits = candidates->n_moves = 0;
+	/* Further candidates cannot cost less than a hit in a block that is there, and such hits stay. */
+	for (int i = 0; i < look->tries.n && (i < CANDIDATE_TRIANGLES || HIT + (float)i / 2 < least); i++) {
 		unsigned q = look->tries.projection[i];
 		const struct corner *corner = look->corner[i];
 
 		if (i == look->n)
-			look_next(level, spot, look);
-		if (i < OFFER_TRIANGLES && is_triangle(level, spot, corner))
-			offers->triangle[offers->n_triangles++] =
-				(struct offer){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
+			look_next(keeper, place, look);
+		if (i < CANDIDATE_TRIANGLES && is_triangle(keeper, place, corner))
+			candidates->triangle[candidates->n_triangles++] =
+				(struct candidate){ q, (float)i / 2, { corner[0].ref, corner[1].ref, corner[2].ref } };
 		for (int k = 0; k < 3; k++) {
 			float distance, cost;
 
 			if (corner[k].ref.patch == SHEET_NONE)
 				continue;
-			distance = (float)(sqrt((double)corner[k].distance2) / level->ds);
+			distance = (float)(sqrt((double)corner[k].distance2) / keeper->sampling->ds);
 			cost = HIT + distance / 4 + (float)i / 2;
-			if (distance > (float)NEAR)
+			if (distance > (float)KEPT_NEAR)
 				continue;
-			offers->hit[offers->n_hits++] = (struct offer){ q, cost, { corner[k].ref } };
-			if (cost < least && patch_of(level, q, corner[k].ref)->is_alive)
+			candidates->hit[candidates->n_hits++] = (struct candidate){ q, cost, { corner[k].ref } };
+			if (cost < least && patch_of(keeper, q, corner[k].ref)->kept != 0)
 				least = cost;
 		}
-		find_snaps(level, i, spot, look, offers);
+		find_moves(candidates, keeper, place, look, i);
 	}
 }
 
-int offer_look(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+int candidates_look(struct candidates *candidates, const struct keeper *keeper, const struct field *field,
+                    const struct place *place)
 {
 	struct look look;
 
-	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds) || is_on_kept(level, spot, &look))
+	if (is_near_kept(keeper, place) || is_on_kept(keeper, field, place, &look))
 		return 1;
-	find(level, spot, &look, offers);
+	find(candidates, keeper, place, &look);
 	return 0;
 }
 
-void offer_find(const struct level *level, const struct surface_spot *spot, struct offers *offers)
+void candidates_find(struct candidates *candidates, const struct keeper *keeper, const struct field *field,
+                     const struct place *place)
 {
 	struct look look = { .n = 0 };
 
-	list_tries(level, spot, &look.tries);
-	find(level, spot, &look, offers);
+	list_tries(keeper, field, place, &look.tries);
+	find(candidates, keeper, place, &look);
 }
 
-static int is_kept(const struct level *level, const struct offer *offer, int corner)
+static int is_kept(const struct keeper *keeper, const struct candidate *candidate, int corner)
 {
-	return (int)(patch_of(level, offer->projection, offer->ref[corner])->kept >> offer->ref[corner].sample & 1);
+	return sheets_is_kept(&keeper->sheets[candidate->projection], candidate->ref[corner]);
 }
 
-int offer_is_superfluous(const struct level *level, const struct surface_spot *spot, const struct offers *offers)
+int candidates_are_superfluous(const struct candidates *candidates, const struct keeper *keeper,
+                               const struct place *place)
 {
-	if (cover_is_near(&level->cover, spot->p, spot->n, NEAR * level->ds))
+	if (is_near_kept(keeper, place))
 		return 1;
-	for (int i = 0; i < offers->n_triangles; i++) {
-		const struct offer *offer = &offers->triangle[i];
+	for (int i = 0; i < candidates->n_triangles; i++) {
+		const struct candidate *triangle = &candidates->triangle[i];
 
-		if (is_kept(level, offer, 0) && is_kept(level, offer, 1) && is_kept(level, offer, 2))
+		if (is_kept(keeper, triangle, 0) && is_kept(keeper, triangle, 1) && is_kept(keeper, triangle, 2))
 			return 1;
 	}
 	return 0;
 }
 
-static float block_cost(const struct level *level)
+static float block_cost(const struct keeper *keeper)
 {
-	return level->finer == NULL ? NEW_BLOCK : NEW_COARSE_BLOCK;
+	return keeper->sampling->level == 0 ? NEW_BLOCK : NEW_COARSE_BLOCK;
 }
 
 /* A patch of which nothing is kept yet costs a block, shared by all places that could use it. */
-static float opening_cost(const struct level *level, unsigned projection, struct sheet_ref ref)
+static float opening_cost(const struct keeper *keeper, unsigned projection, struct sheet_ref ref)
 {
-	const struct patch *patch = patch_of(level, projection, ref);
+	const struct patch *patch = patch_of(keeper, projection, ref);
 
-	return patch->is_alive ? 0 : block_cost(level) + WANTED / (float)(1 + patch->n_wanted);
+	return patch->kept != 0 ? 0 : block_cost(keeper) + WANTED / (float)(1 + patch->n_wanted);
 }
 
 /* The triangle that lacks least. */
-static const struct offer *best_triangle(const struct level *level, const struct offers *offers, float *least)
+static const struct candidate *best_triangle(const struct candidates *candidates, const struct keeper *keeper,
+                                             float *least)
 {
-	const struct offer *best = NULL;
+	const struct candidate *best = NULL;
 
-	for (int i = 0; i < offers->n_triangles; i++) {
-		const struct offer *offer = &offers->triangle[i];
-		float cost = offer->cost, opening = 0;
+	for (int i = 0; i < candidates->n_triangles; i++) {
+		const struct candidate *triangle = &candidates->triangle[i];
+		float cost = triangle->cost, opening = 0;
 
 		for (int k = 0; k < 3; k++) {
-			cost += is_kept(level, offer, k) ? 0 : 0.5f;
-			opening = fmaxf(opening, opening_cost(level, offer->projection, offer->ref[k]));
+			cost += is_kept(keeper, triangle, k) ? 0 : 0.5f;
+			opening = fmaxf(opening, opening_cost(keeper, triangle->projection, triangle->ref[k]));
 		}
 		if (cost + opening < *least) {
 			*least = cost + opening;
-			best = offer;
+			best = triangle;
 		}
 	}
 	return best;
 }
 
-static const struct offer *best_hit(const struct level *level, const struct offers *offers, float *least)
+static const struct candidate *best_hit(const struct candidates *candidates, const struct keeper *keeper, float *least)
 {
-	const struct offer *best = NULL;
+	const struct candidate *best = NULL;
 
-	for (int i = 0; i < offers->n_hits; i++) {
-		const struct offer *offer = &offers->hit[i];
-		float cost = offer->cost;
+	for (int i = 0; i < candidates->n_hits; i++) {
+		const struct candidate *hit = &candidates->hit[i];
+		float cost = hit->cost;
 
 		if (cost < *least)
-			cost += opening_cost(level, offer->projection, offer->ref[0]);
+			cost += opening_cost(keeper, hit->projection, hit->ref[0]);
 		if (cost < *least) {
 			*least = cost;
-			best = offer;
+			best = hit;
 		}
 	}
 	return best;
 }
 
 /* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face,
- * by what a sample may be off at most. */
-static const struct offer_snap *best_snap(const struct level *level, const struct surface_spot *spot,
-                                          const struct offers *offers, float *least)
+ * as far as a sample may be off. */
+static const struct candidate_move *best_move(const struct candidates *candidates, const struct keeper *keeper,
+                                              const struct place *place, float *least)
 {
-	const struct offer_snap *best = NULL;
-	int is_sheet = level_is_sheet(level, spot->surface);
+	const struct candidate_move *best = NULL;
+	int is_sheet = sampling_is_sheet(keeper->sampling, place->surface);
 
-	for (int i = 0; i < offers->n_snaps; i++) {
-		const struct offer_snap *snap = &offers->snap[i];
-		float cost = snap->cost;
+	for (int i = 0; i < candidates->n_moves; i++) {
+		const struct candidate_move *move = &candidates->move[i];
+		float cost = move->cost;
 
 		if (cost < *least
-		    && sheets_room(&level->sheets[snap->projection], snap->at, snap->z, is_sheet).patch == SHEET_NONE)
-			cost += block_cost(level) + WANTED;
+		    && sheets_room(&keeper->sheets[move->projection], move->at, move->z, is_sheet).patch == SHEET_NONE)
+			cost += block_cost(keeper) + WANTED;
 		if (cost < *least) {
 			*least = cost;
-			best = snap;
+			best = move;
 		}
 	}
 	return best;
 }
 
-static int keep_snapped(struct level *level, const struct surface_spot *spot, const struct offer_snap *snap)
-{
-	struct level_ref ref = { .projection = snap->projection };
-	int rc = sheets_add(&level->sheets[snap->projection], snap->at, snap->z, spot->surface,
-	                    level_is_sheet(level, spot->surface), &ref.at);
-
-	if (rc != PSR_OK || ref.at.patch == SHEET_NONE)
-		return rc;
-	return keep_sample(level, ref);
-}
-
-int offer_take(struct level *level, const struct surface_spot *spot, const struct offers *offers, float most,
-               int *is_left)
+int candidates_take(const struct candidates *candidates, const struct keeper *keeper, const struct place *place,
+                    float most, int *is_left)
 {
 	float least = INFINITY;
-	const struct offer *triangle = best_triangle(level, offers, &least), *hit = best_hit(level, offers, &least);
-	const struct offer_snap *snap = best_snap(level, spot, offers, &least);
+	const struct candidate *triangle = best_triangle(candidates, keeper, &least);
+	const struct candidate *hit = best_hit(candidates, keeper, &least);
+	const struct candidate_move *move = best_move(candidates, keeper, place, &least);
 	int rc = PSR_OK;
 
 	*is_left = least < INFINITY && least > most;
 	if (least > most || least == INFINITY)
 		return PSR_OK;
-	if (snap != NULL)
-		return keep_snapped(level, spot, snap);
+	if (move != NULL)
+		return keep_moved(keeper, move->projection, move->at, move->z, place->surface);
 	if (hit != NULL)
-		return keep_sample(level, (struct level_ref){ hit->projection, hit->ref[0] });
+		return keep_sample(keeper, (struct sample_ref){ hit->projection, hit->ref[0] });
 	for (int k = 0; rc == PSR_OK && k < 3; k++)
-		rc = keep_sample(level, (struct level_ref){ triangle->projection, triangle->ref[k] });
+		rc = keep_sample(keeper, (struct sample_ref){ triangle->projection, triangle->ref[k] });
 	return rc;
 }
 
-void offer_ask(struct level *level, const struct offers *offers)
+void candidates_want(const struct candidates *candidates, const struct keeper *keeper)
 {
 	const struct patch *last = NULL;
 
-	for (int i = 0; i < offers->n_hits; i++) {
-		const struct offer *offer = &offers->hit[i];
-		struct patch *patch = &level->sheets[offer->projection].patch[offer->ref[0].patch];
+	for (int i = 0; i < candidates->n_hits; i++) {
+		const struct candidate *hit = &candidates->hit[i];
+		const struct patch *patch = patch_of(keeper, hit->projection, hit->ref[0]);
 
-		if (patch != last && patch->n_wanted != UINT16_MAX)
-			patch->n_wanted++;
+		if (patch != last)
+			sheets_want(&keeper->sheets[hit->projection], hit->ref[0].patch);
 		last = patch;
 	}
 }

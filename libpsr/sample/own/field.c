@@ -1,59 +1,26 @@
 #include <math.h>
-#include <stdlib.h>
-#include <string.h>
-#include "base/mem.h"
-#include "base/vec.h"
 #include "base/cell.h"
+#include "base/vec.h"
 #include "field.h"
 #include "psr/error.h"
 
-#define FREE UINT64_MAX
+#define LOBES 6 /* of normals in a cell: by the axis and sign that is greatest in them */
+#define ONE 256
 
-static struct field_cell *find(const struct field *field, uint64_t key)
+struct cell {
+	uint64_t key;
+	int32_t lobe[LOBES][3]; /* sums of normals, times ONE: integers, so that their order does not matter */
+};
+
+int field_init(struct field *field, double width)
 {
-	size_t i = cell_place(key, field->capacity);
-
-	while (field->table[i].key != FREE && field->table[i].key != key)
-		i = (i + 1) & (field->capacity - 1);
-	return &field->table[i];
-}
-
-static int make_table(struct field *field, size_t capacity)
-{
-	field->table = psr_alloc_array(capacity, sizeof *field->table);
-	if (field->table == NULL)
-		return PSR_ERR_MEMORY;
-	field->capacity = capacity;
-	for (size_t i = 0; i < capacity; i++)
-		field->table[i].key = FREE;
-	return PSR_OK;
-}
-
-int field_init(struct field *field, double cell)
-{
-	*field = (struct field){ .cell = cell };
-	return make_table(field, 1024);
+	field->width = width;
+	return table_init(&field->cells, sizeof(struct cell), 1024);
 }
 
 void field_fini(struct field *field)
 {
-	psr_free(field->table);
-	*field = (struct field){ 0 };
-}
-
-static int grow(struct field *field)
-{
-	struct field old = *field;
-
-	if (make_table(field, 2 * old.capacity) != PSR_OK) {
-		*field = old;
-		return PSR_ERR_MEMORY;
-	}
-	for (size_t i = 0; i < old.capacity; i++)
-		if (old.table[i].key != FREE)
-			*find(field, old.table[i].key) = old.table[i];
-	psr_free(old.table);
-	return PSR_OK;
+	table_fini(&field->cells);
 }
 
 static int lobe_of(const float n[3])
@@ -67,21 +34,15 @@ static int lobe_of(const float n[3])
 
 int field_add(struct field *field, const float p[3], const float n[3], float weight)
 {
-	struct field_cell *cell;
+	struct cell *cell;
 	int at[3], lobe = lobe_of(n);
 
-	if (4 * field->n_cells >= 3 * field->capacity && grow(field) != PSR_OK)
+	cell_of(p, field->width, at);
+	cell = table_put(&field->cells, cell_key(at[0], at[1], at[2]));
+	if (cell == NULL)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k < 3; k++)
-		at[k] = cell_floor((double)p[k] / field->cell);
-	cell = find(field, cell_key(at[0], at[1], at[2]));
-	if (cell->key == FREE) {
-		memset(cell, 0, sizeof *cell);
-		cell->key = cell_key(at[0], at[1], at[2]);
-		field->n_cells++;
-	}
-	for (int k = 0; k < 3; k++)
-		cell->lobe[lobe][k] += (int32_t)lrintf(n[k] * weight * FIELD_ONE);
+		cell->lobe[lobe][k] += (int32_t)lrintf(n[k] * weight * ONE);
 	return PSR_OK;
 }
 
@@ -91,17 +52,18 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 	int at[3];
 
 	for (int k = 0; k < 3; k++) {
-		double x = (double)p[k] / field->cell - 0.5;
+		double x = (double)p[k] / field->width - 0.5;
 
 		at[k] = cell_floor(x);
 		weight[k][1] = (float)(x - at[k]);
 		weight[k][0] = 1 - weight[k][1];
 	}
 	for (int i = 0; i < 8; i++) {
-		const struct field_cell *cell = find(field, cell_key(at[0] + (i & 1), at[1] + (i >> 1 & 1), at[2] + (i >> 2)));
+		const struct cell *cell =
+			table_find(&field->cells, cell_key(at[0] + (i & 1), at[1] + (i >> 1 & 1), at[2] + (i >> 2)));
 		float w = weight[0][i & 1] * weight[1][i >> 1 & 1] * weight[2][i >> 2];
 
-		for (int l = 0; cell->key != FREE && l < FIELD_LOBES; l++) {
+		for (int l = 0; cell != NULL && l < LOBES; l++) {
 			const int32_t *sums = cell->lobe[l];
 			float lobe[3] = { (float)sums[0], (float)sums[1], (float)sums[2] }, g;
 

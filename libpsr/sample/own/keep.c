@@ -1,10 +1,11 @@
 #include <math.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "surface/blend.h"
-#include "sample/level.h"
-#include "psr/direction.h"
+#include "keep.h"
+#include "base/direction.h"
 #include "psr/error.h"
+#include "sample/visible/sides.h"
+#include "surface/blend.h"
 
 #define MOST_BLENDED 64
 
@@ -17,14 +18,14 @@
 
 #define NORMAL_BITS UINT64_C(0x7fff)
 
-static int is_wide(const struct level *level, uint32_t prim)
+static int is_wide(const struct sampling *sampling, uint32_t prim)
 {
-	const double least = WIDE_PIXELS * level->ds;
+	const double least = WIDE_PIXELS * sampling->ds;
 	double corner[3][3], side[3][3], cross[3], longest2 = 0;
 
-	if (prim >= level->mesh->n_triangles)
+	if (prim >= sampling->mesh->n_triangles)
 		return 0;
-	ray_scene_corners(level->scene, prim, corner);
+	ray_scene_corners(sampling->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
 		v3d_sub(side[i], corner[(i + 1) % 3], corner[i]);
 		longest2 = fmax(longest2, v3d_dot(side[i], side[i]));
@@ -33,9 +34,9 @@ static int is_wide(const struct level *level, uint32_t prim)
 	return v3d_dot(cross, cross) > least * least * longest2;
 }
 
-static float least_agreement(const struct level *level, uint32_t prim)
+static float least_agreement(const struct sampling *sampling, uint32_t prim)
 {
-	return is_wide(level, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT;
+	return is_wide(sampling, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT;
 }
 
 /* The normal that is nearest to `normal` of those within a cosine of a face's. */
@@ -56,19 +57,20 @@ static uint16_t agree(uint16_t normal, const float face[3], float least)
 
 /* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance: the normal that
  * tells how they face is a mean, too. 0 if there are none, and then nothing of `to` is touched. */
-static int blend(const struct level *level, const float n[3], const float facing[3], uint32_t prim,
-                 struct cover_point *to)
+static int blend(const struct keeper *keeper, const float n[3], const float facing[3], uint32_t prim,
+                 struct kept_sample *to)
 {
-	const struct cover *finer = level->finer;
+	const struct kept *finer = keeper->finer;
+	const double ds = keeper->sampling->ds;
 	const float (*direction)[3] = psr_direction_table(), *p = to->position;
-	float weight[MOST_BLENDED], reach2 = (float)(level->ds * level->ds);
+	float weight[MOST_BLENDED], reach2 = (float)(ds * ds);
 	uint64_t found[MOST_BLENDED], straight[MOST_BLENDED];
-	uint32_t first[COVER_MOST_AROUND];
-	int n_cells = cover_around(finer, p, level->ds, first), count = 0, n_bent = 0;
+	uint32_t first[GRID_MOST_AROUND];
+	int n_cells = grid_around(&finer->grid, p, ds, first), count = 0, n_bent = 0;
 
 	for (int c = 0; c < n_cells; c++) {
-		for (uint32_t i = first[c]; i != COVER_NONE; i = finer->point[i].next) {
-			const struct cover_point *point = &finer->point[i];
+		for (uint32_t i = first[c]; i != GRID_NONE; i = finer->sample[i].next) {
+			const struct kept_sample *point = &finer->sample[i];
 			float d[3], w, g = v3f_dot(direction[point->normal], n);
 
 			v3f_sub(d, point->position, p);
@@ -88,7 +90,7 @@ static int blend(const struct level *level, const float n[3], const float facing
 	if (n_bent != 0) {
 		uint16_t own = (uint16_t)PSR_ATTR_NORMAL(blend_attr(straight, weight, count, facing));
 
-		if (v3f_dot(direction[to->normal], direction[own]) < least_agreement(level, prim)) {
+		if (v3f_dot(direction[to->normal], direction[own]) < least_agreement(keeper->sampling, prim)) {
 			to->traits |= PSR_BLOCK_BENT;
 			to->normal = own;
 		}
@@ -97,14 +99,14 @@ static int blend(const struct level *level, const float n[3], const float facing
 }
 
 /* Attributes of the place itself. */
-static void look(const struct level *level, const struct surface_place *place, const float n[3], const float facing[3],
-                 struct cover_point *to)
+static void look(const struct sampling *sampling, const struct surface_place *place, const float n[3],
+                 const float facing[3], struct kept_sample *to)
 {
-	const float least = least_agreement(level, place->prim);
+	const float least = least_agreement(sampling, place->prim);
 	uint64_t word;
 	float normal[3];
 
-	word = surface_look(level->surface, place, 1.4142135623730951 * level->ds, normal);
+	word = surface_look(sampling->surface, place, 1.4142135623730951 * sampling->ds, normal);
 	to->attr = word | psr_direction_encode(normal);
 	to->traits |= v3f_dot(normal, n) < least ? PSR_BLOCK_BENT : 0;
 	surface_face(normal, facing);
@@ -113,22 +115,24 @@ static void look(const struct level *level, const struct surface_place *place, c
 		to->attr = word | to->normal;
 }
 
-static int is_sheer(const struct level *level, const struct surface_place *place)
+static int is_sheer(const struct sampling *sampling, const struct surface_place *place)
 {
 	float rgba[4];
 
-	if (level_material(level, place->prim)->alpha != PSR_ALPHA_BLEND)
+	if (sampling_material(sampling, place->prim)->alpha != PSR_ALPHA_BLEND)
 		return 0;
-	texture_base_color(level->mesh, place->prim, place->u, place->v, rgba);
+	texture_base_color(sampling->mesh, place->prim, place->u, place->v, rgba);
 	return rgba[3] < 1;
 }
 
-static void make_point(const struct level *level, const struct level_ref *ref, struct cover_point *point)
+static void make_sample(const struct keeper *keeper, const struct sample_ref *ref, struct kept_sample *sample)
 {
-	const struct sheets *sheets = &level->sheets[ref->projection];
+	const struct sampling *sampling = keeper->sampling;
+	const struct sheets *sheets = &keeper->sheets[ref->projection];
 	const struct patch *patch = &sheets->patch[ref->at.patch];
-	uint32_t surface = sheets->sample[ref->at.patch][ref->at.sample].surface, prim = surface & ~SHEET_BACK;
-	struct surface_place place = { .prim = prim, .is_back = (surface & SHEET_BACK) != 0 };
+	const float *facing = sheets->projection.axis[2];
+	uint32_t surface = sheets->sample[ref->at.patch][ref->at.sample].surface, prim = surface & ~SURFACE_BACK;
+	struct surface_place place = { .prim = prim, .is_back = (surface & SURFACE_BACK) != 0 };
 	struct ray ray;
 	double x, y;
 	float n[3];
@@ -136,55 +140,56 @@ static void make_point(const struct level *level, const struct level_ref *ref, s
 	sheets_point(sheets, PSR_BLOCK_SIDE * patch->row + (int)(ref->at.sample / PSR_BLOCK_SIDE),
 	             PSR_BLOCK_SIDE * patch->col + (int)(ref->at.sample % PSR_BLOCK_SIDE), &x, &y);
 	sheets_ray(&sheets->projection, x, y, &ray);
-	ray_locate(level->scene, &ray, prim, &place.u, &place.v);
-	sheets_position(sheets, ref->at, point->position);
-	level_normal(level, surface, n);
-	point->traits = is_sheer(level, &place) ? PSR_BLOCK_SHEER : 0;
-	if (level->finer == NULL || !blend(level, n, sheets->projection.axis[2], prim, point))
-		look(level, &place, n, sheets->projection.axis[2], point);
-	point->two_sided = (uint8_t)level_is_two_sided(level, prim, point->position, n);
-	point->sample = (uint8_t)ref->at.sample;
-	point->projection = ref->projection;
-	point->patch = ref->at.patch;
-	point->next = COVER_NONE;
+	ray_locate(sampling->scene, &ray, prim, &place.u, &place.v);
+	sheets_position(sheets, ref->at, sample->position);
+	sampling_normal(sampling, surface, n);
+	sample->traits = is_sheer(sampling, &place) ? PSR_BLOCK_SHEER : 0;
+	if (keeper->finer == NULL || !blend(keeper, n, facing, prim, sample))
+		look(sampling, &place, n, facing, sample);
+	sample->two_sided = (uint8_t)keep_is_two_sided(keeper, prim, sample->position, n);
+	sample->sample = (uint8_t)ref->at.sample;
+	sample->projection = ref->projection;
+	sample->patch = ref->at.patch;
+	sample->next = GRID_NONE;
 }
 
-int level_is_two_sided(const struct level *level, uint32_t prim, const float p[3], const float n[3])
+int keep_is_two_sided(const struct keeper *keeper, uint32_t prim, const float p[3], const float n[3])
 {
-	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
 	float back[3];
 
-	if (level_is_thin(level, prim))
+	if (sampling_is_thin(keeper->sampling, prim))
 		return 1;
-	if (!level_material(level, prim)->two_sided)
+	if (!sampling_material(keeper->sampling, prim)->two_sided)
 		return 0;
 	v3f_scale(back, n, -1);
-	return (level->sides[prim] & both) == both || (seen_is(&level->seen, p, back) && seen_is(&level->seen, p, n));
+	return (keeper->sides[prim] & SIDES_SEEN) == SIDES_SEEN
+	       || (visible_set_has(keeper->visible, p, back) && visible_set_has(keeper->visible, p, n));
 }
 
-void keep_mark(struct level *level, const struct level_ref *ref)
+int keep_sample(const struct keeper *keeper, struct sample_ref ref)
 {
-	struct patch *patch = &level->sheets[ref->projection].patch[ref->at.patch];
+	struct kept_sample sample;
 
-	patch->kept |= UINT64_C(1) << ref->at.sample;
-	patch->is_alive = 1;
-}
-
-int keep_sample(struct level *level, struct level_ref ref)
-{
-	struct cover_point point;
-
-	if ((level->sheets[ref.projection].patch[ref.at.patch].kept >> ref.at.sample & 1) != 0)
+	if (sheets_is_kept(&keeper->sheets[ref.projection], ref.at))
 		return PSR_OK;
-	make_point(level, &ref, &point);
-	keep_mark(level, &ref);
-	return cover_add(&level->cover, &point);
+	make_sample(keeper, &ref, &sample);
+	sheets_keep(&keeper->sheets[ref.projection], ref.at);
+	return kept_add(keeper->kept, &sample);
+}
+
+int keep_moved(const struct keeper *keeper, unsigned projection, struct lattice_point at, float z, uint32_t surface)
+{
+	struct sample_ref ref = { .projection = projection };
+	int rc = sheets_add(&keeper->sheets[projection], at, z, surface, sampling_is_sheet(keeper->sampling, surface),
+	                    &ref.at);
+
+	return rc != PSR_OK || ref.at.patch == SHEET_NONE ? rc : keep_sample(keeper, ref);
 }
 
 struct job {
-	struct level *level;
-	const struct level_ref *ref;
-	struct cover_point *point;
+	const struct keeper *keeper;
+	const struct sample_ref *ref;
+	struct kept_sample *sample;
 	uint32_t n;
 };
 
@@ -196,69 +201,72 @@ static void make_chunk(int i, void *userdata)
 	uint32_t end = (uint32_t)(i + 1) * CHUNK < job->n ? (uint32_t)(i + 1) * CHUNK : job->n;
 
 	for (uint32_t k = (uint32_t)i * CHUNK; k < end; k++)
-		make_point(job->level, &job->ref[k], &job->point[k]);
+		make_sample(job->keeper, &job->ref[k], &job->sample[k]);
 }
 
-int keep_samples(struct level *level, const struct level_ref *ref, uint32_t n)
+int keep_samples(const struct keeper *keeper, const struct sample_ref *ref, uint32_t n)
 {
-	struct job job = { .level = level, .ref = ref, .n = n };
+	struct job job = { .keeper = keeper, .ref = ref, .n = n };
 	int rc = PSR_OK;
 
-	job.point = psr_alloc_array(n, sizeof *job.point);
-	if (job.point == NULL)
+	job.sample = psr_alloc_array(n, sizeof *job.sample);
+	if (job.sample == NULL)
 		return PSR_ERR_MEMORY;
-	psr_pool_for(level->pool, (int)((n + CHUNK - 1) / CHUNK), make_chunk, &job);
+	psr_pool_for(keeper->sampling->pool, (int)((n + CHUNK - 1) / CHUNK), make_chunk, &job);
 	for (uint32_t i = 0; rc == PSR_OK && i < n; i++) {
-		keep_mark(level, &ref[i]);
-		rc = cover_add(&level->cover, &job.point[i]);
+		sheets_keep(&keeper->sheets[ref[i].projection], ref[i].at);
+		rc = kept_add(keeper->kept, &job.sample[i]);
 	}
-	psr_free(job.point);
+	psr_free(job.sample);
 	return rc;
 }
 
-static uint32_t list_owned(struct level *level, struct level_ref *ref)
+/* ref: NULL to count them. */
+static uint32_t list_owned(const struct keeper *keeper, const struct ownership *ownership, struct sample_ref *ref)
 {
 	uint32_t n = 0;
 
-	for (unsigned i = 0; i < level->n_projections; i++) {
-		for (uint32_t p = 0; p < level->sheets[i].n_patches; p++) {
-			for (uint64_t left = level->sheets[i].patch[p].owned; left != 0; left &= left - 1, n++)
+	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
+		for (uint32_t p = 0; p < keeper->sheets[i].n_patches; p++) {
+			for (uint64_t left = ownership->patch[i][p].mask; left != 0; left &= left - 1, n++)
 				if (ref != NULL)
-					ref[n] = (struct level_ref){ i, { p, (uint32_t)__builtin_ctzll(left) } };
+					ref[n] = (struct sample_ref){ i, { p, (uint32_t)__builtin_ctzll(left) } };
 		}
 	}
 	return n;
 }
 
-int keep_owned(struct level *level)
+int keep_owned(const struct keeper *keeper, const struct ownership *ownership)
 {
-	struct level_ref *ref = psr_alloc_array(list_owned(level, NULL), sizeof *ref);
+	struct sample_ref *ref = psr_alloc_array(list_owned(keeper, ownership, NULL), sizeof *ref);
 	int rc;
 
 	if (ref == NULL)
 		return PSR_ERR_MEMORY;
-	rc = keep_samples(level, ref, list_owned(level, ref));
+	rc = keep_samples(keeper, ref, list_owned(keeper, ownership, ref));
 	psr_free(ref);
 	return rc;
 }
 
 static void look_again(int i, void *userdata)
 {
-	struct level *level = userdata;
-	uint32_t end =
-		(uint32_t)(i + 1) * CHUNK < level->cover.n_points ? (uint32_t)(i + 1) * CHUNK : level->cover.n_points;
+	const struct keeper *keeper = userdata;
+	struct kept *kept = keeper->kept;
+	uint32_t end = (uint32_t)(i + 1) * CHUNK < kept->n ? (uint32_t)(i + 1) * CHUNK : kept->n;
 
 	for (uint32_t k = (uint32_t)i * CHUNK; k < end; k++) {
-		struct cover_point *point = &level->cover.point[k];
-		uint32_t surface = level->sheets[point->projection].sample[point->patch][point->sample].surface;
+		struct kept_sample *sample = &kept->sample[k];
+		uint32_t surface = keeper->sheets[sample->projection].sample[sample->patch][sample->sample].surface;
 		float n[3];
 
-		level_normal(level, surface, n);
-		point->two_sided = (uint8_t)level_is_two_sided(level, surface & ~SHEET_BACK, point->position, n);
+		sampling_normal(keeper->sampling, surface, n);
+		sample->two_sided = (uint8_t)keep_is_two_sided(keeper, surface & ~SURFACE_BACK, sample->position, n);
 	}
 }
 
-void keep_look_again(struct level *level)
+void keep_look_again(const struct keeper *keeper)
 {
-	psr_pool_for(level->pool, (int)((level->cover.n_points + CHUNK - 1) / CHUNK), look_again, level);
+	struct keeper job = *keeper;
+
+	psr_pool_for(keeper->sampling->pool, (int)((keeper->kept->n + CHUNK - 1) / CHUNK), look_again, &job);
 }

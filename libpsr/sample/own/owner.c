@@ -1,26 +1,29 @@
-#include <string.h>
+#include "base/mem.h"
 #include "base/vec.h"
-#include "sample/level.h"
-#include "psr/direction.h"
+#include "owner.h"
 #include "psr/error.h"
+#include "sample/visible/sides.h"
 
 /* A projection that sees the face itself at over 50 degrees does not own it, however the surface around it lies. */
 #define LEAST_OWNER_COSINE 0.64f
 
-static const float *axis_of(const struct level *level, unsigned projection)
-{
-	return level->sheets[projection].projection.axis[2];
-}
+struct job {
+	struct ownership *ownership;
+	const struct owner_finds *finds;
+	const struct sampling *sampling;
+	const struct sheets *sheets;
+};
 
-static unsigned best_facing(const struct level *level, const float smooth[3], const float n[3])
+static unsigned best_facing(const struct sampling *sampling, const float smooth[3], const float n[3])
 {
 	unsigned best = 0;
 	float most = -1;
 
-	for (unsigned q = 0; q < level->n_projections; q++) {
-		float g = v3f_dot(axis_of(level, q), smooth);
+	for (unsigned q = 0; q < N_PROJECTIONS; q++) {
+		const float *axis = sampling->projection[q].axis[2];
+		float g = v3f_dot(axis, smooth);
 
-		if (g > most && v3f_dot(axis_of(level, q), n) >= LEAST_OWNER_COSINE) {
+		if (g > most && v3f_dot(axis, n) >= LEAST_OWNER_COSINE) {
 			most = g;
 			best = q;
 		}
@@ -28,58 +31,61 @@ static unsigned best_facing(const struct level *level, const float smooth[3], co
 	return best;
 }
 
-unsigned owner_of(const struct level *level, const float p[3], const float n[3])
+unsigned owner_of(const struct sampling *sampling, const struct field *field, const float p[3], const float n[3])
 {
 	float smooth[3];
 
-	field_normal(&level->field, p, n, smooth);
-	return best_facing(level, smooth, n);
+	field_normal(field, p, n, smooth);
+	return best_facing(sampling, smooth, n);
 }
 
-static int is_seen(const struct level *level, const struct sheets *sheets, uint32_t patch, unsigned s, int turned)
+/* Position and normal of a hit. */
+static void locate(const struct job *job, int i, uint32_t patch, unsigned s, float p[3], float n[3])
+{
+	sheets_position(&job->sheets[i], (struct sheet_ref){ patch, s }, p);
+	sampling_normal(job->sampling, job->sheets[i].sample[patch][s].surface, n);
+}
+
+static int is_seen(const struct job *job, int i, uint32_t patch, unsigned s, int turned)
 {
 	float p[3], n[3];
 
-	sheets_position(sheets, (struct sheet_ref){ patch, s }, p);
-	level_normal(level, sheets->sample[patch][s].surface, n);
+	locate(job, i, patch, s, p, n);
 	if (turned)
 		v3f_scale(n, n, -1);
-	return seen_is(&level->seen, p, n);
+	return visible_set_has(job->finds->visible, p, n);
 }
 
 /* By the faces' own normals first: these are what the field is made of, each place once. */
 static void mark_faced(int i, void *userdata)
 {
-	struct level *level = userdata;
-	struct sheets *sheets = &level->sheets[i];
+	const struct job *job = userdata;
+	const struct sheets *sheets = &job->sheets[i];
 
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
-		struct patch *patch = &sheets->patch[p];
+		uint64_t mask = 0;
 
-		patch->owned = 0;
-		for (uint64_t left = patch->mask; left != 0; left &= left - 1) {
+		for (uint64_t left = sheets->patch[p].mask; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
 			float n[3];
 
-			level_normal(level, sheets->sample[p][s].surface, n);
-			patch->owned |= (uint64_t)(best_facing(level, n, n) == (unsigned)i) << s;
+			sampling_normal(job->sampling, sheets->sample[p][s].surface, n);
+			mask |= (uint64_t)(best_facing(job->sampling, n, n) == (unsigned)i) << s;
 		}
+		job->ownership->patch[i][p] = (struct owned){ mask, 0 };
 	}
 }
 
-static int make_field(struct level *level)
+static int make_field(const struct job *job)
 {
-	for (unsigned i = 0; i < level->n_projections; i++) {
-		const struct sheets *sheets = &level->sheets[i];
-
-		for (uint32_t p = 0; p < sheets->n_patches; p++) {
-			for (uint64_t left = sheets->patch[p].owned; left != 0; left &= left - 1) {
-				unsigned s = (unsigned)__builtin_ctzll(left);
+	for (int i = 0; i < N_PROJECTIONS; i++) {
+		for (uint32_t p = 0; p < job->sheets[i].n_patches; p++) {
+			for (uint64_t left = job->ownership->patch[i][p].mask; left != 0; left &= left - 1) {
 				float position[3], n[3];
 
-				sheets_position(sheets, (struct sheet_ref){ p, s }, position);
-				level_normal(level, sheets->sample[p][s].surface, n);
-				if (field_add(&level->field, position, n, 1 / v3f_dot(n, axis_of(level, i))) != PSR_OK)
+				locate(job, i, p, (unsigned)__builtin_ctzll(left), position, n);
+				if (field_add(job->finds->field, position, n, 1 / v3f_dot(n, job->sampling->projection[i].axis[2]))
+				    != PSR_OK)
 					return PSR_ERR_MEMORY;
 			}
 		}
@@ -89,54 +95,46 @@ static int make_field(struct level *level)
 
 static void mark_owned(int i, void *userdata)
 {
-	struct level *level = userdata;
-	struct sheets *sheets = &level->sheets[i];
+	const struct job *job = userdata;
+	const struct sheets *sheets = &job->sheets[i];
 
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
-		struct patch *patch = &sheets->patch[p];
+		uint64_t mask = 0;
 
-		patch->owned = 0;
-		for (uint64_t left = patch->mask; left != 0; left &= left - 1) {
+		for (uint64_t left = sheets->patch[p].mask; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
+			uint32_t surface = sheets->sample[p][s].surface;
 			float position[3], n[3];
 
-			level_normal(level, sheets->sample[p][s].surface, n);
-			if (v3f_dot(axis_of(level, (unsigned)i), n) < LEAST_OWNER_COSINE
-			    || (i % 2 != 0 && level_is_thin(level, sheets->sample[p][s].surface)))
+			sampling_normal(job->sampling, surface, n);
+			if (v3f_dot(job->sampling->projection[i].axis[2], n) < LEAST_OWNER_COSINE
+			    || (i % 2 != 0 && sampling_is_thin(job->sampling, surface)))
 				continue;
 			sheets_position(sheets, (struct sheet_ref){ p, s }, position);
-			patch->owned |= (uint64_t)(owner_of(level, position, n) == (unsigned)i) << s;
+			mask |= (uint64_t)(owner_of(job->sampling, job->finds->field, position, n) == (unsigned)i) << s;
 		}
+		job->ownership->patch[i][p].mask = mask;
 	}
 }
 
-static void note_side(struct level *level, uint32_t surface, int is_seen)
+static void mark_hidden(int i, void *userdata)
 {
-	enum side side = (surface & SHEET_BACK) != 0 ? (is_seen ? SIDE_BACK_SEEN : SIDE_BACK_HIDDEN)
-	                                             : (is_seen ? SIDE_FRONT_SEEN : SIDE_FRONT_HIDDEN);
-
-	__atomic_fetch_or(&level->sides[surface & ~SHEET_BACK], (uint8_t)side, __ATOMIC_RELAXED);
-}
-
-static void mark_seen(int i, void *userdata)
-{
-	struct level *level = userdata;
-	struct sheets *sheets = &level->sheets[i];
+	const struct job *job = userdata;
+	const struct sheets *sheets = &job->sheets[i];
 
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
-		struct patch *patch = &sheets->patch[p];
+		struct owned *owned = &job->ownership->patch[i][p];
+		uint64_t first = sheets->patch[p].first;
 
-		patch->seen = patch->first;
-		for (uint64_t left = patch->owned & ~patch->first; left != 0; left &= left - 1) {
+		for (uint64_t left = owned->mask & ~first; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
 
-			patch->seen |= (uint64_t)is_seen(level, sheets, p, s, 0) << s;
+			owned->hidden |= (uint64_t)!is_seen(job, i, p, s, 0) << s;
 		}
-		patch->hidden = patch->owned & ~patch->seen;
-		for (uint64_t left = patch->mask & (patch->seen | patch->hidden); left != 0; left &= left - 1) {
+		for (uint64_t left = sheets->patch[p].mask & (first | owned->mask); left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
 
-			note_side(level, sheets->sample[p][s].surface, (int)(patch->seen >> s & 1));
+			sides_note(job->finds->sides, sheets->sample[p][s].surface, !(owned->hidden >> s & 1));
 		}
 	}
 }
@@ -145,43 +143,40 @@ static void mark_seen(int i, void *userdata)
  * what is narrow are chosen when places are tested. */
 static void drop_hidden(int i, void *userdata)
 {
-	struct level *level = userdata;
-	struct sheets *sheets = &level->sheets[i];
-	const uint8_t both = SIDE_FRONT_SEEN | SIDE_BACK_SEEN;
+	const struct job *job = userdata;
+	const struct sheets *sheets = &job->sheets[i];
+	const struct sampling *sampling = job->sampling;
 
 	for (uint32_t p = 0; p < sheets->n_patches; p++) {
-		struct patch *patch = &sheets->patch[p];
+		struct owned *owned = &job->ownership->patch[i][p];
 
-		for (uint64_t left = patch->owned; left != 0; left &= left - 1) {
+		for (uint64_t left = owned->mask; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
-			uint32_t surface = sheets->sample[p][s].surface;
-			int is_both = (level->sides[surface & ~SHEET_BACK] & both) == both;
-			int is_kept = (int)(patch->seen >> s & 1);
+			uint32_t surface = sheets->sample[p][s].surface, prim = surface & ~SURFACE_BACK;
+			int is_kept = !(owned->hidden >> s & 1);
 
-			if (is_both)
-				is_kept = (surface & SHEET_BACK) == 0 && (is_kept || is_seen(level, sheets, p, s, 1));
-			else if (level_is_thin(level, surface))
-				is_kept = is_kept || is_seen(level, sheets, p, s, 1);
-			if (!is_kept || (level->sides[surface & ~SHEET_BACK] & SIDE_NARROW) != 0)
-				patch->owned &= ~(UINT64_C(1) << s);
+			if ((job->finds->sides[prim] & SIDES_SEEN) == SIDES_SEEN)
+				is_kept = surface == prim && (is_kept || is_seen(job, i, p, s, 1));
+			else if (sampling_is_thin(sampling, surface))
+				is_kept = is_kept || is_seen(job, i, p, s, 1);
+			if (!is_kept || (sampling->thin != NULL && (sampling->thin[prim] & THIN_NARROW) != 0))
+				owned->mask &= ~(UINT64_C(1) << s);
 		}
 	}
 }
 
 /* What rays met first is seen, here and at coarser levels, though of thin things few views meet anything. */
-static int see_first(struct level *level)
+static int see_first(const struct job *job)
 {
-	for (unsigned i = 0; i < level->n_projections; i++) {
-		const struct sheets *sheets = &level->sheets[i];
+	for (int i = 0; i < N_PROJECTIONS; i++) {
+		for (uint32_t p = 0; p < job->sheets[i].n_patches; p++) {
+			uint64_t left = job->ownership->patch[i][p].mask & job->sheets[i].patch[p].first;
 
-		for (uint32_t p = 0; p < sheets->n_patches; p++) {
-			for (uint64_t left = sheets->patch[p].owned & sheets->patch[p].first; left != 0; left &= left - 1) {
-				unsigned s = (unsigned)__builtin_ctzll(left);
+			for (; left != 0; left &= left - 1) {
 				float position[3], n[3];
 
-				sheets_position(sheets, (struct sheet_ref){ p, s }, position);
-				level_normal(level, sheets->sample[p][s].surface, n);
-				if (seen_add(&level->seen, position, n) != PSR_OK)
+				locate(job, i, p, (unsigned)__builtin_ctzll(left), position, n);
+				if (visible_set_add(job->finds->visible, position, n) != PSR_OK)
 					return PSR_ERR_MEMORY;
 			}
 		}
@@ -189,17 +184,31 @@ static int see_first(struct level *level)
 	return PSR_OK;
 }
 
-int owner_mark(struct level *level)
+int owner_mark(struct ownership *ownership, const struct owner_finds *finds, const struct sampling *sampling,
+               const struct sheets *sheets)
 {
-	int n = (int)level->n_projections;
+	struct job job = { ownership, finds, sampling, sheets };
 
-	psr_pool_for(level->pool, n, mark_faced, level);
-	if (make_field(level) != PSR_OK)
+	*ownership = (struct ownership){ { NULL } };
+	for (int i = 0; i < N_PROJECTIONS; i++) {
+		ownership->patch[i] = psr_alloc_array(sheets[i].n_patches, sizeof **ownership->patch);
+		if (ownership->patch[i] == NULL)
+			return PSR_ERR_MEMORY;
+	}
+	psr_pool_for(sampling->pool, N_PROJECTIONS, mark_faced, &job);
+	if (make_field(&job) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	psr_pool_for(level->pool, n, mark_owned, level);
-	if (see_first(level) != PSR_OK)
+	psr_pool_for(sampling->pool, N_PROJECTIONS, mark_owned, &job);
+	if (see_first(&job) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	psr_pool_for(level->pool, n, mark_seen, level);
-	psr_pool_for(level->pool, n, drop_hidden, level);
+	psr_pool_for(sampling->pool, N_PROJECTIONS, mark_hidden, &job);
+	psr_pool_for(sampling->pool, N_PROJECTIONS, drop_hidden, &job);
 	return PSR_OK;
+}
+
+void ownership_fini(struct ownership *ownership)
+{
+	for (int i = 0; i < N_PROJECTIONS; i++)
+		psr_free(ownership->patch[i]);
+	*ownership = (struct ownership){ { NULL } };
 }

@@ -3,7 +3,7 @@
 #define PSR_SAMPLE_PACK_CONE_H
 
 #include <stdint.h>
-#include "psr/model.h"
+#include "model/blocks.h"
 
 /* The smallest cap that holds n >= 0 unit normals: its axis, a unit vector, and the cosine of the angle from there to
  * its rim, rounded downwards. The cosine is -1, and the axis of no meaning, if no cap smaller than a hemisphere holds

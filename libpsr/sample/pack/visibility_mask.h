@@ -4,9 +4,9 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include "psr/direction.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "base/direction.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 /* Masks of all blocks, whatever their level: bit t of a block is set iff one of its samples is seen from some direction

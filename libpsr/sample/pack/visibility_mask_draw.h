@@ -3,8 +3,8 @@
 #define PSR_SAMPLE_PACK_VISIBILITY_MASK_DRAW_H
 
 #include <stdint.h>
-#include "psr/direction.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "model/blocks.h"
 
 /* The samples of a model, unpacked. Each array is readable for VPOINTS_BEYOND elements beyond its last. */
 #define VPOINTS_BEYOND 64

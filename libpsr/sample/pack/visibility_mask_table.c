@@ -2,7 +2,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "cone.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "visibility_mask_table.h"
 
 #define TRIANGLE_LEVEL 2

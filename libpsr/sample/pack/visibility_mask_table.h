@@ -3,8 +3,8 @@
 #define PSR_SAMPLE_PACK_VISIBILITY_MASK_TABLE_H
 
 #include <stdint.h>
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 
 /* A run has one mask for this many of its blocks, rounded up; so an index has eight bits at most. */
 #define VISIBILITY_SHARE 4

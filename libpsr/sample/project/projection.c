@@ -2,7 +2,7 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "projection.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 /* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which
  * would be as far from one direction as from the next. */
@@ -49,13 +49,13 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 	v3d_cross(turn[1], turn[2], turn[0]);
 	psr_sincos(tolerance, &sine, &cosine);
 	for (int i = 0; i < n; i++) {
-		double frame[3][3], turned[3];
+		double basis[3][3], turned[3];
 
 		m3d_apply(turned, (const double(*)[3])turn, direction[i]);
 		v3d_normalize(turned, turned);
-		psr_direction_frame(turned, frame);
+		psr_direction_frame(turned, basis);
 		for (int k = 0; k < 9; k++)
-			list[i].axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
+			list[i].axis[k / 3][k % 3] = (float)basis[k / 3][k % 3];
 		list[i].spacing = (float)(ds * cosine);
 	}
 }

@@ -148,7 +148,7 @@ struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point a
 	for (; room.patch != SHEET_NONE; room.patch = sheets->patch[room.patch].next) {
 		const struct patch *patch = &sheets->patch[room.patch];
 
-		if (patch->is_alive && (patch->mask >> room.sample & 1) == 0 && patch->two_sided == two_sided
+		if (patch->kept != 0 && (patch->mask >> room.sample & 1) == 0 && patch->two_sided == two_sided
 		    && fabsf(sheets->sample[room.patch][__builtin_ctzll(patch->kept)].z - z)
 		       < SHEET_PATCH_STEPS / 2 * sheets->projection.spacing)
 			break;
@@ -188,6 +188,6 @@ void sheets_position(const struct sheets *sheets, struct sheet_ref ref, float po
 
 	sheets_point(sheets, SIDE * patch->row + (int)(ref.sample / SIDE), SIDE * patch->col + (int)(ref.sample % SIDE), &x,
 	             &y);
-	sheets_inner(&sheets->projection, x, y, (double)sheets->sample[ref.patch][ref.sample].z, inner);
+	projection_inner(&sheets->projection, x, y, (double)sheets->sample[ref.patch][ref.sample].z, inner);
 	v3f_set(position, (float)inner[0], (float)inner[1], (float)inner[2]);
 }

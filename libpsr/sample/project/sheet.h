@@ -9,10 +9,9 @@
 
 #include <stdint.h>
 #include "psr/model.h"
-#include "psr/pool.h"
 #include "ray/ray.h"
+#include "sampling.h"
 
-#define SHEET_BACK 0x80000000u /* in a sample's surface: met from the back */
 #define SHEET_NONE UINT32_MAX
 
 /* Cosine of the steepest angle at which hits are kept: 72 degrees. */
@@ -26,23 +25,19 @@
 
 struct sheet_sample {
 	float z;          /* along the projection's z, inner units */
-	uint32_t surface; /* primitive, and SHEET_BACK */
+	uint32_t surface; /* a side: surface.h */
 };
 
-/* What is looked for most comes first. */
+/* What searches read comes first. */
 struct patch {
 	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
-	float low, high;    /* z of hits is within */
+	float low, high;    /* bound z of the hits */
 	int16_t col, row;   /* in blocks */
 	uint64_t mask;      /* hits; */
-	uint64_t kept;
-	uint8_t two_sided;  /* of what may count for both of its sides; or of the rest */
-	uint8_t is_alive;   /* some of it is kept */
-	uint16_t n_wanted;  /* places that it could cover, for which there was nothing */
-	uint64_t first;     /* of the hits, the first of their rays: nothing hides them; */
-	uint64_t seen;      /* those that are known to be visible, */
-	uint64_t hidden;    /* and known to be hidden; */
-	uint64_t owned;     /* those that this projection faces best */
+	uint64_t kept;      /* those that the model keeps: sheets_keep(); */
+	uint64_t first;     /* and the first of their rays, which nothing hides */
+	uint16_t n_wanted;  /* places that it could cover, and nothing did: sheets_want() */
+	uint8_t two_sided;  /* sampling_is_sheet(), the same of all hits */
 };
 
 /* Puts a hit into a patch that has none at s yet. */
@@ -64,11 +59,9 @@ struct sheets {
 };
 
 /* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z
- * and the same rays; or NULL. sides: enum side (level.h), by primitive, for what is thin; or NULL. The same bytes
- * whatever the number of threads. MEMORY. */
-int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene,
-                 const struct psr_mesh *mesh, const uint8_t *sides, const struct psr_projection *projection,
-                 struct psr_pool *pool);
+ * and the same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct sampling *sampling,
+                 const struct psr_projection *projection);
 void sheets_fini(struct sheets *sheets);
 
 /* Projection space x and y of lattice point (row, column). */
@@ -102,22 +95,38 @@ struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point a
 void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
                          struct sheet_ref found[3]);
 
-/* A living patch that has nothing at a lattice point, and samples of these sides not far from this depth; or none. */
+/* A patch with kept samples, of these sides and not far from this depth, that has nothing at a lattice point; or
+ * none. */
 struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);
 
 /* A sample that no ray found, put at a lattice point: into a patch with room, or into a new one. MEMORY. */
 int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
                struct sheet_ref *out);
 
-/* Puts the last patch of `patch` into the list of its lattice block. */
+/* Puts a new patch into the list of its lattice block. */
 void sheets_link(struct sheets *sheets, uint32_t patch);
+
+static inline void sheets_keep(struct sheets *sheets, struct sheet_ref ref)
+{
+	sheets->patch[ref.patch].kept |= UINT64_C(1) << ref.sample;
+}
+
+static inline int sheets_is_kept(const struct sheets *sheets, struct sheet_ref ref)
+{
+	return (int)(sheets->patch[ref.patch].kept >> ref.sample & 1);
+}
+
+static inline void sheets_want(struct sheets *sheets, uint32_t patch)
+{
+	sheets->patch[patch].n_wanted += sheets->patch[patch].n_wanted != UINT16_MAX;
+}
 
 void sheets_position(const struct sheets *sheets, struct sheet_ref ref, float position[3]);
 
-static inline void sheets_inner(const struct psr_projection *p, double x, double y, double z, double inner[3])
-{
-	for (int k = 0; k < 3; k++)
-		inner[k] = x * (double)p->axis[0][k] + y * (double)p->axis[1][k] + z * (double)p->axis[2][k];
-}
+/* A sample of one of the projections of a level. */
+struct sample_ref {
+	unsigned projection;
+	struct sheet_ref at;
+};
 
 #endif

@@ -3,9 +3,7 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "sample/level.h"
 #include "sheet_patch.h"
-#include "surface/texture.h"
 
 #define SIDE PSR_BLOCK_SIDE
 #define BATCH 64
@@ -26,9 +24,7 @@ struct strip {
 struct job {
 	struct sheets *sheets[2]; /* the second one's lattice is the first one's, looked at from behind: column c of row r
 	                             is column -c - (r & 1) there; NULL if nobody asks for it */
-	const struct ray_scene *scene;
-	const struct psr_mesh *mesh;
-	const uint8_t *sides;
+	const struct sampling *sampling;
 	struct patch_row *row[2];
 };
 
@@ -43,12 +39,6 @@ static void strip_fini(struct strip *strip)
 {
 	psr_free(strip->first);
 	free(strip->hit);
-}
-
-static int is_sheet(const struct job *job, uint32_t prim)
-{
-	return job->mesh->material[texture_material(job->mesh, prim)].two_sided
-	       || (job->sides != NULL && (job->sides[prim] & SIDE_THIN) != 0);
 }
 
 /* The hits of one ray that are not too steep. */
@@ -68,11 +58,11 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 	for (int k = 0; k < n_hits; k++) {
 		uint32_t prim = ray_hit[k].prim;
 
-		if (fabsf(v3f_dot(ray_scene_normal(job->scene, prim), z_axis)) < SHEET_LEAST_COSINE)
+		if (fabsf(v3f_dot(ray_scene_normal(job->sampling->scene, prim), z_axis)) < SHEET_LEAST_COSINE)
 			continue;
 		strip->hit[strip->n++] = (struct strip_hit){ .z = (float)(SHEET_START - ray_hit[k].t),
-			                                         .surface = prim | (ray_hit[k].is_back ? SHEET_BACK : 0),
-			                                         .two_sided = is_sheet(job, prim),
+			                                         .surface = prim | (ray_hit[k].is_back ? SURFACE_BACK : 0),
+			                                         .two_sided = (uint8_t)sampling_is_sheet(job->sampling, prim),
 			                                         .is_first = k == 0 };
 	}
 	return PSR_OK;
@@ -88,6 +78,7 @@ struct batch {
 static int trace_columns(const struct job *job, struct strip strip[2], int row, int first, int end)
 {
 	static _Thread_local struct batch batch;
+	struct ray_hits hits[2];
 	int n = 0, is_of[BATCH], rc = PSR_OK;
 
 	for (int i = 0; i < end - first; i++) {
@@ -99,8 +90,10 @@ static int trace_columns(const struct job *job, struct strip strip[2], int row, 
 			sheets_ray(&job->sheets[0]->projection, x, y, &batch.ray[n++]);
 	}
 	strip->n_rays += (uint64_t)n;
-	ray_scene_trace_ends(job->scene, batch.ray, n, 2 * SHEET_START, SHEET_LAYERS, batch.hit[0], batch.n_hits[0],
-	                     job->sheets[1] != NULL ? batch.hit[1] : NULL, batch.n_hits[1]);
+	for (int k = 0; k < 2; k++)
+		hits[k] = (struct ray_hits){ SHEET_LAYERS, batch.hit[k], batch.n_hits[k] };
+	ray_scene_trace_ends(job->sampling->scene, batch.ray, n, 2 * SHEET_START, &hits[0],
+	                     job->sheets[1] != NULL ? &hits[1] : NULL);
 	for (int end_of_ray = 0; end_of_ray < 2 && job->sheets[end_of_ray] != NULL; end_of_ray++) {
 		struct strip *s = &strip[end_of_ray];
 
@@ -231,11 +224,10 @@ static int finish(struct sheets *sheets, struct patch_row *row, int rc)
 	return rc;
 }
 
-int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_scene *scene,
-                 const struct psr_mesh *mesh, const uint8_t *sides, const struct psr_projection *projection,
-                 struct psr_pool *pool)
+int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct sampling *sampling,
+                 const struct psr_projection *projection)
 {
-	struct job job = { .sheets = { sheets, behind }, .scene = scene, .mesh = mesh, .sides = sides };
+	struct job job = { .sheets = { sheets, behind }, .sampling = sampling };
 	struct psr_projection turned = *projection;
 	int rc = start(sheets, &job.row[0], projection), rc_behind = PSR_OK;
 
@@ -247,7 +239,7 @@ int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct ray_
 		rc_behind = start(behind, &job.row[1], &turned);
 	rc = rc != PSR_OK ? rc : rc_behind;
 	if (rc == PSR_OK)
-		psr_pool_for(pool, 2 * sheets->reach, trace_row, &job);
+		psr_pool_for(sampling->pool, 2 * sheets->reach, trace_row, &job);
 	rc_behind = behind != NULL ? finish(behind, job.row[1], rc) : PSR_OK;
 	rc = finish(sheets, job.row[0], rc);
 	if (rc == PSR_OK && rc_behind == PSR_OK)

@@ -3,12 +3,12 @@
 #ifndef PSR_SAMPLE_THIN_CHOOSE_H
 #define PSR_SAMPLE_THIN_CHOOSE_H
 
-#include <stdint.h>
-#include "sample/level.h"
+#include "sample/project/sheet.h"
+#include "sample/visible/places.h"
 
 /* A hit that may be kept, or a lattice point that may get one. */
 struct thin_candidate {
-	struct level_ref ref; /* at.patch: SHEET_NONE if there is no hit, */
+	struct sample_ref ref; /* at.patch: SHEET_NONE if there is no hit, */
 	struct lattice_point at; /* and then where it would be, */
 	float z;                 /* in projection space, */
 	uint32_t surface;        /* and of what */
@@ -24,13 +24,13 @@ struct thin_candidates {
 /* free() list->candidate. MEMORY. */
 int thin_candidates_add(struct thin_candidates *list, const struct thin_candidate *candidate);
 
-/* Moves a place to the nearest lattice point of projection q, if that is near enough and the place's face not seen
- * edge-on. MEMORY. */
-int thin_candidates_move(struct thin_candidates *list, const struct level *level, const struct surface_spot *spot,
-                         unsigned q);
+/* Moves a place to the nearest lattice point of projection q, whose sheets these are, if that is within 0.4 ds and the
+ * place's face not seen edge-on. MEMORY. */
+int thin_candidates_move(struct thin_candidates *list, const struct sheets *sheets, unsigned q,
+                         const struct place *place, double ds);
 
-/* Leaves those in the list that are chosen, in their order, and those in front of spot[], of *n, that none covers.
- * radius: cover_is_sheet_near()'s. MEMORY. */
-int thin_choose(struct thin_candidates *list, struct surface_spot *spot, size_t *n, double radius);
+/* Leaves those in the list that are chosen, in their order, and those in front of place[], of *n, that none covers.
+ * radius: kept_covers_sheet()'s. MEMORY. */
+int thin_choose(struct thin_candidates *list, struct place *place, size_t *n, double radius);
 
 #endif

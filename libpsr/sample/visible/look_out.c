@@ -1,13 +1,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include "base/mem.h"
+#include "base/random.h"
 #include "base/vec.h"
-#include "surface/area.h"
-#include "psr/direction.h"
-#include "psr/error.h"
 #include "look_out.h"
-#include "sample/mend/places.h"
-#include "surface/texture.h"
+#include "places.h"
+#include "base/direction.h"
+#include "psr/error.h"
+#include "ray/area.h"
 
 #define PLACE_AREA 2.25 /* square pixels: a place for each cell of what was seen */
 #define BATCH 64  /* rays from a side of each place, */
@@ -17,41 +17,27 @@
 #define CHUNK 4096
 
 struct chunk {
-	struct spots open, shut; /* from which rays got outside, and from which none did so far */
+	struct places open, shut; /* from which rays got outside, and from which none did so far */
 	int failed;
 };
 
 struct job {
-	const struct level *level;
+	const struct sampling *sampling;
+	struct visible_set *set;
 	const double *area; /* of all primitives up to this one */
 	double step;        /* of area, from place to place */
 	uint32_t n_prims;
 	uint64_t n_places;
-	struct seen near;   /* what was seen, in wider cells */
-	struct seen around; /* what rays got outside from */
+	struct visible_set near;   /* what was seen, in wider cells */
+	struct visible_set around; /* what rays got outside from */
 	struct chunk *chunk;
 };
-
-/* SplitMix64 (Steele, Lea, Flood 2014), by counter. */
-static uint64_t draw_bits(uint64_t *state)
-{
-	uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
-
-	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
-	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
-	return z ^ z >> 31;
-}
-
-static double draw(uint64_t *state)
-{
-	return (double)(draw_bits(state) >> 11) * 0x1p-53;
-}
 
 /* Towards where a side of a surface shows, as often as it looks large from there: a point of the unit sphere around n,
  * added to n. One in each of BATCH parts of the sphere, in an order in which the next is near. */
 static void draw_view(uint64_t *state, int part, const float n[3], double view[3])
 {
-	const unsigned n_drawn = PSR_DIRECTIONS / BATCH, drawn = (unsigned)(draw_bits(state) % n_drawn);
+	const unsigned n_drawn = PSR_DIRECTIONS / BATCH, drawn = (unsigned)(random_next(state) % n_drawn);
 	const float *direction = psr_direction_table()[(unsigned)part * n_drawn + drawn];
 
 	for (int k = 0; k < 3; k++)
@@ -60,8 +46,7 @@ static void draw_view(uint64_t *state, int part, const float n[3], double view[3
 		v3d_set(view, (double)n[0], (double)n[1], (double)n[2]);
 }
 
-/* Looked at from outside, as one-sided faces let rays through that come from behind them. */
-static int is_open(const struct level *level, const struct surface_spot *spot, int batches, uint64_t *state)
+static int is_open(const struct sampling *sampling, const struct place *place, int batches, uint64_t *state)
 {
 	struct ray ray[BATCH];
 	uint8_t is_hidden[BATCH];
@@ -70,13 +55,10 @@ static int is_open(const struct level *level, const struct surface_spot *spot, i
 		for (int i = 0; i < BATCH; i++) {
 			double view[3];
 
-			draw_view(state, i, spot->n, view);
-			for (int k = 0; k < 3; k++) {
-				ray[i].origin[k] = (double)spot->p[k] + 3 * view[k];
-				ray[i].direction[k] = -view[k];
-			}
+			draw_view(state, i, place->n, view);
+			place_ray(place, view, &ray[i]);
 		}
-		ray_scene_occluded(level->scene, ray, BATCH, 3 - 0.01 * level->ds, is_hidden);
+		ray_scene_occluded(sampling->scene, ray, BATCH, PLACE_AWAY - 0.01 * sampling->ds, is_hidden);
 		for (int i = 0; i < BATCH; i++)
 			if (!is_hidden[i])
 				return 1;
@@ -86,34 +68,22 @@ static int is_open(const struct level *level, const struct surface_spot *spot, i
 
 static int look_at(const struct job *job, uint32_t prim, uint64_t *state, struct chunk *chunk)
 {
-	const struct level *level = job->level;
-	const float *n = ray_scene_normal(level->scene, prim);
-	double p[3];
+	const struct sampling *sampling = job->sampling;
+	double p[3], u = 0, v = 0;
 
-	if (prim < level->mesh->n_triangles) {
-		double u = draw(state), v = draw(state), corner[3][3];
-
-		if (u + v > 1) {
-			u = 1 - u;
-			v = 1 - v;
-		}
-		if (ray_scene_is_absent(level->scene, prim, u, v))
-			return PSR_OK;
-		ray_scene_corners(level->scene, prim, corner);
-		for (int k = 0; k < 3; k++)
-			p[k] = (1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k];
-	} else {
-		ray_scene_center(level->scene, prim, p);
+	if (prim < sampling->mesh->n_triangles) {
+		u = random_in(state, 0, 1);
+		v = random_in(state, 0, 1);
 	}
-	for (int is_back = 0; is_back <= (level_material(level, prim)->two_sided != 0); is_back++) {
-		struct surface_spot spot = { .surface = prim | (is_back ? SHEET_BACK : 0) };
+	if (!area_point(sampling->scene, prim, u, v, p))
+		return PSR_OK;
+	for (int is_back = 0; is_back <= (sampling_material(sampling, prim)->two_sided != 0); is_back++) {
+		struct place place = { .p = { (float)p[0], (float)p[1], (float)p[2] },
+			                   .surface = prim | (is_back ? SURFACE_BACK : 0) };
 
-		for (int k = 0; k < 3; k++) {
-			spot.p[k] = (float)p[k];
-			spot.n[k] = is_back ? -n[k] : n[k];
-		}
-		if (!seen_is(&level->seen, spot.p, spot.n) && seen_is(&job->near, spot.p, spot.n)
-		    && spots_add(is_open(level, &spot, 1, state) ? &chunk->open : &chunk->shut, &spot) != PSR_OK)
+		sampling_normal(sampling, place.surface, place.n);
+		if (!visible_set_has(job->set, place.p, place.n) && visible_set_has(&job->near, place.p, place.n)
+		    && places_add(is_open(sampling, &place, 1, state) ? &chunk->open : &chunk->shut, &place) != PSR_OK)
 			return PSR_ERR_MEMORY;
 	}
 	return PSR_OK;
@@ -128,7 +98,7 @@ static void look_at_chunk(int i, void *userdata)
 
 	for (uint64_t k = first; k < end && !chunk->failed; k++) {
 		uint64_t state = k * UINT64_C(0x632be59bd9b4e019);
-		const double x = ((double)k + draw(&state)) * job->step;
+		const double x = ((double)k + random_in(&state, 0, 1)) * job->step;
 
 		while (prim + 1 < job->n_prims && job->area[prim] <= x)
 			prim++;
@@ -145,84 +115,84 @@ static void look_again(int i, void *userdata)
 
 	chunk->open.n = 0;
 	for (size_t k = 0; k < chunk->shut.n && !chunk->failed; k++) {
-		const struct surface_spot *spot = &chunk->shut.spot[k];
+		const struct place *place = &chunk->shut.place[k];
 
-		if (seen_is(&job->around, spot->p, spot->n) && !seen_is(&job->level->seen, spot->p, spot->n)
-		    && is_open(job->level, spot, AGAIN, &state))
-			chunk->failed = spots_add(&chunk->open, spot) != PSR_OK;
+		if (visible_set_has(&job->around, place->p, place->n) && !visible_set_has(job->set, place->p, place->n)
+		    && is_open(job->sampling, place, AGAIN, &state))
+			chunk->failed = places_add(&chunk->open, place) != PSR_OK;
 	}
 }
 
-static int add_open(struct seen *seen, const struct chunk *chunk, int n_chunks)
+static int add_open(struct visible_set *set, const struct chunk *chunk, int n_chunks)
 {
 	int rc = PSR_OK;
 
 	for (int i = 0; rc == PSR_OK && i < n_chunks; i++) {
 		rc = chunk[i].failed ? PSR_ERR_MEMORY : PSR_OK;
 		for (size_t k = 0; rc == PSR_OK && k < chunk[i].open.n; k++)
-			rc = seen_add(seen, chunk[i].open.spot[k].p, chunk[i].open.spot[k].n);
+			rc = visible_set_add(set, chunk[i].open.place[k].p, chunk[i].open.place[k].n);
 	}
 	return rc;
 }
 
-/* Cells made twice as wide so many times. seen_fini() either way. */
-static int widen(struct seen *wide, const struct seen *seen, int times)
+/* Cells made twice as wide so many times. visible_set_fini() either way. */
+static int widen(struct visible_set *wide, const struct visible_set *set, int times)
 {
-	int rc = seen_coarsen(wide, seen);
+	int rc = visible_set_coarsen(wide, set);
 
 	for (int i = 1; rc == PSR_OK && i < times; i++) {
-		struct seen finer = *wide;
+		struct visible_set finer = *wide;
 
-		rc = seen_coarsen(wide, &finer);
-		seen_fini(&finer);
+		rc = visible_set_coarsen(wide, &finer);
+		visible_set_fini(&finer);
 	}
 	return rc;
 }
 
-static int look_twice(struct level *level, struct job *job, int n_chunks)
+static int look_twice(struct job *job, int n_chunks)
 {
-	struct seen open = { .table = NULL };
-	int rc = widen(&job->near, &level->seen, NEAR);
+	struct visible_set open = { .n_views = 0 };
+	int rc = widen(&job->near, job->set, NEAR);
 
 	if (rc == PSR_OK)
-		psr_pool_for(level->pool, n_chunks, look_at_chunk, job);
+		psr_pool_for(job->sampling->pool, n_chunks, look_at_chunk, job);
 	if (rc == PSR_OK)
-		rc = add_open(&level->seen, job->chunk, n_chunks);
+		rc = add_open(job->set, job->chunk, n_chunks);
 	if (rc == PSR_OK)
-		rc = seen_init(&open, level->ds);
+		rc = visible_set_init(&open, job->sampling->ds);
 	if (rc == PSR_OK)
 		rc = add_open(&open, job->chunk, n_chunks);
 	if (rc == PSR_OK)
 		rc = widen(&job->around, &open, AROUND);
-	seen_fini(&open);
+	visible_set_fini(&open);
 	if (rc != PSR_OK)
 		return rc;
-	psr_pool_for(level->pool, n_chunks, look_again, job);
-	return add_open(&level->seen, job->chunk, n_chunks);
+	psr_pool_for(job->sampling->pool, n_chunks, look_again, job);
+	return add_open(job->set, job->chunk, n_chunks);
 }
 
-int seen_look_out(struct level *level)
+int look_out(struct visible_set *set, const struct sampling *sampling)
 {
-	struct job job = { .level = level, .n_prims = level->mesh->n_triangles + level->mesh->n_points };
+	struct job job = { .sampling = sampling, .set = set, .n_prims = sampling_n_prims(sampling) };
 	double *area = psr_alloc_array(job.n_prims, sizeof *area);
 	int rc = area == NULL ? PSR_ERR_MEMORY : PSR_OK, n_chunks = 0;
 
 	if (rc == PSR_OK) {
-		area_sum(level, job.n_prims, area);
+		area_sum(sampling->scene, sampling->mesh, sampling->surface->scale, area);
 		job.area = area;
-		job.n_places = (uint64_t)(area[job.n_prims - 1] / (PLACE_AREA * level->ds * level->ds)) + 1;
+		job.n_places = (uint64_t)(area[job.n_prims - 1] / (PLACE_AREA * sampling->ds * sampling->ds)) + 1;
 		job.step = area[job.n_prims - 1] / (double)job.n_places;
 		n_chunks = (int)((job.n_places + CHUNK - 1) / CHUNK);
 		job.chunk = calloc((size_t)n_chunks, sizeof *job.chunk);
-		rc = job.chunk == NULL ? PSR_ERR_MEMORY : look_twice(level, &job, n_chunks);
+		rc = job.chunk == NULL ? PSR_ERR_MEMORY : look_twice(&job, n_chunks);
 	}
 	for (int i = 0; job.chunk != NULL && i < n_chunks; i++) {
-		free(job.chunk[i].open.spot);
-		free(job.chunk[i].shut.spot);
+		free(job.chunk[i].open.place);
+		free(job.chunk[i].shut.place);
 	}
 	free(job.chunk);
-	seen_fini(&job.near);
-	seen_fini(&job.around);
+	visible_set_fini(&job.near);
+	visible_set_fini(&job.around);
 	psr_free(area);
 	return rc;
 }

@@ -1,12 +1,14 @@
-/* What views all around do not meet, looked at from the surface: nooks and slots show from a few directions only. */
+/* Looks from the surface outwards for what views from all around do not meet: nooks and slots show from few
+ * directions. */
 #ifndef PSR_SAMPLE_VISIBLE_LOOK_OUT_H
 #define PSR_SAMPLE_VISIBLE_LOOK_OUT_H
 
-#include "sample/level.h"
+#include "sample/project/sampling.h"
+#include "visible_set.h"
 
-/* Of places all over the surface, one for each 1.5 x 1.5 pixels, puts down as seen those that no view has met so far
- * and from which one of 64 rays gets outside, if something that faces like them was seen within 12 pixels or so; 192
- * rays more look out from those within 6 pixels or so of what these found. The same whatever the threads. MEMORY. */
-int seen_look_out(struct level *level);
+/* Tries a place for each 1.5 x 1.5 pixels of the surface that no view has met, if something within about 12 pixels that
+ * faces like it was seen: it is added when one of 64 rays from it gets outside. 192 more rays try those within about 6
+ * pixels of what was added. The same whatever the threads. MEMORY. */
+int look_out(struct visible_set *set, const struct sampling *sampling);
 
 #endif

@@ -1,14 +1,10 @@
 #include <math.h>
-#include <string.h>
-#include "base/mem.h"
-#include "base/vec.h"
 #include "base/cell.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "psr/error.h"
 #include "visible_set.h"
 
-#define FREE UINT64_MAX
-#define RECENT (UINT64_C(1) << 63) /* what the views met that are being looked along */
+#define RECENT TABLE_MARK /* what the views met that are being looked along */
 #define CELL_PIXELS 1.5
 #define BATCH 64
 #define AT_ONCE 16 /* views */
@@ -18,16 +14,6 @@
 #define SET_SIZE (N_DIRECTIONS / N_SETS)
 #define RAY_PIXELS 4 /* between rays: many views rather than fine ones */
 #define LEAST_WAY 0.4f
-
-/* 20 bits an axis, as the sphere is 8192 pixels wide at most, and one of six ways to face. */
-static uint64_t key_of(const int at[3], int axis, int is_negative)
-{
-	uint64_t key = (uint64_t)(2 * axis + is_negative);
-
-	for (int k = 0; k < 3; k++)
-		key = key << 20 | (uint64_t)(at[k] & 0xfffff);
-	return key;
-}
 
 static uint64_t coarser_key(uint64_t key)
 {
@@ -46,16 +32,17 @@ enum found { NO_ROOM, OLD, NEW };
 
 /* From any thread. What is marked as recent is as good as new. To find that there is no room takes a walk through all
  * of it. */
-static enum found insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
+static enum found insert(const struct visible_set *set, uint64_t key, uint64_t *n_new)
 {
+	const struct table *table = &set->table;
 	const uint64_t plain = key & ~RECENT;
-	size_t i = cell_place(plain, seen->size);
+	size_t i = table_place(key, table->size);
 
-	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
-		uint64_t old = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
+	for (size_t tries = 0; tries < table->size; tries++, i = (i + 1) & (table->size - 1)) {
+		uint64_t *entry = table_at(table, i), old = __atomic_load_n(entry, __ATOMIC_RELAXED);
 
-		if (old == FREE &&
-		    __atomic_compare_exchange_n(&seen->table[i], &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
+		if (old == TABLE_FREE
+		    && __atomic_compare_exchange_n(entry, &old, key, 0, __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {
 			__atomic_fetch_add(n_new, 1, __ATOMIC_RELAXED);
 			return NEW;
 		}
@@ -68,23 +55,20 @@ static enum found insert(const struct seen *seen, uint64_t key, uint64_t *n_new)
 }
 
 struct look {
-	const struct seen *seen;
+	const struct visible_set *set;
 	const struct ray_scene *scene;
-	double frame[AT_ONCE][3][3], ds;
+	double basis[AT_ONCE][3][3], ds;
 	int reach; /* rows and columns on each side of the middle */
 	uint64_t n_new, n_hits, n_unseen; /* cells; rays; those that met what no view of before had seen */
 	int is_full, is_counting;
 };
 
-static uint64_t place_key(const struct seen *seen, const float p[3], const float n[3])
+static uint64_t place_key(const struct visible_set *set, const float p[3], const float n[3])
 {
-	int at[3], axis = 0;
+	int at[3];
 
-	for (int k = 0; k < 3; k++) {
-		at[k] = cell_floor((double)p[k] / seen->cell);
-		axis = fabsf(n[k]) > fabsf(n[axis]) ? k : axis;
-	}
-	return key_of(at, axis, n[axis] < 0);
+	cell_of(p, set->width, at);
+	return cell_facing_key(at, cell_facing(n));
 }
 
 static void mark(struct look *look, const struct ray *ray, const struct ray_hit *hit)
@@ -97,10 +81,10 @@ static void mark(struct look *look, const struct ray *ray, const struct ray_hit 
 		p[k] = (float)(ray->origin[k] + hit->t * ray->direction[k]);
 		n[k] = hit->is_back ? -front[k] : front[k];
 	}
-	found = insert(look->seen, place_key(look->seen, p, n) | RECENT, &look->n_new);
+	found = insert(look->set, place_key(look->set, p, n) | RECENT, &look->n_new);
 	if (found == NO_ROOM)
 		__atomic_store_n(&look->is_full, 1, __ATOMIC_RELAXED);
-	else if (found == NEW && look->is_counting && !seen_is(look->seen, p, n))
+	else if (found == NEW && look->is_counting && !visible_set_has(look->set, p, n))
 		__atomic_fetch_add(&look->n_unseen, 1, __ATOMIC_RELAXED);
 }
 
@@ -123,7 +107,7 @@ static void trace_batch(struct look *look, const struct ray *ray, int n)
 static void look_along_rows(int i, void *userdata)
 {
 	struct look *look = userdata;
-	double (*frame)[3] = look->frame[i / look->reach];
+	double (*basis)[3] = look->basis[i / look->reach];
 	int row = 2 * (i % look->reach) - look->reach, columns = 0, n = 0;
 	struct ray ray[BATCH];
 
@@ -138,8 +122,8 @@ static void look_along_rows(int i, void *userdata)
 			double x = (c + 0.5) * look->ds, y = (r + 0.5) * look->ds;
 
 			for (int k = 0; k < 3; k++) {
-				ray[n].origin[k] = x * frame[0][k] + y * frame[1][k] + 2 * frame[2][k];
-				ray[n].direction[k] = -frame[2][k];
+				ray[n].origin[k] = x * basis[0][k] + y * basis[1][k] + 2 * basis[2][k];
+				ray[n].direction[k] = -basis[2][k];
 			}
 		}
 		if (n == BATCH || c + 1 == columns) {
@@ -149,75 +133,57 @@ static void look_along_rows(int i, void *userdata)
 	}
 }
 
-static int grow(struct seen *seen)
+int visible_set_init(struct visible_set *set, double ds)
 {
-	struct seen old = *seen;
-	uint64_t n_new = 0;
-
-	seen->table = psr_alloc_array(2 * old.size, sizeof *seen->table);
-	if (seen->table == NULL) {
-		*seen = old;
-		return PSR_ERR_MEMORY;
-	}
-	seen->size = 2 * old.size;
-	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
-	for (size_t i = 0; i < old.size; i++)
-		if (old.table[i] != FREE)
-			(void)insert(seen, old.table[i], &n_new);
-	psr_free(old.table);
-	return PSR_OK;
+	*set = (struct visible_set){ .width = CELL_PIXELS * ds };
+	return table_init(&set->table, sizeof(uint64_t), 1 << 16);
 }
 
-int seen_init(struct seen *seen, double ds)
+void visible_set_fini(struct visible_set *set)
 {
-	*seen = (struct seen){ .cell = CELL_PIXELS * ds, .size = 1 << 16 };
-	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
-	if (seen->table == NULL)
-		return PSR_ERR_MEMORY;
-	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
-	return PSR_OK;
+	table_fini(&set->table);
 }
 
 /* Views that fill the table are broken off, and looked along again once there is room. */
-static int look_along(struct look *look, struct seen *seen, struct psr_pool *pool)
+static int look_along(struct look *look, struct visible_set *set, struct psr_pool *pool)
 {
 	/* Far apart ones first, so that the table soon has its size. */
 	for (unsigned k = 0; k < AT_ONCE; k++) {
-		unsigned i = seen->n_views + k, view = N_SETS * (i * 211 % SET_SIZE) + i / SET_SIZE % N_SETS;
+		unsigned i = set->n_views + k, view = N_SETS * (i * 211 % SET_SIZE) + i / SET_SIZE % N_SETS;
 		double direction[3];
 
 		psr_direction_center(VIEW_LEVEL, view, direction);
-		psr_direction_frame(direction, look->frame[k]);
+		psr_direction_frame(direction, look->basis[k]);
 	}
 	do {
 		look->n_new = look->n_hits = look->n_unseen = 0;
 		look->is_full = 0;
 		psr_pool_for(pool, AT_ONCE * look->reach, look_along_rows, look);
-		seen->n_cells += look->n_new;
-		while (2 * seen->n_cells > seen->size)
-			if (grow(seen) != PSR_OK)
+		set->table.n += look->n_new;
+		while (2 * set->table.n > set->table.size)
+			if (table_grow(&set->table) != PSR_OK)
 				return PSR_ERR_MEMORY;
 	} while (look->is_full);
-	seen->n_views += AT_ONCE;
-	for (size_t i = 0; i < seen->size; i++)
-		if (seen->table[i] != FREE)
-			seen->table[i] &= ~RECENT;
+	set->n_views += AT_ONCE;
+	for (size_t i = 0; i < set->table.size; i++)
+		if (*table_at(&set->table, i) != TABLE_FREE)
+			*table_at(&set->table, i) &= ~RECENT;
 	return PSR_OK;
 }
 
-int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool)
+int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool)
 {
-	double step = RAY_PIXELS / CELL_PIXELS * seen->cell;
-	struct look look = { .seen = seen, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
+	double step = RAY_PIXELS / CELL_PIXELS * set->width;
+	struct look look = { .set = set, .scene = scene, .ds = step, .reach = (int)ceil(1 / step) };
 	uint64_t n_hits = 0, n_unseen = 0;
 
-	for (unsigned i = 1; i <= SEEN_MOST_VIEWS / AT_ONCE; i++) {
-		look.is_counting = seen->n_views >= SEEN_LEAST_VIEWS; /* to the first ones nearly all is new */
-		if (look_along(&look, seen, pool) != PSR_OK)
+	for (unsigned i = 1; i <= VISIBLE_MOST_VIEWS / AT_ONCE; i++) {
+		look.is_counting = set->n_views >= VISIBLE_LEAST_VIEWS; /* to the first ones nearly all is new */
+		if (look_along(&look, set, pool) != PSR_OK)
 			return PSR_ERR_MEMORY;
 		n_hits += look.n_hits;
 		n_unseen += look.n_unseen;
-		if (i % (SEEN_LEAST_VIEWS / AT_ONCE) != 0)
+		if (i % (VISIBLE_LEAST_VIEWS / AT_ONCE) != 0)
 			continue;
 		if (look.is_counting && enough * n_unseen <= n_hits)
 			break;
@@ -226,62 +192,51 @@ int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough,
 	return PSR_OK;
 }
 
-int seen_coarsen(struct seen *seen, const struct seen *finer)
+int visible_set_coarsen(struct visible_set *set, const struct visible_set *finer)
 {
-	*seen = (struct seen){ .cell = 2 * finer->cell, .size = finer->size };
-	seen->table = psr_alloc_array(seen->size, sizeof *seen->table);
-	if (seen->table == NULL)
+	*set = (struct visible_set){ .width = 2 * finer->width };
+	if (table_init(&set->table, sizeof(uint64_t), finer->table.size) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	memset(seen->table, 0xff, seen->size * sizeof *seen->table);
-	for (size_t i = 0; i < finer->size; i++)
-		if (finer->table[i] != FREE)
-			(void)insert(seen, coarser_key(finer->table[i]), &seen->n_cells);
+	for (size_t i = 0; i < finer->table.size; i++)
+		if (*table_at(&finer->table, i) != TABLE_FREE)
+			(void)table_put(&set->table, coarser_key(*table_at(&finer->table, i)));
 	return PSR_OK;
 }
 
-void seen_fini(struct seen *seen)
+static int has(const struct table *table, uint64_t key)
 {
-	psr_free(seen->table);
-	*seen = (struct seen){ 0 };
-}
+	size_t i = table_place(key, table->size);
 
-static int has(const struct seen *seen, uint64_t key)
-{
-	size_t i = cell_place(key, seen->size);
+	for (size_t tries = 0; tries < table->size; tries++, i = (i + 1) & (table->size - 1)) {
+		uint64_t found = __atomic_load_n(table_at(table, i), __ATOMIC_RELAXED);
 
-	for (size_t tries = 0; tries < seen->size; tries++, i = (i + 1) & (seen->size - 1)) {
-		uint64_t found = __atomic_load_n(&seen->table[i], __ATOMIC_RELAXED);
-
-		if (found == FREE || (found & ~RECENT) == key)
+		if (found == TABLE_FREE || (found & ~RECENT) == key)
 			return found == key;
 	}
 	return 0;
 }
 
-int seen_is(const struct seen *seen, const float p[3], const float n[3])
+int visible_set_has(const struct visible_set *set, const float p[3], const float n[3])
 {
 	int first[3];
 
 	/* The eight cells around; and the ways that something of nearly this normal may have been put down as. */
 	for (int k = 0; k < 3; k++)
-		first[k] = cell_floor((double)p[k] / seen->cell - 0.5);
-	for (int axis = 0; axis < 3; axis++) {
+		first[k] = cell_floor((double)p[k] / set->width - 0.5);
+	for (unsigned axis = 0; axis < 3; axis++) {
 		if (fabsf(n[axis]) < LEAST_WAY)
 			continue;
 		for (int i = 0; i < 8; i++) {
 			int at[3] = { first[0] + (i & 1), first[1] + (i >> 1 & 1), first[2] + (i >> 2) };
 
-			if (has(seen, key_of(at, axis, n[axis] < 0)))
+			if (has(&set->table, cell_facing_key(at, 1 + 2 * axis + (n[axis] < 0))))
 				return 1;
 		}
 	}
 	return 0;
 }
 
-int seen_add(struct seen *seen, const float p[3], const float n[3])
+int visible_set_add(struct visible_set *set, const float p[3], const float n[3])
 {
-	if (2 * seen->n_cells > seen->size && grow(seen) != PSR_OK)
-		return PSR_ERR_MEMORY;
-	(void)insert(seen, place_key(seen, p, n), &seen->n_cells);
-	return PSR_OK;
+	return table_put(&set->table, place_key(set, p, n)) != NULL ? PSR_OK : PSR_ERR_MEMORY;
 }

@@ -3,38 +3,34 @@
 #ifndef PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 #define PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 
-#include <stddef.h>
-#include <stdint.h>
-#include "psr/pool.h"
+#include "base/table.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
-struct seen {
-	double cell;      /* side of a cubic cell, inner units */
-	size_t size;      /* a power of two */
-	uint64_t n_cells;
-	unsigned n_views; /* looked along so far */
-	uint64_t *table;  /* cells, with the way that what was met in them faces; only grows, so its order does not
-	                   * matter */
+struct visible_set {
+	double width;       /* of a cell, inner units */
+	unsigned n_views;   /* looked along so far */
+	struct table table; /* keys alone: cells, and how what was met in them faces */
 };
 
-int seen_init(struct seen *seen, double ds); /* MEMORY; seen_fini() either way */
+int visible_set_init(struct visible_set *set, double ds); /* MEMORY; visible_set_fini() either way */
+void visible_set_fini(struct visible_set *set);
 
 /* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what
  * 64 of them met at most one in `enough` places had not been seen by any earlier one, or until there were 512.
  * MEMORY. */
-#define SEEN_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
-#define SEEN_LEAST_VIEWS 64
-#define SEEN_MOST_VIEWS 512
-int seen_look(struct seen *seen, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
-void seen_fini(struct seen *seen);
+#define VISIBLE_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
+#define VISIBLE_LEAST_VIEWS 64
+#define VISIBLE_MOST_VIEWS 512
+int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
 
-/* What was seen of cells half as wide. MEMORY; seen_fini() either way. */
-int seen_coarsen(struct seen *seen, const struct seen *finer);
+/* The same with cells twice as wide. MEMORY; visible_set_fini() either way. */
+int visible_set_coarsen(struct visible_set *set, const struct visible_set *finer);
 
 /* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
-int seen_is(const struct seen *seen, const float p[3], const float n[3]);
+int visible_set_has(const struct visible_set *set, const float p[3], const float n[3]);
 
-/* Puts a place down as seen that the views missed. MEMORY. */
-int seen_add(struct seen *seen, const float p[3], const float n[3]);
+/* Adds a place that the views missed. MEMORY. */
+int visible_set_add(struct visible_set *set, const float p[3], const float n[3]);
 
 #endif

@@ -1,4 +1,5 @@
 #include "base/maths.h"
+#include "psr/render.h"
 #include "simd/block.h"
 #include "simd/kernels.h"
 

@@ -10,8 +10,8 @@
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/mesh.h"
-#include "psr/model.h"
-#include "psr/pool.h"
+#include "model/blocks.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 
 #define GREEDY_MOST_VIEWS 320

@@ -3,7 +3,7 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "parts.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 #define TURN 0.39269908169872414 /* 22.5 degrees */
 

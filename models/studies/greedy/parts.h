@@ -3,7 +3,7 @@
 #define PSR_MODELS_STUDIES_GREEDY_PARTS_H
 
 #include "greedy.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 /* ---- greedy.c ---- */
 

@@ -1,7 +1,7 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "parts.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 static int is_known(double (*direction)[3], int n, const double wanted[3])
 {

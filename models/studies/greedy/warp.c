@@ -8,7 +8,7 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "parts.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 
 #define N_REPETITIONS 3
 #define DISTANCE 1.7320508075688772 /* of the eye, where a field of view of 60 degrees shows the unit sphere */

@@ -16,6 +16,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
+#include "psr/frame.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -339,11 +340,6 @@ int psr_msg_presets_end_encode(struct psr_buf *out, uint32_t id, const struct ps
 int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *payload, size_t n,
                                struct psr_error *err);
 
-enum psr_wire_plane { /* bits of `planes`, values of `plane` are the bit's number */
-	PSR_WIRE_PLANE_COLOR = 0, PSR_WIRE_PLANE_DEPTH = 1, PSR_WIRE_PLANE_NORMAL = 2, PSR_WIRE_PLANE_ID = 3,
-	PSR_WIRE_PLANE_WEIGHT = 4, PSR_WIRE_PLANE_WORDS = 5, PSR_WIRE_PLANE_BLOCK = 6,
-	PSR_WIRE_PLANES = 7,
-};
 enum psr_codec { PSR_CODEC_RAW = 0, PSR_CODEC_JPEG = 1, PSR_CODEC_ZSTD = 2, PSR_CODEC_PNG = 3 };
 enum psr_wire_depth_format { PSR_WIRE_DEPTH_F32 = 1, PSR_WIRE_DEPTH_U16 = 2, PSR_WIRE_DEPTH_U16_HALF = 3 };
 enum psr_wire_budget {
@@ -360,7 +356,7 @@ struct psr_msg_frame { /* client -> server */
 	uint16_t slot;           /* scene */
 	uint16_t pass_limit;     /* highest pass wanted; 0: one frame, no refinement */
 	uint32_t width, height;  /* 1..16384 each, at most 64 Mpixel */
-	uint32_t planes;         /* 1 << enum psr_wire_plane; not 0 */
+	uint32_t planes;         /* 1 << enum psr_plane, whose values are those on the wire; not 0 */
 	uint8_t color_codec;     /* fields of planes that are not asked for are 0 */
 	uint8_t color_quality;   /* JPEG: 1..100; else 0 */
 	uint8_t depth_format;
@@ -412,8 +408,6 @@ int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format);
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format);
 
-const char *psr_plane_name(unsigned plane); /* "color", "depth", "normal", "id", "weight", "words", "block" */
-
 /* The bytes of a pixel of a plane (depth: F32) that a picture has where no rectangle came: 8 of them, of which the
  * plane has the first. Colour has FRAME_BEGIN's background instead. */
 const uint8_t *psr_plane_background(unsigned plane);
@@ -463,7 +457,7 @@ struct psr_msg_frame_end { /* server -> client */
 	uint8_t status;            /* enum psr_wire_frame_status */
 	double error_px;           /* bound on the geometric error of this frame, pixels, >= 0 */
 	uint32_t planes;           /* those of BEGIN: which hashes follow */
-	uint64_t hash[PSR_WIRE_PLANES]; /* by plane; XXH64, seed 0, before the codec; 0 where the plane is absent */
+	uint64_t hash[PSR_N_PLANES]; /* by plane; XXH64, seed 0, before the codec; 0 where the plane is absent */
 	uint16_t n_entries;
 	struct psr_msg_report_entry entry[PSR_WIRE_MAX_REPORT]; /* ids rising */
 };

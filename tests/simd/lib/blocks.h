@@ -2,7 +2,7 @@
 #ifndef TESTS_SIMD_BLOCKS_H
 #define TESTS_SIMD_BLOCKS_H
 
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "check.h"
 
 /* n_samples of each block: 1..64, or 0 for any. */

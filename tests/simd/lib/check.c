@@ -6,9 +6,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
-#include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "base/maths.h"
+#include "base/random.h"
 #include "check.h"
 
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
@@ -23,20 +24,9 @@
 static const struct check *current; /* for what a fault prints */
 static const char *current_claim;
 
-static double now_ns(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec * 1e9 + (double)t.tv_nsec;
-}
-
-/* xorshift64*: the same numbers everywhere. */
 uint64_t check_u64(struct check *c)
 {
-	c->random ^= c->random >> 12;
-	c->random ^= c->random << 25;
-	c->random ^= c->random >> 27;
-	return c->random * UINT64_C(0x2545f4914f6cdd1d);
+	return random_next(&c->random);
 }
 
 uint32_t check_u32(struct check *c)
@@ -46,7 +36,7 @@ uint32_t check_u32(struct check *c)
 
 uint32_t check_below(struct check *c, uint32_t n)
 {
-	return (uint32_t)((uint64_t)check_u32(c) * n >> 32);
+	return random_below(&c->random, n);
 }
 
 int check_one_in(struct check *c, uint32_t n)
@@ -56,7 +46,7 @@ int check_one_in(struct check *c, uint32_t n)
 
 double check_real(struct check *c, double low, double high)
 {
-	return low + (high - low) * (double)check_u32(c) * 0x1p-32;
+	return random_in(&c->random, low, high);
 }
 
 float check_float(struct check *c)
@@ -189,7 +179,7 @@ static int advance(struct check *c)
 
 int check_next(struct check *c)
 {
-	const double ended = now_ns();
+	const uint64_t ended = clock_ns();
 	if (!c->is_started) {
 		for (int i = 0; i < c->n_buffers; i++)
 			if (c->buffer[i].before)
@@ -197,7 +187,7 @@ int check_next(struct check *c)
 		c->is_started = 1;
 		advance(c);
 	} else {
-		const double ns = ended - c->started_ns;
+		const double ns = (double)(ended - c->started_ns);
 		c->spent_ns += ns;
 		c->best_ns[c->isa] = ns < c->best_ns[c->isa] ? ns : c->best_ns[c->isa];
 		if (!c->is_bench)
@@ -209,7 +199,7 @@ int check_next(struct check *c)
 				memcpy(c->buffer[i].data, c->buffer[i].before, c->buffer[i].size);
 	}
 	c->result = 0;
-	c->started_ns = now_ns();
+	c->started_ns = clock_ns();
 	return 1;
 }
 
@@ -243,7 +233,7 @@ static void begin(struct check *c, int trial, int is_bench)
 	memset(c, 0, sizeof *c);
 	c->trial = trial;
 	c->is_bench = is_bench;
-	c->random = UINT64_C(0x9e3779b97f4a7c15) * (uint64_t)(trial + 1);
+	c->random = (uint64_t)trial;
 	for (int i = 0; i < PSR_N_ISAS; i++)
 		c->best_ns[i] = INFINITY;
 }
@@ -265,11 +255,12 @@ static int check_one(struct check *c, const struct check_test *test, int number)
 }
 
 /* What reading the clock twice takes. */
-static double clock_ns(void)
+static double clock_cost(void)
 {
 	double best = INFINITY;
 	for (int i = 0; i < 1000; i++) {
-		const double start = now_ns(), ns = now_ns() - start;
+		const uint64_t start = clock_ns();
+		const double ns = (double)(clock_ns() - start);
 		best = ns < best ? ns : best;
 	}
 	return best;
@@ -277,18 +268,20 @@ static double clock_ns(void)
 
 static void bench_one(struct check *c, const struct check_test *test)
 {
-	const double clock = clock_ns();
+	const double clock = clock_cost();
 	begin(c, 1, 1);
 	test->run(c);
 	release(c);
-	printf("%-44s", test->claim);
+	printf("%-39s", test->claim);
 	for (int i = 0; i < PSR_N_ISAS; i++) {
 		const double ns = (c->best_ns[i] - clock) / c->units;
-		if (c->best_ns[i] < INFINITY)
-			printf("  %6s %7.3f ns %6.1f M/s %4.1fx", psr_isa_name((enum psr_isa)i), ns, 1e3 / ns,
-			       (c->best_ns[PSR_ISA_C] - clock) / (c->best_ns[i] - clock));
+		if (c->best_ns[i] == INFINITY)
+			continue;
+		printf("  %s %6.3f", psr_isa_name((enum psr_isa)i), ns);
+		if (i != PSR_ISA_C)
+			printf(" %4.1fx", (c->best_ns[PSR_ISA_C] - clock) / (c->best_ns[i] - clock));
 	}
-	printf("  (a %s)\n", test->unit);
+	printf("  ns a %s\n", test->unit);
 }
 
 int check_main(int argc, char **argv, const struct check_test *tests, size_t n_tests)

@@ -34,7 +34,8 @@ struct check {
 	/* The rest is check.c's. */
 	uint64_t random, result, expected;
 	int trial, is_started, is_failed, is_bench, round;
-	double started_ns, best_ns[PSR_N_ISAS], spent_ns, units;
+	uint64_t started_ns;
+	double best_ns[PSR_N_ISAS], spent_ns, units;
 	int n_buffers;
 	struct check_buffer buffer[CHECK_BUFFERS];
 	char why[256];

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "psr/cli.h"
+#include "base/cli.h"
 
 static struct values {
 	int flag, seen, n_calls;

@@ -5,7 +5,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include <string.h>
-#include "psr/direction.h"
+#include "base/direction.h"
 
 static uint64_t random_state = 0x9e3779b97f4a7c15u;
 

@@ -5,6 +5,7 @@
 #include <cmocka.h>
 #include <math.h>
 #include "base/maths.h"
+#include "base/random.h"
 
 static void sincos_is_within_its_bound(void **state)
 {
@@ -25,9 +26,8 @@ static void power_is_within_its_bound(void **state)
 	assert_true(psr_power(1, 65536) == 1);
 	assert_true(psr_power(0, 1) == 0);
 	for (int i = 0; i < 2000000; i++) {
-		seed = seed * 6364136223846793005u + 1442695040888963407u;
-		float x = (float)(seed >> 40) / 16777216.0f;
-		float y = exp2f((float)(seed >> 16 & 0xffff) / 4096.0f);
+		float x = (float)(random_next(&seed) >> 40) / 16777216.0f;
+		float y = exp2f((float)(random_next(&seed) >> 48) / 4096.0f);
 		if (i & 1)
 			x = 1 - x / y; /* where highlights of this exponent are bright */
 		double expect = pow((double)x, (double)y), got = (double)psr_power(x, y);

@@ -9,8 +9,9 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "psr/error.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 
 #define N 1000
 
@@ -35,19 +36,33 @@ static struct psr_pool *make(int n_threads, int with_jobs)
 {
 	struct psr_pool *pool = NULL;
 
-	assert_int_equal(psr_pool_create(&pool, n_threads, with_jobs), PSR_OK);
+	assert_int_equal(with_jobs ? psr_pool_create_for_jobs(&pool, n_threads, NULL) : psr_pool_create(&pool, n_threads, NULL),
+	                 PSR_OK);
 	return pool;
 }
 
 static void thread_counts_outside_of_the_range_are_refused(void **state)
 {
 	struct psr_pool *pool = NULL;
+	struct psr_error err;
 
 	(void)state;
-	assert_int_equal(psr_pool_create(&pool, 0, 0), PSR_ERR_ARG);
-	assert_int_equal(psr_pool_create(&pool, -1, 1), PSR_ERR_ARG);
-	assert_int_equal(psr_pool_create(&pool, 257, 1), PSR_ERR_ARG);
+	assert_int_equal(psr_pool_create(&pool, -1, &err), PSR_ERR_ARG);
+	assert_non_null(strstr(err.text, "1 to 256"));
+	assert_int_equal(psr_pool_create(&pool, 257, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_pool_create_for_jobs(&pool, -1, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_pool_create_for_jobs(&pool, 257, NULL), PSR_ERR_ARG);
 	assert_null(pool);
+}
+
+static void no_thread_count_is_one_thread_a_core(void **state)
+{
+	struct psr_pool *pool = make(0, 0);
+	const long n = sysconf(_SC_NPROCESSORS_ONLN);
+
+	(void)state;
+	assert_int_equal(psr_pool_threads(pool), n < 256 ? n : 256);
+	psr_pool_destroy(pool);
 }
 
 static void null_pool_runs_the_loop_in_order(void **state)
@@ -361,6 +376,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(thread_counts_outside_of_the_range_are_refused),
+		cmocka_unit_test(no_thread_count_is_one_thread_a_core),
 		cmocka_unit_test(null_pool_runs_the_loop_in_order),
 		cmocka_unit_test(every_index_runs_once_with_any_number_of_threads),
 		cmocka_unit_test(loops_after_a_wake_are_whole),

@@ -11,12 +11,13 @@
 #include <turbojpeg.h>
 #include <xxhash.h>
 #include <zstd.h>
+#include "base/random.h"
 #include "client/lib/internal.h"
 
 #define W 37
 #define H 29
 
-static uint8_t planes[PSR_WIRE_PLANES][8 * W * H]; /* colour and depth are these: */
+static uint8_t planes[PSR_N_PLANES][8 * W * H]; /* colour and depth are these: */
 static uint8_t rgb[3 * W * H];
 static float depth[W * H];
 static struct client_decoder *decoder;
@@ -28,12 +29,11 @@ struct trial {
 	struct psr_error err;
 };
 
-static uint32_t random_state = 1;
+static uint64_t random_state = 1;
 
 static uint32_t next_random(uint32_t below)
 {
-	random_state = random_state * 1664525u + 1013904223u;
-	return (uint32_t)((uint64_t)(random_state >> 8) * below >> 24);
+	return random_below(&random_state, below);
 }
 
 static int set_up(void **state)
@@ -43,11 +43,11 @@ static int set_up(void **state)
 		rgb[i] = (uint8_t)next_random(256);
 	for (size_t i = 0; i < W * H; i++)
 		depth[i] = next_random(3) == 0 ? INFINITY : (float)next_random(100000) / 777;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		for (size_t i = 0; i < sizeof planes[plane]; i++)
 			planes[plane][i] = (uint8_t)next_random(256);
-	memcpy(planes[PSR_WIRE_PLANE_COLOR], rgb, sizeof rgb);
-	memcpy(planes[PSR_WIRE_PLANE_DEPTH], depth, sizeof depth);
+	memcpy(planes[PSR_PLANE_COLOR], rgb, sizeof rgb);
+	memcpy(planes[PSR_PLANE_DEPTH], depth, sizeof depth);
 	return client_decoder_create(&decoder);
 }
 
@@ -83,7 +83,7 @@ static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 	assert_int_equal(client_assembly_begin(&trial->assembly, &begin, &trial->err), PSR_OK);
 	trial->end.is_final = 1;
 	trial->end.planes = asked->planes;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (wanted >> plane & 1)
 			trial->end.hash[plane] = XXH64(planes[plane], W * H * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
 }
@@ -199,7 +199,7 @@ static void rectangles_in_pieces_make_the_picture(void **state)
 static void every_plane_comes_back_and_starts_as_its_background(void **state)
 {
 	(void)state;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		for (unsigned others = 0; others < 2; others++) {
 			const unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 			struct psr_msg_rect rect = { (uint8_t)plane, PSR_CODEC_ZSTD, 1, 0, 0, W, 1, 0, 0, 0, NULL };
@@ -207,9 +207,9 @@ static void every_plane_comes_back_and_starts_as_its_background(void **state)
 			const uint8_t *got;
 			unsigned checked;
 
-			start_planes(&trial, PSR_CODEC_ZSTD, others ? (1u << PSR_WIRE_PLANES) - 1 : 1u << plane);
-			got = psr_picture_plane(&trial.assembly.picture, plane);
-			assert_int_equal(psr_picture_plane(&trial.assembly.picture, (plane + 1) % PSR_WIRE_PLANES) != NULL, others);
+			start_planes(&trial, PSR_CODEC_ZSTD, others ? (1u << PSR_N_PLANES) - 1 : 1u << plane);
+			got = psr_frame_plane(&trial.assembly.picture, plane);
+			assert_int_equal(psr_frame_plane(&trial.assembly.picture, (plane + 1) % PSR_N_PLANES) != NULL, others);
 			for (size_t i = 0; i < W * H; i++)
 				assert_memory_equal(got + i * pixel,
 				                    plane == 0 ? (const uint8_t *)"\x01\x02\x03" : psr_plane_background(plane), pixel);
@@ -219,7 +219,7 @@ static void every_plane_comes_back_and_starts_as_its_background(void **state)
 			rect.codec = PSR_CODEC_RAW;
 			assert_int_equal(send_rect(&trial, rect, 100), PSR_OK);
 			assert_memory_equal(got, planes[plane], W * H * pixel);
-			for (unsigned other = 0; other < PSR_WIRE_PLANES && others; other++) {
+			for (unsigned other = 0; other < PSR_N_PLANES && others; other++) {
 				rect = (struct psr_msg_rect){ (uint8_t)other, PSR_CODEC_ZSTD, 1, 0, 0, W, H, 0, 0, 0, NULL };
 				assert_int_equal(send_rect(&trial, rect, 1000), PSR_OK);
 			}

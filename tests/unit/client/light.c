@@ -241,10 +241,10 @@ static void key_light_comes_from_the_upper_left_behind_the_camera(void **state)
 	struct psr_msg_light light;
 
 	(void)state;
-	psr_light_key(&light, &camera); /* the view is along -z: right is +x */
+	client_light_key(&light, &camera); /* the view is along -z: right is +x */
 	assert_true(light.direction[0] > 0 && light.direction[1] < 0 && light.direction[2] < 0);
 	camera.eye[2] = -5;
-	psr_light_key(&light, &camera);
+	client_light_key(&light, &camera);
 	assert_true(light.direction[0] < 0 && light.direction[1] < 0 && light.direction[2] > 0);
 }
 

@@ -15,7 +15,7 @@
 #include <sys/stat.h>
 #include <dirent.h>
 #include <unistd.h>
-#include "psr/picture.h"
+#include "client/lib/picture.h"
 #include "psr/proto.h"
 
 #define W 5
@@ -24,7 +24,7 @@
 static char folder[256], name[512];
 static uint8_t rgb[3 * W * H];
 static float depth[W * H];
-static const struct psr_picture picture = { .width = W, .height = H, .rgb = rgb, .depth = depth };
+static const struct psr_frame picture = { .width = W, .height = H, .rgb = rgb, .depth = depth };
 
 static int set_up(void **state)
 {
@@ -148,20 +148,20 @@ static void npy_holds_every_plane_as_it_is(void **state)
 	static const struct {
 		unsigned plane;
 		const char *descr, *shape;
-	} table[PSR_WIRE_PLANES] = {
-		{ PSR_WIRE_PLANE_COLOR, "|u1", "(3, 5, 3)" }, { PSR_WIRE_PLANE_DEPTH, "<f4", "(3, 5)" },
-		{ PSR_WIRE_PLANE_NORMAL, "<i2", "(3, 5, 3)" }, { PSR_WIRE_PLANE_ID, "<u4", "(3, 5)" },
-		{ PSR_WIRE_PLANE_WEIGHT, "|u1", "(3, 5)" }, { PSR_WIRE_PLANE_WORDS, "<u8", "(3, 5)" },
-		{ PSR_WIRE_PLANE_BLOCK, "|u1", "(3, 5, 3)" },
+	} table[PSR_N_PLANES] = {
+		{ PSR_PLANE_COLOR, "|u1", "(3, 5, 3)" }, { PSR_PLANE_DEPTH, "<f4", "(3, 5)" },
+		{ PSR_PLANE_NORMAL, "<i2", "(3, 5, 3)" }, { PSR_PLANE_ID, "<u4", "(3, 5)" },
+		{ PSR_PLANE_WEIGHT, "|u1", "(3, 5)" }, { PSR_PLANE_WORDS, "<u8", "(3, 5)" },
+		{ PSR_PLANE_BLOCK, "|u1", "(3, 5, 3)" },
 	};
 	static uint8_t data[8 * W * H];
-	struct psr_picture all = { .width = W, .height = H, .rgb = data, .depth = (float *)data, .normal = (int16_t *)data,
+	struct psr_frame all = { .width = W, .height = H, .rgb = data, .depth = (float *)data, .normal = (int16_t *)data,
 		                       .id = (uint32_t *)data, .weight = data, .words = (uint64_t *)data, .block = data };
 
 	(void)state;
 	for (unsigned i = 0; i < sizeof data; i++)
 		data[i] = (uint8_t)(i * 29 + 3);
-	for (unsigned i = 0; i < PSR_WIRE_PLANES; i++) {
+	for (unsigned i = 0; i < PSR_N_PLANES; i++) {
 		size_t n_data = W * H * psr_plane_pixel_bytes(table[i].plane, PSR_WIRE_DEPTH_F32), n, head;
 		char bytes[512], expected[128];
 
@@ -185,16 +185,16 @@ static void normals_and_weights_are_pictures_to_look_at(void **state)
 {
 	static const int16_t normal[3 * W * H] = { 32767, 0, -32767, -128, 128, 129, [12] = 0, -32767, 0 };
 	static const uint8_t weight[W * H] = { 0, 255, 7 };
-	const struct psr_picture data = { .width = W, .height = H, .normal = (int16_t *)normal,
+	const struct psr_frame data = { .width = W, .height = H, .normal = (int16_t *)normal,
 	                                  .weight = (uint8_t *)weight };
 	uint8_t bytes[256];
 
 	(void)state;
-	assert_int_equal(psr_picture_write_plane(&data, PSR_WIRE_PLANE_NORMAL, in_folder("n.ppm"), NULL), PSR_OK);
+	assert_int_equal(psr_picture_write_plane(&data, PSR_PLANE_NORMAL, in_folder("n.ppm"), NULL), PSR_OK);
 	assert_int_equal(read_all(name, (char *)bytes, sizeof bytes), 11 + 3 * W * H);
 	assert_memory_equal(bytes + 11, ((const uint8_t[]){ 255, 128, 0, 127, 128, 128, 0, 0, 0, 0, 0, 0, 128, 0, 128 }),
 	                    15);
-	assert_int_equal(psr_picture_write_plane(&data, PSR_WIRE_PLANE_WEIGHT, in_folder("w.ppm"), NULL), PSR_OK);
+	assert_int_equal(psr_picture_write_plane(&data, PSR_PLANE_WEIGHT, in_folder("w.ppm"), NULL), PSR_OK);
 	read_all(name, (char *)bytes, sizeof bytes);
 	assert_memory_equal(bytes + 11, "\0\0\0\xff\xff\xff\x07\x07\x07\0\0\0", 12);
 }
@@ -211,11 +211,11 @@ static void unfit_endings_are_refused(void **state)
 	assert_int_equal(psr_picture_check_depth("a.png", &err), PSR_ERR_ARG);
 	assert_int_equal(psr_picture_check_depth("a.pfm", &err), PSR_OK);
 	assert_int_equal(psr_picture_check_color("a.png", &err), PSR_OK);
-	assert_int_equal(psr_picture_check_plane(PSR_WIRE_PLANE_COLOR, "a.png", &err), PSR_OK);
-	assert_int_equal(psr_picture_check_plane(PSR_WIRE_PLANE_DEPTH, "a.png", &err), PSR_ERR_ARG);
-	assert_int_equal(psr_picture_check_plane(PSR_WIRE_PLANE_NORMAL, "a.pfm", &err), PSR_ERR_ARG);
-	for (unsigned plane = PSR_WIRE_PLANE_ID; plane < PSR_WIRE_PLANES; plane++)
-		if (plane != PSR_WIRE_PLANE_WEIGHT) {
+	assert_int_equal(psr_picture_check_plane(PSR_PLANE_COLOR, "a.png", &err), PSR_OK);
+	assert_int_equal(psr_picture_check_plane(PSR_PLANE_DEPTH, "a.png", &err), PSR_ERR_ARG);
+	assert_int_equal(psr_picture_check_plane(PSR_PLANE_NORMAL, "a.pfm", &err), PSR_ERR_ARG);
+	for (unsigned plane = PSR_PLANE_ID; plane < PSR_N_PLANES; plane++)
+		if (plane != PSR_PLANE_WEIGHT) {
 			assert_int_equal(psr_picture_check_plane(plane, "a.png", &err), PSR_ERR_ARG);
 			assert_non_null(strstr(err.text, ".npy"));
 		}
@@ -300,7 +300,7 @@ static void full_device_is_an_error(void **state)
 static void full_disk_leaves_the_old_file(void **state)
 {
 	static uint8_t noise[3 * 64 * 64];
-	const struct psr_picture large = { .width = 64, .height = 64, .rgb = noise };
+	const struct psr_frame large = { .width = 64, .height = 64, .rgb = noise };
 	struct rlimit old, small;
 	struct psr_error err;
 	char text[16];
@@ -431,7 +431,7 @@ static void animation_is_a_png_whose_further_frames_are_pngs_too(void **state)
 {
 	static uint8_t frames[3][3 * W * H];
 	static struct chunks c;
-	struct psr_picture frame = picture;
+	struct psr_frame frame = picture;
 	struct psr_animation *animation;
 	char path[512];
 

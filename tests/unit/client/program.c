@@ -77,7 +77,7 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 	float depth[MAX_SIDE * MAX_SIDE];
 	uint8_t weight[MAX_SIDE * MAX_SIDE];
 	uint64_t words[MAX_SIDE * MAX_SIDE];
-	const uint8_t *const planes[PSR_WIRE_PLANES] = { rgb, (uint8_t *)depth, NULL, NULL, weight, (uint8_t *)words };
+	const uint8_t *const planes[PSR_N_PLANES] = { rgb, (uint8_t *)depth, NULL, NULL, weight, (uint8_t *)words };
 
 	if (strcmp(s->model, "broken") == 0 || (strcmp(s->model, "flaky") == 0 && id > 10) || w > MAX_SIDE
 	    || h > MAX_SIDE) {
@@ -95,7 +95,7 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 			rgb[3 * i + (uint32_t)c] = color_at(i % w, i / w, c);
 	}
 	psr_msg_frame_begin_encode(&s->buf, id, 0, &begin, NULL);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		uint32_t bytes = n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 		const struct psr_msg_rect rect = { (uint8_t)plane, PSR_CODEC_RAW, 1, 0, 0, (uint16_t)w, (uint16_t)h, bytes, 0,
 			                               bytes, planes[plane] };

@@ -163,7 +163,7 @@ static void a_sheet_puts_pictures_row_by_row_on_the_background(void **state)
 {
 	static const uint8_t background[3] = { 9, 8, 7 };
 	uint8_t rgb[2 * 1 * 3];
-	const struct psr_picture picture = { .width = 2, .height = 1, .rgb = rgb };
+	const struct psr_frame picture = { .width = 2, .height = 1, .rgb = rgb };
 	struct sheet sheet = { .columns = 2, .rows = 2 };
 
 	(void)state;

@@ -12,7 +12,7 @@
 #include <string.h>
 #include "import/import.h"
 #include "psr/build.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 
 static uint64_t state_of_random;
 static int n_threads_made;

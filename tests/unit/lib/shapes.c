@@ -4,8 +4,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "shapes.h"
+#include "model/blocks.h"
 
 struct arrays {
 	uint32_t n_blocks, n_samples;

@@ -3,7 +3,7 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "tests/unit/sample/meshes.h"
 
 #define SIDE 64
@@ -131,7 +131,7 @@ static void bad_spacings_and_cameras_are_refused(void **state)
 
 	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 0, 1, NULL), PSR_ERR_ARG);
 	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, NAN, 1, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 1, 0, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 1, -1, NULL), PSR_ERR_ARG);
 	f->camera.ortho_height = 0;
 	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 1, 1, NULL), PSR_ERR_ARG);
 }

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/srgb.h"
-#include "psr/measure.h"
+#include "measure/measure.h"
 #include "tests/unit/sample/meshes.h"
 
 #define W 48
@@ -122,7 +122,7 @@ static void bad_pictures_are_refused(void **state)
 	assert_int_equal(psr_truth_draw(truth, &camera, 0, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
 	assert_int_equal(psr_truth_draw(truth, &camera, 1 << 20, 1 << 20, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_LIMIT);
 	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 0, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 0, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, -1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
 	camera.eye[2] = NAN;
 	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
 	psr_truth_destroy(truth);

@@ -6,7 +6,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/model.h"
+#include "model/blocks.h"
 
 #define FIXTURE_BLOCKS 6
 #define FIXTURE_SAMPLES 143

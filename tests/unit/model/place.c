@@ -5,8 +5,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include "base/vec.h"
-#include "psr/direction.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "model/blocks.h"
 
 struct one {
 	struct psr_projection projection;

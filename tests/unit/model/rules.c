@@ -302,7 +302,7 @@ static void masks_need_their_indices_and_their_number(void **state)
 	f.blocks.cone_x = f.blocks.cone_y = f.blocks.cone_z = NULL;
 	f.blocks.cone_sine = NULL;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
-	assert_non_null(strstr(err.text, "traits and no cones"));
+	assert_non_null(strstr(err.text, "traits, but no cones"));
 	fixture_init(&f, 1);
 	f.run.visibility_first = 1;
 	f.visibility_index[5] = FIXTURE_MASKS - 1;

@@ -62,7 +62,7 @@ static int count_files(void)
 
 	assert_non_null(dir);
 	for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
-		n += entry->d_name[0] != '.';
+		n += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
 	closedir(dir);
 	return n;
 }
@@ -129,7 +129,7 @@ static void full_disk_leaves_the_old_file_and_nothing_else(void **state)
 		assert_int_equal(setrlimit(RLIMIT_FSIZE, &limit), 0);
 		signal(SIGXFSZ, SIG_DFL);
 		assert_int_equal(code, PSR_ERR_IO);
-		assert_non_null(strstr(err.text, "cannot write the model: File too large"));
+		assert_non_null(strstr(err.text, "m.psr: File too large"));
 		assert_holds(one);
 		assert_int_equal(count_files(), 1);
 	}
@@ -158,7 +158,7 @@ static void missing_folder_is_an_error_with_the_path(void **state)
 	(void)state;
 	snprintf(nowhere, sizeof nowhere, "%s/none/m.psr", folder);
 	for (int i = 0; i < 2; i++) {
-		assert_int_equal(writers[i](one, nowhere, &err), PSR_ERR_IO);
+		assert_int_equal(writers[i](one, nowhere, &err), PSR_ERR_NOT_FOUND);
 		assert_non_null(strstr(err.text, nowhere));
 		assert_non_null(strstr(err.text, "No such file or directory"));
 	}

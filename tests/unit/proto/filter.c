@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
+#include "base/random.h"
 #include "psr/proto.h"
 
 static void color_is_byte_differences_in_place(void **state)
@@ -47,7 +48,7 @@ static void components_of_a_pixel_are_apart(void **state)
 static void every_shape_comes_back(void **state)
 {
 	static const unsigned component_bytes[] = { 1, 2, 4, 8 };
-	uint32_t random = 3;
+	uint64_t random = 3;
 
 	(void)state;
 	for (unsigned b = 0; b < 4; b++)
@@ -58,10 +59,8 @@ static void every_shape_comes_back(void **state)
 					uint8_t *in = malloc(n), *mid = malloc(n), *out = malloc(n);
 
 					assert_true(in && mid && out);
-					for (size_t i = 0; i < n; i++) {
-						random = random * 1664525u + 1013904223u;
-						in[i] = (uint8_t)(random >> 24);
-					}
+					for (size_t i = 0; i < n; i++)
+						in[i] = (uint8_t)random_next(&random);
 					psr_filter_rows(mid, in, w, h, c, component_bytes[b]);
 					psr_unfilter_rows(out, mid, w, h, c, component_bytes[b]);
 					assert_memory_equal(in, out, n);

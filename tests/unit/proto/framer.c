@@ -6,17 +6,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cmocka.h>
+#include "base/random.h"
 #include "table.h"
 
 static uint8_t storage[PSR_WIRE_MAX_MESSAGE], big[3 * PSR_WIRE_MAX_MESSAGE];
 
-static uint32_t random_state;
-
-static uint32_t random_below(uint32_t n)
-{
-	random_state = random_state * 1664525u + 1013904223u;
-	return (uint32_t)((uint64_t)(random_state >> 8) * n >> 24);
-}
+static uint64_t seed;
 
 static void put(struct psr_framer *framer, const uint8_t *bytes, size_t n)
 {
@@ -87,25 +82,25 @@ static void any_split_gives_the_same_messages(void **state)
 	struct psr_buf out = { stream, 0, sizeof stream };
 
 	(void)state;
-	random_state = 7;
+	seed = 7;
 	for (size_t i = 0; i < sizeof data; i++)
-		data[i] = (uint8_t)random_below(256);
+		data[i] = (uint8_t)random_below(&seed, 256);
 	for (uint32_t i = 0; i < 200; i++) {
-		struct psr_msg_rect rect = { .plane = PSR_WIRE_PLANE_COLOR, .codec = PSR_CODEC_ZSTD, .scale = 1, .w = 640,
+		struct psr_msg_rect rect = { .plane = PSR_PLANE_COLOR, .codec = PSR_CODEC_ZSTD, .scale = 1, .w = 640,
 			.h = 128, .total = 100000, .data = data };
 
-		sizes[i] = rect.bytes = i % 10 == 9 ? PSR_WIRE_MAX_RECT_DATA : 1 + random_below(3000);
+		sizes[i] = rect.bytes = i % 10 == 9 ? PSR_WIRE_MAX_RECT_DATA : 1 + random_below(&seed, 3000);
 		assert_int_equal(psr_msg_rect_encode(&out, i + 1, 0, &rect, NULL), PSR_OK);
 	}
 	for (int round = 0; round < 40; round++) {
 		struct psr_framer framer;
 		struct psr_message m;
 		struct psr_msg_rect rect;
-		size_t at = 0, got = 0, chunk_max = (size_t)1 << random_below(18);
+		size_t at = 0, got = 0, chunk_max = (size_t)1 << random_below(&seed, 18);
 
 		psr_framer_init(&framer, PSR_SERVER, storage, sizeof storage);
 		while (at < out.size) {
-			size_t room, n = 1 + random_below((uint32_t)chunk_max);
+			size_t room, n = 1 + random_below(&seed, (uint32_t)chunk_max);
 			uint8_t *space = psr_framer_space(&framer, &room);
 
 			assert_true(room > 0);

@@ -177,7 +177,7 @@ static void make_rect(struct psr_msg_rect *m)
 {
 	static uint8_t data[PSR_WIRE_MAX_RECT_DATA];
 
-	m->plane = (uint8_t)below(PSR_WIRE_PLANES);
+	m->plane = (uint8_t)below(PSR_N_PLANES);
 	m->codec = PSR_CODEC_ZSTD;
 	m->scale = (uint8_t)(1u << below(3));
 	m->w = (uint16_t)(1 + below(16384));
@@ -200,7 +200,7 @@ static void make_end(struct psr_msg_frame_end *m)
 	m->status = (uint8_t)below(3);
 	m->error_px = fabs(length());
 	m->planes = 1 + below(127);
-	for (unsigned i = 0; i < PSR_WIRE_PLANES; i++)
+	for (unsigned i = 0; i < PSR_N_PLANES; i++)
 		m->hash[i] = m->planes >> i & 1 ? random64() : 0;
 	m->n_entries = (uint16_t)below(65);
 	for (unsigned i = 0; i < m->n_entries; i++) {
@@ -516,16 +516,16 @@ static void routing_key_is_xxh64(void **state)
 static void planes_have_the_bytes_of_the_table(void **state)
 {
 	(void)state;
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_COLOR, 0), 3);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_DEPTH, PSR_WIRE_DEPTH_F32), 4);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_DEPTH, PSR_WIRE_DEPTH_U16_HALF), 2);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_NORMAL, 0), 6);
-	assert_int_equal(psr_plane_component_bytes(PSR_WIRE_PLANE_NORMAL, 0), 2);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_ID, 0), 4);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_WEIGHT, 0), 1);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_WORDS, 0), 8);
-	assert_int_equal(psr_plane_pixel_bytes(PSR_WIRE_PLANE_BLOCK, 0), 3);
-	assert_int_equal(psr_plane_component_bytes(PSR_WIRE_PLANE_BLOCK, 0), 1);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_COLOR, 0), 3);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_DEPTH, PSR_WIRE_DEPTH_F32), 4);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_DEPTH, PSR_WIRE_DEPTH_U16_HALF), 2);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_NORMAL, 0), 6);
+	assert_int_equal(psr_plane_component_bytes(PSR_PLANE_NORMAL, 0), 2);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_ID, 0), 4);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_WEIGHT, 0), 1);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_WORDS, 0), 8);
+	assert_int_equal(psr_plane_pixel_bytes(PSR_PLANE_BLOCK, 0), 3);
+	assert_int_equal(psr_plane_component_bytes(PSR_PLANE_BLOCK, 0), 1);
 }
 
 static void planes_have_names_capabilities_and_backgrounds(void **state)
@@ -534,7 +534,7 @@ static void planes_have_names_capabilities_and_backgrounds(void **state)
 		const char *name;
 		uint64_t capability;
 		uint8_t background[8];
-	} table[PSR_WIRE_PLANES] = {
+	} table[PSR_N_PLANES] = {
 		{ "color", 0, { 0 } },
 		{ "depth", 0, { 0, 0, 0x80, 0x7f } },
 		{ "normal", 1 << 8, { 0 } },
@@ -545,7 +545,7 @@ static void planes_have_names_capabilities_and_backgrounds(void **state)
 	};
 
 	(void)state;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		assert_string_equal(psr_plane_name(plane), table[plane].name);
 		assert_true(psr_plane_capability(plane) == table[plane].capability);
 		assert_memory_equal(psr_plane_background(plane), table[plane].background, 8);

@@ -8,7 +8,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/render.h"
+#include "base/random.h"
+#include "render/stages.h"
 #include "render/render.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -60,65 +61,54 @@ struct case_of {
 	struct psr_instance instance[3];
 	struct psr_light light[5];
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 };
-
-static uint32_t next(uint32_t *seed)
-{
-	*seed = *seed * 1664525u + 1013904223u;
-	return *seed >> 8;
-}
-
-static double between(uint32_t *seed, double low, double high)
-{
-	return low + (high - low) * (next(seed) % 65536) / 65536.0;
-}
 
 static void case_make(struct case_of *c, uint32_t which)
 {
-	uint32_t seed = which * 2654435761u + 1;
+	uint64_t seed = which;
 	const struct psr_model *first = models[which % MODELS];
 	const struct psr_model_info *info = psr_model_info(first);
 	memset(c, 0, sizeof *c);
 	c->scene = (struct psr_scene){ .instance = c->instance,
 		                           .n_instances = which % 3 == 2 ? 3 : 1,
 		                           .light = c->light,
-		                           .n_lights = next(&seed) % 6,
+		                           .n_lights = random_below(&seed, 6),
 		                           .ambient = { 0.1, 0.2, 0.1 },
 		                           .background = { 0.2, 0, 0.5 } };
 	for (uint32_t i = 0; i < c->scene.n_instances; i++) {
 		c->instance[i] =
-			(struct psr_instance){ i ? models[next(&seed) % MODELS] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
+			(struct psr_instance){ i ? models[random_below(&seed, MODELS)] : first, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1 };
 		for (int k = 0; k < 3 && i; k++)
-			c->instance[i].translation[k] = between(&seed, -info->scale, info->scale);
+			c->instance[i].translation[k] = random_in(&seed, -info->scale, info->scale);
 		if (i) /* a third of a turn about a diagonal */
 			for (int k = 0; k < 4; k++)
 				c->instance[i].rotation[k] = 0.5;
 	}
 	for (uint32_t i = 0; i < c->scene.n_lights; i++) {
 		struct psr_light *l = &c->light[i];
-		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(next(&seed) % 3);
+		l->kind = which % 2 ? PSR_LIGHT_DIRECTIONAL : (enum psr_light_kind)(random_below(&seed, 3));
 		l->casts_shadow = (which + i) % 3 == 0;
 		for (int k = 0; k < 3; k++) {
-			l->direction[k] = between(&seed, -1, 1);
-			l->position[k] = info->origin[k] + between(&seed, -3, 3) * info->scale;
-			l->color[k] = i == 3 ? 0 : between(&seed, 0, 1);
+			l->direction[k] = random_in(&seed, -1, 1);
+			l->position[k] = info->origin[k] + random_in(&seed, -3, 3) * info->scale;
+			l->color[k] = i == 3 ? 0 : random_in(&seed, 0, 1);
 		}
-		l->outer = between(&seed, 0.2, 1);
+		l->outer = random_in(&seed, 0.2, 1);
 		l->inner = l->outer * 0.7;
 	}
 	struct psr_camera *camera = &c->scene.camera;
-	const double distance = between(&seed, which % 7 == 6 ? 0.3 : 1.2, 5) * info->scale;
-	double direction[3] = { between(&seed, -1, 1), between(&seed, -1, 1), between(&seed, 0.1, 1) };
+	const double distance = random_in(&seed, which % 7 == 6 ? 0.3 : 1.2, 5) * info->scale;
+	double direction[3] = { random_in(&seed, -1, 1), random_in(&seed, -1, 1), random_in(&seed, 0.1, 1) };
 	for (int k = 0; k < 3; k++) {
 		camera->target[k] = info->origin[k];
 		camera->eye[k] = info->origin[k] + direction[k] * distance;
 	}
 	camera->up[1] = 1;
-	camera->kind = next(&seed) % 4 ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
-	camera->fov_y = between(&seed, 0.2, 1.5);
-	camera->ortho_height = between(&seed, 0.5, 4) * info->scale;
-	psr_settings_default(&c->settings, 64 + next(&seed) % 600, 64 + next(&seed) % 500);
+	camera->kind = random_below(&seed, 4) ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
+	camera->fov_y = random_in(&seed, 0.2, 1.5);
+	camera->ortho_height = random_in(&seed, 0.5, 4) * info->scale;
+	render_settings_default(&c->settings, 64 + random_below(&seed, 600), 64 + random_below(&seed, 500));
 	c->settings.is_smooth = which % 4 == 1;
 }
 
@@ -126,17 +116,17 @@ struct drawn {
 	struct psr_frame frame;
 };
 
-static void draw(struct drawn *d, const struct case_of *c, const struct psr_settings *settings, const struct simd *simd)
+static void draw(struct drawn *d, const struct case_of *c, const struct render_settings *settings, const struct simd *simd)
 {
 	struct psr_renderer *renderer;
 	struct psr_error err;
 	const size_t area = (size_t)settings->width * settings->height;
 	d->frame = (struct psr_frame){ .width = settings->width, .height = settings->height, .rgb = malloc(3 * area),
 		                           .depth = malloc(4 * area) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (simd)
 		renderer_use(renderer, simd);
-	if (psr_render(renderer, &c->scene, settings, NULL, &d->frame, &err))
+	if (renderer_draw(renderer, &c->scene, settings, NULL, &d->frame, &err))
 		fail_msg("%s", err.text);
 	psr_renderer_destroy(renderer);
 }
@@ -248,7 +238,7 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 	struct simd simd = counting();
 	case_make(&c, 5);
 	c.scene.n_instances = 1;
-	psr_settings_default(&c.settings, 640, 480);
+	render_settings_default(&c.settings, 640, 480);
 	for (int i = 0; i < 5; i++)
 		c.light[i] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL,
 			                             .direction = { i - 2, -1, -1 },
@@ -291,7 +281,7 @@ static void frames_do_not_depend_on_the_frame_before(void **state)
 	(void)state;
 	struct psr_renderer *renderer;
 	struct psr_error err;
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	for (uint32_t i = 0; i < CASES * 3 / 2; i++) {
 		const uint32_t which = i / 3 * 7 % 60;
 		struct case_of c;
@@ -299,12 +289,12 @@ static void frames_do_not_depend_on_the_frame_before(void **state)
 		case_make(&c, which);
 		for (int k = 0; k < 3; k++) /* thrice the same picture, its object somewhere else, and out of it at last */
 			c.scene.camera.target[k] += (i % 3) * psr_model_info(c.instance[0].model)->scale;
-		psr_settings_default(&c.settings, 700, 300);
+		render_settings_default(&c.settings, 700, 300);
 		draw(&alone, &c, &c.settings, NULL);
 		next_one.frame = alone.frame;
 		next_one.frame.rgb = malloc(3 * 700 * 300);
 		next_one.frame.depth = malloc(4 * 700 * 300);
-		if (psr_render(renderer, &c.scene, &c.settings, NULL, &next_one.frame, &err))
+		if (renderer_draw(renderer, &c.scene, &c.settings, NULL, &next_one.frame, &err))
 			fail_msg("%s", err.text);
 		assert_same(&alone, &next_one, which, "the frame before");
 		release(&alone);
@@ -322,16 +312,16 @@ static void a_moving_camera_takes_no_more_memory(void **state)
 	uint64_t bytes = 0;
 	case_make(&c, 3);
 	c.scene.n_instances = 1;
-	psr_settings_default(&c.settings, 320, 240);
+	render_settings_default(&c.settings, 320, 240);
 	struct psr_frame frame = { .width = 320, .height = 240, .rgb = malloc(3 * 320 * 240) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	for (int i = 0; i < 40; i++) {
 		const double *middle = psr_model_info(c.instance[0].model)->origin,
 					 scale = psr_model_info(c.instance[0].model)->scale;
 		c.scene.camera.eye[0] = middle[0] + 3 * scale * sin(i * 0.01);
 		c.scene.camera.eye[1] = middle[1];
 		c.scene.camera.eye[2] = middle[2] + 3 * scale * cos(i * 0.01);
-		if (psr_render(renderer, &c.scene, &c.settings, NULL, &frame, &err))
+		if (renderer_draw(renderer, &c.scene, &c.settings, NULL, &frame, &err))
 			fail_msg("%s", err.text);
 		if (i == 0)
 			bytes = psr_renderer_bytes(renderer);

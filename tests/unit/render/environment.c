@@ -13,9 +13,9 @@
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
-#include "psr/direction.h"
-#include "psr/isa.h"
-#include "psr/render.h"
+#include "base/direction.h"
+#include "simd/isa.h"
+#include "render/stages.h"
 #include "tests/unit/lib/shapes.h"
 
 #define FLUSH_AND_DAZ 0x8040u /* of MXCSR: results and operands that are denormal count as 0 */
@@ -49,15 +49,15 @@ static uint64_t draw(const struct view *view, const struct psr_model *model, dou
 		                       .rgb = malloc(3 * n),
 		                       .depth = malloc(4 * n) };
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_pool *pool;
 	struct psr_error err;
-	psr_settings_default(&settings, view->width, view->height);
+	render_settings_default(&settings, view->width, view->height);
 	assert_non_null(frame.rgb);
 	assert_non_null(frame.depth);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, view->n_threads, 0), PSR_OK);
-	if (psr_render(renderer, &scene, &settings, pool, &frame, &err))
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, view->n_threads, NULL), PSR_OK);
+	if (renderer_draw(renderer, &scene, &settings, pool, &frame, &err))
 		fail_msg("%s", err.text);
 	assert_true(frame.report.n_covered > 0);
 	const uint64_t hash = XXH64(frame.depth, 4 * n, XXH64(frame.rgb, 3 * n, 0));

@@ -8,14 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
+#include "base/random.h"
 #include "render/fill.h"
 
-static uint32_t seed;
+static uint64_t seed;
 
 static uint32_t draw(uint32_t n)
 {
-	seed = seed * 1664525 + 1013904223;
-	return (uint32_t)(((uint64_t)(seed >> 4) * n) >> 28);
+	return random_below(&seed, n);
 }
 
 /* ---- the dense fill: every cell of every level, one by one ---- */

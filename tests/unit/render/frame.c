@@ -9,7 +9,7 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "base/vec.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "tests/unit/lib/shapes.h"
 
 struct picture { /* owns its planes */
@@ -39,15 +39,15 @@ static struct psr_camera orthographic(double x, double y, double z, double heigh
 static void draw(struct picture *p, const struct psr_scene *scene, uint32_t w, uint32_t h, int n_threads)
 {
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_pool *pool = NULL;
 	struct psr_error err;
-	psr_settings_default(&settings, w, h);
+	render_settings_default(&settings, w, h);
 	p->frame = (struct psr_frame){ .width = w, .height = h, .rgb = malloc(3 * w * h), .depth = malloc(4 * w * h) };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
 	if (n_threads > 1)
-		assert_int_equal(psr_pool_create(&pool, n_threads, 0), 0);
-	if (psr_render(renderer, scene, &settings, pool, &p->frame, &err))
+		assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
+	if (renderer_draw(renderer, scene, &settings, pool, &p->frame, &err))
 		fail_msg("%s", err.text);
 	psr_pool_destroy(pool);
 	psr_renderer_destroy(renderer);
@@ -511,19 +511,19 @@ static void the_door_refuses_what_is_out_of_range(void **state)
 	instance.scale = 1;
 
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_frame frame = { .width = 0 };
-	assert_int_equal(psr_renderer_create(&renderer), 0);
-	psr_settings_default(&settings, 0, 10);
-	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
-	psr_settings_default(&settings, 100000, 100000);
-	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_LIMIT);
-	psr_settings_default(&settings, 10, 10);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), 0);
+	render_settings_default(&settings, 0, 10);
+	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
+	render_settings_default(&settings, 100000, 100000);
+	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_LIMIT);
+	render_settings_default(&settings, 10, 10);
 	settings.spacing = 0;
-	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
-	psr_settings_default(&settings, 10, 10);
+	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
+	render_settings_default(&settings, 10, 10);
 	settings.gap_method = (enum psr_gap_method)7;
-	assert_int_equal(psr_render(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
+	assert_int_equal(renderer_draw(renderer, &good, &settings, NULL, &frame, &err), PSR_ERR_ARG);
 	psr_renderer_destroy(renderer);
 	psr_model_unref(model);
 }

@@ -9,14 +9,14 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
+#include "base/random.h"
 #include "render/gaps.h"
 
-static uint32_t seed;
+static uint64_t seed;
 
 static uint32_t draw(uint32_t n)
 {
-	seed = seed * 1664525 + 1013904223;
-	return (uint32_t)(((uint64_t)(seed >> 4) * n) >> 28);
+	return random_below(&seed, n);
 }
 
 /* One unit a pixel at depth 1: thresholds are 3 pixels at level 1, 6 at level 2. */

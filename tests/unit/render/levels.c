@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render/cull.h"
 
 #define GROUPS 5
@@ -93,13 +93,13 @@ static double asked_spacing = 1; /* of the settings */
 /* Culls a scene and takes apart which clusters each of its instances draws. */
 static void choose(const struct psr_scene *scene, uint32_t side, struct psr_pool *pool, struct choice *choice)
 {
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_report report = { 0 };
 	struct plan plan = { 0 };
 	struct bins bins = { 0 };
 	uint32_t n_clusters = psr_model_blocks(model)->n_clusters;
 
-	psr_settings_default(&settings, side, side);
+	render_settings_default(&settings, side, side);
 	settings.spacing = asked_spacing;
 	assert_int_equal(plan_make(&plan, scene, &settings, NULL), PSR_OK);
 	assert_int_equal(cull_blocks(&bins, simd_get(), &plan, pool, &report), PSR_OK);
@@ -301,7 +301,7 @@ static void instances_choose_for_themselves_whatever_the_threads(void **state)
 		instance[i].translation[2] = -3.0 * i * i;
 	}
 	scene.n_instances = 3;
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	choose(&scene, 512, NULL, one);
 	choose(&scene, 512, pool, four);
 	psr_pool_destroy(pool);
@@ -318,12 +318,12 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 {
 	struct psr_instance instance;
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_zstack *stack;
 
 	(void)state;
-	psr_settings_default(&settings, 512, 512);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	render_settings_default(&settings, 512, 512);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	for (double distance = 1.2; distance < 12; distance *= 1.3) {
 		struct psr_scene scene = scene_at(&instance, distance, 1.2);
 		struct psr_report report = { 0 };
@@ -331,7 +331,7 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 		int n_pixels[GROUPS] = { 0 };
 
 		choose(&scene, 512, NULL, &choice);
-		assert_int_equal(psr_warp(renderer, &scene, &settings, NULL, &stack, &report, NULL), PSR_OK);
+		assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, &report, NULL), PSR_OK);
 		for (int i = 0; i < 512 * 512; i++) {
 			const struct psr_cluster *k;
 

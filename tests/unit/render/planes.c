@@ -7,9 +7,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/direction.h"
-#include "psr/isa.h"
-#include "psr/render.h"
+#include "base/direction.h"
+#include "simd/isa.h"
+#include "render/stages.h"
 #include "render/block.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -71,7 +71,7 @@ static struct planes *draw_what(const struct psr_scene *scene, int has_color, in
 {
 	struct planes *p = calloc(1, sizeof *p);
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_pool *pool = NULL;
 	struct psr_error err;
 
@@ -84,11 +84,11 @@ static struct planes *draw_what(const struct psr_scene *scene, int has_color, in
 		frame.weight = p->weight;
 		frame.words = p->words;
 	}
-	psr_settings_default(&settings, WIDTH, HEIGHT);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
+	render_settings_default(&settings, WIDTH, HEIGHT);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	if (n_threads > 1)
-		assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
-	if (psr_render(renderer, scene, &settings, pool, &frame, &err) != PSR_OK)
+		assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
+	if (renderer_draw(renderer, scene, &settings, pool, &frame, &err) != PSR_OK)
 		fail_msg("%s", err.text);
 	psr_pool_destroy(pool);
 	psr_renderer_destroy(renderer);

@@ -8,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/pool.h"
-#include "psr/render.h"
+#include "base/pool.h"
 #include "render/splat.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -40,10 +39,10 @@ struct still {
 	struct psr_instance instance;
 	struct psr_light light;
 	struct psr_scene scene;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_frame frame;
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner;
+	struct refiner *refiner;
 };
 
 static void still_make(struct still *s, const struct psr_model *model, uint32_t width, uint32_t height)
@@ -57,18 +56,18 @@ static void still_make(struct still *s, const struct psr_model *model, uint32_t 
 	s->scene = (struct psr_scene){ .instance = &s->instance, .n_instances = 1, .light = &s->light, .n_lights = 1,
 		                           .ambient = { 0.1, 0.1, 0.1 } };
 	psr_camera_frame(&s->scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
-	psr_settings_default(&s->settings, width, height);
+	render_settings_default(&s->settings, width, height);
 	s->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc((size_t)width * height * 3),
 		                           .depth = malloc((size_t)width * height * sizeof(float)) };
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
-	assert_int_equal(psr_refiner_create(&s->refiner, s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
+	assert_int_equal(refiner_create(&s->refiner, s->renderer, NULL), PSR_OK);
 }
 
 static void still_clear(struct still *s)
 {
 	free(s->frame.rgb);
 	free(s->frame.depth);
-	psr_refiner_destroy(s->refiner);
+	refiner_destroy(s->refiner);
 	psr_renderer_destroy(s->renderer);
 }
 
@@ -76,7 +75,8 @@ static void refine(struct still *s, unsigned pass, struct psr_pool *pool)
 {
 	struct psr_error err;
 
-	assert_int_equal(psr_refine(s->refiner, &s->scene, &s->settings, pass, pool, NULL, NULL, &s->frame, &err), PSR_OK);
+	s->settings.pass = pass;
+	assert_int_equal(refiner_draw(s->refiner, &s->scene, &s->settings, pool, &s->frame, &err), PSR_OK);
 }
 
 static int same_frames(const struct still *a, const struct still *b)
@@ -228,7 +228,7 @@ static void pass_0_is_the_plain_frame(void **state)
 	still_make(&s, teapot, 200, 150);
 	still_make(&plain, teapot, 200, 150);
 	refine(&s, 0, NULL);
-	assert_int_equal(psr_render(plain.renderer, &plain.scene, &plain.settings, NULL, &plain.frame, &err), PSR_OK);
+	assert_int_equal(renderer_draw(plain.renderer, &plain.scene, &plain.settings, NULL, &plain.frame, &err), PSR_OK);
 	assert_true(same_frames(&s, &plain));
 	still_clear(&s);
 	still_clear(&plain);
@@ -244,7 +244,7 @@ static void threads_and_instruction_sets_draw_the_same_bytes(void **state)
 	(void)state;
 	still_make(&s, teapot, 560, 300);
 	still_make(&other, teapot, 560, 300);
-	assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	renderer_use(s.renderer, simd_of(PSR_ISA_C));
 	refine(&s, 2, NULL);
 	for (size_t i = 0; i < 3; i++) {
@@ -328,11 +328,13 @@ static void a_pass_ends_between_windows_when_nobody_waits(void **state)
 
 	(void)state;
 	still_make(&s, sphere, 560, 300);
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 2, NULL, count_down, &left, &s.frame, &err),
-	                 PSR_ERR_CANCELLED);
+	s.settings.pass = 2;
+	s.settings.is_cancelled = count_down;
+	s.settings.userdata = &left;
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_CANCELLED);
 	assert_int_equal(left, -1);
 	left = 4;
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 2, NULL, count_down, &left, &s.frame, &err), PSR_OK);
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_OK);
 	assert_int_equal(left, 0); /* four windows */
 	still_clear(&s);
 }
@@ -344,20 +346,21 @@ static void the_door_refuses_what_is_no_still(void **state)
 
 	(void)state;
 	still_make(&s, sphere, 64, 64);
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, PSR_MAX_PASS + 1, NULL, NULL, NULL, &s.frame, &err),
-	                 PSR_ERR_LIMIT);
+	s.settings.pass = PSR_MAX_PASS + 1;
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_LIMIT);
+	s.settings.pass = 1;
 	s.frame.width = 32;
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 1, NULL, NULL, NULL, &s.frame, &err), PSR_ERR_ARG);
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
 	s.frame.width = 64;
 	s.settings.window = (struct psr_window){ 128, 128, 0, 0 };
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 1, NULL, NULL, NULL, &s.frame, &err), PSR_ERR_ARG);
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
 	s.settings.window = (struct psr_window){ 128, 0, 0, 0 };
-	assert_int_equal(psr_render(s.renderer, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
+	assert_int_equal(renderer_draw(s.renderer, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
 	s.settings.window = (struct psr_window){ 128, 128, -PSR_MAX_SIDE - 1, 0 };
-	assert_int_equal(psr_render(s.renderer, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
+	assert_int_equal(renderer_draw(s.renderer, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
 	s.settings.window = (struct psr_window){ 0, 0, 0, 0 };
 	s.settings.width = 0;
-	assert_int_equal(psr_refine(s.refiner, &s.scene, &s.settings, 1, NULL, NULL, NULL, &s.frame, &err), PSR_ERR_ARG);
+	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_ARG);
 	still_clear(&s);
 }
 

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/isa.h"
+#include "simd/isa.h"
 #include "render/shadow.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -69,7 +69,7 @@ static void stage_init(struct stage *s, const struct shape_options *square, cons
 		                                   .up = { 0, 1, 0 },
 		                                   .kind = PSR_CAMERA_ORTHOGRAPHIC,
 		                                   .ortho_height = 2.9 };
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
 }
 
 static void stage_fini(struct stage *s)
@@ -81,12 +81,12 @@ static void stage_fini(struct stage *s)
 
 static uint8_t *draw(struct stage *s, struct psr_pool *pool)
 {
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_error err;
 	struct psr_frame frame = { .width = SIDE, .height = SIDE, .rgb = malloc(3 * PIXELS) };
-	psr_settings_default(&settings, SIDE, SIDE);
+	render_settings_default(&settings, SIDE, SIDE);
 	assert_non_null(frame.rgb);
-	if (psr_render(s->renderer, &s->scene, &settings, pool, &frame, &err))
+	if (renderer_draw(s->renderer, &s->scene, &settings, pool, &frame, &err))
 		fail_msg("%s", err.text);
 	s->report = frame.report;
 	return frame.rgb;
@@ -344,7 +344,7 @@ static void threads_and_instructions_change_no_byte(void **state)
 			s.light[l] = *lights[l];
 		s.scene.n_lights = 3;
 		if (i >= PSR_N_ISAS)
-			assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+			assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 		uint8_t *rgb = draw(&s, pool);
 		if (first)
 			assert_memory_equal(rgb, first, 3 * PIXELS);
@@ -367,7 +367,7 @@ static void check_drawn(struct stage *s, uint32_t n_maps, uint32_t n_drawn)
 	assert_int_equal(s->report.n_shadow_maps_drawn, n_drawn);
 	assert_int_equal(s->report.count[PSR_STAGE_SHADOW] > 0, n_drawn > 0);
 	struct psr_renderer *old = s->renderer;
-	assert_int_equal(psr_renderer_create(&s->renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&s->renderer, NULL), PSR_OK);
 	uint8_t *fresh = draw(s, NULL);
 	assert_int_equal(s->report.n_shadow_maps_drawn, n_maps);
 	assert_memory_equal(kept, fresh, 3 * PIXELS);
@@ -432,16 +432,16 @@ static void without_color_there_are_no_maps_and_those_of_frames_before_are_kept(
 {
 	(void)state;
 	struct stage s;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_error err;
 	static uint8_t rgb[3 * 128 * 128];
 	static float depth[128 * 128];
 	stage_init(&s, &FINE, &SUN);
-	psr_settings_default(&settings, 128, 128);
+	render_settings_default(&settings, 128, 128);
 	struct psr_frame frame = { .width = 128, .height = 128, .depth = depth };
 	for (int i = 0; i < 4; i++) {
 		frame.rgb = i % 2 ? rgb : NULL;
-		assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
+		assert_int_equal(renderer_draw(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
 		assert_int_equal(frame.report.n_shadow_maps, i % 2);
 		assert_int_equal(frame.report.n_shadow_maps_drawn, i == 1);
 		assert_int_equal(frame.report.effect[PSR_EFFECT_SHADOWS].why, i % 2 ? PSR_WHY_RAN : PSR_WHY_OFF);
@@ -453,14 +453,14 @@ static void memory_is_bounded(void **state)
 {
 	(void)state;
 	struct stage s;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_error err;
 	stage_init(&s, &FINE, &LAMP);
-	psr_settings_default(&settings, 4096, 8);
+	render_settings_default(&settings, 4096, 8);
 	static uint8_t rgb[3 * 4096 * 8];
 	struct psr_frame frame = { .width = settings.width, .height = settings.height, .rgb = rgb };
 	s.light[0].casts_shadow = 0;
-	assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
+	assert_int_equal(renderer_draw(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
 	const uint64_t before = psr_renderer_bytes(s.renderer);
 	for (uint32_t n = 1; n <= PSR_MAX_LIGHTS; n += 31) {
 		for (uint32_t l = 0; l < n; l++) {
@@ -468,7 +468,7 @@ static void memory_is_bounded(void **state)
 			s.light[l].position[0] = 0.01 * l;
 		}
 		s.scene.n_lights = n;
-		assert_int_equal(psr_render(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
+		assert_int_equal(renderer_draw(s.renderer, &s.scene, &settings, NULL, &frame, &err), PSR_OK);
 		assert_true(frame.report.n_shadow_maps >= 5 * n);
 		/* Cells of all levels, the guard bands of up to 192 maps among them, the depths of the largest map, and what
 		 * is kept of lights and instances, words of a tile, and entries of tiles. */

@@ -8,8 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/pool.h"
-#include "psr/render.h"
+#include "base/pool.h"
 #include "render/plan.h"
 #include "tests/unit/lib/shapes.h"
 
@@ -97,7 +96,7 @@ struct drawn {
 	struct psr_scene scene;
 	struct psr_instance instance;
 	struct psr_light light;
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_frame frame;
 };
 
@@ -111,7 +110,7 @@ static void scene_make(struct drawn *d, const struct psr_model *model, uint32_t 
 	d->scene = (struct psr_scene){ .instance = &d->instance, .n_instances = 1, .light = &d->light, .n_lights = 1,
 		                           .background = { 0.2, 0.1, 0 } };
 	psr_camera_frame(&d->scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
-	psr_settings_default(&d->settings, width, height);
+	render_settings_default(&d->settings, width, height);
 	const size_t area = (size_t)width * height;
 	d->frame = (struct psr_frame){ .width = width, .height = height, .rgb = malloc(3 * area), .depth = malloc(4 * area),
 		                           .normal = malloc(6 * area), .words = malloc(8 * area), .weight = malloc(area) };
@@ -122,8 +121,8 @@ static void draw(struct drawn *d, int is_smooth, struct psr_pool *pool)
 	struct psr_renderer *renderer;
 	struct psr_error err;
 	d->settings.is_smooth = is_smooth;
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	if (psr_render(renderer, &d->scene, &d->settings, pool, &d->frame, &err))
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	if (renderer_draw(renderer, &d->scene, &d->settings, pool, &d->frame, &err))
 		fail_msg("%s", err.text);
 	psr_renderer_destroy(renderer);
 }
@@ -145,7 +144,7 @@ static void only_color_changes_and_alike_for_any_threads_and_planes(void **state
 	struct psr_pool *pool;
 	(void)state;
 	assert_int_equal(psr_model_read(&model, "tests/golden/wheel.psr", &err), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, 3, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
 	for (int i = 0; i < 2; i++) {
 		const uint32_t width = sizes[i][0], height = sizes[i][1];
 		const size_t area = (size_t)width * height;

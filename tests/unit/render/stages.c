@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
+#include "base/random.h"
 #include "render/fill.h"
 #include "render/gaps.h"
 
@@ -222,12 +223,13 @@ static uint32_t color_at(const struct picture *p, uint32_t x, uint32_t y, uint32
 static void one_color_with_holes_is_that_color(void **state)
 {
 	(void)state;
-	uint32_t seed = 5, holes = 0;
+	uint64_t seed = 5;
+	uint32_t holes = 0;
 	struct picture p;
 	for (uint32_t i = 0; i < SIDE * SIDE; i++) {
-		seed = seed * 1664525 + 1013904223;
-		holes += seed >> 31;
-		paint(&p, i % SIDE, i / SIDE, seed >> 31 ? 1 : 54321, seed >> 31 ? 0 : WEIGHT_ONE, seed >> 31 ? 900 : 100);
+		const int is_hole = (int)random_below(&seed, 2);
+		holes += (uint32_t)is_hole;
+		paint(&p, i % SIDE, i / SIDE, is_hole ? 1 : 54321, is_hole ? 0 : WEIGHT_ONE, is_hole ? 900 : 100);
 	}
 	struct psr_report report = fill_picture(&p);
 	for (uint32_t i = 0; i < SIDE * SIDE; i++) {

@@ -7,7 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "render/cull.h"
 #include "render/zbuffer.h"
 
@@ -30,7 +30,7 @@ static int close_model(void **state)
 
 /* The same picture, of which the whole is one tile and every sample lowers its word and its cell. */
 static void warp_plainly(struct psr_zstack *to, const struct psr_zstack *like, const struct psr_scene *scene,
-                         const struct psr_settings *settings)
+                         const struct render_settings *settings)
 {
 	struct plan plan = { 0 };
 	struct bins bins = { 0 };
@@ -68,13 +68,13 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 	const struct psr_model_info *info = psr_model_info(wheel);
 	struct psr_instance instance = { .model = wheel, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1 };
-	struct psr_settings settings;
+	struct render_settings settings;
 	struct psr_renderer *renderer;
 	struct psr_report report;
 	struct psr_zstack *stack, plain;
 	struct psr_error err;
 
-	psr_settings_default(&settings, width, height);
+	render_settings_default(&settings, width, height);
 	settings.cull_tests &= ~(unsigned)PSR_CULL_OCCLUSION;
 	psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, 0.6, (double)width / height);
 	for (int i = 0; i < 3; i++)
@@ -83,8 +83,8 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 		scene.camera.kind = PSR_CAMERA_ORTHOGRAPHIC;
 		scene.camera.ortho_height = info->scale * 2 / nearness;
 	}
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_warp(renderer, &scene, &settings, NULL, &stack, &report, &err), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, &report, &err), PSR_OK);
 	warp_plainly(&plain, stack, &scene, &settings);
 	for (uint32_t y = 0; y < height; y++)
 		assert_memory_equal(psr_zstack_row(stack, y), psr_zstack_row(&plain, y), width * sizeof(uint64_t));

@@ -16,22 +16,19 @@ static const double zero[3];
 /* Forgets what is kept above this height. */
 static void remove_above(struct level *level, float z)
 {
-	struct cover rest;
+	struct kept rest;
 
-	assert_int_equal(cover_init(&rest, level->ds), PSR_OK);
-	for (uint32_t i = 0; i < level->cover.n_points; i++) {
-		const struct cover_point *point = &level->cover.point[i];
-		struct patch *patch = &level->sheets[point->projection].patch[point->patch];
+	assert_int_equal(kept_init(&rest, level->sampling.ds), PSR_OK);
+	for (uint32_t i = 0; i < level->kept.n; i++) {
+		const struct kept_sample *sample = &level->kept.sample[i];
 
-		if (point->position[2] <= z) {
-			assert_int_equal(cover_add(&rest, point), PSR_OK);
-			continue;
-		}
-		patch->kept &= ~(UINT64_C(1) << point->sample);
-		patch->is_alive = patch->kept != 0;
+		if (sample->position[2] <= z)
+			assert_int_equal(kept_add(&rest, sample), PSR_OK);
+		else
+			level->sheets[sample->projection].patch[sample->patch].kept &= ~(UINT64_C(1) << sample->sample);
 	}
-	cover_fini(&level->cover);
-	level->cover = rest;
+	kept_fini(&level->kept);
+	level->kept = rest;
 }
 
 static double share(const struct adequacy *adequacy)
@@ -53,26 +50,26 @@ static void a_cap_that_is_gone_is_missing(void **state)
 	for (int i = 0; i < 3; i++) {
 		const double height[] = { 0.75, 0.45, -0.3 };
 		double cap = (1 - height[i] / RADIUS) / 2, ring = 2 * 3.1415927 * sqrt(RADIUS * RADIUS - height[i] * height[i]);
-		double border = ring * 1.42 * set.level.ds / (4 * 3.1415927 * RADIUS * RADIUS);
+		double border = ring * 1.42 * set.level.sampling.ds / (4 * 3.1415927 * RADIUS * RADIUS);
 		struct adequacy adequacy;
 		uint64_t n_near = 0;
 
 		remove_above(&set.level, (float)height[i]);
-		assert_int_equal(adequacy_measure(&adequacy, &set.level, 7, N_TRIALS), PSR_OK);
+		assert_int_equal(adequacy_measure(&adequacy, &set.level.sampling, &set.level.kept, 7, N_TRIALS, 0), PSR_OK);
 		assert_in_range(adequacy.n_trials, 95 * N_TRIALS / 100, 105 * N_TRIALS / 100);
 		printf("# %.4f of a cap of %.4f\n", share(&adequacy), cap);
 		assert_true(fabs(share(&adequacy) - cap) < border + 5 * sqrt(cap * (1 - cap) / (double)adequacy.n_trials));
 		for (uint64_t k = 0; k < adequacy.n_missing; k++) {
-			const struct surface_spot *spot = &adequacy.spot[k];
+			const struct place *place = &adequacy.place[k];
 
-			assert_true(fabs((double)v3f_length(spot->p) - RADIUS) < 0.002);
-			assert_true(v3f_dot(spot->n, spot->p) > 0.99f * (float)RADIUS);
-			assert_true(spot->surface < set.mesh->n_triangles);
-			n_near += (double)spot->p[2] < height[i] - 2 * set.level.ds;
+			assert_true(fabs((double)v3f_length(place->p) - RADIUS) < 0.002);
+			assert_true(v3f_dot(place->n, place->p) > 0.99f * (float)RADIUS);
+			assert_true(place->surface < set.mesh->n_triangles);
+			n_near += (double)place->p[2] < height[i] - 2 * set.level.sampling.ds;
 		}
 		/* Below the border only what is missing anyway. */
 		assert_true(1000 * n_near < adequacy.n_trials);
-		free(adequacy.spot);
+		free(adequacy.place);
 	}
 	level_set_close(&set);
 }
@@ -90,17 +87,17 @@ static void nothing_kept_is_all_missing(void **state)
 	mesh->material->two_sided = 1;
 	level_set_make(&set, mesh, 32, 2);
 	remove_above(&set.level, -1);
-	assert_int_equal(adequacy_measure(&adequacy, &set.level, 1, 10000), PSR_OK);
+	assert_int_equal(adequacy_measure(&adequacy, &set.level.sampling, &set.level.kept, 1, 10000, 0), PSR_OK);
 	assert_int_equal(adequacy.n_missing, adequacy.n_trials);
 	for (uint64_t k = 0; k < adequacy.n_missing; k++) {
-		int is_back = (adequacy.spot[k].surface & SHEET_BACK) != 0;
+		int is_back = (adequacy.place[k].surface & SURFACE_BACK) != 0;
 
-		assert_true(adequacy.spot[k].n[2] == (is_back ? -1.0f : 1.0f));
+		assert_true(adequacy.place[k].n[2] == (is_back ? -1.0f : 1.0f));
 		n_backs += (uint64_t)is_back;
 	}
 	/* Half of them, within five standard deviations. */
 	assert_true(fabs((double)n_backs - 0.5 * (double)adequacy.n_trials) < 5 * sqrt(0.25 * (double)adequacy.n_trials));
-	free(adequacy.spot);
+	free(adequacy.place);
 	level_set_close(&set);
 }
 
@@ -120,16 +117,16 @@ static void what_is_hidden_is_not_missing(void **state)
 		for (int k = 0; k < 3; k++)
 			mesh->triangle[shell->n_triangles + i][k] = core->triangle[i][k] + shell->n_vertices;
 	level_set_make(&set, mesh, 64, 2);
-	for (uint32_t i = 0; i < set.level.cover.n_points; i++)
-		assert_true(v3f_length(set.level.cover.point[i].position) > 0.8f);
-	assert_int_equal(adequacy_measure(&adequacy, &set.level, 3, N_TRIALS), PSR_OK);
+	for (uint32_t i = 0; i < set.level.kept.n; i++)
+		assert_true(v3f_length(set.level.kept.sample[i].position) > 0.8f);
+	assert_int_equal(adequacy_measure(&adequacy, &set.level.sampling, &set.level.kept, 3, N_TRIALS, 0), PSR_OK);
 	/* The share of trials is that of the areas: 0.9^2 / (0.9^2 + 0.4^2) of a fourth of the draws, which are 4
 	 * N_TRIALS. */
 	assert_true(fabs((double)adequacy.n_trials / N_TRIALS - 0.81 / 0.97) < 0.02);
 	assert_true(1000 * adequacy.n_missing < adequacy.n_trials);
 	for (uint64_t k = 0; k < adequacy.n_missing; k++)
-		assert_true(v3f_length(adequacy.spot[k].p) > 0.8f);
-	free(adequacy.spot);
+		assert_true(v3f_length(adequacy.place[k].p) > 0.8f);
+	free(adequacy.place);
 	level_set_close(&set);
 	meshes_free(shell);
 	meshes_free(core);
@@ -145,18 +142,18 @@ static void threads_do_not_change_a_trial_and_seeds_do(void **state)
 
 		level_set_make(&set, meshes_sphere(20, zero, RADIUS), 32, i % 3 + 1);
 		remove_above(&set.level, 0.5f);
-		assert_int_equal(adequacy_measure(&adequacy[i], &set.level, i < 3 ? 5 : 6, 20000), PSR_OK);
+		assert_int_equal(adequacy_measure(&adequacy[i], &set.level.sampling, &set.level.kept, i < 3 ? 5 : 6, 20000, 0), PSR_OK);
 		level_set_close(&set);
 	}
 	for (int i = 1; i < 3; i++) {
 		assert_int_equal(adequacy[i].n_trials, adequacy[0].n_trials);
 		assert_int_equal(adequacy[i].n_missing, adequacy[0].n_missing);
-		assert_memory_equal(adequacy[i].spot, adequacy[0].spot, adequacy[0].n_missing * sizeof *adequacy[0].spot);
+		assert_memory_equal(adequacy[i].place, adequacy[0].place, adequacy[0].n_missing * sizeof *adequacy[0].place);
 	}
 	assert_true(adequacy[0].n_missing > 1000 && adequacy[3].n_missing > 1000);
-	assert_memory_not_equal(adequacy[3].spot, adequacy[0].spot, 1000 * sizeof *adequacy[0].spot);
+	assert_memory_not_equal(adequacy[3].place, adequacy[0].place, 1000 * sizeof *adequacy[0].place);
 	for (int i = 0; i < 4; i++)
-		free(adequacy[i].spot);
+		free(adequacy[i].place);
 }
 
 /* The rounds go on until less than a 15,000th is missing; chance in the last one may still find some, of about 7 in
@@ -169,17 +166,17 @@ static void what_is_missing_is_added(void **state)
 	(void)state;
 	level_set_make(&set, meshes_sphere(60, zero, RADIUS), 64, 2);
 	remove_above(&set.level, 0.6f);
-	assert_int_equal(adequacy_measure(&before, &set.level, 9, N_TRIALS), PSR_OK);
+	assert_int_equal(adequacy_measure(&before, &set.level.sampling, &set.level.kept, 9, N_TRIALS, 0), PSR_OK);
 	assert_true(share(&before) > 0.1);
-	free(before.spot);
-	assert_int_equal(adequacy_reach(&after, &set.level), PSR_OK);
-	assert_null(after.spot);
+	free(before.place);
+	assert_int_equal(level_reach(&after, &set.level), PSR_OK);
+	assert_null(after.place);
 	assert_in_range(after.n_missing, 0, 18);
-	assert_int_equal(adequacy_measure(&before, &set.level, 9, N_TRIALS), PSR_OK);
+	assert_int_equal(adequacy_measure(&before, &set.level.sampling, &set.level.kept, 9, N_TRIALS, 0), PSR_OK);
 	printf("# missing in the end: %llu of %llu\n", (unsigned long long)before.n_missing,
 	       (unsigned long long)before.n_trials);
 	assert_in_range(before.n_missing, 0, 18);
-	free(before.spot);
+	free(before.place);
 	level_set_close(&set);
 }
 
@@ -193,12 +190,12 @@ static void the_last_round_makes_all_trials(void **state)
 	(void)state;
 	level_set_make(&set, meshes_sphere(60, zero, RADIUS), 64, 2);
 	remove_above(&set.level, 0.6f);
-	assert_int_equal(adequacy_reach(&after, &set.level), PSR_OK);
-	assert_true(set.level.cover.n_points < 200000); /* so that a round has 100,000 */
+	assert_int_equal(level_reach(&after, &set.level), PSR_OK);
+	assert_true(set.level.kept.n < 200000); /* so that a round has 100,000 */
 	for (uint64_t round = 2; round < 8; round++) {
-		assert_int_equal(adequacy_measure(&whole, &set.level, round, 100000), PSR_OK);
+		assert_int_equal(adequacy_measure(&whole, &set.level.sampling, &set.level.kept, round, 100000, 0), PSR_OK);
 		n_same += whole.n_trials == after.n_trials && whole.n_missing == after.n_missing;
-		free(whole.spot);
+		free(whole.place);
 	}
 	assert_int_equal(n_same, 1);
 	level_set_close(&set);

@@ -5,8 +5,8 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/srgb.h"
-#include "psr/direction.h"
-#include "psr/render.h"
+#include "base/direction.h"
+#include "render/stages.h"
 #include "model.h"
 
 #define SIDE 64
@@ -46,16 +46,16 @@ static int draw(const struct psr_model *model, const struct view *view, uint8_t 
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1 };
 	struct psr_frame frame = { .width = SIDE, .height = SIDE, .rgb = rgb, .depth = depth };
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 	int n = 0;
 
 	scene.camera = (struct psr_camera){ .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = 1.8, .up = { 0, 1, 0 } };
 	memcpy(scene.camera.eye, view->eye, sizeof view->eye);
 	v3d_scale(light.direction, view->to_light, -1);
-	psr_settings_default(&settings, SIDE, SIDE);
+	render_settings_default(&settings, SIDE, SIDE);
 	settings.cull_tests = cull_tests;
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
 	psr_renderer_destroy(renderer);
 	for (int i = 0; i < SIDE * SIDE; i++)
 		n += depth[i] < INFINITY;

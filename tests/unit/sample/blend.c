@@ -5,8 +5,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include "base/srgb.h"
-#include "psr/direction.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "model/blocks.h"
 #include "surface/blend.h"
 #include "surface/material.h"
 #include "meshes.h"

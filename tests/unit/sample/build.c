@@ -5,8 +5,9 @@
 #include <cmocka.h>
 #include <stdio.h>
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "psr/build.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "ray/ray.h"
 #include "meshes.h"
 

@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "model.h"
 
 #define RESOLUTION 128 /* levels of 128 and 64 */
@@ -81,7 +81,7 @@ static void a_dense_cloud_has_no_holes(void **state)
 	uint64_t seed = 31;
 
 	for (unsigned level = 0; level < N_LEVELS; level++) {
-		struct cover map;
+		struct kept map;
 		double farthest = 0;
 
 		model_map(&map, built->sample, built->blocks->n_samples, level, pixel(level));
@@ -96,9 +96,9 @@ static void a_dense_cloud_has_no_holes(void **state)
 			inner(built, p, at);
 			farthest = fmax(farthest, (double)model_nearest(&map, at, UINT32_MAX));
 		}
-		printf("# level %u: %u samples, farthest %.3f pixels\n", level, map.n_points, farthest / pixel(level));
+		printf("# level %u: %u samples, farthest %.3f pixels\n", level, map.n, farthest / pixel(level));
 		assert_true(farthest < 1.12 * pixel(level));
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 }
 
@@ -172,7 +172,7 @@ static void a_disc_is_round(void **state)
 		assert_true(fabs((double)v3f_dot(d, mesh->point_normal[0])) < 1e-3 * pixel(0));
 	}
 	for (unsigned level = 0; level < N_LEVELS; level++) {
-		struct cover map;
+		struct kept map;
 
 		model_map(&map, built.sample, built.blocks->n_samples, level, pixel(level));
 		for (int turn = 0; turn < 100; turn++) {
@@ -186,7 +186,7 @@ static void a_disc_is_round(void **state)
 				assert_true((double)model_nearest(&map, at, UINT32_MAX) < 0.97 * pixel(level));
 			}
 		}
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 	model_close(&built, cloud_free);
 }
@@ -211,7 +211,7 @@ static void lone_points_are_all_there(void **state)
 	}
 	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	for (unsigned level = 0; level < N_LEVELS; level++) {
-		struct cover map;
+		struct kept map;
 		int n_missing = 0;
 
 		model_map(&map, built.sample, built.blocks->n_samples, level, pixel(level));
@@ -221,9 +221,9 @@ static void lone_points_are_all_there(void **state)
 			inner(&built, mesh->point[i], at);
 			n_missing += (double)model_nearest(&map, at, UINT32_MAX) > 0.56 * pixel(level);
 		}
-		printf("# level %u: %d of %u points missing, %u samples\n", level, n_missing, mesh->n_points, map.n_points);
+		printf("# level %u: %d of %u points missing, %u samples\n", level, n_missing, mesh->n_points, map.n);
 		assert_int_equal(n_missing, 0);
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 	model_close(&built, cloud_free);
 }

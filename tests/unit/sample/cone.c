@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "sample/pack/cone.h"
 #include "meshes.h"
 

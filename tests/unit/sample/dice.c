@@ -4,7 +4,6 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
-#include "sample/mend/adequacy.h"
 #include "level.h"
 
 /* A lattice triangle with sides of at most 1.05 pixels has its middle 0.606 pixels from its corners, and places are
@@ -196,7 +195,7 @@ static void thin_things_have_no_gaps(void **state)
 		mesh->material->two_sided = set[i].two_sided;
 		level_set_make(&made, mesh, 96, 2);
 		/* As of level 0: what views find afterwards is added. */
-		assert_int_equal(adequacy_reach(&adequacy, &made.level), PSR_OK);
+		assert_int_equal(level_reach(&adequacy, &made.level), PSR_OK);
 		check_spokes(&made);
 		level_set_close(&made);
 	}
@@ -224,7 +223,7 @@ static void needles_are_sampled_from_foot_to_tip_on_every_face(void **state)
 			for (int k = 0; k < 3; k++)
 				p[k] = (float)((1 - x) * (mesh->position[t[0]][k] + mesh->position[t[1]][k]) / 2
 				               + x * mesh->position[t[2]][k]);
-			if (!seen_is(&set.level.seen, p, n))
+			if (!visible_set_has(&set.level.visible, p, n))
 				continue;
 			assert_true(level_set_nearest(&set, p, n, 2) <= 0.815);
 			n_seen++;
@@ -241,9 +240,9 @@ static void threads_do_not_change_a_sample(void **state)
 	(void)state;
 	for (int i = 0; i < 3; i++) {
 		level_set_make(&set[i], dented_sphere(), 64, i + 1);
-		assert_int_equal(set[i].level.cover.n_points, set[0].level.cover.n_points);
-		for (uint32_t k = 0; k < set[0].level.cover.n_points; k++) {
-			const struct cover_point *a = &set[0].level.cover.point[k], *b = &set[i].level.cover.point[k];
+		assert_int_equal(set[i].level.kept.n, set[0].level.kept.n);
+		for (uint32_t k = 0; k < set[0].level.kept.n; k++) {
+			const struct kept_sample *a = &set[0].level.kept.sample[k], *b = &set[i].level.kept.sample[k];
 
 			assert_memory_equal(a->position, b->position, sizeof a->position);
 			assert_true(a->attr == b->attr && a->projection == b->projection && a->patch == b->patch
@@ -279,9 +278,9 @@ static void slivers_are_survived(void **state)
 	add_strip(mesh, 0, from, to, (const double[3]){ 0, 0, 1 }, 0.4);
 	level_set_make(&set, mesh, 32, 2);
 	assert_true(level_set_nearest(&set, middle, up, 2) <= FARTHEST);
-	for (uint32_t i = 0; i < set.level.cover.n_points; i++)
+	for (uint32_t i = 0; i < set.level.kept.n; i++)
 		for (int k = 0; k < 3; k++)
-			assert_true(fabsf(set.level.cover.point[i].position[k]) < 1.1f);
+			assert_true(fabsf(set.level.kept.sample[i].position[k]) < 1.1f);
 	level_set_close(&set);
 }
 

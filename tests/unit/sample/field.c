@@ -169,8 +169,8 @@ static void the_order_does_not_matter(void **state)
 			assert_int_equal(field_add(&field[f], p[k], n[k], 1.5f), PSR_OK);
 		}
 	}
-	assert_int_equal(field[0].n_cells, field[1].n_cells);
-	assert_true(field[0].n_cells > 1024);
+	assert_int_equal(field[0].cells.n, field[1].cells.n);
+	assert_true(field[0].cells.n > 1024);
 	for (int i = 0; i < n_pieces; i++) {
 		for (int f = 0; f < 2; f++)
 			field_normal(&field[f], p[i], n[i], smooth[f]);

@@ -94,9 +94,9 @@ static void fine_samples_are_in_one_group_each(void **state)
 
 /* Samples of a level by cells of half a pixel: number in `patch`, and one for each group that has it, in
  * `projection`. */
-static void map_level(struct cover *map, const struct draft *draft, unsigned level)
+static void map_level(struct kept *map, const struct draft *draft, unsigned level)
 {
-	assert_int_equal(cover_init(map, draft->ds * (1u << level) / 2), PSR_OK);
+	assert_int_equal(kept_init(map, draft->ds * (1u << level) / 2), PSR_OK);
 	for (uint32_t i = 0; i < draft->n_blocks; i++) {
 		const struct draft_block *block = &draft->block[i];
 
@@ -104,10 +104,10 @@ static void map_level(struct cover *map, const struct draft *draft, unsigned lev
 			continue;
 		for (uint64_t left = block->part; left != 0; left &= left - 1) {
 			unsigned s = (unsigned)__builtin_ctzll(left);
-			struct cover_point point = { .patch = number_of(draft, block, s), .projection = block->group };
+			struct kept_sample sample = { .patch = number_of(draft, block, s), .projection = block->group };
 
-			draft_position(draft, block, s, point.position);
-			assert_int_equal(cover_add(map, &point), PSR_OK);
+			draft_position(draft, block, s, sample.position);
+			assert_int_equal(kept_add(map, &sample), PSR_OK);
 		}
 	}
 }
@@ -124,7 +124,7 @@ static void groups_have_the_nearest_samples_of_each_level(void **state)
 	for (unsigned level = 1; level < N_LEVELS; level++) {
 		float ds = (float)(draft.ds * (1u << level));
 		uint32_t n_far = 0, n_fine = 0;
-		struct cover map;
+		struct kept map;
 
 		map_level(&map, &draft, level);
 		for (uint32_t i = 0; i < draft.n_blocks; i++) {
@@ -133,16 +133,16 @@ static void groups_have_the_nearest_samples_of_each_level(void **state)
 			for (uint64_t left = block->level == 0 ? block->part & 0x8020100804020180u : 0; left != 0;
 			     left &= left - 1, n_fine++) {
 				float p[3], d[3], all = INFINITY, own = INFINITY;
-				uint32_t first[COVER_MOST_AROUND];
+				uint32_t first[GRID_MOST_AROUND];
 				int n_cells;
 
 				draft_position(&draft, block, (unsigned)__builtin_ctzll(left), p);
-				n_cells = cover_around(&map, p, (double)ds, first);
+				n_cells = grid_around(&map.grid, p, (double)ds, first);
 				for (int c = 0; c < n_cells; c++) {
-					for (uint32_t k = first[c]; k != COVER_NONE; k = map.point[k].next) {
-						v3f_sub(d, map.point[k].position, p);
+					for (uint32_t k = first[c]; k != GRID_NONE; k = map.sample[k].next) {
+						v3f_sub(d, map.sample[k].position, p);
 						all = fminf(all, v3f_length(d));
-						if (map.point[k].projection == block->group)
+						if (map.sample[k].projection == block->group)
 							own = fminf(own, v3f_length(d));
 					}
 				}
@@ -153,7 +153,7 @@ static void groups_have_the_nearest_samples_of_each_level(void **state)
 		}
 		/* A coarse spacing along two edges of the 512 fine ones. */
 		assert_true((double)n_far / n_fine < 3.0 * (1u << level) / 512);
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 	draft_fini(&draft);
 }

@@ -3,11 +3,9 @@
 #define TESTS_SAMPLE_LEVEL_H
 
 #include "base/vec.h"
-#include "psr/direction.h"
-#include "psr/pool.h"
-#include "surface/area.h"
+#include "base/direction.h"
+#include "ray/area.h"
 #include "sample/level.h"
-#include "sample/project/projection.h"
 #include "meshes.h"
 
 #define TOLERANCE 0.43633231299858238 /* 25 degrees */
@@ -17,7 +15,6 @@ struct level_set {
 	struct ray_scene *scene;
 	struct surface surface;
 	struct psr_pool *pool;
-	struct psr_projection projection[N_PROJECTIONS];
 	struct level level;
 	double *area; /* of all triangles up to this one */
 };
@@ -31,19 +28,18 @@ static inline void level_set_open(struct level_set *set, struct psr_mesh *mesh, 
 	set->mesh = mesh;
 	assert(ray_scene_create(&set->scene, mesh, zero, 1, NULL) == PSR_OK);
 	assert(surface_init(&set->surface, mesh, 1) == PSR_OK);
-	assert(psr_pool_create(&set->pool, n_threads, 0) == PSR_OK);
-	projection_list(set->projection, 2.0 / resolution, TOLERANCE);
-	set->level = (struct level){ .mesh = mesh, .scene = set->scene, .surface = &set->surface, .pool = set->pool,
-		                         .ds = 2.0 / resolution, .cosine = (float)cos(TOLERANCE),
-		                         .n_projections = N_PROJECTIONS };
+	assert(psr_pool_create(&set->pool, n_threads, NULL) == PSR_OK);
+	set->level.sampling = (struct sampling){ .mesh = mesh, .scene = set->scene, .surface = &set->surface,
+		                                     .pool = set->pool, .ds = 2.0 / resolution };
+	projection_list(set->level.sampling.projection, 2.0 / resolution, TOLERANCE);
 	set->area = malloc((mesh->n_triangles + 1) * sizeof *set->area);
-	area_sum(&set->level, mesh->n_triangles, set->area);
+	area_sum(set->scene, mesh, 1, set->area);
 }
 
 static inline void level_set_make(struct level_set *set, struct psr_mesh *mesh, uint32_t resolution, int n_threads)
 {
 	level_set_open(set, mesh, resolution, n_threads);
-	assert(level_make(&set->level, set->projection, NULL, NULL) == PSR_OK);
+	assert(level_make(&set->level, NULL) == PSR_OK);
 }
 
 static inline void level_set_close(struct level_set *set)
@@ -110,8 +106,8 @@ static inline uint32_t level_set_place(const struct level_set *set, uint64_t *se
 static inline double level_set_nearest(const struct level_set *set, const float p[3], const float n[3], double reach)
 {
 	const float (*direction)[3] = psr_direction_table();
-	const struct cover *cover = &set->level.cover;
-	double ds = set->level.ds, least = reach * ds;
+	const struct kept *kept = &set->level.kept;
+	double ds = set->level.sampling.ds, least = reach * ds;
 	int low[3], high[3], at[3], is_any = 0;
 
 	for (int k = 0; k < 3; k++) {
@@ -121,12 +117,12 @@ static inline double level_set_nearest(const struct level_set *set, const float 
 	for (at[2] = low[2]; at[2] <= high[2]; at[2]++) {
 		for (at[1] = low[1]; at[1] <= high[1]; at[1]++) {
 			for (at[0] = low[0]; at[0] <= high[0]; at[0]++) {
-				for (uint32_t i = cover_cell(cover, at); i != COVER_NONE; i = cover->point[i].next) {
-					const struct cover_point *point = &cover->point[i];
+				for (uint32_t i = grid_first(&kept->grid, at); i != GRID_NONE; i = kept->sample[i].next) {
+					const struct kept_sample *sample = &kept->sample[i];
 					float d[3];
 
-					v3f_sub(d, point->position, p);
-					if (!point->two_sided && v3f_dot(direction[point->normal], n) <= 0)
+					v3f_sub(d, sample->position, p);
+					if (!sample->two_sided && v3f_dot(direction[sample->normal], n) <= 0)
 						continue;
 					if ((double)v3f_length(d) <= least) {
 						least = (double)v3f_length(d);

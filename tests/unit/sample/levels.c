@@ -5,7 +5,7 @@
 #include <cmocka.h>
 #include <stdio.h>
 #include "base/srgb.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "model.h"
 
 #define RESOLUTION 256 /* levels of 256, 128 and 64 */
@@ -110,7 +110,7 @@ static void cut_outs_are_cut_out_of_all_levels(void **state)
 		assert_false(fabs((double)s->p[0]) < inside && fabs((double)s->p[1]) < inside);
 	}
 	for (unsigned level = 0; level < N_LEVELS; level++) {
-		struct cover map;
+		struct kept map;
 
 		model_map(&map, built.sample, built.blocks->n_samples, level, pixel(level));
 		for (int i = -100; i <= 100; i++) {
@@ -121,7 +121,7 @@ static void cut_outs_are_cut_out_of_all_levels(void **state)
 				assert_true((double)model_nearest(&map, p, UINT32_MAX) < 0.97 * pixel(level));
 			}
 		}
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 	model_close(&built, meshes_free);
 }
@@ -187,7 +187,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	info = psr_model_info(built.model);
 	for (unsigned level = 0; level < N_LEVELS; level++) {
-		struct cover map;
+		struct kept map;
 
 		model_map(&map, built.sample, built.blocks->n_samples, level, pixel(level));
 		for (uint32_t i = 0; i < n; i++) {
@@ -199,7 +199,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 				assert_true((double)model_nearest(&map, p, UINT32_MAX) < 0.75 * pixel(level));
 			}
 		}
-		cover_fini(&map);
+		kept_fini(&map);
 	}
 	model_close(&built, meshes_free);
 }

@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "surface/material.h"
 
 static const float grey[3] = { 0.5f, 0.5f, 0.5f };

@@ -54,7 +54,7 @@ static inline struct model_sample *model_samples(const struct psr_blocks *b)
 					                          .projection = b->block_projection[i],
 					                          .row = ((int)place.row >> psr_blocks_level(b, i)) + s / 8,
 					                          .col = ((int)place.col >> psr_blocks_level(b, i)) + s % 8, .attr = b->attr[k] };
-				sheets_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
+				projection_inner(projection, (out->col + (out->row & 1) / 2.0) * spacing,
 				             out->row * 0.86602540378443864676 * spacing, (double)z, inner);
 				v3f_set(out->p, (float)inner[0], (float)inner[1], (float)inner[2]);
 			}
@@ -87,34 +87,34 @@ static inline void model_close(struct model_built *built, void (*mesh_free)(stru
 	mesh_free(built->mesh);
 }
 
-/* Those of a level by cells of a pixel of it, number in the list in `patch`; group in `projection`. cover_fini(). */
-static inline void model_map(struct cover *map, const struct model_sample *list, uint64_t n, unsigned level, double ds)
+/* Those of a level by cells of a pixel of it, number in the list in `patch`; group in `projection`. kept_fini(). */
+static inline void model_map(struct kept *map, const struct model_sample *list, uint64_t n, unsigned level, double ds)
 {
-	assert_int_equal(cover_init(map, ds), PSR_OK);
+	assert_int_equal(kept_init(map, ds), PSR_OK);
 	for (uint64_t i = 0; i < n; i++) {
-		struct cover_point point = { .projection = list[i].group, .patch = (uint32_t)i };
+		struct kept_sample sample = { .projection = list[i].group, .patch = (uint32_t)i };
 
 		if (list[i].level != level)
 			continue;
-		memcpy(point.position, list[i].p, sizeof point.position);
-		assert_int_equal(cover_add(map, &point), PSR_OK);
+		memcpy(sample.position, list[i].p, sizeof sample.position);
+		assert_int_equal(kept_add(map, &sample), PSR_OK);
 	}
 }
 
 /* Distance to the nearest of them within a pixel, of a group or of any (UINT32_MAX); INFINITY. */
-static inline float model_nearest(const struct cover *map, const float p[3], uint32_t group)
+static inline float model_nearest(const struct kept *map, const float p[3], uint32_t group)
 {
 	float least = INFINITY;
 	int at[3];
 
 	for (int i = 0; i < 27; i++) {
 		for (int k = 0; k < 3; k++)
-			at[k] = (int)floor((double)p[k] / map->ds) + (k == 0 ? i % 3 : k == 1 ? i / 3 % 3 : i / 9) - 1;
-		for (uint32_t c = cover_cell(map, at); c != COVER_NONE; c = map->point[c].next) {
+			at[k] = (int)floor((double)p[k] / map->grid.width) + (k == 0 ? i % 3 : k == 1 ? i / 3 % 3 : i / 9) - 1;
+		for (uint32_t c = grid_first(&map->grid, at); c != GRID_NONE; c = map->sample[c].next) {
 			float d[3];
 
-			v3f_sub(d, map->point[c].position, p);
-			if (group == UINT32_MAX || map->point[c].projection == group)
+			v3f_sub(d, map->sample[c].position, p);
+			if (group == UINT32_MAX || map->sample[c].projection == group)
 				least = fminf(least, v3f_length(d));
 		}
 	}

@@ -42,16 +42,16 @@ static void places_of_a_sphere_belong_to_who_faces_them(void **state)
 		double blur;
 
 		level_set_make(&set, meshes_sphere(120, zero, 0.9), resolution, 2);
-		blur = 1.5 * sqrt(3) * 3 * set.level.ds / 0.9 / 2 + 1.1 * DEGREE;
+		blur = 1.5 * sqrt(3) * 3 * set.level.sampling.ds / 0.9 / 2 + 1.1 * DEGREE;
 		for (int i = 0; i < 50000; i++) {
 			float p[3], n[3], up[3];
 			unsigned owner;
 
 			level_set_place(&set, &seed, p, n);
-			owner = owner_of(&set.level, p, n);
-			assert_true(owner < set.level.n_projections);
+			owner = owner_of(&set.level.sampling, &set.level.field, p, n);
+			assert_true(owner < N_PROJECTIONS);
 			v3f_normalize(up, p);
-			assert_true((double)v3f_dot(up, set.projection[owner].axis[2]) > cos(22.7 * DEGREE + blur));
+			assert_true((double)v3f_dot(up, set.level.sampling.projection[owner].axis[2]) > cos(22.7 * DEGREE + blur));
 		}
 		level_set_close(&set);
 	}
@@ -68,30 +68,34 @@ static void places_of_a_sphere_are_owned_once(void **state)
 	int n_blocks = 0, n_few = 0;
 
 	(void)state;
-	level_set_make(&set, meshes_sphere(120, zero, 0.9), 192, 2);
-	for (unsigned i = 0; i < set.level.n_projections; i++) {
+	level_set_open(&set, meshes_sphere(120, zero, 0.9), 192, 2);
+	assert_int_equal(level_own(&set.level, NULL), PSR_OK);
+	level_merge(&set.level);
+	assert_int_equal(level_keep(&set.level), PSR_OK);
+	for (unsigned i = 0; i < N_PROJECTIONS; i++) {
 		const struct sheets *sheets = &set.level.sheets[i];
 		double spacing = (double)sheets->projection.spacing;
 
 		for (uint32_t p = 0; p < sheets->n_patches; p++) {
 			const struct patch *patch = &sheets->patch[p];
+			uint64_t owned = set.level.ownership.patch[i][p].mask;
 
-			assert_int_equal(patch->owned & ~patch->mask, 0);
-			assert_int_equal(patch->owned & ~patch->kept, 0);
-			assert_int_not_equal(__builtin_popcountll(patch->owned), 1);
-			n_blocks += patch->owned != 0;
-			n_few += patch->owned != 0 && __builtin_popcountll(patch->owned) < 16;
-			for (uint64_t left = patch->owned; left != 0; left &= left - 1) {
+			assert_int_equal(owned & ~patch->mask, 0);
+			assert_int_equal(owned & ~patch->kept, 0);
+			assert_int_not_equal(__builtin_popcountll(owned), 1);
+			n_blocks += owned != 0;
+			n_few += owned != 0 && __builtin_popcountll(owned) < 16;
+			for (uint64_t left = owned; left != 0; left &= left - 1) {
 				float n[3];
 
-				level_normal(&set.level, sheets->sample[p][__builtin_ctzll(left)].surface, n);
+				sampling_normal(&set.level.sampling, sheets->sample[p][__builtin_ctzll(left)].surface, n);
 				area += spacing * spacing * 0.8660254 / (double)v3f_dot(n, sheets->projection.axis[2]);
 			}
 		}
 	}
 	printf("# %.4f of the area; %d of %d blocks own less than a quarter\n", area / (4 * 3.14159265 * 0.81),
 	       n_few, n_blocks);
-	assert_true(fabs(area - 4 * 3.14159265 * 0.81) < 32 * set.level.ds);
+	assert_true(fabs(area - 4 * 3.14159265 * 0.81) < 32 * set.level.sampling.ds);
 	assert_true(20 * n_few < n_blocks);
 	level_set_close(&set);
 }
@@ -108,31 +112,31 @@ static void flat_faces_have_one_owner(void **state)
 
 	(void)state;
 	level_set_make(&set, meshes_box(half, 0), 128, 2);
-	inside = half - 10 * set.level.ds;
+	inside = half - 10 * set.level.sampling.ds;
 	for (int f = 0; f < 6; f++) {
 		float sign = f % 2 == 0 ? -1 : 1;
 
 		owner[f] = 0;
 		for (unsigned q = 1; q < N_PROJECTIONS; q++)
-			if (sign * set.projection[q].axis[2][f / 2] > sign * set.projection[owner[f]].axis[2][f / 2])
+			if (sign * set.level.sampling.projection[q].axis[2][f / 2] > sign * set.level.sampling.projection[owner[f]].axis[2][f / 2])
 				owner[f] = q;
 	}
-	for (uint32_t i = 0; i < set.level.cover.n_points; i++) {
-		const struct cover_point *point = &set.level.cover.point[i];
+	for (uint32_t i = 0; i < set.level.kept.n; i++) {
+		const struct kept_sample *sample = &set.level.kept.sample[i];
 
 		for (int k = 0; k < 3; k++) {
-			int f = 2 * k + (point->position[k] > 0);
+			int f = 2 * k + (sample->position[k] > 0);
 
-			if (fabs((double)point->position[k]) < half - 1e-6 || fabs((double)point->position[(k + 1) % 3]) > inside
-			    || fabs((double)point->position[(k + 2) % 3]) > inside)
+			if (fabs((double)sample->position[k]) < half - 1e-6 || fabs((double)sample->position[(k + 1) % 3]) > inside
+			    || fabs((double)sample->position[(k + 2) % 3]) > inside)
 				continue;
-			assert_int_equal(point->projection, owner[f]);
+			assert_int_equal(sample->projection, owner[f]);
 			n[f]++;
 		}
 	}
 	for (int f = 0; f < 6; f++) {
-		double spacing = (double)set.projection[owner[f]].spacing;
-		double cosine = fabs((double)set.projection[owner[f]].axis[2][f / 2]);
+		double spacing = (double)set.level.sampling.projection[owner[f]].spacing;
+		double cosine = fabs((double)set.level.sampling.projection[owner[f]].axis[2][f / 2]);
 		double cells = 4 * inside * inside * cosine / (spacing * spacing * 0.8660254);
 
 		assert_true(fabs(n[f] - cells) < 4 * sqrt(cells));
@@ -153,13 +157,13 @@ static void a_sheet_is_sampled_once(void **state)
 			v3d_scale(mesh->position[i], mesh->position[i], 0.7);
 		mesh->material->two_sided = two_sided;
 		level_set_make(&set, mesh, 96, 2);
-		for (uint32_t i = 0; i < set.level.cover.n_points; i++) {
-			const struct cover_point *point = &set.level.cover.point[i];
-			const struct sheets *sheets = &set.level.sheets[point->projection];
+		for (uint32_t i = 0; i < set.level.kept.n; i++) {
+			const struct kept_sample *sample = &set.level.kept.sample[i];
+			const struct sheets *sheets = &set.level.sheets[sample->projection];
 
-			assert_int_equal(sheets->sample[point->patch][point->sample].surface & SHEET_BACK, 0);
-			assert_true(psr_direction_table()[point->normal][2] > 0);
-			assert_int_equal(point->two_sided, two_sided);
+			assert_int_equal(sheets->sample[sample->patch][sample->sample].surface & SURFACE_BACK, 0);
+			assert_true(psr_direction_table()[sample->normal][2] > 0);
+			assert_int_equal(sample->two_sided, two_sided);
 		}
 		level_set_close(&set);
 	}

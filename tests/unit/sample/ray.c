@@ -131,8 +131,8 @@ static void far_coordinates_lose_nothing(void **state)
 	uint64_t seed = 11;
 
 	(void)state;
-	assert_int_equal(door_bound_mesh(mesh, center, &radius, NULL), PSR_OK);
-	assert_int_equal(door_bound_mesh(near_mesh, near_center, &near_radius, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(mesh, center, &radius, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(near_mesh, near_center, &near_radius, NULL), PSR_OK);
 	scene = open_scene(mesh, center, radius);
 	near_scene = open_scene(near_mesh, near_center, near_radius);
 	for (int i = 0; i < 500; i++) {
@@ -176,25 +176,25 @@ static void broken_meshes_stop_at_the_door(void **state)
 	struct psr_error err;
 
 	(void)state;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_OK);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_OK);
 	mesh->triangle[1][2] = mesh->n_vertices;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_ERR_ARG);
 	mesh->triangle[1][2] = 0;
 	mesh->triangle_material[0] = 1;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_ERR_ARG);
 	mesh->triangle_material[0] = 0;
 	mesh->material->base_texture.image = 0;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_ERR_ARG);
 	mesh->material->base_texture.image = -1;
 	mesh->position[2][1] = NAN;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_ERR_ARG);
 	for (uint32_t i = 0; i < mesh->n_vertices; i++)
 		for (int k = 0; k < 3; k++)
 			mesh->position[i][k] = 4;
-	assert_int_equal(door_check_mesh(mesh, &err), PSR_OK);
-	assert_int_equal(door_bound_mesh(mesh, center, &radius, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_mesh(mesh, &err), PSR_OK);
+	assert_int_equal(validate_bound_mesh(mesh, center, &radius, &err), PSR_ERR_ARG);
 	mesh->position[0][0] = 1e300;
-	assert_int_equal(door_bound_mesh(mesh, center, &radius, &err), PSR_ERR_ARG);
+	assert_int_equal(validate_bound_mesh(mesh, center, &radius, &err), PSR_ERR_ARG);
 	meshes_free(mesh);
 }
 

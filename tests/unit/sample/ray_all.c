@@ -4,7 +4,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/vec.h"
-#include "psr/pool.h"
+#include "base/pool.h"
 #include "ray/ray.h"
 #include "meshes.h"
 
@@ -431,7 +431,7 @@ static void threads_find_the_same_hits(void **state)
 	struct work *one = calloc(1, sizeof *one), *many = calloc(1, sizeof *many);
 
 	(void)state;
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	for (int i = 0; i < 64; i++)
 		for (int k = 0; k < 64; k++)
 			one->ray[i][k] = many->ray[i][k] = random_ray(&seed);

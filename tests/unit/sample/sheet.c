@@ -10,6 +10,7 @@ static const double zero[3];
 struct traced {
 	struct psr_mesh *mesh;
 	struct ray_scene *scene;
+	struct sampling sampling; /* without a pool */
 	struct sheets sheets;
 };
 
@@ -27,8 +28,10 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 		projection.axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 	traced->mesh = mesh;
 	assert_int_equal(ray_scene_create(&traced->scene, mesh, zero, 1, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&pool, n_threads, 0), PSR_OK);
-	assert_int_equal(sheets_trace(&traced->sheets, NULL, traced->scene, mesh, NULL, &projection, pool), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, n_threads, NULL), PSR_OK);
+	traced->sampling = (struct sampling){ .mesh = mesh, .scene = traced->scene, .pool = pool };
+	assert_int_equal(sheets_trace(&traced->sheets, NULL, &traced->sampling, &projection), PSR_OK);
+	traced->sampling.pool = NULL;
 	psr_pool_destroy(pool);
 }
 
@@ -201,9 +204,10 @@ static void both_sides_are_traced_at_once(void **state)
 		turned.axis[0][k] = -turned.axis[0][k];
 		turned.axis[2][k] = -turned.axis[2][k];
 	}
-	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
-	assert_int_equal(sheets_trace(&front, &behind, traced.scene, mesh, NULL, &traced.sheets.projection, pool), PSR_OK);
-	assert_int_equal(sheets_trace(&alone, NULL, traced.scene, mesh, NULL, &turned, pool), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
+	traced.sampling.pool = pool;
+	assert_int_equal(sheets_trace(&front, &behind, &traced.sampling, &traced.sheets.projection), PSR_OK);
+	assert_int_equal(sheets_trace(&alone, NULL, &traced.sampling, &turned), PSR_OK);
 	assert_memory_equal(behind.projection.axis, turned.axis, sizeof turned.axis);
 	assert_int_equal(front.n_hits, traced.sheets.n_hits);
 	assert_int_equal(count_hits(&behind), count_hits(&alone));
@@ -272,7 +276,7 @@ static void a_sample_is_found_where_it_is(void **state)
 			assert_int_equal(ref.sample, s);
 			assert_int_equal(sheets_find(sheets, at, z + 0.09f, 0.08f).patch, SHEET_NONE);
 			sheets_position(sheets, ref, position);
-			level_project(&sheets->projection, position, projected);
+			projection_project(&sheets->projection, position, projected);
 			sheets_point(sheets, at.row, at.col, &x, &y);
 			assert_true(fabs((double)projected[0] - x) < 1e-6 && fabs((double)projected[1] - y) < 1e-6);
 			assert_true(fabsf(projected[2] - z) < 1e-6f);
@@ -307,9 +311,8 @@ static void samples_are_added_where_there_is_room(void **state)
 	ref = sheets_find(sheets, (struct lattice_point){ 5, 5 }, 0, 0.01f);
 	assert_int_not_equal(ref.patch, SHEET_NONE);
 	assert_int_equal(sheets_find(sheets, at, 0, 0.01f).patch, SHEET_NONE);
-	assert_int_equal(sheets_room(sheets, at, 0, 0).patch, SHEET_NONE); /* none is alive */
-	sheets->patch[ref.patch].is_alive = 1;
-	sheets->patch[ref.patch].kept = UINT64_C(1) << ref.sample;
+	assert_int_equal(sheets_room(sheets, at, 0, 0).patch, SHEET_NONE); /* none has kept samples */
+	sheets_keep(sheets, ref);
 	assert_int_equal(sheets_room(sheets, at, 0.02f, 0).patch, ref.patch);
 	assert_int_equal(sheets_room(sheets, at, 0.02f, 1).patch, SHEET_NONE);
 	assert_int_equal(sheets_room(sheets, at, 0.13f, 0).patch, SHEET_NONE); /* over 12 steps away */

@@ -5,7 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "base/srgb.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "surface/stipple.h"
 #include "model.h"
 
@@ -97,18 +97,19 @@ static double opacity_of(const struct psr_model *model, unsigned pass)
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
 	struct psr_frame frame = { .width = SIDE, .height = SIDE, .rgb = rgb };
 	struct psr_renderer *renderer;
-	struct psr_refiner *refiner;
-	struct psr_settings settings;
+	struct refiner *refiner;
+	struct render_settings settings;
 	int half = (int)(0.7 / pixel), n = 0;
 	double sum = 0;
 
 	scene.camera = (struct psr_camera){ .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = SIDE * pixel,
 		                                .eye = { 0, 0, 4 }, .up = { 0, 1, 0 } };
-	psr_settings_default(&settings, SIDE, SIDE);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_refiner_create(&refiner, renderer), PSR_OK);
-	assert_int_equal(psr_refine(refiner, &scene, &settings, pass, NULL, NULL, NULL, &frame, NULL), PSR_OK);
-	psr_refiner_destroy(refiner);
+	render_settings_default(&settings, SIDE, SIDE);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(refiner_create(&refiner, renderer, NULL), PSR_OK);
+	settings.pass = pass;
+	assert_int_equal(refiner_draw(refiner, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	refiner_destroy(refiner);
 	psr_renderer_destroy(renderer);
 	for (int y = SIDE / 2 - half; y < SIDE / 2 + half; y++) {
 		for (int x = SIDE / 2 - half; x < SIDE / 2 + half; x++, n++) {

@@ -5,8 +5,8 @@
 #include <cmocka.h>
 #include "base/srgb.h"
 #include "base/vec.h"
-#include "psr/direction.h"
-#include "psr/model.h"
+#include "base/direction.h"
+#include "model/blocks.h"
 #include "surface/material.h"
 #include "surface/surface.h"
 #include "meshes.h"

@@ -4,7 +4,6 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <stdio.h>
-#include "sample/mend/adequacy.h"
 #include "level.h"
 
 #define RESOLUTION 96
@@ -17,7 +16,7 @@ static uint32_t count_thin(const struct level_set *set, uint32_t first, uint32_t
 	uint32_t n = 0;
 
 	for (uint32_t i = first; i < end; i++)
-		n += (uint32_t)level_is_thin(&set->level, i);
+		n += (uint32_t)sampling_is_thin(&set->level.sampling, i);
 	return n;
 }
 
@@ -41,7 +40,7 @@ static uint32_t thin_of_plate(double pixels, void (*look)(struct psr_mesh *mesh)
 	if (look != NULL)
 		look(mesh);
 	level_set_open(&set, mesh, RESOLUTION, 2);
-	assert_int_equal(level_own(&set.level, set.projection), PSR_OK);
+	assert_int_equal(level_own(&set.level, NULL), PSR_OK);
 	assert_int_equal(count_thin(&set, 0, 8), 0);
 	n = count_thin(&set, 8, 12);
 	level_set_close(&set);
@@ -95,7 +94,7 @@ static void bodies_and_sheets_are_not_thin(void **state)
 		for (uint32_t k = 0; k < mesh[i]->n_vertices; k++)
 			v3d_scale(mesh[i]->position[k], mesh[i]->position[k], 0.7);
 		level_set_open(&set, mesh[i], RESOLUTION, 2);
-		assert_int_equal(level_own(&set.level, set.projection), PSR_OK);
+		assert_int_equal(level_own(&set.level, NULL), PSR_OK);
 		assert_int_equal(count_thin(&set, 0, mesh[i]->n_triangles), 0);
 		level_set_close(&set);
 	}
@@ -118,16 +117,16 @@ static void needles_are_seen_from_all_around_with_fewer_samples(void **state)
 			give_colors(mesh);
 		level_set_make(&set, mesh, RESOLUTION, 2);
 		assert_int_equal(count_thin(&set, 0, mesh->n_triangles), colored ? 0 : mesh->n_triangles);
-		assert_int_equal(adequacy_reach(&adequacy, &set.level), PSR_OK);
-		n_points[colored] = set.level.cover.n_points;
-		assert_int_equal(adequacy_measure(&adequacy, &set.level, 99, 100000), PSR_OK);
+		assert_int_equal(level_reach(&adequacy, &set.level), PSR_OK);
+		n_points[colored] = set.level.kept.n;
+		assert_int_equal(adequacy_measure(&adequacy, &set.level.sampling, &set.level.kept, 99, 100000, 0), PSR_OK);
 		printf("# %u samples, missing %llu of %llu\n", n_points[colored], (unsigned long long)adequacy.n_missing,
 		       (unsigned long long)adequacy.n_trials);
 		if (!colored)
 			assert_in_range(adequacy.n_missing, 0, 19);
-		free(adequacy.spot);
-		for (uint32_t i = 0; i < set.level.cover.n_points; i++)
-			assert_int_equal(set.level.cover.point[i].two_sided, !colored);
+		free(adequacy.place);
+		for (uint32_t i = 0; i < set.level.kept.n; i++)
+			assert_int_equal(set.level.kept.sample[i].two_sided, !colored);
 		level_set_close(&set);
 	}
 	assert_true(3 * n_points[0] < 2 * n_points[1]);
@@ -141,9 +140,9 @@ static void threads_do_not_change_a_sample_of_needles(void **state)
 	(void)state;
 	for (int i = 0; i < 3; i++) {
 		level_set_make(&set[i], meshes_needles(400, 0.4 * PIXEL), RESOLUTION, i + 1);
-		assert_int_equal(set[i].level.cover.n_points, set[0].level.cover.n_points);
-		for (uint32_t k = 0; k < set[0].level.cover.n_points; k++) {
-			const struct cover_point *a = &set[0].level.cover.point[k], *b = &set[i].level.cover.point[k];
+		assert_int_equal(set[i].level.kept.n, set[0].level.kept.n);
+		for (uint32_t k = 0; k < set[0].level.kept.n; k++) {
+			const struct kept_sample *a = &set[0].level.kept.sample[k], *b = &set[i].level.kept.sample[k];
 
 			assert_memory_equal(a->position, b->position, sizeof a->position);
 			assert_true(a->attr == b->attr && a->projection == b->projection && a->patch == b->patch && a->sample == b->sample);

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
-#include "sample/mend/places.h"
+#include "sample/own/kept.h"
 #include "sample/thin/choose.h"
 
 #define RADIUS 0.01
@@ -36,10 +36,10 @@ static void add_at(struct thin_candidates *list, const float p[3], uint32_t name
 	assert_int_equal(thin_candidates_add(list, &candidate), PSR_OK);
 }
 
-static int is_near_any(const struct thin_candidates *list, const struct surface_spot *spot)
+static int is_near_any(const struct thin_candidates *list, const struct place *place)
 {
 	for (uint32_t i = 0; i < list->n; i++)
-		if (cover_is_sheet_near(list->candidate[i].position, spot->p, spot->n, (float)RADIUS))
+		if (kept_covers_sheet(list->candidate[i].position, place->p, place->n, (float)RADIUS))
 			return 1;
 	return 0;
 }
@@ -47,7 +47,7 @@ static int is_near_any(const struct thin_candidates *list, const struct surface_
 /* In a cube so small that candidates cover several places each, and some places have none. */
 static void what_is_left_is_what_no_candidate_covers_and_the_rest_is_covered(void **state)
 {
-	static struct surface_spot spot[N_SPOTS], all[N_SPOTS];
+	static struct place place[N_SPOTS], all[N_SPOTS];
 	static const float middle[3] = { 0.3f, -0.2f, 0.1f };
 	struct thin_candidates list = { NULL, 0, 0 }, every = { NULL, 0, 0 };
 	uint64_t random = 7;
@@ -55,12 +55,12 @@ static void what_is_left_is_what_no_candidate_covers_and_the_rest_is_covered(voi
 
 	(void)state;
 	for (int i = 0; i < N_SPOTS; i++) {
-		scatter(&random, middle, 0.1, spot[i].p);
-		v3f_set(spot[i].n, 0, 0, 0);
-		spot[i].n[i % 3] = 1;
-		spot[i].surface = (uint32_t)i;
+		scatter(&random, middle, 0.1, place[i].p);
+		v3f_set(place[i].n, 0, 0, 0);
+		place[i].n[i % 3] = 1;
+		place[i].surface = (uint32_t)i;
 	}
-	memcpy(all, spot, sizeof all);
+	memcpy(all, place, sizeof all);
 	for (uint32_t i = 0; i < N_CANDIDATES; i++) {
 		float p[3];
 
@@ -68,9 +68,9 @@ static void what_is_left_is_what_no_candidate_covers_and_the_rest_is_covered(voi
 		add_at(&list, p, i);
 		add_at(&every, p, i);
 	}
-	assert_int_equal(thin_choose(&list, spot, &n, RADIUS), PSR_OK);
+	assert_int_equal(thin_choose(&list, place, &n, RADIUS), PSR_OK);
 	for (int i = 0; i < N_SPOTS; i++) {
-		int is_left = n_left < n && spot[n_left].surface == (uint32_t)i;
+		int is_left = n_left < n && place[n_left].surface == (uint32_t)i;
 
 		assert_int_equal(is_left, !is_near_any(&every, &all[i]));
 		assert_int_equal(is_left, !is_near_any(&list, &all[i]));
@@ -89,7 +89,7 @@ static void what_is_left_is_what_no_candidate_covers_and_the_rest_is_covered(voi
 static void one_candidate_is_chosen_where_one_covers_all(void **state)
 {
 	enum { CROWDS = 50, OTHERS = 20, SPOTS = 30 };
-	static struct surface_spot spot[CROWDS * SPOTS];
+	static struct place place[CROWDS * SPOTS];
 	struct thin_candidates list = { NULL, 0, 0 };
 	uint64_t random = 11;
 	size_t n = 0;
@@ -100,8 +100,8 @@ static void one_candidate_is_chosen_where_one_covers_all(void **state)
 		float p[3];
 
 		for (int i = 0; i < SPOTS; i++, n++) {
-			scatter(&random, middle, 0.55 * RADIUS, spot[n].p); /* 0.55 sqrt(3) < 1 */
-			v3f_set(spot[n].n, 0, 1, 0);
+			scatter(&random, middle, 0.55 * RADIUS, place[n].p); /* 0.55 sqrt(3) < 1 */
+			v3f_set(place[n].n, 0, 1, 0);
 		}
 		/* These are further from the nearer corners than the middle is, and reach no place on the other side. */
 		for (int i = 0; i < OTHERS; i++) {
@@ -111,7 +111,7 @@ static void one_candidate_is_chosen_where_one_covers_all(void **state)
 		}
 		add_at(&list, middle, 1);
 	}
-	assert_int_equal(thin_choose(&list, spot, &n, RADIUS), PSR_OK);
+	assert_int_equal(thin_choose(&list, place, &n, RADIUS), PSR_OK);
 	assert_int_equal(n, 0);
 	assert_int_equal(list.n, CROWDS);
 	for (uint32_t i = 0; i < list.n; i++)
@@ -122,16 +122,16 @@ static void one_candidate_is_chosen_where_one_covers_all(void **state)
 static void nothing_is_chosen_of_nothing(void **state)
 {
 	struct thin_candidates list = { NULL, 0, 0 };
-	struct surface_spot spot = { { 0, 0, 0 }, { 0, 0, 1 }, 0 };
+	struct place place = { { 0, 0, 0 }, { 0, 0, 1 }, 0 };
 	static const float far_away[3] = { 0.5f, 0, 0 };
 	size_t n = 1;
 
 	(void)state;
-	assert_int_equal(thin_choose(&list, &spot, &n, RADIUS), PSR_OK);
+	assert_int_equal(thin_choose(&list, &place, &n, RADIUS), PSR_OK);
 	assert_int_equal(n, 1);
 	n = 0;
 	add_at(&list, far_away, 0);
-	assert_int_equal(thin_choose(&list, &spot, &n, RADIUS), PSR_OK);
+	assert_int_equal(thin_choose(&list, &place, &n, RADIUS), PSR_OK);
 	assert_int_equal(list.n, 0);
 	free(list.candidate);
 }
@@ -149,9 +149,9 @@ static void across_a_sheet_a_sample_reaches_further_than_a_ball(void **state)
 		const float oblique[2][3] = { { 0.79f, 0, 0.79f * (float)sign }, { 0.80f, 0, 0.80f * (float)sign } };
 
 		for (int i = 0; i < 2; i++) {
-			assert_int_equal(cover_is_sheet_near(along[i], origin, n, 1), i == 0);
-			assert_int_equal(cover_is_sheet_near(across[i], origin, n, 1), i == 0);
-			assert_int_equal(cover_is_sheet_near(oblique[i], origin, n, 1), i == 0);
+			assert_int_equal(kept_covers_sheet(along[i], origin, n, 1), i == 0);
+			assert_int_equal(kept_covers_sheet(across[i], origin, n, 1), i == 0);
+			assert_int_equal(kept_covers_sheet(oblique[i], origin, n, 1), i == 0);
 		}
 	}
 }
@@ -159,23 +159,23 @@ static void across_a_sheet_a_sample_reaches_further_than_a_ball(void **state)
 static void cells_remember_places_on_both_sides_of_0_by_the_way_that_they_face(void **state)
 {
 	static const float WAY[3][3] = { { 0, 0, 0 }, { 0.1f, -0.9f, 0.2f }, { 0.1f, 0.9f, 0.2f } };
-	struct spot_cells cells;
+	struct place_cells cells;
 
 	(void)state;
-	assert_int_equal(spot_cells_init(&cells, 0.25), PSR_OK);
+	assert_int_equal(place_cells_init(&cells, 0.25), PSR_OK);
 	for (int i = -2000; i < 2000; i++) {
 		const float p[3] = { (float)i * 0.5f + 0.1f, -0.1f, 0.1f }, beside[3] = { (float)i * 0.5f + 0.3f, -0.1f, 0.1f };
 		const float here[3] = { (float)i * 0.5f + 0.2f, -0.2f, 0.2f };
 
 		for (int way = 0; way < 3; way++) {
-			assert_int_equal(spot_cells_has(&cells, p, WAY[way]), 0);
-			assert_int_equal(spot_cells_add(&cells, p, WAY[way]), PSR_OK);
-			assert_int_equal(spot_cells_has(&cells, p, WAY[way]), 1);
-			assert_int_equal(spot_cells_has(&cells, here, WAY[way]), 1);
-			assert_int_equal(spot_cells_has(&cells, beside, WAY[way]), 0);
+			assert_int_equal(place_cells_has(&cells, p, WAY[way]), 0);
+			assert_int_equal(place_cells_add(&cells, p, WAY[way]), PSR_OK);
+			assert_int_equal(place_cells_has(&cells, p, WAY[way]), 1);
+			assert_int_equal(place_cells_has(&cells, here, WAY[way]), 1);
+			assert_int_equal(place_cells_has(&cells, beside, WAY[way]), 0);
 		}
 	}
-	spot_cells_fini(&cells);
+	place_cells_fini(&cells);
 }
 
 int main(void)

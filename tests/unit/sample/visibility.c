@@ -35,7 +35,7 @@ static struct object make_object(struct psr_mesh *mesh)
 	assert_int_equal(psr_model_build(&o.model, mesh, &options, NULL, NULL), PSR_OK);
 	info = psr_model_info(o.model);
 	assert_int_equal(ray_scene_create(&o.scene, mesh, info->origin, info->scale, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&o.pool, 2, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&o.pool, 2, NULL), PSR_OK);
 	o.blocks = *psr_model_blocks(o.model);
 	o.mask = calloc(o.blocks.n_blocks, sizeof *o.mask);
 	o.blocks.visibility_mask = NULL;

@@ -125,7 +125,7 @@ static void the_table_does_not_depend_on_threads(void **state)
 
 	(void)state;
 	make_object(&o);
-	assert_int_equal(psr_pool_create(&pool, 2, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
 	assert_int_equal(visibility_masks(&o.blocks, pool, o.mask), PSR_OK);
 	assert_int_equal(visibility_table_make(&first, &o.blocks, (const uint64_t(*)[2])o.mask, o.run, NULL), PSR_OK);
 	share(&o, pool);

@@ -77,7 +77,9 @@ static struct catalogue_model *load_at(const char *name, uint32_t resolution)
 	uint64_t bytes = psr_model_bytes(plate);
 
 	assert_int_equal(catalogue_reserve(&catalogue, bytes, name, NULL), PSR_OK);
-	assert_int_equal(catalogue_add(&model, &catalogue, catalogue_find(&catalogue, name), plate, "", resolution, bytes),
+	assert_int_equal(catalogue_add(&model, &catalogue,
+	                               &(struct catalogue_loaded){ .entry = catalogue_find(&catalogue, name), .model = plate,
+	                                                           .key = "", .resolution = resolution, .reserved = bytes }),
 	                 PSR_OK);
 	return model;
 }

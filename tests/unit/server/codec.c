@@ -16,11 +16,11 @@
 #define WIDTH 333
 #define HEIGHT 300 /* strips of 128, 128, 44 rows */
 #define PIXELS (WIDTH * HEIGHT)
-#define ALL ((1u << PSR_WIRE_PLANES) - 1)
+#define ALL ((1u << PSR_N_PLANES) - 1)
 
 /* By plane, as bytes. */
-static uint8_t in[PSR_WIRE_PLANES][8 * PIXELS], out[PSR_WIRE_PLANES][8 * PIXELS];
-static uint8_t *const rgb = in[PSR_WIRE_PLANE_COLOR];
+static uint8_t in[PSR_N_PLANES][8 * PIXELS], out[PSR_N_PLANES][8 * PIXELS];
+static uint8_t *const rgb = in[PSR_PLANE_COLOR];
 static const uint8_t background[3] = { 10, 20, 30 };
 
 static size_t plane_bytes(unsigned plane)
@@ -30,12 +30,12 @@ static size_t plane_bytes(unsigned plane)
 
 static const uint8_t *empty_pixel(unsigned plane)
 {
-	return plane == PSR_WIRE_PLANE_COLOR ? background : psr_plane_background(plane);
+	return plane == PSR_PLANE_COLOR ? background : psr_plane_background(plane);
 }
 
 static void set_depth(int i, float z)
 {
-	memcpy(in[PSR_WIRE_PLANE_DEPTH] + 4 * i, &z, 4);
+	memcpy(in[PSR_PLANE_DEPTH] + 4 * i, &z, 4);
 }
 
 enum picture { NOISE, SMOOTH, EMPTY, TOP_EMPTY };
@@ -56,7 +56,7 @@ static void paint(enum picture kind)
 			rgb[3 * i + c] = is_empty ? background[c] : kind == NOISE ? (uint8_t)(random >> (8 * c)) : smooth;
 		}
 		set_depth(i, is_empty ? INFINITY : 2 + (float)x / 64 + (float)(kind == NOISE ? random >> 48 : 0));
-		for (unsigned plane = PSR_WIRE_PLANE_NORMAL; plane < PSR_WIRE_PLANES; plane++) {
+		for (unsigned plane = PSR_PLANE_NORMAL; plane < PSR_N_PLANES; plane++) {
 			unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 			uint64_t smooth = (uint64_t)(x / 7 * 3 + y) * 0x0001000100010001, value = kind == NOISE ? random : smooth;
 
@@ -75,17 +75,18 @@ static struct codec_result encode(unsigned color_codec, unsigned quality, unsign
 		.data_codec = (uint8_t)depth_codec,
 	};
 	struct psr_frame frame = {
-		.width = WIDTH, .height = HEIGHT, .rgb = rgb, .depth = (float *)in[PSR_WIRE_PLANE_DEPTH],
-		.normal = (int16_t *)in[PSR_WIRE_PLANE_NORMAL], .id = (uint32_t *)in[PSR_WIRE_PLANE_ID],
-		.weight = in[PSR_WIRE_PLANE_WEIGHT], .words = (uint64_t *)in[PSR_WIRE_PLANE_WORDS],
-		.block = in[PSR_WIRE_PLANE_BLOCK],
+		.width = WIDTH, .height = HEIGHT, .rgb = rgb, .depth = (float *)in[PSR_PLANE_DEPTH],
+		.normal = (int16_t *)in[PSR_PLANE_NORMAL], .id = (uint32_t *)in[PSR_PLANE_ID],
+		.weight = in[PSR_PLANE_WEIGHT], .words = (uint64_t *)in[PSR_PLANE_WORDS],
+		.block = in[PSR_PLANE_BLOCK],
 	};
+	const struct codec_answer answer = { .id = 9, .request = &request, .background = background };
 	struct codec_result result;
 	struct psr_error error = { 0 };
 	struct codec *codec;
 
 	assert_int_equal(codec_create(&codec), PSR_OK);
-	assert_int_equal(codec_encode(&result, codec, pool, 9, 0, &request, &frame, background, &error), PSR_OK);
+	assert_int_equal(codec_encode(&result, codec, pool, &answer, &frame, &error), PSR_OK);
 	codec_destroy(codec);
 	return result;
 }
@@ -127,7 +128,7 @@ static int decode(struct codec_result *result, unsigned *codecs)
 	uint64_t bytes = 0;
 
 	*codecs = 0;
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 
 		for (unsigned i = 0; i < PIXELS; i++)
@@ -172,7 +173,7 @@ static void lossless_planes_come_back_bit_for_bit(void **state)
 			paint(kinds[k]);
 			result = encode(codecs[c], 0, codecs[c], ALL, NULL);
 			decode(&result, &used);
-			for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+			for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 				assert_memory_equal(out[plane], in[plane], plane_bytes(plane));
 		}
 	}
@@ -186,7 +187,7 @@ static void hashes_are_of_the_whole_planes(void **state)
 	(void)state;
 	paint(TOP_EMPTY);
 	result = encode(PSR_CODEC_JPEG, 50, PSR_CODEC_ZSTD, ALL, NULL);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		assert_true(result.hash[plane] == XXH64(in[plane], plane_bytes(plane), 0));
 	decode(&result, &used);
 }
@@ -203,12 +204,12 @@ static void background_strips_are_left_out(void **state)
 	assert_int_equal(decode(&result, &used), 0);
 	paint(TOP_EMPTY); /* 200 of 300 rows: one strip of three, of each plane */
 	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
-	assert_int_equal(decode(&result, &used), 2 * PSR_WIRE_PLANES);
+	assert_int_equal(decode(&result, &used), 2 * PSR_N_PLANES);
 	paint(EMPTY);
 	rgb[3 * (128 * WIDTH - 1) + 2] ^= 1; /* the last byte of the first strip */
 	result = encode(PSR_CODEC_RAW, 0, 0, 1, NULL);
 	assert_int_equal(decode(&result, &used), 1);
-	assert_memory_equal(out[PSR_WIRE_PLANE_COLOR], rgb, 3 * PIXELS);
+	assert_memory_equal(out[PSR_PLANE_COLOR], rgb, 3 * PIXELS);
 }
 
 static void what_does_not_shrink_travels_raw(void **state)
@@ -255,7 +256,7 @@ static void threads_do_not_change_a_byte(void **state)
 
 	(void)state;
 	paint(SMOOTH);
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	one = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, ALL, NULL);
 	many = encode(PSR_CODEC_JPEG, 80, PSR_CODEC_ZSTD, ALL, pool);
 	for (a = one.first, b = many.first; a != NULL && b != NULL; a = a->next, b = b->next) {
@@ -280,7 +281,7 @@ static void the_depth_range_is_of_finite_depths(void **state)
 	result = encode(0, 0, PSR_CODEC_RAW, 2, NULL);
 	assert_true(result.depth_min == 0.25 && result.depth_max == 7.5);
 	decode(&result, &used);
-	assert_memory_equal(out[PSR_WIRE_PLANE_DEPTH], in[PSR_WIRE_PLANE_DEPTH], 4 * PIXELS);
+	assert_memory_equal(out[PSR_PLANE_DEPTH], in[PSR_PLANE_DEPTH], 4 * PIXELS);
 }
 
 int main(void)

@@ -17,9 +17,9 @@
 #include <sys/stat.h>
 #include <sys/un.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
-#include "psr/model.h"
+#include "base/clock.h"
+#include "model/blocks.h"
 #include "psr/proto.h"
 
 #define PATIENCE_MS 20000 /* for what must happen; nothing that passes waits so long */
@@ -144,10 +144,7 @@ static inline void daemon_path(char path[PATH_MAX], const char *program)
 
 static inline int64_t clock_ms(void)
 {
-	struct timespec now;
-
-	clock_gettime(CLOCK_MONOTONIC, &now);
-	return now.tv_sec * 1000 + now.tv_nsec / 1000000;
+	return (int64_t)(clock_ns() / 1000000);
 }
 
 /* argv[0] is the program's path; the list ends with NULL. */

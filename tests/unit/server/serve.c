@@ -73,8 +73,8 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 {
 	enum { WIDTH = 150, HEIGHT = 300 };
 	struct psr_msg_frame frame = frame_default(WIDTH, HEIGHT);
-	static uint8_t planes[PSR_WIRE_PLANES][8 * WIDTH * HEIGHT], coded[8 * WIDTH * 128];
-	const uint8_t *rgb = planes[PSR_WIRE_PLANE_COLOR];
+	static uint8_t planes[PSR_N_PLANES][8 * WIDTH * HEIGHT], coded[8 * WIDTH * 128];
+	const uint8_t *rgb = planes[PSR_PLANE_COLOR];
 	const unsigned n_pixels = WIDTH * HEIGHT;
 	struct psr_message message;
 	struct psr_msg_frame_begin begin;
@@ -84,7 +84,7 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
-	frame.planes = (1 << PSR_WIRE_PLANES) - 1;
+	frame.planes = (1 << PSR_N_PLANES) - 1;
 	frame.color_codec = frame.depth_codec = frame.data_codec = PSR_CODEC_RAW;
 	frame.depth_format = PSR_WIRE_DEPTH_F32;
 	peer_ask_frame(&p, &frame);
@@ -93,9 +93,9 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	assert_true(fabs(begin.depth_min - 2) < 1e-3 && fabs(begin.depth_max - 2) < 1e-3);
 	assert_memory_equal(begin.camera.eye, frame.camera.eye, sizeof begin.camera.eye);
 	assert_true(begin.camera.extent == frame.camera.extent && begin.camera.near_z == frame.camera.near_z);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++) {
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		const unsigned pixel = psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
-		const uint8_t *empty = plane == PSR_WIRE_PLANE_COLOR ? begin.background : psr_plane_background(plane);
+		const uint8_t *empty = plane == PSR_PLANE_COLOR ? begin.background : psr_plane_background(plane);
 
 		for (unsigned i = 0; i < n_pixels; i++)
 			memcpy(planes[plane] + pixel * i, empty, pixel);
@@ -113,7 +113,7 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 			       rect.total);
 	}
 	assert_int_equal(psr_msg_frame_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
-	for (unsigned plane = 0; plane < PSR_WIRE_PLANES; plane++)
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		assert_true(XXH64(planes[plane], n_pixels * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0) ==
 		            end.hash[plane]);
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
@@ -166,7 +166,7 @@ static void a_frame_without_color_is_not_lit(void **state)
 		                                      .color = { 255, 255, 255 } };
 	peer_send_scene(&p, scene);
 	for (unsigned with_color = 0; with_color < 2; with_color++) {
-		frame.planes = 1u << PSR_WIRE_PLANE_DEPTH | (with_color ? 1u << PSR_WIRE_PLANE_COLOR : 0);
+		frame.planes = 1u << PSR_PLANE_DEPTH | (with_color ? 1u << PSR_PLANE_COLOR : 0);
 		frame.color_codec = with_color ? PSR_CODEC_ZSTD : 0;
 		frame.depth_format = PSR_WIRE_DEPTH_F32;
 		frame.depth_codec = PSR_CODEC_ZSTD;
@@ -290,7 +290,7 @@ static void passes_rise_to_the_final_one(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	hash[0] = end.hash[PSR_WIRE_PLANE_COLOR];
+	hash[0] = end.hash[PSR_PLANE_COLOR];
 	frame.pass_limit = 2;
 	id = peer_ask_frame(&p, &frame);
 	for (unsigned pass = 0; pass <= 2; pass++) {
@@ -298,10 +298,10 @@ static void passes_rise_to_the_final_one(void **state)
 		assert_int_equal(end.pass, pass);
 		assert_int_equal(end.is_final, pass == 2);
 		if (pass == 0)
-			assert_true(end.hash[PSR_WIRE_PLANE_COLOR] == hash[0]);
+			assert_true(end.hash[PSR_PLANE_COLOR] == hash[0]);
 		else
-			assert_true(end.hash[PSR_WIRE_PLANE_COLOR] != hash[pass - 1]);
-		hash[pass] = end.hash[PSR_WIRE_PLANE_COLOR];
+			assert_true(end.hash[PSR_PLANE_COLOR] != hash[pass - 1]);
+		hash[pass] = end.hash[PSR_PLANE_COLOR];
 	}
 	frame = frame_default(32, 32); /* the id has ended: nothing else of it comes */
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);

@@ -7,7 +7,7 @@
 #include "models/studies/cull.h"
 #include "models/studies/cull_part.h"
 #include "psr/build.h"
-#include "psr/render.h"
+#include "render/stages.h"
 #include "sample/pack/visibility_mask.h"
 #include "tests/unit/sample/meshes.h"
 
@@ -41,7 +41,7 @@ static struct object make_object(struct psr_mesh *mesh, int finest)
 	assert_int_equal(psr_model_build(&o.model, mesh, &options, NULL, NULL), PSR_OK);
 	info = psr_model_info(o.model);
 	assert_int_equal(ray_scene_create(&o.scene, mesh, info->origin, info->scale, NULL), PSR_OK);
-	assert_int_equal(psr_pool_create(&o.pool, N_THREADS, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&o.pool, N_THREADS, NULL), PSR_OK);
 	assert_int_equal(cull_set_create(&o.set, o.model, finest, o.pool, NULL), PSR_OK);
 	o.blocks = psr_model_blocks(cull_set_base(o.set));
 	assert_int_equal(o.blocks->n_blocks, cull_set_n_blocks(o.set));
@@ -359,15 +359,15 @@ static void draw(const struct psr_model *model, const struct cull_eye *eye, uint
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
 	struct psr_frame frame = { .width = RESOLUTION, .height = RESOLUTION, .rgb = rgb, .depth = depth };
 	struct psr_renderer *renderer;
-	struct psr_settings settings;
+	struct render_settings settings;
 
 	scene.camera = (struct psr_camera){ .fov_y = 2 * atan(eye->tangent) };
 	memcpy(scene.camera.eye, eye->place, sizeof eye->place);
 	v3d_add(scene.camera.target, eye->place, eye->frame[2]);
 	v3d_scale(scene.camera.up, eye->frame[1], -1);
-	psr_settings_default(&settings, RESOLUTION, RESOLUTION);
-	assert_int_equal(psr_renderer_create(&renderer), PSR_OK);
-	assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	render_settings_default(&settings, RESOLUTION, RESOLUTION);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
 	psr_renderer_destroy(renderer);
 }
 

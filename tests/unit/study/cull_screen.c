@@ -5,7 +5,7 @@
 #include <cmocka.h>
 #include "base/vec.h"
 #include "models/studies/cull.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "tests/unit/sample/meshes.h"
 
 static uint64_t (*masks)[SCREEN_WORDS];

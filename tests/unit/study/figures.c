@@ -41,7 +41,7 @@ static int set_up(void **state)
 
 	assert_non_null(f);
 	f->figures = (struct figures){ .err = &f->err, .study = { .err = &f->err, .n_threads = 1 } };
-	assert_int_equal(psr_renderer_create(&f->figures.renderer), PSR_OK);
+	assert_int_equal(psr_renderer_create(&f->figures.renderer, NULL), PSR_OK);
 	assert_int_equal(figure_model_load(&f->model, &f->figures, "plates", make_plates, 64), PSR_OK);
 	figure_shot_init(&f->shot, &f->model, toward, 1, SIDE, SIDE);
 	*state = f;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/vec.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "surface/validate.h"
 #include "models/studies/greedy/parts.h"
 #include "models/studies/greedy/warp.h"
@@ -41,7 +41,7 @@ static struct object two_spheres(void)
 			                       + (i < first->n_triangles ? 0 : first->n_vertices);
 	meshes_free(first);
 	meshes_free(second);
-	assert_int_equal(door_bound_mesh(mesh, object.origin, &object.scale, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(mesh, object.origin, &object.scale, NULL), PSR_OK);
 	assert_int_equal(ray_scene_create(&object.scene, mesh, object.origin, object.scale, NULL), PSR_OK);
 	return object;
 }
@@ -355,7 +355,7 @@ static void a_sheet_seen_from_one_side_does_not_cover_its_other_side(void **stat
 	}
 	meshes_free(object.mesh);
 	object.mesh = sheet;
-	assert_int_equal(door_bound_mesh(sheet, object.origin, &object.scale, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(sheet, object.origin, &object.scale, NULL), PSR_OK);
 	assert_int_equal(ray_scene_create(&object.scene, sheet, object.origin, object.scale, NULL), PSR_OK);
 	greedy = scan(&object, 32, GREEDY_EQUILATERAL, GREEDY_ICOSAHEDRAL, NULL);
 	greedy_select_default(&options);
@@ -381,7 +381,7 @@ static void threads_and_what_came_before_change_nothing(void **state)
 	size_t n, m;
 
 	(void)state;
-	assert_int_equal(psr_pool_create(&pool, 4, 0), PSR_OK);
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
 	one = scan(&object, 48, GREEDY_EQUILATERAL, GREEDY_CORNERS, NULL);
 	four = scan(&object, 48, GREEDY_EQUILATERAL, GREEDY_CORNERS, pool);
 	assert_int_equal(one->n_views, 290);
@@ -440,7 +440,7 @@ static void cones_cull_less_than_the_far_side(void **state)
 	struct greedy_warp_time time;
 
 	(void)state;
-	assert_int_equal(door_bound_mesh(object.mesh, object.origin, &object.scale, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(object.mesh, object.origin, &object.scale, NULL), PSR_OK);
 	assert_int_equal(ray_scene_create(&object.scene, object.mesh, object.origin, object.scale, NULL), PSR_OK);
 	greedy_select_default(&options);
 	for (int side = 4; side <= 32; side *= 2) {

@@ -10,7 +10,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "models/studies/study.h"
-#include "psr/direction.h"
+#include "base/direction.h"
 #include "tests/unit/sample/meshes.h"
 
 static const struct study_column two[] = { { "size", "size", 1 }, { "ratio", "ratio", 3 } };

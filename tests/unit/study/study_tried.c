@@ -23,7 +23,7 @@ static int set_up(void **state)
 
 	tried.study = (struct study){ .resolution = 64, .n_threads = 1, .n_models = 1, .model = model };
 	model->mesh = meshes_sphere(24, center, 1);
-	assert_int_equal(door_bound_mesh(model->mesh, model->origin, &model->scale, NULL), PSR_OK);
+	assert_int_equal(validate_bound_mesh(model->mesh, model->origin, &model->scale, NULL), PSR_OK);
 	assert_int_equal(ray_scene_create(&model->scene, model->mesh, model->origin, model->scale, NULL), PSR_OK);
 	assert_int_equal(study_trials_create(&model->trials, model->mesh, model->scene, 50, 200, NULL), PSR_OK);
 	assert_int_equal(study_run_selection(&tried.study), PSR_OK);

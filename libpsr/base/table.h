@@ -1,0 +1,55 @@
+/* A hash table by open addressing: entries of one size, each a struct that begins with its 63-bit key. Any number of
+ * threads may look while none puts. */
+#ifndef PSR_BASE_TABLE_H
+#define PSR_BASE_TABLE_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#define TABLE_FREE UINT64_MAX             /* in the place of a key */
+#define TABLE_MARK (UINT64_C(1) << 63)    /* the caller may set it in an entry, which table_find() then passes over */
+
+struct table {
+	size_t n, size; /* entries; places for them, a power of two */
+	size_t bytes;   /* of an entry, a multiple of 8 */
+	unsigned char *entry;
+};
+
+/* size: places to begin with, a power of two. MEMORY; table_fini() either way. */
+int table_init(struct table *table, size_t bytes, size_t size);
+void table_fini(struct table *table);
+
+/* Doubles the places. MEMORY, and then nothing is changed. */
+int table_grow(struct table *table);
+
+/* The entry of a key, a new one zeroed but for its key; entries move when another is put. NULL: no memory. */
+void *table_put(struct table *table, uint64_t key);
+
+/* Where the search for a key begins: the last step of MurmurHash3 (Appleby 2011), so that cells in a row spread. */
+static inline size_t table_place(uint64_t key, size_t size)
+{
+	key &= ~TABLE_MARK;
+	key ^= key >> 33;
+	key *= UINT64_C(0xff51afd7ed558ccd);
+	key ^= key >> 33;
+	key *= UINT64_C(0xc4ceb9fe1a85ec53);
+	key ^= key >> 33;
+	return (size_t)key & (size - 1);
+}
+
+static inline uint64_t *table_at(const struct table *table, size_t place)
+{
+	return (uint64_t *)(void *)(table->entry + place * table->bytes);
+}
+
+/* The entry of a key; NULL. */
+static inline void *table_find(const struct table *table, uint64_t key)
+{
+	size_t i = table_place(key, table->size);
+
+	while (*table_at(table, i) != key && *table_at(table, i) != TABLE_FREE)
+		i = (i + 1) & (table->size - 1);
+	return *table_at(table, i) == key ? table_at(table, i) : NULL;
+}
+
+#endif

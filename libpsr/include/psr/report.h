@@ -1,0 +1,74 @@
+/* What psr_render() did, and how long it took. */
+#ifndef PSR_REPORT_H
+#define PSR_REPORT_H
+
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum psr_stage {
+	PSR_STAGE_PLAN,    /* count: instances */
+	PSR_STAGE_SHADOW,  /* count: samples drawn into the shadow maps that were made for this frame */
+	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
+	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
+	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
+	PSR_STAGE_RESOLVE, /* count: pixels that have a sample and weight above 0; 0 without colour */
+	PSR_STAGE_SHADE,   /* count: pixels shaded; 0 without colour */
+	PSR_STAGE_FILL,    /* count: pixels whose colour the fill changed */
+	PSR_STAGE_SMOOTH,  /* count: pixels at edges */
+	PSR_N_STAGES
+};
+const char *psr_stage_name(enum psr_stage stage); /* "warp" */
+
+/* An effect runs only where it can change a pixel, or saves more than it costs. PROTOCOL.md has these numbers, too. */
+enum psr_effect {
+	PSR_EFFECT_CONES,     /* count: blocks tested */
+	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
+	PSR_EFFECT_OCCLUSION, /* count: blocks left out, once in each tile that they touch */
+	PSR_EFFECT_FACING,    /* count: blocks whose samples are asked one by one whether they face away */
+	PSR_EFFECT_LEVELS,    /* count: depth buffers beside the picture's own */
+	PSR_EFFECT_FILL,      /* count: pixels whose colour changed */
+	PSR_EFFECT_TWO_SIDED, /* count: pixels whose normals may be turned to the eye */
+	PSR_EFFECT_SPECULAR,  /* count: pixels looked at for highlights */
+	PSR_EFFECT_POSITIONS, /* count: pixels whose samples' positions are computed */
+	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
+	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
+	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with the surface behind */
+	PSR_N_EFFECTS
+};
+enum psr_why {
+	PSR_WHY_RAN,
+	PSR_WHY_OFF,     /* the settings turn it off */
+	PSR_WHY_NOTHING, /* nothing in view calls for it */
+	PSR_WHY_VOID,    /* its conditions do not hold here */
+	PSR_WHY_COST,    /* it would cost more than it saves, and changes no pixel */
+};
+const char *psr_effect_name(enum psr_effect effect); /* "specular" */
+const char *psr_effect_counts(enum psr_effect effect); /* the unit of its count: "pixels looked at for highlights" */
+/* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
+const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
+
+struct psr_report {
+	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together and divide it by their own clocks */
+	uint64_t count[PSR_N_STAGES];
+	uint64_t n_blocks, n_samples; /* of all instances, all levels */
+	uint64_t n_blocks_drawn, n_samples_drawn; /* of the drawn levels, after culling; all samples of those blocks */
+	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
+	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
+	uint32_t levels;              /* bit k: level buffer k was in use */
+	uint32_t n_clamped;           /* blocks that needed a coarser depth buffer than there is: holes are possible */
+	uint32_t n_shadow_maps;       /* in use */
+	uint32_t n_shadow_maps_drawn; /* of these made for this frame; the others were kept from frames before */
+	struct {
+		uint64_t count;
+		enum psr_why why;
+	} effect[PSR_N_EFFECTS];
+	double error_bound;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
+};
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,15 @@
+/* Adds what an owned sampling lacks: first for what is thin; then samples in blocks that are there; then new blocks, those
+ * first that most of the rest could use. */
+#ifndef PSR_SAMPLE_MEND_MEND_H
+#define PSR_SAMPLE_MEND_MEND_H
+
+#include "sample/own/keep.h"
+#include "sample/visible/places.h"
+
+/* All over the surface, at other places in each round, 0 or greater. MEMORY. */
+int mend_surface(const struct keeper *keeper, const struct field *field, int round);
+
+/* One place. MEMORY. */
+int mend_place(const struct keeper *keeper, const struct field *field, const struct place *place);
+
+#endif

@@ -1,0 +1,21 @@
+/* Which primitives are thin: at most 0.6 pixels behind all of them is another face of the same plain material, as of
+ * needles and leaves. A sample there stands for both sides. */
+#ifndef PSR_SAMPLE_PROJECT_THIN_H
+#define PSR_SAMPLE_PROJECT_THIN_H
+
+#include <stdint.h>
+
+enum thin {
+	THIN = 1,
+	THIN_NARROW = 2, /* and narrower than half a pixel: its sides are all tested, as none stands for the others when
+	                  * seen from aside */
+	THIN_BEHIND = 4, /* and not narrow: the places of its other side are tested */
+};
+
+struct sampling;
+
+/* Fills thin[], enum thin by primitive, 0 where a primitive is not thin. finer: that of the next finer level, where
+ * what is thin is thin here; or NULL. */
+void thin_mark(uint8_t *thin, const struct sampling *sampling, const uint8_t *finer);
+
+#endif

@@ -1,0 +1,93 @@
+#include <assert.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/srgb.h"
+#include "scene.h"
+#include "wire.h"
+
+struct scene *scene_ref(struct scene *scene)
+{
+	scene->n_refs++;
+	return scene;
+}
+
+void scene_unref(struct scene *scene)
+{
+	if (scene == NULL)
+		return;
+	assert(scene->n_refs > 0);
+	if (--scene->n_refs > 0)
+		return;
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
+		catalogue_unref(scene->catalogue, scene->model[i]);
+	free(scene->instance);
+	free(scene->model);
+	free(scene);
+}
+
+static int add_instance(struct scene *scene, const struct handles *handles, const struct psr_msg_instance *msg,
+                        struct psr_error *err)
+{
+	struct catalogue_model *model = handles_find(handles, msg->handle);
+	uint32_t number = scene->scene.n_instances;
+	struct psr_instance *instance = &scene->instance[number];
+	double norm = 0;
+
+	if (msg->representation != PSR_WIRE_REP_AUTO && msg->representation != PSR_WIRE_REP_BLOCKS)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "instance %" PRIu32 " asks for representation %u; this server draws blocks "
+		                "(1, or 0 for automatic)",
+		                number, msg->representation);
+	if (model == NULL)
+		return psr_fail(err, PSR_ERR_NOT_FOUND,
+		                "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it", number, msg->handle);
+	for (int k = 0; k < 4; k++)
+		norm += msg->rotation[k] * msg->rotation[k];
+	norm = sqrt(norm);
+	instance->model = model->model;
+	for (int k = 0; k < 4; k++)
+		instance->rotation[k] = msg->rotation[k] / norm;
+	memcpy(instance->translation, msg->translation, sizeof instance->translation);
+	instance->scale = msg->scale;
+	scene->model[number] = catalogue_ref(scene->catalogue, model);
+	scene->scene.n_instances++;
+	return PSR_OK;
+}
+
+int scene_create(struct scene **out, const struct handles *handles, const struct psr_msg_scene *msg,
+                 struct psr_error *err)
+{
+	struct scene *scene;
+	int code = PSR_OK;
+
+	if (msg->flags & PSR_WIRE_SCENE_APPEND)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server does not append to scenes; send the whole scene");
+	scene = calloc(1, sizeof *scene);
+	if (scene == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
+	scene->n_refs = 1;
+	scene->catalogue = handles->catalogue;
+	scene->instance = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->instance);
+	scene->model = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->model);
+	if (scene->instance == NULL || scene->model == NULL)
+		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
+	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
+		code = add_instance(scene, handles, &msg->instance[i], err);
+	for (uint32_t i = 0; code == PSR_OK && i < msg->n_lights; i++)
+		wire_to_light(&scene->light[scene->scene.n_lights++], &msg->light[i]);
+	if (code != PSR_OK) {
+		scene_unref(scene);
+		return code;
+	}
+	scene->scene.instance = scene->instance;
+	scene->scene.light = scene->light;
+	for (int k = 0; k < 3; k++) {
+		scene->background[k] = msg->background[k];
+		scene->scene.ambient[k] = msg->ambient;
+		scene->scene.background[k] = (double)psr_srgb_to_linear[msg->background[k]];
+	}
+	*out = scene;
+	return PSR_OK;
+}

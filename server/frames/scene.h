@@ -1,0 +1,27 @@
+/* SCENE messages to scenes. */
+#ifndef PSRD_FRAMES_SCENE_H
+#define PSRD_FRAMES_SCENE_H
+
+#include "server/models/handles.h"
+#include "psr/scene.h"
+
+/* The scene of a SCENE message: immutable, shared by its slot and the frames that were asked for while it stood there.
+ * The loop's thread counts references. */
+struct scene {
+	uint32_t n_refs;
+	struct catalogue *catalogue;
+	struct psr_scene scene;         /* camera unset */
+	uint8_t background[3];
+	struct psr_instance *instance;
+	struct catalogue_model **model; /* of each instance, a reference */
+	struct psr_light light[PSR_WIRE_MAX_LIGHTS];
+};
+
+/* Checks what the wire cannot: handles, representations, angles. *out is the caller's reference. NOT_FOUND,
+ * UNSUPPORTED, MEMORY. */
+int scene_create(struct scene **out, const struct handles *handles, const struct psr_msg_scene *msg,
+                 struct psr_error *err);
+struct scene *scene_ref(struct scene *scene);
+void scene_unref(struct scene *scene); /* NULL is fine */
+
+#endif

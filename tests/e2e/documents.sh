@@ -1,0 +1,80 @@
+#!/bin/bash
+# Documents: lines fit a page, links lead somewhere, the map and decisions are short, the index has every decision, and
+# wide tables fold.
+. "$(dirname "$0")/lib.sh"
+
+MOST_COLUMNS=100
+MOST_MAP=200     # lines of the map of the house
+MOST_DECISION=40 # lines of a decision
+mapfile -t pages < <(git ls-files -- '*.md' 2>/dev/null || find . -path ./build -prune -o -name '*.md' -print)
+
+none() { # claim command...: each line that the command prints is against the claim
+	local claim=$1 found
+	shift
+	found=$("$@" | head -n 20)
+	if [ -z "$found" ]; then ok "$claim"; else not_ok "$claim" "${found//$'\n'/$'\n'# }"; fi
+}
+
+# Characters, not bytes, whatever the locale.
+long_lines() {
+	perl -CSD -ne 'chomp; print "$ARGV:$.: ", length, " columns\n" if length > '$MOST_COLUMNS'; close ARGV if eof' "$@"
+}
+
+# The targets of [text](target) outside of code, without those of other hosts and of this page's own headings.
+dead_links() {
+	local page target
+	for page; do
+		sed '/^```/,/^```/d;s/`[^`]*`//g' "$page" | grep -oE '\]\([^)]+\)' | sed 's/^](//;s/)$//;s/#.*//' |
+			while read -r target; do
+				case $target in
+				'' | *://* | mailto:*) ;;
+				*) [ -e "$(dirname "$page")/$target" ] || echo "$page: $target" ;;
+				esac
+			done
+	done
+}
+
+long_pages() { # most page...
+	local most=$1 page n
+	shift
+	for page; do
+		n=$(wc -l <"$page")
+		[ "$n" -le "$most" ] || echo "$page: $n lines"
+	done
+}
+
+not_in_index() { # decision...
+	local page
+	for page; do
+		grep -qF "(${page##*/})" docs/decisions/README.md || echo "$page"
+	done
+}
+
+# Twenty columns of two rows after a label: 189 columns of text.
+wide_table() {
+	local row
+	for row in one another; do
+		printf '%-9s' "$row"
+		for i in $(seq 20); do printf ' %8s' "$row$i"; done
+		echo
+	done
+}
+lost_words() { # table: words that fold.awk leaves out
+	local word
+	for word in $(cat "$1"); do
+		awk -f docs/fold.awk "$1" | grep -qw "$word" || echo "$word"
+	done
+}
+
+check "there are documents" test ${#pages[@]} -gt 0
+none "no line of a document has more than $MOST_COLUMNS columns" long_lines "${pages[@]}"
+none "every relative link of a document leads to a file" dead_links "${pages[@]}"
+none "docs/architecture.md has at most $MOST_MAP lines" long_pages $MOST_MAP docs/architecture.md
+none "a decision has at most $MOST_DECISION lines" long_pages $MOST_DECISION docs/decisions/[0-9]*.md
+none "the index of decisions has every one" not_in_index docs/decisions/[0-9]*.md
+
+wide_table >"$work/table"
+awk -f docs/fold.awk "$work/table" >"$work/folded"
+none "a table that is folded fits a page" long_lines "$work/folded"
+none "and has all of its columns" lost_words "$work/table"
+check "with the first column in each part" test "$(grep -c '^another ' "$work/folded")" -gt 1
