@@ -88,10 +88,10 @@ static void warn_of_sheer(const struct psr_model *model)
 	uint32_t n = 0;
 
 	for (uint32_t b = 0; b < blocks->n_blocks; b++)
-		n += (psr_blocks_traits(blocks, b) & PSR_BLOCK_SHEER) != 0;
+		n += psr_blocks_is_sheer(blocks, b) != 0;
 	if (n != 0)
-		fprintf(stderr, PROGRAM ": warning: surfaces that are partly transparent are drawn as a pattern of holes, %" PRIu32
-		        " of %" PRIu32 " blocks; --passes makes their mean right\n", n, blocks->n_blocks);
+		fprintf(stderr, PROGRAM ": note: %" PRIu32 " of %" PRIu32 " blocks are of surfaces that let light through (BLEND "
+		        "materials); each pixel shows the nearest eight, without refraction\n", n, blocks->n_blocks);
 }
 
 static void summarize(const char *out, const struct psr_mesh *mesh, const struct psr_model *model,

@@ -52,7 +52,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 
 		summary->level_blocks[level]++;
 		summary->n_bent += (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_BENT) != 0;
-		summary->n_sheer += (psr_blocks_traits(summary->blocks, b) & PSR_BLOCK_SHEER) != 0;
+		summary->n_sheer += psr_blocks_is_sheer(summary->blocks, b) != 0;
 		summary->level_samples[level] += (uint64_t)__builtin_popcountll(summary->blocks->mask[b]);
 	}
 }
@@ -145,7 +145,7 @@ static void print_text(const struct summary *s)
 	if (s->n_bent != 0)
 		printf("bent blocks       %" PRIu32 ", whose shading normals are far from those of their faces\n", s->n_bent);
 	if (s->n_sheer != 0)
-		printf("sheer blocks      %" PRIu32 ", of surfaces that are partly transparent, drawn as a pattern of holes\n",
+		printf("sheer blocks      %" PRIu32 ", of surfaces that let a part of the light through\n",
 		       s->n_sheer);
 }
 

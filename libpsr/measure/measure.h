@@ -14,8 +14,9 @@ struct psr_truth;
 int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct psr_error *err);
 void psr_truth_destroy(struct psr_truth *truth);
 
-/* From now on surfaces that let a part of the light through have the holes that a model of this spacing, in world
- * units, is given in their place; before, they are there where they let less than half through. */
+/* From now on rays go through surfaces that let a part of the light through in proportion to it, by a pattern much finer
+ * than this spacing, in world units: the mean of many rays has the light that is left. Before, these surfaces stop rays
+ * where they let less than half through. */
 void psr_truth_stipple(struct psr_truth *truth, double spacing);
 
 /* One ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in

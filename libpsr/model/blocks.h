@@ -32,7 +32,7 @@ enum psr_block_trait {
 	 * the cone tells it of the whole block. All of it is drawn unless its cone faces away; and a two-sided block is
 	 * seen from its front where the normal of the cone that is nearest to the shading normal faces the eye. */
 	PSR_BLOCK_BENT = 1,
-	/* It has holes as the surface lets light through: what lies between its samples is not to be closed. */
+	/* Some of its samples let a part of the light through, each by its opacity. */
 	PSR_BLOCK_SHEER = 2
 };
 
@@ -75,6 +75,7 @@ struct psr_blocks {
 	const int8_t *cone_x, *cone_y, *cone_z;
 	const uint8_t *cone_sine;               /* PSR_CONE_ANY: any normals, and the axis means nothing */
 	const uint8_t *traits;                  /* enum psr_block_trait; not without cones */
+	const uint8_t *opacity;                 /* a sample, of PSR_OPAQUE; not without traits. NULL: all are opaque */
 	const uint8_t *visibility_index;        /* see psr_blocks_visibility() */
 	const uint64_t (*visibility_mask)[2];   /* 128 bits, one a triangle of directions; many blocks share one */
 };
@@ -92,6 +93,14 @@ static inline unsigned psr_blocks_level(const struct psr_blocks *blocks, uint32_
 static inline unsigned psr_blocks_traits(const struct psr_blocks *blocks, uint32_t block)
 {
 	return blocks->traits != NULL ? blocks->traits[block] : 0;
+}
+
+#define PSR_OPAQUE 255
+
+/* Whether a block's samples have opacities. */
+static inline int psr_blocks_is_sheer(const struct psr_blocks *blocks, uint32_t block)
+{
+	return blocks->opacity != NULL && (psr_blocks_traits(blocks, block) & PSR_BLOCK_SHEER) != 0;
 }
 
 /* Index of a block's first sample. */

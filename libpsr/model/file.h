@@ -51,7 +51,7 @@ struct section_spec {
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
-#define N_KNOWN_SECTIONS 24
+#define N_KNOWN_SECTIONS 25
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 

@@ -39,6 +39,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("VISM", 0, COUNT_MASKS, 16, visibility_mask),
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),
+	ARRAY("OPAC", 0, COUNT_SAMPLES, 1, opacity),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)

@@ -237,6 +237,8 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 		return psr_fail(err, PSR_ERR_ARG, "%d of the four arrays of cones are set; set all or none", n_cones);
 	if (blocks->traits != NULL && n_cones == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the model's blocks have traits, but no cones, which bent blocks need");
+	if (blocks->opacity != NULL && blocks->traits == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "the model's samples have opacities, but its blocks have no traits");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
 		return psr_fail(err, PSR_ERR_ARG, "set visibility masks, their number and their indices together, or none");
 	if (presets == NULL)

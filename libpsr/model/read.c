@@ -280,6 +280,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 		return bad(r, "some of the sections CONX, CONY, CONZ and CONS are missing");
 	if (blocks->traits && !blocks->cone_x)
 		return bad(r, "section TRTS needs CONX, CONY, CONZ and CONS, which are missing");
+	if (blocks->opacity && !blocks->traits)
+		return bad(r, "section OPAC needs TRTS, which is missing");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
 		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS some are missing");
 	return PSR_OK;

@@ -33,12 +33,12 @@ static int insert(struct ray_hit *sorted, int n, int most, const struct ray_hit 
 }
 
 /* Seen from both ends, a face stops one of them at least. */
-static int lets_through(const struct ray_packet *packet, const struct ray_hit *hit)
+static int is_absent(const struct ray_packet *packet, const struct ray_hit *hit)
 {
 	struct ray_hit front = *hit;
 
 	front.is_back = packet->has_ends ? 0 : hit->is_back;
-	return ray_hit_lets_through(packet->scene, &front);
+	return ray_hit_is_absent(packet->scene, &front);
 }
 
 /* Keeps what is met and sends every ray on. */
@@ -62,7 +62,7 @@ static void collect(const struct RTCFilterFunctionNArguments *args)
 		hit.u = (double)column.u[i];
 		hit.v = (double)column.v[i];
 		ray_hit_locate(packet->scene, &packet->ray[column.id[i]], &hit);
-		if (!packet->scene->lets_through || !lets_through(packet, &hit))
+		if (!packet->scene->lets_through || !is_absent(packet, &hit))
 			list->n = insert(list->hit, list->n, MOST_RAW, &hit);
 	}
 }

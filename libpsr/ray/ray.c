@@ -4,6 +4,8 @@
 #include "surface/stipple.h"
 #include "surface/texture.h"
 
+#define LEAST_OPACITY (0.5f / 255) /* less is nothing in a model */
+
 /* Where the ray meets the primitive that the tree found: in its plane, drawn into the triangle, as the tree rounds its
  * edges outwards. An edge-on triangle has no such point; it keeps what the tree says. */
 static void locate_triangle(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit)
@@ -96,15 +98,26 @@ static int is_open(const struct ray_scene *scene, uint32_t prim, double u, doubl
 	return stipple_is_open(opacity, p, scene->cell);
 }
 
-int ray_scene_is_absent(const struct ray_scene *scene, uint32_t prim, double u, double v)
+/* Opacity of a place that is seen through in proportion; else 1, or 0 where nothing is. */
+static float opacity_of(const struct ray_scene *scene, uint32_t prim, double u, double v)
 {
 	const struct psr_material *material = material_of(scene->mesh, prim);
 	float rgba[4];
 
 	if (material->alpha != PSR_ALPHA_BLEND || !(scene->cell > 0))
-		return texture_is_absent(scene->mesh, prim, u, v);
+		return texture_is_absent(scene->mesh, prim, u, v) ? 0 : 1;
 	texture_base_color(scene->mesh, prim, u, v, rgba);
-	return is_open(scene, prim, u, v, rgba[3]);
+	return rgba[3];
+}
+
+int ray_scene_is_absent(const struct ray_scene *scene, uint32_t prim, double u, double v)
+{
+	return opacity_of(scene, prim, u, v) < LEAST_OPACITY;
+}
+
+int ray_scene_is_sheer(const struct ray_scene *scene, uint32_t prim, double u, double v)
+{
+	return material_of(scene->mesh, prim)->alpha == PSR_ALPHA_BLEND && opacity_of(scene, prim, u, v) < 1;
 }
 
 /* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but
@@ -129,13 +142,19 @@ static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, 
 	return slope < -least ? STOPS : slope > least ? GOES_ON : MUST_LOOK;
 }
 
-int ray_hit_lets_through(const struct ray_scene *scene, const struct ray_hit *hit)
+int ray_hit_is_absent(const struct ray_scene *scene, const struct ray_hit *hit)
 {
-	const struct psr_material *material = material_of(scene->mesh, hit->prim);
-
-	if (hit->is_back && !material->two_sided)
+	if (hit->is_back && !ray_is_two_sided(scene, hit->prim))
 		return 1;
 	return ray_scene_is_absent(scene, hit->prim, hit->u, hit->v);
+}
+
+static int lets_through(const struct ray_scene *scene, const struct ray_hit *hit)
+{
+	if (ray_hit_is_absent(scene, hit))
+		return 1;
+	return ray_scene_is_sheer(scene, hit->prim, hit->u, hit->v)
+	       && is_open(scene, hit->prim, hit->u, hit->v, opacity_of(scene, hit->prim, hit->u, hit->v));
 }
 
 static void filter(const struct RTCFilterFunctionNArguments *args)
@@ -155,7 +174,7 @@ static void filter(const struct RTCFilterFunctionNArguments *args)
 			hit.u = (double)column.u[i];
 			hit.v = (double)column.v[i];
 			ray_hit_locate(packet->scene, &packet->ray[column.id[i]], &hit);
-			verdict = ray_hit_lets_through(packet->scene, &hit) ? GOES_ON : STOPS;
+			verdict = lets_through(packet->scene, &hit) ? GOES_ON : STOPS;
 		}
 		if (verdict == GOES_ON)
 			args->valid[i] = 0;

@@ -2,8 +2,8 @@
  * psr/mesh.h. Everything here is in the inner coordinates of a model: object = origin + scale * inner.
  *
  * Surfaces are seen as glTF asks: rays go on through the backs of one-sided faces, through texels of MASK materials
- * below the cutoff, and through BLEND ones below one half, or in proportion (ray_scene_stipple). What a ray meets is
- * found in float by a tree, and where it meets it is computed in double from the primitive, so that a hit has the
+ * below the cutoff, and through BLEND ones below one half, or in proportion (ray_scene_stipple); then all hits of a ray
+ * are BLEND ones, too, wherever these are anything at all. What a ray meets is found in float by a tree, and where it meets it is computed in double from the primitive, so that a hit has the
  * same bits wherever the same one is found. The tree is built by one thread and walked by the same instructions on
  * every CPU with AVX2: the same primitive is found whatever the threads. Of faces that coincide the tree's order
  * chooses one; and a ray that goes through a vertex to within the rounding of a float may slip between its faces. */
@@ -33,13 +33,16 @@ int ray_scene_create(struct ray_scene **out, const struct psr_mesh *mesh, const 
                      struct psr_error *err);
 void ray_scene_destroy(struct ray_scene *scene); /* NULL is fine */
 
-/* From now on BLEND surfaces have holes in proportion to what they let through, in a pattern of cells of this side in
- * inner units (surface/stipple.h). Nobody may trace at the time. */
+/* From now on rays that look for their first hit go through BLEND surfaces in proportion to what these let through, by a
+ * pattern of cells of this side in inner units (surface/stipple.h). Nobody may trace at the time. */
 void ray_scene_stipple(struct ray_scene *scene, double cell);
 
 /* Whether there is nothing at this place of a primitive, for its alpha. The texture is that of a point, as
  * magnification filters it. */
 int ray_scene_is_absent(const struct ray_scene *scene, uint32_t prim, double u, double v);
+
+/* Whether what is at this place of a primitive lets a part of the light through. */
+int ray_scene_is_sheer(const struct ray_scene *scene, uint32_t prim, double u, double v);
 
 /* The first hits of n rays at t >= t_min. Any number of threads may trace at once. */
 void ray_scene_trace(const struct ray_scene *scene, const struct ray *ray, int n, double t_min, struct ray_hit *hit);

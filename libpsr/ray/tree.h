@@ -14,7 +14,7 @@ enum { RAY_TRIANGLES, RAY_DISCS };
 struct ray_scene {
 	const struct psr_mesh *mesh;
 	double origin[3], shrink; /* inner = (object - origin) * shrink */
-	double cell; /* of the pattern of BLEND surfaces (surface/stipple.h), inner units; 0: none */
+	double cell; /* of the pattern by which one sees through BLEND surfaces (surface/stipple.h), inner units; 0: none */
 	double (*corner)[3][3]; /* of the triangles, inner coordinates; */
 	float (*normal)[3]; /* and their unit normals */
 	int lets_through;   /* whether any material may let a ray through */
@@ -37,9 +37,9 @@ void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, c
 /* Rays ray[0..n-1] at t >= t_min as floats, and -1 in `valid` for each; the rest of the packet is off. */
 void ray_packet_fill(struct RTCRay8 *rays, int valid[RAY_PACKET], const struct ray *ray, int n, double t_min);
 
-/* Primitive i of geometry `geometry`, met at u, v as the tree has them: where exactly, and whether the ray goes on. */
+/* A primitive, met at u, v as the tree has them: where exactly, and whether nothing is met there after all. */
 void ray_hit_locate(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit);
-int ray_hit_lets_through(const struct ray_scene *scene, const struct ray_hit *hit);
+int ray_hit_is_absent(const struct ray_scene *scene, const struct ray_hit *hit);
 
 /* A filter's arguments, N wide, for which Embree's header has names in C++ only. */
 struct ray_columns {

@@ -293,7 +293,7 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		report->levels |= chunk->levels;
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
-		plan->has_sheer |= (chunk->traits & PSR_BLOCK_SHEER) != 0;
+		plan->has_sheer |= plan->instance[chunk->instance].cull.blocks->opacity && chunk->traits & PSR_BLOCK_SHEER;
 		if (chunk->traits & PSR_BLOCK_BENT)
 			plan->view.needs |= STRIP_BENT;
 		report->n_clamped += chunk->n_clamped;

@@ -23,6 +23,8 @@ static const struct {
 	                         "a light is near or casts shadows, or a block in view is two-sided",
 	                         "too few lights and pixels, or several instances" } },
 	[PSR_EFFECT_SMOOTH] = { "smooth", { "", "the settings turn it off", "the frame has no colour", "", "" } },
+	[PSR_EFFECT_SHEER] = { "sheer",
+	                       { "", "the frame has neither colour nor depth", "no block in view lets light through", "", "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -45,6 +47,7 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_SHADOWS] = "shadow maps in use",
 		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
+		[PSR_EFFECT_SHEER] = "pixels with surfaces that let a part of the light through",
 	};
 	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] ? counts[effect] : "?";
 }

@@ -1,93 +1,9 @@
-#include <fenv.h>
-#include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
 #include "base/direction.h"
 #include "base/mem.h"
-#include "base/srgb.h"
-#include "buffers.h"
-#include "cull.h"
-#include "fill.h"
 #include "planes.h"
-#include "refine.h"
-#include "shadow.h"
-#include "smooth.h"
-
-struct psr_renderer {
-	const struct simd *simd;
-	struct plan plan;
-	struct bins bins;
-	struct shadow *shadow; /* NULL until a light casts one */
-	struct fill fill;
-	struct smooth smooth;
-	struct buffers buffers;
-	struct refiner *refiner; /* NULL until psr_render draws a pass above 0 */
-	float (*lit)[4]; /* diffuse light by normal */
-	size_t lit_size;
-	uint8_t srgb[65536];         /* 8 bits of 16-bit linear light */
-	const struct inside *inside; /* of frames with splats, or NULL */
-	struct psr_report report;    /* of renderer_warp, until renderer_finish */
-	/* Of the call in progress. */
-	uint8_t *is_object; /* renderer_outline's */
-	struct psr_frame *frame;
-	int has_planes; /* the frame has more planes than colour and depth */
-	struct shade_picture picture;
-	float *depth; /* where depths go, or NULL */
-};
-
-/* The default rounding, as in the pool's threads. */
-static void set_environment(fenv_t *callers)
-{
-	fegetenv(callers);
-	fesetenv(FE_DFL_ENV);
-}
-
-int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
-{
-	struct psr_renderer *r = calloc(1, sizeof *r);
-	fenv_t callers;
-	if (!r)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
-	r->simd = simd_get();
-	set_environment(&callers);
-	for (int i = 0; i < 65536; i++)
-		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
-	fesetenv(&callers);
-	*out = r;
-	return PSR_OK;
-}
-
-void renderer_use(struct psr_renderer *r, const struct simd *simd)
-{
-	r->simd = simd;
-}
-
-struct refiner **renderer_refiner(struct psr_renderer *r)
-{
-	return &r->refiner;
-}
-
-void psr_renderer_destroy(struct psr_renderer *r)
-{
-	if (!r)
-		return;
-	refiner_destroy(r->refiner);
-	plan_clear(&r->plan);
-	shadow_destroy(r->shadow);
-	bins_clear(&r->bins);
-	fill_clear(&r->fill);
-	smooth_clear(&r->smooth);
-	buffers_clear(&r->buffers);
-	psr_free_huge(r->lit, r->lit_size);
-	free(r);
-}
-
-uint64_t psr_renderer_bytes(const struct psr_renderer *r)
-{
-	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
-	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + r->buffers.pixels_size +
-	       r->buffers.counters_size + r->lit_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
-}
+#include "renderer.h"
 
 static void warp_one(int i, void *userdata)
 {
@@ -248,11 +164,6 @@ int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, cons
 	return rc;
 }
 
-void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)
-{
-	r->inside = inside;
-}
-
 static void shade_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
@@ -320,6 +231,18 @@ static int begin_smooth(struct psr_renderer *r, enum psr_why smooth, uint8_t **r
 	return PSR_OK;
 }
 
+/* Draws sheer surfaces over the frame. */
+static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+{
+	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, r->buffers.stack.exponent };
+	const int is_wanted = r->frame->rgb || r->frame->depth, is_drawn = is_wanted && r->plan.has_sheer;
+	const enum psr_why why = is_drawn ? PSR_WHY_RAN : is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	if (is_drawn && sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool))
+		return PSR_ERR_MEMORY;
+	effect_note(report, PSR_EFFECT_SHEER, why, r->sheer.n_pixels);
+	return PSR_OK;
+}
+
 /* From the z-buffer to the frame. */
 static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool,
                         struct psr_frame *frame, struct psr_error *err)
@@ -340,6 +263,12 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	int rc = begin_smooth(r, smooth, &rgb, err);
 	if (rc)
 		return rc;
+	if (r->plan.has_sheer && frame->rgb && !r->depth) {
+		r->depth = sheer_depths(&r->sheer, &r->plan);
+		if (!r->depth)
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for the depths of a picture of %ux%u", r->plan.width,
+			                r->plan.height);
+	}
 	r->picture = (struct shade_picture){ stack, b->weight, rgb, r->srgb, b->rgb[0], b->rgb[1], b->rgb[2], NULL };
 	const struct fill_picture fill = { stack,     b->weight, b->bricks, b->rgb[0], b->rgb[1],
 		                               b->rgb[2], r->srgb,   rgb,       r->depth };
@@ -366,6 +295,10 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
 	note_time(report, PSR_STAGE_SMOOTH, &start);
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
+	if (add_sheer(r, pool, report))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the sheer surfaces of a picture of %ux%u", r->plan.width,
+		                r->plan.height);
+	note_time(report, PSR_STAGE_SHADE, &start);
 	return PSR_OK;
 }
 

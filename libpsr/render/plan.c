@@ -138,7 +138,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
-		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0, .with_splats = plan->with_splats,
+		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
+		.with_splats = plan->with_splats || warp->blocks->opacity,
 		.region_from = { (float)plan->window.left, (float)plan->window.top },
 		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
 		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
@@ -252,7 +253,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
 	plan->finer = (float)(1 / settings->spacing);
 	plan->is_quiet = NULL;
-	plan->has_sheer = 0;
+	plan->has_sheer = plan->is_shadow = 0;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;
 	plan->exponent = scene_exponent(scene);

@@ -33,7 +33,8 @@ struct plan {
 	struct plan_instance *instance;
 	struct warp_instance *warp;        /* one an instance */
 	struct strip_view view;            /* the cull completes `needs` */
-	int has_sheer;                     /* a block in view is sheer; set by the cull */
+	int has_sheer;                     /* a block in view has opacities; set by the cull */
+	int is_shadow;                     /* the picture is a shadow map, where sheer blocks are opaque or missing */
 	struct strip_light *light;
 	const struct shadow_light *shadow; /* one a light, or NULL: no shadows; the shadow stage owns it */
 	double axes[3][3], eye[3];         /* the camera's right, down and forward in the world, and its position */

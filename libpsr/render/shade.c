@@ -100,6 +100,21 @@ static void write_strip(const struct strip *strip, const struct shading *s)
 	s->simd->strip_write(strip, &target, left < STRIP ? left : STRIP);
 }
 
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t n,
+                    struct strip_pixels *pixels, struct strip *strip)
+{
+	const struct shading shading = { simd, plan, NULL };
+	strip->pixels = pixels;
+	simd->strip_list(pixels, word, NULL, n);
+	if (!pixels->n)
+		return 0;
+	simd->strip_find(pixels, &plan->view);
+	simd->strip_read(strip, &plan->view);
+	simd->strip_resolve(strip, &plan->view, plan->ambient);
+	light_strip(strip, &shading);
+	return pixels->n;
+}
+
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_picture *picture, uint32_t y0,
                 uint32_t y1, struct shade_counts *counts)
 {

@@ -30,6 +30,11 @@ struct shade_picture {
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_picture *picture, uint32_t y0,
                 uint32_t y1, struct shade_counts *counts);
 
+/* Lights the samples of n words, STRIP at most, from pixel (pixels->x0, pixels->y) on, the beginning of a strip. Sets
+ * strip->r, g and b of the pixels pixels->x. Returns how many there are. */
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t n,
+                    struct strip_pixels *pixels, struct strip *strip);
+
 /* Reports the counts of all rows of bricks. Resolving, shading and filling run together: divides their wall time by
  * their own clocks. */
 void shade_report(const struct plan *plan, const struct shade_counts *rows, uint64_t wall, int has_rgb,

@@ -197,6 +197,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	int rc = plan_make(plan, &scene, &settings, call->err);
 	if (rc)
 		return rc;
+	plan->is_shadow = 1;
 	for (uint32_t i = 0; i < plan->n_instances; i++)
 		plan->instance[i].cull.both_sides = 1;
 	rc = cull_blocks(call->bins, call->simd, plan, call->pool, &report);

@@ -4,6 +4,7 @@
 #include "base/vec.h"
 #include "base/direction.h"
 #include "block.h"
+#include "sheer.h"
 #include "splat.h"
 #include "simd/block.h"
 
@@ -26,6 +27,7 @@ struct splat_target {
 	uint64_t *word;
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
+	struct sheer_list *list; /* of all that is drawn, in the place of words; or NULL */
 };
 
 /* An ellipse of the picture: its centre, two conjugate radii, and how depth rises along these and to the rim. */
@@ -58,9 +60,20 @@ static void limit_reach(struct splat *s)
 			v3f_scale(s->radius[i], s->radius[i], s->most / extent);
 }
 
+/* A place of a disc is listed if its plane there is before what hides all, or behind that by half of what is added at a
+ * rim: what lies on a surface is not lost in it. */
+static inline void list_place(const struct splat_target *t, const struct splat *s, int32_t x, int32_t y, float z,
+                              float square)
+{
+	const uint32_t at = (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0);
+	if (z - (square + 0.5f) * s->rim < t->list->before[at])
+		sheer_add(t->list, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id);
+}
+
 /* Pixels whose centres are in the ellipse. That which the disc's own centre is in need not be: discs meet their
  * neighbours', and one more pixel at each edge would be too much. */
-static void draw_splat(const struct splat_target *t, const struct splat *s)
+static inline __attribute__((always_inline)) void draw_splat(const struct splat_target *t, const struct splat *s,
+                                                             int is_listed)
 {
 	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1];
 	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
@@ -76,7 +89,11 @@ static void draw_splat(const struct splat_target *t, const struct splat *s)
 			const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
 			const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
 			const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
-			if (square <= 1 && z > t->plan->near_z)
+			if (!(square <= 1 && z > t->plan->near_z))
+				continue;
+			if (is_listed)
+				list_place(t, s, x, y, z, square);
+			else
 				lower(t, x, y, z, s->id);
 		}
 }
@@ -164,7 +181,8 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 	share[1] = across ? 1 : NARROW;
 }
 
-static void draw_block(const struct splat_target *t, const struct bin_entry *entry)
+static inline __attribute__((always_inline)) void draw_block(const struct splat_target *t,
+                                                             const struct bin_entry *entry, int is_listed)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
 	const struct psr_projection *projection =
@@ -211,21 +229,14 @@ static void draw_block(const struct splat_target *t, const struct bin_entry *ent
 		}
 		s.id = b.id + sample;
 		limit_reach(&s);
-		draw_splat(t, &s);
+		draw_splat(t, &s, is_listed);
 	}
 }
 
-/* Whether holes between its samples are meant. */
-static int is_sheer(const struct plan *plan, const struct bin_entry *entry)
-{
-	const struct plan_instance *in = &plan->instance[entry->instance];
-	return (psr_blocks_traits(in->cull.blocks, entry->slot - in->first_slot) & PSR_BLOCK_SHEER) != 0;
-}
-
 /* The cells that samples fall into, by the warp, which draws words, too. Samples that are at most a pixel apart have
- * cells of two pixels; those of sheer blocks have none, and close nothing. */
-static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
-                           const struct psr_zstack *stack, const struct bin_entry *entry, uint32_t n)
+ * cells of two pixels. */
+static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
+                           const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
 	simd->warp_clear(target, stack->levels);
@@ -234,7 +245,7 @@ static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, con
 		uint32_t n_some = 0;
 		for (; e < n && n_some < sizeof some / sizeof *some; e++, n_some++) {
 			some[n_some] = entry[e];
-			some[n_some].level = is_sheer(plan, &entry[e]) ? 0 : entry[e].level ? entry[e].level : 1;
+			some[n_some].level = entry[e].level ? entry[e].level : 1;
 		}
 		n_inside += simd->warp(target, some, n_some);
 	}
@@ -244,16 +255,32 @@ static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, con
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
+	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_counts counts = { 0, 0, 0 };
 	struct warp_target target;
 	warp_target_make(&target, plan, stack, tile, NULL);
 	target.clean = clean;
-	counts.n_inside = draw_cells(simd, plan, &target, stack, bins->entry + begin, end - begin);
+	counts.n_inside = draw_cells(simd, &target, stack, bins->entry + begin, end - begin);
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
-	const struct splat_target t = { plan, target.word, target.stride, target.x0, target.y0, target.x1, target.y1 };
+	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
+		                            target.x1, target.y1,   NULL };
 	for (uint32_t e = begin; e < end; e++)
-		draw_block(&t, &bins->entry[e]);
+		draw_block(&t, &bins->entry[e], 0);
 	return counts;
+}
+
+void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
+                struct sheer_list *list)
+{
+	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
+		                            target->x1, target->y1, list };
+	draw_block(&t, entry, 1);
+}
+
+float splat_rim(const struct plan_instance *in, uint32_t block)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+	const float scale = (float)(1u << psr_blocks_level(b, block));
+	return RIM_DEPTH * (b->projection[b->block_projection[block]].spacing * scale) * in->cull.scale;
 }

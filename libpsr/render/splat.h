@@ -10,6 +10,14 @@
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                               struct psr_zstack *stack, uint32_t tile, uint32_t clean);
 
+/* Lists the discs of a block, as far as they are in the tile, instead of drawing them. */
+struct sheer_list;
+void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
+                struct sheer_list *list);
+
+/* How much further away a block's discs count at their rims than in their planes, in z': a step of its lattice. */
+float splat_rim(const struct plan_instance *in, uint32_t block);
+
 /* Pixels of a picture that lie well inside of the object in its plain frame. The frame being drawn is a window of the
  * picture with 2^pass pixels along the side of each; its pixel (0, 0) is (left, top). */
 struct inside {

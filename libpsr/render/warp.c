@@ -1,3 +1,4 @@
+#include "sheer.h"
 #include "warp.h"
 
 #define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
@@ -48,7 +49,7 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile)
 {
-	const uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
+	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
 	warp_target_make(&target, plan, into->stack, tile, into->own);

@@ -119,7 +119,6 @@ static int make_level(struct build *build, struct level *level)
 	const struct level_progress progress = { report_step, build };
 	int rc;
 
-	ray_scene_stipple(build->scene, STIPPLE_PIXELS * level->sampling.ds);
 	rc = level_make(level, &progress);
 	if (rc == PSR_OK)
 		rc = check_samples(build, level);
@@ -166,13 +165,14 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 {
 	const struct psr_presets presets = { build->mesh->n_cameras, build->mesh->n_lights, build->mesh->camera,
 		                                 build->mesh->light };
-	struct pack_source source = { NULL, &build->draft, &presets, build->pool };
+	struct pack_source source = { .surface = &build->surface, .draft = &build->draft, .presets = &presets, .pool = build->pool };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)
 		return rc;
 	if (surface_init(&build->surface, build->mesh, build->info.scale) != PSR_OK)
 		return psr_fail(build->err, PSR_ERR_MEMORY, "no memory for the mesh's textures");
+	ray_scene_stipple(build->scene, STIPPLE_PIXELS * 2.0 / build->options->resolution);
 	projection_list(build->projection, 2.0 / build->options->resolution, build->options->tolerance);
 	rc = make_levels(build);
 	if (rc == PSR_OK && draft_group(&build->draft, build->pool) != PSR_OK)
@@ -182,7 +182,6 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 		if (rc != PSR_OK)
 			psr_fail(build->err, rc, "no memory or no numbers for all samples of the model; use a lower resolution");
 	}
-	ray_scene_stipple(build->scene, STIPPLE_PIXELS * build->draft.ds); /* that of level 0, by which losses are judged */
 	source.scene = build->scene;
 	if (rc == PSR_OK)
 		rc = pack_model(out, &build->info, &source, build->err);

@@ -193,7 +193,7 @@ static uint64_t textured_word(const struct surface *surface, const struct surfac
                               const struct psr_material *material, float normal[3])
 {
 	struct footprint footprint = { .surface = surface, .place = place, .material = material,
-		                 .radius = diameter / 2 * surface->scale };
+		                           .radius = diameter / 2 * surface->scale };
 	struct material_values values;
 	float rgba[4];
 
@@ -243,6 +243,25 @@ uint64_t surface_look(const struct surface *surface, const struct surface_place 
 	if (place->is_back)
 		v3f_scale(normal, normal, -1);
 	return word;
+}
+
+float surface_opacity(const struct surface *surface, const struct surface_place *place, double diameter)
+{
+	const struct psr_mesh *mesh = surface->mesh;
+	const struct psr_material *material = &mesh->material[texture_material(mesh, place->prim)];
+	struct footprint footprint = { .surface = surface, .place = place, .material = material,
+		                 .radius = diameter / 2 * surface->scale };
+	double share, jacobian[2][2];
+	float rgba[4], texel[4];
+
+	if (material->alpha != PSR_ALPHA_BLEND)
+		return 1;
+	texture_plain_color(mesh, place->prim, place->u, place->v, rgba);
+	if (place->prim >= mesh->n_triangles)
+		return rgba[3];
+	footprint.has_area = normal_plane(mesh, place->prim, &footprint.plane);
+	return look_up(&footprint, &material->base_texture, MIP_COVERED, texel, &share, jacobian) ? rgba[3] * texel[3]
+	                                                                                           : rgba[3];
 }
 
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,

@@ -43,6 +43,9 @@ uint64_t surface_attr(const struct surface *surface, const struct surface_place 
 uint64_t surface_look(const struct surface *surface, const struct surface_place *place, double diameter,
                       float normal[3]);
 
+/* How much of the light a place of a BLEND material keeps back, 0..1, filtered likewise; 1 of other materials. */
+float surface_opacity(const struct surface *surface, const struct surface_place *place, double diameter);
+
 /* Bends a unit normal as far as it must be for a sample to face `facing`, however it is quantised. */
 void surface_face(float normal[3], const float facing[3]);
 

@@ -28,11 +28,12 @@ enum psr_facing {
 };
 
 /* Rows run from the top down, without gaps. A plane that is NULL is left out. Normal, id and block tell of the sample
- * that a pixel shows; a pixel of weight 0 shows none, though the fill may have given it colour and depth. */
+ * that a pixel shows behind all surfaces that let light through; a pixel of weight 0 shows none, though the fill may have given it colour and depth. */
 struct psr_frame {
 	uint32_t width, height; /* pixels, 1..PSR_MAX_SIDE */
 	uint8_t *rgb;     /* 3 * width * height, sRGB; without it nothing is lit */
-	float *depth;     /* width * height, z' in world units along the view, +inf where nothing is */
+	float *depth;     /* width * height, z' in world units along the view, +inf where nothing is. A surface that lets
+	                   * light through has its depth here where it keeps back half of it, or nothing is behind */
 	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is
 	                   * two-sided; 0, 0, 0 without a sample */
 	uint32_t *id;     /* width * height, index of the instance; UINT32_MAX without a sample */

@@ -36,6 +36,7 @@ enum psr_effect {
 	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
 	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
 	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with the surface behind */
+	PSR_EFFECT_SHEER,     /* count: pixels with surfaces that let a part of the light through */
 	PSR_N_EFFECTS
 };
 enum psr_why {

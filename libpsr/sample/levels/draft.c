@@ -104,9 +104,47 @@ static void set_attributes(struct draft *draft, const struct kept *kept, uint32_
 	}
 }
 
+static int has_sheer(const struct draft *draft, uint32_t first)
+{
+	uint8_t any = 0;
+
+	for (uint32_t i = first; i < draft->n_blocks; i++)
+		any |= draft->block[i].traits;
+	return (any & PSR_BLOCK_SHEER) != 0;
+}
+
+/* Makes two blocks, of the same samples, of each one from `first` on that has both sheer ones and others. */
+static int part_sheer(struct draft *draft, const struct kept *kept, uint32_t *const *block_of, uint32_t first)
+{
+	uint32_t n_blocks = draft->n_blocks - first;
+	uint64_t *sheer = psr_alloc_array(n_blocks, sizeof *sheer);
+	int rc = sheer != NULL ? reserve(draft, (uint64_t)draft->n_blocks + n_blocks, 0) : PSR_ERR_MEMORY;
+
+	if (rc == PSR_OK)
+		memset(sheer, 0, n_blocks * sizeof *sheer);
+	for (uint32_t i = 0; rc == PSR_OK && i < kept->n; i++) {
+		const struct kept_sample *sample = &kept->sample[i];
+
+		if ((sample->traits & PSR_BLOCK_SHEER) != 0)
+			sheer[block_of[sample->projection][sample->patch] - first] |= UINT64_C(1) << sample->sample;
+	}
+	for (uint32_t i = 0; rc == PSR_OK && i < n_blocks; i++) {
+		struct draft_block *block = &draft->block[first + i];
+
+		if (sheer[i] == 0 || sheer[i] == block->part)
+			continue;
+		draft->block[draft->n_blocks] = *block;
+		draft->block[draft->n_blocks++].part = sheer[i];
+		block->part &= ~sheer[i];
+		block->traits &= (uint8_t)~PSR_BLOCK_SHEER;
+	}
+	psr_free(sheer);
+	return rc;
+}
+
 int draft_add(struct draft *draft, const struct sheets *sheets, const struct kept *kept)
 {
-	uint32_t *block_of[N_PROJECTIONS] = { NULL };
+	uint32_t *block_of[N_PROJECTIONS] = { NULL }, first = draft->n_blocks;
 	int rc = reserve(draft, (uint64_t)draft->n_blocks + count_kept(sheets), (uint64_t)draft->n_samples + kept->n);
 
 	for (int i = 0; rc == PSR_OK && i < N_PROJECTIONS; i++) {
@@ -116,6 +154,7 @@ int draft_add(struct draft *draft, const struct sheets *sheets, const struct kep
 	if (rc == PSR_OK) {
 		add_blocks(draft, sheets, block_of);
 		set_attributes(draft, kept, block_of);
+		rc = has_sheer(draft, first) ? part_sheer(draft, kept, block_of, first) : PSR_OK;
 		draft->n_levels++;
 	}
 	for (int i = 0; i < N_PROJECTIONS; i++)

@@ -133,7 +133,7 @@ static int split_block(struct group_blocks *blocks, const struct draft *draft, c
 	int rc = PSR_OK;
 
 	parts->n = 0;
-	for (uint64_t left = block->mask; rc == PSR_OK && left != 0; left &= left - 1) {
+	for (uint64_t left = block->part; rc == PSR_OK && left != 0; left &= left - 1) {
 		unsigned s = (unsigned)__builtin_ctzll(left);
 		float p[3];
 		int n;

@@ -109,6 +109,7 @@ static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size
 	ALLOC(pack->traits, n_blocks);
 	ALLOC(pack->mask, n_blocks);
 	ALLOC(pack->attr, n_samples);
+	ALLOC(pack->opacity, n_samples);
 	ALLOC(pack->attr_offset, n_blocks);
 	ALLOC(pack->run, n_blocks / PSR_RUN_BLOCKS + 1);
 #undef ALLOC
@@ -130,6 +131,7 @@ static void pack_fini(struct pack *pack)
 	psr_free(pack->traits);
 	psr_free(pack->mask);
 	psr_free(pack->attr);
+	psr_free(pack->opacity);
 	psr_free(pack->attr_offset);
 	psr_free(pack->run);
 }
@@ -161,13 +163,14 @@ static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct v
 	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
-static int has_traits(const struct pack *pack)
+/* Of all blocks, OR-ed. */
+static uint8_t find_traits(const struct pack *pack)
 {
 	uint8_t any = 0;
 
 	for (uint32_t i = 0; i < pack->draft->n_blocks; i++)
 		any |= pack->traits[i];
-	return any != 0;
+	return any;
 }
 
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct pack_source *source,
@@ -191,7 +194,8 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.flags = pack->flags;
-	blocks.traits = has_traits(pack) ? pack->traits : NULL;
+	blocks.traits = find_traits(pack) != 0 ? pack->traits : NULL;
+	blocks.opacity = (find_traits(pack) & PSR_BLOCK_SHEER) != 0 ? pack->opacity : NULL;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;
@@ -214,7 +218,7 @@ int pack_model(struct psr_model **out, struct psr_model_info *info, const struct
                struct psr_error *err)
 {
 	const struct draft *draft = source->draft;
-	struct pack pack = { .scene = source->scene, .draft = draft };
+	struct pack pack = { .scene = source->scene, .surface = source->surface, .draft = draft };
 	struct order *order = psr_alloc_array(draft->n_blocks, sizeof *order);
 	uint64_t n_samples = count_samples(draft);
 	int rc = order != NULL ? PSR_OK : PSR_ERR_MEMORY;

@@ -8,6 +8,7 @@
 
 struct pack_source {
 	const struct ray_scene *scene; /* of the object, at the stipple of level 0 */
+	const struct surface *surface; /* for opacities */
 	const struct draft *draft;     /* joined */
 	const struct psr_presets *presets;
 	struct psr_pool *pool;

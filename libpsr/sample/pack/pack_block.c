@@ -142,6 +142,28 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		pack->cone[k][i] = axis[k];
 }
 
+/* Of a sample of a sheer block, filtered as its attributes are. */
+static uint8_t find_opacity(const struct pack *pack, const struct draft_block *block, unsigned s)
+{
+	uint32_t surface = draft_sample(pack->draft, block, s)->surface;
+	struct surface_place place = { .prim = surface & ~SURFACE_BACK, .is_back = (surface & SURFACE_BACK) != 0 };
+	double p[3], pixel = pack->draft->ds * (double)(1u << block->level);
+	struct ray ray;
+
+	draft_project(pack->draft, block, s, p);
+	sheets_ray(&pack->draft->projection[block->projection], p[0], p[1], &ray);
+	ray_locate(pack->scene, &ray, place.prim, &place.u, &place.v);
+	return (uint8_t)(surface_opacity(pack->surface, &place, 1.4142135623730951 * pixel) * 255 + 0.5f);
+}
+
+static void find_opacities(struct pack *pack, uint32_t at, const struct draft_block *block)
+{
+	for (uint64_t left = block->part; left != 0; left &= left - 1, at++)
+		pack->opacity[at] = (block->traits & PSR_BLOCK_SHEER) != 0
+		                            ? find_opacity(pack, block, (unsigned)__builtin_ctzll(left))
+		                            : PSR_OPAQUE;
+}
+
 static void place_block(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	if (i % PSR_RUN_BLOCKS == 0)
@@ -163,6 +185,7 @@ void pack_block(struct pack *pack, uint32_t i, const struct draft_block *block)
 	quantise(pack, i, pack->n_samples, block, min[2], max[2]);
 	bound_block(pack, i, pack->n_samples, block);
 	bound_normals(pack, i, block);
+	find_opacities(pack, pack->n_samples, block);
 	pack->n_samples += (uint32_t)__builtin_popcountll(block->part);
 }
 

@@ -6,13 +6,14 @@
 
 struct pack {
 	const struct ray_scene *scene;
+	const struct surface *surface;
 	const struct draft *draft;
 	struct psr_cluster *cluster;
 	struct psr_run *run;
 	int16_t *center[3];
 	uint16_t *radius;
 	int8_t *cone[3];
-	uint8_t *cone_sine, *block_projection, *flags, *traits;
+	uint8_t *cone_sine, *block_projection, *flags, *traits, *opacity;
 	uint16_t *attr_offset, *depth;
 	uint64_t *mask, *attr;
 	uint32_t n_clusters, n_samples; /* so far */

@@ -87,6 +87,8 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 			continue;
 		level->block[level->n_blocks++] = i;
 		level->spacing = spacing > level->spacing ? spacing : level->spacing;
+		if (psr_blocks_is_sheer(b, i)) /* hides nothing */
+			continue;
 		if (level->n_runs == 0 || level->run[level->n_runs - 1][1] != first)
 			level->run[level->n_runs++][0] = first;
 		level->run[level->n_runs - 1][1] = first + n;

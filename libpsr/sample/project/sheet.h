@@ -35,7 +35,7 @@ struct patch {
 	int16_t col, row;   /* in blocks */
 	uint64_t mask;      /* hits; */
 	uint64_t kept;      /* those that the model keeps: sheets_keep(); */
-	uint64_t first;     /* and the first of their rays, which nothing hides */
+	uint64_t first;     /* and the first of their rays but for sheer ones: nothing hides them */
 	uint16_t n_wanted;  /* places that it could cover, and nothing did: sheets_want() */
 	uint8_t two_sided;  /* sampling_is_sheet(), the same of all hits */
 };

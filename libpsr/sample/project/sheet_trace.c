@@ -45,6 +45,7 @@ static void strip_fini(struct strip *strip)
 static int add_hits(const struct job *job, struct strip *strip, const struct ray_hit *ray_hit, int n_hits)
 {
 	const float *z_axis = job->sheets[0]->projection.axis[2];
+	int is_first = 1;
 
 	if (strip->n + (size_t)n_hits > strip->capacity) {
 		size_t capacity = 2 * strip->capacity + 4096;
@@ -57,13 +58,15 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 	}
 	for (int k = 0; k < n_hits; k++) {
 		uint32_t prim = ray_hit[k].prim;
+		const int was_first = is_first;
 
+		is_first &= ray_scene_is_sheer(job->sampling->scene, prim, ray_hit[k].u, ray_hit[k].v);
 		if (fabsf(v3f_dot(ray_scene_normal(job->sampling->scene, prim), z_axis)) < SHEET_LEAST_COSINE)
 			continue;
 		strip->hit[strip->n++] = (struct strip_hit){ .z = (float)(SHEET_START - ray_hit[k].t),
 			                                         .surface = prim | (ray_hit[k].is_back ? SURFACE_BACK : 0),
 			                                         .two_sided = (uint8_t)sampling_is_sheet(job->sampling, prim),
-			                                         .is_first = k == 0 };
+			                                         .is_first = was_first != 0 };
 	}
 	return PSR_OK;
 }

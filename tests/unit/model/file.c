@@ -176,7 +176,7 @@ static void bytes_after_the_end_are_refused(void **state)
 	memcpy(longer, image, n_image);
 	for (size_t extra = 1; extra <= 64; extra++) {
 		assert_int_equal(parse(longer, n_image + extra, &err), PSR_ERR_FORMAT);
-		assert_non_null(strstr(err.text, "follow the end of the last section, ATTR at byte"));
+		assert_non_null(strstr(err.text, "follow the end of the last section, OPAC at byte"));
 	}
 	free(longer);
 }

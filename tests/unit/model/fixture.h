@@ -20,7 +20,7 @@ struct fixture {
 	int16_t center[3][FIXTURE_BLOCKS];
 	struct psr_run run;
 	int8_t cone[3][FIXTURE_BLOCKS];
-	uint8_t cone_sine[FIXTURE_BLOCKS], traits[FIXTURE_BLOCKS];
+	uint8_t cone_sine[FIXTURE_BLOCKS], traits[FIXTURE_BLOCKS], opacity[FIXTURE_SAMPLES];
 	uint8_t block_projection[FIXTURE_BLOCKS], flags[FIXTURE_BLOCKS];
 	uint16_t radius[FIXTURE_BLOCKS];
 	uint16_t attr_offset[FIXTURE_BLOCKS], depth[FIXTURE_SAMPLES];
@@ -80,6 +80,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		for (int s = 0; s < PSR_BLOCK_SAMPLES; s++) {
 			if (f->mask[i] >> s & 1) {
 				f->depth[n] = (uint16_t)fixture_random(&state);
+				f->opacity[n] = (uint8_t)(37 * n);
 				f->attr[n++] = fixture_random(&state);
 			}
 		}
@@ -116,6 +117,7 @@ static inline void fixture_init(struct fixture *f, int with_optional)
 		f->blocks.cone_z = f->cone[2];
 		f->blocks.cone_sine = f->cone_sine;
 		f->blocks.traits = f->traits;
+		f->blocks.opacity = f->opacity;
 		f->blocks.n_masks = FIXTURE_MASKS;
 		f->blocks.visibility_index = f->visibility_index;
 		f->blocks.visibility_mask = (const uint64_t(*)[2])f->visibility_mask;

@@ -304,6 +304,10 @@ static void masks_need_their_indices_and_their_number(void **state)
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
 	assert_non_null(strstr(err.text, "traits, but no cones"));
 	fixture_init(&f, 1);
+	f.blocks.traits = NULL;
+	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
+	assert_non_null(strstr(err.text, "opacities, but its blocks have no traits"));
+	fixture_init(&f, 1);
 	f.run.visibility_first = 1;
 	f.visibility_index[5] = FIXTURE_MASKS - 1;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_FORMAT);
@@ -324,14 +328,14 @@ static void every_required_section_is_missed(void **state)
 
 		file_put(entry_of(bytes, section_table[k].type) + ENTRY_FLAGS, 2, 0);
 		memcpy(entry_of(bytes, section_table[k].type), "GONE", 4);
-		/* Of the optional ones a cone needs its four parts, a mask both; the others stand for themselves. */
-		if (k == SECTION_CAMERAS || k == SECTION_LIGHTS || strcmp(section_table[k].type, "TRTS") == 0)
+		/* Of the optional ones a cone needs its four parts, a mask both, opacities the traits. */
+		if (k == SECTION_CAMERAS || k == SECTION_LIGHTS || strcmp(section_table[k].type, "OPAC") == 0)
 			expected = PSR_OK;
 		assert_int_equal(parse_sealed(bytes, n_bytes, &err), expected);
 		if (section_table[k].flags & ENTRY_REQUIRED)
 			assert_non_null(strstr(err.text, section_table[k].type));
 		else if (expected != PSR_OK)
-			assert_non_null(strstr(err.text, "are missing"));
+			assert_non_null(strstr(err.text, strcmp(section_table[k].type, "TRTS") == 0 ? "OPAC needs TRTS" : "are missing"));
 	}
 }
 
@@ -350,15 +354,15 @@ static void lies_in_header_and_table_are_refused(void **state)
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },
 		{ NULL, HEADER_FILE_SIZE, 8, UINT64_MAX, "the header says 18446744073709551615 bytes" },
-		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 832 has 184 bytes, which reach beyond the file's end" },
-		{ NULL, 28, 4, 1, "4864 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
+		{ NULL, HEADER_FILE_SIZE, 8, 64, "section INFO at byte 896 has 184 bytes, which reach beyond the file's end" },
+		{ NULL, 28, 4, 1, "5120 bytes follow the end of the file's last chunk" }, /* it is packed, says byte 28 */
 		{ NULL, 48, 8, 1, "reserved bytes of the header are not zero" },
 		{ "MASK", ENTRY_OFFSET, 8, 0, "section MASK begins at byte 0 instead of" },
 		{ "MASK", ENTRY_OFFSET, 8, UINT64_MAX, "section MASK begins at byte 18446744073709551615 instead of" },
 		{ "MASK", ENTRY_LENGTH, 8, UINT64_MAX, "reach beyond the file's end" },
 		{ "MASK", ENTRY_LENGTH, 8, 40, "is not zero" },
 		{ "MASK", ENTRY_LENGTH, 8, 49, "has 49 bytes and should have 48" },
-		{ "ATTR", ENTRY_LENGTH, 8, 8 * FIXTURE_SAMPLES + 137, "reach beyond the file's end" },
+		{ "OPAC", ENTRY_LENGTH, 8, FIXTURE_SAMPLES + 201, "reach beyond the file's end" },
 		{ "MASK", ENTRY_TYPE, 4, 0x58485053, "there are two sections SPHX" },
 		{ "MASK", ENTRY_FLAGS, 2, 3, "has unknown flags 0x3" },
 		{ "MASK", ENTRY_FLAGS, 2, 0, "section MASK at byte" },

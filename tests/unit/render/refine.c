@@ -8,6 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
+#include "base/direction.h"
 #include "base/pool.h"
 #include "render/splat.h"
 #include "tests/unit/lib/shapes.h"
@@ -493,6 +494,70 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 		assert_int_equal(weight[i], i / WIDTH == 12 && i % WIDTH < WIDTH / 2 ? 0 : WEIGHT_ONE);
 }
 
+/* Of a gap of so many rows, all across a picture whose cells are eight pixels wide and all have samples, between what
+ * has depth 2 and faces along normal[0], and what has another depth and normal: how many rows are closed. */
+static uint32_t n_rows_closed(uint32_t n_rows, float beyond, const float normal[2][3])
+{
+	enum { WIDTH = 64, HEIGHT = 32, CELLS_X = WIDTH / 8 + 2, CELLS_Y = HEIGHT / 8 + 2, FIRST = 12 };
+	const struct psr_run run = { 0, 0 };
+	const uint64_t mask = 3, attr[2] = { psr_direction_encode(normal[0]), psr_direction_encode(normal[1]) };
+	const uint16_t offset = 0;
+	const struct psr_blocks blocks = { .n_blocks = 1, .run = &run, .mask = &mask, .attr_offset = &offset,
+		                               .attr = attr };
+	struct plan_instance instance = { .cull = { .blocks = &blocks },
+		                              .turn = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } } };
+	const struct plan plan = { .gap_scale = { [1] = 1.03f, [3] = 1.12f, [4] = 1.24f }, .n_instances = 1,
+		                       .instance = &instance };
+	uint64_t word[WIDTH * HEIGHT];
+	uint16_t weight[WIDTH * HEIGHT];
+	float cell[CELLS_X * CELLS_Y];
+	uint8_t bricks[2], is_inside[WIDTH / 8 * HEIGHT / 8];
+	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
+	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
+
+	stack.level[3].z = cell;
+	stack.level[3].width = CELLS_X;
+	stack.level[3].height = CELLS_Y;
+	memset(is_inside, 1, sizeof is_inside);
+	for (uint32_t i = 0; i < CELLS_X * CELLS_Y; i++)
+		cell[i] = 2;
+	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
+		const uint32_t y = i / WIDTH;
+		const float z = y < FIRST ? 2 : beyond;
+		uint32_t bits;
+		memcpy(&bits, &z, sizeof bits);
+		word[i] = y - FIRST < n_rows ? PSR_WORD_EMPTY : (uint64_t)bits << 32 | (y >= FIRST);
+		weight[i] = WEIGHT_ONE;
+	}
+	const uint32_t n_closed = splat_close(&plan, &stack, &inside, 0, HEIGHT, weight, bricks);
+	assert_int_equal(n_closed % WIDTH, 0);
+	return n_closed / WIDTH;
+}
+
+/* A cell is one to two samples wide, a crack at most half a cell: four rows. */
+static void gaps_as_wide_as_samples_stay_open(void **state)
+{
+	static const float same[2][3] = { { 0, 0, -1 }, { 0, 0, -1 } };
+
+	(void)state;
+	assert_int_equal(n_rows_closed(4, 2, same), 4);
+	assert_int_equal(n_rows_closed(5, 2, same), 0);
+}
+
+/* As rims of two round bars beside each other, or a bar before a wall. */
+static void gaps_between_what_turns_away_stay_open(void **state)
+{
+	static const float same[2][3] = { { 0, 0, -1 }, { 0, 0, -1 } };
+	static const float bars[2][3] = { { 0, 0.8f, -0.6f }, { 0, -0.8f, -0.6f } };
+
+	(void)state;
+	assert_int_equal(n_rows_closed(3, 2, same), 3);
+	assert_int_equal(n_rows_closed(3, 2, bars), 0);
+	assert_int_equal(n_rows_closed(3, 2.2f, same), 3);
+	assert_int_equal(n_rows_closed(3, 2.3f, same), 0); /* beyond level 3's threshold, 2.24 */
+	assert_int_equal(n_rows_closed(1, 2.2f, bars), 1); /* too narrow to tell */
+}
+
 /* Where samples are magnified, cells about a crack may have none, and what is before nothing on one side of a surface's
  * end stays so. The surface is x < 48, and row 12 its crack; everything is inside. */
 static void cracks_of_magnified_samples_are_closed_beside_empty_cells(void **state)
@@ -544,6 +609,8 @@ int main(void)
 		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
 		cmocka_unit_test(discs_lie_on_the_plane_of_their_neighbors_whatever_the_normals),
 		cmocka_unit_test(cracks_are_closed_inside_of_the_plain_frame),
+		cmocka_unit_test(gaps_as_wide_as_samples_stay_open),
+		cmocka_unit_test(gaps_between_what_turns_away_stay_open),
 		cmocka_unit_test(cracks_of_magnified_samples_are_closed_beside_empty_cells),
 	};
 	return cmocka_run_group_tests(tests, open_models, close_models);

@@ -1,0 +1,312 @@
+/* Surfaces that let a part of the light through: layer by layer, from the nearest on, over the finished picture. */
+#include <math.h>
+#include <stdatomic.h>
+#include <stdlib.h>
+#include "base/maths.h"
+#include "base/mem.h"
+#include "base/srgb.h"
+#include "base/vec.h"
+#include "block.h"
+#include "shade.h"
+#include "sheer.h"
+#include "splat.h"
+
+/* What lies behind eight layers of one half shows less than a code of 8 bits. */
+#define MOST_LAYERS 8
+/* Light that is left, below which nothing further is looked for: less than half a code of 8 bits anywhere. */
+#define LEAST_THROUGH (1.0f / 8192)
+/* Steps of the lattice that a layer is thick, across the surface. Of the discs of one surface that overlap at a pixel,
+ * one may be nearer than the next by its rim, a step, and as much by its slope. Along the line of sight it is as much
+ * thicker as the surface is steep, up to ten times at silhouettes. */
+#define LAYER_STEPS 3.0f
+#define LEAST_COSINE 0.1f
+
+/* A tile's layers, in rows WARP_OWN_STRIDE apart. */
+struct sheer_tile {
+	struct sheer_list list;
+	uint32_t next[WARP_OWN_WORDS]; /* of the list */
+	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
+	float beyond[WARP_OWN_WORDS];  /* z' where it ends */
+	float before[WARP_OWN_WORDS];  /* z' of the picture without */
+	float first[WARP_OWN_WORDS];   /* z' of the first one, or infinity */
+	float through[WARP_OWN_WORDS]; /* light of what is behind that is left */
+	float light[3][WARP_OWN_WORDS];
+	struct strip_pixels pixels;
+	struct strip strip;
+};
+
+struct drawing {
+	const struct simd *simd;
+	const struct plan *plan;
+	const struct bins *bins;
+	const struct sheer_picture *picture;
+	struct sheer_tile *tile; /* one a thread */
+	float to_world[2], to_stack[2]; /* by two factors, since one of them may be beyond a float */
+	_Atomic uint32_t next_tile;
+	_Atomic uint64_t n_pixels;
+	atomic_int failed;
+};
+
+/* Pixels of a tile: columns from its left edge, and rows. */
+struct area {
+	uint32_t x0, y0, width, low_y, high_y;
+};
+
+/* Whether a block keeps back half of the light or more. */
+static int casts_shadow(const struct psr_blocks *b, uint32_t block)
+{
+	const uint8_t *opacity = b->opacity + psr_blocks_attr_first(b, block);
+	const int n = __builtin_popcountll(b->mask[block]);
+	int sum = 0;
+	for (int i = 0; i < n; i++)
+		sum += opacity[i];
+	return 2 * sum >= n * PSR_OPAQUE;
+}
+
+static int is_sheer(const struct plan *plan, const struct bin_entry *entry)
+{
+	const struct plan_instance *in = &plan->instance[entry->instance];
+	const uint32_t block = entry->slot - in->first_slot;
+	return psr_blocks_is_sheer(in->cull.blocks, block) && !(plan->is_shadow && casts_shadow(in->cull.blocks, block));
+}
+
+uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile)
+{
+	uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
+	if (!plan->has_sheer)
+		return end;
+	while (begin < end) {
+		const struct bin_entry entry = bins->entry[begin];
+		if (!is_sheer(plan, &entry)) {
+			begin++;
+			continue;
+		}
+		bins->entry[begin] = bins->entry[--end];
+		bins->entry[end] = entry;
+	}
+	return end;
+}
+
+/* The rows that any of the blocks may show in. */
+static void find_area(struct area *area, const struct drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
+{
+	const struct plan *plan = d->plan;
+	area->x0 = tile % plan->tiles_x * TILE_WIDTH;
+	area->y0 = tile / plan->tiles_x * TILE_HEIGHT;
+	area->width = plan->width - area->x0 < TILE_WIDTH ? plan->width - area->x0 : TILE_WIDTH;
+	const uint32_t end_y = plan->height - area->y0 < TILE_HEIGHT ? plan->height : area->y0 + TILE_HEIGHT;
+	area->low_y = end_y;
+	area->high_y = area->y0;
+	for (uint32_t e = begin; e < end; e++) {
+		const struct cull_hit *hit = &d->bins->hit[d->bins->entry[e].hit];
+		area->low_y = hit->y0 < area->low_y ? hit->y0 : area->low_y;
+		area->high_y = hit->y1 >= area->high_y ? hit->y1 + 1u : area->high_y;
+	}
+	area->low_y = area->low_y > area->y0 ? area->low_y : area->y0;
+	area->high_y = area->high_y < end_y ? area->high_y : end_y;
+}
+
+static size_t place_of(const struct area *area, uint32_t y)
+{
+	return (size_t)(y - area->y0) * WARP_OWN_STRIDE;
+}
+
+static void begin_layers(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+{
+	for (uint32_t y = area->low_y; y < area->high_y; y++) {
+		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
+		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
+			l->next[at] = SHEER_END;
+			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
+			l->beyond[at] = 0;
+			l->first[at] = INFINITY;
+			l->through[at] = 1;
+			l->light[0][at] = l->light[1][at] = l->light[2][at] = 0;
+		}
+	}
+}
+
+/* Of a layer, in z', at a sample of the instance that shows at a pixel. */
+static float thickness_of(const struct warp_instance *in, uint64_t attr, uint32_t x, uint32_t y, float rim)
+{
+	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)], u = (float)x + 0.5f, v = (float)y + 0.5f;
+	float d[3];
+	for (int k = 0; k < 3; k++)
+		d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
+	const float cosine = __builtin_fabsf(v3f_dot(n, d)) / __builtin_sqrtf(v3f_dot(d, d));
+	return LAYER_STEPS * rim / (cosine > LEAST_COSINE ? cosine : LEAST_COSINE);
+}
+
+/* Pixel (x, y) of the layer, of this colour. */
+static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, uint32_t id, uint32_t x, uint32_t y,
+                      const uint16_t color[3])
+{
+	const uint32_t i = plan_find_instance(plan, id / PSR_BLOCK_SAMPLES);
+	const struct plan_instance *in = &plan->instance[i];
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot;
+	const size_t sample = block_index(b, block, id % PSR_BLOCK_SAMPLES);
+	const uint32_t opacity = b->opacity[sample];
+	const float z = psr_float_from_bits((uint32_t)(l->word[at] >> 32)), back = (float)opacity * (1.0f / PSR_OPAQUE);
+	const float share = l->through[at] * back;
+	for (int c = 0; c < 3; c++)
+		l->light[c][at] += share * ((float)color[c] * (1.0f / 65535));
+	l->through[at] = opacity == PSR_OPAQUE ? 0 : l->through[at] - share;
+	l->first[at] = z < l->first[at] ? z : l->first[at];
+	l->beyond[at] = l->through[at] < LEAST_THROUGH
+	                        ? INFINITY
+	                        : z + thickness_of(&plan->warp[i], b->attr[sample], x, y, splat_rim(in, block));
+}
+
+/* The nearest words beyond the layers before. */
+static void find_layer(struct sheer_tile *l, const struct area *area)
+{
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
+			uint32_t i = l->next[at];
+			while (i != SHEER_END && !(psr_float_from_bits((uint32_t)(l->list.word[i].word >> 32)) > l->beyond[at]))
+				i = l->list.word[i].next;
+			l->next[at] = i;
+			l->word[at] = i != SHEER_END ? l->list.word[i].word : PSR_WORD_EMPTY;
+		}
+}
+
+/* Returns how many pixels the layer has. */
+static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+{
+	uint64_t n_pixels = 0;
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (uint32_t x = 0; x < area->width; x += STRIP) {
+			const uint32_t n = area->width - x < STRIP ? area->width - x : STRIP;
+			const size_t first = place_of(area, y) + x;
+			l->pixels.x0 = area->x0 + x;
+			l->pixels.y = y;
+			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
+			for (uint32_t i = 0; i < n_found; i++) {
+				const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
+				const uint32_t at = l->pixels.x[i];
+				add_pixel(l, d->plan, first + at, l->pixels.id[i], area->x0 + x + at, y, color);
+			}
+			n_pixels += n_found;
+		}
+	return n_pixels;
+}
+
+static uint8_t mix(const uint8_t *srgb, float light, float through, uint8_t code)
+{
+	const float mixed = light + through * psr_srgb_to_linear[code];
+	return srgb[(int32_t)((mixed < 1 ? mixed : 1) * 65535 + 0.5f)];
+}
+
+static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, const struct area *area)
+{
+	const struct sheer_picture *p = d->picture;
+	uint64_t n_pixels = 0;
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (uint32_t x = 0; x < area->width; x++) {
+			const size_t from = place_of(area, y) + x, to = (size_t)y * d->plan->width + area->x0 + x;
+			if (!(l->first[from] < INFINITY))
+				continue;
+			for (size_t c = 0; p->rgb && c < 3; c++)
+				p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
+			if (l->through[from] <= 0.5f || !(p->depth[to] < INFINITY))
+				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
+			n_pixels++;
+		}
+	return n_pixels;
+}
+
+static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
+{
+	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
+	const struct psr_zstack stack = { .levels = 0 };
+	struct warp_target target;
+	struct area area;
+	if (begin == end)
+		return;
+	find_area(&area, d, tile, begin, end);
+	begin_layers(l, d, &area);
+	warp_target_make(&target, d->plan, &stack, tile, l->word);
+	target.y0 = (int32_t)area.low_y;
+	target.y1 = (int32_t)area.high_y;
+	l->list.before = l->before + place_of(&area, area.low_y);
+	l->list.first = l->next + place_of(&area, area.low_y);
+	l->list.n = 0;
+	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
+	if (l->list.failed) {
+		atomic_store(&d->failed, 1);
+		return;
+	}
+	for (int layer = 0; layer < MOST_LAYERS; layer++) {
+		find_layer(l, &area);
+		if (!add_layer(l, d, &area))
+			break;
+	}
+	atomic_fetch_add(&d->n_pixels, end_layers(l, d, &area));
+}
+
+static void draw_some(int part, void *userdata)
+{
+	struct drawing *d = userdata;
+	const uint32_t n_tiles = d->plan->tiles_x * d->plan->tiles_y;
+	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
+		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
+}
+
+/* Exact unless the result is beyond a float. */
+static void find_factors(float factor[2], int exponent)
+{
+	const int clamped = exponent < -252 ? -252 : exponent > 252 ? 252 : exponent;
+	factor[0] = psr_float_from_bits((uint32_t)(127 + clamped / 2) << 23);
+	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - clamped / 2) << 23);
+}
+
+static int make_tiles(struct sheer *sheer, int n)
+{
+	struct sheer_tile *tile = realloc(sheer->tile, (size_t)n * sizeof *tile);
+	if (!tile)
+		return PSR_ERR_MEMORY;
+	for (int i = sheer->n_tiles; i < n; i++)
+		tile[i].list = (struct sheer_list){ .n = 0 };
+	sheer->tile = tile;
+	sheer->n_tiles = n;
+	return PSR_OK;
+}
+
+int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
+               const struct sheer_picture *picture, struct psr_pool *pool)
+{
+	const int n_parts = psr_pool_threads(pool);
+	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture };
+	if (n_parts > sheer->n_tiles && make_tiles(sheer, n_parts))
+		return PSR_ERR_MEMORY;
+	d.tile = sheer->tile;
+	find_factors(d.to_world, picture->exponent);
+	find_factors(d.to_stack, -picture->exponent);
+	psr_pool_for(pool, n_parts, draw_some, &d);
+	sheer->n_pixels = d.n_pixels;
+	return d.failed ? PSR_ERR_MEMORY : PSR_OK;
+}
+
+float *sheer_depths(struct sheer *sheer, const struct plan *plan)
+{
+	const size_t size = (size_t)plan->width * plan->height * sizeof *sheer->depth;
+	sheer->depth = psr_grow_huge(sheer->depth, &sheer->depth_size, size);
+	return sheer->depth;
+}
+
+void sheer_clear(struct sheer *sheer)
+{
+	for (int i = 0; i < sheer->n_tiles; i++)
+		free(sheer->tile[i].list.word);
+	free(sheer->tile);
+	psr_free_huge(sheer->depth, sheer->depth_size);
+}
+
+uint64_t sheer_bytes(const struct sheer *sheer)
+{
+	uint64_t n = sheer->depth_size + (uint64_t)sheer->n_tiles * sizeof *sheer->tile;
+	for (int i = 0; i < sheer->n_tiles; i++)
+		n += sheer->tile[i].list.capacity * sizeof *sheer->tile[i].list.word;
+	return n;
+}
