@@ -1,8 +1,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/json.h"
+#include "base/outfile.h"
+#include "client/cli/cli.h"
 #include "client/scene/preset.h"
-#include "psr.h"
+#include "commands.h"
 
 static const char *state_name(uint8_t state)
 {
@@ -11,7 +14,7 @@ static const char *state_name(uint8_t state)
 	return names[state < sizeof names / sizeof names[0] ? state : 0];
 }
 
-/* Why models of state failed are not served: `why` has n texts, "" of the others. */
+/* Fills in why[i] of each model that failed; the others keep "". */
 static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *entries, uint32_t n,
                         struct psr_client *client, int timeout_ms, struct psr_error *err)
 {
@@ -23,7 +26,7 @@ static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *
 			continue;
 		code = psr_client_open(client, entries[i].name, NULL, NULL, timeout_ms, &opened, err);
 		if (code == PSR_OK)
-			entries[i].state = PSR_ENTRY_LOADED; /* somebody mended it */
+			entries[i].state = PSR_ENTRY_LOADED; /* mended meanwhile */
 		else if (code == PSR_ERR_CONNECTION || code == PSR_ERR_PROTOCOL)
 			return code;
 		else
@@ -44,7 +47,7 @@ static int print_table(const struct psr_msg_list_entry *entries, char (*why)[PSR
 	for (uint32_t i = 0; i < n; i++)
 		printf("%-*s  %-6s  %10.2f%s%s\n", width, entries[i].name, state_name(entries[i].state),
 		       (double)entries[i].file_bytes / 1e6, why[i][0] != '\0' ? "  " : "", why[i]);
-	return psr_flush_output(err);
+	return outfile_flush_stdout(err);
 }
 
 static int print_json(const struct psr_msg_list_entry *entries, char (*why)[PSR_ERROR_TEXT], uint32_t n,
@@ -54,19 +57,17 @@ static int print_json(const struct psr_msg_list_entry *entries, char (*why)[PSR_
 
 	for (uint32_t i = 0; i < n; i++) {
 		cJSON *one = cJSON_CreateObject();
-		char id[33];
+		char id[JSON_ID_TEXT];
 
-		for (int k = 0; k < 16; k++)
-			snprintf(id + 2 * k, 3, "%02x", entries[i].content_id[k]);
 		cJSON_AddStringToObject(one, "name", entries[i].name);
 		cJSON_AddStringToObject(one, "state", state_name(entries[i].state));
 		cJSON_AddNumberToObject(one, "bytes", (double)entries[i].file_bytes);
-		cJSON_AddStringToObject(one, "content_id", id);
+		cJSON_AddStringToObject(one, "content_id", json_id(id, entries[i].content_id));
 		if (why[i][0] != '\0')
 			cJSON_AddStringToObject(one, "error", why[i]);
 		cJSON_AddItemToArray(all, one);
 	}
-	return psr_print_json(all, err);
+	return json_print(all, err);
 }
 
 static void print_presets(const struct psr_msg_preset *presets, uint32_t n)
@@ -103,10 +104,10 @@ static int list_presets(struct psr_client *client, const char *model, int json, 
 	if (code == PSR_OK)
 		code = psr_client_presets(client, opened.handle, &presets, &n, timeout_ms, err);
 	if (code == PSR_OK && json) {
-		code = psr_print_json(presets_json(presets, n), err);
+		code = json_print(presets_json(presets, n), err);
 	} else if (code == PSR_OK) {
 		print_presets(presets, n);
-		code = psr_flush_output(err);
+		code = outfile_flush_stdout(err);
 	}
 	free(presets);
 	return code;
@@ -137,15 +138,14 @@ int psr_list_main(int argc, char **argv)
 	int json = 0, code;
 	const struct psr_opt opts[] = {
 		PSR_OPT_SERVER(server),
-		{ "json", 0, PSR_OPT_FLAG, &json, NULL,
-		  "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of presets "
-		  "with kind, type and name.",
-		  0, 0, NULL, NULL },
-		{ "presets", 'p', PSR_OPT_STRING, &model, "NAME",
-		  "Instead of models, the cameras and lights in the file of this one, for --camera and --light preset:NAME.", 0,
-		  0, NULL, NULL },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
+		  .help = "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of "
+		          "presets with kind, type and name." },
+		{ .name = "presets", .letter = 'p', .type = PSR_OPT_STRING, .value = &model, .arg = "NAME",
+		  .help = "Instead of models, the cameras and lights in the file of this one, for --camera and --light "
+		          "preset:NAME." },
 		PSR_OPT_TIMEOUT(timeout),
-		{ NULL, 0, PSR_OPT_FLAG, NULL, NULL, NULL, 0, 0, NULL, NULL },
+		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
 		"psr list [--server ADDR] [--presets NAME] [--json]",

@@ -1,6 +1,8 @@
 #include <stdio.h>
 #include <string.h>
-#include "psr.h"
+#include "base/outfile.h"
+#include "client/cli/cli.h"
+#include "commands.h"
 
 static const struct {
 	const char *name;
@@ -31,11 +33,11 @@ int main(int argc, char **argv)
 
 	if (name != NULL && strcmp(name, "--help") == 0) {
 		print_help();
-		return psr_flush_output(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
+		return outfile_flush_stdout(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
 	}
 	if (name != NULL && strcmp(name, "--version") == 0) {
 		printf("%s\n", PSR_PROGRAM);
-		return psr_flush_output(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
+		return outfile_flush_stdout(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
 	}
 	for (size_t i = 0; name != NULL && i < N_COMMANDS; i++)
 		if (strcmp(name, commands[i].name) == 0)

@@ -1,5 +1,6 @@
-#include "draw.h"
-#include "psr.h"
+#include "client/cli/cli.h"
+#include "client/draw/draw.h"
+#include "commands.h"
 
 static const char footer[] =
 	SCENE_LIGHT_HELP
@@ -18,19 +19,15 @@ static const char footer[] =
 static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error *err)
 {
 	struct optlist list = { .n = 0 };
-	const struct psr_opt output[] = {
-		{ "output", 'o', PSR_OPT_STRING, &wish->output, "FILE",
-		  "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard output, as "
-		  "PNG. Several pictures are numbered by %d or %03d in the name.",
-		  0, 0, NULL, NULL },
-	};
-	const struct psr_opt series[] = {
-		{ "cameras", 0, PSR_OPT_STRING, &wish->cameras, "FILE",
-		  "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options of a "
-		  "camera without dashes. # begins a comment.",
-		  0, 0, NULL, NULL },
-		{ "replay", 0, PSR_OPT_STRING, &wish->replay, "REPORT",
-		  "The picture that wrote this report, with the same bytes; only files are to be named.", 0, 0, NULL, NULL },
+	const struct psr_opt files[] = {
+		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &wish->sink.output, .arg = "FILE",
+		  .help = "The picture. Its ending is the format: .png, .ppm, or any that OpenImageIO writes. - is standard "
+		          "output, as PNG. Several pictures are numbered by %d or %03d in the name." },
+		{ .name = "cameras", .type = PSR_OPT_STRING, .value = &wish->cameras, .arg = "FILE",
+		  .help = "A picture for each line of a text file of words such as azimuth=30 elevation=20 zoom=2: the options "
+		          "of a camera without dashes. # begins a comment." },
+		{ .name = "replay", .type = PSR_OPT_STRING, .value = &wish->replay, .arg = "REPORT",
+		  .help = "The picture that wrote this report, with the same bytes; only files are to be named." },
 	};
 	const struct psr_cli cli = {
 		"psr shot --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",
@@ -40,26 +37,11 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		footer,
 	};
 
-	draw_add_model_options(&list, wish);
-	optlist_heading(&list, "Files", NULL);
-	OPTLIST_ADD(&list, output);
-	draw_add_file_options(&list, wish);
-	OPTLIST_ADD(&list, series);
-	draw_add_picture_options(&list, wish);
-	draw_add_developer_options(&list, wish);
+	draw_add_options(&list, wish, files, sizeof files / sizeof files[0]);
 	return psr_cli_parse(&cli, argc, argv, NULL, err);
 }
 
 int psr_shot_main(int argc, char **argv)
 {
-	struct draw_wish wish;
-	struct psr_error err;
-	int code;
-
-	draw_wish_init(&wish, "psr shot");
-	code = parse(&wish, argc, argv, &err);
-	if (code == PSR_OK)
-		code = draw(&wish, &err);
-	draw_wish_fini(&wish);
-	return code >= 0 ? 0 : psr_cli_fail("psr shot", &err);
+	return draw_main("psr shot", parse, argc, argv);
 }

@@ -9,7 +9,8 @@
 #include "accuracy_report.h"
 #include "accuracy_verdict.h"
 #include "base/netpbm.h"
-#include "json.h"
+#include "base/outfile.h"
+#include "base/json.h"
 #include "psr/build.h"
 #include "base/cli.h"
 #include "measure/measure.h"
@@ -249,8 +250,8 @@ static int print(const struct result *result, const struct frame *frame, int has
 			print_shadow_text(&result->shadow);
 		puts(result->text);
 	}
-	if (code == PSR_OK && fflush(stdout) != 0)
-		code = psr_fail(err, PSR_ERR_IO, "standard output cannot be written");
+	if (code == PSR_OK)
+		code = outfile_flush_stdout(err);
 	return code;
 }
 

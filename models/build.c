@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "base/outfile.h"
 #include "psr/build.h"
 #include "base/cli.h"
 #include "psr/mesh.h"
@@ -223,7 +224,7 @@ int cmd_build(int argc, char **argv)
 	else
 		code = build(argv[1], out != NULL ? out : made, &import, &options, is_packed, quiet, &err);
 	free(made);
-	if (code == PSR_OK && fflush(stdout) != 0)
-		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
+	if (code == PSR_OK)
+		code = outfile_flush_stdout(&err);
 	return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
 }

@@ -3,8 +3,9 @@
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
-#include "json.h"
 #include "base/cli.h"
+#include "base/json.h"
+#include "base/outfile.h"
 #include "model/blocks.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
@@ -12,7 +13,7 @@
 /* What both forms of the answer say. */
 struct summary {
 	char name[256];
-	char id[33];
+	char id[JSON_ID_TEXT];
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
 	uint64_t bytes, file_bytes;
@@ -40,8 +41,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	memset(summary, 0, sizeof *summary);
 	take_name(summary->name, path);
 	psr_model_content_id(model, id);
-	for (int i = 0; i < 16; i++)
-		snprintf(summary->id + 2 * i, 3, "%02x", id[i]);
+	json_id(summary->id, id);
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
 	summary->bytes = psr_model_bytes(model);
@@ -252,7 +252,7 @@ int cmd_info(int argc, char **argv)
 			print_text(&summary);
 	}
 	psr_model_unref(model);
-	if (code == PSR_OK && fflush(stdout) != 0)
-		code = psr_fail(&err, PSR_ERR_IO, "standard output cannot be written");
+	if (code == PSR_OK)
+		code = outfile_flush_stdout(&err);
 	return code == PSR_OK ? 0 : psr_cli_fail("psr-model info", &err);
 }

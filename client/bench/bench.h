@@ -1,4 +1,4 @@
-/* The parts of psr bench: workers that ask for frames, and what they measured. */
+/* psr bench: workers that ask for frames, each on a thread and connection of its own, and their figures. */
 #ifndef PSR_CLIENT_BENCH_BENCH_H
 #define PSR_CLIENT_BENCH_BENCH_H
 
@@ -8,7 +8,7 @@
 #include "client/scene/view.h"
 
 #define BENCH_MAX_CLIENTS 1024
-#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers; who has filled his share stops early */
+#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers; one that filled its share stops early */
 
 struct bench_options {
 	const char *server;
@@ -19,7 +19,7 @@ struct bench_options {
 	struct psr_msg_frame frame; /* all but the camera */
 };
 
-/* Workers wait here once they are warm, until the last is: then all start, or none if one failed. */
+/* Warm workers wait here for the last one; then all start, or none if one failed. */
 struct bench_gate {
 	pthread_mutex_t lock;
 	pthread_cond_t changed;
@@ -39,11 +39,11 @@ struct bench_worker {
 	double up[3];
 	uint64_t n_asked;
 	/* results */
-	uint32_t *sample_us; /* latency of each frame asked for within the time, the bench's to free */
+	uint32_t *sample_us; /* latency of each frame asked for within the time; bench_run() frees it */
 	size_t n_samples, samples_capacity;
 	uint64_t n_frames, n_bytes; /* that came within the time */
 	uint64_t n_failed, elapsed_ns;
-	int setup_code;             /* not PSR_OK: it never came to measure */
+	int setup_code;             /* not PSR_OK: it never measured */
 	struct psr_error first_error; /* code 0: none */
 };
 
@@ -54,7 +54,8 @@ struct bench_result {
 	uint64_t n_frames, n_samples, n_failed;
 	double p50_ms, p90_ms, p99_ms, max_ms; /* 0 without samples */
 };
-/* Sorts all samples together; MEMORY. */
-int bench_sum(struct bench_result *result, const struct bench_worker *workers, int64_t n, struct psr_error *err);
+
+/* Runs all workers for the time. Workers that failed meanwhile are told on standard error. */
+int bench_run(struct bench_result *result, const struct bench_options *options, struct psr_error *err);
 
 #endif

@@ -1,7 +1,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "bench.h"
-#include "client/psr.h"
+#include "client/cli/cli.h"
 
 #define FRAMES_A_TURN 120
 
@@ -23,7 +23,7 @@ static int prepare(struct bench_worker *worker, struct psr_error *err)
 
 	worker->frame = options->frame;
 	if (code == PSR_OK)
-		code = view_place(&worker->start, &options->view, worker->client, worker->scene, aspect, FRAMES_A_TURN, err);
+		code = view_place(&worker->start, &options->view, worker->scene, aspect, FRAMES_A_TURN, err);
 	if (code != PSR_OK)
 		return code;
 	view_up(worker->up, &options->view, worker->scene);
@@ -93,7 +93,7 @@ static void note_error(struct bench_worker *worker, uint64_t n_failed, const str
 		worker->first_error = *why;
 }
 
-/* 0 when its share of the samples is used up. */
+/* 0: its share of the samples is used up. */
 static int add_sample(struct bench_worker *worker, uint64_t latency_ns)
 {
 	size_t share = BENCH_MAX_SAMPLES / (size_t)worker->options->n_clients;

@@ -4,13 +4,13 @@
 #include <string.h>
 #include "base/vec.h"
 
-#define ROUGH 1.5 /* pixels between samples: what is finer nobody sees */
+#define ROUGH 1.5 /* pixels between samples; finer ones look no better */
 #define GRID 16
-#define MOST 8192 /* that psr-model builds */
-#define DRAFT 2  /* pixels: who asks for such a spacing wants no better */
+#define MOST 8192 /* resolution that psr-model builds */
+#define DRAFT 2  /* pixels of --spacing: a coarse picture was asked for */
 #define STEP 128  /* of advised resolutions */
 
-/* Depth, and how far to the side of the view in tangents (orthographic: world units) a point is. */
+/* p in the frame of the camera: right, up, forward. */
 static void project(double out[3], const struct psr_msg_camera *camera, const double p[3])
 {
 	double forward[3], right[3], up[3], arm[3];
@@ -38,7 +38,7 @@ static void corner_of(double out[3], const double box_min[3], const double box_m
 		out[i] = corner >> i & 1 ? box_max[i] : box_min[i];
 }
 
-/* Whether the picture may show a point that is seen there. */
+/* Whether a point in the frame of the camera is inside of the picture. */
 static int is_in_picture(const struct psr_msg_camera *camera, const double seen[3], double aspect)
 {
 	double half = camera->kind == PSR_WIRE_CAMERA_ORTHOGRAPHIC ? camera->extent / 2 : seen[2] * tan(camera->extent / 2);
@@ -46,8 +46,8 @@ static int is_in_picture(const struct psr_msg_camera *camera, const double seen[
 	return seen[2] >= camera->near_z && seen[2] > 0 && fabs(seen[1]) <= half && fabs(seen[0]) <= half * aspect;
 }
 
-/* The depth of the nearest point of a model's box that is in the picture, of a grid on its faces: its nearest corner is
- * often beside the picture. Infinite: none is. */
+/* Depth of the nearest visible point of a grid on the faces of the model's box, whose nearest corner is often outside
+ * of the picture. INFINITY: none is visible. */
 static double nearest_depth(const struct scene *scene, uint32_t instance, const struct psr_msg_camera *camera,
                             double aspect)
 {
@@ -73,7 +73,7 @@ static double nearest_depth(const struct scene *scene, uint32_t instance, const 
 	return nearest;
 }
 
-/* No point of the box is nearer; 0: it reaches behind the camera. */
+/* A lower bound of the same; 0: the box reaches behind the camera. */
 static double depth_before(const struct scene *scene, uint32_t instance, const struct psr_msg_camera *camera)
 {
 	const struct psr_msg_opened *opened = &scene->model[scene->model_of[instance]].opened;
@@ -104,7 +104,6 @@ double notes_magnification(const struct scene *scene, uint32_t i, const struct p
 	return z < INFINITY ? apart_at(scene, i, camera, z, height) : 0;
 }
 
-/* Of a picture in which nothing is. */
 static const char *why_empty(const struct scene *scene, const struct psr_msg_camera *camera)
 {
 	int n_before = 0;

@@ -1,10 +1,10 @@
-/* What a person should know of a picture and cannot see in it: sentences on standard error. */
+/* Warnings about pictures, on standard error. */
 #ifndef PSR_CLIENT_OUTPUT_NOTES_H
 #define PSR_CLIENT_OUTPUT_NOTES_H
 
 #include "client/scene/scene.h"
 
-/* Counted over all pictures of a command, and said once each. */
+/* Collected over all pictures of a command; each warning is printed once. */
 struct notes {
 	uint32_t n_pictures, n_empty, n_fewer_passes;
 	unsigned least_pass;
@@ -18,7 +18,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 
 void notes_print(const struct notes *notes, const char *program, const struct psr_msg_frame *asked);
 
-/* Pixels between neighbouring samples of instance i at its nearest part in front of the camera, 0 if none is. */
+/* Pixels between neighbouring samples of instance i at its nearest visible part; 0: it is not visible. */
 double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_msg_camera *camera, uint32_t width,
                            uint32_t height);
 

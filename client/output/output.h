@@ -1,4 +1,4 @@
-/* Where pictures and reports go: files, numbered files, standard output, contact sheets. */
+/* Names of numbered files, and contact sheets. */
 #ifndef PSR_CLIENT_OUTPUT_OUTPUT_H
 #define PSR_CLIENT_OUTPUT_OUTPUT_H
 

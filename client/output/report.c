@@ -1,12 +1,12 @@
-#include <cjson/cJSON.h>
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
-#include "client/scene/effects.h"
+#include "base/json.h"
 #include "base/outfile.h"
 #include "client/replay/replay.h"
+#include "effects.h"
 #include "report.h"
 
 #define DEGREE (3.14159265358979323846 / 180)
@@ -17,12 +17,10 @@ static void add_model(cJSON *to, const struct shot_facts *facts)
 	const struct scene_model *first = &facts->scene->model[0];
 	const struct psr_msg_opened *opened = &first->opened;
 	cJSON *model = cJSON_AddObjectToObject(to, "model"), *list;
-	char id[33];
+	char id[JSON_ID_TEXT];
 
-	for (int i = 0; i < 16; i++)
-		snprintf(id + 2 * i, 3, "%02x", opened->content_id[i]);
 	cJSON_AddStringToObject(model, "name", first->name);
-	cJSON_AddStringToObject(model, "content_id", id);
+	cJSON_AddStringToObject(model, "content_id", json_id(id, opened->content_id));
 	cJSON_AddNumberToObject(model, "samples", (double)opened->n_samples);
 	cJSON_AddNumberToObject(model, "blocks", (double)opened->n_blocks);
 	cJSON_AddNumberToObject(model, "levels", opened->n_levels);
@@ -137,20 +135,12 @@ static cJSON *make_report(const struct shot_facts *facts)
 
 int report_write(const struct shot_facts *facts, const char *path, struct psr_error *err)
 {
-	struct outfile file;
-	cJSON *report = make_report(facts);
-	char *text = cJSON_Print(report);
-	int code = PSR_OK;
+	char *text = json_text(make_report(facts));
+	int code;
 
-	cJSON_Delete(report);
 	if (text == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the report");
-	code = outfile_open(&file, path, OUTFILE_PLAIN, err);
-	if (code == PSR_OK) {
-		outfile_write(&file, text, strlen(text));
-		outfile_write(&file, "\n", 1);
-		code = outfile_close(&file, PSR_OK, err);
-	}
+	code = outfile_save(path, OUTFILE_PLAIN, text, strlen(text), err);
 	free(text);
 	return code;
 }

@@ -9,7 +9,7 @@ struct shot_facts {
 	const struct psr_msg_frame *frame; /* as asked */
 	const struct psr_event *event;     /* of the frame */
 	const char *server;                /* name and version, as WELCOME has it */
-	uint64_t start_ns;                 /* of CLOCK_MONOTONIC, before anything was opened */
+	uint64_t start_ns;                 /* clock_ns() before anything was opened */
 };
 
 /* "-" is standard output. */

@@ -15,7 +15,7 @@ struct canvas {
 	uint8_t *rgb;
 };
 
-/* What painters of samples need. */
+/* Input of the painters of samples. */
 #define OF_SAMPLES (PLANE(DEPTH) | PLANE(NORMAL) | PLANE(WORDS) | PLANE(BLOCK))
 
 typedef void painter(uint8_t rgb[3], const struct canvas *canvas, size_t i);
@@ -54,7 +54,7 @@ static void set_random(uint8_t rgb[3], uint32_t number, double light)
 	set(rgb, light * color[0], light * color[1], light * color[2]);
 }
 
-/* 0..1, of the picture itself. */
+/* Luminance of the picture, 0..1. */
 static double grey_of(const struct canvas *canvas, size_t i)
 {
 	const uint8_t *c = canvas->picture->rgb + 3 * i;
@@ -62,7 +62,7 @@ static double grey_of(const struct canvas *canvas, size_t i)
 	return (0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2]) / 255;
 }
 
-/* As a lamp at the eye lights it. */
+/* Light of a lamp at the eye. */
 static double light_of(const struct canvas *canvas, size_t i)
 {
 	const int16_t *n = canvas->picture->normal + 3 * i;
@@ -134,7 +134,7 @@ static void offer(uint32_t *nearest, const struct canvas *canvas, size_t i, size
 		nearest[i] = k;
 }
 
-/* The nearest pixel that has a sample, or almost: what comes from a neighbour's is looked at, in two passes. */
+/* Almost the nearest pixel with a sample: two passes hand on what the neighbours found. */
 static void find_nearest(uint32_t *nearest, const struct canvas *canvas)
 {
 	size_t width = canvas->picture->width, height = canvas->picture->height, n = width * height;

@@ -1,4 +1,4 @@
-/* Pictures of the stages of a frame, for people, painted from its planes. */
+/* Pictures of a frame's stages, painted from its planes. */
 #ifndef PSR_CLIENT_OUTPUT_SHOW_H
 #define PSR_CLIENT_OUTPUT_SHOW_H
 
@@ -8,8 +8,8 @@
 
 struct show;
 
-const struct show *show_find(const char *name, struct psr_error *err); /* NULL: there is no such stage (ARG) */
-uint32_t show_planes(const struct show *show); /* that it is painted from: bits of enum psr_plane */
+const struct show *show_find(const char *name, struct psr_error *err); /* NULL: no such stage (ARG) */
+uint32_t show_planes(const struct show *show); /* that it needs: bits of enum psr_plane */
 
 /* Paints a frame with those planes and writes it as a colour picture. */
 int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err);

@@ -4,8 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "client/scene/effects.h"
-#include "client/psr.h"
+#include "effects.h"
 #include "report.h"
 
 static int write_color(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
@@ -25,7 +24,7 @@ static int write_color(struct sink *sink, uint32_t k, const struct psr_event *ev
 
 static int write_extra(struct sink *sink, uint32_t k, const struct psr_event *event, struct psr_error *err)
 {
-	const struct draw_wish *wish = sink->wish;
+	const struct sink_wish *wish = sink->wish;
 	char path[PATH_MAX];
 	int code = PSR_OK;
 
@@ -147,7 +146,7 @@ static int print_facts(const struct sink *sink, struct psr_error *err)
 	}
 	if (sink->wish->effects)
 		effects_print(&sink->end);
-	return psr_flush_output(err);
+	return outfile_flush_stdout(err);
 }
 
 int sink_finish(struct sink *sink, int code, struct psr_error *err)

@@ -2,15 +2,30 @@
 #ifndef PSR_CLIENT_OUTPUT_SINK_H
 #define PSR_CLIENT_OUTPUT_SINK_H
 
-#include "client/draw.h"
+#include "client/cli/optlist.h"
 #include "notes.h"
+#include "output.h"
+#include "show.h"
 
-#define SINK_HELD 8 /* pictures that came before their turn: fewer than a series has under way */
+#define SINK_HELD 8 /* pictures ahead of their turn; a series has fewer under way */
+
+struct sink_wish {
+	const char *program; /* "psr shot", for messages */
+	const char *output, *depth, *report, *plane_text, *show_text;
+	uint32_t sheet[2];   /* columns and rows */
+	int hash, effects, has_sheet;
+	int64_t n_turn;      /* pictures of a turntable; 0: it is none */
+	double seconds;      /* a turn of an animation */
+};
+
+/* Options of shot and turntable. */
+void sink_add_file_options(struct optlist *list, struct sink_wish *wish);
+void sink_add_developer_options(struct optlist *list, struct sink_wish *wish);
 
 enum sink_kind { SINK_NONE, SINK_FILE, SINK_NUMBERED, SINK_SHEET, SINK_ANIMATION };
 
 struct sink {
-	const struct draw_wish *wish;
+	const struct sink_wish *wish;
 	const struct scene *scene;
 	const struct psr_msg_frame *frame;
 	uint32_t n; /* pictures */
@@ -34,16 +49,18 @@ struct sink {
 	struct { uint32_t k; uint8_t *rgb; } held[SINK_HELD];
 };
 
-/* What of `wish` can be refused before anything is drawn; chooses kind, show, plane. */
-int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, struct psr_error *err);
+/* For n pictures of this width and height: chooses kind, show and plane, and refuses before anything is drawn. */
+int sink_check(struct sink *sink, const struct sink_wish *wish, uint32_t n, const uint32_t size[2],
+               struct psr_error *err);
 
-/* Planes that the files need: bits of enum psr_plane. */
+/* Planes of the files: bits of enum psr_plane. */
 uint32_t sink_planes(const struct sink *sink);
 
-/* For a series: picture k. */
+/* Takes picture k of a series. */
 int sink_take(uint32_t k, const struct psr_event *event, void *sink, struct psr_error *err);
 
-/* Ends it; the files are whole, and hashes and notes printed, if code is PSR_OK. Returns code, or what failed. */
+/* Completes the files and prints hashes and notes if code is PSR_OK; else drops them. Returns code, or the first
+ * error. */
 int sink_finish(struct sink *sink, int code, struct psr_error *err);
 
 #endif

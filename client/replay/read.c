@@ -3,11 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/infile.h"
+#include "base/json.h"
 #include "replay.h"
 
 #define MAX_BYTES (16 << 20)
 
-/* Members of a report. The first that is missing or of another kind is kept. */
+/* Reads members of a report, and notes the first that is missing or of a wrong type. */
 struct reader {
 	const char *missing;
 };
@@ -166,10 +167,9 @@ static int check_models(const struct scene *scene, const cJSON *models, struct p
 		const char *name = get_string(&reader, item, "name"), *expected = get_string(&reader, item, "content_id");
 
 		for (uint32_t i = 0; i < scene->n_models; i++) {
-			char id[33];
+			char id[JSON_ID_TEXT];
 
-			for (int k = 0; k < 16; k++)
-				snprintf(id + 2 * k, 3, "%02x", scene->model[i].opened.content_id[k]);
+			json_id(id, scene->model[i].opened.content_id);
 			if (strcmp(scene->model[i].name, name) == 0 && strcmp(id, expected) != 0)
 				return psr_fail(err, PSR_ERR_VERSION,
 				                "--replay: the server has another model %.200s than the report's: its "

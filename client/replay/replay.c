@@ -1,28 +1,10 @@
-#include "replay.h"
 #include <stdio.h>
 #include <string.h>
+#include "base/json.h"
+#include "replay.h"
 
 static const char *const light_kinds[] = { "", "directional", "point", "spot" };
 static const char *const camera_kinds[] = { "", "perspective", "orthographic" };
-
-void json_add_number(cJSON *to, const char *name, double v)
-{
-	char text[32];
-
-	snprintf(text, sizeof text, "%.17g", v);
-	cJSON_AddRawToObject(to, name, text);
-}
-
-void json_add_numbers(cJSON *to, const char *name, const double *v, int n)
-{
-	cJSON *array = cJSON_AddArrayToObject(to, name);
-	char text[32];
-
-	for (int i = 0; i < n; i++) {
-		snprintf(text, sizeof text, "%.17g", v[i]);
-		cJSON_AddItemToArray(array, cJSON_CreateRaw(text));
-	}
-}
 
 static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 {
@@ -30,12 +12,6 @@ static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 
 	snprintf(text, sizeof text, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
 	cJSON_AddStringToObject(to, name, text);
-}
-
-static void id_text(char text[33], const uint8_t id[16])
-{
-	for (int i = 0; i < 16; i++)
-		snprintf(text + 2 * i, 3, "%02x", id[i]);
 }
 
 static void add_light(cJSON *to, const struct psr_msg_light *light)
@@ -58,13 +34,12 @@ static void add_scene(cJSON *to, const struct scene *scene)
 {
 	cJSON *models = cJSON_AddArrayToObject(to, "models"), *instances = cJSON_AddArrayToObject(to, "instances");
 	cJSON *lights = cJSON_AddArrayToObject(to, "lights"), *item;
-	char id[33];
+	char id[JSON_ID_TEXT];
 
 	for (uint32_t i = 0; i < scene->n_models; i++) {
 		item = cJSON_CreateObject();
-		id_text(id, scene->model[i].opened.content_id);
 		cJSON_AddStringToObject(item, "name", scene->model[i].name);
-		cJSON_AddStringToObject(item, "content_id", id);
+		cJSON_AddStringToObject(item, "content_id", json_id(id, scene->model[i].opened.content_id));
 		cJSON_AddNumberToObject(item, "resolution", scene->model[i].opened.resolution);
 		cJSON_AddItemToArray(models, item);
 	}

@@ -7,8 +7,8 @@
 #define DEGREE (3.14159265358979323846 / 180)
 #define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]"
 
-/* out = a then b, as rotations: the quaternion b a. */
-static void then(double out[4], const double a[4], const double b[4])
+/* Rotation a, then b: the quaternion b a. */
+static void compose(double out[4], const double a[4], const double b[4])
 {
 	double v[3], cross[3], w = b[3] * a[3] - v3d_dot(b, a), length;
 
@@ -40,7 +40,7 @@ static int parse_rotation(struct psr_msg_instance *place, const char *text, cons
 	degrees = fmod(degrees, 720);
 	v3d_scale(turn, axis, sin(degrees / 2 * DEGREE));
 	turn[3] = cos(degrees / 2 * DEGREE);
-	then(place->rotation, place->rotation, turn);
+	compose(place->rotation, place->rotation, turn);
 	return PSR_OK;
 }
 

@@ -1,4 +1,4 @@
-/* Models in a picture, as people write them. */
+/* A model and its place, as the command line has them. */
 #ifndef PSR_CLIENT_SCENE_INSTANCE_H
 #define PSR_CLIENT_SCENE_INSTANCE_H
 
@@ -7,18 +7,18 @@
 struct instance_wish {
 	char model[PSR_WIRE_MAX_NAME + 1];
 	struct psr_msg_instance place; /* without its handle */
-	uint32_t pixels; /* what psr_client_set_resolution() is told of its model; 0: what the scene says */
+	uint32_t pixels; /* for psr_client_set_resolution(); 0: the scene's */
 };
 
-/* NAME[,at=X,Y,Z][,scale=S][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z; rotations happen one after the other, in
- * their order, about the model's own 0,0,0; `at` is where that comes to stand. ARG. */
+/* NAME[,at=X,Y,Z][,scale=S][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply in their order, about the
+ * model's own 0,0,0, which `at` then places. ARG. */
 int instance_parse(struct instance_wish *wish, const char *text, struct psr_error *err);
 
-/* Coordinates, and a direction, of the model in those of the picture. */
+/* A point, and a direction, of the model in the scene. */
 void instance_apply(double out[3], const struct psr_msg_instance *place, const double point[3]);
 void instance_rotate(double out[3], const struct psr_msg_instance *place, const double v[3]);
 
-/* Grows the box `low`, `high` by that of a model in its place. */
+/* Grows the box low..high by the box of a placed model. */
 void instance_add_box(double low[3], double high[3], const struct psr_msg_instance *place, const double box_min[3],
                       const double box_max[3]);
 

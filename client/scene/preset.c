@@ -1,7 +1,6 @@
-#include "preset.h"
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
+#include "preset.h"
 
 const char *preset_of_light(const char *text)
 {
@@ -18,7 +17,7 @@ const char *preset_type(const struct psr_msg_preset *preset)
 	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
 }
 
-/* "there are 'a', 'b'" as far as it fits. */
+/* Lists the names as far as they fit. */
 static int fail_missing(const struct scene *scene, uint8_t kind, const char *name, struct psr_error *err)
 {
 	const char *what = kind == PSR_WIRE_PRESET_CAMERA ? "camera" : "light";
@@ -38,61 +37,42 @@ static int fail_missing(const struct scene *scene, uint8_t kind, const char *nam
 		used += (size_t)n;
 	}
 	if (names[0] == '\0')
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "the model came without %ss", what);
-	return psr_fail(err, PSR_ERR_NOT_FOUND, "no %s '%.80s' came with the model; there are %s", what, name, names);
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "the model has no %ss", what);
+	return psr_fail(err, PSR_ERR_NOT_FOUND, "the model has no %s '%.80s'; it has %s", what, name, names);
 }
 
-static int check_server(const struct psr_client *client, struct psr_error *err)
+static int check_server(const struct scene *scene, struct psr_error *err)
 {
-	if (psr_client_welcome(client)->capabilities & PSR_CAP_PRESETS)
+	const struct psr_msg_welcome *welcome = psr_client_welcome(scene->client);
+
+	if (welcome->capabilities & PSR_CAP_PRESETS)
 		return PSR_OK;
-	return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server tells no cameras and lights of models (%s)",
-	                psr_client_welcome(client)->server);
+	return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not tell the cameras and lights of models", welcome->server);
 }
 
-static const struct psr_msg_preset *find(const struct scene *scene, uint8_t kind, const char *name)
+int preset_find(const struct psr_msg_preset **out, const struct scene *scene, uint8_t kind, const char *name,
+                struct psr_error *err)
 {
-	for (uint32_t i = 0; i < scene->n_presets; i++)
-		if (scene->preset[i].kind == kind && strcmp(scene->preset[i].name, name) == 0)
-			return &scene->preset[i];
-	return NULL;
-}
-
-int preset_camera(struct psr_msg_camera *camera, const char *name, const struct psr_client *client,
-                  const struct scene *scene, struct psr_error *err)
-{
-	const struct psr_msg_preset *found = find(scene, PSR_WIRE_PRESET_CAMERA, name);
-	int code = check_server(client, err);
+	int code = check_server(scene, err);
 
 	if (code != PSR_OK)
 		return code;
-	if (found == NULL)
-		return fail_missing(scene, PSR_WIRE_PRESET_CAMERA, name, err);
-	*camera = found->camera;
-	return PSR_OK;
+	for (uint32_t i = 0; i < scene->n_presets; i++) {
+		*out = &scene->preset[i];
+		if ((*out)->kind == kind && strcmp((*out)->name, name) == 0)
+			return PSR_OK;
+	}
+	return fail_missing(scene, kind, name, err);
 }
 
-int preset_light(struct psr_msg_light *light, const char *name, const struct psr_client *client,
-                 const struct scene *scene, struct psr_error *err)
+int preset_all_lights(struct psr_msg_scene *msg, const struct scene *scene, struct psr_error *err)
 {
-	const struct psr_msg_preset *found = find(scene, PSR_WIRE_PRESET_LIGHT, name);
-	int code = check_server(client, err);
-
-	if (code != PSR_OK)
-		return code;
-	if (found == NULL)
-		return fail_missing(scene, PSR_WIRE_PRESET_LIGHT, name, err);
-	*light = found->light;
-	return PSR_OK;
-}
-
-int preset_all_lights(struct psr_msg_scene *msg, const struct psr_client *client, const struct scene *scene,
-                      struct psr_error *err)
-{
-	int code = check_server(client, err);
+	int code = check_server(scene, err);
 	uint32_t n = 0;
 
-	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++) {
+	if (code != PSR_OK)
+		return code;
+	for (uint32_t i = 0; i < scene->n_presets; i++) {
 		if (scene->preset[i].kind != PSR_WIRE_PRESET_LIGHT)
 			continue;
 		if (msg->n_lights == PSR_WIRE_MAX_LIGHTS)
@@ -101,7 +81,5 @@ int preset_all_lights(struct psr_msg_scene *msg, const struct psr_client *client
 		msg->light[msg->n_lights++] = scene->preset[i].light;
 		n++;
 	}
-	if (code != PSR_OK)
-		return code;
 	return n != 0 ? PSR_OK : fail_missing(scene, PSR_WIRE_PRESET_LIGHT, "", err);
 }

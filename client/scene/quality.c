@@ -25,27 +25,25 @@ void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t heigh
 void quality_add_options(struct optlist *list, struct quality_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "size", 0, PSR_OPT_SIZE, wish->size, "WxH", "Width and height of the picture in pixels.", 0, 0, NULL,
-		  &wish->n_said },
-		{ "quality", 'q', PSR_OPT_STRING, &wish->name, "NAME",
-		  "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth as "
-		  "print, for a picture to keep; it takes about a hundred times as long.",
-		  0, 0, NULL, &wish->n_said },
-		{ "spacing", 0, PSR_OPT_REAL, &wish->spacing, "PX",
-		  "Detail, in the place of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster.", 0, 0, NULL,
-		  &wish->has_spacing },
-		{ "smooth", 0, PSR_OPT_FLAG, &wish->is_smooth, NULL,
-		  "Quick smoothing for moving pictures, also with --quality draft; --passes for final ones.", 0, 0, NULL,
-		  &wish->n_said },
-		{ "no-smooth", 0, PSR_OPT_FLAG, &wish->is_plain, NULL,
-		  "No smoothing: edges of pixel steps, a quarter less time.", 0, 0, NULL, &wish->n_said },
-		{ "passes", 0, PSR_OPT_INT, &wish->passes, "N",
-		  "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times as long; "
-		  "2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one before.",
-		  0, PSR_MAX_PASS, NULL, &wish->has_passes },
-		{ "codec", 0, PSR_OPT_STRING, &wish->codec, "CODEC",
-		  "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw.", 0, 0, NULL,
-		  &wish->n_said },
+		{ .name = "size", .type = PSR_OPT_SIZE, .value = wish->size, .arg = "WxH", .seen = &wish->n_said,
+		  .help = "Width and height of the picture in pixels." },
+		{ .name = "quality", .letter = 'q', .type = PSR_OPT_STRING, .value = &wish->name, .arg = "NAME",
+		  .seen = &wish->n_said,
+		  .help = "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth "
+		          "as print, for a picture to keep; it takes about a hundred times as long." },
+		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &wish->spacing, .arg = "PX", .seen = &wish->has_spacing,
+		  .help = "Detail, in the place of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster." },
+		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &wish->is_smooth, .seen = &wish->n_said,
+		  .help = "Quick smoothing for moving pictures, also with --quality draft; --passes for final ones." },
+		{ .name = "no-smooth", .type = PSR_OPT_FLAG, .value = &wish->is_plain, .seen = &wish->n_said,
+		  .help = "No smoothing: edges of pixel steps, a quarter less time." },
+		{ .name = "passes", .type = PSR_OPT_INT, .value = &wish->passes, .arg = "N", .max = PSR_MAX_PASS,
+		  .seen = &wish->has_passes,
+		  .help = "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times "
+		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
+		          "before." },
+		{ .name = "codec", .type = PSR_OPT_STRING, .value = &wish->codec, .arg = "CODEC", .seen = &wish->n_said,
+		  .help = "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw." },
 	};
 
 	OPTLIST_ADD(list, opts);

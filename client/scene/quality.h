@@ -1,8 +1,8 @@
-/* How well pictures are drawn: size, detail, smoothing, passes, and how colour travels. */
+/* Size, detail, smoothing, passes and codec of pictures. */
 #ifndef PSR_CLIENT_SCENE_QUALITY_H
 #define PSR_CLIENT_SCENE_QUALITY_H
 
-#include "client/optlist.h"
+#include "client/cli/optlist.h"
 #include "psr/client.h"
 
 struct quality_wish {
@@ -18,7 +18,7 @@ struct quality_wish {
 void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec);
 void quality_add_options(struct optlist *list, struct quality_wish *wish);
 
-/* Checks it and puts it into the request: size, settings, passes, and the codec of colour. ARG, LIMIT. */
+/* Sets size, settings, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
 
 #endif

@@ -1,12 +1,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "client/cli/cli.h"
 #include "preset.h"
-#include "client/psr.h"
 #include "scene.h"
-#include "client/suggest.h"
+#include "suggest.h"
 
-#define HOME "home" /* camera whose up vector is the model's natural one */
+#define HOME "home" /* the camera whose up is the model's natural one */
 
 void scene_close(struct scene *scene)
 {
@@ -18,21 +18,19 @@ void scene_close(struct scene *scene)
 	free(scene);
 }
 
-static int open_model(struct scene_model *model, struct psr_client *client, uint32_t pixels, int is_quiet,
-                      int timeout_ms, struct psr_error *err)
+static int open_model(struct scene_model *model, struct psr_client *client, int is_quiet, int timeout_ms,
+                      struct psr_error *err)
 {
 	struct psr_progress_line line = { 0 };
 	int code;
 
-	psr_client_set_resolution(client, pixels);
 	code = psr_client_open(client, model->name, is_quiet ? NULL : psr_progress_draw, &line, timeout_ms, &model->opened,
 	                       err);
 	psr_progress_end(&line);
 	return code == PSR_ERR_NOT_FOUND ? suggest_model(client, model->name, timeout_ms, err) : code;
 }
 
-static int open_models(struct scene *scene, const struct scene_wish *wish, struct psr_client *client, int timeout_ms,
-                       struct psr_error *err)
+static int open_models(struct scene *scene, const struct scene_wish *wish, int timeout_ms, struct psr_error *err)
 {
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
 		uint32_t k = 0, pixels = wish->instance[i].pixels;
@@ -44,8 +42,8 @@ static int open_models(struct scene *scene, const struct scene_wish *wish, struc
 		if (k < scene->n_models)
 			continue;
 		strcpy(scene->model[k].name, wish->instance[i].model);
-		code = open_model(&scene->model[k], client, pixels != 0 ? pixels : wish->pixels, wish->is_quiet, timeout_ms,
-		                  err);
+		psr_client_set_resolution(scene->client, pixels != 0 ? pixels : wish->pixels);
+		code = open_model(&scene->model[k], scene->client, wish->is_quiet, timeout_ms, err);
 		if (code != PSR_OK)
 			return code;
 		scene->n_models++;
@@ -92,15 +90,14 @@ static void place_preset(struct psr_msg_preset *preset, const struct psr_msg_ins
 	light->reference *= place->scale;
 }
 
-static int get_presets(struct scene *scene, const struct scene_wish *wish, struct psr_client *client, int timeout_ms,
-                       struct psr_error *err)
+static int get_presets(struct scene *scene, const struct scene_wish *wish, int timeout_ms, struct psr_error *err)
 {
 	int code;
 
-	if (!(psr_client_welcome(client)->capabilities & PSR_CAP_PRESETS))
+	if (!(psr_client_welcome(scene->client)->capabilities & PSR_CAP_PRESETS))
 		return PSR_OK;
-	code =
-		psr_client_presets(client, scene->model[0].opened.handle, &scene->preset, &scene->n_presets, timeout_ms, err);
+	code = psr_client_presets(scene->client, scene->model[0].opened.handle, &scene->preset, &scene->n_presets,
+	                          timeout_ms, err);
 	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++) {
 		struct psr_msg_preset *preset = &scene->preset[i];
 
@@ -111,8 +108,7 @@ static int get_presets(struct scene *scene, const struct scene_wish *wish, struc
 	return code;
 }
 
-static int add_lights(struct scene *scene, const struct scene_wish *wish, const struct psr_client *client,
-                      struct psr_error *err)
+static int add_lights(struct scene *scene, const struct scene_wish *wish, struct psr_error *err)
 {
 	struct psr_msg_scene *msg = &scene->msg;
 	int code = PSR_OK;
@@ -121,12 +117,15 @@ static int add_lights(struct scene *scene, const struct scene_wish *wish, const 
 	memcpy(msg->background, wish->background, sizeof msg->background);
 	msg->n_lights = (uint16_t)wish->n_lights;
 	for (uint32_t i = 0; i < wish->n_lights && code == PSR_OK; i++) {
-		msg->light[i] = wish->light[i];
+		const struct psr_msg_preset *preset = NULL;
+
 		if (wish->preset_light[i] != NULL)
-			code = preset_light(&msg->light[i], wish->preset_light[i], client, scene, err);
+			code = preset_find(&preset, scene, PSR_WIRE_PRESET_LIGHT, wish->preset_light[i], err);
+		if (code == PSR_OK)
+			msg->light[i] = preset != NULL ? preset->light : wish->light[i];
 	}
 	if (code == PSR_OK && wish->lights_of != NULL)
-		code = preset_all_lights(msg, client, scene, err);
+		code = preset_all_lights(msg, scene, err);
 	if (code != PSR_OK)
 		return code;
 	scene->has_key_light = msg->n_lights == 0 && !wish->has_ambient;
@@ -146,6 +145,7 @@ int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_cli
 
 	*out = scene;
 	if (scene != NULL) {
+		scene->client = client;
 		scene->model = calloc(n, sizeof *scene->model);
 		scene->model_of = calloc(n, sizeof *scene->model_of);
 	}
@@ -154,12 +154,12 @@ int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_cli
 	else if (n > most)
 		code = psr_fail(err, PSR_ERR_LIMIT, "there are %u instances; the server takes %u", n, most);
 	if (code == PSR_OK)
-		code = open_models(scene, wish, client, timeout_ms, err);
+		code = open_models(scene, wish, timeout_ms, err);
 	if (code == PSR_OK)
-		code = get_presets(scene, wish, client, timeout_ms, err);
+		code = get_presets(scene, wish, timeout_ms, err);
 	if (code == PSR_OK) {
 		place_instances(scene, wish);
-		code = add_lights(scene, wish, client, err);
+		code = add_lights(scene, wish, err);
 	}
 	if (code == PSR_OK)
 		return PSR_OK;

@@ -1,9 +1,9 @@
-/* What stands in a picture, and the light: options, scene files, and the scene that a server gets. */
+/* Models and lights: options, scene files, and the scene that the server draws. */
 #ifndef PSR_CLIENT_SCENE_SCENE_H
 #define PSR_CLIENT_SCENE_SCENE_H
 
 #include "instance.h"
-#include "client/optlist.h"
+#include "client/cli/optlist.h"
 #include "psr/client.h"
 
 #define SCENE_AMBIENT 0.15
@@ -12,9 +12,9 @@ struct scene_wish {
 	struct instance_wish *instance;
 	uint32_t n_instances;
 	struct psr_msg_light light[PSR_WIRE_MAX_LIGHTS];
-	const char *preset_light[PSR_WIRE_MAX_LIGHTS]; /* name of what light[i] will be, or NULL: it is there already */
+	const char *preset_light[PSR_WIRE_MAX_LIGHTS]; /* name of a preset for light[i]; NULL: light[i] is set */
 	uint32_t n_lights;
-	const char *lights_of; /* "model": all of the model's, after those */
+	const char *lights_of; /* "model": adds all lights of the model */
 	double ambient;
 	uint8_t background[3];
 	int is_shadowed, has_ambient;
@@ -32,7 +32,7 @@ void scene_wish_fini(struct scene_wish *wish);
 void scene_add_model_options(struct optlist *list, struct scene_wish *wish);
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish);
 
-/* Reads the scene file, and checks what the options could not. */
+/* Reads the scene file and checks the options together. */
 int scene_check(struct scene_wish *wish, struct psr_error *err);
 
 #define SCENE_LIGHT_HELP \
@@ -55,25 +55,25 @@ struct scene_model {
 
 /* A scene on a connection. */
 struct scene {
+	struct psr_client *client;
 	struct psr_msg_scene msg;
-	int has_key_light;            /* light[0] is scene_light's */
+	int has_key_light;            /* scene_light() sets light[0] */
 	int is_key_shadowed;
 	double box_min[3], box_max[3]; /* of all instances, in their places */
-	double up[3];                 /* natural, of the first instance in its place; 0, 0, 0: not known */
-	struct scene_model *model;    /* each once */
+	double up[3];                 /* natural up of the first instance; 0, 0, 0: unknown */
+	struct scene_model *model;    /* without duplicates */
 	uint32_t n_models;
 	uint32_t *model_of;           /* by instance */
 	struct psr_msg_preset *preset; /* of the first model, in its place */
 	uint32_t n_presets;
 };
 
-/* Opens the models, with their progress on the terminal, and asks for cameras and lights of the first. NOT_FOUND with
- * the name that was probably meant. */
+/* Opens the models, shows the progress, and gets the cameras and lights of the first. NOT_FOUND suggests a name. */
 int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_client *client, int timeout_ms,
                struct psr_error *err);
 void scene_close(struct scene *scene); /* NULL is fine */
 
-/* Puts the light in its place that moves with the camera: whether the scene has one. */
+/* Moves the key light with the camera. Returns whether the scene has one. */
 int scene_light(struct scene *scene, const struct psr_msg_camera *camera);
 
 #endif

@@ -47,43 +47,38 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 {
 	struct psr_camera_wish *camera = &wish->camera;
 	const struct psr_opt opts[] = {
-		{ "view", 0, PSR_OPT_STRING, &wish->view, "SIDE",
-		  "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without any of "
-		  "these options. It has perspective unless --ortho is said, too. psr shot draws a picture of each of "
-		  "front,left,top.",
-		  0, 0, NULL, NULL },
-		{ "azimuth", 0, PSR_OPT_REAL, &camera->azimuth, "DEG",
-		  "Degrees around the model: 0 is its front, 90 its right side, 180 its back.", -1e6, 1e6, NULL,
-		  &wish->has_azimuth },
-		{ "elevation", 0, PSR_OPT_REAL, &camera->elevation, "DEG",
-		  "Degrees above the horizon: 0 is level, 90 from straight above, -90 from below.", -90, 90, NULL,
-		  &wish->has_elevation },
-		{ "roll", 0, PSR_OPT_REAL, &camera->roll, "DEG", "Degrees by which the camera is turned clockwise.", -1e6, 1e6,
-		  NULL, &wish->has_roll },
-		{ "zoom", 0, PSR_OPT_REAL, &camera->zoom, "FACTOR",
-		  "As a zoom lens: 1 shows the whole model, 2 its middle (or --target) twice as large.", 1e-6, 1e6, NULL,
-		  &wish->has_zoom },
-		{ "fov", 0, PSR_OPT_REAL, &wish->fov, "DEG",
-		  "Angle of view from the top edge to the bottom edge, degrees: smaller is flatter, as from farther away.", 0,
-		  0, NULL, &wish->has_fov },
-		{ "ortho", 0, PSR_OPT_CALL, wish, "HEIGHT",
-		  "No perspective: parallel lines stay so. The picture is HEIGHT units of the model high; `fit` shows all of "
-		  "it.",
-		  0, 0, on_ortho, &wish->has_ortho },
-		{ "up", 0, PSR_OPT_VEC3, camera->up, "X,Y,Z",
-		  "The direction that is up in the picture. Without it: that of the model's file, usually 0,1,0, or 0,0,1 for "
-		  "scans, CAD and clouds. Say it where a model lies on its side.",
-		  0, 0, NULL, &camera->has_up },
-		{ "eye", 0, PSR_OPT_VEC3, camera->eye, "X,Y,Z",
-		  "Where the camera is, in the model's coordinates, instead of the angles above.", 0, 0, NULL,
-		  &camera->has_eye },
-		{ "target", 0, PSR_OPT_VEC3, camera->target, "X,Y,Z",
-		  "The point in the middle of the picture; without it the middle of the model.", 0, 0, NULL,
-		  &camera->has_target },
-		{ "camera", 0, PSR_OPT_STRING, &wish->preset, "NAME",
-		  "A camera that came with the first model, in the place of all of these; `psr list --presets NAME` shows "
-		  "them.",
-		  0, 0, NULL, NULL },
+		{ .name = "view", .type = PSR_OPT_STRING, .value = &wish->view, .arg = "SIDE",
+		  .help = "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without "
+		          "any of these options. It has perspective unless --ortho is said, too. psr shot draws a picture of "
+		          "each of front,left,top." },
+		{ .name = "azimuth", .type = PSR_OPT_REAL, .value = &camera->azimuth, .arg = "DEG", .min = -1e6, .max = 1e6,
+		  .seen = &wish->has_azimuth,
+		  .help = "Degrees around the model: 0 is its front, 90 its right side, 180 its back." },
+		{ .name = "elevation", .type = PSR_OPT_REAL, .value = &camera->elevation, .arg = "DEG", .min = -90, .max = 90,
+		  .seen = &wish->has_elevation,
+		  .help = "Degrees above the horizon: 0 is level, 90 from straight above, -90 from below." },
+		{ .name = "roll", .type = PSR_OPT_REAL, .value = &camera->roll, .arg = "DEG", .min = -1e6, .max = 1e6,
+		  .seen = &wish->has_roll, .help = "Degrees by which the camera is turned clockwise." },
+		{ .name = "zoom", .type = PSR_OPT_REAL, .value = &camera->zoom, .arg = "FACTOR", .min = 1e-6, .max = 1e6,
+		  .seen = &wish->has_zoom,
+		  .help = "As a zoom lens: 1 shows the whole model, 2 its middle (or --target) twice as large." },
+		{ .name = "fov", .type = PSR_OPT_REAL, .value = &wish->fov, .arg = "DEG", .seen = &wish->has_fov,
+		  .help = "Angle of view from the top edge to the bottom edge, degrees: smaller is flatter, as from farther "
+		          "away." },
+		{ .name = "ortho", .type = PSR_OPT_CALL, .value = wish, .arg = "HEIGHT", .call = on_ortho,
+		  .seen = &wish->has_ortho,
+		  .help = "No perspective: parallel lines stay so. The picture is HEIGHT units of the model high; `fit` shows "
+		          "all of it." },
+		{ .name = "up", .type = PSR_OPT_VEC3, .value = camera->up, .arg = "X,Y,Z", .seen = &camera->has_up,
+		  .help = "The direction that is up in the picture. Without it: that of the model's file, usually 0,1,0, or "
+		          "0,0,1 for scans, CAD and clouds. Say it where a model lies on its side." },
+		{ .name = "eye", .type = PSR_OPT_VEC3, .value = camera->eye, .arg = "X,Y,Z", .seen = &camera->has_eye,
+		  .help = "Where the camera is, in the model's coordinates, instead of the angles above." },
+		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera->target, .arg = "X,Y,Z", .seen = &camera->has_target,
+		  .help = "The point in the middle of the picture; without it the middle of the model." },
+		{ .name = "camera", .type = PSR_OPT_STRING, .value = &wish->preset, .arg = "NAME",
+		  .help = "A camera that came with the first model, in the place of all of these; `psr list --presets NAME` "
+		          "shows them." },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -237,13 +232,19 @@ void view_up(double up[3], const struct view_wish *wish, const struct scene *sce
 	memcpy(up, wish->camera.has_up ? wish->camera.up : has_natural ? scene->up : y, sizeof y);
 }
 
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
-               const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err)
+int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
+               uint32_t n_turn, struct psr_error *err)
 {
 	struct psr_camera_wish placed = wish->camera;
+	const struct psr_msg_preset *preset;
+	int code;
 
-	if (wish->preset != NULL)
-		return preset_camera(camera, wish->preset, client, scene, err);
+	if (wish->preset != NULL) {
+		code = preset_find(&preset, scene, PSR_WIRE_PRESET_CAMERA, wish->preset, err);
+		if (code == PSR_OK)
+			*camera = preset->camera;
+		return code;
+	}
 	memcpy(placed.natural_up, scene->up, sizeof placed.natural_up);
 	if (n_turn > 1 && !placed.has_eye) {
 		placed.has_angles = 1;

@@ -1,8 +1,8 @@
-/* Cameras, as options and camera files have them. */
+/* Cameras from options and camera files. */
 #ifndef PSR_CLIENT_SCENE_VIEW_H
 #define PSR_CLIENT_SCENE_VIEW_H
 
-#include "client/optlist.h"
+#include "client/cli/optlist.h"
 #include "psr/client.h"
 #include "scene.h"
 
@@ -20,8 +20,8 @@ void view_add_options(struct optlist *list, struct view_wish *wish);
 /* Whether any option of a camera was given. */
 int view_is_said(const struct view_wish *wish);
 
-/* The cameras of a command line: one, or one for each of --view front,left,... or for each line of a file, which says
- * what the command line has not. */
+/* The cameras of a command line: one, or one for each of --view front,left,..., or one for each line of a file, whose
+ * options come on top of the command line's. */
 struct views {
 	struct view_wish *wish;
 	uint32_t n;
@@ -30,15 +30,15 @@ struct views {
 
 #define VIEWS_MAX 100000
 
-/* Makes them of `wish` and checks them. `file` may be NULL. ARG, LIMIT, and what wordfile_read says. */
+/* Makes and checks them. `file` may be NULL. ARG, LIMIT, and the errors of wordfile_read(). */
 int views_make(struct views *views, const struct view_wish *wish, const char *file, struct psr_error *err);
 void views_fini(struct views *views);
 
-/* The camera in a scene. n_turn: at how many equal turns the scene is to be in the picture, or 0. */
-int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct psr_client *client,
-               const struct scene *scene, double aspect, uint32_t n_turn, struct psr_error *err);
+/* Places the camera in the scene. n_turn: the scene stays in the picture at so many equal turns; 0: no turns. */
+int view_place(struct psr_msg_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
+               uint32_t n_turn, struct psr_error *err);
 
-/* The way up for turning about: --up, the model's own, or +Y. */
+/* The axis of turns: --up, the model's natural up, or +Y. */
 void view_up(double up[3], const struct view_wish *wish, const struct scene *scene);
 
 #endif

@@ -1,7 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "preset.h"
-#include "client/psr.h"
+#include "client/cli/cli.h"
 #include "scene.h"
 
 void scene_wish_init(struct scene_wish *wish)
@@ -66,14 +66,14 @@ static int on_light(const char *text, void *userdata, struct psr_error *err)
 static void add_instances(struct optlist *list, struct scene_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "model", 'm', PSR_OPT_CALL, wish, "NAME",
-		  "A model, by its name in `psr list`, where its file puts it. "
-		  "Repeat it to see several models in one picture.",
-		  0, 0, on_model, &wish->n_said },
-		{ "instance", 0, PSR_OPT_CALL, wish, "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]",
-		  "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of its "
-		  "file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it.",
-		  0, 0, on_instance, &wish->n_said },
+		{ .name = "model", .letter = 'm', .type = PSR_OPT_CALL, .value = wish, .arg = "NAME", .call = on_model,
+		  .seen = &wish->n_said,
+		  .help = "A model, by its name in `psr list`, where its file puts it. Repeat it to see several models in one "
+		          "picture." },
+		{ .name = "instance", .type = PSR_OPT_CALL, .value = wish, .arg = "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]",
+		  .call = on_instance, .seen = &wish->n_said,
+		  .help = "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of "
+		          "its file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it." },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -82,10 +82,9 @@ static void add_instances(struct optlist *list, struct scene_wish *wish)
 void scene_add_model_options(struct optlist *list, struct scene_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "scene", 0, PSR_OPT_STRING, &wish->file, "FILE",
-		  "Models and lights from a text file of words such as instance=teapot,at=1,0,0 light=dir:-1,-2,-1 shadows: "
-		  "the options of this command without dashes. # begins a comment.",
-		  0, 0, NULL, &wish->n_said },
+		{ .name = "scene", .type = PSR_OPT_STRING, .value = &wish->file, .arg = "FILE", .seen = &wish->n_said,
+		  .help = "Models and lights from a text file of words such as instance=teapot,at=1,0,0 light=dir:-1,-2,-1 "
+		          "shadows: the options of this command without dashes. # begins a comment." },
 	};
 
 	add_instances(list, wish);
@@ -95,18 +94,18 @@ void scene_add_model_options(struct optlist *list, struct scene_wish *wish)
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish)
 {
 	const struct psr_opt opts[] = {
-		{ "light", 'l', PSR_OPT_CALL, wish, "LIGHT", "A light, see below. Repeat it for more.", 0, 0, on_light,
-		  &wish->n_said },
-		{ "lights", 0, PSR_OPT_STRING, &wish->lights_of, "model", "All lights that came with the first model.", 0, 0,
-		  NULL, &wish->n_said },
-		{ "shadows", 0, PSR_OPT_FLAG, &wish->is_shadowed, NULL,
-		  "Every light casts shadows, also the one that is there without --light.", 0, 0, NULL, &wish->n_said },
-		{ "ambient", 0, PSR_OPT_REAL, &wish->ambient, "A",
-		  "Brightness of the light from everywhere: more lifts dark sides; 1 without a --light shows colours without "
-		  "any shading.",
-		  0, PSR_WIRE_MAX_INTENSITY, NULL, &wish->has_ambient },
-		{ "background", 0, PSR_OPT_COLOR, wish->background, "#rrggbb", "The colour where nothing is.", 0, 0, NULL,
-		  &wish->n_said },
+		{ .name = "light", .letter = 'l', .type = PSR_OPT_CALL, .value = wish, .arg = "LIGHT", .call = on_light,
+		  .seen = &wish->n_said, .help = "A light, see below. Repeat it for more." },
+		{ .name = "lights", .type = PSR_OPT_STRING, .value = &wish->lights_of, .arg = "model", .seen = &wish->n_said,
+		  .help = "All lights that came with the first model." },
+		{ .name = "shadows", .type = PSR_OPT_FLAG, .value = &wish->is_shadowed, .seen = &wish->n_said,
+		  .help = "Every light casts shadows, also the one that is there without --light." },
+		{ .name = "ambient", .type = PSR_OPT_REAL, .value = &wish->ambient, .arg = "A", .max = PSR_WIRE_MAX_INTENSITY,
+		  .seen = &wish->has_ambient,
+		  .help = "Brightness of the light from everywhere: more lifts dark sides; 1 without a --light shows colours "
+		          "without any shading." },
+		{ .name = "background", .type = PSR_OPT_COLOR, .value = wish->background, .arg = "#rrggbb",
+		  .seen = &wish->n_said, .help = "The colour where nothing is." },
 	};
 
 	OPTLIST_ADD(list, opts);

@@ -154,6 +154,14 @@ int outfile_save(const char *path, enum outfile_kind kind, const void *data, siz
 	return outfile_close(&file, PSR_OK, err);
 }
 
+int outfile_flush_stdout(struct psr_error *err)
+{
+	errno = 0;
+	if (ferror(stdout) || fflush(stdout) != 0)
+		return psr_fail(err, PSR_ERR_IO, "cannot write to standard output: %s", strerror(errno != 0 ? errno : EIO));
+	return PSR_OK;
+}
+
 void outfile_remove_remains(const char *path, pid_t pid)
 {
 	char name[PATH_MAX];

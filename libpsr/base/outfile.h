@@ -39,6 +39,9 @@ int outfile_close(struct outfile *file, int code, struct psr_error *err);
 /* Opens, writes n bytes, closes. */
 int outfile_save(const char *path, enum outfile_kind kind, const void *data, size_t n, struct psr_error *err);
 
+/* IO: not all that was printed could be written. */
+int outfile_flush_stdout(struct psr_error *err);
+
 /* Removes the temporary files of `path` that a killed process left. */
 void outfile_remove_remains(const char *path, pid_t pid);
 

@@ -1,8 +1,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
@@ -33,14 +33,6 @@ struct build {
 	struct psr_build_report report;
 	struct psr_error *err;
 };
-
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 void psr_build_options_default(struct psr_build_options *options)
 {
@@ -139,7 +131,7 @@ static int make_level(struct build *build, struct level *level)
 
 static int make_levels(struct build *build)
 {
-	double started = now();
+	double started = clock_seconds();
 	int rc = PSR_OK;
 
 	build->n_levels = count_levels(build->options->resolution);
@@ -154,7 +146,7 @@ static int make_levels(struct build *build)
 	}
 	for (int i = 0; i < 2; i++)
 		level_fini(&build->level[i]);
-	build->report.seconds_select = now() - started - build->report.seconds_rays;
+	build->report.seconds_select = clock_seconds() - started - build->report.seconds_rays;
 	if (rc == PSR_ERR_MEMORY || rc == PSR_ERR_LIMIT)
 		return psr_fail(build->err, rc, "no memory to sample the mesh at resolution %u; use a lower one",
 		                build->options->resolution);
@@ -209,7 +201,7 @@ static int prepare(struct build *build)
 int psr_model_build(struct psr_model **out, const struct psr_mesh *mesh, const struct psr_build_options *options,
                     struct psr_build_report *report, struct psr_error *err)
 {
-	double started = now();
+	double started = clock_seconds();
 	struct build *build;
 	int rc = check_options(options, err);
 
@@ -224,7 +216,7 @@ int psr_model_build(struct psr_model **out, const struct psr_mesh *mesh, const s
 	rc = prepare(build);
 	if (rc == PSR_OK)
 		rc = sample_and_pack(build, out);
-	build->report.seconds_total = now() - started;
+	build->report.seconds_total = clock_seconds() - started;
 	if (rc == PSR_OK && report != NULL)
 		*report = build->report;
 	draft_fini(&build->draft);

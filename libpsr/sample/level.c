@@ -1,6 +1,6 @@
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
+#include "base/clock.h"
 #include "base/mem.h"
 #include "level.h"
 #include "psr/error.h"
@@ -13,14 +13,6 @@
 
 #define N_STEPS (N_PROJECTIONS / 2 + 4)
 #define MOST_ROUNDS 7
-
-static double now(void)
-{
-	struct timespec t;
-
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
-}
 
 static void report(const struct level_progress *progress, unsigned done)
 {
@@ -84,7 +76,7 @@ static int own(struct level *level)
 int level_own(struct level *level, const struct level_progress *progress)
 {
 	const uint32_t n_prims = sampling_n_prims(&level->sampling);
-	double started = now();
+	double started = clock_seconds();
 	int rc = mark_thin(level);
 
 	level->sides = psr_alloc_array(n_prims, 1);
@@ -96,7 +88,7 @@ int level_own(struct level *level, const struct level_progress *progress)
 	report(progress, 1);
 	if (rc == PSR_OK)
 		rc = trace(level, progress);
-	level->seconds_rays = now() - started;
+	level->seconds_rays = clock_seconds() - started;
 	return rc == PSR_OK ? own(level) : rc;
 }
 

@@ -6,7 +6,7 @@
 #include <unistd.h>
 #include "models/commands.h"
 #include "models/shapes/generators.h"
-#include "models/json.h"
+#include "base/json.h"
 #include "psr/build.h"
 #include "base/cli.h"
 

@@ -3,37 +3,10 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "base/infile.h"
+#include "tests/unit/lib/folder.h"
 
-static char path[] = "/tmp/psr-infile-XXXXXX";
 static struct psr_error err;
-
-static int make_file(void **state)
-{
-	int fd = mkstemp(path);
-
-	(void)state;
-	return fd < 0 || close(fd) != 0;
-}
-
-static int remove_file(void **state)
-{
-	(void)state;
-	return unlink(path);
-}
-
-static void write_bytes(const void *bytes, size_t n)
-{
-	FILE *file = fopen(path, "wb");
-
-	assert_non_null(file);
-	assert_int_equal(fwrite(bytes, 1, n, file), n);
-	assert_int_equal(fclose(file), 0);
-}
 
 static void bytes_of_any_value_come_whole(void **state)
 {
@@ -41,13 +14,13 @@ static void bytes_of_any_value_come_whole(void **state)
 	size_t n;
 
 	(void)state;
-	write_bytes("a\0b", 3);
-	assert_int_equal(infile_read(&bytes, &n, path, 3, NULL), PSR_OK);
+	write_file("f", "a\0b", 3);
+	assert_int_equal(infile_read(&bytes, &n, in_folder("f"), 3, NULL), PSR_OK);
 	assert_int_equal(n, 3);
 	assert_memory_equal(bytes, "a\0b", 3);
 	free(bytes);
-	write_bytes("", 0);
-	assert_int_equal(infile_read(&bytes, &n, path, 0, NULL), PSR_OK);
+	write_file("f", "", 0);
+	assert_int_equal(infile_read(&bytes, &n, in_folder("f"), 0, NULL), PSR_OK);
 	assert_int_equal(n, 0);
 	free(bytes);
 }
@@ -88,10 +61,10 @@ static void other_files_are_refused(void **state)
 	assert_int_equal(infile_read(&bytes, &n, "/dev/zero", 9, &err), PSR_ERR_IO);
 	assert_int_equal(infile_read(&bytes, &n, "/tmp", 9, &err), PSR_ERR_IO);
 	assert_int_equal(infile_read_text(&text, "/tmp", 9, &err), PSR_ERR_IO);
-	write_bytes("12345\0", 6);
-	assert_int_equal(infile_read(&bytes, &n, path, 5, &err), PSR_ERR_LIMIT);
-	assert_int_equal(infile_read_text(&text, path, 5, &err), PSR_ERR_LIMIT);
-	assert_int_equal(infile_read_text(&text, path, 6, &err), PSR_ERR_FORMAT);
+	write_file("f", "12345\0", 6);
+	assert_int_equal(infile_read(&bytes, &n, in_folder("f"), 5, &err), PSR_ERR_LIMIT);
+	assert_int_equal(infile_read_text(&text, in_folder("f"), 5, &err), PSR_ERR_LIMIT);
+	assert_int_equal(infile_read_text(&text, in_folder("f"), 6, &err), PSR_ERR_FORMAT);
 	assert_non_null(strstr(err.text, "byte 5 is 0"));
 	assert_null(bytes);
 	assert_null(text);
@@ -105,5 +78,5 @@ int main(void)
 		cmocka_unit_test(other_files_are_refused),
 	};
 
-	return cmocka_run_group_tests(tests, make_file, remove_file);
+	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

@@ -4,48 +4,21 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <unistd.h>
 #include "base/netpbm.h"
+#include "tests/unit/lib/folder.h"
 
-static char path[] = "/tmp/psr-netpbm-XXXXXX";
 static uint32_t width, height;
 static uint8_t *rgb;
 static float *depth;
-
-static int make_file(void **state)
-{
-	int fd = mkstemp(path);
-
-	(void)state;
-	return fd < 0 || close(fd) != 0;
-}
-
-static int remove_file(void **state)
-{
-	(void)state;
-	return unlink(path);
-}
-
-static void write_file(const void *bytes, size_t n)
-{
-	FILE *file = fopen(path, "wb");
-
-	assert_non_null(file);
-	assert_int_equal(fwrite(bytes, 1, n, file), n);
-	assert_int_equal(fclose(file), 0);
-}
 
 static int read_ppm(const void *bytes, size_t n)
 {
 	struct psr_error err;
 	int code;
 
-	write_file(bytes, n);
+	write_file("f", bytes, n);
 	rgb = NULL;
-	code = ppm_read(&rgb, &width, &height, path, &err);
+	code = ppm_read(&rgb, &width, &height, in_folder("f"), &err);
 	assert_true((code == PSR_OK) == (rgb != NULL));
 	return code;
 }
@@ -55,9 +28,9 @@ static int read_pfm(const void *bytes, size_t n)
 	struct psr_error err;
 	int code;
 
-	write_file(bytes, n);
+	write_file("f", bytes, n);
 	depth = NULL;
-	code = pfm_read(&depth, &width, &height, path, &err);
+	code = pfm_read(&depth, &width, &height, in_folder("f"), &err);
 	assert_true((code == PSR_OK) == (depth != NULL));
 	return code;
 }
@@ -145,17 +118,17 @@ static void what_was_written_is_read_back(void **state)
 	struct outfile file;
 
 	(void)state;
-	assert_int_equal(outfile_open(&file, path, OUTFILE_PLAIN, NULL), PSR_OK);
+	assert_int_equal(outfile_open(&file, in_folder("f"), OUTFILE_PLAIN, NULL), PSR_OK);
 	assert_int_equal(ppm_write_frame(&file, &frame, NULL), PSR_OK);
 	assert_int_equal(outfile_close(&file, PSR_OK, NULL), PSR_OK);
-	assert_int_equal(ppm_read(&rgb, &width, &height, path, NULL), PSR_OK);
+	assert_int_equal(ppm_read(&rgb, &width, &height, in_folder("f"), NULL), PSR_OK);
 	assert_true(width == 2 && height == 2);
 	assert_memory_equal(rgb, pixels, sizeof pixels);
 	free(rgb);
-	assert_int_equal(outfile_open(&file, path, OUTFILE_PLAIN, NULL), PSR_OK);
+	assert_int_equal(outfile_open(&file, in_folder("f"), OUTFILE_PLAIN, NULL), PSR_OK);
 	assert_int_equal(pfm_write_frame(&file, &frame, NULL), PSR_OK);
 	assert_int_equal(outfile_close(&file, PSR_OK, NULL), PSR_OK);
-	assert_int_equal(pfm_read(&depth, &width, &height, path, NULL), PSR_OK);
+	assert_int_equal(pfm_read(&depth, &width, &height, in_folder("f"), NULL), PSR_OK);
 	assert_true(width == 2 && height == 2);
 	assert_memory_equal(depth, depths, sizeof depths);
 	free(depth);
@@ -173,5 +146,5 @@ int main(void)
 		cmocka_unit_test(what_was_written_is_read_back),
 	};
 
-	return cmocka_run_group_tests(tests, make_file, remove_file);
+	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }

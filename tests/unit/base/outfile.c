@@ -3,71 +3,20 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include <dirent.h>
-#include <fcntl.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <unistd.h>
 #include "base/outfile.h"
+#include "tests/unit/lib/folder.h"
 
 static const uint8_t bytes[5] = { 1, 2, 3, 4, 5 };
 static const enum outfile_kind kinds[] = { OUTFILE_PLAIN, OUTFILE_DURABLE };
-static char folder[32], path[PATH_MAX];
-
-static const char *in_folder(const char *name)
-{
-	snprintf(path, sizeof path, "%s/%s", folder, name);
-	return path;
-}
-
-static int count_files(void)
-{
-	DIR *dir = opendir(folder);
-	int n = 0;
-
-	assert_non_null(dir);
-	for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
-		n += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
-	closedir(dir);
-	return n;
-}
+static const char *path;
 
 static void assert_holds_bytes(const char *name)
 {
-	FILE *file = fopen(name, "rb");
 	uint8_t back[8];
 
-	assert_non_null(file);
-	assert_int_equal(fread(back, 1, sizeof back, file), sizeof bytes);
-	fclose(file);
+	assert_int_equal(read_file(name, back, sizeof back), sizeof bytes);
 	assert_memory_equal(back, bytes, sizeof bytes);
-}
-
-static void touch(const char *name)
-{
-	int fd = open(in_folder(name), O_WRONLY | O_CREAT, 0600);
-
-	assert_true(fd >= 0);
-	close(fd);
-}
-
-static int make_folder(void **state)
-{
-	(void)state;
-	strcpy(folder, "/tmp/psr-outfile-XXXXXX");
-	return mkdtemp(folder) == NULL;
-}
-
-static int remove_folder(void **state)
-{
-	DIR *dir = opendir(folder);
-
-	(void)state;
-	for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
-		remove(in_folder(entry->d_name));
-	closedir(dir);
-	return rmdir(folder);
 }
 
 static void written_file_has_the_bytes_and_usual_permissions(void **state)
@@ -78,11 +27,11 @@ static void written_file_has_the_bytes_and_usual_permissions(void **state)
 	for (int i = 0; i < 2; i++) {
 		mode_t mask = umask(027);
 
-		assert_int_equal(outfile_save(in_folder("out"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
+		assert_int_equal(outfile_save(path = in_folder("out"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
 		umask(mask);
 		assert_int_equal(stat(path, &info), 0);
 		assert_int_equal(info.st_mode & 0777, 0640);
-		assert_holds_bytes(path);
+		assert_holds_bytes("out");
 		assert_int_equal(count_files(), 1);
 		unlink(path);
 	}
@@ -95,7 +44,7 @@ static void unwritable_output_is_an_error_and_leaves_nothing(void **state)
 	(void)state;
 	assert_int_equal(mkdir(in_folder("taken"), 0700), 0);
 	for (int i = 0; i < 2; i++) {
-		in_folder("no/such/folder");
+		path = in_folder("no/such/folder");
 		assert_int_equal(outfile_save(path, kinds[i], bytes, sizeof bytes, &err), PSR_ERR_NOT_FOUND);
 		assert_int_equal(err.code, PSR_ERR_NOT_FOUND);
 		assert_non_null(strstr(err.text, path));
@@ -111,11 +60,11 @@ static void failed_content_leaves_the_old_file(void **state)
 
 	(void)state;
 	for (int i = 0; i < 2; i++) {
-		assert_int_equal(outfile_save(in_folder("kept"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
+		assert_int_equal(outfile_save(path = in_folder("kept"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
 		assert_int_equal(outfile_open(&file, path, kinds[i], NULL), PSR_OK);
 		outfile_write(&file, "other", 5);
 		assert_int_equal(outfile_close(&file, PSR_ERR_FORMAT, NULL), PSR_ERR_FORMAT);
-		assert_holds_bytes(path);
+		assert_holds_bytes("kept");
 		assert_int_equal(count_files(), 1);
 	}
 }
@@ -125,13 +74,13 @@ static void link_to_a_file_stays_a_link(void **state)
 	struct stat info;
 
 	(void)state;
-	touch("real");
+	write_file("real", "", 0);
 	assert_int_equal(symlink("real", in_folder("link")), 0);
 	for (int i = 0; i < 2; i++) {
-		assert_int_equal(outfile_save(in_folder("link"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
+		assert_int_equal(outfile_save(path = in_folder("link"), kinds[i], bytes, sizeof bytes, NULL), PSR_OK);
 		assert_int_equal(lstat(path, &info), 0);
 		assert_true(S_ISLNK(info.st_mode));
-		assert_holds_bytes(in_folder("real"));
+		assert_holds_bytes("real");
 	}
 }
 
@@ -143,7 +92,7 @@ static void a_name_as_long_as_names_may_be_can_be_written(void **state)
 	memset(name, 'n', NAME_MAX);
 	name[NAME_MAX] = '\0';
 	assert_int_equal(outfile_save(in_folder(name), OUTFILE_PLAIN, bytes, sizeof bytes, NULL), PSR_OK);
-	assert_holds_bytes(path);
+	assert_holds_bytes(name);
 }
 
 static void remains_of_one_process_are_removed(void **state)
@@ -151,9 +100,9 @@ static void remains_of_one_process_are_removed(void **state)
 	struct outfile first, second;
 
 	(void)state;
-	touch(".psr-1-0.psr");
-	touch("m.psr");
-	in_folder("m.psr");
+	write_file(".psr-1-0.psr", "", 0);
+	write_file("m.psr", "", 0);
+	path = in_folder("m.psr");
 	assert_int_equal(outfile_open(&first, path, OUTFILE_DURABLE, NULL), PSR_OK);
 	assert_int_equal(outfile_open(&second, path, OUTFILE_DURABLE, NULL), PSR_OK);
 	assert_int_equal(count_files(), 4);

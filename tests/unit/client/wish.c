@@ -14,7 +14,7 @@
 #include "client/output/notes.h"
 #include "client/output/output.h"
 #include "client/scene/quality.h"
-#include "client/suggest.h"
+#include "client/scene/suggest.h"
 #include "client/scene/view.h"
 
 static char path[256];

@@ -3,7 +3,6 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include <dirent.h>
 #include <fcntl.h>
 #include <pthread.h>
 #include <signal.h>
@@ -12,8 +11,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "fixture.h"
+#include "tests/unit/lib/folder.h"
 
-static char folder[32], path[64];
+static char path[64];
 
 static int (*const writers[])(const struct psr_model *, const char *, struct psr_error *) = {
 	psr_model_write, psr_model_write_packed,
@@ -24,9 +24,7 @@ static int setup(void **state)
 {
 	struct fixture f;
 
-	(void)state;
-	strcpy(folder, "/tmp/psr-write-XXXXXX");
-	assert_non_null(mkdtemp(folder));
+	assert_int_equal(make_folder(state), 0);
 	snprintf(path, sizeof path, "%s/m.psr", folder);
 	fixture_init(&f, 0);
 	assert_int_equal(psr_model_create(&one, &f.info, &f.blocks, NULL, NULL), PSR_OK);
@@ -42,29 +40,6 @@ static int teardown(void **state)
 	psr_model_unref(two);
 	unlink(path);
 	return rmdir(folder);
-}
-
-static size_t slurp(uint8_t *bytes, size_t size)
-{
-	FILE *file = fopen(path, "rb");
-	size_t n;
-
-	assert_non_null(file);
-	n = fread(bytes, 1, size, file);
-	fclose(file);
-	return n;
-}
-
-static int count_files(void)
-{
-	DIR *dir = opendir(folder);
-	int n = 0;
-
-	assert_non_null(dir);
-	for (struct dirent *entry; (entry = readdir(dir)) != NULL;)
-		n += strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0;
-	closedir(dir);
-	return n;
 }
 
 static void assert_holds(const struct psr_model *model)
@@ -87,12 +62,12 @@ static void written_twice_gives_the_same_bytes(void **state)
 
 	(void)state;
 	assert_int_equal(psr_model_write(one, path, NULL), PSR_OK);
-	n = slurp(a, sizeof a);
+	n = read_file("m.psr", a, sizeof a);
 	assert_true(n > 64 && n < sizeof a);
 	assert_int_equal(psr_model_read(&read, path, NULL), PSR_OK);
 	assert_int_equal(psr_model_write(read, path, NULL), PSR_OK);
 	psr_model_unref(read);
-	assert_int_equal(slurp(b, sizeof b), n);
+	assert_int_equal(read_file("m.psr", b, sizeof b), n);
 	assert_memory_equal(a, b, n);
 	assert_int_equal(count_files(), 1);
 }

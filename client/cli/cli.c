@@ -1,9 +1,7 @@
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <unistd.h>
-#include "psr.h"
+#include "cli.h"
 
 #define BAR 30
 
@@ -40,24 +38,4 @@ void psr_progress_end(struct psr_progress_line *line)
 	if (line->is_drawn)
 		fprintf(stderr, "\r\x1b[K");
 	line->is_drawn = 0;
-}
-
-int psr_flush_output(struct psr_error *err)
-{
-	errno = 0;
-	if (ferror(stdout) || fflush(stdout) != 0)
-		return psr_fail(err, PSR_ERR_IO, "cannot write to standard output: %s", strerror(errno != 0 ? errno : EIO));
-	return PSR_OK;
-}
-
-int psr_print_json(cJSON *json, struct psr_error *err)
-{
-	char *text = json != NULL ? cJSON_Print(json) : NULL;
-
-	cJSON_Delete(json);
-	if (text == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the JSON text");
-	puts(text);
-	free(text);
-	return psr_flush_output(err);
 }

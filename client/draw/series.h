@@ -1,6 +1,6 @@
 /* Frames of one scene over one connection, several under way at a time. */
-#ifndef PSR_CLIENT_OUTPUT_SERIES_H
-#define PSR_CLIENT_OUTPUT_SERIES_H
+#ifndef PSR_CLIENT_DRAW_SERIES_H
+#define PSR_CLIENT_DRAW_SERIES_H
 
 #include "client/scene/scene.h"
 
@@ -12,12 +12,12 @@ struct series {
 	uint32_t n;
 	const char *server; /* address, for messages */
 	int timeout_ms;     /* of the longest silence */
-	/* Frame k is whole; what the event points to is valid during the call. Any order of k. */
+	/* Takes whole frames, in any order of k. The pointers of the event are valid during the call. */
 	int (*on_frame)(uint32_t k, const struct psr_event *event, void *userdata, struct psr_error *err);
 	void *userdata;
 };
 
-/* PSR_OK once all have come; else what failed first: a frame, the connection, on_frame. */
+/* PSR_OK once all have come; else the first error of a frame, the connection or on_frame. */
 int series_run(struct series *series, struct psr_error *err);
 
 #endif

@@ -1,39 +1,20 @@
-#include "draw.h"
 #include <stdlib.h>
-#include <string.h>
 #include "base/clock.h"
-#include "psr.h"
+#include "client/cli/cli.h"
 #include "client/replay/replay.h"
-#include "client/output/series.h"
-#include "client/output/sink.h"
+#include "draw.h"
+#include "series.h"
 
-void draw_wish_init(struct draw_wish *wish, const char *program)
+void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct psr_opt *files, int n_files)
 {
-	memset(wish, 0, sizeof *wish);
-	wish->program = program;
-	wish->server = psr_default_server();
-	wish->timeout = PSR_DEFAULT_TIMEOUT;
-	scene_wish_init(&wish->scene);
-	view_wish_init(&wish->view);
-	quality_wish_init(&wish->quality, 800, 600, "lossless");
-}
-
-void draw_wish_fini(struct draw_wish *wish)
-{
-	scene_wish_fini(&wish->scene);
-}
-
-void draw_add_model_options(struct optlist *list, struct draw_wish *wish)
-{
-	const struct psr_opt server[] = { PSR_OPT_SERVER(wish->server) };
+	const struct psr_opt server[] = { PSR_OPT_SERVER(wish->server) }, timeout[] = { PSR_OPT_TIMEOUT(wish->timeout) };
 
 	optlist_heading(list, "Models and server", NULL);
 	scene_add_model_options(list, &wish->scene);
 	OPTLIST_ADD(list, server);
-}
-
-void draw_add_picture_options(struct optlist *list, struct draw_wish *wish)
-{
+	optlist_heading(list, "Files", NULL);
+	optlist_add(list, files, n_files);
+	sink_add_file_options(list, &wish->sink);
 	optlist_heading(list, "Camera",
 	                "Without any of these the whole model is in the picture, seen from its front, a little "
 	                "from the right and from above.");
@@ -42,49 +23,10 @@ void draw_add_picture_options(struct optlist *list, struct draw_wish *wish)
 	scene_add_light_options(list, &wish->scene);
 	optlist_heading(list, "Quality", NULL);
 	quality_add_options(list, &wish->quality);
-}
-
-void draw_add_file_options(struct optlist *list, struct draw_wish *wish)
-{
-	const struct psr_opt opts[] = {
-		{ "sheet", 0, PSR_OPT_SIZE, wish->sheet, "COLSxROWS",
-		  "All pictures on one contact sheet, row by row; --size is that of each.", 0, 0, NULL, &wish->has_sheet },
-		{ "depth", 0, PSR_OPT_STRING, &wish->depth, "FILE",
-		  "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. .pfm, "
-		  ".exr or .tif.",
-		  0, 0, NULL, NULL },
-		{ "report", 0, PSR_OPT_STRING, &wish->report, "FILE",
-		  "All about the picture as JSON: request, times, counts, hashes. - is standard output.", 0, 0, NULL, NULL },
-	};
-
-	OPTLIST_ADD(list, opts);
-}
-
-void draw_add_developer_options(struct optlist *list, struct draw_wish *wish)
-{
-	const struct psr_opt opts[] = {
-		{ "plane", 0, PSR_OPT_STRING, &wish->plane_text, "PLANE",
-		  "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or block "
-		  "(levels, facing). All go to .npy; color, normal and weight to pictures, depth as with --depth.",
-		  0, 0, NULL, NULL },
-		{ "show", 0, PSR_OPT_STRING, &wish->show_text, "STAGE",
-		  "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, weights, "
-		  "holes or depth.",
-		  0, 0, NULL, NULL },
-		{ "hash", 0, PSR_OPT_FLAG, &wish->hash, NULL,
-		  "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`.", 0, 0, NULL,
-		  NULL },
-		{ "effects", 0, PSR_OPT_FLAG, &wish->effects, NULL,
-		  "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below 1`.", 0,
-		  0, NULL, NULL },
-		PSR_OPT_TIMEOUT(wish->timeout),
-	};
-
 	optlist_heading(list, "For developers", NULL);
-	OPTLIST_ADD(list, opts);
+	sink_add_developer_options(list, &wish->sink);
+	OPTLIST_ADD(list, timeout);
 }
-
-/* ---- drawing ---- */
 
 struct job {
 	struct draw_wish *wish;
@@ -104,7 +46,7 @@ static int check_replay(struct job *job, struct psr_error *err)
 	int code;
 
 	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
-	    || quality->n_said || quality->has_spacing || quality->has_passes || wish->has_sheet)
+	    || quality->n_said || quality->has_spacing || quality->has_passes || wish->sink.has_sheet)
 		return psr_fail(err, PSR_ERR_ARG,
 		                "--replay repeats a whole picture; it excludes all options that say what is in "
 		                "it");
@@ -127,16 +69,16 @@ static int check(struct job *job, struct psr_error *err)
 			code = views_make(&job->views, &wish->view, wish->cameras, err);
 		if (code == PSR_OK)
 			code = quality_apply(&job->frame, &wish->quality, err);
-		if (code == PSR_OK && wish->n_turn > 0 && job->views.n != 1)
+		if (code == PSR_OK && wish->sink.n_turn > 0 && job->views.n != 1)
 			code = psr_fail(err, PSR_ERR_ARG, "--view: a turntable has one view, not %u", job->views.n);
 	}
 	if (code == PSR_OK)
-		code = sink_check(&job->sink, wish, wish->n_turn > 0 ? (uint32_t)wish->n_turn : wish->replay ? 1 : job->views.n,
-		                  err);
+		code = sink_check(&job->sink, &wish->sink,
+		                  wish->sink.n_turn > 0 ? (uint32_t)wish->sink.n_turn : wish->replay ? 1 : job->views.n,
+		                  wish->quality.size, err);
 	return code == PSR_OK ? psr_address_check(wish->server, err) : code;
 }
 
-/* Codecs of the planes that are asked for. */
 static void choose_codecs(struct psr_msg_frame *frame)
 {
 	if (!(frame->planes & 1 << PSR_PLANE_COLOR))
@@ -153,7 +95,7 @@ static int place_cameras(struct job *job, struct psr_error *err)
 {
 	const struct draw_wish *wish = job->wish;
 	const double aspect = (double)job->frame.width / job->frame.height;
-	uint32_t n = job->sink.n, n_turn = (uint32_t)wish->n_turn;
+	uint32_t n = job->sink.n, n_turn = (uint32_t)wish->sink.n_turn;
 	double up[3];
 	int code = PSR_OK;
 
@@ -165,7 +107,7 @@ static int place_cameras(struct job *job, struct psr_error *err)
 		return PSR_OK;
 	}
 	for (uint32_t k = 0; k < job->views.n && code == PSR_OK; k++)
-		code = view_place(&job->camera[k], &job->views.wish[k], job->client, job->scene, aspect, n_turn, err);
+		code = view_place(&job->camera[k], &job->views.wish[k], job->scene, aspect, n_turn, err);
 	if (code != PSR_OK || n_turn == 0)
 		return code;
 	view_up(up, &job->views.wish[0], job->scene);
@@ -194,7 +136,7 @@ static int run(struct job *job, struct psr_error *err)
 		code = place_cameras(job, err);
 	if (code != PSR_OK)
 		return code;
-	if (job->replay == NULL || wish->output != NULL || wish->depth != NULL)
+	if (job->replay == NULL || wish->sink.output != NULL || wish->sink.depth != NULL)
 		job->frame.planes |= sink_planes(sink);
 	choose_codecs(&job->frame);
 	sink->scene = job->scene;
@@ -206,7 +148,7 @@ static int run(struct job *job, struct psr_error *err)
 	return series_run(&series, err);
 }
 
-int draw(struct draw_wish *wish, struct psr_error *err)
+static int draw(struct draw_wish *wish, struct psr_error *err)
 {
 	struct job *job = calloc(1, sizeof *job);
 	int code;
@@ -226,4 +168,20 @@ int draw(struct draw_wish *wish, struct psr_error *err)
 	free(job->camera);
 	free(job);
 	return code;
+}
+
+int draw_main(const char *program, draw_parse *parse, int argc, char **argv)
+{
+	struct draw_wish wish = { .sink.program = program, .server = psr_default_server(), .timeout = PSR_DEFAULT_TIMEOUT };
+	struct psr_error err;
+	int code;
+
+	scene_wish_init(&wish.scene);
+	view_wish_init(&wish.view);
+	quality_wish_init(&wish.quality, 800, 600, "lossless");
+	code = parse(&wish, argc, argv, &err);
+	if (code == PSR_OK)
+		code = draw(&wish, &err);
+	scene_wish_fini(&wish.scene);
+	return code >= 0 ? 0 : psr_cli_fail(program, &err);
 }

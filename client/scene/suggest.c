@@ -4,7 +4,7 @@
 #include <strings.h>
 #include "base/cli.h"
 
-/* A third of the letters at most, and less than would turn any name into any other. */
+/* A third of the letters; fewer of short names, which all resemble each other. */
 static size_t most_edits(size_t length)
 {
 	return length < 3 ? 1 : length < 9 ? 2 : length / 3;
@@ -39,7 +39,7 @@ int suggest_model(struct psr_client *client, const char *model, int timeout_ms, 
 	if (psr_client_list(client, &entries, &n, timeout_ms, &why) == PSR_OK) {
 		const char *near = n == 0 ? NULL : suggest_name(model, entries[0].name, n, sizeof *entries);
 
-		if (near != NULL && strcmp(near, model) != 0) /* else something else is missing */
+		if (near != NULL && strcmp(near, model) != 0) /* else a part of the model is missing */
 			psr_fail(err, PSR_ERR_NOT_FOUND, "there is no model %.200s; did you mean '%.200s'?", model, near);
 	}
 	free(entries);

@@ -1,9 +1,10 @@
 #include <inttypes.h>
 #include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include "bench.h"
-#include "client/psr.h"
+#include "base/json.h"
+#include "base/outfile.h"
+#include "client/bench/bench.h"
+#include "client/cli/cli.h"
+#include "commands.h"
 
 static int check(struct bench_options *options, struct psr_error *err)
 {
@@ -30,17 +31,17 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 {
 	struct optlist list = { .n = 0 };
 	const struct psr_opt load[] = {
-		{ "clients", 'c', PSR_OPT_INT, &options->n_clients, "N", "Connections, each with a camera of its own.", 1,
-		  BENCH_MAX_CLIENTS, NULL, NULL },
-		{ "seconds", 't', PSR_OPT_INT, &options->seconds, "S", "How long to measure; warming up comes before.", 1,
-		  86400, NULL, NULL },
-		{ "inflight", 0, PSR_OPT_INT, &options->n_inflight, "K",
-		  "Pictures that each connection asks for before the first has come: more hides a slow network.", 1,
-		  PSR_WIRE_MAX_OPEN, NULL, NULL },
+		{ .name = "clients", .letter = 'c', .type = PSR_OPT_INT, .value = &options->n_clients, .arg = "N", .min = 1,
+		  .max = BENCH_MAX_CLIENTS, .help = "Connections, each with a camera of its own." },
+		{ .name = "seconds", .letter = 't', .type = PSR_OPT_INT, .value = &options->seconds, .arg = "S", .min = 1,
+		  .max = 86400, .help = "How long to measure; warming up comes before." },
+		{ .name = "inflight", .type = PSR_OPT_INT, .value = &options->n_inflight, .arg = "K", .min = 1,
+		  .max = PSR_WIRE_MAX_OPEN,
+		  .help = "Pictures that each connection asks for before the first has come: more hides a slow network." },
 		PSR_OPT_SERVER(options->server),
 	};
 	const struct psr_opt script[] = {
-		{ "json", 0, PSR_OPT_FLAG, json, NULL, "Print one object instead of the lines.", 0, 0, NULL, NULL },
+		{ .name = "json", .type = PSR_OPT_FLAG, .value = json, .help = "Print one object instead of the lines." },
 		PSR_OPT_TIMEOUT(options->timeout),
 	};
 	const struct psr_cli cli = {
@@ -67,43 +68,6 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 	return code == PSR_OK ? check(options, err) : code;
 }
 
-static void stop_all(struct bench_worker *workers, int64_t n_started)
-{
-	for (int64_t i = 0; i < n_started; i++)
-		pthread_join(workers[i].thread, NULL);
-}
-
-/* Starts all, waits until they are warm, lets them measure, waits for the end. */
-static int run(struct bench_worker *workers, const struct bench_options *options, struct psr_error *err)
-{
-	struct bench_gate gate = { .lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER };
-	int64_t n = options->n_clients, n_started = 0;
-	int code = PSR_OK;
-
-	for (; n_started < n && code == PSR_OK; n_started++) {
-		struct bench_worker *worker = &workers[n_started];
-
-		worker->options = options;
-		worker->gate = &gate;
-		worker->index = n_started;
-		if (pthread_create(&worker->thread, NULL, bench_worker_run, worker) != 0) {
-			code = psr_fail(err, PSR_ERR_MEMORY, "the system has no room for %" PRId64 " clients", n);
-			break;
-		}
-	}
-	pthread_mutex_lock(&gate.lock);
-	while (gate.n_ready < n_started)
-		pthread_cond_wait(&gate.changed, &gate.lock);
-	for (int64_t i = 0; i < n_started && code == PSR_OK; i++)
-		if (workers[i].setup_code != PSR_OK)
-			code = psr_fail(err, workers[i].setup_code, "%s", workers[i].first_error.text);
-	gate.state = code == PSR_OK ? 1 : -1;
-	pthread_cond_broadcast(&gate.changed);
-	pthread_mutex_unlock(&gate.lock);
-	stop_all(workers, n_started);
-	return code;
-}
-
 static int print_result(const struct bench_options *options, const struct bench_result *r, int as_json,
                         struct psr_error *err)
 {
@@ -120,7 +84,7 @@ static int print_result(const struct bench_options *options, const struct bench_
 		printf("latency   %10.2f ms p50, %.2f p90, %.2f p99, %.2f max (%" PRIu64 " frames)\n", r->p50_ms, r->p90_ms,
 		       r->p99_ms, r->max_ms, r->n_samples);
 		printf("failed    %10" PRIu64 "\n", r->n_failed);
-		return psr_flush_output(err);
+		return outfile_flush_stdout(err);
 	}
 	json = cJSON_CreateObject();
 	cJSON_AddStringToObject(json, "model", model);
@@ -139,7 +103,7 @@ static int print_result(const struct bench_options *options, const struct bench_
 	cJSON_AddNumberToObject(latency, "p90", r->p90_ms);
 	cJSON_AddNumberToObject(latency, "p99", r->p99_ms);
 	cJSON_AddNumberToObject(latency, "max", r->max_ms);
-	return psr_print_json(json, err);
+	return json_print(json, err);
 }
 
 int psr_bench_main(int argc, char **argv)
@@ -149,7 +113,6 @@ int psr_bench_main(int argc, char **argv)
 		                             .seconds = 5,
 		                             .n_inflight = 1,
 		                             .timeout = PSR_DEFAULT_TIMEOUT };
-	struct bench_worker *workers = NULL;
 	struct bench_result result;
 	struct psr_error err;
 	int json = 0, code;
@@ -159,24 +122,12 @@ int psr_bench_main(int argc, char **argv)
 	quality_wish_init(&options.quality, 512, 512, "jpeg:85");
 	options.scene.is_quiet = 1;
 	code = parse(&options, &json, argc, argv, &err);
-	if (code == PSR_OK) {
-		workers = calloc((size_t)options.n_clients, sizeof *workers);
-		code = workers != NULL ? run(workers, &options, &err) : psr_fail(&err, PSR_ERR_MEMORY, "no memory");
-	}
 	if (code == PSR_OK)
-		code = bench_sum(&result, workers, options.n_clients, &err);
+		code = bench_run(&result, &options, &err);
 	if (code == PSR_OK)
 		code = print_result(&options, &result, json, &err);
-	for (int64_t i = 0; workers != NULL && i < options.n_clients; i++) {
-		if (code == PSR_OK && workers[i].first_error.code != PSR_OK)
-			fprintf(stderr, "psr bench: client %" PRId64 ": %s\n", i + 1, workers[i].first_error.text);
-		free(workers[i].sample_us);
-	}
-	free(workers);
 	scene_wish_fini(&options.scene);
 	if (code > 0)
 		return 0;
-	if (code != PSR_OK)
-		return psr_cli_fail("psr bench", &err);
-	return result.n_failed > 0;
+	return code == PSR_OK ? result.n_failed > 0 : psr_cli_fail("psr bench", &err);
 }

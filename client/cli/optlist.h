@@ -1,6 +1,6 @@
 /* Tables of options that several commands put together from the same parts. */
-#ifndef PSR_CLIENT_OPTLIST_H
-#define PSR_CLIENT_OPTLIST_H
+#ifndef PSR_CLIENT_CLI_OPTLIST_H
+#define PSR_CLIENT_CLI_OPTLIST_H
 
 #include "base/cli.h"
 
@@ -16,10 +16,10 @@ void optlist_heading(struct optlist *list, const char *heading, const char *text
 
 #define OPTLIST_ADD(list, opts) optlist_add(list, opts, (int)(sizeof(opts) / sizeof(opts)[0]))
 
-/* Reads a file of words `name=value` for the options of `cli`: apart by blanks, "..." around what holds blanks, `name`
- * alone for a flag, and # before what is for people. After each line that has words, on_line is called (may be NULL).
- * Strings that options take point into *text, which is the caller's to free, also after an error.
- * The options' errors and those of on_line behind file, line and column; NOT_FOUND, IO, MEMORY. */
+/* Reads a file of words `name=value`, options of `cli`. Blanks separate words, "..." keeps blanks, `name` alone sets a
+ * flag, # begins a comment. Calls on_line (may be NULL) after each line with words. Strings of options point into
+ * *text, which the caller frees, also after an error. Errors of options and on_line name file, line and column;
+ * NOT_FOUND, IO, FORMAT, LIMIT, MEMORY. */
 int wordfile_read(char **text, const char *path, const struct psr_cli *cli, int (*on_line)(void *, struct psr_error *),
                   void *userdata, struct psr_error *err);
 

@@ -1,7 +1,7 @@
 #include "series.h"
 #include <string.h>
 
-#define MAX_UNDER_WAY 4 /* what a server needs to be busy while pictures are written here */
+#define MAX_UNDER_WAY 4 /* keep the server busy while pictures are written here */
 
 struct open_frame {
 	uint32_t id, k;
@@ -55,7 +55,7 @@ int series_run(struct series *series, struct psr_error *err)
 	for (uint32_t k = 0; code == PSR_OK && (k < series->n || n_open > 0);) {
 		while (code == PSR_OK && k < series->n && n_open < most) {
 			code = send_frame(series, k, &open[n_open].id, err);
-			if (code == PSR_ERR_BUSY && n_open > 0) { /* what was sent before is to be read first */
+			if (code == PSR_ERR_BUSY && n_open > 0) { /* read the frames under way first */
 				code = PSR_OK;
 				break;
 			}

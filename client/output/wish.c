@@ -4,12 +4,47 @@
 #include <unistd.h>
 #include "sink.h"
 
+void sink_add_file_options(struct optlist *list, struct sink_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ .name = "sheet", .type = PSR_OPT_SIZE, .value = wish->sheet, .arg = "COLSxROWS", .seen = &wish->has_sheet,
+		  .help = "All pictures on one contact sheet, row by row; --size is that of each." },
+		{ .name = "depth", .type = PSR_OPT_STRING, .value = &wish->depth, .arg = "FILE",
+		  .help = "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. "
+		          ".pfm, .exr or .tif." },
+		{ .name = "report", .type = PSR_OPT_STRING, .value = &wish->report, .arg = "FILE",
+		  .help = "All about the picture as JSON: request, times, counts, hashes. - is standard output." },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
+void sink_add_developer_options(struct optlist *list, struct sink_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ .name = "plane", .type = PSR_OPT_STRING, .value = &wish->plane_text, .arg = "PLANE",
+		  .help = "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or "
+		          "block (levels, facing). All go to .npy; color, normal and weight to pictures, depth as with "
+		          "--depth." },
+		{ .name = "show", .type = PSR_OPT_STRING, .value = &wish->show_text, .arg = "STAGE",
+		  .help = "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, "
+		          "weights, holes or depth." },
+		{ .name = "hash", .type = PSR_OPT_FLAG, .value = &wish->hash,
+		  .help = "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`." },
+		{ .name = "effects", .type = PSR_OPT_FLAG, .value = &wish->effects,
+		  .help = "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below "
+		          "1`." },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
 static int is_stdout(const char *name)
 {
 	return name != NULL && strcmp(name, OUTPUT_STDOUT) == 0;
 }
 
-static int check_stdout(const struct draw_wish *wish, struct psr_error *err)
+static int check_stdout(const struct sink_wish *wish, struct psr_error *err)
 {
 	int n = is_stdout(wish->output) + is_stdout(wish->depth) + is_stdout(wish->report);
 
@@ -27,7 +62,7 @@ static int check_stdout(const struct draw_wish *wish, struct psr_error *err)
 
 static int check_plane(struct sink *sink, struct psr_error *err)
 {
-	const struct draw_wish *wish = sink->wish;
+	const struct sink_wish *wish = sink->wish;
 
 	if (wish->plane_text != NULL && wish->show_text != NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--plane and --show exclude each other: both say what -o writes");
@@ -48,7 +83,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 /* How -o takes n pictures. */
 static int choose_kind(struct sink *sink, struct psr_error *err)
 {
-	const struct draw_wish *wish = sink->wish;
+	const struct sink_wish *wish = sink->wish;
 	int is_numbered = 0, is_plain = sink->show == NULL && sink->plane == PSR_PLANE_COLOR;
 
 	if (wish->has_sheet && wish->output == NULL)
@@ -92,7 +127,7 @@ static int check_numbered(int *is_numbered, const struct sink *sink, const char 
 
 static int check_endings(const struct sink *sink, struct psr_error *err)
 {
-	const struct draw_wish *wish = sink->wish;
+	const struct sink_wish *wish = sink->wish;
 	int code = PSR_OK;
 
 	if (sink->kind == SINK_ANIMATION)
@@ -103,7 +138,8 @@ static int check_endings(const struct sink *sink, struct psr_error *err)
 	return code == PSR_OK && wish->depth != NULL ? psr_picture_check_depth(wish->depth, err) : code;
 }
 
-int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, struct psr_error *err)
+int sink_check(struct sink *sink, const struct sink_wish *wish, uint32_t n, const uint32_t size[2],
+               struct psr_error *err)
 {
 	int code;
 
@@ -124,7 +160,7 @@ int sink_check(struct sink *sink, const struct draw_wish *wish, uint32_t n, stru
 	if (code == PSR_OK)
 		code = check_endings(sink, err);
 	if (code == PSR_OK && sink->kind == SINK_SHEET)
-		code = sheet_check(&sink->sheet, n, wish->quality.size[0], wish->quality.size[1], err);
+		code = sheet_check(&sink->sheet, n, size[0], size[1], err);
 	if (code == PSR_OK)
 		code = check_stdout(wish, err);
 	if (code == PSR_OK && (sink->hashes = calloc(n, sizeof *sink->hashes)) == NULL)

@@ -1,10 +1,10 @@
 #include <string.h>
 #include "base/infile.h"
-#include "client/optlist.h"
+#include "optlist.h"
 
 #define MAX_BYTES (16u << 20)
 
-/* The next word, its quotes taken out, ended by a NUL; *at behind it. NULL: the line has no more. */
+/* Returns the next word without its quotes and moves *at behind it; NULL at the end of the line. */
 static char *next_word(char **at, int *is_open)
 {
 	char *start, *to;

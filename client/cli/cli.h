@@ -1,0 +1,34 @@
+/* What every subcommand says and does at the command line. */
+#ifndef PSR_CLIENT_CLI_CLI_H
+#define PSR_CLIENT_CLI_CLI_H
+
+#include "base/cli.h"
+#include "psr/client.h"
+
+#define PSR_PROGRAM "psr " PSR_VERSION
+
+#define PSR_EXIT_CODES \
+	"exit codes: 0 done, 1 a frame of bench failed, 2 usage, 3 file or system, 4 bad data, 5 over a limit,\n" \
+	"6 server or connection, 7 a defect of psr"
+
+#define PSR_OPT_SERVER(variable) \
+	{ .name = "server", .letter = 's', .type = PSR_OPT_STRING, .value = &(variable), .arg = "ADDR", \
+	  .help = "Where psrd listens: HOST:PORT, [V6]:PORT, tcp://HOST:PORT or unix:PATH. Set $PSR_SERVER to say it " \
+	          "once." }
+#define PSR_OPT_TIMEOUT(variable) \
+	{ .name = "timeout", .type = PSR_OPT_INT, .value = &(variable), .arg = "SECONDS", .min = 1, .max = 86400, \
+	  .help = "How long to wait for a server that says nothing." }
+
+#define PSR_DEFAULT_TIMEOUT 60
+
+const char *psr_default_server(void); /* $PSR_SERVER, or the address that psrd listens to by default */
+
+/* Shows a build or load on one line of standard error, if that is a terminal. For psr_client_open(); userdata: a
+ * struct psr_progress_line, zeroed. */
+struct psr_progress_line {
+	int is_drawn;
+};
+void psr_progress_draw(const struct psr_msg_progress *progress, void *userdata);
+void psr_progress_end(struct psr_progress_line *line);
+
+#endif

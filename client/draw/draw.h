@@ -1,0 +1,28 @@
+/* What shot and turntable share: a scene, any number of cameras, and where the pictures go. */
+#ifndef PSR_CLIENT_DRAW_DRAW_H
+#define PSR_CLIENT_DRAW_DRAW_H
+
+#include "client/output/sink.h"
+#include "client/scene/quality.h"
+#include "client/scene/view.h"
+
+struct draw_wish {
+	const char *server;
+	int64_t timeout; /* seconds */
+	struct scene_wish scene;
+	struct view_wish view;
+	struct quality_wish quality;
+	struct sink_wish sink;
+	const char *cameras, *replay;
+};
+
+/* Options of both commands, group by group; `files` are the command's own of the group Files. */
+void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct psr_opt *files, int n_files);
+
+/* Fills the wish, which has its defaults; 1: --help was printed. */
+typedef int draw_parse(struct draw_wish *wish, int argc, char **argv, struct psr_error *err);
+
+/* Parses, checks, connects, draws and writes. Returns the exit status. */
+int draw_main(const char *program, draw_parse *parse, int argc, char **argv);
+
+#endif
