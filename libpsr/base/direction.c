@@ -138,7 +138,7 @@ uint16_t psr_direction_encode(const float v[3])
 	return (uint16_t)(octant << 2 * LEVELS | index);
 }
 
-void psr_direction_frame(const double dir[3], double frame[3][3])
+void psr_direction_basis(const double dir[3], double basis[3][3])
 {
 	double up[3] = { 0, 0, 0 };
 	int least = 0;
@@ -147,9 +147,9 @@ void psr_direction_frame(const double dir[3], double frame[3][3])
 		if (fabs(dir[k]) < fabs(dir[least]))
 			least = k;
 	up[least] = 1;
-	v3d_set(frame[2], dir[0], dir[1], dir[2]);
-	v3d_cross(frame[0], up, frame[2]);
-	v3d_normalize(frame[0], frame[0]);
-	v3d_cross(frame[1], frame[2], frame[0]);
-	v3d_normalize(frame[1], frame[1]);
+	v3d_set(basis[2], dir[0], dir[1], dir[2]);
+	v3d_cross(basis[0], up, basis[2]);
+	v3d_normalize(basis[0], basis[0]);
+	v3d_cross(basis[1], basis[2], basis[0]);
+	v3d_normalize(basis[1], basis[1]);
 }

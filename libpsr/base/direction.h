@@ -39,7 +39,7 @@ void psr_direction_center(int level, unsigned index, double v[3]);
 /* Corners of the same triangle, each of unit length. */
 void psr_direction_corners(int level, unsigned index, double corner[3][3]);
 
-/* Right-handed orthonormal frame whose z is `dir` (unit length): rows x, y, z. The lattices of projections use it. */
-void psr_direction_frame(const double dir[3], double frame[3][3]);
+/* Right-handed orthonormal basis whose z is `dir` (unit length): rows x, y, z. The lattices of projections use it. */
+void psr_direction_basis(const double dir[3], double basis[3][3]);
 
 #endif

@@ -25,16 +25,6 @@ void table_fini(struct table *table)
 	*table = (struct table){ 0 };
 }
 
-/* The place of a key, or the free one for it. */
-static uint64_t *place_for(const struct table *table, uint64_t key)
-{
-	size_t i = table_place(key, table->size);
-
-	while (*table_at(table, i) != key && *table_at(table, i) != TABLE_FREE)
-		i = (i + 1) & (table->size - 1);
-	return table_at(table, i);
-}
-
 int table_grow(struct table *table)
 {
 	struct table old = *table;
@@ -45,21 +35,21 @@ int table_grow(struct table *table)
 	}
 	for (size_t i = 0; i < old.size; i++)
 		if (*table_at(&old, i) != TABLE_FREE)
-			memcpy(place_for(table, *table_at(&old, i)), table_at(&old, i), table->bytes);
+			memcpy(table_search(table, *table_at(&old, i)), table_at(&old, i), table->bytes);
 	psr_free(old.entry);
 	return PSR_OK;
 }
 
 void *table_put(struct table *table, uint64_t key)
 {
-	uint64_t *entry = place_for(table, key);
+	uint64_t *entry = table_search(table, key);
 
 	if (*entry == key)
 		return entry;
 	if (4 * table->n >= 3 * table->size) {
 		if (table_grow(table) != PSR_OK)
 			return NULL;
-		entry = place_for(table, key);
+		entry = table_search(table, key);
 	}
 	table->n++;
 	memset(entry, 0, table->bytes);

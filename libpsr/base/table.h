@@ -42,14 +42,22 @@ static inline uint64_t *table_at(const struct table *table, size_t place)
 	return (uint64_t *)(void *)(table->entry + place * table->bytes);
 }
 
-/* The entry of a key; NULL. */
-static inline void *table_find(const struct table *table, uint64_t key)
+/* The entry of a key, or the free place for it. */
+static inline uint64_t *table_search(const struct table *table, uint64_t key)
 {
 	size_t i = table_place(key, table->size);
 
 	while (*table_at(table, i) != key && *table_at(table, i) != TABLE_FREE)
 		i = (i + 1) & (table->size - 1);
-	return *table_at(table, i) == key ? table_at(table, i) : NULL;
+	return table_at(table, i);
+}
+
+/* The entry of a key; NULL. */
+static inline void *table_find(const struct table *table, uint64_t key)
+{
+	uint64_t *entry = table_search(table, key);
+
+	return *entry == key ? entry : NULL;
 }
 
 #endif

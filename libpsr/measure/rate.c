@@ -33,7 +33,7 @@ static int make_rays(struct rays *rays)
 	for (unsigned d = 0; d < DIRECTIONS; d++) {
 		double z[3], frame[3][3];
 		psr_direction_center(1, 9 * d, z);
-		psr_direction_frame(z, frame);
+		psr_direction_basis(z, frame);
 		for (int b = 0; b < 4 * reach * reach; b++) {
 			for (int s = 0; s < RUN; s++) {
 				int row = SIDE * (b / (2 * reach) - reach) + s / SIDE,

@@ -5,8 +5,7 @@
 #define MOST_RAW (2 * RAY_MOST_HITS)
 #define SAME_HIT 0x1p-20
 
-/* What a ray met so far, sorted by distance; of equal ones the lower primitive comes first. So the list does not depend
- * on the order in which the tree finds things, full or not. */
+/* The nearest hits of a ray, by distance and then by primitive: whatever order the tree finds them in. */
 struct ray_list {
 	int n;
 	struct ray_hit hit[MOST_RAW];
@@ -17,7 +16,7 @@ static int comes_before(const struct ray_hit *a, const struct ray_hit *b)
 	return a->t != b->t ? a->t < b->t : a->prim < b->prim;
 }
 
-/* Into a sorted array of n with room for `most`; the last falls out of a full one. Returns the new n. */
+/* Inserts a hit; a full array of `most` loses its last. Returns the new n. */
 static int insert(struct ray_hit *sorted, int n, int most, const struct ray_hit *hit)
 {
 	int at = n;
@@ -32,7 +31,7 @@ static int insert(struct ray_hit *sorted, int n, int most, const struct ray_hit 
 	return n;
 }
 
-/* Seen from both ends, a face stops one of them at least. */
+/* Of rays from both ends, a face stops at least one. */
 static int is_absent(const struct ray_packet *packet, const struct ray_hit *hit)
 {
 	struct ray_hit front = *hit;
@@ -41,7 +40,7 @@ static int is_absent(const struct ray_packet *packet, const struct ray_hit *hit)
 	return ray_hit_is_absent(packet->scene, &front);
 }
 
-/* Keeps what is met and sends every ray on. */
+/* Collects a hit and sends the ray on. */
 static void collect(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct ray_packet *packet = (const struct ray_packet *)(const void *)args->context;
@@ -67,7 +66,7 @@ static void collect(const struct RTCFilterFunctionNArguments *args)
 	}
 }
 
-/* How far apart two hits of one side may be and yet are one: surfaces that coincide, and the discs of one surface. */
+/* Two hits of one side within this distance are one: surfaces coincide, discs overlap. */
 static double merge_distance(const struct ray_scene *scene, uint32_t a, uint32_t b)
 {
 	double center[3], normal[3], ra, rb;
@@ -82,7 +81,7 @@ static double merge_distance(const struct ray_scene *scene, uint32_t a, uint32_t
 static int merge(const struct ray_scene *scene, const struct ray *ray, const struct ray_list *list, int most,
                  struct ray_hit *out)
 {
-	struct ray_hit group[2]; /* the latest of each side: its first hit is at `first`, the hit itself stands for it */
+	struct ray_hit group[2]; /* the latest of each side; it began at `first` */
 	double first[2], length = v3d_length(ray->direction);
 	int is_open[2] = { 0, 0 }, n = 0;
 
@@ -142,7 +141,7 @@ void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, i
 	}
 }
 
-/* What stops a ray from one end, of what was met from both; from the other end, backwards. */
+/* The hits that stop rays from one end, of those from both; from the other end, backwards. */
 static void choose_end(const struct ray_scene *scene, const struct ray_list *both, int is_other, double length,
                        struct ray_list *list)
 {
@@ -159,7 +158,7 @@ static void choose_end(const struct ray_scene *scene, const struct ray_list *bot
 	}
 }
 
-/* Rays that meet more than a list holds look from their other ends themselves. */
+/* A ray that meets more than a list holds is traced again from its other end. */
 static int merge_other(const struct ray_scene *scene, const struct ray *ray, const struct ray_list *both, double length,
                        int most, struct ray_hit *hit)
 {

@@ -4,15 +4,13 @@
 
 #include "ray.h"
 
-/* sum[i]: the area of all triangles and discs of the scene up to and with primitive i, in inner units; scale: that of
- * the scene. */
+/* sum[i]: the area of primitives 0 to i, in inner units. scale: the scene's. */
 void area_sum(const struct ray_scene *scene, const struct psr_mesh *mesh, double scale, double *sum);
 
-/* The primitive that holds x, 0 <= x < sum[n - 1], n > 0: a random one by area if x is random. */
+/* The primitive that holds x, 0 <= x < sum[n - 1]: one by area if x is random. n > 0. */
 uint32_t area_find(const double *sum, uint32_t n, double x);
 
-/* A point of a primitive, for u and v in 0..1: evenly of a triangle, the centre of a disc. 0: the surface is absent
- * there. */
+/* A point of a triangle, evenly spread for u and v in 0..1, or a disc's centre. 0: the surface is absent there. */
 int area_point(const struct ray_scene *scene, uint32_t prim, double u, double v, double p[3]);
 
 #endif

@@ -4,7 +4,7 @@
 #include "tree.h"
 #include "triangle.h"
 
-/* Embree answers no point queries of discs, but of a user's geometry, which needs boxes only. */
+/* Embree has point queries of a user's geometry, given its boxes, and none of discs. */
 static void bound_disc(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct ray_scene *scene = args->geometryUserPtr;
@@ -59,7 +59,7 @@ static double disc_distance2(const struct ray_scene *scene, uint32_t prim, const
 	return height * height * v3d_dot(normal, normal) + beyond * beyond;
 }
 
-/* The tree only chooses candidates: distances are computed in double from the primitives. */
+/* The tree proposes primitives; their distances are computed in double. */
 static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
 {
 	struct nearest *nearest = args->userPtr;
@@ -75,7 +75,7 @@ static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
 	if (!(distance2 < nearest->distance2))
 		return false;
 	nearest->distance2 = distance2;
-	/* A little more than the distance, so that rounding does not lose an equally near one. */
+	/* A little more, so that rounding does not lose an equally near one. */
 	args->query->radius = (float)(sqrt(distance2) * (1 + 0x1p-20) + 0x1p-20);
 	return true;
 }

@@ -1,13 +1,13 @@
 #include <math.h>
 #include "base/vec.h"
-#include "tree.h"
 #include "surface/stipple.h"
 #include "surface/texture.h"
+#include "tree.h"
 
 #define LEAST_OPACITY (0.5f / 255) /* less is nothing in a model */
 
-/* Where the ray meets the primitive that the tree found: in its plane, drawn into the triangle, as the tree rounds its
- * edges outwards. An edge-on triangle has no such point; it keeps what the tree says. */
+/* Where a ray meets the triangle that the tree found: in its plane, clamped to it, as the tree rounds edges outwards.
+ * An edge-on triangle keeps the tree's u and v. */
 static void locate_triangle(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit)
 {
 	double corner[3][3], e1[3], e2[3], s[3], p[3], q[3], point[3], det, sum;
@@ -36,7 +36,7 @@ static void locate_triangle(const struct ray_scene *scene, const struct ray *ray
 	hit->t = -v3d_dot(point, ray->direction) / v3d_dot(ray->direction, ray->direction);
 }
 
-/* In the plane of the disc, drawn into its rim likewise. */
+/* In the plane of the disc, clamped to its rim. */
 static void locate_disc(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit)
 {
 	double center[3], normal[3], s[3], reach[3], length, radius = ray_disc(scene, hit->prim, center, normal);
@@ -120,8 +120,7 @@ int ray_scene_is_sheer(const struct ray_scene *scene, uint32_t prim, double u, d
 	return material_of(scene->mesh, prim)->alpha == PSR_ALPHA_BLEND && opacity_of(scene, prim, u, v) < 1;
 }
 
-/* Opaque ones need no place on the triangle, only a side, which the rounded normal tells unless the ray all but
- * grazes. */
+/* An opaque triangle stops a ray by its side alone, which the rounded normal tells unless the ray nearly grazes it. */
 enum verdict { STOPS, GOES_ON, MUST_LOOK };
 
 static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, uint32_t prim)
@@ -191,7 +190,7 @@ void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, c
 	packet->list = NULL;
 }
 
-/* A ray that starts far away would round to another ray: it starts just outside of the unit sphere instead. */
+/* Far origins lose bits as floats: a ray starts just outside of the unit sphere instead. */
 static double first_t(const struct ray *ray, double t_min)
 {
 	double squared = v3d_dot(ray->direction, ray->direction);
@@ -279,7 +278,7 @@ void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, in
 		for (int k = 0; k < part; k++)
 			rays.tfar[k] = (float)(t_max - first_t(&ray[i + k], 0));
 		rtcOccluded8(valid, scene->scene, &packet.context, &rays);
-		/* Embree tells by a tfar of minus infinity. */
+		/* Embree sets tfar to minus infinity. */
 		for (int k = 0; k < part; k++)
 			is_occluded[i + k] = rays.tfar[k] == -INFINITY;
 	}

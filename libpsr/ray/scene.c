@@ -46,7 +46,7 @@ static void attach(struct ray_scene *scene, RTCGeometry geometry, unsigned id)
 	rtcAttachGeometryByID(scene->scene, geometry, id);
 }
 
-/* The tree keeps its own arrays: floats, relative to the origin and scaled, so that far coordinates lose nothing. */
+/* The tree's own floats are relative to the origin and scaled: far coordinates lose nothing. */
 static int attach_triangles(struct ray_scene *scene)
 {
 	const struct psr_mesh *mesh = scene->mesh;
@@ -96,8 +96,7 @@ static int attach_discs(struct ray_scene *scene)
 	return rc;
 }
 
-/* Corners once more beside each other, as a hit reads all of them: from the vertices they would be four cache
- * misses. */
+/* A hit reads all corners: from the vertices that would be four cache misses. */
 static int make_triangles(struct ray_scene *scene)
 {
 	const struct psr_mesh *mesh = scene->mesh;
@@ -127,7 +126,7 @@ static int build_tree(struct ray_scene *scene)
 {
 	int rc = PSR_OK;
 
-	/* One thread, so that the tree does not depend on how many there are; one instruction set for the same reason. */
+	/* One thread and one instruction set: always the same tree. */
 	scene->device = rtcNewDevice(__builtin_cpu_supports("avx2") ? "isa=avx2,threads=1,set_affinity=0"
 	                                                            : "threads=1,set_affinity=0");
 	if (scene->device == NULL)

@@ -1,4 +1,4 @@
-/* Inside of the ray tracer: the tree that the ray*.c files share, the only ones that include Embree. */
+/* The tree that the files of ray/ share; they alone include Embree. */
 #ifndef PSR_RAY_TREE_H
 #define PSR_RAY_TREE_H
 
@@ -23,25 +23,25 @@ struct ray_scene {
 	RTCScene discs; /* for distances; NULL until ray_scene_index_distances */
 };
 
-/* A packet of rays under way. The context comes first: Embree hands it back to the filters. */
+/* A packet of rays. The context comes first: Embree hands it back to the filters. */
 struct ray_packet {
 	struct RTCIntersectContext context;
 	const struct ray_scene *scene;
 	const struct ray *ray;
-	struct ray_list *list; /* where ray_scene_trace_all collects, */
-	int has_ends;          /* of rays that are looked along from both ends */
+	struct ray_list *list; /* ray_scene_trace_all() collects hits here, */
+	int has_ends;          /* of rays from both ends */
 };
 
 void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, const struct ray *ray);
 
-/* Rays ray[0..n-1] at t >= t_min as floats, and -1 in `valid` for each; the rest of the packet is off. */
+/* ray[0..n-1] at t >= t_min as floats; `valid` is -1 for each, and 0 for the rest of the packet. */
 void ray_packet_fill(struct RTCRay8 *rays, int valid[RAY_PACKET], const struct ray *ray, int n, double t_min);
 
-/* A primitive, met at u, v as the tree has them: where exactly, and whether nothing is met there after all. */
+/* Computes t, u, v and is_back of a hit from its prim, and the tree's u and v; and whether it is absent there. */
 void ray_hit_locate(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit);
 int ray_hit_is_absent(const struct ray_scene *scene, const struct ray_hit *hit);
 
-/* A filter's arguments, N wide, for which Embree's header has names in C++ only. */
+/* A filter's arguments, N wide: Embree's header names them in C++ only. */
 struct ray_columns {
 	const unsigned *id, *prim, *geometry;
 	const float *u, *v;
@@ -74,7 +74,7 @@ static inline int ray_is_two_sided(const struct ray_scene *scene, uint32_t prim)
 	return mesh->material[texture_material(mesh, prim)].two_sided != 0;
 }
 
-/* What locates a hit is in no order that a cache could guess: asked for early, for all of a packet. */
+/* Prefetch: hits arrive in random order. */
 static inline void ray_prefetch(const struct ray_scene *scene, uint32_t prim)
 {
 	if (!ray_is_disc(scene, prim)) {

@@ -40,6 +40,10 @@ static void clear_level(struct fill_level *level, size_t area)
 
 static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 {
+	uint16_t *values;
+	uint8_t *near;
+	float *z;
+
 	if (fill->width == width && fill->height == height)
 		return PSR_OK;
 	const uint32_t bricks_x = (width + BRICK - 1) / BRICK, bricks_y = (height + BRICK - 1) / BRICK;
@@ -55,12 +59,12 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
-	if (!fill->storage)
+	if (fill->storage == NULL)
 		return PSR_ERR_MEMORY;
-	float *z = fill->storage;
+	z = fill->storage;
 	fill->left = (uint32_t *)(z + cells);
-	uint16_t *values = (uint16_t *)(fill->left + n_bricks);
-	uint8_t *near = (uint8_t *)(values + 4 * cells);
+	values = (uint16_t *)(fill->left + n_bricks);
+	near = (uint8_t *)(values + 4 * cells);
 	uint32_t w = width, h = height;
 	for (int l = 1; l <= top; l++) {
 		w = (w + 1) / 2;
@@ -214,8 +218,8 @@ static void find_coarse(struct fill *fill)
 		for (uint32_t y = 0; y < from->height; y++)
 			for (uint32_t x = 0; x < from->width; x++) {
 				const uint32_t px = x / 2, py = y / 2, nx = x & 1 ? px + 1 : px - 1, ny = y & 1 ? py + 1 : py - 1;
-				if (!(*coarse_at(fill, l, x, y) & FILL_NEEDED) ||
-				    fill_row_at(from, (int32_t)x, (int32_t)y).weight[0] == WEIGHT_ONE)
+				if (!(*coarse_at(fill, l, x, y) & FILL_NEEDED)
+				    || fill_row_at(from, (int32_t)x, (int32_t)y).weight[0] == WEIGHT_ONE)
 					continue;
 				is_whole = 0;
 				pull_tree(fill, l + 1, px, py);

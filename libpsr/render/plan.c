@@ -53,12 +53,13 @@ double plan_place(double center[3], double rotation[3][3], const struct psr_inst
 static int scene_exponent(const struct psr_scene *scene)
 {
 	double far = 0;
+	int exponent = 0;
+
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		double center[3], rotation[3][3];
 		double scale = plan_place(center, rotation, &scene->instance[i], scene->camera.eye);
 		far = fmax(far, v3d_length(center) + scale);
 	}
-	int exponent = 0;
 	frexp(far, &exponent);
 	return exponent;
 }
@@ -79,7 +80,7 @@ static void light_make(struct strip_light *out, const struct psr_light *light, c
 		v3d_sub(v, light->position, view->eye);
 		m3d_apply(v, view->axis, v);
 		v3f_set(out->position, (float)(v[0] * view->scale), (float)(v[1] * view->scale), (float)(v[2] * view->scale));
-		double r = light->reference * view->scale;
+		const double r = light->reference * view->scale;
 		out->reference2 = (float)(r * r);
 	}
 	if (light->kind == PSR_LIGHT_SPOT) {
@@ -95,13 +96,14 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 {
 	const double dx = projection->spacing, dy = dx * 0.86602540378443864676;
 	const double half[3] = { plan->center[0], plan->center[1], 0 };
-	psr_placing_make(&out->placing, projection);
 	double column[4][3]; /* in camera space: a unit of projection space's x, y, z, and its origin */
+	double *to[4] = { out->step, out->down, out->along, out->origin };
+
+	psr_placing_make(&out->placing, projection);
 	for (int k = 0; k < 3; k++)
 		m3d_apply(column[k], (const double(*)[3])to_camera,
 		          (const double[3]){ projection->axis[k][0], projection->axis[k][1], projection->axis[k][2] });
 	memcpy(column[3], center, sizeof column[3]);
-	double *to[4] = { out->step, out->down, out->along, out->origin };
 	const double length[4] = { dx, dy, 1, 1 };
 	for (int a = 0; a < 3; a++) {
 		for (int k = 0; k < 4; k++) {
@@ -129,7 +131,7 @@ static void sight_make(struct warp_instance *out, double turn[3][3], const struc
 static void instance_make(struct plan_instance *out, struct warp_instance *warp, const struct psr_instance *instance,
                           const struct plan *plan, const struct view *view, double focal)
 {
-	double center[3], rotation[3][3], camera_center[3], to_camera[3][3];
+	double center[3], rotation[3][3], camera_center[3], to_camera[3][3], eye[3];
 	double world = plan_place(center, rotation, instance, view->eye), scale = world * view->scale;
 	struct cull_view *cull = &out->cull;
 
@@ -157,7 +159,6 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		cull->center_m[i][3] = (float)camera_center[i];
 	}
 
-	double eye[3];
 	v3d_scale(eye, plan->perspective ? center : view->axis[2], -1);
 	m3d_apply_transposed(eye, (const double(*)[3])rotation, eye);
 	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
@@ -171,7 +172,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	             : !is_outside || info->n_trials == 0 || info->n_lost > 0    ? PSR_WHY_VOID
 	                                                                         : PSR_WHY_RAN;
 
-	struct warp_lattice *lattice = (struct warp_lattice *)warp->lattice;
+	struct warp_lattice *const lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
 		lattice_make(&lattice[p], &warp->blocks->projection[p], to_camera, camera_center, plan, focal);
 }
@@ -189,15 +190,17 @@ static void threshold_make(struct plan *plan, double gap_threshold)
 
 static int storage_make(struct plan *plan, const struct psr_scene *scene)
 {
+	struct warp_lattice *lattice;
 	size_t n_projections = 0;
+
 	for (uint32_t i = 0; i < scene->n_instances; i++)
 		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
-	size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light) +
+	const size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light) +
 	              scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	plan->storage = psr_grow_huge(plan->storage, &plan->storage_size, size + 1);
-	if (!plan->storage)
+	if (plan->storage == NULL)
 		return PSR_ERR_MEMORY;
-	struct warp_lattice *lattice = plan->storage;
+	lattice = plan->storage;
 	plan->instance = (struct plan_instance *)(lattice + n_projections);
 	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
 	plan->light = (struct strip_light *)(plan->warp + scene->n_instances);
@@ -228,6 +231,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 {
 	const struct psr_camera *camera = &scene->camera;
 	struct view view;
+	double focal;
 	int rc = storage_make(plan, scene);
 	if (rc)
 		return psr_fail(err, rc, "no memory for a scene of %u instances", scene->n_instances);
@@ -259,7 +263,6 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 
-	double focal;
 	if (plan->perspective) {
 		double s, c;
 		psr_sincos(camera->fov_y / 2, &s, &c);

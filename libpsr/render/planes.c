@@ -91,19 +91,19 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 	for (uint32_t x = 0; x < plan->width; x += STRIP) {
 		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
 		const size_t first = row + x;
-		if (frame->words)
+		if (frame->words != NULL)
 			put_words(simd, plan, frame->words + first, word + x, n);
-		if (frame->weight)
+		if (frame->weight != NULL)
 			put_weights(frame->weight + first, weight + x, n);
-		if (!frame->normal && !frame->id && !frame->block)
+		if (frame->normal == NULL && frame->id == NULL && frame->block == NULL)
 			continue;
 		pixels.x0 = x;
 		simd->strip_list(&pixels, word + x, weight + x, n);
-		if (frame->normal)
+		if (frame->normal != NULL)
 			put_normals(simd, plan, frame->normal + 3 * first, &pixels, n);
-		if (frame->id)
+		if (frame->id != NULL)
 			put_instances(plan, frame->id + first, &pixels, n);
-		if (frame->block)
+		if (frame->block != NULL)
 			put_blocks(simd, plan, frame->block + 3 * first, &pixels, n);
 	}
 }

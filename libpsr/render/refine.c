@@ -48,11 +48,11 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 {
 	const size_t area = (size_t)WINDOW_WIDTH * WINDOW_HEIGHT;
 	struct refiner *r = calloc(1, sizeof *r);
-	if (!r)
+	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	r->renderer = renderer;
 	r->depth = psr_alloc_array(area, sizeof *r->depth + 3);
-	if (!r->depth) {
+	if (r->depth == NULL) {
 		free(r);
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	}
@@ -67,7 +67,7 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 
 void refiner_destroy(struct refiner *r)
 {
-	if (!r)
+	if (r == NULL)
 		return;
 	psr_free(r->depth);
 	psr_free_huge(r->is_inside, r->inside_size);
@@ -152,16 +152,18 @@ static int draw_window(struct refiner *r, const struct psr_scene *scene, const s
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
 	const int is_last_x = width - left <= WINDOW_WIDTH, is_last_y = height - top <= WINDOW_HEIGHT;
 	struct render_settings window = *settings;
+	struct psr_frame fine;
+
 	window.with_splats = 1;
 	window.is_smooth = 0;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;
 
-	struct psr_frame fine = { .width = window.width,
-		                      .height = window.height,
-		                      .rgb = frame->rgb ? r->rgb : NULL,
-		                      .depth = frame->depth ? r->depth : NULL };
+	fine = (struct psr_frame){ .width = window.width,
+		                       .height = window.height,
+		                       .rgb = frame->rgb != NULL ? r->rgb : NULL,
+		                       .depth = frame->depth != NULL ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
 	renderer_set_inside(r->renderer, &inside);
 	const int rc = renderer_draw(r->renderer, scene, &window, pool, &fine, err);
@@ -210,13 +212,15 @@ static int find_inside(struct refiner *r, const struct psr_scene *scene, const s
 {
 	const size_t area = (size_t)settings->width * settings->height;
 	const uint64_t start = clock_ns();
+	struct erosion erosion;
+
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
-	if (!r->is_inside)
+	if (r->is_inside == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
 	const int rc = renderer_outline(r->renderer, scene, settings, pool, r->is_inside, err);
 	if (rc)
 		return rc;
-	struct erosion erosion = { r->is_inside, r->is_inside + area, settings->width, settings->height };
+	erosion = (struct erosion){ r->is_inside, r->is_inside + area, settings->width, settings->height };
 	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
 	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
 	report->ns[PSR_STAGE_GAPS] += clock_ns() - start;
@@ -232,21 +236,24 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
                  struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	const unsigned pass = settings->pass;
+	int rc;
+
 	if (pass > PSR_MAX_PASS)
 		return psr_fail(err, PSR_ERR_LIMIT, "there is no pass %u, only passes up to %d", pass, PSR_MAX_PASS);
 	if (settings->window.picture_width)
 		return psr_fail(err, PSR_ERR_ARG, "only whole pictures are refined");
-	if (pass == 0 || settings->width == 0 || settings->height == 0 || settings->width > PSR_MAX_SIDE ||
-	    settings->height > PSR_MAX_SIDE)
+	if (pass == 0 || settings->width == 0 || settings->height == 0 || settings->width > PSR_MAX_SIDE
+	    || settings->height > PSR_MAX_SIDE)
 		return renderer_draw(r->renderer, scene, settings, pool, frame, err);
 	if (frame->width != settings->width || frame->height != settings->height)
 		return psr_fail(err, PSR_ERR_ARG, "the frame is of another size than the settings");
-	if (frame->normal || frame->id || frame->block || frame->weight || frame->words)
+	if (frame->normal != NULL || frame->id != NULL || frame->block != NULL || frame->weight != NULL
+	    || frame->words != NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "only colour and depth are refined, no other planes");
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
-	int rc = find_inside(r, scene, settings, pool, &frame->report, err);
+	rc = find_inside(r, scene, settings, pool, &frame->report, err);
 	if (rc)
 		return rc;
 	for (uint32_t j = 0; j < n_y; j++)

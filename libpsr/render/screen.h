@@ -17,7 +17,7 @@ struct screen {
 };
 
 /* Makes the tree of an eye whose ray through screen point x, y is (x * tangent[0], y * tangent[1], 1) in the axes
- * right, down, forward. Triangles are those of level `level` of psr/direction.h. */
+ * right, down, forward. Triangles are those of level `level` of base/direction.h. */
 void screen_make(struct screen *screen, int n, const double axes[3][3], const double tangent[2], int level);
 
 /* Finds the smallest node that contains a rectangle of the screen. */

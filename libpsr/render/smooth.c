@@ -17,7 +17,7 @@ int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth)
 {
 	const size_t area = (size_t)plan->width * plan->height, depths = depth ? 0 : area * sizeof *depth;
 	smooth->storage = psr_grow_huge(smooth->storage, &smooth->storage_size, depths + 3 * area);
-	if (!smooth->storage)
+	if (smooth->storage == NULL)
 		return PSR_ERR_MEMORY;
 	smooth->depth = depth ? depth : smooth->storage;
 	smooth->rgb = (uint8_t *)smooth->storage + depths;

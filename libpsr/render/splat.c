@@ -191,6 +191,8 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 	const int perspective = t->plan->perspective;
 	struct lattice_depths at;
 	struct warp_block b;
+	struct splat s;
+
 	warp_block_make(&b, in, entry->slot);
 	const float scale = (float)b.scale, step = projection->spacing * scale;
 	/* Radii in the projection's plane, along x and y, and along z for a slope of 1. */
@@ -201,8 +203,8 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		along[a] = RADIUS * step * (float)b.lattice->along[a];
 	}
 	place_depths(&at, &b, b.rise / (projection->spacing * (float)b.scale));
-	struct splat s = { .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,
-		               .most = (float)((1 << entry->level) + 2) };
+	s = (struct splat){ .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,
+		                .most = (float)((1 << entry->level) + 2) };
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;

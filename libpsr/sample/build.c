@@ -3,7 +3,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "base/clock.h"
-#include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "level.h"
@@ -157,7 +156,8 @@ static int sample_and_pack(struct build *build, struct psr_model **out)
 {
 	const struct psr_presets presets = { build->mesh->n_cameras, build->mesh->n_lights, build->mesh->camera,
 		                                 build->mesh->light };
-	struct pack_source source = { .surface = &build->surface, .draft = &build->draft, .presets = &presets, .pool = build->pool };
+	struct pack_source source = { .surface = &build->surface, .draft = &build->draft, .presets = &presets,
+		                          .pool = build->pool };
 	int rc = ray_scene_create(&build->scene, build->mesh, build->info.origin, build->info.scale, build->err);
 
 	if (rc != PSR_OK)

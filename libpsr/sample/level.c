@@ -8,7 +8,7 @@
 #include "sample/visible/look_out.h"
 #include "sample/visible/sides.h"
 
-/* Pieces of the surface this many pixels wide have one normal, as far as ownership goes. */
+/* pixels; ownership sees one normal in each cell of the field */
 #define FIELD_PIXELS 3
 
 #define N_STEPS (N_PROJECTIONS / 2 + 4)
@@ -128,8 +128,8 @@ int level_make(struct level *level, const struct level_progress *progress)
 	return rc;
 }
 
-/* What a view found that none of those before had seen is seldom alone: it is put down as seen, views look for more of
- * that kind, and the surface is mended again. */
+/* A place that no earlier view had seen is seldom alone: it is added to the visible set, more views look for such
+ * places, and the surface is mended again. */
 static int add_missing(struct level *level, const struct adequacy *found, int round)
 {
 	const struct keeper keeper = keeper_of(level);
@@ -158,7 +158,7 @@ static double share(const struct adequacy *found)
 	return (double)found->n_missing / (double)(found->n_trials + 1);
 }
 
-/* Enough, or no better than two rounds ago by a fifth: the rest is what this way of looking does not find. */
+/* Enough, or not better by a fifth than two rounds ago: rounds do not find the rest. */
 static int is_over(const struct adequacy *found, int round, double before_last)
 {
 	return ADEQUACY_FEW * found->n_missing < found->n_trials || round == MOST_ROUNDS
@@ -173,7 +173,7 @@ int level_reach(struct adequacy *out, struct level *level)
 
 	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
 	for (int round = 1; rc == PSR_OK; round++) {
-		/* Of the first two, what is not enough cannot be the last. */
+		/* One of the first two rounds is the last only if it is enough: else it may stop early. */
 		rc = adequacy_measure(out, &level->sampling, &level->kept, (uint64_t)round, n, round <= 2);
 		if (rc != PSR_OK || is_over(out, round, before[0]))
 			break;

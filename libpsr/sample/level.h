@@ -38,8 +38,8 @@ struct level_progress {
 };
 int level_make(struct level *level, const struct level_progress *progress); /* all steps; progress may be NULL */
 
-/* One after the other, these are the same: hits, who sees and owns them; small patches merged; what is owned kept; what
- * is missing added. */
+/* One after the other, these are the same: hits, who sees and owns them; small patches merged; what is owned kept;
+ * what is missing added. */
 int level_own(struct level *level, const struct level_progress *progress);
 void level_merge(struct level *level);
 int level_keep(struct level *level);
@@ -49,7 +49,7 @@ int level_mend(struct level *level);
  * with another seed, without places. MEMORY. */
 int level_reach(struct adequacy *out, struct level *level);
 
-/* Frees all that the next coarser level does not ask for. */
+/* Frees all but what the next coarser level reads. */
 void level_trim(struct level *level);
 void level_fini(struct level *level);
 

@@ -1,17 +1,17 @@
 #include <assert.h>
+#include "base/direction.h"
 #include "base/vec.h"
 #include "blend.h"
 #include "material.h"
-#include "base/direction.h"
 #include "model/blocks.h"
 #include "surface.h"
 
-/* As long as the mean of opposite normals can be by their quantisation alone. */
+/* The mean of opposite normals can be as long by quantisation alone. */
 #define NO_NORMAL 0.03
 
 struct sums {
 	double weight, normal[3], diffuse[3];
-	double reflected[3];  /* of specular / (exponent + 2): a lobe's light is in proportion to it */
+	double reflected[3];  /* of specular / (exponent + 2), to which a lobe's light is in proportion */
 	double light, spread; /* of that over the channels, and of it times the lobe's variance */
 	double plain_spread;  /* of weight times variance, where all reflect nothing */
 };

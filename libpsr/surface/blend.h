@@ -1,20 +1,20 @@
-/* One sample for several: how the coarse levels are prefiltered. */
+/* One sample for several: prefilters coarse levels. */
 #ifndef PSR_SURFACE_BLEND_H
 #define PSR_SURFACE_BLEND_H
 
 #include <stdint.h>
 
-/* The attribute word (psr/model.h) that stands for n >= 1 of them in the given proportion: weights are finite, >= 0,
- * and not all 0. Sums are in double and in the order of the arguments.
+/* Blends n >= 1 attribute words (model/blocks.h) into one. Weights are finite, >= 0, and not all 0. Sums are in double
+ * and in the order of the arguments.
  *
- * Where unlit ones have more than half of the weight the result is unlit and the mean of those; else they are left
- * out, and it is the mean of the others. Colours are averaged in linear light. The normal is the mean N of the unit
- * normals, or `facing` (unit length) where they cancel out, bent to face it as surface_attr() does.
+ * The result is the mean of the unlit words if these have more than half of the weight, else of the others. Colours
+ * are averaged in linear light. The normal is the mean N of the unit normals, or `facing` (unit length) where they
+ * cancel out, bent to face it as surface_attr() does.
  *
- * The lobe stands for those of all, by their second moments: one of exponent n spreads the reflected ray with the
- * variance 1/n, and the mean of these, in proportion to the light that they reflect (specular / (n + 2)), is widened
- * by the normals' own spread ([Toksvig]: (1 - r) / r, r = |N|, of a normal; four times that of the reflected ray). The
- * specular colour is such that as much light is reflected as by all of them together. */
+ * The lobe matches all lobes in their second moments. One of exponent n spreads the reflected ray with the variance
+ * 1/n; the mean of these, in proportion to the reflected light (specular / (n + 2)), is widened by the normals' own
+ * spread ([Toksvig]: (1 - r) / r, r = |N|; four times that for the reflected ray). The specular colour keeps the
+ * reflected light. */
 uint64_t blend_attr(const uint64_t *attr, const float *weight, int n, const float facing[3]);
 
 #endif

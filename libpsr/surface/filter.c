@@ -7,11 +7,11 @@
 #define MOST_AXIS 40 /* texels: 1.5 * 8 of the next level, which may have a third of the texels, and a rest */
 #define MOST_RUN (2 * MOST_AXIS + 2)
 
-/* The filter's variance along an axis over the square of that semi-axis: half of the mean of q under exp(-2 q) -
+/* The filter's variance along an axis over the square of its semi-axis: half of the mean of q under exp(-2 q) -
  * exp(-2). */
 #define KERNEL_VARIANCE 0.13608
 
-/* What adds to the square of a semi-axis: the variances of bilinear interpolation and of the mean over a texel. */
+/* Bilinear interpolation and the mean over a texel add these variances to the square of a semi-axis. */
 #define BILINEAR (1.0 / 6 / KERNEL_VARIANCE)
 #define TEXEL (1.0 / 12 / KERNEL_VARIANCE)
 
@@ -36,7 +36,7 @@ static struct ellipse ellipse_on(const struct mip_level *level, const double axe
 	return e;
 }
 
-/* Square of the shorter semi-axis, as it counts for the level. */
+/* Square of the shorter semi-axis, as the choice of a level counts it. */
 static double short_enough(const struct ellipse *e)
 {
 	double least = e->long2 / (MOST_ECCENTRICITY * MOST_ECCENTRICITY);
@@ -61,7 +61,7 @@ static int choose_level(const struct mip *mip, const double axes[2][2], struct e
 	return level;
 }
 
-/* Coordinates far outside come near to where the same texels are. */
+/* Brings far coordinates near, onto the same texels. */
 static double fold(double s, enum psr_wrap wrap)
 {
 	double period = wrap == PSR_WRAP_MIRROR ? 2 : 1;
@@ -100,7 +100,7 @@ static float kernel(float q)
 	return 0.36787944f * e - 0.13533528f;
 }
 
-/* The texels of an image that a point mixes, and how; 1 or 4 of them. */
+/* The 1 or 4 texels that a point mixes. */
 struct points {
 	int n;
 	uint32_t x[4], y[4];

@@ -3,8 +3,8 @@
 #include "material.h"
 #include "model/blocks.h"
 
-/* A metal has no diffuse colour: it mirrors its surroundings, and here there are none. Half of its colour stands in for
- * them, or metals would be black but for highlights. */
+/* A metal mirrors its surroundings, and here there are none. Half of its colour stands for them, or metals would be
+ * black but for highlights. */
 #define METAL_LOSS 0.5f
 
 #define DIELECTRIC 0.04f /* F0 */

@@ -1,4 +1,4 @@
-/* Images in linear light at every half of their resolution, for filtering. */
+/* Mip maps of images in linear light. */
 #ifndef PSR_SURFACE_MIP_H
 #define PSR_SURFACE_MIP_H
 
@@ -16,9 +16,9 @@ enum mip_kind {
 #define MIP_LEVELS 32
 
 /* Level 0 is the image, decoded texel by texel; level k + 1 has half of the texels of level k along each side, rounded
- * down, but one at least, and the last is a single texel. Each texel is the mean over the area that it covers, exactly
- * where sides are odd, too, so that all levels have the same mean and the same edges, and wrap at the same places. From
- * level 1 on 16 bits a channel: 8/3 bytes a texel of the image. */
+ * down, at least one; the last is a single texel. Each texel is the exact mean over its area, of odd sides, too: all
+ * levels have the same mean, and wrap at the same places. From level 1 on 16 bits a channel: 8/3 bytes a texel of the
+ * image. */
 struct mip {
 	const struct psr_image *image;
 	enum mip_kind kind;

@@ -31,7 +31,7 @@ void normal_jacobian(const struct plane *plane, const double side[2][2], double 
 	}
 }
 
-/* The interpolated normal as the vertices have it; 0 if there is none. */
+/* The vertices' normals, interpolated; 0 if there are none. */
 static int interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, float normal[3])
 {
 	const uint32_t *index = mesh->triangle[triangle];

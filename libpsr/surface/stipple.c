@@ -6,7 +6,7 @@ int stipple_is_open(float opacity, const double p[3], double cell)
 {
 	/* Multiples of the powers of 1 / 1.2207440846, the root of x^4 = x + 1, spread evenly along all three axes. */
 	static const uint64_t step[3] = { 3518319155, 2882110345, 2360945575 };
-	/* Faces of built things lie on round coordinates, which cells are not to begin at. */
+	/* Faces of built things lie on round coordinates: cells do not begin there. */
 	static const double offset[3] = { 0.3719, 0.6143, 0.2357 };
 	uint64_t sum = 0;
 

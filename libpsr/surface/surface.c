@@ -1,11 +1,11 @@
 #include <string.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "filter.h"
 #include "material.h"
 #include "mip.h"
 #include "normal.h"
-#include "base/direction.h"
 #include "psr/error.h"
 #include "surface.h"
 #include "texture.h"
@@ -13,10 +13,10 @@
 /* The quantised normals are up to 1.27 degrees off; one at this height still faces the projection. */
 #define LEAST_HEIGHT 0.03f
 
-/* What rounding a unit vector to a mip map's 16 bits may shorten it by: half a step along each axis. */
+/* Rounding to a mip map's 16 bits shortens a unit vector by half a step along each axis at most. */
 #define NORMAL_ROUNDING (0.87 / 32767)
 
-/* A place on a triangle, and what is common to all textures there. */
+/* A place on a triangle, for all of its textures. */
 struct footprint {
 	const struct surface *surface;
 	const struct surface_place *place;
@@ -184,7 +184,7 @@ static double map_normal(const struct footprint *footprint, float normal[3])
 	           normal);
 	if (length + NORMAL_ROUNDING >= 1)
 		return 0;
-	/* The scale stretches small angles by as much. Where all cancels out no lobe is left: any number will do. */
+	/* The scale stretches small angles by as much. Where all cancels out no lobe is left: any number does. */
 	share *= (double)m->normal_scale * (double)m->normal_scale;
 	return share * (1 - NORMAL_ROUNDING - length) / (length > 1e-3 ? length : 1e-3);
 }

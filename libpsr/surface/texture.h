@@ -1,15 +1,15 @@
-/* Where textures lie on a mesh, and what they say at a point. */
+/* Where textures lie on a mesh, and their values at a point. */
 #ifndef PSR_SURFACE_TEXTURE_H
 #define PSR_SURFACE_TEXTURE_H
 
 #include <stdint.h>
 #include "psr/mesh.h"
 
-/* Coordinates of a texture at barycentric (u, v) of a triangle, after its transform; both finite, or 0 is returned. */
+/* Texture coordinates at barycentric (u, v) of a triangle, after the transform; 0 if they are not finite. */
 int texture_place(const struct psr_mesh *mesh, const struct psr_texture *texture, uint32_t triangle, double u, double v,
                   double st[2]);
 
-/* The same for its differences along the triangle's sides: side[i] is what (s, t) grows by from corner 0 to i + 1. */
+/* side[i]: (s, t) of corner i + 1 less those of corner 0. */
 void texture_sides(const struct psr_mesh *mesh, const struct psr_texture *texture, uint32_t triangle,
                    double side[2][2]);
 
@@ -20,8 +20,7 @@ void texture_plain_color(const struct psr_mesh *mesh, uint32_t prim, double u, d
 /* The same times the base texture as a point shows it, bilinear or nearest. */
 void texture_base_color(const struct psr_mesh *mesh, uint32_t prim, double u, double v, float rgba[4]);
 
-/* Whether there is nothing at this place: MASK below its cutoff, BLEND below one half. The texture is that of a point,
- * as magnification filters it. */
+/* Whether a place is transparent: MASK below its cutoff, BLEND below one half. Filtered as for magnification. */
 int texture_is_absent(const struct psr_mesh *mesh, uint32_t prim, double u, double v);
 
 static inline uint32_t texture_material(const struct psr_mesh *mesh, uint32_t prim)

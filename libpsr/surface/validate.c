@@ -1,7 +1,7 @@
 #include <math.h>
 #include "base/vec.h"
-#include "validate.h"
 #include "surface.h"
+#include "validate.h"
 
 static int check_materials(const struct psr_mesh *mesh, struct psr_error *err)
 {
@@ -55,7 +55,7 @@ int validate_mesh(const struct psr_mesh *mesh, struct psr_error *err)
 	return check_materials(mesh, err);
 }
 
-/* Of triangles, and then the points, with how far their discs reach around them. */
+/* Of triangles, and of points with the reach of their discs. */
 static uint64_t n_corners(const struct psr_mesh *mesh)
 {
 	return 3 * (uint64_t)mesh->n_triangles + mesh->n_points;

@@ -1,11 +1,11 @@
-/* What sampler and tracer ask of a mesh. */
+/* Checks of a mesh that is to be sampled or traced. */
 #ifndef PSR_SURFACE_VALIDATE_H
 #define PSR_SURFACE_VALIDATE_H
 
 #include "psr/error.h"
 #include "psr/mesh.h"
 
-/* Checks what psr/mesh.h promises as far as memory and arithmetic depend on it. ARG, LIMIT. */
+/* Checks the promises of psr/mesh.h on which memory and arithmetic depend. ARG, LIMIT. */
 int validate_mesh(const struct psr_mesh *mesh, struct psr_error *err);
 
 /* Middle of the bounding box of all vertices in use, and the radius of the smallest sphere about it that holds them,

@@ -72,7 +72,7 @@ static int make_masks(struct cull_set *set, struct psr_pool *pool)
 		if (set->mask[level] == NULL)
 			return PSR_ERR_MEMORY;
 	}
-	if (visibility_masks_at(psr_model_blocks(set->base), set->finest, words_of(set->finest), pool,
+	if (visibility_mask_make_at(psr_model_blocks(set->base), set->finest, words_of(set->finest), pool,
 	                        set->mask[set->finest]) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	for (int level = set->finest - 1; level >= 0; level--)

@@ -114,7 +114,7 @@ static int make_view(struct study_trials *trials, struct trial_view *view, int n
 	if (view->trial == NULL)
 		return PSR_ERR_MEMORY;
 	next_direction(trials, direction);
-	psr_direction_frame(direction, frame);
+	psr_direction_basis(direction, frame);
 	psr_sincos(next_real(trials) * PI, &sine, &cosine);
 	for (int k = 0; k < 3; k++) {
 		view->axis[0][k] = (float)(cosine * frame[0][k] + sine * frame[1][k]);

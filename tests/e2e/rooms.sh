@@ -1,6 +1,6 @@
 #!/bin/bash
 # Rooms of the source tree include each other in one order: a line below may include itself and the lines above it. The
-# longest prefix of a file is its room. The server's folders still include each other: they are one.
+# longest prefix of a file is its room.
 . "$(dirname "$0")/lib.sh"
 
 cat >"$work/rooms" <<'END'
@@ -30,10 +30,15 @@ libpsr/sample/levels
 libpsr/sample/pack
 libpsr/sample
 proto
+server/log server/options
+server/net
+server/models
+server/frames
+server/session
 server
 client/include
 client/lib
-client/psr.h client/optlist client/suggest
+client/cli client/psr.h client/optlist client/suggest
 client/scene
 client/replay
 client/output client/draw.h

@@ -29,7 +29,9 @@ struct closed {
 	struct psr_mesh *mesh;
 	struct psr_truth *truth;
 	struct psr_frame frame[2]; /* one a background */
-	float *depth;              /* of pass 0 */
+	float *depth;              /* of pass 0, */
+	uint32_t *id;              /* behind blended surfaces: UINT32_MAX without a sample, */
+	uint8_t *weight;           /* and then 255 without a fill */
 	uint8_t *is_solid, *is_inside;
 	uint32_t side, rays;
 };
@@ -67,6 +69,8 @@ static void draw(struct closed *c, unsigned pass)
 		for (int k = 0; k < 3; k++)
 			c->scene.background[k] = k == 2 * b;
 		c->frame[b].depth = pass ? NULL : c->depth;
+		c->frame[b].id = pass ? NULL : c->id;
+		c->frame[b].weight = pass ? NULL : c->weight;
 		c->settings.pass = pass;
 		if (refiner_draw(c->refiner, &c->scene, &c->settings, c->pool, &c->frame[b], &err))
 			die(err.text);
@@ -81,7 +85,7 @@ static int is_stopped(const struct psr_mesh *mesh, uint32_t prim)
 	       mesh->material[material[prim < mesh->n_triangles ? prim : prim - mesh->n_triangles]].alpha != PSR_ALPHA_BLEND;
 }
 
-/* Pixels that pass 0 covers, and whose middle is not on a blended surface. */
+/* Pixels that pass 0 covers, not by blended surfaces alone, and whose middle is not on one. */
 static void find_solid(struct closed *c, const struct view *view)
 {
 	for (uint32_t y = 0; y < c->side; y++)
@@ -91,7 +95,8 @@ static void find_solid(struct closed *c, const struct view *view)
 			struct ray_hit hit;
 			truth_ray(c->truth, view, x + 0.5, y + 0.5, &ray);
 			truth_trace(c->truth, &ray, 1, c->scene.camera.near_z, &hit);
-			c->is_solid[at] = isfinite(c->depth[at]) && (hit.prim == RAY_NONE || is_stopped(c->mesh, hit.prim));
+			c->is_solid[at] = isfinite(c->depth[at]) && (c->id[at] != UINT32_MAX || c->weight[at] < 255) &&
+			                  (hit.prim == RAY_NONE || is_stopped(c->mesh, hit.prim));
 		}
 }
 
@@ -163,6 +168,8 @@ int main(int argc, char **argv)
 		die(err.text);
 	const size_t area = (size_t)c.side * c.side;
 	c.depth = room(area * sizeof *c.depth);
+	c.id = room(area * sizeof *c.id);
+	c.weight = room(area);
 	c.is_solid = room(area);
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
@@ -189,6 +196,8 @@ int main(int argc, char **argv)
 	for (int b = 0; b < 2; b++)
 		free(c.frame[b].rgb);
 	free(c.depth);
+	free(c.id);
+	free(c.weight);
 	free(c.is_solid);
 	free(c.is_inside);
 	refiner_destroy(c.refiner);

@@ -35,16 +35,15 @@ void draft_fini(struct draft *draft);
 /* Adds the next level: kept samples of the sheets of all projections. MEMORY, LIMIT. */
 int draft_add(struct draft *draft, const struct sheets *sheets, const struct kept *kept);
 
-/* Cuts the finest level into groups that lie together, and each coarser one into blocks of the same groups: a group has
- * all samples within three quarters of a pixel, at that level, of its finest samples, so that pieces drawn at different
- * levels meet. Groups are of at most 131072 samples, or twice as many as often as is needed until the blocks that they
- * share do not cost too much: where surfaces lie all through each other (leaves), that may be one group. The same
- * whatever the threads. MEMORY. */
+/* group.c: cuts the finest level into groups that lie together, and each coarser level into blocks of the same groups.
+ * A group has all samples of a level within three quarters of its pixel of the group's finest samples, so that pieces
+ * drawn at different levels meet. Groups have at most 131072 samples; the bound doubles until the blocks that groups
+ * share do not cost too much (leaves may end in one group). The same whatever the threads. MEMORY. */
 int draft_group(struct draft *draft, struct psr_pool *pool);
 
-/* join.c: makes one block of all that have the same level, group, projection and place on the lattice, are seen from as
- * many sides, and have no lattice point in common, as long as it is not too deep: sheets that were apart when all of
- * their hits were there. Afterwards each block has samples of its own, and needs them all. LIMIT, MEMORY. */
+/* join.c: joins blocks of one level, group, projection and number of sides that fit one window of the lattice, have no
+ * lattice point in common, and are not too deep together. Afterwards each block has samples of its own, and needs them
+ * all. LIMIT, MEMORY. */
 int draft_join(struct draft *draft);
 
 static inline double draft_spacing(const struct draft *draft, const struct draft_block *block)

@@ -1,15 +1,15 @@
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
+#include "base/array.h"
 #include "base/vec.h"
 #include "group.h"
 #include "psr/error.h"
 
 #define LEAST_GROUP 131072 /* samples of the finest level */
-#define MOST_GROWTH 1.25   /* of the number of blocks, by those that groups share */
+#define MOST_GROWTH 1.25   /* of the number of blocks, by shared ones */
 
-/* A block that is deeper than this many steps is cut as its samples are, not by its middle: where twigs and needles are
- * dense, groups of whole ones would reach far into each other, and every coarse sample would be in ten of them. */
+/* Deeper blocks are cut sample by sample: where needles are dense, groups of whole blocks would reach far into each
+ * other, and every coarse sample would be in ten of them. */
 #define WHOLE_STEPS 10
 #define WHOLE PSR_BLOCK_SAMPLES
 
@@ -49,7 +49,7 @@ static void swap_places(struct place *a, struct place *b)
 	*b = kept;
 }
 
-/* Puts the first `middle` places of their order in front, in any order (Hoare's quickselect). */
+/* Hoare's quickselect: the first `middle` places come to the front. */
 static void part_places(struct place *place, uint32_t n, uint32_t middle)
 {
 	while (n > 1) {
@@ -77,7 +77,7 @@ static void part_places(struct place *place, uint32_t n, uint32_t middle)
 	}
 }
 
-/* Halves along the longest side of the box of the centres, until a part is small enough. */
+/* Halves along the longest side of the centres' box until a part is small enough. */
 static void cut(struct draft *draft, struct place *place, uint32_t n, uint32_t most)
 {
 	float min[3] = { INFINITY, INFINITY, INFINITY }, max[3] = { -INFINITY, -INFINITY, -INFINITY };
@@ -132,7 +132,7 @@ static int is_whole(const struct draft *draft, const struct draft_block *block)
 	return high - low <= WHOLE_STEPS * draft->projection[block->projection].spacing;
 }
 
-/* Of whole blocks, or of single samples; returns how many. place may be NULL. */
+/* Whole blocks and single samples; returns how many. place may be NULL. */
 static uint32_t list_places(const struct draft *draft, uint32_t n_finest, struct place *place)
 {
 	uint32_t n = 0;
@@ -165,20 +165,13 @@ int group_add(struct group_blocks *blocks, const struct draft_block *block)
 		blocks->is_over = 1;
 		return PSR_OK;
 	}
-	if (blocks->n == blocks->capacity) {
-		uint32_t capacity = blocks->capacity != 0 ? blocks->capacity + blocks->capacity / 2 : 1024;
-		struct draft_block *grown = realloc(blocks->block, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		blocks->block = grown;
-		blocks->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(blocks->block, blocks->n, blocks->capacity))
+		return PSR_ERR_MEMORY;
 	blocks->block[blocks->n++] = *block;
 	return PSR_OK;
 }
 
-/* A block for each group that has some of a finest one, in the order of these. */
+/* A block for each group with some of a finest block, in the order of these. */
 static int cut_finest(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most)
 {
 	uint32_t n = list_places(draft, n_finest, NULL);

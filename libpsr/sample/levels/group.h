@@ -12,8 +12,8 @@ struct group_blocks {
 
 int group_add(struct group_blocks *blocks, const struct draft_block *block); /* MEMORY */
 
-/* Adds the blocks of a coarse level, for each group those samples that it needs. blocks->block[0..n_pieces-1] are those
- * of the finest level, which the draft has n_finest of before they are cut. MEMORY. */
+/* Adds the blocks of a coarse level: for each group the samples that it needs. blocks->block[0..n_pieces-1] are the
+ * finest level's, cut from the draft's first n_finest. MEMORY. */
 int group_split(struct group_blocks *blocks, const struct draft *draft, unsigned level, uint32_t n_finest,
                 uint32_t n_pieces, struct psr_pool *pool);
 

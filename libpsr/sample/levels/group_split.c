@@ -1,14 +1,15 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include "base/array.h"
 #include "base/cell.h"
 #include "base/grid.h"
 #include "group.h"
 #include "psr/error.h"
 
 #define CELLS 4 /* that a coarse pixel is wide */
-#define REACH 3 /* cells: beyond this no sample covers a place ([G] 4.3: a pixel's corner is 0.71 of one away) */
-#define FAR 4   /* for samples that have nothing as near: a moved one is half a pixel off what it covers */
+#define REACH 3 /* cells: no sample farther away covers a place ([G] 4.3: a pixel's corner is 0.71 pixels away) */
+#define FAR 4   /* for samples with nothing in REACH: moved ones are half a pixel off */
 
 /* Which groups have fine samples in each cell of a coarse level. */
 struct map {
@@ -31,15 +32,8 @@ static int map_group(struct map *map, uint32_t group, const float p[3])
 		i = map->mapped[i].next;
 	if (i != GRID_NONE)
 		return PSR_OK;
-	if (map->n == map->capacity) {
-		uint32_t capacity = map->capacity != 0 ? map->capacity + map->capacity / 2 : 4096;
-		struct mapped *grown = realloc(map->mapped, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		map->mapped = grown;
-		map->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(map->mapped, map->n, map->capacity))
+		return PSR_ERR_MEMORY;
 	map->mapped[map->n] = (struct mapped){ { p[0], p[1], p[2] }, group, GRID_NONE };
 	if (grid_put(&map->grid, p, map->n, &map->mapped[map->n].next) != PSR_OK)
 		return PSR_ERR_MEMORY;
@@ -63,7 +57,7 @@ static int map_groups(struct map *map, const struct draft *draft, const struct g
 	return PSR_OK;
 }
 
-/* Which samples of a coarse block each group around it needs: on a coarsest level there may be hundreds of groups. */
+/* The samples of a coarse block that each group around needs: at the coarsest level there may be hundreds. */
 struct part {
 	uint32_t group;
 	uint64_t mask;
@@ -80,15 +74,8 @@ static int add_part(struct parts *parts, uint32_t group, unsigned s)
 
 	while (i < parts->n && parts->part[i].group != group)
 		i++;
-	if (i == parts->capacity) {
-		uint32_t capacity = parts->capacity != 0 ? 2 * parts->capacity : 64;
-		struct part *grown = realloc(parts->part, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		parts->part = grown;
-		parts->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(parts->part, i, parts->capacity))
+		return PSR_ERR_MEMORY;
 	if (i == parts->n)
 		parts->part[parts->n++] = (struct part){ group, 0 };
 	parts->part[i].mask |= UINT64_C(1) << s;
@@ -161,7 +148,7 @@ struct split {
 	struct group_blocks *chunk;
 	int *rc;
 	uint32_t most;    /* blocks of them all; */
-	atomic_uint n;    /* once there are more, the rest is not looked at */
+	atomic_uint n;    /* once there are more, the rest is skipped */
 };
 
 #define CHUNK 256
@@ -178,7 +165,7 @@ static void split_chunk(int i, void *userdata)
 	free(parts.part);
 }
 
-/* Blocks of one level, first..end - 1, each by itself, so that any thread may; in their order. */
+/* Blocks first..end - 1, of one level, by all threads, into their order. */
 static int split_blocks(struct group_blocks *blocks, struct split *split, struct psr_pool *pool)
 {
 	int n = (int)((split->end - split->first + CHUNK - 1) / CHUNK), rc = PSR_OK;

@@ -5,12 +5,11 @@
 #include "draft.h"
 #include "psr/error.h"
 
-/* Blocks that are together as deep as a patch may be are joined, and no deeper ones: their spheres would hold little
- * else than air. */
+/* Joined blocks are no deeper than a patch: their spheres would hold mostly air. */
 #define JOIN_STEPS SHEET_PATCH_STEPS
 #define NONE UINT32_MAX
 
-/* A window of the lattice, and what of it is taken. */
+/* A window of the lattice, and its samples. */
 struct window {
 	int low[2], high[2]; /* columns and rows, */
 	float near, far;     /* and depths: there are samples from the one to the other */
@@ -18,7 +17,7 @@ struct window {
 	uint64_t mask;
 };
 
-/* What a group needs of a block, and the window of it and of all that were joined to it. */
+/* The samples of a block that a group needs, and the window of all pieces joined to it. */
 struct piece {
 	struct draft_block block;
 	struct window window;
@@ -82,7 +81,7 @@ static int compare_pieces(const void *a, const void *b)
 	                                        : x->block.part < y->block.part ? -1 : x->block.part > y->block.part;
 }
 
-/* One window for two, if there is one that is not too deep and they have no lattice point in common. */
+/* One window for two without a common lattice point, unless it is too deep. */
 static int fit(const struct window *a, const struct window *b, float spacing, struct window *both)
 {
 	uint64_t mask;
@@ -114,7 +113,7 @@ static float size2_of(const struct window *w, float spacing)
 	return x * x + y * y + z * z;
 }
 
-/* Which of the pieces after i on its lattice makes the smallest window with it; or NONE. */
+/* The piece after i on its lattice that makes the smallest window with it; NONE. */
 static uint32_t find_best(const struct piece *piece, uint32_t i, uint32_t n, float spacing, struct window *best)
 {
 	float least = INFINITY;
@@ -134,7 +133,7 @@ static uint32_t find_best(const struct piece *piece, uint32_t i, uint32_t n, flo
 	return found;
 }
 
-/* Each piece, from the lowest row on, with others for as long as there are any that fit. */
+/* Joins to each piece, from the lowest row on, others as long as any fit. */
 static void join_lattice(struct piece *piece, uint32_t n, float spacing)
 {
 	for (uint32_t i = 0; i < n; i++) {
@@ -150,8 +149,8 @@ static void join_lattice(struct piece *piece, uint32_t n, float spacing)
 	}
 }
 
-/* The window whose middle is the nearest to that of the box of the samples, of all that begin in even rows: what fits
- * one window fits this one, too. */
+/* Moves a window, which begins in an even row, so that its middle is nearest to that of the samples' box: samples that
+ * fit one window fit this one, too. */
 static void center_window(struct window *w)
 {
 	int low = INT_MAX, high = INT_MIN, col, row; /* in half columns: odd rows lie half a column on */
@@ -169,7 +168,7 @@ static void center_window(struct window *w)
 	w->row = row;
 }
 
-/* Returns where the samples of the next block go. */
+/* Returns the first sample of the next block. */
 static uint32_t copy_samples(const struct draft *draft, const struct piece *piece, uint32_t i,
                              struct draft_block *block, struct draft_sample *sample, uint32_t first)
 {

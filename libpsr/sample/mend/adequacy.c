@@ -1,19 +1,19 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "adequacy.h"
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/random.h"
 #include "base/vec.h"
-#include "adequacy.h"
-#include "base/direction.h"
 #include "psr/error.h"
 #include "ray/area.h"
 
 #define CHUNK 4096
 #define BATCH 64
-#define PARTS 8       /* of the trials: after each it may be clear that too many are missing */
-#define FARTHEST 4    /* pixels around a place in which its surface is looked for, at grazing angles */
-#define BACK 0.0125f  /* as the renderer's: what faces away by less than normals are quantised to still counts */
+#define PARTS 8       /* of the trials, after each of which measuring may stop */
+#define FARTHEST 4    /* pixels around a place that are searched at grazing angles */
+#define BACK 0.0125f  /* as the renderer's: facing away by less than a step of normals still counts */
 
 static void draw_direction(uint64_t *random, double d[3])
 {
@@ -178,7 +178,7 @@ static int join_chunks(struct adequacy *out, struct chunk *chunk, int n_chunks)
 	return PSR_OK;
 }
 
-/* Whether as many are missing of the first chunks as may be of all. */
+/* Whether the first chunks miss as many as all of them may. */
 static int are_too_many(const struct chunk *chunk, int n_done, int n_chunks)
 {
 	uint64_t n_trials = 0, n_missing = 0;

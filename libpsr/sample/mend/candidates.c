@@ -3,12 +3,11 @@
 #include "candidates.h"
 #include "psr/error.h"
 
-/* [G] 4.3 wants sides of at most a pixel; a twentieth is forgiven, as the middle of such a triangle is 0.6 pixels from
- * its corners at most, and a pixel reaches 0.5 to 0.71. */
+/* [G] 4.3 wants sides of at most a pixel. A twentieth more is allowed: the middle of such a triangle is 0.6 pixels
+ * from its corners, and a pixel reaches 0.5 to 0.71. */
 #define LONGEST_SIDE 1.05
 
-/* A place is on such a triangle as far off its plane: surfaces are rough, but what is half a pixel off is another
- * one. */
+/* pixels off its plane: surfaces are rough, but half a pixel off is another surface */
 #define OFF_TRIANGLE 0.4
 
 #define LEAST_COSINE 0.3f
@@ -24,7 +23,7 @@
  * many of these would show in colors and distances. At coarser levels moving comes before new blocks. */
 #define NEW_BLOCK 12
 #define NEW_COARSE_BLOCK 16
-#define WANTED 4.0f /* and up to this more, the fewer places want it */
+#define WANTED 4.0f /* added in full for one place, shared by more */
 #define MOVE_ASIDE 4
 
 struct tries {
@@ -64,8 +63,7 @@ struct corner {
 	int is_kept;
 };
 
-/* The corners of the lattice triangle of projection q around a place; those without a hit of its surface have no
- * patch. */
+/* The corners of projection q's lattice triangle around a place; without a hit of its surface, SHEET_NONE. */
 static void find_corners(const struct keeper *keeper, unsigned q, const struct place *place,
                          struct corner corner[3], float projected[3])
 {
@@ -99,7 +97,7 @@ static void find_corners(const struct keeper *keeper, unsigned q, const struct p
 	}
 }
 
-/* Whether the corners make a triangle that is small enough, and the place is on it, not on something beside it. */
+/* Whether the corners make a small enough triangle with the place on it. */
 static int is_triangle(const struct keeper *keeper, const struct place *place, const struct corner corner[3])
 {
 	const double ds = keeper->sampling->ds;
@@ -201,7 +199,7 @@ static void find(struct candidates *candidates, const struct keeper *keeper, con
 	float least = INFINITY;
 
 	candidates->n_triangles = candidates->n_hits = candidates->n_moves = 0;
-	/* Further candidates cannot cost less than a hit in a block that is there, and such hits stay. */
+	/* Further candidates cannot cost less than a hit in a block that exists. */
 	for (int i = 0; i < look->tries.n && (i < CANDIDATE_TRIANGLES || HIT + (float)i / 2 < least); i++) {
 		unsigned q = look->tries.projection[i];
 		const struct corner *corner = look->corner[i];
@@ -272,7 +270,7 @@ static float block_cost(const struct keeper *keeper)
 	return keeper->sampling->level == 0 ? NEW_BLOCK : NEW_COARSE_BLOCK;
 }
 
-/* A patch of which nothing is kept yet costs a block, shared by all places that could use it. */
+/* A patch without kept samples costs a block, shared by all places that want it. */
 static float opening_cost(const struct keeper *keeper, unsigned projection, struct sheet_ref ref)
 {
 	const struct patch *patch = patch_of(keeper, projection, ref);
@@ -320,8 +318,7 @@ static const struct candidate *best_hit(const struct candidates *candidates, con
 	return best;
 }
 
-/* A place by a face's edge, or on something too thin for any lattice, can be moved to a lattice point: along the face,
- * as far as a sample may be off. */
+/* Places at edges, and on things too thin for any lattice, move along the face to a lattice point. */
 static const struct candidate_move *best_move(const struct candidates *candidates, const struct keeper *keeper,
                                               const struct place *place, float *least)
 {

@@ -1,13 +1,13 @@
-/* What could cover a place of the surface, and its cost in samples: a lattice triangle, a single hit, or a sample that
- * is moved to a lattice point. Finding candidates changes nothing, so that threads can look for many places at once;
- * taking them is for one place after the other, as what one adds may cover the next. */
+/* Candidates to cover a place, at a cost in samples: a lattice triangle, a single hit, or a sample moved to a lattice
+ * point. Finding them changes nothing and runs in threads. Taking them is sequential: one place's samples may cover
+ * the next. */
 #ifndef PSR_SAMPLE_MEND_CANDIDATES_H
 #define PSR_SAMPLE_MEND_CANDIDATES_H
 
 #include "sample/own/keep.h"
 #include "sample/visible/places.h"
 
-#define CANDIDATE_TRIES 10    /* projections, by how well they face a place: of these */
+#define CANDIDATE_TRIES 10    /* projections, by how well they face a place */
 #define CANDIDATE_TRIANGLES 3 /* so many are asked for triangles */
 
 /* Lattice points of one projection; their cost beside that of new blocks. */
@@ -31,9 +31,9 @@ struct candidates {
 	struct candidate_move move[3 * CANDIDATE_TRIES];
 };
 
-/* Whether a place is covered: it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3: some
- * of its corners is in whichever pixel is centred there), or within half a pixel of a kept sample. Any number of threads
- * may ask. */
+/* Whether a place is covered: it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3:
+ * some of its corners is in whichever pixel is centred there), or within half a pixel of a kept sample. Any number of
+ * threads may ask. */
 int candidates_cover(const struct keeper *keeper, const struct field *field, const struct place *place);
 
 /* Any number of threads may look. */

@@ -1,28 +1,28 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/vec.h"
 #include "candidates.h"
 #include "dice.h"
-#include "base/direction.h"
 #include "psr/error.h"
 #include "sample/visible/sides.h"
 
 #define STEP 0.33      /* pixels between places */
-#define THIN_STEP 0.25 /* on what is thin, at the finest level, which is to be adequate */
+#define THIN_STEP 0.25 /* on thin primitives of the finest level, which is to be adequate */
 
-/* Columns of places on a triangle as large as a pixel: at coarser levels, of such ones' places one a cell is enough. */
+/* Columns of places on a triangle of a pixel: at coarser levels one place a cell tests such triangles. */
 #define SMALL 3
 
-/* Where between the lines of such a grid they are, by round: what is smaller than a step shows in one of them. */
+/* Places between grid lines, by round: a gap smaller than a step shows in one of the rounds. */
 static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
 #define N_SHIFTS (int)(sizeof SHIFT / sizeof *SHIFT)
 
 /* What was found of some primitives. */
 struct chunk {
 	struct places thin, rest;
-	struct place_cells thin_cells; /* that have a place on something thin, whose other sides need no test; */
-	struct place_cells rest_cells; /* and one on a small triangle */
+	struct place_cells thin_cells; /* cells with a place on a thin primitive: its other sides need no test; */
+	struct place_cells rest_cells; /* cells with one on a small triangle */
 	int failed;
 };
 
@@ -45,7 +45,7 @@ static uint8_t thin_of(const struct sampling *sampling, uint32_t prim)
 	return sampling->thin != NULL ? sampling->thin[prim] : 0;
 }
 
-/* On what is narrow, samples are chosen only after it was tested: no triangle of them is to be looked for. */
+/* Samples of narrow primitives are chosen after the test: they have no lattice triangles. */
 static int is_covered(const struct job *job, const struct place *place)
 {
 	if ((thin_of(job->sampling, place->surface & ~SURFACE_BACK) & THIN_NARROW) != 0)
@@ -53,7 +53,7 @@ static int is_covered(const struct job *job, const struct place *place)
 	return candidates_cover(job->keeper, job->field, place);
 }
 
-/* What is thin is tested on one of its sides, for both. */
+/* A thin primitive is tested on one side, for both. */
 static int is_any_side_seen(const struct visible_set *visible, const struct place *place)
 {
 	float back[3];
@@ -62,8 +62,8 @@ static int is_any_side_seen(const struct visible_set *visible, const struct plac
 	return visible_set_has(visible, place->p, place->n) || visible_set_has(visible, place->p, back);
 }
 
-/* Tests a place, on all sides that are seen; that of one whose primitive is known to be hidden need not be asked for
- * until more was seen. is_small: at a coarser level, on a triangle of which one place in a cell is enough. */
+/* Tests a place on all sides that are seen, in round 0 not those of hidden primitives. is_small: one place a cell is
+ * enough for the triangle. */
 static void test_place(const struct job *job, uint32_t prim, const float p[3], int is_small, struct chunk *chunk)
 {
 	static const float NO_WAY[3] = { 0, 0, 0 };
@@ -107,7 +107,8 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 	const struct sampling *sampling = job->sampling;
 	const double shift = SHIFT[job->round % N_SHIFTS];
 	int can_be_absent = sampling_material(sampling, prim)->alpha != PSR_ALPHA_OPAQUE, longest = 0, n_columns, is_small;
-	double corner[3][3], side[3], e[3], height, foot, step = step_of(sampling, sampling_is_thin(sampling, prim));
+	double corner[3][3], side[3], e[3], ab[3], ac[3], cross[3], height, foot;
+	const double step = step_of(sampling, sampling_is_thin(sampling, prim));
 
 	ray_scene_corners(sampling->scene, prim, corner);
 	for (int i = 0; i < 3; i++) {
@@ -116,14 +117,11 @@ static void dice_triangle(const struct job *job, uint32_t prim, struct chunk *ch
 		longest = side[i] > side[longest] ? i : longest;
 	}
 	/* The longest side is the base: from corner `longest` to the next. */
-	const double *a = corner[longest], *b = corner[(longest + 1) % 3], *c = corner[(longest + 2) % 3];
-	double ab[3], ac[3], cross[3];
-
-	v3d_sub(ab, b, a);
-	v3d_sub(ac, c, a);
+	v3d_sub(ab, corner[(longest + 1) % 3], corner[longest]);
+	v3d_sub(ac, corner[(longest + 2) % 3], corner[longest]);
 	v3d_cross(cross, ab, ac);
 	height = v3d_length(cross) / side[longest];
-	/* Columns stand on it, as high as the triangle is there: one that is thinner than a step is tested all along. */
+	/* Columns stand on it, as high as the triangle: one thinner than a step is tested all along. */
 	foot = v3d_dot(ab, ac) / (side[longest] * side[longest]);
 	n_columns = (int)ceil(side[longest] / step);
 	n_columns = n_columns > 1 ? n_columns : 1;
@@ -162,7 +160,7 @@ static void dice_disc(const struct job *job, uint32_t prim, struct chunk *chunk)
 	double center[3], basis[3][3], normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
 
 	v3d_normalize(normal, normal);
-	psr_direction_frame(normal, basis);
+	psr_direction_basis(normal, basis);
 	ray_scene_center(sampling->scene, prim, center);
 	for (int i = -reach; i <= reach; i++) {
 		for (int k = -reach; k <= reach; k++) {

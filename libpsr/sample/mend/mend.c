@@ -31,7 +31,7 @@ static void look_for_candidates(int i, void *userdata)
 		                                                 &window->place[k]);
 }
 
-/* In a fixed order, one at a time. A place that costs more than `most` is left, and asks for a block. */
+/* One place at a time, in order. One that costs more than `most` is left, and wants a block. */
 static int cover_window(const struct window *window, float most, struct place *left, size_t *n_left)
 {
 	int rc = PSR_OK;

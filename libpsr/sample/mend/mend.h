@@ -1,5 +1,5 @@
-/* Adds what an owned sampling lacks: first for what is thin; then samples in blocks that are there; then new blocks, those
- * first that most of the rest could use. */
+/* Adds the samples that places lack: for thin primitives; in blocks that exist; in new blocks, the most wanted first.
+ * */
 #ifndef PSR_SAMPLE_MEND_MEND_H
 #define PSR_SAMPLE_MEND_MEND_H
 

@@ -70,7 +70,7 @@ void field_normal(const struct field *field, const float p[3], const float n[3],
 			if ((sums[0] | sums[1] | sums[2]) == 0)
 				continue;
 			g = v3f_dot(lobe, n);
-			/* What faces within some 70 degrees of n counts. */
+			/* Lobes within about 70 degrees of n. */
 			if (g > 0 && g * g > 0.1f * v3f_dot(lobe, lobe))
 				v3f_add_scaled(sum, sum, w, lobe);
 		}

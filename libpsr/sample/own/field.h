@@ -1,5 +1,5 @@
-/* How the surface faces at the scale of a few samples, which decides who owns it. Where it is rough, neighbouring
- * samples would otherwise belong to different projections, and blocks would be full of holes. */
+/* Smoothed normals, at the scale of a few samples, which decide ownership: where the surface is rough, its own normals
+ * would give neighbouring samples to different projections. */
 #ifndef PSR_SAMPLE_OWN_FIELD_H
 #define PSR_SAMPLE_OWN_FIELD_H
 

@@ -1,19 +1,19 @@
 #include <math.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "keep.h"
-#include "base/direction.h"
 #include "psr/error.h"
 #include "sample/visible/sides.h"
 #include "surface/blend.h"
 
 #define MOST_BLENDED 64
 
-/* Samples are drawn where their normals face the eye, and places are visible where their faces do: a shading normal
- * further than this from its face's, as normal maps and smoothing at creases make them, would open the surface in views
- * along it. Such a sample is bent: how it faces is told by a normal that is as near as this, and shaded is its own. */
+/* Samples are drawn where their normals face the eye. A shading normal further than this from its face's, by a normal
+ * map or smoothing at a crease, would open the surface in views along it: such a sample is bent, and faces by a normal
+ * that is as near as this. */
 #define LEAST_AGREEMENT 0.94f       /* 20 degrees */
-#define LEAST_AGREEMENT_WIDE 0.985f /* 10, where a face is so wide that no sample beside it closes what opens */
+#define LEAST_AGREEMENT_WIDE 0.985f /* 10, where a face is so wide that no sample beside it closes the opening */
 #define WIDE_PIXELS 3
 
 #define NORMAL_BITS UINT64_C(0x7fff)
@@ -39,7 +39,7 @@ static float least_agreement(const struct sampling *sampling, uint32_t prim)
 	return is_wide(sampling, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT;
 }
 
-/* The normal that is nearest to `normal` of those within a cosine of a face's. */
+/* The normal nearest to `normal` within a cosine of the face's. */
 static uint16_t agree(uint16_t normal, const float face[3], float least)
 {
 	const float *n = psr_direction_table()[normal];
@@ -55,8 +55,8 @@ static uint16_t agree(uint16_t normal, const float face[3], float least)
 	return (uint16_t)psr_direction_encode(turned);
 }
 
-/* Attributes of the finer samples around, of a footprint that falls to nothing at a pixel's distance: the normal that
- * tells how they face is a mean, too. 0 if there are none, and then nothing of `to` is touched. */
+/* Blends the attributes and facing normals of finer samples, with weights that fall to 0 at a pixel's distance. 0 if
+ * there are none, and then `to` is unchanged. */
 static int blend(const struct keeper *keeper, const float n[3], const float facing[3], uint32_t prim,
                  struct kept_sample *to)
 {

@@ -1,4 +1,4 @@
-/* How samples come to be kept: the one way in for all steps. */
+/* Keeps samples: the one way in for all steps. */
 #ifndef PSR_SAMPLE_OWN_KEEP_H
 #define PSR_SAMPLE_OWN_KEEP_H
 
@@ -9,24 +9,23 @@ struct keeper {
 	const struct sampling *sampling;
 	const struct visible_set *visible;
 	const uint8_t *sides;      /* enum side */
-	const struct kept *finer;  /* of the level with half of this one's ds: attributes are blended from these; or NULL */
+	const struct kept *finer;  /* of the level with half of this ds, for blending attributes; NULL */
 	struct sheets *sheets;     /* of all projections: their hits are marked; */
 	struct kept *kept;         /* and grows */
 };
 
-/* Keeps what is owned; a single hit, unless it is kept; hits that are not kept yet, or only marked. MEMORY. */
+/* Keeps all owned hits; one hit, unless it is kept; hits that are not kept, or only marked. MEMORY. */
 int keep_owned(const struct keeper *keeper, const struct ownership *ownership);
 int keep_sample(const struct keeper *keeper, struct sample_ref ref);
 int keep_samples(const struct keeper *keeper, const struct sample_ref *ref, uint32_t n);
 
-/* Makes a place of the surface a hit at a lattice point, and keeps it; or nothing if the lattice does not reach so
- * far. MEMORY. */
+/* Adds a hit at a lattice point, and keeps it; does nothing beyond the lattice. MEMORY. */
 int keep_moved(const struct keeper *keeper, unsigned projection, struct lattice_point at, float z, uint32_t surface);
 
-/* Whether a sample of a face of this normal counts for those who look at its back, too: a thin sheet's does. */
+/* Whether a sample of a face of this normal counts for views of its back, too: a thin sheet's does. */
 int keep_is_two_sided(const struct keeper *keeper, uint32_t prim, const float p[3], const float n[3]);
 
-/* Asks that of all kept samples again, after more was seen. */
+/* Asks that again of all kept samples, after more was seen. */
 void keep_look_again(const struct keeper *keeper);
 
 #endif

@@ -1,6 +1,6 @@
-#include <stdlib.h>
-#include "kept.h"
+#include "base/array.h"
 #include "base/direction.h"
+#include "kept.h"
 #include "psr/error.h"
 
 int kept_init(struct kept *kept, double ds)
@@ -18,15 +18,8 @@ void kept_fini(struct kept *kept)
 
 int kept_add(struct kept *kept, const struct kept_sample *sample)
 {
-	if (kept->n == kept->capacity) {
-		uint32_t capacity = kept->capacity != 0 ? kept->capacity + kept->capacity / 2 : 4096;
-		struct kept_sample *grown = realloc(kept->sample, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		kept->sample = grown;
-		kept->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(kept->sample, kept->n, kept->capacity))
+		return PSR_ERR_MEMORY;
 	kept->sample[kept->n] = *sample;
 	if (grid_put(&kept->grid, sample->position, kept->n, &kept->sample[kept->n].next) != PSR_OK)
 		return PSR_ERR_MEMORY;

@@ -1,4 +1,4 @@
-/* The samples that are kept, by place: S of [G] 5.2. */
+/* The kept samples, by place: S of [G] 5.2. */
 #ifndef PSR_SAMPLE_OWN_KEPT_H
 #define PSR_SAMPLE_OWN_KEPT_H
 
@@ -7,13 +7,13 @@
 
 struct kept_sample {
 	float position[3];
-	uint16_t normal;     /* psr/direction.h: what is turned away from the viewer does not count, */
+	uint16_t normal;     /* base/direction.h: a sample that faces away does not count, */
 	uint8_t two_sided;   /* unless this is set */
-	uint8_t traits;      /* psr/model.h. Bent: `attr` has another normal, which is shaded and does not tell facing */
+	uint8_t traits;      /* model/blocks.h. Bent: `attr` has another normal, for shading alone */
 	uint8_t sample;      /* of this patch: */
 	uint32_t projection, patch;
 	uint32_t next;       /* of the same cell */
-	uint64_t attr;       /* psr/model.h */
+	uint64_t attr;       /* model/blocks.h */
 };
 
 struct kept {
@@ -22,7 +22,7 @@ struct kept {
 	uint32_t n, capacity;
 };
 
-/* A kept sample within so many pixels is in every pixel that has the place in its middle. */
+/* A kept sample within so many pixels of a place is in every pixel that is centred there. */
 #define KEPT_NEAR 0.5
 
 int kept_init(struct kept *kept, double ds); /* MEMORY; kept_fini() either way */
@@ -32,9 +32,8 @@ int kept_add(struct kept *kept, const struct kept_sample *sample); /* sets `next
 /* Whether a sample covers a place p that faces like n: it is within radius <= ds and faces like n, too. */
 int kept_covers(const struct kept *kept, const float p[3], const float n[3], double radius);
 
-/* The same of one sample on a sheet that is sampled once for both sides, whose normal at p is n: along the sheet as far
- * as radius, and across it, too, as pixels see that foreshortened; between, where 0.6 across^2 + along^2 <=
- * radius^2. */
+/* The same of one sample on a sheet that is sampled once for both sides, of normal n at p: within radius across the
+ * sheet, which pixels see foreshortened, and where 0.6 across^2 + along^2 <= radius^2. */
 static inline int kept_covers_sheet(const float sample[3], const float p[3], const float n[3], float radius)
 {
 	float d[3], across, distance2;

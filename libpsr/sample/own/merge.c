@@ -2,8 +2,8 @@
 #include "owner.h"
 
 /* Patches that own fewer samples than this give them away, fewest first, to projections that face them at an angle of
- * at least this cosine: a block costs as much as some ten samples. Beyond the tolerance angle samples lie further apart
- * than they should: mending adds what is missing then, which for few samples is less than a block. */
+ * at least this cosine: a block costs as much as some ten samples. Beyond the tolerance angle samples lie too far
+ * apart, and mending adds some, fewer than a block costs. */
 static const struct {
 	int least;
 	float cosine;
@@ -26,7 +26,7 @@ struct claim {
 	uint64_t bit;
 };
 
-/* The nearest corner of the lattice triangle of projection q that has this surface, in a patch that owns enough. */
+/* The nearest corner of projection q's lattice triangle with this surface, in a patch that owns enough. */
 static struct claim find_claim(const struct job *job, unsigned q, const float p[3], uint32_t surface)
 {
 	const struct sheets *sheets = &job->sheets[q];
@@ -106,7 +106,7 @@ static void give_away(const struct job *job, unsigned projection, uint32_t p)
 	owned->mask = 0;
 }
 
-/* A sample that is left alone in a block: mending finds what covers its place. */
+/* Drops samples alone in their blocks: mending covers their places. */
 static void drop_single(const struct job *job)
 {
 	for (unsigned i = 0; i < N_PROJECTIONS; i++) {

@@ -4,7 +4,7 @@
 #include "psr/error.h"
 #include "sample/visible/sides.h"
 
-/* A projection that sees the face itself at over 50 degrees does not own it, however the surface around it lies. */
+/* A projection over 50 degrees off the face's own normal does not own it. */
 #define LEAST_OWNER_COSINE 0.64f
 
 struct job {
@@ -56,7 +56,7 @@ static int is_seen(const struct job *job, int i, uint32_t patch, unsigned s, int
 	return visible_set_has(job->finds->visible, p, n);
 }
 
-/* By the faces' own normals first: these are what the field is made of, each place once. */
+/* First by the faces' own normals: the field is made of these, each place once. */
 static void mark_faced(int i, void *userdata)
 {
 	const struct job *job = userdata;
@@ -139,8 +139,8 @@ static void mark_hidden(int i, void *userdata)
 	}
 }
 
-/* A sheet that is seen from both sides is sampled once, on its front; one that is hidden is not sampled; and samples of
- * what is narrow are chosen when places are tested. */
+/* A sheet seen from both sides is sampled once, on its front, and a hidden one not at all. Mending chooses the samples
+ * of narrow primitives. */
 static void drop_hidden(int i, void *userdata)
 {
 	const struct job *job = userdata;
@@ -165,7 +165,7 @@ static void drop_hidden(int i, void *userdata)
 	}
 }
 
-/* What rays met first is seen, here and at coarser levels, though of thin things few views meet anything. */
+/* First hits are seen, here and at coarser levels: few views meet thin things. */
 static int see_first(const struct job *job)
 {
 	for (int i = 0; i < N_PROJECTIONS; i++) {

@@ -1,6 +1,5 @@
-/* Which hits each projection owns. [G] 5.2 adds blocks wherever projections, taken one after the other, still show a
- * hole. Here the projection that faces it best owns each place of the surface, and a block keeps what its projection
- * owns. */
+/* Ownership. [G] 5.2 adds blocks wherever projections, taken one after the other, still show a hole. Here the
+ * projection that faces a place best owns it, and a block keeps the hits that its projection owns. */
 #ifndef PSR_SAMPLE_OWN_OWNER_H
 #define PSR_SAMPLE_OWN_OWNER_H
 
@@ -21,8 +20,8 @@ struct ownership {
 /* The projection that owns a place that faces n. */
 unsigned owner_of(const struct sampling *sampling, const struct field *field, const float p[3], const float n[3]);
 
-/* Decides it for all hits. The field is made on the way, and what is found out is added to the visible set and to
- * `sides` (enum side). MEMORY; ownership_fini() either way. */
+/* Finds the owners of all hits, makes the field on the way, and adds what it sees to the visible set and to `sides`
+ * (enum side). MEMORY; ownership_fini() either way. */
 struct owner_finds {
 	struct field *field; /* initialised */
 	struct visible_set *visible;
@@ -32,8 +31,8 @@ int owner_mark(struct ownership *ownership, const struct owner_finds *finds, con
                const struct sheets *sheets);
 void ownership_fini(struct ownership *ownership);
 
-/* merge.c: gives the hits of patches that own less than a quarter of a block to others that have them as well; what is
- * then alone in its patch is owned no more. */
+/* merge.c: gives the hits of patches that own less than a quarter of a block to other patches that have the same
+ * surface. Single hits that are left are owned no more. */
 void owner_merge(struct ownership *ownership, const struct sampling *sampling, const struct sheets *sheets,
                  const struct field *field);
 

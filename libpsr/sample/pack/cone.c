@@ -1,11 +1,11 @@
 #include "base/vec.h"
-#include "render/render.h"
 #include "cone.h"
+#include "render/render.h"
 
 /* Normals and axis are rounded to floats: their product is off by some 2^-22. */
 #define SLACK 0x1p-20
 
-/* How far outside counts: roundings of double. */
+/* Less is rounding of doubles. */
 #define OUTSIDE 0x1p-48
 
 struct cap {
@@ -24,7 +24,7 @@ static void cap_of_two(struct cap *cap, const double a[3], const double b[3])
 	cap->cosine = v3d_dot(cap->axis, a);
 }
 
-/* The circle through three points of the sphere; of two that coincide one goes. */
+/* The circle through three points of the sphere, or two if some coincide. */
 static void cap_of_three(struct cap *cap, const double a[3], const double b[3], const double c[3])
 {
 	double ab[3], ac[3];
@@ -48,8 +48,8 @@ static int is_outside(const struct cap *cap, const double v[3])
 	return v3d_dot(cap->axis, v) < cap->cosine - OUTSIDE;
 }
 
-/* [G] 6.4: the smallest cap is bound by two of the normals or by three. Welzl's way to them, one normal after the
- * other: one that is outside of the cap of those before it is on the rim of the cap that holds it too. */
+/* [G] 6.4: two or three of the normals bound the smallest cap. Welzl: a normal outside of the cap of those before it
+ * is on the rim of the cap that holds it, too. */
 static void smallest_cap(struct cap *cap, const float (*normal)[3], int n)
 {
 	double a[3], b[3], c[3];

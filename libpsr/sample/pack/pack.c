@@ -91,49 +91,40 @@ static void pack_clusters(struct pack *pack, const struct order *order)
 		pack_bound_cluster(&spheres, &pack->cluster[c]);
 }
 
-static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples, size_t n_clusters)
+/* All arrays of a pack and their elements. */
+#define EACH_ARRAY(DO) \
+	DO(cluster, pack->n_clusters) \
+	DO(center[0], n_blocks) \
+	DO(center[1], n_blocks) \
+	DO(center[2], n_blocks) \
+	DO(cone[0], n_blocks) \
+	DO(cone[1], n_blocks) \
+	DO(cone[2], n_blocks) \
+	DO(radius, n_blocks) \
+	DO(cone_sine, n_blocks) \
+	DO(block_projection, n_blocks) \
+	DO(flags, n_blocks) \
+	DO(traits, n_blocks) \
+	DO(mask, n_blocks) \
+	DO(attr_offset, n_blocks) \
+	DO(run, n_blocks / PSR_RUN_BLOCKS + 1) \
+	DO(depth, n_samples + PSR_BLOCK_SAMPLES) \
+	DO(attr, n_samples) \
+	DO(opacity, n_samples)
+
+static int pack_alloc(struct pack *pack, size_t n_blocks, size_t n_samples)
 {
 	int failed = 0;
 
-#define ALLOC(array, n) failed |= ((array) = psr_alloc_array(n, sizeof *(array))) == NULL
-	ALLOC(pack->cluster, n_clusters);
-	for (int k = 0; k < 3; k++) {
-		ALLOC(pack->center[k], n_blocks);
-		ALLOC(pack->cone[k], n_blocks);
-	}
-	ALLOC(pack->radius, n_blocks);
-	ALLOC(pack->cone_sine, n_blocks);
-	ALLOC(pack->block_projection, n_blocks);
-	ALLOC(pack->depth, n_samples + PSR_BLOCK_SAMPLES);
-	ALLOC(pack->flags, n_blocks);
-	ALLOC(pack->traits, n_blocks);
-	ALLOC(pack->mask, n_blocks);
-	ALLOC(pack->attr, n_samples);
-	ALLOC(pack->opacity, n_samples);
-	ALLOC(pack->attr_offset, n_blocks);
-	ALLOC(pack->run, n_blocks / PSR_RUN_BLOCKS + 1);
-#undef ALLOC
+#define ALLOC(array, n) failed |= (pack->array = psr_alloc_array(n, sizeof *pack->array)) == NULL;
+	EACH_ARRAY(ALLOC)
 	return failed ? PSR_ERR_MEMORY : PSR_OK;
 }
 
 static void pack_fini(struct pack *pack)
 {
-	psr_free(pack->cluster);
-	for (int k = 0; k < 3; k++) {
-		psr_free(pack->center[k]);
-		psr_free(pack->cone[k]);
-	}
-	psr_free(pack->radius);
-	psr_free(pack->cone_sine);
-	psr_free(pack->block_projection);
-	psr_free(pack->depth);
-	psr_free(pack->flags);
-	psr_free(pack->traits);
-	psr_free(pack->mask);
-	psr_free(pack->attr);
-	psr_free(pack->opacity);
-	psr_free(pack->attr_offset);
-	psr_free(pack->run);
+#define FREE(array, n) psr_free(pack->array);
+	EACH_ARRAY(FREE)
 }
 
 static uint64_t count_samples(const struct draft *draft)
@@ -145,22 +136,22 @@ static uint64_t count_samples(const struct draft *draft)
 	return n;
 }
 
-/* Masks, and what culling by them and by cones loses. */
-static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_table *table,
+/* Makes masks, and measures the loss of culling by them and by cones. */
+static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_mask_table *table,
                           struct psr_model_info *info, struct psr_pool *pool)
 {
 	uint64_t (*mask)[2] = psr_alloc_array(blocks->n_blocks, sizeof *mask);
-	int rc = mask != NULL ? visibility_masks(blocks, pool, mask) : PSR_ERR_MEMORY;
+	int rc = mask != NULL ? visibility_mask_make(blocks, pool, mask) : PSR_ERR_MEMORY;
 
-	if (rc == PSR_OK && !visibility_is_full(blocks->n_blocks, (const uint64_t(*)[2])mask))
-		rc = visibility_table_make(table, blocks, (const uint64_t(*)[2])mask, pack->run, pool);
+	if (rc == PSR_OK && !visibility_mask_is_full(blocks->n_blocks, (const uint64_t(*)[2])mask))
+		rc = visibility_mask_table_make(table, blocks, (const uint64_t(*)[2])mask, pack->run, pool);
 	psr_free(mask);
 	if (rc != PSR_OK)
 		return rc;
 	blocks->n_masks = table->n_masks;
 	blocks->visibility_mask = (const uint64_t(*)[2])table->mask;
 	blocks->visibility_index = table->index;
-	return visibility_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
+	return visibility_mask_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
 /* Of all blocks, OR-ed. */
@@ -176,7 +167,7 @@ static uint8_t find_traits(const struct pack *pack)
 static int make_model(struct psr_model **out, struct psr_model_info *info, const struct pack_source *source,
                       struct pack *pack, struct psr_error *err)
 {
-	struct visibility_table table = { 0 };
+	struct visibility_mask_table table = { 0 };
 	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
 		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
 		                         .n_samples = pack->n_samples };
@@ -210,7 +201,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 		psr_fail(err, rc, "no memory for the visibility masks of %u blocks", blocks.n_blocks);
 	else
 		rc = psr_model_create(out, info, &blocks, source->presets, err);
-	visibility_table_fini(&table);
+	visibility_mask_table_fini(&table);
 	return rc;
 }
 
@@ -229,7 +220,7 @@ int pack_model(struct psr_model **out, struct psr_model_info *info, const struct
 	if (rc == PSR_OK) {
 		sort_blocks(order, draft);
 		pack.n_clusters = count_clusters(order, draft->n_blocks);
-		rc = pack_alloc(&pack, draft->n_blocks, n_samples, pack.n_clusters);
+		rc = pack_alloc(&pack, draft->n_blocks, n_samples);
 	}
 	if (rc == PSR_ERR_MEMORY)
 		psr_fail(err, rc, "no memory for a model of %u blocks", draft->n_blocks);

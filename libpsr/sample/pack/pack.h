@@ -2,8 +2,8 @@
 #ifndef PSR_SAMPLE_PACK_PACK_H
 #define PSR_SAMPLE_PACK_PACK_H
 
-#include "psr/error.h"
 #include "base/pool.h"
+#include "psr/error.h"
 #include "sample/levels/draft.h"
 
 struct pack_source {

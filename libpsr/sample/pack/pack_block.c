@@ -1,10 +1,10 @@
 #include <assert.h>
 #include <math.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/vec.h"
 #include "cone.h"
 #include "pack_block.h"
-#include "base/direction.h"
 
 /* Spheres are made from rounded positions; this much more holds the exact ones (a few roundings of 2^-24 each). */
 #define SLACK 0x1p-21
@@ -38,9 +38,8 @@ static double clamp(double x, double middle, double reach)
 	return x < middle - reach ? middle - reach : x > middle + reach ? middle + reach : x;
 }
 
-/* The sphere's center: the middle of the box, which is half a column or a row off the middle of the block's window at
- * most. It is kept from that limit as far as rounding to 2^-14 along each axis may move it, 0.87 of that, and 2^-20
- * more, as axes are of single precision. */
+/* The sphere's center: the middle of the box, half a column or a row off the middle of the block's window at most,
+ * less as much as rounding may move it: 0.87 of 2^-14, and 2^-20 for axes of single precision. */
 static void center_block(struct pack *pack, uint32_t i, const struct draft_block *block, const double min[3],
                          const double max[3])
 {
@@ -63,7 +62,7 @@ static void center_block(struct pack *pack, uint32_t i, const struct draft_block
 	assert(place.row == (double)block->row * (1u << block->level));
 }
 
-/* Depths as 16 bits, in the least step, a power of two, that reaches them all from that of the center. */
+/* Depths as 16 bits, in the least step, a power of two, that reaches all of them from the center's. */
 static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min,
                      double max)
 {
@@ -86,12 +85,11 @@ static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct dr
 	pack->flags[i] |= (uint8_t)((shift - 14) << 3);
 }
 
-/* Through the samples as they will be read back, and half a step beyond.
- *
- * Both fit. A pixel ds is at most 1/4 (at resolution 8), and a sample stands on the surface, which is within the unit
- * sphere, or was moved by up to 0.55 ds: within 1.1375. So along each axis of the projection the middle is, which makes
- * 1.1375 sqrt(3) = 1.97 < 2 at most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with
- * half a step more, 1.79 < 2. */
+/* Holds the samples as they will be read back, and half a step more. Center and radius fit: a pixel ds is at most 1/4
+ * (at resolution 8), and a sample stands on the surface, which is within the unit sphere, or was moved by up to 0.55
+ * ds: within 1.1375. So along each axis of the projection the middle is, which makes 1.1375 sqrt(3) = 1.97 < 2 at
+ * most. Half of the box is at most 3.75 by 3.04 steps of at most ds, and 1.1375 deep: with half a step more, 1.79 < 2.
+ * */
 static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block)
 {
 	const struct psr_projection *projection = &pack->draft->projection[block->projection];
@@ -120,21 +118,23 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and those that the samples are drawn by, if it is not told by the cone alone
- * how they face. A block that is seen from both sides needs one only if it is bent. */
+/* The cone holds the normals of the faces, and unless the block is bent those of the samples, by which the renderer
+ * draws. A block that is seen from both sides needs one only if it is bent: no sample of a bent block is left out by
+ * itself. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
 	float normal[2 * PSR_BLOCK_SAMPLES][3];
+	const int is_bent = block->traits & PSR_BLOCK_BENT;
 	int8_t axis[3];
 	int n = 0;
 
-	for (uint64_t left = block->two_sided && !(block->traits & PSR_BLOCK_BENT) ? 0 : block->part; left != 0; left &= left - 1) {
+	for (uint64_t left = block->two_sided && !is_bent ? 0 : block->part; left != 0; left &= left - 1) {
 		const struct draft_sample *sample = draft_sample(pack->draft, block, (unsigned)__builtin_ctzll(left));
 		const float *front = ray_scene_normal(pack->scene, sample->surface & ~SURFACE_BACK);
 
 		v3f_scale(normal[n++], front, (sample->surface & SURFACE_BACK) != 0 ? -1 : 1);
-		if (!(block->traits & PSR_BLOCK_BENT))
+		if (!is_bent)
 			memcpy(normal[n++], direction[PSR_ATTR_NORMAL(sample->attr)], sizeof *normal);
 	}
 	cone_pack((const float(*)[3])normal, n, axis, &pack->cone_sine[i]);

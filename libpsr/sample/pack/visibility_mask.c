@@ -12,22 +12,22 @@
 #define MOST_LEVEL 3
 #define MOST_WORDS 8
 
-/* Directions at the corners of triangles belong to them all, whatever they are rounded to. */
+/* Directions at the corners of triangles belong to them all, however they are rounded. */
 #define ON_EDGE 1e-9
 
-/* An axis of which both ends are looked from. */
-struct view {
-	double axis[3];
-	uint64_t triangles[2][MOST_WORDS]; /* of each end: for which it counts */
+/* Views from both ends of an axis. */
+struct axis {
+	double direction[3];
+	uint64_t triangles[2][MOST_WORDS]; /* those that hold each end */
 };
 
 struct job {
-	const struct vpoints *points;
-	const struct vlevel *level;
+	const struct mask_points *points;
+	const struct mask_level *level;
 	size_t words; /* of a mask */
 	uint64_t *mask;
-	const struct view *view;
-	int n_views;
+	const struct axis *axis;
+	int n_axes;
 	atomic_int next, failed;
 };
 
@@ -44,7 +44,7 @@ static void planes_of(int level, unsigned triangle, double plane[3][3])
 	}
 }
 
-static void add_triangles(struct view *view, int level)
+static void add_triangles(struct axis *axis, int level)
 {
 	for (unsigned t = 0; t < 8u << 2 * level; t++) {
 		double plane[3][3];
@@ -52,19 +52,19 @@ static void add_triangles(struct view *view, int level)
 
 		planes_of(level, t, plane);
 		for (int i = 0; i < 3; i++) {
-			double side = v3d_dot(plane[i], view->axis);
+			double side = v3d_dot(plane[i], axis->direction);
 
 			inside[0] &= side >= -ON_EDGE;
 			inside[1] &= side <= ON_EDGE;
 		}
 		for (int end = 0; end < 2; end++)
-			view->triangles[end][t >> 6] |= inside[end] << (t & 63);
+			axis->triangles[end][t >> 6] |= inside[end] << (t & 63);
 	}
 }
 
-static int compare_views(const void *a, const void *b)
+static int compare_axes(const void *a, const void *b)
 {
-	const double *x = ((const struct view *)a)->axis, *y = ((const struct view *)b)->axis;
+	const double *x = ((const struct axis *)a)->direction, *y = ((const struct axis *)b)->direction;
 
 	for (int k = 0; k < 3; k++)
 		if (x[k] != y[k])
@@ -72,7 +72,7 @@ static int compare_views(const void *a, const void *b)
 	return 0;
 }
 
-/* Directions that come in pairs: of each the one whose first number that is not 0 is above. */
+/* Of each pair of opposite directions the one whose first number other than 0 is positive. */
 static int is_end_0(const double v[3])
 {
 	for (int k = 0; k < 3; k++)
@@ -81,8 +81,8 @@ static int is_end_0(const double v[3])
 	return 0;
 }
 
-/* The corners of all triangles that are FINER than those of a level, each pair once. */
-static int make_views(struct view *view, int level)
+/* The corners of all triangles that are FINER levels finer, each pair of opposite ones once. */
+static int make_axes(struct axis *axis, int level)
 {
 	int n = 0, n_kept = 0;
 
@@ -93,31 +93,31 @@ static int make_views(struct view *view, int level)
 		for (int i = 0; i < 3; i++) {
 			if (!is_end_0(corner[i]))
 				continue;
-			memset(&view[n], 0, sizeof *view);
-			v3d_set(view[n++].axis, corner[i][0], corner[i][1], corner[i][2]);
+			memset(&axis[n], 0, sizeof *axis);
+			v3d_set(axis[n++].direction, corner[i][0], corner[i][1], corner[i][2]);
 		}
 	}
-	qsort(view, (size_t)n, sizeof *view, compare_views);
+	qsort(axis, (size_t)n, sizeof *axis, compare_axes);
 	for (int i = 0; i < n; i++)
-		if (n_kept == 0 || compare_views(&view[n_kept - 1], &view[i]) != 0)
-			view[n_kept++] = view[i];
+		if (n_kept == 0 || compare_axes(&axis[n_kept - 1], &axis[i]) != 0)
+			axis[n_kept++] = axis[i];
 	for (int i = 0; i < n_kept; i++)
-		add_triangles(&view[i], level);
+		add_triangles(&axis[i], level);
 	return n_kept;
 }
 
-static void look(const struct job *job, const struct vpicture *picture, const struct view *view)
+static void look(const struct job *job, const struct mask_picture *picture, const struct axis *axis)
 {
 	for (uint32_t k = 0; k < job->level->n_blocks; k++) {
 		uint32_t block = job->level->block[k];
 
 		for (int end = 0; end < 2; end++) {
-			const uint64_t *triangles = view->triangles[end];
+			const uint64_t *triangles = axis->triangles[end];
 			uint64_t *mask = job->mask + job->words * block, lacks = 0;
 
 			for (size_t w = 0; w < job->words; w++)
 				lacks |= triangles[w] & ~__atomic_load_n(&mask[w], __ATOMIC_RELAXED);
-			if (lacks == 0 || !vpicture_sees(picture, job->points, block, end))
+			if (lacks == 0 || !mask_picture_sees(picture, job->points, block, end))
 				continue;
 			for (size_t w = 0; w < job->words; w++)
 				__atomic_fetch_or(&mask[w], triangles[w], __ATOMIC_RELAXED);
@@ -125,65 +125,66 @@ static void look(const struct job *job, const struct vpicture *picture, const st
 	}
 }
 
-static void draw_views(int thread, void *userdata)
+static void draw_axes(int thread, void *userdata)
 {
 	struct job *job = userdata;
-	struct vpicture *picture = malloc(sizeof *picture);
+	struct mask_picture *picture = malloc(sizeof *picture);
 
 	(void)thread;
-	if (picture == NULL || vpicture_init(picture, job->points, job->level) != PSR_OK) {
+	if (picture == NULL || mask_picture_init(picture, job->points, job->level) != PSR_OK) {
 		free(picture);
 		atomic_store(&job->failed, 1);
 		return;
 	}
-	for (int i; (i = atomic_fetch_add(&job->next, 1)) < job->n_views;) {
-		vpicture_draw(picture, job->points, job->level, job->view[i].axis, (uint32_t)i);
-		look(job, picture, &job->view[i]);
+	for (int i; (i = atomic_fetch_add(&job->next, 1)) < job->n_axes;) {
+		mask_picture_draw(picture, job->points, job->level, job->axis[i].direction, (uint32_t)i);
+		look(job, picture, &job->axis[i]);
 	}
-	vpicture_fini(picture);
+	mask_picture_fini(picture);
 	free(picture);
 }
 
 static int mask_level(struct job *job, unsigned which, struct psr_pool *pool)
 {
-	struct vlevel level;
-	int rc = vlevel_init(&level, job->points, which);
+	struct mask_level level;
+	int rc = mask_level_init(&level, job->points, which);
 
 	job->level = &level;
 	if (rc == PSR_OK && level.n_blocks > 0) {
 		atomic_store(&job->next, 0);
-		psr_pool_for(pool, psr_pool_threads(pool), draw_views, job);
+		psr_pool_for(pool, psr_pool_threads(pool), draw_axes, job);
 		rc = atomic_load(&job->failed) ? PSR_ERR_MEMORY : PSR_OK;
 	}
-	vlevel_fini(&level);
+	mask_level_fini(&level);
 	return rc;
 }
 
-int visibility_masks_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool, uint64_t *mask)
+int visibility_mask_make_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool,
+                            uint64_t *mask)
 {
-	struct vpoints points;
-	struct view *view = psr_alloc_array((size_t)3 * 8 << 2 * (level + FINER), sizeof *view);
-	struct job job = { .points = &points, .words = words, .mask = mask, .view = view };
-	int rc = view != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
+	struct mask_points points;
+	struct axis *axis = psr_alloc_array((size_t)3 * 8 << 2 * (level + FINER), sizeof *axis);
+	struct job job = { .points = &points, .words = words, .mask = mask, .axis = axis };
+	int rc = axis != NULL ? mask_points_init(&points, blocks) : PSR_ERR_MEMORY;
 
 	assert(level >= 0 && level <= MOST_LEVEL && words <= MOST_WORDS && 64 * words >= 8u << 2 * level);
 	memset(mask, 0, blocks->n_blocks * words * sizeof *mask);
 	if (rc == PSR_OK) {
-		job.n_views = make_views(view, level);
+		job.n_axes = make_axes(axis, level);
 		for (unsigned which = 0; which < blocks->n_levels && rc == PSR_OK; which++)
 			rc = mask_level(&job, which, pool);
-		vpoints_fini(&points);
+		mask_points_fini(&points);
 	}
-	psr_free(view);
+	psr_free(axis);
 	return rc;
 }
 
-int visibility_masks(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2])
+int visibility_mask_make(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2])
 {
-	return visibility_masks_at(blocks, TRIANGLE_LEVEL, 2, pool, mask[0]);
+	return visibility_mask_make_at(blocks, TRIANGLE_LEVEL, 2, pool, mask[0]);
 }
 
-int visibility_is_full(uint32_t n_blocks, const uint64_t (*mask)[2])
+int visibility_mask_is_full(uint32_t n_blocks, const uint64_t (*mask)[2])
 {
 	for (uint32_t i = 0; i < n_blocks; i++)
 		if ((mask[i][0] & mask[i][1]) != UINT64_MAX)

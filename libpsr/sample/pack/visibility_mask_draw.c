@@ -2,19 +2,19 @@
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render/block.h"
 #include "psr/error.h"
+#include "render/block.h"
 #include "visibility_mask_draw.h"
 
 #define MOST_SIDE 4000 /* its square is below 2^24, with margins */
-#define MARGIN (VPICTURE_REACH + 1) /* pixels */
+#define MARGIN (MASK_PICTURE_REACH + 1) /* pixels */
 #define CHUNK 16 /* samples */
 
-/* Steps of the lattice: as far apart as samples are on a surface that is tilted by 25 degrees. Smaller ones have holes,
- * and a sample behind a hole counts as seen. */
+/* Steps of the lattice: the distance of samples on a surface tilted by 25 degrees. Smaller pixels have holes, and a
+ * sample behind a hole counts as seen. */
 #define PIXEL 1.11f
 
-static int alloc_points(struct vpoints *points, size_t n)
+static int alloc_points(struct mask_points *points, size_t n)
 {
 	points->x = psr_alloc_array(n, sizeof *points->x);
 	points->y = psr_alloc_array(n, sizeof *points->y);
@@ -24,14 +24,14 @@ static int alloc_points(struct vpoints *points, size_t n)
 	                                                                                             : PSR_ERR_MEMORY;
 }
 
-int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
+int mask_points_init(struct mask_points *points, const struct psr_blocks *blocks)
 {
 	float reach2 = 0;
 
 	memset(points, 0, sizeof *points);
 	points->blocks = blocks;
-	if (alloc_points(points, blocks->n_samples + VPOINTS_BEYOND) != PSR_OK) {
-		vpoints_fini(points);
+	if (alloc_points(points, blocks->n_samples + MASK_POINTS_BEYOND) != PSR_OK) {
+		mask_points_fini(points);
 		return PSR_ERR_MEMORY;
 	}
 	for (uint32_t b = 0; b < blocks->n_blocks; b++) {
@@ -52,7 +52,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 			                            : (uint16_t)PSR_ATTR_NORMAL(blocks->attr[k]);
 		}
 	}
-	for (size_t k = blocks->n_samples; k < blocks->n_samples + VPOINTS_BEYOND; k++) {
+	for (size_t k = blocks->n_samples; k < blocks->n_samples + MASK_POINTS_BEYOND; k++) {
 		points->x[k] = points->y[k] = points->z[k] = 0;
 		points->normal[k] = PSR_DIRECTIONS;
 	}
@@ -60,7 +60,7 @@ int vpoints_init(struct vpoints *points, const struct psr_blocks *blocks)
 	return PSR_OK;
 }
 
-void vpoints_fini(struct vpoints *points)
+void mask_points_fini(struct mask_points *points)
 {
 	psr_free(points->x);
 	psr_free(points->y);
@@ -68,7 +68,7 @@ void vpoints_fini(struct vpoints *points)
 	psr_free(points->normal);
 }
 
-int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned which)
+int mask_level_init(struct mask_level *level, const struct mask_points *points, unsigned which)
 {
 	const struct psr_blocks *b = points->blocks;
 
@@ -76,7 +76,7 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 	level->block = psr_alloc_array(b->n_blocks, sizeof *level->block);
 	level->run = psr_alloc_array(b->n_blocks, sizeof *level->run);
 	if (level->block == NULL || level->run == NULL) {
-		vlevel_fini(level);
+		mask_level_fini(level);
 		return PSR_ERR_MEMORY;
 	}
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
@@ -96,13 +96,13 @@ int vlevel_init(struct vlevel *level, const struct vpoints *points, unsigned whi
 	return PSR_OK;
 }
 
-void vlevel_fini(struct vlevel *level)
+void mask_level_fini(struct mask_level *level)
 {
 	psr_free(level->block);
 	psr_free(level->run);
 }
 
-int vpicture_init(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level)
+int mask_picture_init(struct mask_picture *picture, const struct mask_points *points, const struct mask_level *level)
 {
 	const float pixel = PIXEL * level->spacing, across = 2 * points->reach / pixel;
 	size_t n;
@@ -115,29 +115,29 @@ int vpicture_init(struct vpicture *picture, const struct vpoints *points, const 
 	picture->row = psr_alloc_array(n, sizeof *picture->row);
 	picture->farthest = psr_alloc_array(n, sizeof *picture->farthest);
 	if (picture->nearest == NULL || picture->row == NULL || picture->farthest == NULL) {
-		vpicture_fini(picture);
+		mask_picture_fini(picture);
 		return PSR_ERR_MEMORY;
 	}
 	return PSR_OK;
 }
 
-void vpicture_fini(struct vpicture *picture)
+void mask_picture_fini(struct mask_picture *picture)
 {
 	psr_free(picture->nearest);
 	psr_free(picture->row);
 	psr_free(picture->farthest);
 }
 
-static void aim(struct vpicture *picture, const struct vpoints *points, const double axis[3], uint32_t seed)
+static void aim(struct mask_picture *picture, const struct mask_points *points, const double axis[3], uint32_t seed)
 {
 	const float(*direction)[3] = psr_direction_table();
-	double frame[3][3];
+	double basis[3][3];
 
-	psr_direction_frame(axis, frame);
+	psr_direction_basis(axis, basis);
 	for (int i = 0; i < 9; i++)
-		picture->frame[i / 3][i % 3] = (float)frame[i / 3][i % 3];
+		picture->basis[i / 3][i % 3] = (float)basis[i / 3][i % 3];
 	for (int i = 0; i < PSR_DIRECTIONS; i++) {
-		const float *n = direction[i], *v = picture->frame[2];
+		const float *n = direction[i], *v = picture->basis[2];
 		float g = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
 
 		picture->faces[i] = (uint8_t)((g >= -BACK_SINE) | (g <= BACK_SINE) << 1);
@@ -150,12 +150,12 @@ static void aim(struct vpicture *picture, const struct vpoints *points, const do
 	}
 }
 
-/* Pixels and heights of samples: a fixed number, so that the compiler does four at a time. Indices of pixels are below
- * 2^24 and thus exact in floats, which every CPU can multiply so. */
-static void project(const struct vpicture *picture, const struct vpoints *points, uint32_t first,
+/* Pixels and heights of a fixed number of samples, so that the compiler does four at a time. Indices of pixels are
+ * below 2^24, exact in floats. */
+static void project(const struct mask_picture *picture, const struct mask_points *points, uint32_t first,
                     int32_t at[restrict CHUNK], float height[restrict CHUNK])
 {
-	const float(*f)[3] = picture->frame;
+	const float(*f)[3] = picture->basis;
 	const float *restrict x = points->x + first, *restrict y = points->y + first, *restrict z = points->z + first;
 	const float ux = f[0][0] * picture->scale, uy = f[0][1] * picture->scale, uz = f[0][2] * picture->scale;
 	const float vx = f[1][0] * picture->scale, vy = f[1][1] * picture->scale, vz = f[1][2] * picture->scale;
@@ -171,14 +171,14 @@ static void project(const struct vpicture *picture, const struct vpoints *points
 	}
 }
 
-_Static_assert(VPICTURE_REACH == 2, "five strides are written out below");
+_Static_assert(MASK_PICTURE_REACH == 2, "five strides are written out below");
 
 static float least(float a, float b)
 {
 	return a < b ? a : b;
 }
 
-/* out[i]: smallest of those within VPICTURE_REACH strides of in[i], where all of them are in 0..n-1. A fixed number at
+/* out[i]: the smallest within MASK_PICTURE_REACH strides of in[i], where all of these are in 0..n-1. A fixed number at
  * a time, as above. */
 static void least_around(float *restrict out, const float *restrict in, int n, int stride)
 {
@@ -196,18 +196,18 @@ static void least_around(float *restrict out, const float *restrict in, int n, i
 	}
 }
 
-/* Numbers of a row are two a pixel: those of an end are two apart. */
-static void spread(const struct vpicture *picture)
+/* A row has two numbers a pixel, one for each end. */
+static void spread(const struct mask_picture *picture)
 {
 	const int n = 2 * picture->side * picture->side;
 
 	least_around(picture->row, picture->nearest, n, 2);
-	for (int i = 0; i < 2 * VPICTURE_REACH; i++)
+	for (int i = 0; i < 2 * MASK_PICTURE_REACH; i++)
 		picture->row[i] = picture->row[n - 1 - i] = -INFINITY;
 	least_around(picture->farthest, picture->row, n, 2 * picture->side);
 }
 
-void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const struct vlevel *level,
+void mask_picture_draw(struct mask_picture *picture, const struct mask_points *points, const struct mask_level *level,
                    const double axis[3], uint32_t seed)
 {
 	aim(picture, points, axis, seed);
@@ -235,7 +235,7 @@ void vpicture_draw(struct vpicture *picture, const struct vpoints *points, const
 	spread(picture);
 }
 
-int vpicture_sees(const struct vpicture *picture, const struct vpoints *points, uint32_t block, int end)
+int mask_picture_sees(const struct mask_picture *picture, const struct mask_points *points, uint32_t block, int end)
 {
 	const struct psr_blocks *b = points->blocks;
 	const uint32_t end_of_block = psr_blocks_attr_first(b, block) + (uint32_t)__builtin_popcountll(b->mask[block]);

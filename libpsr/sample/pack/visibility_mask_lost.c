@@ -4,8 +4,8 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
-#include "render/render.h"
 #include "cone.h"
+#include "render/render.h"
 #include "visibility_mask.h"
 #include "visibility_mask_draw.h"
 
@@ -19,7 +19,7 @@
 #define FAR_AWAY 4.0 /* from any place: outside of the unit sphere */
 
 struct eye {
-	double place[3], frame[3][3], distance;
+	double place[3], basis[3][3], distance;
 	int is_perspective;
 };
 
@@ -30,8 +30,8 @@ struct picture {
 };
 
 struct job {
-	const struct vpoints *points;
-	const struct vlevel *level;
+	const struct mask_points *points;
+	const struct mask_level *level;
 	const struct ray_scene *scene;
 	const uint32_t *block_of; /* of each sample */
 	int first_view;
@@ -61,14 +61,14 @@ static void place_eye(struct eye *eye, int which)
 	eye->is_perspective = which & 1;
 	eye->distance = NEAREST_EYE / (1 - next_random(&state) * (1 - NEAREST_EYE / FURTHEST_EYE));
 	v3d_scale(eye->place, v, eye->distance);
-	psr_direction_frame(v, eye->frame);
+	psr_direction_basis(v, eye->basis);
 }
 
 /* From a sample to the eye. */
 static void to_eye_from(const struct eye *eye, const float p[3], float v[3])
 {
 	for (int k = 0; k < 3; k++)
-		v[k] = (float)(eye->is_perspective ? eye->place[k] - (double)p[k] : eye->frame[2][k]);
+		v[k] = (float)(eye->is_perspective ? eye->place[k] - (double)p[k] : eye->basis[2][k]);
 }
 
 static int cone_says(const struct psr_blocks *blocks, uint32_t block, const struct eye *eye)
@@ -76,11 +76,11 @@ static int cone_says(const struct psr_blocks *blocks, uint32_t block, const stru
 	float place[3];
 
 	for (int i = 0; i < 3; i++)
-		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->frame[2][i]);
+		place[i] = (float)(eye->is_perspective ? eye->place[i] : eye->basis[2][i]);
 	return cone_culls(blocks, block, place, eye->is_perspective);
 }
 
-static int is_away(const struct vpoints *points, uint32_t block, uint32_t k, const float v[3])
+static int is_away(const struct mask_points *points, uint32_t block, uint32_t k, const float v[3])
 {
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(points->blocks->attr[k])];
 	float g = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
@@ -91,7 +91,7 @@ static int is_away(const struct vpoints *points, uint32_t block, uint32_t k, con
 	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
 }
 
-/* A sample a pixel for whatever is nearest. */
+/* Draws the nearest sample of each pixel. */
 static void draw(const struct job *job, const struct eye *eye, struct picture *picture)
 {
 	const struct psr_blocks *b = job->points->blocks;
@@ -117,7 +117,7 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 			to_eye_from(eye, p, v);
 			if (is_away(job->points, block, k, v))
 				continue;
-			m3d_apply(c, (const double(*)[3])eye->frame, q);
+			m3d_apply(c, (const double(*)[3])eye->basis, q);
 			depth = (float)(eye->distance - c[2]);
 			for (int a = 0; a < 2; a++)
 				u[a] = middle + (float)(c[a] * focal * (eye->is_perspective ? nearest / (double)depth : 1));
@@ -132,7 +132,7 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 	}
 }
 
-static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, const struct eye *eye)
+static int is_culled(const struct mask_points *points, uint32_t block, uint32_t k, const struct eye *eye)
 {
 	const struct psr_blocks *b = points->blocks;
 	const float p[3] = { points->x[k], points->y[k], points->z[k] };
@@ -148,8 +148,7 @@ static int is_culled(const struct vpoints *points, uint32_t block, uint32_t k, c
 	return (b->visibility_mask[psr_blocks_visibility(b, block)][triangle >> 6] >> (triangle & 63) & 1) == 0;
 }
 
-/* Whether a ray from the eye, which meets fronts as the eye does, meets nothing before the sample but what is as near
- * to it as its neighbours are. */
+/* Whether a ray from the eye meets nothing before the sample, or something no farther from it than its neighbours. */
 static int is_open(const struct job *job, uint32_t k, const struct eye *eye)
 {
 	const double p[3] = { (double)job->points->x[k], (double)job->points->y[k], (double)job->points->z[k] };
@@ -161,7 +160,7 @@ static int is_open(const struct job *job, uint32_t k, const struct eye *eye)
 		v3d_sub(ray.direction, p, eye->place);
 		distance = v3d_normalize(ray.direction, ray.direction);
 	} else {
-		v3d_scale(ray.direction, eye->frame[2], -1);
+		v3d_scale(ray.direction, eye->basis[2], -1);
 	}
 	v3d_add_scaled(ray.origin, p, -distance, ray.direction);
 	ray_scene_trace(job->scene, &ray, 1, 0, &hit);
@@ -208,7 +207,7 @@ static void draw_views(int thread, void *userdata)
 	psr_free(picture.winner);
 }
 
-/* Batch after batch, and of the last view that is needed only as many pixels as are. */
+/* Batch after batch, and only as many pixels of the last view as are needed. */
 static int look_at(struct job *job, uint64_t n_trials, struct psr_pool *pool, uint64_t *n_lost)
 {
 	uint64_t n_left = n_trials;
@@ -220,7 +219,7 @@ static int look_at(struct job *job, uint64_t n_trials, struct psr_pool *pool, ui
 		atomic_store(&job->next, 0);
 		psr_pool_for(pool, psr_pool_threads(pool), draw_views, job);
 		for (int i = 0; i < BATCH && !atomic_load(&job->failed); i++) {
-			if (job->n_seen[i] > n_left) { /* the views after it are drawn again, too, and not counted */
+			if (job->n_seen[i] > n_left) { /* later views are drawn again, and not counted */
 				job->limit = n_left;
 				atomic_store(&job->next, i);
 				draw_views(0, job);
@@ -240,17 +239,17 @@ static int look_at(struct job *job, uint64_t n_trials, struct psr_pool *pool, ui
 	return PSR_OK;
 }
 
-int visibility_lost(const struct psr_blocks *blocks, const struct ray_scene *scene, uint64_t n_trials,
+int visibility_mask_lost(const struct psr_blocks *blocks, const struct ray_scene *scene, uint64_t n_trials,
                     struct psr_pool *pool, uint64_t *n_lost)
 {
-	struct vpoints points = { 0 };
-	struct vlevel level = { 0 };
+	struct mask_points points = { 0 };
+	struct mask_level level = { 0 };
 	struct job job = { .points = &points, .level = &level, .scene = scene };
 	uint32_t *block_of = psr_alloc_array(blocks->n_samples, sizeof *block_of);
-	int rc = block_of != NULL ? vpoints_init(&points, blocks) : PSR_ERR_MEMORY;
+	int rc = block_of != NULL ? mask_points_init(&points, blocks) : PSR_ERR_MEMORY;
 
 	if (rc == PSR_OK)
-		rc = vlevel_init(&level, &points, 0);
+		rc = mask_level_init(&level, &points, 0);
 	if (rc == PSR_OK) {
 		for (uint32_t b = 0; b < blocks->n_blocks; b++)
 			for (int i = 0; i < __builtin_popcountll(blocks->mask[b]); i++)
@@ -258,8 +257,8 @@ int visibility_lost(const struct psr_blocks *blocks, const struct ray_scene *sce
 		job.block_of = block_of;
 		rc = look_at(&job, n_trials, pool, n_lost);
 	}
-	vpoints_fini(&points);
-	vlevel_fini(&level);
+	mask_points_fini(&points);
+	mask_level_fini(&level);
 	psr_free(block_of);
 	return rc;
 }

@@ -1,23 +1,23 @@
 #include <stdatomic.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "cone.h"
-#include "base/direction.h"
 #include "visibility_mask_table.h"
 
 #define TRIANGLE_LEVEL 2
 #define N_CORNERS 66
-#define MOST_MASKS (PSR_RUN_BLOCKS / VISIBILITY_SHARE)
-#define NEAR 8 /* groups after one, of which the best is joined */
+#define MOST_MASKS (PSR_RUN_BLOCKS / VISIBILITY_MASK_SHARE)
+#define NEAR 8 /* groups after one, the best of which joins it */
 #define NONE UINT32_MAX
 
-/* Blocks that share a mask, in the list of those that are left. */
+/* Blocks that share a mask, in a list of such groups. */
 struct group {
-	uint64_t seen[2];                  /* the mask: directions from which one of them is seen */
-	uint64_t hidden[2];                /* those from which culling one of them depends on its mask */
-	uint32_t lost[PSR_MASK_TRIANGLES]; /* samples of these, for each direction that is hidden and not seen */
+	uint64_t seen[2];                  /* the mask: directions from which one of the blocks is seen */
+	uint64_t hidden[2];                /* directions from which culling a block depends on its mask */
+	uint32_t lost[PSR_MASK_TRIANGLES]; /* samples of hidden blocks, for each direction that is not seen */
 	uint32_t previous, next;
-	uint32_t other, cost; /* the best of the next ones to join, and how many samples times directions it loses */
+	uint32_t other, cost; /* the best of the next groups to join; its loss in samples times directions */
 };
 
 struct corners {
@@ -56,8 +56,8 @@ static void make_corners(struct corners *corners)
 	}
 }
 
-/* Directions that a block's mask culls, and its cone does not: this culls a cap, and so all of a triangle of which it
- * culls the corners. */
+/* Directions from which a block's mask culls it, and its cone does not. A cone culls a cap of directions, so all of a
+ * triangle whose corners it culls. */
 static void find_hidden(const struct job *job, uint32_t block, uint64_t hidden[2])
 {
 	const struct corners *corners = &job->corners;
@@ -97,14 +97,14 @@ static void find_other(struct group *group, uint32_t g)
 	}
 }
 
-/* Of a group, or of none, and of those before it that may want it or what is after it. */
+/* Of a group, if there is one, and of the NEAR ones before it. */
 static void find_others_before(struct group *group, uint32_t g)
 {
 	for (int i = 0; i <= NEAR && g != NONE; i++, g = group[g].previous)
 		find_other(group, g);
 }
 
-/* With the other one, which is gone then. */
+/* Joins its other one to a group. */
 static void join(struct group *group, uint32_t to)
 {
 	uint32_t from = group[to].other, before = group[from].previous;
@@ -122,7 +122,7 @@ static void join(struct group *group, uint32_t to)
 	find_others_before(group, to);
 }
 
-/* Joins what costs least until `most` groups are left; group 0 always is. */
+/* Joins at the least cost until `most` groups are left; group 0 stays. */
 static void join_groups(struct group *group, uint32_t n, uint32_t most)
 {
 	for (uint32_t g = n; g-- > 0;)
@@ -152,7 +152,7 @@ static void make_groups(const struct job *job, uint32_t first, uint32_t n, struc
 	}
 }
 
-/* The mask that has all bits of the block's own, and culls it from the most directions. */
+/* The mask with all bits of the block's own that culls it from the most directions. */
 static uint8_t best_mask(const uint64_t (*table)[2], uint32_t n, const uint64_t own[2], const uint64_t hidden[2])
 {
 	int least = PSR_MASK_TRIANGLES + 1;
@@ -169,7 +169,7 @@ static uint8_t best_mask(const uint64_t (*table)[2], uint32_t n, const uint64_t 
 	return best;
 }
 
-/* Each block takes the best of the n masks, which then lose what nobody needs; those that nobody takes are dropped. */
+/* Each block takes the best of the n masks. Masks then lose the bits that no block needs, and unused ones go. */
 static uint32_t take_masks(const struct job *job, uint32_t first, uint32_t n_blocks, const uint64_t (*hidden)[2],
                            uint64_t (*table)[2], uint32_t n)
 {
@@ -208,7 +208,7 @@ static void share_run(int run, void *userdata)
 
 	if (group != NULL && hidden != NULL) {
 		make_groups(job, first, n, group, hidden);
-		join_groups(group, n, (n + VISIBILITY_SHARE - 1) / VISIBILITY_SHARE);
+		join_groups(group, n, (n + VISIBILITY_MASK_SHARE - 1) / VISIBILITY_MASK_SHARE);
 		for (uint32_t g = 0; g != NONE; g = group[g].next)
 			memcpy(table[n_masks++], group[g].seen, sizeof *table);
 		job->n_masks[run] = take_masks(job, first, n, (const uint64_t(*)[2])hidden, table, n_masks);
@@ -219,8 +219,8 @@ static void share_run(int run, void *userdata)
 	psr_free(hidden);
 }
 
-int visibility_table_make(struct visibility_table *table, const struct psr_blocks *blocks, const uint64_t (*mask)[2],
-                          struct psr_run *run, struct psr_pool *pool)
+int visibility_mask_table_make(struct visibility_mask_table *table, const struct psr_blocks *blocks,
+                               const uint64_t (*mask)[2], struct psr_run *run, struct psr_pool *pool)
 {
 	uint32_t n_runs = psr_blocks_runs(blocks), n_masks = 0;
 	struct job job = { .blocks = blocks, .mask = mask };
@@ -228,7 +228,7 @@ int visibility_table_make(struct visibility_table *table, const struct psr_block
 	job.table = psr_alloc_array((size_t)n_runs * MOST_MASKS, sizeof *job.table);
 	job.n_masks = psr_alloc_array(n_runs, sizeof *job.n_masks);
 	job.index = psr_alloc_array(blocks->n_blocks, 1);
-	*table = (struct visibility_table){ .mask = job.table, .index = job.index };
+	*table = (struct visibility_mask_table){ .mask = job.table, .index = job.index };
 	make_corners(&job.corners);
 	if (job.table != NULL && job.n_masks != NULL && job.index != NULL)
 		psr_pool_for(pool, (int)n_runs, share_run, &job);
@@ -243,13 +243,13 @@ int visibility_table_make(struct visibility_table *table, const struct psr_block
 	psr_free(job.n_masks);
 	if (!atomic_load(&job.failed))
 		return PSR_OK;
-	visibility_table_fini(table);
+	visibility_mask_table_fini(table);
 	return PSR_ERR_MEMORY;
 }
 
-void visibility_table_fini(struct visibility_table *table)
+void visibility_mask_table_fini(struct visibility_mask_table *table)
 {
 	psr_free(table->mask);
 	psr_free(table->index);
-	*table = (struct visibility_table){ 0 };
+	*table = (struct visibility_mask_table){ 0 };
 }

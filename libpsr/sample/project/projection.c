@@ -1,11 +1,11 @@
 #include <math.h>
+#include "base/direction.h"
 #include "base/maths.h"
 #include "base/vec.h"
 #include "projection.h"
-#include "base/direction.h"
 
-/* Turned a little, about an axis of no meaning: built things have normals along the axes and halfway between, which
- * would be as far from one direction as from the next. */
+/* Turned a little: built things have normals along the axes and halfway between, as far from one direction as from the
+ * next. */
 static const double TURN[3][3] = {
 	{ 0.9744706, -0.1910647, 0.1184155 },
 	{ 0.2079117, 0.9657151, -0.1552459 },
@@ -42,7 +42,7 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 	double direction[N_PROJECTIONS][3], turn[3][3], sine, cosine;
 	int n = list_directions(direction);
 
-	/* The rows above are rounded: made orthonormal again. */
+	/* The rows of TURN are rounded: this makes them orthonormal. */
 	v3d_normalize(turn[0], TURN[0]);
 	v3d_cross(turn[2], turn[0], TURN[1]);
 	v3d_normalize(turn[2], turn[2]);
@@ -53,7 +53,7 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 
 		m3d_apply(turned, (const double(*)[3])turn, direction[i]);
 		v3d_normalize(turned, turned);
-		psr_direction_frame(turned, basis);
+		psr_direction_basis(turned, basis);
 		for (int k = 0; k < 9; k++)
 			list[i].axis[k / 3][k % 3] = (float)basis[k / 3][k % 3];
 		list[i].spacing = (float)(ds * cosine);

@@ -10,7 +10,7 @@
 
 #define N_PROJECTIONS 32
 
-/* Number i ^ 1 looks at the other side of the same lattice as number i: its axes are -x, y, -z.
+/* Number i ^ 1 sees the lattice of number i from behind: its axes are -x, y, -z.
  *
  * ds: a pixel at the target resolution, inner units. Axes and the spacing ds * cos(tolerance) ([G] 4.4) are rounded
  * to the floats that models hold. */

@@ -1,11 +1,11 @@
-/* What all steps of a level look at and none changes. */
+/* The context that all steps of a level read, and none changes. */
 #ifndef PSR_SAMPLE_PROJECT_SAMPLING_H
 #define PSR_SAMPLE_PROJECT_SAMPLING_H
 
 #include <stdint.h>
-#include "psr/mesh.h"
 #include "base/pool.h"
 #include "projection.h"
+#include "psr/mesh.h"
 #include "ray/ray.h"
 #include "surface/surface.h"
 #include "surface/texture.h"
@@ -37,7 +37,7 @@ static inline int sampling_is_thin(const struct sampling *sampling, uint32_t sur
 	return sampling->thin != NULL && sampling->thin[surface & ~SURFACE_BACK] != 0;
 }
 
-/* Whether a sample may count for both sides: such ones go into patches of their own. */
+/* Whether samples of a surface may count for both sides: these have patches of their own. */
 static inline int sampling_is_sheet(const struct sampling *sampling, uint32_t surface)
 {
 	return sampling_is_thin(sampling, surface)

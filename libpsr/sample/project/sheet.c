@@ -1,8 +1,8 @@
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include "base/vec.h"
+#include "base/array.h"
 #include "base/cell.h"
+#include "base/vec.h"
 #include "sheet.h"
 
 #define SIDE PSR_BLOCK_SIDE
@@ -75,7 +75,7 @@ static const uint32_t *head_at(const struct sheets *sheets, struct lattice_point
 	return head_of(sheets, at.col >> 3, at.row >> 3);
 }
 
-/* Of patch p, for a sample, if it is nearer than what was found before. */
+/* Takes the sample of patch p if it is nearer than the one found before. */
 static inline void look_at(const struct sheets *sheets, uint32_t p, float z, float *reach, struct sheet_ref *found)
 {
 	float d;
@@ -123,23 +123,6 @@ void sheets_find_corners(const struct sheets *sheets, const struct lattice_point
 			look_at(sheets, p, z, &left[k], &found[k]);
 }
 
-static int grow_sheets(struct sheets *sheets)
-{
-	uint32_t capacity = sheets->capacity + sheets->capacity / 4 + 16;
-	struct patch *patch = realloc(sheets->patch, capacity * sizeof *patch);
-	void *sample;
-
-	if (patch == NULL)
-		return PSR_ERR_MEMORY;
-	sheets->patch = patch;
-	sample = realloc(sheets->sample, capacity * sizeof *sheets->sample);
-	if (sample == NULL)
-		return PSR_ERR_MEMORY;
-	sheets->sample = sample;
-	sheets->capacity = capacity;
-	return PSR_OK;
-}
-
 struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided)
 {
 	const uint32_t *head = head_at(sheets, at);
@@ -163,9 +146,9 @@ int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t
 	if (head_at(sheets, at) == NULL)
 		return PSR_OK;
 	if (out->patch == SHEET_NONE) {
-		uint32_t p = sheets->n_patches;
+		uint32_t p = sheets->n_patches, capacity = sheets->capacity;
 
-		if (p == sheets->capacity && grow_sheets(sheets) != PSR_OK)
+		if (!ARRAY_ROOM(sheets->patch, p, capacity) || !ARRAY_ROOM(sheets->sample, p, sheets->capacity))
 			return PSR_ERR_MEMORY;
 		sheets->n_patches++;
 		memset(&sheets->patch[p], 0, sizeof sheets->patch[p]);

@@ -1,26 +1,27 @@
 /* One orthographic projection of the object, sampled through all of its layers on the equilateral lattice
  * ([G] 4.4, 5.1).
  *
- * [G] keeps the first hit of each ray. Here every hit that faces the projection is kept, so that what a surface hides
- * is sampled from its own best side too. The hits of a lattice block are put together into patches of at most one a
- * lattice point: what may become a block of the model. */
+ * [G] keeps the first hit of each ray. Here every hit that faces the projection is kept, so that hidden
+ * surfaces are sampled from their own best sides, too. The hits of a lattice block form patches of at most one hit a
+ * lattice point: each may become a block of the model. */
 #ifndef PSR_SAMPLE_PROJECT_SHEET_H
 #define PSR_SAMPLE_PROJECT_SHEET_H
 
 #include <stdint.h>
-#include "psr/model.h"
+#include "model/blocks.h"
 #include "ray/ray.h"
 #include "sampling.h"
 
 #define SHEET_NONE UINT32_MAX
 
-/* Cosine of the steepest angle at which hits are kept: 72 degrees. */
+/* Cosine of the steepest angle of hits: 72 degrees. */
 #define SHEET_LEAST_COSINE 0.3f
 
-/* Neighbours on the lattice whose depths differ by more steps than this are not taken for one surface. */
+/* Neighbours on the lattice whose depths differ by more steps are two surfaces. */
 #define SHEET_STEPS 2.5f
 
-/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide. */
+/* Sheets of a lattice block share a patch while it is not deeper than this many steps: thrice as deep as it is wide.
+ * */
 #define SHEET_PATCH_STEPS 24
 
 struct sheet_sample {
@@ -36,7 +37,7 @@ struct patch {
 	uint64_t mask;      /* hits; */
 	uint64_t kept;      /* those that the model keeps: sheets_keep(); */
 	uint64_t first;     /* and the first of their rays but for sheer ones: nothing hides them */
-	uint16_t n_wanted;  /* places that it could cover, and nothing did: sheets_want() */
+	uint16_t n_wanted;  /* uncovered places that it could cover: sheets_want() */
 	uint8_t two_sided;  /* sampling_is_sheet(), the same of all hits */
 };
 
@@ -58,8 +59,8 @@ struct sheets {
 	uint64_t n_rays, n_hits; /* n_rays: 0 of what is behind others */
 };
 
-/* projection->spacing is that of the lattice to trace. behind: the projection from the other side, of axes -x, y, -z
- * and the same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
+/* Traces a lattice of projection->spacing. behind: gets the projection from the other side, of axes -x, y, -z and the
+ * same rays; or NULL. The same bytes whatever the number of threads. MEMORY. */
 int sheets_trace(struct sheets *sheets, struct sheets *behind, const struct sampling *sampling,
                  const struct psr_projection *projection);
 void sheets_fini(struct sheets *sheets);
@@ -73,7 +74,7 @@ static inline void sheets_point(const struct sheets *sheets, int row, int col, d
 	*y = row * 0.86602540378443864676 * spacing;
 }
 
-/* The ray that looks for samples at x, y; z = SHEET_START - t. */
+/* The ray through x, y; z = SHEET_START - t. */
 #define SHEET_START 2.0
 void sheets_ray(const struct psr_projection *projection, double x, double y, struct ray *ray);
 
@@ -88,7 +89,7 @@ struct sheet_ref {
 	uint32_t sample;
 };
 
-/* The hit at a lattice point that is nearest in depth to z, and within reach of it. */
+/* The hit at a lattice point nearest in depth to z, within reach. */
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
 
 /* The same for the corners of a lattice triangle. */
@@ -99,7 +100,7 @@ void sheets_find_corners(const struct sheets *sheets, const struct lattice_point
  * none. */
 struct sheet_ref sheets_room(const struct sheets *sheets, struct lattice_point at, float z, int two_sided);
 
-/* A sample that no ray found, put at a lattice point: into a patch with room, or into a new one. MEMORY. */
+/* Adds a hit that no ray found at a lattice point, to a patch with room or a new one. MEMORY. */
 int sheets_add(struct sheets *sheets, struct lattice_point at, float z, uint32_t surface, int two_sided,
                struct sheet_ref *out);
 

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "psr/error.h"
 #include "sheet_patch.h"
 
@@ -15,7 +16,7 @@ static int root_of(struct block_hits *h, int i)
 	return i;
 }
 
-/* Joins the hits of two neighbouring lattice points that may be one surface: each with the nearest in depth. */
+/* Joins each hit of a lattice point with its neighbour's nearest in depth, if they may be one surface. */
 static void join(struct block_hits *h, int a, int b, float reach)
 {
 	for (int i = h->first_of[a]; i < h->first_of[a + 1]; i++) {
@@ -57,21 +58,11 @@ static void connect(struct block_hits *h, float reach)
 	}
 }
 
-static int grow_row(struct patch_row *row)
+static int has_room(struct patch_row *row)
 {
-	uint32_t capacity = row->capacity != 0 ? 2 * row->capacity : 32;
-	struct patch *patch = realloc(row->patch, capacity * sizeof *patch);
-	void *sample;
+	uint32_t capacity = row->capacity;
 
-	if (patch != NULL)
-		row->patch = patch;
-	sample = realloc(row->sample, capacity * sizeof *row->sample);
-	if (sample != NULL)
-		row->sample = sample;
-	if (patch == NULL || sample == NULL)
-		return PSR_ERR_MEMORY;
-	row->capacity = capacity;
-	return PSR_OK;
+	return ARRAY_ROOM(row->patch, row->n, capacity) && ARRAY_ROOM(row->sample, row->n, row->capacity);
 }
 
 struct sheet {
@@ -110,8 +101,7 @@ static int compare_sheets(const void *a, const void *b)
 	return x->low != y->low ? (x->low < y->low ? -1 : 1) : (int)x->root - (int)y->root;
 }
 
-/* A sheet may pass over a lattice point more than once (a spiral): hits that find their place taken start a patch of
- * their own. */
+/* A sheet may pass over a lattice point twice (a spiral): such hits start a patch of their own. */
 static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit *hit, uint32_t wanted)
 {
 	uint64_t bit = UINT64_C(1) << hit->at;
@@ -122,7 +112,7 @@ static int add_hit(struct patch_row *row, uint32_t first, const struct block_hit
 		     p++)
 			;
 	if (p == row->n) {
-		if (row->n == row->capacity && grow_row(row) != PSR_OK)
+		if (!has_room(row))
 			return PSR_ERR_MEMORY;
 		row->patch[p] = row->patch[wanted];
 		row->patch[p].mask = row->patch[p].first = 0;
@@ -149,7 +139,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 	for (int i = 0; i < n_sheets; i++) {
 		uint32_t p = first;
 
-		/* The first patch with room for all of it that stays shallow. */
+		/* The first patch with room for the whole sheet that stays shallow. */
 		for (; p < row->n; p++) {
 			float top = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
 			float bottom = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
@@ -159,7 +149,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 				break;
 		}
 		if (p == row->n) {
-			if (row->n == row->capacity && grow_row(row) != PSR_OK)
+			if (!has_room(row))
 				return PSR_ERR_MEMORY;
 			memset(&row->patch[p], 0, sizeof row->patch[p]);
 			memset(row->sample[p], 0, sizeof row->sample[p]);
@@ -172,7 +162,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 		}
 		low[p - first] = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];
 		high[p - first] = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
-		/* Reserve the places, so that no later sheet takes them; the hits themselves follow. */
+		/* Reserves the places; the hits follow. */
 		row->patch[p].mask |= sheet[i].mask;
 		patch_of[sheet[i].root] = (uint16_t)(p - first);
 	}

@@ -29,8 +29,8 @@ struct patch_row {
 	int failed;
 };
 
-/* Puts the hits of a block into patches at the end of a row: those of a connected sheet together, shallow sheets with
- * each other. h->hit[].parent is of no value afterwards. step: the lattice's. MEMORY. */
+/* Puts the hits of a block into patches at the end of a row: a connected sheet into one patch, shallow sheets
+ * together. Destroys h->hit[].parent. step: the lattice's. MEMORY. */
 int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int block_row, float step);
 
 #endif

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "base/mem.h"
 #include "base/vec.h"
 #include "sheet_patch.h"
@@ -8,7 +9,7 @@
 #define SIDE PSR_BLOCK_SIDE
 #define BATCH 64
 
-/* What the rays through a row of lattice blocks meet. */
+/* The hits of the rays through a row of lattice blocks. */
 struct strip {
 	int n_columns;
 	uint64_t n_rays;
@@ -47,15 +48,8 @@ static int add_hits(const struct job *job, struct strip *strip, const struct ray
 	const float *z_axis = job->sheets[0]->projection.axis[2];
 	int is_first = 1;
 
-	if (strip->n + (size_t)n_hits > strip->capacity) {
-		size_t capacity = 2 * strip->capacity + 4096;
-		struct strip_hit *grown = realloc(strip->hit, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		strip->hit = grown;
-		strip->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(strip->hit, strip->n + (size_t)n_hits, strip->capacity))
+		return PSR_ERR_MEMORY;
 	for (int k = 0; k < n_hits; k++) {
 		uint32_t prim = ray_hit[k].prim;
 		const int was_first = is_first;
@@ -77,7 +71,7 @@ struct batch {
 	int n_hits[2][BATCH];
 };
 
-/* Rays whose ends are in the unit sphere's disc: columns first <= c < end of a row. */
+/* Columns first <= c < end of a row, within the unit sphere's disc. */
 static int trace_columns(const struct job *job, struct strip strip[2], int row, int first, int end)
 {
 	static _Thread_local struct batch batch;
@@ -123,7 +117,7 @@ static int trace_strip(const struct job *job, struct strip strip[2], int block_r
 	return rc;
 }
 
-/* The patches of a lattice block: of the rays' own projection, or of the one behind. */
+/* The patches of a lattice block, of the rays' projection or the one behind. */
 static int make_block(const struct strip *strip, struct patch_row *row, int col, int block_row, int is_behind,
                       float step)
 {
@@ -209,7 +203,7 @@ static int start(struct sheets *sheets, struct patch_row **row, const struct psr
 
 	memset(sheets, 0, sizeof *sheets);
 	sheets->projection = *projection;
-	/* Rows are the narrower ones, so their reach does for the columns too; half a step of shift is within the one. */
+	/* Rows are narrower than columns, so their reach is enough for both; the one more holds the half step of shift. */
 	sheets->reach = (int)ceil(1 / row_height) + 1;
 	*row = calloc((size_t)(2 * sheets->reach), sizeof **row);
 	return *row != NULL ? PSR_OK : PSR_ERR_MEMORY;

@@ -3,8 +3,8 @@
 #include "base/vec.h"
 #include "sampling.h"
 
-/* Pixels between two sides of what one sample stands for. By the rim of a thicker plate, views along it see one side
- * beyond the samples of the other: of the kittyhawk, 1 in 5,000 pixels at 0.75. */
+/* Pixels between two sides that one sample stands for. Views along a thicker plate's rim see one side beyond the
+ * samples of the other: at 0.75 in 1 of 5,000 pixels of the kittyhawk. */
 #define THICKNESS 0.6
 
 #define NARROW 0.5 /* pixels */
@@ -14,14 +14,14 @@
 #define CHUNK 1024
 #define BATCH 64
 
-/* Where a triangle is looked through: its middle, and near its corners. */
+/* Places of a triangle that are tested: its middle, and near its corners. */
 static const double PLACE[4][3] = { { 1.0 / 3, 1.0 / 3, 1.0 / 3 },
 	                                { 0.8, 0.1, 0.1 },
 	                                { 0.1, 0.8, 0.1 },
 	                                { 0.1, 0.1, 0.8 } };
 #define N_PLACES 4
 
-/* From the far side of what is just THICKNESS thick, outwards. */
+/* A ray outwards from THICKNESS behind a place. */
 static void aim(const struct sampling *sampling, uint32_t prim, const double place[3], struct ray *ray)
 {
 	const float *n = ray_scene_normal(sampling->scene, prim);
@@ -69,7 +69,8 @@ struct part {
 	uint8_t is_behind[BATCH]; /* what is sampled, wherever it was looked */
 };
 
-/* Looks at one place of each, and on behind what is of another look, as leaves grow through each other. */
+/* Keeps the primitives that are thin at one place. Rays go on behind faces of another look: leaves grow through each
+ * other. */
 static void keep_thin(const struct sampling *sampling, struct part *part, const double place[3])
 {
 	const double length = THICKNESS * sampling->ds;

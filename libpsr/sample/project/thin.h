@@ -1,5 +1,5 @@
-/* Which primitives are thin: at most 0.6 pixels behind all of them is another face of the same plain material, as of
- * needles and leaves. A sample there stands for both sides. */
+/* Thin primitives, as of needles and leaves: another face of the same plain material is at most 0.6 pixels behind
+ * them. A sample there stands for both sides. */
 #ifndef PSR_SAMPLE_PROJECT_THIN_H
 #define PSR_SAMPLE_PROJECT_THIN_H
 
@@ -14,8 +14,8 @@ enum thin {
 
 struct sampling;
 
-/* Fills thin[], enum thin by primitive, 0 where a primitive is not thin. finer: that of the next finer level, where
- * what is thin is thin here; or NULL. */
+/* Fills thin[] by primitive with enum thin, or 0. finer: the next finer level's, whose thin primitives are thin here;
+ * or NULL. */
 void thin_mark(uint8_t *thin, const struct sampling *sampling, const uint8_t *finer);
 
 #endif

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/array.h"
 #include "base/cell.h"
 #include "base/table.h"
 #include "base/vec.h"
@@ -9,20 +10,13 @@
 #include "sample/own/kept.h"
 
 #define MOST_MOVE 0.4 /* pixels */
-#define MOST_GAIN 64  /* places that a candidate covers; more count as so many */
+#define MOST_GAIN 64  /* places that a candidate covers, at most */
 #define NOBODY UINT32_MAX
 
 int thin_candidates_add(struct thin_candidates *list, const struct thin_candidate *candidate)
 {
-	if (list->n == list->capacity) {
-		uint32_t capacity = list->capacity != 0 ? 2 * list->capacity : 4096;
-		struct thin_candidate *grown = realloc(list->candidate, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		list->candidate = grown;
-		list->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(list->candidate, list->n, list->capacity))
+		return PSR_ERR_MEMORY;
 	list->candidate[list->n++] = *candidate;
 	return PSR_OK;
 }
@@ -61,7 +55,7 @@ int thin_candidates_move(struct thin_candidates *list, const struct sheets *shee
 	return thin_candidates_add(list, &candidate);
 }
 
-/* Places by cells twice as wide as the radius: those of a cell stand together, as each is looked at by many. */
+/* Places sorted by cells twice as wide as the radius. */
 struct near_places {
 	double radius;
 	size_t size;     /* slots for cells, a power of two */
@@ -108,22 +102,15 @@ static int sort_places(struct near_places *near, const struct place *place, size
 	return PSR_OK;
 }
 
-/* Which places candidates cover, one after the other. */
+/* The places that each candidate covers, one candidate after the other. */
 struct covers {
 	uint32_t *place, n, capacity;
 };
 
 static int add_cover(struct covers *covers, uint32_t place)
 {
-	if (covers->n == covers->capacity) {
-		uint32_t capacity = covers->capacity != 0 ? 2 * covers->capacity : 65536;
-		uint32_t *grown = realloc(covers->place, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		covers->place = grown;
-		covers->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(covers->place, covers->n, covers->capacity))
+		return PSR_ERR_MEMORY;
 	covers->place[covers->n++] = place;
 	return PSR_OK;
 }
@@ -137,7 +124,7 @@ static int look_into(const struct near_places *near, size_t slot, const float po
 	return PSR_OK;
 }
 
-/* In the eight cells around. Two of them may have one slot, which is looked into once. */
+/* In the eight cells around, some of which may share a slot. */
 static int find_covered(const struct near_places *near, struct thin_candidate *candidate, struct covers *covers)
 {
 	size_t slot[8];
@@ -168,7 +155,7 @@ static unsigned gain_of(const struct thin_candidate *candidate, const struct cov
 	return gain < MOST_GAIN ? gain : MOST_GAIN;
 }
 
-/* Lists by gain, which is looked up again when its turn comes: it only falls. Chosen ones get `first` NOBODY. */
+/* Lists by gain, which only falls: it is counted again when its turn comes. Chosen candidates get `first` NOBODY. */
 static void choose(struct thin_candidates *list, const struct covers *covers, uint8_t *is_covered, uint32_t *next)
 {
 	uint32_t head[MOST_GAIN + 1], after;

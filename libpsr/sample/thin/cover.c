@@ -7,15 +7,15 @@
 #include "cover.h"
 #include "psr/error.h"
 
-/* The finest level has to be adequate, and between places that are tested there are others. */
+/* The finest level has to be adequate between tested places, too. */
 #define FINEST_NEAR (0.85 * KEPT_NEAR)
 
-/* Of a cube: what is in it is covered by hits in it. */
+/* Of a cube, whose places are covered by hits in it. */
 #define SIDE_PIXELS 32
 #define LEAST_SIDE 0.125 /* of the unit sphere's radius */
 
-/* What is narrow is sampled in three projections, any two of which are 63 degrees apart (lines through corners of the
- * icosahedron), so that blocks are full: a needle has too few hits in any. */
+/* Narrow primitives are sampled in three projections, any two 63 degrees apart (lines through corners of the
+ * icosahedron), so that blocks are full: a needle has few hits in any. */
 static const unsigned NARROW_PROJECTION[] = { 0, 4, 8 };
 #define N_NARROW (sizeof NARROW_PROJECTION / sizeof *NARROW_PROJECTION)
 
@@ -34,7 +34,7 @@ struct job {
 	uint32_t n_cubes;
 	struct cube *cube;
 	struct thin_candidate *hit; /* by cube, then by projection */
-	uint32_t *count;            /* of hits, by projection and cube; then where they go */
+	uint32_t *count;            /* of hits, by projection and cube; then their places */
 };
 
 static uint32_t cube_of(const struct job *job, const float p[3])
@@ -50,7 +50,7 @@ static uint32_t cube_of(const struct job *job, const float p[3])
 	return cube;
 }
 
-/* A leaf keeps what faces it, and gets what its rim lacks from hits of all around. */
+/* A leaf keeps the hits that it owns, and covers its rim by hits from all around. */
 static int is_leaf(const struct keeper *keeper, uint32_t surface)
 {
 	const uint8_t *thin = keeper->sampling->thin;
@@ -83,7 +83,7 @@ static void each_hit(struct job *job, unsigned projection, int is_counting)
 	}
 }
 
-/* Of projections from both ends of a line the first one's. */
+/* Of each pair of opposite projections, the first. */
 static void count_hits(int line, void *job)
 {
 	each_hit(job, 2 * (unsigned)line, 1);
@@ -146,8 +146,7 @@ static uint32_t count_chosen(const struct job *job)
 	return n;
 }
 
-/* Hits first: what is moved may take the place of one that is not kept. All are marked before any is made, by all
- * threads. */
+/* Hits first: a moved sample may take the place of a hit that is not kept. Threads then make all marked samples. */
 static int keep_chosen(struct job *job)
 {
 	const struct keeper *keeper = job->keeper;

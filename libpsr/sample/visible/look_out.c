@@ -1,23 +1,23 @@
 #include <math.h>
 #include <stdlib.h>
+#include "base/direction.h"
 #include "base/mem.h"
 #include "base/random.h"
 #include "base/vec.h"
 #include "look_out.h"
 #include "places.h"
-#include "base/direction.h"
 #include "psr/error.h"
 #include "ray/area.h"
 
-#define PLACE_AREA 2.25 /* square pixels: a place for each cell of what was seen */
+#define PLACE_AREA 2.25 /* square pixels: a place for each cell of the visible set */
 #define BATCH 64  /* rays from a side of each place, */
-#define AGAIN 3   /* and so many times as many near what they found: what fewer miss shows in one of several hundred */
-#define AROUND 2  /* times that cells are made twice as wide, to tell what is near that: 6 pixels */
-#define NEAR 3    /* times that cells are made twice as wide, to tell what is near: 12 pixels */
+#define AGAIN 3   /* times as many near places that they found: a few hundred rays find most */
+#define AROUND 2  /* doublings of a cell, to 6 pixels, that tell what is near that */
+#define NEAR 3    /* doublings of a cell, to 12 pixels, that tell what is near */
 #define CHUNK 4096
 
 struct chunk {
-	struct places open, shut; /* from which rays got outside, and from which none did so far */
+	struct places open, shut; /* a ray got outside; none did so far */
 	int failed;
 };
 
@@ -33,8 +33,8 @@ struct job {
 	struct chunk *chunk;
 };
 
-/* Towards where a side of a surface shows, as often as it looks large from there: a point of the unit sphere around n,
- * added to n. One in each of BATCH parts of the sphere, in an order in which the next is near. */
+/* A direction from a surface, as likely as the surface looks large from there: n plus a point of the unit sphere, one
+ * in each of BATCH parts, so that rays in a row are near to each other. */
 static void draw_view(uint64_t *state, int part, const float n[3], double view[3])
 {
 	const unsigned n_drawn = PSR_DIRECTIONS / BATCH, drawn = (unsigned)(random_next(state) % n_drawn);
@@ -106,7 +106,7 @@ static void look_at_chunk(int i, void *userdata)
 	}
 }
 
-/* What is open shows from all of its neighborhood: there it is looked more closely. */
+/* Tries shut places near open ones with more rays. */
 static void look_again(int i, void *userdata)
 {
 	const struct job *job = userdata;
@@ -135,7 +135,7 @@ static int add_open(struct visible_set *set, const struct chunk *chunk, int n_ch
 	return rc;
 }
 
-/* Cells made twice as wide so many times. visible_set_fini() either way. */
+/* Doubles cells so many times. visible_set_fini() either way. */
 static int widen(struct visible_set *wide, const struct visible_set *set, int times)
 {
 	int rc = visible_set_coarsen(wide, set);

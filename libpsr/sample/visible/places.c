@@ -1,19 +1,12 @@
-#include <stdlib.h>
+#include "base/array.h"
 #include "base/cell.h"
 #include "places.h"
 #include "psr/error.h"
 
 int places_add(struct places *places, const struct place *place)
 {
-	if (places->n == places->capacity) {
-		size_t capacity = places->capacity != 0 ? 2 * places->capacity : 64;
-		struct place *grown = realloc(places->place, capacity * sizeof *grown);
-
-		if (grown == NULL)
-			return PSR_ERR_MEMORY;
-		places->place = grown;
-		places->capacity = capacity;
-	}
+	if (!ARRAY_ROOM(places->place, places->n, places->capacity))
+		return PSR_ERR_MEMORY;
 	places->place[places->n++] = *place;
 	return PSR_OK;
 }

@@ -17,8 +17,8 @@ struct places {
 
 int places_add(struct places *places, const struct place *place); /* MEMORY */
 
-/* A ray to a place from outside of the object: one-sided faces let rays through that come from behind them. Whatever is
- * met before PLACE_AWAY - 0.01 pixels hides the place. view: unit, towards the viewer. */
+/* A ray to a place from outside of the object: one-sided faces let rays through that come from behind them. Whatever
+ * is met before PLACE_AWAY - 0.01 pixels hides the place. view: unit, towards the viewer. */
 #define PLACE_AWAY 3
 void place_ray(const struct place *place, const double view[3], struct ray *ray);
 

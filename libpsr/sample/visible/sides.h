@@ -1,4 +1,4 @@
-/* What is known of the two sides of each primitive: whether something of them was seen, or found hidden. */
+/* Whether something of the two sides of each primitive was seen, or found hidden. */
 #ifndef PSR_SAMPLE_VISIBLE_SIDES_H
 #define PSR_SAMPLE_VISIBLE_SIDES_H
 

@@ -4,7 +4,7 @@
 #include "psr/error.h"
 #include "visible_set.h"
 
-#define RECENT TABLE_MARK /* what the views met that are being looked along */
+#define RECENT TABLE_MARK /* met by the views under way */
 #define CELL_PIXELS 1.5
 #define BATCH 64
 #define AT_ONCE 16 /* views */
@@ -30,8 +30,7 @@ static uint64_t coarser_key(uint64_t key)
 
 enum found { NO_ROOM, OLD, NEW };
 
-/* From any thread. What is marked as recent is as good as new. To find that there is no room takes a walk through all
- * of it. */
+/* From any thread. A recent key counts as new. Finding no room takes a walk through the whole table. */
 static enum found insert(const struct visible_set *set, uint64_t key, uint64_t *n_new)
 {
 	const struct table *table = &set->table;
@@ -59,7 +58,7 @@ struct look {
 	const struct ray_scene *scene;
 	double basis[AT_ONCE][3][3], ds;
 	int reach; /* rows and columns on each side of the middle */
-	uint64_t n_new, n_hits, n_unseen; /* cells; rays; those that met what no view of before had seen */
+	uint64_t n_new, n_hits, n_unseen; /* cells; rays; rays that met a place unseen by earlier views */
 	int is_full, is_counting;
 };
 
@@ -103,7 +102,7 @@ static void trace_batch(struct look *look, const struct ray *ray, int n)
 	__atomic_fetch_add(&look->n_hits, n_hits, __ATOMIC_RELAXED);
 }
 
-/* Two rows at once: rays that are traced together are to be near to each other. */
+/* Two rows at once: rays traced together are near to each other. */
 static void look_along_rows(int i, void *userdata)
 {
 	struct look *look = userdata;
@@ -144,16 +143,16 @@ void visible_set_fini(struct visible_set *set)
 	table_fini(&set->table);
 }
 
-/* Views that fill the table are broken off, and looked along again once there is room. */
+/* Views that fill the table break off, and start again with more room. */
 static int look_along(struct look *look, struct visible_set *set, struct psr_pool *pool)
 {
-	/* Far apart ones first, so that the table soon has its size. */
+	/* Far apart views come first, so that the table soon has its size. */
 	for (unsigned k = 0; k < AT_ONCE; k++) {
 		unsigned i = set->n_views + k, view = N_SETS * (i * 211 % SET_SIZE) + i / SET_SIZE % N_SETS;
 		double direction[3];
 
 		psr_direction_center(VIEW_LEVEL, view, direction);
-		psr_direction_frame(direction, look->basis[k]);
+		psr_direction_basis(direction, look->basis[k]);
 	}
 	do {
 		look->n_new = look->n_hits = look->n_unseen = 0;
@@ -220,7 +219,7 @@ int visible_set_has(const struct visible_set *set, const float p[3], const float
 {
 	int first[3];
 
-	/* The eight cells around; and the ways that something of nearly this normal may have been put down as. */
+	/* The eight cells around, and all facings that something of nearly this normal may have. */
 	for (int k = 0; k < 3; k++)
 		first[k] = cell_floor((double)p[k] / set->width - 0.5);
 	for (unsigned axis = 0; axis < 3; axis++) {

@@ -1,25 +1,23 @@
-/* Which parts of the surface can be seen from outside: views from all around mark what they meet, as [G] 6.3 marks
- * blocks. */
+/* The parts of the surface that can be seen from outside: views from all around mark them, as [G] 6.3 marks blocks. */
 #ifndef PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 #define PSR_SAMPLE_VISIBLE_VISIBLE_SET_H
 
-#include "base/table.h"
 #include "base/pool.h"
+#include "base/table.h"
 #include "ray/ray.h"
 
 struct visible_set {
 	double width;       /* of a cell, inner units */
 	unsigned n_views;   /* looked along so far */
-	struct table table; /* keys alone: cells, and how what was met in them faces */
+	struct table table; /* keys alone: a cell and a facing */
 };
 
 int visible_set_init(struct visible_set *set, double ds); /* MEMORY; visible_set_fini() either way */
 void visible_set_fini(struct visible_set *set);
 
-/* Looks from directions all around, others than before until there were 8,192, a ray every fourth pixel: until of what
- * 64 of them met at most one in `enough` places had not been seen by any earlier one, or until there were 512.
- * MEMORY. */
-#define VISIBLE_ENOUGH 4000 /* to begin with: nearly all that is unseen then are rims of what is seen */
+/* Looks from all around, a ray every fourth pixel, along new directions until there were 8,192. Stops after 64 views
+ * that met at most one place in `enough` unseen by earlier ones, or after 512. MEMORY. */
+#define VISIBLE_ENOUGH 4000 /* to begin with: nearly all that is unseen are rims of seen parts */
 #define VISIBLE_LEAST_VIEWS 64
 #define VISIBLE_MOST_VIEWS 512
 int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);

@@ -86,7 +86,7 @@ void greedy_make_views(struct greedy *greedy)
 	for (int i = 0; i < n; i++) {
 		double frame[3][3];
 
-		psr_direction_frame(direction[i], frame);
+		psr_direction_basis(direction[i], frame);
 		for (int k = 0; k < 9; k++)
 			greedy->view[i].projection.axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 		greedy->view[i].projection.spacing = (float)(greedy->ds * cosine);

@@ -286,7 +286,7 @@ int greedy_warp_run(struct greedy_warp *warp, int n_frames, struct greedy_warp_t
 		float eye[3];
 
 		psr_direction_center(6, (unsigned)((uint64_t)f * PSR_DIRECTIONS / (uint64_t)n_frames), out);
-		psr_direction_frame(out, back);
+		psr_direction_basis(out, back);
 		for (int k = 0; k < 3; k++) {
 			frame[0][k] = back[0][k];
 			frame[1][k] = -back[1][k];

@@ -181,7 +181,7 @@ static void frames_are_right_handed_and_orthonormal(void **state)
 			psr_direction_center(3, i, v);
 		else
 			v[(i - 512) % 3] = i < 515 ? 1 : -1;
-		psr_direction_frame(v, frame);
+		psr_direction_basis(v, frame);
 		assert_memory_equal(frame[2], v, sizeof v);
 		for (int a = 0; a < 3; a++) {
 			for (int b = 0; b < 3; b++) {

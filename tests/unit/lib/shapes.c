@@ -150,7 +150,7 @@ struct psr_model *shape_build(const struct shape_options *o, double radius)
 	for (int p = 0; p < PSR_PROJECTIONS; p++) {
 		double dir[3], axis[3][3];
 		psr_direction_center(1, (unsigned)p, dir);
-		psr_direction_frame(dir, axis);
+		psr_direction_basis(dir, axis);
 		for (int i = 0; i < 9; i++)
 			projection[p].axis[i / 3][i % 3] = (float)axis[i / 3][i % 3];
 		projection[p].spacing = (float)dx;

@@ -31,7 +31,7 @@ static void make(struct one *one, double spacing, unsigned level, double n[3], c
 	double frame[3][3], center[3];
 
 	v3d_normalize(n, n);
-	psr_direction_frame(n, frame);
+	psr_direction_basis(n, frame);
 	m3d_apply_transposed(center, (const double(*)[3])frame, p);
 	*one = (struct one){ .projection.spacing = (float)spacing, .x = (int16_t)rint(center[0] * 0x1p14),
 		                 .y = (int16_t)rint(center[1] * 0x1p14), .z = (int16_t)rint(center[2] * 0x1p14) };

@@ -198,7 +198,7 @@ static void count_missing(const struct psr_mesh *mesh, const struct psr_model *m
 	struct ray_scene *scene = NULL;
 	uint8_t *is_met = calloc((size_t)side * side, 1), *is_drawn = calloc((size_t)side * side, 1);
 
-	psr_direction_frame(direction, frame);
+	psr_direction_basis(direction, frame);
 	assert_int_equal(ray_scene_create(&scene, mesh, info->origin, info->scale, NULL), PSR_OK);
 	for (int i = 0; i < side * side; i++) {
 		double x = (i % side + 0.5) * ds - 1, y = (i / side + 0.5) * ds - 1;

@@ -161,7 +161,7 @@ static void a_disc_is_round(void **state)
 	mesh->point_radius[0] = 3;
 	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	inner(&built, mesh->point[0], center);
-	psr_direction_frame(normal, frame);
+	psr_direction_basis(normal, frame);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
 		const struct model_sample *s = &built.sample[i];
 		double radius = 3 / psr_model_info(built.model)->scale;

@@ -78,7 +78,7 @@ static void no_axis_has_a_smaller_cap(void **state)
 		for (int k = 0; k < 3; k++)
 			z[k] = (double)axis[k];
 		v3d_normalize(z, z);
-		psr_direction_frame(z, frame);
+		psr_direction_basis(z, frame);
 		for (int i = -STEPS; i <= STEPS; i++) {
 			for (int j = -STEPS; j <= STEPS; j++) {
 				/* Coarse over the sphere's half, then fine around the axis. */

@@ -146,7 +146,7 @@ static struct psr_mesh *spokes(uint32_t n, double width, int in_plane, uint64_t 
 				for (int k = 0; k < 3; k++)
 					direction[k] = 2 * meshes_random(&seed) - 1;
 			} while (v3d_dot(direction, direction) > 1 || v3d_normalize(direction, direction) < 0.1);
-			psr_direction_frame(direction, frame);
+			psr_direction_basis(direction, frame);
 		}
 		for (int k = 0; k < 3; k++)
 			to[k] = 0.95 * (cos(6.2831853 * i / n) * frame[0][k] + sin(6.2831853 * i / n) * frame[1][k]);

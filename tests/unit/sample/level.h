@@ -65,7 +65,7 @@ static inline struct psr_mesh *meshes_needles(uint32_t n, double width)
 			for (int k = 0; k < 3; k++)
 				direction[k] = 2 * meshes_random(&seed) - 1;
 		} while (v3d_dot(direction, direction) > 1 || v3d_normalize(direction, direction) < 0.1);
-		psr_direction_frame(direction, frame);
+		psr_direction_basis(direction, frame);
 		v3d_scale(mesh->position[4 * i + 3], direction, 0.9);
 		for (uint32_t c = 0; c < 3; c++) {
 			double *foot = mesh->position[4 * i + c], angle = 2.0943951 * c;

@@ -170,7 +170,7 @@ static void wires_have_no_gaps_at_any_level(void **state)
 			for (int k = 0; k < 3; k++)
 				direction[k] = 2 * meshes_random(&seed) - 1;
 		while (v3d_dot(direction, direction) > 1 || v3d_normalize(direction, direction) < 0.1);
-		psr_direction_frame(direction, frame);
+		psr_direction_basis(direction, frame);
 		v3d_scale(along[i], frame[0], 1);
 		for (uint32_t c = 0; c < 4; c++) {
 			v3d_scale(mesh->position[4 * i + c], along[i], c == 1 || c == 2 ? 1 : 0.2);

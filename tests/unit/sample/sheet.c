@@ -23,7 +23,7 @@ static void trace(struct traced *traced, struct psr_mesh *mesh, const double dir
 	double unit[3], frame[3][3];
 
 	v3d_normalize(unit, direction);
-	psr_direction_frame(unit, frame);
+	psr_direction_basis(unit, frame);
 	for (int k = 0; k < 9; k++)
 		projection.axis[k / 3][k % 3] = (float)frame[k / 3][k % 3];
 	traced->mesh = mesh;
@@ -299,7 +299,7 @@ static void samples_are_added_where_there_is_room(void **state)
 
 	(void)state;
 	/* From 0.02 to 0.52 in projection space: block 0, 0 is left with free places. */
-	psr_direction_frame(up, frame);
+	psr_direction_basis(up, frame);
 	for (uint32_t i = 0; i < 4; i++) {
 		double x = 0.27 + 0.25 * mesh->position[i][0], y = 0.27 + 0.25 * mesh->position[i][1];
 

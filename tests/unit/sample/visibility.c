@@ -56,7 +56,7 @@ static uint64_t lost_to_cones(const struct object *o, uint64_t n_trials, struct 
 {
 	uint64_t n = UINT64_MAX;
 
-	assert_int_equal(visibility_lost(&o->blocks, o->scene, n_trials, pool, &n), PSR_OK);
+	assert_int_equal(visibility_mask_lost(&o->blocks, o->scene, n_trials, pool, &n), PSR_OK);
 	return n;
 }
 
@@ -64,17 +64,17 @@ static uint64_t lost_to_cones(const struct object *o, uint64_t n_trials, struct 
 static uint64_t lost(const struct object *o, uint64_t n_trials, struct psr_pool *pool)
 {
 	struct psr_run *run = calloc(psr_blocks_runs(&o->blocks), sizeof *run);
-	struct visibility_table table;
+	struct visibility_mask_table table;
 	struct object stored = *o;
 	uint64_t n;
 
 	memcpy(run, o->blocks.run, psr_blocks_runs(&o->blocks) * sizeof *run);
-	assert_int_equal(visibility_table_make(&table, &o->blocks, (const uint64_t(*)[2])o->mask, run, pool), PSR_OK);
+	assert_int_equal(visibility_mask_table_make(&table, &o->blocks, (const uint64_t(*)[2])o->mask, run, pool), PSR_OK);
 	stored.blocks.run = run;
 	stored.blocks.visibility_index = table.index;
 	stored.blocks.visibility_mask = (const uint64_t(*)[2])table.mask;
 	n = lost_to_cones(&stored, n_trials, pool);
-	visibility_table_fini(&table);
+	visibility_mask_table_fini(&table);
 	free(run);
 	return n;
 }
@@ -108,7 +108,7 @@ static void a_ball_is_seen_from_the_triangles_above_it(void **state)
 	uint32_t n_seen = 0, n_hidden = 0;
 
 	(void)state;
-	assert_int_equal(visibility_masks(&o.blocks, o.pool, o.mask), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, o.pool, o.mask), PSR_OK);
 	for (uint32_t b = 0; b < o.blocks.n_blocks; b++) {
 		float center[3], radius;
 		double c[3], beta; /* of a chord: an angle up to 0.9 */
@@ -143,12 +143,12 @@ static void masks_do_not_depend_on_threads(void **state)
 	uint64_t (*mask)[2] = calloc(o.blocks.n_blocks, sizeof *mask);
 
 	(void)state;
-	assert_int_equal(visibility_masks(&o.blocks, NULL, o.mask), PSR_OK);
-	assert_int_equal(visibility_masks(&o.blocks, o.pool, mask), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, NULL, o.mask), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, o.pool, mask), PSR_OK);
 	assert_memory_equal(mask, o.mask, o.blocks.n_blocks * sizeof *mask);
-	assert_int_equal(visibility_is_full(o.blocks.n_blocks, (const uint64_t(*)[2])mask), 0);
+	assert_int_equal(visibility_mask_is_full(o.blocks.n_blocks, (const uint64_t(*)[2])mask), 0);
 	memset(mask, -1, o.blocks.n_blocks * sizeof *mask);
-	assert_int_equal(visibility_is_full(o.blocks.n_blocks, (const uint64_t(*)[2])mask), 1);
+	assert_int_equal(visibility_mask_is_full(o.blocks.n_blocks, (const uint64_t(*)[2])mask), 1);
 	free(mask);
 	drop_object(&o);
 }
@@ -161,7 +161,7 @@ static void a_ball_loses_nothing_to_its_cones_and_masks(void **state)
 
 	(void)state;
 	assert_non_null(o.blocks.cone_x);
-	assert_int_equal(visibility_masks(&o.blocks, o.pool, o.mask), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, o.pool, o.mask), PSR_OK);
 	assert_int_equal(lost(&o, N_TRIALS, o.pool), 0);
 	drop_object(&o);
 }

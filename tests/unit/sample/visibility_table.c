@@ -19,7 +19,7 @@ struct object {
 	struct psr_blocks blocks;
 	struct psr_run *run;
 	uint64_t (*mask)[2];
-	struct visibility_table table;
+	struct visibility_mask_table table;
 };
 
 static uint64_t next_random(uint64_t *state)
@@ -51,8 +51,8 @@ static void make_object(struct object *o)
 
 static void share(struct object *o, struct psr_pool *pool)
 {
-	visibility_table_fini(&o->table);
-	assert_int_equal(visibility_table_make(&o->table, &o->blocks, (const uint64_t(*)[2])o->mask, o->run, pool), PSR_OK);
+	visibility_mask_table_fini(&o->table);
+	assert_int_equal(visibility_mask_table_make(&o->table, &o->blocks, (const uint64_t(*)[2])o->mask, o->run, pool), PSR_OK);
 	o->blocks.visibility_index = o->table.index;
 	o->blocks.visibility_mask = (const uint64_t(*)[2])o->table.mask;
 }
@@ -67,7 +67,7 @@ static const uint64_t *stored(const struct object *o, uint32_t block)
 
 static void drop_object(struct object *o)
 {
-	visibility_table_fini(&o->table);
+	visibility_mask_table_fini(&o->table);
 	psr_model_unref(o->model);
 	free(o->mask);
 	free(o->run);
@@ -119,20 +119,20 @@ static void few_kinds_of_masks_are_stored_as_they_are(void **state)
 
 static void the_table_does_not_depend_on_threads(void **state)
 {
-	struct visibility_table first;
+	struct visibility_mask_table first;
 	struct psr_pool *pool = NULL;
 	struct object o;
 
 	(void)state;
 	make_object(&o);
 	assert_int_equal(psr_pool_create(&pool, 2, NULL), PSR_OK);
-	assert_int_equal(visibility_masks(&o.blocks, pool, o.mask), PSR_OK);
-	assert_int_equal(visibility_table_make(&first, &o.blocks, (const uint64_t(*)[2])o.mask, o.run, NULL), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, pool, o.mask), PSR_OK);
+	assert_int_equal(visibility_mask_table_make(&first, &o.blocks, (const uint64_t(*)[2])o.mask, o.run, NULL), PSR_OK);
 	share(&o, pool);
 	assert_int_equal(o.table.n_masks, first.n_masks);
 	assert_memory_equal(o.table.mask, first.mask, first.n_masks * sizeof *first.mask);
 	assert_memory_equal(o.table.index, first.index, o.blocks.n_blocks);
-	visibility_table_fini(&first);
+	visibility_mask_table_fini(&first);
 	psr_pool_destroy(pool);
 	drop_object(&o);
 }
@@ -147,7 +147,7 @@ static void bits_that_a_cone_culls_are_given_away_first(void **state)
 
 	(void)state;
 	make_object(&o);
-	assert_int_equal(visibility_masks(&o.blocks, NULL, o.mask), PSR_OK);
+	assert_int_equal(visibility_mask_make(&o.blocks, NULL, o.mask), PSR_OK);
 	share(&o, NULL);
 	for (uint32_t b = 0; b < o.blocks.n_blocks; b++) {
 		for (unsigned t = 0; t < PSR_MASK_TRIANGLES; t++) {

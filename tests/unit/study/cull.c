@@ -326,7 +326,7 @@ static void masks_lose_no_pixel_and_hardly_a_block(void **state)
 	for (int i = 0; i + 4 < 16; i++) /* nor do finer masks: their bits are within the coarser's */
 		assert_true(figures[i + 4].blocks >= figures[i].blocks);
 	assert_true(figures[12].blocks > 0.1);
-	assert_int_equal(visibility_lost(psr_model_blocks(o.model), o.scene, 100000, o.pool, &n_lost), PSR_OK);
+	assert_int_equal(visibility_mask_lost(psr_model_blocks(o.model), o.scene, 100000, o.pool, &n_lost), PSR_OK);
 	assert_int_equal(n_lost, 0);
 	drop_object(&o);
 }

@@ -97,7 +97,7 @@ static void a_small_screen_has_one_direction(void **state)
 
 		psr_direction_center(2, t, center);
 		v3d_scale(center, center, -1); /* forward: from the eye */
-		psr_direction_frame(center, frame);
+		psr_direction_basis(center, frame);
 		screen_make(&screen, 3, (const double(*)[3])frame, (const double[2]){ 1e-5, 1e-5 }, 2);
 		for (int node = 1; node < 2 << 6; node++)
 			for (unsigned other = 0; other < 128; other++)
