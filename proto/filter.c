@@ -2,7 +2,7 @@
 #include <stddef.h>
 #include "wire.h"
 
-/* Byte differences in place; no division into planes, as there is only one. */
+/* Byte differences in place; bytes form a single plane. */
 static void filter_bytes(uint8_t *out, const uint8_t *in, size_t row, uint32_t height, unsigned c)
 {
 	for (uint32_t y = 0; y < height; y++, in += row, out += row) {
@@ -26,7 +26,6 @@ static void unfilter_bytes(uint8_t *out, const uint8_t *in, size_t row, uint32_t
 static inline uint64_t load(const uint8_t *p, unsigned b)
 {
 	uint64_t v = 0;
-
 #pragma GCC unroll 8
 	for (unsigned i = 0; i < b; i++)
 		v |= (uint64_t)p[i] << 8 * i;
@@ -40,8 +39,7 @@ static inline void store(uint8_t *p, uint64_t v, unsigned b)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
 
-/* Byte k of component i stands at k * n + i of its row. All of this is inlined once for each b: plain loads
- * are left. */
+/* Moves byte k of component i to k * n + i of the row. Inlined once for each b, which leaves plain loads. */
 static inline void split(uint8_t *out, uint64_t d, size_t n, unsigned b)
 {
 #pragma GCC unroll 8
@@ -52,14 +50,13 @@ static inline void split(uint8_t *out, uint64_t d, size_t n, unsigned b)
 static inline uint64_t join(const uint8_t *in, size_t n, unsigned b)
 {
 	uint64_t d = 0;
-
 #pragma GCC unroll 8
 	for (unsigned k = 0; k < b; k++)
 		d |= (uint64_t)in[k * n] << 8 * k;
 	return d;
 }
 
-/* n components of b bytes a row, c of them a pixel. */
+/* n components of b bytes a row, c a pixel. */
 static inline void filter_wide(uint8_t *out, const uint8_t *in, size_t n, uint32_t height, unsigned c, unsigned b)
 {
 	for (uint32_t y = 0; y < height; y++, in += n * b, out += n * b) {
@@ -84,7 +81,6 @@ void psr_filter_rows(uint8_t *out, const uint8_t *in, uint32_t width, uint32_t h
                      unsigned component_bytes)
 {
 	size_t n = (size_t)width * n_components;
-
 	switch (component_bytes) {
 	case 1: filter_bytes(out, in, n, height, n_components); break;
 	case 2: filter_wide(out, in, n, height, n_components, 2); break;
@@ -98,7 +94,6 @@ void psr_unfilter_rows(uint8_t *out, const uint8_t *in, uint32_t width, uint32_t
                        unsigned component_bytes)
 {
 	size_t n = (size_t)width * n_components;
-
 	switch (component_bytes) {
 	case 1: unfilter_bytes(out, in, n, height, n_components); break;
 	case 2: unfilter_wide(out, in, n, height, n_components, 2); break;

@@ -77,7 +77,7 @@ static int check_settings(const struct psr_msg_settings *m, struct psr_error *er
 	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
 }
 
-/* What a request and its FRAME_BEGIN have in common. */
+/* The fields that a request and its FRAME_BEGIN share. */
 struct picture {
 	uint32_t width, height, planes;
 	uint8_t color_codec, color_quality, depth_format, depth_codec, data_codec;
@@ -86,7 +86,6 @@ struct picture {
 static int check_picture(const struct picture *m, struct psr_error *err)
 {
 	const uint32_t data = ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH);
-
 	if (m->width == 0 || m->height == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides need at least 1", m->width,
 		                m->height);
@@ -99,7 +98,6 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 		                PSR_N_PLANES - 1);
 	if (m->planes & 1u << PSR_PLANE_COLOR) {
 		int jpeg = m->color_codec == PSR_CODEC_JPEG;
-
 		if (check_integer("the codec of colour", m->color_codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err) ||
 		    check_integer(jpeg ? "the JPEG quality" : "the quality of a lossless codec", m->color_quality, jpeg,
 		                  jpeg ? 100 : 0, err))
@@ -125,7 +123,6 @@ static int check_picture(const struct picture *m, struct psr_error *err)
 static void layout_frame(struct wire *w, void *p)
 {
 	struct psr_msg_frame *m = p;
-
 	wire_u16(w, &m->slot);
 	wire_u16(w, &m->pass_limit);
 	wire_u32(w, &m->width);
@@ -149,7 +146,6 @@ static void layout_frame(struct wire *w, void *p)
 static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
 {
 	int no_settings = m->settings.scale == 0 && !m->settings.is_smooth && m->settings.spacing_px == 0;
-
 	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_SETTINGS, err) ||
 	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||
 	    (m->budget != PSR_WIRE_BUDGET_ERROR && check_zero("an error bound", m->error_bound_px == 0, err)) ||
@@ -168,7 +164,6 @@ static int check_frame(const void *p, struct psr_error *err)
 	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
 		m->depth_format, m->depth_codec, m->data_codec };
 	int result;
-
 	if (check_integer("the slot of the scene", m->slot, 0, PSR_WIRE_MAX_SCENES - 1, err))
 		return PSR_ERR_ARG;
 	result = check_picture(&picture, err);
@@ -180,18 +175,17 @@ static int check_frame(const void *p, struct psr_error *err)
 int psr_msg_frame_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame *msg,
                          struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME, id, view, msg, layout_frame, check_frame, err);
+	return wire_encode(out, WIRE(FRAME, layout_frame, check_frame), id, view, msg, err);
 }
 
 int psr_msg_frame_decode(struct psr_msg_frame *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME, payload, n, layout_frame, check_frame, err);
+	return wire_decode(msg, WIRE(FRAME, layout_frame, check_frame), payload, n, err);
 }
 
 static void layout_frame_begin(struct wire *w, void *p)
 {
 	struct psr_msg_frame_begin *m = p;
-
 	wire_u16(w, &m->pass);
 	wire_u16(w, &m->base_pass);
 	wire_u32(w, &m->width);
@@ -217,7 +211,6 @@ static int check_frame_begin(const void *p, struct psr_error *err)
 	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
 		m->depth_format, m->depth_codec, m->data_codec };
 	int result = check_picture(&picture, err);
-
 	if (result != PSR_OK)
 		return result;
 	if ((m->base == 0 && check_zero("the pass of a base that is none", m->base_pass == 0, err)) ||
@@ -231,11 +224,11 @@ static int check_frame_begin(const void *p, struct psr_error *err)
 int psr_msg_frame_begin_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_begin *msg,
                                struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME_BEGIN, id, view, msg, layout_frame_begin, check_frame_begin, err);
+	return wire_encode(out, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), id, view, msg, err);
 }
 
 int psr_msg_frame_begin_decode(struct psr_msg_frame_begin *msg, const uint8_t *payload, size_t n,
                                struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME_BEGIN, payload, n, layout_frame_begin, check_frame_begin, err);
+	return wire_decode(msg, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), payload, n, err);
 }

@@ -54,7 +54,6 @@ static const struct kind *find_kind(unsigned type)
 const char *psr_msg_name(unsigned type)
 {
 	const struct kind *kind = find_kind(type);
-
 	return kind ? kind->name : NULL;
 }
 
@@ -72,7 +71,6 @@ void psr_framer_init(struct psr_framer *framer, enum psr_side peer, void *storag
 void psr_framer_accept(struct psr_framer *framer, void *storage, size_t capacity)
 {
 	size_t n = framer->end - framer->begin;
-
 	assert(capacity >= PSR_WIRE_MAX_MESSAGE && capacity >= n);
 	memmove(storage, framer->storage + framer->begin, n);
 	framer->storage = storage;
@@ -99,11 +97,10 @@ void psr_framer_filled(struct psr_framer *framer, size_t n)
 	framer->end += n;
 }
 
-/* All of HELLO's first 24 bytes but the lower half of its length are the same on every connection. */
+/* Compares the first 24 bytes of HELLO, which are the same on every connection except the lower half of the length. */
 static int looks_like_hello(const uint8_t *bytes, size_t n)
 {
 	uint8_t expected[24] = { 0, 0, 0, 0, PSR_MSG_HELLO };
-
 	memcpy(expected + 16, PSR_HELLO_MAGIC, 8);
 	for (size_t i = 2; i < n && i < sizeof expected; i++)
 		if (bytes[i] != expected[i])
@@ -141,13 +138,12 @@ static int fail(struct psr_framer *framer, int code)
 	return code;
 }
 
-/* A header whose length is in order and whose type may be skipped leaves *kind NULL. */
+/* Sets *kind to NULL for a valid header of an unknown type that may be skipped. */
 static int read_header(struct psr_framer *framer, struct psr_message *m, const struct kind **kind,
                        struct psr_error *err)
 {
 	const uint8_t *p = framer->storage + framer->begin;
 	uint32_t length = wire_get_u32(p);
-
 	if (length < PSR_HEADER_SIZE || length > framer->max_message)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a message claims a length of %u bytes: it must have %d to %zu", length,
 		                PSR_HEADER_SIZE, framer->max_message);
@@ -170,14 +166,13 @@ static int read_header(struct psr_framer *framer, struct psr_message *m, const s
 int psr_framer_next(struct psr_framer *framer, struct psr_message *message, struct psr_error *err)
 {
 	if (framer->failed)
-		return psr_fail(err, framer->failed, "the bytes before could not be read; the connection is lost");
+		return psr_fail(err, framer->failed, "an earlier message could not be read; close the connection");
 	for (;;) {
 		size_t n = framer->end - framer->begin;
 		const struct kind *kind = NULL;
 		int result;
-
 		if (framer->expects_hello && !looks_like_hello(framer->storage + framer->begin, n))
-			return fail(framer, psr_fail(err, PSR_ERR_FORMAT, "the peer is no client of psr"));
+			return fail(framer, psr_fail(err, PSR_ERR_FORMAT, "the peer is not a client of psr"));
 		if (n < (framer->expects_hello ? 24 : PSR_HEADER_SIZE))
 			return 0;
 		result = read_header(framer, message, &kind, err);

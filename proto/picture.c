@@ -3,14 +3,12 @@
 unsigned psr_plane_component_bytes(unsigned plane, unsigned depth_format)
 {
 	static const uint8_t bytes[PSR_N_PLANES] = { 1, 4, 2, 4, 1, 8, 1 };
-
 	return plane == PSR_PLANE_DEPTH && depth_format != PSR_WIRE_DEPTH_F32 ? 2 : bytes[plane];
 }
 
 unsigned psr_plane_pixel_bytes(unsigned plane, unsigned depth_format)
 {
 	static const uint8_t n_components[PSR_N_PLANES] = { 3, 1, 3, 1, 1, 1, 3 };
-
 	return n_components[plane] * psr_plane_component_bytes(plane, depth_format);
 }
 
@@ -23,7 +21,6 @@ const uint8_t *psr_plane_background(unsigned plane)
 		[PSR_PLANE_WORDS] = { 0xff, 0xff, 0xff, 0xff, 0, 0, 0x80, 0x7f },
 		[PSR_PLANE_BLOCK] = { 0xff, 0xff, 0xff },
 	};
-
 	return bytes[plane];
 }
 
@@ -34,7 +31,6 @@ uint64_t psr_plane_capability(unsigned plane)
 		[PSR_PLANE_WEIGHT] = PSR_CAP_WEIGHT, [PSR_PLANE_WORDS] = PSR_CAP_WORDS,
 		[PSR_PLANE_BLOCK] = PSR_CAP_BLOCK,
 	};
-
 	return capability[plane];
 }
 
@@ -46,7 +42,6 @@ uint64_t psr_rect_total_max(uint64_t n_pixels, unsigned pixel_bytes)
 static void layout_rect(struct wire *w, void *p)
 {
 	struct psr_msg_rect *m = p;
-
 	wire_u8(w, &m->plane);
 	wire_u8(w, &m->codec);
 	wire_u8(w, &m->scale);
@@ -65,7 +60,6 @@ static int check_rect(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_rect *m = p;
 	uint64_t n_pixels, raw;
-
 	if (check_integer("the plane of a rectangle", m->plane, 0, PSR_N_PLANES - 1, err) ||
 	    check_integer("the codec of a rectangle", m->codec, PSR_CODEC_RAW, PSR_CODEC_PNG, err))
 		return PSR_ERR_ARG;
@@ -75,7 +69,8 @@ static int check_rect(const void *p, struct psr_error *err)
 	if (m->scale != 1 && m->scale != 2 && m->scale != 4)
 		return psr_fail(err, PSR_ERR_ARG, "the scale of a rectangle is %u: it must be 1, 2 or 4", m->scale);
 	if (m->w == 0 || m->h == 0 || m->x + m->w > PSR_WIRE_MAX_SIDE || m->y + m->h > PSR_WIRE_MAX_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "a rectangle of %u x %u pixels at %u, %u is in no picture", m->w, m->h, m->x,
+		return psr_fail(err, PSR_ERR_ARG, "a rectangle of %u x %u pixels at %u, %u is outside of every picture", m->w,
+		                m->h, m->x,
 		                m->y);
 	if ((uint32_t)m->w * m->h > PSR_WIRE_MAX_RECT_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a rectangle has %u x %u pixels, and holds at most %u", m->w, m->h,
@@ -96,18 +91,17 @@ static int check_rect(const void *p, struct psr_error *err)
 int psr_msg_rect_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_rect *msg,
                         struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_RECT, id, view, msg, layout_rect, check_rect, err);
+	return wire_encode(out, WIRE(RECT, layout_rect, check_rect), id, view, msg, err);
 }
 
 int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_RECT, payload, n, layout_rect, check_rect, err);
+	return wire_decode(msg, WIRE(RECT, layout_rect, check_rect), payload, n, err);
 }
 
 static void layout_frame_end(struct wire *w, void *p)
 {
 	struct psr_msg_frame_end *m = p;
-
 	wire_u16(w, &m->pass);
 	wire_u8(w, &m->is_final);
 	wire_u8(w, &m->status);
@@ -136,7 +130,6 @@ static int check_frame_end(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_frame_end *m = p;
 	uint16_t last = 0;
-
 	if (check_integer("the final mark of a frame", m->is_final, 0, 1, err) ||
 	    check_integer("the status of a frame", m->status, PSR_WIRE_FRAME_OK, PSR_WIRE_FRAME_COARSE, err) ||
 	    check_range("the error of a frame (pixels)", m->error_px, 0, PSR_WIRE_MAX_LENGTH, err))
@@ -162,10 +155,10 @@ static int check_frame_end(const void *p, struct psr_error *err)
 int psr_msg_frame_end_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_end *msg,
                              struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_FRAME_END, id, view, msg, layout_frame_end, check_frame_end, err);
+	return wire_encode(out, WIRE(FRAME_END, layout_frame_end, check_frame_end), id, view, msg, err);
 }
 
 int psr_msg_frame_end_decode(struct psr_msg_frame_end *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_FRAME_END, payload, n, layout_frame_end, check_frame_end, err);
+	return wire_decode(msg, WIRE(FRAME_END, layout_frame_end, check_frame_end), payload, n, err);
 }

@@ -4,31 +4,28 @@
 static void layout_presets(struct wire *w, void *p)
 {
 	struct psr_msg_presets *m = p;
-
 	wire_u32(w, &m->handle);
 }
 
 static int check_presets(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_presets *m = p;
-
 	return check_integer("a model's handle", m->handle, 1, UINT32_MAX, err);
 }
 
 int psr_msg_presets_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESETS, id, 0, msg, layout_presets, check_presets, err);
+	return wire_encode(out, WIRE(PRESETS, layout_presets, check_presets), id, 0, msg, err);
 }
 
 int psr_msg_presets_decode(struct psr_msg_presets *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESETS, payload, n, layout_presets, check_presets, err);
+	return wire_decode(msg, WIRE(PRESETS, layout_presets, check_presets), payload, n, err);
 }
 
 static void layout_preset(struct wire *w, void *p)
 {
 	struct psr_msg_preset *m = p;
-
 	if (!w->writing)
 		memset(m, 0, sizeof *m);
 	wire_u8(w, &m->kind);
@@ -45,7 +42,6 @@ static void layout_preset(struct wire *w, void *p)
 static int check_preset(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_preset *m = p;
-
 	if (check_integer("a preset's kind", m->kind, PSR_WIRE_PRESET_CAMERA, PSR_WIRE_PRESET_LIGHT, err)
 	    || check_integer("a preset's flags", m->light.flags, 0, 0, err))
 		return PSR_ERR_ARG;
@@ -56,18 +52,17 @@ static int check_preset(const void *p, struct psr_error *err)
 
 int psr_msg_preset_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_preset *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESET, id, 0, msg, layout_preset, check_preset, err);
+	return wire_encode(out, WIRE(PRESET, layout_preset, check_preset), id, 0, msg, err);
 }
 
 int psr_msg_preset_decode(struct psr_msg_preset *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESET, payload, n, layout_preset, check_preset, err);
+	return wire_decode(msg, WIRE(PRESET, layout_preset, check_preset), payload, n, err);
 }
 
 static void layout_presets_end(struct wire *w, void *p)
 {
 	struct psr_msg_presets_end *m = p;
-
 	wire_u32(w, &m->n_cameras);
 	wire_u32(w, &m->n_lights);
 }
@@ -75,7 +70,6 @@ static void layout_presets_end(struct wire *w, void *p)
 static int check_presets_end(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_presets_end *m = p;
-
 	return check_integer("the number of cameras", m->n_cameras, 0, PSR_WIRE_MAX_PRESETS, err)
 	               || check_integer("the number of lights", m->n_lights, 0, PSR_WIRE_MAX_PRESETS, err)
 	           ? PSR_ERR_ARG
@@ -85,11 +79,11 @@ static int check_presets_end(const void *p, struct psr_error *err)
 int psr_msg_presets_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets_end *msg,
                                struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PRESETS_END, id, 0, msg, layout_presets_end, check_presets_end, err);
+	return wire_encode(out, WIRE(PRESETS_END, layout_presets_end, check_presets_end), id, 0, msg, err);
 }
 
 int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *payload, size_t n,
                                struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PRESETS_END, payload, n, layout_presets_end, check_presets_end, err);
+	return wire_decode(msg, WIRE(PRESETS_END, layout_presets_end, check_presets_end), payload, n, err);
 }

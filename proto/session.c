@@ -7,7 +7,6 @@ static void layout_hello(struct wire *w, void *p)
 {
 	struct psr_msg_hello *m = p;
 	uint8_t magic[8];
-
 	memcpy(magic, PSR_HELLO_MAGIC, 8);
 	wire_bytes(w, magic, 8);
 	if (memcmp(magic, PSR_HELLO_MAGIC, 8))
@@ -28,16 +27,15 @@ static void layout_hello(struct wire *w, void *p)
 
 int psr_msg_hello_encode(struct psr_buf *out, const struct psr_msg_hello *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_HELLO, 0, 0, msg, layout_hello, NULL, err);
+	return wire_encode(out, WIRE(HELLO, layout_hello, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
 	int result;
-
 	if (n < 48)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "HELLO: the message has %zu of at least 48 bytes", n);
-	result = wire_decode(msg, PSR_MSG_HELLO, payload, n, layout_hello, NULL, err);
+	result = wire_decode(msg, WIRE(HELLO, layout_hello, NULL), payload, n, err);
 	if (result == PSR_ERR_VERSION)
 		return psr_fail(err, PSR_ERR_VERSION, "the client speaks version %u.%u of the protocol, this server %u.%u: "
 		                "use programs of the same release", msg->major, msg->minor, PSR_PROTO_MAJOR, PSR_PROTO_MINOR);
@@ -52,7 +50,6 @@ uint64_t psr_routing_key(const char *model_name)
 static void layout_welcome(struct wire *w, void *p)
 {
 	struct psr_msg_welcome *m = p;
-
 	wire_u16(w, &m->major);
 	wire_u16(w, &m->minor);
 	wire_reserved(w, 4);
@@ -73,7 +70,6 @@ static void layout_welcome(struct wire *w, void *p)
 static int check_welcome(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_welcome *m = p;
-
 	if (m->major != PSR_PROTO_MAJOR || m->minor != PSR_PROTO_MINOR)
 		return psr_fail(err, PSR_ERR_VERSION, "the server answers in version %u.%u of the protocol, this client speaks "
 		                "%u.%u: use programs of the same release", m->major, m->minor, PSR_PROTO_MAJOR,
@@ -93,18 +89,17 @@ static int check_welcome(const void *p, struct psr_error *err)
 
 int psr_msg_welcome_encode(struct psr_buf *out, const struct psr_msg_welcome *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_WELCOME, 0, 0, msg, layout_welcome, check_welcome, err);
+	return wire_encode(out, WIRE(WELCOME, layout_welcome, check_welcome), 0, 0, msg, err);
 }
 
 int psr_msg_welcome_decode(struct psr_msg_welcome *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_WELCOME, payload, n, layout_welcome, check_welcome, err);
+	return wire_decode(msg, WIRE(WELCOME, layout_welcome, check_welcome), payload, n, err);
 }
 
 static void layout_goodbye(struct wire *w, void *p)
 {
 	struct psr_msg_goodbye *m = p;
-
 	wire_u16(w, &m->reason);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -112,40 +107,38 @@ static void layout_goodbye(struct wire *w, void *p)
 
 int psr_msg_goodbye_encode(struct psr_buf *out, const struct psr_msg_goodbye *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_GOODBYE, 0, 0, msg, layout_goodbye, NULL, err);
+	return wire_encode(out, WIRE(GOODBYE, layout_goodbye, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_goodbye_decode(struct psr_msg_goodbye *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_GOODBYE, payload, n, layout_goodbye, NULL, err);
+	return wire_decode(msg, WIRE(GOODBYE, layout_goodbye, NULL), payload, n, err);
 }
 
 static void layout_ping(struct wire *w, void *p)
 {
 	struct psr_msg_ping *m = p;
-
 	wire_u64(w, &m->token);
 }
 
 int psr_msg_ping_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PING, 0, 0, msg, layout_ping, NULL, err);
+	return wire_encode(out, WIRE(PING, layout_ping, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_pong_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
 {
-	return wire_encode(out, PSR_MSG_PONG, 0, 0, msg, layout_ping, NULL, err);
+	return wire_encode(out, WIRE(PONG, layout_ping, NULL), 0, 0, msg, err);
 }
 
 int psr_msg_ping_decode(struct psr_msg_ping *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_PING, payload, n, layout_ping, NULL, err);
+	return wire_decode(msg, WIRE(PING, layout_ping, NULL), payload, n, err);
 }
 
 static void layout_error(struct wire *w, void *p)
 {
 	struct psr_msg_error *m = p;
-
 	wire_u16(w, &m->code);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -154,22 +147,20 @@ static void layout_error(struct wire *w, void *p)
 static int check_error(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_error *m = p;
-
-	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which is none");
+	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which means no error");
 }
 
 int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_error *msg,
                          struct psr_error *err)
 {
 	struct psr_msg_error clean = { .code = msg->code };
-
 	wire_clean(clean.text, msg->text, sizeof clean.text);
-	return wire_encode(out, PSR_MSG_ERROR, id, view, &clean, layout_error, check_error, err);
+	return wire_encode(out, WIRE(ERROR, layout_error, check_error), id, view, &clean, err);
 }
 
 int psr_msg_error_decode(struct psr_msg_error *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
-	return wire_decode(msg, PSR_MSG_ERROR, payload, n, layout_error, check_error, err);
+	return wire_decode(msg, WIRE(ERROR, layout_error, check_error), payload, n, err);
 }
 
 uint16_t psr_wire_error_from(int code)

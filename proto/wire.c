@@ -22,11 +22,10 @@ void wire_fail(struct wire *w, int code, const char *what)
 	w->where = w->at;
 }
 
-/* Moves over n bytes; gives their place, or NULL if they are not there. */
+/* Moves over n bytes; returns them, or NULL beyond the end. */
 static uint8_t *advance_out(struct wire *w, size_t n)
 {
 	size_t at = w->at;
-
 	w->at += n;
 	return w->at <= w->room ? w->out + at : NULL;
 }
@@ -34,7 +33,6 @@ static uint8_t *advance_out(struct wire *w, size_t n)
 static const uint8_t *advance_in(struct wire *w, size_t n)
 {
 	const uint8_t *p;
-
 	if (n > w->room - w->at) {
 		wire_fail(w, PSR_ERR_PROTOCOL, "the message ends too early");
 		w->at = w->room;
@@ -48,7 +46,6 @@ static const uint8_t *advance_in(struct wire *w, size_t n)
 static void put(struct wire *w, uint64_t v, unsigned n)
 {
 	uint8_t *p = advance_out(w, n);
-
 	for (unsigned i = 0; p && i < n; i++)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
@@ -57,13 +54,12 @@ static uint64_t get(struct wire *w, unsigned n)
 {
 	const uint8_t *p = advance_in(w, n);
 	uint64_t v = 0;
-
 	for (unsigned i = 0; p && i < n; i++)
 		v |= (uint64_t)p[i] << 8 * i;
 	return v;
 }
 
-/* Nothing is stored while writing: the message is the caller's, and may be constant. */
+/* Writing must not store to the message, which may be constant. */
 void wire_u8(struct wire *w, uint8_t *v)
 {
 	if (w->writing)
@@ -100,7 +96,6 @@ void wire_f64(struct wire *w, double *v, int n)
 {
 	for (int i = 0; i < n; i++) {
 		uint64_t bits;
-
 		memcpy(&bits, &v[i], sizeof bits);
 		wire_u64(w, &bits);
 		if (!w->writing)
@@ -112,7 +107,6 @@ void wire_bytes(struct wire *w, uint8_t *v, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memcpy(p, v, n);
 		return;
@@ -129,7 +123,6 @@ void wire_reserved(struct wire *w, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memset(p, 0, n);
 		return;
@@ -145,7 +138,6 @@ void wire_data(struct wire *w, const uint8_t **data, uint32_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
-
 		if (p)
 			memcpy(p, *data, n);
 		return;
@@ -153,13 +145,13 @@ void wire_data(struct wire *w, const uint8_t **data, uint32_t n)
 	*data = advance_in(w, n);
 }
 
-/* Bytes of the well-formed character at p, or 0; control characters, which could steer a terminal, do not count. */
+/* Returns the bytes of the well-formed character at p, or 0; control characters, which could steer a terminal, give 0.
+ * */
 static size_t character(const uint8_t *p, size_t n)
 {
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
 	size_t length = p[0] < 0x80 ? 1 : p[0] < 0xc0 ? 0 : p[0] < 0xe0 ? 2 : p[0] < 0xf0 ? 3 : p[0] < 0xf8 ? 4 : 0;
 	uint32_t c;
-
 	if (length == 0 || length > n)
 		return 0;
 	if (length == 1)
@@ -179,7 +171,6 @@ void wire_string(struct wire *w, char *text, size_t size)
 {
 	size_t length = w->writing ? strnlen(text, size) : 0;
 	uint16_t n = (uint16_t)length;
-
 	if (length >= size) {
 		wire_fail(w, PSR_ERR_ARG, "a text is not terminated");
 		return;
@@ -202,61 +193,58 @@ void wire_string(struct wire *w, char *text, size_t size)
 void wire_clean(char *out, const char *text, size_t size)
 {
 	size_t n = strnlen(text, size - 1), i = 0;
-
 	while (i < n) {
 		size_t step = character((const uint8_t *)text + i, n - i);
-
 		memcpy(out + i, step ? text + i : "?", step ? step : 1);
 		i += step ? step : 1;
 	}
 	out[n] = 0;
 }
 
-int wire_encode(struct psr_buf *out, unsigned type, uint32_t id, uint16_t view, const void *msg, wire_layout *layout,
-                wire_check *check, struct psr_error *err)
+int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, uint16_t view, const void *msg,
+                struct psr_error *err)
 {
 	struct wire w = { .writing = 1, .out = out->data + out->size, .room = out->capacity - out->size };
-	uint16_t type16 = (uint16_t)type, flags = 0;
+	const char *name = psr_msg_name(kind->type);
+	uint16_t type = (uint16_t)kind->type, flags = 0;
 	uint32_t length = 0;
 	int result;
-
-	assert(out->size <= out->capacity && psr_msg_name(type));
-	result = check ? check(msg, err) : PSR_OK;
+	assert(out->size <= out->capacity && name);
+	result = kind->check ? kind->check(msg, err) : PSR_OK;
 	if (result != PSR_OK)
 		return result;
 	wire_u32(&w, &length);
-	wire_u16(&w, &type16);
+	wire_u16(&w, &type);
 	wire_u16(&w, &flags);
 	wire_u32(&w, &id);
 	wire_u16(&w, &view);
 	wire_reserved(&w, 2);
-	if (layout)
-		layout(&w, (void *)msg); /* which only reads it, since this is writing */
+	if (kind->layout)
+		kind->layout(&w, (void *)msg); /* reads msg only, as `writing` is set */
 	if (w.code != PSR_OK)
-		return psr_fail(err, w.code, "%s: %s", psr_msg_name(type), w.what);
+		return psr_fail(err, w.code, "%s: %s", name, w.what);
 	if (w.at > PSR_WIRE_MAX_MESSAGE)
-		return psr_fail(err, PSR_ERR_LIMIT, "%s: the message would have %zu bytes, and a message holds %d",
-		                psr_msg_name(type), w.at, PSR_WIRE_MAX_MESSAGE);
+		return psr_fail(err, PSR_ERR_LIMIT, "%s: the message would have %zu bytes; the limit is %d", name, w.at,
+		                PSR_WIRE_MAX_MESSAGE);
 	if (w.at > w.room)
-		return psr_fail(err, PSR_ERR_MEMORY, "%s: the message has %zu bytes, and the buffer has room for %zu",
-		                psr_msg_name(type), w.at, w.room);
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: the message has %zu bytes, but the buffer has room for %zu", name,
+		                w.at,
+		                w.room);
 	for (int i = 0; i < 4; i++)
 		w.out[i] = (uint8_t)(w.at >> 8 * i);
 	out->size += w.at;
 	return PSR_OK;
 }
 
-int wire_decode(void *msg, unsigned type, const uint8_t *payload, size_t n, wire_layout *layout, wire_check *check,
-                struct psr_error *err)
+int wire_decode(void *msg, const struct wire_kind *kind, const uint8_t *payload, size_t n, struct psr_error *err)
 {
 	struct wire w = { .in = payload, .room = n };
-
-	layout(&w, msg);
+	kind->layout(&w, msg);
 	if (w.code == PSR_OK && w.at < n)
-		wire_fail(&w, PSR_ERR_PROTOCOL, "the message goes on behind its last field");
+		wire_fail(&w, PSR_ERR_PROTOCOL, "the message continues after its last field");
 	if (w.code != PSR_OK)
-		return psr_fail(err, w.code, "%s: %s (byte %zu of the payload)", psr_msg_name(type), w.what, w.where);
-	return check ? check(msg, err) : PSR_OK;
+		return psr_fail(err, w.code, "%s: %s (byte %zu of the payload)", psr_msg_name(kind->type), w.what, w.where);
+	return kind->check ? kind->check(msg, err) : PSR_OK;
 }
 
 int check_lengths(const char *what, const double *v, int n, struct psr_error *err)

@@ -1,11 +1,12 @@
-/* Private to proto/: one walk over a message's fields, used to write and to read, so that both have one layout. */
+/* Private to proto/: one walk over a message's fields serves for writing and for reading, so that both share a layout.
+ * */
 #ifndef PSR_PROTO_WIRE_H
 #define PSR_PROTO_WIRE_H
 
 #include "proto.h"
 
-/* While writing, `at` goes on counting behind `room`, and nothing is written there. While reading, fields behind the
- * end are 0. The first thing that is wrong stays in code, what and where. */
+/* A walk. Writing beyond `room` only counts in `at`; fields read beyond the end are 0. code, what and where keep the
+ * first error. */
 struct wire {
 	int writing;
 	uint8_t *out;
@@ -25,10 +26,10 @@ void wire_bytes(struct wire *w, uint8_t *v, size_t n);
 void wire_reserved(struct wire *w, size_t n);
 void wire_string(struct wire *w, char *text, size_t size); /* size of the array, NUL included */
 
-/* The bytes that are left are the field: `data` for writing, the place in the payload for reading. */
+/* A field of all remaining bytes: `data` when writing, a pointer into the payload when reading. */
 void wire_data(struct wire *w, const uint8_t **data, uint32_t n);
 
-/* Copies text, with '?' for every byte that cannot stand in a string on the wire. */
+/* Copies text, replacing each byte that strings on the wire exclude by '?'. */
 void wire_clean(char *out, const char *text, size_t size);
 
 void wire_fail(struct wire *w, int code, const char *what);
@@ -36,20 +37,26 @@ void wire_fail(struct wire *w, int code, const char *what);
 typedef void wire_layout(struct wire *w, void *msg);
 typedef int wire_check(const void *msg, struct psr_error *err);
 
-/* check may be NULL; it is called before writing and after reading. */
-int wire_encode(struct psr_buf *out, unsigned type, uint32_t id, uint16_t view, const void *msg, wire_layout *layout,
-                wire_check *check, struct psr_error *err);
-int wire_decode(void *msg, unsigned type, const uint8_t *payload, size_t n, wire_layout *layout, wire_check *check,
-                struct psr_error *err);
+/* A kind of message. check may be NULL; it runs before writing and after reading. */
+struct wire_kind {
+	unsigned type;
+	wire_layout *layout; /* NULL: no payload */
+	wire_check *check;
+};
+#define WIRE(name, layout, check) (&(const struct wire_kind){ PSR_MSG_##name, layout, check })
 
-/* Rules of values; `what` names the field in the error's sentence. */
+int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, uint16_t view, const void *msg,
+                struct psr_error *err);
+int wire_decode(void *msg, const struct wire_kind *kind, const uint8_t *payload, size_t n, struct psr_error *err);
+
+/* Checks of values; `what` names the field in the error text. */
 int check_lengths(const char *what, const double *v, int n, struct psr_error *err);
 int check_positive(const char *what, double v, struct psr_error *err);
 int check_range(const char *what, double v, double min, double max, struct psr_error *err);
 int check_integer(const char *what, uint64_t v, uint64_t min, uint64_t max, struct psr_error *err);
 int check_zero(const char *what, int all_zero, struct psr_error *err);
 
-/* Parts of more than one message: their layouts, and what they may say. */
+/* Layouts and checks of parts that several messages share. */
 void layout_camera(struct wire *w, struct psr_camera *camera); /* 96 bytes */
 int check_camera(const struct psr_camera *camera, struct psr_error *err);
 void layout_light(struct wire *w, struct psr_msg_light *light); /* 88 bytes */

@@ -5,8 +5,7 @@
 #include <math.h>
 #include <stdint.h>
 
-/* x rounded down, of what an int can hold. As fast as truncation, where floor() takes a dozen instructions before
- * SSE4.1. */
+/* Rounds down a double that fits an int. As fast as truncation; floor() takes a dozen instructions before SSE4.1. */
 static inline int cell_floor(double x)
 {
 	int i = (int)x;

@@ -13,17 +13,15 @@ static int is_checked(const struct psr_opt *opt)
 static int fail_range(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	char least[CLI_VALUE_TEXT], most[CLI_VALUE_TEXT];
-
 	cli_number_format(least, opt->type, opt->min);
 	cli_number_format(most, opt->type, opt->max);
 	return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is out of range; it takes %s to %s", opt->name, text, least, most);
 }
 
-/* Decimal digits into *v; 0 if there are none or they do not fit. */
+/* Reads decimal digits into *v; returns 0 if there are none or the value does not fit. */
 static int read_digits(const char **text, uint64_t *v)
 {
 	const char *at = *text;
-
 	*v = 0;
 	for (; isdigit((unsigned char)*at); at++)
 		if (__builtin_mul_overflow(*v, 10, v) || __builtin_add_overflow(*v, (uint64_t)(*at - '0'), v))
@@ -40,7 +38,6 @@ static int set_int(const struct psr_opt *opt, const char *text, struct psr_error
 	uint64_t magnitude;
 	int64_t value;
 	int shift = 0;
-
 	if (!read_digits(&at, &magnitude))
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a whole number such as 8 or 64m", opt->name, text);
 	if (*at != '\0' && strchr("kKmMgG", *at) != NULL) {
@@ -63,7 +60,6 @@ static int set_int(const struct psr_opt *opt, const char *text, struct psr_error
 static int set_real(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	double value;
-
 	if (psr_parse_real(text, &value, NULL, NULL) != PSR_OK)
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a finite decimal number such as 1.5", opt->name, text);
 	if (is_checked(opt) && (value < opt->min || value > opt->max))
@@ -77,7 +73,6 @@ static int set_size(const struct psr_opt *opt, const char *text, struct psr_erro
 	const char *at = text;
 	uint64_t size[2];
 	uint32_t *out = opt->value;
-
 	if (!read_digits(&at, &size[0]) || (*at != 'x' && *at != 'X') || (at++, !read_digits(&at, &size[1])) || *at != '\0')
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a size such as 1280x720", opt->name, text);
 	for (int i = 0; i < 2; i++)
@@ -93,7 +88,6 @@ static int set_size(const struct psr_opt *opt, const char *text, struct psr_erro
 static int set_flag(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	static const char *const words[2][4] = { { "no", "off", "false", "0" }, { "yes", "on", "true", "1" } };
-
 	for (int value = 0; value < 2; value++) {
 		for (int i = 0; i < 4; i++) {
 			if (strcmp(text, words[value][i]) == 0) {
@@ -109,7 +103,6 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 {
 	struct psr_error inner;
 	int code = PSR_OK;
-
 	switch (opt->type) {
 	case PSR_OPT_FLAG:
 		return set_flag(opt, text, err);
@@ -132,7 +125,7 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 		snprintf(inner.text, sizeof inner.text, "'%.80s' is not valid", text);
 		code = opt->call(text, opt->value, &inner);
 		break;
-	case PSR_OPT_HEADING: /* find_long and find_letter give none */
+	case PSR_OPT_HEADING: /* find_long and find_letter never return one */
 		break;
 	}
 	return code == PSR_OK ? PSR_OK : psr_fail(err, code, "--%s: %.480s", opt->name, inner.text);
@@ -141,7 +134,6 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 static int give(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	int code = set_value(opt, text, err);
-
 	if (code == PSR_OK && opt->seen != NULL)
 		++*opt->seen;
 	return code;
@@ -169,10 +161,8 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	const struct psr_opt *near = NULL;
 	size_t least = 3;
 	int shown = (int)(length < 80 ? length : 80);
-
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
 		size_t distance = psr_edit_distance(name, length, opt->name);
-
 		if (opt->type != PSR_OPT_HEADING && distance < least && distance < strlen(opt->name)) {
 			least = distance;
 			near = opt;
@@ -181,18 +171,16 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	if (near != NULL)
 		return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; did you mean %s%s?", dashes, shown, name, dashes,
 		                near->name);
-	return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; --help lists what there is", dashes, shown, name);
+	return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; --help lists the options", dashes, shown, name);
 }
 
-/* Takes the option at argv[*i] and, where it has one, its value; *i ends on the last argument used. */
+/* Takes the option at argv[*i] and its value, if any; *i ends at the last argument used. */
 static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i, struct psr_error *err)
 {
 	const char *arg = argv[*i], *value = NULL;
 	const struct psr_opt *opt;
-
 	if (arg[1] == '-') {
 		size_t length = strcspn(arg + 2, "=");
-
 		opt = find_long(cli, arg + 2, length);
 		if (opt == NULL)
 			return fail_unknown(cli, "--", arg + 2, length, err);
@@ -201,7 +189,7 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 	} else {
 		opt = arg[2] == '\0' ? find_letter(cli, arg[1]) : NULL;
 		if (opt == NULL)
-			return psr_fail(err, PSR_ERR_ARG, "unknown option %.80s; --help lists what there is", arg);
+			return psr_fail(err, PSR_ERR_ARG, "unknown option %.80s; --help lists the options", arg);
 	}
 	if (opt->type == PSR_OPT_FLAG) {
 		if (value != NULL)
@@ -220,8 +208,7 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err)
 {
 	int n = 0, options_end = 0;
-
-	/* Help is asked for before anything is set, so that it shows the defaults. */
+	/* Help before parsing, so that it shows the defaults. */
 	for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
 		if (strcmp(argv[i], "--help") == 0) {
 			cli_help_print(cli);
@@ -230,7 +217,6 @@ int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_opera
 	}
 	for (int i = 1; i < argc; i++) {
 		int code;
-
 		if (!options_end && strcmp(argv[i], "--") == 0) {
 			options_end = 1;
 		} else if (!options_end && argv[i][0] == '-' && argv[i][1] != '\0') {
@@ -251,7 +237,6 @@ int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_opera
 int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, struct psr_error *err)
 {
 	const struct psr_opt *opt = find_long(cli, name, strlen(name));
-
 	if (opt == NULL)
 		return fail_unknown(cli, "", name, strlen(name), err);
 	return give(opt, text, err);

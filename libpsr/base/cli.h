@@ -65,7 +65,7 @@ int psr_cli_fail(const char *program, const struct psr_error *err);
 /* Prints the whole help on standard output. */
 void cli_help_print(const struct psr_cli *cli);
 
-/* A bound of an option as people write it: 64m for an INT of 67108864, 0.5 for a REAL. */
+/* Formats a number as people write it: 64m for an INT of 67108864, 0.5 for a REAL. */
 void cli_number_format(char text[CLI_VALUE_TEXT], enum psr_opt_type type, double value);
 
 #endif

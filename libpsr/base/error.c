@@ -39,7 +39,6 @@ int psr_fail(struct psr_error *err, int code, const char *format, ...)
 {
 	va_list args;
 	size_t length;
-
 	if (err == NULL)
 		return code;
 	err->code = code;

@@ -10,13 +10,12 @@
 #define FILE_NAME "psr-image-oiio.so"
 #define MOST_PATH (PATH_MAX + 64)
 
-/* 0: it is not beside this program. */
+/* Returns 0 if the module is not beside this program. */
 static int find_beside(char path[MOST_PATH])
 {
 	static const char *const beside[] = { "/../lib/psr/" FILE_NAME, "/../lib/" FILE_NAME };
 	char folder[PATH_MAX], *slash;
 	ssize_t n = readlink("/proc/self/exe", folder, sizeof folder - 1);
-
 	if (n <= 0)
 		return 0;
 	folder[n] = '\0';
@@ -38,7 +37,6 @@ static int load(struct image_module *module, struct psr_error *err)
 	char path[MOST_PATH] = FILE_NAME;
 	int is_anywhere = 0;
 	void *handle;
-
 	if (chosen != NULL && chosen[0] != '\0') {
 		snprintf(path, sizeof path, "%s", chosen);
 	} else if (!find_beside(path)) {
@@ -74,7 +72,6 @@ int image_module_open(const struct image_module **out, struct psr_error *err)
 	static struct image_module module;
 	static int is_loaded;
 	int rc = PSR_OK;
-
 	pthread_mutex_lock(&lock);
 	if (!is_loaded)
 		rc = load(&module, err);

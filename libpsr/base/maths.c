@@ -2,7 +2,7 @@
 
 #define HALF_PI 1.57079632679489661923
 
-/* Taylor series on [0, pi/4], where the first terms left out are below 1e-17. */
+/* Taylor series on [0, pi/4]; the first omitted terms are below 1e-17. */
 static double sin_series(double a)
 {
 	double q = a * a, term = a, sum = a;

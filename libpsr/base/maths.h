@@ -1,5 +1,5 @@
-/* The few transcendental functions that frames need, the same bits on every machine: libm's differ by CPU. Only
- * additions, multiplications and true division, in one order. */
+/* The transcendental functions of frames, with the same bits on every machine, unlike libm: additions, multiplications
+ * and true division in one order. */
 #ifndef PSR_BASE_MATHS_H
 #define PSR_BASE_MATHS_H
 
@@ -23,7 +23,7 @@ static inline uint32_t psr_bits_from_float(float f)
 	return bits;
 }
 
-/* Choices by bits, which the compiler does not take for branches, so that loops become vectors. */
+/* Selects by bits, not branches, so that loops become vectors. */
 static inline float psr_choose(int condition, float yes, float no)
 {
 	const uint32_t mask = 0u - (uint32_t)(condition != 0);
@@ -42,14 +42,14 @@ static inline int32_t psr_floor_int(float x)
 	return i - (x < (float)i);
 }
 
-/* x^y for 0 <= x <= 1 and 1 <= y <= 2^16: what a highlight needs. Relative error below 3e-7 * (1 - y ln x), and
- * results below 2^-60 are 0.
+/* x^y for 0 <= x <= 1 and 1 <= y <= 2^16, for highlights. Relative error below 3e-7 * (1 - y ln x); results below 2^-60
+ * are 0.
  *
- * log2 x = e + log2 m with m in [sqrt 1/2, sqrt 2), as an odd series in s = (m - 1) / (m + 1): exact at x = 1,
- * where large exponents need it; 2^t by its series on [-1/2, 1/2]. Truncation errors: 2 s^13 / 13 / ln 2 < 2e-11
- * (s <= 0.172), (ln 2 / 2)^8 / 8! < 6e-9.
+ * log2 x = e + log2 m with m in [sqrt 1/2, sqrt 2), as an odd series in s = (m - 1) / (m + 1), which is exact at x = 1,
+ * where large exponents need it; 2^t by its series on [-1/2, 1/2]. Truncation errors: 2 s^13 / 13 / ln 2 < 2e-11 (s <=
+ * 0.172), (ln 2 / 2)^8 / 8! < 6e-9.
  *
- * In two halves, for loops of their own: y log2 x, or -60 where the result is 0, and the power of two. */
+ * Two halves, for loops of their own: y log2 x, or -60 where the result is 0; and the power of two. */
 static inline float psr_power_exponent(float x, float y)
 {
 	uint32_t bits = psr_bits_from_float(x);

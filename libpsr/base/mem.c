@@ -10,7 +10,6 @@
 void *psr_alloc_array(size_t n, size_t size)
 {
 	size_t n_bytes;
-
 	if (__builtin_mul_overflow(n, size, &n_bytes) || n_bytes > PTRDIFF_MAX - PSR_ALIGNMENT)
 		return NULL;
 	n_bytes = (n_bytes + PSR_ALIGNMENT - 1) / PSR_ALIGNMENT * PSR_ALIGNMENT;
@@ -25,7 +24,6 @@ void psr_free(void *memory)
 static size_t whole_pages(size_t n_bytes)
 {
 	size_t page = (size_t)sysconf(_SC_PAGESIZE);
-
 	return (n_bytes + page - 1) / page * page;
 }
 
@@ -33,7 +31,6 @@ void *psr_alloc_huge(size_t n_bytes)
 {
 	size_t slack = n_bytes >= HUGE_PAGE ? HUGE_PAGE : 0, head, used, left;
 	char *memory;
-
 	if (n_bytes == 0 || n_bytes > PTRDIFF_MAX - slack)
 		return NULL;
 	memory = mmap(NULL, n_bytes + slack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -49,7 +46,7 @@ void *psr_alloc_huge(size_t n_bytes)
 	left = whole_pages(n_bytes + slack) - head;
 	if (left > used)
 		munmap(memory + used, left - used);
-	/* A system without huge pages refuses, and ordinary ones do as well. */
+	/* May fail without harm: ordinary pages serve as well. */
 	(void)madvise(memory, n_bytes, MADV_HUGEPAGE);
 	return memory;
 }
@@ -57,7 +54,6 @@ void *psr_alloc_huge(size_t n_bytes)
 void psr_free_huge(void *memory, size_t n_bytes)
 {
 	int failed;
-
 	if (memory == NULL)
 		return;
 	failed = munmap(memory, n_bytes);

@@ -18,14 +18,14 @@ struct job {
 	void *userdata;
 };
 
-/* Lives on its caller's stack; helpers touch it only between their count going up and down, both under the mutex. */
+/* On its caller's stack. Helpers use it only while they are counted, which changes under the mutex. */
 struct loop {
 	struct loop *next, *previous;
 	void (*fn)(int i, void *userdata);
 	void *userdata;
 	int n;
 	atomic_int n_helpers; /* changed under the mutex */
-	atomic_int taken;     /* indices given out */
+	atomic_int taken;     /* indices handed out */
 	pthread_cond_t left;
 };
 
@@ -34,19 +34,18 @@ struct psr_pool {
 	pthread_cond_t work;
 	struct job *first_job, **last_job;
 	struct loop loops; /* head of a ring */
-	atomic_int n_jobs; /* queued ones */
-	atomic_uint n_offers; /* loops and jobs ever, and the end: idle workers watch it for a while before they sleep */
+	atomic_int n_jobs; /* queued */
+	atomic_uint n_offers; /* counts loops, jobs and the end; idle workers spin on it before they sleep */
 	int n_threads, n_workers, n_asleep, with_jobs, stopping;
 	pthread_t worker[MAX_THREADS];
 };
 
-/* Whoever runs it, a function of the pool starts from the default rounding and with denormal numbers: a library that
- * sets flush-to-zero in one thread must not show in a frame. */
+/* Runs functions with the default rounding and with denormal numbers: a library that sets flush-to-zero in one thread
+ * must not change frames. */
 static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 {
 	fenv_t callers;
 	int i;
-
 	fegetenv(&callers);
 	fesetenv(FE_DFL_ENV);
 	while ((n_jobs == NULL || atomic_load_explicit(n_jobs, memory_order_relaxed) == 0)
@@ -55,11 +54,10 @@ static void run_indices(struct loop *loop, const atomic_int *n_jobs)
 	fesetenv(&callers);
 }
 
-/* The running loop with indices left and the fewest helpers, the oldest of several; NULL if none. */
+/* The running loop with indices left and the fewest helpers, the oldest if several; or NULL. */
 static struct loop *neediest_loop(struct psr_pool *pool)
 {
 	struct loop *best = NULL;
-
 	for (struct loop *loop = pool->loops.next; loop != &pool->loops; loop = loop->next)
 		if (atomic_load_explicit(&loop->taken, memory_order_relaxed) < loop->n
 		    && (best == NULL || loop->n_helpers < best->n_helpers))
@@ -70,7 +68,6 @@ static struct loop *neediest_loop(struct psr_pool *pool)
 static void run_job(struct psr_pool *pool)
 {
 	struct job *job = pool->first_job;
-
 	pool->first_job = job->next;
 	if (pool->first_job == NULL)
 		pool->last_job = &pool->first_job;
@@ -99,12 +96,11 @@ static void pause_briefly(void)
 #endif
 }
 
-/* A frame is a dozen loops one after the other, each well below a millisecond: waking a thread costs some 50 us, which
- * is what a worker spins for at most. */
+/* A frame is a dozen loops, each well below a millisecond, and waking a thread costs some 50 us: workers spin for as
+ * long before they sleep. */
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
 	const uint64_t start = clock_ns();
-
 	do {
 		for (int i = 0; i < 64; i++) {
 			if (atomic_load_explicit(&pool->n_offers, memory_order_acquire) != n_offers)
@@ -127,11 +123,9 @@ static void *work(void *userdata)
 	struct psr_pool *pool = userdata;
 	struct loop *loop;
 	int has_spun = 0;
-
 	pthread_mutex_lock(&pool->mutex);
 	for (;;) {
 		const unsigned n_offers = atomic_load_explicit(&pool->n_offers, memory_order_relaxed);
-
 		if (pool->first_job != NULL) {
 			run_job(pool);
 			has_spun = 0;
@@ -155,7 +149,7 @@ static void *work(void *userdata)
 	return NULL;
 }
 
-/* Signals belong to the threads of the program; those that tell of a fault stay where it happens. */
+/* Blocks signals, which belong to the program's threads, except those of faults. */
 static int start_worker(struct psr_pool *pool)
 {
 	static const int faults[] = { SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT, SIGSYS };
@@ -254,8 +248,7 @@ int psr_pool_threads(const struct psr_pool *pool)
 void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata), void *userdata)
 {
 	struct loop loop = { .fn = fn, .userdata = userdata, .n = n };
-
-	/* Each thread may take one index too many before it sees the end. */
+	/* Each thread may take one index beyond the end. */
 	assert(n <= INT_MAX - MAX_THREADS - 1);
 	if (n <= 0)
 		return;
@@ -291,7 +284,6 @@ void psr_pool_for(struct psr_pool *pool, int n, void (*fn)(int i, void *userdata
 int psr_pool_submit(struct psr_pool *pool, void (*fn)(void *userdata), void *userdata)
 {
 	struct job *job;
-
 	assert(pool->with_jobs);
 	job = malloc(sizeof *job);
 	if (job == NULL)

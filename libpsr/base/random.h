@@ -1,5 +1,5 @@
-/* Random numbers that are the same everywhere, as long as no expression draws two of them: SplitMix64 (Steele, Lea,
- * Flood 2014). Seed it with any number. */
+/* Random numbers, the same everywhere if no expression draws two of them: SplitMix64 (Steele, Lea, Flood 2014). Any
+ * seed will do. */
 #ifndef PSR_BASE_RANDOM_H
 #define PSR_BASE_RANDOM_H
 

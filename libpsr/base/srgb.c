@@ -1,6 +1,6 @@
 #include "srgb.h"
 
-/* Correctly rounded from the exact curve: libm's pow differs between CPUs. */
+/* The exact curve, correctly rounded; libm's pow differs between CPUs. */
 const float psr_srgb_to_linear[256] = {
 	0.0f, 0.000303526991f, 0.000607053982f, 0.000910580973f, 0.00121410796f, 0.00151763496f, 0.00182116195f,
 	0.00212468882f, 0.00242821593f, 0.0027317428f, 0.00303526991f, 0.00334653584f, 0.00367650739f, 0.00402471703f,
@@ -99,7 +99,6 @@ static const float threshold[255] = {
 uint8_t psr_linear_to_srgb(float linear)
 {
 	unsigned code = 0;
-
 	for (unsigned step = 128; step > 0; step >>= 1)
 		code += linear >= threshold[code + step - 1] ? step : 0;
 	return (uint8_t)code;

@@ -1,18 +1,17 @@
-/* The sRGB curve: codes of 8 bits to linear light and back, the same bits on every machine.
+/* The sRGB curve: 8-bit codes to linear light and back, the same bits on every machine.
  *
  * linear = c / 12.92 for c <= 0.04045, else ((c + 0.055) / 1.055)^2.4, with c = code / 255. Both directions are tables
- * of constants that were computed to 50 digits. */
+ * of constants computed to 50 digits. */
 #ifndef PSR_BASE_SRGB_H
 #define PSR_BASE_SRGB_H
 
 #include <stdint.h>
 
 extern const float psr_srgb_to_linear[256]; /* correctly rounded; 0 -> 0, 255 -> 1 */
-/* The same for codes of 5 and 6 bits: of the nearest code of 8. */
+/* The same for 5-bit and 6-bit codes, by the nearest 8-bit code. */
 extern const float psr_srgb5_to_linear[32], psr_srgb6_to_linear[64];
 
-/* The code whose c is nearest to that of `linear`, a half upwards; clamped to 0..255, NaN gives 0. The inverse of the
- * table above. */
+/* The inverse: the code with c nearest to that of `linear`, halves up; clamps to 0..255; NaN gives 0. */
 uint8_t psr_linear_to_srgb(float linear);
 
 #endif

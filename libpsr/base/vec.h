@@ -40,7 +40,7 @@
 	{                                                                                                                  \
 		return root(v3##s##_dot(a, a));                                                                                \
 	}                                                                                                                  \
-	/* Returns the length that a had; a vector whose squared length is 0 or not finite is copied, with 0 returned. */  \
+	/* Normalizes a; returns its length. Copies a and returns 0 if its squared length is 0 or not finite. */  \
 	static inline type v3##s##_normalize(type r[3], const type a[3])                                                   \
 	{                                                                                                                  \
 		type length = v3##s##_length(a);                                                                               \

@@ -34,7 +34,7 @@ int view_check_camera(const struct psr_camera *camera, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "eye, target and up must be finite and below 1e30");
 	v3d_sub(forward, camera->target, camera->eye);
 	if (!(v3d_normalize(forward, forward) > 0))
-		return psr_fail(err, PSR_ERR_ARG, "the target is where the eye is");
+		return psr_fail(err, PSR_ERR_ARG, "target and eye are the same point");
 	if (!is_direction(camera->up))
 		return psr_fail(err, PSR_ERR_ARG, "up has no length");
 	v3d_normalize(right, camera->up);
@@ -43,16 +43,17 @@ int view_check_camera(const struct psr_camera *camera, struct psr_error *err)
 		return psr_fail(err, PSR_ERR_ARG, "up is parallel to the viewing direction");
 	if (camera->kind == PSR_CAMERA_PERSPECTIVE) {
 		if (!(camera->fov_y >= 1e-6 && camera->fov_y <= 3.14159))
-			return psr_fail(err, PSR_ERR_ARG, "field of view of %g radians is not within 1e-6..3.14159", camera->fov_y);
+			return psr_fail(err, PSR_ERR_ARG, "a field of view of %g radians is not within 1e-6..3.14159",
+			                camera->fov_y);
 	} else if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC) {
 		if (!(camera->ortho_height >= 1e-30 && camera->ortho_height <= MAX_LENGTH))
-			return psr_fail(err, PSR_ERR_ARG, "orthographic height of %g is not within 1e-30..1e30",
+			return psr_fail(err, PSR_ERR_ARG, "an orthographic height of %g is not within 1e-30..1e30",
 			                camera->ortho_height);
 	} else {
 		return psr_fail(err, PSR_ERR_ARG, "unknown kind %d", (int)camera->kind);
 	}
 	if (!(camera->near_z >= 0 && camera->near_z <= MAX_LENGTH))
-		return psr_fail(err, PSR_ERR_ARG, "near distance %g is not within 0..1e30", camera->near_z);
+		return psr_fail(err, PSR_ERR_ARG, "a near distance of %g is not within 0..1e30", camera->near_z);
 	return PSR_OK;
 }
 
@@ -63,13 +64,13 @@ int view_check_light(const struct psr_light *light, struct psr_error *err)
 	if (light->kind != PSR_LIGHT_DIRECTIONAL && light->kind != PSR_LIGHT_POINT && light->kind != PSR_LIGHT_SPOT)
 		return psr_fail(err, PSR_ERR_ARG, "unknown kind %d", (int)light->kind);
 	if (light->kind != PSR_LIGHT_POINT && !is_direction(light->direction))
-		return psr_fail(err, PSR_ERR_ARG, "its direction has no length, or is not finite");
+		return psr_fail(err, PSR_ERR_ARG, "the direction has no length, or is not finite");
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
 		return PSR_OK;
 	if (!view_is_point(light->position))
-		return psr_fail(err, PSR_ERR_ARG, "its position must be finite and below 1e30");
+		return psr_fail(err, PSR_ERR_ARG, "the position must be finite and below 1e30");
 	if (!(light->reference >= 0 && light->reference <= MAX_LENGTH))
-		return psr_fail(err, PSR_ERR_ARG, "reference distance %g is not within 0..1e30", light->reference);
+		return psr_fail(err, PSR_ERR_ARG, "a reference distance of %g is not within 0..1e30", light->reference);
 	if (light->kind == PSR_LIGHT_SPOT &&
 	    !(light->inner >= 0 && light->inner <= light->outer && light->outer > 0 && light->outer <= PI))
 		return psr_fail(err, PSR_ERR_ARG, "half angles %g and %g must be 0 <= inner <= outer <= pi, outer > 0",

@@ -1,5 +1,4 @@
-// The image module's animations: formats of OpenImageIO that hold several pictures. The contract stands in
-// base/image_module.h.
+// The image module's animations: formats of OpenImageIO with several pictures. base/image_module.h has the contract.
 #include <OpenImageIO/imageio.h>
 #include <cstdint>
 #include <cstdio>
@@ -18,19 +17,18 @@ namespace {
 struct Animation {
 	std::unique_ptr<OIIO::ImageOutput> out;
 	std::string path;
-	std::vector<OIIO::ImageSpec> specs; // of each picture; all alike
+	std::vector<OIIO::ImageSpec> specs; // of each picture; all equal
 	std::size_t n_added = 0;
 };
 
 int check(const std::string &ending, char *message, unsigned size)
 {
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
-
 	if (!out)
-		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
+		return fail(message, size, "OpenImageIO cannot write files with the ending ." + ending);
 	if (std::string(out->format_name()) != "gif")
 		return fail(message, size, std::string("the format ") + out->format_name()
-		            + " does not move; use .png or .gif, or number the pictures: 'a_%03d." + ending + "'");
+		            + " has no animations; use .png or .gif, or number the pictures: 'a_%03d." + ending + "'");
 	return 0;
 }
 
@@ -65,7 +63,6 @@ int add(Animation *a, const void *pixels, char *message, unsigned size)
 int close(Animation *a, char *message, unsigned size)
 {
 	std::unique_ptr<Animation> owned(a);
-
 	return owned->out->close() ? 0 : fail(message, size, owned->out->geterror());
 }
 

@@ -1,11 +1,11 @@
-// What the image module's writers have in common.
+// Errors of the image module's writers.
 #ifndef PSR_IMAGE_FAIL_H
 #define PSR_IMAGE_FAIL_H
 
 #include <cstdio>
 #include <string>
 
-// Leaves the text without control characters in a caller's message of `size` bytes. Returns 1, a writer's failure.
+// Copies the text, without control characters, to a message of `size` bytes. Returns 1, a writer's failure.
 inline int fail(char *message, unsigned size, const std::string &text)
 {
 	std::string clean = text;

@@ -1,4 +1,4 @@
-// The image module's decoder: what it does, and how it fails, stands in base/image_module.h.
+// The image module's decoder. base/image_module.h has the contract.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -18,7 +18,7 @@ extern "C" {
 
 namespace {
 
-/* Where a decoded pixel's red, green, blue and alpha stand; alpha -1: opaque. */
+/* Channels of red, green, blue and alpha in a decoded pixel; alpha -1: opaque. */
 struct channels {
 	int n, red, green, blue, alpha;
 };
@@ -50,9 +50,8 @@ int fail(const problem &problem, int code, const std::string &why)
 int check_spec(const OIIO::ImageSpec &spec, uint64_t max_pixels, const problem &problem)
 {
 	const std::string size = std::to_string(spec.width) + " x " + std::to_string(spec.height) + " pixels";
-
 	if (spec.width < 1 || spec.height < 1 || spec.depth > 1 || spec.nchannels < 1 || spec.deep)
-		return fail(problem, PSR_ERR_UNSUPPORTED, "not a plain picture with one to four channels");
+		return fail(problem, PSR_ERR_UNSUPPORTED, "not a 2D image with one to four channels");
 	if (spec.width > IMPORT_MAX_IMAGE_SIDE || spec.height > IMPORT_MAX_IMAGE_SIDE)
 		return fail(problem, PSR_ERR_LIMIT,
 		            size + ", the limit is " + std::to_string(IMPORT_MAX_IMAGE_SIDE) + " on a side");
@@ -62,14 +61,13 @@ int check_spec(const OIIO::ImageSpec &spec, uint64_t max_pixels, const problem &
 	return PSR_OK;
 }
 
-/* Integers are taken as sRGB-coded, whatever the file says, as glTF wants it; floats are linear light. */
+/* Integers are sRGB codes, whatever the file says, as in glTF; floats are linear light. */
 bool read_integers(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uint8_t *rgba)
 {
 	if (!in.read_image(0, 0, 0, c.n, OIIO::TypeDesc::UINT8, rgba, 4))
 		return false;
 	for (size_t i = 0; i < n_pixels; i++) {
 		uint8_t *p = rgba + 4 * i, r = p[c.red], g = p[c.green], b = p[c.blue], a = c.alpha < 0 ? 255 : p[c.alpha];
-
 		p[0] = r;
 		p[1] = g;
 		p[2] = b;
@@ -81,13 +79,11 @@ bool read_integers(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uin
 bool read_floats(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uint8_t *rgba)
 {
 	std::vector<float> linear(n_pixels * (size_t)c.n);
-
 	if (!in.read_image(0, 0, 0, c.n, OIIO::TypeDesc::FLOAT, linear.data()))
 		return false;
 	for (size_t i = 0; i < n_pixels; i++) {
 		const float *p = linear.data() + i * (size_t)c.n;
 		float a = c.alpha < 0 ? 1.0f : p[c.alpha];
-
 		rgba[4 * i] = psr_linear_to_srgb(p[c.red]);
 		rgba[4 * i + 1] = psr_linear_to_srgb(p[c.green]);
 		rgba[4 * i + 2] = psr_linear_to_srgb(p[c.blue]);
@@ -124,7 +120,7 @@ int decode(uint8_t **out, uint32_t size[2], const uint8_t *bytes, size_t n_bytes
 		return fail(problem, PSR_ERR_LIMIT, "too many pixels for an image of floats");
 	std::unique_ptr<uint8_t, decltype(&std::free)> rgba((uint8_t *)std::calloc(n_pixels, 4), &std::free);
 	if (!rgba)
-		return fail(problem, PSR_ERR_MEMORY, "no memory for its pixels");
+		return fail(problem, PSR_ERR_MEMORY, "no memory for the pixels");
 	if (!(is_float ? read_floats(*in, c, n_pixels, rgba.get()) : read_integers(*in, c, n_pixels, rgba.get())))
 		return fail(problem, PSR_ERR_FORMAT, "broken image: " + in->geterror());
 	size[0] = (uint32_t)spec.width;
@@ -141,7 +137,6 @@ extern "C" __attribute__((visibility("default"))) int psr_image_module_read(uint
                                                                             char *message, unsigned message_size)
 {
 	const problem problem = { message, message_size };
-
 	try {
 		return decode(rgba, size, bytes, n_bytes, format, max_pixels, problem);
 	} catch (const std::bad_alloc &) {

@@ -1,4 +1,4 @@
-// The image module's writers: all formats that OpenImageIO writes. The contract stands in base/image_module.h.
+// The image module's writers: all formats that OpenImageIO writes. base/image_module.h has the contract.
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include <cerrno>
@@ -21,25 +21,23 @@ namespace {
 int check(const std::string &ending, bool is_depth, char *message, unsigned size)
 {
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create("x." + ending);
-
 	if (!out)
-		return fail(message, size, "OpenImageIO knows no format that is written with the ending ." + ending);
+		return fail(message, size, "OpenImageIO cannot write files with the ending ." + ending);
 	if (is_depth) {
 		static const char *const formats[] = { "openexr", "tiff", "zfile", "null" };
 		for (const char *name : formats)
 			if (name == std::string(out->format_name()))
 				return 0;
 		return fail(message, size, std::string("the format ") + out->format_name()
-		            + " cannot hold depth, which is float; use .pfm, .exr or .tif");
+		            + " cannot hold floats, which depth needs; use .pfm, .exr or .tif");
 	}
 	return 0;
 }
 
-// Formats of light, not of codes, take linear values.
+// Formats that store linear light.
 bool is_linear(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
-
 	return name == "openexr" || name == "hdr";
 }
 
@@ -47,7 +45,6 @@ std::vector<float> linearize(const std::uint8_t *codes, std::size_t n)
 {
 	std::vector<float> linear(n);
 	float table[256];
-
 	for (int i = 0; i < 256; i++)
 		table[i] = static_cast<float>(i <= 10 ? i / 255.0 / 12.92 : std::pow((i / 255.0 + 0.055) / 1.055, 2.4));
 	for (std::size_t i = 0; i < n; i++)
@@ -55,11 +52,10 @@ std::vector<float> linearize(const std::uint8_t *codes, std::size_t n)
 	return linear;
 }
 
-// Some codecs (libjpeg) end the whole process when the disk is full: those that can write to memory do so first.
+// Some codecs (libjpeg) end the process when the disk is full: write to memory first where the codec can.
 bool wants_memory(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
-
 	return name != "openexr" && name != "tiff" && out.supports("ioproxy");
 }
 
@@ -67,7 +63,6 @@ int write_bytes(const char *path, const std::vector<unsigned char> &bytes, char 
 {
 	std::FILE *file = std::fopen(path, "wb");
 	int reason = file == nullptr ? errno : 0;
-
 	if (file != nullptr && std::fwrite(bytes.data(), 1, bytes.size(), file) != bytes.size())
 		reason = errno;
 	if (file != nullptr && std::fclose(file) != 0 && reason == 0)

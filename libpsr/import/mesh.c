@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -46,12 +47,9 @@ void import_mesh_fini(struct import_mesh *im)
 	im->mesh = NULL;
 }
 
-/* realloc of *array, a pointer of any type, which stays as it was on failure; n * size cannot overflow below the
- * limits of import.h. */
-static int resize(void *array, uint64_t n, size_t size)
+int import_resize(void *array, uint64_t n, size_t size)
 {
 	void *block;
-
 	memcpy(&block, array, sizeof block);
 	block = realloc(block, n > 0 ? (size_t)n * size : 1);
 	if (block == NULL)
@@ -63,7 +61,6 @@ static int resize(void *array, uint64_t n, size_t size)
 static uint64_t next_capacity(uint64_t capacity, uint64_t needed, uint64_t max)
 {
 	uint64_t grown = capacity + capacity / 2;
-
 	if (grown < needed)
 		grown = needed;
 	return grown < max ? grown : max;
@@ -72,7 +69,6 @@ static uint64_t next_capacity(uint64_t capacity, uint64_t needed, uint64_t max)
 static int put_column(struct import_column *out, int n, void *array, size_t size)
 {
 	void *block;
-
 	memcpy(&block, array, sizeof block);
 	if (block == NULL)
 		return n;
@@ -83,7 +79,6 @@ static int put_column(struct import_column *out, int n, void *array, size_t size
 int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
 {
 	int n = 0;
-
 	n = put_column(out, n, &mesh->position, sizeof *mesh->position);
 	n = put_column(out, n, &mesh->normal, sizeof *mesh->normal);
 	for (int set = 0; set < PSR_UV_SETS; set++)
@@ -95,7 +90,6 @@ int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct p
 int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
 {
 	int n = 0;
-
 	n = put_column(out, n, &mesh->point, sizeof *mesh->point);
 	n = put_column(out, n, &mesh->point_normal, sizeof *mesh->point_normal);
 	n = put_column(out, n, &mesh->point_radius, sizeof *mesh->point_radius);
@@ -106,7 +100,6 @@ int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct ps
 void *import_column_at(const struct import_column *column, uint64_t i)
 {
 	char *block;
-
 	memcpy(&block, column->array, sizeof block);
 	return block + i * column->size;
 }
@@ -114,7 +107,7 @@ void *import_column_at(const struct import_column *column, uint64_t i)
 static int resize_columns(const struct import_column *column, int n, uint64_t n_elements)
 {
 	for (int i = 0; i < n; i++)
-		if (!resize(column[i].array, n_elements, column[i].size))
+		if (!import_resize(column[i].array, n_elements, column[i].size))
 			return 0;
 	return 1;
 }
@@ -132,11 +125,10 @@ static void fill_white(float (*color)[4], uint64_t first, uint64_t end)
 			color[i][c] = 1.0f;
 }
 
-/* An array of n elements of 0 at *array, a pointer of any type, unless there is one or it is not wanted. */
+/* Allocates n zero elements at *array, a pointer of any type, if it is wanted and NULL. */
 static int create(void *array, int wanted, uint64_t n, size_t size)
 {
 	void *block;
-
 	memcpy(&block, array, sizeof block);
 	if (block != NULL || !wanted)
 		return 1;
@@ -150,7 +142,6 @@ static int create_vertex_columns(struct import_mesh *im, unsigned has)
 	struct psr_mesh *mesh = im->mesh;
 	const uint64_t n = im->vertex_capacity;
 	const int new_color = mesh->color == NULL;
-
 	for (unsigned set = 0; set < PSR_UV_SETS; set++)
 		if (!create(&mesh->uv[set], (has & IMPORT_HAS_UV0 << set) != 0, n, sizeof *mesh->uv[set]))
 			return 0;
@@ -166,10 +157,8 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
-
 	if (n_vertices > im->vertex_capacity || mesh->position == NULL) {
 		uint64_t n = next_capacity(im->vertex_capacity, n_vertices, IMPORT_MAX_VERTICES);
-
 		if (!create(&mesh->position, 1, 1, sizeof *mesh->position) ||
 		    !create(&mesh->normal, 1, 1, sizeof *mesh->normal) ||
 		    !resize_columns(column, import_vertex_columns(column, mesh), n))
@@ -178,9 +167,8 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 	}
 	if (n_triangles > im->triangle_capacity) {
 		uint64_t n = next_capacity(im->triangle_capacity, n_triangles, IMPORT_MAX_TRIANGLES);
-
-		if (!resize(&mesh->triangle, n, sizeof *mesh->triangle) ||
-		    !resize(&mesh->triangle_material, n, sizeof *mesh->triangle_material))
+		if (!import_resize(&mesh->triangle, n, sizeof *mesh->triangle) ||
+		    !import_resize(&mesh->triangle_material, n, sizeof *mesh->triangle_material))
 			return 0;
 		im->triangle_capacity = n;
 	}
@@ -193,7 +181,6 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t old_v = mesh->n_vertices, old_t = mesh->n_triangles;
-
 	if (n_vertices > IMPORT_MAX_VERTICES - old_v || n_triangles > IMPORT_MAX_TRIANGLES - old_t)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu vertices or %llu triangles", im->path,
 		                (unsigned long long)IMPORT_MAX_VERTICES, (unsigned long long)IMPORT_MAX_TRIANGLES);
@@ -216,10 +203,8 @@ static int reserve_points(struct import_mesh *im, uint64_t n_points, int has_col
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	const int new_color = mesh->point_color == NULL;
-
 	if (n_points > im->point_capacity) {
 		uint64_t n = next_capacity(im->point_capacity, n_points, IMPORT_MAX_POINTS);
-
 		if (!create(&mesh->point, 1, 1, sizeof *mesh->point) ||
 		    !create(&mesh->point_normal, 1, 1, sizeof *mesh->point_normal) ||
 		    !create(&mesh->point_radius, 1, 1, sizeof *mesh->point_radius) ||
@@ -240,7 +225,6 @@ int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_c
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t old = mesh->n_points;
-
 	if (n_points > IMPORT_MAX_POINTS - old)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu points", im->path,
 		                (unsigned long long)IMPORT_MAX_POINTS);
@@ -253,13 +237,28 @@ int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_c
 	return PSR_OK;
 }
 
+void import_mesh_bounds(double low[3], double high[3], const struct psr_mesh *mesh)
+{
+	for (int k = 0; k < 3; k++) {
+		low[k] = INFINITY;
+		high[k] = -INFINITY;
+		for (uint32_t v = 0; v < mesh->n_vertices; v++) {
+			low[k] = fmin(low[k], mesh->position[v][k]);
+			high[k] = fmax(high[k], mesh->position[v][k]);
+		}
+		for (uint32_t p = 0; p < mesh->n_points; p++) {
+			low[k] = fmin(low[k], mesh->point[p][k]);
+			high[k] = fmax(high[k], mesh->point[p][k]);
+		}
+	}
+}
+
 int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err)
 {
 	struct psr_mesh *mesh = im->mesh;
-
 	if (mesh->n_materials >= IMPORT_MAX_MATERIALS)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %d materials", im->path, IMPORT_MAX_MATERIALS);
-	if (!resize(&mesh->material, (uint64_t)mesh->n_materials + 1, sizeof *mesh->material))
+	if (!import_resize(&mesh->material, (uint64_t)mesh->n_materials + 1, sizeof *mesh->material))
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a material", im->path);
 	mesh->material[mesh->n_materials] = *material;
 	return (int)mesh->n_materials++;
@@ -269,12 +268,11 @@ int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, stru
 {
 	struct psr_mesh *mesh = im->mesh;
 	const uint64_t n = (uint64_t)image->width * image->height;
-
 	if (n > IMPORT_MAX_PIXELS - im->n_pixels ||
-	    !resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
+	    !import_resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
 		free(image->rgba);
 		return n > IMPORT_MAX_PIXELS - im->n_pixels ?
-		       psr_fail(err, PSR_ERR_LIMIT, "%s: its images have more than %llu pixels", im->path,
+		       psr_fail(err, PSR_ERR_LIMIT, "%s: the images have more than %llu pixels", im->path,
 		                (unsigned long long)IMPORT_MAX_PIXELS) :
 		       psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", im->path);
 	}
@@ -288,7 +286,6 @@ int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n
 {
 	struct psr_image image;
 	int rc = import_image_decode(&image, bytes, n_bytes, name, IMPORT_MAX_PIXELS - im->n_pixels, err);
-
 	return rc == PSR_OK ? import_mesh_add_pixels(im, &image, err) : rc;
 }
 
@@ -297,7 +294,6 @@ void import_mesh_warn(struct import_mesh *im, const char *format, ...)
 	char *warning = im->mesh->warning, text[PSR_ERROR_TEXT];
 	size_t used = strlen(warning), n;
 	va_list args;
-
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
@@ -311,28 +307,26 @@ void import_mesh_warn(struct import_mesh *im, const char *format, ...)
 	memcpy(warning + used, text, n + 1);
 }
 
-/* Shrinking cannot fail in a way that matters: the old block stays. */
+/* If shrinking fails, the old block stays, which does no harm. */
 static void shrink(struct psr_mesh *mesh)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
-
 	(void)resize_columns(column, import_vertex_columns(column, mesh), mesh->n_vertices);
 	(void)resize_columns(column, import_point_columns(column, mesh), mesh->n_points);
-	(void)resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);
-	(void)resize(&mesh->triangle_material, mesh->n_triangles, sizeof *mesh->triangle_material);
+	(void)import_resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);
+	(void)import_resize(&mesh->triangle_material, mesh->n_triangles, sizeof *mesh->triangle_material);
 }
 
 int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr_error *err)
 {
 	struct psr_mesh *mesh = im->mesh;
 	int rc = import_mesh_repair(im, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (mesh->n_triangles == 0 && mesh->n_points == 0)
 		return psr_fail(
 			err, PSR_ERR_FORMAT,
-			"%s: no triangle and no point to draw (%u faces without area, twice there or not finite, and %u "
+			"%s: no triangle or point to draw (%u faces without area, duplicate or not finite, and %u "
 			"lines and points were left out)",
 			im->path, mesh->n_dropped_triangles, mesh->n_dropped_primitives);
 	if (mesh->n_points > 0) {

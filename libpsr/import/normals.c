@@ -5,20 +5,20 @@
 #include "crease.h"
 #include "import.h"
 
-/* Faces lie in one plane if their normals differ by less than 0.1 degrees (1 minus the cosine): what six digits leave
- * of a triangle whose height is a 3000th of its distance from the origin. */
+/* Normals of faces in one plane differ by less than 0.1 degrees (1 minus the cosine): the precision of six digits for a
+ * triangle whose height is a 3000th of its distance from the origin. */
 #define FLAT 1.5e-6
-#define LONE 1.01 /* of its own area: a triangle that lies in no flat part but with slivers */
+#define LONE 1.01 /* of its own area: a triangle whose flat part adds slivers alone */
 
 /* Corners (3 * triangle + corner) around each point: corner[start[p] .. start[p + 1]), in the order of triangles. */
 struct fan {
 	uint32_t *point;    /* of each vertex: the first vertex at its position */
 	uint64_t *start;
 	uint64_t *corner;
-	uint8_t *wanted;    /* triangles whose vertices have no normals yet */
+	uint8_t *wanted;    /* by triangle: its vertices have no normals */
 	double (*face)[3];  /* unit normals; 0 for a triangle without area */
-	uint32_t *flat;     /* of each triangle: another one of its flat part, the part's own one of itself */
-	double *area;       /* twice that of the flat part, at its own triangle */
+	uint32_t *flat;     /* of each triangle: its parent in the union-find forest of flat parts */
+	double *area;       /* twice that of the flat part, at its root */
 };
 
 static void fan_fini(struct fan *fan)
@@ -32,15 +32,14 @@ static void fan_fini(struct fan *fan)
 	free(fan->area);
 }
 
-/* The corner's share in the normal: e x f / (|e|^2 |f|^2), which is exact where the vertices lie on a sphere (N. Max,
- * "Weights for computing vertex normals from facet normals", 1999) and needs no angle. 0 where there is no area. */
+/* The corner's weighted normal e x f / (|e|^2 |f|^2), exact on spheres and free of angles (N. Max, "Weights for
+ * computing vertex normals from facet normals", 1999). 0 without area. */
 static void corner_share(double share[3], const struct psr_mesh *mesh, uint64_t corner)
 {
 	const uint32_t *v = mesh->triangle[corner / 3];
 	const unsigned at = (unsigned)(corner % 3);
 	const double *p = mesh->position[v[at]], *q = mesh->position[v[(at + 1) % 3]], *r = mesh->position[v[(at + 2) % 3]];
 	double e[3], f[3], weight;
-
 	v3d_sub(e, q, p);
 	v3d_sub(f, r, p);
 	v3d_cross(share, e, f);
@@ -59,7 +58,7 @@ static void face_normals(struct fan *fan, const struct psr_mesh *mesh)
 	}
 }
 
-/* The triangle that stands for t's flat part: its first. Halves paths. */
+/* The root of t's flat part: its first triangle. Halves paths. */
 static uint32_t flat_of(struct fan *fan, uint32_t t)
 {
 	while (fan->flat[t] != t)
@@ -80,21 +79,19 @@ static double twice_area(const struct psr_mesh *mesh, uint32_t t)
 {
 	const uint32_t *v = mesh->triangle[t];
 	double e[3], f[3], n[3];
-
 	v3d_sub(e, mesh->position[v[1]], mesh->position[v[0]]);
 	v3d_sub(f, mesh->position[v[2]], mesh->position[v[0]]);
 	v3d_cross(n, e, f);
 	return v3d_length(n);
 }
 
-/* Triangles that lie in one plane and touch are one part, however they were cut. */
+/* Joins triangles that lie in one plane and touch. */
 static void find_flats(struct fan *fan, const struct psr_mesh *mesh)
 {
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
 		fan->flat[t] = t;
 	for (uint32_t p = 0; p < mesh->n_vertices; p++) {
 		const uint64_t first = fan->start[p], end = fan->start[p + 1];
-
 		for (uint64_t i = first; i < end && end - first <= CREASE_MAX_CORNERS; i++)
 			for (uint64_t k = first; k < i; k++)
 				join_flat(fan, (uint32_t)(fan->corner[i] / 3), (uint32_t)(fan->corner[k] / 3));
@@ -117,7 +114,6 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	const struct psr_mesh *mesh = im->mesh;
 	uint64_t sum = 0;
 	int rc;
-
 	memset(fan, 0, sizeof *fan);
 	rc = import_mesh_groups(&fan->point, im, IMPORT_SAME_NEARLY, err);
 	if (rc != PSR_OK)
@@ -136,7 +132,7 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	}
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
 		fan->wanted[t] = !has_normals(mesh, mesh->triangle[t]);
-	/* Counted two places on, so that filling leaves start[p] where p begins. */
+	/* Counts are two places ahead, so that filling leaves start[p] at the start of p. */
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
 		for (int c = 0; fan->wanted[t] && c < 3; c++)
 			fan->start[fan->point[mesh->triangle[t][c]] + 2]++;
@@ -152,13 +148,12 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	return PSR_OK;
 }
 
-/* A copy of vertex v at the end, for the corners that want another normal. */
+/* Appends a copy of vertex v, for corners with another normal. */
 static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *err)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	const uint32_t to = im->mesh->n_vertices;
 	int n_columns, rc = import_mesh_grow(im, 1, 0, 0, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	n_columns = import_vertex_columns(column, im->mesh);
@@ -167,11 +162,11 @@ static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *er
 	return PSR_OK;
 }
 
-/* The corners around the point at hand. */
+/* The corners around the current point. */
 struct ring {
 	unsigned n;
 	uint64_t at[CREASE_MAX_CORNERS];
-	uint32_t vertex[CREASE_MAX_CORNERS]; /* before any was split */
+	uint32_t vertex[CREASE_MAX_CORNERS]; /* before splitting */
 	struct crease_corner corner[CREASE_MAX_CORNERS];
 };
 
@@ -180,7 +175,6 @@ static void take_ring(struct ring *ring, struct fan *fan, const struct psr_mesh 
 	for (unsigned i = 0; i < ring->n; i++) {
 		const uint64_t at = fan->corner[first + i];
 		const uint32_t t = (uint32_t)(at / 3);
-
 		ring->at[i] = at;
 		ring->vertex[i] = mesh->triangle[t][at % 3];
 		memcpy(ring->corner[i].face, fan->face[t], sizeof fan->face[t]);
@@ -190,7 +184,7 @@ static void take_ring(struct ring *ring, struct fan *fan, const struct psr_mesh 
 	}
 }
 
-/* Corners of one vertex with one normal go on sharing it: the first takes it, others with the same normal follow. */
+/* Corners of a vertex with equal normals go on sharing it. */
 static int put_normals(struct import_mesh *im, const struct ring *ring, struct psr_error *err)
 {
 	for (unsigned i = 0; i < ring->n; i++) {
@@ -198,7 +192,6 @@ static int put_normals(struct import_mesh *im, const struct ring *ring, struct p
 		const float *normal = ring->corner[i].normal;
 		int is_first = 1, rc;
 		unsigned k;
-
 		for (k = 0; k < i; k++) {
 			if (ring->vertex[k] != ring->vertex[i])
 				continue;
@@ -229,7 +222,6 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 	struct ring *ring;
 	struct fan fan;
 	int rc = fan_init(&fan, im, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	ring = malloc(sizeof *ring);
@@ -237,7 +229,6 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for the normals of a vertex", im->path);
 	for (uint32_t p = 0; p < n_vertices && rc == PSR_OK; p++) {
 		const uint64_t first = fan.start[p], n = fan.start[p + 1] - first;
-
 		if (n == 0 || n > CREASE_MAX_CORNERS)
 			continue;
 		ring->n = (unsigned)n;

@@ -4,13 +4,12 @@
 #include <string.h>
 #include "import.h"
 
-#define MAX_NUMBER 128 /* characters; 17 digits say all of a double */
+#define MAX_NUMBER 128 /* characters; a double has 17 digits */
 
-/* What is left to C's own: many digits, large exponents, "nan", "inf", and Microsoft's 1.#QNAN. */
+/* Leaves to strtod: many digits, large exponents, "nan", "inf", and Microsoft's 1.#QNAN. */
 static int parse_rare(const uint8_t *word, size_t n, locale_t locale, double *x)
 {
 	char text[MAX_NUMBER + 1], *end;
-
 	if (n == 0 || n > MAX_NUMBER)
 		return 0;
 	memcpy(text, word, n);
@@ -25,8 +24,8 @@ static int parse_rare(const uint8_t *word, size_t n, locale_t locale, double *x)
 	return end == text + n;
 }
 
-/* Digits of at most 2^53 and a power of ten of at most 10^22 are exact doubles, so that their product or quotient is
- * the nearest to what is written (W. Clinger, "How to read floating point numbers accurately", 1990). */
+/* Digits up to 2^53 and powers of ten up to 10^22 are exact doubles, so that their product or quotient is the nearest
+ * double (W. Clinger, "How to read floating point numbers accurately", 1990). */
 int import_number(double *x, const uint8_t *word, size_t n, locale_t locale)
 {
 	static const double ten[] = { 1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,  1e8,  1e9,  1e10, 1e11,
@@ -34,7 +33,6 @@ int import_number(double *x, const uint8_t *word, size_t n, locale_t locale)
 	size_t i = n > 0 && (word[0] == '-' || word[0] == '+');
 	uint64_t digits = 0;
 	int exponent = 0, n_digits = 0, power = 0, down;
-
 	for (; i < n && word[i] >= '0' && word[i] <= '9' && n_digits < 18; i++, n_digits++)
 		digits = digits * 10 + (uint64_t)(word[i] - '0');
 	if (i < n && word[i] == '.')

@@ -1,13 +1,11 @@
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "import.h"
 
-/* The length of what of a UTF-8 text fits into n bytes, cut between characters. */
+/* The length of the longest start of a UTF-8 text that fits n bytes and ends between characters. */
 static size_t cut(const char *text, size_t n)
 {
 	size_t length = strlen(text);
-
 	if (length <= n)
 		return length;
 	while (n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80)
@@ -15,11 +13,10 @@ static size_t cut(const char *text, size_t n)
 	return n;
 }
 
-/* Printable, no blanks at its ends, as long as it may be. */
+/* Makes a name printable, without blanks at its ends, and short enough. */
 static void tidy_name(char out[PSR_NAME_BYTES], const char *name)
 {
 	size_t n;
-
 	while ((unsigned char)*name <= ' ' && *name != '\0')
 		name++;
 	n = cut(name, PSR_NAME_BYTES - 1);
@@ -38,13 +35,12 @@ static int is_taken(const char *names, size_t stride, uint32_t n, const char *na
 	return 0;
 }
 
-/* `names` is the first of n names, one every `stride` bytes. */
+/* `names`: the first of n names, `stride` bytes apart. */
 static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char *kind, const char *names,
                         size_t stride, uint32_t n)
 {
 	char base[PSR_NAME_BYTES], suffix[16];
 	unsigned number = 1;
-
 	tidy_name(base, wanted);
 	if (base[0] == '\0') {
 		snprintf(base, sizeof base, "%s", kind);
@@ -54,7 +50,6 @@ static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char
 	}
 	while (is_taken(names, stride, n, out)) {
 		size_t room;
-
 		snprintf(suffix, sizeof suffix, " %u", ++number);
 		room = cut(base, PSR_NAME_BYTES - 1 - strlen(suffix));
 		memcpy(out, base, room);
@@ -62,17 +57,12 @@ static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char
 	}
 }
 
-/* Room for one more of `size` bytes in *array, a pointer of any type; LIMIT when there are enough of them. */
+/* Appends a zero element of `size` bytes to *array, a pointer of any type. */
 static int make_room(struct import_mesh *im, void *array, uint32_t n, size_t size, struct psr_error *err)
 {
-	void *block;
-
-	memcpy(&block, array, sizeof block);
-	block = realloc(block, ((size_t)n + 1) * size);
-	if (block == NULL)
+	if (!import_resize(array, (uint64_t)n + 1, size))
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a preset", im->path);
-	memcpy(array, &block, sizeof block);
-	memset((char *)block + n * size, 0, size);
+	memset(import_column_at(&(struct import_column){ array, size }, n), 0, size);
 	return PSR_OK;
 }
 
@@ -82,7 +72,6 @@ int import_mesh_add_camera(struct import_mesh *im, const char *name, const struc
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t n = mesh->n_cameras;
 	int rc;
-
 	if (n >= PSR_MAX_PRESETS) {
 		import_mesh_warn(im, "cameras after the first %d were left out", PSR_MAX_PRESETS);
 		return PSR_OK;
@@ -102,7 +91,6 @@ int import_mesh_add_light(struct import_mesh *im, const char *name, const struct
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t n = mesh->n_lights;
 	int rc;
-
 	if (n >= PSR_MAX_PRESETS) {
 		import_mesh_warn(im, "lights after the first %d were left out", PSR_MAX_PRESETS);
 		return PSR_OK;

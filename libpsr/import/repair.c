@@ -8,12 +8,10 @@ static int is_finite3(const double p[3])
 	return isfinite(p[0]) && isfinite(p[1]) && isfinite(p[2]);
 }
 
-/* Edges are scaled by their largest component first, so that neither tiny nor huge units make the area 0 or
- * infinite. */
+/* Scales edges by their largest component, so that tiny or huge units make the area neither 0 nor infinite. */
 static int has_area(const double a[3], const double b[3], const double c[3])
 {
 	double e[3], f[3], n[3], largest = 0.0;
-
 	for (int i = 0; i < 3; i++) {
 		e[i] = b[i] - a[i];
 		f[i] = c[i] - a[i];
@@ -34,17 +32,14 @@ static int has_area(const double a[3], const double b[3], const double c[3])
 static int check_indices(const struct import_mesh *im, struct psr_error *err)
 {
 	const struct psr_mesh *mesh = im->mesh;
-
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		for (int c = 0; c < 3; c++)
 			if (mesh->triangle[t][c] >= mesh->n_vertices)
 				return psr_fail(err, PSR_ERR_FORMAT, "%s: triangle %u refers to vertex %u, but there are only %u",
-				                im->path, t,
-				                mesh->triangle[t][c], mesh->n_vertices);
+				                im->path, t, mesh->triangle[t][c], mesh->n_vertices);
 		if (mesh->triangle_material[t] >= mesh->n_materials)
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: triangle %u refers to material %u, but there are only %u",
-			                im->path, t,
-			                mesh->triangle_material[t], mesh->n_materials);
+			                im->path, t, mesh->triangle_material[t], mesh->n_materials);
 	}
 	return PSR_OK;
 }
@@ -53,11 +48,9 @@ static void drop_triangles(struct import_mesh *im)
 {
 	struct psr_mesh *mesh = im->mesh;
 	uint32_t kept = 0, n_flat = 0, n_infinite = 0;
-
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		const uint32_t *v = mesh->triangle[t];
 		const double *a = mesh->position[v[0]], *b = mesh->position[v[1]], *c = mesh->position[v[2]];
-
 		if (!is_finite3(a) || !is_finite3(b) || !is_finite3(c)) {
 			n_infinite++;
 		} else if (!has_area(a, b, c)) {
@@ -79,23 +72,21 @@ static int drop_doubles(struct import_mesh *im, struct psr_error *err)
 {
 	uint32_t n;
 	int rc = import_mesh_drop_duplicates(&n, im, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	im->mesh->n_dropped_triangles += n;
 	if (n > 0)
-		import_mesh_warn(im, "faces that were there twice were left out: %u", n);
+		import_mesh_warn(im, "duplicate faces were left out: %u", n);
 	return PSR_OK;
 }
 
-/* Vertices that no triangle uses would widen the bounds, and may be anything but finite. */
+/* Unused vertices would widen the bounds, and need not be finite. */
 static int drop_vertices(struct import_mesh *im, struct psr_error *err)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	const int n_columns = import_vertex_columns(column, mesh);
 	uint32_t *target = calloc(mesh->n_vertices > 0 ? mesh->n_vertices : 1, sizeof *target), kept = 0;
-
 	if (target == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to check %u vertices", im->path, mesh->n_vertices);
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
@@ -122,7 +113,6 @@ static int drop_points(struct import_mesh *im, struct psr_error *err)
 	struct psr_mesh *mesh = im->mesh;
 	const int n_columns = import_point_columns(column, mesh);
 	uint32_t kept = 0;
-
 	for (uint32_t p = 0; p < mesh->n_points; p++) {
 		if (mesh->point_material[p] >= mesh->n_materials)
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: point %u refers to material %u, but there are only %u", im->path,
@@ -143,7 +133,6 @@ static int drop_points(struct import_mesh *im, struct psr_error *err)
 static void unit_normal(float n[3])
 {
 	double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2]))), x, y, z, length;
-
 	if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2]) || largest == 0.0) {
 		n[0] = n[1] = n[2] = 0.0f;
 		return;
@@ -157,7 +146,7 @@ static void unit_normal(float n[3])
 	n[2] = (float)(z / length);
 }
 
-/* The handedness stays, and is right-handed where it is none; without a direction there is no tangent. */
+/* Keeps the handedness; a missing one becomes right-handed. Without a direction the tangent becomes 0. */
 static void unit_tangent(float t[4])
 {
 	unit_normal(t);
@@ -192,7 +181,6 @@ static void tidy_elements(struct psr_mesh *mesh)
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err)
 {
 	int rc = check_indices(im, err);
-
 	if (rc == PSR_OK) {
 		drop_triangles(im);
 		rc = drop_doubles(im, err);

@@ -7,24 +7,22 @@
 #define EMPTY UINT32_MAX
 #define MAX_KEY 128
 
-/* Positions that were computed in single precision, the pole of a ball from every side, say, differ by a few of its
- * roundings; nothing of this part of the mesh's size can be seen. */
+/* Of the mesh's size, below anything visible: positions computed in single precision, such as the pole of a ball from
+ * every side, differ by a few roundings. */
 #define NEARLY 0x1p-22
 
 struct keys {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	int n_columns;
-	double low[3], step; /* step 0: positions count as they are */
+	double low[3], step; /* step 0: exact positions */
 };
 
-/* Non-finite positions are there until repair.c drops them. */
+/* Skips non-finite positions, which repair.c drops later. */
 static void find_step(struct keys *keys, const struct psr_mesh *mesh)
 {
 	double most = 0;
-
 	for (int c = 0; c < 3; c++) {
 		double low = INFINITY, high = -INFINITY;
-
 		for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 			if (!isfinite(mesh->position[v][c]))
 				continue;
@@ -37,12 +35,11 @@ static void find_step(struct keys *keys, const struct psr_mesh *mesh)
 	keys->step = isfinite(most) ? NEARLY * most : 0;
 }
 
-/* What makes vertices the same. Adding 0 makes one zero of the two. */
+/* The bytes that equal vertices have in common. Adding 0 turns -0 into 0. */
 static size_t key_of(const struct keys *keys, uint32_t v, uint8_t key[MAX_KEY])
 {
 	double position[3];
 	size_t n = sizeof position;
-
 	memcpy(position, import_column_at(&keys->column[0], v), sizeof position);
 	for (int c = 0; c < 3; c++) {
 		if (keys->step > 0)
@@ -64,7 +61,6 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum i
 	struct keys keys = { .step = 0 };
 	uint64_t n_slots = 16, mask;
 	uint32_t *slot, *first;
-
 	while (n_slots < 2 * (uint64_t)mesh->n_vertices)
 		n_slots *= 2;
 	mask = n_slots - 1;
@@ -85,7 +81,6 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum i
 		uint8_t key[MAX_KEY], other[MAX_KEY];
 		size_t n = key_of(&keys, v, key);
 		uint64_t at = XXH64(key, n, 0) & mask;
-
 		while (slot[at] != EMPTY) {
 			key_of(&keys, slot[at], other);
 			if (memcmp(key, other, n) == 0)
@@ -106,7 +101,6 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err)
 	struct psr_mesh *mesh = im->mesh;
 	uint32_t *first;
 	int rc = import_mesh_groups(&first, im, IMPORT_SAME_ALL, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)

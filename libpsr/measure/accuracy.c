@@ -15,27 +15,27 @@
 /* A frame's depth is that of some sample in the pixel, up to 0.71 pixels from its centre, and the truth's may be that
  * of a diagonal neighbour's centre, 1.42 away: on a slope they may differ by this many pixels times its tangent. */
 #define SLOPE_PIXELS 2.2
-/* Seen flatter than 85 degrees, a surface has no usable slope. */
+/* 85 degrees: surfaces seen flatter have no usable slope. */
 #define LEAST_COSINE 0.087
 
 /* [G] 7.2: within three sample spacings two depths are on one surface. */
 #define HOLE_SPACINGS 3
 
-/* In footprints of a pixel on the surface: how far a truth may lie to the side to be that of the point. */
+/* Footprints of a pixel on the surface: how far to the side the point's truth may lie. */
 #define NEAR_FOOTPRINTS 1.5
 
-/* What is further than this from the planes of its neighbours is compared with all of the mesh. */
+/* Points further than this from the planes of their neighbours are compared with the whole mesh. */
 #define WALL_SPACINGS 0.5
 
 struct measure {
 	const struct psr_truth *truth;
 	struct view view;
-	double near_z, spacing;
+	double spacing;
 	uint32_t width, height;
 	const float *depth;      /* of the frame */
 	float *truth_depth;
 	float (*truth_normal)[3];
-	double *distance;        /* a pixel each; -1: not compared */
+	double *distance;        /* by pixel; -1: not compared */
 	struct psr_accuracy *row; /* counts of each row */
 };
 
@@ -48,12 +48,10 @@ struct neighbor {
 static int find_neighbors(const struct measure *m, uint32_t x, uint32_t y, struct neighbor neighbor[9])
 {
 	int n = 0;
-
 	for (uint32_t j = y == 0 ? 0 : y - 1; j <= y + 1 && j < m->height; j++) {
 		for (uint32_t i = x == 0 ? 0 : x - 1; i <= x + 1 && i < m->width; i++) {
 			size_t at = (size_t)j * m->width + i;
 			double origin[3], direction[3];
-
 			if (!isfinite(m->truth_depth[at]))
 				continue;
 			view_ray(&m->view, i + 0.5, j + 0.5, origin, direction);
@@ -74,21 +72,18 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 	for (int i = 0; i < n; i++) {
 		double cosine = fmin(1, neighbor[i].cosine), slope = sqrt(1 - cosine * cosine) / cosine;
 		double pixel = view_pixel(&m->view, neighbor[i].z);
-
 		if (z <= neighbor[i].z + HOLE_SPACINGS * m->spacing + SLOPE_PIXELS * pixel * slope)
 			return 0;
 	}
 	return 1;
 }
 
-/* Along the truth's normal, to the nearest of the truths beside the point; to the nearest of all if none is. */
+/* The distance along the truth's normal to the nearest truth beside the point, else to the nearest of all. */
 static double distance_to(const struct measure *m, const double point[3], const struct neighbor *neighbor, int n)
 {
 	double nearest[2] = { INFINITY, INFINITY };
-
 	for (int i = 0; i < n; i++) {
 		double d[3], along, aside, footprint = view_pixel(&m->view, neighbor[i].z) / neighbor[i].cosine;
-
 		v3d_sub(d, point, neighbor[i].point);
 		along = fabs(v3d_dot(d, neighbor[i].normal));
 		aside = sqrt(fmax(0, v3d_dot(d, d) - along * along));
@@ -101,8 +96,8 @@ static double distance_to(const struct measure *m, const double point[3], const 
 
 static int is_outside(const struct measure *m, uint32_t x, uint32_t y)
 {
-	return !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE) &&
-	       !truth_is_met(m->truth, &m->view, m->near_z, x - 1.0, y - 1.0, 3, OUTSIDE_FINE_SIDE);
+	return !truth_is_met(m->truth, &m->view, x - 1.0, y - 1.0, 3, OUTSIDE_SIDE) &&
+	       !truth_is_met(m->truth, &m->view, x - 1.0, y - 1.0, 3, OUTSIDE_FINE_SIDE);
 }
 
 static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struct psr_accuracy *count)
@@ -110,7 +105,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 	size_t at = (size_t)y * m->width + x;
 	int is_drawn = isfinite(m->depth[at]), n, is_inside;
 	struct neighbor neighbor[9];
-
 	m->distance[at] = -1;
 	n = find_neighbors(m, x, y, neighbor);
 	is_inside = n == 9;
@@ -122,11 +116,10 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 		count->n_outside_drawn += (uint64_t)is_outside(m, x, y);
 	if (is_drawn && n != 0) {
 		double origin[3], direction[3], point[3];
-
 		view_ray(&m->view, x + 0.5, y + 0.5, origin, direction);
 		v3d_add_scaled(point, origin, (double)m->depth[at], direction);
 		m->distance[at] = distance_to(m, point, neighbor, n) / m->spacing;
-		/* A wall along the line of sight is met by no centre ray, yet its samples are seen at steps in depth. */
+		/* No centre ray meets a wall along the line of sight, yet its samples show at steps in depth. */
 		if (m->distance[at] > WALL_SPACINGS)
 			m->distance[at] = truth_distance(m->truth, point, m->distance[at] * m->spacing) / m->spacing;
 		count->n_compared++;
@@ -136,7 +129,6 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y, struc
 static void measure_row(int y, void *userdata)
 {
 	const struct measure *m = userdata;
-
 	memset(&m->row[y], 0, sizeof m->row[y]);
 	for (uint32_t x = 0; x < m->width; x++)
 		measure_pixel(m, x, (uint32_t)y, &m->row[y]);
@@ -145,7 +137,6 @@ static void measure_row(int y, void *userdata)
 static void add_up(struct psr_accuracy *out, const struct measure *m)
 {
 	uint64_t n = 0;
-
 	memset(out, 0, sizeof *out);
 	for (uint32_t y = 0; y < m->height; y++) {
 		out->n_truth += m->row[y].n_truth;
@@ -171,7 +162,6 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	size_t n = (size_t)m->width * m->height;
 	struct psr_pool *pool;
 	int rc;
-
 	m->truth_depth = psr_alloc_array(n, sizeof *m->truth_depth);
 	m->truth_normal = psr_alloc_array(n, sizeof *m->truth_normal);
 	m->distance = psr_alloc_array(n, sizeof *m->distance);
@@ -183,7 +173,7 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 		return rc;
 	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	psr_pool_for(pool, (int)m->height, measure_row, m);
 	psr_pool_destroy(pool);
 	add_up(out, m);
@@ -194,10 +184,9 @@ int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, cons
                          uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads,
                          struct psr_error *err)
 {
-	struct measure m = { .truth = truth, .near_z = camera->near_z, .spacing = spacing, .width = width, .height = height,
+	struct measure m = { .truth = truth, .spacing = spacing, .width = width, .height = height,
 		                 .depth = depth };
 	int rc = view_init(&m.view, camera, width, height, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (!(spacing > 0 && isfinite(spacing)))

@@ -10,27 +10,23 @@
 static int largest_difference(const uint8_t *a, const uint8_t *b)
 {
 	int most = 0;
-
 	for (int c = 0; c < 3; c++) {
 		int d = abs(a[c] - b[c]);
-
 		most = d > most ? d : most;
 	}
 	return most;
 }
 
-/* Difference from the most similar truth of the 3x3 neighbourhood; -1 unless all nine pixels are of the object. */
+/* The difference from the most similar truth of the 3x3 neighbourhood; -1 unless the object fills all nine pixels. */
 static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x,
                          uint32_t y)
 {
 	const uint8_t *own = rgb + 3 * ((size_t)y * width + x);
 	int least = 255;
-
 	for (uint32_t j = y - 1; j <= y + 1; j++)
 		for (uint32_t i = x - 1; i <= x + 1; i++) {
 			size_t at = (size_t)j * width + i;
 			int d;
-
 			if (!isfinite(depth[at]))
 				return -1;
 			d = largest_difference(own, truth + 3 * at);
@@ -43,12 +39,10 @@ static void add_up(struct psr_color_accuracy *out, const uint8_t *rgb, const uin
                    uint32_t width, uint32_t height)
 {
 	uint64_t sum = 0;
-
 	memset(out, 0, sizeof *out);
 	for (uint32_t y = 1; y + 1 < height; y++)
 		for (uint32_t x = 1; x + 1 < width; x++) {
 			int d = difference_at(rgb, truth, depth, width, x, y);
-
 			if (d < 0)
 				continue;
 			out->n_compared++;
@@ -58,17 +52,15 @@ static void add_up(struct psr_color_accuracy *out, const uint8_t *rgb, const uin
 	out->mean = out->n_compared ? (double)sum / (double)out->n_compared : 0;
 }
 
-/* The mean of the rays of each pixel in linear light; the depth of one of them, infinite if any meets nothing. */
+/* Averages the rays of each pixel in linear light; takes the depth of one of them, infinite if any meets nothing. */
 static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth, uint8_t *rgb, uint32_t width,
                     uint32_t height)
 {
 	for (size_t i = 0; i < (size_t)width * height; i++) {
 		size_t first = (i / width * width * RAYS + i % width) * RAYS;
 		float sum[3] = { 0 };
-
 		for (size_t k = 0; k < RAYS * RAYS; k++) {
 			size_t at = first + k / RAYS * RAYS * width + k % RAYS;
-
 			depth[i] = k == 0 || !isfinite(ray_depth[at]) ? ray_depth[at] : depth[i];
 			for (int c = 0; c < 3; c++)
 				sum[c] += psr_srgb_to_linear[ray_rgb[3 * at + (size_t)c]];
@@ -86,7 +78,6 @@ int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth 
 	float *depth = psr_alloc_array(n, sizeof *depth), *ray_depth = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_depth);
 	uint8_t *color = psr_alloc_array(n, 3), *ray_color = psr_alloc_array(n, RAYS * RAYS * 3);
 	int rc;
-
 	if (depth == NULL || color == NULL || ray_depth == NULL || ray_color == NULL)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	else

@@ -21,19 +21,17 @@ struct rays {
 	struct RTCRay8 *packet;
 };
 
-/* Block after block of lattices, as the sampler goes. */
+/* Blocks of lattices, in the order of the sampler. */
 static int make_rays(struct rays *rays)
 {
 	const double step = 2.0 / ACROSS, row_height = step * sqrt(3.0) / 2;
 	const int reach = (int)(1 / (SIDE * row_height)) + 1;
 	int n = 0, valid[RAY_PACKET];
-
 	rays->ray = psr_alloc_array((size_t)DIRECTIONS * 4 * (size_t)(reach * reach) * RUN, sizeof *rays->ray);
 	if (rays->ray == NULL)
 		return PSR_ERR_MEMORY;
 	for (unsigned d = 0; d < DIRECTIONS; d++) {
 		double z[3], frame[3][3];
-
 		psr_direction_center(1, 9 * d, z);
 		psr_direction_basis(z, frame);
 		for (int b = 0; b < 4 * reach * reach; b++) {
@@ -41,7 +39,6 @@ static int make_rays(struct rays *rays)
 				int row = SIDE * (b / (2 * reach) - reach) + s / SIDE,
 					col = SIDE * (b % (2 * reach) - reach) + s % SIDE;
 				double x = (col + (row & 1) / 2.0) * step, y = row * row_height;
-
 				if (x * x + y * y > 1)
 					continue;
 				for (int k = 0; k < 3; k++) {
@@ -64,11 +61,9 @@ static int make_rays(struct rays *rays)
 static double time_ours(const struct ray_scene *scene, const struct rays *rays, uint64_t *n_hits)
 {
 	uint64_t started = clock_thread_ns();
-
 	for (int i = 0; i < rays->n; i += RUN) {
 		struct ray_hit hit[RUN];
 		int n = rays->n - i < RUN ? rays->n - i : RUN;
-
 		ray_scene_trace(scene, rays->ray + i, n, 0, hit);
 		for (int k = 0; k < n; k++)
 			*n_hits += hit[k].prim != RAY_NONE;
@@ -81,12 +76,10 @@ static double time_embree(const struct ray_scene *scene, const struct rays *rays
 	static const int all[RAY_PACKET] __attribute__((aligned(32))) = { -1, -1, -1, -1, -1, -1, -1, -1 };
 	struct RTCIntersectContext context;
 	uint64_t started = clock_thread_ns();
-
 	rtcInitIntersectContext(&context);
 	context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
 	for (int i = 0; i < rays->n / RAY_PACKET; i++) {
 		struct RTCRayHit8 rayhit;
-
 		rayhit.ray = rays->packet[i];
 		memset(rayhit.hit.geomID, -1, sizeof rayhit.hit.geomID);
 		memset(rayhit.hit.instID, -1, sizeof rayhit.hit.instID);
@@ -104,7 +97,6 @@ int psr_ray_rate(const struct psr_mesh *mesh, double *ours, double *embree, stru
 	double center[3], radius, best[2] = { INFINITY, INFINITY };
 	uint64_t n_hits = 0;
 	int rc = validate_mesh(mesh, err);
-
 	if (rc == PSR_OK)
 		rc = validate_bound_mesh(mesh, center, &radius, err);
 	if (rc == PSR_OK)

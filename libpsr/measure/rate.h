@@ -1,4 +1,4 @@
-/* How fast rays are traced, beside Embree alone. */
+/* The speed of ray tracing, compared with Embree alone. */
 #ifndef PSR_MEASURE_RATE_H
 #define PSR_MEASURE_RATE_H
 

@@ -10,13 +10,12 @@
 #define RAYS 4 /* along the side of a pixel */
 #define APART 2 /* pixels, on each side */
 #define LEAST_FACING 0.1 /* 6 degrees */
-#define LEAST_LIGHT 0.05 /* linear: darker pixels say too little in 8 bits */
+#define LEAST_LIGHT 0.05 /* linear: 8 bits are too coarse for darker pixels */
 
 struct measure {
 	const struct psr_truth *truth;
 	const struct psr_light *light;
 	struct view view;
-	double near_z;
 	uint32_t width, height;
 	const uint8_t *shadowed, *lit;
 	float *expected, *got; /* 0..1; -1: nothing to compare */
@@ -36,13 +35,12 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y)
 	double place[RAYS * RAYS][2];
 	struct truth_light light[RAYS * RAYS];
 	int n_reaching = 0;
-
 	m->expected[at] = m->got[at] = -1;
 	for (int i = 0; i < RAYS * RAYS; i++) {
 		place[i][0] = x + (i % RAYS + 0.5) / RAYS;
 		place[i][1] = y + (i / RAYS + 0.5) / RAYS;
 	}
-	truth_light(m->truth, &m->view, m->near_z, m->light, (const double(*)[2])place, RAYS * RAYS, light);
+	truth_light(m->truth, &m->view, m->light, (const double(*)[2])place, RAYS * RAYS, light);
 	for (int i = 0; i < RAYS * RAYS; i++) {
 		if (light[i].facing < LEAST_FACING)
 			return;
@@ -56,12 +54,11 @@ static void measure_pixel(const struct measure *m, uint32_t x, uint32_t y)
 static void measure_row(int y, void *userdata)
 {
 	const struct measure *m = userdata;
-
 	for (uint32_t x = 0; x < m->width; x++)
 		measure_pixel(m, x, (uint32_t)y);
 }
 
-/* Frames show an edge of the object up to some pixels off: what is dark there says nothing of shadows. */
+/* Skips edges of the object, which frames show up to some pixels off: darkness there is no shadow. */
 static int is_compared(const struct measure *m, uint32_t x, uint32_t y)
 {
 	if (m->got[(size_t)y * m->width + x] < 0 || x < APART || y < APART || x + APART >= m->width ||
@@ -74,16 +71,14 @@ static int is_compared(const struct measure *m, uint32_t x, uint32_t y)
 	return 1;
 }
 
-/* Pixels to the nearest one that should be as this one is. */
+/* The distance in pixels to the nearest one whose truth equals this one. */
 static double seam_at(const struct measure *m, uint32_t x, uint32_t y, int is_lit)
 {
 	double nearest = PSR_SHADOW_FAR;
-
 	for (int64_t j = -PSR_SHADOW_FAR; j <= PSR_SHADOW_FAR; j++)
 		for (int64_t i = -PSR_SHADOW_FAR; i <= PSR_SHADOW_FAR; i++) {
 			int64_t u = x + i, v = y + j;
 			size_t at = (size_t)(v * m->width + u);
-
 			if (u < 0 || v < 0 || u >= m->width || v >= m->height || m->expected[at] < 0)
 				continue;
 			if ((m->expected[at] >= 0.5f) == is_lit)
@@ -96,13 +91,11 @@ static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 {
 	const size_t n = (size_t)m->width * m->height;
 	double *seam = psr_alloc_array(n, sizeof *seam), sum = 0;
-
 	if (seam == NULL)
 		return PSR_ERR_MEMORY;
 	for (size_t at = 0; at < n; at++) {
 		double off = fabs((double)m->got[at] - (double)m->expected[at]);
 		int is_lit = m->got[at] >= 0.5f;
-
 		if (!is_compared(m, (uint32_t)(at % m->width), (uint32_t)(at / m->width)))
 			continue;
 		out->n_compared++;
@@ -125,11 +118,10 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_trut
                                 uint32_t height, const uint8_t *shadowed, const uint8_t *lit, int n_threads,
                                 struct psr_error *err)
 {
-	struct measure m = { .truth = truth, .light = light, .near_z = camera->near_z, .width = width, .height = height,
+	struct measure m = { .truth = truth, .light = light, .width = width, .height = height,
 		                 .shadowed = shadowed, .lit = lit };
 	struct psr_pool *pool = NULL;
 	int rc = view_init(&m.view, camera, width, height, err);
-
 	memset(out, 0, sizeof *out);
 	if (rc != PSR_OK)
 		return rc;

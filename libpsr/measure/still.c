@@ -28,7 +28,7 @@ static double linear_of(unsigned code, unsigned most)
 	return (double)psr_srgb_to_linear[(code * 255 + most / 2) / most];
 }
 
-/* Phong's light ([G] 7.3), as frames have it, of the surface's own attributes. */
+/* Phong's light ([G] 7.3), as in frames, from the surface's attributes. */
 static void light_place(const struct still *still, uint64_t attr, const double direction[3], double light[3])
 {
 	const struct psr_scene *scene = still->scene;
@@ -99,16 +99,16 @@ int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are outside of 1..%d", side, MOST_SIDE);
+		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", side, MOST_SIDE);
 	for (uint32_t l = 0; l < scene->n_lights; l++) {
 		if (scene->light[l].kind != PSR_LIGHT_DIRECTIONAL)
-			return psr_fail(err, PSR_ERR_UNSUPPORTED, "the truth of a still knows directional lights only");
+			return psr_fail(err, PSR_ERR_UNSUPPORTED, "the truth of a still supports directional lights only");
 		v3d_normalize(still.to_light[l], scene->light[l].direction);
 		v3d_scale(still.to_light[l], still.to_light[l], -1);
 	}
 	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	psr_pool_for(pool, (int)height, draw_row, &still);
 	psr_pool_destroy(pool);
 	return PSR_OK;

@@ -24,7 +24,6 @@ struct psr_truth {
 struct job {
 	const struct psr_truth *truth;
 	struct view view;
-	double near_z;
 	uint32_t side, n_columns;
 	float *depth;
 	float (*normal)[3];
@@ -40,7 +39,6 @@ int psr_truth_create(struct psr_truth **out, const struct psr_mesh *mesh, struct
 {
 	struct psr_truth *truth;
 	int rc = validate_mesh(mesh, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	truth = calloc(1, sizeof *truth);
@@ -82,22 +80,19 @@ void truth_ray(const struct psr_truth *truth, const struct view *view, double x,
 double truth_distance(const struct psr_truth *truth, const double point[3], double most)
 {
 	double inner[3];
-
 	for (int k = 0; k < 3; k++)
 		inner[k] = (point[k] - truth->origin[k]) / truth->scale;
 	return fmin(most, truth->scale * ray_scene_distance(truth->scene, inner, most / truth->scale));
 }
 
-int truth_is_met(const struct psr_truth *truth, const struct view *view, double near_z, double x, double y, int n,
-                 int side)
+int truth_is_met(const struct psr_truth *truth, const struct view *view, double x, double y, int n, int side)
 {
 	struct ray ray[MOST_SIDE];
 	struct ray_hit hit[MOST_SIDE];
-
 	for (int j = 0; j < side; j++) {
 		for (int i = 0; i < side; i++)
 			truth_ray(truth, view, x + (i + 0.5) / side * n, y + (j + 0.5) / side * n, &ray[i]);
-		ray_scene_trace(truth->scene, ray, side, near_z / truth->scale, hit);
+		truth_trace(truth, ray, side, view->near_z, hit);
 		for (int i = 0; i < side; i++)
 			if (hit[i].prim != RAY_NONE)
 				return 1;
@@ -105,13 +100,12 @@ int truth_is_met(const struct psr_truth *truth, const struct view *view, double 
 	return 0;
 }
 
-/* Both ways, since a face lets rays through from its back. */
+/* Traces both ways, since rays pass faces from behind. */
 static int is_between(const struct psr_truth *truth, const double from[3], const double to_light[3], double length)
 {
 	const double off = 1e-4;
 	struct ray ray = { { 0 }, { 0 } };
 	struct ray_hit hit;
-
 	if (length <= 2 * off)
 		return 0;
 	v3d_add_scaled(ray.origin, from, off, to_light);
@@ -125,19 +119,17 @@ static int is_between(const struct psr_truth *truth, const double from[3], const
 	return hit.prim != RAY_NONE;
 }
 
-void truth_light(const struct psr_truth *truth, const struct view *view, double near_z, const struct psr_light *light,
+void truth_light(const struct psr_truth *truth, const struct view *view, const struct psr_light *light,
                  const double (*place)[2], int n, struct truth_light *out)
 {
 	struct ray ray[RUN] = { { { 0 }, { 0 } } };
 	struct ray_hit hit[RUN];
-
 	for (int i = 0; i < n; i++)
 		truth_ray(truth, view, place[i][0], place[i][1], &ray[i]);
-	ray_scene_trace(truth->scene, ray, n, near_z / truth->scale, hit);
+	truth_trace(truth, ray, n, view->near_z, hit);
 	for (int i = 0; i < n; i++) {
 		double point[3], to_light[3], length = 4, facing = 0, seen = 0;
 		const float *normal;
-
 		out[i] = (struct truth_light){ -2, 0 };
 		if (hit[i].prim == RAY_NONE)
 			continue;
@@ -178,19 +170,17 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 {
 	const float *n = ray_scene_normal(job->truth->scene, hit->prim);
 	double facing = 0;
-
 	for (int k = 0; k < 3; k++)
 		facing += (double)n[k] * ray->direction[k];
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
 }
 
-/* Diffuse, unfiltered: the pixel's rays are its filter. */
+/* Unfiltered diffuse color: the rays of a pixel are its filter. */
 static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, uint8_t rgb[3])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
 	const float *normal = ray_scene_normal(truth->scene, hit->prim);
 	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, normal));
-
 	for (int c = 0; c < 3; c++)
 		rgb[c] = (uint8_t)(diffuse >> 8 * c);
 }
@@ -200,17 +190,14 @@ static void draw_row(int row, void *userdata)
 	const struct job *job = userdata;
 	struct ray ray[RUN];
 	struct ray_hit hit[RUN];
-
 	for (uint32_t first = 0; first < job->n_columns; first += RUN) {
 		uint32_t n = job->n_columns - first < RUN ? job->n_columns - first : RUN;
 		size_t at = (size_t)row * job->n_columns + first;
-
 		for (uint32_t i = 0; i < n; i++)
 			truth_ray(job->truth, &job->view, (first + i + 0.5) / job->side, (row + 0.5) / job->side, &ray[i]);
-		ray_scene_trace(job->truth->scene, ray, (int)n, job->near_z / job->truth->scale, hit);
+		truth_trace(job->truth, ray, (int)n, job->view.near_z, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			int is_met = hit[i].prim != RAY_NONE;
-
 			job->depth[at + i] = is_met ? (float)(hit[i].t * job->truth->scale) : INFINITY;
 			if (job->normal != NULL) {
 				v3f_set(job->normal[at + i], 0, 0, 0);
@@ -229,18 +216,17 @@ static void draw_row(int row, void *userdata)
 int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height,
                    uint32_t side, int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
 {
-	struct job job = { .truth = truth, .side = side, .near_z = camera->near_z, .depth = depth, .normal = normal,
+	struct job job = { .truth = truth, .side = side, .depth = depth, .normal = normal,
 		               .rgb = rgb };
 	struct psr_pool *pool;
 	int rc = view_init(&job.view, camera, width, height, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are outside of 1..%d", side, MOST_SIDE);
+		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", side, MOST_SIDE);
 	rc = psr_pool_create(&pool, n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%d threads cannot be started", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", n_threads);
 	job.n_columns = width * side;
 	psr_pool_for(pool, (int)(height * side), draw_row, &job);
 	psr_pool_destroy(pool);

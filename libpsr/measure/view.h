@@ -9,7 +9,8 @@
 struct view {
 	double eye[3], right[3], down[3], forward[3];
 	double width, height;
-	double pixel;       /* perspective: of a pixel at z' = 1; orthographic: of a pixel; world units */
+	double pixel;       /* a pixel's width in world units; perspective: at z' = 1 */
+	double near_z;
 	int is_perspective;
 };
 
@@ -17,7 +18,7 @@ struct view {
 int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height,
               struct psr_error *err);
 
-/* The ray through a place in the picture, in pixels from its top left corner: world = origin + z' * direction. */
+/* The ray through point (x, y) of the picture, in pixels from its top left corner: world = origin + z' * direction. */
 void view_ray(const struct view *view, double x, double y, double origin[3], double direction[3]);
 
 /* A pixel's width in world units at depth z'. */

@@ -1,5 +1,5 @@
-/* The .psr file from the inside: constants of docs/format.md, the table of known sections, and what the files of this
- * folder share. A model in memory is the image of its file, byte for byte, with pointers into it. */
+/* The .psr file: constants of docs/format.md, the table of known sections, and functions that the files of this folder
+ * share. A model in memory is the image of its file, byte for byte, with pointers into it. */
 #ifndef PSR_MODEL_FILE_H
 #define PSR_MODEL_FILE_H
 
@@ -14,7 +14,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MAJOR 5
 #define FILE_MINOR 0
 #define FILE_ALIGNMENT 64
-#define FILE_TAIL_BYTES 128 /* zeros at the end, so that 64 depths may be read beyond the last one of any section */
+#define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64
 #define FILE_ENTRY_BYTES 32
 #define FILE_CHUNK_BYTES ((uint64_t)1 << 20)
@@ -22,7 +22,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 
 #define MODEL_MAX_BLOCKS ((uint32_t)1 << 26)
 #define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 8)
-#define MODEL_LEAST_SPACING 0x1p-14f  /* places on finer lattices could not be told from spheres */
+#define MODEL_LEAST_SPACING 0x1p-14f  /* finer lattices would exceed the precision of spheres */
 #define MODEL_MAX_COORDINATE 1024.0f /* magnitude of any length or coordinate inside of a model */
 
 /* Byte offsets in the header, and in an entry of the table. */
@@ -31,7 +31,7 @@ enum { HEADER_MAJOR = 8, HEADER_MINOR = 10, HEADER_N_SECTIONS = 12, HEADER_FILE_
 enum { ENTRY_TYPE = 0, ENTRY_VERSION = 4, ENTRY_FLAGS = 6, ENTRY_OFFSET = 8, ENTRY_LENGTH = 16, ENTRY_HASH = 24 };
 enum { ENTRY_REQUIRED = 1 };
 
-/* What a section's length is counted in. */
+/* The unit of a section's length. */
 enum section_count {
 	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
 	COUNT_SAMPLES
@@ -92,32 +92,32 @@ static inline uint64_t file_align(uint64_t offset)
 	return (offset + FILE_ALIGNMENT - 1) / FILE_ALIGNMENT * FILE_ALIGNMENT;
 }
 
-/* Hashes that a section of this length keeps after the table: one a chunk, or none if it is a single chunk. */
+/* The number of chunk hashes after the table for a section of this length: one a chunk, none for a single chunk. */
 static inline uint64_t file_chunks(uint64_t length)
 {
 	return length > FILE_CHUNK_BYTES ? (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES : 0;
 }
 
-/* What a model says: structures by value, arrays by pointer. */
+/* The contents of a model: structures by value, arrays by pointer. */
 struct content {
 	struct psr_model_info info;
 	struct psr_blocks blocks;
 	struct psr_presets presets;
 };
 
-/* Number of items that the known section has in this model; section_array() is of those from SECTION_FIRST_ARRAY on. */
+/* The number of items of a known section in this model; section_array() is for sections from SECTION_FIRST_ARRAY on. */
 uint64_t section_items(const struct section_spec *spec, const struct content *content);
 const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
 
-/* The counts of BLKS, from its BLOCKS_BYTES; not checked. */
+/* Reads the counts of BLKS from its BLOCKS_BYTES, unchecked. */
 void file_get_counts(struct psr_blocks *blocks, const uint8_t *at);
 
-/* Lays a model out as a file in memory of psr_alloc_huge(), sealed. The counts must be within the limits and all
- * pointers but the optional ones set; the rest is left to the reader's checks. NULL if there is no memory. */
+/* Makes the file image of a model, in memory of psr_alloc_huge(), with hashes. Counts must be within the limits and all
+ * but optional pointers set; the reader checks the rest. NULL without memory. */
 uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes);
 
-/* Computes every hash of an image anew: chunks, sections, content id, header. What does not lie within the image is
- * left as it is, so that any bytes may be sealed. */
+/* Computes all hashes of an image: chunks, sections, content id, header. Ignores parts outside of the image, so that
+ * tests can seal any bytes. */
 void file_seal(uint8_t *bytes, size_t n_bytes);
 
 /* The hash of an entry: of the section, or of the list of its chunks' hashes (at `chunks`, already computed). */
@@ -125,20 +125,20 @@ uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_
 uint64_t file_header_hash(const uint8_t *bytes, uint64_t table_end);
 void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
 
-/* Checks the fixed part of a header; `name` begins the sentence of an error. Needs FILE_HEADER_BYTES bytes. */
+/* Checks the fixed part of a header of FILE_HEADER_BYTES; `name` begins the error text. */
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err);
 
-/* Checks everything and fills `content` with what the image says and pointers into it. The image must be aligned to
+/* Checks everything; fills `content` with the values of the image and pointers into it. The image must be aligned to
  * FILE_ALIGNMENT and outlive them. FORMAT, VERSION, UNSUPPORTED, MEMORY. */
 int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err);
 
-/* Every rule on values that docs/format.md states; the arrays have their lengths and may be read. */
+/* Checks all values by the rules of docs/format.md; lengths of arrays must be right. */
 int model_validate(const struct content *content, const char *name, struct psr_error *err);
 
-/* The rules of CAMS and LGTS, which model_validate() calls; on failure *section is the one that broke them. */
+/* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
 
-/* Copies as files have them: nothing but zeros after a name, in padding and where a kind does not use a field. */
+/* Copies with zeros after names, in padding and in unused fields, as in files. */
 void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);
 void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_light *from, uint32_t n);
 

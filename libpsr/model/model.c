@@ -11,7 +11,7 @@
 #include "file.h"
 #include "pack.h"
 
-#define MAX_NAME 200 /* of a path in an error, so that the sentence after it has room */
+#define MAX_NAME 200 /* of a path in an error text, to leave room for the sentence */
 
 struct psr_model {
 	atomic_uint n_refs;
@@ -30,13 +30,12 @@ static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
 		psr_free_huge((void *)bytes, n_bytes);
 }
 
-/* Takes the image over, on failure too. */
+/* Takes ownership of the image, on failure too. */
 static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
                  struct psr_error *err)
 {
 	struct psr_model *model = calloc(1, sizeof *model);
 	int code;
-
 	if (model == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
@@ -57,15 +56,14 @@ static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, i
 static const char *short_name(const char *path)
 {
 	size_t length = strlen(path);
-
 	return length > MAX_NAME ? path + length - MAX_NAME : path;
 }
 
-/* What is known of a file before it is read. */
+/* Facts about a file before reading. */
 struct found {
 	int fd, is_packed;
 	size_t n_bytes;   /* of the file */
-	uint64_t n_image; /* what it says that it unpacks to, if it is packed */
+	uint64_t n_image; /* its unpacked size by the header, if packed */
 };
 
 static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
@@ -73,7 +71,6 @@ static int adopt_packed(struct psr_model **out, const struct pack_source *source
 	uint8_t *image = NULL;
 	size_t n_image = 0;
 	int code = pack_open(&image, &n_image, source, err);
-
 	if (code == PSR_OK)
 		code = adopt(out, image, n_image, 0, source->name, err);
 	if (code == PSR_OK) {
@@ -83,15 +80,14 @@ static int adopt_packed(struct psr_model **out, const struct pack_source *source
 	return code;
 }
 
-/* Opens a regular file that begins as a .psr file. */
+/* Opens a regular file with the beginning of a .psr file. */
 static int open_file(struct found *found, const char *path, const char *name, struct psr_error *err)
 {
 	uint8_t header[FILE_HEADER_BYTES] = { 0 };
 	struct stat st;
 	ssize_t got;
 	int code, *fd = &found->fd;
-
-	/* Non-blocking, so that a pipe of that name does not hold anyone up. */
+	/* O_NONBLOCK: opening a pipe without a writer would wait for one. */
 	*fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 	if (*fd < 0)
 		return psr_fail(err, errno == ENOENT || errno == ENOTDIR ? PSR_ERR_NOT_FOUND : PSR_ERR_IO,
@@ -99,12 +95,12 @@ static int open_file(struct found *found, const char *path, const char *name, st
 	if (fstat(*fd, &st) != 0)
 		code = psr_fail(err, PSR_ERR_IO, "%s: cannot look at the file: %m", name);
 	else if (!S_ISREG(st.st_mode))
-		code = psr_fail(err, PSR_ERR_IO, "%s: this is not a regular file", name);
+		code = psr_fail(err, PSR_ERR_IO, "%s: not a regular file", name);
 	else if ((got = pread(*fd, header, sizeof header, 0)) < 0)
 		code = psr_fail(err, PSR_ERR_IO, "%s: cannot read the file: %m", name);
 	else if (got < FILE_HEADER_BYTES)
 		code = psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zd, within its header (bytes 0 to %d); it is "
-		                "no .psr file or was cut short", name, got, FILE_HEADER_BYTES);
+		                "not a .psr file or was cut short", name, got, FILE_HEADER_BYTES);
 	else
 		code = file_check_header(header, name, err);
 	if (code != PSR_OK) {
@@ -120,10 +116,8 @@ static int open_file(struct found *found, const char *path, const char *name, st
 static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, struct psr_error *err)
 {
 	size_t at = 0;
-
 	while (at < n_bytes) {
 		ssize_t got = read(fd, bytes + at, n_bytes - at);
-
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got < 0)
@@ -138,7 +132,6 @@ static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, st
 static int map_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
 {
 	void *bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
-
 	if (bytes == MAP_FAILED)
 		return psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
 	*out = bytes;
@@ -149,7 +142,6 @@ static int read_image(const uint8_t **out, int fd, size_t n_bytes, const char *n
 {
 	uint8_t *bytes = psr_alloc_huge(n_bytes);
 	int code;
-
 	if (bytes == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
 	code = read_all(fd, bytes, n_bytes, name, err);
@@ -167,7 +159,6 @@ static int open_model(struct psr_model **out, const char *path, int mapped, stru
 	const uint8_t *bytes = NULL;
 	struct found f;
 	int code = open_file(&f, path, name, err);
-
 	if (code != PSR_OK)
 		return code;
 	if (f.is_packed)
@@ -188,13 +179,12 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 	const char *name = short_name(path);
 	struct found f;
 	int code = open_file(&f, path, name, err);
-
 	if (code != PSR_OK)
 		return code;
 	close(f.fd);
 	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes))
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; more than %d to 1 "
-		                "is not believed", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; the limit is "
+		                "%d to 1", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
 	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model);
 	return PSR_OK;
 }
@@ -212,7 +202,6 @@ int psr_model_read(struct psr_model **out, const char *path, struct psr_error *e
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)
 {
 	uint8_t *copy;
-
 	if (n_bytes == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "the model has no bytes");
 	if (n_bytes >= FILE_HEADER_BYTES && file_check_header(bytes, "the model", NULL) == PSR_OK && pack_is_packed(bytes))
@@ -229,12 +218,11 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
                            const struct psr_presets *presets, struct psr_error *err)
 {
 	int n_cones;
-
 	if (info == NULL || blocks == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "a model needs its info and its blocks");
+		return psr_fail(err, PSR_ERR_ARG, "a model needs info and blocks; one is NULL");
 	if (memchr(info->builder, 0, sizeof info->builder) == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "the builder's name is longer than %zu bytes", sizeof info->builder - 1);
-	/* The other counts are no larger: the validator says so, once the image stands. */
+	/* The validator bounds the other counts by these, once the image exists. */
 	if (blocks->n_blocks > MODEL_MAX_BLOCKS || blocks->n_projections > MODEL_MAX_PROJECTIONS
 	    || blocks->n_clusters > blocks->n_blocks || blocks->n_masks > blocks->n_blocks
 	    || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
@@ -246,17 +234,17 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
 			return psr_fail(err, PSR_ERR_ARG, "the model's array for section %s is missing", section_table[k].type);
 	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_sine;
 	if (n_cones % 4 != 0)
-		return psr_fail(err, PSR_ERR_ARG, "of the four arrays of cones only %d are there", n_cones);
+		return psr_fail(err, PSR_ERR_ARG, "%d of the four arrays of cones are set; set all or none", n_cones);
 	if (blocks->traits != NULL && n_cones == 0)
-		return psr_fail(err, PSR_ERR_ARG, "the model's blocks have traits and no cones, by which bent blocks face");
+		return psr_fail(err, PSR_ERR_ARG, "the model's blocks have traits, but no cones, which bent blocks need");
 	if (blocks->opacity != NULL && blocks->traits == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "the model's samples have opacities, and its blocks no traits");
+		return psr_fail(err, PSR_ERR_ARG, "the model's samples have opacities, but its blocks have no traits");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
-		return psr_fail(err, PSR_ERR_ARG, "of visibility masks, their number and their indices only some are there");
+		return psr_fail(err, PSR_ERR_ARG, "set visibility masks, their number and their indices together, or none");
 	if (presets == NULL)
 		return PSR_OK;
 	if (presets->n_cameras > PSR_MAX_PRESETS || presets->n_lights > PSR_MAX_PRESETS)
-		return psr_fail(err, PSR_ERR_LIMIT, "%" PRIu32 " cameras and %" PRIu32 " lights; a model takes %d of each",
+		return psr_fail(err, PSR_ERR_LIMIT, "%" PRIu32 " cameras and %" PRIu32 " lights; the limit is %d of each",
 		                presets->n_cameras, presets->n_lights, PSR_MAX_PRESETS);
 	if ((presets->n_cameras != 0 && presets->camera == NULL) || (presets->n_lights != 0 && presets->light == NULL))
 		return psr_fail(err, PSR_ERR_ARG, "the model's array of cameras or lights is missing");
@@ -270,7 +258,6 @@ int psr_model_create(struct psr_model **out, const struct psr_model_info *info, 
 	uint64_t n_bytes;
 	uint8_t *bytes;
 	int code = check_arguments(info, blocks, presets, err);
-
 	if (code != PSR_OK)
 		return code;
 	content = (struct content){ .info = *info, .blocks = *blocks };

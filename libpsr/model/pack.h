@@ -1,5 +1,5 @@
-/* Packed .psr files (docs/format.md, "Packed files"): the table of the plain file, a directory of chunks, and the chunks,
- * compressed. What is unpacked is the plain file, byte for byte. */
+/* Packed .psr files (docs/format.md, "Packed files"): the table of the plain file, a directory of chunks, and the
+ * compressed chunks. They unpack to the plain file, byte for byte. */
 #ifndef PSR_MODEL_PACK_H
 #define PSR_MODEL_PACK_H
 
@@ -16,13 +16,13 @@ enum pack_method {
 	PACK_STORED,      /* the chunk itself */
 	PACK_PLAIN,       /* zstd of the chunk */
 	PACK_PLANES,      /* zstd of its byte planes */
-	PACK_DIFFERENCES, /* zstd of the byte planes of the differences of its words */
-	PACK_XOR,         /* the same with exclusive or for the difference */
+	PACK_DIFFERENCES, /* zstd of the byte planes of the differences of successive words */
+	PACK_XOR,         /* the same with exclusive or */
 	PACK_N_METHODS
 };
-#define PACK_LEVEL 9 /* measured: level 19 saves 2 to 9 % and takes ten times as long */
+#define PACK_LEVEL 9 /* level 19 saves 2 to 9 % more in ten times the time */
 
-/* A file may not claim to unpack to more than this, so that a small one cannot take all memory. */
+/* Greatest ratio of unpacked to packed size, so that a small file cannot claim all memory. */
 #define PACK_MAX_RATIO 64
 static inline uint64_t pack_max_image(uint64_t file_bytes)
 {
@@ -34,8 +34,8 @@ static inline uint64_t pack_chunks(uint64_t length)
 	return (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES;
 }
 
-/* Words of a chunk: 1, 2, 4 or 8 bytes; bytes beyond the last whole word stay where they are, in every method. Differences
- * are to the word before, modulo 2^(8 stride); the first word's is to 0. */
+/* Words of a chunk: 1, 2, 4 or 8 bytes; no method moves bytes beyond the last whole word. Differences are to the word
+ * before, modulo 2^(8 stride), the first word's to 0. */
 static inline int pack_is_stride(uint32_t stride)
 {
 	return stride == 1 || stride == 2 || stride == 4 || stride == 8;
@@ -43,7 +43,7 @@ static inline int pack_is_stride(uint32_t stride)
 void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t stride, enum pack_method method);
 void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t stride, enum pack_method method);
 
-/* Where a packed file is read from: a descriptor, or memory if it is -1. */
+/* The source of a packed file: a descriptor, or memory if that is -1. */
 struct pack_source {
 	int fd;
 	const uint8_t *bytes;
@@ -53,14 +53,14 @@ struct pack_source {
 
 int pack_is_packed(const uint8_t *header); /* FILE_HEADER_BYTES of them */
 
-/* The plain image, in memory of psr_alloc_huge(); file_parse() has still to check it. FORMAT, VERSION, IO, MEMORY. */
+/* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). FORMAT, VERSION, IO, MEMORY. */
 int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source, struct psr_error *err);
 
-/* The packed file of an image, in memory of psr_alloc_huge() of *capacity bytes, of which *n_bytes are the file. */
+/* Packs an image: *n_bytes in memory of psr_alloc_huge() of *capacity bytes. */
 int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,
                struct psr_error *err);
 
-/* As file_seal(), for a packed file: hashes of chunks and header, of what lies within it. */
+/* As file_seal(), for a packed file: hashes of chunks and header. */
 void pack_seal(uint8_t *bytes, size_t n_bytes);
 
 #endif

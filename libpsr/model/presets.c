@@ -2,12 +2,11 @@
 #include "base/view.h"
 #include "file.h"
 
-/* What a kind does not use is zero in files: there is no byte that no rule covers. */
+/* Unused fields are zero in files, so that rules cover every byte. */
 static void put_name(char to[PSR_NAME_BYTES], const char from[PSR_NAME_BYTES])
 {
-	/* A name without an end stays as it is: the validator refuses it. */
+	/* Copies a name without an end unchanged; the validator refuses it. */
 	size_t length = strnlen(from, PSR_NAME_BYTES);
-
 	memcpy(to, from, length);
 	memset(to + length, 0, PSR_NAME_BYTES - length);
 }
@@ -17,7 +16,6 @@ void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_ca
 	for (uint32_t i = 0; i < n; i++) {
 		const struct psr_camera *c = &from[i].camera;
 		struct psr_camera *k = &to[i].camera;
-
 		memset(&to[i], 0, sizeof to[i]);
 		put_name(to[i].name, from[i].name);
 		memcpy(k->eye, c->eye, sizeof k->eye);
@@ -36,7 +34,6 @@ void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_ligh
 		const struct psr_light *l = &from[i].light;
 		struct psr_light *k = &to[i].light;
 		int is_placed = l->kind != PSR_LIGHT_DIRECTIONAL, is_spot = l->kind == PSR_LIGHT_SPOT;
-
 		memset(&to[i], 0, sizeof to[i]);
 		put_name(to[i].name, from[i].name);
 		k->kind = l->kind;
@@ -51,13 +48,12 @@ void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_ligh
 	}
 }
 
-/* Length of the UTF-8 sequence of a character at s, or 0 if it is none, or of what has no picture (C0, DEL, C1). */
+/* The length of the UTF-8 character at s; 0 for other bytes and for control characters (C0, DEL, C1). */
 static size_t character_bytes(const uint8_t *s, size_t n)
 {
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
 	size_t length = s[0] < 0x80 ? 1 : s[0] >> 5 == 6 ? 2 : s[0] >> 4 == 14 ? 3 : s[0] >> 3 == 30 ? 4 : 0;
 	uint32_t code = length == 1 ? s[0] : s[0] & (0x7fu >> length);
-
 	if (length == 0 || length > n)
 		return 0;
 	for (size_t i = 1; i < length; i++) {
@@ -74,7 +70,6 @@ static size_t character_bytes(const uint8_t *s, size_t n)
 static int check_name(const char name[PSR_NAME_BYTES], const char *what, uint32_t number, struct psr_error *err)
 {
 	size_t length = strnlen(name, PSR_NAME_BYTES);
-
 	if (length == 0 || length == PSR_NAME_BYTES)
 		return psr_fail(err, PSR_ERR_FORMAT, "the name of %s %" PRIu32 " %s", what, number,
 		                length == 0 ? "is empty" : "has no end");
@@ -87,7 +82,7 @@ static int check_name(const char name[PSR_NAME_BYTES], const char *what, uint32_
 	return PSR_OK;
 }
 
-/* `stride` bytes from name to name. */
+/* Names are `stride` bytes apart. */
 static int check_unlike(const char *first, size_t stride, uint32_t n, const char *what, struct psr_error *err)
 {
 	for (uint32_t i = 1; i < n; i++)
@@ -103,14 +98,13 @@ static int check_cameras(const struct psr_presets *p, struct psr_error *err)
 		struct psr_preset_camera clean;
 		struct psr_error what = { 0 };
 		int code = check_name(p->camera[i].name, "camera", i, err);
-
 		if (code != PSR_OK)
 			return code;
 		if (view_check_camera(&p->camera[i].camera, &what) != PSR_OK)
 			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": %s", i, what.text);
 		preset_put_cameras(&clean, &p->camera[i], 1);
 		if (memcmp(&clean, &p->camera[i], sizeof clean) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": bytes that it does not use are not zero", i);
+			return psr_fail(err, PSR_ERR_FORMAT, "camera %" PRIu32 ": unused bytes are not zero", i);
 	}
 	return check_unlike((const char *)p->camera, sizeof *p->camera, p->n_cameras, "camera", err);
 }
@@ -121,14 +115,13 @@ static int check_lights(const struct psr_presets *p, struct psr_error *err)
 		struct psr_preset_light clean;
 		struct psr_error what = { 0 };
 		int code = check_name(p->light[i].name, "light", i, err);
-
 		if (code != PSR_OK)
 			return code;
 		if (view_check_light(&p->light[i].light, &what) != PSR_OK)
 			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": %s", i, what.text);
 		preset_put_lights(&clean, &p->light[i], 1);
 		if (memcmp(&clean, &p->light[i], sizeof clean) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": bytes that it does not use are not zero", i);
+			return psr_fail(err, PSR_ERR_FORMAT, "light %" PRIu32 ": unused bytes are not zero", i);
 	}
 	return check_unlike((const char *)p->light, sizeof *p->light, p->n_lights, "light", err);
 }
@@ -136,7 +129,6 @@ static int check_lights(const struct psr_presets *p, struct psr_error *err)
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err)
 {
 	int code;
-
 	*section = "CAMS";
 	code = check_cameras(presets, err);
 	if (code != PSR_OK)

@@ -5,7 +5,7 @@
 #include <xxhash.h>
 #include "file.h"
 
-/* What is known of an image while it is read. */
+/* An image during reading. */
 struct reader {
 	const uint8_t *bytes;
 	uint64_t n_bytes, file_size, table_end;
@@ -21,7 +21,6 @@ static int bad(const struct reader *r, const char *format, ...)
 {
 	char what[256];
 	va_list args;
-
 	va_start(args, format);
 	vsnprintf(what, sizeof what, format, args);
 	va_end(args);
@@ -46,7 +45,6 @@ static struct section get_section(const struct reader *r, uint32_t index)
 		.length = file_get(entry + ENTRY_LENGTH, 8),
 		.hash = file_get(entry + ENTRY_HASH, 8),
 	};
-
 	for (int i = 0; i < 4; i++)
 		s.type[i] = entry[ENTRY_TYPE + i] > ' ' && entry[ENTRY_TYPE + i] < 127 ? (char)entry[ENTRY_TYPE + i] : '?';
 	return s;
@@ -55,9 +53,8 @@ static struct section get_section(const struct reader *r, uint32_t index)
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err)
 {
 	uint64_t major = file_get(header + HEADER_MAJOR, 2), minor = file_get(header + HEADER_MINOR, 2);
-
 	if (memcmp(header, FILE_MAGIC, 8) != 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: this is no .psr file: it does not begin as one", name);
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: not a .psr file: it begins otherwise", name);
 	if (major != FILE_MAJOR)
 		return psr_fail(err, PSR_ERR_VERSION, "%s: the file has format %" PRIu64 ".%" PRIu64
 		                ", and this build reads %d.x; build the model again or take another version of psr", name,
@@ -69,12 +66,11 @@ static int check_table(struct reader *r)
 {
 	const uint8_t *header = r->bytes;
 	uint64_t n_sections, n_chunks;
-
 	n_sections = file_get(header + HEADER_N_SECTIONS, 4);
 	n_chunks = file_get(header + HEADER_N_CHUNKS, 4);
 	r->file_size = file_get(header + HEADER_FILE_SIZE, 8);
 	if (n_sections > FILE_MAX_SECTIONS)
-		return bad(r, "the header counts %" PRIu64 " sections, more than the %d there can be", n_sections,
+		return bad(r, "the header lists %" PRIu64 " sections, more than the %d there can be", n_sections,
 		           FILE_MAX_SECTIONS);
 	r->n_sections = (uint32_t)n_sections;
 	r->table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * n_chunks;
@@ -95,13 +91,12 @@ static int fail_cut(const struct reader *r, const struct section *s)
 	           "); it was cut short", r->n_bytes, s->type, s->offset, s->offset + s->length);
 }
 
-/* Sections follow each other in the order of the table, each padded to FILE_ALIGNMENT, with nothing between. */
+/* Sections follow each other in the order of the table, each padded to FILE_ALIGNMENT. */
 static int check_places(const struct reader *r)
 {
 	uint64_t at = file_align(r->table_end), n_chunks = 0;
 	uint64_t n_listed = (r->table_end - FILE_HEADER_BYTES - FILE_ENTRY_BYTES * r->n_sections) / 8;
 	struct section s = { .type = "none" };
-
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		s = get_section(r, i);
 		if (s.offset != at)
@@ -142,14 +137,11 @@ static int check_hashes(const struct reader *r)
 {
 	const uint8_t *chunks = r->bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * r->n_sections;
 	uint8_t id[16];
-
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		struct section s = get_section(r, i);
 		uint64_t n_chunks = file_chunks(s.length);
-
 		for (uint64_t k = 0; k < n_chunks; k++) {
 			uint64_t first = k * FILE_CHUNK_BYTES, left = s.length - first;
-
 			if (XXH64(r->bytes + s.offset + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0)
 			    != file_get(chunks + 8 * k, 8))
 				return bad(r, "section %s at byte %" PRIu64 " is damaged: the hash of its chunk %" PRIu64 " differs",
@@ -173,8 +165,7 @@ static int known_index(const uint8_t *type)
 	return -1;
 }
 
-/* Fills r->entry. What must be understood and is not is refused; optional sections of other types or versions are
- * skipped. */
+/* Fills r->entry. Refuses unknown required sections; skips optional ones of other types or versions. */
 static int sort_sections(struct reader *r)
 {
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
@@ -182,7 +173,6 @@ static int sort_sections(struct reader *r)
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		struct section s = get_section(r, i);
 		int known = known_index(s.raw_type);
-
 		for (uint32_t k = 0; k < i; k++)
 			if (memcmp(get_section(r, k).raw_type, s.raw_type, 4) == 0)
 				return bad(r, "there are two sections %s, at bytes %" PRIu64 " and %" PRIu64, s.type,
@@ -206,7 +196,6 @@ static int sort_sections(struct reader *r)
 static int check_length(const struct reader *r, int known, uint64_t expected)
 {
 	struct section s = get_section(r, (uint32_t)r->entry[known]);
-
 	if (s.length != expected)
 		return bad(r, "section %s at byte %" PRIu64 " has %" PRIu64 " bytes and should have %" PRIu64, s.type, s.offset,
 		           s.length, expected);
@@ -217,7 +206,6 @@ static int get_info(const struct reader *r, struct psr_model_info *info)
 {
 	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_INFO]).offset;
 	int code = check_length(r, SECTION_INFO, INFO_BYTES);
-
 	if (code != PSR_OK)
 		return code;
 	for (int k = 0; k < 3; k++) {
@@ -243,25 +231,23 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 {
 	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_BLOCKS]).offset;
 	int code = check_length(r, SECTION_BLOCKS, BLOCKS_BYTES);
-
 	if (code != PSR_OK)
 		return code;
 	file_get_counts(blocks, at);
 	if (file_get(at + 28, 4) != 0)
 		return bad(r, "section BLKS: reserved bytes are not zero");
-	/* With 32-bit counts and this no product below overflows; the counts' own limits are the validator's. */
+	/* With this and 32-bit counts no product below overflows; the validator checks the limits of counts. */
 	if (blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
 		return bad(r, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", blocks->n_samples,
 		           blocks->n_blocks);
 	return PSR_OK;
 }
 
-/* How many items of that length the optional section has, 1 to PSR_MAX_PRESETS, or 0 if it is absent. */
+/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS, or 0 if it is missing. */
 static int get_presets(const struct reader *r, int known, uint32_t *n, const void **array)
 {
 	struct section s;
 	uint32_t item_bytes = section_table[known].item_bytes;
-
 	*n = 0;
 	*array = NULL;
 	if (r->entry[known] < 0)
@@ -278,12 +264,10 @@ static int get_presets(const struct reader *r, int known, uint32_t *n, const voi
 static int get_arrays(const struct reader *r, struct content *content)
 {
 	struct psr_blocks *blocks = &content->blocks;
-
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
 		const void *array;
 		int code;
-
 		if (r->entry[k] < 0)
 			continue;
 		code = check_length(r, k, spec->item_bytes * section_items(spec, content));
@@ -293,13 +277,13 @@ static int get_arrays(const struct reader *r, struct content *content)
 		memcpy((char *)blocks + spec->pointer, &array, sizeof array);
 	}
 	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
-		return bad(r, "of the sections CONX, CONY, CONZ and CONS only some are there");
+		return bad(r, "some of the sections CONX, CONY, CONZ and CONS are missing");
 	if (blocks->traits && !blocks->cone_x)
-		return bad(r, "section TRTS is there without CONX, CONY, CONZ and CONS, by which bent blocks face");
+		return bad(r, "section TRTS needs CONX, CONY, CONZ and CONS, which are missing");
 	if (blocks->opacity && !blocks->traits)
-		return bad(r, "section OPAC is there without TRTS, which says what blocks have opacities");
+		return bad(r, "section OPAC needs TRTS, which is missing");
 	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
-		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS only some are there");
+		return bad(r, "of the sections VISI and VISM and their number of masks in BLKS some are missing");
 	return PSR_OK;
 }
 
@@ -308,11 +292,10 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	const void *camera = NULL, *light = NULL;
 	struct reader r = { .bytes = bytes, .n_bytes = n_bytes, .name = name, .err = err };
 	int code;
-
 	assert((uintptr_t)bytes % FILE_ALIGNMENT == 0);
 	if (n_bytes < FILE_HEADER_BYTES) {
 		if (memcmp(bytes, FILE_MAGIC, n_bytes < 8 ? n_bytes : 8) != 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: this is no .psr file: it does not begin as one", name);
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: not a .psr file: it begins otherwise", name);
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the file ends at byte %zu, within its header (bytes 0 to %d); it was "
 		                "cut short", name, n_bytes, FILE_HEADER_BYTES);
 	}
@@ -328,7 +311,8 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	if (code != PSR_OK)
 		return code;
 	if (r.entry[SECTION_BLOCKS] < 0)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: the file has no section BLKS, and this build draws nothing else",
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "%s: the file has no section BLKS, the only kind of samples that this build draws",
 		                name);
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
 		if (section_table[k].flags & ENTRY_REQUIRED && r.entry[k] < 0)

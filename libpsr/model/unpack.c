@@ -8,7 +8,7 @@
 #include "base/mem.h"
 #include "pack.h"
 
-/* A packed file while it is read. `head` is its beginning: header, table, hashes of chunks, directory. */
+/* A packed file during reading. `head`: header, table, hashes of chunks, directory. */
 struct unpacker {
 	const struct pack_source *source;
 	struct psr_error *err;
@@ -26,7 +26,6 @@ static int bad(const struct unpacker *u, const char *format, ...)
 {
 	char what[256];
 	va_list args;
-
 	va_start(args, format);
 	vsnprintf(what, sizeof what, format, args);
 	va_end(args);
@@ -41,9 +40,9 @@ int pack_is_packed(const uint8_t *header)
 static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 {
 	const struct pack_source *s = u->source;
-
 	if (at > s->n_bytes || n > s->n_bytes - at)
-		return bad(u, "the file ends at byte %" PRIu64 ", and bytes %" PRIu64 " to %" PRIu64 " are needed; it was cut short",
+		return bad(u,
+		           "the file ends at byte %" PRIu64 ", and bytes %" PRIu64 " to %" PRIu64 " are needed; it was cut short",
 		           s->n_bytes, at, at + n);
 	if (s->fd < 0) {
 		memcpy(to, s->bytes + at, n);
@@ -51,7 +50,6 @@ static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 	}
 	for (uint64_t done = 0; done < n;) {
 		ssize_t got = pread(s->fd, to + done, n - done, (off_t)(at + done));
-
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got < 0)
@@ -69,27 +67,27 @@ static const uint8_t *entry_at(const struct unpacker *u, uint64_t i)
 	return u->head + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 }
 
-/* Everything before the first chunk, and whether its own hash is right; nothing of it has been followed before. */
+/* Reads everything before the first chunk and checks its hash, before it follows any of it. */
 static int read_head(struct unpacker *u)
 {
 	uint64_t n_chunks = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
 	int code;
-
 	if (packing != PACKING_ZSTD)
-		return psr_fail(u->err, PSR_ERR_VERSION, "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
+		return psr_fail(u->err, PSR_ERR_VERSION,
+		                "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
 		                "a newer psr may read it", u->source->name, packing, PACKING_ZSTD);
 	size = file_get(u->header + HEADER_PACKED_SIZE, 8);
 	u->n_image = file_get(u->header + HEADER_FILE_SIZE, 8);
 	u->n_sections = (uint32_t)file_get(u->header + HEADER_N_SECTIONS, 4);
 	if (u->n_sections > FILE_MAX_SECTIONS)
-		return bad(u, "the header counts %" PRIu32 " sections, more than the %d there can be", u->n_sections,
+		return bad(u, "the header lists %" PRIu32 " sections, more than the %d there can be", u->n_sections,
 		           FILE_MAX_SECTIONS);
 	if (size > u->source->n_bytes)
 		return bad(u, "the file ends at byte %" PRIu64 " of %" PRIu64 "; it was cut short", u->source->n_bytes, size);
 	if (size < u->source->n_bytes)
 		return bad(u, "%" PRIu64 " bytes follow the end of the file's last chunk", u->source->n_bytes - size);
 	if (u->n_image > pack_max_image(size))
-		return bad(u, "the header says that %" PRIu64 " bytes unpack to %" PRIu64 "; more than %d to 1 is not believed",
+		return bad(u, "the header says that %" PRIu64 " bytes unpack to %" PRIu64 "; the limit is %d to 1",
 		           size, u->n_image, PACK_MAX_RATIO);
 	u->table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)u->n_sections
 	               + 8 * file_get(u->header + HEADER_N_CHUNKS, 4);
@@ -102,7 +100,6 @@ static int read_head(struct unpacker *u)
 	code = fetch(u, u->head, 0, u->table_end);
 	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
 		uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
-
 		if (length > u->n_image)
 			return bad(u, "section %" PRIu32 " has %" PRIu64 " of %" PRIu64 " bytes", i, length, u->n_image);
 		n_chunks += pack_chunks(length);
@@ -110,7 +107,8 @@ static int read_head(struct unpacker *u)
 	/* At most 256 sections of 64 times the file: no product overflows. */
 	u->head_end = u->table_end + PACK_ENTRY_BYTES * n_chunks;
 	if (code == PSR_OK && u->head_end > size)
-		return bad(u, "the directory of chunks ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->head_end, size);
+		return bad(u, "the directory of chunks ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->head_end,
+		           size);
 	psr_free(u->head);
 	u->head = psr_alloc_array(u->head_end, 1);
 	if (u->head == NULL)
@@ -124,26 +122,23 @@ static int read_head(struct unpacker *u)
 	return code;
 }
 
-/* The places of sections in the image, the sizes of chunks in the file: all that is needed to follow them. */
+/* Checks the offsets of sections in the image and the sizes of chunks in the file. */
 static int check_head(const struct unpacker *u)
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t image_at = file_align(u->table_end), file_at = u->head_end, n = 0;
-
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = entry_at(u, i);
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
-
 		if (offset != image_at)
 			return bad(u, "section %" PRIu32 " begins at byte %" PRIu64 " instead of %" PRIu64, i, offset, image_at);
 		image_at = file_align(image_at + length);
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint64_t packed = file_get(next + PACK_LENGTH, 4);
-
 			if (next[PACK_METHOD] >= PACK_N_METHODS || !pack_is_stride(next[PACK_STRIDE])
 			    || file_get(next + 6, 2) != 0)
-				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is not known", n,
+				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is unknown", n,
 				           next[PACK_METHOD], next[PACK_STRIDE]);
 			if (next[PACK_METHOD] == PACK_STORED ? packed != size : packed >= size || packed == 0)
 				return bad(u, "chunk %" PRIu64 " of %" PRIu64 " bytes is packed into %" PRIu64, n, size, packed);
@@ -165,7 +160,6 @@ static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, co
 	enum pack_method method = entry[PACK_METHOD];
 	size_t got;
 	int code = fetch(u, u->packed, at, packed);
-
 	if (code != PSR_OK)
 		return code;
 	if (XXH64(u->packed, packed, 0) != file_get(entry + PACK_HASH, 8))
@@ -188,21 +182,18 @@ static int is_blocks(const uint8_t *entry)
 	       && file_get(entry + ENTRY_LENGTH, 8) == BLOCKS_BYTES;
 }
 
-/* All chunks into the image; or, while there is no image, that of BLKS alone into `blocks`. */
+/* Unpacks all chunks into the image; or, if that is NULL, the chunk of BLKS alone into `blocks`. */
 static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t blocks[BLOCKS_BYTES])
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t at = u->head_end, n = 0;
-
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = entry_at(u, i);
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
-
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint8_t *to = image != NULL ? image + offset + first : is_blocks(entry) ? blocks : NULL;
 			int code = to != NULL ? unpack_chunk(u, to, size, next, at, n) : PSR_OK;
-
 			if (code != PSR_OK)
 				return code;
 			at += file_get(next + PACK_LENGTH, 4);
@@ -211,15 +202,14 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t block
 	return PSR_OK;
 }
 
-/* Known sections have the lengths that the counts in BLKS ask for, before any memory is: file_parse() says more about
- * what else may be wrong. */
+/* Compares lengths of known sections with the counts in BLKS before allocating; file_parse() reports other errors
+ * better. */
 static int check_lengths(const struct unpacker *u)
 {
 	uint8_t at[BLOCKS_BYTES] = { 0 };
 	struct content content = { .blocks = { 0 } };
 	uint32_t n_found = 0;
 	int code;
-
 	for (uint32_t i = 0; i < u->n_sections; i++)
 		n_found += (uint32_t)is_blocks(entry_at(u, i));
 	if (n_found == 0)
@@ -235,7 +225,6 @@ static int check_lengths(const struct unpacker *u)
 		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 			const struct section_spec *spec = &section_table[k];
 			uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
-
 			if (memcmp(entry_at(u, i), spec->type, 4) == 0
 			    && file_get(entry_at(u, i) + ENTRY_VERSION, 2) == spec->version
 			    && length != spec->item_bytes * section_items(spec, &content))
@@ -250,7 +239,6 @@ static int make_image(struct unpacker *u, uint8_t **out)
 {
 	uint8_t *image = psr_alloc_huge(u->n_image);
 	int code;
-
 	if (image == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a model of %" PRIu64 " bytes", u->source->name,
 		                u->n_image);
@@ -271,7 +259,6 @@ int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source
 {
 	struct unpacker u = { .source = source, .err = err };
 	int code = fetch(&u, u.header, 0, FILE_HEADER_BYTES);
-
 	if (code == PSR_OK)
 		code = read_head(&u);
 	if (code == PSR_OK)
@@ -299,13 +286,11 @@ int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source
 void pack_seal(uint8_t *bytes, size_t n_bytes)
 {
 	uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), n_chunks = 0, at, head_end, table_end;
-
 	table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4);
 	if (n_sections > FILE_MAX_SECTIONS || table_end > n_bytes)
 		return;
 	for (uint64_t i = 0; i < n_sections; i++) {
 		uint64_t length = file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8);
-
 		n_chunks += length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
 	}
 	if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
@@ -314,7 +299,6 @@ void pack_seal(uint8_t *bytes, size_t n_bytes)
 	for (uint64_t i = 0; i < n_chunks; i++) {
 		uint8_t *entry = bytes + table_end + PACK_ENTRY_BYTES * i;
 		uint64_t length = file_get(entry + PACK_LENGTH, 4);
-
 		if (length > n_bytes - at)
 			break;
 		file_put(entry + PACK_HASH, 8, XXH64(bytes + at, length, 0));

@@ -7,8 +7,8 @@
 #include "base/vec.h"
 #include "file.h"
 
-/* Unit vectors in single precision: a component that went through eight roundings of 2^-24 on either side of a product
- * leaves a scalar product of two of them at most 2 * 8 * 2^-24 off. */
+/* Unit vectors in single precision: if components went through eight roundings of 2^-24 on either side of a product, a
+ * scalar product of two of them is at most 2 * 8 * 2^-24 off. */
 #define UNIT_TOLERANCE 0x1p-20f
 
 struct checker {
@@ -26,14 +26,13 @@ static int fail(const struct checker *c, const char *section, const char *format
 {
 	char what[256];
 	va_list args;
-
 	va_start(args, format);
 	vsnprintf(what, sizeof what, format, args);
 	va_end(args);
 	return psr_fail(c->err, PSR_ERR_FORMAT, "%s: section %s: %s", c->name, section, what);
 }
 
-/* False for NaN too. */
+/* Returns 0 for NaN, too. */
 static int is_length(float v)
 {
 	return v >= 0 && v <= MODEL_MAX_COORDINATE;
@@ -53,7 +52,6 @@ static int check_info(const struct checker *c)
 {
 	const struct psr_model_info *info = c->info;
 	size_t length = strnlen(info->builder, sizeof info->builder);
-
 	for (int k = 0; k < 3; k++) {
 		if (!isfinite(info->origin[k]))
 			return fail(c, "INFO", "the origin is not finite");
@@ -82,7 +80,6 @@ static int check_info(const struct checker *c)
 static int check_counts(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
-
 	if (b->n_blocks == 0 || b->n_blocks > MODEL_MAX_BLOCKS)
 		return fail(c, "BLKS", "%" PRIu32 " blocks; it must be 1 to %" PRIu32, b->n_blocks, MODEL_MAX_BLOCKS);
 	if (b->n_projections == 0 || b->n_projections > MODEL_MAX_PROJECTIONS)
@@ -102,7 +99,6 @@ static int check_projections(const struct checker *c)
 	for (uint32_t i = 0; i < c->blocks->n_projections; i++) {
 		const struct psr_projection *p = &c->blocks->projection[i];
 		float z[3];
-
 		/* Not (... <= ...), so that NaN fails as well. */
 		for (int k = 0; k < 3; k++)
 			if (!is_unit(p->axis[k]) || !(fabsf(v3f_dot(p->axis[k], p->axis[(k + 1) % 3])) <= UNIT_TOLERANCE))
@@ -121,7 +117,6 @@ static int check_cluster(const struct checker *c, uint32_t i, uint64_t next_bloc
 {
 	const struct psr_blocks *b = c->blocks;
 	const struct psr_cluster *k = &b->cluster[i];
-
 	if (k->first_block != next_block || k->n_blocks == 0 || k->n_blocks > b->n_blocks - next_block)
 		return fail(c, "CLUS", "cluster %" PRIu32 " has %" PRIu32 " blocks from %" PRIu32 " on; the next free one is %"
 		            PRIu64 " of %" PRIu32, i, k->n_blocks, k->first_block, next_block, b->n_blocks);
@@ -149,14 +144,12 @@ static int check_clusters(const struct checker *c)
 	uint64_t next_block = 0;
 	uint32_t *levels_of_group;
 	int code = PSR_OK;
-
 	levels_of_group = psr_alloc_array(b->n_clusters, sizeof *levels_of_group);
 	if (levels_of_group == NULL)
 		return psr_fail(c->err, PSR_ERR_MEMORY, "%s: no memory to check %" PRIu32 " clusters", c->name, b->n_clusters);
 	memset(levels_of_group, 0, b->n_clusters * sizeof *levels_of_group);
 	for (uint32_t i = 0; i < b->n_clusters && code == PSR_OK; i++) {
 		const struct psr_cluster *k = &b->cluster[i];
-
 		code = check_cluster(c, i, next_block);
 		if (code != PSR_OK)
 			break;
@@ -176,7 +169,6 @@ static int check_heads(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
 	uint64_t n_samples = 0;
-
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
@@ -199,7 +191,6 @@ static int check_heads(const struct checker *c)
 static int check_visibility(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
-
 	for (uint32_t i = 0; i < psr_blocks_runs(b); i++)
 		if (b->run[i].visibility_first > b->n_masks)
 			return fail(c, "RUNS", "the visibility masks of run %" PRIu32 " begin at %" PRIu32 " of %" PRIu32, i,
@@ -214,16 +205,15 @@ static int check_visibility(const struct checker *c)
 static int check_cones(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
-
 	if (b->cone_x == NULL)
 		return PSR_OK;
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		const int axis[3] = { abs(b->cone_x[i]), abs(b->cone_y[i]), abs(b->cone_z[i]) };
 		int greatest = axis[0] > axis[1] ? axis[0] : axis[1];
-
 		greatest = axis[2] > greatest ? axis[2] : greatest;
 		if (greatest != 127)
-			return fail(c, "CONX, CONY, CONZ", "the greatest component of the axis of block %" PRIu32 " is %d instead of 127",
+			return fail(c, "CONX, CONY, CONZ",
+			            "the greatest component of the axis of block %" PRIu32 " is %d instead of 127",
 			            i, greatest);
 	}
 	return PSR_OK;
@@ -232,7 +222,6 @@ static int check_cones(const struct checker *c)
 static int check_traits(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
-
 	for (uint32_t i = 0; b->traits != NULL && i < b->n_blocks; i++)
 		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER)) != 0)
 			return fail(c, "TRTS", "block %" PRIu32 " has traits %d, of which some are unknown", i, b->traits[i]);
@@ -243,7 +232,6 @@ static int check_presets(const struct checker *c)
 {
 	struct psr_error err = { 0 };
 	const char *section = NULL;
-
 	return presets_validate(c->presets, &section, &err) == PSR_OK ? PSR_OK : fail(c, section, "%s", err.text);
 }
 
@@ -255,7 +243,6 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 	};
 	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;
-
 	for (size_t i = 0; i < sizeof checks / sizeof checks[0] && code == PSR_OK; i++)
 		code = checks[i](&c);
 	return code;

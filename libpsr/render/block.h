@@ -1,9 +1,9 @@
-/* Samples of blocks, where more than one stage reads them. */
+/* Access to single samples of blocks. */
 #ifndef PSR_RENDER_BLOCK_H
 #define PSR_RENDER_BLOCK_H
 
 #include "base/direction.h"
-#include "render.h"
+#include "plan.h"
 
 /* Index of a valid sample's depth and attributes. */
 static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uint32_t sample)
@@ -12,7 +12,7 @@ static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uin
 	return (size_t)psr_blocks_attr_first(b, block) + (size_t)__builtin_popcountll(below);
 }
 
-/* Where a valid sample stands in the instance's inner coordinates. */
+/* The position of a valid sample in inner coordinates. */
 static inline void block_position(const struct psr_blocks *b, uint32_t block, uint32_t sample, float p[3])
 {
 	const struct psr_projection *projection = &b->projection[b->block_projection[block]];
@@ -32,7 +32,7 @@ static inline uint64_t block_attr(const struct psr_blocks *b, uint32_t block, ui
 	return b->attr[block_index(b, block, sample)];
 }
 
-/* Whether a normal whose product with the vector v to the eye is g faces away, as the warp has it. */
+/* Whether a normal faces away, as the warp decides; v: the vector to the eye, g: its product with the normal. */
 static inline int faces_away(float g, const float v[3])
 {
 	return g < 0 && g * g > BACK_SINE * BACK_SINE * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);

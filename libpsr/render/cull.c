@@ -1,17 +1,12 @@
-#include <assert.h>
-#include <math.h>
+#include "cull.h"
+
 #include <stdlib.h>
 #include <string.h>
-#include "base/maths.h"
-#include "base/mem.h"
-#include "base/direction.h"
-#include "render.h"
-#include "screen.h"
 
-/* Two passes over chunks of blocks: the first decides, block by block, and counts for each tile; the second
- * writes the bins where the counts say, in canonical order whatever the threads did. */
+/* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
+ * at places that follow from the counts, in the same order for any number of threads. */
 
-/* Blocks of a chunk: so many that there are some tens of chunks for threads to share. */
+/* Blocks of a chunk; some tens of chunks give threads enough to share. */
 #define LEAST_CHUNK 256
 #define MOST_CHUNK 2048
 #define MANY_CHUNKS 64
@@ -19,15 +14,9 @@
 struct cull_chunk {
 	uint32_t instance, first_cluster, first_block, n_blocks, first_hit, n_hits;
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
-	uint8_t flags, traits; /* of all blocks that are left, OR-ed */
+	uint8_t flags, traits; /* of all hits, OR-ed */
 	uint64_t n_samples;
 	float depth_error; /* greatest half step of depth, in pixels */
-};
-
-/* The masks of the screen's regions, for one instance ([G] 6.3). In the place of the smallest node of a tree that
- * holds a block there is one mask for each of the 10 x 10 ranges of regions that a block can lie in. */
-struct screen_masks {
-	uint64_t range[SCREEN_RANGES * SCREEN_RANGES][2];
 };
 
 struct cull {
@@ -35,18 +24,13 @@ struct cull {
 	const struct simd *simd;
 	const struct plan *plan;
 	uint32_t n_chunks, n_tiles;
-	uint32_t stride; /* of counts, by chunk: whole lines, so that threads that count write none in common */
+	uint32_t stride; /* of counts, by chunk: whole cache lines, so that threads share none */
 };
 
-/* A sphere in camera space, and the pixels that it can touch. */
+/* The pixels that a sphere can touch. */
 struct extent {
 	float x0, x1, y0, y1;
 };
-
-static inline float to_camera(const float m[4], float x, float y, float z)
-{
-	return m[0] * x + m[1] * y + m[2] * z + m[3];
-}
 
 /* Interval of c / z for c within c +- r and z within z0..z1, both positive. */
 static inline void interval(float c, float r, float z0, float z1, float *low, float *high)
@@ -55,18 +39,13 @@ static inline void interval(float c, float r, float z0, float z1, float *low, fl
 	*high = (c + r) / (c + r < 0 ? z1 : z0);
 }
 
-/* 0 if nothing of the sphere can be in the picture grown by `guard` pixels. Two more pixels make up for rounding. */
+/* Returns 0 if the sphere is outside of the picture grown by `guard` pixels. Two more pixels cover rounding. */
 static int sphere_extent(const struct plan *plan, const float c[3], float r, float guard, struct extent *out)
 {
-	float x0, x1, y0, y1;
-
 	r *= 1.0001f;
 	if (!(c[2] + r > plan->near_z))
 		return 0;
-	x0 = c[0] - r;
-	x1 = c[0] + r;
-	y0 = c[1] - r;
-	y1 = c[1] + r;
+	float x0 = c[0] - r, x1 = c[0] + r, y0 = c[1] - r, y1 = c[1] + r;
 	if (plan->perspective) {
 		float z0 = c[2] - r > plan->near_z ? c[2] - r : plan->near_z, z1 = c[2] + r;
 		interval(c[0], r, z0, z1, &x0, &x1);
@@ -81,52 +60,7 @@ static int sphere_extent(const struct plan *plan, const float c[3], float r, flo
 	return out->x1 >= 0 && out->y1 >= 0 && out->x0 < (float)plan->width && out->y0 < (float)plan->height;
 }
 
-/* Whether samples at this distance in pixels need no depth buffer but the picture's, as the kernel has it. */
-static inline int fits_pixel(float pixels)
-{
-	return pixels * (1 - 0x1p-12f) <= 1;
-}
-
-/* The node of a region: its coordinates' bits in turn, x first, after a one. */
-static uint32_t node_of(uint32_t x, uint32_t y)
-{
-	uint32_t node = 1;
-	for (int bit = SCREEN_SPLITS - 1; bit >= 0; bit--)
-		node = node << 2 | (x >> bit & 1) << 1 | (y >> bit & 1);
-	return node;
-}
-
-static void masks_make(struct screen_masks *masks, const struct plan *plan, const struct plan_instance *in)
-{
-	uint64_t region[2 << 2 * SCREEN_SPLITS][SCREEN_WORDS];
-	struct screen screen = { .mask = region };
-	if (plan->perspective) {
-		screen_make(&screen, SCREEN_SPLITS, in->turn, plan->tangent, 2);
-	} else { /* an eye at infinity sees along one direction */
-		const unsigned triangle = psr_direction_encode(in->cull.eye) >> 8;
-		memset(region, 0, sizeof region);
-		for (uint32_t node = node_of(0, 0); node < 2u << 2 * SCREEN_SPLITS; node++)
-			region[node][triangle >> 6] = UINT64_C(1) << (triangle & 63);
-	}
-	memset(masks->range, 0, sizeof masks->range);
-	for (int x1 = 0; x1 < SCREEN_SIDE; x1++)
-		for (int x0 = 0; x0 <= x1; x0++)
-			for (int y1 = 0; y1 < SCREEN_SIDE; y1++)
-				for (int y0 = 0; y0 <= y1; y0++)
-					for (int r = 0, across = x1 - x0 + 1; r < across * (y1 - y0 + 1); r++)
-						for (int w = 0; w < 2; w++)
-							masks->range[screen_range(x0, x1) * SCREEN_RANGES + screen_range(y0, y1)][w] |=
-								region[node_of((uint32_t)(x0 + r % across), (uint32_t)(y0 + r / across))][w];
-}
-
-static inline int mask_culls(const struct screen_masks *masks, const struct psr_blocks *b, uint32_t block,
-                             uint32_t range)
-{
-	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[range];
-	return !((own[0] & seen[0]) | (own[1] & seen[1]));
-}
-
-/* Ones of a word, without a call where the machine that this is compiled for need not have the instruction. */
+/* Counts ones; __builtin_popcountll is a library call where the compiler cannot assume the instruction. */
 static inline uint32_t count_bits(uint64_t word)
 {
 	word -= word >> 1 & UINT64_C(0x5555555555555555);
@@ -135,20 +69,29 @@ static inline uint32_t count_bits(uint64_t word)
 	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
 }
 
-/* Takes over what a batch says of its blocks. */
-static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *chunk, uint32_t *count,
-                                   const struct cull_batch *batch, uint32_t first, uint32_t n, struct cull_hit *hit)
+/* A chunk whose blocks are being tested, and where its results go. */
+struct counting {
+	const struct cull *cull;
+	struct cull_chunk *chunk;
+	uint32_t *count;
+	struct cull_hit *hit;
+};
+
+/* Takes the results of a batch, blocks first .. first + n - 1. */
+static void take_batch(struct counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
-	const struct plan *plan = cull->plan;
+	struct cull_chunk *chunk = to->chunk;
+	struct cull_hit *hit = to->hit;
+	const struct plan *plan = to->cull->plan;
 	const struct plan_instance *in = &plan->instance[chunk->instance];
-	const struct screen_masks *masks = in->masks == PSR_WHY_RAN ? &cull->bins->masks[chunk->instance] : NULL;
+	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
 		if (!batch->is_left[i])
 			continue;
-		if (masks && mask_culls(masks, b, block, (uint32_t)batch->range[i])) {
+		if (masks && cull_by_mask(masks, b, block, (uint32_t)batch->range[i])) {
 			chunk->n_masked++;
 			continue;
 		}
@@ -164,7 +107,7 @@ static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *c
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
-				count[y * plan->tiles_x + x]++;
+				to->count[y * plan->tiles_x + x]++;
 		chunk->levels |= 1u << hit->level;
 		chunk->n_mixed += hit->is_mixed;
 		chunk->n_clamped += (uint32_t)is_clamped;
@@ -175,71 +118,7 @@ static struct cull_hit *take_batch(const struct cull *cull, struct cull_chunk *c
 			chunk->depth_error = batch->depth_error[i];
 		hit++;
 	}
-	return hit;
-}
-
-static struct cluster_view {
-	float c[3], r;
-} view_cluster(const struct plan_instance *in, const struct psr_cluster *k)
-{
-	struct cluster_view v;
-	for (int a = 0; a < 3; a++)
-		v.c[a] = to_camera(in->cull.center_m[a], k->center[0], k->center[1], k->center[2]);
-	v.r = k->radius * in->cull.scale;
-	return v;
-}
-
-/* The least z' that the blocks' spheres of a cluster reach. */
-static float nearest_of(const struct plan_instance *in, const struct psr_cluster *k)
-{
-	const struct psr_blocks *b = in->cull.blocks;
-	const int16_t *x = b->sphere_x + k->first_block, *y = b->sphere_y + k->first_block, *z = b->sphere_z + k->first_block;
-	const uint16_t *r = b->sphere_r + k->first_block;
-	const float *m = in->cull.center_m[2], half = 0.5f * in->cull.scale;
-	float nearest = INFINITY;
-	for (uint32_t i = 0; i < k->n_blocks; i++) {
-		const float front = ((m[0] * x[i] + m[1] * y[i]) + m[2] * z[i]) - half * r[i];
-		nearest = front < nearest ? front : nearest;
-	}
-	return nearest * (1.0f / 16384) + m[3];
-}
-
-/* Whether samples are surely at most a pixel apart, or what the settings say, all over the cluster. Its sphere is held
- * against that first: it reaches nearer than anything in it, by half of its radius where it holds a whole model. */
-static int fits_cluster(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k)
-{
-	const struct cluster_view v = view_cluster(in, k);
-	const float spacing = in->cull.spacing * (float)(1u << k->level) * plan->finer;
-	if (fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2] - v.r) * spacing))
-		return 1;
-	if (!plan->perspective || !fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2]) * spacing))
-		return 0;
-	return fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, nearest_of(in, k)) * spacing);
-}
-
-/* Of each group the coarsest cluster that fits, or the finest if none does: looked for from coarse to fine. Serial,
- * since it costs no more than some nanoseconds a cluster, but for those that are just at the limit. */
-static void choose_levels(struct bins *bins, const struct plan *plan)
-{
-	for (uint32_t i = 0; i < plan->n_instances; i++) {
-		const struct plan_instance *in = &plan->instance[i];
-		const struct psr_blocks *b = in->cull.blocks;
-		struct cull_group *group = bins->group + in->first_group;
-		memset(group, 0, b->n_clusters * sizeof *group);
-		for (unsigned level = b->n_levels; level-- > 0;)
-			for (uint32_t k = 0; k < b->n_clusters; k++) {
-				struct cull_group *g = &group[b->cluster[k].group];
-				if (b->cluster[k].level != level || g->fits)
-					continue;
-				g->level = (uint8_t)level;
-				g->fits = level > 0 && fits_cluster(plan, in, &b->cluster[k]);
-			}
-	}
-}
-
-static int is_chosen(const struct bins *bins, const struct plan_instance *in, const struct psr_cluster *k)
-{
-	return bins->group[in->first_group + k->group].level == k->level;
+	to->hit = hit;
 }
 
 static void count_chunk(int i, void *userdata)
@@ -249,8 +128,8 @@ static void count_chunk(int i, void *userdata)
 	struct cull_chunk chunk = cull->bins->chunk[i];
 	const struct plan_instance *in = &plan->instance[chunk.instance];
 	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
-	struct cull_hit *hit = cull->bins->hit + chunk.first_hit;
-	/* Whatever level a cluster's blocks get, their guard is at most that of the coarsest. */
+	struct counting to = { cull, &chunk, count, cull->bins->hit + chunk.first_hit };
+	/* The guard band of the coarsest level, the widest that a block can get. */
 	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
 
 	memset(count, 0, cull->n_tiles * sizeof *count);
@@ -261,31 +140,30 @@ static void count_chunk(int i, void *userdata)
 		const uint32_t cluster_end = cluster->first_block + cluster->n_blocks;
 		const uint32_t end = cluster_end < chunk_end ? cluster_end : chunk_end;
 		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
-		const struct cluster_view v = view_cluster(in, cluster);
+		const struct cull_sphere v = cull_view_cluster(in, cluster);
 		struct extent e;
-		if (!is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
+		if (!cull_is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk.n_tested += end - first;
 		for (uint32_t n; first < end; first += n) {
 			struct cull_batch batch;
 			n = end - first < CULL_BATCH ? end - first : CULL_BATCH;
 			cull->simd->cull(&batch, &in->cull, first, n);
-			hit = take_batch(cull, &chunk, count, &batch, first, n, hit);
+			take_batch(&to, &batch, first, n);
 		}
 	}
-	chunk.n_hits = (uint32_t)(hit - (cull->bins->hit + chunk.first_hit));
+	chunk.n_hits = (uint32_t)(to.hit - (cull->bins->hit + chunk.first_hit));
 	cull->bins->chunk[i] = chunk;
 }
 
-/* Most often it is marked already, and threads that only look share its line. */
+/* Most parts are marked already; reading first lets threads share the cache line. */
 static inline void mark(uint8_t *is_quiet)
 {
 	if (__atomic_load_n(is_quiet, __ATOMIC_RELAXED))
 		__atomic_store_n(is_quiet, 0, __ATOMIC_RELAXED);
 }
 
-/* What a block draws, and what its cells cover, is within two cells of its pixels: most often in the parts of the four
- * corners. */
+/* A block draws, and its cells reach, within two cells of its pixels. Most often the four corners' parts are all. */
 static void mark_parts(uint8_t *is_quiet, const struct plan *plan, const struct cull_hit *hit)
 {
 	const int32_t reach = 2 << hit->level, most_x = (int32_t)plan->parts_x - 1, most_y = (int32_t)plan->parts_y - 1;
@@ -323,14 +201,6 @@ static void fill_chunk(int i, void *userdata)
 	}
 }
 
-/* Room for n elements, and a quarter more, so that the next frame's will do; what was there is gone. */
-static void *room_for(void *array, size_t *capacity, size_t n, size_t size)
-{
-	if (array && n * size <= *capacity)
-		return array;
-	return psr_grow_huge(array, capacity, (n + n / 4 + 1) * size);
-}
-
 static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int store)
 {
 	const uint32_t share = plan->n_slots / MANY_CHUNKS, least = share > LEAST_CHUNK ? share : LEAST_CHUNK;
@@ -358,7 +228,7 @@ static int compare_keys(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* Turns the counts into the places where each chunk writes its entries of each tile. */
+/* Turns counts into the places of each chunk's entries of each tile. */
 static int place_entries(struct bins *bins, const struct cull *cull)
 {
 	uint64_t total = 0;
@@ -376,9 +246,7 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 	}
 	qsort(bins->by_work, cull->n_tiles, sizeof *bins->by_work, compare_keys);
 	bins->tile_begin[cull->n_tiles] = (uint32_t)total;
-	bins->entry = room_for(bins->entry, &bins->entry_capacity, total, sizeof *bins->entry);
-	bins->order = room_for(bins->order, &bins->order_capacity, total, sizeof *bins->order);
-	return bins->entry && bins->order ? PSR_OK : PSR_ERR_MEMORY;
+	return bins_room(bins, entry, total) && bins_room(bins, order, total) ? PSR_OK : PSR_ERR_MEMORY;
 }
 
 static void note_tests(const struct plan *plan, struct psr_report *report, uint64_t n_masked, uint64_t n_mixed)
@@ -398,42 +266,27 @@ static void note_tests(const struct plan *plan, struct psr_report *report, uint6
 	            (uint64_t)__builtin_popcount(report->levels & ~1u));
 }
 
-int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
-                struct psr_report *report)
+static int make_room(struct bins *bins, const struct cull *cull)
 {
-	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
-	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
-	uint64_t n_masked = 0, n_mixed = 0;
+	const struct plan *plan = cull->plan;
+	return bins_room(bins, chunk, cull->n_chunks) && bins_room(bins, hit, plan->n_slots) &&
+	               bins_room(bins, group, plan->n_groups) &&
+	               bins_room(bins, count, (size_t)cull->n_chunks * cull->stride) &&
+	               bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles) &&
+	               bins_room(bins, is_quiet, plan->parts_x * plan->parts_y) && bins_room(bins, masks, plan->n_instances)
+	           ? PSR_OK
+	           : PSR_ERR_MEMORY;
+}
+
+/* Adds up the chunks in the report, and notes in the plan what shading needs. */
+static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report *report)
+{
 	float depth_error = 0;
-
-	bins->chunk = room_for(bins->chunk, &bins->chunk_capacity, cull.n_chunks, sizeof *bins->chunk);
-	bins->hit = room_for(bins->hit, &bins->hit_capacity, plan->n_slots, sizeof *bins->hit);
-	bins->group = room_for(bins->group, &bins->group_capacity, plan->n_groups, sizeof *bins->group);
-	bins->count = room_for(bins->count, &bins->count_capacity, (size_t)cull.n_chunks * cull.stride,
-	                       sizeof *bins->count);
-	bins->tile_begin = room_for(bins->tile_begin, &bins->tile_capacity, cull.n_tiles + 1, sizeof *bins->tile_begin);
-	bins->by_work = room_for(bins->by_work, &bins->by_work_capacity, cull.n_tiles, sizeof *bins->by_work);
-	bins->is_quiet = room_for(bins->is_quiet, &bins->quiet_capacity, plan->parts_x * plan->parts_y, 1);
-	bins->masks = room_for(bins->masks, &bins->masks_capacity, plan->n_instances, sizeof *bins->masks);
-	if (bins->masks == NULL || bins->chunk == NULL || bins->hit == NULL || bins->group == NULL || bins->count == NULL
-	    || bins->tile_begin == NULL || bins->by_work == NULL || bins->is_quiet == NULL)
-		return PSR_ERR_MEMORY;
-	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
-	make_chunks(bins, plan, 1);
-	choose_levels(bins, plan);
-	for (uint32_t i = 0; i < plan->n_instances; i++)
-		if (plan->instance[i].masks == PSR_WHY_RAN)
-			masks_make(&bins->masks[i], plan, &plan->instance[i]);
-	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
-	const int rc = place_entries(bins, &cull);
-	if (rc)
-		return rc;
-	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
-
+	uint64_t n_masked = 0, n_mixed = 0;
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
-	for (uint32_t i = 0; i < cull.n_chunks; i++) {
-		const struct cull_chunk *chunk = &bins->chunk[i];
+	for (uint32_t i = 0; i < cull->n_chunks; i++) {
+		const struct cull_chunk *chunk = &cull->bins->chunk[i];
 		report->count[PSR_STAGE_CULL] += chunk->n_tested;
 		report->n_blocks_drawn += chunk->n_hits;
 		report->n_samples_drawn += chunk->n_samples;
@@ -455,27 +308,27 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	else if (plan->is_full)
 		report->levels = (2u << PSR_MAX_DEPTH_LEVEL) - 1;
 	note_tests(plan, report, n_masked, n_mixed);
+}
+
+int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
+                struct psr_report *report)
+{
+	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
+	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
+	int rc = make_room(bins, &cull);
+	if (rc)
+		return rc;
+	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
+	make_chunks(bins, plan, 1);
+	cull_choose_levels(bins, plan);
+	for (uint32_t i = 0; i < plan->n_instances; i++)
+		if (plan->instance[i].masks == PSR_WHY_RAN)
+			cull_masks_make(&bins->masks[i], plan, &plan->instance[i]);
+	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
+	rc = place_entries(bins, &cull);
+	if (rc)
+		return rc;
+	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
+	sum_up(&cull, plan, report);
 	return PSR_OK;
-}
-
-size_t bins_bytes(const struct bins *bins)
-{
-	return bins->entry_capacity + bins->chunk_capacity + bins->hit_capacity + bins->order_capacity +
-	       bins->masks_capacity + bins->group_capacity + bins->count_capacity + bins->tile_capacity +
-	       bins->by_work_capacity + bins->quiet_capacity;
-}
-
-void bins_clear(struct bins *bins)
-{
-	psr_free_huge(bins->entry, bins->entry_capacity);
-	psr_free_huge(bins->tile_begin, bins->tile_capacity);
-	psr_free_huge(bins->by_work, bins->by_work_capacity);
-	psr_free_huge(bins->is_quiet, bins->quiet_capacity);
-	psr_free_huge(bins->chunk, bins->chunk_capacity);
-	psr_free_huge(bins->hit, bins->hit_capacity);
-	psr_free_huge(bins->order, bins->order_capacity);
-	psr_free_huge(bins->masks, bins->masks_capacity);
-	psr_free_huge(bins->group, bins->group_capacity);
-	psr_free_huge(bins->count, bins->count_capacity);
-	memset(bins, 0, sizeof *bins);
 }

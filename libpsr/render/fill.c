@@ -1,15 +1,15 @@
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render.h"
+#include "fill_bricks.h"
 
-/* Beyond the paper, both phases know depth: what shines through a hole is whatever is nearest, so among the pixels that
- * are averaged only those count that are not behind the nearest by more than a cell's threshold. A near edge's colour
- * thus is not mixed with the background's before it fills a hole, and depths are filled along with colours.
+/* Beyond the paper, both phases use depth. The nearest surface should show through a hole, so averages count only
+ * pixels within a cell's threshold of the nearest. A near edge's colour is not mixed with the background's before it
+ * fills a hole, and depths are filled along with colours.
  *
- * A cell whose weight is whole needs nothing from above, and a cell above whole cells is whole. So a brick needs the
- * levels up to the first that is whole in it and in the eight bricks around, which hold all that its pixels and their
- * ancestors look at. */
+ * A whole cell needs nothing from coarser levels, and a cell above whole cells is whole. So a brick needs the levels up
+ * to the first that is whole in it and in the eight bricks around it, which hold all that its pixels and their
+ * ancestors read. */
 
 float fill_scale(const struct plan *plan, int level)
 {
@@ -28,7 +28,7 @@ void fill_note_depth(struct fill *fill, int level)
 		;
 }
 
-/* All cells outside of the picture; those inside are written before they are read. */
+/* Sets all cells as outside of the picture; the fill writes those inside before it reads them. */
 static void clear_level(struct fill_level *level, size_t area)
 {
 	memset(level->cell.r, 0, 3 * area * sizeof *level->cell.r);
@@ -112,7 +112,7 @@ void fill_clear(struct fill *fill)
 	memset(fill, 0, sizeof *fill);
 }
 
-/* The finest level that is whole in a brick, whose weights were pulled at least so far. */
+/* The finest level that is whole in a brick, whose weights are pulled that far. */
 static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 {
 	for (int l = 1; l <= fill->brick_top; l++) {
@@ -130,7 +130,7 @@ static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 	return fill->brick_top + 1;
 }
 
-/* The end of a run of bricks of row `by`, of which all have more than `least` in a map. */
+/* The end of the run of bricks of row `by` with values above `least` in a map. */
 static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by, int least)
 {
 	const uint8_t *row = map + (size_t)by * fill->bricks_x;
@@ -161,7 +161,7 @@ void fill_look(struct fill *fill, uint32_t row)
 	}
 }
 
-/* The greatest value of a map at a brick and around it. */
+/* The greatest value of a map at a brick and the eight around it. */
 static uint8_t greatest_around(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by)
 {
 	uint8_t greatest = 0;
@@ -178,7 +178,7 @@ static uint8_t *coarse_at(const struct fill *fill, int l, uint32_t x, uint32_t y
 	return &fill->coarse[fill->coarse_first[l] + (size_t)y * fill->level[l].width + x];
 }
 
-/* Weight and depth of a coarse cell, and the wish for the colours of the bricks below it. */
+/* Pulls weight and depth of a coarse cell; the bricks below it are to pull their colours. */
 static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 {
 	uint8_t *state = coarse_at(fill, l, x, y);
@@ -203,8 +203,8 @@ static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 		fill_note_depth(fill, l);
 }
 
-/* Which bricks and coarse cells those need that are not whole at the bricks' own level, up to where all that is needed
- * is whole, or to the top. */
+/* Finds the bricks and coarse cells needed by bricks that are not whole at their own level: upwards until all needed
+ * cells are whole, or to the top. */
 static void find_coarse(struct fill *fill)
 {
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
@@ -298,7 +298,7 @@ static void push_row(int i, void *userdata)
 	push_pixels(userdata, (uint32_t)i, 0);
 }
 
-/* Weights and depths of bricks bx0..bx1-1 at a level, where they are not pulled so far. */
+/* Pulls weights and depths of bricks bx0..bx1-1 to a level where fill_look did not. */
 static void complete_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t row, int level)
 {
 	const uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
@@ -331,7 +331,7 @@ void fill_pull(struct fill *fill, uint32_t row)
 	push_pixels(fill, row, 1);
 }
 
-/* The single cell at the top has nothing above it: what it holds becomes whole, or the background if it is empty. */
+/* Makes the single cell at the top whole: its own colour, or the background if it is empty. */
 static void finish_top(const struct fill_level *top, const struct plan *plan)
 {
 	const struct fill_row cell = fill_row_at(top, 0, 0);
@@ -342,8 +342,8 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 	cell.weight[0] = WEIGHT_ONE;
 }
 
-/* The levels of which a brick has less than a cell: all of their cells, since they are few; those that find_coarse did
- * not pull hold anything, and nothing reads them. */
+/* Pulls and pushes the levels with cells larger than a brick. All of their cells, since they are few; cells that
+ * find_coarse did not pull are undefined, and nothing reads them. */
 static void run_coarse(struct fill *fill)
 {
 	for (int l = fill->brick_top; l < fill->top; l++) {
@@ -362,10 +362,12 @@ static void run_coarse(struct fill *fill)
 		const struct fill_level *to = &fill->level[l], *from = to + 1;
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const int32_t parent = y >> 1;
-			const struct fill_row row = fill_row_at(to, 0, y), own = fill_row_at(from, 0, parent);
-			const struct fill_row beside = fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1);
-			fill->simd->fill_push(&row, &own, &beside, from->width, fill_scale(fill->plan, l + 1),
-			                      fill_offset(fill->plan, l + 1));
+			const struct fill_row row = fill_row_at(to, 0, y);
+			const struct fill_parents parents = {
+				fill_row_at(from, 0, parent), fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1), from->width,
+				fill_scale(fill->plan, l + 1), fill_offset(fill->plan, l + 1),
+			};
+			fill->simd->fill_push(&row, &parents);
 		}
 	}
 }

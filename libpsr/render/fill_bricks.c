@@ -1,18 +1,19 @@
+#include "fill_bricks.h"
+
 #include <math.h>
 #include <string.h>
-#include "render.h"
 
-#define FILL_PIECE 256 /* pixels of a row that are worked on together. Rows are gone through from end to end before the
-                        * next: in shorter steps memory is not fetched ahead, and a pull takes a quarter more */
+/* Pixels of a row in one call. Row by row: shorter steps defeat the prefetcher, and a pull takes a quarter longer. */
+#define FILL_PIECE 256
 
-/* Rows of the picture reach no further than the picture: one that does is copied, with a border. */
+/* A copy of a piece of the picture that reaches over its border, padded. */
 struct picture_row {
 	float z[FILL_PIECE + 1];
 	uint16_t r[FILL_PIECE + 1], g[FILL_PIECE + 1], b[FILL_PIECE + 1], weight[FILL_PIECE + 1];
 };
 _Static_assert(FILL_PIECE / 2 <= FILL_WIDTH && FILL_PIECE % BRICK == 0, "");
 
-/* Pixel (x, y) and the n - 1 to the right of it, with any depths. */
+/* Pixel (x, y) and the n - 1 to the right of it; depths are undefined. */
 static inline struct fill_row picture_row_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
                                              uint32_t n)
 {
@@ -34,7 +35,7 @@ static inline struct fill_row picture_row_at(struct picture_row *to, const struc
 	return (struct fill_row){ to->r, to->g, to->b, to->weight, to->z, NULL };
 }
 
-/* Their weights and depths. */
+/* Weights and depths of the same pixels. */
 static inline struct fill_row picture_depths_at(struct picture_row *to, const struct fill *fill, uint32_t x, uint32_t y,
                                                 uint32_t n)
 {
@@ -59,7 +60,7 @@ static uint32_t least_of(uint32_t a, uint32_t b)
 	return a < b ? a : b;
 }
 
-/* Cells of a level that bricks bx0..bx1-1 of a row of bricks have. */
+/* The cells of a level in bricks bx0..bx1-1 of brick row `by`. */
 static struct cells { uint32_t x0, x1, y0, y1; } cells_of(const struct fill *fill, uint32_t bx0, uint32_t bx1,
                                                           uint32_t by, int level)
 {
@@ -69,7 +70,7 @@ static struct cells { uint32_t x0, x1, y0, y1; } cells_of(const struct fill *fil
 		                   least_of((by + 1) * side, to->height) };
 }
 
-/* How many cells or pixels of a row are worked on together: levels have all that is needed in place. */
+/* Cells of a row in one call: the picture is copied by piece, levels are used in place. */
 static uint32_t piece_of(uint32_t n, int level)
 {
 	return level == 1 ? least_of(n, FILL_PIECE / 2) : n;
@@ -123,7 +124,7 @@ void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 		}
 }
 
-/* Rows that look at no cells of the bricks above and below. */
+/* is_early: the rows that read no cells of the bricks above and below. */
 static struct rows { uint32_t first, end; } rows_of(uint32_t by, uint32_t side, uint32_t height, int is_early)
 {
 	return (struct rows){ by * side + (is_early ? 1 : 0), least_of((by + 1) * side - (is_early ? 1 : 0), height) };
@@ -137,13 +138,15 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	const float scale = fill_scale(fill->plan, level + 1), offset = fill_offset(fill->plan, level + 1);
 	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
-		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y), own = fill_row_at(from, x, parent);
-		const struct fill_row beside = fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1);
-		fill->simd->fill_push(&row, &own, &beside, (x1 - x0 + 1) / 2, scale, offset);
+		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y);
+		const struct fill_parents parents = { fill_row_at(from, x, parent),
+			                                  fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1),
+			                                  (x1 - x0 + 1) / 2, scale, offset };
+		fill->simd->fill_push(&row, &parents);
 	}
 }
 
-/* Gives pixels of a row from `first` on their colors and depths. */
+/* Writes the colours and depths of listed pixels of a row that begins at `first`. */
 static void write_pixels(const struct fill_picture *p, size_t first, const struct fill_places *places, uint32_t n)
 {
 	const uint8_t *srgb = p->srgb;
@@ -176,10 +179,10 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 			const size_t first = (size_t)y * width + x;
 			const int32_t parent = (int32_t)(y >> 1), px = (int32_t)(x >> 1);
 			const struct fill_row was = picture_row_at(&pixels, fill, x, y, 2 * n_cells);
-			const struct fill_row own = fill_row_at(from, px, parent);
 			const struct fill_row beside = fill_row_at(from, px, y & 1 ? parent + 1 : parent - 1);
-			const uint32_t n = fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &own,
-			                                                 &beside, n_cells, scale, offset);
+			const struct fill_parents parents = { fill_row_at(from, px, parent), beside, n_cells, scale, offset };
+			const uint32_t n =
+				fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &parents);
 			if (!n)
 				continue;
 			if (was.weight == pixels.weight)

@@ -1,7 +1,8 @@
-#include <string.h>
-#include "render.h"
+#include "gaps.h"
 
-/* Nothing is drawn near: whole weights, and no look at the words. */
+#include <string.h>
+
+/* Whole weights, where nothing is drawn nearby. */
 static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	uint16_t whole[GAPS_WIDTH];
@@ -12,12 +13,12 @@ static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t 
 }
 
 _Static_assert(PART_WIDTH % GAPS_WIDTH == 0 && PART_HEIGHT % BRICK == 0,
-               "what gaps are looked for in lies in one part");
+               "a piece lies in one part");
 
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
-                             uint32_t y0, uint32_t y1, uint16_t *weight, uint8_t *bricks)
+                             uint32_t y0, uint32_t y1, const struct gaps_map *map)
 {
-	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, weight, plan->opaque_cells };
+	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, map->weight, plan->opaque_cells };
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	struct gaps_counts total = { 0, 0, 0 };
 	for (uint32_t y = y0; y < y1; y += BRICK)
@@ -27,11 +28,11 @@ struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, c
 			uint8_t marks[GAPS_WIDTH / BRICK] = { 0 };
 			struct gaps_counts counts = { 0, 0, 0 };
 			if (plan_is_quiet(plan, x, y))
-				make_whole(weight, stack->width, x, x1, y, brick_y1);
+				make_whole(map->weight, stack->width, x, x1, y, brick_y1);
 			else
 				counts = simd->gaps(&target, x, x1, y, brick_y1, marks);
 			for (uint32_t b = x / BRICK; b * BRICK < x1; b++)
-				bricks[(size_t)(y / BRICK) * bricks_x + b] = marks[b - x / BRICK];
+				map->bricks[(size_t)(y / BRICK) * bricks_x + b] = marks[b - x / BRICK];
 			total.n_partial += counts.n_partial;
 			total.n_pinholes += counts.n_pinholes;
 			total.n_marked += counts.n_marked;

@@ -4,12 +4,12 @@
 #include "base/mem.h"
 #include "base/vec.h"
 #include "base/direction.h"
-#include "render.h"
+#include "plan.h"
 
-/* z' below this part of the scene's extent is not drawn when the request names no near distance. */
+/* The near distance, as a part of the scene's extent, if the request sets none. */
 #define AUTO_NEAR (1.0 / 16384)
 
-/* The camera's frame in the world (rows right, down, forward), and where its eye is. */
+/* The camera's axes in the world (rows right, down, forward), its eye, and the scale of lengths. */
 struct view {
 	double axis[3][3], eye[3];
 	double scale; /* 2^-exponent */
@@ -117,7 +117,7 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 	}
 }
 
-/* What a pixel's line of sight is in inner coordinates: of length 1 along the view axis. */
+/* A pixel's line of sight in inner coordinates, of length 1 along the view axis. */
 static void sight_make(struct warp_instance *out, double turn[3][3], const struct plan *plan, double focal)
 {
 	for (int k = 0; k < 3; k++) {
@@ -140,7 +140,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
-		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0, .with_splats = plan->with_splats || warp->blocks->opacity,
+		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
+		.with_splats = plan->with_splats || warp->blocks->opacity,
 		.region_from = { (float)plan->window.left, (float)plan->window.top },
 		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
 		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
@@ -163,7 +164,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	v3d_scale(eye, eye, plan->perspective ? 1 / world : 1);
 	v3f_set(cull->eye, (float)eye[0], (float)eye[1], (float)eye[2]);
 
-	/* The eye is outside of the object's convex hull wherever it is outside of the unit sphere. */
+	/* Masks hold for eyes outside of the object's convex hull; the unit sphere contains that. */
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	const int is_outside = !plan->perspective || v3d_length(eye) > 1;
 	out->masks = !(plan->cull_tests & PSR_CULL_MASKS)                        ? PSR_WHY_OFF
@@ -176,8 +177,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		lattice_make(&lattice[p], &warp->blocks->projection[p], to_camera, camera_center, plan, focal);
 }
 
-/* A cell covers a pixel that lies behind it by more than the threshold: `gap_threshold` pixel widths for cells of two
- * pixels ([G] 7.2), growing with the cell, since a slanted surface falls as far within it. */
+/* Thresholds of gaps: `gap_threshold` pixel widths for cells of two pixels ([G] 7.2), proportional to the cell's size,
+ * as is the fall of a slanted surface within the cell. */
 static void threshold_make(struct plan *plan, double gap_threshold)
 {
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
@@ -236,7 +237,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 		return psr_fail(err, rc, "no memory for a scene of %u instances", scene->n_instances);
 
 	view_make(&view, camera);
-	memcpy(plan->frame, view.axis, sizeof plan->frame);
+	memcpy(plan->axes, view.axis, sizeof plan->axes);
 	memcpy(plan->eye, view.eye, sizeof plan->eye);
 	plan->shadow = NULL;
 	plan->width = settings->width;

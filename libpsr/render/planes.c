@@ -1,5 +1,6 @@
+#include "planes.h"
+
 #include <string.h>
-#include "render.h"
 
 static void put_words(const struct simd *simd, const struct plan *plan, uint64_t *to, const uint64_t *word, uint32_t n)
 {
@@ -18,7 +19,7 @@ static void put_weights(uint8_t *to, const uint16_t *weight, uint32_t n)
 		to[x] = (uint8_t)((weight[x] * 255u + WEIGHT_ONE / 2) / WEIGHT_ONE);
 }
 
-/* Normals are unit vectors but for rounding. */
+/* Quantises a component of a unit vector, up to rounding. */
 static int16_t to_steps(float n)
 {
 	const float scaled = n * 32767, clamped = scaled < -32767 ? -32767 : scaled > 32767 ? 32767 : scaled;
@@ -30,7 +31,7 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 {
 	struct strip_view view = plan->view;
 	struct strip strip;
-	view.lit = NULL; /* with a table of light normals are not looked for */
+	view.lit = NULL; /* with a table of light, strip_resolve skips normals */
 	memset(to, 0, 3 * n * sizeof *to);
 	if (!pixels->n)
 		return;
@@ -40,8 +41,8 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 	simd->strip_resolve(&strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < pixels->n; i++)
 		for (int a = 0; a < 3; a++) {
-			const float right = (float)plan->frame[0][a], down = (float)plan->frame[1][a],
-						forward = (float)plan->frame[2][a];
+			const float right = (float)plan->axes[0][a], down = (float)plan->axes[1][a],
+						forward = (float)plan->axes[2][a];
 			const float world = (right * strip.nx[i] + down * strip.ny[i]) + forward * strip.nz[i];
 			to[3 * pixels->x[i] + a] = to_steps(world);
 		}
@@ -54,7 +55,7 @@ static void put_instances(const struct plan *plan, uint32_t *to, const struct st
 		to[pixels->x[i]] = plan_find_instance(plan, pixels->id[i] / PSR_BLOCK_SAMPLES);
 }
 
-/* What the cull says of one block: it is asked again, so that frames without this plane keep nothing of it. */
+/* Runs the cull again for one block, so that frames without this plane keep nothing for it. */
 static void describe(uint8_t to[3], const struct simd *simd, const struct plan *plan, uint32_t slot)
 {
 	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];

@@ -4,7 +4,7 @@
 #include "base/clock.h"
 #include "base/mem.h"
 #include "base/srgb.h"
-#include "render.h"
+#include "refine.h"
 
 /* Windows begin at multiples of the coarsest cell, so that cells are those of the whole picture, and of what is drawn a
  * margin is not used: holes that reach across a window's border are filled from both of its sides. */
@@ -217,7 +217,7 @@ static int find_inside(struct refiner *r, const struct psr_scene *scene, const s
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
 	if (r->is_inside == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
-	const int rc = renderer_cover(r->renderer, scene, settings, pool, r->is_inside, err);
+	const int rc = renderer_outline(r->renderer, scene, settings, pool, r->is_inside, err);
 	if (rc)
 		return rc;
 	erosion = (struct erosion){ r->is_inside, r->is_inside + area, settings->width, settings->height };

@@ -9,16 +9,15 @@
 
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
+	if (!instance->model || !psr_model_blocks(instance->model))
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no blocks", i);
 	double q = 0;
-
-	if (instance->model == NULL || psr_model_blocks(instance->model) == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: its model has no blocks", i);
 	for (int k = 0; k < 4; k++)
 		q += instance->rotation[k] * instance->rotation[k];
 	if (!(fabs(q - 1) <= 1e-6))
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: its rotation is no unit quaternion", i);
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: the rotation is not a unit quaternion", i);
 	if (!view_is_point(instance->translation))
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: its translation must be finite and below 1e30", i);
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: the translation must be finite and below 1e30", i);
 	if (!(instance->scale >= 1e-30 && instance->scale <= MAX_LENGTH))
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: a scale of %g is not within 1e-30..1e30", i, instance->scale);
 	return PSR_OK;
@@ -26,19 +25,18 @@ static int validate_instance(const struct psr_instance *instance, unsigned i, st
 
 int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 {
-	struct psr_error what = { 0 };
-	uint64_t n_blocks = 0;
-	int rc;
-
 	if (scene->n_instances > PSR_MAX_INSTANCES)
-		return psr_fail(err, PSR_ERR_LIMIT, "%u instances, at most %d", scene->n_instances, PSR_MAX_INSTANCES);
+		return psr_fail(err, PSR_ERR_LIMIT, "%u instances exceed the limit of %d", scene->n_instances,
+		                PSR_MAX_INSTANCES);
 	if (scene->n_lights > PSR_MAX_LIGHTS)
-		return psr_fail(err, PSR_ERR_LIMIT, "%u lights, at most %d", scene->n_lights, PSR_MAX_LIGHTS);
+		return psr_fail(err, PSR_ERR_LIMIT, "%u lights exceed the limit of %d", scene->n_lights, PSR_MAX_LIGHTS);
 	if (!view_is_light(scene->ambient) || !view_is_light(scene->background))
 		return psr_fail(err, PSR_ERR_ARG, "ambient and background must be within 0..1e9");
-	rc = view_check_camera(&scene->camera, &what);
+	struct psr_error what = { 0 };
+	int rc = view_check_camera(&scene->camera, &what);
 	if (rc)
 		return psr_fail(err, rc, "camera: %s", what.text);
+	uint64_t n_blocks = 0;
 	for (unsigned i = 0; !rc && i < scene->n_instances; i++) {
 		rc = validate_instance(&scene->instance[i], i, err);
 		if (!rc)
@@ -49,9 +47,9 @@ int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 		if (rc)
 			return psr_fail(err, rc, "light %u: %s", i, what.text);
 	}
-	/* Sample ids are 32 bits, and the last block's would be that of an empty word. */
+	/* Sample ids have 32 bits; the last one belongs to empty words. */
 	if (!rc && n_blocks >= UINT64_C(1) << 26)
-		return psr_fail(err, PSR_ERR_LIMIT, "the instances have %llu blocks together, at most 2^26 - 1",
+		return psr_fail(err, PSR_ERR_LIMIT, "the instances have %llu blocks together; the limit is 2^26 - 1",
 		                (unsigned long long)n_blocks);
 	return rc;
 }
@@ -77,7 +75,7 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 	};
 	const double margin = 1.06;
 	double axes[3][3], right[3], down[3], forward[3];
-	/* The box's corners are made to fit, not a sphere about it: most objects are far from round. */
+	/* Fits the corners of the box, not a sphere around it: most objects are far from round. */
 	double half[3], tangent[2] = { aspect, 1 }, distance = 0, extent = 0, deepest = 0;
 
 	psr_camera_axes(axes, up);
@@ -98,7 +96,7 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 		double p[3];
 		for (int i = 0; i < 3; i++)
 			p[i] = corner >> i & 1 ? half[i] : -half[i];
-		const double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
+		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
 			   z = v3d_dot(p, forward);
 		extent = fmax(extent, fmax(x, y));
 		distance = fmax(distance, fmax(x, y) * margin - z);

@@ -6,16 +6,16 @@
 #include "base/vec.h"
 #include "base/direction.h"
 
-/* A triangle within a rectangle has 7 corners at most; where rounding doubles some, there are more. */
+/* A triangle clipped by a rectangle has at most 7 corners; rounding may double some. */
 #define MOST_CORNERS 24
 
-/* A cone over a convex polygon on the sphere of rays: what of a triangle is seen in a region. */
+/* A cone over a convex polygon on the sphere of rays: the part of a triangle seen in a region. */
 struct part {
 	int n;
 	double corner[MOST_CORNERS][3];
 };
 
-/* What of the part is where a . v >= 0. */
+/* Clips the part to a . v >= 0. */
 static void clip(struct part *out, const struct part *in, const double a[3])
 {
 	out->n = 0;
@@ -40,7 +40,7 @@ struct region {
 	double low[2], high[2]; /* x and y of rays with z = 1 */
 };
 
-/* The triangle goes to those regions that it reaches; each split cuts it at a plane through the eye. */
+/* Marks the regions that the triangle reaches; each split cuts it at a plane through the eye. */
 static void descend(struct screen *screen, unsigned triangle, int node, int depth, const struct region *region,
                     const struct part *part)
 {
@@ -64,7 +64,7 @@ static void descend(struct screen *screen, unsigned triangle, int node, int dept
 	}
 }
 
-void screen_make(struct screen *screen, int n, const double frame[3][3], const double tangent[2], int level)
+void screen_make(struct screen *screen, int n, const double axes[3][3], const double tangent[2], int level)
 {
 	static const double sides[4][2] = { { 1, 0 }, { -1, 0 }, { 0, 1 }, { 0, -1 } };
 	double corner[3][3];
@@ -72,7 +72,7 @@ void screen_make(struct screen *screen, int n, const double frame[3][3], const d
 
 	screen->n = n;
 	memset(screen->mask, 0, (size_t)(2 << 2 * n) * sizeof *screen->mask);
-	/* Octants are mirrored. */
+	/* Triangles of octant 0, mirrored into the others. */
 	for (unsigned t = 0; t < 8u << 2 * level; t++) {
 		const unsigned octant = t & 7, one = t >> 3;
 		struct part part[2] = { { .n = 3 } };
@@ -85,7 +85,7 @@ void screen_make(struct screen *screen, int n, const double frame[3][3], const d
 
 			for (int k = 0; k < 3; k++)
 				from_eye[k] = octant >> k & 1 ? corner[i][k] : -corner[i][k];
-			m3d_apply(part[0].corner[i], frame, from_eye);
+			m3d_apply(part[0].corner[i], axes, from_eye);
 		}
 		for (int i = 0; i < 4 && part[last].n > 0; i++, last ^= 1) {
 			double plane[3] = { sides[i][0], sides[i][1], tangent[i / 2] };

@@ -1,10 +1,10 @@
-#include "base/clock.h"
 #include "base/direction.h"
-#include "render.h"
+#include "base/clock.h"
+#include "shade.h"
 
-#define TIMED_EVERY 16 /* strips: clocks cost, too */
+#define TIMED_EVERY 16 /* strips: reading the clock costs time, too */
 
-/* A table costs as much as lighting so many pixels; it saves nothing where there are few lights to add up. */
+/* A table costs as much as lighting TABLE_PIXELS pixels, and saves nothing with few lights. */
 #define TABLE_LIGHTS 3
 #define TABLE_PIXELS (8 * PSR_DIRECTIONS)
 
@@ -29,7 +29,8 @@ static void tabulate_part(int part, void *userdata)
 {
 	const struct tabulating *t = userdata;
 	const struct plan *plan = t->plan;
-	t->simd->strip_lit(t->lit, &plan->view, plan->light, plan->n_lights, plan->ambient, (uint32_t)part * STRIP, STRIP);
+	const struct strip_lights lights = { plan->light, plan->n_lights, plan->ambient };
+	t->simd->strip_lit(t->lit, &plan->view, &lights, (uint32_t)part * STRIP, STRIP);
 }
 
 void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
@@ -49,14 +50,12 @@ static void add_light(const struct simd *simd, const struct plan *plan, struct s
 }
 
 _Static_assert(PART_WIDTH % STRIP == 0, "a strip lies in one part");
-_Static_assert(STRIP_BRICK == BRICK, "what is wanted is counted in bricks");
+_Static_assert(STRIP_BRICK == BRICK, "`wants` has a flag a brick");
 
 struct shading {
 	const struct simd *simd;
 	const struct plan *plan;
-	const struct shade_target *target;
-	const struct psr_zstack *stack;
-	const uint16_t *weight;
+	const struct shade_picture *picture;
 };
 
 /* Lists the samples of a strip, and returns their number. */
@@ -69,8 +68,8 @@ static uint32_t list_strip(struct strip_pixels *pixels, const struct shading *s,
 	if (plan_is_quiet(plan, x, y))
 		s->simd->strip_list(pixels, NULL, NULL, 0);
 	else
-		s->simd->strip_list(pixels, psr_zstack_row(s->stack, y) + x, s->weight + (size_t)y * plan->width + x,
-		                    left < STRIP ? left : STRIP);
+		s->simd->strip_list(pixels, psr_zstack_row(s->picture->stack, y) + x,
+		                    s->picture->weight + (size_t)y * plan->width + x, left < STRIP ? left : STRIP);
 	return pixels->n;
 }
 
@@ -91,22 +90,20 @@ static void light_strip(struct strip *strip, const struct shading *s)
 static void write_strip(const struct strip *strip, const struct shading *s)
 {
 	const struct plan *plan = s->plan;
-	const struct shade_target *target = s->target;
+	const struct shade_picture *to = s->picture;
 	const uint32_t x = strip->pixels->x0, y = strip->pixels->y, left = plan->width - x;
-	const uint8_t *wants = target->wants;
+	const uint8_t *wants = to->wants;
 	if (wants)
 		wants += (size_t)(y / BRICK) * ((plan->width + BRICK - 1) / BRICK) + x / BRICK;
-	const struct strip_target to = { plan->width, target->rgb, target->srgb, wants, target->r, target->g, target->b,
-		                             { plan->background[0], plan->background[1], plan->background[2] } };
-	s->simd->strip_write(strip, &to, left < STRIP ? left : STRIP);
+	const struct strip_target target = { plan->width, to->rgb, to->srgb, wants, to->r, to->g, to->b,
+		                                 { plan->background[0], plan->background[1], plan->background[2] } };
+	s->simd->strip_write(strip, &target, left < STRIP ? left : STRIP);
 }
 
-uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t x, uint32_t y,
-                    uint32_t n, struct strip_pixels *pixels, struct strip *strip)
+uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint64_t *word, uint32_t n,
+                    struct strip_pixels *pixels, struct strip *strip)
 {
-	const struct shading shading = { simd, plan, NULL, NULL, NULL };
-	pixels->x0 = x;
-	pixels->y = y;
+	const struct shading shading = { simd, plan, NULL };
 	strip->pixels = pixels;
 	simd->strip_list(pixels, word, NULL, n);
 	if (!pixels->n)
@@ -118,15 +115,14 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
 	return pixels->n;
 }
 
-void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_target *target,
-                const struct psr_zstack *stack, const uint16_t *weight, uint32_t y0, uint32_t y1,
-                struct shade_counts *counts)
+void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_picture *picture, uint32_t y0,
+                uint32_t y1, struct shade_counts *counts)
 {
-	const struct shading shading = { simd, plan, target, stack, weight };
+	const struct shading shading = { simd, plan, picture };
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
-	if (target->rgb == NULL) {
+	if (!picture->rgb) {
 		for (uint32_t i = 0; i < n; i++)
 			counts->n_pixels += list_strip(&pixels[0], &shading, i % per_row * STRIP, y0 + i / per_row);
 		return;
@@ -154,4 +150,35 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 			counts->shade_ns += clock_ns() - middle;
 		}
 	}
+}
+
+static uint64_t share_of(uint64_t wall, uint64_t one, uint64_t other)
+{
+	return one ? (uint64_t)((double)one / (double)(one + other) * (double)wall) : 0;
+}
+
+void shade_report(const struct plan *plan, const struct shade_counts *rows, uint64_t wall, int has_rgb,
+                  struct psr_report *report)
+{
+	struct shade_counts all = { 0 };
+	for (uint32_t i = 0; i < (plan->height + BRICK - 1) / BRICK; i++) {
+		const struct shade_counts *row = &rows[i];
+		all.n_pixels += row->n_pixels;
+		all.n_specular += row->n_specular;
+		all.resolve_ns += row->resolve_ns;
+		all.shade_ns += row->shade_ns;
+		all.row_ns += row->row_ns;
+		all.fill_ns += row->fill_ns;
+	}
+	const unsigned needs = has_rgb ? plan->view.needs : 0;
+	const enum psr_why none = has_rgb ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	effect_note(report, PSR_EFFECT_TWO_SIDED, needs & STRIP_TWO_SIDED ? PSR_WHY_RAN : none, all.n_pixels);
+	effect_note(report, PSR_EFFECT_POSITIONS, needs & STRIP_POSITION ? PSR_WHY_RAN : none, all.n_pixels);
+	effect_note(report, PSR_EFFECT_SPECULAR, all.n_specular ? PSR_WHY_RAN : none, all.n_specular);
+	const uint64_t fill_ns = share_of(wall, all.fill_ns, all.row_ns);
+	report->n_covered = all.n_pixels;
+	report->count[PSR_STAGE_RESOLVE] = report->count[PSR_STAGE_SHADE] = has_rgb ? all.n_pixels : 0;
+	report->ns[PSR_STAGE_FILL] += fill_ns;
+	report->ns[PSR_STAGE_RESOLVE] = share_of(wall - fill_ns, all.resolve_ns, all.shade_ns);
+	report->ns[PSR_STAGE_SHADE] = wall - fill_ns - report->ns[PSR_STAGE_RESOLVE];
 }

@@ -6,7 +6,7 @@
 #include "base/vec.h"
 #include "shadow.h"
 
-/* All that maps depend on of an instance. */
+/* All of an instance that maps depend on. */
 struct placed {
 	uint8_t content_id[16];
 	double rotation[4], translation[3], scale;
@@ -14,11 +14,11 @@ struct placed {
 
 struct shadow {
 	struct shadow_drawer drawer;
-	struct placed *placed; /* instances of the maps that are kept */
+	struct placed *placed; /* instances in the kept maps */
 	uint32_t n_placed;
 	struct shadow_kept kept[PSR_MAX_LIGHTS][SHADOW_FACES];
 	uint32_t n_maps[PSR_MAX_LIGHTS];
-	struct shadow_light light[PSR_MAX_LIGHTS]; /* for the picture in progress, in its plan's order */
+	struct shadow_light light[PSR_MAX_LIGHTS]; /* of the picture in progress, in its plan's order */
 };
 
 static void drop(struct shadow_kept *kept)
@@ -29,7 +29,7 @@ static void drop(struct shadow_kept *kept)
 
 void shadow_destroy(struct shadow *shadow)
 {
-	if (shadow == NULL)
+	if (!shadow)
 		return;
 	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
 		for (int f = 0; f < SHADOW_FACES; f++)
@@ -43,7 +43,7 @@ void shadow_destroy(struct shadow *shadow)
 
 uint64_t shadow_bytes(const struct shadow *shadow)
 {
-	if (shadow == NULL)
+	if (!shadow)
 		return 0;
 	const struct shadow_drawer *drawer = &shadow->drawer;
 	uint64_t n = sizeof *shadow + drawer->plan.storage_size + drawer->word_size + drawer->cells_size;
@@ -78,7 +78,7 @@ static int in_view(const struct plan *plan, const float c[3], float r)
 	return 1;
 }
 
-/* The signed distance from a cone's side is at most that from the cone. */
+/* Compares with the signed distance from the cone's side, at most the distance from the cone. */
 static int in_cone(const struct strip_light *light, double outer, const float c[3], float r)
 {
 	double to[3], axis[3], s, cosine;
@@ -90,8 +90,7 @@ static int in_cone(const struct strip_light *light, double outer, const float c[
 	return sqrt(fmax(across2, 0)) * cosine - along * s <= (double)r;
 }
 
-/* Instances fit the unit sphere of their inner coordinates; a hundredth makes up for rounding. p is the plan's number
- * of the light. */
+/* p: the plan's number of the light. Instances fit the unit sphere of their inner coordinates; 1 % covers rounding. */
 static int reaches_view(const struct plan *plan, const struct psr_light *light, uint32_t p)
 {
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
@@ -103,7 +102,7 @@ static int reaches_view(const struct plan *plan, const struct psr_light *light, 
 	return 0;
 }
 
-/* Notes the instances, and whether they were others. */
+/* Keeps the instances; *has_changed: they differ from those before. */
 static int note_instances(struct shadow *shadow, const struct psr_scene *scene, int *has_changed)
 {
 	const uint32_t n = scene->n_instances;
@@ -130,13 +129,13 @@ static int note_instances(struct shadow *shadow, const struct psr_scene *scene, 
 static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 {
 	const struct psr_camera *p = &a->camera, *q = &b->camera;
-	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0
-	       && memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0
-	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
+	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0 &&
+	       memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0 &&
+	       p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
 }
 
-/* Texels a side: as many as the picture's greater side has pixels, within what all maps may have together. Their number
- * is that of maps of the scene, in view or not. */
+/* Texels a side: as many as the picture's greater side has pixels, but at most SHADOW_TEXELS in the n_maps of the whole
+ * scene, in view or not. */
 static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 {
 	const uint32_t w = plan->window.picture_width, h = plan->window.picture_height;
@@ -147,7 +146,7 @@ static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 	return side;
 }
 
-/* Fits the maps of all lights that can cast, seen or not, and forgets what was kept of others. */
+/* Fits the maps of all lights that can cast, in view or not, and drops other maps. */
 static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, const struct plan *plan, int has_changed)
 {
 	struct shadow_bounds bounds;
@@ -174,39 +173,37 @@ static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, con
 	}
 }
 
-/* A light that the plan has, too, which has them in the scene's order. */
+/* Whether the plan has the light; plans keep the scene's order. */
 static int is_planned(const struct plan *plan, const struct psr_light *light)
 {
 	return plan->is_full || has_color(light);
 }
 
-/* Light l of the scene, p of the plan: draws what is not there. */
-static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct simd *simd,
-                         const struct plan *plan, struct bins *bins, const struct psr_scene *scene,
-                         struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
+/* Light l of the scene, p of the plan: draws its missing maps. */
+static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct plan *plan,
+                         const struct shadow_call *call)
 {
 	struct shadow_light *light = &shadow->light[p];
-	const int is_needed = plan->is_full || reaches_view(plan, &scene->light[l], p);
+	const int is_needed = plan->is_full || reaches_view(plan, &call->scene->light[l], p);
 	light->n_maps = is_needed ? shadow->n_maps[l] : 0;
 	for (uint32_t f = 0; f < light->n_maps; f++) {
 		struct shadow_kept *kept = &shadow->kept[l][f];
 		if (!kept->is_drawn) {
-			int rc =
-				shadow_map_draw(kept, &shadow->drawer, simd, bins, scene, pool, &report->count[PSR_STAGE_SHADOW], err);
+			int rc = shadow_map_draw(kept, &shadow->drawer, call);
 			if (rc)
 				return rc;
-			report->n_shadow_maps_drawn++;
+			call->report->n_shadow_maps_drawn++;
 		}
 		shadow_map_bind(&light->map[f], kept, plan);
-		report->n_shadow_maps++;
+		call->report->n_shadow_maps++;
 	}
 	return PSR_OK;
 }
 
-int shadow_prepare(struct shadow **out, const struct simd *simd, struct plan *plan, struct bins *bins,
-                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report,
-                   struct psr_error *err)
+int shadow_prepare(struct shadow **out, struct plan *plan, const struct shadow_call *call)
 {
+	const struct psr_scene *scene = call->scene;
+	struct psr_report *report = call->report;
 	int n_casting = 0, has_changed;
 	for (uint32_t l = 0; l < scene->n_lights; l++)
 		n_casting += can_cast(&scene->light[l]);
@@ -218,14 +215,14 @@ int shadow_prepare(struct shadow **out, const struct simd *simd, struct plan *pl
 	}
 	if (!*out)
 		*out = calloc(1, sizeof **out);
-	struct shadow *const shadow = *out;
+	struct shadow *shadow = *out;
 	if (!shadow || note_instances(shadow, scene, &has_changed))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for shadow maps");
+		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for shadow maps");
 	fit_lights(shadow, scene, plan, has_changed);
 	for (uint32_t l = 0, p = 0; l < scene->n_lights; l++) {
 		if (!is_planned(plan, &scene->light[l]))
 			continue;
-		const int rc = prepare_light(shadow, l, p++, simd, plan, bins, scene, pool, report, err);
+		int rc = prepare_light(shadow, l, p++, plan, call);
 		if (rc)
 			return rc;
 	}

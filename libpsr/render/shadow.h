@@ -1,26 +1,32 @@
-/* Shadows: which lights of a scene need maps, maps that fit them, and maps kept from frame to frame ([G] 7.3.1).
+/* Shadow maps: which lights need them, cameras that fit, and maps kept from frame to frame ([G] 7.3.1).
  *
- * A map is a picture of depths from a light, drawn like every picture: culled, warped, with level buffers where samples
- * are further apart than texels. It depends on light, instances, models and the picture's size, never on the camera, so
- * that it is the same whether it is drawn now or was kept. */
+ * A map is a picture of depths seen from a light, culled and warped like any picture, with z-buffer levels where
+ * samples are further apart than texels. It depends on light, instances, models and the picture's size, but never on
+ * the camera: a kept map equals a new one. */
 #ifndef PSR_RENDER_SHADOW_H
 #define PSR_RENDER_SHADOW_H
 
-#include "render.h"
+#include "warp.h"
 
-struct shadow; /* the maps, and what drawing them takes */
+struct shadow; /* kept maps, and working memory */
 
-/* Gives plan->shadow the maps of those lights that cast shadows, have a colour and reach an instance in view, and notes
- * what shading needs. Draws what is not there yet. *shadow is made when the first light needs it. `bins` is free to be
- * used. MEMORY, LIMIT. */
-int shadow_prepare(struct shadow **shadow, const struct simd *simd, struct plan *plan, struct bins *bins,
-                   const struct psr_scene *scene, struct psr_pool *pool, struct psr_report *report,
-                   struct psr_error *err);
+struct shadow_call {
+	const struct simd *simd;
+	struct bins *bins; /* scratch; contents are lost */
+	const struct psr_scene *scene;
+	struct psr_pool *pool;
+	struct psr_report *report;
+	struct psr_error *err;
+};
 
-/* All maps of a renderer together have at most SHADOW_TEXELS texels, of 2 bytes and, where level buffers are in use, up
- * to two thirds more; 4 bytes more a texel, and up to two thirds more, of the largest. */
+/* Sets plan->shadow to the maps of the lights that cast shadows, have a colour and reach an instance in view, and tells
+ * the plan what shading needs. Draws missing maps. Allocates *shadow when the first light needs it. MEMORY, LIMIT. */
+int shadow_prepare(struct shadow **shadow, struct plan *plan, const struct shadow_call *call);
+
+/* Limits the texels of all maps of a renderer. A texel takes 2 bytes, plus two thirds with z-buffer levels; drawing
+ * takes twice that of the largest map. */
 #define SHADOW_TEXELS (16u << 20)
-#define SHADOW_SIDE 2048 /* at most */
+#define SHADOW_SIDE 2048 /* of a map, at most */
 
 uint64_t shadow_bytes(const struct shadow *shadow); /* 0 for NULL */
 void shadow_destroy(struct shadow *shadow);         /* NULL is fine */
@@ -30,48 +36,46 @@ void shadow_destroy(struct shadow *shadow);         /* NULL is fine */
 struct shadow_fit {
 	struct psr_camera camera;
 	uint32_t width, height;
-	double nearest, farthest; /* z' of instances is between them */
+	double nearest, farthest; /* bounds of the instances' z' */
 };
 
-/* What fitting needs of a scene: a sphere about all instances, and the least distance of samples. */
+/* Of a scene: a sphere around all instances, and the least spacing of samples. */
 struct shadow_bounds {
 	double center[3], radius;
 	double spacing;
 };
 void shadow_bounds_make(struct shadow_bounds *bounds, const struct psr_scene *scene);
 
-/* Cameras of the maps of a light, at most SHADOW_FACES, with at most `side` texels a side: one whose picture holds all
- * instances, or as much as the cone of a spot, or the faces of a cube about the light that see instances. Returns how
- * many. */
+/* Fits cameras to a light, at most SHADOW_FACES, with at most `side` texels a side: one that sees all instances, or all
+ * of a spot's cone, or the faces of a cube around the light that see instances. Returns how many. */
 uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light,
                           const struct psr_scene *scene, const struct shadow_bounds *bounds, uint32_t side);
 
-/* ---- map: one of them, drawn ---- */
+/* ---- map: drawing one ---- */
 
 struct shadow_kept {
 	int is_drawn;
 	struct shadow_fit fit;
-	double axis[3][3], eye[3]; /* of its camera, as a plan has them */
+	double axes[3][3], eye[3]; /* of its camera, as in a plan */
 	int exponent;
-	struct shadow_map map;     /* all but what depends on the picture's camera */
+	struct shadow_map map;     /* without the members that depend on the picture's camera */
 	uint16_t *cells;
 	size_t cells_size;
 };
 
-/* What drawing takes, for one map after the other. */
+/* Working memory, for one map after the other. */
 struct shadow_drawer {
 	struct plan plan;
 	uint64_t *word; /* of a tile, for each thread */
 	size_t word_size;
-	float *cells; /* depths of a map's, in the same order */
+	float *cells; /* depths, in the order of the map's cells */
 	size_t cells_size;
 };
 
-/* Draws kept->fit; adds the samples to *n_samples. On failure the map is left not drawn. */
-int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct simd *simd, struct bins *bins,
-                    const struct psr_scene *scene, struct psr_pool *pool, uint64_t *n_samples, struct psr_error *err);
+/* Draws the map of kept->fit; adds its samples to the report. On failure kept->is_drawn is 0. */
+int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct shadow_call *call);
 
-/* The map for the picture of a plan. */
+/* Makes the map ready for the picture of a plan. */
 void shadow_map_bind(struct shadow_map *out, const struct shadow_kept *kept, const struct plan *plan);
 
 #endif

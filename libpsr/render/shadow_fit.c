@@ -5,12 +5,12 @@
 #include "shadow.h"
 
 #define HALF_PI 1.57079632679489661923
-#define MARGIN 3        /* texels on each side: four cells lie around every place that is lit */
+#define MARGIN 3        /* texels on each side: four cells surround every lit point */
 #define LEAST_SIDE 16
-#define WIDEST 1.3089969389957472 /* 75 degrees: wider cones take faces of a cube */
-#define CORNER 0.9553166181245093 /* between the axis of a cube's face and its corners */
+#define WIDEST 1.3089969389957472 /* 75 degrees; wider cones get faces of a cube */
+#define CORNER 0.9553166181245093 /* angle from the axis of a cube's face to its corners */
 
-/* Where instances are along a unit vector: each within its box and its sphere. */
+/* The range of an instance along a unit vector, from its box and its sphere. */
 static void range_along(const struct psr_instance *instance, const double axis[3], double *low, double *high)
 {
 	static const double origin[3] = { 0, 0, 0 };
@@ -73,7 +73,7 @@ void shadow_bounds_make(struct shadow_bounds *bounds, const struct psr_scene *sc
 	}
 }
 
-/* As far as possible from parallel to v. */
+/* The axis furthest from parallel to v. */
 static void any_up(double up[3], const double v[3])
 {
 	int least = 0;
@@ -83,7 +83,7 @@ static void any_up(double up[3], const double v[3])
 	v3d_set(up, least == 0, least == 1, least == 2);
 }
 
-/* Angle of 0..pi/2 whose tangent this is. */
+/* The arc tangent, in 0..pi/2, by bisection: frames use no libm. */
 static double angle_of(double tangent)
 {
 	double low = 0, high = HALF_PI;
@@ -103,7 +103,7 @@ static uint32_t clamp_side(double side, uint32_t most)
 	return side < LEAST_SIDE ? LEAST_SIDE : side > most ? most : (uint32_t)side;
 }
 
-/* The eye stands before the scene, as far as nothing of it is nearer than a plan draws. */
+/* Places the eye far enough before the scene that a plan draws all of it. */
 static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *light, const struct psr_scene *scene,
                                 const struct shadow_bounds *bounds, uint32_t side)
 {
@@ -134,28 +134,34 @@ static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *
 	return 1;
 }
 
-/* A square picture that reaches as far as `tangent` around the axis at least. */
-static void fit_square(struct shadow_fit *fit, const double position[3], const double axis[3], double tangent,
-                       double distance, const struct shadow_bounds *bounds, uint32_t side)
+/* The field of a square map: its axis, the tangent of half its angle, and the distance where texels match the spacing.
+ * */
+struct field {
+	double axis[3], tangent, distance;
+};
+
+/* A square picture from the light of at least a field. */
+static void fit_square(struct shadow_fit *fit, const struct psr_light *light, const struct field *field,
+                       const struct shadow_bounds *bounds, uint32_t side)
 {
+	const double tangent = field->tangent, *axis = field->axis, *position = light->position;
 	struct psr_camera *camera = &fit->camera;
-	double to[3];
-	const double adequate = 2 * tangent * distance / bounds->spacing + 2 * MARGIN;
+	const double adequate = 2 * tangent * field->distance / bounds->spacing + 2 * MARGIN;
 	fit->width = fit->height = clamp_side(ceil(adequate), side);
 	memcpy(camera->eye, position, sizeof camera->eye);
-	v3d_add_scaled(camera->target, position, distance, axis);
+	v3d_add_scaled(camera->target, position, field->distance, axis);
 	any_up(camera->up, axis);
 	camera->kind = PSR_CAMERA_PERSPECTIVE;
 	camera->ortho_height = camera->near_z = 0;
 	camera->fov_y = 2 * angle_of(tangent * fit->width / (fit->width - 2 * MARGIN));
+	double to[3];
 	v3d_sub(to, bounds->center, position);
 	const double along = v3d_dot(axis, to), reach = bounds->radius * 1.01;
 	fit->nearest = fmax(along - reach, 0);
 	fit->farthest = fmax(along + reach, 0.01 * reach);
 }
 
-/* Whether instances' sphere, at `to` from the light, reaches into the pyramid of a face, and a spot's cone does,
- * too. */
+/* Whether the instances' sphere, at `to` from the light, and a spot's cone both reach into the pyramid of a face. */
 static int face_sees(const double face[3], const double to[3], double radius, const struct psr_light *light)
 {
 	for (int k = 0; k < 3; k++)
@@ -177,10 +183,10 @@ static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_l
 {
 	uint32_t n = 0;
 	for (int f = 0; f < SHADOW_FACES; f++) {
-		double face[3] = { 0, 0, 0 };
-		face[f / 2] = f & 1 ? -1 : 1;
-		if (face_sees(face, to, bounds->radius, light))
-			fit_square(&fit[n++], light->position, face, 1, distance, bounds, side);
+		struct field face = { { 0, 0, 0 }, 1, distance };
+		face.axis[f / 2] = f & 1 ? -1 : 1;
+		if (face_sees(face.axis, to, bounds->radius, light))
+			fit_square(&fit[n++], light, &face, bounds, side);
 	}
 	return n;
 }
@@ -188,10 +194,9 @@ static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_l
 uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_light *light,
                           const struct psr_scene *scene, const struct shadow_bounds *bounds, uint32_t side)
 {
-	double to[3], axis[3], s, c, widest;
-
 	if (light->kind == PSR_LIGHT_DIRECTIONAL)
 		return fit_directional(fit, light, scene, bounds, side);
+	double to[3], s, c, widest;
 	v3d_sub(to, bounds->center, light->position);
 	const double away = v3d_length(to), distance = fmax(away, bounds->radius), r = bounds->radius * 1.0001;
 	const double sphere = away > r ? r / sqrt(away * away - r * r) : INFINITY; /* tangents of half angles */
@@ -204,7 +209,8 @@ uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_
 	}
 	if (fmin(sphere, cone) > widest)
 		return fit_cube(fit, light, to, distance, bounds, side);
-	v3d_normalize(axis, sphere < cone ? to : light->direction);
-	fit_square(fit, light->position, axis, fmin(sphere, cone), distance, bounds, side);
+	struct field field = { .tangent = fmin(sphere, cone), .distance = distance };
+	v3d_normalize(field.axis, sphere < cone ? to : light->direction);
+	fit_square(fit, light, &field, bounds, side);
 	return 1;
 }

@@ -3,10 +3,11 @@
 #include <string.h>
 #include "base/mem.h"
 #include "base/vec.h"
+#include "cull.h"
 #include "shadow.h"
 
-/* In cells: the least that a plane must fall within them, and a cell's width. Samples that are half a cell from its
- * centre in both directions need the half; the width makes up for normals that are not the surface's own. */
+/* Cells. The half bounds how far samples lie from the centre of their cell in each direction; a whole width covers
+ * shading normals that differ from the surface's. */
 #define SLOPE_BIAS 0.5
 #define TEXEL_BIAS 1.0
 
@@ -18,7 +19,7 @@ struct drawing {
 	struct shadow_drawer *drawer;
 	struct psr_zstack stack;
 	const struct shadow_map *map;
-	float *cells; /* the drawer's: of level 0, and of the others where the map has them */
+	float *cells; /* the drawer's: of level 0, and of the map's other levels */
 	uint16_t *kept_cells; /* the map's, in the same order */
 	uint32_t stride;
 	_Atomic uint32_t next_tile;
@@ -31,15 +32,16 @@ static void clear_cells(float *cells, size_t n)
 		cells[i] = INFINITY;
 }
 
-/* A tile where no block is costs no warp, unless cells of its levels are to be cleared. `own` are words for it. */
+/* Tiles without blocks need no warp unless their cells must be cleared. `own`: words for the tile. */
 static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 {
 	const struct plan *plan = &d->drawer->plan;
 	const uint32_t x0 = tile % plan->tiles_x * TILE_WIDTH, y0 = tile / plan->tiles_x * TILE_HEIGHT;
 	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
 	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
+	const struct warp_into into = { &d->stack, 0, own };
 	if (!is_empty)
-		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &d->stack, tile, 0, own).n_inside);
+		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &into, tile).n_inside);
 	for (uint32_t y = y0; y < y0 + TILE_HEIGHT && y < plan->height; y++) {
 		float *to = d->cells + (size_t)(y + 1) * d->stride + x0 + 1;
 		if (is_empty)
@@ -49,7 +51,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 	}
 }
 
-/* One tile after the other, in the same words. */
+/* Draws tile after tile into the same words, which stay in the cache. */
 static void draw_some(int part, void *userdata)
 {
 	struct drawing *d = userdata;
@@ -59,7 +61,7 @@ static void draw_some(int part, void *userdata)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], own);
 }
 
-/* Level 0 has a guard band as the others do; no sample falls into it. */
+/* The guard band of level 0, into which no sample falls. */
 static void clear_band(const struct drawing *d)
 {
 	const uint32_t height = d->stack.height + 2;
@@ -74,14 +76,14 @@ static int has_seam(const struct shadow_map *map, int k)
 	return k > 0 && map->levels >> k & 1 && map->levels >> (k - 1) & 1;
 }
 
-/* Where the drawer has the depths of these cells of the map. */
+/* The drawer's depths of these cells of the map. */
 static float *drawn(const struct drawing *d, const uint16_t *cells)
 {
 	return d->cells + (cells - d->map->level[0].z);
 }
 
-/* Counted with the guard band, cell (i, j) of level k has cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer level in
- * it, as far as these exist. */
+/* Cell (i, j) of level k, counted from the guard band, contains cells 2 i - 1 and 2 i, 2 j - 1 and 2 j of the finer
+ * level, as far as these exist. */
 static void make_seams(int k, void *userdata)
 {
 	const struct drawing *d = userdata;
@@ -110,9 +112,9 @@ static void sink_rows(const struct drawing *d, const uint16_t *cells, int k, uin
 	const float *from = drawn(d, cells);
 	uint16_t *to = d->kept_cells + (cells - d->map->level[0].z);
 	for (uint32_t j = begin; j < end; j++) {
-		const float *own = from + (size_t)j * stride, *above = j ? own - stride : own;
-		d->simd->shadow_sink(to + (size_t)j * stride, above, own, j < last ? own + stride : own, stride, d->map->from,
-		                     d->map->step);
+		const float *own = from + (size_t)j * stride;
+		const struct shadow_rows rows = { j ? own - stride : own, own, j < last ? own + stride : own };
+		d->simd->shadow_sink(to + (size_t)j * stride, &rows, stride, d->map->from, d->map->step);
 	}
 }
 
@@ -134,22 +136,20 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 	const uint32_t width = kept->fit.width, height = kept->fit.height;
 	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1], seam[PSR_MAX_DEPTH_LEVEL + 1];
 	kept->map.levels = levels | 1;
-	d->stack = (struct psr_zstack){ .width = width, .height = height, .levels = levels & ~1u };
+	zbuffer_measure(&d->stack, width, height, levels & ~1u);
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		const uint32_t cells_x = (width + (1u << k) - 1) >> k, cells_y = (height + (1u << k) - 1) >> k;
-		d->stack.level[k].width = cells_x + 2;
-		d->stack.level[k].height = cells_y + 2;
-		kept->map.level[k].stride = cells_x + 2;
-		kept->map.level[k].most_x = (float)cells_x - 0.5f;
-		kept->map.level[k].most_y = (float)cells_y - 0.5f;
+		const uint32_t cells_x = d->stack.level[k].width, cells_y = d->stack.level[k].height;
+		kept->map.level[k].stride = cells_x;
+		kept->map.level[k].most_x = (float)(cells_x - 2) - 0.5f;
+		kept->map.level[k].most_y = (float)(cells_y - 2) - 0.5f;
 		first[k] = n;
 		if (kept->map.levels >> k & 1)
-			n += (size_t)(cells_x + 2) * (cells_y + 2);
+			n += (size_t)cells_x * cells_y;
 		seam[k] = n;
 		if (has_seam(&kept->map, k))
-			n += (size_t)(cells_x + 2) * (cells_y + 2);
+			n += (size_t)cells_x * cells_y;
 	}
-	struct shadow_drawer *const drawer = d->drawer;
+	struct shadow_drawer *drawer = d->drawer;
 	kept->cells = psr_grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
 	drawer->cells = psr_grow_huge(drawer->cells, &drawer->cells_size, n * sizeof *drawer->cells);
 	if (!kept->cells || !drawer->cells)
@@ -169,7 +169,7 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 
 static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 {
-	memcpy(kept->axis, plan->frame, sizeof kept->axis);
+	memcpy(kept->axes, plan->axes, sizeof kept->axes);
 	memcpy(kept->eye, plan->eye, sizeof kept->eye);
 	kept->exponent = plan->exponent;
 	kept->map.perspective = plan->perspective;
@@ -181,42 +181,40 @@ static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 	kept->map.step = (float)ldexp((kept->fit.farthest - kept->fit.nearest) / SHADOW_EMPTY, -plan->exponent);
 }
 
-int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct simd *simd, struct bins *bins,
-                    const struct psr_scene *scene, struct psr_pool *pool, uint64_t *n_samples, struct psr_error *err)
+int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct shadow_call *call)
 {
-	const int n_parts = psr_pool_threads(pool);
+	const int n_parts = psr_pool_threads(call->pool);
 	struct render_settings settings;
-	struct psr_scene seen = *scene;
+	struct psr_scene scene = *call->scene;
 	struct psr_report report = { 0 };
 	struct plan *plan = &drawer->plan;
-	struct drawing d = { .simd = simd, .bins = bins, .drawer = drawer };
-	int rc;
-
-	seen.camera = kept->fit.camera;
-	seen.n_lights = 0;
+	struct drawing d = { .simd = call->simd, .bins = call->bins, .drawer = drawer };
+	scene.camera = kept->fit.camera;
+	scene.n_lights = 0;
 	kept->is_drawn = 0;
 	render_settings_default(&settings, kept->fit.width, kept->fit.height);
 	settings.cull_tests = 0;
-	rc = plan_make(plan, &seen, &settings, err);
+	int rc = plan_make(plan, &scene, &settings, call->err);
 	if (rc)
 		return rc;
 	plan->is_shadow = 1;
 	for (uint32_t i = 0; i < plan->n_instances; i++)
 		plan->instance[i].cull.both_sides = 1;
-	rc = cull_blocks(bins, simd, plan, pool, &report);
+	rc = cull_blocks(call->bins, call->simd, plan, call->pool, &report);
 	if (rc == PSR_ERR_LIMIT)
-		return psr_fail(err, rc, "too many blocks for a shadow map");
+		return psr_fail(call->err, rc, "too many blocks for a shadow map");
 	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size,
 	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
 	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width, kept->fit.height);
+		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width,
+		                kept->fit.height);
 	note_plan(kept, plan);
 	clear_band(&d);
-	psr_pool_for(pool, n_parts, draw_some, &d);
-	psr_pool_for(pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
-	psr_pool_for(pool, SINK_PARTS, sink_part, &d);
+	psr_pool_for(call->pool, n_parts, draw_some, &d);
+	psr_pool_for(call->pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
+	psr_pool_for(call->pool, SINK_PARTS, sink_part, &d);
 	kept->is_drawn = 1;
-	*n_samples += d.n_samples;
+	call->report->count[PSR_STAGE_SHADOW] += d.n_samples;
 	return PSR_OK;
 }
 
@@ -227,16 +225,16 @@ void shadow_map_bind(struct shadow_map *out, const struct shadow_kept *kept, con
 	*out = kept->map;
 	for (int a = 0; a < 3; a++)
 		for (int b = 0; b < 3; b++)
-			turn[a][b] = v3d_dot(kept->axis[a], plan->frame[b]) * scale;
+			turn[a][b] = v3d_dot(kept->axes[a], plan->axes[b]) * scale;
 	v3d_sub(move, plan->eye, kept->eye);
-	m3d_apply(move, (const double(*)[3])kept->axis, move);
+	m3d_apply(move, (const double(*)[3])kept->axes, move);
 	v3d_scale(move, move, ldexp(1, -kept->exponent));
 	for (int a = 0; a < 3; a++) {
 		v3f_set(out->turn[a], (float)turn[a][0], (float)turn[a][1], (float)turn[a][2]);
 		out->move[a] = (float)move[a];
 	}
 	out->scale = (float)scale;
-	/* Coordinates are up to 1 in both units, and each of some eight steps may be off by half of their last bit. */
+	/* Coordinates are at most 1 in both units; each of some eight operations errs by half of a last bit. */
 	const double rounding = 4 * 0x1p-23 * (1 + scale);
 	out->slack = (float)rounding;
 	out->slope_bias = (float)SLOPE_BIAS;

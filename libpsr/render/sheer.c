@@ -6,8 +6,10 @@
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "base/vec.h"
-#include "render/block.h"
-#include "render/render.h"
+#include "block.h"
+#include "shade.h"
+#include "sheer.h"
+#include "splat.h"
 
 /* What lies behind eight layers of one half shows less than a code of 8 bits. */
 #define MOST_LAYERS 8
@@ -177,7 +179,9 @@ static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const s
 		for (uint32_t x = 0; x < area->width; x += STRIP) {
 			const uint32_t n = area->width - x < STRIP ? area->width - x : STRIP;
 			const size_t first = place_of(area, y) + x;
-			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, area->x0 + x, y, n, &l->pixels, &l->strip);
+			l->pixels.x0 = area->x0 + x;
+			l->pixels.y = y;
+			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
 			for (uint32_t i = 0; i < n_found; i++) {
 				const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
 				const uint32_t at = l->pixels.x[i];
@@ -270,7 +274,7 @@ static int make_tiles(struct sheer *sheer, int n)
 }
 
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
-               const struct sheer_picture *picture, struct psr_pool *pool, uint64_t *n_pixels)
+               const struct sheer_picture *picture, struct psr_pool *pool)
 {
 	const int n_parts = psr_pool_threads(pool);
 	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture };
@@ -280,7 +284,7 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
 	psr_pool_for(pool, n_parts, draw_some, &d);
-	*n_pixels = d.n_pixels;
+	sheer->n_pixels = d.n_pixels;
 	return d.failed ? PSR_ERR_MEMORY : PSR_OK;
 }
 

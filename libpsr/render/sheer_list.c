@@ -3,8 +3,9 @@
 #include <stdlib.h>
 #include "base/maths.h"
 #include "base/vec.h"
-#include "render/block.h"
-#include "render/render.h"
+#include "block.h"
+#include "sheer.h"
+#include "splat.h"
 #include "simd/block.h"
 
 /* Steps of the lattice that a pixel's centre counts as before or behind its sample, at most: normals are not the

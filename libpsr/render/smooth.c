@@ -1,9 +1,10 @@
+#include "smooth.h"
+
 #include <math.h>
 #include <string.h>
 #include "base/mem.h"
-#include "render.h"
 
-#define EDGE 3.0 /* pixel widths from one pixel to the next, as for gaps ([G] 7.2) */
+#define EDGE 3.0 /* least step in depth, in pixel widths, as for gaps ([G] 7.2) */
 
 struct smoothing {
 	struct smooth *smooth;
@@ -28,7 +29,7 @@ void smooth_clear(struct smooth *smooth)
 	psr_free_huge(smooth->storage, smooth->storage_size);
 }
 
-/* A row of bricks, of which each lies in one tile. Where nothing is, the picture is the background. */
+/* A row of bricks, tile by tile. Copies the background of quiet parts. */
 static void smooth_row(int row, void *userdata)
 {
 	struct smoothing *s = userdata;

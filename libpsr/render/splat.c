@@ -4,6 +4,8 @@
 #include "base/vec.h"
 #include "base/direction.h"
 #include "block.h"
+#include "sheer.h"
+#include "splat.h"
 #include "simd/block.h"
 
 /* Steps of the lattice: no point of an equilateral one is further than 1/sqrt(3) from a sample. */

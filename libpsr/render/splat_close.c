@@ -4,7 +4,7 @@
 #include "base/maths.h"
 #include "base/direction.h"
 #include "base/vec.h"
-#include "render.h"
+#include "splat.h"
 
 #define REACH 8 /* pixels, a power of two: no hole between discs that one surface encloses is sought further */
 /* Cells on either side of a pixel's own: a gap in a row of cells that all have samples is narrower than two of them. */

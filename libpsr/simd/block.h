@@ -1,13 +1,13 @@
-/* One block made ready for the warp, the same for all variants. */
+/* A block prepared for the warp; all variants use it. */
 #ifndef PSR_SIMD_BLOCK_H
 #define PSR_SIMD_BLOCK_H
 
-#include "simd.h"
+#include "warp.h"
 
 struct warp_block {
 	double origin[3]; /* of its first lattice point, at depth 0 */
 	double scale;     /* 2^level */
-	float unit[3];    /* what a step of depth adds */
+	float unit[3];    /* added by a step of depth */
 	float rise;       /* a step of depth, in inner units */
 	const struct warp_lattice *lattice;
 	const uint16_t *depth;
@@ -16,7 +16,7 @@ struct warp_block {
 	uint32_t id;
 };
 
-/* Its lattice's terms of row and column, [G] (7.5)'s p, q and r. */
+/* A block's terms of row and column, p, q and r of [G] (7.5). */
 struct warp_terms {
 	float row[3][8], col[3][8];
 };
@@ -54,7 +54,7 @@ static inline void warp_terms_make(struct warp_terms *out, const struct warp_blo
 		}
 }
 
-/* Axis a of the sample of row r and column c: (7.6)'s x', y' or z'. */
+/* Axis a of the sample of row r and column c: x', y' or z' of (7.6). */
 static inline float warp_axis(const struct warp_terms *terms, const struct warp_block *b, int a, uint32_t r, uint32_t c,
                               float depth)
 {

@@ -1,11 +1,10 @@
-/* Every variant of every kernel. */
+/* Kernels written by hand; loops/ has the other variants. */
 #ifndef PSR_SIMD_KERNELS_H
 #define PSR_SIMD_KERNELS_H
 
 #include "simd.h"
 
 warp_fn warp_c, warp_avx2, warp_avx512;
-/* The others of these: strip.h, fill.h. */
 strip_list_fn strip_list_avx512;
 strip_read_fn strip_read_avx512;
 strip_write_fn strip_write_avx512;

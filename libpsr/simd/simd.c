@@ -4,7 +4,7 @@
 #include "simd.h"
 
 static const char *const names[PSR_N_ISAS] = { "c", "avx2", "avx512" };
-static atomic_int cap = -1; /* not asked for yet */
+static atomic_int cap = -1; /* -1: not set */
 
 const char *psr_isa_name(enum psr_isa isa)
 {

@@ -1,266 +1,117 @@
-/* Samples of strips and their pixels, as plain loops, which the compiler turns into vectors; compiled once for each
- * ISA. */
-#include <string.h>
-#include "base/maths.h"
-#include "base/srgb.h"
-#include "strip_parts.h"
+/* Kernels of shading ([G] 7.3): strips, samples that are resolved and lit together. */
+#ifndef PSR_SIMD_STRIP_H
+#define PSR_SIMD_STRIP_H
 
-static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
-{
-	uint32_t n = 0;
-	memset(p->covered, 0, sizeof p->covered);
-	for (uint32_t x = 0; x < n_pixels; x++) {
-		const uint32_t is_covered = word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
-		p->x[n] = (uint16_t)x;
-		p->id[n] = (uint32_t)word[x];
-		p->covered[x / 32] |= is_covered << x % 32;
-		n += is_covered;
-	}
-	p->n = n;
-	p->word = word;
-}
+#include "psr/scene.h"
+#include "warp.h"
 
-static inline uint32_t cone_of(const struct psr_blocks *b, uint32_t block)
-{
-	if (!(psr_blocks_traits(b, block) & PSR_BLOCK_BENT))
-		return STRIP_NO_CONE;
-	return (uint32_t)(uint8_t)b->cone_x[block] | (uint32_t)(uint8_t)b->cone_y[block] << 8 |
-	       (uint32_t)(uint8_t)b->cone_z[block] << 16 | (uint32_t)b->cone_sine[block] << 24;
-}
+#define STRIP 128
+#define STRIP_PADDING 16 /* elements that listing may write beyond the last */
 
-static void find_cones(struct strip_pixels *p, const struct strip_view *view)
-{
-	for (uint32_t i = 0, end; i < p->n;) {
-		const struct warp_instance *in = instance_run(&end, p, view, i, p->n);
-		const struct psr_blocks b = *in->blocks;
-		for (; i < end; i++) {
-			p->cone[i] = cone_of(&b, p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot);
-			p->has_cones |= p->cone[i] != STRIP_NO_CONE;
-		}
-	}
-}
+enum strip_needs {
+	STRIP_TWO_SIDED = 1, /* a block in view is two-sided */
+	STRIP_POSITION = 2,  /* a light is near, or casts shadows */
+	STRIP_LIGHTS = 8,    /* a light shines */
+	STRIP_SPECULAR = 4,  /* compute highlights whether or not a sample is specular */
+	STRIP_BENT = 16,     /* a block in view is bent */
+};
 
-static void strip_find(struct strip_pixels *p, const struct strip_view *view)
-{
-	const uint32_t n = p->n;
-	for (uint32_t i = 0, end; i < n;) {
-		const struct warp_instance *in = instance_run(&end, p, view, i, n);
-		const struct psr_blocks b = *in->blocks;
-		for (; i < end; i++) {
-			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
-			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);
-			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
-			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
-			__builtin_prefetch(p->at[i]);
-		}
-	}
-	p->has_cones = 0;
-	if (view->needs & STRIP_BENT && view->needs & (STRIP_POSITION | STRIP_TWO_SIDED))
-		find_cones(p, view);
-	repeat_last(p);
-}
+/* The pixels of a piece of a row that have a sample: pixel i is (x0 + x[i], y). */
+struct strip_pixels {
+	uint32_t n, x0, y;
+	const uint64_t *word;         /* of the piece; not NULL where n is not 0 */
+	uint32_t has_sample[STRIP / 32]; /* bit x % 32 of has_sample[x / 32]: pixel x is among them */
+	uint16_t x[STRIP + STRIP_PADDING];
+	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
+	const uint64_t *at[STRIP];          /* attributes */
+	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
+	uint32_t has_cones;   /* a sample's block is bent; with STRIP_BENT, where the surface's normal is needed */
+	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */
+};
+#define STRIP_NO_CONE ((uint32_t)PSR_CONE_ANY << 24)
 
-static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
-{
-	const uint64_t first = strip->attr[0];
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint64_t attr = is_one ? first : strip->attr[i];
-		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
-		strip->sr[i] = psr_srgb5_to_linear[specular & 31];
-		strip->sg[i] = psr_srgb6_to_linear[specular >> 5 & 63];
-		strip->sb[i] = psr_srgb5_to_linear[specular >> 11];
-		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
-	}
-}
+/* Their samples, in camera space; colours are linear. */
+struct strip {
+	const struct strip_pixels *pixels;
+	uint32_t n;              /* pixels->n, rounded up to a multiple of STRIP_PADDING by repeating the last sample */
+	int is_specular;         /* a sample is, or the view asks for STRIP_SPECULAR */
+	uint64_t attr[STRIP];
+	uint64_t normal_word[STRIP];
+	float px[STRIP], py[STRIP], pz[STRIP]; /* with STRIP_POSITION */
+	float nx[STRIP], ny[STRIP], nz[STRIP]; /* turned to the eye where the block is two-sided */
+	/* With STRIP_POSITION or STRIP_TWO_SIDED: the surface's normal, which decides shadows and sides. It equals the
+	 * sample's, or in a bent block is the nearest one inside the block's cone. */
+	float gx[STRIP], gy[STRIP], gz[STRIP];
+	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
+	float dr[STRIP], dg[STRIP], db[STRIP];
+	float sr[STRIP], sg[STRIP], sb[STRIP], exponent[STRIP]; /* if is_specular */
+	/* Diffuse light and highlights, before multiplication with the sample's colours. */
+	float lr[STRIP], lg[STRIP], lb[STRIP];
+	float hr[STRIP], hg[STRIP], hb[STRIP];
+	uint16_t r[STRIP], g[STRIP], b[STRIP];
+};
 
-static inline void strip_read(struct strip *strip, const struct strip_view *view)
-{
-	uint64_t all, common;
-	read_attributes(&all, &common, strip, view);
-	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
-		read_diffuse(strip, 1);
-	else
-		read_diffuse(strip, 0);
-	if (strip->is_specular && all >> 40 == common >> 40)
-		read_specular(strip, 1);
-	else if (strip->is_specular)
-		read_specular(strip, 0);
-}
+struct strip_view {
+	const struct warp_instance *instance;
+	uint32_t n_instances;
+	const uint64_t *direction_word;
+	const float (*lit)[4]; /* diffuse light by normal, for strips without highlights; NULL: add up the lights */
+	float half_width, half_height, focal; /* pixels; the former to where the view axis meets the picture */
+	int perspective;
+	unsigned needs; /* enum strip_needs */
+};
 
-/* A sample is less than a pixel from the centre of the one that shows it, and the centre is what a ray would meet. */
-static void locate(struct strip *strip, const struct strip_view *view)
-{
-	const struct strip_pixels *p = strip->pixels;
-	const float y = ((float)p->y + 0.5f - view->half_height) / view->focal;
-	for (uint32_t i = 0; i < strip->n; i++)
-		strip->pz[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) / view->focal;
-		const float w = psr_choose(view->perspective, strip->pz[i], 1);
-		strip->px[i] = x * w;
-		strip->py[i] = y * w;
-	}
-}
+/* A light in camera space. */
+struct strip_light {
+	enum psr_light_kind kind;
+	float position[3], to_light[3];      /* to_light: unit, of directional lights */
+	float axis[3], cos_inner, cos_outer; /* spot; axis: unit, away from the light */
+	float reference2;                    /* square of the reference distance; 0: no fall-off */
+	float color[3];
+};
 
-static void look(struct strip *strip, const struct strip_view *view)
-{
-	const float scale = view->perspective ? 1 / view->focal : 0;
-	const struct strip_pixels *p = strip->pixels;
-	const float y = ((float)p->y + 0.5f - view->half_height) * scale;
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) * scale;
-		const float unit = -1 / __builtin_sqrtf((x * x + y * y) + 1);
-		strip->vx[i] = x * unit;
-		strip->vy[i] = y * unit;
-		strip->vz[i] = unit;
-	}
-}
+struct strip_lights {
+	const struct strip_light *light;
+	uint32_t n;
+	const float *ambient; /* r, g, b */
+};
 
-/* Normals of the surface: what is outside of a cone is moved straight to its rim. */
-static void straighten(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
-{
-	const struct strip_pixels *p = strip->pixels;
-	for (uint32_t i = first; i < end; i++) {
-		const uint32_t cone = p->cone[i], code = cone >> 24;
-		const float x = (float)(int8_t)cone, y = (float)(int8_t)(cone >> 8), z = (float)(int8_t)(cone >> 16);
-		const float unit = 1 / __builtin_sqrtf((x * x + y * y) + z * z);
-		const float ax = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * unit;
-		const float ay = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * unit;
-		const float az = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * unit;
-		const float nx = strip->nx[i], ny = strip->ny[i], nz = strip->nz[i];
-		const float sine = (float)(int32_t)code * (1.0f / 255), rim = __builtin_sqrtf(1 - sine * sine);
-		const float c = (nx * ax + ny * ay) + nz * az, square = 1 - c * c, least = 1e-12f;
-		const float across = sine / __builtin_sqrtf(psr_choose(square > least, square, least)), along = rim - c * across;
-		const int is_outside = (code != PSR_CONE_ANY) & (c < rim);
-		strip->gx[i] = psr_choose(is_outside, ax * along + nx * across, nx);
-		strip->gy[i] = psr_choose(is_outside, ay * along + ny * across, ny);
-		strip->gz[i] = psr_choose(is_outside, az * along + nz * across, nz);
-	}
-}
+/* Lists the pixels of a piece of a row, at most STRIP, that have a word and a weight above 0 (NULL: any weight): sets
+ * n, word, has_sample, x and id. */
+typedef void strip_list_fn(struct strip_pixels *pixels, const uint64_t *word, const uint16_t *weight, uint32_t n);
+/* Finds and prefetches the attributes of at least one pixel, and with STRIP_TWO_SIDED and STRIP_BENT its block's
+ * properties. Repeats the last pixel up to a multiple of STRIP_PADDING. Finding the next strip before reading this one
+ * hides the latency of memory. */
+typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view *view);
+/* Reads n, is_specular, attributes, normals and colours of strip->pixels, which strip_find has found. */
+typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
+/* Completes samples that strip_read has read: turned normals, lines of sight, and with STRIP_POSITION positions, at the
+ * centre of the pixel and the depth of its word. Sets the light to `ambient` and highlights to 0. */
+typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
+/* Adds a light: Phong's diffuse (N.L) and, if is_specular, (R.V)^n. `reaches`: the share of the light that reaches each
+ * sample, 0..1; NULL: all of it. */
+typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
+/* Tabulates light by normal, as strip_light gives it, for normals first .. first + n - 1; n at most STRIP. */
+typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_lights *lights,
+                          uint32_t first, uint32_t n);
+/* Multiplies light and colours into 16 bits; unlit samples keep their diffuse colour. */
+typedef void strip_color_fn(struct strip *strip);
 
-static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
-{
-	const struct strip_pixels *p = strip->pixels;
-	const uint32_t n = strip->n;
-	if (view->lit && !strip->is_specular) {
-		for (uint32_t i = 0; i < n; i++) {
-			const float *lit = view->lit[PSR_ATTR_NORMAL(strip->attr[i])];
-			strip->lr[i] = lit[0];
-			strip->lg[i] = lit[1];
-			strip->lb[i] = lit[2];
-		}
-		return;
-	}
-	for (uint32_t first = 0, end; first < n; first = end) {
-		const struct warp_instance *in = instance_run(&end, p, view, first, n);
-		turn_normals(strip, in->turn, first, end);
-		if (p->has_cones)
-			straighten(strip, in->turn, first, end);
-	}
-	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !p->has_cones) {
-		memcpy(strip->gx, strip->nx, n * sizeof *strip->nx);
-		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
-		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
-	}
-	for (uint32_t i = 0; i < n; i++) {
-		strip->lr[i] = ambient[0];
-		strip->lg[i] = ambient[1];
-		strip->lb[i] = ambient[2];
-	}
-	if (view->needs & STRIP_POSITION)
-		locate(strip, view);
-	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
-		look(strip, view);
-	if (strip->is_specular)
-		for (uint32_t i = 0; i < n; i++)
-			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
-	if (view->needs & STRIP_TWO_SIDED)
-		for (uint32_t i = 0; i < n; i++) {
-			const float g = (strip->gx[i] * strip->vx[i] + strip->gy[i] * strip->vy[i]) + strip->gz[i] * strip->vz[i];
-			const float turn = psr_choose((p->two_sided[i] != 0) & (g < 0), -1, 1);
-			strip->nx[i] *= turn;
-			strip->ny[i] *= turn;
-			strip->nz[i] *= turn;
-			strip->gx[i] *= turn;
-			strip->gy[i] *= turn;
-			strip->gz[i] *= turn;
-		}
-}
+#define STRIP_BRICK 32 /* pixels of a row that share one flag in `wants` */
 
-static inline uint16_t light16(float linear)
-{
-	linear = linear > 0 ? linear : 0;
-	linear = linear < 1 ? linear : 1;
-	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
-}
+struct strip_target {
+	uint32_t width;
+	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
+	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
+	const uint8_t *wants;   /* a flag for each STRIP_BRICK pixels of the piece: write linear light; NULL: none */
+	uint16_t *r, *g, *b;    /* linear light; written where wanted */
+	uint16_t background[3]; /* linear */
+};
 
-static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
-{
-	for (uint32_t i = 0; i < s->n; i++) {
-		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
-		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
-		if (is_specular) {
-			r += s->sr[i] * s->hr[i];
-			g += s->sg[i] * s->hg[i];
-			b += s->sb[i] * s->hb[i];
-		}
-		s->r[i] = light16(is_unlit ? s->dr[i] : r);
-		s->g[i] = light16(is_unlit ? s->dg[i] : g);
-		s->b[i] = light16(is_unlit ? s->db[i] : b);
-	}
-}
+/* Writes the n pixels of the piece: the colours of strip->pixels, and the background elsewhere. */
+typedef void strip_write_fn(const struct strip *strip, const struct strip_target *target, uint32_t n);
 
-static void strip_color(struct strip *strip)
-{
-	if (strip->is_specular)
-		strip_color_by(strip, 1);
-	else
-		strip_color_by(strip, 0);
-}
+/* Converts the words of a row to world depths, z' 2^exponent; +inf where a word is empty. */
+typedef void depth_row_fn(float *depth, const uint64_t *word, uint32_t n, int exponent);
 
-static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)
-{
-	const uint16_t *const from[3] = { strip->r, strip->g, strip->b };
-	uint16_t *const to[3] = { target->r, target->g, target->b };
-	const struct strip_pixels *p = strip->pixels;
-	const size_t first = (size_t)p->y * target->width + p->x0;
-	for (int c = 0; c < 3; c++) {
-		uint16_t row[STRIP];
-		for (uint32_t x = 0; x < n; x++)
-			row[x] = target->background[c];
-		for (uint32_t i = 0; i < p->n; i++)
-			row[p->x[i]] = from[c][i];
-		for (uint32_t x = 0; x < n; x += STRIP_BRICK)
-			if (target->wants[x / STRIP_BRICK])
-				memcpy(to[c] + first + x, row + x, 2 * (n - x < STRIP_BRICK ? n - x : STRIP_BRICK));
-	}
-}
-
-static inline void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
-{
-	const struct strip_pixels *p = strip->pixels;
-	if (target->rgb) {
-		const uint16_t *empty = target->background;
-		uint8_t *to = target->rgb + 3 * ((size_t)p->y * target->width + p->x0);
-		uint32_t pixel[STRIP];
-		for (uint32_t x = 0; x < n; x++)
-			pixel[x] = pixel_of(target->srgb, empty[0], empty[1], empty[2]);
-		for (uint32_t i = 0; i < p->n; i++)
-			pixel[p->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
-		for (uint32_t x = 0; x + 1 < n; x++) /* the fourth byte is the next pixel's */
-			memcpy(to + 3 * (size_t)x, &pixel[x], 4);
-		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
-	}
-	if (target->wants)
-		write_linear(strip, target, n);
-}
-
-/* By two factors, since one of them may be beyond a float: exact unless the result is. */
-static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
-{
-	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
-	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
-	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
-	for (uint32_t i = 0; i < n; i++)
-		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
-}
+#endif

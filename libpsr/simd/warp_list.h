@@ -1,7 +1,6 @@
-/* What falls into a tile, of many blocks: words, depths of cells, and the places that they go to. They are computed
- * first and stored after, so that the long way from a block's head to its words is walked for several blocks at a time;
- * and stored a quarter of the list apart in turn, since samples that follow each other often fall into one pixel, and a
- * store must not wait for the one just before. */
+/* Lists of words and cells to lower, of many blocks. Computing them before storing overlaps the latencies of several
+ * blocks. Stores take turns among the four quarters of the list: successive samples often fall into one pixel, where a
+ * store would wait for the one before. */
 #ifndef PSR_SIMD_WARP_LIST_H
 #define PSR_SIMD_WARP_LIST_H
 
@@ -54,10 +53,10 @@ static inline void lower_cells(const struct warp_target *t, struct cells *list)
 #undef LOWER
 #undef LOWER_ALL
 
-/* Blocks that are made ready together: one after the other, each would wait for what it reads. */
+/* Blocks prepared together, to overlap their cache misses. */
 #define BLOCKS 16
 
-/* Also asks the memory for the samples' depths and, where some may face away, attributes. */
+/* Prefetches the samples' depths and, where some may face away, attributes. */
 static inline void make_blocks(struct warp_block *blocks, const struct warp_target *t, const struct bin_entry *entry,
                                uint32_t n)
 {
@@ -74,7 +73,7 @@ static inline void make_blocks(struct warp_block *blocks, const struct warp_targ
 typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t,
                            const struct bin_entry *entry, const struct warp_block *block);
 
-/* The warp, by what lists a block; room for one more block is there whenever it is called. */
+/* The warp, given a function that lists a block; both lists have room for a block at each call. */
 static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *list_block,
                                                               const struct warp_target *target,
                                                               const struct bin_entry *entry, uint32_t n)

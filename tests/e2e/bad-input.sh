@@ -30,9 +30,9 @@ cp "$models/dice.psr" "$models/longer.psr"
 echo >>"$models/longer.psr"
 damage longer "1 bytes follow the end"
 echo "not a model" >"$models/text.psr"
-damage text "no .psr file"
+damage text "not a .psr file"
 head -c 20000 /dev/zero >"$models/zeros.psr"
-damage zeros "no .psr file"
+damage zeros "not a .psr file"
 mkdir "$models/folder.psr"
 
 start_psrd --models "$models" --handshake-timeout 3 --max-pixels 2m

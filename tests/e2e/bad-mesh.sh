@@ -126,7 +126,7 @@ refuses "no command" 2 "^usage: psr-model COMMAND" limited
 
 # --- info ---
 refuses "info of a file that is not there" 3 "nosuch.psr: .*No such file" limited info nosuch.psr
-refuses "info of a mesh" 4 "top.glb: this is no .psr file" limited info top.glb
+refuses "info of a mesh" 4 "top.glb: not a .psr file" limited info top.glb
 refuses "info of a folder" 3 "folder.glb: " limited info folder.glb
 size=$(stat -c %s good.psr)
 for length in 0 7 64 1000 $((size / 2)) $((size - 1)); do

@@ -126,7 +126,7 @@ check "indeed the same" cmp "$work/turn.png" "$work/again.png"
 if [ -f "$BUILD/lib/psr-image-oiio.so" ]; then
 	check "a GIF is written" turntable --model teapot --frames 5 -o "$work/turn.gif"
 	is "which is one" GIF89a "$(head -c 6 "$work/turn.gif")"
-	refuses "what does not move" 4 "does not move" turntable --model teapot -o "$work/x.jpg"
+	refuses "what does not move" 4 "has no animations" turntable --model teapot -o "$work/x.jpg"
 fi
 check "a sheet has as many pictures as places" turntable --model teapot --sheet 3x2 -o "$work/turn.ppm" --hash
 is "six" 6 "$(grep -c color "$work/out")"

@@ -96,8 +96,9 @@ static void push(struct check *c, uint32_t n, int is_spoilt)
 	const struct fill_row to = random_row(c, 2 * n, 0, 1, 1, is_spoilt), own = random_row(c, n, 1, 0, 1, is_spoilt);
 	const struct fill_row beside = random_row(c, n, 0, 0, 1, is_spoilt);
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
+	const struct fill_parents parents = { own, beside, n, scale, offset };
 	while (check_next(c)) {
-		c->simd->fill_push(&to, &own, &beside, n, scale, offset);
+		c->simd->fill_push(&to, &parents);
 		check_settle(to.z, 2 * (size_t)n);
 	}
 }
@@ -119,6 +120,7 @@ static void push_picture(struct check *c, uint32_t n, int is_spoilt)
 	const uint16_t *weight = was.weight;
 	const float scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), offset = (float)check_real(c, 0, 0.1);
 	const uint32_t n_blocks = (n + FILL_BLOCK - 1) / FILL_BLOCK, bit = 1u << check_below(c, 32);
+	const struct fill_parents parents = { own, beside, n, scale, offset };
 	struct fill_places *places = check_out(c, 1, sizeof *places);
 	uint32_t *left = check_out(c, n_blocks, sizeof *left);
 	for (uint32_t i = 0; i < n_blocks; i++)
@@ -128,7 +130,7 @@ static void push_picture(struct check *c, uint32_t n, int is_spoilt)
 	while (check_next(c)) {
 		memcpy(was.weight, weight, 2 * (size_t)n * sizeof *weight);
 		const uint32_t n_places =
-			c->simd->fill_push_picture(places, left, bit, &was, &own, &beside, n, scale, offset);
+			c->simd->fill_push_picture(places, left, bit, &was, &parents);
 		check_result(c, n_places);
 		if (!c->is_bench)
 			settle_places(places, n_places);

@@ -105,9 +105,10 @@ static void lit(struct check *c, uint32_t first, uint32_t n, uint32_t n_lights, 
 		instance->turn[k / 3][k % 3] = check_plain_or_any(c, is_spoilt, -1, 1);
 	for (int k = 0; k < 3; k++)
 		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
+	const struct strip_lights all = { lights, n_lights, ambient };
 	check_units(c, n);
 	while (check_next(c)) {
-		c->simd->strip_lit(table, &view, lights, n_lights, ambient, first, n);
+		c->simd->strip_lit(table, &view, &all, first, n);
 		if (!c->is_bench)
 			check_settle(table[0], 4 * (size_t)(first + n));
 	}
@@ -155,9 +156,9 @@ static void write_pixels(struct check *c, uint32_t width, uint32_t height, int h
 	p->y = check_below(c, height);
 	const uint32_t n = width - p->x0 < STRIP ? width - p->x0 : STRIP;
 	p->n = 0;
-	memset(p->covered, 0, sizeof p->covered);
+	memset(p->has_sample, 0, sizeof p->has_sample);
 	for (uint32_t x = check_below(c, 3); x < n; x += check_one_in(c, 6) ? 1 + check_below(c, 40) : 1) {
-		p->covered[x / 32] |= 1u << x % 32;
+		p->has_sample[x / 32] |= 1u << x % 32;
 		p->x[p->n++] = (uint16_t)x;
 	}
 	strip->pixels = p;

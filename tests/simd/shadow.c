@@ -116,9 +116,10 @@ static void sink(struct check *c, uint32_t n, int is_spoilt)
 		for (uint32_t i = 0; i < n; i++)
 			row[j][i] = check_one_in(c, 4) ? INFINITY : check_plain_or_any(c, is_spoilt, 0.5, 3);
 	}
+	const struct shadow_rows rows = { row[0], row[1], row[2] };
 	check_units(c, n);
 	while (check_next(c))
-		c->simd->shadow_sink(to, row[0], row[1], row[2], n, from, step);
+		c->simd->shadow_sink(to, &rows, n, from, step);
 }
 
 static void random_sink(struct check *c)

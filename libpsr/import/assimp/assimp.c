@@ -15,8 +15,7 @@
 struct walk {
 	struct assimp_io io;
 	struct obj obj; /* n is 0 for the other formats */
-	const struct aiScene *scene;
-	int *material; /* of the scene's material m without and with vertex colors: 2 m, 2 m + 1; -1: not made yet */
+	int *material; /* 2 m, 2 m + 1: of the scene's material m without and with vertex colors; -1: not made yet */
 	int (*uv_source)[PSR_UV_SETS];
 	int ignore_normals;
 };
@@ -27,7 +26,6 @@ static void multiply(matrix out, const matrix a, const struct aiMatrix4x4 *b)
 {
 	const double m[4][4] = { { b->a1, b->a2, b->a3, b->a4 }, { b->b1, b->b2, b->b3, b->b4 },
 		                 { b->c1, b->c2, b->c3, b->c4 }, { 0.0, 0.0, 0.0, 1.0 } };
-
 	for (int row = 0; row < 3; row++)
 		for (int col = 0; col < 4; col++) {
 			out[row][col] = col == 3 ? a[row][3] : 0.0;
@@ -36,15 +34,13 @@ static void multiply(matrix out, const matrix a, const struct aiMatrix4x4 *b)
 		}
 }
 
-/* Cofactors, whose sign of the determinant makes them the inverse transpose but for length. */
+/* Cofactors times the determinant's sign: the inverse transpose up to length. Returns whether m mirrors. */
 static int cofactors(double out[3][3], const matrix m)
 {
 	double determinant = 0.0;
-
 	for (int row = 0; row < 3; row++)
 		for (int col = 0; col < 3; col++) {
 			int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (col + 1) % 3, c2 = (col + 2) % 3;
-
 			out[row][col] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
 		}
 	for (int col = 0; col < 3; col++)
@@ -55,7 +51,7 @@ static int cofactors(double out[3][3], const matrix m)
 	return determinant < 0.0;
 }
 
-/* Where a mesh goes, and room for its largest face. */
+/* Where a mesh goes, and scratch memory for its largest face. */
 struct target {
 	const struct aiMesh *source;
 	const struct obj *obj;
@@ -70,7 +66,6 @@ struct target {
 static void position_of(double p[3], const struct target *t, unsigned from)
 {
 	const struct aiVector3D *v = &t->source->mVertices[from];
-
 	p[0] = v->x;
 	p[1] = v->y;
 	p[2] = v->z;
@@ -78,20 +73,18 @@ static void position_of(double p[3], const struct target *t, unsigned from)
 		obj_position(p, t->obj, v->x, v->y);
 }
 
-/* One vertex of Assimp's as vertex `to` of the mesh. */
+/* Copies a vertex of Assimp's to vertex `to` of the mesh. */
 static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *t, unsigned from)
 {
 	const struct aiMesh *source = t->source;
 	const double (*m)[4] = t->m;
 	double p[3];
-
 	position_of(p, t, from);
 	for (int row = 0; row < 3; row++)
 		mesh->position[to][row] = m[row][0] * p[0] + m[row][1] * p[1] + m[row][2] * p[2] + m[row][3];
 	if (t->with_normals) {
 		const double (*normals)[3] = (const double(*)[3])t->normals;
 		const struct aiVector3D *n = &source->mNormals[from];
-
 		for (int row = 0; row < 3; row++)
 			mesh->normal[to][row] =
 				(float)(normals[row][0] * n->x + normals[row][1] * n->y + normals[row][2] * n->z);
@@ -99,9 +92,8 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *
 	for (int set = 0; set < PSR_UV_SETS; set++)
 		if (t->uv_source[set] >= 0 && source->mTextureCoords[t->uv_source[set]] != NULL) {
 			const struct aiVector3D *uv = &source->mTextureCoords[t->uv_source[set]][from];
-
 			mesh->uv[set][to][0] = uv->x;
-			mesh->uv[set][to][1] = 1.0f - uv->y; /* Assimp's v grows upwards */
+			mesh->uv[set][to][1] = 1.0f - uv->y; /* Assimp's v points up */
 		}
 	if (source->mColors[0] != NULL) {
 		mesh->color[to][0] = assimp_linear(source->mColors[0][from].r);
@@ -111,15 +103,13 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *
 	}
 }
 
-/* Of polygons too; *most is the number of corners of the largest one. */
+/* Counts triangles after cutting polygons; *most: corners of the largest one. */
 static uint64_t count_triangles(struct psr_mesh *mesh, const struct aiMesh *source, unsigned *most)
 {
 	uint64_t n = 0;
-
 	*most = 3;
 	for (unsigned f = 0; f < source->mNumFaces; f++) {
 		unsigned corners = source->mFaces[f].mNumIndices;
-
 		if (corners < 3)
 			mesh->n_dropped_primitives++;
 		else
@@ -134,15 +124,13 @@ static void add_face(struct psr_mesh *mesh, struct target *t, const struct aiFac
 {
 	double point[POLYGON_MAX_CLIP][3];
 	const unsigned n = face->mNumIndices;
-
 	for (unsigned i = 0; n > 3 && i < n && i < POLYGON_MAX_CLIP; i++)
 		position_of(point[i], t, face->mIndices[i]);
 	polygon_cut(t->cut, (const double(*)[3])point, n);
 	for (unsigned k = 0; k + 2 < n; k++) {
 		for (unsigned c = 0; c < 3; c++) {
 			unsigned from = face->mIndices[t->cut[k][t->flip ? 2 - c : c]];
-
-			/* Without normals each corner is a vertex of its own until they are made. */
+			/* Without normals, each corner is a vertex of its own until import_mesh_smooth. */
 			mesh->triangle[t->triangle][c] = t->with_normals ? t->first + from : t->vertex;
 			if (!t->with_normals)
 				put_vertex(mesh, t->vertex++, t, from);
@@ -156,15 +144,14 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	struct import_mesh *im = w->io.im;
 	struct psr_mesh *mesh = im->mesh;
 	const int has_color = source->mColors[0] != NULL;
-	const unsigned key = 2 * (source->mMaterialIndex < w->scene->mNumMaterials ? source->mMaterialIndex : 0) +
+	const unsigned key = 2 * (source->mMaterialIndex < w->io.scene->mNumMaterials ? source->mMaterialIndex : 0) +
 	                     (unsigned)has_color;
 	unsigned most, has = has_color ? IMPORT_HAS_COLOR : 0;
 	const uint64_t n = count_triangles(mesh, source, &most);
 	struct target t = { .source = source, .obj = &w->obj, .m = m };
 	int rc;
-
 	if (w->material[key] < 0)
-		w->material[key] = assimp_material(&w->io, w->scene, key / 2, has_color, w->uv_source[key], err);
+		w->material[key] = assimp_material(&w->io, key / 2, has_color, w->uv_source[key], err);
 	if (w->material[key] < 0)
 		return w->material[key];
 	t.with_normals = source->mNormals != NULL && !w->ignore_normals;
@@ -194,24 +181,22 @@ static int add_node(struct walk *w, const struct aiNode *node, const matrix pare
 {
 	matrix m;
 	int rc = PSR_OK;
-
 	if (depth > MAX_DEPTH)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: nodes nested deeper than %d", w->io.im->path, MAX_DEPTH);
 	multiply(m, parent, &node->mTransformation);
 	for (unsigned i = 0; i < node->mNumMeshes && rc == PSR_OK; i++)
-		if (node->mMeshes[i] < w->scene->mNumMeshes)
-			rc = add_mesh(w, w->scene->mMeshes[node->mMeshes[i]], (const double(*)[4])m, err);
+		if (node->mMeshes[i] < w->io.scene->mNumMeshes)
+			rc = add_mesh(w, w->io.scene->mMeshes[node->mMeshes[i]], (const double(*)[4])m, err);
 	for (unsigned i = 0; i < node->mNumChildren && rc == PSR_OK; i++)
-		if (node->mChildren[i] != NULL) /* its RAW reader leaves such */
+		if (node->mChildren[i] != NULL) /* Assimp's RAW reader leaves NULL */
 			rc = add_node(w, node->mChildren[i], (const double(*)[4])m, depth + 1, err);
 	return rc;
 }
 
-/* STL has a normal a face, which says no more than the face itself: smooth ones serve a scan better. */
+/* STL's normals are those of the faces; smooth ones suit scans better. */
 static int is_stl(const struct aiScene *scene)
 {
 	const struct aiMetadata *d = scene->mMetaData;
-
 	for (unsigned i = 0; d != NULL && i < d->mNumProperties; i++)
 		if (strcmp(d->mKeys[i].data, AI_METADATA_SOURCE_FORMAT) == 0 && d->mValues[i].mType == AI_AISTRING)
 			return strstr(((const struct aiString *)d->mValues[i].mData)->data, "Stereolithography") != NULL;
@@ -221,17 +206,16 @@ static int is_stl(const struct aiScene *scene)
 static int read_scene(struct walk *w, struct psr_error *err)
 {
 	static const matrix identity = { { 1, 0, 0, 0 }, { 0, 1, 0, 0 }, { 0, 0, 1, 0 } };
-	const size_t n = 2 * ((size_t)w->scene->mNumMaterials + 1);
+	const size_t n = 2 * ((size_t)w->io.scene->mNumMaterials + 1);
 	int rc;
-
 	w->material = malloc(n * sizeof *w->material);
 	w->uv_source = malloc(n * sizeof *w->uv_source);
 	if (w->material == NULL || w->uv_source == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for materials", w->io.im->path);
 	for (size_t i = 0; i < n; i++)
 		w->material[i] = -1;
-	w->ignore_normals = is_stl(w->scene);
-	rc = add_node(w, w->scene->mRootNode, identity, 0, err);
+	w->ignore_normals = is_stl(w->io.scene);
+	rc = add_node(w, w->io.scene->mRootNode, identity, 0, err);
 	if (rc == PSR_OK)
 		rc = import_mesh_smooth(w->io.im, err);
 	return rc == PSR_OK ? import_mesh_weld(w->io.im, err) : rc;
@@ -242,17 +226,16 @@ static int read_file(struct walk *w, struct psr_error *err)
 	const char *path = w->io.im->path;
 	char why[ASSIMP_WHY];
 	int rc;
-
-	w->scene = assimp_read(w->io.path, &w->io.io, why);
-	if (w->scene == NULL && strncmp(why, "No suitable reader", 18) == 0)
+	w->io.scene = assimp_read(w->io.path, &w->io.io, why);
+	if (w->io.scene == NULL && strncmp(why, "No suitable reader", 18) == 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "%s: not a mesh file that is known (glTF, OBJ, STL, PLY, OFF, 3DS, Collada, ...)", path);
-	if (w->scene == NULL)
+		                "%s: not a mesh file in a supported format (glTF, OBJ, STL, PLY, OFF, Collada, ...)", path);
+	if (w->io.scene == NULL)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: cannot be read as a mesh: %s", path, why);
-	rc = assimp_check_faces(w->io.im, w->scene, err);
+	rc = assimp_check_faces(w->io.im, w->io.scene, err);
 	if (rc != PSR_OK)
 		return rc;
-	if (w->scene->mRootNode == NULL || w->scene->mNumMeshes == 0)
+	if (w->io.scene->mRootNode == NULL || w->io.scene->mNumMeshes == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the file has no surface", path);
 	return read_scene(w, err);
 }
@@ -261,7 +244,6 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 {
 	struct walk w;
 	int rc = assimp_check_counts(im, bytes, n_bytes, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	memset(&w, 0, sizeof w);
@@ -274,8 +256,8 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 		rc = assimp_io_init(&w.io, im, bytes, n_bytes, err);
 	if (rc == PSR_OK)
 		rc = read_file(&w, err);
-	if (w.scene != NULL)
-		aiReleaseImport(w.scene);
+	if (w.io.scene != NULL)
+		aiReleaseImport(w.io.scene);
 	free(w.material);
 	free(w.uv_source);
 	assimp_io_fini(&w.io);

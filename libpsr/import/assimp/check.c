@@ -1,6 +1,5 @@
 #include <ctype.h>
 #include <string.h>
-#include <strings.h>
 #include "check.h"
 
 #define MAX_HEADER 65536
@@ -23,7 +22,7 @@ static int skip_blank(struct text *t)
 	return 0;
 }
 
-/* The next word as a number; 0 if it is none. Saturates. */
+/* Reads the next word as a number, which saturates; returns 0 if it is not one. */
 static int next_number(struct text *t, uint64_t *x)
 {
 	if (!skip_blank(t) || !isdigit(*t->at))
@@ -42,13 +41,12 @@ static void skip_word(struct text *t)
 static int check_off(const struct import_mesh *im, struct text t, size_t n_bytes, struct psr_error *err)
 {
 	uint64_t n;
-
 	if (skip_blank(&t) && !isdigit(*t.at))
 		skip_word(&t);
 	for (int i = 0; i < 2 && next_number(&t, &n); i++)
 		if (n > n_bytes)
 			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: the OFF header speaks of %llu %s, but the file has only %zu bytes",
+			                "%s: the OFF header promises %llu %s, but the file has only %zu bytes",
 			                im->path, (unsigned long long)n, i == 0 ? "vertices" : "faces", n_bytes);
 	return PSR_OK;
 }
@@ -56,10 +54,9 @@ static int check_off(const struct import_mesh *im, struct text t, size_t n_bytes
 /* By the file's ending, or a first word like OFF, COFF, STCN4OFF. */
 static int is_off(const char *path, struct text t)
 {
-	size_t n = strlen(path), word;
 	const uint8_t *start;
-
-	if (n >= 4 && strcasecmp(path + n - 4, ".off") == 0)
+	size_t word;
+	if (import_path_ends_with(path, ".off"))
 		return 1;
 	if (!skip_blank(&t))
 		return 0;
@@ -72,7 +69,6 @@ static int is_off(const char *path, struct text t)
 int assimp_check_counts(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
 	struct text t = { bytes, bytes + (n_bytes < MAX_HEADER ? n_bytes : MAX_HEADER) };
-
 	return is_off(im->path, t) ? check_off(im, t, n_bytes, err) : PSR_OK;
 }
 
@@ -80,7 +76,6 @@ int assimp_check_faces(const struct import_mesh *im, const struct aiScene *scene
 {
 	for (unsigned m = 0; m < scene->mNumMeshes; m++) {
 		const struct aiMesh *mesh = scene->mMeshes[m];
-
 		if (mesh == NULL || (mesh->mVertices == NULL && mesh->mNumVertices > 0) ||
 		    (mesh->mFaces == NULL && mesh->mNumFaces > 0))
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: mesh %u is empty", im->path, m);

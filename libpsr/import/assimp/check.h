@@ -1,15 +1,15 @@
-/* What Assimp takes on trust, checked on both sides of it. */
+/* Checks of counts and indices that Assimp trusts. */
 #ifndef PSR_IMPORT_ASSIMP_CHECK_H
 #define PSR_IMPORT_ASSIMP_CHECK_H
 
 #include <assimp/scene.h>
 #include "import/import.h"
 
-/* Before: OFF files tell their counts first, and Assimp allocates whatever they say. Each vertex and face takes
- * at least a byte, so a count beyond the file's size is a lie. */
+/* Before reading: refuses OFF files whose counts exceed the file's size, since Assimp allocates by the counts. Each
+ * vertex and face takes at least a byte. */
 int assimp_check_counts(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 
-/* After reading: no face refers to a vertex that is not there. */
+/* After reading: refuses faces that refer to missing vertices. */
 int assimp_check_faces(const struct import_mesh *im, const struct aiScene *scene, struct psr_error *err);
 
 #endif

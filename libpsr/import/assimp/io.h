@@ -1,18 +1,20 @@
-/* Files for Assimp: the source from memory, and what it names from its own folder; nothing else can be opened. */
+/* Files for Assimp: the source from memory, and files in its folder; nothing else can be opened. */
 #ifndef PSR_IMPORT_ASSIMP_IO_H
 #define PSR_IMPORT_ASSIMP_IO_H
 
 #include <assimp/cfileio.h>
+#include <assimp/scene.h>
 #include "import/import.h"
 
 struct assimp_io {
-	struct aiFileIO io; /* first: Assimp hands a pointer to it back */
+	struct aiFileIO io; /* first: callbacks get a pointer to it */
 	struct import_mesh *im;
 	char *folder;
-	char *path; /* by which Assimp knows the source: folder, slash, name */
+	char *path; /* the source's name for Assimp: folder, slash, name */
 	const uint8_t *bytes;
 	size_t n_bytes;
-	char **image_path; /* of each image of the mesh; NULL where it has none */
+	char **image_path; /* of each image of the mesh, or NULL */
+	const struct aiScene *scene; /* set by the reader, which releases it */
 };
 
 int assimp_io_init(struct assimp_io *io, struct import_mesh *im, const uint8_t *bytes, size_t n_bytes,

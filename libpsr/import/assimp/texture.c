@@ -11,23 +11,20 @@ static enum psr_wrap wrap_of(enum aiTextureMapMode mode)
 	                                                                                         : PSR_WRAP_REPEAT;
 }
 
-/* Takes `path`, whatever happens. */
+/* Takes ownership of `path`, on failure too. */
 static int add_image(struct assimp_io *io, const uint8_t *bytes, size_t n_bytes, char *path, const char *name,
                      struct psr_error *err)
 {
-	char **paths = realloc(io->image_path, ((size_t)io->im->mesh->n_images + 1) * sizeof *paths);
 	char place[PSR_ERROR_TEXT];
 	int rc;
-
-	if (paths == NULL) {
+	if (!import_resize(&io->image_path, (uint64_t)io->im->mesh->n_images + 1, sizeof *io->image_path)) {
 		free(path);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", name);
 	}
-	io->image_path = paths;
 	snprintf(place, sizeof place, "%.300s: %.150s", io->im->path, name);
 	rc = import_mesh_add_image(io->im, bytes, n_bytes, place, err);
 	if (rc >= 0)
-		paths[rc] = path;
+		io->image_path[rc] = path;
 	else
 		free(path);
 	return rc;
@@ -41,11 +38,11 @@ static int find_image(const struct assimp_io *io, const char *path)
 	return -1;
 }
 
-static int add_embedded(struct assimp_io *io, const struct aiScene *scene, const char *name, struct psr_error *err)
+static int add_embedded(struct assimp_io *io, const char *name, struct psr_error *err)
 {
+	const struct aiScene *scene = io->scene;
 	unsigned long i = strtoul(name + 1, NULL, 10);
 	int image = find_image(io, name);
-
 	if (image >= 0)
 		return image;
 	if (i >= scene->mNumTextures || scene->mTextures[i]->mHeight != 0) {
@@ -56,12 +53,11 @@ static int add_embedded(struct assimp_io *io, const struct aiScene *scene, const
 	                 name, err);
 }
 
-/* Written on another machine: C:\textures\wood.png and /home/someone/wood.png are looked for beside the source. */
+/* Looks for files of other machines, like C:\textures\wood.png or /home/someone/wood.png, beside the source. */
 static int find_texture(char **path, const struct assimp_io *io, char *name, struct psr_error *err)
 {
 	char *base;
 	int rc;
-
 	for (char *c = name; *c != '\0'; c++)
 		if (*c == '\\')
 			*c = '/';
@@ -72,16 +68,15 @@ static int find_texture(char **path, const struct assimp_io *io, char *name, str
 	return rc;
 }
 
-/* An image's index, -1 with a warning where there is no such file, another negative code for a broken one. */
-static int find_or_add(struct assimp_io *io, const struct aiScene *scene, struct aiString *name, struct psr_error *err)
+/* Returns an image's index; -1 with a warning if the file is missing; another negative code if it is broken. */
+static int find_or_add(struct assimp_io *io, struct aiString *name, struct psr_error *err)
 {
 	char *path;
 	uint8_t *bytes;
 	size_t n_bytes;
 	int rc;
-
 	if (name->data[0] == '*')
-		return add_embedded(io, scene, name->data, err);
+		return add_embedded(io, name->data, err);
 	if (find_texture(&path, io, name->data, err) != PSR_OK) {
 		import_mesh_warn(io->im, "the texture \"%.100s\" is not in the folder of the file and was left out",
 		                 name->data);
@@ -102,7 +97,7 @@ static int find_or_add(struct assimp_io *io, const struct aiScene *scene, struct
 	return rc;
 }
 
-/* The mesh's set for the scene's set n: n where it has one, else one that the material leaves free; -1: none. */
+/* The mesh's set for the scene's set n: n if possible, else another free one; -1: none is free. */
 static int take_set(int source[PSR_UV_SETS], int n)
 {
 	for (int set = 0; set < PSR_UV_SETS; set++)
@@ -110,7 +105,6 @@ static int take_set(int source[PSR_UV_SETS], int n)
 			return set;
 	for (int k = 0; k < PSR_UV_SETS; k++) {
 		int set = n < PSR_UV_SETS ? (n + k) % PSR_UV_SETS : k;
-
 		if (source[set] < 0) {
 			source[set] = n;
 			return set;
@@ -119,12 +113,11 @@ static int take_set(int source[PSR_UV_SETS], int n)
 	return -1;
 }
 
-/* Assimp's v grows upwards: v' = 1 - (s (1 - v) + t). */
+/* Assimp's v points up: v' = 1 - (s (1 - v) + t). */
 static void set_transform(struct psr_texture *out, struct assimp_io *io, const struct aiMaterial *m,
                           enum aiTextureType type)
 {
 	struct aiUVTransform t;
-
 	if (aiGetMaterialUVTransform(m, AI_MATKEY_UVTRANSFORM(type, 0), &t) != aiReturn_SUCCESS)
 		return;
 	if (t.mRotation != 0.0f)
@@ -135,16 +128,14 @@ static void set_transform(struct psr_texture *out, struct assimp_io *io, const s
 	out->transform[5] = 1.0f - t.mScaling.y - t.mTranslation.y;
 }
 
-int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct aiScene *scene,
-                   const struct aiMaterial *m, enum aiTextureType type, int uv_source[PSR_UV_SETS],
-                   struct psr_error *err)
+int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct aiMaterial *m, enum aiTextureType type,
+                   int uv_source[PSR_UV_SETS], struct psr_error *err)
 {
 	enum aiTextureMapMode mode[3] = { aiTextureMapMode_Wrap, aiTextureMapMode_Wrap, aiTextureMapMode_Wrap };
 	enum aiTextureMapping mapping = aiTextureMapping_UV;
 	struct aiString name;
 	unsigned set = 0;
 	int image;
-
 	if (aiGetMaterialTexture(m, type, 0, &name, &mapping, &set, NULL, NULL, mode, NULL) != aiReturn_SUCCESS ||
 	    name.length == 0)
 		return PSR_OK;
@@ -152,7 +143,7 @@ int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct a
 		import_mesh_warn(io->im, "the texture \"%.100s\" has no coordinates and was left out", name.data);
 		return PSR_OK;
 	}
-	image = find_or_add(io, scene, &name, err);
+	image = find_or_add(io, &name, err);
 	if (image < 0)
 		return image == -1 ? PSR_OK : image;
 	out->uv_set = take_set(uv_source, set < AI_MAX_NUMBER_OF_TEXTURECOORDS ? (int)set : 0);
@@ -169,32 +160,28 @@ int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct a
 	return PSR_OK;
 }
 
-/* The image made by `make` of images a and b (-1: none), once for each pair. */
+/* The image that `make` makes of images a and b (-1: none); each pair once. */
 static int add_made(struct assimp_io *io, int a, int b, const char *kind,
                     int (*make)(struct psr_image *, const struct psr_image *, const struct psr_image *),
                     struct psr_error *err)
 {
 	const struct psr_mesh *mesh = io->im->mesh;
 	struct psr_image image;
-	char key[64], *copy, **paths;
+	char key[64], *copy;
 	int rc;
-
 	snprintf(key, sizeof key, "%s of %d and %d", kind, a, b); /* paths begin with a slash or a star */
 	rc = find_image(io, key);
 	if (rc >= 0)
 		return rc;
 	copy = strdup(key);
-	paths = realloc(io->image_path, ((size_t)mesh->n_images + 1) * sizeof *paths);
-	if (paths != NULL)
-		io->image_path = paths;
-	if (copy == NULL || paths == NULL ||
+	if (copy == NULL || !import_resize(&io->image_path, (uint64_t)mesh->n_images + 1, sizeof *io->image_path) ||
 	    !make(&image, a < 0 ? NULL : &mesh->image[a], b < 0 ? NULL : &mesh->image[b])) {
 		free(copy);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", io->im->path);
 	}
 	rc = import_mesh_add_pixels(io->im, &image, err);
 	if (rc >= 0)
-		paths[rc] = copy;
+		io->image_path[rc] = copy;
 	else
 		free(copy);
 	return rc;
@@ -204,7 +191,6 @@ int assimp_opacity(struct psr_material *out, struct assimp_io *io, const struct 
                    struct psr_error *err)
 {
 	int base = out->base_texture.image, image;
-
 	if (base >= 0 && opacity->uv_set != out->base_texture.uv_set) {
 		import_mesh_warn(io->im, "an opacity map with coordinates of its own was left out");
 		return PSR_OK;
@@ -223,7 +209,6 @@ int assimp_metallic_roughness(struct psr_material *out, struct assimp_io *io, co
                               const struct psr_texture *roughness, struct psr_error *err)
 {
 	int image, metal = metallic->image;
-
 	if (metal < 0 && roughness->image < 0)
 		return PSR_OK;
 	if (metal >= 0 && roughness->image >= 0 && metallic->uv_set != roughness->uv_set) {

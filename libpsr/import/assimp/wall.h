@@ -1,4 +1,4 @@
-/* Assimp's entry point, with everything caught that it throws and asserts. */
+/* Assimp's entry point; catches exceptions and assertions. */
 #ifndef PSR_IMPORT_ASSIMP_WALL_H
 #define PSR_IMPORT_ASSIMP_WALL_H
 
@@ -11,7 +11,7 @@ extern "C" {
 
 #define ASSIMP_WHY 300
 
-/* The scene, unprocessed, to be given to aiReleaseImport; or NULL and why. */
+/* Returns the unprocessed scene, for aiReleaseImport; or NULL, and why. */
 const struct aiScene *assimp_read(const char *path, struct aiFileIO *io, char why[ASSIMP_WHY]);
 
 #ifdef __cplusplus

@@ -7,12 +7,11 @@
 
 #define EMPTY UINT32_MAX
 #define LONE_RADIUS 1.0f     /* of a cloud that is one point, in units of the file */
-#define LEAST_RADIUS 1e-9f   /* of the model's size: what is nearer than doubles can tell */
+#define LEAST_RADIUS 1e-9f   /* of the model's size */
 
 float cloud_linear(double code)
 {
 	int below;
-
 	if (!(code > 0.0))
 		return psr_srgb_to_linear[0];
 	if (!(code < 255.0))
@@ -27,15 +26,14 @@ static int same_place(const double a[3], const double b[3])
 	return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
 }
 
-/* Adding 0 makes one zero of the two. */
+/* Adding 0 turns -0 into 0. */
 static uint64_t hash_of(const double p[3])
 {
 	const double key[3] = { p[0] + 0.0, p[1] + 0.0, p[2] + 0.0 };
-
 	return XXH64(key, sizeof key, 0);
 }
 
-/* Of points at one place the first stays. */
+/* Keeps the first of points at one position. */
 static int drop_duplicates(struct import_mesh *im)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
@@ -43,7 +41,6 @@ static int drop_duplicates(struct import_mesh *im)
 	const int n_columns = import_point_columns(column, mesh);
 	uint64_t n_slots = 16;
 	uint32_t *slot, kept = 0, n_dropped;
-
 	while (n_slots < 2 * (uint64_t)mesh->n_points)
 		n_slots *= 2;
 	slot = malloc(n_slots * sizeof *slot);
@@ -52,7 +49,6 @@ static int drop_duplicates(struct import_mesh *im)
 	memset(slot, 0xff, n_slots * sizeof *slot);
 	for (uint32_t p = 0; p < mesh->n_points; p++) {
 		uint64_t at = hash_of(mesh->point[p]) & (n_slots - 1);
-
 		while (slot[at] != EMPTY && !same_place(mesh->point[slot[at]], mesh->point[p]))
 			at = (at + 1) & (n_slots - 1);
 		if (slot[at] != EMPTY)
@@ -67,7 +63,7 @@ static int drop_duplicates(struct import_mesh *im)
 	mesh->n_points = kept;
 	mesh->n_dropped_primitives += n_dropped;
 	if (n_dropped > 0)
-		import_mesh_warn(im, "points that were there twice were left out: %u", n_dropped);
+		import_mesh_warn(im, "duplicate points were left out: %u", n_dropped);
 	return PSR_OK;
 }
 
@@ -86,7 +82,6 @@ static void cloud_fini(struct cloud *cloud)
 static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh, int n_threads)
 {
 	int rc;
-
 	memset(cloud, 0, sizeof *cloud);
 	cloud->n = mesh->n_points;
 	cloud->normal = malloc(cloud->n * sizeof *cloud->normal);
@@ -101,14 +96,12 @@ static int cloud_init(struct cloud *cloud, const struct psr_mesh *mesh, int n_th
 	return psr_pool_create(&cloud->pool, n_threads, NULL);
 }
 
-/* Slots' normals from the mesh; returns how many are missing. */
+/* Copies normals from the mesh; returns how many are missing. */
 static uint32_t take_normals(struct cloud *cloud, const struct psr_mesh *mesh)
 {
 	uint32_t n_missing = 0;
-
 	for (uint32_t i = 0; i < cloud->n; i++) {
 		const float *n = mesh->point_normal[cloud->point[i].id];
-
 		memcpy(cloud->normal[i], n, sizeof cloud->normal[i]);
 		cloud->is_given[i] = n[0] != 0.0f || n[1] != 0.0f || n[2] != 0.0f;
 		n_missing += !cloud->is_given[i];
@@ -122,7 +115,6 @@ static void put_results(struct psr_mesh *mesh, const struct cloud *cloud)
 		const uint32_t to = cloud->point[i].id;
 		const float least = LEAST_RADIUS;
 		double radius = (double)(cloud->radius[i] > least ? cloud->radius[i] : least) * cloud->unit;
-
 		memcpy(mesh->point_normal[to], cloud->normal[i], sizeof cloud->normal[i]);
 		if (!(mesh->point_radius[to] > 0.0f && mesh->point_radius[to] <= FLT_MAX))
 			mesh->point_radius[to] = radius < FLT_MIN ? FLT_MIN : radius > FLT_MAX ? FLT_MAX : (float)radius;
@@ -132,7 +124,6 @@ static void put_results(struct psr_mesh *mesh, const struct cloud *cloud)
 static void finish_one(struct psr_mesh *mesh)
 {
 	float *n = mesh->point_normal[0];
-
 	if (n[0] == 0.0f && n[1] == 0.0f && n[2] == 0.0f)
 		n[2] = 1.0f;
 	if (!(mesh->point_radius[0] > 0.0f && mesh->point_radius[0] <= FLT_MAX))
@@ -145,7 +136,6 @@ int import_cloud_finish(struct import_mesh *im, struct psr_error *err)
 	struct cloud cloud;
 	uint32_t n_missing;
 	int rc = drop_duplicates(im);
-
 	memset(&cloud, 0, sizeof cloud);
 	if (rc == PSR_OK && mesh->n_points == 1) {
 		finish_one(mesh);

@@ -2,16 +2,15 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 #include "cloud.h"
 
 #define MAX_HEADER 375 /* bytes, of version 1.4 */
 #define LEAST_HEADER 227
 #define VLR_HEADER 54
 #define FORMATS 11
-#define BRIGHT 0.99    /* the part of the points whose intensity is below the one that is drawn as white */
+#define BRIGHT 0.99    /* the share of points with an intensity below white */
 
-/* LAS 1.2 to 1.4 as the specifications of the ASPRS say, whose words these are. */
+/* LAS 1.2 to 1.4 in the terms of the ASPRS specifications. */
 struct las {
 	const char *path;
 	const uint8_t *bytes;
@@ -20,7 +19,7 @@ struct las {
 	double scale[3], offset[3];
 };
 
-/* Bytes of a point of each format, and where its color stands; 0: nowhere. */
+/* Bytes of a point of each format, and the offset of its color; 0: none. */
 static const struct {
 	uint8_t size, color;
 } formats[FORMATS] = {
@@ -31,7 +30,6 @@ static const struct {
 static uint64_t get(const uint8_t *p, int n)
 {
 	uint64_t x = 0;
-
 	for (int i = 0; i < n; i++)
 		x |= (uint64_t)p[i] << 8 * i;
 	return x;
@@ -41,22 +39,14 @@ static double get_double(const uint8_t *p)
 {
 	uint64_t bits = get(p, 8);
 	double x;
-
 	memcpy(&x, &bits, sizeof x);
 	return x;
-}
-
-static int ends_with(const char *path, const char *ending)
-{
-	size_t n = strlen(path), m = strlen(ending);
-
-	return n >= m && strcasecmp(path + n - m, ending) == 0;
 }
 
 static int refuse_laz(const struct las *las, struct psr_error *err)
 {
 	return psr_fail(err, PSR_ERR_UNSUPPORTED,
-	                "%s: is compressed (LAZ); unpack it with \"laszip -i IN.laz -o OUT.las\", with las2las, or with "
+	                "%s: compressed (LAZ); unpack it with \"laszip -i IN.laz -o OUT.las\", with las2las, or with "
 	                "\"pdal translate IN.laz OUT.las\"",
 	                las->path);
 }
@@ -64,29 +54,26 @@ static int refuse_laz(const struct las *las, struct psr_error *err)
 static int read_numbers(struct las *las, struct psr_error *err)
 {
 	const uint8_t *b = las->bytes;
-
 	for (int c = 0; c < 3; c++) {
 		las->scale[c] = get_double(b + 131 + 8 * c);
 		las->offset[c] = get_double(b + 155 + 8 * c);
 		if (!isfinite(las->scale[c]) || las->scale[c] == 0.0 || !isfinite(las->offset[c]))
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header's scale or offset of %c is not a number to use",
+			return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header's scale or offset of %c is zero or not finite",
 			                las->path, "xyz"[c]);
 	}
 	return PSR_OK;
 }
 
-/* Variable length records lie between the header and the points. Returns whether one is LASzip's. */
+/* Checks the variable length records between header and points; *is_laz: one is LASzip's. */
 static int check_records(const struct las *las, uint64_t header, uint32_t n, int *is_laz, struct psr_error *err)
 {
 	uint64_t at = header;
-
 	*is_laz = 0;
 	for (uint32_t i = 0; i < n; i++) {
 		uint64_t length;
-
 		if (las->first - at < VLR_HEADER)
 			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: the LAS header speaks of %u variable length records, but there is room for only %u "
+			                "%s: the LAS header promises %u variable length records, but there is room for only %u "
 			                "before the points",
 			                las->path, n, i);
 		length = get(las->bytes + at + 20, 2);
@@ -102,20 +89,19 @@ static int check_records(const struct las *las, uint64_t header, uint32_t n, int
 	return PSR_OK;
 }
 
-/* From version 1.4 on the count has 64 bits, and the old one is 0 where it would not fit. */
+/* Since version 1.4 the count has 64 bits, and the old field may be 0. */
 static uint64_t count_of(const struct las *las)
 {
 	uint64_t old = get(las->bytes + 107, 4), count = las->minor >= 4 ? get(las->bytes + 247, 8) : 0;
-
 	return count > 0 ? count : old;
 }
 
 static int check_points(struct las *las, struct psr_error *err)
 {
 	uint64_t room;
-
 	if (las->format >= FORMATS)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: LAS point format %u; 0 to 10 are known", las->path, las->format);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: LAS point format %u is not supported; 0 to 10 are", las->path,
+		                las->format);
 	if (las->record < formats[las->format].size)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: points of %u bytes, but point format %u takes %u", las->path,
 		                las->record, las->format, formats[las->format].size);
@@ -123,10 +109,10 @@ static int check_points(struct las *las, struct psr_error *err)
 	if (las->n_points > room)
 		return psr_fail(
 			err, PSR_ERR_FORMAT,
-			"%s: the LAS header speaks of %llu points, but the file has room for only %llu; is it cut short?",
+			"%s: the LAS header promises %llu points, but the file has room for only %llu; is it cut short?",
 			las->path, (unsigned long long)las->n_points, (unsigned long long)room);
 	if (las->n_points == 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header speaks of no points", las->path);
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header promises no points", las->path);
 	return PSR_OK;
 }
 
@@ -136,17 +122,16 @@ static int read_header(struct las *las, struct psr_error *err)
 	const uint8_t *b = las->bytes;
 	uint64_t header;
 	int rc, is_laz;
-
 	if (las->n_bytes < 4 || memcmp(b, "LASF", 4) != 0)
-		return ends_with(las->path, ".laz") ? refuse_laz(las, err)
+		return import_path_ends_with(las->path, ".laz") ? refuse_laz(las, err)
 		                                    : psr_fail(err, PSR_ERR_FORMAT, "%s: does not begin with LASF", las->path);
 	if (las->n_bytes < LEAST_HEADER)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the LAS header is cut short after %llu of %d bytes", las->path,
 		                (unsigned long long)las->n_bytes, LEAST_HEADER);
 	las->minor = b[25];
 	if (b[24] != 1 || las->minor > 4)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: LAS of version %u.%u; 1.0 to 1.4 are known", las->path, b[24],
-		                las->minor);
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: LAS version %u.%u is not supported; 1.0 to 1.4 are", las->path,
+		                b[24], las->minor);
 	header = get(b + 94, 2);
 	las->first = get(b + 96, 4);
 	las->format = b[104] & 0x3f;
@@ -172,26 +157,24 @@ static const uint8_t *point_of(const struct las *las, uint64_t i)
 	return las->bytes + las->first + i * las->record;
 }
 
-/* Low and high noise, and what its producer marked as withheld. */
+/* Points classified as low or high noise, or marked as withheld. */
 static int is_left_out(const struct las *las, const uint8_t *p)
 {
 	const int is_new = las->format >= 6, class = is_new ? p[16] : p[15] & 31;
-
 	return class == 7 || class == 18 || (is_new ? p[15] & 4 : p[15] & 0x80) != 0;
 }
 
-/* What colors the points: their own, of 16 bits or of 8 in 16, or intensity. */
+/* The colours of points: their own, of 16 bits or of 8 in 16, or intensity. */
 struct tint {
-	unsigned color;     /* where it stands; 0: intensity */
+	unsigned color;     /* its offset in a point; 0: intensity */
 	double scale;       /* to codes of 0..255, or of intensity to linear light */
 	int is_none;
 };
 
-/* Instruments' intensities have no unit: white is what few points exceed. */
+/* Intensities have no unit: few points exceed white. */
 static double white_of(const uint64_t histogram[65536])
 {
 	uint64_t n = 0, below = 0;
-
 	for (uint32_t i = 0; i < 65536; i++)
 		n += histogram[i];
 	for (uint32_t i = 0; i < 65536; i++) {
@@ -206,13 +189,11 @@ static int find_tint(struct tint *tint, const struct las *las, struct psr_error 
 {
 	uint64_t *histogram = calloc(65536, sizeof *histogram), most = 0;
 	double white;
-
 	if (histogram == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a histogram", las->path);
 	tint->color = formats[las->format].color;
 	for (uint64_t i = 0; i < las->n_points; i++) {
 		const uint8_t *p = point_of(las, i);
-
 		for (int c = 0; tint->color > 0 && c < 3; c++)
 			most = get(p + tint->color + 2 * c, 2) > most ? get(p + tint->color + 2 * c, 2) : most;
 		if (!is_left_out(las, p))
@@ -230,7 +211,6 @@ static int find_tint(struct tint *tint, const struct las *las, struct psr_error 
 static void put_color(float out[4], const struct tint *tint, const uint8_t *p)
 {
 	double gray = (double)get(p + 12, 2) * tint->scale;
-
 	for (int c = 0; c < 3; c++)
 		out[c] = tint->color > 0 ? cloud_linear((double)get(p + tint->color + 2 * c, 2) * tint->scale)
 		                         : (float)(gray < 1.0 ? gray : 1.0);
@@ -242,7 +222,6 @@ static int add_points(struct import_mesh *im, const struct las *las, const struc
 	uint64_t n_kept = 0;
 	uint32_t to;
 	int rc;
-
 	for (uint64_t i = 0; i < las->n_points; i++)
 		n_kept += !is_left_out(las, point_of(las, i));
 	to = mesh->n_points;
@@ -251,7 +230,6 @@ static int add_points(struct import_mesh *im, const struct las *las, const struc
 		return rc;
 	for (uint64_t i = 0; i < las->n_points; i++) {
 		const uint8_t *p = point_of(las, i);
-
 		if (is_left_out(las, p))
 			continue;
 		for (int c = 0; c < 3; c++)
@@ -274,7 +252,6 @@ int import_las(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	struct psr_material material;
 	struct tint tint = { 0, 0.0, 0 };
 	int rc = read_header(&las, err);
-
 	if (rc == PSR_OK)
 		rc = find_tint(&tint, &las, err);
 	if (rc != PSR_OK)

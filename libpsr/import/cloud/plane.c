@@ -5,15 +5,14 @@
 
 #define CHUNK 4096
 #define MAX_CORNERS (4 + CLOUD_NEIGHBOURS)
-#define OVERLAP 1.05 /* of radii, since neighbours' discs lie in planes of their own */
+#define OVERLAP 1.05 /* of radii: discs of neighbours lie in different planes */
 #define MAX_RATIO 2.0f /* of a radius to the median of those around it */
-#define WIRE 0.01    /* points whose second extent, squared, is this part of their first lie on a line */
+#define WIRE 0.01    /* least ratio of second to first extent, squared, of points that are not on a line */
 
 /* Rotates rows p and q of the symmetric m (and v) so that m[p][q] becomes 0 (Jacobi). */
 static void rotate(double m[3][3], double v[3][3], int p, int q)
 {
 	double theta, t, c, s;
-
 	if (m[p][q] == 0.0)
 		return;
 	theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
@@ -22,13 +21,11 @@ static void rotate(double m[3][3], double v[3][3], int p, int q)
 	s = t * c;
 	for (int i = 0; i < 3; i++) {
 		double a = m[i][p], b = m[i][q];
-
 		m[i][p] = c * a - s * b;
 		m[i][q] = s * a + c * b;
 	}
 	for (int i = 0; i < 3; i++) {
 		double a = m[p][i], b = m[q][i];
-
 		m[p][i] = c * a - s * b;
 		m[q][i] = s * a + c * b;
 		a = v[p][i];
@@ -38,12 +35,12 @@ static void rotate(double m[3][3], double v[3][3], int p, int q)
 	}
 }
 
-/* Rows of v: the axes of m, whose values are left on its diagonal. What is off it shrinks quadratically: three sweeps
- * do for nearly all, and below 1e-12 of the trace it turns no axis by what a float could tell. */
+/* Sets the rows of v to the axes of m, and leaves their values on its diagonal. Off-diagonal elements shrink
+ * quadratically: three sweeps nearly always suffice, and below 1e-12 of the trace they turn no axis by a float's
+ * precision. */
 static void diagonalise(double m[3][3], double v[3][3])
 {
 	const double least = 1e-12 * (m[0][0] + m[1][1] + m[2][2]);
-
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j < 3; j++)
 			v[i][j] = i == j;
@@ -56,12 +53,11 @@ static void diagonalise(double m[3][3], double v[3][3])
 	}
 }
 
-/* The neighbours relative to the point, in units of the farthest one's distance, which is returned: nothing below
- * overflows or vanishes. */
+/* Gathers the neighbours relative to the point, in units of the farthest one's distance, so that no later step
+ * overflows or underflows. Returns that distance. */
 static double gather(double offset[CLOUD_NEIGHBOURS][3], const struct cloud *cloud, uint32_t i)
 {
 	double largest = 0.0, length;
-
 	for (uint32_t j = 0; j < cloud->k; j++) {
 		v3d_sub(offset[j], cloud->point[cloud->near[(size_t)i * cloud->k + j]].at, cloud->point[i].at);
 		for (int c = 0; c < 3; c++)
@@ -80,18 +76,16 @@ static double gather(double offset[CLOUD_NEIGHBOURS][3], const struct cloud *clo
 	return largest * length;
 }
 
-/* The normal that the point and its neighbours make, and whether they lie on a line. */
+/* Fits a normal to the point and its neighbours; returns whether they lie on a line. */
 static int fit_plane(float normal[3], double offset[CLOUD_NEIGHBOURS][3], uint32_t k)
 {
 	double mean[3] = { 0.0, 0.0, 0.0 }, m[3][3] = { { 0.0 } }, v[3][3], value[3], n[3];
 	int least = 0, most = 0;
-
 	for (uint32_t j = 0; j < k; j++)
 		v3d_add(mean, mean, offset[j]);
 	v3d_scale(mean, mean, 1.0 / (k + 1.0));
 	for (uint32_t j = 0; j <= k; j++) {
 		double d[3] = { 0.0, 0.0, 0.0 };
-
 		if (j < k)
 			memcpy(d, offset[j], sizeof d);
 		v3d_sub(d, d, mean);
@@ -118,29 +112,27 @@ static int fit_plane(float normal[3], double offset[CLOUD_NEIGHBOURS][3], uint32
 	return most == least || value[3 - most - least] < WIRE * value[most];
 }
 
-/* A corner of the cell, with the edge that leaves it: -1 is the frame's. */
+/* A corner of the cell, and the edge that leaves it; -1: of the initial square. */
 struct corner {
 	double at[2];
 	int edge;
 };
 
-/* Leaves what is nearer to the origin than to `site`. */
+/* Clips the cell to the half plane nearer to the origin than to `site`. */
 static int clip(struct corner *out, const struct corner *in, int n, const double site[2], int edge)
 {
 	const double half = 0.5 * (site[0] * site[0] + site[1] * site[1]);
 	int n_out = 0;
-
 	for (int i = 0; i < n; i++) {
 		const struct corner *a = &in[i], *b = &in[(i + 1) % n];
 		double da = a->at[0] * site[0] + a->at[1] * site[1] - half, db = b->at[0] * site[0] + b->at[1] * site[1] - half;
 		double t;
-
 		if (da <= 0.0)
 			out[n_out++] = *a;
 		if ((da <= 0.0) == (db <= 0.0))
 			continue;
 		t = da / (da - db);
-		/* Leaving, the new edge begins here; coming back, the old one goes on. */
+		/* Where the outline leaves the half plane the new edge begins; where it returns the old one goes on. */
 		out[n_out].edge = da <= 0.0 ? edge : a->edge;
 		for (int c = 0; c < 2; c++)
 			out[n_out].at[c] = a->at[c] + t * (b->at[c] - a->at[c]);
@@ -149,7 +141,7 @@ static int clip(struct corner *out, const struct corner *in, int n, const double
 	return n_out;
 }
 
-/* In units of the farthest neighbour's distance; 0 where the cell has no corner but the frame's. */
+/* In units of the farthest neighbour's distance; 0 if all corners are of the initial square. */
 static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const float normal[3])
 {
 	struct corner corner[2][MAX_CORNERS] = {
@@ -157,15 +149,13 @@ static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const 
 	};
 	const double n[3] = { normal[0], normal[1], normal[2] };
 	const double other[3] = { fabs(n[0]) < 0.6, fabs(n[0]) >= 0.6, 0.0 };
-	double u[3], v[3], farthest = 0.0, reach = 2.0; /* reach: the farthest corner, squared, frame and all */
+	double u[3], v[3], farthest = 0.0, reach = 2.0; /* reach: the farthest corner, squared, of the square too */
 	int count = 4, now = 0;
-
 	v3d_cross(u, n, other);
 	v3d_normalize(u, u);
 	v3d_cross(v, n, u);
 	for (uint32_t j = 0; j < k && count > 0; j++) {
 		const double site[2] = { v3d_dot(offset[j], u), v3d_dot(offset[j], v) };
-
 		const double squared = site[0] * site[0] + site[1] * site[1];
 
 		if (squared == 0.0 || squared >= 4.0 * reach)
@@ -175,13 +165,11 @@ static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const 
 		reach = 0.0;
 		for (int i = 0; i < count; i++) {
 			const double *at = corner[now][i].at;
-
 			reach = fmax(reach, at[0] * at[0] + at[1] * at[1]);
 		}
 	}
 	for (int i = 0; i < count; i++) {
 		const struct corner *c = &corner[now][i];
-
 		if (c->edge >= 0 && corner[now][(i + count - 1) % count].edge >= 0)
 			farthest = fmax(farthest, c->at[0] * c->at[0] + c->at[1] * c->at[1]);
 	}
@@ -192,14 +180,12 @@ static void planes_of_chunk(int chunk, void *userdata)
 {
 	struct cloud *cloud = userdata;
 	const uint64_t first = (uint64_t)chunk * CHUNK, end = first + CHUNK < cloud->n ? first + CHUNK : cloud->n;
-
 	for (uint64_t i = first; i < end; i++) {
 		double offset[CLOUD_NEIGHBOURS][3], unit = gather(offset, cloud, (uint32_t)i), radius = 0.0;
 		int is_wire = fit_plane(cloud->is_given[i] ? NULL : cloud->normal[i], offset, cloud->k);
-
 		if (!is_wire)
 			radius = cell_radius(offset, cloud->k, cloud->normal[i]);
-		if (!(radius > 0.0)) /* as far as the second one: along a wire one stands on each side */
+		if (!(radius > 0.0)) /* the second neighbour: along a wire there is one on each side */
 			radius = v3d_length(offset[cloud->k > 1 ? 1 : 0]);
 		cloud->open_radius[i] = (float)(OVERLAP * radius * unit);
 	}
@@ -209,14 +195,11 @@ static void hold_chunk(int chunk, void *userdata)
 {
 	struct cloud *cloud = userdata;
 	const uint64_t first = (uint64_t)chunk * CHUNK, end = first + CHUNK < cloud->n ? first + CHUNK : cloud->n;
-
 	for (uint64_t i = first; i < end; i++) {
 		float around[CLOUD_NEIGHBOURS], limit;
-
 		for (uint32_t j = 0; j < cloud->k; j++) {
 			float r = cloud->open_radius[cloud->near[i * cloud->k + j]];
 			uint32_t at = j;
-
 			for (; at > 0 && around[at - 1] > r; at--)
 				around[at] = around[at - 1];
 			around[at] = r;
@@ -229,7 +212,6 @@ static void hold_chunk(int chunk, void *userdata)
 void cloud_planes(struct cloud *cloud)
 {
 	const int n_chunks = (int)((cloud->n + CHUNK - 1) / CHUNK);
-
 	psr_pool_for(cloud->pool, n_chunks, planes_of_chunk, cloud);
 	psr_pool_for(cloud->pool, n_chunks, hold_chunk, cloud);
 }

@@ -4,9 +4,9 @@
 #include "cloud.h"
 
 #define LEAF 8
-#define CHUNK 4096 /* slots that a thread takes at once */
+#define CHUNK 4096 /* slots a task */
 
-/* Points first .. end; the children of an inner node are the next node and `right`, which begins at `middle`. */
+/* Points first .. end - 1; the children of an inner node are the next node and `right`. */
 struct cloud_node {
 	double split;
 	uint32_t first, end, right;
@@ -21,21 +21,18 @@ static int is_before(const struct cloud_point *a, const struct cloud_point *b, i
 static void swap(struct cloud_point *a, struct cloud_point *b)
 {
 	struct cloud_point t = *a;
-
 	*a = *b;
 	*b = t;
 }
 
-/* Hoare's selection: what is before the point of rank `middle` comes to stand before it. The order is total, so equal
- * coordinates cost nothing; pivots are pseudo-random, so that no ordered file is a bad case. */
+/* Hoare's selection: moves the point of rank `middle` to its place, and smaller ones before it. The order is total, so
+ * that equal coordinates cost nothing; pivots are pseudo-random, so that no ordered file is a bad case. */
 static void select_rank(struct cloud_point *p, uint32_t first, uint32_t end, uint32_t middle, int axis)
 {
 	uint64_t random = UINT64_C(0x9e3779b97f4a7c15) * (end - first);
-
 	while (end - first > 1) {
 		uint32_t i = first, j = end - 1;
 		struct cloud_point pivot;
-
 		random = random * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
 		pivot = p[first + (uint32_t)((random >> 32) % (end - first))];
 		while (i <= j) {
@@ -63,13 +60,11 @@ static int widest_axis(const struct cloud_point *p, uint32_t first, uint32_t end
 {
 	double low[3], high[3];
 	int axis = 0;
-
 	memcpy(low, p[first].at, sizeof low);
 	memcpy(high, p[first].at, sizeof high);
 	for (uint32_t i = first + 1; i < end; i++)
 		for (int c = 0; c < 3; c++) {
 			double x = p[i].at[c];
-
 			low[c] = x < low[c] ? x : low[c];
 			high[c] = x > high[c] ? x : high[c];
 		}
@@ -79,12 +74,11 @@ static int widest_axis(const struct cloud_point *p, uint32_t first, uint32_t end
 	return axis;
 }
 
-/* Halves, so the depth is the logarithm of the number of leaves. */
+/* Halving bounds the depth by the logarithm of the number of leaves. */
 static void build(struct cloud *cloud, uint32_t first, uint32_t end)
 {
 	struct cloud_node *node = &cloud->node[cloud->n_nodes++];
 	const uint32_t middle = first + (end - first) / 2;
-
 	*node = (struct cloud_node){ 0.0, first, end, 0, -1 };
 	if (end - first <= LEAF)
 		return;
@@ -99,7 +93,6 @@ static void build(struct cloud *cloud, uint32_t first, uint32_t end)
 static void normalise(struct cloud *cloud, const double (*position)[3])
 {
 	double low[3], high[3];
-
 	memcpy(low, position[0], sizeof low);
 	memcpy(high, position[0], sizeof high);
 	for (uint32_t i = 1; i < cloud->n; i++)
@@ -123,9 +116,8 @@ static void normalise(struct cloud *cloud, const double (*position)[3])
 
 int cloud_tree_build(struct cloud *cloud, const double (*position)[3])
 {
-	/* A leaf that was split from 9 points holds 4 at least. */
+	/* Splitting 9 points leaves at least 4 in a leaf. */
 	const size_t n_nodes = 2 * ((size_t)cloud->n / (LEAF / 2)) + 1;
-
 	cloud->k = cloud->n - 1 < CLOUD_NEIGHBOURS ? cloud->n - 1 : CLOUD_NEIGHBOURS;
 	cloud->point = malloc(cloud->n * sizeof *cloud->point);
 	cloud->node = malloc(n_nodes * sizeof *cloud->node);
@@ -137,14 +129,14 @@ int cloud_tree_build(struct cloud *cloud, const double (*position)[3])
 	return PSR_OK;
 }
 
-/* The k best so far, in order of distance and then of id. */
+/* The k nearest so far, in order of distance, then of id. */
 struct search {
 	const struct cloud *cloud;
 	const double *from;
 	uint32_t self, n;
 	uint32_t slot[CLOUD_NEIGHBOURS];
 	double distance[CLOUD_NEIGHBOURS]; /* squared */
-	double offset[3];                  /* of the cell that is looked into, along each axis */
+	double offset[3];                  /* to the current cell, along each axis */
 };
 
 static void try_point(struct search *s, uint32_t slot)
@@ -154,7 +146,6 @@ static void try_point(struct search *s, uint32_t slot)
 	const double d = dx * dx + dy * dy + dz * dz;
 	const uint32_t k = s->cloud->k;
 	uint32_t i;
-
 	if (slot == s->self)
 		return;
 	if (s->n == k) {
@@ -173,12 +164,11 @@ static void try_point(struct search *s, uint32_t slot)
 	s->slot[i] = slot;
 }
 
-/* `distance` is the squared one of the node's cell. What is as far as the k-th is looked at: its id may be less. */
+/* `distance`: squared, of the node's cell. Visits cells as far as the k-th neighbour, since ids break ties. */
 static void search(struct search *s, uint32_t at, double distance)
 {
 	const struct cloud_node *node = &s->cloud->node[at];
 	double to_split, before, farther;
-
 	if (node->axis < 0) {
 		for (uint32_t i = node->first; i < node->end; i++)
 			try_point(s, i);
@@ -188,7 +178,7 @@ static void search(struct search *s, uint32_t at, double distance)
 	search(s, to_split < 0.0 ? at + 1 : node->right, distance);
 	before = s->offset[node->axis];
 	farther = distance - before * before + to_split * to_split;
-	/* The difference may round to a little too much. */
+	/* The factor covers rounding. */
 	if (s->n < s->cloud->k || farther * (1.0 - 1e-12) <= s->distance[s->cloud->k - 1]) {
 		s->offset[node->axis] = to_split;
 		search(s, to_split < 0.0 ? node->right : at + 1, farther);
@@ -200,10 +190,8 @@ static void nearest_of_chunk(int chunk, void *userdata)
 {
 	struct cloud *cloud = userdata;
 	const uint64_t first = (uint64_t)chunk * CHUNK, end = first + CHUNK < cloud->n ? first + CHUNK : cloud->n;
-
 	for (uint64_t i = first; i < end; i++) {
 		struct search s = { .cloud = cloud, .from = cloud->point[i].at, .self = (uint32_t)i };
-
 		search(&s, 0, 0.0);
 		memcpy(&cloud->near[i * cloud->k], s.slot, cloud->k * sizeof s.slot[0]);
 	}

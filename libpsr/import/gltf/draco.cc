@@ -6,7 +6,7 @@ namespace gltf {
 
 namespace {
 
-/* Draco knows whether an attribute is normalized, but glTF's accessor has the word. */
+/* glTF's accessor decides whether values are normalized, not the Draco data. */
 float scale_of(const draco::PointAttribute &a, bool normalized)
 {
 	if (!normalized || a.normalized())
@@ -28,14 +28,12 @@ float scale_of(const draco::PointAttribute &a, bool normalized)
 } // namespace
 
 std::vector<float> draco_floats(const reader &r, const draco::Mesh &mesh, const tinygltf::Primitive &p,
-                                const std::string &name, size_t n_wanted, const std::string &place,
-                                bool is_normalized)
+                                const std::string &where, size_t n_wanted, bool is_normalized)
 {
-	const std::string where = place + "." + name;
+	const std::string name = where.substr(where.rfind('.') + 1);
 	std::vector<float> out;
 	int id = value_int(p.extensions.at("KHR_draco_mesh_compression").Get("attributes"), name.c_str(), -1);
-
-	if (id < 0) { /* not compressed: an accessor of its own may have it */
+	if (id < 0) { /* not compressed: an accessor may have it */
 		auto it = p.attributes.find(name);
 
 		return it == p.attributes.end() ? out : accessor_floats(r, it->second, n_wanted, where, is_normalized);
@@ -60,7 +58,6 @@ std::vector<float> draco_floats(const reader &r, const draco::Mesh &mesh, const 
 	for (draco::PointIndex i(0); i < mesh.num_points(); ++i) {
 		float value[4] = { 0.0f, 0.0f, 0.0f, 0.0f };
 		draco::AttributeValueIndex at = a->mapped_index(i);
-
 		if (at.value() >= a->size() || !a->ConvertValue<float>(at, (int8_t)n_components, value))
 			refuse(PSR_ERR_FORMAT, "%s: the Draco data have no value for point %u", where.c_str(), i.value());
 		for (int c = 0; c < n_components; c++)
@@ -72,7 +69,6 @@ std::vector<float> draco_floats(const reader &r, const draco::Mesh &mesh, const 
 std::shared_ptr<draco::Mesh> draco_open(const reader &r, const tinygltf::Primitive &p, const std::string &place)
 {
 	const tinygltf::Value &extension = p.extensions.at("KHR_draco_mesh_compression");
-
 	if (!extension.IsObject() || !extension.Get("attributes").IsObject())
 		refuse(PSR_ERR_FORMAT, "%s: KHR_draco_mesh_compression has no attributes", place.c_str());
 
@@ -100,7 +96,6 @@ std::shared_ptr<draco::Mesh> draco_open(const reader &r, const tinygltf::Primiti
 std::vector<uint32_t> draco_triangles(const draco::Mesh &mesh)
 {
 	std::vector<uint32_t> out;
-
 	for (draco::FaceIndex f(0); f < mesh.num_faces(); ++f)
 		for (size_t c = 0; c < 3; c++)
 			out.push_back(mesh.face(f)[c].value());

@@ -19,7 +19,7 @@ const std::set<std::string> known = {
 	"KHR_texture_transform",
 };
 
-/* Where these are not required, the file shows the same without them. */
+/* Unless required, these do not change the picture. */
 const std::set<std::string> harmless = {
 	"EXT_meshopt_compression", "KHR_animation_pointer", "KHR_materials_variants", "KHR_meshopt_compression",
 	"KHR_texture_basisu",      "KHR_xmp",               "KHR_xmp_json_ld",        "MSFT_lod",

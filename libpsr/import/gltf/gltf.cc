@@ -7,40 +7,36 @@ namespace gltf {
 
 namespace {
 
-/* A mesh where a node puts it; -1: a file without nodes. */
+/* A mesh at a node (-1: a file without nodes), and its morph weights. */
 struct placement {
 	int node;
-	bool is_morphed;
+	const std::vector<double> *weights;
 };
 
 std::vector<std::vector<placement>> place_meshes(const reader &r)
 {
 	std::vector<std::vector<placement>> uses(r.model.meshes.size());
-
 	if (r.model.nodes.empty())
-		for (auto &use : uses)
-			use.push_back({ -1, false });
+		for (size_t m = 0; m < uses.size(); m++)
+			uses[m].push_back({ -1, &r.model.meshes[m].weights });
 	for (int n : r.scene) {
 		const tinygltf::Node &node = r.model.nodes[(size_t)n];
-
 		if (node.mesh < 0)
 			continue;
-		if ((size_t)node.mesh >= r.model.meshes.size())
-			refuse(PSR_ERR_FORMAT, "nodes[%d]: mesh %d does not exist, there are %zu", n, node.mesh,
-			       r.model.meshes.size());
-		uses[(size_t)node.mesh].push_back({ n, !node.weights.empty() });
+		check_index(node.mesh, r.model.meshes.size(), "mesh", "nodes[" + std::to_string(n) + "]");
+		const std::vector<double> &own = r.model.meshes[(size_t)node.mesh].weights;
+		uses[(size_t)node.mesh].push_back({ n, node.weights.empty() ? &own : &node.weights });
 	}
 	return uses;
 }
 
-void place_primitive(reader &r, const tinygltf::Mesh &mesh, const tinygltf::Primitive &g, const primitive &p,
-                     const material_use &use, const placement &at, const std::string &place)
+void place_primitive(reader &r, const tinygltf::Primitive &g, const primitive &p, const material_use &use,
+                     const placement &at, const std::string &place)
 {
-	const std::vector<double> &weights = at.is_morphed ? r.model.nodes[(size_t)at.node].weights : mesh.weights;
+	const std::vector<double> &weights = *at.weights;
 	const int skin = at.node >= 0 && !p.joint.empty() ? r.model.nodes[(size_t)at.node].skin : -1;
 	const std::vector<transform> *joints = skin >= 0 ? &skin_joints(r, skin) : nullptr;
 	const transform world = at.node >= 0 ? r.world[(size_t)at.node] : transform();
-
 	if (g.targets.empty() || weights.empty()) {
 		add_instance(r, p, use, world, joints, place);
 		return;
@@ -55,16 +51,13 @@ void place_primitive(reader &r, const tinygltf::Mesh &mesh, const tinygltf::Prim
 void read_meshes(reader &r)
 {
 	const std::vector<std::vector<placement>> uses = place_meshes(r);
-
 	for (size_t m = 0; m < uses.size(); m++) {
 		const tinygltf::Mesh &mesh = r.model.meshes[m];
-
 		for (size_t i = 0; i < mesh.primitives.size() && !uses[m].empty(); i++) {
 			const tinygltf::Primitive &g = mesh.primitives[i];
 			const std::string place = "meshes[" + std::to_string(m) + "].primitives[" + std::to_string(i) + "]";
 			const material_use &use = use_material(r, g.material, g.mode == TINYGLTF_MODE_POINTS);
 			primitive p;
-
 			if (!read_primitive(r, g, use, p, place))
 				continue;
 			if (p.n_vertices() * uses[m].size() > IMPORT_MAX_VERTICES ||
@@ -73,7 +66,7 @@ void read_meshes(reader &r)
 				refuse(PSR_ERR_LIMIT, "%s: %zu vertices under %zu nodes are more than %llu", place.c_str(),
 				       p.n_vertices(), uses[m].size(), (unsigned long long)IMPORT_MAX_VERTICES);
 			for (const placement &at : uses[m])
-				place_primitive(r, mesh, g, p, use, at, place);
+				place_primitive(r, g, p, use, at, place);
 		}
 	}
 }
@@ -81,24 +74,21 @@ void read_meshes(reader &r)
 void report(reader &r)
 {
 	std::string names;
-
 	if (r.n_lines > 0) {
 		const uint64_t room = UINT32_MAX - r.im.mesh->n_dropped_primitives;
-
 		import_mesh_warn(&r.im, "lines were left out: %llu", (unsigned long long)r.n_lines);
 		r.im.mesh->n_dropped_primitives += (uint32_t)(r.n_lines < room ? r.n_lines : room);
 	}
 	for (const std::string &name : r.src.ignored)
 		names += (names.empty() ? "" : ", ") + name;
 	if (!names.empty())
-		import_mesh_warn(&r.im, "extensions that are not supported were ignored: %.200s", names.c_str());
+		import_mesh_warn(&r.im, "unsupported extensions were ignored: %.200s", names.c_str());
 }
 
 void parse(reader &r)
 {
 	tinygltf::TinyGLTF parser;
 	std::string errors, warnings;
-
 	if (!parser.LoadASCIIFromString(&r.model, &errors, &warnings, r.src.json.data(), (unsigned)r.src.json.size(), "")) {
 		while (!errors.empty() && errors.back() == '\n')
 			errors.pop_back();
@@ -118,7 +108,7 @@ extern "C" int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t 
 	try {
 		gltf::reader r = { *im, {}, {}, {}, {}, {}, {}, {}, {} };
 
-		gltf::door_open(r.src, im->path, bytes, n_bytes);
+		gltf::validate(r.src, im->path, bytes, n_bytes);
 		gltf::parse(r);
 		gltf::place_nodes(r);
 		gltf::read_meshes(r);

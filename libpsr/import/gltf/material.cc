@@ -18,9 +18,7 @@ enum psr_wrap wrap_of(int wrap)
 
 const tinygltf::Texture &texture_at(const reader &r, int index, const std::string &place)
 {
-	if (index < 0 || (size_t)index >= r.model.textures.size())
-		refuse(PSR_ERR_FORMAT, "%s: texture %d does not exist, there are %zu", place.c_str(), index,
-		       r.model.textures.size());
+	check_index(index, r.model.textures.size(), "texture", place);
 	return r.model.textures[(size_t)index];
 }
 
@@ -29,12 +27,9 @@ int image_of_texture(const reader &r, int texture, const std::string &place)
 	const tinygltf::Texture &t = texture_at(r, texture, place);
 	auto webp = t.extensions.find("EXT_texture_webp");
 	int image = webp != t.extensions.end() ? value_int(webp->second, "source", t.source) : t.source;
-
 	if (image < 0)
 		refuse(PSR_ERR_UNSUPPORTED, "textures[%d] has no image in a supported format", texture);
-	if ((size_t)image >= r.src.images.size())
-		refuse(PSR_ERR_FORMAT, "textures[%d]: image %d does not exist, there are %zu", texture, image,
-		       r.src.images.size());
+	check_index(image, r.src.images.size(), "image", "textures[" + std::to_string(texture) + "]");
 	return image;
 }
 
@@ -48,12 +43,11 @@ image_bytes read_image(const reader &r, int image)
 {
 	const image_source &source = r.src.images[(size_t)image];
 	image_bytes i;
-
 	i.name = "images[" + std::to_string(image) + "]";
 	if (source.uri.empty()) {
 		i.bytes = view_bytes(r, source.buffer_view, i.name);
 	} else {
-		i.owned = door_read_uri(r.src, source.uri, i.name);
+		i.owned = read_uri(r.src, source.uri, i.name);
 		i.bytes = { i.owned.data(), i.owned.size() };
 		if (source.uri.compare(0, 5, "data:") != 0)
 			i.name += " (" + source.uri + ")";
@@ -64,7 +58,6 @@ image_bytes read_image(const reader &r, int image)
 int psr_image_of(reader &r, int image)
 {
 	struct psr_error error = {};
-
 	if (r.image_of[(size_t)image] >= 0)
 		return r.image_of[(size_t)image];
 
@@ -77,7 +70,7 @@ int psr_image_of(reader &r, int image)
 	return index;
 }
 
-/* Which texture, as tinygltf's several kinds of it, or a member of an extension, say it. */
+/* A reference to a texture, from tinygltf's several kinds, or a member of an extension. */
 struct texture_info {
 	int index = -1;
 	int tex_coord = 0;
@@ -89,7 +82,6 @@ template<class info> texture_info info_of(const info &t, const std::string &plac
 {
 	texture_info out;
 	auto it = t.extensions.find("KHR_texture_transform");
-
 	out.index = t.index;
 	out.tex_coord = t.texCoord;
 	out.transform = it != t.extensions.end() ? &it->second : nullptr;
@@ -100,7 +92,6 @@ template<class info> texture_info info_of(const info &t, const std::string &plac
 texture_info info_of(const tinygltf::Value &extension, const char *key, const std::string &place)
 {
 	texture_info out;
-
 	if (!extension.Has(key))
 		return out;
 
@@ -114,7 +105,7 @@ texture_info info_of(const tinygltf::Value &extension, const char *key, const st
 	return out;
 }
 
-/* Numbers of an array member; the others stay. */
+/* Reads the numbers of an array member; keeps the others. */
 void value_numbers(const tinygltf::Value &v, const char *key, double *out, int n)
 {
 	if (!v.IsObject() || !v.Has(key) || !v.Get(key).IsArray())
@@ -124,11 +115,10 @@ void value_numbers(const tinygltf::Value &v, const char *key, double *out, int n
 			out[i] = v.Get(key).Get(i).GetNumberAsDouble();
 }
 
-/* The same bits on every machine, for any angle. */
+/* For any angle; the same bits on every machine. */
 void sine_and_cosine(double angle, double &s, double &c)
 {
 	double turn = std::isfinite(angle) ? std::fmod(angle, 2.0 * M_PI) : 0.0;
-
 	if (turn < 0.0)
 		turn += 2.0 * M_PI;
 	psr_sincos(turn > M_PI ? 2.0 * M_PI - turn : turn, &s, &c);
@@ -138,7 +128,6 @@ void sine_and_cosine(double angle, double &s, double &c)
 void set_transform(struct psr_texture &out, const tinygltf::Value &t)
 {
 	double offset[2] = { 0, 0 }, scale[2] = { 1, 1 }, s, c;
-
 	value_numbers(t, "offset", offset, 2);
 	value_numbers(t, "scale", scale, 2);
 	sine_and_cosine(value_number(t, "rotation", 0.0), s, c);
@@ -149,17 +138,15 @@ void set_transform(struct psr_texture &out, const tinygltf::Value &t)
 		out.transform[i] = (float)m[i];
 }
 
-/* The mesh's set for TEXCOORD_n: n where it has one, else one that the material leaves free; -1: there is none. */
+/* The mesh's set for TEXCOORD_n: n if possible, else another free one; -1: none is free. */
 int take_set(material_use &use, int n)
 {
 	const std::string name = "TEXCOORD_" + std::to_string(n);
-
 	for (int set = 0; set < PSR_UV_SETS; set++)
 		if (use.uv_name[set] == name)
 			return set;
 	for (int k = 0; k < PSR_UV_SETS; k++) {
 		int set = n < PSR_UV_SETS ? (n + k) % PSR_UV_SETS : k;
-
 		if (use.uv_name[set].empty()) {
 			use.uv_name[set] = name;
 			return set;
@@ -168,7 +155,7 @@ int take_set(material_use &use, int n)
 	return -1;
 }
 
-/* In the order of calls, so that the base color gets its set first. */
+/* Called for the base color first, which so gets its own set. */
 void set_texture(reader &r, struct psr_texture &out, material_use &use, const texture_info &info)
 {
 	if (info.index < 0)
@@ -188,12 +175,10 @@ void set_texture(reader &r, struct psr_texture &out, material_use &use, const te
 	out.uv_set = set;
 	if (info.transform != nullptr)
 		set_transform(out, *info.transform);
-	if (texture.sampler >= 0 && (size_t)texture.sampler >= r.model.samplers.size())
-		refuse(PSR_ERR_FORMAT, "textures[%d]: sampler %d does not exist, there are %zu", info.index, texture.sampler,
-		       r.model.samplers.size());
 	if (texture.sampler >= 0) {
+		check_index(texture.sampler, r.model.samplers.size(), "sampler",
+		            "textures[" + std::to_string(info.index) + "]");
 		const tinygltf::Sampler &sampler = r.model.samplers[(size_t)texture.sampler];
-
 		out.wrap_s = wrap_of(sampler.wrapS);
 		out.wrap_t = wrap_of(sampler.wrapT);
 		out.is_nearest = sampler.magFilter == TINYGLTF_TEXTURE_FILTER_NEAREST;
@@ -204,7 +189,6 @@ void set_specular_glossiness(reader &r, struct psr_material &m, material_use &us
                              const std::string &place)
 {
 	double diffuse[4] = { 1, 1, 1, 1 }, specular[3] = { 1, 1, 1 };
-
 	value_numbers(v, "diffuseFactor", diffuse, 4);
 	value_numbers(v, "specularFactor", specular, 3);
 	for (int c = 0; c < 4; c++)
@@ -233,14 +217,13 @@ void set_metallic_roughness(reader &r, struct psr_material &m, material_use &use
 		            info_of(pbr.metallicRoughnessTexture, place + ".metallicRoughnessTexture"));
 }
 
-/* Textures whose factor is 0 are not read. */
+/* Skips textures whose factor is 0. */
 void set_relief_and_light(reader &r, struct psr_material &m, material_use &use, const tinygltf::Material &g,
                           const std::string &place)
 {
 	auto strength = g.extensions.find("KHR_materials_emissive_strength");
 	const double factor =
 		strength != g.extensions.end() ? value_number(strength->second, "emissiveStrength", 1.0) : 1.0;
-
 	m.normal_scale = (float)g.normalTexture.scale;
 	if (m.normal_scale != 0.0f)
 		set_texture(r, m.normal_texture, use, info_of(g.normalTexture, place + ".normalTexture"));
@@ -258,7 +241,6 @@ struct psr_material convert(reader &r, material_use &use, const tinygltf::Materi
 {
 	auto glossiness = g.extensions.find("KHR_materials_pbrSpecularGlossiness");
 	struct psr_material m;
-
 	psr_material_default(&m);
 	m.unlit = g.extensions.count("KHR_materials_unlit") != 0;
 	m.alpha = g.alphaMode == "MASK" ? PSR_ALPHA_MASK : g.alphaMode == "BLEND" ? PSR_ALPHA_BLEND : PSR_ALPHA_OPAQUE;
@@ -277,18 +259,16 @@ int add_material(reader &r, const struct psr_material &m)
 {
 	struct psr_error error = {};
 	int index = import_mesh_add_material(&r.im, &m, &error);
-
 	if (index < 0)
 		refuse(error.code, "%s", error.text);
 	return index;
 }
 
-/* The material of `use` for points, which have no coordinates of textures. */
+/* The variant of a material for points, which have no texture coordinates. */
 int add_textureless(reader &r, const material_use &use)
 {
 	struct psr_material m = r.im.mesh->material[use.index];
 	bool has_texture = false;
-
 	for (struct psr_texture *t : { &m.base_texture, &m.metallic_roughness_texture, &m.emissive_texture,
 	                               &m.occlusion_texture, &m.normal_texture, &m.specular_texture }) {
 		has_texture |= t->image >= 0;
@@ -315,17 +295,15 @@ int value_int(const tinygltf::Value &v, const char *key, int fallback)
 const material_use &use_material(reader &r, int material, bool for_points)
 {
 	const size_t n = r.model.materials.size();
-
-	if (material >= 0 && (size_t)material >= n)
-		refuse(PSR_ERR_FORMAT, "material %d does not exist, there are %zu", material, n);
+	if (material >= 0)
+		check_index(material, n, "material", "");
 
 	material_use &use = r.materials[material < 0 ? n : (size_t)material];
 
 	if (use.index < 0) {
 		struct psr_material m;
-
-		/* Nothing is said about a primitive without a material. glTF's default is a rough metal, which has no diffuse
-		 * color to show without surroundings to mirror, so it is matt and white here. */
+		/* Without a material, matt and white. glTF's default, a rough metal, has no diffuse color: without an
+		 * environment to reflect it would be black. */
 		psr_material_default(&m);
 		if (material >= 0)
 			m = convert(r, use, r.model.materials[(size_t)material], "materials[" + std::to_string(material) + "]");

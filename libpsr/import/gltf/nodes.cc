@@ -8,14 +8,13 @@ namespace {
 void check_length(const std::vector<double> &v, size_t n, const char *what, int node)
 {
 	if (!v.empty() && v.size() != n)
-		refuse(PSR_ERR_FORMAT, "nodes[%d]: %s has %zu numbers, not %zu", node, what, v.size(), n);
+		refuse(PSR_ERR_FORMAT, "nodes[%d]: %s has %zu numbers, expected %zu", node, what, v.size(), n);
 }
 
 transform local_transform(const tinygltf::Node &node, int index)
 {
 	double s[3] = { 1, 1, 1 }, q[4] = { 0, 0, 0, 1 }, t[3] = { 0, 0, 0 }, norm = 0.0;
 	transform out;
-
 	check_length(node.matrix, 16, "matrix", index);
 	check_length(node.scale, 3, "scale", index);
 	check_length(node.rotation, 4, "rotation", index);
@@ -36,7 +35,7 @@ transform local_transform(const tinygltf::Node &node, int index)
 	for (double x : q)
 		norm += x * x;
 	if (!(norm > 0.0) || !std::isfinite(norm))
-		refuse(PSR_ERR_FORMAT, "nodes[%d]: its rotation is no quaternion of positive length", index);
+		refuse(PSR_ERR_FORMAT, "nodes[%d]: its rotation is not a quaternion of positive length", index);
 
 	double k = 2.0 / norm, x = q[0], y = q[1], z = q[2], w = q[3];
 	const double r[9] = { 1 - k * (y * y + z * z), k * (x * y + z * w), k * (x * z - y * w),
@@ -55,7 +54,6 @@ std::vector<int> parentless(const tinygltf::Model &model)
 {
 	std::vector<char> is_child(model.nodes.size(), 0);
 	std::vector<int> out;
-
 	for (const tinygltf::Node &node : model.nodes)
 		for (int child : node.children)
 			if (child >= 0 && (size_t)child < is_child.size())
@@ -69,9 +67,8 @@ std::vector<int> parentless(const tinygltf::Model &model)
 const std::vector<int> &scene_roots(const tinygltf::Model &model, const std::vector<int> &all)
 {
 	int scene = model.defaultScene;
-
-	if (scene >= 0 && (size_t)scene >= model.scenes.size())
-		refuse(PSR_ERR_FORMAT, "scene %d does not exist, there are %zu", scene, model.scenes.size());
+	if (scene >= 0)
+		check_index(scene, model.scenes.size(), "scene", "");
 	if (!model.scenes.empty())
 		return model.scenes[(size_t)(scene < 0 ? 0 : scene)].nodes;
 	if (all.empty() && !model.nodes.empty())
@@ -79,7 +76,7 @@ const std::vector<int> &scene_roots(const tinygltf::Model &model, const std::vec
 	return all;
 }
 
-/* Nodes form trees: each is reached once, so the walk ends, and its cost is bounded by their number. */
+/* Nodes must form trees: the walk reaches each once, and ends. */
 void walk(reader &r, const std::vector<int> &roots, bool is_scene)
 {
 	struct open_node {
@@ -95,8 +92,7 @@ void walk(reader &r, const std::vector<int> &roots, bool is_scene)
 		open_node at = stack.back();
 
 		stack.pop_back();
-		if (at.node < 0 || (size_t)at.node >= model.nodes.size())
-			refuse(PSR_ERR_FORMAT, "node %d does not exist, there are %zu", at.node, model.nodes.size());
+		check_index(at.node, model.nodes.size(), "node", "");
 		if (r.is_placed[(size_t)at.node] && !is_scene)
 			continue;
 		if (r.is_placed[(size_t)at.node])
@@ -119,11 +115,9 @@ void walk(reader &r, const std::vector<int> &roots, bool is_scene)
 transform multiply(const transform &a, const transform &b)
 {
 	transform out;
-
 	for (int col = 0; col < 4; col++)
 		for (int row = 0; row < 4; row++) {
 			double sum = 0.0;
-
 			for (int k = 0; k < 4; k++)
 				sum += a.m[4 * k + row] * b.m[4 * col + k];
 			out.m[4 * col + row] = sum;
@@ -134,11 +128,10 @@ transform multiply(const transform &a, const transform &b)
 void place_nodes(reader &r)
 {
 	const std::vector<int> all = parentless(r.model);
-
 	r.world.resize(r.model.nodes.size());
 	r.is_placed.assign(r.model.nodes.size(), 0);
 	walk(r, scene_roots(r.model, all), true);
-	/* Joints may stand outside of the scene. */
+	/* Joints may be outside of the scene. */
 	if (!r.model.skins.empty())
 		walk(r, all, false);
 }

@@ -23,7 +23,6 @@ camera_source read_camera(const json &o)
 	const std::string type = text(o, "type");
 	const json &body = o.contains(type) ? o[type] : json();
 	camera_source out = { text(o, "name"), {}, false };
-
 	out.camera.near_z = number(body, "znear", 0.0);
 	if (type == "perspective") {
 		out.camera.kind = PSR_CAMERA_PERSPECTIVE;
@@ -44,11 +43,9 @@ light_source read_light(const json &o)
 	const json &spot = o.contains("spot") ? o["spot"] : json();
 	const double intensity = number(o, "intensity", 1.0);
 	light_source out = { text(o, "name"), {}, type == "directional" || type == "point" || type == "spot" };
-
 	out.light.kind = type == "point" ? PSR_LIGHT_POINT : type == "spot" ? PSR_LIGHT_SPOT : PSR_LIGHT_DIRECTIONAL;
 	for (size_t c = 0; c < 3; c++) {
 		double x = 1.0;
-
 		if (o.contains("color") && o["color"].is_array() && c < o["color"].size() && o["color"][c].is_number())
 			x = o["color"][c].get<double>();
 		out.light.color[c] = x * intensity;
@@ -74,12 +71,10 @@ bool axes_of(axes &out, const transform &t)
 {
 	double *axis[3] = { out.right, out.up, out.back };
 	bool is_good = true;
-
 	for (int k = 0; k < 3; k++) {
 		const double *column = &t.m[4 * k];
 		double largest = std::fmax(std::fabs(column[0]), std::fmax(std::fabs(column[1]), std::fabs(column[2])));
 		double sum = 0.0;
-
 		for (int i = 0; i < 3; i++)
 			sum += column[i] / largest * (column[i] / largest);
 		out.scale[k] = largest * std::sqrt(sum);
@@ -91,33 +86,24 @@ bool axes_of(axes &out, const transform &t)
 	return is_good;
 }
 
-/* The middle of what the mesh shows; false if there is nothing finite. */
+/* The middle of the mesh; false if it is not finite. */
 bool middle_of(double out[3], const struct psr_mesh *mesh)
 {
-	double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY };
+	double low[3], high[3];
 	bool is_good = true;
-
+	import_mesh_bounds(low, high, mesh);
 	for (int k = 0; k < 3; k++) {
-		for (uint32_t v = 0; v < mesh->n_vertices; v++) {
-			low[k] = std::fmin(low[k], mesh->position[v][k]);
-			high[k] = std::fmax(high[k], mesh->position[v][k]);
-		}
-		for (uint32_t p = 0; p < mesh->n_points; p++) {
-			low[k] = std::fmin(low[k], mesh->point[p][k]);
-			high[k] = std::fmax(high[k], mesh->point[p][k]);
-		}
 		out[k] = 0.5 * low[k] + 0.5 * high[k];
 		is_good = is_good && std::isfinite(out[k]);
 	}
 	return is_good;
 }
 
-/* A camera has no target. The point of its axis next to the middle of the scene is what it turns around best. */
+/* glTF cameras have no target: takes the point of the axis nearest to the middle of the scene. */
 bool place_camera(struct psr_camera &c, const axes &a, const double *middle)
 {
 	double distance = 0.0, cosine = 0.0;
 	bool is_good = true;
-
 	for (int k = 0; k < 3; k++) {
 		distance -= middle != nullptr ? a.back[k] * (middle[k] - a.origin[k]) : 0.0;
 		cosine += a.up[k] * a.back[k];
@@ -138,9 +124,7 @@ bool place_camera(struct psr_camera &c, const axes &a, const double *middle)
 
 void add_camera(reader &r, int node, int index, const axes *a, const double *middle)
 {
-	if (index < 0 || (size_t)index >= r.src.cameras.size())
-		refuse(PSR_ERR_FORMAT, "nodes[%d]: camera %d does not exist, there are %zu", node, index, r.src.cameras.size());
-
+	check_index(index, r.src.cameras.size(), "camera", "nodes[" + std::to_string(node) + "]");
 	const camera_source &s = r.src.cameras[(size_t)index];
 	const std::string &name = r.model.nodes[(size_t)node].name;
 	struct psr_camera camera = s.camera;
@@ -154,9 +138,7 @@ void add_camera(reader &r, int node, int index, const axes *a, const double *mid
 
 void add_light(reader &r, int node, int index, const axes *a)
 {
-	if (index < 0 || (size_t)index >= r.src.lights.size())
-		refuse(PSR_ERR_FORMAT, "nodes[%d]: light %d does not exist, there are %zu", node, index, r.src.lights.size());
-
+	check_index(index, r.src.lights.size(), "light", "nodes[" + std::to_string(node) + "]");
 	const light_source &s = r.src.lights[(size_t)index];
 	const std::string &name = r.model.nodes[(size_t)node].name;
 	struct psr_light light = s.light;
@@ -198,13 +180,11 @@ void presets_place(reader &r)
 {
 	double middle[3];
 	const bool has_middle = middle_of(middle, r.im.mesh);
-
 	for (int n : r.scene) {
 		const tinygltf::Node &node = r.model.nodes[(size_t)n];
 		auto light = node.extensions.find("KHR_lights_punctual");
 		axes a;
 		const bool is_good = axes_of(a, r.world[(size_t)n]);
-
 		if (node.camera >= 0)
 			add_camera(r, n, node.camera, is_good ? &a : nullptr, has_middle ? middle : nullptr);
 		if (light != node.extensions.end())

@@ -10,7 +10,6 @@ const size_t max_joint_sets = 4;
 void set_triangles(reader &r, int mode, const std::vector<uint32_t> &index, primitive &out)
 {
 	const size_t n = index.size();
-
 	if (mode == TINYGLTF_MODE_TRIANGLES) {
 		out.triangle.assign(index.begin(), index.end() - (ptrdiff_t)(n % 3));
 		if (n % 3 != 0)
@@ -19,7 +18,6 @@ void set_triangles(reader &r, int mode, const std::vector<uint32_t> &index, prim
 	}
 	for (size_t i = 0; i + 2 < n; i++) {
 		size_t odd = i & 1;
-
 		if (mode == TINYGLTF_MODE_TRIANGLE_STRIP)
 			out.triangle.insert(out.triangle.end(), { index[i], index[i + 1 + odd], index[i + 2 - odd] });
 		else
@@ -36,7 +34,6 @@ void check_count(size_t n, const char *name, size_t n_vertices, const std::strin
 void check_counts(const primitive &p, const material_use &use, const std::string &place)
 {
 	const size_t n = p.n_vertices();
-
 	check_count(p.normal.size() / 3, "NORMAL", n, place);
 	check_count(p.tangent.size() / 4, "TANGENT", n, place);
 	check_count(p.color.size() / 4, "COLOR_0", n, place);
@@ -75,7 +72,7 @@ void read_attributes(const tinygltf::Primitive &g, const material_use &use, cons
 {
 	out.position = list("POSITION", 3, false);
 	out.normal = list("NORMAL", 3, false);
-	/* Tangents go with normals: beside generated ones they mean nothing. */
+	/* Tangents without normals would not fit the generated ones. */
 	if (use.has_normal_map && !out.normal.empty())
 		out.tangent = list("TANGENT", 4, false);
 	out.color = list("COLOR_0", 4, true);
@@ -84,7 +81,6 @@ void read_attributes(const tinygltf::Primitive &g, const material_use &use, cons
 			out.uv[set] = list(use.uv_name[set], 2, false);
 	for (size_t set = 0; set < max_joint_sets; set++) {
 		const std::string digit = std::to_string(set);
-
 		if (g.attributes.count("JOINTS_" + digit) == 0 || g.attributes.count("WEIGHTS_" + digit) == 0)
 			break;
 		out.joint.push_back(list("JOINTS_" + digit, 4, false));
@@ -98,18 +94,16 @@ bool read_primitive(reader &r, const tinygltf::Primitive &g, const material_use 
                     const std::string &place)
 {
 	auto position = g.attributes.find("POSITION");
-
 	if (position == g.attributes.end()) {
 		import_mesh_warn(&r.im, "%s has no POSITION and was left out", place.c_str());
 		return false;
 	}
 	if (g.mode < TINYGLTF_MODE_POINTS || g.mode > TINYGLTF_MODE_TRIANGLE_FAN)
-		refuse(PSR_ERR_FORMAT, "%s: mode %d is not known", place.c_str(), g.mode);
+		refuse(PSR_ERR_FORMAT, "%s: unknown mode %d", place.c_str(), g.mode);
 	if (g.extensions.count("KHR_draco_mesh_compression") != 0) {
 		const std::shared_ptr<draco::Mesh> mesh = draco_open(r, g, place);
-
 		read_attributes(g, use, [&](const std::string &name, size_t n, bool is_normalized) {
-			return draco_floats(r, *mesh, g, name, n, place, is_normalized);
+			return draco_floats(r, *mesh, g, place + "." + name, n, is_normalized);
 		}, out);
 		out.triangle = draco_triangles(*mesh);
 	} else if (g.mode != TINYGLTF_MODE_POINTS && g.mode < TINYGLTF_MODE_TRIANGLES) {
@@ -117,10 +111,8 @@ bool read_primitive(reader &r, const tinygltf::Primitive &g, const material_use 
 		return false;
 	} else {
 		std::vector<uint32_t> index;
-
 		read_attributes(g, use, [&](const std::string &name, size_t n, bool is_normalized) {
 			auto it = g.attributes.find(name);
-
 			return it == g.attributes.end() ? std::vector<float>() :
 			                                  accessor_floats(r, it->second, n, place + "." + name, is_normalized);
 		}, out);

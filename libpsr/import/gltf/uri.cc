@@ -22,11 +22,9 @@ std::vector<uint8_t> base64_decode(const std::string &uri, size_t at, const std:
 	std::vector<uint8_t> out;
 	uint32_t word = 0;
 	int n_bits = 0;
-
 	out.reserve((uri.size() - at) / 4 * 3 + 3);
 	for (; at < uri.size() && uri[at] != '='; at++) {
 		int value = base64_value(uri[at]);
-
 		if (value < 0)
 			refuse(PSR_ERR_FORMAT, "%s: byte %zu of its data uri is not base64", place.c_str(), at);
 		word = word << 6 | (uint32_t)value;
@@ -50,7 +48,6 @@ int hex_value(char c)
 std::string percent_decode(const std::string &uri)
 {
 	std::string out;
-
 	for (size_t i = 0; i < uri.size(); i++) {
 		if (uri[i] == '%' && i + 2 < uri.size() && hex_value(uri[i + 1]) >= 0 && hex_value(uri[i + 2]) >= 0) {
 			out += (char)(hex_value(uri[i + 1]) * 16 + hex_value(uri[i + 2]));
@@ -64,13 +61,12 @@ std::string percent_decode(const std::string &uri)
 
 } // namespace
 
-std::vector<uint8_t> door_read_uri(const source &s, const std::string &uri, const std::string &place)
+std::vector<uint8_t> read_uri(const source &s, const std::string &uri, const std::string &place)
 {
 	if (uri.compare(0, 5, "data:") == 0) {
 		size_t comma = uri.find(',');
-
 		if (comma == std::string::npos || comma < 12 || uri.compare(comma - 7, 7, ";base64") != 0)
-			refuse(PSR_ERR_UNSUPPORTED, "%s: a data uri that is not base64", place.c_str());
+			refuse(PSR_ERR_UNSUPPORTED, "%s: its data uri is not base64", place.c_str());
 		return base64_decode(uri, comma + 1, place);
 	}
 
@@ -81,7 +77,7 @@ std::vector<uint8_t> door_read_uri(const source &s, const std::string &uri, cons
 	size_t n_bytes = 0;
 
 	if (name.find('\0') != std::string::npos)
-		refuse(PSR_ERR_FORMAT, "%s: a file name with a zero byte", place.c_str());
+		refuse(PSR_ERR_FORMAT, "%s: its file name has a zero byte", place.c_str());
 	if (uri.find("://") != std::string::npos)
 		refuse(PSR_ERR_UNSUPPORTED, "%s is at \"%.200s\"; only files are read", place.c_str(), uri.c_str());
 	if (import_path_inside(&path, s.folder.c_str(), name.c_str(), &error) != PSR_OK)

@@ -1,10 +1,9 @@
 #include <string.h>
-#include <strings.h>
 #include "base/image_module.h"
 #include "import/import.h"
 
 struct magic {
-	const char *format; /* as OpenImageIO calls it */
+	const char *format; /* OpenImageIO's name */
 	size_t offset, n;
 	const char *bytes;
 };
@@ -19,17 +18,12 @@ static const struct magic magics[] = {
 
 static const char *format_of(const uint8_t *bytes, size_t n_bytes, const char *name)
 {
-	size_t n = strlen(name);
-
 	for (size_t i = 0; i < sizeof magics / sizeof magics[0]; i++) {
 		const struct magic *m = &magics[i];
-
 		if (n_bytes >= m->offset + m->n && memcmp(bytes + m->offset, m->bytes, m->n) == 0)
 			return m->format;
 	}
-	if (n >= 4 && strcasecmp(name + n - 4, ".tga") == 0)
-		return "targa";
-	return NULL;
+	return import_path_ends_with(name, ".tga") ? "targa" : NULL;
 }
 
 int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, const char *name,
@@ -42,15 +36,14 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 	uint32_t size[2];
 	uint8_t *rgba;
 	int rc;
-
 	if (format == NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "%s: not an image of a known format (PNG, JPEG, WebP, TIFF, TGA, ...)", name);
+		                "%s: not an image in a supported format (PNG, JPEG, WebP, TIFF, TGA, ...)", name);
 	if (strcmp(format, "png") == 0 && import_image_plain_png(out, bytes, n_bytes, max_pixels))
 		return PSR_OK;
 	rc = image_module_open(&module, &why);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "%s: no image can be read: %s", name, why.text);
+		return psr_fail(err, rc, "%s: cannot read images: %s", name, why.text);
 	rc = module->read(&rgba, size, bytes, n_bytes, format, max_pixels, message, sizeof message);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%s: %s", name, message);

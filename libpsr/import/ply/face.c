@@ -3,13 +3,13 @@
 #include "ply.h"
 #include "polygon.h"
 
-/* Where faces go, and room for the largest one. */
+/* Where faces go, and scratch memory for the largest one. */
 struct target {
 	struct import_mesh *im;
 	struct ply_rows *rows;
 	const struct ply_vertices *vertices;
-	uint32_t material, first;   /* first: of the shared vertices; colors or coordinates of faces need their own */
-	int is_shared, has_colors;
+	uint32_t material, first;   /* first: of the shared vertices */
+	int is_shared, has_colors;  /* is_shared: no colors or coordinates by face, which need vertices of their own */
 	unsigned has;               /* IMPORT_HAS_* */
 	struct ply_colors colors;
 	float color[4];             /* of this face */
@@ -22,7 +22,6 @@ static void put_vertex(const struct target *t, uint32_t to, uint32_t from, const
 {
 	struct psr_mesh *mesh = t->im->mesh;
 	const struct ply_vertices *v = t->vertices;
-
 	memcpy(mesh->position[to], v->position[from], sizeof v->position[from]);
 	if (v->normal != NULL)
 		memcpy(mesh->normal[to], v->normal[from], sizeof v->normal[from]);
@@ -40,18 +39,9 @@ static void put_vertex(const struct target *t, uint32_t to, uint32_t from, const
 
 static int reserve(struct target *t, uint64_t n, struct psr_error *err)
 {
-	uint32_t *corner;
-	unsigned (*cut)[3];
-
 	if (n <= t->capacity)
 		return PSR_OK;
-	corner = realloc(t->corner, n * sizeof *corner);
-	if (corner != NULL)
-		t->corner = corner;
-	cut = realloc(t->cut, n * sizeof *cut);
-	if (cut != NULL)
-		t->cut = cut;
-	if (corner == NULL || cut == NULL)
+	if (!import_resize(&t->corner, n, sizeof *t->corner) || !import_resize(&t->cut, n, sizeof *t->cut))
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a face of %llu corners", t->im->path,
 		                (unsigned long long)n);
 	t->capacity = n;
@@ -68,15 +58,13 @@ static int read_index(uint32_t *index, const struct target *t, double x, struct 
 	return PSR_OK;
 }
 
-/* One triangle of corners i, j, k of t->corner; uv: two values a corner, or NULL. */
+/* Adds the triangle of three corners of t->corner; uv: two values a corner, or NULL. */
 static void put_triangle(const struct target *t, uint32_t to, uint32_t first_vertex, const unsigned cut[3],
                          const double *uv)
 {
 	struct psr_mesh *mesh = t->im->mesh;
-
 	for (unsigned c = 0; c < 3; c++) {
 		uint32_t from = t->corner[cut[c]];
-
 		mesh->triangle[to][c] = t->is_shared ? t->first + from : first_vertex + c;
 		if (!t->is_shared)
 			put_vertex(t, first_vertex + c, from, uv != NULL ? uv + 2 * (size_t)cut[c] : NULL);
@@ -84,13 +72,12 @@ static void put_triangle(const struct target *t, uint32_t to, uint32_t first_ver
 	mesh->triangle_material[to] = t->material;
 }
 
-/* The polygon of t->corner. */
+/* Adds the polygon of t->corner. */
 static int put_polygon(struct target *t, uint32_t n, const double *uv, struct psr_error *err)
 {
 	const uint32_t first_triangle = t->im->mesh->n_triangles, first_vertex = t->im->mesh->n_vertices;
 	double point[POLYGON_MAX_CLIP][3];
 	int rc;
-
 	rc = import_mesh_grow(t->im, t->is_shared ? 0 : 3 * ((uint64_t)n - 2), (uint64_t)n - 2, t->has, err);
 	if (rc != PSR_OK)
 		return rc;
@@ -107,13 +94,12 @@ static int target_init(struct target *t, struct import_mesh *im, struct ply_rows
 {
 	const struct ply_list *uv = &rows->list[PLY_LIST_UV];
 	int rc = PSR_OK;
-
 	memset(t, 0, sizeof *t);
 	t->im = im;
 	t->rows = rows;
 	t->vertices = vertices;
 	t->material = material;
-	/* Where a file has both, colors of vertices are finer, unless the writer only filled them in. */
+	/* Colors of vertices are finer than those of faces, unless all are the same, a writer's default. */
 	t->has_colors = (vertices->color == NULL || ply_vertices_are_one_color(vertices)) &&
 	                ply_colors_find(&t->colors, rows->header, rows->element);
 	t->is_shared = !t->has_colors && uv->property < 0;
@@ -136,7 +122,6 @@ static void target_fini(struct target *t)
 static int find_list(struct ply_rows *rows, int which, const char *const *names, struct psr_error *err)
 {
 	const int at = ply_find_property(rows->header, rows->element, names);
-
 	if (at >= 0 && rows->header->property[rows->element->first_property + (unsigned)at].count_type != PLY_NO_TYPE)
 		rows->list[which].property = at;
 	else if (which == PLY_LIST_INDEX)
@@ -149,7 +134,6 @@ static int read_face(struct target *t, struct psr_error *err)
 {
 	const struct ply_list *index = &t->rows->list[PLY_LIST_INDEX], *uv = &t->rows->list[PLY_LIST_UV];
 	int rc;
-
 	if (index->n > IMPORT_MAX_TRIANGLES)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: a face of more than %llu corners", t->im->path,
 		                (unsigned long long)IMPORT_MAX_TRIANGLES);
@@ -176,7 +160,6 @@ int ply_faces_read(struct import_mesh *im, struct ply_rows *rows, const struct p
 	const uint32_t dropped = im->mesh->n_dropped_primitives;
 	struct target t;
 	int rc = find_list(rows, PLY_LIST_INDEX, index_names, err);
-
 	if (rc == PSR_OK)
 		rc = find_list(rows, PLY_LIST_UV, uv_names, err);
 	if (rc != PSR_OK)
@@ -194,19 +177,17 @@ int ply_faces_read(struct import_mesh *im, struct ply_rows *rows, const struct p
 	return rc;
 }
 
-/* Each vertex makes a triangle with the two before it, every other one turned round; -1 starts anew. Where two of the
- * three are the same the strip only turns a corner. */
+/* Each vertex makes a triangle with the two before it, every other one reversed; -1 begins a new strip. Triangles with
+ * two equal vertices only turn a corner of the strip. */
 static int read_strip(struct target *t, struct psr_error *err)
 {
 	static const unsigned even[3] = { 0, 1, 2 }, odd[3] = { 1, 0, 2 };
 	const struct ply_list *index = &t->rows->list[PLY_LIST_INDEX];
 	uint64_t length = 0;
 	int rc;
-
 	for (uint64_t i = 0; i < index->n; i++) {
 		struct psr_mesh *mesh = t->im->mesh;
 		uint32_t *v = t->corner;
-
 		if (index->item[i] == -1.0) {
 			length = 0;
 			continue;
@@ -231,7 +212,6 @@ int ply_strips_read(struct import_mesh *im, struct ply_rows *rows, const struct 
 {
 	struct target t;
 	int rc = find_list(rows, PLY_LIST_INDEX, index_names, err);
-
 	if (rc != PSR_OK)
 		return rc;
 	rc = target_init(&t, im, rows, vertices, material, err);

@@ -9,7 +9,7 @@ struct text {
 	const char *path;
 	const uint8_t *at, *end;
 	unsigned line;
-	int crlf_is_one; /* the first line ends in CR LF or LF: a binary body may begin with LF, but not after such a CR */
+	int crlf_is_one; /* the first line ends in CR LF or LF; after a lone CR, LF may begin a binary body */
 };
 
 struct line {
@@ -17,6 +17,9 @@ struct line {
 	struct ply_name word[MAX_WORDS];
 	struct ply_name rest[MAX_WORDS]; /* from word i to the end of the line */
 };
+
+#define fail(t, err, code, format, ...) \
+	psr_fail(err, code, "%s: line %u: " format, (t)->path, (t)->line, ##__VA_ARGS__)
 
 int ply_name_is(const struct ply_name *name, const char *text)
 {
@@ -26,7 +29,6 @@ int ply_name_is(const struct ply_name *name, const char *text)
 size_t ply_type_size(enum ply_type type)
 {
 	static const size_t size[] = { 0, 1, 1, 2, 2, 4, 4, 4, 8 };
-
 	return size[type];
 }
 
@@ -40,11 +42,10 @@ static int is_blank(uint8_t c)
 	return c == ' ' || c == '\t';
 }
 
-/* 0 at the end of the file: a header's last line has an end. */
+/* Returns 0 at the end of the file; the last line of a header has a line end. */
 static int next_line(struct text *t, struct line *line)
 {
 	const uint8_t *p = t->at, *end;
-
 	while (p < t->end && *p != '\n' && *p != '\r')
 		p++;
 	if (p == t->end)
@@ -56,7 +57,6 @@ static int next_line(struct text *t, struct line *line)
 	line->n_words = 0;
 	for (const uint8_t *q = t->at; q < end;) {
 		const uint8_t *word;
-
 		while (q < end && is_blank(*q))
 			q++;
 		for (word = q; q < end && !is_blank(*q);)
@@ -103,10 +103,10 @@ static enum ply_type parse_type(const struct ply_name *word)
 static int read_format(struct ply_header *h, const struct text *t, const struct line *l, struct psr_error *err)
 {
 	if (h->format != PLY_NO_FORMAT)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second format", t->path, t->line);
+		return fail(t, err, PSR_ERR_FORMAT, "a second format");
 	if (l->n_words == 3 && !ply_name_is(&l->word[2], "1.0"))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: line %u: PLY of version %.*s; only 1.0 is known", t->path,
-		                t->line, shown(&l->word[2]), l->word[2].at);
+		return fail(t, err, PSR_ERR_UNSUPPORTED, "PLY version %.*s is not supported; 1.0 is",
+		            shown(&l->word[2]), l->word[2].at);
 	if (l->n_words == 3 && ply_name_is(&l->word[1], "ascii"))
 		h->format = PLY_ASCII;
 	else if (l->n_words == 3 && ply_name_is(&l->word[1], "binary_little_endian"))
@@ -114,24 +114,21 @@ static int read_format(struct ply_header *h, const struct text *t, const struct 
 	else if (l->n_words == 3 && ply_name_is(&l->word[1], "binary_big_endian"))
 		h->format = PLY_BIG;
 	else
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: line %u: the format is none of ascii, binary_little_endian, binary_big_endian 1.0",
-		                t->path, t->line);
+		return fail(t, err, PSR_ERR_FORMAT,
+		            "the format is none of ascii, binary_little_endian and binary_big_endian 1.0");
 	return PSR_OK;
 }
 
 static int read_element(struct ply_header *h, const struct text *t, const struct line *l, struct psr_error *err)
 {
 	struct ply_element *e = &h->element[h->n_elements];
-
 	if (h->n_elements == PLY_MAX_ELEMENTS)
-		return psr_fail(err, PSR_ERR_LIMIT, "%s: line %u: more than %d elements", t->path, t->line, PLY_MAX_ELEMENTS);
+		return fail(t, err, PSR_ERR_LIMIT, "more than %d elements", PLY_MAX_ELEMENTS);
 	if (l->n_words != 3 || !parse_count(&l->word[2], &e->n_rows))
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: not \"element NAME COUNT\"", t->path, t->line);
+		return fail(t, err, PSR_ERR_FORMAT, "expected \"element NAME COUNT\"");
 	for (unsigned i = 0; i < h->n_elements; i++)
 		if (h->element[i].name.n == l->word[1].n && memcmp(h->element[i].name.at, l->word[1].at, l->word[1].n) == 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second element \"%.*s\"", t->path, t->line,
-			                shown(&l->word[1]), l->word[1].at);
+			return fail(t, err, PSR_ERR_FORMAT, "a second element \"%.*s\"", shown(&l->word[1]), l->word[1].at);
 	e->name = l->word[1];
 	e->line = t->line;
 	e->first_property = h->n_properties;
@@ -146,64 +143,55 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 	const unsigned n_words = is_list ? 5 : 3;
 	struct ply_property *p = &h->property[h->n_properties];
 	struct ply_element *e;
-
 	if (h->n_elements == 0)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a property before any element", t->path, t->line);
+		return fail(t, err, PSR_ERR_FORMAT, "a property before any element");
 	if (h->n_properties == PLY_MAX_PROPERTIES)
-		return psr_fail(err, PSR_ERR_LIMIT, "%s: line %u: more than %d properties", t->path, t->line,
-		                PLY_MAX_PROPERTIES);
+		return fail(t, err, PSR_ERR_LIMIT, "more than %d properties", PLY_MAX_PROPERTIES);
 	if (l->n_words != n_words)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: line %u: neither \"property TYPE NAME\" nor \"property list TYPE TYPE NAME\"", t->path,
-		                t->line);
+		return fail(t, err, PSR_ERR_FORMAT, "expected \"property TYPE NAME\" or \"property list TYPE TYPE NAME\"");
 	for (unsigned i = is_list ? 2 : 1; i + 1 < n_words; i++)
 		if (parse_type(&l->word[i]) == PLY_NO_TYPE)
-			return psr_fail(err, PSR_ERR_FORMAT,
-			                "%s: line %u: \"%.*s\" is not a type of PLY (char, uchar, ..., double)", t->path, t->line,
-			                shown(&l->word[i]), l->word[i].at);
+			return fail(t, err, PSR_ERR_FORMAT, "\"%.*s\" is not a type of PLY (char, uchar, ..., double)",
+			            shown(&l->word[i]), l->word[i].at);
 	p->count_type = is_list ? parse_type(&l->word[2]) : PLY_NO_TYPE;
 	p->type = parse_type(&l->word[n_words - 2]);
 	p->name = l->word[n_words - 1];
 	if (p->count_type >= PLY_FLOAT)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: the length of a list is not an integer", t->path, t->line);
+		return fail(t, err, PSR_ERR_FORMAT, "the length of a list is not an integer");
 	e = &h->element[h->n_elements - 1];
 	for (unsigned i = e->first_property; i < h->n_properties; i++)
 		if (h->property[i].name.n == p->name.n && memcmp(h->property[i].name.at, p->name.at, p->name.n) == 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: a second property \"%.*s\" of \"%.*s\"", t->path,
-			                t->line, shown(&p->name), p->name.at, shown(&e->name), e->name.at);
+			return fail(t, err, PSR_ERR_FORMAT, "a second property \"%.*s\" of \"%.*s\"",
+			            shown(&p->name), p->name.at, shown(&e->name), e->name.at);
 	h->n_properties++;
 	e->n_properties++;
 	return PSR_OK;
 }
 
-/* The fewest bytes of a row: in text a digit and a blank a value. */
+/* The least bytes of a row; in text, a value takes a digit and a blank. */
 static uint64_t least_row(const struct ply_header *h, const struct ply_element *e)
 {
 	uint64_t n = 0;
-
 	for (unsigned i = e->first_property; i < e->first_property + e->n_properties; i++) {
 		const struct ply_property *p = &h->property[i];
-
 		n += h->format == PLY_ASCII ? 2 : ply_type_size(p->count_type != PLY_NO_TYPE ? p->count_type : p->type);
 	}
 	return n;
 }
 
-/* Division, so that no product overflows. One byte more than there are: text may end without a newline. */
+/* Divides, so that no product overflows. Adds a byte for text that ends without a newline. */
 static int check_counts(const struct ply_header *h, const char *path, size_t n_bytes, struct psr_error *err)
 {
 	uint64_t left = n_bytes - h->body + (h->format == PLY_ASCII);
-
 	for (unsigned i = 0; i < h->n_elements; i++) {
 		const struct ply_element *e = &h->element[i];
 		uint64_t least = least_row(h, e);
-
 		if (least == 0)
 			continue;
 		if (e->n_rows > left / least)
 			return psr_fail(
 				err, PSR_ERR_FORMAT,
-				"%s: line %u: the header speaks of %llu elements \"%.*s\", but the file has only %llu bytes "
+				"%s: line %u: the header promises %llu elements \"%.*s\", but the file has only %llu bytes "
 				"for them; is it cut short?",
 				path, e->line, (unsigned long long)e->n_rows, shown(&e->name), e->name.at,
 				(unsigned long long)(n_bytes - h->body));
@@ -227,7 +215,7 @@ static int read_line(struct ply_header *h, const struct text *t, const struct li
 		return read_element(h, t, l, err);
 	if (ply_name_is(&l->word[0], "property"))
 		return read_property(h, t, l, err);
-	/* A comment that lacks the word, as Blender once wrote; what is missing because of a misspelt one shows later. */
+	/* A comment without the word, as Blender once wrote. A misspelt keyword shows later, by what is missing. */
 	if (h->odd_line == 0)
 		h->odd_line = t->line;
 	return PSR_OK;
@@ -238,7 +226,6 @@ int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes
 	struct text t = { path, bytes, bytes + n_bytes, 0, 0 };
 	struct line l;
 	int rc;
-
 	memset(h, 0, sizeof *h);
 	if (!next_line(&t, &l) || l.n_words != 1 || !ply_name_is(&l.word[0], "ply"))
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: does not begin with a line \"ply\"", path);

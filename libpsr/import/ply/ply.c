@@ -9,7 +9,6 @@ static int load_image(int *image, struct import_mesh *im, const char *name, stru
 	uint8_t *bytes = NULL;
 	size_t n_bytes = 0;
 	int rc = import_path_folder(&folder, im->path, err);
-
 	if (rc == PSR_OK && import_path_inside(&path, folder, name, NULL) != PSR_OK) {
 		import_mesh_warn(im, "the texture \"%.100s\" is not in the folder of the file and was left out", name);
 	} else if (rc == PSR_OK) {
@@ -23,13 +22,12 @@ static int load_image(int *image, struct import_mesh *im, const char *name, stru
 	return rc < 0 ? rc : PSR_OK;
 }
 
-/* *image is -1 where the file names none, or one that is not there; a broken one is an error. */
+/* *image: -1 if the file names no texture or a missing one; a broken one is an error. */
 static int find_texture(int *image, struct import_mesh *im, const struct ply_name *texture, struct psr_error *err)
 {
 	size_t n = texture->n;
 	char *name;
 	int rc;
-
 	*image = -1;
 	while (n > 0 && (texture->at[n - 1] == ' ' || texture->at[n - 1] == '\t'))
 		n--;
@@ -43,13 +41,12 @@ static int find_texture(int *image, struct import_mesh *im, const struct ply_nam
 	return rc;
 }
 
-/* Two-sided, as most of these files cannot say. A cloud is rough: its normals are no more than estimates. */
+/* Two-sided, since most files do not tell. Clouds are rough: their normals are estimates. */
 static int add_material(struct import_mesh *im, const struct ply_header *h, int is_cloud, int has_colors,
                         struct psr_error *err)
 {
 	struct psr_material material;
 	int image = -1, rc = PSR_OK;
-
 	psr_material_default(&material);
 	material.two_sided = 1;
 	material.roughness = is_cloud ? 1.0f : IMPORT_ROUGHNESS;
@@ -66,7 +63,6 @@ static int add_material(struct import_mesh *im, const struct ply_header *h, int 
 static int has_colors(const struct ply_header *h, const struct ply_vertices *vertices, const struct ply_element *faces)
 {
 	struct ply_colors colors;
-
 	return vertices->color != NULL || (faces != NULL && ply_colors_find(&colors, h, faces));
 }
 
@@ -75,7 +71,6 @@ static int add_points(struct import_mesh *im, const struct ply_vertices *v, uint
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t first = mesh->n_points;
 	int rc = import_mesh_grow_points(im, v->n, v->color != NULL, err);
-
 	if (rc != PSR_OK || v->n == 0)
 		return rc;
 	memcpy(mesh->point + first, v->position, v->n * sizeof *v->position);
@@ -93,13 +88,12 @@ static int has_rows(const struct ply_element *element)
 	return element != NULL && element->n_rows > 0;
 }
 
-/* Elements stand in the file in the order of the header, but faces can only be read when the vertices are known. */
+/* Skips to the vertices: elements have the order of the header, but faces need the vertices. */
 static int read_vertices(struct ply_vertices *vertices, struct ply_rows *rows, struct psr_error *err)
 {
 	const struct ply_header *h = rows->header;
 	const struct ply_element *vertex = ply_find_element(h, "vertex");
 	int rc = PSR_OK;
-
 	if (vertex == NULL)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the PLY header has no element vertex", rows->path);
 	for (const struct ply_element *e = h->element; e < vertex && rc == PSR_OK; e++) {
@@ -120,7 +114,6 @@ static int read_surface(struct import_mesh *im, struct ply_rows *rows, const str
 	                         *strips = ply_find_element(h, "tristrips");
 	const struct ply_element *e = vertex + 1;
 	int rc, material;
-
 	material = add_material(im, h, 0, has_colors(h, vertices, has_rows(faces) ? faces : strips), err);
 	if (material < 0)
 		return material;
@@ -147,9 +140,8 @@ static int read_all(struct import_mesh *im, struct ply_rows *rows, struct psr_er
 	const struct ply_element *edges = ply_find_element(rows->header, "edge");
 	struct ply_vertices vertices;
 	int rc, material;
-
 	if (rows->header->odd_line > 0)
-		import_mesh_warn(im, "line %u is no line of a PLY header and was left out", rows->header->odd_line);
+		import_mesh_warn(im, "line %u is not a line of a PLY header and was left out", rows->header->odd_line);
 	memset(&vertices, 0, sizeof vertices);
 	rc = read_vertices(&vertices, rows, err);
 	if (rc != PSR_OK) {
@@ -175,7 +167,6 @@ int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	struct ply_header *header = malloc(sizeof *header);
 	struct ply_rows *rows = malloc(sizeof *rows);
 	int rc;
-
 	if (header == NULL || rows == NULL) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a header", im->path);
 	} else {

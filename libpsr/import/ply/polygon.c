@@ -7,18 +7,16 @@ static double area(const double a[2], const double b[2], const double c[2])
 	return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Drops the axis along which the polygon's normal (Newell's sum) is longest, and keeps its turn counter-clockwise. */
+/* Projects along the axis where the polygon's normal (Newell's sum) is longest, keeping the winding counter-clockwise.
+ * */
 static void project(double (*flat)[2], const double (*point)[3], unsigned n)
 {
 	double normal[3] = { 0.0, 0.0, 0.0 };
 	int axis = 0, x, y;
-
 	for (unsigned i = 0; i < n; i++) {
 		const double *p = point[i], *q = point[(i + 1) % n];
-
 		for (int k = 0; k < 3; k++) {
 			int a = (k + 1) % 3, b = (k + 2) % 3;
-
 			normal[k] += (p[a] - q[a]) * (p[b] + q[b] - 2.0 * point[0][b]);
 		}
 	}
@@ -54,12 +52,10 @@ static int is_ear(double (*flat)[2], const unsigned *left, unsigned n, unsigned 
 {
 	const unsigned before = left[(i + n - 1) % n], at = left[i], after = left[(i + 1) % n];
 	const double *a = flat[before], *b = flat[at], *c = flat[after];
-
 	if (!(area(a, b, c) > 0.0))
 		return 0;
 	for (unsigned k = 0; k < n; k++) {
 		const double *p = flat[left[k]];
-
 		if (left[k] != before && left[k] != at && left[k] != after && area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 &&
 		    area(c, a, p) >= 0.0)
 			return 0;
@@ -71,7 +67,6 @@ void polygon_cut(unsigned (*out)[3], const double (*point)[3], unsigned n)
 {
 	double flat[POLYGON_MAX_CLIP][2];
 	unsigned left[POLYGON_MAX_CLIP], n_out = 0;
-
 	if (n > 3 && n <= POLYGON_MAX_CLIP)
 		project(flat, point, n);
 	if (n == 3 || n > POLYGON_MAX_CLIP || is_convex(flat, n)) {
@@ -82,11 +77,10 @@ void polygon_cut(unsigned (*out)[3], const double (*point)[3], unsigned n)
 		left[i] = i;
 	while (n > 3) {
 		unsigned ear = 0;
-
 		while (ear < n && !is_ear(flat, left, n, ear))
 			ear++;
 		if (ear == n)
-			ear = 0; /* it crosses itself or has no area: any corner will do */
+			ear = 0; /* it crosses itself or has no area: cut any corner */
 		out[n_out][0] = left[(ear + n - 1) % n];
 		out[n_out][1] = left[ear];
 		out[n_out++][2] = left[(ear + 1) % n];

@@ -12,7 +12,7 @@ int ply_rows_init(struct ply_rows *rows, const char *path, const struct ply_head
 	rows->header = header;
 	rows->cursor = (struct ply_cursor){ bytes, bytes + header->body, bytes + n_bytes, header->format, (locale_t)0 };
 	rows->cursor.locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
-	return rows->cursor.locale == (locale_t)0 ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path)
+	return rows->cursor.locale == (locale_t)0 ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory", path)
 	                                          : PSR_OK;
 }
 
@@ -39,7 +39,6 @@ int ply_rows_fail(const struct ply_rows *rows, struct psr_error *err, const char
 	char text[PSR_ERROR_TEXT], place[64];
 	uint64_t line = 1;
 	va_list args;
-
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
@@ -71,14 +70,10 @@ static struct ply_list *list_of(struct ply_rows *rows, int property)
 
 static int reserve(struct ply_list *list, uint64_t n)
 {
-	double *item;
-
 	if (n <= list->capacity)
 		return 1;
-	item = realloc(list->item, n * sizeof *item);
-	if (item == NULL)
+	if (!import_resize(&list->item, n, sizeof *list->item))
 		return 0;
-	list->item = item;
 	list->capacity = n;
 	return 1;
 }
@@ -86,16 +81,15 @@ static int reserve(struct ply_list *list, uint64_t n)
 static int read_list(struct ply_rows *rows, const struct ply_property *p, struct ply_list *list, struct psr_error *err)
 {
 	struct ply_cursor *c = &rows->cursor;
-	/* in text an item takes two bytes, but for the last one of a file */
+	/* In text an item takes two bytes, except the last one of a file. */
 	const uint64_t left = (uint64_t)(c->end - c->at) + 1;
 	double count;
-
 	if (!ply_value(c, p->count_type, &count))
 		return fail_value(rows, err);
 	if (!(count >= 0.0) || count != (double)(uint64_t)(count < 1e18 ? count : 0.0))
 		return ply_rows_fail(rows, err, "has a list of %g items", count);
 	if (count > (double)(left / (c->format == PLY_ASCII ? 2 : ply_type_size(p->type))))
-		return ply_rows_fail(rows, err, "has a list of %.0f items, but the file ends before", count);
+		return ply_rows_fail(rows, err, "has a list of %.0f items, but the file ends before it does", count);
 	if (list == NULL)
 		return ply_skip(c, p->type, (uint64_t)count) ? PSR_OK : fail_value(rows, err);
 	list->n = (uint64_t)count;
@@ -108,14 +102,13 @@ static int read_list(struct ply_rows *rows, const struct ply_property *p, struct
 	return PSR_OK;
 }
 
-/* A row may take several lines, but ends where its line ends: a value that is missing or too many shows at once. */
+/* A row may take several lines, but must end at the end of a line: a missing or extra value shows at once. */
 static int end_line(struct ply_rows *rows, struct psr_error *err)
 {
 	struct ply_cursor *c = &rows->cursor;
-
 	while (c->at < c->end && *c->at != '\n' && *c->at != '\r') {
 		if (*c->at != ' ' && *c->at != '\t')
-			return ply_rows_fail(rows, err, "does not have the %u properties that the header gives it",
+			return ply_rows_fail(rows, err, "does not have the %u properties that the header promises",
 			                     rows->element->n_properties);
 		c->at++;
 	}
@@ -126,7 +119,6 @@ int ply_rows_next(struct ply_rows *rows, struct psr_error *err)
 {
 	const struct ply_property *p = &rows->header->property[rows->element->first_property];
 	int rc;
-
 	rows->at++;
 	for (unsigned i = 0; i < rows->element->n_properties; i++) {
 		if (p[i].count_type == PLY_NO_TYPE) {
@@ -145,7 +137,6 @@ int ply_rows_next(struct ply_rows *rows, struct psr_error *err)
 int ply_rows_skip(struct ply_rows *rows, struct psr_error *err)
 {
 	int rc = PSR_OK;
-
 	if (rows->element->n_properties == 0)
 		return PSR_OK;
 	while (rows->at < rows->element->n_rows && rc == PSR_OK)

@@ -3,7 +3,7 @@
 #include "import/cloud/cloud.h"
 #include "ply.h"
 
-/* Which property of the row each of these is; -1: none. */
+/* Properties of a row by role; -1: none. */
 struct roles {
 	int position[3], normal[3], uv[2];
 	struct ply_colors colors;
@@ -18,17 +18,15 @@ int ply_colors_find(struct ply_colors *colors, const struct ply_header *header, 
 		{ "blue", "diffuse_blue", "b", NULL },
 		{ "alpha", "diffuse_alpha", "a", NULL },
 	};
-
 	for (int c = 0; c < 4; c++) {
 		const struct ply_property *p;
-
 		colors->property[c] = ply_find_property(header, element, names[c]);
 		if (colors->property[c] < 0)
 			continue;
 		p = &header->property[element->first_property + (unsigned)colors->property[c]];
 		if (p->count_type != PLY_NO_TYPE)
 			colors->property[c] = -1;
-		/* Integers of 32 bits are codes of 8 whose writer was lavish. */
+		/* 32-bit integers hold 8-bit codes. */
 		colors->scale[c] = p->type >= PLY_FLOAT ? 0.0 : p->type == PLY_UINT16 ? 255.0 / 65535.0 : 1.0;
 	}
 	return colors->property[0] >= 0 && colors->property[1] >= 0 && colors->property[2] >= 0;
@@ -38,7 +36,6 @@ void ply_colors_get(float out[4], const struct ply_colors *colors, const struct 
 {
 	for (int c = 0; c < 4; c++) {
 		double x = colors->property[c] >= 0 ? rows->scalar[colors->property[c]] : 0.0;
-
 		if (colors->property[c] < 0)
 			out[c] = 1.0f;
 		else if (colors->scale[c] == 0.0)
@@ -57,7 +54,6 @@ static int find_roles(struct roles *roles, const struct ply_rows *rows, struct p
 	static const char *const uv[2][6] = { { "s", "u", "texture_u", "texture_s", "tx", NULL },
 		                              { "t", "v", "texture_v", "texture_t", "ty", NULL } };
 	const struct ply_property *p = &rows->header->property[rows->element->first_property];
-
 	for (int c = 0; c < 3; c++) {
 		roles->position[c] = ply_find_property(rows->header, rows->element, position[c]);
 		if (roles->position[c] < 0 || p[roles->position[c]].count_type != PLY_NO_TYPE)
@@ -79,11 +75,10 @@ static int has_all(const int *property, int n)
 	return 1;
 }
 
-/* NULL if it is not wanted; *ok becomes 0 where there is no memory. */
+/* Returns NULL if not wanted; sets *ok to 0 without memory. */
 static void *array(int wanted, uint64_t n, size_t size, int *ok)
 {
 	void *block = wanted ? malloc((size_t)(n > 0 ? n : 1) * size) : NULL;
-
 	if (wanted && block == NULL)
 		*ok = 0;
 	return block;
@@ -105,7 +100,7 @@ static void put_vertex(struct ply_vertices *out, uint32_t at, const struct roles
 		out->normal[at][c] = (float)rows->scalar[roles->normal[c]];
 	if (out->uv != NULL) {
 		out->uv[at][0] = (float)rows->scalar[roles->uv[0]];
-		out->uv[at][1] = 1.0f - (float)rows->scalar[roles->uv[1]]; /* upwards, as in OBJ */
+		out->uv[at][1] = 1.0f - (float)rows->scalar[roles->uv[1]]; /* v points up, as in OBJ */
 	}
 	if (out->color != NULL)
 		ply_colors_get(out->color[at], &roles->colors, rows);
@@ -124,7 +119,6 @@ int ply_vertices_read(struct ply_vertices *out, struct ply_rows *rows, struct ps
 	const uint64_t n = rows->element->n_rows;
 	struct roles roles;
 	int rc = find_roles(&roles, rows, err), ok = 1;
-
 	memset(out, 0, sizeof *out);
 	if (rc != PSR_OK)
 		return rc;

@@ -1,4 +1,4 @@
-#include "simd/table.h"
+#include "simd/loops/table.h"
 
 #define AS_LOOPS(kernel) kernel
 

@@ -25,7 +25,7 @@ static inline __m256 axis_of(__m256 rows, __m256 columns, __m256i r, __m256i c, 
 	return _mm256_add_ps(place, _mm256_mul_ps(depth, _mm256_set1_ps(unit)));
 }
 
-/* What does not fit, and NaN, becomes INT32_MIN, which is outside of every picture. */
+/* Values that do not fit, and NaN, become INT32_MIN, outside of every picture. */
 static inline __m256i floor_int(__m256 u)
 {
 	return _mm256_cvttps_epi32(_mm256_floor_ps(u));
@@ -44,7 +44,7 @@ static inline __m256 dot(const __m256 a[3], const __m256 b[3])
 	                     _mm256_mul_ps(a[2], b[2]));
 }
 
-/* Masks here have all bits of a lane set or none. Only the attributes of lanes of `valid` are read. */
+/* A mask has all bits of a lane set, or none. Reads the attributes of `valid` lanes alone. */
 static inline __m256i faces_away(const struct warp_target *t, const struct warp_instance *in, const uint64_t *attr,
                                  __m256i valid, __m256 u, __m256 v)
 {
@@ -72,11 +72,6 @@ static inline __m256i within(__m256i a, int32_t first, int32_t end)
 	                           _mm256_cmpgt_epi32(_mm256_set1_epi32(end), a));
 }
 
-static inline __m256i inside(__m256i k, __m256i u, __m256i v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
-{
-	return _mm256_and_si256(k, _mm256_and_si256(within(u, x0, x1), within(v, y0, y1)));
-}
-
 static inline uint32_t bits_of(__m256i k)
 {
 	return (uint32_t)_mm256_movemask_ps(_mm256_castsi256_ps(k));
@@ -95,14 +90,16 @@ static inline void store(void *to, __m256i value)
 	_mm256_storeu_si256(to, value);
 }
 
-static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __m256i k, __m256i u,
-                              __m256i v, __m256 z)
+static inline void list_cells(struct cells *list, const struct warp_target *t, __m256i k, __m256i u, __m256i v,
+                              __m256 z)
 {
-	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32(level);
+	const struct warp_cells *cells = &t->cells[list->level];
+	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32((int)list->level);
+	k = _mm256_and_si256(k, _mm256_and_si256(within(u, cells->x0, cells->x1), within(v, cells->y0, cells->y1)));
 	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one),
 				  y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
 	const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)cells->stride)), x);
-	const uint32_t bits = bits_of(inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1));
+	const uint32_t bits = bits_of(k);
 	const __m256i front = front_of(bits);
 	store(list->at + list->n, _mm256_permutevar8x32_epi32(at, front));
 	store(list->z + list->n, _mm256_permutevar8x32_epi32(_mm256_castps_si256(z), front));
@@ -121,7 +118,7 @@ static inline void list_words(struct words *list, __m256i k, __m256i at, __m256i
 	list->n += (uint32_t)__builtin_popcount(bits);
 }
 
-/* The numbers of the bits of a mask, in order; what follows them is of no value. */
+/* Lists the indices of the bits of a mask, in order; later elements are undefined. */
 static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 {
 	uint32_t n = 0;
@@ -165,8 +162,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		if (entry->is_mixed)
 			k = _mm256_andnot_si256(faces_away(t, in, block->attr + 8 * g, valid, u, v), k);
 		if (entry->level)
-			list_cells(cells, &t->cells[entry->level], entry->level, k, pixel_u, pixel_v, z1);
-		k = inside(k, pixel_u, pixel_v, t->x0, t->y0, t->x1, t->y1);
+			list_cells(cells, t, k, pixel_u, pixel_v, z1);
+		k = _mm256_and_si256(k, _mm256_and_si256(within(pixel_u, t->x0, t->x1), within(pixel_v, t->y0, t->y1)));
 		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
 		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
 		const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x);

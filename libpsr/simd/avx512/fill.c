@@ -1,4 +1,4 @@
-/* Pull and push of rows, 16 coarser cells and their 32 children at a time; the last ones by masks. */
+/* Pull and push of rows ([G] 4.7), 16 coarser cells and their 32 children at a time; masks cut off the last ones. */
 #include <immintrin.h>
 #include <math.h>
 #include "simd/kernels.h"
@@ -11,7 +11,7 @@ static inline __mmask32 interleave(__mmask16 left, __mmask16 right)
 	return _pdep_u32(left, 0x55555555) | _pdep_u32(right, 0xaaaaaaaa);
 }
 
-/* A share of 0..256 in 256 of 16-bit values. */
+/* value * share / 256 for a share of 0..256 of 16-bit values. */
 struct share {
 	__m512i factor;
 	__mmask32 all;
@@ -40,20 +40,22 @@ static inline __m512i load_parents(__mmask16 k, const uint16_t *from)
 /* ---- pull ---- */
 
 struct pull_shares {
+	__mmask16 k;               /* the cells, */
+	__mmask32 kk;              /* and their children of one row */
 	struct share upper, lower; /* from the picture */
 	__mmask32 above, below;    /* from a level: all or nothing */
 	__m512 divisor, inverse;
 };
 
-/* As pull_channel of fill.h; the remainder of a division is whole and less than 2^24 in size, and thus a float. */
-static inline void pull_channel(uint16_t *to, __mmask16 k, __mmask32 kk, const uint16_t *upper, const uint16_t *lower,
+/* As pull_channel of loops/fill_pull.h; the remainder of a division is whole and below 2^24, an exact float. */
+static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint16_t *lower,
                                 const struct pull_shares *s, int is_picture)
 {
 	const __m512i low = _mm512_set1_epi32(0xffff);
 	const __m512i above =
-		is_picture ? part_of(load_children(kk, upper), s->upper) : load_children(s->above & kk, upper);
+		is_picture ? part_of(load_children(s->kk, upper), s->upper) : load_children(s->above & s->kk, upper);
 	const __m512i below =
-		is_picture ? part_of(load_children(kk, lower), s->lower) : load_children(s->below & kk, lower);
+		is_picture ? part_of(load_children(s->kk, lower), s->lower) : load_children(s->below & s->kk, lower);
 	const __m512i left = _mm512_add_epi32(_mm512_and_si512(above, low), _mm512_and_si512(below, low));
 	const __m512i right = _mm512_add_epi32(_mm512_srli_epi32(above, 16), _mm512_srli_epi32(below, 16));
 	const __m512 sum = _mm512_cvtepi32_ps(_mm512_add_epi32(left, right));
@@ -62,7 +64,7 @@ static inline void pull_channel(uint16_t *to, __mmask16 k, __mmask32 kk, const u
 		_mm512_fnmadd_ps(_mm512_cvtepi32_ps(quotient), s->divisor, _mm512_mul_ps(sum, _mm512_set1_ps(256)));
 	const __mmask16 is_more = _mm512_cmp_ps_mask(rest, s->divisor, _CMP_GE_OQ);
 	const __m512i value = _mm512_mask_add_epi32(quotient, is_more, quotient, _mm512_set1_epi32(1));
-	_mm256_mask_storeu_epi16(to, k, _mm512_cvtepi32_epi16(value));
+	_mm256_mask_storeu_epi16(to, s->k, _mm512_cvtepi32_epi16(value));
 }
 
 uint16_t fill_pull_weights_avx512(const struct fill_row *to, const struct fill_row *upper, const struct fill_row *lower,
@@ -116,9 +118,8 @@ static inline __attribute__((always_inline)) void pull_row(const struct fill_row
 {
 	for (uint32_t x = 0; x < n; x += PARENTS) {
 		const __mmask16 k = (__mmask16)_bzhi_u32(0xffff, n - x < PARENTS ? n - x : PARENTS);
-		const __mmask32 kk = interleave(k, k);
 		const __m128i bits = _mm_maskz_loadu_epi8(k, to->near + x);
-		struct pull_shares s;
+		struct pull_shares s = { .k = k, .kk = interleave(k, k) };
 		s.above = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(1)), _mm_test_epi8_mask(bits, _mm_set1_epi8(2)));
 		s.below = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(4)), _mm_test_epi8_mask(bits, _mm_set1_epi8(8)));
 		const __m512i above = load_children(s.above, upper->weight + 2 * x);
@@ -128,9 +129,9 @@ static inline __attribute__((always_inline)) void pull_row(const struct fill_row
 		s.lower = share_of(below);
 		s.divisor = _mm512_cvtepi32_ps(_mm512_max_epi32(sum, _mm512_set1_epi32(GAPS_WHOLE)));
 		s.inverse = _mm512_div_ps(_mm512_set1_ps(256 - 0x1p-12f), s.divisor);
-		pull_channel(to->r + x, k, kk, upper->r + 2 * x, lower->r + 2 * x, &s, is_picture);
-		pull_channel(to->g + x, k, kk, upper->g + 2 * x, lower->g + 2 * x, &s, is_picture);
-		pull_channel(to->b + x, k, kk, upper->b + 2 * x, lower->b + 2 * x, &s, is_picture);
+		pull_channel(to->r + x, upper->r + 2 * x, lower->r + 2 * x, &s, is_picture);
+		pull_channel(to->g + x, upper->g + 2 * x, lower->g + 2 * x, &s, is_picture);
+		pull_channel(to->b + x, upper->b + 2 * x, lower->b + 2 * x, &s, is_picture);
 	}
 }
 
@@ -145,8 +146,8 @@ void fill_pull_colors_avx512(const struct fill_row *to, const struct fill_row *u
 
 /* ---- push ---- */
 
-/* What children on one side take from their parents, from the parents' neighbors to that side and from those above or
- * below. */
+/* Which parents give to the children on one side: the children's own, its neighbour to that side, and its neighbour
+ * above or below. */
 struct push_shares {
 	__mmask16 own, side, beside;
 	__m512 inverse, z;
@@ -181,7 +182,7 @@ static inline __m512i interpolate(const struct push_shares *s, __m512i own, __m5
 	return _mm512_cvttps_epi32(_mm512_add_ps(value, _mm512_set1_ps(0.125f)));
 }
 
-/* 32 cells under way. */
+/* Up to 32 cells that are being pushed. */
 struct push {
 	__mmask16 k;
 	__mmask32 kk, turn;
@@ -190,7 +191,7 @@ struct push {
 	struct share rest;
 };
 
-/* Whose turn it is; k and kk are set. */
+/* Marks the cells that are not whole and whose parents are; needs k and kk. */
 static inline void find_turn(struct push *p, const uint16_t *weight, const uint16_t *own, const uint16_t *beside)
 {
 	const __m256i whole = _mm256_set1_epi16(GAPS_WHOLE);
@@ -215,7 +216,7 @@ static inline void find_shares(struct push *p, const float *own, const float *be
 	p->rest = share_of(_mm512_sub_epi16(_mm512_set1_epi16(GAPS_WHOLE), p->weight));
 }
 
-/* What parents give to a channel of those whose turn it is. */
+/* The part of a channel that parents give to the cells whose turn it is. */
 static inline __m512i push_channel(const struct push *p, const uint16_t *own, const uint16_t *beside)
 {
 	const __m512i a = load_parents(p->k, own), c = load_parents(p->k, beside);
@@ -244,16 +245,17 @@ static inline void set_masks(struct push *p, uint32_t n)
 	p->kk = interleave(p->k, p->k);
 }
 
-void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, const struct fill_row *beside, uint32_t n,
-                      float scale, float offset)
+void fill_push_avx512(const struct fill_row *to, const struct fill_parents *parents)
 {
+	const struct fill_row *own = &parents->own, *beside = &parents->beside;
+	const uint32_t n = parents->n;
 	for (uint32_t x = 0; x < n; x += PARENTS) {
 		struct push p;
 		set_masks(&p, n - x);
 		find_turn(&p, to->weight + 2 * x, own->weight + x, beside->weight + x);
 		if (!p.turn)
 			continue;
-		find_shares(&p, own->z + x, beside->z + x, scale, offset);
+		find_shares(&p, own->z + x, beside->z + x, parents->scale, parents->offset);
 		push_cells(&p, to->r + 2 * x, own->r + x, beside->r + x);
 		push_cells(&p, to->g + 2 * x, own->g + x, beside->g + x);
 		push_cells(&p, to->b + 2 * x, own->b + x, beside->b + x);
@@ -263,13 +265,13 @@ void fill_push_avx512(const struct fill_row *to, const struct fill_row *own, con
 	}
 }
 
-/* PARENTS pixels at most, side by side: few of a row are filled. Their parents are lanes of what is loaded from own - 1
- * on, and from beside. */
+/* At most PARENTS pixels of the list, since few pixels of a row are filled. `own` and `side` are lanes of the row
+ * loaded from own - 1 on, `beside` of its own row. */
 struct listed {
 	__m512i own, side, beside;
 	struct push_shares shares;
 	__m256i share, rest; /* of 2^16 */
-	__mmask16 is_empty;  /* the rest is all */
+	__mmask16 is_empty;  /* rest would be 2^16 */
 };
 
 static inline __m256i half_of(__m512i values, uint32_t first)
@@ -277,10 +279,11 @@ static inline __m256i half_of(__m512i values, uint32_t first)
 	return first ? _mm512_extracti64x4_epi64(values, 1) : _mm512_castsi512_si256(values);
 }
 
-/* own_k, k: which lanes of those rows there are. */
-static inline struct listed find_listed(__m256i at, __m256i weight, __mmask32 own_k, __mmask16 k, const float *own,
-                                        const float *beside, float scale, float offset)
+/* Parents of the pixels from cell x on. own_k, k: their lanes in `own` - 1 and `beside` that exist. */
+static inline struct listed find_listed(__m256i at, __m256i weight, const struct fill_parents *parents, uint32_t x,
+                                        __mmask32 own_k, __mmask16 k)
 {
+	const float *own = parents->own.z + x, *beside = parents->beside.z + x;
 	const __m512i one = _mm512_set1_epi32(1), column = _mm512_cvtepu16_epi32(at);
 	const __m512i is_right = _mm512_and_si512(column, one);
 	const __m512 first = _mm512_maskz_loadu_ps((__mmask16)own_k, own - 1);
@@ -290,8 +293,8 @@ static inline struct listed find_listed(__m256i at, __m256i weight, __mmask32 ow
 	l.own = _mm512_add_epi32(l.beside, one);
 	l.side = _mm512_add_epi32(l.beside, _mm512_add_epi32(is_right, is_right));
 	l.shares = share_parents(_mm512_permutex2var_ps(first, l.own, last), _mm512_permutex2var_ps(first, l.side, last),
-	                         _mm512_permutexvar_ps(l.beside, _mm512_maskz_loadu_ps(k, beside)), _mm512_set1_ps(scale),
-	                         _mm512_set1_ps(offset));
+	                         _mm512_permutexvar_ps(l.beside, _mm512_maskz_loadu_ps(k, beside)),
+	                         _mm512_set1_ps(parents->scale), _mm512_set1_ps(parents->offset));
 	l.share = _mm256_slli_epi16(weight, 8);
 	l.rest = _mm256_sub_epi16(_mm256_setzero_si256(), l.share);
 	l.is_empty = _mm256_testn_epi16_mask(weight, weight);
@@ -312,11 +315,12 @@ static inline void push_listed(uint16_t *to, const struct listed *l, __m256i was
 }
 
 uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, uint32_t bit, const struct fill_row *was,
-                                  const struct fill_row *own, const struct fill_row *beside, uint32_t n, float scale,
-                                  float offset)
+                                  const struct fill_parents *parents)
 {
 	_Alignas(64) static const uint16_t column[32] = { 0,  1,  2,  3,  4,  5,  6,  7,  8,  9,  10, 11, 12, 13, 14, 15,
 		                                              16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30, 31 };
+	const struct fill_row *own = &parents->own, *beside = &parents->beside;
+	const uint32_t n = parents->n;
 	uint32_t to = 0, n_filled = 0, n_moved = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
@@ -341,8 +345,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		n_moved += (uint32_t)__builtin_popcount(
 			_mm512_mask_cmplt_epu16_mask(p.turn, p.weight, _mm512_set1_epi16(GAPS_WHOLE / 2)));
 		for (uint32_t i = 0; i < n_turn; i += PARENTS) {
-			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), own_k, p.k, own->z + x,
-			                                    beside->z + x, scale, offset);
+			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), parents, x, own_k, p.k);
 			const __mmask16 listed = (__mmask16)_bzhi_u32(0xffff, n_turn - i < PARENTS ? n_turn - i : PARENTS);
 			n_filled += (uint32_t)__builtin_popcount(
 				_mm512_mask_cmp_ps_mask(l.is_empty & listed, l.shares.z, _mm512_set1_ps(INFINITY), _CMP_LT_OQ));

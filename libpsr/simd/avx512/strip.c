@@ -1,24 +1,24 @@
 #include <immintrin.h>
 #include <string.h>
 #include "base/srgb.h"
-#include "simd/strip_parts.h"
 #include "simd/kernels.h"
+#include "simd/loops/strip_parts.h"
 
-/* The n lowest bits, of which there are `most`, below 64. */
+/* The lowest min(n, most) bits; most < 64. */
 static inline uint64_t lowest(uint32_t n, uint32_t most)
 {
 	return (UINT64_C(1) << (n < most ? n : most)) - 1;
 }
 
-#define AHEAD (2 * STRIP) /* words: those of the strip after the next */
+#define AHEAD (2 * STRIP) /* words: prefetch the strip after the next */
 
 void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	const __m512i empty = _mm512_set1_epi64((long long)PSR_WORD_EMPTY);
 	__m512i x = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-	uint16_t *covered = (uint16_t *)p->covered;
+	uint16_t *has_sample = (uint16_t *)p->has_sample;
 	uint32_t n = 0;
-	memset(p->covered, 0, sizeof p->covered);
+	memset(p->has_sample, 0, sizeof p->has_sample);
 	for (uint32_t first = 0; first < n_pixels; first += 16) {
 		__mmask16 k = (__mmask16)lowest(n_pixels - first, 16);
 		_mm_prefetch((const char *)(word + first + AHEAD), _MM_HINT_T0);
@@ -33,7 +33,7 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 		const __m512i id = _mm512_inserti64x4(low_id, _mm512_cvtepi64_epi32(high), 1);
 		_mm512_storeu_si512(p->id + n, _mm512_maskz_compress_epi32(k, id));
 		_mm256_storeu_si256((__m256i *)(p->x + n), _mm512_cvtepi32_epi16(_mm512_maskz_compress_epi32(k, x)));
-		covered[first / 16] = k;
+		has_sample[first / 16] = k;
 		n += (uint32_t)__builtin_popcount(k);
 		x = _mm512_add_epi32(x, _mm512_set1_epi32(16));
 	}
@@ -49,7 +49,7 @@ static void fill_floats(float *to, uint32_t n, float value)
 		_mm512_storeu_ps(to + i, _mm512_set1_ps(value));
 }
 
-/* Tables of 32 and 64 floats, in registers. */
+/* Look-ups in tables of 32 and 64 floats, in registers. */
 static inline __m512 look_up_5(const __m512 table[2], __m512i index)
 {
 	return _mm512_permutex2var_ps(table[0], index, table[1]);
@@ -69,7 +69,7 @@ static void read_specular(struct strip *strip)
 		                    _mm512_loadu_ps(psr_srgb6_to_linear + 32), _mm512_loadu_ps(psr_srgb6_to_linear + 48) };
 	const __m512 root = _mm512_loadu_ps(exponent_root);
 	for (uint32_t i = 0; i < strip->n; i += 16) {
-		/* From the lowest bit on 8 of blue, 16 specular and 8 of the exponent. */
+		/* High halves: 8 bits of blue, 16 specular, 8 of the exponent. */
 		const __m512i attr = _mm512_loadu_si512(strip->attr + i), next = _mm512_loadu_si512(strip->attr + i + 8);
 		const __m512i high = _mm512_permutex2var_epi32(attr, upper, next);
 		const __m512i power = _mm512_slli_epi32(_mm512_srli_epi32(high, 28), 23);
@@ -111,8 +111,8 @@ static const uint8_t first_three[64] = {
 	32, 33, 34, 36, 37, 38, 40, 41, 42, 44, 45, 46, 48, 49, 50, 52, 53, 54, 56, 57, 58, 60, 61, 62,
 };
 
-/* Sixteen pixels at a time: those of the samples go where the bits are, and each gives up its fourth byte. Table
- * look-ups one by one are faster than gathers. */
+/* Sixteen pixels at a time: expands samples to the covered pixels, and drops each fourth byte. Scalar look-ups are
+ * faster than gathers. */
 static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
 	const uint16_t *dark = target->background;
@@ -122,7 +122,7 @@ static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip
 	for (uint32_t i = 0; i < strip->pixels->n; i++)
 		pixel[i] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
 	for (uint32_t x = 0; x < n; x += 16) {
-		const __mmask16 k = (__mmask16)(strip->pixels->covered[x / 32] >> x % 32);
+		const __mmask16 k = (__mmask16)(strip->pixels->has_sample[x / 32] >> x % 32);
 		const __m512i row = _mm512_mask_expand_epi32(empty, k, _mm512_loadu_si512(pixel + n_written));
 		_mm512_mask_storeu_epi8(to + 3 * x, lowest(3 * (n - x), 48), _mm512_permutexvar_epi8(pack, row));
 		n_written += (uint32_t)__builtin_popcount(k);
@@ -137,7 +137,7 @@ void strip_write_avx512(const struct strip *strip, const struct strip_target *ta
 	if (target->rgb)
 		write_rgb(target->rgb + 3 * first, strip, target, n);
 	for (uint32_t x = 0, i = 0; target->wants && x < n; x += STRIP_BRICK) {
-		const uint32_t k = p->covered[x / 32];
+		const uint32_t k = p->has_sample[x / 32];
 		if (target->wants[x / STRIP_BRICK]) {
 			write_linear(target->r + first + x, strip->r + i, k, dark[0], n - x);
 			write_linear(target->g + first + x, strip->g + i, k, dark[1], n - x);

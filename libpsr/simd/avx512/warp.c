@@ -21,7 +21,7 @@ static inline __m512 axis_of(__m512 rows, __m512 columns, __m512i r, __m512i c, 
 	return _mm512_add_ps(place, _mm512_mul_ps(depth, _mm512_set1_ps(unit)));
 }
 
-/* What does not fit, and NaN, becomes INT32_MIN, which is outside of every picture. */
+/* Values that do not fit, and NaN, become INT32_MIN, outside of every picture. */
 static inline __m512i floor_int(__m512 u)
 {
 	return _mm512_cvt_roundps_epi32(u, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
@@ -40,7 +40,7 @@ static inline __m512 dot(const __m512 a[3], const __m512 b[3])
 	                     _mm512_mul_ps(a[2], b[2]));
 }
 
-/* Of the lanes of k, those whose samples face away. */
+/* The lanes of k whose samples face away. */
 static inline __mmask16 faces_away(const struct warp_target *t, const struct warp_instance *in, const uint64_t *attr,
                                    __mmask16 k, __m512 u, __m512 v)
 {
@@ -58,40 +58,46 @@ static inline __mmask16 faces_away(const struct warp_target *t, const struct war
 	return _mm512_mask_cmp_ps_mask(k, _mm512_mul_ps(g, g), limit, _CMP_GT_OQ);
 }
 
-static inline __mmask16 inside(__mmask16 k, __m512i u, __m512i v, int32_t x0, int32_t y0, int32_t x1, int32_t y1)
+/* The lanes of k with first <= a < end. */
+static inline __mmask16 within(__mmask16 k, __m512i a, int32_t first, int32_t end)
 {
-	k = _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(u, _mm512_set1_epi32(x0)), _mm512_set1_epi32(x1 - x0));
-	return _mm512_mask_cmplt_epu32_mask(k, _mm512_sub_epi32(v, _mm512_set1_epi32(y0)), _mm512_set1_epi32(y1 - y0));
+	const __m512i from = _mm512_sub_epi32(a, _mm512_set1_epi32(first));
+	return _mm512_mask_cmplt_epu32_mask(k, from, _mm512_set1_epi32(end - first));
 }
 
-static inline void list_cells(struct cells *list, const struct warp_cells *cells, int level, __mmask16 k, __m512i u,
-                              __m512i v, __m512 z)
+static inline void list_cells(struct cells *list, const struct warp_target *t, __mmask16 k, __m512i u, __m512i v,
+                              __m512 z)
 {
-	const __m512i one = _mm512_set1_epi32(1), by = _mm512_set1_epi32(level);
+	const struct warp_cells *cells = &t->cells[list->level];
+	const __m512i one = _mm512_set1_epi32(1), by = _mm512_set1_epi32((int)list->level);
 	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one),
 				  y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
 	const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride)), x);
-	k = inside(k, u, v, cells->x0, cells->y0, cells->x1, cells->y1);
+	k = within(within(k, u, cells->x0, cells->x1), v, cells->y0, cells->y1);
 	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
 	_mm512_storeu_si512(list->z + list->n, _mm512_maskz_compress_epi32(k, _mm512_castps_si512(z)));
 	list->n += (uint32_t)__builtin_popcount(k);
 }
 
-/* Words of the lanes of k, from element n of the list on; returns where they end. Most often all samples of a block
- * that is not mixed are listed, and nothing needs to be moved together. */
-static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, __m512i at,
-                                  __m512i id, __m512i z)
+/* Samples under way: their places, ids and depths. */
+struct warped {
+	__m512i at, id, z;
+};
+
+/* Lists the words of the lanes of k from element n on; returns the end of the list. A block that is not mixed most
+ * often lists all samples, which then need no compression. */
+static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, struct warped s)
 {
 	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 	const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
 	if (is_mixed | (k & (k + 1))) {
-		at = _mm512_maskz_compress_epi32(k, at);
-		id = _mm512_maskz_compress_epi32(k, id);
-		z = _mm512_maskz_compress_epi32(k, z);
+		s.at = _mm512_maskz_compress_epi32(k, s.at);
+		s.id = _mm512_maskz_compress_epi32(k, s.id);
+		s.z = _mm512_maskz_compress_epi32(k, s.z);
 	}
-	_mm512_storeu_si512(list->at + n, at);
-	_mm512_storeu_si512(list->word + n, _mm512_permutex2var_epi32(id, low, z));
-	_mm512_storeu_si512(list->word + n + 8, _mm512_permutex2var_epi32(id, high, z));
+	_mm512_storeu_si512(list->at + n, s.at);
+	_mm512_storeu_si512(list->word + n, _mm512_permutex2var_epi32(s.id, low, s.z));
+	_mm512_storeu_si512(list->word + n + 8, _mm512_permutex2var_epi32(s.id, high, s.z));
 	return n + (uint32_t)__builtin_popcount(k);
 }
 
@@ -136,12 +142,13 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		if (is_mixed)
 			k &= (__mmask16)~faces_away(t, in, block->attr + i, k, u, v);
 		if (level)
-			list_cells(cells, &t->cells[level], level, k, pixel_u, pixel_v, z1);
+			list_cells(cells, t, k, pixel_u, pixel_v, z1);
 		const __m512i x = _mm512_sub_epi32(pixel_u, x0), y = _mm512_sub_epi32(pixel_v, y0);
-		const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x);
+		const struct warped samples = { _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x), _mm512_add_epi32(s, id),
+			                            _mm512_castps_si512(z1) };
 		k = _mm512_mask_cmplt_epu32_mask(k, x, width);
 		k = _mm512_mask_cmplt_epu32_mask(k, y, height);
-		n_words = list_words(words, n_words, is_mixed, k, at, _mm512_add_epi32(s, id), _mm512_castps_si512(z1));
+		n_words = list_words(words, n_words, is_mixed, k, samples);
 	}
 	words->n = n_words;
 }

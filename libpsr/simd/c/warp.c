@@ -1,8 +1,9 @@
 #include "base/maths.h"
+#include "psr/render.h"
 #include "simd/block.h"
 #include "simd/kernels.h"
 
-/* Far enough outside of every picture to be clipped, and small enough to be an int; NaN is clipped, too. */
+/* Bounds u to an int outside of every picture; NaN becomes such an int, too. */
 static inline float clamp_pixel(float u)
 {
 	const float far = 2.0f * PSR_MAX_SIDE;

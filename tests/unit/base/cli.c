@@ -129,9 +129,9 @@ static void bad_command_lines_get_a_sentence_and_change_nothing(void **state)
 		const char *args[3], *text;
 	} cases[] = {
 		{ { "--cuont", "1" }, "unknown option --cuont; did you mean --count?" },
-		{ { "--nothing-like-it" }, "unknown option --nothing-like-it; --help lists what there is" },
-		{ { "-z" }, "unknown option -z; --help lists what there is" },
-		{ { "-fs" }, "unknown option -fs; --help lists what there is" },
+		{ { "--nothing-like-it" }, "unknown option --nothing-like-it; --help lists the options" },
+		{ { "-z" }, "unknown option -z; --help lists the options" },
+		{ { "-fs" }, "unknown option -fs; --help lists the options" },
 		{ { "--flag=1" }, "--flag takes no value" },
 		{ { "--count" }, "--count needs a value: --count N" },
 		{ { "--count", "0" }, "--count: '0' is out of range; it takes 1 to 256" },
@@ -313,7 +313,7 @@ static void headings_stand_above_their_options_and_are_none(void **state)
 	                          "      --red   Red.\n\nOther:\n      --big   Big.\n"
 	                          "      --help  Print this and exit.\n");
 	assert_int_equal(psr_cli_set(&grouped, "Other", "yes", &err), PSR_ERR_ARG);
-	assert_string_equal(err.text, "unknown option Other; --help lists what there is");
+	assert_string_equal(err.text, "unknown option Other; --help lists the options");
 }
 
 int main(void)

@@ -525,7 +525,7 @@ static void report_says_which_effects_ran_and_why_others_did_not(void **state)
 
 	(void)state;
 	assert_int_equal(psr("shot --model cube --size 20x10 --spacing 0.5 --smooth --report r.json --effects"), 0);
-	assert_string_equal(out, "levels     ran: 3 depth buffers beside the picture's own\n"
+	assert_string_equal(out, "levels     ran: 3 depth buffers in addition to the picture's\n"
 	                         "specular   left out: no sample in view is specular, or no light shines\n");
 	read_back("r.json", text, sizeof text);
 	report = cJSON_Parse(text);

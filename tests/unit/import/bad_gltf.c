@@ -74,8 +74,8 @@ static void buffers_and_views_that_lie_are_refused(void **state)
 static void indices_out_of_range_are_refused(void **state)
 {
 	(void)state;
-	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0},'indices':4"), PSR_ERR_FORMAT, "indices are plain scalars");
-	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0},'indices':0"), PSR_ERR_FORMAT, "indices are plain scalars");
+	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0},'indices':4"), PSR_ERR_FORMAT, "indices must be scalars");
+	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0},'indices':0"), PSR_ERR_FORMAT, "indices must be scalars");
 	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0},'indices':99"), PSR_ERR_FORMAT, "out of bounds");
 	refuse_glb(PRIMITIVE("'attributes':{'POSITION':99}"), PSR_ERR_FORMAT, "accessor 99 does not exist");
 	refuse_glb(PRIMITIVE("'attributes':{'POSITION':0,'NORMAL':-1}"), PSR_ERR_FORMAT, "NORMAL is not an integer");
@@ -96,7 +96,7 @@ static void sparse_accessors_that_lie_are_refused(void **state)
 	static const char *const change[][3] = {
 		{ "'sparse':{'count':1", "'sparse':{'count':5", "5 sparse values of 4" },
 		{ "'sparse':{'count':1", "'sparse':{'count':2", "sparse.values" },
-		{ "'componentType':5125}", "'componentType':5126}", "indices are unsigned" },
+		{ "'componentType':5125}", "'componentType':5126}", "they must be unsigned integers" },
 		{ "'indices':{'bufferView':8", "'indices':{'bufferView':80", "buffer view 80" },
 		{ "'indices':{'bufferView':8,'byteOffset':0", "'indices':{'bufferView':8,'byteOffset':4", "sparse index" },
 	};
@@ -130,7 +130,7 @@ static void vertices_beyond_doubles_leave_no_triangle(void **state)
 	(void)state;
 	refuse_changed("'nodes':[{'mesh':0}]",
 	               "'nodes':[{'children':[1],'scale':[1e200,1,1]},{'mesh':0,'scale':[1e200,1,1]}]",
-	               PSR_ERR_FORMAT, "2 faces without area, twice there or not finite");
+	               PSR_ERR_FORMAT, "2 faces without area, duplicate or not finite");
 }
 
 static void required_extensions_that_are_missing_are_named(void **state)

@@ -261,7 +261,7 @@ static void points_at_one_place_are_one(void **state)
 	assert_int_equal(m->n_points, 4);
 	assert_int_equal(m->n_dropped_primitives, 8);
 	assert_non_null(strstr(m->warning, "not finite were left out: 2"));
-	assert_non_null(strstr(m->warning, "twice were left out: 6"));
+	assert_non_null(strstr(m->warning, "duplicate points were left out: 6"));
 	psr_mesh_destroy(m);
 }
 

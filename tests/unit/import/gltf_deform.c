@@ -256,7 +256,7 @@ static void deformations_that_lie_are_refused(void **state)
 	put_skinned(&b);
 #define NODE "'nodes':[{'mesh':0,'skin':0},{}]"
 	refuse_built(&b, SKINNED NODE, PSR_ERR_FORMAT, "skin 0 does not exist");
-	refuse_built(&b, SKINNED "'skins':[{'joints':[1]}]," NODE, PSR_ERR_FORMAT, "hangs on joint 1, but its skin has 1");
+	refuse_built(&b, SKINNED "'skins':[{'joints':[1]}]," NODE, PSR_ERR_FORMAT, "uses joint 1, but its skin has 1");
 	refuse_built(&b, SKINNED "'skins':[{'joints':[1,77]}]," NODE, PSR_ERR_FORMAT, "node 77");
 	refuse_built(&b, SKINNED "'skins':[{'joints':[-1]}]," NODE, PSR_ERR_FORMAT, "skins[0].joints[0]");
 	refuse_built(&b, SKINNED "'skins':[{'joints':[]}]," NODE, PSR_ERR_FORMAT, "no joints");

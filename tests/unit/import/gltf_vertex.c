@@ -300,7 +300,7 @@ static void broken_faces_are_left_out_and_counted(void **state)
 	assert_int_equal(m->n_vertices, 3); /* 9,9,9 is not used */
 	assert_int_equal(m->n_dropped_triangles, 6);
 	assert_string_equal(m->warning, "faces without area were left out: 2; faces with a corner that is not finite were "
-	                                "left out: 2; faces that were there twice were left out: 2");
+	                                "left out: 2; duplicate faces were left out: 2");
 	psr_mesh_destroy(m);
 	/* the same faces of another material stay; of another mesh at the same place they go */
 	b = (struct built){ .n_bin = 0 };

@@ -32,8 +32,8 @@ static void missing_module_is_a_clear_error(void **state)
 	(void)state;
 	assert_int_equal(setenv("PSR_IMAGE_MODULE", "/nowhere/module.so", 1), 0);
 	refuse_image("BM", 2, "a.bmp", PSR_ERR_UNSUPPORTED,
-	             "no image can be read: the image module cannot be loaded: /nowhere/module.so");
-	refuse_image("nonsense", 8, "a.bmp", PSR_ERR_UNSUPPORTED, "not an image of a known format");
+	             "cannot read images: the image module cannot be loaded: /nowhere/module.so");
+	refuse_image("nonsense", 8, "a.bmp", PSR_ERR_UNSUPPORTED, "not an image in a supported format");
 	assert_int_equal(setenv("PSR_IMAGE_MODULE", "libm.so.6", 1), 0);
 	refuse_image("BM", 2, "a.bmp", PSR_ERR_VERSION, "libm.so.6 is not the image module of this version");
 	unsetenv("PSR_IMAGE_MODULE");

@@ -555,8 +555,8 @@ static void headers_that_lie_are_refused(void **state)
 		{ "ply\nformat ascii 1.1\n" END, PSR_ERR_UNSUPPORTED, "version 1.1" },
 		{ "ply\nformat binary 1.0\n" END, PSR_ERR_FORMAT, "line 2: the format is none of" },
 		{ ASCII_HEADER "format ascii 1.0\n" END, PSR_ERR_FORMAT, "line 3: a second format" },
-		{ ASCII_HEADER "element vertex\n" END, PSR_ERR_FORMAT, "line 3: not \"element NAME COUNT\"" },
-		{ ASCII_HEADER "element vertex -1\n" END, PSR_ERR_FORMAT, "line 3: not" },
+		{ ASCII_HEADER "element vertex\n" END, PSR_ERR_FORMAT, "line 3: expected \"element NAME COUNT\"" },
+		{ ASCII_HEADER "element vertex -1\n" END, PSR_ERR_FORMAT, "line 3: expected" },
 		{ ASCII_HEADER "element vertex 1\n" XYZ "element vertex 1\n" END, PSR_ERR_FORMAT,
 		  "line 7: a second element \"vertex\"" },
 		{ ASCII_HEADER "element vertex 1\n" XYZ "property int x\n" END, PSR_ERR_FORMAT,
@@ -564,7 +564,7 @@ static void headers_that_lie_are_refused(void **state)
 		{ ASCII_HEADER "property int x\n" END, PSR_ERR_FORMAT, "line 3: a property before any element" },
 		{ ASCII_HEADER "element vertex 1\nproperty quad x\n" END, PSR_ERR_FORMAT, "line 4: \"quad\" is not a type" },
 		{ ASCII_HEADER "element vertex 1\nproperty list float int x\n" END, PSR_ERR_FORMAT, "line 4: the length" },
-		{ ASCII_HEADER "element vertex 1\nproperty int\n" END, PSR_ERR_FORMAT, "line 4: neither" },
+		{ ASCII_HEADER "element vertex 1\nproperty int\n" END, PSR_ERR_FORMAT, "line 4: expected" },
 		{ ASCII_HEADER "element vertex 1\nproperty float x\nproperty float y\n" END "1 2\n", PSR_ERR_FORMAT,
 		  "line 3: the element vertex has no property z" },
 		{ ASCII_HEADER "element face 0\n" LIST END, PSR_ERR_FORMAT, "no element vertex" },
@@ -573,7 +573,7 @@ static void headers_that_lie_are_refused(void **state)
 		{ ASCII_HEADER "element vertex 99999999999999999999999\n" XYZ END "1 2 3\n", PSR_ERR_FORMAT,
 		  "line 3: the header" },
 		{ ASCII_HEADER "element vertex 3\n" XYZ END "1 2 3\n1 2 3\n", PSR_ERR_FORMAT, "3 elements \"vertex\"" },
-		{ ASCII_HEADER "element vertex 0\n" XYZ END, PSR_ERR_FORMAT, "no triangle and no point" },
+		{ ASCII_HEADER "element vertex 0\n" XYZ END, PSR_ERR_FORMAT, "no triangle or point" },
 	};
 
 	for (size_t i = 0; i < sizeof lies / sizeof lies[0]; i++)

@@ -299,7 +299,7 @@ static void missing_files_folders_and_pipes_are_told_apart(void **state)
 	fwrite("solid teapot, and more than sixty-four bytes of what is no such file at all", 1, 75, file);
 	fclose(file);
 	assert_int_equal(psr_model_read(&model, path, &err), PSR_ERR_FORMAT);
-	assert_non_null(strstr(err.text, "this is no .psr file"));
+	assert_non_null(strstr(err.text, "not a .psr file"));
 	assert_int_equal(psr_model_parse(&model, "", 0, &err), PSR_ERR_FORMAT);
 	assert_null(model);
 	unlink(path);

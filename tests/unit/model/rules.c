@@ -108,24 +108,24 @@ static const struct violation violations[] = {
 	{ "CAMS", 0, 3, 0x80a0ed, "CAMS: byte 0 of the name of camera 0 is not UTF-8" },      /* a surrogate */
 	{ "CAMS", 0, 3, 0xbf9fe0, "CAMS: byte 0 of the name of camera 0 is not UTF-8" },      /* longer than it need be */
 	{ "CAMS", 2, 1, '\n', "CAMS: byte 2 of the name of camera 0 is not UTF-8, or a control character" },
-	{ "CAMS", 63, 1, 'x', "CAMS: camera 0: bytes that it does not use are not zero" },
+	{ "CAMS", 63, 1, 'x', "CAMS: camera 0: unused bytes are not zero" },
 	{ "CAMS", 64, 8, D_NAN, "CAMS: camera 0: eye, target and up must be finite and below 1e30" },
-	{ "CAMS", 80, 8, 0, "CAMS: camera 0: the target is where the eye is" },
+	{ "CAMS", 80, 8, 0, "CAMS: camera 0: target and eye are the same point" },
 	{ "CAMS", 120, 8, 0, "CAMS: camera 0: up has no length" },
 	{ "CAMS", 136, 4, 2, "CAMS: camera 0: unknown kind 2" },
-	{ "CAMS", 140, 4, 1, "CAMS: camera 0: bytes that it does not use are not zero" },
-	{ "CAMS", 144, 8, 0, "CAMS: camera 0: field of view of 0 radians" },
-	{ "CAMS", 152, 8, 1, "CAMS: camera 0: bytes that it does not use are not zero" },
-	{ "CAMS", 168 + 152, 8, D_NAN, "CAMS: camera 1: orthographic height of nan" },
-	{ "CAMS", 160, 8, D_MINUS_1, "CAMS: camera 0: near distance -1" },
+	{ "CAMS", 140, 4, 1, "CAMS: camera 0: unused bytes are not zero" },
+	{ "CAMS", 144, 8, 0, "CAMS: camera 0: a field of view of 0 radians" },
+	{ "CAMS", 152, 8, 1, "CAMS: camera 0: unused bytes are not zero" },
+	{ "CAMS", 168 + 152, 8, D_NAN, "CAMS: camera 1: an orthographic height of nan" },
+	{ "CAMS", 160, 8, D_MINUS_1, "CAMS: camera 0: a near distance of -1" },
 	{ "LGTS", 168, 1, 0, "LGTS: the name of light 1 is empty" },
 	{ "LGTS", 168, 4, 0x6e7573, "LGTS: lights 0 and 1 have the same name" }, /* "sun" */
 	{ "LGTS", 64, 4, 3, "LGTS: light 0: unknown kind 3" },
-	{ "LGTS", 72, 8, D_2, "LGTS: light 0: bytes that it does not use are not zero" },
-	{ "LGTS", 104, 8, 0, "LGTS: light 0: its direction has no length" },
+	{ "LGTS", 72, 8, D_2, "LGTS: light 0: unused bytes are not zero" },
+	{ "LGTS", 104, 8, 0, "LGTS: light 0: the direction has no length" },
 	{ "LGTS", 120, 8, D_INF, "LGTS: light 0: colour times intensity must be within 0..1e9" },
-	{ "LGTS", 168 + 72, 8, D_NAN, "LGTS: light 1: its position must be finite" },
-	{ "LGTS", 168 + 160, 8, D_INF, "LGTS: light 1: reference distance inf" },
+	{ "LGTS", 168 + 72, 8, D_NAN, "LGTS: light 1: the position must be finite" },
+	{ "LGTS", 168 + 160, 8, D_INF, "LGTS: light 1: a reference distance of inf" },
 	{ "LGTS", 2 * 168 + 144, 8, D_2, "LGTS: light 2: half angles 2 and 0.5" },
 	{ "BLKS", 0, 4, 0, "BLKS: 143 samples do not fit 0 blocks" },
 	{ "BLKS", 0, 4, 5, "SPHX at byte" },
@@ -296,17 +296,17 @@ static void masks_need_their_indices_and_their_number(void **state)
 		else
 			f.blocks.n_masks = 0;
 		assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
-		assert_non_null(strstr(err.text, "only some are there"));
+		assert_non_null(strstr(err.text, "together, or none"));
 	}
 	fixture_init(&f, 1);
 	f.blocks.cone_x = f.blocks.cone_y = f.blocks.cone_z = NULL;
 	f.blocks.cone_sine = NULL;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
-	assert_non_null(strstr(err.text, "traits and no cones"));
+	assert_non_null(strstr(err.text, "traits, but no cones"));
 	fixture_init(&f, 1);
 	f.blocks.traits = NULL;
 	assert_int_equal(psr_model_create(&model, &f.info, &f.blocks, NULL, &err), PSR_ERR_ARG);
-	assert_non_null(strstr(err.text, "opacities, and its blocks no traits"));
+	assert_non_null(strstr(err.text, "opacities, but its blocks have no traits"));
 	fixture_init(&f, 1);
 	f.run.visibility_first = 1;
 	f.visibility_index[5] = FIXTURE_MASKS - 1;
@@ -335,8 +335,7 @@ static void every_required_section_is_missed(void **state)
 		if (section_table[k].flags & ENTRY_REQUIRED)
 			assert_non_null(strstr(err.text, section_table[k].type));
 		else if (expected != PSR_OK)
-			assert_non_null(strstr(err.text, strcmp(section_table[k].type, "TRTS") == 0 ? "OPAC is there without TRTS"
-			                                                                            : "only some are there"));
+			assert_non_null(strstr(err.text, strcmp(section_table[k].type, "TRTS") == 0 ? "OPAC needs TRTS" : "are missing"));
 	}
 }
 
@@ -350,7 +349,7 @@ struct edit {
 static void lies_in_header_and_table_are_refused(void **state)
 {
 	static const struct edit edits[] = {
-		{ NULL, HEADER_N_SECTIONS, 4, UINT32_MAX, "the header counts 4294967295 sections, more than the 256" },
+		{ NULL, HEADER_N_SECTIONS, 4, UINT32_MAX, "the header lists 4294967295 sections, more than the 256" },
 		{ NULL, HEADER_N_SECTIONS, 4, 256, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, UINT32_MAX, "within its section table" },
 		{ NULL, HEADER_N_CHUNKS, 4, 8, "section INFO begins at byte" },

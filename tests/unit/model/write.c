@@ -121,7 +121,7 @@ static void devices_and_folders_are_never_replaced(void **state)
 		assert_int_equal(stat("/dev/full", &st), 0);
 		assert_true(S_ISCHR(st.st_mode));
 		assert_int_equal(writers[i](one, folder, &err), PSR_ERR_IO);
-		assert_non_null(strstr(err.text, "it is not a regular file"));
+		assert_non_null(strstr(err.text, "is not a regular file"));
 	}
 }
 

@@ -191,11 +191,11 @@ static void count_light(struct strip *strip, const struct strip_light *light, co
 	simd_c.strip_light(strip, light, reaches);
 }
 
-static void count_lit(float (*lit)[4], const struct strip_view *view, const struct strip_light *light,
-                      uint32_t n_lights, const float ambient[3], uint32_t first, uint32_t n)
+static void count_lit(float (*lit)[4], const struct strip_view *view, const struct strip_lights *lights,
+                      uint32_t first, uint32_t n)
 {
 	calls.lit++;
-	simd_c.strip_lit(lit, view, light, n_lights, ambient, first, n);
+	simd_c.strip_lit(lit, view, lights, first, n);
 }
 
 static void count_far(const struct warp_target *target, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)])

@@ -9,7 +9,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/random.h"
-#include "render/render.h"
+#include "render/fill.h"
 
 static uint64_t seed;
 

@@ -10,7 +10,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/random.h"
-#include "render/render.h"
+#include "render/gaps.h"
 
 static uint64_t seed;
 
@@ -182,8 +182,9 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 	strew(&stack, strewn);
 	/* In two parts: rows do not see which call they are of. */
 	const uint32_t half = (bricks_y / 2) * BRICK;
-	struct gaps_counts upper = gaps_rows(simd, &plan, &stack, 0, half, weight, bricks);
-	struct gaps_counts lower = gaps_rows(simd, &plan, &stack, half, height, weight, bricks);
+	const struct gaps_map map = { weight, bricks };
+	struct gaps_counts upper = gaps_rows(simd, &plan, &stack, 0, half, &map);
+	struct gaps_counts lower = gaps_rows(simd, &plan, &stack, half, height, &map);
 	for (uint32_t y = 0; y < height; y++)
 		for (uint32_t x = 0; x < width; x++) {
 			const uint16_t w = weight_of(&plan, &stack, x, y, &n_pinholes);
@@ -242,7 +243,7 @@ static struct gaps_counts weigh(const struct psr_zstack *stack, uint16_t weight[
 {
 	const struct plan plan = plan_of(0);
 	uint8_t bricks[4];
-	return gaps_rows(simd_get(), &plan, stack, 0, SIDE, weight, bricks);
+	return gaps_rows(simd_get(), &plan, stack, 0, SIDE, &(struct gaps_map){ weight, bricks });
 }
 
 static struct psr_zstack wall(void)

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/direction.h"
-#include "render/render.h"
+#include "render/cull.h"
 
 #define GROUPS 5
 #define LEVELS 5

@@ -10,8 +10,7 @@
 #include "base/srgb.h"
 #include "base/direction.h"
 #include "base/pool.h"
-#include "render/stages.h"
-#include "render/render.h"
+#include "render/splat.h"
 #include "tests/unit/lib/shapes.h"
 
 static struct psr_model *sphere, *fine_sphere, *teapot;

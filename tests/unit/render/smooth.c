@@ -9,8 +9,7 @@
 #include <string.h>
 #include "base/srgb.h"
 #include "base/pool.h"
-#include "render/stages.h"
-#include "render/render.h"
+#include "render/plan.h"
 #include "tests/unit/lib/shapes.h"
 
 #define SIDE 7

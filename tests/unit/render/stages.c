@@ -8,7 +8,8 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/random.h"
-#include "render/render.h"
+#include "render/fill.h"
+#include "render/gaps.h"
 
 #define SIDE 16
 
@@ -54,7 +55,7 @@ static uint16_t weight_at(const struct stack *s, uint32_t x, uint32_t y)
 	struct plan plan = flat_plan();
 	uint16_t weight[SIDE * SIDE];
 	uint8_t brick;
-	gaps_rows(simd_get(), &plan, &s->stack, 0, SIDE, weight, &brick);
+	gaps_rows(simd_get(), &plan, &s->stack, 0, SIDE, &(struct gaps_map){ weight, &brick });
 	return weight[y * SIDE + x];
 }
 

@@ -8,7 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/direction.h"
-#include "render/render.h"
+#include "render/cull.h"
+#include "render/zbuffer.h"
 
 static struct psr_model *wheel;
 

@@ -270,7 +270,7 @@ static void files_that_cannot_be_served_are_listed_and_refused_with_a_reason(voi
 	peer_expect_error(&p, peer_ask_open(&p, "twin.ply"), PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "twin.obj"));
 	peer_expect_open_error(&p, peer_ask_open(&p, "old"), PSR_WIRE_FORMAT, text);
-	assert_non_null(strstr(text, "no .psr file"));
+	assert_non_null(strstr(text, "not a .psr file"));
 	assert_int_equal(count_builds(log), 0);
 	peer_close(&p);
 	daemon_stop(&psrd);

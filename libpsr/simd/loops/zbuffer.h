@@ -1,9 +1,9 @@
-/* Plain loops, which the compiler turns into vectors; compiled once for each ISA. */
+/* The hierarchical z-buffer of a tile ([G] 7.2): clearing it, cells from words, greatest depths. */
 #include <math.h>
 #include <string.h>
-#include "simd.h"
+#include "simd/warp.h"
 
-/* Whether the part at pixel (x, y) of the tile is among those of the bits. */
+/* Whether `bits` has the part at pixel (x, y) of the tile. */
 static inline int is_part(uint32_t bits, int32_t x, int32_t y)
 {
 	return bits && bits & part_bit((uint32_t)x, (uint32_t)y);
@@ -34,7 +34,6 @@ static void warp_clear(const struct warp_target *t, uint32_t levels)
 	}
 }
 
-/* To each place of `to` the lesser of two of `from`. */
 static inline void halve(uint32_t *restrict to, const uint32_t *restrict from, int32_t n)
 {
 	for (int32_t i = 0; i < n; i++)
@@ -72,7 +71,7 @@ static void warp_cells(const struct warp_target *t, int level)
 	}
 }
 
-static void warp_far(const struct warp_target *t, uint32_t far[TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE)])
+static void warp_far(const struct warp_target *t, uint32_t far[FAR_CELLS])
 {
 	for (int32_t y = t->y0; y < t->y1; y += FAR_SIDE) {
 		const int32_t y1 = y + FAR_SIDE < t->y1 ? y + FAR_SIDE : t->y1, n = t->x1 - t->x0;

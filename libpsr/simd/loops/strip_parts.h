@@ -1,11 +1,11 @@
-/* What all variants of the kernels of strips share. */
+/* Parts of the strip kernels that all variants share. */
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
 #include "base/srgb.h"
-#include "simd.h"
+#include "simd/strip.h"
 
-/* Of functions whose flags are constants where they are called, so that each case is a loop of its own. */
+/* For functions whose callers pass constant flags: each case becomes a loop of its own. */
 #define CONSTANT_FLAGS inline __attribute__((always_inline))
 
 static inline uint32_t strip_whole(uint32_t n)
@@ -25,7 +25,7 @@ static inline void repeat_last(struct strip_pixels *p)
 	}
 }
 
-/* Attributes, normals, n and is_specular. *all and *common: attributes, or-ed and and-ed. */
+/* *all and *common: all attributes or-ed, and and-ed. */
 static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip *strip, const struct strip_view *view)
 {
 	const struct strip_pixels *p = strip->pixels;
@@ -44,7 +44,7 @@ static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip
 	*common = each;
 }
 
-/* Colours, from the attributes: often the same in the whole strip. */
+/* is_one: the whole strip has one colour, a frequent case. */
 static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
 {
 	const uint64_t first = strip->attr[0];
@@ -75,7 +75,7 @@ static inline const struct warp_instance *instance_of(const struct strip_view *v
 	return &view->instance[low];
 }
 
-/* The instance of sample `first`, and in *end where the run of its samples ends, at n at the latest. */
+/* Returns the instance of sample `first`; *end: the end of the run of samples of that instance, at most n. */
 static inline const struct warp_instance *instance_run(uint32_t *end, const struct strip_pixels *p,
                                                        const struct strip_view *view, uint32_t first, uint32_t n)
 {

@@ -1,14 +1,15 @@
-/* The loops, and the table of one instruction set, for c/, avx2/ and avx512/. Arguments: the kernel that warps, and a
- * macro that names the variant of those kernels that an instruction set may have written by hand. */
+/* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
+ * instructions. Arguments: the warp kernel, and a macro that names a kernel's variant where one is written by hand. */
 #include "cull.h"
-#include "fill.h"
+#include "fill_pull.h"
+#include "fill_push.h"
 #include "gaps.h"
-#include "kernels.h"
+#include "simd/kernels.h"
 #include "light.h"
 #include "shadow.h"
 #include "smooth.h"
 #include "strip.h"
-#include "warp_clear.h"
+#include "zbuffer.h"
 
 #define SIMD_TABLE(warp_kernel, KERNEL) { \
 	.cull = cull,                                  \

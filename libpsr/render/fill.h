@@ -1,0 +1,75 @@
+/* Fill: pull-push ([G] 4.7, appendix). */
+#ifndef PSR_RENDER_FILL_H
+#define PSR_RENDER_FILL_H
+
+#include <stdatomic.h>
+#include "plan.h"
+
+#define FILL_LEVELS 15      /* 2^14 is the largest side */
+#define FILL_BRICK_LEVELS 5 /* where a brick is one cell */
+
+/* The cells of one level, with a border outside of the picture; `cell` is the one at (left, top). */
+struct fill_level {
+	uint32_t width, height; /* of the picture */
+	int32_t left, top;
+	uint32_t stride;
+	struct fill_row cell;
+};
+
+/* The picture to fill. In the bricks that fill_wants flags, the linear colours r, g, b of all pixels with weight above
+ * 0, the background's too, are valid. */
+struct fill_picture {
+	const struct psr_zstack *stack;
+	uint16_t *weight;      /* becomes WEIGHT_ONE where filled */
+	const uint8_t *bricks; /* as gaps_rows marks them */
+	uint16_t *r, *g, *b;
+	const uint8_t *srgb;   /* 8 bits of 16-bit linear light */
+	uint8_t *rgb;          /* 3 * width * height, or NULL */
+	float *depth;          /* world units, or NULL */
+};
+
+struct fill {
+	struct fill_level level[FILL_LEVELS]; /* of 1..top, the single cell */
+	int top, brick_top;                   /* brick_top: the coarsest level that a brick pulls by itself */
+	uint32_t width, height, bricks_x, bricks_y;
+	uint8_t *pulled;  /* by brick: level to which weights and depths are pulled */
+	uint8_t *whole;   /* by brick: finest level with whole cells only; brick_top + 1: none; 0: not marked */
+	uint8_t *needs;   /* by marked brick: the greatest of `whole` around it */
+	uint32_t *left;   /* by brick, a bit a row: the row may have pixels that are not whole */
+	uint8_t *wants;   /* by brick: number of levels to pull */
+	uint8_t *coarse;  /* by cell of levels from brick_top: enum fill_coarse */
+	size_t coarse_first[FILL_LEVELS], n_coarse;
+	int is_coarse;    /* a brick needs levels beyond brick_top */
+	int needed;       /* the greatest of `needs` */
+	int pushed;       /* the level that is being pushed */
+	void *storage;
+	size_t storage_size;
+	/* The picture in progress. */
+	const struct simd *simd;
+	const struct plan *plan;
+	struct fill_picture picture;
+	_Atomic int deepest; /* coarsest level with a cell of weight below a half: its depth comes from a coarser one */
+	_Atomic uint64_t n_changed, n_filled, n_moved; /* as of fill_counts */
+};
+
+/* Filling takes four steps; each begins when the one before has ended. Any thread may run the steps that take a row of
+ * bricks, in any order; they run while the row's pixels are in the cache, looking after gaps_rows, pulling after
+ * shading. */
+int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *plan, const struct fill_picture *picture);
+void fill_clear(struct fill *fill);
+
+/* 1. Finds, from weights and depths, which coarser levels the row's bricks need. */
+void fill_look(struct fill *fill, uint32_t row);
+
+/* 2. Finds what they need of other bricks. Returns a byte a brick, not 0 where the fill needs the brick's 16-bit
+ * colours. */
+const uint8_t *fill_wants(struct fill *fill);
+
+/* 3. Pulls the coarser levels that are needed from the row's colours, and pushes to pixels that need no other row. */
+void fill_pull(struct fill *fill, uint32_t row);
+
+/* 4. Pushes: sets the colour of every pixel of weight below WEIGHT_ONE and, where the weight is below a half, its
+ * depth. Other pixels of rgb and depth stay. Adds the stage's counts and error bound to the report. */
+void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
+
+#endif

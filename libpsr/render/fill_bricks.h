@@ -1,0 +1,42 @@
+/* Pull and push of bricks, for fill.c. */
+#ifndef PSR_RENDER_FILL_BRICKS_H
+#define PSR_RENDER_FILL_BRICKS_H
+
+#include <stddef.h>
+#include "fill.h"
+
+static inline struct fill_row fill_row_at(const struct fill_level *level, int32_t x, int32_t y)
+{
+	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
+	const struct fill_row *cell = &level->cell;
+	return (struct fill_row){ cell->r + at,      cell->g + at, cell->b + at,
+		                      cell->weight + at, cell->z + at, cell->near + at };
+}
+
+/* The threshold among cells of a level. */
+float fill_scale(const struct plan *plan, int level);
+float fill_offset(const struct plan *plan, int level);
+void fill_note_depth(struct fill *fill, int level);
+
+enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
+/* Pulls weights and depths of bricks bx0..bx1-1 of brick row `by` from the finer level to `level`; returns the least
+ * weight. */
+uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+
+/* Pulls their colours, after their weights. */
+void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level);
+
+/* Pushes to their cells of a level, from the coarser level. is_early: only to cells that read none of the bricks above
+ * and below. */
+void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by, int level, int is_early);
+
+/* Pixels; moved: their depth changed. */
+struct fill_counts {
+	uint32_t n_changed, n_filled, n_moved;
+};
+
+/* Pushes to their pixels. Adds to the counts. */
+void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx0, uint32_t bx1, uint32_t by,
+                      int is_early);
+
+#endif

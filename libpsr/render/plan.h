@@ -1,0 +1,68 @@
+/* The plan: a request prepared for drawing, read by all stages. */
+#ifndef PSR_RENDER_PLAN_H
+#define PSR_RENDER_PLAN_H
+
+#include "render.h"
+
+struct plan_instance {
+	uint32_t first_slot;  /* slot of block b is first_slot + b */
+	uint32_t first_group; /* number of the model's group 0; each model has n_clusters numbers */
+	struct cull_view cull;
+	double turn[3][3];    /* inner coordinates to camera space, a rotation */
+	enum psr_why masks;   /* PSR_WHY_RAN: test visibility masks */
+};
+
+struct plan {
+	uint32_t width, height, tiles_x, tiles_y, parts_x, parts_y;
+	struct psr_window window;  /* of the picture; the whole picture if the settings have none */
+	double center[2];          /* pixels from the frame's corner to where the view axis meets it */
+	int perspective;
+	int with_splats;
+	int is_smooth;
+	unsigned cull_tests;
+	int is_full;
+	int opaque_cells;          /* PSR_GAPS_OPAQUE */
+	float finer;               /* 1 / settings' spacing: samples are to be this much finer than pixels */
+	int exponent;              /* lengths below are world * 2^-exponent, positions relative to the eye */
+	double tangent[2];         /* of half the picture's angles; perspective */
+	float focal;               /* pixels a unit of x'/z', or of x' if orthographic */
+	float near_z;
+	/* A cell of level k at z' covers pixels beyond gap_scale[k] * z' + gap_offset[k]. */
+	float gap_scale[PSR_MAX_DEPTH_LEVEL + 1], gap_offset[PSR_MAX_DEPTH_LEVEL + 1];
+	uint32_t n_instances, n_lights, n_slots, n_groups;
+	struct plan_instance *instance;
+	struct warp_instance *warp;        /* one an instance */
+	struct strip_view view;            /* the cull completes `needs` */
+	int has_sheer;                     /* a block in view has opacities; set by the cull */
+	int is_shadow;                     /* the picture is a shadow map, where sheer blocks are opaque or missing */
+	struct strip_light *light;
+	const struct shadow_light *shadow; /* one a light, or NULL: no shadows; the shadow stage owns it */
+	double axes[3][3], eye[3];         /* the camera's right, down and forward in the world, and its position */
+	float ambient[3];
+	uint16_t background[3];            /* linear, 16 bits */
+	/* Map of the picture's parts, parts_x in a row, or NULL: 1 where all words are empty and all weights whole, since
+	 * no block draws there, nor do cells reach there. */
+	const uint8_t *is_quiet;
+	uint64_t n_samples;
+	void *storage;                     /* of all arrays */
+	size_t storage_size;
+};
+
+/* Validated scene and settings. ARG, LIMIT, MEMORY. */
+int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
+              struct psr_error *err);
+void plan_clear(struct plan *plan);
+
+/* Finds the centre of an instance's inner coordinates relative to `from`, and its rotation. Returns the length of an
+ * inner unit in the world. */
+double plan_place(double center[3], double rotation[3][3], const struct psr_instance *instance, const double from[3]);
+
+/* Finds the instance of a slot; the slot must be below n_slots. */
+uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
+
+static inline int plan_is_quiet(const struct plan *plan, uint32_t x, uint32_t y)
+{
+	return plan->is_quiet && plan->is_quiet[y / PART_HEIGHT * plan->parts_x + x / PART_WIDTH];
+}
+
+#endif

@@ -1,0 +1,110 @@
+/* Blocks against the frustum ([G] 6.1), and the whole cull. */
+#include <string.h>
+#include "base/maths.h"
+#include "cull_cones.h"
+#include "simd/tile.h"
+
+/* Bounds the projection of c - r or c + r by the scales of the two ends of z. */
+static inline float edge_of(float at, float if_negative, float if_positive)
+{
+	return at * psr_choose(at < 0, if_negative, if_positive);
+}
+
+static inline int32_t pixel_within(float pixel, float most)
+{
+	const float low = psr_where(pixel > 0, pixel);
+	return (int32_t)psr_choose(low < most, low, most);
+}
+
+static inline int32_t region_of(int32_t pixel, float from, float scale)
+{
+	const float region = ((float)pixel + from) * scale, most = SCREEN_SIDE - 1, low = psr_where(region > 0, region);
+	return (int32_t)psr_choose(low < most, low, most);
+}
+
+static void widen(struct widened *restrict to, const struct psr_blocks *b, uint32_t first, uint32_t n)
+{
+	const int16_t *x = b->sphere_x + first, *y = b->sphere_y + first, *z = b->sphere_z + first;
+	const uint16_t *r = b->sphere_r + first;
+	const uint8_t *flags = b->flags + first;
+	for (uint32_t i = 0; i < n; i++) {
+		to->x[i] = (float)x[i] * (1.0f / 16384);
+		to->y[i] = (float)y[i] * (1.0f / 16384);
+		to->z[i] = (float)z[i] * (1.0f / 16384);
+		to->r[i] = (float)r[i] * (1.0f / 32768);
+	}
+	for (uint32_t i = 0; i < n; i++)
+		to->flags[i] = flags[i];
+}
+
+static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view,
+                            const struct widened *restrict b, uint32_t n)
+{
+	const struct cull_view v = *view;
+	const float half_width = v.center_x, half_height = v.center_y;
+	const float most_x = v.width - 1, most_y = v.height - 1;
+	const int is_perspective = v.perspective;
+
+	for (uint32_t i = 0; i < n; i++) {
+		const float x = b->x[i], y = b->y[i], z = b->z[i], r = b->r[i] * v.scale;
+		const int32_t flags = b->flags[i];
+		const float cx = ((v.center_m[0][0] * x + v.center_m[0][1] * y) + v.center_m[0][2] * z) + v.center_m[0][3];
+		const float cy = ((v.center_m[1][0] * x + v.center_m[1][1] * y) + v.center_m[1][2] * z) + v.center_m[1][3];
+		const float cz = ((v.center_m[2][0] * x + v.center_m[2][1] * y) + v.center_m[2][2] * z) + v.center_m[2][3];
+		const float stretch = cull_stretch(&v, cx, cy, cz, r, cz - r);
+
+		/* Smallest k >= 0 with `pixels` <= 2^k ([G] 7.11), from the exponent. A tolerance of 1/4096 keeps rounding from
+		 * doubling the cells of a picture at exactly the magnification of a level. */
+		const float spacing = v.spacing * psr_float_from_bits((uint32_t)(127 + (flags & PSR_BLOCK_LEVEL)) << 23);
+		const float pixels = stretch * spacing * (1 - 0x1p-12f); /* may be NaN: 0 times infinity */
+		const int32_t bits = (int32_t)psr_bits_from_float(psr_choose(pixels < 0x1p100f, pixels, 0x1p100f));
+		const int32_t exponent = ((bits + 0x7fffff) >> 23) - 127, level = exponent > 0 ? exponent : 0;
+		const int32_t used = level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL;
+
+		/* Two pixels beyond the guard band's cell cover rounding. */
+		const float grown = r * 1.0001f, guard = psr_float_from_bits((uint32_t)(127 + used) << 23) + 2;
+		const float front1 = cz - grown, z0 = psr_choose(front1 > v.near_z, front1, v.near_z), z1 = cz + grown;
+		const float near_scale = v.focal * psr_choose(is_perspective, 1 / z0, 1);
+		const float far_scale = v.focal * psr_choose(is_perspective, 1 / z1, 1);
+		const float left = edge_of(cx - grown, near_scale, far_scale) + half_width;
+		const float right = edge_of(cx + grown, far_scale, near_scale) + half_width;
+		const float top = edge_of(cy - grown, near_scale, far_scale) + half_height;
+		const float bottom = edge_of(cy + grown, far_scale, near_scale) + half_height;
+		const float x0 = left - guard, x1 = right + guard, y0 = top - guard, y1 = bottom + guard;
+		out->is_left[i] = (z1 > v.near_z) & (x1 >= 0) & (y1 >= 0) & (x0 < v.width) & (y0 < v.height);
+		out->is_mixed[i] = !(flags & PSR_BLOCK_TWO_SIDED) & !v.both_sides;
+		out->level[i] = level;
+		const int32_t px0 = pixel_within(x0, most_x), px1 = pixel_within(x1, most_x);
+		const int32_t py0 = pixel_within(y0, most_y), py1 = pixel_within(y1, most_y);
+		out->x0[i] = px0;
+		out->x1[i] = px1;
+		out->y0[i] = py0;
+		out->y1[i] = py1;
+		const float reach = psr_choose(v.with_splats, guard, 2);
+		out->tile_x0[i] = pixel_within(left - reach, most_x) / TILE_WIDTH;
+		out->tile_x1[i] = pixel_within(right + reach, most_x) / TILE_WIDTH;
+		out->tile_y0[i] = pixel_within(top - reach, most_y) / TILE_HEIGHT;
+		out->tile_y1[i] = pixel_within(bottom + reach, most_y) / TILE_HEIGHT;
+		const int32_t range_x = screen_range(region_of(px0, v.region_from[0], v.region_scale[0]),
+		                                     region_of(px1, v.region_from[0], v.region_scale[0]));
+		const int32_t range_y = screen_range(region_of(py0, v.region_from[1], v.region_scale[1]),
+		                                     region_of(py1, v.region_from[1], v.region_scale[1]));
+		out->range[i] = range_x * SCREEN_RANGES + range_y;
+		out->near[i] = front1 * (1 - 0x1p-16f);
+		const uint32_t shift = 14u + ((uint32_t)(flags & PSR_BLOCK_DEPTH) >> 3);
+		out->depth_error[i] = stretch * v.scale * psr_float_from_bits((126u - shift) << 23);
+	}
+}
+
+static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n)
+{
+	const uint32_t whole = (n + LANES - 1) / LANES * LANES;
+	struct widened blocks;
+	memset(&blocks, 0, sizeof blocks);
+	widen(&blocks, view->blocks, first, n);
+	cull_by_frustum(out, view, &blocks, whole);
+	if (view->blocks->cone_sine && (view->with_cones || view->blocks->traits)) {
+		widen_cones(&blocks, view->blocks, first, n);
+		cull_by_cones(out, view, &blocks, whole);
+	}
+}

@@ -1,0 +1,266 @@
+/* Samples of strips and their pixels. */
+#include <string.h>
+#include "base/maths.h"
+#include "base/srgb.h"
+#include "strip_parts.h"
+
+static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
+{
+	uint32_t n = 0;
+	memset(p->has_sample, 0, sizeof p->has_sample);
+	for (uint32_t x = 0; x < n_pixels; x++) {
+		const uint32_t has_sample = word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
+		p->x[n] = (uint16_t)x;
+		p->id[n] = (uint32_t)word[x];
+		p->has_sample[x / 32] |= has_sample << x % 32;
+		n += has_sample;
+	}
+	p->n = n;
+	p->word = word;
+}
+
+static inline uint32_t cone_of(const struct psr_blocks *b, uint32_t block)
+{
+	if (!(psr_blocks_traits(b, block) & PSR_BLOCK_BENT))
+		return STRIP_NO_CONE;
+	return (uint32_t)(uint8_t)b->cone_x[block] | (uint32_t)(uint8_t)b->cone_y[block] << 8 |
+	       (uint32_t)(uint8_t)b->cone_z[block] << 16 | (uint32_t)b->cone_sine[block] << 24;
+}
+
+static void find_cones(struct strip_pixels *p, const struct strip_view *view)
+{
+	for (uint32_t i = 0, end; i < p->n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, p->n);
+		const struct psr_blocks b = *in->blocks;
+		for (; i < end; i++) {
+			p->cone[i] = cone_of(&b, p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot);
+			p->has_cones |= p->cone[i] != STRIP_NO_CONE;
+		}
+	}
+}
+
+static void strip_find(struct strip_pixels *p, const struct strip_view *view)
+{
+	const uint32_t n = p->n;
+	for (uint32_t i = 0, end; i < n;) {
+		const struct warp_instance *in = instance_run(&end, p, view, i, n);
+		const struct psr_blocks b = *in->blocks;
+		for (; i < end; i++) {
+			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
+			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);
+			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
+			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
+			__builtin_prefetch(p->at[i]);
+		}
+	}
+	p->has_cones = 0;
+	if (view->needs & STRIP_BENT && view->needs & (STRIP_POSITION | STRIP_TWO_SIDED))
+		find_cones(p, view);
+	repeat_last(p);
+}
+
+static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
+{
+	const uint64_t first = strip->attr[0];
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const uint64_t attr = is_one ? first : strip->attr[i];
+		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
+		strip->sr[i] = psr_srgb5_to_linear[specular & 31];
+		strip->sg[i] = psr_srgb6_to_linear[specular >> 5 & 63];
+		strip->sb[i] = psr_srgb5_to_linear[specular >> 11];
+		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
+	}
+}
+
+static inline void strip_read(struct strip *strip, const struct strip_view *view)
+{
+	uint64_t all, common;
+	read_attributes(&all, &common, strip, view);
+	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
+		read_diffuse(strip, 1);
+	else
+		read_diffuse(strip, 0);
+	if (strip->is_specular && all >> 40 == common >> 40)
+		read_specular(strip, 1);
+	else if (strip->is_specular)
+		read_specular(strip, 0);
+}
+
+/* Positions are those of pixel centres, less than a pixel from the samples: where a ray would meet the surface. */
+static void locate(struct strip *strip, const struct strip_view *view)
+{
+	const struct strip_pixels *p = strip->pixels;
+	const float y = ((float)p->y + 0.5f - view->half_height) / view->focal;
+	for (uint32_t i = 0; i < strip->n; i++)
+		strip->pz[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) / view->focal;
+		const float w = psr_choose(view->perspective, strip->pz[i], 1);
+		strip->px[i] = x * w;
+		strip->py[i] = y * w;
+	}
+}
+
+static void look(struct strip *strip, const struct strip_view *view)
+{
+	const float scale = view->perspective ? 1 / view->focal : 0;
+	const struct strip_pixels *p = strip->pixels;
+	const float y = ((float)p->y + 0.5f - view->half_height) * scale;
+	for (uint32_t i = 0; i < strip->n; i++) {
+		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) * scale;
+		const float unit = -1 / __builtin_sqrtf((x * x + y * y) + 1);
+		strip->vx[i] = x * unit;
+		strip->vy[i] = y * unit;
+		strip->vz[i] = unit;
+	}
+}
+
+/* Surface normals: moves a normal outside of its cone straight to the rim. */
+static void straighten(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
+{
+	const struct strip_pixels *p = strip->pixels;
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t cone = p->cone[i], code = cone >> 24;
+		const float x = (float)(int8_t)cone, y = (float)(int8_t)(cone >> 8), z = (float)(int8_t)(cone >> 16);
+		const float unit = 1 / __builtin_sqrtf((x * x + y * y) + z * z);
+		const float ax = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * unit;
+		const float ay = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * unit;
+		const float az = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * unit;
+		const float nx = strip->nx[i], ny = strip->ny[i], nz = strip->nz[i];
+		const float sine = (float)(int32_t)code * (1.0f / 255), rim = __builtin_sqrtf(1 - sine * sine);
+		const float c = (nx * ax + ny * ay) + nz * az, square = 1 - c * c, least = 1e-12f;
+		const float across = sine / __builtin_sqrtf(psr_choose(square > least, square, least));
+		const float along = rim - c * across;
+		const int is_outside = (code != PSR_CONE_ANY) & (c < rim);
+		strip->gx[i] = psr_choose(is_outside, ax * along + nx * across, nx);
+		strip->gy[i] = psr_choose(is_outside, ay * along + ny * across, ny);
+		strip->gz[i] = psr_choose(is_outside, az * along + nz * across, nz);
+	}
+}
+
+static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
+{
+	const struct strip_pixels *p = strip->pixels;
+	const uint32_t n = strip->n;
+	if (view->lit && !strip->is_specular) {
+		for (uint32_t i = 0; i < n; i++) {
+			const float *lit = view->lit[PSR_ATTR_NORMAL(strip->attr[i])];
+			strip->lr[i] = lit[0];
+			strip->lg[i] = lit[1];
+			strip->lb[i] = lit[2];
+		}
+		return;
+	}
+	for (uint32_t first = 0, end; first < n; first = end) {
+		const struct warp_instance *in = instance_run(&end, p, view, first, n);
+		turn_normals(strip, in->turn, first, end);
+		if (p->has_cones)
+			straighten(strip, in->turn, first, end);
+	}
+	if (view->needs & (STRIP_POSITION | STRIP_TWO_SIDED) && !p->has_cones) {
+		memcpy(strip->gx, strip->nx, n * sizeof *strip->nx);
+		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
+		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		strip->lr[i] = ambient[0];
+		strip->lg[i] = ambient[1];
+		strip->lb[i] = ambient[2];
+	}
+	if (view->needs & STRIP_POSITION)
+		locate(strip, view);
+	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
+		look(strip, view);
+	if (strip->is_specular)
+		for (uint32_t i = 0; i < n; i++)
+			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
+	if (view->needs & STRIP_TWO_SIDED)
+		for (uint32_t i = 0; i < n; i++) {
+			const float g = (strip->gx[i] * strip->vx[i] + strip->gy[i] * strip->vy[i]) + strip->gz[i] * strip->vz[i];
+			const float turn = psr_choose((p->two_sided[i] != 0) & (g < 0), -1, 1);
+			strip->nx[i] *= turn;
+			strip->ny[i] *= turn;
+			strip->nz[i] *= turn;
+			strip->gx[i] *= turn;
+			strip->gy[i] *= turn;
+			strip->gz[i] *= turn;
+		}
+}
+
+static inline uint16_t light16(float linear)
+{
+	linear = linear > 0 ? linear : 0;
+	linear = linear < 1 ? linear : 1;
+	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
+}
+
+static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
+{
+	for (uint32_t i = 0; i < s->n; i++) {
+		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
+		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
+		if (is_specular) {
+			r += s->sr[i] * s->hr[i];
+			g += s->sg[i] * s->hg[i];
+			b += s->sb[i] * s->hb[i];
+		}
+		s->r[i] = light16(is_unlit ? s->dr[i] : r);
+		s->g[i] = light16(is_unlit ? s->dg[i] : g);
+		s->b[i] = light16(is_unlit ? s->db[i] : b);
+	}
+}
+
+static void strip_color(struct strip *strip)
+{
+	if (strip->is_specular)
+		strip_color_by(strip, 1);
+	else
+		strip_color_by(strip, 0);
+}
+
+static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const uint16_t *const from[3] = { strip->r, strip->g, strip->b };
+	uint16_t *const to[3] = { target->r, target->g, target->b };
+	const struct strip_pixels *p = strip->pixels;
+	const size_t first = (size_t)p->y * target->width + p->x0;
+	for (int c = 0; c < 3; c++) {
+		uint16_t row[STRIP];
+		for (uint32_t x = 0; x < n; x++)
+			row[x] = target->background[c];
+		for (uint32_t i = 0; i < p->n; i++)
+			row[p->x[i]] = from[c][i];
+		for (uint32_t x = 0; x < n; x += STRIP_BRICK)
+			if (target->wants[x / STRIP_BRICK])
+				memcpy(to[c] + first + x, row + x, 2 * (n - x < STRIP_BRICK ? n - x : STRIP_BRICK));
+	}
+}
+
+static inline void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
+{
+	const struct strip_pixels *p = strip->pixels;
+	if (target->rgb) {
+		const uint16_t *empty = target->background;
+		uint8_t *to = target->rgb + 3 * ((size_t)p->y * target->width + p->x0);
+		uint32_t pixel[STRIP];
+		for (uint32_t x = 0; x < n; x++)
+			pixel[x] = pixel_of(target->srgb, empty[0], empty[1], empty[2]);
+		for (uint32_t i = 0; i < p->n; i++)
+			pixel[p->x[i]] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
+		for (uint32_t x = 0; x + 1 < n; x++) /* writes a byte of the next pixel, too */
+			memcpy(to + 3 * (size_t)x, &pixel[x], 4);
+		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
+	}
+	if (target->wants)
+		write_linear(strip, target, n);
+}
+
+/* Two factors, since 2^exponent may not fit a float: exact unless the result does not fit. */
+static void depth_row(float *depth, const uint64_t *word, uint32_t n, int exponent)
+{
+	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
+	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
+	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
+	for (uint32_t i = 0; i < n; i++)
+		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
+}
