@@ -18,7 +18,7 @@ static size_t capacity_of(const struct bins *bins, size_t i)
 
 void *bins_room_for(void *array, size_t *capacity, size_t n, size_t size)
 {
-	if (array && n * size <= *capacity)
+	if (array != NULL && n * size <= *capacity)
 		return array;
 	return psr_grow_huge(array, capacity, (n + n / 4 + 1) * size);
 }
@@ -26,6 +26,7 @@ void *bins_room_for(void *array, size_t *capacity, size_t n, size_t size)
 size_t bins_bytes(const struct bins *bins)
 {
 	size_t n = 0;
+
 	for (size_t i = 0; i < N_ARRAYS; i++)
 		n += capacity_of(bins, i);
 	return n;

@@ -44,9 +44,9 @@ size_t bins_bytes(const struct bins *bins);
 void bins_clear(struct bins *bins);
 
 /* Makes room for n elements of one of the arrays, and a quarter more for the next frame; its contents are lost. Returns
- * NULL without memory. */
+ * 0 without memory. */
 #define bins_room(bins, array, n) \
-	((bins)->array = bins_room_for((bins)->array, &(bins)->array##_capacity, n, sizeof *(bins)->array))
+	(((bins)->array = bins_room_for((bins)->array, &(bins)->array##_capacity, n, sizeof *(bins)->array)) != NULL)
 void *bins_room_for(void *array, size_t *capacity, size_t n, size_t size);
 
 #endif

@@ -9,6 +9,7 @@
 static inline size_t block_index(const struct psr_blocks *b, uint32_t block, uint32_t sample)
 {
 	const uint64_t below = b->mask[block] & ((UINT64_C(1) << sample) - 1);
+
 	return (size_t)psr_blocks_attr_first(b, block) + (size_t)__builtin_popcountll(below);
 }
 
@@ -19,6 +20,7 @@ static inline void block_position(const struct psr_blocks *b, uint32_t block, ui
 	const float dx = projection->spacing, dy = dx * 0.866025404f, scale = (float)(1u << psr_blocks_level(b, block));
 	const uint32_t r = sample >> 3, c = sample & 7;
 	struct psr_place place;
+
 	psr_blocks_place(b, block, &place);
 	const float x = ((float)place.col + scale * ((float)c + (float)(r & 1) * 0.5f)) * dx;
 	const float y = ((float)place.row + scale * (float)r) * dy;

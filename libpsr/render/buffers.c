@@ -9,6 +9,7 @@ static void place(struct buffers *b, const struct plan *plan, size_t n_words)
 {
 	const size_t area = (size_t)plan->width * plan->height, rows = n_brick_rows(plan);
 	struct psr_zstack *stack = &b->stack;
+
 	b->tile = b->counters;
 	b->shade = (struct shade_counts *)(b->tile + (size_t)plan->tiles_x * plan->tiles_y);
 	b->gaps = (struct gaps_counts *)(b->shade + rows);
@@ -27,15 +28,16 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 	const size_t n_tiles = (size_t)plan->tiles_x * plan->tiles_y, n_parts = (size_t)plan->parts_x * plan->parts_y;
 	struct psr_zstack *stack = &b->stack;
 	const size_t n_cells = zbuffer_measure(stack, w, h, levels & ~1u);
+
 	stack->gap = warp_gap(w);
 	stack->exponent = plan->exponent;
 	const size_t n_words = (size_t)(w + stack->gap) * h;
 	b->pixels = psr_grow_huge(b->pixels, &b->pixels_size,
-	                          n_words * sizeof *stack->word + area * 4 * sizeof *b->weight + n_cells * sizeof(float) +
-	                              n_bricks);
+	                          n_words * sizeof *stack->word + area * 4 * sizeof *b->weight + n_cells * sizeof(float)
+	                              + n_bricks);
 	b->counters = psr_grow_huge(b->counters, &b->counters_size,
 	                            n_tiles * sizeof *b->tile + n_parts + rows * (sizeof *b->gaps + sizeof *b->shade));
-	if (!b->pixels || !b->counters)
+	if (b->pixels == NULL || b->counters == NULL)
 		return PSR_ERR_MEMORY;
 	place(b, plan, n_words);
 	if (b->clean_pixels != b->pixels || b->clean_width != w || b->clean_height != h || b->clean_levels != stack->levels)

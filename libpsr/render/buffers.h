@@ -39,6 +39,7 @@ static inline uint32_t n_brick_rows(const struct plan *plan)
 static inline uint32_t brick_row_end(const struct plan *plan, uint32_t row)
 {
 	const uint32_t end = (row + 1) * BRICK;
+
 	return end < plan->height ? end : plan->height;
 }
 

@@ -48,6 +48,7 @@ static int sphere_extent(const struct plan *plan, const float c[3], float r, flo
 	float x0 = c[0] - r, x1 = c[0] + r, y0 = c[1] - r, y1 = c[1] + r;
 	if (plan->perspective) {
 		float z0 = c[2] - r > plan->near_z ? c[2] - r : plan->near_z, z1 = c[2] + r;
+
 		interval(c[0], r, z0, z1, &x0, &x1);
 		interval(c[1], r, z0, z1, &y0, &y1);
 	}
@@ -87,11 +88,13 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 	const struct cull_masks *masks = in->masks == PSR_WHY_RAN ? &to->cull->bins->masks[chunk->instance] : NULL;
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint16_t most_x = (uint16_t)(plan->width - 1), most_y = (uint16_t)(plan->height - 1);
+
 	for (uint32_t i = 0; i < n; i++) {
 		const uint32_t block = first + i;
+
 		if (!batch->is_left[i])
 			continue;
-		if (masks && cull_by_mask(masks, b, block, (uint32_t)batch->range[i])) {
+		if (masks != NULL && cull_by_mask(masks, b, block, (uint32_t)batch->range[i])) {
 			chunk->n_masked++;
 			continue;
 		}
@@ -129,6 +132,7 @@ static void count_chunk(int i, void *userdata)
 	const struct plan_instance *in = &plan->instance[chunk.instance];
 	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
 	struct counting to = { cull, &chunk, count, cull->bins->hit + chunk.first_hit };
+
 	/* The guard band of the coarsest level, the widest that a block can get. */
 	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
 
@@ -142,11 +146,13 @@ static void count_chunk(int i, void *userdata)
 		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
 		const struct cull_sphere v = cull_view_cluster(in, cluster);
 		struct extent e;
+
 		if (!cull_is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk.n_tested += end - first;
 		for (uint32_t n; first < end; first += n) {
 			struct cull_batch batch;
+
 			n = end - first < CULL_BATCH ? end - first : CULL_BATCH;
 			cull->simd->cull(&batch, &in->cull, first, n);
 			take_batch(&to, &batch, first, n);
@@ -172,6 +178,7 @@ static void mark_parts(uint8_t *is_quiet, const struct plan *plan, const struct 
 	const int32_t x0 = (left > 0 ? left : 0) / PART_WIDTH, x1 = right < most_x ? right : most_x;
 	const int32_t y0 = (top > 0 ? top : 0) / PART_HEIGHT, y1 = bottom < most_y ? bottom : most_y;
 	uint8_t *first = is_quiet + (size_t)y0 * plan->parts_x, *last = is_quiet + (size_t)y1 * plan->parts_x;
+
 	mark(&first[x0]);
 	mark(&first[x1]);
 	mark(&last[x0]);
@@ -188,12 +195,14 @@ static void fill_chunk(int i, void *userdata)
 	const struct cull *cull = userdata;
 	const struct cull_chunk *chunk = &cull->bins->chunk[i];
 	uint32_t *next = cull->bins->count + (size_t)i * cull->stride;
+
 	for (uint32_t h = 0; h < chunk->n_hits; h++) {
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
 			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
 			.at_border = hit->at_border, .hit = chunk->first_hit + h,
 		};
+
 		mark_parts(cull->bins->is_quiet, cull->plan, hit);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
@@ -206,11 +215,14 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 	const uint32_t share = plan->n_slots / MANY_CHUNKS, least = share > LEAST_CHUNK ? share : LEAST_CHUNK;
 	const uint32_t most = least < MOST_CHUNK ? least : MOST_CHUNK;
 	uint32_t n = 0;
+
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
 		uint32_t k = 0;
+
 		for (uint32_t first = 0; first < blocks->n_blocks; first += most, n++) {
 			const uint32_t left = blocks->n_blocks - first;
+
 			while (blocks->cluster[k].first_block + blocks->cluster[k].n_blocks <= first)
 				k++;
 			if (store)
@@ -225,6 +237,7 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 static int compare_keys(const void *a, const void *b)
 {
 	const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+
 	return (x > y) - (x < y);
 }
 
@@ -232,11 +245,14 @@ static int compare_keys(const void *a, const void *b)
 static int place_entries(struct bins *bins, const struct cull *cull)
 {
 	uint64_t total = 0;
+
 	for (uint32_t t = 0; t < cull->n_tiles; t++) {
 		const uint64_t begin = total;
+
 		bins->tile_begin[t] = (uint32_t)total;
 		for (uint32_t i = 0; i < cull->n_chunks; i++) {
 			uint32_t *count = &bins->count[(size_t)i * cull->stride + t], n = *count;
+
 			*count = (uint32_t)total;
 			total += n;
 		}
@@ -252,9 +268,11 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 static void note_tests(const struct plan *plan, struct psr_report *report, uint64_t n_masked, uint64_t n_mixed)
 {
 	enum psr_why cones = PSR_WHY_NOTHING, masks = PSR_WHY_NOTHING;
+
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct plan_instance *in = &plan->instance[i];
-		if (in->cull.blocks->cone_sine)
+
+		if (in->cull.blocks->cone_sine != NULL)
 			cones = in->cull.with_cones ? PSR_WHY_RAN : PSR_WHY_OFF;
 		if (masks != PSR_WHY_RAN && in->masks != PSR_WHY_NOTHING)
 			masks = in->masks;
@@ -269,11 +287,13 @@ static void note_tests(const struct plan *plan, struct psr_report *report, uint6
 static int make_room(struct bins *bins, const struct cull *cull)
 {
 	const struct plan *plan = cull->plan;
-	return bins_room(bins, chunk, cull->n_chunks) && bins_room(bins, hit, plan->n_slots) &&
-	               bins_room(bins, group, plan->n_groups) &&
-	               bins_room(bins, count, (size_t)cull->n_chunks * cull->stride) &&
-	               bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles) &&
-	               bins_room(bins, is_quiet, plan->parts_x * plan->parts_y) && bins_room(bins, masks, plan->n_instances)
+
+	return bins_room(bins, chunk, cull->n_chunks) && bins_room(bins, hit, plan->n_slots)
+	               && bins_room(bins, group, plan->n_groups)
+	               && bins_room(bins, count, (size_t)cull->n_chunks * cull->stride)
+	               && bins_room(bins, tile_begin, cull->n_tiles + 1) && bins_room(bins, by_work, cull->n_tiles)
+	               && bins_room(bins, is_quiet, plan->parts_x * plan->parts_y)
+	               && bins_room(bins, masks, plan->n_instances)
 	           ? PSR_OK
 	           : PSR_ERR_MEMORY;
 }
@@ -283,17 +303,20 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 {
 	float depth_error = 0;
 	uint64_t n_masked = 0, n_mixed = 0;
+
 	report->n_blocks = plan->n_slots;
 	report->n_samples = plan->n_samples;
 	for (uint32_t i = 0; i < cull->n_chunks; i++) {
 		const struct cull_chunk *chunk = &cull->bins->chunk[i];
+
 		report->count[PSR_STAGE_CULL] += chunk->n_tested;
 		report->n_blocks_drawn += chunk->n_hits;
 		report->n_samples_drawn += chunk->n_samples;
 		report->levels |= chunk->levels;
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
-		plan->has_sheer |= plan->instance[chunk->instance].cull.blocks->opacity && chunk->traits & PSR_BLOCK_SHEER;
+		plan->has_sheer |=
+			plan->instance[chunk->instance].cull.blocks->opacity != NULL && chunk->traits & PSR_BLOCK_SHEER;
 		if (chunk->traits & PSR_BLOCK_BENT)
 			plan->view.needs |= STRIP_BENT;
 		report->n_clamped += chunk->n_clamped;
@@ -316,6 +339,7 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
 	int rc = make_room(bins, &cull);
+
 	if (rc)
 		return rc;
 	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);

@@ -42,6 +42,7 @@ static inline int cull_by_mask(const struct cull_masks *masks, const struct psr_
                                uint32_t range)
 {
 	const uint64_t *own = b->visibility_mask[psr_blocks_visibility(b, block)], *seen = masks->range[range];
+
 	return !((own[0] & seen[0]) | (own[1] & seen[1]));
 }
 

@@ -16,6 +16,7 @@ static inline int fits_pixel(float pixels)
 struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k)
 {
 	struct cull_sphere v;
+
 	for (int a = 0; a < 3; a++)
 		v.c[a] = to_camera(in->cull.center_m[a], k->center[0], k->center[1], k->center[2]);
 	v.r = k->radius * in->cull.scale;
@@ -31,8 +32,10 @@ static float nearest_of(const struct plan_instance *in, const struct psr_cluster
 	const uint16_t *r = b->sphere_r + k->first_block;
 	const float *m = in->cull.center_m[2], half = 0.5f * in->cull.scale;
 	float nearest = INFINITY;
+
 	for (uint32_t i = 0; i < k->n_blocks; i++) {
 		const float front = ((m[0] * x[i] + m[1] * y[i]) + m[2] * z[i]) - half * r[i];
+
 		nearest = front < nearest ? front : nearest;
 	}
 	return nearest * (1.0f / 16384) + m[3];
@@ -44,6 +47,7 @@ static int fits_cluster(const struct plan *plan, const struct plan_instance *in,
 {
 	const struct cull_sphere v = cull_view_cluster(in, k);
 	const float spacing = in->cull.spacing * (float)(1u << k->level) * plan->finer;
+
 	if (fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2] - v.r) * spacing))
 		return 1;
 	if (!plan->perspective || !fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2]) * spacing))
@@ -58,10 +62,12 @@ void cull_choose_levels(struct bins *bins, const struct plan *plan)
 		const struct plan_instance *in = &plan->instance[i];
 		const struct psr_blocks *b = in->cull.blocks;
 		struct cull_group *group = bins->group + in->first_group;
+
 		memset(group, 0, b->n_clusters * sizeof *group);
 		for (unsigned level = b->n_levels; level-- > 0;)
 			for (uint32_t k = 0; k < b->n_clusters; k++) {
 				struct cull_group *g = &group[b->cluster[k].group];
+
 				if (b->cluster[k].level != level || g->fits)
 					continue;
 				g->level = (uint8_t)level;

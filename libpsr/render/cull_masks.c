@@ -7,6 +7,7 @@
 static uint32_t node_of(uint32_t x, uint32_t y)
 {
 	uint32_t node = 1;
+
 	for (int bit = SCREEN_SPLITS - 1; bit >= 0; bit--)
 		node = node << 2 | (x >> bit & 1) << 1 | (y >> bit & 1);
 	return node;
@@ -16,6 +17,7 @@ void cull_masks_make(struct cull_masks *masks, const struct plan *plan, const st
 {
 	uint64_t region[2 << 2 * SCREEN_SPLITS][SCREEN_WORDS];
 	struct screen screen = { .mask = region };
+
 	if (plan->perspective) {
 		screen_make(&screen, SCREEN_SPLITS, in->turn, plan->tangent, 2);
 	} else { /* all rays have one direction */

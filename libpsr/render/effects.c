@@ -24,7 +24,8 @@ static const struct {
 	                         "too few lights and pixels, or several instances" } },
 	[PSR_EFFECT_SMOOTH] = { "smooth", { "", "the settings turn it off", "the frame has no colour", "", "" } },
 	[PSR_EFFECT_SHEER] = { "sheer",
-	                       { "", "the frame has neither colour nor depth", "no block in view lets light through", "", "" } },
+	                       { "", "the frame has neither colour nor depth", "no block in view lets light through", "",
+	                         "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -49,7 +50,8 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
 		[PSR_EFFECT_SHEER] = "pixels with surfaces that let a part of the light through",
 	};
-	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] ? counts[effect] : "?";
+
+	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] != NULL ? counts[effect] : "?";
 }
 
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why)

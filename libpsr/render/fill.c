@@ -24,6 +24,7 @@ float fill_offset(const struct plan *plan, int level)
 void fill_note_depth(struct fill *fill, int level)
 {
 	int seen = atomic_load(&fill->deepest);
+
 	while (seen < level && !atomic_compare_exchange_weak(&fill->deepest, &seen, level))
 		;
 }
@@ -55,8 +56,8 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		h = (h + 1) / 2;
 		cells += (size_t)(w + 2) * (h + 2);
 	}
-	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t) + 1) + (sizeof *fill->left + 6) * n_bricks +
-	                    2 * FILL_LEVELS * (bricks_x + bricks_y);
+	const size_t size = cells * (sizeof(float) + 4 * sizeof(uint16_t) + 1) + (sizeof *fill->left + 6) * n_bricks
+	                    + 2 * FILL_LEVELS * (bricks_x + bricks_y);
 	fill->width = fill->height = 0;
 	fill->storage = psr_grow_huge(fill->storage, &fill->storage_size, size);
 	if (fill->storage == NULL)
@@ -119,8 +120,10 @@ static int whole_level(const struct fill *fill, uint32_t bx, uint32_t by)
 		const struct fill_level *level = &fill->level[l];
 		const uint32_t side = BRICK >> l;
 		uint16_t least = WEIGHT_ONE;
+
 		for (uint32_t y = by * side; y < (by + 1) * side && y < level->height && least == WEIGHT_ONE; y++) {
 			const uint16_t *weight = fill_row_at(level, 0, (int32_t)y).weight;
+
 			for (uint32_t x = bx * side; x < (bx + 1) * side && x < level->width; x++)
 				least = weight[x] < least ? weight[x] : least;
 		}
@@ -135,6 +138,7 @@ static uint32_t run_end(const struct fill *fill, const uint8_t *map, uint32_t bx
 {
 	const uint8_t *row = map + (size_t)by * fill->bricks_x;
 	uint32_t end = bx + 1;
+
 	while (end < fill->bricks_x && row[end] > least)
 		end++;
 	return end;
@@ -145,10 +149,12 @@ void fill_look(struct fill *fill, uint32_t row)
 	const uint8_t *bricks = fill->picture.bricks + (size_t)row * fill->bricks_x;
 	uint8_t *whole = fill->whole + (size_t)row * fill->bricks_x;
 	uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
+
 	memset(whole, 0, fill->bricks_x);
 	memset(pulled, 0, fill->bricks_x);
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		int level = 1;
+
 		end = bx + 1;
 		if (!bricks[bx])
 			continue;
@@ -165,9 +171,11 @@ void fill_look(struct fill *fill, uint32_t row)
 static uint8_t greatest_around(const struct fill *fill, const uint8_t *map, uint32_t bx, uint32_t by)
 {
 	uint8_t greatest = 0;
+
 	for (uint32_t y = by ? by - 1 : 0; y <= by + 1 && y < fill->bricks_y; y++)
 		for (uint32_t x = bx ? bx - 1 : 0; x <= bx + 1 && x < fill->bricks_x; x++) {
 			const uint8_t value = map[(size_t)y * fill->bricks_x + x];
+
 			greatest = value > greatest ? value : greatest;
 		}
 	return greatest;
@@ -182,11 +190,13 @@ static uint8_t *coarse_at(const struct fill *fill, int l, uint32_t x, uint32_t y
 static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 {
 	uint8_t *state = coarse_at(fill, l, x, y);
+
 	if (*state & FILL_PULLED)
 		return;
 	*state |= FILL_PULLED;
 	if (l == fill->brick_top) {
 		const size_t brick = (size_t)y * fill->bricks_x + x;
+
 		fill->wants[brick] = (uint8_t)l;
 		while (fill->pulled[brick] < l)
 			fill_pull_weights(fill, x, x + 1, y, ++fill->pulled[brick]);
@@ -209,15 +219,18 @@ static void find_coarse(struct fill *fill)
 {
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
 	int is_whole = 0;
+
 	memset(fill->coarse, 0, fill->n_coarse);
 	for (size_t i = 0; i < n_bricks; i++)
 		fill->coarse[i] = fill->whole[i] > fill->brick_top ? FILL_NEEDED : 0;
 	for (int l = fill->brick_top; l < fill->top && !is_whole; l++) {
 		const struct fill_level *from = &fill->level[l], *to = from + 1;
+
 		is_whole = 1;
 		for (uint32_t y = 0; y < from->height; y++)
 			for (uint32_t x = 0; x < from->width; x++) {
 				const uint32_t px = x / 2, py = y / 2, nx = x & 1 ? px + 1 : px - 1, ny = y & 1 ? py + 1 : py - 1;
+
 				if (!(*coarse_at(fill, l, x, y) & FILL_NEEDED)
 				    || fill_row_at(from, (int32_t)x, (int32_t)y).weight[0] == WEIGHT_ONE)
 					continue;
@@ -239,6 +252,7 @@ static void find_coarse(struct fill *fill)
 const uint8_t *fill_wants(struct fill *fill)
 {
 	const size_t n_bricks = (size_t)fill->bricks_x * fill->bricks_y;
+
 	fill->is_coarse = 0;
 	for (uint32_t by = 0, i = 0; by < fill->bricks_y; by++)
 		for (uint32_t bx = 0; bx < fill->bricks_x; bx++, i++) {
@@ -262,6 +276,7 @@ const uint8_t *fill_wants(struct fill *fill)
 static void push_level(struct fill *fill, uint32_t row, int level, int is_early)
 {
 	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
+
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		end = bx + 1;
 		if (wants[bx] <= level)
@@ -274,6 +289,7 @@ static void push_level(struct fill *fill, uint32_t row, int level, int is_early)
 static void push_level_row(int i, void *userdata)
 {
 	struct fill *fill = userdata;
+
 	push_level(fill, (uint32_t)i, fill->pushed, 0);
 }
 
@@ -281,6 +297,7 @@ static void push_pixels(struct fill *fill, uint32_t row, int is_early)
 {
 	const uint8_t *needs = fill->needs + (size_t)row * fill->bricks_x;
 	struct fill_counts counts = { 0, 0, 0 };
+
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		end = bx + 1;
 		if (!needs[bx])
@@ -302,6 +319,7 @@ static void push_row(int i, void *userdata)
 static void complete_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t row, int level)
 {
 	const uint8_t *pulled = fill->pulled + (size_t)row * fill->bricks_x;
+
 	for (uint32_t bx = bx0, end; bx < bx1; bx = end) {
 		end = bx + 1;
 		if (pulled[bx] >= level)
@@ -315,14 +333,16 @@ static void complete_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint
 void fill_pull(struct fill *fill, uint32_t row)
 {
 	const uint8_t *wants = fill->wants + (size_t)row * fill->bricks_x;
+
 	for (uint32_t bx = 0, end; bx < fill->bricks_x; bx = end) {
 		int level = 0;
+
 		end = wants[bx] ? run_end(fill, fill->wants, bx, row, 0) : bx + 1;
 		for (uint32_t b = bx; b < end; b++)
 			level = wants[b] > level ? wants[b] : level;
 		for (int l = 1; l <= level; l++) {
 			complete_weights(fill, bx, end, row, l);
-			if (fill->picture.rgb)
+			if (fill->picture.rgb != NULL)
 				fill_pull_colors(fill, bx, end, row, l);
 		}
 	}
@@ -337,6 +357,7 @@ static void finish_top(const struct fill_level *top, const struct plan *plan)
 	const struct fill_row cell = fill_row_at(top, 0, 0);
 	uint16_t *const rgb[3] = { cell.r, cell.g, cell.b };
 	const uint32_t w = cell.weight[0];
+
 	for (int k = 0; k < 3; k++)
 		*rgb[k] = (uint16_t)(w ? *rgb[k] * (uint32_t)WEIGHT_ONE / w : plan->background[k]);
 	cell.weight[0] = WEIGHT_ONE;
@@ -348,18 +369,21 @@ static void run_coarse(struct fill *fill)
 {
 	for (int l = fill->brick_top; l < fill->top; l++) {
 		const struct fill_level *from = &fill->level[l], *to = from + 1;
+
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const struct fill_row row = fill_row_at(to, 0, y), upper = fill_row_at(from, 0, 2 * y);
 			const struct fill_row lower = fill_row_at(from, 0, 2 * y + 1);
+
 			fill->simd->fill_pull_weights(&row, &upper, &lower, to->width, fill_scale(fill->plan, l + 1),
 			                              fill_offset(fill->plan, l + 1));
-			if (fill->picture.rgb)
+			if (fill->picture.rgb != NULL)
 				fill->simd->fill_pull_colors(&row, &upper, &lower, to->width, 0);
 		}
 	}
 	finish_top(&fill->level[fill->top], fill->plan);
 	for (int l = fill->top - 1; l >= fill->brick_top; l--) {
 		const struct fill_level *to = &fill->level[l], *from = to + 1;
+
 		for (int32_t y = 0; y < (int32_t)to->height; y++) {
 			const int32_t parent = y >> 1;
 			const struct fill_row row = fill_row_at(to, 0, y);
@@ -367,6 +391,7 @@ static void run_coarse(struct fill *fill)
 				fill_row_at(from, 0, parent), fill_row_at(from, 0, y & 1 ? parent + 1 : parent - 1), from->width,
 				fill_scale(fill->plan, l + 1), fill_offset(fill->plan, l + 1),
 			};
+
 			fill->simd->fill_push(&row, &parents);
 		}
 	}

@@ -20,6 +20,7 @@ static inline struct fill_row picture_row_at(struct picture_row *to, const struc
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = fill->width, n_inside = y >= fill->height ? 0 : x + n > width ? width - x : n;
 	const size_t first = (size_t)y * width + x;
+
 	if (n_inside == n)
 		return (struct fill_row){ p->r + first, p->g + first, p->b + first, p->weight + first, to->z, NULL };
 	if (n_inside) {
@@ -42,6 +43,7 @@ static inline struct fill_row picture_depths_at(struct picture_row *to, const st
 	const struct fill_picture *p = &fill->picture;
 	const uint32_t width = fill->width, n_inside = y >= fill->height ? 0 : x + n > width ? width - x : n;
 	const size_t first = (size_t)y * width + x;
+
 	if (n_inside)
 		fill->simd->fill_depths(to->z, psr_zstack_row(p->stack, y) + x, n_inside);
 	if (n_inside == n)
@@ -66,6 +68,7 @@ static struct cells { uint32_t x0, x1, y0, y1; } cells_of(const struct fill *fil
 {
 	const struct fill_level *to = &fill->level[level];
 	const uint32_t side = BRICK >> level;
+
 	return (struct cells){ bx0 * side, least_of(bx1 * side, to->width), by * side,
 		                   least_of((by + 1) * side, to->height) };
 }
@@ -83,10 +86,12 @@ uint16_t fill_pull_weights(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32
 	const float scale = fill_scale(fill->plan, level), offset = fill_offset(fill->plan, level);
 	struct picture_row rows[2];
 	uint16_t least = WEIGHT_ONE;
+
 	for (uint32_t y = c.y0; y < c.y1; y++)
 		for (uint32_t x = c.x0, n; x < c.x1; x += n) {
 			const struct fill_row row = fill_row_at(to, (int32_t)x, (int32_t)y);
 			struct fill_row upper, lower;
+
 			n = piece_of(c.x1 - x, level);
 			if (level == 1) {
 				upper = picture_depths_at(&rows[0], fill, 2 * x, 2 * y, 2 * n);
@@ -108,10 +113,12 @@ void fill_pull_colors(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by
 	const struct fill_level *to = &fill->level[level], *from = to - 1;
 	const struct cells c = cells_of(fill, bx0, bx1, by, level);
 	struct picture_row rows[2];
+
 	for (uint32_t y = c.y0; y < c.y1; y++)
 		for (uint32_t x = c.x0, n; x < c.x1; x += n) {
 			const struct fill_row row = fill_row_at(to, (int32_t)x, (int32_t)y);
 			struct fill_row upper, lower;
+
 			n = piece_of(c.x1 - x, level);
 			if (level == 1) {
 				upper = picture_row_at(&rows[0], fill, 2 * x, 2 * y, 2 * n);
@@ -136,12 +143,14 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 	const uint32_t side = BRICK >> level, x0 = bx0 * side, x1 = least_of(bx1 * side, to->width);
 	const struct rows rows = rows_of(by, side, to->height, is_early);
 	const float scale = fill_scale(fill->plan, level + 1), offset = fill_offset(fill->plan, level + 1);
+
 	for (uint32_t y = rows.first; y < rows.end; y++) {
 		const int32_t parent = (int32_t)(y >> 1), x = (int32_t)(x0 >> 1);
 		const struct fill_row row = fill_row_at(to, (int32_t)x0, (int32_t)y);
 		const struct fill_parents parents = { fill_row_at(from, x, parent),
 			                                  fill_row_at(from, x, y & 1 ? parent + 1 : parent - 1),
 			                                  (x1 - x0 + 1) / 2, scale, offset };
+
 		fill->simd->fill_push(&row, &parents);
 	}
 }
@@ -151,13 +160,15 @@ static void write_pixels(const struct fill_picture *p, size_t first, const struc
 {
 	const uint8_t *srgb = p->srgb;
 	uint8_t *rgb = p->rgb + 3 * first;
-	for (uint32_t i = 0; i < n && p->rgb; i++) {
+
+	for (uint32_t i = 0; i < n && p->rgb != NULL; i++) {
 		const uint32_t at = places->at[i];
+
 		rgb[3 * at] = srgb[places->r[i]];
 		rgb[3 * at + 1] = srgb[places->g[i]];
 		rgb[3 * at + 2] = srgb[places->b[i]];
 	}
-	for (uint32_t i = 0; i < n && p->depth; i++)
+	for (uint32_t i = 0; i < n && p->depth != NULL; i++)
 		if (places->weight[i] < WEIGHT_ONE / 2)
 			p->depth[first + places->at[i]] = ldexpf(places->z[i], p->stack->exponent);
 }
@@ -172,6 +183,7 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 	struct fill_places places;
 	struct picture_row pixels;
 	uint32_t *left = fill->left + (size_t)by * fill->bricks_x;
+
 	_Static_assert(BRICK == 32 && FILL_BLOCK * 2 == BRICK, "a bit a row, and a block is a brick wide");
 	for (uint32_t y = rows.first; y < rows.end; y++)
 		for (uint32_t x = bx0 * BRICK; x < x1; x += FILL_PIECE) {
@@ -183,6 +195,7 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 			const struct fill_parents parents = { fill_row_at(from, px, parent), beside, n_cells, scale, offset };
 			const uint32_t n =
 				fill->simd->fill_push_picture(&places, left + x / BRICK, 1u << y % BRICK, &was, &parents);
+
 			if (!n)
 				continue;
 			if (was.weight == pixels.weight)

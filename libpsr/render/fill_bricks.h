@@ -9,6 +9,7 @@ static inline struct fill_row fill_row_at(const struct fill_level *level, int32_
 {
 	const ptrdiff_t at = (ptrdiff_t)(y - level->top) * (ptrdiff_t)level->stride + (x - level->left);
 	const struct fill_row *cell = &level->cell;
+
 	return (struct fill_row){ cell->r + at,      cell->g + at, cell->b + at,
 		                      cell->weight + at, cell->z + at, cell->near + at };
 }

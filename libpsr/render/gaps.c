@@ -6,6 +6,7 @@
 static void make_whole(uint16_t *weight, uint32_t stride, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	uint16_t whole[GAPS_WIDTH];
+
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 		whole[x] = WEIGHT_ONE;
 	for (uint32_t y = y0; y < y1; y++)
@@ -21,12 +22,14 @@ struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, c
 	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, map->weight, plan->opaque_cells };
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	struct gaps_counts total = { 0, 0, 0 };
+
 	for (uint32_t y = y0; y < y1; y += BRICK)
 		for (uint32_t x = 0; x < stack->width; x += GAPS_WIDTH) {
 			const uint32_t x1 = x + GAPS_WIDTH < stack->width ? x + GAPS_WIDTH : stack->width;
 			const uint32_t brick_y1 = y + BRICK < y1 ? y + BRICK : y1;
 			uint8_t marks[GAPS_WIDTH / BRICK] = { 0 };
 			struct gaps_counts counts = { 0, 0, 0 };
+
 			if (plan_is_quiet(plan, x, y))
 				make_whole(map->weight, stack->width, x, x1, y, brick_y1);
 			else

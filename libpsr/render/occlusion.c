@@ -14,6 +14,7 @@ struct occlusion {
 static uint32_t depth_of(const struct bins *bins, uint32_t entry)
 {
 	const float near = bins->hit[bins->entry[entry].hit].near;
+
 	return near > 0 ? psr_bits_from_float(near) : 0;
 }
 
@@ -21,8 +22,10 @@ static uint32_t depth_of(const struct bins *bins, uint32_t entry)
 static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
 {
 	uint32_t low = UINT32_MAX, high = 0, count[KEYS + 1] = { 0 };
+
 	for (uint32_t e = begin; e < end; e++) {
 		const uint32_t depth = depth_of(bins, e);
+
 		low = depth < low ? depth : low;
 		high = depth > high ? depth : high;
 	}
@@ -43,6 +46,7 @@ static int is_occluded(const struct occlusion *o, const struct warp_target *t, c
 {
 	const int32_t grown = hit->level ? 2 << hit->level : 0;
 	int32_t x0 = hit->x0 - grown, x1 = hit->x1 + grown, y0 = hit->y0 - grown, y1 = hit->y1 + grown;
+
 	if (!o->is_known || !(hit->near > 0))
 		return 0;
 	if (hit->level && (x0 < t->x0 || y0 < t->y0 || x1 >= t->x1 || y1 >= t->y1))
@@ -67,9 +71,11 @@ struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *
 	struct bin_entry some[64];
 	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* the latter two since the last look */
 	int is_over = 0;
+
 	sort_by_depth(bins, begin, end);
 	for (uint32_t i = begin; i < end; i++) {
 		const struct bin_entry *entry = &bins->entry[bins->order[i]];
+
 		if (is_occluded(&occlusion, target, &bins->hit[entry->hit])) {
 			n_left_out++;
 			continue;

@@ -13,6 +13,7 @@ static void warp_one(int i, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	const uint32_t clean = warp_parts(&r->plan, b->is_clean, tile);
 	const struct warp_into into = { &b->stack, clean, NULL };
+
 	b->tile[tile] = (struct warp_counts){ 0, 0, 0 };
 	if (!is_empty || clean != ALL_PARTS)
 		b->tile[tile] = r->plan.with_splats ? splat_tile(r->simd, &r->plan, &r->bins, &b->stack, tile, clean)
@@ -27,6 +28,7 @@ static void warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr
 	const int n_tiles = (int)(plan->tiles_x * plan->tiles_y);
 	uint64_t n_occluded = 0;
 	int with_occlusion = 0;
+
 	psr_pool_for(pool, n_tiles, warp_one, r);
 	memcpy(b->is_clean, r->bins.is_quiet, (size_t)plan->parts_x * plan->parts_y);
 	for (int t = 0; t < n_tiles; t++) {
@@ -51,6 +53,7 @@ struct call {
 static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t *start)
 {
 	const uint64_t end = clock_ns();
+
 	report->ns[stage] += end - *start;
 	*start = end;
 }
@@ -62,6 +65,7 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	struct psr_report *report = call->report;
 	struct psr_error *err = call->err;
 	int rc = settings_validate(settings, err);
+
 	if (rc == PSR_OK)
 		rc = psr_scene_validate(call->scene, err);
 	if (rc)
@@ -106,6 +110,7 @@ int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const s
 {
 	const struct call call = { scene, settings, pool, report, err };
 	fenv_t callers;
+
 	set_environment(&callers);
 	const int rc = make_stack(r, &call, 1);
 	fesetenv(&callers);
@@ -118,6 +123,7 @@ int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const s
 static struct gaps_counts find_row_gaps(struct psr_renderer *r, const struct psr_zstack *stack, int row)
 {
 	const struct gaps_map map = { r->buffers.weight, r->buffers.bricks };
+
 	return gaps_rows(r->simd, &r->plan, stack, (uint32_t)row * BRICK, brick_row_end(&r->plan, (uint32_t)row), &map);
 }
 
@@ -127,6 +133,7 @@ static void gaps_one(int row, void *userdata)
 	struct buffers *b = &r->buffers;
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(&r->plan, (uint32_t)row);
 	struct psr_zstack stack = b->stack;
+
 	if (r->plan.with_splats)
 		stack.levels = 0; /* discs, not cells, cover what is behind them */
 	b->gaps[row] = find_row_gaps(r, &stack, row);
@@ -140,10 +147,12 @@ static void outline_one(int row, void *userdata)
 	struct psr_renderer *r = userdata;
 	const struct buffers *b = &r->buffers;
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(&r->plan, (uint32_t)row), width = r->plan.width;
+
 	find_row_gaps(r, &b->stack, row);
 	for (uint32_t y = y0; y < y1; y++) {
 		const uint64_t *word = psr_zstack_row(&b->stack, y);
 		const size_t first = (size_t)y * width;
+
 		for (uint32_t x = 0; x < width; x++)
 			r->is_object[first + x] = word[x] != PSR_WORD_EMPTY || b->weight[first + x] < WEIGHT_ONE / 2;
 	}
@@ -155,6 +164,7 @@ int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, cons
 	struct psr_report report;
 	const struct call call = { scene, settings, pool, &report, err };
 	fenv_t callers;
+
 	set_environment(&callers);
 	const int rc = make_stack(r, &call, 0);
 	r->is_object = is_object;
@@ -172,17 +182,19 @@ static void shade_one(int row, void *userdata)
 	const struct buffers *b = &r->buffers;
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(plan, (uint32_t)row);
 	const uint64_t start = clock_ns();
+
 	shade_rows(r->simd, plan, &r->picture, y0, y1, &counts);
 	for (uint32_t y = y0; y < y1; y++) {
 		const size_t first = (size_t)y * plan->width;
 		const uint64_t *word = psr_zstack_row(&b->stack, y);
-		if (r->depth)
+
+		if (r->depth != NULL)
 			r->simd->depth_row(r->depth + first, word, plan->width, b->stack.exponent);
 		if (r->has_planes)
 			planes_row(r->simd, plan, r->frame, word, b->weight + first, y);
 	}
 	const uint64_t middle = clock_ns();
-	if (r->picture.wants)
+	if (r->picture.wants != NULL)
 		fill_pull(&r->fill, (uint32_t)row);
 	counts.row_ns = middle - start;
 	counts.fill_ns = clock_ns() - middle;
@@ -194,6 +206,7 @@ static uint32_t find_gaps(struct psr_renderer *r, struct psr_pool *pool, struct 
 {
 	const int n = (int)n_brick_rows(&r->plan);
 	uint32_t n_marked = 0;
+
 	psr_pool_for(pool, n, gaps_one, r);
 	for (int i = 0; i < n; i++) {
 		n_marked += r->buffers.gaps[i].n_marked;
@@ -204,12 +217,13 @@ static uint32_t find_gaps(struct psr_renderer *r, struct psr_pool *pool, struct 
 
 static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
-	const enum psr_why why = r->plan.is_full || !r->frame->rgb ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+	const enum psr_why why = r->plan.is_full || r->frame->rgb == NULL ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+
 	effect_note(report, PSR_EFFECT_TABLE, why, PSR_DIRECTIONS);
 	if (why != PSR_WHY_RAN)
 		return PSR_OK;
 	r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
-	if (!r->lit)
+	if (r->lit == NULL)
 		return PSR_ERR_MEMORY;
 	shade_tabulate(r->simd, &r->plan, pool, r->lit);
 	r->plan.view.lit = (const float(*)[4])r->lit;
@@ -235,8 +249,9 @@ static int begin_smooth(struct psr_renderer *r, enum psr_why smooth, uint8_t **r
 static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
 	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, r->buffers.stack.exponent };
-	const int is_wanted = r->frame->rgb || r->frame->depth, is_drawn = is_wanted && r->plan.has_sheer;
+	const int is_wanted = r->frame->rgb != NULL || r->frame->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
 	const enum psr_why why = is_drawn ? PSR_WHY_RAN : is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+
 	if (is_drawn && sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool))
 		return PSR_ERR_MEMORY;
 	effect_note(report, PSR_EFFECT_SHEER, why, r->sheer.n_pixels);
@@ -248,6 +263,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
                         struct psr_frame *frame, struct psr_error *err)
 {
 	struct buffers *b = &r->buffers;
+
 	if (stack != &b->stack)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack belongs to another renderer");
 	if (frame->width != stack->width || frame->height != stack->height)
@@ -256,16 +272,17 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 	struct psr_report *report = &frame->report;
 	*report = r->report;
 	r->frame = frame;
-	r->has_planes = frame->normal || frame->id || frame->block || frame->weight || frame->words;
+	r->has_planes = frame->normal != NULL || frame->id != NULL || frame->block != NULL
+	                || frame->weight != NULL || frame->words != NULL;
 
-	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb ? PSR_WHY_RAN : PSR_WHY_NOTHING;
+	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb != NULL ? PSR_WHY_RAN : PSR_WHY_NOTHING;
 	uint8_t *rgb;
 	int rc = begin_smooth(r, smooth, &rgb, err);
 	if (rc)
 		return rc;
-	if (r->plan.has_sheer && frame->rgb && !r->depth) {
+	if (r->plan.has_sheer && frame->rgb != NULL && r->depth == NULL) {
 		r->depth = sheer_depths(&r->sheer, &r->plan);
-		if (!r->depth)
+		if (r->depth == NULL)
 			return psr_fail(err, PSR_ERR_MEMORY, "no memory for the depths of a picture of %ux%u", r->plan.width,
 			                r->plan.height);
 	}
@@ -306,6 +323,7 @@ int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr
                struct psr_error *err)
 {
 	fenv_t callers;
+
 	set_environment(&callers);
 	const int rc = finish_stack(r, stack, pool, frame, err);
 	fesetenv(&callers);
@@ -317,6 +335,7 @@ int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const s
 {
 	const struct call call = { scene, settings, pool, &frame->report, err };
 	fenv_t callers;
+
 	set_environment(&callers);
 	int rc = make_stack(r, &call, frame->rgb != NULL);
 	if (rc == PSR_OK)

@@ -19,6 +19,7 @@ static void rotation_matrix(double m[3][3], const double q[4])
 {
 	double n = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
 	double x = q[0] / n, y = q[1] / n, z = q[2] / n, w = q[3] / n;
+
 	v3d_set(m[0], 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w));
 	v3d_set(m[1], 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w));
 	v3d_set(m[2], 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y));
@@ -27,6 +28,7 @@ static void rotation_matrix(double m[3][3], const double q[4])
 static void view_make(struct view *view, const struct psr_camera *camera)
 {
 	double forward[3], right[3];
+
 	v3d_sub(forward, camera->target, camera->eye);
 	v3d_normalize(forward, forward);
 	v3d_normalize(right, camera->up);
@@ -42,6 +44,7 @@ double plan_place(double center[3], double rotation[3][3], const struct psr_inst
 {
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	double turned[3];
+
 	rotation_matrix(rotation, instance->rotation);
 	m3d_apply(turned, (const double(*)[3])rotation, info->origin);
 	for (int i = 0; i < 3; i++)
@@ -58,6 +61,7 @@ static int scene_exponent(const struct psr_scene *scene)
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		double center[3], rotation[3][3];
 		double scale = plan_place(center, rotation, &scene->instance[i], scene->camera.eye);
+
 		far = fmax(far, v3d_length(center) + scale);
 	}
 	frexp(far, &exponent);
@@ -67,6 +71,7 @@ static int scene_exponent(const struct psr_scene *scene)
 static void light_make(struct strip_light *out, const struct psr_light *light, const struct view *view)
 {
 	double v[3], s, c;
+
 	out->kind = light->kind;
 	for (int i = 0; i < 3; i++)
 		out->color[i] = (float)light->color[i];
@@ -108,6 +113,7 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 	for (int a = 0; a < 3; a++) {
 		for (int k = 0; k < 4; k++) {
 			const double sideways = (a < 2 ? focal : 1) * column[k][a];
+
 			to[k][a] = length[k] * (sideways + (plan->perspective ? half[a] * column[k][2] : k == 3 ? half[a] : 0));
 		}
 		for (int i = 0; i < 8; i++) {
@@ -122,6 +128,7 @@ static void sight_make(struct warp_instance *out, double turn[3][3], const struc
 {
 	for (int k = 0; k < 3; k++) {
 		const double across = turn[0][k] / focal, down = turn[1][k] / focal, forward = turn[2][k];
+
 		out->du[k] = (float)(plan->perspective ? across : 0);
 		out->dv[k] = (float)(plan->perspective ? down : 0);
 		out->d0[k] = (float)(plan->perspective ? forward - across * plan->center[0] - down * plan->center[1] : forward);
@@ -141,7 +148,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
-		.with_splats = plan->with_splats || warp->blocks->opacity,
+		.with_splats = plan->with_splats || warp->blocks->opacity != NULL,
 		.region_from = { (float)plan->window.left, (float)plan->window.top },
 		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
 		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
@@ -167,10 +174,10 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	/* Masks hold for eyes outside of the object's convex hull; the unit sphere contains that. */
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	const int is_outside = !plan->perspective || v3d_length(eye) > 1;
-	out->masks = !(plan->cull_tests & PSR_CULL_MASKS)                        ? PSR_WHY_OFF
-	             : !warp->blocks->visibility_mask                            ? PSR_WHY_NOTHING
-	             : !is_outside || info->n_trials == 0 || info->n_lost > 0    ? PSR_WHY_VOID
-	                                                                         : PSR_WHY_RAN;
+	out->masks = !(plan->cull_tests & PSR_CULL_MASKS)                     ? PSR_WHY_OFF
+	             : warp->blocks->visibility_mask == NULL                  ? PSR_WHY_NOTHING
+	             : !is_outside || info->n_trials == 0 || info->n_lost > 0 ? PSR_WHY_VOID
+	                                                                      : PSR_WHY_RAN;
 
 	struct warp_lattice *const lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
@@ -183,6 +190,7 @@ static void threshold_make(struct plan *plan, double gap_threshold)
 {
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		float t = (float)(gap_threshold * (1 << k) / 2) / plan->focal;
+
 		plan->gap_scale[k] = plan->perspective ? 1 + t : 1;
 		plan->gap_offset[k] = plan->perspective ? 0 : t;
 	}
@@ -195,8 +203,8 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 
 	for (uint32_t i = 0; i < scene->n_instances; i++)
 		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
-	const size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light) +
-	              scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
+	const size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light)
+	                    + scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	plan->storage = psr_grow_huge(plan->storage, &plan->storage_size, size + 1);
 	if (plan->storage == NULL)
 		return PSR_ERR_MEMORY;
@@ -208,6 +216,7 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	plan->n_samples = 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_blocks *blocks = psr_model_blocks(scene->instance[i].model);
+
 		plan->instance[i].first_slot = plan->n_slots;
 		plan->warp[i].blocks = blocks;
 		plan->warp[i].lattice = lattice;
@@ -233,6 +242,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	struct view view;
 	double focal;
 	int rc = storage_make(plan, scene);
+
 	if (rc)
 		return psr_fail(err, rc, "no memory for a scene of %u instances", scene->n_instances);
 
@@ -265,6 +275,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 
 	if (plan->perspective) {
 		double s, c;
+
 		psr_sincos(camera->fov_y / 2, &s, &c);
 		focal = plan->window.picture_height / 2.0 * c / s;
 		plan->tangent[0] = plan->window.picture_width / 2.0 / focal;
@@ -293,6 +304,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	};
 	for (uint32_t l = 0; l < scene->n_lights; l++) {
 		const double *color = scene->light[l].color;
+
 		if (!(color[0] > 0 || color[1] > 0 || color[2] > 0) && !plan->is_full)
 			continue;
 		light_make(&plan->light[plan->n_lights], &scene->light[l], &view);
@@ -315,8 +327,10 @@ void plan_clear(struct plan *plan)
 uint32_t plan_find_instance(const struct plan *plan, uint32_t slot)
 {
 	uint32_t low = 0, high = plan->n_instances;
+
 	while (high - low > 1) {
 		uint32_t middle = (low + high) / 2;
+
 		if (plan->instance[middle].first_slot <= slot)
 			low = middle;
 		else

@@ -62,7 +62,7 @@ uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
 
 static inline int plan_is_quiet(const struct plan *plan, uint32_t x, uint32_t y)
 {
-	return plan->is_quiet && plan->is_quiet[y / PART_HEIGHT * plan->parts_x + x / PART_WIDTH];
+	return plan->is_quiet != NULL && plan->is_quiet[y / PART_HEIGHT * plan->parts_x + x / PART_WIDTH];
 }
 
 #endif

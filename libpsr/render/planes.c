@@ -5,9 +5,11 @@
 static void put_words(const struct simd *simd, const struct plan *plan, uint64_t *to, const uint64_t *word, uint32_t n)
 {
 	float z[STRIP];
+
 	simd->depth_row(z, word, n, plan->exponent);
 	for (uint32_t x = 0; x < n; x++) {
 		uint32_t bits;
+
 		memcpy(&bits, &z[x], sizeof bits);
 		to[x] = (uint64_t)bits << 32 | (uint32_t)word[x];
 	}
@@ -23,6 +25,7 @@ static void put_weights(uint8_t *to, const uint16_t *weight, uint32_t n)
 static int16_t to_steps(float n)
 {
 	const float scaled = n * 32767, clamped = scaled < -32767 ? -32767 : scaled > 32767 ? 32767 : scaled;
+
 	return (int16_t)(clamped + (clamped < 0 ? -0.5f : 0.5f));
 }
 
@@ -31,6 +34,7 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 {
 	struct strip_view view = plan->view;
 	struct strip strip;
+
 	view.lit = NULL; /* with a table of light, strip_resolve skips normals */
 	memset(to, 0, 3 * n * sizeof *to);
 	if (!pixels->n)
@@ -44,6 +48,7 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 			const float right = (float)plan->axes[0][a], down = (float)plan->axes[1][a],
 						forward = (float)plan->axes[2][a];
 			const float world = (right * strip.nx[i] + down * strip.ny[i]) + forward * strip.nz[i];
+
 			to[3 * pixels->x[i] + a] = to_steps(world);
 		}
 }
@@ -62,6 +67,7 @@ static void describe(uint8_t to[3], const struct simd *simd, const struct plan *
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint32_t block = slot - in->first_slot;
 	struct cull_batch batch;
+
 	simd->cull(&batch, &in->cull, block, 1);
 	to[0] = (uint8_t)psr_blocks_level(b, block);
 	to[1] = batch.level[0] > PSR_MAX_DEPTH_LEVEL ? PSR_MAX_DEPTH_LEVEL : batch.level[0];
@@ -73,9 +79,11 @@ static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t
                        uint32_t n)
 {
 	uint8_t last[3] = { 0, 0, 0 };
+
 	memset(to, 0xff, 3 * n);
 	for (uint32_t i = 0; i < pixels->n; i++) {
 		const uint32_t slot = pixels->id[i] / PSR_BLOCK_SAMPLES;
+
 		if (i == 0 || slot != pixels->id[i - 1] / PSR_BLOCK_SAMPLES)
 			describe(last, simd, plan, slot);
 		memcpy(to + 3 * pixels->x[i], last, 3);
@@ -87,10 +95,12 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 {
 	const size_t row = (size_t)y * plan->width;
 	struct strip_pixels pixels;
+
 	pixels.y = y;
 	for (uint32_t x = 0; x < plan->width; x += STRIP) {
 		const uint32_t n = plan->width - x < STRIP ? plan->width - x : STRIP;
 		const size_t first = row + x;
+
 		if (frame->words != NULL)
 			put_words(simd, plan, frame->words + first, word + x, n);
 		if (frame->weight != NULL)

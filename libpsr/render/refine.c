@@ -48,6 +48,7 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 {
 	const size_t area = (size_t)WINDOW_WIDTH * WINDOW_HEIGHT;
 	struct refiner *r = calloc(1, sizeof *r);
+
 	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	r->renderer = renderer;
@@ -84,8 +85,10 @@ static void average_color(const struct part *part, size_t first, size_t at)
 	const struct refiner *r = part->refiner;
 	const uint32_t side = 1u << part->pass, half = 1u << (2 * part->pass - 1);
 	uint32_t sum[3] = { half, half, half };
+
 	for (uint32_t j = 0; j < side; j++) {
 		const uint8_t *rgb = r->rgb + 3 * (first + (size_t)j * part->stride);
+
 		for (uint32_t i = 0; i < side; i++)
 			for (int c = 0; c < 3; c++)
 				sum[c] += r->linear[rgb[3 * i + (uint32_t)c]];
@@ -98,9 +101,11 @@ static void find_nearest(const struct part *part, size_t first, size_t at)
 {
 	const uint32_t side = 1u << part->pass;
 	float nearest = INFINITY;
+
 	for (uint32_t j = 0; j < side; j++)
 		for (uint32_t i = 0; i < side; i++) {
 			const float z = part->refiner->depth[first + (size_t)j * part->stride + i];
+
 			nearest = z < nearest ? z : nearest;
 		}
 	part->frame->depth[at] = nearest;
@@ -110,13 +115,15 @@ static void average_row(int row, void *userdata)
 {
 	const struct part *part = userdata;
 	const uint32_t side = 1u << part->pass, y = part->y0 + (uint32_t)row;
+
 	for (uint32_t x = part->x0; x < part->x1; x++) {
 		const size_t first =
 			(size_t)(part->top + (uint32_t)row * side) * part->stride + part->left + (x - part->x0) * side;
 		const size_t at = (size_t)y * part->frame->width + x;
-		if (part->frame->rgb)
+
+		if (part->frame->rgb != NULL)
 			average_color(part, first, at);
-		if (part->frame->depth)
+		if (part->frame->depth != NULL)
 			find_nearest(part, first, at);
 	}
 }
@@ -186,6 +193,7 @@ static int draw_window(struct refiner *r, const struct psr_scene *scene, const s
 static void erode(uint8_t *to, const uint8_t *from, uint32_t n, size_t step)
 {
 	uint32_t n_whole = 0; /* up to here, without any that is 0 */
+
 	for (uint32_t x = 0; x < n + INSIDE; x++) {
 		n_whole = x >= n || from[x * step] ? n_whole + 1 : 0;
 		if (x >= INSIDE)
@@ -197,12 +205,14 @@ static void erode_row(int y, void *userdata)
 {
 	const struct erosion *e = userdata;
 	const size_t first = (size_t)y * e->width;
+
 	erode(e->scratch + first, e->is_inside + first, e->width, 1);
 }
 
 static void erode_column(int x, void *userdata)
 {
 	const struct erosion *e = userdata;
+
 	erode(e->is_inside + x, e->scratch + x, e->height, e->width);
 }
 
@@ -258,7 +268,7 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 		return rc;
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x; i++) {
-			if (settings->is_cancelled && settings->is_cancelled(settings->userdata))
+			if (settings->is_cancelled != NULL && settings->is_cancelled(settings->userdata))
 				return psr_fail(err, PSR_ERR_CANCELLED, "nobody waits for pass %u any more", pass);
 			rc = draw_window(r, scene, settings, i, j, pool, frame, err);
 			if (rc)

@@ -5,6 +5,7 @@ const char *psr_stage_name(enum psr_stage stage)
 {
 	static const char *const names[PSR_N_STAGES] = { "plan",    "shadow", "cull", "warp",  "gaps",
 		                                             "resolve", "shade",  "fill", "smooth" };
+
 	return (unsigned)stage < PSR_N_STAGES ? names[stage] : "?";
 }
 
@@ -25,6 +26,7 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 {
 	struct refiner **refiner = renderer_refiner(renderer);
 	struct render_settings settings;
+
 	render_settings_default(&settings, asked->width, asked->height);
 	settings.spacing_px = asked->spacing_px;
 	settings.is_smooth = asked->is_smooth;
@@ -33,6 +35,6 @@ int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, con
 	settings.userdata = asked->userdata;
 	if (settings.pass == 0)
 		return renderer_draw(renderer, scene, &settings, pool, frame, err);
-	const int rc = *refiner ? PSR_OK : refiner_create(refiner, renderer, err);
+	const int rc = *refiner != NULL ? PSR_OK : refiner_create(refiner, renderer, err);
 	return rc ? rc : refiner_draw(*refiner, scene, &settings, pool, frame, err);
 }

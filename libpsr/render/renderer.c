@@ -8,7 +8,8 @@ int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
 	fenv_t callers;
-	if (!r)
+
+	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
 	set_environment(&callers);
@@ -31,7 +32,7 @@ struct refiner **renderer_refiner(struct psr_renderer *r)
 
 void psr_renderer_destroy(struct psr_renderer *r)
 {
-	if (!r)
+	if (r == NULL)
 		return;
 	refiner_destroy(r->refiner);
 	plan_clear(&r->plan);
@@ -47,9 +48,11 @@ void psr_renderer_destroy(struct psr_renderer *r)
 
 uint64_t psr_renderer_bytes(const struct psr_renderer *r)
 {
-	const uint64_t refiner = r->refiner ? refiner_bytes(r->refiner) : 0;
-	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size + sheer_bytes(&r->sheer) +
-	       r->buffers.pixels_size + r->buffers.counters_size + r->lit_size + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
+	const uint64_t refiner = r->refiner != NULL ? refiner_bytes(r->refiner) : 0;
+
+	return sizeof *r + refiner + r->plan.storage_size + r->fill.storage_size + r->smooth.storage_size
+	       + sheer_bytes(&r->sheer) + r->buffers.pixels_size + r->buffers.counters_size + r->lit_size
+	       + bins_bytes(&r->bins) + shadow_bytes(r->shadow);
 }
 
 void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)

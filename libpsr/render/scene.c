@@ -9,7 +9,7 @@
 
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
-	if (!instance->model || !psr_model_blocks(instance->model))
+	if (instance->model == NULL || psr_model_blocks(instance->model) == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no blocks", i);
 	double q = 0;
 	for (int k = 0; k < 4; k++)
@@ -88,12 +88,14 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 	}
 	if (fov_y > 0) {
 		double s, c;
+
 		psr_sincos(fov_y / 2, &s, &c);
 		tangent[0] *= s / c;
 		tangent[1] *= s / c;
 	}
 	for (int corner = 0; corner < 8; corner++) {
 		double p[3];
+
 		for (int i = 0; i < 3; i++)
 			p[i] = corner >> i & 1 ? half[i] : -half[i];
 		double x = fabs(v3d_dot(p, right)) / tangent[0], y = fabs(v3d_dot(p, down)) / tangent[1],
@@ -117,6 +119,7 @@ void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const 
 void psr_light_key(struct psr_light *light, const struct psr_camera *camera)
 {
 	double forward[3], right[3], up[3];
+
 	*light = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 1, 1, 1 } };
 	v3d_sub(forward, camera->target, camera->eye);
 	v3d_normalize(forward, forward);

@@ -3,15 +3,16 @@
 int settings_validate(const struct render_settings *settings, struct psr_error *err)
 {
 	uint32_t w = settings->width, h = settings->height;
+
 	if (w < 1 || h < 1)
 		return psr_fail(err, PSR_ERR_ARG, "a picture of %ux%u has no pixels", w, h);
 	if (w > PSR_MAX_SIDE || h > PSR_MAX_SIDE || (uint64_t)w * h > PSR_MAX_PIXELS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a picture of %ux%u is too large: at most %d a side and %u pixels", w, h,
 		                PSR_MAX_SIDE, PSR_MAX_PIXELS);
 	const struct psr_window *window = &settings->window;
-	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE ||
-	    !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE ||
-	    window->top < -PSR_MAX_SIDE || window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
+	if (window->picture_width > PSR_MAX_PICTURE_SIDE || window->picture_height > PSR_MAX_PICTURE_SIDE
+	    || !window->picture_width != !window->picture_height || window->left < -PSR_MAX_SIDE
+	    || window->top < -PSR_MAX_SIDE || window->left > PSR_MAX_PICTURE_SIDE || window->top > PSR_MAX_PICTURE_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "a window at (%d, %d) of a picture of %ux%u is not possible",
 		                (int)window->left, (int)window->top, window->picture_width, window->picture_height);
 	if (settings->cull_tests & ~(unsigned)PSR_CULL_ALL)

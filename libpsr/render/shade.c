@@ -30,12 +30,14 @@ static void tabulate_part(int part, void *userdata)
 	const struct tabulating *t = userdata;
 	const struct plan *plan = t->plan;
 	const struct strip_lights lights = { plan->light, plan->n_lights, plan->ambient };
+
 	t->simd->strip_lit(t->lit, &plan->view, &lights, (uint32_t)part * STRIP, STRIP);
 }
 
 void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
 {
 	struct tabulating tabulating = { simd, plan, lit };
+
 	_Static_assert(PSR_DIRECTIONS % STRIP == 0, "parts are whole strips");
 	psr_pool_for(pool, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
 }
@@ -43,7 +45,8 @@ void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr
 static void add_light(const struct simd *simd, const struct plan *plan, struct strip *strip, uint32_t l)
 {
 	float reaches[STRIP];
-	if (!plan->shadow || !plan->shadow[l].n_maps)
+
+	if (plan->shadow == NULL || !plan->shadow[l].n_maps)
 		simd->strip_light(strip, &plan->light[l], NULL);
 	else if (simd->strip_shadow(strip, &plan->shadow[l], reaches))
 		simd->strip_light(strip, &plan->light[l], reaches);
@@ -63,6 +66,7 @@ static uint32_t list_strip(struct strip_pixels *pixels, const struct shading *s,
 {
 	const struct plan *plan = s->plan;
 	const uint32_t left = plan->width - x;
+
 	pixels->x0 = x;
 	pixels->y = y;
 	if (plan_is_quiet(plan, x, y))
@@ -82,7 +86,8 @@ static void begin_strip(struct strip_pixels *pixels, const struct shading *s, ui
 static void light_strip(struct strip *strip, const struct shading *s)
 {
 	const struct plan *plan = s->plan;
-	for (uint32_t l = 0; l < plan->n_lights && !(plan->view.lit && !strip->is_specular); l++)
+
+	for (uint32_t l = 0; l < plan->n_lights && (plan->view.lit == NULL || strip->is_specular); l++)
 		add_light(s->simd, plan, strip, l);
 	s->simd->strip_color(strip);
 }
@@ -93,7 +98,8 @@ static void write_strip(const struct strip *strip, const struct shading *s)
 	const struct shade_picture *to = s->picture;
 	const uint32_t x = strip->pixels->x0, y = strip->pixels->y, left = plan->width - x;
 	const uint8_t *wants = to->wants;
-	if (wants)
+
+	if (wants != NULL)
 		wants += (size_t)(y / BRICK) * ((plan->width + BRICK - 1) / BRICK) + x / BRICK;
 	const struct strip_target target = { plan->width, to->rgb, to->srgb, wants, to->r, to->g, to->b,
 		                                 { plan->background[0], plan->background[1], plan->background[2] } };
@@ -104,6 +110,7 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
                     struct strip_pixels *pixels, struct strip *strip)
 {
 	const struct shading shading = { simd, plan, NULL };
+
 	strip->pixels = pixels;
 	simd->strip_list(pixels, word, NULL, n);
 	if (!pixels->n)
@@ -122,7 +129,8 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	const uint32_t per_row = (plan->width + STRIP - 1) / STRIP, n = (y1 - y0) * per_row;
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
-	if (!picture->rgb) {
+
+	if (picture->rgb == NULL) {
 		for (uint32_t i = 0; i < n; i++)
 			counts->n_pixels += list_strip(&pixels[0], &shading, i % per_row * STRIP, y0 + i / per_row);
 		return;
@@ -131,6 +139,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	for (uint32_t i = 0; i < n; i++) {
 		const int is_timed = (i % per_row + i / per_row) % TIMED_EVERY == 0;
 		const uint64_t start = is_timed ? clock_ns() : 0;
+
 		strip.pixels = &pixels[i % 2];
 		if (i + 1 < n)
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
@@ -161,8 +170,10 @@ void shade_report(const struct plan *plan, const struct shade_counts *rows, uint
                   struct psr_report *report)
 {
 	struct shade_counts all = { 0 };
+
 	for (uint32_t i = 0; i < (plan->height + BRICK - 1) / BRICK; i++) {
 		const struct shade_counts *row = &rows[i];
+
 		all.n_pixels += row->n_pixels;
 		all.n_specular += row->n_specular;
 		all.resolve_ns += row->resolve_ns;

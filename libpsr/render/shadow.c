@@ -29,7 +29,7 @@ static void drop(struct shadow_kept *kept)
 
 void shadow_destroy(struct shadow *shadow)
 {
-	if (!shadow)
+	if (shadow == NULL)
 		return;
 	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
 		for (int f = 0; f < SHADOW_FACES; f++)
@@ -43,7 +43,7 @@ void shadow_destroy(struct shadow *shadow)
 
 uint64_t shadow_bytes(const struct shadow *shadow)
 {
-	if (!shadow)
+	if (shadow == NULL)
 		return 0;
 	const struct shadow_drawer *drawer = &shadow->drawer;
 	uint64_t n = sizeof *shadow + drawer->plan.storage_size + drawer->word_size + drawer->cells_size;
@@ -67,11 +67,13 @@ static int can_cast(const struct psr_light *light)
 static int in_view(const struct plan *plan, const float c[3], float r)
 {
 	const float half[2] = { (float)plan->window.picture_width / 2, (float)plan->window.picture_height / 2 };
+
 	if (!(c[2] + r > plan->near_z))
 		return 0;
 	for (int a = 0; a < 2; a++) {
 		const float along = plan->perspective ? c[2] : 1, f = plan->focal;
 		const float reach = r * (plan->perspective ? sqrtf(f * f + half[a] * half[a]) : f);
+
 		if (fabsf(c[a]) * f - half[a] * along > reach)
 			return 0;
 	}
@@ -82,6 +84,7 @@ static int in_view(const struct plan *plan, const float c[3], float r)
 static int in_cone(const struct strip_light *light, double outer, const float c[3], float r)
 {
 	double to[3], axis[3], s, cosine;
+
 	v3d_set(to, (double)c[0] - (double)light->position[0], (double)c[1] - (double)light->position[1],
 	        (double)c[2] - (double)light->position[2]);
 	v3d_set(axis, (double)light->axis[0], (double)light->axis[1], (double)light->axis[2]);
@@ -96,6 +99,7 @@ static int reaches_view(const struct plan *plan, const struct psr_light *light, 
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct cull_view *v = &plan->instance[i].cull;
 		const float c[3] = { v->center_m[0][3], v->center_m[1][3], v->center_m[2][3] }, r = v->scale * 1.01f;
+
 		if (in_view(plan, c, r) && (light->kind != PSR_LIGHT_SPOT || in_cone(&plan->light[p], light->outer, c, r)))
 			return 1;
 	}
@@ -106,17 +110,19 @@ static int reaches_view(const struct plan *plan, const struct psr_light *light, 
 static int note_instances(struct shadow *shadow, const struct psr_scene *scene, int *has_changed)
 {
 	const uint32_t n = scene->n_instances;
+
 	*has_changed = n != shadow->n_placed;
 	if (*has_changed) {
 		free(shadow->placed);
 		shadow->placed = calloc(n, sizeof *shadow->placed);
-		shadow->n_placed = shadow->placed ? n : 0;
-		if (!shadow->placed)
+		shadow->n_placed = shadow->placed != NULL ? n : 0;
+		if (shadow->placed == NULL)
 			return PSR_ERR_MEMORY;
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		const struct psr_instance *from = &scene->instance[i];
 		struct placed to = { .scale = from->scale };
+
 		psr_model_content_id(from->model, to.content_id);
 		memcpy(to.rotation, from->rotation, sizeof to.rotation);
 		memcpy(to.translation, from->translation, sizeof to.translation);
@@ -129,9 +135,10 @@ static int note_instances(struct shadow *shadow, const struct psr_scene *scene, 
 static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 {
 	const struct psr_camera *p = &a->camera, *q = &b->camera;
-	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0 &&
-	       memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0 &&
-	       p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
+
+	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0
+	       && memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0
+	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
 }
 
 /* Texels a side: as many as the picture's greater side has pixels, but at most SHADOW_TEXELS in the n_maps of the whole
@@ -140,6 +147,7 @@ static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 {
 	const uint32_t w = plan->window.picture_width, h = plan->window.picture_height;
 	uint32_t side = w > h ? w : h;
+
 	side = side < 64 ? 64 : side > SHADOW_SIDE ? SHADOW_SIDE : side;
 	while ((uint64_t)n_maps * side * side > SHADOW_TEXELS)
 		side -= 16;
@@ -152,6 +160,7 @@ static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, con
 	struct shadow_bounds bounds;
 	struct shadow_fit fit[SHADOW_FACES];
 	uint32_t n_maps = 0;
+
 	shadow_bounds_make(&bounds, scene);
 	for (uint32_t l = 0; l < scene->n_lights; l++)
 		if (can_cast(&scene->light[l]))
@@ -160,10 +169,12 @@ static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, con
 	for (uint32_t l = 0; l < PSR_MAX_LIGHTS; l++) {
 		const int can = l < scene->n_lights && can_cast(&scene->light[l]);
 		const uint32_t n = can ? shadow_fit_light(fit, &scene->light[l], scene, &bounds, side) : 0;
+
 		shadow->n_maps[l] = n;
 		for (uint32_t f = 0; f < SHADOW_FACES; f++) {
 			struct shadow_kept *kept = &shadow->kept[l][f];
-			if (kept->cells && (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height))
+
+			if (kept->cells != NULL && (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height))
 				drop(kept);
 			if (f < n && (has_changed || !same_fit(&kept->fit, &fit[f]))) {
 				kept->is_drawn = 0;
@@ -185,11 +196,14 @@ static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const st
 {
 	struct shadow_light *light = &shadow->light[p];
 	const int is_needed = plan->is_full || reaches_view(plan, &call->scene->light[l], p);
+
 	light->n_maps = is_needed ? shadow->n_maps[l] : 0;
 	for (uint32_t f = 0; f < light->n_maps; f++) {
 		struct shadow_kept *kept = &shadow->kept[l][f];
+
 		if (!kept->is_drawn) {
 			int rc = shadow_map_draw(kept, &shadow->drawer, call);
+
 			if (rc)
 				return rc;
 			call->report->n_shadow_maps_drawn++;
@@ -205,6 +219,7 @@ int shadow_prepare(struct shadow **out, struct plan *plan, const struct shadow_c
 	const struct psr_scene *scene = call->scene;
 	struct psr_report *report = call->report;
 	int n_casting = 0, has_changed;
+
 	for (uint32_t l = 0; l < scene->n_lights; l++)
 		n_casting += can_cast(&scene->light[l]);
 	if (!n_casting || !scene->n_instances) {
@@ -213,10 +228,10 @@ int shadow_prepare(struct shadow **out, struct plan *plan, const struct shadow_c
 		effect_note(report, PSR_EFFECT_SHADOWS, PSR_WHY_NOTHING, 0);
 		return PSR_OK;
 	}
-	if (!*out)
+	if (*out == NULL)
 		*out = calloc(1, sizeof **out);
 	struct shadow *shadow = *out;
-	if (!shadow || note_instances(shadow, scene, &has_changed))
+	if (shadow == NULL || note_instances(shadow, scene, &has_changed))
 		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for shadow maps");
 	fit_lights(shadow, scene, plan, has_changed);
 	for (uint32_t l = 0, p = 0; l < scene->n_lights; l++) {

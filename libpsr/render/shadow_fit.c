@@ -19,6 +19,7 @@ static void range_along(const struct psr_instance *instance, const double axis[3
 	const double radius = plan_place(center, rotation, instance, origin);
 	const double sphere = v3d_dot(axis, center);
 	double turned[3];
+
 	m3d_apply_transposed(turned, (const double(*)[3])rotation, axis);
 	for (int k = 0; k < 3; k++) {
 		middle[k] = info->box_min[k] / 2 + info->box_max[k] / 2;
@@ -35,6 +36,7 @@ static void scene_range(const struct psr_scene *scene, const double axis[3], dou
 	*high = -INFINITY;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		double l, h;
+
 		range_along(&scene->instance[i], axis, &l, &h);
 		*low = fmin(*low, l);
 		*high = fmax(*high, h);
@@ -46,8 +48,10 @@ static double radius_about(const struct psr_instance *instance, const double poi
 	const struct psr_model_info *info = psr_model_info(instance->model);
 	double center[3], rotation[3][3], farthest = 0;
 	const double radius = plan_place(center, rotation, instance, point);
+
 	for (int corner = 0; corner < 8; corner++) {
 		double p[3];
+
 		for (int k = 0; k < 3; k++)
 			p[k] = instance->scale * ((corner >> k & 1 ? info->box_max[k] : info->box_min[k]) - info->origin[k]);
 		m3d_apply(p, (const double(*)[3])rotation, p);
@@ -63,11 +67,13 @@ void shadow_bounds_make(struct shadow_bounds *bounds, const struct psr_scene *sc
 	bounds->radius = 0;
 	for (int k = 0; k < 3; k++) {
 		double low, high;
+
 		scene_range(scene, (const double[3]){ k == 0, k == 1, k == 2 }, &low, &high);
 		bounds->center[k] = low / 2 + high / 2;
 	}
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		const struct psr_instance *instance = &scene->instance[i];
+
 		bounds->radius = fmax(bounds->radius, radius_about(instance, bounds->center));
 		bounds->spacing = fmin(bounds->spacing, psr_model_info(instance->model)->spacing * instance->scale);
 	}
@@ -77,6 +83,7 @@ void shadow_bounds_make(struct shadow_bounds *bounds, const struct psr_scene *sc
 static void any_up(double up[3], const double v[3])
 {
 	int least = 0;
+
 	for (int k = 1; k < 3; k++)
 		if (fabs(v[k]) < fabs(v[least]))
 			least = k;
@@ -87,8 +94,10 @@ static void any_up(double up[3], const double v[3])
 static double angle_of(double tangent)
 {
 	double low = 0, high = HALF_PI;
+
 	for (int i = 0; i < 60; i++) {
 		double middle = (low + high) / 2, s, c;
+
 		psr_sincos(middle, &s, &c);
 		if (s < tangent * c)
 			low = middle;
@@ -109,6 +118,7 @@ static uint32_t fit_directional(struct shadow_fit *fit, const struct psr_light *
 {
 	double axis[3][3], low[3], high[3];
 	struct psr_camera *camera = &fit->camera;
+
 	v3d_normalize(axis[2], light->direction);
 	any_up(camera->up, axis[2]);
 	v3d_cross(axis[0], axis[2], camera->up);
@@ -147,6 +157,7 @@ static void fit_square(struct shadow_fit *fit, const struct psr_light *light, co
 	const double tangent = field->tangent, *axis = field->axis, *position = light->position;
 	struct psr_camera *camera = &fit->camera;
 	const double adequate = 2 * tangent * field->distance / bounds->spacing + 2 * MARGIN;
+
 	fit->width = fit->height = clamp_side(ceil(adequate), side);
 	memcpy(camera->eye, position, sizeof camera->eye);
 	v3d_add_scaled(camera->target, position, field->distance, axis);
@@ -171,6 +182,7 @@ static int face_sees(const double face[3], const double to[3], double radius, co
 					return 0;
 	if (light->kind == PSR_LIGHT_SPOT && light->outer + CORNER < 2 * HALF_PI) {
 		double axis[3], s, c;
+
 		v3d_normalize(axis, light->direction);
 		psr_sincos(light->outer + CORNER, &s, &c);
 		return v3d_dot(axis, face) > c - 1e-9;
@@ -182,8 +194,10 @@ static uint32_t fit_cube(struct shadow_fit fit[SHADOW_FACES], const struct psr_l
                          double distance, const struct shadow_bounds *bounds, uint32_t side)
 {
 	uint32_t n = 0;
+
 	for (int f = 0; f < SHADOW_FACES; f++) {
 		struct field face = { { 0, 0, 0 }, 1, distance };
+
 		face.axis[f / 2] = f & 1 ? -1 : 1;
 		if (face_sees(face.axis, to, bounds->radius, light))
 			fit_square(&fit[n++], light, &face, bounds, side);

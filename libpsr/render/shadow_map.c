@@ -40,10 +40,12 @@ static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 	const uint32_t width = plan->width - x0 < TILE_WIDTH ? plan->width - x0 : TILE_WIDTH;
 	const int is_empty = !d->stack.levels && d->bins->tile_begin[tile] == d->bins->tile_begin[tile + 1];
 	const struct warp_into into = { &d->stack, 0, own };
+
 	if (!is_empty)
 		atomic_fetch_add(&d->n_samples, warp_tile(d->simd, plan, d->bins, &into, tile).n_inside);
 	for (uint32_t y = y0; y < y0 + TILE_HEIGHT && y < plan->height; y++) {
 		float *to = d->cells + (size_t)(y + 1) * d->stride + x0 + 1;
+
 		if (is_empty)
 			clear_cells(to, width);
 		else
@@ -57,6 +59,7 @@ static void draw_some(int part, void *userdata)
 	struct drawing *d = userdata;
 	const uint32_t n_tiles = d->drawer->plan.tiles_x * d->drawer->plan.tiles_y;
 	uint64_t *own = d->drawer->word + (size_t)part * WARP_OWN_WORDS;
+
 	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], own);
 }
@@ -65,6 +68,7 @@ static void draw_some(int part, void *userdata)
 static void clear_band(const struct drawing *d)
 {
 	const uint32_t height = d->stack.height + 2;
+
 	clear_cells(d->cells, d->stride);
 	clear_cells(d->cells + (size_t)(height - 1) * d->stride, d->stride);
 	for (uint32_t y = 1; y + 1 < height; y++)
@@ -88,6 +92,7 @@ static void make_seams(int k, void *userdata)
 {
 	const struct drawing *d = userdata;
 	const struct shadow_map *map = d->map;
+
 	if (!has_seam(map, k))
 		return;
 	const uint32_t stride = map->level[k].stride, finer = map->level[k - 1].stride;
@@ -97,9 +102,11 @@ static void make_seams(int k, void *userdata)
 	for (uint32_t j = 0; j < height; j++)
 		for (uint32_t i = 0; i < stride; i++) {
 			float z = own[(size_t)j * stride + i];
+
 			for (uint32_t y = j ? 2 * j - 1 : 0; y <= 2 * j && y < finer_height; y++)
 				for (uint32_t x = i ? 2 * i - 1 : 0; x <= 2 * i && x < finer; x++) {
 					const float part = fine[(size_t)y * finer + x];
+
 					z = part < z ? part : z;
 				}
 			to[(size_t)j * stride + i] = z;
@@ -111,9 +118,11 @@ static void sink_rows(const struct drawing *d, const uint16_t *cells, int k, uin
 	const uint32_t stride = d->map->level[k].stride, last = d->stack.level[k].height - 1;
 	const float *from = drawn(d, cells);
 	uint16_t *to = d->kept_cells + (cells - d->map->level[0].z);
+
 	for (uint32_t j = begin; j < end; j++) {
 		const float *own = from + (size_t)j * stride;
 		const struct shadow_rows rows = { j ? own - stride : own, own, j < last ? own + stride : own };
+
 		d->simd->shadow_sink(to + (size_t)j * stride, &rows, stride, d->map->from, d->map->step);
 	}
 }
@@ -121,12 +130,14 @@ static void sink_rows(const struct drawing *d, const uint16_t *cells, int k, uin
 static void sink_part(int part, void *userdata)
 {
 	const struct drawing *d = userdata;
+
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const uint32_t height = d->stack.level[k].height;
 		const uint32_t begin = height * (uint32_t)part / SINK_PARTS, end = height * ((uint32_t)part + 1) / SINK_PARTS;
-		if (d->map->level[k].z)
+
+		if (d->map->level[k].z != NULL)
 			sink_rows(d, d->map->level[k].z, k, begin, end);
-		if (d->map->level[k].seam)
+		if (d->map->level[k].seam != NULL)
 			sink_rows(d, d->map->level[k].seam, k, begin, end);
 	}
 }
@@ -135,10 +146,12 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 {
 	const uint32_t width = kept->fit.width, height = kept->fit.height;
 	size_t n = 0, first[PSR_MAX_DEPTH_LEVEL + 1], seam[PSR_MAX_DEPTH_LEVEL + 1];
+
 	kept->map.levels = levels | 1;
 	zbuffer_measure(&d->stack, width, height, levels & ~1u);
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const uint32_t cells_x = d->stack.level[k].width, cells_y = d->stack.level[k].height;
+
 		kept->map.level[k].stride = cells_x;
 		kept->map.level[k].most_x = (float)(cells_x - 2) - 0.5f;
 		kept->map.level[k].most_y = (float)(cells_y - 2) - 0.5f;
@@ -152,10 +165,11 @@ static int prepare_cells(struct shadow_kept *kept, struct drawing *d, uint32_t l
 	struct shadow_drawer *drawer = d->drawer;
 	kept->cells = psr_grow_huge(kept->cells, &kept->cells_size, n * sizeof *kept->cells);
 	drawer->cells = psr_grow_huge(drawer->cells, &drawer->cells_size, n * sizeof *drawer->cells);
-	if (!kept->cells || !drawer->cells)
+	if (kept->cells == NULL || drawer->cells == NULL)
 		return PSR_ERR_MEMORY;
 	for (int k = 0; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const int is_used = kept->map.levels >> k & 1;
+
 		kept->map.level[k].z = is_used ? kept->cells + first[k] : NULL;
 		kept->map.level[k].seam = has_seam(&kept->map, k) ? kept->cells + seam[k] : NULL;
 		d->stack.level[k].z = k && is_used ? drawer->cells + first[k] : NULL;
@@ -189,6 +203,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	struct psr_report report = { 0 };
 	struct plan *plan = &drawer->plan;
 	struct drawing d = { .simd = call->simd, .bins = call->bins, .drawer = drawer };
+
 	scene.camera = kept->fit.camera;
 	scene.n_lights = 0;
 	kept->is_drawn = 0;
@@ -205,7 +220,7 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 		return psr_fail(call->err, rc, "too many blocks for a shadow map");
 	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size,
 	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
-	if (rc || !drawer->word || prepare_cells(kept, &d, report.levels))
+	if (rc || drawer->word == NULL || prepare_cells(kept, &d, report.levels))
 		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width,
 		                kept->fit.height);
 	note_plan(kept, plan);
@@ -222,6 +237,7 @@ void shadow_map_bind(struct shadow_map *out, const struct shadow_kept *kept, con
 {
 	const double scale = ldexp(1, plan->exponent - kept->exponent);
 	double turn[3][3], move[3];
+
 	*out = kept->map;
 	for (int a = 0; a < 3; a++)
 		for (int b = 0; b < 3; b++)

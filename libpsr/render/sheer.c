@@ -58,6 +58,7 @@ static int casts_shadow(const struct psr_blocks *b, uint32_t block)
 	const uint8_t *opacity = b->opacity + psr_blocks_attr_first(b, block);
 	const int n = __builtin_popcountll(b->mask[block]);
 	int sum = 0;
+
 	for (int i = 0; i < n; i++)
 		sum += opacity[i];
 	return 2 * sum >= n * PSR_OPAQUE;
@@ -67,16 +68,19 @@ static int is_sheer(const struct plan *plan, const struct bin_entry *entry)
 {
 	const struct plan_instance *in = &plan->instance[entry->instance];
 	const uint32_t block = entry->slot - in->first_slot;
+
 	return psr_blocks_is_sheer(in->cull.blocks, block) && !(plan->is_shadow && casts_shadow(in->cull.blocks, block));
 }
 
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile)
 {
 	uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
+
 	if (!plan->has_sheer)
 		return end;
 	while (begin < end) {
 		const struct bin_entry entry = bins->entry[begin];
+
 		if (!is_sheer(plan, &entry)) {
 			begin++;
 			continue;
@@ -91,6 +95,7 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 static void find_area(struct area *area, const struct drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
 {
 	const struct plan *plan = d->plan;
+
 	area->x0 = tile % plan->tiles_x * TILE_WIDTH;
 	area->y0 = tile / plan->tiles_x * TILE_HEIGHT;
 	area->width = plan->width - area->x0 < TILE_WIDTH ? plan->width - area->x0 : TILE_WIDTH;
@@ -99,6 +104,7 @@ static void find_area(struct area *area, const struct drawing *d, uint32_t tile,
 	area->high_y = area->y0;
 	for (uint32_t e = begin; e < end; e++) {
 		const struct cull_hit *hit = &d->bins->hit[d->bins->entry[e].hit];
+
 		area->low_y = hit->y0 < area->low_y ? hit->y0 : area->low_y;
 		area->high_y = hit->y1 >= area->high_y ? hit->y1 + 1u : area->high_y;
 	}
@@ -115,6 +121,7 @@ static void begin_layers(struct sheer_tile *l, const struct drawing *d, const st
 {
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
+
 		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
 			l->next[at] = SHEER_END;
 			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
@@ -131,6 +138,7 @@ static float thickness_of(const struct warp_instance *in, uint64_t attr, uint32_
 {
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)], u = (float)x + 0.5f, v = (float)y + 0.5f;
 	float d[3];
+
 	for (int k = 0; k < 3; k++)
 		d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
 	const float cosine = __builtin_fabsf(v3f_dot(n, d)) / __builtin_sqrtf(v3f_dot(d, d));
@@ -149,6 +157,7 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, 
 	const uint32_t opacity = b->opacity[sample];
 	const float z = psr_float_from_bits((uint32_t)(l->word[at] >> 32)), back = (float)opacity * (1.0f / PSR_OPAQUE);
 	const float share = l->through[at] * back;
+
 	for (int c = 0; c < 3; c++)
 		l->light[c][at] += share * ((float)color[c] * (1.0f / 65535));
 	l->through[at] = opacity == PSR_OPAQUE ? 0 : l->through[at] - share;
@@ -164,6 +173,7 @@ static void find_layer(struct sheer_tile *l, const struct area *area)
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
 			uint32_t i = l->next[at];
+
 			while (i != SHEER_END && !(psr_float_from_bits((uint32_t)(l->list.word[i].word >> 32)) > l->beyond[at]))
 				i = l->list.word[i].next;
 			l->next[at] = i;
@@ -175,16 +185,19 @@ static void find_layer(struct sheer_tile *l, const struct area *area)
 static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const struct area *area)
 {
 	uint64_t n_pixels = 0;
+
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (uint32_t x = 0; x < area->width; x += STRIP) {
 			const uint32_t n = area->width - x < STRIP ? area->width - x : STRIP;
 			const size_t first = place_of(area, y) + x;
+
 			l->pixels.x0 = area->x0 + x;
 			l->pixels.y = y;
 			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
 			for (uint32_t i = 0; i < n_found; i++) {
 				const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
 				const uint32_t at = l->pixels.x[i];
+
 				add_pixel(l, d->plan, first + at, l->pixels.id[i], area->x0 + x + at, y, color);
 			}
 			n_pixels += n_found;
@@ -195,6 +208,7 @@ static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const s
 static uint8_t mix(const uint8_t *srgb, float light, float through, uint8_t code)
 {
 	const float mixed = light + through * psr_srgb_to_linear[code];
+
 	return srgb[(int32_t)((mixed < 1 ? mixed : 1) * 65535 + 0.5f)];
 }
 
@@ -202,12 +216,14 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, 
 {
 	const struct sheer_picture *p = d->picture;
 	uint64_t n_pixels = 0;
+
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (uint32_t x = 0; x < area->width; x++) {
 			const size_t from = place_of(area, y) + x, to = (size_t)y * d->plan->width + area->x0 + x;
+
 			if (!(l->first[from] < INFINITY))
 				continue;
-			for (size_t c = 0; p->rgb && c < 3; c++)
+			for (size_t c = 0; p->rgb != NULL && c < 3; c++)
 				p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
 			if (l->through[from] <= 0.5f || !(p->depth[to] < INFINITY))
 				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
@@ -222,6 +238,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	const struct psr_zstack stack = { .levels = 0 };
 	struct warp_target target;
 	struct area area;
+
 	if (begin == end)
 		return;
 	find_area(&area, d, tile, begin, end);
@@ -249,6 +266,7 @@ static void draw_some(int part, void *userdata)
 {
 	struct drawing *d = userdata;
 	const uint32_t n_tiles = d->plan->tiles_x * d->plan->tiles_y;
+
 	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
 }
@@ -257,6 +275,7 @@ static void draw_some(int part, void *userdata)
 static void find_factors(float factor[2], int exponent)
 {
 	const int clamped = exponent < -252 ? -252 : exponent > 252 ? 252 : exponent;
+
 	factor[0] = psr_float_from_bits((uint32_t)(127 + clamped / 2) << 23);
 	factor[1] = psr_float_from_bits((uint32_t)(127 + clamped - clamped / 2) << 23);
 }
@@ -264,7 +283,8 @@ static void find_factors(float factor[2], int exponent)
 static int make_tiles(struct sheer *sheer, int n)
 {
 	struct sheer_tile *tile = realloc(sheer->tile, (size_t)n * sizeof *tile);
-	if (!tile)
+
+	if (tile == NULL)
 		return PSR_ERR_MEMORY;
 	for (int i = sheer->n_tiles; i < n; i++)
 		tile[i].list = (struct sheer_list){ .n = 0 };
@@ -278,6 +298,7 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 {
 	const int n_parts = psr_pool_threads(pool);
 	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture };
+
 	if (n_parts > sheer->n_tiles && make_tiles(sheer, n_parts))
 		return PSR_ERR_MEMORY;
 	d.tile = sheer->tile;
@@ -291,6 +312,7 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 float *sheer_depths(struct sheer *sheer, const struct plan *plan)
 {
 	const size_t size = (size_t)plan->width * plan->height * sizeof *sheer->depth;
+
 	sheer->depth = psr_grow_huge(sheer->depth, &sheer->depth_size, size);
 	return sheer->depth;
 }
@@ -306,6 +328,7 @@ void sheer_clear(struct sheer *sheer)
 uint64_t sheer_bytes(const struct sheer *sheer)
 {
 	uint64_t n = sheer->depth_size + (uint64_t)sheer->n_tiles * sizeof *sheer->tile;
+
 	for (int i = 0; i < sheer->n_tiles; i++)
 		n += sheer->tile[i].list.capacity * sizeof *sheer->tile[i].list.word;
 	return n;

@@ -31,6 +31,7 @@ int sheer_grow(struct sheer_list *list);
 static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
 {
 	uint32_t *link = &list->first[at];
+
 	if (list->n == list->capacity && sheer_grow(list))
 		return;
 	while (*link != SHEER_END && list->word[*link].word < word)

@@ -16,8 +16,9 @@ int sheer_grow(struct sheer_list *list)
 {
 	const uint32_t capacity = list->capacity < UINT32_MAX / 2 ? 2 * list->capacity + 65536 : 0;
 	struct sheer_word *grown = capacity ? realloc(list->word, capacity * sizeof *grown) : NULL;
-	list->failed |= !grown;
-	if (!grown)
+
+	list->failed |= grown == NULL;
+	if (grown == NULL)
 		return PSR_ERR_MEMORY;
 	list->word = grown;
 	list->capacity = capacity;
@@ -33,6 +34,7 @@ static float center_depth(const struct plan *plan, const struct warp_instance *i
 				down = (psr_floor_int(v) + 0.5f - v) / focal;
 	const float x = (u - plan->view.half_width) / focal, y = (v - plan->view.half_height) / focal;
 	float n[3], off;
+
 	for (int k = 0; k < 3; k++)
 		n[k] = (in->turn[k][0] * inner[0] + in->turn[k][1] * inner[1]) + in->turn[k][2] * inner[2];
 	const float aside = n[0] * across + n[1] * down;
@@ -49,16 +51,19 @@ static void list_points(const struct plan *plan, const struct bin_entry *entry, 
 	const float rim = splat_rim(&plan->instance[entry->instance], entry->slot - in->first_slot);
 	struct warp_terms terms;
 	struct warp_block b;
+
 	warp_block_make(&b, in, entry->slot);
 	warp_terms_make(&terms, &b);
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
 		const float z = warp_axis(&terms, &b, 2, r, c, depth), inverse = plan->perspective ? 1 / z : 1;
-		const float u = warp_axis(&terms, &b, 0, r, c, depth) * inverse, v = warp_axis(&terms, &b, 1, r, c, depth) * inverse;
+		const float u = warp_axis(&terms, &b, 0, r, c, depth) * inverse;
+		const float v = warp_axis(&terms, &b, 1, r, c, depth) * inverse;
 		float d[3];
-		if (!(z > plan->near_z && u >= (float)target->x0 && u < (float)target->x1 && v >= (float)target->y0 &&
-		      v < (float)target->y1))
+
+		if (!(z > plan->near_z && u >= (float)target->x0 && u < (float)target->x1 && v >= (float)target->y0
+		      && v < (float)target->y1))
 			continue;
 		for (int k = 0; k < 3; k++)
 			d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];

@@ -22,6 +22,7 @@ static int draw(const struct psr_shot *shot, const struct psr_scene *scene, stru
 	struct psr_renderer *renderer = NULL;
 	struct psr_pool *pool = NULL;
 	int rc = psr_renderer_create(&renderer, err);
+
 	if (rc == PSR_OK)
 		rc = psr_pool_create(&pool, 0, err);
 	if (rc == PSR_OK)
@@ -39,13 +40,14 @@ int psr_shot_draw(const struct psr_shot *shot, struct psr_model *model, struct p
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = shot->light,
 		                       .n_lights = shot->n_lights };
 	int rc = psr_frame_alloc(frame, shot->settings.width, shot->settings.height, shot->planes, err);
+
 	if (rc)
 		return rc;
 	for (int k = 0; k < 3; k++) {
 		scene.ambient[k] = shot->ambient;
 		scene.background[k] = (double)psr_srgb_to_linear[shot->background[k]];
 	}
-	if (shot->camera)
+	if (shot->camera != NULL)
 		scene.camera = *shot->camera;
 	else
 		psr_camera_frame(&scene.camera, info->box_min, info->box_max, info->up, shot->fov_y,

@@ -15,11 +15,12 @@ struct smoothing {
 
 int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth)
 {
-	const size_t area = (size_t)plan->width * plan->height, depths = depth ? 0 : area * sizeof *depth;
+	const size_t area = (size_t)plan->width * plan->height, depths = depth != NULL ? 0 : area * sizeof *depth;
+
 	smooth->storage = psr_grow_huge(smooth->storage, &smooth->storage_size, depths + 3 * area);
 	if (smooth->storage == NULL)
 		return PSR_ERR_MEMORY;
-	smooth->depth = depth ? depth : smooth->storage;
+	smooth->depth = depth != NULL ? depth : smooth->storage;
 	smooth->rgb = (uint8_t *)smooth->storage + depths;
 	return PSR_OK;
 }
@@ -37,14 +38,17 @@ static void smooth_row(int row, void *userdata)
 	const struct smooth_target *t = &s->target;
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = y0 + BRICK < plan->height ? y0 + BRICK : plan->height;
 	uint64_t n_edges = 0;
+
 	for (uint32_t x0 = 0; x0 < plan->width; x0 += TILE_WIDTH) {
 		const uint32_t x1 = x0 + TILE_WIDTH < plan->width ? x0 + TILE_WIDTH : plan->width;
+
 		if (!plan_is_quiet(plan, x0, y0) || !plan_is_quiet(plan, x1 - 1, y0)) {
 			n_edges += s->simd->smooth(t, x0, x1, y0, y1);
 			continue;
 		}
 		for (uint32_t y = y0; y < y1; y++) {
 			const size_t first = 3 * ((size_t)y * plan->width + x0);
+
 			memcpy(t->to + first, t->from + first, 3 * (size_t)(x1 - x0));
 		}
 	}
@@ -59,6 +63,7 @@ uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const st
 	struct smoothing smoothing = {
 		smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, 1 + step, 0 },
 	};
+
 	if (!plan->perspective) {
 		smoothing.target.scale = 1;
 		smoothing.target.offset = ldexpf(step, plan->exponent);

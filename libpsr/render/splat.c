@@ -40,6 +40,7 @@ static inline void lower(const struct splat_target *t, int32_t x, int32_t y, flo
 {
 	const uint64_t word = (uint64_t)psr_bits_from_float(z) << 32 | id;
 	uint64_t *at = &t->word[(size_t)(y - t->y0) * t->stride + (size_t)(x - t->x0)];
+
 	*at = word < *at ? word : *at;
 }
 
@@ -55,6 +56,7 @@ static void limit_reach(struct splat *s)
 	const float *a = s->radius[0], *b = s->radius[1];
 	const float x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]), y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
 	const float extent = x > y ? x : y;
+
 	if (extent > s->most)
 		for (int i = 0; i < 2; i++)
 			v3f_scale(s->radius[i], s->radius[i], s->most / extent);
@@ -66,6 +68,7 @@ static inline void list_place(const struct splat_target *t, const struct splat *
                               float square)
 {
 	const uint32_t at = (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0);
+
 	if (z - (square + 0.5f) * s->rim < t->list->before[at])
 		sheer_add(t->list, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id);
 }
@@ -79,6 +82,7 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
 				extent_y = __builtin_fabsf(a[1]) + __builtin_fabsf(b[1]);
 	const float area = a[0] * b[1] - a[1] * b[0];
+
 	if (!(area < 0 || area > 0))
 		return;
 	const float p_x = b[1] / area, p_y = -b[0] / area, q_x = -a[1] / area, q_y = a[0] / area;
@@ -89,6 +93,7 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 			const float dx = (float)x + 0.5f - u, dy = (float)y + 0.5f - v;
 			const float p = dx * p_x + dy * p_y, q = dx * q_x + dy * q_y, square = p * p + q * q;
 			const float z = (s->at[2] + (p * a[2] + q * b[2])) + square * s->rim;
+
 			if (!(square <= 1 && z > t->plan->near_z))
 				continue;
 			if (is_listed)
@@ -108,6 +113,7 @@ struct lattice_depths {
 static void place_depths(struct lattice_depths *to, const struct warp_block *b, float rise)
 {
 	const uint16_t *depth = b->depth;
+
 	to->mask = b->mask;
 	to->rise = rise;
 	for (uint64_t left = b->mask; left; left &= left - 1)
@@ -128,6 +134,7 @@ static inline int slope_to(float *slope, const struct lattice_depths *at, int ow
 static inline float slope_along(int has_next, float next, int has_last, float last, float normal, float safe)
 {
 	const float low = next < -last ? next : -last, high = next < -last ? -last : next;
+
 	if (!(has_next && has_last))
 		return safe;
 	return normal > low ? normal < high ? normal : high : low;
@@ -137,6 +144,7 @@ static inline float slope_along(int has_next, float next, int has_last, float la
 static void slope_of_normal(float slope[2], const float n[3], const struct psr_projection *projection)
 {
 	const float nz = v3f_dot(n, projection->axis[2]);
+
 	slope[0] = -v3f_dot(n, projection->axis[0]) / nz;
 	slope[1] = -v3f_dot(n, projection->axis[1]) / nz;
 }
@@ -144,8 +152,10 @@ static void slope_of_normal(float slope[2], const float n[3], const struct psr_p
 static void limit_slope(float slope[2], float most)
 {
 	const float length = __builtin_sqrtf(slope[0] * slope[0] + slope[1] * slope[1]);
+
 	if (!(length <= most)) {
 		const int is_vertical = !(length < 0x1p60f);
+
 		slope[0] = is_vertical ? 0 : slope[0] * (most / length);
 		slope[1] = is_vertical ? 0 : slope[1] * (most / length);
 	}
@@ -160,6 +170,7 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 	static const float half = 0.5f, high = 0.866025404f;
 	const int r = (int)(sample >> 3), c = (int)(sample & 7), own = at->depth[sample], left = c - 1 + (r & 1);
 	float normal[2], next[3] = { 0, 0, 0 }, last[3] = { 0, 0, 0 }, rise[3];
+
 	slope_of_normal(normal, n, projection);
 	const int has_next[3] = { slope_to(&next[0], at, own, r, c + 1), slope_to(&next[1], at, own, r + 1, left + 1),
 		                      slope_to(&next[2], at, own, r + 1, left) };
@@ -209,9 +220,10 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
 		float p[3], d[3], slope[2], share[2];
+
 		for (int a = 0; a < 3; a++)
-			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c]) +
-			       depth * b.unit[a];
+			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c])
+			       + depth * b.unit[a];
 		if (!(p[2] > t->plan->near_z))
 			continue;
 		const float inverse = perspective ? 1 / p[2] : 1;
@@ -223,6 +235,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		find_plane(slope, share, &at, sample, n, projection);
 		for (int i = 0; i < 2; i++) {
 			float h[3];
+
 			for (int a = 0; a < 3; a++)
 				h[a] = share[i] * (radius[i][a] + slope[i] * along[a]);
 			s.radius[i][0] = perspective ? (h[0] - s.at[0] * h[2]) * inverse : h[0];
@@ -241,10 +254,12 @@ static uint64_t draw_cells(const struct simd *simd, const struct warp_target *ta
                            const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
+
 	simd->warp_clear(target, stack->levels);
 	for (uint32_t e = 0; e < n;) {
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
+
 		for (; e < n && n_some < sizeof some / sizeof *some; e++, n_some++) {
 			some[n_some] = entry[e];
 			some[n_some].level = entry[e].level ? entry[e].level : 1;
@@ -260,6 +275,7 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_counts counts = { 0, 0, 0 };
 	struct warp_target target;
+
 	warp_target_make(&target, plan, stack, tile, NULL);
 	target.clean = clean;
 	counts.n_inside = draw_cells(simd, &target, stack, bins->entry + begin, end - begin);
@@ -277,6 +293,7 @@ void splat_list(const struct plan *plan, const struct bin_entry *entry, const st
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
 		                            target->x1, target->y1, list };
+
 	draw_block(&t, entry, 1);
 }
 
@@ -284,5 +301,6 @@ float splat_rim(const struct plan_instance *in, uint32_t block)
 {
 	const struct psr_blocks *b = in->cull.blocks;
 	const float scale = (float)(1u << psr_blocks_level(b, block));
+
 	return RIM_DEPTH * (b->projection[b->block_projection[block]].spacing * scale) * in->cull.scale;
 }

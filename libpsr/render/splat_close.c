@@ -32,6 +32,7 @@ static int steps_to(const struct plan *plan, const struct psr_zstack *stack, uin
 {
 	for (int i = 1; i <= reach; i++) {
 		const float other = depth_at(stack, (int64_t)x + i * step[0], (int64_t)y + i * step[1]);
+
 		if (other * plan->gap_scale[1] + plan->gap_offset[1] < z)
 			return i;
 	}
@@ -48,6 +49,7 @@ static struct shown find_shown(const struct plan *plan, const struct psr_zstack 
 {
 	const uint32_t id = (uint32_t)psr_zstack_row(stack, (uint32_t)y)[x], slot = id / PSR_BLOCK_SAMPLES;
 	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];
+
 	return (struct shown){ in, slot - in->first_slot, id % PSR_BLOCK_SAMPLES };
 }
 
@@ -59,9 +61,10 @@ static void find_normal(float n[3], const struct plan *plan, const struct psr_zs
 	const uint64_t before = b->mask[shown.block] & ((UINT64_C(1) << shown.sample) - 1);
 	const uint64_t attr = b->attr[psr_blocks_attr_first(b, shown.block) + (uint32_t)__builtin_popcountll(before)];
 	const float *inner = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
+
 	for (int a = 0; a < 3; a++)
-		n[a] = (float)(shown.in->turn[a][0] * (double)inner[0] + shown.in->turn[a][1] * (double)inner[1] +
-		               shown.in->turn[a][2] * (double)inner[2]);
+		n[a] = (float)(shown.in->turn[a][0] * (double)inner[0] + shown.in->turn[a][1] * (double)inner[1]
+		               + shown.in->turn[a][2] * (double)inner[2]);
 }
 
 /* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
@@ -69,9 +72,11 @@ static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, 
 {
 	const float z = depth_at(stack, x, y);
 	float nearest = INFINITY, farthest = 0;
+
 	for (int w = 0; w < 8; w++) {
 		const int steps = steps_to(plan, stack, x, y, z, way[w], reach);
 		const int64_t u = (int64_t)x + steps * way[w][0], v = (int64_t)y + steps * way[w][1];
+
 		if (!steps)
 			return 0;
 		const float other = depth_at(stack, u, v);
@@ -87,8 +92,8 @@ static int is_crossed(const struct plan *plan, const struct psr_zstack *stack, u
 	if (depth_at(stack, x, y) < INFINITY)
 		return 0;
 	for (int w = 0; w < 8; w += 2)
-		if (steps_to(plan, stack, x, y, INFINITY, way[w], reach) &&
-		    steps_to(plan, stack, x, y, INFINITY, way[w + 1], reach))
+		if (steps_to(plan, stack, x, y, INFINITY, way[w], reach)
+		    && steps_to(plan, stack, x, y, INFINITY, way[w + 1], reach))
 			return 1;
 	return 0;
 }
@@ -101,6 +106,7 @@ static int is_continued(const struct plan *plan, const struct psr_zstack *stack,
 	const float z[2] = { depth_at(stack, a[0], a[1]), depth_at(stack, b[0], b[1]) };
 	const float nearer = z[0] < z[1] ? z[0] : z[1], farther = z[0] < z[1] ? z[1] : z[0];
 	float n[2][3];
+
 	if (farther > nearer * plan->gap_scale[level] + plan->gap_offset[level])
 		return 0;
 	find_normal(n[0], plan, stack, a[0], a[1]);
@@ -117,12 +123,14 @@ static int is_narrow(const struct plan *plan, const struct psr_zstack *stack, ui
 	const float z = depth_at(stack, x, y);
 	const int cell = 1 << level, least = cell < 16 ? 1 : cell * 3 / 16;
 	int n_narrow = 0;
+
 	for (int w = 0; w < 8; w += 2) {
 		const int before = steps_to(plan, stack, x, y, z, way[w], cell);
 		const int after = before ? steps_to(plan, stack, x, y, z, way[w + 1], cell) : 0;
 		const int halves = (before + after - 1) * (w < 4 ? 2 : 3); /* of a pixel: a diagonal's steps are longer */
 		const int64_t a[2] = { (int64_t)x + before * way[w][0], (int64_t)y + before * way[w][1] };
 		const int64_t b[2] = { (int64_t)x + after * way[w + 1][0], (int64_t)y + after * way[w + 1][1] };
+
 		if (!after || 4 * halves > 5 * cell)
 			continue;
 		if (halves <= 2 * least || (halves <= cell && is_continued(plan, stack, level, a, b)) || ++n_narrow == 4)
@@ -139,10 +147,12 @@ static void find_between(uint8_t *is_between, const struct plan *plan, const str
 	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
 	const uint64_t *word = psr_zstack_row(stack, y) + x;
 	int has_any = 0;
+
 	for (uint32_t i = 0; i < REACH; i++)
 		nearest[i] = nearest[n + REACH + i] = z[i] = z[n + REACH + i] = INFINITY;
 	for (uint32_t i = first; i < end; i++) {
 		const uint32_t bits = (uint32_t)(word[(int32_t)i - REACH] >> 32);
+
 		nearest[i] = z[i] = psr_float_from_bits(bits);
 		has_any |= bits < (uint32_t)(PSR_WORD_EMPTY >> 32);
 	}
@@ -157,6 +167,7 @@ static void find_between(uint8_t *is_between, const struct plan *plan, const str
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
+
 		is_between[i] = farther * plan->gap_scale[1] + plan->gap_offset[1] < z[i + REACH];
 	}
 }
@@ -173,6 +184,7 @@ struct cell_row {
 static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, int64_t i, int64_t j, uint32_t n)
 {
 	const int64_t width = stack->level[k].width, height = stack->level[k].height;
+
 	for (uint32_t c = 0; c < n; c++)
 		nearest[c] = INFINITY;
 	if (j < 0 || j >= height)
@@ -183,12 +195,14 @@ static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, 
 	for (int f = k - 1; f > 0; f--) {
 		const int64_t fine_width = stack->level[f].width, fine_height = stack->level[f].height;
 		const int64_t x = (i - 1) * (1 << (k - f)) + 1, y = (j - 1) * (1 << (k - f)) + 1;
+
 		if (!(stack->levels >> f & 1))
 			continue;
 		for (int64_t v = y < 0 ? 0 : y; v < y + (1 << (k - f)) && v < fine_height; v++)
 			for (int64_t u = x < 0 ? 0 : x; u < x + ((int64_t)n << (k - f)) && u < fine_width; u++) {
 				float *to = &nearest[(u - x) >> (k - f)];
 				const float z = stack->level[f].z[v * fine_width + u];
+
 				*to = z < *to ? z : *to;
 			}
 	}
@@ -197,9 +211,11 @@ static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, 
 static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	const uint32_t width = stack->level[k].width;
+
 	memset(is_near, 0, n);
 	for (uint32_t v = j - 1; v <= j + 1; v++) {
 		const float *z = stack->level[k].z + (size_t)v * width + i;
+
 		for (uint32_t c = 0; c < n; c++)
 			is_near[c] |= (z[(int32_t)c - 1] < INFINITY) | (z[c] < INFINITY) | (z[c + 1] < INFINITY);
 	}
@@ -211,6 +227,7 @@ static void find_cells(struct cell_row *to, const struct plan *plan, const struc
 {
 	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
 	const uint32_t n_around = n + 2 * GAP;
+
 	find_own(to->is_near, stack, k, i, j, n);
 	to->has_any = 0;
 	for (uint32_t c = 0; c < n; c++)
@@ -225,6 +242,7 @@ static void find_cells(struct cell_row *to, const struct plan *plan, const struc
 	}
 	for (uint32_t c = 0; c < n; c++) {
 		float all = farthest[c];
+
 		for (uint32_t u = 1; u <= 2 * GAP; u++)
 			all = farthest[c + u] > all ? farthest[c + u] : all;
 		to->limit[c] = all * plan->gap_scale[k] + plan->gap_offset[k];
@@ -242,12 +260,14 @@ static void find_holes(struct row_holes *to, const struct cell_row *cells, const
                        uint32_t y, uint32_t n)
 {
 	const uint64_t *word = psr_zstack_row(stack, y) + x;
+
 	memset(to, 0, sizeof *to);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(stack->levels >> k & 1) || !cells[k].has_any)
 			continue;
 		for (uint32_t c = 0; c < n; c++) {
 			const float z = psr_float_from_bits((uint32_t)(word[c] >> 32));
+
 			to->is_covered[c] |= cells[k].is_near[c >> k] & (cells[k].limit[c >> k] < z);
 			to->level[c] = cells[k].is_near[c >> k] ? (uint8_t)k : to->level[c];
 		}
@@ -257,6 +277,7 @@ static void find_holes(struct row_holes *to, const struct cell_row *cells, const
 static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
 {
 	const uint32_t u = (inside->left + x) >> inside->pass, v = (inside->top + y) >> inside->pass;
+
 	return inside->is_inside[(size_t)v * inside->width + u];
 }
 
@@ -266,6 +287,7 @@ static int is_crack(const struct plan *plan, const struct psr_zstack *stack, int
                     uint32_t x, uint32_t y)
 {
 	const int is_magnified = level > (int)pass + 1; /* cells are wider than two of its pixels */
+
 	if (is_magnified)
 		return is_covered || is_crossed(plan, stack, x, y, 1 << level < MOST_ACROSS ? 1 << level : MOST_ACROSS);
 	return is_covered && is_narrow(plan, stack, x, y, level);
@@ -277,15 +299,17 @@ static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stac
 {
 	struct row_holes holes;
 	uint32_t n_closed = 0;
+
 	find_holes(&holes, cells, stack, x0, y, n);
 	find_between(holes.is_between, plan, stack, x0, y, n);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
 		const int level = holes.level[c], reach = 1 << level < REACH ? 1 << level : REACH;
-		if (weight[c] && level &&
-		    ((inside && is_inside(inside, x, y) &&
-		      is_crack(plan, stack, holes.is_covered[c], level, inside->pass, x, y)) ||
-		     (holes.is_between[c] && is_enclosed(plan, stack, x, y, reach)))) {
+
+		if (weight[c] && level
+		    && ((inside != NULL && is_inside(inside, x, y)
+		      && is_crack(plan, stack, holes.is_covered[c], level, inside->pass, x, y))
+		     || (holes.is_between[c] && is_enclosed(plan, stack, x, y, reach)))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
 			n_closed++;
@@ -302,8 +326,10 @@ uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, co
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	struct cell_row cells[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_closed = 0;
+
 	for (uint32_t x = 0; x < stack->width; x += TILE_WIDTH) {
 		const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
+
 		for (uint32_t y = y0; y < y1; y++) {
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 				if (stack->levels >> k & 1 && (y == y0 || y % (1u << k) == 0))

@@ -8,6 +8,7 @@ static int most_frequent_level(const struct bin_entry *entry, uint32_t n)
 {
 	uint32_t count[PSR_MAX_DEPTH_LEVEL + 1] = { 0 };
 	int most = 0;
+
 	for (uint32_t e = 0; e < n; e++)
 		count[entry[e].level] += !entry[e].at_border;
 	count[0] = 0;
@@ -22,14 +23,17 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 {
 	const int first = most_frequent_level(entry, n);
 	uint64_t n_inside = 0;
+
 	simd->warp_clear(target, first ? levels & ~(1u << first) : levels);
 	if (first == 0)
 		return simd->warp(target, entry, n);
 	for (int turn = 0; turn < 2; turn++) {
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
+
 		for (uint32_t e = 0; e < n; e++) {
 			const int is_first = entry[e].level == first && !entry[e].at_border;
+
 			if (is_first == turn)
 				continue;
 			some[n_some] = entry[e];
@@ -52,6 +56,7 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_target target;
 	struct warp_counts counts = { 0, 0, 0 };
+
 	warp_target_make(&target, plan, into->stack, tile, into->own);
 	target.clean = into->clean;
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
