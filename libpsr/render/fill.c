@@ -11,24 +11,6 @@
  * to the first that is whole in it and in the eight bricks around it, which hold all that its pixels and their
  * ancestors read. */
 
-float fill_scale(const struct plan *plan, int level)
-{
-	return plan->gap_scale[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
-}
-
-float fill_offset(const struct plan *plan, int level)
-{
-	return plan->gap_offset[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
-}
-
-void fill_note_depth(struct fill *fill, int level)
-{
-	int seen = atomic_load(&fill->deepest);
-
-	while (seen < level && !atomic_compare_exchange_weak(&fill->deepest, &seen, level))
-		;
-}
-
 /* Sets all cells as outside of the picture; the fill writes those inside before it reads them. */
 static void clear_level(struct fill_level *level, size_t area)
 {
@@ -208,8 +190,8 @@ static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 	const struct fill_row to = fill_row_at(&fill->level[l], (int32_t)x, (int32_t)y);
 	const struct fill_row upper = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y));
 	const struct fill_row lower = fill_row_at(&fill->level[l - 1], (int32_t)(2 * x), (int32_t)(2 * y + 1));
-	if (fill->simd->fill_pull_weights(&to, &upper, &lower, 1, fill_scale(fill->plan, l), fill_offset(fill->plan, l)) <
-	    WEIGHT_ONE / 2)
+	if (fill->simd->fill_pull_weights(&to, &upper, &lower, 1, fill_scale(fill->plan, l), fill_offset(fill->plan, l))
+	    < WEIGHT_ONE / 2)
 		fill_note_depth(fill, l);
 }
 

@@ -15,9 +15,23 @@ static inline struct fill_row fill_row_at(const struct fill_level *level, int32_
 }
 
 /* The threshold among cells of a level. */
-float fill_scale(const struct plan *plan, int level);
-float fill_offset(const struct plan *plan, int level);
-void fill_note_depth(struct fill *fill, int level);
+static inline float fill_scale(const struct plan *plan, int level)
+{
+	return plan->gap_scale[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
+}
+
+static inline float fill_offset(const struct plan *plan, int level)
+{
+	return plan->gap_offset[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
+}
+
+static inline void fill_note_depth(struct fill *fill, int level)
+{
+	int seen = atomic_load(&fill->deepest);
+
+	while (seen < level && !atomic_compare_exchange_weak(&fill->deepest, &seen, level))
+		;
+}
 
 enum fill_coarse { FILL_PULLED = 1, FILL_NEEDED = 2 };
 /* Pulls weights and depths of bricks bx0..bx1-1 of brick row `by` from the finer level to `level`; returns the least

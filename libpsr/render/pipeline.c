@@ -45,7 +45,6 @@ struct call {
 	const struct psr_scene *scene;
 	const struct render_settings *settings;
 	struct psr_pool *pool;
-	struct psr_report *report;
 	struct psr_error *err;
 };
 
@@ -62,7 +61,7 @@ static void note_time(struct psr_report *report, enum psr_stage stage, uint64_t 
 static int make_stack(struct psr_renderer *r, const struct call *call, int is_lit)
 {
 	const struct render_settings *settings = call->settings;
-	struct psr_report *report = call->report;
+	struct psr_report *report = &r->report;
 	struct psr_error *err = call->err;
 	int rc = settings_validate(settings, err);
 
@@ -101,14 +100,13 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 
 	warp_tiles(r, call->pool, report);
 	note_time(report, PSR_STAGE_WARP, &start);
-	r->report = *report;
 	return PSR_OK;
 }
 
 int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
-             struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err)
+                  struct psr_pool *pool, struct psr_zstack **stack, struct psr_error *err)
 {
-	const struct call call = { scene, settings, pool, report, err };
+	const struct call call = { scene, settings, pool, err };
 	fenv_t callers;
 
 	set_environment(&callers);
@@ -119,10 +117,15 @@ int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const s
 	return rc;
 }
 
+static struct gaps_map map_of(const struct psr_renderer *r)
+{
+	return (struct gaps_map){ r->buffers.weight, r->buffers.bricks };
+}
+
 /* Finds the gaps of a row of bricks. */
 static struct gaps_counts find_row_gaps(struct psr_renderer *r, const struct psr_zstack *stack, int row)
 {
-	const struct gaps_map map = { r->buffers.weight, r->buffers.bricks };
+	const struct gaps_map map = map_of(r);
 
 	return gaps_rows(r->simd, &r->plan, stack, (uint32_t)row * BRICK, brick_row_end(&r->plan, (uint32_t)row), &map);
 }
@@ -131,6 +134,7 @@ static void gaps_one(int row, void *userdata)
 {
 	struct psr_renderer *r = userdata;
 	struct buffers *b = &r->buffers;
+	const struct gaps_map map = map_of(r);
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(&r->plan, (uint32_t)row);
 	struct psr_zstack stack = b->stack;
 
@@ -138,7 +142,7 @@ static void gaps_one(int row, void *userdata)
 		stack.levels = 0; /* discs, not cells, cover what is behind them */
 	b->gaps[row] = find_row_gaps(r, &stack, row);
 	if (r->plan.with_splats)
-		b->gaps[row].n_marked += splat_close(&r->plan, &b->stack, r->inside, y0, y1, b->weight, b->bricks);
+		b->gaps[row].n_marked += splat_close(&r->plan, &b->stack, r->inside, y0, y1, &map);
 	fill_look(&r->fill, (uint32_t)row);
 }
 
@@ -161,8 +165,7 @@ static void outline_one(int row, void *userdata)
 int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
                      struct psr_pool *pool, uint8_t *is_object, struct psr_error *err)
 {
-	struct psr_report report;
-	const struct call call = { scene, settings, pool, &report, err };
+	const struct call call = { scene, settings, pool, err };
 	fenv_t callers;
 
 	set_environment(&callers);
@@ -320,7 +323,7 @@ static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct
 }
 
 int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,
-               struct psr_error *err)
+                    struct psr_error *err)
 {
 	fenv_t callers;
 
@@ -331,9 +334,9 @@ int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr
 }
 
 int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
-               struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
+                  struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
-	const struct call call = { scene, settings, pool, &frame->report, err };
+	const struct call call = { scene, settings, pool, err };
 	fenv_t callers;
 
 	set_environment(&callers);

@@ -39,6 +39,16 @@ struct part {
 	unsigned pass;
 };
 
+/* A call of refiner_draw. */
+struct still {
+	struct refiner *refiner;
+	const struct psr_scene *scene;
+	const struct render_settings *settings;
+	struct psr_pool *pool;
+	struct psr_frame *frame;
+	struct psr_error *err;
+};
+
 struct erosion {
 	uint8_t *is_inside, *scratch;
 	uint32_t width, height;
@@ -151,9 +161,11 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 }
 
 /* Draws the window of column i and row j of windows, and averages what of it is used. */
-static int draw_window(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
-                       uint32_t i, uint32_t j, struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
+static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 {
+	const struct refiner *r = still->refiner;
+	const struct render_settings *settings = still->settings;
+	struct psr_frame *frame = still->frame;
 	const unsigned pass = settings->pass;
 	const uint32_t width = settings->width << pass, height = settings->height << pass;
 	const uint32_t left = i * STEP_X, top = j * STEP_Y;
@@ -173,7 +185,7 @@ static int draw_window(struct refiner *r, const struct psr_scene *scene, const s
 		                       .depth = frame->depth != NULL ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
 	renderer_set_inside(r->renderer, &inside);
-	const int rc = renderer_draw(r->renderer, scene, &window, pool, &fine, err);
+	const int rc = renderer_draw(r->renderer, still->scene, &window, still->pool, &fine, still->err);
 	renderer_set_inside(r->renderer, NULL);
 	if (rc)
 		return rc;
@@ -183,7 +195,7 @@ static int draw_window(struct refiner *r, const struct psr_scene *scene, const s
 		.refiner = r, .frame = frame, .pass = pass, .stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
-	psr_pool_for(pool, (int)((to_y - from_y) >> pass), average_row, &part);
+	psr_pool_for(still->pool, (int)((to_y - from_y) >> pass), average_row, &part);
 	add_report(&frame->report, &fine.report, pass);
 	return PSR_OK;
 }
@@ -217,23 +229,25 @@ static void erode_column(int x, void *userdata)
 }
 
 /* Which pixels lie well inside of what the plain frame covers: there a pass shows no background between discs. */
-static int find_inside(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
-                       struct psr_pool *pool, struct psr_report *report, struct psr_error *err)
+static int find_inside(const struct still *still)
 {
+	struct refiner *r = still->refiner;
+	const struct render_settings *settings = still->settings;
 	const size_t area = (size_t)settings->width * settings->height;
 	const uint64_t start = clock_ns();
 	struct erosion erosion;
 
 	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
 	if (r->is_inside == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
-	const int rc = renderer_outline(r->renderer, scene, settings, pool, r->is_inside, err);
+		return psr_fail(still->err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width,
+		                settings->height);
+	const int rc = renderer_outline(r->renderer, still->scene, settings, still->pool, r->is_inside, still->err);
 	if (rc)
 		return rc;
 	erosion = (struct erosion){ r->is_inside, r->is_inside + area, settings->width, settings->height };
-	psr_pool_for(pool, (int)settings->height, erode_row, &erosion);
-	psr_pool_for(pool, (int)settings->width, erode_column, &erosion);
-	report->ns[PSR_STAGE_GAPS] += clock_ns() - start;
+	psr_pool_for(still->pool, (int)settings->height, erode_row, &erosion);
+	psr_pool_for(still->pool, (int)settings->width, erode_column, &erosion);
+	still->frame->report.ns[PSR_STAGE_GAPS] += clock_ns() - start;
 	return PSR_OK;
 }
 
@@ -245,6 +259,7 @@ static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
 int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct render_settings *settings,
                  struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
+	const struct still still = { r, scene, settings, pool, frame, err };
 	const unsigned pass = settings->pass;
 	int rc;
 
@@ -263,14 +278,14 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
-	rc = find_inside(r, scene, settings, pool, &frame->report, err);
+	rc = find_inside(&still);
 	if (rc)
 		return rc;
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x; i++) {
 			if (settings->is_cancelled != NULL && settings->is_cancelled(settings->userdata))
 				return psr_fail(err, PSR_ERR_CANCELLED, "nobody waits for pass %u any more", pass);
-			rc = draw_window(r, scene, settings, i, j, pool, frame, err);
+			rc = draw_window(&still, i, j);
 			if (rc)
 				return rc;
 		}

@@ -25,7 +25,7 @@ struct psr_renderer {
 	size_t lit_size;
 	uint8_t srgb[65536];         /* 8 bits of 16-bit linear light */
 	const struct inside *inside; /* of frames with splats, or NULL */
-	struct psr_report report;    /* of renderer_warp, until renderer_finish */
+	struct psr_report report;    /* of the stages up to the z-stack */
 	/* Of the call in progress. */
 	uint8_t *is_object; /* renderer_outline's */
 	struct psr_frame *frame;

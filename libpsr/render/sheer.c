@@ -145,12 +145,15 @@ static float thickness_of(const struct warp_instance *in, uint64_t attr, uint32_
 	return LAYER_STEPS * rim / (cosine > LEAST_COSINE ? cosine : LEAST_COSINE);
 }
 
-/* Pixel (x, y) of the layer, of this colour. */
-static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, uint32_t id, uint32_t x, uint32_t y,
-                      const uint16_t color[3])
+/* Adds pixel i of those found in the strip from word `first` on. */
+static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t first, uint32_t i)
 {
-	const uint32_t i = plan_find_instance(plan, id / PSR_BLOCK_SAMPLES);
-	const struct plan_instance *in = &plan->instance[i];
+	const struct strip_pixels *pixels = &l->pixels;
+	const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
+	const uint32_t id = pixels->id[i], x = pixels->x0 + pixels->x[i];
+	const uint32_t n = plan_find_instance(plan, id / PSR_BLOCK_SAMPLES);
+	const size_t at = first + pixels->x[i];
+	const struct plan_instance *in = &plan->instance[n];
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot;
 	const size_t sample = block_index(b, block, id % PSR_BLOCK_SAMPLES);
@@ -164,7 +167,7 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t at, 
 	l->first[at] = z < l->first[at] ? z : l->first[at];
 	l->beyond[at] = l->through[at] < LEAST_THROUGH
 	                        ? INFINITY
-	                        : z + thickness_of(&plan->warp[i], b->attr[sample], x, y, splat_rim(in, block));
+	                        : z + thickness_of(&plan->warp[n], b->attr[sample], x, pixels->y, splat_rim(in, block));
 }
 
 /* The nearest words beyond the layers before. */
@@ -194,12 +197,8 @@ static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const s
 			l->pixels.x0 = area->x0 + x;
 			l->pixels.y = y;
 			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
-			for (uint32_t i = 0; i < n_found; i++) {
-				const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
-				const uint32_t at = l->pixels.x[i];
-
-				add_pixel(l, d->plan, first + at, l->pixels.id[i], area->x0 + x + at, y, color);
-			}
+			for (uint32_t i = 0; i < n_found; i++)
+				add_pixel(l, d->plan, first, i);
 			n_pixels += n_found;
 		}
 	return n_pixels;

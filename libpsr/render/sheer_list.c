@@ -25,13 +25,13 @@ int sheer_grow(struct sheer_list *list)
 	return PSR_OK;
 }
 
-/* z' where the line of sight through a pixel's centre meets the plane of a sample of normal n that is at (u, v) and z:
- * at two samples of a surface that is steep this differs by less than their own. */
-static float center_depth(const struct plan *plan, const struct warp_instance *in, const float inner[3], float u,
-                          float v, float z, float most)
+/* Finds z' where the line of sight through a pixel's centre meets the plane of a sample at pixel (at[0], at[1]) and
+ * depth at[2], at most `most` from it. On a steep surface two samples' planes differ by less than their depths. */
+static float center_depth(const struct plan *plan, const struct warp_instance *in, const float inner[3],
+                          const float at[3], float most)
 {
-	const float focal = plan->view.focal, across = (psr_floor_int(u) + 0.5f - u) / focal,
-				down = (psr_floor_int(v) + 0.5f - v) / focal;
+	const float focal = plan->view.focal, u = at[0], v = at[1], z = at[2];
+	const float across = (psr_floor_int(u) + 0.5f - u) / focal, down = (psr_floor_int(v) + 0.5f - v) / focal;
 	const float x = (u - plan->view.half_width) / focal, y = (v - plan->view.half_height) / focal;
 	float n[3], off;
 
@@ -69,7 +69,7 @@ static void list_points(const struct plan *plan, const struct bin_entry *entry, 
 			d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
-		const float center_z = center_depth(plan, in, n, u, v, z, MOST_OFF * rim);
+		const float center_z = center_depth(plan, in, n, (const float[3]){ u, v, z }, MOST_OFF * rim);
 		const uint32_t at = (uint32_t)((int32_t)v - target->y0) * target->stride + (uint32_t)((int32_t)u - target->x0);
 		if (center_z > plan->near_z && center_z - 0.5f * rim < list->before[at])
 			sheer_add(list, at, (uint64_t)psr_bits_from_float(center_z) << 32 | (b.id + sample));

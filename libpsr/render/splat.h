@@ -2,6 +2,7 @@
 #ifndef PSR_RENDER_SPLAT_H
 #define PSR_RENDER_SPLAT_H
 
+#include "gaps.h"
 #include "warp.h"
 
 /* As warp_tile, with a disc around each sample: in its projection's plane, tilted onto the surface's, and large enough
@@ -33,6 +34,6 @@ struct inside {
  * empty or behind by more than level 1's threshold, with one surface within a cell, or some pixels, in each of eight
  * directions. */
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
-                     uint32_t y1, uint16_t *weight, uint8_t *bricks);
+                     uint32_t y1, const struct gaps_map *map);
 
 #endif

@@ -19,6 +19,13 @@ static const int8_t way[8][2] = {
 	{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
 };
 
+/* A picture of splats. */
+struct splats {
+	const struct plan *plan;
+	const struct psr_zstack *stack;
+	const struct inside *inside; /* NULL: unknown */
+};
+
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 {
 	if (x < 0 || y < 0 || x >= (int64_t)stack->width || y >= (int64_t)stack->height)
@@ -27,13 +34,12 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 }
 
 /* How many pixels away, at most `reach`, something is before the depth by more than level 1's threshold; 0: none. */
-static int steps_to(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, float z,
-                    const int8_t *step, int reach)
+static int steps_to(const struct splats *s, uint32_t x, uint32_t y, float z, const int8_t *step, int reach)
 {
 	for (int i = 1; i <= reach; i++) {
-		const float other = depth_at(stack, (int64_t)x + i * step[0], (int64_t)y + i * step[1]);
+		const float other = depth_at(s->stack, (int64_t)x + i * step[0], (int64_t)y + i * step[1]);
 
-		if (other * plan->gap_scale[1] + plan->gap_offset[1] < z)
+		if (other * s->plan->gap_scale[1] + s->plan->gap_offset[1] < z)
 			return i;
 	}
 	return 0;
@@ -45,18 +51,18 @@ struct shown {
 	uint32_t block, sample;
 };
 
-static struct shown find_shown(const struct plan *plan, const struct psr_zstack *stack, int64_t x, int64_t y)
+static struct shown find_shown(const struct splats *s, int64_t x, int64_t y)
 {
-	const uint32_t id = (uint32_t)psr_zstack_row(stack, (uint32_t)y)[x], slot = id / PSR_BLOCK_SAMPLES;
-	const struct plan_instance *in = &plan->instance[plan_find_instance(plan, slot)];
+	const uint32_t id = (uint32_t)psr_zstack_row(s->stack, (uint32_t)y)[x], slot = id / PSR_BLOCK_SAMPLES;
+	const struct plan_instance *in = &s->plan->instance[plan_find_instance(s->plan, slot)];
 
 	return (struct shown){ in, slot - in->first_slot, id % PSR_BLOCK_SAMPLES };
 }
 
 /* In camera space. */
-static void find_normal(float n[3], const struct plan *plan, const struct psr_zstack *stack, int64_t x, int64_t y)
+static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y)
 {
-	const struct shown shown = find_shown(plan, stack, x, y);
+	const struct shown shown = find_shown(s, x, y);
 	const struct psr_blocks *b = shown.in->cull.blocks;
 	const uint64_t before = b->mask[shown.block] & ((UINT64_C(1) << shown.sample) - 1);
 	const uint64_t attr = b->attr[psr_blocks_attr_first(b, shown.block) + (uint32_t)__builtin_popcountll(before)];
@@ -68,49 +74,47 @@ static void find_normal(float n[3], const struct plan *plan, const struct psr_zs
 }
 
 /* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
-static int is_enclosed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
+static int is_enclosed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 {
-	const float z = depth_at(stack, x, y);
+	const float z = depth_at(s->stack, x, y);
 	float nearest = INFINITY, farthest = 0;
 
 	for (int w = 0; w < 8; w++) {
-		const int steps = steps_to(plan, stack, x, y, z, way[w], reach);
+		const int steps = steps_to(s, x, y, z, way[w], reach);
 		const int64_t u = (int64_t)x + steps * way[w][0], v = (int64_t)y + steps * way[w][1];
 
 		if (!steps)
 			return 0;
-		const float other = depth_at(stack, u, v);
+		const float other = depth_at(s->stack, u, v);
 		nearest = other < nearest ? other : nearest;
 		farthest = other > farthest ? other : farthest;
 	}
-	return farthest <= nearest * plan->gap_scale[4] + plan->gap_offset[4];
+	return farthest <= nearest * s->plan->gap_scale[4] + s->plan->gap_offset[4];
 }
 
 /* Whether the pixel is before nothing, and something is within `reach` pixels in two opposite directions. */
-static int is_crossed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int reach)
+static int is_crossed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 {
-	if (depth_at(stack, x, y) < INFINITY)
+	if (depth_at(s->stack, x, y) < INFINITY)
 		return 0;
 	for (int w = 0; w < 8; w += 2)
-		if (steps_to(plan, stack, x, y, INFINITY, way[w], reach)
-		    && steps_to(plan, stack, x, y, INFINITY, way[w + 1], reach))
+		if (steps_to(s, x, y, INFINITY, way[w], reach) && steps_to(s, x, y, INFINITY, way[w + 1], reach))
 			return 1;
 	return 0;
 }
 
 /* Whether one surface may go on from a pixel to the other: they are within the level's threshold of each other, and
  * face the same half of all directions. What ends on both sides of a gap turns away there. */
-static int is_continued(const struct plan *plan, const struct psr_zstack *stack, int level, const int64_t a[2],
-                        const int64_t b[2])
+static int is_continued(const struct splats *s, int level, const int64_t a[2], const int64_t b[2])
 {
-	const float z[2] = { depth_at(stack, a[0], a[1]), depth_at(stack, b[0], b[1]) };
+	const float z[2] = { depth_at(s->stack, a[0], a[1]), depth_at(s->stack, b[0], b[1]) };
 	const float nearer = z[0] < z[1] ? z[0] : z[1], farther = z[0] < z[1] ? z[1] : z[0];
 	float n[2][3];
 
-	if (farther > nearer * plan->gap_scale[level] + plan->gap_offset[level])
+	if (farther > nearer * s->plan->gap_scale[level] + s->plan->gap_offset[level])
 		return 0;
-	find_normal(n[0], plan, stack, a[0], a[1]);
-	find_normal(n[1], plan, stack, b[0], b[1]);
+	find_normal(n[0], s, a[0], a[1]);
+	find_normal(n[1], s, b[0], b[1]);
 	return v3f_dot(n[0], n[1]) > 0;
 }
 
@@ -118,34 +122,35 @@ static int is_continued(const struct plan *plan, const struct psr_zstack *stack,
  * two samples wide: half a cell where one surface goes on across; three sixteenths, or a pixel, whatever is beside it;
  * five eighths where it is no wider in any direction. Measured: with three cells in any case a chair whose samples are
  * half a pixel apart loses 6 dB, as what is seen between its spindles is closed. */
-static int is_narrow(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int level)
+static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
 {
-	const float z = depth_at(stack, x, y);
+	const float z = depth_at(s->stack, x, y);
 	const int cell = 1 << level, least = cell < 16 ? 1 : cell * 3 / 16;
 	int n_narrow = 0;
 
 	for (int w = 0; w < 8; w += 2) {
-		const int before = steps_to(plan, stack, x, y, z, way[w], cell);
-		const int after = before ? steps_to(plan, stack, x, y, z, way[w + 1], cell) : 0;
+		const int before = steps_to(s, x, y, z, way[w], cell);
+		const int after = before ? steps_to(s, x, y, z, way[w + 1], cell) : 0;
 		const int halves = (before + after - 1) * (w < 4 ? 2 : 3); /* of a pixel: a diagonal's steps are longer */
 		const int64_t a[2] = { (int64_t)x + before * way[w][0], (int64_t)y + before * way[w][1] };
 		const int64_t b[2] = { (int64_t)x + after * way[w + 1][0], (int64_t)y + after * way[w + 1][1] };
 
 		if (!after || 4 * halves > 5 * cell)
 			continue;
-		if (halves <= 2 * least || (halves <= cell && is_continued(plan, stack, level, a, b)) || ++n_narrow == 4)
+		if (halves <= 2 * least || (halves <= cell && is_continued(s, level, a, b)) || ++n_narrow == 4)
 			return 1;
 	}
 	return 0;
 }
 
 /* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct plan *plan, const struct psr_zstack *stack, uint32_t x,
-                         uint32_t y, uint32_t n)
+static void find_between(uint8_t *is_between, const struct splats *s, uint32_t x, uint32_t y, uint32_t n)
 {
 	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
-	const uint32_t first = x ? 0 : REACH, end = stack->width - x < n + REACH ? stack->width - x + REACH : n + 2 * REACH;
-	const uint64_t *word = psr_zstack_row(stack, y) + x;
+	const uint32_t first = x ? 0 : REACH, beyond = s->stack->width - x;
+	const uint32_t end = beyond < n + REACH ? beyond + REACH : n + 2 * REACH;
+	const float scale = s->plan->gap_scale[1], offset = s->plan->gap_offset[1];
+	const uint64_t *word = psr_zstack_row(s->stack, y) + x;
 	int has_any = 0;
 
 	for (uint32_t i = 0; i < REACH; i++)
@@ -168,7 +173,7 @@ static void find_between(uint8_t *is_between, const struct plan *plan, const str
 	for (uint32_t i = 0; i < n; i++) {
 		const float before = nearest[i], behind = nearest[i + REACH + 1], farther = before > behind ? before : behind;
 
-		is_between[i] = farther * plan->gap_scale[1] + plan->gap_offset[1] < z[i + REACH];
+		is_between[i] = farther * scale + offset < z[i + REACH];
 	}
 }
 
@@ -222,13 +227,12 @@ static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, ui
 }
 
 /* The n cells from (i, j), inside of the guard band. */
-static void find_cells(struct cell_row *to, const struct plan *plan, const struct psr_zstack *stack, int k, uint32_t i,
-                       uint32_t j, uint32_t n)
+static void find_cells(struct cell_row *to, const struct splats *s, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
 	const uint32_t n_around = n + 2 * GAP;
 
-	find_own(to->is_near, stack, k, i, j, n);
+	find_own(to->is_near, s->stack, k, i, j, n);
 	to->has_any = 0;
 	for (uint32_t c = 0; c < n; c++)
 		to->has_any |= to->is_near[c];
@@ -236,7 +240,7 @@ static void find_cells(struct cell_row *to, const struct plan *plan, const struc
 		return;
 	memset(farthest, 0, sizeof farthest);
 	for (int v = -GAP; v <= GAP; v++) {
-		find_nearest(nearest, stack, k, (int64_t)i - GAP, (int64_t)j + v, n_around);
+		find_nearest(nearest, s->stack, k, (int64_t)i - GAP, (int64_t)j + v, n_around);
 		for (uint32_t c = 0; c < n_around; c++)
 			farthest[c] = nearest[c] > farthest[c] ? nearest[c] : farthest[c];
 	}
@@ -245,7 +249,7 @@ static void find_cells(struct cell_row *to, const struct plan *plan, const struc
 
 		for (uint32_t u = 1; u <= 2 * GAP; u++)
 			all = farthest[c + u] > all ? farthest[c + u] : all;
-		to->limit[c] = all * plan->gap_scale[k] + plan->gap_offset[k];
+		to->limit[c] = all * s->plan->gap_scale[k] + s->plan->gap_offset[k];
 	}
 }
 
@@ -283,33 +287,33 @@ static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
 
 /* Whether the pixel, of a picture of 2^pass in a row and column of each of its pixels, and well inside of the plain
  * frame, lies in a crack. */
-static int is_crack(const struct plan *plan, const struct psr_zstack *stack, int is_covered, int level, unsigned pass,
-                    uint32_t x, uint32_t y)
+static int is_crack(const struct splats *s, int is_covered, int level, uint32_t x, uint32_t y)
 {
-	const int is_magnified = level > (int)pass + 1; /* cells are wider than two of its pixels */
+	const int is_magnified = level > (int)s->inside->pass + 1; /* cells are wider than two of its pixels */
 
 	if (is_magnified)
-		return is_covered || is_crossed(plan, stack, x, y, 1 << level < MOST_ACROSS ? 1 << level : MOST_ACROSS);
-	return is_covered && is_narrow(plan, stack, x, y, level);
+		return is_covered || is_crossed(s, x, y, 1 << level < MOST_ACROSS ? 1 << level : MOST_ACROSS);
+	return is_covered && is_narrow(s, x, y, level);
 }
 
-static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside,
-                          const struct cell_row *cells, uint32_t x0, uint32_t y, uint32_t n, uint16_t *weight,
-                          uint8_t *bricks)
+static uint32_t close_row(const struct splats *s, const struct cell_row *cells, uint32_t x0, uint32_t y, uint32_t n,
+                          const struct gaps_map *map)
 {
+	const uint32_t width = s->stack->width, bricks_x = (width + BRICK - 1) / BRICK;
+	uint16_t *weight = map->weight + (size_t)y * width + x0;
+	uint8_t *bricks = map->bricks + (size_t)(y / BRICK) * bricks_x;
 	struct row_holes holes;
 	uint32_t n_closed = 0;
 
-	find_holes(&holes, cells, stack, x0, y, n);
-	find_between(holes.is_between, plan, stack, x0, y, n);
+	find_holes(&holes, cells, s->stack, x0, y, n);
+	find_between(holes.is_between, s, x0, y, n);
 	for (uint32_t c = 0; c < n; c++) {
 		const uint32_t x = x0 + c;
 		const int level = holes.level[c], reach = 1 << level < REACH ? 1 << level : REACH;
 
 		if (weight[c] && level
-		    && ((inside != NULL && is_inside(inside, x, y)
-		      && is_crack(plan, stack, holes.is_covered[c], level, inside->pass, x, y))
-		     || (holes.is_between[c] && is_enclosed(plan, stack, x, y, reach)))) {
+		    && ((s->inside != NULL && is_inside(s->inside, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
+		        || (holes.is_between[c] && is_enclosed(s, x, y, reach)))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
 			n_closed++;
@@ -321,9 +325,9 @@ static uint32_t close_row(const struct plan *plan, const struct psr_zstack *stac
 _Static_assert(TILE_WIDTH % (1 << PSR_MAX_DEPTH_LEVEL) == 0, "a tile's row has whole cells");
 
 uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
-                     uint32_t y1, uint16_t *weight, uint8_t *bricks)
+                     uint32_t y1, const struct gaps_map *map)
 {
-	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
+	const struct splats s = { plan, stack, inside };
 	struct cell_row cells[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_closed = 0;
 
@@ -333,9 +337,8 @@ uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, co
 		for (uint32_t y = y0; y < y1; y++) {
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 				if (stack->levels >> k & 1 && (y == y0 || y % (1u << k) == 0))
-					find_cells(&cells[k], plan, stack, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);
-			n_closed += close_row(plan, stack, inside, cells, x, y, n, weight + (size_t)y * stack->width + x,
-			                      bricks + (size_t)(y / BRICK) * bricks_x);
+					find_cells(&cells[k], &s, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);
+			n_closed += close_row(&s, cells, x, y, n, map);
 		}
 	}
 	return n_closed;

@@ -52,9 +52,10 @@ int renderer_draw(struct psr_renderer *renderer, const struct psr_scene *scene, 
                   struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 
 /* The same in two halves. renderer_warp() leaves words and level buffers in the renderer's z-stack, which holds until
- * the next call; renderer_finish() does gaps, resolve, shade and fill on it, with the scene unchanged. */
+ * the next call; renderer_finish() does gaps, resolve, shade and fill on it, with the scene unchanged, and gives the
+ * report of both. */
 int renderer_warp(struct psr_renderer *renderer, const struct psr_scene *scene, const struct render_settings *settings,
-                  struct psr_pool *pool, struct psr_zstack **stack, struct psr_report *report, struct psr_error *err);
+                  struct psr_pool *pool, struct psr_zstack **stack, struct psr_error *err);
 int renderer_finish(struct psr_renderer *renderer, struct psr_zstack *stack, struct psr_pool *pool,
                     struct psr_frame *frame, struct psr_error *err);
 

@@ -139,13 +139,12 @@ static int draw_open(struct psr_frame *frame, struct study *study, const struct 
 	struct cover cover = { malloc(n * sizeof(float)), malloc(n * sizeof(float)) };
 	struct psr_frame raw = { .width = 0 };
 	struct psr_zstack *stack;
-	struct psr_report report;
 	int rc = psr_frame_alloc(&raw, frame->width, frame->width, FIGURE_PLANES, study->err);
 
 	if (rc == PSR_OK && (cover.closed == NULL || cover.greatest == NULL))
 		rc = psr_fail(study->err, PSR_ERR_MEMORY, "no memory for weights");
 	if (rc == PSR_OK)
-		rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &report, study->err);
+		rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, study->err);
 	if (rc == PSR_OK) {
 		find_weights(&cover, stack, shot);
 		rc = figure_draw_no_gaps(&raw, study, shot);

@@ -97,8 +97,7 @@ void figure_shot_copy(struct figure_shot *to, const struct figure_shot *from)
 static int draw(struct psr_frame *frame, struct study *study, const struct figure_shot *shot, int has_gaps)
 {
 	struct psr_zstack *stack;
-	int rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, &frame->report,
-	                       study->err);
+	int rc = renderer_warp(study->renderer, &shot->scene, &shot->settings, study->pool, &stack, study->err);
 
 	for (int k = 1; rc == PSR_OK && !has_gaps && k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		const size_t n = (size_t)stack->level[k].width * stack->level[k].height;

@@ -9,6 +9,7 @@
 #include <string.h>
 #include "base/direction.h"
 #include "render/cull.h"
+#include "render/renderer.h"
 
 #define GROUPS 5
 #define LEVELS 5
@@ -326,12 +327,12 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
 	for (double distance = 1.2; distance < 12; distance *= 1.3) {
 		struct psr_scene scene = scene_at(&instance, distance, 1.2);
-		struct psr_report report = { 0 };
+		const struct psr_report *report = &renderer->report;
 		struct choice choice;
 		int n_pixels[GROUPS] = { 0 };
 
 		choose(&scene, 512, NULL, &choice);
-		assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, &report, NULL), PSR_OK);
+		assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, NULL), PSR_OK);
 		for (int i = 0; i < 512 * 512; i++) {
 			const struct psr_cluster *k;
 
@@ -345,10 +346,10 @@ static void the_picture_has_samples_of_the_chosen_clusters_only(void **state)
 		}
 		for (int g = 0; g < GROUPS; g++)
 			assert_true(n_pixels[g] > 0);
-		assert_int_equal(report.n_blocks, psr_model_blocks(model)->n_blocks);
-		assert_int_equal(report.n_blocks_drawn, GROUPS);
-		assert_int_equal(report.n_samples_drawn, 64 * GROUPS);
-		assert_int_equal(report.count[PSR_STAGE_CULL], GROUPS);
+		assert_int_equal(report->n_blocks, psr_model_blocks(model)->n_blocks);
+		assert_int_equal(report->n_blocks_drawn, GROUPS);
+		assert_int_equal(report->n_samples_drawn, 64 * GROUPS);
+		assert_int_equal(report->count[PSR_STAGE_CULL], GROUPS);
 	}
 	psr_renderer_destroy(renderer);
 }

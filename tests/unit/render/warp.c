@@ -70,7 +70,6 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1 };
 	struct render_settings settings;
 	struct psr_renderer *renderer;
-	struct psr_report report;
 	struct psr_zstack *stack, plain;
 	struct psr_error err;
 
@@ -84,7 +83,7 @@ static void compare(uint32_t width, uint32_t height, double nearness, int kind, 
 		scene.camera.ortho_height = info->scale * 2 / nearness;
 	}
 	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
-	assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, &report, &err), PSR_OK);
+	assert_int_equal(renderer_warp(renderer, &scene, &settings, NULL, &stack, &err), PSR_OK);
 	warp_plainly(&plain, stack, &scene, &settings);
 	for (uint32_t y = 0; y < height; y++)
 		assert_memory_equal(psr_zstack_row(stack, y), psr_zstack_row(&plain, y), width * sizeof(uint64_t));
