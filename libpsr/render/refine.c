@@ -6,16 +6,16 @@
 #include "base/srgb.h"
 #include "refine.h"
 
-/* Windows begin at multiples of the coarsest cell, so that cells are those of the whole picture, and of what is drawn a
- * margin is not used: holes that reach across a window's border are filled from both of its sides. */
+/* Windows begin at multiples of the coarsest cell, so that their cells are those of the whole picture. Each draws a
+ * margin and drops it, so that a hole across the border of the rest is filled from both of its sides. */
 #define WINDOW_WIDTH 2048
 #define WINDOW_HEIGHT 1024
 #define MARGIN 64
 #define STEP_X (WINDOW_WIDTH - 2 * MARGIN)
 #define STEP_Y (WINDOW_HEIGHT - 2 * MARGIN)
-/* Pixels. The plain frame's edges are up to a sample's distance outside of the silhouette, and what lies between two
- * things that it shows as one ends nearer than this. Measured: with two in the place of four a wheel at 256 loses 1.7
- * dB. */
+/* Pixels from the plain frame's edges, which are up to a sample's distance outside the silhouette, to its inside. A gap
+ * between two things that the plain frame joins ends nearer to an edge. Measured: with two instead of four a wheel at
+ * 256 pixels loses 1.7 dB. */
 #define INSIDE 4
 _Static_assert(STEP_X % (1 << PSR_MAX_DEPTH_LEVEL) == 0 && STEP_Y % (1 << PSR_MAX_DEPTH_LEVEL) == 0,
                "cells stay where they are");
@@ -23,15 +23,15 @@ _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
 
 struct refiner {
 	struct psr_renderer *renderer;
-	uint8_t *rgb; /* of a window, and its depths behind them */
+	uint8_t *rgb; /* of a window, behind its depths in memory */
 	float *depth;
-	uint8_t *is_inside; /* by pixel of the picture, and room for as much again */
+	uint8_t *is_inside; /* by pixel of the plain frame, then as much scratch */
 	size_t inside_size;
 	uint8_t srgb[65536];   /* of 16-bit linear light */
 	uint16_t linear[256];
 };
 
-/* A window's part of the frame: pixels, and the first one's first sub-pixel in the window. */
+/* A window's part of the frame: its pixels, and the first sub-pixel of the first one in the window. */
 struct part {
 	const struct refiner *refiner;
 	struct psr_frame *frame;
@@ -160,7 +160,7 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 	sum->error_px = fmax(sum->error_px, ldexp(one->error_px, -(int)pass));
 }
 
-/* Draws the window of column i and row j of windows, and averages what of it is used. */
+/* Draws the window in column i and row j, and averages it without its margin. */
 static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 {
 	const struct refiner *r = still->refiner;
@@ -200,11 +200,11 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	return PSR_OK;
 }
 
-/* Of a run of n pixels that lie `step` apart: each becomes 1 where all are that lie within INSIDE of it. What would lie
- * beyond the picture does not count. */
+/* Erodes n pixels that lie `step` apart: one stays 1 if all within INSIDE of it are 1. Pixels beyond the picture do not
+ * count. */
 static void erode(uint8_t *to, const uint8_t *from, uint32_t n, size_t step)
 {
-	uint32_t n_whole = 0; /* up to here, without any that is 0 */
+	uint32_t n_whole = 0; /* length of the run of 1 that ends here */
 
 	for (uint32_t x = 0; x < n + INSIDE; x++) {
 		n_whole = x >= n || from[x * step] ? n_whole + 1 : 0;
@@ -228,7 +228,7 @@ static void erode_column(int x, void *userdata)
 	erode(e->is_inside + x, e->scratch + x, e->height, e->width);
 }
 
-/* Which pixels lie well inside of what the plain frame covers: there a pass shows no background between discs. */
+/* Finds the pixels well inside the plain frame's object, where a pass shows no background between discs. */
 static int find_inside(const struct still *still)
 {
 	struct refiner *r = still->refiner;

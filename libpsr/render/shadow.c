@@ -138,7 +138,8 @@ static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 
 	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0
 	       && memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0
-	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height && p->near_z == q->near_z;
+	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height
+	       && p->near_z == q->near_z;
 }
 
 /* Texels a side: as many as the picture's greater side has pixels, but at most SHADOW_TEXELS in the n_maps of the whole

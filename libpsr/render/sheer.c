@@ -1,4 +1,4 @@
-/* Surfaces that let a part of the light through: layer by layer, from the nearest on, over the finished picture. */
+/* Adds up translucent layers, the nearest first, and mixes the sum with the finished picture. */
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -11,13 +11,13 @@
 #include "sheer.h"
 #include "splat.h"
 
-/* What lies behind eight layers of one half shows less than a code of 8 bits. */
+/* Eight layers that each absorb half of the light leave less than one 8-bit code. */
 #define MOST_LAYERS 8
-/* Light that is left, below which nothing further is looked for: less than half a code of 8 bits anywhere. */
+/* A pixel is finished when less light than this is left: the rest changes any 8-bit code by less than half. */
 #define LEAST_THROUGH (1.0f / 8192)
-/* Steps of the lattice that a layer is thick, across the surface. Of the discs of one surface that overlap at a pixel,
- * one may be nearer than the next by its rim, a step, and as much by its slope. Along the line of sight it is as much
- * thicker as the surface is steep, up to ten times at silhouettes. */
+/* Thickness of a layer across the surface, in steps of the lattice. Overlapping discs of one surface differ in depth by
+ * a step for the rim and as much for the slope. Along the line of sight a steep surface is thicker, at most ten times
+ * at silhouettes. */
 #define LAYER_STEPS 3.0f
 #define LEAST_COSINE 0.1f
 
@@ -26,10 +26,10 @@ struct sheer_tile {
 	struct sheer_list list;
 	uint32_t next[WARP_OWN_WORDS]; /* of the list */
 	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
-	float beyond[WARP_OWN_WORDS];  /* z' where it ends */
-	float before[WARP_OWN_WORDS];  /* z' of the picture without */
-	float first[WARP_OWN_WORDS];   /* z' of the first one, or infinity */
-	float through[WARP_OWN_WORDS]; /* light of what is behind that is left */
+	float beyond[WARP_OWN_WORDS];  /* z' where the layer ends */
+	float before[WARP_OWN_WORDS];  /* z' of the opaque picture */
+	float first[WARP_OWN_WORDS];   /* z' of the nearest layer, or infinity */
+	float through[WARP_OWN_WORDS]; /* share of the light behind that the layers let through */
 	float light[3][WARP_OWN_WORDS];
 	struct strip_pixels pixels;
 	struct strip strip;
@@ -41,7 +41,7 @@ struct drawing {
 	const struct bins *bins;
 	const struct sheer_picture *picture;
 	struct sheer_tile *tile; /* one a thread */
-	float to_world[2], to_stack[2]; /* by two factors, since one of them may be beyond a float */
+	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
 	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_pixels;
 	atomic_int failed;
@@ -52,7 +52,7 @@ struct area {
 	uint32_t x0, y0, width, low_y, high_y;
 };
 
-/* Whether a block keeps back half of the light or more. */
+/* Whether a block absorbs at least half of the light. */
 static int casts_shadow(const struct psr_blocks *b, uint32_t block)
 {
 	const uint8_t *opacity = b->opacity + psr_blocks_attr_first(b, block);
@@ -91,7 +91,7 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 	return end;
 }
 
-/* The rows that any of the blocks may show in. */
+/* Finds the rows that the blocks reach. */
 static void find_area(struct area *area, const struct drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
 {
 	const struct plan *plan = d->plan;
@@ -133,7 +133,7 @@ static void begin_layers(struct sheer_tile *l, const struct drawing *d, const st
 	}
 }
 
-/* Of a layer, in z', at a sample of the instance that shows at a pixel. */
+/* Returns the thickness in z' of a layer whose sample shows at pixel (x, y). */
 static float thickness_of(const struct warp_instance *in, uint64_t attr, uint32_t x, uint32_t y, float rim)
 {
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)], u = (float)x + 0.5f, v = (float)y + 0.5f;
@@ -170,7 +170,7 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t firs
 	                        : z + thickness_of(&plan->warp[n], b->attr[sample], x, pixels->y, splat_rim(in, block));
 }
 
-/* The nearest words beyond the layers before. */
+/* Finds the nearest words beyond the layers drawn so far. */
 static void find_layer(struct sheer_tile *l, const struct area *area)
 {
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
@@ -270,7 +270,7 @@ static void draw_some(int part, void *userdata)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
 }
 
-/* Exact unless the result is beyond a float. */
+/* Splits 2^exponent into two factors. Exact unless the result is beyond a float. */
 static void find_factors(float factor[2], int exponent)
 {
 	const int clamped = exponent < -252 ? -252 : exponent > 252 ? 252 : exponent;

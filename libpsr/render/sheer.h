@@ -1,18 +1,18 @@
-/* Sheer: surfaces that let a part of the light through, over the finished picture. */
+/* Sheer: draws translucent surfaces over the finished picture. */
 #ifndef PSR_RENDER_SHEER_H
 #define PSR_RENDER_SHEER_H
 
 #include "bins.h"
 
 struct sheer {
-	struct sheer_tile *tile; /* scratch, one a thread that has drawn any */
+	struct sheer_tile *tile; /* scratch, one a thread */
 	int n_tiles;
 	float *depth;
 	size_t depth_size;
 	uint64_t n_pixels; /* of the last picture */
 };
 
-/* All words of a tile's sheer blocks, by pixel, nearest first. */
+/* All words of a tile's sheer blocks: a list a pixel, nearest first. */
 struct sheer_list {
 	const float *before; /* z' of the opaque surface, which hides words behind it */
 	uint32_t *first;     /* by pixel; SHEER_END: none */
@@ -25,7 +25,7 @@ struct sheer_list {
 };
 #define SHEER_END UINT32_MAX
 
-/* Makes room for more words. MEMORY, also noted in `failed`. */
+/* Makes room for more words. MEMORY, which also sets `failed`. */
 int sheer_grow(struct sheer_list *list);
 
 static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
@@ -40,16 +40,17 @@ static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word
 	*link = list->n++;
 }
 
-/* Moves the sheer entries of a tile behind the others, which alone are warped; returns the first of them. In a shadow map
- * blocks that absorb half of the light or more stay, and the other sheer ones cast no shadow. */
+/* Moves a tile's sheer entries behind its opaque ones, and returns the first sheer one. The warp draws the opaque ones.
+ * In a shadow map a block that absorbs at least half of the light counts as opaque, and other sheer blocks cast no
+ * shadow. */
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
 
-/* Lists blocks of a tile: samples as pixels if they are at most a pixel apart and the picture has no splats, else as
- * discs. */
+/* Lists the words of blocks in a tile. Samples at most a pixel apart are pixels if the picture has no splats; all
+ * others are discs. */
 void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
                        const struct warp_target *target);
 
-/* A picture without sheer surfaces: sRGB or NULL, and its depths in world units. */
+/* The picture to draw over: sRGB or NULL, and depths in world units. */
 struct sheer_picture {
 	uint8_t *rgb;
 	const uint8_t *srgb; /* 8 bits of 16-bit linear light */
@@ -57,12 +58,12 @@ struct sheer_picture {
 	int exponent; /* of the stack */
 };
 
-/* Allocates depths, for frames without. NULL without memory. */
+/* Allocates depths for a frame that has none. Returns NULL without memory. */
 float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
-/* Draws sheer surfaces over the picture, at most the eight nearest of a pixel, from back to front: each hides its opacity's
- * share of the light behind it. The depth becomes the nearest one's where they hide half of the light, or nothing is
- * behind them. sheer->n_pixels: pixels with any. A pure function of picture, plan and bins. MEMORY. */
+/* Draws the eight nearest sheer surfaces of each pixel over the picture. Each hides its opacity's share of the light
+ * behind it. Where they hide half of the light, or nothing is behind them, the depth becomes that of the nearest. Sets
+ * sheer->n_pixels to how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);

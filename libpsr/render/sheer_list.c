@@ -1,5 +1,4 @@
-/* What sheer blocks show, by place: samples that are a pixel apart at most as the pixels that they fall into, others as
- * discs. */
+/* Lists the words of sheer blocks by pixel. */
 #include <stdlib.h>
 #include "base/maths.h"
 #include "base/vec.h"
@@ -8,8 +7,8 @@
 #include "splat.h"
 #include "simd/block.h"
 
-/* Steps of the lattice that a pixel's centre counts as before or behind its sample, at most: normals are not the
- * surface's own everywhere. */
+/* At most so many steps of the lattice between the depths of a pixel's centre and its sample: a normal may not be the
+ * surface's own. */
 #define MOST_OFF 4.0f
 
 int sheer_grow(struct sheer_list *list)

@@ -8,18 +8,18 @@
 #include "splat.h"
 #include "simd/block.h"
 
-/* Steps of the lattice: no point of an equilateral one is further than 1/sqrt(3) from a sample. */
+/* Steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
 #define RADIUS 0.6f
-/* Of the tangent plane against the projection's, where the lattice does not tell. Projections own what they see at less
- * than 50 degrees, and normals of steeper places are mostly those of a texture or of something smaller than the disc;
- * steps would stick out. Measured. */
+/* The greatest slope of a tangent plane in its projection, where a sample lacks neighbours. Projections own surfaces
+ * that they see at less than 50 degrees; steeper normals mostly belong to a texture or to detail smaller than the disc.
+ * Measured. */
 #define MOST_SLOPE 0.7f
-/* Of a plane on which neighbours agree, however steep a face may be that another projection would own. */
+/* The greatest slope of a plane that neighbours confirm. */
 #define MOST_STEEP 3.0f
-/* Of a disc whose sample has no neighbours on either side, along that line: what it lies on is narrower than a step. */
+/* Share of the radius along a line without neighbours on either side: the surface is narrower than a step there. */
 #define NARROW 0.5f
-/* A disc's rim counts as so many steps further away, so that of discs of one surface the one whose sample is nearest
- * shows. Measured. */
+/* Steps by which a disc's rim counts as further away, so that a pixel shows the disc whose centre is nearest to it.
+ * Measured. */
 #define RIM_DEPTH 1.0f
 
 struct splat_target {
@@ -27,10 +27,11 @@ struct splat_target {
 	uint64_t *word;
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
-	struct sheer_list *list; /* of all that is drawn, in the place of words; or NULL */
+	struct sheer_list *list; /* takes the discs instead of words, or NULL */
 };
 
-/* An ellipse of the picture: its centre, two conjugate radii, and how depth rises along these and to the rim. */
+/* An ellipse in the picture: centre, two conjugate radii, how depth rises along them and to the rim, and the greatest
+ * reach in pixels. */
 struct splat {
 	float at[3], radius[2][3], rim, most;
 	uint32_t id;
@@ -62,8 +63,8 @@ static void limit_reach(struct splat *s)
 			v3f_scale(s->radius[i], s->radius[i], s->most / extent);
 }
 
-/* A place of a disc is listed if its plane there is before what hides all, or behind that by half of what is added at a
- * rim: what lies on a surface is not lost in it. */
+/* Lists a pixel of a disc unless an opaque surface is nearer than its plane by half of a rim's depth: a sheer surface
+ * on an opaque one stays visible. */
 static inline void list_place(const struct splat_target *t, const struct splat *s, int32_t x, int32_t y, float z,
                               float square)
 {
@@ -73,8 +74,8 @@ static inline void list_place(const struct splat_target *t, const struct splat *
 		sheer_add(t->list, at, (uint64_t)psr_bits_from_float(z) << 32 | s->id);
 }
 
-/* Pixels whose centres are in the ellipse. That which the disc's own centre is in need not be: discs meet their
- * neighbours', and one more pixel at each edge would be too much. */
+/* Draws the pixels whose centres are in the ellipse. It may miss the pixel of the disc's own centre: discs meet their
+ * neighbours', and that pixel would widen every edge. */
 static inline __attribute__((always_inline)) void draw_splat(const struct splat_target *t, const struct splat *s,
                                                              int is_listed)
 {
@@ -103,11 +104,11 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 		}
 }
 
-/* Depths of a block's samples by place. */
+/* Depths of a block's samples by place in the lattice. */
 struct lattice_depths {
 	uint64_t mask;
 	uint16_t depth[PSR_BLOCK_SAMPLES];
-	float rise; /* of a step of depth, in steps of the lattice */
+	float rise; /* a step of depth, in steps of the lattice */
 };
 
 static void place_depths(struct lattice_depths *to, const struct warp_block *b, float rise)
@@ -120,7 +121,7 @@ static void place_depths(struct lattice_depths *to, const struct warp_block *b, 
 		to->depth[__builtin_ctzll(left)] = *depth++;
 }
 
-/* Slope towards a neighbour, if the block has it. */
+/* Finds the slope towards a neighbour. Returns 0 if the block has no sample there. */
 static inline int slope_to(float *slope, const struct lattice_depths *at, int own, int row, int col)
 {
 	if (((row | col) & ~7) != 0 || !(at->mask >> (8 * row + col) & 1))
@@ -129,8 +130,8 @@ static inline int slope_to(float *slope, const struct lattice_depths *at, int ow
 	return 1;
 }
 
-/* Slope along a line of the lattice: the normal's, as far as it is between the slopes to the neighbours before and
- * behind. Without both of them, `safe`. */
+/* Slope along a line of the lattice: the normal's, clamped between the slopes to the neighbours on both sides. `safe`
+ * unless the sample has both. */
 static inline float slope_along(int has_next, float next, int has_last, float last, float normal, float safe)
 {
 	const float low = next < -last ? next : -last, high = next < -last ? -last : next;
@@ -140,7 +141,7 @@ static inline float slope_along(int has_next, float next, int has_last, float la
 	return normal > low ? normal < high ? normal : high : low;
 }
 
-/* How z of the projection rises along its x and y, on the plane of a normal. */
+/* Finds how the projection's z rises along its x and y, on the plane of a normal. */
 static void slope_of_normal(float slope[2], const float n[3], const struct psr_projection *projection)
 {
 	const float nz = v3f_dot(n, projection->axis[2]);
@@ -161,9 +162,9 @@ static void limit_slope(float slope[2], float most)
 	}
 }
 
-/* The plane of the normal, along each of the lattice's three lines as far as depths on both sides agree with it: a
- * normal may be that of a map, or of a rounded corner. In odd rows samples are half a step to the right. Also how much
- * of the radius along the rows, and across them, is covered. */
+/* Finds the slopes of a disc's plane, and the share of its radius along the rows and across them. The plane is the
+ * normal's, clamped along each of the lattice's three lines by the depths on both sides: the normal may come from a
+ * map, or a rounded corner. Odd rows are half a step to the right. */
 static void find_plane(float slope[2], float share[2], const struct lattice_depths *at, uint32_t sample,
                        const float n[3], const struct psr_projection *projection)
 {
@@ -184,7 +185,7 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 	slope[0] = (2 * rise[0] + rise[1] - rise[2]) / 3;
 	slope[1] = (rise[1] + rise[2]) / (2 * high);
 	limit_slope(slope, MOST_STEEP);
-	/* Outside of the block there may be some. */
+	/* A sample at the block's border may have neighbours in the next block. */
 	const int beside = has_next[0] | has_last[0] | (c == 0) | (c == 7);
 	const int at_end = (r == 0) | (r == 7) | (left < 0) | (left == 7);
 	const int across = has_next[1] | has_next[2] | has_last[1] | has_last[2] | at_end;
@@ -248,8 +249,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 	}
 }
 
-/* The cells that samples fall into, by the warp, which draws words, too. Samples that are at most a pixel apart have
- * cells of two pixels. */
+/* Draws the samples' cells by the warp, which draws words, too. Blocks of level 0 get cells of two pixels. */
 static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
                            const struct bin_entry *entry, uint32_t n)
 {

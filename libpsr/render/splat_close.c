@@ -1,4 +1,4 @@
-/* Holes between the discs of refined pixels. */
+/* Closes holes between discs. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -6,15 +6,15 @@
 #include "base/vec.h"
 #include "splat.h"
 
-#define REACH 8 /* pixels, a power of two: no hole between discs that one surface encloses is sought further */
-/* Cells on either side of a pixel's own: a gap in a row of cells that all have samples is narrower than two of them. */
+#define REACH 8 /* pixels, a power of two: how far from a hole its enclosing surface may be */
+/* Cells to look at on each side of a pixel's own: a gap in a full row of cells is narrower than two of them. */
 #define GAP 1
-/* Pixels, on either side of one before nothing, of magnified samples: what is used of a window has as many about it. */
+/* Pixels to look at on each side of an empty one between magnified samples: a window's margin has as many. */
 #define MOST_ACROSS 64
 #define CELLS (TILE_WIDTH / 2)
 #define CELLS_AROUND (CELLS + 2 * GAP)
 
-/* Each and its opposite. */
+/* Eight directions: each, then its opposite. */
 static const int8_t way[8][2] = {
 	{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
 };
@@ -33,7 +33,7 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 	return psr_float_from_bits((uint32_t)(psr_zstack_row(stack, (uint32_t)y)[x] >> 32));
 }
 
-/* How many pixels away, at most `reach`, something is before the depth by more than level 1's threshold; 0: none. */
+/* Returns how many pixels away, at most `reach`, something is nearer than z by more than level 1's threshold, or 0. */
 static int steps_to(const struct splats *s, uint32_t x, uint32_t y, float z, const int8_t *step, int reach)
 {
 	for (int i = 1; i <= reach; i++) {
@@ -59,7 +59,7 @@ static struct shown find_shown(const struct splats *s, int64_t x, int64_t y)
 	return (struct shown){ in, slot - in->first_slot, id % PSR_BLOCK_SAMPLES };
 }
 
-/* In camera space. */
+/* Finds the normal of the sample that a pixel shows, in camera space. */
 static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y)
 {
 	const struct shown shown = find_shown(s, x, y);
@@ -73,7 +73,7 @@ static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y
 		               + shown.in->turn[a][2] * (double)inner[2]);
 }
 
-/* Whether what is before the pixel meets it within `reach` pixels in all eight directions, and is one surface. */
+/* Whether one surface, nearer than the pixel, is within `reach` pixels of it in all eight directions. */
 static int is_enclosed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 {
 	const float z = depth_at(s->stack, x, y);
@@ -92,7 +92,7 @@ static int is_enclosed(const struct splats *s, uint32_t x, uint32_t y, int reach
 	return farthest <= nearest * s->plan->gap_scale[4] + s->plan->gap_offset[4];
 }
 
-/* Whether the pixel is before nothing, and something is within `reach` pixels in two opposite directions. */
+/* Whether the pixel is empty and between samples in two opposite directions, at most `reach` pixels away. */
 static int is_crossed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 {
 	if (depth_at(s->stack, x, y) < INFINITY)
@@ -103,8 +103,8 @@ static int is_crossed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 	return 0;
 }
 
-/* Whether one surface may go on from a pixel to the other: they are within the level's threshold of each other, and
- * face the same half of all directions. What ends on both sides of a gap turns away there. */
+/* Whether one surface may continue from pixel a to pixel b: their depths differ by at most the level's threshold, and
+ * the angle between their normals is less than 90 degrees. Two surfaces that end at a gap turn away from each other. */
 static int is_continued(const struct splats *s, int level, const int64_t a[2], const int64_t b[2])
 {
 	const float z[2] = { depth_at(s->stack, a[0], a[1]), depth_at(s->stack, b[0], b[1]) };
@@ -118,10 +118,10 @@ static int is_continued(const struct splats *s, int level, const int64_t a[2], c
 	return v3f_dot(n[0], n[1]) > 0;
 }
 
-/* Whether the pixel is in something as narrow as a crack between samples that have cells of a level, which are one to
- * two samples wide: half a cell where one surface goes on across; three sixteenths, or a pixel, whatever is beside it;
- * five eighths where it is no wider in any direction. Measured: with three cells in any case a chair whose samples are
- * half a pixel apart loses 6 dB, as what is seen between its spindles is closed. */
+/* Whether the pixel is in a gap as narrow as a crack between samples. A cell of the level is one to two samples wide. A
+ * crack is at most half a cell wide where one surface continues across it, five eighths if it is so narrow in every
+ * direction, and three sixteenths, or a pixel, anywhere. Measured: with three cells in any case, a chair whose samples
+ * are half a pixel apart loses 6 dB, since the gaps between its spindles close. */
 static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
 {
 	const float z = depth_at(s->stack, x, y);
@@ -131,7 +131,7 @@ static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
 	for (int w = 0; w < 8; w += 2) {
 		const int before = steps_to(s, x, y, z, way[w], cell);
 		const int after = before ? steps_to(s, x, y, z, way[w + 1], cell) : 0;
-		const int halves = (before + after - 1) * (w < 4 ? 2 : 3); /* of a pixel: a diagonal's steps are longer */
+		const int halves = (before + after - 1) * (w < 4 ? 2 : 3); /* half pixels: a diagonal's steps are longer */
 		const int64_t a[2] = { (int64_t)x + before * way[w][0], (int64_t)y + before * way[w][1] };
 		const int64_t b[2] = { (int64_t)x + after * way[w + 1][0], (int64_t)y + after * way[w + 1][1] };
 
@@ -143,10 +143,10 @@ static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
 	return 0;
 }
 
-/* Of n pixels from x on: whether what is before them meets them on the left and on the right. */
+/* Finds for n pixels from x on whether something nearer is within REACH on the left and on the right. */
 static void find_between(uint8_t *is_between, const struct splats *s, uint32_t x, uint32_t y, uint32_t n)
 {
-	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of a pixel and the next ones, REACH in all */
+	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of REACH pixels from this one on */
 	const uint32_t first = x ? 0 : REACH, beyond = s->stack->width - x;
 	const uint32_t end = beyond < n + REACH ? beyond + REACH : n + 2 * REACH;
 	const float scale = s->plan->gap_scale[1], offset = s->plan->gap_offset[1];
@@ -177,15 +177,15 @@ static void find_between(uint8_t *is_between, const struct splats *s, uint32_t x
 	}
 }
 
-/* A row of cells of a level, of a tile: what lies beyond these depths is behind samples of all cells around. */
+/* A tile's row of cells of a level. */
 struct cell_row {
-	float limit[CELLS];
-	uint8_t is_near[CELLS]; /* a block of this very level has samples in the cell or beside it */
+	float limit[CELLS];     /* a greater depth is behind samples of all cells around */
+	uint8_t is_near[CELLS]; /* a block of this level has samples in the cell or beside it */
 	int has_any;
 };
 
-/* The nearest z' of cells from (i, j) on, counted from the guard band's corner: of their own samples, and of those of
- * finer levels in use. Beyond the guard band there is nothing. */
+/* Finds the nearest z' of n cells from (i, j) on, of their level's samples and of finer levels'. (0, 0) is the guard
+ * band's corner; cells beyond the guard band are empty. */
 static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, int64_t i, int64_t j, uint32_t n)
 {
 	const int64_t width = stack->level[k].width, height = stack->level[k].height;
@@ -213,6 +213,7 @@ static void find_nearest(float *nearest, const struct psr_zstack *stack, int k, 
 	}
 }
 
+/* Finds which of n cells from (i, j) on have samples of their own level in them or beside them. */
 static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	const uint32_t width = stack->level[k].width;
@@ -226,7 +227,7 @@ static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, ui
 	}
 }
 
-/* The n cells from (i, j), inside of the guard band. */
+/* Fills in n cells from (i, j) on, which lie inside the guard band. */
 static void find_cells(struct cell_row *to, const struct splats *s, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
@@ -253,11 +254,11 @@ static void find_cells(struct cell_row *to, const struct splats *s, int k, uint3
 	}
 }
 
-/* What is known of the pixels of a row of a tile. */
+/* Properties of the pixels in a row of a tile. */
 struct row_holes {
-	uint8_t is_between[TILE_WIDTH]; /* what is before it is on its left and on its right */
-	uint8_t is_covered[TILE_WIDTH]; /* it lies behind samples in all cells around */
-	uint8_t level[TILE_WIDTH];      /* of the coarsest cells around; 0: there are none */
+	uint8_t is_between[TILE_WIDTH]; /* something nearer is on its left and on its right */
+	uint8_t is_covered[TILE_WIDTH]; /* samples in all cells around are nearer */
+	uint8_t level[TILE_WIDTH];      /* of the coarsest cells around; 0: none */
 };
 
 static void find_holes(struct row_holes *to, const struct cell_row *cells, const struct psr_zstack *stack, uint32_t x,
@@ -285,11 +286,10 @@ static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
 	return inside->is_inside[(size_t)v * inside->width + u];
 }
 
-/* Whether the pixel, of a picture of 2^pass in a row and column of each of its pixels, and well inside of the plain
- * frame, lies in a crack. */
+/* Whether a pixel well inside the plain frame's object lies in a crack. */
 static int is_crack(const struct splats *s, int is_covered, int level, uint32_t x, uint32_t y)
 {
-	const int is_magnified = level > (int)s->inside->pass + 1; /* cells are wider than two of its pixels */
+	const int is_magnified = level > (int)s->inside->pass + 1; /* cells are wider than two plain pixels */
 
 	if (is_magnified)
 		return is_covered || is_crossed(s, x, y, 1 << level < MOST_ACROSS ? 1 << level : MOST_ACROSS);
