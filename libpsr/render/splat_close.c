@@ -34,12 +34,15 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 }
 
 /* Returns how many pixels away, at most `reach`, something is nearer than z by more than level 1's threshold, or 0. */
-static int steps_to(const struct splats *s, uint32_t x, uint32_t y, float z, const int8_t *step, int reach)
+static inline int steps_to(const struct splats *s, uint32_t x, uint32_t y, float z, const int8_t *step, int reach)
 {
-	for (int i = 1; i <= reach; i++) {
-		const float other = depth_at(s->stack, (int64_t)x + i * step[0], (int64_t)y + i * step[1]);
+	const float scale = s->plan->gap_scale[1], offset = s->plan->gap_offset[1];
+	int64_t u = x, v = y;
 
-		if (other * s->plan->gap_scale[1] + s->plan->gap_offset[1] < z)
+	for (int i = 1; i <= reach; i++) {
+		u += step[0];
+		v += step[1];
+		if (depth_at(s->stack, u, v) * scale + offset < z)
 			return i;
 	}
 	return 0;
@@ -300,6 +303,7 @@ static uint32_t close_row(const struct splats *s, const struct cell_row *cells, 
                           const struct gaps_map *map)
 {
 	const uint32_t width = s->stack->width, bricks_x = (width + BRICK - 1) / BRICK;
+	const struct inside *inside = s->inside;
 	uint16_t *weight = map->weight + (size_t)y * width + x0;
 	uint8_t *bricks = map->bricks + (size_t)(y / BRICK) * bricks_x;
 	struct row_holes holes;
@@ -312,7 +316,7 @@ static uint32_t close_row(const struct splats *s, const struct cell_row *cells, 
 		const int level = holes.level[c], reach = 1 << level < REACH ? 1 << level : REACH;
 
 		if (weight[c] && level
-		    && ((s->inside != NULL && is_inside(s->inside, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
+		    && ((inside != NULL && is_inside(inside, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
 		        || (holes.is_between[c] && is_enclosed(s, x, y, reach)))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
