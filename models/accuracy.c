@@ -162,13 +162,13 @@ static int measure(struct result *result, const char *source, const struct frame
 	if (code == PSR_OK)
 		code = psr_truth_create(&shot.truth, mesh, err);
 	if (code == PSR_OK)
-		psr_truth_stipple(shot.truth, frame->spacing);
-	if (code == PSR_OK)
 		code = psr_accuracy_measure(&result->depth, &shot, depth, frame->spacing, err);
-	if (code == PSR_OK && frame->color != NULL)
-		code = measure_color(&result->color, shot, frame->color, err);
 	if (code == PSR_OK && shadow->shadowed != NULL)
 		code = measure_shadow(&result->shadow, shot, shadow, err);
+	if (code == PSR_OK) /* depths and shadow maps know glass as there or not; colours know how much it lets through */
+		psr_truth_stipple(shot.truth, frame->spacing);
+	if (code == PSR_OK && frame->color != NULL)
+		code = measure_color(&result->color, shot, frame->color, err);
 	if (code == PSR_OK)
 		result->verdict = accuracy_judge(result->text, &result->depth, bounds,
 		                                 &(struct accuracy_frame){ camera, shot.width, shot.height, depth,

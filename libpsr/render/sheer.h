@@ -60,8 +60,8 @@ struct sheer_picture {
 float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
 /* Draws sheer surfaces over the picture, at most the eight nearest of a pixel, from back to front: each hides its opacity's
- * share of the light behind it. The depth becomes the nearest one's where they hide half of the light, or nothing is
- * behind them. sheer->n_pixels: pixels with any. A pure function of picture, plan and bins. MEMORY. */
+ * share of the light behind it. The depth becomes the nearest one's where they hide half of the light or
+ * more. sheer->n_pixels: pixels with any. A pure function of picture, plan and bins. MEMORY. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);
