@@ -97,38 +97,38 @@ static int print_json(const struct psr_accuracy *a, const struct psr_color_accur
 	return json_print(root, err);
 }
 
-static int measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                         const char *path, int n_threads, struct psr_error *err)
+/* The size is the file's. */
+static int measure_color(struct psr_color_accuracy *out, struct psr_truth_shot shot, const char *path,
+                         struct psr_error *err)
 {
-	uint32_t width, height;
 	uint8_t *rgb = NULL;
-	int code = ppm_read(&rgb, &width, &height, path, err);
+	int code = ppm_read(&rgb, &shot.width, &shot.height, path, err);
 
 	if (code == PSR_OK)
-		code = psr_accuracy_measure_color(out, truth, camera, width, height, rgb, n_threads, err);
+		code = psr_accuracy_measure_color(out, &shot, rgb, err);
 	free(rgb);
 	return code;
 }
 
-/* The frames with and without shadows, and their light. */
 struct shadow_frames {
 	const char *shadowed, *lit; /* NULL: none */
 	struct psr_light light;
 };
 
-static int measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                          const struct shadow_frames *frames, int n_threads, struct psr_error *err)
+/* The size is the files'. */
+static int measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth_shot shot,
+                          const struct shadow_frames *frames, struct psr_error *err)
 {
-	uint32_t width, height, lit_width, lit_height;
+	uint32_t lit_width, lit_height;
 	uint8_t *shadowed = NULL, *lit = NULL;
-	int code = ppm_read(&shadowed, &width, &height, frames->shadowed, err);
+	int code = ppm_read(&shadowed, &shot.width, &shot.height, frames->shadowed, err);
 
 	if (code == PSR_OK)
 		code = ppm_read(&lit, &lit_width, &lit_height, frames->lit, err);
-	if (code == PSR_OK && (width != lit_width || height != lit_height))
+	if (code == PSR_OK && (shot.width != lit_width || shot.height != lit_height))
 		code = psr_fail(err, PSR_ERR_ARG, "%s and %s are of different sizes", frames->shadowed, frames->lit);
 	if (code == PSR_OK)
-		code = psr_accuracy_measure_shadow(out, truth, camera, &frames->light, width, height, shadowed, lit, n_threads, err);
+		code = psr_accuracy_measure_shadow(out, &shot, &frames->light, shadowed, lit, err);
 	free(shadowed);
 	free(lit);
 	return code;
@@ -148,33 +148,32 @@ static int measure(struct result *result, const char *source, const struct frame
 	const struct psr_camera *camera = &frame->camera;
 	struct psr_build_options options;
 	struct psr_mesh *mesh = NULL;
-	struct psr_truth *truth = NULL;
-	uint32_t width, height;
+	struct psr_truth_shot shot = { .camera = camera };
 	float *depth = NULL;
-	int code = pfm_read(&depth, &width, &height, frame->depth, err);
+	int code = pfm_read(&depth, &shot.width, &shot.height, frame->depth, err);
 
 	psr_build_options_default(&options);
-	if (code == PSR_OK && frame->width > 0 && (frame->width != width || frame->height != height))
+	shot.n_threads = options.n_threads;
+	if (code == PSR_OK && frame->width > 0 && (frame->width != shot.width || frame->height != shot.height))
 		code = psr_fail(err, PSR_ERR_ARG, "%s has %ux%u pixels, and %s is of a frame of %ux%u: they belong to different frames",
-		                frame->depth, width, height, frame->report, frame->width, frame->height);
+		                frame->depth, shot.width, shot.height, frame->report, frame->width, frame->height);
 	if (code == PSR_OK)
 		code = psr_mesh_import(&mesh, source, NULL, err);
 	if (code == PSR_OK)
-		code = psr_truth_create(&truth, mesh, err);
+		code = psr_truth_create(&shot.truth, mesh, err);
 	if (code == PSR_OK)
-		psr_truth_stipple(truth, frame->spacing);
-	if (code == PSR_OK)
-		code = psr_accuracy_measure(&result->depth, truth, camera, width, height, depth, frame->spacing, options.n_threads,
-		                            err);
-	if (code == PSR_OK && frame->color != NULL)
-		code = measure_color(&result->color, truth, camera, frame->color, options.n_threads, err);
+		code = psr_accuracy_measure(&result->depth, &shot, depth, frame->spacing, err);
 	if (code == PSR_OK && shadow->shadowed != NULL)
-		code = measure_shadow(&result->shadow, truth, camera, shadow, options.n_threads, err);
+		code = measure_shadow(&result->shadow, shot, shadow, err);
+	if (code == PSR_OK) /* depths and shadow maps know glass as there or not; colours know how much it lets through */
+		psr_truth_stipple(shot.truth, frame->spacing);
+	if (code == PSR_OK && frame->color != NULL)
+		code = measure_color(&result->color, shot, frame->color, err);
 	if (code == PSR_OK)
 		result->verdict = accuracy_judge(result->text, &result->depth, bounds,
-		                                 &(struct accuracy_frame){ camera, width, height, depth, frame->spacing,
-		                                                           frame->spacing_px });
-	psr_truth_destroy(truth);
+		                                 &(struct accuracy_frame){ camera, shot.width, shot.height, depth,
+		                                                           frame->spacing, frame->spacing_px });
+	psr_truth_destroy(shot.truth);
 	psr_mesh_destroy(mesh);
 	free(depth);
 	return code;

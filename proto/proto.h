@@ -126,7 +126,7 @@ int psr_wire_error_to(uint16_t wire);   /* wire -> enum psr_err; UNAUTHORIZED gi
 
 struct psr_msg_error { /* server -> client; terminal of the id; id 0: about the connection, which the server closes */
 	uint16_t code;               /* enum psr_wire_error, not 0; receivers take unknown codes */
-	char text[PSR_ERROR_TEXT];   /* encode replaces what is not clean UTF-8 by '?': an ERROR can always be sent */
+	char text[PSR_ERROR_TEXT];   /* encoding replaces bytes that are not clean UTF-8 by '?': an ERROR can always be sent */
 };
 
 struct psr_msg_list_end { uint32_t n_entries; };

@@ -104,10 +104,10 @@ int psr_address_check(const char *address, struct psr_error *err)
 }
 
 /* CONNECTION with the system's reason in err, or the open socket. */
-static int try_connect(int *out, int family, const struct sockaddr *to, socklen_t length, const char *name,
-                       uint64_t deadline_ns, struct psr_error *err)
+static int try_connect(int *out, const struct sockaddr *to, socklen_t length, const char *name, uint64_t deadline_ns,
+                       struct psr_error *err)
 {
-	int fd = socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), reason = 0, one = 1;
+	int fd = socket(to->sa_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), reason = 0, one = 1;
 	socklen_t reason_size = sizeof reason;
 
 	if (fd < 0)
@@ -116,7 +116,7 @@ static int try_connect(int *out, int family, const struct sockaddr *to, socklen_
 		static const struct timespec pause = { .tv_nsec = 5000000 };
 
 		reason = errno;
-		if (family == AF_UNIX && reason == EAGAIN && clock_ns() < deadline_ns) { /* its backlog is full */
+		if (to->sa_family == AF_UNIX && reason == EAGAIN && clock_ns() < deadline_ns) { /* its backlog is full */
 			reason = 0;
 			nanosleep(&pause, NULL);
 			continue;
@@ -136,7 +136,7 @@ static int try_connect(int *out, int family, const struct sockaddr *to, socklen_
 		return psr_fail(err, PSR_ERR_CONNECTION, "cannot connect to %s: %s; does psrd run there?", name,
 		                strerror(reason));
 	}
-	if (family != AF_UNIX)
+	if (to->sa_family != AF_UNIX)
 		setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
 	*out = fd;
 	return PSR_OK;
@@ -154,14 +154,14 @@ int client_socket_connect(int *out, const char *text, uint64_t deadline_ns, stru
 		struct sockaddr_un to = { .sun_family = AF_UNIX };
 
 		memcpy(to.sun_path, address.path, sizeof address.path);
-		return try_connect(out, AF_UNIX, (struct sockaddr *)&to, sizeof to, text, deadline_ns, err);
+		return try_connect(out, (struct sockaddr *)&to, sizeof to, text, deadline_ns, err);
 	}
 	code = getaddrinfo(address.host, address.port, &hints, &all);
 	if (code != 0)
 		return psr_fail(err, PSR_ERR_CONNECTION, "cannot find the host of %.200s: %s", text, gai_strerror(code));
 	code = PSR_ERR_CONNECTION;
 	for (const struct addrinfo *one = all; one != NULL && code != PSR_OK; one = one->ai_next)
-		code = try_connect(out, one->ai_family, one->ai_addr, one->ai_addrlen, text, deadline_ns, err);
+		code = try_connect(out, one->ai_addr, one->ai_addrlen, text, deadline_ns, err);
 	freeaddrinfo(all);
 	return code;
 }

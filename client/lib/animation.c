@@ -43,6 +43,7 @@ int psr_animation_check(const char *path, struct psr_error *err)
 int psr_animation_open(struct psr_animation **out, const char *path, const struct psr_frame *first, uint32_t n_frames,
                        double seconds, struct psr_error *err)
 {
+	const struct image_module_film film = { first->width, first->height, n_frames, seconds };
 	struct psr_animation *animation = calloc(1, sizeof *animation);
 	char message[256] = "";
 	int code;
@@ -59,7 +60,7 @@ int psr_animation_open(struct psr_animation **out, const char *path, const struc
 	if (animation->module == NULL)
 		code = apng_open(&animation->apng, &animation->file, first, n_frames, seconds, err);
 	else if (animation->module->animation_open(&animation->module_animation, outfile_name(&animation->file),
-	                                           first->width, first->height, n_frames, seconds, message, sizeof message)
+	                                           &film, message, sizeof message)
 	         != 0)
 		code = psr_fail(err, PSR_ERR_IO, "cannot write %.200s: %s", path, message);
 	if (code != PSR_OK) {

@@ -20,7 +20,7 @@ int psr_codec_parse(uint8_t *codec, uint8_t *quality, const char *text, struct p
 struct psr_camera_wish {
 	int has_eye, has_target, has_up, has_angles;
 	double eye[3], target[3], up[3];
-	double natural_up[3]; /* of the model, in the place of `up` if nobody said that; 0, 0, 0: +Y */
+	double natural_up[3]; /* of the model; used if `up` is unset; 0, 0, 0: +Y */
 	double azimuth, elevation; /* has_angles: degrees about the up vector from the front to the right, and above the
 	                            * horizon; the whole box is in the picture then. psr_camera_axes() says which way is
 	                            * front */

@@ -51,18 +51,25 @@ static int reserve(uint8_t **buffer, size_t *capacity, size_t n, struct psr_erro
 	return *buffer == NULL ? psr_fail(err, PSR_ERR_MEMORY, "no memory for a rectangle of %zu bytes", n) : PSR_OK;
 }
 
-static int decode_jpeg(struct client_decoder *decoder, uint8_t *pixels, size_t pitch, uint32_t width, uint32_t height,
-                       const uint8_t *data, size_t n, struct psr_error *err)
+/* Pixels on a side before they are drawn `scale` times as large. */
+static uint32_t coded_side(uint32_t side, uint32_t scale)
 {
+	return (side + scale - 1u) / scale;
+}
+
+static int decode_jpeg(struct client_decoder *decoder, uint8_t *pixels, size_t pitch, const struct psr_msg_rect *rect,
+                       const uint8_t *data, struct psr_error *err)
+{
+	const uint32_t width = coded_side(rect->w, rect->scale), height = coded_side(rect->h, rect->scale);
 	int w, h, sampling, space;
 
-	if (tjDecompressHeader3(decoder->jpeg, data, n, &w, &h, &sampling, &space) != 0)
+	if (tjDecompressHeader3(decoder->jpeg, data, rect->total, &w, &h, &sampling, &space) != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a JPEG rectangle cannot be read: %.200s",
 		                tjGetErrorStr2(decoder->jpeg));
 	if (w != (int)width || h != (int)height)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a rectangle of %ux%u pixels holds a JPEG of %dx%d", width, height, w,
 		                h);
-	if (tjDecompress2(decoder->jpeg, data, n, pixels, w, (int)pitch, h, TJPF_RGB,
+	if (tjDecompress2(decoder->jpeg, data, rect->total, pixels, w, (int)pitch, h, TJPF_RGB,
 	                  TJFLAG_ACCURATEDCT | TJFLAG_LIMITSCANS)
 	    != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a JPEG rectangle is damaged: %.200s", tjGetErrorStr2(decoder->jpeg));
@@ -102,7 +109,7 @@ int client_decode(struct client_decoder *decoder, struct psr_frame *picture, con
 {
 	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	int code;
-	uint32_t width = (rect->w + rect->scale - 1u) / rect->scale, height = (rect->h + rect->scale - 1u) / rect->scale;
+	uint32_t width = coded_side(rect->w, rect->scale), height = coded_side(rect->h, rect->scale);
 	const size_t pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	const size_t raw = (size_t)width * height * pixel, pitch = (size_t)picture->width * pixel;
 	uint8_t *plane = psr_frame_plane(picture, rect->plane), *to = plane + rect->y * pitch + rect->x * pixel;
@@ -113,12 +120,12 @@ int client_decode(struct client_decoder *decoder, struct psr_frame *picture, con
 		return PSR_OK;
 	}
 	if (rect->codec == PSR_CODEC_JPEG && rect->scale == 1)
-		return decode_jpeg(decoder, to, pitch, width, height, data, rect->total, err);
+		return decode_jpeg(decoder, to, pitch, rect, data, err);
 	code = reserve(&decoder->pixels, &decoder->pixels_capacity, raw, err);
 	if (code != PSR_OK)
 		return code;
 	if (rect->codec == PSR_CODEC_JPEG) {
-		code = decode_jpeg(decoder, decoder->pixels, width * pixel, width, height, data, rect->total, err);
+		code = decode_jpeg(decoder, decoder->pixels, width * pixel, rect, data, err);
 	} else {
 		code = reserve(&decoder->coded, &decoder->coded_capacity, raw, err);
 		if (code == PSR_OK)

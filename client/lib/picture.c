@@ -51,6 +51,8 @@ static int choose(struct plan *plan, const char *path, int is_depth, struct psr_
 
 static int write_picture(const struct psr_frame *picture, const char *path, int is_depth, struct psr_error *err)
 {
+	const struct image_module_picture pixels = { picture->width, picture->height, is_depth,
+		                                         is_depth ? (const void *)picture->depth : picture->rgb };
 	struct outfile file;
 	struct plan plan;
 	char message[256] = "";
@@ -62,9 +64,7 @@ static int write_picture(const struct psr_frame *picture, const char *path, int 
 		return code;
 	if (plan.write != NULL)
 		code = plan.write(&file, picture, err);
-	else if (plan.module_write(outfile_name(&file), picture->width, picture->height, is_depth,
-	                           is_depth ? (const void *)picture->depth : picture->rgb, message, sizeof message)
-	         != 0)
+	else if (plan.module_write(outfile_name(&file), &pixels, message, sizeof message) != 0)
 		code = psr_fail(err, PSR_ERR_IO, "cannot write %.200s: %s", path, message);
 	return outfile_close(&file, code, err);
 }

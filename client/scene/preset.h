@@ -4,7 +4,7 @@
 
 #include "scene.h"
 
-/* The camera or light (enum psr_wire_preset_kind) of the scene's first model. NOT_FOUND lists the names that there are;
+/* The camera or light (enum psr_wire_preset_kind) of the scene's first model. NOT_FOUND lists the names;
  * UNSUPPORTED by an older server. */
 int preset_find(const struct psr_msg_preset **out, const struct scene *scene, uint8_t kind, const char *name,
                 struct psr_error *err);

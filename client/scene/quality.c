@@ -33,14 +33,14 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		  .help = "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth "
 		          "as print, for a picture to keep; it takes about a hundred times as long." },
 		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &wish->spacing, .arg = "PX", .seen = &wish->has_spacing,
-		  .help = "Detail, in the place of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster." },
+		  .help = "Detail, instead of the quality's: 1 normal, 0.5 finer and slower, 2 coarser and faster." },
 		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &wish->is_smooth, .seen = &wish->n_said,
 		  .help = "Quick smoothing for moving pictures, also with --quality draft; --passes for final ones." },
 		{ .name = "no-smooth", .type = PSR_OPT_FLAG, .value = &wish->is_plain, .seen = &wish->n_said,
 		  .help = "No smoothing: edges of pixel steps, a quarter less time." },
 		{ .name = "passes", .type = PSR_OPT_INT, .value = &wish->passes, .arg = "N", .max = PSR_MAX_PASS,
 		  .seen = &wish->has_passes,
-		  .help = "Final smoothing, in the place of the quality's: 1 draws 4 points a pixel and takes about ten times "
+		  .help = "Final smoothing, instead of the quality's: 1 draws 4 points a pixel and takes about ten times "
 		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
 		          "before." },
 		{ .name = "codec", .type = PSR_OPT_STRING, .value = &wish->codec, .arg = "CODEC", .seen = &wish->n_said,

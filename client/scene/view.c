@@ -77,7 +77,7 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 		{ .name = "target", .type = PSR_OPT_VEC3, .value = camera->target, .arg = "X,Y,Z", .seen = &camera->has_target,
 		  .help = "The point in the middle of the picture; without it the middle of the model." },
 		{ .name = "camera", .type = PSR_OPT_STRING, .value = &wish->preset, .arg = "NAME",
-		  .help = "A camera that came with the first model, in the place of all of these; `psr list --presets NAME` "
+		  .help = "A camera that came with the first model, instead of all of these; `psr list --presets NAME` "
 		          "shows them." },
 	};
 

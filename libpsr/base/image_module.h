@@ -10,24 +10,45 @@
 /* The functions of the module, with C linkage: psr_image_module_read, _write, _check, _animation_check,
  * _animation_open, _animation_add, _animation_close. On failure they write a sentence to `message`. */
 
-/* Decodes an image of a format (OpenImageIO's name), from the top left, into *rgba (free): 8 bits a channel. Takes
- * integers as sRGB codes, whatever the file says, floats as linear light, and alpha as unassociated. FORMAT,
- * UNSUPPORTED, LIMIT (more than max_pixels, or a side too long), MEMORY. */
-typedef int image_module_read(uint8_t **rgba, uint32_t size[2], const uint8_t *bytes, size_t n_bytes,
-                              const char *format, uint64_t max_pixels, char *message, unsigned message_size);
+/* An encoded image in memory, which the caller owns. format: OpenImageIO's name. */
+struct image_module_source {
+	const uint8_t *bytes;
+	size_t n_bytes;
+	const char *format;
+	uint64_t max_pixels;
+};
 
-/* Writes `path` in place, in the format of its ending. is_depth: pixels are floats of one channel Z, else 8-bit sRGB.
- * Returns 0, or 1 on failure. */
-typedef int image_module_write(const char *path, unsigned width, unsigned height, int is_depth, const void *pixels,
-                               char *message, unsigned message_size);
+/* Decodes an image, from the top left, into *rgba (free): 8 bits a channel. Takes integers as sRGB codes, whatever the
+ * file says, floats as linear light, and alpha as unassociated. FORMAT, UNSUPPORTED, LIMIT (more than max_pixels, or a
+ * side too long), MEMORY. */
+typedef int image_module_read(uint8_t **rgba, uint32_t size[2], const struct image_module_source *source,
+                              char *message, unsigned message_size);
+
+/* A picture to write, which the caller owns. Sides in pixels. is_depth: pixels are floats of one channel Z, else 8-bit
+ * sRGB. */
+struct image_module_picture {
+	unsigned width, height;
+	int is_depth;
+	const void *pixels;
+};
+
+/* Writes `path` in place, in the format of its ending. Returns 0, or 1 on failure. */
+typedef int image_module_write(const char *path, const struct image_module_picture *picture, char *message,
+                               unsigned message_size);
 
 /* Returns 0 if it can write such pixels with this ending, else 1. */
 typedef int image_module_check(const char *ending, int is_depth, char *message, unsigned message_size);
 
+/* n pictures, their sides in pixels, each shown for `seconds`. */
+struct image_module_film {
+	unsigned width, height, n;
+	double seconds;
+};
+
 /* Animations: open, add n pictures (8-bit sRGB), close, which always frees. */
 typedef int image_module_animation_check(const char *ending, char *message, unsigned message_size);
-typedef int image_module_animation_open(void **animation, const char *path, unsigned width, unsigned height, unsigned n,
-                                        double seconds, char *message, unsigned message_size);
+typedef int image_module_animation_open(void **animation, const char *path, const struct image_module_film *film,
+                                        char *message, unsigned message_size);
 typedef int image_module_animation_add(void *animation, const void *pixels, char *message, unsigned message_size);
 typedef int image_module_animation_close(void *animation, char *message, unsigned message_size);
 

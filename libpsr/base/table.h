@@ -6,7 +6,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define TABLE_FREE UINT64_MAX             /* in the place of a key */
+#define TABLE_FREE UINT64_MAX             /* no key */
 #define TABLE_MARK (UINT64_C(1) << 63)    /* the caller may set it in an entry, which table_find() then passes over */
 
 struct table {

@@ -32,21 +32,20 @@ int check(const std::string &ending, char *message, unsigned size)
 	return 0;
 }
 
-int open(void **animation, const char *path, unsigned width, unsigned height, unsigned n, double seconds, char *message,
-         unsigned size)
+int open(void **animation, const char *path, const image_module_film &film, char *message, unsigned size)
 {
 	auto made = std::make_unique<Animation>();
-	OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), 3, OIIO::TypeDesc::UINT8);
+	OIIO::ImageSpec spec(static_cast<int>(film.width), static_cast<int>(film.height), 3, OIIO::TypeDesc::UINT8);
 
 	spec.attribute("oiio:ColorSpace", "sRGB");
 	spec.attribute("oiio:Movie", 1);
-	spec.attribute("FramesPerSecond", static_cast<float>(1 / seconds));
+	spec.attribute("FramesPerSecond", static_cast<float>(1 / film.seconds));
 	made->out = OIIO::ImageOutput::create(path);
 	made->path = path;
-	made->specs.assign(n, spec);
+	made->specs.assign(film.n, spec);
 	if (!made->out)
 		return fail(message, size, OIIO::geterror());
-	if (!made->out->open(path, static_cast<int>(n), made->specs.data()))
+	if (!made->out->open(path, static_cast<int>(film.n), made->specs.data()))
 		return fail(message, size, made->out->geterror());
 	*animation = made.release();
 	return 0;
@@ -86,10 +85,10 @@ EXPORT int psr_image_module_animation_check(const char *ending, char *message, u
 	return guard(message, size, [&] { return check(ending, message, size); });
 }
 
-EXPORT int psr_image_module_animation_open(void **animation, const char *path, unsigned width, unsigned height,
-                                           unsigned n, double seconds, char *message, unsigned size)
+EXPORT int psr_image_module_animation_open(void **animation, const char *path, const image_module_film *film,
+                                           char *message, unsigned size)
 {
-	return guard(message, size, [&] { return open(animation, path, width, height, n, seconds, message, size); });
+	return guard(message, size, [&] { return open(animation, path, *film, message, size); });
 }
 
 EXPORT int psr_image_module_animation_add(void *animation, const void *pixels, char *message, unsigned size)

@@ -92,23 +92,22 @@ bool read_floats(OIIO::ImageInput &in, const channels &c, size_t n_pixels, uint8
 	return true;
 }
 
-int decode(uint8_t **out, uint32_t size[2], const uint8_t *bytes, size_t n_bytes, const char *format,
-           uint64_t max_pixels, const problem &problem)
+int decode(uint8_t **out, uint32_t size[2], const image_module_source &source, const problem &problem)
 {
-	OIIO::Filesystem::IOMemReader reader(const_cast<uint8_t *>(bytes), n_bytes);
-	std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::create(format);
+	OIIO::Filesystem::IOMemReader reader(const_cast<uint8_t *>(source.bytes), source.n_bytes);
+	std::unique_ptr<OIIO::ImageInput> in = OIIO::ImageInput::create(source.format);
 	OIIO::ImageSpec spec, config;
 
 	if (!in || !in->supports("ioproxy") || !in->set_ioproxy(&reader)) {
 		OIIO::geterror();
 		return fail(problem, PSR_ERR_UNSUPPORTED,
-		            std::string("OpenImageIO has no reader for ") + format + " in memory");
+		            std::string("OpenImageIO has no reader for ") + source.format + " in memory");
 	}
 	config.attribute("oiio:UnassociatedAlpha", 1);
-	if (!in->open(std::string("memory.") + format, spec, config))
+	if (!in->open(std::string("memory.") + source.format, spec, config))
 		return fail(problem, PSR_ERR_FORMAT, "broken image: " + in->geterror());
 
-	int rc = check_spec(spec, max_pixels, problem);
+	int rc = check_spec(spec, source.max_pixels, problem);
 	if (rc != PSR_OK)
 		return rc;
 
@@ -132,13 +131,12 @@ int decode(uint8_t **out, uint32_t size[2], const uint8_t *bytes, size_t n_bytes
 } // namespace
 
 extern "C" __attribute__((visibility("default"))) int psr_image_module_read(uint8_t **rgba, uint32_t size[2],
-                                                                            const uint8_t *bytes, size_t n_bytes,
-                                                                            const char *format, uint64_t max_pixels,
+                                                                            const image_module_source *source,
                                                                             char *message, unsigned message_size)
 {
 	const problem problem = { message, message_size };
 	try {
-		return decode(rgba, size, bytes, n_bytes, format, max_pixels, problem);
+		return decode(rgba, size, *source, problem);
 	} catch (const std::bad_alloc &) {
 		std::snprintf(message, message_size, "no memory to decode this image");
 		return PSR_ERR_MEMORY;

@@ -34,7 +34,6 @@ int check(const std::string &ending, bool is_depth, char *message, unsigned size
 	return 0;
 }
 
-// Formats that store linear light.
 bool is_linear(const OIIO::ImageOutput &out)
 {
 	const std::string name = out.format_name();
@@ -70,9 +69,10 @@ int write_bytes(const char *path, const std::vector<unsigned char> &bytes, char 
 	return reason == 0 ? 0 : fail(message, size, std::strerror(reason));
 }
 
-int write(const char *path, unsigned width, unsigned height, bool is_depth, const void *pixels, char *message,
-          unsigned size)
+int write(const char *path, const image_module_picture &picture, char *message, unsigned size)
 {
+	const bool is_depth = picture.is_depth != 0;
+	const void *pixels = picture.pixels;
 	std::unique_ptr<OIIO::ImageOutput> out = OIIO::ImageOutput::create(path);
 	std::vector<float> linear;
 	OIIO::TypeDesc type = OIIO::TypeDesc::UINT8;
@@ -81,14 +81,15 @@ int write(const char *path, unsigned width, unsigned height, bool is_depth, cons
 		return fail(message, size, OIIO::geterror());
 	if (is_depth || is_linear(*out))
 		type = OIIO::TypeDesc::FLOAT;
-	OIIO::ImageSpec spec(static_cast<int>(width), static_cast<int>(height), is_depth ? 1 : 3, type);
+	OIIO::ImageSpec spec(static_cast<int>(picture.width), static_cast<int>(picture.height), is_depth ? 1 : 3, type);
 	if (is_depth) {
 		spec.channelnames.assign(1, "Z");
 		spec.z_channel = 0;
 	} else {
 		spec.attribute("oiio:ColorSpace", is_linear(*out) ? "Linear" : "sRGB");
 		if (is_linear(*out)) {
-			linear = linearize(static_cast<const std::uint8_t *>(pixels), std::size_t(width) * height * 3);
+			linear = linearize(static_cast<const std::uint8_t *>(pixels),
+			                   std::size_t(picture.width) * picture.height * 3);
 			pixels = linear.data();
 		}
 	}
@@ -117,13 +118,12 @@ extern "C" __attribute__((visibility("default"))) int psr_image_module_check(con
 	}
 }
 
-extern "C" __attribute__((visibility("default"))) int psr_image_module_write(const char *path, unsigned width,
-                                                                             unsigned height, int is_depth,
-                                                                             const void *pixels, char *message,
-                                                                             unsigned message_size)
+extern "C" __attribute__((visibility("default"))) int psr_image_module_write(const char *path,
+                                                                             const image_module_picture *picture,
+                                                                             char *message, unsigned message_size)
 {
 	try {
-		return write(path, width, height, is_depth != 0, pixels, message, message_size);
+		return write(path, *picture, message, message_size);
 	} catch (const std::exception &e) {
 		return fail(message, message_size, e.what());
 	} catch (...) {

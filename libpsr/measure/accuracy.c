@@ -156,8 +156,8 @@ static void add_up(struct psr_accuracy *out, const struct measure *m)
 	out->distance_max = stats_percentile(m->distance, n, 1);
 }
 
-static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth *truth,
-                   const struct psr_camera *camera, int n_threads, struct psr_error *err)
+static int measure(struct psr_accuracy *out, struct measure *m, const struct psr_truth_shot *shot,
+                   struct psr_error *err)
 {
 	size_t n = (size_t)m->width * m->height;
 	struct psr_pool *pool;
@@ -168,30 +168,29 @@ static int measure(struct psr_accuracy *out, struct measure *m, struct psr_truth
 	m->row = psr_alloc_array(m->height, sizeof *m->row);
 	if (m->truth_depth == NULL || m->truth_normal == NULL || m->distance == NULL || m->row == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", m->width, m->height);
-	rc = psr_truth_draw(truth, camera, m->width, m->height, 1, n_threads, m->truth_depth, m->truth_normal, NULL, err);
+	rc = psr_truth_draw(shot, 1, m->truth_depth, m->truth_normal, NULL, err);
 	if (rc != PSR_OK)
 		return rc;
-	rc = psr_pool_create(&pool, n_threads, NULL);
+	rc = psr_pool_create(&pool, shot->n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "cannot start %d threads", n_threads);
+		return psr_fail(err, rc, "cannot start %d threads", shot->n_threads);
 	psr_pool_for(pool, (int)m->height, measure_row, m);
 	psr_pool_destroy(pool);
 	add_up(out, m);
 	return PSR_OK;
 }
 
-int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                         uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads,
-                         struct psr_error *err)
+int psr_accuracy_measure(struct psr_accuracy *out, const struct psr_truth_shot *shot, const float *depth,
+                         double spacing, struct psr_error *err)
 {
-	struct measure m = { .truth = truth, .spacing = spacing, .width = width, .height = height,
+	struct measure m = { .truth = shot->truth, .spacing = spacing, .width = shot->width, .height = shot->height,
 		                 .depth = depth };
-	int rc = view_init(&m.view, camera, width, height, err);
+	int rc = view_init(&m.view, shot->camera, shot->width, shot->height, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (!(spacing > 0 && isfinite(spacing)))
 		return psr_fail(err, PSR_ERR_ARG, "a sample spacing of %g is not a positive length", spacing);
-	rc = measure(out, &m, truth, camera, n_threads, err);
+	rc = measure(out, &m, shot, err);
 	psr_free(m.truth_depth);
 	psr_free(m.truth_normal);
 	psr_free(m.distance);

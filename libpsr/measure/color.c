@@ -70,10 +70,10 @@ static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth
 	}
 }
 
-int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                               uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads,
+int psr_accuracy_measure_color(struct psr_color_accuracy *out, const struct psr_truth_shot *shot, const uint8_t *rgb,
                                struct psr_error *err)
 {
+	const uint32_t width = shot->width, height = shot->height;
 	size_t n = (size_t)width * height;
 	float *depth = psr_alloc_array(n, sizeof *depth), *ray_depth = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_depth);
 	uint8_t *color = psr_alloc_array(n, 3), *ray_color = psr_alloc_array(n, RAYS * RAYS * 3);
@@ -81,7 +81,7 @@ int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth 
 	if (depth == NULL || color == NULL || ray_depth == NULL || ray_color == NULL)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	else
-		rc = psr_truth_draw(truth, camera, width, height, RAYS, n_threads, ray_depth, NULL, ray_color, err);
+		rc = psr_truth_draw(shot, RAYS, ray_depth, NULL, ray_color, err);
 	if (rc == PSR_OK) {
 		average(ray_depth, ray_color, depth, color, width, height);
 		add_up(out, rgb, color, depth, width, height);

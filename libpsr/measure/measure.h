@@ -19,11 +19,20 @@ void psr_truth_destroy(struct psr_truth *truth);
  * where they let less than half through. */
 void psr_truth_stipple(struct psr_truth *truth, double spacing);
 
+/* A picture of the mesh. The caller owns truth and camera. width, height: pixels; n_threads: as for
+ * psr_pool_create(). */
+struct psr_truth_shot {
+	struct psr_truth *truth;
+	const struct psr_camera *camera;
+	uint32_t width, height;
+	int n_threads;
+};
+
 /* One ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in
  * world units, +inf where nothing is; normal: unit, towards the eye, world; both width * side by height * side;
  * normal and rgb may be NULL. rgb: flat diffuse colour, sRGB, 3 bytes. */
-int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height,
-                   uint32_t side, int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err);
+int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
+                   struct psr_error *err);
 
 /* A frame's depth against the truth, `spacing` being the distance of the samples on the surface in world units. */
 struct psr_accuracy {
@@ -41,9 +50,8 @@ struct psr_accuracy {
 	 * as a hole, however near it is to the mesh. */
 	double distance_p50, distance_p99, distance_p999, distance_max;
 };
-int psr_accuracy_measure(struct psr_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                         uint32_t width, uint32_t height, const float *depth, double spacing, int n_threads,
-                         struct psr_error *err);
+int psr_accuracy_measure(struct psr_accuracy *out, const struct psr_truth_shot *shot, const float *depth,
+                         double spacing, struct psr_error *err);
 
 /* A frame drawn with --ambient 1 and no light, which shows the flat diffuse colour, against the truth, the
  * mean of 4x4 rays a pixel in linear light: pixels where all rays of the whole 3x3 neighbourhood meet the object, each
@@ -54,8 +62,7 @@ struct psr_color_accuracy {
 	uint64_t n_wrong; /* differ by more than PSR_COLOR_WRONG */
 	double mean;      /* difference in the channel that differs most, codes */
 };
-int psr_accuracy_measure_color(struct psr_color_accuracy *out, struct psr_truth *truth, const struct psr_camera *camera,
-                               uint32_t width, uint32_t height, const uint8_t *rgb, int n_threads,
+int psr_accuracy_measure_color(struct psr_color_accuracy *out, const struct psr_truth_shot *shot, const uint8_t *rgb,
                                struct psr_error *err);
 
 /* A frame with no ambient and one light that casts shadows against the same frame whose light casts none, and both
@@ -72,17 +79,16 @@ struct psr_shadow_accuracy {
 	                                * to PSR_SHADOW_FAR */
 };
 #define PSR_SHADOW_FAR 16
-int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth,
-                                const struct psr_camera *camera, const struct psr_light *light, uint32_t width,
-                                uint32_t height, const uint8_t *shadowed, const uint8_t *lit, int n_threads,
+int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, const struct psr_truth_shot *shot,
+                                const struct psr_light *light, const uint8_t *shadowed, const uint8_t *lit,
                                 struct psr_error *err);
 
 /* What a still of the mesh at the world's origin must show ([G] 9.1.1): the mean of side x side rays a pixel in linear
- * light, each lit by ambient and Phong without shadows, over the scene's background; the scene's instances are not
- * looked at. rgb: sRGB, 3 bytes a pixel; covered: 1 where a ray meets the mesh. side: 1..32. UNSUPPORTED unless all
+ * light, each lit by ambient and Phong without shadows, over the scene's background. Ignores the scene's camera and
+ * instances. rgb: sRGB, 3 bytes a pixel; covered: 1 where a ray meets the mesh. side: 1..32. UNSUPPORTED unless all
  * lights are directional. */
-int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint32_t width, uint32_t height,
-                    uint32_t side, int n_threads, uint8_t *rgb, uint8_t *covered, struct psr_error *err);
+int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *scene, uint32_t side, uint8_t *rgb,
+                    uint8_t *covered, struct psr_error *err);
 
 /* Peak signal to noise of the covered pixels, in dB, by their sRGB codes; +inf if they are the same. */
 double psr_still_psnr(const uint8_t *rgb, const uint8_t *truth, const uint8_t *covered, uint64_t n_pixels);

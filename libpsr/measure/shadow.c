@@ -113,21 +113,21 @@ static int add_up(struct psr_shadow_accuracy *out, const struct measure *m)
 	return PSR_OK;
 }
 
-int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth *truth,
-                                const struct psr_camera *camera, const struct psr_light *light, uint32_t width,
-                                uint32_t height, const uint8_t *shadowed, const uint8_t *lit, int n_threads,
+int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, const struct psr_truth_shot *shot,
+                                const struct psr_light *light, const uint8_t *shadowed, const uint8_t *lit,
                                 struct psr_error *err)
 {
-	struct measure m = { .truth = truth, .light = light, .width = width, .height = height,
+	const uint32_t width = shot->width, height = shot->height;
+	struct measure m = { .truth = shot->truth, .light = light, .width = width, .height = height,
 		                 .shadowed = shadowed, .lit = lit };
 	struct psr_pool *pool = NULL;
-	int rc = view_init(&m.view, camera, width, height, err);
+	int rc = view_init(&m.view, shot->camera, width, height, err);
 	memset(out, 0, sizeof *out);
 	if (rc != PSR_OK)
 		return rc;
 	m.expected = psr_alloc_array((size_t)width * height, sizeof *m.expected);
 	m.got = psr_alloc_array((size_t)width * height, sizeof *m.got);
-	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, n_threads, NULL) != PSR_OK) {
+	if (m.expected == NULL || m.got == NULL || psr_pool_create(&pool, shot->n_threads, NULL) != PSR_OK) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);
 	} else {
 		psr_pool_for(pool, (int)height, measure_row, &m);

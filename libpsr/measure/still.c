@@ -69,7 +69,7 @@ static void draw_pixel(const struct still *still, uint32_t x, uint32_t y)
 		for (uint32_t i = 0; i < n; i++)
 			truth_ray(still->truth, &still->view, x + ((first + i) % side + 0.5) / side,
 			          y + ((first + i) / side + 0.5) / side, &ray[i]);
-		truth_trace(still->truth, ray, (int)n, still->scene->camera.near_z, hit);
+		truth_trace(still->truth, ray, (int)n, still->view.near_z, hit);
 		for (uint32_t i = 0; i < n; i++) {
 			double light[3] = { still->scene->background[0], still->scene->background[1], still->scene->background[2] };
 			if (hit[i].prim != RAY_NONE)
@@ -90,12 +90,12 @@ static void draw_row(int y, void *userdata)
 		draw_pixel(still, x, (uint32_t)y);
 }
 
-int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint32_t width, uint32_t height,
-                    uint32_t side, int n_threads, uint8_t *rgb, uint8_t *covered, struct psr_error *err)
+int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *scene, uint32_t side, uint8_t *rgb,
+                    uint8_t *covered, struct psr_error *err)
 {
-	struct still still = { .truth = truth, .scene = scene, .side = side, .rgb = rgb, .covered = covered };
+	struct still still = { .truth = shot->truth, .scene = scene, .side = side, .rgb = rgb, .covered = covered };
 	struct psr_pool *pool;
-	int rc = view_init(&still.view, &scene->camera, width, height, err);
+	int rc = view_init(&still.view, shot->camera, shot->width, shot->height, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
@@ -106,10 +106,10 @@ int psr_truth_still(struct psr_truth *truth, const struct psr_scene *scene, uint
 		v3d_normalize(still.to_light[l], scene->light[l].direction);
 		v3d_scale(still.to_light[l], still.to_light[l], -1);
 	}
-	rc = psr_pool_create(&pool, n_threads, NULL);
+	rc = psr_pool_create(&pool, shot->n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "cannot start %d threads", n_threads);
-	psr_pool_for(pool, (int)height, draw_row, &still);
+		return psr_fail(err, rc, "cannot start %d threads", shot->n_threads);
+	psr_pool_for(pool, (int)shot->height, draw_row, &still);
 	psr_pool_destroy(pool);
 	return PSR_OK;
 }

@@ -213,22 +213,21 @@ static void draw_row(int row, void *userdata)
 	}
 }
 
-int psr_truth_draw(struct psr_truth *truth, const struct psr_camera *camera, uint32_t width, uint32_t height,
-                   uint32_t side, int n_threads, float *depth, float (*normal)[3], uint8_t *rgb, struct psr_error *err)
+int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
+                   struct psr_error *err)
 {
-	struct job job = { .truth = truth, .side = side, .depth = depth, .normal = normal,
-		               .rgb = rgb };
+	struct job job = { .truth = shot->truth, .side = side, .depth = depth, .normal = normal, .rgb = rgb };
 	struct psr_pool *pool;
-	int rc = view_init(&job.view, camera, width, height, err);
+	int rc = view_init(&job.view, shot->camera, shot->width, shot->height, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (side < 1 || side > MOST_SIDE)
 		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", side, MOST_SIDE);
-	rc = psr_pool_create(&pool, n_threads, NULL);
+	rc = psr_pool_create(&pool, shot->n_threads, NULL);
 	if (rc != PSR_OK)
-		return psr_fail(err, rc, "cannot start %d threads", n_threads);
-	job.n_columns = width * side;
-	psr_pool_for(pool, (int)(height * side), draw_row, &job);
+		return psr_fail(err, rc, "cannot start %d threads", shot->n_threads);
+	job.n_columns = shot->width * side;
+	psr_pool_for(pool, (int)(shot->height * side), draw_row, &job);
 	psr_pool_destroy(pool);
 	return PSR_OK;
 }

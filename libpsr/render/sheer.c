@@ -224,7 +224,7 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, 
 				continue;
 			for (size_t c = 0; p->rgb != NULL && c < 3; c++)
 				p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
-			if (l->through[from] <= 0.5f || !(p->depth[to] < INFINITY))
+			if (l->through[from] <= 0.5f)
 				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
 			n_pixels++;
 		}

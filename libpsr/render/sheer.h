@@ -62,8 +62,8 @@ struct sheer_picture {
 float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
 /* Draws the eight nearest sheer surfaces of each pixel over the picture. Each hides its opacity's share of the light
- * behind it. Where they hide half of the light, or nothing is behind them, the depth becomes that of the nearest. Sets
- * sheer->n_pixels to how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY. */
+ * behind it. Where they hide at least half of the light, the depth becomes that of the nearest. Sets sheer->n_pixels to
+ * how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);

@@ -114,7 +114,8 @@ static int measure(struct passes *p, const char *source, const char *model, doub
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for pictures of %ux%u pixels", p->side, p->side);
 	p->truth_rgb = p->rgb + (size_t)p->side * p->side * 3;
 	p->covered = p->truth_rgb + (size_t)p->side * p->side * 3;
-	code = psr_truth_still(p->truth, &scene, p->side, p->side, RAYS, options.n_threads, p->truth_rgb, p->covered, err);
+	const struct psr_truth_shot shot = { p->truth, &scene.camera, p->side, p->side, options.n_threads };
+	code = psr_truth_still(&shot, &scene, RAYS, p->truth_rgb, p->covered, err);
 	return code == PSR_OK ? draw_passes(p, &scene, n_passes, err) : code;
 }
 

@@ -28,12 +28,11 @@ struct accuracy_frame {
 
 /* A frame's depth and its comparison with the truth become a verdict and a line that gives its reasons.
  *
- * PASS: 1 pixel in 1,000 of those inside of the silhouette is a hole, or fewer; as few as 1 in 1,000 of those that show
- * the object are drawn more than a pixel outside of it; and 99.9 % of the pixels lie within one spacing of the samples
- * from the surface, or within spacing_px pixels at the depth of what is drawn farthest where those are wider: a sample
- * shows wherever in its pixel it falls.
- * CAMERA: fewer than half of the pixels that are drawn, or that should be, show the object in both pictures; or half of
- * those lie twice as far off: no model is so wrong, so the picture is of something else. */
+ * PASS needs all of these. At most 1 pixel in 1,000 inside of the silhouette is a hole. At most 1 in 1,000 of the
+ * object's pixels is drawn more than a pixel outside of it. 99.9 % of the pixels lie within one spacing of the surface,
+ * or within spacing_px pixels at the farthest drawn depth if that is wider: a sample may fall anywhere in its pixel.
+ * CAMERA: of the pixels that are drawn or should be, fewer than half show the object in both pictures, or half lie
+ * twice as far off. No model is so wrong: the picture shows something else. */
 enum accuracy_verdict accuracy_judge(char text[ACCURACY_TEXT], const struct psr_accuracy *accuracy,
                                      const struct accuracy_bounds *bounds, const struct accuracy_frame *frame);
 

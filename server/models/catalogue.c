@@ -141,8 +141,8 @@ int catalogue_reserve(struct catalogue *catalogue, uint64_t bytes, const char *n
 		                name, (double)bytes * mb, (double)catalogue->max_bytes * mb);
 	if (!make_room(catalogue, bytes))
 		return psr_fail(err, PSR_ERR_LIMIT,
-		                "model %s needs %.1f MB of memory, and models in use hold %.1f of the %.1f MB "
-		                "that there are (--max-memory); close others, or try again later",
+		                "model %s needs %.1f MB of memory, and models in use hold %.1f of this server's %.1f MB "
+		                "(--max-memory); close others, or try again later",
 		                name, (double)bytes * mb, (double)(catalogue->bytes + catalogue->reserved) * mb,
 		                (double)catalogue->max_bytes * mb);
 	catalogue->reserved += bytes;

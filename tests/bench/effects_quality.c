@@ -50,7 +50,8 @@ static void truth_make(struct truth *truth, const char *source, int n_threads)
 	scene(&drawn, 0, &truth->film);
 	truth->n_threads = n_threads;
 	if (psr_mesh_import(&truth->mesh, source, NULL, &err) != PSR_OK || psr_truth_create(&truth->rays, truth->mesh, &err) != PSR_OK
-	    || psr_truth_draw(truth->rays, &drawn.camera, SIDE, SIDE, RAYS, n_threads, depth, normal, rgb, &err) != PSR_OK)
+	    || psr_truth_draw(&(struct psr_truth_shot){ truth->rays, &drawn.camera, SIDE, SIDE, n_threads }, RAYS, depth,
+	                      normal, rgb, &err) != PSR_OK)
 		report_die(source, err.text);
 	truth->light = report_alloc((size_t)SIDE * SIDE, sizeof *truth->light);
 	for (size_t i = 0; i < n; i++) {
@@ -190,8 +191,9 @@ static void gaps_row(const struct truth *truth, const char *name, double magnifi
 	settings.gap_method = method;
 	draw(&drawn, truth, &settings);
 	scene(&seen, 0, &truth->film);
-	if (psr_accuracy_measure(&accuracy, truth->rays, &seen.camera, SIDE, SIDE, drawn.depth,
-	                         psr_model_info(truth->film.model)->spacing, truth->n_threads, &err) != PSR_OK)
+	const struct psr_truth_shot shot = { truth->rays, &seen.camera, SIDE, SIDE, truth->n_threads };
+
+	if (psr_accuracy_measure(&accuracy, &shot, drawn.depth, psr_model_info(truth->film.model)->spacing, &err) != PSR_OK)
 		report_die("the truth", err.text);
 	const double db = psnr(truth, drawn.rgb, NULL);
 

@@ -13,13 +13,19 @@ struct channel {
 	size_t n_components;
 };
 
-void add_target(reader &r, const std::map<std::string, int> &target, const channel &c, double weight,
-                std::vector<double> &sum, const std::string &place)
+/* A morph target: the accessor of each attribute that it moves. */
+struct target {
+	const std::map<std::string, int> &accessor;
+	double weight;
+	std::string place;
+};
+
+void add_target(reader &r, const target &target, const channel &c, std::vector<double> &sum)
 {
-	auto it = target.find(c.name);
-	if (it == target.end() || sum.empty())
+	auto it = target.accessor.find(c.name);
+	if (it == target.accessor.end() || sum.empty())
 		return;
-	const std::string where = place + "." + c.name;
+	const std::string where = target.place + "." + c.name;
 	const size_t n = sum.size() / c.n_components;
 	if (accessor_count(r, it->second, where) != n)
 		refuse(PSR_ERR_FORMAT, "%s has %zu elements where the primitive has %zu", where.c_str(),
@@ -27,7 +33,7 @@ void add_target(reader &r, const std::map<std::string, int> &target, const chann
 	const std::vector<float> delta = accessor_floats(r, it->second, 3, where);
 	for (size_t i = 0; i < n; i++)
 		for (size_t k = 0; k < 3; k++)
-			sum[i * c.n_components + k] += weight * (double)delta[3 * i + k];
+			sum[i * c.n_components + k] += target.weight * (double)delta[3 * i + k];
 }
 
 void morph_list(reader &r, const tinygltf::Primitive &g, const channel &c, const std::vector<double> &weights,
@@ -36,7 +42,7 @@ void morph_list(reader &r, const tinygltf::Primitive &g, const channel &c, const
 	std::vector<double> sum(list.begin(), list.end());
 	for (size_t t = 0; t < g.targets.size() && t < weights.size(); t++)
 		if (weights[t] != 0.0)
-			add_target(r, g.targets[t], c, weights[t], sum, place + ".targets[" + std::to_string(t) + "]");
+			add_target(r, { g.targets[t], weights[t], place + ".targets[" + std::to_string(t) + "]" }, c, sum);
 	for (size_t i = 0; i < sum.size(); i++)
 		list[i] = (float)sum[i];
 }

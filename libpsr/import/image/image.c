@@ -44,7 +44,8 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 	rc = image_module_open(&module, &why);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%s: cannot read images: %s", name, why.text);
-	rc = module->read(&rgba, size, bytes, n_bytes, format, max_pixels, message, sizeof message);
+	rc = module->read(&rgba, size, &(struct image_module_source){ bytes, n_bytes, format, max_pixels }, message,
+	                  sizeof message);
 	if (rc != PSR_OK)
 		return psr_fail(err, rc, "%s: %s", name, message);
 	out->width = size[0];

@@ -33,7 +33,7 @@ struct psr_frame {
 	uint32_t width, height; /* pixels, 1..PSR_MAX_SIDE */
 	uint8_t *rgb;     /* 3 * width * height, sRGB; without it nothing is lit */
 	float *depth;     /* width * height, z' in world units along the view, +inf where nothing is. A surface that lets
-	                   * light through has its depth here where it keeps back half of it, or nothing is behind */
+	                   * light through has its depth here where it keeps back half of it or more */
 	int16_t *normal;  /* 3 * width * height, world space, round(32767 * n), turned to the eye where the block is
 	                   * two-sided; 0, 0, 0 without a sample */
 	uint32_t *id;     /* width * height, index of the instance; UINT32_MAX without a sample */

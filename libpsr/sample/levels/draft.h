@@ -17,7 +17,7 @@ struct draft_block {
 	uint8_t level, two_sided, traits;
 	uint32_t group;   /* of blocks */
 	uint64_t mask;    /* of what is there, */
-	uint64_t part;    /* what the group needs, of what is sheer or of what is not */
+	uint64_t part;    /* the samples that the group needs: all sheer, or none */
 	uint32_t first;   /* of its samples, one for each bit of mask */
 };
 

@@ -40,7 +40,7 @@ struct job {
 	uint32_t n_prims;
 	uint64_t seed;
 	struct chunk *chunk;
-	int first_chunk; /* of those that are run now */
+	int first_chunk; /* of this run */
 };
 
 struct trial {

@@ -58,9 +58,10 @@ void figure_score_colors(struct figure_score *score, const struct psr_frame *fra
 int figure_score_add(struct figure_score *score, struct study *study, const struct figure_model *model,
                      const struct figure_shot *shot, const struct psr_frame *frame, const struct figure_truth *truth)
 {
+	const struct psr_truth_shot seen = { model->truth, &shot->scene.camera, frame->width, frame->height,
+		                                 study->n_threads };
 	struct psr_accuracy accuracy;
-	int rc = psr_accuracy_measure(&accuracy, model->truth, &shot->scene.camera, frame->width, frame->width,
-	                              frame->depth, model->spacing, study->n_threads, study->err);
+	int rc = psr_accuracy_measure(&accuracy, &seen, frame->depth, model->spacing, study->err);
 
 	if (rc != PSR_OK)
 		return rc;

@@ -519,7 +519,7 @@ static void silent_server_is_given_up_and_a_busy_one_is_not(void **state)
 	start(answer_pings_for_a_while, 65536);
 	client = connected();
 	/* three PINGs at half of the time each: it lasts 1.5 times as long as a silence may */
-	assert_int_equal(psr_client_open(client, "m", 400, &opened, &err), PSR_OK);
+	assert_int_equal(psr_client_open(client, "m", 1200, &opened, &err), PSR_OK);
 	stop(client);
 }
 

@@ -129,13 +129,14 @@ static void plain_pngs_are_read_alike_without_the_module(void **state)
 		pixels[i] = (uint8_t)(i * i * 2654435761u >> 13);
 	for (size_t i = 0; i < sizeof kind / sizeof kind[0]; i++) {
 		size_t n = make_png(png, sizeof png, 7, 5, kind[i].format, pixels);
+		const struct image_module_source source = { png, n, "png", 35 };
 		struct psr_image image = { 0 }, decoded;
 		char message[256] = "";
 		uint32_t size[2];
 		uint8_t *rgba;
 
 		assert_int_equal(import_image_plain_png(&image, png, n, 35), kind[i].is_plain);
-		assert_int_equal(module->read(&rgba, size, png, n, "png", 35, message, sizeof message), PSR_OK);
+		assert_int_equal(module->read(&rgba, size, &source, message, sizeof message), PSR_OK);
 		assert_int_equal(decode(&decoded, png, n, "a.png", NULL), PSR_OK);
 		assert_memory_equal(decoded.rgba, rgba, 4 * 7 * 5);
 		if (kind[i].is_plain) {

@@ -16,6 +16,7 @@ struct fixture {
 	struct psr_camera camera;
 	float depth[SIDE * SIDE]; /* a perfect frame */
 };
+#define SHOT(f, n_threads) ((struct psr_truth_shot){ (f)->truth, &(f)->camera, SIDE, SIDE, n_threads })
 
 static int open_fixture(void **state)
 {
@@ -26,7 +27,7 @@ static int open_fixture(void **state)
 		                             .ortho_height = 2.5 };
 	*state = f;
 	return psr_truth_create(&f->truth, f->mesh, NULL)
-	       || psr_truth_draw(f->truth, &f->camera, SIDE, SIDE, 1, 1, f->depth, NULL, NULL, NULL);
+	       || psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, NULL, NULL);
 }
 
 static int close_fixture(void **state)
@@ -43,7 +44,7 @@ static struct psr_accuracy measure(const struct fixture *f)
 {
 	struct psr_accuracy a;
 
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, SPACING, 2, NULL), PSR_OK);
+	assert_int_equal(psr_accuracy_measure(&a, &SHOT(f, 2), f->depth, SPACING, NULL), PSR_OK);
 	return a;
 }
 
@@ -113,7 +114,7 @@ static void a_slope_is_no_hole(void **state)
 
 	f->camera.eye[0] = 3 * sin(a);
 	f->camera.eye[2] = 3 * cos(a);
-	assert_int_equal(psr_truth_draw(f->truth, &f->camera, SIDE, SIDE, 1, 1, f->depth, NULL, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, NULL, NULL), PSR_OK);
 	/* As if each pixel's sample lay half a pixel to its side: the depth changes by half a pixel times the tangent. */
 	for (int i = 0; i < SIDE * SIDE; i++)
 		f->depth[i] += (float)(2.5 / SIDE / 2 * tan(a));
@@ -129,11 +130,11 @@ static void bad_spacings_and_cameras_are_refused(void **state)
 	struct fixture *f = *state;
 	struct psr_accuracy a;
 
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 0, 1, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, NAN, 1, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 1, -1, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_accuracy_measure(&a, &SHOT(f, 1), f->depth, 0, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_accuracy_measure(&a, &SHOT(f, 1), f->depth, NAN, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_accuracy_measure(&a, &SHOT(f, -1), f->depth, 1, NULL), PSR_ERR_ARG);
 	f->camera.ortho_height = 0;
-	assert_int_equal(psr_accuracy_measure(&a, f->truth, &f->camera, SIDE, SIDE, f->depth, 1, 1, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_accuracy_measure(&a, &SHOT(f, 1), f->depth, 1, NULL), PSR_ERR_ARG);
 }
 
 #define TEST(f) cmocka_unit_test_setup_teardown(f, open_fixture, close_fixture)
@@ -144,14 +145,14 @@ static void colors_are_compared_within_a_pixel(void **state)
 	struct psr_color_accuracy color;
 	uint8_t *rgb = malloc(3 * SIDE * SIDE);
 
-	assert_int_equal(psr_truth_draw(f->truth, &f->camera, SIDE, SIDE, 1, 1, f->depth, NULL, rgb, NULL), PSR_OK);
-	assert_int_equal(psr_accuracy_measure_color(&color, f->truth, &f->camera, SIDE, SIDE, rgb, 1, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, rgb, NULL), PSR_OK);
+	assert_int_equal(psr_accuracy_measure_color(&color, &SHOT(f, 1), rgb, NULL), PSR_OK);
 	assert_true(color.n_compared > 0 && color.n_wrong == 0 && color.mean == 0);
 	/* White is 255: what is as far off as is allowed, what is further, and what is outside and does not count. */
 	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2) + 1] = 255 - PSR_COLOR_WRONG;
 	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2 + 5) + 2] = 255 - PSR_COLOR_WRONG - 1;
 	rgb[0] = 77;
-	assert_int_equal(psr_accuracy_measure_color(&color, f->truth, &f->camera, SIDE, SIDE, rgb, 1, NULL), PSR_OK);
+	assert_int_equal(psr_accuracy_measure_color(&color, &SHOT(f, 1), rgb, NULL), PSR_OK);
 	assert_int_equal(color.n_wrong, 1);
 	assert_true(fabs(color.mean * (double)color.n_compared - (2 * PSR_COLOR_WRONG + 1)) < 1e-9);
 	free(rgb);

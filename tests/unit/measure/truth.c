@@ -9,6 +9,7 @@
 
 #define W 48
 #define H 32
+#define SHOT(width, height, n_threads) ((struct psr_truth_shot){ truth, &camera, width, height, n_threads })
 
 static const double zero[3];
 
@@ -38,7 +39,7 @@ static void a_facing_square_has_one_depth(void **state)
 	(void)state;
 	mesh->material->base_color[0] = 0.5f;
 	truth = open_truth(mesh);
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 2, depth, normal, rgb, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, 2), 1, depth, normal, rgb, NULL), PSR_OK);
 	for (int y = 0; y < H; y++) {
 		for (int x = 0; x < W; x++) {
 			int i = y * W + x;
@@ -73,7 +74,7 @@ static void pictures_are_not_mirrored(void **state)
 	memmove(mesh->triangle, mesh->triangle + 6, 2 * sizeof *mesh->triangle);
 	mesh->n_triangles = 2;
 	truth = open_truth(mesh);
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 1, depth, NULL, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, 1), 1, depth, NULL, NULL, NULL), PSR_OK);
 	for (int i = 0; i < W * H; i++) {
 		double x = (i % W + 0.5 - W / 2) * 2.5 / H, y = -(i / W + 0.5 - H / 2) * 2.5 / H;
 
@@ -94,7 +95,7 @@ static void spheres_have_their_depths_and_normals(void **state)
 	double distance = sqrt(21), near_z = distance - 1;
 
 	(void)state;
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 2, 2, depth, normal, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, 2), 2, depth, normal, NULL, NULL), PSR_OK);
 	for (int i = 0; i < 4 * W * H; i++) {
 		double x = (i % (2 * W) + 0.5 - W) / W, y = (i / (2 * W) + 0.5 - H) / H;
 		double px = x * tan(0.4) * W / H, py = y * tan(0.4), squared = px * px + py * py + 1;
@@ -119,12 +120,12 @@ static void bad_pictures_are_refused(void **state)
 	float depth[W * H];
 
 	(void)state;
-	assert_int_equal(psr_truth_draw(truth, &camera, 0, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_truth_draw(truth, &camera, 1 << 20, 1 << 20, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_LIMIT);
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 0, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, -1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(&SHOT(0, H, 1), 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(&SHOT(1 << 20, 1 << 20, 1), 1, depth, NULL, NULL, NULL), PSR_ERR_LIMIT);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, 1), 0, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, -1), 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
 	camera.eye[2] = NAN;
-	assert_int_equal(psr_truth_draw(truth, &camera, W, H, 1, 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
+	assert_int_equal(psr_truth_draw(&SHOT(W, H, 1), 1, depth, NULL, NULL, NULL), PSR_ERR_ARG);
 	psr_truth_destroy(truth);
 	psr_truth_destroy(NULL);
 	meshes_free(mesh);
