@@ -25,6 +25,7 @@
 struct sheer_tile {
 	struct sheer_list list;
 	uint32_t next[WARP_OWN_WORDS]; /* of the list */
+	uint8_t n_words[WARP_OWN_WORDS];
 	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
 	float beyond[WARP_OWN_WORDS];  /* z' where the layer ends */
 	float before[WARP_OWN_WORDS];  /* z' of the opaque picture */
@@ -124,6 +125,7 @@ static void begin_layers(struct sheer_tile *l, const struct drawing *d, const st
 
 		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
 			l->next[at] = SHEER_END;
+			l->n_words[at] = 0;
 			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
 			l->beyond[at] = 0;
 			l->first[at] = INFINITY;
@@ -247,6 +249,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	target.y1 = (int32_t)area.high_y;
 	l->list.before = l->before + place_of(&area, area.low_y);
 	l->list.first = l->next + place_of(&area, area.low_y);
+	l->list.n_words = l->n_words + place_of(&area, area.low_y);
 	l->list.n = 0;
 	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
 	if (l->list.failed) {

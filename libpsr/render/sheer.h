@@ -12,10 +12,13 @@ struct sheer {
 	uint64_t n_pixels; /* of the last picture */
 };
 
-/* All words of a tile's sheer blocks: a list a pixel, nearest first. */
+#define SHEER_MOST 64 /* words of a pixel: eight layers of eight samples, so that a crowd of panes costs no more */
+
+/* The nearest words of a tile's sheer blocks: a list a pixel, nearest first. */
 struct sheer_list {
 	const float *before; /* z' of the opaque surface, which hides words behind it */
 	uint32_t *first;     /* by pixel; SHEER_END: none */
+	uint8_t *n_words;    /* by pixel */
 	struct sheer_word {
 		uint64_t word;
 		uint32_t next;
@@ -30,14 +33,25 @@ int sheer_grow(struct sheer_list *list);
 
 static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
 {
-	uint32_t *link = &list->first[at];
+	uint32_t *link = &list->first[at], *last, to = list->n;
 
-	if (list->n == list->capacity && sheer_grow(list))
+	if (list->n_words[at] < SHEER_MOST && list->n == list->capacity && sheer_grow(list))
 		return;
 	while (*link != SHEER_END && list->word[*link].word < word)
 		link = &list->word[*link].next;
-	list->word[list->n] = (struct sheer_word){ word, *link };
-	*link = list->n++;
+	if (list->n_words[at] < SHEER_MOST) {
+		list->n_words[at]++;
+		list->n++;
+	} else if (*link != SHEER_END) { /* takes the place of the farthest */
+		for (last = link; list->word[*last].next != SHEER_END;)
+			last = &list->word[*last].next;
+		to = *last;
+		*last = SHEER_END;
+	} else {
+		return;
+	}
+	list->word[to] = (struct sheer_word){ word, *link };
+	*link = to;
 }
 
 /* Moves a tile's sheer entries behind its opaque ones, and returns the first sheer one. The warp draws the opaque ones.

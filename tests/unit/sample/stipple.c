@@ -326,6 +326,33 @@ static void a_pane_has_the_depth_of_what_shows_most(void **state)
 	}
 }
 
+/* Each pane has a word or more in each pixel, 16 bytes each: beyond 64 MB without a limit. */
+static void a_crowd_of_panes_takes_little_memory(void **state)
+{
+	enum { CROWD = 1000 };
+	const struct square set[] = { { 0, 0.8, 2, 0.3f } };
+	struct psr_model *model = build_squares(set, 1);
+	static struct psr_instance instance[CROWD];
+	static struct picture picture;
+	struct psr_scene scene = { .instance = instance, .n_instances = CROWD, .ambient = { 1, 1, 1 } };
+	struct psr_frame frame = { .width = SIDE, .height = SIDE, .rgb = picture.rgb };
+	struct render_settings settings;
+	struct psr_renderer *renderer;
+
+	(void)state;
+	for (int i = 0; i < CROWD; i++)
+		instance[i] = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1,
+			                                 .translation = { 0, 0, (i * 617 % CROWD - CROWD / 2.0) / CROWD } };
+	scene.camera = (struct psr_camera){ .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = 1, .eye = { 0, 0, 4 },
+		                                .up = { 0, 1, 0 } };
+	render_settings_default(&settings, SIDE, SIDE);
+	assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+	assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+	assert_true(psr_renderer_bytes(renderer) < 64 << 20);
+	psr_renderer_destroy(renderer);
+	psr_model_unref(model);
+}
+
 static void pictures_have_the_same_bits_by_any_threads_and_instructions(void **state)
 {
 	const struct square set[] = { { -0.5, 1, 0, 1 }, { 0.1, 0.8, 2, 0.3f }, { 0.4, 0.6, 1, 0.6f } };
@@ -380,6 +407,7 @@ int main(void)
 		cmocka_unit_test(a_decal_changes_nothing_of_the_wall_beside_it),
 		cmocka_unit_test(what_is_in_a_case_of_glass_is_seen),
 		cmocka_unit_test(a_pane_has_the_depth_of_what_shows_most),
+		cmocka_unit_test(a_crowd_of_panes_takes_little_memory),
 		cmocka_unit_test(pictures_have_the_same_bits_by_any_threads_and_instructions),
 		cmocka_unit_test(only_what_lets_light_through_has_opacities),
 	};
