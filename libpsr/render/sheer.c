@@ -251,6 +251,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	l->list.first = l->next + place_of(&area, area.low_y);
 	l->list.n_words = l->n_words + place_of(&area, area.low_y);
 	l->list.n = 0;
+	l->list.failed = 0; /* of an earlier picture */
 	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
 	if (l->list.failed) {
 		atomic_store(&d->failed, 1);
