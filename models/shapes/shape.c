@@ -222,17 +222,24 @@ static void get_vertex(const struct shape *shape, uint32_t i, double p[3], doubl
 	}
 }
 
-void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], const double move[3])
+/* Positions by m, then moved; normals by `normals`. */
+static void apply(struct shape *shape, uint32_t first, const double m[3][3], const double normals[3][3],
+                  const double move[3])
 {
 	double p[3], n[3];
 
 	for (uint32_t i = first; i < shape->n_vertices; i++) {
 		get_vertex(shape, i, p, n);
-		m3d_apply(p, turn, p);
+		m3d_apply(p, m, p);
 		v3d_add(p, p, move);
-		m3d_apply(n, turn, n);
+		m3d_apply(n, normals, n);
 		set_vertex(shape, i, p, n);
 	}
+}
+
+void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], const double move[3])
+{
+	apply(shape, first, turn, turn, move);
 }
 
 void shape_shift(struct shape *shape, uint32_t first, const double move[3])
@@ -242,17 +249,11 @@ void shape_shift(struct shape *shape, uint32_t first, const double move[3])
 
 void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3])
 {
-	double p[3], n[3], cofactor[3][3];
+	double cofactor[3][3];
 
 	for (int k = 0; k < 3; k++)
 		v3d_cross(cofactor[k], m[(k + 1) % 3], m[(k + 2) % 3]);
-	for (uint32_t i = first; i < shape->n_vertices; i++) {
-		get_vertex(shape, i, p, n);
-		m3d_apply(p, m, p);
-		v3d_add(p, p, move);
-		m3d_apply(n, cofactor, n);
-		set_vertex(shape, i, p, n);
-	}
+	apply(shape, first, m, (const double(*)[3])cofactor, move);
 }
 
 void shape_map(struct shape *shape, uint32_t first, const double u[4], const double v[4])

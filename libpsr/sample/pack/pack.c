@@ -171,6 +171,7 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	struct psr_blocks blocks = { .n_blocks = pack->draft->n_blocks, .n_projections = N_PROJECTIONS,
 		                         .n_clusters = pack->n_clusters, .n_levels = pack->draft->n_levels,
 		                         .n_samples = pack->n_samples };
+	const uint8_t traits = find_traits(pack);
 	int rc;
 
 	blocks.projection = pack->draft->projection;
@@ -185,8 +186,8 @@ static int make_model(struct psr_model **out, struct psr_model_info *info, const
 	blocks.cone_sine = pack->cone_sine;
 	blocks.block_projection = pack->block_projection;
 	blocks.flags = pack->flags;
-	blocks.traits = find_traits(pack) != 0 ? pack->traits : NULL;
-	blocks.opacity = (find_traits(pack) & PSR_BLOCK_SHEER) != 0 ? pack->opacity : NULL;
+	blocks.traits = traits != 0 ? pack->traits : NULL;
+	blocks.opacity = (traits & PSR_BLOCK_SHEER) != 0 ? pack->opacity : NULL;
 	blocks.mask = pack->mask;
 	blocks.attr_offset = pack->attr_offset;
 	blocks.run = pack->run;
