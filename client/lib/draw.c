@@ -3,7 +3,6 @@
 #include "internal.h"
 
 #define PROGRAM "libpsrclient"
-#define HOME "home" /* the camera among a model's presets whose up is the model's */
 
 /* The model's way up, as far as the server tells it. */
 static int find_up(double up[3], struct psr_client *client, uint32_t handle, int timeout_ms, struct psr_error *err)
@@ -16,7 +15,7 @@ static int find_up(double up[3], struct psr_client *client, uint32_t handle, int
 	if (client->welcome.capabilities & PSR_CAP_PRESETS)
 		code = psr_client_presets(client, handle, &presets, &n, timeout_ms, err);
 	for (uint32_t i = 0; i < n; i++)
-		if (presets[i].kind == PSR_WIRE_PRESET_CAMERA && strcmp(presets[i].name, HOME) == 0)
+		if (presets[i].kind == PSR_WIRE_PRESET_CAMERA && strcmp(presets[i].name, PSR_WIRE_HOME) == 0)
 			memcpy(up, presets[i].camera.up, 3 * sizeof up[0]);
 	free(presets);
 	return code;

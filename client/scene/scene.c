@@ -7,8 +7,6 @@
 #include "suggest.h"
 #include "client/lib/camera.h"
 
-#define HOME "home" /* the camera whose up is the model's natural one */
-
 void scene_close(struct scene *scene)
 {
 	if (scene == NULL)
@@ -104,7 +102,7 @@ static int get_presets(struct scene *scene, const struct scene_wish *wish, int t
 		struct psr_msg_preset *preset = &scene->preset[i];
 
 		place_preset(preset, &wish->instance[0].place);
-		if (preset->kind == PSR_WIRE_PRESET_CAMERA && strcmp(preset->name, HOME) == 0)
+		if (preset->kind == PSR_WIRE_PRESET_CAMERA && strcmp(preset->name, PSR_WIRE_HOME) == 0)
 			memcpy(scene->up, preset->camera.up, sizeof scene->up);
 	}
 	return code;

@@ -1,7 +1,6 @@
 #include <string.h>
 #include "answers.h"
 
-#define HOME_CAMERA "home"
 #define HOME_FOV 0.6108652381980153 /* 35 degrees, as the client's */
 
 /* Leaves out a preset that the protocol cannot hold. */
@@ -41,9 +40,9 @@ static int make_home(struct psr_preset_camera *home, const struct psr_model *mod
 	if (presets->n_cameras == PSR_MAX_PRESETS)
 		return 0;
 	for (uint32_t i = 0; i < presets->n_cameras; i++)
-		if (strcmp(presets->camera[i].name, HOME_CAMERA) == 0)
+		if (strcmp(presets->camera[i].name, PSR_WIRE_HOME) == 0)
 			return 0;
-	*home = (struct psr_preset_camera){ .name = HOME_CAMERA };
+	*home = (struct psr_preset_camera){ .name = PSR_WIRE_HOME };
 	psr_camera_frame(&home->camera, info->box_min, info->box_max, info->up, HOME_FOV, 1);
 	return 1;
 }

@@ -146,6 +146,7 @@ struct psr_msg_scene {
 /* ---- cameras and lights that came with a model ---- */
 
 #define PSR_WIRE_MAX_PRESETS 256 /* of each kind */
+#define PSR_WIRE_HOME "home"     /* a camera that shows the whole model, its natural way up */
 
 enum psr_wire_preset_kind { PSR_WIRE_PRESET_CAMERA = 1, PSR_WIRE_PRESET_LIGHT = 2 };
 struct psr_msg_preset { /* object coordinates; the part that the kind has no use for is 0 */
