@@ -4,8 +4,8 @@
 
 #include <stdlib.h>
 
-/* Whether `array`, which has `capacity` elements and is free()d in the end, has element n: it grows by half until it
- * has. 0: no memory, and nothing is changed. */
+/* Makes sure that `array` has element n: grows it by half until it does. The array has `capacity` elements, and its
+ * owner frees it with free(). Returns 0 without memory, and changes nothing. */
 #define ARRAY_ROOM(array, n, capacity)                                                                      \
 	({                                                                                                       \
 		if ((size_t)(n) >= (capacity)) {                                                                     \

@@ -13,20 +13,20 @@ static inline int cell_floor(double x)
 	return i - (x < i);
 }
 
-/* The cell of this width that holds p. */
+/* Finds the cell of this width that holds p. */
 static inline void cell_of(const float p[3], double width, int at[3])
 {
 	for (int k = 0; k < 3; k++)
 		at[k] = cell_floor((double)p[k] / width);
 }
 
-/* 21 bits of each coordinate. */
+/* Packs 21 bits of each coordinate. */
 static inline uint64_t cell_key(int x, int y, int z)
 {
 	return (uint64_t)(x & 0x1fffff) | (uint64_t)(y & 0x1fffff) << 21 | (uint64_t)(z & 0x1fffff) << 42;
 }
 
-/* The axis along which n is longest, and its sign: 1 to 6; 0 of no direction. */
+/* Returns the axis along which n is longest, and its sign: 1 to 6; 0 if n has no direction. */
 static inline unsigned cell_facing(const float n[3])
 {
 	unsigned axis = 0;
@@ -36,7 +36,7 @@ static inline unsigned cell_facing(const float n[3])
 	return n[axis] != 0 ? 1 + 2 * axis + (n[axis] < 0) : 0;
 }
 
-/* Of a cell and how something in it faces: 20 bits a coordinate, and the topmost bit is 0. */
+/* Packs a cell and the axis that something in it faces: 20 bits a coordinate; the topmost bit is 0. */
 static inline uint64_t cell_facing_key(const int at[3], unsigned facing)
 {
 	uint64_t key = facing;

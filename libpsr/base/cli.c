@@ -174,7 +174,7 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	return psr_fail(err, PSR_ERR_ARG, "unknown option %s%.*s; --help lists the options", dashes, shown, name);
 }
 
-/* Takes the option at argv[*i] and its value, if any; *i ends at the last argument used. */
+/* Takes the option at argv[*i] and its value, if it has one; leaves *i at the last argument used. */
 static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i, struct psr_error *err)
 {
 	const char *arg = argv[*i], *value = NULL;
@@ -208,7 +208,7 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err)
 {
 	int n = 0, options_end = 0;
-	/* Help before parsing, so that it shows the defaults. */
+	/* --help comes before any parsing, so that it shows the defaults. */
 	for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
 		if (strcmp(argv[i], "--help") == 0) {
 			cli_help_print(cli);

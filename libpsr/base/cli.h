@@ -16,16 +16,17 @@ enum psr_opt_type {
 	PSR_OPT_SIZE,   /* uint32_t[2], "WxH", each within min..max */
 	PSR_OPT_COLOR,  /* uint8_t[3], "#rrggbb" */
 	PSR_OPT_CALL,   /* int (*)(const char *text, void *userdata, struct psr_error *): repeatable, own syntax */
-	PSR_OPT_HEADING, /* no option: --help prints `name` above those that follow, and `help` (may be NULL) below it */
+	PSR_OPT_HEADING, /* not an option: --help prints `name` above the options that follow, and `help` (may be NULL)
+	                  * below it */
 };
 
 struct psr_opt {
 	const char *name;      /* long name without the dashes; NULL ends the table */
 	char letter;           /* short name, or 0 */
 	enum psr_opt_type type;
-	void *value;           /* where it goes; its content before parsing is the default that --help prints */
+	void *value;           /* where the value goes; --help prints its content before parsing as the default */
 	const char *arg;       /* what --help calls the argument ("DEG"); NULL for flags */
-	const char *help;      /* one line or more ('\n'); the default is added in brackets by the table itself */
+	const char *help;      /* one line or more ('\n'); the parser adds the default in brackets */
 	double min, max;       /* INT, REAL, SIZE: both 0 means unchecked */
 	int (*call)(const char *text, void *userdata, struct psr_error *err);
 	int *seen;             /* if not NULL: incremented when the option is given */
@@ -33,7 +34,7 @@ struct psr_opt {
 
 struct psr_cli {
 	const char *usage;           /* "psr shot --server ADDR --model NAME [options]" */
-	const char *summary;         /* what it does, a sentence or two */
+	const char *summary;         /* a sentence or two about the program */
 	const struct psr_opt *opts;
 	const char *footer;          /* examples, exit codes; may be NULL */
 };
@@ -51,8 +52,8 @@ int psr_parse_vec3(const char *text, double v[3], const char **end, struct psr_e
 int psr_parse_color(const char *text, uint8_t rgb[3], const char **end, struct psr_error *err);
 int psr_parse_real(const char *text, double *v, const char **end, struct psr_error *err);
 
-/* Number of letters to insert, remove or change that turn the first n_a bytes of `a` into `b`; n_a + strlen(b) where
- * one of them has more than 63. */
+/* Returns how many letters to insert, remove or change to turn the first n_a bytes of `a` into `b`; n_a + strlen(b)
+ * where one of them has more than 63. */
 size_t psr_edit_distance(const char *a, size_t n_a, const char *b);
 
 /* Prints "PROGRAM: text" to standard error and returns the exit status for err->code. */

@@ -7,7 +7,7 @@
 
 #define NUMBER_TEXT 64
 
-/* The length of the decimal number at the beginning of text, or 0; spaces, hex, inf and nan are not allowed. */
+/* Returns the length of the decimal number at the beginning of text, or 0. Takes no spaces, hex, inf or nan. */
 static size_t number_length(const char *text)
 {
 	const char *at = text;

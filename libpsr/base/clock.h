@@ -1,4 +1,4 @@
-/* The clocks of the whole tree. */
+/* The clocks that the whole tree uses. */
 #ifndef PSR_BASE_CLOCK_H
 #define PSR_BASE_CLOCK_H
 

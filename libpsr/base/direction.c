@@ -8,8 +8,8 @@
 #define LEVELS 6
 #define N_INNER ((1 << 2 * LEVELS) / 3) /* divided triangles of one octant: 1 + 4 + ... + 4^5 */
 
-/* Of the triangles of the positive octant, level after level: for each of the children 1, 2 and 3 the plane (through
- * the origin) that cuts it off, with its normal towards the child. The other octants are mirror images. */
+/* Planes through the origin that divide the triangles of the positive octant, level after level. A triangle has three:
+ * each cuts off child 1, 2 or 3, with its normal towards that child. The other octants are mirror images. */
 static double cut_plane[N_INNER][3][3];
 static float direction_table[PSR_DIRECTIONS][3];
 static uint64_t direction_words[PSR_DIRECTIONS];
@@ -117,7 +117,7 @@ const uint32_t *psr_direction_tens(void)
 uint16_t psr_direction_encode(const float v[3])
 {
 	double folded[3];
-	unsigned octant = 0, index = 0, first = 0; /* first: of the level's nodes */
+	unsigned octant = 0, index = 0, first = 0; /* first: number of the level's first node */
 	int infinite = isinf(v[0]) || isinf(v[1]) || isinf(v[2]);
 	if (isnan(v[0]) || isnan(v[1]) || isnan(v[2]) || (v[0] == 0 && v[1] == 0 && v[2] == 0))
 		return 0;

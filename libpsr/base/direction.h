@@ -20,26 +20,29 @@
 #define PSR_MASK_TRIANGLES 128
 #define PSR_PROJECTIONS 32
 
-/* Index of the triangle that holds v, which need not have unit length. A vector with NaN or of length 0 gives 0. */
+/* Returns the index of the triangle that holds v, which may have any length. A vector with NaN or of length 0 gives
+ * 0. */
 uint16_t psr_direction_encode(const float v[3]);
 
-/* Unit vectors by index: PSR_DIRECTIONS rows. Made on first use (thread-safe), never freed. */
+/* Returns the unit vectors by index: PSR_DIRECTIONS rows, made on first use (thread-safe), never freed. */
 const float (*psr_direction_table(void))[3];
 
-/* The same in one word each: x, y and z as integers of 16 bits, 32,767 times as long, x lowest. */
+/* Returns the same vectors in one word each: x, y and z as integers of 16 bits, 32,767 times as long, x lowest. */
 const uint64_t *psr_direction_words(void);
 
-/* The same as integers of 10 bits, 511 times as long, x lowest: no component is off by more than 1/1022. */
+/* Returns the same vectors as integers of 10 bits, 511 times as long, x lowest: no component is off by more than
+ * 1/1022. */
 const uint32_t *psr_direction_tens(void);
 
-/* Centre (normalised sum of the corners) of triangle `index` of the sphere subdivided `level` times (0..6):
- * index < 8 * 4^level. The 32 projections of [G] 5.1 are level 1, the 128 triangles of [G] 6.3 level 2. */
+/* Computes the centre (normalised sum of the corners) of triangle `index` of the sphere subdivided `level` times
+ * (0..6): index < 8 * 4^level. The 32 projections of [G] 5.1 are level 1, the 128 triangles of [G] 6.3 level 2. */
 void psr_direction_center(int level, unsigned index, double v[3]);
 
-/* Corners of the same triangle, each of unit length. */
+/* Computes the corners of the same triangle, each of unit length. */
 void psr_direction_corners(int level, unsigned index, double corner[3][3]);
 
-/* Right-handed orthonormal basis whose z is `dir` (unit length): rows x, y, z. The lattices of projections use it. */
+/* Makes a right-handed orthonormal basis whose z is `dir` (unit length): rows x, y, z. The lattices of projections use
+ * it. */
 void psr_direction_basis(const double dir[3], double basis[3][3]);
 
 #endif

@@ -1,12 +1,12 @@
 #include <assert.h>
 #include <stdlib.h>
 #include <string.h>
-#include <xxhash.h>
+#include "hash.h"
 #include "psr/frame.h"
 
 static const struct {
 	const char *name;
-	size_t offset, bytes; /* in struct psr_frame; of a pixel */
+	size_t offset, bytes; /* offset in struct psr_frame; bytes of a pixel */
 } planes_of[PSR_N_PLANES] = {
 	[PSR_PLANE_COLOR] = { "color", offsetof(struct psr_frame, rgb), 3 },
 	[PSR_PLANE_DEPTH] = { "depth", offsetof(struct psr_frame, depth), 4 },
@@ -70,5 +70,5 @@ int psr_frame_alloc(struct psr_frame *frame, uint32_t width, uint32_t height, un
 
 uint64_t psr_frame_hash(const struct psr_frame *frame, unsigned plane)
 {
-	return XXH64(psr_frame_plane(frame, plane), (size_t)frame->width * frame->height * psr_plane_bytes(plane), 0);
+	return hash_plane(psr_frame_plane(frame, plane), frame->width * psr_plane_bytes(plane), frame->height);
 }

@@ -5,7 +5,7 @@
 
 struct brick {
 	uint64_t key;
-	uint32_t after[8]; /* one more than the first element of each cell; 0: none */
+	uint32_t after[8]; /* one more than the first element of each cell; 0: the cell is empty */
 };
 
 static uint64_t brick_key(const int at[3])

@@ -1,4 +1,5 @@
 #include <dlfcn.h>
+#include <inttypes.h>
 #include <limits.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -16,6 +17,7 @@ static int find_beside(char path[MOST_PATH])
 	static const char *const beside[] = { "/../lib/psr/" FILE_NAME, "/../lib/" FILE_NAME };
 	char folder[PATH_MAX], *slash;
 	ssize_t n = readlink("/proc/self/exe", folder, sizeof folder - 1);
+
 	if (n <= 0)
 		return 0;
 	folder[n] = '\0';
@@ -31,12 +33,14 @@ static int find_beside(char path[MOST_PATH])
 	return 0;
 }
 
-static int load(struct image_module *module, struct psr_error *err)
+static int load(const struct image_module **module, struct psr_error *err)
 {
 	const char *chosen = getenv("PSR_IMAGE_MODULE");
 	char path[MOST_PATH] = FILE_NAME;
-	int is_anywhere = 0;
+	const struct image_module *found;
+	int is_anywhere = 0, rc = PSR_OK;
 	void *handle;
+
 	if (chosen != NULL && chosen[0] != '\0') {
 		snprintf(path, sizeof path, "%s", chosen);
 	} else if (!find_beside(path)) {
@@ -49,34 +53,30 @@ static int load(struct image_module *module, struct psr_error *err)
 		                "the module " FILE_NAME " is not installed beside this program; PSR_IMAGE_MODULE can name it");
 	if (handle == NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED, "the image module cannot be loaded: %.300s", dlerror());
-	module->read = (image_module_read *)(uintptr_t)dlsym(handle, "psr_image_module_read");
-	module->write = (image_module_write *)(uintptr_t)dlsym(handle, "psr_image_module_write");
-	module->check = (image_module_check *)(uintptr_t)dlsym(handle, "psr_image_module_check");
-	module->animation_check =
-		(image_module_animation_check *)(uintptr_t)dlsym(handle, "psr_image_module_animation_check");
-	module->animation_open = (image_module_animation_open *)(uintptr_t)dlsym(handle, "psr_image_module_animation_open");
-	module->animation_add = (image_module_animation_add *)(uintptr_t)dlsym(handle, "psr_image_module_animation_add");
-	module->animation_close =
-		(image_module_animation_close *)(uintptr_t)dlsym(handle, "psr_image_module_animation_close");
-	if (module->read == NULL || module->write == NULL || module->check == NULL || module->animation_check == NULL
-	    || module->animation_open == NULL || module->animation_add == NULL || module->animation_close == NULL) {
+	found = dlsym(handle, "psr_image_module");
+	if (found == NULL)
+		rc = psr_fail(err, PSR_ERR_VERSION, "%.300s is not psr's image module", path);
+	else if (found->version != IMAGE_MODULE_VERSION)
+		rc = psr_fail(err, PSR_ERR_VERSION,
+		              "%.300s is image module version %" PRIu32 ", and this program needs version %d: install both from "
+		              "the same psr", path, found->version, IMAGE_MODULE_VERSION);
+	if (rc != PSR_OK)
 		dlclose(handle);
-		return psr_fail(err, PSR_ERR_VERSION, "%.300s is not the image module of this version of psr", path);
-	}
-	return PSR_OK;
+	else
+		*module = found;
+	return rc;
 }
 
 int image_module_open(const struct image_module **out, struct psr_error *err)
 {
 	static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
-	static struct image_module module;
-	static int is_loaded;
+	static const struct image_module *module;
 	int rc = PSR_OK;
+
 	pthread_mutex_lock(&lock);
-	if (!is_loaded)
+	if (module == NULL)
 		rc = load(&module, err);
-	is_loaded = rc == PSR_OK;
+	*out = module;
 	pthread_mutex_unlock(&lock);
-	*out = &module;
 	return rc;
 }

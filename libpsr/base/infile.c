@@ -15,7 +15,7 @@ static int fail_system(const char *path, struct psr_error *err)
 	                strerror(errno));
 }
 
-/* Until n bytes, or the end; -1 on failure. */
+/* Reads n bytes, fewer only at the end; returns how many, or -1 on failure. */
 static ssize_t fill(int fd, void *to, size_t n)
 {
 	size_t done = 0;
@@ -63,7 +63,7 @@ static int read_regular(uint8_t **bytes, size_t *n_bytes, int fd, const char *pa
 
 int infile_read(uint8_t **bytes, size_t *n_bytes, const char *path, uint64_t max_bytes, struct psr_error *err)
 {
-	/* Opening a pipe without a writer would wait for one. */
+	/* O_NONBLOCK: opening a pipe without a writer would wait for one. */
 	int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK), code;
 
 	if (fd < 0)

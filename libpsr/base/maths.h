@@ -6,7 +6,9 @@
 #include <stdint.h>
 #include <string.h>
 
-/* sin and cos of 0 <= a <= pi; absolute error below 1e-15. */
+#define PSR_DEGREE (3.14159265358979323846 / 180) /* radians */
+
+/* Computes sin and cos of 0 <= a <= pi; absolute error below 1e-15. */
 void psr_sincos(double a, double *s, double *c);
 
 static inline float psr_float_from_bits(uint32_t bits)
@@ -35,7 +37,8 @@ static inline float psr_where(int condition, float value)
 	return psr_float_from_bits(psr_bits_from_float(value) & (0u - (uint32_t)(condition != 0)));
 }
 
-/* Largest integer <= x; |x| < 2^31. Compiles to a truncation and a compare where the ISA has no rounding. */
+/* Returns the largest integer <= x; |x| < 2^31. Compiles to a truncation and a compare where the ISA has no
+ * rounding. */
 static inline int32_t psr_floor_int(float x)
 {
 	int32_t i = (int32_t)x;

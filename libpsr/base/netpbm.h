@@ -7,10 +7,11 @@
 #include "outfile.h"
 #include "psr/frame.h"
 
-/* 3 bytes a pixel, in memory of malloc(). NOT_FOUND, IO, FORMAT, LIMIT (sides and pixels of psr/frame.h), MEMORY. */
+/* Reads colours, 3 bytes a pixel, into memory of malloc(). NOT_FOUND, IO, FORMAT, LIMIT (sides and pixels of
+ * psr/frame.h), MEMORY. */
 int ppm_read(uint8_t **rgb, uint32_t *width, uint32_t *height, const char *path, struct psr_error *err);
 
-/* The same of a picture of one channel. */
+/* Reads a picture of one channel into memory of malloc(), with the same errors. */
 int pfm_read(float **depth, uint32_t *width, uint32_t *height, const char *path, struct psr_error *err);
 
 /* Write the frame's colour, and its depth (little-endian). outfile_close() reports failures; these return PSR_OK. */

@@ -23,7 +23,7 @@ static int fail_system(const struct outfile *file, int reason, struct psr_error 
 	                "cannot write %.300s: %s", file->path, strerror(reason));
 }
 
-/* FOLDER/.psr-PID-N.ENDING, short so that it fits wherever the target's name does. */
+/* Makes a name FOLDER/.psr-PID-N.ENDING, short enough for any file system that takes the target's name. */
 static int name_temporary(char name[PATH_MAX], const char *target, pid_t pid, int n)
 {
 	const char *slash = strrchr(target, '/'), *ending = outfile_ending(target);
@@ -33,7 +33,7 @@ static int name_temporary(char name[PATH_MAX], const char *target, pid_t pid, in
 	                ending) < PATH_MAX;
 }
 
-/* The first free name; mkstemp() would ignore the umask. */
+/* Takes the first free name; mkstemp() would ignore the umask. */
 static int open_temporary(struct outfile *file)
 {
 	int fd = -1;
@@ -106,7 +106,7 @@ const char *outfile_name(const struct outfile *file)
 	return file->temporary[0] != '\0' ? file->temporary : file->path;
 }
 
-/* So that the new name survives a power cut. Some file systems cannot sync folders, and say so with EINVAL. */
+/* The new name must survive a power cut. Some file systems cannot sync folders, and say so with EINVAL. */
 static int sync_folder(struct outfile *file, struct psr_error *err)
 {
 	char *slash = strrchr(file->target, '/');

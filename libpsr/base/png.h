@@ -6,15 +6,16 @@
 #include "outfile.h"
 #include "psr/frame.h"
 
-/* Errors go to *why, which must outlive it, and jump to the caller's setjmp(png_jmpbuf()). NULL: no memory. */
+/* Errors go to *why, which must outlive the writer, and jump to the caller's setjmp(png_jmpbuf()). NULL: no memory. */
 png_structp png_writer_create(png_infop *info, struct psr_error *why);
 
-/* Signature and header of a picture of the frame's size; `write` gets the bytes, with png_get_io_ptr() == sink. */
+/* Writes signature and header of a picture of the frame's size; `write` gets the bytes, with png_get_io_ptr() ==
+ * sink. */
 void png_writer_begin(png_structp png, png_infop info, void *sink, png_rw_ptr write, const struct psr_frame *frame);
 
-void png_write_outfile(png_structp png, png_bytep data, size_t n); /* a png_rw_ptr whose sink is a struct outfile */
+void png_write_outfile(png_structp png, png_bytep data, size_t n); /* a png_rw_ptr; its sink is a struct outfile */
 
-/* A whole PNG of the colours. MEMORY, IO. */
+/* Writes a whole PNG of the colours. MEMORY, IO. */
 int png_encode(void *sink, png_rw_ptr write, const struct psr_frame *frame, struct psr_error *err);
 int png_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
 

@@ -1,3 +1,5 @@
+#include <fenv.h>
+#include <pthread.h>
 #include "srgb.h"
 
 /* The exact curve, correctly rounded; libm's pow differs between CPUs. */
@@ -102,4 +104,26 @@ uint8_t psr_linear_to_srgb(float linear)
 	for (unsigned step = 128; step > 0; step >>= 1)
 		code += linear >= threshold[code + step - 1] ? step : 0;
 	return (uint8_t)code;
+}
+
+static uint8_t of_16_bits[65536];
+
+/* Computes the same codes in any rounding mode of the caller. */
+static void make_of_16_bits(void)
+{
+	fenv_t callers;
+
+	fegetenv(&callers);
+	fesetenv(FE_DFL_ENV);
+	for (int i = 0; i < 65536; i++)
+		of_16_bits[i] = psr_linear_to_srgb((float)i / 65535.0f);
+	fesetenv(&callers);
+}
+
+const uint8_t *psr_srgb_of_16_bits(void)
+{
+	static pthread_once_t once = PTHREAD_ONCE_INIT;
+
+	pthread_once(&once, make_of_16_bits);
+	return of_16_bits;
 }

@@ -8,10 +8,14 @@
 #include <stdint.h>
 
 extern const float psr_srgb_to_linear[256]; /* correctly rounded; 0 -> 0, 255 -> 1 */
-/* The same for 5-bit and 6-bit codes, by the nearest 8-bit code. */
+/* Tables of 5-bit and 6-bit codes, which stand for the nearest 8-bit codes. */
 extern const float psr_srgb5_to_linear[32], psr_srgb6_to_linear[64];
 
-/* The inverse: the code with c nearest to that of `linear`, halves up; clamps to 0..255; NaN gives 0. */
+/* Returns the code whose light is nearest to `linear`, halves up; clamps to 0..255; NaN gives 0. */
 uint8_t psr_linear_to_srgb(float linear);
+
+/* Returns a table of 65536 codes: of i / 65535. The first call makes it, in half a millisecond, for good. Any
+ * thread. */
+const uint8_t *psr_srgb_of_16_bits(void);
 
 #endif

@@ -6,10 +6,10 @@
 
 void stats_sort(double *v, size_t n);
 
-/* The least value that this part (0..1) of all do not exceed; 0 of none. */
+/* Returns the least value that is not below this part (0..1) of all values; 0 if there are none. */
 double stats_percentile(const double *sorted, size_t n, double part);
 
-/* Sorts them; n >= 1. The mean of the middle two of an even number. */
+/* Sorts the values, n >= 1, and returns the median: the mean of the middle two of an even number. */
 double stats_median(double *v, size_t n);
 
 #endif

@@ -1,13 +1,14 @@
-/* A hash table by open addressing: entries of one size, each a struct that begins with its 63-bit key. Any number of
- * threads may look while none puts. */
+/* A hash table by open addressing. Entries have one size, and are structs that begin with a 63-bit key. Any number of
+ * threads may look entries up while none puts one. */
 #ifndef PSR_BASE_TABLE_H
 #define PSR_BASE_TABLE_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#define TABLE_FREE UINT64_MAX             /* no key */
-#define TABLE_MARK (UINT64_C(1) << 63)    /* the caller may set it in an entry, which table_find() then passes over */
+#define TABLE_FREE UINT64_MAX             /* a place without an entry */
+#define TABLE_MARK (UINT64_C(1) << 63)    /* a caller may set it in an entry's key, and table_find() then passes over
+                                           * the entry */
 
 struct table {
 	size_t n, size; /* entries; places for them, a power of two */
@@ -15,17 +16,18 @@ struct table {
 	unsigned char *entry;
 };
 
-/* size: places to begin with, a power of two. MEMORY; table_fini() either way. */
+/* Makes a table with `size` places, a power of two. MEMORY; call table_fini() even then. */
 int table_init(struct table *table, size_t bytes, size_t size);
 void table_fini(struct table *table);
 
-/* Doubles the places. MEMORY, and then nothing is changed. */
+/* Doubles the number of places. MEMORY, and nothing has changed. */
 int table_grow(struct table *table);
 
-/* The entry of a key, a new one zeroed but for its key; entries move when another is put. NULL: no memory. */
+/* Returns the entry of a key; makes a zeroed one if there is none. Putting may move all entries. NULL: no memory. */
 void *table_put(struct table *table, uint64_t key);
 
-/* Where the search for a key begins: the last step of MurmurHash3 (Appleby 2011), so that cells in a row spread. */
+/* Returns where the search for a key begins: the last step of MurmurHash3 (Appleby 2011), so that cells in a row
+ * spread. */
 static inline size_t table_place(uint64_t key, size_t size)
 {
 	key &= ~TABLE_MARK;
@@ -42,7 +44,7 @@ static inline uint64_t *table_at(const struct table *table, size_t place)
 	return (uint64_t *)(void *)(table->entry + place * table->bytes);
 }
 
-/* The entry of a key, or the free place for it. */
+/* Returns the entry of a key, or the free place for it. */
 static inline uint64_t *table_search(const struct table *table, uint64_t key)
 {
 	size_t i = table_place(key, table->size);
@@ -52,7 +54,7 @@ static inline uint64_t *table_search(const struct table *table, uint64_t key)
 	return table_at(table, i);
 }
 
-/* The entry of a key; NULL. */
+/* Returns the entry of a key, or NULL. */
 static inline void *table_find(const struct table *table, uint64_t key)
 {
 	uint64_t *entry = table_search(table, key);

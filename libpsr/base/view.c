@@ -5,6 +5,9 @@
 #define MAX_LENGTH 1e30
 #define PI 3.14159265358979323846
 
+const char *const view_camera_kinds[2] = { "perspective", "orthographic" };
+const char *const view_light_kinds[3] = { "directional", "point", "spot" };
+
 int view_is_point(const double v[3])
 {
 	for (int i = 0; i < 3; i++)

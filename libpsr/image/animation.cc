@@ -2,15 +2,12 @@
 #include <OpenImageIO/imageio.h>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "fail.h"
-extern "C" {
-#include "base/image_module.h"
-}
+#include "module.h"
 
 namespace {
 
@@ -65,38 +62,25 @@ int close(Animation *a, char *message, unsigned size)
 	return owned->out->close() ? 0 : fail(message, size, owned->out->geterror());
 }
 
-template <typename F> int guard(char *message, unsigned size, F function)
-{
-	try {
-		return function();
-	} catch (const std::exception &e) {
-		return fail(message, size, e.what());
-	} catch (...) {
-		return fail(message, size, "OpenImageIO failed");
-	}
 }
 
-}
-
-#define EXPORT extern "C" __attribute__((visibility("default")))
-
-EXPORT int psr_image_module_animation_check(const char *ending, char *message, unsigned size)
+extern "C" int image_animation_check(const char *ending, char *message, unsigned size)
 {
 	return guard(message, size, [&] { return check(ending, message, size); });
 }
 
-EXPORT int psr_image_module_animation_open(void **animation, const char *path, const image_module_film *film,
-                                           char *message, unsigned size)
+extern "C" int image_animation_open(void **animation, const char *path, const image_module_film *film, char *message,
+                                    unsigned size)
 {
 	return guard(message, size, [&] { return open(animation, path, *film, message, size); });
 }
 
-EXPORT int psr_image_module_animation_add(void *animation, const void *pixels, char *message, unsigned size)
+extern "C" int image_animation_add(void *animation, const void *pixels, char *message, unsigned size)
 {
 	return guard(message, size, [&] { return add(static_cast<Animation *>(animation), pixels, message, size); });
 }
 
-EXPORT int psr_image_module_animation_close(void *animation, char *message, unsigned size)
+extern "C" int image_animation_close(void *animation, char *message, unsigned size)
 {
 	return guard(message, size, [&] { return close(static_cast<Animation *>(animation), message, size); });
 }

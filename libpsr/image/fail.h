@@ -3,6 +3,7 @@
 #define PSR_IMAGE_FAIL_H
 
 #include <cstdio>
+#include <exception>
 #include <string>
 
 // Copies the text, without control characters, to a message of `size` bytes. Returns 1, a writer's failure.
@@ -15,6 +16,18 @@ inline int fail(char *message, unsigned size, const std::string &text)
 			c = ' ';
 	std::snprintf(message, size, "%s", clean.c_str());
 	return 1;
+}
+
+// Calls a writer; an exception becomes its failure.
+template <typename F> int guard(char *message, unsigned size, F function)
+{
+	try {
+		return function();
+	} catch (const std::exception &e) {
+		return fail(message, size, e.what());
+	} catch (...) {
+		return fail(message, size, "OpenImageIO failed");
+	}
 }
 
 #endif

@@ -10,9 +10,9 @@
 #include <OpenImageIO/filesystem.h>
 #include <OpenImageIO/imageio.h>
 #include "import/import.h"
+#include "module.h"
 
 extern "C" {
-#include "base/image_module.h"
 #include "base/srgb.h"
 }
 
@@ -130,9 +130,8 @@ int decode(uint8_t **out, uint32_t size[2], const image_module_source &source, c
 
 } // namespace
 
-extern "C" __attribute__((visibility("default"))) int psr_image_module_read(uint8_t **rgba, uint32_t size[2],
-                                                                            const image_module_source *source,
-                                                                            char *message, unsigned message_size)
+extern "C" int image_read(uint8_t **rgba, uint32_t size[2], const image_module_source *source, char *message,
+                          unsigned message_size)
 {
 	const problem problem = { message, message_size };
 	try {

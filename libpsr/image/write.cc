@@ -6,15 +6,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <exception>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "fail.h"
-extern "C" {
-#include "base/image_module.h"
-}
+#include "module.h"
 
 namespace {
 
@@ -106,27 +103,12 @@ int write(const char *path, const image_module_picture &picture, char *message, 
 
 }
 
-extern "C" __attribute__((visibility("default"))) int psr_image_module_check(const char *ending, int is_depth,
-                                                                             char *message, unsigned message_size)
+extern "C" int image_check(const char *ending, int is_depth, char *message, unsigned size)
 {
-	try {
-		return check(ending, is_depth != 0, message, message_size);
-	} catch (const std::exception &e) {
-		return fail(message, message_size, e.what());
-	} catch (...) {
-		return fail(message, message_size, "OpenImageIO failed");
-	}
+	return guard(message, size, [&] { return check(ending, is_depth != 0, message, size); });
 }
 
-extern "C" __attribute__((visibility("default"))) int psr_image_module_write(const char *path,
-                                                                             const image_module_picture *picture,
-                                                                             char *message, unsigned message_size)
+extern "C" int image_write(const char *path, const image_module_picture *picture, char *message, unsigned size)
 {
-	try {
-		return write(path, *picture, message, message_size);
-	} catch (const std::exception &e) {
-		return fail(message, message_size, e.what());
-	} catch (...) {
-		return fail(message, message_size, "OpenImageIO failed");
-	}
+	return guard(message, size, [&] { return write(path, *picture, message, size); });
 }

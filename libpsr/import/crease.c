@@ -66,20 +66,20 @@ static double importance(double area, double largest)
 	return fmin(fmax((area - MINOR * largest) / ((MAJOR - MINOR) * largest), 0.0), 1.0);
 }
 
-/* The corners of group g. */
+/* Lists the corners of group g. */
 struct members {
 	struct crease_corner *corner;
 	const unsigned *group;
 	unsigned n, g;
 };
 
-/* Whether corner k is of the group, and within `reach` of `face` (NULL: anywhere). */
+/* Whether corner k belongs to the group, and lies within `reach` of `face` (NULL: anywhere). */
 static int counts(const struct members *m, unsigned k, const double *face, double reach)
 {
 	return m->group[k] == m->g && (face == NULL || gap(face, m->corner[k].face) <= reach);
 }
 
-/* The normal of the group's faces near `face` (NULL: of all). Returns 0 if it is undefined. */
+/* Computes the normal of the group's faces near `face` (NULL: of all). Returns 0 if it is undefined. */
 static int common_normal(double normal[3], const struct members *m, const double *face, double reach)
 {
 	double largest = 0.0, length;

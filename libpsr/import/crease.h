@@ -15,7 +15,8 @@ struct crease_corner {
 /* `crease`: 1 minus the cosine of the angle up to which faces are smooth, 0..2. n <= CREASE_MAX_CORNERS.
  *
  * Faces that differ by less than the crease angle form a group, directly or through others. If neither of two faces is
- * flat, as on a scan, the limit is 1.7 times that angle: noise and coarse triangles make such steps as often as edges.
+ * flat, as on a scan, the limit is 1.7 times that angle: noise and coarse triangles make steps of that size as often as
+ * edges do.
  *
  * A group shares one normal where the surface is regular: no face is further from that normal than 1.7 times the widest
  * step between neighbours and than the group's limit, though 0.6 times the crease angle is always allowed. Elsewhere

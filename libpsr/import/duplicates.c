@@ -5,7 +5,7 @@
 
 #define EMPTY UINT32_MAX
 
-/* The triangle's points, rotated to begin with the least, and its material. */
+/* The triangle's points, rotated so that the least comes first, and its material. */
 static void key_of(uint32_t key[4], const struct psr_mesh *mesh, const uint32_t *first_of, uint32_t t)
 {
 	uint32_t point[3];

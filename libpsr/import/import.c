@@ -55,6 +55,11 @@ static int is_las(const char *path, const uint8_t *bytes, size_t n_bytes)
 	       (n_bytes >= 4 && memcmp(bytes, "LASF", 4) == 0);
 }
 
+static int is_pcd(const char *path, const uint8_t *bytes, size_t n_bytes)
+{
+	return import_path_ends_with(path, ".pcd") || (n_bytes >= 6 && memcmp(bytes, "# .PCD", 6) == 0);
+}
+
 /* Survey coordinates have a far origin, and their z is height. */
 static int is_surveyed(const struct psr_mesh *mesh)
 {
@@ -69,7 +74,8 @@ static int is_surveyed(const struct psr_mesh *mesh)
 static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *bytes, size_t n_bytes)
 {
 	static const char *const endings[] = { ".stl", ".amf", ".3mf" };
-	int has_z = is_las(path, bytes, n_bytes) || (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
+	int has_z = is_las(path, bytes, n_bytes) || is_pcd(path, bytes, n_bytes) ||
+	             (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
 	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
 		has_z |= import_path_ends_with(path, endings[i]);
 	mesh->up[has_z ? 2 : 1] = 1;
@@ -103,6 +109,8 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 		rc = import_ply(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK && is_las(path, bytes, n_bytes))
 		rc = import_las(&im, bytes, n_bytes, err);
+	else if (rc == PSR_OK && is_pcd(path, bytes, n_bytes))
+		rc = import_pcd(&im, bytes, n_bytes, err);
 	else if (rc == PSR_OK)
 		rc = import_assimp(&im, bytes, n_bytes, err);
 	if (rc == PSR_OK)

@@ -1,4 +1,4 @@
-/* The import of mesh files: the mesh under construction, files and paths, images, and the four readers. import.c knows
+/* The import of mesh files: the mesh under construction, files and paths, images, and the five readers. import.c knows
  * the order of the steps.
  *
  * Readers open files that the source file names through import_path_inside alone, which refuses paths outside of the
@@ -69,7 +69,7 @@ void *import_column_at(const struct import_column *column, uint64_t i);
  * Within the limits above n * size cannot overflow. */
 int import_resize(void *array, uint64_t n, size_t size);
 
-/* The bounds of all vertices and points; infinite if there are none. */
+/* Finds the bounds of all vertices and points; infinite if there are none. */
 void import_mesh_bounds(double low[3], double high[3], const struct psr_mesh *mesh);
 
 /* Return the index of the new element, or a negative code. `name` stands for the image in error texts. */
@@ -124,13 +124,13 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err);
 int import_cloud_finish(struct import_mesh *im, struct psr_error *err);
 
 /* path.c. The caller frees the strings. */
-/* The folder of a file, resolved, without a slash at the end. */
+/* Returns the folder of a file, resolved, without a slash at the end. */
 int import_path_folder(char **folder, const char *path, struct psr_error *err);
 
 /* Resolves `name`, absolute or relative to `folder`. NOT_FOUND; UNSUPPORTED if it leads outside of the folder. */
 int import_path_inside(char **out, const char *folder, const char *name, struct psr_error *err);
 
-/* Whether a path has an ending, in any case. */
+/* Returns whether a path has an ending, in any case. */
 int import_path_ends_with(const char *path, const char *ending);
 
 /* number.c: converts a word to the nearest double; returns 0 if it is not a number. Takes "nan", "inf" and all that C's
@@ -147,11 +147,12 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
  * or broken images, and leaves *out alone; the module then reports the error. */
 int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, uint64_t max_pixels);
 
-/* The readers: append the contents of a source file, `bytes`, to the mesh. */
+/* The readers append the contents of a source file, `bytes`, to the mesh. */
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_las(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
+int import_pcd(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 
 #ifdef __cplusplus
 }

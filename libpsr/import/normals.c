@@ -18,7 +18,7 @@ struct fan {
 	uint8_t *wanted;    /* by triangle: its vertices have no normals */
 	double (*face)[3];  /* unit normals; 0 for a triangle without area */
 	uint32_t *flat;     /* of each triangle: its parent in the union-find forest of flat parts */
-	double *area;       /* twice that of the flat part, at its root */
+	double *area;       /* twice the area of the flat part, stored at its root */
 };
 
 static void fan_fini(struct fan *fan)
@@ -32,8 +32,8 @@ static void fan_fini(struct fan *fan)
 	free(fan->area);
 }
 
-/* The corner's weighted normal e x f / (|e|^2 |f|^2), exact on spheres and free of angles (N. Max, "Weights for
- * computing vertex normals from facet normals", 1999). 0 without area. */
+/* Computes the corner's weighted normal e x f / (|e|^2 |f|^2), exact on spheres and free of angles (N. Max, "Weights
+ * for computing vertex normals from facet normals", 1999). 0 without area. */
 static void corner_share(double share[3], const struct psr_mesh *mesh, uint64_t corner)
 {
 	const uint32_t *v = mesh->triangle[corner / 3];
@@ -58,7 +58,7 @@ static void face_normals(struct fan *fan, const struct psr_mesh *mesh)
 	}
 }
 
-/* The root of t's flat part: its first triangle. Halves paths. */
+/* Returns the root of t's flat part: its first triangle. Halves paths. */
 static uint32_t flat_of(struct fan *fan, uint32_t t)
 {
 	while (fan->flat[t] != t)
@@ -162,7 +162,7 @@ static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *er
 	return PSR_OK;
 }
 
-/* The corners around the current point. */
+/* Lists the corners around the current point. */
 struct ring {
 	unsigned n;
 	uint64_t at[CREASE_MAX_CORNERS];

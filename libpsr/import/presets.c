@@ -2,7 +2,7 @@
 #include <string.h>
 #include "import.h"
 
-/* The length of the longest start of a UTF-8 text that fits n bytes and ends between characters. */
+/* Returns the length of the longest start of a UTF-8 text that fits n bytes and ends between characters. */
 static size_t cut(const char *text, size_t n)
 {
 	size_t length = strlen(text);

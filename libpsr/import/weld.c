@@ -7,8 +7,8 @@
 #define EMPTY UINT32_MAX
 #define MAX_KEY 128
 
-/* Of the mesh's size, below anything visible: positions computed in single precision, such as the pole of a ball from
- * every side, differ by a few roundings. */
+/* Part of the mesh's size, below anything visible: positions computed in single precision, such as the pole of a ball
+ * from every side, differ by a few roundings. */
 #define NEARLY 0x1p-22
 
 struct keys {
@@ -35,7 +35,7 @@ static void find_step(struct keys *keys, const struct psr_mesh *mesh)
 	keys->step = isfinite(most) ? NEARLY * most : 0;
 }
 
-/* The bytes that equal vertices have in common. Adding 0 turns -0 into 0. */
+/* Makes the bytes that equal vertices have in common. Adding 0 turns -0 into 0. */
 static size_t key_of(const struct keys *keys, uint32_t v, uint8_t key[MAX_KEY])
 {
 	double position[3];

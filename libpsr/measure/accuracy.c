@@ -21,7 +21,7 @@
 /* [G] 7.2: within three sample spacings two depths are on one surface. */
 #define HOLE_SPACINGS 3
 
-/* Footprints of a pixel on the surface: how far to the side the point's truth may lie. */
+/* A point's truth may lie this many footprints of a pixel to the side. */
 #define NEAR_FOOTPRINTS 1.5
 
 /* Points further than this from the planes of their neighbours are compared with the whole mesh. */
@@ -78,7 +78,7 @@ static int is_hole(const struct measure *m, double z, const struct neighbor *nei
 	return 1;
 }
 
-/* The distance along the truth's normal to the nearest truth beside the point, else to the nearest of all. */
+/* Returns the distance along the truth's normal to the nearest truth beside the point, else to the nearest of all. */
 static double distance_to(const struct measure *m, const double point[3], const struct neighbor *neighbor, int n)
 {
 	double nearest[2] = { INFINITY, INFINITY };

@@ -17,7 +17,8 @@ static int largest_difference(const uint8_t *a, const uint8_t *b)
 	return most;
 }
 
-/* The difference from the most similar truth of the 3x3 neighbourhood; -1 unless the object fills all nine pixels. */
+/* Returns the difference from the most similar truth of the 3x3 neighbourhood; -1 unless the object fills all nine
+ * pixels. */
 static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x,
                          uint32_t y)
 {

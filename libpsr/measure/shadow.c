@@ -71,7 +71,7 @@ static int is_compared(const struct measure *m, uint32_t x, uint32_t y)
 	return 1;
 }
 
-/* The distance in pixels to the nearest one whose truth equals this one. */
+/* Returns the distance in pixels to the nearest pixel whose truth equals this one. */
 static double seam_at(const struct measure *m, uint32_t x, uint32_t y, int is_lit)
 {
 	double nearest = PSR_SHADOW_FAR;

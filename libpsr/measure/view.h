@@ -18,10 +18,11 @@ struct view {
 int view_init(struct view *view, const struct psr_camera *camera, uint32_t width, uint32_t height,
               struct psr_error *err);
 
-/* The ray through point (x, y) of the picture, in pixels from its top left corner: world = origin + z' * direction. */
+/* Makes the ray through point (x, y) of the picture, in pixels from its top left corner: world = origin + z' *
+ * direction. */
 void view_ray(const struct view *view, double x, double y, double origin[3], double direction[3]);
 
-/* A pixel's width in world units at depth z'. */
+/* Returns a pixel's width in world units at depth z'. */
 static inline double view_pixel(const struct view *view, double z)
 {
 	return view->is_perspective ? view->pixel * z : view->pixel;

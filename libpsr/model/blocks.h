@@ -26,22 +26,23 @@ enum psr_block_flag {
 	                              * 7.3.2) */
 };
 
-/* What is so of few models' blocks: a byte a block, in models that have any. */
+/* Properties that only few models' blocks have: a byte a block, in models where some block has one. */
 enum psr_block_trait {
-	/* The shading normals of some samples are far from those of their faces, so that they cannot tell how these face:
-	 * the cone tells it of the whole block. All of it is drawn unless its cone faces away; and a two-sided block is
-	 * seen from its front where the normal of the cone that is nearest to the shading normal faces the eye. */
+	/* Some samples' shading normals are far from their faces' normals, so they cannot tell how these face: the block's
+	 * cone tells it of the whole block. The renderer draws all of the block unless its cone faces away. It sees a
+	 * two-sided block from the front where the cone's normal nearest to the shading normal faces the eye. */
 	PSR_BLOCK_BENT = 1,
-	/* Some of its samples let a part of the light through, each by its opacity. */
+	/* Some samples let a part of the light through, by their opacity. */
 	PSR_BLOCK_SHEER = 2
 };
 
-/* Blocks whose numbers have the same quotient by this are a run, and share what is the same or near for all of them. */
+/* A run is PSR_RUN_BLOCKS blocks in a row: their numbers have the same quotient. It stores what is equal or near for
+ * all of them. */
 #define PSR_RUN_BLOCKS 1024
 
 struct psr_run {
 	uint32_t attr_first;       /* of the first block */
-	uint32_t visibility_first; /* 0 in a model without visibility masks */
+	uint32_t visibility_first; /* the first block's; 0 in a model without visibility masks */
 };
 
 #define PSR_CONE_ANY 255
@@ -57,7 +58,7 @@ struct psr_run {
 struct psr_blocks {
 	uint32_t n_blocks, n_projections, n_clusters, n_levels;
 	uint32_t n_masks;                       /* length of visibility_mask, at most n_blocks; 0 without */
-	uint64_t n_samples;                     /* valid ones of all blocks; == length of attr and depth */
+	uint64_t n_samples;                     /* valid samples of all blocks; == length of attr and depth */
 	const struct psr_projection *projection;
 	const struct psr_cluster *cluster;
 	const struct psr_run *run;              /* psr_blocks_runs() of them */
@@ -67,7 +68,7 @@ struct psr_blocks {
 	const uint8_t *flags;                   /* enum psr_block_flag */
 	const uint64_t *mask;                   /* never 0 */
 	const uint16_t *attr_offset;            /* see psr_blocks_attr_first() */
-	const uint16_t *depth;                  /* readable for 64 elements beyond the last, which are of no value */
+	const uint16_t *depth;                  /* readable for 64 elements beyond the last; these have no meaning */
 	const uint64_t *attr;                   /* see PSR_ATTR_* */
 	/* Optional, NULL if absent ([G] 6.3, 6.4). The cone: all normals of the block's faces, and but in a bent block
 	 * those of its samples, are within an angle below 90 degrees, of sine cone_sine / 255, of the direction of (cone_x,
@@ -97,26 +98,26 @@ static inline unsigned psr_blocks_traits(const struct psr_blocks *blocks, uint32
 
 #define PSR_OPAQUE 255
 
-/* Whether a block's samples have opacities. */
+/* Returns whether a block's samples have opacities. */
 static inline int psr_blocks_is_sheer(const struct psr_blocks *blocks, uint32_t block)
 {
 	return blocks->opacity != NULL && (psr_blocks_traits(blocks, block) & PSR_BLOCK_SHEER) != 0;
 }
 
-/* Index of a block's first sample. */
+/* Returns the index of a block's first sample. */
 static inline uint32_t psr_blocks_attr_first(const struct psr_blocks *blocks, uint32_t block)
 {
 	return blocks->run[block / PSR_RUN_BLOCKS].attr_first + blocks->attr_offset[block];
 }
 
-/* Index in visibility_mask of a block's mask, in a model that has them. */
+/* Returns the index of a block's mask in visibility_mask, in a model that has masks. */
 static inline uint32_t psr_blocks_visibility(const struct psr_blocks *blocks, uint32_t block)
 {
 	return blocks->run[block / PSR_RUN_BLOCKS].visibility_first + blocks->visibility_index[block];
 }
 
-/* The sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x, sphere_y,
- * sphere_z) / 2^14, its radius sphere_r / 2^15, in inner units. All are exact. */
+/* Computes the sphere that bounds the samples of a block and reaches half a step beyond: its centre is (sphere_x,
+ * sphere_y, sphere_z) / 2^14, its radius sphere_r / 2^15, in inner units. All are exact. */
 static inline void psr_blocks_sphere(const struct psr_blocks *blocks, uint32_t block, float center[3], float *radius)
 {
 	center[0] = (float)blocks->sphere_x[block] * (1.0f / 16384);
@@ -125,16 +126,17 @@ static inline void psr_blocks_sphere(const struct psr_blocks *blocks, uint32_t b
 	*radius = (float)blocks->sphere_r[block] * (1.0f / 32768);
 }
 
-/* Where a block is on the lattice of its projection and level l, which its sphere says: of all windows of 8 x 8 lattice
- * points that begin in an even row, its is the one whose middle is nearest to the sphere's center, 3.75 columns and 3.5
- * rows from its first point. Depths are told from that of the center. */
+/* A block's place on the lattice of its projection and level l, which follows from its sphere: of all windows of 8 x 8
+ * lattice points that begin in an even row, the one whose middle is nearest to the sphere's center, 3.75 columns and
+ * 3.5 rows from its first point. The center's depth is the origin of depths. */
 struct psr_place {
-	double col, row; /* of its first lattice point, in those of level 0: multiples of 2^l, and of twice that */
-	double z;        /* depth of the center, in inner units, */
-	float step;      /* and what a step of `depth` is, a power of two */
+	double col, row; /* the first lattice point in those of level 0: multiples of 2^l, and of twice that */
+	double z;        /* the center's depth, in inner units */
+	float step;      /* a step of `depth` in inner units, a power of two */
 };
 
-/* Columns, rows and depth of what is 2^-14 long along x, y and z: what places of one projection are found by. */
+/* Columns, rows and depth for a length of 2^-14 along x, y and z. They turn a sphere into its place in one
+ * projection. */
 struct psr_placing {
 	double of[3][3];
 };
@@ -148,11 +150,12 @@ static inline void psr_placing_make(struct psr_placing *placing, const struct ps
 			placing->of[i][k] = (double)projection->axis[i][k] * length[i] * (1.0 / 16384);
 }
 
-/* The place of a block of that projection. */
+/* Computes the place of a block of that projection. */
 static inline void psr_placing_find(const struct psr_placing *placing, const struct psr_blocks *blocks, uint32_t block,
                                     struct psr_place *place)
 {
 	const double x = blocks->sphere_x[block], y = blocks->sphere_y[block], z = blocks->sphere_z[block];
+
 	const double (*of)[3] = placing->of;
 	const unsigned flags = blocks->flags[block], level = flags & PSR_BLOCK_LEVEL;
 	const double scale = (double)(1u << level), whole = 0x1.8p52 * scale; /* next to this, doubles are 2^level apart */
@@ -171,19 +174,19 @@ static inline void psr_blocks_place(const struct psr_blocks *blocks, uint32_t bl
 	psr_placing_find(&placing, blocks, block, place);
 }
 
-/* Along the projection's z, in inner units. */
+/* Returns a sample's depth along the projection's z, in inner units. */
 static inline float psr_place_depth(const struct psr_place *place, uint16_t depth)
 {
 	return (float)(place->z + (double)place->step * (depth - 32768));
 }
 
 /* A spatial cluster at one level: blocks first_block .. first_block + n_blocks - 1. Clusters of one `group` are the
- * same piece of the object at different levels; exactly one of them is drawn. */
+ * same piece of the object at different levels; a frame draws exactly one of them. */
 struct psr_cluster {
 	float center[3], radius; /* holds its blocks' spheres */
 	uint32_t first_block, n_blocks;
-	uint32_t group; /* < n_clusters; no two clusters of a group are of one level */
-	uint8_t level, zero[3]; /* that of its blocks */
+	uint32_t group; /* < n_clusters; the clusters of a group have different levels */
+	uint8_t level, zero[3]; /* level: that of its blocks */
 };
 
 /* Attributes of a sample, one word ([G] table 5.1):
@@ -198,15 +201,15 @@ struct psr_cluster {
 #define PSR_ATTR_SPECULAR(a) ((uint32_t)((a) >> 40 & 0xffff))
 #define PSR_ATTR_EXPONENT(a) ((uint32_t)((a) >> 56))
 
-/* psr_model_read() of bytes in memory, which are copied: for tests and fuzzers. */
+/* psr_model_read() from bytes in memory, which it copies: for tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);
 
-/* Makes a model from arrays of the caller's, which are copied and validated like a file's; presets may be NULL. ARG for
- * missing arrays, LIMIT for counts, FORMAT for values that break a rule, MEMORY. */
+/* Makes a model from the caller's arrays. Copies and validates them like a file's; presets may be NULL. ARG for missing
+ * arrays, LIMIT for counts, FORMAT for values that break a rule, MEMORY. */
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                      const struct psr_presets *presets, struct psr_error *err);
 
-/* NULL if the model has no such representation. */
+/* Returns NULL if the model has no such representation. */
 const struct psr_blocks *psr_model_blocks(const struct psr_model *model);
 
 #endif

@@ -92,7 +92,7 @@ static inline uint64_t file_align(uint64_t offset)
 	return (offset + FILE_ALIGNMENT - 1) / FILE_ALIGNMENT * FILE_ALIGNMENT;
 }
 
-/* The number of chunk hashes after the table for a section of this length: one a chunk, none for a single chunk. */
+/* Returns how many chunk hashes follow the table for a section of this length: one a chunk, none for a single chunk. */
 static inline uint64_t file_chunks(uint64_t length)
 {
 	return length > FILE_CHUNK_BYTES ? (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES : 0;
@@ -105,7 +105,7 @@ struct content {
 	struct psr_presets presets;
 };
 
-/* The number of items of a known section in this model; section_array() is for sections from SECTION_FIRST_ARRAY on. */
+/* The number of items of a known section in this model. section_array() is for sections from SECTION_FIRST_ARRAY on. */
 uint64_t section_items(const struct section_spec *spec, const struct content *content);
 const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
 
@@ -120,7 +120,8 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes);
  * tests can seal any bytes. */
 void file_seal(uint8_t *bytes, size_t n_bytes);
 
-/* The hash of an entry: of the section, or of the list of its chunks' hashes (at `chunks`, already computed). */
+/* Computes the hash of an entry: of the section, or of the list of its chunks' hashes (at `chunks`, already
+ * computed). */
 uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_t *chunks);
 uint64_t file_header_hash(const uint8_t *bytes, uint64_t table_end);
 void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
@@ -138,11 +139,11 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 /* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
 
-/* Copies with zeros after names, in padding and in unused fields, as in files. */
+/* Copy presets, with zeros after names, in padding and in unused fields, as in files. */
 void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);
 void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_light *from, uint32_t n);
 
-/* The image of a model, for the writer. */
+/* Returns the image of a model, for the writer. */
 const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes);
 
 #endif

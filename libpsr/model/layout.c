@@ -45,6 +45,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
 {
 	const struct psr_blocks *blocks = &content->blocks;
+
 	switch (spec->count) {
 	case COUNT_CAMERAS:
 		return content->presets.n_cameras;
@@ -78,6 +79,7 @@ const void *section_array(const struct section_spec *spec, const struct psr_bloc
 uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_t *chunks)
 {
 	uint64_t n_chunks = file_chunks(length);
+
 	return n_chunks == 0 ? XXH64(section, length, 0) : XXH64(chunks, 8 * n_chunks, 0);
 }
 
@@ -90,9 +92,11 @@ void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16])
 {
 	uint8_t list[FILE_MAX_SECTIONS * 24];
 	XXH128_hash_t hash;
+
 	assert(n_sections <= FILE_MAX_SECTIONS);
 	for (uint32_t i = 0; i < n_sections; i++) {
 		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+
 		memcpy(list + 24 * i, entry + ENTRY_TYPE, 6);
 		file_put(list + 24 * i + 6, 2, 0);
 		memcpy(list + 24 * i + 8, entry + ENTRY_LENGTH, 16);
@@ -105,8 +109,10 @@ void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16])
 static void hash_chunks(const uint8_t *section, uint64_t length, uint8_t *chunks)
 {
 	uint64_t n_chunks = file_chunks(length);
+
 	for (uint64_t i = 0; i < n_chunks; i++) {
 		uint64_t first = i * FILE_CHUNK_BYTES, left = length - first;
+
 		file_put(chunks + 8 * i, 8, XXH64(section + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0));
 	}
 }
@@ -114,6 +120,7 @@ static void hash_chunks(const uint8_t *section, uint64_t length, uint8_t *chunks
 void file_seal(uint8_t *bytes, size_t n_bytes)
 {
 	uint64_t n_sections, n_chunks, table_end, chunks_at;
+
 	if (n_bytes < FILE_HEADER_BYTES)
 		return;
 	n_sections = file_get(bytes + HEADER_N_SECTIONS, 4);
@@ -125,6 +132,7 @@ void file_seal(uint8_t *bytes, size_t n_bytes)
 	for (uint64_t i = 0; i < n_sections; i++) {
 		uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
 		if (offset < table_end || offset > n_bytes || length > n_bytes - offset
 		    || file_chunks(length) > (table_end - chunks_at) / 8)
 			continue;
@@ -212,9 +220,11 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 {
 	uint64_t n_sections = 0, n_chunks = 0, at = 0;
 	uint8_t *bytes = NULL, *entry;
+
 	/* Once to add the sizes up, once to write. */
 	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
 		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], content);
+
 		if (is_present(i, content)) {
 			n_sections++;
 			n_chunks += file_chunks(length);
@@ -235,6 +245,7 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 	entry = bytes + FILE_HEADER_BYTES;
 	for (int i = 0; i < N_KNOWN_SECTIONS; i++) {
 		uint64_t length = section_table[i].item_bytes * section_items(&section_table[i], content);
+
 		if (!is_present(i, content))
 			continue;
 		memcpy(entry + ENTRY_TYPE, section_table[i].type, 4);

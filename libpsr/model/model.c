@@ -36,6 +36,7 @@ static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, i
 {
 	struct psr_model *model = calloc(1, sizeof *model);
 	int code;
+
 	if (model == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
@@ -56,6 +57,7 @@ static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, i
 static const char *short_name(const char *path)
 {
 	size_t length = strlen(path);
+
 	return length > MAX_NAME ? path + length - MAX_NAME : path;
 }
 
@@ -71,6 +73,7 @@ static int adopt_packed(struct psr_model **out, const struct pack_source *source
 	uint8_t *image = NULL;
 	size_t n_image = 0;
 	int code = pack_open(&image, &n_image, source, err);
+
 	if (code == PSR_OK)
 		code = adopt(out, image, n_image, 0, source->name, err);
 	if (code == PSR_OK) {
@@ -87,6 +90,7 @@ static int open_file(struct found *found, const char *path, const char *name, st
 	struct stat st;
 	ssize_t got;
 	int code, *fd = &found->fd;
+
 	/* O_NONBLOCK: opening a pipe without a writer would wait for one. */
 	*fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
 	if (*fd < 0)
@@ -116,8 +120,10 @@ static int open_file(struct found *found, const char *path, const char *name, st
 static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, struct psr_error *err)
 {
 	size_t at = 0;
+
 	while (at < n_bytes) {
 		ssize_t got = read(fd, bytes + at, n_bytes - at);
+
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got < 0)
@@ -142,6 +148,7 @@ static int read_image(const uint8_t **out, int fd, size_t n_bytes, const char *n
 {
 	uint8_t *bytes = psr_alloc_huge(n_bytes);
 	int code;
+
 	if (bytes == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a model of %zu bytes", name, n_bytes);
 	code = read_all(fd, bytes, n_bytes, name, err);
@@ -159,6 +166,7 @@ static int open_model(struct psr_model **out, const char *path, int mapped, stru
 	const uint8_t *bytes = NULL;
 	struct found f;
 	int code = open_file(&f, path, name, err);
+
 	if (code != PSR_OK)
 		return code;
 	if (f.is_packed)
@@ -179,6 +187,7 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 	const char *name = short_name(path);
 	struct found f;
 	int code = open_file(&f, path, name, err);
+
 	if (code != PSR_OK)
 		return code;
 	close(f.fd);
@@ -202,6 +211,7 @@ int psr_model_read(struct psr_model **out, const char *path, struct psr_error *e
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)
 {
 	uint8_t *copy;
+
 	if (n_bytes == 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "the model has no bytes");
 	if (n_bytes >= FILE_HEADER_BYTES && file_check_header(bytes, "the model", NULL) == PSR_OK && pack_is_packed(bytes))
@@ -218,6 +228,7 @@ static int check_arguments(const struct psr_model_info *info, const struct psr_b
                            const struct psr_presets *presets, struct psr_error *err)
 {
 	int n_cones;
+
 	if (info == NULL || blocks == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "a model needs info and blocks; one is NULL");
 	if (memchr(info->builder, 0, sizeof info->builder) == NULL)
@@ -258,6 +269,7 @@ int psr_model_create(struct psr_model **out, const struct psr_model_info *info, 
 	uint64_t n_bytes;
 	uint8_t *bytes;
 	int code = check_arguments(info, blocks, presets, err);
+
 	if (code != PSR_OK)
 		return code;
 	content = (struct content){ .info = *info, .blocks = *blocks };

@@ -8,6 +8,7 @@
 static uint64_t get_word(const uint8_t *at, uint32_t stride)
 {
 	uint64_t word = 0;
+
 	memcpy(&word, at, stride);
 	return word;
 }
@@ -16,8 +17,10 @@ void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t str
 {
 	size_t n_words = n_bytes / stride;
 	uint64_t before = 0;
+
 	for (size_t i = 0; i < n_words; i++) {
 		uint64_t word = get_word(chunk + i * stride, stride), value = word;
+
 		if (method == PACK_DIFFERENCES)
 			value = word - before;
 		else if (method == PACK_XOR)
@@ -33,8 +36,10 @@ void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t strid
 {
 	size_t n_words = n_bytes / stride;
 	uint64_t before = 0;
+
 	for (size_t i = 0; i < n_words; i++) {
 		uint64_t word = 0;
+
 		for (uint32_t k = 0; k < stride; k++)
 			word |= (uint64_t)in[k * n_words + i] << 8 * k;
 		if (method == PACK_DIFFERENCES)
@@ -52,6 +57,7 @@ static uint32_t stride_of(const uint8_t *type)
 {
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		uint32_t item = section_table[k].item_bytes;
+
 		if (memcmp(type, section_table[k].type, 4) == 0)
 			return pack_is_stride(item) ? item : section_table[k].count == COUNT_MASKS ? 8 : 4;
 	}
@@ -70,10 +76,12 @@ static uint32_t pack_chunk(const struct packer *p, uint8_t *out, uint8_t *entry,
 {
 	enum pack_method best = PACK_STORED;
 	size_t length = n;
+
 	memcpy(out, chunk, n);
 	for (enum pack_method method = PACK_PLAIN; method < PACK_N_METHODS; method++) {
 		const uint8_t *bytes = chunk;
 		size_t got;
+
 		if (method == PACK_PLANES && stride == 1)
 			continue;
 		if (method != PACK_PLAIN) {
@@ -114,6 +122,7 @@ static void packer_fini(struct packer *p)
 static uint64_t directory_end(const uint8_t *image, uint64_t *directory)
 {
 	uint64_t n_chunks = 0, n_sections = file_get(image + HEADER_N_SECTIONS, 4);
+
 	*directory = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(image + HEADER_N_CHUNKS, 4);
 	for (uint64_t i = 0; i < n_sections; i++)
 		n_chunks += pack_chunks(file_get(image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8));
@@ -125,11 +134,14 @@ static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8
 {
 	uint64_t directory, at = directory_end(image, &directory), n = 0;
 	uint8_t *next = out + directory;
+
 	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++) {
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+
 			if (n < n_packed) {
 				at += pack_chunk(p, out + at, next, image + offset + first, size, stride_of(entry + ENTRY_TYPE));
 			} else {
@@ -153,6 +165,7 @@ int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *
 	uint64_t directory, end = directory_end(image, &directory), n_packed = (end - directory) / PACK_ENTRY_BYTES;
 	uint64_t size;
 	uint8_t *bytes;
+
 	*capacity = n_image + (end - directory);
 	bytes = psr_alloc_huge(*capacity);
 	if (bytes == NULL || packer_init(&packer) != PSR_OK) {

@@ -16,6 +16,7 @@ void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_ca
 	for (uint32_t i = 0; i < n; i++) {
 		const struct psr_camera *c = &from[i].camera;
 		struct psr_camera *k = &to[i].camera;
+
 		memset(&to[i], 0, sizeof to[i]);
 		put_name(to[i].name, from[i].name);
 		memcpy(k->eye, c->eye, sizeof k->eye);
@@ -34,6 +35,7 @@ void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_ligh
 		const struct psr_light *l = &from[i].light;
 		struct psr_light *k = &to[i].light;
 		int is_placed = l->kind != PSR_LIGHT_DIRECTIONAL, is_spot = l->kind == PSR_LIGHT_SPOT;
+
 		memset(&to[i], 0, sizeof to[i]);
 		put_name(to[i].name, from[i].name);
 		k->kind = l->kind;
@@ -54,6 +56,7 @@ static size_t character_bytes(const uint8_t *s, size_t n)
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
 	size_t length = s[0] < 0x80 ? 1 : s[0] >> 5 == 6 ? 2 : s[0] >> 4 == 14 ? 3 : s[0] >> 3 == 30 ? 4 : 0;
 	uint32_t code = length == 1 ? s[0] : s[0] & (0x7fu >> length);
+
 	if (length == 0 || length > n)
 		return 0;
 	for (size_t i = 1; i < length; i++) {
@@ -70,6 +73,7 @@ static size_t character_bytes(const uint8_t *s, size_t n)
 static int check_name(const char name[PSR_NAME_BYTES], const char *what, uint32_t number, struct psr_error *err)
 {
 	size_t length = strnlen(name, PSR_NAME_BYTES);
+
 	if (length == 0 || length == PSR_NAME_BYTES)
 		return psr_fail(err, PSR_ERR_FORMAT, "the name of %s %" PRIu32 " %s", what, number,
 		                length == 0 ? "is empty" : "has no end");
@@ -98,6 +102,7 @@ static int check_cameras(const struct psr_presets *p, struct psr_error *err)
 		struct psr_preset_camera clean;
 		struct psr_error what = { 0 };
 		int code = check_name(p->camera[i].name, "camera", i, err);
+
 		if (code != PSR_OK)
 			return code;
 		if (view_check_camera(&p->camera[i].camera, &what) != PSR_OK)
@@ -115,6 +120,7 @@ static int check_lights(const struct psr_presets *p, struct psr_error *err)
 		struct psr_preset_light clean;
 		struct psr_error what = { 0 };
 		int code = check_name(p->light[i].name, "light", i, err);
+
 		if (code != PSR_OK)
 			return code;
 		if (view_check_light(&p->light[i].light, &what) != PSR_OK)
@@ -129,6 +135,7 @@ static int check_lights(const struct psr_presets *p, struct psr_error *err)
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err)
 {
 	int code;
+
 	*section = "CAMS";
 	code = check_cameras(presets, err);
 	if (code != PSR_OK)

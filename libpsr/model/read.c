@@ -1,6 +1,5 @@
 #include <assert.h>
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <xxhash.h>
 #include "file.h"
@@ -15,17 +14,7 @@ struct reader {
 	int entry[N_KNOWN_SECTIONS]; /* index in the file's table, -1 if absent */
 };
 
-static int bad(const struct reader *r, const char *format, ...) __attribute__((format(printf, 2, 3)));
-
-static int bad(const struct reader *r, const char *format, ...)
-{
-	char what[256];
-	va_list args;
-	va_start(args, format);
-	vsnprintf(what, sizeof what, format, args);
-	va_end(args);
-	return psr_fail(r->err, PSR_ERR_FORMAT, "%s: %s", r->name, what);
-}
+#define bad(r, format, ...) psr_fail((r)->err, PSR_ERR_FORMAT, "%s: " format, (r)->name, ##__VA_ARGS__)
 
 struct section {
 	char type[5]; /* printable */
@@ -45,6 +34,7 @@ static struct section get_section(const struct reader *r, uint32_t index)
 		.length = file_get(entry + ENTRY_LENGTH, 8),
 		.hash = file_get(entry + ENTRY_HASH, 8),
 	};
+
 	for (int i = 0; i < 4; i++)
 		s.type[i] = entry[ENTRY_TYPE + i] > ' ' && entry[ENTRY_TYPE + i] < 127 ? (char)entry[ENTRY_TYPE + i] : '?';
 	return s;
@@ -53,6 +43,7 @@ static struct section get_section(const struct reader *r, uint32_t index)
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err)
 {
 	uint64_t major = file_get(header + HEADER_MAJOR, 2), minor = file_get(header + HEADER_MINOR, 2);
+
 	if (memcmp(header, FILE_MAGIC, 8) != 0)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: not a .psr file: it begins otherwise", name);
 	if (major != FILE_MAJOR)
@@ -66,6 +57,7 @@ static int check_table(struct reader *r)
 {
 	const uint8_t *header = r->bytes;
 	uint64_t n_sections, n_chunks;
+
 	n_sections = file_get(header + HEADER_N_SECTIONS, 4);
 	n_chunks = file_get(header + HEADER_N_CHUNKS, 4);
 	r->file_size = file_get(header + HEADER_FILE_SIZE, 8);
@@ -97,6 +89,7 @@ static int check_places(const struct reader *r)
 	uint64_t at = file_align(r->table_end), n_chunks = 0;
 	uint64_t n_listed = (r->table_end - FILE_HEADER_BYTES - FILE_ENTRY_BYTES * r->n_sections) / 8;
 	struct section s = { .type = "none" };
+
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		s = get_section(r, i);
 		if (s.offset != at)
@@ -137,11 +130,14 @@ static int check_hashes(const struct reader *r)
 {
 	const uint8_t *chunks = r->bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * r->n_sections;
 	uint8_t id[16];
+
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		struct section s = get_section(r, i);
 		uint64_t n_chunks = file_chunks(s.length);
+
 		for (uint64_t k = 0; k < n_chunks; k++) {
 			uint64_t first = k * FILE_CHUNK_BYTES, left = s.length - first;
+
 			if (XXH64(r->bytes + s.offset + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0)
 			    != file_get(chunks + 8 * k, 8))
 				return bad(r, "section %s at byte %" PRIu64 " is damaged: the hash of its chunk %" PRIu64 " differs",
@@ -153,7 +149,7 @@ static int check_hashes(const struct reader *r)
 	}
 	file_content_id(r->bytes, r->n_sections, id);
 	if (memcmp(id, r->bytes + HEADER_CONTENT_ID, sizeof id) != 0)
-		return bad(r, "the content id in the header is not that of the sections");
+		return bad(r, "the content id in the header does not match the sections");
 	return PSR_OK;
 }
 
@@ -173,6 +169,7 @@ static int sort_sections(struct reader *r)
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		struct section s = get_section(r, i);
 		int known = known_index(s.raw_type);
+
 		for (uint32_t k = 0; k < i; k++)
 			if (memcmp(get_section(r, k).raw_type, s.raw_type, 4) == 0)
 				return bad(r, "there are two sections %s, at bytes %" PRIu64 " and %" PRIu64, s.type,
@@ -196,6 +193,7 @@ static int sort_sections(struct reader *r)
 static int check_length(const struct reader *r, int known, uint64_t expected)
 {
 	struct section s = get_section(r, (uint32_t)r->entry[known]);
+
 	if (s.length != expected)
 		return bad(r, "section %s at byte %" PRIu64 " has %" PRIu64 " bytes and should have %" PRIu64, s.type, s.offset,
 		           s.length, expected);
@@ -206,6 +204,7 @@ static int get_info(const struct reader *r, struct psr_model_info *info)
 {
 	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_INFO]).offset;
 	int code = check_length(r, SECTION_INFO, INFO_BYTES);
+
 	if (code != PSR_OK)
 		return code;
 	for (int k = 0; k < 3; k++) {
@@ -231,6 +230,7 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 {
 	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_BLOCKS]).offset;
 	int code = check_length(r, SECTION_BLOCKS, BLOCKS_BYTES);
+
 	if (code != PSR_OK)
 		return code;
 	file_get_counts(blocks, at);
@@ -248,6 +248,7 @@ static int get_presets(const struct reader *r, int known, uint32_t *n, const voi
 {
 	struct section s;
 	uint32_t item_bytes = section_table[known].item_bytes;
+
 	*n = 0;
 	*array = NULL;
 	if (r->entry[known] < 0)
@@ -264,8 +265,10 @@ static int get_presets(const struct reader *r, int known, uint32_t *n, const voi
 static int get_arrays(const struct reader *r, struct content *content)
 {
 	struct psr_blocks *blocks = &content->blocks;
+
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
+
 		const void *array;
 		int code;
 		if (r->entry[k] < 0)

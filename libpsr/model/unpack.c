@@ -1,6 +1,5 @@
 #include <errno.h>
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <unistd.h>
 #include <xxhash.h>
@@ -20,17 +19,7 @@ struct unpacker {
 	uint8_t *packed, *split; /* a chunk each */
 };
 
-static int bad(const struct unpacker *u, const char *format, ...) __attribute__((format(printf, 2, 3)));
-
-static int bad(const struct unpacker *u, const char *format, ...)
-{
-	char what[256];
-	va_list args;
-	va_start(args, format);
-	vsnprintf(what, sizeof what, format, args);
-	va_end(args);
-	return psr_fail(u->err, PSR_ERR_FORMAT, "%s: %s", u->source->name, what);
-}
+#define bad(u, format, ...) psr_fail((u)->err, PSR_ERR_FORMAT, "%s: " format, (u)->source->name, ##__VA_ARGS__)
 
 int pack_is_packed(const uint8_t *header)
 {
@@ -40,6 +29,7 @@ int pack_is_packed(const uint8_t *header)
 static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 {
 	const struct pack_source *s = u->source;
+
 	if (at > s->n_bytes || n > s->n_bytes - at)
 		return bad(u,
 		           "the file ends at byte %" PRIu64 ", and bytes %" PRIu64 " to %" PRIu64 " are needed; it was cut short",
@@ -50,6 +40,7 @@ static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 	}
 	for (uint64_t done = 0; done < n;) {
 		ssize_t got = pread(s->fd, to + done, n - done, (off_t)(at + done));
+
 		if (got < 0 && errno == EINTR)
 			continue;
 		if (got < 0)
@@ -72,6 +63,7 @@ static int read_head(struct unpacker *u)
 {
 	uint64_t n_chunks = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
 	int code;
+
 	if (packing != PACKING_ZSTD)
 		return psr_fail(u->err, PSR_ERR_VERSION,
 		                "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
@@ -100,6 +92,7 @@ static int read_head(struct unpacker *u)
 	code = fetch(u, u->head, 0, u->table_end);
 	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
 		uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
+
 		if (length > u->n_image)
 			return bad(u, "section %" PRIu32 " has %" PRIu64 " of %" PRIu64 " bytes", i, length, u->n_image);
 		n_chunks += pack_chunks(length);
@@ -127,15 +120,18 @@ static int check_head(const struct unpacker *u)
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t image_at = file_align(u->table_end), file_at = u->head_end, n = 0;
+
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = entry_at(u, i);
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
 		if (offset != image_at)
 			return bad(u, "section %" PRIu32 " begins at byte %" PRIu64 " instead of %" PRIu64, i, offset, image_at);
 		image_at = file_align(image_at + length);
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint64_t packed = file_get(next + PACK_LENGTH, 4);
+
 			if (next[PACK_METHOD] >= PACK_N_METHODS || !pack_is_stride(next[PACK_STRIDE])
 			    || file_get(next + 6, 2) != 0)
 				return bad(u, "chunk %" PRIu64 " is packed by method %d in words of %d bytes, which is unknown", n,
@@ -160,6 +156,7 @@ static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, co
 	enum pack_method method = entry[PACK_METHOD];
 	size_t got;
 	int code = fetch(u, u->packed, at, packed);
+
 	if (code != PSR_OK)
 		return code;
 	if (XXH64(u->packed, packed, 0) != file_get(entry + PACK_HASH, 8))
@@ -187,13 +184,16 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t block
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t at = u->head_end, n = 0;
+
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = entry_at(u, i);
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint8_t *to = image != NULL ? image + offset + first : is_blocks(entry) ? blocks : NULL;
 			int code = to != NULL ? unpack_chunk(u, to, size, next, at, n) : PSR_OK;
+
 			if (code != PSR_OK)
 				return code;
 			at += file_get(next + PACK_LENGTH, 4);
@@ -210,6 +210,7 @@ static int check_lengths(const struct unpacker *u)
 	struct content content = { .blocks = { 0 } };
 	uint32_t n_found = 0;
 	int code;
+
 	for (uint32_t i = 0; i < u->n_sections; i++)
 		n_found += (uint32_t)is_blocks(entry_at(u, i));
 	if (n_found == 0)
@@ -225,6 +226,7 @@ static int check_lengths(const struct unpacker *u)
 		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 			const struct section_spec *spec = &section_table[k];
 			uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
+
 			if (memcmp(entry_at(u, i), spec->type, 4) == 0
 			    && file_get(entry_at(u, i) + ENTRY_VERSION, 2) == spec->version
 			    && length != spec->item_bytes * section_items(spec, &content))
@@ -239,6 +241,7 @@ static int make_image(struct unpacker *u, uint8_t **out)
 {
 	uint8_t *image = psr_alloc_huge(u->n_image);
 	int code;
+
 	if (image == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a model of %" PRIu64 " bytes", u->source->name,
 		                u->n_image);
@@ -259,6 +262,7 @@ int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source
 {
 	struct unpacker u = { .source = source, .err = err };
 	int code = fetch(&u, u.header, 0, FILE_HEADER_BYTES);
+
 	if (code == PSR_OK)
 		code = read_head(&u);
 	if (code == PSR_OK)
@@ -286,11 +290,13 @@ int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source
 void pack_seal(uint8_t *bytes, size_t n_bytes)
 {
 	uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), n_chunks = 0, at, head_end, table_end;
+
 	table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4);
 	if (n_sections > FILE_MAX_SECTIONS || table_end > n_bytes)
 		return;
 	for (uint64_t i = 0; i < n_sections; i++) {
 		uint64_t length = file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8);
+
 		n_chunks += length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
 	}
 	if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
@@ -299,6 +305,7 @@ void pack_seal(uint8_t *bytes, size_t n_bytes)
 	for (uint64_t i = 0; i < n_chunks; i++) {
 		uint8_t *entry = bytes + table_end + PACK_ENTRY_BYTES * i;
 		uint64_t length = file_get(entry + PACK_LENGTH, 4);
+
 		if (length > n_bytes - at)
 			break;
 		file_put(entry + PACK_HASH, 8, XXH64(bytes + at, length, 0));

@@ -1,7 +1,5 @@
 #include <inttypes.h>
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include "base/mem.h"
 #include "base/vec.h"
@@ -19,18 +17,8 @@ struct checker {
 	struct psr_error *err;
 };
 
-static int fail(const struct checker *c, const char *section, const char *format, ...)
-	__attribute__((format(printf, 3, 4)));
-
-static int fail(const struct checker *c, const char *section, const char *format, ...)
-{
-	char what[256];
-	va_list args;
-	va_start(args, format);
-	vsnprintf(what, sizeof what, format, args);
-	va_end(args);
-	return psr_fail(c->err, PSR_ERR_FORMAT, "%s: section %s: %s", c->name, section, what);
-}
+#define fail(c, section, format, ...) \
+	psr_fail((c)->err, PSR_ERR_FORMAT, "%s: section %s: " format, (c)->name, section, ##__VA_ARGS__)
 
 /* Returns 0 for NaN, too. */
 static int is_length(float v)
@@ -52,6 +40,7 @@ static int check_info(const struct checker *c)
 {
 	const struct psr_model_info *info = c->info;
 	size_t length = strnlen(info->builder, sizeof info->builder);
+
 	for (int k = 0; k < 3; k++) {
 		if (!isfinite(info->origin[k]))
 			return fail(c, "INFO", "the origin is not finite");
@@ -80,6 +69,7 @@ static int check_info(const struct checker *c)
 static int check_counts(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
+
 	if (b->n_blocks == 0 || b->n_blocks > MODEL_MAX_BLOCKS)
 		return fail(c, "BLKS", "%" PRIu32 " blocks; it must be 1 to %" PRIu32, b->n_blocks, MODEL_MAX_BLOCKS);
 	if (b->n_projections == 0 || b->n_projections > MODEL_MAX_PROJECTIONS)
@@ -99,6 +89,7 @@ static int check_projections(const struct checker *c)
 	for (uint32_t i = 0; i < c->blocks->n_projections; i++) {
 		const struct psr_projection *p = &c->blocks->projection[i];
 		float z[3];
+
 		/* Not (... <= ...), so that NaN fails as well. */
 		for (int k = 0; k < 3; k++)
 			if (!is_unit(p->axis[k]) || !(fabsf(v3f_dot(p->axis[k], p->axis[(k + 1) % 3])) <= UNIT_TOLERANCE))
@@ -117,6 +108,7 @@ static int check_cluster(const struct checker *c, uint32_t i, uint64_t next_bloc
 {
 	const struct psr_blocks *b = c->blocks;
 	const struct psr_cluster *k = &b->cluster[i];
+
 	if (k->first_block != next_block || k->n_blocks == 0 || k->n_blocks > b->n_blocks - next_block)
 		return fail(c, "CLUS", "cluster %" PRIu32 " has %" PRIu32 " blocks from %" PRIu32 " on; the next free one is %"
 		            PRIu64 " of %" PRIu32, i, k->n_blocks, k->first_block, next_block, b->n_blocks);
@@ -144,12 +136,14 @@ static int check_clusters(const struct checker *c)
 	uint64_t next_block = 0;
 	uint32_t *levels_of_group;
 	int code = PSR_OK;
+
 	levels_of_group = psr_alloc_array(b->n_clusters, sizeof *levels_of_group);
 	if (levels_of_group == NULL)
 		return psr_fail(c->err, PSR_ERR_MEMORY, "%s: no memory to check %" PRIu32 " clusters", c->name, b->n_clusters);
 	memset(levels_of_group, 0, b->n_clusters * sizeof *levels_of_group);
 	for (uint32_t i = 0; i < b->n_clusters && code == PSR_OK; i++) {
 		const struct psr_cluster *k = &b->cluster[i];
+
 		code = check_cluster(c, i, next_block);
 		if (code != PSR_OK)
 			break;
@@ -169,6 +163,7 @@ static int check_heads(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
 	uint64_t n_samples = 0;
+
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		if (b->block_projection[i] >= b->n_projections)
 			return fail(c, "BPRJ", "block %" PRIu32 " is of projection %d of %" PRIu32, i, b->block_projection[i],
@@ -191,6 +186,7 @@ static int check_heads(const struct checker *c)
 static int check_visibility(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
+
 	for (uint32_t i = 0; i < psr_blocks_runs(b); i++)
 		if (b->run[i].visibility_first > b->n_masks)
 			return fail(c, "RUNS", "the visibility masks of run %" PRIu32 " begin at %" PRIu32 " of %" PRIu32, i,
@@ -205,11 +201,13 @@ static int check_visibility(const struct checker *c)
 static int check_cones(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
+
 	if (b->cone_x == NULL)
 		return PSR_OK;
 	for (uint32_t i = 0; i < b->n_blocks; i++) {
 		const int axis[3] = { abs(b->cone_x[i]), abs(b->cone_y[i]), abs(b->cone_z[i]) };
 		int greatest = axis[0] > axis[1] ? axis[0] : axis[1];
+
 		greatest = axis[2] > greatest ? axis[2] : greatest;
 		if (greatest != 127)
 			return fail(c, "CONX, CONY, CONZ",
@@ -222,9 +220,10 @@ static int check_cones(const struct checker *c)
 static int check_traits(const struct checker *c)
 {
 	const struct psr_blocks *b = c->blocks;
+
 	for (uint32_t i = 0; b->traits != NULL && i < b->n_blocks; i++)
 		if ((b->traits[i] & ~(PSR_BLOCK_BENT | PSR_BLOCK_SHEER)) != 0)
-			return fail(c, "TRTS", "block %" PRIu32 " has traits %d, of which some are unknown", i, b->traits[i]);
+			return fail(c, "TRTS", "block %" PRIu32 " has unknown traits %d", i, b->traits[i]);
 	return PSR_OK;
 }
 
@@ -232,6 +231,7 @@ static int check_presets(const struct checker *c)
 {
 	struct psr_error err = { 0 };
 	const char *section = NULL;
+
 	return presets_validate(c->presets, &section, &err) == PSR_OK ? PSR_OK : fail(c, section, "%s", err.text);
 }
 

@@ -7,6 +7,7 @@ int psr_model_write(const struct psr_model *model, const char *path, struct psr_
 {
 	size_t n_bytes;
 	const uint8_t *bytes = model_image(model, &n_bytes);
+
 	return outfile_save(path, OUTFILE_DURABLE, bytes, n_bytes, err);
 }
 
@@ -18,6 +19,7 @@ int psr_model_write_packed(const struct psr_model *model, const char *path, stru
 	struct outfile file;
 	uint8_t *bytes;
 	int code = outfile_open(&file, path, OUTFILE_DURABLE, err);
+
 	if (code != PSR_OK)
 		return code;
 	code = pack_image(&bytes, &n_bytes, &capacity, image, n_image, err);

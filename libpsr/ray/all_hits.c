@@ -5,7 +5,7 @@
 #define MOST_RAW (2 * RAY_MOST_HITS)
 #define SAME_HIT 0x1p-20
 
-/* The nearest hits of a ray, by distance and then by primitive: whatever order the tree finds them in. */
+/* Keeps the nearest hits of a ray, by distance and then by primitive, in whichever order the tree finds them. */
 struct ray_list {
 	int n;
 	struct ray_hit hit[MOST_RAW];
@@ -31,7 +31,8 @@ static int insert(struct ray_hit *sorted, int n, int most, const struct ray_hit 
 	return n;
 }
 
-/* Of rays from both ends, a face stops at least one. */
+/* Whether the surface is absent at a hit. Of rays from both ends a face stops at least one, so its side does not count
+ * then. */
 static int is_absent(const struct ray_packet *packet, const struct ray_hit *hit)
 {
 	struct ray_hit front = *hit;
@@ -81,7 +82,7 @@ static double merge_distance(const struct ray_scene *scene, uint32_t a, uint32_t
 static int merge(const struct ray_scene *scene, const struct ray *ray, const struct ray_list *list, int most,
                  struct ray_hit *out)
 {
-	struct ray_hit group[2]; /* the latest of each side; it began at `first` */
+	struct ray_hit group[2]; /* the latest of each side; the group began at `first` */
 	double first[2], length = v3d_length(ray->direction);
 	int is_open[2] = { 0, 0 }, n = 0;
 
@@ -141,7 +142,7 @@ void ray_scene_trace_all(const struct ray_scene *scene, const struct ray *ray, i
 	}
 }
 
-/* The hits that stop rays from one end, of those from both; from the other end, backwards. */
+/* Takes from the hits of rays from both ends those that stop rays from one; from the other end, backwards. */
 static void choose_end(const struct ray_scene *scene, const struct ray_list *both, int is_other, double length,
                        struct ray_list *list)
 {

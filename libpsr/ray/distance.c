@@ -4,7 +4,7 @@
 #include "tree.h"
 #include "triangle.h"
 
-/* Embree has point queries of a user's geometry, given its boxes, and none of discs. */
+/* Embree can query points against a user's geometry, given its boxes, but not against discs. */
 static void bound_disc(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct ray_scene *scene = args->geometryUserPtr;
@@ -75,7 +75,7 @@ static bool visit_nearest(struct RTCPointQueryFunctionArguments *args)
 	if (!(distance2 < nearest->distance2))
 		return false;
 	nearest->distance2 = distance2;
-	/* A little more, so that rounding does not lose an equally near one. */
+	/* A little more, so that rounding loses no primitive that is as near. */
 	args->query->radius = (float)(sqrt(distance2) * (1 + 0x1p-20) + 0x1p-20);
 	return true;
 }

@@ -4,7 +4,7 @@
 #include "surface/texture.h"
 #include "tree.h"
 
-#define LEAST_OPACITY (0.5f / 255) /* less is nothing in a model */
+#define LEAST_OPACITY (0.5f / 255) /* less counts as nothing in a model */
 
 /* Where a ray meets the triangle that the tree found: in its plane, clamped to it, as the tree rounds edges outwards.
  * An edge-on triangle keeps the tree's u and v. */
@@ -98,7 +98,7 @@ static int is_open(const struct ray_scene *scene, uint32_t prim, double u, doubl
 	return stipple_is_open(opacity, p, scene->cell);
 }
 
-/* Opacity of a place that is seen through in proportion; else 1, or 0 where nothing is. */
+/* Returns the opacity of a place that lets light through in proportion; else 1, or 0 where the surface is absent. */
 static float opacity_of(const struct ray_scene *scene, uint32_t prim, double u, double v)
 {
 	const struct psr_material *material = material_of(scene->mesh, prim);
@@ -120,7 +120,8 @@ int ray_scene_is_sheer(const struct ray_scene *scene, uint32_t prim, double u, d
 	return material_of(scene->mesh, prim)->alpha == PSR_ALPHA_BLEND && opacity_of(scene, prim, u, v) < 1;
 }
 
-/* An opaque triangle stops a ray by its side alone, which the rounded normal tells unless the ray nearly grazes it. */
+/* The side alone decides whether an opaque triangle stops a ray; the rounded normal tells the side unless the ray
+ * nearly grazes the triangle. */
 enum verdict { STOPS, GOES_ON, MUST_LOOK };
 
 static enum verdict judge(const struct ray_scene *scene, const struct ray *ray, uint32_t prim)

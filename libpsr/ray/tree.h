@@ -14,7 +14,7 @@ enum { RAY_TRIANGLES, RAY_DISCS };
 struct ray_scene {
 	const struct psr_mesh *mesh;
 	double origin[3], shrink; /* inner = (object - origin) * shrink */
-	double cell; /* of the pattern by which one sees through BLEND surfaces (surface/stipple.h), inner units; 0: none */
+	double cell; /* of the stipple pattern of BLEND surfaces (surface/stipple.h), inner units; 0: none */
 	double (*corner)[3][3]; /* of the triangles, inner coordinates; */
 	float (*normal)[3]; /* and their unit normals */
 	int lets_through;   /* whether any material may let a ray through */
@@ -23,21 +23,22 @@ struct ray_scene {
 	RTCScene discs; /* for distances; NULL until ray_scene_index_distances */
 };
 
-/* A packet of rays. The context comes first: Embree hands it back to the filters. */
+/* A packet of rays. The context comes first: Embree gives it back to the filters. */
 struct ray_packet {
 	struct RTCIntersectContext context;
 	const struct ray_scene *scene;
 	const struct ray *ray;
 	struct ray_list *list; /* ray_scene_trace_all() collects hits here, */
-	int has_ends;          /* of rays from both ends */
+	int has_ends;          /* the rays of both ends */
 };
 
 void ray_packet_init(struct ray_packet *packet, const struct ray_scene *scene, const struct ray *ray);
 
-/* ray[0..n-1] at t >= t_min as floats; `valid` is -1 for each, and 0 for the rest of the packet. */
+/* Fills a packet with ray[0..n-1] at t >= t_min as floats; `valid` is -1 for each, and 0 for the rest of the packet. */
 void ray_packet_fill(struct RTCRay8 *rays, int valid[RAY_PACKET], const struct ray *ray, int n, double t_min);
 
-/* Computes t, u, v and is_back of a hit from its prim, and the tree's u and v; and whether it is absent there. */
+/* Computes t, u, v and is_back of a hit from its prim, and the tree's u and v. Returns whether the surface is absent
+ * there. */
 void ray_hit_locate(const struct ray_scene *scene, const struct ray *ray, struct ray_hit *hit);
 int ray_hit_is_absent(const struct ray_scene *scene, const struct ray_hit *hit);
 
@@ -83,7 +84,7 @@ static inline void ray_prefetch(const struct ray_scene *scene, uint32_t prim)
 	}
 }
 
-/* Centre, normal and radius of the disc of a primitive, in inner coordinates. */
+/* Finds centre, normal and radius of a primitive's disc, in inner coordinates. */
 double ray_disc(const struct ray_scene *scene, uint32_t prim, double center[3], double normal[3]);
 
 #endif

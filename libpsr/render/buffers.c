@@ -49,6 +49,11 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 	return PSR_OK;
 }
 
+void buffers_forget(struct buffers *b)
+{
+	b->clean_pixels = NULL;
+}
+
 void buffers_clear(struct buffers *b)
 {
 	psr_free_huge(b->pixels, b->pixels_size);

@@ -28,6 +28,9 @@ struct buffers {
 
 /* Lays out the picture of a plan with the z-buffer levels of a bit mask. */
 int buffers_prepare(struct buffers *buffers, const struct plan *plan, uint32_t levels);
+
+/* After a picture that was drawn in part: nothing is clean. */
+void buffers_forget(struct buffers *buffers);
 void buffers_clear(struct buffers *buffers);
 
 /* Rows of bricks, and the end of one in pixels. */

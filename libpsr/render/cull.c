@@ -150,7 +150,7 @@ static void count_chunk(int i, void *userdata)
 		if (!cull_is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
 			continue;
 		chunk.n_tested += end - first;
-		for (uint32_t n; first < end; first += n) {
+		for (uint32_t n; first < end && !plan_is_cancelled(plan); first += n) {
 			struct cull_batch batch;
 
 			n = end - first < CULL_BATCH ? end - first : CULL_BATCH;
@@ -203,6 +203,8 @@ static void fill_chunk(int i, void *userdata)
 			.at_border = hit->at_border, .hit = chunk->first_hit + h,
 		};
 
+		if (h % CULL_BATCH == 0 && plan_is_cancelled(cull->plan))
+			return;
 		mark_parts(cull->bins->is_quiet, cull->plan, hit);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
@@ -216,7 +218,7 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 	const uint32_t most = least < MOST_CHUNK ? least : MOST_CHUNK;
 	uint32_t n = 0;
 
-	for (uint32_t i = 0; i < plan->n_instances; i++) {
+	for (uint32_t i = 0; i < plan->n_instances && !plan_is_cancelled(plan); i++) {
 		const struct psr_blocks *blocks = plan->instance[i].cull.blocks;
 		uint32_t k = 0;
 
@@ -253,6 +255,8 @@ static int place_entries(struct bins *bins, const struct cull *cull)
 		for (uint32_t i = 0; i < cull->n_chunks; i++) {
 			uint32_t *count = &bins->count[(size_t)i * cull->stride + t], n = *count;
 
+			if (plan_is_cancelled_at(cull->plan, i))
+				return PSR_ERR_CANCELLED;
 			*count = (uint32_t)total;
 			total += n;
 		}
@@ -338,21 +342,22 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
 	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
-	int rc = make_room(bins, &cull);
+	int rc = plan_is_cancelled(plan) ? PSR_ERR_CANCELLED : make_room(bins, &cull);
 
 	if (rc)
 		return rc;
 	memset(bins->is_quiet, 1, plan->parts_x * plan->parts_y);
 	make_chunks(bins, plan, 1);
 	cull_choose_levels(bins, plan);
-	for (uint32_t i = 0; i < plan->n_instances; i++)
+	for (uint32_t i = 0; i < plan->n_instances && !plan_is_cancelled(plan); i++)
 		if (plan->instance[i].masks == PSR_WHY_RAN)
 			cull_masks_make(&bins->masks[i], plan, &plan->instance[i]);
-	psr_pool_for(pool, (int)cull.n_chunks, count_chunk, &cull);
-	rc = place_entries(bins, &cull);
-	if (rc)
-		return rc;
-	psr_pool_for(pool, (int)cull.n_chunks, fill_chunk, &cull);
-	sum_up(&cull, plan, report);
-	return PSR_OK;
+	rc = psr_pool_for_until(pool, &plan->cancel, (int)cull.n_chunks, count_chunk, &cull);
+	if (rc == PSR_OK)
+		rc = place_entries(bins, &cull);
+	if (rc == PSR_OK)
+		rc = psr_pool_for_until(pool, &plan->cancel, (int)cull.n_chunks, fill_chunk, &cull);
+	if (rc == PSR_OK)
+		sum_up(&cull, plan, report);
+	return rc;
 }

@@ -4,7 +4,7 @@
 
 #include "bins.h"
 
-/* Fills the bins. Completes the plan: what shading needs for the blocks in view. MEMORY, LIMIT. */
+/* Fills the bins. Completes the plan: what shading needs for the blocks in view. MEMORY, LIMIT, CANCELLED. */
 int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, struct psr_pool *pool,
                 struct psr_report *report);
 
@@ -27,7 +27,8 @@ struct cull_sphere {
 struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k);
 
 /* Chooses of each group of clusters the coarsest level whose spacing is at most a pixel, or the settings' spacing,
- * where its blocks are nearest; such blocks need no depth buffer but the picture's. The finest level if none fits. */
+ * where its blocks are nearest; such blocks need no depth buffer but the picture's. The finest level if none fits.
+ * Returns early if the frame is cancelled. */
 void cull_choose_levels(struct bins *bins, const struct plan *plan);
 
 /* Visibility masks of the screen's regions, for one instance ([G] 6.3): one mask for each of the 10 x 10 ranges of

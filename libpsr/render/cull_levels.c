@@ -68,6 +68,8 @@ void cull_choose_levels(struct bins *bins, const struct plan *plan)
 			for (uint32_t k = 0; k < b->n_clusters; k++) {
 				struct cull_group *g = &group[b->cluster[k].group];
 
+				if (plan_is_cancelled_at(plan, k))
+					return;
 				if (b->cluster[k].level != level || g->fits)
 					continue;
 				g->level = (uint8_t)level;

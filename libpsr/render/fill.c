@@ -11,14 +11,18 @@
  * to the first that is whole in it and in the eight bricks around it, which hold all that its pixels and their
  * ancestors read. */
 
-/* Sets all cells as outside of the picture; the fill writes those inside before it reads them. */
-static void clear_level(struct fill_level *level, size_t area)
+/* Sets all cells as outside of the picture; the fill writes those inside before it reads them. Returns early if the
+ * frame is cancelled. */
+static void clear_level(const struct fill_level *level, size_t area, const struct plan *plan)
 {
-	memset(level->cell.r, 0, 3 * area * sizeof *level->cell.r);
-	for (size_t i = 0; i < area; i++) {
-		level->cell.weight[i] = WEIGHT_ONE;
-		level->cell.z[i] = NAN;
-	}
+	const struct fill_row *cell = &level->cell;
+
+	for (size_t first = 0; first < area && !plan_is_cancelled(plan); first += level->stride)
+		for (size_t i = first; i < first + level->stride; i++) {
+			cell->r[i] = cell->g[i] = cell->b[i] = 0;
+			cell->weight[i] = WEIGHT_ONE;
+			cell->z[i] = NAN;
+		}
 }
 
 static int prepare(struct fill *fill, uint32_t width, uint32_t height)
@@ -55,11 +59,13 @@ static int prepare(struct fill *fill, uint32_t width, uint32_t height)
 		const size_t area = (size_t)(w + 2) * (h + 2);
 		fill->level[l] = (struct fill_level){ .width = w, .height = h, .left = -1, .top = -1, .stride = w + 2,
 			.cell = { values, values + area, values + 2 * area, values + 3 * area, z, near } };
-		clear_level(&fill->level[l], area);
+		clear_level(&fill->level[l], area, fill->plan);
 		z += area;
 		values += 4 * area;
 		near += area;
 	}
+	if (plan_is_cancelled(fill->plan))
+		return PSR_ERR_CANCELLED;
 	fill->pulled = near;
 	fill->whole = fill->pulled + n_bricks;
 	fill->needs = fill->whole + n_bricks;
@@ -173,7 +179,7 @@ static void pull_tree(struct fill *fill, int l, uint32_t x, uint32_t y)
 {
 	uint8_t *state = coarse_at(fill, l, x, y);
 
-	if (*state & FILL_PULLED)
+	if (*state & FILL_PULLED || plan_is_cancelled(fill->plan))
 		return;
 	*state |= FILL_PULLED;
 	if (l == fill->brick_top) {
@@ -268,13 +274,6 @@ static void push_level(struct fill *fill, uint32_t row, int level, int is_early)
 	}
 }
 
-static void push_level_row(int i, void *userdata)
-{
-	struct fill *fill = userdata;
-
-	push_level(fill, (uint32_t)i, fill->pushed, 0);
-}
-
 static void push_pixels(struct fill *fill, uint32_t row, int is_early)
 {
 	const uint8_t *needs = fill->needs + (size_t)row * fill->bricks_x;
@@ -294,7 +293,12 @@ static void push_pixels(struct fill *fill, uint32_t row, int is_early)
 
 static void push_row(int i, void *userdata)
 {
-	push_pixels(userdata, (uint32_t)i, 0);
+	struct fill *fill = userdata;
+
+	if (fill->pushed)
+		push_level(fill, (uint32_t)i, fill->pushed, 0);
+	else
+		push_pixels(fill, (uint32_t)i, 0);
 }
 
 /* Pulls weights and depths of bricks bx0..bx1-1 to a level where fill_look did not. */
@@ -379,15 +383,17 @@ static void run_coarse(struct fill *fill)
 	}
 }
 
-void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report)
+int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report)
 {
+	int rc = PSR_OK;
+
 	if (fill->is_coarse)
 		run_coarse(fill);
-	for (fill->pushed = fill->needed - 1; fill->pushed > 0; fill->pushed--)
-		psr_pool_for(pool, (int)fill->bricks_y, push_level_row, fill);
-	psr_pool_for(pool, (int)fill->bricks_y, push_row, fill);
+	for (fill->pushed = fill->needed - 1; fill->pushed >= 0 && rc == PSR_OK; fill->pushed--)
+		rc = psr_pool_for_until(pool, &fill->plan->cancel, (int)fill->bricks_y, push_row, fill);
 	report->count[PSR_STAGE_FILL] += fill->n_changed;
 	report->n_filled += fill->n_filled;
 	if (fill->n_moved)
 		report->error_px += (double)(2 << fill->deepest);
+	return rc;
 }

@@ -41,7 +41,7 @@ struct fill {
 	size_t coarse_first[FILL_LEVELS], n_coarse;
 	int is_coarse;    /* a brick needs levels beyond brick_top */
 	int needed;       /* the greatest of `needs` */
-	int pushed;       /* the level that is being pushed */
+	int pushed;       /* the level that is being pushed; 0: the picture */
 	void *storage;
 	size_t storage_size;
 	/* The picture in progress. */
@@ -55,6 +55,7 @@ struct fill {
 /* Filling takes four steps; each begins when the one before has ended. Any thread may run the steps that take a row of
  * bricks, in any order; they run while the row's pixels are in the cache, looking after gaps_rows, pulling after
  * shading. */
+/* MEMORY, CANCELLED. */
 int fill_begin(struct fill *fill, const struct simd *simd, const struct plan *plan, const struct fill_picture *picture);
 void fill_clear(struct fill *fill);
 
@@ -62,14 +63,14 @@ void fill_clear(struct fill *fill);
 void fill_look(struct fill *fill, uint32_t row);
 
 /* 2. Finds what they need of other bricks. Returns a byte a brick, not 0 where the fill needs the brick's 16-bit
- * colours. */
+ * colours. Returns early if the frame is cancelled. */
 const uint8_t *fill_wants(struct fill *fill);
 
 /* 3. Pulls the coarser levels that are needed from the row's colours, and pushes to pixels that need no other row. */
 void fill_pull(struct fill *fill, uint32_t row);
 
 /* 4. Pushes: sets the colour of every pixel of weight below WEIGHT_ONE and, where the weight is below a half, its
- * depth. Other pixels of rgb and depth stay. Adds the stage's counts and error bound to the report. */
-void fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
+ * depth. Other pixels of rgb and depth stay. Adds the stage's counts and error bound to the report. CANCELLED. */
+int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *report);
 
 #endif

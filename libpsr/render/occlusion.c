@@ -18,26 +18,35 @@ static uint32_t depth_of(const struct bins *bins, uint32_t entry)
 	return near > 0 ? psr_bits_from_float(near) : 0;
 }
 
-/* Counting sort by the upper bits of depth; stable. */
-static void sort_by_depth(const struct bins *bins, uint32_t begin, uint32_t end)
+/* Counting sort by the upper bits of depth; stable. Returns 0 if the frame was cancelled. */
+static int sort_by_depth(const struct plan *plan, const struct bins *bins, uint32_t begin, uint32_t end)
 {
 	uint32_t low = UINT32_MAX, high = 0, count[KEYS + 1] = { 0 };
 
 	for (uint32_t e = begin; e < end; e++) {
 		const uint32_t depth = depth_of(bins, e);
 
+		if (plan_is_cancelled_at(plan, e))
+			return 0;
 		low = depth < low ? depth : low;
 		high = depth > high ? depth : high;
 	}
 	int shift = 0;
 	while ((high - low) >> shift >= KEYS)
 		shift++;
-	for (uint32_t e = begin; e < end; e++)
+	for (uint32_t e = begin; e < end; e++) {
+		if (plan_is_cancelled_at(plan, e))
+			return 0;
 		count[((depth_of(bins, e) - low) >> shift) + 1]++;
+	}
 	for (int k = 0; k < KEYS; k++)
 		count[k + 1] += count[k];
-	for (uint32_t e = begin; e < end; e++)
+	for (uint32_t e = begin; e < end; e++) {
+		if (plan_is_cancelled_at(plan, e))
+			return 0;
 		bins->order[begin + count[(depth_of(bins, e) - low) >> shift]++] = e;
+	}
+	return 1;
 }
 
 /* Whether all pixels that the block can change are nearer already. Cells of level k matter up to two cells away; those
@@ -63,7 +72,7 @@ static int is_occluded(const struct occlusion *o, const struct warp_target *t, c
 	return 1;
 }
 
-struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins,
+struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                                     const struct warp_target *target, uint32_t begin, uint32_t end)
 {
 	struct warp_counts counts = { 0, 0, 1 };
@@ -72,8 +81,9 @@ struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *
 	uint32_t n = 0, n_drawn = 0, n_left_out = 0; /* the latter two since the last look */
 	int is_over = 0;
 
-	sort_by_depth(bins, begin, end);
-	for (uint32_t i = begin; i < end; i++) {
+	if (!sort_by_depth(plan, bins, begin, end))
+		return counts;
+	for (uint32_t i = begin; i < end && !plan_is_cancelled_at(plan, i); i++) {
 		const struct bin_entry *entry = &bins->entry[bins->order[i]];
 
 		if (is_occluded(&occlusion, target, &bins->hit[entry->hit])) {

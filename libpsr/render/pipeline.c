@@ -21,7 +21,7 @@ static void warp_one(int i, void *userdata)
 }
 
 /* Draws the words and cells of all tiles. */
-static void warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+static int warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
 	const struct plan *plan = &r->plan;
 	struct buffers *b = &r->buffers;
@@ -29,7 +29,10 @@ static void warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr
 	uint64_t n_occluded = 0;
 	int with_occlusion = 0;
 
-	psr_pool_for(pool, n_tiles, warp_one, r);
+	if (psr_pool_for_until(pool, &plan->cancel, n_tiles, warp_one, r)) {
+		buffers_forget(b);
+		return PSR_ERR_CANCELLED;
+	}
 	memcpy(b->is_clean, r->bins.is_quiet, (size_t)plan->parts_x * plan->parts_y);
 	for (int t = 0; t < n_tiles; t++) {
 		report->count[PSR_STAGE_WARP] += b->tile[t].n_inside;
@@ -38,6 +41,7 @@ static void warp_tiles(struct psr_renderer *r, struct psr_pool *pool, struct psr
 	}
 	const enum psr_why no_occlusion = plan->cull_tests & PSR_CULL_OCCLUSION ? PSR_WHY_COST : PSR_WHY_OFF;
 	effect_note(report, PSR_EFFECT_OCCLUSION, with_occlusion ? PSR_WHY_RAN : no_occlusion, n_occluded);
+	return PSR_OK;
 }
 
 /* A call of renderer_warp or psr_render, or a part of one. */
@@ -78,7 +82,9 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	report->count[PSR_STAGE_PLAN] = r->plan.n_instances;
 	note_time(report, PSR_STAGE_PLAN, &start);
 
-	const struct shadow_call shadow = { r->simd, &r->bins, call->scene, call->pool, report, err };
+	const struct shadow_call shadow = {
+		&r->plan.cancel, r->simd, &r->bins, call->scene, call->pool, report, err,
+	};
 	if (is_lit)
 		rc = shadow_prepare(&r->shadow, &r->plan, &shadow);
 	else
@@ -90,6 +96,8 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 	rc = cull_blocks(&r->bins, r->simd, &r->plan, call->pool, report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(err, rc, "too many blocks for a picture of this size");
+	if (rc == PSR_ERR_CANCELLED)
+		return render_cancelled(err);
 	if (rc || buffers_prepare(&r->buffers, &r->plan, report->levels))
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width, settings->height);
 	if (r->plan.is_full)
@@ -98,9 +106,9 @@ static int make_stack(struct psr_renderer *r, const struct call *call, int is_li
 		r->plan.is_quiet = r->bins.is_quiet;
 	note_time(report, PSR_STAGE_CULL, &start);
 
-	warp_tiles(r, call->pool, report);
+	rc = warp_tiles(r, call->pool, report);
 	note_time(report, PSR_STAGE_WARP, &start);
-	return PSR_OK;
+	return rc ? render_cancelled(err) : PSR_OK;
 }
 
 int renderer_warp(struct psr_renderer *r, const struct psr_scene *scene, const struct render_settings *settings,
@@ -169,10 +177,10 @@ int renderer_outline(struct psr_renderer *r, const struct psr_scene *scene, cons
 	fenv_t callers;
 
 	set_environment(&callers);
-	const int rc = make_stack(r, &call, 0);
+	int rc = make_stack(r, &call, 0);
 	r->is_object = is_object;
-	if (rc == PSR_OK)
-		psr_pool_for(pool, (int)n_brick_rows(&r->plan), outline_one, r);
+	if (rc == PSR_OK && psr_pool_for_until(pool, &settings->cancel, (int)n_brick_rows(&r->plan), outline_one, r))
+		rc = render_cancelled(err);
 	fesetenv(&callers);
 	return rc;
 }
@@ -193,7 +201,7 @@ static void shade_one(int row, void *userdata)
 
 		if (r->depth != NULL)
 			r->simd->depth_row(r->depth + first, word, plan->width, b->stack.exponent);
-		if (r->has_planes)
+		if (r->has_planes && !plan_is_cancelled(plan))
 			planes_row(r->simd, plan, r->frame, word, b->weight + first, y);
 	}
 	const uint64_t middle = clock_ns();
@@ -204,18 +212,18 @@ static void shade_one(int row, void *userdata)
 	b->shade[row] = counts;
 }
 
-/* Returns how many bricks gaps marked. */
-static uint32_t find_gaps(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
+/* Finds gaps, and how many bricks they mark. */
+static int find_gaps(uint32_t *n_marked, struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
 	const int n = (int)n_brick_rows(&r->plan);
-	uint32_t n_marked = 0;
+	const int rc = psr_pool_for_until(pool, &r->plan.cancel, n, gaps_one, r);
 
-	psr_pool_for(pool, n, gaps_one, r);
-	for (int i = 0; i < n; i++) {
-		n_marked += r->buffers.gaps[i].n_marked;
+	*n_marked = 0;
+	for (int i = 0; i < n && rc == PSR_OK; i++) {
+		*n_marked += r->buffers.gaps[i].n_marked;
 		report->count[PSR_STAGE_GAPS] += r->buffers.gaps[i].n_partial;
 	}
-	return n_marked;
+	return rc;
 }
 
 static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
@@ -228,36 +236,82 @@ static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_re
 	r->lit = psr_grow_huge(r->lit, &r->lit_size, PSR_DIRECTIONS * sizeof *r->lit);
 	if (r->lit == NULL)
 		return PSR_ERR_MEMORY;
-	shade_tabulate(r->simd, &r->plan, pool, r->lit);
+	const int rc = shade_tabulate(r->simd, &r->plan, pool, r->lit);
 	r->plan.view.lit = (const float(*)[4])r->lit;
-	return PSR_OK;
-}
-
-/* Where colours and depths go before smoothing. */
-static int begin_smooth(struct psr_renderer *r, enum psr_why smooth, uint8_t **rgb, struct psr_error *err)
-{
-	*rgb = r->frame->rgb;
-	r->depth = r->frame->depth;
-	if (smooth != PSR_WHY_RAN)
-		return PSR_OK;
-	if (smooth_begin(&r->smooth, &r->plan, r->frame->depth))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for smoothing a picture of %ux%u", r->plan.width,
-		                r->plan.height);
-	*rgb = r->smooth.rgb;
-	r->depth = r->smooth.depth;
-	return PSR_OK;
+	return rc;
 }
 
 /* Draws sheer surfaces over the frame. */
 static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
-	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, r->buffers.stack.exponent };
-	const int is_wanted = r->frame->rgb != NULL || r->frame->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
+	const struct psr_frame *planes = r->has_planes ? r->frame : NULL;
+	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, planes, r->buffers.stack.exponent };
+	const int is_wanted = r->frame->rgb != NULL || r->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
 	const enum psr_why why = is_drawn ? PSR_WHY_RAN : is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	const int rc = is_drawn ? sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool) : PSR_OK;
 
-	if (is_drawn && sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool))
-		return PSR_ERR_MEMORY;
 	effect_note(report, PSR_EFFECT_SHEER, why, r->sheer.n_pixels);
+	return rc;
+}
+
+/* Says why a stage failed: the frame was cancelled, or there is no memory for its purpose. */
+static int explain(int rc, const struct psr_renderer *r, const char *purpose, struct psr_error *err)
+{
+	if (rc == PSR_ERR_CANCELLED)
+		return render_cancelled(err);
+	return psr_fail(err, rc, "no memory for %s a picture of %ux%u", purpose, r->plan.width, r->plan.height);
+}
+
+/* Finds where the stages write colours and depths: smoothing has a picture of its own, sheer surfaces need depths. */
+static int begin_finish(struct psr_renderer *r, enum psr_why smooth, struct psr_error *err)
+{
+	const struct buffers *b = &r->buffers;
+	uint8_t *rgb = r->frame->rgb;
+
+	r->depth = r->frame->depth;
+	if (smooth == PSR_WHY_RAN) {
+		if (smooth_begin(&r->smooth, &r->plan, r->frame->depth))
+			return explain(PSR_ERR_MEMORY, r, "smoothing", err);
+		rgb = r->smooth.rgb;
+		r->depth = r->smooth.depth;
+	}
+	if (r->plan.has_sheer && (rgb != NULL || r->has_planes) && r->depth == NULL) {
+		r->depth = sheer_depths(&r->sheer, &r->plan);
+		if (r->depth == NULL)
+			return explain(PSR_ERR_MEMORY, r, "the depths of", err);
+	}
+	r->picture = (struct shade_picture){ &b->stack, b->weight, rgb, r->srgb, b->rgb[0], b->rgb[1], b->rgb[2], NULL };
+	const struct fill_picture fill = { &b->stack, b->weight, b->bricks, b->rgb[0], b->rgb[1],
+		                               b->rgb[2], r->srgb,   rgb,       r->depth };
+	const int rc = fill_begin(&r->fill, r->simd, &r->plan, &fill);
+	return rc ? explain(rc, r, "filling", err) : PSR_OK;
+}
+
+/* From gaps to colours without holes. */
+static int shade_picture(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report,
+                         struct psr_error *err)
+{
+	uint64_t start = clock_ns();
+	uint32_t n_marked;
+
+	int rc = find_gaps(&n_marked, r, pool, report);
+	note_time(report, PSR_STAGE_GAPS, &start);
+	if (rc == PSR_OK && n_marked)
+		r->picture.wants = fill_wants(&r->fill);
+	note_time(report, PSR_STAGE_FILL, &start);
+	if (rc == PSR_OK)
+		rc = tabulate(r, pool, report);
+	if (rc == PSR_OK)
+		rc = psr_pool_for_until(pool, &r->plan.cancel, (int)n_brick_rows(&r->plan), shade_one, r);
+	if (rc)
+		return explain(rc, r, "the light of", err);
+	const uint64_t shaded = clock_ns();
+	shade_report(&r->plan, r->buffers.shade, shaded - start, r->frame->rgb != NULL, report);
+	start = shaded;
+	if (n_marked && fill_push(&r->fill, pool, report))
+		return render_cancelled(err);
+	note_time(report, PSR_STAGE_FILL, &start);
+	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
 	return PSR_OK;
 }
 
@@ -265,61 +319,33 @@ static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_r
 static int finish_stack(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool,
                         struct psr_frame *frame, struct psr_error *err)
 {
-	struct buffers *b = &r->buffers;
+	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb != NULL ? PSR_WHY_RAN : PSR_WHY_NOTHING;
+	struct psr_report *report = &frame->report;
 
-	if (stack != &b->stack)
+	if (stack != &r->buffers.stack)
 		return psr_fail(err, PSR_ERR_ARG, "the z-stack belongs to another renderer");
 	if (frame->width != stack->width || frame->height != stack->height)
 		return psr_fail(err, PSR_ERR_ARG, "the frame has %ux%u pixels, the z-stack %ux%u", frame->width, frame->height,
 		                stack->width, stack->height);
-	struct psr_report *report = &frame->report;
 	*report = r->report;
 	r->frame = frame;
 	r->has_planes = frame->normal != NULL || frame->id != NULL || frame->block != NULL
 	                || frame->weight != NULL || frame->words != NULL;
-
-	const enum psr_why smooth = !r->plan.is_smooth ? PSR_WHY_OFF : frame->rgb != NULL ? PSR_WHY_RAN : PSR_WHY_NOTHING;
-	uint8_t *rgb;
-	int rc = begin_smooth(r, smooth, &rgb, err);
+	int rc = begin_finish(r, smooth, err);
+	if (rc == PSR_OK)
+		rc = shade_picture(r, pool, report, err);
 	if (rc)
 		return rc;
-	if (r->plan.has_sheer && frame->rgb != NULL && r->depth == NULL) {
-		r->depth = sheer_depths(&r->sheer, &r->plan);
-		if (r->depth == NULL)
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for the depths of a picture of %ux%u", r->plan.width,
-			                r->plan.height);
-	}
-	r->picture = (struct shade_picture){ stack, b->weight, rgb, r->srgb, b->rgb[0], b->rgb[1], b->rgb[2], NULL };
-	const struct fill_picture fill = { stack,     b->weight, b->bricks, b->rgb[0], b->rgb[1],
-		                               b->rgb[2], r->srgb,   rgb,       r->depth };
-	if (fill_begin(&r->fill, r->simd, &r->plan, &fill))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for filling a picture of %ux%u", r->plan.width, r->plan.height);
-	uint64_t start = clock_ns();
-	const uint32_t n_marked = find_gaps(r, pool, report);
-	note_time(report, PSR_STAGE_GAPS, &start);
-	if (n_marked)
-		r->picture.wants = fill_wants(&r->fill);
-	note_time(report, PSR_STAGE_FILL, &start);
 
-	if (tabulate(r, pool, report))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a table of light");
-	psr_pool_for(pool, (int)n_brick_rows(&r->plan), shade_one, r);
-	const uint64_t shaded = clock_ns();
-	shade_report(&r->plan, b->shade, shaded - start, frame->rgb != NULL, report);
-	start = shaded;
-	if (n_marked)
-		fill_push(&r->fill, pool, report);
-	note_time(report, PSR_STAGE_FILL, &start);
-	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
-	if (smooth == PSR_WHY_RAN)
-		report->count[PSR_STAGE_SMOOTH] = smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb);
+	uint64_t start = clock_ns();
+	if (smooth == PSR_WHY_RAN && smooth_picture(&r->smooth, r->simd, &r->plan, pool, frame->rgb))
+		return render_cancelled(err);
+	report->count[PSR_STAGE_SMOOTH] = smooth == PSR_WHY_RAN ? r->smooth.n_edges : 0;
 	note_time(report, PSR_STAGE_SMOOTH, &start);
 	effect_note(report, PSR_EFFECT_SMOOTH, smooth, report->count[PSR_STAGE_SMOOTH]);
-	if (add_sheer(r, pool, report))
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the sheer surfaces of a picture of %ux%u", r->plan.width,
-		                r->plan.height);
+	rc = add_sheer(r, pool, report);
 	note_time(report, PSR_STAGE_SHADE, &start);
-	return PSR_OK;
+	return rc ? explain(rc, r, "the sheer surfaces of", err) : PSR_OK;
 }
 
 int renderer_finish(struct psr_renderer *r, struct psr_zstack *stack, struct psr_pool *pool, struct psr_frame *frame,

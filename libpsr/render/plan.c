@@ -267,9 +267,11 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
 	plan->finer = (float)(1 / settings->spacing_px);
 	plan->is_quiet = NULL;
-	plan->has_sheer = plan->is_shadow = 0;
+	plan->has_sheer = 0;
+	plan->caster = NO_CASTER;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;
+	plan->cancel = settings->cancel;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
 
@@ -295,8 +297,11 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 		plan->ambient[i] = (float)scene->ambient[i];
 		plan->background[i] = light16(scene->background[i]);
 	}
-	for (uint32_t i = 0; i < scene->n_instances; i++)
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		if (plan_is_cancelled(plan))
+			return render_cancelled(err);
 		instance_make(&plan->instance[i], &plan->warp[i], &scene->instance[i], plan, &view, focal);
+	}
 	plan->view = (struct strip_view){
 		.instance = plan->warp, .n_instances = plan->n_instances, .direction_word = psr_direction_words(),
 		.half_width = (float)plan->center[0], .half_height = (float)plan->center[1],

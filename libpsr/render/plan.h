@@ -4,6 +4,10 @@
 
 #include "render.h"
 
+/* What casts the shadow of a map. Sheer blocks are of the class of their mean opacity: 1 up to a quarter, 2 to a half, 3
+ * and 4. Each class has a map, in which its blocks are solid. */
+enum { NO_CASTER = -1, SHADOW_OPAQUE, SHADOW_CASTERS = 5 };
+
 struct plan_instance {
 	uint32_t first_slot;  /* slot of block b is first_slot + b */
 	uint32_t first_group; /* number of the model's group 0; each model has n_clusters numbers */
@@ -34,21 +38,25 @@ struct plan {
 	struct warp_instance *warp;        /* one an instance */
 	struct strip_view view;            /* the cull completes `needs` */
 	int has_sheer;                     /* a block in view has opacities; set by the cull */
-	int is_shadow;                     /* the picture is a shadow map, where sheer blocks are opaque or missing */
+	int caster;                        /* of a shadow map, SHADOW_OPAQUE or a class of glass; of a picture NO_CASTER */
 	struct strip_light *light;
-	const struct shadow_light *shadow; /* one a light, or NULL: no shadows; the shadow stage owns it */
+	/* By light, SHADOW_CASTERS each, or NULL: no shadows; and the share of the light that each caster keeps back. The
+	 * shadow stage owns both. */
+	const struct shadow_light *shadow;
+	const float *shadow_share;
 	double axes[3][3], eye[3];         /* the camera's right, down and forward in the world, and its position */
 	float ambient[3];
 	uint16_t background[3];            /* linear, 16 bits */
 	/* Map of the picture's parts, parts_x in a row, or NULL: 1 where all words are empty and all weights whole, since
 	 * no block draws there, nor do cells reach there. */
 	const uint8_t *is_quiet;
+	struct psr_cancel cancel;          /* the settings' */
 	uint64_t n_samples;
 	void *storage;                     /* of all arrays */
 	size_t storage_size;
 };
 
-/* Validated scene and settings. ARG, LIMIT, MEMORY. */
+/* Validated scene and settings. ARG, LIMIT, MEMORY, CANCELLED. */
 int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
               struct psr_error *err);
 void plan_clear(struct plan *plan);
@@ -59,6 +67,19 @@ double plan_place(double center[3], double rotation[3][3], const struct psr_inst
 
 /* Finds the instance of a slot; the slot must be below n_slots. */
 uint32_t plan_find_instance(const struct plan *plan, uint32_t slot);
+
+/* Whether the frame is to end. A stage asks so often that no thread works on for more than a millisecond. Then it
+ * leaves what it does, and returns CANCELLED once all threads have left. */
+static inline int plan_is_cancelled(const struct plan *plan)
+{
+	return psr_is_cancelled(&plan->cancel);
+}
+
+/* Asks before some steps of a run of short ones: before step 0, 1024, ... */
+static inline int plan_is_cancelled_at(const struct plan *plan, uint32_t step)
+{
+	return step % 1024 == 0 && plan_is_cancelled(plan);
+}
 
 static inline int plan_is_quiet(const struct plan *plan, uint32_t x, uint32_t y)
 {

@@ -29,16 +29,12 @@ static int16_t to_steps(float n)
 	return (int16_t)(clamped + (clamped < 0 ? -0.5f : 0.5f));
 }
 
-static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip_pixels *pixels,
-                        uint32_t n)
+static void put_normals(const struct simd *simd, const struct plan *plan, int16_t *to, struct strip_pixels *pixels)
 {
 	struct strip_view view = plan->view;
 	struct strip strip;
 
 	view.lit = NULL; /* with a table of light, strip_resolve skips normals */
-	memset(to, 0, 3 * n * sizeof *to);
-	if (!pixels->n)
-		return;
 	strip.pixels = pixels;
 	simd->strip_find(pixels, &view);
 	simd->strip_read(&strip, &view);
@@ -53,9 +49,8 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 		}
 }
 
-static void put_instances(const struct plan *plan, uint32_t *to, const struct strip_pixels *pixels, uint32_t n)
+static void put_instances(const struct plan *plan, uint32_t *to, const struct strip_pixels *pixels)
 {
-	memset(to, 0xff, n * sizeof *to);
 	for (uint32_t i = 0; i < pixels->n; i++)
 		to[pixels->x[i]] = plan_find_instance(plan, pixels->id[i] / PSR_BLOCK_SAMPLES);
 }
@@ -75,12 +70,10 @@ static void describe(uint8_t to[3], const struct simd *simd, const struct plan *
 	        : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;
 }
 
-static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip_pixels *pixels,
-                       uint32_t n)
+static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t *to, const struct strip_pixels *pixels)
 {
 	uint8_t last[3] = { 0, 0, 0 };
 
-	memset(to, 0xff, 3 * n);
 	for (uint32_t i = 0; i < pixels->n; i++) {
 		const uint32_t slot = pixels->id[i] / PSR_BLOCK_SAMPLES;
 
@@ -88,6 +81,28 @@ static void put_blocks(const struct simd *simd, const struct plan *plan, uint8_t
 			describe(last, simd, plan, slot);
 		memcpy(to + 3 * pixels->x[i], last, 3);
 	}
+}
+
+/* Pixels without a sample. */
+static void clear_samples(const struct psr_frame *frame, size_t first, uint32_t n)
+{
+	if (frame->normal != NULL)
+		memset(frame->normal + 3 * first, 0, 3 * n * sizeof *frame->normal);
+	if (frame->id != NULL)
+		memset(frame->id + first, 0xff, n * sizeof *frame->id);
+	if (frame->block != NULL)
+		memset(frame->block + 3 * first, 0xff, 3 * n);
+}
+
+static void put_samples(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, size_t first,
+                        struct strip_pixels *pixels)
+{
+	if (pixels->n && frame->normal != NULL)
+		put_normals(simd, plan, frame->normal + 3 * first, pixels);
+	if (pixels->n && frame->id != NULL)
+		put_instances(plan, frame->id + first, pixels);
+	if (pixels->n && frame->block != NULL)
+		put_blocks(simd, plan, frame->block + 3 * first, pixels);
 }
 
 void planes_row(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
@@ -109,11 +124,19 @@ void planes_row(const struct simd *simd, const struct plan *plan, const struct p
 			continue;
 		pixels.x0 = x;
 		simd->strip_list(&pixels, word + x, weight + x, n);
-		if (frame->normal != NULL)
-			put_normals(simd, plan, frame->normal + 3 * first, &pixels, n);
-		if (frame->id != NULL)
-			put_instances(plan, frame->id + first, &pixels, n);
-		if (frame->block != NULL)
-			put_blocks(simd, plan, frame->block + 3 * first, &pixels, n);
+		clear_samples(frame, first, n);
+		put_samples(simd, plan, frame, first, &pixels);
 	}
+}
+
+void planes_over(const struct simd *simd, const struct plan *plan, const struct psr_frame *frame, const uint64_t *word,
+                 const struct planes_part *part)
+{
+	const size_t first = (size_t)part->y * plan->width + part->x;
+	struct strip_pixels pixels = { .x0 = part->x, .y = part->y };
+
+	simd->strip_list(&pixels, word, NULL, part->n);
+	put_samples(simd, plan, frame, first, &pixels);
+	for (uint32_t i = 0; frame->weight != NULL && i < pixels.n; i++)
+		frame->weight[first + pixels.x[i]] = UINT8_MAX;
 }

@@ -4,6 +4,7 @@
 #include "base/clock.h"
 #include "base/mem.h"
 #include "base/srgb.h"
+#include "placed.h"
 #include "refine.h"
 
 /* Windows begin at multiples of the coarsest cell, so that their cells are those of the whole picture. Each draws a
@@ -27,7 +28,12 @@ struct refiner {
 	float *depth;
 	uint8_t *is_inside; /* by pixel of the plain frame, then as much scratch */
 	size_t inside_size;
-	uint8_t srgb[65536];   /* of 16-bit linear light */
+	/* What is_inside was found for: the passes of a still share it. */
+	int has_inside;
+	struct placed placed;
+	struct psr_camera camera;
+	struct render_settings settings;
+	const uint8_t *srgb;   /* of 16-bit linear light */
 	uint16_t linear[256];
 };
 
@@ -68,8 +74,7 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	}
 	r->rgb = (uint8_t *)(r->depth + area);
-	for (int i = 0; i < 65536; i++)
-		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
+	r->srgb = psr_srgb_of_16_bits();
 	for (int i = 0; i < 256; i++)
 		r->linear[i] = (uint16_t)(psr_srgb_to_linear[i] * 65535.0f + 0.5f);
 	*out = r;
@@ -82,12 +87,26 @@ void refiner_destroy(struct refiner *r)
 		return;
 	psr_free(r->depth);
 	psr_free_huge(r->is_inside, r->inside_size);
+	placed_clear(&r->placed);
 	free(r);
 }
 
 uint64_t refiner_bytes(const struct refiner *r)
 {
-	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3) + r->inside_size;
+	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3) + r->inside_size
+	       + placed_bytes(&r->placed);
+}
+
+uint64_t refiner_most_bytes(uint64_t n_pixels)
+{
+	return sizeof(struct refiner) + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof(float) + 3) + 2 * n_pixels;
+}
+
+uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
+{
+	const uint64_t w = (uint64_t)width << pass, h = (uint64_t)height << pass;
+
+	return (w < WINDOW_WIDTH ? w : WINDOW_WIDTH) * (h < WINDOW_HEIGHT ? h : WINDOW_HEIGHT);
 }
 
 static void average_color(const struct part *part, size_t first, size_t at)
@@ -160,6 +179,13 @@ static void add_report(struct psr_report *sum, const struct psr_report *one, uns
 	sum->error_px = fmax(sum->error_px, ldexp(one->error_px, -(int)pass));
 }
 
+static int loop(const struct still *still, int n, void (*fn)(int i, void *userdata), void *userdata)
+{
+	const int rc = psr_pool_for_until(still->pool, &still->settings->cancel, n, fn, userdata);
+
+	return rc ? render_cancelled(still->err) : PSR_OK;
+}
+
 /* Draws the window in column i and row j, and averages it without its margin. */
 static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 {
@@ -195,9 +221,8 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 		.refiner = r, .frame = frame, .pass = pass, .stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
-	psr_pool_for(still->pool, (int)((to_y - from_y) >> pass), average_row, &part);
 	add_report(&frame->report, &fine.report, pass);
-	return PSR_OK;
+	return loop(still, (int)((to_y - from_y) >> pass), average_row, &part);
 }
 
 /* Erodes n pixels that lie `step` apart: one stays 1 if all within INSIDE of it are 1. Pixels beyond the picture do not
@@ -228,6 +253,27 @@ static void erode_column(int x, void *userdata)
 	erode(e->is_inside + x, e->scratch + x, e->height, e->width);
 }
 
+/* Whether the outlines of two frames of one scene and camera are the same. */
+static int same_outline(const struct render_settings *a, const struct render_settings *b)
+{
+	return a->width == b->width && a->height == b->height && a->spacing_px == b->spacing_px
+	       && a->cull_tests == b->cull_tests && a->is_full == b->is_full && a->with_splats == b->with_splats
+	       && a->gap_threshold == b->gap_threshold && a->gap_method == b->gap_method;
+}
+
+/* Notes what a still's is_inside depends on. *has_changed: it differs from what was noted before. */
+static int note_still(const struct still *still, int *has_changed)
+{
+	const struct psr_camera *camera = &still->scene->camera;
+	struct refiner *r = still->refiner;
+	const int rc = placed_note(&r->placed, still->scene, has_changed);
+
+	*has_changed |= !placed_same_camera(&r->camera, camera) || !same_outline(&r->settings, still->settings);
+	r->camera = *camera;
+	r->settings = *still->settings;
+	return rc;
+}
+
 /* Finds the pixels well inside the plain frame's object, where a pass shows no background between discs. */
 static int find_inside(const struct still *still)
 {
@@ -236,19 +282,31 @@ static int find_inside(const struct still *still)
 	const size_t area = (size_t)settings->width * settings->height;
 	const uint64_t start = clock_ns();
 	struct erosion erosion;
+	int has_changed;
 
-	r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
-	if (r->is_inside == NULL)
-		return psr_fail(still->err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width,
-		                settings->height);
-	const int rc = renderer_outline(r->renderer, still->scene, settings, still->pool, r->is_inside, still->err);
+	int rc = settings_validate(settings, still->err);
+	if (rc == PSR_OK)
+		rc = psr_scene_validate(still->scene, still->err);
 	if (rc)
 		return rc;
+	rc = note_still(still, &has_changed);
+	if (rc == PSR_OK && r->has_inside && !has_changed)
+		return PSR_OK;
+	r->has_inside = 0;
+	if (rc == PSR_OK)
+		r->is_inside = psr_grow_huge(r->is_inside, &r->inside_size, 2 * area);
+	if (rc || r->is_inside == NULL)
+		return psr_fail(still->err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", settings->width,
+		                settings->height);
+	rc = renderer_outline(r->renderer, still->scene, settings, still->pool, r->is_inside, still->err);
 	erosion = (struct erosion){ r->is_inside, r->is_inside + area, settings->width, settings->height };
-	psr_pool_for(still->pool, (int)settings->height, erode_row, &erosion);
-	psr_pool_for(still->pool, (int)settings->width, erode_column, &erosion);
+	if (rc == PSR_OK)
+		rc = loop(still, (int)settings->height, erode_row, &erosion);
+	if (rc == PSR_OK)
+		rc = loop(still, (int)settings->width, erode_column, &erosion);
+	r->has_inside = rc == PSR_OK;
 	still->frame->report.ns[PSR_STAGE_GAPS] += clock_ns() - start;
-	return PSR_OK;
+	return rc;
 }
 
 static uint32_t n_windows(uint32_t side, uint32_t window, uint32_t step)
@@ -279,15 +337,8 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
 	rc = find_inside(&still);
-	if (rc)
-		return rc;
 	for (uint32_t j = 0; j < n_y; j++)
-		for (uint32_t i = 0; i < n_x; i++) {
-			if (settings->is_cancelled != NULL && settings->is_cancelled(settings->userdata))
-				return psr_fail(err, PSR_ERR_CANCELLED, "nobody waits for pass %u any more", pass);
+		for (uint32_t i = 0; i < n_x && rc == PSR_OK; i++)
 			rc = draw_window(&still, i, j);
-			if (rc)
-				return rc;
-		}
-	return PSR_OK;
+	return rc;
 }

@@ -1,3 +1,4 @@
+#include <stdatomic.h>
 #include <string.h>
 #include "render.h"
 
@@ -21,18 +22,42 @@ void render_settings_default(struct render_settings *settings, uint32_t width, u
 		                                  .gap_method = PSR_GAPS_BILINEAR };
 }
 
+int render_cancelled(struct psr_error *err)
+{
+	return psr_fail(err, PSR_ERR_CANCELLED, "the frame was cancelled");
+}
+
+/* Remembers an answer other than 0, so that all later questions get it. */
+struct latch {
+	struct psr_cancel asked;
+	atomic_int is_cancelled;
+};
+
+static int is_cancelled(void *userdata)
+{
+	struct latch *latch = userdata;
+
+	if (atomic_load_explicit(&latch->is_cancelled, memory_order_relaxed))
+		return 1;
+	if (!latch->asked.is_cancelled(latch->asked.userdata))
+		return 0;
+	atomic_store_explicit(&latch->is_cancelled, 1, memory_order_relaxed);
+	return 1;
+}
+
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *asked,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err)
 {
 	struct refiner **refiner = renderer_refiner(renderer);
+	struct latch latch = { .asked = asked->cancel };
 	struct render_settings settings;
 
 	render_settings_default(&settings, asked->width, asked->height);
 	settings.spacing_px = asked->spacing_px;
 	settings.is_smooth = asked->is_smooth;
 	settings.pass = asked->pass;
-	settings.is_cancelled = asked->is_cancelled;
-	settings.userdata = asked->userdata;
+	if (asked->cancel.is_cancelled != NULL)
+		settings.cancel = (struct psr_cancel){ is_cancelled, &latch };
 	if (settings.pass == 0)
 		return renderer_draw(renderer, scene, &settings, pool, frame, err);
 	const int rc = *refiner != NULL ? PSR_OK : refiner_create(refiner, renderer, err);

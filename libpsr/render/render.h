@@ -13,6 +13,9 @@
 /* ARG, LIMIT. */
 int settings_validate(const struct render_settings *settings, struct psr_error *err);
 
+/* Fails with CANCELLED. */
+int render_cancelled(struct psr_error *err);
+
 /* Reports that an effect ran, with its count, or why it did not. */
 void effect_note(struct psr_report *report, enum psr_effect effect, enum psr_why why, uint64_t count);
 

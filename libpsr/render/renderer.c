@@ -7,15 +7,11 @@
 int psr_renderer_create(struct psr_renderer **out, struct psr_error *err)
 {
 	struct psr_renderer *r = calloc(1, sizeof *r);
-	fenv_t callers;
 
 	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a renderer");
 	r->simd = simd_get();
-	set_environment(&callers);
-	for (int i = 0; i < 65536; i++)
-		r->srgb[i] = psr_linear_to_srgb((float)i / 65535.0f);
-	fesetenv(&callers);
+	r->srgb = psr_srgb_of_16_bits();
 	*out = r;
 	return PSR_OK;
 }

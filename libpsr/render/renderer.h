@@ -23,7 +23,7 @@ struct psr_renderer {
 	struct refiner *refiner; /* NULL until psr_render draws a pass above 0 */
 	float (*lit)[4]; /* diffuse light by normal */
 	size_t lit_size;
-	uint8_t srgb[65536];         /* 8 bits of 16-bit linear light */
+	const uint8_t *srgb;         /* 8 bits of 16-bit linear light */
 	const struct inside *inside; /* of frames with splats, or NULL */
 	struct psr_report report;    /* of the stages up to the z-stack */
 	/* Of the call in progress. */

@@ -34,22 +34,37 @@ static void tabulate_part(int part, void *userdata)
 	t->simd->strip_lit(t->lit, &plan->view, &lights, (uint32_t)part * STRIP, STRIP);
 }
 
-void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
+int shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4])
 {
 	struct tabulating tabulating = { simd, plan, lit };
 
 	_Static_assert(PSR_DIRECTIONS % STRIP == 0, "parts are whole strips");
-	psr_pool_for(pool, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
+	return psr_pool_for_until(pool, &plan->cancel, PSR_DIRECTIONS / STRIP, tabulate_part, &tabulating);
+}
+
+/* Takes the share of the light that glass keeps back. */
+static void dim(float *reaches, const struct simd *simd, const struct plan *plan, const struct strip *strip,
+                const struct shadow_light *shadow)
+{
+	float passes[STRIP];
+
+	for (int c = SHADOW_OPAQUE + 1; c < SHADOW_CASTERS; c++)
+		if (shadow[c].n_maps && simd->strip_shadow(strip, &shadow[c], passes))
+			for (uint32_t i = 0; i < strip->n; i++)
+				reaches[i] *= 1 - plan->shadow_share[c] * (1 - passes[i]);
 }
 
 static void add_light(const struct simd *simd, const struct plan *plan, struct strip *strip, uint32_t l)
 {
+	const struct shadow_light *shadow = plan->shadow != NULL ? plan->shadow + (size_t)l * SHADOW_CASTERS : NULL;
 	float reaches[STRIP];
 
-	if (plan->shadow == NULL || !plan->shadow[l].n_maps)
+	if (shadow == NULL || !shadow[SHADOW_OPAQUE].n_maps) {
 		simd->strip_light(strip, &plan->light[l], NULL);
-	else if (simd->strip_shadow(strip, &plan->shadow[l], reaches))
+	} else if (simd->strip_shadow(strip, &shadow[SHADOW_OPAQUE], reaches)) {
+		dim(reaches, simd, plan, strip, shadow);
 		simd->strip_light(strip, &plan->light[l], reaches);
+	}
 }
 
 _Static_assert(PART_WIDTH % STRIP == 0, "a strip lies in one part");
@@ -140,6 +155,8 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 		const int is_timed = (i % per_row + i / per_row) % TIMED_EVERY == 0;
 		const uint64_t start = is_timed ? clock_ns() : 0;
 
+		if (is_timed && plan_is_cancelled(plan))
+			return;
 		strip.pixels = &pixels[i % 2];
 		if (i + 1 < n)
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);

@@ -11,9 +11,10 @@ struct shade_counts {
 	uint64_t row_ns, fill_ns;      /* of all work on a row of bricks, and of the fill's part; pipeline.c sets them */
 };
 
-/* Whether to tabulate diffuse light by normal ([B] 4.1), and if so, the table of PSR_DIRECTIONS rows. */
+/* Whether to tabulate diffuse light by normal ([B] 4.1), and if so, the table of PSR_DIRECTIONS rows. CANCELLED.
+ * */
 enum psr_why shade_wants_table(const struct plan *plan);
-void shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4]);
+int shade_tabulate(const struct simd *simd, const struct plan *plan, struct psr_pool *pool, float (*lit)[4]);
 
 /* A picture: its samples, and where its colours go. */
 struct shade_picture {

@@ -4,21 +4,20 @@
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/vec.h"
+#include "placed.h"
 #include "shadow.h"
+#include "sheer.h"
 
-/* All of an instance that maps depend on. */
-struct placed {
-	uint8_t content_id[16];
-	double rotation[4], translation[3], scale;
-};
+#define MOST_MAPS (PSR_MAX_LIGHTS * SHADOW_CASTERS * SHADOW_FACES)
 
 struct shadow {
 	struct shadow_drawer drawer;
-	struct placed *placed; /* instances in the kept maps */
-	uint32_t n_placed;
-	struct shadow_kept kept[PSR_MAX_LIGHTS][SHADOW_FACES];
-	uint32_t n_maps[PSR_MAX_LIGHTS];
-	struct shadow_light light[PSR_MAX_LIGHTS]; /* of the picture in progress, in its plan's order */
+	struct placed placed; /* in the kept maps */
+	int has_shares;
+	float share[SHADOW_CASTERS]; /* of the light that casters keep back; 0: there is none of the class */
+	struct shadow_kept kept[MOST_MAPS]; /* by light, caster and face */
+	uint32_t n_maps[PSR_MAX_LIGHTS]; /* of each caster */
+	struct shadow_light light[PSR_MAX_LIGHTS][SHADOW_CASTERS]; /* of the picture in progress, in its plan's order */
 };
 
 static void drop(struct shadow_kept *kept)
@@ -31,13 +30,12 @@ void shadow_destroy(struct shadow *shadow)
 {
 	if (shadow == NULL)
 		return;
-	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
-		for (int f = 0; f < SHADOW_FACES; f++)
-			drop(&shadow->kept[l][f]);
+	for (int i = 0; i < MOST_MAPS; i++)
+		drop(&shadow->kept[i]);
 	plan_clear(&shadow->drawer.plan);
 	psr_free_huge(shadow->drawer.word, shadow->drawer.word_size);
 	psr_free_huge(shadow->drawer.cells, shadow->drawer.cells_size);
-	free(shadow->placed);
+	placed_clear(&shadow->placed);
 	free(shadow);
 }
 
@@ -47,10 +45,14 @@ uint64_t shadow_bytes(const struct shadow *shadow)
 		return 0;
 	const struct shadow_drawer *drawer = &shadow->drawer;
 	uint64_t n = sizeof *shadow + drawer->plan.storage_size + drawer->word_size + drawer->cells_size;
-	for (int l = 0; l < PSR_MAX_LIGHTS; l++)
-		for (int f = 0; f < SHADOW_FACES; f++)
-			n += shadow->kept[l][f].cells_size;
-	return n + shadow->n_placed * sizeof *shadow->placed;
+	for (int i = 0; i < MOST_MAPS; i++)
+		n += shadow->kept[i].cells_size;
+	return n + placed_bytes(&shadow->placed);
+}
+
+static struct shadow_kept *kept_of(struct shadow *shadow, uint32_t light, int caster, uint32_t face)
+{
+	return &shadow->kept[(light * SHADOW_CASTERS + (uint32_t)caster) * SHADOW_FACES + face];
 }
 
 static int has_color(const struct psr_light *light)
@@ -106,40 +108,52 @@ static int reaches_view(const struct plan *plan, const struct psr_light *light, 
 	return 0;
 }
 
-/* Keeps the instances; *has_changed: they differ from those before. */
-static int note_instances(struct shadow *shadow, const struct psr_scene *scene, int *has_changed)
+/* Keeps the instances. If they differ from those before, no map is drawn any more. */
+static int note_instances(struct shadow *shadow, const struct psr_scene *scene)
 {
-	const uint32_t n = scene->n_instances;
+	int has_changed;
+	const int rc = placed_note(&shadow->placed, scene, &has_changed);
 
-	*has_changed = n != shadow->n_placed;
-	if (*has_changed) {
-		free(shadow->placed);
-		shadow->placed = calloc(n, sizeof *shadow->placed);
-		shadow->n_placed = shadow->placed != NULL ? n : 0;
-		if (shadow->placed == NULL)
-			return PSR_ERR_MEMORY;
-	}
-	for (uint32_t i = 0; i < n; i++) {
-		const struct psr_instance *from = &scene->instance[i];
-		struct placed to = { .scale = from->scale };
+	for (int i = 0; has_changed && i < MOST_MAPS; i++)
+		shadow->kept[i].is_drawn = 0;
+	shadow->has_shares &= !has_changed;
+	return rc;
+}
 
-		psr_model_content_id(from->model, to.content_id);
-		memcpy(to.rotation, from->rotation, sizeof to.rotation);
-		memcpy(to.translation, from->translation, sizeof to.translation);
-		*has_changed |= memcmp(&to, &shadow->placed[i], sizeof to) != 0;
-		shadow->placed[i] = to;
+/* Finds the mean opacity of each class of glass. */
+static int find_shares(struct shadow *shadow, const struct plan *plan)
+{
+	double sum[SHADOW_CASTERS] = { 0 };
+	uint64_t n[SHADOW_CASTERS] = { 0 };
+
+	for (uint32_t i = 0; i < plan->n_instances; i++) {
+		const struct psr_blocks *b = plan->instance[i].cull.blocks;
+		uint32_t first = 0;
+
+		while (plan->instance[first].cull.blocks != b)
+			first++;
+		for (uint32_t k = 0; b->opacity != NULL && first == i && k < b->n_blocks; k++) {
+			float opacity = 0;
+
+			if (plan_is_cancelled_at(plan, k))
+				return PSR_ERR_CANCELLED;
+			if (!psr_blocks_is_sheer(b, k))
+				continue;
+			const int caster = sheer_caster(&opacity, b, k);
+			sum[caster] += (double)opacity;
+			n[caster]++;
+		}
 	}
+	shadow->share[SHADOW_OPAQUE] = 1;
+	for (int c = SHADOW_OPAQUE + 1; c < SHADOW_CASTERS; c++)
+		shadow->share[c] = n[c] ? (float)(sum[c] / (double)n[c]) : 0;
+	shadow->has_shares = 1;
 	return PSR_OK;
 }
 
 static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 {
-	const struct psr_camera *p = &a->camera, *q = &b->camera;
-
-	return a->width == b->width && a->height == b->height && memcmp(p->eye, q->eye, sizeof p->eye) == 0
-	       && memcmp(p->target, q->target, sizeof p->target) == 0 && memcmp(p->up, q->up, sizeof p->up) == 0
-	       && p->kind == q->kind && p->fov_y == q->fov_y && p->ortho_height == q->ortho_height
-	       && p->near_z == q->near_z;
+	return a->width == b->width && a->height == b->height && placed_same_camera(&a->camera, &b->camera);
 }
 
 /* Texels a side: as many as the picture's greater side has pixels, but at most SHADOW_TEXELS in the n_maps of the whole
@@ -155,34 +169,49 @@ static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 	return side;
 }
 
+/* Fits the maps of a light and a caster, which stay drawn if they fit as before; drops those that there are no more. */
+static void fit_maps(struct shadow *shadow, uint32_t light, int caster, const struct shadow_fit *fit)
+{
+	const uint32_t n = shadow->share[caster] > 0 ? shadow->n_maps[light] : 0;
+
+	for (uint32_t f = 0; f < SHADOW_FACES; f++) {
+		struct shadow_kept *kept = kept_of(shadow, light, caster, f);
+
+		if (kept->cells != NULL && (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height))
+			drop(kept);
+		kept->caster = caster;
+		if (f < n && !same_fit(&kept->fit, &fit[f])) {
+			kept->is_drawn = 0;
+			kept->fit = fit[f];
+		}
+	}
+}
+
 /* Fits the maps of all lights that can cast, in view or not, and drops other maps. */
-static void fit_lights(struct shadow *shadow, const struct psr_scene *scene, const struct plan *plan, int has_changed)
+static int fit_lights(struct shadow *shadow, const struct psr_scene *scene, const struct plan *plan,
+                      struct psr_error *err)
 {
 	struct shadow_bounds bounds;
 	struct shadow_fit fit[SHADOW_FACES];
-	uint32_t n_maps = 0;
+	uint32_t n_maps = 0, n_casters = 0;
 
 	shadow_bounds_make(&bounds, scene);
-	for (uint32_t l = 0; l < scene->n_lights; l++)
+	for (uint32_t l = 0; l < scene->n_lights && !plan_is_cancelled(plan); l++)
 		if (can_cast(&scene->light[l]))
 			n_maps += shadow_fit_light(fit, &scene->light[l], scene, &bounds, SHADOW_SIDE);
-	const uint32_t side = side_of(plan, n_maps);
+	for (int c = SHADOW_OPAQUE; c < SHADOW_CASTERS; c++)
+		n_casters += shadow->share[c] > 0;
+	const uint32_t side = side_of(plan, n_maps * n_casters);
 	for (uint32_t l = 0; l < PSR_MAX_LIGHTS; l++) {
+		if (plan_is_cancelled(plan))
+			return render_cancelled(err);
 		const int can = l < scene->n_lights && can_cast(&scene->light[l]);
-		const uint32_t n = can ? shadow_fit_light(fit, &scene->light[l], scene, &bounds, side) : 0;
 
-		shadow->n_maps[l] = n;
-		for (uint32_t f = 0; f < SHADOW_FACES; f++) {
-			struct shadow_kept *kept = &shadow->kept[l][f];
-
-			if (kept->cells != NULL && (f >= n || kept->fit.width != fit[f].width || kept->fit.height != fit[f].height))
-				drop(kept);
-			if (f < n && (has_changed || !same_fit(&kept->fit, &fit[f]))) {
-				kept->is_drawn = 0;
-				kept->fit = fit[f];
-			}
-		}
+		shadow->n_maps[l] = can ? shadow_fit_light(fit, &scene->light[l], scene, &bounds, side) : 0;
+		for (int c = SHADOW_OPAQUE; c < SHADOW_CASTERS; c++)
+			fit_maps(shadow, l, c, fit);
 	}
+	return PSR_OK;
 }
 
 /* Whether the plan has the light; plans keep the scene's order. */
@@ -191,16 +220,12 @@ static int is_planned(const struct plan *plan, const struct psr_light *light)
 	return plan->is_full || has_color(light);
 }
 
-/* Light l of the scene, p of the plan: draws its missing maps. */
-static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct plan *plan,
-                         const struct shadow_call *call)
+/* The maps of a caster for light l of the scene: draws those that are missing. */
+static int prepare_maps(struct shadow *shadow, struct shadow_light *light, uint32_t l, int caster,
+                        const struct plan *plan, const struct shadow_call *call)
 {
-	struct shadow_light *light = &shadow->light[p];
-	const int is_needed = plan->is_full || reaches_view(plan, &call->scene->light[l], p);
-
-	light->n_maps = is_needed ? shadow->n_maps[l] : 0;
 	for (uint32_t f = 0; f < light->n_maps; f++) {
-		struct shadow_kept *kept = &shadow->kept[l][f];
+		struct shadow_kept *kept = kept_of(shadow, l, caster, f);
 
 		if (!kept->is_drawn) {
 			int rc = shadow_map_draw(kept, &shadow->drawer, call);
@@ -215,11 +240,27 @@ static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const st
 	return PSR_OK;
 }
 
+/* Light l of the scene, p of the plan. */
+static int prepare_light(struct shadow *shadow, uint32_t l, uint32_t p, const struct plan *plan,
+                         const struct shadow_call *call)
+{
+	const int is_needed = plan->is_full || reaches_view(plan, &call->scene->light[l], p);
+	int rc = PSR_OK;
+
+	for (int c = SHADOW_OPAQUE; c < SHADOW_CASTERS && rc == PSR_OK; c++) {
+		struct shadow_light *light = &shadow->light[p][c];
+
+		light->n_maps = is_needed && shadow->share[c] > 0 ? shadow->n_maps[l] : 0;
+		rc = prepare_maps(shadow, light, l, c, plan, call);
+	}
+	return rc;
+}
+
 int shadow_prepare(struct shadow **out, struct plan *plan, const struct shadow_call *call)
 {
 	const struct psr_scene *scene = call->scene;
 	struct psr_report *report = call->report;
-	int n_casting = 0, has_changed;
+	int n_casting = 0;
 
 	for (uint32_t l = 0; l < scene->n_lights; l++)
 		n_casting += can_cast(&scene->light[l]);
@@ -232,20 +273,21 @@ int shadow_prepare(struct shadow **out, struct plan *plan, const struct shadow_c
 	if (*out == NULL)
 		*out = calloc(1, sizeof **out);
 	struct shadow *shadow = *out;
-	if (shadow == NULL || note_instances(shadow, scene, &has_changed))
+	if (shadow == NULL || note_instances(shadow, scene))
 		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for shadow maps");
-	fit_lights(shadow, scene, plan, has_changed);
-	for (uint32_t l = 0, p = 0; l < scene->n_lights; l++) {
-		if (!is_planned(plan, &scene->light[l]))
-			continue;
-		int rc = prepare_light(shadow, l, p++, plan, call);
-		if (rc)
-			return rc;
-	}
+	if (!shadow->has_shares && find_shares(shadow, plan))
+		return render_cancelled(call->err);
+	int rc = fit_lights(shadow, scene, plan, call->err);
+	for (uint32_t l = 0, p = 0; rc == PSR_OK && l < scene->n_lights; l++)
+		if (is_planned(plan, &scene->light[l]))
+			rc = prepare_light(shadow, l, p++, plan, call);
+	if (rc)
+		return rc;
 	effect_note(report, PSR_EFFECT_SHADOWS, report->n_shadow_maps ? PSR_WHY_RAN : PSR_WHY_NOTHING,
 	            report->n_shadow_maps);
 	if (report->n_shadow_maps) {
-		plan->shadow = shadow->light;
+		plan->shadow = shadow->light[0];
+		plan->shadow_share = shadow->share;
 		plan->view.needs |= STRIP_POSITION;
 	}
 	return PSR_OK;

@@ -11,6 +11,7 @@
 struct shadow; /* kept maps, and working memory */
 
 struct shadow_call {
+	const struct psr_cancel *cancel;
 	const struct simd *simd;
 	struct bins *bins; /* scratch; contents are lost */
 	const struct psr_scene *scene;
@@ -19,8 +20,9 @@ struct shadow_call {
 	struct psr_error *err;
 };
 
-/* Sets plan->shadow to the maps of the lights that cast shadows, have a colour and reach an instance in view, and tells
- * the plan what shading needs. Draws missing maps. Allocates *shadow when the first light needs it. MEMORY, LIMIT. */
+/* Sets plan->shadow and shadow_share to the maps of the lights that cast shadows, have a colour and reach an instance in
+ * view, and tells the plan what shading needs. Draws missing maps. Allocates *shadow when the first light needs it.
+ * MEMORY, LIMIT; CANCELLED, after which the next call draws the maps that are still missing. */
 int shadow_prepare(struct shadow **shadow, struct plan *plan, const struct shadow_call *call);
 
 /* Limits the texels of all maps of a renderer. A texel takes 2 bytes, plus two thirds with z-buffer levels; drawing
@@ -54,7 +56,7 @@ uint32_t shadow_fit_light(struct shadow_fit fit[SHADOW_FACES], const struct psr_
 /* ---- map: drawing one ---- */
 
 struct shadow_kept {
-	int is_drawn;
+	int is_drawn, caster; /* of the plan */
 	struct shadow_fit fit;
 	double axes[3][3], eye[3]; /* of its camera, as in a plan */
 	int exponent;

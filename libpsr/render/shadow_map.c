@@ -60,7 +60,7 @@ static void draw_some(int part, void *userdata)
 	const uint32_t n_tiles = d->drawer->plan.tiles_x * d->drawer->plan.tiles_y;
 	uint64_t *own = d->drawer->word + (size_t)part * WARP_OWN_WORDS;
 
-	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
+	for (uint32_t i; !plan_is_cancelled(&d->drawer->plan) && (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], own);
 }
 
@@ -99,7 +99,7 @@ static void make_seams(int k, void *userdata)
 	const uint32_t height = d->stack.level[k].height, finer_height = d->stack.level[k - 1].height;
 	const float *own = drawn(d, map->level[k].z), *fine = drawn(d, map->level[k - 1].z);
 	float *to = drawn(d, map->level[k].seam);
-	for (uint32_t j = 0; j < height; j++)
+	for (uint32_t j = 0; j < height && !plan_is_cancelled(&d->drawer->plan); j++)
 		for (uint32_t i = 0; i < stride; i++) {
 			float z = own[(size_t)j * stride + i];
 
@@ -135,6 +135,8 @@ static void sink_part(int part, void *userdata)
 		const uint32_t height = d->stack.level[k].height;
 		const uint32_t begin = height * (uint32_t)part / SINK_PARTS, end = height * ((uint32_t)part + 1) / SINK_PARTS;
 
+		if (plan_is_cancelled(&d->drawer->plan))
+			return;
 		if (d->map->level[k].z != NULL)
 			sink_rows(d, d->map->level[k].z, k, begin, end);
 		if (d->map->level[k].seam != NULL)
@@ -209,15 +211,18 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	kept->is_drawn = 0;
 	render_settings_default(&settings, kept->fit.width, kept->fit.height);
 	settings.cull_tests = 0;
+	settings.cancel = *call->cancel;
 	int rc = plan_make(plan, &scene, &settings, call->err);
 	if (rc)
 		return rc;
-	plan->is_shadow = 1;
+	plan->caster = kept->caster;
 	for (uint32_t i = 0; i < plan->n_instances; i++)
 		plan->instance[i].cull.both_sides = 1;
 	rc = cull_blocks(call->bins, call->simd, plan, call->pool, &report);
 	if (rc == PSR_ERR_LIMIT)
 		return psr_fail(call->err, rc, "too many blocks for a shadow map");
+	if (rc == PSR_ERR_CANCELLED)
+		return render_cancelled(call->err);
 	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size,
 	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
 	if (rc || drawer->word == NULL || prepare_cells(kept, &d, report.levels))
@@ -225,9 +230,13 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 		                kept->fit.height);
 	note_plan(kept, plan);
 	clear_band(&d);
-	psr_pool_for(call->pool, n_parts, draw_some, &d);
-	psr_pool_for(call->pool, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
-	psr_pool_for(call->pool, SINK_PARTS, sink_part, &d);
+	rc = psr_pool_for_until(call->pool, call->cancel, n_parts, draw_some, &d);
+	if (rc == PSR_OK)
+		rc = psr_pool_for_until(call->pool, call->cancel, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
+	if (rc == PSR_OK)
+		rc = psr_pool_for_until(call->pool, call->cancel, SINK_PARTS, sink_part, &d);
+	if (rc)
+		return render_cancelled(call->err);
 	kept->is_drawn = 1;
 	call->report->count[PSR_STAGE_SHADOW] += d.n_samples;
 	return PSR_OK;

@@ -2,11 +2,13 @@
 #include <math.h>
 #include <stdatomic.h>
 #include <stdlib.h>
+#include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "block.h"
+#include "planes.h"
 #include "shade.h"
 #include "sheer.h"
 #include "splat.h"
@@ -20,18 +22,22 @@
  * at silhouettes. */
 #define LAYER_STEPS 3.0f
 #define LEAST_COSINE 0.1f
+/* Light let through at most where depth and planes tell of the nearest layer. */
+#define HALF 0.5f
 
 /* A tile's layers, in rows WARP_OWN_STRIDE apart. */
 struct sheer_tile {
 	struct sheer_list list;
-	uint32_t next[WARP_OWN_WORDS]; /* of the list */
+	uint32_t last[WARP_OWN_WORDS]; /* of the list */
 	uint8_t n_words[WARP_OWN_WORDS];
 	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
 	float beyond[WARP_OWN_WORDS];  /* z' where the layer ends */
 	float before[WARP_OWN_WORDS];  /* z' of the opaque picture */
 	float first[WARP_OWN_WORDS];   /* z' of the nearest layer, or infinity */
+	uint64_t front[WARP_OWN_WORDS]; /* its word; of frames with planes */
 	float through[WARP_OWN_WORDS]; /* share of the light behind that the layers let through */
 	float light[3][WARP_OWN_WORDS];
+	uint8_t is_done[TILE_HEIGHT][TILE_WIDTH / STRIP]; /* strips without words beyond their layers */
 	struct strip_pixels pixels;
 	struct strip strip;
 };
@@ -53,24 +59,28 @@ struct area {
 	uint32_t x0, y0, width, low_y, high_y;
 };
 
-/* Whether a block absorbs at least half of the light. */
-static int casts_shadow(const struct psr_blocks *b, uint32_t block)
+int sheer_caster(float *opacity, const struct psr_blocks *b, uint32_t block)
 {
-	const uint8_t *opacity = b->opacity + psr_blocks_attr_first(b, block);
+	const uint8_t *of_sample = b->opacity + psr_blocks_attr_first(b, block);
 	const int n = __builtin_popcountll(b->mask[block]);
 	int sum = 0;
 
 	for (int i = 0; i < n; i++)
-		sum += opacity[i];
-	return 2 * sum >= n * PSR_OPAQUE;
+		sum += of_sample[i];
+	*opacity = (float)sum / (float)(n * PSR_OPAQUE);
+	return *opacity <= 0.25f ? 1 : *opacity <= 0.5f ? 2 : *opacity <= 0.75f ? 3 : 4;
 }
 
-static int is_sheer(const struct plan *plan, const struct bin_entry *entry)
+/* Whether the warp draws a block: opaque ones, or in a shadow map of glass the sheer ones of its class. */
+static int is_warped(const struct plan *plan, const struct bin_entry *entry)
 {
 	const struct plan_instance *in = &plan->instance[entry->instance];
 	const uint32_t block = entry->slot - in->first_slot;
+	float opacity;
 
-	return psr_blocks_is_sheer(in->cull.blocks, block) && !(plan->is_shadow && casts_shadow(in->cull.blocks, block));
+	if (!psr_blocks_is_sheer(in->cull.blocks, block))
+		return plan->caster <= SHADOW_OPAQUE;
+	return plan->caster > SHADOW_OPAQUE && sheer_caster(&opacity, in->cull.blocks, block) == plan->caster;
 }
 
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile)
@@ -78,11 +88,13 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 	uint32_t begin = bins->tile_begin[tile], end = bins->tile_begin[tile + 1];
 
 	if (!plan->has_sheer)
-		return end;
+		return plan->caster <= SHADOW_OPAQUE ? end : begin;
 	while (begin < end) {
 		const struct bin_entry entry = bins->entry[begin];
 
-		if (!is_sheer(plan, &entry)) {
+		if (plan_is_cancelled_at(plan, end - begin))
+			break;
+		if (is_warped(plan, &entry)) {
 			begin++;
 			continue;
 		}
@@ -120,11 +132,12 @@ static size_t place_of(const struct area *area, uint32_t y)
 
 static void begin_layers(struct sheer_tile *l, const struct drawing *d, const struct area *area)
 {
+	memset(l->is_done, 0, sizeof l->is_done);
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
 
 		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
-			l->next[at] = SHEER_END;
+			l->last[at] = SHEER_END;
 			l->n_words[at] = 0;
 			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
 			l->beyond[at] = 0;
@@ -157,33 +170,45 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t firs
 	const size_t at = first + pixels->x[i];
 	const struct plan_instance *in = &plan->instance[n];
 	const struct psr_blocks *b = in->cull.blocks;
-	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot;
-	const size_t sample = block_index(b, block, id % PSR_BLOCK_SAMPLES);
-	const uint32_t opacity = b->opacity[sample];
+	const uint32_t block = id / PSR_BLOCK_SAMPLES - in->first_slot, opacity = b->opacity[pixels->at[i] - b->attr];
 	const float z = psr_float_from_bits((uint32_t)(l->word[at] >> 32)), back = (float)opacity * (1.0f / PSR_OPAQUE);
 	const float share = l->through[at] * back;
 
 	for (int c = 0; c < 3; c++)
 		l->light[c][at] += share * ((float)color[c] * (1.0f / 65535));
 	l->through[at] = opacity == PSR_OPAQUE ? 0 : l->through[at] - share;
-	l->first[at] = z < l->first[at] ? z : l->first[at];
+	if (z < l->first[at]) {
+		l->first[at] = z;
+		l->front[at] = l->word[at];
+	}
 	l->beyond[at] = l->through[at] < LEAST_THROUGH
 	                        ? INFINITY
-	                        : z + thickness_of(&plan->warp[n], b->attr[sample], x, pixels->y, splat_rim(in, block));
+	                        : z + thickness_of(&plan->warp[n], l->strip.attr[i], x, pixels->y, splat_rim(in, block));
 }
 
-/* Finds the nearest words beyond the layers drawn so far. */
-static void find_layer(struct sheer_tile *l, const struct area *area)
+/* Finds the nearest words beyond the layers drawn so far, and forgets those in front. */
+static void find_layer(struct sheer_tile *l, const struct plan *plan, const struct area *area)
 {
-	for (uint32_t y = area->low_y; y < area->high_y; y++)
-		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
-			uint32_t i = l->next[at];
+	struct sheer_list *list = &l->list;
+	const size_t first = place_of(area, area->low_y);
+	const float *beyond = l->beyond + first;
+	uint64_t *nearest = l->word + first;
+	uint32_t n = 0;
 
-			while (i != SHEER_END && !(psr_float_from_bits((uint32_t)(l->list.word[i].word >> 32)) > l->beyond[at]))
-				i = l->list.word[i].next;
-			l->next[at] = i;
-			l->word[at] = i != SHEER_END ? l->list.word[i].word : PSR_WORD_EMPTY;
-		}
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++)
+			l->word[at] = PSR_WORD_EMPTY;
+	for (uint32_t i = 0; i < list->n && !plan_is_cancelled_at(plan, i); i++) {
+		const struct sheer_word w = list->word[i];
+
+		const int is_beyond = psr_float_from_bits((uint32_t)(w.word >> 32)) > beyond[w.at];
+		const uint64_t word = is_beyond ? w.word : PSR_WORD_EMPTY;
+
+		nearest[w.at] = word < nearest[w.at] ? word : nearest[w.at];
+		list->word[n] = w;
+		n += (uint32_t)is_beyond;
+	}
+	list->n = n;
 }
 
 /* Returns how many pixels the layer has. */
@@ -195,12 +220,20 @@ static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const s
 		for (uint32_t x = 0; x < area->width; x += STRIP) {
 			const uint32_t n = area->width - x < STRIP ? area->width - x : STRIP;
 			const size_t first = place_of(area, y) + x;
+			uint8_t *is_done = &l->is_done[y - area->y0][x / STRIP];
 
+			if (*is_done)
+				continue;
+			if (plan_is_cancelled(d->plan))
+				return 0;
 			l->pixels.x0 = area->x0 + x;
 			l->pixels.y = y;
 			const uint32_t n_found = shade_part(d->simd, d->plan, l->word + first, n, &l->pixels, &l->strip);
 			for (uint32_t i = 0; i < n_found; i++)
+				__builtin_prefetch(psr_direction_table()[PSR_ATTR_NORMAL(l->strip.attr[i])]);
+			for (uint32_t i = 0; i < n_found; i++)
 				add_pixel(l, d->plan, first, i);
+			*is_done = n_found == 0;
 			n_pixels += n_found;
 		}
 	return n_pixels;
@@ -226,11 +259,25 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, 
 				continue;
 			for (size_t c = 0; p->rgb != NULL && c < 3; c++)
 				p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
-			if (l->through[from] <= 0.5f)
+			if (l->through[from] <= HALF)
 				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
 			n_pixels++;
 		}
 	return n_pixels;
+}
+
+/* Where the layers keep back half of the light or more, the planes tell of the nearest. */
+static void put_planes(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+{
+	for (uint32_t y = area->low_y; y < area->high_y && !plan_is_cancelled(d->plan); y++)
+		for (uint32_t x = 0; x < area->width; x += STRIP) {
+			const struct planes_part part = { area->x0 + x, y, area->width - x < STRIP ? area->width - x : STRIP };
+			const size_t first = place_of(area, y) + x;
+
+			for (size_t at = first; at < first + part.n; at++)
+				l->word[at] = l->first[at] < INFINITY && l->through[at] <= HALF ? l->front[at] : PSR_WORD_EMPTY;
+			planes_over(d->simd, d->plan, d->picture->planes, l->word + first, &part);
+		}
 }
 
 static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
@@ -248,7 +295,7 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 	target.y0 = (int32_t)area.low_y;
 	target.y1 = (int32_t)area.high_y;
 	l->list.before = l->before + place_of(&area, area.low_y);
-	l->list.first = l->next + place_of(&area, area.low_y);
+	l->list.last = l->last + place_of(&area, area.low_y);
 	l->list.n_words = l->n_words + place_of(&area, area.low_y);
 	l->list.n = 0;
 	l->list.failed = 0; /* of an earlier picture */
@@ -258,11 +305,13 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 		return;
 	}
 	for (int layer = 0; layer < MOST_LAYERS; layer++) {
-		find_layer(l, &area);
+		find_layer(l, d->plan, &area);
 		if (!add_layer(l, d, &area))
 			break;
 	}
 	atomic_fetch_add(&d->n_pixels, end_layers(l, d, &area));
+	if (d->picture->planes != NULL)
+		put_planes(l, d, &area);
 }
 
 static void draw_some(int part, void *userdata)
@@ -270,7 +319,7 @@ static void draw_some(int part, void *userdata)
 	struct drawing *d = userdata;
 	const uint32_t n_tiles = d->plan->tiles_x * d->plan->tiles_y;
 
-	for (uint32_t i; (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
+	for (uint32_t i; !plan_is_cancelled(d->plan) && (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
 		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
 }
 
@@ -307,9 +356,9 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 	d.tile = sheer->tile;
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
-	psr_pool_for(pool, n_parts, draw_some, &d);
+	const int rc = psr_pool_for_until(pool, &plan->cancel, n_parts, draw_some, &d);
 	sheer->n_pixels = d.n_pixels;
-	return d.failed ? PSR_ERR_MEMORY : PSR_OK;
+	return d.failed ? PSR_ERR_MEMORY : rc;
 }
 
 float *sheer_depths(struct sheer *sheer, const struct plan *plan)
@@ -326,6 +375,15 @@ void sheer_clear(struct sheer *sheer)
 		free(sheer->tile[i].list.word);
 	free(sheer->tile);
 	psr_free_huge(sheer->depth, sheer->depth_size);
+}
+
+uint64_t sheer_most_bytes(uint64_t n_pixels, int n_threads)
+{
+	const uint64_t grown = 2 * SHEER_MOST * n_pixels + 65536; /* sheer_grow() */
+	const uint64_t n_words = grown < SHEER_LIST_MOST ? grown : SHEER_LIST_MOST;
+
+	return n_pixels * sizeof(float)
+	       + (uint64_t)n_threads * (sizeof(struct sheer_tile) + n_words * sizeof(struct sheer_word));
 }
 
 uint64_t sheer_bytes(const struct sheer *sheer)

@@ -14,49 +14,47 @@ struct sheer {
 
 #define SHEER_MOST 64 /* words of a pixel: eight layers of eight samples, so that a crowd of panes costs no more */
 
-/* The nearest words of a tile's sheer blocks: a list a pixel, nearest first. */
+/* The nearest words of a tile's sheer blocks, in the order of blocks. */
 struct sheer_list {
-	const float *before; /* z' of the opaque surface, which hides words behind it */
-	uint32_t *first;     /* by pixel; SHEER_END: none */
+	const float *before; /* by pixel: z' of the opaque surface, which hides words behind it */
+	uint32_t *last;      /* by pixel: its last word; SHEER_END: none */
 	uint8_t *n_words;    /* by pixel */
 	struct sheer_word {
 		uint64_t word;
-		uint32_t next;
+		uint32_t at;     /* its pixel */
+		uint32_t former; /* the pixel's word before it */
 	} *word;
 	uint32_t n, capacity;
 	int failed;          /* out of memory */
 };
 #define SHEER_END UINT32_MAX
 
-/* Makes room for more words. MEMORY, which also sets `failed`. */
+#define SHEER_LIST_MOST (TILE_WIDTH * TILE_HEIGHT * SHEER_MOST) /* words of a tile */
+
+/* Makes room for more words, SHEER_LIST_MOST at most. MEMORY, which also sets `failed`. */
 int sheer_grow(struct sheer_list *list);
+
+/* Puts a word into the place of the farthest of a pixel that has SHEER_MOST, if it is nearer. */
+void sheer_replace(struct sheer_list *list, uint32_t at, uint64_t word);
 
 static inline void sheer_add(struct sheer_list *list, uint32_t at, uint64_t word)
 {
-	uint32_t *link = &list->first[at], *last, to = list->n;
-
-	if (list->n_words[at] < SHEER_MOST && list->n == list->capacity && sheer_grow(list))
-		return;
-	while (*link != SHEER_END && list->word[*link].word < word)
-		link = &list->word[*link].next;
-	if (list->n_words[at] < SHEER_MOST) {
-		list->n_words[at]++;
-		list->n++;
-	} else if (*link != SHEER_END) { /* takes the place of the farthest */
-		for (last = link; list->word[*last].next != SHEER_END;)
-			last = &list->word[*last].next;
-		to = *last;
-		*last = SHEER_END;
-	} else {
+	if (list->n_words[at] == SHEER_MOST) {
+		sheer_replace(list, at, word);
 		return;
 	}
-	list->word[to] = (struct sheer_word){ word, *link };
-	*link = to;
+	if (list->n == list->capacity && sheer_grow(list))
+		return;
+	list->n_words[at]++;
+	list->word[list->n] = (struct sheer_word){ word, at, list->last[at] };
+	list->last[at] = list->n++;
 }
 
-/* Moves a tile's sheer entries behind its opaque ones, and returns the first sheer one. The warp draws the opaque ones.
- * In a shadow map a block that absorbs at least half of the light counts as opaque, and other sheer blocks cast no
- * shadow. */
+/* Finds the mean opacity of a sheer block, 0..1. Returns the class of its shadow. */
+int sheer_caster(float *opacity, const struct psr_blocks *blocks, uint32_t block);
+
+/* Moves the entries of a tile that the warp leaves out behind the others, and returns the first of them: of a picture
+ * the sheer ones, of a shadow map all that another map has. */
 uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t tile);
 
 /* Lists the words of blocks in a tile. Samples at most a pixel apart are pixels if the picture has no splats; all
@@ -64,11 +62,12 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
                        const struct warp_target *target);
 
-/* The picture to draw over: sRGB or NULL, and depths in world units. */
+/* The picture to draw over: sRGB or NULL, depths in world units, and the frame if it has other planes, or NULL. */
 struct sheer_picture {
 	uint8_t *rgb;
 	const uint8_t *srgb; /* 8 bits of 16-bit linear light */
 	float *depth;
+	const struct psr_frame *planes;
 	int exponent; /* of the stack */
 };
 
@@ -76,11 +75,13 @@ struct sheer_picture {
 float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
 /* Draws the eight nearest sheer surfaces of each pixel over the picture. Each hides its opacity's share of the light
- * behind it. Where they hide at least half of the light, the depth becomes that of the nearest. Sets sheer->n_pixels to
- * how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY. */
+ * behind it. Where they hide at least half of the light, depth and planes become those of the nearest. Sets
+ * sheer->n_pixels to how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY,
+ * CANCELLED. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);
 uint64_t sheer_bytes(const struct sheer *sheer);
+uint64_t sheer_most_bytes(uint64_t n_pixels, int n_threads); /* of pictures of so many pixels */
 
 #endif

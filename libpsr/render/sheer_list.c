@@ -13,8 +13,8 @@
 
 int sheer_grow(struct sheer_list *list)
 {
-	const uint32_t capacity = list->capacity < UINT32_MAX / 2 ? 2 * list->capacity + 65536 : 0;
-	struct sheer_word *grown = capacity ? realloc(list->word, capacity * sizeof *grown) : NULL;
+	const uint32_t more = 2 * list->capacity + 65536, capacity = more < SHEER_LIST_MOST ? more : SHEER_LIST_MOST;
+	struct sheer_word *grown = realloc(list->word, capacity * sizeof *grown);
 
 	list->failed |= grown == NULL;
 	if (grown == NULL)
@@ -22,6 +22,17 @@ int sheer_grow(struct sheer_list *list)
 	list->word = grown;
 	list->capacity = capacity;
 	return PSR_OK;
+}
+
+void sheer_replace(struct sheer_list *list, uint32_t at, uint64_t word)
+{
+	struct sheer_word *farthest = &list->word[list->last[at]];
+
+	for (uint32_t i = farthest->former; i != SHEER_END; i = list->word[i].former)
+		if (list->word[i].word > farthest->word)
+			farthest = &list->word[i];
+	if (word < farthest->word)
+		farthest->word = word;
 }
 
 /* Finds z' where the line of sight through a pixel's centre meets the plane of a sample at pixel (at[0], at[1]) and
@@ -42,43 +53,72 @@ static float center_depth(const struct plan *plan, const struct warp_instance *i
 	return z + (off < most ? off : most);
 }
 
-static void list_points(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                        struct sheer_list *list)
-{
-	const struct warp_instance *in = &plan->warp[entry->instance];
-	const float (*normals)[3] = psr_direction_table();
-	const float rim = splat_rim(&plan->instance[entry->instance], entry->slot - in->first_slot);
-	struct warp_terms terms;
-	struct warp_block b;
+/* The samples of a block that may show in the tile. */
+struct points {
+	uint32_t n, sample[PSR_BLOCK_SAMPLES], at[PSR_BLOCK_SAMPLES];
+	float place[PSR_BLOCK_SAMPLES][3]; /* pixel and z' */
+	const float *normal[PSR_BLOCK_SAMPLES];
+};
 
-	warp_block_make(&b, in, entry->slot);
-	warp_terms_make(&terms, &b);
-	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, b.attr++) {
-		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
-		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
-		const float z = warp_axis(&terms, &b, 2, r, c, depth), inverse = plan->perspective ? 1 / z : 1;
-		const float u = warp_axis(&terms, &b, 0, r, c, depth) * inverse;
-		const float v = warp_axis(&terms, &b, 1, r, c, depth) * inverse;
-		float d[3];
+/* Finds a block's samples in the tile that lie before the opaque surface or at most `most` behind it. Asks for their
+ * normals, which are far apart in memory. */
+static void find_points(struct points *points, const struct warp_block *b, const struct plan *plan,
+                        const struct warp_target *target, const float *before, float most)
+{
+	const float (*normals)[3] = psr_direction_table();
+	const uint16_t *depths = b->depth;
+	const uint64_t *attr = b->attr;
+	struct warp_terms terms;
+
+	points->n = 0;
+	warp_terms_make(&terms, b);
+	for (uint64_t left = b->mask; left; left &= left - 1, depths++, attr++) {
+		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7, i = points->n;
+		const float depth = (float)*depths, z = warp_axis(&terms, b, 2, r, c, depth);
+		const float inverse = plan->perspective ? 1 / z : 1;
+		const float u = warp_axis(&terms, b, 0, r, c, depth) * inverse;
+		const float v = warp_axis(&terms, b, 1, r, c, depth) * inverse;
 
 		if (!(z > plan->near_z && u >= (float)target->x0 && u < (float)target->x1 && v >= (float)target->y0
 		      && v < (float)target->y1))
 			continue;
-		for (int k = 0; k < 3; k++)
-			d[k] = (u * in->du[k] + v * in->dv[k]) + in->d0[k];
+		points->sample[i] = sample;
+		points->at[i] = (uint32_t)((int32_t)v - target->y0) * target->stride + (uint32_t)((int32_t)u - target->x0);
+		points->normal[i] = normals[PSR_ATTR_NORMAL(*attr)];
+		v3f_set(points->place[i], u, v, z);
+		__builtin_prefetch(points->normal[i]);
+		points->n += z - most < before[points->at[i]];
+	}
+}
+
+static void list_points(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
+                        struct sheer_list *list)
+{
+	const struct warp_instance *in = &plan->warp[entry->instance];
+	const float rim = splat_rim(&plan->instance[entry->instance], entry->slot - in->first_slot);
+	struct points points;
+	struct warp_block b;
+
+	warp_block_make(&b, in, entry->slot);
+	find_points(&points, &b, plan, target, list->before, (MOST_OFF + 1) * rim);
+	for (uint32_t i = 0; i < points.n; i++) {
+		const float *place = points.place[i], *n = points.normal[i];
+		float d[3];
+
+		for (int k = 0; entry->is_mixed && k < 3; k++)
+			d[k] = (place[0] * in->du[k] + place[1] * in->dv[k]) + in->d0[k];
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
-		const float center_z = center_depth(plan, in, n, (const float[3]){ u, v, z }, MOST_OFF * rim);
-		const uint32_t at = (uint32_t)((int32_t)v - target->y0) * target->stride + (uint32_t)((int32_t)u - target->x0);
-		if (center_z > plan->near_z && center_z - 0.5f * rim < list->before[at])
-			sheer_add(list, at, (uint64_t)psr_bits_from_float(center_z) << 32 | (b.id + sample));
+		const float z = center_depth(plan, in, n, place, MOST_OFF * rim);
+		if (z > plan->near_z && z - 0.5f * rim < list->before[points.at[i]])
+			sheer_add(list, points.at[i], (uint64_t)psr_bits_from_float(z) << 32 | (b.id + points.sample[i]));
 	}
 }
 
 void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
                        const struct warp_target *target)
 {
-	for (uint32_t e = 0; e < n; e++)
+	for (uint32_t e = 0; e < n && !plan_is_cancelled(plan); e++)
 		if (entry[e].level || plan->with_splats)
 			splat_list(plan, &entry[e], target, list);
 		else

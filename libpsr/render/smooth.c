@@ -56,8 +56,8 @@ static void smooth_row(int row, void *userdata)
 }
 _Static_assert(TILE_WIDTH <= SMOOTH_WIDTH && TILE_WIDTH <= 2 * PART_WIDTH && TILE_HEIGHT % BRICK == 0, "");
 
-uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-                        uint8_t *rgb)
+int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                   uint8_t *rgb)
 {
 	const float step = (float)(EDGE / (double)plan->focal);
 	struct smoothing smoothing = {
@@ -69,6 +69,5 @@ uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const st
 		smoothing.target.offset = ldexpf(step, plan->exponent);
 	}
 	atomic_store(&smooth->n_edges, 0);
-	psr_pool_for(pool, (int)((plan->height + BRICK - 1) / BRICK), smooth_row, &smoothing);
-	return atomic_load(&smooth->n_edges);
+	return psr_pool_for_until(pool, &plan->cancel, (int)((plan->height + BRICK - 1) / BRICK), smooth_row, &smoothing);
 }

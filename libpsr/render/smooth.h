@@ -18,8 +18,8 @@ struct smooth {
 int smooth_begin(struct smooth *smooth, const struct plan *plan, float *depth);
 void smooth_clear(struct smooth *smooth);
 
-/* Smooths the picture into `rgb`. Returns how many pixels are at an edge. */
-uint64_t smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
-                        uint8_t *rgb);
+/* Smooths the picture into `rgb`. CANCELLED. */
+int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct plan *plan, struct psr_pool *pool,
+                   uint8_t *rgb);
 
 #endif

@@ -21,6 +21,9 @@
 /* Steps by which a disc's rim counts as further away, so that a pixel shows the disc whose centre is nearest to it.
  * Measured. */
 #define RIM_DEPTH 1.0f
+/* Levels from which a block's discs cover so many pixels that each disc asks whether the frame is to end. */
+#define LONG_LISTED 2
+#define LONG_DRAWN 4
 
 struct splat_target {
 	const struct plan *plan;
@@ -233,6 +236,8 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 			d[k] = (s.at[0] * in->du[k] + s.at[1] * in->dv[k]) + in->d0[k];
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
+		if (entry->level >= (is_listed ? LONG_LISTED : LONG_DRAWN) && plan_is_cancelled(t->plan))
+			return;
 		find_plane(slope, share, &at, sample, n, projection);
 		for (int i = 0; i < 2; i++) {
 			float h[3];
@@ -250,13 +255,13 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 }
 
 /* Draws the samples' cells by the warp, which draws words, too. Blocks of level 0 get cells of two pixels. */
-static uint64_t draw_cells(const struct simd *simd, const struct warp_target *target, const struct psr_zstack *stack,
-                           const struct bin_entry *entry, uint32_t n)
+static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                           uint32_t levels, const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
 
-	simd->warp_clear(target, stack->levels);
-	for (uint32_t e = 0; e < n;) {
+	simd->warp_clear(target, levels);
+	for (uint32_t e = 0; e < n && !plan_is_cancelled(plan);) {
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
 
@@ -278,12 +283,12 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 
 	warp_target_make(&target, plan, stack, tile, NULL);
 	target.clean = clean;
-	counts.n_inside = draw_cells(simd, &target, stack, bins->entry + begin, end - begin);
+	counts.n_inside = draw_cells(simd, plan, &target, stack->levels, bins->entry + begin, end - begin);
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
 		                            target.x1, target.y1,   NULL };
-	for (uint32_t e = begin; e < end; e++)
+	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++)
 		draw_block(&t, &bins->entry[e], 0);
 	return counts;
 }

@@ -338,7 +338,7 @@ uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, co
 	for (uint32_t x = 0; x < stack->width; x += TILE_WIDTH) {
 		const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
 
-		for (uint32_t y = y0; y < y1; y++) {
+		for (uint32_t y = y0; y < y1 && !plan_is_cancelled(plan); y++) {
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 				if (stack->levels >> k & 1 && (y == y0 || y % (1u << k) == 0))
 					find_cells(&cells[k], &s, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);

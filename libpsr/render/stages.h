@@ -30,12 +30,11 @@ struct psr_window {
 #define PSR_MAX_PICTURE_SIDE (1 << 20)
 
 struct render_settings {
-	uint32_t width, height; /* these five as in struct psr_settings */
+	uint32_t width, height; /* these as in struct psr_settings */
 	double spacing_px;
 	int is_smooth;
 	unsigned pass;          /* read by refiner_draw() only */
-	int (*is_cancelled)(void *userdata);
-	void *userdata;
+	struct psr_cancel cancel; /* answers 0 never again after another answer; renderer_finish() asks it, too */
 
 	struct psr_window window;
 	unsigned cull_tests;    /* enum psr_cull_test, OR-ed; all by default */
@@ -67,6 +66,8 @@ int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct p
 void refiner_destroy(struct refiner *refiner); /* NULL is fine */
 /* Without the renderer's: two bytes a pixel of the largest picture, the rest independent of its size. */
 uint64_t refiner_bytes(const struct refiner *refiner);
+uint64_t refiner_most_bytes(uint64_t n_pixels); /* for frames of so many pixels */
+uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass); /* pixels that it draws at once */
 
 /* psr_render() of settings->pass. Blocks choose levels and depth buffers for 2^p x 2^p sub-pixels a pixel, so that
  * samples no longer fill whole pixels. Gaps between samples are closed well inside of the pixels that pass 0 covers.

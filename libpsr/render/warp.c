@@ -3,13 +3,15 @@
 
 #define OCCLUSION_BLOCKS 6144 /* of a tile: some eight samples a pixel; with fewer, looking costs what it saves */
 
+#define RUN 1024 /* blocks warped between two questions */
+
 /* The most frequent level above 0 among a tile's blocks; 0 if there is none. */
-static int most_frequent_level(const struct bin_entry *entry, uint32_t n)
+static int most_frequent_level(const struct plan *plan, const struct bin_entry *entry, uint32_t n)
 {
 	uint32_t count[PSR_MAX_DEPTH_LEVEL + 1] = { 0 };
 	int most = 0;
 
-	for (uint32_t e = 0; e < n; e++)
+	for (uint32_t e = 0; e < n && !plan_is_cancelled_at(plan, e); e++)
 		count[entry[e].level] += !entry[e].at_border;
 	count[0] = 0;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
@@ -17,16 +19,26 @@ static int most_frequent_level(const struct bin_entry *entry, uint32_t n)
 	return most;
 }
 
-/* Draws the blocks of one level first, without cells, and derives that level's cells from the words. */
-static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *target, uint32_t levels,
-                             const struct bin_entry *entry, uint32_t n)
+static uint64_t warp_runs(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                          const struct bin_entry *entry, uint32_t n)
 {
-	const int first = most_frequent_level(entry, n);
+	uint64_t n_inside = 0;
+
+	for (uint32_t first = 0; first < n && !plan_is_cancelled(plan); first += RUN)
+		n_inside += simd->warp(target, entry + first, n - first < RUN ? n - first : RUN);
+	return n_inside;
+}
+
+/* Draws the blocks of one level first, without cells, and derives that level's cells from the words. */
+static uint64_t warp_in_turn(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                             uint32_t levels, const struct bin_entry *entry, uint32_t n)
+{
+	const int first = most_frequent_level(plan, entry, n);
 	uint64_t n_inside = 0;
 
 	simd->warp_clear(target, first ? levels & ~(1u << first) : levels);
 	if (first == 0)
-		return simd->warp(target, entry, n);
+		return warp_runs(simd, plan, target, entry, n);
 	for (int turn = 0; turn < 2; turn++) {
 		struct bin_entry some[256];
 		uint32_t n_some = 0;
@@ -34,6 +46,8 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct warp_target *
 		for (uint32_t e = 0; e < n; e++) {
 			const int is_first = entry[e].level == first && !entry[e].at_border;
 
+			if (plan_is_cancelled_at(plan, e))
+				return n_inside;
 			if (is_first == turn)
 				continue;
 			some[n_some] = entry[e];
@@ -62,9 +76,9 @@ struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, c
 	target.bare = warp_parts(plan, bins->is_quiet, tile);
 	if (plan->cull_tests & PSR_CULL_OCCLUSION && (end - begin >= OCCLUSION_BLOCKS || plan->is_full)) {
 		simd->warp_clear(&target, into->stack->levels);
-		counts = warp_near_to_far(simd, bins, &target, begin, end);
+		counts = warp_near_to_far(simd, plan, bins, &target, begin, end);
 	} else {
-		counts.n_inside = warp_in_turn(simd, &target, into->stack->levels, bins->entry + begin, end - begin);
+		counts.n_inside = warp_in_turn(simd, plan, &target, into->stack->levels, bins->entry + begin, end - begin);
 	}
 	return counts;
 }

@@ -18,13 +18,13 @@ struct warp_into {
 	uint64_t *own;                  /* WARP_OWN_WORDS, or NULL */
 };
 
-/* Clears a tile, and draws its blocks. */
+/* Clears a tile, and draws its blocks; some of them if the frame is cancelled. */
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile);
 
 /* Draws the blocks `begin` .. `end` - 1 of the bins into a cleared tile from near to far, skipping blocks that the tile
  * already hides. */
-struct warp_counts warp_near_to_far(const struct simd *simd, const struct bins *bins,
+struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                                     const struct warp_target *target, uint32_t begin, uint32_t end);
 
 #endif

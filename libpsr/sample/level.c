@@ -173,7 +173,7 @@ int level_reach(struct adequacy *out, struct level *level)
 
 	n = n < 100000 ? 100000 : n > 250000 ? 250000 : n;
 	for (int round = 1; rc == PSR_OK; round++) {
-		/* One of the first two rounds is the last only if it is enough: else it may stop early. */
+		/* The first two rounds may stop early: either is the last only if it is enough. */
 		rc = adequacy_measure(out, &level->sampling, &level->kept, (uint64_t)round, n, round <= 2);
 		if (rc != PSR_OK || is_over(out, round, before[0]))
 			break;

@@ -16,7 +16,7 @@
 #include "sample/mend/adequacy.h"
 #include "sample/own/keep.h"
 
-/* The steps' results. Each has one module that writes it; others get it const, or call that module. */
+/* The steps' results. One module writes each; the others get it const, or call that module. */
 struct level {
 	struct sampling sampling;
 	uint8_t *thin;
@@ -31,25 +31,26 @@ struct level {
 	double seconds_rays;
 };
 
-/* All of `sampling` but `thin` is to be set, and `finer`. Those that can fail: MEMORY; level_fini() either way. */
+/* Set `finer`, and all of `sampling` but `thin`, before the call. Functions that return int can fail with MEMORY; call
+ * level_fini() even then. */
 struct level_progress {
 	void (*on_step)(unsigned done, unsigned total, void *userdata);
 	void *userdata;
 };
 int level_make(struct level *level, const struct level_progress *progress); /* all steps; progress may be NULL */
 
-/* One after the other, these are the same: hits, who sees and owns them; small patches merged; what is owned kept;
- * what is missing added. */
+/* The steps of level_make() one by one: own finds hits, and who sees and owns them; merge merges small patches; keep
+ * keeps the owned hits; mend adds missing samples. */
 int level_own(struct level *level, const struct level_progress *progress);
 void level_merge(struct level *level);
 int level_keep(struct level *level);
 int level_mend(struct level *level);
 
-/* Measures and adds what is missing, until less than a 15,000th is or it does not get better; *out: of the last round,
- * with another seed, without places. MEMORY. */
+/* Measures adequacy and adds missing samples, until less than a 15,000th is missing or rounds stop helping. *out: the
+ * last round's result, with another seed, without places. MEMORY. */
 int level_reach(struct adequacy *out, struct level *level);
 
-/* Frees all but what the next coarser level reads. */
+/* Frees everything that the next coarser level does not read. */
 void level_trim(struct level *level);
 void level_fini(struct level *level);
 

@@ -29,10 +29,12 @@ static inline void warp_block_make(struct warp_block *out, const struct warp_ins
 	const double scale = (double)(1u << psr_blocks_level(b, block));
 	const uint32_t first = psr_blocks_attr_first(b, block);
 	struct psr_place place;
+
 	psr_placing_find(&lattice->placing, b, block, &place);
 	const double bias = place.z - 32768 * (double)place.step;
 	for (int a = 0; a < 3; a++) {
 		const double across = place.col * lattice->step[a] + place.row * lattice->down[a];
+
 		out->origin[a] = (lattice->origin[a] + bias * lattice->along[a]) + across;
 		out->unit[a] = (float)lattice->along[a] * place.step;
 	}

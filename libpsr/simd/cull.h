@@ -31,6 +31,7 @@ static inline float cull_stretch(const struct cull_view *v, float cx, float cy, 
 	const float near = psr_choose(front > v->near_z, front, v->near_z);
 	const float side2 = cx * cx + cy * cy, distance2 = side2 + cz * cz, rim2 = distance2 - r * r;
 	const float reach = __builtin_sqrtf(distance2) + r;
+
 	/* The cosine times distance2. */
 	const float cosine = cz * __builtin_sqrtf(psr_where(rim2 > 0, rim2)) - __builtin_sqrtf(side2) * r;
 	const int is_sharp = (rim2 > 0) & (cosine > 0) & (distance2 * near < reach * cosine);

@@ -25,6 +25,7 @@ int psr_isa_check_environment(struct psr_error *err)
 {
 	enum psr_isa isa;
 	const char *wanted = getenv("PSR_ISA");
+
 	if (wanted && psr_isa_parse(&isa, wanted))
 		return psr_fail(err, PSR_ERR_ARG, "PSR_ISA is '%.40s'; it takes c, avx2 or avx512, or is left out", wanted);
 	return PSR_OK;
@@ -57,8 +58,10 @@ static int has(enum psr_isa isa)
 enum psr_isa psr_isa_get(void)
 {
 	enum psr_isa most = PSR_ISA_AVX512;
+
 	if (atomic_load(&cap) < 0) {
 		const char *wanted = getenv("PSR_ISA");
+
 		if (wanted)
 			(void)psr_isa_parse(&most, wanted);
 		psr_isa_cap(most);

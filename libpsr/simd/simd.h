@@ -10,6 +10,7 @@
 #include "cull.h"
 #include "fill.h"
 #include "gaps.h"
+#include "reproject.h"
 #include "shadow.h"
 #include "smooth.h"
 #include "strip.h"
@@ -39,6 +40,12 @@ struct simd {
 	fill_push_picture_fn *fill_push_picture;
 	fill_depths_fn *fill_depths;
 	smooth_fn *smooth;
+	reproject_depths_fn *reproject_depths;
+	reproject_texels_fn *reproject_texels;
+	reproject_fit_fn *reproject_fit;
+	reproject_bound_fn *reproject_bound;
+	reproject_cells_fn *reproject_cells;
+	reproject_look_fn *reproject_look;
 };
 
 extern const struct simd simd_c, simd_avx2, simd_avx512;

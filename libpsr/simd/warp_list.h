@@ -47,6 +47,7 @@ static inline void lower_words(uint64_t *base, struct words *list)
 static inline void lower_cells(const struct warp_target *t, struct cells *list)
 {
 	uint32_t *base = (uint32_t *)t->cells[list->level].z;
+
 	LOWER_ALL(uint32_t, base, z);
 }
 
@@ -62,6 +63,7 @@ static inline void make_blocks(struct warp_block *blocks, const struct warp_targ
 {
 	for (uint32_t i = 0; i < n; i++) {
 		struct warp_block *b = &blocks[i];
+
 		warp_block_make(b, &t->instance[entry[i].instance], entry[i].slot);
 		for (uint32_t k = 0; k < PSR_BLOCK_SAMPLES; k += 64 / sizeof *b->depth)
 			__builtin_prefetch(b->depth + k);
@@ -82,6 +84,7 @@ static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *lis
 	struct cells cells;
 	struct warp_block blocks[BLOCKS];
 	uint64_t n_inside = 0;
+
 	words.n = cells.n = cells.level = 0;
 	for (uint32_t e = 0; e < n; e++) {
 		if (e % BLOCKS == 0)

@@ -12,7 +12,7 @@
 struct sums {
 	double weight, normal[3], diffuse[3];
 	double reflected[3];  /* of specular / (exponent + 2), to which a lobe's light is in proportion */
-	double light, spread; /* of that over the channels, and of it times the lobe's variance */
+	double light, spread; /* sums of that over the channels, and of that times the lobe's variance */
 	double plain_spread;  /* of weight times variance, where all reflect nothing */
 };
 

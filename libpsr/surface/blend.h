@@ -1,4 +1,4 @@
-/* One sample for several: prefilters coarse levels. */
+/* Makes one sample of several: the prefilter of coarse levels. */
 #ifndef PSR_SURFACE_BLEND_H
 #define PSR_SURFACE_BLEND_H
 

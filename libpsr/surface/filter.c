@@ -100,7 +100,7 @@ static float kernel(float q)
 	return 0.36787944f * e - 0.13533528f;
 }
 
-/* The 1 or 4 texels that a point mixes. */
+/* Finds the 1 or 4 texels that a point mixes. */
 struct points {
 	int n;
 	uint32_t x[4], y[4];
@@ -145,7 +145,7 @@ void filter_point(const struct psr_image *image, enum mip_kind kind, const struc
 	}
 }
 
-/* The weighted mean of the texels of a level under an ellipse around st. */
+/* Computes the weighted mean of the texels of a level under an ellipse around st. */
 static void average(const struct mip *mip, int level, const struct psr_texture *texture, const double st[2],
                     const struct ellipse *e, float out[4])
 {

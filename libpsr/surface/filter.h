@@ -5,8 +5,8 @@
 #include "mip.h"
 #include "psr/mesh.h"
 
-/* The mean of the image around st (0..1 over the image, finite). `axes` turns the unit circle into the ellipse (d(s,t)
- * = axes * d(x,y)) that supports a Gaussian; its value at the rim, exp(-2), is subtracted, so that texels enter
+/* Computes the mean of the image around st (0..1 over the image, finite). `axes` turns the unit circle into the ellipse
+ * (d(s,t) = axes * d(x,y)) that supports a Gaussian; its value at the rim, exp(-2), is subtracted, so that texels enter
  * without a jump. The variance of bilinear interpolation widens the ellipse.
  *
  * The filter reads the last mip level where the shorter semi-axis has at least 1.5 texels, less the variance that
@@ -14,12 +14,12 @@
  * the longer one, so that 250 texels are enough, 600 where sides are not powers of two, and as at least 1.5 texels of
  * the image. Where the longer axis is below 1, the result goes over to the bilinear, or nearest, value of the point.
  *
- * Returns the share of the ellipse in the variance of the filter, 0..1: the rest is between texels that are farther
- * apart than the ellipse is wide. */
+ * Returns the ellipse's share of the filter's variance, 0..1: the rest is between texels that are farther apart than
+ * the ellipse is wide. */
 double filter_look_up(const struct mip *mip, const struct psr_texture *texture, const double st[2],
                       const double axes[2][2], float out[4]);
 
-/* The image at a point, bilinear or nearest; st finite. */
+/* Computes the image at a point, bilinear or nearest; st finite. */
 void filter_point(const struct psr_image *image, enum mip_kind kind, const struct psr_texture *texture,
                   const double st[2], float out[4]);
 

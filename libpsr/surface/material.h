@@ -15,7 +15,7 @@ struct material_values {
 	double spread;                 /* variance of the normals around there along each axis, radians^2 */
 };
 
-/* The factors alone. */
+/* Sets the values that the factors alone give. */
 void material_values_default(struct material_values *values, const struct psr_material *material);
 
 /* An attribute word (model/blocks.h) without its normal.

@@ -4,7 +4,7 @@
 #include "base/vec.h"
 #include "mip.h"
 
-/* The texels along a side that one texel of the next level covers, and their shares of it. */
+/* Which texels along a side one texel of the next level covers, and its share of each. */
 struct taps {
 	uint32_t first;
 	int n;
@@ -52,7 +52,7 @@ static struct taps taps_of(uint32_t i, uint32_t from, uint32_t to)
 		                  { (float)(to - i) / (float)from, (float)to / (float)from, (float)(i + 1) / (float)from } };
 }
 
-/* One row of a level, from `line`: the blend of the rows of the level before that it covers. */
+/* Makes one row of a level, from `line`: the blend of the rows of the level before that it covers. */
 static void make_row(const struct mip *mip, int level, uint32_t y, float (*line)[4], uint16_t *out)
 {
 	const struct mip_level *from = &mip->level[level - 1], *to = &mip->level[level];

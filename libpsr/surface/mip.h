@@ -30,14 +30,14 @@ struct mip {
 	uint16_t *memory;
 };
 
-/* The image must outlive it. MEMORY; mip_fini() either way. */
+/* Makes the levels; the image must outlive them. MEMORY; call mip_fini() even then. */
 int mip_init(struct mip *mip, const struct psr_image *image, enum mip_kind kind);
 void mip_fini(struct mip *mip);
 
 /* Four bytes of an image. */
 void mip_decode(enum mip_kind kind, const uint8_t *texel, float out[4]);
 
-/* Of one level: x < width, y < height. */
+/* Returns a texel of a level: x < width, y < height. */
 static inline void mip_texel(const struct mip *mip, int level, uint32_t x, uint32_t y, float out[4])
 {
 	size_t at = 4 * ((size_t)y * mip->level[level].width + x);

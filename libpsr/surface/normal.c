@@ -31,7 +31,7 @@ void normal_jacobian(const struct plane *plane, const double side[2][2], double 
 	}
 }
 
-/* The vertices' normals, interpolated; 0 if there are none. */
+/* Interpolates the vertices' normals; 0 if there are none. */
 static int interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, float normal[3])
 {
 	const uint32_t *index = mesh->triangle[triangle];
@@ -69,7 +69,8 @@ void normal_interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u
 		v3f_set(normal, 0, 0, 1);
 }
 
-/* The mesh's tangent at a place and its bitangent's side of the vertices' own normal; 0 if it has none. */
+/* Finds the mesh's tangent at a place, and on which side of the vertices' own normal the bitangent lies; 0 if the mesh
+ * has none. */
 static float given_tangent(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, float tangent[3])
 {
 	const uint32_t *index = mesh->triangle[triangle];
@@ -83,7 +84,7 @@ static float given_tangent(const struct psr_mesh *mesh, uint32_t triangle, doubl
 	return v3f_dot(tangent, tangent) > 0 ? mesh->tangent[index[0]][3] : 0;
 }
 
-/* The direction in which s grows and t does not, and the side on which t falls. */
+/* Finds the direction in which s grows and t does not, and the side on which t falls. */
 static float made_tangent(const struct plane *plane, const double jacobian[2][2], float tangent[3])
 {
 	double det = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];

@@ -15,17 +15,17 @@ struct plane {
 
 int normal_plane(const struct psr_mesh *mesh, uint32_t triangle, struct plane *plane); /* whether it has an area */
 
-/* The matrix from x, y of the plane to s, t, from differences along the sides (texture_sides). The plane has an area.
- * */
+/* Computes the matrix from x, y of the plane to s, t, from differences along the sides (texture_sides). The plane must
+ * have an area. */
 void normal_jacobian(const struct plane *plane, const double side[2][2], double jacobian[2][2]);
 
-/* The unit normal at a place, interpolated, or else the triangle's own, and on its front side. Of a triangle without
- * area: the vertices', or +z. */
+/* Computes the unit normal at a place: interpolated, or else the triangle's own, on its front side. For a triangle
+ * without area: the vertices', or +z. */
 void normal_interpolate(const struct psr_mesh *mesh, uint32_t triangle, double u, double v, float normal[3]);
 
-/* Turns `normal` (normal_interpolate) by a normal map's vector `mapped`, of any length but 0. The tangent is the
- * mesh's, or else that of growing s, by the texture's jacobian (normal_jacobian); the bitangent is perpendicular to
- * both, on the side of falling t. A jacobian of determinant 0 changes nothing. */
+/* Turns `normal` (normal_interpolate) by a normal map's vector `mapped`, of any length but 0. The tangent is the mesh's
+ * own, or else the direction of growing s, by the texture's jacobian (normal_jacobian); the bitangent is perpendicular
+ * to both, on the side of falling t. A jacobian of determinant 0 changes nothing. */
 void normal_map(const struct psr_mesh *mesh, const struct surface_place *place, const struct plane *plane,
                 const double jacobian[2][2], const float mapped[3], float normal[3]);
 

@@ -6,9 +6,9 @@
  * a pixel. */
 #define STIPPLE_PIXELS 0.37
 
-/* Whether a surface of this opacity is open at p: at 0 and less everywhere, at 1 and more nowhere. Space is cut into
- * cubes of this side, each with a threshold; neighbours' are far apart, so that surfaces of any slope are open evenly.
- * */
+/* Returns whether a surface of this opacity is open at p: at 0 and less everywhere, at 1 and more nowhere. Space is cut
+ * into cubes of this side, each with a threshold. Neighbouring cubes have thresholds far apart, so that surfaces of any
+ * slope are open evenly. */
 int stipple_is_open(float opacity, const double p[3], double cell);
 
 #endif

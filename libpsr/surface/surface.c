@@ -111,7 +111,7 @@ void surface_face(float normal[3], const float facing[3])
 		v3f_set(normal, facing[0], facing[1], facing[2]);
 }
 
-/* The mean of a texture over the circle, and filter_look_up()'s share; 0 if there is no texture. */
+/* Computes the mean of a texture over the circle, and filter_look_up()'s share; 0 if there is no texture. */
 static int look_up(const struct footprint *footprint, const struct psr_texture *texture, enum mip_kind kind,
                    float out[4], double *share, double jacobian[2][2])
 {
@@ -184,7 +184,8 @@ static double map_normal(const struct footprint *footprint, float normal[3])
 	           normal);
 	if (length + NORMAL_ROUNDING >= 1)
 		return 0;
-	/* The scale stretches small angles by as much. Where all cancels out no lobe is left: any number does. */
+	/* The scale stretches small angles by as much. Where everything cancels out no lobe is left, and any number will
+	 * do. */
 	share *= (double)m->normal_scale * (double)m->normal_scale;
 	return share * (1 - NORMAL_ROUNDING - length) / (length > 1e-3 ? length : 1e-3);
 }

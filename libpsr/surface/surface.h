@@ -1,4 +1,4 @@
-/* The look of a mesh's surface, as attribute words (model/blocks.h). */
+/* How a mesh's surface looks, as attribute words (model/blocks.h). */
 #ifndef PSR_SURFACE_SURFACE_H
 #define PSR_SURFACE_SURFACE_H
 
@@ -14,12 +14,12 @@ struct mip;
 struct surface {
 	const struct psr_mesh *mesh;
 	double scale;         /* object units an inner unit */
-	struct mip *mip;      /* n_images * MIP_KINDS; those that no material uses are empty */
+	struct mip *mip;      /* n_images * MIP_KINDS; pyramids that no material uses are empty */
 	uint64_t *plain_word; /* of each material by itself, normal 0 */
 	uint8_t *is_plain;    /* whether a material has no textures: only the mesh's colours can change its word */
 };
 
-/* The mesh must outlive it. scale > 0. MEMORY; surface_fini() either way. */
+/* Prepares the surface; the mesh must outlive it. scale > 0. MEMORY; call surface_fini() even then. */
 int surface_init(struct surface *surface, const struct psr_mesh *mesh, double scale);
 void surface_fini(struct surface *surface);
 
@@ -37,11 +37,11 @@ struct surface_place {
 uint64_t surface_attr(const struct surface *surface, const struct surface_place *place, double diameter,
                       const float facing[3]);
 
-/* The same without a normal in the word: it goes to *normal, unbent. */
+/* Computes the attributes without a normal in the word; *normal gets the normal, unbent. */
 uint64_t surface_look(const struct surface *surface, const struct surface_place *place, double diameter,
                       float normal[3]);
 
-/* The opacity of a place, 0..1, filtered likewise; 1 of materials that are not BLEND. */
+/* Computes the opacity of a place, 0..1, filtered likewise; 1 for materials that are not BLEND. */
 float surface_opacity(const struct surface *surface, const struct surface_place *place, double diameter);
 
 /* Bends a unit normal until it faces `facing`, however it is quantised. */

@@ -1,4 +1,4 @@
-/* Where textures lie on a mesh, and their values at a point. */
+/* Where textures lie on a mesh, and which values they have at a point. */
 #ifndef PSR_SURFACE_TEXTURE_H
 #define PSR_SURFACE_TEXTURE_H
 
@@ -9,7 +9,7 @@
 int texture_place(const struct psr_mesh *mesh, const struct psr_texture *texture, uint32_t triangle, double u, double v,
                   double st[2]);
 
-/* side[i]: (s, t) of corner i + 1 less those of corner 0. */
+/* side[i] becomes (s, t) of corner i + 1 less (s, t) of corner 0. */
 void texture_sides(const struct psr_mesh *mesh, const struct psr_texture *texture, uint32_t triangle,
                    double side[2][2]);
 
@@ -17,10 +17,10 @@ void texture_sides(const struct psr_mesh *mesh, const struct psr_texture *textur
  * textures. */
 void texture_plain_color(const struct psr_mesh *mesh, uint32_t prim, double u, double v, float rgba[4]);
 
-/* The same times the base texture as a point shows it, bilinear or nearest. */
+/* Computes that colour times the base texture as a point shows it, bilinear or nearest. */
 void texture_base_color(const struct psr_mesh *mesh, uint32_t prim, double u, double v, float rgba[4]);
 
-/* Whether a place is transparent: MASK below its cutoff, BLEND below one half. Filtered as for magnification. */
+/* Returns whether a place is transparent: MASK below its cutoff, BLEND below one half. Filters as for magnification. */
 int texture_is_absent(const struct psr_mesh *mesh, uint32_t prim, double u, double v);
 
 static inline uint32_t texture_material(const struct psr_mesh *mesh, uint32_t prim)

@@ -55,7 +55,7 @@ int validate_mesh(const struct psr_mesh *mesh, struct psr_error *err)
 	return check_materials(mesh, err);
 }
 
-/* Of triangles, and of points with the reach of their discs. */
+/* Counts corners of triangles, and points, each of which reaches as far as its disc. */
 static uint64_t n_corners(const struct psr_mesh *mesh)
 {
 	return 3 * (uint64_t)mesh->n_triangles + mesh->n_points;
@@ -93,7 +93,7 @@ int validate_bound_mesh(const struct psr_mesh *mesh, double center[3], double *r
 	*radius = reach * (1 + 0x1p-20);
 	if (!isnormal(*radius) || *radius * *radius == 0 || !isfinite(*radius * *radius))
 		return psr_fail(err, PSR_ERR_ARG,
-		                "the mesh has a radius of %g: it must have an extent, and one whose square is a number",
+		                "the mesh has a radius of %g: it must be above 0, and its square finite",
 		                *radius);
 	return PSR_OK;
 }

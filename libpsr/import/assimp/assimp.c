@@ -51,7 +51,7 @@ static int cofactors(double out[3][3], const matrix m)
 	return determinant < 0.0;
 }
 
-/* Where a mesh goes, and scratch memory for its largest face. */
+/* The mesh under construction, and scratch memory for its largest face. */
 struct target {
 	const struct aiMesh *source;
 	const struct obj *obj;
@@ -193,7 +193,7 @@ static int add_node(struct walk *w, const struct aiNode *node, const matrix pare
 	return rc;
 }
 
-/* STL's normals are those of the faces; smooth ones suit scans better. */
+/* STL's normals belong to faces; smooth ones suit scans better. */
 static int is_stl(const struct aiScene *scene)
 {
 	const struct aiMetadata *d = scene->mMetaData;

@@ -51,7 +51,7 @@ static int check_off(const struct import_mesh *im, struct text t, size_t n_bytes
 	return PSR_OK;
 }
 
-/* By the file's ending, or a first word like OFF, COFF, STCN4OFF. */
+/* Tells the format by the file's ending, or by a first word like OFF, COFF, STCN4OFF. */
 static int is_off(const char *path, struct text t)
 {
 	const uint8_t *start;

@@ -128,9 +128,12 @@ static int put_vertex(struct reader *r, const struct word *word, unsigned n, str
 	obj->n_text += (size_t)sprintf((char *)obj->text + obj->n_text, "v %u %u 0", obj->n & ((1u << LOW_BITS) - 1),
 	                               obj->n >> LOW_BITS);
 	for (unsigned i = first_color; n - first_color == 3 && i < n; i++) {
+		size_t length = word[i].n;
+		while (word[i].at[length - 1] == '\\') /* before the line's end it would join the next line */
+			length--;
 		obj->text[obj->n_text++] = ' ';
-		memcpy(obj->text + obj->n_text, word[i].at, word[i].n);
-		obj->n_text += word[i].n;
+		memcpy(obj->text + obj->n_text, word[i].at, length);
+		obj->n_text += length;
 	}
 	obj->n++;
 	return PSR_OK;

@@ -18,7 +18,7 @@ int obj_is(const char *path); /* by its ending, as Assimp does */
 int obj_read(struct obj *obj, const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 void obj_fini(struct obj *obj);
 
-/* The position for the text's coordinates x and y; NAN if there is none. */
+/* Returns the position for the text's coordinates x and y; NAN if there is none. */
 void obj_position(double out[3], const struct obj *obj, float x, float y);
 
 #endif

@@ -97,7 +97,7 @@ static int find_or_add(struct assimp_io *io, struct aiString *name, struct psr_e
 	return rc;
 }
 
-/* The mesh's set for the scene's set n: n if possible, else another free one; -1: none is free. */
+/* Returns the mesh's set for the scene's set n: n if possible, else another free one; -1: none is free. */
 static int take_set(int source[PSR_UV_SETS], int n)
 {
 	for (int set = 0; set < PSR_UV_SETS; set++)
@@ -160,7 +160,7 @@ int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct a
 	return PSR_OK;
 }
 
-/* The image that `make` makes of images a and b (-1: none); each pair once. */
+/* Returns the image that `make` makes of images a and b (-1: none). Makes each pair once. */
 static int add_made(struct assimp_io *io, int a, int b, const char *kind,
                     int (*make)(struct psr_image *, const struct psr_image *, const struct psr_image *),
                     struct psr_error *err)

@@ -12,7 +12,7 @@ namespace Assimp {
 __attribute__((visibility("default"))) void aiAssertViolation(const char *expression, const char *, int)
 {
 	char text[256];
-	std::snprintf(text, sizeof text, "not what the reader expected (%s)", expression);
+	std::snprintf(text, sizeof text, "unexpected content (%s)", expression);
 	throw std::runtime_error(text);
 }
 

@@ -7,6 +7,7 @@
 
 #define EMPTY UINT32_MAX
 #define LONE_RADIUS 1.0f     /* of a cloud that is one point, in units of the file */
+#define BRIGHT 0.99          /* share of a cloud's points with an intensity below white */
 #define LEAST_RADIUS 1e-9f   /* of the model's size */
 
 float cloud_linear(double code)
@@ -19,6 +20,20 @@ float cloud_linear(double code)
 	below = (int)code;
 	return (float)(psr_srgb_to_linear[below] +
 	               (code - below) * ((double)psr_srgb_to_linear[below + 1] - psr_srgb_to_linear[below]));
+}
+
+double cloud_white(const uint64_t histogram[CLOUD_BINS])
+{
+	uint64_t n = 0, below = 0;
+
+	for (uint32_t i = 0; i < CLOUD_BINS; i++)
+		n += histogram[i];
+	for (uint32_t i = 0; i < CLOUD_BINS; i++) {
+		below += histogram[i];
+		if ((double)below >= BRIGHT * (double)n)
+			return i;
+	}
+	return CLOUD_BINS - 1;
 }
 
 static int same_place(const double a[3], const double b[3])

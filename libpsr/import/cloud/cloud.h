@@ -50,4 +50,8 @@ int cloud_orient(struct cloud *cloud);
  * */
 float cloud_linear(double code);
 
+/* Intensities have no unit: returns the bin at which few points exceed white. */
+#define CLOUD_BINS 65536
+double cloud_white(const uint64_t histogram[CLOUD_BINS]);
+
 #endif

@@ -8,7 +8,6 @@
 #define LEAST_HEADER 227
 #define VLR_HEADER 54
 #define FORMATS 11
-#define BRIGHT 0.99    /* the share of points with an intensity below white */
 
 /* LAS 1.2 to 1.4 in the terms of the ASPRS specifications. */
 struct las {
@@ -164,30 +163,16 @@ static int is_left_out(const struct las *las, const uint8_t *p)
 	return class == 7 || class == 18 || (is_new ? p[15] & 4 : p[15] & 0x80) != 0;
 }
 
-/* The colours of points: their own, of 16 bits or of 8 in 16, or intensity. */
+/* Finds the colours of points: their own, of 16 bits or of 8 in 16, or intensity. */
 struct tint {
 	unsigned color;     /* its offset in a point; 0: intensity */
 	double scale;       /* to codes of 0..255, or of intensity to linear light */
 	int is_none;
 };
 
-/* Intensities have no unit: few points exceed white. */
-static double white_of(const uint64_t histogram[65536])
-{
-	uint64_t n = 0, below = 0;
-	for (uint32_t i = 0; i < 65536; i++)
-		n += histogram[i];
-	for (uint32_t i = 0; i < 65536; i++) {
-		below += histogram[i];
-		if ((double)below >= BRIGHT * (double)n)
-			return i;
-	}
-	return 65535;
-}
-
 static int find_tint(struct tint *tint, const struct las *las, struct psr_error *err)
 {
-	uint64_t *histogram = calloc(65536, sizeof *histogram), most = 0;
+	uint64_t *histogram = calloc(CLOUD_BINS, sizeof *histogram), most = 0;
 	double white;
 	if (histogram == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a histogram", las->path);
@@ -199,7 +184,7 @@ static int find_tint(struct tint *tint, const struct las *las, struct psr_error 
 		if (!is_left_out(las, p))
 			histogram[get(p + 12, 2)]++;
 	}
-	white = white_of(histogram);
+	white = cloud_white(histogram);
 	free(histogram);
 	if (most == 0)
 		tint->color = 0;

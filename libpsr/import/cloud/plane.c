@@ -6,7 +6,7 @@
 #define CHUNK 4096
 #define MAX_CORNERS (4 + CLOUD_NEIGHBOURS)
 #define OVERLAP 1.05 /* of radii: discs of neighbours lie in different planes */
-#define MAX_RATIO 2.0f /* of a radius to the median of those around it */
+#define MAX_RATIO 2.0f /* ratio of a radius to the median of the radii around it */
 #define WIRE 0.01    /* least ratio of second to first extent, squared, of points that are not on a line */
 
 /* Rotates rows p and q of the symmetric m (and v) so that m[p][q] becomes 0 (Jacobi). */
@@ -141,7 +141,7 @@ static int clip(struct corner *out, const struct corner *in, int n, const double
 	return n_out;
 }
 
-/* In units of the farthest neighbour's distance; 0 if all corners are of the initial square. */
+/* Returns the radius in units of the farthest neighbour's distance; 0 if all corners belong to the initial square. */
 static double cell_radius(double offset[CLOUD_NEIGHBOURS][3], uint32_t k, const float normal[3])
 {
 	struct corner corner[2][MAX_CORNERS] = {

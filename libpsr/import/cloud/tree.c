@@ -129,7 +129,7 @@ int cloud_tree_build(struct cloud *cloud, const double (*position)[3])
 	return PSR_OK;
 }
 
-/* The k nearest so far, in order of distance, then of id. */
+/* The k nearest points so far, in order of distance, then of id. */
 struct search {
 	const struct cloud *cloud;
 	const double *from;
@@ -178,7 +178,7 @@ static void search(struct search *s, uint32_t at, double distance)
 	search(s, to_split < 0.0 ? at + 1 : node->right, distance);
 	before = s->offset[node->axis];
 	farther = distance - before * before + to_split * to_split;
-	/* The factor covers rounding. */
+	/* The factor allows for rounding. */
 	if (s->n < s->cloud->k || farther * (1.0 - 1e-12) <= s->distance[s->cloud->k - 1]) {
 		s->offset[node->axis] = to_split;
 		search(s, to_split < 0.0 ? node->right : at + 1, farther);

@@ -84,7 +84,7 @@ struct transform {
 
 transform multiply(const transform &a, const transform &b);
 
-/* A material, and what its primitives need. */
+/* A material, with everything that its primitives need. */
 struct material_use {
 	int index = -1;                               /* in the mesh; -1: not made yet */
 	int point_index = -1;                         /* of its variant without textures, for points */
@@ -114,7 +114,7 @@ struct reader {
 void extensions_check(source &s, nlohmann::json &doc);
 bool extension_is_known(const std::string &name);
 
-/* presets.cc: reads and erases the cameras and lights of the document; makes presets of those in the scene. */
+/* presets.cc: reads and erases the cameras and lights of the document; makes presets of the ones in the scene. */
 void presets_read(source &s, nlohmann::json &doc);
 void presets_place(reader &r);
 
@@ -143,14 +143,14 @@ const std::vector<transform> &skin_joints(reader &r, int skin);
 void morph(reader &r, const tinygltf::Primitive &g, const std::vector<double> &weights, primitive &p,
            const std::string &place);
 
-/* The transform of vertex v: the weighted mean of its joints. */
+/* Computes the transform of vertex v: the weighted mean of its joints. */
 transform blend(const primitive &p, const std::vector<transform> &joints, size_t v, const std::string &place);
 
 /* Adds the primitive to the mesh, transformed by `world`, or by `joints` unless NULL. */
 void add_instance(reader &r, const primitive &p, const material_use &use, const transform &world,
                   const std::vector<transform> *joints, const std::string &place);
 
-/* The bytes of a buffer view, within its buffer. */
+/* Returns the bytes of a buffer view, within its buffer. */
 span view_bytes(const reader &r, int view, const std::string &place);
 
 /* Reads all elements of an accessor as floats, n_wanted a row: scales normalized integers (with is_normalized all
@@ -166,7 +166,8 @@ std::vector<float> draco_floats(const reader &r, const draco::Mesh &mesh, const 
                                 const std::string &where, size_t n_wanted, bool is_normalized);
 std::vector<uint32_t> draco_triangles(const draco::Mesh &mesh);
 
-/* The material of a primitive (-1: none), created on demand, with its variant for points if asked for. */
+/* Returns the material of a primitive (-1: none). Makes it on demand, with its variant for points if the caller wants
+ * that. */
 const material_use &use_material(reader &r, int material, bool for_points);
 
 /* A member of an extension's object, or the fallback if it is missing. */

@@ -115,7 +115,7 @@ void value_numbers(const tinygltf::Value &v, const char *key, double *out, int n
 			out[i] = v.Get(key).Get(i).GetNumberAsDouble();
 }
 
-/* For any angle; the same bits on every machine. */
+/* Takes any angle; gives the same bits on every machine. */
 void sine_and_cosine(double angle, double &s, double &c)
 {
 	double turn = std::isfinite(angle) ? std::fmod(angle, 2.0 * M_PI) : 0.0;
@@ -138,7 +138,7 @@ void set_transform(struct psr_texture &out, const tinygltf::Value &t)
 		out.transform[i] = (float)m[i];
 }
 
-/* The mesh's set for TEXCOORD_n: n if possible, else another free one; -1: none is free. */
+/* Returns the mesh's set for TEXCOORD_n: n if possible, else another free one; -1: none is free. */
 int take_set(material_use &use, int n)
 {
 	const std::string name = "TEXCOORD_" + std::to_string(n);
@@ -264,7 +264,7 @@ int add_material(reader &r, const struct psr_material &m)
 	return index;
 }
 
-/* The variant of a material for points, which have no texture coordinates. */
+/* Makes the variant of a material for points, which have no texture coordinates. */
 int add_textureless(reader &r, const material_use &use)
 {
 	struct psr_material m = r.im.mesh->material[use.index];

@@ -86,7 +86,7 @@ bool axes_of(axes &out, const transform &t)
 	return is_good;
 }
 
-/* The middle of the mesh; false if it is not finite. */
+/* Finds the middle of the mesh; false if it is not finite. */
 bool middle_of(double out[3], const struct psr_mesh *mesh)
 {
 	double low[3], high[3];

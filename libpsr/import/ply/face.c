@@ -3,7 +3,7 @@
 #include "ply.h"
 #include "polygon.h"
 
-/* Where faces go, and scratch memory for the largest one. */
+/* The mesh under construction, and scratch memory for the largest face. */
 struct target {
 	struct import_mesh *im;
 	struct ply_rows *rows;
@@ -99,7 +99,7 @@ static int target_init(struct target *t, struct import_mesh *im, struct ply_rows
 	t->rows = rows;
 	t->vertices = vertices;
 	t->material = material;
-	/* Colors of vertices are finer than those of faces, unless all are the same, a writer's default. */
+	/* Vertices' colors are finer than faces', unless all vertices have one color, a writer's default. */
 	t->has_colors = (vertices->color == NULL || ply_vertices_are_one_color(vertices)) &&
 	                ply_colors_find(&t->colors, rows->header, rows->element);
 	t->is_shared = !t->has_colors && uv->property < 0;
@@ -177,8 +177,8 @@ int ply_faces_read(struct import_mesh *im, struct ply_rows *rows, const struct p
 	return rc;
 }
 
-/* Each vertex makes a triangle with the two before it, every other one reversed; -1 begins a new strip. Triangles with
- * two equal vertices only turn a corner of the strip. */
+/* Each vertex makes a triangle with the two vertices before it, every second one reversed; -1 begins a new strip.
+ * Triangles with two equal vertices only turn a corner of the strip. */
 static int read_strip(struct target *t, struct psr_error *err)
 {
 	static const unsigned even[3] = { 0, 1, 2 }, odd[3] = { 1, 0, 2 };

@@ -115,7 +115,7 @@ static int read_format(struct ply_header *h, const struct text *t, const struct 
 		h->format = PLY_BIG;
 	else
 		return fail(t, err, PSR_ERR_FORMAT,
-		            "the format is none of ascii, binary_little_endian and binary_big_endian 1.0");
+		            "the format is not ascii, binary_little_endian or binary_big_endian 1.0");
 	return PSR_OK;
 }
 
@@ -168,7 +168,7 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 	return PSR_OK;
 }
 
-/* The least bytes of a row; in text, a value takes a digit and a blank. */
+/* Returns the least bytes of a row; in text, a value takes a digit and a blank. */
 static uint64_t least_row(const struct ply_header *h, const struct ply_element *e)
 {
 	uint64_t n = 0;
@@ -215,7 +215,8 @@ static int read_line(struct ply_header *h, const struct text *t, const struct li
 		return read_element(h, t, l, err);
 	if (ply_name_is(&l->word[0], "property"))
 		return read_property(h, t, l, err);
-	/* A comment without the word, as Blender once wrote. A misspelt keyword shows later, by what is missing. */
+	/* A comment without its keyword, as Blender once wrote. A misspelt keyword becomes apparent later, when something
+	 * is missing. */
 	if (h->odd_line == 0)
 		h->odd_line = t->line;
 	return PSR_OK;

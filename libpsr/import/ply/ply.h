@@ -96,7 +96,7 @@ int ply_rows_skip(struct ply_rows *rows, struct psr_error *err); /* the remainin
 int ply_rows_fail(const struct ply_rows *rows, struct psr_error *err, const char *format, ...)
 	__attribute__((format(printf, 3, 4)));
 
-/* Finds an element by name, or NULL; and a property of it by the first matching name (NULL ends the list), or -1. */
+/* Find an element by name, or NULL; and a property of it by the first matching name (NULL ends the list), or -1. */
 const struct ply_element *ply_find_element(const struct ply_header *header, const char *name);
 int ply_find_property(const struct ply_header *header, const struct ply_element *element, const char *const *names);
 

@@ -18,7 +18,7 @@ enum psr_err {
 	PSR_ERR_NOT_FOUND = -4,   /* no such file, no such model */
 	PSR_ERR_FORMAT = -5,      /* corrupt or truncated bytes */
 	PSR_ERR_VERSION = -6,     /* a file or a peer of a version that this build does not speak */
-	PSR_ERR_UNSUPPORTED = -7, /* well-formed, but asks for a feature that is not there */
+	PSR_ERR_UNSUPPORTED = -7, /* well-formed, but asks for a feature that psr lacks */
 	PSR_ERR_LIMIT = -8,       /* over a documented limit */
 	PSR_ERR_BUSY = -9,        /* too much is open already; try again */
 	PSR_ERR_CANCELLED = -10,  /* given up on request */
@@ -37,8 +37,8 @@ struct psr_error {
 /* A short name of a code ("not found"); never NULL. */
 const char *psr_strerror(int code);
 
-/* The exit status of a program that ends with this code; the table stands in the man pages:
- * 0 ok, 1 a check failed, 2 usage, 3 file or system, 4 bad data, 5 over a limit, 6 server or connection, 7 internal. */
+/* The exit status for a program that ends with this code; the man pages list them: 0 ok, 1 a check failed, 2 usage, 3
+ * file or system, 4 bad data, 5 over a limit, 6 server or connection, 7 internal. */
 int psr_exit_status(int code);
 
 /* Fills err (unless NULL) and returns code, so that a failing function can `return psr_fail(...)`. */

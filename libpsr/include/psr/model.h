@@ -25,12 +25,12 @@ struct psr_model_info {
 	double tolerance; /* angle of [G] 4.4, radians */
 	uint32_t resolution; /* >= 1; target resolution: pixels across the unit sphere at magnification 1 */
 
-	/* Adequacy ([G] 4.2), measured when the model was built: of n_trials pixels, each around a random visible place of
-	 * the surface, at the target resolution, seen from a random direction, n_missing have no sample. 0 of 0: not
-	 * measured. */
+	/* Adequacy ([G] 4.2), measured when the model was built: n_missing of n_trials pixels have no sample. Each
+	 * pixel lies around a random visible place of the surface, at the target resolution, seen from a random
+	 * direction. 0 of 0: not measured. */
 	uint64_t n_trials, n_missing;
-	/* Of as many pixels that hold a sample, in views from random places, n_lost hold one whose block the cones or masks
-	 * would cull, though a ray from the eye reaches it. */
+	/* Culling loss, measured with as many pixels, each with a sample, in views from random places: in n_lost of
+	 * them cones or masks would cull the sample's block though a ray from the eye reaches the sample. */
 	uint64_t n_lost;
 	char builder[32];    /* printable ASCII: name and version of the program that built it */
 };
@@ -44,11 +44,11 @@ struct psr_model;
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
-/* Bytes of memory that psr_model_read() of this file takes, by its header: more than the file has, if it is packed.
+/* Reads from the header how much memory psr_model_read() takes for this file; a packed file takes more than its size.
  * Errors as of psr_model_read(), as far as the header shows them. */
 int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
 
-/* Cameras and lights of the source file, in object coordinates; the model's own. */
+/* Cameras and lights of the source file, in object coordinates; the model owns them. */
 struct psr_presets {
 	uint32_t n_cameras, n_lights; /* each at most PSR_MAX_PRESETS */
 	const struct psr_preset_camera *camera;
@@ -59,8 +59,8 @@ struct psr_presets {
  * regular files only. NOT_FOUND (no such folder), IO (disk full, ...), MEMORY. */
 int psr_model_write(const struct psr_model *model, const char *path, struct psr_error *err);
 
-/* The same, packed: sections compressed, chunk by chunk. psr_model_read and _map open such a file too, into anonymous
- * memory; the model, its content id included, is the same. */
+/* psr_model_write() with compressed sections. psr_model_read() and psr_model_map() open such a file, too, and unpack it
+ * into memory of their own; the model and its content id are the same as without packing. */
 int psr_model_write_packed(const struct psr_model *model, const char *path, struct psr_error *err);
 
 struct psr_model *psr_model_ref(struct psr_model *model);
@@ -69,11 +69,11 @@ void psr_model_unref(struct psr_model *model); /* NULL is fine */
 const struct psr_model_info *psr_model_info(const struct psr_model *model);
 const struct psr_presets *psr_model_presets(const struct psr_model *model); /* never NULL */
 
-/* XXH128 of the section table (types, versions, lengths, hashes): the same bytes of content, the same id. */
+/* XXH128 of the section table (types, versions, lengths, hashes): models of equal content have equal ids. */
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);
-/* Size of the file that it was opened from, 0 without one; *is_packed tells whether the file is packed. */
+/* Size of the file that the model was opened from, 0 without one; *is_packed tells whether the file is packed. */
 uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed);
-uint64_t psr_model_bytes(const struct psr_model *model); /* memory that it holds, all overhead included */
+uint64_t psr_model_bytes(const struct psr_model *model); /* memory that the model holds, in all */
 
 #ifdef __cplusplus
 }

@@ -19,6 +19,14 @@ void psr_pool_destroy(struct psr_pool *pool);
 
 int psr_pool_threads(const struct psr_pool *pool); /* 1 for NULL, which stands for the caller's thread alone */
 
+/* How a caller stops work under way. The work asks is_cancelled(userdata) every few microseconds, from all threads of
+ * its pool and from several at a time, so the answer must be cheap: best a flag that another thread sets. An answer
+ * other than 0 ends the work: its call returns PSR_ERR_CANCELLED. NULL for is_cancelled: nobody stops the work. */
+struct psr_cancel {
+	int (*is_cancelled)(void *userdata);
+	void *userdata;
+};
+
 #ifdef __cplusplus
 }
 #endif

@@ -18,19 +18,18 @@ extern "C" {
 
 struct psr_settings {
 	uint32_t width, height; /* 1..PSR_MAX_SIDE each, PSR_MAX_PIXELS at most together */
-	/* The greatest distance between neighbouring samples that is good enough, in pixels: the renderer draws the
-	 * coarsest level that keeps it, or the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
+	/* The greatest distance between neighbouring samples, in pixels: the renderer draws the coarsest level that
+	 * keeps it, or else the finest. 1/64..64; 1 by default, [G]'s adequate sampling. */
 	double spacing_px;
-	/* 1: anti-aliasing in one pass ([G] 9.1.1), at a third of the frame's time. A pixel at an edge is blended with the
-	 * surface behind it, by how many of its eight neighbours are there; others with the neighbours of their own
-	 * surface. Only colour changes. 0 by default; passes above 0 ignore it. */
+	/* 1: anti-aliasing in one pass ([G] 9.1.1), for a third of the frame's time. Blends a pixel at an edge with the
+	 * surface behind it, by how many of its eight neighbours belong to the near surface, and any other pixel with
+	 * neighbours of its own surface. Only colour changes. 0 by default; passes above 0 ignore it. */
 	int is_smooth;
 	/* Pass p > 0 draws 2^p x 2^p sub-pixels a pixel, and gives each pixel the mean of their light and the least of
-	 * their depths. It draws colour and depth only, takes about 4^p times as long, and depends on no other pass. 0, by
-	 * default, to PSR_MAX_PASS. */
+	 * their depths. It draws colour and depth only, takes about 4^p times as long, and needs no other pass before
+	 * it. 0..PSR_MAX_PASS; 0 by default. */
 	unsigned pass;
-	int (*is_cancelled)(void *userdata); /* asked several times in a pass above 0; not 0 ends it. NULL by default */
-	void *userdata;
+	struct psr_cancel cancel; /* ends the frame within some milliseconds; nobody by default */
 };
 void psr_settings_default(struct psr_settings *settings, uint32_t width, uint32_t height);
 
@@ -40,10 +39,11 @@ int psr_renderer_create(struct psr_renderer **out, struct psr_error *err); /* ME
 void psr_renderer_destroy(struct psr_renderer *renderer); /* NULL is fine */
 uint64_t psr_renderer_bytes(const struct psr_renderer *renderer);
 
-/* Draws the frame's planes that are not NULL; they are the caller's (psr_frame_alloc()), of the size of the settings.
- * pool: NULL for the caller's thread alone. frame->report tells times and counts; of a pass above 0 they are of all
- * sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for planes other than
- * colour and depth in passes above 0. */
+/* Draws the planes of the frame that are not NULL. The caller owns them (psr_frame_alloc()); their size must be that of
+ * the settings. pool NULL: draws in the caller's thread alone. Fills frame->report with times and counts; in passes
+ * above 0 these count sub-pixels. ARG or LIMIT for a field outside of its range, MEMORY, CANCELLED; UNSUPPORTED for
+ * planes other than colour and depth in passes above 0. A failure leaves the planes undefined, and has no effect on the
+ * renderer's next frame. */
 int psr_render(struct psr_renderer *renderer, const struct psr_scene *scene, const struct psr_settings *settings,
                struct psr_pool *pool, struct psr_frame *frame, struct psr_error *err);
 

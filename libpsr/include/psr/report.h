@@ -11,7 +11,7 @@ extern "C" {
 enum psr_stage {
 	PSR_STAGE_PLAN,    /* count: instances */
 	PSR_STAGE_SHADOW,  /* count: samples drawn into the shadow maps that were made for this frame */
-	PSR_STAGE_CULL,    /* count: blocks tested: those of clusters of the chosen levels that are in view */
+	PSR_STAGE_CULL,    /* count: blocks tested, which belong to clusters in view at the chosen levels */
 	PSR_STAGE_WARP,    /* count: samples that fell into the picture and do not face away */
 	PSR_STAGE_GAPS,    /* count: pixels with a sample whose weight is below 1 */
 	PSR_STAGE_RESOLVE, /* count: pixels that have a sample and weight above 0; 0 without colour */
@@ -27,7 +27,7 @@ enum psr_effect {
 	PSR_EFFECT_CONES,     /* count: blocks tested */
 	PSR_EFFECT_MASKS,     /* count: blocks that only their mask culls */
 	PSR_EFFECT_OCCLUSION, /* count: blocks left out, once in each tile that they touch */
-	PSR_EFFECT_FACING,    /* count: blocks whose samples are asked one by one whether they face away */
+	PSR_EFFECT_FACING,    /* count: blocks with a test for each sample whether it faces away */
 	PSR_EFFECT_LEVELS,    /* count: depth buffers beside the picture's own */
 	PSR_EFFECT_FILL,      /* count: pixels whose colour changed */
 	PSR_EFFECT_TWO_SIDED, /* count: pixels whose normals may be turned to the eye */
@@ -36,32 +36,36 @@ enum psr_effect {
 	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
 	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
 	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with the surface behind */
-	PSR_EFFECT_SHEER,     /* count: pixels with surfaces that let a part of the light through */
+	PSR_EFFECT_SHEER,     /* count: pixels with translucent surfaces */
 	PSR_N_EFFECTS
 };
 enum psr_why {
 	PSR_WHY_RAN,
 	PSR_WHY_OFF,     /* the settings turn it off */
 	PSR_WHY_NOTHING, /* nothing in view calls for it */
-	PSR_WHY_VOID,    /* its conditions do not hold here */
+	PSR_WHY_VOID,    /* a condition of the effect is not met */
 	PSR_WHY_COST,    /* it would cost more than it saves, and changes no pixel */
 };
 const char *psr_effect_name(enum psr_effect effect); /* "specular" */
 const char *psr_effect_counts(enum psr_effect effect); /* the unit of its count: "pixels looked at for highlights" */
-/* Why an effect was left out, as the end of a sentence: "no sample in view is specular"; "" if it ran. */
+/* Why the renderer left an effect out, as the end of a sentence: "no sample in view is specular"; "" if the effect
+ * ran. */
 const char *psr_effect_why(enum psr_effect effect, enum psr_why why);
 
 struct psr_report {
-	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together and divide it by their own clocks */
+	uint64_t ns[PSR_N_STAGES];    /* wall time; resolve and shade run together: their own clocks divide the time
+	                               * that both took */
 	uint64_t count[PSR_N_STAGES];
 	uint64_t n_blocks, n_samples; /* of all instances, all levels */
-	uint64_t n_blocks_drawn, n_samples_drawn; /* of the drawn levels, after culling; all samples of those blocks */
+	uint64_t n_blocks_drawn, n_samples_drawn; /* at the drawn levels, after culling; counts all samples of a drawn
+	                                           * block */
 	uint64_t n_covered;           /* pixels that a sample keeps: weight above 0 before the fill */
-	uint64_t n_filled;            /* pixels of weight 0 that the fill gave a colour of the scene */
+	uint64_t n_filled;            /* pixels of weight 0 to which the fill gave a colour of the scene */
 	uint32_t levels;              /* bit k: level buffer k was in use */
-	uint32_t n_clamped;           /* blocks that needed a coarser depth buffer than there is: holes are possible */
+	uint32_t n_clamped;           /* blocks that needed a coarser depth buffer than psr has: holes are possible */
 	uint32_t n_shadow_maps;       /* in use */
-	uint32_t n_shadow_maps_drawn; /* of these made for this frame; the others were kept from frames before */
+	uint32_t n_shadow_maps_drawn; /* how many of these were made for this frame; the others were kept from earlier
+	                               * frames */
 	struct {
 		uint64_t count;
 		enum psr_why why;

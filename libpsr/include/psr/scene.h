@@ -1,8 +1,8 @@
-/* A scene: instances of models, a camera, lights. Plain data of the caller's, in doubles.
+/* A scene: instances of models, a camera, lights. Plain data that the caller owns, in doubles.
  *
- * Object and world space are right-handed, +Y up. Camera space is [G] 7.1: the eye at the origin looking along +z;
- * with forward = target - eye, the picture's right is forward x up and its down is forward x right. Depth is z' in
- * world units along the view axis. Pixel centres are at +0.5, (0,0) is the top left pixel. */
+ * Object and world space are right-handed, +Y up. Camera space is [G] 7.1: the eye at the origin looking along +z; with
+ * forward = target - eye, the picture's right is forward x up and its down is forward x right. Depth is z' in world
+ * units along the view axis. Pixel centres are at +0.5, (0,0) is the top left pixel. */
 #ifndef PSR_SCENE_H
 #define PSR_SCENE_H
 
@@ -39,17 +39,17 @@ struct psr_scene {
 /* Checks all ranges above: PSR_ERR_ARG or LIMIT with a sentence that names the field. */
 int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err);
 
-/* Shows the whole box from a little to the right and above of the front, with a vertical angle of fov_y radians (0:
- * orthographic) and an aspect of width / height. `up` has any length but 0 and becomes camera->up, with length 1. Right
- * is +x unless up is within 25 degrees of it (then +y), and the front is right x up: +z where +y is up, -y where +z
- * is. */
+/* Sets a camera that shows the whole box from a little to the right and above of the front, with a vertical angle of
+ * fov_y radians (0: orthographic) and an aspect of width / height. `up` has any length but 0; camera->up gets it with
+ * length 1. Right is +x unless up is within 25 degrees of it (then +y), and the front is right x up: +z where +y is up,
+ * -y where +z is up. */
 void psr_camera_frame(struct psr_camera *camera, const double box_min[3], const double box_max[3], const double up[3],
                       double fov_y, double aspect);
 
-/* The axes of an object with this way up, orthonormal: right, up, front. */
+/* Finds the axes of an object with this way up, orthonormal: right, up, front. */
 void psr_camera_axes(double axes[3][3], const double up[3]);
 
-/* A white directional light from behind the camera, above it and to its left. */
+/* Sets a white directional light from behind the camera, above it and to its left. */
 void psr_light_key(struct psr_light *light, const struct psr_camera *camera);
 
 #ifdef __cplusplus

@@ -113,7 +113,8 @@ static int has_sheer(const struct draft *draft, uint32_t first)
 	return (any & PSR_BLOCK_SHEER) != 0;
 }
 
-/* Makes two blocks, of the same samples, of each one from `first` on that has both sheer ones and others. */
+/* Splits each block from `first` on that has both sheer and other samples into two, which together have the same
+ * samples. */
 static int part_sheer(struct draft *draft, const struct kept *kept, uint32_t *const *block_of, uint32_t first)
 {
 	uint32_t n_blocks = draft->n_blocks - first;

@@ -199,7 +199,7 @@ static int cut_finest(struct group_blocks *blocks, struct draft *draft, uint32_t
 	return rc;
 }
 
-/* The blocks of all levels, for groups of at most so many samples. */
+/* Makes the blocks of all levels, for groups of at most so many samples. */
 static int make_blocks(struct group_blocks *blocks, struct draft *draft, uint32_t n_finest, uint32_t most,
                        struct psr_pool *pool)
 {
@@ -227,7 +227,7 @@ int draft_group(struct draft *draft, struct psr_pool *pool)
 
 	while (n_finest < draft->n_blocks && draft->block[n_finest].level == 0)
 		n_finest++;
-	/* One group shares nothing. */
+	/* A single group shares nothing. */
 	for (uint32_t most = LEAST_GROUP; rc == PSR_OK; most = most < UINT32_MAX / 2 ? 2 * most : UINT32_MAX) {
 		rc = make_blocks(&blocks, draft, n_finest, most, pool);
 		if (!blocks.is_over)

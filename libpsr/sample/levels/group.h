@@ -1,4 +1,4 @@
-/* The blocks of a draft's groups, as they are made. */
+/* The blocks of a draft's groups under construction. */
 #ifndef PSR_SAMPLE_LEVELS_GROUP_H
 #define PSR_SAMPLE_LEVELS_GROUP_H
 

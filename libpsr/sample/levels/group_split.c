@@ -57,7 +57,7 @@ static int map_groups(struct map *map, const struct draft *draft, const struct g
 	return PSR_OK;
 }
 
-/* The samples of a coarse block that each group around needs: at the coarsest level there may be hundreds. */
+/* Which samples of a coarse block each group around it needs; at the coarsest level there may be hundreds of groups. */
 struct part {
 	uint32_t group;
 	uint64_t mask;
@@ -82,7 +82,7 @@ static int add_part(struct parts *parts, uint32_t group, unsigned s)
 	return PSR_OK;
 }
 
-/* From p to the nearest place of the cell that holds a position. */
+/* Returns the distance from p to the nearest place of the cell that holds a position. */
 static double distance2(double width, const float position[3], const float p[3])
 {
 	double sum = 0;
@@ -96,7 +96,7 @@ static double distance2(double width, const float position[3], const float p[3])
 	return sum;
 }
 
-/* All groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
+/* Finds all groups with a cell within reach of a sample; returns how many cells, or MEMORY. */
 static int find_groups(const struct map *map, const float p[3], double reach, unsigned s, struct parts *parts)
 {
 	uint32_t first[GRID_MOST_AROUND];

@@ -17,11 +17,11 @@ struct window {
 	uint64_t mask;
 };
 
-/* The samples of a block that a group needs, and the window of all pieces joined to it. */
+/* The samples of a block that a group needs, and the window of all pieces joined to this one. */
 struct piece {
 	struct draft_block block;
 	struct window window;
-	uint32_t next;       /* of those; NONE ends */
+	uint32_t next;       /* the next joined piece; NONE ends the list */
 	uint8_t is_joined;   /* to another */
 };
 
@@ -81,7 +81,7 @@ static int compare_pieces(const void *a, const void *b)
 	                                        : x->block.part < y->block.part ? -1 : x->block.part > y->block.part;
 }
 
-/* One window for two without a common lattice point, unless it is too deep. */
+/* Makes one window for two without a common lattice point, unless it is too deep. */
 static int fit(const struct window *a, const struct window *b, float spacing, struct window *both)
 {
 	uint64_t mask;
@@ -113,7 +113,7 @@ static float size2_of(const struct window *w, float spacing)
 	return x * x + y * y + z * z;
 }
 
-/* The piece after i on its lattice that makes the smallest window with it; NONE. */
+/* Returns the piece after i on its lattice that makes the smallest window with it, or NONE. */
 static uint32_t find_best(const struct piece *piece, uint32_t i, uint32_t n, float spacing, struct window *best)
 {
 	float least = INFINITY;
@@ -149,8 +149,8 @@ static void join_lattice(struct piece *piece, uint32_t n, float spacing)
 	}
 }
 
-/* Moves a window, which begins in an even row, so that its middle is nearest to that of the samples' box: samples that
- * fit one window fit this one, too. */
+/* Moves a window, which begins in an even row, so that its middle is nearest to the middle of the samples' box. Samples
+ * that fit one window fit the moved one, too. */
 static void center_window(struct window *w)
 {
 	int low = INT_MAX, high = INT_MIN, col, row; /* in half columns: odd rows lie half a column on */

@@ -11,7 +11,7 @@
 
 #define CHUNK 4096
 #define BATCH 64
-#define PARTS 8       /* of the trials, after each of which measuring may stop */
+#define PARTS 8       /* measuring may stop after each of so many parts of the trials */
 #define FARTHEST 4    /* pixels around a place that are searched at grazing angles */
 #define BACK 0.0125f  /* as the renderer's: facing away by less than a step of normals still counts */
 
@@ -178,7 +178,7 @@ static int join_chunks(struct adequacy *out, struct chunk *chunk, int n_chunks)
 	return PSR_OK;
 }
 
-/* Whether the first chunks miss as many as all of them may. */
+/* Whether the first chunks already miss as many places as all chunks together may. */
 static int are_too_many(const struct chunk *chunk, int n_done, int n_chunks)
 {
 	uint64_t n_trials = 0, n_missing = 0;

@@ -13,7 +13,7 @@
 #define LEAST_COSINE 0.3f
 #define LEAST_ALIKE 0.6f
 
-/* The least that candidates cost, in samples: a single hit covers less than a triangle; a moved sample is off by up to
+/* The least costs of candidates, in samples: a single hit covers less than a triangle; a moved sample is off by up to
  * half a pixel. */
 #define HIT 1.5f
 #define MOVE 3
@@ -63,7 +63,7 @@ struct corner {
 	int is_kept;
 };
 
-/* The corners of projection q's lattice triangle around a place; without a hit of its surface, SHEET_NONE. */
+/* Finds the corners of projection q's lattice triangle around a place; SHEET_NONE where its surface has no hit. */
 static void find_corners(const struct keeper *keeper, unsigned q, const struct place *place,
                          struct corner corner[3], float projected[3])
 {
@@ -118,10 +118,10 @@ static int is_triangle(const struct keeper *keeper, const struct place *place, c
 	return away * away <= (float)(OFF_TRIANGLE * OFF_TRIANGLE * ds * ds) * v3f_dot(n, n);
 }
 
-/* The corners around a place in each try, and the place in the space of that projection. */
+/* The corners around a place in each try, and the place in that projection's space. */
 struct look {
 	struct tries tries;
-	int n; /* tries of which this is known */
+	int n; /* tries made so far */
 	struct corner corner[CANDIDATE_TRIES][3];
 	float projected[CANDIDATE_TRIES][3];
 };
@@ -278,7 +278,7 @@ static float opening_cost(const struct keeper *keeper, unsigned projection, stru
 	return patch->kept != 0 ? 0 : block_cost(keeper) + WANTED / (float)(1 + patch->n_wanted);
 }
 
-/* The triangle that lacks least. */
+/* Returns the triangle that lacks the fewest samples. */
 static const struct candidate *best_triangle(const struct candidates *candidates, const struct keeper *keeper,
                                              float *least)
 {

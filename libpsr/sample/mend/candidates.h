@@ -8,9 +8,9 @@
 #include "sample/visible/places.h"
 
 #define CANDIDATE_TRIES 10    /* projections, by how well they face a place */
-#define CANDIDATE_TRIANGLES 3 /* so many are asked for triangles */
+#define CANDIDATE_TRIANGLES 3 /* only the first so many are searched for triangles */
 
-/* Lattice points of one projection; their cost beside that of new blocks. */
+/* Lattice points of one projection, and their cost without new blocks. */
 struct candidate {
 	unsigned projection;
 	float cost;
@@ -23,7 +23,7 @@ struct candidate_move {
 	struct lattice_point at;
 };
 
-/* By how well their projections face the place. */
+/* In each list, projections that face the place better come first. */
 struct candidates {
 	int n_triangles, n_hits, n_moves;
 	struct candidate triangle[CANDIDATE_TRIANGLES]; /* small ones on which the place is; */
@@ -31,28 +31,30 @@ struct candidates {
 	struct candidate_move move[3 * CANDIDATE_TRIES];
 };
 
-/* Whether a place is covered: it lies in a lattice triangle of kept samples with sides of at most a pixel ([G] 4.3:
- * some of its corners is in whichever pixel is centred there), or within half a pixel of a kept sample. Any number of
- * threads may ask. */
+/* Returns whether a place is covered: it lies in a lattice triangle of kept samples with sides of at most a pixel ([G]
+ * 4.3: any pixel centred there holds one of the corners), or within half a pixel of a kept sample. Any number of
+ * threads may call it. */
 int candidates_cover(const struct keeper *keeper, const struct field *field, const struct place *place);
 
-/* Any number of threads may look. */
+/* Finds the candidates to cover a place. Any number of threads may call it. */
 void candidates_find(struct candidates *candidates, const struct keeper *keeper, const struct field *field,
                      const struct place *place);
 
-/* The same of a place that is not covered; returns 1 of one that is, without candidates. */
+/* Finds candidates only if the place is not covered. Returns 1 if it is covered, and then has no candidates. */
 int candidates_look(struct candidates *candidates, const struct keeper *keeper, const struct field *field,
                     const struct place *place);
 
-/* Whether a place is covered by now, if no new hits were added since its candidates were found. */
+/* Returns whether a place is covered by now, if no new hits were added since its candidates were found. */
 int candidates_are_superfluous(const struct candidates *candidates, const struct keeper *keeper,
                                const struct place *place);
 
-/* Keeps what covers a place at the least cost; *is_left: that is above `most`, and nothing was kept. MEMORY. */
+/* Keeps the samples that cover a place at the least cost. *is_left: the cost is above `most`, and it kept none.
+ * MEMORY. */
 int candidates_take(const struct candidates *candidates, const struct keeper *keeper, const struct place *place,
                     float most, int *is_left);
 
-/* Counts a place for each patch that could cover it: of those without kept samples, the most wanted are opened. */
+/* Counts the place for each patch that could cover it. Of the patches without kept samples the most wanted get
+ * opened. */
 void candidates_want(const struct candidates *candidates, const struct keeper *keeper);
 
 #endif

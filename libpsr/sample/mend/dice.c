@@ -18,7 +18,7 @@
 static const double SHIFT[] = { 0.5, 0.99, 0.25, 0.75 };
 #define N_SHIFTS (int)(sizeof SHIFT / sizeof *SHIFT)
 
-/* What was found of some primitives. */
+/* The places found on some primitives. */
 struct chunk {
 	struct places thin, rest;
 	struct place_cells thin_cells; /* cells with a place on a thin primitive: its other sides need no test; */
@@ -62,8 +62,8 @@ static int is_any_side_seen(const struct visible_set *visible, const struct plac
 	return visible_set_has(visible, place->p, place->n) || visible_set_has(visible, place->p, back);
 }
 
-/* Tests a place on all sides that are seen, in round 0 not those of hidden primitives. is_small: one place a cell is
- * enough for the triangle. */
+/* Tests a place on all sides that views have seen; in round 0 not on sides of hidden primitives. is_small: one place a
+ * cell is enough for the triangle. */
 static void test_place(const struct job *job, uint32_t prim, const float p[3], int is_small, struct chunk *chunk)
 {
 	static const float NO_WAY[3] = { 0, 0, 0 };
@@ -81,7 +81,7 @@ static void test_place(const struct job *job, uint32_t prim, const float p[3], i
 
 		if (job->round == 0 && !is_thin && (sides & hidden) != 0 && (sides & seen) == 0)
 			continue;
-		/* What is kept for the front counts. */
+		/* Samples kept for the front count for the back, too. */
 		if (back && is_side_seen && keep_is_two_sided(job->keeper, prim, p, front))
 			continue;
 		v3f_set(place.p, p[0], p[1], p[2]);

@@ -5,9 +5,9 @@
 #include "sample/own/keep.h"
 #include "sample/visible/places.h"
 
-/* Dices all primitives ([G] 9.2.1, [Cook87]) into places a third of a pixel apart, other ones in each round (0 or
- * greater), and lists those that are seen and not covered: first *n_thin on thin primitives. free() places->place.
- * MEMORY. */
+/* Dices all primitives ([G] 9.2.1, [Cook87]) into places a third of a pixel apart, at different places in each round (0
+ * or greater), and lists the places that views see and no sample covers: first *n_thin on thin primitives. free()
+ * places->place. MEMORY. */
 int dice(struct places *places, size_t *n_thin, const struct keeper *keeper, const struct field *field, int round);
 
 #endif

@@ -31,7 +31,7 @@ static void look_for_candidates(int i, void *userdata)
 		                                                 &window->place[k]);
 }
 
-/* One place at a time, in order. One that costs more than `most` is left, and wants a block. */
+/* Covers one place after the other. A place that costs more than `most` is left over, and asks for a block. */
 static int cover_window(const struct window *window, float most, struct place *left, size_t *n_left)
 {
 	int rc = PSR_OK;
@@ -50,7 +50,7 @@ static int cover_window(const struct window *window, float most, struct place *l
 	return rc;
 }
 
-/* Those that are left come to the front: *n of them. */
+/* Moves places that are left over to the front: *n of them. */
 static int cover_places(struct window *window, struct place *place, size_t *n, float most)
 {
 	size_t n_left = 0;

@@ -6,10 +6,10 @@
 #include "sample/own/keep.h"
 #include "sample/visible/places.h"
 
-/* All over the surface, at other places in each round, 0 or greater. MEMORY. */
+/* Covers places all over the surface, other ones in each round (0 or greater). MEMORY. */
 int mend_surface(const struct keeper *keeper, const struct field *field, int round);
 
-/* One place. MEMORY. */
+/* Covers one place. MEMORY. */
 int mend_place(const struct keeper *keeper, const struct field *field, const struct place *place);
 
 #endif

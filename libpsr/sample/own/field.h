@@ -17,8 +17,8 @@ void field_fini(struct field *field);
  * matter. MEMORY. */
 int field_add(struct field *field, const float p[3], const float n[3], float weight);
 
-/* The smoothed normal (not of unit length) at p of what faces like n: n itself where nothing is known. Any number of
- * threads may ask. */
+/* Finds the smoothed normal (not of unit length) at p of the surface that faces like n: n itself where the field is
+ * empty. Any number of threads may call it. */
 void field_normal(const struct field *field, const float p[3], const float n[3], float out[3]);
 
 #endif

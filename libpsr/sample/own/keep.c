@@ -39,7 +39,7 @@ static float least_agreement(const struct sampling *sampling, uint32_t prim)
 	return is_wide(sampling, prim) ? LEAST_AGREEMENT_WIDE : LEAST_AGREEMENT;
 }
 
-/* The normal nearest to `normal` within a cosine of the face's. */
+/* Finds the normal nearest to `normal` within a cosine of the face's. */
 static uint16_t agree(uint16_t normal, const float face[3], float least)
 {
 	const float *n = psr_direction_table()[normal];

@@ -22,7 +22,7 @@ int keep_samples(const struct keeper *keeper, const struct sample_ref *ref, uint
 /* Adds a hit at a lattice point, and keeps it; does nothing beyond the lattice. MEMORY. */
 int keep_moved(const struct keeper *keeper, unsigned projection, struct lattice_point at, float z, uint32_t surface);
 
-/* Whether a sample of a face of this normal counts for views of its back, too: a thin sheet's does. */
+/* Returns whether a sample of a face with this normal counts in views of its back, too. A thin sheet's sample does. */
 int keep_is_two_sided(const struct keeper *keeper, uint32_t prim, const float p[3], const float n[3]);
 
 /* Asks that again of all kept samples, after more was seen. */

@@ -17,7 +17,7 @@ struct job {
 	const struct sampling *sampling;
 	const struct sheets *sheets;
 	const struct field *field;
-	int least; /* of this round */
+	int least; /* the fewest samples that a patch may own in this round */
 	float cosine;
 };
 
@@ -26,7 +26,7 @@ struct claim {
 	uint64_t bit;
 };
 
-/* The nearest corner of projection q's lattice triangle with this surface, in a patch that owns enough. */
+/* Finds the nearest corner of projection q's lattice triangle with this surface, in a patch that owns enough. */
 static struct claim find_claim(const struct job *job, unsigned q, const float p[3], uint32_t surface)
 {
 	const struct sheets *sheets = &job->sheets[q];

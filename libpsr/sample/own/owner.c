@@ -39,7 +39,7 @@ unsigned owner_of(const struct sampling *sampling, const struct field *field, co
 	return best_facing(sampling, smooth, n);
 }
 
-/* Position and normal of a hit. */
+/* Finds position and normal of a hit. */
 static void locate(const struct job *job, int i, uint32_t patch, unsigned s, float p[3], float n[3])
 {
 	sheets_position(&job->sheets[i], (struct sheet_ref){ patch, s }, p);
@@ -56,7 +56,8 @@ static int is_seen(const struct job *job, int i, uint32_t patch, unsigned s, int
 	return visible_set_has(job->finds->visible, p, n);
 }
 
-/* First by the faces' own normals: the field is made of these, each place once. */
+/* Gives each place at first to the projection that faces the face's own normal best: the field is made of these places,
+ * each once. */
 static void mark_faced(int i, void *userdata)
 {
 	const struct job *job = userdata;
@@ -139,8 +140,8 @@ static void mark_hidden(int i, void *userdata)
 	}
 }
 
-/* A sheet seen from both sides is sampled once, on its front, and a hidden one not at all. Mending chooses the samples
- * of narrow primitives. */
+/* A sheet seen from both sides is sampled once, on its front, a hidden sheet not at all. Mending chooses the samples of
+ * narrow primitives. */
 static void drop_hidden(int i, void *userdata)
 {
 	const struct job *job = userdata;
@@ -165,7 +166,7 @@ static void drop_hidden(int i, void *userdata)
 	}
 }
 
-/* First hits are seen, here and at coarser levels: few views meet thin things. */
+/* Records first hits as seen, here and at coarser levels: few views meet thin things. */
 static int see_first(const struct job *job)
 {
 	for (int i = 0; i < N_PROJECTIONS; i++) {

@@ -7,21 +7,21 @@
 #include "sample/project/sheet.h"
 #include "sample/visible/visible_set.h"
 
-/* Of the hits of a patch. */
+/* Bits of a patch's hits. */
 struct owned {
-	uint64_t mask;   /* owned, and to be kept; */
-	uint64_t hidden; /* owned at first, but nobody can see them */
+	uint64_t mask;   /* owned, and to be kept */
+	uint64_t hidden; /* owned at first, but no view can see them */
 };
 
 struct ownership {
 	struct owned *patch[N_PROJECTIONS]; /* n_patches of each projection's sheets */
 };
 
-/* The projection that owns a place that faces n. */
+/* Returns the projection that owns a place that faces n. */
 unsigned owner_of(const struct sampling *sampling, const struct field *field, const float p[3], const float n[3]);
 
-/* Finds the owners of all hits, makes the field on the way, and adds what it sees to the visible set and to `sides`
- * (enum side). MEMORY; ownership_fini() either way. */
+/* Finds the owners of all hits, makes the field on the way, and adds seen places to the visible set and to `sides`
+ * (enum side). MEMORY; call ownership_fini() even then. */
 struct owner_finds {
 	struct field *field; /* initialised */
 	struct visible_set *visible;
@@ -31,8 +31,8 @@ int owner_mark(struct ownership *ownership, const struct owner_finds *finds, con
                const struct sheets *sheets);
 void ownership_fini(struct ownership *ownership);
 
-/* merge.c: gives the hits of patches that own less than a quarter of a block to other patches that have the same
- * surface. Single hits that are left are owned no more. */
+/* merge.c: gives the hits of patches that own less than a quarter of a block to other patches with the same surface.
+ * Drops single hits that remain. */
 void owner_merge(struct ownership *ownership, const struct sampling *sampling, const struct sheets *sheets,
                  const struct field *field);
 

@@ -5,7 +5,7 @@
 /* Normals and axis are rounded to floats: their product is off by some 2^-22. */
 #define SLACK 0x1p-20
 
-/* Less is rounding of doubles. */
+/* A smaller value is rounding of doubles. */
 #define OUTSIDE 0x1p-48
 
 struct cap {
@@ -24,7 +24,7 @@ static void cap_of_two(struct cap *cap, const double a[3], const double b[3])
 	cap->cosine = v3d_dot(cap->axis, a);
 }
 
-/* The circle through three points of the sphere, or two if some coincide. */
+/* Finds the circle through three points of the sphere, or two if some coincide. */
 static void cap_of_three(struct cap *cap, const double a[3], const double b[3], const double c[3])
 {
 	double ab[3], ac[3];
@@ -48,8 +48,8 @@ static int is_outside(const struct cap *cap, const double v[3])
 	return v3d_dot(cap->axis, v) < cap->cosine - OUTSIDE;
 }
 
-/* [G] 6.4: two or three of the normals bound the smallest cap. Welzl: a normal outside of the cap of those before it
- * is on the rim of the cap that holds it, too. */
+/* [G] 6.4: two or three of the normals bound the smallest cap. Welzl's rule: a normal outside of the cap of all earlier
+ * ones is on the rim of the cap that holds it, too. */
 static void smallest_cap(struct cap *cap, const float (*normal)[3], int n)
 {
 	double a[3], b[3], c[3];

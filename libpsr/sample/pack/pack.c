@@ -91,7 +91,7 @@ static void pack_clusters(struct pack *pack, const struct order *order)
 		pack_bound_cluster(&spheres, &pack->cluster[c]);
 }
 
-/* All arrays of a pack and their elements. */
+/* All arrays of a pack, with their elements. */
 #define EACH_ARRAY(DO) \
 	DO(cluster, pack->n_clusters) \
 	DO(center[0], n_blocks) \
@@ -136,7 +136,7 @@ static uint64_t count_samples(const struct draft *draft)
 	return n;
 }
 
-/* Makes masks, and measures the loss of culling by them and by cones. */
+/* Makes masks, and measures how many samples are lost when masks and cones cull. */
 static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct visibility_mask_table *table,
                           struct psr_model_info *info, struct psr_pool *pool)
 {
@@ -154,7 +154,7 @@ static int add_visibility(struct pack *pack, struct psr_blocks *blocks, struct v
 	return visibility_mask_lost(blocks, pack->scene, info->n_trials, pool, &info->n_lost);
 }
 
-/* Of all blocks, OR-ed. */
+/* all blocks' bits, OR-ed */
 static uint8_t find_traits(const struct pack *pack)
 {
 	uint8_t any = 0;

@@ -14,8 +14,9 @@ struct pack_source {
 	struct psr_pool *pool;
 };
 
-/* A cluster for each group and level, coarse levels first; in a cluster blocks are in the order of the Morton code of
- * their centres. Depths are quantised. Fills in the box and n_lost of info; the rest must be set. MEMORY, LIMIT. */
+/* Makes a cluster for each group and level, coarse levels first; a cluster's blocks are in the order of the Morton
+ * codes of their centres. Quantises depths. Fills in the box and n_lost of info; the caller sets the rest. MEMORY,
+ * LIMIT. */
 int pack_model(struct psr_model **out, struct psr_model_info *info, const struct pack_source *source,
                struct psr_error *err);
 

@@ -62,7 +62,7 @@ static void center_block(struct pack *pack, uint32_t i, const struct draft_block
 	assert(place.row == (double)block->row * (1u << block->level));
 }
 
-/* Depths as 16 bits, in the least step, a power of two, that reaches all of them from the center's. */
+/* Quantises depths to 16 bits, in the least step, a power of two, that reaches all of them from the center's. */
 static void quantise(struct pack *pack, uint32_t i, uint32_t at, const struct draft_block *block, double min,
                      double max)
 {
@@ -118,9 +118,9 @@ static void bound_block(struct pack *pack, uint32_t i, uint32_t at, const struct
 	pack->radius[i] = (uint16_t)radius;
 }
 
-/* The cone holds the normals of the faces, and unless the block is bent those of the samples, by which the renderer
- * draws. A block that is seen from both sides needs one only if it is bent: no sample of a bent block is left out by
- * itself. */
+/* The cone holds the normals of the faces, and the samples' own, by which the renderer draws, unless the block is bent.
+ * A block that is seen from both sides needs a cone only if it is bent: the renderer leaves out no single sample of a
+ * bent block. */
 static void bound_normals(struct pack *pack, uint32_t i, const struct draft_block *block)
 {
 	const float (*direction)[3] = psr_direction_table();
@@ -142,7 +142,7 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		pack->cone[k][i] = axis[k];
 }
 
-/* Of a sample of a sheer block, filtered as its attributes are. */
+/* The opacity of a sheer block's sample, filtered as its attributes are. */
 static uint8_t find_opacity(const struct pack *pack, const struct draft_block *block, unsigned s)
 {
 	uint32_t surface = draft_sample(pack->draft, block, s)->surface;

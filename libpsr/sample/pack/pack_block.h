@@ -1,4 +1,4 @@
-/* The arrays of a model's blocks while they are filled. */
+/* The arrays of a model's blocks under construction. */
 #ifndef PSR_SAMPLE_PACK_PACK_BLOCK_H
 #define PSR_SAMPLE_PACK_PACK_BLOCK_H
 
@@ -23,10 +23,10 @@ struct pack {
 /* Box of a block's samples in the space of its projection. */
 void pack_box(const struct draft *draft, const struct draft_block *block, double min[3], double max[3]);
 
-/* Fills entry i of the arrays of blocks, in order, and the next entries of those of samples. */
+/* Fills entry i of the arrays of blocks, in order, and the next entries of the samples' arrays. */
 void pack_block(struct pack *pack, uint32_t i, const struct draft_block *block);
 
-/* Sets the sphere of a cluster from those of its blocks. */
+/* Sets the sphere of a cluster from its blocks' spheres. */
 void pack_bound_cluster(const struct psr_blocks *blocks, struct psr_cluster *cluster);
 
 #endif

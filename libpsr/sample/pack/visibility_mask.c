@@ -18,7 +18,7 @@
 /* Views from both ends of an axis. */
 struct axis {
 	double direction[3];
-	uint64_t triangles[2][MOST_WORDS]; /* those that hold each end */
+	uint64_t triangles[2][MOST_WORDS]; /* the triangles that hold each end */
 };
 
 struct job {
@@ -72,7 +72,7 @@ static int compare_axes(const void *a, const void *b)
 	return 0;
 }
 
-/* Of each pair of opposite directions the one whose first number other than 0 is positive. */
+/* Keeps of each pair of opposite directions the one whose first number other than 0 is positive. */
 static int is_end_0(const double v[3])
 {
 	for (int k = 0; k < 3; k++)
@@ -81,7 +81,7 @@ static int is_end_0(const double v[3])
 	return 0;
 }
 
-/* The corners of all triangles that are FINER levels finer, each pair of opposite ones once. */
+/* Finds the corners of all triangles that are FINER levels finer; of opposite ones only one. */
 static int make_axes(struct axis *axis, int level)
 {
 	int n = 0, n_kept = 0;

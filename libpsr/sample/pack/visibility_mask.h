@@ -20,12 +20,12 @@
  * `blocks` needs all arrays but cones and masks. The same masks whatever the number of threads. MEMORY. */
 int visibility_mask_make(const struct psr_blocks *blocks, struct psr_pool *pool, uint64_t (*mask)[2]);
 
-/* The same with the triangles of any level, 0..3, from directions two levels finer: `words` words a block, enough for
- * 8 * 4^level bits. */
+/* Makes masks with the triangles of any level, 0..3, from directions two levels finer: `words` words a block, enough
+ * for 8 * 4^level bits. */
 int visibility_mask_make_at(const struct psr_blocks *blocks, int level, size_t words, struct psr_pool *pool,
                         uint64_t *mask);
 
-/* Whether all bits of all masks are set: such masks are not worth storing. */
+/* Returns whether all bits of all masks are set: such masks are not worth storing. */
 int visibility_mask_is_full(uint32_t n_blocks, const uint64_t (*mask)[2]);
 
 /* Measures the loss. Level 0 is drawn without culling from random places outside of the unit sphere, half of them

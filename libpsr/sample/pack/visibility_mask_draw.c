@@ -186,7 +186,7 @@ static void least_around(float *restrict out, const float *restrict in, int n, i
 	int first = 2 * stride;
 
 	for (; first < end; first += CHUNK) {
-		/* The last ones are done twice. */
+		/* the last ones are done twice */
 		const int at = first + CHUNK <= end ? first : end - CHUNK;
 		const float *p = in + at;
 

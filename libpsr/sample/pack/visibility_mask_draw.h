@@ -6,7 +6,7 @@
 #include "base/direction.h"
 #include "model/blocks.h"
 
-/* The samples of a model, unpacked. Each array is readable for MASK_POINTS_BEYOND elements beyond its last. */
+/* A model's samples, unpacked. Each array is readable for MASK_POINTS_BEYOND elements beyond its last. */
 #define MASK_POINTS_BEYOND 64
 
 struct mask_points {
@@ -39,8 +39,8 @@ struct mask_picture {
 	float scale, offset[2];                 /* pixel = scale * coordinate + offset */
 	float basis[3][3];                      /* rows: right, up, towards end 0 */
 	uint8_t faces[PSR_DIRECTIONS + 1];      /* bit e: a normal faces end e */
-	/* Heights along the axis, negated for end 1, so that greater ones are nearer, two a pixel: of what is nearest to
-	 * either end, -INFINITY where nothing is; and the least of all within MASK_PICTURE_REACH columns, then also
+	/* Heights along the axis, negated for end 1, so that greater ones are nearer, two a pixel: of the sample nearest to
+	 * either end, -INFINITY in an empty pixel; and the least of all within MASK_PICTURE_REACH columns, then also
 	 * rows. */
 	float *nearest, *row, *farthest;
 };
@@ -53,8 +53,8 @@ void mask_picture_fini(struct mask_picture *picture);
 void mask_picture_draw(struct mask_picture *picture, const struct mask_points *points, const struct mask_level *level,
                    const double axis[3], uint32_t seed);
 
-/* Whether a sample of the block is seen from an end: it faces that and is not behind the farthest of the pixels
- * around it. */
+/* Returns whether a sample of the block is seen from an end: it faces the end, and is not behind the farthest of the
+ * pixels around it. */
 int mask_picture_sees(const struct mask_picture *picture, const struct mask_points *points, uint32_t block, int end);
 
 #endif

@@ -64,7 +64,7 @@ static void place_eye(struct eye *eye, int which)
 	psr_direction_basis(v, eye->basis);
 }
 
-/* From a sample to the eye. */
+/* The direction from a sample to the eye. */
 static void to_eye_from(const struct eye *eye, const float p[3], float v[3])
 {
 	for (int k = 0; k < 3; k++)
@@ -107,7 +107,7 @@ static void draw(const struct job *job, const struct eye *eye, struct picture *p
 		uint32_t end = first + (uint32_t)__builtin_popcountll(b->mask[block]);
 
 		if ((psr_blocks_traits(b, block) & PSR_BLOCK_BENT) != 0 && cone_says(b, block, eye))
-			continue; /* all of it faces away */
+			continue; /* all of the block faces away */
 		for (uint32_t k = first; k < end; k++) {
 			const float p[3] = { job->points->x[k], job->points->y[k], job->points->z[k] };
 			float v[3], u[2], depth;
@@ -148,7 +148,8 @@ static int is_culled(const struct mask_points *points, uint32_t block, uint32_t 
 	return (b->visibility_mask[psr_blocks_visibility(b, block)][triangle >> 6] >> (triangle & 63) & 1) == 0;
 }
 
-/* Whether a ray from the eye meets nothing before the sample, or something no farther from it than its neighbours. */
+/* Whether a ray from the eye meets nothing before the sample, or a surface no farther from the sample than its
+ * neighbours are. */
 static int is_open(const struct job *job, uint32_t k, const struct eye *eye)
 {
 	const double p[3] = { (double)job->points->x[k], (double)job->points->y[k], (double)job->points->z[k] };

@@ -8,7 +8,7 @@
 #define TRIANGLE_LEVEL 2
 #define N_CORNERS 66
 #define MOST_MASKS (PSR_RUN_BLOCKS / VISIBILITY_MASK_SHARE)
-#define NEAR 8 /* groups after one, the best of which joins it */
+#define NEAR 8 /* a group may join the best of so many groups after it */
 #define NONE UINT32_MAX
 
 /* Blocks that share a mask, in a list of such groups. */
@@ -97,7 +97,7 @@ static void find_other(struct group *group, uint32_t g)
 	}
 }
 
-/* Of a group, if there is one, and of the NEAR ones before it. */
+/* Finds the other of a group, if there is one, and of the NEAR groups before it. */
 static void find_others_before(struct group *group, uint32_t g)
 {
 	for (int i = 0; i <= NEAR && g != NONE; i++, g = group[g].previous)
@@ -152,7 +152,7 @@ static void make_groups(const struct job *job, uint32_t first, uint32_t n, struc
 	}
 }
 
-/* The mask with all bits of the block's own that culls it from the most directions. */
+/* Returns the mask with all bits of the block's own that culls the block from the most directions. */
 static uint8_t best_mask(const uint64_t (*table)[2], uint32_t n, const uint64_t own[2], const uint64_t hidden[2])
 {
 	int least = PSR_MASK_TRIANGLES + 1;

@@ -42,7 +42,7 @@ void projection_list(struct psr_projection list[N_PROJECTIONS], double ds, doubl
 	double direction[N_PROJECTIONS][3], turn[3][3], sine, cosine;
 	int n = list_directions(direction);
 
-	/* The rows of TURN are rounded: this makes them orthonormal. */
+	/* TURN's rows are rounded: this makes them orthonormal. */
 	v3d_normalize(turn[0], TURN[0]);
 	v3d_cross(turn[2], turn[0], TURN[1]);
 	v3d_normalize(turn[2], turn[2]);

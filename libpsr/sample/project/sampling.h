@@ -1,4 +1,4 @@
-/* The context that all steps of a level read, and none changes. */
+/* The context of a level: all steps read it, and none changes it. */
 #ifndef PSR_SAMPLE_PROJECT_SAMPLING_H
 #define PSR_SAMPLE_PROJECT_SAMPLING_H
 
@@ -19,7 +19,7 @@ struct sampling {
 	const uint8_t *thin; /* enum thin, by primitive, once thin_mark() has made it; NULL: nothing is thin */
 	unsigned level;      /* 0: the finest */
 	double ds;           /* a pixel at this level's resolution, inner units */
-	struct psr_projection projection[N_PROJECTIONS]; /* spacing: that of this level */
+	struct psr_projection projection[N_PROJECTIONS]; /* spacing: this level's */
 };
 
 static inline uint32_t sampling_n_prims(const struct sampling *sampling)
@@ -37,7 +37,7 @@ static inline int sampling_is_thin(const struct sampling *sampling, uint32_t sur
 	return sampling->thin != NULL && sampling->thin[surface & ~SURFACE_BACK] != 0;
 }
 
-/* Whether samples of a surface may count for both sides: these have patches of their own. */
+/* Returns whether samples of a surface may count for both sides: these have patches of their own. */
 static inline int sampling_is_sheet(const struct sampling *sampling, uint32_t surface)
 {
 	return sampling_is_thin(sampling, surface)

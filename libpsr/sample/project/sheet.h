@@ -29,16 +29,16 @@ struct sheet_sample {
 	uint32_t surface; /* a side: surface.h */
 };
 
-/* What searches read comes first. */
+/* First the members that searches read. */
 struct patch {
-	uint32_t next;      /* of the same lattice block; SHEET_NONE ends */
+	uint32_t next;      /* next patch of the same lattice block; SHEET_NONE ends */
 	float low, high;    /* bound z of the hits */
 	int16_t col, row;   /* in blocks */
 	uint64_t mask;      /* hits; */
-	uint64_t kept;      /* those that the model keeps: sheets_keep(); */
-	uint64_t first;     /* and the first of their rays but for sheer ones: nothing hides them */
+	uint64_t kept;      /* hits that the model keeps: sheets_keep() */
+	uint64_t first;     /* first hits of their rays, but for sheer ones: nothing hides them */
 	uint16_t n_wanted;  /* uncovered places that it could cover: sheets_want() */
-	uint8_t two_sided;  /* sampling_is_sheet(), the same of all hits */
+	uint8_t two_sided;  /* sampling_is_sheet(), equal for all hits */
 };
 
 /* Puts a hit into a patch that has none at s yet. */
@@ -50,13 +50,13 @@ static inline void patch_put(struct patch *patch, unsigned s, float z)
 }
 
 struct sheets {
-	struct psr_projection projection; /* spacing: that of this level */
+	struct psr_projection projection; /* spacing: this level's */
 	int reach;                        /* lattice blocks on each side of the origin, along rows and columns */
 	uint32_t *head;                   /* (2 reach)^2: first patch of a lattice block, SHEET_NONE */
 	uint32_t n_patches, capacity;
 	struct patch *patch;
 	struct sheet_sample (*sample)[PSR_BLOCK_SAMPLES];
-	uint64_t n_rays, n_hits; /* n_rays: 0 of what is behind others */
+	uint64_t n_rays, n_hits; /* n_rays: 0 of the projection that looks from behind */
 };
 
 /* Traces a lattice of projection->spacing. behind: gets the projection from the other side, of axes -x, y, -z and the
@@ -74,7 +74,7 @@ static inline void sheets_point(const struct sheets *sheets, int row, int col, d
 	*y = row * 0.86602540378443864676 * spacing;
 }
 
-/* The ray through x, y; z = SHEET_START - t. */
+/* Makes the ray through x, y; z = SHEET_START - t. */
 #define SHEET_START 2.0
 void sheets_ray(const struct psr_projection *projection, double x, double y, struct ray *ray);
 
@@ -89,10 +89,10 @@ struct sheet_ref {
 	uint32_t sample;
 };
 
-/* The hit at a lattice point nearest in depth to z, within reach. */
+/* Finds the hit at a lattice point nearest in depth to z, within reach. */
 struct sheet_ref sheets_find(const struct sheets *sheets, struct lattice_point at, float z, float reach);
 
-/* The same for the corners of a lattice triangle. */
+/* Finds such hits at the corners of a lattice triangle. */
 void sheets_find_corners(const struct sheets *sheets, const struct lattice_point at[3], float z, float reach,
                          struct sheet_ref found[3]);
 

@@ -139,7 +139,7 @@ int patch_row_add(struct patch_row *row, struct block_hits *h, int col, int bloc
 	for (int i = 0; i < n_sheets; i++) {
 		uint32_t p = first;
 
-		/* The first patch with room for the whole sheet that stays shallow. */
+		/* Returns the first patch with room for the whole sheet that stays shallow. */
 		for (; p < row->n; p++) {
 			float top = sheet[i].high > high[p - first] ? sheet[i].high : high[p - first];
 			float bottom = sheet[i].low < low[p - first] ? sheet[i].low : low[p - first];

@@ -1,4 +1,4 @@
-/* From the hits of a lattice block to its patches. */
+/* Makes patches from the hits of a lattice block. */
 #ifndef PSR_SAMPLE_PROJECT_SHEET_PATCH_H
 #define PSR_SAMPLE_PROJECT_SHEET_PATCH_H
 
@@ -20,7 +20,7 @@ struct block_hits {
 	int n;
 };
 
-/* The patches of a row of lattice blocks, which one thread makes. */
+/* Patches of a row of lattice blocks; one thread makes them. */
 struct patch_row {
 	uint32_t n, capacity;
 	uint64_t n_rays, n_hits;

@@ -9,7 +9,7 @@
 #define SIDE PSR_BLOCK_SIDE
 #define BATCH 64
 
-/* The hits of the rays through a row of lattice blocks. */
+/* Hits of the rays through a row of lattice blocks. */
 struct strip {
 	int n_columns;
 	uint64_t n_rays;
@@ -23,8 +23,8 @@ struct strip {
 };
 
 struct job {
-	struct sheets *sheets[2]; /* the second one's lattice is the first one's, looked at from behind: column c of row r
-	                             is column -c - (r & 1) there; NULL if nobody asks for it */
+	struct sheets *sheets[2]; /* the second one's lattice is the first one's, seen from behind: column c of row r is
+	                           * column -c - (r & 1) there; NULL if the caller does not want it */
 	const struct sampling *sampling;
 	struct patch_row *row[2];
 };
@@ -42,7 +42,7 @@ static void strip_fini(struct strip *strip)
 	free(strip->hit);
 }
 
-/* The hits of one ray that are not too steep. */
+/* Takes the hits of one ray that are not too steep. */
 static int add_hits(const struct job *job, struct strip *strip, const struct ray_hit *ray_hit, int n_hits)
 {
 	const float *z_axis = job->sheets[0]->projection.axis[2];
@@ -117,7 +117,7 @@ static int trace_strip(const struct job *job, struct strip strip[2], int block_r
 	return rc;
 }
 
-/* The patches of a lattice block, of the rays' projection or the one behind. */
+/* Makes the patches of a lattice block, of the rays' projection or the one behind. */
 static int make_block(const struct strip *strip, struct patch_row *row, int col, int block_row, int is_behind,
                       float step)
 {

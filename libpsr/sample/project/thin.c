@@ -35,7 +35,7 @@ static void aim(const struct sampling *sampling, uint32_t prim, const double pla
 	}
 }
 
-/* Another face of the same look, met from outside. */
+/* Finds another face of the same look, met from outside. */
 static int is_other_side(const struct sampling *sampling, uint32_t prim, const struct ray_hit *hit)
 {
 	return hit->prim != prim && !hit->is_back
@@ -48,8 +48,8 @@ struct job {
 	uint8_t *thin;
 };
 
-/* Whether a primitive faces the even one of the two projections along the line that it faces best: owners keep what is
- * thin there. */
+/* Whether a primitive faces the even one of the two projections along the line that it faces best: that one owns thin
+ * things. */
 static int is_sampled_side(const struct sampling *sampling, uint32_t prim)
 {
 	const float *n = ray_scene_normal(sampling->scene, prim);

@@ -102,7 +102,7 @@ static int sort_places(struct near_places *near, const struct place *place, size
 	return PSR_OK;
 }
 
-/* The places that each candidate covers, one candidate after the other. */
+/* Finds the places that each candidate covers, one candidate after the other. */
 struct covers {
 	uint32_t *place, n, capacity;
 };
@@ -124,7 +124,7 @@ static int look_into(const struct near_places *near, size_t slot, const float po
 	return PSR_OK;
 }
 
-/* In the eight cells around, some of which may share a slot. */
+/* Looks in the eight cells around, some of which may share a slot. */
 static int find_covered(const struct near_places *near, struct thin_candidate *candidate, struct covers *covers)
 {
 	size_t slot[8];

@@ -9,11 +9,11 @@
 /* A hit to keep, or a lattice point to add one at. */
 struct thin_candidate {
 	struct sample_ref ref; /* at.patch: SHEET_NONE if there is no hit, */
-	struct lattice_point at; /* and then where it would be, */
-	float z;                 /* in projection space, */
-	uint32_t surface;        /* and of what */
+	struct lattice_point at; /* at.patch: SHEET_NONE if there is no hit */
+	float z;                 /* where the new sample would be */
+	uint32_t surface;        /* the surface that it samples */
 	float position[3];
-	uint32_t first, end; /* of its places, while it is chosen from */
+	uint32_t first, end; /* of its places, while the search runs */
 };
 
 struct thin_candidates {

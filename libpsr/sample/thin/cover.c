@@ -10,7 +10,7 @@
 /* The finest level has to be adequate between tested places, too. */
 #define FINEST_NEAR (0.85 * KEPT_NEAR)
 
-/* Of a cube, whose places are covered by hits in it. */
+/* Side of a cube; hits inside of it cover its places. */
 #define SIDE_PIXELS 32
 #define LEAST_SIDE 0.125 /* of the unit sphere's radius */
 
@@ -29,7 +29,7 @@ struct cube {
 
 struct job {
 	const struct keeper *keeper;
-	double radius, side; /* of what a sample covers; of a cube */
+	double radius, side; /* radius that a sample covers; side of a cube */
 	int n_side;          /* cubes along a side of all */
 	uint32_t n_cubes;
 	struct cube *cube;

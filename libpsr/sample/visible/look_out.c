@@ -12,8 +12,8 @@
 #define PLACE_AREA 2.25 /* square pixels: a place for each cell of the visible set */
 #define BATCH 64  /* rays from a side of each place, */
 #define AGAIN 3   /* times as many near places that they found: a few hundred rays find most */
-#define AROUND 2  /* doublings of a cell, to 6 pixels, that tell what is near that */
-#define NEAR 3    /* doublings of a cell, to 12 pixels, that tell what is near */
+#define AROUND 2  /* doublings of a cell, to 6 pixels: the size of "around" */
+#define NEAR 3    /* doublings of a cell, to 12 pixels: the size of "near" */
 #define CHUNK 4096
 
 struct chunk {
@@ -28,8 +28,8 @@ struct job {
 	double step;        /* of area, from place to place */
 	uint32_t n_prims;
 	uint64_t n_places;
-	struct visible_set near;   /* what was seen, in wider cells */
-	struct visible_set around; /* what rays got outside from */
+	struct visible_set near;   /* places seen, in wider cells */
+	struct visible_set around; /* places from which rays got outside */
 	struct chunk *chunk;
 };
 

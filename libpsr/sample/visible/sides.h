@@ -1,4 +1,4 @@
-/* Whether something of the two sides of each primitive was seen, or found hidden. */
+/* Which sides of each primitive were seen at some place, or found hidden at some place. */
 #ifndef PSR_SAMPLE_VISIBLE_SIDES_H
 #define PSR_SAMPLE_VISIBLE_SIDES_H
 

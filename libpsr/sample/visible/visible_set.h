@@ -22,10 +22,10 @@ void visible_set_fini(struct visible_set *set);
 #define VISIBLE_MOST_VIEWS 512
 int visible_set_look(struct visible_set *set, const struct ray_scene *scene, uint64_t enough, struct psr_pool *pool);
 
-/* The same with cells twice as wide. MEMORY; visible_set_fini() either way. */
+/* Makes a set with cells twice as wide. MEMORY; call visible_set_fini() even then. */
 int visible_set_coarsen(struct visible_set *set, const struct visible_set *finer);
 
-/* Whether anything near p that faces like n (unit, on the side that was met) was seen. */
+/* Returns whether views saw anything near p that faces like n (unit, on the side that the view met). */
 int visible_set_has(const struct visible_set *set, const float p[3], const float n[3]);
 
 /* Adds a place that the views missed. MEMORY. */

@@ -6,6 +6,7 @@
 static inline __m256 rows_of(const struct warp_block *b, int a)
 {
 	__m128 part[2];
+
 	for (int h = 0; h < 2; h++) {
 		const __m256d row = _mm256_loadu_pd(b->lattice->row[a] + 4 * h);
 		part[h] =
@@ -22,6 +23,7 @@ static inline __m256 columns_of(const struct warp_block *b, int a)
 static inline __m256 axis_of(__m256 rows, __m256 columns, __m256i r, __m256i c, __m256 depth, float unit)
 {
 	const __m256 place = _mm256_add_ps(_mm256_permutevar8x32_ps(rows, r), _mm256_permutevar8x32_ps(columns, c));
+
 	return _mm256_add_ps(place, _mm256_mul_ps(depth, _mm256_set1_ps(unit)));
 }
 
@@ -35,6 +37,7 @@ static inline __m256 sight_axis(const struct warp_instance *in, int k, __m256 u,
 {
 	const __m256 across = _mm256_mul_ps(u, _mm256_set1_ps(in->du[k])),
 				 down = _mm256_mul_ps(v, _mm256_set1_ps(in->dv[k]));
+
 	return _mm256_add_ps(_mm256_add_ps(across, down), _mm256_set1_ps(in->d0[k]));
 }
 
@@ -56,6 +59,7 @@ static inline __m256i faces_away(const struct warp_target *t, const struct warp_
 	const __m256i normal =
 		_mm256_i32gather_epi32((const int *)t->direction, _mm256_and_si256(a, _mm256_set1_epi32(0x7fff)), 4);
 	__m256 n[3], d[3];
+
 	for (int i = 0; i < 3; i++) {
 		n[i] = _mm256_cvtepi32_ps(_mm256_srai_epi32(_mm256_slli_epi32(normal, 22 - 10 * i), 22));
 		d[i] = sight_axis(in, i, u, v);
@@ -82,6 +86,7 @@ static inline __m256i front_of(uint32_t bits)
 {
 	const uint64_t lanes =
 		_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
+
 	return _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)lanes));
 }
 
@@ -95,6 +100,7 @@ static inline void list_cells(struct cells *list, const struct warp_target *t, _
 {
 	const struct warp_cells *cells = &t->cells[list->level];
 	const __m256i one = _mm256_set1_epi32(1), by = _mm256_set1_epi32((int)list->level);
+
 	k = _mm256_and_si256(k, _mm256_and_si256(within(u, cells->x0, cells->x1), within(v, cells->y0, cells->y1)));
 	const __m256i x = _mm256_add_epi32(_mm256_srav_epi32(u, by), one),
 				  y = _mm256_add_epi32(_mm256_srav_epi32(v, by), one);
@@ -112,6 +118,7 @@ static inline void list_words(struct words *list, __m256i k, __m256i at, __m256i
 	const __m256i front = front_of(bits), own = _mm256_permutevar8x32_epi32(id, front);
 	const __m256i depth = _mm256_permutevar8x32_epi32(_mm256_castps_si256(z), front);
 	const __m256i low = _mm256_unpacklo_epi32(own, depth), high = _mm256_unpackhi_epi32(own, depth);
+
 	store(list->at + list->n, _mm256_permutevar8x32_epi32(at, front));
 	store(list->word + list->n, _mm256_permute2x128_si256(low, high, 0x20));
 	store(list->word + list->n + 4, _mm256_permute2x128_si256(low, high, 0x31));
@@ -122,11 +129,13 @@ static inline void list_words(struct words *list, __m256i k, __m256i at, __m256i
 static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 {
 	uint32_t n = 0;
+
 	for (uint64_t row = 0; row < 8; row++) {
 		const uint64_t bits = mask >> 8 * row & 0xff;
 		const uint64_t columns =
 			_pext_u64(UINT64_C(0x0706050403020100), _pdep_u64(bits, UINT64_C(0x0101010101010101)) * 0xff);
 		const uint64_t numbers = columns + row * UINT64_C(0x0808080808080808);
+
 		memcpy(sample + n, &numbers, sizeof numbers);
 		n += (uint32_t)__builtin_popcountll(bits);
 	}

@@ -64,6 +64,7 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 		_mm512_fnmadd_ps(_mm512_cvtepi32_ps(quotient), s->divisor, _mm512_mul_ps(sum, _mm512_set1_ps(256)));
 	const __mmask16 is_more = _mm512_cmp_ps_mask(rest, s->divisor, _CMP_GE_OQ);
 	const __m512i value = _mm512_mask_add_epi32(quotient, is_more, quotient, _mm512_set1_epi32(1));
+
 	_mm256_mask_storeu_epi16(to, s->k, _mm512_cvtepi32_epi16(value));
 }
 
@@ -75,6 +76,7 @@ uint16_t fill_pull_weights_avx512(const struct fill_row *to, const struct fill_r
 	const __m512i whole = _mm512_set1_epi32(GAPS_WHOLE);
 	const __m512 nothing = _mm512_set1_ps(INFINITY);
 	__m512i least = whole;
+
 	for (uint32_t x = 0; x < n; x += PARENTS) {
 		const __mmask16 k = (__mmask16)_bzhi_u32(0xffff, n - x < PARENTS ? n - x : PARENTS);
 		const __mmask32 kk = interleave(k, k);
@@ -82,11 +84,13 @@ uint16_t fill_pull_weights_avx512(const struct fill_row *to, const struct fill_r
 		__m512i w[4], sum = _mm512_setzero_si512();
 		__m128i bits = _mm_setzero_si128();
 		__mmask16 near[4];
+
 		for (int i = 0; i < 2; i++) {
 			const struct fill_row *row = i ? lower : upper;
 			const __m512 a = _mm512_maskz_loadu_ps((__mmask16)kk, row->z + 2 * x);
 			const __m512 b = _mm512_maskz_loadu_ps((__mmask16)(kk >> 16), row->z + 2 * x + 16);
 			const __m512i weight = load_children(kk, row->weight + 2 * x);
+
 			z[2 * i] = _mm512_permutex2var_ps(a, even, b);
 			z[2 * i + 1] = _mm512_permutex2var_ps(a, odd, b);
 			w[2 * i] = _mm512_and_si512(weight, low);
@@ -120,6 +124,7 @@ static inline __attribute__((always_inline)) void pull_row(const struct fill_row
 		const __mmask16 k = (__mmask16)_bzhi_u32(0xffff, n - x < PARENTS ? n - x : PARENTS);
 		const __m128i bits = _mm_maskz_loadu_epi8(k, to->near + x);
 		struct pull_shares s = { .k = k, .kk = interleave(k, k) };
+
 		s.above = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(1)), _mm_test_epi8_mask(bits, _mm_set1_epi8(2)));
 		s.below = interleave(_mm_test_epi8_mask(bits, _mm_set1_epi8(4)), _mm_test_epi8_mask(bits, _mm_set1_epi8(8)));
 		const __m512i above = load_children(s.above, upper->weight + 2 * x);
@@ -160,6 +165,7 @@ static inline struct push_shares share_parents(__m512 own, __m512 side, __m512 b
 	struct push_shares s;
 	const __m512 nearest = _mm512_min_ps(beside, _mm512_min_ps(side, _mm512_min_ps(own, _mm512_set1_ps(INFINITY))));
 	const __m512 limit = _mm512_add_ps(_mm512_mul_ps(nearest, scale), offset);
+
 	s.own = _mm512_cmp_ps_mask(own, limit, _CMP_LE_OQ);
 	s.side = _mm512_cmp_ps_mask(side, limit, _CMP_LE_OQ);
 	s.beside = _mm512_cmp_ps_mask(beside, limit, _CMP_LE_OQ);
@@ -176,6 +182,7 @@ static inline struct push_shares share_parents(__m512 own, __m512 side, __m512 b
 static inline __m512i interpolate(const struct push_shares *s, __m512i own, __m512i side, __m512i beside)
 {
 	__m512i sum = _mm512_maskz_slli_epi32(s->own, own, 1);
+
 	sum = _mm512_mask_add_epi32(sum, s->side, sum, side);
 	sum = _mm512_mask_add_epi32(sum, s->beside, sum, beside);
 	const __m512 value = _mm512_mul_ps(_mm512_cvtepi32_ps(sum), s->inverse);
@@ -195,6 +202,7 @@ struct push {
 static inline void find_turn(struct push *p, const uint16_t *weight, const uint16_t *own, const uint16_t *beside)
 {
 	const __m256i whole = _mm256_set1_epi16(GAPS_WHOLE);
+
 	p->weight = _mm512_maskz_loadu_epi16(p->kk, weight);
 	p->turn = _mm512_mask_cmplt_epu16_mask(p->kk, p->weight, _mm512_set1_epi16(GAPS_WHOLE));
 	if (!p->turn)
@@ -211,6 +219,7 @@ static inline void find_shares(struct push *p, const float *own, const float *be
 {
 	const __m512 by = _mm512_set1_ps(scale), plus = _mm512_set1_ps(offset);
 	const __m512 a = _mm512_maskz_loadu_ps(p->k, own), c = _mm512_maskz_loadu_ps(p->k, beside);
+
 	p->left = share_parents(a, _mm512_maskz_loadu_ps(p->k, own - 1), c, by, plus);
 	p->right = share_parents(a, _mm512_maskz_loadu_ps(p->k, own + 1), c, by, plus);
 	p->rest = share_of(_mm512_sub_epi16(_mm512_set1_epi16(GAPS_WHOLE), p->weight));
@@ -222,12 +231,14 @@ static inline __m512i push_channel(const struct push *p, const uint16_t *own, co
 	const __m512i a = load_parents(p->k, own), c = load_parents(p->k, beside);
 	const __m512i left = interpolate(&p->left, a, load_parents(p->k, own - 1), c);
 	const __m512i right = interpolate(&p->right, a, load_parents(p->k, own + 1), c);
+
 	return _mm512_maskz_mov_epi16(p->turn, part_of(_mm512_or_si512(left, _mm512_slli_epi32(right, 16)), p->rest));
 }
 
 static inline void push_cells(const struct push *p, uint16_t *cell, const uint16_t *own, const uint16_t *beside)
 {
 	const __m512i value = _mm512_add_epi16(load_children(p->turn, cell), push_channel(p, own, beside));
+
 	_mm512_mask_storeu_epi16(cell, p->turn, value);
 }
 
@@ -235,6 +246,7 @@ static inline void push_depths(const struct push *p, float *to, __mmask32 k)
 {
 	const __m512i first = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 	const __m512i second = _mm512_add_epi32(first, _mm512_set1_epi32(8));
+
 	_mm512_mask_storeu_ps(to, (__mmask16)k, _mm512_permutex2var_ps(p->left.z, first, p->right.z));
 	_mm512_mask_storeu_ps(to + 16, (__mmask16)(k >> 16), _mm512_permutex2var_ps(p->left.z, second, p->right.z));
 }
@@ -249,8 +261,10 @@ void fill_push_avx512(const struct fill_row *to, const struct fill_parents *pare
 {
 	const struct fill_row *own = &parents->own, *beside = &parents->beside;
 	const uint32_t n = parents->n;
+
 	for (uint32_t x = 0; x < n; x += PARENTS) {
 		struct push p;
+
 		set_masks(&p, n - x);
 		find_turn(&p, to->weight + 2 * x, own->weight + x, beside->weight + x);
 		if (!p.turn)
@@ -289,6 +303,7 @@ static inline struct listed find_listed(__m256i at, __m256i weight, const struct
 	const __m512 first = _mm512_maskz_loadu_ps((__mmask16)own_k, own - 1);
 	const __m512 last = _mm512_maskz_loadu_ps((__mmask16)(own_k >> 16), own + 15);
 	struct listed l;
+
 	l.beside = _mm512_srli_epi32(column, 1);
 	l.own = _mm512_add_epi32(l.beside, one);
 	l.side = _mm512_add_epi32(l.beside, _mm512_add_epi32(is_right, is_right));
@@ -311,6 +326,7 @@ static inline void push_listed(uint16_t *to, const struct listed *l, __m256i was
 	const __m256i value = _mm512_cvtepi32_epi16(
 		interpolate(&l->shares, pick(own, l->own), pick(own, l->side), pick(beside, l->beside)));
 	const __m256i part = _mm256_mask_mov_epi16(_mm256_mulhi_epu16(value, l->rest), l->is_empty, value);
+
 	_mm256_storeu_si256((__m256i *)to, _mm256_add_epi16(_mm256_mulhi_epu16(was, l->share), part));
 }
 
@@ -324,6 +340,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 	uint32_t to = 0, n_filled = 0, n_moved = 0;
 	for (uint32_t x = 0; x < n; x += PARENTS, left++) {
 		struct push p;
+
 		if (!(*left & bit))
 			continue;
 		set_masks(&p, n - x);
@@ -347,6 +364,7 @@ uint32_t fill_push_picture_avx512(struct fill_places *places, uint32_t *left, ui
 		for (uint32_t i = 0; i < n_turn; i += PARENTS) {
 			const struct listed l = find_listed(half_of(at, i), half_of(weight, i), parents, x, own_k, p.k);
 			const __mmask16 listed = (__mmask16)_bzhi_u32(0xffff, n_turn - i < PARENTS ? n_turn - i : PARENTS);
+
 			n_filled += (uint32_t)__builtin_popcount(
 				_mm512_mask_cmp_ps_mask(l.is_empty & listed, l.shares.z, _mm512_set1_ps(INFINITY), _CMP_LT_OQ));
 			_mm512_storeu_ps(places->z + to + i, l.shares.z);

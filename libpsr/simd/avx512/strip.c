@@ -18,9 +18,11 @@ void strip_list_avx512(struct strip_pixels *p, const uint64_t *word, const uint1
 	__m512i x = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
 	uint16_t *has_sample = (uint16_t *)p->has_sample;
 	uint32_t n = 0;
+
 	memset(p->has_sample, 0, sizeof p->has_sample);
 	for (uint32_t first = 0; first < n_pixels; first += 16) {
 		__mmask16 k = (__mmask16)lowest(n_pixels - first, 16);
+
 		_mm_prefetch((const char *)(word + first + AHEAD), _MM_HINT_T0);
 		_mm_prefetch((const char *)(word + first + AHEAD + 8), _MM_HINT_T0);
 		const __m512i low = _mm512_maskz_loadu_epi64((__mmask8)k, word + first);
@@ -58,6 +60,7 @@ static inline __m512 look_up_5(const __m512 table[2], __m512i index)
 static inline __m512 look_up_6(const __m512 table[4], __m512i index)
 {
 	const __mmask16 is_upper = _mm512_test_epi32_mask(index, _mm512_set1_epi32(32));
+
 	return _mm512_mask_blend_ps(is_upper, look_up_5(table, index), look_up_5(table + 2, index));
 }
 
@@ -68,6 +71,7 @@ static void read_specular(struct strip *strip)
 	const __m512 six[4] = { _mm512_loadu_ps(psr_srgb6_to_linear), _mm512_loadu_ps(psr_srgb6_to_linear + 16),
 		                    _mm512_loadu_ps(psr_srgb6_to_linear + 32), _mm512_loadu_ps(psr_srgb6_to_linear + 48) };
 	const __m512 root = _mm512_loadu_ps(exponent_root);
+
 	for (uint32_t i = 0; i < strip->n; i += 16) {
 		/* High halves: 8 bits of blue, 16 specular, 8 of the exponent. */
 		const __m512i attr = _mm512_loadu_si512(strip->attr + i), next = _mm512_loadu_si512(strip->attr + i + 8);
@@ -84,6 +88,7 @@ static void read_specular(struct strip *strip)
 void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 {
 	uint64_t all, common;
+
 	read_attributes(&all, &common, strip, view);
 	const uint32_t diffuse = PSR_ATTR_DIFFUSE(all);
 	if (diffuse != PSR_ATTR_DIFFUSE(common)) {
@@ -103,6 +108,7 @@ static inline void write_linear(uint16_t *to, const uint16_t *from, __mmask32 k,
 {
 	const __mmask32 lanes = (__mmask32)lowest((uint32_t)__builtin_popcount(k), 32);
 	const __m512i light = _mm512_maskz_loadu_epi16(lanes, from), empty = _mm512_set1_epi16((short)background);
+
 	_mm512_mask_storeu_epi16(to, (__mmask32)lowest(n, 32), _mm512_mask_expand_epi16(empty, k, light));
 }
 
@@ -119,11 +125,13 @@ static void write_rgb(uint8_t *to, const struct strip *strip, const struct strip
 	const __m512i pack = _mm512_loadu_si512(first_three);
 	const __m512i empty = _mm512_set1_epi32((int)pixel_of(target->srgb, dark[0], dark[1], dark[2]));
 	uint32_t pixel[STRIP + 16], n_written = 0;
+
 	for (uint32_t i = 0; i < strip->pixels->n; i++)
 		pixel[i] = pixel_of(target->srgb, strip->r[i], strip->g[i], strip->b[i]);
 	for (uint32_t x = 0; x < n; x += 16) {
 		const __mmask16 k = (__mmask16)(strip->pixels->has_sample[x / 32] >> x % 32);
 		const __m512i row = _mm512_mask_expand_epi32(empty, k, _mm512_loadu_si512(pixel + n_written));
+
 		_mm512_mask_storeu_epi8(to + 3 * x, lowest(3 * (n - x), 48), _mm512_permutexvar_epi8(pack, row));
 		n_written += (uint32_t)__builtin_popcount(k);
 	}
@@ -134,10 +142,12 @@ void strip_write_avx512(const struct strip *strip, const struct strip_target *ta
 	const struct strip_pixels *p = strip->pixels;
 	const size_t first = (size_t)p->y * target->width + p->x0;
 	const uint16_t *dark = target->background;
+
 	if (target->rgb)
 		write_rgb(target->rgb + 3 * first, strip, target, n);
 	for (uint32_t x = 0, i = 0; target->wants && x < n; x += STRIP_BRICK) {
 		const uint32_t k = p->has_sample[x / 32];
+
 		if (target->wants[x / STRIP_BRICK]) {
 			write_linear(target->r + first + x, strip->r + i, k, dark[0], n - x);
 			write_linear(target->g + first + x, strip->g + i, k, dark[1], n - x);

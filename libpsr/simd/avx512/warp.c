@@ -12,12 +12,14 @@ static inline __m512 rows_of(const struct warp_block *b, int a)
 static inline __m512 columns_of(const struct warp_block *b, int a)
 {
 	const __m256 col = _mm256_loadu_ps(b->lattice->col[a]);
+
 	return _mm512_castps256_ps512(_mm256_mul_ps(_mm256_set1_ps((float)b->scale), col));
 }
 
 static inline __m512 axis_of(__m512 rows, __m512 columns, __m512i r, __m512i c, __m512 depth, float unit)
 {
 	const __m512 place = _mm512_add_ps(_mm512_permutexvar_ps(r, rows), _mm512_permutexvar_ps(c, columns));
+
 	return _mm512_add_ps(place, _mm512_mul_ps(depth, _mm512_set1_ps(unit)));
 }
 
@@ -31,6 +33,7 @@ static inline __m512 sight_axis(const struct warp_instance *in, int k, __m512 u,
 {
 	const __m512 across = _mm512_mul_ps(u, _mm512_set1_ps(in->du[k])),
 				 down = _mm512_mul_ps(v, _mm512_set1_ps(in->dv[k]));
+
 	return _mm512_add_ps(_mm512_add_ps(across, down), _mm512_set1_ps(in->d0[k]));
 }
 
@@ -49,6 +52,7 @@ static inline __mmask16 faces_away(const struct warp_target *t, const struct war
 	const __m512i a = _mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
 	const __m512i normal = _mm512_i32gather_epi32(_mm512_and_si512(a, _mm512_set1_epi32(0x7fff)), t->direction, 4);
 	__m512 n[3], d[3];
+
 	for (int i = 0; i < 3; i++) {
 		n[i] = _mm512_cvtepi32_ps(_mm512_srai_epi32(_mm512_slli_epi32(normal, (unsigned)(22 - 10 * i)), 22));
 		d[i] = sight_axis(in, i, u, v);
@@ -62,6 +66,7 @@ static inline __mmask16 faces_away(const struct warp_target *t, const struct war
 static inline __mmask16 within(__mmask16 k, __m512i a, int32_t first, int32_t end)
 {
 	const __m512i from = _mm512_sub_epi32(a, _mm512_set1_epi32(first));
+
 	return _mm512_mask_cmplt_epu32_mask(k, from, _mm512_set1_epi32(end - first));
 }
 
@@ -73,6 +78,7 @@ static inline void list_cells(struct cells *list, const struct warp_target *t, _
 	const __m512i x = _mm512_add_epi32(_mm512_srav_epi32(u, by), one),
 				  y = _mm512_add_epi32(_mm512_srav_epi32(v, by), one);
 	const __m512i at = _mm512_add_epi32(_mm512_mullo_epi32(y, _mm512_set1_epi32((int)cells->stride)), x);
+
 	k = within(within(k, u, cells->x0, cells->x1), v, cells->y0, cells->y1);
 	_mm512_storeu_si512(list->at + list->n, _mm512_maskz_compress_epi32(k, at));
 	_mm512_storeu_si512(list->z + list->n, _mm512_maskz_compress_epi32(k, _mm512_castps_si512(z)));
@@ -90,6 +96,7 @@ static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, 
 {
 	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 	const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
+
 	if (is_mixed | (k & (k + 1))) {
 		s.at = _mm512_maskz_compress_epi32(k, s.at);
 		s.id = _mm512_maskz_compress_epi32(k, s.id);
@@ -117,6 +124,7 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 	const __m512i stride = _mm512_set1_epi32((int)t->stride);
 	const __m512 near_z = _mm512_set1_ps(t->near_z);
 	uint32_t n_words = words->n;
+
 	_Alignas(64) uint8_t sample[64];
 
 	const int n = __builtin_popcountll(block->mask);

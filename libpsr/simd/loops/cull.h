@@ -13,12 +13,14 @@ static inline float edge_of(float at, float if_negative, float if_positive)
 static inline int32_t pixel_within(float pixel, float most)
 {
 	const float low = psr_where(pixel > 0, pixel);
+
 	return (int32_t)psr_choose(low < most, low, most);
 }
 
 static inline int32_t region_of(int32_t pixel, float from, float scale)
 {
 	const float region = ((float)pixel + from) * scale, most = SCREEN_SIDE - 1, low = psr_where(region > 0, region);
+
 	return (int32_t)psr_choose(low < most, low, most);
 }
 
@@ -27,6 +29,7 @@ static void widen(struct widened *restrict to, const struct psr_blocks *b, uint3
 	const int16_t *x = b->sphere_x + first, *y = b->sphere_y + first, *z = b->sphere_z + first;
 	const uint16_t *r = b->sphere_r + first;
 	const uint8_t *flags = b->flags + first;
+
 	for (uint32_t i = 0; i < n; i++) {
 		to->x[i] = (float)x[i] * (1.0f / 16384);
 		to->y[i] = (float)y[i] * (1.0f / 16384);
@@ -100,6 +103,7 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 {
 	const uint32_t whole = (n + LANES - 1) / LANES * LANES;
 	struct widened blocks;
+
 	memset(&blocks, 0, sizeof blocks);
 	widen(&blocks, view->blocks, first, n);
 	cull_by_frustum(out, view, &blocks, whole);

@@ -22,6 +22,7 @@ static void widen_cones(struct widened *restrict to, const struct psr_blocks *b,
 {
 	const int8_t *x = b->cone_x + first, *y = b->cone_y + first, *z = b->cone_z + first;
 	const uint8_t *sine = b->cone_sine + first;
+
 	for (uint32_t i = 0; i < n; i++) {
 		to->axis_x[i] = x[i];
 		to->axis_y[i] = y[i];
@@ -39,11 +40,13 @@ static void cull_by_cones(struct cull_batch *restrict out, const struct cull_vie
 {
 	const int is_perspective = view->perspective, with_cones = view->with_cones;
 	const float eye_x = view->eye[0], eye_y = view->eye[1], eye_z = view->eye[2];
+
 	for (uint32_t i = 0; i < n; i++) {
 		const float ax = b->axis_x[i], ay = b->axis_y[i], az = b->axis_z[i], r = psr_where(is_perspective, b->r[i]);
 		const float dx = psr_where(is_perspective, b->x[i]) - eye_x, dy = psr_where(is_perspective, b->y[i]) - eye_y;
 		const float dz = psr_where(is_perspective, b->z[i]) - eye_z;
 		const float length2 = (dx * dx + dy * dy) + dz * dz, length = __builtin_sqrtf(length2);
+
 		/* All lengths times that of the axis. */
 		const float axis2 = (ax * ax + ay * ay) + az * az, axis = __builtin_sqrtf(axis2);
 		const float g = (dx * ax + dy * ay) + dz * az, square = axis2 * length2 - g * g;

@@ -16,6 +16,7 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 {
 	uint16_t above[2 * FILL_BLOCK], below[2 * FILL_BLOCK];
 	int32_t value[FILL_BLOCK];
+
 	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
 		above[x] = part_of(upper[x], shares->upper[x]);
 		below[x] = part_of(lower[x], shares->lower[x]);
@@ -25,6 +26,7 @@ static inline void pull_channel(uint16_t *to, const uint16_t *upper, const uint1
 		const int32_t sum = (int32_t)((two & 0xffff) + (two >> 16) + (others & 0xffff) + (others >> 16));
 		const int32_t by = shares->divisor[x];
 		const int32_t quotient = (int32_t)((float)sum * shares->inverse[x]);
+
 		value[x] = quotient + (256 * sum - quotient * by >= by);
 	}
 	for (uint32_t x = 0; x < FILL_BLOCK; x++)
@@ -46,6 +48,7 @@ static inline int32_t pull_weights(struct fill_row to, struct fill_row above, st
 	float depth[4][FILL_BLOCK], mean[FILL_BLOCK];
 	int32_t sums[FILL_BLOCK], bits[FILL_BLOCK];
 	int32_t least = GAPS_WHOLE;
+
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		depth[0][x] = upper_z[2 * x];
 		depth[1][x] = upper_z[2 * x + 1];
@@ -58,6 +61,7 @@ static inline int32_t pull_weights(struct fill_row to, struct fill_row above, st
 			                   (int32_t)(others >> 16) };
 		float nearest = INFINITY, sum_z = 0;
 		int32_t sum = 0, is_near = 0;
+
 		for (int i = 0; i < 4; i++) { /* NaN fails the comparison */
 			const float own = psr_choose(w[i] > 0, depth[i][x], INFINITY);
 			nearest = own < nearest ? own : nearest;
@@ -65,6 +69,7 @@ static inline int32_t pull_weights(struct fill_row to, struct fill_row above, st
 		const float limit = nearest * scale + offset;
 		for (int i = 0; i < 4; i++) {
 			const int32_t own = w[i] & -(depth[i][x] <= limit);
+
 			sum_z += psr_where(own > 0, (float)own * depth[i][x]);
 			sum += own;
 			is_near |= (own > 0) << i;
@@ -88,6 +93,7 @@ static inline __attribute__((always_inline)) void find_shares(struct pull_shares
                                                               int is_picture)
 {
 	uint32_t above[FILL_BLOCK], below[FILL_BLOCK];
+
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const uint32_t bits = near[x], left = 0x0000ffff, right = 0xffff0000;
 		const uint32_t two = (left & (0u - (bits & 1))) | (right & (0u - (bits >> 1 & 1)));
@@ -95,6 +101,7 @@ static inline __attribute__((always_inline)) void find_shares(struct pull_shares
 		const uint32_t w = pair_at(upper, x) & two, v = pair_at(lower, x) & others;
 		const int32_t sum = (int32_t)((w & 0xffff) + (w >> 16) + (v & 0xffff) + (v >> 16));
 		const int32_t by = sum > GAPS_WHOLE ? sum : GAPS_WHOLE;
+
 		above[x] = is_picture ? w : two & (GAPS_WHOLE | GAPS_WHOLE << 16);
 		below[x] = is_picture ? v : others & (GAPS_WHOLE | GAPS_WHOLE << 16);
 		shares->divisor[x] = by;
@@ -110,8 +117,10 @@ static inline uint16_t fill_pull_weights(const struct fill_row *to, const struct
 	const struct fill_row out = *to, above = *upper, below = *lower;
 	int32_t least = GAPS_WHOLE, some;
 	uint32_t x = 0;
+
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
 		const struct fill_row cells = { .weight = out.weight + x, .z = out.z + x, .near = out.near + x };
+
 		some = pull_weights(cells, depths_from(&above, 2 * x), depths_from(&below, 2 * x), scale, offset);
 		least = some < least ? some : least;
 	}
@@ -121,6 +130,7 @@ static inline uint16_t fill_pull_weights(const struct fill_row *to, const struct
 		const struct fill_row cells = { .weight = rows[0].weight, .z = rows[0].z, .near = near };
 		const struct fill_row upper_copy = { .weight = rows[1].weight, .z = rows[1].z };
 		const struct fill_row lower_copy = { .weight = rows[2].weight, .z = rows[2].z };
+
 		copy_weights(&rows[1], &above, 2 * x, 2 * (n - x));
 		copy_weights(&rows[2], &below, 2 * x, 2 * (n - x));
 		some = pull_weights(cells, upper_copy, lower_copy, scale, offset);
@@ -140,6 +150,7 @@ static inline __attribute__((always_inline)) void pull_row(const struct fill_row
 	const uint16_t *const below[3] = { lower->r, lower->g, lower->b };
 	struct pull_shares shares;
 	uint32_t x = 0;
+
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
 		find_shares(&shares, to->near + x, upper->weight + 2 * x, lower->weight + 2 * x, is_picture);
 		for (int i = 0; i < 3; i++)
@@ -150,6 +161,7 @@ static inline __attribute__((always_inline)) void pull_row(const struct fill_row
 		struct block_row rows[2];
 		uint16_t values[FILL_BLOCK];
 		uint8_t near[FILL_BLOCK] = { 0 };
+
 		memcpy(near, to->near + x, left);
 		copy_values(rows[0].weight, upper->weight + 2 * x, 2 * left, 0);
 		copy_values(rows[1].weight, lower->weight + 2 * x, 2 * left, 0);

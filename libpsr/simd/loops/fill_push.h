@@ -33,6 +33,7 @@ static inline void share_parents(struct push_shares *to, const float *own, const
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const float a = own[x], b = side[x], c = beside[x];
 		float nearest = a < INFINITY ? a : INFINITY;
+
 		nearest = b < nearest ? b : nearest;
 		nearest = c < nearest ? c : nearest;
 		const float limit = nearest * scale + offset;
@@ -51,6 +52,7 @@ static inline uint32_t interpolate(const struct push_shares *s, uint32_t x, uint
                                    uint32_t beside)
 {
 	const int32_t sum = (int32_t)(2 * (own & s->own[x]) + (side & s->side[x]) + (beside & s->beside[x]));
+
 	return (uint32_t)(int32_t)((float)sum * s->inverse[x] + 0.125f);
 }
 
@@ -68,14 +70,17 @@ static inline __attribute__((always_inline)) void push_channel(uint16_t *to, con
 {
 	uint32_t pair[FILL_BLOCK];
 	uint16_t both[2 * FILL_BLOCK], value[2 * FILL_BLOCK];
+
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const uint32_t l = interpolate(&p->left, x, own[x], *(own + x - 1), beside[x]);
 		const uint32_t r = interpolate(&p->right, x, own[x], own[x + 1], beside[x]);
+
 		pair[x] = l | r << 16;
 	}
 	memcpy(both, pair, sizeof both);
 	for (uint32_t x = 0; x < 2 * FILL_BLOCK; x++) {
 		const uint16_t w = p->weight[x], rest = (uint16_t)(GAPS_WHOLE - w);
+
 		value[x] = (uint16_t)((is_picture ? part_of(was[x], w) : was[x]) + (part_of(both[x], rest) & p->turn[x]));
 	}
 	memcpy(to, value, sizeof value);
@@ -86,9 +91,11 @@ static inline int find_turn(uint16_t *turn, const uint16_t *weight, const uint16
 {
 	uint32_t ready[FILL_BLOCK];
 	uint16_t any = 0;
+
 	for (uint32_t x = 0; x < FILL_BLOCK; x++) {
 		const uint32_t both = (own[x] == GAPS_WHOLE) & (beside[x] == GAPS_WHOLE);
 		const uint32_t left = both & (*(own + x - 1) == GAPS_WHOLE), right = both & (own[x + 1] == GAPS_WHOLE);
+
 		ready[x] = left * 0xffff | right * 0xffff0000;
 	}
 	memcpy(turn, ready, sizeof ready);
@@ -102,6 +109,7 @@ static inline int find_turn(uint16_t *turn, const uint16_t *weight, const uint16
 static inline int has_partial(const uint16_t *weight, uint32_t n)
 {
 	uint16_t rest = 0;
+
 	for (uint32_t x = 0; x < n; x++)
 		rest |= weight[x] ^ GAPS_WHOLE;
 	return rest != 0;
@@ -120,6 +128,7 @@ static inline __attribute__((always_inline)) int push_block(struct push_turn *p,
 	const struct fill_row to = rows->to, was = rows->was, own = rows->own, beside = rows->beside;
 	float both[2 * FILL_BLOCK];
 	uint16_t weight[2 * FILL_BLOCK];
+
 	if (!find_turn(p->turn, was.weight, own.weight, beside.weight))
 		return 0;
 	p->weight = was.weight;
@@ -148,6 +157,7 @@ static inline struct push_rows rows_at(const struct fill_row *to, const struct f
                                        const struct fill_parents *parents, uint32_t x)
 {
 	const struct fill_row own = row_from(*was, 2 * x);
+
 	return (struct push_rows){ to ? *to : own, own, row_from(parents->own, x), row_from(parents->beside, x),
 		                       parents->scale, parents->offset };
 }
@@ -165,14 +175,17 @@ static inline void fill_push(const struct fill_row *to, const struct fill_parent
 	const uint32_t n = parents->n;
 	struct push_turn turn;
 	uint32_t x = 0;
+
 	for (; n - x >= FILL_BLOCK; x += FILL_BLOCK) {
 		const struct push_rows rows = rows_at(NULL, to, parents, x);
+
 		if (has_partial(rows.was.weight, 2 * FILL_BLOCK))
 			push_block(&turn, &rows, 0);
 	}
 	if (x < n && has_partial(to->weight + 2 * x, 2 * (n - x))) {
 		struct push_rows rows = rows_at(NULL, to, parents, x);
 		struct block_row copy[3];
+
 		copy_rows(&rows, copy, n - x);
 		rows.to = rows.was;
 		if (push_block(&turn, &rows, 0))
@@ -195,6 +208,7 @@ static inline void list_block(struct listing *list, const struct push_turn *p, u
 	const uint32_t n_places = list->n;
 	uint16_t *at = places->at + n_places;
 	uint32_t n_turn = 0, n_partial = 0;
+
 	for (uint32_t x = 0; x < n; x++) {
 		at[n_turn] = (uint16_t)x;
 		n_turn += p->turn[x] & 1;
@@ -203,6 +217,7 @@ static inline void list_block(struct listing *list, const struct push_turn *p, u
 	*list->left &= ~(n_turn == n_partial ? list->bit : 0);
 	for (uint32_t i = 0; i < n_turn; i++) {
 		const uint32_t x = at[i], to = n_places + i;
+
 		places->at[to] = (uint16_t)(first + x);
 		places->weight[to] = weight[x];
 		places->r[to] = row->r[x];
@@ -224,10 +239,12 @@ static inline uint32_t fill_push_picture(struct fill_places *places, uint32_t *l
 	const struct fill_row to = { row.r, row.g, row.b, NULL, row.z, NULL };
 	struct push_turn turn;
 	struct listing list = { places, 0, left, bit };
+
 	places->n_filled = places->n_moved = 0;
 	for (uint32_t x = 0; x < parents->n; x += FILL_BLOCK, list.left++) {
 		const uint32_t n = parents->n - x < FILL_BLOCK ? parents->n - x : FILL_BLOCK;
 		uint16_t *weight = pixels.weight + 2 * x;
+
 		if (!(*list.left & bit))
 			continue;
 		if (!has_partial(weight, 2 * n)) {
@@ -240,6 +257,7 @@ static inline uint32_t fill_push_picture(struct fill_places *places, uint32_t *l
 			is_turn = push_block(&turn, &rows, 1);
 		} else {
 			struct block_row copy[3];
+
 			copy_rows(&rows, copy, n);
 			is_turn = push_block(&turn, &rows, 1);
 		}

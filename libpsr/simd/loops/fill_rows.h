@@ -1,4 +1,4 @@
-/* What pull and push share: rows of cells, FILL_BLOCK coarser ones at a time. Loops have a constant length, for
+/* Shared by pull and push: rows of cells, FILL_BLOCK coarser ones at a time. Loops have a constant length, for
  * vectors. */
 #ifndef PSR_SIMD_LOOPS_FILL_ROWS_H
 #define PSR_SIMD_LOOPS_FILL_ROWS_H
@@ -13,6 +13,7 @@
 static inline uint32_t pair_at(const uint16_t *values, uint32_t x)
 {
 	uint32_t pair;
+
 	memcpy(&pair, values + 2 * x, sizeof pair);
 	return pair;
 }
@@ -21,6 +22,7 @@ static inline uint32_t pair_at(const uint16_t *values, uint32_t x)
 static inline uint16_t part_of(uint16_t value, uint16_t share)
 {
 	const uint16_t all = (uint16_t)-(share >> 8), factor = (uint16_t)(share << 8);
+
 	return (uint16_t)((value & all) | (uint16_t)((uint32_t)value * factor >> 16));
 }
 

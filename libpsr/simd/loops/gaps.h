@@ -31,6 +31,7 @@ static void load_depths(struct gaps_tile *tile, const struct psr_zstack *stack)
 		const int is_inside = tile->y0 + i >= 1 && tile->y0 + i <= stack->height;
 		const uint64_t *word = psr_zstack_row(stack, is_inside ? tile->y0 + i - 1 : 0) + tile->x0;
 		const uint32_t n = is_inside ? tile->width : 0;
+
 		for (uint32_t x = 0; x < n; x++)
 			z[x] = depth_of(word[x]);
 		for (uint32_t x = n; x <= GAPS_WIDTH; x++)
@@ -63,8 +64,10 @@ static inline void repeat(float *to, const float *from, uint32_t n)
 static void spread(float *to, const float *from, uint32_t n, int k)
 {
 	float some[2][MAX_SPREAD / 2 + 2 * SPREAD_RUN];
+
 	for (; k > 1; k--, n *= 2) {
 		float *twice = some[k & 1];
+
 		repeat(twice, from, n);
 		from = twice;
 	}
@@ -77,6 +80,7 @@ static void find_limits(struct limits *to, const struct gaps_target *t, int k, u
 	const float scale = t->scale[k], offset = t->offset[k];
 	float once[MAX_CELLS + SPREAD_RUN];
 	int32_t has_any = 0;
+
 	for (uint32_t c = 0; c < n; c++) {
 		once[c] = cell[c] * scale + offset;
 		has_any |= cell[c] < INFINITY;
@@ -97,6 +101,7 @@ static void find_either(struct limits *to, const struct gaps_target *t, int k)
 	const struct psr_zstack *stack = t->stack;
 	const float scale = t->scale[k - 1], offset = t->offset[k - 1];
 	const uint32_t width = stack->level[k - 1].width, height = stack->level[k - 1].height, n = to->n;
+
 	/* The finer level has no cell where 2 i - 1 is below 0, and may have none at its other end. */
 	const uint32_t before = to->i ? 0 : 1, u0 = 2 * to->i + before - 1, most = 2 * n - before;
 	const uint32_t n_children = width - u0 < most ? width - u0 : most;
@@ -110,10 +115,12 @@ static void find_either(struct limits *to, const struct gaps_target *t, int k)
 		once[c] = cell[c] * t->scale[k] + t->offset[k];
 	for (uint32_t v = to->j ? 2 * to->j - 1 : 0; v <= 2 * to->j && v < height; v++) {
 		const float *fine = stack->level[k - 1].z + (size_t)v * width + u0;
+
 		for (uint32_t c = 0; c < n_children; c++)
 			children[before + c] = fine[c] * scale + offset;
 		for (uint32_t c = 0; c < n; c++) {
 			const float a = children[2 * c], b = children[2 * c + 1], two = a < b ? a : b;
+
 			once[c] = two < once[c] ? two : once[c];
 		}
 	}
@@ -136,6 +143,7 @@ static void begin_level(struct gaps_level *level, int k)
 	level->lower = &level->limits[1];
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
 		const int32_t right = (int32_t)((2 * x + 1 + (1u << k)) & ((2u << k) - 1));
+
 		level->right[x] = (float)right;
 		level->left[x] = (float)((2 << k) - right);
 	}
@@ -150,10 +158,12 @@ static inline void cover_row(int32_t *cover, const float *z, const float *upper,
 	const uint32_t step = 1u << k;
 	const float unit = (float)GAPS_WHOLE / (float)(4 << 2 * k), below = (float)fy * unit,
 				above = (float)((2 << k) - fy) * unit;
+
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
 		const float left = level->left[x], right = level->right[x], depth = z[x];
 		const float high = psr_where(upper[x] < depth, left) + psr_where(upper[x + step] < depth, right);
 		const float low = psr_where(lower[x] < depth, left) + psr_where(lower[x + step] < depth, right);
+
 		cover[x] = (int32_t)(high * above + low * below);
 	}
 }
@@ -173,11 +183,13 @@ static int cover_level(int32_t *weight, struct gaps_level *level, const struct g
 	const uint32_t j = from_top >> (k + 1);
 	const int32_t fy = (int32_t)(from_top & ((2u << k) - 1));
 	const float *z = &tile->z[y + 1][GAPS_LEFT];
+
 	_Alignas(64) int32_t cover[GAPS_WIDTH], either[GAPS_WIDTH];
 	if (y == 0)
 		find_limits(level->lower, t, k, i, j, n_cells);
 	if (y == 0 || fy == 1) {
 		struct limits *was = level->upper;
+
 		level->upper = level->lower;
 		level->lower = was;
 		find_limits(level->lower, t, k, i, j + 1, n_cells);
@@ -195,6 +207,7 @@ static int cover_level(int32_t *weight, struct gaps_level *level, const struct g
 	}
 	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
 		const int32_t left = GAPS_WHOLE - cover[x];
+
 		weight[x] = left < weight[x] ? left : weight[x];
 	}
 	return 1;
@@ -208,6 +221,7 @@ static int cover_opaque(int32_t *weight, const struct gaps_target *t, const stru
 		stack->level[k].z + (size_t)(((tile->y0 + y) >> k) + 1) * stack->level[k].width + (tile->x0 >> k) + 1;
 	const float *z = &tile->z[y + 1][GAPS_LEFT];
 	int has_cells = 0;
+
 	for (uint32_t x = 0; x < tile->width; x++) {
 		has_cells |= cell[x >> k] < INFINITY;
 		weight[x] = cell[x >> k] * t->scale[k] + t->offset[k] < z[x] ? 0 : weight[x];
@@ -230,14 +244,17 @@ static uint32_t guard_run(int32_t *weight, const struct gaps_target *t, const fl
 	const float alike = t->scale[ALIKE], alike_offset = t->offset[ALIKE];
 	const float nothing = t->scale[ALIKE_BEFORE_NOTHING], nothing_offset = t->offset[ALIKE_BEFORE_NOTHING];
 	int32_t n_pinholes = 0;
+
 	for (int x = 0; x < GUARD_RUN; x++) {
 		const float z[8] = { above[x - 1], above[x],     above[x + 1], own[x - 1],
 			                 own[x + 1],   below[x - 1], below[x],     below[x + 1] };
 		float nearest = INFINITY, farthest = 0;
 		int32_t n_before = 0;
+
 		for (int i = 0; i < 8; i++) {
 			const int32_t is_before = z[i] * scale + offset < own[x];
 			const float seen = psr_where(is_before, z[i]);
+
 			n_before += is_before;
 			nearest = z[i] < nearest ? z[i] : nearest;
 			farthest = seen > farthest ? seen : farthest;
@@ -258,10 +275,12 @@ static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps
 {
 	const float scale = t->scale[1], offset = t->offset[1];
 	int32_t is_near = 0;
+
 	for (int x = 0; x < GUARD_RUN; x++) {
 		const float side = own[x - 1] < own[x + 1] ? own[x - 1] : own[x + 1],
 					line = above[x] < below[x] ? above[x] : below[x];
 		const float later = side < line ? line : side;
+
 		is_near |= (later * scale + offset < own[x]) & (weight[x] > 0);
 	}
 	return is_near;
@@ -270,10 +289,12 @@ static inline int32_t may_have_pinholes(const int32_t *weight, const struct gaps
 static uint32_t guard_row(int32_t *weight, const struct gaps_target *t, const struct gaps_tile *tile, uint32_t y)
 {
 	uint32_t n_pinholes = 0;
+
 	if (!(tile->has_samples[y] | tile->has_samples[y + 2]))
 		return 0;
 	for (uint32_t x = 0; x < tile->width; x += GUARD_RUN) {
 		const float *above = &tile->z[y][GAPS_LEFT + x], *own = above + GAPS_STRIDE, *below = own + GAPS_STRIDE;
+
 		if (may_have_pinholes(weight + x, t, above, own, below))
 			n_pinholes += guard_run(weight + x, t, above, own, below);
 	}
@@ -286,6 +307,7 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 	struct gaps_tile tile = { .x0 = x0, .y0 = y0, .width = x1 - x0, .height = y1 - y0 };
 	struct gaps_level level[PSR_MAX_DEPTH_LEVEL + 1];
 	struct gaps_counts counts = { 0, 0, 0 };
+
 	_Alignas(64) int32_t is_marked[GAPS_WIDTH] = { 0 }, n_partial[GAPS_WIDTH] = { 0 };
 	load_depths(&tile, t->stack);
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL && !t->opaque_cells; k++)
@@ -294,6 +316,7 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 	for (uint32_t y = 0; y < tile.height; y++) {
 		uint16_t *to = t->weight + (size_t)(y0 + y) * t->stack->width + x0;
 		const float *z = &tile.z[y + 1][GAPS_LEFT];
+
 		_Alignas(64) int32_t weight[GAPS_WIDTH];
 		int is_less = 0;
 		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
@@ -310,12 +333,14 @@ static struct gaps_counts gaps(const struct gaps_target *t, uint32_t x0, uint32_
 			continue;
 		for (uint32_t x = 0; x < tile.width; x++) {
 			const int32_t is_partial = weight[x] < GAPS_WHOLE;
+
 			is_marked[x] |= is_partial;
 			n_partial[x] += is_partial & (z[x] < INFINITY);
 		}
 	}
 	for (uint32_t brick = 0; brick < GAPS_WIDTH / GAPS_BRICK; brick++) {
 		int32_t is_any = 0, n = 0;
+
 		for (uint32_t x = brick * GAPS_BRICK; x < (brick + 1) * GAPS_BRICK; x++) {
 			is_any |= is_marked[x];
 			n += n_partial[x];

@@ -11,10 +11,12 @@ struct highlights {
 static void add_highlights(struct strip *s, const struct highlights *h, const float color[3])
 {
 	float exponent[STRIP];
+
 	for (uint32_t i = 0; i < s->n; i++)
 		exponent[i] = psr_power_exponent(h->cosine[i], s->exponent[i]);
 	for (uint32_t i = 0; i < s->n; i++) {
 		const float highlight = psr_power_of_two(exponent[i]) * h->amount[i];
+
 		s->hr[i] += color[0] * highlight;
 		s->hg[i] += color[1] * highlight;
 		s->hb[i] += color[2] * highlight;
@@ -33,6 +35,7 @@ static CONSTANT_FLAGS void reflect(struct strip *s, struct highlights *h, uint32
 	const float x = from.x, y = from.y, z = from.z, amount = from.amount;
 	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
 	const float diffuse = psr_where(facing > 0, facing) * amount;
+
 	s->lr[i] += color[0] * diffuse;
 	s->lg[i] += color[1] * diffuse;
 	s->lb[i] += color[2] * diffuse;
@@ -41,6 +44,7 @@ static CONSTANT_FLAGS void reflect(struct strip *s, struct highlights *h, uint32
 		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
 		const float mirror = 2 * facing * normal_view - light_view;
 		const float least = psr_where(mirror > 0, mirror);
+
 		h->cosine[i] = psr_choose(least < 1, least, 1);
 		h->amount[i] = psr_where(facing > 0, amount);
 	}
@@ -51,6 +55,7 @@ static CONSTANT_FLAGS void light_directional(struct strip *s, const struct strip
 {
 	const struct strip_light l = *light;
 	struct highlights h;
+
 	for (uint32_t i = 0; i < s->n; i++)
 		reflect(s, &h, i, is_specular, l.color,
 		        (struct arriving){ l.to_light[0], l.to_light[1], l.to_light[2], is_partial ? reaches[i] : 1 });
@@ -63,12 +68,14 @@ static CONSTANT_FLAGS void light_near(struct strip *s, const struct strip_light 
 {
 	const struct strip_light l = *light;
 	struct highlights h;
+
 	for (uint32_t i = 0; i < s->n; i++) {
 		const float dx = l.position[0] - s->px[i], dy = l.position[1] - s->py[i], dz = l.position[2] - s->pz[i];
 		const float distance2 = (dx * dx + dy * dy) + dz * dz, distance = __builtin_sqrtf(distance2);
 		const float x = dx / distance, y = dy / distance, z = dz / distance;
 		const float falling = l.reference2 / distance2; /* infinite where a light touches a sample */
 		float amount = psr_choose(l.reference2 > 0, psr_choose(falling < 0x1p60f, falling, 0x1p60f), 1);
+
 		if (is_spot) { /* a smooth edge: 3 t^2 - 2 t^3 */
 			const float c = -((x * l.axis[0] + y * l.axis[1]) + z * l.axis[2]);
 			const float t = (c - l.cos_outer) / (l.cos_inner - l.cos_outer);
@@ -109,6 +116,7 @@ static void strip_lit(float (*lit)[4], const struct strip_view *view, const stru
                       uint32_t first, uint32_t n)
 {
 	struct strip strip;
+
 	strip.n = n;
 	strip.is_specular = 0;
 	for (uint32_t i = 0; i < n; i++) {

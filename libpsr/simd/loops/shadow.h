@@ -41,6 +41,7 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, const struc
 	float *const reaches = at->reaches;
 	const float least = GRAZING * m.scale, unit = 1 / m.focal;
 	uint32_t n_front = 0, n_here = 0;
+
 	for (size_t i = 0; i < GROUP; i++) {
 		const size_t from = first + i, to = at->n + i;
 		const float px = s->px[from], py = s->py[from], pz = s->pz[from];
@@ -59,6 +60,7 @@ static CONSTANT_FLAGS uint32_t locate_group(struct shadow_place *at, const struc
 		const float steep = w / psr_choose(facing > floor, facing, floor), slope = texel * steep,
 					secant = m.scale * steep;
 		const int32_t is_here = (facing > 0) & is_beyond & is_inside;
+
 		at->u[to] = x * scale + m.half_width;
 		at->v[to] = y * scale + m.half_height;
 		at->z[to] = z;
@@ -105,6 +107,7 @@ static inline float clamp_cell(float x, float most)
 static inline uint32_t load_pair(const uint16_t *cells)
 {
 	uint32_t pair;
+
 	memcpy(&pair, cells, sizeof pair);
 	return pair;
 }
@@ -131,10 +134,12 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 	float fx[STRIP], fy[STRIP];
 	int32_t cell[STRIP];
 	uint32_t pair[2][STRIP];
+
 	for (size_t i = 0; i < n; i++) {
 		const float x = clamp_cell(at->u[i] * inverse - 0.5f, most_x),
 					y = clamp_cell(at->v[i] * inverse - 0.5f, most_y);
 		const int32_t cx = psr_floor_int(x), cy = psr_floor_int(y);
+
 		cell[i] = (cy * stride + cx) & -at->is_here[i]; /* the others read cell 0, which costs least */
 		fx[i] = x - (float)cx;
 		fy[i] = y - (float)cy;
@@ -151,6 +156,7 @@ static void shadow_cover(float *cover, const struct shadow_place *at, const stru
 					c10 = cover_of(pair[0][i] >> 16, step, from, z10, x * (1 - y));
 		const float c01 = cover_of(pair[1][i] & 0xffff, step, from, z01, (1 - x) * y),
 					c11 = cover_of(pair[1][i] >> 16, step, from, z11, x * y);
+
 		cover[i] = (c00 + c11) + (c10 + c01);
 	}
 }
@@ -163,6 +169,7 @@ static void shadow_raise(struct shadow_place *at, const struct shadow_map *map, 
 	const size_t n = at->n / GROUP * GROUP;
 	float cover[STRIP], seam[STRIP];
 	uint32_t n_partial = 0;
+
 	shadow_cover(cover, at, map, map->level[k].z, k);
 	if (map->level[k].seam) {
 		for (size_t i = 0; i < n; i++)
@@ -182,8 +189,10 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 	struct shadow_place at;
 	float others[STRIP]; /* every map of a light finds the same samples facing it: the first one's result counts */
 	int is_lit = 0;
+
 	for (uint32_t f = 0; f < shadow->n_maps; f++) {
 		const struct shadow_map *map = &shadow->map[f];
+
 		at.reaches = f ? others : reaches;
 		is_lit |= shadow_locate(&at, strip, map, shadow->n_maps > 1);
 		if (!is_lit)
@@ -205,6 +214,7 @@ static int strip_shadow(const struct strip *strip, const struct shadow_light *sh
 static inline float steady(float before, float here, float after)
 {
 	const float a = here - before, b = after - here, fall = magnitude(a), next = magnitude(b);
+
 	return psr_where((a > 0) == (b > 0), psr_choose(fall < next, fall, next));
 }
 
@@ -212,6 +222,7 @@ static inline uint16_t cell_of(float z, float from, float per_step)
 {
 	const float steps = (z - from) * per_step, least = psr_where(steps > 0, steps);
 	const int32_t up = (int32_t)psr_choose(least < SHADOW_EMPTY - 2, least, SHADOW_EMPTY - 2) + 1;
+
 	return (uint16_t)(z < __builtin_inff() ? up : SHADOW_EMPTY);
 }
 
@@ -219,10 +230,12 @@ static void shadow_sink(uint16_t *restrict to, const struct shadow_rows *rows, u
 {
 	const float *above = rows->above, *own = rows->own, *below = rows->below;
 	const float per_step = 1 / step;
+
 	to[0] = cell_of(own[0], from, per_step);
 	for (uint32_t i = 1; i < n - 1; i++) {
 		const float here = own[i];
 		const float fall = steady(own[i - 1], here, own[i + 1]) + steady(above[i], here, below[i]);
+
 		to[i] = cell_of(psr_choose(here < __builtin_inff(), here + fall, here), from, per_step);
 	}
 	to[n - 1] = cell_of(own[n - 1], from, per_step);

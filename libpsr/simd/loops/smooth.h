@@ -16,9 +16,10 @@ static void load_smooth_row(struct smooth_row *row, const struct smooth_target *
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
 	const uint32_t first = is_inside && x0 ? 0 : 1, end = x0 + n < t->width ? n + 2 : n + 1;
-	const size_t at = (size_t)(is_inside ? y : 0) * t->width + x0 - 1;
+	const ptrdiff_t at = (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - 1;
 	const uint8_t *code = t->from + 3 * at;
 	const float *z = t->depth + at;
+
 	row->z[0] = row->limit[0] = row->z[n + 1] = row->limit[n + 1] = NAN;
 	for (int c = 0; c < 3; c++)
 		row->light[c][0] = row->light[c][n + 1] = 0;
@@ -39,6 +40,7 @@ static void load_smooth_row(struct smooth_row *row, const struct smooth_target *
 	row->is_empty = !has_any;
 	for (uint32_t i = first; i < end; i++) {
 		const int32_t r = code[3 * i], g = code[3 * i + 1], b = code[3 * i + 2];
+
 		row->light[0][i] = r * r;
 		row->light[1][i] = g * g;
 		row->light[2][i] = b * b;
@@ -70,6 +72,7 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
                               const struct smooth_row *restrict own, const struct smooth_row *restrict down, uint32_t n)
 {
 	uint32_t n_edges = 0;
+
 	for (uint32_t i = 1; i <= n; i++) {
 		const float z = own->z[i], limit = own->limit[i];
 		const struct smooth_masks behind = {
@@ -90,10 +93,12 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 		const float share = (float)(8 - through) * (1 / 64.0f);
 		const float rest = (float)through / (float)(8 * (edges ? edges : 1));
 		int32_t code[3];
+
 		for (int c = 0; c < 3; c++) {
 			const int32_t *a = up->light[c] + i, *o = own->light[c] + i, *b = down->light[c] + i;
 			const float front = (float)((4 + others) * o[0] + add_sides(a, o, b, &same));
 			const float back = (float)(2 * add_sides(a, o, b, &behind) + add_corners(a, b, &behind));
+
 			code[c] = (int32_t)(__builtin_sqrtf(front * share + back * rest) + 0.5f);
 		}
 		pixel[i - 1] = code[0] | code[1] << 8 | code[2] << 16;
@@ -108,10 +113,12 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	struct smooth_row rows[3];
 	int32_t pixel[SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
+
 	for (uint32_t y = y0; y < y0 + 2; y++)
 		load_smooth_row(&rows[y % 3], t, x0, n, (int64_t)y - 1);
 	for (uint32_t y = y0; y < y1; y++) {
 		uint8_t *to = t->to + 3 * ((size_t)y * t->width + x0);
+
 		load_smooth_row(&rows[(y + 2) % 3], t, x0, n, (int64_t)y + 1);
 		if (rows[(y + 1) % 3].is_empty) {
 			memcpy(to, t->from + 3 * ((size_t)y * t->width + x0), 3 * (size_t)n);

@@ -7,9 +7,11 @@
 static inline void strip_list(struct strip_pixels *p, const uint64_t *word, const uint16_t *weight, uint32_t n_pixels)
 {
 	uint32_t n = 0;
+
 	memset(p->has_sample, 0, sizeof p->has_sample);
 	for (uint32_t x = 0; x < n_pixels; x++) {
 		const uint32_t has_sample = word[x] != PSR_WORD_EMPTY && (!weight || weight[x]);
+
 		p->x[n] = (uint16_t)x;
 		p->id[n] = (uint32_t)word[x];
 		p->has_sample[x / 32] |= has_sample << x % 32;
@@ -32,6 +34,7 @@ static void find_cones(struct strip_pixels *p, const struct strip_view *view)
 	for (uint32_t i = 0, end; i < p->n;) {
 		const struct warp_instance *in = instance_run(&end, p, view, i, p->n);
 		const struct psr_blocks b = *in->blocks;
+
 		for (; i < end; i++) {
 			p->cone[i] = cone_of(&b, p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot);
 			p->has_cones |= p->cone[i] != STRIP_NO_CONE;
@@ -42,12 +45,15 @@ static void find_cones(struct strip_pixels *p, const struct strip_view *view)
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
+
 	for (uint32_t i = 0, end; i < n;) {
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks b = *in->blocks;
+
 		for (; i < end; i++) {
 			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
 			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);
+
 			p->at[i] = b.attr + psr_blocks_attr_first(&b, block) + __builtin_popcountll(below);
 			p->two_sided[i] = view->needs & STRIP_TWO_SIDED ? b.flags[block] & PSR_BLOCK_TWO_SIDED : 0;
 			__builtin_prefetch(p->at[i]);
@@ -62,9 +68,11 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
 {
 	const uint64_t first = strip->attr[0];
+
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const uint64_t attr = is_one ? first : strip->attr[i];
 		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
+
 		strip->sr[i] = psr_srgb5_to_linear[specular & 31];
 		strip->sg[i] = psr_srgb6_to_linear[specular >> 5 & 63];
 		strip->sb[i] = psr_srgb5_to_linear[specular >> 11];
@@ -75,6 +83,7 @@ static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
 static inline void strip_read(struct strip *strip, const struct strip_view *view)
 {
 	uint64_t all, common;
+
 	read_attributes(&all, &common, strip, view);
 	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
 		read_diffuse(strip, 1);
@@ -91,11 +100,13 @@ static void locate(struct strip *strip, const struct strip_view *view)
 {
 	const struct strip_pixels *p = strip->pixels;
 	const float y = ((float)p->y + 0.5f - view->half_height) / view->focal;
+
 	for (uint32_t i = 0; i < strip->n; i++)
 		strip->pz[i] = psr_float_from_bits((uint32_t)(p->word[p->x[i]] >> 32));
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) / view->focal;
 		const float w = psr_choose(view->perspective, strip->pz[i], 1);
+
 		strip->px[i] = x * w;
 		strip->py[i] = y * w;
 	}
@@ -106,9 +117,11 @@ static void look(struct strip *strip, const struct strip_view *view)
 	const float scale = view->perspective ? 1 / view->focal : 0;
 	const struct strip_pixels *p = strip->pixels;
 	const float y = ((float)p->y + 0.5f - view->half_height) * scale;
+
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const float x = ((float)(int32_t)(p->x0 + p->x[i]) + 0.5f - view->half_width) * scale;
 		const float unit = -1 / __builtin_sqrtf((x * x + y * y) + 1);
+
 		strip->vx[i] = x * unit;
 		strip->vy[i] = y * unit;
 		strip->vz[i] = unit;
@@ -119,6 +132,7 @@ static void look(struct strip *strip, const struct strip_view *view)
 static void straighten(struct strip *strip, const float m[3][3], uint32_t first, uint32_t end)
 {
 	const struct strip_pixels *p = strip->pixels;
+
 	for (uint32_t i = first; i < end; i++) {
 		const uint32_t cone = p->cone[i], code = cone >> 24;
 		const float x = (float)(int8_t)cone, y = (float)(int8_t)(cone >> 8), z = (float)(int8_t)(cone >> 16);
@@ -132,6 +146,7 @@ static void straighten(struct strip *strip, const float m[3][3], uint32_t first,
 		const float across = sine / __builtin_sqrtf(psr_choose(square > least, square, least));
 		const float along = rim - c * across;
 		const int is_outside = (code != PSR_CONE_ANY) & (c < rim);
+
 		strip->gx[i] = psr_choose(is_outside, ax * along + nx * across, nx);
 		strip->gy[i] = psr_choose(is_outside, ay * along + ny * across, ny);
 		strip->gz[i] = psr_choose(is_outside, az * along + nz * across, nz);
@@ -142,9 +157,11 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip->n;
+
 	if (view->lit && !strip->is_specular) {
 		for (uint32_t i = 0; i < n; i++) {
 			const float *lit = view->lit[PSR_ATTR_NORMAL(strip->attr[i])];
+
 			strip->lr[i] = lit[0];
 			strip->lg[i] = lit[1];
 			strip->lb[i] = lit[2];
@@ -153,6 +170,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 	}
 	for (uint32_t first = 0, end; first < n; first = end) {
 		const struct warp_instance *in = instance_run(&end, p, view, first, n);
+
 		turn_normals(strip, in->turn, first, end);
 		if (p->has_cones)
 			straighten(strip, in->turn, first, end);
@@ -178,6 +196,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		for (uint32_t i = 0; i < n; i++) {
 			const float g = (strip->gx[i] * strip->vx[i] + strip->gy[i] * strip->vy[i]) + strip->gz[i] * strip->vz[i];
 			const float turn = psr_choose((p->two_sided[i] != 0) & (g < 0), -1, 1);
+
 			strip->nx[i] *= turn;
 			strip->ny[i] *= turn;
 			strip->nz[i] *= turn;
@@ -199,6 +218,7 @@ static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
 	for (uint32_t i = 0; i < s->n; i++) {
 		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
 		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
+
 		if (is_specular) {
 			r += s->sr[i] * s->hr[i];
 			g += s->sg[i] * s->hg[i];
@@ -224,8 +244,10 @@ static inline void write_linear(const struct strip *strip, const struct strip_ta
 	uint16_t *const to[3] = { target->r, target->g, target->b };
 	const struct strip_pixels *p = strip->pixels;
 	const size_t first = (size_t)p->y * target->width + p->x0;
+
 	for (int c = 0; c < 3; c++) {
 		uint16_t row[STRIP];
+
 		for (uint32_t x = 0; x < n; x++)
 			row[x] = target->background[c];
 		for (uint32_t i = 0; i < p->n; i++)
@@ -239,10 +261,12 @@ static inline void write_linear(const struct strip *strip, const struct strip_ta
 static inline void strip_write(const struct strip *strip, const struct strip_target *target, uint32_t n)
 {
 	const struct strip_pixels *p = strip->pixels;
+
 	if (target->rgb) {
 		const uint16_t *empty = target->background;
 		uint8_t *to = target->rgb + 3 * ((size_t)p->y * target->width + p->x0);
 		uint32_t pixel[STRIP];
+
 		for (uint32_t x = 0; x < n; x++)
 			pixel[x] = pixel_of(target->srgb, empty[0], empty[1], empty[2]);
 		for (uint32_t i = 0; i < p->n; i++)
@@ -261,6 +285,7 @@ static void depth_row(float *depth, const uint64_t *word, uint32_t n, int expone
 	const int clamped = exponent < -252 ? -252 : exponent > 254 ? 254 : exponent, half = clamped / 2;
 	const float first = psr_float_from_bits((uint32_t)(127 + half) << 23);
 	const float second = psr_float_from_bits((uint32_t)(127 + clamped - half) << 23);
+
 	for (uint32_t i = 0; i < n; i++)
 		depth[i] = psr_float_from_bits((uint32_t)(word[i] >> 32)) * first * second;
 }

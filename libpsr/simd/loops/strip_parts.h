@@ -31,8 +31,10 @@ static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip_whole(p->n);
 	uint64_t some = 0, each = ~UINT64_C(0);
+
 	for (uint32_t i = 0; i < n; i++) {
 		const uint64_t attr = *p->at[i];
+
 		strip->attr[i] = attr;
 		strip->normal_word[i] = view->direction_word[PSR_ATTR_NORMAL(attr)];
 		some |= attr;
@@ -48,8 +50,10 @@ static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip
 static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
 {
 	const uint64_t first = strip->attr[0];
+
 	for (uint32_t i = 0; i < strip->n; i++) {
 		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
+
 		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
 		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
 		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
@@ -65,8 +69,10 @@ static const float exponent_root[16] = {
 static inline const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
 {
 	uint32_t low = 0, high = view->n_instances;
+
 	while (high - low > 1) {
 		const uint32_t middle = (low + high) / 2;
+
 		if (view->instance[middle].first_slot <= slot)
 			low = middle;
 		else
@@ -81,6 +87,7 @@ static inline const struct warp_instance *instance_run(uint32_t *end, const stru
 {
 	const struct warp_instance *in = instance_of(view, p->id[first] / PSR_BLOCK_SAMPLES);
 	uint32_t i = view->n_instances > 1 ? first + 1 : n;
+
 	while (i < n && p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot < in->blocks->n_blocks)
 		i++;
 	*end = i;
@@ -92,6 +99,7 @@ static inline void turn_normals(struct strip *strip, const float m[3][3], uint32
 	for (uint32_t i = first; i < end; i++) {
 		const uint64_t word = strip->normal_word[i];
 		const float x = (float)(int16_t)word, y = (float)(int16_t)(word >> 16), z = (float)(int16_t)(word >> 32);
+
 		strip->nx[i] = ((m[0][0] * x + m[0][1] * y) + m[0][2] * z) * (1 / 32767.0f);
 		strip->ny[i] = ((m[1][0] * x + m[1][1] * y) + m[1][2] * z) * (1 / 32767.0f);
 		strip->nz[i] = ((m[2][0] * x + m[2][1] * y) + m[2][2] * z) * (1 / 32767.0f);

@@ -1,17 +1,20 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
- * instructions. Arguments: the warp kernel, and a macro that names a kernel's variant where one is written by hand. */
+ * instructions. Arguments: the kernels of warp and reproject_look, and a macro that names a kernel's variant where one is
+ * written by hand. */
 #include "cull.h"
 #include "fill_pull.h"
 #include "fill_push.h"
 #include "gaps.h"
 #include "simd/kernels.h"
 #include "light.h"
+#include "reproject.h"
+#include "reproject_fit.h"
 #include "shadow.h"
 #include "smooth.h"
 #include "strip.h"
 #include "zbuffer.h"
 
-#define SIMD_TABLE(warp_kernel, KERNEL) { \
+#define SIMD_TABLE(warp_kernel, look_kernel, KERNEL) { \
 	.cull = cull,                                  \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
@@ -35,4 +38,10 @@
 	.fill_push_picture = KERNEL(fill_push_picture),\
 	.fill_depths = fill_depths,                    \
 	.smooth = smooth,                              \
+	.reproject_depths = reproject_depths,          \
+	.reproject_texels = reproject_texels,          \
+	.reproject_fit = reproject_fit,                \
+	.reproject_bound = reproject_bound,            \
+	.reproject_cells = reproject_cells,            \
+	.reproject_look = look_kernel,                 \
 }
