@@ -1,3 +1,4 @@
+#include <math.h>
 #include "wire.h"
 
 static int check_name(const char *name, struct psr_error *err)
@@ -5,10 +6,7 @@ static int check_name(const char *name, struct psr_error *err)
 	return *name ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "the name of a model is empty");
 }
 
-int psr_msg_list_encode(struct psr_buf *out, uint32_t id, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(LIST, NULL, NULL), id, 0, NULL, err);
-}
+WIRE_EMPTY_ID(list, LIST)
 
 static void layout_list_entry(struct wire *w, void *p)
 {
@@ -18,6 +16,8 @@ static void layout_list_entry(struct wire *w, void *p)
 	wire_u64(w, &m->file_bytes);
 	wire_bytes(w, m->content_id, sizeof m->content_id);
 	wire_string(w, m->name, sizeof m->name);
+	if (!w->writing && m->state > PSR_ENTRY_FAILED)
+		m->state = PSR_ENTRY_FAILED;
 }
 
 static int check_list_entry(const void *p, struct psr_error *err)
@@ -29,16 +29,7 @@ static int check_list_entry(const void *p, struct psr_error *err)
 	return check_name(m->name, err);
 }
 
-int psr_msg_list_entry_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_list_entry *msg,
-                              struct psr_error *err)
-{
-	return wire_encode(out, WIRE(LIST_ENTRY, layout_list_entry, check_list_entry), id, 0, msg, err);
-}
-
-int psr_msg_list_entry_decode(struct psr_msg_list_entry *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(LIST_ENTRY, layout_list_entry, check_list_entry), payload, n, err);
-}
+WIRE_ID(list_entry, LIST_ENTRY, check_list_entry)
 
 static void layout_list_end(struct wire *w, void *p)
 {
@@ -46,16 +37,7 @@ static void layout_list_end(struct wire *w, void *p)
 	wire_u32(w, &m->n_entries);
 }
 
-int psr_msg_list_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_list_end *msg,
-                            struct psr_error *err)
-{
-	return wire_encode(out, WIRE(LIST_END, layout_list_end, NULL), id, 0, msg, err);
-}
-
-int psr_msg_list_end_decode(struct psr_msg_list_end *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(LIST_END, layout_list_end, NULL), payload, n, err);
-}
+WIRE_ID(list_end, LIST_END, NULL)
 
 static void layout_open(struct wire *w, void *p)
 {
@@ -72,15 +54,7 @@ static int check_open(const void *p, struct psr_error *err)
 	return check_name(m->name, err);
 }
 
-int psr_msg_open_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_open *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(OPEN, layout_open, check_open), id, 0, msg, err);
-}
-
-int psr_msg_open_decode(struct psr_msg_open *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(OPEN, layout_open, check_open), payload, n, err);
-}
+WIRE_ID(open, OPEN, check_open)
 
 static void layout_progress(struct wire *w, void *p)
 {
@@ -89,6 +63,8 @@ static void layout_progress(struct wire *w, void *p)
 	wire_reserved(w, 6);
 	wire_u64(w, &m->done);
 	wire_u64(w, &m->total);
+	if (!w->writing && m->stage > PSR_PROGRESS_LOAD)
+		m->stage = PSR_PROGRESS_LOAD;
 }
 
 static int check_progress(const void *p, struct psr_error *err)
@@ -101,16 +77,7 @@ static int check_progress(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_progress_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_progress *msg,
-                            struct psr_error *err)
-{
-	return wire_encode(out, WIRE(PROGRESS, layout_progress, check_progress), id, 0, msg, err);
-}
-
-int psr_msg_progress_decode(struct psr_msg_progress *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(PROGRESS, layout_progress, check_progress), payload, n, err);
-}
+WIRE_ID(progress, PROGRESS, check_progress)
 
 static void layout_opened(struct wire *w, void *p)
 {
@@ -128,12 +95,13 @@ static void layout_opened(struct wire *w, void *p)
 	wire_u64(w, &m->n_samples);
 	wire_u64(w, &m->n_blocks);
 	wire_u64(w, &m->bytes);
+	wire_f64(w, m->up, 3);
 }
 
 static int check_opened(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_opened *m = p;
-	const uint32_t known = 1u << PSR_WIRE_REP_BLOCKS | 1u << PSR_WIRE_REP_OCTREE | 1u << PSR_WIRE_REP_DPOINT;
+	const double *up = m->up;
 	if (check_integer("a model's handle", m->handle, 1, UINT32_MAX, err) ||
 	    check_lengths("a model's box", m->box_min, 3, err) || check_lengths("a model's box", m->box_max, 3, err) ||
 	    check_lengths("a model's origin", m->origin, 3, err) || check_positive("a model's scale", m->scale, err) ||
@@ -144,24 +112,18 @@ static int check_opened(const void *p, struct psr_error *err)
 	    check_integer("a model's number of blocks", m->n_blocks, 0, PSR_WIRE_MAX_INTEGER, err) ||
 	    check_integer("a model's memory", m->bytes, 0, PSR_WIRE_MAX_INTEGER, err))
 		return PSR_ERR_ARG;
-	if (m->representations == 0 || (m->representations & ~known))
-		return psr_fail(err, PSR_ERR_ARG, "a model's representations are %#x: bits 1 to 3 are known, and one is needed",
+	if (m->representations == 0 || (m->representations & 1u << PSR_WIRE_REP_AUTO))
+		return psr_fail(err, PSR_ERR_ARG, "a model's representations are %#x: one is needed, and bit 0 is none",
 		                m->representations);
+	if (!(fabs(up[0] * up[0] + up[1] * up[1] + up[2] * up[2] - 1) <= 1e-6))
+		return psr_fail(err, PSR_ERR_ARG, "a model's way up (%g, %g, %g) is not a unit vector", up[0], up[1], up[2]);
 	for (int i = 0; i < 3; i++)
 		if (m->box_min[i] > m->box_max[i])
 			return psr_fail(err, PSR_ERR_ARG, "a model's box is inside out along axis %d", i);
 	return PSR_OK;
 }
 
-int psr_msg_opened_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_opened *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(OPENED, layout_opened, check_opened), id, 0, msg, err);
-}
-
-int psr_msg_opened_decode(struct psr_msg_opened *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(OPENED, layout_opened, check_opened), payload, n, err);
-}
+WIRE_ID(opened, OPENED, check_opened)
 
 static void layout_close(struct wire *w, void *p)
 {
@@ -175,12 +137,4 @@ static int check_close(const void *p, struct psr_error *err)
 	return check_integer("a model's handle", m->handle, 1, UINT32_MAX, err);
 }
 
-int psr_msg_close_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_close *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(CLOSE, layout_close, check_close), id, 0, msg, err);
-}
-
-int psr_msg_close_decode(struct psr_msg_close *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(CLOSE, layout_close, check_close), payload, n, err);
-}
+WIRE_ID(close, CLOSE, check_close)

@@ -12,16 +12,7 @@ static int check_superseded(const void *p, struct psr_error *err)
 	return check_integer("the id that supersedes", m->by, 2, UINT32_MAX, err);
 }
 
-int psr_msg_superseded_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_superseded *msg,
-                              struct psr_error *err)
-{
-	return wire_encode(out, WIRE(SUPERSEDED, layout_superseded, check_superseded), id, view, msg, err);
-}
-
-int psr_msg_superseded_decode(struct psr_msg_superseded *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(SUPERSEDED, layout_superseded, check_superseded), payload, n, err);
-}
+WIRE_VIEW(superseded, SUPERSEDED, check_superseded)
 
 static void layout_ack(struct wire *w, void *p)
 {
@@ -30,41 +21,13 @@ static void layout_ack(struct wire *w, void *p)
 	wire_reserved(w, 2);
 }
 
-int psr_msg_ack_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_ack *msg,
-                       struct psr_error *err)
-{
-	return wire_encode(out, WIRE(ACK, layout_ack, NULL), id, view, msg, err);
-}
+WIRE_VIEW(ack, ACK, NULL)
 
-int psr_msg_ack_decode(struct psr_msg_ack *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(ACK, layout_ack, NULL), payload, n, err);
-}
-
-int psr_msg_cancelled_encode(struct psr_buf *out, uint32_t id, uint16_t view, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(CANCELLED, NULL, NULL), id, view, NULL, err);
-}
-
-int psr_msg_cancel_encode(struct psr_buf *out, uint32_t id, uint16_t view, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(CANCEL, NULL, NULL), id, view, NULL, err);
-}
-
-int psr_msg_pause_encode(struct psr_buf *out, uint16_t view, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(PAUSE, NULL, NULL), 0, view, NULL, err);
-}
-
-int psr_msg_resume_encode(struct psr_buf *out, uint16_t view, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(RESUME, NULL, NULL), 0, view, NULL, err);
-}
-
-int psr_msg_stats_encode(struct psr_buf *out, uint32_t id, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(STATS, NULL, NULL), id, 0, NULL, err);
-}
+WIRE_EMPTY_VIEW(cancelled, CANCELLED)
+WIRE_EMPTY_VIEW(cancel, CANCEL)
+WIRE_EMPTY_VIEW(pause, PAUSE)
+WIRE_EMPTY_VIEW(resume, RESUME)
+WIRE_EMPTY_ID(stats, STATS)
 
 static void layout_stats_reply(struct wire *w, void *p)
 {
@@ -98,14 +61,4 @@ static int check_stats_reply(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_stats_reply_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_stats_reply *msg,
-                               struct psr_error *err)
-{
-	return wire_encode(out, WIRE(STATS_REPLY, layout_stats_reply, check_stats_reply), id, 0, msg, err);
-}
-
-int psr_msg_stats_reply_decode(struct psr_msg_stats_reply *msg, const uint8_t *payload, size_t n,
-                               struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(STATS_REPLY, layout_stats_reply, check_stats_reply), payload, n, err);
-}
+WIRE_ID(stats_reply, STATS_REPLY, check_stats_reply)

@@ -1,7 +1,7 @@
 #include <math.h>
 #include "wire.h"
 
-/* Kinds count from 1 on the wire; one field is the angle or the height. */
+/* Kinds count from 1 on the wire; one field holds the angle or the height. */
 void layout_camera(struct wire *w, struct psr_camera *m)
 {
 	uint8_t kind = (uint8_t)(m->kind + 1);
@@ -77,6 +77,27 @@ static int check_settings(const struct psr_msg_settings *m, struct psr_error *er
 	return check_range("the sample spacing of the settings (pixels)", m->spacing_px, 1.0 / 64, 64, err);
 }
 
+static int check_scale(const struct psr_msg_settings *m, uint32_t width, uint32_t height, struct psr_error *err)
+{
+	if (width % m->scale == 0 && height % m->scale == 0)
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides must be multiples of its scale, %u",
+	                width, height, m->scale);
+}
+
+static int check_depth_range(unsigned format, enum psr_camera_kind kind, double min, double max, struct psr_error *err)
+{
+	const double most = PSR_WIRE_MAX_LENGTH;
+	if (format != PSR_WIRE_DEPTH_U16 && format != PSR_WIRE_DEPTH_U16_HALF)
+		return check_zero("the range of depth, which only formats 2 and 3 have,", min == 0 && max == 0, err);
+	if (check_range("the nearest depth", min, kind == PSR_CAMERA_PERSPECTIVE ? 1 / most : -most, most, err) ||
+	    check_range("the farthest depth", max, -most, most, err))
+		return PSR_ERR_ARG;
+	if (min < max)
+		return PSR_OK;
+	return psr_fail(err, PSR_ERR_ARG, "the range of depth is %g to %g: the first must be less", min, max);
+}
+
 /* The fields that a request and its FRAME_BEGIN share. */
 struct picture {
 	uint32_t width, height, planes;
@@ -134,13 +155,15 @@ static void layout_frame(struct wire *w, void *p)
 	wire_u8(w, &m->depth_codec);
 	wire_u8(w, &m->data_codec);
 	wire_u8(w, &m->budget);
-	wire_reserved(w, 2);
+	wire_u16(w, &m->flags);
 	wire_u64(w, &m->time_budget_us);
 	wire_f64(w, &m->error_bound_px, 1);
 	layout_settings(w, &m->settings);
 	wire_u32(w, &m->base);
 	wire_reserved(w, 4);
 	layout_camera(w, &m->camera);
+	wire_f64(w, &m->depth_min, 1);
+	wire_f64(w, &m->depth_max, 1);
 }
 
 static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
@@ -164,24 +187,20 @@ static int check_frame(const void *p, struct psr_error *err)
 	const struct picture picture = { m->width, m->height, m->planes, m->color_codec, m->color_quality,
 		m->depth_format, m->depth_codec, m->data_codec };
 	int result;
-	if (check_integer("the slot of the scene", m->slot, 0, PSR_WIRE_MAX_SCENES - 1, err))
+	if (check_integer("the slot of the scene", m->slot, 0, PSR_WIRE_MAX_SCENES - 1, err) ||
+	    check_integer("the flag word of a frame", m->flags, 0, PSR_WIRE_FRAME_NO_HASHES | PSR_WIRE_FRAME_SHARP, err))
 		return PSR_ERR_ARG;
 	result = check_picture(&picture, err);
 	if (result != PSR_OK)
 		return result;
-	return check_budget(m, err) || check_camera(&m->camera, err) ? PSR_ERR_ARG : PSR_OK;
+	if (check_budget(m, err) || check_camera(&m->camera, err))
+		return PSR_ERR_ARG;
+	if (m->budget == PSR_WIRE_BUDGET_SETTINGS && check_scale(&m->settings, m->width, m->height, err))
+		return PSR_ERR_ARG;
+	return check_depth_range(m->depth_format, m->camera.kind, m->depth_min, m->depth_max, err);
 }
 
-int psr_msg_frame_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame *msg,
-                         struct psr_error *err)
-{
-	return wire_encode(out, WIRE(FRAME, layout_frame, check_frame), id, view, msg, err);
-}
-
-int psr_msg_frame_decode(struct psr_msg_frame *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(FRAME, layout_frame, check_frame), payload, n, err);
-}
+WIRE_VIEW(frame, FRAME, check_frame)
 
 static void layout_frame_begin(struct wire *w, void *p)
 {
@@ -198,7 +217,8 @@ static void layout_frame_begin(struct wire *w, void *p)
 	wire_u8(w, &m->data_codec);
 	wire_bytes(w, m->background, 3);
 	wire_u32(w, &m->base);
-	wire_reserved(w, 4);
+	wire_u16(w, &m->refine);
+	wire_reserved(w, 2);
 	layout_settings(w, &m->settings);
 	wire_f64(w, &m->depth_min, 1);
 	wire_f64(w, &m->depth_max, 1);
@@ -214,21 +234,10 @@ static int check_frame_begin(const void *p, struct psr_error *err)
 	if (result != PSR_OK)
 		return result;
 	if ((m->base == 0 && check_zero("the pass of a base that is none", m->base_pass == 0, err)) ||
-	    check_range("the nearest depth", m->depth_min, 0, PSR_WIRE_MAX_LENGTH, err) ||
-	    check_range("the farthest depth", m->depth_max, m->depth_min, PSR_WIRE_MAX_LENGTH, err) ||
-	    check_settings(&m->settings, err) || check_camera(&m->camera, err))
+	    check_settings(&m->settings, err) || check_scale(&m->settings, m->width, m->height, err) ||
+	    check_camera(&m->camera, err))
 		return PSR_ERR_ARG;
-	return PSR_OK;
+	return check_depth_range(m->depth_format, m->camera.kind, m->depth_min, m->depth_max, err);
 }
 
-int psr_msg_frame_begin_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_begin *msg,
-                               struct psr_error *err)
-{
-	return wire_encode(out, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), id, view, msg, err);
-}
-
-int psr_msg_frame_begin_decode(struct psr_msg_frame_begin *msg, const uint8_t *payload, size_t n,
-                               struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(FRAME_BEGIN, layout_frame_begin, check_frame_begin), payload, n, err);
-}
+WIRE_VIEW(frame_begin, FRAME_BEGIN, check_frame_begin)

@@ -16,7 +16,7 @@ void psr_msg_light_get(struct psr_light *light, const struct psr_msg_light *msg)
 	light->reference = msg->reference;
 }
 
-/* The greatest component becomes the intensity, the rest is the colour. */
+/* The greatest component becomes the intensity, and the color is divided by it. */
 static void color_and_intensity(struct psr_msg_light *to, const double color[3])
 {
 	double most = 0;

@@ -88,16 +88,7 @@ static int check_rect(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_rect_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_rect *msg,
-                        struct psr_error *err)
-{
-	return wire_encode(out, WIRE(RECT, layout_rect, check_rect), id, view, msg, err);
-}
-
-int psr_msg_rect_decode(struct psr_msg_rect *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(RECT, layout_rect, check_rect), payload, n, err);
-}
+WIRE_VIEW(rect, RECT, check_rect)
 
 static void layout_frame_end(struct wire *w, void *p)
 {
@@ -108,9 +99,14 @@ static void layout_frame_end(struct wire *w, void *p)
 	wire_u32(w, &m->planes);
 	wire_f64(w, &m->error_px, 1);
 	wire_u16(w, &m->n_entries);
-	wire_reserved(w, 6);
+	wire_u8(w, &m->has_hashes);
+	wire_reserved(w, 5);
+	wire_f64(w, &m->depth_min, 1);
+	wire_f64(w, &m->depth_max, 1);
+	if (!w->writing && m->status > PSR_WIRE_FRAME_COARSE)
+		m->status = PSR_WIRE_FRAME_OK;
 	for (unsigned i = 0; i < PSR_N_PLANES; i++) {
-		if (m->planes & 1u << i)
+		if (m->has_hashes && m->planes & 1u << i)
 			wire_u64(w, &m->hash[i]);
 		else if (!w->writing)
 			m->hash[i] = 0;
@@ -129,10 +125,14 @@ static void layout_frame_end(struct wire *w, void *p)
 static int check_frame_end(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_frame_end *m = p;
+	const int has_depth = (m->planes & 1u << PSR_PLANE_DEPTH) != 0;
 	uint16_t last = 0;
 	if (check_integer("the final mark of a frame", m->is_final, 0, 1, err) ||
 	    check_integer("the status of a frame", m->status, PSR_WIRE_FRAME_OK, PSR_WIRE_FRAME_COARSE, err) ||
-	    check_range("the error of a frame (pixels)", m->error_px, 0, PSR_WIRE_MAX_LENGTH, err))
+	    check_range("the error of a frame (pixels)", m->error_px, 0, PSR_WIRE_MAX_LENGTH, err) ||
+	    check_integer("whether a frame has hashes", m->has_hashes, 0, 1, err) ||
+	    check_range("the nearest depth", m->depth_min, 0, has_depth ? PSR_WIRE_MAX_LENGTH : 0, err) ||
+	    check_range("the farthest depth", m->depth_max, m->depth_min, has_depth ? PSR_WIRE_MAX_LENGTH : 0, err))
 		return PSR_ERR_ARG;
 	if (m->planes == 0 || m->planes >> PSR_N_PLANES)
 		return psr_fail(err, PSR_ERR_ARG, "the planes of a frame are %#x: bits 0 to %d are known, and one is needed",
@@ -152,13 +152,4 @@ static int check_frame_end(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_frame_end_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_frame_end *msg,
-                             struct psr_error *err)
-{
-	return wire_encode(out, WIRE(FRAME_END, layout_frame_end, check_frame_end), id, view, msg, err);
-}
-
-int psr_msg_frame_end_decode(struct psr_msg_frame_end *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(FRAME_END, layout_frame_end, check_frame_end), payload, n, err);
-}
+WIRE_VIEW(frame_end, FRAME_END, check_frame_end)

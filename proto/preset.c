@@ -1,6 +1,8 @@
 #include <string.h>
 #include "wire.h"
 
+#define LEAST_BYTES 107 /* size of a preset with a name */
+
 static void layout_presets(struct wire *w, void *p)
 {
 	struct psr_msg_presets *m = p;
@@ -13,15 +15,7 @@ static int check_presets(const void *p, struct psr_error *err)
 	return check_integer("a model's handle", m->handle, 1, UINT32_MAX, err);
 }
 
-int psr_msg_presets_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(PRESETS, layout_presets, check_presets), id, 0, msg, err);
-}
-
-int psr_msg_presets_decode(struct psr_msg_presets *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(PRESETS, layout_presets, check_presets), payload, n, err);
-}
+WIRE_ID(presets, PRESETS, check_presets)
 
 static void layout_preset(struct wire *w, void *p)
 {
@@ -57,6 +51,10 @@ int psr_msg_preset_encode(struct psr_buf *out, uint32_t id, const struct psr_msg
 
 int psr_msg_preset_decode(struct psr_msg_preset *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
+	if (n >= LEAST_BYTES && payload[0] > PSR_WIRE_PRESET_LIGHT) {
+		memset(msg, 0, sizeof *msg);
+		return PSR_OK;
+	}
 	return wire_decode(msg, WIRE(PRESET, layout_preset, check_preset), payload, n, err);
 }
 
@@ -76,14 +74,4 @@ static int check_presets_end(const void *p, struct psr_error *err)
 	           : PSR_OK;
 }
 
-int psr_msg_presets_end_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_presets_end *msg,
-                               struct psr_error *err)
-{
-	return wire_encode(out, WIRE(PRESETS_END, layout_presets_end, check_presets_end), id, 0, msg, err);
-}
-
-int psr_msg_presets_end_decode(struct psr_msg_presets_end *msg, const uint8_t *payload, size_t n,
-                               struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(PRESETS_END, layout_presets_end, check_presets_end), payload, n, err);
-}
+WIRE_ID(presets_end, PRESETS_END, check_presets_end)

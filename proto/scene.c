@@ -113,12 +113,4 @@ static int check_scene(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_scene_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_scene *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(SCENE, layout_scene, check_scene), id, 0, msg, err);
-}
-
-int psr_msg_scene_decode(struct psr_msg_scene *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(SCENE, layout_scene, check_scene), payload, n, err);
-}
+WIRE_ID(scene, SCENE, check_scene)

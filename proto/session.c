@@ -37,8 +37,9 @@ int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size
 		return psr_fail(err, PSR_ERR_PROTOCOL, "HELLO: the message has %zu of at least 48 bytes", n);
 	result = wire_decode(msg, WIRE(HELLO, layout_hello, NULL), payload, n, err);
 	if (result == PSR_ERR_VERSION)
-		return psr_fail(err, PSR_ERR_VERSION, "the client speaks version %u.%u of the protocol, this server %u.%u: "
-		                "use programs of the same release", msg->major, msg->minor, PSR_PROTO_MAJOR, PSR_PROTO_MINOR);
+		return psr_fail(err, PSR_ERR_VERSION, "psr %d.%d: this server speaks this version of the protocol alone, the "
+		                "client %u.%u: use programs of the same release", PSR_PROTO_MAJOR, PSR_PROTO_MINOR, msg->major,
+		                msg->minor);
 	return result;
 }
 
@@ -87,15 +88,7 @@ static int check_welcome(const void *p, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_msg_welcome_encode(struct psr_buf *out, const struct psr_msg_welcome *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(WELCOME, layout_welcome, check_welcome), 0, 0, msg, err);
-}
-
-int psr_msg_welcome_decode(struct psr_msg_welcome *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(WELCOME, layout_welcome, check_welcome), payload, n, err);
-}
+WIRE_PLAIN(welcome, WELCOME, check_welcome)
 
 static void layout_goodbye(struct wire *w, void *p)
 {
@@ -103,17 +96,11 @@ static void layout_goodbye(struct wire *w, void *p)
 	wire_u16(w, &m->reason);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
+	if (!w->writing && m->reason > PSR_GOODBYE_SLOW)
+		m->reason = PSR_GOODBYE_DONE;
 }
 
-int psr_msg_goodbye_encode(struct psr_buf *out, const struct psr_msg_goodbye *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(GOODBYE, layout_goodbye, NULL), 0, 0, msg, err);
-}
-
-int psr_msg_goodbye_decode(struct psr_msg_goodbye *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(GOODBYE, layout_goodbye, NULL), payload, n, err);
-}
+WIRE_PLAIN(goodbye, GOODBYE, NULL)
 
 static void layout_ping(struct wire *w, void *p)
 {
@@ -121,19 +108,11 @@ static void layout_ping(struct wire *w, void *p)
 	wire_u64(w, &m->token);
 }
 
-int psr_msg_ping_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
-{
-	return wire_encode(out, WIRE(PING, layout_ping, NULL), 0, 0, msg, err);
-}
+WIRE_PLAIN(ping, PING, NULL)
 
 int psr_msg_pong_encode(struct psr_buf *out, const struct psr_msg_ping *msg, struct psr_error *err)
 {
 	return wire_encode(out, WIRE(PONG, layout_ping, NULL), 0, 0, msg, err);
-}
-
-int psr_msg_ping_decode(struct psr_msg_ping *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(PING, layout_ping, NULL), payload, n, err);
 }
 
 static void layout_error(struct wire *w, void *p)
@@ -158,10 +137,7 @@ int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const 
 	return wire_encode(out, WIRE(ERROR, layout_error, check_error), id, view, &clean, err);
 }
 
-int psr_msg_error_decode(struct psr_msg_error *msg, const uint8_t *payload, size_t n, struct psr_error *err)
-{
-	return wire_decode(msg, WIRE(ERROR, layout_error, check_error), payload, n, err);
-}
+WIRE_DECODE(error, ERROR, check_error)
 
 uint16_t psr_wire_error_from(int code)
 {

@@ -22,7 +22,7 @@ void wire_fail(struct wire *w, int code, const char *what)
 	w->where = w->at;
 }
 
-/* Moves over n bytes; returns them, or NULL beyond the end. */
+/* Moves on by n bytes; returns them, or NULL beyond the end. */
 static uint8_t *advance_out(struct wire *w, size_t n)
 {
 	size_t at = w->at;
@@ -145,8 +145,8 @@ void wire_data(struct wire *w, const uint8_t **data, uint32_t n)
 	*data = advance_in(w, n);
 }
 
-/* Returns the bytes of the well-formed character at p, or 0; control characters, which could steer a terminal, give 0.
- * */
+/* Returns the length of the well-formed character at p, or 0; control characters, which could steer a terminal, give
+ * 0. */
 static size_t character(const uint8_t *p, size_t n)
 {
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
@@ -240,8 +240,6 @@ int wire_decode(void *msg, const struct wire_kind *kind, const uint8_t *payload,
 {
 	struct wire w = { .in = payload, .room = n };
 	kind->layout(&w, msg);
-	if (w.code == PSR_OK && w.at < n)
-		wire_fail(&w, PSR_ERR_PROTOCOL, "the message continues after its last field");
 	if (w.code != PSR_OK)
 		return psr_fail(err, w.code, "%s: %s (byte %zu of the payload)", psr_msg_name(kind->type), w.what, w.where);
 	return kind->check ? kind->check(msg, err) : PSR_OK;

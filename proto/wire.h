@@ -1,11 +1,10 @@
-/* Private to proto/: one walk over a message's fields serves for writing and for reading, so that both share a layout.
- * */
+/* Private to proto/: one walk over a message's fields does the writing and the reading, so that both share a layout. */
 #ifndef PSR_PROTO_WIRE_H
 #define PSR_PROTO_WIRE_H
 
 #include "proto.h"
 
-/* A walk. Writing beyond `room` only counts in `at`; fields read beyond the end are 0. code, what and where keep the
+/* A walk. Writing beyond `room` only advances `at`; fields read beyond the end are 0. code, what and where keep the
  * first error. */
 struct wire {
 	int writing;
@@ -48,6 +47,44 @@ struct wire_kind {
 int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, uint16_t view, const void *msg,
                 struct psr_error *err);
 int wire_decode(void *msg, const struct wire_kind *kind, const uint8_t *payload, size_t n, struct psr_error *err);
+
+/* The functions that proto.h declares by PROTO_PLAIN(), PROTO_ID() and PROTO_VIEW(), for a message with layout_NAME();
+ * check may be NULL. The EMPTY ones have no payload, and so no decoder. */
+#define WIRE_DECODE(name, type, check)                                                                              \
+	int psr_msg_##name##_decode(struct psr_msg_##name *msg, const uint8_t *payload, size_t n, struct psr_error *err) \
+	{                                                                                                               \
+		return wire_decode(msg, WIRE(type, layout_##name, check), payload, n, err);                                 \
+	}
+#define WIRE_PLAIN(name, type, check)                                                                               \
+	int psr_msg_##name##_encode(struct psr_buf *out, const struct psr_msg_##name *msg, struct psr_error *err)       \
+	{                                                                                                               \
+		return wire_encode(out, WIRE(type, layout_##name, check), 0, 0, msg, err);                                  \
+	}                                                                                                               \
+	WIRE_DECODE(name, type, check)
+#define WIRE_ID(name, type, check)                                                                                  \
+	int psr_msg_##name##_encode(struct psr_buf *out, uint32_t id, const struct psr_msg_##name *msg,                 \
+	                            struct psr_error *err)                                                              \
+	{                                                                                                               \
+		return wire_encode(out, WIRE(type, layout_##name, check), id, 0, msg, err);                                 \
+	}                                                                                                               \
+	WIRE_DECODE(name, type, check)
+#define WIRE_VIEW(name, type, check)                                                                                \
+	int psr_msg_##name##_encode(struct psr_buf *out, uint32_t id, uint16_t view, const struct psr_msg_##name *msg,  \
+	                            struct psr_error *err)                                                              \
+	{                                                                                                               \
+		return wire_encode(out, WIRE(type, layout_##name, check), id, view, msg, err);                              \
+	}                                                                                                               \
+	WIRE_DECODE(name, type, check)
+#define WIRE_EMPTY_ID(name, type)                                                                                   \
+	int psr_msg_##name##_encode(struct psr_buf *out, uint32_t id, struct psr_error *err)                            \
+	{                                                                                                               \
+		return wire_encode(out, WIRE(type, NULL, NULL), id, 0, NULL, err);                                          \
+	}
+#define WIRE_EMPTY_VIEW(name, type)                                                                                 \
+	int psr_msg_##name##_encode(struct psr_buf *out, uint32_t id, uint16_t view, struct psr_error *err)             \
+	{                                                                                                               \
+		return wire_encode(out, WIRE(type, NULL, NULL), id, view, NULL, err);                                       \
+	}
 
 /* Checks of values; `what` names the field in the error text. */
 int check_lengths(const char *what, const double *v, int n, struct psr_error *err);

@@ -1,6 +1,5 @@
-/* The messages between a client and psrd that psr/client.h takes and gives, as structs. proto/PROTOCOL.md tells what
- * they mean and which bytes they are. Coordinates and lengths are of magnitude 1e30 at most, positive lengths at least
- * 1e-30. */
+/* The messages of psr/client.h as structs. proto/PROTOCOL.md describes their meaning and their bytes. Coordinates and
+ * lengths have a magnitude of at most 1e30, positive lengths at least 1e-30. */
 #ifndef PSR_MESSAGE_H
 #define PSR_MESSAGE_H
 
@@ -24,8 +23,8 @@ extern "C" {
 #define PSR_WIRE_MAX_LENGTH 1e30       /* magnitude of a coordinate or length; positive lengths are at least 1e-30 */
 #define PSR_WIRE_MAX_INTENSITY 1e6
 
-/* What a server offers (WELCOME) or a client understands (HELLO); unknown bits are ignored. Every server offers
- * view 0, colour as raw, JPEG or zstd, depth as float, raw or zstd, blocks, lights without shadows. */
+/* Features that a server offers (WELCOME); clients ignore unknown bits. Every server offers view 0, colour as raw, JPEG or zstd,
+ * depth as float, raw or zstd, blocks, lights without shadows. */
 enum psr_cap {
 	PSR_CAP_VIEWS = 1 << 0,        /* views > 0: supersession, window of unacknowledged frames, ACK */
 	PSR_CAP_REFINE = 1 << 1,       /* pass_limit > 0 */
@@ -34,7 +33,7 @@ enum psr_cap {
 	PSR_CAP_ERROR_BOUND = 1 << 4,
 	PSR_CAP_SETTINGS = 1 << 5,     /* settings of a scale other than 1 */
 	PSR_CAP_SHADOWS = 1 << 6,
-	PSR_CAP_DEPTH_U16 = 1 << 7,    /* depth formats U16 and U16_HALF */
+	PSR_CAP_DEPTH_U16 = 1 << 7,    /* depth formats U16 and U16_HALF, in the range that FRAME gives */
 	PSR_CAP_NORMAL = 1 << 8,
 	PSR_CAP_ID = 1 << 9,
 	PSR_CAP_WEIGHT = 1 << 10,
@@ -47,8 +46,9 @@ enum psr_cap {
 	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
 	PSR_CAP_PAUSE = 1 << 18,
 	PSR_CAP_PRESETS = 1 << 19,
-	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN says for which pictures */
+	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN tells the size of the pictures */
 	PSR_CAP_BLOCK = 1 << 20,
+	PSR_CAP_SHARP = 1 << 22,       /* FRAME with PSR_WIRE_FRAME_SHARP; needs VIEWS */
 };
 
 /* ---- the session ---- */
@@ -56,15 +56,16 @@ enum psr_cap {
 struct psr_msg_welcome { /* server -> client, answers HELLO; id 0 */
 	uint16_t major, minor;
 	uint64_t capabilities;
-	uint32_t max_message;    /* 1024..65536 */
-	uint32_t max_side;       /* these are the server's own limits, at least 1, at most those of this header */
+	uint32_t max_message;    /* longest message that the server takes, 1024..65536; it sends up to 65536 */
+	uint32_t max_side;       /* the limits from here on are the server's own, at least 1, at most those of this
+	                          * header */
 	uint32_t max_pixels;
 	uint32_t max_instances;
 	uint32_t max_lights;
 	uint32_t max_scenes;
 	uint32_t max_open;
 	uint32_t max_models;     /* open handles of a connection */
-	uint32_t idle_timeout_ms; /* a connection silent for so long is closed; 0: never */
+	uint32_t idle_timeout_ms; /* the server closes a connection that sends no byte for this long; 0: never */
 	char server[PSR_WIRE_MAX_NAME + 1]; /* name and version */
 };
 
@@ -74,10 +75,10 @@ enum psr_entry_state {
 	PSR_ENTRY_READY = 1,   /* a model file */
 	PSR_ENTRY_LOADED = 2,  /* the same, in the server's memory now */
 	PSR_ENTRY_SOURCE = 3,  /* a source file: OPEN builds it first */
-	PSR_ENTRY_FAILED = 4,  /* could not be built or read; OPEN says why */
+	PSR_ENTRY_FAILED = 4,  /* the server could not build or read it; OPEN says why */
 };
 struct psr_msg_list_entry { /* one a model, sorted by the names' bytes */
-	uint8_t state;
+	uint8_t state;          /* the decoder turns an unknown one into FAILED */
 	uint64_t file_bytes;
 	uint8_t content_id[16]; /* zero if not known yet */
 	char name[PSR_WIRE_MAX_NAME + 1];
@@ -87,23 +88,25 @@ enum psr_progress_stage {
 	PSR_PROGRESS_WAITING = 0, PSR_PROGRESS_IMPORT = 1, PSR_PROGRESS_SAMPLE = 2, PSR_PROGRESS_SELECT = 3,
 	PSR_PROGRESS_WRITE = 4, PSR_PROGRESS_LOAD = 5,
 };
-struct psr_msg_progress { /* any number before OPENED; stages never go back */
-	uint16_t stage;
-	uint64_t done, total; /* in units of the stage; total 0: not known, then done only rises; else done <= total */
+struct psr_msg_progress { /* any number of these before OPENED; stages never go back */
+	uint16_t stage;       /* the decoder turns an unknown one into LOAD */
+	uint64_t done, total; /* in units of the stage; total 0: unknown, and done only rises; else done <= total */
 };
 
 enum psr_wire_rep { PSR_WIRE_REP_AUTO = 0, PSR_WIRE_REP_BLOCKS = 1, PSR_WIRE_REP_OCTREE = 2, PSR_WIRE_REP_DPOINT = 3 };
 struct psr_msg_opened {
 	uint32_t handle;          /* not 0; of this connection */
-	uint32_t representations; /* bit r: has representation r of enum psr_wire_rep; not 0, bit 0 is 0 */
+	uint32_t representations; /* bit r: the model has representation r of enum psr_wire_rep; not 0, bit 0 is 0;
+	                           * receivers ignore unknown bits */
 	uint8_t content_id[16];
-	double box_min[3], box_max[3]; /* of the samples, object coordinates (those of the source file) */
+	double box_min[3], box_max[3]; /* around the samples, in object coordinates (those of the source file) */
 	double origin[3];
 	double scale;             /* object units an inner unit; > 0 */
 	double spacing;           /* of samples at the finest level, object units; > 0 */
 	uint32_t resolution;      /* target resolution: pixels across the unit sphere at magnification 1; >= 1 */
 	uint32_t n_levels;        /* >= 1 */
 	uint64_t n_samples, n_blocks, bytes; /* bytes: in the server's memory */
+	double up[3];             /* the model's natural way up, object coordinates; | |up|^2 - 1 | <= 1e-6 */
 };
 
 /* ---- scenes ---- */
@@ -131,10 +134,10 @@ struct psr_msg_light { /* a field that the kind does not use is 0 */
 	                           * not fall */
 };
 
-/* APPEND adds to what the slot holds instead of replacing it (PSR_CAP_APPEND). */
+/* APPEND adds to the slot instead of replacing its scene (PSR_CAP_APPEND). */
 enum psr_wire_scene_flag { PSR_WIRE_SCENE_APPEND = 1 };
 struct psr_msg_scene {
-	uint16_t slot;            /* 0..15, chosen by the client; replaces what the slot held */
+	uint16_t slot;            /* 0..15, chosen by the client */
 	uint16_t flags;
 	double ambient;           /* 0..1e6: light from everywhere, times diffuse colour */
 	uint8_t background[3];    /* sRGB */
@@ -149,8 +152,9 @@ struct psr_msg_scene {
 #define PSR_WIRE_HOME "home"     /* a camera that shows the whole model, its natural way up */
 
 enum psr_wire_preset_kind { PSR_WIRE_PRESET_CAMERA = 1, PSR_WIRE_PRESET_LIGHT = 2 };
-struct psr_msg_preset { /* object coordinates; the part that the kind has no use for is 0 */
-	uint8_t kind;
+struct psr_msg_preset { /* in object coordinates; camera or light is 0, by kind */
+	uint8_t kind;                        /* the decoder turns an unknown one into 0 and sets nothing else: leave
+	                                      * this preset out */
 	struct psr_camera camera;
 	struct psr_msg_light light;          /* flags 0 */
 	char name[PSR_WIRE_MAX_NAME + 1];    /* not empty */
@@ -166,39 +170,49 @@ enum psr_wire_budget {
 
 struct psr_msg_settings { /* resolved settings: with them a frame is a pure function of models and request */
 	uint8_t scale;       /* drawn at 1/scale of the size in each direction and enlarged: 1, 2 or 4 */
-	uint8_t is_smooth;   /* 1: edges are blended with what is behind, and pixels with those of their surface; else 0 */
-	double spacing_px;   /* greatest distance of neighbouring samples, pixels: 1 is [G]'s adequate one; 2^-6..2^6 */
+	uint8_t is_smooth;   /* 1: blends edges with the surface behind, and pixels with others of their surface; else
+	                      * 0 */
+	double spacing_px;   /* greatest distance of neighbouring samples, pixels; 1 is [G]'s adequate sampling;
+	                      * 2^-6..2^6 */
 };
+
+/* NO_HASHES: FRAME_END has none. SHARP (PSR_CAP_SHARP, view > 0): once the view is at rest, frame 1 has scale 1, smooth
+ * edges and lossless codecs; refined frames follow it. */
+enum psr_wire_frame_flag { PSR_WIRE_FRAME_NO_HASHES = 1, PSR_WIRE_FRAME_SHARP = 2 };
 
 struct psr_msg_frame { /* client -> server */
 	uint16_t slot;           /* scene */
-	uint16_t pass_limit;     /* highest pass wanted; 0: one frame, no refinement */
+	uint16_t pass_limit;     /* highest refinement to draw; 0: none */
 	uint32_t width, height;  /* 1..16384 each, at most 64 Mpixel */
-	uint32_t planes;         /* 1 << enum psr_plane, whose values are those on the wire; not 0 */
-	uint8_t color_codec;     /* fields of planes that are not asked for are 0 */
+	uint32_t planes;         /* 1 << enum psr_plane, OR-ed; not 0. The wire has the same values */
+	uint8_t color_codec;     /* fields of planes that the request leaves out are 0 */
 	uint8_t color_quality;   /* JPEG: 1..100; else 0 */
 	uint8_t depth_format;
 	uint8_t depth_codec;     /* raw or zstd */
 	uint8_t data_codec;      /* of normal, id, weight, words, block: raw or zstd */
-	uint8_t budget;          /* enum psr_wire_budget: exactly one of the next three counts, the others are 0 */
+	uint8_t budget;          /* enum psr_wire_budget: it tells which one of the next three is set; the other two are
+	                          * 0 */
+	uint16_t flags;          /* enum psr_wire_frame_flag; the receiver checks that SHARP is not in view 0 */
 	uint64_t time_budget_us; /* TIME: 1..2^53-1, from the start of work on the frame to its END in the output queue */
 	double error_bound_px;   /* ERROR: of the geometric error, > 0 */
-	struct psr_msg_settings settings; /* SETTINGS */
-	uint32_t base;           /* id of an acknowledged frame of this view that the client still holds, or 0; that it is
-	                          * below the request's id, and 0 in view 0, is the receiver's to check */
+	struct psr_msg_settings settings; /* SETTINGS; width and height are multiples of the scale */
+	uint32_t base;           /* id of an acknowledged frame of this view that the client still holds, or 0; the
+	                          * receiver checks that it is below the request's id, and 0 in view 0 */
 	struct psr_camera camera;
+	double depth_min, depth_max; /* U16*: the range of depth, min < max, min > 0 in perspective; else 0 */
 };
 
 struct psr_msg_frame_begin { /* server -> client */
-	uint16_t pass;           /* 0, 1, ... rising within an id */
+	uint16_t pass;           /* number of the frame in its answer: 0, 1, ... */
+	uint16_t refine;         /* level of refinement; 0: none. The receiver checks that it fits the pass */
 	uint32_t width, height, planes; /* as asked */
-	uint8_t color_codec, color_quality, depth_format, depth_codec, data_codec; /* as asked */
-	uint8_t background[3];   /* of pixels without a rectangle, when there is no base */
-	uint32_t base;           /* 0: no base, else (base, base_pass) is what the rectangles go on top of */
+	uint8_t color_codec, color_quality; /* as asked or better: zstd for JPEG or PNG, a higher quality of JPEG */
+	uint8_t depth_format, depth_codec, data_codec; /* as asked */
+	uint8_t background[3];   /* colour of pixels that no rectangle covers, when there is no base */
+	uint32_t base;           /* 0: no base; else rectangles go on top of frame (base, base_pass) */
 	uint16_t base_pass;
 	struct psr_msg_settings settings; /* resolved */
-	double depth_min, depth_max; /* of the finite depths of this frame, both 0 if there are none; the range of
-	                              * PSR_WIRE_DEPTH_U16* */
+	double depth_min, depth_max; /* U16*: the range of depth, as asked; else 0 */
 	struct psr_camera camera;    /* as asked */
 };
 
@@ -208,7 +222,7 @@ enum psr_wire_frame_status {
 	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound could not be reached with these models */
 };
 
-enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
+enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts */
 	PSR_WIRE_REPORT_PLAN = 1,    /* instances of the scene */
 	PSR_WIRE_REPORT_CULL = 2,    /* blocks tested */
 	PSR_WIRE_REPORT_WARP = 3,    /* samples that fell into the picture */
@@ -221,6 +235,7 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_TOTAL = 10,  /* from the start of plan to the end of encode; threads of the server's pool */
 	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
 	PSR_WIRE_REPORT_SMOOTH = 12, /* pixels at edges */
+	PSR_WIRE_REPORT_CORES = 13,  /* that cores worked for the frame, summed over all of them; 0 */
 	/* values only, ns is 0: */
 	PSR_WIRE_REPORT_SAMPLES_WARPED = 32, /* all samples of the blocks drawn */
 	PSR_WIRE_REPORT_BLOCKS_DRAWN = 33,   /* after culling */
@@ -232,34 +247,53 @@ enum psr_wire_report_id { /* time in ns; what `count` counts stands beside it */
 	PSR_WIRE_REPORT_LIGHTS = 39,
 	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
 	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
-	PSR_WIRE_REPORT_EFFECTS = 64, /* and the effect's number, see PROTOCOL.md; ns is the reason's number */
+	PSR_WIRE_REPORT_EFFECTS = 64, /* plus the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
 struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
 
 struct psr_msg_frame_end { /* server -> client */
-	uint16_t pass;             /* that of BEGIN */
+	uint16_t pass;             /* as in BEGIN */
 	uint8_t is_final;          /* 1: the id ends here; else 0 */
-	uint8_t status;            /* enum psr_wire_frame_status */
+	uint8_t status;            /* enum psr_wire_frame_status; the decoder turns an unknown one into OK */
 	double error_px;           /* bound on the geometric error of this frame, pixels, >= 0 */
-	uint32_t planes;           /* those of BEGIN: which hashes follow */
-	uint64_t hash[PSR_N_PLANES]; /* by plane; XXH64, seed 0, before the codec; 0 where the plane is absent */
+	uint32_t planes;           /* as in BEGIN: tells which hashes follow */
+	uint8_t has_hashes;        /* 0: `hash` is all 0 */
+	double depth_min, depth_max; /* range of this frame's finite depths; both 0 without any, or without the plane */
+	uint64_t hash[PSR_N_PLANES]; /* by plane, psr_frame_hash() of the drawn frame; 0 for an absent plane */
 	uint16_t n_entries;
 	struct psr_msg_report_entry entry[PSR_WIRE_MAX_REPORT]; /* ids rising */
 };
 
 /* ---- statistics ---- */
 
-enum psr_stat_id { /* of the whole server since its start */
+enum psr_stat_id { /* counted for the whole server since its start */
 	PSR_STAT_UPTIME_US = 1, PSR_STAT_CONNECTIONS = 2, PSR_STAT_CONNECTIONS_TOTAL = 3, PSR_STAT_MODELS = 4,
 	PSR_STAT_MODEL_BYTES = 5, PSR_STAT_FRAMES = 6, PSR_STAT_FRAMES_FAILED = 7, PSR_STAT_FRAMES_WAITING = 8,
 	PSR_STAT_BYTES_SENT = 9, PSR_STAT_BYTES_RECEIVED = 10, PSR_STAT_FRAMES_SUPERSEDED = 11,
 	PSR_STAT_FRAMES_CANCELLED = 12, PSR_STAT_THREADS = 13,
 	PSR_STAT_DROPPED_PEERS = 14, /* connections that the server closed for an error or a limit */
+	PSR_STAT_MEMORY_BYTES = 15,  /* of models, workers, pictures and queues together */
+	PSR_STAT_MEMORY_LIMIT = 16,  /* limit on MEMORY_BYTES */
+	PSR_STAT_CONNECTIONS_NEW = 17, /* connections still without HELLO */
+	PSR_STAT_CONNECTIONS_BUSY = 18, /* connections refused because the server was full */
+	PSR_STAT_LOG_DROPPED = 19,   /* lines of its log that no reader took in time */
+	PSR_STAT_FRAMES_TIMED_OUT = 20, /* frames ended over the server's limit on their time */
+	PSR_STAT_FRAMES_LACKING = 21, /* part of FRAMES_WAITING: frames without memory at their turn */
+	PSR_STAT_FRAMES_ON_BASE = 24, /* frames sent as changes to a base */
+	PSR_STAT_BUILDS = 25,        /* builds that run */
+	PSR_STAT_BUILDS_WAITING = 26,
+	PSR_STAT_BUILDS_DONE = 27,
+	PSR_STAT_BUILDS_FAILED = 28, /* or stopped */
+	PSR_STAT_MODELS_LEFT = 29,   /* how often a model left memory though a handle or a scene held it */
+	PSR_STAT_MODELS_RETURNED = 30, /* how often such a model came back */
+	PSR_STAT_DRAW_US = 33,       /* time on cores of drawing and encoding */
+	PSR_STAT_PEERS_SLOW = 34,    /* part of DROPPED_PEERS: they read too slowly */
+	PSR_STAT_PEERS_SILENT = 35,  /* part of DROPPED_PEERS: they were silent too long */
 };
 struct psr_msg_stat { uint16_t id; uint64_t value; };
 struct psr_msg_stats_reply {
 	uint16_t n_stats;
-	struct psr_msg_stat stat[PSR_WIRE_MAX_STATS]; /* ids rising; unknown ones are skipped by receivers */
+	struct psr_msg_stat stat[PSR_WIRE_MAX_STATS]; /* ids rising; receivers skip unknown ones */
 };
 
 #ifdef __cplusplus
