@@ -14,7 +14,7 @@
 #define MAX_OPTIONS 40
 #define MAX_CONFIG 65536
 #define MEBI 1048576.0
-#define LEAST_RESOLUTION 8   /* those of psr-model build */
+#define LEAST_RESOLUTION 8   /* as in psr-model build */
 #define MOST_RESOLUTION 8192
 
 static int on_listen(const char *text, void *userdata, struct psr_error *err)
@@ -54,11 +54,12 @@ static int set_defaults(struct options *options)
 {
 	*options = (struct options){
 		.threads = count_cores(), .resolution = 768, .max_resolution = 1536,
-		.max_clients = 64, .max_open = 64, .max_handles = 64, .max_builds = 1,
+		.max_clients = 64, .max_pending = 1024, .max_open = 64, .max_handles = 64, .max_builds = 1,
 		.max_pixels = INT64_C(16) << 20,
 		.max_memory = INT64_C(4) << 30, .max_queue = INT64_C(32) << 20, .build_memory = INT64_C(16) << 30,
-		.handshake_timeout = 10, .idle_timeout = 600, .slow_timeout = 30, .drain_timeout = 5,
-		.build_time = 3600,
+		.build_file_size = INT64_C(4) << 30, .cache_size = INT64_C(16) << 30,
+		.handshake_timeout = 5, .idle_timeout = 600, .slow_timeout = 30, .drain_timeout = 5, .frame_timeout = 10,
+		.build_time = 3600, .build_wall_time = 7200,
 	};
 	options->isa = psr_isa_name(psr_isa_get());
 	options->cache = options->cache_default = find_cache();
@@ -78,10 +79,12 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		          " this machine only (loopback addresses); `ssh -L` reaches it from others. [" OPTIONS_LISTEN_DEFAULT "]" },
 		{ .name = "cache", .type = PSR_OPT_STRING, .value = &o->cache, .arg = "DIR",
 		  .help = "The folder that keeps models built from meshes and scans. It needs room: tens of MB a model." },
+		{ .name = "cache-size", .type = PSR_OPT_INT, .value = &o->cache_size, .arg = "BYTES", .min = 0, .max = 1e15,
+		  .help = "Built models that the cache keeps; beyond it the longest unused are removed. 0: no limit." },
 		{ .name = "config", .letter = 'c', .type = PSR_OPT_STRING, .value = &o->config, .arg = "FILE",
 		  .help = "A file of `name = value` lines, names as here without the dashes; the command line wins." },
 		{ .name = "verbose", .letter = 'v', .type = PSR_OPT_FLAG, .value = &o->verbose,
-		  .help = "Writes to standard error who connects, and what is loaded and built." },
+		  .help = "Reports connections, loads and builds on standard error." },
 		{ .name = "version", .type = PSR_OPT_FLAG, .value = &o->version, .help = "Prints the version and exits." },
 		{ .name = "Models built from meshes and scans", .type = PSR_OPT_HEADING },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &o->resolution, .arg = "PIXELS",
@@ -98,15 +101,23 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		  .max = 1e15, .help = "Memory (address space) that one build may take; one that needs more fails and says so." },
 		{ .name = "build-time", .type = PSR_OPT_INT, .value = &o->build_time, .arg = "SECONDS", .min = 1, .max = 1e6,
 		  .help = "Processor time that one build may take, over all its threads; one that needs more fails and says so." },
+		{ .name = "build-wall-time", .type = PSR_OPT_INT, .value = &o->build_wall_time, .arg = "SECONDS", .min = 1,
+		  .max = 1e6, .help = "Time that one build may take by the clock; one that takes longer is ended, and says so." },
+		{ .name = "build-file-size", .type = PSR_OPT_INT, .value = &o->build_file_size, .arg = "BYTES", .min = MEBI,
+		  .max = 1e15, .help = "Size of each file that a build may write; one that needs more fails and says so." },
 		{ .name = "Share of the machine", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .letter = 't', .type = PSR_OPT_INT, .value = &o->threads, .arg = "N", .min = 1, .max = 256,
 		  .help = "Processor cores that draw and build. Lower it to leave cores to other programs." },
 		{ .name = "max-memory", .type = PSR_OPT_INT, .value = &o->max_memory, .arg = "BYTES", .min = MEBI, .max = 1e15,
-		  .help = "Memory for models. Models that nobody uses make room for others; raise it if clients are refused." },
+		  .help = "Memory for models, pictures and answers that wait. Models that no frame has used for longest make room"
+		          " for others, and come back when one asks; raise it if frames wait for that." },
 		{ .name = "max-clients", .type = PSR_OPT_INT, .value = &o->max_clients, .arg = "N", .min = 1, .max = 65536,
 		  .help = "Clients connected at the same time; further ones are told that the server is full." },
 		{ .name = "max-pixels", .type = PSR_OPT_INT, .value = &o->max_pixels, .arg = "N", .min = 1, .max = 64 * MEBI,
 		  .help = "Pixels of the largest picture; drawing takes some tens of bytes of memory a pixel." },
+		{ .name = "frame-timeout", .type = PSR_OPT_REAL, .value = &o->frame_timeout, .arg = "SECONDS", .min = 0.001,
+		  .max = 1e6, .help = "Time of one picture on all cores, before refinement; one that needs more is answered by an"
+		                      " error." },
 		{ .name = "For those who run many clients", .type = PSR_OPT_HEADING,
 		  .help = "The defaults serve programs that keep to the protocol." },
 		{ .name = "max-open", .type = PSR_OPT_INT, .value = &o->max_open, .arg = "N", .min = 1, .max = 64,
@@ -116,13 +127,20 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		{ .name = "max-queue", .type = PSR_OPT_INT, .value = &o->max_queue, .arg = "BYTES", .min = 65536, .max = 1e12,
 		  .help = "Answers that may wait in memory for one slow client before its requests wait too; a single frame may"
 		          " exceed it." },
+		{ .name = "max-pending", .type = PSR_OPT_INT, .value = &o->max_pending, .arg = "N", .min = 1, .max = 65536,
+		  .help = "Connections that have not introduced themselves (HELLO), beside --max-clients. Another one takes the"
+		          " place of the one that waits longest." },
+		{ .name = "max-pending-per-address", .type = PSR_OPT_INT, .value = &o->max_pending_per_address, .arg = "N",
+		  .min = 0, .max = 65536, .help = "The same from one address; 0: as many as --max-pending. All addresses of this"
+		                                  " machine count as one." },
 		{ .name = "handshake-timeout", .type = PSR_OPT_REAL, .value = &o->handshake_timeout, .arg = "SECONDS",
 		  .min = 0.05, .max = 3600, .help = "A connection that has not introduced itself (HELLO) by then is closed." },
 		{ .name = "idle-timeout", .type = PSR_OPT_REAL, .value = &o->idle_timeout, .arg = "SECONDS",
-		  .min = 0, .max = 1e6, .help = "A client that asks for nothing for so long is disconnected; 0: never." },
+		  .min = 0, .max = 1e6, .help = "A client that says nothing for so long is disconnected; 0: never. psrd sends it a PING"
+		                             " after half of that." },
 		{ .name = "slow-timeout", .type = PSR_OPT_REAL, .value = &o->slow_timeout, .arg = "SECONDS",
-		  .min = 0.05, .max = 3600, .help = "A client that reads less than 64 KiB of its answers in that time is"
-		                                     " disconnected." },
+		  .min = 0.05, .max = 3600, .help = "A client that reads less than 64 KiB of its answers in that time, or"
+		                                     " less than a sixteenth of what waits for it, is disconnected." },
 		{ .name = "drain-timeout", .type = PSR_OPT_REAL, .value = &o->drain_timeout, .arg = "SECONDS",
 		  .min = 0, .max = 3600, .help = "How long psrd, told to end, finishes the frames under way." },
 		{ .name = "For developers", .type = PSR_OPT_HEADING },
@@ -168,7 +186,7 @@ static int is_given(const struct psr_opt *table, const int *given, const char *n
 	return 0;
 }
 
-/* What the command line gave stays as it is; the rest of the file is set in order. */
+/* Options of the command line keep their values; the file sets the others in order. */
 static int apply_config(const struct psr_cli *cli, const int *given, struct options *options, struct psr_error *err)
 {
 	char *next = options->config_text, *line;
@@ -199,7 +217,7 @@ static int apply_config(const struct psr_cli *cli, const int *given, struct opti
 	return PSR_OK;
 }
 
-/* One that was not given follows the other. */
+/* If only one of the two was given, the other follows it. */
 static int check_resolutions(struct options *options, int has_least, int has_most, struct psr_error *err)
 {
 	if (options->resolution <= options->max_resolution)
@@ -259,6 +277,8 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 	if (check_resolutions(options, is_given(cli.opts, seen, "resolution"), is_given(cli.opts, seen, "max-resolution"), err)
 	    != PSR_OK)
 		return PSR_ERR_ARG;
+	if (options->max_pending_per_address == 0 || options->max_pending_per_address > options->max_pending)
+		options->max_pending_per_address = options->max_pending;
 	if (options->models == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--models DIR is missing: it names the folder of models");
 	if (options->n_listen == 0)

@@ -14,8 +14,6 @@
 
 #define IO_THREADS 2
 
-static const char ENDING[] = "the server is shutting down";
-
 struct server {
 	struct options *options;
 	struct loop loop;
@@ -28,6 +26,7 @@ struct server {
 	struct catalogue catalogue;
 	struct builder *builder;
 	struct opener *opener;
+	struct residence *residence;
 	struct frames *frames;
 	struct sessions sessions;
 	int is_draining, is_scanning, must_scan_again, is_ticking;
@@ -62,7 +61,7 @@ static void start_scan(struct server *server)
 	scan = calloc(1, sizeof *scan);
 	if (scan != NULL)
 		scan->server = server;
-	if (scan == NULL || psr_pool_submit(server->io, scan_job, scan) != PSR_OK) {
+	if (scan == NULL || psr_pool_submit(server->io, &(struct pool_job){ .fn = scan_job, .userdata = scan }) != PSR_OK) {
 		free(scan);
 		log_warn("no memory to read the models folder again");
 		return;
@@ -76,12 +75,12 @@ static void on_scanned(void *userdata)
 	struct server *server = scan->server;
 
 	server->is_scanning = 0;
-	if (scan->code != PSR_OK)
+	if (scan->code != PSR_OK) {
 		log_warn("the models folder was not read again: %s", scan->error.text);
-	else if (catalogue_adopt(&server->catalogue, scan->listing) != PSR_OK)
-		log_warn("no memory to read the models folder again");
-	else
+	} else {
+		catalogue_adopt(&server->catalogue, scan->listing);
 		log_info("models folder read again: %zu models", server->catalogue.n);
+	}
 	free(scan);
 	if (server->must_scan_again) {
 		server->must_scan_again = 0;
@@ -104,7 +103,7 @@ static void start_draining(struct server *server)
 {
 	struct conn *next;
 
-	if (server->is_draining) { /* asked twice: at once */
+	if (server->is_draining) { /* the second signal: end at once */
 		server->drain_end_us = server->loop.now_us;
 		loop_stop(&server->loop);
 		return;
@@ -114,21 +113,27 @@ static void start_draining(struct server *server)
 	server->drain_end_us = server->loop.now_us + to_us(server->options->drain_timeout);
 	accept_close(&server->acceptor);
 	builder_destroy(server->builder);
-	server->builder = NULL;
-	opener_stop(server->opener, PSR_ERR_CANCELLED, ENDING);
-	frames_stop(server->frames);
+	server->builder = server->sessions.builder = NULL;
+	opener_stop(server->opener, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
+	frames_stop(server->frames, PSR_ERR_CANCELLED);
 	for (struct conn *conn = server->conns.first; conn != NULL; conn = next) {
 		struct session *session = conn->session;
 
 		next = conn->next;
-		if (session == NULL)
+		if (session == NULL) {
 			conn_close(conn);
-		else
-			frames_refuse_waiting(server->frames, &session->flow, PSR_ERR_CANCELLED, ENDING);
+			continue;
+		}
+		sessions_refuse_lists(session, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
 	}
 }
 
-/* Clients without a running frame get GOODBYE; after the last one the loop ends. */
+static int is_reading(const struct server *server)
+{
+	return opener_is_working(server->opener) || residence_is_working(server->residence);
+}
+
+/* Sends GOODBYE to clients without a running frame; the loop ends with the last client. */
 static void go_on_draining(struct server *server)
 {
 	struct conn *next;
@@ -137,14 +142,14 @@ static void go_on_draining(struct server *server)
 		const struct session *session = conn->session;
 
 		next = conn->next;
-		if (conn->state == CONN_OPEN && session->flow.running == NULL) {
-			conn_goodbye(conn, PSR_GOODBYE_SHUTDOWN, ENDING);
+		if (conn->state == CONN_OPEN && session->flow.schedule.n_requests == 0) {
+			conn_goodbye(conn, PSR_GOODBYE_SHUTDOWN, CONN_SHUTDOWN);
 			conn_flush(conn);
 		}
 	}
 	if (server->loop.now_us >= server->drain_end_us
 	    || (server->conns.first == NULL && frames_running(server->frames) == 0 && !server->is_scanning
-	        && !opener_is_working(server->opener)))
+	        && !is_reading(server)))
 		loop_stop(&server->loop);
 }
 
@@ -168,6 +173,10 @@ static void on_tick(void *userdata)
 
 	accept_wake(&server->acceptor);
 	conns_tick(&server->conns);
+	if (server->builder != NULL) {
+		builder_tick(server->builder);
+		opener_tick(server->opener);
+	}
 }
 
 static void on_batch_end(void *userdata)
@@ -175,11 +184,14 @@ static void on_batch_end(void *userdata)
 	struct server *server = userdata;
 	int must_tick;
 
-	conns_resume(&server->conns);
+	if (server->loop.wake_us != 0 && server->loop.now_us >= server->loop.wake_us)
+		frames_pump(server->frames);
+	catalogue_try_claims(&server->catalogue); /* frames and queues may have freed some room */
 	if (server->is_draining)
 		go_on_draining(server);
 	conns_end_batch(&server->conns);
-	must_tick = server->conns.first != NULL || server->acceptor.is_resting || server->is_draining;
+	must_tick = server->conns.first != NULL || server->acceptor.is_resting || server->is_draining
+	            || builder_is_running(server->builder);
 	if (must_tick != server->is_ticking) {
 		server->is_ticking = must_tick;
 		loop_set_ticking(&server->loop, must_tick);
@@ -194,10 +206,12 @@ static void destroy(struct server *server)
 	builder_destroy(server->builder);
 	while (server->conns.first != NULL)
 		conn_close(server->conns.first);
-	psr_pool_destroy(server->pool); /* its jobs end before what they use goes */
+	conns_end_batch(&server->conns); /* stops frames under way */
+	psr_pool_destroy(server->pool);  /* waits for them before their data goes */
 	psr_pool_destroy(server->io);
-	conns_end_batch(&server->conns);
+	server->catalogue.io = NULL;
 	opener_destroy(server->opener);
+	residence_destroy(server->residence);
 	frames_destroy(server->frames);
 	codec_destroy(server->codec);
 	catalogue_fini(&server->catalogue);
@@ -205,15 +219,41 @@ static void destroy(struct server *server)
 	free(server);
 }
 
-/* A folder of .psr files alone needs no cache, unless somebody named one. */
+/* A folder of .psr files alone needs no cache, unless an option names one. */
 static int needs_cache(const struct server *server)
 {
-	const struct catalogue *catalogue = &server->catalogue;
-	int n_sources = 0;
+	return catalogue_has_sources(&server->catalogue) || server->options->cache != server->options->cache_default;
+}
 
-	for (size_t i = 0; i < catalogue->n; i++)
-		n_sources += catalogue->entry[i].file.is_source && catalogue->entry[i].file.reason == NULL;
-	return n_sources > 0 || server->options->cache != server->options->cache_default;
+/* ---- the memory of models and queues ---- */
+
+static uint64_t kept_bytes(void *userdata)
+{
+	const struct server *server = userdata;
+
+	return server->catalogue.bytes + server->catalogue.reserved + server->conns.bytes_input;
+}
+
+static uint64_t queued_bytes(void *userdata)
+{
+	const struct server *server = userdata;
+
+	return server->conns.bytes_queued;
+}
+
+static void make_room(uint64_t bytes, void *userdata)
+{
+	struct server *server = userdata;
+
+	catalogue_make_room(&server->catalogue, bytes);
+}
+
+static uint64_t others_held(uint64_t wanted, void *userdata)
+{
+	struct server *server = userdata;
+
+	frames_free_idle(server->frames, wanted);
+	return frames_bytes(server->frames) + server->conns.bytes_queued + server->conns.bytes_input;
 }
 
 static int create_parts(struct server *server)
@@ -222,25 +262,42 @@ static int create_parts(struct server *server)
 	const struct builder_limits limits = {
 		.max_builds = (int)options->max_builds, .threads = (int)options->threads,
 		.memory_bytes = (uint64_t)options->build_memory, .cpu_seconds = (uint64_t)options->build_time,
+		.wall_seconds = (uint64_t)options->build_wall_time, .file_bytes = (uint64_t)options->build_file_size,
 	};
 
 	if (psr_pool_create_for_jobs(&server->pool, (int)options->threads, NULL) != PSR_OK
 	    || psr_pool_create_for_jobs(&server->io, IO_THREADS, NULL) != PSR_OK || codec_create(&server->codec) != PSR_OK
 	    || builder_create(&server->builder, &server->loop, &limits) != PSR_OK)
 		return PSR_ERR_MEMORY;
-	if (frames_create(&server->frames, &(struct frames_parts){
-	        .loop = &server->loop, .pool = server->pool, .codec = server->codec, .max_pixels = options->max_pixels,
-	        .max_queue = (uint64_t)options->max_queue, .on_end = sessions_on_frame_end }) != PSR_OK
-	    || opener_create(&server->opener, &(struct opener_parts){
+	server->catalogue.io = server->io;
+	server->catalogue.others = (struct catalogue_others){ others_held, server };
+	if (opener_create(&server->opener, &(struct opener_parts){
 	        .loop = &server->loop, .io = server->io, .catalogue = &server->catalogue, .builder = server->builder,
-	        .cache = options->cache, .resolution = (uint32_t)options->resolution,
-	        .max_resolution = (uint32_t)options->max_resolution, .user = &sessions_opener_user }) != PSR_OK)
+	        .models = options->models, .cache = options->cache, .max_cache = (uint64_t)options->cache_size,
+	        .resolution = (uint32_t)options->resolution, .max_resolution = (uint32_t)options->max_resolution,
+	        .user = &sessions_opener_user, .on_rebuilt = residence_on_rebuilt }) != PSR_OK
+	    || residence_create(&server->residence, &(struct residence_parts){
+	        .loop = &server->loop, .io = server->io, .catalogue = &server->catalogue, .opener = server->opener,
+	        .cache = options->cache }) != PSR_OK
+	    || frames_create(&server->frames, &(struct frames_parts){
+	        .loop = &server->loop, .pool = server->pool, .io = server->io, .codec = server->codec,
+	        .residence = server->residence, .max_pixels = options->max_pixels,
+	        .max_queue = (uint64_t)options->max_queue, .max_memory = (uint64_t)options->max_memory,
+	        .timeout_ns = (uint64_t)(options->frame_timeout * 1e9),
+	        .memory = { kept_bytes, queued_bytes, make_room, server }, .on_end = sessions_on_frame_end }) != PSR_OK)
 		return PSR_ERR_MEMORY;
 	server->sessions = (struct sessions){
 		.options = options, .conns = &server->conns, .catalogue = &server->catalogue, .opener = server->opener,
-		.frames = server->frames, .pool = server->pool, .start_us = server->loop.now_us,
+		.builder = server->builder, .frames = server->frames, .pool = server->pool, .start_us = server->loop.now_us,
 	};
 	return PSR_OK;
+}
+
+static void trim_job(void *userdata)
+{
+	const struct options *options = userdata;
+
+	cache_trim(options->cache, (uint64_t)options->cache_size, NULL, 0);
 }
 
 static int start_parts(struct server *server, struct psr_error *err)
@@ -252,18 +309,28 @@ static int start_parts(struct server *server, struct psr_error *err)
 	if (code != PSR_OK)
 		return code;
 	catalogue_init(&server->catalogue, (uint64_t)options->max_memory);
-	if (catalogue_adopt(&server->catalogue, listing) != PSR_OK || create_parts(server) != PSR_OK)
+	catalogue_adopt(&server->catalogue, listing);
+	if (create_parts(server) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory, or no threads, to start with --threads %" PRId64,
 		                options->threads);
-	return needs_cache(server) ? cache_check(options->cache, err) : PSR_OK;
+	if (!needs_cache(server))
+		return PSR_OK;
+	const struct pool_job trim = { .fn = trim_job, .userdata = server->options };
+
+	code = cache_check(options->cache, err);
+	if (code == PSR_OK && psr_pool_submit(server->io, &trim) != PSR_OK)
+		log_warn("no memory to look at the size of the cache");
+	return code;
 }
 
-/* From here on connections can come, and wait in the listeners' backlog until the loop runs. */
+/* From here on connections can arrive; they wait in the listeners' backlog until the loop runs. */
 static int open_doors(struct server *server, struct psr_error *err)
 {
 	const struct options *options = server->options;
 	const struct conn_limits limits = {
 		.max_clients = (unsigned)options->max_clients, .max_queue = (uint64_t)options->max_queue,
+		.max_pending = (unsigned)options->max_pending,
+		.max_pending_per_origin = (unsigned)options->max_pending_per_address,
 		.handshake_us = to_us(options->handshake_timeout), .idle_us = to_us(options->idle_timeout),
 		.slow_us = to_us(options->slow_timeout),
 	};
@@ -289,7 +356,7 @@ int server_start(struct server **out, struct options *options, struct psr_error 
 	sigaddset(&signals, SIGINT);
 	sigaddset(&signals, SIGHUP);
 	sigaddset(&signals, SIGCHLD);
-	options->max_clients = accept_raise_descriptors(options->max_clients);
+	accept_raise_descriptors(&options->max_clients, &options->max_pending);
 	code = loop_init(&server->loop, &signals, err);
 	server->loop.on_signal = on_signal;
 	server->loop.on_tick = on_tick;
@@ -317,8 +384,8 @@ int server_run(struct server *server, struct psr_error *err)
 	log_info("serving %zu models with %d threads and %s", server->catalogue.n, psr_pool_threads(server->pool),
 	         psr_isa_name(psr_isa_get()));
 	code = loop_run(&server->loop, err);
-	if (frames_running(server->frames) > 0 || opener_is_working(server->opener) || server->is_scanning) {
-		/* The drain time is over: jobs that still draw or read cannot be stopped, and nobody waits for them. */
+	if (frames_running(server->frames) > 0 || is_reading(server) || server->is_scanning) {
+		/* The drain time is over. Jobs that still draw or read cannot be stopped, and psrd does not wait for them. */
 		log_info("ended in the middle of %u frames", frames_running(server->frames));
 		builder_destroy(server->builder);
 		accept_close(&server->acceptor);

@@ -6,10 +6,10 @@
 
 struct server;
 
-/* Opens the listeners, reads the models folder, starts the threads. On failure everything is closed again. */
+/* Opens the listeners, reads the models folder, starts the threads. After a failure everything is closed again. */
 int server_start(struct server **out, struct options *options, struct psr_error *err);
 
-/* Prints READY lines and serves until a signal ends it. The server is gone afterwards. */
+/* Prints READY lines and serves until a signal ends it; frees the server. */
 int server_run(struct server *server, struct psr_error *err);
 
 #endif

@@ -3,287 +3,241 @@
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
-#include <turbojpeg.h>
-#include <xxhash.h>
-#include <zstd.h>
-#include "base/mem.h"
+#include "base/hash.h"
 #include "codec.h"
+#include "codec_rect.h"
+#include "pixels.h"
 
-#define ZSTD_LEVEL 1
-#define RECT_HEAD (PSR_HEADER_SIZE + 24) /* bytes of a RECT message before its data */
-
-struct encoder {
-	struct encoder *next;
-	tjhandle jpeg;
-	ZSTD_CCtx *zstd;
-	uint8_t *scratch;
-	size_t capacity;
-};
-
-struct codec {
-	pthread_mutex_t mutex;
-	struct encoder *idle;
-};
+#define MAX_STRIPS (PSR_WIRE_MAX_SIDE / HASH_STRIP_ROWS) /* in a plane */
+#define ALONE_BYTES 65536 /* as many pixel bytes as a thread codes alone before another one would have woken up */
 
 struct plane {
-	unsigned number, pixel_bytes, codec, quality;
-	const uint8_t *pixels;
-	int n_strips, first_strip;
+	unsigned number, pixel_bytes, codec, quality; /* quality: the wanted one, as in parts */
+	const uint8_t *pixels, *empty; /* empty: one pixel of background */
+	int first_strip;
 };
 
 struct strip {
-	struct outq_chunk *chunk;
-	uint64_t data_bytes;
+	struct outq_chunk *first, **last;
+	uint64_t data_bytes, hash;
 	double depth_min, depth_max; /* min > max: no finite depth */
-	int code;
-};
-
-/* The rows of a plane that a strip codes, and how. */
-struct rows {
-	const struct plane *plane;
-	uint32_t y, n, width;
-	const uint8_t *pixels;
-	unsigned codec;
-	const uint8_t *data; /* coded, in the encoder's scratch or the pixels themselves */
-	size_t bytes;
+	int is_done;
 };
 
 struct job {
 	struct codec *codec;
-	uint32_t id;
-	uint16_t view;
-	uint32_t width, height;
-	const uint8_t *background;
+	const struct codec_answer *answer;
+	uint32_t width, height, strip_rows; /* of the frame */
 	struct plane plane[PSR_N_PLANES];
-	int n_planes;
+	int n_planes, n_strips; /* n_strips: of all planes */
 	struct strip *strip;
-	uint64_t *hash;
+	/* Under the mutex: */
+	pthread_mutex_t mutex;
+	int code, n_emitted, is_emitting;
 };
 
-int codec_create(struct codec **out)
+/* Which rows of a plane a strip codes. */
+struct rows {
+	const struct plane *plane;
+	uint32_t number, y, n; /* in pixels of the frame */
+	const uint8_t *pixels;
+	size_t pitch;
+};
+
+/* The strip as the client will have it: each pixel scale x scale times. */
+static int hash_rows(struct strip *strip, const struct job *job, struct encoder *e, const struct rows *rows)
 {
-	struct codec *codec = calloc(1, sizeof *codec);
+	const uint32_t scale = job->answer->scale;
+	const size_t n = rows->pitch * rows->n * scale * scale;
+	uint8_t *large;
 
-	if (codec == NULL)
-		return PSR_ERR_MEMORY;
-	pthread_mutex_init(&codec->mutex, NULL);
-	*out = codec;
-	return PSR_OK;
-}
-
-static void destroy_encoder(struct encoder *e)
-{
-	if (e->jpeg != NULL)
-		tjDestroy(e->jpeg);
-	ZSTD_freeCCtx(e->zstd);
-	psr_free(e->scratch);
-	free(e);
-}
-
-void codec_destroy(struct codec *codec)
-{
-	if (codec == NULL)
-		return;
-	while (codec->idle != NULL) {
-		struct encoder *e = codec->idle;
-
-		codec->idle = e->next;
-		destroy_encoder(e);
-	}
-	pthread_mutex_destroy(&codec->mutex);
-	free(codec);
-}
-
-static struct encoder *take_encoder(struct codec *codec)
-{
-	struct encoder *e;
-
-	pthread_mutex_lock(&codec->mutex);
-	e = codec->idle;
-	if (e != NULL)
-		codec->idle = e->next;
-	pthread_mutex_unlock(&codec->mutex);
-	if (e != NULL)
-		return e;
-	e = calloc(1, sizeof *e);
-	if (e == NULL)
-		return NULL;
-	e->jpeg = tjInitCompress();
-	e->zstd = ZSTD_createCCtx();
-	if (e->jpeg == NULL || e->zstd == NULL) {
-		destroy_encoder(e);
-		return NULL;
-	}
-	return e;
-}
-
-static void put_encoder(struct codec *codec, struct encoder *e)
-{
-	pthread_mutex_lock(&codec->mutex);
-	e->next = codec->idle;
-	codec->idle = e;
-	pthread_mutex_unlock(&codec->mutex);
-}
-
-static int reserve(struct encoder *e, size_t n)
-{
-	if (e->capacity >= n)
+	if (scale == 1) {
+		strip->hash = hash_strip(rows->pixels, n);
 		return PSR_OK;
-	psr_free(e->scratch);
-	e->capacity = 0;
-	e->scratch = psr_alloc_array(n, 1);
-	if (e->scratch == NULL)
+	}
+	large = encoder_scratch(e, n);
+	if (large == NULL)
 		return PSR_ERR_MEMORY;
-	e->capacity = n;
+	pixels_enlarge(large, rows->pixels, job->width, rows->n, rows->plane->pixel_bytes, scale);
+	strip->hash = hash_strip(large, n);
 	return PSR_OK;
 }
 
-static int is_background(const struct plane *plane, const uint8_t *pixels, size_t n, const uint8_t background[3])
+/* Turns depth into u16 for the codec; at half size takes the nearest of each 2x2 pixels. */
+static int quantise(struct coded_rect *rect, struct encoder *e, const struct psr_msg_frame *request)
 {
-	const uint8_t *empty = plane->number == PSR_PLANE_COLOR ? background : psr_plane_background(plane->number);
+	const uint32_t step = request->depth_format == PSR_WIRE_DEPTH_U16_HALF && rect->scale == 1 ? 2 : 1;
+	const uint32_t width = (rect->width + step - 1) / step, height = (rect->height + step - 1) / step;
+	const struct psr_depth_range range = psr_depth_range_of(request);
+	float *row = (float *)encoder_scratch(e, width * sizeof *row + (size_t)width * height * sizeof(uint16_t));
+	uint16_t *q = (uint16_t *)(row + width);
 
-	/* The strip is background if its first pixel is, and each equals the one before. */
-	return memcmp(pixels, empty, plane->pixel_bytes) == 0
-	       && memcmp(pixels, pixels + plane->pixel_bytes, (n - 1) * plane->pixel_bytes) == 0;
-}
-
-static void find_depth_range(struct strip *strip, const uint8_t *pixels, size_t n)
-{
-	float least = INFINITY, most = -INFINITY;
-
-	for (size_t i = 0; i < n; i++) {
-		float z;
-
-		memcpy(&z, pixels + 4 * i, 4);
-		least = z < least ? z : least;
-		most = z > most && z < INFINITY ? z : most;
-	}
-	strip->depth_min = (double)least;
-	strip->depth_max = (double)most;
-}
-
-/* The RECTs of a coded strip, in one chunk. */
-static int put_rects(struct strip *strip, const struct job *job, const struct rows *rows)
-{
-	const size_t total = rows->bytes;
-	size_t n_pieces = (total + PSR_WIRE_MAX_RECT_DATA - 1) / PSR_WIRE_MAX_RECT_DATA;
-	struct outq_chunk *chunk = outq_chunk_create(total + n_pieces * RECT_HEAD);
-	struct psr_buf buf;
-
-	if (chunk == NULL)
+	if (row == NULL)
 		return PSR_ERR_MEMORY;
-	buf = (struct psr_buf){ .data = chunk->data, .capacity = chunk->capacity };
-	for (size_t offset = 0; offset < total; offset += PSR_WIRE_MAX_RECT_DATA) {
-		size_t bytes = total - offset < PSR_WIRE_MAX_RECT_DATA ? total - offset : PSR_WIRE_MAX_RECT_DATA;
-		const struct psr_msg_rect rect = {
-			.plane = (uint8_t)rows->plane->number, .codec = (uint8_t)rows->codec, .scale = 1,
-			.y = (uint16_t)rows->y, .w = (uint16_t)rows->width, .h = (uint16_t)rows->n, .total = (uint32_t)total,
-			.offset = (uint32_t)offset, .bytes = (uint32_t)bytes, .data = rows->data + offset,
-		};
-		int code = psr_msg_rect_encode(&buf, job->id, job->view, &rect, NULL);
+	for (uint32_t y = 0; y < height; y++) {
+		const float *z = (const float *)(rect->pixels + y * step * rect->pitch);
 
-		if (code != PSR_OK) {
-			outq_chunks_destroy(chunk);
-			return PSR_ERR_INTERNAL;
+		if (step == 2) {
+			const int has_next = 2 * y + 1 < rect->height;
+
+			pixels_nearest(row, z, has_next ? (const float *)((const uint8_t *)z + rect->pitch) : z, rect->width);
+			z = row;
 		}
+		psr_depth_quantise(q + (size_t)y * width, z, width, &range);
 	}
-	chunk->size = buf.size;
-	strip->chunk = chunk;
-	strip->data_bytes = total;
+	rect->pixels = (const uint8_t *)q;
+	rect->pixel_bytes = rect->component_bytes = sizeof *q;
+	rect->pitch = width * sizeof *q;
+	rect->width = width;
+	rect->height = height;
+	rect->scale *= step;
 	return PSR_OK;
 }
 
-static int encode_jpeg(struct encoder *e, struct rows *rows)
+/* Codes a rectangle of the strip, in pixels of the frame; *quality becomes the quality that the client then has. */
+static int code_rect(struct strip *strip, const struct job *job, struct encoder *e, const struct rows *rows,
+                     struct coded_rect *rect, unsigned *quality)
 {
-	const int quality = (int)rows->plane->quality, chroma = quality >= CODEC_CHROMA_QUALITY ? TJSAMP_444 : TJSAMP_420;
-	unsigned long size = tjBufSize((int)rows->width, (int)rows->n, chroma);
-	unsigned char *at;
-
-	if (reserve(e, size) != PSR_OK)
-		return PSR_ERR_MEMORY;
-	at = e->scratch;
-	if (tjCompress2(e->jpeg, rows->pixels, (int)rows->width, 0, (int)rows->n, TJPF_RGB, &at, &size, chroma, quality,
-	                TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
-		return PSR_ERR_INTERNAL;
-	rows->data = e->scratch;
-	rows->bytes = size;
-	return PSR_OK;
-}
-
-static int encode_zstd(struct encoder *e, struct rows *rows)
-{
-	const unsigned pixel = rows->plane->pixel_bytes;
-	const unsigned component = psr_plane_component_bytes(rows->plane->number, PSR_WIRE_DEPTH_F32);
-	const size_t raw = (size_t)rows->width * rows->n * pixel, bound = ZSTD_compressBound(raw);
-
-	if (reserve(e, raw + bound) != PSR_OK)
-		return PSR_ERR_MEMORY;
-	psr_filter_rows(e->scratch, rows->pixels, rows->width, rows->n, pixel / component, component);
-	rows->bytes = ZSTD_compressCCtx(e->zstd, e->scratch + raw, bound, e->scratch, raw, ZSTD_LEVEL);
-	rows->data = e->scratch + raw;
-	return ZSTD_isError(rows->bytes) ? PSR_ERR_INTERNAL : PSR_OK;
-}
-
-static int encode_strip(struct strip *strip, const struct job *job, const struct plane *plane, int number)
-{
-	const uint32_t y = (uint32_t)number * CODEC_STRIP_ROWS;
-	struct rows rows = {
-		.plane = plane, .y = y, .n = job->height - y < CODEC_STRIP_ROWS ? job->height - y : CODEC_STRIP_ROWS,
-		.width = job->width, .pixels = plane->pixels + (size_t)y * job->width * plane->pixel_bytes, .codec = plane->codec,
-	};
-	const size_t n_pixels = (size_t)rows.width * rows.n, raw = n_pixels * plane->pixel_bytes;
-	struct encoder *e;
+	const struct codec_answer *answer = job->answer;
+	const struct plane *plane = rows->plane;
+	const uint32_t scale = answer->scale;
 	int code = PSR_OK;
 
-	if (plane->number == PSR_PLANE_DEPTH)
-		find_depth_range(strip, rows.pixels, n_pixels);
-	if (is_background(plane, rows.pixels, n_pixels, job->background))
-		return PSR_OK;
-	e = take_encoder(job->codec);
-	if (e == NULL)
-		return PSR_ERR_MEMORY;
-	if (rows.codec == PSR_CODEC_JPEG)
-		code = encode_jpeg(e, &rows);
-	else if (rows.codec == PSR_CODEC_ZSTD)
-		code = encode_zstd(e, &rows);
-	if (rows.codec == PSR_CODEC_RAW || rows.bytes >= raw) {
-		rows.codec = PSR_CODEC_RAW;
-		rows.data = rows.pixels;
-		rows.bytes = raw;
-	}
+	rect->id = answer->id;
+	rect->view = answer->view;
+	rect->plane = plane->number;
+	rect->codec = plane->codec;
+	rect->quality = plane->quality;
+	rect->pixels = rows->pixels + (rect->y - rows->y) * rows->pitch + rect->x * plane->pixel_bytes;
+	rect->pitch = rows->pitch;
+	rect->pixel_bytes = plane->pixel_bytes;
+	rect->component_bytes = psr_plane_component_bytes(plane->number, PSR_WIRE_DEPTH_F32);
+	rect->scale = scale;
+	rect->w = rect->width * scale;
+	rect->h = rect->height * scale;
+	rect->x *= scale;
+	rect->y *= scale;
+	if (plane->number == PSR_PLANE_DEPTH && answer->request->depth_format != PSR_WIRE_DEPTH_F32)
+		code = quantise(rect, e, answer->request);
 	if (code == PSR_OK)
-		code = put_rects(strip, job, &rows);
-	put_encoder(job->codec, e);
+		code = encoder_code(strip->last, e, rect);
+	if (code != PSR_OK)
+		return code;
+	strip->last = &(*strip->last)->next;
+	strip->data_bytes += rect->bytes;
+	*quality = plane->codec == PSR_CODEC_JPEG && rect->codec == PSR_CODEC_RAW ? PART_LOSSLESS : plane->quality;
+	return PSR_OK;
+}
+
+static int code_whole(struct strip *strip, const struct job *job, struct encoder *e, const struct rows *rows)
+{
+	struct codec_parts *parts = job->answer->parts;
+	struct coded_rect rect = { .y = rows->y, .width = job->width, .height = rows->n };
+	unsigned quality = PART_LOSSLESS;
+	int code = PSR_OK;
+
+	if (!pixels_are_all(rows->plane->empty, rows->pixels, (size_t)job->width * rows->n, rows->plane->pixel_bytes))
+		code = code_rect(strip, job, e, rows, &rect, &quality);
+	if (code == PSR_OK && parts != NULL) {
+		const struct part_area all = codec_parts_all(parts, rows->number);
+
+		codec_parts_sent(parts, rows->plane->number, rows->number, &all, quality);
+	}
 	return code;
 }
 
-/* Hashes come first: each is one long job, which should not start last. */
+static int code_changes(struct strip *strip, const struct job *job, struct encoder *e, const struct rows *rows)
+{
+	const uint32_t columns = PSR_WIRE_PART_WIDTH / job->answer->scale;
+	const uint32_t n_rows = PSR_WIRE_PART_HEIGHT / job->answer->scale;
+	struct codec_parts *parts = job->answer->parts;
+	struct part_area area[PART_AREAS];
+	const unsigned n = codec_parts_changed(area, parts, job->answer->base, rows->plane->number, rows->number,
+	                                       rows->plane->quality);
+
+	for (unsigned i = 0; i < n; i++) {
+		const uint32_t x0 = area[i].x0 * columns, x1 = area[i].x1 * columns;
+		const uint32_t y0 = area[i].y0 * n_rows, y1 = area[i].y1 * n_rows;
+		struct coded_rect rect = {
+			.x = x0, .y = rows->y + y0, .width = (x1 < job->width ? x1 : job->width) - x0,
+			.height = (y1 < rows->n ? y1 : rows->n) - y0,
+		};
+		unsigned quality;
+		int code = code_rect(strip, job, e, rows, &rect, &quality);
+
+		if (code != PSR_OK)
+			return code;
+		codec_parts_sent(parts, rows->plane->number, rows->number, &area[i], quality);
+	}
+	return PSR_OK;
+}
+
+static int code_strip(struct strip *strip, const struct job *job, const struct rows *rows)
+{
+	const struct codec_answer *answer = job->answer;
+	struct encoder *e = codec_take_encoder(job->codec);
+	int code = PSR_OK;
+
+	if (e == NULL)
+		return PSR_ERR_MEMORY;
+	if (rows->plane->number == PSR_PLANE_DEPTH)
+		pixels_depth_range(&strip->depth_min, &strip->depth_max, (const float *)rows->pixels,
+		                   (size_t)job->width * rows->n);
+	if (!(answer->request->flags & PSR_WIRE_FRAME_NO_HASHES))
+		code = hash_rows(strip, job, e, rows);
+	if (answer->parts != NULL)
+		codec_parts_hash(answer->parts, rows->plane->number, rows->number, rows->pixels, rows->n);
+	if (code == PSR_OK)
+		code = (answer->base != NULL ? code_changes : code_whole)(strip, job, e, rows);
+	codec_put_encoder(job->codec, e);
+	return code;
+}
+
+/* The thread that finds strips ready while no other emits does so until none is ready. */
+static void emit_ready(struct job *job)
+{
+	if (job->is_emitting)
+		return;
+	job->is_emitting = 1;
+	while (job->code == PSR_OK && job->n_emitted < job->n_strips && job->strip[job->n_emitted].is_done) {
+		struct strip *strip = &job->strip[job->n_emitted++];
+		struct outq_chunk *first = strip->first;
+
+		strip->first = NULL;
+		if (first == NULL)
+			continue;
+		pthread_mutex_unlock(&job->mutex);
+		job->answer->emit(first, job->answer->userdata);
+		pthread_mutex_lock(&job->mutex);
+	}
+	job->is_emitting = 0;
+}
+
 static void run(int i, void *userdata)
 {
 	struct job *job = userdata;
 	const struct plane *plane = &job->plane[job->n_planes - 1];
+	struct strip *strip = &job->strip[i];
+	struct rows rows;
+	int code;
 
-	if (i < job->n_planes) {
-		plane = &job->plane[i];
-		job->hash[plane->number] = XXH64(plane->pixels, (size_t)job->width * job->height * plane->pixel_bytes, 0);
-		return;
-	}
-	i -= job->n_planes;
 	while (i < plane->first_strip)
 		plane--;
-	job->strip[i].code = encode_strip(&job->strip[i], job, plane, i - plane->first_strip);
-}
-
-static void add_plane(struct job *job, unsigned number, const void *pixels, unsigned codec, unsigned quality)
-{
-	struct plane *plane = &job->plane[job->n_planes];
-	int n_strips = (int)((job->height + CODEC_STRIP_ROWS - 1) / CODEC_STRIP_ROWS);
-
-	*plane = (struct plane){
-		.number = number, .pixel_bytes = psr_plane_pixel_bytes(number, PSR_WIRE_DEPTH_F32), .codec = codec,
-		.quality = quality, .pixels = pixels, .n_strips = n_strips, .first_strip = job->n_planes * n_strips,
-	};
-	job->n_planes++;
+	rows = (struct rows){ .plane = plane, .number = (uint32_t)(i - plane->first_strip),
+		                  .pitch = (size_t)job->width * plane->pixel_bytes };
+	rows.y = rows.number * job->strip_rows;
+	rows.n = job->height - rows.y < job->strip_rows ? job->height - rows.y : job->strip_rows;
+	rows.pixels = plane->pixels + rows.y * rows.pitch;
+	strip->last = &strip->first;
+	strip->depth_min = INFINITY;
+	strip->depth_max = -INFINITY;
+	code = code_strip(strip, job, &rows);
+	pthread_mutex_lock(&job->mutex);
+	strip->is_done = 1;
+	if (job->code == PSR_OK)
+		job->code = code;
+	emit_ready(job);
+	pthread_mutex_unlock(&job->mutex);
 }
 
 static unsigned codec_of(const struct psr_msg_frame *request, unsigned plane)
@@ -292,64 +246,111 @@ static unsigned codec_of(const struct psr_msg_frame *request, unsigned plane)
 	       : plane == PSR_PLANE_DEPTH ? request->depth_codec : request->data_codec;
 }
 
-static int collect(struct codec_result *out, const struct job *job, int n_strips)
+static unsigned quality_of(const struct psr_msg_frame *request, unsigned plane)
 {
-	struct outq_chunk **last = &out->first;
+	if (plane == PSR_PLANE_COLOR && request->color_codec == PSR_CODEC_JPEG)
+		return request->color_quality;
+	if (plane == PSR_PLANE_DEPTH && request->depth_format != PSR_WIRE_DEPTH_F32)
+		return request->depth_format == PSR_WIRE_DEPTH_U16 ? 2 : 1;
+	return PART_LOSSLESS;
+}
+
+/* Returns how many bytes all pixels have. */
+static uint64_t add_planes(struct job *job, const struct codec_answer *answer, const struct psr_frame *frame)
+{
+	const struct psr_msg_frame *request = answer->request;
+	const int n_strips = (int)((job->height + job->strip_rows - 1) / job->strip_rows);
+	uint64_t bytes = 0;
+
+	for (unsigned number = 0; number < PSR_N_PLANES; number++) {
+		if (!(request->planes >> number & 1))
+			continue;
+		job->plane[job->n_planes++] = (struct plane){
+			.number = number, .pixel_bytes = (unsigned)psr_plane_bytes(number), .codec = codec_of(request, number),
+			.quality = quality_of(request, number), .pixels = psr_frame_plane(frame, number),
+			.empty = number == PSR_PLANE_COLOR ? answer->background : psr_plane_background(number),
+			.first_strip = job->n_strips,
+		};
+		job->n_strips += n_strips;
+		bytes += (uint64_t)job->width * job->height * psr_plane_bytes(number);
+	}
+	return bytes;
+}
+
+static void describe(struct codec_parts *parts, const struct codec_answer *answer)
+{
+	const struct psr_msg_frame *request = answer->request;
+
+	if (parts == NULL)
+		return;
+	assert(parts->width == request->width && parts->height == request->height && parts->planes == request->planes);
+	parts->scale = answer->scale;
+	parts->depth_format = request->depth_format;
+	parts->range = psr_depth_range_of(request);
+}
+
+static uint64_t join_hashes(const struct strip *strip, int n_strips)
+{
+	uint64_t hash[MAX_STRIPS];
+
+	for (int i = 0; i < n_strips; i++)
+		hash[i] = strip[i].hash;
+	return hash_join(hash, (size_t)n_strips);
+}
+
+static void collect(struct codec_result *out, const struct job *job)
+{
+	const int n_strips = job->n_strips / job->n_planes;
 	double least = INFINITY, most = -INFINITY;
-	int code = PSR_OK;
 
-	for (int i = 0; i < n_strips; i++) {
-		struct strip *strip = &job->strip[i];
+	for (int i = 0; i < job->n_strips; i++) {
+		const struct strip *strip = &job->strip[i];
 
-		if (strip->chunk != NULL) {
-			*last = strip->chunk;
-			last = &strip->chunk->next;
-		}
 		out->rect_bytes += strip->data_bytes;
 		least = strip->depth_min < least ? strip->depth_min : least;
 		most = strip->depth_max > most ? strip->depth_max : most;
-		if (code == PSR_OK)
-			code = strip->code;
 	}
 	if (least <= most) {
 		out->depth_min = least;
 		out->depth_max = most;
 	}
-	return code;
+	if (job->answer->request->flags & PSR_WIRE_FRAME_NO_HASHES)
+		return;
+	for (int i = 0; i < job->n_planes; i++)
+		out->hash[job->plane[i].number] = join_hashes(job->strip + job->plane[i].first_strip, n_strips);
 }
 
 int codec_encode(struct codec_result *out, struct codec *codec, struct psr_pool *pool,
                  const struct codec_answer *answer, const struct psr_frame *frame, struct psr_error *err)
 {
-	const struct psr_msg_frame *request = answer->request;
 	struct job job = {
-		.codec = codec, .id = answer->id, .view = answer->view, .width = frame->width, .height = frame->height,
-		.background = answer->background, .hash = out->hash,
+		.codec = codec, .answer = answer, .width = frame->width, .height = frame->height,
+		.strip_rows = HASH_STRIP_ROWS / answer->scale, .mutex = PTHREAD_MUTEX_INITIALIZER,
 	};
-	int n_strips = 0, code;
+	const uint64_t bytes = add_planes(&job, answer, frame);
+	int code;
 
+	assert(job.n_planes > 0 && answer->request->width == frame->width * answer->scale);
+	assert(answer->base == NULL || (answer->parts != NULL && answer->parts != answer->base));
 	memset(out, 0, sizeof *out);
-	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		if (request->planes >> plane & 1)
-			add_plane(&job, plane, psr_frame_plane(frame, plane), codec_of(request, plane), request->color_quality);
-	assert(job.n_planes > 0);
-	for (int i = 0; i < job.n_planes; i++)
-		n_strips += job.plane[i].n_strips;
-	job.strip = calloc((size_t)n_strips, sizeof *job.strip);
+	describe(answer->parts, answer);
+	job.strip = calloc((size_t)job.n_strips, sizeof *job.strip);
 	if (job.strip == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory to encode a frame of %ux%u pixels", frame->width, frame->height);
-	for (int i = 0; i < n_strips; i++) {
-		job.strip[i].depth_min = INFINITY;
-		job.strip[i].depth_max = -INFINITY;
-	}
-	psr_pool_for(pool, job.n_planes + n_strips, run, &job);
-	code = collect(out, &job, n_strips);
+	code = psr_pool_for_until(bytes <= ALONE_BYTES || job.n_strips == 1 ? NULL : pool, answer->cancel, job.n_strips, run,
+	                          &job);
+	if (code == PSR_OK)
+		code = job.code;
+	if (code == PSR_OK)
+		collect(out, &job);
+	for (int i = 0; i < job.n_strips; i++)
+		outq_chunks_destroy(job.strip[i].first);
 	free(job.strip);
-	if (code != PSR_OK) {
-		outq_chunks_destroy(out->first);
-		out->first = NULL;
+	pthread_mutex_destroy(&job.mutex);
+	if (code == PSR_ERR_CANCELLED)
+		return psr_fail(err, code, "given up");
+	if (code != PSR_OK)
 		return psr_fail(err, code, "a frame of %ux%u pixels could not be encoded: %s", frame->width, frame->height,
 		                psr_strerror(code));
-	}
 	return PSR_OK;
 }

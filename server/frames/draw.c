@@ -1,8 +1,10 @@
+#include <assert.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
 #include "draw.h"
+#include "render/need.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -38,11 +40,34 @@ uint64_t draw_worker_bytes(const struct draw_worker *worker)
 }
 
 /* Resolved. */
-static struct psr_msg_settings settings_of(const struct psr_msg_frame *request)
+static struct psr_msg_settings settings_of(const struct psr_msg_frame *request, int is_sharp)
 {
-	const struct psr_msg_settings usual = { .scale = 1, .spacing_px = 1 };
+	struct psr_msg_settings settings = { .scale = 1, .spacing_px = 1 };
 
-	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings : usual;
+	if (request->budget == PSR_WIRE_BUDGET_SETTINGS)
+		settings = request->settings;
+	if (is_sharp) {
+		settings.scale = 1;
+		settings.is_smooth = 1;
+	}
+	return settings;
+}
+
+/* The codecs of a sharp frame lose nothing. */
+static void sharpen(struct psr_msg_frame *request)
+{
+	if (!(request->planes >> PSR_PLANE_COLOR & 1) || request->color_codec == PSR_CODEC_RAW)
+		return;
+	request->color_codec = PSR_CODEC_ZSTD;
+	request->color_quality = 0;
+}
+
+int draw_is_sharp(const struct psr_msg_frame *request)
+{
+	const struct psr_msg_settings settings = settings_of(request, 0);
+	const int is_lossless = request->color_codec == PSR_CODEC_RAW || request->color_codec == PSR_CODEC_ZSTD;
+
+	return settings.scale == 1 && settings.is_smooth && is_lossless;
 }
 
 static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
@@ -72,6 +97,7 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_TOTAL, times->end_ns - times->start_ns, (uint64_t)psr_pool_threads(d->pool));
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
+	add_entry(end, PSR_WIRE_REPORT_CORES, pool_job_used_ns(), 0);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS_DRAWN, 0, report->n_blocks_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS, 0, report->n_blocks);
@@ -86,64 +112,65 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }
 
-static struct outq_chunk *encode_begin(const struct drawing *d, const struct codec_result *coded)
+static int emit_begin(const struct drawing *d, const struct psr_msg_frame *shown, struct psr_error *err)
 {
 	const struct psr_msg_frame *request = &d->request;
 	const struct psr_msg_frame_begin begin = {
-		.pass = (uint16_t)d->pass, .width = request->width, .height = request->height, .planes = request->planes,
-		.color_codec = request->color_codec, .color_quality = request->color_quality,
+		.pass = (uint16_t)d->frame, .refine = (uint16_t)d->refine,
+		.width = request->width, .height = request->height, .planes = request->planes,
+		.color_codec = shown->color_codec, .color_quality = shown->color_quality,
 		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
 		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
-		.settings = settings_of(request),
-		.depth_min = coded->depth_min, .depth_max = coded->depth_max, .camera = request->camera,
+		.base = d->base != NULL ? d->base->id : 0, .base_pass = d->base != NULL ? (uint16_t)d->base->frame : 0,
+		.settings = settings_of(request, d->is_sharp),
+		.depth_min = request->depth_min, .depth_max = request->depth_max, .camera = request->camera,
 	};
 	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
 	struct psr_buf buf;
+	int code;
 
 	if (chunk == NULL)
-		return NULL;
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the answer to a frame");
 	buf = (struct psr_buf){ .data = chunk->data, .capacity = chunk->capacity };
-	if (psr_msg_frame_begin_encode(&buf, d->id, 0, &begin, NULL) != PSR_OK) {
-		outq_chunks_destroy(chunk);
-		return NULL;
-	}
+	code = psr_msg_frame_begin_encode(&buf, d->id, d->view, &begin, err);
 	chunk->size = buf.size;
+	if (code == PSR_OK)
+		d->emit(chunk, d->userdata);
+	else
+		outq_chunks_destroy(chunk);
+	return code;
+}
+
+struct outq_chunk *draw_take_end(struct drawing *d)
+{
+	struct outq_chunk *chunk = d->end_chunk;
+	struct psr_buf buf = { .data = chunk->data, .capacity = chunk->capacity };
+
+	if (psr_msg_frame_end_encode(&buf, d->id, d->view, &d->end, NULL) != PSR_OK)
+		assert(!"a frame's end can be written");
+	chunk->size = buf.size;
+	d->end_chunk = NULL;
 	return chunk;
 }
 
-static struct outq_chunk *encode_end(const struct drawing *d, const struct psr_msg_frame_end *end)
+struct codec_parts *draw_parts(const struct drawing *d)
 {
-	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
-	struct psr_buf buf;
-
-	if (chunk == NULL)
-		return NULL;
-	buf = (struct psr_buf){ .data = chunk->data, .capacity = chunk->capacity };
-	if (psr_msg_frame_end_encode(&buf, d->id, 0, end, NULL) != PSR_OK) {
-		outq_chunks_destroy(chunk);
-		return NULL;
-	}
-	chunk->size = buf.size;
-	return chunk;
+	return codec_parts_create(d->request.width, d->request.height, d->request.planes);
 }
 
-static int join_answer(struct drawing *d, const struct codec_result *coded, const struct psr_msg_frame_end *end,
-                       struct psr_error *err)
+int draw_fits(const struct drawing *d, const struct base *base)
 {
-	struct outq_chunk *first = encode_begin(d, coded), *last = encode_end(d, end), *at = first;
+	return codec_parts_fit(base->parts, &d->request, settings_of(&d->request, d->is_sharp).scale);
+}
 
-	if (first == NULL || last == NULL) {
-		outq_chunks_destroy(first);
-		outq_chunks_destroy(last);
-		outq_chunks_destroy(coded->first);
-		return psr_fail(err, PSR_ERR_INTERNAL, "the answer to a frame could not be written");
-	}
-	first->next = coded->first;
-	while (at->next != NULL)
-		at = at->next;
-	at->next = last;
-	d->answer = first;
-	return PSR_OK;
+static uint64_t planes_bytes(uint32_t planes, uint64_t n_pixels, unsigned depth_format)
+{
+	uint64_t bytes = 0;
+
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
+		if (planes >> plane & 1)
+			bytes += n_pixels * psr_plane_pixel_bytes(plane, depth_format);
+	return bytes;
 }
 
 /* The room for a plane from *next on, if it is wanted. */
@@ -161,23 +188,19 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
                           struct psr_error *err)
 {
 	const uint32_t wanted = d->request.planes;
-	uint64_t n = (uint64_t)d->request.width * d->request.height, bytes = 0;
+	const uint64_t n = (uint64_t)picture->width * picture->height;
+	const uint64_t bytes = planes_bytes(wanted, n, PSR_WIRE_DEPTH_F32);
 	uint8_t *next;
 
-	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		if (wanted >> plane & 1)
-			bytes += n * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32);
 	if (bytes > worker->capacity) {
 		psr_free(worker->pixels);
 		worker->capacity = 0;
 		worker->pixels = psr_alloc_array(bytes, 1);
 		if (worker->pixels == NULL)
-			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %ux%u pixels", d->request.width,
-			                d->request.height);
+			return psr_fail(err, PSR_ERR_MEMORY, "no memory for a frame of %ux%u pixels", picture->width,
+			                picture->height);
 		worker->capacity = bytes;
 	}
-	picture->width = d->request.width;
-	picture->height = d->request.height;
 	next = worker->pixels; /* those of the longest components first, so that each is aligned */
 	picture->words = take_plane(&next, picture, wanted, PSR_PLANE_WORDS);
 	picture->depth = take_plane(&next, picture, wanted, PSR_PLANE_DEPTH);
@@ -189,54 +212,112 @@ static int reserve_pixels(struct draw_worker *worker, const struct drawing *d, s
 	return PSR_OK;
 }
 
-static int is_abandoned(void *userdata)
+static int is_over(const struct drawing *d)
+{
+	return d->refine == 0 && atomic_load_explicit(&d->used_ns, memory_order_relaxed) > d->limit_ns;
+}
+
+static int is_cancelled(void *userdata)
 {
 	struct drawing *d = userdata;
 
-	return atomic_load(&d->is_abandoned);
+	atomic_store_explicit(&d->used_ns, pool_job_used_ns(), memory_order_relaxed);
+	return atomic_load_explicit(&d->is_stopped, memory_order_relaxed) || is_over(d);
 }
 
-static int draw_pass(struct drawing *d, struct draw_worker *worker, const struct psr_scene *scene,
-                     struct psr_frame *picture, struct psr_error *err)
+static int is_cancelled_or_yields(void *userdata)
 {
-	const struct psr_msg_settings asked = settings_of(&d->request);
-	struct psr_settings settings;
+	struct drawing *d = userdata;
 
-	psr_settings_default(&settings, d->request.width, d->request.height);
+	return is_cancelled(d) || atomic_load_explicit(&d->must_yield, memory_order_relaxed);
+}
+
+static int draw_picture(struct drawing *d, struct draw_worker *worker, struct psr_frame *picture, struct psr_error *err)
+{
+	const struct psr_msg_settings asked = settings_of(&d->request, d->is_sharp);
+	struct psr_scene scene = d->scene->scene;
+	struct psr_settings settings;
+	int code;
+
+	scene.camera = d->request.camera;
+	psr_settings_default(&settings, picture->width, picture->height);
 	settings.spacing_px = asked.spacing_px;
 	settings.is_smooth = asked.is_smooth;
-	settings.pass = d->pass;
-	settings.is_cancelled = is_abandoned;
-	settings.userdata = d;
-	return psr_render(worker->renderer, scene, &settings, d->pool, picture, err);
+	settings.pass = d->refine;
+	settings.cancel = (struct psr_cancel){ is_cancelled_or_yields, d };
+	code = psr_render(worker->renderer, &scene, &settings, d->pool, picture, err);
+	if (code == PSR_ERR_CANCELLED && atomic_load(&d->must_yield) && !atomic_load(&d->is_stopped))
+		return psr_fail(err, PSR_ERR_BUSY, "the frame gave way to another one");
+	return code;
+}
+
+static int draw_and_encode(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
+{
+	struct psr_msg_frame shown = d->request;
+	struct psr_frame picture = { 0 };
+	const struct psr_cancel cancel = { is_cancelled, d };
+	struct codec_answer answer = {
+		.id = d->id, .view = d->view, .request = &shown, .scale = settings_of(&d->request, d->is_sharp).scale,
+		.background = d->scene->background, .base = d->base != NULL ? d->base->parts : NULL, .parts = d->parts,
+		.emit = d->emit, .userdata = d->userdata, .cancel = &cancel,
+	};
+	struct codec_result coded;
+	struct times times = { .start_ns = clock_ns() };
+	int code;
+
+	if (d->is_sharp)
+		sharpen(&shown);
+	picture.width = d->request.width / answer.scale;
+	picture.height = d->request.height / answer.scale;
+	code = reserve_pixels(worker, d, &picture, err);
+	if (code == PSR_OK)
+		code = draw_picture(d, worker, &picture, err);
+	times.drawn_ns = clock_ns();
+	if (code == PSR_OK)
+		code = emit_begin(d, &shown, err);
+	if (code == PSR_OK)
+		code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
+	if (code != PSR_OK)
+		return code;
+	times.end_ns = clock_ns();
+	d->end_chunk = outq_chunk_create(CONTROL_BYTES);
+	if (d->end_chunk == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the answer to a frame");
+	d->end = (struct psr_msg_frame_end){
+		.pass = (uint16_t)d->frame, .planes = d->request.planes, .error_px = picture.report.error_px,
+		.has_hashes = !(d->request.flags & PSR_WIRE_FRAME_NO_HASHES),
+		.depth_min = coded.depth_min, .depth_max = coded.depth_max,
+	};
+	memcpy(d->end.hash, coded.hash, sizeof d->end.hash);
+	fill_report(&d->end, d, &picture.report, &times, coded.rect_bytes);
+	return PSR_OK;
 }
 
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
 {
-	struct psr_scene scene = d->scene->scene;
-	struct psr_frame picture = { 0 };
-	const struct codec_answer answer = { .id = d->id, .request = &d->request, .background = d->scene->background };
-	struct codec_result coded;
-	struct psr_msg_frame_end end = { .pass = (uint16_t)d->pass, .is_final = d->pass == d->last_pass,
-		                             .planes = d->request.planes };
-	struct times times = { .start_ns = clock_ns() };
-	int code;
+	int code = draw_and_encode(d, worker, err);
 
-	scene.camera = d->request.camera;
-	code = reserve_pixels(worker, d, &picture, err);
-	if (code == PSR_OK)
-		code = draw_pass(d, worker, &scene, &picture, err);
-	if (code != PSR_OK)
-		return code;
-	if (atomic_load(&d->is_abandoned))
-		return psr_fail(err, PSR_ERR_CANCELLED, "given up");
-	times.drawn_ns = clock_ns();
-	code = codec_encode(&coded, d->codec, d->pool, &answer, &picture, err);
-	if (code != PSR_OK)
-		return code;
-	times.end_ns = clock_ns();
-	end.error_px = picture.report.error_px;
-	memcpy(end.hash, coded.hash, sizeof end.hash);
-	fill_report(&end, d, &picture.report, &times, coded.rect_bytes);
-	return join_answer(d, &coded, &end, err);
+	atomic_store_explicit(&d->used_ns, pool_job_used_ns(), memory_order_relaxed);
+	if (code == PSR_ERR_CANCELLED && is_over(d) && !atomic_load(&d->is_stopped))
+		return psr_fail(err, PSR_ERR_LIMIT,
+		                "the frame was stopped after %.3g s on the processor's cores; this server gives a frame %.3g s "
+		                "(--frame-timeout): ask for fewer pixels, lights with shadows or instances, or a wider spacing",
+		                (double)atomic_load(&d->used_ns) * 1e-9, (double)d->limit_ns * 1e-9);
+	return code;
+}
+
+uint64_t draw_answer_bytes(const struct psr_msg_frame *request)
+{
+	return planes_bytes(request->planes, (uint64_t)request->width * request->height, request->depth_format);
+}
+
+uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *scene, int n_threads)
+{
+	const struct renderer_need need = {
+		.width = request->width, .height = request->height, .pass = request->pass_limit, .n_threads = n_threads,
+		.n_shadow_lights = scene_shadow_lights(scene), .has_sheer = scene_has_sheer(scene),
+	};
+
+	return renderer_need(&need) + planes_bytes(request->planes, (uint64_t)request->width * request->height,
+	                                           PSR_WIRE_DEPTH_F32) + draw_answer_bytes(request);
 }

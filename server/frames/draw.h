@@ -1,10 +1,10 @@
-/* One pass of a frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any
- * thread. */
+/* One frame from request to answer: the wire's terms to a scene, drawing, encoding, messages. On any thread. */
 #ifndef PSRD_DRAW_H
 #define PSRD_DRAW_H
 
 #include <stdatomic.h>
 #include <stdint.h>
+#include "bases.h"
 #include "codec.h"
 #include "server/net/outq.h"
 #include "psr/error.h"
@@ -22,16 +22,40 @@ struct drawing {
 	struct psr_pool *pool;
 	struct codec *codec;
 	uint32_t id;
+	uint16_t view;
 	struct psr_msg_frame request; /* checked */
-	unsigned pass, last_pass;
+	unsigned frame, refine;       /* number within the answer; level of refinement */
+	int is_sharp;                 /* scale 1, smooth, lossless, whatever was asked */
+	const struct base *base;      /* what the client holds, and fits; or NULL */
+	struct codec_parts *parts;    /* of this frame; NULL in view 0 */
 	struct scene *scene;
-	uint64_t arrived_ns;          /* clock_ns() when the request came, or the pass before was done */
+	uint64_t arrived_ns;          /* clock_ns() when the request came, or the frame before was done */
 	uint64_t n_waiting;           /* frames that waited then */
-	atomic_int is_abandoned;      /* set by the loop: nobody wants the answer any more */
-	struct outq_chunk *answer;    /* out: FRAME_BEGIN, RECT..., FRAME_END; the caller's */
+	uint64_t limit_ns;            /* time on cores that a frame without refinement may take */
+	atomic_int is_stopped;        /* set by the loop: nobody wants the answer any more */
+	atomic_int must_yield;        /* set by the loop: a refined frame ends with BUSY, if nothing of it is emitted yet */
+	atomic_uint_fast64_t used_ns; /* so far */
+	/* Takes parts of the answer in order, FRAME_BEGIN first, from any thread. */
+	void (*emit)(struct outq_chunk *chunks, void *userdata);
+	void *userdata;
+	struct psr_msg_frame_end end;  /* out: is_final is the caller's */
+	struct outq_chunk *end_chunk; /* room for it */
 };
 
-/* CANCELLED: it was abandoned on the way; errors of the renderer and the encoder. */
+int draw_is_sharp(const struct psr_msg_frame *request); /* what it asks for is sharp by itself */
+
+/* For frame, refine and is_sharp as they are set: parts to be filled in, NULL without memory; whether `base` fits. */
+struct codec_parts *draw_parts(const struct drawing *d);
+int draw_fits(const struct drawing *d, const struct base *base);
+
+/* The most memory that a frame takes while it is drawn, its answer included; and the answer alone. */
+uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *scene, int n_threads);
+uint64_t draw_answer_bytes(const struct psr_msg_frame *request);
+
+/* CANCELLED: it was stopped on the way; BUSY: it gave way; LIMIT: it took too long; errors of the renderer and the
+ * encoder. */
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);
+
+struct outq_chunk *draw_take_end(struct drawing *d); /* FRAME_END, once d->end.is_final is set */
 
 #endif

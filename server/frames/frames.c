@@ -1,50 +1,356 @@
-#include <stdatomic.h>
 #include <stdlib.h>
-#include <string.h>
 #include "base/clock.h"
 #include "check.h"
-#include "draw.h"
-#include "frames.h"
+#include "frame.h"
+#include "workers.h"
 
-#define IDLE_BYTES (UINT64_C(512) << 20) /* memory that idle workers keep, all together */
-
-struct frame {
-	struct frame *next;
-	struct flow *flow;       /* NULL: nobody waits for the answer any more */
-	struct frames *frames;
-	uint64_t reserved;
-	struct loop_note note;
-	/* The job's while it runs: */
-	struct drawing drawing;
-	struct draw_worker *worker;
-	struct psr_error error;
-	int code;
-};
+#define MAX_RUNNING 128           /* frames, each with a thread of its own */
+#define IDLE_PART 4               /* of the memory is the most that idle workers keep */
+#define LOOK_NS UINT64_C(5000000) /* how often frames that wait look who has run long */
 
 struct frames {
 	struct frames_parts parts;
 	struct frames_stats stats;
-	int is_stopped;
-	struct draw_worker **idle;
-	unsigned n_idle;
-	uint64_t idle_bytes;
-	struct flow *first_turn, **last_turn; /* flows with waiting requests */
-	unsigned n_waiting, n_running;
+	struct schedule schedule;
+	struct schedule_user user;
+	struct workers workers;
+	uint64_t n_flows, bases_bytes;
+	int is_pumping, must_pump_again;
 };
+
+static struct frame *frame_of(struct schedule_request *request)
+{
+	return (struct frame *)request;
+}
+
+static void tell_end(struct frame *frame, struct frames_end end)
+{
+	struct frames_stats *stats = &frame->frames->stats;
+	struct flow *flow = frame_flow(frame);
+
+	stats->superseded += end.outcome == FRAMES_SUPERSEDED;
+	stats->cancelled += end.outcome == FRAMES_CANCELLED;
+	stats->failed += end.outcome == FRAMES_FAILED;
+	end.id = frame->drawing.id;
+	end.view = frame->drawing.view;
+	if (end.outcome == FRAMES_CANCELLED)
+		frame_drop_unsent(flow, end.id, end.view, 0);
+	else if (end.outcome == FRAMES_SUPERSEDED)
+		frame_drop_unsent(flow, end.id, end.view, 1); /* a plain frame is sent, or a slow line would show nothing */
+	else if (end.outcome == FRAMES_FAILED)
+		frame_drop_unsent(flow, end.id, end.view, frame->request.frame);
+	frame->frames->parts.on_end(flow, &end);
+}
+
+/* At any time, so nobody else sends it. */
+static void tell_failure(struct frame *frame, int code, const char *text)
+{
+	tell_end(frame, (struct frames_end){ .outcome = FRAMES_FAILED, .code = code, .text = text });
+	conn_flush(frame_flow(frame)->conn);
+}
+
+static void on_done(void *userdata)
+{
+	struct frame *frame = userdata;
+	struct frames *frames = frame->frames;
+	struct conn *conn = frame_flow(frame) != NULL ? frame_flow(frame)->conn : NULL;
+	const uint64_t used_ns = atomic_load(&frame->drawing.used_ns);
+	enum schedule_next next;
+
+	frames->stats.used_ns += used_ns;
+	if (conn == NULL)
+		frame->use.flow = 0;
+	workers_put(&frames->workers, &frame->use, frame->worker);
+	frame_put_models(frame);
+	frame_send_coded(frame);
+	next = (frame->code == PSR_OK ? schedule_done : frame->code == PSR_ERR_BUSY ? schedule_put_back : schedule_fail)(
+		&frames->schedule, &frame->request, used_ns);
+	if (next != SCHEDULE_DROPPED && frame->code == PSR_OK) {
+		if (conn->state == CONN_OPEN)
+			frame_send_end(frame, next == SCHEDULE_FINAL);
+		frames->stats.drawn++;
+		frames->stats.on_base += frame->used != NULL;
+	}
+	frames->stats.late += next == SCHEDULE_FINAL && frame->code == PSR_ERR_LIMIT && used_ns > frame->drawing.limit_ns;
+	if (next == SCHEDULE_FINAL && frame->code == PSR_OK)
+		tell_end(frame, (struct frames_end){ .outcome = FRAMES_FINAL });
+	else if (next == SCHEDULE_FINAL && frame->code == PSR_ERR_BUSY)
+		tell_failure(frame, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
+	else if (next == SCHEDULE_FINAL)
+		tell_failure(frame, frame->code, frame->error.text);
+	if (next == SCHEDULE_MORE)
+		frame->drawing.arrived_ns = clock_ns();
+	else
+		frame_destroy(frame);
+	if (conn != NULL)
+		conn_flush(conn);
+	frames_pump(frames);
+}
+
+/* ---- what the schedule decides ---- */
+
+/* The scene's models are in memory and pinned; or they cannot be. */
+static void on_models(const struct psr_error *error, void *userdata)
+{
+	struct frame *frame = userdata;
+	struct frames *frames = frame->frames;
+
+	frame->is_needing = 0;
+	if (error == NULL) {
+		frame->has_models = 1;
+		schedule_ready(&frame->request);
+	} else {
+		frame->error = *error;
+		schedule_cancel(&frames->schedule, &frame->request, error->code);
+	}
+	frames_pump(frames);
+}
+
+static int on_prepare(struct schedule_request *request, void *userdata)
+{
+	struct frame *frame = frame_of(request);
+	struct scene *scene = frame->drawing.scene;
+
+	(void)userdata;
+	if (frame->has_models)
+		return 1;
+	frame->need = (struct residence_need){ .model = scene->model, .n = scene->n_models, .on_end = on_models,
+		                                   .userdata = frame };
+	frame->is_needing = 1;
+	if (!residence_get(frame->residence, &frame->need))
+		return 0;
+	frame->is_needing = 0;
+	frame->has_models = 1;
+	return 1;
+}
+
+static void on_let_go(struct schedule_request *request, void *userdata)
+{
+	(void)userdata;
+	frame_put_models(frame_of(request));
+}
+
+static void on_begin(struct schedule_request *request, enum pool_class class, void *userdata)
+{
+	struct frames *frames = userdata;
+	struct frame *frame = frame_of(request);
+	struct drawing *d = &frame->drawing;
+	const struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame };
+
+	d->frame = request->frame;
+	d->is_sharp = request->has_sharp && request->frame > 0;
+	d->refine = request->frame - (unsigned)d->is_sharp;
+	d->n_waiting = frames->schedule.n_waiting;
+	atomic_store(&d->used_ns, 0);
+	atomic_store(&d->must_yield, 0);
+	scene_bind(d->scene);
+	if (d->view > 0)
+		frame_set_bases(frame);
+	frame->worker = workers_take(&frames->workers, &frame->use, request->bytes);
+	if (frame->worker != NULL && psr_pool_submit(frames->parts.pool, &job) == PSR_OK)
+		return;
+	if (frame->worker != NULL)
+		workers_put(&frames->workers, &frame->use, frame->worker);
+	schedule_fail(&frames->schedule, request, 0);
+	tell_failure(frame, PSR_ERR_MEMORY, "no memory to draw a frame");
+	frame_destroy(frame);
+}
+
+static void on_stop(struct schedule_request *request, void *userdata)
+{
+	(void)userdata;
+	atomic_store(&frame_of(request)->drawing.is_stopped, 1);
+}
+
+static void on_yield(struct schedule_request *request, void *userdata)
+{
+	(void)userdata;
+	atomic_store(&frame_of(request)->drawing.must_yield, 1);
+}
+
+static void on_end(struct schedule_request *request, int code, uint32_t by, void *userdata)
+{
+	struct frames *frames = userdata;
+	struct frame *frame = frame_of(request);
+	struct psr_error error;
+
+	if (by != 0)
+		tell_end(frame, (struct frames_end){ .outcome = FRAMES_SUPERSEDED, .by = by });
+	else if (!request->is_running && frame->error.code != PSR_OK) /* a job that runs has it for itself */
+		tell_failure(frame, frame->error.code, frame->error.text);
+	else if (code == PSR_ERR_LIMIT)
+		tell_failure(frame, code, frame_never_fits(&error, frame, &frames->schedule));
+	else if (frames->schedule.is_stopped)
+		tell_failure(frame, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
+	else
+		tell_end(frame, (struct frames_end){ .outcome = FRAMES_CANCELLED });
+	if (!request->is_running)
+		frame_destroy(frame);
+}
+
+static void look_at_memory(struct frames *frames)
+{
+	const struct frames_memory *memory = &frames->parts.memory;
+
+	frames->schedule.kept_bytes = memory->kept(memory->userdata) + frames->workers.bytes + frames->bases_bytes;
+	frames->schedule.queued_bytes = memory->queued(memory->userdata);
+}
+
+/* Idle workers first: models take longer to come back. */
+static void on_need(uint64_t bytes, void *userdata)
+{
+	struct frames *frames = userdata;
+	const struct frames_memory *memory = &frames->parts.memory;
+	const uint64_t idle = frames->workers.bytes;
+
+	workers_free(&frames->workers, bytes);
+	if (idle < bytes)
+		memory->make_room(bytes - idle, memory->userdata);
+	look_at_memory(frames);
+}
+
+static void look_at_load(struct frames *frames)
+{
+	struct schedule *schedule = &frames->schedule;
+
+	look_at_memory(frames);
+	for (struct schedule_flow *flow = schedule->first; flow != NULL; flow = flow->next)
+		flow->queued_bytes = ((struct flow *)flow)->conn->out.size;
+	for (struct schedule_request *request = schedule->begun; request != NULL; request = request->next_begun)
+		request->used_ns = atomic_load_explicit(&frame_of(request)->drawing.used_ns, memory_order_relaxed);
+}
+
+static void set_wake(struct frames *frames)
+{
+	const struct schedule *schedule = &frames->schedule;
+	const uint64_t now_ns = clock_ns();
+	uint64_t due_ns = schedule_due(schedule, now_ns);
+
+	if (schedule->n_waiting > 0 && schedule->n_running > 0 && (due_ns == 0 || due_ns > now_ns + LOOK_NS))
+		due_ns = now_ns + LOOK_NS;
+	loop_wake_at(frames->parts.loop, (due_ns + 999) / 1000);
+}
+
+/* What it begins may call it again. */
+void frames_pump(struct frames *frames)
+{
+	frames->must_pump_again = 1;
+	if (frames->is_pumping)
+		return;
+	frames->is_pumping = 1;
+	while (frames->must_pump_again) {
+		frames->must_pump_again = 0;
+		look_at_load(frames);
+		schedule_pump(&frames->schedule, clock_ns());
+	}
+	frames->is_pumping = 0;
+	set_wake(frames);
+}
+
+/* ---- requests ---- */
+
+/* Sharp and refined frames of answers that are drawn to their end, and have not left yet. */
+static void supersede_drawn(struct frames *frames, struct flow *flow, uint32_t by, uint16_t view)
+{
+	const struct schedule_view *v = &flow->schedule.view[view];
+
+	for (unsigned i = v->n_unacknowledged; i-- > 0;) {
+		struct frames_end end = { .outcome = FRAMES_SUPERSEDED, .id = v->unacknowledged[i].id, .view = view, .by = by };
+
+		if (v->unacknowledged[i].frame > 0 && schedule_find(&flow->schedule, end.id) == NULL
+		    && frame_drop_unsent(flow, end.id, view, 1)) {
+			frames->stats.superseded++;
+			frames->parts.on_end(flow, &end);
+			i = v->n_unacknowledged;
+		}
+	}
+}
+
+void frames_ask(struct frames *frames, struct flow *flow, const struct psr_message *message,
+                const struct psr_msg_frame *request, struct scene *scene)
+{
+	struct frame *frame = NULL;
+	struct psr_error error;
+	int code = frame_check(request, message->id, message->view, frames->parts.max_pixels, &error);
+
+	if (code == PSR_OK && scene == NULL)
+		code = psr_fail(&error, PSR_ERR_NOT_FOUND, "slot %u holds no scene: send SCENE first", request->slot);
+	if (code == PSR_OK) {
+		frame = frame_create(&frames->parts, flow, message, request, scene);
+		if (frame == NULL)
+			code = psr_fail(&error, PSR_ERR_MEMORY, "no memory to draw a frame");
+	}
+	if (code != PSR_OK) {
+		const struct frames_end end = { FRAMES_FAILED, message->id, message->view, 0, code, error.text };
+
+		frames->stats.failed++;
+		frames->parts.on_end(flow, &end);
+		return;
+	}
+	frame->frames = frames;
+	frame->done_note = (struct loop_note){ .fn = on_done, .userdata = frame };
+	if (message->view > 0)
+		supersede_drawn(frames, flow, message->id, message->view);
+	schedule_ask(&frames->schedule, &flow->schedule, &frame->request, frame->drawing.arrived_ns);
+	frames_pump(frames);
+}
+
+int frames_cancel(struct frames *frames, struct flow *flow, uint32_t id, uint16_t view)
+{
+	struct schedule_request *request = schedule_find(&flow->schedule, id);
+
+	if (request == NULL)
+		return 0;
+	if (request->view != view)
+		return PSR_ERR_PROTOCOL;
+	schedule_cancel(&frames->schedule, request, PSR_ERR_CANCELLED);
+	frames_pump(frames);
+	return 1;
+}
+
+void frames_acknowledge(struct frames *frames, struct flow *flow, uint16_t view, uint32_t id, unsigned frame)
+{
+	bases_acknowledge(&flow->bases, view, id, frame);
+	if (schedule_acknowledge(&flow->schedule, view, id, frame))
+		frames_pump(frames);
+}
+
+void frames_pause(struct frames *frames, struct flow *flow, uint16_t view, int is_paused)
+{
+	schedule_pause(&flow->schedule, view, is_paused);
+	frames_pump(frames);
+}
+
+int flow_init(struct flow *flow, struct frames *frames, struct conn *conn)
+{
+	*flow = (struct flow){ .conn = conn, .bases.bytes = &frames->bases_bytes, .number = ++frames->n_flows };
+	return pool_flow_create(&flow->share, frames->parts.pool);
+}
+
+void frames_forget(struct frames *frames, struct flow *flow)
+{
+	schedule_forget(&frames->schedule, &flow->schedule);
+	workers_forget(&frames->workers, flow->number);
+	bases_fini(&flow->bases);
+	pool_flow_destroy(flow->share);
+	flow->share = NULL;
+}
+
+/* ---- life ---- */
 
 int frames_create(struct frames **out, const struct frames_parts *parts)
 {
+	const struct schedule_limits limits = { (unsigned)psr_pool_threads(parts->pool), MAX_RUNNING, parts->max_queue,
+		                                    parts->max_memory };
 	struct frames *frames = calloc(1, sizeof *frames);
 
 	if (frames == NULL)
 		return PSR_ERR_MEMORY;
-	frames->idle = calloc((size_t)psr_pool_threads(parts->pool), sizeof *frames->idle);
-	if (frames->idle == NULL) {
-		free(frames);
-		return PSR_ERR_MEMORY;
-	}
 	frames->parts = *parts;
-	frames->last_turn = &frames->first_turn;
+	frames->user = (struct schedule_user){ on_prepare, on_let_go, on_begin, on_stop, on_yield, on_end, on_need,
+	                                        frames };
+	schedule_init(&frames->schedule, &limits, &frames->user);
+	workers_init(&frames->workers, parts->io, parts->max_memory / IDLE_PART);
 	*out = frames;
 	return PSR_OK;
 }
@@ -53,331 +359,38 @@ void frames_destroy(struct frames *frames)
 {
 	if (frames == NULL)
 		return;
-	while (frames->n_idle > 0)
-		draw_worker_destroy(frames->idle[--frames->n_idle]);
-	free(frames->idle);
+	workers_fini(&frames->workers);
 	free(frames);
 }
 
-static struct draw_worker *take_worker(struct frames *frames)
+void frames_stop(struct frames *frames, int code)
 {
-	struct draw_worker *worker;
-
-	if (frames->n_idle == 0)
-		return draw_worker_create();
-	worker = frames->idle[--frames->n_idle];
-	frames->idle_bytes -= draw_worker_bytes(worker);
-	return worker;
-}
-
-/* The array holds a worker for each frame that can run. */
-static void put_worker(struct frames *frames, struct draw_worker *worker)
-{
-	uint64_t bytes;
-
-	if (worker == NULL)
-		return;
-	bytes = draw_worker_bytes(worker);
-	if (frames->idle_bytes + bytes > IDLE_BYTES) {
-		draw_worker_destroy(worker);
-		return;
-	}
-	frames->idle_bytes += bytes;
-	frames->idle[frames->n_idle++] = worker;
-}
-
-static void destroy_frame(struct frame *frame)
-{
-	scene_unref(frame->drawing.scene);
-	outq_chunks_destroy(frame->drawing.answer);
-	free(frame);
-}
-
-static void run(void *userdata)
-{
-	struct frame *frame = userdata;
-
-	if (atomic_load(&frame->drawing.is_abandoned))
-		frame->code = PSR_ERR_CANCELLED;
-	else
-		frame->code = draw_frame(&frame->drawing, frame->worker, &frame->error);
-	loop_post(frame->frames->parts.loop, &frame->note);
-}
-
-static void take_out_running(struct flow *flow, struct frame *frame)
-{
-	struct frame **at = &flow->running;
-
-	while (*at != frame)
-		at = &(*at)->next;
-	*at = frame->next;
-}
-
-static void add_turn(struct frames *frames, struct flow *flow)
-{
-	if (flow->has_turn)
-		return;
-	flow->has_turn = 1;
-	flow->next_turn = NULL;
-	*frames->last_turn = flow;
-	frames->last_turn = &flow->next_turn;
-}
-
-static struct flow *take_turn(struct frames *frames)
-{
-	struct flow *flow = frames->first_turn;
-
-	frames->first_turn = flow->next_turn;
-	if (frames->first_turn == NULL)
-		frames->last_turn = &frames->first_turn;
-	flow->has_turn = 0;
-	return flow;
-}
-
-static void remove_turn(struct frames *frames, struct flow *flow)
-{
-	struct flow **at = &frames->first_turn;
-
-	if (!flow->has_turn)
-		return;
-	while (*at != flow)
-		at = &(*at)->next_turn;
-	*at = flow->next_turn;
-	if (frames->last_turn == &flow->next_turn)
-		frames->last_turn = at;
-	flow->has_turn = 0;
-}
-
-/* Behind the flow's earlier requests. */
-static void add_waiting(struct frames *frames, struct flow *flow, struct frame *frame)
-{
-	frame->drawing.arrived_ns = clock_ns();
-	frame->drawing.n_waiting = frames->n_waiting;
-	frame->next = NULL;
-	*flow->last_waiting = frame;
-	flow->last_waiting = &frame->next;
-	frames->n_waiting++;
-	add_turn(frames, flow);
-}
-
-static struct frame *take_waiting(struct frames *frames, struct flow *flow, struct frame **at)
-{
-	struct frame *frame = *at;
-
-	*at = frame->next;
-	if (flow->last_waiting == &frame->next)
-		flow->last_waiting = at;
-	frames->n_waiting--;
-	if (flow->waiting == NULL)
-		remove_turn(frames, flow);
-	return frame;
-}
-
-/* Sends a pass that is done. 1: the frame waits for its next pass. */
-static int answer(struct frames *frames, struct flow *flow, struct frame *frame)
-{
-	struct drawing *drawing = &frame->drawing;
-
-	frames->stats.drawn++;
-	conn_push(flow->conn, drawing->answer);
-	drawing->answer = NULL;
-	if (drawing->pass == drawing->last_pass) {
-		frames->parts.on_end(flow, drawing->id, 0, PSR_OK, NULL);
-		return 0;
-	}
-	if (frames->is_stopped) {
-		frames->parts.on_end(flow, drawing->id, 0, PSR_ERR_CANCELLED, "the server is shutting down");
-		return 0;
-	}
-	drawing->pass++;
-	add_waiting(frames, flow, frame);
-	return 1;
-}
-
-static void on_done(void *userdata)
-{
-	struct frame *frame = userdata;
-	struct frames *frames = frame->frames;
-	struct flow *flow = frame->flow;
-	int goes_on = 0;
-
-	frames->n_running--;
-	put_worker(frames, frame->worker);
-	if (flow != NULL) {
-		take_out_running(flow, frame);
-		flow->reserved -= frame->reserved;
-		if (frame->code != PSR_OK) {
-			frames->stats.failed++;
-			frames->parts.on_end(flow, frame->drawing.id, 0, frame->code, frame->error.text);
-		} else if (flow->conn->state == CONN_OPEN) {
-			goes_on = answer(frames, flow, frame);
-		}
-		conn_flush(flow->conn);
-	}
-	if (!goes_on)
-		destroy_frame(frame);
-	frames_pump(frames);
-}
-
-static int can_start(const struct frames *frames, const struct flow *flow)
-{
-	uint64_t held = flow->conn->out.size + flow->reserved;
-
-	return held == 0 || held + flow->waiting->reserved <= frames->parts.max_queue;
-}
-
-static void start(struct frames *frames, struct flow *flow)
-{
-	struct frame *frame = take_waiting(frames, flow, &flow->waiting);
-
-	frame->worker = take_worker(frames);
-	if (frame->worker == NULL || psr_pool_submit(frames->parts.pool, run, frame) != PSR_OK) {
-		put_worker(frames, frame->worker);
-		frames->parts.on_end(flow, frame->drawing.id, 0, PSR_ERR_MEMORY, "no memory to draw a frame");
-		destroy_frame(frame);
-		return;
-	}
-	frames->n_running++;
-	frame->next = flow->running;
-	flow->running = frame;
-	flow->reserved += frame->reserved;
-}
-
-/* Ends after a round over the flows without a start: a flow whose reader is slow keeps its turn. */
-void frames_pump(struct frames *frames)
-{
-	struct flow *first_blocked = NULL;
-
-	while (frames->first_turn != NULL && frames->n_running < (unsigned)psr_pool_threads(frames->parts.pool)) {
-		struct flow *flow = frames->first_turn;
-
-		if (flow == first_blocked)
-			return;
-		take_turn(frames);
-		if (can_start(frames, flow)) {
-			start(frames, flow);
-			first_blocked = NULL;
-		} else if (first_blocked == NULL) {
-			first_blocked = flow;
-		}
-		if (flow->waiting != NULL)
-			add_turn(frames, flow);
-	}
-}
-
-void flow_init(struct flow *flow, struct conn *conn)
-{
-	*flow = (struct flow){ .conn = conn, .last_waiting = &flow->waiting };
-}
-
-void frames_ask(struct frames *frames, struct flow *flow, const struct psr_message *message,
-                const struct psr_msg_frame *request, struct scene *scene)
-{
-	uint64_t n = (uint64_t)request->width * request->height;
-	struct frame *frame = NULL;
-	struct psr_error error;
-	int code = frame_check(request, message->view, frames->parts.max_pixels, &error);
-
-	if (code == PSR_OK && scene == NULL)
-		code = psr_fail(&error, PSR_ERR_NOT_FOUND, "slot %u holds no scene: send SCENE first", request->slot);
-	if (code == PSR_OK) {
-		frame = calloc(1, sizeof *frame);
-		if (frame == NULL)
-			code = psr_fail(&error, PSR_ERR_MEMORY, "no memory to draw a frame");
-	}
-	if (code != PSR_OK) {
-		frames->stats.failed++;
-		frames->parts.on_end(flow, message->id, message->view, code, error.text);
-		return;
-	}
-	frame->flow = flow;
-	frame->frames = frames;
-	frame->drawing.pool = frames->parts.pool;
-	frame->drawing.codec = frames->parts.codec;
-	frame->drawing.id = message->id;
-	frame->drawing.request = *request;
-	frame->drawing.scene = scene_ref(scene);
-	frame->drawing.last_pass = request->pass_limit;
-	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		if (request->planes >> plane & 1)
-			frame->reserved += n * psr_plane_pixel_bytes(plane, request->depth_format);
-	frame->note = (struct loop_note){ .fn = on_done, .userdata = frame };
-	add_waiting(frames, flow, frame);
-	frames_pump(frames);
-}
-
-/* A running job sees this at its next check, and on_done() drops it. */
-static void abandon(struct frame *frame)
-{
-	atomic_store(&frame->drawing.is_abandoned, 1);
-	frame->flow = NULL;
-}
-
-static int take_out(struct frames *frames, struct flow *flow, uint32_t id)
-{
-	for (struct frame **at = &flow->waiting; *at != NULL; at = &(*at)->next) {
-		if ((*at)->drawing.id == id) {
-			destroy_frame(take_waiting(frames, flow, at));
-			return 1;
-		}
-	}
-	for (struct frame **at = &flow->running; *at != NULL; at = &(*at)->next) {
-		struct frame *frame = *at;
-
-		if (frame->drawing.id == id) {
-			*at = frame->next;
-			flow->reserved -= frame->reserved;
-			abandon(frame);
-			return 1;
-		}
-	}
-	return 0;
-}
-
-int frames_cancel(struct frames *frames, struct flow *flow, uint32_t id)
-{
-	int was_open = take_out(frames, flow, id);
-
-	frames->stats.cancelled += (uint64_t)was_open;
-	return was_open;
-}
-
-void frames_forget(struct frames *frames, struct flow *flow)
-{
-	while (flow->waiting != NULL)
-		destroy_frame(take_waiting(frames, flow, &flow->waiting));
-	while (flow->running != NULL) {
-		struct frame *frame = flow->running;
-
-		flow->running = frame->next;
-		abandon(frame);
-	}
-	flow->reserved = 0;
-}
-
-void frames_refuse_waiting(struct frames *frames, struct flow *flow, int code, const char *text)
-{
-	while (flow->waiting != NULL) {
-		struct frame *frame = take_waiting(frames, flow, &flow->waiting);
-
-		frames->parts.on_end(flow, frame->drawing.id, 0, code, text);
-		destroy_frame(frame);
-	}
-}
-
-void frames_stop(struct frames *frames)
-{
-	frames->is_stopped = 1;
+	schedule_stop(&frames->schedule, code);
 }
 
 unsigned frames_waiting(const struct frames *frames)
 {
-	return frames->n_waiting;
+	return frames->schedule.n_waiting;
+}
+
+unsigned frames_lacking(const struct frames *frames)
+{
+	return frames->schedule.n_lacking;
 }
 
 unsigned frames_running(const struct frames *frames)
 {
-	return frames->n_running;
+	return frames->schedule.n_running;
+}
+
+uint64_t frames_bytes(const struct frames *frames)
+{
+	return frames->schedule.running_bytes + frames->workers.bytes + frames->bases_bytes;
+}
+
+void frames_free_idle(struct frames *frames, uint64_t bytes)
+{
+	workers_free(&frames->workers, bytes);
 }
 
 struct frames_stats *frames_stats(struct frames *frames)

@@ -19,11 +19,51 @@ void scene_unref(struct scene *scene)
 	assert(scene->n_refs > 0);
 	if (--scene->n_refs > 0)
 		return;
-	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
+	for (uint32_t i = 0; i < scene->n_models; i++)
 		catalogue_unref(scene->catalogue, scene->model[i]);
 	free(scene->instance);
+	free(scene->of_instance);
 	free(scene->model);
 	free(scene);
+}
+
+unsigned scene_shadow_lights(const struct scene *scene)
+{
+	unsigned n = 0;
+
+	for (uint32_t i = 0; i < scene->scene.n_lights; i++)
+		n += scene->light[i].casts_shadow != 0;
+	return n;
+}
+
+int scene_has_sheer(const struct scene *scene)
+{
+	for (uint32_t i = 0; i < scene->n_models; i++)
+		if (scene->model[i]->card.has_sheer)
+			return 1;
+	return 0;
+}
+
+/* While one frame of the scene is drawn, its models stay where they are: another one finds nothing to change. */
+void scene_bind(struct scene *scene)
+{
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++) {
+		const struct psr_model *model = scene->model[scene->of_instance[i]]->model;
+
+		if (scene->instance[i].model != model)
+			scene->instance[i].model = model;
+	}
+}
+
+static uint32_t add_model(struct scene *scene, struct catalogue_model *model)
+{
+	uint32_t i = 0;
+
+	while (i < scene->n_models && scene->model[i] != model)
+		i++;
+	if (i == scene->n_models)
+		scene->model[scene->n_models++] = catalogue_ref(scene->catalogue, model);
+	return i;
 }
 
 static int add_instance(struct scene *scene, const struct handles *handles, const struct psr_msg_instance *msg,
@@ -45,12 +85,11 @@ static int add_instance(struct scene *scene, const struct handles *handles, cons
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];
 	norm = sqrt(norm);
-	instance->model = model->model;
 	for (int k = 0; k < 4; k++)
 		instance->rotation[k] = msg->rotation[k] / norm;
 	memcpy(instance->translation, msg->translation, sizeof instance->translation);
 	instance->scale = msg->scale;
-	scene->model[number] = catalogue_ref(scene->catalogue, model);
+	scene->of_instance[number] = add_model(scene, model);
 	scene->scene.n_instances++;
 	return PSR_OK;
 }
@@ -70,7 +109,8 @@ int scene_create(struct scene **out, const struct handles *handles, const struct
 	scene->catalogue = handles->catalogue;
 	scene->instance = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->instance);
 	scene->model = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->model);
-	if (scene->instance == NULL || scene->model == NULL)
+	scene->of_instance = calloc(msg->n_instances > 0 ? msg->n_instances : 1, sizeof *scene->of_instance);
+	if (scene->instance == NULL || scene->model == NULL || scene->of_instance == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a scene");
 	for (uint32_t i = 0; code == PSR_OK && i < msg->n_instances; i++)
 		code = add_instance(scene, handles, &msg->instance[i], err);

@@ -12,8 +12,10 @@ struct scene {
 	struct catalogue *catalogue;
 	struct psr_scene scene;         /* camera unset */
 	uint8_t background[3];
-	struct psr_instance *instance;
-	struct catalogue_model **model; /* of each instance, a reference */
+	struct psr_instance *instance;  /* models as of scene_bind() */
+	uint32_t *of_instance;          /* index of its model */
+	struct catalogue_model **model; /* each once, a reference */
+	uint32_t n_models;
 	struct psr_light light[PSR_WIRE_MAX_LIGHTS];
 };
 
@@ -21,6 +23,13 @@ struct scene {
  * UNSUPPORTED, MEMORY. */
 int scene_create(struct scene **out, const struct handles *handles, const struct psr_msg_scene *msg,
                  struct psr_error *err);
+
+unsigned scene_shadow_lights(const struct scene *scene); /* that cast shadows */
+int scene_has_sheer(const struct scene *scene);          /* a model has samples that let light through */
+
+/* Gives the instances their models, all of which are in memory and pinned: before a frame is drawn. */
+void scene_bind(struct scene *scene);
+
 struct scene *scene_ref(struct scene *scene);
 void scene_unref(struct scene *scene); /* NULL is fine */
 

@@ -1,6 +1,5 @@
 #define _GNU_SOURCE
 #include <errno.h>
-#include <fcntl.h>
 #include <inttypes.h>
 #include <signal.h>
 #include <stdio.h>
@@ -10,28 +9,27 @@
 #include <unistd.h>
 #include "base/outfile.h"
 #include "builder.h"
+#include "failures.h"
+#include "lines.h"
+#include "outcome.h"
 #include "server/log.h"
 #include "spawn.h"
 
-#define MAX_FAILURES 256
-#define LINE 512
-
-struct failure {
-	char key[CATALOGUE_KEY];
-	uint32_t resolution; /* 0: every one */
-	struct psr_error error;
-};
+#define PROGRESS_AT_ONCE 16
 
 struct build {
 	struct build *next;
 	struct builder *builder;
-	struct builder_job job; /* its strings are copies, the key's is this: */
+	struct builder_job job; /* copies of the job's strings; its key is a copy in */
 	char key[CATALOGUE_KEY];
-	pid_t pid;              /* 0: waits for its turn */
-	struct loop_source progress_source, error_source;
-	char progress_line[LINE], error_line[LINE], last_error[LINE];
-	size_t n_progress, n_error;
+	pid_t pid;              /* 0: not yet started */
+	uint64_t start_us;
+	enum outcome_end end;
+	struct lines progress_lines, error_lines;
+	char last_error[LINES_LENGTH];
 	struct psr_msg_progress progress;
+	int n_progress_left, has_unsent; /* messages that may be passed on before the next tick; whether `progress` was not
+	                                  * passed on */
 };
 
 struct builder {
@@ -39,8 +37,8 @@ struct builder {
 	struct builder_limits limits;
 	struct build *first;    /* in order of arrival, running or not */
 	int n_running;
-	struct failure *failure[MAX_FAILURES]; /* a ring */
-	unsigned n_failures;
+	uint64_t n_done, n_failed;
+	struct failures failures;
 };
 
 int builder_create(struct builder **out, struct loop *loop, const struct builder_limits *limits)
@@ -63,16 +61,6 @@ static void destroy_build(struct build *build)
 	free(build);
 }
 
-static void close_pipe(struct build *build, struct loop_source *source)
-{
-	int fd = source->fd;
-
-	if (fd < 0)
-		return;
-	loop_remove(build->builder->loop, source);
-	close(fd);
-}
-
 static enum psr_progress_stage stage_of(const char *name, enum psr_progress_stage now)
 {
 	static const struct {
@@ -90,8 +78,16 @@ static enum psr_progress_stage stage_of(const char *name, enum psr_progress_stag
 	return now;
 }
 
-static void on_progress_text(struct build *build, const char *line)
+static void send_progress(struct build *build)
 {
+	build->n_progress_left--;
+	build->has_unsent = 0;
+	build->job.on_progress(&build->progress, build->job.userdata);
+}
+
+static void on_progress_line(const char *line, void *userdata)
+{
+	struct build *build = userdata;
 	struct psr_msg_progress next = { 0 };
 	unsigned long long done, total;
 	char name[32];
@@ -105,89 +101,26 @@ static void on_progress_text(struct build *build, const char *line)
 	if (next.stage < build->progress.stage || (next.stage == build->progress.stage && done < build->progress.done))
 		return;
 	build->progress = next;
-	build->job.on_progress(&build->progress, build->job.userdata);
+	build->has_unsent = 1;
+	if (build->n_progress_left > 0)
+		send_progress(build);
 }
 
-static void on_error_text(struct build *build, const char *line)
+static void on_error_line(const char *line, void *userdata)
 {
-	static const char prefix[] = "psr-model: ";
+	static const char *const prefixes[] = { "psr-model: ", "psr-model build: " };
+	struct build *build = userdata;
 
-	if (strncmp(line, prefix, sizeof prefix - 1) == 0)
-		line += sizeof prefix - 1;
+	for (size_t i = 0; i < sizeof prefixes / sizeof prefixes[0]; i++)
+		if (strncmp(line, prefixes[i], strlen(prefixes[i])) == 0)
+			line += strlen(prefixes[i]);
 	if (line[0] != '\0')
 		memcpy(build->last_error, line, strlen(line) + 1);
 }
 
-/* Reads all lines that have come; a line of over LINE bytes loses its end. */
-static void read_lines(struct build *build, struct loop_source *source, char line[LINE], size_t *used,
-                       void (*on_line)(struct build *, const char *))
-{
-	char bytes[4096];
-	ssize_t n;
-
-	while ((n = read(source->fd, bytes, sizeof bytes)) > 0) {
-		for (ssize_t i = 0; i < n; i++) {
-			if (bytes[i] == '\n') {
-				line[*used] = '\0';
-				on_line(build, line);
-				*used = 0;
-			} else if (*used < LINE - 1 && bytes[i] != '\0') {
-				line[(*used)++] = bytes[i];
-			}
-		}
-	}
-	if (n == 0 || errno != EAGAIN)
-		close_pipe(build, source);
-}
-
-static void on_progress_ready(uint32_t events, void *userdata)
-{
-	struct build *build = userdata;
-
-	(void)events;
-	read_lines(build, &build->progress_source, build->progress_line, &build->n_progress, on_progress_text);
-}
-
-static void on_error_ready(uint32_t events, void *userdata)
-{
-	struct build *build = userdata;
-
-	(void)events;
-	read_lines(build, &build->error_source, build->error_line, &build->n_error, on_error_text);
-}
-
-static void watch(struct build *build, struct loop_source *source, int fd, void (*on_ready)(uint32_t, void *))
-{
-	*source = (struct loop_source){ .fd = fd, .on_ready = on_ready, .userdata = build };
-	if (loop_add(build->builder->loop, source, EPOLLIN, NULL) != PSR_OK) {
-		close(fd);
-		source->fd = -1;
-	}
-}
-
-/* A limit may hold at a lower resolution; a defect of the source shows at every one. */
-static void remember(struct builder *builder, const struct build *build, const struct psr_error *error)
-{
-	struct failure **place = &builder->failure[builder->n_failures++ % MAX_FAILURES];
-
-	if (*place == NULL)
-		*place = malloc(sizeof **place);
-	if (*place == NULL)
-		return;
-	memcpy((*place)->key, build->key, CATALOGUE_KEY);
-	(*place)->resolution = error->code == PSR_ERR_LIMIT ? build->job.resolution : 0;
-	(*place)->error = *error;
-}
-
 const struct psr_error *builder_failure(const struct builder *builder, const char *key, uint32_t resolution)
 {
-	for (size_t i = 0; i < MAX_FAILURES && builder->failure[i] != NULL; i++) {
-		const struct failure *failure = builder->failure[i];
-
-		if (strcmp(failure->key, key) == 0 && (failure->resolution == 0 || failure->resolution == resolution))
-			return &failure->error;
-	}
-	return NULL;
+	return failures_find(&builder->failures, key, resolution, builder->loop->now_us);
 }
 
 static void remove_remains(const struct build *build)
@@ -199,7 +132,7 @@ static void remove_remains(const struct build *build)
 
 static void start_waiting(struct builder *builder);
 
-/* failure NULL: built. */
+/* failure NULL: the model is built. */
 static void finish(struct build *build, const struct psr_error *failure)
 {
 	struct builder *builder = build->builder;
@@ -208,8 +141,8 @@ static void finish(struct build *build, const struct psr_error *failure)
 	while (*at != build)
 		at = &(*at)->next;
 	*at = build->next;
-	close_pipe(build, &build->progress_source);
-	close_pipe(build, &build->error_source);
+	builder->n_done += failure == NULL;
+	builder->n_failed += failure != NULL;
 	if (failure != NULL) {
 		log_warn("build of %s failed: %s", build->job.source, failure->text);
 		remove_remains(build);
@@ -230,7 +163,8 @@ static int run(struct build *build, struct psr_error *err)
 		"--quiet", "--threads", threads, NULL,
 	};
 	const struct spawn_limits limits = {
-		.memory_bytes = builder->limits.memory_bytes, .cpu_seconds = builder->limits.cpu_seconds, .nice = 10,
+		.memory_bytes = builder->limits.memory_bytes, .cpu_seconds = builder->limits.cpu_seconds,
+		.file_bytes = builder->limits.file_bytes, .nice = 10,
 	};
 	int progress_fd, error_fd, code;
 
@@ -241,10 +175,12 @@ static int run(struct build *build, struct psr_error *err)
 		return code;
 	builder->n_running++;
 	log_info("build of %s started, at %" PRIu32, build->job.source, build->job.resolution);
-	watch(build, &build->progress_source, progress_fd, on_progress_ready);
-	watch(build, &build->error_source, error_fd, on_error_ready);
+	lines_open(&build->progress_lines, builder->loop, progress_fd, on_progress_line, build);
+	lines_open(&build->error_lines, builder->loop, error_fd, on_error_line, build);
+	build->start_us = builder->loop->now_us;
 	build->progress.stage = PSR_PROGRESS_IMPORT;
-	build->job.on_progress(&build->progress, build->job.userdata);
+	build->n_progress_left = PROGRESS_AT_ONCE;
+	send_progress(build);
 	return PSR_OK;
 }
 
@@ -259,7 +195,7 @@ static void start_waiting(struct builder *builder)
 		next = build->next;
 		if (build->pid == 0 && run(build, &error) != PSR_OK) {
 			finish(build, &error);
-			return; /* finish() went on with the rest */
+			return; /* finish() has gone on with the list */
 		}
 	}
 }
@@ -277,7 +213,6 @@ int builder_start(struct builder *builder, const struct builder_job *job)
 	build->job.target = strdup(job->target);
 	memcpy(build->key, job->key, CATALOGUE_KEY);
 	build->job.key = build->key;
-	build->progress_source.fd = build->error_source.fd = -1;
 	if (build->job.program == NULL || build->job.source == NULL || build->job.target == NULL) {
 		destroy_build(build);
 		return PSR_ERR_MEMORY;
@@ -289,29 +224,43 @@ int builder_start(struct builder *builder, const struct builder_job *job)
 	return PSR_OK;
 }
 
-/* Exit codes are those of psr_exit_status. */
-static int explain(struct psr_error *error, const struct build *build, const struct builder_limits *limits, int status)
+static void fail(struct build *build, int status)
 {
-	const char *name = strrchr(build->job.source, '/') != NULL ? strrchr(build->job.source, '/') + 1 : build->job.source;
+	struct builder *builder = build->builder;
+	const struct outcome outcome = { .source = build->job.source, .target = build->job.target,
+		                             .last_line = build->last_error, .status = status, .end = build->end,
+		                             .limits = &builder->limits };
+	struct psr_error failure;
+	enum outcome_memory memory = outcome_explain(&failure, &outcome);
 
-	if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGKILL))
-		return psr_fail(error, PSR_ERR_LIMIT, "%s: the build was stopped: it needed more than %llu s of processor time "
-		                "(--build-time), or the machine's memory; a lower --max-resolution takes less of both", name,
-		                (unsigned long long)limits->cpu_seconds);
-	if (WIFSIGNALED(status))
-		return psr_fail(error, PSR_ERR_FORMAT, "%s: psr-model crashed on it (signal %d)", name, WTERMSIG(status));
-	psr_fail(error, PSR_ERR_INTERNAL, "%s: %.400s", name,
-	         build->last_error[0] != '\0' ? build->last_error : "psr-model failed without saying why");
-	switch (WEXITSTATUS(status)) {
-	case 3:
-		return error->code = PSR_ERR_IO;
-	case 4:
-		return error->code = PSR_ERR_FORMAT;
-	case 5:
-		return error->code = PSR_ERR_LIMIT;
-	default:
-		return error->code;
-	}
+	if (memory == OUTCOME_FOR_GOOD)
+		failures_add(&builder->failures, build->key, 0, FAILURES_ALWAYS, &failure);
+	else if (memory == OUTCOME_FOR_A_WHILE)
+		failures_add(&builder->failures, build->key, build->job.resolution,
+		             builder->loop->now_us + BUILDER_RETRY_US, &failure);
+	finish(build, &failure);
+}
+
+static void on_ended(struct build *build, int status)
+{
+	struct builder *builder = build->builder;
+	builder->n_running--;
+	lines_finish(&build->progress_lines);
+	lines_finish(&build->error_lines);
+	if (build->has_unsent)
+		send_progress(build);
+	if (WIFEXITED(status) && WEXITSTATUS(status) == 0)
+		finish(build, NULL);
+	else
+		fail(build, status);
+}
+
+/* Kills the group, with all processes that the child has started. While the child is a zombie, no other process gets
+ * its number. */
+static void kill_group(pid_t pid)
+{
+	kill(-pid, SIGKILL);
+	kill(pid, SIGKILL);
 }
 
 void builder_reap(struct builder *builder)
@@ -319,31 +268,71 @@ void builder_reap(struct builder *builder)
 	struct build *build = builder->first;
 
 	while (build != NULL) {
-		struct psr_error failure;
+		siginfo_t info = { .si_pid = 0 };
 		int status;
 
-		if (build->pid == 0 || waitpid(build->pid, &status, WNOHANG) != build->pid) {
+		if (build->pid == 0 || waitid(P_PID, (id_t)build->pid, &info, WEXITED | WNOHANG | WNOWAIT) != 0
+		    || info.si_pid != build->pid) {
 			build = build->next;
 			continue;
 		}
-		builder->n_running--;
-		if (build->progress_source.fd >= 0)
-			on_progress_ready(0, build);
-		if (build->error_source.fd >= 0)
-			on_error_ready(0, build);
-		if (build->n_error > 0) {
-			build->error_line[build->n_error] = '\0';
-			on_error_text(build, build->error_line);
-		}
-		if (WIFEXITED(status) && WEXITSTATUS(status) == 0) {
-			finish(build, NULL);
-		} else {
-			if (explain(&failure, build, &builder->limits, status) != PSR_ERR_IO)
-				remember(builder, build, &failure);
-			finish(build, &failure);
-		}
-		build = builder->first; /* the next one may have ended too */
+		kill_group(build->pid);
+		waitpid(build->pid, &status, 0);
+		on_ended(build, status);
+		build = builder->first; /* starts again at the front: the next build may have ended, too */
 	}
+}
+
+void builder_drop(struct builder *builder, const void *userdata)
+{
+	struct build *build = builder->first;
+
+	while (build != NULL && build->job.userdata != userdata)
+		build = build->next;
+	if (build == NULL || build->end != OUTCOME_BY_ITSELF)
+		return;
+	build->end = OUTCOME_UNWANTED;
+	if (build->pid != 0)
+		kill_group(build->pid);
+	else
+		fail(build, SIGKILL);
+}
+
+void builder_tick(struct builder *builder)
+{
+	const uint64_t now_us = builder->loop->now_us, wall_us = builder->limits.wall_seconds * 1000000;
+
+	for (struct build *build = builder->first; build != NULL; build = build->next) {
+		if (build->pid == 0)
+			continue;
+		if (build->n_progress_left < PROGRESS_AT_ONCE)
+			build->n_progress_left++;
+		if (build->has_unsent)
+			send_progress(build);
+		lines_tick(&build->progress_lines);
+		lines_tick(&build->error_lines);
+		if (build->end == OUTCOME_BY_ITSELF && now_us - build->start_us > wall_us) {
+			build->end = OUTCOME_WALL;
+			kill_group(build->pid);
+		}
+	}
+}
+
+int builder_is_running(const struct builder *builder)
+{
+	return builder != NULL && builder->n_running > 0;
+}
+
+struct builder_stats builder_stats(const struct builder *builder)
+{
+	struct builder_stats stats = { 0 };
+
+	if (builder == NULL)
+		return stats;
+	stats = (struct builder_stats){ .n_done = builder->n_done, .n_failed = builder->n_failed };
+	for (const struct build *build = builder->first; build != NULL; build = build->next)
+		*(build->pid != 0 ? &stats.n_running : &stats.n_waiting) += 1;
+	return stats;
 }
 
 void builder_destroy(struct builder *builder)
@@ -354,18 +343,16 @@ void builder_destroy(struct builder *builder)
 		struct build *build = builder->first;
 
 		builder->first = build->next;
-		close_pipe(build, &build->progress_source);
-		close_pipe(build, &build->error_source);
 		if (build->pid != 0) {
-			kill(-build->pid, SIGKILL);
-			kill(build->pid, SIGKILL);
+			lines_close(&build->progress_lines);
+			lines_close(&build->error_lines);
+			kill_group(build->pid);
 			while (waitpid(build->pid, NULL, 0) < 0 && errno == EINTR)
 				;
 			remove_remains(build);
 		}
 		destroy_build(build);
 	}
-	for (size_t i = 0; i < MAX_FAILURES; i++)
-		free(builder->failure[i]);
+	failures_fini(&builder->failures);
 	free(builder);
 }

@@ -14,14 +14,14 @@
 
 /* In order of preference. */
 static const char *const endings[] = {
-	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "ply", "stl", "x",
+	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "pcd", "ply", "stl", "x",
 };
 #define N_ENDINGS (sizeof endings / sizeof endings[0])
 
 struct list {
 	struct catalogue_file *file;
 	size_t n, capacity;
-	size_t n_root; /* length of the models folder's part of a path */
+	size_t n_root; /* length of the models folder's part of paths */
 };
 
 void catalogue_file_fini(struct catalogue_file *file)
@@ -71,7 +71,7 @@ static void clear(struct list *list)
 	*list = (struct list){ .n_root = list->n_root };
 }
 
-/* Takes the file, even on MEMORY. */
+/* Takes the file, even if it returns MEMORY. */
 static int add(struct list *list, struct catalogue_file *file)
 {
 	if (list->n == list->capacity) {
@@ -89,7 +89,7 @@ static int add(struct list *list, struct catalogue_file *file)
 	return PSR_OK;
 }
 
-/* The first n bytes of a text as a clean name. */
+/* Makes a clean name of the first n bytes of a text. */
 static void set_name(char name[PSR_WIRE_MAX_NAME + 1], const char *text, size_t n)
 {
 	n = n < PSR_WIRE_MAX_NAME ? n : PSR_WIRE_MAX_NAME;
@@ -100,7 +100,8 @@ static void set_name(char name[PSR_WIRE_MAX_NAME + 1], const char *text, size_t 
 			name[i] = '?';
 }
 
-/* Gives a file the reason "PATH: text", PATH within the models folder, and PATH for its name if it has none. */
+/* Gives a file the reason "PATH: text", with PATH within the models folder; a file without a name gets PATH as its
+ * name. */
 static int set_reason(const struct list *list, struct catalogue_file *file, const char *text)
 {
 	const char *relative = file->path + list->n_root;
@@ -119,7 +120,7 @@ static int is_candidate(const char *file_name)
 	return find_ending(file_name) < N_ENDINGS || formats_advice(file_name, &stem) != NULL;
 }
 
-/* Adds a regular file. 0 or MEMORY; takes path. */
+/* Adds a regular file. Returns 0 or MEMORY; takes path. */
 static int consider(struct list *list, const char *file_name, char *path, const struct stat *status, int is_nested)
 {
 	size_t ending = find_ending(file_name), stem = 0;
@@ -154,7 +155,7 @@ static int consider(struct list *list, const char *file_name, char *path, const 
 
 static int read_folder(struct list *list, const char *folder, int is_nested, struct psr_error *err);
 
-/* Adds a subfolder of several models, `first` and `other` among them, as one entry. 0 or MEMORY. */
+/* Adds a subfolder that holds several models, `first` and `other` among them, as one entry. Returns 0 or MEMORY. */
 static int add_folder(struct list *list, const char *path, const char *first, const char *other)
 {
 	struct catalogue_file file = { .path = strdup(path), .is_nested = 1 };
@@ -170,8 +171,8 @@ static int add_folder(struct list *list, const char *path, const char *first, co
 	return add(list, &file);
 }
 
-/* Of a subfolder's files those count that can be read, or all if none can. They are one model, or the folder is passed
- * over, with a reason. */
+/* Counts those files of a subfolder that psr can read, or all files if it can read none. If they are not one model,
+ * skips the folder with a reason. */
 static int take_subfolder(struct list *list, const char *path, struct list *inner)
 {
 	size_t n_read = 0, n;
@@ -225,7 +226,7 @@ static int read_one(struct list *list, const char *folder, const char *file_name
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the models folder");
 	if (stat(path, &status) != 0) {
 		free(path);
-		return PSR_OK; /* removed meanwhile, or a dangling link */
+		return PSR_OK; /* it has been removed, or is a dangling link */
 	}
 	if (S_ISREG(status.st_mode) && is_candidate(file_name)) {
 		if (list->n >= CATALOGUE_MAX_FILES) {
@@ -260,7 +261,7 @@ static int read_folder(struct list *list, const char *folder, int is_nested, str
 	return code;
 }
 
-/* By name, and within a name the preferred file first. */
+/* Sorts by name, and within a name puts the preferred file first. */
 static int compare(const void *a, const void *b)
 {
 	const struct catalogue_file *x = a, *y = b;
@@ -278,8 +279,8 @@ static int compare(const void *a, const void *b)
 	return order != 0 ? order : strcmp(x->path, y->path);
 }
 
-/* Two files of one kind that claim one name: the later one stays, under its path, with a reason. The source of a .psr
- * and what was converted go without. */
+/* Of two files of one kind with one name the later one stays under its path, with a reason. The source of a .psr, and
+ * files that were converted, are left out. */
 static int is_clash(const struct catalogue_file *taken, const struct catalogue_file *file)
 {
 	return file->reason == NULL && taken->is_source == file->is_source;
@@ -295,7 +296,7 @@ static int rename_clash(const struct list *list, const struct catalogue_file *ta
 	return set_reason(list, file, text);
 }
 
-/* One file a name, sorted. */
+/* Keeps one file for each name, sorted. */
 static int settle(struct list *list)
 {
 	size_t n = 0, taken = 0, n_clashes = 0;
@@ -323,7 +324,27 @@ static int settle(struct list *list)
 		n++;
 	}
 	list->n = n;
-	return n_clashes > 0 ? settle(list) : PSR_OK; /* settles at once: entries with a reason never clash */
+	return n_clashes > 0 ? settle(list) : PSR_OK; /* settles at once, as entries with a reason never clash */
+}
+
+/* Takes the files. Returns NULL without memory. */
+static struct catalogue_listing *create_listing(struct list *list)
+{
+	struct catalogue_listing *listing = malloc(sizeof *listing);
+	struct catalogue_entry *entry = calloc(list->n > 0 ? list->n : 1, sizeof *entry);
+
+	if (listing == NULL || entry == NULL) {
+		free(listing);
+		free(entry);
+		return NULL;
+	}
+	for (size_t i = 0; i < list->n; i++) {
+		entry[i].file = list->file[i];
+		entry[i].has_failed = entry[i].file.is_broken || entry[i].file.reason != NULL;
+	}
+	*listing = (struct catalogue_listing){ .entry = entry, .n = list->n };
+	list->n = 0;
+	return listing;
 }
 
 int catalogue_scan(struct catalogue_listing **out, const char *folder, struct psr_error *err)
@@ -338,12 +359,10 @@ int catalogue_scan(struct catalogue_listing **out, const char *folder, struct ps
 		clear(&list);
 		return code;
 	}
-	listing = malloc(sizeof *listing);
-	if (listing == NULL) {
-		clear(&list);
+	listing = create_listing(&list);
+	clear(&list);
+	if (listing == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for the models folder");
-	}
-	*listing = (struct catalogue_listing){ .file = list.file, .n = list.n };
 	*out = listing;
 	return PSR_OK;
 }
@@ -353,7 +372,7 @@ void catalogue_listing_destroy(struct catalogue_listing *listing)
 	if (listing == NULL)
 		return;
 	for (size_t i = 0; i < listing->n; i++)
-		catalogue_file_fini(&listing->file[i]);
-	free(listing->file);
+		catalogue_file_fini(&listing->entry[i].file);
+	free(listing->entry);
 	free(listing);
 }

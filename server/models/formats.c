@@ -3,7 +3,7 @@
 #include "formats.h"
 
 static const struct {
-	const char *endings; /* with a blank after each */
+	const char *endings; /* each followed by a blank */
 	const char *advice;
 } formats[] = {
 	{ ".copc.laz .laz ",
@@ -11,7 +11,7 @@ static const struct {
 	  "\"pdal translate IN.laz OUT.las\"" },
 	{ ".e57 ",
 	  "psr reads no E57 scans; convert it with \"pdal translate IN.e57 OUT.las\", or save it as LAS or PLY in CloudCompare" },
-	{ ".pcd .pts .ptx .xyz .asc ",
+	{ ".pts .ptx .xyz .asc ",
 	  "psr reads no points in this format; save it as LAS or PLY in CloudCompare, or with \"pdal translate\"" },
 	{ ".rcp .rcs .fls .fws .lsproj .zfs ",
 	  "psr reads no project of a scanner's own program; export it from there as LAS, or as PLY" },
@@ -37,7 +37,7 @@ static const struct {
 
 const char *formats_advice(const char *file_name, size_t *stem)
 {
-	/* From the first dot on: .tar.gz comes before .gz. */
+	/* Looks from the first dot on: .tar.gz comes before .gz. */
 	for (const char *dot = strchr(file_name, '.'); dot != NULL; dot = strchr(dot + 1, '.')) {
 		*stem = (size_t)(dot - file_name);
 		for (size_t i = 0; *stem > 0 && i < sizeof formats / sizeof formats[0]; i++)

@@ -6,6 +6,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
@@ -21,8 +22,12 @@ void opening_load(void *userdata)
 	struct opening *o = userdata;
 
 	o->code = PSR_OK;
-	if (o->was_built && rename(o->temporary, o->cached) != 0 && !(errno == ENOENT && access(o->cached, R_OK) == 0))
+	if (o->was_built && rename(o->temporary, o->cached) != 0)
 		o->code = psr_fail(&o->error, PSR_ERR_IO, "%s: %s", o->cached, strerror(errno));
+	else if (o->was_built)
+		cache_trim(o->cache, o->max_cache, (const char(*)[CATALOGUE_KEY])o->in_use, o->n_in_use);
+	else if (o->file.is_source)
+		cache_touch(o->cached);
 	if (o->code == PSR_OK)
 		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
 	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
@@ -61,7 +66,6 @@ static int find_program(char path[PATH_MAX], struct psr_error *err)
 static int prepare_source(struct opening *o)
 {
 	const char *cache = o->cache;
-	struct stat status;
 	int code = find_program(o->program, &o->error);
 
 	if (code == PSR_OK)
@@ -70,15 +74,15 @@ static int prepare_source(struct opening *o)
 		code = cache_make(cache, &o->error);
 	if (code != PSR_OK)
 		return code;
-	if (asprintf(&o->cached, "%s/%s-%" PRIu32 ".psr", cache, o->key, o->resolution) < 0)
-		o->cached = NULL;
-	if (asprintf(&o->temporary, "%s/%s-%" PRIu32 ".psr.tmp", cache, o->key, o->resolution) < 0)
+	free(o->cached);
+	free(o->temporary);
+	o->cached = cache_path(cache, o->key, o->resolution);
+	/* Unlike names of other openings, and of other daemons that share the folder. */
+	if (asprintf(&o->temporary, "%s/.built-%ld-%" PRIx64 ".tmp", cache, (long)getpid(), clock_ns()) < 0)
 		o->temporary = NULL;
 	if (o->cached == NULL || o->temporary == NULL)
 		return psr_fail(&o->error, PSR_ERR_MEMORY, "no memory");
-	o->is_cached = stat(o->cached, &status) == 0;
-	if (o->is_cached)
-		o->bytes = (uint64_t)status.st_size;
+	o->is_cached = cache_find(&o->bytes, o->cached);
 	return PSR_OK;
 }
 
@@ -93,7 +97,7 @@ void opening_prepare(void *userdata)
 		o->code = prepare_source(o);
 	else if (psr_model_need(&need, o->file.path, NULL) == PSR_OK)
 		o->bytes = need;
-	else if (stat(o->file.path, &status) == 0) /* loading it says what is wrong */
+	else if (stat(o->file.path, &status) == 0) /* loading it will say what is wrong */
 		o->bytes = (uint64_t)status.st_size;
 	else
 		o->code = psr_fail(&o->error, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s", strerror(errno));

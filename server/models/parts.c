@@ -9,7 +9,7 @@
 #include "parts.h"
 
 #define MAX_JSON (64u << 20) /* a longer glTF text holds its buffers itself */
-#define MAX_HEAD (64u << 10) /* of a PLY or OBJ: they name files at their beginning */
+#define MAX_HEAD (64u << 10) /* read of a PLY or OBJ, which name files at their beginning */
 #define MAX_MTL (1u << 20)
 #define MAX_SEEN 4096
 
@@ -23,7 +23,7 @@ struct search {
 	uint32_t n_seen;
 };
 
-/* Up to n bytes from `offset` on, NUL-terminated; NULL on failure. */
+/* Reads up to n bytes from `offset` on, and adds a NUL; NULL on failure. */
 static char *read_text(const char *path, uint64_t offset, size_t n, size_t *n_read)
 {
 	FILE *file = fopen(path, "rbe");
@@ -45,7 +45,7 @@ static char *read_text(const char *path, uint64_t offset, size_t n, size_t *n_re
 	return text;
 }
 
-/* Whether the file exists; adds its size the first time. */
+/* Returns whether the file exists; adds its size the first time. */
 static int add_file(struct search *s, const char *name)
 {
 	char path[PATH_MAX];
@@ -90,7 +90,7 @@ static void add_uri(struct search *s, char *uri)
 	add_file(s, uri);
 }
 
-/* Every "uri": "..." but data URIs. */
+/* Finds every "uri": "..." except data URIs. */
 static void search_json(struct search *s, char *text)
 {
 	for (char *at = strstr(text, "\"uri\""), *end; at != NULL; at = strstr(at, "\"uri\"")) {
@@ -140,7 +140,7 @@ static void search_gltf(struct search *s, const char *source, int is_binary)
 	free(text);
 }
 
-/* The trimmed rest of the next line of *text that starts with `word`; NULL: no such line. */
+/* Returns the trimmed rest of the next line of *text that starts with `word`; NULL: there is none. */
 static char *next_line_with(char **text, const char *word)
 {
 	while (**text != '\0') {
@@ -194,7 +194,7 @@ static void search_mtl(struct search *s, const char *name)
 		while (text != NULL && (line = next_line_with(&at, words[i])) != NULL) {
 			for (char *c = line; *c != '\0'; c++)
 				*c = *c == '\\' ? '/' : *c;
-			line += i == 0 ? strcspn(line, " \t") : 0; /* the rest of map_Kd */
+			line += i == 0 ? strcspn(line, " \t") : 0; /* skips the rest of map_Kd */
 			line += strspn(line, " \t");
 			if (!add_file(s, line) && strrchr(line, ' ') != NULL)
 				add_file(s, strrchr(line, ' ') + 1);

@@ -11,13 +11,13 @@
 
 extern char **environ;
 
-struct plan { /* everything that the child reads; made before the child exists */
+struct plan { /* everything that the child reads, made before the child exists */
 	const char *const *argv;
-	struct rlimit memory, cpu;
+	struct rlimit memory, cpu, file, core;
 	int nice, null_fd, error_fd, fd3;
 	pid_t parent;
 	sigset_t none;
-	volatile int failure; /* errno of the child: it shares this memory */
+	volatile int failure; /* the child's errno: it shares this memory */
 };
 
 /* Between vfork and exec the child shares the parent's memory: system calls only, no allocation, no lock. */
@@ -35,7 +35,9 @@ static void become(struct plan *plan)
 	setpriority(PRIO_PROCESS, 0, plan->nice);
 	setrlimit(RLIMIT_AS, &plan->memory);
 	setrlimit(RLIMIT_CPU, &plan->cpu);
-	/* spawn_start() keeps fd3 and error_fd above 3: dup2() overwrites neither before its turn. */
+	setrlimit(RLIMIT_FSIZE, &plan->file);
+	setrlimit(RLIMIT_CORE, &plan->core);
+	/* spawn_start() keeps fd3 and error_fd above 3, so that dup2() overwrites neither too early. */
 	if (dup2(plan->null_fd, 0) < 0 || dup2(plan->null_fd, 1) < 0 || dup2(plan->error_fd, 2) < 0
 	    || dup2(plan->fd3, 3) < 0 || close_range(4, ~0u, 0) != 0) {
 		plan->failure = errno;
@@ -70,7 +72,8 @@ int spawn_start(pid_t *pid, int *fd3, int *error_fd, const char *const *argv, co
 {
 	struct plan plan = {
 		.argv = argv, .memory = { limits->memory_bytes, limits->memory_bytes },
-		.cpu = { limits->cpu_seconds, limits->cpu_seconds + 5 }, .nice = limits->nice, .parent = getpid(),
+		.cpu = { limits->cpu_seconds, limits->cpu_seconds + 5 }, .file = { limits->file_bytes, limits->file_bytes },
+		.nice = limits->nice, .parent = getpid(),
 	};
 	int three[2] = { -1, -1 }, errors[2] = { -1, -1 }, failure;
 	sigset_t all, before;

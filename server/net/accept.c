@@ -8,7 +8,8 @@
 #include "accept.h"
 #include "server/log.h"
 
-#define ACCEPT_TURN 64
+#define ACCEPT_TURN 16
+#define WARN_US 10000000 /* between two warnings that psrd cannot accept connections */
 #define OTHER_DESCRIPTORS 64 /* beside connections: listeners, pipes, files, the loop's own */
 
 static void set_resting(struct acceptor *acceptor, int is_resting)
@@ -24,7 +25,19 @@ void accept_wake(struct acceptor *acceptor)
 		set_resting(acceptor, 0);
 }
 
-/* Without descriptors or memory the listeners rest until the next tick: epoll would report them without end. */
+static void rest(struct acceptor *acceptor, int reason)
+{
+	uint64_t now_us = acceptor->conns->loop->now_us;
+
+	if (acceptor->warned_us == 0 || now_us - acceptor->warned_us >= WARN_US) {
+		log_warn("cannot accept connections for now: %s", strerror(reason));
+		acceptor->warned_us = now_us;
+	}
+	set_resting(acceptor, 1);
+}
+
+/* Without descriptors or memory, connections that are not clients make room. If there are none, the listeners rest
+ * until the next tick: epoll would report them without end. */
 static void on_connection(uint32_t events, void *userdata)
 {
 	struct accept_source *l = userdata;
@@ -32,16 +45,18 @@ static void on_connection(uint32_t events, void *userdata)
 
 	(void)events;
 	for (int i = 0; i < ACCEPT_TURN; i++) {
-		int fd = accept4(l->listener.fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
+		struct sockaddr_storage peer = { 0 };
+		socklen_t n = sizeof peer;
+		int fd = accept4(l->listener.fd, (struct sockaddr *)&peer, &n, SOCK_NONBLOCK | SOCK_CLOEXEC);
 
 		if (fd >= 0) {
-			if (conns->n >= conns->limits.max_clients + CONN_SPARE)
-				close(fd);
-			else
-				conn_accept(conns, fd);
+			conn_accept(conns, fd, &peer);
 		} else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
-			log_warn("cannot accept connections for now: %s", strerror(errno));
-			set_resting(l->acceptor, 1);
+			int reason = errno;
+
+			if (conns_drop_pending(conns))
+				continue;
+			rest(l->acceptor, reason);
 			return;
 		} else if (errno == EAGAIN || errno == EWOULDBLOCK) {
 			return;
@@ -75,7 +90,8 @@ int accept_open(struct acceptor *acceptor, struct conns *conns, const char *cons
 
 			l->listener = opened[k];
 			l->acceptor = acceptor;
-			l->source = (struct loop_source){ .fd = l->listener.fd, .on_ready = on_connection, .userdata = l };
+			l->source = (struct loop_source){ .fd = l->listener.fd, .on_ready = on_connection, .userdata = l,
+			                                  .is_last = 1 };
 			if (code == PSR_OK)
 				code = loop_add(conns->loop, &l->source, EPOLLIN, err);
 		}
@@ -85,21 +101,26 @@ int accept_open(struct acceptor *acceptor, struct conns *conns, const char *cons
 	return PSR_OK;
 }
 
-int64_t accept_raise_descriptors(int64_t max_clients)
+/* Connections that are not clients get at most a fourth of all descriptors. */
+void accept_raise_descriptors(int64_t *max_clients, int64_t *max_pending)
 {
-	const rlim_t others = CONN_SPARE + OTHER_DESCRIPTORS;
 	struct rlimit limit;
-	rlim_t wanted = (rlim_t)max_clients + others;
-	int64_t allowed;
+	rlim_t wanted = (rlim_t)*max_clients + (rlim_t)*max_pending + OTHER_DESCRIPTORS;
+	int64_t all, rest;
 
 	if (getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_cur >= wanted)
-		return max_clients;
+		return;
 	limit.rlim_cur = wanted < limit.rlim_max ? wanted : limit.rlim_max;
 	setrlimit(RLIMIT_NOFILE, &limit);
 	if (limit.rlim_cur >= wanted)
-		return max_clients;
-	allowed = limit.rlim_cur > others ? (int64_t)(limit.rlim_cur - others) : 1;
+		return;
+	all = limit.rlim_cur > OTHER_DESCRIPTORS + 2 ? (int64_t)limit.rlim_cur - OTHER_DESCRIPTORS : 2;
+	rest = all / 4 > all - *max_clients ? all / 4 : all - *max_clients;
+	rest = rest > 1 ? rest : 1;
+	*max_pending = *max_pending < rest ? *max_pending : rest;
+	if (*max_clients <= all - *max_pending)
+		return;
+	*max_clients = all - *max_pending;
 	log_warn("the system allows %" PRIu64 " open files (ulimit -n): --max-clients is now %" PRId64,
-	         (uint64_t)limit.rlim_cur, allowed);
-	return allowed;
+	         (uint64_t)limit.rlim_cur, *max_clients);
 }

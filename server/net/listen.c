@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,7 +12,24 @@
 #include <unistd.h>
 #include "listen.h"
 
-#define BACKLOG 128
+#define BACKLOG 1024 /* connections that may arrive within one turn of the loop */
+#define NOT_SENT_BYTES 262144
+
+/* Sets options that accepted sockets inherit. Messages go out at once; psrd finds out about a dead peer two minutes
+ * after its last word; little waits in the kernel, where control messages cannot overtake it. */
+static void set_tcp_options(int fd)
+{
+	static const struct {
+		int level, name, value;
+	} options[] = {
+		{ IPPROTO_TCP, TCP_NODELAY, 1 }, { SOL_SOCKET, SO_KEEPALIVE, 1 }, { IPPROTO_TCP, TCP_KEEPIDLE, 60 },
+		{ IPPROTO_TCP, TCP_KEEPINTVL, 15 }, { IPPROTO_TCP, TCP_KEEPCNT, 4 },
+		{ IPPROTO_TCP, TCP_NOTSENT_LOWAT, NOT_SENT_BYTES },
+	};
+
+	for (size_t i = 0; i < sizeof options / sizeof options[0]; i++)
+		setsockopt(fd, options[i].level, options[i].name, &options[i].value, sizeof options[i].value);
+}
 
 static int is_loopback(const struct sockaddr *address)
 {
@@ -32,7 +50,7 @@ static int fail_system(struct psr_error *err, const char *address, const char *w
 	return psr_fail(err, code, "--listen %.200s: %s: %s", address, what, strerror(errno));
 }
 
-/* Splits ADDR:PORT at the last colon, and removes brackets. */
+/* Splits ADDR:PORT at the last colon and removes brackets. */
 static int split(char host[LISTEN_NAME], char port[16], const char *text, const char *address, struct psr_error *err)
 {
 	const char *colon = strrchr(text, ':');
@@ -70,6 +88,7 @@ static int open_one(struct listener *l, const struct addrinfo *info, const char 
 	setsockopt(l->fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
 	if (info->ai_family == AF_INET6)
 		setsockopt(l->fd, IPPROTO_IPV6, IPV6_V6ONLY, &on, sizeof on);
+	set_tcp_options(l->fd);
 	if (bind(l->fd, info->ai_addr, info->ai_addrlen) != 0 || listen(l->fd, BACKLOG) != 0
 	    || getsockname(l->fd, (struct sockaddr *)&bound, &n) != 0
 	    || getnameinfo((struct sockaddr *)&bound, n, host, sizeof host, port, sizeof port,
@@ -122,7 +141,7 @@ static int open_tcp(struct listener *listeners, int max, int *n, const char *tex
 	return code;
 }
 
-/* A killed daemon leaves its socket file, and nobody answers there. */
+/* A killed daemon leaves its socket file behind, but nobody answers there. */
 static int remove_stale(const struct sockaddr_un *name, const char *address, struct psr_error *err)
 {
 	struct stat status;

@@ -32,10 +32,10 @@ static void send_light(struct conn *conn, uint32_t id, const struct psr_preset_l
 	send_preset(conn, id, &msg, n_sent);
 }
 
-static int make_home(struct psr_preset_camera *home, const struct psr_model *model)
+static int make_home(struct psr_preset_camera *home, const struct card *card)
 {
-	const struct psr_presets *presets = psr_model_presets(model);
-	const struct psr_model_info *info = psr_model_info(model);
+	const struct psr_presets *presets = &card->presets;
+	const struct psr_model_info *info = &card->info;
 
 	if (presets->n_cameras == PSR_MAX_PRESETS)
 		return 0;
@@ -60,10 +60,10 @@ void answer_presets(struct session *session, uint32_t id, uint32_t handle)
 		refuse_handle(session, id, handle);
 		return;
 	}
-	presets = psr_model_presets(found->model);
+	presets = &found->card.presets;
 	for (uint32_t i = 0; i < presets->n_cameras; i++)
 		send_camera(session->conn, id, &presets->camera[i], &end.n_cameras);
-	if (make_home(&home, found->model))
+	if (make_home(&home, &found->card))
 		send_camera(session->conn, id, &home, &end.n_cameras);
 	for (uint32_t i = 0; i < presets->n_lights; i++)
 		send_light(session->conn, id, &presets->light[i], &end.n_lights);

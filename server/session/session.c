@@ -16,7 +16,8 @@ static void welcome(struct conn *conn, const struct options *options)
 		.major = PSR_PROTO_MAJOR,
 		.minor = PSR_PROTO_MINOR,
 		.capabilities = PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_PRESETS | PSR_CAP_NORMAL |
-		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK | PSR_CAP_RESOLUTION,
+		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK | PSR_CAP_RESOLUTION |
+		                PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS | PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP,
 		.max_message = PSR_WIRE_MAX_MESSAGE,
 		.max_side = PSR_WIRE_MAX_SIDE,
 		.max_pixels = (uint32_t)options->max_pixels,
@@ -44,20 +45,22 @@ static int on_hello(struct conn *conn, const struct psr_message *message, struct
 
 	if (code != PSR_OK)
 		return code;
-	if (conn->is_surplus)
-		return psr_fail(err, PSR_ERR_BUSY, "the server is full: it serves %" PRId64 " clients; try again later",
-		                all->options->max_clients);
 	session = calloc(1, sizeof *session);
 	if (session == NULL || handles_init(&session->handles, all->catalogue, (uint32_t)all->options->max_handles) != PSR_OK
-	    || conn_open(conn) != PSR_OK) {
-		if (session != NULL)
+	    || flow_init(&session->flow, all->frames, conn) != PSR_OK)
+		code = psr_fail(err, PSR_ERR_MEMORY, "the server has no memory for another client");
+	else
+		code = conn_open(conn, err);
+	if (code != PSR_OK) {
+		if (session != NULL) {
+			frames_forget(all->frames, &session->flow);
 			handles_fini(&session->handles);
+		}
 		free(session);
-		return psr_fail(err, PSR_ERR_MEMORY, "the server has no memory for another client");
+		return code;
 	}
 	session->all = all;
 	session->conn = conn;
-	flow_init(&session->flow, conn);
 	conn->session = session;
 	log_info("connection %llu: %s", (unsigned long long)conn->number, hello.client);
 	welcome(conn, all->options);
@@ -80,20 +83,42 @@ static void on_end(struct conn *conn)
 
 /* ---- requests that stay open: their ends ---- */
 
-static void refuse(struct session *session, uint32_t id, uint16_t view, int code, const char *text)
+static void refuse_open(struct session *session, uint32_t id, int code, const char *text)
 {
 	session->n_open--;
-	conn_send_error(session->conn, id, view, code, text);
+	conn_send_error(session->conn, id, 0, code, text);
 }
 
-void sessions_on_frame_end(struct flow *flow, uint32_t id, uint16_t view, int code, const char *text)
+static void send_superseded(struct session *session, uint32_t id, uint16_t view, uint32_t by)
+{
+	const struct psr_msg_superseded msg = { .by = by };
+	uint8_t bytes[64];
+	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+
+	if (psr_msg_superseded_encode(&buf, id, view, &msg, NULL) == PSR_OK)
+		conn_send_last(session->conn, id, &buf);
+}
+
+static void send_cancelled(struct session *session, uint32_t id, uint16_t view)
+{
+	uint8_t bytes[64];
+	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+
+	if (psr_msg_cancelled_encode(&buf, id, view, NULL) == PSR_OK)
+		conn_send_last(session->conn, id, &buf);
+}
+
+void sessions_on_frame_end(struct flow *flow, const struct frames_end *end)
 {
 	struct session *session = flow->conn->session;
 
-	if (code != PSR_OK)
-		refuse(session, id, view, code, text);
-	else
-		session->n_open--;
+	session->n_open -= end->view == 0;
+	if (end->outcome == FRAMES_SUPERSEDED)
+		send_superseded(session, end->id, end->view, end->by);
+	else if (end->outcome == FRAMES_CANCELLED)
+		send_cancelled(session, end->id, end->view);
+	else if (end->outcome == FRAMES_FAILED)
+		conn_send_error(session->conn, end->id, end->view, end->code, end->text);
 }
 
 static void on_progress(void *client, uint32_t id, const struct psr_msg_progress *progress)
@@ -103,7 +128,7 @@ static void on_progress(void *client, uint32_t id, const struct psr_msg_progress
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
 
 	if (session->conn->out.size > MAX_WAITING_PROGRESS || psr_msg_progress_encode(&buf, id, progress, NULL) != PSR_OK)
-		return; /* progress would pile up in front of a reader that takes none */
+		return; /* a reader that takes nothing gets no progress, which would only pile up */
 	conn_send(session->conn, &buf);
 	conn_flush(session->conn);
 }
@@ -115,7 +140,7 @@ static void on_opened(void *client, uint32_t id, struct catalogue_model *model)
 	int code = answer_opened(session, id, model, &error);
 
 	if (code != PSR_OK)
-		refuse(session, id, 0, code, error.text);
+		refuse_open(session, id, code, error.text);
 	else
 		session->n_open--;
 	conn_flush(session->conn);
@@ -125,33 +150,43 @@ static void on_refused(void *client, uint32_t id, int code, const char *text)
 {
 	struct session *session = client;
 
-	refuse(session, id, 0, code, text);
+	refuse_open(session, id, code, text);
 	conn_flush(session->conn);
 }
 
 const struct opener_user sessions_opener_user = { on_progress, on_opened, on_refused };
 
+void sessions_refuse_lists(struct session *session, int code, const char *text)
+{
+	uint32_t id;
+
+	while ((id = lists_end(&session->lists)) != 0)
+		refuse_open(session, id, code, text);
+}
+
 /* ---- messages ---- */
 
-static void cancel(struct session *session, uint32_t id, uint16_t view)
+static int cancel(struct session *session, uint32_t id, uint16_t view, struct psr_error *err)
 {
-	uint8_t bytes[64];
-	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };
+	const int code = frames_cancel(session->all->frames, &session->flow, id, view);
 
-	if (!frames_cancel(session->all->frames, &session->flow, id) && !opener_cancel(session->all->opener, session, id))
-		return;
-	session->n_open--;
-	if (psr_msg_cancelled_encode(&buf, id, view, NULL) == PSR_OK)
-		conn_send(session->conn, &buf);
+	if (code == PSR_ERR_PROTOCOL)
+		return psr_fail(err, code, "CANCEL names view %u, and request %" PRIu32 " belongs to another", view, id);
+	if (code == 0 && opener_cancel(session->all->opener, session, id)) {
+		session->n_open--;
+		send_cancelled(session, id, 0);
+	}
+	return PSR_OK;
 }
 
 static int is_request(unsigned type)
 {
 	return type == PSR_MSG_LIST || type == PSR_MSG_OPEN || type == PSR_MSG_CLOSE || type == PSR_MSG_SCENE
-	       || type == PSR_MSG_FRAME || type == PSR_MSG_STATS || type == PSR_MSG_PRESETS;
+	       || type == PSR_MSG_FRAME || type == PSR_MSG_STATS || type == PSR_MSG_PRESETS || type == PSR_MSG_PAUSE
+	       || type == PSR_MSG_RESUME;
 }
 
-/* A bad value costs the request; a message that breaks the protocol is an error, and costs the connection. */
+/* A bad value ends only the request; a message that breaks the protocol is an error, and ends the connection. */
 static int refuse_or_break(struct session *session, const struct psr_message *message, int code,
                            const struct psr_error *error, struct psr_error *err)
 {
@@ -163,7 +198,7 @@ static int refuse_or_break(struct session *session, const struct psr_message *me
 	return PSR_OK;
 }
 
-/* LIST, OPEN, PRESETS, FRAME, STATS: ids that stay open until they are answered. */
+/* LIST, OPEN, PRESETS, FRAME, STATS: their ids stay open until they are answered. */
 static int take_open_id(struct session *session, const struct psr_message *message, struct psr_error *err)
 {
 	union {
@@ -183,22 +218,23 @@ static int take_open_id(struct session *session, const struct psr_message *messa
 		code = psr_msg_frame_decode(&msg.frame, message->payload, message->n, &error);
 	if (code != PSR_OK)
 		return refuse_or_break(session, message, code, &error, err);
-	if (session->n_open >= (uint32_t)session->all->options->max_open) {
+	if (message->view == 0 && session->n_open >= (uint32_t)session->all->options->max_open) {
 		snprintf(text, sizeof text, "%" PRIu32 " requests of this connection are unanswered; wait for one to end",
 		         session->n_open);
 		conn_send_error(session->conn, message->id, message->view, PSR_ERR_BUSY, text);
 		return PSR_OK;
 	}
-	session->n_open++;
+	session->n_open += message->view == 0;
 	if (message->type == PSR_MSG_OPEN) {
 		opener_open(session->all->opener, session, message->id, &msg.open);
 	} else if (message->type == PSR_MSG_FRAME) {
 		frames_ask(session->all->frames, &session->flow, message, &msg.frame, session->slot[msg.frame.slot]);
+	} else if (message->type == PSR_MSG_LIST) {
+		lists_ask(&session->lists, message->id);
+		conn_go_on(session->conn);
 	} else {
 		session->n_open--;
-		if (message->type == PSR_MSG_LIST)
-			answer_list(session, message->id);
-		else if (message->type == PSR_MSG_PRESETS)
+		if (message->type == PSR_MSG_PRESETS)
 			answer_presets(session, message->id, msg.presets.handle);
 		else
 			answer_stats(session, message->id);
@@ -221,6 +257,18 @@ static int take_scene(struct session *session, const struct psr_message *message
 		session->slot[slot] = scene;
 	}
 	return code == PSR_OK ? PSR_OK : refuse_or_break(session, message, code, &error, err);
+}
+
+static void pause(struct session *session, const struct psr_message *message)
+{
+	char text[PSR_ERROR_TEXT];
+
+	if (message->view < SCHEDULE_VIEWS) {
+		frames_pause(session->all->frames, &session->flow, message->view, message->type == PSR_MSG_PAUSE);
+		return;
+	}
+	snprintf(text, sizeof text, "this server has views 0 to %d, not %u", SCHEDULE_VIEWS - 1, message->view);
+	conn_send_error(session->conn, message->id, message->view, PSR_ERR_LIMIT, text);
 }
 
 static int on_message(struct conn *conn, const struct psr_message *message, struct psr_error *err)
@@ -259,8 +307,7 @@ static int on_message(struct conn *conn, const struct psr_message *message, stru
 			refuse_handle(session, message->id, msg.close.handle);
 		return PSR_OK;
 	case PSR_MSG_CANCEL:
-		cancel(session, message->id, message->view);
-		return PSR_OK;
+		return cancel(session, message->id, message->view, err);
 	case PSR_MSG_PING:
 		code = psr_msg_ping_decode(&msg.ping, message->payload, message->n, err);
 		if (code == PSR_OK)
@@ -268,8 +315,11 @@ static int on_message(struct conn *conn, const struct psr_message *message, stru
 		return code;
 	case PSR_MSG_PONG:
 		return psr_msg_ping_decode(&msg.ping, message->payload, message->n, err);
-	case PSR_MSG_ACK: /* of no frame: this server sends none in a view > 0 */
-		return psr_msg_ack_decode(&msg.ack, message->payload, message->n, err);
+	case PSR_MSG_ACK:
+		code = psr_msg_ack_decode(&msg.ack, message->payload, message->n, err);
+		if (code == PSR_OK && message->view < SCHEDULE_VIEWS)
+			frames_acknowledge(session->all->frames, &session->flow, message->view, message->id, msg.ack.pass);
+		return code;
 	case PSR_MSG_GOODBYE:
 		code = psr_msg_goodbye_decode(&msg.goodbye, message->payload, message->n, err);
 		if (code == PSR_OK)
@@ -277,7 +327,8 @@ static int on_message(struct conn *conn, const struct psr_message *message, stru
 		return code;
 	case PSR_MSG_PAUSE:
 	case PSR_MSG_RESUME:
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server offers neither PAUSE nor RESUME (capability bit 18)");
+		pause(session, message);
+		return PSR_OK;
 	default:
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a client does not send %s",
 		                psr_msg_name(message->type) != NULL ? psr_msg_name(message->type) : "this type");
@@ -291,6 +342,11 @@ static int is_busy(const struct conn *conn)
 	return session != NULL && session->n_open > 0;
 }
 
+static int on_part(struct conn *conn)
+{
+	return answer_list_part(conn->session);
+}
+
 static void on_room(void *userdata)
 {
 	struct sessions *all = userdata;
@@ -301,5 +357,5 @@ static void on_room(void *userdata)
 void sessions_conn_user(struct conn_user *user, struct sessions *sessions)
 {
 	*user = (struct conn_user){ .on_hello = on_hello, .on_message = on_message, .is_busy = is_busy,
-		                        .on_room = on_room, .on_end = on_end, .userdata = sessions };
+		                        .on_part = on_part, .on_room = on_room, .on_end = on_end, .userdata = sessions };
 }

@@ -1,20 +1,22 @@
-/* A client's session: messages to actions. Models that it has open, scenes, unanswered requests. */
+/* A client's session turns messages into actions. It holds the client's open models, scenes and unanswered requests. */
 #ifndef PSRD_SESSION_H
 #define PSRD_SESSION_H
 
 #include "server/frames/frames.h"
 #include "server/models/opener.h"
 #include "server/options.h"
+#include "lists.h"
 
-/* What all sessions share. */
+/* Shared by all sessions. */
 struct sessions {
 	const struct options *options;
 	struct conns *conns;
 	struct catalogue *catalogue;
 	struct opener *opener;
+	struct builder *builder;    /* NULL: the daemon ends */
 	struct frames *frames;
 	struct psr_pool *pool;
-	uint64_t start_us;          /* of the daemon */
+	uint64_t start_us;          /* when the daemon started */
 	struct psr_msg_scene scene; /* scratch: 80 KiB */
 };
 
@@ -22,15 +24,19 @@ struct session {
 	struct sessions *all;
 	struct conn *conn;
 	uint32_t last_id;
-	uint32_t n_open;            /* OPEN and FRAME requests that are unanswered */
+	uint32_t n_open;            /* unanswered requests: LIST, OPEN, and FRAME in view 0 */
 	struct handles handles;
+	struct lists lists;
 	struct scene *slot[PSR_WIRE_MAX_SCENES];
 	struct flow flow;
 };
 
-/* What the layers below call; userdata of the first is the struct sessions. */
+/* The daemon ends: answers unanswered LIST requests with ERROR. */
+void sessions_refuse_lists(struct session *session, int code, const char *text);
+
+/* Calls from the layers below; userdata of the first is the struct sessions. */
 void sessions_conn_user(struct conn_user *user, struct sessions *sessions);
 extern const struct opener_user sessions_opener_user;
-void sessions_on_frame_end(struct flow *flow, uint32_t id, uint16_t view, int code, const char *text);
+void sessions_on_frame_end(struct flow *flow, const struct frames_end *end);
 
 #endif

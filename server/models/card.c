@@ -1,0 +1,39 @@
+#include <stdlib.h>
+#include <string.h>
+#include "card.h"
+#include "model/blocks.h"
+
+/* Returns NULL for no presets, or without memory. */
+static void *copy(const void *from, size_t n, size_t bytes)
+{
+	void *to = n > 0 ? malloc(n * bytes) : NULL;
+
+	if (to != NULL)
+		memcpy(to, from, n * bytes);
+	return to;
+}
+
+int card_init(struct card *card, const struct psr_model *model)
+{
+	const struct psr_blocks *blocks = psr_model_blocks(model);
+	const struct psr_presets *presets = psr_model_presets(model);
+
+	*card = (struct card){ .info = *psr_model_info(model), .presets = *presets, .n_levels = blocks->n_levels,
+		                   .n_blocks = blocks->n_blocks, .n_samples = blocks->n_samples,
+		                   .has_sheer = blocks->opacity != NULL };
+	psr_model_content_id(model, card->content_id);
+	card->presets.camera = copy(presets->camera, presets->n_cameras, sizeof *presets->camera);
+	card->presets.light = copy(presets->light, presets->n_lights, sizeof *presets->light);
+	if ((presets->n_cameras == 0 || card->presets.camera != NULL)
+	    && (presets->n_lights == 0 || card->presets.light != NULL))
+		return PSR_OK;
+	card_fini(card);
+	return PSR_ERR_MEMORY;
+}
+
+void card_fini(struct card *card)
+{
+	free((void *)card->presets.camera);
+	free((void *)card->presets.light);
+	card->presets = (struct psr_presets){ 0 };
+}
