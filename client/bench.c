@@ -17,7 +17,7 @@ static int check(struct bench_options *options, struct psr_error *err)
 		options->view = views.wish[0];
 	else if (code == PSR_OK)
 		code = psr_fail(err, PSR_ERR_ARG, "--view: a bench begins at one view, not at %u", views.n);
-	options->view.view = NULL; /* its angles stand in the wish */
+	options->view.view = NULL; /* the wish holds the view's angles now */
 	views_fini(&views);
 	options->frame.planes = 1 << PSR_PLANE_COLOR;
 	if (code == PSR_OK)

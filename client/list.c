@@ -14,7 +14,7 @@ static const char *state_name(uint8_t state)
 	return names[state < sizeof names / sizeof names[0] ? state : 0];
 }
 
-/* Fills in why[i] of each model that failed; the others keep "". */
+/* Fills in why[i] for each model that failed; the others keep "". */
 static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *entries, uint32_t n,
                         struct psr_client *client, int timeout_ms, struct psr_error *err)
 {
@@ -26,7 +26,7 @@ static int find_reasons(char (*why)[PSR_ERROR_TEXT], struct psr_msg_list_entry *
 			continue;
 		code = psr_client_open(client, entries[i].name, timeout_ms, &opened, err);
 		if (code == PSR_OK)
-			entries[i].state = PSR_ENTRY_LOADED; /* mended meanwhile */
+			entries[i].state = PSR_ENTRY_LOADED; /* it works again */
 		else if (code == PSR_ERR_CONNECTION || code == PSR_ERR_PROTOCOL)
 			return code;
 		else
@@ -142,7 +142,7 @@ int psr_list_main(int argc, char **argv)
 	const struct psr_opt opts[] = {
 		PSR_OPT_SERVER(server),
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
-		  .help = "For scripts: an array of objects with name, state, bytes, content_id and, of what failed, error; of "
+		  .help = "For scripts: an array of objects with name, state, bytes, content_id and, of a failed model, error; of "
 		          "presets with kind, type and name." },
 		{ .name = "presets", .letter = 'p', .type = PSR_OPT_STRING, .value = &model, .arg = "NAME",
 		  .help = "Instead of models, the cameras and lights in the file of this one, for --camera and --light "

@@ -12,6 +12,7 @@ static const struct {
 	{ "list", psr_list_main, "the models that a server has" },
 	{ "shot", psr_shot_main, "a picture of a model, or of several, into a file" },
 	{ "turntable", psr_turntable_main, "a model from all sides: numbered pictures, an animation or a contact sheet" },
+	{ "view", psr_view_main, "models in a window, to be turned, moved and lit; --term: in a terminal" },
 	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
 };
 
@@ -43,9 +44,9 @@ int main(int argc, char **argv)
 		if (strcmp(name, commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);
 	if (name == NULL)
-		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot, turntable and bench, and --help");
+		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot, turntable, view and bench, and --help");
 	else
-		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable and bench, and --help",
+		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable, view and bench, and --help",
 		         name);
 	return psr_cli_fail("psr", &err);
 }

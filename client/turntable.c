@@ -48,7 +48,7 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		return code;
 	if (sink->has_sheet && !has_frames && (uint64_t)sink->sheet[0] * sink->sheet[1] <= MAX_FRAMES)
 		sink->n_turn = (int64_t)sink->sheet[0] * sink->sheet[1];
-	if (sink->n_turn == 0) /* sink_check says why */
+	if (sink->n_turn == 0) /* sink_check() says why */
 		sink->n_turn = 1;
 	if (sink->seconds / (double)sink->n_turn > MAX_SECONDS_A_FRAME)
 		return psr_fail(err, PSR_ERR_ARG, "--seconds: a picture of an animation stays for %d seconds at most",

@@ -1,4 +1,4 @@
-/* psr bench: workers that ask for frames, each on a thread and connection of its own, and their figures. */
+/* psr bench: workers, each with a thread and a connection of its own, ask for frames and measure them. */
 #ifndef PSR_CLIENT_BENCH_BENCH_H
 #define PSR_CLIENT_BENCH_BENCH_H
 
@@ -8,7 +8,7 @@
 #include "client/scene/view.h"
 
 #define BENCH_MAX_CLIENTS 1024
-#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers; one that filled its share stops early */
+#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers together; a worker whose share is full stops early */
 
 struct bench_options {
 	const char *server;
@@ -16,7 +16,7 @@ struct bench_options {
 	struct scene_wish scene;
 	struct view_wish view;
 	struct quality_wish quality;
-	struct psr_msg_frame frame; /* all but the camera */
+	struct psr_msg_frame frame; /* all fields but the camera */
 };
 
 /* Warm workers wait here for the last one; then all start, or none if one failed. */
@@ -35,15 +35,15 @@ struct bench_worker {
 	struct psr_client *client;
 	struct psr_msg_frame frame;
 	struct scene *scene;
-	struct psr_camera start; /* the camera flies around its target from here */
+	struct psr_camera start; /* where the camera begins its flight around its target */
 	double up[3];
 	uint64_t n_asked;
 	/* results */
-	uint32_t *sample_us; /* latency of each frame asked for within the time; bench_run() frees it */
+	uint32_t *sample_us; /* latency of each frame that was requested within the time; bench_run() frees it */
 	size_t n_samples, samples_capacity;
-	uint64_t n_frames, n_bytes; /* that came within the time */
+	uint64_t n_frames, n_bytes; /* frames that arrived within the time, and their bytes */
 	uint64_t n_failed, elapsed_ns;
-	int setup_code;             /* not PSR_OK: it never measured */
+	int setup_code;             /* PSR_OK, or why the worker did not measure */
 	struct psr_error first_error; /* code 0: none */
 };
 
@@ -55,7 +55,7 @@ struct bench_result {
 	double p50_ms, p90_ms, p99_ms, max_ms; /* 0 without samples */
 };
 
-/* Runs all workers for the time. Workers that failed meanwhile are told on standard error. */
+/* Runs all workers for the given time. Reports workers that failed on standard error. */
 int bench_run(struct bench_result *result, const struct bench_options *options, struct psr_error *err);
 
 #endif

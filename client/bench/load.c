@@ -5,7 +5,7 @@
 #include "base/stats.h"
 #include "bench.h"
 
-/* Starts all, waits until they are warm, lets them measure, waits for the end. */
+/* Starts all workers, waits until they are warm, lets them measure, waits for the end. */
 static int run(struct bench_worker *workers, const struct bench_options *options, struct psr_error *err)
 {
 	struct bench_gate gate = { .lock = PTHREAD_MUTEX_INITIALIZER, .changed = PTHREAD_COND_INITIALIZER };

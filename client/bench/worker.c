@@ -42,7 +42,7 @@ static int wait_for_frame(struct bench_worker *worker, struct psr_event *event, 
 	return got;
 }
 
-/* Connects, opens, and draws one frame that is not counted. */
+/* Connects, opens, and draws one frame, which does not count. */
 static int warm_up(struct bench_worker *worker, struct psr_error *err)
 {
 	const struct bench_options *options = worker->options;
@@ -94,7 +94,7 @@ static void note_error(struct bench_worker *worker, uint64_t n_failed, const str
 		worker->first_error = *why;
 }
 
-/* 0: its share of the samples is used up. */
+/* Returns 0 if its share of the samples is full. */
 static int add_sample(struct bench_worker *worker, uint64_t latency_ns)
 {
 	size_t share = BENCH_MAX_SAMPLES / (size_t)worker->options->n_clients;

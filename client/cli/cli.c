@@ -1,5 +1,6 @@
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 #include "cli.h"
 
@@ -10,6 +11,23 @@ const char *psr_default_server(void)
 	const char *set = getenv("PSR_SERVER");
 
 	return set != NULL && set[0] != '\0' ? set : PSR_CLIENT_DEFAULT_ADDRESS;
+}
+
+void psr_find_program(char path[PATH_MAX], const char *name)
+{
+	const ssize_t n = readlink("/proc/self/exe", path, PATH_MAX - 1);
+	char *slash;
+
+	if (n > 0) {
+		path[n] = '\0';
+		slash = strrchr(path, '/');
+		if (slash != NULL && (size_t)(slash - path) + strlen(name) + 2 < PATH_MAX) {
+			strcpy(slash + 1, name);
+			if (access(path, X_OK) == 0)
+				return;
+		}
+	}
+	snprintf(path, PATH_MAX, "%s", name);
 }
 
 void psr_progress_draw(const struct psr_msg_progress *progress, void *userdata)

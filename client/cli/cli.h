@@ -1,7 +1,8 @@
-/* What every subcommand says and does at the command line. */
+/* The command-line manners that all subcommands share. */
 #ifndef PSR_CLIENT_CLI_CLI_H
 #define PSR_CLIENT_CLI_CLI_H
 
+#include <limits.h>
 #include "base/cli.h"
 #include "psr/client.h"
 
@@ -21,10 +22,13 @@
 
 #define PSR_DEFAULT_TIMEOUT 60
 
-const char *psr_default_server(void); /* $PSR_SERVER, or the address that psrd listens to by default */
+const char *psr_default_server(void); /* $PSR_SERVER, or psrd's default address */
 
-/* Shows a build or load on one line of standard error, if that is a terminal. For psr_client_open(); userdata: a
- * struct psr_progress_line, zeroed. */
+/* The path of a program that stands beside this one, or else its bare name, for PATH. */
+void psr_find_program(char path[PATH_MAX], const char *name);
+
+/* Shows a build or load on one line of standard error, if that is a terminal. A callback for psr_client_open();
+ * userdata is a zeroed struct psr_progress_line. */
 struct psr_progress_line {
 	int is_drawn;
 };

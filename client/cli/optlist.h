@@ -1,4 +1,4 @@
-/* Tables of options that several commands put together from the same parts. */
+/* Tables of options, which several commands assemble from common parts. */
 #ifndef PSR_CLIENT_CLI_OPTLIST_H
 #define PSR_CLIENT_CLI_OPTLIST_H
 
@@ -7,7 +7,7 @@
 #define OPTLIST_MAX 80
 
 struct optlist {
-	struct psr_opt opt[OPTLIST_MAX + 1]; /* ended by one without a name, if it is zero at first */
+	struct psr_opt opt[OPTLIST_MAX + 1]; /* the entry behind the last has no name, if the struct was zeroed at first */
 	int n;
 };
 

@@ -1,4 +1,4 @@
-/* What shot and turntable share: a scene, any number of cameras, and where the pictures go. */
+/* The common part of shot and turntable: a scene, any number of cameras, and the files of the pictures. */
 #ifndef PSR_CLIENT_DRAW_DRAW_H
 #define PSR_CLIENT_DRAW_DRAW_H
 
@@ -16,10 +16,10 @@ struct draw_wish {
 	const char *cameras, *replay;
 };
 
-/* Options of both commands, group by group; `files` are the command's own of the group Files. */
+/* Lists the options of both commands, group by group; `files` are the command's own in the group Files. */
 void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct psr_opt *files, int n_files);
 
-/* Fills the wish, which has its defaults; 1: --help was printed. */
+/* Fills the wish, which must hold its defaults. Returns 1 if it printed --help. */
 typedef int draw_parse(struct draw_wish *wish, int argc, char **argv, struct psr_error *err);
 
 /* Parses, checks, connects, draws and writes. Returns the exit status. */

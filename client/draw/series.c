@@ -1,7 +1,7 @@
 #include "series.h"
 #include <string.h>
 
-#define MAX_UNDER_WAY 4 /* keep the server busy while pictures are written here */
+#define MAX_UNDER_WAY 4 /* keeps the server busy while this program writes pictures */
 
 struct open_frame {
 	uint32_t id, k;
@@ -41,7 +41,7 @@ static int wait_for_one(const struct series *series, struct open_frame *open, un
 		open[i] = open[--*n_open];
 		return series->on_frame(found.k, &event, series->userdata, err);
 	}
-	return psr_fail(err, PSR_ERR_INTERNAL, "a frame came that nobody asked for");
+	return psr_fail(err, PSR_ERR_INTERNAL, "a frame came that this program did not request");
 }
 
 int series_run(struct series *series, struct psr_error *err)

@@ -14,6 +14,13 @@
 #include "base/clock.h"
 #include "internal.h"
 
+struct address {
+	int is_unix;
+	char host[256]; /* without brackets */
+	char port[6];
+	char path[108];
+};
+
 uint64_t client_deadline_ns(int timeout_ms)
 {
 	return timeout_ms < 0 ? UINT64_MAX : clock_ns() + (uint64_t)timeout_ms * 1000000u;
@@ -38,7 +45,7 @@ int client_poll(int fd, int events, uint64_t deadline_ns, struct psr_error *err)
 	}
 }
 
-static int parse_port(struct client_address *address, const char *port, const char *text, struct psr_error *err)
+static int parse_port(struct address *address, const char *port, const char *text, struct psr_error *err)
 {
 	size_t length = strlen(port);
 
@@ -49,7 +56,7 @@ static int parse_port(struct client_address *address, const char *port, const ch
 	return PSR_OK;
 }
 
-int client_address_parse(struct client_address *address, const char *text, struct psr_error *err)
+static int parse(struct address *address, const char *text, struct psr_error *err)
 {
 	const char *at = text, *host_end;
 
@@ -98,12 +105,12 @@ int client_address_parse(struct client_address *address, const char *text, struc
 
 int psr_address_check(const char *address, struct psr_error *err)
 {
-	struct client_address parsed;
+	struct address parsed;
 
-	return client_address_parse(&parsed, address, err);
+	return parse(&parsed, address, err);
 }
 
-/* CONNECTION with the system's reason in err, or the open socket. */
+/* Returns the open socket, or CONNECTION with the system's reason in err. */
 static int try_connect(int *out, const struct sockaddr *to, socklen_t length, const char *name, uint64_t deadline_ns,
                        struct psr_error *err)
 {
@@ -116,7 +123,8 @@ static int try_connect(int *out, const struct sockaddr *to, socklen_t length, co
 		static const struct timespec pause = { .tv_nsec = 5000000 };
 
 		reason = errno;
-		if (to->sa_family == AF_UNIX && reason == EAGAIN && clock_ns() < deadline_ns) { /* its backlog is full */
+		/* the server's backlog is full */
+		if (to->sa_family == AF_UNIX && reason == EAGAIN && clock_ns() < deadline_ns) {
 			reason = 0;
 			nanosleep(&pause, NULL);
 			continue;
@@ -145,8 +153,8 @@ static int try_connect(int *out, const struct sockaddr *to, socklen_t length, co
 int client_socket_connect(int *out, const char *text, uint64_t deadline_ns, struct psr_error *err)
 {
 	struct addrinfo hints = { .ai_family = AF_UNSPEC, .ai_socktype = SOCK_STREAM, .ai_flags = AI_NUMERICSERV }, *all;
-	struct client_address address;
-	int code = client_address_parse(&address, text, err);
+	struct address address;
+	int code = parse(&address, text, err);
 
 	if (code != PSR_OK)
 		return code;

@@ -6,12 +6,12 @@
 
 struct psr_animation {
 	struct outfile file;
-	struct apng *apng;                 /* NULL: the module does it */
+	struct apng *apng;                 /* NULL: the module writes the file */
 	const struct image_module *module;
 	void *module_animation;
 };
 
-/* *module stays NULL for what needs none. */
+/* Opens the image module if the file needs it; else leaves *module NULL. */
 static int choose(const struct image_module **module, const char *path, struct psr_error *err)
 {
 	const char *ending = outfile_ending(path);

@@ -1,5 +1,5 @@
-/* APNG, version 1.0: a PNG whose IDAT is the first frame; further ones are fdAT chunks. libpng compresses each frame as
- * a picture of its own, of which the data is taken. */
+/* APNG, version 1.0: a PNG whose IDAT is the first frame, with fdAT chunks for the others. libpng compresses each frame
+ * as a picture of its own; apng.c takes the data out of that. */
 #include <setjmp.h>
 #include <stdlib.h>
 #include <string.h>
@@ -78,7 +78,7 @@ static void on_frame_write(png_structp png, png_bytep data, size_t n)
 
 static void write_control(struct apng *apng, const struct psr_frame *picture)
 {
-	uint8_t control[26] = { 0 }; /* at 0,0, replacing what was there */
+	uint8_t control[26] = { 0 }; /* the frame lies at 0,0 and replaces the one before */
 
 	put_u32(control, apng->sequence++);
 	put_u32(control + 4, picture->width);
@@ -90,7 +90,8 @@ static void write_control(struct apng *apng, const struct psr_frame *picture)
 	png_write_chunk(apng->png, (png_const_bytep)"fcTL", control, sizeof control);
 }
 
-/* A chunk of the frame's PNG, with room before its data for a number: the length and type of the chunk. */
+/* Writes a chunk of the frame's PNG. A later frame's chunk has a number in front of its data, over the old length and
+ * type. */
 static void write_data(struct apng *apng, uint8_t *data, uint32_t n)
 {
 	if (apng->n_written == 0) {

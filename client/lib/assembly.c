@@ -32,35 +32,94 @@ static void fill_background(const struct psr_frame *frame, const struct psr_msg_
 	}
 }
 
+/* Whether a sharp frame follows frame 0. It does unless frame 0 is just as sharp. */
+static unsigned has_sharp(const struct psr_msg_frame *asked)
+{
+	const struct psr_msg_settings *settings = &asked->settings;
+	const int is_settled = asked->budget == PSR_WIRE_BUDGET_SETTINGS && settings->scale == 1 && settings->is_smooth;
+
+	return asked->flags & PSR_WIRE_FRAME_SHARP && !(is_settled && asked->color_codec != PSR_CODEC_JPEG);
+}
+
+/* The sharp frame is not refined; refined frames follow it. */
+static unsigned refinement(const struct psr_msg_frame *asked, unsigned pass)
+{
+	return pass > 0 ? pass - has_sharp(asked) : 0;
+}
+
+/* The server must send the codec of the request, or a better one. */
+static int is_asked(const struct psr_msg_frame_begin *begin, const struct psr_msg_frame *asked)
+{
+	const int is_better = begin->color_codec == PSR_CODEC_ZSTD && asked->color_codec == PSR_CODEC_JPEG;
+	const int is_codec = begin->color_codec == asked->color_codec && begin->color_quality >= asked->color_quality;
+
+	return begin->width == asked->width && begin->height == asked->height && begin->planes == asked->planes
+	       && (is_better || is_codec) && begin->depth_format == asked->depth_format
+	       && begin->depth_codec == asked->depth_codec && begin->data_codec == asked->data_codec
+	       && begin->depth_min == asked->depth_min && begin->depth_max == asked->depth_max;
+}
+
+static int check_base(const struct psr_msg_frame_begin *begin, const struct client_held *base, struct psr_error *err)
+{
+	if (begin->base == 0)
+		return PSR_OK;
+	if (base == NULL)
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame on frame %" PRIu32
+		                ", pass %u, which was not offered as its base", begin->base, begin->base_pass);
+	if (begin->width != base->begin.width || begin->height != base->begin.height || begin->planes != base->begin.planes
+	    || begin->settings.scale != base->begin.settings.scale
+	    || (begin->depth_format > PSR_WIRE_DEPTH_F32
+	        && (begin->depth_min != base->begin.depth_min || begin->depth_max != base->begin.depth_max)))
+		return psr_fail(err, PSR_ERR_PROTOCOL,
+		                "the server began a frame on a base of another size (%" PRIu32 "x%" PRIu32
+		                "), other planes, another scale or range of depth",
+		                base->begin.width, base->begin.height);
+	return PSR_OK;
+}
+
+static void copy_planes(const struct psr_frame *to, const struct psr_frame *from)
+{
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
+		if (psr_frame_plane(to, plane) != NULL)
+			memcpy(psr_frame_plane(to, plane), psr_frame_plane(from, plane),
+			       (size_t)to->width * to->height * psr_plane_bytes(plane));
+}
+
 int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg_frame_begin *begin,
-                          struct psr_error *err)
+                          const struct client_held *base, struct psr_error *err)
 {
 	const struct psr_msg_frame *asked = &assembly->asked;
 	int code;
 
 	if (assembly->has_begun)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server began a frame twice");
-	if (begin->pass != assembly->pass || begin->base != 0 || begin->width != asked->width ||
-	    begin->height != asked->height || begin->planes != asked->planes || begin->color_codec != asked->color_codec ||
-	    begin->color_quality != asked->color_quality || begin->depth_format != asked->depth_format ||
-	    begin->depth_codec != asked->depth_codec || begin->data_codec != asked->data_codec)
+	if (begin->pass != assembly->pass || begin->refine != refinement(asked, begin->pass) || !is_asked(begin, asked))
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server began another frame (%" PRIu32 "x%" PRIu32 ") than the one asked "
 		                "for (%" PRIu32 "x%" PRIu32 ")",
 		                begin->width, begin->height, asked->width, asked->height);
+	code = check_base(begin, base, err);
+	if (code != PSR_OK)
+		return code;
 	assembly->begin = *begin;
 	assembly->has_begun = 1;
 	code = psr_frame_alloc(&assembly->picture, asked->width, asked->height, asked->planes, err);
 	if (code != PSR_OK)
 		return code;
-	fill_background(&assembly->picture, begin);
+	if (begin->base == 0) {
+		fill_background(&assembly->picture, begin);
+	} else {
+		copy_planes(&assembly->picture, &base->picture);
+		assembly->base_lossy = base->lossy;
+	}
 	return PSR_OK;
 }
 
-/* The rules that need to know the frame; psr_msg_rect_decode has checked those within the message. */
+/* Checks the rules that depend on the frame; psr_msg_rect_decode() has checked the rules within the message. */
 static int check_rect(const struct client_assembly *assembly, const struct psr_msg_rect *rect, struct psr_error *err)
 {
 	const struct psr_msg_frame *asked = &assembly->asked;
+	const struct psr_msg_frame_begin *begin = &assembly->begin;
 	unsigned wanted, pixel;
 	uint64_t n;
 
@@ -76,10 +135,11 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server sent a rectangle %ux%u at %u,%u: outside of the picture of %" PRIu32 "x%" PRIu32,
 		                rect->w, rect->h, rect->x, rect->y, asked->width, asked->height);
-	wanted = rect->plane == PSR_PLANE_COLOR ? asked->color_codec
-	         : rect->plane == PSR_PLANE_DEPTH ? asked->depth_codec : asked->data_codec;
-	if (rect->codec != PSR_CODEC_RAW && rect->codec != wanted)
-		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle with codec %u, %u was asked for",
+	wanted = rect->plane == PSR_PLANE_COLOR ? begin->color_codec
+	         : rect->plane == PSR_PLANE_DEPTH ? begin->depth_codec : begin->data_codec;
+	if (rect->codec != PSR_CODEC_RAW && rect->codec != wanted
+	    && !(rect->codec == PSR_CODEC_ZSTD && wanted == PSR_CODEC_JPEG))
+		return psr_fail(err, PSR_ERR_PROTOCOL, "the server sent a rectangle of codec %u in a frame of codec %u",
 		                rect->codec, wanted);
 	pixel = psr_plane_pixel_bytes(rect->plane, asked->depth_format);
 	n = (uint64_t)((rect->w + rect->scale - 1u) / rect->scale) * ((rect->h + rect->scale - 1u) / rect->scale);
@@ -90,7 +150,7 @@ static int check_rect(const struct client_assembly *assembly, const struct psr_m
 	return PSR_OK;
 }
 
-/* Room for n more bytes: twice what has come, never more than what the rectangle claims. */
+/* Makes room for n more bytes: doubles the memory, up to the size that the rectangle claims. */
 static int reserve_pieces(struct client_assembly *assembly, size_t n, struct psr_error *err)
 {
 	size_t need = assembly->n_pieces + n, capacity = 2 * need;
@@ -128,10 +188,12 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 	if (rect->bytes == 0 || (uint64_t)rect->offset + rect->bytes > rect->total)
 		return psr_fail(err, PSR_ERR_PROTOCOL,
 		                "the server sent more bytes of a rectangle than the %" PRIu32 " it claimed", rect->total);
-	if (rect->codec == PSR_CODEC_JPEG || rect->scale != 1)
+	/* The hashes of a frame drawn at a scale are those of the enlarged picture. */
+	if (rect->codec == PSR_CODEC_JPEG || rect->scale > assembly->begin.settings.scale
+	    || (rect->plane == PSR_PLANE_DEPTH && assembly->asked.depth_format != PSR_WIRE_DEPTH_F32))
 		assembly->lossy |= 1u << rect->plane;
 	if (rect->bytes == rect->total)
-		return client_decode(decoder, &assembly->picture, rect, rect->data, err);
+		return client_decode(decoder, &assembly->picture, &assembly->asked, rect, rect->data, err);
 	assembly->open = *rect;
 	code = reserve_pieces(assembly, rect->bytes, err);
 	if (code != PSR_OK)
@@ -142,33 +204,40 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 		return PSR_OK;
 	assembly->open.total = 0;
 	assembly->n_pieces = 0;
-	return client_decode(decoder, &assembly->picture, rect, assembly->pieces, err);
+	return client_decode(decoder, &assembly->picture, &assembly->asked, rect, assembly->pieces, err);
 }
 
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
                         struct psr_error *err)
 {
 	const struct psr_frame *picture = &assembly->picture;
+	const struct psr_msg_frame *asked = &assembly->asked;
 
 	if (!assembly->has_begun || assembly->open.total != 0)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended a frame %s",
 		                assembly->has_begun ? "within a rectangle" : "that it had not begun");
-	if (end->pass != assembly->pass || (end->pass == assembly->asked.pass_limit && !end->is_final) ||
-	    end->planes != assembly->asked.planes)
+	if (end->pass != assembly->pass || end->planes != asked->planes
+	    || (end->pass == asked->pass_limit + has_sharp(asked) && !end->is_final)
+	    || end->has_hashes == ((asked->flags & PSR_WIRE_FRAME_NO_HASHES) != 0))
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
 	*checked = 0;
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
+		const unsigned bit = 1u << plane;
 		uint64_t hash;
 
-		if (!(end->planes >> plane & 1) || assembly->lossy >> plane & 1)
+		if (!end->has_hashes || !(end->planes & bit) || assembly->lossy & bit)
 			continue;
 		hash = psr_frame_hash(picture, plane);
-		if (hash != end->hash[plane])
+		if (hash == end->hash[plane]) {
+			*checked |= bit;
+			assembly->base_lossy &= ~bit;
+		} else if (!(assembly->base_lossy & bit)) {
 			return psr_fail(err, PSR_ERR_FORMAT,
 			                "the %s plane of a frame is damaged: its hash is %016" PRIx64
 			                ", the server drew %016" PRIx64,
 			                plane == PSR_PLANE_COLOR ? "colour" : psr_plane_name(plane), hash, end->hash[plane]);
-		*checked |= 1u << plane;
+		}
 	}
+	assembly->lossy |= assembly->base_lossy;
 	return PSR_OK;
 }

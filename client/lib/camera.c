@@ -9,7 +9,6 @@
 #define LEAST_FOV 1e-6
 #define GREATEST_FOV 3.14159
 #define MARGIN 1.06
-#define DEGREE (3.14159265358979323846 / 180)
 
 static double near_from_box(const double eye[3], const double box_min[3], const double box_max[3])
 {
@@ -28,7 +27,7 @@ static double near_from_box(const double eye[3], const double box_min[3], const 
 	return near_z > LEAST ? near_z : LEAST;
 }
 
-/* Sine of the angle between a and b is below the limit of the protocol; also for a vector of length 0. */
+/* Whether the sine of the angle between a and b is below the protocol's limit; also for a vector of length 0. */
 static int is_parallel(const double a[3], const double b[3])
 {
 	double u[3], v[3], cross[3];
@@ -39,14 +38,14 @@ static int is_parallel(const double a[3], const double b[3])
 	return v3d_length(cross) < 1e-6;
 }
 
-/* The same bits on every machine, as frames are to have. */
+/* Computes the same bits on every machine, as frames must have. */
 static void sincos_degrees(double degrees, double *s, double *c)
 {
 	double turn = fmod(degrees, 360);
 
 	if (turn < 0)
 		turn += 360;
-	psr_sincos((turn > 180 ? 360 - turn : turn) * DEGREE, s, c);
+	psr_sincos((turn > 180 ? 360 - turn : turn) * PSR_DEGREE, s, c);
 	if (turn > 180)
 		*s = -*s;
 }
@@ -57,7 +56,7 @@ static void combine(double out[3], double k, const double a[3], double m, const 
 		out[i] = k * a[i] + m * b[i];
 }
 
-/* Right, up and the way to the eye. axes: right, up and front of the object. */
+/* Finds right, up and the direction to the eye. axes: right, up and front of the object. */
 static void view_axes(double view[3][3], const double axes[3][3], double azimuth, double elevation, double roll)
 {
 	double s, c, level[3], right[3], up[3];
@@ -76,10 +75,10 @@ static void view_axes(double view[3][3], const double axes[3][3], double azimuth
 struct fit {
 	double distance; /* of the eye of a perspective camera */
 	double extent;   /* half the height of an orthographic picture */
-	double deepest;  /* of the box before its middle */
+	double deepest;  /* how far the box reaches from its middle towards the eye */
 };
 
-/* Enlarges `fit` so that all corners of a box of these half sides are in a picture of these tangents. */
+/* Enlarges `fit` until all corners of a box of these half sides are in a picture of these tangents. */
 static void fit_box(struct fit *fit, const double half[3], const double view[3][3], const double tangent[2])
 {
 	for (int corner = 0; corner < 8; corner++) {
@@ -96,7 +95,7 @@ static void fit_box(struct fit *fit, const double half[3], const double view[3][
 	}
 }
 
-/* What psr_camera_frame does for its one direction. */
+/* Does for any direction what psr_camera_frame() does for one. */
 static void frame_angles(struct psr_camera *camera, const struct psr_camera_wish *wish, const double up[3],
                          const double box_min[3], const double box_max[3], double aspect)
 {
@@ -130,7 +129,7 @@ static void frame_angles(struct psr_camera *camera, const struct psr_camera_wish
 	v3d_add_scaled(camera->eye, camera->target, fit.distance, view[2]);
 }
 
-/* Of a camera that has an eye: by its own view. */
+/* A camera with an eye is framed along its own view. */
 static void roll_camera(struct psr_camera *camera, const double forward[3], double degrees)
 {
 	double right[3], up[3], along[3], s, c;
@@ -156,10 +155,10 @@ static int zoom_camera(struct psr_camera *camera, double zoom, struct psr_error 
 	if (camera->fov_y >= LEAST_FOV && camera->fov_y <= GREATEST_FOV)
 		return PSR_OK;
 	return psr_fail(err, PSR_ERR_ARG, "a zoom of %g leaves an angle of view of %g degrees; it has to be between 0.0001 "
-	                "and 179.999", zoom, camera->fov_y / DEGREE);
+	                "and 179.999", zoom, camera->fov_y / PSR_DEGREE);
 }
 
-/* Eye, target, up and ortho_height, without roll unless there are angles. */
+/* Sets eye, target, up and ortho_height; rolls the camera only if there are angles. */
 static int place_camera(struct psr_camera *framed, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err)
 {
@@ -181,7 +180,7 @@ static int place_camera(struct psr_camera *framed, const struct psr_camera_wish 
 	return PSR_OK;
 }
 
-/* Of a camera that has an eye or is framed without angles: its up, which must not run along its view. */
+/* Sets up for a camera that has an eye, or is framed without angles; up must not run along its view. */
 static int turn_up(struct psr_camera *framed, const struct psr_camera_wish *wish, struct psr_error *err)
 {
 	double forward[3], axes[3][3];

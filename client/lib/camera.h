@@ -1,4 +1,4 @@
-/* Cameras and lights as command lines say them. */
+/* Cameras and lights as users write them on the command line. */
 #ifndef PSR_CLIENT_LIB_CAMERA_H
 #define PSR_CLIENT_LIB_CAMERA_H
 
@@ -20,36 +20,36 @@ int psr_codec_parse(uint8_t *codec, uint8_t *quality, const char *text, struct p
 struct psr_camera_wish {
 	int has_eye, has_target, has_up, has_angles;
 	double eye[3], target[3], up[3];
-	double natural_up[3]; /* of the model; used if `up` is unset; 0, 0, 0: +Y */
-	double azimuth, elevation; /* has_angles: degrees about the up vector from the front to the right, and above the
-	                            * horizon; the whole box is in the picture then. psr_camera_axes() says which way is
-	                            * front */
+	double natural_up[3]; /* the model's; used if `up` is unset; 0, 0, 0: +Y */
+	double azimuth, elevation; /* if has_angles: degrees about the up vector from the front to the right, and degrees
+	                            * above the horizon. The picture then shows the whole box. psr_camera_axes() tells which
+	                            * side is the front */
 	double roll;         /* degrees by which the camera is turned clockwise about its view */
-	double zoom;         /* as a lens has it: 2 shows everything twice as large; 0: not said, 1 */
-	uint32_t n_turn;     /* the box is to stay in the picture at so many equal turns about the up vector (see
-	                      * psr_camera_turn); 0 and 1: as it is. Has no use with an eye */
+	double zoom;         /* as of a lens: 2 shows everything twice as large; 0: unset, counts as 1 */
+	uint32_t n_turn;     /* the box stays in the picture at so many equal turns about the up vector (psr_camera_turn());
+	                      * 0 and 1: no turns. Ignored with an eye */
 	double fov_y;        /* radians; 0: orthographic */
 	double ortho_height; /* world units; 0: as tall as the box needs */
 };
 
-/* Where the azimuth and the elevation are for which nobody asked, degrees. */
+/* Returns the default azimuth and elevation, in degrees. */
 #define PSR_CAMERA_AZIMUTH 21.5246
 #define PSR_CAMERA_ELEVATION 17.4576
 
-/* Completes it: nothing said gives psr_camera_frame's; an eye alone looks at the middle of the box; a target alone is
- * seen from that camera's side. A natural up that runs along the view gives way to the back (-Z where +Y is up). near_z
- * is 1/1000 of the way to the far end of the box, but half of the way to its near end at most when the eye is outside
- * (orthographic: 0).
- * ARG: eye and target are the same point, up runs along the view, the zoom leaves no angle that the protocol has. */
+/* Completes the camera. With nothing set it becomes psr_camera_frame()'s; with an eye alone it looks at the middle of
+ * the box; with a target alone it looks from that camera's side. A natural up that runs along the view is replaced by
+ * the back (-Z where +Y is up). near_z is 1/1000 of the way to the far end of the box, but at most half of the way to
+ * its near end when the eye is outside (orthographic: 0). ARG: eye and target are the same point, up runs along the
+ * view, or the zoom makes an angle that the protocol excludes. */
 int psr_camera_complete(struct psr_camera *camera, const struct psr_camera_wish *wish, const double box_min[3],
                         const double box_max[3], double aspect, struct psr_error *err);
 
-/* Turns eye and up by `degrees` about the axis `up` (any length but 0) through the target, counter-clockwise seen from
- * where up points to. Perspective: near_z is chosen anew. */
+/* Turns eye and up by `degrees` about the axis `up` (any length but 0) through the target, counter-clockwise as seen
+ * from the tip of up. Perspective: near_z is chosen anew. */
 void psr_camera_turn(struct psr_camera *camera, const double up[3], double degrees, const double box_min[3],
                      const double box_max[3]);
 
-/* psr_light_key() as a message has it. */
+/* Makes psr_light_key()'s light as a message. */
 void client_light_key(struct psr_msg_light *light, const struct psr_camera *camera);
 
 #endif

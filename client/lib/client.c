@@ -16,7 +16,7 @@ int client_create(struct psr_client **out, int fd, const char *address, struct p
 
 	if (client == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a connection");
-	client->fd = -1; /* the caller's until this succeeds */
+	client->fd = -1; /* still the caller's until this function succeeds */
 	client->next_id = 1;
 	snprintf(client->address, sizeof client->address, "%s", address);
 	client->in_storage = malloc(CLIENT_IN_BYTES);
@@ -50,6 +50,8 @@ void psr_client_close(struct psr_client *client)
 	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++)
 		client_assembly_fini(&client->frame[i].assembly);
 	client_assembly_fini(&client->done);
+	client_free_queued(client);
+	client_free_held(client);
 	client_decoder_destroy(client->decoder);
 	free(client->list.entry);
 	free(client->presets.preset);
@@ -69,9 +71,9 @@ int client_break(struct psr_client *client, int code, const char *format, ...)
 	return psr_fail(&client->broken, code, "%.200s: %s", client->address, text);
 }
 
-static int fail_broken(const struct psr_client *client, struct psr_error *err)
+int client_check(const struct psr_client *client, struct psr_error *err)
 {
-	return psr_fail(err, client->broken.code, "%s", client->broken.text);
+	return client->broken.code == PSR_OK ? PSR_OK : psr_fail(err, client->broken.code, "%s", client->broken.text);
 }
 
 const struct psr_msg_welcome *psr_client_welcome(const struct psr_client *client)
@@ -91,8 +93,8 @@ uint64_t psr_client_bytes_received(const struct psr_client *client)
 	return client->n_received;
 }
 
-/* A peer that has closed may have said why: what it sent is still read, so a failed write is no error yet. */
-static void flush_output(struct psr_client *client)
+/* A peer that has closed may have sent the reason before. So a failed write is no error yet: reading goes on. */
+void client_flush(struct psr_client *client)
 {
 	struct psr_buf *out = &client->out;
 
@@ -116,7 +118,7 @@ static void flush_output(struct psr_client *client)
 	}
 }
 
-/* 1: something came; 0: nothing is there now; negative: broken. */
+/* Returns 1: bytes came; 0: there are none now; negative: the connection is broken. */
 static int fill_input(struct psr_client *client)
 {
 	size_t room;
@@ -163,6 +165,7 @@ static int take_messages(struct psr_client *client, struct psr_event *event)
 int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event *event, struct psr_error *err)
 {
 	client_assembly_fini(&client->done);
+	client_free_given(client);
 	memset(event, 0, sizeof *event);
 	client->answer = CLIENT_ANSWER_NONE;
 	for (int has_read = 0; client->broken.code == PSR_OK; has_read = 1) {
@@ -172,9 +175,9 @@ int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event
 			return 1;
 		if (got < 0)
 			break;
-		if (has_read && clock_ns() >= deadline_ns) /* a server that never stops sending */
+		if (has_read && clock_ns() >= deadline_ns) /* for a server that never stops sending */
 			return 0;
-		flush_output(client);
+		client_flush(client);
 		got = fill_input(client);
 		if (got != 0)
 			continue;
@@ -182,7 +185,7 @@ int client_run(struct psr_client *client, uint64_t deadline_ns, struct psr_event
 		if (got <= 0)
 			return got;
 	}
-	return fail_broken(client, err);
+	return client_check(client, err);
 }
 
 int psr_client_wait(struct psr_client *client, int timeout_ms, struct psr_event *event, struct psr_error *err)
@@ -190,17 +193,19 @@ int psr_client_wait(struct psr_client *client, int timeout_ms, struct psr_event 
 	uint64_t deadline_ns = client_deadline_ns(timeout_ms);
 	int got;
 
+	if (client->broken.code == PSR_OK && client_take_queued(client, event))
+		return 1;
 	do
 		got = client_run(client, deadline_ns, event, err);
-	while (got > 0 && event->type == 0); /* a late PONG is nobody's event */
+	while (got > 0 && event->type == 0); /* a late PONG makes no event */
 	return got;
 }
 
-/* Ends a request that was encoded behind `start`. */
+/* Completes a request that was encoded behind `start`. */
 static int finish_request(struct psr_client *client, size_t start, int code, const char *what, struct psr_error *err)
 {
 	if (code == PSR_ERR_MEMORY)
-		return psr_fail(err, PSR_ERR_BUSY, "%s waits for the server to take what was sent before", client->address);
+		return psr_fail(err, PSR_ERR_BUSY, "%s waits until the server has taken earlier requests", client->address);
 	if (code != PSR_OK)
 		return code;
 	if (client->out.size - start > client->welcome.max_message) {
@@ -211,14 +216,14 @@ static int finish_request(struct psr_client *client, size_t start, int code, con
 		                client->welcome.max_message);
 	}
 	client->next_id++;
-	flush_output(client);
+	client_flush(client);
 	return PSR_OK;
 }
 
 static int start_request(struct psr_client *client, struct psr_error *err)
 {
 	if (client->broken.code != PSR_OK)
-		return fail_broken(client, err);
+		return client_check(client, err);
 	if (client->next_id == UINT32_MAX)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: the ids of this connection are used up; connect again",
 		                client->address);
@@ -242,70 +247,118 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
 	return finish_request(client, start, code, "scene", err);
 }
 
-static struct client_frame *free_frame(struct psr_client *client)
+static struct client_frame *free_frame(struct psr_client *client, uint16_t view)
 {
 	struct client_frame *frame = NULL;
 	unsigned n_open = 0;
 
 	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++) {
-		if (client->frame[i].id != 0)
+		if (client->frame[i].id == 0)
+			frame = frame == NULL ? &client->frame[i] : frame;
+		else if (client->frame[i].view == 0)
 			n_open++;
-		else if (frame == NULL)
-			frame = &client->frame[i];
 	}
-	return n_open < client->welcome.max_open ? frame : NULL;
+	return view > 0 || n_open < client->welcome.max_open ? frame : NULL;
 }
 
-int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *asked, uint32_t *id, struct psr_error *err)
+static int check_offered(const struct psr_client *client, uint16_t view, const struct psr_msg_frame *asked,
+                         struct psr_error *err)
 {
-	struct client_frame *frame = free_frame(client);
+	const struct {
+		int is_asked;
+		uint64_t capability;
+		const char *what;
+	} needs[] = {
+		{ view > 0, PSR_CAP_VIEWS, "keep views" },
+		{ asked->base != 0, PSR_CAP_BASE, "send changes to a base" },
+		{ asked->pass_limit > 0, PSR_CAP_REFINE, "refine frames" },
+		{ asked->budget == PSR_WIRE_BUDGET_SETTINGS && asked->settings.scale != 1, PSR_CAP_SETTINGS,
+		  "draw at other scales" },
+		{ asked->depth_format > PSR_WIRE_DEPTH_F32, PSR_CAP_DEPTH_U16, "send depth as u16" },
+		{ asked->flags & PSR_WIRE_FRAME_SHARP, PSR_CAP_SHARP, "send sharp frames" },
+	};
+
+	for (size_t i = 0; i < sizeof needs / sizeof needs[0]; i++)
+		if (needs[i].is_asked && !(client->welcome.capabilities & needs[i].capability))
+			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not %s (%s)", client->address, needs[i].what,
+			                client->welcome.server);
+	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
+		if (asked->planes >> plane & 1 && psr_plane_capability(plane) & ~client->welcome.capabilities)
+			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
+			                psr_plane_name(plane));
+	return PSR_OK;
+}
+
+int psr_client_frame_in(struct psr_client *client, uint16_t view, const struct psr_msg_frame *asked, uint32_t *id,
+                        struct psr_error *err)
+{
+	struct client_frame *frame = free_frame(client, view);
 	size_t start = client->out.size;
 	int code = start_request(client, err);
 
 	if (code != PSR_OK)
 		return code;
 	if (frame == NULL)
-		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address, client->welcome.max_open);
-	if (asked->base != 0 || (asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS)
-	    || asked->color_codec > PSR_CODEC_ZSTD
-	    || (asked->planes >> PSR_PLANE_DEPTH & 1 && asked->depth_format != PSR_WIRE_DEPTH_F32))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "this client asks for planes, depth as float, without budgets of time or error, or base");
-	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		if (asked->planes >> plane & 1 && psr_plane_capability(plane) & ~client->welcome.capabilities)
-			return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server does not send the %s plane", client->address,
-			                psr_plane_name(plane));
-	if (asked->pass_limit > 0 && !(client->welcome.capabilities & PSR_CAP_REFINE))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not refine frames (%s)", client->address,
-		                client->welcome.server);
-	code = psr_msg_frame_encode(&client->out, client->next_id, 0, asked, err);
+		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address,
+		                view > 0 ? PSR_WIRE_MAX_OPEN : client->welcome.max_open);
+	if (asked->color_codec > PSR_CODEC_ZSTD
+	    || (asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this client asks for frames without PNG, and without budgets of time "
+		                                          "or error");
+	if (asked->base != 0 && asked->base != psr_client_base(client, view))
+		return psr_fail(err, PSR_ERR_ARG, "frame %" PRIu32 " is no base: the last one acknowledged in view %u is %" PRIu32,
+		                asked->base, view, psr_client_base(client, view));
+	code = check_offered(client, view, asked, err);
+	if (code != PSR_OK)
+		return code;
+	code = psr_msg_frame_encode(&client->out, client->next_id, view, asked, err);
 	*id = client->next_id;
 	code = finish_request(client, start, code, "request", err);
 	if (code != PSR_OK)
 		return code;
 	client_assembly_init(&frame->assembly, asked, 0);
 	frame->id = *id;
-	frame->bytes = 0;
+	frame->view = view;
+	frame->bytes = frame->decode_ns = 0;
 	frame->sent_ns = clock_ns();
 	return PSR_OK;
+}
+
+int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *asked, uint32_t *id, struct psr_error *err)
+{
+	return psr_client_frame_in(client, 0, asked, id, err);
 }
 
 int psr_client_cancel(struct psr_client *client, uint32_t id, struct psr_error *err)
 {
 	size_t i = 0;
-	int code;
+	int code = client_check(client, err);
 
-	if (client->broken.code != PSR_OK)
-		return fail_broken(client, err);
+	if (code != PSR_OK)
+		return code;
 	while (i < PSR_WIRE_MAX_OPEN && (id == 0 || client->frame[i].id != id))
 		i++;
 	if (i == PSR_WIRE_MAX_OPEN)
 		return psr_fail(err, PSR_ERR_NOT_FOUND, "no frame %" PRIu32 " is under way", id);
-	code = psr_msg_cancel_encode(&client->out, id, 0, err);
+	code = psr_msg_cancel_encode(&client->out, id, client->frame[i].view, err);
 	if (code == PSR_ERR_MEMORY)
-		return psr_fail(err, PSR_ERR_BUSY, "%s waits for the server to take what was sent before", client->address);
-	flush_output(client);
+		return psr_fail(err, PSR_ERR_BUSY, "%s waits until the server has taken earlier requests", client->address);
+	client_flush(client);
 	return code;
+}
+
+int psr_client_pause(struct psr_client *client, uint16_t view, int is_paused, struct psr_error *err)
+{
+	size_t start = client->out.size;
+	int code = start_request(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (!(client->welcome.capabilities & PSR_CAP_PAUSE))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s does not pause views (%s)", client->address,
+		                client->welcome.server);
+	code = (is_paused ? psr_msg_pause_encode : psr_msg_resume_encode)(&client->out, client->next_id, view, err);
+	return finish_request(client, start, code, "request", err);
 }
 
 int psr_client_close_model(struct psr_client *client, uint32_t handle, struct psr_error *err)
@@ -318,4 +371,17 @@ int psr_client_close_model(struct psr_client *client, uint32_t handle, struct ps
 		return code;
 	code = psr_msg_close_encode(&client->out, client->next_id, &msg, err);
 	return finish_request(client, start, code, "request", err);
+}
+
+int psr_client_ping(struct psr_client *client, struct psr_error *err)
+{
+	const struct psr_msg_ping ping = { 0 };
+	const int code = client_check(client, err);
+
+	if (code != PSR_OK)
+		return code;
+	if (psr_msg_ping_encode(&client->out, &ping, NULL) != PSR_OK)
+		return psr_fail(err, PSR_ERR_BUSY, "%s waits for the server to take what was sent before", client->address);
+	client_flush(client);
+	return PSR_OK;
 }

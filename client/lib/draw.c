@@ -4,23 +4,6 @@
 
 #define PROGRAM "libpsrclient"
 
-/* The model's way up, as far as the server tells it. */
-static int find_up(double up[3], struct psr_client *client, uint32_t handle, int timeout_ms, struct psr_error *err)
-{
-	struct psr_msg_preset *presets = NULL;
-	uint32_t n = 0;
-	int code = PSR_OK;
-
-	memcpy(up, (const double[3]){ 0, 1, 0 }, 3 * sizeof up[0]);
-	if (client->welcome.capabilities & PSR_CAP_PRESETS)
-		code = psr_client_presets(client, handle, &presets, &n, timeout_ms, err);
-	for (uint32_t i = 0; i < n; i++)
-		if (presets[i].kind == PSR_WIRE_PRESET_CAMERA && strcmp(presets[i].name, PSR_WIRE_HOME) == 0)
-			memcpy(up, presets[i].camera.up, 3 * sizeof up[0]);
-	free(presets);
-	return code;
-}
-
 static int send_scene(struct psr_client *client, uint32_t handle, const struct psr_shot *shot,
                       const struct psr_camera *camera, struct psr_error *err)
 {
@@ -70,7 +53,7 @@ static int send_frame(struct psr_client *client, const struct psr_shot *shot, co
 	return psr_client_frame(client, &msg, id, err);
 }
 
-/* The planes of the last pass, taken out of the client. */
+/* Takes the planes of the last pass out of the client. */
 static int take_frame(struct psr_client *client, uint32_t id, struct psr_frame *frame, int timeout_ms,
                       struct psr_error *err)
 {
@@ -99,24 +82,24 @@ int psr_client_draw(struct psr_client *client, const char *model, const struct p
 	const uint32_t width = shot->settings.width, height = shot->settings.height, resolution = client->resolution;
 	struct psr_msg_opened opened;
 	struct psr_camera camera;
-	double up[3];
 	uint32_t id;
 	int code;
 
 	memset(frame, 0, sizeof *frame);
 	if (width == 0 || height == 0)
 		return psr_fail(err, PSR_ERR_ARG, "the picture has %u x %u pixels: both sides need at least 1", width, height);
+	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++)
+		if (client->frame[i].id != 0 || client->queued != NULL)
+			return psr_fail(err, PSR_ERR_BUSY, "frames are under way on this connection, or their events wait");
 	psr_client_set_resolution(client, width > height ? width : height);
 	code = psr_client_open(client, model, timeout_ms, &opened, err);
 	client->resolution = resolution;
-	if (code == PSR_OK && shot->camera == NULL)
-		code = find_up(up, client, opened.handle, timeout_ms, err);
 	if (code != PSR_OK)
 		return code;
 	if (shot->camera != NULL)
 		camera = *shot->camera;
 	else
-		psr_camera_frame(&camera, opened.box_min, opened.box_max, up, shot->fov_y, (double)width / height);
+		psr_camera_frame(&camera, opened.box_min, opened.box_max, opened.up, shot->fov_y, (double)width / height);
 	code = send_scene(client, opened.handle, shot, &camera, err);
 	if (code == PSR_OK)
 		code = send_frame(client, shot, &camera, &id, err);

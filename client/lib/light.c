@@ -2,9 +2,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/cli.h"
+#include "base/maths.h"
 #include "camera.h"
 
-#define DEGREE (3.14159265358979323846 / 180)
 
 static int parse_option(struct psr_msg_light *light, const char **at, struct psr_error *err)
 {
@@ -74,7 +74,7 @@ static int parse_spot(struct psr_msg_light *light, const char **at, struct psr_e
 		                text);
 	for (int i = 0; i < 3; i++)
 		light->direction[i] = target[i] - light->position[i];
-	light->outer = angle * DEGREE;
+	light->outer = angle * PSR_DEGREE;
 	light->inner = 0.9 * light->outer;
 	return check_direction(light->direction, "a spot cannot shine at its own position", err);
 }

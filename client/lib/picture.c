@@ -8,7 +8,7 @@
 typedef int native_writer(struct outfile *file, const struct psr_frame *picture, struct psr_error *err);
 
 struct plan {
-	native_writer *write; /* NULL: the module does it */
+	native_writer *write; /* NULL: the module writes it */
 	image_module_write *module_write;
 };
 

@@ -44,9 +44,6 @@ static int start_control(struct psr_client *client, uint16_t type, struct psr_er
 		return psr_fail(err, client->broken.code, "%s", client->broken.text);
 	if (client->control_id != 0)
 		return psr_fail(err, PSR_ERR_BUSY, "%s has not answered the request before", client->address);
-	for (size_t i = 0; i < PSR_WIRE_MAX_OPEN; i++)
-		if (client->frame[i].id != 0)
-			return psr_fail(err, PSR_ERR_BUSY, "frames are under way on this connection");
 	if (client->next_id == UINT32_MAX)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: the ids of this connection are used up; connect again",
 		                client->address);
@@ -55,7 +52,8 @@ static int start_control(struct psr_client *client, uint16_t type, struct psr_er
 	return PSR_OK;
 }
 
-/* The next answer to the control request. A silent server is asked by PING half way through the time. */
+/* Waits for the next answer to the control request, and keeps events that come before it. Half way through the time it
+ * sends a PING to a silent server. */
 static int next_answer(struct psr_client *client, int timeout_ms, struct psr_error *err)
 {
 	struct psr_event event;
@@ -68,9 +66,9 @@ static int next_answer(struct psr_client *client, int timeout_ms, struct psr_err
 
 		if (got < 0)
 			return got;
-		if (got > 0 && event.type == PSR_EVENT_FAILED)
-			return psr_fail(err, event.error.code, "%s", event.error.text);
-		if (got > 0 && client->answer != CLIENT_ANSWER_PONG)
+		if (got > 0 && event.type != 0 && client_queue_event(client, &event) != PSR_OK)
+			return client_check(client, err);
+		if (got > 0 && event.type == 0 && client->answer != CLIENT_ANSWER_PONG)
 			return client->answer == CLIENT_ANSWER_ERROR
 			           ? psr_fail(err, client->control_error.code, "%s", client->control_error.text)
 			           : PSR_OK;
@@ -86,7 +84,7 @@ static int next_answer(struct psr_client *client, int timeout_ms, struct psr_err
 	}
 }
 
-/* The request did not fit any more, or its name is none: its id was never sent. */
+/* The request was too long, or its name is not valid: its id was never sent. */
 static int withdraw(struct psr_client *client, int code)
 {
 	client->control_id = 0;

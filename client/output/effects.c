@@ -3,9 +3,9 @@
 #include "effects.h"
 #include "psr/render.h"
 
-#define LARGEST_WHY 1000 /* of no effect */
+#define LARGEST_WHY 1000 /* more than any effect's */
 
-/* The next entry of an effect that is known, from *at on; NULL: there is none. */
+/* Returns the next entry of a known effect, from *at on, or NULL. */
 static const struct psr_msg_report_entry *next(const struct psr_msg_frame_end *end, unsigned *at,
                                                enum psr_effect *effect)
 {

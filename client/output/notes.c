@@ -4,13 +4,13 @@
 #include <string.h>
 #include "base/vec.h"
 
-#define ROUGH 1.5 /* pixels between samples; finer ones look no better */
+#define ROUGH 1.5 /* pixels between samples; a smaller distance looks no better */
 #define GRID 16
-#define MOST 8192 /* resolution that psr-model builds */
-#define DRAFT 2  /* pixels of --spacing: a coarse picture was asked for */
+#define MOST 8192 /* largest resolution of psr-model build */
+#define DRAFT 2  /* pixels of --spacing: from here on the user asked for a coarse picture */
 #define STEP 128  /* of advised resolutions */
 
-/* p in the frame of the camera: right, up, forward. */
+/* Finds p in the camera's frame: right, up, forward. */
 static void project(double out[3], const struct psr_camera *camera, const double p[3])
 {
 	double forward[3], right[3], up[3], arm[3];
@@ -24,7 +24,7 @@ static void project(double out[3], const struct psr_camera *camera, const double
 	v3d_set(out, v3d_dot(arm, right), v3d_dot(arm, up), v3d_dot(arm, forward));
 }
 
-/* World units of a pixel at depth z. */
+/* Returns the size of a pixel at depth z, in world units. */
 static double pixel_at(const struct psr_camera *camera, double z, uint32_t height)
 {
 	if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
@@ -46,8 +46,8 @@ static int is_in_picture(const struct psr_camera *camera, const double seen[3], 
 	return seen[2] >= camera->near_z && seen[2] > 0 && fabs(seen[1]) <= half && fabs(seen[0]) <= half * aspect;
 }
 
-/* Depth of the nearest visible point of a grid on the faces of the model's box, whose nearest corner is often outside
- * of the picture. INFINITY: none is visible. */
+/* Returns the depth of the nearest visible point of a grid on the faces of the model's box, whose nearest corner is
+ * often outside of the picture. INFINITY: none is visible. */
 static double nearest_depth(const struct scene *scene, uint32_t instance, const struct psr_camera *camera,
                             double aspect)
 {
@@ -73,7 +73,7 @@ static double nearest_depth(const struct scene *scene, uint32_t instance, const 
 	return nearest;
 }
 
-/* A lower bound of the same; 0: the box reaches behind the camera. */
+/* Returns a lower bound of that depth; 0: the box reaches behind the camera. */
 static double depth_before(const struct scene *scene, uint32_t instance, const struct psr_camera *camera)
 {
 	const struct psr_msg_opened *opened = &scene->model[scene->model_of[instance]].opened;
@@ -145,7 +145,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 	for (uint32_t i = 0; i < scene->msg.n_instances; i++) {
 		double apart, most = apart_at(scene, i, camera, depth_before(scene, i, camera), asked->height);
 
-		if (most <= fmax(notes->coarsest, ROUGH)) /* most instances of most scenes */
+		if (most <= fmax(notes->coarsest, ROUGH)) /* true of most instances of most scenes */
 			continue;
 		apart = notes_magnification(scene, i, camera, asked->width, asked->height);
 		if (apart <= notes->coarsest)

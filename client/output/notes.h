@@ -4,12 +4,12 @@
 
 #include "client/scene/scene.h"
 
-/* Collected over all pictures of a command; each warning is printed once. */
+/* Collects warnings over all pictures of a command, and prints each once. */
 struct notes {
 	uint32_t n_pictures, n_empty, n_fewer_passes;
 	unsigned least_pass;
-	const char *why_empty;   /* of the last one */
-	double coarsest;         /* pixels between samples of the model that is magnified most */
+	const char *why_empty;   /* of the last picture */
+	double coarsest;         /* pixels between samples of the most magnified model */
 	const struct scene_model *coarsest_model;
 };
 
@@ -18,7 +18,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 
 void notes_print(const struct notes *notes, const char *program, const struct psr_msg_frame *asked);
 
-/* Pixels between neighbouring samples of instance i at its nearest visible part; 0: it is not visible. */
+/* Returns the pixels between neighbouring samples of instance i at its nearest visible part; 0: it is not visible. */
 double notes_magnification(const struct scene *scene, uint32_t i, const struct psr_camera *camera, uint32_t width,
                            uint32_t height);
 

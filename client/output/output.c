@@ -6,7 +6,7 @@
 
 #define MAX_SHEET_PIXELS (1u << 28)
 
-/* The length of the number at `at`, which is a %: 0 if it is none. */
+/* Returns the length of the number format at `at`, which is a %; 0 if it is not one. */
 static size_t number_length(const char *at)
 {
 	size_t n = 1;

@@ -8,20 +8,20 @@
 
 #define OUTPUT_STDOUT "-"
 
-/* Whether a name numbers its files by %d or %03d. ARG: another % than these and %%, or two numbers. */
+/* Returns whether a name numbers its files by %d or %03d. ARG: it has another % than these and %%, or two numbers. */
 int output_is_numbered(int *is_numbered, const char *name, struct psr_error *err);
 
-/* The name of file `number`; LIMIT: it is too long. */
+/* Makes the name of file `number`. LIMIT: it is too long. */
 int output_name(char path[PATH_MAX], const char *name, uint32_t number, struct psr_error *err);
 
-/* "4x3" of --sheet. ARG. */
+/* Reads "4x3" of --sheet. ARG. */
 struct sheet {
 	uint32_t columns, rows; /* 0: no sheet */
 	struct psr_frame picture;
 };
 int sheet_check(const struct sheet *sheet, uint32_t n_pictures, uint32_t width, uint32_t height, struct psr_error *err);
 
-/* Puts picture k (from 0) into its place; the first one makes the sheet, of this background. MEMORY. */
+/* Puts picture k (from 0) into its place; the first one makes the sheet, with this background. MEMORY. */
 int sheet_add(struct sheet *sheet, uint32_t k, const struct psr_frame *picture, const uint8_t background[3],
               struct psr_error *err);
 void sheet_fini(struct sheet *sheet);

@@ -4,12 +4,13 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/json.h"
+#include "base/maths.h"
 #include "base/outfile.h"
+#include "base/view.h"
 #include "client/replay/replay.h"
 #include "effects.h"
 #include "report.h"
 
-#define DEGREE (3.14159265358979323846 / 180)
 
 static void add_model(cJSON *to, const struct shot_facts *facts)
 {
@@ -42,19 +43,19 @@ static void add_camera(cJSON *to, const struct psr_camera *from)
 	cJSON *camera = cJSON_AddObjectToObject(to, "camera");
 	int is_perspective = from->kind == PSR_CAMERA_PERSPECTIVE;
 
-	cJSON_AddStringToObject(camera, "kind", is_perspective ? "perspective" : "orthographic");
+	cJSON_AddStringToObject(camera, "kind", view_camera_kinds[from->kind]);
 	json_add_numbers(camera, "eye", from->eye, 3);
 	json_add_numbers(camera, "target", from->target, 3);
 	json_add_numbers(camera, "up", from->up, 3);
 	json_add_number(camera, is_perspective ? "fov_deg" : "height",
-	                is_perspective ? from->fov_y / DEGREE : from->ortho_height);
+	                is_perspective ? from->fov_y / PSR_DEGREE : from->ortho_height);
 	json_add_number(camera, "near", from->near_z);
 }
 
 static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
 {
 	static const char *const stages[] = { "",      "plan", "cull",   "warp",  "gaps", "resolve",
-		                                  "shade", "fill", "encode", "queue", "total", "shadow", "smooth" };
+		                                  "shade", "fill", "encode", "queue", "total", "shadow", "smooth", "cores" };
 	static const char *const values[] = { "samples_warped", "blocks_drawn", "blocks",       "pixels_covered",
 		                                  "pixels_filled",  "samples",      "depth_levels", "lights",
 		                                  "shadow_maps",    "shadow_maps_drawn" };
@@ -63,7 +64,7 @@ static void add_stages(cJSON *to, const struct psr_msg_frame_end *end)
 	for (unsigned i = 0; i < end->n_entries; i++) {
 		const struct psr_msg_report_entry *entry = &end->entry[i];
 
-		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_SMOOTH) {
+		if (entry->id >= PSR_WIRE_REPORT_PLAN && entry->id <= PSR_WIRE_REPORT_CORES) {
 			cJSON *stage = cJSON_AddObjectToObject(times, stages[entry->id]);
 
 			cJSON_AddNumberToObject(stage, "ms", (double)entry->ns / 1e6);
@@ -125,7 +126,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	effects_add(report, event->end);
 	add_planes(report, event);
 	if (event->end->planes >> PSR_PLANE_DEPTH & 1) {
-		const double range[2] = { event->begin->depth_min, event->begin->depth_max };
+		const double range[2] = { event->end->depth_min, event->end->depth_max };
 
 		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));
 	}

@@ -6,13 +6,13 @@
 
 struct shot_facts {
 	const struct scene *scene;
-	const struct psr_msg_frame *frame; /* as asked */
+	const struct psr_msg_frame *frame; /* the request */
 	const struct psr_event *event;     /* of the frame */
-	const char *server;                /* name and version, as WELCOME has it */
+	const char *server;                /* name and version from WELCOME */
 	uint64_t start_ns;                 /* clock_ns() before anything was opened */
 };
 
-/* "-" is standard output. */
+/* Writes the report to a file; "-" is standard output. */
 int report_write(const struct shot_facts *facts, const char *path, struct psr_error *err);
 
 #endif

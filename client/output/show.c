@@ -11,6 +11,7 @@
 struct canvas {
 	const struct psr_frame *picture;
 	const struct psr_msg_frame_begin *begin;
+	const struct psr_msg_frame_end *end;
 	double forward[3];
 	uint8_t *rgb;
 };
@@ -54,7 +55,7 @@ static void set_random(uint8_t rgb[3], uint32_t number, double light)
 	set(rgb, light * color[0], light * color[1], light * color[2]);
 }
 
-/* Luminance of the picture, 0..1. */
+/* Returns the luminance of the picture, 0..1. */
 static double grey_of(const struct canvas *canvas, size_t i)
 {
 	const uint8_t *c = canvas->picture->rgb + 3 * i;
@@ -78,7 +79,7 @@ static uint32_t block_of(const struct canvas *canvas, size_t i)
 	return (uint32_t)canvas->picture->words[i] / 64;
 }
 
-/* ---- painters of samples, of pixels that have one ---- */
+/* ---- painters of pixels that have a sample ---- */
 
 static void paint_blocks(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
@@ -134,7 +135,7 @@ static void offer(uint32_t *nearest, const struct canvas *canvas, size_t i, size
 		nearest[i] = k;
 }
 
-/* Almost the nearest pixel with a sample: two passes hand on what the neighbours found. */
+/* Finds almost the nearest pixel with a sample: two passes hand on the neighbours' findings. */
 static void find_nearest(uint32_t *nearest, const struct canvas *canvas)
 {
 	size_t width = canvas->picture->width, height = canvas->picture->height, n = width * height;
@@ -185,7 +186,7 @@ static int paint_all_samples(const struct canvas *canvas, painter *paint)
 	return PSR_OK;
 }
 
-/* ---- the others ---- */
+/* ---- painters of all other pixels ---- */
 
 static int is_hole(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
@@ -220,10 +221,10 @@ static void paint_holes(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 		set(rgb, 90 * grey, 90 * grey, 90 * grey);
 }
 
-/* Evenly in 1 / z of a perspective camera, as the picture's pixels are. */
+/* Spreads greys evenly over 1 / z of a perspective camera, as its pixels are. */
 static void paint_depth(uint8_t rgb[3], const struct canvas *canvas, size_t i)
 {
-	double z = (double)canvas->picture->depth[i], near = canvas->begin->depth_min, far = canvas->begin->depth_max, part;
+	double z = (double)canvas->picture->depth[i], near = canvas->end->depth_min, far = canvas->end->depth_max, part;
 
 	if (!(z < INFINITY)) {
 		memcpy(rgb, BACKGROUND, 3);
@@ -249,6 +250,11 @@ static const struct show shows[] = {
 	{ "depth", PLANE(DEPTH), paint_depth },
 };
 
+const char *show_name(unsigned i)
+{
+	return i < sizeof shows / sizeof shows[0] ? shows[i].name : NULL;
+}
+
 const struct show *show_find(const char *name, struct psr_error *err)
 {
 	for (size_t i = 0; i < sizeof shows / sizeof shows[0]; i++)
@@ -264,30 +270,36 @@ uint32_t show_planes(const struct show *show)
 	return show->planes;
 }
 
-int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err)
+int show_paint(const struct show *show, const struct psr_frame *picture, const struct psr_msg_frame_begin *begin,
+               const struct psr_msg_frame_end *end, uint8_t *rgb)
 {
-	const struct psr_frame *picture = event->picture;
-	const struct psr_camera *camera = &event->begin->camera;
+	const struct psr_camera *camera = &begin->camera;
 	size_t n = (size_t)picture->width * picture->height;
-	struct canvas canvas = { .picture = picture, .begin = event->begin, .rgb = malloc(3 * n) };
-	struct psr_frame painted = { .width = picture->width, .height = picture->height, .rgb = canvas.rgb };
+	struct canvas canvas = { .picture = picture, .begin = begin, .end = end, .rgb = rgb };
 	double length = 0;
-	int code = PSR_OK;
 
-	if (canvas.rgb == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u pixels", picture->width,
-		                picture->height);
 	for (int a = 0; a < 3; a++)
 		length = hypot(length, camera->target[a] - camera->eye[a]);
 	for (int a = 0; a < 3; a++)
 		canvas.forward[a] = (camera->target[a] - camera->eye[a]) / length;
 	if (show->planes == OF_SAMPLES)
-		code = paint_all_samples(&canvas, show->paint);
-	else
-		for (size_t i = 0; i < n; i++)
-			show->paint(canvas.rgb + 3 * i, &canvas, i);
+		return paint_all_samples(&canvas, show->paint);
+	for (size_t i = 0; i < n; i++)
+		show->paint(rgb + 3 * i, &canvas, i);
+	return PSR_OK;
+}
+
+int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err)
+{
+	const struct psr_frame *picture = event->picture;
+	struct psr_frame painted = { .width = picture->width, .height = picture->height };
+	int code = PSR_ERR_MEMORY;
+
+	painted.rgb = malloc(3 * (size_t)picture->width * picture->height);
+	if (painted.rgb != NULL)
+		code = show_paint(show, picture, event->begin, event->end, painted.rgb);
 	code = code != PSR_OK ? psr_fail(err, code, "no memory to paint %ux%u pixels", picture->width, picture->height)
 	                      : psr_picture_write_color(&painted, path, err);
-	free(canvas.rgb);
+	free(painted.rgb);
 	return code;
 }

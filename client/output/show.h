@@ -1,4 +1,4 @@
-/* Pictures of a frame's stages, painted from its planes. */
+/* Pictures of a frame's stages, painted from the frame's planes. */
 #ifndef PSR_CLIENT_OUTPUT_SHOW_H
 #define PSR_CLIENT_OUTPUT_SHOW_H
 
@@ -8,10 +8,15 @@
 
 struct show;
 
+const char *show_name(unsigned i); /* of stage i, from 0; NULL: there are no more */
 const struct show *show_find(const char *name, struct psr_error *err); /* NULL: no such stage (ARG) */
-uint32_t show_planes(const struct show *show); /* that it needs: bits of enum psr_plane */
+uint32_t show_planes(const struct show *show); /* planes that it needs: bits of enum psr_plane */
 
-/* Paints a frame with those planes and writes it as a colour picture. */
+/* Paints a frame with those planes into rgb, 3 bytes a pixel. MEMORY. */
+int show_paint(const struct show *show, const struct psr_frame *picture, const struct psr_msg_frame_begin *begin,
+               const struct psr_msg_frame_end *end, uint8_t *rgb);
+
+/* Paints the frame of an event, and writes it as a colour picture. */
 int show_write(const struct show *show, const struct psr_event *event, const char *path, struct psr_error *err);
 
 #define SHOW_HELP \

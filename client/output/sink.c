@@ -45,7 +45,7 @@ static int write_extra(struct sink *sink, uint32_t k, const struct psr_event *ev
 	return code;
 }
 
-/* ---- animations take pictures in their order ---- */
+/* ---- animations take pictures in order ---- */
 
 static int show_picture(struct sink *sink, const struct psr_frame *picture, struct psr_error *err)
 {
@@ -90,7 +90,7 @@ static int animate(struct sink *sink, uint32_t k, const struct psr_frame *pictur
 		code = show_picture(sink, &next, err);
 		free(sink->held[i].rgb);
 		sink->held[i].rgb = NULL;
-		i = -1; /* the next one may be before it */
+		i = -1; /* the next picture may stand before this one */
 	}
 	return code;
 }

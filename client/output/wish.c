@@ -8,7 +8,7 @@ void sink_add_file_options(struct optlist *list, struct sink_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "sheet", .type = PSR_OPT_SIZE, .value = wish->sheet, .arg = "COLSxROWS", .seen = &wish->has_sheet,
-		  .help = "All pictures on one contact sheet, row by row; --size is that of each." },
+		  .help = "All pictures on one contact sheet, row by row; --size is the size of each." },
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &wish->depth, .arg = "FILE",
 		  .help = "How far each pixel is from the camera, along its view, in the model's units; +inf where nothing is. "
 		          ".pfm, .exr or .tif." },
@@ -30,7 +30,7 @@ void sink_add_developer_options(struct optlist *list, struct sink_wish *wish)
 		  .help = "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, "
 		          "weights, holes or depth." },
 		{ .name = "hash", .type = PSR_OPT_FLAG, .value = &wish->hash,
-		  .help = "Print the XXH64 of each plane as it was drawn, before its codec: `color 0123456789abcdef`." },
+		  .help = "Print the hash of each plane as it was drawn, before its codec: `color 0123456789abcdef`." },
 		{ .name = "effects", .type = PSR_OPT_FLAG, .value = &wish->effects,
 		  .help = "Print what the frame ran, and what it left out and why: `fill left out: no pixel's weight is below "
 		          "1`." },
@@ -65,7 +65,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 	const struct sink_wish *wish = sink->wish;
 
 	if (wish->plane_text != NULL && wish->show_text != NULL)
-		return psr_fail(err, PSR_ERR_ARG, "--plane and --show exclude each other: both say what -o writes");
+		return psr_fail(err, PSR_ERR_ARG, "--plane and --show exclude each other: both decide what -o writes");
 	if (wish->output == NULL && wish->show_text != NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--show paints a picture; -o FILE says where");
 	while (wish->plane_text != NULL && strcmp(psr_plane_name(sink->plane), wish->plane_text) != 0)
@@ -80,7 +80,7 @@ static int check_plane(struct sink *sink, struct psr_error *err)
 	return PSR_OK;
 }
 
-/* How -o takes n pictures. */
+/* Chooses how -o takes n pictures. */
 static int choose_kind(struct sink *sink, struct psr_error *err)
 {
 	const struct sink_wish *wish = sink->wish;

@@ -4,12 +4,13 @@
 #include <string.h>
 #include "base/infile.h"
 #include "base/json.h"
+#include "base/view.h"
 #include "replay.h"
 #include "client/lib/camera.h"
 
 #define MAX_BYTES (16 << 20)
 
-/* Reads members of a report, and notes the first that is missing or of a wrong type. */
+/* Reads members of a report; remembers the first that is missing or has a wrong type. */
 struct reader {
 	const char *missing;
 };
@@ -144,10 +145,8 @@ static uint8_t find_kind(struct reader *reader, const cJSON *from, const char *c
 
 static void read_light(struct reader *reader, struct psr_msg_light *light, const cJSON *from)
 {
-	static const char *const kinds[] = { "directional", "point", "spot" };
-
 	memset(light, 0, sizeof *light);
-	light->kind = find_kind(reader, from, kinds, 3);
+	light->kind = find_kind(reader, from, view_light_kinds, 3);
 	light->flags = get_flag(reader, from, "shadow") ? PSR_WIRE_LIGHT_SHADOW : 0;
 	get_color(reader, light->color, from, "color");
 	light->intensity = get_number(reader, from, "intensity", 0, PSR_WIRE_MAX_INTENSITY);
@@ -213,7 +212,6 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 
 int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_error *err)
 {
-	static const char *const kinds[] = { "perspective", "orthographic" };
 	struct reader reader = { NULL };
 	const cJSON *request = request_of(report), *camera = get(&reader, request, "camera");
 	double size[2] = { 0, 0 };
@@ -223,7 +221,8 @@ int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_er
 		return psr_fail(err, PSR_ERR_FORMAT, "--replay: the report's size is no size of a picture");
 	frame->width = (uint32_t)size[0];
 	frame->height = (uint32_t)size[1];
-	frame->camera.kind = find_kind(&reader, camera, kinds, 2) == 2 ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
+	frame->camera.kind = find_kind(&reader, camera, view_camera_kinds, 2) == 2 ? PSR_CAMERA_ORTHOGRAPHIC
+	                                                                           : PSR_CAMERA_PERSPECTIVE;
 	get_numbers(&reader, frame->camera.eye, camera, "eye", 3);
 	get_numbers(&reader, frame->camera.target, camera, "target", 3);
 	get_numbers(&reader, frame->camera.up, camera, "up", 3);

@@ -1,10 +1,8 @@
 #include <stdio.h>
 #include <string.h>
 #include "base/json.h"
+#include "base/view.h"
 #include "replay.h"
-
-static const char *const light_kinds[] = { "", "directional", "point", "spot" };
-static const char *const camera_kinds[] = { "perspective", "orthographic" };
 
 static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 {
@@ -18,7 +16,7 @@ static void add_light(cJSON *to, const struct psr_msg_light *light)
 {
 	cJSON *item = cJSON_CreateObject();
 
-	cJSON_AddStringToObject(item, "kind", light_kinds[light->kind]);
+	cJSON_AddStringToObject(item, "kind", view_light_kinds[light->kind - PSR_WIRE_LIGHT_DIRECTIONAL]);
 	cJSON_AddBoolToObject(item, "shadow", (light->flags & PSR_WIRE_LIGHT_SHADOW) != 0);
 	add_color(item, "color", light->color);
 	json_add_number(item, "intensity", light->intensity);
@@ -77,7 +75,7 @@ void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_f
 
 	add_scene(request, scene);
 	camera = cJSON_AddObjectToObject(request, "camera");
-	cJSON_AddStringToObject(camera, "kind", camera_kinds[frame->camera.kind]);
+	cJSON_AddStringToObject(camera, "kind", view_camera_kinds[frame->camera.kind]);
 	json_add_numbers(camera, "eye", frame->camera.eye, 3);
 	json_add_numbers(camera, "target", frame->camera.target, 3);
 	json_add_numbers(camera, "up", frame->camera.up, 3);

@@ -1,4 +1,4 @@
-/* The request in a report, from which the same frame is drawn again. */
+/* The request in a report, which draws the same frame again. */
 #ifndef PSR_CLIENT_REPLAY_REPLAY_H
 #define PSR_CLIENT_REPLAY_REPLAY_H
 
@@ -8,7 +8,7 @@
 /* Adds "request": models, instances, lights, camera, size, settings, passes, planes, codec. */
 void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_frame *frame);
 
-/* Reads a report. *report is the caller's (cJSON_Delete), also after FORMAT. NOT_FOUND, IO, LIMIT, FORMAT. */
+/* Reads a report. The caller owns *report (cJSON_Delete), also after FORMAT. NOT_FOUND, IO, LIMIT, FORMAT. */
 int replay_read(cJSON **report, const char *path, struct psr_error *err);
 
 /* Fills in the instances, for scene_open(). FORMAT: a member of the report is missing or wrong. */

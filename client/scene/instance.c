@@ -1,10 +1,10 @@
 #include "instance.h"
 #include <math.h>
 #include <string.h>
+#include "base/maths.h"
 #include "base/vec.h"
 #include "base/cli.h"
 
-#define DEGREE (3.14159265358979323846 / 180)
 #define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]"
 
 /* Rotation a, then b: the quaternion b a. */
@@ -38,8 +38,8 @@ static int parse_rotation(struct psr_msg_instance *place, const char *text, cons
 	if (!(v3d_normalize(axis, axis) > 0))
 		return psr_fail(err, PSR_ERR_ARG, "rotate=%.40s: the axis 0,0,0 has no direction", text);
 	degrees = fmod(degrees, 720);
-	v3d_scale(turn, axis, sin(degrees / 2 * DEGREE));
-	turn[3] = cos(degrees / 2 * DEGREE);
+	v3d_scale(turn, axis, sin(degrees / 2 * PSR_DEGREE));
+	turn[3] = cos(degrees / 2 * PSR_DEGREE);
 	compose(place->rotation, place->rotation, turn);
 	return PSR_OK;
 }

@@ -1,4 +1,4 @@
-/* A model and its place, as the command line has them. */
+/* A model and its place, as users write them on the command line. */
 #ifndef PSR_CLIENT_SCENE_INSTANCE_H
 #define PSR_CLIENT_SCENE_INSTANCE_H
 
@@ -6,15 +6,16 @@
 
 struct instance_wish {
 	char model[PSR_WIRE_MAX_NAME + 1];
-	struct psr_msg_instance place; /* without its handle */
-	uint32_t pixels; /* for psr_client_set_resolution(); 0: the scene's */
+	struct psr_msg_instance place; /* without a handle */
+	const char *text; /* as the user wrote it: NAME,at=...; NULL if not in one text */
+	uint32_t pixels; /* for psr_client_set_resolution(); 0: as the scene */
 };
 
-/* NAME[,at=X,Y,Z][,scale=S][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply in their order, about the
- * model's own 0,0,0, which `at` then places. ARG. */
+/* Reads NAME[,at=X,Y,Z][,scale=S][,rotate=AXIS:DEG]...: AXIS is X, Y, Z or x,y,z. Rotations apply in their order, about
+ * the model's own 0,0,0, which `at` then places. ARG. */
 int instance_parse(struct instance_wish *wish, const char *text, struct psr_error *err);
 
-/* A point, and a direction, of the model in the scene. */
+/* Finds where a point and a direction of the model are in the scene. */
 void instance_apply(double out[3], const struct psr_msg_instance *place, const double point[3]);
 void instance_rotate(double out[3], const struct psr_msg_instance *place, const double v[3]);
 

@@ -1,5 +1,6 @@
 #include <stdio.h>
 #include <string.h>
+#include "base/view.h"
 #include "preset.h"
 
 const char *preset_of_light(const char *text)
@@ -9,15 +10,35 @@ const char *preset_of_light(const char *text)
 	return strncmp(text, prefix, sizeof prefix - 1) == 0 ? text + sizeof prefix - 1 : NULL;
 }
 
+void preset_place(struct psr_msg_preset *preset, const struct psr_msg_instance *place)
+{
+	struct psr_camera *camera = &preset->camera;
+	struct psr_msg_light *light = &preset->light;
+
+	if (preset->kind == PSR_WIRE_PRESET_CAMERA) {
+		instance_apply(camera->eye, place, camera->eye);
+		instance_apply(camera->target, place, camera->target);
+		instance_rotate(camera->up, place, camera->up);
+		camera->near_z *= place->scale;
+		if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
+			camera->ortho_height *= place->scale;
+		return;
+	}
+	if (light->kind != PSR_WIRE_LIGHT_DIRECTIONAL)
+		instance_apply(light->position, place, light->position);
+	if (light->kind != PSR_WIRE_LIGHT_POINT)
+		instance_rotate(light->direction, place, light->direction);
+	light->reference *= place->scale;
+}
+
 const char *preset_type(const struct psr_msg_preset *preset)
 {
 	if (preset->kind == PSR_WIRE_PRESET_CAMERA)
-		return preset->camera.kind == PSR_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
-	return preset->light.kind == PSR_WIRE_LIGHT_DIRECTIONAL ? "directional"
-	       : preset->light.kind == PSR_WIRE_LIGHT_POINT ? "point" : "spot";
+		return view_camera_kinds[preset->camera.kind];
+	return view_light_kinds[preset->light.kind - PSR_WIRE_LIGHT_DIRECTIONAL];
 }
 
-/* Lists the names as far as they fit. */
+/* Lists as many names as fit. */
 static int fail_missing(const struct scene *scene, uint8_t kind, const char *name, struct psr_error *err)
 {
 	const char *what = kind == PSR_WIRE_PRESET_CAMERA ? "camera" : "light";
@@ -76,7 +97,7 @@ int preset_all_lights(struct psr_msg_scene *msg, const struct scene *scene, stru
 		if (scene->preset[i].kind != PSR_WIRE_PRESET_LIGHT)
 			continue;
 		if (msg->n_lights == PSR_WIRE_MAX_LIGHTS)
-			return psr_fail(err, PSR_ERR_LIMIT, "with those of the model there are more than %d lights; name some with "
+			return psr_fail(err, PSR_ERR_LIMIT, "together with the model's lights there are more than %d; name some with "
 			                "--light preset:NAME", PSR_WIRE_MAX_LIGHTS);
 		msg->light[msg->n_lights++] = scene->preset[i].light;
 		n++;

@@ -12,7 +12,7 @@ struct quality_wish {
 	int64_t passes;
 	int is_smooth, is_plain, has_spacing, has_passes;
 	const char *codec;
-	int n_said; /* options given */
+	int n_said; /* how many of these options were given */
 };
 
 void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec);

@@ -59,6 +59,7 @@ static void place_instances(struct scene *scene, const struct scene_wish *wish)
 		scene->box_min[a] = INFINITY;
 		scene->box_max[a] = -INFINITY;
 	}
+	instance_rotate(scene->up, &wish->instance[0].place, scene->model[scene->model_of[0]].opened.up);
 	msg->n_instances = (uint16_t)wish->n_instances;
 	for (uint32_t i = 0; i < wish->n_instances; i++) {
 		const struct psr_msg_opened *opened = &scene->model[scene->model_of[i]].opened;
@@ -69,27 +70,6 @@ static void place_instances(struct scene *scene, const struct scene_wish *wish)
 	}
 }
 
-static void place_preset(struct psr_msg_preset *preset, const struct psr_msg_instance *place)
-{
-	struct psr_camera *camera = &preset->camera;
-	struct psr_msg_light *light = &preset->light;
-
-	if (preset->kind == PSR_WIRE_PRESET_CAMERA) {
-		instance_apply(camera->eye, place, camera->eye);
-		instance_apply(camera->target, place, camera->target);
-		instance_rotate(camera->up, place, camera->up);
-		camera->near_z *= place->scale;
-		if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
-			camera->ortho_height *= place->scale;
-		return;
-	}
-	if (light->kind != PSR_WIRE_LIGHT_DIRECTIONAL)
-		instance_apply(light->position, place, light->position);
-	if (light->kind != PSR_WIRE_LIGHT_POINT)
-		instance_rotate(light->direction, place, light->direction);
-	light->reference *= place->scale;
-}
-
 static int get_presets(struct scene *scene, const struct scene_wish *wish, int timeout_ms, struct psr_error *err)
 {
 	int code;
@@ -98,13 +78,8 @@ static int get_presets(struct scene *scene, const struct scene_wish *wish, int t
 		return PSR_OK;
 	code = psr_client_presets(scene->client, scene->model[0].opened.handle, &scene->preset, &scene->n_presets,
 	                          timeout_ms, err);
-	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++) {
-		struct psr_msg_preset *preset = &scene->preset[i];
-
-		place_preset(preset, &wish->instance[0].place);
-		if (preset->kind == PSR_WIRE_PRESET_CAMERA && strcmp(preset->name, PSR_WIRE_HOME) == 0)
-			memcpy(scene->up, preset->camera.up, sizeof scene->up);
-	}
+	for (uint32_t i = 0; code == PSR_OK && i < scene->n_presets; i++)
+		preset_place(&scene->preset[i], &wish->instance[0].place);
 	return code;
 }
 

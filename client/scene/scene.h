@@ -12,23 +12,24 @@ struct scene_wish {
 	struct instance_wish *instance;
 	uint32_t n_instances;
 	struct psr_msg_light light[PSR_WIRE_MAX_LIGHTS];
-	const char *preset_light[PSR_WIRE_MAX_LIGHTS]; /* name of a preset for light[i]; NULL: light[i] is set */
+	const char *preset_light[PSR_WIRE_MAX_LIGHTS]; /* preset's name for light[i]; NULL: light[i] is set */
+	const char *light_text[PSR_WIRE_MAX_LIGHTS]; /* as the user wrote them */
 	uint32_t n_lights;
 	const char *lights_of; /* "model": adds all lights of the model */
 	double ambient;
 	uint8_t background[3];
 	int is_shadowed, has_ambient;
 	const char *file;
-	char *file_text; /* strings above point into it */
-	int n_said;   /* options given */
+	char *file_text; /* holds the strings above */
+	int n_said;   /* how many of these options were given */
 	uint32_t pixels; /* the greater side of the pictures */
-	int is_quiet; /* no progress on the terminal */
+	int is_quiet; /* shows no progress on the terminal */
 };
 
 void scene_wish_init(struct scene_wish *wish);
 void scene_wish_fini(struct scene_wish *wish);
 
-/* --model, --instance, --scene. Options point into *wish. */
+/* Lists --model, --instance, --scene. The options point into *wish. */
 void scene_add_model_options(struct optlist *list, struct scene_wish *wish);
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish);
 
@@ -59,16 +60,16 @@ struct scene {
 	struct psr_msg_scene msg;
 	int has_key_light;            /* scene_light() sets light[0] */
 	int is_key_shadowed;
-	double box_min[3], box_max[3]; /* of all instances, in their places */
-	double up[3];                 /* natural up of the first instance; 0, 0, 0: unknown */
+	double box_min[3], box_max[3]; /* around all instances, in their places */
+	double up[3];                 /* the first instance's natural up */
 	struct scene_model *model;    /* without duplicates */
 	uint32_t n_models;
 	uint32_t *model_of;           /* by instance */
-	struct psr_msg_preset *preset; /* of the first model, in its place */
+	struct psr_msg_preset *preset; /* the first model's, in its place */
 	uint32_t n_presets;
 };
 
-/* Opens the models, shows the progress, and gets the cameras and lights of the first. NOT_FOUND suggests a name. */
+/* Opens the models, shows the progress, and gets the first model's cameras and lights. NOT_FOUND suggests a name. */
 int scene_open(struct scene **out, const struct scene_wish *wish, struct psr_client *client, int timeout_ms,
                struct psr_error *err);
 void scene_close(struct scene *scene); /* NULL is fine */

@@ -4,7 +4,7 @@
 #include <strings.h>
 #include "base/cli.h"
 
-/* A third of the letters; fewer of short names, which all resemble each other. */
+/* Allows a third of the letters to differ; fewer in short names, which all resemble each other. */
 static size_t most_edits(size_t length)
 {
 	return length < 3 ? 1 : length < 9 ? 2 : length / 3;

@@ -2,9 +2,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/maths.h"
 #include "preset.h"
 
-#define DEGREE (3.14159265358979323846 / 180)
 
 static const struct {
 	const char *name;
@@ -105,20 +105,31 @@ static int check_ranges(const struct view_wish *wish, struct psr_error *err)
 	return PSR_OK;
 }
 
-static int find_side(struct view_wish *wish, struct psr_error *err)
+int view_side(const char *name, double angles[2])
 {
 	for (size_t i = 0; i < sizeof sides / sizeof sides[0]; i++) {
-		if (strcmp(sides[i].name, wish->view) != 0)
+		if (strcmp(sides[i].name, name) != 0)
 			continue;
-		wish->camera.azimuth = sides[i].azimuth;
-		wish->camera.elevation = sides[i].elevation;
-		return PSR_OK;
+		angles[0] = sides[i].azimuth;
+		angles[1] = sides[i].elevation;
+		return 1;
 	}
-	return psr_fail(err, PSR_ERR_ARG,
-	                "--view takes front, back, left, right, top, bottom, iso or home, not '%.40s'", wish->view);
+	return 0;
 }
 
-static int check_view(struct view_wish *wish, struct psr_error *err)
+static int find_side(struct view_wish *wish, struct psr_error *err)
+{
+	double angles[2];
+
+	if (!view_side(wish->view, angles))
+		return psr_fail(err, PSR_ERR_ARG,
+		                "--view takes front, back, left, right, top, bottom, iso or home, not '%.40s'", wish->view);
+	wish->camera.azimuth = angles[0];
+	wish->camera.elevation = angles[1];
+	return PSR_OK;
+}
+
+int view_check(struct view_wish *wish, struct psr_error *err)
 {
 	struct view_wish others = *wish;
 	int has_angle = wish->has_azimuth || wish->has_elevation;
@@ -140,7 +151,7 @@ static int check_view(struct view_wish *wish, struct psr_error *err)
 	wish->camera.has_angles =
 		!wish->camera.has_eye
 		&& (has_angle || wish->has_roll || (wish->view != NULL && strcmp(wish->view, "home") != 0));
-	wish->camera.fov_y = wish->has_ortho ? 0 : wish->fov * DEGREE;
+	wish->camera.fov_y = wish->has_ortho ? 0 : wish->fov * PSR_DEGREE;
 	return check_ranges(wish, err);
 }
 
@@ -164,7 +175,7 @@ static int add_view(struct views *views, const struct view_wish *wish, struct ps
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u cameras", views->n);
 	views->wish = grown;
 	grown[views->n] = *wish;
-	code = check_view(&grown[views->n], err);
+	code = view_check(&grown[views->n], err);
 	views->n += code == PSR_OK;
 	return code;
 }
@@ -226,10 +237,7 @@ void views_fini(struct views *views)
 
 void view_up(double up[3], const struct view_wish *wish, const struct scene *scene)
 {
-	static const double y[3] = { 0, 1, 0 };
-	int has_natural = scene->up[0] != 0 || scene->up[1] != 0 || scene->up[2] != 0;
-
-	memcpy(up, wish->camera.has_up ? wish->camera.up : has_natural ? scene->up : y, sizeof y);
+	memcpy(up, wish->camera.has_up ? wish->camera.up : scene->up, sizeof scene->up);
 }
 
 int view_place(struct psr_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,

@@ -47,6 +47,7 @@ static int on_instance(const char *text, void *userdata, struct psr_error *err)
 	struct instance_wish instance;
 	int code = instance_parse(&instance, text, err);
 
+	instance.text = text;
 	return code == PSR_OK ? add_instance(userdata, &instance, err) : code;
 }
 
@@ -60,6 +61,7 @@ static int on_light(const char *text, void *userdata, struct psr_error *err)
 	if (wish->preset_light[wish->n_lights] == NULL
 	    && psr_light_parse(&wish->light[wish->n_lights], text, err) != PSR_OK)
 		return PSR_ERR_ARG;
+	wish->light_text[wish->n_lights] = text;
 	wish->n_lights++;
 	return PSR_OK;
 }

@@ -1,0 +1,76 @@
+/* What a viewer shows, and in what light: in the words of `psr shot`, which draws the same picture from them. */
+#ifndef PSR_CLIENT_VIEW_SUBJECT_H
+#define PSR_CLIENT_VIEW_SUBJECT_H
+
+#include "client/output/show.h"
+#include "client/scene/quality.h"
+#include "client/scene/scene.h"
+#include "client/scene/view.h"
+#include "hand.h"
+#include "lens.h"
+#include "link.h"
+
+#define SUBJECT_INSTANCES 64
+#define SUBJECT_TEXT 512
+
+struct subject_instance {
+	char text[SUBJECT_TEXT];     /* NAME[,at=...][,rotate=...][,scale=...]; a NAME with =: is_plain */
+	int is_plain;                /* the text is the name alone */
+	struct link_instance link;
+};
+struct subject_light {
+	char text[SUBJECT_TEXT];     /* as --light takes it */
+	struct psr_msg_light light;  /* of preset:NAME once the models are open; kind 0 before */
+};
+
+struct subject {
+	struct subject_instance instance[SUBJECT_INSTANCES];
+	uint32_t n_instances;
+	struct subject_light light[PSR_WIRE_MAX_LIGHTS];
+	uint32_t n_lights;           /* 0 with has_key_light: one light moves with the camera */
+	int has_key_light, is_shadowed, wants_lights; /* wants_lights: all of the model, once it is open */
+	double ambient;
+	uint8_t background[3];
+	double spacing;
+	int is_smooth;
+	uint16_t passes;
+	const struct show *stage;    /* a picture of a stage in the place of colours; NULL: none */
+	const char *stage_name;
+};
+
+/* From the options of a command line. LIMIT. */
+int subject_init(struct subject *subject, const struct scene_wish *scene, const struct psr_msg_frame *quality,
+                 struct psr_error *err);
+
+/* Shows one model alone, where its file puts it; lights of its own are forgotten. ARG: no such name is possible. */
+int subject_set_model(struct subject *subject, const char *name, struct psr_error *err);
+int subject_add_model(struct subject *subject, const char *name, struct psr_error *err);      /* LIMIT */
+/* Reads the instance again from text. */
+int subject_place(struct subject *subject, uint32_t k, const char *text, struct psr_error *err);
+
+/* The key light, which moves with the camera, becomes one that stays where it is now. */
+void subject_fix_light(struct subject *subject, const struct psr_camera *camera);
+/* Turns directional light k about the camera's up and right, radians; others stay. */
+void subject_turn_light(struct subject *subject, uint32_t k, const struct psr_camera *camera, double right,
+                        double down);
+/* Light k becomes this directional one. */
+void subject_set_light(struct subject *subject, uint32_t k, const struct psr_msg_light *light);
+
+/* A camera or light that came with the first model, in its place in the scene: preset k of it. 0: there is none. */
+int subject_preset(const struct subject *subject, const struct link_scene *scene, uint32_t k,
+                   struct psr_msg_preset *preset);
+
+/* The camera of the command line, in the box of the scene. NOT_FOUND: the first model has none of that name. ARG. */
+int subject_camera(struct psr_camera *camera, const struct subject *subject, const struct link_scene *scene,
+                   const struct view_wish *wish, double aspect, struct psr_error *err);
+
+/* Finds the lights of the models (preset:NAME, and all of them). NOT_FOUND: one is not there; it is left out. */
+int subject_resolve(struct subject *subject, const struct link_scene *scene, struct psr_error *err);
+
+/* Sets all but camera and size. `instance` has room for SUBJECT_INSTANCES and lives until link_wish(). */
+void subject_wish(const struct subject *subject, struct link_wish *wish, struct link_instance *instance);
+
+/* The command line that draws this picture, for a shell; without -o FILE. The caller's (free). NULL: no memory. */
+char *subject_command(const struct subject *subject, const struct hand *hand, const char *server);
+
+#endif
