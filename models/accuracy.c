@@ -8,6 +8,7 @@
 #include "accuracy/passes.h"
 #include "accuracy/report.h"
 #include "accuracy/verdict.h"
+#include "base/maths.h"
 #include "base/netpbm.h"
 #include "base/outfile.h"
 #include "base/json.h"
@@ -18,9 +19,8 @@
 #include "psr/render.h"
 
 #define PROGRAM "psr-model accuracy"
-#define RADIANS (3.14159265358979323846 / 180)
 
-/* The frame and how it was drawn; given says what of it options gave, which win over a report. */
+/* The frame and how it was drawn. `given` tells which of it options gave; they win over a report. */
 struct frame {
 	const char *depth, *color, *report;
 	struct psr_camera camera;
@@ -41,7 +41,7 @@ static void print_text(const struct psr_accuracy *a)
 	printf("pixels that show the object          %" PRIu64 "\n", a->n_truth);
 	printf("  inside of the silhouette           %" PRIu64 "\n", a->n_inside);
 	printf("  inside and empty                   %" PRIu64 "\n", a->n_inside_empty);
-	printf("  holes                              %" PRIu64 " (%.4f %% of those inside)\n", a->n_holes,
+	printf("  holes                              %" PRIu64 " (%.4f %% of the pixels inside)\n", a->n_holes,
 	       100 * fraction(a->n_holes, a->n_inside));
 	printf("drawn over a pixel outside           %" PRIu64 "\n", a->n_outside_drawn);
 	printf("distance to the truth, in spacings   p50 %.4f, p99 %.4f, p99.9 %.4f, max %.4f of %" PRIu64 " pixels\n",
@@ -179,7 +179,7 @@ static int measure(struct result *result, const char *source, const struct frame
 	return code;
 }
 
-/* Takes from the report what no option gave. */
+/* Takes from the report everything that no option gave. */
 static int take_report(struct frame *frame, struct psr_error *err)
 {
 	struct accuracy_report report;
@@ -220,14 +220,14 @@ static int complete(struct frame *frame, int n_operands, struct psr_error *err)
 	if (frame->given.fov && frame->given.ortho)
 		return psr_fail(err, PSR_ERR_ARG, "--fov and --ortho exclude each other");
 	frame->camera.kind = frame->given.ortho ? PSR_CAMERA_ORTHOGRAPHIC : PSR_CAMERA_PERSPECTIVE;
-	frame->camera.fov_y = frame->fov * RADIANS;
+	frame->camera.fov_y = frame->fov * PSR_DEGREE;
 	frame->spacing_px = 1;
 	if (frame->report != NULL)
 		return take_report(frame, err);
 	if (!frame->given.eye || !frame->given.target || !frame->given.up)
-		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --eye, --target and --up: those of the frame");
+		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --eye, --target and --up of the frame");
 	if (!frame->given.fov && !frame->given.ortho)
-		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or one of --fov and --ortho: that of the frame");
+		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --fov or --ortho of the frame");
 	if (!frame->given.spacing)
 		return psr_fail(err, PSR_ERR_ARG, "--report FRAME.json is needed, or --spacing; psr-model info prints it");
 	return PSR_OK;
@@ -309,7 +309,7 @@ int cmd_accuracy(int argc, char **argv)
 		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
 		  .help = "Compares shadows as well: a frame drawn with --ambient 0 and one light, which casts them." },
 		{ .name = "lit", .type = PSR_OPT_STRING, .value = &shadow.lit, .arg = "FRAME.ppm",
-		  .help = "The same frame, whose light casts none." },
+		  .help = "The same frame without shadows." },
 		{ .name = "sun", .type = PSR_OPT_VEC3, .value = shadow.light.direction, .arg = "X,Y,Z",
 		  .help = "The direction of that light, if it is a dir: light.", .seen = &sun },
 		{ .name = "lamp", .type = PSR_OPT_VEC3, .value = shadow.light.position, .arg = "X,Y,Z",
@@ -330,7 +330,7 @@ int cmd_accuracy(int argc, char **argv)
 		         "       psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
 		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]\n"
 		         "       psr-model accuracy SOURCE --model FILE.psr --passes N [--magnification M]",
-		.summary = "Says whether a frame shows what it should: compares its depth (and colours) with the same view of SOURCE,"
+		.summary = "Checks a frame: compares its depth (and colours) with the same view of SOURCE,"
 		           " the mesh that its model was built from, ray-traced. The last line is the verdict.",
 		.opts = opts,
 		.footer = "example:\n"

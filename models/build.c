@@ -7,6 +7,7 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "base/maths.h"
 #include "base/outfile.h"
 #include "psr/build.h"
 #include "base/cli.h"
@@ -14,7 +15,6 @@
 #include "model/blocks.h"
 
 #define PROGRAM "psr-model build"
-#define RADIANS (3.14159265358979323846 / 180)
 #define BAR_WIDTH 32
 #define FORMATS \
 	"IN is told by its first bytes and its ending:\n" \
@@ -24,7 +24,8 @@
 	"              EXT_texture_webp\n" \
 	"  PLY         meshes and clouds; text and binary\n" \
 	"  LAS         clouds of versions 1.0 to 1.4; not compressed ones (LAZ)\n" \
-	"  the others  OBJ, STL, OFF, 3DS, Collada and what else Assimp reads"
+	"  PCD         clouds of the Point Cloud Library; text, binary and compressed\n" \
+	"  the others  OBJ, STL, OFF, 3DS, Collada and other formats that Assimp reads"
 
 struct progress {
 	int fd;     /* -1: none */
@@ -109,7 +110,7 @@ static void summarize(const char *out, const struct psr_mesh *mesh, const struct
 	       report->seconds_total, report->seconds_rays, report->seconds_select);
 }
 
-/* What options ask for. */
+/* The wishes of the command line. */
 struct wish {
 	struct psr_import_options import;
 	struct psr_build_options build;
@@ -170,7 +171,7 @@ int cmd_build(int argc, char **argv)
 		          " takes four times the memory.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = wish.build.up, .arg = "X,Y,Z",
 		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
-		          " usual for the format, +z for LAS, STL and survey coordinates, +y for the others." },
+		          " usual for the format, +z for LAS, PCD, STL and survey coordinates, +y for the others." },
 		{ .name = "crease", .type = PSR_OPT_REAL, .value = &crease, .arg = "DEG",
 		  .help = "Edges stay sharp where faces meet at a greater angle, in files that bring no directions of shading"
 		          " (normals). Lower it where edges look rounded; raise it where a smooth surface shows facets.",
@@ -182,7 +183,7 @@ int cmd_build(int argc, char **argv)
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
 		{ .name = "quiet", .letter = 'q', .type = PSR_OPT_FLAG, .value = &wish.quiet,
-		  .help = "Prints errors only: no progress, no warnings of what is left out, no summary." },
+		  .help = "Prints errors only: no progress, no warnings about parts left out, no summary." },
 		{ .name = "For developers", .type = PSR_OPT_HEADING },
 		{ .name = "tolerance", .type = PSR_OPT_REAL, .value = &tolerance, .arg = "DEG",
 		  .help = "The greatest angle between a surface and the plane of the projection that samples it; docs/studies.md"
@@ -203,8 +204,8 @@ int cmd_build(int argc, char **argv)
 	psr_import_options_default(&wish.import);
 	psr_build_options_default(&wish.build);
 	resolution = wish.build.resolution;
-	tolerance = wish.build.tolerance / RADIANS;
-	crease = wish.import.crease / RADIANS;
+	tolerance = wish.build.tolerance / PSR_DEGREE;
+	crease = wish.import.crease / PSR_DEGREE;
 	n_threads = wish.build.n_threads;
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
@@ -216,9 +217,9 @@ int cmd_build(int argc, char **argv)
 	if (code != PSR_OK)
 		return psr_cli_fail(PROGRAM, &err);
 	wish.build.resolution = (uint32_t)resolution;
-	wish.build.tolerance = tolerance * RADIANS;
+	wish.build.tolerance = tolerance * PSR_DEGREE;
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
-	wish.import.crease = crease * RADIANS;
+	wish.import.crease = crease * PSR_DEGREE;
 	wish.build.on_progress = on_progress;
 	wish.build.userdata = &progress;
 	progress.fd = (int)fd;

@@ -1,5 +1,5 @@
-/* The subcommands of psr-model. Each gets argv with its own name in argv[0] and returns the exit status of the program
- * (psr/error.h has the table); what it has to say about a failure stands on standard error by then. */
+/* The subcommands of psr-model. Each gets argv with its own name in argv[0], reports failures on standard error, and
+ * returns the exit status of the program (psr/error.h has the table). */
 #ifndef MODELS_COMMANDS_H
 #define MODELS_COMMANDS_H
 

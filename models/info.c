@@ -6,11 +6,12 @@
 #include "base/cli.h"
 #include "base/json.h"
 #include "base/outfile.h"
+#include "base/view.h"
 #include "model/blocks.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 
-/* What both forms of the answer say. */
+/* The facts that both forms of the answer give. */
 struct summary {
 	char name[256];
 	char id[JSON_ID_TEXT];
@@ -87,24 +88,14 @@ static void print_share(const char *label, uint64_t n, uint64_t n_trials, const 
 		       grouped(all, n_trials), what, ratio((double)n, (double)n_trials) * 100);
 }
 
-static const char *camera_kind(const struct psr_camera *camera)
-{
-	return camera->kind == PSR_CAMERA_PERSPECTIVE ? "perspective" : "orthographic";
-}
-
-static const char *light_kind(const struct psr_light *light)
-{
-	return light->kind == PSR_LIGHT_DIRECTIONAL ? "directional" : light->kind == PSR_LIGHT_POINT ? "point" : "spot";
-}
-
 static void print_presets(const struct psr_presets *p)
 {
 	printf("cameras           %" PRIu32 "\n", p->n_cameras);
 	for (uint32_t i = 0; i < p->n_cameras; i++)
-		printf("  %-12s    %s\n", camera_kind(&p->camera[i].camera), p->camera[i].name);
+		printf("  %-12s    %s\n", view_camera_kinds[p->camera[i].camera.kind], p->camera[i].name);
 	printf("lights            %" PRIu32 "\n", p->n_lights);
 	for (uint32_t i = 0; i < p->n_lights; i++)
-		printf("  %-12s    %s\n", light_kind(&p->light[i].light), p->light[i].name);
+		printf("  %-12s    %s\n", view_light_kinds[p->light[i].light.kind], p->light[i].name);
 }
 
 static void print_text(const struct summary *s)
@@ -191,10 +182,10 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	}
 	part = cJSON_AddArrayToObject(root, "cameras");
 	for (uint32_t i = 0; i < s->presets->n_cameras; i++)
-		add_preset(part, s->presets->camera[i].name, camera_kind(&s->presets->camera[i].camera));
+		add_preset(part, s->presets->camera[i].name, view_camera_kinds[s->presets->camera[i].camera.kind]);
 	part = cJSON_AddArrayToObject(root, "lights");
 	for (uint32_t i = 0; i < s->presets->n_lights; i++)
-		add_preset(part, s->presets->light[i].name, light_kind(&s->presets->light[i].light));
+		add_preset(part, s->presets->light[i].name, view_light_kinds[s->presets->light[i].light.kind]);
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
 	cJSON_AddNumberToObject(root, "file_bytes", (double)s->file_bytes);
 	cJSON_AddBoolToObject(root, "is_packed", s->is_packed);
@@ -232,7 +223,7 @@ int cmd_info(int argc, char **argv)
 	};
 	const struct psr_cli cli = {
 		.usage = "psr-model info FILE.psr [--json]",
-		.summary = "Checks a .psr file and says what is in it. Lengths are in the source file's units.",
+		.summary = "Checks a .psr file and describes its content. Lengths are in the source file's units.",
 		.opts = opts,
 		.footer = NULL,
 	};

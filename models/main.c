@@ -9,8 +9,8 @@ static const struct command {
 	const char *name, *summary;
 	int (*run)(int argc, char **argv);
 } commands[] = {
-	{ "build", "turn a mesh or scan (glTF, OBJ, PLY, STL, LAS, ...) into a .psr model", cmd_build },
-	{ "info", "check a .psr file and say what is in it", cmd_info },
+	{ "build", "turn a mesh or scan (glTF, OBJ, PLY, STL, LAS, PCD, ...) into a .psr model", cmd_build },
+	{ "info", "check a .psr file and describe its content", cmd_info },
 	{ "make", "generate one of fourteen models to try things with, as glTF", cmd_make },
 	{ "accuracy", "say whether a picture is right, beside the ray-traced mesh", cmd_accuracy },
 };

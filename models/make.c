@@ -77,7 +77,7 @@ int cmd_make(int argc, char **argv)
 	const struct psr_opt opts[] = {
 		{ .name = "output", .letter = 'o', .type = PSR_OPT_STRING, .value = &path, .arg = "OUT",
 		  .help = "The file to write; for `all` the folder." },
-		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "Prints the names, and what each shows." },
+		{ .name = "list", .type = PSR_OPT_FLAG, .value = &list, .help = "Prints the names, and a description of each." },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {

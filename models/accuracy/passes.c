@@ -12,7 +12,7 @@
 
 #define FOV (35 * 3.14159265358979323846 / 180)
 #define RAYS 16  /* along the side of a pixel */
-#define TRIALS 3 /* of a pass, of which the quickest counts */
+#define TRIALS 3 /* runs of a pass; the quickest counts */
 #define MOST_SIDE 4096
 
 struct passes {

@@ -5,11 +5,11 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/infile.h"
+#include "base/maths.h"
 
-#define RADIANS (3.14159265358979323846 / 180)
 #define MOST_BYTES (4 << 20)
 
-/* Whether there are n finite numbers of this name; one stands alone, several in an array. */
+/* Returns whether there are n finite numbers of this name: one alone, several in an array. */
 static int take(double *v, int n, const cJSON *object, const char *name)
 {
 	const cJSON *item = cJSON_GetObjectItemCaseSensitive(object, name);
@@ -40,11 +40,12 @@ static int take_camera(struct psr_camera *camera, const cJSON *report)
 	if (is_orthographic)
 		camera->ortho_height = extent;
 	else
-		camera->fov_y = extent * RADIANS;
+		camera->fov_y = extent * PSR_DEGREE;
 	return 1;
 }
 
-/* One instance, where the source file has it; a report without instances is of such a picture. */
+/* The picture must have one instance, at its place in the source file; a report without instances is of such a
+ * picture. */
 static int is_plain(const cJSON *report)
 {
 	static const double rotation[4] = { 0, 0, 0, 1 }, translation[3] = { 0, 0, 0 };

@@ -14,8 +14,8 @@ struct accuracy_report {
 	int is_smooth;
 };
 
-/* NOT_FOUND, IO; FORMAT: no such report; UNSUPPORTED: of a picture of several models, or of one that was moved;
- * MEMORY. */
+/* Reads a report. NOT_FOUND, IO; FORMAT: it is not a report; UNSUPPORTED: the picture shows several models, or one that
+ * was moved; MEMORY. */
 int accuracy_report_read(struct accuracy_report *out, const char *path, struct psr_error *err);
 
 #endif

@@ -15,8 +15,8 @@ struct limits {
 	uint64_t outside;
 };
 
-/* World width of a pixel at the 99th percentile of what is drawn, and how many pixels are; a few wild depths do not
- * count, and the other bounds see them. */
+/* World width of a pixel at the 99th percentile of the drawn depths, and the number of drawn pixels. A few wild depths
+ * do not count; the other bounds see them. */
 static double find_pixel(uint64_t *n_drawn, const struct accuracy_frame *frame)
 {
 	const struct psr_camera *camera = frame->camera;

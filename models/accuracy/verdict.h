@@ -1,4 +1,4 @@
-/* What a person wants to know of a comparison: is the picture right? */
+/* The answer to the question of a comparison: is the picture right? */
 #ifndef MODELS_ACCURACY_VERDICT_H
 #define MODELS_ACCURACY_VERDICT_H
 

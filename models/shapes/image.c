@@ -128,7 +128,7 @@ static uint32_t crc32_of(const uint8_t *bytes, size_t n)
 	return ~crc;
 }
 
-/* A chunk whose n bytes of data stand at out + 8 already. Returns what follows it. */
+/* Completes a chunk whose n bytes of data stand at out + 8 already. Returns the end of the chunk. */
 static uint8_t *put_chunk(uint8_t *out, const char type[4], uint32_t n)
 {
 	put_be32(out, n);

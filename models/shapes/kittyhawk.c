@@ -13,7 +13,7 @@
 #define DROOP 0.12     /* of the wings' tips */
 #define STRUT 0.022
 #define WIRE 0.0045
-#define BAYS 8         /* of the cells between the struts, the middle one is that of the pilot */
+#define BAYS 8         /* cells between the struts; the pilot's is the middle one */
 
 enum { MUSLIN, SPRUCE, WIRES, ENGINE, RADIATOR, CHAIN, PILOT, SUIT, N_MATERIALS };
 

@@ -70,7 +70,7 @@ static void place_twig(struct shape *shape, uint32_t part, const double at[3], c
 	shape_place(shape, part, turn, at);
 }
 
-/* What branches carry. */
+/* The twigs and the cone that branches carry. */
 struct parts {
 	uint32_t twig[2], cone;
 };

@@ -1,9 +1,9 @@
-/* Triangle meshes under construction: what the generators fill and glb.c writes.
+/* Triangle meshes under construction: the generators fill them, and glb.c writes them.
  *
  * Object space is right-handed, +Y up. Triangles are counter-clockwise seen from outside. Everything is computed in
- * doubles with + - * / and sqrt alone and rounded once, to float, when a vertex is added: the same bytes everywhere.
- * A failed allocation is remembered in `failed`, and whatever is added later is dropped, so that a generator need not
- * look at every call; glb_write and shape_check report it. */
+ * doubles with + - * / and sqrt alone and rounded once, to float, when a vertex is added: the same bytes everywhere. A
+ * failed allocation is remembered in `failed`, and all later additions are dropped, so that a generator need not look
+ * at every call; glb_write and shape_check report it. */
 #ifndef MODELS_SHAPE_H
 #define MODELS_SHAPE_H
 
@@ -98,10 +98,10 @@ void shape_move(struct shape *shape, uint32_t first, const double turn[3][3], co
 void shape_shift(struct shape *shape, uint32_t first, const double move[3]); /* without a turn */
 extern const double shape_straight[3][3];                                    /* no turn */
 
-/* The same as shape_move for any m with det m > 0; the normals become those of the moved surface. */
+/* shape_move() for any m with det m > 0; the normals become those of the moved surface. */
 void shape_transform(struct shape *shape, uint32_t first, const double m[3][3], const double move[3]);
 
-/* Where the vertices from `first` on lie in their picture, v downwards: u . (x, y, z, 1) and v . (x, y, z, 1). */
+/* Sets where the vertices from `first` on lie in their picture, v downwards: u . (x, y, z, 1) and v . (x, y, z, 1). */
 void shape_map(struct shape *shape, uint32_t first, const double u[4], const double v[4]);
 
 #endif

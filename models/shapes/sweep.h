@@ -11,11 +11,11 @@ void sweep_angle(double turns, double *c, double *s);
 /* A rotation that turns +Y into `axis` (unit). */
 void sweep_frame(const double axis[3], double turn[3][3]);
 
-/* Turns what was made around +Y from the origin on so that it points from a towards b, and moves it to a. */
+/* Turns a shape made around +Y from the origin on so that it points from a towards b, and moves it to a. */
 void sweep_along(struct shape *shape, uint32_t first, const double a[3], const double b[3]);
 
-/* The vertices' normals from their places: the sum of those of the quads around, weighted by area. A first or last row
- * that is one point has one normal, unless it is a sharp tip. */
+/* Computes the vertices' normals from their places: each is the sum of the normals of the quads around it, weighted by
+ * area. A first or last row that is one point has one normal, unless it is a sharp tip. */
 void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, int wrap_rows, int wrap_cols);
 
 struct sweep_grid {

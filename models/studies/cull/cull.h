@@ -32,13 +32,13 @@ struct cull_eye {
  * zoom > 1 the picture shows a part of that, 1 / zoom wide, around a random place in the sphere. */
 void cull_eye_place(struct cull_eye *eye, uint32_t which, double zoom);
 
-/* part.c: the blocks of level 0 of which is_kept[b] is not 0 (all of them if is_kept is NULL), in their order, without
- * cones and masks; world coordinates of an untransformed instance are inner ones. index (may be NULL): the blocks'
- * numbers in `model`. ARG if none is kept, MEMORY. */
+/* part.c: makes a model of the blocks of level 0 whose is_kept[b] is not 0 (all of them if is_kept is NULL), in their
+ * order, without cones and masks; world coordinates of an untransformed instance are inner ones. index (may be NULL):
+ * the blocks' numbers in `model`. ARG if no block is kept, MEMORY. */
 int cull_part(struct psr_model **out, const struct psr_model *model, const uint8_t *is_kept, uint32_t *index,
               struct psr_error *err);
 
-/* What tests need of level 0. */
+/* The parts of level 0 that tests need. */
 struct cull_set {
 	struct psr_model *model; /* with its cones; its own masks are not read */
 	struct psr_model *base;  /* level 0 alone, without cones and masks; block b is the set's */

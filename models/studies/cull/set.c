@@ -141,7 +141,7 @@ static void interval(float c, float r, float z0, float z1, double *low, double *
 	*high = (double)((c + r) / (c + r < 0 ? z1 : z0));
 }
 
-/* The smallest node that holds a sphere; that of the whole screen for spheres at the eye. */
+/* Returns the smallest node that holds a sphere; the whole screen's for spheres at the eye. */
 static int node_of(const struct screen *screen, const struct lens *lens, const float c[3], float r)
 {
 	double low[2], high[2];

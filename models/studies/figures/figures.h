@@ -22,7 +22,7 @@ int figure_model_load(struct figure_model *model, struct study *study, const cha
                       void (*make)(struct shape *), uint32_t resolution);
 void figure_model_fini(struct figure_model *model); /* a zeroed one is fine */
 
-/* What is drawn. The scene points into it: copy it by figure_shot_copy(). */
+/* A picture to draw. The scene points into it: copy it by figure_shot_copy(). */
 struct figure_shot {
 	struct psr_scene scene;
 	struct render_settings settings;
@@ -73,7 +73,7 @@ struct figure_score {
 int figure_score_add(struct figure_score *score, struct study *study, const struct figure_model *model,
                      const struct figure_shot *shot, const struct psr_frame *frame,
                      const struct figure_truth *truth);
-/* The same of the colours alone. */
+/* Does the same with the colours alone. */
 void figure_score_colors(struct figure_score *score, const struct psr_frame *frame,
                          const struct figure_truth *truth);
 void figure_score_print_head(const char *first);

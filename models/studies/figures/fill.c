@@ -19,7 +19,7 @@ struct filling {
 	uint8_t *weights;             /* as greys */
 };
 
-/* What pixels keep of their own samples; gaps are white. */
+/* Paints how much pixels keep of their own samples; gaps are white. */
 static void show_gaps(struct filling *f)
 {
 	for (size_t i = 0; i < PIXELS; i++) {

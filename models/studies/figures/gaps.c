@@ -1,4 +1,4 @@
-/* Figures 4.9, 7.2 and 9.3: what is done about gaps. */
+/* Figures 4.9, 7.2 and 9.3: ways to close gaps. */
 #include <math.h>
 #include <stdlib.h>
 #include "base/maths.h"
@@ -115,7 +115,7 @@ static void find_weights(struct cover *cover, const struct psr_zstack *stack, co
 		}
 }
 
-/* Gives back to pixels what the greatest coverage would leave them of their own samples. */
+/* Gives back to pixels the share that the greatest coverage would leave them of their own samples. */
 static void open_interfaces(struct psr_frame *frame, const struct psr_frame *raw, const struct cover *cover)
 {
 	for (size_t at = 0; at < (size_t)frame->width * frame->width; at++) {

@@ -1,4 +1,4 @@
-/* Figures 8.1, 9.1 and 9.4: the standard set, edges, and what is thin. */
+/* Figures 8.1, 9.1 and 9.4: the standard set, edges, and thin things. */
 #include <math.h>
 #include "base/srgb.h"
 #include "figures.h"

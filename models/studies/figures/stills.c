@@ -1,11 +1,11 @@
-/* Section 9.1.1: what a model's resolution and passes of refinement give, and take. */
+/* Section 9.1.1: gains and costs of a model's resolution and of passes of refinement. */
 #include <math.h>
 #include "base/clock.h"
 #include "figures.h"
 
 #define SIDE 256
 #define RAYS 16   /* along the side of a pixel */
-#define TRIALS 3  /* of which the quickest counts */
+#define TRIALS 3  /* runs; the quickest counts */
 #define FINEST 1024
 
 struct still {

@@ -51,8 +51,8 @@ static void look_up(struct place *place, const struct figure_model *model, const
 	place->is_unlit = PSR_ATTR_UNLIT(attr) != 0;
 }
 
-/* How much of a light gets to the place but for what stands between; where it comes from, and how far away that
- * is, in inner units. */
+/* How much of a light gets to the place if no surface stands between; from where, and from how far away, in inner
+ * units. */
 static double light_amount(const struct psr_light *light, const struct figure_model *model, const struct place *place,
                            double to_light[3], double *distance)
 {

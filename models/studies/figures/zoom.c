@@ -1,4 +1,4 @@
-/* A zoom path: how far each frame is from the truth, and how much it changes beyond what the truth changes. */
+/* A zoom path: how far each frame is from the truth, and how much more it changes than the truth does. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

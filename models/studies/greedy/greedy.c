@@ -59,7 +59,7 @@ static int start(struct greedy *greedy, int side)
 	return job.failed ? PSR_ERR_MEMORY : PSR_OK;
 }
 
-/* Adds the blocks that S lacks, or removes those that it does not need. */
+/* Adds the blocks that S lacks, or removes blocks that it does not need. */
 static int visit(struct greedy *greedy, int v, const struct greedy_select_options *options,
                  struct greedy_strictness strictness)
 {

@@ -85,8 +85,8 @@ struct greedy {
 	double seconds_scan;
 };
 
-/* Traces every projection but the scouts. The model, of which it reads mesh, scene and scale, and the pool, which may be
- * NULL, must outlive it. MEMORY. */
+/* Traces every projection but the scouts. The model (mesh, scene, scale) and the pool, which may be NULL, must outlive
+ * it. MEMORY. */
 int greedy_create(struct greedy **out, const struct study_model *model, const struct greedy_scan_options *options,
                   struct psr_pool *pool, struct psr_error *err);
 void greedy_destroy(struct greedy *greedy); /* NULL is fine */
@@ -98,10 +98,10 @@ struct greedy_select_options {
 	int is_strict_first;       /* a sweep before, in which only samples within the tolerance angle choose blocks */
 	int forgives_outlines;     /* a sample seen at over 60 degrees chooses only where its surface is not there within
 	                            * half a pixel more */
-	double depth_tolerance;    /* how far apart depths may be to be of one surface, as a part of what its slope and the
-	                            * size of a pixel explain: 1; [G] does not say */
-	int goes_on;               /* from what the last selection kept, with the same side: the first pass, or the order by
-	                            * score, is not repeated */
+	double depth_tolerance;    /* how far apart depths of one surface may be, as a part of the difference that its slope
+	                            * and the size of a pixel explain: 1; [G] does not say */
+	int goes_on;               /* begins with the last selection's samples, of the same side: does not repeat the first
+	                            * pass, or the order by score */
 	int second_pass;           /* [G] 5.2: in the same order, blocks that are no longer needed are removed */
 	int by_score;              /* [G] 9.2.2 instead of both passes: all blocks from the worst to the best by the
 	                            * deviation of their normals from the projection, each dropped that no test view needs */
@@ -113,13 +113,13 @@ void greedy_select_default(struct greedy_select_options *options);
 
 struct greedy_result {
 	uint64_t n_blocks, n_samples; /* kept; samples: valid ones */
-	uint64_t n_lanes;             /* n_blocks * side^2: what warping costs */
+	uint64_t n_lanes;             /* n_blocks * side^2: warping costs that much */
 	uint64_t n_bytes;             /* as our file would take, without its fixed parts */
 	uint64_t n_first_pass;        /* blocks before the second pass, or before they were dropped by score */
 	double seconds;                /* of this call */
 };
 
-/* Marks what is kept. Without goes_on the result depends on nothing that was selected before. MEMORY. */
+/* Marks the kept samples. Without goes_on the result does not depend on earlier selections. MEMORY. */
 int greedy_select(struct greedy *greedy, const struct greedy_select_options *options, struct greedy_result *result,
                   struct psr_error *err);
 
@@ -128,7 +128,8 @@ int greedy_select(struct greedy *greedy, const struct greedy_select_options *opt
 int greedy_take_model(struct greedy **out, const struct psr_blocks *blocks, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
 
-/* The same of a draft (sample/levels/draft.h) of one level and these projections, GREEDY_MOST_VIEWS at most. MEMORY. */
+/* Does the same for a draft (sample/levels/draft.h) of one level and these projections, GREEDY_MOST_VIEWS at most.
+ * MEMORY. */
 struct draft;
 int greedy_take_draft(struct greedy **out, const struct draft *draft, unsigned n_projections, uint32_t resolution,
                       struct greedy_result *result, struct psr_error *err);
@@ -144,7 +145,7 @@ void greedy_samples(const struct greedy *greedy, struct trials_sample *sample);
 
 struct greedy_warp;
 
-/* Copies what is kept. MEMORY. */
+/* Copies the kept blocks. MEMORY. */
 int greedy_warp_create(struct greedy_warp **out, const struct greedy *greedy, struct psr_error *err);
 void greedy_warp_destroy(struct greedy_warp *warp); /* NULL is fine */
 

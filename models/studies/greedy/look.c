@@ -20,7 +20,7 @@ struct look {
 	const struct greedy_select_options *options;
 	int view;
 	struct greedy_facing facing;
-	struct trials_seen *seen; /* of each view's kept samples those that count, from first[view] on */
+	struct trials_seen *seen; /* of each view's kept samples the ones that count, from first[view] on */
 	size_t first[GREEDY_MOST_VIEWS];
 	uint32_t n_seen[GREEDY_MOST_VIEWS];
 	struct candidate *candidate;
@@ -99,8 +99,8 @@ static void take_candidates(struct look *look, struct greedy_strictness strictne
 	}
 }
 
-/* Whether S has a point as near as this candidate in its pixel; or one of the same surface in those at the corners of a
- * pixel around it. */
+/* Whether S has a point as near as this candidate in its pixel, or a point of the same surface in the pixels at the
+ * corners of a pixel around it. */
 static int is_there(const float *z, const struct greedy_grid *grid, const struct candidate *candidate)
 {
 	static const float corner[4][2] = { { -0.5f, -0.5f }, { 0.5f, -0.5f }, { -0.5f, 0.5f }, { 0.5f, 0.5f } };

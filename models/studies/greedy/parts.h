@@ -17,8 +17,7 @@ void greedy_make_views(struct greedy *greedy);
 
 /* ---- scan.c ---- */
 
-/* Traces a view, of which no sample is there yet; or of every `stride` rows and columns of 8x8 blocks only one.
- * MEMORY. */
+/* Traces a view, which must be empty; or only one in `stride` rows and columns of its 8x8 blocks. MEMORY. */
 int greedy_trace(struct greedy *greedy, int view, int stride);
 void greedy_forget(struct greedy_view *view); /* its samples and blocks */
 
@@ -51,7 +50,7 @@ static inline uint32_t greedy_pixel(const struct greedy_grid *grid, const struct
 	return v * grid->side + u;
 }
 
-/* Whether each of the quantised normals is turned to the viewer of this frame. */
+/* Returns for each of the quantised normals whether it is turned to the viewer of this frame. */
 struct greedy_facing {
 	uint64_t bit[PSR_DIRECTIONS / 64];
 };
@@ -66,9 +65,9 @@ static inline int greedy_counts(const struct greedy_facing *facing, const struct
 
 /* Which samples of a view may choose blocks. */
 struct greedy_strictness {
-	float least_cosine;  /* those seen at this cosine or more */
-	float lenient_below; /* those seen at less are forgiven half a pixel */
-	int kept_only;       /* those of blocks that are kept */
+	float least_cosine;  /* only samples seen at this cosine or more */
+	float lenient_below; /* samples seen at less are forgiven half a pixel */
+	int kept_only;       /* only samples of kept blocks */
 };
 
 /* Marks in is_missed the blocks of a view that have a sample that the kept samples of all other views, and of none of
@@ -78,7 +77,7 @@ int greedy_find_missed(const struct greedy *greedy, int view, const struct greed
 
 /* ---- prune.c ---- */
 
-/* Goes through what is kept, blocks or single samples, from the worst seen to the best, and drops what no test of any
+/* Goes through the kept blocks or single samples, from the worst seen to the best, and drops each that no test of any
  * view needs. MEMORY. */
 int greedy_prune(struct greedy *greedy, const struct greedy_select_options *options, int is_by_sample);
 

@@ -59,7 +59,7 @@ static void ask(struct prune *prune, int v)
 		table->need[i] = table->need[i] == -INFINITY ? INFINITY : table->need[i];
 }
 
-/* What a view asks for, and how often it is there. */
+/* Which samples a view asks for, and how often each is there. */
 static void fill_table(int v, void *userdata)
 {
 	struct prune *prune = userdata;

@@ -24,7 +24,7 @@ static int add_corners(double (*direction)[3], int n, int level)
 	return n;
 }
 
-/* Each followed by its opposite, as the first two of [G] 5.2 are; what is far apart, first. */
+/* Each is followed by its opposite, as the first two of [G] 5.2 are; views far apart come first. */
 static int add_centers(double (*direction)[3])
 {
 	int n = 0;

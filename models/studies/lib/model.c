@@ -35,7 +35,7 @@ static int import_shape(struct psr_mesh **mesh, const struct shape *shape, const
 	return code;
 }
 
-/* What follows from the mesh, if `code` says that there is one. */
+/* Makes everything that follows from the mesh, if `code` says that there is one. */
 static int prepare(struct study_model *model, int code, struct psr_error *err)
 {
 	if (code == PSR_OK)
@@ -87,7 +87,7 @@ void study_model_fini(struct study_model *model)
 	memset(model, 0, sizeof *model);
 }
 
-/* Only a generator's name says what the model is. */
+/* Only a generator's name tells what the model shows. */
 static int kept_path(char path[1024], const struct study *study, const struct study_model *model)
 {
 	return study->keep != NULL && strchr(model->name, '.') == NULL

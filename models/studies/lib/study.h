@@ -57,7 +57,7 @@ void study_table_print(const struct study_table *table, FILE *to);
 
 /* ---- model.c ---- */
 
-/* A mesh, and what follows from it. */
+/* A mesh, and everything computed from it. */
 struct study_model {
 	char name[64];
 	struct psr_mesh *mesh;

@@ -13,7 +13,8 @@
 #define SEED UINT64_C(0x5053525354554459)
 #define MOST_TRIES 1000 /* for each place that is wanted */
 #define AWAY 4.0        /* rays begin this far from the place: outside of the unit sphere */
-#define BACK 0.0125f    /* as the renderer's: what faces away by less than normals are quantised to still counts */
+#define BACK 0.0125f    /* as the renderer's: a sample that faces away by less than the error of quantised normals still
+                         * counts */
 #define RUN 64
 #define FARTHEST 4.0f   /* pixels before a place within which its surface may stand, at grazing angles */
 
@@ -66,7 +67,7 @@ static void next_place(struct trials *trials, uint32_t *prim, double place[3])
 		place[k] = (1 - u - v) * corner[0][k] + u * corner[1][k] + v * corner[2][k];
 }
 
-/* Adds those of RUN random places that are seen. */
+/* Adds the places that are seen, of RUN random ones. */
 static void try_places(struct trials *trials, struct trial_view *view, const double direction[3], int most)
 {
 	double place[RUN][3];
@@ -170,7 +171,7 @@ struct run {
 	int failed;
 };
 
-/* What a view sees of the points, sorted into cells of a pixel's size. */
+/* The points that a view sees, sorted into cells of a pixel's size. */
 struct field {
 	uint32_t side, *first; /* side * side + 1 */
 	struct trials_seen *spot;

@@ -29,7 +29,7 @@ static inline struct trials_seen trials_project(const float axis[3][3], const fl
  * the same mesh. Around each a pixel of a randomly turned grid (sample/mend/adequacy.h). */
 struct trials;
 
-/* n_views directions, each with places of which n_a_view are seen if a thousandth of all are. scene: of the mesh.
+/* Makes n_views directions, each with places: n_a_view of them are seen if a thousandth of all are. scene: of the mesh.
  * MEMORY, ARG for a mesh without an area. */
 int trials_create(struct trials **out, const struct psr_mesh *mesh, const struct ray_scene *scene, int n_views,
                   int n_a_view, struct psr_error *err);

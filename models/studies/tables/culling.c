@@ -1,4 +1,4 @@
-/* Figures 6.7 and 6.8: what visibility tests cull, and what that saves. */
+/* Figures 6.7 and 6.8: how much visibility tests cull, and how much time that saves. */
 #include "models/studies/cull/cull.h"
 #include "tables.h"
 
@@ -45,7 +45,7 @@ static void put(double *value, int has_gain, const struct cull_result *result, i
 		value[GAIN] = 100 * (figures->blocks / base->blocks - 1);
 }
 
-/* A row for each choice; the first is what others are compared with. */
+/* A row for each choice; the others are compared with the first. */
 static int run_choices(struct study *study, const struct cull_choice *choice, int n, int finest)
 {
 	const struct cull_views views = { N_VIEWS, 1, 1, choice, n };

@@ -1,9 +1,9 @@
 #include <math.h>
 #include <stdlib.h>
+#include "base/maths.h"
 #include "base/mem.h"
 #include "tables.h"
 
-#define RADIANS (3.14159265358979323846 / 180)
 #define N_FRAMES 16
 #define N_ROUNDS 3
 
@@ -85,7 +85,7 @@ int selections_put(struct selections *s, int row, int model, const struct greedy
 int selection_scan(struct greedy **greedy, struct study *study, int model, const struct selection *selection)
 {
 	const struct greedy_scan_options options = { study->resolution,
-		                                         (selection->degrees > 0 ? selection->degrees : 25) * RADIANS,
+		                                         (selection->degrees > 0 ? selection->degrees : 25) * PSR_DEGREE,
 		                                         selection->lattice, selection->directions };
 
 	greedy_destroy(*greedy);
@@ -141,7 +141,7 @@ int selections_run(struct selections *s, int model, const struct selection *sele
 	return rc;
 }
 
-/* All rows of a model one after the other, some times: a machine's speed drifts. */
+/* Goes through all rows of a model, several times: a machine's speed drifts. */
 static int time_warps(struct selections *s)
 {
 	const struct study_table *table = &s->study->table;

@@ -27,13 +27,13 @@ static const struct selection greedy_rows[] = {
 #define BASE 7
 #define N_GREEDY ((int)(sizeof greedy_rows / sizeof *greedy_rows))
 
-/* psr's own way, of one level, and what it makes of a model. */
+/* psr's own way, at one level, and its result for a model. */
 enum { OWNED = N_GREEDY, MERGED, DICED, REACHED, BUILT, N_ROWS };
 static const char *const steps[] = { "psr: owned by what faces it best", "  blocks that own little merged away",
 	                                 "    diced, and what is missing added (9.2.1)", "      until it is adequate",
 	                                 "psr, all levels built" };
 
-/* What is kept of a level, as the others are measured. */
+/* The kept samples of a level, measured like the others. */
 static int measure_level(struct selections *s, int row, int model, const struct level *level, double seconds)
 {
 	struct draft draft = { .projection = level->sampling.projection, .ds = level->sampling.ds };

@@ -102,7 +102,7 @@ int table_models(struct study *study)
 /* ---- table 8.3: culling ---- */
 
 #define N_VIEWS 24
-#define ZOOM 4 /* of the views that show what a frustum culls */
+#define ZOOM 4 /* of the views that show how much a frustum culls */
 
 enum {
 	CONE = THESIS_COLUMNS, MASK, BOTH, BLOCKS_HIDDEN, BOTH_SAMPLES, SAMPLES_HIDDEN, BOTH_WRONG, FRUSTUM, FRUSTUM_BOTH,

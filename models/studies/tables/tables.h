@@ -1,4 +1,4 @@
-/* The tables, and what several of them use. */
+/* The tables, and code that several of them use. */
 #ifndef MODELS_STUDIES_TABLES_TABLES_H
 #define MODELS_STUDIES_TABLES_TABLES_H
 
@@ -22,10 +22,10 @@ struct selection {
 int selection_missing(double *missing, const struct study *study, const struct study_model *model,
                       const struct greedy *greedy, const struct greedy_result *result);
 
-/* The projections that a row selects from, in place of those of *greedy, which may be NULL. MEMORY. */
+/* The projections that a row selects from, instead of those in *greedy, which may be NULL. MEMORY. */
 int selection_scan(struct greedy **greedy, struct study *study, int model, const struct selection *selection);
 
-/* psr's own model as a selection: what its level 0 has, and the time that all of it took. */
+/* Makes a selection of psr's own model: its level 0, and the time that all of it took. */
 int selection_of_model(struct greedy **out, struct greedy_result *result, double *seconds, const struct study *study,
                        const struct study_model *model);
 
@@ -45,8 +45,8 @@ int selections_run(struct selections *s, int model, const struct selection *sele
 int selections_put(struct selections *s, int row, int model, const struct greedy *greedy,
                    const struct greedy_result *result, double seconds);
 
-/* If rc is OK, times the warping of all selections, and relates size and time to row `base`. Frees what was kept for
- * it. Returns rc, or what failed. */
+/* If rc is OK, times the warping of all selections, and relates size and time to row `base`. Frees everything kept for
+ * that. Returns rc, or the code of a failure. */
 int selections_finish(struct selections *s, int base, int rc);
 
 /* ---- culling.c ---- */
