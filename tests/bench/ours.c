@@ -56,19 +56,26 @@ static void draw(struct bench *bench, const struct psr_scene *scene)
 		report_die("psr_render", err.text);
 }
 
+static void drop(struct outq_chunk *first, void *userdata)
+{
+	(void)userdata;
+	outq_chunks_destroy(first);
+}
+
 static double encode(struct bench *bench)
 {
-	static const struct psr_msg_frame request = {
-		.planes = 1u << PSR_PLANE_COLOR, .color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
+	const struct psr_msg_frame request = {
+		.width = bench->frame.width, .height = bench->frame.height, .planes = 1u << PSR_PLANE_COLOR,
+		.color_codec = PSR_CODEC_JPEG, .color_quality = OURS_QUALITY,
 	};
 	static const uint8_t background[3];
-	const struct codec_answer answer = { .id = 1, .request = &request, .background = background };
+	const struct codec_answer answer = { .id = 1, .request = &request, .scale = 1, .background = background,
+		                                 .emit = drop };
 	struct codec_result result;
 	struct psr_error err;
 
 	if (codec_encode(&result, bench->codec, bench->pool, &answer, &bench->frame, &err) != PSR_OK)
 		report_die("codec", err.text);
-	outq_chunks_destroy(result.first);
 	return (double)result.rect_bytes;
 }
 

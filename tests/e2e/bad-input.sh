@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # Bad input to psr and psrd: each gets a sentence that names it and the documented exit status, and the daemon goes on.
 . "$(dirname "$0")/lib.sh"
 models=$work/models
@@ -109,6 +110,10 @@ if [ -f "$BUILD/lib/psr-image-oiio.so" ]; then
 fi
 refuses "an image module that is not there" 4 "$work/nosuch.so" \
 	env PSR_IMAGE_MODULE="$work/nosuch.so" psr shot --server "$server" --model dice -o "$work/a.exr"
+echo 'const unsigned psr_image_module[64] = { 99 };' >"$work/other.c"
+"${CC:-cc}" -shared -fPIC -o "$work/other.so" "$work/other.c"
+refuses "an image module of another version" 4 "$work/other.so is image module version 99, and this program needs version" \
+	env PSR_IMAGE_MODULE="$work/other.so" psr shot --server "$server" --model dice -o "$work/a.exr"
 refuses "nothing that was asked for" 2 "nothing was asked for" shot
 refuses "an operand" 2 "unexpected argument 'operand'" shot --hash operand
 refuses "an unknown option" 2 "unknown option --colour" shot --hash --colour 3

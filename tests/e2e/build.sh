@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # What the build promises: headers that stand alone, programs that load little, an install that works (machine code: tests/simd/isa-leaks.sh).
 . "$(dirname "$0")/lib.sh"
 
@@ -29,7 +30,7 @@ if [ "$CONFIG" = release ]; then
 		"$work/alone/psr-model" build "$work/red.obj" -r 32 -o "$work/none.psr"
 	check "psr-model makes a model with PNG for texture" psr-model make plant -o "$work/plant.glb"
 	check "PNG is read without the module" "$work/alone/psr-model" build "$work/plant.glb" -r 32 -o "$work/plant.psr"
-	for page in psr psrd psr-model; do
+	for page in psr psrd psr-model psr-view psr-view-term; do
 		check "$page has a man page" test -s "$work/root/usr/share/man/man1/$page.1"
 	done
 fi

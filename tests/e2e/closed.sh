@@ -4,7 +4,7 @@
 # background, in any pass, unless a ray of it misses the mesh. Of scans, CAD parts, textured models, and the standard
 # set, in five views, samples about a pixel apart; one model's more than two.
 . "$(dirname "$0")/lib.sh"
-resolution=128
+resolution=96
 testmodels=${PSR_TESTMODELS:-/usr/share/assimp/models}
 # A built psr-model finds the module beside it; the tool is elsewhere.
 export PSR_IMAGE_MODULE=$BUILD/lib/psr-image-oiio.so
@@ -56,7 +56,6 @@ check "the standard set is made" psr-model make all -o "$work/source"
 for source in "$work"/source/*.glb; do
 	model=$(basename "$source" .glb)
 	case $model in
-	pinetree | tree) closed "$model" "$source" 96 ;;
 	*) closed "$model" "$source" $resolution ;;
 	esac
 done

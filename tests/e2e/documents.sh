@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # Documents: lines fit a page, links lead somewhere, the map and decisions are short, the index has every decision, and
 # wide tables fold.
 . "$(dirname "$0")/lib.sh"

@@ -19,8 +19,10 @@ for header in "$tree"/include/psr/*.h; do
 		"$CXX" -x c++ -std=c++17 -Wall -Wextra -Wpedantic -Werror -I"$tree/include" -fsyntax-only "$work/alone.c"
 done
 
-example() { # name package
-	local source=docs/examples/$1.c flags
+example() { # name package lines
+	local source=docs/examples/$1.c flags n
+	n=$(sed '/^\/\*/,/\*\/$/d; /^$/d' "$source" | wc -l)
+	check "$1.c has at most $3 lines of code: $n" test "$n" -le "$3"
 	flags=$(pkg-config --define-prefix --cflags --libs "$2")
 	# shellcheck disable=SC2086
 	check "$1.c compiles through pkg-config" "$CC" -std=c11 -Wall -Wextra -Werror "$source" $flags -o "$work/$1"
@@ -31,9 +33,9 @@ example() { # name package
 	# shellcheck disable=SC2086
 	check "$1.c is C++17, too" "$CXX" -x c++ -std=c++17 $flags -fsyntax-only "$source"
 }
-example draw psr
-example shot psr-client
-example build psr-build
+example draw psr 20
+example shot psr-client 20
+example build psr-build 30
 
 mkdir "$work/models"
 check "build makes a model" "$work/build" "$work/models/pyramid.psr"

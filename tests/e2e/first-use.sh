@@ -99,14 +99,14 @@ is "by one more build" 2 "$(started needle.obj)"
 check "psrd stops cleanly" stop_psrd
 
 # --- the cache ---
-find "$cache" -type f -printf '%p %i %T@ %s\n' | sort >"$work/before"
+find "$cache" -type f -printf '%p %i %s\n' | sort >"$work/before"
 is "every source that can be built is in the cache, the changed one twice" 5 "$(wc -l <"$work/before")"
 start
 is "a second psrd draws the same" "$second" "$(color needle)"
 check "and the pencil" shot --model pencil --hash
 is "without a build" 0 "$(grep -c "build of" "$work/psrd.log")"
-find "$cache" -type f -printf '%p %i %T@ %s\n' | sort >"$work/after"
-check "the cache is as it was" cmp "$work/before" "$work/after"
+find "$cache" -type f -printf '%p %i %s\n' | sort >"$work/after"
+check "the files of the cache are as they were" cmp "$work/before" "$work/after"
 check "psrd stops cleanly after that" stop_psrd
 find "$cache" -type f | while read -r file; do head -c 5000 "$file" >"$file.cut" && mv "$file.cut" "$file"; done
 start

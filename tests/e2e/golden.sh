@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # The frames of tests/golden through psrd and psr: what tests/golden/frames draws without sockets, with what instructions
 # and by how many threads ever.
 . "$(dirname "$0")/lib.sh"

@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # Planes beside colour and depth, and pictures of stages: the same bytes whatever the threads, the ISA and the codec of
 # colour; files of the right size; each stage a picture of its own.
 . "$(dirname "$0")/lib.sh"

@@ -3,7 +3,7 @@
 . "$(dirname "$0")/lib.sh"
 
 still() {
-	psr shot --server "$server" --model wheel --size 320x240 --no-smooth --codec lossless --depth "$work/depth.pfm" -o "$work/$1.png" --hash "${@:2}" >"$work/$1"
+	psr shot --server "$server" --model wheel --size 160x120 --no-smooth --codec lossless --depth "$work/depth.pfm" -o "$work/$1.png" --hash "${@:2}" >"$work/$1"
 }
 
 start_psrd --models tests/golden --threads 1 --isa c

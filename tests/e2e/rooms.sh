@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # Rooms of the source tree include each other in one order: a line below may include itself and the lines above it. The
 # longest prefix of a file is its room.
 . "$(dirname "$0")/lib.sh"
@@ -44,6 +45,11 @@ client/replay
 client/output
 client/draw
 client/bench/
+client/view/lens
+client/view/hand
+client/view/link client/view/home
+client/view/
+client/view/window
 client
 models/shapes
 models/commands.h

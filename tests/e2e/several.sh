@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # Several models in a picture, scene files, reports that draw the same picture again, and what psr says of a picture.
 . "$(dirname "$0")/lib.sh"
 

@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <xxhash.h>
 #include "simd/isa.h"
 #include "simd/simd.h"
 #include "shot.h"
@@ -106,8 +105,8 @@ static void draw(struct golden *out, const struct shot *shot, const struct way *
 	if (!frame.rgb || !frame.depth || psr_render(way->renderer, &shot->scene, &settings, way->pool, &frame, &err))
 		stop(shot->name, frame.rgb && frame.depth ? err.text : "no memory");
 	snprintf(out->name, sizeof out->name, "%s", shot->name);
-	out->color = XXH64(frame.rgb, 3 * n, 0);
-	out->depth = XXH64(frame.depth, 4 * n, 0);
+	out->color = psr_frame_hash(&frame, PSR_PLANE_COLOR);
+	out->depth = psr_frame_hash(&frame, PSR_PLANE_DEPTH);
 	free(frame.rgb);
 	free(frame.depth);
 }

@@ -65,13 +65,25 @@ static void sizes_and_planes_that_cannot_be_are_refused(void **state)
 	}
 }
 
-/* XXH64 of "abc", seed 0, as its authors publish it. */
-static void the_hash_is_that_of_the_bytes(void **state)
+/* Made by another program, in Python from the text of XXH64. */
+static void the_hash_is_that_of_the_strips(void **state)
 {
-	const struct psr_frame frame = { .width = 1, .height = 1, .rgb = (uint8_t *)"abc" };
+	static const struct {
+		uint32_t height;
+		uint64_t hash;
+	} rows[] = { { 300, UINT64_C(0x298c4d1b89110f4f) }, { 256, UINT64_C(0x25e10b563baf22a9) } };
+	const struct psr_frame tiny = { .width = 1, .height = 1, .rgb = (uint8_t *)"abc" };
+	uint8_t pixels[3 * 5 * 300];
 
 	(void)state;
-	assert_true(psr_frame_hash(&frame, PSR_PLANE_COLOR) == UINT64_C(0x44bc2cf5ad770999));
+	assert_true(psr_frame_hash(&tiny, PSR_PLANE_COLOR) == UINT64_C(0xb32a991d315bd521));
+	for (uint32_t i = 0; i < sizeof pixels; i++)
+		pixels[i] = (uint8_t)(i * i + i / 7);
+	for (size_t i = 0; i < sizeof rows / sizeof rows[0]; i++) {
+		const struct psr_frame frame = { .width = 5, .height = rows[i].height, .rgb = pixels };
+
+		assert_true(psr_frame_hash(&frame, PSR_PLANE_COLOR) == rows[i].hash);
+	}
 }
 
 static void an_image_reads_back(void **state)
@@ -119,7 +131,7 @@ int main(void)
 		cmocka_unit_test(a_frame_gets_the_planes_that_are_asked_for),
 		cmocka_unit_test(planes_are_their_members),
 		cmocka_unit_test(sizes_and_planes_that_cannot_be_are_refused),
-		cmocka_unit_test(the_hash_is_that_of_the_bytes),
+		cmocka_unit_test(the_hash_is_that_of_the_strips),
 		cmocka_unit_test(an_image_reads_back),
 		cmocka_unit_test(images_without_colour_or_folder_are_refused),
 	};

@@ -43,6 +43,11 @@ static struct psr_pool *make(int n_threads, int with_jobs)
 	return pool;
 }
 
+static int submit(struct psr_pool *pool, void (*fn)(void *userdata), void *userdata)
+{
+	return psr_pool_submit(pool, &(struct pool_job){ .fn = fn, .userdata = userdata });
+}
+
 static void thread_counts_outside_of_the_range_are_refused(void **state)
 {
 	struct psr_pool *pool = NULL;
@@ -149,7 +154,7 @@ static void jobs_run_in_order_and_destroy_waits_for_all(void **state)
 	(void)state;
 	one_chain.next = 0;
 	for (int i = 0; i < N; i++)
-		assert_int_equal(psr_pool_submit(pool, append, &one_chain.order[i]), PSR_OK);
+		assert_int_equal(submit(pool, append, &one_chain.order[i]), PSR_OK);
 	psr_pool_destroy(pool);
 	assert_int_equal(one_chain.next, N);
 	for (int i = 0; i < N; i++)
@@ -190,7 +195,7 @@ static void stress_with(int n_threads, int n_frames)
 	for (int i = 0; i < n_frames; i++) {
 		frames[i].pool = pool;
 		frames[i].n_done = &n_done;
-		assert_int_equal(psr_pool_submit(pool, draw_frame, &frames[i]), PSR_OK);
+		assert_int_equal(submit(pool, draw_frame, &frames[i]), PSR_OK);
 		if (i % 16 == 0)
 			psr_pool_for(pool, 100, count, t); /* from outside, meanwhile */
 	}
@@ -245,7 +250,7 @@ static void caller_finishes_its_loop_alone_when_all_workers_are_busy(void **stat
 
 	(void)state;
 	for (int i = 0; i < 2; i++)
-		assert_int_equal(psr_pool_submit(pool, meet_then_loop, &r[i]), PSR_OK);
+		assert_int_equal(submit(pool, meet_then_loop, &r[i]), PSR_OK);
 	psr_pool_destroy(pool);
 	for (int i = 0; i < 16; i++)
 		assert_true(r[0].done[i] == 1 && r[1].done[i] == 1);
@@ -282,7 +287,7 @@ static void resubmit(void *userdata)
 	struct chaining *c = userdata;
 
 	if (atomic_fetch_sub(&c->left, 1) > 1)
-		psr_pool_submit(c->pool, resubmit, c);
+		submit(c->pool, resubmit, c);
 }
 
 static void destroy_also_runs_what_jobs_submit(void **state)
@@ -291,9 +296,58 @@ static void destroy_also_runs_what_jobs_submit(void **state)
 	struct chaining c = { .pool = pool, .left = 500 };
 
 	(void)state;
-	assert_int_equal(psr_pool_submit(pool, resubmit, &c), PSR_OK);
+	assert_int_equal(submit(pool, resubmit, &c), PSR_OK);
 	psr_pool_destroy(pool);
 	assert_int_equal(atomic_load(&c.left), 0);
+}
+
+/* Says so from question `last` on. */
+struct patience {
+	struct tally tally;
+	atomic_int n_asked;
+	int last;
+};
+
+static int is_over(void *userdata)
+{
+	struct patience *p = userdata;
+
+	return atomic_fetch_add(&p->n_asked, 1) >= p->last;
+}
+
+static void a_loop_ends_at_the_question_that_says_so(void **state)
+{
+	struct psr_pool *pool = make(3, 0);
+
+	(void)state;
+	for (int k = 0; k < 2; k++)
+		for (int last = 0; last <= N + 1; last += last < 4 || last >= N - 4 ? 1 : 166) {
+			struct patience *p = calloc(1, sizeof *p);
+			const struct psr_cancel cancel = { is_over, p };
+			int n_run = 0;
+
+			p->last = last;
+			assert_int_equal(psr_pool_for_until(k ? pool : NULL, &cancel, N, count, &p->tally),
+			                 last <= N ? PSR_ERR_CANCELLED : PSR_OK);
+			for (int i = 0; i < N; i++)
+				n_run += p->tally.plain[i];
+			assert_int_equal(n_run, last < N ? last : N);
+			free(p);
+		}
+	psr_pool_destroy(pool);
+}
+
+static void a_loop_that_nobody_can_stop_is_whole(void **state)
+{
+	static const struct psr_cancel nobody = { NULL, NULL };
+	struct tally *t = calloc(1, sizeof *t);
+
+	(void)state;
+	assert_int_equal(psr_pool_for_until(NULL, NULL, N, record, t), PSR_OK);
+	assert_int_equal(psr_pool_for_until(NULL, &nobody, N, count, t), PSR_OK);
+	for (int i = 0; i < N; i++)
+		assert_true(t->order[i] == i && t->plain[i] == 1);
+	free(t);
 }
 
 struct environment {
@@ -365,7 +419,7 @@ static void workers_leave_signals_to_the_program(void **state)
 
 	(void)state;
 	sigemptyset(&seen);
-	assert_int_equal(psr_pool_submit(pool, look_at_signals, &seen), PSR_OK);
+	assert_int_equal(submit(pool, look_at_signals, &seen), PSR_OK);
 	psr_pool_destroy(pool);
 	assert_int_equal(sigismember(&seen, SIGTERM), 1);
 	assert_int_equal(sigismember(&seen, SIGHUP), 1);
@@ -386,6 +440,8 @@ int main(void)
 		cmocka_unit_test(frames_with_loops_all_finish_however_busy_the_workers),
 		cmocka_unit_test(caller_finishes_its_loop_alone_when_all_workers_are_busy),
 		cmocka_unit_test(idle_threads_help_a_running_loop),
+		cmocka_unit_test(a_loop_ends_at_the_question_that_says_so),
+		cmocka_unit_test(a_loop_that_nobody_can_stop_is_whole),
 		cmocka_unit_test(destroy_also_runs_what_jobs_submit),
 		cmocka_unit_test(loops_run_in_the_default_environment_and_give_the_callers_back),
 #if defined(__SSE2__)

@@ -59,6 +59,16 @@ static void values_outside_are_clamped(void **state)
 	assert_int_equal(psr_linear_to_srgb(INFINITY), 255);
 }
 
+static void the_table_of_16_bits_is_made_once_and_alike(void **state)
+{
+	const uint8_t *table = psr_srgb_of_16_bits();
+
+	(void)state;
+	assert_ptr_equal(psr_srgb_of_16_bits(), table);
+	for (int i = 0; i < 65536; i++)
+		assert_int_equal(table[i], psr_linear_to_srgb((float)i / 65535.0f));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -67,6 +77,7 @@ int main(void)
 		cmocka_unit_test(every_code_comes_back),
 		cmocka_unit_test(codes_change_halfway_on_the_curve),
 		cmocka_unit_test(values_outside_are_clamped),
+		cmocka_unit_test(the_table_of_16_bits_is_made_once_and_alike),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

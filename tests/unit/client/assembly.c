@@ -9,7 +9,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <turbojpeg.h>
-#include <xxhash.h>
 #include <zstd.h>
 #include "base/random.h"
 #include "client/lib/internal.h"
@@ -60,7 +59,13 @@ static int tear_down(void **state)
 
 static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 {
-	struct psr_msg_frame_begin begin = { .width = W, .height = H };
+	struct psr_msg_frame_begin begin = { .width = W, .height = H, .settings = { .scale = 1 } };
+	const struct psr_frame drawn = {
+		.width = W, .height = H, .rgb = planes[PSR_PLANE_COLOR], .depth = (float *)planes[PSR_PLANE_DEPTH],
+		.normal = (int16_t *)planes[PSR_PLANE_NORMAL], .id = (uint32_t *)planes[PSR_PLANE_ID],
+		.weight = planes[PSR_PLANE_WEIGHT], .words = (uint64_t *)planes[PSR_PLANE_WORDS],
+		.block = planes[PSR_PLANE_BLOCK],
+	};
 	struct psr_msg_frame *asked = &trial->asked;
 
 	memset(trial, 0, sizeof *trial);
@@ -80,12 +85,13 @@ static void start_planes(struct trial *trial, uint8_t codec, uint32_t wanted)
 	begin.depth_codec = asked->depth_codec;
 	begin.data_codec = asked->data_codec;
 	memcpy(begin.background, "\x01\x02\x03", 3);
-	assert_int_equal(client_assembly_begin(&trial->assembly, &begin, &trial->err), PSR_OK);
+	assert_int_equal(client_assembly_begin(&trial->assembly, &begin, NULL, &trial->err), PSR_OK);
 	trial->end.is_final = 1;
 	trial->end.planes = asked->planes;
+	trial->end.has_hashes = 1;
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (wanted >> plane & 1)
-			trial->end.hash[plane] = XXH64(planes[plane], W * H * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0);
+			trial->end.hash[plane] = psr_frame_hash(&drawn, plane);
 }
 
 static void start(struct trial *trial, uint8_t codec)
@@ -420,7 +426,7 @@ static void another_frame_than_asked_is_refused(void **state)
 	bad[6].depth_format = PSR_WIRE_DEPTH_F32;
 	for (int i = 0; i < 7; i++) {
 		client_assembly_init(&assembly, &asked, 0);
-		assert_int_equal(client_assembly_begin(&assembly, &bad[i], NULL), PSR_ERR_PROTOCOL);
+		assert_int_equal(client_assembly_begin(&assembly, &bad[i], NULL, NULL), PSR_ERR_PROTOCOL);
 		assert_null(assembly.picture.rgb);
 		client_assembly_fini(&assembly);
 	}
@@ -428,8 +434,8 @@ static void another_frame_than_asked_is_refused(void **state)
 	assert_int_equal(
 		client_assembly_end(&assembly, &(struct psr_msg_frame_end){ .is_final = 1, .planes = 1 }, &checked, NULL),
 		PSR_ERR_PROTOCOL);
-	assert_int_equal(client_assembly_begin(&assembly, &good, NULL), PSR_OK);
-	assert_int_equal(client_assembly_begin(&assembly, &good, NULL), PSR_ERR_PROTOCOL);
+	assert_int_equal(client_assembly_begin(&assembly, &good, NULL, NULL), PSR_OK);
+	assert_int_equal(client_assembly_begin(&assembly, &good, NULL, NULL), PSR_ERR_PROTOCOL);
 	client_assembly_fini(&assembly);
 }
 

@@ -18,7 +18,6 @@
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <xxhash.h>
 #include "proto/proto.h"
 #include "psr/render.h"
 
@@ -65,6 +64,7 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 	if (asked->budget == PSR_WIRE_BUDGET_SETTINGS)
 		begin.settings = asked->settings;
 	struct psr_msg_frame_end end = { .is_final = 1,
+		                             .has_hashes = 1,
 		                             .planes = asked->planes,
 		                             .error_px = 1.5,
 		                             .n_entries = 5,
@@ -78,6 +78,8 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 	uint8_t weight[MAX_SIDE * MAX_SIDE];
 	uint64_t words[MAX_SIDE * MAX_SIDE];
 	const uint8_t *const planes[PSR_N_PLANES] = { rgb, (uint8_t *)depth, NULL, NULL, weight, (uint8_t *)words };
+	const struct psr_frame frame = { .width = w, .height = h, .rgb = rgb, .depth = depth, .weight = weight,
+		                             .words = words };
 
 	if (strcmp(s->model, "broken") == 0 || (strcmp(s->model, "flaky") == 0 && id > 10) || w > MAX_SIDE
 	    || h > MAX_SIDE) {
@@ -102,7 +104,7 @@ static void put_frame(struct session *s, uint32_t id, const struct psr_msg_frame
 
 		if (!(asked->planes >> plane & 1))
 			continue;
-		end.hash[plane] = XXH64(planes[plane], bytes, 0) ^ (plane == 0 && strcmp(s->model, "damaged") == 0);
+		end.hash[plane] = psr_frame_hash(&frame, plane) ^ (plane == 0 && strcmp(s->model, "damaged") == 0);
 		psr_msg_rect_encode(&s->buf, id, 0, &rect, NULL);
 	}
 	psr_msg_frame_end_encode(&s->buf, id, 0, &end, NULL);
@@ -129,7 +131,8 @@ static void put_opened(struct session *s, uint32_t id)
 		                                          .spacing = 0.125,
 		                                          .resolution = 256,
 		                                          .n_levels = 1,
-		                                          .n_samples = 1000 };
+		                                          .n_samples = 1000,
+		                                          .up = { 0, 1, 0 } };
 	struct psr_msg_error missing = { PSR_WIRE_NOT_FOUND, "no model of this name" };
 	struct psr_msg_error rotten = { PSR_WIRE_FORMAT, "face 7 has no vertex 8" };
 

@@ -35,7 +35,7 @@ static void missing_module_is_a_clear_error(void **state)
 	             "cannot read images: the image module cannot be loaded: /nowhere/module.so");
 	refuse_image("nonsense", 8, "a.bmp", PSR_ERR_UNSUPPORTED, "not an image in a supported format");
 	assert_int_equal(setenv("PSR_IMAGE_MODULE", "libm.so.6", 1), 0);
-	refuse_image("BM", 2, "a.bmp", PSR_ERR_VERSION, "libm.so.6 is not the image module of this version");
+	refuse_image("BM", 2, "a.bmp", PSR_ERR_VERSION, "libm.so.6 is not psr's image module");
 	unsetenv("PSR_IMAGE_MODULE");
 }
 

@@ -118,8 +118,18 @@ static void make_camera(struct psr_camera *m)
 	m->near_z = below(2) ? fabs(length()) : 0;
 }
 
+static void make_depth_range(double range[2], unsigned format, enum psr_camera_kind kind)
+{
+	if (format < PSR_WIRE_DEPTH_U16)
+		return;
+	range[0] = kind == PSR_CAMERA_PERSPECTIVE ? fabs(length()) : length();
+	range[1] = range[0] + fabs(range[0]) * (1e-9 + unit());
+}
+
 static void make_frame(struct psr_msg_frame *m)
 {
+	double range[2] = { 0, 0 };
+
 	m->slot = (uint16_t)below(16);
 	m->pass_limit = (uint16_t)below(65536);
 	m->width = 1 + below(16384);
@@ -145,8 +155,16 @@ static void make_frame(struct psr_msg_frame *m)
 		m->settings.is_smooth = (uint8_t)below(2);
 		m->settings.spacing_px = 1.0 / 64 + 63 * unit();
 	}
+	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
+		m->width = 4 * (1 + below(4096));
+		m->height = 4 * (1 + below(1024));
+	}
+	m->flags = (uint16_t)below(4);
 	m->base = below(1000);
 	make_camera(&m->camera);
+	make_depth_range(range, m->depth_format, m->camera.kind);
+	m->depth_min = range[0];
+	m->depth_max = range[1];
 }
 
 static void make_begin(struct psr_msg_frame_begin *m)
@@ -155,8 +173,9 @@ static void make_begin(struct psr_msg_frame_begin *m)
 
 	make_frame(&f);
 	m->pass = (uint16_t)below(100);
-	m->width = f.width;
-	m->height = f.height;
+	m->refine = (uint16_t)below(100);
+	m->width = (f.width + 3) / 4 * 4;
+	m->height = (f.height + 3) / 4 * 4;
 	m->planes = f.planes;
 	m->color_codec = f.color_codec;
 	m->color_quality = f.color_quality;
@@ -169,9 +188,9 @@ static void make_begin(struct psr_msg_frame_begin *m)
 	m->settings.scale = 4;
 	m->settings.is_smooth = 1;
 	m->settings.spacing_px = 64;
-	m->depth_min = fabs(length()) * 1e-2;
-	m->depth_max = m->depth_min * (1 + unit());
 	m->camera = f.camera;
+	m->depth_min = f.depth_min;
+	m->depth_max = f.depth_max;
 }
 
 static void make_rect(struct psr_msg_rect *m)
@@ -201,8 +220,13 @@ static void make_end(struct psr_msg_frame_end *m)
 	m->status = (uint8_t)below(3);
 	m->error_px = fabs(length());
 	m->planes = 1 + below(127);
+	m->has_hashes = (uint8_t)below(2);
+	if (m->planes & 1u << PSR_PLANE_DEPTH) {
+		m->depth_min = fabs(length()) * 1e-2;
+		m->depth_max = m->depth_min * (1 + unit());
+	}
 	for (unsigned i = 0; i < PSR_N_PLANES; i++)
-		m->hash[i] = m->planes >> i & 1 ? random64() : 0;
+		m->hash[i] = m->has_hashes && m->planes >> i & 1 ? random64() : 0;
 	m->n_entries = (uint16_t)below(65);
 	for (unsigned i = 0; i < m->n_entries; i++) {
 		m->entry[i].id = (uint16_t)(i + 1);
@@ -246,6 +270,7 @@ static void make(unsigned type, union proto_any *m)
 		m->opened.resolution = 1 + below(100000);
 		m->opened.n_levels = 1 + below(20);
 		m->opened.n_samples = random64() >> 11;
+		m->opened.up[below(3)] = below(2) ? 1 : -1;
 		break;
 	case PSR_MSG_PRESET:
 		m->preset.kind = (uint8_t)(1 + below(2));
@@ -504,6 +529,7 @@ static void another_version_is_told_apart_first(void **state)
 	assert_int_equal(back.hello.major, 3);
 	assert_int_equal(back.hello.minor, 7);
 	assert_non_null(strstr(err.text, "3.7"));
+	assert_true(!strncmp(err.text, "psr 0.2: ", 9)); /* programs read it */
 	assert_int_equal(psr_msg_hello_decode(&back.hello, bytes + 16, 47, &err), PSR_ERR_PROTOCOL);
 }
 

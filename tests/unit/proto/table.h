@@ -85,7 +85,7 @@ ID_ENCODE(list_entry) ID_ENCODE(list_end) ID_ENCODE(open) ID_ENCODE(progress) ID
 ID_ENCODE(presets) ID_ENCODE(preset) ID_ENCODE(presets_end) ID_ENCODE(scene) ID_ENCODE(stats_reply)
 VIEW_ENCODE(error) VIEW_ENCODE(frame) VIEW_ENCODE(frame_begin) VIEW_ENCODE(rect) VIEW_ENCODE(frame_end)
 VIEW_ENCODE(superseded) VIEW_ENCODE(ack)
-EMPTY(list, id) EMPTY(cancelled, id, view) EMPTY(cancel, id, view) EMPTY(pause, view) EMPTY(resume, view)
+EMPTY(list, id) EMPTY(cancelled, id, view) EMPTY(cancel, id, view) EMPTY(pause, id, view) EMPTY(resume, id, view)
 EMPTY(stats, id)
 DECODE(hello) DECODE(welcome) DECODE(goodbye) DECODE(ping) DECODE(error) DECODE(list_entry) DECODE(list_end)
 DECODE(open) DECODE(progress) DECODE(opened) DECODE(close) DECODE(scene) DECODE(frame) DECODE(frame_begin) DECODE(rect)
@@ -118,7 +118,7 @@ static const struct proto_field fields_opened[] = { AT(opened, handle, F_U32), A
 	ARRAY(opened, content_id, F_HEX, 16), ARRAY(opened, box_min, F_F64, 3), ARRAY(opened, box_max, F_F64, 3),
 	ARRAY(opened, origin, F_F64, 3), AT(opened, scale, F_F64), AT(opened, spacing, F_F64),
 	AT(opened, resolution, F_U32), AT(opened, n_levels, F_U32), AT(opened, n_samples, F_U64),
-	AT(opened, n_blocks, F_U64), AT(opened, bytes, F_U64), END };
+	AT(opened, n_blocks, F_U64), AT(opened, bytes, F_U64), ARRAY(opened, up, F_F64, 3), END };
 static const struct proto_field fields_close[] = { AT(close, handle, F_U32), END };
 static const struct proto_field fields_instance[] = { AT(instance, handle, F_U32), AT(instance, representation, F_U8),
 	ARRAY(instance, rotation, F_F64, 4), ARRAY(instance, translation, F_F64, 3), AT(instance, scale, F_F64), END };
@@ -147,10 +147,10 @@ static const struct proto_field fields_preset[] = { AT(preset, kind, F_U8), CAME
 static const struct proto_field fields_presets_end[] = { AT(presets_end, n_cameras, F_U32),
 	AT(presets_end, n_lights, F_U32), END };
 static const struct proto_field fields_frame[] = { AT(frame, slot, F_U16), AT(frame, pass_limit, F_U16),
-	PICTURE(frame), AT(frame, budget, F_U8), AT(frame, time_budget_us, F_U64), AT(frame, error_bound_px, F_F64),
-	CAMERA(frame), END };
+	PICTURE(frame), AT(frame, budget, F_U8), AT(frame, flags, F_U16), AT(frame, time_budget_us, F_U64),
+	AT(frame, error_bound_px, F_F64), AT(frame, depth_min, F_F64), AT(frame, depth_max, F_F64), CAMERA(frame), END };
 static const struct proto_field fields_frame_begin[] = { AT(frame_begin, pass, F_U16),
-	AT(frame_begin, base_pass, F_U16),
+	AT(frame_begin, base_pass, F_U16), AT(frame_begin, refine, F_U16),
 	PICTURE(frame_begin), ARRAY(frame_begin, background, F_U8, 3), AT(frame_begin, depth_min, F_F64),
 	AT(frame_begin, depth_max, F_F64), CAMERA(frame_begin), END };
 static const struct proto_field fields_rect[] = { AT(rect, plane, F_U8), AT(rect, codec, F_U8), AT(rect, scale, F_U8),
@@ -160,7 +160,8 @@ static const struct proto_field fields_entry[] = { AT(report_entry, id, F_U16), 
 	AT(report_entry, count, F_U64), END };
 #define HASH(i) { "hash." #i, F_U64, offsetof(struct psr_msg_frame_end, hash) + 8 * i, 1, NULL, 0 }
 static const struct proto_field fields_frame_end[] = { AT(frame_end, pass, F_U16), AT(frame_end, is_final, F_U8),
-	AT(frame_end, status, F_U8), AT(frame_end, error_px, F_F64), AT(frame_end, planes, F_U32), HASH(0), HASH(1),
+	AT(frame_end, status, F_U8), AT(frame_end, error_px, F_F64), AT(frame_end, planes, F_U32),
+	AT(frame_end, has_hashes, F_U8), AT(frame_end, depth_min, F_F64), AT(frame_end, depth_max, F_F64), HASH(0), HASH(1),
 	HASH(2), HASH(3), HASH(4), HASH(5), HASH(6), AT(frame_end, n_entries, F_U16),
 	LIST(frame_end, entry, PSR_WIRE_MAX_REPORT, fields_entry, report_entry), END };
 static const struct proto_field fields_superseded[] = { AT(superseded, by, F_U32), END };
@@ -190,6 +191,30 @@ static inline const struct proto_case *proto_case_of(unsigned type)
 		if (proto_cases[i].type == type)
 			return &proto_cases[i];
 	return NULL;
+}
+
+/* Unknown values of these bytes of a payload are decoded as another value. */
+static inline int proto_falls_back(unsigned type, size_t at)
+{
+	return type == PSR_MSG_GOODBYE || type == PSR_MSG_PROGRESS ? at < 2 : type == PSR_MSG_LIST_ENTRY ? at == 0 :
+	       type == PSR_MSG_FRAME_END && at == 3;
+}
+
+/* Whether a decoded message, encoded into `out`, gives the payload that it came from, but for values that fall back and
+ * bytes behind the last field. */
+static inline int proto_is_kept(const struct proto_case *kind, struct psr_buf *out, const union proto_any *msg,
+                                const uint8_t *payload, size_t n)
+{
+	const uint8_t *again = out->data + out->size + PSR_HEADER_SIZE;
+
+	if (kind->type == PSR_MSG_PRESET && msg->preset.kind == 0) /* of a later version, and nothing of it is kept */
+		return payload[0] > PSR_WIRE_PRESET_LIGHT;
+	if (kind->encode(out, 1, 1, msg, NULL) != PSR_OK || out->size > PSR_HEADER_SIZE + n)
+		return 0;
+	for (size_t i = 0; out->data + out->size > again + i; i++)
+		if (again[i] != payload[i] && !proto_falls_back(kind->type, i))
+			return 0;
+	return 1;
 }
 
 #endif

@@ -13,7 +13,7 @@ static const char *vectors_path = "proto/vectors.txt";
 
 struct vector {
 	char name[64];
-	int is_refused;
+	int is_refused, is_later;
 	enum psr_side side;
 	int code;
 	const struct proto_case *kind;
@@ -131,7 +131,9 @@ static void read_head(struct vector *v, const char *line)
 	char a[32], b[32];
 	unsigned id, view;
 
-	if (sscanf(line, "message %63s %31s %u %u", v->name, a, &id, &view) == 4) {
+	v->is_later = !strncmp(line, "later ", 6);
+	if (sscanf(line, "message %63s %31s %u %u", v->name, a, &id, &view) == 4 ||
+	    sscanf(line, "later %63s %31s %u %u", v->name, a, &id, &view) == 4) {
 		for (size_t i = 0; i < N_PROTO_CASES; i++)
 			if (!strcmp(psr_msg_name(proto_cases[i].type), a))
 				v->kind = &proto_cases[i];
@@ -163,7 +165,7 @@ static int load_vectors(void **state)
 		line[n] = 0;
 		if (line[0] == '#' || line[0] == 0 || !strcmp(line, "hex"))
 			continue;
-		if (!strncmp(line, "message ", 8) || !strncmp(line, "refused ", 8)) {
+		if (!strncmp(line, "message ", 8) || !strncmp(line, "refused ", 8) || !strncmp(line, "later ", 6)) {
 			assert_true(n_vectors < sizeof vectors / sizeof vectors[0]);
 			v = &vectors[n_vectors++];
 			read_head(v, line);
@@ -221,7 +223,7 @@ static void fields_encode_to_the_vector(void **state)
 		struct psr_buf out = { bytes, 0, v->n };
 		struct psr_error err = { 0, "" };
 
-		if (v->is_refused)
+		if (v->is_refused || v->is_later)
 			continue;
 		if (v->kind->encode(&out, v->id, v->view, &v->msg, &err) != PSR_OK || out.size != v->n ||
 		    memcmp(bytes, v->bytes, v->n))
@@ -302,7 +304,7 @@ static void every_truncation_is_refused(void **state)
 	for (size_t i = 0; i < n_vectors; i++) {
 		struct vector *v = &vectors[i];
 
-		if (v->is_refused || !v->kind->decode)
+		if (v->is_refused || v->is_later || !v->kind->decode)
 			continue;
 		for (size_t n = 0; n < v->n - 16; n++) {
 			uint8_t *copy;
@@ -314,7 +316,7 @@ static void every_truncation_is_refused(void **state)
 	}
 }
 
-static void a_byte_behind_the_end_is_refused(void **state)
+static void bytes_behind_the_end_are_skipped(void **state)
 {
 	static union proto_any msg;
 	static uint8_t longer[4096];
@@ -322,24 +324,41 @@ static void a_byte_behind_the_end_is_refused(void **state)
 	(void)state;
 	for (size_t i = 0; i < n_vectors; i++) {
 		struct vector *v = &vectors[i];
-		uint8_t *copy;
 
 		if (v->is_refused || !v->kind->decode)
 			continue;
-		memset(longer, 0, sizeof longer);
+		memset(longer, 0xee, sizeof longer);
 		memcpy(longer, v->bytes + 16, v->n - 16);
-		assert_int_equal(decode_exactly(v->kind, &msg, longer, v->n - 16 + 1, &copy), PSR_ERR_PROTOCOL);
-		free(copy);
+		for (size_t n = 1; n <= PSR_WIRE_GROWTH; n += PSR_WIRE_GROWTH - 1) {
+			uint8_t *copy;
+
+			memset(&msg, 0, sizeof msg);
+			assert_int_equal(decode_exactly(v->kind, &msg, longer, v->n - 16 + n, &copy), PSR_OK);
+			if (v->kind->type == PSR_MSG_RECT)
+				msg.rect.data = v->data;
+			assert_memory_equal(&msg, &v->msg, sizeof msg);
+			free(copy);
+		}
 	}
 }
 
-/* A message has one encoding: whatever is decoded at all encodes to the bytes that it came from. So a set reserved bit
- * cannot pass unseen. */
-static void each_flipped_bit_is_refused_or_kept(void **state)
+/* Decodes a payload. What is taken is refused or kept: it has the encoding that it came from, but for what fell back
+ * and what stood behind the end. So a set reserved bit cannot pass unseen. */
+static void refuse_or_keep(const struct vector *v, size_t at)
 {
 	static union proto_any msg;
 	static uint8_t bytes[4096];
+	struct psr_buf out = { bytes, 0, sizeof bytes };
+	uint8_t *copy;
 
+	if (decode_exactly(v->kind, &msg, v->bytes + 16, v->n - 16, &copy) == PSR_OK &&
+	    !proto_is_kept(v->kind, &out, &msg, copy, v->n - 16))
+		fail_msg("%s: a change at byte %zu of the payload is lost", v->name, at);
+	free(copy);
+}
+
+static void each_flipped_bit_is_refused_or_kept(void **state)
+{
 	(void)state;
 	for (size_t i = 0; i < n_vectors; i++) {
 		struct vector *v = &vectors[i];
@@ -347,17 +366,69 @@ static void each_flipped_bit_is_refused_or_kept(void **state)
 		if (v->is_refused || !v->kind->decode)
 			continue;
 		for (size_t bit = 0; bit < 8 * (v->n - 16); bit++) {
-			struct psr_buf out = { bytes, 0, sizeof bytes };
-			uint8_t *copy;
+			v->bytes[16 + bit / 8] ^= (uint8_t)(1u << bit % 8);
+			refuse_or_keep(v, bit / 8);
+			v->bytes[16 + bit / 8] ^= (uint8_t)(1u << bit % 8);
+		}
+	}
+}
 
-			v->bytes[16 + bit / 8] ^= (uint8_t)(1u << bit % 8);
-			if (decode_exactly(v->kind, &msg, v->bytes + 16, v->n - 16, &copy) == PSR_OK) {
-				assert_int_equal(v->kind->encode(&out, v->id, v->view, &msg, NULL), PSR_OK);
-				if (out.size != v->n || memcmp(bytes, v->bytes, v->n))
-					fail_msg("%s: bit %zu of the payload is lost", v->name, bit);
-			}
-			free(copy);
-			v->bytes[16 + bit / 8] ^= (uint8_t)(1u << bit % 8);
+/* Counts, lengths and offsets among them: an integer of any size at any place says something else. */
+static void every_integer_may_lie(void **state)
+{
+	static const uint64_t lies[] = { 0, 1, 2, 0x7f, 0xff, 0x100, 0x200, 0x3e8, 0x7fff, 0xfff0, 0xffff, 0x10000,
+		0x7fffffff, 0x80000000, 0xfffffff0, 0xffffffff, UINT64_C(0x7ff0000000000000), UINT64_MAX };
+
+	(void)state;
+	for (size_t i = 0; i < n_vectors; i++) {
+		struct vector *v = &vectors[i];
+
+		if (v->is_refused || !v->kind->decode)
+			continue;
+		for (size_t size = 1; size <= 8; size *= 2)
+			for (size_t at = 0; at + size <= v->n - 16; at++)
+				for (size_t k = 0; k < sizeof lies / sizeof lies[0]; k++) {
+					uint8_t true_bytes[8];
+
+					memcpy(true_bytes, v->bytes + 16 + at, size);
+					for (size_t b = 0; b < size; b++)
+						v->bytes[16 + at + b] = (uint8_t)(lies[k] >> 8 * b);
+					refuse_or_keep(v, at);
+					memcpy(v->bytes + 16 + at, true_bytes, size);
+				}
+	}
+}
+
+/* The header may claim any length: the framer waits for more, refuses it, or hands out what was claimed. */
+static void every_length_of_a_message_may_lie(void **state)
+{
+	static uint8_t storage[PSR_WIRE_MAX_MESSAGE];
+	static union proto_any msg;
+
+	(void)state;
+	for (size_t i = 0; i < n_vectors; i++) {
+		const struct vector *v = &vectors[i];
+		const int from_server = !v->is_refused && (v->kind->type == PSR_MSG_RECT || v->kind->type == PSR_MSG_FRAME_END);
+
+		if (v->is_refused || (!from_server && v->kind->type != PSR_MSG_HELLO && v->kind->type != PSR_MSG_FRAME &&
+		                      v->kind->type != PSR_MSG_SCENE && v->kind->type != PSR_MSG_OPEN))
+			continue;
+		for (uint32_t length = 0; length < 2 * v->n + 600; length++) {
+			struct psr_framer framer;
+			struct psr_message m;
+			size_t n;
+			int result;
+
+			psr_framer_init(&framer, from_server ? PSR_SERVER : PSR_CLIENT, storage, sizeof storage);
+			framer.expects_hello = v->kind->type == PSR_MSG_HELLO;
+			memcpy(psr_framer_space(&framer, &n), v->bytes, v->n);
+			for (int b = 0; b < 4; b++)
+				storage[b] = (uint8_t)(length >> 8 * b);
+			psr_framer_filled(&framer, v->n);
+			result = psr_framer_next(&framer, &m, NULL);
+			assert_true(result == 1 ? length <= v->n && m.n == length - 16 : result == 0 ? length > v->n : result < 0);
+			if (result == 1 && length < v->n)
+				assert_true(v->is_later || v->kind->decode(&msg, m.payload, m.n, NULL) != PSR_OK);
 		}
 	}
 }
@@ -370,8 +441,10 @@ int main(int argc, char **argv)
 		cmocka_unit_test(the_vector_decodes_to_its_fields),
 		cmocka_unit_test(bad_streams_are_refused_for_the_right_reason),
 		cmocka_unit_test(every_truncation_is_refused),
-		cmocka_unit_test(a_byte_behind_the_end_is_refused),
+		cmocka_unit_test(bytes_behind_the_end_are_skipped),
 		cmocka_unit_test(each_flipped_bit_is_refused_or_kept),
+		cmocka_unit_test(every_integer_may_lie),
+		cmocka_unit_test(every_length_of_a_message_may_lie),
 	};
 
 	if (argc > 1)

@@ -12,6 +12,7 @@
 #include "render/stages.h"
 #include "render/block.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 #define WIDTH 531 /* strips of 128, 128, 128, 128, 19 */
 #define HEIGHT 503
@@ -433,5 +434,6 @@ int main(void)
 		cmocka_unit_test(an_empty_scene_is_background_in_every_plane),
 	};
 
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -12,6 +12,7 @@
 #include "base/pool.h"
 #include "render/splat.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 static struct psr_model *sphere, *fine_sphere, *teapot;
 
@@ -314,32 +315,6 @@ static void depth_is_that_of_the_nearest_sub_pixel(void **state)
 	still_clear(&s);
 }
 
-static int count_down(void *userdata)
-{
-	int *left = userdata;
-
-	return (*left)-- == 0;
-}
-
-static void a_pass_ends_between_windows_when_nobody_waits(void **state)
-{
-	struct still s;
-	struct psr_error err;
-	int left = 2;
-
-	(void)state;
-	still_make(&s, sphere, 560, 300);
-	s.settings.pass = 2;
-	s.settings.is_cancelled = count_down;
-	s.settings.userdata = &left;
-	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_ERR_CANCELLED);
-	assert_int_equal(left, -1);
-	left = 4;
-	assert_int_equal(refiner_draw(s.refiner, &s.scene, &s.settings, NULL, &s.frame, &err), PSR_OK);
-	assert_int_equal(left, 0); /* four windows */
-	still_clear(&s);
-}
-
 static void the_public_call_draws_passes_too(void **state)
 {
 	struct psr_settings settings;
@@ -362,6 +337,53 @@ static void the_public_call_draws_passes_too(void **state)
 	assert_int_equal(psr_render(same.renderer, &same.scene, &settings, NULL, &same.frame, &err), PSR_ERR_LIMIT);
 	still_clear(&s);
 	still_clear(&same);
+}
+
+static int count_question(void *userdata)
+{
+	++*(int *)userdata;
+	return 0;
+}
+
+/* A plain frame's outline takes questions, too. */
+static void passes_find_the_outline_once_for_each_still(void **state)
+{
+	struct still s;
+	int n = 0, n_with_outline = 0;
+
+	(void)state;
+	still_make(&s, teapot, 160, 120);
+	s.settings.cancel = (struct psr_cancel){ count_question, &n };
+	for (int change = 0; change <= 8; change++) {
+		struct psr_camera *camera = &s.scene.camera;
+
+		camera->fov_y -= change == 1 ? 0.01 : 0;
+		camera->eye[0] += change == 2 ? 0.25 : 0;
+		camera->up[0] += change == 3 ? 0.1 : 0;
+		s.instance.translation[1] += change == 4 ? 0.1 : 0;
+		s.instance.model = change == 5 ? sphere : s.instance.model;
+		s.settings.spacing_px *= change == 6 ? 2 : 1;
+		s.settings.gap_threshold += change == 7 ? 2 : 0;
+		s.settings.cull_tests ^= change == 8 ? PSR_CULL_MASKS : 0;
+		for (unsigned pass = 1; pass <= 2; pass++)
+			for (int again = 0; again <= 1; again++) {
+				struct still fresh;
+
+				n = 0;
+				refine(&s, pass, NULL);
+				if (pass == 1 && again)
+					assert_true(n < n_with_outline);
+				n_with_outline = n;
+				still_make(&fresh, s.instance.model, 160, 120);
+				fresh.scene = s.scene;
+				fresh.settings = s.settings;
+				fresh.settings.cancel = (struct psr_cancel){ 0 };
+				refine(&fresh, pass, NULL);
+				assert_true(same_frames(&s, &fresh));
+				still_clear(&fresh);
+			}
+	}
+	still_clear(&s);
 }
 
 static void the_door_refuses_what_is_no_still(void **state)
@@ -632,8 +654,8 @@ int main(void)
 		cmocka_unit_test(threads_and_instruction_sets_draw_the_same_bytes),
 		cmocka_unit_test(windows_have_no_seams),
 		cmocka_unit_test(depth_is_that_of_the_nearest_sub_pixel),
-		cmocka_unit_test(a_pass_ends_between_windows_when_nobody_waits),
 		cmocka_unit_test(the_public_call_draws_passes_too),
+		cmocka_unit_test(passes_find_the_outline_once_for_each_still),
 		cmocka_unit_test(the_door_refuses_what_is_no_still),
 		cmocka_unit_test(holes_between_discs_are_closed_and_slots_and_notches_are_not),
 		cmocka_unit_test(discs_lie_on_the_plane_of_their_neighbors_whatever_the_normals),
@@ -642,5 +664,6 @@ int main(void)
 		cmocka_unit_test(gaps_between_what_turns_away_stay_open),
 		cmocka_unit_test(cracks_of_magnified_samples_are_closed_beside_empty_cells),
 	};
+	only_threads_under_tsan();
 	return cmocka_run_group_tests(tests, open_models, close_models);
 }

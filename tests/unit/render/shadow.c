@@ -10,6 +10,7 @@
 #include "simd/isa.h"
 #include "render/shadow.h"
 #include "tests/unit/lib/shapes.h"
+#include "tests/unit/lib/threads.h"
 
 #define SIDE 256
 #define PIXELS (SIDE * SIDE)
@@ -496,6 +497,7 @@ int main(void)
 		cmocka_unit_test(without_color_there_are_no_maps_and_those_of_frames_before_are_kept),
 		cmocka_unit_test(memory_is_bounded),
 	};
+	only_threads_under_tsan();
 	const int n_failed = cmocka_run_group_tests(tests, NULL, NULL);
 	for (int i = 0; i <= 256; i++)
 		psr_model_unref(squares[i]);

@@ -326,6 +326,136 @@ static void a_pane_has_the_depth_of_what_shows_most(void **state)
 	}
 }
 
+struct pane_planes {
+	int16_t normal[3 * SIDE * SIDE];
+	uint32_t id[SIDE * SIDE];
+	uint8_t block[3 * SIDE * SIDE], weight[SIDE * SIDE];
+	uint64_t words[SIDE * SIDE];
+	float depth[SIDE * SIDE];
+};
+
+/* Rounding to 15 bits, and 1.27 degrees by which stored normals are off. */
+static void assert_normal(const int16_t n[3], const double expected[3])
+{
+	for (int k = 0; k < 3; k++)
+		assert_float_equal(n[k] / 32767.0, expected[k], 0.0222);
+}
+
+/* The pane is turned against the wall, so that their normals differ. */
+static void a_pane_that_keeps_back_half_shows_in_all_planes(void **state)
+{
+	static const float opacity[] = { 0.25f, 0.75f };
+	static const double turned[3] = { 0, -0.38941834, 0.92106099 }, straight[3] = { 0, 0, 1 };
+	static struct pane_planes all, some;
+	struct psr_model *wall = build_squares(&(struct square){ -0.5, 1, 0, 1 }, 1);
+
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		struct psr_model *pane = build_squares(&(struct square){ 0.1, 0.8, 2, opacity[i] }, 1);
+		const double pixel = psr_model_info(pane)->spacing / 0.8;
+		const struct psr_instance instance[] = {
+			{ .model = wall, .rotation = { 0, 0, 0, 1 }, .scale = 1 },
+			{ .model = pane, .rotation = { 0.19866933, 0, 0, 0.98006658 }, .scale = 1 },
+		};
+		const struct psr_scene scene = { .instance = instance, .n_instances = 2, .ambient = { 1, 1, 1 },
+			                             .camera = { .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = SIDE * pixel,
+			                                         .eye = { 0, 0, 4 }, .up = { 0, 1, 0 } } };
+		struct psr_frame frame = { .width = SIDE, .height = SIDE, .normal = all.normal, .id = all.id,
+			                       .block = all.block, .weight = all.weight, .words = all.words, .depth = all.depth };
+		struct render_settings settings;
+		struct psr_renderer *renderer;
+
+		render_settings_default(&settings, SIDE, SIDE);
+		assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+		assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+		for (int k = -5; k < 5; k++) {
+			const int at = SIDE * (SIDE / 2 + k) + SIDE / 2 + k;
+
+			assert_int_equal(all.id[at], i);
+			assert_normal(all.normal + 3 * at, i ? turned : straight);
+			assert_int_equal(all.weight[at], 255);
+			assert_int_equal(all.block[3 * at], 0);
+			/* The wall is first. */
+			assert_true((uint32_t)all.words[at] < PSR_BLOCK_SAMPLES * psr_model_blocks(wall)->n_blocks);
+			assert_true(i == 0 ? all.depth[at] > 4.4f : all.depth[at] < 4);
+		}
+		frame.depth = NULL; /* the same without it, by planes of their own */
+		frame.words = NULL;
+		frame.normal = some.normal;
+		frame.id = some.id;
+		frame.block = some.block;
+		frame.weight = some.weight;
+		assert_int_equal(renderer_draw(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+		assert_memory_equal(all.normal, some.normal, sizeof all.normal);
+		assert_memory_equal(all.id, some.id, sizeof all.id);
+		assert_memory_equal(all.block, some.block, sizeof all.block);
+		assert_memory_equal(all.weight, some.weight, sizeof all.weight);
+		psr_renderer_destroy(renderer);
+		psr_model_unref(pane);
+	}
+	psr_model_unref(wall);
+}
+
+/* A floor's light at (0.6, 0), where panes cast their shadow, of its light without them. */
+static double light_under(const struct square *pane, uint32_t n, unsigned pass, uint32_t *n_maps)
+{
+	struct square set[3] = { { -0.5, 1, 0, 1 } };
+	const struct psr_light light = { .direction = { 1, 0, -1 }, .color = { 1.1, 1.1, 1.1 }, .casts_shadow = 1 };
+	double red[2];
+
+	memcpy(set + 1, pane, n * sizeof *pane);
+	for (int has_panes = 0; has_panes <= 1; has_panes++) {
+		static uint8_t rgb[3 * SIDE * SIDE];
+		struct psr_mesh *mesh = squares(set, has_panes ? n + 1 : 1);
+		for (uint32_t i = 0; i < mesh->n_materials; i++)
+			mesh->material[i].unlit = 0;
+		struct psr_model *model = model_build(mesh, RESOLUTION);
+		const double pixel = psr_model_info(model)->spacing / 0.8;
+		const struct psr_instance instance = { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+		const struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
+			                             .camera = { .kind = PSR_CAMERA_ORTHOGRAPHIC, .ortho_height = SIDE * pixel,
+			                                         .eye = { 0, 0, 4 }, .up = { 0, 1, 0 } } };
+		struct psr_frame frame = { .width = SIDE, .height = SIDE, .rgb = rgb };
+		struct psr_settings settings;
+		struct psr_renderer *renderer;
+
+		psr_settings_default(&settings, SIDE, SIDE);
+		settings.pass = pass;
+		assert_int_equal(psr_renderer_create(&renderer, NULL), PSR_OK);
+		assert_int_equal(psr_render(renderer, &scene, &settings, NULL, &frame, NULL), PSR_OK);
+		red[has_panes] = (double)psr_srgb_to_linear[rgb[3 * (SIDE / 2 * SIDE + SIDE / 2 + (int)(0.6 / pixel))]];
+		*n_maps = frame.report.n_shadow_maps;
+		psr_renderer_destroy(renderer);
+		psr_model_unref(model);
+		meshes_free(mesh);
+	}
+	assert_true(red[0] > 0.5 && red[0] < 1);
+	return red[1] / red[0];
+}
+
+/* Two codes of 8 bits, each of 2.28 / 255 of white at most and half rounded away, beside more than half of white; an
+ * opacity is rounded to half of 1 / 255. */
+static void shadows_let_light_through_in_proportion(void **state)
+{
+	static const float opacity[] = { 0.1f, 0.25f, 0.4f, 0.5f, 0.7f, 0.9f };
+	const double most = 2 * 2.28 / 255 + 0.5 / 255;
+	uint32_t n_maps;
+
+	(void)state;
+	for (int i = 0; i < 6; i++)
+		for (unsigned pass = 0; pass <= 1; pass++) {
+			const struct square pane = { 0.1, 0.3, 2, opacity[i] };
+
+			assert_float_equal(light_under(&pane, 1, pass, &n_maps), 1 - (double)opacity[i], most);
+			assert_int_equal(n_maps, pass ? 0 : 2); /* refined frames do not count them */
+		}
+	const struct square both[] = { { 0.1, 0.3, 2, 0.2f }, { 0.3, 0.3, 2, 0.6f } };
+	assert_float_equal(light_under(both, 2, 0, &n_maps), 0.8 * 0.4, most);
+	assert_true(n_maps >= 3); /* a fourth, of blocks that were joined from both panes */
+	assert_float_equal(light_under(&(struct square){ 0.1, 0.3, 2, 1 }, 1, 0, &n_maps), 0, most);
+	assert_int_equal(n_maps, 1);
+}
+
 /* Each pane has a word or more in each pixel, 16 bytes each: beyond 64 MB without a limit. */
 static void a_crowd_of_panes_takes_little_memory(void **state)
 {
@@ -407,6 +537,8 @@ int main(void)
 		cmocka_unit_test(a_decal_changes_nothing_of_the_wall_beside_it),
 		cmocka_unit_test(what_is_in_a_case_of_glass_is_seen),
 		cmocka_unit_test(a_pane_has_the_depth_of_what_shows_most),
+		cmocka_unit_test(a_pane_that_keeps_back_half_shows_in_all_planes),
+		cmocka_unit_test(shadows_let_light_through_in_proportion),
 		cmocka_unit_test(a_crowd_of_panes_takes_little_memory),
 		cmocka_unit_test(pictures_have_the_same_bits_by_any_threads_and_instructions),
 		cmocka_unit_test(only_what_lets_light_through_has_opacities),

@@ -32,18 +32,9 @@ static const char script[] =
 
 static int set_up(void **state)
 {
-	char path[PATH_MAX], command[3 * PATH_MAX];
-
 	(void)state;
 	folder_make(folder);
-	folder_make(bin);
-	daemon_path(path, "psrd");
-	snprintf(command, sizeof command, "cp '%s' '%s/psrd'", path, bin);
-	assert_int_equal(system(command), 0);
-	file_write(bin, "psr-model", script, sizeof script - 1);
-	snprintf(path, sizeof path, "%.200s/psr-model", bin);
-	assert_int_equal(chmod(path, 0700), 0);
-	plate_write(bin, "ready.psr", 0x2040c0);
+	builder_make(bin, script);
 	return 0;
 }
 

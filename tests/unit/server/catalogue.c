@@ -47,7 +47,7 @@ static void scan(void)
 	struct psr_error error;
 
 	assert_int_equal(catalogue_scan(&listing, folder, &error), PSR_OK);
-	assert_int_equal(catalogue_adopt(&catalogue, listing), PSR_OK);
+	catalogue_adopt(&catalogue, listing);
 }
 
 static void expect_path(const char *name, const char *ending)
@@ -295,8 +295,13 @@ static void the_longest_unused_makes_room_and_the_used_stay(void **state)
 	bytes = a->bytes;
 	catalogue.max_bytes = 2 * bytes;
 	b = load("b");
-	assert_int_equal(catalogue_reserve(&catalogue, bytes, "c", &error), PSR_ERR_LIMIT); /* both are in use */
+	catalogue_pin(&catalogue, a);
+	catalogue_pin(&catalogue, b);
+	assert_int_equal(catalogue_reserve(&catalogue, bytes, "c", &error), PSR_ERR_BUSY); /* both are being drawn */
 	assert_non_null(strstr(error.text, "--max-memory"));
+	assert_int_equal(catalogue.bytes, 2 * bytes);
+	catalogue_unpin(&catalogue, b);
+	catalogue_unpin(&catalogue, a);
 	catalogue_unref(&catalogue, b);
 	catalogue_unref(&catalogue, a);
 	c = load("c"); /* b has been unused for longer than a */
@@ -336,6 +341,8 @@ static void a_source_has_a_model_a_resolution(void **state)
 	assert_int_equal(catalogue.n_models, 2);
 	catalogue_unref(&catalogue, fine);
 	catalogue.max_bytes = 2 * fine->bytes;
+	catalogue_pin(&catalogue, again);
+	catalogue_unpin(&catalogue, again);
 	catalogue_unref(&catalogue, load("a")); /* the longest unused of an entry's models makes room */
 	assert_null(catalogue_model(entry, 1024));
 	assert_ptr_equal(catalogue_model(entry, 512), again);

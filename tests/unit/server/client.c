@@ -15,18 +15,11 @@ static struct psr_client *client;
 static int set_up(void **state)
 {
 	static const char *const more[] = { "--threads", "2", NULL };
-	struct psr_model *teapot;
-	char path[2 * PATH_MAX];
 
 	(void)state;
 	folder_make(folder);
 	plate_write(folder, "plate.psr", 0x2040c0);
-	if (psr_model_map(&teapot, "tests/golden/teapot.psr", NULL) != PSR_OK)
-		return -1;
-	snprintf(path, sizeof path, "%s/teapot.psr", folder);
-	if (psr_model_write(teapot, path, NULL) != PSR_OK)
-		return -1;
-	psr_model_unref(teapot);
+	teapot_write(folder);
 	daemon_start(&psrd, folder, more);
 	return 0;
 }

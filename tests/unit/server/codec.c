@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include <turbojpeg.h>
-#include <xxhash.h>
 #include <zstd.h>
+#include "base/hash.h"
 #include "server/frames/codec.h"
 
 #define WIDTH 333
@@ -21,6 +21,11 @@
 /* By plane, as bytes. */
 static uint8_t in[PSR_N_PLANES][8 * PIXELS], out[PSR_N_PLANES][8 * PIXELS];
 static uint8_t *const rgb = in[PSR_PLANE_COLOR];
+static const struct psr_frame drawn = {
+	.width = WIDTH, .height = HEIGHT, .rgb = in[PSR_PLANE_COLOR], .depth = (float *)in[PSR_PLANE_DEPTH],
+	.normal = (int16_t *)in[PSR_PLANE_NORMAL], .id = (uint32_t *)in[PSR_PLANE_ID], .weight = in[PSR_PLANE_WEIGHT],
+	.words = (uint64_t *)in[PSR_PLANE_WORDS], .block = in[PSR_PLANE_BLOCK],
+};
 static const uint8_t background[3] = { 10, 20, 30 };
 
 static size_t plane_bytes(unsigned plane)
@@ -65,8 +70,23 @@ static void paint(enum picture kind)
 	}
 }
 
+/* What was emitted. */
+struct coded {
+	struct codec_result result;
+	struct outq_chunk *first, **last;
+};
+
+static void emit(struct outq_chunk *first, void *userdata)
+{
+	struct coded *coded = userdata;
+
+	*coded->last = first;
+	while (*coded->last != NULL)
+		coded->last = &(*coded->last)->next;
+}
+
 /* Normal, id and so on have the codec of depth. */
-static struct codec_result encode(unsigned color_codec, unsigned quality, unsigned depth_codec, unsigned planes,
+static struct coded encode(unsigned color_codec, unsigned quality, unsigned depth_codec, unsigned planes,
                                   struct psr_pool *pool)
 {
 	struct psr_msg_frame request = {
@@ -74,33 +94,29 @@ static struct codec_result encode(unsigned color_codec, unsigned quality, unsign
 		.color_quality = (uint8_t)quality, .depth_format = PSR_WIRE_DEPTH_F32, .depth_codec = (uint8_t)depth_codec,
 		.data_codec = (uint8_t)depth_codec,
 	};
-	struct psr_frame frame = {
-		.width = WIDTH, .height = HEIGHT, .rgb = rgb, .depth = (float *)in[PSR_PLANE_DEPTH],
-		.normal = (int16_t *)in[PSR_PLANE_NORMAL], .id = (uint32_t *)in[PSR_PLANE_ID],
-		.weight = in[PSR_PLANE_WEIGHT], .words = (uint64_t *)in[PSR_PLANE_WORDS],
-		.block = in[PSR_PLANE_BLOCK],
+	struct coded coded = { .last = &coded.first };
+	const struct codec_answer answer = {
+		.id = 9, .request = &request, .scale = 1, .background = background, .emit = emit, .userdata = &coded
 	};
-	const struct codec_answer answer = { .id = 9, .request = &request, .background = background };
-	struct codec_result result;
 	struct psr_error error = { 0 };
 	struct codec *codec;
 
 	assert_int_equal(codec_create(&codec), PSR_OK);
-	assert_int_equal(codec_encode(&result, codec, pool, &answer, &frame, &error), PSR_OK);
+	assert_int_equal(codec_encode(&coded.result, codec, pool, &answer, &drawn, &error), PSR_OK);
 	codec_destroy(codec);
-	return result;
+	return coded;
 }
 
 static void decode_rect(const struct psr_msg_rect *rect, const uint8_t *coded)
 {
-	static uint8_t filtered[8 * WIDTH * CODEC_STRIP_ROWS], plain[8 * WIDTH * CODEC_STRIP_ROWS];
+	static uint8_t filtered[8 * WIDTH * HASH_STRIP_ROWS], plain[8 * WIDTH * HASH_STRIP_ROWS];
 	unsigned pixel = psr_plane_pixel_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	unsigned component = psr_plane_component_bytes(rect->plane, PSR_WIRE_DEPTH_F32);
 	size_t n = (size_t)rect->w * rect->h * pixel;
 	uint8_t *to = out[rect->plane];
 	int w, h, chroma, space;
 
-	assert_true(rect->x == 0 && rect->w == WIDTH && rect->y % CODEC_STRIP_ROWS == 0);
+	assert_true(rect->x == 0 && rect->w == WIDTH && rect->y % HASH_STRIP_ROWS == 0);
 	to += (size_t)rect->y * WIDTH * pixel;
 	if (rect->codec == PSR_CODEC_RAW) {
 		assert_int_equal(rect->total, n);
@@ -121,9 +137,9 @@ static void decode_rect(const struct psr_msg_rect *rect, const uint8_t *coded)
 }
 
 /* Takes the messages apart, pieces of 64 KiB put together; returns the number of rectangles. */
-static int decode(struct codec_result *result, unsigned *codecs)
+static int decode(struct coded *coded_frame, unsigned *codecs)
 {
-	static uint8_t coded[16 * WIDTH * CODEC_STRIP_ROWS];
+	static uint8_t coded[16 * WIDTH * HASH_STRIP_ROWS];
 	int n = 0;
 	uint64_t bytes = 0;
 
@@ -134,7 +150,7 @@ static int decode(struct codec_result *result, unsigned *codecs)
 		for (unsigned i = 0; i < PIXELS; i++)
 			memcpy(out[plane] + pixel * i, empty_pixel(plane), pixel);
 	}
-	for (struct outq_chunk *chunk = result->first; chunk != NULL; chunk = chunk->next) {
+	for (struct outq_chunk *chunk = coded_frame->first; chunk != NULL; chunk = chunk->next) {
 		for (size_t at = 0; at < chunk->size;) {
 			uint32_t length = chunk->data[at] | (uint32_t)chunk->data[at + 1] << 8 | (uint32_t)chunk->data[at + 2] << 16;
 			struct psr_msg_rect rect;
@@ -154,8 +170,8 @@ static int decode(struct codec_result *result, unsigned *codecs)
 			at += length;
 		}
 	}
-	assert_true(bytes == result->rect_bytes);
-	outq_chunks_destroy(result->first);
+	assert_true(bytes == coded_frame->result.rect_bytes);
+	outq_chunks_destroy(coded_frame->first);
 	return n;
 }
 
@@ -168,77 +184,77 @@ static void lossless_planes_come_back_bit_for_bit(void **state)
 	(void)state;
 	for (size_t k = 0; k < 4; k++) {
 		for (size_t c = 0; c < 2; c++) {
-			struct codec_result result;
+			struct coded coded;
 
 			paint(kinds[k]);
-			result = encode(codecs[c], 0, codecs[c], ALL, NULL);
-			decode(&result, &used);
+			coded = encode(codecs[c], 0, codecs[c], ALL, NULL);
+			decode(&coded, &used);
 			for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 				assert_memory_equal(out[plane], in[plane], plane_bytes(plane));
 		}
 	}
 }
 
-static void hashes_are_of_the_whole_planes(void **state)
+static void hashes_are_those_of_the_planes(void **state)
 {
-	struct codec_result result;
+	struct coded coded;
 	unsigned used;
 
 	(void)state;
 	paint(TOP_EMPTY);
-	result = encode(PSR_CODEC_JPEG, 50, PSR_CODEC_ZSTD, ALL, NULL);
+	coded = encode(PSR_CODEC_JPEG, 50, PSR_CODEC_ZSTD, ALL, NULL);
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		assert_true(result.hash[plane] == XXH64(in[plane], plane_bytes(plane), 0));
-	decode(&result, &used);
+		assert_true(coded.result.hash[plane] == psr_frame_hash(&drawn, plane));
+	decode(&coded, &used);
 }
 
 static void background_strips_are_left_out(void **state)
 {
-	struct codec_result result;
+	struct coded coded;
 	unsigned used;
 
 	(void)state;
 	paint(EMPTY);
-	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
-	assert_true(result.depth_min == 0 && result.depth_max == 0);
-	assert_int_equal(decode(&result, &used), 0);
+	coded = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
+	assert_true(coded.result.depth_min == 0 && coded.result.depth_max == 0);
+	assert_int_equal(decode(&coded, &used), 0);
 	paint(TOP_EMPTY); /* 200 of 300 rows: one strip of three, of each plane */
-	result = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
-	assert_int_equal(decode(&result, &used), 2 * PSR_N_PLANES);
+	coded = encode(PSR_CODEC_ZSTD, 0, PSR_CODEC_ZSTD, ALL, NULL);
+	assert_int_equal(decode(&coded, &used), 2 * PSR_N_PLANES);
 	paint(EMPTY);
 	rgb[3 * (128 * WIDTH - 1) + 2] ^= 1; /* the last byte of the first strip */
-	result = encode(PSR_CODEC_RAW, 0, 0, 1, NULL);
-	assert_int_equal(decode(&result, &used), 1);
+	coded = encode(PSR_CODEC_RAW, 0, 0, 1, NULL);
+	assert_int_equal(decode(&coded, &used), 1);
 	assert_memory_equal(out[PSR_PLANE_COLOR], rgb, 3 * PIXELS);
 }
 
 static void what_does_not_shrink_travels_raw(void **state)
 {
-	struct codec_result result;
+	struct coded coded;
 	unsigned used;
 
 	(void)state;
 	paint(NOISE);
-	result = encode(PSR_CODEC_ZSTD, 0, 0, 1, NULL);
-	decode(&result, &used);
+	coded = encode(PSR_CODEC_ZSTD, 0, 0, 1, NULL);
+	decode(&coded, &used);
 	assert_int_equal(used, 1u << PSR_CODEC_RAW);
 	paint(SMOOTH);
-	result = encode(PSR_CODEC_ZSTD, 0, 0, 1, NULL);
-	assert_true(result.rect_bytes < 3 * PIXELS / 4);
-	decode(&result, &used);
+	coded = encode(PSR_CODEC_ZSTD, 0, 0, 1, NULL);
+	assert_true(coded.result.rect_bytes < 3 * PIXELS / 4);
+	decode(&coded, &used);
 	assert_int_equal(used, 1u << PSR_CODEC_ZSTD);
 }
 
 static void each_strip_is_a_whole_jpeg(void **state)
 {
-	struct codec_result result;
+	struct coded coded;
 	unsigned used;
 	double sum = 0;
 
 	(void)state;
 	paint(SMOOTH);
-	result = encode(PSR_CODEC_JPEG, 95, 0, 1, NULL);
-	assert_int_equal(decode(&result, &used), 3);
+	coded = encode(PSR_CODEC_JPEG, 95, 0, 1, NULL);
+	assert_int_equal(decode(&coded, &used), 3);
 	assert_int_equal(used, 1u << PSR_CODEC_JPEG);
 	for (size_t i = 0; i < 3 * PIXELS; i++)
 		sum += (rgb[i] - out[0][i]) * (rgb[i] - out[0][i]);
@@ -250,7 +266,7 @@ static void each_strip_is_a_whole_jpeg(void **state)
 static void threads_do_not_change_a_byte(void **state)
 {
 	struct psr_pool *pool;
-	struct codec_result one, many;
+	struct coded one, many;
 	struct outq_chunk *a, *b;
 	unsigned used;
 
@@ -271,16 +287,16 @@ static void threads_do_not_change_a_byte(void **state)
 
 static void the_depth_range_is_of_finite_depths(void **state)
 {
-	struct codec_result result;
+	struct coded coded;
 	unsigned used;
 
 	(void)state;
 	paint(EMPTY);
 	set_depth(5, 7.5f);
 	set_depth(PIXELS - 1, 0.25f);
-	result = encode(0, 0, PSR_CODEC_RAW, 2, NULL);
-	assert_true(result.depth_min == 0.25 && result.depth_max == 7.5);
-	decode(&result, &used);
+	coded = encode(0, 0, PSR_CODEC_RAW, 2, NULL);
+	assert_true(coded.result.depth_min == 0.25 && coded.result.depth_max == 7.5);
+	decode(&coded, &used);
 	assert_memory_equal(out[PSR_PLANE_DEPTH], in[PSR_PLANE_DEPTH], 4 * PIXELS);
 }
 
@@ -288,7 +304,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(lossless_planes_come_back_bit_for_bit),
-		cmocka_unit_test(hashes_are_of_the_whole_planes),
+		cmocka_unit_test(hashes_are_those_of_the_planes),
 		cmocka_unit_test(background_strips_are_left_out),
 		cmocka_unit_test(what_does_not_shrink_travels_raw),
 		cmocka_unit_test(each_strip_is_a_whole_jpeg),

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <arpa/inet.h>
 #include <limits.h>
 #include <math.h>
@@ -22,7 +23,7 @@
 #include "model/blocks.h"
 #include "proto/proto.h"
 
-#define PATIENCE_MS 20000 /* for what must happen; nothing that passes waits so long */
+#define PATIENCE_MS 60000 /* for what must happen; nothing that passes waits so long */
 
 /* ---- files ---- */
 
@@ -57,9 +58,9 @@ static inline void file_write(const char *folder, const char *name, const void *
 #define PLATE_BLOCKS 64
 #define PLATE_SAMPLES (64 * PLATE_BLOCKS)
 
-/* A plate in the plane z = 0, 8x8 full blocks, x from -0.5 to 0.5, of one color, facing +z. It comes with a camera,
- * 'front', and lights 'lamp', 'dim' (too narrow a spot for the wire) and 'sun'. */
-static inline struct psr_model *plate_create(uint32_t rgb)
+/* A plate in the plane z = 0, 8x8 full blocks, x from -0.5 to 0.5, of one color and opacity, facing +z. It comes with a
+ * camera, 'front', and lights 'lamp', 'dim' (too narrow a spot for the wire) and 'sun'. */
+static inline struct psr_model *pane_create(uint32_t rgb, uint8_t opacity)
 {
 	static struct psr_projection projection = { .axis = { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } },
 		                                        .spacing = 1.0f / 64 };
@@ -67,7 +68,9 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	static int16_t x[PLATE_BLOCKS], y[PLATE_BLOCKS], z[PLATE_BLOCKS];
 	static const struct psr_run run;
 	static uint16_t depth[PLATE_SAMPLES], offset[PLATE_BLOCKS], r[PLATE_BLOCKS];
-	static uint8_t number[PLATE_BLOCKS], flags[PLATE_BLOCKS];
+	static uint8_t number[PLATE_BLOCKS], flags[PLATE_BLOCKS], cone_sine[PLATE_BLOCKS], traits[PLATE_BLOCKS];
+	static uint8_t opacities[PLATE_SAMPLES];
+	static int8_t cone_x[PLATE_BLOCKS], cone_y[PLATE_BLOCKS], cone_z[PLATE_BLOCKS];
 	static uint64_t mask[PLATE_BLOCKS], attr[PLATE_SAMPLES];
 	struct psr_model_info info = {
 		.scale = 1, .box_min = { -0.5, -0.5, 0 }, .box_max = { 0.5, 0.5, 0 }, .spacing = 1.0 / 64, .tolerance = 0.4,
@@ -101,19 +104,52 @@ static inline struct psr_model *plate_create(uint32_t rgb)
 	for (int i = 0; i < PLATE_SAMPLES; i++) {
 		depth[i] = 32768;                                  /* that of the sphere's center */
 		attr[i] = (uint64_t)1 << 15 | (uint64_t)rgb << 16; /* unlit */
+		opacities[i] = opacity;
+	}
+	memset(cone_sine, PSR_CONE_ANY, sizeof cone_sine);
+	memset(cone_z, 127, sizeof cone_z);
+	memset(traits, PSR_BLOCK_SHEER, sizeof traits);
+	if (opacity < PSR_OPAQUE) {
+		blocks.cone_x = cone_x;
+		blocks.cone_y = cone_y;
+		blocks.cone_z = cone_z;
+		blocks.cone_sine = cone_sine;
+		blocks.traits = traits;
+		blocks.opacity = opacities;
 	}
 	assert_int_equal(psr_model_create(&model, &info, &blocks, &presets, &error), PSR_OK);
 	return model;
 }
 
-static inline void plate_write(const char *folder, const char *name, uint32_t rgb)
+static inline struct psr_model *plate_create(uint32_t rgb)
 {
-	struct psr_model *model = plate_create(rgb);
+	return pane_create(rgb, PSR_OPAQUE);
+}
+
+static inline void pane_write(const char *folder, const char *name, uint32_t rgb, uint8_t opacity)
+{
+	struct psr_model *model = pane_create(rgb, opacity);
 	char path[2 * PATH_MAX];
 
 	snprintf(path, sizeof path, "%s/%s", folder, name);
 	assert_int_equal(psr_model_write(model, path, NULL), PSR_OK);
 	psr_model_unref(model);
+}
+
+static inline void plate_write(const char *folder, const char *name, uint32_t rgb)
+{
+	pane_write(folder, name, rgb, PSR_OPAQUE);
+}
+
+static inline void teapot_write(const char *folder)
+{
+	struct psr_model *teapot = NULL;
+	char path[2 * PATH_MAX];
+
+	assert_int_equal(psr_model_map(&teapot, "tests/golden/teapot.psr", NULL), PSR_OK);
+	snprintf(path, sizeof path, "%s/teapot.psr", folder);
+	assert_int_equal(psr_model_write(teapot, path, NULL), PSR_OK);
+	psr_model_unref(teapot);
 }
 
 /* ---- the daemon ---- */
@@ -140,6 +176,22 @@ static inline void daemon_path(char path[PATH_MAX], const char *program)
 			*strrchr(own, '/') = '\0';
 		snprintf(path, PATH_MAX, "%.3000s/bin/%s", own, program);
 	}
+}
+
+/* A folder with psrd, beside it a psr-model of the test's own, a script, and a plate that the script can copy:
+ * ready.psr. */
+static inline void builder_make(char bin[PATH_MAX], const char *script)
+{
+	char path[PATH_MAX], command[3 * PATH_MAX];
+
+	folder_make(bin);
+	daemon_path(path, "psrd");
+	snprintf(command, sizeof command, "cp '%s' '%s/psrd'", path, bin);
+	assert_int_equal(system(command), 0);
+	file_write(bin, "psr-model", script, strlen(script));
+	snprintf(path, sizeof path, "%.200s/psr-model", bin);
+	assert_int_equal(chmod(path, 0700), 0);
+	plate_write(bin, "ready.psr", 0x2040c0);
 }
 
 static inline int64_t clock_ms(void)
@@ -240,6 +292,29 @@ static inline void daemon_stop(struct daemon *d)
 		fail_msg("psrd ended with %d: %s", status, d->log);
 }
 
+/* VmRSS: memory in use; VmHWM: the most of it so far. */
+static inline long daemon_memory_kb(const struct daemon *d, const char *which)
+{
+	const size_t n = strlen(which);
+	char path[64], line[256];
+	long kb = 0;
+	FILE *file;
+
+	snprintf(path, sizeof path, "/proc/%d/status", (int)d->pid);
+	file = fopen(path, "r");
+	assert_non_null(file);
+	while (fgets(line, sizeof line, file) != NULL)
+		if (strncmp(line, which, n) == 0 && line[n] == ':')
+			kb = atol(line + n + 1);
+	fclose(file);
+	return kb;
+}
+
+static inline long daemon_resident_kb(const struct daemon *d)
+{
+	return daemon_memory_kb(d, "VmRSS");
+}
+
 /* ---- a peer ---- */
 
 struct peer {
@@ -256,6 +331,7 @@ static inline void peer_connect(struct peer *p, const struct daemon *d)
 	struct sockaddr_in in = { .sin_family = AF_INET, .sin_port = htons(d->port),
 		                      .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };
 	struct sockaddr_un un = { .sun_family = AF_UNIX };
+	const int on = 1;
 
 	memset(p, 0, sizeof *p);
 	psr_framer_init(&p->framer, PSR_SERVER, p->storage, sizeof p->storage);
@@ -263,6 +339,7 @@ static inline void peer_connect(struct peer *p, const struct daemon *d)
 	if (d->port != 0) {
 		p->fd = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
 		assert_int_equal(connect(p->fd, (struct sockaddr *)&in, sizeof in), 0);
+		setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on); /* or a small message waits for a delayed ACK */
 	} else {
 		p->fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
 		snprintf(un.sun_path, sizeof un.sun_path, "%.100s", d->ready + 5);
@@ -424,6 +501,39 @@ static inline void scene_default(struct psr_msg_scene *scene, uint32_t handle)
 	scene->instance[0] = (struct psr_msg_instance){ .handle = handle, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 }
 
+static inline uint32_t peer_ask_stats(struct peer *p)
+{
+	assert_int_equal(psr_msg_stats_encode(&p->buf, ++p->id, NULL), PSR_OK);
+	peer_send(p);
+	return p->id;
+}
+
+static inline uint64_t peer_stat(struct peer *p, unsigned id)
+{
+	struct psr_message message;
+	struct psr_msg_stats_reply reply;
+
+	peer_expect(p, &message, PSR_MSG_STATS_REPLY, peer_ask_stats(p));
+	assert_int_equal(psr_msg_stats_reply_decode(&reply, message.payload, message.n, NULL), PSR_OK);
+	for (int i = 0; i < reply.n_stats; i++)
+		if (reply.stat[i].id == id)
+			return reply.stat[i].value;
+	fail();
+	return 0;
+}
+
+/* By a client of its own. */
+static inline uint64_t stat_of(const struct daemon *d, unsigned id)
+{
+	static struct peer asker;
+	uint64_t value;
+
+	peer_hello(&asker, d, NULL);
+	value = peer_stat(&asker, id);
+	peer_close(&asker);
+	return value;
+}
+
 static inline void peer_send_scene(struct peer *p, const struct psr_msg_scene *scene)
 {
 	assert_int_equal(psr_msg_scene_encode(&p->buf, ++p->id, scene, NULL), PSR_OK);
@@ -467,6 +577,15 @@ static inline uint64_t peer_expect_frame(struct peer *p, uint32_t id, struct psr
 	return n;
 }
 
+/* A frame of 64x64. */
+static inline void peer_draw(struct peer *p)
+{
+	struct psr_msg_frame frame = frame_default(64, 64);
+	struct psr_msg_frame_end end;
+
+	assert_true(peer_expect_frame(p, peer_ask_frame(p, &frame), &end) > 0);
+}
+
 /* HELLO, OPEN `name`, a scene of it in slot 0. */
 static inline void peer_begin(struct peer *p, const struct daemon *d, const char *name)
 {
@@ -485,12 +604,10 @@ static inline void peer_begin(struct peer *p, const struct daemon *d, const char
 static inline void expect_serves(const struct daemon *d, const char *name)
 {
 	struct peer *p = malloc(sizeof *p);
-	struct psr_msg_frame frame = frame_default(64, 64);
-	struct psr_msg_frame_end end;
 
 	assert_non_null(p);
 	peer_begin(p, d, name);
-	assert_true(peer_expect_frame(p, peer_ask_frame(p, &frame), &end) > 0);
+	peer_draw(p);
 	peer_close(p);
 	free(p);
 }

@@ -5,26 +5,10 @@
 #include <setjmp.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "fixture.h"
+#include "plate.h"
 
-static char folder[PATH_MAX];
 static struct daemon psrd;
 static struct peer p, q;
-
-static int set_up(void **state)
-{
-	(void)state;
-	folder_make(folder);
-	plate_write(folder, "plate.psr", 0x2040c0);
-	return 0;
-}
-
-static int tear_down(void **state)
-{
-	(void)state;
-	folder_remove(folder);
-	return 0;
-}
 
 /* Exit status of psrd with these arguments, when it does not start; its words stay in psrd.log. */
 static int refused(const char *const *arguments)
@@ -170,7 +154,7 @@ static void silence_before_hello_is_closed_in_time(void **state)
 	daemon_stop(&psrd);
 }
 
-static void idle_clients_hear_goodbye(void **state)
+static void idle_clients_hear_ping_then_goodbye(void **state)
 {
 	struct psr_msg_welcome welcome;
 	struct psr_message message;
@@ -180,31 +164,13 @@ static void idle_clients_hear_goodbye(void **state)
 	start("--idle-timeout", "0.2", NULL, NULL);
 	peer_hello(&p, &psrd, &welcome);
 	assert_int_equal(welcome.idle_timeout_ms, 200);
+	peer_expect(&p, &message, PSR_MSG_PING, 0);
 	peer_expect(&p, &message, PSR_MSG_GOODBYE, 0);
 	assert_int_equal(psr_msg_goodbye_decode(&goodbye, message.payload, message.n, NULL), PSR_OK);
 	assert_int_equal(goodbye.reason, PSR_GOODBYE_IDLE);
 	peer_expect_end(&p);
 	peer_close(&p);
 	daemon_stop(&psrd);
-}
-
-static uint64_t stat_of(const struct daemon *d, unsigned id)
-{
-	static struct peer asker;
-	struct psr_message message;
-	struct psr_msg_stats_reply reply;
-
-	peer_hello(&asker, d, NULL);
-	psr_msg_stats_encode(&asker.buf, ++asker.id, NULL);
-	peer_send(&asker);
-	peer_expect(&asker, &message, PSR_MSG_STATS_REPLY, asker.id);
-	assert_int_equal(psr_msg_stats_reply_decode(&reply, message.payload, message.n, NULL), PSR_OK);
-	peer_close(&asker);
-	for (int i = 0; i < reply.n_stats; i++)
-		if (reply.stat[i].id == id)
-			return reply.stat[i].value;
-	fail();
-	return 0;
 }
 
 /* 64 raw frames of 3 MB for a peer that reads none: only what fits the queue is drawn, others are served, and in the
@@ -474,7 +440,7 @@ static void the_end_does_not_wait_for_readers_that_stopped(void **state)
 	int64_t began;
 
 	(void)state;
-	start("--drain-timeout", "0.5", NULL, NULL);
+	start("--drain-timeout", "0.5", "--frame-timeout", "3600");
 	peer_begin(&p, &psrd, "plate");
 	frame.color_codec = PSR_CODEC_RAW;
 	frame.camera.fov_y = 0.1;
@@ -647,7 +613,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(sighup_finds_new_models, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(damaged_models_are_refused_and_listed_as_failed, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(silence_before_hello_is_closed_in_time, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(idle_clients_hear_goodbye, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(idle_clients_hear_ping_then_goodbye, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_reader_that_stops_is_dropped_and_costs_others_nothing, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(a_late_reader_gets_all_its_frames, set_up, tear_down),
 		cmocka_unit_test_setup_teardown(requests_wait_when_answers_are_not_read, set_up, tear_down),

@@ -41,7 +41,8 @@ static void welcome_tells_the_limits(void **state)
 	peer_hello(&p, &psrd, &welcome);
 	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_RESOLUTION | PSR_CAP_PRESETS |
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
-	                                           PSR_CAP_BLOCK);
+	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
+	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -75,6 +76,12 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	struct psr_msg_frame frame = frame_default(WIDTH, HEIGHT);
 	static uint8_t planes[PSR_N_PLANES][8 * WIDTH * HEIGHT], coded[8 * WIDTH * 128];
 	const uint8_t *rgb = planes[PSR_PLANE_COLOR];
+	const struct psr_frame got = {
+		.width = WIDTH, .height = HEIGHT, .rgb = planes[PSR_PLANE_COLOR], .depth = (float *)planes[PSR_PLANE_DEPTH],
+		.normal = (int16_t *)planes[PSR_PLANE_NORMAL], .id = (uint32_t *)planes[PSR_PLANE_ID],
+		.block = planes[PSR_PLANE_BLOCK], .weight = planes[PSR_PLANE_WEIGHT],
+		.words = (uint64_t *)planes[PSR_PLANE_WORDS],
+	};
 	const unsigned n_pixels = WIDTH * HEIGHT;
 	struct psr_message message;
 	struct psr_msg_frame_begin begin;
@@ -90,7 +97,7 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 	peer_ask_frame(&p, &frame);
 	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, p.id);
 	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
-	assert_true(fabs(begin.depth_min - 2) < 1e-3 && fabs(begin.depth_max - 2) < 1e-3);
+	assert_true(begin.depth_min == 0 && begin.depth_max == 0 && begin.refine == 0);
 	assert_memory_equal(begin.camera.eye, frame.camera.eye, sizeof begin.camera.eye);
 	assert_true(begin.camera.fov_y == frame.camera.fov_y && begin.camera.near_z == frame.camera.near_z);
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
@@ -113,9 +120,9 @@ static void raw_planes_have_the_hashes_of_the_end(void **state)
 			       rect.total);
 	}
 	assert_int_equal(psr_msg_frame_end_decode(&end, message.payload, message.n, NULL), PSR_OK);
+	assert_true(fabs(end.depth_min - 2) < 1e-3 && fabs(end.depth_max - 2) < 1e-3 && end.has_hashes);
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
-		assert_true(XXH64(planes[plane], n_pixels * psr_plane_pixel_bytes(plane, PSR_WIRE_DEPTH_F32), 0) ==
-		            end.hash[plane]);
+		assert_true(psr_frame_hash(&got, plane) == end.hash[plane]);
 	for (int i = 0; i < WIDTH * HEIGHT; i++)
 		n_plate += rgb[3 * i] == 0xc0 && rgb[3 * i + 1] == 0x40 && rgb[3 * i + 2] == 0x20;
 	/* The plate is wider than the picture, which shows 4 tan(0.3) of its plane in height; 0.866 are covered. At either
@@ -133,18 +140,19 @@ static void the_report_has_every_entry_in_order(void **state)
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
-	assert_int_equal(end.n_entries, 22 + PSR_N_EFFECTS);
-	for (int i = 0; i < 12; i++)
+	assert_int_equal(end.n_entries, 23 + PSR_N_EFFECTS);
+	for (int i = 0; i < 13; i++)
 		assert_int_equal(end.entry[i].id, i + 1);
-	for (int i = 12; i < 22; i++)
-		assert_int_equal(end.entry[i].id, i - 12 + 32);
-	for (int i = 22; i < 22 + PSR_N_EFFECTS; i++) {
-		assert_int_equal(end.entry[i].id, i - 22 + PSR_WIRE_REPORT_EFFECTS);
+	assert_true(end.entry[12].ns > 0); /* cores' time */
+	for (int i = 13; i < 23; i++)
+		assert_int_equal(end.entry[i].id, i - 13 + 32);
+	for (int i = 23; i < 23 + PSR_N_EFFECTS; i++) {
+		assert_int_equal(end.entry[i].id, i - 23 + PSR_WIRE_REPORT_EFFECTS);
 		assert_true(end.entry[i].ns == PSR_WHY_RAN || end.entry[i].count == 0);
 	}
-	assert_int_equal(end.entry[22 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
+	assert_int_equal(end.entry[23 + PSR_EFFECT_SPECULAR].ns, PSR_WHY_NOTHING);
 	assert_int_equal(end.entry[9].count, 2);
-	assert_int_equal(end.entry[17].count, PLATE_SAMPLES);
+	assert_int_equal(end.entry[18].count, PLATE_SAMPLES);
 	peer_close(&p);
 }
 
@@ -203,8 +211,8 @@ static void a_light_that_casts_shadows_gets_a_map(void **state)
 		peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
 		assert_int_equal(end.entry[10].id, PSR_WIRE_REPORT_SHADOW);
 		assert_int_equal(end.entry[10].count > 0, casts);
-		assert_int_equal(end.entry[20].id, PSR_WIRE_REPORT_SHADOW_MAPS);
-		assert_int_equal(end.entry[20].count, casts);
+		assert_int_equal(end.entry[21].id, PSR_WIRE_REPORT_SHADOW_MAPS);
+		assert_int_equal(end.entry[21].count, casts);
 	}
 	peer_close(&p);
 	free(scene);
@@ -215,7 +223,6 @@ static void settings_are_kept_and_returned(void **state)
 	struct psr_msg_frame frame = frame_default(64, 48);
 	struct psr_msg_frame_begin begin;
 	struct psr_message message;
-	char text[PSR_ERROR_TEXT];
 
 	(void)state;
 	peer_begin(&p, &psrd, "plate");
@@ -228,8 +235,9 @@ static void settings_are_kept_and_returned(void **state)
 		assert_true(peer_next(&p, &message));
 	while (message.type != PSR_MSG_FRAME_END);
 	frame.settings.scale = 2;
-	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "scale 1"));
+	peer_expect(&p, &message, PSR_MSG_FRAME_BEGIN, peer_ask_frame(&p, &frame));
+	assert_int_equal(psr_msg_frame_begin_decode(&begin, message.payload, message.n, NULL), PSR_OK);
+	assert_int_equal(begin.settings.scale, 2);
 	peer_close(&p);
 }
 
@@ -277,6 +285,36 @@ static void cancelled_frames_end_once(void **state)
 	}
 	frame = frame_default(32, 32);
 	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &(struct psr_msg_frame_end){ 0 });
+	peer_close(&p);
+}
+
+static void a_cancel_keeps_the_view_of_its_id(void **state)
+{
+	struct psr_msg_frame frame = frame_default(512, 512);
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	assert_int_equal(psr_msg_frame_encode(&p.buf, ++p.id, 0, &frame, NULL), PSR_OK);
+	assert_int_equal(psr_msg_cancel_encode(&p.buf, p.id + 1, 7, NULL), PSR_OK); /* of no open id: nothing */
+	assert_int_equal(psr_msg_cancel_encode(&p.buf, p.id, 7, NULL), PSR_OK);
+	peer_send(&p);
+	peer_expect_error(&p, 0, PSR_WIRE_PROTOCOL, NULL);
+	peer_expect_end(&p);
+	peer_close(&p);
+}
+
+static void hashes_are_left_out_on_request(void **state)
+{
+	struct psr_msg_frame frame = frame_default(64, 48);
+	struct psr_msg_frame_end end;
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	assert_true(end.has_hashes && end.hash[0] != 0);
+	frame.flags = PSR_WIRE_FRAME_NO_HASHES;
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	assert_true(!end.has_hashes && end.hash[0] == 0);
 	peer_close(&p);
 }
 
@@ -386,7 +424,7 @@ static void stats_count_what_happened(void **state)
 	peer_send(&p);
 	peer_expect(&p, &message, PSR_MSG_STATS_REPLY, p.id);
 	assert_int_equal(psr_msg_stats_reply_decode(&reply, message.payload, message.n, NULL), PSR_OK);
-	assert_int_equal(reply.n_stats, 14);
+	assert_int_equal(reply.n_stats, 31);
 	assert_int_equal(reply.stat[3].id, PSR_STAT_MODELS);
 	assert_int_equal(reply.stat[3].value, 1);
 	assert_true(reply.stat[5].value >= 1);
@@ -518,15 +556,17 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
 	assert_non_null(strstr(text, "time budgets"));
 	frame = frame_default(64, 64);
-	frame.planes = 2;
-	frame.color_codec = 0;
-	frame.depth_format = PSR_WIRE_DEPTH_U16;
-	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, NULL);
-	frame = frame_default(64, 64);
-	assert_int_equal(psr_msg_frame_encode(&p.buf, ++p.id, 3, &frame, NULL), PSR_OK);
+	frame.flags = PSR_WIRE_FRAME_SHARP;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_ARG, text);
+	assert_non_null(strstr(text, "view above 0"));
+	frame.flags = 0;
+	assert_int_equal(psr_msg_frame_encode(&p.buf, ++p.id, 16, &frame, NULL), PSR_OK);
+	assert_int_equal(psr_msg_pause_encode(&p.buf, ++p.id, 16, NULL), PSR_OK);
 	peer_send(&p);
-	peer_expect_error(&p, p.id, PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "view"));
+	peer_expect_error(&p, p.id - 1, PSR_WIRE_LIMIT, text);
+	assert_non_null(strstr(text, "views 0 to 15"));
+	peer_expect_error(&p, p.id, PSR_WIRE_LIMIT, text);
+	assert_non_null(strstr(text, "views 0 to 15"));
 	scene_default(scene, 1);
 	scene->instance[0].representation = PSR_WIRE_REP_OCTREE;
 	peer_send_scene(&p, scene);
@@ -576,6 +616,7 @@ static void cameras_and_lights_of_a_model_are_told(void **state)
 	(void)state;
 	peer_hello(&p, &psrd, NULL);
 	peer_expect_opened(&p, peer_ask_open(&p, "plate"), &opened);
+	assert_memory_equal(opened.up, ((const double[]){ 0, 0, 1 }), sizeof opened.up);
 	id = ask_presets(opened.handle);
 	for (int i = 0; i < 4; i++) {
 		peer_expect(&p, &message, PSR_MSG_PRESET, id);
@@ -673,6 +714,8 @@ int main(void)
 		cmocka_unit_test(settings_are_kept_and_returned),
 		cmocka_unit_test(many_frames_at_once_are_all_answered_alike),
 		cmocka_unit_test(cancelled_frames_end_once),
+		cmocka_unit_test(a_cancel_keeps_the_view_of_its_id),
+		cmocka_unit_test(hashes_are_left_out_on_request),
 		cmocka_unit_test(passes_rise_to_the_final_one),
 		cmocka_unit_test(passes_beyond_the_last_are_refused),
 		cmocka_unit_test(refinement_is_cancelled_at_once),

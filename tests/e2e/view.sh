@@ -1,0 +1,189 @@
+#!/bin/bash
+# psr-view on a screen of Xvfb, with a hand of xdotool. At rest the screen has the pixels of `psr shot`, which the command
+# of a screenshot draws.
+. "$(dirname "$0")/lib.sh"
+here=$PWD
+
+for program in psr-view Xvfb xdotool; do
+	if ! type -P $program >/dev/null; then
+		skip "a window is turned, zoomed, resized" "$program is not there"
+		exit
+	fi
+done
+refuses "without a display a sentence says what to do" 3 "no display.*psr view --term" \
+	timeout 10 env -u DISPLAY -u WAYLAND_DISPLAY -u SDL_VIDEODRIVER psr view --model teapot
+refuses "two files" 2 "one file at a time" timeout 10 psr view a.ply b.ply
+refuses "a path that is none" 4 "no path that --record wrote" timeout 10 psr view --play "$here/tests/e2e/lib.sh"
+
+mkdir "$work/screen" "$work/shots"
+Xvfb -noreset -displayfd 3 -screen 0 400x320x24 -fbdir "$work/screen" 3>"$work/display" 2>/dev/null &
+xvfb_pid=$!
+view_pid=
+end() {
+	[ -z "$view_pid" ] || kill $view_pid 2>/dev/null
+	kill $xvfb_pid
+	finish
+}
+trap 'end; exit $?' EXIT
+within() { # seconds command...: tries it until it succeeds
+	local tries=$(($1 * 20))
+	shift
+	for _ in $(seq $tries); do
+		"$@" >/dev/null 2>&1 && return 0
+		sleep 0.05
+	done
+	return 1
+}
+within 10 test -s "$work/display"
+DISPLAY=:$(cat "$work/display")
+export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
+
+# --- a hand ---
+view() { # psr-view's options
+	(cd "$work/shots" && exec psr view --bare "$@" >"$work/view.log" 2>"$work/view.err") &
+	view_pid=$!
+	within 10 xdotool search --name psr-view
+	window=$(xdotool search --name psr-view)
+	xdotool windowfocus "$window" 2>/dev/null
+}
+drag() { # button dx dy: from the middle, in steps
+	xdotool mousemove --window "$window" 160 120 mousedown "$1"
+	for _ in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative --sync -- $(($2 / 8)) $(($3 / 8)); done
+	xdotool mouseup "$1"
+}
+n_shots=0
+shot() { # takes a screenshot, which waits until the picture is sharp; sets $command
+	n_shots=$((n_shots + 1))
+	xdotool key F2
+	within 20 test -s "$work/shots/psr-view-$n_shots.png"
+	within 1 grep -q "psr-view-$n_shots.png" "$work/view.log"
+	command=$(grep "^psr shot.*psr-view-$n_shots.png" "$work/view.log")
+	xdotool key Shift_L # the note goes
+}
+draws_the_same() { # the screenshot's command draws the screenshot
+	sh -c "${command% -o *} -o '$work/true.png'" 2>/dev/null && cmp "$work/true.png" "$work/shots/psr-view-$n_shots.png"
+}
+read_screen() { # [rows]: the window's pixels, or its upper rows, into $work/screen.ppm, without the mouse
+	xdotool mousemove 0 0
+	eval "$(xdotool getwindowgeometry --shell "$window")"
+	python3 tests/tools/screen.py "$work/screen/Xvfb_screen0" "$X" "$Y" "$WIDTH" "${1:-$HEIGHT}" "$work/screen.ppm"
+}
+screen_is() { read_screen && cmp -s "$work/screen.ppm" "$1"; }
+has_turned() { read_screen 100 && ! cmp -s "$work/screen.ppm" "$1"; } # what is written below is not looked at
+is_true() { # claim: screenshot, its command and the screen agree
+	shot
+	check "$1: psr shot draws the same, bit for bit" draws_the_same
+	sh -c "${command% -o *} -o '$work/true.ppm'" 2>/dev/null
+	check "$1: and the screen has it" within 5 screen_is "$work/true.ppm"
+}
+said() { sed -n "s/.*--$1 \([^ ]*\).*/\1/p" <<<"$command"; } # the value of an option of $command
+differs() { # claim a b
+	if [ "$2" != "$3" ]; then ok "$1"; else not_ok "$1" "'$2' twice"; fi
+}
+length() { awk -v a="$1" -v b="$2" 'BEGIN { split(a, p, ","); split(b, q, ",")
+	print sqrt((p[1] - q[1]) ^ 2 + (p[2] - q[2]) ^ 2 + (p[3] - q[3]) ^ 2) }'; }
+
+start_psrd --models tests/golden --threads 2
+address=$server
+view --server "$address" --model teapot --size 320x240 --no-inertia
+is_true "the first picture"
+home=$command
+
+# --- orbit, pan, zoom ---
+drag 1 80 40
+is_true "after an orbit"
+differs "the eye went" "$(said eye)" "$(command=$home said eye)"
+check "about the middle, as far from it as before" awk -v a="$(length "$(said eye)" "$(said target)")" \
+	-v b="$(command=$home; length "$(said eye)" "$(said target)")" 'BEGIN { exit !((a / b - 1) ^ 2 < 1e-20) }'
+before=$command
+drag 3 -40 16
+is_true "after a pan"
+differs "the target went" "$(said target)" "$(command=$before said target)"
+before=$command
+xdotool mousemove --window "$window" 150 130 click 4 click 4 click 4 click 4
+is_true "after a zoom"
+check "the eye is nearer" awk -v a="$(said eye)" -v b="$(command=$before said eye)" 'BEGIN {
+	split(a, p, ","); split(b, q, ","); exit !(p[3] < q[3]) }'
+
+# --- light, stages ---
+xdotool keydown l
+drag 1 40 -24
+xdotool keyup l
+xdotool key x n Prior
+is_true "with a light of its own, shadows, without smoothing"
+check "says so" grep -q -- "--light dir:.*--ambient 0.2.*--shadows.*--no-smooth" <<<"${command//\'/}"
+xdotool key t
+is_true "a picture of blocks"
+xdotool key t t t t t t t t k x n Next h
+shot
+check "all back is the first picture" [ "${command% -o *}" = "${home% -o *}" ]
+
+# --- pick and measure ---
+psr shot --server "$address" --model teapot --size 320x240 --depth "$work/depth.pfm" 2>/dev/null
+depth=$(tail -c $((4 * 320 * 240)) "$work/depth.pfm" | od -An -v -tf4 -w$((4 * 320)) | tail -n +$((240 - 120)) |
+	head -n 1 | awk '{ print $(160 + 1) }') # rows from the bottom
+xdotool mousemove --window "$window" 160 120 click 1
+within 3 grep -q '^point' "$work/view.log"
+check "a click reads the depth of the picture" awk -v is="$(sed -n 's/^point.*depth \([^ ]*\).*/\1/p' "$work/view.log")" \
+	-v true="$depth" 'BEGIN { exit !((is / true - 1) ^ 2 < 1e-12) }'
+check "and a normal of length 1" awk -F'normal ' '/^point/ { split($2, n, ",")
+	exit !((n[1] ^ 2 + n[2] ^ 2 + n[3] ^ 2 - 1) ^ 2 < 1e-6) }' "$work/view.log"
+xdotool key m
+sleep 0.6 # single clicks, not a double one
+xdotool mousemove --window "$window" 140 120 click 1
+sleep 0.6
+xdotool mousemove --window "$window" 180 130 click 1
+within 3 grep -q '^distance' "$work/view.log"
+check "two clicks measure between them" awk '/^point/ { a = b; b = $2 } /^distance/ { d = $2 }
+	END { split(a, p, ","); split(b, q, ",")
+	exit !(d > 0 && (sqrt((p[1] - q[1]) ^ 2 + (p[2] - q[2]) ^ 2 + (p[3] - q[3]) ^ 2) / d - 1) ^ 2 < 1e-12) }' "$work/view.log"
+xdotool key m
+
+# --- another size; psrd goes and comes back ---
+xdotool windowsize --sync "$window" 280 200
+is_true "in a smaller window"
+check "of its size" grep -q -- "--size 280x200" <<<"$command"
+kill -9 $psrd_pid
+wait $psrd_pid 2>/dev/null
+check "a lost connection is said" within 5 sh -c "xdotool getwindowname $window | grep -q 'connection lost'"
+read_screen 100
+cp "$work/screen.ppm" "$work/lost.ppm"
+drag 1 40 16
+check "the last picture turns meanwhile" within 3 has_turned "$work/lost.ppm"
+psrd --listen "$address" --models tests/golden --threads 2 >/dev/null 2>"$work/psrd.log" &
+psrd_pid=$!
+check "psrd comes back, and so does the connection" within 10 sh -c "! xdotool getwindowname $window | grep -q lost"
+is_true "after that, from where it was turned to"
+
+# --- a file is dropped ---
+if type -P psr-model >/dev/null && [ -x "$BUILD/tests/tools/drop" ]; then
+	printf '%s\n' 'v 0 0 0' 'v 1 0 0' 'v 1 1 0' 'v 0 1 0' 'v 0 0 3' 'v 1 0 3' 'v 1 1 3' 'v 0 1 3' 'f 4 3 2 1' \
+		'f 5 6 7 8' 'f 1 2 6 5' 'f 2 3 7 6' 'f 3 4 8 7' 'f 4 1 5 8' >"$work/tower.obj"
+	check "a window takes a file" "$BUILD/tests/tools/drop" "$window" "$work/tower.obj"
+	check "and shows it" within 20 sh -c "xdotool getwindowname $window | grep -q '^tower'"
+	is_true "built and drawn here"
+	check "through a Unix socket" grep -q -- "--server unix:.* --model tower" <<<"$command"
+fi
+xdotool key Escape
+check "Escape ends it" wait $view_pid
+view_pid=
+
+# --- a way of the camera ---
+view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
+n_shots=0
+rm "$work"/shots/*
+shot
+drag 1 64 32
+shot
+last=$command
+xdotool key F5
+check "a way is recorded" within 3 test -s "$work/way.json"
+xdotool key h space
+sleep 0.3
+shot
+check "and played to its end" [ "$(said eye)" = "$(command=$last said eye)" ]
+xdotool key Escape
+check "the end is quiet" wait $view_pid
+view_pid=
+check "nothing is said on standard error" test ! -s "$work/view.err"
+check "psrd stops cleanly" stop_psrd
