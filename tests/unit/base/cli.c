@@ -34,20 +34,22 @@ static int on_light(const char *text, void *userdata, struct psr_error *err)
 }
 
 static const struct psr_opt table[] = {
-	{ "flag", 'f', PSR_OPT_FLAG, &v.flag, NULL, "A flag.", 0, 0, NULL, NULL },
-	{ "count", 'n', PSR_OPT_INT, &v.count, "N", "How many.", 1, 256, NULL, &v.seen },
+	{ "flag", 'f', PSR_OPT_FLAG, &v.flag, NULL, "A flag.", 0, 0, NULL, NULL, NULL },
+	{ "count", 'n', PSR_OPT_INT, &v.count, "N", "How many.", 1, 256, NULL, &v.seen, NULL },
 	{ "bytes", 0, PSR_OPT_INT, &v.bytes, "BYTES", "Memory for everything, which is said at such a length that the line "
-	  "has to be broken twice or more before its end, and then\nanother line.", 0, 0, NULL, NULL },
-	{ "angle", 'a', PSR_OPT_REAL, &v.angle, "DEG", "An angle.", -1, 180, NULL, NULL },
-	{ "name", 0, PSR_OPT_STRING, &v.name, "NAME", "A name.", 0, 0, NULL, NULL },
-	{ "eye", 0, PSR_OPT_VEC3, v.eye, "X,Y,Z", "A point.", 0, 0, NULL, NULL },
-	{ "size", 's', PSR_OPT_SIZE, v.size, "WxH", "A size.", 1, 16384, NULL, NULL },
-	{ "color", 0, PSR_OPT_COLOR, v.color, "#RRGGBB", "A color.", 0, 0, NULL, NULL },
-	{ "light", 0, PSR_OPT_CALL, &v, "dir:x,y,z[,color=#rrggbb][,intensity=I]", "A light.", 0, 0, on_light, NULL },
+	  "has to be broken twice or more before its end, and then\nanother line.", 0, 0, NULL, NULL, NULL },
+	{ "angle", 'a', PSR_OPT_REAL, &v.angle, "DEG", "An angle.", -1, 180, NULL, NULL, NULL },
+	{ "name", 0, PSR_OPT_STRING, &v.name, "NAME", "A name.", 0, 0, NULL, NULL, NULL },
+	{ "eye", 0, PSR_OPT_VEC3, v.eye, "X,Y,Z", "A point.", 0, 0, NULL, NULL, NULL },
+	{ "size", 's', PSR_OPT_SIZE, v.size, "WxH", "A size.", 1, 16384, NULL, NULL, NULL },
+	{ "color", 0, PSR_OPT_COLOR, v.color, "#RRGGBB", "A color.", 0, 0, NULL, NULL, NULL },
+	{ "light", 0, PSR_OPT_CALL, &v, "dir:x,y,z[,color=#rrggbb][,intensity=I]", "A light.", 0, 0, on_light, NULL, NULL },
 	{ 0 },
 };
 
-static const struct psr_cli cli = { "psr test [options] FILE", "Tests the command line.", table, "Examples:\n  none" };
+static const struct psr_cli cli = {
+	.usage = "psr test [options] FILE", .summary = "Tests the command line.", .opts = table, .footer = "Examples:\n  none",
+};
 
 static int reset(void **state)
 {

@@ -353,7 +353,7 @@ static void a_full_server_tells_how_many_it_serves_and_has_room_when_one_leaves(
 		peer_close(&q);
 	}
 	peer_close(&p);
-	expect_serves(&psrd, "plate"); /* its end is seen before the next one comes */
+	expect_serves(&psrd, "plate");
 	for (int i = 0; i < 10; i++)
 		close(silent[i]);
 	daemon_stop(&psrd);

@@ -587,17 +587,46 @@ static inline void peer_draw(struct peer *p)
 }
 
 /* HELLO, OPEN `name`, a scene of it in slot 0. */
-static inline void peer_begin(struct peer *p, const struct daemon *d, const char *name)
+/* As peer_hello(), but tries again while the server is full: that somebody has left is seen a moment later. */
+static inline void peer_hello_in_turn(struct peer *p, const struct daemon *d)
+{
+	struct psr_msg_hello hello = { .major = PSR_PROTO_MAJOR, .minor = PSR_PROTO_MINOR, .client = "test" };
+	const int64_t end = clock_ms() + PATIENCE_MS;
+	struct psr_message message;
+	struct psr_msg_error error;
+
+	for (;;) {
+		peer_connect(p, d);
+		assert_int_equal(psr_msg_hello_encode(&p->buf, &hello, NULL), PSR_OK);
+		peer_send(p);
+		assert_true(peer_next(p, &message));
+		if (message.type == PSR_MSG_WELCOME)
+			return;
+		assert_int_equal(psr_msg_error_decode(&error, message.payload, message.n, NULL), PSR_OK);
+		assert_int_equal(error.code, PSR_WIRE_BUSY);
+		assert_true(clock_ms() < end);
+		peer_close(p);
+		usleep(2000);
+	}
+}
+
+/* The peer has said HELLO: opens the model, and a scene of it. */
+static inline void peer_set_scene(struct peer *p, const char *name)
 {
 	struct psr_msg_opened opened;
 	struct psr_msg_scene *scene = malloc(sizeof *scene);
 
 	assert_non_null(scene);
-	peer_hello(p, d, NULL);
 	peer_expect_opened(p, peer_ask_open(p, name), &opened);
 	scene_default(scene, opened.handle);
 	peer_send_scene(p, scene);
 	free(scene);
+}
+
+static inline void peer_begin(struct peer *p, const struct daemon *d, const char *name)
+{
+	peer_hello(p, d, NULL);
+	peer_set_scene(p, name);
 }
 
 /* The daemon still serves: a new client draws a frame and finds the plate in it. */
@@ -606,7 +635,8 @@ static inline void expect_serves(const struct daemon *d, const char *name)
 	struct peer *p = malloc(sizeof *p);
 
 	assert_non_null(p);
-	peer_begin(p, d, name);
+	peer_hello_in_turn(p, d);
+	peer_set_scene(p, name);
 	peer_draw(p);
 	peer_close(p);
 	free(p);

@@ -599,7 +599,6 @@ static void running_out_of_descriptors_does_not_stop_the_daemon(void **state)
 	usleep(300000);
 	for (int i = 0; i < N; i++)
 		peer_close(&peers[i]);
-	usleep(300000);
 	expect_serves(&psrd, "plate");
 	daemon_stop(&psrd);
 	assert_non_null(strstr(psrd.log, "ulimit -n"));
