@@ -422,6 +422,8 @@ deps:
 	@.ci/deps $(DEPS_BUILD)
 	@.ci/deps $(DEPS_VIEW) || :
 
+BASH_COMPLETION := $(PREFIX)/share/bash-completion/completions
+
 install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
 	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
@@ -430,6 +432,10 @@ install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, hea
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -d $(DESTDIR)$(BASH_COMPLETION) $(DESTDIR)$(PREFIX)/share/zsh/site-functions
+	install -m 644 client/completion/psr.bash $(DESTDIR)$(BASH_COMPLETION)/psr
+	for name in psr-model psrd psr-view psr-view-term; do ln -sf psr $(DESTDIR)$(BASH_COMPLETION)/$$name || exit 1; done
+	install -m 644 client/completion/_psr $(DESTDIR)$(PREFIX)/share/zsh/site-functions
 	for pc in psr psr-client psr-build; do sed 's|@PREFIX@|$(PREFIX)|;s|@VERSION@|$(VERSION)|' docs/pkgconfig/$$pc.pc.in \
 	  > $(DESTDIR)$(PREFIX)/lib/pkgconfig/$$pc.pc || exit 1; done
 

@@ -45,11 +45,13 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 		PSR_OPT_TIMEOUT(options->timeout),
 	};
 	const struct psr_cli cli = {
-		"psr bench --model NAME [--server ADDR] [--clients N] [--seconds S] [models, camera, light, quality] [--json]",
-		"Measures how many pictures a server draws: N connections whose cameras fly around the model, each asking for "
-		"the next picture when one has come. Latency is the time from asking to the decoded picture.",
-		list.opt,
-		SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
+		.usage = "psr bench --model NAME [--server ADDR] [--clients N] [--seconds S] [models, camera, light, quality] "
+		         "[--json]",
+		.summary = "Measures how many pictures a server draws: N connections whose cameras fly around the model, each "
+		           "asking for the next picture when one has come. Latency is the time from asking to the decoded "
+		           "picture.",
+		.opts = list.opt,
+		.footer = SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
 	};
 	int code;
 
@@ -64,7 +66,7 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 	quality_add_options(&list, &options->quality);
 	optlist_heading(&list, "For developers", NULL);
 	OPTLIST_ADD(&list, script);
-	code = psr_cli_parse(&cli, argc, argv, NULL, err);
+	code = psr_command_parse("bench", &cli, argc, argv, NULL, err);
 	return code == PSR_OK ? check(options, err) : code;
 }
 

@@ -145,22 +145,23 @@ int psr_list_main(int argc, char **argv)
 		  .help = "For scripts: an array of objects with name, state, bytes, content_id and, of a failed model, error; of "
 		          "presets with kind, type and name." },
 		{ .name = "presets", .letter = 'p', .type = PSR_OPT_STRING, .value = &model, .arg = "NAME",
+		  .words = "@models",
 		  .help = "Instead of models, the cameras and lights in the file of this one, for --camera and --light "
 		          "preset:NAME." },
 		PSR_OPT_TIMEOUT(timeout),
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
-		"psr list [--server ADDR] [--presets NAME] [--json]",
-		"Lists the models of a server: ready (a model file), loaded (in the server's memory), source (built when a "
-		"picture first asks for it), failed (cannot be served; the reason stands beside it).",
-		opts,
-		PSR_EXIT_CODES,
+		.usage = "psr list [--server ADDR] [--presets NAME] [--json]",
+		.summary = "Lists the models of a server: ready (a model file), loaded (in the server's memory), source "
+		           "(built when a picture first asks for it), failed (cannot be served; the reason stands beside it).",
+		.opts = opts,
+		.footer = PSR_EXIT_CODES,
 	};
 	struct psr_client *client = NULL;
 	struct psr_error err;
 
-	code = psr_cli_parse(&cli, argc, argv, NULL, &err);
+	code = psr_command_parse("list", &cli, argc, argv, NULL, &err);
 	if (code > 0)
 		return 0;
 	if (code == PSR_OK)

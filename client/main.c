@@ -36,6 +36,11 @@ int main(int argc, char **argv)
 		print_help();
 		return outfile_flush_stdout(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
 	}
+	if (name != NULL && strcmp(name, "--completions") == 0) {
+		for (size_t i = 0; i < N_COMMANDS; i++)
+			printf("%s\t\t\t\t%s\n", commands[i].name, commands[i].help);
+		return outfile_flush_stdout(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
+	}
 	if (name != NULL && strcmp(name, "--version") == 0) {
 		printf("%s\n", PSR_PROGRAM);
 		return outfile_flush_stdout(&err) == PSR_OK ? 0 : psr_cli_fail("psr", &err);
@@ -44,9 +49,8 @@ int main(int argc, char **argv)
 		if (strcmp(name, commands[i].name) == 0)
 			return commands[i].run(argc - 1, argv + 1);
 	if (name == NULL)
-		psr_fail(&err, PSR_ERR_ARG, "a command is missing; there are list, shot, turntable, view and bench, and --help");
+		psr_fail(&err, PSR_ERR_ARG, "a command is missing; psr --help lists them");
 	else
-		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; there are list, shot, turntable, view and bench, and --help",
-		         name);
+		psr_fail(&err, PSR_ERR_ARG, "'%.80s' is no command; psr --help lists them", name);
 	return psr_cli_fail("psr", &err);
 }

@@ -30,15 +30,15 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		  .help = "The picture that wrote this report, with the same bytes; only files are to be named." },
 	};
 	const struct psr_cli cli = {
-		"psr shot --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",
-		"Asks a server for a picture of a model, or of several, and writes it to a file. --view front,left,... and "
-		"--cameras draw several pictures.",
-		list.opt,
-		footer,
+		.usage = "psr shot --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",
+		.summary = "Asks a server for a picture of a model, or of several, and writes it to a file. --view "
+		           "front,left,... and --cameras draw several pictures.",
+		.opts = list.opt,
+		.footer = footer,
 	};
 
 	draw_add_options(&list, wish, files, sizeof files / sizeof files[0]);
-	return psr_cli_parse(&cli, argc, argv, NULL, err);
+	return psr_command_parse("shot", &cli, argc, argv, NULL, err);
 }
 
 int psr_shot_main(int argc, char **argv)

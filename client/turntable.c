@@ -32,18 +32,18 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		  .help = "How long a turn of an animation takes." },
 	};
 	const struct psr_cli cli = {
-		"psr turntable --model NAME [--server ADDR] [--frames N] [models, camera, light, quality] -o FILE",
-		"Draws a model from all sides: the camera goes once around it, to its right at first, and the model stays in "
-		"the picture. The camera's options say where it begins. Lights of --light stay with the model; the one that is "
-		"there without stays with the camera.",
-		list.opt,
-		footer,
+		.usage = "psr turntable --model NAME [--server ADDR] [--frames N] [models, camera, light, quality] -o FILE",
+		.summary = "Draws a model from all sides: the camera goes once around it, to its right at first, and the "
+		           "model stays in the picture. The camera's options say where it begins. Lights of --light stay with "
+		           "the model; the one that is there without stays with the camera.",
+		.opts = list.opt,
+		.footer = footer,
 	};
 
 	sink->n_turn = DEFAULT_FRAMES;
 	sink->seconds = 4;
 	draw_add_options(&list, wish, files, sizeof files / sizeof files[0]);
-	code = psr_cli_parse(&cli, argc, argv, NULL, err);
+	code = psr_command_parse("turntable", &cli, argc, argv, NULL, err);
 	if (code != PSR_OK)
 		return code;
 	if (sink->has_sheet && !has_frames && (uint64_t)sink->sheet[0] * sink->sheet[1] <= MAX_FRAMES)

@@ -10,6 +10,7 @@ PATH=$BUILD/bin:$PATH
 seconds=${PSR_DEMO_SECONDS:-3}
 mkdir -p "$models"
 unset PSR_SERVER
+export XDG_CONFIG_HOME=/nonexistent # no defaults of the user
 
 pid=
 stop() {

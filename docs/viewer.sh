@@ -7,6 +7,7 @@ PATH=$BUILD/bin:$PATH
 models=${XDG_CACHE_HOME:-$HOME/.cache}/psr/models
 [ -f "$models/engine.glb" ] || { echo "docs/viewer.sh: make models fetches engine.glb, which is not there" >&2; exit 3; }
 unset PSR_SERVER
+export XDG_CONFIG_HOME=/nonexistent # no defaults of the user
 out=build/viewer
 mkdir -p "$out"
 [ "$out/engine.psr" -nt "$models/engine.glb" ] || psr-model build "$models/engine.glb" -r 512 -o "$out/engine.psr"

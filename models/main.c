@@ -37,6 +37,11 @@ int main(int argc, char **argv)
 		print_usage(stdout);
 		return 0;
 	}
+	if (strcmp(argv[1], "--completions") == 0) {
+		for (size_t i = 0; i < N_COMMANDS; i++)
+			printf("%s\t\t\t\t%s\n", commands[i].name, commands[i].summary);
+		return 0;
+	}
 	if (strcmp(argv[1], "--version") == 0) {
 		puts("psr-model " PSR_VERSION);
 		return 0;

@@ -1,18 +1,15 @@
 #define _GNU_SOURCE
-#include <ctype.h>
 #include <inttypes.h>
 #include <sched.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "base/infile.h"
 #include "options.h"
 #include "base/cli.h"
 #include "simd/isa.h"
 
 #define MAX_OPTIONS 40
-#define MAX_CONFIG 65536
 #define MEBI 1048576.0
 #define LEAST_RESOLUTION 8   /* as in psr-model build */
 #define MOST_RESOLUTION 8192
@@ -66,7 +63,7 @@ static int set_defaults(struct options *options)
 	return options->cache != NULL ? PSR_OK : PSR_ERR_MEMORY;
 }
 
-static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int seen[MAX_OPTIONS])
+static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int *has_least, int *has_most)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "What is served, and where", .type = PSR_OPT_HEADING },
@@ -88,11 +85,11 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		{ .name = "version", .type = PSR_OPT_FLAG, .value = &o->version, .help = "Prints the version and exits." },
 		{ .name = "Models built from meshes and scans", .type = PSR_OPT_HEADING },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &o->resolution, .arg = "PIXELS",
-		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
+		  .seen = has_least, .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
 		  .help = "The coarsest model that psrd builds: sharp in pictures up to this side. Larger pictures get a finer"
 		          " model, see --max-resolution. Twice the figure takes four times the memory." },
 		{ .name = "max-resolution", .type = PSR_OPT_INT, .value = &o->max_resolution, .arg = "PIXELS",
-		  .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
+		  .seen = has_most, .min = LEAST_RESOLUTION, .max = MOST_RESOLUTION,
 		  .help = "The finest model that psrd builds. Raise it for pictures larger than this side; lower it where first"
 		          " pictures take too long. The same as --resolution: one model for all pictures." },
 		{ .name = "max-builds", .type = PSR_OPT_INT, .value = &o->max_builds, .arg = "N", .min = 1, .max = 64,
@@ -145,76 +142,14 @@ static void fill_table(struct psr_opt table[MAX_OPTIONS], struct options *o, int
 		  .min = 0, .max = 3600, .help = "How long psrd, told to end, finishes the frames under way." },
 		{ .name = "For developers", .type = PSR_OPT_HEADING },
 		{ .name = "isa", .type = PSR_OPT_STRING, .value = &o->isa, .arg = "NAME",
+		  .words = "c avx2 avx512",
 		  .help = "The widest instructions that draw: c (what any processor of the kind has), avx2 or avx512. Frames"
 		          " are the same bytes with each; only their time differs." },
 		{ .name = NULL },
 	};
-	size_t n = sizeof opts / sizeof opts[0];
 
 	_Static_assert(sizeof opts / sizeof opts[0] <= MAX_OPTIONS, "the table is too small");
 	memcpy(table, opts, sizeof opts);
-	for (size_t i = 0; i < n; i++)
-		table[i].seen = &seen[i];
-}
-
-static int read_config(char **text, const char *path, struct psr_error *err)
-{
-	struct psr_error why;
-	int code = infile_read_text(text, path, MAX_CONFIG, &why);
-
-	return code == PSR_OK ? code : psr_fail(err, code, "--config %s", why.text);
-}
-
-static char *trim(char *text)
-{
-	char *end;
-
-	while (isspace((unsigned char)*text))
-		text++;
-	end = text + strlen(text);
-	while (end > text && isspace((unsigned char)end[-1]))
-		end--;
-	*end = '\0';
-	return text;
-}
-
-static int is_given(const struct psr_opt *table, const int *given, const char *name)
-{
-	for (int i = 0; table[i].name != NULL; i++)
-		if (strcmp(table[i].name, name) == 0)
-			return given[i] > 0;
-	return 0;
-}
-
-/* Options of the command line keep their values; the file sets the others in order. */
-static int apply_config(const struct psr_cli *cli, const int *given, struct options *options, struct psr_error *err)
-{
-	char *next = options->config_text, *line;
-	struct psr_error inner;
-
-	for (int number = 1; (line = strsep(&next, "\n")) != NULL; number++) {
-		char *value, *name = trim(line);
-		int code;
-
-		if (name[0] == '\0' || name[0] == '#')
-			continue;
-		value = strchr(name, '=');
-		if (value == NULL)
-			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: '%.80s' is not `name = value`", options->config, number,
-			                name);
-		*value++ = '\0';
-		name = trim(name);
-		value = trim(value);
-		if (strcmp(name, "config") == 0 || strcmp(name, "version") == 0)
-			return psr_fail(err, PSR_ERR_ARG, "%.200s, line %d: `%s` belongs on the command line", options->config,
-			                number, name);
-		if (is_given(cli->opts, given, name))
-			continue;
-		code = psr_cli_set(cli, name, value, &inner);
-		if (code != PSR_OK)
-			return psr_fail(err, code, "%.200s, line %d: %.280s", options->config, number, inner.text);
-	}
-	return PSR_OK;
 }
 
 /* If only one of the two was given, the other follows it. */
@@ -237,7 +172,7 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 {
 	enum psr_isa isa;
 	struct psr_opt table[MAX_OPTIONS];
-	int seen[MAX_OPTIONS] = { 0 }, given[MAX_OPTIONS], n_operands = 0, code;
+	int given[MAX_OPTIONS] = { 0 }, has_least = 0, has_most = 0, n_operands = 0, code;
 	const struct psr_cli cli = {
 		.usage = "psrd --models DIR [--listen ADDR:PORT|unix:PATH]... [options]",
 		.summary = "Holds point-sample models in memory and draws frames of them for thin clients (psr).",
@@ -247,11 +182,12 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 		          "SIGTERM ends it after the frames under way, SIGHUP reads the models folder again.\n"
 		          "Exit codes: 0 ok, 2 usage, 3 file or system, 5 over a limit, 6 address in use, 7 internal."
 		          " More in psrd(1).",
+		.given = given,
 	};
 
 	if (set_defaults(options) != PSR_OK)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory");
-	fill_table(table, options, seen);
+	fill_table(table, options, &has_least, &has_most);
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, err);
 	if (code != PSR_OK)
 		return code;
@@ -262,20 +198,19 @@ int options_parse(struct options *options, int argc, char **argv, struct psr_err
 	if (n_operands > 0)
 		return psr_fail(err, PSR_ERR_ARG, "unexpected argument '%.80s'; --help shows the usage", argv[1]);
 	if (options->config != NULL) {
-		memcpy(given, seen, sizeof given);
-		code = read_config(&options->config_text, options->config, err);
-		if (code == PSR_OK)
-			code = apply_config(&cli, given, options, err);
+		const struct psr_config config = { .path = options->config };
+		struct psr_error why;
+
+		code = psr_config_read(&options->config_text, &config, &cli, &why);
 		if (code != PSR_OK)
-			return code;
+			return psr_fail(err, code, "--config %s", why.text);
 	}
 	if (psr_isa_check_environment(err) != PSR_OK)
 		return PSR_ERR_ARG;
 	if (psr_isa_parse(&isa, options->isa) != PSR_OK)
 		return psr_fail(err, PSR_ERR_ARG, "--isa: there is no '%.40s'; it takes c, avx2 or avx512", options->isa);
 	psr_isa_cap(isa);
-	if (check_resolutions(options, is_given(cli.opts, seen, "resolution"), is_given(cli.opts, seen, "max-resolution"), err)
-	    != PSR_OK)
+	if (check_resolutions(options, has_least, has_most, err) != PSR_OK)
 		return PSR_ERR_ARG;
 	if (options->max_pending_per_address == 0 || options->max_pending_per_address > options->max_pending)
 		options->max_pending_per_address = options->max_pending;

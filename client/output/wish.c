@@ -23,10 +23,12 @@ void sink_add_developer_options(struct optlist *list, struct sink_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "plane", .type = PSR_OPT_STRING, .value = &wish->plane_text, .arg = "PLANE",
+		  .words = "color depth normal id weight words block",
 		  .help = "What -o writes: color, depth, normal, id (of instances), weight, words (depth and sample id) or "
 		          "block (levels, facing). All go to .npy; color, normal and weight to pictures, depth as with "
 		          "--depth." },
 		{ .name = "show", .type = PSR_OPT_STRING, .value = &wish->show_text, .arg = "STAGE",
+		  .words = "blocks samples cull levels normals weights holes depth",
 		  .help = "What -o writes is a picture of a stage instead, see below: blocks, samples, cull, levels, normals, "
 		          "weights, holes or depth." },
 		{ .name = "hash", .type = PSR_OPT_FLAG, .value = &wish->hash,

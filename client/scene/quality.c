@@ -30,6 +30,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		  .help = "Width and height of the picture in pixels." },
 		{ .name = "quality", .letter = 'q', .type = PSR_OPT_STRING, .value = &wish->name, .arg = "NAME",
 		  .seen = &wish->n_said,
+		  .words = "draft good best",
 		  .help = "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth "
 		          "as print, for a picture to keep; it takes about a hundred times as long." },
 		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &wish->spacing, .arg = "PX", .seen = &wish->has_spacing,
@@ -44,6 +45,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
 		          "before." },
 		{ .name = "codec", .type = PSR_OPT_STRING, .value = &wish->codec, .arg = "CODEC", .seen = &wish->n_said,
+		  .words = "lossless jpeg:85 jpeg:95 raw",
 		  .help = "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw." },
 	};
 

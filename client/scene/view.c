@@ -48,6 +48,7 @@ void view_add_options(struct optlist *list, struct view_wish *wish)
 	struct psr_camera_wish *camera = &wish->camera;
 	const struct psr_opt opts[] = {
 		{ .name = "view", .type = PSR_OPT_STRING, .value = &wish->view, .arg = "SIDE",
+		  .words = "front back left right top bottom iso home",
 		  .help = "From a side: front, back, left, right, top, bottom, iso (a corner above) or home, the view without "
 		          "any of these options. It has perspective unless --ortho is said, too. psr shot draws a picture of "
 		          "each of front,left,top." },
@@ -193,7 +194,7 @@ static int read_file(struct views *views, const struct view_wish *wish, const ch
 {
 	struct reader reader = { views, *wish, *wish };
 	struct optlist list = { .n = 0 };
-	const struct psr_cli cli = { "", "", list.opt, NULL };
+	const struct psr_cli cli = { .opts = list.opt };
 	int code;
 
 	view_add_options(&list, &reader.line);

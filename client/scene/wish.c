@@ -71,10 +71,12 @@ static void add_instances(struct optlist *list, struct scene_wish *wish)
 	const struct psr_opt opts[] = {
 		{ .name = "model", .letter = 'm', .type = PSR_OPT_CALL, .value = wish, .arg = "NAME", .call = on_model,
 		  .seen = &wish->n_said,
+		  .words = "@models",
 		  .help = "A model, by its name in `psr list`, where its file puts it. Repeat it to see several models in one "
 		          "picture." },
 		{ .name = "instance", .type = PSR_OPT_CALL, .value = wish, .arg = "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]",
 		  .call = on_instance, .seen = &wish->n_said,
+		  .words = "@models",
 		  .help = "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of "
 		          "its file, S times as large, its 0,0,0 put at X,Y,Z. Repeat it, and rotate= within it." },
 	};
@@ -100,6 +102,7 @@ void scene_add_light_options(struct optlist *list, struct scene_wish *wish)
 		{ .name = "light", .letter = 'l', .type = PSR_OPT_CALL, .value = wish, .arg = "LIGHT", .call = on_light,
 		  .seen = &wish->n_said, .help = "A light, see below. Repeat it for more." },
 		{ .name = "lights", .type = PSR_OPT_STRING, .value = &wish->lights_of, .arg = "model", .seen = &wish->n_said,
+		  .words = "model",
 		  .help = "All lights that came with the first model." },
 		{ .name = "shadows", .type = PSR_OPT_FLAG, .value = &wish->is_shadowed, .seen = &wish->n_said,
 		  .help = "Every light casts shadows, also the one that is there without --light." },
@@ -117,7 +120,7 @@ void scene_add_light_options(struct optlist *list, struct scene_wish *wish)
 static int read_file(struct scene_wish *wish, struct psr_error *err)
 {
 	struct optlist list = { .n = 0 };
-	const struct psr_cli cli = { "", "", list.opt, NULL };
+	const struct psr_cli cli = { .opts = list.opt };
 
 	add_instances(&list, wish);
 	scene_add_light_options(&list, wish);

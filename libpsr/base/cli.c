@@ -191,6 +191,8 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 		if (opt == NULL)
 			return psr_fail(err, PSR_ERR_ARG, "unknown option %.80s; --help lists the options", arg);
 	}
+	if (cli->given != NULL)
+		cli->given[opt - cli->opts]++;
 	if (opt->type == PSR_OPT_FLAG) {
 		if (value != NULL)
 			return psr_fail(err, PSR_ERR_ARG, "--%s takes no value", opt->name);
@@ -208,6 +210,11 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err)
 {
 	int n = 0, options_end = 0;
+
+	if (argc == 2 && strcmp(argv[1], "--completions") == 0) {
+		cli_completions_print(cli);
+		return 1;
+	}
 	/* --help comes before any parsing, so that it shows the defaults. */
 	for (int i = 1; i < argc && strcmp(argv[i], "--") != 0; i++) {
 		if (strcmp(argv[i], "--help") == 0) {
@@ -240,6 +247,13 @@ int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, s
 	if (opt == NULL)
 		return fail_unknown(cli, "", name, strlen(name), err);
 	return give(opt, text, err);
+}
+
+int psr_cli_is_given(const struct psr_cli *cli, const char *name)
+{
+	const struct psr_opt *opt = find_long(cli, name, strlen(name));
+
+	return opt != NULL && cli->given[opt - cli->opts] > 0;
 }
 
 int psr_cli_fail(const char *program, const struct psr_error *err)

@@ -169,3 +169,16 @@ void cli_help_print(const struct psr_cli *cli)
 		printf("\n%s\n", cli->footer);
 	fflush(stdout);
 }
+
+void cli_completions_print(const struct psr_cli *cli)
+{
+	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
+		const char letter[2] = { opt->letter, '\0' };
+
+		if (opt->type != PSR_OPT_HEADING)
+			printf("--%s\t%s\t%s\t%s\t%.*s\n", opt->name, letter, opt->arg != NULL ? opt->arg : "",
+			       opt->words != NULL ? opt->words : "", (int)strcspn(opt->help, ".:;\n"), opt->help);
+	}
+	printf("--help\t\t\t\tPrint this and exit\n");
+	fflush(stdout);
+}

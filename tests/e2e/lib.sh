@@ -5,6 +5,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.." || exit 1
 PATH=$BUILD/bin:$PATH
 work=$(mktemp -d "${TMPDIR:-/tmp}/psr-e2e.XXXXXX")
 test_number=0 failures=0 psrd_pid=
+export XDG_CONFIG_HOME=$work # the user's own defaults are not the tests'
+unset PSR_SERVER
 
 finish() {
 	stop_psrd

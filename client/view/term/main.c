@@ -28,6 +28,7 @@ static void add_options(struct optlist *list, struct wishes *wishes)
 	const struct psr_opt server[] = { PSR_OPT_SERVER(wishes->server) };
 	const struct psr_opt terminal[] = {
 		{ .name = "pixels", .type = PSR_OPT_STRING, .value = &wishes->way, .arg = "WAY",
+		  .words = "auto kitty sixel symbols",
 		  .help = "How the terminal shows pictures: kitty, sixel, or symbols, which any can; auto: the best of them "
 		          "that it says it knows." },
 		{ .name = "fps", .type = PSR_OPT_REAL, .value = &wishes->options.fps, .arg = "N", .min = 1, .max = 1000,
@@ -66,15 +67,15 @@ static int parse(struct wishes *wishes, char **file, int argc, char **argv, stru
 	struct psr_msg_frame frame = { .slot = 0 };
 	struct optlist list = { .n = 0 };
 	const struct psr_cli cli = {
-		"psr view --term FILE | --model NAME ... [--server ADDR] [camera, light, quality]",
-		"Shows models of a server, or a file, in a terminal, to be turned, moved and lit.",
-		list.opt,
-		footer,
+		.usage = "psr view --term FILE | --model NAME ... [--server ADDR] [camera, light, quality]",
+		.summary = "Shows models of a server, or a file, in a terminal, to be turned, moved and lit.",
+		.opts = list.opt,
+		.footer = footer,
 	};
 	int n_operands = 0, code;
 
 	add_options(&list, wishes);
-	code = psr_cli_parse(&cli, argc, argv, &n_operands, err);
+	code = psr_command_parse("view", &cli, argc, argv, &n_operands, err);
 	if (code != PSR_OK)
 		return code;
 	if (n_operands > 1 || (n_operands == 1 && wishes->scene.n_instances + (wishes->scene.file != NULL) > 0))

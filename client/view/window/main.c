@@ -60,17 +60,17 @@ static int parse(struct wishes *wishes, int argc, char **argv, struct psr_error 
 	struct psr_msg_frame frame = { .slot = 0 };
 	struct optlist list = { .n = 0 };
 	const struct psr_cli cli = {
-		"psr view [--model NAME ... | FILE] [--server ADDR] [models, window, camera, light, quality]",
-		"Shows models of a server in a window, to be turned, moved and lit. Without a model the window's list shows what "
-		"the server has. A FILE is built and drawn on this computer, coarse at first; one that is dropped on the window, "
-		"too.",
-		list.opt,
-		footer,
+		.usage = "psr view [--model NAME ... | FILE] [--server ADDR] [models, window, camera, light, quality]",
+		.summary = "Shows models of a server in a window, to be turned, moved and lit. Without a model the window's "
+		           "list shows what the server has. A FILE is built and drawn on this computer, coarse at first; one "
+		           "that is dropped on the window, too.",
+		.opts = list.opt,
+		.footer = footer,
 	};
 	int n_files = 0, code;
 
 	add_options(&list, wishes);
-	code = psr_cli_parse(&cli, argc, argv, &n_files, err);
+	code = psr_command_parse("view", &cli, argc, argv, &n_files, err);
 	if (code == PSR_OK && n_files > 1)
 		code = psr_fail(err, PSR_ERR_ARG, "one file at a time, not %d; psrd --models serves folders", n_files);
 	if (code == PSR_OK && n_files == 1 && (wishes->scene.n_instances > 0 || wishes->scene.file != NULL))
