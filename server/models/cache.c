@@ -163,7 +163,7 @@ static int list_file(struct cached_list *list, const char *name, const struct st
 		list->capacity = capacity;
 	}
 	list->file[list->n] = (struct cached){ .used = status->st_mtim, .bytes = (uint64_t)status->st_size };
-	snprintf(list->file[list->n++].name, sizeof list->file->name, "%s", name);
+	snprintf(list->file[list->n++].name, sizeof list->file->name, "%.*s", (int)sizeof list->file->name - 1, name);
 	list->bytes += (uint64_t)status->st_size;
 	return PSR_OK;
 }

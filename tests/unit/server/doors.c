@@ -311,7 +311,7 @@ static void a_process_that_crowds_a_unix_socket_replaces_its_own(void **state)
 static void a_hello_that_drips_is_closed_in_time(void **state)
 {
 	struct psr_msg_hello hello = { .major = PSR_PROTO_MAJOR, .minor = PSR_PROTO_MINOR, .client = "test" };
-	const char *const more[] = { "--handshake-timeout", "0.3", NULL };
+	const char *const more[] = { "--handshake-timeout", "1", NULL };
 	int64_t began;
 	size_t n = 0;
 
@@ -322,10 +322,10 @@ static void a_hello_that_drips_is_closed_in_time(void **state)
 	began = clock_ms();
 	while (n + 1 < p.buf.size && send(p.fd, p.bytes + n, 1, MSG_NOSIGNAL) == 1) {
 		n++;
-		usleep(100000); /* all of it takes ten times as long as psrd waits */
+		usleep(100000); /* all of it takes several times as long as psrd waits */
 	}
 	assert_true(n + 1 < p.buf.size);
-	assert_in_range(clock_ms() - began, 280, PATIENCE_MS);
+	assert_in_range(clock_ms() - began, 980, PATIENCE_MS);
 	peer_close(&p);
 	expect_serves(&psrd, "plate");
 	daemon_stop(&psrd);
@@ -359,18 +359,42 @@ static void a_full_server_tells_how_many_it_serves_and_has_room_when_one_leaves(
 	daemon_stop(&psrd);
 }
 
+static void answer_ping(struct peer *peer, const struct psr_message *message)
+{
+	struct psr_msg_ping ping;
+
+	assert_int_equal(psr_msg_ping_decode(&ping, message->payload, message->n, NULL), PSR_OK);
+	assert_int_equal(psr_msg_pong_encode(&peer->buf, &ping, NULL), PSR_OK);
+	peer_send(peer);
+}
+
+/* Reads on to a message of this type, however long psrd takes to draw. */
+static void read_to(struct peer *peer, unsigned type)
+{
+	struct psr_message message;
+	struct psr_msg_error error;
+
+	do {
+		assert_true(peer_next(peer, &message));
+		if (message.type == PSR_MSG_ERROR && psr_msg_error_decode(&error, message.payload, message.n, NULL) == PSR_OK)
+			fail_msg("ERROR %u: %s", error.code, error.text);
+		if (message.type == PSR_MSG_PING)
+			answer_ping(peer, &message);
+	} while (message.type != type);
+}
+
 /* It asked for what takes long, and vanished behind something that keeps its connection. */
 static void a_busy_peer_that_does_not_answer_ping_is_dropped(void **state)
 {
 	struct psr_msg_frame frame = frame_default(16, 16);
-	const char *const more[] = { "--idle-timeout", "2", "--threads", "1", NULL };
+	const char *const more[] = { "--idle-timeout", "4", "--threads", "1", NULL };
 	struct psr_message message;
-	struct psr_msg_frame_end end;
 
 	(void)state;
 	daemon_start(&psrd, folder, more);
 	peer_begin(&p, &psrd, "plate");
-	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	peer_ask_frame(&p, &frame);
+	read_to(&p, PSR_MSG_FRAME_END);
 	frame = frame_default(1500, 1500);
 	frame.pass_limit = 4;
 	frame.camera.fov_y = 0.1;
@@ -383,15 +407,6 @@ static void a_busy_peer_that_does_not_answer_ping_is_dropped(void **state)
 	peer_close(&p);
 	expect_serves(&psrd, "plate");
 	daemon_stop(&psrd);
-}
-
-static void answer_ping(struct peer *peer, const struct psr_message *message)
-{
-	struct psr_msg_ping ping;
-
-	assert_int_equal(psr_msg_ping_decode(&ping, message->payload, message->n, NULL), PSR_OK);
-	assert_int_equal(psr_msg_pong_encode(&peer->buf, &ping, NULL), PSR_OK);
-	peer_send(peer);
 }
 
 static void answers_to_ping_keep_a_connection(void **state)
@@ -409,21 +424,6 @@ static void answers_to_ping_keep_a_connection(void **state)
 	draw(&p);
 	peer_close(&p);
 	daemon_stop(&psrd);
-}
-
-/* Reads on to a message of this type, however long psrd takes to draw. */
-static void read_to(struct peer *peer, unsigned type)
-{
-	struct psr_message message;
-	struct psr_msg_error error;
-
-	do {
-		assert_true(peer_next(peer, &message));
-		if (message.type == PSR_MSG_ERROR && psr_msg_error_decode(&error, message.payload, message.n, NULL) == PSR_OK)
-			fail_msg("ERROR %u: %s", error.code, error.text);
-		if (message.type == PSR_MSG_PING)
-			answer_ping(peer, &message);
-	} while (message.type != type);
 }
 
 /* A stopped process, a machine that was suspended: peers that were there before are there after it. */

@@ -6,6 +6,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include <inttypes.h>
+#include <sys/prctl.h>
 #include "plate.h"
 
 static struct daemon psrd;
@@ -112,6 +113,7 @@ static void a_flood_of_connections_stops_nobody(void **state)
 		flood[k] = fork();
 		assert_true(flood[k] >= 0);
 		if (flood[k] == 0) {
+			prctl(PR_SET_PDEATHSIG, SIGKILL);
 			for (;;) {
 				struct sockaddr_in in = { .sin_family = AF_INET, .sin_port = htons(psrd.port),
 					                      .sin_addr.s_addr = htonl(INADDR_LOOPBACK) };

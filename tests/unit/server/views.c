@@ -344,7 +344,7 @@ static void a_frame_over_its_time_is_refused_and_keeps_nobody_waiting(void **sta
 {
 	struct psr_msg_scene *scene = malloc(sizeof *scene);
 	struct psr_msg_frame frame = frame_at(0), small = frame_at(0);
-	static const char *const more[] = { "--threads", "2", "--frame-timeout", "0.2", NULL };
+	static const char *const more[] = { "--threads", "2", "--frame-timeout", "2", NULL };
 	const struct daemon patient = psrd;
 	struct psr_client *other;
 	struct psr_error err;
