@@ -103,12 +103,12 @@ A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 PROGRAMS := $(BIN)/psrd $(BIN)/psr
 ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(BIN)/psr-study $(LIB)/psr-image-oiio.so
-ifeq ($(shell pkg-config --exists sdl2 imgui && echo 1),1)
+ifeq ($(shell pkg-config --exists sdl2 imgui 2>/dev/null && echo 1),1)
 PROGRAMS += $(BIN)/psr-view
 else ifneq ($(filter compile,$(MAKECMDGOALS)),)
 $(info psr-view is left out: libsdl2-dev or libimgui-dev is not there)
 endif
-ifeq ($(shell pkg-config --exists chafa && echo 1),1)
+ifeq ($(shell pkg-config --exists chafa 2>/dev/null && echo 1),1)
 PROGRAMS += $(BIN)/psr-view-term
 else ifneq ($(filter compile,$(MAKECMDGOALS)),)
 $(info psr-view-term is left out: libchafa-dev is not there)
