@@ -60,6 +60,8 @@ echo "$rule"
 sheet=
 for name in teapot top pencil wheel $real; do
 	report=$out/$name.json
+	# The first picture of a model reads it from the disk.
+	psr shot --server "$server" --model "$name" --size $size --codec jpeg:90 -o "$out/$name.png"
 	psr shot --server "$server" --model "$name" --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
 	psr shot --server "$server" --model "$name" --size 320x240 --background '#f4f4f0' --quality best -o "$out/$name-small.png"
 	psr bench --server "$server" --model "$name" --clients 4 --seconds "$seconds" --size $size --json >"$out/$name-bench.json"
