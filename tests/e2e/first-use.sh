@@ -11,18 +11,7 @@ needle() { # height: a thin tetrahedron, which is built soon
 shot() { psr shot --server "$server" --size 160x120 "$@"; }
 color() { shot --model "$1" --hash 2>&1; }
 state() { psr list --server "$server" | awk -v name="$1" '$1 == name { print $2 }'; }
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 started() { grep -c "build of .*/$1 started" "$work/psrd.log"; }
-wait_for() { # seconds command...: until it succeeds
-	local end=$((SECONDS + $1))
-	shift
-	until "$@"; do
-		[ $SECONDS -lt $end ] || return 1
-		sleep 0.1
-	done
-}
 is_state() { [ "$(state "$1")" = "$2" ]; }
 is_building() { [ "$(started "$1")" -gt 0 ]; }
 # Processes whose command line names a file of this test, other than psrd itself.

@@ -39,6 +39,17 @@ check() { # claim command...: the command must succeed
 		sed 's/^/# /' "$work/err" "$work/out" | head -n 20
 	fi
 }
+is() { # claim expected got
+	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
+}
+wait_for() { # seconds command...: until it succeeds
+	local end=$((SECONDS + $1))
+	shift
+	until "$@"; do
+		[ $SECONDS -lt $end ] || return 1
+		sleep 0.1
+	done
+}
 refuses() { # claim status pattern command...: fails with just this status and a message that matches
 	local claim=$1 status=$2 pattern=$3 got
 	shift 3

@@ -7,9 +7,6 @@ planes=(color depth normal id weight words block)
 stages=(blocks samples cull levels normals weights holes depth)
 views=("--model teapot" "--model dice --eye 1,0.8,1.2 --ortho 0.5" "--model wheel --size 64x48")
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 shot() { psr shot --server "$server" --size 301x203 --no-smooth "$@"; }
 hashes() {
 	for view in "${views[@]}"; do

@@ -23,22 +23,11 @@ stop_relay() { # what it counted is in $work/relay
 }
 trap 'stop_relay; finish; exit $?' EXIT
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 counted() { sed -n "s/.*$1 \([0-9]*\).*/\1/p" "$work/relay"; }
 shot() { psr shot --server "$through" --model teapot --size 320x240 "$@"; }
 hash() { shot --hash "$@" 2>&1 | grep -oE 'color [0-9a-f]{16}'; }
 descriptors() { find "/proc/$psrd_pid/fd" -mindepth 1 2>/dev/null | wc -l; }
 memory() { sed -n 's/^VmRSS:[^0-9]*\([0-9]*\).*/\1/p' "/proc/$psrd_pid/status"; }
-wait_for() { # seconds command...: until it succeeds
-	local end=$((SECONDS + $1))
-	shift
-	until "$@"; do
-		[ $SECONDS -lt $end ] || return 1
-		sleep 0.05
-	done
-}
 has_descriptors() { [ "$(descriptors)" -eq "$1" ]; }
 
 start_psrd --models tests/golden --threads 2 --idle-timeout 2

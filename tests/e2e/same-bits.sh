@@ -6,9 +6,6 @@
 models=$work/models
 mkdir "$models"
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 build() { psr-model build "$work/$1.glb" -r 96 -o "$2" --quiet "${@:3}"; }
 
 # --- models ---

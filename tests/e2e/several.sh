@@ -3,9 +3,6 @@
 # Several models in a picture, scene files, reports that draw the same picture again, and what psr says of a picture.
 . "$(dirname "$0")/lib.sh"
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 shot() { psr shot --server "$server" --size 160x120 "$@"; }
 hashes() { shot "$@" --hash 2>/dev/null; }
 replayed() { psr shot --server "$server" --replay "$1" --hash 2>/dev/null; }

@@ -6,9 +6,6 @@ cp tests/golden/dice.psr "$work/models"
 start_psrd --models "$work/models"
 psr=$(command -v psr)
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 has() { # claim pattern text
 	if grep -q -- "$2" <<<"$3"; then ok "$1"; else not_ok "$1" "no '$2' in: $3"; fi
 }

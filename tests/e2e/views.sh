@@ -4,9 +4,6 @@
 . "$(dirname "$0")/lib.sh"
 size=64x48
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 shot() { psr shot --server "$server" --size $size "$@"; }
 turntable() { psr turntable --server "$server" --size $size "$@"; }
 color() { shot "$@" --hash 2>/dev/null | sed -n 's/^color //p'; }
