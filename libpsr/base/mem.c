@@ -61,12 +61,35 @@ void psr_free_huge(void *memory, size_t n_bytes)
 	(void)failed;
 }
 
-void *psr_grow_huge(void *memory, size_t *capacity, size_t n_bytes)
+static void *alloc_pages(size_t n_bytes)
+{
+	void *memory;
+	if (n_bytes == 0 || n_bytes > PTRDIFF_MAX)
+		return NULL;
+	memory = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+	if (memory == MAP_FAILED)
+		return NULL;
+	/* May fail without harm: a system without huge pages does not know it. */
+	(void)madvise(memory, n_bytes, MADV_NOHUGEPAGE);
+	return memory;
+}
+
+static void *grow(void *memory, size_t *capacity, size_t n_bytes, void *(*alloc)(size_t n_bytes))
 {
 	if (memory != NULL && n_bytes <= *capacity)
 		return memory;
 	psr_free_huge(memory, *capacity);
-	memory = psr_alloc_huge(n_bytes);
+	memory = alloc(n_bytes);
 	*capacity = memory != NULL ? n_bytes : 0;
 	return memory;
+}
+
+void *psr_grow_huge(void *memory, size_t *capacity, size_t n_bytes)
+{
+	return grow(memory, capacity, n_bytes, psr_alloc_huge);
+}
+
+void *psr_grow_by_pages(void *memory, size_t *capacity, size_t n_bytes)
+{
+	return grow(memory, capacity, n_bytes, alloc_pages);
 }

@@ -21,4 +21,8 @@ void psr_free_huge(void *memory, size_t n_bytes);
  * capacity of 0. */
 void *psr_grow_huge(void *memory, size_t *capacity, size_t n_bytes) __attribute__((warn_unused_result));
 
+/* The same in ordinary pages, for arrays that threads fill little by little: the system clears a page as a thread first
+ * writes to it, and a huge one holds up that thread for milliseconds. psr_free_huge() frees it. */
+void *psr_grow_by_pages(void *memory, size_t *capacity, size_t n_bytes) __attribute__((warn_unused_result));
+
 #endif

@@ -20,7 +20,7 @@ void *bins_room_for(void *array, size_t *capacity, size_t n, size_t size)
 {
 	if (array != NULL && n * size <= *capacity)
 		return array;
-	return psr_grow_huge(array, capacity, (n + n / 4 + 1) * size);
+	return psr_grow_by_pages(array, capacity, (n + n / 4 + 1) * size);
 }
 
 size_t bins_bytes(const struct bins *bins)

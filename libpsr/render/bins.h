@@ -25,7 +25,7 @@ struct bins {
 	size_t by_work_capacity;
 	uint8_t *is_quiet;       /* as plan.is_quiet */
 	size_t is_quiet_capacity;
-	struct cull_hit *hit;    /* by chunk */
+	struct cull_hit *hit;    /* of each chunk together; chunks as they end, in any order */
 	size_t hit_capacity;
 	uint32_t *order;         /* one an entry, for the thread that draws its tile */
 	size_t order_capacity;

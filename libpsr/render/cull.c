@@ -1,5 +1,6 @@
 #include "cull.h"
 
+#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -25,6 +26,7 @@ struct cull {
 	const struct plan *plan;
 	uint32_t n_chunks, n_tiles;
 	uint32_t stride; /* of counts, by chunk: whole cache lines, so that threads share none */
+	atomic_uint n_hits; /* that chunks have appended */
 };
 
 /* The pixels that a sphere can touch. */
@@ -126,12 +128,13 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 
 static void count_chunk(int i, void *userdata)
 {
-	const struct cull *cull = userdata;
+	struct cull *cull = userdata;
 	const struct plan *plan = cull->plan;
 	struct cull_chunk chunk = cull->bins->chunk[i];
 	const struct plan_instance *in = &plan->instance[chunk.instance];
 	uint32_t *count = cull->bins->count + (size_t)i * cull->stride;
-	struct counting to = { cull, &chunk, count, cull->bins->hit + chunk.first_hit };
+	struct cull_hit hit[MOST_CHUNK];
+	struct counting to = { cull, &chunk, count, hit };
 
 	/* The guard band of the coarsest level, the widest that a block can get. */
 	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
@@ -158,7 +161,9 @@ static void count_chunk(int i, void *userdata)
 			take_batch(&to, &batch, first, n);
 		}
 	}
-	chunk.n_hits = (uint32_t)(to.hit - (cull->bins->hit + chunk.first_hit));
+	chunk.n_hits = (uint32_t)(to.hit - hit);
+	chunk.first_hit = atomic_fetch_add_explicit(&cull->n_hits, chunk.n_hits, memory_order_relaxed);
+	memcpy(cull->bins->hit + chunk.first_hit, hit, chunk.n_hits * sizeof *hit);
 	cull->bins->chunk[i] = chunk;
 }
 
@@ -229,8 +234,7 @@ static uint32_t make_chunks(struct bins *bins, const struct plan *plan, int stor
 				k++;
 			if (store)
 				bins->chunk[n] = (struct cull_chunk){ .instance = i, .first_cluster = k, .first_block = first,
-					                                  .n_blocks = left < most ? left : most,
-					                                  .first_hit = plan->instance[i].first_slot + first };
+					                                  .n_blocks = left < most ? left : most };
 		}
 	}
 	return n;
