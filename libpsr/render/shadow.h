@@ -6,6 +6,7 @@
 #ifndef PSR_RENDER_SHADOW_H
 #define PSR_RENDER_SHADOW_H
 
+#include "slots.h"
 #include "warp.h"
 
 struct shadow; /* kept maps, and working memory */
@@ -68,8 +69,9 @@ struct shadow_kept {
 /* Working memory, for one map after the other. */
 struct shadow_drawer {
 	struct plan plan;
-	uint64_t *word; /* of a tile, for each thread */
+	uint64_t *word; /* of a tile, for each slot */
 	size_t word_size;
+	struct slots slots;
 	float *cells; /* depths, in the order of the map's cells */
 	size_t cells_size;
 };

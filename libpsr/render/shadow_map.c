@@ -22,7 +22,6 @@ struct drawing {
 	float *cells; /* the drawer's: of level 0, and of the map's other levels */
 	uint16_t *kept_cells; /* the map's, in the same order */
 	uint32_t stride;
-	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_samples;
 };
 
@@ -53,15 +52,13 @@ static void draw_tile(struct drawing *d, uint32_t tile, uint64_t *own)
 	}
 }
 
-/* Draws tile after tile into the same words, which stay in the cache. */
-static void draw_some(int part, void *userdata)
+static void draw_one(int i, void *userdata)
 {
 	struct drawing *d = userdata;
-	const uint32_t n_tiles = d->drawer->plan.tiles_x * d->drawer->plan.tiles_y;
-	uint64_t *own = d->drawer->word + (size_t)part * WARP_OWN_WORDS;
+	const int slot = slots_take(&d->drawer->slots);
 
-	for (uint32_t i; !plan_is_cancelled(&d->drawer->plan) && (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
-		draw_tile(d, (uint32_t)d->bins->by_work[i], own);
+	draw_tile(d, (uint32_t)d->bins->by_work[i], d->drawer->word + (size_t)slot * WARP_OWN_WORDS);
+	slots_give(&d->drawer->slots, slot);
 }
 
 /* The guard band of level 0, into which no sample falls. */
@@ -199,7 +196,6 @@ static void note_plan(struct shadow_kept *kept, const struct plan *plan)
 
 int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, const struct shadow_call *call)
 {
-	const int n_parts = psr_pool_threads(call->pool);
 	struct render_settings settings;
 	struct psr_scene scene = *call->scene;
 	struct psr_report report = { 0 };
@@ -224,13 +220,13 @@ int shadow_map_draw(struct shadow_kept *kept, struct shadow_drawer *drawer, cons
 	if (rc == PSR_ERR_CANCELLED)
 		return render_cancelled(call->err);
 	drawer->word = psr_grow_huge(drawer->word, &drawer->word_size,
-	                             (size_t)n_parts * WARP_OWN_WORDS * sizeof *drawer->word);
+	                             (size_t)slots_most(call->pool) * WARP_OWN_WORDS * sizeof *drawer->word);
 	if (rc || drawer->word == NULL || prepare_cells(kept, &d, report.levels))
 		return psr_fail(call->err, PSR_ERR_MEMORY, "no memory for a shadow map of %ux%u", kept->fit.width,
 		                kept->fit.height);
 	note_plan(kept, plan);
 	clear_band(&d);
-	rc = psr_pool_for_until(call->pool, call->cancel, n_parts, draw_some, &d);
+	rc = psr_pool_for_until(call->pool, call->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);
 	if (rc == PSR_OK)
 		rc = psr_pool_for_until(call->pool, call->cancel, PSR_MAX_DEPTH_LEVEL + 1, make_seams, &d);
 	if (rc == PSR_OK)

@@ -47,9 +47,8 @@ struct drawing {
 	const struct plan *plan;
 	const struct bins *bins;
 	const struct sheer_picture *picture;
-	struct sheer_tile *tile; /* one a thread */
+	struct sheer *sheer;
 	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
-	_Atomic uint32_t next_tile;
 	_Atomic uint64_t n_pixels;
 	atomic_int failed;
 };
@@ -314,13 +313,13 @@ static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
 		put_planes(l, d, &area);
 }
 
-static void draw_some(int part, void *userdata)
+static void draw_one(int i, void *userdata)
 {
 	struct drawing *d = userdata;
-	const uint32_t n_tiles = d->plan->tiles_x * d->plan->tiles_y;
+	const int slot = slots_take(&d->sheer->slots);
 
-	for (uint32_t i; !plan_is_cancelled(d->plan) && (i = atomic_fetch_add(&d->next_tile, 1)) < n_tiles;)
-		draw_tile(d, (uint32_t)d->bins->by_work[i], &d->tile[part]);
+	draw_tile(d, (uint32_t)d->bins->by_work[i], &d->sheer->tile[slot]);
+	slots_give(&d->sheer->slots, slot);
 }
 
 /* Splits 2^exponent into two factors. Exact unless the result is beyond a float. */
@@ -348,15 +347,14 @@ static int make_tiles(struct sheer *sheer, int n)
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool)
 {
-	const int n_parts = psr_pool_threads(pool);
-	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture };
+	const int n_slots = slots_most(pool);
+	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture, .sheer = sheer };
 
-	if (n_parts > sheer->n_tiles && make_tiles(sheer, n_parts))
+	if (n_slots > sheer->n_tiles && make_tiles(sheer, n_slots))
 		return PSR_ERR_MEMORY;
-	d.tile = sheer->tile;
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
-	const int rc = psr_pool_for_until(pool, &plan->cancel, n_parts, draw_some, &d);
+	const int rc = psr_pool_for_until(pool, &plan->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);
 	sheer->n_pixels = d.n_pixels;
 	return d.failed ? PSR_ERR_MEMORY : rc;
 }
@@ -382,8 +380,8 @@ uint64_t sheer_most_bytes(uint64_t n_pixels, int n_threads)
 	const uint64_t grown = 2 * SHEER_MOST * n_pixels + 65536; /* sheer_grow() */
 	const uint64_t n_words = grown < SHEER_LIST_MOST ? grown : SHEER_LIST_MOST;
 
-	return n_pixels * sizeof(float)
-	       + (uint64_t)n_threads * (sizeof(struct sheer_tile) + n_words * sizeof(struct sheer_word));
+	return n_pixels * sizeof(float) + (uint64_t)(n_threads + 1) * sizeof(struct sheer_tile)
+	       + (uint64_t)n_threads * n_words * sizeof(struct sheer_word);
 }
 
 uint64_t sheer_bytes(const struct sheer *sheer)

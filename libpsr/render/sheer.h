@@ -3,10 +3,12 @@
 #define PSR_RENDER_SHEER_H
 
 #include "bins.h"
+#include "slots.h"
 
 struct sheer {
-	struct sheer_tile *tile; /* scratch, one a thread */
+	struct sheer_tile *tile; /* scratch, by slot */
 	int n_tiles;
+	struct slots slots;
 	float *depth;
 	size_t depth_size;
 	uint64_t n_pixels; /* of the last picture */
