@@ -13,6 +13,7 @@
 #include "server/session/session.h"
 
 #define IO_THREADS 2
+#define LEND_NS 500000 /* the loop draws a small frame itself for so long, about as long as it writes in a turn */
 
 struct server {
 	struct options *options;
@@ -190,6 +191,7 @@ static void on_batch_end(void *userdata)
 	if (server->is_draining)
 		go_on_draining(server);
 	conns_end_batch(&server->conns);
+	psr_pool_lend(server->pool, LEND_NS);
 	must_tick = server->conns.first != NULL || server->acceptor.is_resting || server->is_draining
 	            || builder_is_running(server->builder);
 	if (must_tick != server->is_ticking) {

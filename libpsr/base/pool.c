@@ -71,6 +71,8 @@ void psr_pool_destroy(struct psr_pool *pool)
 	if (pool == NULL)
 		return;
 	pthread_mutex_lock(&pool->mutex);
+	if (pool->n_jobs > 0)
+		pool_call(pool, 1); /* nobody lends a thread any more */
 	while (pool->n_jobs > 0)
 		pthread_cond_wait(&pool->all_done, &pool->mutex);
 	pool->stopping = 1;
@@ -164,7 +166,9 @@ int psr_pool_submit(struct psr_pool *pool, const struct pool_job *job)
 	pool->n_jobs++;
 	shares_enter(&pool->shares, &own->claim, &own->flow->shares, job->class, now);
 	pool_want(pool, own, 1, now);
-	pool_call(pool, 1);
+	atomic_store(&pool->is_lent_to, job->is_lent_to && pool->n_jobs == 1);
+	if (!job->is_lent_to || pool->n_jobs > 1)
+		pool_call(pool, 1);
 	pthread_mutex_unlock(&pool->mutex);
 	return PSR_OK;
 }

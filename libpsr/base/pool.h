@@ -62,11 +62,22 @@ struct pool_job {
 	enum pool_class class;
 	void (*fn)(void *userdata);
 	void *userdata;
+	int is_lent_to; /* the caller lends itself next; until then a core is called only if there are other jobs */
 };
 
 /* Queues the job, and returns at once. Jobs of one flow and class begin in their order. psr_pool_destroy() waits for
  * all of them. MEMORY. */
 int psr_pool_submit(struct psr_pool *pool, const struct pool_job *job);
+
+/* The calling thread, which is none of the pool's, works as a core for the job that is_lent_to, if that is the only job,
+ * and its flow's last one took less than most_ns. If it takes longer nevertheless, it goes to a core after its next
+ * index or question. So a short job costs no wake-up of another thread. */
+void psr_pool_lend(struct psr_pool *pool, uint64_t most_ns);
+
+/* Inside a job: leaves the core to a better claim, as after an index. For serial parts and long indices, which ask more
+ * often than they end; the caller holds no mutex, and may come back on another thread. Does nothing in an index that
+ * another core runs for the job, and outside. */
+void pool_give_way(void);
 
 /* Inside a job, or an index of one of its loops: returns how long the job has held cores, all threads together, up to
  * the last index or part that has ended. 0 outside. */

@@ -72,7 +72,7 @@ static void leave(struct psr_pool *pool, struct job *job, enum pool_leave why)
 
 void pool_yield(struct psr_pool *pool, struct job *job, uint64_t now)
 {
-	if (shares_rival(&pool->shares, &job->claim, now) != NULL)
+	if (pool_is_overdue(job->worker, now) || shares_rival(&pool->shares, &job->claim, now) != NULL)
 		leave(pool, job, POOL_YIELDS);
 }
 

@@ -25,9 +25,11 @@ struct worker {
 	pthread_t thread;
 	pthread_cond_t called;
 	int is_called;
+	int is_helping; /* the thread's own: it runs indices of a job whose fiber is elsewhere */
 	enum pool_leave leave;
 	uint64_t begun_ns;  /* the core works for the job since then */
 	uint64_t marked_ns; /* until then, that time is the job's */
+	uint64_t until_ns;  /* when a thread that lends itself wants to go; 0: never */
 };
 
 /* On its caller's stack. Helpers use it only while they are counted, which changes under the mutex. */
@@ -50,6 +52,7 @@ struct job {
 	struct loop *loop;
 	int is_waiting; /* the fiber wants a core: before it has begun, too */
 	int is_ending;  /* the fiber waits for helpers at the end of a loop */
+	uint64_t asked_ns; /* the fiber's: when it last gave way, or would have */
 	atomic_uint_fast64_t used_ns;
 };
 
@@ -71,6 +74,7 @@ struct psr_pool {
 	int n_threads, with_jobs, stopping;
 	int n_coming; /* workers that were called or spin, and will look for work */
 	int n_jobs;
+	atomic_int is_lent_to; /* a job waits for a thread that lends itself, and no core was called */
 	int n_workers, n_fibers;
 	struct fiber *fiber[POOL_MAX_FIBERS]; /* that rest */
 	struct worker *worker[POOL_MAX_CORES];
@@ -93,6 +97,11 @@ struct job *pool_best(struct psr_pool *pool, uint64_t now);
 void pool_begin(struct worker *worker, struct job *job, uint64_t now);
 void pool_end(struct worker *worker, struct job *job, uint64_t now);
 void pool_mark(struct worker *worker, struct job *job, uint64_t now); /* needs no mutex */
+
+static inline int pool_is_overdue(const struct worker *worker, uint64_t now)
+{
+	return worker->until_ns != 0 && now >= worker->until_ns;
+}
 
 void pool_offer(struct psr_pool *pool);
 

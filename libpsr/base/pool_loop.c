@@ -65,7 +65,8 @@ static int may_go_on(struct psr_pool *pool, struct worker *helper, struct job *j
 		call_helpers(pool, job, loop);
 		pthread_mutex_unlock(&pool->mutex);
 	}
-	if (!is_contended(pool) || (job->claim.class != POOL_REFINING && now - *asked_ns < SLICE_NS))
+	if (!(helper == NULL && pool_is_overdue(job->worker, now))
+	    && (!is_contended(pool) || (job->claim.class != POOL_REFINING && now - *asked_ns < SLICE_NS)))
 		return 1;
 	*asked_ns = now;
 	pthread_mutex_lock(&pool->mutex);
@@ -75,6 +76,33 @@ static int may_go_on(struct psr_pool *pool, struct worker *helper, struct job *j
 		stays = shares_rival(&pool->shares, &job->claim, now) == NULL;
 	pthread_mutex_unlock(&pool->mutex);
 	return stays;
+}
+
+/* Without a loop whose indices are wanted, the job itself is not among those who want. */
+static int is_wanted(const struct psr_pool *pool, const struct job *job)
+{
+	return atomic_load_explicit(&pool->n_wanting, memory_order_relaxed)
+	       > (unsigned)(job->loop != NULL && !pool_is_taken(job->loop));
+}
+
+void pool_give_way(void)
+{
+	const struct worker *self = pool_current_worker();
+	struct job *job = pool_current_job();
+	struct psr_pool *pool;
+	uint64_t now;
+
+	if (job == NULL || self->is_helping || (self->until_ns == 0 && !is_wanted(self->pool, job)))
+		return;
+	pool = self->pool;
+	now = clock_ns();
+	if (now - job->asked_ns < SLICE_NS)
+		return;
+	job->asked_ns = now;
+	pool_mark(job->worker, job, now);
+	pthread_mutex_lock(&pool->mutex);
+	pool_yield(pool, job, now);
+	pthread_mutex_unlock(&pool->mutex);
 }
 
 /* Runs functions with the default rounding and with denormal numbers: a library that sets flush-to-zero in one thread

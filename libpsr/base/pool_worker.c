@@ -70,6 +70,27 @@ static void run_fiber(struct worker *self, struct job *job, uint64_t now)
 		end_job(pool, job, now);
 }
 
+void psr_pool_lend(struct psr_pool *pool, uint64_t most_ns)
+{
+	const uint64_t now = pool_now(pool);
+	struct worker guest = { .pool = pool, .until_ns = now + most_ns };
+	struct job *job;
+
+	if (!atomic_load_explicit(&pool->is_lent_to, memory_order_relaxed))
+		return;
+	pthread_mutex_lock(&pool->mutex);
+	atomic_store(&pool->is_lent_to, 0);
+	job = pool_best(pool, now);
+	if (job != NULL && job->is_waiting && pool->n_jobs == 1 && job->flow->last_ns != 0
+	    && job->flow->last_ns < most_ns) {
+		current_worker = &guest;
+		run_fiber(&guest, job, now);
+		current_worker = NULL;
+	}
+	pass_on(pool);
+	pthread_mutex_unlock(&pool->mutex);
+}
+
 static void help(struct worker *self, struct job *job, uint64_t now)
 {
 	struct psr_pool *pool = self->pool;
@@ -80,7 +101,9 @@ static void help(struct worker *self, struct job *job, uint64_t now)
 	pass_on(pool);
 	pthread_mutex_unlock(&pool->mutex);
 	current_job = job->fiber != NULL ? job : NULL;
+	self->is_helping = 1;
 	pool_run_indices(pool, self, job, loop);
+	self->is_helping = 0;
 	current_job = NULL;
 	pthread_mutex_lock(&pool->mutex);
 	now = pool_now(pool);

@@ -345,7 +345,8 @@ int cull_blocks(struct bins *bins, const struct simd *simd, struct plan *plan, s
                 struct psr_report *report)
 {
 	const uint32_t n_tiles = plan->tiles_x * plan->tiles_y, line = 64 / sizeof *bins->count;
-	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, (n_tiles + line - 1) / line * line };
+	const uint32_t stride = (n_tiles + line - 1) / line * line;
+	struct cull cull = { bins, simd, plan, make_chunks(bins, plan, 0), n_tiles, stride, 0 };
 	int rc = plan_is_cancelled(plan) ? PSR_ERR_CANCELLED : make_room(bins, &cull);
 
 	if (rc)

@@ -217,10 +217,12 @@ static int is_over(const struct drawing *d)
 	return d->refine == 0 && atomic_load_explicit(&d->used_ns, memory_order_relaxed) > d->limit_ns;
 }
 
+/* Whoever asks holds no mutex: a question is a place to give way, too. */
 static int is_cancelled(void *userdata)
 {
 	struct drawing *d = userdata;
 
+	pool_give_way();
 	atomic_store_explicit(&d->used_ns, pool_job_used_ns(), memory_order_relaxed);
 	return atomic_load_explicit(&d->is_stopped, memory_order_relaxed) || is_over(d);
 }

@@ -3,6 +3,9 @@
 #include "base/clock.h"
 #include "frame.h"
 
+#define SLIGHT_PIXELS 16384
+#define SLIGHT_INSTANCES 16
+#define SLIGHT_BLOCKS 262144
 #define EMIT_BYTES 32768 /* coded bytes that are worth a note to the loop */
 
 /* ---- on the pool's threads ---- */
@@ -136,6 +139,16 @@ void frame_set_bases(struct frame *frame)
 	frame->used = frame->made != NULL ? find_base(frame) : NULL;
 	d->base = frame->used;
 	d->parts = frame->made != NULL ? parts : NULL;
+}
+
+int frame_is_slight(const struct frame *frame)
+{
+	const struct psr_msg_frame *request = &frame->drawing.request;
+	const struct scene *scene = frame->drawing.scene;
+
+	return frame->request.n_frames == 1 && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
+	       && scene->scene.n_instances <= SLIGHT_INSTANCES && scene_blocks(scene) <= SLIGHT_BLOCKS
+	       && scene_shadow_lights(scene) == 0 && !scene_has_sheer(scene);
 }
 
 const char *frame_never_fits(struct psr_error *err, const struct frame *frame, const struct schedule *schedule)

@@ -43,6 +43,10 @@ static inline struct flow *frame_flow(const struct frame *frame)
 void frame_put_models(struct frame *frame); /* unpins them, or stops their coming */
 void frame_set_bases(struct frame *frame); /* of the frame that comes next */
 
+/* Whether each part between two places where cores change is short by what the frame consists of: the thread of the
+ * event loop may draw it. */
+int frame_is_slight(const struct frame *frame);
+
 void frame_run(void *frame);       /* the job: draws, codes, and posts done_note */
 void frame_send_coded(struct frame *frame);
 void frame_send_end(struct frame *frame, int is_final); /* FRAME_END, once all rectangles are in the queue */

@@ -135,7 +135,7 @@ static void on_begin(struct schedule_request *request, enum pool_class class, vo
 	struct frames *frames = userdata;
 	struct frame *frame = frame_of(request);
 	struct drawing *d = &frame->drawing;
-	const struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame };
+	const struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame, frame_is_slight(frame) };
 
 	d->frame = request->frame;
 	d->is_sharp = request->has_sharp && request->frame > 0;

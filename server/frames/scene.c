@@ -36,6 +36,15 @@ unsigned scene_shadow_lights(const struct scene *scene)
 	return n;
 }
 
+uint64_t scene_blocks(const struct scene *scene)
+{
+	uint64_t n = 0;
+
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
+		n += scene->model[scene->of_instance[i]]->card.n_blocks;
+	return n;
+}
+
 int scene_has_sheer(const struct scene *scene)
 {
 	for (uint32_t i = 0; i < scene->n_models; i++)

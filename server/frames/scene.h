@@ -25,6 +25,7 @@ int scene_create(struct scene **out, const struct handles *handles, const struct
                  struct psr_error *err);
 
 unsigned scene_shadow_lights(const struct scene *scene); /* that cast shadows */
+uint64_t scene_blocks(const struct scene *scene);        /* of all instances */
 int scene_has_sheer(const struct scene *scene);          /* a model has samples that let light through */
 
 /* Gives the instances their models, all of which are in memory and pinned: before a frame is drawn. */

@@ -128,7 +128,7 @@ static void draw_many(void *userdata)
 
 static int begin(struct load *load, void (*fn)(void *userdata))
 {
-	return psr_pool_submit(load->pool, &(struct pool_job){ load->flow, load->class, fn, load });
+	return psr_pool_submit(load->pool, &(struct pool_job){ load->flow, load->class, fn, load, 0 });
 }
 
 static int open_load(struct load *load, struct psr_pool *pool, enum pool_class class, uint64_t index_ns, int n_indices)

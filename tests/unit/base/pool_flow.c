@@ -249,6 +249,116 @@ static void flows_of_long_and_of_short_indices_both_end(void **state)
 		assert_int_equal(frames[i].sum, frames[i].n_loops * N_TILES);
 }
 
+/* ---- giving way ---- */
+
+struct asking {
+	struct psr_pool *pool;
+	int in_index;
+	atomic_int has_begun, is_submitted, n_done;
+	struct frame guest;
+};
+
+static void ask_until_guest_is_done(int i, void *userdata)
+{
+	struct asking *asking = userdata;
+
+	(void)i;
+	atomic_store(&asking->has_begun, 1);
+	while (!atomic_load(&asking->is_submitted))
+		sched_yield();
+	while (atomic_load(&asking->n_done) == 0)
+		pool_give_way();
+}
+
+static void ask(void *userdata)
+{
+	struct asking *asking = userdata;
+
+	if (asking->in_index)
+		psr_pool_for(asking->pool, 2, ask_until_guest_is_done, asking);
+	else
+		ask_until_guest_is_done(0, asking);
+}
+
+/* On one core: ends only if the guest gets it in the midst of the other job. */
+static void check_giving_way(int in_index, enum pool_class class)
+{
+	struct asking asking = { .pool = make(1), .in_index = in_index };
+	struct pool_flow *a = make_flow(asking.pool), *b = make_flow(asking.pool);
+	const struct pool_job job = { .flow = a, .class = class, .fn = ask, .userdata = &asking };
+
+	asking.guest = (struct frame){ .pool = asking.pool, .n_loops = 2, .n_done = &asking.n_done };
+	assert_int_equal(psr_pool_submit(asking.pool, &job), PSR_OK);
+	while (!atomic_load(&asking.has_begun))
+		sched_yield();
+	submit(&asking.guest, b, POOL_MOVING);
+	atomic_store(&asking.is_submitted, 1);
+	pool_flow_destroy(a);
+	pool_flow_destroy(b);
+	psr_pool_destroy(asking.pool);
+	assert_int_equal(asking.guest.sum, 2 * N_TILES);
+}
+
+static void a_long_part_gives_way_where_it_asks(void **state)
+{
+	(void)state;
+	for (int in_index = 0; in_index < 2; in_index++) {
+		check_giving_way(in_index, POOL_MOVING);
+		check_giving_way(in_index, POOL_REFINING);
+	}
+	pool_give_way();
+}
+
+/* ---- threads that lend themselves ---- */
+
+struct lent {
+	struct psr_pool *pool;
+	pthread_t thread;
+	int is_long; /* it goes on until its thread is back */
+	atomic_int is_back, is_done;
+};
+
+static void run_lent(void *userdata)
+{
+	struct lent *lent = userdata;
+
+	lent->thread = pthread_self();
+	while (lent->is_long && !atomic_load(&lent->is_back))
+		pool_give_way();
+	atomic_store(&lent->is_done, 1);
+}
+
+/* Returns whether the job began on this thread. */
+static int lend_once(struct psr_pool *pool, struct pool_flow *flow, int is_long, uint64_t most_ns)
+{
+	struct lent lent = { .pool = pool, .is_long = is_long };
+	const struct pool_job job = { .flow = flow, .fn = run_lent, .userdata = &lent, .is_lent_to = 1 };
+
+	assert_int_equal(psr_pool_submit(pool, &job), PSR_OK);
+	psr_pool_lend(pool, most_ns);
+	atomic_store(&lent.is_back, 1);
+	while (!atomic_load(&lent.is_done))
+		sched_yield();
+	return pthread_equal(lent.thread, pthread_self());
+}
+
+/* A flow's first job goes to a core, since nobody knows how long it takes. */
+static void a_thread_that_lends_itself_runs_a_job_and_gets_back(void **state)
+{
+	struct psr_pool *pool = make(2);
+	struct pool_flow *flow = make_flow(pool);
+
+	(void)state;
+	assert_false(lend_once(pool, flow, 0, UINT64_C(1) << 60));
+	while (!lend_once(pool, flow, 0, UINT64_C(1) << 60))
+		;
+	while (!lend_once(pool, flow, 1, 1000000))
+		lend_once(pool, flow, 0, 0);
+	psr_pool_lend(pool, 1000000);
+	pool_flow_destroy(flow);
+	psr_pool_destroy(pool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -256,6 +366,8 @@ int main(void)
 		cmocka_unit_test(a_job_waits_for_an_index_of_another_flow_and_not_for_its_frame),
 		cmocka_unit_test(one_flow_has_all_cores_and_pays_for_all),
 		cmocka_unit_test(flows_of_long_and_of_short_indices_both_end),
+		cmocka_unit_test(a_long_part_gives_way_where_it_asks),
+		cmocka_unit_test(a_thread_that_lends_itself_runs_a_job_and_gets_back),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
