@@ -302,8 +302,8 @@ $(EFFECTS): $(EFFECTS_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $
 CANCEL_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,cancel child isolate level ours report scene))
 $(CANCEL): $(CANCEL_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
-DAEMON_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child daemon daemon_costs daemon_latency daemon_link daemon_open daemon_server \
-	daemon_shares isolate level ours report scene))
+DAEMON_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child daemon daemon_costs daemon_given_up daemon_latency daemon_link daemon_open \
+	daemon_server daemon_shares isolate level ours report scene))
 $(DAEMON_BENCH): $(DAEMON_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 REPROJECT_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report reproject scene))

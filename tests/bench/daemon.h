@@ -49,6 +49,8 @@ double daemon_processor_s(const struct daemon_server *server); /* processor time
 /* The part of the machine's processors that other programs used since the last call; while no daemon runs. */
 double daemon_others(void);
 double daemon_peak_bytes(const struct daemon_server *server);
+/* The sum of a field's numbers in a file of lines `NAME: NUMBER`; names that begin alike count, too. 0 without the file. */
+double daemon_field(const char *path, const char *name);
 double daemon_switches(const struct daemon_server *server);    /* context switches of all its threads so far */
 
 /* ---- a connection ---- */

@@ -121,6 +121,16 @@ static double time_daemon(const struct daemon_server *server, struct link *link)
 	return (daemon_processor_s(server) - start_s) * 1e6 / link->n_done;
 }
 
+/* The trace has begun, or its program has ended. */
+static void wait_for_trace(const struct daemon_server *server, pid_t tracer)
+{
+	char path[64];
+
+	snprintf(path, sizeof path, "/proc/%d/status", (int)server->pid);
+	while (daemon_field(path, "TracerPid:") == 0 && waitpid(tracer, NULL, WNOHANG | WNOWAIT) == 0)
+		usleep(1000);
+}
+
 /* System calls a frame, as strace counts them; 0 without strace. */
 static double count_calls(const struct daemon_server *server, struct link *link)
 {
@@ -136,7 +146,7 @@ static double count_calls(const struct daemon_server *server, struct link *link)
 		execlp("strace", "strace", "-c", "-f", "-o", path, "-p", number, (char *)NULL);
 		_exit(127);
 	}
-	links_run(link, 1, 1);
+	wait_for_trace(server, pid);
 	run_frames(link, ROUND);
 	const double n = link->n_done;
 	kill(pid, SIGINT);

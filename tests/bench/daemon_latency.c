@@ -1,4 +1,4 @@
-/* A small frame beside large ones; frames that are given up; the sharp frame at rest. */
+/* A small frame beside large ones; the sharp frame at rest. */
 #include "daemon.h"
 
 #include <math.h>
@@ -13,7 +13,6 @@
 #define SMALL 256
 #define PASSES 4
 #define REFRESH_NS 33333333 /* between requests of a viewer that moves */
-#define REST_NS 110000000  /* in a view, refining begins 0.1 s after the request */
 #define WORST_INSTANCES 870
 #define MOST_BLOCKS ((UINT64_C(1) << 26) - 1) /* of a scene */
 #define WORST_SIDE 2048
@@ -170,137 +169,6 @@ void daemon_beside_worst(struct daemon_bench *bench)
 
 	beside_start(&b, bench, bench->build == 0 ? without_limit : none, size);
 	beside_measure(&b, start_worst);
-}
-
-/* ---- 5: frames that are given up ---- */
-
-struct trials {
-	double ms[MOST_TRIALS], processor_ms[MOST_TRIALS];
-	size_t n;
-};
-
-/* From now on until the daemon has counted the frame that was given up; 0: none was running. */
-static void wait_until_free(struct trials *to, struct link *watch, const struct daemon_server *server, uint64_t counted)
-{
-	const double used_s = daemon_processor_s(server);
-	const uint64_t start_ns = clock_ns();
-
-	while (link_stat(watch, PSR_STAT_DRAW_US) == counted) {
-		if (clock_ns() - start_ns > 1000000000)
-			return;
-		usleep(100); /* who asks all the time takes the processors from those who are to end */
-	}
-	if (to->n == MOST_TRIALS)
-		return;
-	to->ms[to->n] = (double)(clock_ns() - start_ns) * 1e-6;
-	to->processor_ms[to->n++] = (daemon_processor_s(server) - used_s) * 1e3;
-}
-
-enum way { WAY_CANCEL, WAY_SUPERSEDE, WAY_HANG_UP, N_WAYS };
-
-/* A plain frame is finished when it is superseded, a refined one is not. */
-static void try_once(struct trials *to, enum way way, struct link *links, const struct daemon_server *server,
-                     double after_ms)
-{
-	struct link *given = &links[0], *watch = &links[1];
-	const uint32_t id = link_ask(given);
-	const uint64_t start_ns = clock_ns();
-	uint64_t counted;
-
-	while (way == WAY_SUPERSEDE && (given->last_id != id || clock_ns() - start_ns < REST_NS)
-	       && clock_ns() - start_ns < 1000000000)
-		links_run(given, 1, 0.001);
-	links_run(given, 1, after_ms * 1e-3);
-	if (given->n_open == 0)
-		return;
-	counted = link_stat(watch, PSR_STAT_DRAW_US);
-	if (way == WAY_CANCEL)
-		link_cancel(given, id);
-	else if (way == WAY_SUPERSEDE)
-		link_ask(given);
-	else
-		link_close(given);
-	wait_until_free(to, watch, server, counted);
-	if (way == WAY_SUPERSEDE)
-		link_cancel(given, given->next_id - 1);
-	if (way != WAY_HANG_UP)
-		links_finish(given, 1, 1);
-}
-
-static void open_given(struct link *link, const struct daemon_server *server, const struct scene_film *film, enum way way)
-{
-	link_connect(link, server, film);
-	link_frame(link, film->picture.width, film->picture.height);
-	link->frame.pass_limit = PASSES;
-	link->view = way == WAY_SUPERSEDE;
-}
-
-static double median_reply_ms(struct link *watch)
-{
-	double ms[101];
-
-	for (int i = 0; i < 101; i++) {
-		const uint64_t start_ns = clock_ns();
-
-		link_stat(watch, PSR_STAT_DRAW_US);
-		ms[i] = (double)(clock_ns() - start_ns) * 1e-6;
-	}
-	return stats_median(ms, 101);
-}
-
-static void print_trials(const struct daemon_bench *bench, struct trials *t)
-{
-	stats_sort(t->ms, t->n);
-	stats_sort(t->processor_ms, t->n);
-	daemon_figure(bench, "until threads are free, p50", "ms", stats_percentile(t->ms, t->n, 0.5), DAEMON_NO_BOUND, 0);
-	daemon_figure(bench, "until threads are free, p99", "ms", stats_percentile(t->ms, t->n, 0.99), DAEMON_AT_MOST, 2);
-	daemon_figure(bench, "processor time meanwhile, p50", "ms", stats_percentile(t->processor_ms, t->n, 0.5),
-	              DAEMON_NO_BOUND, 0);
-	daemon_figure(bench, "processor time meanwhile, p99", "ms", stats_percentile(t->processor_ms, t->n, 0.99),
-	              DAEMON_NO_BOUND, 0);
-	daemon_figure(bench, "frames given up", "", (double)t->n, DAEMON_NO_BOUND, 0);
-}
-
-void daemon_given_up(struct daemon_bench *bench)
-{
-	static const char *const options[] = { NULL }, *const name[] = { "cancelled, p99", "superseded: its end, behind the newer, p99", "hung up, p99" };
-	static struct trials all, one;
-	struct daemon_server server;
-	struct scene_film film;
-	struct link links[2];
-	uint64_t seed = 1;
-
-	daemon_start(&server, bench, options);
-	daemon_film(&film, bench, 1920, 1080);
-	link_connect(&links[1], &server, &film);
-	link_frame(&links[1], SMALL, SMALL);
-	link_ask(&links[1]);
-	links_finish(&links[1], 1, 10);
-	daemon_figure(bench, "of that: the question whether", "ms", median_reply_ms(&links[1]), DAEMON_NO_BOUND, 0);
-	all.n = 0;
-	for (enum way way = 0; way < N_WAYS && link_stat(&links[1], PSR_STAT_DRAW_US) > 0; way++) {
-		const uint64_t start_ns = clock_ns();
-
-		one.n = 0;
-		links[0].fd = -1;
-		while ((double)(clock_ns() - start_ns) * 1e-9 < bench->seconds) {
-			if (links[0].fd < 0)
-				open_given(&links[0], &server, &film, way);
-			try_once(&one, way, links, &server, random_in(&seed, 0, 120));
-		}
-		link_close(&links[0]);
-		/* What a newer frame superseded ends behind that, which has its threads at once. */
-		for (size_t i = 0; way != WAY_SUPERSEDE && i < one.n && all.n < MOST_TRIALS; i++, all.n++) {
-			all.ms[all.n] = one.ms[i];
-			all.processor_ms[all.n] = one.processor_ms[i];
-		}
-		stats_sort(one.ms, one.n);
-		daemon_figure(bench, name[way], "ms", stats_percentile(one.ms, one.n, 0.99), DAEMON_NO_BOUND, 0);
-	}
-	if (all.n > 0)
-		print_trials(bench, &all);
-	link_close(&links[1]);
-	daemon_stop(&server);
 }
 
 /* ---- 9: the sharp frame ---- */

@@ -83,8 +83,7 @@ double daemon_processor_s(const struct daemon_server *server)
 	return (double)clock_read(clock) * 1e-9;
 }
 
-/* The sum of a field's numbers in a file of lines `NAME: NUMBER`; names that begin alike count, too. */
-static double field_of(const char *path, const char *name)
+double daemon_field(const char *path, const char *name)
 {
 	FILE *file = fopen(path, "r");
 	double sum = 0;
@@ -127,7 +126,7 @@ double daemon_peak_bytes(const struct daemon_server *server)
 	char path[64];
 
 	snprintf(path, sizeof path, "/proc/%d/status", (int)server->pid);
-	return field_of(path, "VmHWM:") * 1024;
+	return daemon_field(path, "VmHWM:") * 1024;
 }
 
 double daemon_switches(const struct daemon_server *server)
@@ -142,7 +141,7 @@ double daemon_switches(const struct daemon_server *server)
 	while (tasks != NULL && (entry = readdir(tasks)) != NULL) {
 		snprintf(path, sizeof path, "/proc/%d/task/%s/status", (int)server->pid, entry->d_name);
 		if (entry->d_name[0] != '.')
-			sum += field_of(path, "voluntary_ctxt_switches:");
+			sum += daemon_field(path, "voluntary_ctxt_switches:");
 	}
 	if (tasks != NULL)
 		closedir(tasks);

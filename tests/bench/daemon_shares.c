@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdio.h>
+#include "base/clock.h"
 #include "report.h"
 
 #define EQUALS 64
@@ -10,6 +11,8 @@
 #define EQUAL_SIDE 256
 #define SIZES 4
 #define OF_EACH 4
+#define QUANTUM 0.01    /* of a client's time is the most that one frame may be, */
+#define MOST_SECONDS 60 /* unless the measurement took longer */
 
 static void open_links(struct link *links, unsigned n, const struct daemon_server *server, const struct scene_film *film)
 {
@@ -49,14 +52,24 @@ static unsigned count_done(const struct link *links, unsigned n)
 
 /* ---- 3: equals ---- */
 
+static double frames_of(const struct link *link)
+{
+	return link->n_done;
+}
+
+static double time_of(const struct link *link)
+{
+	return link->cores_s;
+}
+
 /* (sum x)^2 / (n sum x^2): 1 if all have as much, 1/n if one has all. */
-static double jain(const struct link *links, unsigned n)
+static double jain(const struct link *links, unsigned n, double (*of)(const struct link *link))
 {
 	double sum = 0, squares = 0;
 
 	for (unsigned i = 0; i < n; i++) {
-		sum += links[i].n_done;
-		squares += (double)links[i].n_done * links[i].n_done;
+		sum += of(&links[i]);
+		squares += of(&links[i]) * of(&links[i]);
 	}
 	return squares > 0 ? sum * sum / (n * squares) : 0;
 }
@@ -68,7 +81,7 @@ void daemon_equals(struct daemon_bench *bench)
 	const int n_windows = (int)fmax(2, 2 * bench->seconds / WINDOW_SECONDS);
 	struct daemon_server server;
 	struct scene_film film;
-	double least = 1, sum = 0, greedy = 0, frames = 0;
+	double least = 1, least_time = 1, sum = 0, greedy = 0, frames = 0;
 
 	daemon_start(&server, bench, options);
 	daemon_film(&film, bench, EQUAL_SIDE, EQUAL_SIDE);
@@ -81,8 +94,9 @@ void daemon_equals(struct daemon_bench *bench)
 	for (int w = 0; w < n_windows; w++) {
 		links_forget(links, EQUALS);
 		links_run(links, EQUALS, WINDOW_SECONDS);
-		least = fmin(least, jain(links, EQUALS));
-		sum += jain(links, EQUALS);
+		least = fmin(least, jain(links, EQUALS, frames_of));
+		least_time = fmin(least_time, jain(links, EQUALS, time_of));
+		sum += jain(links, EQUALS, frames_of);
 		frames += count_done(links, EQUALS);
 		greedy += links[0].n_done;
 	}
@@ -90,6 +104,7 @@ void daemon_equals(struct daemon_bench *bench)
 	daemon_figure(bench, "Jain's index, mean", "", sum / n_windows, DAEMON_NO_BOUND, 0);
 	daemon_figure(bench, "frames a client and window", "", frames / n_windows / EQUALS, DAEMON_NO_BOUND, 0);
 	daemon_figure(bench, "greedy client's frames / mean", "x", greedy * EQUALS / frames, DAEMON_NO_BOUND, 0);
+	daemon_figure(bench, "Jain's index of cores' time, least", "", least_time, DAEMON_NO_BOUND, 0);
 	close_links(links, EQUALS);
 	daemon_stop(&server);
 }
@@ -162,13 +177,29 @@ static void print_shares(const struct daemon_bench *bench, const struct link *li
 	daemon_figure(bench, "frames x price alone / time used", "x", sum / used_s, DAEMON_NO_BOUND, 0);
 }
 
+/* Shares come in whole frames. Runs until the slowest client has so many that one of them is QUANTUM. Returns what part
+ * of its time a frame of the slowest one is. */
+static double run_until_fine(const struct daemon_bench *bench, struct link *links)
+{
+	const double start_s = clock_seconds(), most_s = fmax(MOST_SECONDS, 3 * bench->seconds);
+	unsigned least;
+
+	do {
+		links_run(links, SIZES * OF_EACH, bench->seconds);
+		least = links[0].n_done;
+		for (int i = 1; i < SIZES * OF_EACH; i++)
+			least = links[i].n_done < least ? links[i].n_done : least;
+	} while (least * QUANTUM < 1 && clock_seconds() - start_s < most_s);
+	return least > 0 ? 1.0 / least : 1;
+}
+
 void daemon_mixed(struct daemon_bench *bench)
 {
 	static const char *const options[] = { NULL };
 	struct link links[SIZES * OF_EACH];
 	struct daemon_server server;
 	struct scene_film film[SIZES];
-	double price_s[SIZES], used_s;
+	double price_s[SIZES], used_s, quantum;
 
 	daemon_start(&server, bench, options);
 	for (int s = 0; s < SIZES; s++) {
@@ -182,8 +213,9 @@ void daemon_mixed(struct daemon_bench *bench)
 	links_run(links, SIZES * OF_EACH, bench->seconds / 2);
 	links_forget(links, SIZES * OF_EACH);
 	used_s = daemon_processor_s(&server);
-	links_run(links, SIZES * OF_EACH, 3 * bench->seconds);
+	quantum = run_until_fine(bench, links);
 	used_s = daemon_processor_s(&server) - used_s;
+	daemon_figure(bench, "a frame of 1920x1080 of its client's time", "%", 100 * quantum, DAEMON_NO_BOUND, 0);
 	print_shares(bench, links, price_s, used_s);
 	close_links(links, SIZES * OF_EACH);
 	daemon_stop(&server);
@@ -221,8 +253,11 @@ static void compare(const struct daemon_bench *bench, const struct daemon_server
 	daemon_figure(bench, name, "x", report_ratio(used_s[1] * frames[0], used_s[0] * frames[1]), DAEMON_NO_BOUND, 0);
 	snprintf(name, sizeof name, "%ux%u: frames/s of one", side, side);
 	daemon_figure(bench, name, "1/s", frames[0] / (TURNS * bench->seconds / 2), DAEMON_NO_BOUND, 0);
+	const double in_use = used_s[0] / (TURNS * bench->seconds / 2);
 	snprintf(name, sizeof name, "%ux%u: processors in use for one", side, side);
-	daemon_figure(bench, name, "", used_s[0] / (TURNS * bench->seconds / 2), DAEMON_NO_BOUND, 0);
+	daemon_figure(bench, name, "", in_use, DAEMON_NO_BOUND, 0);
+	snprintf(name, sizeof name, "%ux%u: bound, 2 / those in use", side, side);
+	daemon_figure(bench, name, "x", 2 / in_use, DAEMON_NO_BOUND, 0);
 	close_links(links, EQUALS);
 }
 
