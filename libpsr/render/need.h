@@ -10,6 +10,7 @@ struct renderer_need {
 	unsigned n_shadow_lights;
 	int has_sheer;            /* some model has samples that let light through */
 	int n_threads;            /* of the pool */
+	uint64_t n_blocks;        /* of all instances */
 };
 
 /* The most that psr_renderer_bytes() comes to. Measured with a reserve, but for sheer surfaces, whose memory has a bound:

@@ -318,6 +318,7 @@ uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *sce
 	const struct renderer_need need = {
 		.width = request->width, .height = request->height, .pass = request->pass_limit, .n_threads = n_threads,
 		.n_shadow_lights = scene_shadow_lights(scene), .has_sheer = scene_has_sheer(scene),
+		.n_blocks = scene_blocks(scene),
 	};
 
 	return renderer_need(&need) + planes_bytes(request->planes, (uint64_t)request->width * request->height,
