@@ -220,6 +220,7 @@ int cmd_build(int argc, char **argv)
 	wish.build.tolerance = tolerance * PSR_DEGREE;
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
 	wish.import.crease = crease * PSR_DEGREE;
+	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
 	wish.build.on_progress = on_progress;
 	wish.build.userdata = &progress;
 	progress.fd = (int)fd;

@@ -217,6 +217,8 @@ static int read_scene(struct walk *w, struct psr_error *err)
 	w->ignore_normals = is_stl(w->io.scene);
 	rc = add_node(w, w->io.scene->mRootNode, identity, 0, err);
 	if (rc == PSR_OK)
+		rc = import_mesh_merge(w->io.im, err);
+	if (rc == PSR_OK)
 		rc = import_mesh_smooth(w->io.im, err);
 	return rc == PSR_OK ? import_mesh_weld(w->io.im, err) : rc;
 }
