@@ -33,11 +33,20 @@ static int is_name(uint8_t c)
 	return c == 'o' || c == 'g';
 }
 
+/* A line end of its own, as on old Macs. */
+static int has_lone_return(const uint8_t *at, const uint8_t *end)
+{
+	while ((at = memchr(at, '\r', (size_t)(end - at))) != NULL)
+		if (++at == end || *at != '\n')
+			return 1;
+	return 0;
+}
+
 /* Looks at the beginnings of lines only. *n_vertices, *n_faces: how many there are if it is plain. */
 static int looks_plain(const uint8_t *line, const uint8_t *end, uint64_t *n_vertices, uint64_t *n_faces)
 {
 	*n_vertices = *n_faces = 0;
-	if (memchr(line, '\\', (size_t)(end - line)) != NULL)
+	if (memchr(line, '\\', (size_t)(end - line)) != NULL || has_lone_return(line, end))
 		return 0;
 	while (line < end) {
 		const uint8_t *next = memchr(line, '\n', (size_t)(end - line));
@@ -73,7 +82,8 @@ static int read_vertex(struct reader *r)
 	for (int k = 0; k < 3; k++) {
 		const size_t n = next_word(r, &word);
 
-		if (n == 0 || !import_number(&p[k], word, n, r->locale))
+		/* Here # begins a comment; to import_number() it is a part of 1.#QNAN. */
+		if (n == 0 || memchr(word, '#', n) != NULL || !import_number(&p[k], word, n, r->locale))
 			return 0;
 	}
 	return next_word(r, &word) == 0;
@@ -134,8 +144,6 @@ static int read_lines(struct reader *r, struct psr_error *err)
 			rc = key == 'v' ? read_vertex(r) : read_face(r, err);
 		}
 		next = memchr(r->at, '\n', (size_t)(r->end - r->at));
-		if (r->at < r->end && *r->at == '\r' && r->at + 1 != next) /* it ends a line of its own */
-			return 0;
 		r->at = next != NULL ? next + 1 : r->end;
 	}
 	return rc;

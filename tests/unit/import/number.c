@@ -134,7 +134,8 @@ static void forms_of_c_are_read(void **state)
 
 static void other_words_are_refused(void **state)
 {
-	static const char *const texts[] = { "", "-", "+", ".", "e5", "1e", "1e+", "1x", "0x10", "1,5", "--1", "1 ", "nan(1)" };
+	static const char *const texts[] = { "", "-", "+", ".", "e5", "1e", "1e+", "1x", "0x10", "1,5", "--1", "1 ", " 1",
+		                             "\f.5", "nan(1)" };
 	double x;
 
 	(void)state;
