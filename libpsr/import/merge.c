@@ -39,7 +39,7 @@ static uint32_t cell_at(const struct grid *grid, const double p[3])
 		const double at = (p[k] - grid->low[k]) * grid->per_unit;
 		if (!isfinite(p[k]))
 			return NO_CELL;
-		cell = cell * CELLS + (uint32_t)(at < CELLS - 1 ? at : CELLS - 1);
+		cell = cell * CELLS + (uint32_t)(at > 0 ? at < CELLS - 1 ? at : CELLS - 1 : 0);
 	}
 	return cell;
 }
@@ -199,7 +199,8 @@ int import_mesh_merge(struct import_mesh *im, struct psr_error *err)
 		find_places(&grid, mesh);
 		drop_triangles(&grid, mesh);
 		move_vertices(&grid, mesh);
-		import_mesh_warn(im, "triangles much smaller than a pixel were merged: %u became %u", n_before, mesh->n_triangles);
+		import_mesh_warn(im, "triangles much smaller than a pixel were merged: %u became %u", n_before,
+		                 mesh->n_triangles);
 		rc = import_mesh_drop_vertices(im, err);
 	}
 	grid_fini(&grid);

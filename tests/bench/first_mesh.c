@@ -15,7 +15,8 @@
 static void vertex(float p[3], int i)
 {
 	const double theta = PI * (i / COLUMNS) / ROWS, phi = 2 * PI * (i % COLUMNS) / COLUMNS;
-	const double radius = 1 + 0.05 * sin(13 * phi) * sin(11 * theta) + 0.002 * sin(97 * phi + 5 * theta) * sin(89 * theta);
+	const double bumps = 0.05 * sin(13 * phi) * sin(11 * theta);
+	const double radius = 1 + bumps + 0.002 * sin(97 * phi + 5 * theta) * sin(89 * theta);
 
 	p[0] = (float)(radius * sin(theta) * cos(phi));
 	p[1] = (float)(radius * cos(theta));
@@ -136,7 +137,8 @@ static void write_glb(FILE *out)
 
 int first_mesh_write(char *path, size_t n, const char *folder, int format, struct psr_error *err)
 {
-	static const char *const names[FIRST_MESH_FORMATS] = { "text.ply", "binary.ply", "lines.obj", "corners.stl", "arrays.glb" };
+	static const char *const names[FIRST_MESH_FORMATS] = { "text.ply", "binary.ply", "lines.obj", "corners.stl",
+		                                                   "arrays.glb" };
 	FILE *out;
 	int failed;
 

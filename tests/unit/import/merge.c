@@ -54,7 +54,8 @@ static void add_ball(struct import_mesh *im, int rows, int is_shared)
 		}
 	for (int i = 0; i < rows; i++)
 		for (int k = 0; k < COLUMNS; k++, t += 2) {
-			const uint32_t a = first + (uint32_t)(i * COLUMNS + k), b = first + (uint32_t)(i * COLUMNS + (k + 1) % COLUMNS);
+			const uint32_t row = first + (uint32_t)(i * COLUMNS), a = row + (uint32_t)k;
+			const uint32_t b = row + (uint32_t)((k + 1) % COLUMNS);
 			const uint32_t corner[2][3] = { { a, a + COLUMNS, b + COLUMNS }, { a, b + COLUMNS, b } };
 
 			memcpy(im->mesh->triangle[t], corner, sizeof corner);
