@@ -238,6 +238,7 @@ DAEMON_BENCH := $(BUILD)/tests/bench/daemon
 REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
 VIEW_BENCH := $(BUILD)/tests/bench/view
 LATENCY    := $(BUILD)/tests/bench/latency
+FIRST      := $(BUILD)/tests/bench/first
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
@@ -315,11 +316,13 @@ $(VIEW_BENCH): $(VIEW_BENCH_O) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a $(
 $(LATENCY): $(addprefix $(BUILD)/tests/bench/,latency.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a \
 		$(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
+$(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(A)
+	$(link) $(L_CODEC) -lcjson $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
 .PHONY: fuzz fuzz-bin soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
-.PHONY: bench-reproject bench-simd bench-view
+.PHONY: bench-first bench-reproject bench-simd bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -378,6 +381,9 @@ bench-daemon: compile $(DAEMON_BENCH) ## bench-daemon: psrd under many clients b
 
 bench-effects: compile $(EFFECTS) ## bench-effects: what a light, a highlight, a shadow, an instance, ... costs, one by one; table and picture
 	$(Q)$(EFFECTS) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched)
+
+bench-first: compile $(FIRST) ## bench-first: seconds from psr view FILE to its first picture, by step and format (files="scan.ply")
+	$(Q)mkdir -p $(BUILD)/bench-first && $(FIRST) $(abspath $(BIN)) $(BUILD)/bench-first $(files)
 
 bench-model: compile $(BENCH) ## bench-model: build the standard set and the dragon; time, memory, size, adequacy and rays beside targets (only="teapot top")
 	$(Q)$(BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench-model.json $(dragon) $(only)

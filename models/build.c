@@ -168,7 +168,8 @@ int cmd_build(int argc, char **argv)
 		  .help = "The file to write. If not given: IN's name with .psr for its ending." },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
 		  .help = "Use about twice the height of the pictures that you want. Larger pictures show rough edges; twice the figure"
-		          " takes four times the memory.", .min = 8, .max = 8192 },
+		          " takes four times the memory. Up to 64, meshes of more than 131,072 triangles are merged to few: a model"
+		          " for a first look, fast.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = wish.build.up, .arg = "X,Y,Z",
 		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
 		          " usual for the format, +z for LAS, PCD, STL and survey coordinates, +y for the others." },
@@ -220,6 +221,7 @@ int cmd_build(int argc, char **argv)
 	wish.build.tolerance = tolerance * PSR_DEGREE;
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
 	wish.import.crease = crease * PSR_DEGREE;
+	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
 	wish.build.on_progress = on_progress;
 	wish.build.userdata = &progress;
 	progress.fd = (int)fd;

@@ -7,7 +7,7 @@
 #include "psr/error.h"
 
 /* Wish `pixels` as large as the picture, and this for link_wish.coarse_pixels: psrd builds a coarse model first, which
- * takes little more than reading the file. */
+ * takes little more than reading the file (PSR_PREVIEW_RESOLUTION of psr/mesh.h). */
 #define HOME_COARSE_PIXELS 64
 
 struct home;

@@ -98,6 +98,12 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
  * normals of 0,0,0. */
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err);
 
+/* FORMAT: a triangle's vertex or material is out of range. */
+int import_mesh_check_indices(const struct import_mesh *im, struct psr_error *err);
+
+/* Drops vertices that no triangle uses. Indices must be in range. MEMORY. */
+int import_mesh_drop_vertices(struct import_mesh *im, struct psr_error *err);
+
 /* duplicates.c: drops each triangle with the positions, winding and material of an earlier one; *n_dropped: how many.
  * Indices must be in range. MEMORY. */
 int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, struct psr_error *err);
@@ -113,6 +119,12 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum i
                        struct psr_error *err);
 /* Makes triangles use the first of equal vertices; the others stay, unused. */
 int import_mesh_weld(struct import_mesh *im, struct psr_error *err);
+
+/* merge.c: with options.is_preview, and if there are more than 131,072 triangles: moves vertices within a 128th of the
+ * mesh's longest side of each other together, and drops triangles that have no area any more, repeated ones, and unused
+ * vertices. Vertices keep their other attributes; those near corners of larger triangles stay. Readers call it when all
+ * triangles are there, before the next two. Indices must be in range. MEMORY. */
+int import_mesh_merge(struct import_mesh *im, struct psr_error *err);
 
 /* normals.c: makes smooth normals for triangles whose vertices have none. Splits vertices whose corners need different
  * normals; the copies are appended. MEMORY, LIMIT. */

@@ -14,7 +14,7 @@ static int parse_rare(const uint8_t *word, size_t n, locale_t locale, double *x)
 		return 0;
 	memcpy(text, word, n);
 	text[n] = '\0';
-	if (strpbrk(text, "xX(") != NULL)
+	if (strpbrk(text, "xX( \t\n\v\f\r") != NULL) /* strtod takes more than numbers of decimals */
 		return 0;
 	*x = strtod_l(text, &end, locale);
 	if (*end == '#') {

@@ -29,7 +29,7 @@ static int has_area(const double a[3], const double b[3], const double c[3])
 	return n[0] * n[0] + n[1] * n[1] + n[2] * n[2] > 0.0;
 }
 
-static int check_indices(const struct import_mesh *im, struct psr_error *err)
+int import_mesh_check_indices(const struct import_mesh *im, struct psr_error *err)
 {
 	const struct psr_mesh *mesh = im->mesh;
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
@@ -81,7 +81,7 @@ static int drop_doubles(struct import_mesh *im, struct psr_error *err)
 }
 
 /* Unused vertices would widen the bounds, and need not be finite. */
-static int drop_vertices(struct import_mesh *im, struct psr_error *err)
+int import_mesh_drop_vertices(struct import_mesh *im, struct psr_error *err)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
@@ -180,13 +180,13 @@ static void tidy_elements(struct psr_mesh *mesh)
 
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err)
 {
-	int rc = check_indices(im, err);
+	int rc = import_mesh_check_indices(im, err);
 	if (rc == PSR_OK) {
 		drop_triangles(im);
 		rc = drop_doubles(im, err);
 	}
 	if (rc == PSR_OK)
-		rc = drop_vertices(im, err);
+		rc = import_mesh_drop_vertices(im, err);
 	if (rc == PSR_OK)
 		rc = drop_points(im, err);
 	if (rc == PSR_OK)

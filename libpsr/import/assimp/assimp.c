@@ -18,6 +18,7 @@ struct walk {
 	int *material; /* 2 m, 2 m + 1: of the scene's material m without and with vertex colors; -1: not made yet */
 	int (*uv_source)[PSR_UV_SETS];
 	int ignore_normals;
+	int is_plain;  /* the mesh is there, but for its material */
 };
 
 typedef double matrix[3][4];
@@ -215,7 +216,14 @@ static int read_scene(struct walk *w, struct psr_error *err)
 	for (size_t i = 0; i < n; i++)
 		w->material[i] = -1;
 	w->ignore_normals = is_stl(w->io.scene);
-	rc = add_node(w, w->io.scene->mRootNode, identity, 0, err);
+	if (w->is_plain)
+		rc = assimp_material(&w->io, w->io.scene->mMeshes[0]->mMaterialIndex, 0, w->uv_source[0], err);
+	else
+		rc = add_node(w, w->io.scene->mRootNode, identity, 0, err);
+	if (rc > 0)
+		rc = PSR_OK;
+	if (rc == PSR_OK)
+		rc = import_mesh_merge(w->io.im, err);
 	if (rc == PSR_OK)
 		rc = import_mesh_smooth(w->io.im, err);
 	return rc == PSR_OK ? import_mesh_weld(w->io.im, err) : rc;
@@ -240,6 +248,15 @@ static int read_file(struct walk *w, struct psr_error *err)
 	return read_scene(w, err);
 }
 
+static int read_obj(struct walk *w, struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+{
+	const int rc = obj_read_plain(im, bytes, n_bytes, err);
+	w->is_plain = rc == 1;
+	if (rc != 0)
+		return rc < 0 ? rc : PSR_OK;
+	return obj_read(&w->obj, im->path, bytes, n_bytes, err);
+}
+
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
 	struct walk w;
@@ -247,7 +264,12 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 	if (rc != PSR_OK)
 		return rc;
 	memset(&w, 0, sizeof w);
-	rc = obj_is(im->path) ? obj_read(&w.obj, im->path, bytes, n_bytes, err) : PSR_OK;
+	if (obj_is(im->path))
+		rc = read_obj(&w, im, bytes, n_bytes, err);
+	if (w.is_plain) {
+		bytes = (const uint8_t *)OBJ_TRIANGLE;
+		n_bytes = sizeof OBJ_TRIANGLE - 1;
+	}
 	if (rc == PSR_OK && w.obj.n > 0) {
 		bytes = w.obj.text;
 		n_bytes = w.obj.n_text;

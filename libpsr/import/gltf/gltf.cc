@@ -114,7 +114,7 @@ extern "C" int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t 
 		gltf::read_meshes(r);
 		gltf::presets_place(r);
 		gltf::report(r);
-		return PSR_OK;
+		return import_mesh_merge(im, err);
 	} catch (const gltf::failure &f) {
 		return psr_fail(err, f.code, "%s: %s", im->path, f.text.c_str());
 	} catch (const gltf::reported &f) {

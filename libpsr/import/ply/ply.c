@@ -131,6 +131,8 @@ static int read_surface(struct import_mesh *im, struct ply_rows *rows, const str
 			rc = ply_rows_skip(rows, err);
 	}
 	if (rc == PSR_OK)
+		rc = import_mesh_merge(im, err);
+	if (rc == PSR_OK)
 		rc = import_mesh_smooth(im, err);
 	return rc == PSR_OK ? import_mesh_weld(im, err) : rc;
 }

@@ -106,8 +106,12 @@ struct psr_import_options {
 	double crease; /* radians, 0..pi: where faces without normals of their own meet at a greater angle, the edge
 	                * stays sharp */
 	int n_threads; /* 1..256; the result does not depend on it */
+	int is_preview; /* of more than 131,072 triangles, those smaller than a 128th of the mesh's longest side are merged:
+	                 * fast, and fine enough for models of PSR_PREVIEW_RESOLUTION pixels. Thinner things may vanish */
 };
-void psr_import_options_default(struct psr_import_options *options); /* 35 degrees, all cores */
+#define PSR_PREVIEW_RESOLUTION 64
+
+void psr_import_options_default(struct psr_import_options *options); /* 35 degrees, all cores, no preview */
 
 /* Reads any supported file: .gltf and .glb through tinygltf, .ply, .las and .pcd by readers of our own, all others
  * through Assimp; images through libpng, or through OpenImageIO, whose module psr-image-oiio.so is loaded when the first

@@ -416,7 +416,9 @@ static void normals_that_a_file_brings_are_kept_at_any_crease(void **state)
 static void options_outside_of_their_ranges_are_refused(void **state)
 {
 	(void)state;
-	static const struct psr_import_options bad[] = { { -0.1, 1 }, { 3.2, 1 }, { NAN, 1 }, { 0.6, 0 }, { 0.6, 257 } };
+	static const struct psr_import_options bad[] = {
+		{ -0.1, 1, 0 }, { 3.2, 1, 0 }, { NAN, 1, 0 }, { 0.6, 0, 0 }, { 0.6, 257, 0 },
+	};
 
 	n_soup = 0;
 	cube();

@@ -8,6 +8,7 @@
 #include <math.h>
 #include "base/srgb.h"
 #include "files.h"
+#include "import/assimp/obj.h"
 
 #define SIDE 60
 
@@ -131,6 +132,87 @@ static void a_vertex_that_is_no_number_is_refused_with_its_line(void **state)
 	refuse("bad.obj", PSR_ERR_FORMAT, "line 5: \"1x\" is no number");
 }
 
+/* With a coordinate of a texture that no face uses, Assimp reads it. */
+static void assert_plain_as_through_assimp(const char *text, int is_plain)
+{
+	struct import_mesh im;
+	struct psr_error err;
+	char other[2048];
+
+	assert_int_equal(import_mesh_init(&im, "plain.obj", &err), PSR_OK);
+	if (obj_read_plain(&im, (const uint8_t *)text, strlen(text), &err) != is_plain)
+		fail_msg("this is%s plain:\n%s", is_plain ? "" : " not", text);
+	assert_int_equal(im.mesh->n_triangles > 0, is_plain);
+	import_mesh_fini(&im);
+
+	snprintf(other, sizeof other, "vt 0 0\n%s", text);
+	write_text("plain.obj", text);
+	write_text("other.obj", other);
+	struct psr_mesh *a = import("plain.obj"), *b = import("other.obj");
+
+	assert_int_equal(a->n_triangles, b->n_triangles);
+	assert_int_equal(a->n_vertices, b->n_vertices);
+	assert_int_equal(a->n_dropped_triangles, b->n_dropped_triangles);
+	assert_int_equal(a->n_dropped_primitives, b->n_dropped_primitives);
+	assert_int_equal(a->n_materials, b->n_materials);
+	assert_memory_equal(a->material, b->material, sizeof *a->material);
+	assert_string_equal(a->warning, b->warning);
+	assert_null(a->color);
+	assert_null(a->uv[0]);
+	for (uint32_t i = 0; i < 3 * a->n_triangles; i++) {
+		const uint32_t v = a->triangle[i / 3][i % 3], w = b->triangle[i / 3][i % 3];
+
+		assert_int_equal(a->triangle_material[i / 3], 0);
+		assert_memory_equal(a->position[v], b->position[w], sizeof *a->position);
+		assert_memory_equal(a->normal[v], b->normal[w], sizeof *a->normal);
+	}
+	psr_mesh_destroy(a);
+	psr_mesh_destroy(b);
+}
+
+#define CUBE \
+	"v 0.1 0 0\nv 1 0 0\nv 1 1 0\nv 0.1 1 0\nv 0.1 0 1\nv 1 0 1\nv 1 1 1.00000000000000001\nv 0.1 1 1\n" \
+	"f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+
+static void a_plain_file_gives_the_mesh_that_assimp_gives(void **state)
+{
+	(void)state;
+	static const char *const plain[] = {
+		CUBE,
+		"# a cube\no cube\ng all\ns 1\n" CUBE "s off\n# the end",
+		"v 0 0 0\r\nv 4 0 0 \r\nv 4 4 0\r\nv 2 1 0\r\nv 0 4 0\r\n\r\nf 1 2 3 4 5\r\n", /* not convex */
+		"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv nan 0 0\nf 1 2 3\nf 4 2 3\nf 1 1 2\nf 5 2 3\n",
+		"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 1 1 1\nf 2 4 3",
+	};
+	static const char *const other[] = {
+		CUBE "g top\nf 5 6 7\n",
+		CUBE "f 1 2\nl 1 2\n",
+		CUBE "usemtl red\nf 5 7 6\n",
+		CUBE "f -1 -2 -3\n",
+		"v 0 0 0\nv 1 0 0\nv 1.5 1 2#0 7\nf 1 2 3\n",
+		"v 0 0 0\nv 1 0 0\n# old\rv 0 1 0\nv 0 0 1\nf 1 2 3\n",
+		"v 0 0 0\nv 1 0 0\nv 0 1 0 # up\nf 1 \\\n2 3\n",
+	};
+
+	for (size_t i = 0; i < sizeof plain / sizeof plain[0]; i++)
+		assert_plain_as_through_assimp(plain[i], 1);
+	for (size_t i = 0; i < sizeof other / sizeof other[0]; i++)
+		assert_plain_as_through_assimp(other[i], 0);
+}
+
+static void a_plain_file_with_a_wrong_index_is_refused(void **state)
+{
+	(void)state;
+	static const char *const faces[] = { "f 1 2 9\n", "f 1 2 99999999999999999999\n", "f 1 2 4294967297\n" };
+	char text[256];
+
+	for (size_t i = 0; i < sizeof faces / sizeof faces[0]; i++) {
+		snprintf(text, sizeof text, "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n%s", faces[i]);
+		write_text("index.obj", text);
+		refuse("index.obj", PSR_ERR_FORMAT, "");
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -140,6 +222,8 @@ int main(void)
 		cmocka_unit_test(indices_from_the_end_are_counted_in_vertices),
 		cmocka_unit_test(a_vertex_that_is_not_finite_costs_its_faces_only),
 		cmocka_unit_test(a_vertex_that_is_no_number_is_refused_with_its_line),
+		cmocka_unit_test(a_plain_file_gives_the_mesh_that_assimp_gives),
+		cmocka_unit_test(a_plain_file_with_a_wrong_index_is_refused),
 	};
 
 	return cmocka_run_group_tests_name("import_obj", tests, make_folder, remove_folder);
