@@ -7,6 +7,7 @@
 cat >"$work/rooms" <<'END'
 libpsr/include
 libpsr/base
+libpsr/compare
 libpsr/model
 libpsr/simd
 libpsr/render
