@@ -1,7 +1,6 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "client/cli/cli.h"
-#include "client/lib/camera.h"
 #include "client/replay/replay.h"
 #include "draw.h"
 #include "series.h"

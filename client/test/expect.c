@@ -181,36 +181,37 @@ static int has_color_metric(const struct expect *e)
 	return e->has[EXPECT_PSNR] || e->has[EXPECT_SSIM] || e->has[EXPECT_FLIP] || e->has[EXPECT_OFF];
 }
 
-static int check_error(const struct expect *e, struct psr_error *err)
+int expect_wants_hash(const struct expect *expect)
 {
-	int n = e->reference != NULL || e->depth != NULL || e->of != NULL;
-
 	for (int i = 0; i < PSR_N_PLANES; i++)
-		n += e->hash[i].text != NULL;
-	return n == 0 ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "error excludes hash, reference, depth and time: there is no picture");
+		if (expect->hash[i].text != NULL)
+			return 1;
+	return 0;
+}
+
+static int wants_picture(const struct expect *e)
+{
+	return e->reference != NULL || e->depth != NULL || e->of != NULL || expect_wants_hash(e);
 }
 
 int expect_check(struct expect *e, uint32_t n_pictures, struct psr_error *err)
 {
-	int code = PSR_OK, n = e->reference != NULL || e->depth != NULL || e->of != NULL || e->error != PSR_OK;
+	int code = PSR_OK;
 
-	for (int i = 0; i < PSR_N_PLANES && code == PSR_OK; i++) {
-		if (e->hash[i].text == NULL)
-			continue;
-		n++;
-		code = read_hashes(&e->hash[i], n_pictures, err);
-	}
+	if (e->error != PSR_OK && wants_picture(e))
+		return psr_fail(err, PSR_ERR_ARG, "error excludes hash, reference, depth and time: there is no picture");
+	for (int i = 0; i < PSR_N_PLANES && code == PSR_OK; i++)
+		if (e->hash[i].text != NULL)
+			code = read_hashes(&e->hash[i], n_pictures, err);
 	if (code != PSR_OK)
 		return code;
-	if (n == 0)
+	if (e->error == PSR_OK && !wants_picture(e))
 		return psr_fail(err, PSR_ERR_ARG, "the test expects nothing; it needs hash, reference, depth, time or error");
 	if (e->reference == NULL && (has_color_metric(e) || e->is_exact))
 		return psr_fail(err, PSR_ERR_ARG, "exact, psnr, ssim, flip and off compare with a picture; reference=FILE says "
 		                "which");
 	if ((e->depth != NULL) != (e->has[EXPECT_DEPTH] > 0))
 		return psr_fail(err, PSR_ERR_ARG, "depth=FILE and depth-rmse=MOST go together");
-	if (e->error != PSR_OK)
-		return check_error(e, err);
 	if (e->reference != NULL && !has_color_metric(e))
 		e->is_exact = 1;
 	if (e->reference != NULL)

@@ -44,5 +44,6 @@ void expect_fini(struct expect *expect);
 
 /* Returns the planes that are needed: bits of enum psr_plane. */
 uint32_t expect_planes(const struct expect *expect);
+int expect_wants_hash(const struct expect *expect);
 
 #endif
