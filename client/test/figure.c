@@ -112,15 +112,20 @@ static struct compare_box with_margin(const struct compare_box *box, uint32_t wi
 	return (struct compare_box){ x, y, (right < width ? right : width) - x, (bottom < height ? bottom : height) - y };
 }
 
-/* A column: the picture, and below it its box enlarged. */
+/* A column: the picture with its box outlined, and below it the box enlarged. */
 static int print_column(const struct figure *figure, const char *title, const uint8_t *rgb, struct psr_error *err)
 {
 	const struct compare_box *box = &figure->box;
 	struct psr_frame frame = { .width = figure->width, .height = figure->height, .rgb = (uint8_t *)rgb };
 	int code;
 
-	fprintf(figure->to, "<figure><figcaption>%s</figcaption>", title);
+	fprintf(figure->to, "<figure><figcaption>%s</figcaption><span>", title);
 	code = print_image(figure->to, &frame, 1, err);
+	if (box->width > 0)
+		fprintf(figure->to, "<i style=\"left:%.2f%%;top:%.2f%%;width:%.2f%%;height:%.2f%%\"></i>",
+		        100.0 * box->x / figure->width, 100.0 * box->y / figure->height, 100.0 * box->width / figure->width,
+		        100.0 * box->height / figure->height);
+	fputs("</span>", figure->to);
 	if (code == PSR_OK && box->width > 0) {
 		frame = (struct psr_frame){ .width = box->width, .height = box->height,
 			                        .rgb = malloc(3 * (size_t)box->width * box->height) };

@@ -23,7 +23,8 @@ static void check_hashes(struct result *result, const struct judge *judge, const
 		if (!end->has_hashes)
 			result_fail(result, "the server tells no hashes");
 		else if (hash->value == NULL)
-			result_fail(result, "%s has the hash %016" PRIx64 "; --accept takes it", psr_plane_name(i), end->hash[i]);
+			result_fail(result, "%s has the hash %016" PRIx64 ", and the suite knows none yet", psr_plane_name(i),
+			            end->hash[i]);
 		else if (hash->value[judge->k] != end->hash[i])
 			result_fail(result, "%s has the hash %016" PRIx64 " instead of %016" PRIx64, psr_plane_name(i), end->hash[i],
 			            hash->value[judge->k]);
@@ -86,7 +87,7 @@ static int read_color(struct psr_frame *reference, struct result *result, const 
 	if (code == PSR_ERR_MEMORY)
 		return psr_fail(err, code, "%s", why.text);
 	if (code == PSR_ERR_NOT_FOUND)
-		result_fail(result, "the reference %.200s is not there; --accept writes it", path);
+		result_fail(result, "the reference %.200s is not there yet", path);
 	else if (code != PSR_OK)
 		result_fail(result, "the reference cannot be read: %.300s", why.text);
 	if (code != PSR_OK || (reference->width == picture->width && reference->height == picture->height))
@@ -107,7 +108,7 @@ static int read_depth(float **depth, struct result *result, const char *path, co
 	if (code == PSR_ERR_MEMORY)
 		return psr_fail(err, code, "%s", why.text);
 	if (code == PSR_ERR_NOT_FOUND)
-		result_fail(result, "the reference %.200s is not there; --accept writes it", path);
+		result_fail(result, "the reference %.200s is not there yet", path);
 	else if (code != PSR_OK)
 		result_fail(result, "the reference cannot be read: %.300s", why.text);
 	if (code != PSR_OK || (width == picture->width && height == picture->height))

@@ -9,7 +9,9 @@ void page_begin(FILE *to)
 	      "p { margin: 0 0 .6em }\n"
 	      "div { display: flex; flex-wrap: wrap; gap: 1em } figure { margin: 0 }\n"
 	      "figcaption { color: #666; font-size: 13px }\n"
-	      "img { display: block; margin-bottom: .6em; image-rendering: pixelated; background: #888 }\n"
+	      "img { display: block; max-width: 100%; height: auto; image-rendering: pixelated }\n"
+	      "span { display: inline-block; position: relative; margin-bottom: .6em }\n"
+	      "i { position: absolute; box-sizing: border-box; border: 1px solid #f0f }\n"
 	      "</style>\n</head>\n<body>\n<h1>psr test</h1>\n", to);
 }
 

@@ -74,13 +74,15 @@ void report_suite(struct report *report, const struct results *results, const st
 	for (uint32_t i = 0; i < suite->n_tests; i++)
 		for (uint32_t k = 0; results->is_chosen[i] && k < suite->test[i].n_pictures; k++) {
 			struct result *result = &results->of[results->first[i] + k];
+			const int is_drawn = result->outcome != OUTCOME_NONE;
 
-			if (result->outcome == OUTCOME_NONE)
+			if (!is_drawn)
 				result_fail(result, "not drawn: %.400s", why != NULL ? why->text : "the run ended before");
 			report->n_passed += result->outcome == OUTCOME_PASSED;
 			report->n_failed += result->outcome == OUTCOME_FAILED;
 			report->n_accepted += result->outcome == OUTCOME_ACCEPTED;
-			print_result(report, results, &suite->test[i], k, result);
+			if (is_drawn || report->is_tap) /* one line on standard error tells people */
+				print_result(report, results, &suite->test[i], k, result);
 		}
 	if (report->junit != NULL)
 		junit_suite(report->junit_file.stream, results);
