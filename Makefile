@@ -259,7 +259,7 @@ $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
 STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_create ZSTD_createCCtx ZSTD_createDCtx tjInitCompress
 $(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
-$(call unit_bin,tests/unit/client/wish.c): $(CLIENT_PARTS)
+$(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c): $(CLIENT_PARTS)
 $(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(VIEW_O) $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
@@ -270,6 +270,7 @@ FUZZ_MAIN := $(if $(filter fuzz,$(config)),,$(BUILD)/tests/fuzz/main.c.o)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(A)
 	$(link) $(L_TEST)
 $(BUILD)/tests/fuzz/server_session: $(SERVER_PARTS)
+$(BUILD)/tests/fuzz/client_suite: $(CLIENT_PARTS)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a

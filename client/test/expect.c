@@ -194,7 +194,7 @@ static int wants_picture(const struct expect *e)
 	return e->reference != NULL || e->depth != NULL || e->of != NULL || expect_wants_hash(e);
 }
 
-int expect_check(struct expect *e, uint32_t n_pictures, struct psr_error *err)
+int expect_finish(struct expect *e, uint32_t n_pictures, struct psr_error *err)
 {
 	int code = PSR_OK;
 

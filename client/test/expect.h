@@ -39,7 +39,7 @@ void expect_init(struct expect *expect);
 void expect_add_options(struct optlist *list, struct expect_reader *reader);
 
 /* Checks what does not depend on other tests, and reads the hashes of n pictures. ARG, MEMORY. */
-int expect_check(struct expect *expect, uint32_t n_pictures, struct psr_error *err);
+int expect_finish(struct expect *expect, uint32_t n_pictures, struct psr_error *err);
 void expect_fini(struct expect *expect);
 
 /* Returns the planes that are needed: bits of enum psr_plane. */

@@ -102,7 +102,7 @@ static int check_test(struct suite *suite, struct suite_test *test, struct psr_e
 	if (code == PSR_OK)
 		code = quality_apply(&test->frame, &test->quality, err);
 	if (code == PSR_OK)
-		code = expect_check(&test->expect, test->n_pictures, err);
+		code = expect_finish(&test->expect, test->n_pictures, err);
 	if (code == PSR_OK)
 		finish_request(test);
 	return code;
