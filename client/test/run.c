@@ -124,10 +124,16 @@ static int wait_for_one(struct way *way, struct psr_error *err)
 	return psr_fail(err, PSR_ERR_INTERNAL, "a frame came that this program did not request");
 }
 
+static unsigned most_open(const struct run *run)
+{
+	const unsigned max_open = psr_client_welcome(run->client)->max_open;
+
+	return max_open < MAX_UNDER_WAY ? max_open : MAX_UNDER_WAY;
+}
+
 static int send_one(struct way *way, const struct request *request, uint32_t test, uint32_t k, struct psr_error *err)
 {
-	const unsigned max_open = psr_client_welcome(way->run->client)->max_open;
-	const unsigned most = max_open < MAX_UNDER_WAY ? max_open : MAX_UNDER_WAY;
+	const unsigned most = most_open(way->run);
 	int code = PSR_ERR_BUSY;
 
 	while (code == PSR_ERR_BUSY) {
@@ -152,8 +158,12 @@ static int start_test(struct way *way, uint32_t test, struct psr_error *err)
 	const struct suite_test *of = &run->results->suite->test[test];
 	struct request request;
 	uint32_t k = 0;
-	int code = request_open(&request, run, of, err);
+	int code = PSR_OK;
 
+	while (way->n_open >= most_open(run)) /* opening a model is a request, too */
+		if ((code = wait_for_one(way, err)) != PSR_OK)
+			return code;
+	code = request_open(&request, run, of, err);
 	while (code == PSR_OK && k < of->n_pictures) {
 		code = send_one(way, &request, test, k, err);
 		k += code == PSR_OK;
