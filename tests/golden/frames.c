@@ -77,6 +77,7 @@ static void draw(struct golden *out, const struct shot *shot, const struct way *
 	struct psr_error err;
 	psr_settings_default(&settings, shot->size[0], shot->size[1]);
 	settings.is_smooth = shot->is_smooth;
+	settings.pass = shot->n_passes;
 	if (!frame.rgb || !frame.depth || psr_render(way->renderer, &shot->scene, &settings, way->pool, &frame, &err))
 		stop(shot->name, frame.rgb && frame.depth ? err.text : "no memory");
 	out->color = psr_frame_hash(&frame, PSR_PLANE_COLOR);

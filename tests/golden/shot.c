@@ -17,6 +17,7 @@ struct words {
 	const char *name, *model, *color, *depth;
 	uint32_t size[2];
 	int is_smooth, is_plain;
+	int64_t n_passes;
 	struct psr_camera_wish wish;
 	double fov, ortho, ambient;
 	int has_ortho, has_ambient;
@@ -81,6 +82,7 @@ static int end_shot(struct reader *reader, struct psr_error *err)
 	snprintf(shot.model, sizeof shot.model, "%s", now->model ? now->model : "");
 	memcpy(shot.size, now->size, sizeof shot.size);
 	shot.is_smooth = !now->is_plain;
+	shot.n_passes = (unsigned)now->n_passes;
 	shot.instance = (struct psr_instance){ .model = reader->open(shot.model), .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	if (!shot.instance.model)
 		return psr_fail(err, PSR_ERR_NOT_FOUND, "there is no model '%s'", shot.model);
@@ -150,6 +152,7 @@ int shots_read(const char *path, const struct psr_model *(*open)(const char *nam
 		{ .name = "ambient", .type = PSR_OPT_REAL, .value = &now->ambient, .seen = &now->has_ambient },
 		{ .name = "smooth", .type = PSR_OPT_FLAG, .value = &now->is_smooth },
 		{ .name = "no-smooth", .type = PSR_OPT_FLAG, .value = &now->is_plain },
+		{ .name = "passes", .type = PSR_OPT_INT, .value = &now->n_passes },
 		{ .name = "background", .type = PSR_OPT_COLOR, .value = now->background },
 		{ .name = NULL },
 	};

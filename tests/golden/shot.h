@@ -11,6 +11,7 @@ struct shot {
 	char name[SHOT_NAME_BYTES], model[SHOT_NAME_BYTES];
 	uint32_t size[2];
 	int is_smooth;
+	unsigned n_passes;
 	struct psr_scene scene; /* of instance and light below: the shot must stay where it is */
 	struct psr_instance instance;
 	struct psr_light light[SHOT_MAX_LIGHTS];
