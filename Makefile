@@ -124,7 +124,7 @@ L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
 
-.PHONY: all demo figures latency viewer-picture studies test test-all models models-all install help clean deps compile
+.PHONY: all demo figures latency mutations viewer-picture studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -407,6 +407,10 @@ figures: deps ## figures: install what is missing, build, draw the thesis's figu
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/figures.sh
 
+mutations: compile $(GOLDEN) ## mutations: spoil a copy of psr in twelve places, one by one; which suites see it; renews docs/mutations.md (minutes)
+	$(Q)tests/tools/mutations $(only) >$(BUILD)/mutations.txt
+	$(Q)docs/put-table.sh docs/mutations.md mutations $(BUILD)/mutations.txt
+
 viewer-picture: deps ## viewer-picture: install what is missing, build, renew docs/viewer.png: psr view at work on the engine
 	$(Q).ci/deps xvfb xdotool python3
 	$(Q)$(MAKE) --no-print-directory compile
@@ -427,12 +431,13 @@ BASH_COMPLETION := $(PREFIX)/share/bash-completion/completions
 
 install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
-	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
+	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man5
 	install $(addprefix $(BIN)/,psrd psr psr-model) $(wildcard $(BIN)/psr-view $(BIN)/psr-view-term) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 docs/man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
 	install -d $(DESTDIR)$(BASH_COMPLETION) $(DESTDIR)$(PREFIX)/share/zsh/site-functions
 	install -m 644 client/completion/psr.bash $(DESTDIR)$(BASH_COMPLETION)/psr
 	for name in psr-model psrd psr-view psr-view-term; do ln -sf psr $(DESTDIR)$(BASH_COMPLETION)/$$name || exit 1; done

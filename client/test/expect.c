@@ -16,6 +16,11 @@ void expect_init(struct expect *expect)
 		expect->bound[i] = NAN;
 }
 
+void expect_begin(struct expect *expect)
+{
+	memset(expect->is_said, 0, sizeof expect->is_said);
+}
+
 void expect_fini(struct expect *expect)
 {
 	for (int i = 0; i < PSR_N_PLANES; i++)
@@ -112,18 +117,18 @@ void expect_add_options(struct optlist *list, struct expect_reader *reader)
 	const struct psr_opt opts[] = {
 		{ .name = "hash", .type = PSR_OPT_CALL, .value = reader, .arg = "[PLANE:]HASH", .call = on_hash },
 		{ .name = "reference", .type = PSR_OPT_STRING, .value = &e->reference, .arg = "FILE" },
-		{ .name = "exact", .type = PSR_OPT_FLAG, .value = &e->is_exact, .seen = &e->has[EXPECT_EXACT] },
+		{ .name = "exact", .type = PSR_OPT_FLAG, .value = &e->is_exact, .seen = &e->is_said[EXPECT_EXACT] },
 		{ .name = "psnr", .type = PSR_OPT_REAL, .value = &e->bound[EXPECT_PSNR], .arg = "DB", .min = 0, .max = 1000,
-		  .seen = &e->has[EXPECT_PSNR] },
+		  .seen = &e->is_said[EXPECT_PSNR] },
 		{ .name = "ssim", .type = PSR_OPT_REAL, .value = &e->bound[EXPECT_SSIM], .arg = "LEAST", .min = -1, .max = 1,
-		  .seen = &e->has[EXPECT_SSIM] },
+		  .seen = &e->is_said[EXPECT_SSIM] },
 		{ .name = "flip", .type = PSR_OPT_REAL, .value = &e->bound[EXPECT_FLIP], .arg = "MOST", .min = 0, .max = 1,
-		  .seen = &e->has[EXPECT_FLIP] },
+		  .seen = &e->is_said[EXPECT_FLIP] },
 		{ .name = "off", .type = PSR_OPT_CALL, .value = reader, .arg = "CODES:SHARE%", .call = on_off,
-		  .seen = &e->has[EXPECT_OFF] },
+		  .seen = &e->is_said[EXPECT_OFF] },
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &e->depth, .arg = "FILE" },
 		{ .name = "depth-rmse", .type = PSR_OPT_REAL, .value = &e->bound[EXPECT_DEPTH], .arg = "MOST", .min = 0,
-		  .max = PSR_WIRE_MAX_LENGTH, .seen = &e->has[EXPECT_DEPTH] },
+		  .max = PSR_WIRE_MAX_LENGTH, .seen = &e->is_said[EXPECT_DEPTH] },
 		{ .name = "time", .type = PSR_OPT_CALL, .value = reader, .arg = "RATIO,of=TEST[,n=N]", .call = on_time },
 		{ .name = "error", .type = PSR_OPT_CALL, .value = reader, .arg = "CODE", .call = on_error },
 	};
@@ -176,9 +181,16 @@ static int check_file(const char *word, const char *name, const char *ending, ui
 	return PSR_OK;
 }
 
-static int has_color_metric(const struct expect *e)
+static int says_color_bound(const struct expect *e)
 {
-	return e->has[EXPECT_PSNR] || e->has[EXPECT_SSIM] || e->has[EXPECT_FLIP] || e->has[EXPECT_OFF];
+	return e->is_said[EXPECT_EXACT] || e->is_said[EXPECT_PSNR] || e->is_said[EXPECT_SSIM] || e->is_said[EXPECT_FLIP]
+	       || e->is_said[EXPECT_OFF];
+}
+
+static int has_color_bound(const struct expect *e)
+{
+	return !isnan(e->bound[EXPECT_PSNR]) || !isnan(e->bound[EXPECT_SSIM]) || !isnan(e->bound[EXPECT_FLIP])
+	       || !isnan(e->bound[EXPECT_OFF]);
 }
 
 int expect_wants_hash(const struct expect *expect)
@@ -207,12 +219,12 @@ int expect_finish(struct expect *e, uint32_t n_pictures, struct psr_error *err)
 		return code;
 	if (e->error == PSR_OK && !wants_picture(e))
 		return psr_fail(err, PSR_ERR_ARG, "the test expects nothing; it needs hash, reference, depth, time or error");
-	if (e->reference == NULL && (has_color_metric(e) || e->is_exact))
+	if (e->reference == NULL && says_color_bound(e))
 		return psr_fail(err, PSR_ERR_ARG, "exact, psnr, ssim, flip and off compare with a picture; reference=FILE says "
 		                "which");
-	if ((e->depth != NULL) != (e->has[EXPECT_DEPTH] > 0))
+	if (e->depth != NULL ? isnan(e->bound[EXPECT_DEPTH]) : e->is_said[EXPECT_DEPTH])
 		return psr_fail(err, PSR_ERR_ARG, "depth=FILE and depth-rmse=MOST go together");
-	if (e->reference != NULL && !has_color_metric(e))
+	if (e->reference != NULL && !has_color_bound(e))
 		e->is_exact = 1;
 	if (e->reference != NULL)
 		code = check_file("reference", e->reference, ".png", n_pictures, err);

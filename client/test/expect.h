@@ -17,8 +17,8 @@ struct expect_hash {
 struct expect {
 	struct expect_hash hash[PSR_N_PLANES];
 	const char *reference, *depth; /* files, numbered where there are several pictures; NULL: none */
-	int has[EXPECT_N_METRICS];     /* how often each was said */
-	double bound[EXPECT_N_METRICS];
+	double bound[EXPECT_N_METRICS]; /* NAN: none. Bounds without a reference are defaults, and not used */
+	int is_said[EXPECT_N_METRICS]; /* how often the test itself said the bound, beside the defaults */
 	int is_exact;
 	unsigned off_codes;
 	const char *of;                /* the test whose time is compared; NULL: none */
@@ -36,6 +36,7 @@ struct expect_reader {
 };
 
 void expect_init(struct expect *expect);
+void expect_begin(struct expect *expect); /* what it has is defaults: words of a test follow */
 void expect_add_options(struct optlist *list, struct expect_reader *reader);
 
 /* Checks what does not depend on other tests, and reads the hashes of n pictures. ARG, MEMORY. */

@@ -52,6 +52,7 @@ static void test_fini(struct suite_test *test)
 static int test_init(struct suite_test *to, const struct suite_test *defaults, struct psr_error *err)
 {
 	*to = *defaults;
+	expect_begin(&to->expect);
 	return scene_wish_copy(&to->scene, &defaults->scene, err);
 }
 

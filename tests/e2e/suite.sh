@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # psr test: a suite with one of each failure, its page, accepting, and what ends a run.
 . "$(dirname "$0")/lib.sh"
 golden=$PWD/tests/golden

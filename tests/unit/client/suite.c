@@ -102,6 +102,19 @@ static void metrics_have_bounds(void **state)
 	assert_int_equal(suite->test[3].expect.error, PSR_ERR_LIMIT);
 }
 
+static void bounds_may_be_defaults_of_tests_without_a_reference(void **state)
+{
+	(void)state;
+	assert_int_equal(parse("model=x psnr=45 depth-rmse=2\n"
+	                       "test=a hash=?\n"
+	                       "test=b reference=b.png\n"
+	                       "test=c reference=b.png psnr=30\n"
+	                       "test=d depth=d.pfm\n"), PSR_OK);
+	assert_true(suite->test[1].expect.bound[EXPECT_PSNR] == 45 && !suite->test[1].expect.is_exact);
+	assert_true(suite->test[2].expect.bound[EXPECT_PSNR] == 30);
+	assert_true(suite->test[3].expect.bound[EXPECT_DEPTH] == 2);
+}
+
 static void errors_have_a_place_and_say_what_would_be_right(void **state)
 {
 	static const struct {
@@ -171,6 +184,7 @@ int main(void)
 		cmocka_unit_test_teardown(a_test_may_have_several_pictures, tear_down),
 		cmocka_unit_test_teardown(expectations_say_which_planes_are_drawn, tear_down),
 		cmocka_unit_test_teardown(metrics_have_bounds, tear_down),
+		cmocka_unit_test_teardown(bounds_may_be_defaults_of_tests_without_a_reference, tear_down),
 		cmocka_unit_test_teardown(errors_have_a_place_and_say_what_would_be_right, tear_down),
 		cmocka_unit_test_teardown(patterns_choose_tests, tear_down),
 	};
