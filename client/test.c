@@ -59,7 +59,8 @@ static int parse(struct wish *wish, int argc, char **argv, int *n_suites, struct
 	};
 	const struct psr_cli cli = {
 		"psr test [--server ADDR | --models DIR] [--only PATTERN] [--html FILE] SUITE...",
-		"Draws the pictures of test suites and compares them with what is expected. Prints a line for each that failed.",
+		"Draws the pictures of test suites and compares them with what is expected. Prints a line for each that "
+		"failed.",
 		list.opt,
 		footer,
 	};

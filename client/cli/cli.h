@@ -9,8 +9,8 @@
 #define PSR_PROGRAM "psr " PSR_VERSION
 
 #define PSR_EXIT_CODES \
-	"exit codes: 0 done, 1 a frame of bench failed, 2 usage, 3 file or system, 4 bad data, 5 over a limit,\n" \
-	"6 server or connection, 7 a defect of psr"
+	"exit codes: 0 done, 1 a frame of bench or a test failed, 2 usage, 3 file or system, 4 bad data,\n" \
+	"5 over a limit, 6 server or connection, 7 a defect of psr"
 
 #define PSR_OPT_SERVER(variable) \
 	{ .name = "server", .letter = 's', .type = PSR_OPT_STRING, .value = &(variable), .arg = "ADDR", \

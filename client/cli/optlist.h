@@ -16,8 +16,8 @@ void optlist_heading(struct optlist *list, const char *heading, const char *text
 
 #define OPTLIST_ADD(list, opts) optlist_add(list, opts, (int)(sizeof(opts) / sizeof(opts)[0]))
 
-/* A file of words `name=value`, options of `cli`. Blanks separate words, "..." keeps blanks, `name` alone sets a flag, #
- * begins a comment. Errors name the path and the place: `cameras.txt:3:14: ...`. */
+/* A file of words `name=value`, options of `cli`. Blanks separate words, "..." keeps blanks, `name` alone sets a flag,
+ * # begins a comment. Errors name the path and the place: `cameras.txt:3:14: ...`. */
 struct wordfile {
 	const char *path;
 	const struct psr_cli *cli;

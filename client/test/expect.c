@@ -40,8 +40,8 @@ static int on_hash(const char *text, void *userdata, struct psr_error *err)
 		       && (strlen(psr_plane_name(plane)) != n || memcmp(psr_plane_name(plane), text, n) != 0))
 			plane++;
 		if (plane == PSR_N_PLANES)
-			return psr_fail(err, PSR_ERR_ARG, "there is no plane '%.*s'; there are color, depth, normal, id, weight, words "
-			                "and block", (int)(n < 40 ? n : 40), text);
+			return psr_fail(err, PSR_ERR_ARG, "there is no plane '%.*s'; there are color, depth, normal, id, weight, "
+			                "words and block", (int)(n < 40 ? n : 40), text);
 		text += n + 1;
 	}
 	if (strcmp(text, "?") != 0 && strspn(text, "0123456789abcdef,") != strlen(text))
@@ -60,8 +60,8 @@ static int on_off(const char *text, void *userdata, struct psr_error *err)
 	if (psr_parse_real(text, &codes, &at, NULL) != PSR_OK || !(codes >= 0 && codes <= 255) || codes != floor(codes)
 	    || *at != ':' || psr_parse_real(at + 1, &share, &at, NULL) != PSR_OK || strcmp(at, "%") != 0
 	    || !(share >= 0 && share <= 100))
-		return psr_fail(err, PSR_ERR_ARG, "'%.40s' is not CODES:SHARE%%, such as 16:0.1%% for at most 0.1 %% of the pixels "
-		                "off by more than 16 of 255 codes", text);
+		return psr_fail(err, PSR_ERR_ARG, "'%.40s' is not CODES:SHARE%%, such as 16:0.1%% for at most 0.1 %% of the "
+		                "pixels off by more than 16 of 255 codes", text);
 	expect->off_codes = (unsigned)codes;
 	expect->bound[EXPECT_OFF] = share / 100;
 	return PSR_OK;
@@ -77,8 +77,8 @@ static int on_time(const char *text, void *userdata, struct psr_error *err)
 
 	if (psr_parse_real(text, &expect->ratio, &at, NULL) != PSR_OK || !(expect->ratio > 0)
 	    || strncmp(at, ",of=", 4) != 0 || at[4] == '\0' || at[4] == ',')
-		return psr_fail(err, PSR_ERR_ARG, "'%.60s' is not RATIO,of=TEST[,n=N], such as 0.5,of=large for half of the time of "
-		                "the test `large`", text);
+		return psr_fail(err, PSR_ERR_ARG, "'%.60s' is not RATIO,of=TEST[,n=N], such as 0.5,of=large for half of the time "
+		                "of the test `large`", text);
 	expect->of = at + 4;
 	n = strchr(expect->of, ',');
 	if (n != NULL && (strncmp(n, ",n=", 3) != 0 || psr_parse_real(n + 3, &draws, &at, NULL) != PSR_OK || *at != '\0'
@@ -152,8 +152,8 @@ static int read_hashes(struct expect_hash *hash, uint32_t n, struct psr_error *e
 		const size_t digits = strcspn(at, ",");
 
 		if (digits != HASH_DIGITS)
-			return psr_fail(err, PSR_ERR_ARG, "hash: '%.*s' has %zu digits instead of %d", (int)(digits < 40 ? digits : 40),
-			                at, digits, HASH_DIGITS);
+			return psr_fail(err, PSR_ERR_ARG, "hash: '%.*s' has %zu digits instead of %d",
+			                (int)(digits < 40 ? digits : 40), at, digits, HASH_DIGITS);
 		if (k < n)
 			hash->value[k] = strtoull(at, NULL, 16); /* stops at the comma */
 		at += digits;
@@ -162,8 +162,8 @@ static int read_hashes(struct expect_hash *hash, uint32_t n, struct psr_error *e
 		at++;
 	}
 	if (k + 1 != n)
-		return psr_fail(err, PSR_ERR_ARG, "hash: there are %u for %u pictures; ? stands for all of them while they are not "
-		                "known", k + 1, n);
+		return psr_fail(err, PSR_ERR_ARG, "hash: there are %u for %u pictures; ? stands for all of them while they are "
+		                "not known", k + 1, n);
 	return PSR_OK;
 }
 
@@ -174,8 +174,8 @@ static int check_file(const char *word, const char *name, const char *ending, ui
 	if (n > 1 && output_is_numbered(&is_numbered, name, err) != PSR_OK)
 		return PSR_ERR_ARG;
 	if (n > 1 && !is_numbered)
-		return psr_fail(err, PSR_ERR_ARG, "%s: '%.100s' is one file for %u pictures; number them, as in 'a_%%02d%s'", word,
-		                name, n, ending);
+		return psr_fail(err, PSR_ERR_ARG, "%s: '%.100s' is one file for %u pictures; number them, as in 'a_%%02d%s'",
+		                word, name, n, ending);
 	if (strlen(name) <= strlen(ending) || strcmp(name + strlen(name) - strlen(ending), ending) != 0)
 		return psr_fail(err, PSR_ERR_ARG, "%s: '%.100s' does not end in %s", word, name, ending);
 	return PSR_OK;

@@ -26,8 +26,8 @@ static void check_hashes(struct result *result, const struct judge *judge, const
 			result_fail(result, "%s has the hash %016" PRIx64 ", and the suite knows none yet", psr_plane_name(i),
 			            end->hash[i]);
 		else if (hash->value[judge->k] != end->hash[i])
-			result_fail(result, "%s has the hash %016" PRIx64 " instead of %016" PRIx64, psr_plane_name(i), end->hash[i],
-			            hash->value[judge->k]);
+			result_fail(result, "%s has the hash %016" PRIx64 " instead of %016" PRIx64, psr_plane_name(i),
+			            end->hash[i], hash->value[judge->k]);
 	}
 }
 
@@ -54,7 +54,8 @@ static int check_color(struct result *result, const struct expect *e, const stru
 			result_fail(result, "%.0f of %" PRIu64 " pixels differ", value * (double)n, n);
 	}
 	if (!isnan(e->bound[EXPECT_PSNR]))
-		check_bound(result, "psnr", compare_psnr(picture->rgb, reference->rgb, NULL, n), e->bound[EXPECT_PSNR], 1, " dB");
+		check_bound(result, "psnr", compare_psnr(picture->rgb, reference->rgb, NULL, n), e->bound[EXPECT_PSNR], 1,
+		            " dB");
 	if (!isnan(e->bound[EXPECT_OFF])) {
 		char metric[64];
 
@@ -198,6 +199,22 @@ static int accept(const struct compared *compared, const struct psr_frame *pictu
 	return code;
 }
 
+/* Shows the picture, and takes it if that is wished and possible. */
+static int end_failed(struct result *result, const struct judge *judge, const struct psr_frame *picture,
+                      const struct compared *compared, struct psr_error *err)
+{
+	const struct expect *e = &judge->test->expect;
+	int code = find_worst(result, picture, compared, err);
+
+	if (code == PSR_OK && judge->wants_figure)
+		code = figure_make(&result->figure, picture, compared->reference.rgb, compared->depth, &result->box, err);
+	if (code != PSR_OK || !judge->is_accepted || e->error != PSR_OK
+	    || (expect_wants_hash(e) && !result->has_hashes))
+		return code;
+	result->outcome = OUTCOME_ACCEPTED;
+	return accept(compared, picture, err);
+}
+
 int judge_frame(struct result *result, const struct judge *judge, const struct psr_event *event, struct psr_error *err)
 {
 	struct compared *compared = calloc(1, sizeof *compared);
@@ -211,14 +228,7 @@ int judge_frame(struct result *result, const struct judge *judge, const struct p
 	check_hashes(result, judge, event);
 	code = compare(result, compared, judge, event->picture, err);
 	if (code == PSR_OK && result->outcome == OUTCOME_FAILED)
-		code = find_worst(result, event->picture, compared, err);
-	if (code == PSR_OK && result->outcome == OUTCOME_FAILED && judge->wants_figure)
-		code = figure_make(&result->figure, event->picture, compared->reference.rgb, compared->depth, &result->box, err);
-	if (code == PSR_OK && result->outcome == OUTCOME_FAILED && judge->is_accepted
-	    && judge->test->expect.error == PSR_OK && (event->end->has_hashes || !expect_wants_hash(&judge->test->expect))) {
-		code = accept(compared, event->picture, err);
-		result->outcome = OUTCOME_ACCEPTED;
-	}
+		code = end_failed(result, judge, event->picture, compared, err);
 	psr_frame_free(&compared->reference);
 	free(compared->depth);
 	free(compared);

@@ -209,11 +209,9 @@ static int find_timed(struct reader *reader, struct psr_error *err)
 		                              || memcmp(suite->test[k].name, expect->of, length) != 0))
 			k++;
 		if (k == suite->n_tests || k == i || suite->test[k].expect.error != PSR_OK) {
-			reader->file.line = expect->time_line;
-			reader->file.column = expect->time_column;
-			return psr_fail(err, PSR_ERR_ARG, "%s:%d:%d: time: '%.*s' is no other test of this suite that draws a picture",
-			                suite->path, expect->time_line, expect->time_column, (int)(length < 80 ? length : 80),
-			                expect->of);
+			return psr_fail(err, PSR_ERR_ARG,
+			                "%s:%d:%d: time: '%.*s' is no other test of this suite that draws a picture", suite->path,
+			                expect->time_line, expect->time_column, (int)(length < 80 ? length : 80), expect->of);
 		}
 		expect->of_test = k;
 	}

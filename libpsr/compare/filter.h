@@ -14,8 +14,8 @@ struct filter {
 /* Makes a Gaussian whose weights have the sum 1. sigma: pixels. */
 void filter_gaussian(struct filter *filter, double sigma, int radius);
 
-/* Filters a plane of width x height by `across` along its rows, and by `down` along its columns; outside of the plane is
- * its nearest pixel. `out` and `scratch` are planes of their own. */
+/* Filters a plane of width x height by `across` along its rows, and by `down` along its columns; outside of the plane
+ * is its nearest pixel. `out` and `scratch` are planes of their own. */
 struct filter_plane {
 	uint32_t width, height;
 	float *scratch;

@@ -19,3 +19,5 @@ for isa in $isas; do
 		check "it drew with $isa by $threads threads" grep -q "with $threads threads and $isa$" "$work/psrd.log"
 	done
 done
+
+check "what a change would show is within its bounds, with a psrd of its own" psr test tests/golden/looks.suite

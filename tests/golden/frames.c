@@ -1,5 +1,5 @@
-/* Draws the shots of tests/golden/frames.suite with every instruction set that the machine has, by one thread and by two:
- * each frame has the hashes that the suite names, whatever the machine. */
+/* Draws the shots of tests/golden/frames.suite with every instruction set that the machine has, by one thread and by
+ * two: each frame has the hashes that the suite names, whatever the machine. */
 #define _GNU_SOURCE
 #include <inttypes.h>
 #include <stdio.h>
@@ -72,7 +72,8 @@ static void make_ways(void)
 static void draw(struct golden *out, const struct shot *shot, const struct way *way)
 {
 	const size_t n = (size_t)shot->size[0] * shot->size[1];
-	struct psr_frame frame = { .width = shot->size[0], .height = shot->size[1], .rgb = malloc(3 * n), .depth = malloc(4 * n) };
+	struct psr_frame frame = { .width = shot->size[0], .height = shot->size[1], .rgb = malloc(3 * n),
+		                       .depth = malloc(4 * n) };
 	struct psr_settings settings;
 	struct psr_error err;
 	psr_settings_default(&settings, shot->size[0], shot->size[1]);

@@ -133,8 +133,10 @@ static int on_test(const char *text, void *userdata, struct psr_error *err)
 int shots_read(const char *path, const struct psr_model *(*open)(const char *name), void (*on_shot)(struct shot *shot),
                struct psr_error *err)
 {
-	struct reader reader = { .open = open, .on_shot = on_shot,
-		                     .now = { .size = { 800, 600 }, .fov = 35, .ambient = 0.15, .background = { 0x20, 0x24, 0x28 } } };
+	struct reader reader = {
+		.open = open, .on_shot = on_shot,
+		.now = { .size = { 800, 600 }, .fov = 35, .ambient = 0.15, .background = { 0x20, 0x24, 0x28 } },
+	};
 	struct words *now = &reader.now;
 	const char *models;
 	const struct psr_opt opts[] = {

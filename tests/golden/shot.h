@@ -18,8 +18,8 @@ struct shot {
 	uint64_t color, depth; /* the hashes that are expected */
 };
 
-/* Gives every shot of the file to on_shot, in order. Knows the words that the golden frames need; each shot has a hash of
- * colour and one of depth. open: gives the model of a name, or NULL. ARG, NOT_FOUND, and the errors of
+/* Gives every shot of the file to on_shot, in order. Knows the words that the golden frames need; each shot has a hash
+ * of colour and one of depth. open: gives the model of a name, or NULL. ARG, NOT_FOUND, and the errors of
  * wordfile_read(). */
 int shots_read(const char *path, const struct psr_model *(*open)(const char *name), void (*on_shot)(struct shot *shot),
                struct psr_error *err);
