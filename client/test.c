@@ -13,6 +13,7 @@ enum { ALL_PASSED = 0, SOME_FAILED = 1, SUITE_WRONG = 2, NO_DAEMON = 3 };
 
 struct wish {
 	const char *server, *models, *pattern, *accept;
+	int is_server_said; /* on the command line: else a suite's own models come first */
 	int64_t timeout; /* seconds */
 	struct report report;
 };
@@ -27,7 +28,7 @@ static const char footer[] =
 	"  test=none  model=nothing error=not-found\n"
 	"\n"
 	"A psrd of its own serves the suite's folder `models`, unless --server or --models says otherwise; suites that\n"
-	"name no folder go to $PSR_SERVER, or psrd's default address.\n"
+	"name no folder go to the default server.\n"
 	"\n"
 	"examples:\n"
 	"  psr test engine.suite --html failures.html\n"
@@ -57,16 +58,20 @@ static int parse(struct wish *wish, int argc, char **argv, int *n_suites, struct
 		  .help = "Write a page with each picture that failed beside its reference and their difference." },
 		PSR_OPT_TIMEOUT(wish->timeout),
 	};
+	int given[OPTLIST_MAX + 1] = { 0 }, code;
 	const struct psr_cli cli = {
-		"psr test [--server ADDR | --models DIR] [--only PATTERN] [--html FILE] SUITE...",
-		"Draws the pictures of test suites and compares them with what is expected. Prints a line for each that "
-		"failed.",
-		list.opt,
-		footer,
+		.usage = "psr test [--server ADDR | --models DIR] [--only PATTERN] [--html FILE] SUITE...",
+		.summary = "Draws the pictures of test suites and compares them with what is expected. Prints a line for "
+		           "each that failed.",
+		.opts = list.opt,
+		.footer = footer,
+		.given = given,
 	};
 
 	OPTLIST_ADD(&list, opts);
-	return psr_cli_parse(&cli, argc, argv, n_suites, err);
+	code = psr_command_parse("test", &cli, argc, argv, n_suites, err);
+	wish->is_server_said = code == PSR_OK && psr_cli_is_given(&cli, "server");
+	return code;
 }
 
 /* ---- a suite ---- */
@@ -109,14 +114,13 @@ static int run_suite(struct wish *wish, struct results *results, struct psr_erro
 	struct daemon *daemon = NULL;
 	int code = PSR_OK;
 
-	if (wish->server == NULL && models != NULL) {
+	if (!wish->is_server_said && models != NULL) {
 		code = daemon_create(&daemon, err);
 		if (code == PSR_OK)
 			code = daemon_start(daemon, models, no_options, err);
 	}
 	if (code == PSR_OK)
-		code = draw(results, wish, wish->server != NULL ? wish->server : daemon != NULL ? daemon_address(daemon)
-		                                                                                : psr_default_server(), err);
+		code = draw(results, wish, daemon != NULL ? daemon_address(daemon) : wish->server, err);
 	daemon_destroy(daemon);
 	if (code == PSR_OK)
 		code = accept_write(results, err);
@@ -175,7 +179,7 @@ static int run_suites(struct wish *wish, struct results *results, uint32_t n, st
 
 int psr_test_main(int argc, char **argv)
 {
-	struct wish wish = { .timeout = PSR_DEFAULT_TIMEOUT };
+	struct wish wish = { .server = psr_default_server(), .timeout = PSR_DEFAULT_TIMEOUT };
 	struct suite **suite = NULL;
 	struct results *results = NULL;
 	struct psr_error err;
@@ -185,9 +189,9 @@ int psr_test_main(int argc, char **argv)
 		return 0;
 	if (code == PSR_OK && n == 0)
 		code = psr_fail(&err, PSR_ERR_ARG, "a suite is missing: psr test FILE; --help shows one");
-	if (code == PSR_OK && wish.server != NULL && wish.models != NULL)
+	if (code == PSR_OK && wish.is_server_said && wish.models != NULL)
 		code = psr_fail(&err, PSR_ERR_ARG, "--server and --models exclude each other: both say who draws");
-	if (code == PSR_OK && wish.server != NULL)
+	if (code == PSR_OK)
 		code = psr_address_check(wish.server, &err);
 	if (code == PSR_OK) {
 		suite = calloc((size_t)n, sizeof *suite);

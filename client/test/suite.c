@@ -221,7 +221,7 @@ static int find_timed(struct reader *reader, struct psr_error *err)
 static int parse(struct reader *reader, char *text, struct psr_error *err)
 {
 	struct optlist list = { .n = 0 };
-	const struct psr_cli cli = { "", "", list.opt, NULL };
+	const struct psr_cli cli = { .opts = list.opt };
 	struct psr_error why;
 	int code;
 

@@ -134,6 +134,12 @@ check "psrd stops cleanly" stop_psrd
 start_psrd --models "$golden" --max-open 1 --max-handles 1
 check "a daemon that takes one request at a time" run 0 --server "$server" tests/golden/frames.suite
 check "psrd stops cleanly" stop_psrd
+mkdir -p "$work/config/psr"
+echo "server = unix:$work/nobody" >"$work/config/psr/psr.conf"
+check "the user's own server does not draw for a suite that names its models" \
+	env XDG_CONFIG_HOME="$work/config" psr test "$suite"
+sed "s|^models=[^ ]*||" "$suite" >"$work/served.suite"
+refuses "but for one that names none" 3 "cannot connect" env XDG_CONFIG_HOME="$work/config" psr test "$work/served.suite"
 refuses "nobody listens" 3 "cannot connect" psr test --server "unix:$work/nobody" "$suite"
 refuses "a psrd of its own that cannot start" 3 \
 	"psrd does not start: .*nowhere" psr test --models "$work/nowhere" "$suite"
