@@ -80,7 +80,7 @@ SIMD_O         := $(call objs,libpsr/simd/*.c libpsr/simd/c/*.c)
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
 endif
-LIBPSR_O       := $(call tree,libpsr/base libpsr/model libpsr/render) $(SIMD_O)
+LIBPSR_O       := $(call tree,libpsr/base libpsr/compare libpsr/model libpsr/render) $(SIMD_O)
 LIBPSR_BUILD_O := $(call tree,libpsr/import libpsr/surface libpsr/ray libpsr/sample libpsr/measure)
 IMAGE_O        := $(call tree,libpsr/image)
 PROTO_O        := $(call tree,proto)
@@ -89,7 +89,7 @@ PSRD_O         := $(call tree,server)
 WINDOW_O       := $(call tree,client/view/window)
 TERM_O         := $(call tree,client/view/term)
 VIEW_O         := $(call objs,client/view/*.c)
-PSR_PARTS_O    := $(call tree,client/cli client/scene) $(call objs,client/output/show.c)
+PSR_PARTS_O    := $(call tree,client/cli client/home client/scene) $(call objs,client/output/show.c)
 PSR_O          := $(filter-out $(CLIENT_LIB_O) $(call tree,client/view),$(call tree,client))
 SHAPES_O       := $(call tree,models/shapes)
 MODEL_O        := $(call objs,models/*.c) $(call tree,models/accuracy) $(SHAPES_O)
@@ -124,7 +124,7 @@ L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
 
-.PHONY: all demo figures latency viewer-picture studies test test-all models models-all install help clean deps compile
+.PHONY: all demo figures latency mutations viewer-picture studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -260,7 +260,7 @@ $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
 STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_create ZSTD_createCCtx ZSTD_createDCtx tjInitCompress
 $(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
-$(call unit_bin,tests/unit/client/wish.c): $(CLIENT_PARTS)
+$(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c): $(CLIENT_PARTS)
 $(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(VIEW_O) $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
@@ -271,11 +271,12 @@ FUZZ_MAIN := $(if $(filter fuzz,$(config)),,$(BUILD)/tests/fuzz/main.c.o)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(A)
 	$(link) $(L_TEST)
 $(BUILD)/tests/fuzz/server_session: $(SERVER_PARTS)
+$(BUILD)/tests/fuzz/client_suite: $(CLIENT_PARTS)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
-$(GOLDEN): $(call objs,tests/golden/*.c client/lib/camera.c client/lib/light.c proto/light.c) $(LIB)/libpsr.a
+$(GOLDEN): $(call objs,tests/golden/*.c client/cli/wordfile.c client/lib/camera.c client/lib/light.c proto/light.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
@@ -412,6 +413,10 @@ figures: deps ## figures: install what is missing, build, draw the thesis's figu
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/figures.sh
 
+mutations: compile $(GOLDEN) ## mutations: spoil a copy of psr in twelve places, one by one; which suites see it; renews docs/mutations.md (minutes)
+	$(Q)tests/tools/mutations $(only) >$(BUILD)/mutations.txt
+	$(Q)docs/put-table.sh docs/mutations.md mutations $(BUILD)/mutations.txt
+
 viewer-picture: deps ## viewer-picture: install what is missing, build, renew docs/viewer.png: psr view at work on the engine
 	$(Q).ci/deps xvfb xdotool python3
 	$(Q)$(MAKE) --no-print-directory compile
@@ -432,12 +437,13 @@ BASH_COMPLETION := $(PREFIX)/share/bash-completion/completions
 
 install: compile $(A) $(LIB)/libpsr-build.a ## install: programs, libraries, headers, man pages under DESTDIR/PREFIX
 	install -d $(DESTDIR)$(PREFIX)/bin $(DESTDIR)$(PREFIX)/lib/psr $(DESTDIR)$(PREFIX)/include/psr \
-	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1
+	  $(DESTDIR)$(PREFIX)/lib/pkgconfig $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/man/man5
 	install $(addprefix $(BIN)/,psrd psr psr-model) $(wildcard $(BIN)/psr-view $(BIN)/psr-view-term) $(DESTDIR)$(PREFIX)/bin
 	install -m 644 $(LIB)/psr-image-oiio.so $(DESTDIR)$(PREFIX)/lib/psr
 	install -m 644 $(A) $(LIB)/libpsr-build.a $(DESTDIR)$(PREFIX)/lib
 	install -m 644 libpsr/include/psr/*.h proto/include/psr/*.h client/include/psr/*.h $(DESTDIR)$(PREFIX)/include/psr
 	install -m 644 docs/man/*.1 $(DESTDIR)$(PREFIX)/share/man/man1
+	install -m 644 docs/man/*.5 $(DESTDIR)$(PREFIX)/share/man/man5
 	install -d $(DESTDIR)$(BASH_COMPLETION) $(DESTDIR)$(PREFIX)/share/zsh/site-functions
 	install -m 644 client/completion/psr.bash $(DESTDIR)$(BASH_COMPLETION)/psr
 	for name in psr-model psrd psr-view psr-view-term; do ln -sf psr $(DESTDIR)$(BASH_COMPLETION)/$$name || exit 1; done

@@ -6,6 +6,7 @@ int psr_list_main(int argc, char **argv);
 int psr_shot_main(int argc, char **argv);
 int psr_turntable_main(int argc, char **argv);
 int psr_view_main(int argc, char **argv);
+int psr_test_main(int argc, char **argv);
 int psr_bench_main(int argc, char **argv);
 
 #endif

@@ -13,6 +13,7 @@ static const struct {
 	{ "shot", psr_shot_main, "a picture of a model, or of several, into a file" },
 	{ "turntable", psr_turntable_main, "a model from all sides: numbered pictures, an animation or a contact sheet" },
 	{ "view", psr_view_main, "models in a window, to be turned, moved and lit; --term: in a terminal" },
+	{ "test", psr_test_main, "pictures of test suites, compared with what is expected" },
 	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
 };
 

@@ -9,8 +9,8 @@
 #define PSR_PROGRAM "psr " PSR_VERSION
 
 #define PSR_EXIT_CODES \
-	"exit codes: 0 done, 1 a frame of bench failed, 2 usage, 3 file or system, 4 bad data, 5 over a limit,\n" \
-	"6 server or connection, 7 a defect of psr"
+	"exit codes: 0 done, 1 a frame of bench or a test failed, 2 usage, 3 file or system, 4 bad data,\n" \
+	"5 over a limit, 6 server or connection, 7 a defect of psr"
 
 #define PSR_OPT_SERVER(variable) \
 	{ .name = "server", .letter = 's', .type = PSR_OPT_STRING, .value = &(variable), .arg = "ADDR", \
@@ -28,7 +28,7 @@ extern const char *const psr_commands[]; /* names, NULL at the end */
 
 /* psr_cli_parse(), then the user's defaults for what the command line leaves open: $XDG_CONFIG_HOME/psr/psr.conf, or
  * ~/.config/psr/psr.conf, if it exists. Lines above the first section hold for all commands, those below [COMMAND] for
- * one. --help shows them. With --replay the section is left out, as the report says everything. ARG, IO, LIMIT, MEMORY;
+ * one. cli->given, if not NULL, is of the command line alone. --help shows them. With --replay the section is left out, as the report says everything. ARG, IO, LIMIT, MEMORY;
  * 1 as of psr_cli_parse(). */
 int psr_command_parse(const char *command, const struct psr_cli *cli, int argc, char **argv, int *n_operands,
                       struct psr_error *err);

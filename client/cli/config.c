@@ -6,7 +6,7 @@
 #include "cli.h"
 #include "optlist.h"
 
-const char *const psr_commands[] = { "list", "shot", "turntable", "view", "bench", NULL };
+const char *const psr_commands[] = { "list", "shot", "turntable", "view", "test", "bench", NULL };
 
 static char *text; /* options point into it until the program ends */
 
@@ -28,15 +28,18 @@ static int configure(const char *command, const struct psr_cli *cli, struct psr_
 	char path[PATH_MAX];
 	const struct psr_config config = { path, psr_cli_is_given(cli, "replay") ? NULL : command, psr_commands };
 	const char *server = getenv("PSR_SERVER");
+	int taken[OPTLIST_MAX + 1];
+	struct psr_cli own = *cli;
 
 	if (!find(path))
 		return PSR_OK;
-	if (server != NULL && server[0] != '\0')
-		for (int i = 0; cli->opts[i].name != NULL; i++)
-			cli->given[i] += strcmp(cli->opts[i].name, "server") == 0;
+	own.given = taken;
+	for (int i = 0; cli->opts[i].name != NULL; i++)
+		taken[i] = cli->given[i]
+		           + (server != NULL && server[0] != '\0' && strcmp(cli->opts[i].name, "server") == 0);
 	free(text);
 	text = NULL;
-	return psr_config_read(&text, &config, cli, err);
+	return psr_config_read(&text, &config, &own, err);
 }
 
 static int asks_for_help(int argc, char **argv)
@@ -56,7 +59,8 @@ int psr_command_parse(const char *command, const struct psr_cli *cli, int argc, 
 
 	for (int n = 0; cli->opts[n].name != NULL; n++)
 		assert(n < OPTLIST_MAX);
-	own.given = given;
+	if (own.given == NULL)
+		own.given = given;
 	if (is_help)
 		code = configure(command, &own, err);
 	if (code == PSR_OK)

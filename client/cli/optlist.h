@@ -16,11 +16,21 @@ void optlist_heading(struct optlist *list, const char *heading, const char *text
 
 #define OPTLIST_ADD(list, opts) optlist_add(list, opts, (int)(sizeof(opts) / sizeof(opts)[0]))
 
-/* Reads a file of words `name=value`, options of `cli`. Blanks separate words, "..." keeps blanks, `name` alone sets a
- * flag, # begins a comment. Calls on_line (may be NULL) after each line with words. Strings of options point into
- * *text, which the caller frees, also after an error. Errors of options and on_line name file, line and column;
- * NOT_FOUND, IO, FORMAT, LIMIT, MEMORY. */
-int wordfile_read(char **text, const char *path, const struct psr_cli *cli, int (*on_line)(void *, struct psr_error *),
-                  void *userdata, struct psr_error *err);
+/* A file of words `name=value`, options of `cli`. Blanks separate words, "..." keeps blanks, `name` alone sets a flag,
+ * # begins a comment. Errors name the path and the place: `cameras.txt:3:14: ...`. */
+struct wordfile {
+	const char *path;
+	const struct psr_cli *cli;
+	int (*on_line)(void *userdata, struct psr_error *err); /* called after each line with words; may be NULL */
+	void *userdata;
+	int line, column; /* of the word that is read, from 1; callbacks that fail may set the place that is to blame */
+};
+
+/* Sets the options. Their strings point into the text, which changes. Errors of options and on_line. */
+int wordfile_parse(struct wordfile *file, char *text, struct psr_error *err);
+
+/* Reads the file into *text, which the caller frees, also after an error, and parses it. NOT_FOUND, IO, FORMAT, LIMIT,
+ * MEMORY beside the errors above. */
+int wordfile_read(struct wordfile *file, char **text, struct psr_error *err);
 
 #endif

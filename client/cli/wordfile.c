@@ -40,32 +40,43 @@ static int take_word(const struct psr_cli *cli, char *word, int is_open, struct 
 	return psr_cli_set(cli, word, value != NULL ? value : "yes", err);
 }
 
-int wordfile_read(char **text, const char *path, const struct psr_cli *cli, int (*on_line)(void *, struct psr_error *),
-                  void *userdata, struct psr_error *err)
+static int parse_line(struct wordfile *file, char *line, struct psr_error *err)
+{
+	char *at = line, *word;
+	int code = PSR_OK, n_words = 0, is_open = 0;
+
+	while (code == PSR_OK && (word = next_word(&at, &is_open)) != NULL) {
+		file->column = (int)(word - line) + 1;
+		code = take_word(file->cli, word, is_open, err);
+		n_words++;
+	}
+	if (code == PSR_OK && n_words > 0 && file->on_line != NULL) {
+		file->column = 1;
+		code = file->on_line(file->userdata, err);
+	}
+	return code;
+}
+
+int wordfile_parse(struct wordfile *file, char *text, struct psr_error *err)
 {
 	struct psr_error why;
-	int code = infile_read_text(text, path, MAX_BYTES, &why), number = 0;
-	char *rest = *text;
+	int code = PSR_OK;
+
+	for (int number = 1; code == PSR_OK && text != NULL; number++) {
+		file->line = number;
+		code = parse_line(file, strsep(&text, "\n"), &why);
+	}
+	if (code != PSR_OK)
+		psr_fail(err, code, "%.200s:%d:%d: %.290s", file->path, file->line, file->column, why.text);
+	return code;
+}
+
+int wordfile_read(struct wordfile *file, char **text, struct psr_error *err)
+{
+	struct psr_error why;
+	int code = infile_read_text(text, file->path, MAX_BYTES, &why);
 
 	if (code != PSR_OK)
 		return psr_fail(err, code, "cannot read %s", why.text);
-
-	while (code == PSR_OK && rest != NULL) {
-		char *line = strsep(&rest, "\n"), *at = line, *word = NULL;
-		int column = 1, n_words = 0, is_open = 0;
-
-		number++;
-		while (code == PSR_OK && (word = next_word(&at, &is_open)) != NULL) {
-			column = (int)(word - line) + 1;
-			code = take_word(cli, word, is_open, &why);
-			n_words++;
-		}
-		if (code == PSR_OK && n_words > 0 && on_line != NULL) {
-			column = 1;
-			code = on_line(userdata, &why);
-		}
-		if (code != PSR_OK)
-			return psr_fail(err, code, "%.200s, line %d, column %d: %.300s", path, number, column, why.text);
-	}
-	return code;
+	return wordfile_parse(file, *text, err);
 }

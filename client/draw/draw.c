@@ -1,7 +1,6 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "client/cli/cli.h"
-#include "client/lib/camera.h"
 #include "client/replay/replay.h"
 #include "draw.h"
 #include "series.h"
@@ -80,42 +79,16 @@ static int check(struct job *job, struct psr_error *err)
 	return code == PSR_OK ? psr_address_check(wish->server, err) : code;
 }
 
-static void choose_codecs(struct psr_msg_frame *frame)
-{
-	if (!(frame->planes & 1 << PSR_PLANE_COLOR))
-		frame->color_codec = frame->color_quality = 0;
-	if (frame->planes & 1 << PSR_PLANE_DEPTH) {
-		frame->depth_format = PSR_WIRE_DEPTH_F32;
-		frame->depth_codec = PSR_CODEC_ZSTD;
-	}
-	if (frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
-		frame->data_codec = PSR_CODEC_ZSTD;
-}
-
 static int place_cameras(struct job *job, struct psr_error *err)
 {
-	const struct draw_wish *wish = job->wish;
 	const double aspect = (double)job->frame.width / job->frame.height;
-	uint32_t n = job->sink.n, n_turn = (uint32_t)wish->sink.n_turn;
-	double up[3];
-	int code = PSR_OK;
 
-	job->camera = calloc(n, sizeof *job->camera);
+	job->camera = calloc(job->sink.n, sizeof *job->camera);
 	if (job->camera == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u cameras", n);
-	if (job->replay != NULL) {
-		job->camera[0] = job->frame.camera;
-		return PSR_OK;
-	}
-	for (uint32_t k = 0; k < job->views.n && code == PSR_OK; k++)
-		code = view_place(&job->camera[k], &job->views.wish[k], job->scene, aspect, n_turn, err);
-	if (code != PSR_OK || n_turn == 0)
-		return code;
-	view_up(up, &job->views.wish[0], job->scene);
-	for (uint32_t k = 1; k < n; k++) {
-		job->camera[k] = job->camera[0];
-		psr_camera_turn(&job->camera[k], up, 360.0 * k / n_turn, job->scene->box_min, job->scene->box_max);
-	}
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u cameras", job->sink.n);
+	if (job->replay == NULL)
+		return views_place(job->camera, &job->views, job->scene, aspect, (uint32_t)job->wish->sink.n_turn, err);
+	job->camera[0] = job->frame.camera;
 	return PSR_OK;
 }
 
@@ -139,7 +112,7 @@ static int run(struct job *job, struct psr_error *err)
 		return code;
 	if (job->replay == NULL || wish->sink.output != NULL || wish->sink.depth != NULL)
 		job->frame.planes |= sink_planes(sink);
-	choose_codecs(&job->frame);
+	quality_choose_codecs(&job->frame);
 	sink->scene = job->scene;
 	sink->frame = &job->frame;
 	sink->server = psr_client_welcome(job->client)->server;

@@ -86,3 +86,15 @@ int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, 
 	frame->pass_limit = (uint16_t)(wish->has_passes ? wish->passes : qualities[i].passes);
 	return psr_codec_parse(&frame->color_codec, &frame->color_quality, wish->codec, err);
 }
+
+void quality_choose_codecs(struct psr_msg_frame *frame)
+{
+	if (!(frame->planes & 1 << PSR_PLANE_COLOR))
+		frame->color_codec = frame->color_quality = 0;
+	if (frame->planes & 1 << PSR_PLANE_DEPTH) {
+		frame->depth_format = PSR_WIRE_DEPTH_F32;
+		frame->depth_codec = PSR_CODEC_ZSTD;
+	}
+	if (frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
+		frame->data_codec = PSR_CODEC_ZSTD;
+}

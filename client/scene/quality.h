@@ -21,4 +21,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish);
 /* Sets size, settings, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
 
+/* Chooses how the planes of the request travel, all but colour without loss. */
+void quality_choose_codecs(struct psr_msg_frame *frame);
+
 #endif

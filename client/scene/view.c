@@ -195,10 +195,11 @@ static int read_file(struct views *views, const struct view_wish *wish, const ch
 	struct reader reader = { views, *wish, *wish };
 	struct optlist list = { .n = 0 };
 	const struct psr_cli cli = { .opts = list.opt };
+	struct wordfile words = { .path = file, .cli = &cli, .on_line = on_line, .userdata = &reader };
 	int code;
 
 	view_add_options(&list, &reader.line);
-	code = wordfile_read(&views->text, file, &cli, on_line, &reader, err);
+	code = wordfile_read(&words, &views->text, err);
 	if (code == PSR_OK && views->n == 0)
 		code = psr_fail(err, PSR_ERR_ARG, "%.300s has no camera; a line is one, such as azimuth=30 elevation=20", file);
 	return code;
@@ -260,4 +261,22 @@ int view_place(struct psr_camera *camera, const struct view_wish *wish, const st
 		placed.n_turn = n_turn;
 	}
 	return psr_camera_complete(camera, &placed, scene->box_min, scene->box_max, aspect, err);
+}
+
+int views_place(struct psr_camera *camera, const struct views *views, const struct scene *scene, double aspect,
+                uint32_t n_turn, struct psr_error *err)
+{
+	double up[3];
+	int code = PSR_OK;
+
+	for (uint32_t k = 0; k < views->n && code == PSR_OK; k++)
+		code = view_place(&camera[k], &views->wish[k], scene, aspect, n_turn, err);
+	if (code != PSR_OK || n_turn == 0)
+		return code;
+	view_up(up, &views->wish[0], scene);
+	for (uint32_t k = 1; k < n_turn; k++) {
+		camera[k] = camera[0];
+		psr_camera_turn(&camera[k], up, 360.0 * k / n_turn, scene->box_min, scene->box_max);
+	}
+	return PSR_OK;
 }

@@ -46,6 +46,10 @@ int view_check(struct view_wish *wish, struct psr_error *err);
 int view_place(struct psr_camera *camera, const struct view_wish *wish, const struct scene *scene, double aspect,
                uint32_t n_turn, struct psr_error *err);
 
+/* Places all cameras of the wishes; with n_turn > 0 the only one, and n_turn - 1 more that go around the scene. */
+int views_place(struct psr_camera *camera, const struct views *views, const struct scene *scene, double aspect,
+                uint32_t n_turn, struct psr_error *err);
+
 /* Returns the axis of turns: --up, the model's natural up, or +Y. */
 void view_up(double up[3], const struct view_wish *wish, const struct scene *scene);
 

@@ -12,6 +12,18 @@ void scene_wish_init(struct scene_wish *wish)
 	memcpy(wish->background, "\x20\x24\x28", 3);
 }
 
+int scene_wish_copy(struct scene_wish *to, const struct scene_wish *from, struct psr_error *err)
+{
+	*to = *from;
+	to->file_text = NULL;
+	to->instance = malloc((from->n_instances + 1) * sizeof *to->instance);
+	if (to->instance == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u instances", from->n_instances);
+	if (from->n_instances > 0)
+		memcpy(to->instance, from->instance, from->n_instances * sizeof *to->instance);
+	return PSR_OK;
+}
+
 void scene_wish_fini(struct scene_wish *wish)
 {
 	free(wish->instance);
@@ -121,10 +133,11 @@ static int read_file(struct scene_wish *wish, struct psr_error *err)
 {
 	struct optlist list = { .n = 0 };
 	const struct psr_cli cli = { .opts = list.opt };
+	struct wordfile words = { .path = wish->file, .cli = &cli };
 
 	add_instances(&list, wish);
 	scene_add_light_options(&list, wish);
-	return wordfile_read(&wish->file_text, wish->file, &cli, NULL, NULL, err);
+	return wordfile_read(&words, &wish->file_text, err);
 }
 
 int scene_check(struct scene_wish *wish, struct psr_error *err)

@@ -1,4 +1,4 @@
-/* libpng for frames of 8-bit sRGB: its errors as texts. */
+/* libpng for frames of 8-bit sRGB. */
 #ifndef PSR_BASE_PNG_H
 #define PSR_BASE_PNG_H
 
@@ -18,5 +18,9 @@ void png_write_outfile(png_structp png, png_bytep data, size_t n); /* a png_rw_p
 /* Writes a whole PNG of the colours. MEMORY, IO. */
 int png_encode(void *sink, png_rw_ptr write, const struct psr_frame *frame, struct psr_error *err);
 int png_write_frame(struct outfile *file, const struct psr_frame *frame, struct psr_error *err);
+
+/* Reads the colours of a PNG without alpha, as 8-bit sRGB, into a new frame (psr_frame_free()). NOT_FOUND, IO, FORMAT,
+ * UNSUPPORTED, LIMIT, MEMORY; after a failure there is nothing to free. */
+int png_read_frame(struct psr_frame *frame, const char *path, struct psr_error *err);
 
 #endif

@@ -90,7 +90,4 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, const struct ps
 int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *scene, uint32_t side, uint8_t *rgb,
                     uint8_t *covered, struct psr_error *err);
 
-/* Returns the peak signal to noise of the covered pixels, in dB, by their sRGB codes; +inf if they are the same. */
-double psr_still_psnr(const uint8_t *rgb, const uint8_t *truth, const uint8_t *covered, uint64_t n_pixels);
-
 #endif

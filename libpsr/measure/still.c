@@ -113,18 +113,3 @@ int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *s
 	psr_pool_destroy(pool);
 	return PSR_OK;
 }
-
-double psr_still_psnr(const uint8_t *rgb, const uint8_t *truth, const uint8_t *covered, uint64_t n_pixels)
-{
-	uint64_t sum = 0, n = 0;
-	for (uint64_t i = 0; i < n_pixels; i++) {
-		if (!covered[i])
-			continue;
-		for (int c = 0; c < 3; c++) {
-			const int d = rgb[3 * i + (uint64_t)c] - truth[3 * i + (uint64_t)c];
-			sum += (uint64_t)(d * d);
-		}
-		n += 3;
-	}
-	return sum ? 10 * log10(255.0 * 255.0 * (double)n / (double)sum) : INFINITY;
-}

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "base/clock.h"
 #include "psr/build.h"
+#include "compare/compare.h"
 #include "measure/measure.h"
 #include "psr/mesh.h"
 #include "psr/render.h"
@@ -88,7 +89,7 @@ static int draw_passes(struct passes *p, const struct psr_scene *scene, unsigned
 		}
 		if (code == PSR_OK)
 			printf("%4u  %6ux%-2u  %8.2f  %6.1f\n", pass, 1u << pass, 1u << pass,
-			       psr_still_psnr(p->rgb, p->truth_rgb, p->covered, n), (double)least / 1e6);
+			       compare_psnr(p->rgb, p->truth_rgb, p->covered, n), (double)least / 1e6);
 	}
 	return code;
 }

@@ -4,7 +4,7 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include "measure/measure.h"
+#include "compare/compare.h"
 #include "psr/frame.h"
 #include "report.h"
 
@@ -16,7 +16,7 @@ static inline double psnr(const struct psr_frame *truth, const uint8_t *rgb)
 
 	for (size_t i = 0; i < n; i++)
 		covered[i] = truth->depth[i] < INFINITY;
-	const double db = psr_still_psnr(rgb, truth->rgb, covered, n);
+	const double db = compare_psnr(rgb, truth->rgb, covered, n);
 
 	free(covered);
 	return db;

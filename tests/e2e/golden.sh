@@ -1,26 +1,23 @@
 #!/bin/bash
 # not for threads
-# The frames of tests/golden through psrd and psr: what tests/golden/frames draws without sockets, with what instructions
-# and by how many threads ever.
+# The golden frames through psrd, with all instructions that the machine has, by one thread and by two: what
+# tests/golden/frames draws without sockets.
 . "$(dirname "$0")/lib.sh"
-hashes=tests/golden/hashes
+suite=tests/golden/frames.suite
+n=$(grep -c '^test=' $suite)
 
-shots() {
-	while read -r name options; do
-		case $name in '' | '#'*) continue ;; esac
-		case " $options " in *" --smooth "*) ;; *) options="$options --no-smooth" ;; esac
-		# shellcheck disable=SC2086
-		hash=$(psr shot --server "$server" $options --codec lossless --depth "$work/depth.pfm" -o "$work/frame.png" --hash |
-			tr '\n' ' ')
-		echo "$name ${hash% }"
-	done <tests/golden/shots
-}
-
-for way in "--threads 3" "--threads 1 --isa c"; do
-	# shellcheck disable=SC2086
-	start_psrd --models tests/golden --verbose $way
-	shots >"$work/got"
-	check "psrd $way stops cleanly" stop_psrd
-	check "psrd $way draws frames of the golden hashes" diff -u $hashes "$work/got"
+isas=c
+for isa in avx2 avx512; do
+	if PSR_ISA=$isa psrd --help | grep -qF "[$isa]"; then isas="$isas $isa"; fi # the default is capped by the machine
 done
-check "psrd --isa c draws with c" grep -q "with 1 threads and c$" "$work/psrd.log"
+for isa in $isas; do
+	for threads in 1 2; do
+		start_psrd --models tests/golden --verbose --threads $threads --isa "$isa"
+		psr test --server "$server" $suite >"$work/sum"
+		check "$n golden frames with $isa by $threads threads" grep -qx "$n passed, 0 failed" "$work/sum"
+		check "psrd stops cleanly" stop_psrd
+		check "it drew with $isa by $threads threads" grep -q "with $threads threads and $isa$" "$work/psrd.log"
+	done
+done
+
+check "what a change would show is within its bounds, with a psrd of its own" psr test tests/golden/looks.suite

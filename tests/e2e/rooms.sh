@@ -7,6 +7,7 @@
 cat >"$work/rooms" <<'END'
 libpsr/include
 libpsr/base
+libpsr/compare
 libpsr/model
 libpsr/simd
 libpsr/render
@@ -40,11 +41,13 @@ server
 client/include
 client/lib
 client/cli
+client/home/
 client/scene
 client/replay
 client/output
 client/draw
 client/bench/
+client/test/
 client/view/lens
 client/view/hand
 client/view/link client/view/home

@@ -59,7 +59,7 @@ END
 is "a scene file is the same as its words" \
 	"$(hashes "${both[@]}" --light dir:-1,-2,-1 --shadows --ambient 0.3 --background '#405060')" "$(hashes --scene "$work/scene")"
 printf 'model=teapot\nlight=sun\n' >"$work/bad"
-refuses "an error in it has its place" 2 "bad, line 2, column 1: --light: 'sun' is no light" shot --scene "$work/bad" --hash
+refuses "an error in it has its place" 2 "bad:2:1: --light: 'sun' is no light" shot --scene "$work/bad" --hash
 printf 'light=dir:0,-1,0\n' >"$work/bad"
 refuses "a scene of no model" 2 "the scene file names no model" shot --scene "$work/bad" --hash
 refuses "a scene file that is not there" 3 "cannot read $work/nosuch" shot --scene "$work/nosuch" --hash

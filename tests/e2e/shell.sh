@@ -19,7 +19,7 @@ complete_line() { # words...: what may stand for the last one
 	echo "${COMPREPLY[*]}"
 }
 compopt() { :; }
-has "commands" '^list shot turntable view bench.* --help --version$' "$(complete_line psr '')"
+has "commands" '^list shot turntable view test bench.* --help --version$' "$(complete_line psr '')"
 is "a command from its first letters" "turntable" "$(complete_line psr tu)"
 is "options from their first letters" "--ambient" "$(complete_line psr shot --am)"
 is "values of an option" "draft" "$(complete_line psr shot --quality d)"

@@ -105,7 +105,7 @@ shot --model teapot --eye 5,4,6 --target 0,1,0 --fov 30 -o "$work/a.ppm"
 check "each as from the command line" cmp "$work/a.ppm" "$work/camera_02.ppm"
 is "no more than it has" 3 "$(find "$work" -name 'camera_*' | wc -l)"
 echo "azimuth=30 elevatoin=20" >"$work/cameras"
-refuses "an error in it has its place" 2 "cameras, line 1, column 12: unknown option elevatoin; did you mean elevation" \
+refuses "an error in it has its place" 2 "cameras:1:12: unknown option elevatoin; did you mean elevation" \
 	shot --model teapot --cameras "$work/cameras" -o "$work/x_%d.png"
 
 # --- turntables ---

@@ -214,11 +214,11 @@ static void errors_of_files_name_line_and_column(void **state)
 	static const struct {
 		const char *text, *says;
 	} bad[] = {
-		{ "azimuth=30\nelevation=20 zoom=x\n", ", line 2, column 14: --zoom: 'x'" },
-		{ "\n\n azimut=30", ", line 3, column 2: unknown option azimut; did you mean azimuth?" },
-		{ "view=top eye=1,2,3", ", line 1, column 1: --view excludes" },
-		{ "zoom", ", line 1, column 1: zoom needs a value: zoom=FACTOR" },
-		{ "camera=\"a", ", line 1, column 1: a \" is not closed" },
+		{ "azimuth=30\nelevation=20 zoom=x\n", ":2:14: --zoom: 'x'" },
+		{ "\n\n azimut=30", ":3:2: unknown option azimut; did you mean azimuth?" },
+		{ "view=top eye=1,2,3", ":1:1: --view excludes" },
+		{ "zoom", ":1:1: zoom needs a value: zoom=FACTOR" },
+		{ "camera=\"a", ":1:1: a \" is not closed" },
 		{ "# nothing\n", "has no camera" },
 		{ "view=side", "not 'side'" },
 		{ "elevation=91", "--elevation: '91' is out of range; it takes -90 to 90" },
