@@ -57,13 +57,16 @@ rule=$(printf '%.0s-' {1..78})
 echo "== a frame of $size as JPEG: milliseconds of its stages; and $seconds s of load by 4 clients"
 printf '%-10s %8s %6s %6s %6s %6s %6s %6s %7s %8s\n' model samples cull warp shade fill code total kB frames/s
 echo "$rule"
+shot() { # what psr says beside a picture would break the table
+	psr shot --server "$server" "$@" 2>"$out/notes.txt" || { cat "$out/notes.txt" >&2; exit 1; }
+}
 sheet=
 for name in teapot top pencil wheel $real; do
 	report=$out/$name.json
 	# The first picture of a model reads it from the disk.
-	psr shot --server "$server" --model "$name" --size $size --codec jpeg:90 -o "$out/$name.png"
-	psr shot --server "$server" --model "$name" --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
-	psr shot --server "$server" --model "$name" --size 320x240 --background '#f4f4f0' --quality best -o "$out/$name-small.png"
+	shot --model "$name" --size $size --codec jpeg:90 -o "$out/$name.png"
+	shot --model "$name" --size $size --codec jpeg:90 --report "$report" -o "$out/$name.png"
+	shot --model "$name" --size 320x240 --background '#f4f4f0' --quality best -o "$out/$name-small.png"
 	psr bench --server "$server" --model "$name" --clients 4 --seconds "$seconds" --size $size --json >"$out/$name-bench.json"
 	printf '%-10s %8.0f %6.2f %6.2f %6.2f %6.2f %6.2f %6.2f %7.1f %8.1f\n' "$name" "$(of_model "$report" samples)" \
 		"$(sum "$(stage "$report" plan)" "$(stage "$report" cull)")" "$(stage "$report" warp)" \
