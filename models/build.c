@@ -77,9 +77,6 @@ static void warn(const struct psr_mesh *mesh)
 {
 	if (mesh->warning[0] != '\0')
 		fprintf(stderr, PROGRAM ": warning: %s\n", mesh->warning);
-	if (mesh->n_dropped_triangles != 0)
-		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " triangles without an area were left out\n",
-		        mesh->n_dropped_triangles);
 	if (mesh->n_dropped_primitives != 0)
 		fprintf(stderr, PROGRAM ": warning: %" PRIu32 " points and lines were left out\n", mesh->n_dropped_primitives);
 }
