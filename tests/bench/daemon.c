@@ -175,7 +175,7 @@ int main(int argc, char **argv)
 	const struct psr_cli cli = {
 		"daemon [options] PSR-MODEL MODELS CACHE PSRD",
 		"Measures psrd with two threads under many clients. MODELS is a folder for models, CACHE that of real meshes.",
-		opts, NULL,
+		opts, NULL, NULL,
 	};
 	struct psr_error err;
 	int n, code = psr_cli_parse(&cli, argc, argv, &n, &err);
