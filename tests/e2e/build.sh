@@ -33,4 +33,5 @@ if [ "$CONFIG" = release ]; then
 	for page in psr psrd psr-model psr-view psr-view-term; do
 		check "$page has a man page" test -s "$work/root/usr/share/man/man1/$page.1"
 	done
+	check "suites have one, too" test -s "$work/root/usr/share/man/man5/psr-suite.5"
 fi
