@@ -121,8 +121,8 @@ static uint32_t find_inside(struct closed *c)
 }
 
 /* Finds how many pixels from its middle a pixel may rightly depend on the background. Samples a pixel apart know of an
- * edge where it is to half a pixel. Cells of pass 0 are one to two samples wide, and a pixel fades over four of them, as
- * far as one and a half cells away; those of up to INSIDE pixels have faded out where pixels are looked at. */
+ * edge where it is to half a pixel. Cells of pass 0 are one to two samples wide, and a pixel fades over four of them,
+ * as far as one and a half cells away; those of up to INSIDE pixels have faded out where pixels are looked at. */
 static double find_reach(const struct closed *c, const struct view *view, unsigned pass, size_t at)
 {
 	const double apart = c->spacing / (view->pixel * c->depth[at]), cell = 2 * apart;
@@ -193,7 +193,8 @@ int main(int argc, char **argv)
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
 		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
-	if (psr_renderer_create(&c.renderer, NULL) || refiner_create(&c.refiner, c.renderer, NULL) || psr_pool_create(&c.pool, 2, NULL))
+	if (psr_renderer_create(&c.renderer, NULL) || refiner_create(&c.refiner, c.renderer, NULL)
+	    || psr_pool_create(&c.pool, 2, NULL))
 		die("no memory");
 	c.instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	c.scene = (struct psr_scene){ .instance = &c.instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
