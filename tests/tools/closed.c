@@ -1,8 +1,9 @@
-/* closed MODEL.psr SOURCE [SIDE [RAYS]]: whether refined stills show what is behind a surface. Draws the model in five
- * views and all passes on a red and on a blue background, lit by ambient light alone. Of pixels at least four pixels
- * inside of what pass 0 covers, blended surfaces apart, it counts those whose colour depends on the background, and of
- * these those of which all RAYS x RAYS rays meet the source: they are torn. Prints a line for each view; exits with 1
- * if any pixel is torn. */
+/* closed MODEL.psr SOURCE [SIDE [RAYS [ZOOM]]]: whether stills show what is behind a surface. Draws the middle of the
+ * model, ZOOM times as large, in five views and all passes on a red and on a blue background, lit by ambient light
+ * alone. Of pixels at least four pixels inside of what pass 0 covers, blended surfaces apart, it counts those whose
+ * colour depends on the background, and of these those that are torn: all rays around them, as far as the samples may
+ * be wrong about an edge, meet the source. RAYS x RAYS rays, or one a pixel if these are more. Prints a line for each
+ * view and pass; exits with 1 if any pixel is torn. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -13,7 +14,7 @@
 
 #define INSIDE 4
 #define VIEWS 5
-#define MOST_RAYS 64
+#define MOST_RAYS 128
 
 static const double direction[VIEWS][3] = {
 	{ 0.45, 0.35, 1 }, { -1, 0.25, 0.4 }, { 0.15, 1, 0.3 }, { 0.7, -0.4, -0.8 }, { -0.3, 0.05, -1 },
@@ -34,6 +35,8 @@ struct closed {
 	uint8_t *weight;           /* and then 255 without a fill */
 	uint8_t *is_solid, *is_inside;
 	uint32_t side, rays;
+	double zoom;
+	double spacing; /* of samples, in the source's units */
 };
 
 static void die(const char *what)
@@ -55,7 +58,7 @@ static void look_from(struct closed *c, const struct psr_model_info *info, const
 	struct psr_camera *camera = &c->scene.camera;
 	const double length = sqrt(from[0] * from[0] + from[1] * from[1] + from[2] * from[2]);
 	*camera = (struct psr_camera){ .up = { 0, fabs(from[1]) > 0.9 ? 0 : 1, fabs(from[1]) > 0.9 ? 1 : 0 },
-		                           .kind = PSR_CAMERA_PERSPECTIVE, .fov_y = 0.6 };
+		                           .kind = PSR_CAMERA_PERSPECTIVE, .fov_y = 2 * atan(tan(0.3) / c->zoom) };
 	for (int k = 0; k < 3; k++) {
 		camera->target[k] = (info->box_min[k] + info->box_max[k]) / 2;
 		camera->eye[k] = camera->target[k] + from[k] / length * info->scale / sin(0.3) * 0.9;
@@ -117,17 +120,31 @@ static uint32_t find_inside(struct closed *c)
 	return n;
 }
 
-/* Whether all rays through a pixel, and half a pixel around it, are stopped by the source: what samples a pixel apart
- * know of an edge is where it is to half a pixel. */
-static int is_closed(const struct closed *c, const struct view *view, uint32_t x, uint32_t y)
+/* Finds how many pixels from its middle a pixel may rightly depend on the background. Samples a pixel apart know of an
+ * edge where it is to half a pixel. Cells of pass 0 are one to two samples wide, and a pixel fades over four of them,
+ * as far as one and a half cells away; those of up to INSIDE pixels have faded out where pixels are looked at. */
+static double find_reach(const struct closed *c, const struct view *view, unsigned pass, size_t at)
 {
-	for (uint32_t j = 0; j < c->rays; j++) {
-		struct ray ray[MOST_RAYS];
-		struct ray_hit hit[MOST_RAYS];
-		for (uint32_t i = 0; i < c->rays; i++)
-			truth_ray(c->truth, view, x - 0.5 + (2 * i + 1.0) / c->rays, y - 0.5 + (2 * j + 1.0) / c->rays, &ray[i]);
-		truth_trace(c->truth, ray, (int)c->rays, c->scene.camera.near_z, hit);
-		for (uint32_t i = 0; i < c->rays; i++)
+	const double apart = c->spacing / (view->pixel * c->depth[at]), cell = 2 * apart;
+	if (cell <= INSIDE)
+		return 1;
+	return pass == 0 ? 1.5 * cell : 0.5 + apart / 2;
+}
+
+/* Whether all rays within `reach` pixels of a pixel's middle, along x and y, are stopped by the source. */
+static int is_closed(const struct closed *c, const struct view *view, double x, double y, double reach)
+{
+	const uint32_t least = (uint32_t)ceil(2 * reach), rays = c->rays > least ? c->rays : least;
+	const double step = 2 * reach / rays;
+	struct ray ray[MOST_RAYS];
+	struct ray_hit hit[MOST_RAYS];
+	if (rays > MOST_RAYS)
+		die("samples are too far apart in this picture");
+	for (uint32_t j = 0; j < rays; j++) {
+		for (uint32_t i = 0; i < rays; i++)
+			truth_ray(c->truth, view, x - reach + (i + 0.5) * step, y - reach + (j + 0.5) * step, &ray[i]);
+		truth_trace(c->truth, ray, (int)rays, c->scene.camera.near_z, hit);
+		for (uint32_t i = 0; i < rays; i++)
 			if (!is_stopped(c->mesh, hit[i].prim))
 				return 0;
 	}
@@ -144,7 +161,7 @@ static uint32_t look(struct closed *c, unsigned pass, const struct view *view, i
 			if (!c->is_inside[at] || memcmp(c->frame[0].rgb + 3 * at, c->frame[1].rgb + 3 * at, 3) == 0)
 				continue;
 			n_dependent++;
-			if (!is_closed(c, view, x, y))
+			if (!is_closed(c, view, x + 0.5, y + 0.5, find_reach(c, view, pass, at)))
 				continue;
 			if (!n_torn++)
 				snprintf(example, sizeof example, ", first at %u,%u", x, y);
@@ -157,15 +174,17 @@ static uint32_t look(struct closed *c, unsigned pass, const struct view *view, i
 int main(int argc, char **argv)
 {
 	struct closed c = { .side = argc > 3 ? (uint32_t)atoi(argv[3]) : 300,
-		                .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16 };
+		                .rays = argc > 4 ? (uint32_t)atoi(argv[4]) : 16,
+		                .zoom = argc > 5 ? atof(argv[5]) : 1 };
 	struct psr_model *model;
 	struct psr_error err;
 	uint32_t n_torn = 0;
-	if (argc < 3 || argc > 5 || c.side < 16 || c.rays < 1 || c.rays > MOST_RAYS)
-		die("usage: closed MODEL.psr SOURCE [SIDE [RAYS]]");
+	if (argc < 3 || argc > 6 || c.side < 16 || c.rays < 1 || c.rays > MOST_RAYS || !(c.zoom >= 1))
+		die("usage: closed MODEL.psr SOURCE [SIDE [RAYS [ZOOM]]]");
 	if (psr_model_read(&model, argv[1], &err) || psr_mesh_import(&c.mesh, argv[2], NULL, &err) ||
 	    psr_truth_create(&c.truth, c.mesh, &err))
 		die(err.text);
+	c.spacing = psr_model_info(model)->spacing;
 	const size_t area = (size_t)c.side * c.side;
 	c.depth = room(area * sizeof *c.depth);
 	c.id = room(area * sizeof *c.id);
@@ -174,7 +193,8 @@ int main(int argc, char **argv)
 	c.is_inside = room(area);
 	for (int b = 0; b < 2; b++)
 		c.frame[b] = (struct psr_frame){ .width = c.side, .height = c.side, .rgb = room(3 * area) };
-	if (psr_renderer_create(&c.renderer, NULL) || refiner_create(&c.refiner, c.renderer, NULL) || psr_pool_create(&c.pool, 2, NULL))
+	if (psr_renderer_create(&c.renderer, NULL) || refiner_create(&c.refiner, c.renderer, NULL)
+	    || psr_pool_create(&c.pool, 2, NULL))
 		die("no memory");
 	c.instance = (struct psr_instance){ .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	c.scene = (struct psr_scene){ .instance = &c.instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
