@@ -260,7 +260,7 @@ $(call unit_bin,$(UNIT_LIGHT)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 $(call unit_bin,$(filter tests/unit/server/%,$(UNIT))): $(SERVER_PARTS)
 STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_create ZSTD_createCCtx ZSTD_createDCtx tjInitCompress
 $(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
-$(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c): $(CLIENT_PARTS)
+$(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c $(filter tests/unit/bench/%,$(UNIT))): $(CLIENT_PARTS)
 $(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(VIEW_O) $(CLIENT_PARTS)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
