@@ -1,61 +1,55 @@
-/* psr bench: workers, each with a thread and a connection of its own, ask for frames and measure them. */
+/* psr bench: many connections to a server from a few threads, and what they measure. */
 #ifndef PSR_CLIENT_BENCH_BENCH_H
 #define PSR_CLIENT_BENCH_BENCH_H
 
-#include <pthread.h>
-#include <stdint.h>
-#include "client/scene/quality.h"
-#include "client/scene/view.h"
+#include "measure.h"
+#include "plan.h"
 
-#define BENCH_MAX_CLIENTS 1024
-#define BENCH_MAX_SAMPLES (1u << 24) /* of all workers together; a worker whose share is full stops early */
+#define BENCH_MAX_CLIENTS 100000
+#define BENCH_MAX_THREADS 256
+#define BENCH_DRAIN_NS UINT64_C(5000000000) /* that what is under way at the end gets to arrive */
 
-struct bench_options {
+struct bench_load { /* how a plan's requests are offered */
 	const char *server;
-	int64_t n_clients, seconds, n_inflight, timeout;
-	struct scene_wish scene;
-	struct view_wish view;
-	struct quality_wish quality;
-	struct psr_msg_frame frame; /* all fields but the camera */
+	int64_t n_clients, n_threads;
+	int64_t n_inflight;    /* closed loop: each client's requests under way */
+	double rate;           /* open loop: requests a second of all clients; 0: closed */
+	int is_poisson, is_view, is_decoded;
+	double warmup, seconds;
+	int64_t n_frames;      /* 0: `seconds` decide; else the load ends with so many requests */
+	int64_t timeout;       /* seconds */
+	int64_t keep;          /* every so many-th answer is kept in bench_result; 0: none */
 };
 
-/* Warm workers wait here for the last one; then all start, or none if one failed. */
-struct bench_gate {
-	pthread_mutex_t lock;
-	pthread_cond_t changed;
-	int64_t n_ready;
-	int state; /* 0 closed, 1 measure, -1 go home */
+struct bench_kept { /* an answer */
+	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since the load began; hash of the colour; k: plan_camera() */
+	uint32_t client, kind;
+	uint16_t pass;
+	uint8_t has_hash;
 };
-
-struct bench_worker {
-	const struct bench_options *options;
-	struct bench_gate *gate;
-	int64_t index;
-	pthread_t thread;
-	struct psr_client *client;
-	struct psr_msg_frame frame;
-	struct scene *scene;
-	struct psr_camera start; /* where the camera begins its flight around its target */
-	double up[3];
-	uint64_t n_asked;
-	/* results */
-	uint32_t *sample_us; /* latency of each frame that was requested within the time; bench_run() frees it */
-	size_t n_samples, samples_capacity;
-	uint64_t n_frames, n_bytes; /* frames that arrived within the time, and their bytes */
-	uint64_t n_failed, elapsed_ns;
-	int setup_code;             /* PSR_OK, or why the worker did not measure */
-	struct psr_error first_error; /* code 0: none */
-};
-
-void *bench_worker_run(void *worker);
 
 struct bench_result {
-	double frames_per_s, mb_per_s;
-	uint64_t n_frames, n_samples, n_failed;
-	double p50_ms, p90_ms, p99_ms, max_ms; /* 0 without samples */
+	struct bench_load load;
+	struct measure measure;   /* of requests that were due while it measured */
+	double seconds;           /* it measured */
+	uint64_t n_drawn, n_bytes; /* arrived while it measured */
+	double fairness;          /* Jain's index */
+	double processor_s;       /* that this program's threads worked meanwhile */
+	struct psr_error first_error; /* of a connection that was lost; code 0: none was */
+	uint64_t n_lost;          /* connections */
+	struct measure_row *row;  /* one a second */
+	size_t n_rows;
+	struct bench_kept *kept;
+	size_t n_kept;
 };
 
-/* Runs all workers for the given time. Reports workers that failed on standard error. */
-int bench_run(struct bench_result *result, const struct bench_options *options, struct psr_error *err);
+/* Opens all connections, then loads the server. on_row (may be NULL) is called each second. bench_result_fini() is due
+ * also after an error. CONNECTION, LIMIT (file descriptors), MEMORY, and what the server refuses. */
+int bench_run(struct bench_result *result, const struct plan *plan, const struct bench_load *load,
+              void (*on_row)(const struct measure_row *row), struct psr_error *err);
+void bench_result_fini(struct bench_result *result);
+
+/* Returns frames (or requests) that arrived a second. */
+double bench_rate(const struct bench_result *result);
 
 #endif

@@ -1,79 +1,265 @@
+#include "worker.h"
+#include <errno.h>
+#include <inttypes.h>
 #include <stdlib.h>
+#include <string.h>
+#include <sys/epoll.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
 #include "base/clock.h"
-#include "bench.h"
-#include "client/cli/cli.h"
-#include "client/lib/camera.h"
 
-#define FRAMES_A_TURN 120
+#define EVENTS 256
+#define SECOND UINT64_C(1000000000)
+#define MAX_WAITING (UINT64_C(1) << 24) /* requests that are due in one thread; more of them end the load */
 
-static void turn_camera(struct bench_worker *worker)
+static void on_ready(struct conn *conn)
 {
-	double part = (double)(worker->n_asked % FRAMES_A_TURN) / FRAMES_A_TURN
-	              + (double)worker->index / (double)worker->options->n_clients;
-
-	worker->frame.camera = worker->start;
-	psr_camera_turn(&worker->frame.camera, worker->up, 360 * part, worker->scene->box_min, worker->scene->box_max);
-	worker->n_asked++;
+	((struct worker *)conn->shared->userdata)->n_ready++;
 }
 
-static int prepare(struct bench_worker *worker, struct psr_error *err)
+int worker_init(struct worker *worker, struct psr_error *err)
 {
-	const struct bench_options *options = worker->options;
-	double aspect = (double)options->frame.width / options->frame.height;
-	int code = scene_open(&worker->scene, &options->scene, worker->client, (int)options->timeout * 1000, err);
+	const struct bench_load *load = worker->load;
+	struct epoll_event event = { .events = EPOLLIN };
 
-	worker->frame = options->frame;
-	if (code == PSR_OK)
-		code = view_place(&worker->start, &options->view, worker->scene, aspect, FRAMES_A_TURN, err);
-	if (code != PSR_OK)
-		return code;
-	view_up(worker->up, &options->view, worker->scene);
-	scene_light(worker->scene, &worker->start);
+	pthread_mutex_init(&worker->lock, NULL);
+	worker->epoll = epoll_create1(EPOLL_CLOEXEC);
+	worker->timer = timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK);
+	worker->n_clients = (uint32_t)((load->n_clients - worker->index + load->n_threads - 1) / load->n_threads);
+	worker->client = calloc(worker->n_clients, sizeof *worker->client);
+	worker->shared = (struct conn_shared){ .plan = worker->plan, .server = load->server, .is_view = load->is_view,
+		                                   .is_decoded = load->is_decoded, .userdata = worker, .on_ready = on_ready,
+		                                   .on_answer = worker_on_answer };
+	if (worker->client == NULL || (load->is_decoded && client_decoder_create(&worker->shared.decoder) != PSR_OK))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %" PRId64 " clients", load->n_clients);
+	if (worker->epoll < 0 || worker->timer < 0 || epoll_ctl(worker->epoll, EPOLL_CTL_ADD, worker->timer, &event) != 0)
+		return psr_fail(err, PSR_ERR_LIMIT, "the system gives no event loop: %s", strerror(errno));
 	return PSR_OK;
 }
 
-static int wait_for_frame(struct bench_worker *worker, struct psr_event *event, struct psr_error *err)
+void worker_fini(struct worker *worker)
 {
-	int got;
-
-	do
-		got = psr_client_wait(worker->client, (int)worker->options->timeout * 1000, event, err);
-	while (got > 0 && event->type == PSR_EVENT_FRAME && !event->end->is_final);
-	return got;
-}
-
-/* Connects, opens, and draws one frame, which does not count. */
-static int warm_up(struct bench_worker *worker, struct psr_error *err)
-{
-	const struct bench_options *options = worker->options;
-	int timeout_ms = (int)options->timeout * 1000, code;
-	struct psr_event event;
-	uint32_t id;
-
-	code = psr_client_connect(&worker->client, options->server, PSR_PROGRAM, options->scene.instance[0].model,
-	                          timeout_ms, err);
-	if (code == PSR_OK && options->n_inflight > psr_client_welcome(worker->client)->max_open)
-		code = psr_fail(err, PSR_ERR_LIMIT, "--inflight: %s takes %u requests at a time", options->server,
-		                psr_client_welcome(worker->client)->max_open);
-	if (code == PSR_OK)
-		code = prepare(worker, err);
-	if (code == PSR_OK)
-		code = psr_client_scene(worker->client, &worker->scene->msg, NULL, err);
-	if (code == PSR_OK) {
-		turn_camera(worker);
-		code = psr_client_frame(worker->client, &worker->frame, &id, err);
+	for (uint32_t i = 0; worker->client != NULL && i < worker->n_clients; i++) {
+		conn_close(&worker->client[i].conn);
+		free(worker->client[i].waiting);
 	}
-	if (code != PSR_OK)
-		return code;
-	code = wait_for_frame(worker, &event, err);
-	if (code == 0)
-		return psr_fail(err, PSR_ERR_CONNECTION, "%s: no frame within %d s", options->server, timeout_ms / 1000);
-	if (code > 0 && event.type == PSR_EVENT_FAILED)
-		return psr_fail(err, event.error.code, "%s", event.error.text);
-	return code > 0 ? PSR_OK : code;
+	free(worker->client);
+	free(worker->kept);
+	client_decoder_destroy(worker->shared.decoder);
+	if (worker->epoll >= 0)
+		close(worker->epoll);
+	if (worker->timer >= 0)
+		close(worker->timer);
+	pthread_mutex_destroy(&worker->lock);
 }
 
-static int pass_gate(struct bench_gate *gate)
+/* ---- requests that wait ---- */
+
+static void push(struct worker *worker, struct worker_client *client, const struct worker_waiting *one)
+{
+	if (client->n_waiting == client->capacity) {
+		const size_t capacity = client->capacity == 0 ? 16 : 2 * client->capacity;
+		struct worker_waiting *grown =
+			worker->n_waiting < MAX_WAITING ? malloc(capacity * sizeof *grown) : NULL;
+
+		if (grown == NULL) {
+			conn_fail(&client->conn, PSR_ERR_LIMIT, "%" PRIu64 " requests wait: the rate is far above what it can draw",
+			          (uint64_t)worker->n_waiting);
+			return;
+		}
+		for (size_t i = 0; i < client->n_waiting; i++)
+			grown[i] = client->waiting[(client->first + i) % client->capacity];
+		free(client->waiting);
+		client->waiting = grown;
+		client->first = 0;
+		client->capacity = capacity;
+	}
+	client->waiting[(client->first + client->n_waiting++) % client->capacity] = *one;
+	worker->n_waiting++;
+}
+
+static struct worker_waiting pop(struct worker *worker, struct worker_client *client)
+{
+	const struct worker_waiting one = client->waiting[client->first];
+
+	client->first = (client->first + 1) % client->capacity;
+	client->n_waiting--;
+	worker->n_waiting--;
+	return one;
+}
+
+/* ---- asking ---- */
+
+static void send_one(struct worker *worker, struct worker_client *client, uint64_t k, uint64_t intended_ns)
+{
+	worker->n_open += (uint64_t)conn_ask(&client->conn, k, intended_ns, (uint32_t)worker->load->n_clients);
+}
+
+/* Whether a request of that time is still part of the load. */
+static int may_ask(struct worker *worker, uint64_t intended_ns)
+{
+	struct worker_gate *gate = worker->gate;
+
+	if (intended_ns >= atomic_load(&gate->end_ns))
+		return 0;
+	if (worker->load->n_frames == 0 || intended_ns < gate->begin_ns)
+		return 1;
+	if (atomic_fetch_add(&gate->n_asked, 1) < worker->load->n_frames)
+		return 1;
+	atomic_store(&gate->end_ns, intended_ns);
+	return 0;
+}
+
+static int is_open_loop(const struct worker *worker)
+{
+	return worker->load->rate > 0 || worker->plan->request != NULL;
+}
+
+void worker_ask(struct worker *worker, struct worker_client *client)
+{
+	struct conn *conn = &client->conn;
+	const uint32_t most = (uint32_t)worker->load->n_inflight;
+
+	while (conn->state == CONN_READY && client->n_waiting > 0 && conn->n_open < conn->most_open) {
+		const struct worker_waiting one = pop(worker, client);
+		const uint64_t now_ns = clock_ns();
+
+		pthread_mutex_lock(&worker->lock);
+		if (worker_is_measured(worker, one.intended_ns))
+			histogram_add(&worker->total.waited, now_ns - one.intended_ns);
+		pthread_mutex_unlock(&worker->lock);
+		send_one(worker, client, one.k, one.intended_ns);
+	}
+	while (!is_open_loop(worker) && conn->state == CONN_READY && conn->n_open < most) {
+		const uint64_t now_ns = clock_ns();
+
+		if (!may_ask(worker, now_ns))
+			break;
+		send_one(worker, client, client->next_k++, now_ns);
+	}
+}
+
+static void arrive(struct worker *worker, struct worker_client *client, uint64_t k, uint64_t intended_ns)
+{
+	struct conn *conn = &client->conn;
+
+	if (conn->state == CONN_READY && client->n_waiting == 0 && conn->n_open < conn->most_open)
+		send_one(worker, client, k, intended_ns);
+	else if (conn->state == CONN_READY)
+		push(worker, client, &(struct worker_waiting){ k, intended_ns });
+}
+
+/* ---- the loop ---- */
+
+static void lose(struct worker *worker, struct worker_client *client)
+{
+	if (client->is_lost)
+		return;
+	client->is_lost = 1;
+	worker->n_lost++;
+	if (worker->error.code == PSR_OK)
+		worker->error = client->conn.why;
+	if (client->is_watched)
+		epoll_ctl(worker->epoll, EPOLL_CTL_DEL, client->conn.fd, NULL);
+	client->is_watched = 0;
+	pthread_mutex_lock(&worker->lock);
+	while (client->n_waiting > 0)
+		if (worker_is_measured(worker, pop(worker, client).intended_ns))
+			worker->total.n_failed[-client->conn.why.code]++;
+	pthread_mutex_unlock(&worker->lock);
+}
+
+/* Asks for the events that the connection wants now. */
+static void watch(struct worker *worker, struct worker_client *client)
+{
+	const uint32_t events = EPOLLIN | (client->conn.wants_out ? EPOLLOUT : 0);
+	struct epoll_event event = { .events = events, .data.ptr = client };
+
+	if (client->conn.state == CONN_OVER) {
+		lose(worker, client);
+		return;
+	}
+	if (client->is_watched && client->events == events)
+		return;
+	if (epoll_ctl(worker->epoll, client->is_watched ? EPOLL_CTL_MOD : EPOLL_CTL_ADD, client->conn.fd, &event) != 0) {
+		conn_fail(&client->conn, PSR_ERR_LIMIT, "the system watches no more connections: %s", strerror(errno));
+		lose(worker, client);
+		return;
+	}
+	client->is_watched = 1;
+	client->events = events;
+}
+
+/* Handles events until `until_ns`, or until something has happened. */
+static void wait_for_events(struct worker *worker, uint64_t until_ns)
+{
+	struct itimerspec timer = { .it_value = { (time_t)(until_ns / SECOND), (long)(until_ns % SECOND) } };
+	struct epoll_event event[EVENTS];
+	uint64_t n_rings;
+	int n;
+
+	if (until_ns != worker->timer_ns)
+		timerfd_settime(worker->timer, TFD_TIMER_ABSTIME, &timer, NULL);
+	worker->timer_ns = until_ns;
+	n = epoll_wait(worker->epoll, event, EVENTS, -1);
+	for (int i = 0; i < n; i++) {
+		struct worker_client *client = event[i].data.ptr;
+
+		if (client == NULL) {
+			if (read(worker->timer, &n_rings, sizeof n_rings) > 0)
+				worker->timer_ns = 0;
+			continue;
+		}
+		if (event[i].events & EPOLLOUT)
+			conn_flush(&client->conn);
+		if (event[i].events & (EPOLLIN | EPOLLHUP | EPOLLERR))
+			conn_read(&client->conn);
+		watch(worker, client);
+	}
+}
+
+/* A server that answers nobody for so long is given up. */
+static void check_silence(struct worker *worker, uint64_t now_ns)
+{
+	const uint64_t limit_ns = (uint64_t)worker->load->timeout * SECOND;
+
+	if (now_ns < worker->checked_ns + SECOND)
+		return;
+	worker->checked_ns = now_ns;
+	for (uint32_t i = 0; i < worker->n_clients; i++) {
+		struct worker_client *client = &worker->client[i];
+		const int is_asked = client->conn.state < CONN_READY || client->conn.n_open > 0;
+
+		if (client->conn.shared == NULL || client->conn.state == CONN_OVER || !is_asked)
+			continue;
+		if (now_ns > client->conn.heard_ns && now_ns - client->conn.heard_ns > limit_ns) {
+			worker->shared.now_ns = now_ns;
+			conn_fail(&client->conn, PSR_ERR_CONNECTION, "no answer within %" PRId64 " s", worker->load->timeout);
+			watch(worker, client);
+		}
+	}
+}
+
+static int set_up(struct worker *worker)
+{
+	const uint64_t deadline_ns = clock_ns() + (uint64_t)worker->load->timeout * SECOND;
+
+	for (uint32_t i = 0; i < worker->n_clients && worker->n_lost == 0; i++) {
+		struct worker_client *client = &worker->client[i];
+		const uint32_t index = worker->index + i * (uint32_t)worker->load->n_threads;
+
+		if (conn_open(&client->conn, &worker->shared, index, deadline_ns, &worker->error) != PSR_OK)
+			return worker->error.code;
+		watch(worker, client);
+	}
+	while (worker->n_ready < worker->n_clients && worker->n_lost == 0) {
+		wait_for_events(worker, clock_ns() + SECOND);
+		check_silence(worker, clock_ns());
+	}
+	return worker->error.code;
+}
+
+static int pass_gate(struct worker_gate *gate)
 {
 	int state;
 
@@ -87,95 +273,101 @@ static int pass_gate(struct bench_gate *gate)
 	return state > 0;
 }
 
-static void note_error(struct bench_worker *worker, uint64_t n_failed, const struct psr_error *why)
+/* The next request of a recording that is this thread's. */
+static const struct plan_request *next_recorded(struct worker *worker)
 {
-	worker->n_failed += n_failed;
-	if (worker->first_error.code == PSR_OK)
-		worker->first_error = *why;
+	const struct plan *plan = worker->plan;
+
+	while (worker->next_request < plan->n_requests
+	       && plan->request[worker->next_request].client % worker->load->n_threads != worker->index)
+		worker->next_request++;
+	return worker->next_request < plan->n_requests ? &plan->request[worker->next_request] : NULL;
 }
 
-/* Returns 0 if its share of the samples is full. */
-static int add_sample(struct bench_worker *worker, uint64_t latency_ns)
+/* Sends what is due. Returns when the next request is. */
+static uint64_t send_due(struct worker *worker)
 {
-	size_t share = BENCH_MAX_SAMPLES / (size_t)worker->options->n_clients;
-	uint64_t us = latency_ns / 1000;
-
-	if (worker->n_samples == worker->samples_capacity) {
-		size_t capacity = worker->samples_capacity == 0 ? 4096 : 2 * worker->samples_capacity;
-		uint32_t *grown = worker->n_samples < share ? realloc(worker->sample_us, capacity * sizeof *grown) : NULL;
-
-		if (grown == NULL)
-			return 0;
-		worker->sample_us = grown;
-		worker->samples_capacity = capacity;
-	}
-	worker->sample_us[worker->n_samples++] = us < UINT32_MAX ? (uint32_t)us : UINT32_MAX;
-	return worker->n_samples < share;
-}
-
-static void measure(struct bench_worker *worker)
-{
-	const struct bench_options *options = worker->options;
-	uint64_t start_ns = clock_ns(), length_ns = (uint64_t)options->seconds * 1000000000u;
-	int64_t n_open = 0;
-	int is_over = 0;
-
 	for (;;) {
-		struct psr_event event;
-		struct psr_error why;
-		uint64_t since_ns;
-		uint32_t id;
-		int got = 1;
+		const struct plan_request *recorded = worker->plan->request != NULL ? next_recorded(worker) : NULL;
+		struct worker_client *client;
+		uint64_t due_ns = UINT64_MAX, k;
 
-		while (!is_over && n_open < options->n_inflight && got > 0) {
-			turn_camera(worker);
-			if (psr_client_frame(worker->client, &worker->frame, &id, &why) == PSR_OK)
-				n_open++;
-			else
-				got = -1;
+		if (recorded != NULL)
+			due_ns = worker->gate->start_ns + recorded->due_ns;
+		else if (worker->load->rate > 0 && worker->plan->request == NULL)
+			due_ns = arrivals_due(&worker->arrivals);
+		if (due_ns > clock_ns() || !may_ask(worker, due_ns))
+			return due_ns;
+		if (recorded != NULL) {
+			k = worker->next_request++;
+			client = &worker->client[recorded->client / (uint32_t)worker->load->n_threads];
+		} else {
+			arrivals_advance(&worker->arrivals);
+			client = &worker->client[worker->turn++ % worker->n_clients];
+			for (uint32_t i = 0; i < worker->n_clients && client->is_lost; i++)
+				client = &worker->client[worker->turn++ % worker->n_clients];
+			k = client->next_k++;
 		}
-		if (n_open == 0 && got > 0)
-			break;
-		if (got > 0)
-			got = wait_for_frame(worker, &event, &why);
-		since_ns = clock_ns() - start_ns;
-		if (got == 0)
-			psr_fail(&why, PSR_ERR_CONNECTION, "%s: no frame within %d s", options->server, (int)options->timeout);
-		if (got <= 0) {
-			note_error(worker, n_open > 0 ? (uint64_t)n_open : 1, &why);
-			break;
-		}
-		n_open--;
-		if (!is_over)
-			is_over = since_ns >= length_ns;
-		if (event.type == PSR_EVENT_FAILED) {
-			note_error(worker, 1, &event.error);
-			continue;
-		}
-		if (!is_over) {
-			worker->n_frames++;
-			worker->n_bytes += event.bytes;
-		}
-		if (!add_sample(worker, event.latency_ns) && !is_over) {
-			length_ns = since_ns;
-			is_over = 1;
-		}
+		worker->shared.now_ns = clock_ns();
+		arrive(worker, client, k, due_ns);
+		watch(worker, client);
 	}
-	worker->elapsed_ns = length_ns;
 }
 
-void *bench_worker_run(void *userdata)
+/* Notes the processor time at the beginning and at the end of measuring. */
+static void note_use(struct worker *worker, uint64_t now_ns, uint64_t end_ns)
 {
-	struct bench_worker *worker = userdata;
-	struct psr_error err;
+	if (worker->used_from_ns == 0 && now_ns >= worker->gate->begin_ns)
+		worker->used_from_ns = clock_thread_ns();
+	if (worker->used_ns == 0 && now_ns >= end_ns)
+		worker->used_ns = clock_thread_ns() - worker->used_from_ns;
+}
 
-	worker->setup_code = warm_up(worker, &err);
-	if (worker->setup_code != PSR_OK)
-		worker->first_error = err;
+static void measure(struct worker *worker)
+{
+	struct worker_gate *gate = worker->gate;
+	const struct bench_load *load = worker->load;
+
+	if (load->rate > 0) {
+		arrivals_init(&worker->arrivals, gate->start_ns, load->rate * worker->n_clients / (double)load->n_clients,
+		              (double)worker->index / (double)load->n_threads);
+		if (load->is_poisson)
+			arrivals_set_poisson(&worker->arrivals, worker->plan->seed + worker->index);
+	}
+	for (uint32_t i = 0; i < worker->n_clients && !is_open_loop(worker); i++) {
+		worker_ask(worker, &worker->client[i]);
+		watch(worker, &worker->client[i]);
+	}
+	for (;;) {
+		const uint64_t due_ns = send_due(worker), now_ns = clock_ns(), end_ns = atomic_load(&gate->end_ns);
+		uint64_t until_ns = now_ns + SECOND / 4;
+
+		note_use(worker, now_ns, end_ns);
+		if (worker->n_lost == worker->n_clients
+		    || (now_ns >= end_ns
+		        && ((worker->n_open == 0 && worker->n_waiting == 0) || now_ns >= end_ns + BENCH_DRAIN_NS)))
+			break;
+		check_silence(worker, now_ns);
+		if (now_ns < end_ns && end_ns < until_ns)
+			until_ns = end_ns;
+		if (now_ns < end_ns && due_ns < until_ns)
+			until_ns = due_ns;
+		wait_for_events(worker, until_ns);
+	}
+	note_use(worker, UINT64_MAX, 0);
+	worker_count_unfinished(worker);
+}
+
+void *worker_run(void *userdata)
+{
+	struct worker *worker = userdata;
+
+	set_up(worker);
 	if (pass_gate(worker->gate))
 		measure(worker);
-	psr_client_close(worker->client);
-	worker->client = NULL;
-	scene_close(worker->scene);
+	pthread_mutex_lock(&worker->gate->lock);
+	worker->gate->n_over++;
+	pthread_cond_broadcast(&worker->gate->changed);
+	pthread_mutex_unlock(&worker->gate->lock);
 	return NULL;
 }

@@ -46,10 +46,11 @@ client/scene
 client/replay
 client/output
 client/draw
-client/bench/
-client/test/
 client/view/lens
 client/view/hand
+client/view/path
+client/bench/
+client/test/
 client/view/link client/view/home
 client/view/
 client/view/window
