@@ -8,5 +8,6 @@ int psr_turntable_main(int argc, char **argv);
 int psr_view_main(int argc, char **argv);
 int psr_test_main(int argc, char **argv);
 int psr_bench_main(int argc, char **argv);
+int psr_stats_main(int argc, char **argv);
 
 #endif

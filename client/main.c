@@ -15,6 +15,7 @@ static const struct {
 	{ "view", psr_view_main, "models in a window, to be turned, moved and lit; --term: in a terminal" },
 	{ "test", psr_test_main, "pictures of test suites, compared with what is expected" },
 	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
+	{ "stats", psr_stats_main, "what a server counts: connections, frames, bytes, memory" },
 };
 
 #define N_COMMANDS (sizeof commands / sizeof commands[0])

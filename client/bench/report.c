@@ -86,7 +86,7 @@ void report_print(const struct bench_result *result, const char *what)
 	if (measure->decode.n > 0)
 		print_histogram("decode", &measure->decode);
 	for (unsigned i = 0; i < MEASURE_STAGES; i++)
-		if (measure->stage[i].n > 0)
+		if (measure->stage[i].max > 0)
 			print_histogram(measure_stage_name(i), &measure->stage[i]);
 	print_ends(result);
 	printf("fairness (Jain) %.3f; processor time: this program %.2f s, psrd's frames %.2f s\n", result->fairness,
