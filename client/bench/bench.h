@@ -22,7 +22,7 @@ struct bench_load { /* how a plan's requests are offered */
 };
 
 struct bench_kept { /* an answer */
-	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since the load began; hash of the colour; k: plan_camera() */
+	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since measuring began; hash of the colour; k: bench_plan_camera() */
 	uint32_t client, kind;
 	uint16_t pass;
 	uint8_t has_hash;
@@ -45,7 +45,7 @@ struct bench_result {
 
 /* Opens all connections, then loads the server. on_row (may be NULL) is called each second. bench_result_fini() is due
  * also after an error. CONNECTION, LIMIT (file descriptors), MEMORY, and what the server refuses. */
-int bench_run(struct bench_result *result, const struct plan *plan, const struct bench_load *load,
+int bench_run(struct bench_result *result, const struct bench_plan *plan, const struct bench_load *load,
               void (*on_row)(const struct measure_row *row), struct psr_error *err);
 void bench_result_fini(struct bench_result *result);
 

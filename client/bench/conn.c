@@ -165,7 +165,7 @@ void conn_read(struct conn *conn)
 int conn_ask(struct conn *conn, uint64_t k, uint64_t intended_ns, uint32_t n_clients)
 {
 	struct conn_shared *shared = conn->shared;
-	const uint32_t kind = plan_kind_of(shared->plan, conn->index, k);
+	const uint32_t kind = bench_kind_of(shared->plan, conn->index, k);
 	struct psr_msg_frame frame = shared->plan->kind[kind].frame;
 	struct conn_request *request = conn->request;
 	struct psr_error err;
@@ -177,7 +177,7 @@ int conn_ask(struct conn *conn, uint64_t k, uint64_t intended_ns, uint32_t n_cli
 		conn_fail(conn, PSR_ERR_LIMIT, "the ids of a connection are used up");
 		return 0;
 	}
-	plan_camera(&frame.camera, shared->plan, conn->index, n_clients, k);
+	bench_plan_camera(&frame.camera, shared->plan, conn->index, n_clients, k);
 	if (conn->view > 0 && !shared->is_decoded && conn->capabilities & PSR_CAP_BASE)
 		frame.base = conn->base;
 	while ((code = psr_msg_frame_encode(&conn->out, conn->next_id, conn->view, &frame, &err)) == PSR_ERR_MEMORY)

@@ -10,7 +10,7 @@ enum conn_state { CONN_HELLO, CONN_OPENING, CONN_READY, CONN_OVER };
 
 struct conn_request {
 	uint32_t id, kind; /* id 0: this place is free */
-	uint64_t k;        /* its number; see plan_camera() */
+	uint64_t k;        /* its number; see bench_plan_camera() */
 	uint64_t intended_ns, first_ns; /* first_ns 0: no byte of the answer has come */
 	uint64_t bytes, decode_ns;
 	struct client_assembly *assembly; /* NULL: the picture is not decoded */
@@ -28,7 +28,7 @@ struct conn;
 
 /* What the connections of a thread share. */
 struct conn_shared {
-	const struct plan *plan;
+	const struct bench_plan *plan;
 	const char *server;
 	int is_view, is_decoded;
 	struct client_decoder *decoder; /* with is_decoded */

@@ -15,7 +15,7 @@ static void unexpected(struct conn *conn, const struct psr_message *message)
 
 static void open_next(struct conn *conn)
 {
-	const struct plan_model *model = &conn->shared->plan->model[conn->n_opened];
+	const struct bench_model *model = &conn->shared->plan->model[conn->n_opened];
 	struct psr_msg_open msg = { .resolution = conn->capabilities & PSR_CAP_RESOLUTION ? model->pixels : 0 };
 	struct psr_error err;
 	int code;
@@ -32,7 +32,7 @@ static void open_next(struct conn *conn)
 
 static void send_scenes(struct conn *conn)
 {
-	const struct plan *plan = conn->shared->plan;
+	const struct bench_plan *plan = conn->shared->plan;
 	struct psr_msg_scene *msg = &conn->shared->scene;
 	struct psr_error err;
 

@@ -5,10 +5,10 @@
 #include "client/cli/cli.h"
 
 /* Finds the model, or adds it. */
-static int find_model(uint32_t *at, struct plan *plan, const struct scene_model *model, uint32_t pixels,
+static int find_model(uint32_t *at, struct bench_plan *plan, const struct scene_model *model, uint32_t pixels,
                       struct psr_error *err)
 {
-	struct plan_model *grown;
+	struct bench_model *grown;
 
 	for (*at = 0; *at < plan->n_models; ++*at)
 		if (strcmp(plan->model[*at].name, model->name) == 0 && plan->model[*at].pixels == pixels)
@@ -25,7 +25,7 @@ static int find_model(uint32_t *at, struct plan *plan, const struct scene_model 
 	return PSR_OK;
 }
 
-int plan_add_models(struct plan *plan, struct plan_kind *kind, const uint32_t *pixels, struct psr_error *err)
+int bench_plan_add_models(struct bench_plan *plan, struct bench_kind *kind, const uint32_t *pixels, struct psr_error *err)
 {
 	const struct scene *scene = kind->scene;
 	int code = PSR_OK;
@@ -38,10 +38,10 @@ int plan_add_models(struct plan *plan, struct plan_kind *kind, const uint32_t *p
 	return code;
 }
 
-static int add_kind(struct plan *plan, const struct mix_line *line, struct psr_client *client, int timeout_ms,
+static int add_kind(struct bench_plan *plan, const struct mix_line *line, struct psr_client *client, int timeout_ms,
                     struct psr_error *err)
 {
-	struct plan_kind *kind = &plan->kind[plan->n_kinds];
+	struct bench_kind *kind = &plan->kind[plan->n_kinds];
 	const double aspect = (double)line->frame.width / line->frame.height;
 	uint32_t *pixels;
 	int code = scene_open(&kind->scene, &line->scene, client, timeout_ms, err);
@@ -58,12 +58,12 @@ static int add_kind(struct plan *plan, const struct mix_line *line, struct psr_c
 	for (uint32_t i = 0; code == PSR_OK && i < line->scene.n_instances; i++)
 		pixels[i] = line->scene.pixels;
 	if (code == PSR_OK)
-		code = plan_add_models(plan, kind, pixels, err);
+		code = bench_plan_add_models(plan, kind, pixels, err);
 	free(pixels);
 	return code;
 }
 
-int plan_make(struct plan *plan, const struct mix *mix, const char *server, int timeout_ms, struct psr_error *err)
+int bench_plan_make(struct bench_plan *plan, const struct mix *mix, const char *server, int timeout_ms, struct psr_error *err)
 {
 	struct psr_client *client = NULL;
 	double total = 0, sum = 0;
@@ -83,7 +83,7 @@ int plan_make(struct plan *plan, const struct mix *mix, const char *server, int 
 	return code;
 }
 
-void plan_fini(struct plan *plan)
+void bench_plan_fini(struct bench_plan *plan)
 {
 	for (uint32_t i = 0; i < plan->n_kinds; i++) {
 		scene_close(plan->kind[i].scene);
@@ -96,14 +96,14 @@ void plan_fini(struct plan *plan)
 }
 
 /* A number of its own for each client. */
-static uint64_t random_of(const struct plan *plan, uint32_t client)
+static uint64_t random_of(const struct bench_plan *plan, uint32_t client)
 {
 	uint64_t random = plan->seed ^ ((uint64_t)client + 1) << 32;
 
 	return random_next(&random);
 }
 
-uint32_t plan_kind_of(const struct plan *plan, uint32_t client, uint64_t k)
+uint32_t bench_kind_of(const struct bench_plan *plan, uint32_t client, uint64_t k)
 {
 	uint64_t random = random_of(plan, client) + k;
 	double at;
@@ -116,11 +116,11 @@ uint32_t plan_kind_of(const struct plan *plan, uint32_t client, uint64_t k)
 	return kind;
 }
 
-void plan_camera(struct psr_camera *camera, const struct plan *plan, uint32_t client, uint32_t n_clients, uint64_t k)
+void bench_plan_camera(struct psr_camera *camera, const struct bench_plan *plan, uint32_t client, uint32_t n_clients, uint64_t k)
 {
 	if (plan->request != NULL)
 		*camera = plan->request[k].camera;
 	else
-		flight_at(camera, &plan->kind[plan_kind_of(plan, client, k)].flight, k, (double)client / n_clients,
+		flight_at(camera, &plan->kind[bench_kind_of(plan, client, k)].flight, k, (double)client / n_clients,
 		          random_of(plan, client));
 }

@@ -32,7 +32,7 @@ static int reserve_files(const struct bench_load *load, struct psr_error *err)
 	                " file descriptors at most; `ulimit -n` raises that", load->n_clients, (uint64_t)limit.rlim_max);
 }
 
-static int start(struct run *run, const struct plan *plan, const struct bench_load *load, struct psr_error *err)
+static int start(struct run *run, const struct bench_plan *plan, const struct bench_load *load, struct psr_error *err)
 {
 	for (uint32_t i = 0; i < run->n_workers; i++) {
 		struct worker *worker = &run->worker[i];
@@ -52,7 +52,7 @@ static int start(struct run *run, const struct plan *plan, const struct bench_lo
 }
 
 /* Waits until all threads are ready, and opens the gate, or sends them home. */
-static int open_gate(struct run *run, const struct bench_load *load, const struct plan *plan, struct psr_error *err)
+static int open_gate(struct run *run, const struct bench_load *load, const struct bench_plan *plan, struct psr_error *err)
 {
 	struct worker_gate *gate = &run->gate;
 	int code = PSR_OK;
@@ -197,7 +197,7 @@ static int sum_up(struct run *run, struct psr_error *err)
 	return gather_kept(result, run, err);
 }
 
-int bench_run(struct bench_result *result, const struct plan *plan, const struct bench_load *load,
+int bench_run(struct bench_result *result, const struct bench_plan *plan, const struct bench_load *load,
               void (*on_row)(const struct measure_row *row), struct psr_error *err)
 {
 	struct run run = { .result = result, .n_workers = (uint32_t)load->n_threads, .on_row = on_row,

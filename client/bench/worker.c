@@ -274,9 +274,9 @@ static int pass_gate(struct worker_gate *gate)
 }
 
 /* The next request of a recording that is this thread's. */
-static const struct plan_request *next_recorded(struct worker *worker)
+static const struct bench_request *next_recorded(struct worker *worker)
 {
-	const struct plan *plan = worker->plan;
+	const struct bench_plan *plan = worker->plan;
 
 	while (worker->next_request < plan->n_requests
 	       && plan->request[worker->next_request].client % worker->load->n_threads != worker->index)
@@ -288,7 +288,7 @@ static const struct plan_request *next_recorded(struct worker *worker)
 static uint64_t send_due(struct worker *worker)
 {
 	for (;;) {
-		const struct plan_request *recorded = worker->plan->request != NULL ? next_recorded(worker) : NULL;
+		const struct bench_request *recorded = worker->plan->request != NULL ? next_recorded(worker) : NULL;
 		struct worker_client *client;
 		uint64_t due_ns = UINT64_MAX, k;
 

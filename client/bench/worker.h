@@ -35,7 +35,7 @@ struct worker_client {
 };
 
 struct worker {
-	const struct plan *plan;
+	const struct bench_plan *plan;
 	const struct bench_load *load;
 	struct worker_gate *gate;
 	uint32_t index, n_clients; /* it has connections index, index + load.n_threads, ... */

@@ -23,7 +23,7 @@ static void keep(struct worker *worker, const struct conn *conn, const struct co
 		return;
 	worker->kept = grown;
 	grown[worker->n_kept++] = (struct bench_kept){
-		.due_ns = request->intended_ns - worker->gate->start_ns, .k = request->k, .bytes = request->bytes,
+		.due_ns = request->intended_ns - worker->gate->begin_ns, .k = request->k, .bytes = request->bytes,
 		.latency_ns = worker->shared.now_ns - request->intended_ns, .client = conn->index, .kind = request->kind,
 		.pass = end->pass, .hash = end->hash[PSR_PLANE_COLOR], .has_hash = end->has_hashes,
 	};
