@@ -7,7 +7,7 @@
 
 #define BENCH_MAX_CLIENTS 100000
 #define BENCH_MAX_THREADS 256
-#define BENCH_DRAIN_NS UINT64_C(5000000000) /* that what is under way at the end gets to arrive */
+#define BENCH_DRAIN_NS UINT64_C(5000000000) /* for what is under way at the end, unless n_frames are asked for */
 
 struct bench_load { /* how a plan's requests are offered */
 	const char *server;

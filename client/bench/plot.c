@@ -42,7 +42,7 @@ static int open_gnuplot(FILE **out, const char *path, const char *what, struct p
 	write_quoted(*out, path);
 	fputs("\nset multiplot layout 1,2 title ", *out);
 	write_quoted(*out, what);
-	fputs(" noenhanced\nset grid\nset key top left\n", *out);
+	fputs(" noenhanced\nset grid\nset key below horizontal\n", *out);
 	return PSR_OK;
 }
 
@@ -103,11 +103,11 @@ int plot_sweep(const struct sweep *sweep, const struct sweep_points *points, con
 	for (uint32_t i = 0; i < points->n; i++)
 		fprintf(to, "%.6g %.4f %.4f %.4f %d\n", points->point[i].load, points->point[i].frames_per_s,
 		        points->point[i].ms.p50, points->point[i].ms.p99, (int)i == points->knee);
-	fprintf(to, "EOD\nset logscale x 2\nset xlabel '%s'\nset ylabel 'frames/s'\nset yrange [0:*]\nset key bottom right\n"
+	fprintf(to, "EOD\nset logscale x 2\nset xlabel '%s'\nset ylabel 'frames/s'\nset yrange [0:*]\n"
 	        "plot $points using 1:2 with linespoints lw 2 notitle, "
-	        "'' using 1:($5 == 1 ? $2 : NaN) with points pt 7 ps 2 title 'knee'\n", label);
-	fputs("set ylabel 'latency, ms'\nset logscale y\nset yrange [*:*]\nset key top left\n"
+	        "'' using 1:($5 == 1 ? $2 : NaN) with points pt 7 ps 2 lc rgb 'black' title 'knee'\n", label);
+	fputs("set ylabel 'latency, ms'\nset logscale y\nset yrange [*:*]\n"
 	      "plot $points using 1:3 with linespoints lw 2 title 'p50', '' using 1:4 with linespoints lw 2 title 'p99', "
-	      "'' using 1:($5 == 1 ? $4 : NaN) with points pt 7 ps 2 title 'knee'\n", to);
+	      "'' using 1:($5 == 1 ? $4 : NaN) with points pt 7 ps 2 lc rgb 'black' title 'knee'\n", to);
 	return close_gnuplot(to, err);
 }
