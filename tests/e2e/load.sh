@@ -41,6 +41,7 @@ holds "some are superseded" "$(number "$json" superseded) > 0"
 # --- a second that psrd does not live through ---
 # Stops psrd for a second as soon as a load has measured its first one. The load's latencies: p99 and max.
 stopped() { # bench's options
+	: >"$work/rows"
 	bench --model dice --clients 1 --seconds 6 --warmup 0 "$@" >"$work/rows" 2>&1 &
 	local load=$!
 	until grep -q frames/s "$work/rows" || ! kill -0 $load 2>/dev/null; do sleep 0.05; done
