@@ -124,7 +124,7 @@ L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
 
-.PHONY: all demo figures latency mutations viewer-picture studies test test-all models models-all install help clean deps compile
+.PHONY: all demo figures latency load mutations viewer-picture studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -323,7 +323,7 @@ $(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o)
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
 .PHONY: fuzz fuzz-bin soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
-.PHONY: bench-first bench-reproject bench-simd bench-view
+.PHONY: bench-first bench-load bench-reproject bench-simd bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -398,6 +398,9 @@ bench-reproject: compile $(REPROJECT_BENCH) ## bench-reproject: what warping rec
 bench-view: compile $(VIEW_BENCH) $(BUILD)/tests/tools/relay ## bench-view: frames a second, latency and time until sharp of a viewer's link, by network
 	$(Q)$(VIEW_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd $(BUILD)/tests/tools/relay
 
+bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
+	$(Q)BUILD=$(BUILD) tests/bench/load.sh
+
 bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares
 	$(Q)$(POOL_BENCH)
 
@@ -407,6 +410,11 @@ demo: deps ## demo: install what is missing, build, draw pictures of several mod
 
 latency: compile $(LATENCY) $(BUILD)/tests/tools/relay ## latency: what a viewer shows through slow links along movements of a hand; renews docs/latency.md (only="50:10 200:1000", ms:Mbit/s)
 	$(Q)BUILD=$(BUILD) docs/latency.sh $(only)
+
+load: deps ## load: install what is missing, build, load psrd with more and more clients and requests; renews docs/load.md
+	$(Q).ci/deps $(DEPS_STUDY)
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/load.sh
 
 figures: deps ## figures: install what is missing, build, draw the thesis's figures beside the ray-traced truth, renew docs/figures.md (minutes)
 	$(Q).ci/deps $(DEPS_STUDY)

@@ -18,6 +18,7 @@
 #include "base/clock.h"
 #include "base/random.h"
 #include "client/lib/internal.h"
+#include "stamps.h"
 
 #define CHUNK 16384
 #define CONNECT_MS 2000
@@ -28,7 +29,7 @@ enum way { UP, DOWN };   /* from the client; to the client */
 enum fault { RESET, CLOSE, CUT };
 
 static struct options {
-	const char *listen, *to;
+	const char *listen, *to, *stamps;
 	double delay_ms, jitter_ms, rate[2], stall_ms, every_ms; /* rate: Mbit/s; 0: as fast as it goes */
 	int64_t split, queue, fault[3][2], n_faulty, seed; /* fault: after so many bytes; -1: never */
 } options = { .listen = "127.0.0.1:0", .every_ms = 1000, .queue = 1 << 20,
@@ -55,11 +56,13 @@ struct link {            /* a connection */
 	struct flow flow[2];
 	int is_faulty, is_dead;
 	uint64_t random;
+	struct stamps stamps;
 };
 
 static int epoll_fd;
 static struct link *links;
 static uint64_t now_ns, start_ns;
+static FILE *stamps_file;
 
 static void die(const char *what)
 {
@@ -158,6 +161,8 @@ static void take(struct flow *flow)
 		flow->has_eof |= is_over;
 		return;
 	}
+	if (stamps_file != NULL && way_of(flow) == UP)
+		stamps_take(&flow->link->stamps, UP, chunk->data, (size_t)n, clock_ns(), stamps_file);
 	flow->due_ns = due_ns > flow->due_ns ? due_ns : flow->due_ns; /* in order */
 	chunk->next = NULL;
 	chunk->due_ns = flow->due_ns;
@@ -221,6 +226,8 @@ static void pass(struct flow *flow)
 	flow->is_blocked = sent < 0;
 	if (sent < 0)
 		return;
+	if (stamps_file != NULL && way_of(flow) == DOWN)
+		stamps_take(&flow->link->stamps, DOWN, chunk->data + chunk->sent, (size_t)sent, clock_ns(), stamps_file);
 	counts.bytes[way_of(flow)] += (uint64_t)sent;
 	flow->passed += (uint64_t)sent;
 	flow->queued -= (uint64_t)sent;
@@ -420,6 +427,8 @@ int main(int argc, char **argv)
 		FAULT("cut-down", options.fault[CUT][DOWN], "The same from psrd."),
 		{ .name = "faulty", .type = PSR_OPT_INT, .value = &options.n_faulty, .arg = "N", .max = 9e18,
 		  .help = "These six happen to the first N connections alone." },
+		{ .name = "stamps", .type = PSR_OPT_STRING, .value = &options.stamps, .arg = "FILE",
+		  .help = "Microseconds from each FRAME, as it comes here, to its FRAME_END, as it leaves, a line each." },
 		{ .name = "seed", .type = PSR_OPT_INT, .value = &options.seed, .arg = "N", .max = 9e15,
 		  .help = "Of all that is random." },
 		{ 0 },
@@ -438,6 +447,10 @@ int main(int argc, char **argv)
 		code = psr_address_check(options.to, &err);
 	if (code != PSR_OK)
 		return psr_cli_fail("relay", &err);
+	if (options.stamps != NULL && (stamps_file = fopen(options.stamps, "w")) == NULL)
+		code = psr_fail(&err, PSR_ERR_IO, "--stamps %.300s: %s", options.stamps, strerror(errno));
+	if (code != PSR_OK)
+		return psr_cli_fail("relay", &err);
 	signals = open_signals();
 	listener = open_listener(&err);
 	if (listener < 0)
@@ -446,5 +459,7 @@ int main(int argc, char **argv)
 	printf("connections %" PRIu64 " up %" PRIu64 " down %" PRIu64 " resets %" PRIu64 " closes %" PRIu64 " cuts %" PRIu64
 	       "\n", counts.connections, counts.bytes[UP], counts.bytes[DOWN], counts.faults[RESET], counts.faults[CLOSE],
 	       counts.faults[CUT]);
+	if (stamps_file != NULL)
+		fclose(stamps_file);
 	return 0;
 }
