@@ -3,9 +3,11 @@
 #include "base/clock.h"
 #include "worker.h"
 
+/* With n_frames all requests since begin_ns were counted when they were sent, and no others were sent. */
 int worker_is_measured(const struct worker *worker, uint64_t intended_ns)
 {
-	return intended_ns >= worker->gate->begin_ns && intended_ns < atomic_load(&worker->gate->end_ns);
+	return intended_ns >= worker->gate->begin_ns
+	       && (worker->load->n_frames > 0 || intended_ns < atomic_load(&worker->gate->end_ns));
 }
 
 /* Memory for kept answers grows by doubling; without memory fewer are kept. */
