@@ -34,7 +34,6 @@ int conn_open(struct conn *conn, struct conn_shared *shared, uint32_t index, uin
 	if (code != PSR_OK)
 		return code;
 	psr_framer_init(&conn->framer, PSR_SERVER, conn->in, IN_BYTES);
-	conn->heard_ns = clock_ns();
 	while (psr_msg_hello_encode(&conn->out, &hello, NULL) == PSR_ERR_MEMORY && conn_grow(conn)) {
 	}
 	conn_flush(conn);
@@ -151,8 +150,8 @@ void conn_read(struct conn *conn)
 		          strerror(errno));
 		return;
 	}
-	conn->shared->now_ns = conn->heard_ns = clock_ns();
-	conn->n_received += (uint64_t)n;
+	conn->shared->now_ns = clock_ns();
+	conn->shared->n_received += (uint64_t)n;
 	psr_framer_filled(&conn->framer, (size_t)n);
 	while (conn->state != CONN_OVER && (got = psr_framer_next(&conn->framer, &message, &err)) > 0)
 		conn_take(conn, &message);

@@ -33,6 +33,7 @@ struct conn_shared {
 	int is_view, is_decoded;
 	struct client_decoder *decoder; /* with is_decoded */
 	uint64_t now_ns;                /* when the bytes in work were read; clock_ns() */
+	uint64_t n_received;            /* bytes of all connections */
 	struct psr_msg_frame_begin begin; /* scratch */
 	struct psr_msg_frame_end end;
 	struct psr_msg_scene scene;
@@ -54,7 +55,6 @@ struct conn {
 	uint8_t *in;
 	struct psr_buf out;
 	size_t out_sent;
-	uint64_t heard_ns, n_received;
 	uint32_t next_id, control_id, scene_id, n_opened, base;
 	uint32_t *handle;        /* of each model of the plan */
 	uint64_t capabilities;

@@ -218,25 +218,25 @@ static void wait_for_events(struct worker *worker, uint64_t until_ns)
 	}
 }
 
-/* A server that answers nobody for so long is given up. */
-static void check_silence(struct worker *worker, uint64_t now_ns)
+/* A server that says nothing to anybody for so long is given up. Looks are counted, not time: while this program itself
+ * did not run, nobody was silent. */
+static void check_silence(struct worker *worker, uint64_t now_ns, int is_waiting)
 {
-	const uint64_t limit_ns = (uint64_t)worker->load->timeout * SECOND;
-
 	if (now_ns < worker->checked_ns + SECOND)
 		return;
 	worker->checked_ns = now_ns;
+	worker->n_silent = is_waiting && worker->n_heard == worker->shared.n_received ? worker->n_silent + 1 : 0;
+	worker->n_heard = worker->shared.n_received;
+	if (worker->n_silent <= worker->load->timeout)
+		return;
+	worker->shared.now_ns = now_ns;
 	for (uint32_t i = 0; i < worker->n_clients; i++) {
 		struct worker_client *client = &worker->client[i];
-		const int is_asked = client->conn.state < CONN_READY || client->conn.n_open > 0;
 
-		if (client->conn.shared == NULL || client->conn.state == CONN_OVER || !is_asked)
+		if (client->conn.shared == NULL)
 			continue;
-		if (now_ns > client->conn.heard_ns && now_ns - client->conn.heard_ns > limit_ns) {
-			worker->shared.now_ns = now_ns;
-			conn_fail(&client->conn, PSR_ERR_CONNECTION, "no answer within %" PRId64 " s", worker->load->timeout);
-			watch(worker, client);
-		}
+		conn_fail(&client->conn, PSR_ERR_CONNECTION, "no answer within %" PRId64 " s", worker->load->timeout);
+		watch(worker, client);
 	}
 }
 
@@ -254,7 +254,7 @@ static int set_up(struct worker *worker)
 	}
 	while (worker->n_ready < worker->n_clients && worker->n_lost == 0) {
 		wait_for_events(worker, clock_ns() + SECOND);
-		check_silence(worker, clock_ns());
+		check_silence(worker, clock_ns(), 1);
 	}
 	return worker->error.code;
 }
@@ -354,7 +354,7 @@ static void measure(struct worker *worker)
 		note_use(worker, now_ns, end_ns);
 		if (worker->n_lost == worker->n_clients || is_over(worker, now_ns, end_ns))
 			break;
-		check_silence(worker, now_ns);
+		check_silence(worker, now_ns, worker->n_open > 0);
 		if (now_ns < end_ns && end_ns < until_ns)
 			until_ns = end_ns;
 		if (now_ns < end_ns && due_ns < until_ns)

@@ -47,7 +47,9 @@ struct worker {
 	uint64_t next_request;     /* of a recording */
 	uint32_t turn;             /* whose is the next request of an open loop */
 	uint32_t n_ready, n_lost;
-	uint64_t n_open, n_seen, checked_ns, timer_ns;
+	uint64_t n_open, n_seen, timer_ns;
+	uint64_t checked_ns, n_heard; /* when silence was looked for, and the bytes that had come by then */
+	int64_t n_silent;          /* looks since the server said anything */
 	uint64_t used_ns, used_from_ns; /* processor time */
 	struct bench_kept *kept;
 	size_t n_kept;
