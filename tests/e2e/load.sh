@@ -16,7 +16,7 @@ stat() { psr stats --server "$server" --json >"$work/stats" && number "$work/sta
 of() { tr -d '\n\t ' <"$json" | sed -n "s/.*\"$1\":{[^}]*\"$2\":\([-+0-9.eE]*\).*/\1/p"; } # object key
 
 ulimit -S -n 4096 2>/dev/null
-start_psrd --models tests/golden --threads 2 --max-clients 1100
+start_psrd --models tests/golden --threads 2 --max-clients 1100 --frame-timeout 600
 
 # --- counts ---
 frames=$(stat frames) connections=$(stat connections_total)
