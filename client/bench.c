@@ -198,12 +198,12 @@ static int parse(struct command *command, int argc, char **argv, struct psr_erro
 		          "size=640x480 path=zoom; see psr-mix(5). The options below are their defaults." },
 	};
 	const struct psr_cli cli = {
-		"psr bench --model NAME|--mix FILE [--clients N] [--rate R] [--seconds S] [models, camera, light, quality]",
-		"Loads a server with many clients and measures. Closed loop: each client asks for the next picture when one has "
+		.usage = "psr bench --model NAME|--mix FILE [--clients N] [--rate R] [--seconds S] [models, camera, light, quality]",
+		.summary = "Loads a server with many clients and measures. Closed loop: each client asks for the next picture when one has "
 		"come. Open loop (--rate): requests are due at times of their own, and latency counts from then, so that what a "
 		"slow server makes wait is seen. Pictures are not decoded.",
-		list.opt,
-		SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
+		.opts = list.opt,
+		.footer = SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
 	};
 	int code;
 
@@ -215,7 +215,7 @@ static int parse(struct command *command, int argc, char **argv, struct psr_erro
 	add_searches(&list, command);
 	add_checks(&list, command);
 	add_results(&list, command);
-	code = psr_cli_parse(&cli, argc, argv, NULL, err);
+	code = psr_command_parse("bench", &cli, argc, argv, NULL, err);
 	return code == PSR_OK ? check(command, err) : code;
 }
 

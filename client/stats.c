@@ -154,15 +154,15 @@ int psr_stats_main(int argc, char **argv)
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
-		"psr stats [--server ADDR] [--watch] [--json|--prometheus]",
-		"Prints what a server counts: connections, models, frames, bytes, memory, builds; of the whole server since its "
+		.usage = "psr stats [--server ADDR] [--watch] [--json|--prometheus]",
+		.summary = "Prints what a server counts: connections, models, frames, bytes, memory, builds; of the whole server since its "
 		"start.",
-		opts,
-		PSR_EXIT_CODES,
+		.opts = opts,
+		.footer = PSR_EXIT_CODES,
 	};
 	struct psr_client *client = NULL;
 	struct psr_error err;
-	int code = psr_cli_parse(&cli, argc, argv, NULL, &err);
+	int code = psr_command_parse("stats", &cli, argc, argv, NULL, &err);
 
 	if (code > 0)
 		return 0;

@@ -82,7 +82,8 @@ static int read_file(struct mix *mix, const struct mix_line *said, const char *f
 {
 	struct reader reader = { .mix = mix, .said = said };
 	struct optlist list = { .n = 0 };
-	const struct psr_cli cli = { "", "", list.opt, NULL };
+	const struct psr_cli cli = { .opts = list.opt };
+	struct wordfile words = { .path = file, .cli = &cli, .on_line = on_line, .userdata = &reader };
 	const struct psr_opt weight[] = {
 		{ .name = "weight", .type = PSR_OPT_REAL, .value = &reader.line.weight, .arg = "W", .min = 1e-6, .max = 1e6 },
 	};
@@ -91,7 +92,7 @@ static int read_file(struct mix *mix, const struct mix_line *said, const char *f
 	begin_line(&reader);
 	mix_add_options(&list, &reader.line);
 	OPTLIST_ADD(&list, weight);
-	code = wordfile_read(&mix->text, file, &cli, on_line, &reader, err);
+	code = wordfile_read(&words, &mix->text, err);
 	scene_wish_fini(&reader.line.scene); /* of a line that an error has cut short */
 	if (code == PSR_OK && mix->n == 0)
 		code = psr_fail(err, PSR_ERR_ARG, "%.300s has no line; a line is such as weight=2 model=engine size=640x480",

@@ -102,12 +102,12 @@ refuses "a model that the folder lacks" 3 "no .psr file in .* is the server's di
 
 # --- mixes and options that are wrong ---
 mix() { printf '%b' "$1" >"$work/mix" && psr bench --server "$server" --mix "$work/mix" --frames 1; }
-refuses "an unknown word" 2 "mix, line 2, column 12: .*colour" mix 'model=dice\nmodel=dice colour=red\n'
-refuses "a weight of nothing" 2 "mix, line 1, column 12: .*weight" mix 'model=dice weight=0\n'
-refuses "a line without a model" 2 "mix, line 1, column 1: .*model" mix 'size=64x48\n'
+refuses "an unknown word" 2 "mix:2:12: .*colour" mix 'model=dice\nmodel=dice colour=red\n'
+refuses "a weight of nothing" 2 "mix:1:12: .*weight" mix 'model=dice weight=0\n'
+refuses "a line without a model" 2 "mix:1:1: .*model" mix 'size=64x48\n'
 refuses "a path that is no file" 3 "cannot read nosuch" mix 'model=dice path=nosuch\n'
 refuses "an empty mix" 2 "has no line" mix '# nothing\n'
-refuses "seventeen lines" 5 "line 17, column 1: a mix has at most 16 lines" mix "$(for _ in $(seq 17); do printf 'model=dice\\n'; done)"
+refuses "seventeen lines" 5 "mix:17:1: a mix has at most 16 lines" mix "$(for _ in $(seq 17); do printf 'model=dice\\n'; done)"
 refuses "a mix beside a model" 2 "its lines say which models" bench --mix "$work/mix" --model dice
 refuses "an open and a closed loop" 2 "--rate excludes --inflight" bench --model dice --rate 5 --inflight 2
 refuses "a sweep of nothing" 2 "--sweep takes" bench --model dice --sweep clients=4
@@ -142,6 +142,7 @@ check "metrics are those of Prometheus" awk '
 	{ exit 1 }
 	END { exit n < 20 }' "$work/metrics"
 check "each id that psrd counts has a name" test "$(psr stats --server "$server" | wc -l)" -eq "$(grep -c '^psrd_' "$work/metrics")"
+: >"$work/watch"
 psr stats --server "$server" --watch >"$work/watch" &
 watch=$!
 until grep -q '^frames .*/s$' "$work/watch" || ! kill -0 $watch 2>/dev/null; do sleep 0.05; done
