@@ -22,7 +22,8 @@ struct bench_load { /* how a plan's requests are offered */
 };
 
 struct bench_kept { /* an answer */
-	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since measuring began; hash of the colour; k: bench_plan_camera() */
+	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since measuring began; hash: of the colour; k: of
+	                                              * bench_plan_camera() */
 	uint32_t client, kind;
 	uint16_t pass;
 	uint8_t has_hash;

@@ -1,5 +1,5 @@
-/* A connection of a load: never blocks, and holds no picture unless asked to. Its owner watches the socket and gives the
- * time. */
+/* A connection of a load: never blocks, and holds no picture unless asked to. Its owner watches the socket and gives
+ * the time. */
 #ifndef PSR_CLIENT_BENCH_CONN_H
 #define PSR_CLIENT_BENCH_CONN_H
 

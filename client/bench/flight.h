@@ -20,8 +20,8 @@ struct flight {
 /* Finds what is wrong with a path and a view without a scene. ARG. */
 int flight_check(const char *path, const struct view_wish *view, struct psr_error *err);
 
-/* Prepares the way in this scene, which must outlive it. flight_fini() is due also after an error. ARG, MEMORY, and what
- * reading the path's file says. */
+/* Prepares the way in this scene, which must outlive it. flight_fini() is due also after an error. ARG, MEMORY, and
+ * what reading the path's file says. */
 int flight_make(struct flight *flight, const char *path, const struct view_wish *view, const struct scene *scene,
                 double aspect, struct psr_error *err);
 void flight_fini(struct flight *flight);

@@ -25,7 +25,8 @@ static int find_model(uint32_t *at, struct bench_plan *plan, const struct scene_
 	return PSR_OK;
 }
 
-int bench_plan_add_models(struct bench_plan *plan, struct bench_kind *kind, const uint32_t *pixels, struct psr_error *err)
+int bench_plan_add_models(struct bench_plan *plan, struct bench_kind *kind, const uint32_t *pixels,
+                          struct psr_error *err)
 {
 	const struct scene *scene = kind->scene;
 	int code = PSR_OK;
@@ -63,7 +64,8 @@ static int add_kind(struct bench_plan *plan, const struct mix_line *line, struct
 	return code;
 }
 
-int bench_plan_make(struct bench_plan *plan, const struct mix *mix, const char *server, int timeout_ms, struct psr_error *err)
+int bench_plan_make(struct bench_plan *plan, const struct mix *mix, const char *server, int timeout_ms,
+                    struct psr_error *err)
 {
 	struct psr_client *client = NULL;
 	double total = 0, sum = 0;
@@ -116,7 +118,8 @@ uint32_t bench_kind_of(const struct bench_plan *plan, uint32_t client, uint64_t 
 	return kind;
 }
 
-void bench_plan_camera(struct psr_camera *camera, const struct bench_plan *plan, uint32_t client, uint32_t n_clients, uint64_t k)
+void bench_plan_camera(struct psr_camera *camera, const struct bench_plan *plan, uint32_t client, uint32_t n_clients,
+                       uint64_t k)
 {
 	if (plan->request != NULL)
 		*camera = plan->request[k].camera;

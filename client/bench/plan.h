@@ -38,16 +38,19 @@ struct bench_plan {
 	uint32_t n_clients;      /* of the recording */
 };
 
-/* Opens all models of the mix on a connection of its own, which waits while the server builds, and closes it. bench_plan_fini()
- * is due also after an error. The errors of scene_open(), flight_make() and psr_client_connect(). */
-int bench_plan_make(struct bench_plan *plan, const struct mix *mix, const char *server, int timeout_ms, struct psr_error *err);
+/* Opens all models of the mix on a connection of its own, which waits while the server builds, and closes it.
+ * bench_plan_fini() is due also after an error. The errors of scene_open(), flight_make() and psr_client_connect(). */
+int bench_plan_make(struct bench_plan *plan, const struct mix *mix, const char *server, int timeout_ms,
+                    struct psr_error *err);
 void bench_plan_fini(struct bench_plan *plan);
 
 /* Adds the models of the kind's scene. MEMORY. */
-int bench_plan_add_models(struct bench_plan *plan, struct bench_kind *kind, const uint32_t *pixels, struct psr_error *err);
+int bench_plan_add_models(struct bench_plan *plan, struct bench_kind *kind, const uint32_t *pixels,
+                          struct psr_error *err);
 
 /* Which kind request k of a client is, and its camera. */
 uint32_t bench_kind_of(const struct bench_plan *plan, uint32_t client, uint64_t k);
-void bench_plan_camera(struct psr_camera *camera, const struct bench_plan *plan, uint32_t client, uint32_t n_clients, uint64_t k);
+void bench_plan_camera(struct psr_camera *camera, const struct bench_plan *plan, uint32_t client, uint32_t n_clients,
+                       uint64_t k);
 
 #endif

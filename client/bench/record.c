@@ -67,7 +67,8 @@ static cJSON *kept_json(const struct bench_plan *plan, const struct bench_result
 	return json;
 }
 
-int record_write(const char *path, const struct bench_plan *plan, const struct bench_result *result, struct psr_error *err)
+int record_write(const char *path, const struct bench_plan *plan, const struct bench_result *result,
+                 struct psr_error *err)
 {
 	struct outfile file;
 	int code = outfile_open(&file, path, OUTFILE_PLAIN, err);
@@ -162,7 +163,8 @@ static int open_kind(struct bench_plan *plan, const cJSON *report, struct psr_cl
 	return code;
 }
 
-static int open_kinds(struct bench_plan *plan, const cJSON *head, const char *server, int timeout_ms, struct psr_error *err)
+static int open_kinds(struct bench_plan *plan, const cJSON *head, const char *server, int timeout_ms,
+                      struct psr_error *err)
 {
 	const cJSON *kinds = cJSON_GetObjectItemCaseSensitive(head, "kinds"), *kind;
 	const double clients = number(head, "clients", 1, BENCH_MAX_CLIENTS);

@@ -52,7 +52,8 @@ static int start(struct run *run, const struct bench_plan *plan, const struct be
 }
 
 /* Waits until all threads are ready, and opens the gate, or sends them home. */
-static int open_gate(struct run *run, const struct bench_load *load, const struct bench_plan *plan, struct psr_error *err)
+static int open_gate(struct run *run, const struct bench_load *load, const struct bench_plan *plan,
+                     struct psr_error *err)
 {
 	struct worker_gate *gate = &run->gate;
 	int code = PSR_OK;

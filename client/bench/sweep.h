@@ -41,7 +41,8 @@ struct slo { double part; uint64_t limit_ns; char text[40]; };
 int slo_parse(struct slo *slo, const char *text, struct psr_error *err);
 
 /* Finds the greatest load of the sweep's range that holds the limit, to 5 %: from `low` upwards by doubling, then by
- * halves. It holds if the percentile does, and nothing failed or is unfinished. *best: 0 if even `low` does not hold. */
+ * halves. It holds if the percentile does, and nothing failed or is unfinished. *best: 0 if even `low` does
+ * not hold. */
 int slo_search(double *best, struct sweep_points *points, const struct slo *slo, const struct sweep *sweep,
                const struct bench_plan *plan, const struct bench_load *load,
                void (*on_point)(const struct sweep *, const struct sweep_point *), struct psr_error *err);

@@ -57,7 +57,8 @@ static void try_file(struct psr_model **model, const struct bench_plan *plan, co
 	psr_model_unref(found);
 }
 
-static int find_models(struct psr_model **model, const struct bench_plan *plan, const char *folder, struct psr_error *err)
+static int find_models(struct psr_model **model, const struct bench_plan *plan, const char *folder,
+                       struct psr_error *err)
 {
 	DIR *dir = opendir(folder);
 	const struct dirent *entry;

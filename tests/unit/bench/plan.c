@@ -152,7 +152,8 @@ static void kinds_are_chosen_by_weight_and_alike_each_time(void **state)
 
 static void ranges_of_sweeps_are_read(void **state)
 {
-	static const char *const bad[] = { "", "clients", "clients=", "clients=4", "clients=4..", "clients=..4", "clients=4..2",
+	static const char *const bad[] = { "", "clients", "clients=", "clients=4", "clients=4..", "clients=..4",
+	                                   "clients=4..2",
 		                               "clients=0..4", "rate=0..4", "rate=1..2/0", "rate=1..2/65", "rate=1..2/2x",
 		                               "rate=1..2/1.5", "speed=1..2", "rate=1x..2", "clients=1..1000000", "rate=nan..2" };
 	struct sweep sweep;
