@@ -155,8 +155,8 @@ int psr_stats_main(int argc, char **argv)
 	};
 	const struct psr_cli cli = {
 		.usage = "psr stats [--server ADDR] [--watch] [--json|--prometheus]",
-		.summary = "Prints what a server counts: connections, models, frames, bytes, memory, builds; of the whole server since "
-		"its start.",
+		.summary = "Prints what a server counts: connections, models, frames, bytes, memory, builds; of the whole server "
+		"since its start.",
 		.opts = opts,
 		.footer = PSR_EXIT_CODES,
 	};
