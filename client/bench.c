@@ -200,8 +200,8 @@ static int parse(struct command *command, int argc, char **argv, struct psr_erro
 	const struct psr_cli cli = {
 		.usage = "psr bench --model NAME|--mix FILE [--clients N] [--rate R] [--seconds S] [models, camera, light, quality]",
 		.summary = "Loads a server with many clients and measures. Closed loop: each client asks for the next picture when "
-		"one has come. Open loop (--rate): requests are due at times of their own, and latency counts from then, so that what a "
-		"slow server makes wait is seen. Pictures are not decoded.",
+		"one has come. Open loop (--rate): requests are due at times of their own, and latency counts from then, so that "
+		"what a slow server makes wait is seen. Pictures are not decoded.",
 		.opts = list.opt,
 		.footer = SCENE_LIGHT_HELP "\n" PSR_EXIT_CODES,
 	};
