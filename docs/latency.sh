@@ -59,6 +59,8 @@ mkdir -p "$models/sources"
 [ -f "$models/sources/doorway.ply" ] || doorway "$models/sources/doorway.ply"
 build_model "$models/sources/doorway.ply" 512
 build_model "$cache/bunny.obj" 1024
+build_model "$cache/dragon.ply" 1024
+build_model "$cache/engine.glb" 1024
 
 # Starts a program and waits for its READY; sets `address`.
 start() { # ready-file command...

@@ -1,9 +1,9 @@
 /* latency ADDRESS MODELS [MOVEMENT...]: what a viewer shows along movements of a hand, through the psrd at ADDRESS,
- * which serves the folder MODELS: bunny.psr and doorway.psr. Prints a row a movement. It drives what psr-view stands on
- * (hand, link, show), without a window.
+ * which serves the folder MODELS: bunny.psr, dragon.psr, engine.psr and doorway.psr. Prints a row a movement. It drives
+ * what psr-view stands on (hand, link, show), without a window.
  *
- * The truth of a moment is what psr_render() draws for its camera. PSNR is over the pixels where the truth shows a
- * surface, of every tenth frame; "unwarped" is the last received picture as it is. */
+ * The truth of a moment is what psr_render() draws for its camera, smooth, as the picture at rest is. PSNR is over the
+ * pixels where the truth shows a surface, of every tenth frame; "unwarped" is the last received picture as it is. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -97,7 +97,8 @@ static const struct movement {
 	const char *name, *model;
 	void (*move)(struct hand *hand, double t, uint64_t now_ns);
 } movements[] = {
-	{ "pan", "bunny", pan }, { "orbit", "bunny", orbit }, { "flick", "bunny", flick }, { "zoom", "bunny", zoom },
+	{ "pan", "bunny", pan }, { "orbit", "bunny", orbit }, { "dragon", "dragon", orbit }, { "engine", "engine", orbit },
+	{ "flick", "bunny", flick }, { "zoom", "bunny", zoom },
 	{ "doorway", "doorway", dolly },
 };
 
@@ -298,6 +299,7 @@ static void compare(struct run *run, struct psr_model *model, double *warped, do
 		scene.background[c] = psr_srgb_to_linear[run->wish.background[c]];
 	}
 	psr_settings_default(&settings, WIDTH, HEIGHT);
+	settings.is_smooth = run->wish.is_smooth;
 	if (psr_renderer_create(&renderer, &err) != PSR_OK
 	    || psr_frame_alloc(&truth, WIDTH, HEIGHT, 1 << PSR_PLANE_COLOR | 1 << PSR_PLANE_DEPTH, &err) != PSR_OK)
 		report_die("truth", err.text);
