@@ -86,7 +86,7 @@ for one; do
 		--rate-down "$rate"
 	{
 		printf '%-8s %6s %8s %6s %6s %7s %8s %9s %6s %8s\n' '' shown/s new/s age warp 'filled' warped unwarped more sharp
-		"$build/tests/bench/latency" "$address" "$models"
+		"$build/tests/bench/latency" "$address" "$models" docs/hands
 	} >"$work/table"
 	stop
 	docs/put-table.sh $page "$delay ms, $rate Mbit/s" "$work/table"

@@ -42,8 +42,8 @@ export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
 view() { # psr-view's options
 	(cd "$work/shots" && exec psr view --bare "$@" >"$work/view.log" 2>"$work/view.err") &
 	view_pid=$!
-	within 10 xdotool search --name psr-view
-	window=$(xdotool search --name psr-view)
+	within 20 xdotool search --name ' - psr-view$' # the title of a loop that runs: it takes keys
+	window=$(xdotool search --name ' - psr-view$')
 	within 10 has_focus
 }
 has_focus() { xdotool windowfocus "$window" && [ "$(xdotool getwindowfocus)" = "$window" ]; }
@@ -194,6 +194,7 @@ differs "and shines elsewhere" "$(lamp | cut -d: -f3)" "$(cut -d: -f3 <<<"$moved
 hold_and_drag g 40 0
 shot
 check "without a click no model moves" [ "$(placed)" = 0,0,4 ]
+sleep 0.6 # not a double click with the drag before
 xdotool mousemove --window "$window" 160 120 click 1
 check "a click chooses the model in front" within 3 grep -q '^point' "$work/view.log"
 hold_and_drag g 40 0
