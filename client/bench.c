@@ -64,6 +64,7 @@ static int parse(struct bench_options *options, int *json, int argc, char **argv
 	view_add_options(&list, &options->view);
 	scene_add_light_options(&list, &options->scene);
 	quality_add_options(&list, &options->quality);
+	quality_add_codec_option(&list, &options->quality);
 	optlist_heading(&list, "For developers", NULL);
 	OPTLIST_ADD(&list, script);
 	code = psr_command_parse("bench", &cli, argc, argv, NULL, err);

@@ -340,7 +340,8 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 	if (to == NULL)
 		return NULL;
 	fprintf(to, "psr shot");
-	put_option(to, "server", server);
+	if (server != NULL)
+		put_option(to, "server", server);
 	for (uint32_t i = 0; i < subject->n_instances; i++)
 		put_option(to, subject->instance[i].is_plain ? "model" : "instance", subject->instance[i].text);
 	fprintf(to, " --size %ux%u", hand->width, hand->height);

@@ -162,8 +162,18 @@ if type -P psr-model >/dev/null && [ -x "$BUILD/tests/tools/drop" ]; then
 		'f 5 6 7 8' 'f 1 2 6 5' 'f 2 3 7 6' 'f 3 4 8 7' 'f 4 1 5 8' >"$work/tower.obj"
 	check "a window takes a file" "$BUILD/tests/tools/drop" "$window" "$work/tower.obj"
 	check "and shows it" within 20 sh -c "xdotool getwindowname $window | grep -q '^tower'"
-	is_true "built and drawn here"
-	check "through a Unix socket" grep -q -- "--server unix:.* --model tower" <<<"$command"
+	shot
+	check "the command names no psrd of its own, but the folder" \
+		grep -q "^psr shot --model tower .* # beside: psrd --models $work\$" <<<"$command"
+	mkdir "$work/others"
+	cp "$work/tower.obj" "$work/others"
+	psrd --listen "unix:$work/others/socket" --models "$work/others" --cache "$work/others/cache" >"$work/others.ready" \
+		2>/dev/null &
+	others_pid=$!
+	within 20 grep -q READY "$work/others.ready"
+	check "beside another psrd it draws the same, bit for bit" env PSR_SERVER="unix:$work/others/socket" \
+		sh -c "${command% -o *} -o '$work/true.png' && cmp '$work/true.png' '$work/shots/psr-view-$n_shots.png'"
+	kill $others_pid
 fi
 xdotool key Escape
 check "Escape ends it" wait $view_pid
