@@ -23,7 +23,7 @@ DISPLAY=:$(cat "$work/display")
 export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
 
 cd "$work"
-psr view --server "unix:$work/socket" --model engine --size 1600x1000 --shadows --azimuth 30 --elevation 25 \
+psr view --server "unix:$work/socket" --model engine --size 1600x1000 --shadows --azimuth 30 --elevation 25 --zoom 0.7 \
 	--background '#30353c' >"$work/log" 2>&1 &
 pids="$! $pids"
 for _ in $(seq 100); do xdotool search --name '^engine' >/dev/null && break || sleep 0.1; done
@@ -31,9 +31,9 @@ xdotool windowfocus "$(xdotool search --name '^engine')"
 xdotool key p F2
 for _ in $(seq 200); do grep -q '^psr shot' "$work/log" && break || sleep 0.1; done # it waits for the true picture
 xdotool key m
-xdotool mousemove 560 470 click 1
+xdotool mousemove 640 470 click 1
 sleep 0.7
-xdotool mousemove 840 640 click 1
+xdotool mousemove 815 590 click 1
 sleep 0.7
 xdotool mousemove 0 999
 sleep 5

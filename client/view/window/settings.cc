@@ -100,7 +100,7 @@ static void draw_instances(struct viewer *viewer)
 	ImGui::TextDisabled("NAME,at=X,Y,Z,rotate=Y:90,scale=2");
 	if (viewer->picked >= 0 && (uint32_t)viewer->picked < subject->n_instances)
 		draw_place(viewer, (uint32_t)viewer->picked);
-	ImGui::TextDisabled("hold G and drag: move, Shift turns, Ctrl scales");
+	ImGui::TextDisabled("G drag moves; Shift turns, Ctrl scales");
 }
 
 static void draw_camera(struct viewer *viewer)
@@ -172,8 +172,8 @@ static void draw_lights(struct viewer *viewer)
 	}
 	for (uint32_t k = 0; k < subject->n_lights && !has_key; k++)
 		draw_light(viewer, k);
-	ImGui::TextDisabled("dir:X,Y,Z point:X,Y,Z spot:X,Y,Z:TX,TY,TZ:ANGLE");
-	ImGui::TextDisabled("hold L and drag; Shift turns a spot, brings a point nearer");
+	ImGui::TextDisabled("dir: point: X,Y,Z spot: X,Y,Z:TX,TY,TZ:DEG");
+	ImGui::TextDisabled("L drag; Shift: turn a spot, point nearer");
 	if (ImGui::Checkbox("shadows", &is_shadowed))
 		subject->is_shadowed = is_shadowed;
 	if (ImGui::SliderFloat("ambient", &ambient, 0, 1, "%.2f"))
