@@ -311,7 +311,7 @@ $(DAEMON_BENCH): $(DAEMON_O) $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr-build
 REPROJECT_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report reproject scene))
 $(REPROJECT_BENCH): $(REPROJECT_O) $(CODEC_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
-VIEW_BENCH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report scene view)) $(CODEC_O)
+VIEW_BENCH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child isolate level ours report scene view view_reading)) $(CODEC_O)
 $(VIEW_BENCH): $(VIEW_BENCH_O) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 $(LATENCY): $(addprefix $(BUILD)/tests/bench/,latency.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(LIB)/libpsrclient.a \

@@ -59,6 +59,8 @@ mkdir -p "$models/sources"
 [ -f "$models/sources/doorway.ply" ] || doorway "$models/sources/doorway.ply"
 build_model "$models/sources/doorway.ply" 512
 build_model "$cache/bunny.obj" 1024
+build_model "$cache/dragon.ply" 1024
+build_model "$cache/engine.glb" 1024
 
 # Starts a program and waits for its READY; sets `address`.
 start() { # ready-file command...
@@ -84,7 +86,7 @@ for one; do
 		--rate-down "$rate"
 	{
 		printf '%-8s %6s %8s %6s %6s %7s %8s %9s %6s %8s\n' '' shown/s new/s age warp 'filled' warped unwarped more sharp
-		"$build/tests/bench/latency" "$address" "$models"
+		"$build/tests/bench/latency" "$address" "$models" docs/hands
 	} >"$work/table"
 	stop
 	docs/put-table.sh $page "$delay ms, $rate Mbit/s" "$work/table"

@@ -10,12 +10,12 @@ unset PSR_SERVER
 export XDG_CONFIG_HOME=/nonexistent # no defaults of the user
 out=build/viewer
 mkdir -p "$out"
-[ "$out/engine.psr" -nt "$models/engine.glb" ] || psr-model build "$models/engine.glb" -r 512 -o "$out/engine.psr"
+[ "$out/engine.psr" -nt "$models/engine.glb" ] || psr-model build "$models/engine.glb" -r 1024 -o "$out/engine.psr"
 
 work=$(mktemp -d)
 psrd --listen "unix:$work/socket" --models "$out" >"$work/ready" 2>"$work/psrd.log" &
 pids=$!
-Xvfb -noreset -displayfd 3 -screen 0 900x560x24 -fbdir "$work" 3>"$work/display" 2>/dev/null &
+Xvfb -noreset -displayfd 3 -screen 0 1600x1000x24 -fbdir "$work" 3>"$work/display" 2>/dev/null &
 pids="$! $pids"
 trap 'kill $pids 2>/dev/null || :; wait; rm -rf "$work"' EXIT
 until [ -s "$work/display" ] && [ -s "$work/ready" ]; do sleep 0.1; done
@@ -23,7 +23,7 @@ DISPLAY=:$(cat "$work/display")
 export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
 
 cd "$work"
-psr view --server "unix:$work/socket" --model engine --size 900x560 --shadows --azimuth 30 --elevation 25 \
+psr view --server "unix:$work/socket" --model engine --size 1600x1000 --shadows --azimuth 30 --elevation 25 --zoom 0.7 \
 	--background '#30353c' >"$work/log" 2>&1 &
 pids="$! $pids"
 for _ in $(seq 100); do xdotool search --name '^engine' >/dev/null && break || sleep 0.1; done
@@ -31,12 +31,12 @@ xdotool windowfocus "$(xdotool search --name '^engine')"
 xdotool key p F2
 for _ in $(seq 200); do grep -q '^psr shot' "$work/log" && break || sleep 0.1; done # it waits for the true picture
 xdotool key m
-xdotool mousemove 250 255 click 1
+xdotool mousemove 640 470 click 1
 sleep 0.7
-xdotool mousemove 420 370 click 1
+xdotool mousemove 815 590 click 1
 sleep 0.7
-xdotool mousemove 0 559
+xdotool mousemove 0 999
 sleep 5
 cd - >/dev/null
-python3 tests/tools/screen.py "$work/Xvfb_screen0" 0 0 900 560 docs/viewer.png
+python3 tests/tools/screen.py "$work/Xvfb_screen0" 0 0 1600 1000 docs/viewer.png
 ls -l docs/viewer.png

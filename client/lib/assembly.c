@@ -13,6 +13,8 @@ void client_assembly_init(struct client_assembly *assembly, const struct psr_msg
 
 void client_assembly_fini(struct client_assembly *assembly)
 {
+	if (assembly->crew != NULL)
+		client_crew_wait(assembly->crew, NULL);
 	psr_frame_free(&assembly->picture);
 	free(assembly->pieces);
 	memset(assembly, 0, sizeof *assembly);
@@ -174,6 +176,14 @@ static int is_same_rect(const struct psr_msg_rect *a, const struct psr_msg_rect 
 	       && a->w == b->w && a->h == b->h && a->total == b->total;
 }
 
+static int decode(struct client_assembly *assembly, struct client_decoder *decoder, const struct psr_msg_rect *rect,
+                  const uint8_t *data, struct psr_error *err)
+{
+	if (assembly->crew != NULL)
+		return client_crew_decode(assembly->crew, assembly, rect, data, err);
+	return client_decode(decoder, &assembly->picture, &assembly->asked, rect, data, err);
+}
+
 int client_assembly_rect(struct client_assembly *assembly, struct client_decoder *decoder,
                          const struct psr_msg_rect *rect, struct psr_error *err)
 {
@@ -193,7 +203,7 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 	    || (rect->plane == PSR_PLANE_DEPTH && assembly->asked.depth_format != PSR_WIRE_DEPTH_F32))
 		assembly->lossy |= 1u << rect->plane;
 	if (rect->bytes == rect->total)
-		return client_decode(decoder, &assembly->picture, &assembly->asked, rect, rect->data, err);
+		return decode(assembly, decoder, rect, rect->data, err);
 	assembly->open = *rect;
 	code = reserve_pieces(assembly, rect->bytes, err);
 	if (code != PSR_OK)
@@ -204,7 +214,7 @@ int client_assembly_rect(struct client_assembly *assembly, struct client_decoder
 		return PSR_OK;
 	assembly->open.total = 0;
 	assembly->n_pieces = 0;
-	return client_decode(decoder, &assembly->picture, &assembly->asked, rect, assembly->pieces, err);
+	return decode(assembly, decoder, rect, assembly->pieces, err);
 }
 
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
@@ -220,6 +230,8 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 	    || (end->pass == asked->pass_limit + has_sharp(asked) && !end->is_final)
 	    || end->has_hashes == ((asked->flags & PSR_WIRE_FRAME_NO_HASHES) != 0))
 		return psr_fail(err, PSR_ERR_PROTOCOL, "the server ended another frame than it began");
+	if (assembly->crew != NULL && client_crew_wait(assembly->crew, err) != PSR_OK)
+		return err != NULL ? err->code : PSR_ERR_PROTOCOL;
 	*checked = 0;
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++) {
 		const unsigned bit = 1u << plane;

@@ -53,6 +53,7 @@ void psr_client_close(struct psr_client *client)
 	client_free_queued(client);
 	client_free_held(client);
 	client_decoder_destroy(client->decoder);
+	client_crew_destroy(client->crew);
 	free(client->list.entry);
 	free(client->presets.preset);
 	free(client->in_storage);
@@ -74,6 +75,16 @@ int client_break(struct psr_client *client, int code, const char *format, ...)
 int client_check(const struct psr_client *client, struct psr_error *err)
 {
 	return client->broken.code == PSR_OK ? PSR_OK : psr_fail(err, client->broken.code, "%s", client->broken.text);
+}
+
+int psr_client_use_threads(struct psr_client *client, int n_threads, struct psr_error *err)
+{
+	if (n_threads < 1 || n_threads > PSR_CLIENT_MAX_THREADS || client->crew != NULL)
+		return psr_fail(err, PSR_ERR_ARG, "%d threads are to decode: 1 to %d can, and it is said once", n_threads,
+		                PSR_CLIENT_MAX_THREADS);
+	if (client_crew_create(&client->crew, n_threads) != PSR_OK)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %d threads", n_threads);
+	return PSR_OK;
 }
 
 const struct psr_msg_welcome *psr_client_welcome(const struct psr_client *client)

@@ -90,6 +90,7 @@ static int on_frame_begin(struct psr_client *client, struct client_frame *frame,
 	struct psr_error why;
 	int code = psr_msg_frame_begin_decode(&begin, message->payload, message->n, &why);
 
+	frame->assembly.crew = client->crew;
 	if (code == PSR_OK)
 		code = client_assembly_begin(&frame->assembly, &begin,
 		                             client_find_base(client, frame, begin.base, begin.base_pass), &why);

@@ -31,6 +31,21 @@ void client_decoder_destroy(struct client_decoder *decoder);
 int client_decode(struct client_decoder *decoder, struct psr_frame *picture, const struct psr_msg_frame *asked,
                   const struct psr_msg_rect *rect, const uint8_t *data, struct psr_error *err);
 
+/* ---- crew.c: threads that decode while the caller reads on ---- */
+
+struct client_crew;
+struct client_assembly;
+/* n_threads beside the caller's: 1..8. MEMORY, also when the system starts no more threads. */
+int client_crew_create(struct client_crew **out, int n_threads);
+/* Jobs must have ended: client_crew_wait(). NULL is fine. */
+void client_crew_destroy(struct client_crew *crew);
+/* As client_decode(), but the pixels are there only after client_crew_wait(). Copies `data`. The caller works, too,
+ * where it would wait. MEMORY. */
+int client_crew_decode(struct client_crew *crew, const struct client_assembly *assembly,
+                       const struct psr_msg_rect *rect, const uint8_t *data, struct psr_error *err);
+/* Returns the first error of any rectangle; with err NULL it only waits. */
+int client_crew_wait(struct client_crew *crew, struct psr_error *err);
+
 /* ---- assembly.c: one frame from BEGIN to END; no sockets ---- */
 
 struct client_held { /* a picture of a view above 0; the list has the order of arrival */
@@ -54,6 +69,7 @@ struct client_assembly {
 	uint8_t *pieces;      /* of the rectangle that arrives in pieces; grows with them */
 	size_t n_pieces, pieces_capacity;
 	struct psr_msg_rect open; /* that rectangle; total 0: none */
+	struct client_crew *crew; /* the caller's: decodes rectangles; NULL: they are decoded at once */
 };
 /* Begins a frame. Takes ownership of nothing; fini frees the picture and its pieces. BEGIN allocates the pixels. */
 void client_assembly_init(struct client_assembly *assembly, const struct psr_msg_frame *asked, uint16_t pass);
@@ -63,8 +79,8 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
                           const struct client_held *base, struct psr_error *err);
 int client_assembly_rect(struct client_assembly *assembly, struct client_decoder *decoder,
                          const struct psr_msg_rect *rect, struct psr_error *err);
-/* PROTOCOL: END does not fit; FORMAT: a hash is wrong, and this frame alone is lost. *checked gets the planes that have
- * their hash, `lossy` the planes that may differ from the server's picture. */
+/* Waits for the crew. PROTOCOL: END does not fit, or a rectangle was damaged; FORMAT: a hash is wrong, and this frame
+ * alone is lost. *checked gets the planes that have their hash, `lossy` the planes that may differ from the server's picture. */
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
                         struct psr_error *err);
 
@@ -115,6 +131,7 @@ struct psr_client {
 	void (*on_progress)(const struct psr_msg_progress *progress, void *userdata);
 	void *userdata;
 	struct client_decoder *decoder;
+	struct client_crew *crew;     /* NULL: none */
 	struct client_frame frame[PSR_WIRE_MAX_OPEN];
 	struct client_assembly done; /* the frame of the last event */
 	struct client_queued *queued, *given; /* given: by the last psr_client_wait() */

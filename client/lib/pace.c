@@ -9,9 +9,6 @@
 #define DRAW_PART 0.9
 #define CYCLE_PART 1.06
 
-/* If the way is too long for the wished rate, sharpness may make it longer by this factor at most. */
-#define LONG_WAY_PART 0.08
-
 /* The pacer takes a sharper rung only if it fits with this much room, so that noise does not make it jump. */
 #define CLIMB_PART 0.8
 
@@ -147,7 +144,7 @@ static double frame_bytes(const struct pace *pace, unsigned rung, double quality
 static double byte_budget(const struct pace *pace, unsigned rung)
 {
 	const double frame = 1 / pace->wish.fps, rate = pace_rate(pace), most = MOST_GROWTH * most_bytes(pace);
-	const double cycle = larger(PACE_WINDOW * CYCLE_PART * frame - pace->away, LONG_WAY_PART * pace->away);
+	const double cycle = larger(PACE_WINDOW * CYCLE_PART * frame - pace->away, PACE_WORK_FRAMES * frame);
 	const double link = smaller(LINK_PART * frame, cycle - draw_time(pace, rung) - decode_time(pace, rung));
 
 	return rate > 0 ? smaller(rate * link, most) : most;

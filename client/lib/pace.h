@@ -11,6 +11,9 @@
 
 #define PACE_WINDOW 2               /* most requests of a movement that wait for their frames at a time */
 #define PACE_REST_NS UINT64_C(50000000) /* a camera that has not moved for this long is at rest */
+/* On a way too long for the wished rate, drawing, sending and decoding of a frame may take so many frame times all the
+ * same: warping makes up for frames that are late or rare, not for coarse ones. */
+#define PACE_WORK_FRAMES 1.5
 #define PACE_OPEN 16                /* most requests that wait for their frames at a time, those at rest included */
 #define PACE_SAMPLES 6              /* frames over which the link's rate is measured */
 #define PACE_SCALES 3               /* 1, 2, 4 */
@@ -18,7 +21,7 @@
 
 /* The user's wishes for a moving picture. */
 struct pace_wish {
-	double fps;                     /* 1..1000; goes before sharpness */
+	double fps;                     /* 1..1000; goes before sharpness, unless the way is too long for it */
 	uint32_t width, height;         /* of the window: 1..16384 pixels each */
 	uint8_t least_quality;          /* JPEG, 1..100: a larger scale looks better than a lower quality */
 	uint8_t most_quality;           /* least_quality..100 */

@@ -44,6 +44,14 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		  .help = "Final smoothing, instead of the quality's: 1 draws 4 points a pixel and takes about ten times "
 		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
 		          "before." },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
+void quality_add_codec_option(struct optlist *list, struct quality_wish *wish)
+{
+	const struct psr_opt opts[] = {
 		{ .name = "codec", .type = PSR_OPT_STRING, .value = &wish->codec, .arg = "CODEC", .seen = &wish->n_said,
 		  .words = "lossless jpeg:85 jpeg:95 raw",
 		  .help = "How colour travels from the server: lossless; jpeg:Q, Q of 1 to 100, for slow networks; or raw." },

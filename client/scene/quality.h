@@ -17,6 +17,7 @@ struct quality_wish {
 
 void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t height, const char *codec);
 void quality_add_options(struct optlist *list, struct quality_wish *wish);
+void quality_add_codec_option(struct optlist *list, struct quality_wish *wish); /* of still pictures */
 
 /* Sets size, settings, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);

@@ -17,6 +17,7 @@
 
 struct home {
 	struct daemon *daemon;
+	char file_folder[PATH_MAX];
 	char model[PSR_WIRE_MAX_NAME + 1];
 };
 
@@ -40,11 +41,12 @@ static int choose_models(char models[PATH_MAX], struct home *home, const char *f
 	const size_t n_stem = dot != NULL && dot != name ? (size_t)(dot - name) : strlen(name);
 	char at[PATH_MAX];
 
+	snprintf(home->file_folder, sizeof home->file_folder, "%.*s", name - 1 == file ? 1 : (int)(name - 1 - file), file);
 	if (n_stem > PSR_WIRE_MAX_NAME)
 		return psr_fail(err, PSR_ERR_ARG, "%s: its name has more than %d bytes", file, PSR_WIRE_MAX_NAME);
 	memcpy(home->model, name, n_stem);
 	if (!is_alone(name)) {
-		snprintf(models, PATH_MAX, "%.*s", name - 1 == file ? 1 : (int)(name - 1 - file), file);
+		snprintf(models, PATH_MAX, "%s", home->file_folder);
 		snprintf(at, sizeof at, "%.3000s/%s.psr", models, home->model);
 		if (access(at, F_OK) == 0) /* psrd would serve it, and not tell of the other one */
 			return psr_fail(err, PSR_ERR_ARG, "%s has the same name; view it, or move one of the two", at);
@@ -147,4 +149,9 @@ const char *home_address(const struct home *home)
 const char *home_model(const struct home *home)
 {
 	return home->model;
+}
+
+const char *home_folder(const struct home *home)
+{
+	return home->file_folder;
 }

@@ -22,4 +22,6 @@ void home_close(struct home *home); /* NULL is fine */
 const char *home_address(const struct home *home); /* for link_open() */
 const char *home_model(const struct home *home);   /* its name there */
 
+const char *home_folder(const struct home *home); /* that the file lies in: psrd --models FOLDER serves it, too */
+
 #endif

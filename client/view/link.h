@@ -126,6 +126,7 @@ int link_fd(const struct link *link);
 
 enum link_news {
 	LINK_NEWS_PICTURE = 1, LINK_NEWS_STATE = 2, LINK_NEWS_SCENE = 4, LINK_NEWS_LIST = 8,
+	LINK_NEWS_PROBE = 16,
 };
 /* What is new since the last call, OR-ed. */
 unsigned link_heard(struct link *link);
@@ -141,6 +142,17 @@ void link_state(struct link *link, struct link_state *state);
  * The caller's to free. A camera can be chosen by its box. */
 struct link_scene *link_scene_take(struct link *link);
 void link_scene_free(struct link_scene *scene); /* NULL is fine */
+
+/* Asks what the camera sees at a place of a picture of `size` pixels, in pixels from its top left
+ * corner. The newest place counts. Returns its number, which rises; the answer comes as NEWS_PROBE. */
+uint64_t link_probe(struct link *link, const struct psr_camera *camera, const uint32_t size[2], const double at[2]);
+struct link_surface {
+	uint64_t number;             /* of the place; 0: no answer has come */
+	int has_surface;             /* 0: nothing else is set. Nothing is there, or the server does not tell */
+	double normal[3];            /* of the frame's plane: world, unit length */
+	uint32_t instance;           /* of the wish */
+};
+void link_probed(struct link *link, struct link_surface *surface); /* the last answer */
 
 /* Asks for the list of the server's models; it comes as NEWS_LIST, also beside pictures. take: entries that the caller
  * frees (free()), NULL if none came since the last call. */

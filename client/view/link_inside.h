@@ -40,6 +40,13 @@ void link_pictures_unref(struct link_pictures *pictures);
 
 /* ---- link.c ---- */
 
+struct link_place_asked { /* by link_probe() */
+	uint64_t number;      /* 0: none was */
+	struct psr_camera camera;
+	uint32_t width, height;
+	double x, y;
+};
+
 struct link {
 	pthread_t thread;
 	int wake_fd, news_fd;
@@ -57,6 +64,8 @@ struct link {
 	unsigned news;
 	struct link_state state;
 	struct link_picture *picture;
+	struct link_place_asked probe_asked;
+	struct link_surface surface;
 	struct link_scene *scene;
 	struct psr_msg_list_entry *list;
 	uint32_t n_list;
@@ -198,5 +207,19 @@ int link_view_ask(struct link_view *view, const struct link_content *content, ui
 /* 1: the frame's ERROR, in *why, is about the newest request; 0: all is well. */
 int link_view_event(struct link_view *view, const struct psr_event *event, struct psr_error *why);
 void link_view_cancel(struct link_view *view);
+/* Sends the scene, if the server has another one. */
+int link_view_scene(struct link_view *view, const struct link_content *content, const struct psr_camera *camera,
+                    struct psr_error *err);
+
+/* ---- link_probe.c: the surface at a place ---- */
+
+struct link_probe {
+	uint64_t number;         /* of the last one that was sent */
+	uint32_t id;             /* 0: none is under way */
+	uint32_t index[PSR_WIRE_MAX_INSTANCES], n_places; /* of the scene then, into the wish's instances */
+};
+int link_probe_ask(struct link_probe *probe, struct link_view *view, const struct link_content *content,
+                   struct psr_error *err);
+int link_probe_event(struct link_probe *probe, struct link *link, const struct psr_event *event); /* 1: it was its */
 
 #endif

@@ -13,6 +13,7 @@ struct serve {
 	struct link *link;
 	struct psr_client *client;
 	struct link_view view;
+	struct link_probe probe;
 	struct link_models models;
 	struct link_box wish;
 	struct link_place *place;
@@ -123,6 +124,8 @@ static int read_all(struct serve *serve, struct psr_error *err)
 	int got;
 
 	while ((got = psr_client_wait(serve->client, 0, &event, err)) > 0) {
+		if (link_probe_event(&serve->probe, serve->link, &event))
+			continue;
 		if (link_view_event(&serve->view, &event, &why))
 			refuse(serve, &why);
 		else if (event.type == PSR_EVENT_FRAME && event.id == serve->view.newest)
@@ -325,6 +328,8 @@ static int step(struct serve *serve, struct psr_error *err)
 	const uint64_t now_ns = clock_ns();
 	int code = link_view_ask(&serve->view, &content, now_ns, &again_ns, err);
 
+	if (code == PSR_OK)
+		code = link_probe_ask(&serve->probe, &serve->view, &content, err);
 	if (code == PSR_OK || is_refusal(code)) {
 		if (code != PSR_OK) /* such as too many lights for this server */
 			refuse(serve, err);

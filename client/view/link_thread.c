@@ -2,9 +2,12 @@
 #include <math.h>
 #include <poll.h>
 #include <string.h>
+#include <unistd.h>
 #include "base/clock.h"
 #include "base/random.h"
 #include "link_inside.h"
+
+#define MOST_HELP 3
 
 /* 0: link_close() was called. */
 static int begin_connecting(struct link *link)
@@ -45,6 +48,15 @@ static void name_first_model(char name[PSR_WIRE_MAX_NAME + 1], struct link *link
 	pthread_mutex_unlock(&link->lock);
 }
 
+/* The link's own thread decodes, too, and the window's threads have to draw. Without help it decodes alone. */
+static void get_help(struct psr_client *client)
+{
+	const long n_cores = sysconf(_SC_NPROCESSORS_ONLN), n = n_cores - 1 < MOST_HELP ? n_cores - 1 : MOST_HELP;
+
+	if (n > 0)
+		psr_client_use_threads(client, (int)n, NULL);
+}
+
 /* One connection. PSR_ERR_CANCELLED: no error, but other models are wished, or link_close() was called. */
 static int connect_and_serve(struct link *link, int *has_shown, struct psr_error *err)
 {
@@ -55,6 +67,8 @@ static int connect_and_serve(struct link *link, int *has_shown, struct psr_error
 	name_first_model(model, link);
 	code = psr_client_connect(&client, link->address, link->program, model[0] != '\0' ? model : NULL, LINK_CONNECT_MS,
 	                          err);
+	if (code == PSR_OK)
+		get_help(client);
 	if (end_connecting(link, client) && code == PSR_OK)
 		code = link_serve(link, client, has_shown, err);
 	pthread_mutex_lock(&link->lock);

@@ -65,8 +65,8 @@ void link_view_changed(struct link_view *view, const struct link_wish *wish, uin
 	view->pace_wish = pace_wish;
 }
 
-static int send_scene(struct link_view *view, const struct link_content *content, const struct psr_camera *camera,
-                      struct psr_error *err)
+int link_view_scene(struct link_view *view, const struct link_content *content, const struct psr_camera *camera,
+                    struct psr_error *err)
 {
 	struct psr_msg_scene *sent = view->sent;
 	int code;
@@ -107,7 +107,7 @@ static int send_frame(struct link_view *view, const struct link_content *content
 	int code;
 
 	link_frame(&frame, asked, content->wish, content->box_min, content->box_max, is_direct);
-	code = send_scene(view, content, &frame.camera, err);
+	code = link_view_scene(view, content, &frame.camera, err);
 	if (code != PSR_OK)
 		return code;
 	frame.base = find_base(view, &frame);

@@ -9,7 +9,7 @@ void link_wish_default(struct link_wish *wish)
 
 	*wish = (struct link_wish){
 		.overscan = 1, .n_lights = 1, .has_key_light = 1, .ambient = 0.15, .spacing_px = 1, .is_smooth = 1,
-		.planes = 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, .fps = 30, .least_quality = 30, .most_quality = 85,
+		.planes = 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, .fps = 30, .least_quality = 30, .most_quality = 92,
 		.most_scale = 4,
 	};
 	memcpy(wish->background, background, sizeof background);

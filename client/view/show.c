@@ -141,33 +141,11 @@ static int find_source(const struct link_picture *picture, const struct lens *fr
 	return depth_at(picture, source[0], source[1], &depth);
 }
 
-/* One of the two neighbours along an axis, the one nearer in depth: the other may be behind an edge. */
-static int step_to(const struct link_picture *picture, const struct lens *lens, const double at[2], int axis,
-                   double step[3])
-{
-	double depth, best = INFINITY, here[3], there[3];
-
-	depth_at(picture, at[0], at[1], &depth);
-	lens_point(lens, floor(at[0]) + 0.5, floor(at[1]) + 0.5, depth, here);
-	for (int side = -1; side <= 1; side += 2) {
-		const double x = floor(at[0]) + 0.5 + (axis == 0 ? side : 0), y = floor(at[1]) + 0.5 + (axis == 1 ? side : 0);
-		double other;
-
-		if (!depth_at(picture, x, y, &other) || fabs(other - depth) >= best)
-			continue;
-		best = fabs(other - depth);
-		lens_point(lens, x, y, other, there);
-		v3d_sub(step, there, here);
-		v3d_scale(step, step, side);
-	}
-	return best < INFINITY;
-}
-
 void view_show_probe(const struct view_show *show, double x, double y, struct view_probe *probe)
 {
 	const struct link_picture *picture = show->picture;
 	const double at[2] = { x, y };
-	double source[2], depth, right[3], down[3], is[2];
+	double source[2], depth, is[2];
 	struct lens from, to;
 
 	memset(probe, 0, sizeof *probe);
@@ -179,8 +157,4 @@ void view_show_probe(const struct view_show *show, double x, double y, struct vi
 		return;
 	lens_point(&from, source[0], source[1], depth, probe->point);
 	probe->has_surface = lens_project(&to, probe->point, is, &probe->depth);
-	if (!step_to(picture, &from, source, 0, right) || !step_to(picture, &from, source, 1, down))
-		return;
-	v3d_cross(probe->normal, down, right); /* right x up is towards the eye */
-	probe->has_normal = v3d_normalize(probe->normal, probe->normal) > 0;
 }

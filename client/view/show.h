@@ -35,8 +35,6 @@ struct view_probe {
 	int has_surface;   /* 0: nothing else is set */
 	double point[3];   /* world */
 	double depth;      /* z' of the present camera, world units */
-	int has_normal;
-	double normal[3];  /* world, unit length, towards the eye: of the plane through the pixels around */
 };
 void view_show_probe(const struct view_show *show, double x, double y, struct view_probe *probe);
 

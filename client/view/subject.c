@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/maths.h"
 #include "base/vec.h"
 #include "client/lib/camera.h"
 #include "client/scene/preset.h"
@@ -109,22 +110,53 @@ static size_t write_vector(char *to, size_t size, const double v[3])
 	return (size_t)snprintf(to, size, "%.17g,%.17g,%.17g", v[0], v[1], v[2]);
 }
 
-/* Of lights that are set here, which are directions. */
 static void write_light(char text[SUBJECT_TEXT], const struct psr_msg_light *light)
 {
-	size_t n = (size_t)snprintf(text, SUBJECT_TEXT, "dir:");
+	static const char *const kinds[] = { [PSR_WIRE_LIGHT_DIRECTIONAL] = "dir:", [PSR_WIRE_LIGHT_POINT] = "point:",
+		                                 [PSR_WIRE_LIGHT_SPOT] = "spot:" };
+	const int is_spot = light->kind == PSR_WIRE_LIGHT_SPOT;
+	size_t n = (size_t)snprintf(text, SUBJECT_TEXT, "%s", kinds[light->kind]);
+	double target[3];
 
-	n += write_vector(text + n, SUBJECT_TEXT - n, light->direction);
-	snprintf(text + n, SUBJECT_TEXT - n, ",color=#%02x%02x%02x,intensity=%.17g", light->color[0], light->color[1],
-	         light->color[2], light->intensity);
+	n += write_vector(text + n, SUBJECT_TEXT - n,
+	                  light->kind == PSR_WIRE_LIGHT_DIRECTIONAL ? light->direction : light->position);
+	if (is_spot) {
+		v3d_add_scaled(target, light->position, 1, light->direction);
+		n += (size_t)snprintf(text + n, SUBJECT_TEXT - n, ":");
+		n += write_vector(text + n, SUBJECT_TEXT - n, target);
+		n += (size_t)snprintf(text + n, SUBJECT_TEXT - n, ":%.17g", fmin(light->outer / PSR_DEGREE, 90));
+	}
+	n += (size_t)snprintf(text + n, SUBJECT_TEXT - n, ",color=#%02x%02x%02x,intensity=%.17g", light->color[0],
+	                      light->color[1], light->color[2], light->intensity);
+	if (light->reference > 0)
+		n += (size_t)snprintf(text + n, SUBJECT_TEXT - n, ",ref=%.17g", light->reference);
+	if (light->flags & PSR_WIRE_LIGHT_SHADOW)
+		snprintf(text + n, SUBJECT_TEXT - n, ",shadow");
 }
 
-void subject_set_light(struct subject *subject, uint32_t k, const struct psr_msg_light *light)
+int subject_read_light(struct subject *subject, uint32_t k, const char *text, struct psr_error *err)
 {
 	struct subject_light *to = &subject->light[k];
+	struct psr_msg_light light;
+	int code;
 
-	write_light(to->text, light);
-	psr_light_parse(&to->light, to->text, NULL);
+	if (strlen(text) >= SUBJECT_TEXT)
+		return psr_fail(err, PSR_ERR_LIMIT, "a light has at most %d bytes", SUBJECT_TEXT - 1);
+	code = psr_light_parse(&light, text, err);
+	if (code != PSR_OK)
+		return code;
+	to->light = light;
+	snprintf(to->text, sizeof to->text, "%s", text);
+	return PSR_OK;
+}
+
+/* What is beyond the range of a light, such as a place too far away, changes nothing. */
+void subject_set_light(struct subject *subject, uint32_t k, const struct psr_msg_light *light)
+{
+	char text[SUBJECT_TEXT];
+
+	write_light(text, light);
+	subject_read_light(subject, k, text, NULL);
 }
 
 void subject_fix_light(struct subject *subject, const struct psr_camera *camera)
@@ -137,30 +169,6 @@ void subject_fix_light(struct subject *subject, const struct psr_camera *camera)
 	subject->has_key_light = 0;
 	subject->n_lights = 1;
 	subject_set_light(subject, 0, &key);
-}
-
-static void turn(double v[3], const double axis[3], double angle)
-{
-	double cross[3], along = v3d_dot(axis, v), s = sin(angle), c = cos(angle);
-
-	v3d_cross(cross, axis, v);
-	for (int i = 0; i < 3; i++)
-		v[i] = c * v[i] + s * cross[i] + (1 - c) * along * axis[i];
-}
-
-void subject_turn_light(struct subject *subject, uint32_t k, const struct psr_camera *camera, double right,
-                        double down)
-{
-	struct psr_msg_light light = subject->light[k].light;
-	struct lens lens;
-
-	if (light.kind != PSR_WIRE_LIGHT_DIRECTIONAL)
-		return;
-	lens_init(&lens, camera, 1, 1);
-	turn(light.direction, lens.up, right);
-	turn(light.direction, lens.right, down);
-	v3d_normalize(light.direction, light.direction);
-	subject_set_light(subject, k, &light);
 }
 
 int subject_preset(const struct subject *subject, const struct link_scene *scene, uint32_t k,
@@ -332,7 +340,8 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 	if (to == NULL)
 		return NULL;
 	fprintf(to, "psr shot");
-	put_option(to, "server", server);
+	if (server != NULL)
+		put_option(to, "server", server);
 	for (uint32_t i = 0; i < subject->n_instances; i++)
 		put_option(to, subject->instance[i].is_plain ? "model" : "instance", subject->instance[i].text);
 	fprintf(to, " --size %ux%u", hand->width, hand->height);

@@ -50,11 +50,32 @@ int subject_place(struct subject *subject, uint32_t k, const char *text, struct 
 
 /* The key light, which moves with the camera, becomes one that stays where it is now. */
 void subject_fix_light(struct subject *subject, const struct psr_camera *camera);
-/* Turns directional light k about the camera's up and right, radians; others stay. */
-void subject_turn_light(struct subject *subject, uint32_t k, const struct psr_camera *camera, double right,
-                        double down);
-/* Light k becomes this directional one. */
+/* Light k becomes this one. The cone of a spot fades from 0.9 of its angle on, as --light has it. */
 void subject_set_light(struct subject *subject, uint32_t k, const struct psr_msg_light *light);
+/* Reads the light again from text. ARG. */
+int subject_read_light(struct subject *subject, uint32_t k, const char *text, struct psr_error *err);
+
+/* ---- subject_move.c: by hand, as a camera sees it ---- */
+
+/* Turns light k, a directional one or a spot, about the camera's up and right, radians; others stay. */
+void subject_turn_light(struct subject *subject, uint32_t k, const struct lens *lens, double right, double down);
+/* Moves light k, a point or a spot, to the right, down and nearer, pixels at its depth; others stay. */
+void subject_move_light(struct subject *subject, uint32_t k, const struct lens *lens, const double by[3]);
+
+/* Corners of the box of instance k, in its place: bit i of the corner's number is the greater side of axis i. 0: its
+ * model is not open. */
+int subject_instance_box(double corner[8][3], const struct subject *subject, const struct link_scene *scene,
+                         uint32_t k);
+/* Move instance k to the right and down, pixels at the depth of its middle; turn it about the camera's up and right
+ * there, radians; scale it there. UNSUPPORTED: its name leaves no room for a place. ARG: it would leave the range. */
+int subject_move_instance(struct subject *subject, const struct link_scene *scene, uint32_t k, const struct lens *lens,
+                          const double by[2], struct psr_error *err);
+int subject_turn_instance(struct subject *subject, const struct link_scene *scene, uint32_t k, const struct lens *lens,
+                          const double by[2], struct psr_error *err);
+int subject_scale_instance(struct subject *subject, const struct link_scene *scene, uint32_t k, double factor,
+                           struct psr_error *err);
+
+/* ---- subject.c, again ---- */
 
 /* A camera or light that came with the first model, in its place in the scene: preset k of it. 0: there is none. */
 int subject_preset(const struct subject *subject, const struct link_scene *scene, uint32_t k,
@@ -70,7 +91,7 @@ int subject_resolve(struct subject *subject, const struct link_scene *scene, str
 /* Sets all but camera and size. `instance` has room for SUBJECT_INSTANCES and lives until link_wish(). */
 void subject_wish(const struct subject *subject, struct link_wish *wish, struct link_instance *instance);
 
-/* The command line that draws this picture, for a shell; without -o FILE. The caller's (free). NULL: no memory. */
+/* The command line that draws this picture, for a shell; without -o FILE. server NULL: none is named. The caller's (free). NULL: no memory. */
 char *subject_command(const struct subject *subject, const struct hand *hand, const char *server);
 
 #endif

@@ -1,9 +1,9 @@
-/* latency ADDRESS MODELS [MOVEMENT...]: what a viewer shows along movements of a hand, through the psrd at ADDRESS,
- * which serves the folder MODELS: bunny.psr and doorway.psr. Prints a row a movement. It drives what psr-view stands on
- * (hand, link, show), without a window.
+/* latency ADDRESS MODELS HANDS [MOVEMENT...]: what a viewer shows along movements of a hand, through the psrd at ADDRESS,
+ * which serves the folder MODELS: bunny.psr, dragon.psr, engine.psr and doorway.psr, while hands move that were recorded
+ * in the folder HANDS. Prints a row a movement. It drives what psr-view stands on (hand, link, show), without a window.
  *
- * The truth of a moment is what psr_render() draws for its camera. PSNR is over the pixels where the truth shows a
- * surface, of every tenth frame; "unwarped" is the last received picture as it is. */
+ * The truth of a moment is what psr_render() draws for its camera, smooth, as the picture at rest is. PSNR is over the
+ * pixels where the truth shows a surface, of every tenth frame; "unwarped" is the last received picture as it is. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +14,7 @@
 #include "base/stats.h"
 #include "base/vec.h"
 #include "client/view/hand.h"
+#include "client/view/path.h"
 #include "client/view/show.h"
 #include "measure/measure.h"
 #include "proto/proto.h"
@@ -26,79 +27,19 @@
 #define FPS 60
 #define OVERSCAN 1.2
 #define FOV 35
-#define MOVE_S 1.5           /* how long the hand moves */
 #define SETTLE_S 4           /* how long the sharp picture is waited for */
 #define MOST_FRAMES 1024
 #define MOST_WISHES 4096
 #define SAMPLE_EVERY 10
 #define MS 1e-6
 
-/* ---- movements: what a mouse says 125 times a second ---- */
-
-#define TICK_S 0.008
-
-/* From 0 to 1 as a hand moves: with the least jerk. */
-static double reach(double part)
-{
-	const double t = part < 0 ? 0 : part > 1 ? 1 : part;
-
-	return t * t * t * (10 - 15 * t + 6 * t * t);
-}
-
-static void pan(struct hand *hand, double t, uint64_t now_ns)
-{
-	if (t == 0)
-		hand_grab(hand, HAND_PAN, (struct hand_cursor){ 500, 360 }, INFINITY, now_ns);
-	hand_drag(hand, (struct hand_cursor){ 500 + 250 * reach(t / MOVE_S), 360 - 60 * reach(t / MOVE_S) }, now_ns);
-}
-
-/* 30 degrees a second: a height is half a turn. */
-static void orbit(struct hand *hand, double t, uint64_t now_ns)
-{
-	if (t == 0)
-		hand_grab(hand, HAND_ORBIT, (struct hand_cursor){ 500, 360 }, INFINITY, now_ns);
-	hand_drag(hand, (struct hand_cursor){ 500 + 30.0 / 180 * HEIGHT * t, 360 }, now_ns);
-}
-
-/* 50 degrees in a quarter of a second, let go in motion. */
-static void flick(struct hand *hand, double t, uint64_t now_ns)
-{
-	const double drag_s = 0.25;
-
-	if (t == 0)
-		hand_grab(hand, HAND_ORBIT, (struct hand_cursor){ 500, 360 }, INFINITY, now_ns);
-	if (t < drag_s)
-		hand_drag(hand, (struct hand_cursor){ 500 + 50.0 / 180 * HEIGHT * t / drag_s, 360 }, now_ns);
-	else if (hand->grip == HAND_ORBIT)
-		hand_release(hand, now_ns);
-	hand_tick(hand, now_ns);
-}
-
-/* Eight clicks of a wheel. */
-static void zoom(struct hand *hand, double t, uint64_t now_ns)
-{
-	const int clicks = (int)((t + TICK_S) / MOVE_S * 8) - (int)(t / MOVE_S * 8);
-
-	(void)now_ns;
-	if (clicks > 0)
-		hand_zoom(hand, (struct hand_cursor){ 700, 300 }, INFINITY, clicks);
-}
-
-static void dolly(struct hand *hand, double t, uint64_t now_ns)
-{
-	static const double forwards[3] = { 0, 0, 1 };
-
-	if (t == 0)
-		hand_fly(hand, forwards);
-	hand_tick(hand, now_ns);
-}
+/* ---- movements, recorded by docs/hands.sh ---- */
 
 static const struct movement {
 	const char *name, *model;
-	void (*move)(struct hand *hand, double t, uint64_t now_ns);
 } movements[] = {
-	{ "pan", "bunny", pan }, { "orbit", "bunny", orbit }, { "flick", "bunny", flick }, { "zoom", "bunny", zoom },
-	{ "doorway", "doorway", dolly },
+	{ "pan", "bunny" }, { "orbit", "bunny" }, { "dragon", "dragon" }, { "engine", "engine" }, { "flick", "bunny" },
+	{ "zoom", "bunny" }, { "doorway", "doorway" },
 };
 
 /* ---- what is shown ---- */
@@ -110,6 +51,7 @@ struct sample {
 
 struct run {
 	const struct movement *movement;
+	struct path path;
 	struct link *link;
 	struct view_show *show;
 	struct psr_pool *pool;
@@ -224,10 +166,6 @@ static void wait_sharp(struct run *run, double most_s, const char *what)
 	}
 }
 
-/* docs/latency.sh makes the doorway: the door is at z = 1, the room behind it reaches to z = -2. */
-static const struct psr_camera before_door = { .eye = { 0.1, 0, 2.6 }, .target = { 0, -0.1, -2 }, .up = { 0, 1, 0 },
-	                                           .kind = PSR_CAMERA_PERSPECTIVE, .fov_y = 1 };
-
 static void begin(struct run *run, const struct movement *movement, const char *address, struct psr_model *model)
 {
 	const struct psr_model_info *info = psr_model_info(model);
@@ -244,10 +182,7 @@ static void begin(struct run *run, const struct movement *movement, const char *
 	    || psr_pool_create(&run->pool, 0, &err) != PSR_OK)
 		report_die(movement->name, err.text);
 	hand_set_size(&run->hand, WIDTH, HEIGHT);
-	if (movement->move == dolly)
-		hand_set_camera(&run->hand, &before_door);
-	else
-		hand_look_from(&run->hand, 20, 15);
+	hand_set_pose(&run->hand, &run->path.pose[0].pose);
 	link_wish_default(&run->wish);
 	run->wish.instance = &run->instance;
 	run->wish.n_instances = 1;
@@ -263,20 +198,21 @@ static void begin(struct run *run, const struct movement *movement, const char *
 static void move(struct run *run)
 {
 	const uint64_t start_ns = clock_ns();
+	const double end_s = path_seconds(&run->path);
 	double t = 0;
 
 	run->n_pictures = 0;
-	for (int frame = 0; t < MOVE_S; frame++) {
-		while (t < MOVE_S && (double)(clock_ns() - start_ns) * 1e-9 >= t) {
-			run->movement->move(&run->hand, t, start_ns + (uint64_t)(t * 1e9));
-			t += TICK_S;
-		}
+	for (int frame = 0; t < end_s; frame++) {
+		struct hand_pose pose;
+
+		t = (double)(clock_ns() - start_ns) * 1e-9;
+		path_at(&run->path, t, &pose);
+		hand_set_pose(&run->hand, &pose);
 		say_wish(run);
 		hear(run, 0);
 		show_frame(run);
 		sleep_until(start_ns + (uint64_t)((frame + 1) * 1e9 / FPS));
 	}
-	hand_stop(&run->hand);
 	say_wish(run);
 }
 
@@ -298,6 +234,7 @@ static void compare(struct run *run, struct psr_model *model, double *warped, do
 		scene.background[c] = psr_srgb_to_linear[run->wish.background[c]];
 	}
 	psr_settings_default(&settings, WIDTH, HEIGHT);
+	settings.is_smooth = run->wish.is_smooth;
 	if (psr_renderer_create(&renderer, &err) != PSR_OK
 	    || psr_frame_alloc(&truth, WIDTH, HEIGHT, 1 << PSR_PLANE_COLOR | 1 << PSR_PLANE_DEPTH, &err) != PSR_OK)
 		report_die("truth", err.text);
@@ -316,7 +253,7 @@ static void compare(struct run *run, struct psr_model *model, double *warped, do
 	psr_renderer_destroy(renderer);
 }
 
-static void measure(const struct movement *movement, const char *address, const char *folder)
+static void measure(const struct movement *movement, const char *address, const char *folder, const char *hands)
 {
 	struct run *run = report_alloc(1, sizeof *run);
 	struct psr_model *model;
@@ -327,11 +264,14 @@ static void measure(const struct movement *movement, const char *address, const 
 	snprintf(path, sizeof path, "%s/%s.psr", folder, movement->model);
 	if (psr_model_read(&model, path, &err) != PSR_OK)
 		report_die(path, err.text);
+	snprintf(path, sizeof path, "%s/%s.json", hands, movement->name);
+	if (path_read(&run->path, path, &err) != PSR_OK)
+		report_die("hand", err.text);
 	begin(run, movement, address, model);
 	const uint64_t start_ns = clock_ns();
 	move(run);
 	const uint64_t stop_ns = clock_ns();
-	const double pictures = run->n_pictures / MOVE_S, shown = run->n_frames / ((double)(stop_ns - start_ns) * 1e-9);
+	const double pictures = run->n_pictures / path_seconds(&run->path), shown = run->n_frames / ((double)(stop_ns - start_ns) * 1e-9);
 
 	wait_sharp(run, 60, movement->name);
 	const double sharp_ms = (double)(clock_ns() - stop_ns) * MS;
@@ -344,23 +284,24 @@ static void measure(const struct movement *movement, const char *address, const 
 	link_close(run->link);
 	view_show_destroy(run->show);
 	psr_pool_destroy(run->pool);
+	path_fini(&run->path);
 	psr_model_unref(model);
 	free(run);
 }
 
 int main(int argc, char **argv)
 {
-	if (argc < 3) {
-		fprintf(stderr, "usage: latency ADDRESS MODELS [MOVEMENT...]\n");
+	if (argc < 4) {
+		fprintf(stderr, "usage: latency ADDRESS MODELS HANDS [MOVEMENT...]\n");
 		return 2;
 	}
 	for (size_t i = 0; i < sizeof movements / sizeof movements[0]; i++) {
-		int is_asked = argc == 3;
+		int is_asked = argc == 4;
 
-		for (int k = 3; k < argc; k++)
+		for (int k = 4; k < argc; k++)
 			is_asked |= strcmp(argv[k], movements[i].name) == 0;
 		if (is_asked)
-			measure(&movements[i], argv[1], argv[2]);
+			measure(&movements[i], argv[1], argv[2], argv[3]);
 	}
 	return 0;
 }

@@ -14,13 +14,13 @@
 #include "client/view/link.h"
 #include "report.h"
 #include "scene.h"
+#include "view_reading.h"
 
 #define RESOLUTION 768
 #define TURN_S 1.5
 #define STOPS 3
 #define MOST 4096
 #define SHARP_MS 1000.0
-#define SHOW_MS 5.0
 #define PATIENCE_S 20.0
 
 struct program {
@@ -58,7 +58,7 @@ static void stop(struct program *program)
 }
 
 struct found {
-	double ms[MOST], decode_ms[MOST], read_ms[MOST], bytes[MOST], scale[MOST];
+	double ms[MOST], bytes[MOST], scale[MOST];
 	size_t n;
 	double sharp_ms[STOPS];
 	double seconds;
@@ -96,8 +96,6 @@ static void note(const struct link_picture *picture)
 	if (found.n == MOST || picture->is_sharp)
 		return;
 	found.ms[found.n] = (double)(picture->came_ns - picture->asked_ns) * 1e-6;
-	found.read_ms[found.n] = (double)(picture->came_ns - picture->begun_ns) * 1e-6;
-	found.decode_ms[found.n] = (double)picture->decode_ns * 1e-6;
 	found.bytes[found.n] = (double)picture->bytes;
 	found.scale[found.n++] = picture->begin.settings.scale;
 }
@@ -213,26 +211,10 @@ static void networks(const char *relay, const struct program *psrd)
 	}
 }
 
-/* JPEG of quality 85 at full scale, as fast as they come. */
-static void reading(const struct program *psrd)
-{
-	double decode;
-
-	begin_wish(1);
-	wish.least_quality = wish.most_quality = 85;
-	wish.most_scale = 1;
-	wish.planes = 1u << PSR_PLANE_COLOR;
-	run(psrd->address, 1920, 1080);
-	decode = median(found.decode_ms, found.n);
-	printf("\n1920x1080, JPEG of quality 85, %.0f kB: decoded and handed over in %.2f ms, target %.0f%s; %.2f ms from "
-	       "first byte to picture, while psrd encodes beside it\n", 1e-3 * median(found.bytes, found.n), decode,
-	       SHOW_MS, decode <= SHOW_MS ? "" : " MISSED", median(found.read_ms, found.n));
-}
-
 int main(int argc, char **argv)
 {
 	struct program psrd;
-	char path[4096];
+	char path[4096], folder[] = "/tmp/psr-view-bench-XXXXXX", address[64];
 
 	if (argc != 6)
 		report_die("usage", "view PSR-MODEL FOLDER FETCHED PSRD RELAY");
@@ -240,10 +222,13 @@ int main(int argc, char **argv)
 	if (access(path, R_OK) != 0)
 		report_die(path, "is not there; make models fetches it");
 	psr_model_unref(scene_model(argv[1], argv[2], "dragon", path, RESOLUTION));
-	start(&psrd, (const char *const[]){ argv[4], "--models", argv[2], "--listen", "127.0.0.1:0", "--threads", "2",
-	                                     NULL });
+	if (mkdtemp(folder) == NULL)
+		report_die(folder, "cannot be made");
+	snprintf(address, sizeof address, "unix:%s/socket", folder);
+	start(&psrd, (const char *const[]){ argv[4], "--models", argv[2], "--listen", address, "--threads", "2", NULL });
 	networks(argv[5], &psrd);
-	reading(&psrd);
+	view_reading(psrd.address, psrd.pid, instance.model, &wish.camera);
 	stop(&psrd);
+	rmdir(folder);
 	return 0;
 }

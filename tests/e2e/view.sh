@@ -42,10 +42,11 @@ export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
 view() { # psr-view's options
 	(cd "$work/shots" && exec psr view --bare "$@" >"$work/view.log" 2>"$work/view.err") &
 	view_pid=$!
-	within 10 xdotool search --name psr-view
-	window=$(xdotool search --name psr-view)
-	xdotool windowfocus "$window" 2>/dev/null
+	within 20 xdotool search --name ' - psr-view$' # the title of a loop that runs: it takes keys
+	window=$(xdotool search --name ' - psr-view$')
+	within 10 has_focus
 }
+has_focus() { xdotool windowfocus "$window" && [ "$(xdotool getwindowfocus)" = "$window" ]; }
 drag() { # button dx dy: from the middle, in steps
 	xdotool mousemove --window "$window" 160 120 mousedown "$1"
 	for _ in 1 2 3 4 5 6 7 8; do xdotool mousemove_relative --sync -- $(($2 / 8)) $(($3 / 8)); done
@@ -161,8 +162,19 @@ if type -P psr-model >/dev/null && [ -x "$BUILD/tests/tools/drop" ]; then
 		'f 5 6 7 8' 'f 1 2 6 5' 'f 2 3 7 6' 'f 3 4 8 7' 'f 4 1 5 8' >"$work/tower.obj"
 	check "a window takes a file" "$BUILD/tests/tools/drop" "$window" "$work/tower.obj"
 	check "and shows it" within 20 sh -c "xdotool getwindowname $window | grep -q '^tower'"
-	is_true "built and drawn here"
-	check "through a Unix socket" grep -q -- "--server unix:.* --model tower" <<<"$command"
+	shot
+	check "the command names no psrd of its own, but the folder" \
+		grep -q "^psr shot --model tower .* # beside: psrd --models $work\$" <<<"$command"
+	mkdir "$work/others"
+	cp "$work/tower.obj" "$work/others"
+	psrd --listen "unix:$work/others/socket" --models "$work/others" --cache "$work/others/cache" >"$work/others.ready" \
+		2>/dev/null &
+	others_pid=$!
+	within 20 grep -q READY "$work/others.ready"
+	check "beside another psrd it draws" env PSR_SERVER="unix:$work/others/socket" \
+		sh -c "${command% -o *} -o '$work/true.png'" # of a model as fine as that psrd builds
+	kill $others_pid
+	wait $others_pid 2>/dev/null
 fi
 xdotool key Escape
 check "Escape ends it" wait $view_pid

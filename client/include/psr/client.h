@@ -46,6 +46,12 @@ int psr_address_check(const char *address, struct psr_error *err);
 int psr_client_connect(struct psr_client **out, const char *address, const char *program, const char *model,
                        int timeout_ms, struct psr_error *err);
 
+#define PSR_CLIENT_MAX_THREADS 8
+
+/* Lets n_threads (1..PSR_CLIENT_MAX_THREADS) decode frames while the caller of psr_client_wait() reads on, and beside
+ * it. Without this call it decodes alone. No frame may be under way. ARG, also the second time; MEMORY. */
+int psr_client_use_threads(struct psr_client *client, int n_threads, struct psr_error *err);
+
 /* Says GOODBYE if the connection is sound, without waiting, and frees the client. NULL is fine. */
 void psr_client_close(struct psr_client *client);
 

@@ -24,42 +24,68 @@ static double depth_at(const struct viewer *viewer, struct hand_cursor at)
 
 /* ---- clicks ---- */
 
-static void tell_point(struct viewer *viewer, const struct view_probe *probe)
-{
-	const double *p = probe->point, *n = probe->normal;
-
-	if (!probe->has_surface) {
-		viewer_note(viewer, "nothing is there");
-		return;
-	}
-	printf("point %.9g,%.9g,%.9g depth %.9g", p[0], p[1], p[2], probe->depth);
-	if (probe->has_normal)
-		printf(" normal %.4f,%.4f,%.4f", n[0], n[1], n[2]);
-	printf("\n");
-	fflush(stdout);
-}
-
 static void tell_distance(const struct viewer *viewer)
 {
 	const double *a = viewer->point[0].probe.point, *b = viewer->point[1].probe.point;
 
 	printf("distance %.9g\n", sqrt((b[0] - a[0]) * (b[0] - a[0]) + (b[1] - a[1]) * (b[1] - a[1])
 	                               + (b[2] - a[2]) * (b[2] - a[2])));
+}
+
+static void tell_point(const struct viewer *viewer, int k)
+{
+	const struct viewer_point *point = &viewer->point[k];
+	const double *p = point->probe.point, *n = point->normal;
+
+	printf("point %.9g,%.9g,%.9g depth %.9g", p[0], p[1], p[2], point->probe.depth);
+	if (point->has_normal)
+		printf(" normal %.6f,%.6f,%.6f", n[0], n[1], n[2]);
+	printf("\n");
+	if (k == 1)
+		tell_distance(viewer);
 	fflush(stdout);
 }
 
+/* Position and depth are read from the picture that is shown; normal and model come from the server. */
 static void click(struct viewer *viewer, struct hand_cursor at)
 {
 	const int is_second = viewer->is_measuring && viewer->point[0].is_set && !viewer->point[1].is_set;
+	const uint32_t size[2] = { viewer->hand.width, viewer->hand.height };
 	struct viewer_point *point = &viewer->point[is_second];
 
+	*point = (struct viewer_point){ 0 };
 	view_show_probe(viewer->show, at.x, at.y, &point->probe);
 	point->is_set = point->probe.has_surface;
 	if (!is_second)
 		viewer->point[1].is_set = 0;
-	tell_point(viewer, &point->probe);
-	if (is_second && point->is_set)
-		tell_distance(viewer);
+	viewer->probe = 0;
+	if (!point->is_set) {
+		viewer->picked = -1;
+		viewer_note(viewer, "nothing is there");
+	} else if (viewer->state.phase == LINK_LIVE) {
+		viewer->probe = link_probe(viewer->link, &viewer->hand.camera, size, (const double[2]){ at.x, at.y });
+		viewer->probe_point = is_second;
+	} else {
+		tell_point(viewer, is_second);
+	}
+}
+
+void input_surface(struct viewer *viewer)
+{
+	struct viewer_point *point = &viewer->point[viewer->probe_point];
+	struct link_surface surface;
+
+	link_probed(viewer->link, &surface);
+	if (viewer->probe == 0 || surface.number != viewer->probe)
+		return;
+	viewer->probe = 0;
+	viewer->picked = surface.has_surface ? (int)surface.instance : -1;
+	if (!point->is_set)
+		return;
+	point->has_normal = surface.has_surface;
+	memcpy(point->normal, surface.normal, sizeof point->normal);
+	tell_point(viewer, viewer->probe_point);
+	viewer->frames_due = VIEWER_SETTLE;
 }
 
 /* ---- the mouse ---- */
@@ -95,11 +121,8 @@ static void press(struct viewer *viewer, const SDL_MouseButtonEvent *button)
 		hand_set_pivot(&viewer->hand, at, depth_at(viewer, at));
 		viewer_note(viewer, isfinite(depth_at(viewer, at)) ? "turns about this point now" : "nothing is there");
 	}
-	if (SDL_GetKeyboardState(NULL)[SDL_SCANCODE_L]) {
-		subject_fix_light(&viewer->subject, &viewer->hand.camera);
-		viewer->is_light_drag = viewer->subject.n_lights > 0;
+	if (drag_begin(viewer))
 		return;
-	}
 	hand_grab(&viewer->hand, grip_of(viewer, button), at, depth_at(viewer, at), clock_ns());
 }
 
@@ -111,10 +134,8 @@ static void move(struct viewer *viewer, const SDL_MouseMotionEvent *motion)
 		return;
 	if (hypot(at.x - viewer->press.x, at.y - viewer->press.y) > CLICK_PIXELS * viewer->scale)
 		viewer->is_click = 0;
-	if (viewer->is_light_drag)
-		subject_turn_light(&viewer->subject, viewer->light < viewer->subject.n_lights ? viewer->light : 0,
-		                   &viewer->hand.camera, -PI * motion->xrel * viewer->scale / viewer->hand.height,
-		                   -PI * motion->yrel * viewer->scale / viewer->hand.height);
+	if (viewer->drag != DRAG_NONE)
+		drag_move(viewer, motion->xrel * viewer->scale, motion->yrel * viewer->scale);
 	else if (!viewer->is_click)
 		hand_drag(&viewer->hand, at, clock_ns());
 }
@@ -124,9 +145,10 @@ static void release(struct viewer *viewer, const SDL_MouseButtonEvent *button)
 	if (!viewer->is_pressed)
 		return;
 	hand_release(&viewer->hand, clock_ns());
-	if (viewer->is_click && !viewer->is_light_drag && button->button == SDL_BUTTON_LEFT && button->clicks == 1)
+	if (viewer->is_click && viewer->drag == DRAG_NONE && button->button == SDL_BUTTON_LEFT && button->clicks == 1)
 		click(viewer, viewer->press);
-	viewer->is_pressed = viewer->is_light_drag = 0;
+	viewer->is_pressed = 0;
+	viewer->drag = DRAG_NONE;
 }
 
 static void scroll(struct viewer *viewer, const SDL_MouseWheelEvent *wheel)

@@ -18,6 +18,7 @@ void viewer_show_model(struct viewer *viewer, const char *name)
 	if (subject_set_model(&viewer->subject, name, &err) != PSR_OK)
 		viewer_note(viewer, "%s", err.text);
 	viewer->has_hand = 0;
+	viewer->picked = -1;
 	viewer->has_camera = 1; /* the command line's was for another model */
 	viewer->frames_due = VIEWER_SETTLE;
 }
@@ -111,7 +112,7 @@ void news_wish(struct viewer *viewer)
 		wish.camera = viewer->hand.camera;
 		wish.width = viewer->hand.width;
 		wish.height = viewer->hand.height;
-		wish.is_rest = !hand_is_moving(&viewer->hand) && !viewer->is_light_drag && !viewer->is_playing;
+		wish.is_rest = !hand_is_moving(&viewer->hand) && viewer->drag == DRAG_NONE && !viewer->is_playing;
 	}
 	number = link_wish(viewer->link, &wish);
 	if (number != 0)
@@ -169,6 +170,8 @@ void news_hear(struct viewer *viewer)
 		viewer->list = list;
 		viewer->n_list = n;
 	}
+	if (news & LINK_NEWS_PROBE)
+		input_surface(viewer);
 	if (viewer->frames_due == 0)
 		viewer->frames_due = 1;
 }

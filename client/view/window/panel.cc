@@ -174,7 +174,8 @@ static void draw_help(struct viewer *viewer)
 		{ "w s a d e f", "fly; drag looks around" },
 		{ "h   1 2 3 4 5 6 7", "home; front back left right top bottom iso" },
 		{ "c   o   i", "the file's cameras; no perspective; inertia" },
-		{ "L drag   k", "move the light; let it go with the camera" },
+		{ "L drag   k", "move the light, Shift turns a spot; let it go with the camera" },
+		{ "click, G drag", "choose a model, move it; Shift turns, Ctrl scales" },
 		{ "x   n", "shadows; smoothing" },
 		{ ", .   PgUp PgDn   b", "spacing; ambient; background" },
 		{ "t   m", "pictures of stages; measure" },
@@ -211,8 +212,9 @@ static bool place(const struct viewer *viewer, const double point[3], ImVec2 *at
 	return true;
 }
 
-static void draw_point(const struct viewer *viewer, const struct view_probe *probe)
+static void draw_point(const struct viewer *viewer, const struct viewer_point *point)
 {
+	const struct view_probe *probe = &point->probe;
 	ImDrawList *list = ImGui::GetBackgroundDrawList();
 	char text[200];
 	ImVec2 at;
@@ -222,15 +224,34 @@ static void draw_point(const struct viewer *viewer, const struct view_probe *pro
 		return;
 	n = snprintf(text, sizeof text, "%.6g, %.6g, %.6g\ndepth %.6g", probe->point[0], probe->point[1], probe->point[2],
 	             probe->depth);
-	if (probe->has_normal)
-		snprintf(text + n, sizeof text - (size_t)n, "\nnormal %.3f, %.3f, %.3f", probe->normal[0], probe->normal[1],
-		         probe->normal[2]);
+	if (point->has_normal)
+		snprintf(text + n, sizeof text - (size_t)n, "\nnormal %.3f, %.3f, %.3f", point->normal[0], point->normal[1],
+		         point->normal[2]);
 	list->AddCircle(at, points(viewer, 4), IM_COL32(0, 0, 0, 255), 0, points(viewer, 3));
 	list->AddCircle(at, points(viewer, 4), IM_COL32(255, 210, 60, 255), 0, points(viewer, 1.5));
 	at.x += points(viewer, 9);
 	at.y += points(viewer, 4);
 	list->AddText(ImVec2(at.x + 1, at.y + 1), IM_COL32(0, 0, 0, 255), text);
 	list->AddText(at, IM_COL32(255, 230, 150, 255), text);
+}
+
+/* The box of the instance that was clicked, where there is another one that it could be. */
+static void draw_picked(const struct viewer *viewer)
+{
+	ImDrawList *list = ImGui::GetBackgroundDrawList();
+	double corner[8][3];
+
+	if (viewer->picked < 0 || (uint32_t)viewer->picked >= viewer->subject.n_instances
+	    || (viewer->subject.n_instances == 1 && viewer->drag != DRAG_INSTANCE)
+	    || !subject_instance_box(corner, &viewer->subject, viewer->scene, (uint32_t)viewer->picked))
+		return;
+	for (int c = 0; c < 8; c++)
+		for (int i = 0; i < 3; i++) {
+			ImVec2 from, to;
+
+			if (!(c >> i & 1) && place(viewer, corner[c], &from) && place(viewer, corner[c | 1 << i], &to))
+				list->AddLine(from, to, IM_COL32(120, 200, 255, 160), points(viewer, 1));
+		}
 }
 
 static void draw_distance(const struct viewer *viewer)
@@ -259,9 +280,10 @@ static void draw_marks(const struct viewer *viewer)
 	if ((viewer->hand.grip == HAND_ORBIT || viewer->hand.grip == HAND_TRACKBALL) && !viewer->is_click
 	    && place(viewer, viewer->hand.pivot, &at))
 		ImGui::GetBackgroundDrawList()->AddCircleFilled(at, points(viewer, 3), IM_COL32(120, 200, 255, 200));
+	draw_picked(viewer);
 	for (const auto &point : viewer->point)
 		if (point.is_set)
-			draw_point(viewer, &point.probe);
+			draw_point(viewer, &point);
 	if (viewer->point[0].is_set && viewer->point[1].is_set)
 		draw_distance(viewer);
 }

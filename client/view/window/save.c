@@ -20,7 +20,9 @@ static int free_name(char name[32], const char *ending)
 
 void save_shot(struct viewer *viewer)
 {
-	char *command = subject_command(&viewer->subject, &viewer->hand, viewer->address);
+	/* A psrd of the window's own is there for nobody else. */
+	const char *server = viewer->home == NULL ? viewer->address : NULL;
+	char *command = subject_command(&viewer->subject, &viewer->hand, server);
 	struct psr_error err;
 	char name[32];
 
@@ -33,7 +35,8 @@ void save_shot(struct viewer *viewer)
 		viewer_note(viewer, "%s", err.text);
 	else {
 		viewer_note(viewer, "%s is written; the command that draws it stands on the terminal", name);
-		printf("%s -o %s\n", command, name);
+		printf("%s -o %s%s%s\n", command, name, viewer->home != NULL ? " # beside: psrd --models " : "",
+		       viewer->home != NULL ? home_folder(viewer->home) : "");
 		fflush(stdout);
 	}
 	free(command);

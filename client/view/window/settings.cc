@@ -40,6 +40,36 @@ static void draw_models(struct viewer *viewer)
 	ImGui::EndChild();
 }
 
+/* Where the instance is, to be dragged. */
+static void draw_place(struct viewer *viewer, uint32_t k)
+{
+	struct subject *subject = &viewer->subject;
+	const struct link_instance *link = &subject->instance[k].link;
+	double corner[8][3];
+	float by[2] = { 0, 0 }, turn[2] = { 0, 0 }, scale = (float)link->scale;
+	struct psr_error err;
+	struct lens lens;
+	int code = PSR_OK;
+
+	if (!viewer->has_hand || !subject_instance_box(corner, subject, viewer->scene, k))
+		return;
+	lens_init(&lens, &viewer->hand.camera, viewer->hand.width, viewer->hand.height);
+	if (ImGui::DragFloat2("move", by, 1, 0, 0, "drag")) {
+		const double pixels[2] = { (double)by[0], (double)by[1] };
+
+		code = subject_move_instance(subject, viewer->scene, k, &lens, pixels, &err);
+	}
+	if (ImGui::DragFloat2("turn", turn, 0.01f, 0, 0, "drag")) {
+		const double radians[2] = { (double)turn[0], (double)turn[1] };
+
+		code = subject_turn_instance(subject, viewer->scene, k, &lens, radians, &err);
+	}
+	if (ImGui::DragFloat("scale", &scale, 0.01f * scale, 1e-6f, 1e6f, "%.4g") && scale > 0)
+		code = subject_scale_instance(subject, viewer->scene, k, (double)scale / link->scale, &err);
+	if (code != PSR_OK)
+		viewer_note(viewer, "%s", err.text);
+}
+
 /* The text is what psr shot takes, so a place that is typed here is the same there. */
 static void draw_instances(struct viewer *viewer)
 {
@@ -51,6 +81,9 @@ static void draw_instances(struct viewer *viewer)
 
 		snprintf(text, sizeof text, "%s", subject->instance[k].text);
 		ImGui::PushID((int)k);
+		if (ImGui::RadioButton("##pick", viewer->picked == (int)k))
+			viewer->picked = (int)k;
+		ImGui::SameLine();
 		if (ImGui::InputText("##place", text, sizeof text, ImGuiInputTextFlags_EnterReturnsTrue)
 		    && subject_place(subject, k, text, &err) != PSR_OK)
 			viewer_note(viewer, "%s", err.text);
@@ -60,10 +93,14 @@ static void draw_instances(struct viewer *viewer)
 			memmove(&subject->instance[k], &subject->instance[k + 1],
 			        (subject->n_instances - k - 1) * sizeof subject->instance[0]);
 			subject->n_instances--;
+			viewer->picked = -1;
 		}
 		ImGui::PopID();
 	}
 	ImGui::TextDisabled("NAME,at=X,Y,Z,rotate=Y:90,scale=2");
+	if (viewer->picked >= 0 && (uint32_t)viewer->picked < subject->n_instances)
+		draw_place(viewer, (uint32_t)viewer->picked);
+	ImGui::TextDisabled("G drag moves; Shift turns, Ctrl scales");
 }
 
 static void draw_camera(struct viewer *viewer)
@@ -95,6 +132,8 @@ static void draw_light(struct viewer *viewer, uint32_t k)
 {
 	struct psr_msg_light light = viewer->subject.light[k].light;
 	float color[3], intensity = (float)light.intensity;
+	char text[SUBJECT_TEXT];
+	struct psr_error err;
 	bool has_changed;
 
 	for (int i = 0; i < 3; i++)
@@ -109,8 +148,12 @@ static void draw_light(struct viewer *viewer, uint32_t k)
 	for (int i = 0; i < 3; i++)
 		light.color[i] = (uint8_t)(color[i] * 255 + 0.5f);
 	light.intensity = (double)intensity;
-	if (has_changed && light.kind == PSR_WIRE_LIGHT_DIRECTIONAL)
+	if (has_changed && light.kind != 0)
 		subject_set_light(&viewer->subject, k, &light);
+	snprintf(text, sizeof text, "%s", viewer->subject.light[k].text);
+	if (ImGui::InputText("##light", text, sizeof text, ImGuiInputTextFlags_EnterReturnsTrue)
+	    && subject_read_light(&viewer->subject, k, text, &err) != PSR_OK)
+		viewer_note(viewer, "%s", err.text);
 	ImGui::PopID();
 }
 
@@ -129,7 +172,8 @@ static void draw_lights(struct viewer *viewer)
 	}
 	for (uint32_t k = 0; k < subject->n_lights && !has_key; k++)
 		draw_light(viewer, k);
-	ImGui::TextDisabled("hold L and drag to move it");
+	ImGui::TextDisabled("dir: point: X,Y,Z spot: X,Y,Z:TX,TY,TZ:DEG");
+	ImGui::TextDisabled("L drag; Shift: turn a spot, point nearer");
 	if (ImGui::Checkbox("shadows", &is_shadowed))
 		subject->is_shadowed = is_shadowed;
 	if (ImGui::SliderFloat("ambient", &ambient, 0, 1, "%.2f"))

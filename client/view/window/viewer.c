@@ -262,6 +262,7 @@ int viewer_run(const struct viewer_options *options, struct psr_error *err)
 	viewer->options = *options;
 	viewer->subject = options->subject;
 	viewer->hand.has_inertia = options->has_inertia;
+	viewer->picked = -1;
 	viewer->has_overlay = !options->is_bare;
 	/* Without a model the panel's list is where to choose one. */
 	viewer->has_panel = !options->is_bare && options->subject.n_instances == 0 && options->file == NULL;

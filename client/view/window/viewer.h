@@ -1,6 +1,6 @@
 /* psr-view: a window on the models of a psrd. Files of this folder: main.c (command line), viewer.c (window and loop),
- * connect.c (to which psrd), news.c (wishes to the link, and what comes of them), input.c (mouse and keys), save.c
- * (screenshots, ways), bell.c (the link's news as events), gui.cc (Dear ImGui on an SDL renderer), panel.cc (what stands
+ * connect.c (to which psrd), news.c (wishes to the link, and what comes of them), input.c (mouse and keys), drag.c
+ * (lights and instances by hand), save.c (screenshots, ways), bell.c (the link's news as events), gui.cc (Dear ImGui on an SDL renderer), panel.cc (what stands
  * on the picture), settings.cc (the panel of settings). */
 #ifndef PSR_CLIENT_VIEW_WINDOW_VIEWER_H
 #define PSR_CLIENT_VIEW_WINDOW_VIEWER_H
@@ -34,9 +34,12 @@ struct viewer_options {
 };
 
 struct viewer_point { /* that was clicked */
-	int is_set;
+	int is_set, has_normal;
 	struct view_probe probe;
+	double normal[3];        /* of the frame's plane; it comes a round trip later */
 };
+
+enum viewer_drag { DRAG_NONE, DRAG_NOTHING, DRAG_LIGHT, DRAG_INSTANCE };
 
 /* Frames a second over the last second. */
 struct viewer_rate { uint64_t since_ns; uint32_t n; double per_second; };
@@ -77,8 +80,11 @@ struct viewer {
 	/* the hand */
 	struct hand_cursor press;    /* where a button went down */
 	int is_pressed, is_click;    /* is_click: it has not moved since */
-	int is_light_drag;
+	enum viewer_drag drag;       /* the press that is on drags no camera */
 	uint32_t light;              /* that is dragged */
+	int picked;                  /* instance that was clicked; -1: none */
+	uint64_t probe;              /* number of the place that is asked for; 0: none */
+	int probe_point;             /* which point waits for it */
 	int fly_keys[6];             /* right, left, up, down, forwards, backwards */
 
 	/* what is shown on top */
@@ -128,6 +134,13 @@ void connect_end(struct viewer *viewer);
 
 void input_event(struct viewer *viewer, const SDL_Event *event);
 void input_next_camera(struct viewer *viewer); /* of those that came with the first model */
+
+void input_surface(struct viewer *viewer); /* what link_probe() asked for has come */
+
+/* ---- drag.c ---- */
+
+int drag_begin(struct viewer *viewer);         /* 1: the press drags a light or an instance, or nothing, but no camera */
+void drag_move(struct viewer *viewer, double right, double down); /* pixels */
 
 /* ---- save.c ---- */
 

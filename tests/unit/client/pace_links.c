@@ -32,14 +32,17 @@ static double least_link_ms(const struct world *world)
 	return 8e-3 * world->cost_high * world_bytes(wish.most_scale, wish.least_quality) / world->mbit;
 }
 
-/* Frames a second that can be had at all: link and server take so long, and two are under way at once. */
+/* Frames a second that can be had: link and server take so long, and two are under way at once. Where the way is too
+ * long for the wished rate, each may work for PACE_WORK_FRAMES. */
 static double feasible(const struct world *world)
 {
 	const double link_ms = least_link_ms(world), draw_ms = least_draw_ms(world);
-	const double cycle_ms = world->rtt_ms + world->jitter_ms + draw_ms + link_ms +
-	                        world->decode_ms / (wish.most_scale * wish.most_scale);
-	double ms = 1e3 / FPS;
+	const double least_ms = draw_ms + link_ms + world->decode_ms / (wish.most_scale * wish.most_scale);
+	const double way_ms = world->rtt_ms + world->jitter_ms, work_ms = PACE_WORK_FRAMES * 1e3 / FPS;
+	double ms = 1e3 / FPS, cycle_ms = way_ms + least_ms;
 
+	if (way_ms + work_ms > PACE_WINDOW * ms && cycle_ms < way_ms + work_ms)
+		cycle_ms = way_ms + work_ms;
 	ms = link_ms > ms ? link_ms : ms;
 	ms = draw_ms > ms ? draw_ms : ms;
 	return 1e3 / (cycle_ms / PACE_WINDOW > ms ? cycle_ms / PACE_WINDOW : ms);

