@@ -349,7 +349,7 @@ static void soak_all(void)
 static int start(void)
 {
 	const char *const argv[] = { soak.psrd, "--listen", "127.0.0.1:0", "--models", soak.models, "--threads", "2",
-		"--max-clients", "200", "--max-memory", "100000000", "--max-queue", "2000000", "--idle-timeout", "4",
+		"--max-clients", "200", "--max-memory", "110000000", "--max-queue", "2000000", "--idle-timeout", "4",
 		"--slow-timeout", "3", "--handshake-timeout", "1", NULL };
 	const char *const relay_argv[] = { soak.relay, "--to", soak.address, "--rate-down", "8", "--rate-up", "2", "--delay",
 		"20", "--jitter", "10", "--queue", "100000", NULL };
