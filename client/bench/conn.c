@@ -1,4 +1,5 @@
 #include "conn.h"
+#include <assert.h>
 #include <errno.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -170,6 +171,7 @@ int conn_ask(struct conn *conn, uint64_t k, uint64_t intended_ns, uint32_t n_cli
 	struct psr_error err;
 	int code;
 
+	assert(conn->n_open < conn->most_open);
 	while (request->id != 0)
 		request++;
 	if (conn->next_id == UINT32_MAX) {

@@ -21,6 +21,7 @@ enum conn_outcome { CONN_DRAWN, CONN_SUPERSEDED, CONN_FAILED };
 struct conn_answer {
 	enum conn_outcome outcome;
 	int code;                            /* FAILED: enum psr_err; CANCELLED, too */
+	const char *text;                    /* FAILED: what the server says of it; NULL: nothing */
 	const struct psr_msg_frame_end *end; /* DRAWN: of the last frame */
 };
 

@@ -243,7 +243,8 @@ static void on_error(struct conn *conn, const struct psr_message *message)
 	if (psr_msg_error_decode(&msg, message->payload, message->n, &err) != PSR_OK)
 		conn_fail(conn, PSR_ERR_PROTOCOL, "%.300s", err.text);
 	else if (request != NULL)
-		conn_end(conn, request, &(struct conn_answer){ .outcome = CONN_FAILED, .code = psr_wire_error_to(msg.code) });
+		conn_end(conn, request, &(struct conn_answer){ .outcome = CONN_FAILED, .code = psr_wire_error_to(msg.code),
+		                                               .text = msg.text });
 	else if (message->id == 0)
 		conn_fail(conn, psr_wire_error_to(msg.code), "the server refuses: %.400s", msg.text);
 	else if (message->id == conn->control_id || message->id <= conn->scene_id)

@@ -1,3 +1,5 @@
+#include <stdio.h>
+#include <string.h>
 #include "measure.h"
 
 const char *measure_stage_name(unsigned id)
@@ -16,12 +18,16 @@ const char *measure_stage_name(unsigned id)
 void measure_add(struct measure *measure, const struct conn_request *request, const struct conn_answer *answer,
                  uint64_t now_ns)
 {
+	uint64_t server_ns = 0;
+
 	if (answer->outcome == CONN_SUPERSEDED) {
 		measure->n_superseded++;
 		return;
 	}
 	if (answer->outcome == CONN_FAILED) {
 		measure->n_failed[-answer->code]++;
+		if (measure->first_failure[0] == '\0' && answer->text != NULL)
+			snprintf(measure->first_failure, sizeof measure->first_failure, "%.255s", answer->text);
 		return;
 	}
 	measure->n_bytes += request->bytes;
@@ -34,7 +40,10 @@ void measure_add(struct measure *measure, const struct conn_request *request, co
 
 		if (measure_stage_name(entry->id) != NULL)
 			histogram_add(&measure->stage[entry->id], entry->ns);
+		if (entry->id == PSR_WIRE_REPORT_QUEUE || entry->id == PSR_WIRE_REPORT_TOTAL)
+			server_ns += entry->ns;
 	}
+	histogram_add(&measure->server, server_ns);
 }
 
 void measure_merge(struct measure *to, const struct measure *from)
@@ -45,6 +54,9 @@ void measure_merge(struct measure *to, const struct measure *from)
 	histogram_merge(&to->decode, &from->decode);
 	for (unsigned i = 0; i < MEASURE_STAGES; i++)
 		histogram_merge(&to->stage[i], &from->stage[i]);
+	histogram_merge(&to->server, &from->server);
+	if (to->first_failure[0] == '\0')
+		memcpy(to->first_failure, from->first_failure, sizeof to->first_failure);
 	to->n_bytes += from->n_bytes;
 	to->n_superseded += from->n_superseded;
 	to->n_unfinished += from->n_unfinished;

@@ -14,7 +14,9 @@ struct measure {
 	struct histogram first;   /* from the intended time to the first byte */
 	struct histogram decode;
 	struct histogram stage[MEASURE_STAGES]; /* as the server reports them */
+	struct histogram server; /* queue and total of a frame together: latency by the server's clock */
 	uint64_t n_bytes, n_superseded, n_unfinished, n_failed[MEASURE_CODES];
+	char first_failure[256]; /* what the server said of a failed request, the first of a thread; "": nothing */
 };
 
 /* Adds the answer to a request; now_ns: when its last bytes were read. */

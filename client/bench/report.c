@@ -50,6 +50,8 @@ static void print_ends(const struct bench_result *result)
 		if (measure->n_failed[i] > 0)
 			printf("; %s %" PRIu64, psr_strerror(-i), measure->n_failed[i]);
 	printf("\n");
+	if (measure->first_failure[0] != '\0')
+		printf("the first failure: %s\n", measure->first_failure);
 	if (result->n_lost > 0)
 		printf("connections lost: %" PRIu64 "; the first: %s\n", result->n_lost, result->first_error.text);
 }
@@ -88,6 +90,7 @@ void report_print(const struct bench_result *result, const char *what)
 	for (unsigned i = 0; i < MEASURE_STAGES; i++)
 		if (measure->stage[i].max > 0)
 			print_histogram(measure_stage_name(i), &measure->stage[i]);
+	print_histogram("psrd", &measure->server);
 	print_ends(result);
 	printf("fairness (Jain) %.3f; processor time: this program %.2f s, psrd's frames %.2f s\n", result->fairness,
 	       result->processor_s, server_s(result));
@@ -170,6 +173,8 @@ cJSON *report_json(const struct bench_result *result, const char *what)
 	cJSON_AddNumberToObject(json, "server_processor_s", server_s(result));
 	cJSON_AddNumberToObject(json, "percentile_error", HISTOGRAM_ERROR);
 	add_failures(json, measure);
+	if (measure->first_failure[0] != '\0')
+		cJSON_AddStringToObject(json, "first_failure", measure->first_failure);
 	add_histogram(json, "latency_ms", &measure->latency);
 	add_histogram(json, "first_byte_ms", &measure->first);
 	add_histogram(json, "waited_ms", &measure->waited);
@@ -178,6 +183,7 @@ cJSON *report_json(const struct bench_result *result, const char *what)
 	for (unsigned i = 0; i < MEASURE_STAGES; i++)
 		if (measure->stage[i].n > 0)
 			add_histogram(stages, measure_stage_name(i), &measure->stage[i]);
+	add_histogram(json, "psrd_ms", &measure->server);
 	add_rows(json, result);
 	return json;
 }

@@ -14,7 +14,13 @@
 
 static void on_ready(struct conn *conn)
 {
-	((struct worker *)conn->shared->userdata)->n_ready++;
+	struct worker *worker = conn->shared->userdata;
+
+	if (worker->load->rate <= 0 && worker->load->n_inflight > conn->most_open)
+		conn_fail(conn, PSR_ERR_LIMIT, "--inflight %" PRId64 ": the server lets a client open %" PRIu32 " requests",
+		          worker->load->n_inflight, conn->most_open);
+	else
+		worker->n_ready++;
 }
 
 int worker_init(struct worker *worker, struct psr_error *err)

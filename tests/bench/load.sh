@@ -53,6 +53,7 @@ for load in '--clients 1' '--clients 8' '--clients 4 --rate 100 --poisson'; do
 	sed -n 's/.*"latency_ms":\([0-9.]*\).*/\1/p' "$work/recording" >"$work/recorded"
 	row '  without the histogram' "$(part "$work/recorded" 0.5)" "$(part "$work/recorded" 0.99)"
 	row 'stamps of the relay' "$(part "$work/relayed" 0.5)" "$(part "$work/relayed" 0.99)"
+	row 'reports of psrd' "$(of psrd_ms p50)" "$(of psrd_ms p99)"
 	awk -v total="$(of total mean)" -v queue="$(of queue mean)" -v mean="$(of latency_ms mean)" 'BEGIN {
 		printf "mean: %.3f ms, of which psrd reports %.3f waiting and %.3f at work\n\n", mean, queue, total }'
 done

@@ -1,4 +1,5 @@
 #!/bin/bash
+# not for threads
 # psr bench: what it counts, against psrd's own count; a psrd that stops for a second, seen by an open loop and not by a
 # closed one; a thousand connections; pictures that are verified, recorded and sent again; mixes; searches. And psr stats.
 . "$(dirname "$0")/lib.sh"

@@ -638,10 +638,12 @@ static void bench_counts_frames_and_fails_if_one_failed(void **state)
 	assert_true(cJSON_GetObjectItem(cJSON_GetObjectItem(json, "latency_ms"), "p50")->valuedouble
 	            <= cJSON_GetObjectItem(cJSON_GetObjectItem(json, "latency_ms"), "max")->valuedouble);
 	cJSON_Delete(json);
-	assert_int_equal(psr("bench --model broken --clients 2 --seconds 1 --size 16x16 --codec raw"), 7);
+	assert_int_equal(psr("bench --model broken --clients 2 --seconds 1 --size 16x16 --codec raw"), 1);
 	assert_int_equal(psr("bench --model flaky --clients 2 --seconds 1 --size 16x16 --codec raw"), 1);
-	assert_non_null(strstr(err, "on fire"));
+	assert_non_null(strstr(out, "the first failure: "));
+	assert_non_null(strstr(out, "on fire"));
 	assert_int_equal(psr("bench --model cube --clients 2 --inflight 9 --seconds 1"), 5);
+	assert_non_null(strstr(err, "--inflight 9: the server lets a client open 8 requests"));
 }
 
 static void help_and_version_work_without_a_server(void **state)
