@@ -28,8 +28,8 @@ extern const char *const psr_commands[]; /* names, NULL at the end */
 
 /* psr_cli_parse(), then the user's defaults for what the command line leaves open: $XDG_CONFIG_HOME/psr/psr.conf, or
  * ~/.config/psr/psr.conf, if it exists. Lines above the first section hold for all commands, those below [COMMAND] for
- * one. cli->given, if not NULL, is of the command line alone. --help shows them. With --replay the section is left out, as the report says everything. ARG, IO, LIMIT, MEMORY;
- * 1 as of psr_cli_parse(). */
+ * one. cli->given, if not NULL, is of the command line alone. --help shows them. With --replay the section is left
+ * out, as the report says everything. ARG, IO, LIMIT, MEMORY; 1 as of psr_cli_parse(). */
 int psr_command_parse(const char *command, const struct psr_cli *cli, int argc, char **argv, int *n_operands,
                       struct psr_error *err);
 

@@ -43,9 +43,9 @@ struct psr_cli {
 };
 
 /* Parses argv[1..argc-1]: --name value, --name=value, -l value, flags, "--" ends options. Operands are moved to the
- * front of argv[1..]; *n_operands says how many. Returns PSR_OK, PSR_ERR_ARG with a sentence that names the option,
- * or 1 if --help was given (the help stands on standard output by then), or --completions: that prints, for the scripts in
- * client/completion, a line `--name TAB letter TAB arg TAB words TAB help` for each option. */
+ * front of argv[1..]; *n_operands says how many. Returns PSR_OK, PSR_ERR_ARG with a sentence that names the option, or
+ * 1 if --help was given (the help stands on standard output by then), or --completions: that prints, for the scripts
+ * in client/completion, a line `--name TAB letter TAB arg TAB words TAB help` for each option. */
 int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_operands, struct psr_error *err);
 
 /* Sets one option by its name from text, as a configuration line does. */
@@ -54,16 +54,16 @@ int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, s
 /* Returns whether the command line of a cli with `given` named this option. */
 int psr_cli_is_given(const struct psr_cli *cli, const char *name);
 
-/* A file of `name = value` lines, # before comments. Lines above the first `[section]` hold for every program that reads
- * the file. */
+/* A file of `name = value` lines, # before comments. Lines above the first `[section]` hold for every program that
+ * reads the file. */
 struct psr_config {
 	const char *path;
 	const char *section;         /* the one whose lines hold, too; NULL: none */
 	const char *const *sections; /* that the file may have, NULL at the end; NULL: none */
 };
 
-/* Sets the options of `cli` (with `given`) that its command line did not. Strings of options point into *text, which the
- * caller frees, also after an error. ARG, with path and line; NOT_FOUND, IO, LIMIT, MEMORY. */
+/* Sets the options of `cli` (with `given`) that its command line did not. Strings of options point into *text, which
+ * the caller frees, also after an error. ARG, with path and line; NOT_FOUND, IO, LIMIT, MEMORY. */
 int psr_config_read(char **text, const struct psr_config *config, const struct psr_cli *cli, struct psr_error *err);
 
 /* "x,y,z" -> three finite doubles; PSR_ERR_ARG otherwise. *end, if not NULL, gets the first character not used. */
