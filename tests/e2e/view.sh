@@ -180,6 +180,47 @@ xdotool key Escape
 check "Escape ends it" wait $view_pid
 view_pid=
 
+# --- lights and models by hand ---
+hold_and_drag() { # key dx dy [modifier]
+	xdotool keydown "$1" ${4:+keydown "$4"}
+	drag 1 "$2" "$3"
+	xdotool ${4:+keyup "$4"} keyup "$1"
+}
+lamp() { sed -n "s/.*--light '*\([^ ']*\).*/\1/p" <<<"$command"; }
+placed() { sed -n "s/.*--instance '*wheel,at=\([^ ']*\).*/\1/p" <<<"$command"; }
+: >"$work/view.log"
+rm "$work"/shots/*
+n_shots=0
+view --server "$address" --model teapot --instance wheel,at=0,0,4 --light spot:0,9,9:0,0,0:30 --size 320x240 --no-inertia
+is_true "a spot before two models"
+check "is where it was said to be" [ "$(lamp)" = spot:0,9,9:0,0,0:30 ]
+hold_and_drag l 40 -24
+is_true "a spot that was moved"
+moved=$(lamp)
+differs "it moved" "$moved" spot:0,9,9:0,0,0:30
+hold_and_drag l 24 8 shift
+is_true "a spot that was turned"
+check "stays where it is" [ "$(lamp | cut -d: -f2)" = "$(cut -d: -f2 <<<"$moved")" ]
+differs "and shines elsewhere" "$(lamp | cut -d: -f3)" "$(cut -d: -f3 <<<"$moved")"
+hold_and_drag g 40 0
+shot
+check "without a click no model moves" [ "$(placed)" = 0,0,4 ]
+sleep 0.6 # not a double click with the drag before
+xdotool mousemove --window "$window" 160 120 click 1
+check "a click chooses the model in front" within 3 grep -q '^point' "$work/view.log"
+hold_and_drag g 40 0
+is_true "a model that was moved"
+differs "it moved" "$(placed)" 0,0,4
+hold_and_drag g 32 16 shift
+is_true "a model that was turned"
+check "says so" grep -q rotate= <<<"$(placed)"
+hold_and_drag g 0 -40 ctrl
+is_true "a model that was made larger"
+check "says so, too" awk -v s="$(placed | sed -n 's/.*scale=//p')" 'BEGIN { exit !(s > 1.05 && s < 1.2) }'
+xdotool key Escape
+check "and ends" wait $view_pid
+view_pid=
+
 # --- a way of the camera ---
 view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
 n_shots=0
