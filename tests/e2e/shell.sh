@@ -26,7 +26,11 @@ is "values of an option" "draft" "$(complete_line psr shot --quality d)"
 is "and after its letter" "good" "$(complete_line psr shot -q g)"
 is "models of a server" "dice" "$(complete_line psr shot --server "$server" --model d)"
 is "options of psrd" "--max-clients" "$(complete_line psrd --max-cl)"
-is "options of a command of psr-model" "--resolution" "$(complete_line psr-model build --res)"
+if command -v psr-model >/dev/null; then
+	is "options of a command of psr-model" "--resolution" "$(complete_line psr-model build --res)"
+else
+	skip "options of a command of psr-model" "this configuration has no psr-model"
+fi
 is "files" "$work/models" "$(complete_line psr shot -o "$work/mod")"
 all_have_options=yes
 for command in $(psr --completions | cut -f 1); do
