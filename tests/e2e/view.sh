@@ -187,7 +187,7 @@ hold_and_drag() { # key dx dy [modifier]
 	xdotool ${4:+keyup "$4"} keyup "$1"
 }
 lamp() { sed -n "s/.*--light '*\([^ ']*\).*/\1/p" <<<"$command"; }
-placed() { sed -n "s/.*--instance '*wheel,at=\([^ ']*\).*/\1/p" <<<"$command"; }
+models() { grep -oE -- "--(model|instance) '?[^ ']*" <<<"$command"; }
 : >"$work/view.log"
 rm "$work"/shots/*
 n_shots=0
@@ -204,19 +204,24 @@ check "stays where it is" [ "$(lamp | cut -d: -f2)" = "$(cut -d: -f2 <<<"$moved"
 differs "and shines elsewhere" "$(lamp | cut -d: -f3)" "$(cut -d: -f3 <<<"$moved")"
 hold_and_drag g 40 0
 shot
-check "without a click no model moves" [ "$(placed)" = 0,0,4 ]
+before=$(models)
+check "without a click no model moves" grep -q "wheel,at=0,0,4$" <<<"$before"
 sleep 0.6 # not a double click with the drag before
 xdotool mousemove --window "$window" 160 120 click 1
 check "a click chooses the model in front" within 3 grep -q '^point' "$work/view.log"
+is_drawn() { # claim: the screenshot is of the command; a box on the screen shows which model was chosen
+	shot
+	check "$1: psr shot draws the same, bit for bit" draws_the_same
+}
 hold_and_drag g 40 0
-is_true "a model that was moved"
-differs "it moved" "$(placed)" 0,0,4
+is_drawn "a model that was moved"
+differs "it moved" "$(models)" "$before"
 hold_and_drag g 32 16 shift
-is_true "a model that was turned"
-check "says so" grep -q rotate= <<<"$(placed)"
+is_drawn "a model that was turned"
+check "says so" grep -q rotate= <<<"$(models)"
 hold_and_drag g 0 -40 ctrl
-is_true "a model that was made larger"
-check "says so, too" awk -v s="$(placed | sed -n 's/.*scale=//p')" 'BEGIN { exit !(s > 1.05 && s < 1.2) }'
+is_drawn "a model that was made larger"
+check "says so, too" awk -v s="$(models | sed -n 's/.*scale=//p')" 'BEGIN { exit !(s > 1.05 && s < 1.2) }'
 xdotool key Escape
 check "and ends" wait $view_pid
 view_pid=
