@@ -80,7 +80,8 @@ int client_assembly_begin(struct client_assembly *assembly, const struct psr_msg
 int client_assembly_rect(struct client_assembly *assembly, struct client_decoder *decoder,
                          const struct psr_msg_rect *rect, struct psr_error *err);
 /* Waits for the crew. PROTOCOL: END does not fit, or a rectangle was damaged; FORMAT: a hash is wrong, and this frame
- * alone is lost. *checked gets the planes that have their hash, `lossy` the planes that may differ from the server's picture. */
+ * alone is lost. *checked gets the planes that have their hash, `lossy` the planes that may differ from the server's
+ * picture. */
 int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_frame_end *end, unsigned *checked,
                         struct psr_error *err);
 

@@ -1,6 +1,6 @@
-/* latency ADDRESS MODELS HANDS [MOVEMENT...]: what a viewer shows along movements of a hand, through the psrd at ADDRESS,
- * which serves the folder MODELS: bunny.psr, dragon.psr, engine.psr and doorway.psr, while hands move that were recorded
- * in the folder HANDS. Prints a row a movement. It drives what psr-view stands on (hand, link, show), without a window.
+/* latency ADDRESS MODELS HANDS [MOVEMENT...]: what a viewer shows along movements of a hand, through the psrd at
+ * ADDRESS, which serves the folder MODELS: bunny.psr, dragon.psr, engine.psr and doorway.psr, while hands move that
+ * were recorded in the folder HANDS. Prints a row a movement. It drives what psr-view stands on (hand, link, show), without a window.
  *
  * The truth of a moment is what psr_render() draws for its camera, smooth, as the picture at rest is. PSNR is over the
  * pixels where the truth shows a surface, of every tenth frame; "unwarped" is the last received picture as it is. */
@@ -271,7 +271,8 @@ static void measure(const struct movement *movement, const char *address, const 
 	const uint64_t start_ns = clock_ns();
 	move(run);
 	const uint64_t stop_ns = clock_ns();
-	const double pictures = run->n_pictures / path_seconds(&run->path), shown = run->n_frames / ((double)(stop_ns - start_ns) * 1e-9);
+	const double pictures = run->n_pictures / path_seconds(&run->path);
+	const double shown = run->n_frames / ((double)(stop_ns - start_ns) * 1e-9);
 
 	wait_sharp(run, 60, movement->name);
 	const double sharp_ms = (double)(clock_ns() - stop_ns) * MS;

@@ -36,9 +36,9 @@ int main(int argc, char **argv)
 	struct optlist list = { .n = 0 };
 	const struct psr_cli cli = {
 		.usage = "psr view [--model NAME ... | FILE] [--server ADDR] [models, window, camera, light, quality]",
-		.summary = "Shows models of a server in a window, to be turned, moved and lit. Without a model the window's list shows what "
-		"the server has. A FILE is built and drawn on this computer, coarse at first; one that is dropped on the window, "
-		"too.",
+		.summary = "Shows models of a server in a window, to be turned, moved and lit. Without a model the window's "
+		           "list shows what the server has. A FILE is built and drawn on this computer, coarse at first; one "
+		           "that is dropped on the window, too.",
 		.opts = list.opt,
 		.footer = footer,
 	};

@@ -1,7 +1,7 @@
 /* psr-view: a window on the models of a psrd. Files of this folder: main.c (command line), viewer.c (window and loop),
  * connect.c (to which psrd), news.c (wishes to the link, and what comes of them), input.c (mouse and keys), drag.c
- * (lights and instances by hand), save.c (screenshots, ways), bell.c (the link's news as events), gui.cc (Dear ImGui on an SDL renderer), panel.cc (what stands
- * on the picture), settings.cc (the panel of settings). */
+ * (lights and instances by hand), save.c (screenshots, ways), bell.c (the link's news as events), gui.cc (Dear ImGui on
+ * an SDL renderer), panel.cc (what stands on the picture), settings.cc (the panel of settings). */
 #ifndef PSR_CLIENT_VIEW_WINDOW_VIEWER_H
 #define PSR_CLIENT_VIEW_WINDOW_VIEWER_H
 
@@ -139,7 +139,7 @@ void input_surface(struct viewer *viewer); /* what link_probe() asked for has co
 
 /* ---- drag.c ---- */
 
-int drag_begin(struct viewer *viewer);         /* 1: the press drags a light or an instance, or nothing, but no camera */
+int drag_begin(struct viewer *viewer);         /* 1: the press drags a light, an instance or nothing, but no camera */
 void drag_move(struct viewer *viewer, double right, double down); /* pixels */
 
 /* ---- save.c ---- */
