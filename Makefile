@@ -103,11 +103,15 @@ A   := $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr.a
 PROGRAMS := $(BIN)/psrd $(BIN)/psr
 ifneq ($(filter release debug,$(config)),)
 PROGRAMS += $(BIN)/psr-model $(BIN)/psr-study $(LIB)/psr-image-oiio.so
+endif
+ifneq ($(filter release debug asan,$(config)),)
 ifeq ($(shell pkg-config --exists sdl2 imgui 2>/dev/null && echo 1),1)
 PROGRAMS += $(BIN)/psr-view
 else ifneq ($(filter compile,$(MAKECMDGOALS)),)
 $(info psr-view is left out: libsdl2-dev or libimgui-dev is not there)
 endif
+endif
+ifneq ($(filter release debug,$(config)),)
 ifeq ($(shell pkg-config --exists chafa 2>/dev/null && echo 1),1)
 PROGRAMS += $(BIN)/psr-view-term
 else ifneq ($(filter compile,$(MAKECMDGOALS)),)

@@ -4,6 +4,8 @@
 . "$(dirname "$0")/lib.sh"
 here=$PWD
 
+export LSAN_OPTIONS=suppressions=$here/tests/tools/view.supp:print_suppressions=0
+
 for program in psr-view Xvfb xdotool; do
 	if ! type -P $program >/dev/null; then
 		skip "a window is turned, zoomed, resized" "$program is not there"
