@@ -5,18 +5,13 @@
 #define PI 3.14159265358979323846
 #define PIXELS_TO_DOUBLE 300.0 /* a drag of so many pixels doubles or halves an instance */
 
-static int is_held(SDL_Scancode key)
-{
-	return SDL_GetKeyboardState(NULL)[key] != 0;
-}
-
 int drag_begin(struct viewer *viewer)
 {
 	viewer->drag = DRAG_NONE;
-	if (is_held(SDL_SCANCODE_L)) {
+	if (viewer->holds_light) {
 		subject_fix_light(&viewer->subject, &viewer->hand.camera);
 		viewer->drag = viewer->subject.n_lights > 0 ? DRAG_LIGHT : DRAG_NOTHING;
-	} else if (is_held(SDL_SCANCODE_G)) {
+	} else if (viewer->holds_model) {
 		if (viewer->picked >= (int)viewer->subject.n_instances)
 			viewer->picked = -1;
 		if (viewer->picked < 0 && viewer->subject.n_instances == 1)
@@ -31,7 +26,7 @@ int drag_begin(struct viewer *viewer)
 static void drag_light(struct viewer *viewer, const struct lens *lens, double right, double down)
 {
 	const uint32_t k = viewer->light < viewer->subject.n_lights ? viewer->light : 0;
-	const int is_shifted = (SDL_GetModState() & KMOD_SHIFT) != 0;
+	const int is_shifted = (viewer->mod & KMOD_SHIFT) != 0;
 	const double turn = PI / viewer->hand.height, sideways[3] = { right, down, 0 }, nearer[3] = { 0, 0, down };
 
 	switch (viewer->subject.light[k].light.kind) {
@@ -51,7 +46,7 @@ static void drag_light(struct viewer *viewer, const struct lens *lens, double ri
 
 static void drag_instance(struct viewer *viewer, const struct lens *lens, double right, double down)
 {
-	const SDL_Keymod mod = SDL_GetModState();
+	const SDL_Keymod mod = viewer->mod;
 	const double turn = PI / viewer->hand.height, by[2] = { right, down }, turns[2] = { turn * right, turn * down };
 	const uint32_t k = (uint32_t)viewer->picked;
 	struct psr_error err;

@@ -100,7 +100,7 @@ static int flies(const struct viewer *viewer)
 
 static enum hand_grip grip_of(const struct viewer *viewer, const SDL_MouseButtonEvent *button)
 {
-	const SDL_Keymod mod = SDL_GetModState();
+	const SDL_Keymod mod = viewer->mod;
 
 	if (button->button != SDL_BUTTON_LEFT || mod & KMOD_CTRL)
 		return HAND_PAN;
@@ -334,11 +334,22 @@ static int key_of_flight(struct viewer *viewer, SDL_Scancode code, int is_down)
 	return is_one;
 }
 
-static void end_flight(struct viewer *viewer)
+static void note_keys(struct viewer *viewer, const SDL_KeyboardEvent *key)
+{
+	viewer->mod = (SDL_Keymod)key->keysym.mod;
+	if (key->keysym.scancode == SDL_SCANCODE_L)
+		viewer->holds_light = key->type == SDL_KEYDOWN;
+	if (key->keysym.scancode == SDL_SCANCODE_G)
+		viewer->holds_model = key->type == SDL_KEYDOWN;
+}
+
+static void let_go(struct viewer *viewer)
 {
 	static const double nowhere[3] = { 0, 0, 0 };
 
 	memset(viewer->fly_keys, 0, sizeof viewer->fly_keys);
+	viewer->mod = KMOD_NONE;
+	viewer->holds_light = viewer->holds_model = 0;
 	hand_fly(&viewer->hand, nowhere);
 }
 
@@ -347,6 +358,8 @@ void input_event(struct viewer *viewer, const SDL_Event *event)
 	const int is_plain = event->type == SDL_KEYDOWN && !(event->key.keysym.mod & (KMOD_CTRL | KMOD_ALT | KMOD_GUI));
 	const SDL_Keycode key = event->type == SDL_KEYDOWN ? event->key.keysym.sym : SDLK_UNKNOWN;
 
+	if (event->type == SDL_KEYDOWN || event->type == SDL_KEYUP)
+		note_keys(viewer, &event->key);
 	if (event->type == SDL_KEYDOWN || event->type == SDL_MOUSEBUTTONDOWN)
 		viewer->note_ns = 0; /* it was read */
 	if (viewer->has_hand && event->type == SDL_MOUSEBUTTONDOWN)
@@ -362,7 +375,7 @@ void input_event(struct viewer *viewer, const SDL_Event *event)
 	else if (event->type == SDL_KEYUP)
 		key_of_flight(viewer, event->key.keysym.scancode, 0);
 	else if (event->type == SDL_WINDOWEVENT && event->window.event == SDL_WINDOWEVENT_FOCUS_LOST)
-		end_flight(viewer); /* the key goes up somewhere else */
+		let_go(viewer); /* the key goes up somewhere else */
 	else if (is_plain && viewer->has_hand
 	         && (key_of_flight(viewer, event->key.keysym.scancode, 1) || key_of_hand(viewer, key)
 	             || key_of_light(viewer, key)))

@@ -80,6 +80,8 @@ struct viewer {
 	/* the hand */
 	struct hand_cursor press;    /* where a button went down */
 	int is_pressed, is_click;    /* is_click: it has not moved since */
+	int holds_light, holds_model; /* L and G, and the modifiers, when the event came: SDL knows of later ones already */
+	SDL_Keymod mod;
 	enum viewer_drag drag;       /* the press that is on drags no camera */
 	uint32_t light;              /* that is dragged */
 	int picked;                  /* instance that was clicked; -1: none */
