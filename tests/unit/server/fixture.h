@@ -506,6 +506,23 @@ static inline void scene_default(struct psr_msg_scene *scene, uint32_t handle)
 	scene->instance[0] = (struct psr_msg_instance){ .handle = handle, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 }
 
+/* Makes a frame of it take many seconds on any machine: 800 instances in the shadows of 32 lights, six maps each. */
+static inline void scene_make_heavy(struct psr_msg_scene *scene)
+{
+	scene->n_instances = 800;
+	for (int i = 1; i < 800; i++) {
+		scene->instance[i] = scene->instance[0];
+		scene->instance[i].translation[0] = (i % 20 - 10) * 0.1;
+		scene->instance[i].translation[1] = (i / 20 % 20 - 10) * 0.1;
+		scene->instance[i].translation[2] = i * -0.01;
+	}
+	scene->n_lights = 32;
+	for (int i = 0; i < 32; i++)
+		scene->light[i] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_POINT, .flags = PSR_WIRE_LIGHT_SHADOW,
+			                                      .color = { 9, 9, 9 }, .intensity = 1, .reference = 1,
+			                                      .position = { i * 0.1 - 1.6, 0.5, 0.3 - i * 0.1 } };
+}
+
 static inline uint32_t peer_ask_stats(struct peer *p)
 {
 	assert_int_equal(psr_msg_stats_encode(&p->buf, ++p->id, NULL), PSR_OK);

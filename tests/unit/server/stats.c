@@ -115,22 +115,12 @@ static void acknowledge(struct peer *peer, uint32_t id)
 	peer_send(peer);
 }
 
-/* Takes more than half a second to draw, wherever: 800 plates in 32 shadow maps. */
 static void send_crowd(struct peer *peer)
 {
 	static struct psr_msg_scene scene;
 
 	scene_default(&scene, 1);
-	scene.n_instances = 800;
-	for (int i = 0; i < 800; i++) {
-		scene.instance[i] = scene.instance[0];
-		scene.instance[i].translation[2] = i * -0.01;
-	}
-	scene.n_lights = 32;
-	for (int i = 0; i < 32; i++)
-		scene.light[i] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .flags = PSR_WIRE_LIGHT_SHADOW,
-			                                     .color = { 9, 9, 9 }, .intensity = 1,
-			                                     .direction = { i * 0.05 - 0.8, -1, -1 } };
+	scene_make_heavy(&scene);
 	peer_send_scene(peer, &scene);
 }
 

@@ -355,18 +355,7 @@ static void a_frame_over_its_time_is_refused_and_keeps_nobody_waiting(void **sta
 	daemon_start(&psrd, folder, more);
 	connect_client(NULL);
 	scene_default(scene, opened.handle);
-	scene->n_instances = 400;
-	for (int i = 0; i < 400; i++) {
-		scene->instance[i] = scene->instance[0];
-		scene->instance[i].translation[0] = (i % 20 - 10) * 0.1;
-		scene->instance[i].translation[1] = (i / 20 - 10) * 0.1;
-		scene->instance[i].translation[2] = i * -0.01;
-	}
-	scene->n_lights = 16;
-	for (int i = 0; i < 16; i++)
-		scene->light[i] = (struct psr_msg_light){ .kind = PSR_WIRE_LIGHT_DIRECTIONAL, .flags = PSR_WIRE_LIGHT_SHADOW,
-			                                      .color = { 9, 9, 9 }, .intensity = 1,
-			                                      .direction = { i * 0.1 - 0.8, -1, -1 } };
+	scene_make_heavy(scene);
 	assert_int_equal(psr_client_scene(client, scene, NULL, &err), PSR_OK);
 	frame.width = frame.height = 2048;
 	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
