@@ -215,7 +215,7 @@ ifeq ($(config),tsan)
 # Programs that start no thread, neither themselves nor in a psrd, show nothing to the thread sanitizer. Those left out by
 # name measure memory, or draw what takes it minutes; the same threads run in views, serve, flood, residence and e2e.
 UNIT_LIGHT := $(filter-out $(patsubst %,tests/unit/server/%.c,budget lanes limits starve),\
-	$(shell grep -lE 'pthread\.h|psr_pool_create|daemon_start|daemon_spawn' $(UNIT_LIGHT)))
+	$(shell grep -lE 'pthread\.h|psr_pool_create|client_crew_create|daemon_start|daemon_spawn' $(UNIT_LIGHT)))
 FUZZ       := $(BUILD)/tests/fuzz/server_session
 SIMD_TESTS :=
 endif
