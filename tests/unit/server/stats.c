@@ -127,10 +127,11 @@ static void send_crowd(struct peer *peer)
 /* The view is at PAUSE while requests wait: one is superseded, one cancelled. */
 static void frames_and_how_they_end(void **state)
 {
-	static const char *const more[] = { "--threads", "1", "--frame-timeout", "2", NULL };
-	struct psr_msg_frame frame = frame_default(64, 64), late = frame_default(4096, 4096);
+	static const char *const more[] = { "--threads", "1", "--frame-timeout", "0.5", NULL };
+	struct psr_msg_frame frame = frame_default(64, 64), late = frame_default(2048, 2048);
 	struct psr_msg_frame_end end;
 	struct psr_message message;
+	struct psr_msg_error error;
 	uint64_t draw_us;
 	uint32_t id;
 
@@ -160,8 +161,16 @@ static void frames_and_how_they_end(void **state)
 	draw_us = peer_stat(&p, PSR_STAT_DRAW_US);
 	assert_true(draw_us > 0);
 	send_crowd(&p);
-	peer_expect_error(&p, peer_ask_frame(&p, &late), PSR_WIRE_LIMIT, NULL);
-	assert_true(peer_stat(&p, PSR_STAT_DRAW_US) >= draw_us + 2000000);
+	late.budget = PSR_WIRE_BUDGET_SETTINGS;
+	late.settings = (struct psr_msg_settings){ .scale = 1, .spacing_px = 1.0 / 64 };
+	id = peer_ask_frame(&p, &late);
+	do /* BEGIN and rectangles may have been sent by then */
+		assert_true(peer_next(&p, &message) && message.id == id);
+	while (message.type == PSR_MSG_FRAME_BEGIN || message.type == PSR_MSG_RECT);
+	assert_int_equal(message.type, PSR_MSG_ERROR);
+	assert_int_equal(psr_msg_error_decode(&error, message.payload, message.n, NULL), PSR_OK);
+	assert_int_equal(error.code, PSR_WIRE_LIMIT);
+	assert_true(peer_stat(&p, PSR_STAT_DRAW_US) >= draw_us + 500000);
 	assert_int_equal(peer_stat(&p, PSR_STAT_FRAMES_TIMED_OUT), 1);
 	frame.slot = 3;
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_NOT_FOUND, NULL);
