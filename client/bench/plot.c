@@ -1,9 +1,7 @@
 #include "plot.h"
-#include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/wait.h>
+#include "base/gnuplot.h"
 #include "base/outfile.h"
 
 static const char *terminal_of(const char *path)
@@ -20,42 +18,29 @@ int plot_check(const char *path, struct psr_error *err)
 	           ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "--plot: '%.200s' ends neither in .svg nor in .png", path);
 }
 
-/* In quotes, as gnuplot reads them: within '...' a quote is written twice. */
-static void write_quoted(FILE *to, const char *text)
-{
-	fputc('\'', to);
-	for (; *text != '\0'; text++) {
-		if (*text == '\'')
-			fputc('\'', to);
-		fputc(*text, to);
-	}
-	fputc('\'', to);
-}
-
 static int open_gnuplot(FILE **out, const char *path, const char *what, struct psr_error *err)
 {
-	signal(SIGPIPE, SIG_IGN); /* where there is no gnuplot */
-	*out = popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot", "w");
-	if (*out == NULL)
-		return psr_fail(err, PSR_ERR_IO, "--plot: gnuplot cannot be started: %s", strerror(errno));
+	struct psr_error why;
+	const int code = gnuplot_open(out, &why);
+
+	if (code != PSR_OK)
+		return psr_fail(err, code, "--plot: %s", why.text);
 	fprintf(*out, "set terminal %s\nset output ", terminal_of(path));
-	write_quoted(*out, path);
+	gnuplot_quote(*out, path);
 	fputs("\nset multiplot layout 1,2 title ", *out);
-	write_quoted(*out, what);
+	gnuplot_quote(*out, what);
 	fputs(" noenhanced\nset grid\nset key below horizontal\n", *out);
 	return PSR_OK;
 }
 
 static int close_gnuplot(FILE *gnuplot, struct psr_error *err)
 {
-	int status;
+	struct psr_error why;
+	int code;
 
 	fputs("unset multiplot\n", gnuplot);
-	status = pclose(gnuplot);
-	if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
-		return psr_fail(err, PSR_ERR_NOT_FOUND,
-		                "--plot: gnuplot, which draws plots, is not installed; install the package gnuplot-nox");
-	return status == 0 ? PSR_OK : psr_fail(err, PSR_ERR_IO, "--plot: gnuplot failed; its message stands above");
+	code = gnuplot_close(gnuplot, &why);
+	return code == PSR_OK ? PSR_OK : psr_fail(err, code, "--plot: %s", why.text);
 }
 
 int plot_load(const struct bench_result *result, const char *what, const char *path, struct psr_error *err)

@@ -1,8 +1,6 @@
-#include <errno.h>
 #include <math.h>
-#include <signal.h>
 #include <string.h>
-#include <sys/wait.h>
+#include "base/gnuplot.h"
 #include "study.h"
 
 static int terminal_of(const char **terminal, const char *path, struct psr_error *err)
@@ -21,23 +19,12 @@ static int terminal_of(const char **terminal, const char *path, struct psr_error
 	return PSR_OK;
 }
 
-static void write_quoted(FILE *to, const char *text)
-{
-	fputc('\'', to);
-	for (; *text != '\0'; text++) {
-		if (*text == '\'')
-			fputc('\'', to);
-		fputc(*text, to);
-	}
-	fputc('\'', to);
-}
-
 static void write_program(FILE *to, const struct study *study, const char *terminal, const char *path)
 {
 	const struct study_table *table = &study->table;
 
 	fprintf(to, "set terminal %s\nset output ", terminal);
-	write_quoted(to, path);
+	gnuplot_quote(to, path);
 	fputs("\nset datafile missing 'nan'\n$table << EOD\n", to);
 	for (int row = 0; row < table->n_rows; row++) {
 		fprintf(to, "%d \"%s\"", row, table->label[row]);
@@ -58,22 +45,15 @@ int study_plot(const struct study *study, const char *path, struct psr_error *er
 {
 	const char *terminal = NULL;
 	FILE *gnuplot;
-	int status, rc = terminal_of(&terminal, path, err);
+	int rc = terminal_of(&terminal, path, err);
 
 	if (rc != PSR_OK)
 		return rc;
 	if (study->kind->plot == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "--plot: '%s' is a table without a plot", study->kind->name);
-	signal(SIGPIPE, SIG_IGN); /* where there is no gnuplot */
-	gnuplot = popen("command -v gnuplot >/dev/null || exit 127; exec gnuplot", "w");
-	if (gnuplot == NULL)
-		return psr_fail(err, PSR_ERR_IO, "gnuplot cannot be started: %s", strerror(errno));
+	rc = gnuplot_open(&gnuplot, err);
+	if (rc != PSR_OK)
+		return rc;
 	write_program(gnuplot, study, terminal, path);
-	status = pclose(gnuplot);
-	if (WIFEXITED(status) && WEXITSTATUS(status) == 127)
-		return psr_fail(err, PSR_ERR_NOT_FOUND,
-		                "gnuplot, which draws plots, is not installed; install the package gnuplot-nox");
-	if (status != 0)
-		return psr_fail(err, PSR_ERR_IO, "gnuplot failed; its message stands above");
-	return PSR_OK;
+	return gnuplot_close(gnuplot, err);
 }
