@@ -78,6 +78,19 @@ static int check_color(struct result *result, const struct expect *e, const stru
 
 /* ---- files of references ---- */
 
+/* A reference was not read: the result says why. MEMORY is the run's error. */
+static int tell_unread(struct result *result, const char *path, int code, const struct psr_error *why,
+                       struct psr_error *err)
+{
+	if (code == PSR_ERR_MEMORY)
+		return psr_fail(err, code, "%s", why->text);
+	if (code == PSR_ERR_NOT_FOUND)
+		result_fail(result, "the reference %.200s is not there yet", path);
+	else
+		result_fail(result, "the reference cannot be read: %.300s", why->text);
+	return PSR_OK;
+}
+
 /* A reference that is missing or unreadable has no pixels; the result says why. MEMORY. */
 static int read_color(struct psr_frame *reference, struct result *result, const char *path,
                       const struct psr_frame *picture, struct psr_error *err)
@@ -85,13 +98,9 @@ static int read_color(struct psr_frame *reference, struct result *result, const 
 	struct psr_error why;
 	int code = png_read_frame(reference, path, &why);
 
-	if (code == PSR_ERR_MEMORY)
-		return psr_fail(err, code, "%s", why.text);
-	if (code == PSR_ERR_NOT_FOUND)
-		result_fail(result, "the reference %.200s is not there yet", path);
-	else if (code != PSR_OK)
-		result_fail(result, "the reference cannot be read: %.300s", why.text);
-	if (code != PSR_OK || (reference->width == picture->width && reference->height == picture->height))
+	if (code != PSR_OK)
+		return tell_unread(result, path, code, &why, err);
+	if (reference->width == picture->width && reference->height == picture->height)
 		return PSR_OK;
 	result_fail(result, "the picture has %ux%u pixels, the reference %ux%u", picture->width, picture->height,
 	            reference->width, reference->height);
@@ -106,13 +115,9 @@ static int read_depth(float **depth, struct result *result, const char *path, co
 	struct psr_error why;
 	int code = pfm_read(depth, &width, &height, path, &why);
 
-	if (code == PSR_ERR_MEMORY)
-		return psr_fail(err, code, "%s", why.text);
-	if (code == PSR_ERR_NOT_FOUND)
-		result_fail(result, "the reference %.200s is not there yet", path);
-	else if (code != PSR_OK)
-		result_fail(result, "the reference cannot be read: %.300s", why.text);
-	if (code != PSR_OK || (width == picture->width && height == picture->height))
+	if (code != PSR_OK)
+		return tell_unread(result, path, code, &why, err);
+	if (width == picture->width && height == picture->height)
 		return PSR_OK;
 	result_fail(result, "the picture has %ux%u pixels, the reference of depth %ux%u", picture->width, picture->height,
 	            width, height);
