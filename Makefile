@@ -275,7 +275,7 @@ FUZZ_MAIN := $(if $(filter fuzz,$(config)),,$(BUILD)/tests/fuzz/main.c.o)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(A)
 	$(link) $(L_TEST)
 $(BUILD)/tests/fuzz/server_session: $(SERVER_PARTS)
-$(BUILD)/tests/fuzz/client_suite: $(CLIENT_PARTS)
+$(BUILD)/tests/fuzz/client_bench $(BUILD)/tests/fuzz/client_suite: $(CLIENT_PARTS)
 $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(LIB)/libpsr-build.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a

@@ -7,9 +7,14 @@
 #include "client/cli/cli.h"
 #include "commands.h"
 
-enum { COUNTER, GAUGE };
+enum { COUNTER, GAUGE, SUMMARY };
 
-/* Prometheus wants seconds, and _total behind counters; `scale` makes seconds of microseconds there. */
+static const char *const kinds[] = { "counter", "gauge", "summary" };
+
+#define ANSWERED "From the arrival of a FRAME until the socket had its first picture; since the start."
+
+/* Prometheus wants seconds, and _total behind counters; `scale` makes seconds of microseconds there. help NULL: the same
+ * metric as before, with another label. */
 static const struct stat {
 	uint16_t id;
 	int kind;
@@ -47,6 +52,10 @@ static const struct stat {
 	{ PSR_STAT_DRAW_US, COUNTER, "draw_us", "draw_seconds_total", "Time of frames on cores.", 1e-6 },
 	{ PSR_STAT_PEERS_SLOW, COUNTER, "peers_slow", "peers_slow_total", "Dropped for reading too slowly.", 1 },
 	{ PSR_STAT_PEERS_SILENT, COUNTER, "peers_silent", "peers_silent_total", "Dropped for silence.", 1 },
+	{ PSR_STAT_ANSWERED_P50_US, SUMMARY, "answered_p50_us", "answered_seconds{quantile=\"0.5\"}", ANSWERED, 1e-6 },
+	{ PSR_STAT_ANSWERED_P90_US, SUMMARY, "answered_p90_us", "answered_seconds{quantile=\"0.9\"}", NULL, 1e-6 },
+	{ PSR_STAT_ANSWERED_P99_US, SUMMARY, "answered_p99_us", "answered_seconds{quantile=\"0.99\"}", NULL, 1e-6 },
+	{ PSR_STAT_ANSWERED_MAX_US, SUMMARY, "answered_max_us", "answered_seconds{quantile=\"1\"}", NULL, 1e-6 },
 };
 
 static const struct stat *find(uint16_t id)
@@ -64,8 +73,9 @@ static void print_prometheus(const struct psr_msg_stats_reply *reply)
 
 		if (stat == NULL)
 			continue;
-		printf("# HELP psrd_%s %s\n# TYPE psrd_%s %s\n", stat->metric, stat->help, stat->metric,
-		       stat->kind == COUNTER ? "counter" : "gauge");
+		if (stat->help != NULL)
+			printf("# HELP psrd_%.*s %s\n# TYPE psrd_%.*s %s\n", (int)strcspn(stat->metric, "{"), stat->metric, stat->help,
+			       (int)strcspn(stat->metric, "{"), stat->metric, kinds[stat->kind]);
 		printf("psrd_%s %.17g\n", stat->metric, (double)reply->stat[i].value * stat->scale);
 	}
 }

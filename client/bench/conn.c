@@ -17,12 +17,19 @@
 int conn_open(struct conn *conn, struct conn_shared *shared, uint32_t index, uint64_t deadline_ns,
               struct psr_error *err)
 {
-	struct psr_msg_hello hello = { .major = PSR_PROTO_MAJOR, .minor = PSR_PROTO_MINOR, .client = PSR_PROGRAM,
-		                           .routing_key = psr_routing_key(shared->plan->model[0].name) };
-	int code;
+	int fd, code = client_socket_connect(&fd, shared->server, deadline_ns, err);
 
 	memset(conn, 0, sizeof *conn);
-	conn->fd = -1;
+	return code == PSR_OK ? conn_begin(conn, shared, index, fd, err) : code;
+}
+
+int conn_begin(struct conn *conn, struct conn_shared *shared, uint32_t index, int fd, struct psr_error *err)
+{
+	struct psr_msg_hello hello = { .major = PSR_PROTO_MAJOR, .minor = PSR_PROTO_MINOR, .client = PSR_PROGRAM,
+		                           .routing_key = psr_routing_key(shared->plan->model[0].name) };
+
+	memset(conn, 0, sizeof *conn);
+	conn->fd = fd;
 	conn->shared = shared;
 	conn->index = index;
 	conn->next_id = 1;
@@ -31,9 +38,6 @@ int conn_open(struct conn *conn, struct conn_shared *shared, uint32_t index, uin
 	conn->handle = calloc(shared->plan->n_models, sizeof *conn->handle);
 	if (conn->in == NULL || conn->handle == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u connections", index + 1);
-	code = client_socket_connect(&conn->fd, shared->server, deadline_ns, err);
-	if (code != PSR_OK)
-		return code;
 	psr_framer_init(&conn->framer, PSR_SERVER, conn->in, IN_BYTES);
 	while (psr_msg_hello_encode(&conn->out, &hello, NULL) == PSR_ERR_MEMORY && conn_grow(conn)) {
 	}
@@ -87,9 +91,10 @@ void conn_fail(struct conn *conn, int code, const char *format, ...)
 
 void conn_end(struct conn *conn, struct conn_request *request, const struct conn_answer *answer)
 {
-	const struct conn_request ended = *request;
+	struct conn_request ended;
 
 	free_assembly(request);
+	ended = *request;
 	request->id = 0;
 	conn->n_open--;
 	conn->shared->on_answer(conn, &ended, answer);

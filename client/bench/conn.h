@@ -66,6 +66,8 @@ struct conn {
 /* Connects and sends HELLO. conn_close() is due also after an error. CONNECTION, MEMORY. */
 int conn_open(struct conn *conn, struct conn_shared *shared, uint32_t index, uint64_t deadline_ns,
               struct psr_error *err);
+/* The same on a socket that is connected and does not block. Takes fd. */
+int conn_begin(struct conn *conn, struct conn_shared *shared, uint32_t index, int fd, struct psr_error *err);
 void conn_close(struct conn *conn); /* a struct of zeros is fine */
 
 /* Reads what is there, once, and handles whole messages. The state becomes OVER if the connection is lost. */

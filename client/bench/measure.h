@@ -3,7 +3,7 @@
 #define PSR_CLIENT_BENCH_MEASURE_H
 
 #include "conn.h"
-#include "histogram.h"
+#include "base/histogram.h"
 
 #define MEASURE_STAGES (PSR_WIRE_REPORT_CORES + 1) /* by enum psr_wire_report_id */
 #define MEASURE_CODES (-PSR_ERR_INTERNAL + 1)      /* by the negative of enum psr_err */

@@ -83,6 +83,7 @@ void frame_send_end(struct frame *frame, int is_final)
 	chunk = draw_take_end(&frame->drawing);
 	chunk->ends_part = 1;
 	chunk->ends_answer = (uint8_t)is_final;
+	chunk->asked_ns = frame->drawing.end.pass == 0 ? frame->request.asked_ns : 0;
 	push(frame, chunk);
 	if (frame->made != NULL)
 		bases_add(&flow->bases, frame->made);

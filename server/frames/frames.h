@@ -9,6 +9,7 @@
 #include "schedule.h"
 #include "server/models/residence.h"
 #include "server/net/conn.h"
+#include "base/histogram.h"
 #include "base/pool.h"
 
 struct frames;
@@ -64,6 +65,7 @@ struct frames_stats {
 	uint64_t late;    /* of failed: over their time */
 	uint64_t on_base; /* of drawn */
 	uint64_t used_ns; /* time on cores of all */
+	struct histogram answered; /* from a FRAME's arrival until the socket took the last byte of its first picture */
 };
 
 int frames_create(struct frames **out, const struct frames_parts *parts); /* MEMORY */

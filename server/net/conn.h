@@ -25,6 +25,8 @@ struct conn_user {
 	                                 /* handles a later message; an error: the client broke the protocol */
 	int (*is_busy)(const struct conn *conn);   /* whether requests are unanswered: then the connection is not idle */
 	void (*on_room)(void *userdata);           /* output queues of connections shrank; once a batch */
+	void (*on_sent)(const struct outq_chunk *chunk, void *userdata); /* the socket took all of a pushed chunk that has
+	                                                                  * asked_ns */
 	int (*on_part)(struct conn *conn);         /* sends the next part of an answer; 1: there are more, see conn_go_on() */
 	void (*on_end)(struct conn *conn);         /* before the memory of a closed one goes */
 	void *userdata;

@@ -56,6 +56,8 @@ static struct conn *create(struct conns *conns, int fd)
 	conn->input_bytes = PSR_WIRE_MAX_MESSAGE_HELLO;
 	silence_heard(&conn->silence, conns->loop->now_us);
 	outq_init(&conn->out, &conns->bytes_queued);
+	conn->out.on_sent = conns->user->on_sent;
+	conn->out.userdata = conns->user->userdata;
 	psr_framer_init(&conn->framer, PSR_CLIENT, conn->input, PSR_WIRE_MAX_MESSAGE_HELLO);
 	conn->source = (struct loop_source){ .fd = fd, .on_ready = conn_on_ready, .userdata = conn };
 	if (loop_add(conns->loop, &conn->source, EPOLLIN, NULL) != PSR_OK) {

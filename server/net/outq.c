@@ -227,6 +227,8 @@ static uint64_t take(struct outq *q, struct outq_lane *lane, uint64_t n)
 		left -= chunk->size;
 		lane->first = chunk->next;
 		lane->boundary = 0;
+		if (chunk->asked_ns != 0 && q->on_sent != NULL)
+			q->on_sent(chunk, q->userdata);
 		free_chunk(q, chunk);
 	}
 	if (lane->first == NULL)

@@ -23,6 +23,7 @@ struct outq_chunk { /* whole messages, each of which begins with its length: u32
 	uint32_t id;            /* the request that its messages answer; outq_push() sets it */
 	uint16_t part;          /* for the user: which part of the answer they belong to */
 	uint8_t ends_part, ends_answer; /* for the user */
+	uint64_t asked_ns;      /* for the user: when what it answers was asked; 0: on_sent() does not see it */
 	uint8_t data[];
 };
 
@@ -40,6 +41,9 @@ struct outq {
 	uint64_t mark_us, mark_sent, mark_size; /* when outq_is_stalled() last saw progress, and `sent` and `size` at that
 	                                         * time */
 	uint64_t *held;         /* the user's counter of the memory of all its queues */
+	void (*on_sent)(const struct outq_chunk *chunk, void *userdata); /* sees chunks of answers, sent wholly, before they
+	                                                                  * are freed; NULL: nobody does */
+	void *userdata;
 };
 
 struct outq_chunk *outq_chunk_create(size_t capacity); /* empty; NULL without memory */

@@ -136,6 +136,10 @@ void answer_stats(struct session *session, uint32_t id)
 		{ PSR_STAT_DRAW_US, frames->used_ns / 1000 },
 		{ PSR_STAT_PEERS_SLOW, all->conns->n_slow },
 		{ PSR_STAT_PEERS_SILENT, all->conns->n_idle },
+		{ PSR_STAT_ANSWERED_P50_US, histogram_percentile(&frames->answered, 0.5) / 1000 },
+		{ PSR_STAT_ANSWERED_P90_US, histogram_percentile(&frames->answered, 0.9) / 1000 },
+		{ PSR_STAT_ANSWERED_P99_US, histogram_percentile(&frames->answered, 0.99) / 1000 },
+		{ PSR_STAT_ANSWERED_MAX_US, frames->answered.max / 1000 },
 	};
 	struct psr_msg_stats_reply reply = { .n_stats = sizeof stats / sizeof stats[0] };
 	uint8_t bytes[1024];

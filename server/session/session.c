@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "answers.h"
+#include "base/clock.h"
 #include "server/log.h"
 
 #define MAX_WAITING_PROGRESS 65536
@@ -354,8 +355,16 @@ static void on_room(void *userdata)
 	frames_pump(all->frames);
 }
 
+static void on_sent(const struct outq_chunk *chunk, void *userdata)
+{
+	struct sessions *all = userdata;
+
+	histogram_add(&frames_stats(all->frames)->answered, clock_ns() - chunk->asked_ns);
+}
+
 void sessions_conn_user(struct conn_user *user, struct sessions *sessions)
 {
 	*user = (struct conn_user){ .on_hello = on_hello, .on_message = on_message, .is_busy = is_busy,
-		                        .on_part = on_part, .on_room = on_room, .on_end = on_end, .userdata = sessions };
+		                        .on_part = on_part, .on_room = on_room, .on_sent = on_sent, .on_end = on_end,
+		                        .userdata = sessions };
 }

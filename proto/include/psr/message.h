@@ -289,6 +289,11 @@ enum psr_stat_id { /* counted for the whole server since its start */
 	PSR_STAT_DRAW_US = 33,       /* time on cores of drawing and encoding */
 	PSR_STAT_PEERS_SLOW = 34,    /* part of DROPPED_PEERS: they read too slowly */
 	PSR_STAT_PEERS_SILENT = 35,  /* part of DROPPED_PEERS: they were silent too long */
+	PSR_STAT_ANSWERED_P50_US = 36, /* percentiles of the time from a FRAME's arrival until the socket took the last byte of
+	                                * its first picture */
+	PSR_STAT_ANSWERED_P90_US = 37,
+	PSR_STAT_ANSWERED_P99_US = 38,
+	PSR_STAT_ANSWERED_MAX_US = 39,
 };
 struct psr_msg_stat { uint16_t id; uint64_t value; };
 struct psr_msg_stats_reply {

@@ -359,6 +359,47 @@ static void the_clock_of_a_stall_starts_with_the_first_byte(void **state)
 	outq_fini(&q);
 }
 
+struct seen { uint64_t asked_ns[4]; unsigned n; };
+
+static void see(const struct outq_chunk *chunk, void *userdata)
+{
+	struct seen *seen = userdata;
+
+	assert_in_range(seen->n, 0, 3);
+	seen->asked_ns[seen->n++] = chunk->asked_ns;
+}
+
+static void who_times_answers_sees_each_once_when_its_last_byte_is_sent(void **state)
+{
+	struct outq_chunk *chunk[3];
+	struct seen seen = { .n = 0 };
+	uint64_t held = 0;
+	struct outq q;
+
+	(void)state;
+	outq_init(&q, &held);
+	q.on_sent = see;
+	q.userdata = &seen;
+	for (uint32_t i = 0; i < 3; i++) {
+		chunk[i] = message_of(20, i + 1, i);
+		chunk[i]->asked_ns = i == 1 ? 0 : 7 + i;
+		outq_push(&q, i + 1, chunk[i], 0);
+	}
+	outq_consume(&q, 19);
+	assert_int_equal(seen.n, 0);
+	outq_consume(&q, 1 + 20 + 5);
+	assert_int_equal(seen.n, 1);
+	assert_int_equal(seen.asked_ns[0], 7);
+	outq_push(&q, 4, message_of(20, 4, 3), 0);
+	q.answers.last->asked_ns = 99;
+	outq_drop(&q, 4, 0, NULL, NULL); /* never sent */
+	outq_consume(&q, 15);
+	assert_int_equal(seen.n, 2);
+	assert_int_equal(seen.asked_ns[1], 9);
+	assert_int_equal(q.size, 0);
+	outq_fini(&q);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -372,6 +413,7 @@ int main(void)
 		cmocka_unit_test(what_is_not_written_belongs_to_the_queue),
 		cmocka_unit_test(a_stall_is_bytes_that_wait_without_progress),
 		cmocka_unit_test(the_clock_of_a_stall_starts_with_the_first_byte),
+		cmocka_unit_test(who_times_answers_sees_each_once_when_its_last_byte_is_sent),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

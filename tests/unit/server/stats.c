@@ -182,6 +182,27 @@ static void frames_and_how_they_end(void **state)
 	peer_close(&p);
 }
 
+/* From outside an answer takes no less than psrd says; and of one answer all percentiles are its time. */
+static void times_of_answers(void **state)
+{
+	const struct psr_msg_frame frame = frame_default(400, 400);
+	struct psr_msg_frame_end end;
+	uint64_t start_us, outside_us, most_us;
+
+	(void)state;
+	daemon_start(&psrd, folder, NULL);
+	peer_begin(&p, &psrd, "plate");
+	assert_int_equal(peer_stat(&p, PSR_STAT_ANSWERED_MAX_US), 0);
+	start_us = clock_ns() / 1000;
+	peer_expect_frame(&p, peer_ask_frame(&p, &frame), &end);
+	most_us = peer_stat(&p, PSR_STAT_ANSWERED_MAX_US);
+	outside_us = clock_ns() / 1000 - start_us;
+	assert_in_range(most_us, 1, outside_us);
+	for (unsigned id = PSR_STAT_ANSWERED_P50_US; id <= PSR_STAT_ANSWERED_P99_US; id++)
+		assert_in_range(peer_stat(&p, id), most_us - most_us / 256 - 1, most_us + most_us / 256 + 1);
+	peer_close(&p);
+}
+
 /* Two readers that do not read, and one that says nothing. */
 static void wait_for_dropped(uint64_t n)
 {
@@ -274,6 +295,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(time_threads_limits_and_models, set_up, stop),
 		cmocka_unit_test_setup_teardown(connections_and_bytes, set_up, stop),
 		cmocka_unit_test_setup_teardown(frames_and_how_they_end, set_up, stop),
+		cmocka_unit_test_setup_teardown(times_of_answers, set_up, stop),
 		cmocka_unit_test_setup_teardown(peers_that_are_too_slow, set_up, stop),
 		cmocka_unit_test_setup_teardown(peers_that_are_silent, set_up, stop),
 		cmocka_unit_test_setup_teardown(builds, set_up, stop),

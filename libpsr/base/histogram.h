@@ -1,6 +1,6 @@
 /* Counts of times in buckets of bounded relative width, after HDR Histogram: one of 37 KB holds any number of times. */
-#ifndef PSR_CLIENT_BENCH_HISTOGRAM_H
-#define PSR_CLIENT_BENCH_HISTOGRAM_H
+#ifndef PSR_BASE_HISTOGRAM_H
+#define PSR_BASE_HISTOGRAM_H
 
 #include <stddef.h>
 #include <stdint.h>
