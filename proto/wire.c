@@ -204,7 +204,8 @@ void wire_clean(char *out, const char *text, size_t size)
 int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, uint16_t view, const void *msg,
                 struct psr_error *err)
 {
-	struct wire w = { .writing = 1, .out = out->data + out->size, .room = out->capacity - out->size };
+	struct wire w = { .writing = 1, .out = out->capacity > 0 ? out->data + out->size : NULL,
+		              .room = out->capacity - out->size };
 	const char *name = psr_msg_name(kind->type);
 	uint16_t type = (uint16_t)kind->type, flags = 0;
 	uint32_t length = 0;

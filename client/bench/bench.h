@@ -25,6 +25,8 @@ struct bench_kept { /* an answer */
 	uint64_t due_ns, latency_ns, bytes, hash, k; /* due_ns: since measuring began; hash: of the colour; k: of
 	                                              * bench_plan_camera() */
 	uint32_t client, kind;
+	enum conn_outcome outcome;
+	int code; /* FAILED: enum psr_err */
 	uint16_t pass;
 	uint8_t has_hash;
 };

@@ -33,7 +33,7 @@ void measure_add(struct measure *measure, const struct conn_request *request, co
 	measure->n_bytes += request->bytes;
 	histogram_add(&measure->latency, now_ns - request->intended_ns);
 	histogram_add(&measure->first, request->first_ns - request->intended_ns);
-	if (request->assembly != NULL)
+	if (request->decode_ns > 0)
 		histogram_add(&measure->decode, request->decode_ns);
 	for (unsigned i = 0; i < answer->end->n_entries; i++) {
 		const struct psr_msg_report_entry *entry = &answer->end->entry[i];

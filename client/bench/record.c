@@ -60,6 +60,9 @@ static cJSON *kept_json(const struct bench_plan *plan, const struct bench_result
 	json_add_numbers(json, "up", camera.up, 3);
 	json_add_number(json, "extent", camera.kind == PSR_CAMERA_PERSPECTIVE ? camera.fov_y : camera.ortho_height);
 	json_add_number(json, "near", camera.near_z);
+	cJSON_AddStringToObject(json, "outcome", kept->outcome == CONN_DRAWN        ? "drawn"
+	                                         : kept->outcome == CONN_SUPERSEDED ? "superseded"
+	                                                                            : psr_strerror(kept->code));
 	if (kept->has_hash)
 		cJSON_AddStringToObject(json, "hash", hash);
 	cJSON_AddNumberToObject(json, "latency_ms", (double)kept->latency_ns / 1e6);

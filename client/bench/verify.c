@@ -162,6 +162,8 @@ int verify_by_drawing(struct verify_result *out, const struct bench_plan *plan, 
 	for (size_t i = 0; code == PSR_OK && i < result->n_kept; i++) {
 		uint64_t hash;
 
+		if (!result->kept[i].has_hash)
+			continue;
 		code = draw(&hash, artist, &result->kept[i], (uint32_t)result->load.n_clients, err);
 		if (code == PSR_OK)
 			judge(out, &result->kept[i], hash, "drawn here");

@@ -12,8 +12,9 @@ int worker_is_measured(const struct worker *worker, uint64_t intended_ns)
 
 /* Memory for kept answers grows by doubling; without memory fewer are kept. */
 static void keep(struct worker *worker, const struct conn *conn, const struct conn_request *request,
-                 const struct psr_msg_frame_end *end)
+                 const struct conn_answer *answer)
 {
+	const struct psr_msg_frame_end *end = answer->end; /* NULL: it was not drawn */
 	struct bench_kept *grown = worker->kept;
 	const size_t n = worker->n_kept;
 
@@ -27,7 +28,8 @@ static void keep(struct worker *worker, const struct conn *conn, const struct co
 	grown[worker->n_kept++] = (struct bench_kept){
 		.due_ns = request->intended_ns - worker->gate->begin_ns, .k = request->k, .bytes = request->bytes,
 		.latency_ns = worker->shared.now_ns - request->intended_ns, .client = conn->index, .kind = request->kind,
-		.pass = end->pass, .hash = end->hash[PSR_PLANE_COLOR], .has_hash = end->has_hashes,
+		.outcome = answer->outcome, .code = answer->code, .pass = end != NULL ? end->pass : 0,
+		.hash = end != NULL ? end->hash[PSR_PLANE_COLOR] : 0, .has_hash = end != NULL && end->has_hashes,
 	};
 }
 
@@ -58,8 +60,8 @@ static void count(struct worker *worker, struct worker_client *client, const str
 		}
 	}
 	pthread_mutex_unlock(&worker->lock);
-	if (is_measured && answer->outcome == CONN_DRAWN)
-		keep(worker, &client->conn, request, answer->end);
+	if (is_measured)
+		keep(worker, &client->conn, request, answer);
 }
 
 void worker_on_answer(struct conn *conn, const struct conn_request *request, const struct conn_answer *answer)

@@ -94,6 +94,14 @@ is "and gives the same pictures" 60 "$(number "$json" verified_right)"
 sed '2,$s/"hash":"../"hash":"5a/' "$work/recording" >"$work/spoilt"
 refuses "a wrong picture is found" 1 "request [0-9]+ of client [0-9]: the picture has the hash" \
 	psr bench --server "$server" --replay "$work/spoilt" --verify 1
+check "views are recorded" psr bench --server "$server" --size $size --model dice --views --inflight 8 --frames 200 --warmup 0 \
+	--record "$work/views" --json
+mv "$work/out" "$json"
+is "with what was superseded" "$(number "$json" superseded)" "$(grep -c '"outcome":"superseded"' "$work/views")"
+psr bench --server "$server" --size 5000x5000 --model dice --frames 3 --warmup 0 --record "$work/failing" >"$work/out"
+is "failures are recorded, too" 3 "$(grep -c '"outcome":"over a limit"' "$work/failing")"
+psr bench --server "$server" --replay "$work/failing" --json >"$json"
+is "and sent again" 3 "$(number "$json" failed)"
 head -n 1 "$work/recording" >"$work/cut"
 refuses "a recording without requests" 4 "has no requests" psr bench --server "$server" --replay "$work/cut"
 (cat "$work/cut" && echo '{"at":0,"client":99}') >"$work/bad"
