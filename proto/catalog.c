@@ -11,6 +11,7 @@ WIRE_EMPTY_ID(list, LIST)
 static void layout_list_entry(struct wire *w, void *p)
 {
 	struct psr_msg_list_entry *m = p;
+
 	wire_u8(w, &m->state);
 	wire_reserved(w, 7);
 	wire_u64(w, &m->file_bytes);
@@ -23,6 +24,7 @@ static void layout_list_entry(struct wire *w, void *p)
 static int check_list_entry(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_list_entry *m = p;
+
 	if (check_integer("the state of a model", m->state, PSR_ENTRY_READY, PSR_ENTRY_FAILED, err) ||
 	    check_integer("the size of a file", m->file_bytes, 0, PSR_WIRE_MAX_INTEGER, err))
 		return PSR_ERR_ARG;
@@ -34,6 +36,7 @@ WIRE_ID(list_entry, LIST_ENTRY, check_list_entry)
 static void layout_list_end(struct wire *w, void *p)
 {
 	struct psr_msg_list_end *m = p;
+
 	wire_u32(w, &m->n_entries);
 }
 
@@ -42,6 +45,7 @@ WIRE_ID(list_end, LIST_END, NULL)
 static void layout_open(struct wire *w, void *p)
 {
 	struct psr_msg_open *m = p;
+
 	wire_u32(w, &m->resolution);
 	wire_string(w, m->name, sizeof m->name);
 }
@@ -49,6 +53,7 @@ static void layout_open(struct wire *w, void *p)
 static int check_open(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_open *m = p;
+
 	if (check_integer("the side of the pictures", m->resolution, 0, PSR_WIRE_MAX_SIDE, err))
 		return PSR_ERR_ARG;
 	return check_name(m->name, err);
@@ -59,6 +64,7 @@ WIRE_ID(open, OPEN, check_open)
 static void layout_progress(struct wire *w, void *p)
 {
 	struct psr_msg_progress *m = p;
+
 	wire_u16(w, &m->stage);
 	wire_reserved(w, 6);
 	wire_u64(w, &m->done);
@@ -70,6 +76,7 @@ static void layout_progress(struct wire *w, void *p)
 static int check_progress(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_progress *m = p;
+
 	if (check_integer("the stage of a build", m->stage, PSR_PROGRESS_WAITING, PSR_PROGRESS_LOAD, err) ||
 	    check_integer("the work of a stage", m->total, 0, PSR_WIRE_MAX_INTEGER, err) ||
 	    check_integer("the work done", m->done, 0, m->total ? m->total : PSR_WIRE_MAX_INTEGER, err))
@@ -82,6 +89,7 @@ WIRE_ID(progress, PROGRESS, check_progress)
 static void layout_opened(struct wire *w, void *p)
 {
 	struct psr_msg_opened *m = p;
+
 	wire_u32(w, &m->handle);
 	wire_u32(w, &m->representations);
 	wire_bytes(w, m->content_id, sizeof m->content_id);
@@ -102,6 +110,7 @@ static int check_opened(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_opened *m = p;
 	const double *up = m->up;
+
 	if (check_integer("a model's handle", m->handle, 1, UINT32_MAX, err) ||
 	    check_lengths("a model's box", m->box_min, 3, err) || check_lengths("a model's box", m->box_max, 3, err) ||
 	    check_lengths("a model's origin", m->origin, 3, err) || check_positive("a model's scale", m->scale, err) ||
@@ -128,12 +137,14 @@ WIRE_ID(opened, OPENED, check_opened)
 static void layout_close(struct wire *w, void *p)
 {
 	struct psr_msg_close *m = p;
+
 	wire_u32(w, &m->handle);
 }
 
 static int check_close(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_close *m = p;
+
 	return check_integer("a model's handle", m->handle, 1, UINT32_MAX, err);
 }
 

@@ -3,12 +3,14 @@
 static void layout_superseded(struct wire *w, void *p)
 {
 	struct psr_msg_superseded *m = p;
+
 	wire_u32(w, &m->by);
 }
 
 static int check_superseded(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_superseded *m = p;
+
 	return check_integer("the id that supersedes", m->by, 2, UINT32_MAX, err);
 }
 
@@ -17,6 +19,7 @@ WIRE_VIEW(superseded, SUPERSEDED, check_superseded)
 static void layout_ack(struct wire *w, void *p)
 {
 	struct psr_msg_ack *m = p;
+
 	wire_u16(w, &m->pass);
 	wire_reserved(w, 2);
 }
@@ -32,6 +35,7 @@ WIRE_EMPTY_ID(stats, STATS)
 static void layout_stats_reply(struct wire *w, void *p)
 {
 	struct psr_msg_stats_reply *m = p;
+
 	wire_u16(w, &m->n_stats);
 	wire_reserved(w, 6);
 	if (m->n_stats > PSR_WIRE_MAX_STATS) {
@@ -48,6 +52,7 @@ static int check_stats_reply(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_stats_reply *m = p;
 	uint16_t last = 0;
+
 	if (m->n_stats > PSR_WIRE_MAX_STATS)
 		return psr_fail(err, PSR_ERR_LIMIT, "statistics have %u entries, and hold at most %d", m->n_stats,
 		                PSR_WIRE_MAX_STATS);

@@ -26,6 +26,7 @@ static void unfilter_bytes(uint8_t *out, const uint8_t *in, size_t row, uint32_t
 static inline uint64_t load(const uint8_t *p, unsigned b)
 {
 	uint64_t v = 0;
+
 #pragma GCC unroll 8
 	for (unsigned i = 0; i < b; i++)
 		v |= (uint64_t)p[i] << 8 * i;
@@ -50,6 +51,7 @@ static inline void split(uint8_t *out, uint64_t d, size_t n, unsigned b)
 static inline uint64_t join(const uint8_t *in, size_t n, unsigned b)
 {
 	uint64_t d = 0;
+
 #pragma GCC unroll 8
 	for (unsigned k = 0; k < b; k++)
 		d |= (uint64_t)in[k * n] << 8 * k;
@@ -81,6 +83,7 @@ void psr_filter_rows(uint8_t *out, const uint8_t *in, uint32_t width, uint32_t h
                      unsigned component_bytes)
 {
 	size_t n = (size_t)width * n_components;
+
 	switch (component_bytes) {
 	case 1: filter_bytes(out, in, n, height, n_components); break;
 	case 2: filter_wide(out, in, n, height, n_components, 2); break;
@@ -94,6 +97,7 @@ void psr_unfilter_rows(uint8_t *out, const uint8_t *in, uint32_t width, uint32_t
                        unsigned component_bytes)
 {
 	size_t n = (size_t)width * n_components;
+
 	switch (component_bytes) {
 	case 1: unfilter_bytes(out, in, n, height, n_components); break;
 	case 2: unfilter_wide(out, in, n, height, n_components, 2); break;

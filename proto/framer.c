@@ -54,6 +54,7 @@ static const struct kind *find_kind(unsigned type)
 const char *psr_msg_name(unsigned type)
 {
 	const struct kind *kind = find_kind(type);
+
 	return kind ? kind->name : NULL;
 }
 
@@ -71,6 +72,7 @@ void psr_framer_init(struct psr_framer *framer, enum psr_side peer, void *storag
 void psr_framer_accept(struct psr_framer *framer, void *storage, size_t capacity)
 {
 	size_t n = framer->end - framer->begin;
+
 	assert(capacity >= PSR_WIRE_MAX_MESSAGE && capacity >= n);
 	memmove(storage, framer->storage + framer->begin, n);
 	framer->storage = storage;
@@ -101,6 +103,7 @@ void psr_framer_filled(struct psr_framer *framer, size_t n)
 static int looks_like_hello(const uint8_t *bytes, size_t n)
 {
 	uint8_t expected[24] = { 0, 0, 0, 0, PSR_MSG_HELLO };
+
 	memcpy(expected + 16, PSR_HELLO_MAGIC, 8);
 	for (size_t i = 2; i < n && i < sizeof expected; i++)
 		if (bytes[i] != expected[i])
@@ -144,6 +147,7 @@ static int read_header(struct psr_framer *framer, struct psr_message *m, const s
 {
 	const uint8_t *p = framer->storage + framer->begin;
 	uint32_t length = wire_get_u32(p);
+
 	if (length < PSR_HEADER_SIZE || length > framer->max_message)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "a message claims a length of %u bytes: it must have %d to %zu", length,
 		                PSR_HEADER_SIZE, framer->max_message);
@@ -171,6 +175,7 @@ int psr_framer_next(struct psr_framer *framer, struct psr_message *message, stru
 		size_t n = framer->end - framer->begin;
 		const struct kind *kind = NULL;
 		int result;
+
 		if (framer->expects_hello && !looks_like_hello(framer->storage + framer->begin, n))
 			return fail(framer, psr_fail(err, PSR_ERR_FORMAT, "the peer is not a client of psr"));
 		if (n < (framer->expects_hello ? 24 : PSR_HEADER_SIZE))

@@ -6,12 +6,14 @@
 static void layout_presets(struct wire *w, void *p)
 {
 	struct psr_msg_presets *m = p;
+
 	wire_u32(w, &m->handle);
 }
 
 static int check_presets(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_presets *m = p;
+
 	return check_integer("a model's handle", m->handle, 1, UINT32_MAX, err);
 }
 
@@ -20,6 +22,7 @@ WIRE_ID(presets, PRESETS, check_presets)
 static void layout_preset(struct wire *w, void *p)
 {
 	struct psr_msg_preset *m = p;
+
 	if (!w->writing)
 		memset(m, 0, sizeof *m);
 	wire_u8(w, &m->kind);
@@ -36,6 +39,7 @@ static void layout_preset(struct wire *w, void *p)
 static int check_preset(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_preset *m = p;
+
 	if (check_integer("a preset's kind", m->kind, PSR_WIRE_PRESET_CAMERA, PSR_WIRE_PRESET_LIGHT, err)
 	    || check_integer("a preset's flags", m->light.flags, 0, 0, err))
 		return PSR_ERR_ARG;
@@ -61,6 +65,7 @@ int psr_msg_preset_decode(struct psr_msg_preset *msg, const uint8_t *payload, si
 static void layout_presets_end(struct wire *w, void *p)
 {
 	struct psr_msg_presets_end *m = p;
+
 	wire_u32(w, &m->n_cameras);
 	wire_u32(w, &m->n_lights);
 }
@@ -68,6 +73,7 @@ static void layout_presets_end(struct wire *w, void *p)
 static int check_presets_end(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_presets_end *m = p;
+
 	return check_integer("the number of cameras", m->n_cameras, 0, PSR_WIRE_MAX_PRESETS, err)
 	               || check_integer("the number of lights", m->n_lights, 0, PSR_WIRE_MAX_PRESETS, err)
 	           ? PSR_ERR_ARG

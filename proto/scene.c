@@ -28,6 +28,7 @@ void layout_light(struct wire *w, struct psr_msg_light *m)
 static void layout_scene(struct wire *w, void *p)
 {
 	struct psr_msg_scene *m = p;
+
 	wire_u16(w, &m->slot);
 	wire_u16(w, &m->flags);
 	wire_u16(w, &m->n_instances);
@@ -49,6 +50,7 @@ static int check_instance(const struct psr_msg_instance *m, struct psr_error *er
 {
 	const double *q = m->rotation;
 	double norm = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+
 	if (check_integer("an instance's model handle", m->handle, 1, UINT32_MAX, err) ||
 	    check_integer("an instance's representation", m->representation, 0, PSR_WIRE_REP_DPOINT, err) ||
 	    check_lengths("an instance's translation", m->translation, 3, err) ||
@@ -69,6 +71,7 @@ static int is_zero(const double v[3])
 int check_light(const struct psr_msg_light *m, struct psr_error *err)
 {
 	const double *d = m->direction;
+
 	if (check_integer("a light's kind", m->kind, PSR_WIRE_LIGHT_DIRECTIONAL, PSR_WIRE_LIGHT_SPOT, err) ||
 	    check_integer("a light's flags", m->flags, 0, PSR_WIRE_LIGHT_SHADOW, err) ||
 	    check_range("a light's intensity", m->intensity, 0, PSR_WIRE_MAX_INTENSITY, err) ||
@@ -97,6 +100,7 @@ int check_light(const struct psr_msg_light *m, struct psr_error *err)
 static int check_scene(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_scene *m = p;
+
 	if (m->n_instances > PSR_WIRE_MAX_INSTANCES || m->n_lights > PSR_WIRE_MAX_LIGHTS)
 		return psr_fail(err, PSR_ERR_LIMIT, "a scene holds at most %d instances and %d lights, this one %u and %u",
 		                PSR_WIRE_MAX_INSTANCES, PSR_WIRE_MAX_LIGHTS, m->n_instances, m->n_lights);

@@ -7,6 +7,7 @@ static void layout_hello(struct wire *w, void *p)
 {
 	struct psr_msg_hello *m = p;
 	uint8_t magic[8];
+
 	memcpy(magic, PSR_HELLO_MAGIC, 8);
 	wire_bytes(w, magic, 8);
 	if (memcmp(magic, PSR_HELLO_MAGIC, 8))
@@ -33,6 +34,7 @@ int psr_msg_hello_encode(struct psr_buf *out, const struct psr_msg_hello *msg, s
 int psr_msg_hello_decode(struct psr_msg_hello *msg, const uint8_t *payload, size_t n, struct psr_error *err)
 {
 	int result;
+
 	if (n < 48)
 		return psr_fail(err, PSR_ERR_PROTOCOL, "HELLO: the message has %zu of at least 48 bytes", n);
 	result = wire_decode(msg, WIRE(HELLO, layout_hello, NULL), payload, n, err);
@@ -51,6 +53,7 @@ uint64_t psr_routing_key(const char *model_name)
 static void layout_welcome(struct wire *w, void *p)
 {
 	struct psr_msg_welcome *m = p;
+
 	wire_u16(w, &m->major);
 	wire_u16(w, &m->minor);
 	wire_reserved(w, 4);
@@ -71,6 +74,7 @@ static void layout_welcome(struct wire *w, void *p)
 static int check_welcome(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_welcome *m = p;
+
 	if (m->major != PSR_PROTO_MAJOR || m->minor != PSR_PROTO_MINOR)
 		return psr_fail(err, PSR_ERR_VERSION, "the server answers in version %u.%u of the protocol, this client speaks "
 		                "%u.%u: use programs of the same release", m->major, m->minor, PSR_PROTO_MAJOR,
@@ -93,6 +97,7 @@ WIRE_PLAIN(welcome, WELCOME, check_welcome)
 static void layout_goodbye(struct wire *w, void *p)
 {
 	struct psr_msg_goodbye *m = p;
+
 	wire_u16(w, &m->reason);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -105,6 +110,7 @@ WIRE_PLAIN(goodbye, GOODBYE, NULL)
 static void layout_ping(struct wire *w, void *p)
 {
 	struct psr_msg_ping *m = p;
+
 	wire_u64(w, &m->token);
 }
 
@@ -118,6 +124,7 @@ int psr_msg_pong_encode(struct psr_buf *out, const struct psr_msg_ping *msg, str
 static void layout_error(struct wire *w, void *p)
 {
 	struct psr_msg_error *m = p;
+
 	wire_u16(w, &m->code);
 	wire_reserved(w, 2);
 	wire_string(w, m->text, sizeof m->text);
@@ -126,6 +133,7 @@ static void layout_error(struct wire *w, void *p)
 static int check_error(const void *p, struct psr_error *err)
 {
 	const struct psr_msg_error *m = p;
+
 	return m->code ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "an ERROR has the code 0, which means no error");
 }
 
@@ -133,6 +141,7 @@ int psr_msg_error_encode(struct psr_buf *out, uint32_t id, uint16_t view, const 
                          struct psr_error *err)
 {
 	struct psr_msg_error clean = { .code = msg->code };
+
 	wire_clean(clean.text, msg->text, sizeof clean.text);
 	return wire_encode(out, WIRE(ERROR, layout_error, check_error), id, view, &clean, err);
 }

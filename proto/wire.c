@@ -26,6 +26,7 @@ void wire_fail(struct wire *w, int code, const char *what)
 static uint8_t *advance_out(struct wire *w, size_t n)
 {
 	size_t at = w->at;
+
 	w->at += n;
 	return w->at <= w->room ? w->out + at : NULL;
 }
@@ -33,6 +34,7 @@ static uint8_t *advance_out(struct wire *w, size_t n)
 static const uint8_t *advance_in(struct wire *w, size_t n)
 {
 	const uint8_t *p;
+
 	if (n > w->room - w->at) {
 		wire_fail(w, PSR_ERR_PROTOCOL, "the message ends too early");
 		w->at = w->room;
@@ -46,6 +48,7 @@ static const uint8_t *advance_in(struct wire *w, size_t n)
 static void put(struct wire *w, uint64_t v, unsigned n)
 {
 	uint8_t *p = advance_out(w, n);
+
 	for (unsigned i = 0; p && i < n; i++)
 		p[i] = (uint8_t)(v >> 8 * i);
 }
@@ -54,6 +57,7 @@ static uint64_t get(struct wire *w, unsigned n)
 {
 	const uint8_t *p = advance_in(w, n);
 	uint64_t v = 0;
+
 	for (unsigned i = 0; p && i < n; i++)
 		v |= (uint64_t)p[i] << 8 * i;
 	return v;
@@ -96,6 +100,7 @@ void wire_f64(struct wire *w, double *v, int n)
 {
 	for (int i = 0; i < n; i++) {
 		uint64_t bits;
+
 		memcpy(&bits, &v[i], sizeof bits);
 		wire_u64(w, &bits);
 		if (!w->writing)
@@ -107,6 +112,7 @@ void wire_bytes(struct wire *w, uint8_t *v, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
+
 		if (p)
 			memcpy(p, v, n);
 		return;
@@ -123,6 +129,7 @@ void wire_reserved(struct wire *w, size_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
+
 		if (p)
 			memset(p, 0, n);
 		return;
@@ -138,6 +145,7 @@ void wire_data(struct wire *w, const uint8_t **data, uint32_t n)
 {
 	if (w->writing) {
 		uint8_t *p = advance_out(w, n);
+
 		if (p)
 			memcpy(p, *data, n);
 		return;
@@ -152,6 +160,7 @@ static size_t character(const uint8_t *p, size_t n)
 	static const uint32_t least[5] = { 0, 0, 0x80, 0x800, 0x10000 };
 	size_t length = p[0] < 0x80 ? 1 : p[0] < 0xc0 ? 0 : p[0] < 0xe0 ? 2 : p[0] < 0xf0 ? 3 : p[0] < 0xf8 ? 4 : 0;
 	uint32_t c;
+
 	if (length == 0 || length > n)
 		return 0;
 	if (length == 1)
@@ -171,6 +180,7 @@ void wire_string(struct wire *w, char *text, size_t size)
 {
 	size_t length = w->writing ? strnlen(text, size) : 0;
 	uint16_t n = (uint16_t)length;
+
 	if (length >= size) {
 		wire_fail(w, PSR_ERR_ARG, "a text is not terminated");
 		return;
@@ -193,8 +203,10 @@ void wire_string(struct wire *w, char *text, size_t size)
 void wire_clean(char *out, const char *text, size_t size)
 {
 	size_t n = strnlen(text, size - 1), i = 0;
+
 	while (i < n) {
 		size_t step = character((const uint8_t *)text + i, n - i);
+
 		memcpy(out + i, step ? text + i : "?", step ? step : 1);
 		i += step ? step : 1;
 	}
@@ -210,6 +222,7 @@ int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, 
 	uint16_t type = (uint16_t)kind->type, flags = 0;
 	uint32_t length = 0;
 	int result;
+
 	assert(out->size <= out->capacity && name);
 	result = kind->check ? kind->check(msg, err) : PSR_OK;
 	if (result != PSR_OK)
@@ -240,6 +253,7 @@ int wire_encode(struct psr_buf *out, const struct wire_kind *kind, uint32_t id, 
 int wire_decode(void *msg, const struct wire_kind *kind, const uint8_t *payload, size_t n, struct psr_error *err)
 {
 	struct wire w = { .in = payload, .room = n };
+
 	kind->layout(&w, msg);
 	if (w.code != PSR_OK)
 		return psr_fail(err, w.code, "%s: %s (byte %zu of the payload)", psr_msg_name(kind->type), w.what, w.where);

@@ -13,6 +13,7 @@ static int is_checked(const struct psr_opt *opt)
 static int fail_range(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	char least[CLI_VALUE_TEXT], most[CLI_VALUE_TEXT];
+
 	cli_number_format(least, opt->type, opt->min);
 	cli_number_format(most, opt->type, opt->max);
 	return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is out of range; it takes %s to %s", opt->name, text, least, most);
@@ -22,6 +23,7 @@ static int fail_range(const struct psr_opt *opt, const char *text, struct psr_er
 static int read_digits(const char **text, uint64_t *v)
 {
 	const char *at = *text;
+
 	*v = 0;
 	for (; isdigit((unsigned char)*at); at++)
 		if (__builtin_mul_overflow(*v, 10, v) || __builtin_add_overflow(*v, (uint64_t)(*at - '0'), v))
@@ -38,6 +40,7 @@ static int set_int(const struct psr_opt *opt, const char *text, struct psr_error
 	uint64_t magnitude;
 	int64_t value;
 	int shift = 0;
+
 	if (!read_digits(&at, &magnitude))
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a whole number such as 8 or 64m", opt->name, text);
 	if (*at != '\0' && strchr("kKmMgG", *at) != NULL) {
@@ -60,6 +63,7 @@ static int set_int(const struct psr_opt *opt, const char *text, struct psr_error
 static int set_real(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	double value;
+
 	if (psr_parse_real(text, &value, NULL, NULL) != PSR_OK)
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a finite decimal number such as 1.5", opt->name, text);
 	if (is_checked(opt) && (value < opt->min || value > opt->max))
@@ -73,6 +77,7 @@ static int set_size(const struct psr_opt *opt, const char *text, struct psr_erro
 	const char *at = text;
 	uint64_t size[2];
 	uint32_t *out = opt->value;
+
 	if (!read_digits(&at, &size[0]) || (*at != 'x' && *at != 'X') || (at++, !read_digits(&at, &size[1])) || *at != '\0')
 		return psr_fail(err, PSR_ERR_ARG, "--%s: '%.80s' is not a size such as 1280x720", opt->name, text);
 	for (int i = 0; i < 2; i++)
@@ -88,6 +93,7 @@ static int set_size(const struct psr_opt *opt, const char *text, struct psr_erro
 static int set_flag(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	static const char *const words[2][4] = { { "no", "off", "false", "0" }, { "yes", "on", "true", "1" } };
+
 	for (int value = 0; value < 2; value++) {
 		for (int i = 0; i < 4; i++) {
 			if (strcmp(text, words[value][i]) == 0) {
@@ -103,6 +109,7 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 {
 	struct psr_error inner;
 	int code = PSR_OK;
+
 	switch (opt->type) {
 	case PSR_OPT_FLAG:
 		return set_flag(opt, text, err);
@@ -134,6 +141,7 @@ static int set_value(const struct psr_opt *opt, const char *text, struct psr_err
 static int give(const struct psr_opt *opt, const char *text, struct psr_error *err)
 {
 	int code = set_value(opt, text, err);
+
 	if (code == PSR_OK && opt->seen != NULL)
 		++*opt->seen;
 	return code;
@@ -161,8 +169,10 @@ static int fail_unknown(const struct psr_cli *cli, const char *dashes, const cha
 	const struct psr_opt *near = NULL;
 	size_t least = 3;
 	int shown = (int)(length < 80 ? length : 80);
+
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
 		size_t distance = psr_edit_distance(name, length, opt->name);
+
 		if (opt->type != PSR_OPT_HEADING && distance < least && distance < strlen(opt->name)) {
 			least = distance;
 			near = opt;
@@ -179,8 +189,10 @@ static int parse_option(const struct psr_cli *cli, int argc, char **argv, int *i
 {
 	const char *arg = argv[*i], *value = NULL;
 	const struct psr_opt *opt;
+
 	if (arg[1] == '-') {
 		size_t length = strcspn(arg + 2, "=");
+
 		opt = find_long(cli, arg + 2, length);
 		if (opt == NULL)
 			return fail_unknown(cli, "--", arg + 2, length, err);
@@ -224,6 +236,7 @@ int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_opera
 	}
 	for (int i = 1; i < argc; i++) {
 		int code;
+
 		if (!options_end && strcmp(argv[i], "--") == 0) {
 			options_end = 1;
 		} else if (!options_end && argv[i][0] == '-' && argv[i][1] != '\0') {
@@ -244,6 +257,7 @@ int psr_cli_parse(const struct psr_cli *cli, int argc, char **argv, int *n_opera
 int psr_cli_set(const struct psr_cli *cli, const char *name, const char *text, struct psr_error *err)
 {
 	const struct psr_opt *opt = find_long(cli, name, strlen(name));
+
 	if (opt == NULL)
 		return fail_unknown(cli, "", name, strlen(name), err);
 	return give(opt, text, err);

@@ -64,6 +64,7 @@ static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 	case PSR_OPT_VEC3: {
 		const double *v = opt->value;
 		char part[3][CLI_VALUE_TEXT];
+
 		if (!isfinite(v[0]) || !isfinite(v[1]) || !isfinite(v[2]))
 			break;
 		for (int i = 0; i < 3; i++)
@@ -73,12 +74,14 @@ static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 	}
 	case PSR_OPT_SIZE: {
 		const uint32_t *size = opt->value;
+
 		if (size[0] != 0 || size[1] != 0)
 			snprintf(text, CLI_VALUE_TEXT, "%" PRIu32 "x%" PRIu32, size[0], size[1]);
 		break;
 	}
 	case PSR_OPT_COLOR: {
 		const uint8_t *rgb = opt->value;
+
 		snprintf(text, CLI_VALUE_TEXT, "#%02x%02x%02x", rgb[0], rgb[1], rgb[2]);
 		break;
 	}
@@ -89,8 +92,10 @@ static void format_default(char text[CLI_VALUE_TEXT], const struct psr_opt *opt)
 static void print_wrapped(const char *text, int at, int indent)
 {
 	int line_is_empty = 1;
+
 	while (*text != '\0') {
 		int length = (int)strcspn(text, " \n");
+
 		if (length > 0) {
 			if (!line_is_empty && at + 1 + length > WIDTH) {
 				printf("\n%*s", indent, "");
@@ -114,6 +119,7 @@ static void print_wrapped(const char *text, int at, int indent)
 static int format_name(char *text, size_t size, const struct psr_opt *opt)
 {
 	char letter[8] = "    ";
+
 	if (opt->letter != '\0')
 		snprintf(letter, sizeof letter, "-%c, ", opt->letter);
 	return snprintf(text, size, "  %s--%s%s%s", letter, opt->name, opt->arg != NULL ? " " : "",
@@ -133,6 +139,7 @@ static void print_option(const struct psr_opt *opt, int column)
 {
 	char name[256], value[CLI_VALUE_TEXT], text[2048];
 	int length = format_name(name, sizeof name, opt);
+
 	format_default(value, opt);
 	snprintf(text, sizeof text, value[0] != '\0' ? "%s [%s]" : "%s%s", opt->help, value);
 	if (length + 2 > column)
@@ -147,8 +154,10 @@ void cli_help_print(const struct psr_cli *cli)
 	static const struct psr_opt help = { .name = "help", .type = PSR_OPT_FLAG, .help = "Print this and exit." };
 	char name[256];
 	int column = format_name(name, sizeof name, &help) + 2;
+
 	for (const struct psr_opt *opt = cli->opts; opt->name != NULL; opt++) {
 		int length = opt->type == PSR_OPT_HEADING ? 0 : format_name(name, sizeof name, opt) + 2;
+
 		if (length > column && length <= MAX_COLUMN)
 			column = length;
 	}

@@ -27,6 +27,7 @@ static void child_corners(double child[3][3], const double corner[3][3], unsigne
 	double ab[3], bc[3], ca[3];
 	const double *pick[4][3] = { { bc, ca, ab }, { corner[0], ab, ca }, { ab, corner[1], bc }, { ca, bc, corner[2] } };
 	double made[3][3];
+
 	midpoint(ab, corner[0], corner[1]);
 	midpoint(bc, corner[1], corner[2]);
 	midpoint(ca, corner[2], corner[0]);
@@ -39,6 +40,7 @@ static void child_corners(double child[3][3], const double corner[3][3], unsigne
 void psr_direction_corners(int level, unsigned index, double corner[3][3])
 {
 	unsigned octant = index >> 2 * level;
+
 	assert(level >= 0 && level <= LEVELS && octant < 8);
 	v3d_set(corner[0], 1, 0, 0);
 	v3d_set(corner[1], 0, 1, 0);
@@ -54,6 +56,7 @@ void psr_direction_corners(int level, unsigned index, double corner[3][3])
 void psr_direction_center(int level, unsigned index, double v[3])
 {
 	double corner[3][3];
+
 	psr_direction_corners(level, index, corner);
 	v3d_add(v, corner[0], corner[1]);
 	v3d_add(v, v, corner[2]);
@@ -72,11 +75,13 @@ static void make_tables(void)
 {
 	unsigned node = 0;
 	fenv_t callers;
+
 	fegetenv(&callers);
 	fesetenv(FE_DFL_ENV);
 	for (int level = 0; level < LEVELS; level++) {
 		for (unsigned index = 0; index < 1u << 2 * level; index++, node++) {
 			double corner[3][3], middle[3][3]; /* bc, ca, ab */
+
 			psr_direction_corners(level, index, corner);
 			child_corners(middle, corner, 0);
 			cut_off(cut_plane[node][0], middle[2], middle[1], corner[0]);
@@ -86,6 +91,7 @@ static void make_tables(void)
 	}
 	for (unsigned index = 0; index < PSR_DIRECTIONS; index++) {
 		double v[3];
+
 		psr_direction_center(LEVELS, index, v);
 		for (int k = 0; k < 3; k++) {
 			direction_table[index][k] = (float)v[k];
@@ -119,6 +125,7 @@ uint16_t psr_direction_encode(const float v[3])
 	double folded[3];
 	unsigned octant = 0, index = 0, first = 0; /* first: number of the level's first node */
 	int infinite = isinf(v[0]) || isinf(v[1]) || isinf(v[2]);
+
 	if (isnan(v[0]) || isnan(v[1]) || isnan(v[2]) || (v[0] == 0 && v[1] == 0 && v[2] == 0))
 		return 0;
 	for (int k = 0; k < 3; k++) {
@@ -129,6 +136,7 @@ uint16_t psr_direction_encode(const float v[3])
 	for (int level = 0; level < LEVELS; level++) {
 		const double (*plane)[3] = (const double(*)[3])cut_plane[first + index];
 		unsigned child = 0;
+
 		for (unsigned i = 0; i < 3 && child == 0; i++)
 			if (v3d_dot(plane[i], folded) > 0)
 				child = i + 1;
@@ -142,6 +150,7 @@ void psr_direction_basis(const double dir[3], double basis[3][3])
 {
 	double up[3] = { 0, 0, 0 };
 	int least = 0;
+
 	assert(fabs(v3d_dot(dir, dir) - 1) < 1e-6);
 	for (int k = 1; k < 3; k++)
 		if (fabs(dir[k]) < fabs(dir[least]))

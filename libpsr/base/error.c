@@ -39,6 +39,7 @@ int psr_fail(struct psr_error *err, int code, const char *format, ...)
 {
 	va_list args;
 	size_t length;
+
 	if (err == NULL)
 		return code;
 	err->code = code;

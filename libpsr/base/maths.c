@@ -6,6 +6,7 @@
 static double sin_series(double a)
 {
 	double q = a * a, term = a, sum = a;
+
 	for (int i = 3; i <= 17; i += 2) {
 		term = -term * q / ((i - 1) * i);
 		sum += term;
@@ -16,6 +17,7 @@ static double sin_series(double a)
 static double cos_series(double a)
 {
 	double q = a * a, term = 1, sum = 1;
+
 	for (int i = 2; i <= 18; i += 2) {
 		term = -term * q / ((i - 1) * i);
 		sum += term;
@@ -26,6 +28,7 @@ static double cos_series(double a)
 void psr_sincos(double a, double *s, double *c)
 {
 	int mirrored = a > HALF_PI;
+
 	if (mirrored)
 		a = 2 * HALF_PI - a;
 	if (a <= HALF_PI / 2) {

@@ -10,6 +10,7 @@
 void *psr_alloc_array(size_t n, size_t size)
 {
 	size_t n_bytes;
+
 	if (__builtin_mul_overflow(n, size, &n_bytes) || n_bytes > PTRDIFF_MAX - PSR_ALIGNMENT)
 		return NULL;
 	n_bytes = (n_bytes + PSR_ALIGNMENT - 1) / PSR_ALIGNMENT * PSR_ALIGNMENT;
@@ -24,6 +25,7 @@ void psr_free(void *memory)
 static size_t whole_pages(size_t n_bytes)
 {
 	size_t page = (size_t)sysconf(_SC_PAGESIZE);
+
 	return (n_bytes + page - 1) / page * page;
 }
 
@@ -31,6 +33,7 @@ void *psr_alloc_huge(size_t n_bytes)
 {
 	size_t slack = n_bytes >= HUGE_PAGE ? HUGE_PAGE : 0, head, used, left;
 	char *memory;
+
 	if (n_bytes == 0 || n_bytes > PTRDIFF_MAX - slack)
 		return NULL;
 	memory = mmap(NULL, n_bytes + slack, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -54,6 +57,7 @@ void *psr_alloc_huge(size_t n_bytes)
 void psr_free_huge(void *memory, size_t n_bytes)
 {
 	int failed;
+
 	if (memory == NULL)
 		return;
 	failed = munmap(memory, n_bytes);
@@ -64,6 +68,7 @@ void psr_free_huge(void *memory, size_t n_bytes)
 static void *alloc_pages(size_t n_bytes)
 {
 	void *memory;
+
 	if (n_bytes == 0 || n_bytes > PTRDIFF_MAX)
 		return NULL;
 	memory = mmap(NULL, n_bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);

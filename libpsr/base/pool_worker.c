@@ -116,6 +116,7 @@ static void help(struct worker *self, struct job *job, uint64_t now)
 static int spin_until_offer(struct psr_pool *pool, unsigned n_offers)
 {
 	const uint64_t start = clock_ns();
+
 	do {
 		for (int i = 0; i < 64; i++) {
 			if (atomic_load_explicit(&pool->n_offers, memory_order_acquire) != n_offers)

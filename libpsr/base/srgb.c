@@ -101,6 +101,7 @@ static const float threshold[255] = {
 uint8_t psr_linear_to_srgb(float linear)
 {
 	unsigned code = 0;
+
 	for (unsigned step = 128; step > 0; step >>= 1)
 		code += linear >= threshold[code + step - 1] ? step : 0;
 	return (uint8_t)code;

@@ -19,6 +19,7 @@ int view_is_point(const double v[3])
 static int is_direction(const double v[3])
 {
 	double length = v3d_length(v);
+
 	return view_is_point(v) && length >= 1e-30 && length <= MAX_LENGTH;
 }
 
@@ -33,6 +34,7 @@ int view_is_light(const double v[3])
 int view_check_camera(const struct psr_camera *camera, struct psr_error *err)
 {
 	double forward[3], right[3];
+
 	if (!view_is_point(camera->eye) || !view_is_point(camera->target) || !view_is_point(camera->up))
 		return psr_fail(err, PSR_ERR_ARG, "eye, target and up must be finite and below 1e30");
 	v3d_sub(forward, camera->target, camera->eye);

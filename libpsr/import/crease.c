@@ -33,12 +33,14 @@ static unsigned find_groups(unsigned *group, double *widest, const struct crease
 {
 	double step[CREASE_MAX_CORNERS], nearest[CREASE_MAX_CORNERS]; /* from the tree; nearest: the same as an angle */
 	unsigned n_groups = 0;
+
 	for (unsigned i = 0; i < n; i++) {
 		step[i] = nearest[i] = INFINITY;
 		group[i] = n;
 	}
 	for (;;) {
 		unsigned next = n;
+
 		for (unsigned i = 0; i < n; i++)
 			if (group[i] == n && has_area(&corner[i]) && (next == n || step[i] < step[next]))
 				next = i;
@@ -53,6 +55,7 @@ static unsigned find_groups(unsigned *group, double *widest, const struct crease
 		for (unsigned i = 0; i < n; i++) {
 			const double angle = fmax(gap(corner[i].face, corner[next].face), 0.0);
 			const double s = corner[i].is_flat || corner[next].is_flat ? angle : angle / ROUGH;
+
 			if (s < step[i]) {
 				step[i] = s;
 				nearest[i] = angle;
@@ -83,6 +86,7 @@ static int counts(const struct members *m, unsigned k, const double *face, doubl
 static int common_normal(double normal[3], const struct members *m, const double *face, double reach)
 {
 	double largest = 0.0, length;
+
 	for (unsigned k = 0; k < m->n; k++)
 		if (counts(m, k, face, reach))
 			largest = fmax(largest, m->corner[k].area);
@@ -107,10 +111,12 @@ static void finish_group(const struct members *m, double reach)
 {
 	double shared[3], own[3];
 	int is_regular = common_normal(shared, m, NULL, 0.0);
+
 	for (unsigned i = 0; i < m->n && is_regular; i++)
 		is_regular = m->group[i] != m->g || gap(m->corner[i].face, shared) <= reach;
 	for (unsigned i = 0; i < m->n; i++) {
 		struct crease_corner *corner = &m->corner[i];
+
 		if (m->group[i] != m->g)
 			continue;
 		if (is_regular)
@@ -123,6 +129,7 @@ static void finish_group(const struct members *m, double reach)
 static double reach_of(const struct members *m, double widest, double crease)
 {
 	double most = ROUGH * crease;
+
 	for (unsigned i = 0; i < m->n; i++)
 		if (m->group[i] == m->g && m->corner[i].is_flat)
 			most = crease;
@@ -133,6 +140,7 @@ void crease_normals(struct crease_corner *corner, unsigned n, double crease)
 {
 	double widest[CREASE_MAX_CORNERS];
 	unsigned group[CREASE_MAX_CORNERS], n_groups;
+
 	assert(n <= CREASE_MAX_CORNERS);
 	n_groups = find_groups(group, widest, corner, n, crease);
 	for (unsigned i = 0; i < n; i++)
@@ -140,6 +148,7 @@ void crease_normals(struct crease_corner *corner, unsigned n, double crease)
 			corner[i].normal[c] = 0.0f;
 	for (unsigned g = 0; g < n_groups; g++) {
 		const struct members members = { corner, group, n, g };
+
 		finish_group(&members, reach_of(&members, widest[g], crease));
 	}
 }

@@ -10,6 +10,7 @@ static void key_of(uint32_t key[4], const struct psr_mesh *mesh, const uint32_t 
 {
 	uint32_t point[3];
 	int least = 0;
+
 	for (int c = 0; c < 3; c++) {
 		point[c] = first_of[mesh->triangle[t][c]];
 		if (point[c] < point[least])
@@ -26,6 +27,7 @@ int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, str
 	uint64_t n_slots = 16;
 	uint32_t *first_of, *slot, kept = 0;
 	int rc = import_mesh_groups(&first_of, im, IMPORT_SAME_POSITION, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	while (n_slots < 2 * (uint64_t)mesh->n_triangles)
@@ -39,6 +41,7 @@ int import_mesh_drop_duplicates(uint32_t *n_dropped, struct import_mesh *im, str
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		uint32_t key[4], other[4];
 		uint64_t at;
+
 		key_of(key, mesh, first_of, t);
 		for (at = XXH64(key, sizeof key, 0) & (n_slots - 1); slot[at] != EMPTY; at = (at + 1) & (n_slots - 1)) {
 			key_of(other, mesh, first_of, slot[at]);

@@ -34,6 +34,7 @@ static int check_options(const struct psr_import_options *options, struct psr_er
 static int is_gltf(const char *path, const uint8_t *bytes, size_t n_bytes)
 {
 	size_t i = 0, n = n_bytes < SNIFF_BYTES ? n_bytes : SNIFF_BYTES;
+
 	if (n >= 4 && memcmp(bytes, "glTF", 4) == 0)
 		return 1;
 	if (import_path_ends_with(path, ".gltf") || import_path_ends_with(path, ".glb"))
@@ -65,6 +66,7 @@ static int is_pcd(const char *path, const uint8_t *bytes, size_t n_bytes)
 static int is_surveyed(const struct psr_mesh *mesh)
 {
 	double low[3], high[3], size = 0;
+
 	import_mesh_bounds(low, high, mesh);
 	for (int k = 0; k < 3; k++)
 		size = fmax(size, high[k] - low[k]);
@@ -77,6 +79,7 @@ static void find_up(struct psr_mesh *mesh, const char *path, const uint8_t *byte
 	static const char *const endings[] = { ".stl", ".amf", ".3mf" };
 	int has_z = is_las(path, bytes, n_bytes) || is_pcd(path, bytes, n_bytes) ||
 	             (!is_gltf(path, bytes, n_bytes) && is_surveyed(mesh));
+
 	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
 		has_z |= import_path_ends_with(path, endings[i]);
 	mesh->up[has_z ? 2 : 1] = 1;
@@ -89,6 +92,7 @@ int psr_mesh_import(struct psr_mesh **out, const char *path, const struct psr_im
 	uint8_t *bytes = NULL;
 	size_t n_bytes = 0;
 	int rc;
+
 	if (out == NULL || path == NULL || path[0] == '\0')
 		return psr_fail(err, PSR_ERR_ARG, "the path of the mesh file is empty");
 	*out = NULL;

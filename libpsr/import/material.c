@@ -40,6 +40,7 @@ static void tidy_texture(struct psr_texture *t)
 {
 	static const float identity[6] = { 1, 0, 0, 0, 1, 0 };
 	int is_finite = 1;
+
 	for (int i = 0; i < 6; i++)
 		is_finite &= isfinite(t->transform[i]) && fabsf(t->transform[i]) <= MAX_FACTOR;
 	if (!is_finite)
@@ -59,6 +60,7 @@ static void textures_of(struct psr_texture *out[6], struct psr_material *m)
 void import_material_tidy(struct psr_material *m)
 {
 	struct psr_texture *texture[6];
+
 	for (int c = 0; c < 4; c++)
 		m->base_color[c] = clamp(m->base_color[c], 0.0f, 1.0f, 1.0f);
 	for (int c = 0; c < 3; c++) {
@@ -82,6 +84,7 @@ int import_mesh_drop_images(struct import_mesh *im, struct psr_error *err)
 	struct psr_texture *texture[6];
 	int *target = calloc((size_t)mesh->n_images + 1, sizeof *target);
 	uint32_t kept = 0;
+
 	if (target == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %u images", im->path, mesh->n_images);
 	for (uint32_t m = 0; m < mesh->n_materials; m++) {

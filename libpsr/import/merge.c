@@ -35,8 +35,10 @@ static void grid_fini(struct grid *grid)
 static uint32_t cell_at(const struct grid *grid, const double p[3])
 {
 	uint32_t cell = 0;
+
 	for (int k = 0; k < 3; k++) {
 		const double at = (p[k] - grid->low[k]) * grid->per_unit;
+
 		if (!isfinite(p[k]))
 			return NO_CELL;
 		cell = cell * CELLS + (uint32_t)(at > 0 ? at < CELLS - 1 ? at : CELLS - 1 : 0);
@@ -48,10 +50,12 @@ static uint32_t cell_at(const struct grid *grid, const double p[3])
 static double find_size(struct grid *grid, const struct psr_mesh *mesh)
 {
 	double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY }, size = 0;
+
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
 		for (int c = 0; c < 3; c++)
 			for (int k = 0; k < 3; k++) {
 				const double x = mesh->position[mesh->triangle[t][c]][k];
+
 				if (!isfinite(x))
 					continue;
 				low[k] = x < low[k] ? x : low[k];
@@ -67,6 +71,7 @@ static double find_size(struct grid *grid, const struct psr_mesh *mesh)
 static int grid_init(struct grid *grid, const struct import_mesh *im, double size, struct psr_error *err)
 {
 	const struct psr_mesh *mesh = im->mesh;
+
 	grid->per_unit = CELLS / size;
 	grid->cell = malloc((size_t)mesh->n_vertices * sizeof *grid->cell);
 	grid->number = calloc((size_t)CELLS * CELLS * CELLS, sizeof *grid->number);
@@ -90,6 +95,7 @@ static int are_near(uint32_t a, uint32_t b)
 static int stays(const struct grid *grid, const uint32_t v[3])
 {
 	const uint32_t a = grid->cell[v[0]], b = grid->cell[v[1]], c = grid->cell[v[2]];
+
 	return a == NO_CELL || b == NO_CELL || c == NO_CELL || !are_near(a, b) || !are_near(b, c) || !are_near(c, a);
 }
 
@@ -98,6 +104,7 @@ static void keep_cells(struct grid *grid, const struct psr_mesh *mesh)
 {
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		const uint32_t *v = mesh->triangle[t];
+
 		for (int c = 0; c < 3 && stays(grid, v); c++)
 			if (grid->cell[v[c]] != NO_CELL)
 				grid->number[grid->cell[v[c]]] = KEEPS;
@@ -107,12 +114,14 @@ static void keep_cells(struct grid *grid, const struct psr_mesh *mesh)
 static struct place *place_of(const struct grid *grid, uint32_t v)
 {
 	const uint32_t number = grid->cell[v] != NO_CELL ? grid->number[grid->cell[v]] : KEEPS;
+
 	return number != KEEPS && number != 0 ? &grid->place[number - 1] : NULL;
 }
 
 static void add_corner(struct grid *grid, const struct psr_mesh *mesh, uint32_t v)
 {
 	struct place *place;
+
 	if (grid->cell[v] != NO_CELL && grid->number[grid->cell[v]] == 0) {
 		grid->place[grid->n_places] = (struct place){ .n = 0 };
 		grid->number[grid->cell[v]] = ++grid->n_places;
@@ -138,6 +147,7 @@ static void find_places(struct grid *grid, const struct psr_mesh *mesh)
 static const double *target_of(const struct grid *grid, const struct psr_mesh *mesh, uint32_t v)
 {
 	const struct place *place = place_of(grid, v);
+
 	return place != NULL ? place->sum : mesh->position[v];
 }
 
@@ -153,6 +163,7 @@ static int keeps_side(const struct grid *grid, const struct psr_mesh *mesh, cons
 {
 	const double *p = mesh->position[v[0]], *q = target_of(grid, mesh, v[0]);
 	double e[3], f[3], before[3], after[3];
+
 	v3d_sub(e, mesh->position[v[1]], p);
 	v3d_sub(f, mesh->position[v[2]], p);
 	v3d_cross(before, e, f);
@@ -165,9 +176,11 @@ static int keeps_side(const struct grid *grid, const struct psr_mesh *mesh, cons
 static void drop_triangles(const struct grid *grid, struct psr_mesh *mesh)
 {
 	uint32_t kept = 0;
+
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		const uint32_t *v = mesh->triangle[t];
 		const int moves = place_of(grid, v[0]) != NULL || place_of(grid, v[1]) != NULL || place_of(grid, v[2]) != NULL;
+
 		if (moves && !keeps_side(grid, mesh, v))
 			continue;
 		memmove(mesh->triangle[kept], mesh->triangle[t], sizeof mesh->triangle[t]);
@@ -186,6 +199,7 @@ int import_mesh_merge(struct import_mesh *im, struct psr_error *err)
 	uint32_t n_doubles;
 	double size;
 	int rc;
+
 	if (!im->options.is_preview || mesh->n_triangles <= FEW_TRIANGLES)
 		return PSR_OK;
 	rc = import_mesh_check_indices(im, err);

@@ -50,6 +50,7 @@ void import_mesh_fini(struct import_mesh *im)
 int import_resize(void *array, uint64_t n, size_t size)
 {
 	void *block;
+
 	memcpy(&block, array, sizeof block);
 	block = realloc(block, n > 0 ? (size_t)n * size : 1);
 	if (block == NULL)
@@ -61,6 +62,7 @@ int import_resize(void *array, uint64_t n, size_t size)
 static uint64_t next_capacity(uint64_t capacity, uint64_t needed, uint64_t max)
 {
 	uint64_t grown = capacity + capacity / 2;
+
 	if (grown < needed)
 		grown = needed;
 	return grown < max ? grown : max;
@@ -69,6 +71,7 @@ static uint64_t next_capacity(uint64_t capacity, uint64_t needed, uint64_t max)
 static int put_column(struct import_column *out, int n, void *array, size_t size)
 {
 	void *block;
+
 	memcpy(&block, array, sizeof block);
 	if (block == NULL)
 		return n;
@@ -79,6 +82,7 @@ static int put_column(struct import_column *out, int n, void *array, size_t size
 int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
 {
 	int n = 0;
+
 	n = put_column(out, n, &mesh->position, sizeof *mesh->position);
 	n = put_column(out, n, &mesh->normal, sizeof *mesh->normal);
 	for (int set = 0; set < PSR_UV_SETS; set++)
@@ -90,6 +94,7 @@ int import_vertex_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct p
 int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct psr_mesh *mesh)
 {
 	int n = 0;
+
 	n = put_column(out, n, &mesh->point, sizeof *mesh->point);
 	n = put_column(out, n, &mesh->point_normal, sizeof *mesh->point_normal);
 	n = put_column(out, n, &mesh->point_radius, sizeof *mesh->point_radius);
@@ -100,6 +105,7 @@ int import_point_columns(struct import_column out[IMPORT_MAX_COLUMNS], struct ps
 void *import_column_at(const struct import_column *column, uint64_t i)
 {
 	char *block;
+
 	memcpy(&block, column->array, sizeof block);
 	return block + i * column->size;
 }
@@ -129,6 +135,7 @@ static void fill_white(float (*color)[4], uint64_t first, uint64_t end)
 static int create(void *array, int wanted, uint64_t n, size_t size)
 {
 	void *block;
+
 	memcpy(&block, array, sizeof block);
 	if (block != NULL || !wanted)
 		return 1;
@@ -142,6 +149,7 @@ static int create_vertex_columns(struct import_mesh *im, unsigned has)
 	struct psr_mesh *mesh = im->mesh;
 	const uint64_t n = im->vertex_capacity;
 	const int new_color = mesh->color == NULL;
+
 	for (unsigned set = 0; set < PSR_UV_SETS; set++)
 		if (!create(&mesh->uv[set], (has & IMPORT_HAS_UV0 << set) != 0, n, sizeof *mesh->uv[set]))
 			return 0;
@@ -157,8 +165,10 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
+
 	if (n_vertices > im->vertex_capacity || mesh->position == NULL) {
 		uint64_t n = next_capacity(im->vertex_capacity, n_vertices, IMPORT_MAX_VERTICES);
+
 		if (!create(&mesh->position, 1, 1, sizeof *mesh->position) ||
 		    !create(&mesh->normal, 1, 1, sizeof *mesh->normal) ||
 		    !resize_columns(column, import_vertex_columns(column, mesh), n))
@@ -167,6 +177,7 @@ static int reserve(struct import_mesh *im, uint64_t n_vertices, uint64_t n_trian
 	}
 	if (n_triangles > im->triangle_capacity) {
 		uint64_t n = next_capacity(im->triangle_capacity, n_triangles, IMPORT_MAX_TRIANGLES);
+
 		if (!import_resize(&mesh->triangle, n, sizeof *mesh->triangle) ||
 		    !import_resize(&mesh->triangle_material, n, sizeof *mesh->triangle_material))
 			return 0;
@@ -181,6 +192,7 @@ int import_mesh_grow(struct import_mesh *im, uint64_t n_vertices, uint64_t n_tri
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t old_v = mesh->n_vertices, old_t = mesh->n_triangles;
+
 	if (n_vertices > IMPORT_MAX_VERTICES - old_v || n_triangles > IMPORT_MAX_TRIANGLES - old_t)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu vertices or %llu triangles", im->path,
 		                (unsigned long long)IMPORT_MAX_VERTICES, (unsigned long long)IMPORT_MAX_TRIANGLES);
@@ -203,8 +215,10 @@ static int reserve_points(struct import_mesh *im, uint64_t n_points, int has_col
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	const int new_color = mesh->point_color == NULL;
+
 	if (n_points > im->point_capacity) {
 		uint64_t n = next_capacity(im->point_capacity, n_points, IMPORT_MAX_POINTS);
+
 		if (!create(&mesh->point, 1, 1, sizeof *mesh->point) ||
 		    !create(&mesh->point_normal, 1, 1, sizeof *mesh->point_normal) ||
 		    !create(&mesh->point_radius, 1, 1, sizeof *mesh->point_radius) ||
@@ -225,6 +239,7 @@ int import_mesh_grow_points(struct import_mesh *im, uint64_t n_points, int has_c
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	struct psr_mesh *mesh = im->mesh;
 	uint64_t old = mesh->n_points;
+
 	if (n_points > IMPORT_MAX_POINTS - old)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %llu points", im->path,
 		                (unsigned long long)IMPORT_MAX_POINTS);
@@ -256,6 +271,7 @@ void import_mesh_bounds(double low[3], double high[3], const struct psr_mesh *me
 int import_mesh_add_material(struct import_mesh *im, const struct psr_material *material, struct psr_error *err)
 {
 	struct psr_mesh *mesh = im->mesh;
+
 	if (mesh->n_materials >= IMPORT_MAX_MATERIALS)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %d materials", im->path, IMPORT_MAX_MATERIALS);
 	if (!import_resize(&mesh->material, (uint64_t)mesh->n_materials + 1, sizeof *mesh->material))
@@ -268,6 +284,7 @@ int import_mesh_add_pixels(struct import_mesh *im, struct psr_image *image, stru
 {
 	struct psr_mesh *mesh = im->mesh;
 	const uint64_t n = (uint64_t)image->width * image->height;
+
 	if (n > IMPORT_MAX_PIXELS - im->n_pixels ||
 	    !import_resize(&mesh->image, (uint64_t)mesh->n_images + 1, sizeof *mesh->image)) {
 		free(image->rgba);
@@ -286,6 +303,7 @@ int import_mesh_add_image(struct import_mesh *im, const uint8_t *bytes, size_t n
 {
 	struct psr_image image;
 	int rc = import_image_decode(&image, bytes, n_bytes, name, IMPORT_MAX_PIXELS - im->n_pixels, err);
+
 	return rc == PSR_OK ? import_mesh_add_pixels(im, &image, err) : rc;
 }
 
@@ -294,6 +312,7 @@ void import_mesh_warn(struct import_mesh *im, const char *format, ...)
 	char *warning = im->mesh->warning, text[PSR_ERROR_TEXT];
 	size_t used = strlen(warning), n;
 	va_list args;
+
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
@@ -311,6 +330,7 @@ void import_mesh_warn(struct import_mesh *im, const char *format, ...)
 static void shrink(struct psr_mesh *mesh)
 {
 	struct import_column column[IMPORT_MAX_COLUMNS];
+
 	(void)resize_columns(column, import_vertex_columns(column, mesh), mesh->n_vertices);
 	(void)resize_columns(column, import_point_columns(column, mesh), mesh->n_points);
 	(void)import_resize(&mesh->triangle, mesh->n_triangles, sizeof *mesh->triangle);
@@ -321,6 +341,7 @@ int import_mesh_finish(struct psr_mesh **out, struct import_mesh *im, struct psr
 {
 	struct psr_mesh *mesh = im->mesh;
 	int rc = import_mesh_repair(im, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	if (mesh->n_triangles == 0 && mesh->n_points == 0)

@@ -40,6 +40,7 @@ static void corner_share(double share[3], const struct psr_mesh *mesh, uint64_t 
 	const unsigned at = (unsigned)(corner % 3);
 	const double *p = mesh->position[v[at]], *q = mesh->position[v[(at + 1) % 3]], *r = mesh->position[v[(at + 2) % 3]];
 	double e[3], f[3], weight;
+
 	v3d_sub(e, q, p);
 	v3d_sub(f, r, p);
 	v3d_cross(share, e, f);
@@ -79,6 +80,7 @@ static double twice_area(const struct psr_mesh *mesh, uint32_t t)
 {
 	const uint32_t *v = mesh->triangle[t];
 	double e[3], f[3], n[3];
+
 	v3d_sub(e, mesh->position[v[1]], mesh->position[v[0]]);
 	v3d_sub(f, mesh->position[v[2]], mesh->position[v[0]]);
 	v3d_cross(n, e, f);
@@ -92,6 +94,7 @@ static void find_flats(struct fan *fan, const struct psr_mesh *mesh)
 		fan->flat[t] = t;
 	for (uint32_t p = 0; p < mesh->n_vertices; p++) {
 		const uint64_t first = fan->start[p], end = fan->start[p + 1];
+
 		for (uint64_t i = first; i < end && end - first <= CREASE_MAX_CORNERS; i++)
 			for (uint64_t k = first; k < i; k++)
 				join_flat(fan, (uint32_t)(fan->corner[i] / 3), (uint32_t)(fan->corner[k] / 3));
@@ -114,6 +117,7 @@ static int fan_init(struct fan *fan, const struct import_mesh *im, struct psr_er
 	const struct psr_mesh *mesh = im->mesh;
 	uint64_t sum = 0;
 	int rc;
+
 	memset(fan, 0, sizeof *fan);
 	rc = import_mesh_groups(&fan->point, im, IMPORT_SAME_NEARLY, err);
 	if (rc != PSR_OK)
@@ -154,6 +158,7 @@ static int split_vertex(struct import_mesh *im, uint32_t v, struct psr_error *er
 	struct import_column column[IMPORT_MAX_COLUMNS];
 	const uint32_t to = im->mesh->n_vertices;
 	int n_columns, rc = import_mesh_grow(im, 1, 0, 0, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	n_columns = import_vertex_columns(column, im->mesh);
@@ -175,6 +180,7 @@ static void take_ring(struct ring *ring, struct fan *fan, const struct psr_mesh 
 	for (unsigned i = 0; i < ring->n; i++) {
 		const uint64_t at = fan->corner[first + i];
 		const uint32_t t = (uint32_t)(at / 3);
+
 		ring->at[i] = at;
 		ring->vertex[i] = mesh->triangle[t][at % 3];
 		memcpy(ring->corner[i].face, fan->face[t], sizeof fan->face[t]);
@@ -192,6 +198,7 @@ static int put_normals(struct import_mesh *im, const struct ring *ring, struct p
 		const float *normal = ring->corner[i].normal;
 		int is_first = 1, rc;
 		unsigned k;
+
 		for (k = 0; k < i; k++) {
 			if (ring->vertex[k] != ring->vertex[i])
 				continue;
@@ -222,6 +229,7 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 	struct ring *ring;
 	struct fan fan;
 	int rc = fan_init(&fan, im, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	ring = malloc(sizeof *ring);
@@ -229,6 +237,7 @@ int import_mesh_smooth(struct import_mesh *im, struct psr_error *err)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for the normals of a vertex", im->path);
 	for (uint32_t p = 0; p < n_vertices && rc == PSR_OK; p++) {
 		const uint64_t first = fan.start[p], n = fan.start[p + 1] - first;
+
 		if (n == 0 || n > CREASE_MAX_CORNERS)
 			continue;
 		ring->n = (unsigned)n;

@@ -10,6 +10,7 @@
 static int parse_rare(const uint8_t *word, size_t n, locale_t locale, double *x)
 {
 	char text[MAX_NUMBER + 1], *end;
+
 	if (n == 0 || n > MAX_NUMBER)
 		return 0;
 	memcpy(text, word, n);
@@ -33,6 +34,7 @@ int import_number(double *x, const uint8_t *word, size_t n, locale_t locale)
 	size_t i = n > 0 && (word[0] == '-' || word[0] == '+');
 	uint64_t digits = 0;
 	int exponent = 0, n_digits = 0, power = 0, down;
+
 	for (; i < n && word[i] >= '0' && word[i] <= '9' && n_digits < 18; i++, n_digits++)
 		digits = digits * 10 + (uint64_t)(word[i] - '0');
 	if (i < n && word[i] == '.')

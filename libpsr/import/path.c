@@ -10,6 +10,7 @@
 int import_path_ends_with(const char *path, const char *ending)
 {
 	const size_t n = strlen(path), m = strlen(ending);
+
 	return n >= m && strcasecmp(path + n - m, ending) == 0;
 }
 
@@ -17,6 +18,7 @@ int import_path_folder(char **folder, const char *path, struct psr_error *err)
 {
 	const char *slash = strrchr(path, '/');
 	char *name, *resolved;
+
 	name = slash == NULL ? strdup(".") : slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
 	if (name == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for its path", path);
@@ -34,6 +36,7 @@ int import_path_inside(char **out, const char *folder, const char *name, struct 
 {
 	size_t n = strlen(folder);
 	char *joined, *resolved;
+
 	if (name[0] == '\0')
 		return psr_fail(err, PSR_ERR_FORMAT, "names a file by an empty string");
 	if (name[0] == '/')

@@ -6,6 +6,7 @@
 static size_t cut(const char *text, size_t n)
 {
 	size_t length = strlen(text);
+
 	if (length <= n)
 		return length;
 	while (n > 0 && ((unsigned char)text[n] & 0xc0) == 0x80)
@@ -17,6 +18,7 @@ static size_t cut(const char *text, size_t n)
 static void tidy_name(char out[PSR_NAME_BYTES], const char *name)
 {
 	size_t n;
+
 	while ((unsigned char)*name <= ' ' && *name != '\0')
 		name++;
 	n = cut(name, PSR_NAME_BYTES - 1);
@@ -41,6 +43,7 @@ static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char
 {
 	char base[PSR_NAME_BYTES], suffix[16];
 	unsigned number = 1;
+
 	tidy_name(base, wanted);
 	if (base[0] == '\0') {
 		snprintf(base, sizeof base, "%s", kind);
@@ -50,6 +53,7 @@ static void choose_name(char out[PSR_NAME_BYTES], const char *wanted, const char
 	}
 	while (is_taken(names, stride, n, out)) {
 		size_t room;
+
 		snprintf(suffix, sizeof suffix, " %u", ++number);
 		room = cut(base, PSR_NAME_BYTES - 1 - strlen(suffix));
 		memcpy(out, base, room);
@@ -72,6 +76,7 @@ int import_mesh_add_camera(struct import_mesh *im, const char *name, const struc
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t n = mesh->n_cameras;
 	int rc;
+
 	if (n >= PSR_MAX_PRESETS) {
 		import_mesh_warn(im, "cameras after the first %d were left out", PSR_MAX_PRESETS);
 		return PSR_OK;
@@ -91,6 +96,7 @@ int import_mesh_add_light(struct import_mesh *im, const char *name, const struct
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t n = mesh->n_lights;
 	int rc;
+
 	if (n >= PSR_MAX_PRESETS) {
 		import_mesh_warn(im, "lights after the first %d were left out", PSR_MAX_PRESETS);
 		return PSR_OK;

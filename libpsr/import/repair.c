@@ -12,6 +12,7 @@ static int is_finite3(const double p[3])
 static int has_area(const double a[3], const double b[3], const double c[3])
 {
 	double e[3], f[3], n[3], largest = 0.0;
+
 	for (int i = 0; i < 3; i++) {
 		e[i] = b[i] - a[i];
 		f[i] = c[i] - a[i];
@@ -32,6 +33,7 @@ static int has_area(const double a[3], const double b[3], const double c[3])
 int import_mesh_check_indices(const struct import_mesh *im, struct psr_error *err)
 {
 	const struct psr_mesh *mesh = im->mesh;
+
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		for (int c = 0; c < 3; c++)
 			if (mesh->triangle[t][c] >= mesh->n_vertices)
@@ -48,9 +50,11 @@ static void drop_triangles(struct import_mesh *im)
 {
 	struct psr_mesh *mesh = im->mesh;
 	uint32_t kept = 0, n_flat = 0, n_infinite = 0;
+
 	for (uint32_t t = 0; t < mesh->n_triangles; t++) {
 		const uint32_t *v = mesh->triangle[t];
 		const double *a = mesh->position[v[0]], *b = mesh->position[v[1]], *c = mesh->position[v[2]];
+
 		if (!is_finite3(a) || !is_finite3(b) || !is_finite3(c)) {
 			n_infinite++;
 		} else if (!has_area(a, b, c)) {
@@ -72,6 +76,7 @@ static int drop_doubles(struct import_mesh *im, struct psr_error *err)
 {
 	uint32_t n;
 	int rc = import_mesh_drop_duplicates(&n, im, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	im->mesh->n_dropped_triangles += n;
@@ -87,6 +92,7 @@ int import_mesh_drop_vertices(struct import_mesh *im, struct psr_error *err)
 	struct psr_mesh *mesh = im->mesh;
 	const int n_columns = import_vertex_columns(column, mesh);
 	uint32_t *target = calloc(mesh->n_vertices > 0 ? mesh->n_vertices : 1, sizeof *target), kept = 0;
+
 	if (target == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to check %u vertices", im->path, mesh->n_vertices);
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)
@@ -113,6 +119,7 @@ static int drop_points(struct import_mesh *im, struct psr_error *err)
 	struct psr_mesh *mesh = im->mesh;
 	const int n_columns = import_point_columns(column, mesh);
 	uint32_t kept = 0;
+
 	for (uint32_t p = 0; p < mesh->n_points; p++) {
 		if (mesh->point_material[p] >= mesh->n_materials)
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: point %u refers to material %u, but there are only %u", im->path,
@@ -133,6 +140,7 @@ static int drop_points(struct import_mesh *im, struct psr_error *err)
 static void unit_normal(float n[3])
 {
 	double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2]))), x, y, z, length;
+
 	if (!isfinite(n[0]) || !isfinite(n[1]) || !isfinite(n[2]) || largest == 0.0) {
 		n[0] = n[1] = n[2] = 0.0f;
 		return;
@@ -181,6 +189,7 @@ static void tidy_elements(struct psr_mesh *mesh)
 int import_mesh_repair(struct import_mesh *im, struct psr_error *err)
 {
 	int rc = import_mesh_check_indices(im, err);
+
 	if (rc == PSR_OK) {
 		drop_triangles(im);
 		rc = drop_doubles(im, err);

@@ -21,8 +21,10 @@ struct keys {
 static void find_step(struct keys *keys, const struct psr_mesh *mesh)
 {
 	double most = 0;
+
 	for (int c = 0; c < 3; c++) {
 		double low = INFINITY, high = -INFINITY;
+
 		for (uint32_t v = 0; v < mesh->n_vertices; v++) {
 			if (!isfinite(mesh->position[v][c]))
 				continue;
@@ -40,6 +42,7 @@ static size_t key_of(const struct keys *keys, uint32_t v, uint8_t key[MAX_KEY])
 {
 	double position[3];
 	size_t n = sizeof position;
+
 	memcpy(position, import_column_at(&keys->column[0], v), sizeof position);
 	for (int c = 0; c < 3; c++) {
 		if (keys->step > 0)
@@ -61,6 +64,7 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum i
 	struct keys keys = { .step = 0 };
 	uint64_t n_slots = 16, mask;
 	uint32_t *slot, *first;
+
 	while (n_slots < 2 * (uint64_t)mesh->n_vertices)
 		n_slots *= 2;
 	mask = n_slots - 1;
@@ -81,6 +85,7 @@ int import_mesh_groups(uint32_t **first_of, const struct import_mesh *im, enum i
 		uint8_t key[MAX_KEY], other[MAX_KEY];
 		size_t n = key_of(&keys, v, key);
 		uint64_t at = XXH64(key, n, 0) & mask;
+
 		while (slot[at] != EMPTY) {
 			key_of(&keys, slot[at], other);
 			if (memcmp(key, other, n) == 0)
@@ -101,6 +106,7 @@ int import_mesh_weld(struct import_mesh *im, struct psr_error *err)
 	struct psr_mesh *mesh = im->mesh;
 	uint32_t *first;
 	int rc = import_mesh_groups(&first, im, IMPORT_SAME_ALL, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	for (uint32_t t = 0; t < mesh->n_triangles; t++)

@@ -72,6 +72,7 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks)
 {
 	const void *array;
+
 	memcpy(&array, (const char *)blocks + spec->pointer, sizeof array);
 	return array;
 }

@@ -138,6 +138,7 @@ static int read_all(int fd, uint8_t *bytes, size_t n_bytes, const char *name, st
 static int map_image(const uint8_t **out, int fd, size_t n_bytes, const char *name, struct psr_error *err)
 {
 	void *bytes = mmap(NULL, n_bytes, PROT_READ, MAP_PRIVATE, fd, 0);
+
 	if (bytes == MAP_FAILED)
 		return psr_fail(err, errno == ENOMEM ? PSR_ERR_MEMORY : PSR_ERR_IO, "%s: cannot map the file: %m", name);
 	*out = bytes;

@@ -295,6 +295,7 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	const void *camera = NULL, *light = NULL;
 	struct reader r = { .bytes = bytes, .n_bytes = n_bytes, .name = name, .err = err };
 	int code;
+
 	assert((uintptr_t)bytes % FILE_ALIGNMENT == 0);
 	if (n_bytes < FILE_HEADER_BYTES) {
 		if (memcmp(bytes, FILE_MAGIC, n_bytes < 8 ? n_bytes : 8) != 0)

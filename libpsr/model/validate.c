@@ -243,6 +243,7 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 	};
 	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;
+
 	for (size_t i = 0; i < sizeof checks / sizeof checks[0] && code == PSR_OK; i++)
 		code = checks[i](&c);
 	return code;

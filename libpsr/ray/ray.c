@@ -269,6 +269,7 @@ void ray_scene_occluded(const struct ray_scene *scene, const struct ray *ray, in
 {
 	for (int i = 0; i < n; i += RAY_PACKET) {
 		int part = n - i < RAY_PACKET ? n - i : RAY_PACKET;
+
 		_Alignas(32) int valid[RAY_PACKET];
 		struct RTCRay8 rays;
 		struct ray_packet packet;

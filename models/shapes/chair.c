@@ -87,6 +87,7 @@ static void stretcher(struct shape *shape, const double a[3], const double b[3])
 
 	for (int i = 0; i <= 20; i++) {
 		double t = i / 20.0, swell = 4 * t * (1 - t);
+
 		for (int k = 0; k < 3; k++)
 			path[i][k] = a[k] + (b[k] - a[k]) * t;
 		radius[i] = 0.007 + 0.007 * swell * swell;
@@ -101,6 +102,7 @@ static void legs(struct shape *shape)
 
 	for (int i = 0; i < 4; i++) {
 		double x = i & 1 ? 1 : -1, z = i & 2 ? 1 : -1;
+
 		v3d_set(foot[i], 0.215 * x, 0, 0.225 * z);
 		v3d_set(top[i], 0.15 * x, SEAT_Y - 0.005, 0.135 * z);
 		leg(shape, foot[i], top[i]);
@@ -138,10 +140,12 @@ static void back(struct shape *shape)
 	sweep_tube(shape, (const double (*)[3])path, radius, 65, 24);
 	for (int i = 0; i < SPINDLES; i++) {
 		double along = 0.2 + 0.6 * (i + 0.5) / SPINDLES, foot[3], top[3], spindle[17][3], thick[17];
+
 		hoop_at(along, top);
 		v3d_set(foot, top[0] * 0.8, SEAT_Y, HOOP_Z - 0.005);
 		for (int j = 0; j <= 16; j++) {
 			double t = j / 16.0, swell = 4 * t * (1 - t);
+
 			for (int k = 0; k < 3; k++)
 				spindle[j][k] = foot[k] + (top[k] - foot[k]) * t;
 			thick[j] = 0.0038 + 0.0022 * swell * (1.4 - t);

@@ -53,6 +53,7 @@ static double girth(double t)
 	/* head and tail meet within the head */
 	if (blend <= 1) {
 		double neck = 0.27, tail = 0.17;
+
 		blend = blend * blend * (3 - 2 * blend);
 		return tail + (neck - tail) * blend;
 	}
@@ -83,11 +84,13 @@ static void skin(struct shape *shape)
 
 	for (uint32_t row = 0; row < ROWS; row++) {
 		double t = (double)row / ROWS, radius = girth(t);
+
 		knot_at(t, p, along, out);
 		v3d_cross(side, along, out);
 		for (uint32_t col = 0; col < COLS; col++) {
 			struct shape_vertex *v = &grid[row * COLS + col];
 			double r = radius * (0.95 + 0.11 * relief(row, col));
+
 			surface_turn(col, COLS, &c, &s);
 			v3d_add_scaled(v->p, p, r * c, out);
 			v3d_add_scaled(v->p, v->p, r * s, side);
@@ -108,6 +111,7 @@ static void crest(struct shape *shape)
 	shape->current = SPIKE;
 	for (uint32_t i = 5; i + 3 < SCALES_ALONG; i += 2) {
 		double t = (double)i / SCALES_ALONG, radius = girth(t);
+
 		knot_at(t, p, along, out);
 		v3d_add_scaled(foot, p, radius * 0.85, out);
 		v3d_add_scaled(tip, p, radius * 1.72, out);
@@ -138,6 +142,7 @@ static void head(struct shape *shape)
 		const double horn[3][3] = { { 0.17 * x, 0.28, 0.16 }, { 0.3 * x, 0.75, 0.35 }, { 0.28 * x, 0.8, 0.95 } };
 		const double whisker[3][3] = { { 0.16 * x, 0, -0.75 }, { 0.75 * x, 0.1, -0.8 }, { 0.95 * x, -0.2, -0.1 } };
 		double path[25][3], radius[25];
+
 		shape->current = EYE;
 		sweep_ball(shape, eye, eye_half, 20, 32);
 		shape->current = PUPIL;
@@ -148,6 +153,7 @@ static void head(struct shape *shape)
 		shape->current = HORN;
 		for (int i = 0; i <= 24; i++) {
 			double a = i / 24.0, b = 1 - a;
+
 			for (int k = 0; k < 3; k++)
 				path[i][k] = b * b * horn[0][k] + 2 * a * b * horn[1][k] + a * a * horn[2][k];
 			radius[i] = 0.085 * b;
@@ -157,6 +163,7 @@ static void head(struct shape *shape)
 		for (int i = 0; i < 5; i++) {
 			const double root[3] = { (0.2 - 0.022 * i * i * 0.4) * x, -0.02 + 0.012 * i, -0.36 - 0.1 * i };
 			const double tip[3] = { root[0] * 0.95, root[1] - 0.16 + 0.015 * i, root[2] - 0.02 };
+
 			sweep_cone(shape, root, 0.03, tip, 12);
 		}
 	}

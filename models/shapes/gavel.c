@@ -55,6 +55,7 @@ static void head(struct shape *shape)
 
 	for (size_t i = HALF; i-- > 0;) {
 		struct surface_profile *piece = &pieces[n++];
+
 		*piece = (struct surface_profile){ .from = 0, .to = 1, .steps = 14, .material = WALNUT };
 		for (int k = 0; k < 4; k++) {
 			piece->p[k][0] = half_head[i][3 - k][0];
@@ -66,6 +67,7 @@ static void head(struct shape *shape)
 	pieces[n++] = surface_line(0.25, 0.085, 0.235, 0.09, 1, BRASS);
 	for (size_t i = 0; i < HALF; i++) {
 		struct surface_profile *piece = &pieces[n++];
+
 		*piece = (struct surface_profile){ .from = 0, .to = 1, .steps = 14, .material = WALNUT };
 		for (int k = 0; k < 4; k++) {
 			piece->p[k][0] = half_head[i][k][0];

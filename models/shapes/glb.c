@@ -42,6 +42,7 @@ static int sorted_init(struct glb_sorted *sorted, const struct shape *shape)
 		for (uint32_t t = 0; t < shape->n_triangles; t++) {
 			for (int k = 0; k < 3 && group_of(shape, t) == g; k++) {
 				uint32_t v = shape->triangle[t][k];
+
 				if (number[v] == UINT32_MAX) {
 					number[v] = sorted->n_vertices - sorted->vertex_first[g];
 					sorted->vertex[sorted->n_vertices++] = v;

@@ -68,6 +68,7 @@ static void add_images(cJSON *root, const struct shape *shape)
 	images = cJSON_AddArrayToObject(root, "images");
 	for (uint32_t i = 0; i < shape->n_images; i++) {
 		cJSON *image = add_object(images);
+
 		cJSON_AddNumberToObject(add_object(textures), "source", i);
 		cJSON_AddNumberToObject(image, "bufferView", GLB_IMAGES + i);
 		cJSON_AddStringToObject(image, "mimeType", "image/png");
@@ -94,6 +95,7 @@ static void add_bounds(cJSON *accessor, const struct shape *shape, const uint32_
 		low[k] = high[k] = shape->position[vertex[0]][k];
 		for (uint32_t i = 1; i < n; i++) {
 			double x = shape->position[vertex[i]][k];
+
 			low[k] = x < low[k] ? x : low[k];
 			high[k] = x > high[k] ? x : high[k];
 		}
@@ -111,6 +113,7 @@ static void add_primitives(cJSON *primitives, cJSON *accessors, const struct sha
 		uint32_t first = sorted->vertex_first[group], n = sorted->vertex_first[group + 1] - first;
 		uint32_t index = sorted->index_first[group], n_indices = sorted->index_first[group + 1] - index;
 		int number = cJSON_GetArraySize(accessors), has_image = image_of(shape, m) >= 0;
+
 		if (n_indices == 0)
 			continue;
 		cJSON *position = add_accessor(accessors, GLB_POSITIONS, 12.0 * first, GLTF_FLOAT, n, "VEC3");
@@ -140,6 +143,7 @@ static void add_meshes(cJSON *root, const struct shape *shape, const struct glb_
 
 	for (uint32_t part = 0; part < shape->n_parts; part++) {
 		uint32_t first = part * shape->n_materials;
+
 		mesh[part] = -1;
 		if (sorted->index_first[first] == sorted->index_first[first + shape->n_materials])
 			continue;
@@ -165,6 +169,7 @@ static void add_nodes(cJSON *root, const struct shape *shape, const char *name, 
 		const struct shape_instance *instance = &shape->instance[i];
 		double columns[16] = { [15] = 1 };
 		cJSON *node = add_object(nodes);
+
 		for (int k = 0; k < 3; k++) {
 			for (int j = 0; j < 3; j++)
 				columns[4 * j + k] = instance->m[k][j];
@@ -184,6 +189,7 @@ static void add_views(cJSON *root, const struct shape *shape, const struct glb_l
 	for (uint32_t i = 0; i < layout->n_views; i++) {
 		uint32_t end = i + 1 < layout->n_views ? layout->start[i + 1] : layout->bytes;
 		cJSON *view = add_object(views);
+
 		cJSON_AddNumberToObject(view, "buffer", 0);
 		cJSON_AddNumberToObject(view, "byteOffset", layout->start[i]);
 		if (i < GLB_IMAGES) {

@@ -72,6 +72,7 @@ uint8_t *image_planks(uint32_t size, uint32_t wood, uint32_t seam, uint64_t seed
 		uint32_t x = i % size, plank = x * 4 / size, at = x - plank * size / 4;
 		double u = (double)x / size, v = (double)(i / size) / size;
 		double tone = 0.3 * lattice(seed, plank, 0) + 0.35 * noise(seed + 1, u, v, 64, 4);
+
 		put_color(rgb + 3 * i, wood, seam, at < size / 64 ? 1 : 0.5 * tone);
 	}
 	return rgb;
@@ -85,6 +86,7 @@ uint8_t *image_leaf(uint32_t size, uint32_t blade, uint32_t vein)
 		double u = fabs((i % size + 0.5) / size - 0.5), v = (i / size + 0.5) / size;
 		double side = 9 * (v - 0.7 * u), away = fabs(side - floor(side + 0.5)) / 9, rib = 0.022 * (1.2 - v);
 		double t = u < rib ? 1 : away < 0.008 * (1 - 1.6 * u) ? 0.6 : 0.15 * noise(3, u, v, 16, 16);
+
 		put_color(rgb + 3 * i, blade, vein, t);
 	}
 	return rgb;
@@ -146,6 +148,7 @@ static void put_rows(uint8_t *out, uint32_t size, const uint8_t *rgb)
 	for (uint32_t row = 0; row < size; row++) {
 		if (row % per_block == 0) {
 			uint32_t rows = size - row < per_block ? size - row : per_block, n = rows * row_bytes;
+
 			*out++ = row + rows == size;
 			*out++ = (uint8_t)n;
 			*out++ = (uint8_t)(n >> 8);

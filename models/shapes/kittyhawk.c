@@ -70,8 +70,10 @@ static void cell(struct shape *shape)
 
 	for (int i = 0; i <= BAYS; i++) {
 		double z = half * (2.0 * i / BAYS - 1), next = half * (2.0 * (i + 1) / BAYS - 1);
+
 		for (int row = 0; row < 2; row++) {
 			double x = row ? 0.8 : -0.55, sag = DROOP * (z / SPAN) * (z / SPAN) * 4;
+
 			rod(shape, SPRUCE, STRUT, x, low - sag, z, x, high + 0.04 - sag, z);
 			if (i == BAYS)
 				continue;
@@ -97,6 +99,7 @@ static void tail_and_canard(struct shape *shape)
 		rod(shape, SPRUCE, 0.014, 3.1, LOW_Y + 0.16, 0.8 * i, 3.1, LOW_Y + 0.99, 0.8 * i);
 	for (int side = -1; side <= 1; side += 2) {
 		const double rudder[3] = { -3.3, LOW_Y + 0.95, 0.28 * side };
+
 		shape->current = MUSLIN;
 		sweep_block(shape, rudder, rudder_half, 0.011);
 		rod(shape, SPRUCE, 0.018, -0.55, LOW_Y + 0.03, 0.28 * side, -3.3, LOW_Y + 0.5, 0.28 * side);
@@ -117,6 +120,7 @@ static void skids(struct shape *shape)
 	for (int side = -1; side <= 1; side += 2) {
 		const double runner[3][3] = { { -1.6, 0.03, 0.7 * side }, { 2.5, 0.03, 0.7 * side },
 			{ 3.3, LOW_Y + 0.6, 0.7 * side } };
+
 		shape->current = SPRUCE;
 		sweep_bend(shape, runner, 0.03, 48, 16);
 		rod(shape, SPRUCE, 0.018, -0.55, 0.04, 0.7 * side, -0.55, LOW_Y, 0.7 * side);
@@ -147,10 +151,12 @@ static void propellers(struct shape *shape)
 	for (int side = -1; side <= 1; side += 2) {
 		double y = LOW_Y + 0.95, z = 1.75 * side, c, s;
 		const double hub[3] = { -1.15, y, z };
+
 		sweep_angle(side > 0 ? 0.09 : -0.16, &c, &s);
 		for (int end = -1; end <= 1; end += 2) {
 			const double turn[3][3] = { { 1, 0, 0 }, { 0, end * c, -end * s }, { 0, end * s, end * c } };
 			uint32_t first = shape->n_vertices;
+
 			shape->current = SPRUCE;
 			sweep_surface(shape, blade_at, NULL, 60, 32, 1);
 			shape_move(shape, first, turn, hub);

@@ -44,6 +44,7 @@ static void make_outline(struct outline outline[AROUND])
 		surface_turn(face, 6, &c, &s);
 		for (int i = 0; i < FACE_STEPS; i++, o++) {
 			double t = half * (2.0 * i / FACE_STEPS - 1);
+
 			o->p[0] = APOTHEM * c - t * s;
 			o->p[1] = APOTHEM * s + t * c;
 			o->n[0] = c;
@@ -81,6 +82,7 @@ static void cone(struct shape *shape, const struct outline outline[AROUND], doub
 			const struct outline *o = &outline[i];
 			double end = to > 0 ? to : o->r, r = row == rows ? end : from + (end - from) * row / rows;
 			double dir[2] = { o->p[0] / o->r, o->p[1] / o->r }, p[2] = { r * dir[0], r * dir[1] };
+
 			/* the outline's own places, which the body shares */
 			if (row == rows && to == 0) {
 				p[0] = o->p[0];
@@ -102,6 +104,7 @@ static void sharpened_body(struct shape *shape, const struct outline outline[ARO
 	for (int i = 0; i < AROUND; i++) {
 		const struct outline *o = &outline[i];
 		double dir[2] = { o->p[0] / o->r, o->p[1] / o->r }, p[2] = { POINT * dir[0], POINT * dir[1] };
+
 		set(&grid[i], origin, POINT / TAPER * 0.75, 0, -1, 0);
 		set(&grid[AROUND + i], p, POINT / TAPER, dir[0], -TAPER, dir[1]);
 	}
@@ -114,6 +117,7 @@ static void sharpened_body(struct shape *shape, const struct outline outline[ARO
 		for (int i = 0; i < AROUND; i++) {
 			const struct outline *o = &outline[i];
 			double start = o->r / TAPER, y = row == BODY_ROWS ? BODY : start + (BODY - start) * row / BODY_ROWS;
+
 			set(&grid[row * AROUND + (uint32_t)i], o->p, y, o->n[0], 0, o->n[1]);
 		}
 	}

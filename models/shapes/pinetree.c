@@ -36,6 +36,7 @@ static uint32_t twig_part(struct shape *shape, uint64_t seed, uint32_t needles)
 	for (int i = 0; i < NEEDLES; i++) {
 		double at = 0.06 + 0.92 * i / (NEEDLES - 1), c, s, length = random_in(&random, 0.26, 0.36) * (1.15 - 0.5 * at);
 		double lean = random_in(&random, 0.55, 0.85) + 0.5 * at;
+
 		sweep_angle(0.38196601125 * i + random_in(&random, -0.04, 0.04), &c, &s);
 		const double foot[3] = { 0.008 * c, at, -0.008 * s };
 		const double point[3] = { foot[0] + length * c, at + length * lean, foot[2] - length * s };
@@ -84,6 +85,7 @@ static void branch(struct shape *shape, double height, double length, double tur
 	sweep_angle(turn, &c, &s);
 	for (int i = 0; i <= 12; i++) {
 		double t = i / 12.0, sag = rise * t - 0.42 * t * t + 0.2 * t * t * t * t;
+
 		v3d_set(path[i], length * t * c, height + length * sag, -length * t * s);
 		radius[i] = (0.009 + 0.016 * length) * (1 - t);
 	}
@@ -94,6 +96,7 @@ static void branch(struct shape *shape, double height, double length, double tur
 		int k = (int)x, side = i & 1 ? 1 : -1;
 		double spread = i == n - 1 ? 0 : random_in(random, 0.6, 1.0) * side,
 			size = random_in(random, 0.3, 0.42) * (1.1 - 0.35 * t);
+
 		size *= 0.3 + 0.7 * (length < 0.8 ? length / 0.8 : 1);
 		for (int j = 0; j < 3; j++)
 			at[j] = path[k][j] + (path[k + 1][j] - path[k][j]) * rest;
@@ -116,6 +119,7 @@ void make_pinetree(struct shape *shape)
 	sweep_ball(shape, mound, mound_half, 20, 48);
 	for (int i = 0; i <= 24; i++) {
 		double t = i / 24.0;
+
 		v3d_set(path[i], 0.03 * (1 - t) * t * 4 - 0.02 * t * t, HEIGHT * t, 0.02 * t * (1 - t));
 		radius[i] = 0.13 * (1 - t) + 0.06 * (1 - t) * (1 - t) * (1 - t) * (1 - t) * (1 - t) * (1 - t);
 	}
@@ -129,8 +133,10 @@ void make_pinetree(struct shape *shape)
 			length = 1.85 * (1 - t) * (1 - 0.15 * t) + 0.06;
 		int n = 7 - (int)(2.5 * t);
 		double start = random_in(&random, 0, 1);
+
 		for (int j = 0; j < n; j++) {
 			double reach = length * random_in(&random, 0.85, 1.1), off = random_in(&random, -0.03, 0.03);
+
 			branch(shape, height + random_in(&random, -0.06, 0.06), reach, start + (double)j / n + off, &parts,
 			       &random);
 		}

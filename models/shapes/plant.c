@@ -79,6 +79,7 @@ static uint32_t blossom_part(struct shape *shape)
 
 	for (uint32_t i = 0; i < 5; i++) {
 		uint32_t first = shape->n_vertices;
+
 		surface_turn(i, 5, &c, &s);
 		const double turn[3][3] = { { c, 0, s }, { 0, 1, 0 }, { -s, 0, c } };
 		shape->current = PETAL;
@@ -114,6 +115,7 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 	sweep_angle(turn, &c, &s);
 	for (int i = 0; i <= 20; i++) {
 		double t = i / 20.0;
+
 		v3d_set(path[i], (0.08 + reach * t * t) * c, SOIL + height * t * (1 - 0.25 * t * reach),
 		        -(0.08 + reach * t * t) * s);
 		radius[i] = 0.014 * (1 - 0.75 * t);
@@ -124,6 +126,7 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 		int at = 20 - i * 3;
 		double out[3], leaf_turn = turn + (i == 0 ? 0 : 0.38196601125 * i + random_in(random, -0.05, 0.05));
 		double rise = i == 0 ? 0.25 : random_in(random, -0.1, 0.3);
+
 		sweep_angle(leaf_turn, &c, &s);
 		v3d_set(out, c, rise, -s);
 		v3d_normalize(out, out);
@@ -135,6 +138,7 @@ static void stem(struct shape *shape, uint32_t number, const uint32_t leaf[3], u
 		const double stalk[3][3] = { { x, y, z }, { x, y + 0.12, z }, { x, y + 0.24, z } };
 		const double tilt[3] = { 0.95, random_in(random, -0.3, 0.3), 0.1 };
 		double out[3];
+
 		v3d_normalize(out, tilt);
 		sweep_bend(shape, stalk, 0.006, 12, 8);
 		place(shape, blossom, stalk[2], out, 0.13);

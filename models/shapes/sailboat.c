@@ -83,6 +83,7 @@ static void hull(struct shape *shape)
 	for (uint32_t i = 0; i < (ALONG + 1) * (ACROSS + 1); i++) {
 		uint32_t j = i % (ACROSS + 1);
 		double along = (double)(i / (ACROSS + 1)) / ALONG;
+
 		hull_at((double)j / ACROSS, along, grid[i].p);
 		/* the deck's rows run the other way, so that its outside is up */
 		deck_at(ACROSS - j, along, deck[i].p);
@@ -134,6 +135,7 @@ static void fittings(struct shape *shape)
 	shape->current = GLASS;
 	for (int i = 0; i < 6; i++) {
 		const double at[3] = { -0.15 + 0.45 * (i % 3), 0.88, i < 3 ? 0.545 : -0.545 }, half[3] = { 0.13, 0.07, 0.045 };
+
 		sweep_block(shape, at, half, 0.03);
 	}
 }
@@ -208,6 +210,7 @@ static void sails(struct shape *shape)
 
 	for (int i = 0; i < 5; i++) {
 		const struct strip strip = { &main, cut[i], cut[i + 1] };
+
 		shape->current = i & 1 ? TRIM : SAIL;
 		sweep_surface(shape, strip_at, &strip, (uint32_t)(100 * (strip.to - strip.from)), 48, 0);
 	}

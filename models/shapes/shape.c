@@ -56,6 +56,7 @@ uint32_t shape_material(struct shape *shape, const struct shape_material *materi
 {
 	if (shape->n_materials == shape->material_room) {
 		uint32_t room = shape->material_room * 2 + 8;
+
 		if (shape->failed || !grow(shape, &shape->material, room, sizeof *shape->material))
 			return 0;
 		shape->material_room = room;
@@ -98,6 +99,7 @@ void shape_place(struct shape *shape, uint32_t part, const double m[3][3], const
 	assert(part < shape->n_parts);
 	if (shape->n_instances == shape->instance_room) {
 		uint32_t room = shape->instance_room * 2 + 64;
+
 		if (shape->failed || !grow(shape, &shape->instance, room, sizeof *shape->instance))
 			return;
 		shape->instance_room = room;
@@ -126,6 +128,7 @@ uint32_t shape_vertex(struct shape *shape, const struct shape_vertex *vertex)
 {
 	if (shape->n_vertices == shape->vertex_room) {
 		uint32_t room = shape->vertex_room * 2 + 1024;
+
 		if (shape->failed || !grow(shape, &shape->position, room, sizeof *shape->position) ||
 		    !grow(shape, &shape->normal, room, sizeof *shape->normal) ||
 		    !grow(shape, &shape->uv, room, sizeof *shape->uv))
@@ -155,6 +158,7 @@ void shape_triangle(struct shape *shape, uint32_t a, uint32_t b, uint32_t c)
 		return;
 	if (i == shape->triangle_room) {
 		uint32_t room = shape->triangle_room * 2 + 1024;
+
 		if (!grow(shape, &shape->triangle, room, sizeof *shape->triangle) ||
 		    !grow(shape, &shape->triangle_material, room, sizeof *shape->triangle_material) ||
 		    !grow(shape, &shape->triangle_part, room, sizeof *shape->triangle_part))
@@ -189,8 +193,10 @@ void shape_grid(struct shape *shape, const struct shape_vertex *grid, uint32_t n
 	for (uint32_t row = 0; row < quad_rows; row++) {
 		uint32_t low = first + row * n_cols;
 		uint32_t high = first + (row + 1) % n_rows * n_cols;
+
 		for (uint32_t col = 0; col < quad_cols; col++) {
 			uint32_t next = (col + 1) % n_cols;
+
 			shape_triangle(shape, low + col, low + next, high + next);
 			shape_triangle(shape, low + col, high + next, high + col);
 		}

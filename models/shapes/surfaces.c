@@ -36,6 +36,7 @@ static void bezier(const double *const control[4], int dim, double s, double t, 
 
 	for (int k = 0; k < dim; k++) {
 		double p0 = control[0][k], p1 = control[1][k], p2 = control[2][k], p3 = control[3][k];
+
 		point[k] = (b0 * p0 + b3 * p3) + (b1 * p1 + b2 * p2);
 		if (slope != NULL)
 			slope[k] = 3 * ((s * s * (p1 - p0) + t * t * (p3 - p2)) + 2 * (s * t) * (p2 - p1));
@@ -54,6 +55,7 @@ struct surface_profile surface_line(double r0, double y0, double r1, double y1, 
 		       { r1 - (r1 - r0) / 3, y1 - (y1 - y0) / 3 }, { r1, y1 } },
 		.from = 0, .to = 1, .steps = steps, .material = material,
 	};
+
 	return line;
 }
 
@@ -63,6 +65,7 @@ static void profile_slope(const struct surface_profile *piece, double t, double 
 	for (int k = 1; k < 4 && slope[0] == 0 && slope[1] == 0; k++) {
 		const double *a = t < 0.5 ? piece->p[0] : piece->p[3 - k];
 		const double *b = t < 0.5 ? piece->p[k] : piece->p[3];
+
 		slope[0] = b[0] - a[0];
 		slope[1] = b[1] - a[1];
 	}
@@ -76,6 +79,7 @@ static void lathe_piece(struct shape *shape, const struct surface_profile *piece
 
 	for (uint32_t row = 0; row <= piece->steps; row++) {
 		double t = row == piece->steps ? piece->to : piece->from + (piece->to - piece->from) * row / piece->steps;
+
 		bezier(control, 2, 1 - t, t, point, slope);
 		profile_slope(piece, t, slope);
 		for (uint32_t col = 0; col < n; col++, v++) {
@@ -92,6 +96,7 @@ void surface_lathe(struct shape *shape, const struct surface_profile *pieces, ui
 {
 	for (uint32_t i = 0; i < n_pieces; i++) {
 		struct shape_vertex *grid = shape_grid_alloc(shape, pieces[i].steps + 1, n);
+
 		if (grid == NULL)
 			return;
 		lathe_piece(shape, &pieces[i], n, grid);
@@ -165,6 +170,7 @@ static void patch_side(const double control[4][4][3], int along_rows, uint32_t i
 			along_rows ? control[0][k] : control[k][0], along_rows ? control[1][k] : control[k][1],
 			along_rows ? control[2][k] : control[k][2], along_rows ? control[3][k] : control[k][3],
 		};
+
 		surface_bezier(c, 3, i, n, point[k], slope[k]);
 	}
 }

@@ -73,9 +73,11 @@ void sweep_normals(struct shape_vertex *grid, uint32_t n_rows, uint32_t n_cols, 
 		v3d_set(grid[i].n, 0, 0, 0);
 	for (uint32_t i = 0; i + !wrap_rows < n_rows; i++) {
 		struct shape_vertex *low = grid + (size_t)i * n_cols, *high = grid + (size_t)((i + 1) % n_rows) * n_cols;
+
 		for (uint32_t j = 0; j + !wrap_cols < n_cols; j++) {
 			uint32_t next = (j + 1) % n_cols;
 			double rising[3], falling[3], n[3];
+
 			v3d_sub(rising, high[next].p, low[j].p);
 			v3d_sub(falling, high[j].p, low[next].p);
 			v3d_cross(n, rising, falling);
@@ -200,6 +202,7 @@ void sweep_bend(struct shape *shape, const double curve[3][3], double radius, ui
 	assert(n >= 2 && n <= 64);
 	for (uint32_t i = 0; i < n; i++) {
 		double t = (double)i / (n - 1), s = 1 - t;
+
 		for (int k = 0; k < 3; k++)
 			path[i][k] = s * s * curve[0][k] + 2 * s * t * curve[1][k] + t * t * curve[2][k];
 		radii[i] = radius;
@@ -221,6 +224,7 @@ void sweep_block(struct shape *shape, const double center[3], const double half[
 		uint32_t row = i / COLS, col = i % COLS, octant = col / (STEPS + 1), high = row > STEPS;
 		uint32_t step = high ? row - STEPS - 1 : STEPS - row;
 		struct shape_vertex *v = &grid[i];
+
 		surface_turn(octant * STEPS + col % (STEPS + 1), 4 * STEPS, &c, &s);
 		surface_turn(step, 4 * STEPS, &across, &up);
 		v3d_set(v->n, across * c, high ? up : -up, -across * s);
@@ -232,6 +236,7 @@ void sweep_block(struct shape *shape, const double center[3], const double half[
 	shape_grid(shape, grid, ROWS, COLS, 0, 1);
 	for (uint32_t row = 0; row < ROWS; row += ROWS - 1) {
 		uint32_t corner[4];
+
 		for (uint32_t k = 0; k < 4; k++)
 			corner[k] = first + row * COLS + (row ? k : 3 - k) * (STEPS + 1);
 		shape_triangle(shape, corner[0], corner[1], corner[2]);

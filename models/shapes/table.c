@@ -38,6 +38,7 @@ static void frame(struct shape *shape)
 	for (int side = -1; side <= 1; side += 2) {
 		const double along[3] = { 0, TOP_Y - THICK - 0.05, side * 0.35 }, along_half[3] = { 0.68, 0.052, 0.012 };
 		const double across[3] = { side * 0.72, TOP_Y - THICK - 0.05, 0 }, across_half[3] = { 0.012, 0.052, 0.31 };
+
 		sweep_block(shape, along, along_half, 0.003);
 		sweep_block(shape, across, across_half, 0.003);
 	}
@@ -80,6 +81,7 @@ static void cloth_at(double u, double v, double p[3], const void *context)
 		p[1] = TOP_Y + 0.003 - bend * (1 - c);
 	} else {
 		double drop = rest - quarter;
+
 		sweep_angle(2.5 * u, &fold_c, &fold_s);
 		p[0] = side * (half_top + bend + 0.09 * drop * (1 - fold_c) * 0.5);
 		p[1] = TOP_Y + 0.003 - bend - drop;
@@ -135,6 +137,7 @@ static void fruit(struct shape *shape)
 		double lean_x = random_in(&random, -0.4, 0.4), lean_z = random_in(&random, -0.4, 0.4);
 		double tip[3] = { center[0] + lean_x, center[1] + 1, center[2] + lean_z };
 		uint32_t first = shape->n_vertices;
+
 		if (i == 1 || i == 3) {
 			shape->current = ORANGE;
 			sweep_ball(shape, center, round, 24, 40);

@@ -70,6 +70,7 @@ static void mirrored(const uint8_t index[16], int sign_x, int sign_y, double con
 	for (int row = 0; row < 4; row++) {
 		for (int col = 0; col < 4; col++) {
 			const double *p = points[index[4 * row + (sign_x * sign_y > 0 ? col : 3 - col)]];
+
 			control[row][col][0] = sign_x * p[0];
 			control[row][col][1] = p[2];
 			control[row][col][2] = -sign_y * p[1];
@@ -97,12 +98,14 @@ static void groove(struct shape *shape)
 
 	for (int quarter = 0; quarter < 4; quarter++) {
 		int sign_x = quarter & 2 ? -1 : 1, sign_y = quarter & 1 ? -1 : 1;
+
 		mirrored(patches[0].index, sign_x, sign_y, rim);
 		mirrored(patches[4].index, sign_x, sign_y, lid);
 		for (int row = 0; row < 4; row++) {
 			for (int col = 0; col < 4; col++) {
 				for (int k = 0; k < 3; k++) {
 					double a = lid[3][col][k], b = rim[0][col][k];
+
 					ring[row][col][k] = row == 0 ? a : row == 3 ? b : a + (b - a) * row / 3;
 				}
 			}

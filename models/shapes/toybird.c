@@ -72,11 +72,13 @@ static void head(struct shape *shape)
 	for (int i = 0; i < 3; i++) {
 		const double at[3] = { 0.74 - 0.14 * i, 1.95 - 0.04 * i * i + 0.02 * i, 0 },
 			size[3] = { 0.085, 0.12 - 0.012 * i, 0.05 };
+
 		sweep_ball(shape, at, size, 20, 28);
 	}
 	for (int side = -1; side <= 1; side += 2) {
 		const double eye[3] = { 0.76, 1.71, side * 0.225 }, pupil[3] = { 0.785, 1.72, side * 0.272 };
 		static const double eye_half[3] = { 0.085, 0.085, 0.06 }, pupil_half[3] = { 0.045, 0.045, 0.055 };
+
 		shape->current = EYE;
 		sweep_ball(shape, eye, eye_half, 20, 28);
 		shape->current = PUPIL;
@@ -96,6 +98,7 @@ static void feathers(struct shape *shape)
 			const double to[3] = { at[0] - 0.9, at[1] + 0.32 - 0.16 * i, at[2] + side * 0.12 };
 			uint32_t first = shape->n_vertices;
 			double low[3] = { 0, half[1] * 0.8, 0 };
+
 			shape->current = i == 1 ? COMB : WING;
 			sweep_ball(shape, origin, half, 32, 40);
 			shape_shift(shape, first, low);
@@ -106,6 +109,7 @@ static void feathers(struct shape *shape)
 		static const double half[3] = { 0.035, 0.38, 0.1 }, low[3] = { 0, 0.3, 0 };
 		const double from[3] = { -0.62, 1.04, 0.03 * i }, to[3] = { -1.3, 1.35 + 0.1 * (i == 0), 0.28 * i };
 		uint32_t first = shape->n_vertices;
+
 		shape->current = i == 0 ? WING : BODY;
 		sweep_ball(shape, low, half, 32, 40);
 		sweep_along(shape, first, from, to);
@@ -131,6 +135,7 @@ static void cart(struct shape *shape)
 	for (int x = -1; x <= 1; x += 2) {
 		const double axle[2][3] = { { 0.55 * x, 0.24, -0.5 }, { 0.55 * x, 0.24, 0.5 } };
 		const double leg[2][3] = { { 0.12 * x + 0.05, 0.34, 0.16 * x }, { 0.06 * x + 0.05, 0.78, 0.12 * x } };
+
 		shape->current = HUB;
 		surface_rod(shape, axle[0], 0.028, axle[1], 0.028, 32);
 		shape->current = BEAK;
@@ -138,6 +143,7 @@ static void cart(struct shape *shape)
 		for (int z = -1; z <= 1; z += 2) {
 			const double from[3] = { 0.55 * x, 0.24, 0.43 * z }, to[3] = { 0.55 * x, 0.24, 0.43 * z + z };
 			uint32_t first = shape->n_vertices;
+
 			surface_lathe(shape, wheel, sizeof wheel / sizeof wheel[0], 64);
 			sweep_along(shape, first, from, to);
 		}
@@ -152,6 +158,7 @@ static void string(struct shape *shape)
 
 	for (int i = 0; i <= 48; i++) {
 		double t = i / 48.0, fall = t < 0.35 ? 1 - t / 0.35 : 0;
+
 		sweep_angle(0.85 * t, &c, &s);
 		v3d_set(path[i], 0.84 + 0.91 * t, 0.016 + 0.284 * fall * fall + 0.059 * t * t * t * t * t * t,
 		        0.38 * s * t * 0.8 + 0.9 * t * t * t);

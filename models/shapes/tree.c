@@ -75,6 +75,7 @@ static void grow(struct grower *g, const double a[3], const double axis[3], doub
 	for (int i = 0; i < n; i++) {
 		double at = depth == 0 ? 0.28 + 0.6 * i / (n - 1) : 0.3 + 0.62 * i / (n - 1), from[3], out[3], size;
 		double spread = random_in(&g->random, 0.6, 1.1) * (1.25 - 0.6 * at);
+
 		v3d_add_scaled(from, a, at * length, axis);
 		leave(out, axis, spread, turns + GOLDEN * i);
 		/* towards the light */
@@ -130,6 +131,7 @@ void make_tree(struct shape *shape)
 	}
 	for (int i = 0; i < 6; i++) {
 		double c, s;
+
 		sweep_angle((i + 0.3) / 6, &c, &s);
 		const double root[3] = { 0.06 * c, 0.5, 0.06 * s }, end[3] = { 0.75 * c, 0.03, 0.75 * s };
 		place_cone(shape, g.thick, root, end, 0.13);

@@ -114,6 +114,7 @@ static void reflectors(struct shape *shape)
 	for (int sign = -1; sign <= 1; sign += 2) {
 		const double move[3] = { sign * 0.66, 0, 0 };
 		uint32_t first = shape->n_vertices;
+
 		surface_box(shape, half);
 		shape_shift(shape, first, move);
 	}

@@ -27,6 +27,7 @@ static void multiply(matrix out, const matrix a, const struct aiMatrix4x4 *b)
 {
 	const double m[4][4] = { { b->a1, b->a2, b->a3, b->a4 }, { b->b1, b->b2, b->b3, b->b4 },
 		                 { b->c1, b->c2, b->c3, b->c4 }, { 0.0, 0.0, 0.0, 1.0 } };
+
 	for (int row = 0; row < 3; row++)
 		for (int col = 0; col < 4; col++) {
 			out[row][col] = col == 3 ? a[row][3] : 0.0;
@@ -39,9 +40,11 @@ static void multiply(matrix out, const matrix a, const struct aiMatrix4x4 *b)
 static int cofactors(double out[3][3], const matrix m)
 {
 	double determinant = 0.0;
+
 	for (int row = 0; row < 3; row++)
 		for (int col = 0; col < 3; col++) {
 			int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (col + 1) % 3, c2 = (col + 2) % 3;
+
 			out[row][col] = m[r1][c1] * m[r2][c2] - m[r1][c2] * m[r2][c1];
 		}
 	for (int col = 0; col < 3; col++)
@@ -67,6 +70,7 @@ struct target {
 static void position_of(double p[3], const struct target *t, unsigned from)
 {
 	const struct aiVector3D *v = &t->source->mVertices[from];
+
 	p[0] = v->x;
 	p[1] = v->y;
 	p[2] = v->z;
@@ -80,12 +84,14 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *
 	const struct aiMesh *source = t->source;
 	const double (*m)[4] = t->m;
 	double p[3];
+
 	position_of(p, t, from);
 	for (int row = 0; row < 3; row++)
 		mesh->position[to][row] = m[row][0] * p[0] + m[row][1] * p[1] + m[row][2] * p[2] + m[row][3];
 	if (t->with_normals) {
 		const double (*normals)[3] = (const double(*)[3])t->normals;
 		const struct aiVector3D *n = &source->mNormals[from];
+
 		for (int row = 0; row < 3; row++)
 			mesh->normal[to][row] =
 				(float)(normals[row][0] * n->x + normals[row][1] * n->y + normals[row][2] * n->z);
@@ -93,6 +99,7 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *
 	for (int set = 0; set < PSR_UV_SETS; set++)
 		if (t->uv_source[set] >= 0 && source->mTextureCoords[t->uv_source[set]] != NULL) {
 			const struct aiVector3D *uv = &source->mTextureCoords[t->uv_source[set]][from];
+
 			mesh->uv[set][to][0] = uv->x;
 			mesh->uv[set][to][1] = 1.0f - uv->y; /* Assimp's v points up */
 		}
@@ -108,9 +115,11 @@ static void put_vertex(struct psr_mesh *mesh, uint32_t to, const struct target *
 static uint64_t count_triangles(struct psr_mesh *mesh, const struct aiMesh *source, unsigned *most)
 {
 	uint64_t n = 0;
+
 	*most = 3;
 	for (unsigned f = 0; f < source->mNumFaces; f++) {
 		unsigned corners = source->mFaces[f].mNumIndices;
+
 		if (corners < 3)
 			mesh->n_dropped_primitives++;
 		else
@@ -125,12 +134,14 @@ static void add_face(struct psr_mesh *mesh, struct target *t, const struct aiFac
 {
 	double point[POLYGON_MAX_CLIP][3];
 	const unsigned n = face->mNumIndices;
+
 	for (unsigned i = 0; n > 3 && i < n && i < POLYGON_MAX_CLIP; i++)
 		position_of(point[i], t, face->mIndices[i]);
 	polygon_cut(t->cut, (const double(*)[3])point, n);
 	for (unsigned k = 0; k + 2 < n; k++) {
 		for (unsigned c = 0; c < 3; c++) {
 			unsigned from = face->mIndices[t->cut[k][t->flip ? 2 - c : c]];
+
 			/* Without normals, each corner is a vertex of its own until import_mesh_smooth. */
 			mesh->triangle[t->triangle][c] = t->with_normals ? t->first + from : t->vertex;
 			if (!t->with_normals)
@@ -151,6 +162,7 @@ static int add_mesh(struct walk *w, const struct aiMesh *source, const matrix m,
 	const uint64_t n = count_triangles(mesh, source, &most);
 	struct target t = { .source = source, .obj = &w->obj, .m = m };
 	int rc;
+
 	if (w->material[key] < 0)
 		w->material[key] = assimp_material(&w->io, key / 2, has_color, w->uv_source[key], err);
 	if (w->material[key] < 0)
@@ -198,6 +210,7 @@ static int add_node(struct walk *w, const struct aiNode *node, const matrix pare
 static int is_stl(const struct aiScene *scene)
 {
 	const struct aiMetadata *d = scene->mMetaData;
+
 	for (unsigned i = 0; d != NULL && i < d->mNumProperties; i++)
 		if (strcmp(d->mKeys[i].data, AI_METADATA_SOURCE_FORMAT) == 0 && d->mValues[i].mType == AI_AISTRING)
 			return strstr(((const struct aiString *)d->mValues[i].mData)->data, "Stereolithography") != NULL;
@@ -234,6 +247,7 @@ static int read_file(struct walk *w, struct psr_error *err)
 	const char *path = w->io.im->path;
 	char why[ASSIMP_WHY];
 	int rc;
+
 	w->io.scene = assimp_read(w->io.path, &w->io.io, why);
 	if (w->io.scene == NULL && strncmp(why, "No suitable reader", 18) == 0)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
@@ -251,6 +265,7 @@ static int read_file(struct walk *w, struct psr_error *err)
 static int read_obj(struct walk *w, struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
 	const int rc = obj_read_plain(im, bytes, n_bytes, err);
+
 	w->is_plain = rc == 1;
 	if (rc != 0)
 		return rc < 0 ? rc : PSR_OK;
@@ -261,6 +276,7 @@ int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, 
 {
 	struct walk w;
 	int rc = assimp_check_counts(im, bytes, n_bytes, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	memset(&w, 0, sizeof w);

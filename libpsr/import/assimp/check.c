@@ -41,6 +41,7 @@ static void skip_word(struct text *t)
 static int check_off(const struct import_mesh *im, struct text t, size_t n_bytes, struct psr_error *err)
 {
 	uint64_t n;
+
 	if (skip_blank(&t) && !isdigit(*t.at))
 		skip_word(&t);
 	for (int i = 0; i < 2 && next_number(&t, &n); i++)
@@ -56,6 +57,7 @@ static int is_off(const char *path, struct text t)
 {
 	const uint8_t *start;
 	size_t word;
+
 	if (import_path_ends_with(path, ".off"))
 		return 1;
 	if (!skip_blank(&t))
@@ -69,6 +71,7 @@ static int is_off(const char *path, struct text t)
 int assimp_check_counts(const struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 {
 	struct text t = { bytes, bytes + (n_bytes < MAX_HEADER ? n_bytes : MAX_HEADER) };
+
 	return is_off(im->path, t) ? check_off(im, t, n_bytes, err) : PSR_OK;
 }
 
@@ -76,6 +79,7 @@ int assimp_check_faces(const struct import_mesh *im, const struct aiScene *scene
 {
 	for (unsigned m = 0; m < scene->mNumMeshes; m++) {
 		const struct aiMesh *mesh = scene->mMeshes[m];
+
 		if (mesh == NULL || (mesh->mVertices == NULL && mesh->mNumVertices > 0) ||
 		    (mesh->mFaces == NULL && mesh->mNumFaces > 0))
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: mesh %u is empty", im->path, m);

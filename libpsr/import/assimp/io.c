@@ -16,6 +16,7 @@ static size_t on_read(struct aiFile *file, char *out, size_t size, size_t count)
 {
 	struct open_file *f = (struct open_file *)file;
 	size_t n = size > 0 ? (f->n_bytes - f->at) / size : 0;
+
 	if (n > count)
 		n = count;
 	if (n > 0)
@@ -44,6 +45,7 @@ static enum aiReturn on_seek(struct aiFile *file, size_t offset, enum aiOrigin o
 {
 	struct open_file *f = (struct open_file *)file;
 	size_t from = origin == aiOrigin_CUR ? f->at : origin == aiOrigin_END ? f->n_bytes : 0;
+
 	/* Negative offsets come as large unsigned ones; the sum wraps to the right place, or is out of range. */
 	if (from + offset > f->n_bytes)
 		return aiReturn_FAILURE;
@@ -68,6 +70,7 @@ static int open_named(struct open_file *f, struct assimp_io *io, const char *nam
 	struct psr_error error;
 	char *path;
 	int rc = import_path_inside(&path, io->folder, name, &error);
+
 	if (rc == PSR_OK) {
 		rc = infile_read(&f->owned, &f->n_bytes, path, IMPORT_MAX_FILE, &error);
 		free(path);
@@ -83,6 +86,7 @@ static struct aiFile *on_open(struct aiFileIO *aio, const char *name, const char
 {
 	struct assimp_io *io = (struct assimp_io *)aio;
 	struct open_file *f;
+
 	if (strchr(mode, 'w') != NULL || strchr(mode, 'a') != NULL || strchr(mode, '+') != NULL)
 		return NULL;
 	f = calloc(1, sizeof *f);
@@ -109,6 +113,7 @@ int assimp_io_init(struct assimp_io *io, struct import_mesh *im, const uint8_t *
 {
 	const char *slash = strrchr(im->path, '/');
 	int rc;
+
 	memset(io, 0, sizeof *io);
 	rc = import_path_folder(&io->folder, im->path, err);
 	if (rc != PSR_OK)

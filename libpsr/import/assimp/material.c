@@ -9,18 +9,21 @@
 float assimp_linear(float c)
 {
 	int code = c > 0.0f ? c < 1.0f ? (int)(c * 255.0f + 0.5f) : 255 : 0;
+
 	return psr_srgb_to_linear[code];
 }
 
 static int get_float(const struct aiMaterial *m, const char *key, float *x)
 {
 	unsigned n = 1;
+
 	return aiGetMaterialFloatArray(m, key, 0, 0, x, &n) == aiReturn_SUCCESS && n == 1 && isfinite(*x);
 }
 
 static int is_made_up(const struct aiMaterial *m)
 {
 	struct aiString name;
+
 	return aiGetMaterialString(m, AI_MATKEY_NAME, &name) != aiReturn_SUCCESS || name.length == 0 ||
 	       strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) == 0;
 }
@@ -30,6 +33,7 @@ static float roughness_of(const struct aiMaterial *m)
 {
 	struct aiColor4D specular;
 	float x;
+
 	if (get_float(m, "$mat.roughnessFactor", &x))
 		return x;
 	if (aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE_ROUGHNESS) > 0)
@@ -48,6 +52,7 @@ static void set_colors(struct psr_material *out, const struct aiMaterial *m, int
 	int mode = 0;
 	unsigned n = 1;
 	float x;
+
 	if (aiGetMaterialColor(m, AI_MATKEY_BASE_COLOR, &color) == aiReturn_SUCCESS) {
 		out->base_color[0] = color.r;
 		out->base_color[1] = color.g;
@@ -89,9 +94,11 @@ static int set_relief(struct psr_material *out, struct assimp_io *io, const stru
 {
 	static const enum aiTextureType types[] = { aiTextureType_NORMALS, aiTextureType_NORMAL_CAMERA,
 		                                    aiTextureType_HEIGHT };
+
 	for (size_t i = 0; i < sizeof types / sizeof types[0]; i++) {
 		struct psr_texture t = out->normal_texture;
 		int source[PSR_UV_SETS], rc;
+
 		memcpy(source, uv_source, sizeof source);
 		rc = assimp_texture(&t, io, m, types[i], source, err);
 		if (rc != PSR_OK)
@@ -112,6 +119,7 @@ static int set_emission(struct psr_material *out, struct assimp_io *io, const st
 {
 	struct aiColor4D color;
 	int rc;
+
 	if (aiGetMaterialColor(m, AI_MATKEY_COLOR_EMISSIVE, &color) == aiReturn_SUCCESS) {
 		out->emissive[0] = assimp_linear(color.r);
 		out->emissive[1] = assimp_linear(color.g);
@@ -135,6 +143,7 @@ static int set_base(struct psr_material *out, struct assimp_io *io, const struct
 	int rc = assimp_texture(&out->base_texture, io, m,
 	                        has_texture(m, aiTextureType_BASE_COLOR) ? aiTextureType_BASE_COLOR : aiTextureType_DIFFUSE,
 	                        uv_source, err);
+
 	if (rc == PSR_OK)
 		rc = assimp_texture(&opacity, io, m, aiTextureType_OPACITY, uv_source, err);
 	if (rc != PSR_OK)
@@ -153,6 +162,7 @@ static int set_textures(struct psr_material *out, struct assimp_io *io, const st
 {
 	struct psr_texture metallic = out->base_texture, roughness = out->base_texture;
 	int rc = set_base(out, io, m, uv_source, err);
+
 	if (rc != PSR_OK || out->unlit)
 		return rc;
 	rc = set_relief(out, io, m, uv_source, err);
@@ -173,6 +183,7 @@ int assimp_material(struct assimp_io *io, unsigned m, int has_color, int uv_sour
 	const struct aiScene *scene = io->scene;
 	struct psr_material out;
 	int rc;
+
 	psr_material_default(&out);
 	out.two_sided = 1; /* most formats do not tell, and viewers show both sides */
 	for (int set = 0; set < PSR_UV_SETS; set++)

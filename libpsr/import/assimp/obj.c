@@ -51,6 +51,7 @@ static int is_vertex(const uint8_t *at, const uint8_t *end)
 static int skip_continuation(const uint8_t **at, const uint8_t *end)
 {
 	const uint8_t *p = *at + 1;
+
 	if (**at != '\\' || p >= end || !is_end(*p))
 		return 0;
 	p += *p == '\r' && p + 1 < end && p[1] == '\n' ? 2 : 1;
@@ -61,6 +62,7 @@ static int skip_continuation(const uint8_t **at, const uint8_t *end)
 static int is_number(const struct word *word)
 {
 	const uint8_t c = word->at[0];
+
 	return (c >= '0' && c <= '9') || c == '-' || c == '+' || c == '.' ||
 	       (word->n >= 3 && (strncasecmp((const char *)word->at, "nan", 3) == 0 ||
 	                         strncasecmp((const char *)word->at, "inf", 3) == 0));
@@ -71,11 +73,13 @@ static unsigned take_words(struct word word[MAX_WORDS], struct reader *r)
 {
 	unsigned n = 0;
 	int is_over = 0;
+
 	while (is_blank(*r->at))
 		r->at++;
 	r->at++;
 	while (r->at < r->end && !is_end(*r->at)) {
 		struct word w = { r->at, 0 };
+
 		if (skip_continuation(&r->at, r->end)) {
 			r->line++;
 			continue;
@@ -86,6 +90,7 @@ static unsigned take_words(struct word word[MAX_WORDS], struct reader *r)
 		}
 		while (r->at < r->end && !is_end(*r->at) && !is_blank(*r->at) && *r->at != '#') {
 			const uint8_t *p = r->at;
+
 			if (w.n > 0 && skip_continuation(&p, r->end))
 				break;
 			r->at++;
@@ -105,6 +110,7 @@ static unsigned take_words(struct word word[MAX_WORDS], struct reader *r)
 static int read_number(double *x, const struct word *word, locale_t locale)
 {
 	uint8_t text[64];
+
 	if (import_number(x, word->at, word->n, locale))
 		return 1;
 	if (word->n > sizeof text)
@@ -119,6 +125,7 @@ static int put_vertex(struct reader *r, const struct word *word, unsigned n, str
 	struct obj *obj = r->obj;
 	const unsigned has_w = n == 4 || n == MAX_WORDS, first_color = 3 + has_w;
 	double *p = obj->position[obj->n], x[4] = { 0.0, 0.0, 0.0, 1.0 };
+
 	for (unsigned i = 0; i < 3 + has_w; i++)
 		if (!read_number(&x[i], &word[i], r->locale))
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %" PRIu64 ": \"%.*s\" is no number", r->path, r->line,
@@ -129,6 +136,7 @@ static int put_vertex(struct reader *r, const struct word *word, unsigned n, str
 	                               obj->n >> LOW_BITS);
 	for (unsigned i = first_color; n - first_color == 3 && i < n; i++) {
 		size_t length = word[i].n;
+
 		while (word[i].at[length - 1] == '\\') /* before the line's end it would join the next line */
 			length--;
 		obj->text[obj->n_text++] = ' ';
@@ -143,6 +151,7 @@ static int put_vertex(struct reader *r, const struct word *word, unsigned n, str
 static void copy_line(struct reader *r)
 {
 	const uint8_t *start = r->at;
+
 	while (r->at < r->end && !is_end(*r->at)) {
 		if (skip_continuation(&r->at, r->end))
 			r->line++;
@@ -158,10 +167,12 @@ static void copy_line(struct reader *r)
 static int read_lines(struct reader *r, struct psr_error *err)
 {
 	int rc = PSR_OK;
+
 	while (r->at < r->end && rc == PSR_OK) {
 		struct word word[MAX_WORDS];
 		const struct reader start = *r;
 		unsigned n;
+
 		if (is_vertex(r->at, r->end)) {
 			n = take_words(word, r);
 			if (n >= 3)
@@ -179,8 +190,10 @@ static uint64_t count_vertices(const uint8_t *bytes, size_t n_bytes)
 {
 	const uint8_t *end = bytes + n_bytes;
 	uint64_t n = 0;
+
 	for (const uint8_t *at = bytes; at < end; at++) {
 		const uint8_t *v = memchr(at, 'v', (size_t)(end - at));
+
 		if (v == NULL)
 			break;
 		at = v;
@@ -194,6 +207,7 @@ int obj_read(struct obj *obj, const char *path, const uint8_t *bytes, size_t n_b
 	const uint64_t most = count_vertices(bytes, n_bytes);
 	struct reader r = { .obj = obj, .path = path, .at = bytes, .end = bytes + n_bytes, .line = 1 };
 	int rc;
+
 	memset(obj, 0, sizeof *obj);
 	if (most > IMPORT_MAX_VERTICES)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: more than %" PRIu64 " vertices", path, IMPORT_MAX_VERTICES);
@@ -224,6 +238,7 @@ void obj_position(double out[3], const struct obj *obj, float x, float y)
 	const uint64_t i = x >= 0.0f && x < (float)most && y >= 0.0f && y < (float)most
 	                           ? (uint64_t)x | (uint64_t)y << LOW_BITS
 	                           : UINT64_MAX;
+
 	for (int c = 0; c < 3; c++)
 		out[c] = i < obj->n ? obj->position[i][c] : (double)NAN;
 }

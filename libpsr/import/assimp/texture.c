@@ -17,6 +17,7 @@ static int add_image(struct assimp_io *io, const uint8_t *bytes, size_t n_bytes,
 {
 	char place[PSR_ERROR_TEXT];
 	int rc;
+
 	if (!import_resize(&io->image_path, (uint64_t)io->im->mesh->n_images + 1, sizeof *io->image_path)) {
 		free(path);
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for an image", name);
@@ -43,6 +44,7 @@ static int add_embedded(struct assimp_io *io, const char *name, struct psr_error
 	const struct aiScene *scene = io->scene;
 	unsigned long i = strtoul(name + 1, NULL, 10);
 	int image = find_image(io, name);
+
 	if (image >= 0)
 		return image;
 	if (i >= scene->mNumTextures || scene->mTextures[i]->mHeight != 0) {
@@ -58,6 +60,7 @@ static int find_texture(char **path, const struct assimp_io *io, char *name, str
 {
 	char *base;
 	int rc;
+
 	for (char *c = name; *c != '\0'; c++)
 		if (*c == '\\')
 			*c = '/';
@@ -75,6 +78,7 @@ static int find_or_add(struct assimp_io *io, struct aiString *name, struct psr_e
 	uint8_t *bytes;
 	size_t n_bytes;
 	int rc;
+
 	if (name->data[0] == '*')
 		return add_embedded(io, name->data, err);
 	if (find_texture(&path, io, name->data, err) != PSR_OK) {
@@ -105,6 +109,7 @@ static int take_set(int source[PSR_UV_SETS], int n)
 			return set;
 	for (int k = 0; k < PSR_UV_SETS; k++) {
 		int set = n < PSR_UV_SETS ? (n + k) % PSR_UV_SETS : k;
+
 		if (source[set] < 0) {
 			source[set] = n;
 			return set;
@@ -118,6 +123,7 @@ static void set_transform(struct psr_texture *out, struct assimp_io *io, const s
                           enum aiTextureType type)
 {
 	struct aiUVTransform t;
+
 	if (aiGetMaterialUVTransform(m, AI_MATKEY_UVTRANSFORM(type, 0), &t) != aiReturn_SUCCESS)
 		return;
 	if (t.mRotation != 0.0f)
@@ -136,6 +142,7 @@ int assimp_texture(struct psr_texture *out, struct assimp_io *io, const struct a
 	struct aiString name;
 	unsigned set = 0;
 	int image;
+
 	if (aiGetMaterialTexture(m, type, 0, &name, &mapping, &set, NULL, NULL, mode, NULL) != aiReturn_SUCCESS ||
 	    name.length == 0)
 		return PSR_OK;
@@ -169,6 +176,7 @@ static int add_made(struct assimp_io *io, int a, int b, const char *kind,
 	struct psr_image image;
 	char key[64], *copy;
 	int rc;
+
 	snprintf(key, sizeof key, "%s of %d and %d", kind, a, b); /* paths begin with a slash or a star */
 	rc = find_image(io, key);
 	if (rc >= 0)
@@ -191,6 +199,7 @@ int assimp_opacity(struct psr_material *out, struct assimp_io *io, const struct 
                    struct psr_error *err)
 {
 	int base = out->base_texture.image, image;
+
 	if (base >= 0 && opacity->uv_set != out->base_texture.uv_set) {
 		import_mesh_warn(io->im, "an opacity map with coordinates of its own was left out");
 		return PSR_OK;
@@ -209,6 +218,7 @@ int assimp_metallic_roughness(struct psr_material *out, struct assimp_io *io, co
                               const struct psr_texture *roughness, struct psr_error *err)
 {
 	int image, metal = metallic->image;
+
 	if (metal < 0 && roughness->image < 0)
 		return PSR_OK;
 	if (metal >= 0 && roughness->image >= 0 && metallic->uv_set != roughness->uv_set) {

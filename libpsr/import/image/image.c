@@ -20,6 +20,7 @@ static const char *format_of(const uint8_t *bytes, size_t n_bytes, const char *n
 {
 	for (size_t i = 0; i < sizeof magics / sizeof magics[0]; i++) {
 		const struct magic *m = &magics[i];
+
 		if (n_bytes >= m->offset + m->n && memcmp(bytes + m->offset, m->bytes, m->n) == 0)
 			return m->format;
 	}
@@ -36,6 +37,7 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
 	uint32_t size[2];
 	uint8_t *rgba;
 	int rc;
+
 	if (format == NULL)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "%s: not an image in a supported format (PNG, JPEG, WebP, TIFF, TGA, ...)", name);

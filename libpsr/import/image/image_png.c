@@ -25,6 +25,7 @@ static void on_warning(png_structp png, png_const_charp message)
 static void on_read(png_structp png, png_bytep data, size_t n)
 {
 	struct source *source = png_get_io_ptr(png);
+
 	if (n > source->n_left)
 		png_error(png, "cut");
 	memcpy(data, source->bytes, n);
@@ -36,6 +37,7 @@ static int is_plain(png_structp png, png_infop info, uint64_t max_pixels)
 {
 	const uint32_t width = png_get_image_width(png, info), height = png_get_image_height(png, info);
 	const int kind = png_get_color_type(png, info);
+
 	return png_get_bit_depth(png, info) == 8 && (kind == PNG_COLOR_TYPE_RGB || kind == PNG_COLOR_TYPE_RGB_ALPHA) &&
 	       png_get_interlace_type(png, info) == PNG_INTERLACE_NONE && !png_get_valid(png, info, PNG_INFO_tRNS) &&
 	       width <= IMPORT_MAX_IMAGE_SIDE && height <= IMPORT_MAX_IMAGE_SIDE && (uint64_t)width * height <= max_pixels;
@@ -71,6 +73,7 @@ int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n
 	png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, NULL, on_error, on_warning);
 	png_infop info = png != NULL ? png_create_info_struct(png) : NULL;
 	int is_read = info != NULL && read_plain(&image, png, info, &source, max_pixels);
+
 	png_destroy_read_struct(&png, &info, NULL);
 	if (is_read)
 		*out = image;

@@ -22,6 +22,7 @@ static void put_vertex(const struct target *t, uint32_t to, uint32_t from, const
 {
 	struct psr_mesh *mesh = t->im->mesh;
 	const struct ply_vertices *v = t->vertices;
+
 	memcpy(mesh->position[to], v->position[from], sizeof v->position[from]);
 	if (v->normal != NULL)
 		memcpy(mesh->normal[to], v->normal[from], sizeof v->normal[from]);
@@ -63,8 +64,10 @@ static void put_triangle(const struct target *t, uint32_t to, uint32_t first_ver
                          const double *uv)
 {
 	struct psr_mesh *mesh = t->im->mesh;
+
 	for (unsigned c = 0; c < 3; c++) {
 		uint32_t from = t->corner[cut[c]];
+
 		mesh->triangle[to][c] = t->is_shared ? t->first + from : first_vertex + c;
 		if (!t->is_shared)
 			put_vertex(t, first_vertex + c, from, uv != NULL ? uv + 2 * (size_t)cut[c] : NULL);
@@ -78,6 +81,7 @@ static int put_polygon(struct target *t, uint32_t n, const double *uv, struct ps
 	const uint32_t first_triangle = t->im->mesh->n_triangles, first_vertex = t->im->mesh->n_vertices;
 	double point[POLYGON_MAX_CLIP][3];
 	int rc;
+
 	rc = import_mesh_grow(t->im, t->is_shared ? 0 : 3 * ((uint64_t)n - 2), (uint64_t)n - 2, t->has, err);
 	if (rc != PSR_OK)
 		return rc;
@@ -94,6 +98,7 @@ static int target_init(struct target *t, struct import_mesh *im, struct ply_rows
 {
 	const struct ply_list *uv = &rows->list[PLY_LIST_UV];
 	int rc = PSR_OK;
+
 	memset(t, 0, sizeof *t);
 	t->im = im;
 	t->rows = rows;
@@ -122,6 +127,7 @@ static void target_fini(struct target *t)
 static int find_list(struct ply_rows *rows, int which, const char *const *names, struct psr_error *err)
 {
 	const int at = ply_find_property(rows->header, rows->element, names);
+
 	if (at >= 0 && rows->header->property[rows->element->first_property + (unsigned)at].count_type != PLY_NO_TYPE)
 		rows->list[which].property = at;
 	else if (which == PLY_LIST_INDEX)
@@ -134,6 +140,7 @@ static int read_face(struct target *t, struct psr_error *err)
 {
 	const struct ply_list *index = &t->rows->list[PLY_LIST_INDEX], *uv = &t->rows->list[PLY_LIST_UV];
 	int rc;
+
 	if (index->n > IMPORT_MAX_TRIANGLES)
 		return psr_fail(err, PSR_ERR_LIMIT, "%s: a face of more than %llu corners", t->im->path,
 		                (unsigned long long)IMPORT_MAX_TRIANGLES);
@@ -160,6 +167,7 @@ int ply_faces_read(struct import_mesh *im, struct ply_rows *rows, const struct p
 	const uint32_t dropped = im->mesh->n_dropped_primitives;
 	struct target t;
 	int rc = find_list(rows, PLY_LIST_INDEX, index_names, err);
+
 	if (rc == PSR_OK)
 		rc = find_list(rows, PLY_LIST_UV, uv_names, err);
 	if (rc != PSR_OK)
@@ -185,9 +193,11 @@ static int read_strip(struct target *t, struct psr_error *err)
 	const struct ply_list *index = &t->rows->list[PLY_LIST_INDEX];
 	uint64_t length = 0;
 	int rc;
+
 	for (uint64_t i = 0; i < index->n; i++) {
 		struct psr_mesh *mesh = t->im->mesh;
 		uint32_t *v = t->corner;
+
 		if (index->item[i] == -1.0) {
 			length = 0;
 			continue;
@@ -212,6 +222,7 @@ int ply_strips_read(struct import_mesh *im, struct ply_rows *rows, const struct 
 {
 	struct target t;
 	int rc = find_list(rows, PLY_LIST_INDEX, index_names, err);
+
 	if (rc != PSR_OK)
 		return rc;
 	rc = target_init(&t, im, rows, vertices, material, err);

@@ -29,6 +29,7 @@ int ply_name_is(const struct ply_name *name, const char *text)
 size_t ply_type_size(enum ply_type type)
 {
 	static const size_t size[] = { 0, 1, 1, 2, 2, 4, 4, 4, 8 };
+
 	return size[type];
 }
 
@@ -46,6 +47,7 @@ static int is_blank(uint8_t c)
 static int next_line(struct text *t, struct line *line)
 {
 	const uint8_t *p = t->at, *end;
+
 	while (p < t->end && *p != '\n' && *p != '\r')
 		p++;
 	if (p == t->end)
@@ -57,6 +59,7 @@ static int next_line(struct text *t, struct line *line)
 	line->n_words = 0;
 	for (const uint8_t *q = t->at; q < end;) {
 		const uint8_t *word;
+
 		while (q < end && is_blank(*q))
 			q++;
 		for (word = q; q < end && !is_blank(*q);)
@@ -122,6 +125,7 @@ static int read_format(struct ply_header *h, const struct text *t, const struct 
 static int read_element(struct ply_header *h, const struct text *t, const struct line *l, struct psr_error *err)
 {
 	struct ply_element *e = &h->element[h->n_elements];
+
 	if (h->n_elements == PLY_MAX_ELEMENTS)
 		return fail(t, err, PSR_ERR_LIMIT, "more than %d elements", PLY_MAX_ELEMENTS);
 	if (l->n_words != 3 || !parse_count(&l->word[2], &e->n_rows))
@@ -143,6 +147,7 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 	const unsigned n_words = is_list ? 5 : 3;
 	struct ply_property *p = &h->property[h->n_properties];
 	struct ply_element *e;
+
 	if (h->n_elements == 0)
 		return fail(t, err, PSR_ERR_FORMAT, "a property before any element");
 	if (h->n_properties == PLY_MAX_PROPERTIES)
@@ -172,8 +177,10 @@ static int read_property(struct ply_header *h, const struct text *t, const struc
 static uint64_t least_row(const struct ply_header *h, const struct ply_element *e)
 {
 	uint64_t n = 0;
+
 	for (unsigned i = e->first_property; i < e->first_property + e->n_properties; i++) {
 		const struct ply_property *p = &h->property[i];
+
 		n += h->format == PLY_ASCII ? 2 : ply_type_size(p->count_type != PLY_NO_TYPE ? p->count_type : p->type);
 	}
 	return n;
@@ -183,9 +190,11 @@ static uint64_t least_row(const struct ply_header *h, const struct ply_element *
 static int check_counts(const struct ply_header *h, const char *path, size_t n_bytes, struct psr_error *err)
 {
 	uint64_t left = n_bytes - h->body + (h->format == PLY_ASCII);
+
 	for (unsigned i = 0; i < h->n_elements; i++) {
 		const struct ply_element *e = &h->element[i];
 		uint64_t least = least_row(h, e);
+
 		if (least == 0)
 			continue;
 		if (e->n_rows > left / least)
@@ -227,6 +236,7 @@ int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes
 	struct text t = { path, bytes, bytes + n_bytes, 0, 0 };
 	struct line l;
 	int rc;
+
 	memset(h, 0, sizeof *h);
 	if (!next_line(&t, &l) || l.n_words != 1 || !ply_name_is(&l.word[0], "ply"))
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: does not begin with a line \"ply\"", path);

@@ -9,6 +9,7 @@ static int load_image(int *image, struct import_mesh *im, const char *name, stru
 	uint8_t *bytes = NULL;
 	size_t n_bytes = 0;
 	int rc = import_path_folder(&folder, im->path, err);
+
 	if (rc == PSR_OK && import_path_inside(&path, folder, name, NULL) != PSR_OK) {
 		import_mesh_warn(im, "the texture \"%.100s\" is not in the folder of the file and was left out", name);
 	} else if (rc == PSR_OK) {
@@ -28,6 +29,7 @@ static int find_texture(int *image, struct import_mesh *im, const struct ply_nam
 	size_t n = texture->n;
 	char *name;
 	int rc;
+
 	*image = -1;
 	while (n > 0 && (texture->at[n - 1] == ' ' || texture->at[n - 1] == '\t'))
 		n--;
@@ -47,6 +49,7 @@ static int add_material(struct import_mesh *im, const struct ply_header *h, int 
 {
 	struct psr_material material;
 	int image = -1, rc = PSR_OK;
+
 	psr_material_default(&material);
 	material.two_sided = 1;
 	material.roughness = is_cloud ? 1.0f : IMPORT_ROUGHNESS;
@@ -63,6 +66,7 @@ static int add_material(struct import_mesh *im, const struct ply_header *h, int 
 static int has_colors(const struct ply_header *h, const struct ply_vertices *vertices, const struct ply_element *faces)
 {
 	struct ply_colors colors;
+
 	return vertices->color != NULL || (faces != NULL && ply_colors_find(&colors, h, faces));
 }
 
@@ -71,6 +75,7 @@ static int add_points(struct import_mesh *im, const struct ply_vertices *v, uint
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t first = mesh->n_points;
 	int rc = import_mesh_grow_points(im, v->n, v->color != NULL, err);
+
 	if (rc != PSR_OK || v->n == 0)
 		return rc;
 	memcpy(mesh->point + first, v->position, v->n * sizeof *v->position);
@@ -94,6 +99,7 @@ static int read_vertices(struct ply_vertices *vertices, struct ply_rows *rows, s
 	const struct ply_header *h = rows->header;
 	const struct ply_element *vertex = ply_find_element(h, "vertex");
 	int rc = PSR_OK;
+
 	if (vertex == NULL)
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the PLY header has no element vertex", rows->path);
 	for (const struct ply_element *e = h->element; e < vertex && rc == PSR_OK; e++) {
@@ -114,6 +120,7 @@ static int read_surface(struct import_mesh *im, struct ply_rows *rows, const str
 	                         *strips = ply_find_element(h, "tristrips");
 	const struct ply_element *e = vertex + 1;
 	int rc, material;
+
 	material = add_material(im, h, 0, has_colors(h, vertices, has_rows(faces) ? faces : strips), err);
 	if (material < 0)
 		return material;
@@ -142,6 +149,7 @@ static int read_all(struct import_mesh *im, struct ply_rows *rows, struct psr_er
 	const struct ply_element *edges = ply_find_element(rows->header, "edge");
 	struct ply_vertices vertices;
 	int rc, material;
+
 	if (rows->header->odd_line > 0)
 		import_mesh_warn(im, "line %u is not a line of a PLY header and was left out", rows->header->odd_line);
 	memset(&vertices, 0, sizeof vertices);
@@ -169,6 +177,7 @@ int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	struct ply_header *header = malloc(sizeof *header);
 	struct ply_rows *rows = malloc(sizeof *rows);
 	int rc;
+
 	if (header == NULL || rows == NULL) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a header", im->path);
 	} else {

@@ -13,10 +13,13 @@ static void project(double (*flat)[2], const double (*point)[3], unsigned n)
 {
 	double normal[3] = { 0.0, 0.0, 0.0 };
 	int axis = 0, x, y;
+
 	for (unsigned i = 0; i < n; i++) {
 		const double *p = point[i], *q = point[(i + 1) % n];
+
 		for (int k = 0; k < 3; k++) {
 			int a = (k + 1) % 3, b = (k + 2) % 3;
+
 			normal[k] += (p[a] - q[a]) * (p[b] + q[b] - 2.0 * point[0][b]);
 		}
 	}
@@ -52,10 +55,12 @@ static int is_ear(double (*flat)[2], const unsigned *left, unsigned n, unsigned 
 {
 	const unsigned before = left[(i + n - 1) % n], at = left[i], after = left[(i + 1) % n];
 	const double *a = flat[before], *b = flat[at], *c = flat[after];
+
 	if (!(area(a, b, c) > 0.0))
 		return 0;
 	for (unsigned k = 0; k < n; k++) {
 		const double *p = flat[left[k]];
+
 		if (left[k] != before && left[k] != at && left[k] != after && area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 &&
 		    area(c, a, p) >= 0.0)
 			return 0;
@@ -67,6 +72,7 @@ void polygon_cut(unsigned (*out)[3], const double (*point)[3], unsigned n)
 {
 	double flat[POLYGON_MAX_CLIP][2];
 	unsigned left[POLYGON_MAX_CLIP], n_out = 0;
+
 	if (n > 3 && n <= POLYGON_MAX_CLIP)
 		project(flat, point, n);
 	if (n == 3 || n > POLYGON_MAX_CLIP || is_convex(flat, n)) {
@@ -77,6 +83,7 @@ void polygon_cut(unsigned (*out)[3], const double (*point)[3], unsigned n)
 		left[i] = i;
 	while (n > 3) {
 		unsigned ear = 0;
+
 		while (ear < n && !is_ear(flat, left, n, ear))
 			ear++;
 		if (ear == n)

@@ -39,6 +39,7 @@ int ply_rows_fail(const struct ply_rows *rows, struct psr_error *err, const char
 	char text[PSR_ERROR_TEXT], place[64];
 	uint64_t line = 1;
 	va_list args;
+
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
@@ -84,6 +85,7 @@ static int read_list(struct ply_rows *rows, const struct ply_property *p, struct
 	/* In text an item takes two bytes, except the last one of a file. */
 	const uint64_t left = (uint64_t)(c->end - c->at) + 1;
 	double count;
+
 	if (!ply_value(c, p->count_type, &count))
 		return fail_value(rows, err);
 	if (!(count >= 0.0) || count != (double)(uint64_t)(count < 1e18 ? count : 0.0))
@@ -106,6 +108,7 @@ static int read_list(struct ply_rows *rows, const struct ply_property *p, struct
 static int end_line(struct ply_rows *rows, struct psr_error *err)
 {
 	struct ply_cursor *c = &rows->cursor;
+
 	while (c->at < c->end && *c->at != '\n' && *c->at != '\r') {
 		if (*c->at != ' ' && *c->at != '\t')
 			return ply_rows_fail(rows, err, "does not have the %u properties that the header promises",
@@ -119,6 +122,7 @@ int ply_rows_next(struct ply_rows *rows, struct psr_error *err)
 {
 	const struct ply_property *p = &rows->header->property[rows->element->first_property];
 	int rc;
+
 	rows->at++;
 	for (unsigned i = 0; i < rows->element->n_properties; i++) {
 		if (p[i].count_type == PLY_NO_TYPE) {
@@ -137,6 +141,7 @@ int ply_rows_next(struct ply_rows *rows, struct psr_error *err)
 int ply_rows_skip(struct ply_rows *rows, struct psr_error *err)
 {
 	int rc = PSR_OK;
+
 	if (rows->element->n_properties == 0)
 		return PSR_OK;
 	while (rows->at < rows->element->n_rows && rc == PSR_OK)

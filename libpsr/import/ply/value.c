@@ -21,6 +21,7 @@ static size_t next_word(struct ply_cursor *c, const uint8_t **word)
 static uint64_t bits_of(const struct ply_cursor *c, size_t size)
 {
 	uint64_t bits = 0;
+
 	for (size_t i = 0; i < size; i++)
 		bits |= (uint64_t)c->at[i] << 8 * (c->format == PLY_LITTLE ? i : size - 1 - i);
 	return bits;
@@ -33,8 +34,10 @@ int ply_value(struct ply_cursor *c, enum ply_type type, double *x)
 	uint64_t bits;
 	uint32_t low;
 	float single;
+
 	if (c->format == PLY_ASCII) {
 		size_t n = next_word(c, &word);
+
 		return n > 0 && import_number(x, word, n, c->locale);
 	}
 	if ((size_t)(c->end - c->at) < size)
@@ -69,6 +72,7 @@ int ply_skip(struct ply_cursor *c, enum ply_type type, uint64_t n)
 {
 	const size_t size = ply_type_size(type);
 	const uint8_t *word;
+
 	if (c->format == PLY_ASCII) {
 		while (n > 0 && next_word(c, &word) > 0)
 			n--;

@@ -18,8 +18,10 @@ int ply_colors_find(struct ply_colors *colors, const struct ply_header *header, 
 		{ "blue", "diffuse_blue", "b", NULL },
 		{ "alpha", "diffuse_alpha", "a", NULL },
 	};
+
 	for (int c = 0; c < 4; c++) {
 		const struct ply_property *p;
+
 		colors->property[c] = ply_find_property(header, element, names[c]);
 		if (colors->property[c] < 0)
 			continue;
@@ -36,6 +38,7 @@ void ply_colors_get(float out[4], const struct ply_colors *colors, const struct 
 {
 	for (int c = 0; c < 4; c++) {
 		double x = colors->property[c] >= 0 ? rows->scalar[colors->property[c]] : 0.0;
+
 		if (colors->property[c] < 0)
 			out[c] = 1.0f;
 		else if (colors->scale[c] == 0.0)
@@ -54,6 +57,7 @@ static int find_roles(struct roles *roles, const struct ply_rows *rows, struct p
 	static const char *const uv[2][6] = { { "s", "u", "texture_u", "texture_s", "tx", NULL },
 		                              { "t", "v", "texture_v", "texture_t", "ty", NULL } };
 	const struct ply_property *p = &rows->header->property[rows->element->first_property];
+
 	for (int c = 0; c < 3; c++) {
 		roles->position[c] = ply_find_property(rows->header, rows->element, position[c]);
 		if (roles->position[c] < 0 || p[roles->position[c]].count_type != PLY_NO_TYPE)
@@ -79,6 +83,7 @@ static int has_all(const int *property, int n)
 static void *array(int wanted, uint64_t n, size_t size, int *ok)
 {
 	void *block = wanted ? malloc((size_t)(n > 0 ? n : 1) * size) : NULL;
+
 	if (wanted && block == NULL)
 		*ok = 0;
 	return block;
@@ -119,6 +124,7 @@ int ply_vertices_read(struct ply_vertices *out, struct ply_rows *rows, struct ps
 	const uint64_t n = rows->element->n_rows;
 	struct roles roles;
 	int rc = find_roles(&roles, rows, err), ok = 1;
+
 	memset(out, 0, sizeof *out);
 	if (rc != PSR_OK)
 		return rc;
