@@ -90,4 +90,38 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, const struct ps
 int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *scene, uint32_t side, uint8_t *rgb,
                     uint8_t *covered, struct psr_error *err);
 
+/* A mesh behind a ray tracer that evaluates the materials of its source, for pictures with all effects. Shares no code
+ * with the modeller's surface/. The mesh must outlive it. MEMORY, and as psr_truth_create(). */
+struct psr_source;
+
+int psr_source_create(struct psr_source **out, const struct psr_mesh *mesh, struct psr_error *err);
+void psr_source_destroy(struct psr_source *source); /* NULL is fine */
+
+/* What a picture of the scene would be without samples, levels, quantisation and shadow maps.
+ *
+ * Every instance of the scene shows the source, whatever its model; with none the source stands at the world's origin.
+ * Materials are those of glTF 2.0 (appendix B), specular-glossiness, or OBJ's; units of light are those of psr/view.h:
+ * a white diffuse surface that faces a light of 1 shows 1. Ambient is light that comes from all sides, which metals
+ * mirror. Lights that cast shadows are traced, also through glass. A pixel is the mean of side x side rays in linear
+ * light, over the background; each sees the surfaces of BLEND materials in the order of depth. */
+struct psr_source_shot {
+	struct psr_source *source;
+	const struct psr_scene *scene;
+	uint32_t width, height; /* pixels */
+	uint32_t side;          /* 1..16 */
+	int n_threads;          /* as for psr_pool_create(); the picture does not depend on it */
+};
+
+/* Where the picture goes; each is width * height, or NULL. */
+struct psr_source_planes {
+	uint8_t (*rgb)[3];   /* sRGB of `light`, clamped to 1 */
+	float (*light)[3];   /* linear, may exceed 1 */
+	float *coverage;     /* 0..1: share of the pixel that hides the background */
+	float *depth;        /* z' of the ray through the pixel's centre, +inf where it meets nothing; as in frames the
+	                      * nearest surface that holds back half of the light or more */
+	float (*range)[2];   /* nearest and farthest such z' of the pixel's other rays; +inf, -inf: no ray meets one */
+	float (*normal)[3];  /* shading normal at `depth`, world, unit, on the side that is seen; 0,0,0 */
+};
+int psr_source_draw(const struct psr_source_shot *shot, const struct psr_source_planes *to, struct psr_error *err);
+
 #endif
