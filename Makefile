@@ -201,7 +201,7 @@ $(LIB)/psr-image-oiio.so: $(IMAGE_O) $(BUILD)/libpsr/base/srgb.c.o
 
 , := ,
 # What a unit test links depends on its folder.
-UNIT       := $(filter-out tests/unit/lib/%,$(sort $(wildcard tests/unit/*/*.c)))
+UNIT       := $(filter-out tests/unit/lib/% $(if $(filter %/psr-view,$(PROGRAMS)),,tests/unit/window/%),$(sort $(wildcard tests/unit/*/*.c)))
 UNIT_BUILD := $(filter $(foreach room,import sample measure models study,tests/unit/$(room)/%),$(UNIT))
 UNIT_LIGHT := $(filter-out $(UNIT_BUILD),$(UNIT))
 unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
@@ -266,6 +266,9 @@ STARVED := malloc calloc realloc aligned_alloc strdup strndup mmap pthread_creat
 $(call unit_bin,tests/unit/server/starve.c): LDFLAGS += $(addprefix -Wl$(,)--wrap=,$(STARVED))
 $(call unit_bin,tests/unit/client/wish.c tests/unit/client/suite.c $(filter tests/unit/bench/%,$(UNIT))): $(CLIENT_PARTS)
 $(call unit_bin,$(filter tests/unit/view/%,$(UNIT))): $(sort $(VIEW_O) $(CLIENT_PARTS))
+$(BUILD)/tests/unit/window/%.o: ISA := $(shell pkg-config --cflags sdl2 2>/dev/null)
+$(call unit_bin,$(filter tests/unit/window/%,$(UNIT))): $(filter-out $(BUILD)/client/view/window/main.c.o,$(WINDOW_O)) $(VIEW_O) $(PSR_PARTS_O)
+$(call unit_bin,$(filter tests/unit/window/%,$(UNIT))): L_TEST += $(L_VIEW)
 $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o $(LIB)/libpsr-build.a $(LIB)/libpsrtest.a $(A)
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(call unit_bin,$(filter tests/unit/models/%,$(UNIT))): $(MODEL_PARTS)
