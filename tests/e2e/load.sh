@@ -6,9 +6,6 @@
 size=64x48
 json=$work/bench.json
 
-is() { # claim expected got
-	if [ "$3" = "$2" ]; then ok "$1"; else not_ok "$1" "'$3', expected '$2'"; fi
-}
 holds() { # claim expression-of-awk
 	if awk "BEGIN { exit !($2) }"; then ok "$1 ($2)"; else not_ok "$1" "not so: $2"; fi
 }

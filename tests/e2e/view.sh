@@ -23,7 +23,7 @@ xvfb_pid=$!
 view_pid=
 end() {
 	[ -z "$view_pid" ] || kill $view_pid 2>/dev/null
-	kill $xvfb_pid
+	[ -z "$xvfb_pid" ] || kill $xvfb_pid
 	finish
 }
 trap 'end; exit $?' EXIT
@@ -246,4 +246,16 @@ xdotool key Escape
 check "the end is quiet" wait $view_pid
 view_pid=
 check "nothing is said on standard error" test ! -s "$work/view.err"
+
+# --- a display that goes ---
+rm "$work/way.json" "$work"/shots/*
+n_shots=0
+view --server "$address" --model wheel --size 320x240 --no-inertia --record "$work/way.json"
+shot
+kill -KILL $xvfb_pid
+wait $view_pid
+is "without its display the viewer ends" 3 $?
+view_pid= xvfb_pid=
+check "and says why" grep -q 'the display is gone' "$work/view.err"
+check "the way that it recorded is kept" test -s "$work/way.json"
 check "psrd stops cleanly" stop_psrd

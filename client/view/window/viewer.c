@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "base/clock.h"
 #include "gui.h"
 
@@ -237,6 +238,19 @@ static int open_all(struct viewer *viewer, struct psr_error *err)
 	return code;
 }
 
+static struct viewer *open_viewer;
+
+/* Xlib calls exit() where its display goes. Other threads still run then: nothing may be freed below them. */
+static void lose_display(void)
+{
+	if (open_viewer == NULL)
+		return;
+	if (open_viewer->is_recording)
+		save_toggle_record(open_viewer);
+	fprintf(stderr, VIEWER_NAME ": the display is gone\n");
+	_exit(3);
+}
+
 static void close_all(struct viewer *viewer)
 {
 	connect_end(viewer);
@@ -250,12 +264,13 @@ static void close_all(struct viewer *viewer)
 	if (viewer->window != NULL)
 		SDL_DestroyWindow(viewer->window);
 	SDL_Quit();
+	open_viewer = NULL;
 }
 
 int viewer_run(const struct viewer_options *options, struct psr_error *err)
 {
 	struct viewer *viewer = calloc(1, sizeof *viewer);
-	int code;
+	int code = PSR_OK;
 
 	if (viewer == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a viewer");
@@ -266,7 +281,11 @@ int viewer_run(const struct viewer_options *options, struct psr_error *err)
 	viewer->has_overlay = !options->is_bare;
 	/* Without a model the panel's list is where to choose one. */
 	viewer->has_panel = !options->is_bare && options->subject.n_instances == 0 && options->file == NULL;
-	code = open_all(viewer, err);
+	open_viewer = viewer;
+	if (atexit(lose_display) != 0)
+		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a viewer");
+	if (code == PSR_OK)
+		code = open_all(viewer, err);
 	if (code == PSR_OK) {
 		if (options->play != NULL)
 			save_toggle_play(viewer);
