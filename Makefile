@@ -243,6 +243,7 @@ REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
 VIEW_BENCH := $(BUILD)/tests/bench/view
 LATENCY    := $(BUILD)/tests/bench/latency
 FIRST      := $(BUILD)/tests/bench/first
+TRUTH      := $(BUILD)/tests/bench/truth
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
@@ -326,11 +327,14 @@ $(LATENCY): $(addprefix $(BUILD)/tests/bench/,latency.c.o report.c.o) $(VIEW_O) 
 	$(link) $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 $(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o) $(VIEW_O) $(PSR_PARTS_O) $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)
+TRUTH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child report truth truth_build truth_rows truth_table))
+$(TRUTH): $(TRUTH_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) -lcjson $(L_BUILD_HERE) $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
 .PHONY: fuzz fuzz-bin soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
-.PHONY: bench-first bench-load bench-reproject bench-simd bench-view
+.PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
 	$(Q)BUILD=$(BUILD) CONFIG=$(config) tests/run
@@ -401,6 +405,9 @@ bench-simd: $(SIMD_TESTS) ## bench-simd: nanoseconds a sample (pixel, ...) of ea
 
 bench-reproject: compile $(REPROJECT_BENCH) ## bench-reproject: what warping received pictures costs, and how near it comes to the truth (only="bunny crowd")
 	$(Q)$(REPROJECT_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(only)
+
+bench-truth: compile $(TRUTH) ## bench-truth: how near frames come to the truth with all effects, by model (args="--programs OTHER/bin --only dragon --rows double")
+	$(Q)$(TRUTH) $(args) --programs $(BIN) $(BUILD)/bench-truth $(fetched)
 
 bench-view: compile $(VIEW_BENCH) $(BUILD)/tests/tools/relay ## bench-view: frames a second, latency and time until sharp of a viewer's link, by network
 	$(Q)$(VIEW_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd $(BUILD)/tests/tools/relay

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 #include "psr/error.h"
+#include "psr/frame.h"
 #include "psr/mesh.h"
 #include "psr/scene.h"
 
@@ -117,11 +118,46 @@ struct psr_source_planes {
 	uint8_t (*rgb)[3];   /* sRGB of `light`, clamped to 1 */
 	float (*light)[3];   /* linear, may exceed 1 */
 	float *coverage;     /* 0..1: share of the pixel that hides the background */
+	float *textured;     /* 0..1: share of its rays that meet a surface whose base colour has an image */
 	float *depth;        /* z' of the ray through the pixel's centre, +inf where it meets nothing; as in frames the
 	                      * nearest surface that holds back half of the light or more */
 	float (*range)[2];   /* nearest and farthest such z' of the pixel's other rays; +inf, -inf: no ray meets one */
 	float (*normal)[3];  /* shading normal at `depth`, world, unit, on the side that is seen; 0,0,0 */
 };
 int psr_source_draw(const struct psr_source_shot *shot, const struct psr_source_planes *to, struct psr_error *err);
+
+/* How far a frame is from the truth. A pixel is covered if a ray of it meets the object, inside if all rays of its 3x3
+ * neighbourhood do. Decibels are of sRGB codes; +inf: no difference, or no such pixel. */
+struct psr_errors {
+	uint64_t n_covered, n_inside, n_textured;
+	double psnr, psnr_inside; /* of covered pixels; of those inside */
+	double psnr_textured;     /* of those inside whose neighbourhood is one surface with images: no step in depth */
+	double ssim, flip;        /* of the whole picture (compare/compare.h) */
+	/* Of the frame's depth. A place is right if its depth is that of a ray of the 3x3 neighbourhood, within three
+	 * spacings ([G] 7.2). */
+	uint64_t n_holes, n_leaks; /* pixels inside that are empty; that show what lies behind all of the neighbourhood */
+	double depth_rmse, depth_p999; /* of drawn pixels inside, beyond the range of the pixel's rays, in spacings */
+	uint64_t n_outline;        /* drawn where less than half is covered, or empty where more is */
+	double outline_mean, outline_max; /* pixels from these to the nearest that should look so; up to PSR_OUTLINE_FAR */
+	double normal_mean, normal_p99; /* degrees, at right places inside; 0 without the frame's normals */
+	/* Of the squared error over covered pixels: the part at the object's edges and at wrong places, 0..1, and the rest,
+	 * which is the shading's; decibels of the pixels inside that are at the right place. */
+	double geometry, psnr_shading;
+};
+#define PSR_OUTLINE_FAR 16
+
+/* Compares a frame, which has colour and depth, with the planes of psr_source_draw() of its size: rgb, coverage, depth
+ * and range; textured and normal may be NULL. spacing: of the model's samples, world units. MEMORY. */
+int psr_errors_measure(struct psr_errors *out, const struct psr_frame *frame, const struct psr_source_planes *truth,
+                       double spacing, struct psr_error *err);
+
+/* Returns the root of the mean square, in codes, by which a pixel changes otherwise from one picture to the next than
+ * the truth does, over both pictures' pixels where all rays meet the object: shimmer along a path. rgb[0], coverage[0]:
+ * of the first picture; 0 if there is no such pixel. */
+struct psr_step {
+	const uint8_t (*rgb[2])[3], (*truth[2])[3];
+	const float *coverage[2];
+};
+double psr_errors_shimmer(const struct psr_step *step, uint64_t n_pixels);
 
 #endif

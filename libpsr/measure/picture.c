@@ -96,6 +96,7 @@ static void shade(const struct picture *picture, const struct placed_hit *hit, c
 struct seen {
 	double light[3], coverage, z; /* z: +inf where nothing holds back half of the light */
 	double normal[3];
+	int is_textured;
 };
 
 static void add_layer(const struct picture *picture, const struct source_ray *world, const struct placed_hit *hit,
@@ -117,6 +118,7 @@ static void add_layer(const struct picture *picture, const struct source_ray *wo
 	if (look.opacity >= 0.5 && isinf(seen->z)) {
 		seen->z = hit->z;
 		v3d_set(seen->normal, look.normal[0], look.normal[1], look.normal[2]);
+		seen->is_textured = look.is_textured;
 	}
 	seen->coverage += share;
 }
@@ -168,11 +170,12 @@ static void see_all(const struct picture *picture, const double (*place)[2], int
 static void write_pixel(const struct psr_source_planes *to, size_t at, const struct seen *seen, int n_rays)
 {
 	const struct seen *center = &seen[n_rays];
-	double light[3] = { 0 }, coverage = 0, near = INFINITY, far = -INFINITY;
+	double light[3] = { 0 }, coverage = 0, textured = 0, near = INFINITY, far = -INFINITY;
 
 	for (int i = 0; i < n_rays; i++) {
 		v3d_add_scaled(light, light, 1.0 / n_rays, seen[i].light);
 		coverage += seen[i].coverage / n_rays;
+		textured += (double)seen[i].is_textured / n_rays;
 		near = fmin(near, seen[i].z);
 		far = isinf(seen[i].z) ? far : fmax(far, seen[i].z);
 	}
@@ -186,6 +189,8 @@ static void write_pixel(const struct psr_source_planes *to, size_t at, const str
 	}
 	if (to->coverage != NULL)
 		to->coverage[at] = (float)coverage;
+	if (to->textured != NULL)
+		to->textured[at] = (float)textured;
 	if (to->depth != NULL)
 		to->depth[at] = (float)center->z;
 	if (to->range != NULL) {
@@ -219,7 +224,8 @@ static int check(const struct psr_source_shot *shot, struct psr_error *err)
 	const struct psr_scene *scene = shot->scene;
 
 	if (shot->side < 1 || shot->side > MOST_SIDE)
-		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", shot->side, MOST_SIDE);
+		return psr_fail(err, PSR_ERR_ARG, "%u rays along the side of a pixel are not within 1..%d", shot->side,
+		                MOST_SIDE);
 	if (scene->n_lights > PSR_MAX_LIGHTS)
 		return psr_fail(err, PSR_ERR_LIMIT, "%u lights exceed the limit of %d", scene->n_lights, PSR_MAX_LIGHTS);
 	for (uint32_t l = 0; l < scene->n_lights; l++) {

@@ -31,7 +31,8 @@ static int place(struct placed_instance *to, const struct psr_source *source, co
 	const double *q = from->rotation, norm = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
 	double unit[4];
 
-	if (!(fabs(norm - 1) <= 1e-6) || !view_is_point(from->translation) || !(from->scale >= 1e-30 && from->scale <= 1e30))
+	if (!(fabs(norm - 1) <= 1e-6) || !view_is_point(from->translation) ||
+	    !(from->scale >= 1e-30 && from->scale <= 1e30))
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: rotation, translation or scale is out of range", i);
 	for (int k = 0; k < 4; k++)
 		unit[k] = q[k] / norm;

@@ -377,6 +377,7 @@ void source_look_at(const struct psr_source *source, const struct source_ray *ra
 	v3d_set(look->face, (double)front[0], (double)front[1], (double)front[2]);
 	v3d_set(look->base, rgba[0], rgba[1], rgba[2]);
 	look->is_unlit = m->unlit;
+	look->is_textured = m->base_texture.image >= 0;
 	interpolate(&place, look->face, look->normal);
 	/* Some files' normals contradict the order of their corners, which tells the side. */
 	const double turned = v3d_dot(look->normal, look->face) < 0 ? -side : side;

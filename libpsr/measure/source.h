@@ -32,7 +32,7 @@ struct source_look {
 	double occlusion;   /* share of the surroundings' light that arrives */
 	double opacity;     /* 0..1 */
 	double base[3];     /* unlit: what is seen */
-	int is_unlit;
+	int is_unlit, is_textured; /* is_textured: the base colour has an image */
 };
 void source_look_at(const struct psr_source *source, const struct source_ray *ray, const struct ray_hit *hit,
                     struct source_look *look);
