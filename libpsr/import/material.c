@@ -66,7 +66,9 @@ void import_material_tidy(struct psr_material *m)
 	for (int c = 0; c < 3; c++) {
 		m->emissive[c] = clamp(m->emissive[c], 0.0f, MAX_FACTOR, 0.0f);
 		m->specular[c] = clamp(m->specular[c], 0.0f, 1.0f, 1.0f);
+		m->phong[c] = clamp(m->phong[c], 0.0f, 1.0f, 0.0f);
 	}
+	m->phong_exponent = clamp(m->phong_exponent, 0.0f, MAX_FACTOR, 0.0f);
 	m->metallic = clamp(m->metallic, 0.0f, 1.0f, 0.0f);
 	m->roughness = clamp(m->roughness, 0.0f, 1.0f, 1.0f);
 	m->glossiness = clamp(m->glossiness, 0.0f, 1.0f, 1.0f);

@@ -352,6 +352,12 @@ static void set_reflection(const struct place *place, const double base[3], stru
 		brdf->f0[c] = m->is_specular_glossiness ? specular[c] : DIELECTRIC + (base[c] - DIELECTRIC) * metallic;
 	}
 	brdf->alpha = roughness * roughness;
+	if (!m->is_phong)
+		return;
+	brdf->is_phong = 1;
+	brdf->exponent = (double)m->phong_exponent;
+	v3d_set(brdf->phong, (double)m->phong[0], (double)m->phong[1], (double)m->phong[2]);
+	v3d_set(brdf->diffuse, base[0], base[1], base[2]);
 }
 
 void source_look_at(const struct psr_source *source, const struct source_ray *ray, const struct ray_hit *hit,

@@ -28,22 +28,31 @@ static int is_made_up(const struct aiMaterial *m)
 	       strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) == 0;
 }
 
-/* (2 / (n + 2))^(1/4): the roughness whose Beckmann lobe is as wide as Phong's with exponent n, alpha = roughness^2. */
-static float roughness_of(const struct aiMaterial *m)
+/* Takes the highlight of formats that have no roughness: roughness is (2 / (n + 2))^(1/4), whose Beckmann lobe is as wide
+ * as that of the exponent n, alpha = roughness^2. */
+static void set_highlight(struct psr_material *out, const struct aiMaterial *m)
 {
 	struct aiColor4D specular;
 	float x;
 
-	if (get_float(m, "$mat.roughnessFactor", &x))
-		return x;
+	out->roughness = 1.0f;
+	if (get_float(m, "$mat.roughnessFactor", &x)) {
+		out->roughness = x;
+		return;
+	}
 	if (aiGetMaterialTextureCount(m, aiTextureType_DIFFUSE_ROUGHNESS) > 0)
-		return 1.0f;
+		return;
 	if (!get_float(m, "$mat.shininess", &x) || !(x > 0.0f))
-		return 1.0f;
+		return;
 	if (aiGetMaterialColor(m, AI_MATKEY_COLOR_SPECULAR, &specular) != aiReturn_SUCCESS ||
 	    !(specular.r > 0.0f || specular.g > 0.0f || specular.b > 0.0f))
-		return 1.0f;
-	return sqrtf(sqrtf(2.0f / (x + 2.0f)));
+		return;
+	out->roughness = sqrtf(sqrtf(2.0f / (x + 2.0f)));
+	out->is_phong = 1;
+	out->phong[0] = assimp_linear(specular.r);
+	out->phong[1] = assimp_linear(specular.g);
+	out->phong[2] = assimp_linear(specular.b);
+	out->phong_exponent = x;
 }
 
 static void set_colors(struct psr_material *out, const struct aiMaterial *m, int has_color)
@@ -62,7 +71,7 @@ static void set_colors(struct psr_material *out, const struct aiMaterial *m, int
 		out->base_color[1] = assimp_linear(color.g);
 		out->base_color[2] = assimp_linear(color.b);
 	}
-	out->roughness = roughness_of(m);
+	set_highlight(out, m);
 	if (get_float(m, "$mat.metallicFactor", &x))
 		out->metallic = x;
 	else if (aiGetMaterialTextureCount(m, aiTextureType_METALNESS) > 0)
@@ -70,6 +79,7 @@ static void set_colors(struct psr_material *out, const struct aiMaterial *m, int
 	if (is_made_up(m)) {
 		out->base_color[0] = out->base_color[1] = out->base_color[2] = has_color ? 1.0f : IMPORT_GRAY;
 		out->roughness = IMPORT_ROUGHNESS;
+		out->is_phong = 0;
 	}
 	/* Some writers mean "opaque" by 0. */
 	if (get_float(m, "$mat.opacity", &x) && x > 0.0f && x < 1.0f) {

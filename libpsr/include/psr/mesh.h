@@ -54,6 +54,10 @@ struct psr_material {
 	                             * replace metallic and roughness */
 	float specular[3], glossiness;
 	struct psr_texture specular_texture;    /* RGB: specular, coded; A: glossiness, linear */
+	/* The source's own highlight, of formats without microfacets (OBJ's illum 2): phong * (N.H)^exponent beside the
+	 * base colour. Metallic and roughness above are its translation, with 4 % of reflectance. */
+	int is_phong;
+	float phong[3], phong_exponent; /* 0..1; >= 0 */
 	float alpha_cutoff;                     /* MASK: the surface has holes where alpha is less */
 	enum psr_alpha alpha;
 	int two_sided;                          /* 0: rays that meet the back of a face pass through, as glTF asks */

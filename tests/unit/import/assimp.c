@@ -44,6 +44,7 @@ static void an_obj_brings_its_colors_and_texture(void **state)
 	assert_true(b->base_color[0] == 0.0f && b->base_color[2] == 1.0f && b->metallic == 0.0f);
 	/* (2 / (30 + 2))^(1/4) */
 	assert_true(a->roughness == 0.5f && a->two_sided && !a->unlit);
+	assert_true(a->is_phong && a->phong_exponent == 30 && fabsf(a->phong[1] - 0.2140f) < 0.003f);
 	/* OBJ's v grows upwards: the corner at the origin is the image's bottom left */
 	for (uint32_t i = 0; i < 3; i++) {
 		uint32_t v = m->triangle[0][i];

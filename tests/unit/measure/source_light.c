@@ -228,6 +228,27 @@ static void normal_maps_tilt_towards_x_and_up(void **state)
 	meshes_free(mesh);
 }
 
+static void obj_s_highlight_is_added_by_the_half_way_angle(void **state)
+{
+	struct psr_mesh *mesh = meshes_square(1);
+	const struct psr_light light = sun(-0.6, 0, -0.8);
+	const struct psr_scene scene = scene_of(0.5, &light, 1);
+	float got[3];
+
+	(void)state;
+	for (int c = 0; c < 3; c++)
+		mesh->material->base_color[c] = 0.25f;
+	mesh->material->is_phong = 1;
+	v3f_set(mesh->material->phong, 0.5f, 2, 0);
+	mesh->material->phong_exponent = 40;
+	light_at(mesh, &scene, 0, 0, NULL, got);
+	/* The half-way vector of (0, 0, 1) and (0.6, 0, 0.8) is at half of their angle: its cosine is sqrt(0.9). */
+	const double shine = pow(0.9, 20);
+	assert_near((double)got[0], 0.25 * (0.5 + 0.8) + 0.5 * shine, FLOATS);
+	assert_near((double)got[1], 0.25 * (0.5 + 0.8) + 2 * shine, FLOATS);
+	meshes_free(mesh);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -237,6 +258,7 @@ int main(void)
 		cmocka_unit_test(a_highlight_on_a_sphere_has_its_place_width_and_peak),
 		cmocka_unit_test(surroundings_give_what_their_lights_give),
 		cmocka_unit_test(a_spot_is_full_inside_dark_outside_and_smooth_between),
+		cmocka_unit_test(obj_s_highlight_is_added_by_the_half_way_angle),
 		cmocka_unit_test(normal_maps_tilt_towards_x_and_up),
 	};
 
