@@ -205,6 +205,11 @@ UNIT       := $(filter-out tests/unit/lib/% $(if $(filter %/psr-view,$(PROGRAMS)
 UNIT_BUILD := $(filter $(foreach room,import sample measure models study,tests/unit/$(room)/%),$(UNIT))
 UNIT_LIGHT := $(filter-out $(UNIT_BUILD),$(UNIT))
 unit_bin    = $(patsubst tests/unit/%.c,$(BUILD)/tests/unit/%,$(1))
+# Hard cases: a program a family, scale and sampling with the modeller.
+HARD       := $(patsubst %.c,$(BUILD)/%,$(wildcard tests/hard/*.c))
+HARD_BUILD := $(filter %/scale %/sampling,$(HARD))
+HARD_LIGHT := $(filter-out $(HARD_BUILD),$(HARD))
+HARD_O     := $(call objs,tests/hard/lib/*.c)
 FUZZ       := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(filter-out tests/fuzz/main.c tests/fuzz/import_%,$(wildcard tests/fuzz/*.c)))
 FUZZ_BUILD := $(patsubst tests/fuzz/%.c,$(BUILD)/tests/fuzz/%,$(wildcard tests/fuzz/import_*.c))
 TOOLS_BUILD := $(BUILD)/tests/tools/closed
@@ -217,13 +222,14 @@ ifeq ($(config),tsan)
 UNIT_LIGHT := $(filter-out $(patsubst %,tests/unit/server/%.c,budget lanes limits starve),\
 	$(shell grep -lE 'pthread\.h|psr_pool_create|client_crew_create|daemon_start|daemon_spawn' $(UNIT_LIGHT)))
 FUZZ       := $(BUILD)/tests/fuzz/server_session
+HARD_LIGHT :=
 SIMD_TESTS :=
 endif
 GOLDEN     := $(BUILD)/tests/golden/frames
 SOAK       := $(BUILD)/tests/soak/soak
-TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(FUZZ) $(TOOLS) $(SOAK) $(SIMD_TESTS) $(GOLDEN)
+TEST_BIN   := $(call unit_bin,$(UNIT_LIGHT)) $(HARD_LIGHT) $(FUZZ) $(TOOLS) $(SOAK) $(SIMD_TESTS) $(GOLDEN)
 ifneq ($(filter release debug,$(config)),)
-TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(FUZZ_BUILD) $(TOOLS_BUILD)
+TEST_BIN   += $(call unit_bin,$(UNIT_BUILD)) $(HARD_BUILD) $(FUZZ_BUILD) $(TOOLS_BUILD)
 TEST_BIN   += $(if $(filter %/psr-view,$(PROGRAMS)),$(TOOLS_X11))
 endif
 ifeq ($(config),aarch64)
@@ -256,7 +262,7 @@ L_BUILD_HERE := $(L_BUILD) -Wl,-rpath,'$$ORIGIN/../../lib:$$ORIGIN/../../../lib'
 # Tests keep their assertions in every configuration. What builds their models is not under test, and would take most of
 # the sanitizers' time.
 $(BUILD)/tests/%.o: CFLAGS += -UNDEBUG
-$(BUILD)/tests/unit/%.o $(BUILD)/tests/fuzz/%.o $(BUILD)/tests/simd/%.o: CFLAGS += $(TEST_O)
+$(BUILD)/tests/unit/%.o $(BUILD)/tests/hard/%.o $(BUILD)/tests/fuzz/%.o $(BUILD)/tests/simd/%.o: CFLAGS += $(TEST_O)
 $(BUILD)/tests/simd/forms.c.o: CFLAGS += -O3 -fno-trapping-math
 $(BUILD)/tests/unit/lib/%.o: CFLAGS += -O2 -fno-sanitize=all
 
@@ -274,6 +280,10 @@ $(call unit_bin,$(UNIT_BUILD)): $(BUILD)/tests/unit/%: $(BUILD)/tests/unit/%.c.o
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(call unit_bin,$(filter tests/unit/models/%,$(UNIT))): $(MODEL_PARTS)
 $(call unit_bin,$(filter tests/unit/study/%,$(UNIT))): $(STUDY_PARTS)
+$(HARD_LIGHT): $(BUILD)/tests/hard/%: $(BUILD)/tests/hard/%.c.o $(HARD_O) $(LIB)/libpsrtest.a $(LIB)/libpsr.a
+	$(link) -lcmocka $(L_PSR)
+$(HARD_BUILD): $(BUILD)/tests/hard/%: $(BUILD)/tests/hard/%.c.o $(HARD_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) -lcmocka $(L_BUILD_HERE) $(L_PSR)
 # libFuzzer has a main() of its own.
 FUZZ_MAIN := $(if $(filter fuzz,$(config)),,$(BUILD)/tests/fuzz/main.c.o)
 $(FUZZ): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(A)

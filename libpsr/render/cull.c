@@ -333,7 +333,9 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		if (chunk->depth_error > depth_error)
 			depth_error = chunk->depth_error;
 	}
-	report->error_px = 0.5 + (double)depth_error;
+	/* Where the eye is within a step of depth of a block, a sample may be anywhere in the picture. */
+	const float extent = (float)plan->window.picture_width + (float)plan->window.picture_height;
+	report->error_px = 0.5 + (double)(depth_error < extent ? depth_error : extent);
 	if (plan->with_splats)
 		report->levels |= report->levels & 1 ? 2 : 0;
 	else if (plan->is_full)
