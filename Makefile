@@ -282,6 +282,8 @@ $(call unit_bin,$(filter tests/unit/models/%,$(UNIT))): $(MODEL_PARTS)
 $(call unit_bin,$(filter tests/unit/study/%,$(UNIT))): $(STUDY_PARTS)
 $(HARD_LIGHT): $(BUILD)/tests/hard/%: $(BUILD)/tests/hard/%.c.o $(HARD_O) $(LIB)/libpsrtest.a $(LIB)/libpsr.a
 	$(link) -lcmocka $(L_PSR)
+# The modeller's cones, of all that it makes, need nothing else of it.
+$(filter %/visibility,$(HARD_LIGHT)): $(BUILD)/libpsr/sample/pack/cone.c.o
 $(HARD_BUILD): $(BUILD)/tests/hard/%: $(BUILD)/tests/hard/%.c.o $(HARD_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lcmocka $(L_BUILD_HERE) $(L_PSR)
 # libFuzzer has a main() of its own.

@@ -28,9 +28,9 @@ struct exact_counts {
 };
 
 /* Draws the scene, whose models have one level and two-sided blocks, and compares its words with exact places. A
- * pixel's word is of a sample whose exact place is in that pixel, grown by the bound, and has its exact depth within the
- * bound. A sample whose place is in a pixel, shrunk by the bound, is there or behind what is there. The count of samples
- * in the report is within what is unsure. Fails the test otherwise. */
+ * pixel's word is of a sample whose exact place is in that pixel, grown by the bound, and has its exact depth within
+ * the bound. A sample whose place is in a pixel, shrunk by the bound, is there or behind what is there. The count of
+ * samples in the report is within what is unsure. Fails the test otherwise. */
 struct exact_counts exact_check(const struct psr_scene *scene, uint32_t width, uint32_t height);
 
 #endif
