@@ -23,20 +23,12 @@
 
 enum family { EQUAL, OPPOSED, COPLANAR, HEMISPHERE, ONE, NEAR, N_FAMILIES };
 
-static void random_direction(double d[3], uint64_t *seed)
-{
-	do
-		for (int k = 0; k < 3; k++)
-			d[k] = random_in(seed, -1, 1);
-	while (!(v3d_dot(d, d) <= 1 && v3d_normalize(d, d) > 0.01));
-}
-
 /* Normals of a family about the axis n. */
 static void family_normal(double out[3], enum family family, const double n[3], int i, uint64_t *seed)
 {
 	double side[3];
 
-	random_direction(side, seed);
+	hard_direction(side, seed);
 	v3d_set(out, n[0], n[1], n[2]);
 	if (family == OPPOSED && i % 2)
 		v3d_scale(out, n, -1);
@@ -85,13 +77,13 @@ static struct psr_model *random_model(uint64_t *seed)
 	for (int p = 0; p < 8; p++) {
 		double d[3];
 
-		random_direction(d, seed);
+		hard_direction(d, seed);
 		projection[p] = hard_projection(d[0], d[1], d[2], SPACING);
 	}
 	for (int b = 0; b < BLOCKS; b++) {
 		double axis[3];
 
-		random_direction(axis, seed);
+		hard_direction(axis, seed);
 		make_block(&block[b], (enum family)random_below(seed, N_FAMILIES), axis, seed);
 		block[b].projection = random_below(seed, 8);
 		block[b].group = (uint32_t)b / 100;
@@ -110,8 +102,8 @@ static void random_camera(struct psr_camera *camera, const struct psr_blocks *b,
 
 	*camera = (struct psr_camera){ .fov_y = exp2(random_in(seed, -5, 1.5)), .ortho_height = random_in(seed, 0.05, 3) };
 	psr_blocks_sphere(b, block, center, &radius);
-	random_direction(camera->up, seed);
-	random_direction(d, seed);
+	hard_direction(camera->up, seed);
+	hard_direction(d, seed);
 	if (random_below(seed, 2)) {
 		v3d_normalize(axis, axis);
 		v3d_add_scaled(d, d, -v3d_dot(d, axis) + random_in(seed, -0.1, 0.1), axis);
@@ -120,7 +112,7 @@ static void random_camera(struct psr_camera *camera, const struct psr_blocks *b,
 	const double distance = exp2(random_in(seed, -8, 3));
 	for (int k = 0; k < 3; k++)
 		camera->eye[k] = (double)center[k] + distance * d[k];
-	random_direction(d, seed);
+	hard_direction(d, seed);
 	for (int k = 0; k < 3; k++)
 		camera->target[k] = (double)center[k] + 0.3 * distance * d[k];
 	if (random_below(seed, 4) == 0)

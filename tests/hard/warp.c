@@ -28,14 +28,6 @@ static struct psr_scene scene_of(const struct psr_instance *instance, uint32_t n
 	return scene;
 }
 
-static void random_direction(double d[3], uint64_t *seed)
-{
-	do
-		for (int k = 0; k < 3; k++)
-			d[k] = random_in(seed, -1, 1);
-	while (!(v3d_dot(d, d) <= 1 && v3d_normalize(d, d) > 0.01));
-}
-
 static void a_sample_is_where_80_bits_say(void **state)
 {
 	uint64_t seed = 1, n_inside = 0, n_unsure = 0;
@@ -50,8 +42,8 @@ static void a_sample_is_where_80_bits_say(void **state)
 		const double distance = exp2(random_in(&seed, -3, 8));
 		double d[3];
 
-		random_direction(d, &seed);
-		random_direction(scene.camera.up, &seed);
+		hard_direction(d, &seed);
+		hard_direction(scene.camera.up, &seed);
 		v3d_scale(scene.camera.eye, d, distance);
 		for (int k = 0; k < 3; k++)
 			scene.camera.target[k] = random_in(&seed, -0.1, 0.1);
@@ -130,8 +122,8 @@ static void the_near_plane_cuts_where_80_bits_say(void **state)
 
 		for (int k = 0; k < 3; k++)
 			scene.camera.eye[k] = random_in(&seed, -0.2, 0.2);
-		random_direction(scene.camera.target, &seed);
-		random_direction(scene.camera.up, &seed);
+		hard_direction(scene.camera.target, &seed);
+		hard_direction(scene.camera.up, &seed);
 		scene.camera.fov_y = random_in(&seed, 0.5, 3.1);
 		for (size_t n = 0; n < sizeof near / sizeof near[0]; n++) {
 			scene.camera.near_z = near[n];
@@ -196,12 +188,12 @@ static void the_eye_may_be_inside_a_block_and_on_a_sample(void **state)
 		double d[3];
 
 		psr_blocks_sphere(b, block, center, &radius);
-		random_direction(d, &seed);
+		hard_direction(d, &seed);
 		for (int k = 0; k < 3; k++)
 			scene.camera.eye[k] = (double)center[k] + 0.9 * (double)radius * d[k];
-		random_direction(d, &seed);
+		hard_direction(d, &seed);
 		v3d_add(scene.camera.target, scene.camera.eye, d);
-		random_direction(scene.camera.up, &seed);
+		hard_direction(scene.camera.up, &seed);
 		scene.camera.fov_y = 2;
 		exact_check(&scene, SIDE, SIDE);
 
@@ -233,7 +225,7 @@ static void a_scene_may_be_a_million_radii_deep(void **state)
 			instance[n].scale = n == 3 ? 1 : exp2(8 * n);
 			instance[n].translation[2] = n == 3 ? -1e6 : -3 * instance[n].scale;
 			instance[n].translation[0] = random_in(&seed, -1, 1) * instance[n].scale;
-			random_direction(instance[n].rotation, &seed);
+			hard_direction(instance[n].rotation, &seed);
 			instance[n].rotation[3] = 0; /* half a turn about a random axis */
 		}
 		scene.camera.eye[2] = 1.5;
@@ -324,9 +316,9 @@ static void magnified_to_1e5_a_sample_is_where_it_is(void **state)
 		double d[3];
 
 		hard_position(scene.camera.target, b, block, (uint32_t)__builtin_ctzll(b->mask[block]));
-		random_direction(d, &seed);
+		hard_direction(d, &seed);
 		v3d_add_scaled(scene.camera.eye, scene.camera.target, distance, d);
-		random_direction(scene.camera.up, &seed);
+		hard_direction(scene.camera.up, &seed);
 		const double height = SIDE / 64.0 / magnification; /* of the picture, at the target */
 		scene.camera.fov_y = fmax(1e-6, 2 * atan(height / 2 / distance));
 		if (random_below(&seed, 2)) {

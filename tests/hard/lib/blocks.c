@@ -13,6 +13,14 @@
 
 #define ROW 0.86602540378443864676 /* of a lattice, in steps of a column */
 
+void hard_direction(double d[3], uint64_t *seed)
+{
+	do
+		for (int k = 0; k < 3; k++)
+			d[k] = random_in(seed, -1, 1);
+	while (!(v3d_dot(d, d) <= 1 && v3d_normalize(d, d) > 0.01));
+}
+
 /* What a model is made of, but for its counts. */
 struct arrays {
 	struct psr_cluster *cluster;
@@ -319,4 +327,12 @@ void hard_draw_pass(struct psr_frame *frame, const struct psr_scene *scene, cons
 	struct psr_error err;
 
 	end(renderer, frame, psr_render(renderer, scene, settings, NULL, frame, &err), &err);
+}
+
+void hard_same_planes(const struct psr_frame *a, const struct psr_frame *b, unsigned planes)
+{
+	for (unsigned p = 0; p < PSR_N_PLANES; p++)
+		if (planes >> p & 1)
+			assert_memory_equal(psr_frame_plane(a, p), psr_frame_plane(b, p),
+			                    psr_plane_bytes(p) * a->width * a->height);
 }

@@ -10,7 +10,13 @@
 #define HARD_CASES(n) ((n) / 50 + 1)
 #else
 #define HARD_CASES(n) (n)
+/* Fails unless the planes, a set of bits 1 << enum psr_plane, have the same bytes in both frames. */
+void hard_same_planes(const struct psr_frame *a, const struct psr_frame *b, unsigned planes);
+#define HARD_ALL_PLANES ((1u << PSR_N_PLANES) - 1)
+
 #endif
+
+void hard_direction(double d[3], uint64_t *seed); /* uniform, of length 1 */
 
 struct hard_block {
 	unsigned projection, level;
@@ -58,5 +64,9 @@ void hard_draw_with(struct psr_frame *frame, const struct psr_scene *scene, cons
 
 /* The same of colour and depth alone, with what psr_settings offers: smoothing and passes. */
 void hard_draw_pass(struct psr_frame *frame, const struct psr_scene *scene, const struct psr_settings *settings);
+
+/* Fails unless the planes, a set of bits 1 << enum psr_plane, have the same bytes in both frames. */
+void hard_same_planes(const struct psr_frame *a, const struct psr_frame *b, unsigned planes);
+#define HARD_ALL_PLANES ((1u << PSR_N_PLANES) - 1)
 
 #endif

@@ -54,11 +54,6 @@ static real length_of(const double v[3])
 	return length((const real[3]){ v[0], v[1], v[2] });
 }
 
-/* Pixels, z' in world units, and what a frame's may be off by; off_u and off_v are infinite where z' may be 0. */
-struct exact_place {
-	real u, v, z, off_u, off_v, off_z;
-};
-
 /* The view of a frame: the picture's right, down and forward. */
 struct sight {
 	real axis[3][3], focal, focal_off, half[3];
@@ -204,6 +199,21 @@ static void place_in(struct exact_place *out, const struct sight *s, const struc
 	out->off_v = least > 0 ? (off[1] + fabsl(out->v) * off[2]) / least + 3 * E * fabsl(out->v) : INFINITY;
 }
 
+void exact_place(struct exact_place *out, const struct psr_scene *scene, uint32_t width, uint32_t height,
+                 uint32_t slot, uint32_t sample)
+{
+	struct sight sight;
+
+	sight_make(&sight, &scene->camera, width, height);
+	place_in(out, &sight, scene, slot, sample);
+}
+
+int exact_is_at_border(const struct exact_place *at)
+{
+	return floorl(at->u - at->off_u) != floorl(at->u + at->off_u)
+	       || floorl(at->v - at->off_v) != floorl(at->v + at->off_v);
+}
+
 static void check_word(const struct exact_place *at, uint32_t x, uint32_t y, real z, real near)
 {
 	if (!(at->u >= x - at->off_u && at->u <= x + 1 + at->off_u && at->v >= y - at->off_v && at->v <= y + 1 + at->off_v))
@@ -265,10 +275,9 @@ struct exact_counts exact_check(const struct psr_scene *scene, uint32_t width, u
 				counts.n_samples++;
 				if (at.z + at.off_z < near * (1 - E))
 					continue;
-				const real u0 = at.u - at.off_u, u1 = at.u + at.off_u, v0 = at.v - at.off_v, v1 = at.v + at.off_v;
-				if (u1 < 0 || v1 < 0 || u0 > width || v0 > height)
+				if (at.u + at.off_u < 0 || at.v + at.off_v < 0 || at.u - at.off_u > width || at.v - at.off_v > height)
 					continue;
-				if (!(at.z - at.off_z > near * (1 + E) && floorl(u0) == floorl(u1) && floorl(v0) == floorl(v1))) {
+				if (!(at.z - at.off_z > near * (1 + E)) || exact_is_at_border(&at)) {
 					counts.n_unsure++;
 					continue;
 				}

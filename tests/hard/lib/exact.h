@@ -21,6 +21,18 @@ int exact_is_there(void);
  * psr_sincos() has 1e-15.
  *
  * u = x' / z' takes a division, a product and their roundings: it is within (Ex + |u| Ez) / (z' - Ez) + 3 e |u|. */
+struct exact_place {
+	long double u, v, z;             /* pixels, and z' in world units */
+	long double off_u, off_v, off_z; /* what a frame's are within; off_u and off_v are infinite where z' may be 0 */
+};
+
+/* Places a sample of a scene's block; slots count the blocks of all instances. */
+void exact_place(struct exact_place *out, const struct psr_scene *scene, uint32_t width, uint32_t height,
+                 uint32_t slot, uint32_t sample);
+
+/* Whether the place is within its bounds of a pixel's border, so that it may fall on either side. */
+int exact_is_at_border(const struct exact_place *at);
+
 struct exact_counts {
 	uint64_t n_samples, n_inside; /* of all, those that surely are in the picture, beyond the near plane */
 	uint64_t n_unsure;            /* at a border of pixels or at the near plane within their bounds */
