@@ -254,6 +254,39 @@ struct psr_model *hard_random_model(uint64_t *seed, uint32_t n_blocks, double sp
 	return model;
 }
 
+struct psr_model *hard_sheet(const struct hard_sheet *sheet)
+{
+	const struct psr_projection projection = { { { 1, 0, 0 }, { 0, 1, 0 }, { 0, 0, 1 } }, (float)sheet->spacing };
+	const struct hard_model options = { .projection = &projection, .n_projections = 1 };
+	const unsigned top = sheet->levels - 1;
+	uint32_t n = 0, n_of_group = 0;
+
+	for (unsigned l = 0; l <= top; l++)
+		n_of_group += 1u << 2 * (top - l);
+	struct hard_block *block = room((size_t)(sheet->groups * sheet->groups) * n_of_group, sizeof *block);
+	for (int g = 0; g < sheet->groups * sheet->groups; g++)
+		for (unsigned l = 0; l <= top; l++)
+			for (int i = 0; i < 1 << 2 * (top - l); i++) {
+				const int side = 1 << (top - l), x = g % sheet->groups * side + i % side,
+						  y = g / sheet->groups * side + i / side;
+				struct hard_block *b = &block[n++];
+
+				b->level = l;
+				b->group = (uint32_t)g;
+				b->col = 8 * x - 4 * sheet->groups * side;
+				b->row = 8 * y - 4 * sheet->groups * side;
+				b->mask = UINT64_MAX;
+				b->flags = PSR_BLOCK_TWO_SIDED;
+				for (int s = 0; s < 64; s++) {
+					b->depth[s] = sheet->z;
+					b->attr[s] = sheet->attr;
+				}
+			}
+	struct psr_model *model = hard_model(&options, block, n);
+	free(block);
+	return model;
+}
+
 void hard_position(double at[3], const struct psr_blocks *b, uint32_t block, uint32_t sample)
 {
 	const struct psr_projection *p = &b->projection[b->block_projection[block]];

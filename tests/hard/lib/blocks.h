@@ -52,6 +52,17 @@ uint64_t hard_attr(const double normal[3], uint32_t specular, uint32_t exponent)
  * of a block lie within `deep` of one another. */
 struct psr_model *hard_random_model(uint64_t *seed, uint32_t n_blocks, double spacing, double deep);
 
+/* A flat square about the origin, in the plane z = 0 or another, that faces +z: groups x groups groups, each of blocks
+ * of `levels` levels. A group is 8 * 2^(levels - 1) columns and rows of the finest lattice a side. */
+struct hard_sheet {
+	double spacing, z;
+	int groups;
+	unsigned levels; /* 1..PSR_MAX_LEVELS */
+	uint64_t attr;
+};
+struct psr_model *hard_sheet(const struct hard_sheet *sheet);
+#define HARD_UNLIT (UINT64_C(1) << 15) /* of an attribute */
+
 /* Where a valid sample of a block is, in inner coordinates. */
 void hard_position(double at[3], const struct psr_blocks *blocks, uint32_t block, uint32_t sample);
 
