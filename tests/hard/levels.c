@@ -206,7 +206,8 @@ static void no_interface_of_a_slanted_plane_has_a_hole(void **state)
 			}
 			psr_frame_free(&frame);
 		}
-	print_message("# %u views of several levels, %u clamped, %llu pixels\n", n_mixed, n_clamped, (unsigned long long)n_inside);
+	print_message("# %u views of several levels, %u clamped, %llu pixels\n", n_mixed, n_clamped,
+	              (unsigned long long)n_inside);
 	assert_true(n_mixed > 10 && n_clamped < n_mixed / 5 && n_inside > 500000);
 	psr_model_unref(model);
 }
