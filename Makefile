@@ -250,6 +250,7 @@ VIEW_BENCH := $(BUILD)/tests/bench/view
 LATENCY    := $(BUILD)/tests/bench/latency
 FIRST      := $(BUILD)/tests/bench/first
 TRUTH      := $(BUILD)/tests/bench/truth
+LARGE      := $(BUILD)/tests/bench/large
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
 CLIENT_PARTS := $(filter-out $(BUILD)/client/main.c.o,$(PSR_O))
@@ -342,10 +343,12 @@ $(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o)
 TRUTH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child report truth truth_build truth_rows truth_table))
 $(TRUTH): $(TRUTH_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lcjson $(L_BUILD_HERE) $(L_PSR)
+$(LARGE): $(BUILD)/tests/bench/large.c.o $(HARD_O) $(LIB)/libpsr.a
+	$(link) -lcmocka $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: fuzz fuzz-bin soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
+.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
@@ -423,6 +426,9 @@ bench-truth: compile $(TRUTH) ## bench-truth: how near frames come to the truth 
 
 bench-view: compile $(VIEW_BENCH) $(BUILD)/tests/tools/relay ## bench-view: frames a second, latency and time until sharp of a viewer's link, by network
 	$(Q)$(VIEW_BENCH) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(BIN)/psrd $(BUILD)/tests/tools/relay
+
+hard-large: $(LARGE) ## hard-large: a model of 100 million samples: memory and times of frames beside bounds (4 GB of memory)
+	$(Q)$(LARGE)
 
 bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
