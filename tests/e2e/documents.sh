@@ -1,7 +1,7 @@
 #!/bin/bash
 # not for threads
-# Documents: lines fit a page, links lead somewhere, the map and decisions are short, the index has every decision, and
-# wide tables fold.
+# Documents: lines fit a page, links lead somewhere, the map and decisions are short, the index has every decision, the
+# page of hard cases every test, and wide tables fold.
 . "$(dirname "$0")/lib.sh"
 
 MOST_COLUMNS=100
@@ -51,6 +51,12 @@ not_in_index() { # decision...
 	done
 }
 
+# Lines with < are tests that the page lacks, with > what it has and is no test.
+other_hard_cases() {
+	diff <(grep -ho 'cmocka_unit_test([a-z0-9_]*' tests/hard/*.c | sed 's/.*(//' | sort) \
+		<(grep -oE '^  `[a-z0-9_]+`$' docs/stability.md | tr -d ' `' | sort) | grep '^[<>]'
+}
+
 # Twenty columns of two rows after a label: 189 columns of text.
 wide_table() {
 	local row
@@ -73,6 +79,7 @@ none "every relative link of a document leads to a file" dead_links "${pages[@]}
 none "docs/architecture.md has at most $MOST_MAP lines" long_pages $MOST_MAP docs/architecture.md
 none "a decision has at most $MOST_DECISION lines" long_pages $MOST_DECISION docs/decisions/[0-9]*.md
 none "the index of decisions has every one" not_in_index docs/decisions/[0-9]*.md
+none "docs/stability.md has each test of tests/hard once, and no other" other_hard_cases
 
 wide_table >"$work/table"
 awk -f docs/fold.awk "$work/table" >"$work/folded"
