@@ -296,6 +296,7 @@ static int shade_picture(struct psr_renderer *r, struct psr_pool *pool, struct p
 
 	int rc = find_gaps(&n_marked, r, pool, report);
 	note_time(report, PSR_STAGE_GAPS, &start);
+	n_marked = r->plan.no_fill ? 0 : n_marked;
 	if (rc == PSR_OK && n_marked)
 		r->picture.wants = fill_wants(&r->fill);
 	note_time(report, PSR_STAGE_FILL, &start);
@@ -311,7 +312,8 @@ static int shade_picture(struct psr_renderer *r, struct psr_pool *pool, struct p
 	if (n_marked && fill_push(&r->fill, pool, report))
 		return render_cancelled(err);
 	note_time(report, PSR_STAGE_FILL, &start);
-	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : PSR_WHY_NOTHING, report->count[PSR_STAGE_FILL]);
+	const enum psr_why none = r->plan.no_fill ? PSR_WHY_OFF : PSR_WHY_NOTHING;
+	effect_note(report, PSR_EFFECT_FILL, n_marked ? PSR_WHY_RAN : none, report->count[PSR_STAGE_FILL]);
 	return PSR_OK;
 }
 

@@ -144,7 +144,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 
 	*cull = (struct cull_view){
 		.blocks = warp->blocks, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
-		.spacing = (float)(psr_model_info(instance->model)->spacing * instance->scale * view->scale),
+		.spacing = (float)ldexp(psr_model_info(instance->model)->spacing * instance->scale * view->scale, plan->cell_bias),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
@@ -265,7 +265,10 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;
 	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
-	plan->finer = (float)(1 / settings->spacing_px);
+	plan->no_fill = settings->no_fill;
+	plan->shadow_side = settings->shadow_side;
+	plan->finer = (float)ldexp(1 / settings->spacing_px, -settings->cell_bias); /* levels of models know no bias */
+	plan->cell_bias = settings->cell_bias;
 	plan->is_quiet = NULL;
 	plan->has_sheer = 0;
 	plan->caster = NO_CASTER;

@@ -26,6 +26,9 @@ struct plan {
 	unsigned cull_tests;
 	int is_full;
 	int opaque_cells;          /* PSR_GAPS_OPAQUE */
+	int no_fill;
+	int cell_bias;
+	uint32_t shadow_side;
 	float finer;               /* 1 / settings' spacing: samples are to be this much finer than pixels */
 	int exponent;              /* lengths below are world * 2^-exponent, positions relative to the eye */
 	double tangent[2];         /* of half the picture's angles; perspective */

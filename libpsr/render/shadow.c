@@ -156,14 +156,14 @@ static int same_fit(const struct shadow_fit *a, const struct shadow_fit *b)
 	return a->width == b->width && a->height == b->height && placed_same_camera(&a->camera, &b->camera);
 }
 
-/* Texels a side: as many as the picture's greater side has pixels, but at most SHADOW_TEXELS in the n_maps of the whole
- * scene, in view or not. */
+/* Texels a side: as many as the picture's greater side has pixels, at most as many as the settings say, and at most
+ * SHADOW_TEXELS in the n_maps of the whole scene, in view or not. */
 static uint32_t side_of(const struct plan *plan, uint32_t n_maps)
 {
 	const uint32_t w = plan->window.picture_width, h = plan->window.picture_height;
 	uint32_t side = w > h ? w : h;
 
-	side = side < 64 ? 64 : side > SHADOW_SIDE ? SHADOW_SIDE : side;
+	side = side < 64 ? 64 : side > plan->shadow_side ? plan->shadow_side : side;
 	while ((uint64_t)n_maps * side * side > SHADOW_TEXELS)
 		side -= 16;
 	return side;
@@ -198,7 +198,7 @@ static int fit_lights(struct shadow *shadow, const struct psr_scene *scene, cons
 	shadow_bounds_make(&bounds, scene);
 	for (uint32_t l = 0; l < scene->n_lights && !plan_is_cancelled(plan); l++)
 		if (can_cast(&scene->light[l]))
-			n_maps += shadow_fit_light(fit, &scene->light[l], scene, &bounds, SHADOW_SIDE);
+			n_maps += shadow_fit_light(fit, &scene->light[l], scene, &bounds, plan->shadow_side);
 	for (int c = SHADOW_OPAQUE; c < SHADOW_CASTERS; c++)
 		n_casters += shadow->share[c] > 0;
 	const uint32_t side = side_of(plan, n_maps * n_casters);

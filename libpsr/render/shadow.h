@@ -29,7 +29,6 @@ int shadow_prepare(struct shadow **shadow, struct plan *plan, const struct shado
 /* Limits the texels of all maps of a renderer. A texel takes 2 bytes, plus two thirds with z-buffer levels; drawing
  * takes twice that of the largest map. */
 #define SHADOW_TEXELS (16u << 20)
-#define SHADOW_SIDE 2048 /* of a map, at most */
 
 uint64_t shadow_bytes(const struct shadow *shadow); /* 0 for NULL */
 void shadow_destroy(struct shadow *shadow);         /* NULL is fine */

@@ -28,6 +28,7 @@ struct psr_window {
 	int32_t left, top;                      /* -PSR_MAX_SIDE..PSR_MAX_PICTURE_SIDE */
 };
 #define PSR_MAX_PICTURE_SIDE (1 << 20)
+#define PSR_MAX_SHADOW_SIDE 2048
 
 struct render_settings {
 	uint32_t width, height; /* these as in struct psr_settings */
@@ -43,6 +44,10 @@ struct render_settings {
 	                  * the surface that close the gaps themselves: for pixels finer than samples */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 	enum psr_gap_method gap_method; /* bilinear by default */
+	int cell_bias;          /* depth buffers whose cells are 2^cell_bias times as wide as samples ask for; -4..4, 0 by
+	                         * default */
+	int no_fill;            /* 1: pixels that the gaps left without a colour show the background */
+	uint32_t shadow_side;   /* texels a side of a shadow map, at most: 64..PSR_MAX_SHADOW_SIDE, which is the default */
 };
 void render_settings_default(struct render_settings *settings, uint32_t width, uint32_t height);
 

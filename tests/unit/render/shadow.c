@@ -474,7 +474,7 @@ static void memory_is_bounded(void **state)
 		/* Cells of all levels, the guard bands of up to 192 maps among them, the depths of the largest map, and what
 		 * is kept of lights and instances, words of a tile, and entries of tiles. */
 		const uint64_t cells = SHADOW_TEXELS * UINT64_C(2) * 5 / 3, bands = 194 * 15 * 4 * UINT64_C(2048) * 2;
-		const uint64_t drawn = SHADOW_SIDE * SHADOW_SIDE * UINT64_C(4) * 5 / 3, rest = 4u << 20;
+		const uint64_t drawn = PSR_MAX_SHADOW_SIDE * PSR_MAX_SHADOW_SIDE * UINT64_C(4) * 5 / 3, rest = 4u << 20;
 		assert_true(psr_renderer_bytes(s.renderer) - before <= cells + bands + drawn + rest);
 	}
 	stage_fini(&s);
