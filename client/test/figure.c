@@ -3,53 +3,10 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "base/png.h"
+#include "base/html.h"
 
 #define ENLARGED 240  /* pixels on the screen that the side of an enlarged box has, about */
 #define MARGIN 4      /* pixels around the box that are enlarged with it */
-
-/* ---- data: URIs ---- */
-
-static void write_memory(png_structp png, png_bytep data, size_t n)
-{
-	if (fwrite(data, 1, n, png_get_io_ptr(png)) != n)
-		png_error(png, "no memory");
-}
-
-static void print_base64(FILE *to, const uint8_t *bytes, size_t n)
-{
-	static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-	for (size_t i = 0; i < n; i += 3) {
-		const uint32_t three =
-			(uint32_t)bytes[i] << 16 | (i + 1 < n ? (uint32_t)bytes[i + 1] << 8 : 0) | (i + 2 < n ? bytes[i + 2] : 0);
-
-		for (size_t k = 0; k < 4; k++)
-			putc(i + k <= n ? digits[three >> (18 - 6 * k) & 63] : '=', to);
-	}
-}
-
-/* An <img> of the pixels, `factor` times as large. */
-static int print_image(FILE *to, const struct psr_frame *picture, uint32_t factor, struct psr_error *err)
-{
-	char *png = NULL;
-	size_t n = 0;
-	FILE *memory = open_memstream(&png, &n);
-	int code = memory != NULL ? png_encode(memory, write_memory, picture, err) : PSR_ERR_MEMORY;
-
-	if (memory != NULL && fclose(memory) != 0)
-		code = PSR_ERR_MEMORY;
-	if (code == PSR_OK) {
-		fprintf(to, "<img width=\"%u\" height=\"%u\" alt=\"\" src=\"data:image/png;base64,", picture->width * factor,
-		        picture->height * factor);
-		print_base64(to, (const uint8_t *)png, n);
-		fputs("\">", to);
-	}
-	free(png);
-	return code == PSR_OK ? PSR_OK : psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of the page");
-}
-
-/* ---- pictures of differences ---- */
 
 struct figure {
 	FILE *to;
@@ -120,7 +77,7 @@ static int print_column(const struct figure *figure, const char *title, const ui
 	int code;
 
 	fprintf(figure->to, "<figure><figcaption>%s</figcaption><span>", title);
-	code = print_image(figure->to, &frame, 1, err);
+	code = html_image(figure->to, &frame, 1, err);
 	if (box->width > 0)
 		fprintf(figure->to, "<i style=\"left:%.2f%%;top:%.2f%%;width:%.2f%%;height:%.2f%%\"></i>",
 		        100.0 * box->x / figure->width, 100.0 * box->y / figure->height, 100.0 * box->width / figure->width,
@@ -132,7 +89,7 @@ static int print_column(const struct figure *figure, const char *title, const ui
 		for (uint32_t y = 0; frame.rgb != NULL && y < box->height; y++)
 			memcpy(frame.rgb + 3 * (size_t)y * box->width,
 			       rgb + 3 * ((size_t)(box->y + y) * figure->width + box->x), 3 * (size_t)box->width);
-		code = frame.rgb != NULL ? print_image(figure->to, &frame, figure->factor, err)
+		code = frame.rgb != NULL ? html_image(figure->to, &frame, figure->factor, err)
 		                         : psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of the page");
 		free(frame.rgb);
 	}

@@ -1,3 +1,4 @@
+#include "base/html.h"
 #include "report.h"
 
 void junit_begin(FILE *to)
@@ -8,14 +9,14 @@ void junit_begin(FILE *to)
 static void print_case(FILE *to, const struct suite *suite, const char *name, const struct result *result)
 {
 	fputs("    <testcase classname=\"", to);
-	report_escape(to, suite->name);
+	html_escape(to, suite->name);
 	fprintf(to, "\" name=\"%s\" time=\"%.3f\"", name, result->seconds);
 	if (result->text[0] == '\0') {
 		fputs("/>\n", to);
 		return;
 	}
 	fputs(result->outcome == OUTCOME_FAILED ? ">\n      <failure message=\"" : ">\n      <system-out>accepted: ", to);
-	report_escape(to, result->text);
+	html_escape(to, result->text);
 	if (result->box.width > 0)
 		fprintf(to, "; worst in %ux%u pixels at %u,%u", result->box.width, result->box.height, result->box.x,
 		        result->box.y);
@@ -31,7 +32,7 @@ void junit_suite(FILE *to, const struct results *results)
 	for (int is_printing = 0; is_printing < 2; is_printing++) {
 		if (is_printing) {
 			fputs("  <testsuite name=\"", to);
-			report_escape(to, suite->name);
+			html_escape(to, suite->name);
 			fprintf(to, "\" tests=\"%lu\" failures=\"%lu\" time=\"%.3f\">\n", n, n_failed, seconds);
 		}
 		for (uint32_t i = 0; i < suite->n_tests; i++)

@@ -1,4 +1,5 @@
 #include <inttypes.h>
+#include "base/html.h"
 #include "report.h"
 
 void page_begin(FILE *to)
@@ -19,7 +20,7 @@ static void print_failure(FILE *to, const char *name, const struct result *resul
 {
 	fprintf(to, "<h3%s>%s</h3>\n<p>%s", result->outcome == OUTCOME_ACCEPTED ? " class=\"accepted\"" : "", name,
 	        result->outcome == OUTCOME_ACCEPTED ? "accepted: " : "");
-	report_escape(to, result->text);
+	html_escape(to, result->text);
 	if (result->box.width > 0)
 		fprintf(to, "<br>worst in %ux%u pixels at %u,%u, enlarged below", result->box.width, result->box.height,
 		        result->box.x, result->box.y);
@@ -34,7 +35,7 @@ void page_suite(FILE *to, const struct results *results)
 	unsigned long n_passed = 0;
 
 	fputs("<h2>", to);
-	report_escape(to, suite->name);
+	html_escape(to, suite->name);
 	fputs("</h2>\n", to);
 	for (int is_passing = 0; is_passing < 2; is_passing++) {
 		for (uint32_t i = 0; i < suite->n_tests; i++)

@@ -2,22 +2,6 @@
 #include <inttypes.h>
 #include <unistd.h>
 
-void report_escape(FILE *to, const char *text)
-{
-	for (; *text != '\0'; text++) {
-		if (*text == '<')
-			fputs("&lt;", to);
-		else if (*text == '>')
-			fputs("&gt;", to);
-		else if (*text == '&')
-			fputs("&amp;", to);
-		else if (*text == '"')
-			fputs("&quot;", to);
-		else
-			putc((unsigned char)*text < ' ' || *text == '\x7f' ? '?' : *text, to);
-	}
-}
-
 int report_open(struct report *report, struct psr_error *err)
 {
 	int code = report->junit != NULL ? outfile_open(&report->junit_file, report->junit, OUTFILE_PLAIN, err) : PSR_OK;

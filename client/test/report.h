@@ -32,7 +32,4 @@ void page_begin(FILE *to);
 void page_suite(FILE *to, const struct results *results);
 void page_end(FILE *to, const struct report *report);
 
-/* Writes a text for XML and HTML; what is not printable becomes a ?. */
-void report_escape(FILE *to, const char *text);
-
 #endif
