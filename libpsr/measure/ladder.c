@@ -90,6 +90,11 @@ struct drawn {
 	uint64_t n_bytes;
 };
 
+static uint64_t clock_of(const struct psr_pool *pool)
+{
+	return pool != NULL ? clock_ns() : clock_thread_ns();
+}
+
 /* Draws a frame into the ladder's room, and encodes it. is_first: shadow maps of earlier frames are dropped before. */
 static int draw(struct drawn *drawn, const struct call *call, const struct ladder_rung *rung, int is_first)
 {
@@ -108,12 +113,12 @@ static int draw(struct drawn *drawn, const struct call *call, const struct ladde
 		rc = render(call, rung, &scene, renderer, pool, &frame);
 		scene.n_lights = 1;
 	}
-	const uint64_t start = clock_ns();
+	const uint64_t start = clock_of(pool);
 	if (rc == PSR_OK)
 		rc = render(call, rung, &scene, renderer, pool, &frame);
 	if (rc == PSR_OK && coder != NULL)
 		rc = coder->encode(&drawn->n_bytes, frame.rgb, frame.width, frame.height, coder->userdata);
-	drawn->ns = clock_ns() - start;
+	drawn->ns = clock_of(pool) - start;
 	if (rc == PSR_OK && frame.report.n_shadow_maps_drawn > 0) {
 		drawn->shadow_ns = frame.report.ns[PSR_STAGE_SHADOW];
 		drawn->ns -= drawn->shadow_ns;

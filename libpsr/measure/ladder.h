@@ -68,7 +68,8 @@ struct ladder_rung {
 	const struct ladder_coder *coder; /* NULL: none */
 };
 
-/* A rung's frames of one view. The first rung is the one that others are compared with. */
+/* A rung's frames of one view. The first rung is the one that others are compared with. Times of one thread are its
+ * processor time, which others on the machine take less from; those of several are wall time. */
 struct ladder_row {
 	double ms, ms_low, ms_high;          /* of a frame: median and quartiles. Shadow maps stand from frames before */
 	double ratio, ratio_low, ratio_high; /* to the first rung's frame of the same round: median and quartiles */
