@@ -8,6 +8,7 @@
 #include "accuracy/passes.h"
 #include "accuracy/report.h"
 #include "accuracy/verdict.h"
+#include "price/price.h"
 #include "base/maths.h"
 #include "base/netpbm.h"
 #include "base/outfile.h"
@@ -267,7 +268,9 @@ int cmd_accuracy(int argc, char **argv)
 	const char *model = NULL;
 	double magnification = 1;
 	int64_t n_passes = 0;
-	int seen_passes = 0, sun = 0, lamp = 0, json = 0, n_operands, code;
+	struct price_options price = { .size = { 256, 256 }, .resolution = 512, .n_rounds = 9, .seed = 1 };
+	int64_t n_views = 8, resolution = price.resolution, n_rounds = price.n_rounds, seed = (int64_t)price.seed;
+	int seen_views = 0, seen_passes = 0, sun = 0, lamp = 0, json = 0, n_operands, code;
 	const struct psr_opt opts[] = {
 		{ .name = "The frame", .type = PSR_OPT_HEADING },
 		{ .name = "depth", .type = PSR_OPT_STRING, .value = &frame.depth, .arg = "FRAME.pfm",
@@ -305,6 +308,23 @@ int cmd_accuracy(int argc, char **argv)
 		          " if not given.", .min = 0, .max = 1 << 26, .seen = &bounds.has_outside },
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
 		  .help = "Prints all figures as a JSON object, with `verdict`: pass, fail or camera." },
+		{ .name = "What accuracy costs", .type = PSR_OPT_HEADING,
+		  .help = "Builds models of SOURCE, draws views of them with each of many settings, one after the other, and tells time"
+		          " and error of each: which settings no other beats, the best within a time, the cheapest within an error." },
+		{ .name = "views", .type = PSR_OPT_INT, .value = &n_views, .arg = "N",
+		  .help = "Measures on so many views: the first is from around, the second close, the third grazing, the fourth from far,"
+		          " and so on.", .min = 1, .max = PRICE_MOST_VIEWS, .seen = &seen_views },
+		{ .name = "out", .type = PSR_OPT_STRING, .value = &price.out, .arg = "DIR",
+		  .help = "Writes index.html, which holds all of it, plot.svg, plot.png, strip.png, prices.csv and prices.json into this"
+		          " folder.", .seen = &seen_views },
+		{ .name = "size", .type = PSR_OPT_SIZE, .value = price.size, .arg = "WxH", .help = "Pixels of a view.", .min = 32,
+		  .max = 4096 },
+		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
+		  .help = "Of the usual model; others have a quarter, half and twice of it.", .min = 16, .max = 4096 },
+		{ .name = "rounds", .type = PSR_OPT_INT, .value = &n_rounds, .arg = "N",
+		  .help = "Frames of each setting and view that are timed.", .min = 1, .max = 1000 },
+		{ .name = "seed", .type = PSR_OPT_INT, .value = &seed, .arg = "N", .help = "Other seeds give other views.", .min = 0,
+		  .max = 1e15 },
 		{ .name = "For developers: shadows", .type = PSR_OPT_HEADING },
 		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
 		  .help = "Compares shadows as well: a frame drawn with --ambient 0 and one light, which casts them." },
@@ -329,6 +349,7 @@ int cmd_accuracy(int argc, char **argv)
 		.usage = "psr-model accuracy SOURCE --depth FRAME.pfm --report FRAME.json [options]\n"
 		         "       psr-model accuracy SOURCE --depth FRAME.pfm --eye X,Y,Z --target X,Y,Z --up X,Y,Z\n"
 		         "                 (--fov DEG | --ortho HEIGHT) --spacing S [options]\n"
+		         "       psr-model accuracy SOURCE --views N [--out DIR] [options]\n"
 		         "       psr-model accuracy SOURCE --model FILE.psr --passes N [--magnification M]",
 		.summary = "Checks a frame: compares its depth (and colours) with the same view of SOURCE,"
 		           " the mesh that its model was built from, ray-traced. The last line is the verdict.",
@@ -344,6 +365,15 @@ int cmd_accuracy(int argc, char **argv)
 	code = psr_cli_parse(&cli, argc, argv, &n_operands, &err);
 	if (code > 0)
 		return 0;
+	if (code == PSR_OK && seen_views) {
+		price.n_views = (uint32_t)n_views;
+		price.resolution = (uint32_t)resolution;
+		price.n_rounds = (uint32_t)n_rounds;
+		price.seed = (uint64_t)seed;
+		price.source = argv[1];
+		code = n_operands == 1 ? price_run(&price, &err) : psr_fail(&err, PSR_ERR_ARG, "--views needs one source file");
+		return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
+	}
 	if (code == PSR_OK && seen_passes) {
 		if (n_operands != 1 || model == NULL)
 			code = psr_fail(&err, PSR_ERR_ARG, "--passes needs one source file, and --model FILE.psr made from it");

@@ -95,6 +95,11 @@ static uint64_t clock_of(const struct psr_pool *pool)
 	return pool != NULL ? clock_ns() : clock_thread_ns();
 }
 
+static int check_coding(int rc, struct psr_error *err)
+{
+	return rc == PSR_OK ? PSR_OK : psr_fail(err, rc, "a picture could not be coded");
+}
+
 /* Draws a frame into the ladder's room, and encodes it. is_first: shadow maps of earlier frames are dropped before. */
 static int draw(struct drawn *drawn, const struct call *call, const struct ladder_rung *rung, int is_first)
 {
@@ -117,7 +122,8 @@ static int draw(struct drawn *drawn, const struct call *call, const struct ladde
 	if (rc == PSR_OK)
 		rc = render(call, rung, &scene, renderer, pool, &frame);
 	if (rc == PSR_OK && coder != NULL)
-		rc = coder->encode(&drawn->n_bytes, frame.rgb, frame.width, frame.height, coder->userdata);
+		rc = check_coding(coder->encode(&drawn->n_bytes, frame.rgb, frame.width, frame.height, coder->userdata),
+		                  call->err);
 	drawn->ns = clock_of(pool) - start;
 	if (rc == PSR_OK && frame.report.n_shadow_maps_drawn > 0) {
 		drawn->shadow_ns = frame.report.ns[PSR_STAGE_SHADOW];
@@ -133,7 +139,8 @@ static int draw_decoded(struct drawn *drawn, const struct call *call, const stru
 
 	if (rc != PSR_OK || coder == NULL)
 		return rc;
-	return coder->decode(call->ladder->rgb, call->view->width, call->view->height, coder->userdata);
+	return check_coding(coder->decode(call->ladder->rgb, call->view->width, call->view->height, coder->userdata),
+	                    call->err);
 }
 
 static double error_of(const uint8_t *rgb, const struct ladder_view *view)

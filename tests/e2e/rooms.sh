@@ -58,6 +58,7 @@ client
 models/shapes
 models/commands.h
 models/accuracy/
+models/price
 models/studies/lib
 models/studies/greedy
 models/studies/cull
