@@ -105,6 +105,7 @@ static int draw(struct drawn *drawn, const struct call *call, const struct ladde
 {
 	const struct psr_instance instance = { .model = rung->model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	const struct ladder_coder *coder = rung->coder;
+	struct psr_light light = call->view->light;
 	struct psr_frame frame = { .width = call->view->width, .height = call->view->height, .rgb = call->ladder->rgb };
 	struct psr_renderer *renderer;
 	struct psr_pool *pool;
@@ -113,7 +114,9 @@ static int draw(struct drawn *drawn, const struct call *call, const struct ladde
 
 	*drawn = (struct drawn){ .n_bytes = 0 };
 	ladder_scene(&scene, call->view, &instance);
-	if (rc == PSR_OK && is_first && call->view->light.casts_shadow) {
+	light.casts_shadow &= !rung->no_shadows;
+	scene.light = &light;
+	if (rc == PSR_OK && is_first && light.casts_shadow) {
 		scene.n_lights = 0;
 		rc = render(call, rung, &scene, renderer, pool, &frame);
 		scene.n_lights = 1;

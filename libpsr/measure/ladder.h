@@ -20,7 +20,8 @@ enum ladder_kind {
 const char *ladder_kind_name(enum ladder_kind kind); /* "around" */
 
 /* A picture of one model at its own place, in the light of psr_light_key(), dimmed so that white does not saturate, and
- * ambient light. Plain data but for the truth, which ladder_view_fini() frees. */
+ * ambient light; views 4 to 7, 12 to 15, ... have shadows. Plain data but for the truth, which ladder_view_fini()
+ * frees. */
 struct ladder_view {
 	enum ladder_kind kind;
 	struct psr_camera camera;
@@ -31,7 +32,8 @@ struct ladder_view {
 };
 
 struct ladder_look {
-	struct psr_truth *truth;
+	struct psr_truth *truth;           /* finds places of the surface */
+	struct psr_source *source;         /* draws the truth; only ladder_view_trace() needs it */
 	const struct psr_model_info *info; /* of the model at the ladder's usual resolution: box, way up, spacing */
 	uint32_t width, height;
 	uint64_t seed;                     /* other seeds give other views */
@@ -41,13 +43,13 @@ struct ladder_look {
 /* Makes n views; view i is of kind i % LADDER_N_KINDS, and does not depend on n. They have no truth yet. MEMORY. */
 int ladder_views_make(struct ladder_view *view, uint32_t n, const struct ladder_look *look, struct psr_error *err);
 
-/* Traces the truth of a view: rays * rays a pixel, 1..32. MEMORY. */
+/* Traces the truth of a view: rays * rays a pixel, 1..16. MEMORY. */
 int ladder_view_trace(struct ladder_view *view, const struct ladder_look *look, uint32_t rays, struct psr_error *err);
 void ladder_view_fini(struct ladder_view *view); /* a zeroed one is fine */
 
 /* ---- settings, measured (ladder.c) ---- */
 
-/* Makes the scene that shows the instance in the view. It points to both. */
+/* Makes the scene that shows the instance in the view; NULL: none. It points to both. */
 void ladder_scene(struct psr_scene *scene, const struct ladder_view *view, const struct psr_instance *instance);
 
 /* A coder whose loss counts as the frame's, and whose time of encoding counts as the frame's. Both functions return
@@ -63,6 +65,7 @@ struct ladder_coder {
 struct ladder_rung {
 	const struct psr_model *model;   /* of the object that all rungs draw */
 	struct render_settings settings; /* width, height and cancel are the ladder's own */
+	int no_shadows;                  /* 1: the light shines through */
 	enum psr_isa isa;                /* LADDER_BEST_ISA: the best of the machine. simd_of() must have it */
 	int n_threads;                   /* 1..256; 0: the ladder's */
 	const struct ladder_coder *coder; /* NULL: none */

@@ -171,6 +171,7 @@ int ladder_views_make(struct ladder_view *view, uint32_t n, const struct ladder_
 		look_around(&v->camera, look, v->kind == LADDER_FAR ? AWAY : 1, &random);
 		psr_light_key(&v->light, &v->camera);
 		v3d_set(v->light.color, LIGHT, LIGHT, LIGHT);
+		v->light.casts_shadow = i / LADDER_N_KINDS % 2 != 0;
 		if (v->kind == LADDER_CLOSE || v->kind == LADDER_GRAZING)
 			rc = look_at_place(v, look, &random, err);
 	}
@@ -179,8 +180,8 @@ int ladder_views_make(struct ladder_view *view, uint32_t n, const struct ladder_
 
 void ladder_scene(struct psr_scene *scene, const struct ladder_view *view, const struct psr_instance *instance)
 {
-	*scene = (struct psr_scene){ .instance = instance, .n_instances = 1, .light = &view->light, .n_lights = 1,
-		                         .camera = view->camera };
+	*scene = (struct psr_scene){ .instance = instance, .n_instances = instance != NULL, .light = &view->light,
+		                         .n_lights = 1, .camera = view->camera };
 	for (int i = 0; i < 3; i++) {
 		scene->ambient[i] = AMBIENT;
 		scene->background[i] = BACKGROUND;
@@ -189,20 +190,22 @@ void ladder_scene(struct psr_scene *scene, const struct ladder_view *view, const
 
 int ladder_view_trace(struct ladder_view *view, const struct ladder_look *look, uint32_t rays, struct psr_error *err)
 {
-	const struct psr_truth_shot shot = { look->truth, &view->camera, view->width, view->height, look->n_threads };
 	const size_t area = (size_t)view->width * view->height;
-	uint8_t *truth = malloc(3 * area), *covered = malloc(area);
+	uint8_t *truth = malloc(3 * area);
+	float *coverage = malloc(area * sizeof *coverage);
 	struct psr_scene scene;
-	int rc = truth != NULL && covered != NULL ? PSR_OK : psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u",
-	                                                               view->width, view->height);
+	int rc = truth != NULL && coverage != NULL
+	             ? PSR_OK
+	             : psr_fail(err, PSR_ERR_MEMORY, "no memory for a picture of %ux%u", view->width, view->height);
 
 	ladder_scene(&scene, view, NULL);
+	const struct psr_source_shot shot = { look->source, &scene, view->width, view->height, rays, look->n_threads };
 	if (rc == PSR_OK)
-		rc = psr_truth_still(&shot, &scene, rays, truth, covered, err);
+		rc = psr_source_draw(&shot, &(struct psr_source_planes){ .rgb = (uint8_t(*)[3])truth, .coverage = coverage }, err);
 	view->n_covered = 0;
 	for (size_t i = 0; rc == PSR_OK && i < area; i++)
-		view->n_covered += covered[i];
-	free(covered);
+		view->n_covered += coverage[i] > 0;
+	free(coverage);
 	if (rc != PSR_OK) {
 		free(truth);
 		return rc;

@@ -74,7 +74,7 @@ void price_judge(struct price *price)
 	for (uint32_t i = 0; i < price->set.n; i++) {
 		judge_setting(price, i);
 		price->is_unbeaten[i] = 0;
-		if (price->set.setting[i].is_choice)
+		if (price->set.setting[i].is_choice && (i == 0 || !price->is_same[i] || price->ratio[i][2] < 1))
 			price->choice[price->n_choices++] = i;
 	}
 	find_unbeaten(price);

@@ -22,9 +22,9 @@ static void begin(FILE *to, const struct price *price)
 	      "figcaption { color: #666; font-size: 13px } img { display: block; image-rendering: pixelated }\n"
 	      "</style>\n</head>\n<body>\n<h1>What accuracy costs: ", to);
 	html_escape(to, price->title);
-	fprintf(to, "</h1>\n<p>%u views of %ux%u pixels; a model of %u pixels; one light; one thread, %u rounds. Milliseconds are "
-	        "the mean over the views of each view's median frame; ratios are to the usual setting's frame of the same round, "
-	        "with quartiles; dB are the whole picture's, to rays through the source.</p>\n",
+	fprintf(to, "</h1>\n<p>%u views of %ux%u pixels; a model of %u pixels; one light; one thread, %u rounds. "
+	        "Milliseconds are the mean over the views of each view's median frame; ratios are to the usual setting's "
+	        "frame of the same round, with quartiles; dB are the whole picture's, to rays through the source.</p>\n",
 	        options->n_views, options->size[0], options->size[1], options->resolution, options->n_rounds);
 }
 

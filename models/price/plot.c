@@ -1,15 +1,18 @@
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "base/gnuplot.h"
 #include "price.h"
 
-/* Knobs that are drawn in a colour of their own; others are grey. */
+/* Knobs, each in a colour that colour-blind people tell from the others (Okabe, Ito 2008). */
 static const struct {
 	const char *knob, *title;
+	const char *color;
 } groups[] = {
-	{ "spacing", "spacing" }, { "smoothing", "smoothing" }, { "passes", "passes" }, { "resolution", "resolution of the model" },
-	{ "gaps", "gaps" }, { "culling", "culling" },
+	{ "spacing", "spacing", "#0072b2" }, { "smoothing", "smoothing", "#e69f00" }, { "passes", "passes", "#d55e00" },
+	{ "resolution", "resolution of the model", "#009e73" }, { "gaps", "gaps", "#cc79a7" }, { "shadows", "shadows", "#56b4e9" },
 };
+#define LABEL_LOG 0.05 /* a name needs so much room above the next */
 #define N_GROUPS (sizeof groups / sizeof groups[0])
 
 static int is_in(const struct price *price, uint32_t setting, size_t group)
@@ -19,6 +22,8 @@ static int is_in(const struct price *price, uint32_t setting, size_t group)
 
 static void write_points(FILE *to, const struct price *price)
 {
+	const struct ladder_point *labelled = NULL;
+
 	for (size_t g = 0; g < N_GROUPS; g++) {
 		fprintf(to, "$group%zu << EOD\n", g);
 		for (uint32_t i = 0; i < price->n_choices; i++)
@@ -27,9 +32,14 @@ static void write_points(FILE *to, const struct price *price)
 		fputs("EOD\n", to);
 	}
 	fprintf(to, "$usual << EOD\n%.6g %.6g\nEOD\n$unbeaten << EOD\n", price->point[0].ms, price->point[0].rmse);
-	for (uint32_t i = 0; i < price->n_unbeaten; i++)
-		fprintf(to, "%.6g %.6g \"%s\"\n", price->point[price->unbeaten[i]].ms, price->point[price->unbeaten[i]].rmse,
-		        price->set.setting[price->unbeaten[i]].name);
+	for (uint32_t i = 0; i < price->n_unbeaten; i++) {
+		const struct ladder_point *point = &price->point[price->unbeaten[i]];
+		const int has_room = labelled == NULL || fabs(log(point->rmse / labelled->rmse)) > LABEL_LOG;
+
+		fprintf(to, "%.6g %.6g \"%s\"\n", point->ms, point->rmse,
+		        has_room ? price->set.setting[price->unbeaten[i]].name : "");
+		labelled = has_room ? point : labelled;
+	}
 	fputs("EOD\n", to);
 }
 
@@ -42,7 +52,8 @@ static void write_plot(FILE *to, const struct price *price, const char *terminal
 	gnuplot_quote(to, path);
 	fputs("\nplot $unbeaten using 1:2 with fsteps lw 2 lc rgb '#888888' title 'no choice beats these'", to);
 	for (size_t g = 0; g < N_GROUPS; g++)
-		fprintf(to, ", $group%zu using 1:2 with points pt 7 ps 0.7 title '%s'", g, groups[g].title);
+		fprintf(to, ", $group%zu using 1:2 with points pt 7 ps 0.8 lc rgb '%s' title '%s'", g, groups[g].color,
+		        groups[g].title);
 	fputs(", $usual using 1:2 with points pt 6 ps 2 lw 2 lc rgb 'black' title 'usual'"
 	      ", $unbeaten using 1:2:3 with labels left offset 0.6,0.6 font ',9' noenhanced notitle\nunset output\n", to);
 }
@@ -55,7 +66,7 @@ int price_write_plots(struct price *price, struct psr_error *err)
 
 	price->has_plot = 0;
 	if (code == PSR_OK) {
-		fputs("set logscale xy\nset grid\nset key below horizontal\nset xlabel 'milliseconds a frame'\n"
+		fputs("set logscale xy\nset ytics add (2, 3, 5, 20, 30, 50)\nset grid xtics ytics\nset key below horizontal\nset xlabel 'milliseconds a frame'\n"
 		      "set ylabel 'error, codes of sRGB (root mean square)'\nset title ", to);
 		gnuplot_quote(to, price->title);
 		fputs(" noenhanced\n", to);

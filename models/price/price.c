@@ -82,7 +82,7 @@ static int check_exact(const struct price *price, struct psr_error *err)
 	return PSR_OK;
 }
 
-static int run(struct price *price, const struct psr_mesh *mesh, struct psr_truth *truth, struct psr_error *err)
+static int run(struct price *price, const struct psr_mesh *mesh, struct ladder_look *look, struct psr_error *err)
 {
 	const struct price_options *options = price->options;
 	const struct ladder_options ladder = { .n_threads = 1, .n_rounds = options->n_rounds, .most_seconds = MOST_SECONDS,
@@ -95,11 +95,12 @@ static int run(struct price *price, const struct psr_mesh *mesh, struct psr_trut
 	if (rc != PSR_OK)
 		return rc;
 	psr_build_options_default(&build);
-	const struct psr_model_info *info = psr_model_info(price->set.model[0]);
-	psr_truth_stipple(truth, info->spacing);
-	rc = measure(price, &(struct ladder_look){ .truth = truth, .info = info, .width = options->size[0],
-	                                           .height = options->size[1], .seed = options->seed,
-	                                           .n_threads = build.n_threads }, err);
+	look->info = psr_model_info(price->set.model[0]);
+	look->width = options->size[0];
+	look->height = options->size[1];
+	look->seed = options->seed;
+	look->n_threads = build.n_threads;
+	rc = measure(price, look, err);
 	if (rc != PSR_OK)
 		return rc;
 	price_judge(price);
@@ -121,7 +122,7 @@ int price_run(const struct price_options *options, struct psr_error *err)
 {
 	struct price *price = calloc(1, sizeof *price);
 	struct psr_mesh *mesh = NULL;
-	struct psr_truth *truth = NULL;
+	struct ladder_look look = { .truth = NULL };
 	int rc = price != NULL ? PSR_OK : psr_fail(err, PSR_ERR_MEMORY, "no memory to measure settings");
 
 	if (rc == PSR_OK && options->out != NULL)
@@ -129,11 +130,13 @@ int price_run(const struct price_options *options, struct psr_error *err)
 	if (rc == PSR_OK)
 		rc = psr_mesh_import(&mesh, options->source, NULL, err);
 	if (rc == PSR_OK)
-		rc = psr_truth_create(&truth, mesh, err);
+		rc = psr_truth_create(&look.truth, mesh, err);
+	if (rc == PSR_OK)
+		rc = psr_source_create(&look.source, mesh, err);
 	if (rc == PSR_OK) {
 		price->options = options;
 		price->title = file_name(options->source);
-		rc = run(price, mesh, truth, err);
+		rc = run(price, mesh, &look, err);
 	}
 	for (uint32_t v = 0; price != NULL && price->view != NULL && v < options->n_views; v++)
 		ladder_view_fini(&price->view[v]);
@@ -144,7 +147,8 @@ int price_run(const struct price_options *options, struct psr_error *err)
 		free(price->row);
 	}
 	free(price);
-	psr_truth_destroy(truth);
+	psr_source_destroy(look.source);
+	psr_truth_destroy(look.truth);
 	psr_mesh_destroy(mesh);
 	return rc;
 }

@@ -71,7 +71,9 @@ struct price {
 	                                                     * quartiles, each the mean over all views */
 	double bytes[PRICE_MOST_SETTINGS];                  /* that its coder makes; 0 without one */
 	uint8_t is_same[PRICE_MOST_SETTINGS];               /* all its pictures are the usual setting's */
-	uint32_t n_choices, choice[PRICE_MOST_SETTINGS];    /* the settings of the set that are choices */
+	/* The settings of the set that are choices; of those that draw the usual picture only the ones of which three in
+	 * four frames are faster. */
+	uint32_t n_choices, choice[PRICE_MOST_SETTINGS];
 	uint8_t is_unbeaten[PRICE_MOST_SETTINGS];           /* a choice that no other choice beats */
 	uint32_t n_unbeaten, unbeaten[PRICE_MOST_SETTINGS]; /* these, the fastest first */
 	int has_plot;                                       /* plot.svg and plot.png are there */
@@ -90,8 +92,8 @@ void price_judge(struct price *price);
 uint32_t price_best_within(const struct price *price, double ms);
 uint32_t price_cheapest_within(const struct price *price, double rmse);
 
-/* Calls `row` for times, each 1.41 times the one before, from the fastest unbeaten choice's on, and for errors, each 2 dB
- * below the one before, as long as the choice is another one than before. */
+/* Calls `row` for times, each 1.41 times the one before, from the fastest unbeaten choice's on, and for errors, each
+ * 2 dB below the one before, where the choice is another one than before. */
 struct price_rows {
 	void (*row)(double bound, uint32_t setting, void *userdata);
 	void *userdata;

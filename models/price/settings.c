@@ -106,6 +106,14 @@ static void add_gaps(struct price_set *set)
 	add(set, "warp", "discs")->settings.with_splats = 1;
 }
 
+/* Only with views that have shadows. */
+static void add_shadows(struct price_set *set)
+{
+	for (uint32_t side = 128; side >= 64; side /= 2)
+		add(set, "shadows", "shadow map of %u", side)->settings.shadow_side = side;
+	add(set, "shadows", "no shadows")->no_shadows = 1;
+}
+
 /* What must not change the picture. */
 static void add_exact(struct price_set *set)
 {
@@ -192,6 +200,8 @@ int price_set_make(struct price_set *set, const struct psr_mesh *mesh, const str
 	add_requests(set);
 	rc = add_resolutions(set, mesh, options->resolution, err);
 	add_gaps(set);
+	if (options->n_views > LADDER_N_KINDS)
+		add_shadows(set);
 	add_exact(set);
 	if (rc == PSR_OK)
 		rc = add_words(set, err);

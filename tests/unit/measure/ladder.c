@@ -20,6 +20,7 @@ struct fixture {
 	struct psr_mesh *mesh;
 	struct psr_model *model;
 	struct psr_truth *truth;
+	struct psr_source *source;
 	struct ladder_look look;
 };
 
@@ -34,10 +35,11 @@ static int open_fixture(void **state)
 	options.resolution = 64;
 	*state = f;
 	if (psr_model_build(&f->model, f->mesh, &options, NULL, NULL) != PSR_OK
-	    || psr_truth_create(&f->truth, f->mesh, NULL) != PSR_OK)
+	    || psr_truth_create(&f->truth, f->mesh, NULL) != PSR_OK
+	    || psr_source_create(&f->source, f->mesh, NULL) != PSR_OK)
 		return -1;
-	f->look = (struct ladder_look){ .truth = f->truth, .info = psr_model_info(f->model), .width = SIDE, .height = SIDE,
-		                            .seed = 7, .n_threads = 1 };
+	f->look = (struct ladder_look){ .truth = f->truth, .source = f->source, .info = psr_model_info(f->model),
+		                            .width = SIDE, .height = SIDE, .seed = 7, .n_threads = 1 };
 	return 0;
 }
 
@@ -45,6 +47,7 @@ static int close_fixture(void **state)
 {
 	struct fixture *f = *state;
 
+	psr_source_destroy(f->source);
 	psr_truth_destroy(f->truth);
 	psr_model_unref(f->model);
 	meshes_free(f->mesh);
@@ -68,6 +71,7 @@ static void views_are_of_their_seed_and_number_alone(void **state)
 	assert_int_equal(ladder_views_make(b, 8, &other, NULL), PSR_OK);
 	for (int i = 0; i < 8; i++) {
 		assert_int_equal(a[i].kind, i % LADDER_N_KINDS);
+		assert_int_equal(a[i].light.casts_shadow, i >= LADDER_N_KINDS);
 		assert_memory_not_equal(a[i].camera.eye, b[i].camera.eye, sizeof a[i].camera.eye);
 	}
 }
@@ -208,17 +212,18 @@ static void a_slow_rung_sits_out_and_the_first_one_never(void **state)
 static void shadow_maps_are_drawn_once_and_counted_apart(void **state)
 {
 	const struct fixture *f = *state;
-	struct ladder_rung rung[2] = { usual(f), usual(f) };
+	struct ladder_rung rung[3] = { usual(f), usual(f), usual(f) };
 	struct measured m;
-	struct ladder_row row[2];
+	struct ladder_row row[3];
 
 	measured_make(&m, f, &(struct ladder_options){ .n_threads = 1, .n_rounds = 1, .most_seconds = 1 });
 	assert_int_equal(ladder_measure(row, m.ladder, &m.view[0], rung, 2, NULL), PSR_OK);
 	assert_true(row[0].shadow_ms == 0 && row[1].shadow_ms == 0);
 	m.view[0].light.casts_shadow = 1;
 	rung[1].settings.shadow_side = 64;
-	assert_int_equal(ladder_measure(row, m.ladder, &m.view[0], rung, 2, NULL), PSR_OK);
-	assert_true(row[0].shadow_ms > 0 && row[1].shadow_ms > 0);
+	rung[2].no_shadows = 1;
+	assert_int_equal(ladder_measure(row, m.ladder, &m.view[0], rung, 3, NULL), PSR_OK);
+	assert_true(row[0].shadow_ms > 0 && row[1].shadow_ms > 0 && row[2].shadow_ms == 0);
 	measured_fini(&m);
 }
 
