@@ -9,7 +9,7 @@
 #include "psr/build.h"
 
 #define RAYS 8           /* a side of a pixel, for the truth */
-#define MOST_SECONDS 0.5 /* that a slow setting may take in a view; then it sits out later rounds */
+#define MOST_SECONDS 0.3 /* that a slow setting may take in a view; then it sits out later rounds */
 
 static void tell(const char *what, uint32_t done, uint32_t total)
 {
