@@ -1,18 +1,16 @@
 #include "commands.h"
 
-#include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "accuracy/passes.h"
+#include "accuracy/print.h"
 #include "accuracy/report.h"
-#include "accuracy/verdict.h"
 #include "price/price.h"
 #include "base/maths.h"
 #include "base/netpbm.h"
 #include "base/outfile.h"
-#include "base/json.h"
 #include "psr/build.h"
 #include "base/cli.h"
 #include "measure/measure.h"
@@ -31,72 +29,6 @@ struct frame {
 		int eye, target, up, fov, ortho, spacing;
 	} given;
 };
-
-static double fraction(uint64_t part, uint64_t whole)
-{
-	return whole == 0 ? 0 : (double)part / (double)whole;
-}
-
-static void print_text(const struct psr_accuracy *a)
-{
-	printf("pixels that show the object          %" PRIu64 "\n", a->n_truth);
-	printf("  inside of the silhouette           %" PRIu64 "\n", a->n_inside);
-	printf("  inside and empty                   %" PRIu64 "\n", a->n_inside_empty);
-	printf("  holes                              %" PRIu64 " (%.4f %% of the pixels inside)\n", a->n_holes,
-	       100 * fraction(a->n_holes, a->n_inside));
-	printf("drawn over a pixel outside           %" PRIu64 "\n", a->n_outside_drawn);
-	printf("distance to the truth, in spacings   p50 %.4f, p99 %.4f, p99.9 %.4f, max %.4f of %" PRIu64 " pixels\n",
-	       a->distance_p50, a->distance_p99, a->distance_p999, a->distance_max, a->n_compared);
-}
-
-static void print_color_text(const struct psr_color_accuracy *c)
-{
-	printf("colour: more than %d codes off          %" PRIu64 " (%.4f %%) of %" PRIu64 " pixels; mean %.3f codes\n",
-	       PSR_COLOR_WRONG, c->n_wrong, 100 * fraction(c->n_wrong, c->n_compared), c->n_compared, c->mean);
-}
-
-static void print_shadow_text(const struct psr_shadow_accuracy *s)
-{
-	printf("shadow: light more than %.0f %% off       %" PRIu64 " (%.4f %%) of %" PRIu64 " pixels, %" PRIu64 " of them in shadow; mean %.4f\n",
-	       100 * PSR_SHADOW_WRONG, s->n_wrong, 100 * fraction(s->n_wrong, s->n_compared), s->n_compared, s->n_shadow, s->mean);
-	printf("  on the wrong side of an edge       %" PRIu64 ", by p99 %.2f, max %.2f pixels\n", s->n_misplaced, s->seam_p99,
-	       s->seam_max);
-}
-
-/* color and shadow may be NULL. */
-static int print_json(const struct psr_accuracy *a, const struct psr_color_accuracy *color,
-                      const struct psr_shadow_accuracy *shadow, enum accuracy_verdict verdict, struct psr_error *err)
-{
-	cJSON *root = cJSON_CreateObject();
-
-	cJSON_AddNumberToObject(root, "truth", (double)a->n_truth);
-	cJSON_AddNumberToObject(root, "inside", (double)a->n_inside);
-	cJSON_AddNumberToObject(root, "inside_empty", (double)a->n_inside_empty);
-	cJSON_AddNumberToObject(root, "holes", (double)a->n_holes);
-	cJSON_AddNumberToObject(root, "holes_fraction", fraction(a->n_holes, a->n_inside));
-	cJSON_AddNumberToObject(root, "outside_drawn", (double)a->n_outside_drawn);
-	cJSON_AddNumberToObject(root, "compared", (double)a->n_compared);
-	cJSON_AddNumberToObject(root, "distance_p50", a->distance_p50);
-	cJSON_AddNumberToObject(root, "distance_p99", a->distance_p99);
-	cJSON_AddNumberToObject(root, "distance_p999", a->distance_p999);
-	cJSON_AddNumberToObject(root, "distance_max", a->distance_max);
-	if (color != NULL) {
-		cJSON_AddNumberToObject(root, "color_compared", (double)color->n_compared);
-		cJSON_AddNumberToObject(root, "color_wrong", (double)color->n_wrong);
-		cJSON_AddNumberToObject(root, "color_mean", color->mean);
-	}
-	if (shadow != NULL) {
-		cJSON_AddNumberToObject(root, "shadow_compared", (double)shadow->n_compared);
-		cJSON_AddNumberToObject(root, "shadow_in_shadow", (double)shadow->n_shadow);
-		cJSON_AddNumberToObject(root, "shadow_wrong", (double)shadow->n_wrong);
-		cJSON_AddNumberToObject(root, "shadow_misplaced", (double)shadow->n_misplaced);
-		cJSON_AddNumberToObject(root, "shadow_mean", shadow->mean);
-		cJSON_AddNumberToObject(root, "shadow_seam_p99", shadow->seam_p99);
-		cJSON_AddNumberToObject(root, "shadow_seam_max", shadow->seam_max);
-	}
-	cJSON_AddStringToObject(root, "verdict", accuracy_verdict_name(verdict));
-	return json_print(root, err);
-}
 
 /* The size is the file's. */
 static int measure_color(struct psr_color_accuracy *out, struct psr_truth_shot shot, const char *path,
@@ -135,15 +67,7 @@ static int measure_shadow(struct psr_shadow_accuracy *out, struct psr_truth_shot
 	return code;
 }
 
-struct result {
-	struct psr_accuracy depth;
-	struct psr_color_accuracy color;
-	struct psr_shadow_accuracy shadow;
-	enum accuracy_verdict verdict;
-	char text[ACCURACY_TEXT];
-};
-
-static int measure(struct result *result, const char *source, const struct frame *frame,
+static int measure(struct accuracy_result *result, const char *source, const struct frame *frame,
                    const struct shadow_frames *shadow, const struct accuracy_bounds *bounds, struct psr_error *err)
 {
 	const struct psr_camera *camera = &frame->camera;
@@ -155,6 +79,8 @@ static int measure(struct result *result, const char *source, const struct frame
 
 	psr_build_options_default(&options);
 	shot.n_threads = options.n_threads;
+	result->has_color = frame->color != NULL;
+	result->has_shadow = shadow->shadowed != NULL;
 	if (code == PSR_OK && frame->width > 0 && (frame->width != shot.width || frame->height != shot.height))
 		code = psr_fail(err, PSR_ERR_ARG, "%s has %ux%u pixels, and %s is of a frame of %ux%u: they belong to different frames",
 		                frame->depth, shot.width, shot.height, frame->report, frame->width, frame->height);
@@ -234,35 +160,13 @@ static int complete(struct frame *frame, int n_operands, struct psr_error *err)
 	return PSR_OK;
 }
 
-static int print(const struct result *result, const struct frame *frame, int has_shadow, int json, struct psr_error *err)
-{
-	int code = PSR_OK;
-
-	if (json) {
-		code = print_json(&result->depth, frame->color ? &result->color : NULL, has_shadow ? &result->shadow : NULL,
-		                  result->verdict, err);
-		if (result->verdict != ACCURACY_PASS)
-			fprintf(stderr, PROGRAM ": %s\n", result->text);
-	} else {
-		print_text(&result->depth);
-		if (frame->color != NULL)
-			print_color_text(&result->color);
-		if (has_shadow)
-			print_shadow_text(&result->shadow);
-		puts(result->text);
-	}
-	if (code == PSR_OK)
-		code = outfile_flush_stdout(err);
-	return code;
-}
-
 int cmd_accuracy(int argc, char **argv)
 {
 	/* NAN: not given, which --help shows as no default. */
 	struct frame frame = { .camera = { .eye = { NAN }, .target = { NAN }, .up = { NAN }, .ortho_height = NAN },
 		                   .fov = NAN, .spacing = NAN };
 	struct accuracy_bounds bounds = { .holes = NAN, .distance = NAN, .outside = NAN };
-	struct result result;
+	struct accuracy_result result;
 	struct psr_error err;
 	struct shadow_frames shadow = { .light = { .position = { NAN }, .direction = { NAN } } };
 	const char *model = NULL;
@@ -318,13 +222,14 @@ int cmd_accuracy(int argc, char **argv)
 		  .help = "Writes index.html, which holds all of it, plot.svg, plot.png, strip.png, prices.csv and prices.json into this"
 		          " folder.", .seen = &seen_views },
 		{ .name = "size", .type = PSR_OPT_SIZE, .value = price.size, .arg = "WxH", .help = "Pixels of a view.", .min = 32,
-		  .max = 4096 },
+		  .max = 4096, .seen = &seen_views },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
-		  .help = "Of the usual model; others have a quarter, half and twice of it.", .min = 16, .max = 4096 },
+		  .help = "Of the usual model; others have a quarter, half and twice of it.", .min = 16, .max = 4096,
+		  .seen = &seen_views },
 		{ .name = "rounds", .type = PSR_OPT_INT, .value = &n_rounds, .arg = "N",
-		  .help = "Frames of each setting and view that are timed.", .min = 1, .max = 1000 },
+		  .help = "Frames of each setting and view that are timed.", .min = 1, .max = 1000, .seen = &seen_views },
 		{ .name = "seed", .type = PSR_OPT_INT, .value = &seed, .arg = "N", .help = "Other seeds give other views.", .min = 0,
-		  .max = 1e15 },
+		  .max = 1e15, .seen = &seen_views },
 		{ .name = "For developers: shadows", .type = PSR_OPT_HEADING },
 		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
 		  .help = "Compares shadows as well: a frame drawn with --ambient 0 and one light, which casts them." },
@@ -371,7 +276,13 @@ int cmd_accuracy(int argc, char **argv)
 		price.n_rounds = (uint32_t)n_rounds;
 		price.seed = (uint64_t)seed;
 		price.source = argv[1];
-		code = n_operands == 1 ? price_run(&price, &err) : psr_fail(&err, PSR_ERR_ARG, "--views needs one source file");
+		if (n_operands != 1)
+			code = psr_fail(&err, PSR_ERR_ARG, "--views needs one source file");
+		else if (seen_passes || frame.depth != NULL)
+			code = psr_fail(&err, PSR_ERR_ARG, "--views measures settings, %s; use one of them",
+			                seen_passes ? "--passes a still" : "--depth a frame");
+		else
+			code = price_run(&price, &err);
 		return code == PSR_OK ? 0 : psr_cli_fail(PROGRAM, &err);
 	}
 	if (code == PSR_OK && seen_passes) {
@@ -389,7 +300,7 @@ int cmd_accuracy(int argc, char **argv)
 	if (code == PSR_OK)
 		code = measure(&result, argv[1], &frame, &shadow, &bounds, &err);
 	if (code == PSR_OK)
-		code = print(&result, &frame, shadow.shadowed != NULL, json, &err);
+		code = accuracy_print(&result, json, &err);
 	if (code != PSR_OK)
 		return psr_cli_fail(PROGRAM, &err);
 	return result.verdict == ACCURACY_PASS ? 0 : result.verdict == ACCURACY_FAIL ? 1 : psr_exit_status(PSR_ERR_FORMAT);

@@ -2,6 +2,8 @@
 #include <stdlib.h>
 #include "price.h"
 
+#define MOST_DB 60 /* of a row of the table; less than half a code */
+
 static const struct ladder_row *row_of(const struct price *price, uint32_t view, uint32_t setting)
 {
 	return &price->row[(size_t)view * price->set.n + setting];
@@ -120,9 +122,10 @@ void price_equal_errors(const struct price *price, const struct price_rows *rows
 {
 	const double worst = price->point[price->unbeaten[0]].rmse;
 	const double best = price->point[price->unbeaten[price->n_unbeaten - 1]].rmse;
+	const double most = best > 0 ? ladder_psnr(best) : MOST_DB;
 	uint32_t before = price->set.n;
 
-	for (double db = 2 * floor(ladder_psnr(worst) / 2); best > 0 && db <= ladder_psnr(best); db += 2) {
+	for (double db = 2 * floor(ladder_psnr(worst) / 2); db <= most; db += 2) {
 		const uint32_t cheapest = price_cheapest_within(price, 255 * pow(10, -db / 20));
 
 		if (cheapest != before && cheapest < price->set.n)
