@@ -128,7 +128,7 @@ L_VIEW   := $(shell pkg-config --libs sdl2 imgui 2>/dev/null) -lcjson -lstdc++
 L_TERM   := $(shell pkg-config --libs chafa 2>/dev/null) -lcjson
 L_BUILD  := -lembree3 -lassimp -ldraco -lcjson -llzf -lstdc++
 
-.PHONY: all demo figures latency load mutations viewer-picture studies test test-all models models-all install help clean deps compile
+.PHONY: all accuracy demo figures latency load mutations viewer-picture studies test test-all models models-all install help clean deps compile
 all: deps ## all: install what is missing, build everything (the default)
 	$(Q)$(MAKE) --no-print-directory compile
 
@@ -448,6 +448,11 @@ load: deps ## load: install what is missing, build, load psrd with more and more
 	$(Q).ci/deps $(DEPS_STUDY)
 	$(Q)$(MAKE) --no-print-directory compile
 	$(Q)BUILD=$(BUILD) docs/load.sh
+
+accuracy: deps ## accuracy: install what is missing, build, measure what accuracy costs, by settings; renews docs/accuracy.md (only="bunny table"; minutes)
+	$(Q).ci/deps $(DEPS_STUDY)
+	$(Q)$(MAKE) --no-print-directory compile
+	$(Q)BUILD=$(BUILD) docs/accuracy.sh $(only)
 
 figures: deps ## figures: install what is missing, build, draw the thesis's figures beside the ray-traced truth, renew docs/figures.md (minutes)
 	$(Q).ci/deps $(DEPS_STUDY)
