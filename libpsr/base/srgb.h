@@ -8,8 +8,6 @@
 #include <stdint.h>
 
 extern const float psr_srgb_to_linear[256]; /* correctly rounded; 0 -> 0, 255 -> 1 */
-/* Tables of 5-bit and 6-bit codes, which stand for the nearest 8-bit codes. */
-extern const float psr_srgb5_to_linear[32], psr_srgb6_to_linear[64];
 
 /* Returns the code whose light is nearest to `linear`, halves up; clamps to 0..255; NaN gives 0. */
 uint8_t psr_linear_to_srgb(float linear);

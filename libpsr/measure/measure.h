@@ -85,7 +85,7 @@ int psr_accuracy_measure_shadow(struct psr_shadow_accuracy *out, const struct ps
                                 struct psr_error *err);
 
 /* Draws what a still of the mesh at the world's origin must show ([G] 9.1.1): the mean of side x side rays a pixel in
- * linear light, each lit by ambient and Phong without shadows, over the scene's background. Ignores the scene's camera
+ * linear light, each lit as in frames, without shadows, over the scene's background. Ignores the scene's camera
  * and instances. rgb: sRGB, 3 bytes a pixel; covered: 1 where a ray meets the mesh. side: 1..32. UNSUPPORTED unless all
  * lights are directional. */
 int psr_truth_still(const struct psr_truth_shot *shot, const struct psr_scene *scene, uint32_t side, uint8_t *rgb,

@@ -4,6 +4,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "ray/ray.h"
+#include "surface/lobe.h"
 #include "surface/surface.h"
 #include "base/direction.h"
 #include "measure.h"
@@ -23,34 +24,25 @@ struct still {
 	double to_light[PSR_MAX_LIGHTS][3];
 };
 
-static double linear_of(unsigned code, unsigned most)
-{
-	return (double)psr_srgb_to_linear[(code * 255 + most / 2) / most];
-}
-
-/* Phong's light ([G] 7.3), as in frames, from the surface's attributes. */
+/* Light as in frames, from the surface's attributes. */
 static void light_place(const struct still *still, uint64_t attr, const double direction[3], double light[3])
 {
 	const struct psr_scene *scene = still->scene;
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 	const double normal[3] = { (double)n[0], (double)n[1], (double)n[2] };
-	const uint32_t diffuse = PSR_ATTR_DIFFUSE(attr), specular = PSR_ATTR_SPECULAR(attr);
-	const double highlight[3] = { linear_of(specular & 31, 31), linear_of(specular >> 5 & 63, 63),
-		                          linear_of(specular >> 11, 31) };
-	double to_eye[3];
+	double to_eye[3], ambient[3];
+	struct look look;
+	material_decode(&look, attr);
 	v3d_normalize(to_eye, direction);
 	v3d_scale(to_eye, to_eye, -1);
+	lobe_ambient(ambient, &look, normal, to_eye);
 	for (int c = 0; c < 3; c++)
-		light[c] = (PSR_ATTR_UNLIT(attr) ? 1 : scene->ambient[c]) * linear_of(diffuse >> 8 * c & 255, 255);
-	for (uint32_t l = 0; l < scene->n_lights && !PSR_ATTR_UNLIT(attr); l++) {
-		const double *to_light = still->to_light[l], facing = v3d_dot(normal, to_light);
-		const double mirror = 2 * facing * v3d_dot(normal, to_eye) - v3d_dot(to_light, to_eye);
-		if (!(facing > 0))
-			continue;
-		const double shine = pow(fmin(fmax(mirror, 0), 1), exp2(PSR_ATTR_EXPONENT(attr) / 16.0));
+		light[c] = look.unlit ? (double)look.base[c] : scene->ambient[c] * ambient[c];
+	for (uint32_t l = 0; l < scene->n_lights && !look.unlit; l++) {
+		double part[3];
+		lobe_reflect(part, &look, normal, still->to_light[l], to_eye);
 		for (int c = 0; c < 3; c++)
-			light[c] +=
-				scene->light[l].color[c] * (linear_of(diffuse >> 8 * c & 255, 255) * facing + highlight[c] * shine);
+			light[c] += scene->light[l].color[c] * part[c];
 	}
 	for (int c = 0; c < 3; c++)
 		light[c] = fmin(light[c], 1);

@@ -2,10 +2,13 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "base/direction.h"
 #include "base/mem.h"
+#include "base/srgb.h"
 #include "base/vec.h"
 #include "surface/validate.h"
 #include "ray/ray.h"
+#include "surface/lobe.h"
 #include "surface/stipple.h"
 #include "surface/surface.h"
 #include "model/blocks.h"
@@ -175,14 +178,21 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
 }
 
-/* Unfiltered diffuse color: the rays of a pixel are its filter. */
-static void put_color(const struct psr_truth *truth, const struct ray_hit *hit, uint8_t rgb[3])
+/* Unfiltered color in ambient light: the rays of a pixel are its filter. */
+static void put_color(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit, uint8_t rgb[3])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
 	const float *normal = ray_scene_normal(truth->scene, hit->prim);
-	uint32_t diffuse = PSR_ATTR_DIFFUSE(surface_attr(&truth->surface, &place, 0, normal));
+	const uint64_t attr = surface_attr(&truth->surface, &place, 0, normal);
+	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
+	double light[3], to_eye[3];
+	struct look look;
+	material_decode(&look, attr);
+	v3d_normalize(to_eye, ray->direction);
+	v3d_scale(to_eye, to_eye, -1);
+	lobe_ambient(light, &look, (const double[3]){ (double)n[0], (double)n[1], (double)n[2] }, to_eye);
 	for (int c = 0; c < 3; c++)
-		rgb[c] = (uint8_t)(diffuse >> 8 * c);
+		rgb[c] = psr_linear_to_srgb(look.unlit ? look.base[c] : (float)light[c]);
 }
 
 static void draw_row(int row, void *userdata)
@@ -207,7 +217,7 @@ static void draw_row(int row, void *userdata)
 			if (job->rgb != NULL) {
 				memset(job->rgb + 3 * (at + i), 0, 3);
 				if (is_met)
-					put_color(job->truth, &hit[i], job->rgb + 3 * (at + i));
+					put_color(job->truth, &ray[i], &hit[i], job->rgb + 3 * (at + i));
 			}
 		}
 	}

@@ -192,14 +192,20 @@ struct psr_cluster {
 /* Attributes of a sample, one word ([G] table 5.1):
  *   bits  0-14  normal, index of the subdivided sphere (base/direction.h)
  *   bit   15    unlit: drawn in its diffuse colour whatever the lights
- *   bits 16-39  diffuse R, G, B, 8 bits each, sRGB-coded (R lowest)
- *   bits 40-55  specular 5-6-5, sRGB-coded (R in the lowest five)
- *   bits 56-63  e: the Phong exponent is 2^(e/16) */
+ *   bits 16-39  base colour R, G, B, 8 bits each, sRGB-coded (R lowest)
+ *   bits 40-44  metallic, 31sts
+ *   bits 45-49  r: what is not metal reflects F0 = (r / 30)^2, at most 1, of light from ahead
+ *   bits 50-55  shut, 63rds: ambient light that does not reach the sample
+ *   bits 56-63  roughness, 255ths
+ * Where bits 40-55 are 0 the sample only scatters light, in all directions alike. Unlit samples have zeros in 40-63. */
 #define PSR_ATTR_NORMAL(a) ((uint32_t)((a) & 0x7fff))
 #define PSR_ATTR_UNLIT(a) ((uint32_t)((a) >> 15 & 1))
-#define PSR_ATTR_DIFFUSE(a) ((uint32_t)((a) >> 16 & 0xffffff)) /* r | g << 8 | b << 16 */
-#define PSR_ATTR_SPECULAR(a) ((uint32_t)((a) >> 40 & 0xffff))
-#define PSR_ATTR_EXPONENT(a) ((uint32_t)((a) >> 56))
+#define PSR_ATTR_BASE(a) ((uint32_t)((a) >> 16 & 0xffffff)) /* r | g << 8 | b << 16 */
+#define PSR_ATTR_GLOSS(a) ((uint32_t)((a) >> 40 & 0xffff))  /* metallic, reflectance and shut */
+#define PSR_ATTR_METALLIC(a) ((uint32_t)((a) >> 40 & 31))
+#define PSR_ATTR_REFLECTANCE(a) ((uint32_t)((a) >> 45 & 31))
+#define PSR_ATTR_SHUT(a) ((uint32_t)((a) >> 50 & 63))
+#define PSR_ATTR_ROUGHNESS(a) ((uint32_t)((a) >> 56))
 
 /* psr_model_read() from bytes in memory, which it copies: for tests and fuzzers. */
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err);

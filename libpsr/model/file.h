@@ -11,7 +11,7 @@
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
 
 #define FILE_MAGIC "\x89PSR\r\n\x1a\n"
-#define FILE_MAJOR 5
+#define FILE_MAJOR 6
 #define FILE_MINOR 0
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */

@@ -15,7 +15,7 @@ static const struct {
 	                        { "", "", "the samples of every block in view are within a pixel of each other", "", "" } },
 	[PSR_EFFECT_FILL] = { "fill", { "", "", "no pixel's weight is below 1", "", "" } },
 	[PSR_EFFECT_TWO_SIDED] = { "two-sided", { "", "", "no block in view is two-sided", "", "" } },
-	[PSR_EFFECT_SPECULAR] = { "specular", { "", "", "no sample in view is specular, or no light shines", "", "" } },
+	[PSR_EFFECT_SPECULAR] = { "specular", { "", "", "no sample in view mirrors light", "", "" } },
 	[PSR_EFFECT_POSITIONS] = { "positions", { "", "", "no light is near or casts shadows", "", "" } },
 	[PSR_EFFECT_SHADOWS] = { "shadows", { "", "", "no light that casts shadows reaches an instance in view", "", "" } },
 	[PSR_EFFECT_TABLE] = { "table",

@@ -319,10 +319,8 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 		if (plan->light[plan->n_lights++].kind != PSR_LIGHT_DIRECTIONAL)
 			plan->view.needs |= STRIP_POSITION;
 	}
-	if (plan->n_lights)
-		plan->view.needs |= STRIP_LIGHTS;
 	if (plan->is_full)
-		plan->view.needs = STRIP_LIGHTS | STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR | STRIP_BENT;
+		plan->view.needs = STRIP_POSITION | STRIP_TWO_SIDED | STRIP_SPECULAR | STRIP_BENT;
 	return PSR_OK;
 }
 

@@ -29,7 +29,7 @@ static void tabulate_part(int part, void *userdata)
 {
 	const struct tabulating *t = userdata;
 	const struct plan *plan = t->plan;
-	const struct strip_lights lights = { plan->light, plan->n_lights, plan->ambient };
+	const struct strip_lights lights = { plan->light, plan->n_lights };
 
 	t->simd->strip_lit(t->lit, &plan->view, &lights, (uint32_t)part * STRIP, STRIP);
 }
@@ -104,7 +104,7 @@ static void light_strip(struct strip *strip, const struct shading *s)
 
 	for (uint32_t l = 0; l < plan->n_lights && (plan->view.lit == NULL || strip->is_specular); l++)
 		add_light(s->simd, plan, strip, l);
-	s->simd->strip_color(strip);
+	s->simd->strip_color(strip, plan->ambient);
 }
 
 static void write_strip(const struct strip *strip, const struct shading *s)
@@ -132,7 +132,7 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
 		return 0;
 	simd->strip_find(pixels, &plan->view);
 	simd->strip_read(strip, &plan->view);
-	simd->strip_resolve(strip, &plan->view, plan->ambient);
+	simd->strip_resolve(strip, &plan->view);
 	light_strip(strip, &shading);
 	return pixels->n;
 }
@@ -162,7 +162,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
 		if (strip.pixels->n) {
 			simd->strip_read(&strip, &plan->view);
-			simd->strip_resolve(&strip, &plan->view, plan->ambient);
+			simd->strip_resolve(&strip, &plan->view);
 		}
 		const uint64_t middle = is_timed ? clock_ns() : 0;
 		if (strip.pixels->n) {

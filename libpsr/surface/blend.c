@@ -1,4 +1,5 @@
 #include <assert.h>
+#include <math.h>
 #include "base/direction.h"
 #include "base/vec.h"
 #include "blend.h"
@@ -10,10 +11,11 @@
 #define NO_NORMAL 0.03
 
 struct sums {
-	double weight, normal[3], diffuse[3];
-	double reflected[3];  /* of specular / (exponent + 2), to which a lobe's light is in proportion */
-	double light, spread; /* sums of that over the channels, and of that times the lobe's variance */
-	double plain_spread;  /* of weight times variance, where all reflect nothing */
+	double weight, normal[3], base[3];
+	double metallic, open;
+	double dielectric, reflected; /* of what is not metal: weight, and that times F0 */
+	double mirrored, width2;      /* of F0 over the channels, and of that times the lobe's squared width */
+	double plain_width2;          /* of weight times squared width, where all reflect nothing */
 };
 
 static int is_mostly_unlit(const uint64_t *attr, const float *weight, int n)
@@ -38,15 +40,20 @@ static void add(struct sums *sums, uint64_t attr, double weight)
 	v3d_set(unit, (double)normal[0], (double)normal[1], (double)normal[2]);
 	v3d_normalize(unit, unit); /* in double: a float's rounding would widen the sharpest lobes */
 	v3d_add_scaled(sums->normal, sums->normal, weight, unit);
+	const double metallic = (double)look.metallic, rest = 1 - metallic, reflectance = (double)look.reflectance;
+	const double width2 = (double)look.roughness * (double)look.roughness * (double)look.roughness * (double)look.roughness;
 	sums->weight += weight;
-	sums->plain_spread += weight / look.exponent;
+	sums->metallic += weight * metallic;
+	sums->open += weight * (double)look.open;
+	sums->dielectric += weight * rest;
+	sums->reflected += weight * rest * reflectance;
+	sums->plain_width2 += weight * width2;
 	for (int c = 0; c < 3; c++) {
-		double reflected = weight * (double)look.specular[c] / (look.exponent + 2);
+		const double mirrored = weight * (rest * reflectance + metallic * (double)look.base[c]);
 
-		sums->diffuse[c] += weight * (double)look.diffuse[c];
-		sums->reflected[c] += reflected;
-		sums->light += reflected;
-		sums->spread += reflected / look.exponent;
+		sums->base[c] += weight * (double)look.base[c];
+		sums->mirrored += mirrored;
+		sums->width2 += mirrored * width2;
 	}
 }
 
@@ -55,20 +62,21 @@ uint64_t blend_attr(const uint64_t *attr, const float *weight, int n, const floa
 	struct sums sums = { .weight = 0 };
 	struct look look = { .unlit = is_mostly_unlit(attr, weight, n) };
 	float normal[3] = { facing[0], facing[1], facing[2] };
-	double length, variance;
+	double length;
 
 	for (int i = 0; i < n; i++)
 		if (weight[i] > 0 && (int)PSR_ATTR_UNLIT(attr[i]) == look.unlit)
 			add(&sums, attr[i], (double)weight[i]);
-	variance = sums.light > 0 ? sums.spread / sums.light : sums.plain_spread / sums.weight;
 	length = v3d_normalize(sums.normal, sums.normal) / sums.weight;
 	if (length > NO_NORMAL)
 		v3f_set(normal, (float)sums.normal[0], (float)sums.normal[1], (float)sums.normal[2]);
-	look.exponent = material_widened(1 / variance, length < 1 ? (1 - length) / length : 0);
-	for (int c = 0; c < 3; c++) {
-		look.diffuse[c] = (float)(sums.diffuse[c] / sums.weight);
-		look.specular[c] = (float)(sums.reflected[c] / sums.weight * (look.exponent + 2));
-	}
+	const double width2 = sums.mirrored > 0 ? sums.width2 / sums.mirrored : sums.plain_width2 / sums.weight;
+	look.roughness = (float)material_widened(sqrt(sqrt(width2)), length < 1 ? (1 - length) / length : 0);
+	for (int c = 0; c < 3; c++)
+		look.base[c] = (float)(sums.base[c] / sums.weight);
+	look.metallic = (float)(sums.metallic / sums.weight);
+	look.open = (float)(sums.open / sums.weight);
+	look.reflectance = sums.dielectric > 0 ? (float)(sums.reflected / sums.dielectric) : (float)MATERIAL_DIELECTRIC;
 	surface_face(normal, facing);
 	return material_encode(&look) | psr_direction_encode(normal);
 }

@@ -1,9 +1,11 @@
-/* glTF's materials as [G] table 5.1 stores them: diffuse, specular, Phong exponent. */
+/* glTF's materials as attribute words. */
 #ifndef PSR_SURFACE_MATERIAL_H
 #define PSR_SURFACE_MATERIAL_H
 
 #include <stdint.h>
 #include "psr/mesh.h"
+
+#define MATERIAL_DIELECTRIC 0.04 /* F0, what glTF's dielectrics reflect of light from ahead */
 
 /* Factors, textures and colours of a material at one place, linear, in 0..1; emission >= 0. */
 struct material_values {
@@ -18,38 +20,32 @@ struct material_values {
 /* Sets the values that the factors alone give. */
 void material_values_default(struct material_values *values, const struct psr_material *material);
 
-/* An attribute word (model/blocks.h) without its normal.
+/* An attribute word (model/blocks.h) without its normal: the look of the material, its roughness widened by the spread
+ * of normals.
  *
- * Metallic-roughness: diffuse = base * (1 - metallic / 2): half of a metal's colour stands for the surroundings that
- * it would mirror. F0 = 0.04 + (base - 0.04) * metallic. Specular-glossiness: F0 = specular; s = max(0, (F0 - 0.04) /
- * 0.96), its excess over a dielectric's, is a metal's: diffuse = base * (1 - the largest channel of s) + s / 2.
- * Roughness is 1 - glossiness. Dielectrics are the same either way; metals differ by 0.02.
+ * A look has one colour for what is scattered and what is mirrored. Specular-glossiness has two: diffuse d and F0 s.
+ * Where s is grey, or d black, a look is exact: a dielectric of the F0 s, or a metal of the colour s. Else it is that
+ * of these two which is nearer, or a mixture, if both colours differ from grey in the same direction.
  *
- * Roughness r gives the microfacets' Blinn-Phong exponent 2 / r^4 - 2; a fourth of it is the exponent n of the
- * reflected ray's cosine, in 1..2^(255/16), which the spread of normals widens (material_widened). specular = min(1,
- * F0 * (n + 2) / 2): a normalised lobe where diffuse is albedo times N.L.
- *
- * Occlusion multiplies the diffuse colour: a word has no ambient colour of its own. Emission is added to the diffuse
- * colour, clipped at 1; if it has the greater luminance of the two, the sample is unlit. Else it shows only as far as
- * there is light. Unlit materials have their base colour and nothing else. */
+ * Emission is added to the base colour, clipped at 1; if it has the greater luminance of the two, the sample is unlit.
+ * Else it shows only as far as there is light. Unlit materials have their base colour and nothing else. */
 uint64_t material_word(const struct psr_material *material, const struct material_values *values);
 
-/* An attribute word without its normal, in linear light. */
+/* An attribute word without its normal. */
 struct look {
-	float diffuse[3], specular[3]; /* encoded, clamped to 0..1 */
-	double exponent;               /* encoded, clamped to 1..2^(255/16) */
-	int unlit;                     /* encoded, neither specular nor exponent are */
+	float base[3];     /* linear, encoded clamped to 0..1 as all that follow */
+	float metallic;
+	float reflectance; /* F0 of what is not metal; 0 in a look without metal: it only scatters light */
+	float open;        /* ambient light that reaches the place */
+	float roughness;
+	int unlit;         /* the base colour alone is encoded */
 };
 
 uint64_t material_encode(const struct look *look);
 void material_decode(struct look *look, uint64_t attr); /* material_encode() gives the same bits again */
 
-/* Widens a lobe of exponent n > 0, of variance 1/n, by the variance of normals, of which the reflected ray has four
- * times: 1 / (1/n + 4 variance), at least 1. [Toksvig]: normals whose mean has the length r have the variance (1 - r)
- * / r. */
-double material_widened(double n, double variance);
-
-/* e in 0..255 of the exponent 2^(e/16) that is nearest in the logarithm. */
-unsigned material_exponent_code(double exponent);
+/* Widens a lobe by the variance of normals along each axis: GGX's width, roughness^2, is the root of twice the variance
+ * of its facets' slopes. At most 1. [Toksvig]: normals whose mean has the length r have the variance (1 - r) / r. */
+double material_widened(double roughness, double variance);
 
 #endif

@@ -80,7 +80,7 @@ struct stage {
 /* The model without highlights and back faces, or with one of them. */
 static struct psr_model *variant(const struct psr_model *model, enum kind kind)
 {
-	const uint64_t gloss = UINT64_C(0x60) << 56 | UINT64_C(0x8410) << 40; /* exponent 64, half of the light */
+	const uint64_t gloss = UINT64_C(110) << 56 | UINT64_C(6) << 45; /* a smooth dielectric */
 	struct psr_blocks blocks = *psr_model_blocks(model);
 	uint8_t *flags = report_alloc(blocks.n_blocks, 1);
 	uint64_t *attr = report_alloc(blocks.n_samples, sizeof *attr);

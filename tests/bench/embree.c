@@ -32,7 +32,7 @@ struct tracer {
 
 /* What shading reads and writes, a column a lane. */
 struct lanes {
-	float direction[3][N], position[3][N], normal[3][N], diffuse[3][N], specular[3][N], exponent[N], lit[N],
+	float direction[3][N], position[3][N], normal[3][N], diffuse[3][N], f0[3][N], width2[N], lit[N],
 		color[3][N];
 } __attribute__((aligned(64)));
 
@@ -101,9 +101,9 @@ static int fetch(struct lanes *l, const struct tracer *t, const struct RTCRayHit
 		if (rays->hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
 			for (int c = 0; c < 3; c++) {
 				l->normal[c][i] = c == 0;
-				l->diffuse[c][i] = l->specular[c][i] = 0;
+				l->diffuse[c][i] = l->f0[c][i] = 0;
 			}
-			l->exponent[i] = 1;
+			l->width2[i] = 1;
 			continue;
 		}
 		const uint32_t prim = rays->hit.primID[i], *v = t->mesh->triangle[prim];
@@ -114,9 +114,9 @@ static int fetch(struct lanes *l, const struct tracer *t, const struct RTCRayHit
 			l->normal[c][i] = b0 * t->mesh->normal[v[0]][c] + b1 * t->mesh->normal[v[1]][c]
 			                  + b2 * t->mesh->normal[v[2]][c];
 			l->diffuse[c][i] = look->diffuse[c];
-			l->specular[c][i] = look->specular[c];
+			l->f0[c][i] = look->f0[c];
 		}
-		l->exponent[i] = look->exponent;
+		l->width2[i] = fmaxf(powf(look->roughness, 4), 4e-6f);
 		any = 1;
 	}
 	return any;
@@ -153,27 +153,6 @@ static void cast_shadows(struct lanes *l, const struct tracer *t, const struct R
 		l->lit[i] = valid[i] && shadow.tfar[i] < 0 ? 0 : 1;
 }
 
-/* x^y for 0 <= x <= 1, without branches, so that lanes go together; as exact as psr_power(). */
-static inline float power(float x, float y)
-{
-	union { float f; int32_t i; } a = { .f = x > 1e-30f ? x : 1e-30f }, b;
-	const int32_t e = (a.i - 0x3f3504f3) >> 23;
-	float s, q, p, t, f;
-
-	b.i = a.i - e * (1 << 23);
-	s = (b.f - 1) / (b.f + 1);
-	q = s * s;
-	p = ((0.41219858f * q + 0.57707802f) * q + 0.96179669f) * q + 2.88539008f;
-	t = ((float)e + s * p) * y;
-	t = t > -126 ? t : -126;
-	f = t + 126.5f;
-	const int32_t n = (int32_t)f - 126;
-	f = t - (float)n;
-	p = (((1.3333558e-3f * f + 9.6181291e-3f) * f + 5.5504109e-2f) * f + 2.4022651e-1f) * f + 6.9314718e-1f;
-	b.i = (n + 127) * (1 << 23);
-	return (p * f + 1) * b.f;
-}
-
 static void shade(struct lanes *l, const struct peer_view *view)
 {
 	const float lx = view->to_light[0], ly = view->to_light[1], lz = view->to_light[2], ambient = view->ambient;
@@ -183,13 +162,17 @@ static void shade(struct lanes *l, const struct peer_view *view)
 		const float facing = k * (x * lx + y * ly + z * lz);
 		const float n_v = -k * (x * l->direction[0][i] + y * l->direction[1][i] + z * l->direction[2][i]);
 		const float l_v = -(lx * l->direction[0][i] + ly * l->direction[1][i] + lz * l->direction[2][i]);
-		const float mirror = 2 * facing * n_v - l_v;
-		const float lit = facing > 0 ? l->lit[i] : 0;
-		const float highlight = mirror > 0 ? lit * power(mirror < 1 ? mirror : 1, l->exponent[i]) : 0;
-		const float diffuse = ambient + lit * facing;
+		const float nl = facing > 0 ? facing : 0, nv = n_v > 1e-3f ? n_v : 1e-3f, lit = l->lit[i] * nl;
+		const float width2 = l->width2[i], rest = 1 - width2, h2 = 2 + 2 * l_v > 1e-6f ? 2 + 2 * l_v : 1e-6f;
+		const float wide = h2 - rest * (nl + nv) * (nl + nv), t = wide > h2 * width2 ? wide : h2 * width2;
+		const float shadowed = nl * sqrtf(nv * nv * rest + width2) + nv * sqrtf(nl * nl * rest + width2);
+		const float lobe = 0.5f * width2 * h2 * h2 / (t * t * shadowed), grazing = 1 - 0.5f * sqrtf(h2);
+		const float square = grazing * grazing, fresnel = square * square * grazing;
 
 		for (int c = 0; c < 3; c++) {
-			const float color = l->diffuse[c][i] * diffuse + l->specular[c][i] * highlight;
+			const float f0 = l->f0[c][i], mirrored = f0 * (1 - fresnel) + fresnel;
+			const float color = (l->diffuse[c][i] + f0) * ambient
+			                    + (l->diffuse[c][i] * (1 - fresnel) + lobe * mirrored) * lit;
 
 			l->color[c][i] = color < 1 ? color : 1;
 		}

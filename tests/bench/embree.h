@@ -1,4 +1,4 @@
-/* Embree on the mesh: primary rays in packets of 16, Phong, and a shadow ray if wanted. */
+/* Embree on the mesh: primary rays in packets of 16, light as in frames, and a shadow ray if wanted. */
 #ifndef TESTS_BENCH_EMBREE_H
 #define TESTS_BENCH_EMBREE_H
 

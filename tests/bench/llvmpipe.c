@@ -12,7 +12,6 @@
 #include "base/stats.h"
 #include "base/vec.h"
 #include "model/blocks.h"
-#include "surface/material.h"
 #include "base/direction.h"
 #include "report.h"
 
@@ -26,30 +25,32 @@ struct mesh_vertex {
 struct point_vertex {
 	float position[3];
 	int16_t normal[4];
-	uint16_t diffuse[4], specular[4]; /* linear; specular[3]: log2 of the exponent / 16 */
+	uint16_t diffuse[4], specular[4]; /* linear; specular: F0 and roughness */
 };
 
 /* Colours are coded by the shader, sRGB's curve as three square roots (3 codes of 255 off at most, where it is
  * nearly black): a frame buffer that does it takes a tenth longer. */
-#define PHONG                                                                                                          \
+#define LIGHT                                                                                                          \
 	"vec3 coded(vec3 c) {\n"                                                                                           \
 	"	vec3 a = sqrt(min(c, 1.0)), b = sqrt(a);\n"                                                                    \
 	"	return max(0.585122381 * a + 0.783140355 * b - 0.368262736 * sqrt(b), 0.0);\n"                                 \
 	"}\n"                                                                                                              \
 	"uniform vec3 eye, light; uniform float ambient;\n"                                                                \
-	"vec3 phong(vec3 p, vec3 n, vec3 d, vec4 s) {\n"                                                                   \
-	"	vec3 v = normalize(eye - p);\n"                                                                                \
-	"	float f = dot(n, light), m = max(2.0 * f * dot(n, v) - dot(light, v), 0.0);\n"                                 \
-	"	float h = f > 0.0 ? pow(m, s.a) : 0.0;\n"                                                                      \
-	"	return coded(d * (ambient + max(f, 0.0)) + s.rgb * h);\n"                                                      \
+	"vec3 lit(vec3 p, vec3 n, vec3 d, vec4 s) {\n"                                                                     \
+	"	vec3 v = normalize(eye - p); float w = s.a * s.a, w2 = max(w * w, 4e-6), rest = 1.0 - w2;\n"                   \
+	"	float l = max(dot(n, light), 0.0), e = max(dot(n, v), 1e-3), h = max(2.0 + 2.0 * dot(light, v), 1e-6);\n"      \
+	"	float t = max(h - rest * (l + e) * (l + e), h * w2);\n"                                                        \
+	"	float g = l * sqrt(e * e * rest + w2) + e * sqrt(l * l * rest + w2);\n"                                        \
+	"	float k = 0.5 * w2 * h * h / (t * t * g), a = 1.0 - 0.5 * sqrt(h), q = a * a, f = q * q * a;\n"                \
+	"	return coded((d + s.rgb) * ambient + l * (d * (1.0 - f) + k * (s.rgb * (1.0 - f) + f)));\n"                    \
 	"}\n"
 
 static const char mesh_vs[] =
 	"#version 330\nlayout(location = 0) in vec3 p; layout(location = 1) in vec3 n; uniform mat4 m;\n"
 	"out vec3 vp, vn; void main() { gl_Position = m * vec4(p, 1.0); vp = p; vn = n; }\n";
 static const char mesh_fs[] =
-	"#version 330\n" PHONG "uniform vec3 diffuse; uniform vec4 specular; in vec3 vp, vn; out vec4 o;\n"
-	"void main() { o = vec4(phong(vp, normalize(vn), diffuse, specular), 1.0); }\n";
+	"#version 330\n" LIGHT "uniform vec3 diffuse; uniform vec4 specular; in vec3 vp, vn; out vec4 o;\n"
+	"void main() { o = vec4(lit(vp, normalize(vn), diffuse, specular), 1.0); }\n";
 
 /* Samples that face away go outside of the picture, before anything is set up for them. */
 #define POINT_IN                                                                                                       \
@@ -58,13 +59,13 @@ static const char mesh_fs[] =
 	"vec4 place() { return dot(n, from - p) > 0.0 ? m * vec4(p, 1.0) : vec4(2.0, 2.0, 2.0, 1.0); }\n"
 static const char point_vs[] =
 	"#version 330\n" POINT_IN "flat out vec3 vp, vn, vd; flat out vec4 vs;\n"
-	"void main() { gl_Position = place(); vp = p; vn = n; vd = d; vs = vec4(s.rgb, exp2(s.a * 16.0)); }\n";
+	"void main() { gl_Position = place(); vp = p; vn = n; vd = d; vs = s; }\n";
 static const char point_fs[] =
-	"#version 330\n" PHONG "flat in vec3 vp, vn, vd; flat in vec4 vs; out vec4 o;\n"
-	"void main() { o = vec4(phong(vp, normalize(vn), vd, vs), 1.0); }\n";
+	"#version 330\n" LIGHT "flat in vec3 vp, vn, vd; flat in vec4 vs; out vec4 o;\n"
+	"void main() { o = vec4(lit(vp, normalize(vn), vd, vs), 1.0); }\n";
 static const char shaded_vs[] =
-	"#version 330\n" PHONG POINT_IN "flat out vec3 vc;\n"
-	"void main() { gl_Position = place(); vc = phong(p, normalize(n), d, vec4(s.rgb, exp2(s.a * 16.0))); }\n";
+	"#version 330\n" LIGHT POINT_IN "flat out vec3 vc;\n"
+	"void main() { gl_Position = place(); vc = lit(p, normalize(n), d, s); }\n";
 static const char shaded_fs[] =
 	"#version 330\nflat in vec3 vc; out vec4 o; void main() { o = vec4(vc, 1.0); }\n";
 
@@ -193,16 +194,16 @@ static void put_points(struct gl *gl, const struct peer_points *points)
 	struct point_vertex *v = report_alloc(points->n, sizeof *v);
 
 	for (uint64_t i = 0; i < points->n; i++) {
-		struct look look;
+		struct peer_look look;
 
-		material_decode(&look, points->attr[i]);
+		peer_look_init(&look, points->attr[i]);
 		memcpy(v[i].position, points->position[i], sizeof v[i].position);
 		put_normal(v[i].normal, direction[PSR_ATTR_NORMAL(points->attr[i])]);
 		for (int k = 0; k < 3; k++) {
 			v[i].diffuse[k] = (uint16_t)lrintf(look.diffuse[k] * 65535);
-			v[i].specular[k] = (uint16_t)lrintf(look.specular[k] * 65535);
+			v[i].specular[k] = (uint16_t)lrintf(look.f0[k] * 65535);
 		}
-		v[i].specular[3] = (uint16_t)(PSR_ATTR_EXPONENT(points->attr[i]) * 65535 / 256);
+		v[i].specular[3] = (uint16_t)lrintf(look.roughness * 65535);
 	}
 	put_buffer(GL_ARRAY_BUFFER, v, points->n * sizeof *v);
 	put_attribute(0, 3, GL_FLOAT, sizeof *v, offsetof(struct point_vertex, position));
@@ -246,7 +247,7 @@ static void draw_mesh(const struct gl *gl)
 		for (end = t + 1; end < mesh->n_triangles && mesh->triangle_look[end] == mesh->triangle_look[t];)
 			end++;
 		glUniform3fv(gl->diffuse, 1, look->diffuse);
-		glUniform4f(gl->specular, look->specular[0], look->specular[1], look->specular[2], look->exponent);
+		glUniform4f(gl->specular, look->f0[0], look->f0[1], look->f0[2], look->roughness);
 		glDrawElements(GL_TRIANGLES, (GLsizei)(3 * (end - t)), GL_UNSIGNED_INT,
 		               (const char *)NULL + t * sizeof *mesh->triangle);
 	}

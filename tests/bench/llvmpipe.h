@@ -5,9 +5,9 @@
 #include "peer.h"
 
 enum llvmpipe_way {
-	LLVMPIPE_MESH,          /* triangles, back faces culled, Phong a fragment */
-	LLVMPIPE_POINTS,        /* a pixel a sample, Phong a fragment */
-	LLVMPIPE_POINTS_VERTEX, /* the same, Phong a vertex: the same pixels, other costs */
+	LLVMPIPE_MESH,          /* triangles, back faces culled, light a fragment */
+	LLVMPIPE_POINTS,        /* a pixel a sample, light a fragment */
+	LLVMPIPE_POINTS_VERTEX, /* the same, light a vertex: the same pixels, other costs */
 };
 
 /* Draws n_frames of the film's frames into a frame buffer object and reads each back. rgb takes frame 0, rows top-down,

@@ -5,18 +5,22 @@
 #include <string.h>
 #include "base/vec.h"
 #include "model/blocks.h"
-#include "surface/material.h"
+#include "surface/lobe.h"
 #include "base/direction.h"
 #include "report.h"
 
-static void look_of(struct peer_look *out, uint64_t attr)
+void peer_look_init(struct peer_look *out, uint64_t attr)
 {
 	struct look look;
+	double diffuse[3], f0[3];
 
 	material_decode(&look, attr);
-	memcpy(out->diffuse, look.diffuse, sizeof out->diffuse);
-	memcpy(out->specular, look.specular, sizeof out->specular);
-	out->exponent = (float)look.exponent;
+	lobe_colors(diffuse, f0, &look);
+	for (int c = 0; c < 3; c++) {
+		out->diffuse[c] = (float)diffuse[c];
+		out->f0[c] = (float)f0[c];
+	}
+	out->roughness = look.roughness;
 }
 
 static void fill_triangles(struct peer_mesh *out, const struct psr_mesh *mesh)
@@ -28,7 +32,7 @@ static void fill_triangles(struct peer_mesh *out, const struct psr_mesh *mesh)
 		struct material_values values;
 
 		material_values_default(&values, &mesh->material[m]);
-		look_of(&out->look[m], material_word(&mesh->material[m], &values));
+		peer_look_init(&out->look[m], material_word(&mesh->material[m], &values));
 	}
 }
 

@@ -9,8 +9,10 @@
 #include "scene.h"
 
 struct peer_look {
-	float diffuse[3], specular[3], exponent;
+	float diffuse[3], f0[3], roughness;
 };
+
+void peer_look_init(struct peer_look *out, uint64_t attr);
 
 struct peer_mesh {
 	uint32_t n_vertices, n_triangles, n_looks;

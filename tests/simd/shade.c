@@ -18,12 +18,8 @@ static void random_samples(struct check *c, struct strip *strip, uint32_t n, int
 	strip->is_specular = is_specular;
 	for (float *value = strip->px; value < strip->sr; value++)
 		*value = check_plain_or_any(c, is_spoilt, -1, 1);
-	for (uint32_t i = 0; i < STRIP; i++) {
-		strip->sr[i] = check_plain_or_any(c, is_spoilt, 0, 1);
-		strip->sg[i] = check_plain_or_any(c, is_spoilt, 0, 1);
-		strip->sb[i] = check_plain_or_any(c, is_spoilt, 0, 1);
-		strip->exponent[i] = (float)exp2(check_below(c, 256) / 16.0);
-	}
+	for (float *value = strip->sr; value < strip->lr; value++)
+		*value = check_plain_or_any(c, is_spoilt, 0, 1);
 	for (float *value = strip->lr; value < (float *)strip->r; value++)
 		*value = check_plain_or_any(c, is_spoilt, 0, 2);
 }
@@ -89,7 +85,7 @@ static void bench_spot_specular(struct check *c)
 /* Of directional lights: tables are made for these alone. */
 static void lit(struct check *c, uint32_t first, uint32_t n, uint32_t n_lights, int is_spoilt)
 {
-	float (*table)[4] = check_out(c, first + n, sizeof *table), *ambient = check_in(c, 3, sizeof *ambient);
+	float (*table)[4] = check_out(c, first + n, sizeof *table);
 	struct strip_light *lights = check_in(c, n_lights, sizeof *lights);
 	struct warp_instance *instance = check_in(c, 1, sizeof *instance);
 	const struct strip_view view = { .instance = instance, .n_instances = 1, .direction_word = psr_direction_words() };
@@ -103,9 +99,7 @@ static void lit(struct check *c, uint32_t first, uint32_t n, uint32_t n_lights, 
 	}
 	for (int k = 0; k < 9; k++)
 		instance->turn[k / 3][k % 3] = check_plain_or_any(c, is_spoilt, -1, 1);
-	for (int k = 0; k < 3; k++)
-		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
-	const struct strip_lights all = { lights, n_lights, ambient };
+	const struct strip_lights all = { lights, n_lights };
 	check_units(c, n);
 	while (check_next(c)) {
 		c->simd->strip_lit(table, &view, &all, first, n);
@@ -127,10 +121,13 @@ static void bench_lit(struct check *c)
 static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
 {
 	struct strip *strip = check_out(c, 1, sizeof *strip);
+	float *ambient = check_in(c, 3, sizeof *ambient);
 	random_samples(c, strip, n, is_specular, is_spoilt);
+	for (int k = 0; k < 3; k++)
+		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
 	check_units(c, n);
 	while (check_next(c))
-		c->simd->strip_color(strip);
+		c->simd->strip_color(strip, ambient);
 }
 
 static void random_color(struct check *c)

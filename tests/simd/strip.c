@@ -108,7 +108,6 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	struct strip_view *view = check_in(c, 1, sizeof *view);
 	struct strip_pixels *pixels = check_out(c, 1, sizeof *pixels);
 	struct strip *strip = check_out(c, 1, sizeof *strip);
-	float *ambient = check_in(c, 3, sizeof *ambient);
 	struct psr_blocks blocks;
 
 	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS, 0);
@@ -117,7 +116,7 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 			((uint64_t *)blocks.attr)[i] &= ~(UINT64_C(0xffff) << 40);
 	if (check_one_in(c, 3)) /* one colour */
 		for (uint64_t i = 0; i < blocks.n_samples; i++)
-			((uint64_t *)blocks.attr)[i] = (blocks.attr[i] & 0xffff) | UINT64_C(0x5012348090a00000);
+			((uint64_t *)blocks.attr)[i] = (blocks.attr[i] & 0xffff) | UINT64_C(0x500ccf8090a00000);
 	uint32_t slot = check_one_in(c, 3) ? (1u << 26) - 1 - n_instances * blocks.n_blocks : 0;
 	for (uint32_t i = 0; i < n_instances; i++, slot += blocks.n_blocks) {
 		random_instance(c, &instance[i], &blocks, is_spoilt);
@@ -129,15 +128,13 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 		.focal = check_plain_or_any(c, is_spoilt, 1, 1000), .perspective = (int)check_below(c, 2),
 		.lit = check_one_in(c, 4) && !c->is_bench ? check_in(c, PSR_DIRECTIONS, sizeof *view->lit) : NULL,
 	};
-	for (int k = 0; k < 3; k++)
-		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
 	random_pixels(c, pixels, view, n);
 	strip->pixels = pixels;
 	check_units(c, pixels->n);
 	while (check_next(c)) {
 		c->simd->strip_find(pixels, view);
 		c->simd->strip_read(strip, view);
-		c->simd->strip_resolve(strip, view, ambient);
+		c->simd->strip_resolve(strip, view);
 		if (!c->is_bench)
 			settle(strip);
 	}

@@ -51,55 +51,21 @@ static void fill_floats(float *to, uint32_t n, float value)
 		_mm512_storeu_ps(to + i, _mm512_set1_ps(value));
 }
 
-/* Look-ups in tables of 32 and 64 floats, in registers. */
-static inline __m512 look_up_5(const __m512 table[2], __m512i index)
-{
-	return _mm512_permutex2var_ps(table[0], index, table[1]);
-}
-
-static inline __m512 look_up_6(const __m512 table[4], __m512i index)
-{
-	const __mmask16 is_upper = _mm512_test_epi32_mask(index, _mm512_set1_epi32(32));
-
-	return _mm512_mask_blend_ps(is_upper, look_up_5(table, index), look_up_5(table + 2, index));
-}
-
-static void read_specular(struct strip *strip)
-{
-	const __m512i upper = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
-	const __m512 five[2] = { _mm512_loadu_ps(psr_srgb5_to_linear), _mm512_loadu_ps(psr_srgb5_to_linear + 16) };
-	const __m512 six[4] = { _mm512_loadu_ps(psr_srgb6_to_linear), _mm512_loadu_ps(psr_srgb6_to_linear + 16),
-		                    _mm512_loadu_ps(psr_srgb6_to_linear + 32), _mm512_loadu_ps(psr_srgb6_to_linear + 48) };
-	const __m512 root = _mm512_loadu_ps(exponent_root);
-
-	for (uint32_t i = 0; i < strip->n; i += 16) {
-		/* High halves: 8 bits of blue, 16 specular, 8 of the exponent. */
-		const __m512i attr = _mm512_loadu_si512(strip->attr + i), next = _mm512_loadu_si512(strip->attr + i + 8);
-		const __m512i high = _mm512_permutex2var_epi32(attr, upper, next);
-		const __m512i power = _mm512_slli_epi32(_mm512_srli_epi32(high, 28), 23);
-		const __m512 exponent = _mm512_permutexvar_ps(_mm512_srli_epi32(high, 24), root);
-		_mm512_storeu_ps(strip->sr + i, look_up_5(five, _mm512_srli_epi32(high, 8)));
-		_mm512_storeu_ps(strip->sg + i, look_up_6(six, _mm512_srli_epi32(high, 13)));
-		_mm512_storeu_ps(strip->sb + i, look_up_5(five, _mm512_srli_epi32(high, 19)));
-		_mm512_storeu_si512(strip->exponent + i, _mm512_add_epi32(_mm512_castps_si512(exponent), power));
-	}
-}
-
 void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 {
 	uint64_t all, common;
 
 	read_attributes(&all, &common, strip, view);
-	const uint32_t diffuse = PSR_ATTR_DIFFUSE(all);
-	if (diffuse != PSR_ATTR_DIFFUSE(common)) {
-		read_diffuse(strip, 0);
+	const uint32_t base = PSR_ATTR_BASE(all);
+	if (base != PSR_ATTR_BASE(common)) {
+		read_base(strip, 0);
 	} else {
-		fill_floats(strip->dr, strip->n, psr_srgb_to_linear[diffuse & 0xff]);
-		fill_floats(strip->dg, strip->n, psr_srgb_to_linear[diffuse >> 8 & 0xff]);
-		fill_floats(strip->db, strip->n, psr_srgb_to_linear[diffuse >> 16]);
+		fill_floats(strip->dr, strip->n, psr_srgb_to_linear[base & 0xff]);
+		fill_floats(strip->dg, strip->n, psr_srgb_to_linear[base >> 8 & 0xff]);
+		fill_floats(strip->db, strip->n, psr_srgb_to_linear[base >> 16]);
 	}
 	if (strip->is_specular)
-		read_specular(strip);
+		read_gloss(strip);
 }
 
 /* ---- write ---- */

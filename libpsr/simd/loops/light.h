@@ -2,24 +2,39 @@
 #include "base/maths.h"
 #include "strip_parts.h"
 
-/* Of each sample: R.V, and how much of the light makes a highlight. */
+/* Of each sample: N.L and L.V of a light that faces it, and how much of the light arrives; else 0. */
 struct highlights {
-	float cosine[STRIP], amount[STRIP];
+	float facing[STRIP], light_view[STRIP], amount[STRIP];
 };
 
-/* Two short loops: a core overlaps several iterations of their long dependency chains. */
+/* GGX with Smith's shadowing and Schlick's Fresnel (surface/lobe.h). H = L + V is not normalised, h2 = H.H = 2 + 2 L.V,
+ * and one division serves distribution and shadowing: D = width2 / (1 - (1 - width2) (N.H)^2)^2 = width2 (h2 n2)^2 /
+ * (h2 n2 - (1 - width2) (N.L + N.V)^2)^2, since stored normals' squares n2 are not quite 1. */
 static void add_highlights(struct strip *s, const struct highlights *h, const float color[3])
 {
-	float exponent[STRIP];
+	const float red = color[0], green = color[1], blue = color[2];
 
-	for (uint32_t i = 0; i < s->n; i++)
-		exponent[i] = psr_power_exponent(h->cosine[i], s->exponent[i]);
 	for (uint32_t i = 0; i < s->n; i++) {
-		const float highlight = psr_power_of_two(exponent[i]) * h->amount[i];
+		const float width2 = s->width2[i], rest = 1 - width2, nl = h->facing[i], nv = s->nv[i], shine = s->shine[i];
+		const float doubled = 2 + 2 * h->light_view[i], h2 = psr_choose(doubled > 1e-6f, doubled, 1e-6f);
+		const float c = h2 * s->n2[i], sum = nl + nv, least = c * width2;
+		const float wide = c - rest * (sum * sum), t = psr_choose(wide > least, wide, least);
+		const float shadowed = nl * s->seen[i] + nv * __builtin_sqrtf(nl * nl * rest + width2);
+		const float lobe = shine * (0.5f * width2) * (c * c) * nl / (t * t * shadowed);
+		const float below = 1 - 0.5f * __builtin_sqrtf(h2), grazing = psr_where(below > 0, below);
+		const float square = grazing * grazing, fresnel = square * square * grazing;
+		const float specular = lobe * h->amount[i], white = specular * fresnel, mirror = specular - white;
+		const float diffuse = nl * h->amount[i] * (1 - shine * fresnel);
 
-		s->hr[i] += color[0] * highlight;
-		s->hg[i] += color[1] * highlight;
-		s->hb[i] += color[2] * highlight;
+		s->lr[i] += red * diffuse;
+		s->lg[i] += green * diffuse;
+		s->lb[i] += blue * diffuse;
+		s->hr[i] += red * mirror;
+		s->hg[i] += green * mirror;
+		s->hb[i] += blue * mirror;
+		s->wr[i] += red * white;
+		s->wg[i] += green * white;
+		s->wb[i] += blue * white;
 	}
 }
 
@@ -28,25 +43,22 @@ struct arriving {
 	float x, y, z, amount;
 };
 
-/* Diffuse light is max(N.L, 0) of it, the highlight (R.V)^n with R = 2 (N.L) N - L. */
 static CONSTANT_FLAGS void reflect(struct strip *s, struct highlights *h, uint32_t i, int is_specular,
                                    const float color[3], struct arriving from)
 {
-	const float x = from.x, y = from.y, z = from.z, amount = from.amount;
-	const float facing = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z;
-	const float diffuse = psr_where(facing > 0, facing) * amount;
+	const float x = from.x, y = from.y, z = from.z;
+	const float cosine = (s->nx[i] * x + s->ny[i] * y) + s->nz[i] * z, facing = psr_where(cosine > 0, cosine);
 
-	s->lr[i] += color[0] * diffuse;
-	s->lg[i] += color[1] * diffuse;
-	s->lb[i] += color[2] * diffuse;
 	if (is_specular) {
-		const float normal_view = (s->nx[i] * s->vx[i] + s->ny[i] * s->vy[i]) + s->nz[i] * s->vz[i];
-		const float light_view = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
-		const float mirror = 2 * facing * normal_view - light_view;
-		const float least = psr_where(mirror > 0, mirror);
+		h->facing[i] = facing;
+		h->light_view[i] = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
+		h->amount[i] = from.amount;
+	} else {
+		const float diffuse = facing * from.amount;
 
-		h->cosine[i] = psr_choose(least < 1, least, 1);
-		h->amount[i] = psr_where(facing > 0, amount);
+		s->lr[i] += color[0] * diffuse;
+		s->lg[i] += color[1] * diffuse;
+		s->lb[i] += color[2] * diffuse;
 	}
 }
 
@@ -121,9 +133,7 @@ static void strip_lit(float (*lit)[4], const struct strip_view *view, const stru
 	strip.is_specular = 0;
 	for (uint32_t i = 0; i < n; i++) {
 		strip.normal_word[i] = view->direction_word[first + i];
-		strip.lr[i] = lights->ambient[0];
-		strip.lg[i] = lights->ambient[1];
-		strip.lb[i] = lights->ambient[2];
+		strip.lr[i] = strip.lg[i] = strip.lb[i] = 0;
 	}
 	turn_normals(&strip, view->instance->turn, 0, n);
 	for (uint32_t l = 0; l < lights->n; l++)

@@ -65,34 +65,17 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 	repeat_last(p);
 }
 
-static CONSTANT_FLAGS void read_specular(struct strip *strip, int is_one)
-{
-	const uint64_t first = strip->attr[0];
-
-	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint64_t attr = is_one ? first : strip->attr[i];
-		const uint32_t specular = PSR_ATTR_SPECULAR(attr), e = PSR_ATTR_EXPONENT(attr);
-
-		strip->sr[i] = psr_srgb5_to_linear[specular & 31];
-		strip->sg[i] = psr_srgb6_to_linear[specular >> 5 & 63];
-		strip->sb[i] = psr_srgb5_to_linear[specular >> 11];
-		strip->exponent[i] = exponent_root[e & 15] * (float)(1u << (e >> 4));
-	}
-}
-
 static inline void strip_read(struct strip *strip, const struct strip_view *view)
 {
 	uint64_t all, common;
 
 	read_attributes(&all, &common, strip, view);
-	if (PSR_ATTR_DIFFUSE(all) == PSR_ATTR_DIFFUSE(common))
-		read_diffuse(strip, 1);
+	if (PSR_ATTR_BASE(all) == PSR_ATTR_BASE(common))
+		read_base(strip, 1);
 	else
-		read_diffuse(strip, 0);
-	if (strip->is_specular && all >> 40 == common >> 40)
-		read_specular(strip, 1);
-	else if (strip->is_specular)
-		read_specular(strip, 0);
+		read_base(strip, 0);
+	if (strip->is_specular)
+		read_gloss(strip);
 }
 
 /* Positions are those of pixel centres, less than a pixel from the samples: where a ray would meet the surface. */
@@ -153,7 +136,42 @@ static void straighten(struct strip *strip, const float m[3][3], uint32_t first,
 	}
 }
 
-static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
+/* A shading normal may face away from the eye; its highlights are those of one that is seen at this cosine. */
+#define LEAST_NV 1e-3f
+
+/* lobe_ambient() of surface/lobe.h, which has the formulas. */
+static inline void ambient_color(struct strip *s, uint32_t i)
+{
+	const int32_t gloss = (int32_t)(s->attr[i] >> 40);
+	const float open = 1 - (float)(gloss >> 10 & 63) * (1 / 63.0f), nv = s->nv[i], aside = 1 - nv, square = aside * aside;
+	const float roughness = (float)(gloss >> 16) * (1 / 255.0f), smooth = 1 - roughness, a = roughness * roughness;
+	const float grazing = s->shine[i] * (smooth * (square * aside) * (0.27f + 0.8f * (smooth * smooth * square)));
+	const float loss = (0.42f + nv * (1.05f - 1.87f * nv)) + a * ((1.83f * nv - 0.45f) + 1.17f * (nv * nv));
+	const float mirrored = 1 / (1 + a * loss) - grazing;
+
+	s->ar[i] = (s->dr[i] + (s->sr[i] * mirrored + grazing)) * open;
+	s->ag[i] = (s->dg[i] + (s->sg[i] * mirrored + grazing)) * open;
+	s->ab[i] = (s->db[i] + (s->sb[i] * mirrored + grazing)) * open;
+}
+
+/* What the highlights of all lights have in common, and the colour in ambient light. */
+static void prepare_highlights(struct strip *s)
+{
+	for (uint32_t i = 0; i < s->n; i++) {
+		const float x = s->nx[i], y = s->ny[i], z = s->nz[i], width2 = s->width2[i];
+		const float facing = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
+		const float nv = psr_choose(facing > LEAST_NV, facing, LEAST_NV);
+
+		s->nv[i] = nv;
+		s->n2[i] = (x * x + y * y) + z * z;
+		s->seen[i] = __builtin_sqrtf(nv * nv * (1 - width2) + width2);
+		ambient_color(s, i);
+		s->hr[i] = s->hg[i] = s->hb[i] = 0;
+		s->wr[i] = s->wg[i] = s->wb[i] = 0;
+	}
+}
+
+static void strip_resolve(struct strip *strip, const struct strip_view *view)
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip->n;
@@ -180,18 +198,12 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 		memcpy(strip->gy, strip->ny, n * sizeof *strip->ny);
 		memcpy(strip->gz, strip->nz, n * sizeof *strip->nz);
 	}
-	for (uint32_t i = 0; i < n; i++) {
-		strip->lr[i] = ambient[0];
-		strip->lg[i] = ambient[1];
-		strip->lb[i] = ambient[2];
-	}
+	for (uint32_t i = 0; i < n; i++)
+		strip->lr[i] = strip->lg[i] = strip->lb[i] = 0;
 	if (view->needs & STRIP_POSITION)
 		locate(strip, view);
 	if (strip->is_specular || view->needs & STRIP_TWO_SIDED)
 		look(strip, view);
-	if (strip->is_specular)
-		for (uint32_t i = 0; i < n; i++)
-			strip->hr[i] = strip->hg[i] = strip->hb[i] = 0;
 	if (view->needs & STRIP_TWO_SIDED)
 		for (uint32_t i = 0; i < n; i++) {
 			const float g = (strip->gx[i] * strip->vx[i] + strip->gy[i] * strip->vy[i]) + strip->gz[i] * strip->vz[i];
@@ -204,6 +216,8 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view, co
 			strip->gy[i] *= turn;
 			strip->gz[i] *= turn;
 		}
+	if (strip->is_specular)
+		prepare_highlights(strip);
 }
 
 static inline uint16_t light16(float linear)
@@ -213,29 +227,34 @@ static inline uint16_t light16(float linear)
 	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
 }
 
-static CONSTANT_FLAGS void strip_color_by(struct strip *s, int is_specular)
+static CONSTANT_FLAGS void strip_color_by(struct strip *s, const float ambient[3], int is_specular)
 {
+	const float ambient_r = ambient[0], ambient_g = ambient[1], ambient_b = ambient[2];
+
 	for (uint32_t i = 0; i < s->n; i++) {
 		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
 		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
 
 		if (is_specular) {
-			r += s->sr[i] * s->hr[i];
-			g += s->sg[i] * s->hg[i];
-			b += s->sb[i] * s->hb[i];
+			r += s->sr[i] * s->hr[i] + s->wr[i];
+			g += s->sg[i] * s->hg[i] + s->wg[i];
+			b += s->sb[i] * s->hb[i] + s->wb[i];
 		}
+		r += (is_specular ? s->ar[i] : s->dr[i]) * ambient_r;
+		g += (is_specular ? s->ag[i] : s->dg[i]) * ambient_g;
+		b += (is_specular ? s->ab[i] : s->db[i]) * ambient_b;
 		s->r[i] = light16(is_unlit ? s->dr[i] : r);
 		s->g[i] = light16(is_unlit ? s->dg[i] : g);
 		s->b[i] = light16(is_unlit ? s->db[i] : b);
 	}
 }
 
-static void strip_color(struct strip *strip)
+static void strip_color(struct strip *strip, const float ambient[3])
 {
 	if (strip->is_specular)
-		strip_color_by(strip, 1);
+		strip_color_by(strip, ambient, 1);
 	else
-		strip_color_by(strip, 0);
+		strip_color_by(strip, ambient, 0);
 }
 
 static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)

@@ -2,6 +2,7 @@
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
+#include "base/maths.h"
 #include "base/srgb.h"
 #include "simd/strip.h"
 
@@ -41,30 +42,50 @@ static inline void read_attributes(uint64_t *all, uint64_t *common, struct strip
 		each &= attr;
 	}
 	strip->n = n;
-	strip->is_specular = (PSR_ATTR_SPECULAR(some) && view->needs & STRIP_LIGHTS) || view->needs & STRIP_SPECULAR;
+	strip->is_specular = PSR_ATTR_GLOSS(some) || view->needs & STRIP_SPECULAR;
 	*all = some;
 	*common = each;
 }
 
 /* is_one: the whole strip has one colour, a frequent case. */
-static CONSTANT_FLAGS void read_diffuse(struct strip *strip, int is_one)
+static CONSTANT_FLAGS void read_base(struct strip *strip, int is_one)
 {
 	const uint64_t first = strip->attr[0];
 
 	for (uint32_t i = 0; i < strip->n; i++) {
-		const uint32_t diffuse = PSR_ATTR_DIFFUSE(is_one ? first : strip->attr[i]);
+		const uint32_t base = PSR_ATTR_BASE(is_one ? first : strip->attr[i]);
 
-		strip->dr[i] = psr_srgb_to_linear[diffuse & 0xff];
-		strip->dg[i] = psr_srgb_to_linear[diffuse >> 8 & 0xff];
-		strip->db[i] = psr_srgb_to_linear[diffuse >> 16];
+		strip->dr[i] = psr_srgb_to_linear[base & 0xff];
+		strip->dg[i] = psr_srgb_to_linear[base >> 8 & 0xff];
+		strip->db[i] = psr_srgb_to_linear[base >> 16];
 	}
 }
 
-/* 2^(e / 16), the Phong exponents ([G] table 5.1: 8 bits). */
-static const float exponent_root[16] = {
-	1.0f,        1.04427378f, 1.09050773f, 1.13878863f, 1.18920712f, 1.24185781f, 1.29683955f, 1.35425555f,
-	1.41421356f, 1.47682615f, 1.54221083f, 1.61049033f, 1.68179283f, 1.75625216f, 1.83400809f, 1.91520656f,
-};
+/* The least roughness^4: stored normals are half a degree off, and floats would not tell sharper lobes' places. */
+#define LEAST_WIDTH2 4e-6f
+
+/* Splits base colours into what is scattered and what is mirrored of light from ahead. */
+static inline void read_gloss(struct strip *s)
+{
+	for (uint32_t i = 0; i < s->n; i++) {
+		const int32_t gloss = (int32_t)(s->attr[i] >> 40);
+		const float metallic = (float)(gloss & 31) * (1 / 31.0f);
+		const float root = (float)(gloss >> 5 & 31) * (1 / 30.0f), square = root * root;
+		const float dielectric = square < 1 ? square : 1, rest = 1 - metallic, f0 = dielectric * rest;
+		const float scatter = rest * (1 - dielectric), r = s->dr[i], g = s->dg[i], b = s->db[i];
+		const float roughness = (float)(gloss >> 16) * (1 / 255.0f), width = roughness * roughness;
+		const float width2 = width * width;
+
+		s->sr[i] = f0 + r * metallic;
+		s->sg[i] = f0 + g * metallic;
+		s->sb[i] = f0 + b * metallic;
+		s->dr[i] = r * scatter;
+		s->dg[i] = g * scatter;
+		s->db[i] = b * scatter;
+		s->shine[i] = psr_where((gloss & 0x3ff) != 0, 1);
+		s->width2[i] = width2 > LEAST_WIDTH2 ? width2 : LEAST_WIDTH2;
+	}
+}
 
 static inline const struct warp_instance *instance_of(const struct strip_view *view, uint32_t slot)
 {

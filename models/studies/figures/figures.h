@@ -55,7 +55,7 @@ struct figure_truth {
 	uint16_t *n_met;     /* rays of the pixel that meet the object */
 };
 
-/* Phong's light as frames have it, with shadow rays where a light casts shadows. */
+/* Light as frames have it, with shadow rays where a light casts shadows. */
 int figure_truth_draw(struct figure_truth *truth, struct study *study, const struct figure_model *model,
                       const struct figure_shot *shot, uint32_t rays);
 void figure_truth_fini(struct figure_truth *truth);

@@ -4,6 +4,7 @@
 #include "base/srgb.h"
 #include "base/vec.h"
 #include "measure/truth.h"
+#include "surface/lobe.h"
 #include "base/direction.h"
 
 #define RUN 64   /* rays traced together */
@@ -18,15 +19,9 @@ struct job {
 
 struct place {
 	double point[3], normal[3], to_eye[3]; /* the point in inner coordinates */
-	double diffuse[3], specular[3], exponent;
 	double face[3];                        /* the face's normal, on the side that was met */
-	int is_unlit;
+	struct look look;
 };
-
-static double linear(uint32_t code, uint32_t most)
-{
-	return (double)psr_srgb_to_linear[(code * 255 + most / 2) / most];
-}
 
 static void look_up(struct place *place, const struct figure_model *model, const struct ray *ray,
                     const struct ray_hit *hit)
@@ -34,7 +29,6 @@ static void look_up(struct place *place, const struct figure_model *model, const
 	const float *face = ray_scene_normal(model->source.scene, hit->prim);
 	const uint64_t attr = truth_attr(model->truth, ray, hit);
 	const float *normal = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
-	const uint32_t diffuse = PSR_ATTR_DIFFUSE(attr), specular = PSR_ATTR_SPECULAR(attr);
 
 	v3d_normalize(place->to_eye, ray->direction);
 	v3d_scale(place->to_eye, place->to_eye, -1);
@@ -42,13 +36,8 @@ static void look_up(struct place *place, const struct figure_model *model, const
 	for (int k = 0; k < 3; k++) {
 		place->face[k] = hit->is_back ? -(double)face[k] : (double)face[k];
 		place->normal[k] = (double)normal[k];
-		place->diffuse[k] = linear(diffuse >> 8 * k & 255, 255);
 	}
-	place->specular[0] = linear(specular & 31, 31);
-	place->specular[1] = linear(specular >> 5 & 63, 63);
-	place->specular[2] = linear(specular >> 11, 31);
-	place->exponent = exp2(PSR_ATTR_EXPONENT(attr) / 16.0);
-	place->is_unlit = PSR_ATTR_UNLIT(attr) != 0;
+	material_decode(&place->look, attr);
 }
 
 /* How much of a light gets to the place if no surface stands between; from where, and from how far away, in inner
@@ -95,22 +84,23 @@ static void light_place(const struct job *job, const struct place *place, double
 {
 	const struct psr_scene *scene = job->scene;
 
-	for (int c = 0; c < 3; c++)
-		light[c] = place->diffuse[c] * (place->is_unlit ? 1 : scene->ambient[c]);
-	for (uint32_t l = 0; l < scene->n_lights && !place->is_unlit; l++) {
-		double to_light[3], distance;
-		const double amount = light_amount(&scene->light[l], job->model, place, to_light, &distance);
-		const double facing = v3d_dot(place->normal, to_light);
-		const double mirror = 2 * facing * v3d_dot(place->normal, place->to_eye) - v3d_dot(to_light, place->to_eye);
+	double ambient[3];
 
-		if (!(facing > 0 && amount > 0))
+	lobe_ambient(ambient, &place->look, place->normal, place->to_eye);
+	for (int c = 0; c < 3; c++)
+		light[c] = place->look.unlit ? (double)place->look.base[c] : ambient[c] * scene->ambient[c];
+	for (uint32_t l = 0; l < scene->n_lights && !place->look.unlit; l++) {
+		double to_light[3], distance, part[3];
+		const double amount = light_amount(&scene->light[l], job->model, place, to_light, &distance);
+
+		if (!(v3d_dot(place->normal, to_light) > 0 && amount > 0))
 			continue;
 		if (scene->light[l].casts_shadow
 		    && (v3d_dot(place->face, to_light) <= 0 || is_shadowed(job->model, place, to_light, distance)))
 			continue;
-		const double shine = pow(fmin(fmax(mirror, 0), 1), place->exponent);
+		lobe_reflect(part, &place->look, place->normal, to_light, place->to_eye);
 		for (int c = 0; c < 3; c++)
-			light[c] += scene->light[l].color[c] * amount * (place->diffuse[c] * facing + place->specular[c] * shine);
+			light[c] += scene->light[l].color[c] * amount * part[c];
 	}
 	for (int c = 0; c < 3; c++)
 		light[c] = fmin(light[c], 1);

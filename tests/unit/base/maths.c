@@ -5,7 +5,6 @@
 #include <cmocka.h>
 #include <math.h>
 #include "base/maths.h"
-#include "base/random.h"
 
 static void sincos_is_within_its_bound(void **state)
 {
@@ -16,26 +15,6 @@ static void sincos_is_within_its_bound(void **state)
 		/* pi itself is rounded: mirroring moves the angle by 1.2e-16 more */
 		assert_true(fabs(s - sin(a)) < 1.5e-15);
 		assert_true(fabs(c - cos(a)) < 1.5e-15);
-	}
-}
-
-static void power_is_within_its_bound(void **state)
-{
-	(void)state;
-	uint64_t seed = 1;
-	assert_true(psr_power(1, 65536) == 1);
-	assert_true(psr_power(0, 1) == 0);
-	for (int i = 0; i < 2000000; i++) {
-		float x = (float)(random_next(&seed) >> 40) / 16777216.0f;
-		float y = exp2f((float)(random_next(&seed) >> 48) / 4096.0f);
-		if (i & 1)
-			x = 1 - x / y; /* where highlights of this exponent are bright */
-		double expect = pow((double)x, (double)y), got = (double)psr_power(x, y);
-		if (expect < 0x1p-59)
-			continue;
-		double bound = 3e-7 * (1 - (double)y * log((double)x));
-		if (fabs(got - expect) > bound * expect)
-			fail_msg("%g^%g: %g, expected %g", (double)x, (double)y, got, expect);
 	}
 }
 
@@ -54,7 +33,6 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sincos_is_within_its_bound),
-		cmocka_unit_test(power_is_within_its_bound),
 		cmocka_unit_test(floor_is_exact_around_whole_numbers),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -22,15 +22,6 @@ static void table_is_the_curve_rounded_to_float(void **state)
 	assert_true(psr_srgb_to_linear[0] == 0 && psr_srgb_to_linear[255] == 1);
 }
 
-static void tables_of_fewer_bits_are_of_the_nearest_codes(void **state)
-{
-	(void)state;
-	for (int i = 0; i < 32; i++)
-		assert_true(psr_srgb5_to_linear[i] == psr_srgb_to_linear[(int)floor(i * 255 / 31.0 + 0.5)]);
-	for (int i = 0; i < 64; i++)
-		assert_true(psr_srgb6_to_linear[i] == psr_srgb_to_linear[(int)floor(i * 255 / 63.0 + 0.5)]);
-}
-
 static void every_code_comes_back(void **state)
 {
 	(void)state;
@@ -73,7 +64,6 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(table_is_the_curve_rounded_to_float),
-		cmocka_unit_test(tables_of_fewer_bits_are_of_the_nearest_codes),
 		cmocka_unit_test(every_code_comes_back),
 		cmocka_unit_test(codes_change_halfway_on_the_curve),
 		cmocka_unit_test(values_outside_are_clamped),

@@ -135,8 +135,9 @@ static void add_block(struct arrays *a, const struct shape_options *o, const str
 		a->depth[a->n_samples] = (uint16_t)((s[i].depth - place.z) * (double)(1u << shift) + 32768.5);
 		float n[3] = { (float)s[i].normal[0], (float)s[i].normal[1], (float)s[i].normal[2] };
 		a->attr[a->n_samples++] = psr_direction_encode(n) | (uint64_t)(o->unlit != 0) << 15 |
-		                          (uint64_t)o->diffuse << 16 | (uint64_t)o->specular << 40 |
-		                          (uint64_t)o->exponent << 56;
+		                          (uint64_t)o->diffuse << 16 | (uint64_t)o->metallic << 40 |
+		                          (uint64_t)o->reflectance << 45 | (uint64_t)o->shut << 50 |
+		                          (uint64_t)o->roughness << 56;
 	}
 }
 

@@ -6,9 +6,8 @@
 
 struct shape_options {
 	uint32_t resolution;   /* pixels across the unit sphere */
-	uint32_t diffuse;      /* r | g << 8 | b << 16 */
-	uint32_t specular;     /* 5-6-5 */
-	uint32_t exponent;     /* 0..255 */
+	uint32_t diffuse;      /* base colour, r | g << 8 | b << 16 */
+	uint32_t metallic, reflectance, shut, roughness; /* as in PSR_ATTR_*; 0: matt */
 	int two_sided, unlit;
 	int cones;             /* with [G] 6.4's visibility cones */
 	double origin[3], scale;

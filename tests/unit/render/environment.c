@@ -72,8 +72,9 @@ static struct psr_model *sphere(void)
 {
 	const struct shape_options o = { .resolution = 96,
 		                             .diffuse = 0x6090c0,
-		                             .specular = 0xffff,
-		                             .exponent = 80,
+		                             .metallic = 15,
+		                             .reflectance = 6,
+		                             .roughness = 80,
 		                             .scale = 1 };
 	return shape_build(&o, 0.9);
 }

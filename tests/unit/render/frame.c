@@ -225,8 +225,8 @@ static void scaling_the_world_by_a_power_of_two_changes_no_colour(void **state)
 		struct shape_options o = GREY;
 		o.scale = s;
 		o.origin[0] = 0.25 * s;
-		o.specular = 0xffff;
-		o.exponent = 80;
+		o.metallic = 15;
+		o.roughness = 80;
 		struct psr_model *model = shape_build(&o, 0.95);
 		struct psr_instance instance = place(model);
 		struct psr_light here = light;
@@ -381,15 +381,41 @@ static void one_sided_squares_are_seen_through_from_behind(void **state)
 	psr_model_unref(ball);
 }
 
-/* Diffuse and highlight of the square's middle against the formula in double. */
-static void lights_follow_phong(void **state)
+struct facet {
+	double base, metallic, reflectance, open, roughness;
+};
+
+/* GGX, Smith and Schlick over Lambert as published, of light along l seen from (0, 0, 1); and that of ambient light by
+ * the fit of surface/lobe.h. */
+static double reflected(const struct facet *f, const double n[3], const double l[3])
 {
-	(void)state;
-	struct shape_options o = GREY;
-	o.diffuse = 0x404040;
-	o.specular = 0xffff;
-	o.exponent = 16 * 4; /* 16 */
-	struct psr_model *model = shape_build(&o, 0);
+	const double nl = v3d_dot(n, l), nv = n[2], alpha2 = fmax(pow(f->roughness, 4), 4e-6);
+	const double mirrors = f->metallic > 0 || f->reflectance > 0;
+	const double f0 = f->reflectance * (1 - f->metallic) + f->base * f->metallic;
+	double h[3] = { l[0], l[1], l[2] + 1 };
+
+	v3d_normalize(h, h);
+	const double nh = v3d_dot(n, h), schlick = mirrors * pow(1 - h[2], 5);
+	const double d = mirrors * alpha2 / pow(nh * nh * (alpha2 - 1) + 1, 2); /* times pi */
+	const double v = 0.5 / (nl * sqrt(alpha2 + (1 - alpha2) * nv * nv) + nv * sqrt(alpha2 + (1 - alpha2) * nl * nl));
+	const double diffuse = f->base * (1 - f->metallic) * (1 - f->reflectance) * (1 - schlick);
+	return nl > 0 ? nl * (diffuse + d * v * (f0 + (1 - f0) * schlick)) : 0;
+}
+
+static double reflected_ambient(const struct facet *f, const double n[3])
+{
+	const double v = n[2], w = f->roughness * f->roughness, s = 1 - f->roughness;
+	const double f0 = f->reflectance * (1 - f->metallic) + f->base * f->metallic;
+	const double grazing = f0 > 0 ? s * pow(1 - v, 3) * (0.27 + 0.8 * s * s * (1 - v) * (1 - v)) : 0;
+	const double whole = 1 / (1 + w * (0.42 + 1.05 * v - 1.87 * v * v) + w * w * (-0.45 + 1.83 * v + 1.17 * v * v));
+
+	return f->open * (f->base * (1 - f->metallic) * (1 - f->reflectance) + f0 * (whole - grazing) + grazing);
+}
+
+/* The square's middle against that. */
+static void draw_lit(const struct shape_options *o)
+{
+	struct psr_model *model = shape_build(o, 0);
 	struct psr_instance instance = place(model);
 	static const struct psr_light lights[] = {
 		{ .kind = PSR_LIGHT_DIRECTIONAL, .direction = { -1, 0, -2 }, .color = { 0.3, 0.3, 0.3 } },
@@ -404,7 +430,7 @@ static void lights_follow_phong(void **state)
 	for (unsigned i = 0; i < sizeof lights / sizeof *lights; i++) {
 		const struct psr_light *l = &lights[i];
 		struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = l, .n_lights = 1,
-			                       .camera = perspective(0, 0, 5, 16) };
+			                       .ambient = { 0.1, 0.1, 0.1 }, .camera = perspective(0, 0, 5, 16) };
 		struct picture p;
 		draw(&p, &scene, 101, 101, 1); /* the middle of pixel (50, 50) is the square's */
 		double L[3], length = 0, amount = 1;
@@ -419,18 +445,69 @@ static void lights_follow_phong(void **state)
 			amount = l->reference * l->reference / (length * length);
 		if (i == 4) /* 26.6 degrees off the axis, beyond 0.4 radians */
 			amount = 0;
-		double facing = fmax(0, L[2]), side = sqrt(1 - L[2] * L[2]); /* N = V = z, so R.V = N.L */
-		double light = facing > 0 ? 0.3 * amount : 0;
-		double diffuse = (double)psr_srgb_to_linear[0x40] * facing, specular = pow(facing, 16);
-		/* The stored normal is off by up to 0.7 degrees, R by twice that, and the sample by a pixel; half a code at the
-		 * end. */
-		double turn = 0.0125, slack = light * (turn * side + 16 * 2 * turn * specular * side / L[2] * 1.1) + 0.002;
-		double expect = light * (diffuse + specular), got = (double)psr_srgb_to_linear[pixel(&p, 50, 50) & 255];
-		if (fabs(got - expect) > slack)
-			fail_msg("light %u: %g, expected %g", i, got, expect);
+		const struct facet facet = { (double)psr_srgb_to_linear[o->diffuse & 255], o->metallic / 31.0,
+			                         o->reflectance * o->reflectance / 900.0, 1 - o->shut / 63.0, o->roughness / 255.0 };
+		/* The stored normal is off by up to 0.7 degrees, and the sample by a pixel: the range of light over normals that
+		 * are off by so much; half a code at the end. */
+		double low = INFINITY, high = 0, got = (double)psr_srgb_to_linear[pixel(&p, 50, 50) & 255];
+		for (int turn = 0; turn < 17; turn++) {
+			const double off = turn ? 0.0125 : 0, n[3] = { off * cos(turn * 0.3927), off * sin(turn * 0.3927), 1 };
+			const double light = 0.3 * amount * reflected(&facet, n, L) + 0.1 * reflected_ambient(&facet, n);
+
+			low = fmin(low, light);
+			high = fmax(high, light);
+		}
+		if (got < low - 0.002 - 0.01 * low || got > high + 0.002 + 0.01 * high)
+			fail_msg("light %u: %g, expected %g to %g", i, got, low, high);
 		release(&p);
 	}
 	psr_model_unref(model);
+}
+
+static void lights_follow_the_lobe(void **state)
+{
+	(void)state;
+	struct shape_options o = GREY;
+	o.diffuse = 0x404040;
+	draw_lit(&o);
+	o.reflectance = 6;
+	o.roughness = 100;
+	draw_lit(&o);
+	o.metallic = 31;
+	o.roughness = 180;
+	draw_lit(&o);
+	o.metallic = 11;
+	o.reflectance = 14;
+	o.shut = 40;
+	draw_lit(&o);
+}
+
+/* Head on, rough white is 0.96 + 0.04 / 4 of its light, and grey of 0.5 is 0.48 + 0.01. */
+static void rough_surfaces_add_no_light(void **state)
+{
+	(void)state;
+	static const struct psr_light light = { .kind = PSR_LIGHT_DIRECTIONAL, .direction = { 0, 0, -1 },
+		                                    .color = { 1, 1, 1 } };
+	struct shape_options o = GREY;
+	o.reflectance = 6;
+	o.roughness = 255;
+	for (int i = 0; i < 2; i++) {
+		const uint32_t code = i ? 255 : 188;
+		const double expected = (double)psr_srgb_to_linear[code] * 0.96 + 0.01;
+
+		o.diffuse = code * 0x10101;
+		struct psr_model *model = shape_build(&o, 0);
+		struct psr_instance instance = place(model);
+		struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
+			                       .camera = perspective(0, 0, 5, 16) };
+		struct picture p;
+		draw(&p, &scene, 101, 101, 1);
+		/* A code at most; the stored normal takes a cosine of 0.7 degrees, 1e-4. */
+		assert_in_range((pixel(&p, 50, 50) & 255) + 1, psr_linear_to_srgb((float)expected),
+		                psr_linear_to_srgb((float)expected) + 2u);
+		release(&p);
+		psr_model_unref(model);
+	}
 }
 
 static void hard_cameras_draw_something_or_nothing(void **state)
@@ -585,7 +662,8 @@ int main(void)
 		cmocka_unit_test(one_sided_squares_have_no_back_and_two_sided_ones_do),
 		cmocka_unit_test(cones_cull_the_back_of_a_solid_and_change_no_pixel),
 		cmocka_unit_test(one_sided_squares_are_seen_through_from_behind),
-		cmocka_unit_test(lights_follow_phong),
+		cmocka_unit_test(lights_follow_the_lobe),
+		cmocka_unit_test(rough_surfaces_add_no_light),
 		cmocka_unit_test(hard_cameras_draw_something_or_nothing),
 		cmocka_unit_test(an_empty_scene_is_background),
 		cmocka_unit_test(the_door_refuses_what_is_out_of_range),

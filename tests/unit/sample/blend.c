@@ -14,10 +14,15 @@
 /* An angle that a normal may be off by its quantisation (base/direction.h), radians. */
 #define NORMAL_ERROR 0.0222f
 
-static uint64_t word(uint32_t normal, uint32_t diffuse, uint32_t specular, uint32_t exponent)
+/* gloss: PSR_ATTR_GLOSS() */
+static uint64_t word(uint32_t normal, uint32_t base, uint32_t gloss, uint32_t roughness)
 {
-	return (uint64_t)normal | (uint64_t)diffuse << 16 | (uint64_t)specular << 40 | (uint64_t)exponent << 56;
+	return (uint64_t)normal | (uint64_t)base << 16 | (uint64_t)gloss << 40 | (uint64_t)roughness << 56;
 }
+
+#define METAL 31u
+#define REFLECTANCE(code) ((uint32_t)(code) << 5)
+#define SHUT(code) ((uint32_t)(code) << 10)
 
 static uint64_t random_word(uint64_t *seed)
 {
@@ -44,6 +49,10 @@ static void equal_words_give_that_word(void **state)
 
 		if (PSR_ATTR_UNLIT(own)) /* which has nothing in the bits of a highlight */
 			own &= (UINT64_C(1) << 40) - 1;
+		else if (PSR_ATTR_METALLIC(own) == 31) /* of which none is dielectric */
+			own = (own & ~(UINT64_C(31) << 45)) | UINT64_C(6) << 45;
+		else if (PSR_ATTR_REFLECTANCE(own) == 31) /* counts as 30 */
+			own ^= UINT64_C(1) << 45;
 		for (int k = 0; k < n; k++) {
 			attr[k] = own;
 			weight[k] = (float)(meshes_random(&seed) + 1e-3);
@@ -58,27 +67,42 @@ static void colors_are_averaged_in_linear_light(void **state)
 	uint64_t blend = blend_two(word(77, 0x0000ff, 0, 0), 1, word(77, 0xffff00, 0, 0), 3, up);
 
 	(void)state;
-	assert_int_equal(PSR_ATTR_DIFFUSE(blend) & 255, psr_linear_to_srgb(0.25f));
-	assert_int_equal(PSR_ATTR_DIFFUSE(blend) >> 8 & 255, psr_linear_to_srgb(0.75f));
+	assert_int_equal(PSR_ATTR_BASE(blend) & 255, psr_linear_to_srgb(0.25f));
+	assert_int_equal(PSR_ATTR_BASE(blend) >> 8 & 255, psr_linear_to_srgb(0.75f));
 	assert_int_equal(PSR_ATTR_NORMAL(blend), 77);
 }
 
-static void lobes_keep_their_light(void **state)
+static void scattered_and_mirrored_light_keep_their_sum(void **state)
 {
 	const float *up = psr_direction_table()[77];
-	/* Full peaks, exponents 16 and 2^8: variances 1/16 and 1/256, light 1/18 and 1/258. */
-	uint64_t blend = blend_two(word(77, 0, 0xffff, 64), 1, word(77, 0, 0xffff, 128), 1, up);
-	double light = 1.0 / 18 + 1.0 / 258, variance = (1.0 / 18 / 16 + 1.0 / 258 / 256) / light;
-	unsigned code = material_exponent_code(1 / variance);
+	const uint64_t metal = word(77, 0x4080ff, METAL | REFLECTANCE(6), 99), paint = word(77, 0x204060, REFLECTANCE(12), 99);
+	const uint64_t blend = blend_two(metal, 8, paint, 23, up);
 
 	(void)state;
-	assert_int_equal(PSR_ATTR_EXPONENT(blend), code);
-	assert_int_equal(PSR_ATTR_SPECULAR(blend) & 31,
-	                 (psr_linear_to_srgb((float)(light / 2 * (1 / variance + 2))) * 31 + 127) / 255);
+	assert_int_equal(PSR_ATTR_METALLIC(blend), 8);
+	assert_int_equal(PSR_ATTR_REFLECTANCE(blend), 12); /* of the paint alone */
+	assert_int_equal(PSR_ATTR_ROUGHNESS(blend), 99);
+	for (int c = 0; c < 3; c++) {
+		const float a = psr_srgb_to_linear[PSR_ATTR_BASE(metal) >> 8 * c & 255];
+		const float b = psr_srgb_to_linear[PSR_ATTR_BASE(paint) >> 8 * c & 255];
+
+		assert_int_equal(PSR_ATTR_BASE(blend) >> 8 * c & 255, psr_linear_to_srgb((a * 8 + b * 23) / 31));
+	}
+	assert_int_equal(PSR_ATTR_SHUT(blend_two(word(77, 0, SHUT(60), 0), 1, word(77, 0, SHUT(20), 0), 3, up)), 30);
+}
+
+/* Squared widths, the fourth powers of roughness, count by F0: 0.04 and 0.16 of the whole here. */
+static void lobes_have_the_mean_of_their_widths(void **state)
+{
+	const float *up = psr_direction_table()[77];
+	const uint32_t dim = REFLECTANCE(6), bright = REFLECTANCE(12);
+	const double expected = pow((0.04 * pow(51 / 255.0, 4) + 0.16 * pow(153 / 255.0, 4)) / 0.2, 0.25);
+
+	(void)state;
+	assert_int_equal(PSR_ATTR_ROUGHNESS(blend_two(word(77, 0, dim, 51), 1, word(77, 0, bright, 153), 1, up)),
+	                 (int)(expected * 255 + 0.5));
 	/* What reflects nothing has no say. */
-	blend = blend_two(word(77, 0, 0xffff, 64), 1, word(77, 0, 0, 0), 1, up);
-	assert_int_equal(PSR_ATTR_EXPONENT(blend), 64);
-	assert_int_equal(PSR_ATTR_SPECULAR(blend) & 31, (psr_linear_to_srgb(0.5f) * 31 + 127) / 255);
+	assert_int_equal(PSR_ATTR_ROUGHNESS(blend_two(word(77, 0, dim, 51), 1, word(77, 0, 0, 255), 1, up)), 51);
 }
 
 static void spread_normals_widen_the_lobe(void **state)
@@ -91,20 +115,21 @@ static void spread_normals_widen_the_lobe(void **state)
 		double angle = 0.7 * meshes_random(&seed), turn = 6.28 * meshes_random(&seed), r;
 		float a[3] = { (float)(sin(angle) * cos(turn)), (float)(sin(angle) * sin(turn)), (float)cos(angle) };
 		float b[3] = { -a[0], -a[1], a[2] }, facing[3] = { 0, 0, 1 };
-		uint32_t e = (uint32_t)(meshes_random(&seed) * 256), na = psr_direction_encode(a), nb = psr_direction_encode(b);
-		uint64_t blend = blend_two(word(na, 0, 0x8410, e), 1, word(nb, 0, 0x8410, e), 1, facing);
-		double n = exp2(e / 16.0), expected, exact;
+		uint32_t rough = (uint32_t)(meshes_random(&seed) * 256);
+		uint32_t na = psr_direction_encode(a), nb = psr_direction_encode(b), gloss = REFLECTANCE(6);
+		uint64_t blend = blend_two(word(na, 0, gloss, rough), 1, word(nb, 0, gloss, rough), 1, facing);
+		double expected;
 
 		/* |a + b| / 2 of the normals as stored, from the chord between them, which does not cancel. */
 		r = 0;
 		for (int k = 0; k < 3; k++)
 			r += ((double)table[na][k] - (double)table[nb][k]) * ((double)table[na][k] - (double)table[nb][k]);
 		r = sqrt(1 - r / 4);
-		expected = fmax(1, 1 / (1 / n + 4 * (1 - r) / r));
-		exact = 16 * log2(expected);
-		/* The table's floats are of unit length to 1e-7, which moves 4 (1 - r) by four times as much. */
-		assert_true(fabs((double)PSR_ATTR_EXPONENT(blend) - exact) <= 0.5 + 16 * log2(1 + 4e-7 * n));
-		assert_true(PSR_ATTR_EXPONENT(blend) <= e);
+		expected = 255 * fmin(1, pow(pow(rough / 255.0, 4) + 2 * (1 - r) / r, 0.25));
+		/* Half a code. The table's floats are of unit length to 1e-7, which moves 1 - r as much: by 1e-7^(1/4) at
+		 * most, 0.02, where nothing else widens the lobe. */
+		assert_true(fabs((double)PSR_ATTR_ROUGHNESS(blend) - expected) <= 0.5001 + 255 * 0.02);
+		assert_true(PSR_ATTR_ROUGHNESS(blend) >= rough);
 		assert_true(table[PSR_ATTR_NORMAL(blend)][2] > cosf(2 * NORMAL_ERROR));
 	}
 }
@@ -113,13 +138,11 @@ static void opposite_normals_give_the_one_asked_for(void **state)
 {
 	const float up[3] = { 0, 0, 1 }, left[3] = { -1, 0, 0 }, right[3] = { 1, 0, 0 };
 	uint32_t a = psr_direction_encode(left), b = psr_direction_encode(right);
-	uint64_t blend = blend_two(word(a, 0, 0x8410, 200), 1, word(b, 0, 0x8410, 200), 1, up);
+	uint64_t blend = blend_two(word(a, 0, METAL, 20), 1, word(b, 0, METAL, 20), 1, up);
 
 	(void)state;
 	assert_true(psr_direction_table()[PSR_ATTR_NORMAL(blend)][2] > 0.999f);
-	/* The widest lobe, of the exponent 1: its peak is nearly 3 / 5795 of what it was, too little for five bits. */
-	assert_int_equal(PSR_ATTR_EXPONENT(blend), 0);
-	assert_int_equal(PSR_ATTR_SPECULAR(blend) & 31, 0);
+	assert_int_equal(PSR_ATTR_ROUGHNESS(blend), 255);
 }
 
 static void every_blend_faces_its_view(void **state)
@@ -140,7 +163,7 @@ static void every_blend_faces_its_view(void **state)
 static void unlit_ones_do_not_mix_with_lit_ones(void **state)
 {
 	const float *up = psr_direction_table()[77];
-	uint64_t unlit = word(77, 0x0000ff, 0, 0) | 1 << 15, lit = word(77, 0x00ff00, 0x1234, 99);
+	uint64_t unlit = word(77, 0x0000ff, 0, 0) | 1 << 15, lit = word(77, 0x00ff00, REFLECTANCE(9) | SHUT(20), 99);
 
 	(void)state;
 	assert_true(blend_two(unlit, 2, lit, 1, up) == unlit);
@@ -154,7 +177,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(equal_words_give_that_word),
 		cmocka_unit_test(colors_are_averaged_in_linear_light),
-		cmocka_unit_test(lobes_keep_their_light),
+		cmocka_unit_test(scattered_and_mirrored_light_keep_their_sum),
+		cmocka_unit_test(lobes_have_the_mean_of_their_widths),
 		cmocka_unit_test(spread_normals_widen_the_lobe),
 		cmocka_unit_test(opposite_normals_give_the_one_asked_for),
 		cmocka_unit_test(every_blend_faces_its_view),

@@ -126,7 +126,7 @@ static void samples_have_colors_and_normals_of_their_points(void **state)
 
 	for (uint64_t i = 0; i < built->blocks->n_samples; i++) {
 		const struct model_sample *s = &built->sample[i];
-		uint32_t color = PSR_ATTR_DIFFUSE(s->attr);
+		uint32_t color = PSR_ATTR_BASE(s->attr);
 		double margin = 0.072 + 2 * pixel(s->level), p[3];
 
 		for (int k = 0; k < 3; k++)

@@ -66,7 +66,7 @@ static void a_checkerboard_becomes_its_linear_mean(void **state)
 	model_open(&built, mesh, RESOLUTION, N_LEVELS);
 	for (uint64_t i = 0; i < built.blocks->n_samples; i++) {
 		const struct model_sample *s = &built.sample[i];
-		double value = (double)psr_srgb_to_linear[PSR_ATTR_DIFFUSE(s->attr) & 255];
+		double value = (double)psr_srgb_to_linear[PSR_ATTR_BASE(s->attr) & 255];
 
 		if (fabsf(s->p[0]) > 0.65f || fabsf(s->p[1]) > 0.65f)
 			continue;

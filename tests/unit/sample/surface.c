@@ -68,8 +68,8 @@ static void base_textures_are_coded(void **state)
 
 	(void)state;
 	mesh->material->base_texture.image = 0;
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_of(mesh, 0)), 10 | 100 << 8 | 200 << 16);
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_of(mesh, 1)), 10 | 100 << 8 | 200 << 16);
+	assert_int_equal(PSR_ATTR_BASE(attr_of(mesh, 0)), 10 | 100 << 8 | 200 << 16);
+	assert_int_equal(PSR_ATTR_BASE(attr_of(mesh, 1)), 10 | 100 << 8 | 200 << 16);
 	meshes_free(mesh);
 }
 
@@ -83,7 +83,7 @@ static void far_textures_are_their_linear_mean(void **state)
 		memset(rgba + 4 * i, (i + i / 32) & 1 ? 255 : 0, 4);
 	meshes_texture(mesh, 32, 32, rgba);
 	/* A circle with a diameter of half the square: 8 texels around its centre. */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_of(mesh, 1)), psr_linear_to_srgb(0.5f) * 0x10101u);
+	assert_int_equal(PSR_ATTR_BASE(attr_of(mesh, 1)), psr_linear_to_srgb(0.5f) * 0x10101u);
 	meshes_free(mesh);
 }
 
@@ -169,7 +169,7 @@ static void unlit_materials_have_their_base_color_alone(void **state)
 	mesh->material->occlusion_texture.image = 0;
 	mesh->material->normal_texture.image = 0;
 	attr = attr_of(mesh, 0.1);
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr), 51 | 120 << 8 | 220 << 16);
+	assert_int_equal(PSR_ATTR_BASE(attr), 51 | 120 << 8 | 220 << 16);
 	assert_int_equal(PSR_ATTR_UNLIT(attr), 1);
 	assert_int_equal(PSR_ATTR_NORMAL(attr), psr_direction_encode(up));
 	meshes_free(mesh);
@@ -185,13 +185,13 @@ static void uv_sets_and_transforms_choose_the_place(void **state)
 	meshes_texture(mesh, 2, 2, rgba);
 	texture->is_nearest = 1;
 	/* u = 0.4, v = 0.9 */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x030303);
+	assert_int_equal(PSR_ATTR_BASE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x030303);
 	memcpy(texture->transform, (float[]){ 0, 1, 0, 1, 0, 0 }, sizeof texture->transform); /* 0.9, 0.4 */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x020202);
+	assert_int_equal(PSR_ATTR_BASE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x020202);
 	memcpy(texture->transform, (float[]){ 1, 0, 0.3f, 0, 1, 0 }, sizeof texture->transform); /* 0.7, 0.9 */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x040404);
+	assert_int_equal(PSR_ATTR_BASE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x040404);
 	texture->uv_set = 1; /* there is none: 0, 0, which is moved to 0.3, 0 */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x010101);
+	assert_int_equal(PSR_ATTR_BASE(attr_at(mesh, 0.3, 0.1, 0, 0)), 0x010101);
 	meshes_free(mesh);
 }
 
@@ -208,9 +208,9 @@ static void clear_neighbors_do_not_bleed(void **state)
 	meshes_texture(mesh, 16, 16, rgba);
 	mesh->material->alpha = PSR_ALPHA_MASK;
 	for (double diameter = 0.001; diameter < 3; diameter *= 1.3)
-		assert_int_equal(PSR_ATTR_DIFFUSE(attr_of(mesh, diameter)), 0x646464);
+		assert_int_equal(PSR_ATTR_BASE(attr_of(mesh, diameter)), 0x646464);
 	mesh->material->alpha = PSR_ALPHA_OPAQUE; /* where glTF ignores it: half of each */
-	assert_int_equal(PSR_ATTR_DIFFUSE(attr_of(mesh, 1)),
+	assert_int_equal(PSR_ATTR_BASE(attr_of(mesh, 1)),
 	                 psr_linear_to_srgb((1 + psr_srgb_to_linear[100]) / 2) * 0x10101u);
 	meshes_free(mesh);
 }
@@ -362,24 +362,18 @@ static struct psr_mesh *ribs(double *cosine)
 
 static void unseen_bumps_widen_the_highlight(void **state)
 {
-	double cosine, exponent = (2 / (0.2 * 0.2 * 0.2 * 0.2) - 2) / 4, widened;
+	double cosine;
 	struct psr_mesh *mesh = ribs(&cosine);
 
 	(void)state;
 	for (int i = 0; i < 2; i++) {
 		/* A scale of one half makes a quarter of the variance. The 16 bits of the mean move its length by 3e-5 at most,
-		 * and 4 (1 - r) / r by four times that: less than a step of 2^(1/32) = 1.02 at these exponents. */
-		double spread = (1 - cosine) / cosine / (i == 0 ? 1 : 4);
-		uint64_t attr = attr_of(mesh, 1);
-		float peak;
+		 * and the fourth power of roughness by twice that, here 1e-4 / (4 roughness^3) < 0.01 of roughness: 2 codes. */
+		const double spread = (1 - cosine) / cosine / (i == 0 ? 1 : 4), widened = material_widened(0.2, spread);
+		const uint64_t attr = attr_of(mesh, 1);
 
-		widened = 1 / (1 / exponent + 4 * spread);
-		assert_true(4 * 3e-5 * widened < 0.02 / 2);
-		assert_in_range(PSR_ATTR_EXPONENT(attr) + 1, material_exponent_code(widened),
-		                material_exponent_code(widened) + 2);
-		peak = (float)fmin(1, 0.04 * (exp2(PSR_ATTR_EXPONENT(attr) / 16.0) + 2) / 2);
-		assert_in_range((PSR_ATTR_SPECULAR(attr) & 31) + 1, (psr_linear_to_srgb(peak) * 31 + 127) / 255,
-		                (psr_linear_to_srgb(peak) * 31 + 127) / 255 + 2);
+		assert_true(6e-5 / (4 * widened * widened * widened) < 0.01 && widened > 0.3);
+		assert_true(fabs((double)PSR_ATTR_ROUGHNESS(attr) - 255 * widened) < 0.01 * 255);
 		assert_true(angle_to(attr, 0, 0, 1) < NORMAL_ERROR + sqrt(2) / 255);
 		mesh->material->normal_scale = 0.5f;
 	}
@@ -388,12 +382,12 @@ static void unseen_bumps_widen_the_highlight(void **state)
 
 static void bumps_that_are_seen_leave_it_sharp(void **state)
 {
-	double cosine, exponent = (2 / (0.2 * 0.2 * 0.2 * 0.2) - 2) / 4;
+	double cosine;
 	struct psr_mesh *mesh = ribs(&cosine);
 
 	(void)state;
-	assert_int_equal(PSR_ATTR_EXPONENT(attr_of(mesh, 0)), material_exponent_code(exponent));
-	assert_int_equal(PSR_ATTR_EXPONENT(attr_of(mesh, 1e-5)), material_exponent_code(exponent));
+	assert_int_equal(PSR_ATTR_ROUGHNESS(attr_of(mesh, 0)), 51);
+	assert_int_equal(PSR_ATTR_ROUGHNESS(attr_of(mesh, 1e-5)), 51);
 	meshes_free(mesh);
 }
 
