@@ -61,7 +61,7 @@ int smooth_picture(struct smooth *smooth, const struct simd *simd, const struct 
 {
 	const float step = (float)(EDGE / (double)plan->focal);
 	struct smoothing smoothing = {
-		smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, 1 + step, 0 },
+		smooth, simd, plan, { smooth->rgb, rgb, smooth->depth, plan->width, plan->height, plan->perspective, 1 / (1 + step), 0 },
 	};
 
 	if (!plan->perspective) {

@@ -6,12 +6,18 @@
 
 #define SMOOTH_WIDTH 256
 
-/* A finished picture, and its smoothed copy. A pixel beyond scale * z' + offset of another lies behind it. */
+#define SMOOTH_REACH 3 /* pixels around one that it depends on */
+
+/* A finished picture, and its smoothed copy. How near a pixel is, 1 / z' in perspective and -z' else, is linear on a
+ * plane. A pixel less near than scale * nearness - offset of another lies behind it, unless the surface falls as much
+ * there: by half of that a pixel, over the two pixels on either side of the step. So planes that light and eye graze
+ * are one surface. */
 struct smooth_target {
 	const uint8_t *from; /* sRGB, 3 bytes a pixel */
 	uint8_t *to;
 	const float *depth;  /* z', +inf where nothing is */
 	uint32_t width, height;
+	int perspective;
 	float scale, offset;
 };
 

@@ -22,7 +22,7 @@ static void smooth(struct check *c, uint32_t width, uint32_t height, uint32_t x0
 			depth[i] = INFINITY;
 	const struct smooth_target target = {
 		.from = from, .to = to, .depth = depth, .width = width, .height = height,
-		.scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 1, 1.1), .offset = (float)check_real(c, 0, 0.1),
+		.perspective = check_one_in(c, 2), .scale = check_one_in(c, 2) ? 1 : (float)check_real(c, 0.9, 1), .offset = (float)check_real(c, 0, 0.1),
 	};
 	check_units(c, (uint64_t)n * rows);
 	while (check_next(c))

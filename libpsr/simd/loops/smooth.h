@@ -1,40 +1,45 @@
 /* Anti-aliasing by a pixel's neighbours ([G] 9.1.1). */
 #include <math.h>
 #include <string.h>
+#include "base/maths.h"
 #include "simd/smooth.h"
 
 #define MOST_BEHIND 6 /* eighths: lines a pixel wide must not vanish */
 
-/* A row and a pixel on each side of it: [1] is the first. */
+#define MARGIN SMOOTH_REACH
+#define ROWS (2 * MARGIN + 1)
+
+/* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane: 1 / z'
+ * in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
-	float z[SMOOTH_WIDTH + 2], limit[SMOOTH_WIDTH + 2]; /* NaN outside of the picture: every comparison fails */
-	int32_t light[3][SMOOTH_WIDTH + 2];                 /* squared codes, close to linear */
+	float near[SMOOTH_WIDTH + 2 * MARGIN], limit[SMOOTH_WIDTH + 2 * MARGIN];
+	int32_t light[3][SMOOTH_WIDTH + 2 * MARGIN]; /* squared codes, close to linear */
 	int32_t is_empty;
 };
+
+static void clear_smooth_row(struct smooth_row *row, uint32_t first, uint32_t end)
+{
+	for (uint32_t i = first; i < end; i++) {
+		row->near[i] = row->limit[i] = NAN;
+		row->light[0][i] = row->light[1][i] = row->light[2][i] = 0;
+	}
+}
 
 static void load_smooth_row(struct smooth_row *row, const struct smooth_target *t, uint32_t x0, uint32_t n, int64_t y)
 {
 	const int is_inside = y >= 0 && y < (int64_t)t->height;
-	const uint32_t first = is_inside && x0 ? 0 : 1, end = x0 + n < t->width ? n + 2 : n + 1;
-	const ptrdiff_t at = (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - 1;
+	const uint32_t first = x0 < MARGIN ? MARGIN - x0 : 0, left = t->width - x0, all = n + 2 * MARGIN;
+	const uint32_t end = is_inside ? (left + MARGIN < all ? left + MARGIN : all) : first;
+	const ptrdiff_t at = (ptrdiff_t)(is_inside ? y : 0) * t->width + x0 - MARGIN;
 	const uint8_t *code = t->from + 3 * at;
 	const float *z = t->depth + at;
-
-	row->z[0] = row->limit[0] = row->z[n + 1] = row->limit[n + 1] = NAN;
-	for (int c = 0; c < 3; c++)
-		row->light[c][0] = row->light[c][n + 1] = 0;
-	row->is_empty = 1;
-	if (!is_inside) {
-		for (uint32_t i = 0; i < n + 2; i++) {
-			row->z[i] = row->limit[i] = NAN;
-			row->light[0][i] = row->light[1][i] = row->light[2][i] = 0;
-		}
-		return;
-	}
 	int32_t has_any = 0;
+
 	for (uint32_t i = first; i < end; i++) {
-		row->z[i] = z[i];
-		row->limit[i] = z[i] * t->scale + t->offset;
+		const float near = t->perspective ? 1 / z[i] : -z[i];
+
+		row->near[i] = near;
+		row->limit[i] = near * t->scale - t->offset;
 		has_any |= z[i] < INFINITY;
 	}
 	row->is_empty = !has_any;
@@ -45,6 +50,8 @@ static void load_smooth_row(struct smooth_row *row, const struct smooth_target *
 		row->light[1][i] = g * g;
 		row->light[2][i] = b * b;
 	}
+	clear_smooth_row(row, 0, first);
+	clear_smooth_row(row, end, all);
 }
 
 /* Masks of the neighbours that count. */
@@ -62,28 +69,51 @@ static inline int32_t add_corners(const int32_t *a, const int32_t *b, const stru
 	return ((a[-1] & m->corner[0]) + (a[1] & m->corner[1])) + ((b[-1] & m->corner[2]) + (b[1] & m->corner[3]));
 }
 
-static inline int32_t is_same(float z, float limit, float other, float others_limit)
+/* How much a surface falls over two pixels on either side of a step from a pixel to the next: the lesser fall, and at
+ * least 0; `rise` the other way. The surface may fall by so much in the step. */
+struct smooth_fall {
+	float fall, rise;
+};
+
+static inline struct smooth_fall fall_at(const float before[2], const float after[2])
 {
-	return -((other <= limit) & (z <= others_limit));
+	const float a = before[0] - before[1], b = after[0] - after[1];
+	const float least = a < b ? a : b, most = a < b ? b : a;
+
+	return (struct smooth_fall){ psr_where(least > 0, least), psr_where(most < 0, -most) };
 }
 
-/* Returns how many pixels have a neighbour behind. */
-static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *restrict up,
-                              const struct smooth_row *restrict own, const struct smooth_row *restrict down, uint32_t n)
+/* Whether a step from a pixel to its neighbour stays on one surface. */
+static inline int32_t is_same(const struct smooth_fall *f, float near, float limit, float other, float others_limit)
 {
+	return -((other >= limit - f->fall) & (near >= others_limit - f->rise));
+}
+
+/* Returns how many pixels have a neighbour behind. `row` points to the middle one of ROWS. */
+static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *const *row, uint32_t n)
+{
+	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
+	const float *up3 = row[-3]->near, *up2 = row[-2]->near, *up1 = up->near, *at = own->near, *down1 = down->near,
+				*down2 = row[2]->near, *down3 = row[3]->near;
 	uint32_t n_edges = 0;
 
-	for (uint32_t i = 1; i <= n; i++) {
-		const float z = own->z[i], limit = own->limit[i];
+	for (uint32_t i = MARGIN; i < n + MARGIN; i++) {
+		const float near = at[i], limit = own->limit[i];
+		const struct smooth_fall right = fall_at((float[]){ at[i - 2], near }, (float[]){ at[i + 1], at[i + 3] });
+		const struct smooth_fall left = fall_at((float[]){ at[i + 2], near }, (float[]){ at[i - 1], at[i - 3] });
+		const struct smooth_fall below = fall_at((float[]){ up2[i], near }, (float[]){ down1[i], down3[i] });
+		const struct smooth_fall above = fall_at((float[]){ down2[i], near }, (float[]){ up1[i], up3[i] });
+		const float high = limit - above.fall, low = limit - below.fall;
 		const struct smooth_masks behind = {
-			-(up->z[i] > limit), -(down->z[i] > limit), -(own->z[i - 1] > limit), -(own->z[i + 1] > limit),
-			{ -(up->z[i - 1] > limit), -(up->z[i + 1] > limit), -(down->z[i - 1] > limit), -(down->z[i + 1] > limit) },
+			-(up1[i] < high), -(down1[i] < low), -(at[i - 1] < limit - left.fall), -(at[i + 1] < limit - right.fall),
+			{ -(up1[i - 1] < high - left.fall), -(up1[i + 1] < high - right.fall), -(down1[i - 1] < low - left.fall),
+			  -(down1[i + 1] < low - right.fall) },
 		};
 		const struct smooth_masks same = {
-			is_same(z, limit, up->z[i], up->limit[i]),
-			is_same(z, limit, down->z[i], down->limit[i]),
-			is_same(z, limit, own->z[i - 1], own->limit[i - 1]),
-			is_same(z, limit, own->z[i + 1], own->limit[i + 1]),
+			is_same(&above, near, limit, up1[i], up->limit[i]),
+			is_same(&below, near, limit, down1[i], down->limit[i]),
+			is_same(&left, near, limit, at[i - 1], own->limit[i - 1]),
+			is_same(&right, near, limit, at[i + 1], own->limit[i + 1]),
 			{ 0 },
 		};
 		const int32_t sides = behind.above + behind.below + behind.left + behind.right;
@@ -101,7 +131,7 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 
 			code[c] = (int32_t)(__builtin_sqrtf(front * share + back * rest) + 0.5f);
 		}
-		pixel[i - 1] = code[0] | code[1] << 8 | code[2] << 16;
+		pixel[i - MARGIN] = code[0] | code[1] << 8 | code[2] << 16;
 		n_edges += edges > 0;
 	}
 	return n_edges;
@@ -110,21 +140,24 @@ static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *
 static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	const uint32_t n = x1 - x0;
-	struct smooth_row rows[3];
+	struct smooth_row rows[ROWS];
+	const struct smooth_row *row[ROWS];
 	int32_t pixel[SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
 
-	for (uint32_t y = y0; y < y0 + 2; y++)
-		load_smooth_row(&rows[y % 3], t, x0, n, (int64_t)y - 1);
+	for (uint32_t y = y0; y < y0 + ROWS - 1; y++)
+		load_smooth_row(&rows[y % ROWS], t, x0, n, (int64_t)y - MARGIN);
 	for (uint32_t y = y0; y < y1; y++) {
 		uint8_t *to = t->to + 3 * ((size_t)y * t->width + x0);
 
-		load_smooth_row(&rows[(y + 2) % 3], t, x0, n, (int64_t)y + 1);
-		if (rows[(y + 1) % 3].is_empty) {
+		load_smooth_row(&rows[(y + ROWS - 1) % ROWS], t, x0, n, (int64_t)y + MARGIN);
+		for (uint32_t k = 0; k < ROWS; k++)
+			row[k] = &rows[(y + k) % ROWS];
+		if (row[MARGIN]->is_empty) {
 			memcpy(to, t->from + 3 * ((size_t)y * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
-		n_edges += smooth_pixels(pixel, &rows[y % 3], &rows[(y + 1) % 3], &rows[(y + 2) % 3], n);
+		n_edges += smooth_pixels(pixel, row + MARGIN, n);
 		for (uint32_t i = 0; i + 1 < n; i++) /* writes a byte of the next pixel, too */
 			memcpy(to + 3 * (size_t)i, &pixel[i], 4);
 		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);
