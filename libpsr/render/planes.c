@@ -38,7 +38,8 @@ static void put_normals(const struct simd *simd, const struct plan *plan, int16_
 	strip.pixels = pixels;
 	simd->strip_find(pixels, &view);
 	simd->strip_read(&strip, &view);
-	simd->strip_resolve(&strip, &view);
+	strip.is_specular = 0; /* normals alone are wanted */
+	simd->strip_resolve(&strip, &view, plan->ambient);
 	for (uint32_t i = 0; i < pixels->n; i++)
 		for (int a = 0; a < 3; a++) {
 			const float right = (float)plan->axes[0][a], down = (float)plan->axes[1][a],

@@ -132,7 +132,7 @@ uint32_t shade_part(const struct simd *simd, const struct plan *plan, const uint
 		return 0;
 	simd->strip_find(pixels, &plan->view);
 	simd->strip_read(strip, &plan->view);
-	simd->strip_resolve(strip, &plan->view);
+	simd->strip_resolve(strip, &plan->view, plan->ambient);
 	light_strip(strip, &shading);
 	return pixels->n;
 }
@@ -162,7 +162,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 			begin_strip(&pixels[(i + 1) % 2], &shading, (i + 1) % per_row * STRIP, y0 + (i + 1) / per_row);
 		if (strip.pixels->n) {
 			simd->strip_read(&strip, &plan->view);
-			simd->strip_resolve(&strip, &plan->view);
+			simd->strip_resolve(&strip, &plan->view, plan->ambient);
 		}
 		const uint64_t middle = is_timed ? clock_ns() : 0;
 		if (strip.pixels->n) {

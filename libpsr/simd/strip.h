@@ -42,18 +42,13 @@ struct strip {
 	 * sample's, or in a bent block is the nearest one inside the block's cone. */
 	float gx[STRIP], gy[STRIP], gz[STRIP];
 	float vx[STRIP], vy[STRIP], vz[STRIP]; /* unit vector along the pixel's line of sight, to the eye */
-	float dr[STRIP], dg[STRIP], db[STRIP]; /* diffuse colour */
-	/* If is_specular: what is mirrored of light from ahead (F0), 1 if anything is and else 0, and the square of the
-	 * lobe's width (roughness^4). Once resolved: the colour in ambient light, N.V, N^2, and the eye's part of Smith's
-	 * shadowing. */
+	float dr[STRIP], dg[STRIP], db[STRIP]; /* base colour; once resolved, diffuse colour */
+	/* If is_specular, once resolved: what is mirrored of light from ahead (F0), 1 if anything is and else 0, the square
+	 * of the lobe's width (roughness^4), N.V, N^2, and the eye's part of Smith's shadowing. */
 	float sr[STRIP], sg[STRIP], sb[STRIP], shine[STRIP], width2[STRIP];
-	float ar[STRIP], ag[STRIP], ab[STRIP];
 	float nv[STRIP], n2[STRIP], seen[STRIP];
-	/* Light that is scattered, highlights, and highlights' part that grazes (Schlick), before multiplication with the
-	 * sample's colours; the last is white. */
-	float lr[STRIP], lg[STRIP], lb[STRIP];
-	float hr[STRIP], hg[STRIP], hb[STRIP];
-	float wr[STRIP], wg[STRIP], wb[STRIP];
+	float lr[STRIP], lg[STRIP], lb[STRIP]; /* light that is scattered, before multiplication with the diffuse colour */
+	float hr[STRIP], hg[STRIP], hb[STRIP]; /* if is_specular: highlights and reflected ambient light */
 	uint16_t r[STRIP], g[STRIP], b[STRIP];
 };
 
@@ -91,15 +86,16 @@ typedef void strip_find_fn(struct strip_pixels *pixels, const struct strip_view 
 /* Reads n, is_specular, attributes, normals and colours of strip->pixels, which strip_find has found. */
 typedef void strip_read_fn(struct strip *strip, const struct strip_view *view);
 /* Completes samples that strip_read has read: turned normals, lines of sight, and with STRIP_POSITION positions, at the
- * centre of the pixel and the depth of its word. Sets light and highlights to 0. */
-typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view);
+ * centre of the pixel and the depth of its word. Sets the light to 0 and highlights to what ambient light gives. */
+typedef void strip_resolve_fn(struct strip *strip, const struct strip_view *view, const float ambient[3]);
 /* Adds a light (surface/lobe.h has the formulas). `reaches`: the share of the light that reaches each sample, 0..1;
  * NULL: all of it. */
 typedef void strip_light_fn(struct strip *strip, const struct strip_light *light, const float *reaches);
 /* Tabulates light by normal, as strip_light gives it, for normals first .. first + n - 1; n at most STRIP. */
 typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_lights *lights,
                           uint32_t first, uint32_t n);
-/* Multiplies light and colours into 16 bits, with ambient light; unlit samples keep their base colour. */
+/* Multiplies light and colours into 16 bits; adds ambient light where !is_specular. Unlit samples keep their base
+ * colour. */
 typedef void strip_color_fn(struct strip *strip, const float ambient[3]);
 
 #define STRIP_BRICK 32 /* pixels of a row that share one flag in `wants` */

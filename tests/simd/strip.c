@@ -108,6 +108,7 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 	struct strip_view *view = check_in(c, 1, sizeof *view);
 	struct strip_pixels *pixels = check_out(c, 1, sizeof *pixels);
 	struct strip *strip = check_out(c, 1, sizeof *strip);
+	float *ambient = check_in(c, 3, sizeof *ambient);
 	struct psr_blocks blocks;
 
 	check_blocks(c, &blocks, 1 + check_below(c, check_one_in(c, 60) ? 2 * PSR_RUN_BLOCKS : 40), MAX_PROJECTIONS, 0);
@@ -128,13 +129,15 @@ static void resolve(struct check *c, uint32_t n, unsigned needs, int is_spoilt)
 		.focal = check_plain_or_any(c, is_spoilt, 1, 1000), .perspective = (int)check_below(c, 2),
 		.lit = check_one_in(c, 4) && !c->is_bench ? check_in(c, PSR_DIRECTIONS, sizeof *view->lit) : NULL,
 	};
+	for (int k = 0; k < 3; k++)
+		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
 	random_pixels(c, pixels, view, n);
 	strip->pixels = pixels;
 	check_units(c, pixels->n);
 	while (check_next(c)) {
 		c->simd->strip_find(pixels, view);
 		c->simd->strip_read(strip, view);
-		c->simd->strip_resolve(strip, view);
+		c->simd->strip_resolve(strip, view, ambient);
 		if (!c->is_bench)
 			settle(strip);
 	}

@@ -64,8 +64,6 @@ void strip_read_avx512(struct strip *strip, const struct strip_view *view)
 		fill_floats(strip->dg, strip->n, psr_srgb_to_linear[base >> 8 & 0xff]);
 		fill_floats(strip->db, strip->n, psr_srgb_to_linear[base >> 16]);
 	}
-	if (strip->is_specular)
-		read_gloss(strip);
 }
 
 /* ---- write ---- */

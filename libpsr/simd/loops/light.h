@@ -29,12 +29,9 @@ static void add_highlights(struct strip *s, const struct highlights *h, const fl
 		s->lr[i] += red * diffuse;
 		s->lg[i] += green * diffuse;
 		s->lb[i] += blue * diffuse;
-		s->hr[i] += red * mirror;
-		s->hg[i] += green * mirror;
-		s->hb[i] += blue * mirror;
-		s->wr[i] += red * white;
-		s->wg[i] += green * white;
-		s->wb[i] += blue * white;
+		s->hr[i] += red * (s->sr[i] * mirror + white);
+		s->hg[i] += green * (s->sg[i] * mirror + white);
+		s->hb[i] += blue * (s->sb[i] * mirror + white);
 	}
 }
 

@@ -69,51 +69,62 @@ static inline int32_t add_corners(const int32_t *a, const int32_t *b, const stru
 	return ((a[-1] & m->corner[0]) + (a[1] & m->corner[1])) + ((b[-1] & m->corner[2]) + (b[1] & m->corner[3]));
 }
 
-/* How much a surface falls over two pixels on either side of a step from a pixel to the next: the lesser fall, and at
- * least 0; `rise` the other way. The surface may fall by so much in the step. */
-struct smooth_fall {
-	float fall, rise;
-};
-
-static inline struct smooth_fall fall_at(const float before[2], const float after[2])
+/* How much a surface falls over the two pixels before and after a step from a pixel to the next: the lesser of both, 0
+ * where it rises on a side; negative where it rises on both. The surface may fall by so much in the step. */
+static void smooth_falls(float *restrict fall, const float *near2, const float *near, const float *next,
+                         const float *next2, uint32_t n)
 {
-	const float a = before[0] - before[1], b = after[0] - after[1];
-	const float least = a < b ? a : b, most = a < b ? b : a;
+	for (uint32_t i = 0; i < n; i++) {
+		const float before = near2[i] - near[i], after = next[i] - next2[i];
+		const int is_less = before < after;
+		const float least = psr_choose(is_less, before, after), most = psr_choose(is_less, after, before);
 
-	return (struct smooth_fall){ psr_where(least > 0, least), psr_where(most < 0, -most) };
+		fall[i] = psr_choose(least > 0, least, psr_where(most < 0, most));
+	}
 }
 
-/* Whether a step from a pixel to its neighbour stays on one surface. */
-static inline int32_t is_same(const struct smooth_fall *f, float near, float limit, float other, float others_limit)
+/* The falls beside a row: [i] of the step from pixel i to the next one right, of that to the next one below, and of that
+ * from the one above. */
+struct smooth_steps {
+	float right[SMOOTH_WIDTH + 2 * MARGIN], vertical[2][SMOOTH_WIDTH + 2 * MARGIN];
+};
+
+static inline float down_by(float fall)
 {
-	return -((other >= limit - f->fall) & (near >= others_limit - f->rise));
+	return psr_where(fall > 0, fall);
+}
+
+/* Whether a step that may fall by so much stays on one surface. */
+static inline int32_t is_same(float fall, float rise, float near, float limit, float other, float others_limit)
+{
+	return -((other >= limit - fall) & (near >= others_limit - rise));
 }
 
 /* Returns how many pixels have a neighbour behind. `row` points to the middle one of ROWS. */
-static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *const *row, uint32_t n)
+static uint32_t smooth_pixels(int32_t *restrict pixel, const struct smooth_row *const *row, const float *rightward,
+                              const float *downward, const float *from_above, uint32_t n)
 {
 	const struct smooth_row *up = row[-1], *own = row[0], *down = row[1];
-	const float *up3 = row[-3]->near, *up2 = row[-2]->near, *up1 = up->near, *at = own->near, *down1 = down->near,
-				*down2 = row[2]->near, *down3 = row[3]->near;
 	uint32_t n_edges = 0;
 
 	for (uint32_t i = MARGIN; i < n + MARGIN; i++) {
-		const float near = at[i], limit = own->limit[i];
-		const struct smooth_fall right = fall_at((float[]){ at[i - 2], near }, (float[]){ at[i + 1], at[i + 3] });
-		const struct smooth_fall left = fall_at((float[]){ at[i + 2], near }, (float[]){ at[i - 1], at[i - 3] });
-		const struct smooth_fall below = fall_at((float[]){ up2[i], near }, (float[]){ down1[i], down3[i] });
-		const struct smooth_fall above = fall_at((float[]){ down2[i], near }, (float[]){ up1[i], up3[i] });
-		const float high = limit - above.fall, low = limit - below.fall;
+		const float near = own->near[i], limit = own->limit[i];
+		const float right = down_by(rightward[i]), right_up = down_by(-rightward[i]);
+		const float left = down_by(-rightward[i - 1]), left_up = down_by(rightward[i - 1]);
+		const float below = down_by(downward[i]), below_up = down_by(-downward[i]);
+		const float above = down_by(-from_above[i]), above_up = down_by(from_above[i]);
+		const float high = limit - above, low = limit - below;
 		const struct smooth_masks behind = {
-			-(up1[i] < high), -(down1[i] < low), -(at[i - 1] < limit - left.fall), -(at[i + 1] < limit - right.fall),
-			{ -(up1[i - 1] < high - left.fall), -(up1[i + 1] < high - right.fall), -(down1[i - 1] < low - left.fall),
-			  -(down1[i + 1] < low - right.fall) },
+			-(up->near[i] < high), -(down->near[i] < low), -(own->near[i - 1] < limit - left),
+			-(own->near[i + 1] < limit - right),
+			{ -(up->near[i - 1] < high - left), -(up->near[i + 1] < high - right), -(down->near[i - 1] < low - left),
+			  -(down->near[i + 1] < low - right) },
 		};
 		const struct smooth_masks same = {
-			is_same(&above, near, limit, up1[i], up->limit[i]),
-			is_same(&below, near, limit, down1[i], down->limit[i]),
-			is_same(&left, near, limit, at[i - 1], own->limit[i - 1]),
-			is_same(&right, near, limit, at[i + 1], own->limit[i + 1]),
+			is_same(above, above_up, near, limit, up->near[i], up->limit[i]),
+			is_same(below, below_up, near, limit, down->near[i], down->limit[i]),
+			is_same(left, left_up, near, limit, own->near[i - 1], own->limit[i - 1]),
+			is_same(right, right_up, near, limit, own->near[i + 1], own->limit[i + 1]),
 			{ 0 },
 		};
 		const int32_t sides = behind.above + behind.below + behind.left + behind.right;
@@ -142,6 +153,7 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 	const uint32_t n = x1 - x0;
 	struct smooth_row rows[ROWS];
 	const struct smooth_row *row[ROWS];
+	struct smooth_steps steps;
 	int32_t pixel[SMOOTH_WIDTH];
 	uint32_t n_edges = 0;
 
@@ -157,7 +169,17 @@ static uint32_t smooth(const struct smooth_target *t, uint32_t x0, uint32_t x1, 
 			memcpy(to, t->from + 3 * ((size_t)y * t->width + x0), 3 * (size_t)n);
 			continue;
 		}
-		n_edges += smooth_pixels(pixel, row + MARGIN, n);
+		const struct smooth_row *own = row[MARGIN];
+		float *below = steps.vertical[y % 2], *above = steps.vertical[(y + 1) % 2];
+		const int is_first = y == y0 || row[MARGIN - 1]->is_empty;
+
+		smooth_falls(steps.right + 2, own->near, own->near + 2, own->near + 3, own->near + 5, n + 1);
+		smooth_falls(below + MARGIN, row[1]->near + MARGIN, own->near + MARGIN, row[4]->near + MARGIN,
+		             row[6]->near + MARGIN, n);
+		if (is_first)
+			smooth_falls(above + MARGIN, row[0]->near + MARGIN, row[2]->near + MARGIN, own->near + MARGIN,
+			             row[5]->near + MARGIN, n);
+		n_edges += smooth_pixels(pixel, row + MARGIN, steps.right, below, above, n);
 		for (uint32_t i = 0; i + 1 < n; i++) /* writes a byte of the next pixel, too */
 			memcpy(to + 3 * (size_t)i, &pixel[i], 4);
 		memcpy(to + 3 * (size_t)(n - 1), &pixel[n - 1], 3);

@@ -74,8 +74,6 @@ static inline void strip_read(struct strip *strip, const struct strip_view *view
 		read_base(strip, 1);
 	else
 		read_base(strip, 0);
-	if (strip->is_specular)
-		read_gloss(strip);
 }
 
 /* Positions are those of pixel centres, less than a pixel from the samples: where a ray would meet the surface. */
@@ -138,40 +136,53 @@ static void straighten(struct strip *strip, const float m[3][3], uint32_t first,
 
 /* A shading normal may face away from the eye; its highlights are those of one that is seen at this cosine. */
 #define LEAST_NV 1e-3f
+/* The least roughness^4: stored normals are half a degree off, and floats would not tell sharper lobes' places. */
+#define LEAST_WIDTH2 4e-6f
 
-/* lobe_ambient() of surface/lobe.h, which has the formulas. */
-static inline void ambient_color(struct strip *s, uint32_t i)
+/* Splits base colours into what is scattered and what is mirrored, and prepares what the highlights of all lights have
+ * in common: lobe_colors() and lobe_ambient() of surface/lobe.h, which has the formulas. */
+static void prepare_highlights(struct strip *s, const float ambient[3])
 {
-	const int32_t gloss = (int32_t)(s->attr[i] >> 40);
-	const float open = 1 - (float)(gloss >> 10 & 63) * (1 / 63.0f), nv = s->nv[i], aside = 1 - nv, square = aside * aside;
-	const float roughness = (float)(gloss >> 16) * (1 / 255.0f), smooth = 1 - roughness, a = roughness * roughness;
-	const float grazing = s->shine[i] * (smooth * (square * aside) * (0.27f + 0.8f * (smooth * smooth * square)));
-	const float loss = (0.42f + nv * (1.05f - 1.87f * nv)) + a * ((1.83f * nv - 0.45f) + 1.17f * (nv * nv));
-	const float mirrored = 1 / (1 + a * loss) - grazing;
+	const float ambient_r = ambient[0], ambient_g = ambient[1], ambient_b = ambient[2];
 
-	s->ar[i] = (s->dr[i] + (s->sr[i] * mirrored + grazing)) * open;
-	s->ag[i] = (s->dg[i] + (s->sg[i] * mirrored + grazing)) * open;
-	s->ab[i] = (s->db[i] + (s->sb[i] * mirrored + grazing)) * open;
-}
-
-/* What the highlights of all lights have in common, and the colour in ambient light. */
-static void prepare_highlights(struct strip *s)
-{
 	for (uint32_t i = 0; i < s->n; i++) {
-		const float x = s->nx[i], y = s->ny[i], z = s->nz[i], width2 = s->width2[i];
+		const int32_t gloss = (int32_t)(s->attr[i] >> 40);
+		const float metallic = (float)(gloss & 31) * (1 / 31.0f), rest = 1 - metallic;
+		const float root = (float)(gloss >> 5 & 31) * (1 / 30.0f), square = root * root;
+		const float dielectric = psr_choose(square < 1, square, 1), f0 = dielectric * rest;
+		const float scatter = rest * (1 - dielectric), open = 1 - (float)(gloss >> 10 & 63) * (1 / 63.0f);
+		const float roughness = (float)(gloss >> 16) * (1 / 255.0f), a = roughness * roughness, wide = a * a;
+		const float width2 = psr_choose(wide > LEAST_WIDTH2, wide, LEAST_WIDTH2);
+		const float shine = psr_where((gloss & 0x3ff) != 0, 1);
+		const float x = s->nx[i], y = s->ny[i], z = s->nz[i];
 		const float facing = (x * s->vx[i] + y * s->vy[i]) + z * s->vz[i];
 		const float nv = psr_choose(facing > LEAST_NV, facing, LEAST_NV);
+		const float aside = 1 - nv, aside2 = aside * aside, smooth = 1 - roughness;
+		const float grazing = shine * (smooth * (aside2 * aside) * (0.27f + 0.8f * (smooth * smooth * aside2)));
+		const float loss = (0.42f + nv * (1.05f - 1.87f * nv)) + a * ((1.83f * nv - 0.45f) + 1.17f * (nv * nv));
+		const float mirrored = 1 / (1 + a * loss) - grazing;
+		const float r = s->dr[i], g = s->dg[i], b = s->db[i];
+		const float sr = f0 + r * metallic, sg = f0 + g * metallic, sb = f0 + b * metallic;
+		const float dr = r * scatter, dg = g * scatter, db = b * scatter;
 
+		s->dr[i] = dr;
+		s->dg[i] = dg;
+		s->db[i] = db;
+		s->sr[i] = sr;
+		s->sg[i] = sg;
+		s->sb[i] = sb;
+		s->shine[i] = shine;
+		s->width2[i] = width2;
 		s->nv[i] = nv;
 		s->n2[i] = (x * x + y * y) + z * z;
 		s->seen[i] = __builtin_sqrtf(nv * nv * (1 - width2) + width2);
-		ambient_color(s, i);
-		s->hr[i] = s->hg[i] = s->hb[i] = 0;
-		s->wr[i] = s->wg[i] = s->wb[i] = 0;
+		s->hr[i] = (dr + (sr * mirrored + grazing)) * open * ambient_r;
+		s->hg[i] = (dg + (sg * mirrored + grazing)) * open * ambient_g;
+		s->hb[i] = (db + (sb * mirrored + grazing)) * open * ambient_b;
 	}
 }
 
-static void strip_resolve(struct strip *strip, const struct strip_view *view)
+static void strip_resolve(struct strip *strip, const struct strip_view *view, const float ambient[3])
 {
 	const struct strip_pixels *p = strip->pixels;
 	const uint32_t n = strip->n;
@@ -217,7 +228,7 @@ static void strip_resolve(struct strip *strip, const struct strip_view *view)
 			strip->gz[i] *= turn;
 		}
 	if (strip->is_specular)
-		prepare_highlights(strip);
+		prepare_highlights(strip, ambient);
 }
 
 static inline uint16_t light16(float linear)
@@ -235,14 +246,9 @@ static CONSTANT_FLAGS void strip_color_by(struct strip *s, const float ambient[3
 		const int is_unlit = PSR_ATTR_UNLIT(s->attr[i]) != 0;
 		float r = s->dr[i] * s->lr[i], g = s->dg[i] * s->lg[i], b = s->db[i] * s->lb[i];
 
-		if (is_specular) {
-			r += s->sr[i] * s->hr[i] + s->wr[i];
-			g += s->sg[i] * s->hg[i] + s->wg[i];
-			b += s->sb[i] * s->hb[i] + s->wb[i];
-		}
-		r += (is_specular ? s->ar[i] : s->dr[i]) * ambient_r;
-		g += (is_specular ? s->ag[i] : s->dg[i]) * ambient_g;
-		b += (is_specular ? s->ab[i] : s->db[i]) * ambient_b;
+		r += is_specular ? s->hr[i] : s->dr[i] * ambient_r;
+		g += is_specular ? s->hg[i] : s->dg[i] * ambient_g;
+		b += is_specular ? s->hb[i] : s->db[i] * ambient_b;
 		s->r[i] = light16(is_unlit ? s->dr[i] : r);
 		s->g[i] = light16(is_unlit ? s->dg[i] : g);
 		s->b[i] = light16(is_unlit ? s->db[i] : b);

@@ -2,7 +2,6 @@
 #ifndef PSR_SIMD_STRIP_PARTS_H
 #define PSR_SIMD_STRIP_PARTS_H
 
-#include "base/maths.h"
 #include "base/srgb.h"
 #include "simd/strip.h"
 
@@ -58,32 +57,6 @@ static CONSTANT_FLAGS void read_base(struct strip *strip, int is_one)
 		strip->dr[i] = psr_srgb_to_linear[base & 0xff];
 		strip->dg[i] = psr_srgb_to_linear[base >> 8 & 0xff];
 		strip->db[i] = psr_srgb_to_linear[base >> 16];
-	}
-}
-
-/* The least roughness^4: stored normals are half a degree off, and floats would not tell sharper lobes' places. */
-#define LEAST_WIDTH2 4e-6f
-
-/* Splits base colours into what is scattered and what is mirrored of light from ahead. */
-static inline void read_gloss(struct strip *s)
-{
-	for (uint32_t i = 0; i < s->n; i++) {
-		const int32_t gloss = (int32_t)(s->attr[i] >> 40);
-		const float metallic = (float)(gloss & 31) * (1 / 31.0f);
-		const float root = (float)(gloss >> 5 & 31) * (1 / 30.0f), square = root * root;
-		const float dielectric = square < 1 ? square : 1, rest = 1 - metallic, f0 = dielectric * rest;
-		const float scatter = rest * (1 - dielectric), r = s->dr[i], g = s->dg[i], b = s->db[i];
-		const float roughness = (float)(gloss >> 16) * (1 / 255.0f), width = roughness * roughness;
-		const float width2 = width * width;
-
-		s->sr[i] = f0 + r * metallic;
-		s->sg[i] = f0 + g * metallic;
-		s->sb[i] = f0 + b * metallic;
-		s->dr[i] = r * scatter;
-		s->dg[i] = g * scatter;
-		s->db[i] = b * scatter;
-		s->shine[i] = psr_where((gloss & 0x3ff) != 0, 1);
-		s->width2[i] = width2 > LEAST_WIDTH2 ? width2 : LEAST_WIDTH2;
 	}
 }
 
