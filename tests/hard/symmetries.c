@@ -12,95 +12,12 @@
 #include "base/vec.h"
 #include "lib/blocks.h"
 #include "lib/exact.h"
+#include "lib/world.h"
 #include "render/cull.h"
 #include "render/zbuffer.h"
 
 #define WIDTH 301
 #define HEIGHT 260
-#define BLOCKS 300
-#define SPACING (1.0 / 64)
-
-/* Random blocks of random colours; every sample has a depth of its own. */
-static struct hard_block *random_blocks(struct psr_projection projection[8], uint64_t *seed)
-{
-	struct hard_block *block = calloc(BLOCKS, sizeof *block);
-
-	assert_non_null(block);
-	for (int p = 0; p < 8; p++) {
-		double d[3];
-
-		hard_direction(d, seed);
-		projection[p] = hard_projection(d[0], d[1], d[2], SPACING);
-	}
-	for (int b = 0; b < BLOCKS; b++) {
-		const double z = random_in(seed, -0.5, 0.5);
-		double normal[3];
-
-		hard_direction(normal, seed);
-		block[b].projection = random_below(seed, 8);
-		block[b].col = (int)random_below(seed, 60) - 30;
-		block[b].row = 2 * ((int)random_below(seed, 30) - 15);
-		block[b].mask = random_next(seed) | 1;
-		block[b].flags = random_below(seed, 2) ? PSR_BLOCK_TWO_SIDED : 0;
-		for (int i = 0; i < 64; i++) {
-			block[b].depth[i] = z + random_in(seed, 0, 0.05);
-			block[b].attr[i] = hard_attr(normal, random_below(seed, 3) ? 0 : 0xffff, random_below(seed, 256));
-			block[b].attr[i] ^= (uint64_t)random_below(seed, 1 << 24) << 16;
-		}
-	}
-	return block;
-}
-
-static struct psr_model *model_of(const struct psr_projection projection[8], const struct hard_block *block, uint32_t n)
-{
-	return hard_model(&(struct hard_model){ .projection = projection, .n_projections = 8 }, block, n);
-}
-
-/* A lit scene whose blocks need no and some depth buffers. */
-static struct psr_scene random_scene(struct psr_instance *instance, struct psr_light light[2], uint64_t *seed)
-{
-	struct psr_scene scene = { .instance = instance, .n_instances = 1, .light = light, .n_lights = 2,
-		                       .ambient = { 0.2, 0.1, 0.3 } };
-	double d[3];
-
-	hard_direction(d, seed);
-	hard_direction(scene.camera.up, seed);
-	v3d_scale(scene.camera.eye, d, exp2(random_in(seed, 0, 2.5)));
-	scene.camera.fov_y = 0.9;
-	scene.camera.ortho_height = random_in(seed, 0.5, 2);
-	scene.camera.kind = random_below(seed, 3) ? PSR_CAMERA_PERSPECTIVE : PSR_CAMERA_ORTHOGRAPHIC;
-	light[0] = (struct psr_light){ .kind = PSR_LIGHT_DIRECTIONAL, .color = { 0.6, 0.5, 0.4 }, .casts_shadow = 1 };
-	hard_direction(light[0].direction, seed);
-	light[1] = (struct psr_light){ .kind = PSR_LIGHT_SPOT, .color = { 0.3, 0.6, 0.9 }, .inner = 0.3, .outer = 0.9,
-		                           .reference = 2, .casts_shadow = 1 };
-	hard_direction(light[1].direction, seed);
-	v3d_scale(light[1].position, light[1].direction, -2);
-	return scene;
-}
-
-/* A model, its blocks, and a lit scene with one instance of it. */
-struct world {
-	struct psr_projection projection[8];
-	struct hard_block *block;
-	struct psr_model *model;
-	struct psr_instance instance;
-	struct psr_light light[2];
-	struct psr_scene scene;
-};
-
-static void world_make(struct world *w, uint64_t *seed)
-{
-	w->block = random_blocks(w->projection, seed);
-	w->model = model_of(w->projection, w->block, BLOCKS);
-	w->instance = hard_place(w->model);
-	w->scene = random_scene(&w->instance, w->light, seed);
-}
-
-static void world_clear(struct world *w)
-{
-	psr_model_unref(w->model);
-	free(w->block);
-}
 
 /* Without ids of samples and instances. */
 #define LOOKS (HARD_ALL_PLANES & ~(1u << PSR_PLANE_WORDS | 1u << PSR_PLANE_ID))
@@ -122,7 +39,7 @@ static void blocks_may_be_warped_in_any_order(void **state)
 
 	(void)state;
 	for (int i = 0; i < HARD_CASES(100); i++) {
-		struct world w;
+		struct hard_world w;
 		struct render_settings settings;
 		struct plan plan = { 0 };
 		struct bins bins = { 0 };
@@ -131,7 +48,7 @@ static void blocks_may_be_warped_in_any_order(void **state)
 		uint64_t *word[2];
 		float *cells[2];
 
-		world_make(&w, &seed);
+		hard_world_make(&w, &seed);
 		render_settings_default(&settings, TILE_WIDTH, TILE_HEIGHT);
 		assert_int_equal(plan_make(&plan, &w.scene, &settings, NULL), PSR_OK);
 		assert_int_equal(cull_blocks(&bins, simd_get(), &plan, NULL, &report), PSR_OK);
@@ -167,7 +84,7 @@ static void blocks_may_be_warped_in_any_order(void **state)
 		free(entry);
 		plan_clear(&plan);
 		bins_clear(&bins);
-		world_clear(&w);
+		hard_world_clear(&w);
 	}
 }
 
@@ -179,20 +96,20 @@ static void blocks_may_be_culled_and_binned_in_any_order(void **state)
 
 	(void)state;
 	for (int i = 0; i < HARD_CASES(60); i++) {
-		struct world w;
-		struct hard_block *other = malloc(BLOCKS * sizeof *other);
+		struct hard_world w;
+		struct hard_block *other = malloc(HARD_BLOCKS * sizeof *other);
 		struct psr_instance instance;
-		uint32_t order[BLOCKS];
+		uint32_t order[HARD_BLOCKS];
 		struct psr_frame frame[2];
 		uint64_t n_here = 0;
 
-		world_make(&w, &seed);
-		for (uint32_t b = 0; b < BLOCKS; b++)
+		hard_world_make(&w, &seed);
+		for (uint32_t b = 0; b < HARD_BLOCKS; b++)
 			order[b] = b;
-		shuffle(order, BLOCKS, &seed);
-		for (uint32_t b = 0; b < BLOCKS; b++)
+		shuffle(order, HARD_BLOCKS, &seed);
+		for (uint32_t b = 0; b < HARD_BLOCKS; b++)
 			other[b] = w.block[order[b]];
-		instance = hard_place(model_of(w.projection, other, BLOCKS));
+		instance = hard_place(hard_world_model(&w, other, HARD_BLOCKS));
 		hard_draw(&frame[0], &w.scene, WIDTH, HEIGHT);
 		w.scene.instance = &instance;
 		hard_draw(&frame[1], &w.scene, WIDTH, HEIGHT);
@@ -212,7 +129,7 @@ static void blocks_may_be_culled_and_binned_in_any_order(void **state)
 		psr_frame_free(&frame[0]);
 		psr_frame_free(&frame[1]);
 		psr_model_unref((struct psr_model *)instance.model);
-		world_clear(&w);
+		hard_world_clear(&w);
 		free(other);
 	}
 	/* Depths have 24 bits; some 20 samples fall to a pixel at most. */
@@ -220,7 +137,7 @@ static void blocks_may_be_culled_and_binned_in_any_order(void **state)
 }
 
 /* All lengths times 2^n: floats and doubles keep their digits, and the frame its bits, but for the exponents of its
- * depths. */
+ * depths; in all planes, smoothed, and in passes. */
 static void a_scene_scaled_by_a_power_of_two_is_the_same_picture(void **state)
 {
 	static const int by[] = { -90, -60, -20, -1, 1, 10, 40, 90 };
@@ -228,13 +145,18 @@ static void a_scene_scaled_by_a_power_of_two_is_the_same_picture(void **state)
 
 	(void)state;
 	for (int i = 0; i < HARD_CASES(20); i++) {
-		struct world w;
-		struct psr_frame plain;
+		struct hard_world w;
+		struct psr_settings settings;
+		struct psr_frame plain, still;
 
-		world_make(&w, &seed);
+		hard_world_make(&w, &seed);
 		w.instance.translation[0] = 0.1;
 		w.scene.camera.near_z = i % 2 ? 0.3 : 0;
 		hard_draw(&plain, &w.scene, WIDTH, HEIGHT);
+		psr_settings_default(&settings, 100, 70);
+		settings.is_smooth = 1;
+		settings.pass = (unsigned)i % 3;
+		hard_draw_pass(&still, &w.scene, &settings);
 		for (size_t n = 0; n < sizeof by / sizeof by[0]; n++) {
 			const double scale = ldexp(1, by[n]);
 			struct psr_instance large = w.instance;
@@ -260,9 +182,13 @@ static void a_scene_scaled_by_a_power_of_two_is_the_same_picture(void **state)
 			}
 			assert_true(frame.report.error_px == plain.report.error_px);
 			psr_frame_free(&frame);
+			hard_draw_pass(&frame, &scaled, &settings);
+			hard_same_planes(&still, &frame, 1u << PSR_PLANE_COLOR);
+			psr_frame_free(&frame);
 		}
 		psr_frame_free(&plain);
-		world_clear(&w);
+		psr_frame_free(&still);
+		hard_world_clear(&w);
 	}
 }
 
@@ -273,18 +199,18 @@ static void a_model_may_be_divided_over_two_instances(void **state)
 
 	(void)state;
 	for (int i = 0; i < HARD_CASES(60); i++) {
-		struct world w;
-		struct hard_block half[2][BLOCKS / 2];
+		struct hard_world w;
+		struct hard_block half[2][HARD_BLOCKS / 2];
 		struct psr_model *model[2];
 		struct psr_instance instance[2];
 		struct psr_frame whole, parts;
 
-		world_make(&w, &seed);
+		hard_world_make(&w, &seed);
 		hard_draw(&whole, &w.scene, WIDTH, HEIGHT);
-		for (int b = 0; b < BLOCKS; b++)
+		for (int b = 0; b < HARD_BLOCKS; b++)
 			half[b % 2][b / 2] = w.block[b];
 		for (int h = 0; h < 2; h++)
-			model[h] = model_of(w.projection, half[h], BLOCKS / 2);
+			model[h] = hard_world_model(&w, half[h], HARD_BLOCKS / 2);
 		w.scene.instance = instance;
 		w.scene.n_instances = 2;
 		for (int turn = 0; turn < 2; turn++) {
@@ -300,7 +226,7 @@ static void a_model_may_be_divided_over_two_instances(void **state)
 		psr_frame_free(&whole);
 		psr_model_unref(model[0]);
 		psr_model_unref(model[1]);
-		world_clear(&w);
+		hard_world_clear(&w);
 	}
 }
 
@@ -360,17 +286,17 @@ static void a_scene_may_be_moved_rigidly(void **state)
 	if (!exact_is_there())
 		return;
 	for (int i = 0; i < HARD_CASES(200); i++) {
-		struct world w;
+		struct hard_world w;
 		struct psr_instance moved;
 		struct psr_scene scene[2];
 		struct psr_frame frame[2];
 		double q[4], by[3];
 
-		world_make(&w, &seed);
-		for (int b = 0; b < BLOCKS; b++) /* no test of facing, which has bounds of its own */
+		hard_world_make(&w, &seed);
+		for (int b = 0; b < HARD_BLOCKS; b++) /* no test of facing, which has bounds of its own */
 			w.block[b].flags = PSR_BLOCK_TWO_SIDED;
 		psr_model_unref(w.model);
-		w.model = model_of(w.projection, w.block, BLOCKS);
+		w.model = hard_world_model(&w, w.block, HARD_BLOCKS);
 		moved = w.instance = hard_place(w.model);
 		w.scene.n_lights = 0;
 		scene[0] = scene[1] = w.scene;
@@ -405,7 +331,7 @@ static void a_scene_may_be_moved_rigidly(void **state)
 		}
 		psr_frame_free(&frame[0]);
 		psr_frame_free(&frame[1]);
-		world_clear(&w);
+		hard_world_clear(&w);
 	}
 	/* So that there is something to explain: by 2^36 doubles are off by 2^-17, which is a thousandth of a pixel. */
 	print_message("# %llu of %llu pixels differ\n", (unsigned long long)n_differ, (unsigned long long)n_drawn);
@@ -421,12 +347,12 @@ static void a_move_without_rounding_changes_no_bit(void **state)
 
 	(void)state;
 	for (int i = 0; i < HARD_CASES(40); i++) {
-		struct world w;
+		struct hard_world w;
 		struct psr_frame frame[2];
 		double *const moved[] = { w.instance.translation, w.scene.camera.eye, w.scene.camera.target,
 			                      w.light[1].position };
 
-		world_make(&w, &seed);
+		hard_world_make(&w, &seed);
 		w.light[0].casts_shadow = w.light[1].casts_shadow = 0;
 		for (int turn = 0; turn < 2; turn++) {
 			for (int k = 0; k < 3; k++) {
@@ -440,7 +366,7 @@ static void a_move_without_rounding_changes_no_bit(void **state)
 		hard_same_planes(&frame[0], &frame[1], HARD_ALL_PLANES);
 		psr_frame_free(&frame[0]);
 		psr_frame_free(&frame[1]);
-		world_clear(&w);
+		hard_world_clear(&w);
 	}
 }
 
