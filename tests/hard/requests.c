@@ -104,22 +104,25 @@ static void what_is_no_number_is_refused_by_name(void **state)
 	psr_model_unref(model);
 }
 
-/* Some fields at once at the ends of their ranges, at 0 and at denormal numbers, in all passes. */
+/* Some fields at once at the ends of their ranges, at 0 and at denormal numbers, in passes 0 to 2, of a model of random
+ * blocks, one with glass and one with levels, cones and masks. */
 static void the_ends_of_all_ranges_are_drawn_or_refused(void **state)
 {
 	static const double ends[] = { 0, -0.0, 0x1p-1074, 1e-300, 1e-31, 1e-30, 1e-6, 1e-3, 1, -1, PI, 3.14159, 1e6, 1e9,
 		                           1e30, -1e30 };
 	const uint32_t n_cases = HARD_CASES(20000);
-	struct psr_model *model = any_model();
+	struct psr_model *model[3] = { any_model() };
 	uint64_t seed = 2;
 	uint32_t n_drawn = 0;
 
 	(void)state;
+	assert_int_equal(psr_model_read(&model[1], "tests/golden/case.psr", NULL), PSR_OK);
+	assert_int_equal(psr_model_read(&model[2], "tests/golden/wheel.psr", NULL), PSR_OK);
 	for (uint32_t i = 0; i < n_cases; i++) {
 		struct psr_error err = { 0 };
 		struct request r;
 
-		request_make(&r, model);
+		request_make(&r, model[i % 3]);
 		r.scene.camera.kind = (enum psr_camera_kind)random_below(&seed, 2);
 		r.light.kind = (enum psr_light_kind)random_below(&seed, 3);
 		r.settings.is_smooth = (int)random_below(&seed, 2);
@@ -135,7 +138,8 @@ static void the_ends_of_all_ranges_are_drawn_or_refused(void **state)
 		n_drawn += rc == PSR_OK;
 	}
 	assert_true(n_drawn > n_cases / 10 && n_drawn < n_cases);
-	psr_model_unref(model);
+	for (int m = 0; m < 3; m++)
+		psr_model_unref(model[m]);
 }
 
 static struct psr_error *refuse(const struct psr_scene *scene)

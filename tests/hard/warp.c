@@ -203,6 +203,12 @@ static void the_eye_may_be_inside_a_block_and_on_a_sample(void **state)
 		exact_check(&scene, SIDE, SIDE);
 		scene.camera.near_z = 1e-30; /* nothing keeps z' away from 0 */
 		exact_check(&scene, SIDE, SIDE);
+		struct psr_settings settings; /* refined, discs as wide as the picture */
+		struct psr_frame frame;
+		psr_settings_default(&settings, 60, 40);
+		settings.pass = 1 + (unsigned)i % 3;
+		hard_draw_pass(&frame, &scene, &settings);
+		psr_frame_free(&frame);
 		psr_model_unref(model);
 	}
 }
