@@ -28,7 +28,7 @@ static int is_made_up(const struct aiMaterial *m)
 	       strcmp(name.data, AI_DEFAULT_MATERIAL_NAME) == 0;
 }
 
-/* Takes the highlight of formats that have no roughness: roughness is (2 / (n + 2))^(1/4), whose Beckmann lobe is as wide
+/* Takes the highlight of formats without a roughness, which becomes (2 / (n + 2))^(1/4): its Beckmann lobe is as wide
  * as that of the exponent n, alpha = roughness^2. */
 static void set_highlight(struct psr_material *out, const struct aiMaterial *m)
 {
