@@ -164,11 +164,29 @@ static void say_scene(struct words *words, const struct psr_scene *scene)
 	}
 }
 
+/* What the child says goes to FOLDER/log: psr shot gives advice with each picture of a small model. */
+static int run_quietly(const struct truth_build *build, const char *const *argv)
+{
+	char path[PATH_MAX];
+	struct child_use use;
+	int kept = dup(STDERR_FILENO), log, status;
+
+	path_of(path, build->folder, "log");
+	log = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+	if (kept < 0 || log < 0 || fcntl(kept, F_SETFD, FD_CLOEXEC) != 0)
+		report_die(path, strerror(errno));
+	dup2(log, STDERR_FILENO);
+	status = child_run(&use, argv);
+	dup2(kept, STDERR_FILENO);
+	close(kept);
+	close(log);
+	return status;
+}
+
 void truth_build_shot(const struct truth_build *build, const struct truth_shot *shot, struct psr_frame *frame)
 {
 	char program[PATH_MAX], color[PATH_MAX], depth[PATH_MAX];
 	struct words words = { .n = 0 };
-	struct child_use use;
 	struct psr_error err;
 	uint32_t width, height;
 
@@ -189,8 +207,8 @@ void truth_build_shot(const struct truth_build *build, const struct truth_shot *
 	say_scene(&words, shot->scene);
 	for (const char *const *option = shot->options; *option != NULL; option++)
 		say(&words, "%s", *option);
-	if (child_run(&use, words.argv) != 0)
-		report_die(shot->name, "psr shot draws no picture");
+	if (run_quietly(build, words.argv) != 0)
+		report_die(build->folder, "psr shot drew no picture; `log` there says why");
 	memset(frame, 0, sizeof *frame);
 	if (ppm_read(&frame->rgb, &frame->width, &frame->height, color, &err) != PSR_OK ||
 	    pfm_read(&frame->depth, &width, &height, depth, &err) != PSR_OK)
