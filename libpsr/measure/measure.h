@@ -31,7 +31,7 @@ struct psr_truth_shot {
 
 /* Traces one ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in
  * world units, +inf where the ray meets nothing; normal: unit, towards the eye, world; both width * side by height *
- * side; normal and rgb may be NULL. rgb: flat diffuse colour, sRGB, 3 bytes. */
+ * side; normal and rgb may be NULL. rgb: the colour in ambient light 1, sRGB, 3 bytes. */
 int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
                    struct psr_error *err);
 
@@ -54,9 +54,9 @@ struct psr_accuracy {
 int psr_accuracy_measure(struct psr_accuracy *out, const struct psr_truth_shot *shot, const float *depth,
                          double spacing, struct psr_error *err);
 
-/* How far the colours of a frame drawn with --ambient 1 and no light, which shows the flat diffuse colour, are from the
- * truth, the mean of 4x4 rays a pixel in linear light. Counts pixels where all rays of the 3x3 neighbourhood meet the
- * object, each with the most similar of the nine, since a sample may be anywhere in its pixel. */
+/* How far the colours of a frame drawn with --ambient 1 and no light are from the truth, the mean of 4x4 rays a pixel
+ * in linear light. Counts pixels where all rays of the 3x3 neighbourhood meet the object, each with the most similar of
+ * the nine, since a sample may be anywhere in its pixel. */
 #define PSR_COLOR_WRONG 16 /* codes of sRGB, in any channel */
 struct psr_color_accuracy {
 	uint64_t n_compared;

@@ -191,7 +191,7 @@ struct psr_cluster {
 
 /* Attributes of a sample, one word ([G] table 5.1):
  *   bits  0-14  normal, index of the subdivided sphere (base/direction.h)
- *   bit   15    unlit: drawn in its diffuse colour whatever the lights
+ *   bit   15    unlit: drawn in its base colour whatever the lights
  *   bits 16-39  base colour R, G, B, 8 bits each, sRGB-coded (R lowest)
  *   bits 40-44  metallic, 31sts
  *   bits 45-49  r: what is not metal reflects F0 = (r / 30)^2, at most 1, of light from ahead

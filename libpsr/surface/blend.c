@@ -41,7 +41,7 @@ static void add(struct sums *sums, uint64_t attr, double weight)
 	v3d_normalize(unit, unit); /* in double: a float's rounding would widen the sharpest lobes */
 	v3d_add_scaled(sums->normal, sums->normal, weight, unit);
 	const double metallic = (double)look.metallic, rest = 1 - metallic, reflectance = (double)look.reflectance;
-	const double width2 = (double)look.roughness * (double)look.roughness * (double)look.roughness * (double)look.roughness;
+	const double width = (double)look.roughness * (double)look.roughness, width2 = width * width;
 	sums->weight += weight;
 	sums->metallic += weight * metallic;
 	sums->open += weight * (double)look.open;

@@ -18,7 +18,8 @@ void lobe_colors(double diffuse[3], double f0[3], const struct look *look)
 void lobe_reflect(double light[3], const struct look *look, const double n[3], const double to_light[3],
                   const double to_eye[3])
 {
-	const double roughness = (double)look->roughness, width = roughness * roughness, width2 = fmax(width * width, LEAST_WIDTH2);
+	const double width = (double)look->roughness * (double)look->roughness;
+	const double width2 = fmax(width * width, LEAST_WIDTH2);
 	const double nl = v3d_dot(n, to_light), nv = fmax(v3d_dot(n, to_eye), LEAST_NV);
 	double h[3], diffuse[3], f0[3];
 

@@ -21,8 +21,8 @@ void lobe_colors(double diffuse[3], double f0[3], const struct look *look);
 void lobe_reflect(double light[3], const struct look *look, const double n[3], const double to_light[3],
                   const double to_eye[3]);
 
-/* Computes the light that goes to the eye of ambient light 1, as far as the place is open: what is scattered, and S F0 +
- * (1 - F0) G of what is mirrored, the lobe's integral over all lights. With v = N.V, w as above, s = 1 - roughness:
+/* Computes the light that goes to the eye of ambient light 1, as far as the place is open: what is scattered, and S F0
+ * + (1 - F0) G of what is mirrored, the lobe's integral over all lights. With v = N.V, w as above, s = 1 - roughness:
  *
  *     S = 1 / (1 + w (0.42 + 1.05 v - 1.87 v^2) + w^2 (-0.45 + 1.83 v + 1.17 v^2))
  *     G = s (1 - v)^3 (0.27 + 0.8 s^2 (1 - v)^2)

@@ -22,7 +22,7 @@ struct psr_shot {
 	const struct psr_light *light;   /* the caller's, n_lights of them; by default 0, which stands for one light of
 	                                  * psr_light_key() */
 	uint32_t n_lights;
-	double ambient;                  /* light from everywhere, times diffuse colour: 0..1e6; 0.15 by default */
+	double ambient;                  /* light from everywhere: white shows it as it is; 0..1e6; 0.15 by default */
 	uint8_t background[3];           /* sRGB; 20 24 28 in hexadecimal by default */
 };
 void psr_shot_default(struct psr_shot *shot, uint32_t width, uint32_t height);

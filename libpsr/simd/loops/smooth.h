@@ -9,8 +9,8 @@
 #define MARGIN SMOOTH_REACH
 #define ROWS (2 * MARGIN + 1)
 
-/* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane: 1 / z'
- * in perspective, else -z'. NaN outside of the picture: every comparison fails. */
+/* A row and MARGIN pixels on each side of it: [MARGIN] is the first. `near` is linear in the picture on any plane:
+ * 1 / z' in perspective, else -z'. NaN outside of the picture: every comparison fails. */
 struct smooth_row {
 	float near[SMOOTH_WIDTH + 2 * MARGIN], limit[SMOOTH_WIDTH + 2 * MARGIN];
 	int32_t light[3][SMOOTH_WIDTH + 2 * MARGIN]; /* squared codes, close to linear */
@@ -83,8 +83,8 @@ static void smooth_falls(float *restrict fall, const float *near2, const float *
 	}
 }
 
-/* The falls beside a row: [i] of the step from pixel i to the next one right, of that to the next one below, and of that
- * from the one above. */
+/* The falls beside a row: [i] of the step from pixel i to the next one right; and down from a row to the next, by the
+ * parity of the upper row. */
 struct smooth_steps {
 	float right[SMOOTH_WIDTH + 2 * MARGIN], vertical[2][SMOOTH_WIDTH + 2 * MARGIN];
 };

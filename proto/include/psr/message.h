@@ -139,7 +139,7 @@ enum psr_wire_scene_flag { PSR_WIRE_SCENE_APPEND = 1 };
 struct psr_msg_scene {
 	uint16_t slot;            /* 0..15, chosen by the client */
 	uint16_t flags;
-	double ambient;           /* 0..1e6: light from everywhere, times diffuse colour */
+	double ambient;           /* 0..1e6: light from everywhere: white shows it as it is */
 	uint8_t background[3];    /* sRGB */
 	uint16_t n_instances, n_lights;
 	struct psr_msg_instance instance[PSR_WIRE_MAX_INSTANCES];

@@ -260,8 +260,8 @@ static double inner_edges(const struct psr_model *square, double above, int is_p
 	return n_edges - n_outline;
 }
 
-/* At 10 degrees above a plane neighbours are 5.7 pixel widths apart in depth, at 2 degrees 29, where steps from 3 on are
- * edges unless the surface falls as much on both sides of the step. In the lowest row but one, and by some
+/* At 10 degrees above a plane neighbours are 5.7 pixel widths apart in depth, at 2 degrees 29, where steps from 3 on
+ * are edges unless the surface falls as much on both sides of the step. In the lowest row but one, and by some
  * pixels beside the outline, that is not known. */
 static void a_grazed_plane_is_one_surface(void **state)
 {
