@@ -33,7 +33,10 @@ enum psr_block_trait {
 	 * two-sided block from the front where the cone's normal nearest to the shading normal faces the eye. */
 	PSR_BLOCK_BENT = 1,
 	/* Some samples let a part of the light through, by their opacity. */
-	PSR_BLOCK_SHEER = 2
+	PSR_BLOCK_SHEER = 2,
+	/* A sheer block of things narrower than a sample's cell: an opacity is the share that they cover of a disc about
+	 * the sample, as wide as a step of the lattice. */
+	PSR_BLOCK_THIN = 4
 };
 
 /* A run is PSR_RUN_BLOCKS blocks in a row: their numbers have the same quotient. It stores what is equal or near for

@@ -1,6 +1,5 @@
 /* Adds up translucent layers, the nearest first, and mixes the sum with the finished picture. */
 #include <math.h>
-#include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/maths.h"
@@ -9,9 +8,9 @@
 #include "base/vec.h"
 #include "block.h"
 #include "planes.h"
-#include "shade.h"
-#include "sheer.h"
+#include "sheer_tile.h"
 #include "splat.h"
+#include "thin.h"
 
 /* Eight layers that each absorb half of the light leave less than one 8-bit code. */
 #define MOST_LAYERS 8
@@ -24,39 +23,6 @@
 #define LEAST_COSINE 0.1f
 /* Light let through at most where depth and planes tell of the nearest layer. */
 #define HALF 0.5f
-
-/* A tile's layers, in rows WARP_OWN_STRIDE apart. */
-struct sheer_tile {
-	struct sheer_list list;
-	uint32_t last[WARP_OWN_WORDS]; /* of the list */
-	uint8_t n_words[WARP_OWN_WORDS];
-	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
-	float beyond[WARP_OWN_WORDS];  /* z' where the layer ends */
-	float before[WARP_OWN_WORDS];  /* z' of the opaque picture */
-	float first[WARP_OWN_WORDS];   /* z' of the nearest layer, or infinity */
-	uint64_t front[WARP_OWN_WORDS]; /* its word; of frames with planes */
-	float through[WARP_OWN_WORDS]; /* share of the light behind that the layers let through */
-	float light[3][WARP_OWN_WORDS];
-	uint8_t is_done[TILE_HEIGHT][TILE_WIDTH / STRIP]; /* strips without words beyond their layers */
-	struct strip_pixels pixels;
-	struct strip strip;
-};
-
-struct drawing {
-	const struct simd *simd;
-	const struct plan *plan;
-	const struct bins *bins;
-	const struct sheer_picture *picture;
-	struct sheer *sheer;
-	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
-	_Atomic uint64_t n_pixels;
-	atomic_int failed;
-};
-
-/* Pixels of a tile: columns from its left edge, and rows. */
-struct area {
-	uint32_t x0, y0, width, low_y, high_y;
-};
 
 int sheer_caster(float *opacity, const struct psr_blocks *b, uint32_t block)
 {
@@ -104,7 +70,7 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 }
 
 /* Finds the rows that the blocks reach. */
-static void find_area(struct area *area, const struct drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
+static void find_area(struct sheer_area *area, const struct sheer_drawing *d, uint32_t tile, uint32_t begin, uint32_t end)
 {
 	const struct plan *plan = d->plan;
 
@@ -124,18 +90,13 @@ static void find_area(struct area *area, const struct drawing *d, uint32_t tile,
 	area->high_y = area->high_y < end_y ? area->high_y : end_y;
 }
 
-static size_t place_of(const struct area *area, uint32_t y)
-{
-	return (size_t)(y - area->y0) * WARP_OWN_STRIDE;
-}
-
-static void begin_layers(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+static void begin_layers(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	memset(l->is_done, 0, sizeof l->is_done);
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
 
-		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++) {
+		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++) {
 			l->last[at] = SHEER_END;
 			l->n_words[at] = 0;
 			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
@@ -186,16 +147,16 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t firs
 }
 
 /* Finds the nearest words beyond the layers drawn so far, and forgets those in front. */
-static void find_layer(struct sheer_tile *l, const struct plan *plan, const struct area *area)
+static void find_layer(struct sheer_tile *l, const struct plan *plan, const struct sheer_area *area)
 {
 	struct sheer_list *list = &l->list;
-	const size_t first = place_of(area, area->low_y);
+	const size_t first = sheer_place(area, area->low_y);
 	const float *beyond = l->beyond + first;
 	uint64_t *nearest = l->word + first;
 	uint32_t n = 0;
 
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
-		for (size_t at = place_of(area, y), x = 0; x < area->width; at++, x++)
+		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++)
 			l->word[at] = PSR_WORD_EMPTY;
 	for (uint32_t i = 0; i < list->n && !plan_is_cancelled_at(plan, i); i++) {
 		const struct sheer_word w = list->word[i];
@@ -211,14 +172,14 @@ static void find_layer(struct sheer_tile *l, const struct plan *plan, const stru
 }
 
 /* Returns how many pixels the layer has. */
-static uint64_t add_layer(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+static uint64_t add_layer(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	uint64_t n_pixels = 0;
 
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (uint32_t x = 0; x < area->width; x += STRIP) {
 			const uint32_t n = area->width - x < STRIP ? area->width - x : STRIP;
-			const size_t first = place_of(area, y) + x;
+			const size_t first = sheer_place(area, y) + x;
 			uint8_t *is_done = &l->is_done[y - area->y0][x / STRIP];
 
 			if (*is_done)
@@ -245,14 +206,14 @@ static uint8_t mix(const uint8_t *srgb, float light, float through, uint8_t code
 	return srgb[(int32_t)((mixed < 1 ? mixed : 1) * 65535 + 0.5f)];
 }
 
-static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, const struct area *area)
+static uint64_t end_layers(const struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	const struct sheer_picture *p = d->picture;
 	uint64_t n_pixels = 0;
 
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (uint32_t x = 0; x < area->width; x++) {
-			const size_t from = place_of(area, y) + x, to = (size_t)y * d->plan->width + area->x0 + x;
+			const size_t from = sheer_place(area, y) + x, to = (size_t)y * d->plan->width + area->x0 + x;
 
 			if (!(l->first[from] < INFINITY))
 				continue;
@@ -266,12 +227,12 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct drawing *d, 
 }
 
 /* Where the layers keep back half of the light or more, the planes tell of the nearest. */
-static void put_planes(struct sheer_tile *l, const struct drawing *d, const struct area *area)
+static void put_planes(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	for (uint32_t y = area->low_y; y < area->high_y && !plan_is_cancelled(d->plan); y++)
 		for (uint32_t x = 0; x < area->width; x += STRIP) {
 			const struct planes_part part = { area->x0 + x, y, area->width - x < STRIP ? area->width - x : STRIP };
-			const size_t first = place_of(area, y) + x;
+			const size_t first = sheer_place(area, y) + x;
 
 			for (size_t at = first; at < first + part.n; at++)
 				l->word[at] = l->first[at] < INFINITY && l->through[at] <= HALF ? l->front[at] : PSR_WORD_EMPTY;
@@ -279,43 +240,66 @@ static void put_planes(struct sheer_tile *l, const struct drawing *d, const stru
 		}
 }
 
-static void draw_tile(struct drawing *d, uint32_t tile, struct sheer_tile *l)
+/* Mixes what was drawn with the picture. */
+static void end_tile(struct sheer_tile *l, struct sheer_drawing *d, const struct sheer_area *area)
 {
-	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
-	const struct psr_zstack stack = { .levels = 0 };
-	struct warp_target target;
-	struct area area;
+	atomic_fetch_add(&d->n_pixels, end_layers(l, d, area));
+	if (d->picture->planes != NULL)
+		put_planes(l, d, area);
+}
 
-	if (begin == end)
-		return;
-	find_area(&area, d, tile, begin, end);
-	begin_layers(l, d, &area);
-	warp_target_make(&target, d->plan, &stack, tile, l->word);
-	target.y0 = (int32_t)area.low_y;
-	target.y1 = (int32_t)area.high_y;
-	l->list.before = l->before + place_of(&area, area.low_y);
-	l->list.last = l->last + place_of(&area, area.low_y);
-	l->list.n_words = l->n_words + place_of(&area, area.low_y);
+/* Draws the glass of a tile, layer by layer. */
+static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const struct sheer_area *area,
+                       const struct warp_target *target, const struct sheer_entries *glass)
+{
+	const size_t first = sheer_place(area, area->low_y);
+
+	begin_layers(l, d, area);
+	l->list.before = l->before + first;
+	l->list.last = l->last + first;
+	l->list.n_words = l->n_words + first;
 	l->list.n = 0;
 	l->list.failed = 0; /* of an earlier picture */
-	sheer_list_blocks(&l->list, d->plan, d->bins->entry + begin, end - begin, &target);
+	sheer_list_blocks(&l->list, d->plan, d->bins->entry + glass->begin, glass->end - glass->begin, target);
 	if (l->list.failed) {
 		atomic_store(&d->failed, 1);
 		return;
 	}
 	for (int layer = 0; layer < MOST_LAYERS; layer++) {
-		find_layer(l, d->plan, &area);
-		if (!add_layer(l, d, &area))
+		find_layer(l, d->plan, area);
+		if (!add_layer(l, d, area))
 			break;
 	}
-	atomic_fetch_add(&d->n_pixels, end_layers(l, d, &area));
-	if (d->picture->planes != NULL)
-		put_planes(l, d, &area);
+	end_tile(l, d, area);
+}
+
+static void draw_tile(struct sheer_drawing *d, uint32_t tile, struct sheer_tile *l)
+{
+	const uint32_t begin = sheer_begin(d->plan, d->bins, tile), end = d->bins->tile_begin[tile + 1];
+	const struct psr_zstack stack = { .levels = 0 };
+	struct warp_target target;
+	struct sheer_area area;
+
+	if (begin == end)
+		return;
+	const uint32_t middle = thin_end(d->plan, d->bins, begin, end);
+	const struct sheer_entries thin = { begin, middle }, glass = { middle, end };
+	find_area(&area, d, tile, begin, end);
+	warp_target_make(&target, d->plan, &stack, tile, l->word);
+	target.y0 = (int32_t)area.low_y;
+	target.y1 = (int32_t)area.high_y;
+	if (begin < middle) {
+		begin_layers(l, d, &area);
+		thin_draw(l, d, &area, &target, &thin);
+		end_tile(l, d, &area);
+	}
+	if (middle < end)
+		draw_glass(l, d, &area, &target, &glass);
 }
 
 static void draw_one(int i, void *userdata)
 {
-	struct drawing *d = userdata;
+	struct sheer_drawing *d = userdata;
 	const int slot = slots_take(&d->sheer->slots);
 
 	draw_tile(d, (uint32_t)d->bins->by_work[i], &d->sheer->tile[slot]);
@@ -348,7 +332,7 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
                const struct sheer_picture *picture, struct psr_pool *pool)
 {
 	const int n_slots = slots_most(pool);
-	struct drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture, .sheer = sheer };
+	struct sheer_drawing d = { .simd = simd, .plan = plan, .bins = bins, .picture = picture, .sheer = sheer };
 
 	if (n_slots > sheer->n_tiles && make_tiles(sheer, n_slots))
 		return PSR_ERR_MEMORY;

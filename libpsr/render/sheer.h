@@ -76,10 +76,10 @@ struct sheer_picture {
 /* Allocates depths for a frame that has none. Returns NULL without memory. */
 float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
-/* Draws the eight nearest sheer surfaces of each pixel over the picture. Each hides its opacity's share of the light
- * behind it. Where they hide at least half of the light, depth and planes become those of the nearest. Sets
- * sheer->n_pixels to how many pixels have sheer surfaces. A pure function of picture, plan and bins. MEMORY,
- * CANCELLED. */
+/* Draws thin things, then the eight nearest other sheer surfaces of each pixel over the picture. Each hides its
+ * opacity's share of the light behind it. Where they hide at least half of the light, depth and planes become those of
+ * the nearest. Sets sheer->n_pixels to how many pixels have sheer surfaces, twice those that have both kinds. A pure
+ * function of picture, plan and bins. MEMORY, CANCELLED. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);

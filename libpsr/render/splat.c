@@ -6,6 +6,7 @@
 #include "block.h"
 #include "sheer.h"
 #include "splat.h"
+#include "thin.h"
 #include "simd/block.h"
 
 /* Steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
@@ -31,13 +32,17 @@ struct splat_target {
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
 	struct sheer_list *list; /* takes the discs instead of words, or NULL */
+	const struct thin_layer *thin; /* does, or NULL */
 };
+
+/* Where a picture's discs go. */
+enum way { WORDS, LIST, VEILS };
 
 /* An ellipse in the picture: centre, two conjugate radii, how depth rises along them and to the rim, and the greatest
  * reach in pixels. */
 struct splat {
 	float at[3], radius[2][3], rim, most;
-	uint32_t id;
+	uint32_t id, veil;
 };
 
 static inline void lower(const struct splat_target *t, int32_t x, int32_t y, float z, uint32_t id)
@@ -80,7 +85,7 @@ static inline void list_place(const struct splat_target *t, const struct splat *
 /* Draws the pixels whose centres are in the ellipse. It may miss the pixel of the disc's own centre: discs meet their
  * neighbours', and that pixel would widen every edge. */
 static inline __attribute__((always_inline)) void draw_splat(const struct splat_target *t, const struct splat *s,
-                                                             int is_listed)
+                                                             enum way way)
 {
 	const float u = s->at[0], v = s->at[1], *a = s->radius[0], *b = s->radius[1];
 	const float extent_x = __builtin_fabsf(a[0]) + __builtin_fabsf(b[0]),
@@ -100,8 +105,11 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 
 			if (!(square <= 1 && z > t->plan->near_z))
 				continue;
-			if (is_listed)
+			if (way == LIST)
 				list_place(t, s, x, y, z, square);
+			else if (way == VEILS)
+				thin_add(t->thin, (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0),
+				         (uint64_t)psr_bits_from_float(z) << 32 | s->id, s->veil);
 			else
 				lower(t, x, y, z, s->id);
 		}
@@ -197,7 +205,7 @@ static void find_plane(float slope[2], float share[2], const struct lattice_dept
 }
 
 static inline __attribute__((always_inline)) void draw_block(const struct splat_target *t,
-                                                             const struct bin_entry *entry, int is_listed)
+                                                             const struct bin_entry *entry, enum way way)
 {
 	const struct warp_instance *in = &t->plan->warp[entry->instance];
 	const struct psr_projection *projection =
@@ -236,7 +244,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 			d[k] = (s.at[0] * in->du[k] + s.at[1] * in->dv[k]) + in->d0[k];
 		if (entry->is_mixed && faces_away(-v3f_dot(n, d), d))
 			continue;
-		if (entry->level >= (is_listed ? LONG_LISTED : LONG_DRAWN) && plan_is_cancelled(t->plan))
+		if (entry->level >= (way == LIST ? LONG_LISTED : LONG_DRAWN) && plan_is_cancelled(t->plan))
 			return;
 		find_plane(slope, share, &at, sample, n, projection);
 		for (int i = 0; i < 2; i++) {
@@ -249,8 +257,10 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 			s.radius[i][2] = h[2];
 		}
 		s.id = b.id + sample;
+		if (way == VEILS)
+			s.veil = (uint32_t)t->thin->bits[in->blocks->opacity[b.attr - in->blocks->attr]];
 		limit_reach(&s);
-		draw_splat(t, &s, is_listed);
+		draw_splat(t, &s, way);
 	}
 }
 
@@ -287,9 +297,9 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
-		                            target.x1, target.y1,   NULL };
+		                            target.x1, target.y1,   NULL,         NULL };
 	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++)
-		draw_block(&t, &bins->entry[e], 0);
+		draw_block(&t, &bins->entry[e], WORDS);
 	return counts;
 }
 
@@ -297,9 +307,18 @@ void splat_list(const struct plan *plan, const struct bin_entry *entry, const st
                 struct sheer_list *list)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, list };
+		                            target->x1, target->y1, list,       NULL };
 
-	draw_block(&t, entry, 1);
+	draw_block(&t, entry, LIST);
+}
+
+void splat_veil(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
+                const struct thin_layer *layer)
+{
+	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
+		                            target->x1, target->y1, NULL,           layer };
+
+	draw_block(&t, entry, VEILS);
 }
 
 float splat_rim(const struct plan_instance *in, uint32_t block)

@@ -84,7 +84,7 @@ static void add_blocks(struct draft *draft, const struct sheets *all, uint32_t *
 			for (uint64_t left = patch->kept; left != 0; left &= left - 1, k++) {
 				const struct sheet_sample *sample = &sheets->sample[p][__builtin_ctzll(left)];
 
-				draft->sample[k] = (struct draft_sample){ sample->z, sample->surface, 0 };
+				draft->sample[k] = (struct draft_sample){ sample->z, sample->surface, 0, PSR_OPAQUE };
 			}
 			draft->n_samples = k;
 			block_of[i][p] = draft->n_blocks++;
@@ -100,7 +100,10 @@ static void set_attributes(struct draft *draft, const struct kept *kept, uint32_
 
 		block->two_sided |= sample->two_sided;
 		block->traits |= sample->traits;
-		draft->sample[draft_sample(draft, block, sample->sample) - draft->sample].attr = sample->attr;
+		struct draft_sample *to = &draft->sample[draft_sample(draft, block, sample->sample) - draft->sample];
+
+		to->attr = sample->attr;
+		to->opacity = sample->opacity;
 	}
 }
 
@@ -113,33 +116,45 @@ static int has_sheer(const struct draft *draft, uint32_t first)
 	return (any & PSR_BLOCK_SHEER) != 0;
 }
 
-/* Splits each block from `first` on that has both sheer and other samples into two, which together have the same
- * samples. */
+/* Gives samples of a block these traits: makes a block of them, unless they are all that it has. */
+static void split_off(struct draft *draft, uint32_t i, uint64_t part, uint8_t traits)
+{
+	struct draft_block *block = &draft->block[i], *to = block;
+
+	if (part == 0)
+		return;
+	if (part != block->part) {
+		to = &draft->block[draft->n_blocks++];
+		*to = *block;
+		to->part = part;
+		block->part &= ~part;
+	}
+	to->traits |= traits;
+}
+
+/* Splits each block from `first` on whose samples are sheer or thin in part into up to three, which together have the
+ * same samples. */
 static int part_sheer(struct draft *draft, const struct kept *kept, uint32_t *const *block_of, uint32_t first)
 {
 	uint32_t n_blocks = draft->n_blocks - first;
-	uint64_t *sheer = psr_alloc_array(n_blocks, sizeof *sheer);
-	int rc = sheer != NULL ? reserve(draft, (uint64_t)draft->n_blocks + n_blocks, 0) : PSR_ERR_MEMORY;
+	uint64_t (*part)[2] = psr_alloc_array(n_blocks, sizeof *part); /* glass, then thin */
+	int rc = part != NULL ? reserve(draft, (uint64_t)draft->n_blocks + 2 * (uint64_t)n_blocks, 0) : PSR_ERR_MEMORY;
 
 	if (rc == PSR_OK)
-		memset(sheer, 0, n_blocks * sizeof *sheer);
+		memset(part, 0, n_blocks * sizeof *part);
 	for (uint32_t i = 0; rc == PSR_OK && i < kept->n; i++) {
 		const struct kept_sample *sample = &kept->sample[i];
+		const int is_thin = (sample->traits & PSR_BLOCK_THIN) != 0;
 
 		if ((sample->traits & PSR_BLOCK_SHEER) != 0)
-			sheer[block_of[sample->projection][sample->patch] - first] |= UINT64_C(1) << sample->sample;
+			part[block_of[sample->projection][sample->patch] - first][is_thin] |= UINT64_C(1) << sample->sample;
 	}
 	for (uint32_t i = 0; rc == PSR_OK && i < n_blocks; i++) {
-		struct draft_block *block = &draft->block[first + i];
-
-		if (sheer[i] == 0 || sheer[i] == block->part)
-			continue;
-		draft->block[draft->n_blocks] = *block;
-		draft->block[draft->n_blocks++].part = sheer[i];
-		block->part &= ~sheer[i];
-		block->traits &= (uint8_t)~PSR_BLOCK_SHEER;
+		draft->block[first + i].traits &= (uint8_t)~(PSR_BLOCK_SHEER | PSR_BLOCK_THIN);
+		split_off(draft, first + i, part[i][0], PSR_BLOCK_SHEER);
+		split_off(draft, first + i, part[i][1], PSR_BLOCK_SHEER | PSR_BLOCK_THIN);
 	}
-	psr_free(sheer);
+	psr_free(part);
 	return rc;
 }
 

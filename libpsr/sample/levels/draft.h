@@ -9,6 +9,7 @@ struct draft_sample {
 	float z;
 	uint32_t surface; /* a side: surface.h */
 	uint64_t attr;
+	uint8_t opacity;  /* own/kept.h */
 };
 
 struct draft_block {
@@ -17,7 +18,7 @@ struct draft_block {
 	uint8_t level, two_sided, traits;
 	uint32_t group;   /* of blocks */
 	uint64_t mask;    /* of what is there, */
-	uint64_t part;    /* the samples that the group needs: all sheer, or none */
+	uint64_t part;    /* the samples that the group needs: all sheer and all thin, or none */
 	uint32_t first;   /* of its samples, one for each bit of mask */
 };
 

@@ -54,6 +54,8 @@ static void make_piece(const struct draft *draft, const struct draft_block *bloc
 
 static int compare_lattices(const struct draft_block *a, const struct draft_block *b)
 {
+	const int kinds = PSR_BLOCK_SHEER | PSR_BLOCK_THIN;
+
 	if (a->level != b->level)
 		return a->level < b->level ? -1 : 1;
 	if (a->group != b->group)
@@ -62,7 +64,7 @@ static int compare_lattices(const struct draft_block *a, const struct draft_bloc
 		return a->projection < b->projection ? -1 : 1;
 	if (a->two_sided != b->two_sided)
 		return (int)a->two_sided - (int)b->two_sided;
-	return (a->traits & PSR_BLOCK_SHEER) - (b->traits & PSR_BLOCK_SHEER);
+	return (a->traits & kinds) - (b->traits & kinds);
 }
 
 static int compare_pieces(const void *a, const void *b)

@@ -144,6 +144,11 @@ static void make_sample(const struct keeper *keeper, const struct sample_ref *re
 	sheets_position(sheets, ref->at, sample->position);
 	sampling_normal(sampling, surface, n);
 	sample->traits = is_sheer(sampling, &place) ? PSR_BLOCK_SHEER : 0;
+	sample->opacity = PSR_OPAQUE;
+	if (sample->traits == 0 && sampling_is_thin(sampling, prim))
+		sample->opacity = thin_opacity(sampling, sample->position, n);
+	if (sample->opacity < PSR_OPAQUE)
+		sample->traits = PSR_BLOCK_SHEER | PSR_BLOCK_THIN;
 	if (keeper->finer == NULL || !blend(keeper, n, facing, prim, sample))
 		look(sampling, &place, n, facing, sample);
 	sample->two_sided = (uint8_t)keep_is_two_sided(keeper, prim, sample->position, n);

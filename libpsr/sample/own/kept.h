@@ -11,6 +11,7 @@ struct kept_sample {
 	uint8_t two_sided;   /* set: it counts from both sides */
 	uint8_t traits;      /* model/blocks.h. Bent: `attr` has another normal, for shading alone */
 	uint8_t sample;      /* its place in this patch: */
+	uint8_t opacity;     /* model/blocks.h; of thin things, else PSR_OPAQUE */
 	uint32_t projection, patch;
 	uint32_t next;       /* next sample of the same cell */
 	uint64_t attr;       /* model/blocks.h */

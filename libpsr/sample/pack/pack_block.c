@@ -142,7 +142,7 @@ static void bound_normals(struct pack *pack, uint32_t i, const struct draft_bloc
 		pack->cone[k][i] = axis[k];
 }
 
-/* The opacity of a sheer block's sample, filtered as its attributes are. */
+/* The opacity of glass at a sample, filtered as its attributes are. */
 static uint8_t find_opacity(const struct pack *pack, const struct draft_block *block, unsigned s)
 {
 	uint32_t surface = draft_sample(pack->draft, block, s)->surface;
@@ -158,10 +158,13 @@ static uint8_t find_opacity(const struct pack *pack, const struct draft_block *b
 
 static void find_opacities(struct pack *pack, uint32_t at, const struct draft_block *block)
 {
-	for (uint64_t left = block->part; left != 0; left &= left - 1, at++)
-		pack->opacity[at] = (block->traits & PSR_BLOCK_SHEER) != 0
-		                            ? find_opacity(pack, block, (unsigned)__builtin_ctzll(left))
-		                            : PSR_OPAQUE;
+	const int is_glass = (block->traits & (PSR_BLOCK_SHEER | PSR_BLOCK_THIN)) == PSR_BLOCK_SHEER;
+
+	for (uint64_t left = block->part; left != 0; left &= left - 1, at++) {
+		const unsigned s = (unsigned)__builtin_ctzll(left);
+
+		pack->opacity[at] = is_glass ? find_opacity(pack, block, s) : draft_sample(pack->draft, block, s)->opacity;
+	}
 }
 
 static void place_block(struct pack *pack, uint32_t i, const struct draft_block *block)

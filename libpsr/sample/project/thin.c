@@ -1,6 +1,9 @@
 #include <math.h>
 #include <string.h>
+#include "base/direction.h"
+#include "base/maths.h"
 #include "base/vec.h"
+#include "model/blocks.h"
 #include "sampling.h"
 
 /* Pixels between two sides that one sample stands for. Views along a thicker plate's rim see one side beyond the
@@ -10,6 +13,11 @@
 #define NARROW 0.5 /* pixels */
 
 #define PAST 0.001 /* pixels behind a hit where the search goes on */
+
+#define DISC_RAYS 32
+#define DISC_WHOLE 28 /* rays that meet a surface where a disc counts as whole; a leaf may bend away from the others */
+
+#define PI 3.14159265358979323846
 
 #define CHUNK 1024
 #define BATCH 64
@@ -159,4 +167,31 @@ void thin_mark(uint8_t *thin, const struct sampling *sampling, const uint8_t *fi
 	memset(thin, 0, sampling_n_prims(sampling));
 	if (sampling->mesh->color == NULL)
 		psr_pool_for(sampling->pool, (int)((sampling->mesh->n_triangles + CHUNK - 1) / CHUNK), mark_chunk, &job);
+}
+
+uint8_t thin_opacity(const struct sampling *sampling, const float p[3], const float n[3])
+{
+	const double axis[3] = { (double)n[0], (double)n[1], (double)n[2] }, turn = 2.399963229728653; /* the golden angle */
+	const double depth = THICKNESS * sampling->ds;
+	struct ray ray[DISC_RAYS];
+	uint8_t is_met[DISC_RAYS];
+	double basis[3][3];
+	int n_met = 0;
+
+	psr_direction_basis(axis, basis);
+	for (int i = 0; i < DISC_RAYS; i++) {
+		const double r = 0.5 * sampling->ds * sqrt((i + 0.5) / DISC_RAYS);
+		const double angle = fmod(i * turn, 2 * PI), above = angle <= PI ? 1 : -1;
+		double s, c;
+
+		psr_sincos(above > 0 ? angle : 2 * PI - angle, &s, &c);
+		for (int k = 0; k < 3; k++) {
+			ray[i].direction[k] = -axis[k];
+			ray[i].origin[k] = (double)p[k] + r * (c * basis[0][k] + above * s * basis[1][k]) + depth * axis[k];
+		}
+	}
+	ray_scene_occluded(sampling->scene, ray, DISC_RAYS, 2 * depth, is_met);
+	for (int i = 0; i < DISC_RAYS; i++)
+		n_met += is_met[i];
+	return n_met >= DISC_WHOLE ? PSR_OPAQUE : (uint8_t)((n_met > 0 ? n_met : 1) * PSR_OPAQUE / DISC_RAYS);
 }

@@ -18,4 +18,8 @@ struct sampling;
  * or NULL. */
 void thin_mark(uint8_t *thin, const struct sampling *sampling, const uint8_t *finer);
 
+/* Returns the opacity of a sample at p with this normal: the share that surfaces cover of a disc about p as wide as a
+ * pixel, of PSR_OPAQUE. At least 1. Nearly whole discs, as inside of a leaf, are PSR_OPAQUE. */
+uint8_t thin_opacity(const struct sampling *sampling, const float p[3], const float n[3]);
+
 #endif

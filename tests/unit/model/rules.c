@@ -177,7 +177,8 @@ static const struct violation violations[] = {
 	{ "CONX", 3, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 3 is 60 instead of 127" },
 	{ "CONY", 4, 1, 0, "CONX, CONY, CONZ: the greatest component of the axis of block 4 is 80 instead of 127" },
 	{ "CONZ", 0, 1, 0x80, "CONX, CONY, CONZ: the greatest component of the axis of block 0 is 128 instead of 127" },
-	{ "TRTS", 2, 1, 4, "TRTS: block 2 has unknown traits 4" },
+	{ "TRTS", 2, 1, 8, "TRTS: block 2 has unknown traits 8" },
+	{ "TRTS", 2, 1, 4, "TRTS: block 2 is thin, but not sheer" },
 };
 
 static void each_violated_rule_is_refused_by_its_name(void **state)

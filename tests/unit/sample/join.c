@@ -32,7 +32,8 @@ static struct draft_block *add_block(struct draft *draft, uint64_t mask, uint64_
 
 	*block = (struct draft_block){ .mask = mask, .part = part, .first = draft->n_samples };
 	for (uint64_t left = mask; left != 0; left &= left - 1, draft->n_samples++)
-		draft->sample[draft->n_samples] = (struct draft_sample){ steps * SPACING, draft->n_samples, draft->n_samples + 7u };
+		draft->sample[draft->n_samples] = (struct draft_sample){ steps * SPACING, draft->n_samples,
+			                                                     draft->n_samples + 7u, PSR_OPAQUE };
 	return block;
 }
 

@@ -1,0 +1,54 @@
+/* A tile's sheer surfaces while they are drawn. */
+#ifndef PSR_RENDER_SHEER_TILE_H
+#define PSR_RENDER_SHEER_TILE_H
+
+#include <stdatomic.h>
+#include "shade.h"
+#include "sheer.h"
+#include "zbuffer.h"
+
+/* A tile's layers, in rows WARP_OWN_STRIDE apart. */
+struct sheer_tile {
+	struct sheer_list list;
+	uint32_t last[WARP_OWN_WORDS]; /* of the list */
+	uint8_t n_words[WARP_OWN_WORDS];
+	uint64_t word[WARP_OWN_WORDS]; /* of the layer that is drawn */
+	float beyond[WARP_OWN_WORDS];  /* z' where the layer ends */
+	float before[WARP_OWN_WORDS];  /* z' of the opaque picture */
+	float first[WARP_OWN_WORDS];   /* z' of the nearest layer, or infinity */
+	uint64_t front[WARP_OWN_WORDS]; /* its word; of frames with planes */
+	float through[WARP_OWN_WORDS]; /* share of the light behind that the layers let through */
+	float light[3][WARP_OWN_WORDS];
+	uint32_t veil[WARP_OWN_WORDS]; /* of thin things, see thin.h */
+	uint8_t is_done[TILE_HEIGHT][TILE_WIDTH / STRIP]; /* strips without words beyond their layers */
+	struct strip_pixels pixels;
+	struct strip strip;
+};
+
+struct sheer_drawing {
+	const struct simd *simd;
+	const struct plan *plan;
+	const struct bins *bins;
+	const struct sheer_picture *picture;
+	struct sheer *sheer;
+	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
+	_Atomic uint64_t n_pixels;
+	atomic_int failed;
+};
+
+/* Pixels of a tile: columns from its left edge, and rows. */
+struct sheer_area {
+	uint32_t x0, y0, width, low_y, high_y;
+};
+
+/* Entries of the bins, begin .. end - 1. */
+struct sheer_entries {
+	uint32_t begin, end;
+};
+
+static inline size_t sheer_place(const struct sheer_area *area, uint32_t y)
+{
+	return (size_t)(y - area->y0) * WARP_OWN_STRIDE;
+}
+
+#endif
