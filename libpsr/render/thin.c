@@ -29,10 +29,37 @@ uint32_t thin_end(const struct plan *plan, const struct bins *bins, uint32_t beg
 	return end;
 }
 
+/* Returns how many times 1 is halved to give x, 0 < x <= 1, to 2^-20. */
+static double halvings(double x)
+{
+	double n = 0;
+
+	for (; x < 1; x *= 2)
+		n++;
+	for (double bit = 0.5; bit > 0x1p-21; bit /= 2) {
+		x *= x;
+		if (x >= 2) {
+			x /= 2;
+			n -= bit;
+		}
+	}
+	return n;
+}
+
 static void tabulate(float bits[PSR_OPAQUE + 1], float share)
 {
-	for (int i = 0; i <= PSR_OPAQUE; i++)
-		bits[i] = -65536 * share * psr_power_exponent((float)(PSR_OPAQUE - i) * (1.0f / PSR_OPAQUE), 1);
+	for (int i = 0; i < PSR_OPAQUE; i++)
+		bits[i] = 65536 * share * (float)halvings((double)(PSR_OPAQUE - i) / PSR_OPAQUE);
+	bits[PSR_OPAQUE] = THIN_MOST_VEIL;
+}
+
+/* Returns the share of the light that comes through a veil. Taylor's series is 2e-5 off at most. */
+static float through_veil(uint32_t veil)
+{
+	const float t = (float)(veil & 0xffff) * (1.0f / 65536) * 0.69314718f;
+	const float part = 1 - t * (1 - t / 2 * (1 - t / 3 * (1 - t / 4 * (1 - t / 5 * (1 - t / 6)))));
+
+	return part * psr_float_from_bits((127 - (veil >> 16)) << 23);
 }
 
 /* Returns the square of the distance between a block's samples, in pixels, where they are points. */
@@ -86,7 +113,7 @@ static void light_strip(struct sheer_tile *l, const struct sheer_drawing *d, con
 	for (uint32_t i = 0; i < n_found; i++) {
 		const size_t at = first + l->pixels.x[i];
 		const uint16_t color[3] = { l->strip.r[i], l->strip.g[i], l->strip.b[i] };
-		const float through = psr_power_of_two((float)l->veil[at] * (-1.0f / 65536));
+		const float through = through_veil(l->veil[at]);
 
 		for (int c = 0; c < 3; c++)
 			l->light[c][at] = (1 - through) * ((float)color[c] * (1.0f / 65535));
