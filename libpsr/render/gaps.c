@@ -19,7 +19,7 @@ _Static_assert(PART_WIDTH % GAPS_WIDTH == 0 && PART_HEIGHT % BRICK == 0,
 struct gaps_counts gaps_rows(const struct simd *simd, const struct plan *plan, const struct psr_zstack *stack,
                              uint32_t y0, uint32_t y1, const struct gaps_map *map)
 {
-	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, map->weight, plan->opaque_cells };
+	const struct gaps_target target = { stack, plan->gap_scale, plan->gap_offset, map->weight, plan->gap_method };
 	const uint32_t bricks_x = (stack->width + BRICK - 1) / BRICK;
 	struct gaps_counts total = { 0, 0, 0 };
 

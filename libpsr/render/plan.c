@@ -264,7 +264,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->perspective = camera->kind == PSR_CAMERA_PERSPECTIVE;
 	plan->cull_tests = settings->cull_tests;
 	plan->is_full = settings->is_full;
-	plan->opaque_cells = settings->gap_method == PSR_GAPS_OPAQUE;
+	plan->gap_method = settings->gap_method;
 	plan->no_fill = settings->no_fill;
 	plan->shadow_side = settings->shadow_side;
 	plan->finer = (float)ldexp(1 / settings->spacing_px, -settings->cell_bias); /* levels of models know no bias */

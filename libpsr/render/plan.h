@@ -25,7 +25,7 @@ struct plan {
 	int is_smooth;
 	unsigned cull_tests;
 	int is_full;
-	int opaque_cells;          /* PSR_GAPS_OPAQUE */
+	enum psr_gap_method gap_method;
 	int no_fill;
 	int cell_bias;
 	uint32_t shadow_side;

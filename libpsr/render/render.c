@@ -19,7 +19,7 @@ void render_settings_default(struct render_settings *settings, uint32_t width, u
 {
 	*settings = (struct render_settings){ .width = width, .height = height, .spacing_px = 1,
 		                                  .cull_tests = PSR_CULL_ALL, .gap_threshold = 3,
-		                                  .gap_method = PSR_GAPS_BILINEAR, .shadow_side = PSR_MAX_SHADOW_SIDE };
+		                                  .gap_method = PSR_GAPS_CLOSED, .shadow_side = PSR_MAX_SHADOW_SIDE };
 }
 
 int render_cancelled(struct psr_error *err)

@@ -3,7 +3,7 @@
 #define PSR_RENDER_STAGES_H
 
 #include "psr/render.h"
-#include "simd/zstack.h"
+#include "simd/gaps.h"
 
 /* What may leave out blocks that cannot show, beside the frustum. All are conservative: without any of them a frame has
  * the same bytes. */
@@ -13,12 +13,6 @@ enum psr_cull_test {
 	                         * them */
 	PSR_CULL_OCCLUSION = 4, /* what is drawn nearer, where many samples fall into a tile */
 	PSR_CULL_ALL = 7
-};
-
-/* How cells of the depth buffers cover the pixels behind them ([G] 4.6). */
-enum psr_gap_method {
-	PSR_GAPS_BILINEAR, /* by the distance to the cells' centres */
-	PSR_GAPS_OPAQUE    /* whole, as opaque squares: the simplest, kept for comparison */
 };
 
 /* A part of a larger picture: pixel (0, 0) of the frame is (left, top) there. It may reach beyond the picture, and
@@ -43,7 +37,7 @@ struct render_settings {
 	int with_splats; /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on
 	                  * the surface that close the gaps themselves: for pixels finer than samples */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
-	enum psr_gap_method gap_method; /* bilinear by default */
+	enum psr_gap_method gap_method; /* PSR_GAPS_CLOSED by default */
 	int cell_bias;          /* depth buffers whose cells are 2^cell_bias times as wide as samples ask for; -4..4, 0 by
 	                         * default */
 	int no_fill;            /* 1: pixels that the gaps left without a colour show the background */

@@ -4,16 +4,24 @@
 
 #include "zstack.h"
 
+/* How a surface covers what lies behind it between its samples. */
+enum psr_gap_method {
+	PSR_GAPS_BILINEAR, /* [G] 4.6: by cells of the depth buffers, by the distance to their centres */
+	PSR_GAPS_OPAQUE,   /* by cells as opaque squares; both are kept for comparison */
+	PSR_GAPS_CLOSED    /* levels 1 and 2 by depths, closed over the distance of samples; coarser ones bilinear */
+};
+
 #define GAPS_WIDTH 128 /* a multiple of the coarsest cell */
 #define GAPS_BRICK 32
 #define GAPS_WHOLE 256 /* the weight of an uncovered pixel */
 
-/* A cell of level k at z' covers pixels beyond scale[k] * z' + offset[k]. */
+/* A cell of level k at z' covers pixels beyond scale[k] * z' + offset[k], closed depths of level k
+ * beyond scale[k - 1] * z' + offset[k - 1]. */
 struct gaps_target {
 	const struct psr_zstack *stack;
 	const float *scale, *offset; /* by level */
 	uint16_t *weight;            /* stack->width * stack->height */
-	int opaque_cells;            /* a cell covers all of its own pixels, and no others */
+	enum psr_gap_method method;
 };
 
 struct gaps_counts {

@@ -179,7 +179,7 @@ void effects_spacing(const struct effects *effects)
 
 static void gaps_row(const struct truth *truth, const char *name, double magnification, enum psr_gap_method method)
 {
-	static const char *const names[] = { "bilinear", "opaque" };
+	static const char *const names[] = { "bilinear", "opaque", "closed" };
 	cJSON *item = report_add(report_array("gaps"));
 	struct render_settings settings;
 	struct psr_accuracy accuracy;
@@ -216,7 +216,7 @@ void effects_gaps(const struct effects *effects)
 {
 	struct truth truth;
 
-	printf("\nGaps by bilinear coverage and by opaque squares ([G] 4.6): one level of the %s at %dx%d; holes and pixels drawn "
+	printf("\nGaps by closed depths, by bilinear coverage and by opaque squares ([G] 4.6): one level of the %s at %dx%d; holes and pixels drawn "
 	       "outside of the\nsilhouette against the mesh, PSNR as above\n%-8s %6s %-9s %9s %8s %9s %9s %10s\n", effects->name, SIDE, SIDE,
 	       "", "magni-", "", "partial", "filled", "holes", "outside", "PSNR to");
 	printf("%-8s %6s %-9s %9s %8s %9s %9s %10s\n", "model", "fied", "method", "pixels", "pixels", "", "", "the truth");
@@ -225,6 +225,7 @@ void effects_gaps(const struct effects *effects)
 
 		film_make(&truth.film, model, 2);
 		truth_make(&truth, effects->source, effects->n_threads);
+		gaps_row(&truth, effects->name, truth.film.magnification, PSR_GAPS_CLOSED);
 		gaps_row(&truth, effects->name, truth.film.magnification, PSR_GAPS_BILINEAR);
 		gaps_row(&truth, effects->name, truth.film.magnification, PSR_GAPS_OPAQUE);
 		truth_free(&truth);

@@ -50,8 +50,8 @@ static void piece(struct check *c, uint32_t width, uint32_t height, uint32_t lev
 	const uint32_t y0 = GAPS_BRICK * check_below(c, (height + GAPS_BRICK - 1) / GAPS_BRICK);
 	const uint32_t x1 = x0 + GAPS_WIDTH < width ? x0 + GAPS_WIDTH : width;
 	const uint32_t y1 = y0 + GAPS_BRICK < height ? y0 + GAPS_BRICK : height;
-	const int opaque_cells = numbers != SMOOTH && check_one_in(c, 4);
-	const struct gaps_target target = { stack, scale, offset, check_out(c, area, sizeof(uint16_t)), opaque_cells };
+	const enum psr_gap_method method = numbers == SMOOTH ? PSR_GAPS_CLOSED : (enum psr_gap_method)check_below(c, 3);
+	const struct gaps_target target = { stack, scale, offset, check_out(c, area, sizeof(uint16_t)), method };
 	uint8_t *marks = check_out(c, GAPS_WIDTH / GAPS_BRICK, 1);
 	check_units(c, (uint64_t)(x1 - x0) * (y1 - y0));
 	while (check_next(c)) {

@@ -96,6 +96,53 @@ static int is_pinhole(const struct plan *plan, const struct psr_zstack *stack, u
 	return n >= 7 && farthest <= nearest * plan->gap_scale[alike] + plan->gap_offset[alike];
 }
 
+/* ---- closing, one pixel after the other ---- */
+
+static int is_in_picture(const struct psr_zstack *stack, int64_t x, int64_t y)
+{
+	return x >= 0 && y >= 0 && x < (int64_t)stack->width && y < (int64_t)stack->height;
+}
+
+static float cell_at(const struct psr_zstack *stack, int k, int64_t i, int64_t j)
+{
+	if (i < 0 || j < 0 || i >= stack->level[k].width || j >= stack->level[k].height)
+		return INFINITY;
+	return stack->level[k].z[(size_t)j * stack->level[k].width + (size_t)i];
+}
+
+static float least_around(const struct psr_zstack *stack, int k, int64_t x, int64_t y)
+{
+	float least = INFINITY;
+	for (int64_t v = y - k; v <= y + k; v++)
+		for (int64_t u = x - k; u <= x + k; u++)
+			least = fminf(least, is_in_picture(stack, u, v) ? depth_at(stack, u, v)
+			                                                : cell_at(stack, k, (u >> k) + 1, (v >> k) + 1));
+	return least == INFINITY && !is_in_picture(stack, x, y) ? 0 : least;
+}
+
+static int is_closed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z)
+{
+	float near = INFINITY, greatest = 0;
+	for (int64_t j = y >> k; j <= (y >> k) + 2; j++)
+		for (int64_t i = x >> k; i <= (x >> k) + 2; i++)
+			near = fminf(near, cell_at(stack, k, i, j));
+	for (int64_t v = (int64_t)y - k; near < INFINITY && v <= (int64_t)y + k; v++)
+		for (int64_t u = (int64_t)x - k; u <= (int64_t)x + k; u++)
+			greatest = fmaxf(greatest, least_around(stack, k, u, v));
+	return near < INFINITY && greatest * plan->gap_scale[k - 1] + plan->gap_offset[k - 1] < z;
+}
+
+static int32_t cover_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z)
+{
+	if (plan->gap_method == PSR_GAPS_OPAQUE)
+		return covers(plan, stack, k, (int32_t)(x >> k) + 1, (int32_t)(y >> k) + 1, z) ? WEIGHT_ONE : 0;
+	if (plan->gap_method == PSR_GAPS_CLOSED && k <= 2)
+		return is_closed(plan, stack, x, y, k, z) ? WEIGHT_ONE : 0;
+	const int32_t cover = coverage(plan, stack, x, y, k, z, covers);
+	const int is_seam = k > 1 && (stack->levels >> (k - 1) & 1) && cover > 0 && cover < WEIGHT_ONE;
+	return is_seam ? coverage(plan, stack, x, y, k, z, covers_either) : cover;
+}
+
 static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y,
                           uint32_t *n_pinholes)
 {
@@ -104,11 +151,7 @@ static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stac
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
 		if (!(stack->levels >> k & 1))
 			continue;
-		int32_t cover = coverage(plan, stack, x, y, k, z, covers);
-		if (plan->opaque_cells)
-			cover = covers(plan, stack, k, (int32_t)(x >> k) + 1, (int32_t)(y >> k) + 1, z) ? WEIGHT_ONE : 0;
-		else if (k > 1 && (stack->levels >> (k - 1) & 1) && cover > 0 && cover < WEIGHT_ONE)
-			cover = coverage(plan, stack, x, y, k, z, covers_either);
+		const int32_t cover = cover_of(plan, stack, x, y, k, z);
 		most = cover > most ? cover : most;
 	}
 	if (most < WEIGHT_ONE && is_pinhole(plan, stack, x, y)) {
@@ -169,8 +212,8 @@ static void strew(struct psr_zstack *stack, uint32_t strewn)
 					stack->level[k].z[i] = 80 + 0.01f * (float)draw(3000);
 }
 
-static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn, int opaque_cells,
-                    const struct simd *simd)
+static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t strewn,
+                    enum psr_gap_method method, const struct simd *simd)
 {
 	struct plan plan = plan_of((int)draw(2));
 	struct psr_zstack stack = stack_make(width, height, levels);
@@ -178,7 +221,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 	uint16_t *weight = malloc((size_t)width * height * 2);
 	uint8_t *bricks = malloc((size_t)bricks_x * bricks_y), *expected = calloc(bricks_x, bricks_y);
 	uint32_t n_partial = 0, n_marked = 0, n_pinholes = 0;
-	plan.opaque_cells = opaque_cells;
+	plan.gap_method = method;
 	strew(&stack, strewn);
 	/* In two parts: rows do not see which call they are of. */
 	const uint32_t half = (bricks_y / 2) * BRICK;
@@ -206,7 +249,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t levels, uint32_t s
 	stack_free(&stack);
 }
 
-static void compare_all(int opaque_cells)
+static void compare_all(enum psr_gap_method method)
 {
 	static const uint32_t size[][2] = {
 		{ 1, 1 }, { 2, 1 }, { 1, 5 }, { 31, 33 }, { 128, 32 }, { 129, 65 }, { 300, 140 }
@@ -217,7 +260,7 @@ static void compare_all(int opaque_cells)
 		for (size_t s = 0; simd && s < sizeof size / sizeof *size; s++) {
 			static const uint32_t levels[] = { 0, 2, 6, 0xc, 0x20, 0x8a, 0xfe, 0x80 };
 			for (size_t l = 0; l < sizeof levels / sizeof *levels; l++)
-				compare(size[s][0], size[s][1], levels[l], l % 2 ? 8 : 128, opaque_cells, simd);
+				compare(size[s][0], size[s][1], levels[l], l % 2 ? 8 : 128, method, simd);
 		}
 	}
 }
@@ -225,13 +268,84 @@ static void compare_all(int opaque_cells)
 static void weights_are_those_of_single_pixels(void **state)
 {
 	(void)state;
-	compare_all(0);
+	compare_all(PSR_GAPS_BILINEAR);
+}
+
+static void closed_depths_are_those_of_single_pixels(void **state)
+{
+	(void)state;
+	compare_all(PSR_GAPS_CLOSED);
 }
 
 static void opaque_squares_cover_their_own_pixels_whole(void **state)
 {
 	(void)state;
-	compare_all(1);
+	compare_all(PSR_GAPS_OPAQUE);
+}
+
+/* ---- surfaces with gaps ---- */
+
+#define STEP 3       /* pixels between samples: blocks of level 2 */
+#define FIELD 96     /* the picture's side */
+#define FIRST 33     /* of the surface's pixels, in both directions, */
+#define END 64
+
+/* Samples every STEP pixels from FIRST to END, z' rising by `slope` a pixel to the right; behind them a wall, as fine as
+ * pixels. Level 2 has the samples alone. */
+static struct psr_zstack fence(float slope)
+{
+	struct psr_zstack stack = stack_make(FIELD, FIELD, 1 << 2);
+	for (uint32_t y = 0; y < FIELD; y++)
+		for (uint32_t x = 0; x < FIELD; x++)
+			set_depth(&stack, x, y, 2000);
+	for (uint32_t y = FIRST; y < END; y += STEP)
+		for (uint32_t x = FIRST; x < END; x += STEP) {
+			const float z = 100 + slope * (float)x;
+			float *cell = &stack.level[2].z[((y >> 2) + 1) * stack.level[2].width + (x >> 2) + 1];
+			set_depth(&stack, x, y, z);
+			*cell = fminf(*cell, z);
+		}
+	return stack;
+}
+
+static void weigh_fence(uint16_t weight[FIELD * FIELD], float slope)
+{
+	struct plan plan = plan_of(0);
+	struct psr_zstack stack = fence(slope);
+	uint8_t bricks[FIELD / BRICK * (FIELD / BRICK)];
+	plan.gap_method = PSR_GAPS_CLOSED;
+	gaps_rows(simd_get(), &plan, &stack, 0, FIELD, &(struct gaps_map){ weight, bricks });
+	stack_free(&stack);
+}
+
+/* Up to 84 degrees. Samples at the rim have none on one side to take back what the other takes. */
+static void a_steep_plane_of_samples_covers_what_is_behind_it_and_not_itself(void **state)
+{
+	(void)state;
+	static uint16_t weight[FIELD * FIELD];
+	for (int slope = -10; slope <= 10; slope++) {
+		weigh_fence(weight, (float)slope);
+		for (uint32_t y = FIRST + STEP; y + STEP < END; y++)
+			for (uint32_t x = FIRST + STEP; x + STEP < END; x++) {
+				const int is_sample = (x - FIRST) % STEP == 0 && (y - FIRST) % STEP == 0;
+				if (weight[y * FIELD + x] != (is_sample ? WEIGHT_ONE : 0))
+					fail_msg("slope %d: weight %u at (%u, %u)", slope, weight[y * FIELD + x], x, y);
+			}
+	}
+}
+
+static void a_surface_ends_where_its_samples_end(void **state)
+{
+	(void)state;
+	static uint16_t weight[FIELD * FIELD];
+	const uint32_t last = FIRST + (END - 1 - FIRST) / STEP * STEP;
+	weigh_fence(weight, 0);
+	for (uint32_t y = 0; y < FIELD; y++)
+		for (uint32_t x = 0; x < FIELD; x++) {
+			const int is_inside = x >= FIRST && y >= FIRST && x <= last && y <= last;
+			const int is_sample = is_inside && (x - FIRST) % STEP == 0 && (y - FIRST) % STEP == 0;
+			assert_int_equal(weight[y * FIELD + x], is_sample || !is_inside ? WEIGHT_ONE : 0);
+		}
 }
 
 /* ---- the guard ---- */
@@ -337,6 +451,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(weights_are_those_of_single_pixels),
+		cmocka_unit_test(closed_depths_are_those_of_single_pixels),
+		cmocka_unit_test(a_steep_plane_of_samples_covers_what_is_behind_it_and_not_itself),
+		cmocka_unit_test(a_surface_ends_where_its_samples_end),
 		cmocka_unit_test(opaque_squares_cover_their_own_pixels_whole),
 		cmocka_unit_test(a_pinhole_is_closed_before_background_and_before_a_surface),
 		cmocka_unit_test(one_of_eight_neighbors_may_be_another_pinhole),

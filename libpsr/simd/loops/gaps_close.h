@@ -1,0 +1,209 @@
+/* Finding gaps by closing depths, as morphology closes shapes: each pixel takes the least depth in a square around it,
+ * then the greatest of these in a square around it. On a plane, however steep, the second step takes back what the first
+ * one took, so that a surface does not cover itself. Gaps close where every square holds a sample, and an edge stays
+ * where its samples are. */
+#include "gaps_tile.h"
+
+/* Samples of level k are at most 2^k pixels apart, so that a square of 3 pixels on their surface holds one of level 1,
+ * and a square of 5 one of level 2. */
+#define CLOSED_LEVELS 2
+
+_Static_assert(2 * CLOSED_LEVELS <= GAPS_MARGIN, "two squares reach so far");
+
+/* Finds the nearest of the 3x3 cells of level k around each pixel of row y: +inf where no sample of the level is near.
+ * Returns whether any is finite. */
+static int find_near(float *near, const struct gaps_target *t, const struct gaps_tile *tile, int k, uint32_t y)
+{
+	const uint32_t stride = t->stack->level[k].width, n = ((tile->width - 1) >> k) + 1;
+	const float *cell = t->stack->level[k].z + (size_t)((tile->y0 + y) >> k) * stride + (tile->x0 >> k);
+	float least[GAPS_WIDTH / 2 + 2], once[GAPS_WIDTH / 2 + SPREAD_RUN];
+	int32_t has_any = 0;
+
+	for (uint32_t i = 0; i < n + 2; i++) {
+		const float above = cell[i], own = cell[i + stride], below = cell[i + 2 * stride];
+		const float two = above < own ? above : own;
+
+		least[i] = two < below ? two : below;
+	}
+	for (uint32_t i = 0; i < n; i++) {
+		const float two = least[i] < least[i + 1] ? least[i] : least[i + 1];
+
+		once[i] = two < least[i + 2] ? two : least[i + 2];
+		has_any |= once[i] < INFINITY;
+	}
+	if (has_any)
+		spread(near, once, n, k);
+	return has_any;
+}
+
+static int is_near_any(const struct gaps_target *t, const struct gaps_tile *tile, int k)
+{
+	float near[GAPS_WIDTH + 2 * SPREAD_RUN];
+
+	for (uint32_t y = 0; y < tile->height; y += 1u << k)
+		if (find_near(near, t, tile, k, y))
+			return 1;
+	return 0;
+}
+
+static int is_in_picture(const struct gaps_target *t, int64_t x, int64_t y)
+{
+	return x >= 0 && y >= 0 && x < (int64_t)t->stack->width && y < (int64_t)t->stack->height;
+}
+
+/* Beyond the picture the guard band tells what is there. */
+static float depth_at(const struct gaps_target *t, const struct gaps_tile *tile, int k, int32_t x, int32_t y)
+{
+	const int64_t u = (int64_t)tile->x0 + x, v = (int64_t)tile->y0 + y, i = (u >> k) + 1, j = (v >> k) + 1;
+
+	if (is_in_picture(t, u, v))
+		return gaps_row(tile, y)[x];
+	if (i < 0 || j < 0 || i >= t->stack->level[k].width || j >= t->stack->level[k].height)
+		return INFINITY;
+	return t->stack->level[k].z[(size_t)j * t->stack->level[k].width + (size_t)i];
+}
+
+static inline void least_beside(float *to, const float *from, int32_t begin, int32_t end, int reach)
+{
+	for (int32_t x = begin; x < end; x++) {
+		float least = from[x];
+
+		for (int u = 1; u <= reach; u++) {
+			const float side = from[x - u] < from[x + u] ? from[x - u] : from[x + u];
+
+			least = side < least ? side : least;
+		}
+		to[x] = least;
+	}
+}
+
+static inline void greatest_beside(float *to, const float *from, int32_t begin, int32_t end, int reach)
+{
+	for (int32_t x = begin; x < end; x++) {
+		float greatest = from[x];
+
+		for (int u = 1; u <= reach; u++) {
+			const float side = from[x - u] > from[x + u] ? from[x - u] : from[x + u];
+
+			greatest = side > greatest ? side : greatest;
+		}
+		to[x] = greatest;
+	}
+}
+
+/* The last 2 reach + 1 rows, in any order. */
+struct close_rows {
+	_Alignas(64) float row[2 * CLOSED_LEVELS + 1][GAPS_STRIDE];
+};
+
+static inline void least_of_rows(float *to, const struct close_rows *rows, int32_t begin, int32_t end, int reach)
+{
+	for (int32_t x = begin; x < end; x++) {
+		float least = rows->row[0][GAPS_LEFT + x];
+
+		for (int r = 1; r <= 2 * reach; r++) {
+			const float other = rows->row[r][GAPS_LEFT + x];
+
+			least = other < least ? other : least;
+		}
+		to[x] = least;
+	}
+}
+
+static inline void greatest_of_rows(float *to, const struct close_rows *rows, int32_t begin, int32_t end, int reach)
+{
+	for (int32_t x = begin; x < end; x++) {
+		float greatest = rows->row[0][GAPS_LEFT + x];
+
+		for (int r = 1; r <= 2 * reach; r++) {
+			const float other = rows->row[r][GAPS_LEFT + x];
+
+			greatest = other > greatest ? other : greatest;
+		}
+		to[x] = greatest;
+	}
+}
+
+/* Where nothing is known beyond the picture, nothing opens its border. */
+static void forget_beyond(float *least, const struct gaps_target *t, const struct gaps_tile *tile, int reach, int32_t y)
+{
+	for (int32_t x = -reach; x < GAPS_WIDTH + reach; x++)
+		if (!(least[x] < INFINITY) && !is_in_picture(t, (int64_t)tile->x0 + x, (int64_t)tile->y0 + y))
+			least[x] = 0;
+}
+
+/* Lowers the limits of the piece's pixels by level k, with squares of 2 reach + 1 pixels. */
+static inline __attribute__((always_inline)) void close_level(float (*limit)[GAPS_WIDTH], const struct gaps_target *t,
+                                                              const struct gaps_tile *tile, int k, int reach)
+{
+	const int32_t n_rows = 2 * reach + 1, margin = 2 * reach, height = (int32_t)tile->height;
+	const int32_t is_border = tile->x0 == 0 || tile->x0 + GAPS_WIDTH + GAPS_MARGIN > t->stack->width;
+	const float scale = t->scale[k - 1], offset = t->offset[k - 1];
+	struct close_rows lesser, greater;
+	float near[GAPS_WIDTH + 2 * SPREAD_RUN];
+	int has_near = 0;
+
+	for (int32_t y = -margin; y < height + margin; y++) {
+		_Alignas(64) float depth[GAPS_STRIDE], least[GAPS_STRIDE], greatest[GAPS_WIDTH];
+		const int32_t at = (y + margin) % n_rows, around = y - reach, own = y - 2 * reach;
+		const float *from = gaps_row(tile, y);
+
+		if (is_border || !is_in_picture(t, tile->x0, (int64_t)tile->y0 + y)) {
+			for (int32_t x = -margin; x < GAPS_WIDTH + margin; x++)
+				depth[GAPS_LEFT + x] = depth_at(t, tile, k, x, y);
+			from = depth + GAPS_LEFT;
+		}
+		least_beside(lesser.row[at] + GAPS_LEFT, from, -reach, GAPS_WIDTH + reach, reach);
+		if (around < -reach)
+			continue;
+		least_of_rows(least + GAPS_LEFT, &lesser, -reach, GAPS_WIDTH + reach, reach);
+		if (is_border || !is_in_picture(t, tile->x0, (int64_t)tile->y0 + around))
+			forget_beyond(least + GAPS_LEFT, t, tile, reach, around);
+		greatest_beside(greater.row[at] + GAPS_LEFT, least + GAPS_LEFT, 0, GAPS_WIDTH, reach);
+		if (own < 0)
+			continue;
+		if (own % (1 << k) == 0)
+			has_near = find_near(near, t, tile, k, (uint32_t)own);
+		if (!has_near)
+			continue;
+		greatest_of_rows(greatest, &greater, 0, GAPS_WIDTH, reach);
+		for (uint32_t x = 0; x < tile->width; x++) {
+			const float own_limit = psr_choose(near[x] < INFINITY, greatest[x] * scale + offset, INFINITY);
+
+			limit[own][x] = own_limit < limit[own][x] ? own_limit : limit[own][x];
+		}
+	}
+}
+
+/* Finds the depths beyond which a piece's pixels lie behind a surface. Returns 0 if nothing has gaps. */
+static int close_piece(float (*limit)[GAPS_WIDTH], const struct gaps_target *t, const struct gaps_tile *tile)
+{
+	int is_near[CLOSED_LEVELS + 1];
+
+	for (int k = 1; k <= CLOSED_LEVELS; k++)
+		is_near[k] = t->stack->levels >> k & 1 && is_near_any(t, tile, k);
+	if (!is_near[1] && !is_near[2])
+		return 0;
+	for (uint32_t y = 0; y < GAPS_BRICK; y++)
+		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+			limit[y][x] = INFINITY;
+	if (is_near[1])
+		close_level(limit, t, tile, 1, 1);
+	if (is_near[2])
+		close_level(limit, t, tile, 2, 2);
+	return 1;
+}
+
+/* Takes the weight of a row's pixels beyond their limits. Returns whether there are any. */
+static int cover_closed(int32_t *weight, const float *limit, const float *z)
+{
+	int32_t is_any = 0;
+
+	for (uint32_t x = 0; x < GAPS_WIDTH; x++) {
+		const int32_t is_gap = limit[x] < z[x];
+
+		weight[x] = is_gap ? 0 : weight[x];
+		is_any |= is_gap;
+	}
+	return is_any;
+}
