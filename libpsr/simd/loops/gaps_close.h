@@ -46,21 +46,46 @@ static int is_near_any(const struct gaps_target *t, const struct gaps_tile *tile
 	return 0;
 }
 
-static int is_in_picture(const struct gaps_target *t, int64_t x, int64_t y)
+/* Of a row of the piece with its margin, the pixels that are in the picture: begin <= x < end. */
+struct close_span {
+	int32_t begin, end;
+};
+
+static struct close_span span_of(const struct gaps_target *t, const struct gaps_tile *tile, int32_t y)
 {
-	return x >= 0 && y >= 0 && x < (int64_t)t->stack->width && y < (int64_t)t->stack->height;
+	const int64_t v = (int64_t)tile->y0 + y, left = (int64_t)tile->x0, right = (int64_t)t->stack->width - left;
+
+	if (v < 0 || v >= (int64_t)t->stack->height)
+		return (struct close_span){ 0, 0 };
+	return (struct close_span){ left < GAPS_MARGIN ? (int32_t)-left : -GAPS_MARGIN,
+		                        right < GAPS_WIDTH + GAPS_MARGIN ? (int32_t)right : GAPS_WIDTH + GAPS_MARGIN };
 }
 
 /* Beyond the picture the guard band tells what is there. */
-static float depth_at(const struct gaps_target *t, const struct gaps_tile *tile, int k, int32_t x, int32_t y)
+static float depth_beyond(const struct gaps_target *t, const struct gaps_tile *tile, int k, int32_t x, int32_t y)
 {
-	const int64_t u = (int64_t)tile->x0 + x, v = (int64_t)tile->y0 + y, i = (u >> k) + 1, j = (v >> k) + 1;
+	const int64_t i = (((int64_t)tile->x0 + x) >> k) + 1, j = (((int64_t)tile->y0 + y) >> k) + 1;
 
-	if (is_in_picture(t, u, v))
-		return gaps_row(tile, y)[x];
 	if (i < 0 || j < 0 || i >= t->stack->level[k].width || j >= t->stack->level[k].height)
 		return INFINITY;
 	return t->stack->level[k].z[(size_t)j * t->stack->level[k].width + (size_t)i];
+}
+
+/* Returns the depths of a row with its margin, in `copy` where some lie beyond the picture. */
+static const float *depths_of(const struct gaps_target *t, const struct gaps_tile *tile, int k, int32_t y,
+                              float copy[GAPS_STRIDE])
+{
+	const struct close_span in = span_of(t, tile, y);
+	const float *row = gaps_row(tile, y);
+
+	if (in.begin == -GAPS_MARGIN && in.end == GAPS_WIDTH + GAPS_MARGIN)
+		return row;
+	memcpy(copy, row - GAPS_LEFT, GAPS_STRIDE * sizeof *copy);
+	for (int32_t x = -GAPS_MARGIN; x < in.begin; x++)
+		copy[GAPS_LEFT + x] = depth_beyond(t, tile, k, x, y);
+	for (int32_t x = in.end; x < GAPS_WIDTH + GAPS_MARGIN; x++)
+		copy[GAPS_LEFT + x] = depth_beyond(t, tile, k, x, y);
+	return copy + GAPS_LEFT;
 }
 
 static inline void least_beside(float *to, const float *from, int32_t begin, int32_t end, int reach)
@@ -127,9 +152,12 @@ static inline void greatest_of_rows(float *to, const struct close_rows *rows, in
 /* Where nothing is known beyond the picture, nothing opens its border. */
 static void forget_beyond(float *least, const struct gaps_target *t, const struct gaps_tile *tile, int reach, int32_t y)
 {
-	for (int32_t x = -reach; x < GAPS_WIDTH + reach; x++)
-		if (!(least[x] < INFINITY) && !is_in_picture(t, (int64_t)tile->x0 + x, (int64_t)tile->y0 + y))
-			least[x] = 0;
+	const struct close_span in = span_of(t, tile, y);
+
+	for (int32_t x = -reach; x < in.begin; x++)
+		least[x] = least[x] < INFINITY ? least[x] : 0;
+	for (int32_t x = in.end; x < GAPS_WIDTH + reach; x++)
+		least[x] = least[x] < INFINITY ? least[x] : 0;
 }
 
 /* Lowers the limits of the piece's pixels by level k, with squares of 2 reach + 1 pixels. */
@@ -137,28 +165,20 @@ static inline __attribute__((always_inline)) void close_level(float (*limit)[GAP
                                                               const struct gaps_tile *tile, int k, int reach)
 {
 	const int32_t n_rows = 2 * reach + 1, margin = 2 * reach, height = (int32_t)tile->height;
-	const int32_t is_border = tile->x0 == 0 || tile->x0 + GAPS_WIDTH + GAPS_MARGIN > t->stack->width;
 	const float scale = t->scale[k - 1], offset = t->offset[k - 1];
 	struct close_rows lesser, greater;
 	float near[GAPS_WIDTH + 2 * SPREAD_RUN];
 	int has_near = 0;
 
 	for (int32_t y = -margin; y < height + margin; y++) {
-		_Alignas(64) float depth[GAPS_STRIDE], least[GAPS_STRIDE], greatest[GAPS_WIDTH];
+		_Alignas(64) float copy[GAPS_STRIDE], least[GAPS_STRIDE], greatest[GAPS_WIDTH];
 		const int32_t at = (y + margin) % n_rows, around = y - reach, own = y - 2 * reach;
-		const float *from = gaps_row(tile, y);
 
-		if (is_border || !is_in_picture(t, tile->x0, (int64_t)tile->y0 + y)) {
-			for (int32_t x = -margin; x < GAPS_WIDTH + margin; x++)
-				depth[GAPS_LEFT + x] = depth_at(t, tile, k, x, y);
-			from = depth + GAPS_LEFT;
-		}
-		least_beside(lesser.row[at] + GAPS_LEFT, from, -reach, GAPS_WIDTH + reach, reach);
+		least_beside(lesser.row[at] + GAPS_LEFT, depths_of(t, tile, k, y, copy), -reach, GAPS_WIDTH + reach, reach);
 		if (around < -reach)
 			continue;
 		least_of_rows(least + GAPS_LEFT, &lesser, -reach, GAPS_WIDTH + reach, reach);
-		if (is_border || !is_in_picture(t, tile->x0, (int64_t)tile->y0 + around))
-			forget_beyond(least + GAPS_LEFT, t, tile, reach, around);
+		forget_beyond(least + GAPS_LEFT, t, tile, reach, around);
 		greatest_beside(greater.row[at] + GAPS_LEFT, least + GAPS_LEFT, 0, GAPS_WIDTH, reach);
 		if (own < 0)
 			continue;
