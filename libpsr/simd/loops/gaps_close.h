@@ -1,7 +1,7 @@
 /* Finding gaps by closing depths, as morphology closes shapes: each pixel takes the least depth in a square around it,
- * then the greatest of these in a square around it. On a plane, however steep, the second step takes back what the first
- * one took, so that a surface does not cover itself. Gaps close where every square holds a sample, and an edge stays
- * where its samples are. */
+ * then the greatest of these in a square around it. On a plane, however steep, the second step takes back what the
+ * first one took, so that a surface does not cover itself. Gaps close where every square holds a sample, and an edge
+ * stays where its samples are. */
 #include "gaps_tile.h"
 
 /* Samples of level k are at most 2^k pixels apart, so that a square of 3 pixels on their surface holds one of level 1,

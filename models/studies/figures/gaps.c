@@ -10,6 +10,11 @@ static void make_opaque(struct figure_shot *shot)
 	shot->settings.gap_method = PSR_GAPS_OPAQUE;
 }
 
+static void make_bilinear(struct figure_shot *shot)
+{
+	shot->settings.gap_method = PSR_GAPS_BILINEAR;
+}
+
 int figure_gaps(struct study *study)
 {
 	static const struct figure_plan plan = {
@@ -18,7 +23,8 @@ int figure_gaps(struct study *study)
 		{
 			{ .label = "gaps are left", .draw = figure_draw_no_gaps },
 			{ .label = "opaque squares", .change = make_opaque },
-			{ .label = "bilinear coverage" },
+			{ .label = "bilinear coverage", .change = make_bilinear },
+			{ .label = "closed depths" },
 		},
 	};
 
@@ -159,10 +165,16 @@ static int draw_open(struct psr_frame *frame, struct study *study, const struct 
 	return rc;
 }
 
+static void cover_bilinearly(struct figure_shot *shot, const struct figure_model *model)
+{
+	(void)model;
+	make_bilinear(shot);
+}
+
 int figure_interfaces(struct study *study)
 {
 	static const struct figure_plan plan = {
-		"interfaces", NULL, { 1.8, 1024, 2, figure_view, .n_views = FIGURE_VIEWS }, 256,
+		"interfaces", NULL, { 1.8, 1024, 2, figure_view, .n_views = FIGURE_VIEWS, .prepare = cover_bilinearly }, 256,
 		{ { "dragon", NULL, { FIGURE_FIND, 0, 64, 64, 4 } } },
 		{ { .label = "the greatest coverage of a level", .draw = draw_open }, { .label = "both levels' cells counted" } },
 	};
