@@ -97,6 +97,7 @@ static void add_gaps(struct price_set *set)
 {
 	static const double threshold[] = { 0.75, 1.5, 6, 12 };
 
+	add(set, "gaps", "bilinear cells")->settings.gap_method = PSR_GAPS_BILINEAR;
 	add(set, "gaps", "opaque cells")->settings.gap_method = PSR_GAPS_OPAQUE;
 	for (size_t i = 0; i < sizeof threshold / sizeof threshold[0]; i++)
 		add(set, "gaps", "threshold %g", threshold[i])->settings.gap_threshold = threshold[i];
