@@ -19,7 +19,7 @@ for name in "$@"; do
 		continue
 	fi
 	echo "accuracy: $name" >&2
-	"$build/bin/psr-model" accuracy "$file" --views 8 --out "$out/$name" >"$out/$name.txt"
+	"$build/bin/psr-model" accuracy "$file" --views 8 --size 128x128 -r 256 --out "$out/$name" >"$out/$name.txt"
 	docs/put-table.sh $page "$name" "$out/$name.txt"
 	cp "$out/$name/plot.svg" "docs/accuracy/$name.svg"
 	[ "$name" != engine ] || cp "$out/$name/strip.png" docs/accuracy/engine.png

@@ -213,23 +213,23 @@ int cmd_accuracy(int argc, char **argv)
 		{ .name = "json", .type = PSR_OPT_FLAG, .value = &json,
 		  .help = "Prints all figures as a JSON object, with `verdict`: pass, fail or camera." },
 		{ .name = "What accuracy costs", .type = PSR_OPT_HEADING,
-		  .help = "Builds models of SOURCE, draws views of them with each of many settings, one after the other, and tells time"
-		          " and error of each: which settings no other beats, the best within a time, the cheapest within an error." },
+		  .help = "Builds models of SOURCE, draws views of them with each of many settings in turn, and tells time and error"
+		          " of each: which settings no other beats, the best within a time, the cheapest within an error." },
 		{ .name = "views", .type = PSR_OPT_INT, .value = &n_views, .arg = "N",
-		  .help = "Measures on so many views: the first is from around, the second close, the third grazing, the fourth from far,"
-		          " and so on.", .min = 1, .max = PRICE_MOST_VIEWS, .seen = &seen_views },
+		  .help = "Measures on so many views: the first is from around, the second close, the third grazing, the fourth from"
+		          " far, and so on.", .min = 1, .max = PRICE_MOST_VIEWS, .seen = &seen_views },
 		{ .name = "out", .type = PSR_OPT_STRING, .value = &price.out, .arg = "DIR",
-		  .help = "Writes index.html, which holds all of it, plot.svg, plot.png, strip.png, prices.csv and prices.json into this"
-		          " folder.", .seen = &seen_views },
-		{ .name = "size", .type = PSR_OPT_SIZE, .value = price.size, .arg = "WxH", .help = "Pixels of a view.", .min = 32,
-		  .max = 4096, .seen = &seen_views },
+		  .help = "Writes index.html, which holds all of it, plot.svg, plot.png, strip.png, prices.csv and prices.json into"
+		          " this folder.", .seen = &seen_views },
+		{ .name = "size", .type = PSR_OPT_SIZE, .value = price.size, .arg = "WxH", .help = "Pixels of a view.",
+		  .min = 32, .max = 4096, .seen = &seen_views },
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
-		  .help = "Of the usual model; others have a quarter, half and twice of it.", .min = 16, .max = 4096,
+		  .help = "Of the usual model; others have a quarter, half and twice of it.", .min = 32, .max = 4096,
 		  .seen = &seen_views },
 		{ .name = "rounds", .type = PSR_OPT_INT, .value = &n_rounds, .arg = "N",
 		  .help = "Frames of each setting and view that are timed.", .min = 1, .max = 1000, .seen = &seen_views },
-		{ .name = "seed", .type = PSR_OPT_INT, .value = &seed, .arg = "N", .help = "Other seeds give other views.", .min = 0,
-		  .max = 1e15, .seen = &seen_views },
+		{ .name = "seed", .type = PSR_OPT_INT, .value = &seed, .arg = "N", .help = "Other seeds give other views.",
+		  .min = 0, .max = 1e15, .seen = &seen_views },
 		{ .name = "For developers: shadows", .type = PSR_OPT_HEADING },
 		{ .name = "shadow", .type = PSR_OPT_STRING, .value = &shadow.shadowed, .arg = "FRAME.ppm",
 		  .help = "Compares shadows as well: a frame drawn with --ambient 0 and one light, which casts them." },

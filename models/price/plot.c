@@ -9,8 +9,9 @@ static const struct {
 	const char *knob, *title;
 	const char *color;
 } groups[] = {
-	{ "spacing", "spacing", "#0072b2" }, { "smoothing", "smoothing", "#e69f00" }, { "passes", "passes", "#d55e00" },
-	{ "resolution", "resolution of the model", "#009e73" }, { "gaps", "gaps", "#cc79a7" }, { "shadows", "shadows", "#56b4e9" },
+	{ "spacing", "spacing", "#0072b2" },       { "smoothing", "smoothing", "#e69f00" },
+	{ "passes", "passes", "#d55e00" },         { "resolution", "resolution of the model", "#009e73" },
+	{ "gaps", "gaps", "#cc79a7" },             { "shadows", "shadows", "#56b4e9" },
 };
 #define LABEL_LOG 0.05 /* a name needs so much room above the next */
 #define N_GROUPS (sizeof groups / sizeof groups[0])
@@ -60,15 +61,18 @@ static void write_plot(FILE *to, const struct price *price, const char *terminal
 
 int price_write_plots(struct price *price, struct psr_error *err)
 {
+	char title[256];
 	struct psr_error why;
 	FILE *to;
 	int code = gnuplot_open(&to, &why);
 
 	price->has_plot = 0;
 	if (code == PSR_OK) {
-		fputs("set logscale xy\nset ytics add (2, 3, 5, 20, 30, 50)\nset grid xtics ytics\nset key below horizontal\nset xlabel 'milliseconds a frame'\n"
+		fputs("set logscale xy\nset ytics add (2, 3, 5, 20, 30, 50)\nset grid xtics ytics\nset key below horizontal\n"
+		      "set xlabel 'milliseconds a frame'\n"
 		      "set ylabel 'error, codes of sRGB (root mean square)'\nset title ", to);
-		gnuplot_quote(to, price->title);
+		snprintf(title, sizeof title, "What accuracy costs: %s", price->title);
+		gnuplot_quote(to, title);
 		fputs(" noenhanced\n", to);
 		write_points(to, price);
 		write_plot(to, price, "svg size 900,560 background 'white' font 'sans,12'", "plot.svg");

@@ -11,7 +11,7 @@
 #define RAYS 8           /* a side of a pixel, for the truth */
 #define MOST_SECONDS 0.3 /* that a slow setting may take in a view; then it sits out later rounds */
 
-static void tell(const char *what, uint32_t done, uint32_t total)
+void price_tell(const char *what, uint32_t done, uint32_t total)
 {
 	const int is_terminal = isatty(STDERR_FILENO);
 
@@ -42,11 +42,11 @@ static int measure(struct price *price, const struct ladder_look *look, struct p
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %u views", n_views);
 	rc = ladder_views_make(price->view, n_views, look, err);
 	for (uint32_t v = 0; rc == PSR_OK && v < n_views; v++) {
-		tell("rays through the source, view", v + 1, n_views);
+		price_tell("rays through the source, view", v + 1, n_views);
 		rc = ladder_view_trace(&price->view[v], look, RAYS, err);
 	}
 	for (uint32_t v = 0; rc == PSR_OK && v < n_views; v++) {
-		tell("frames, view", v + 1, n_views);
+		price_tell("frames, view", v + 1, n_views);
 		rc = ladder_measure(&price->row[(size_t)v * price->set.n], price->ladder, &price->view[v], price->set.rung,
 		                    price->set.n, err);
 	}

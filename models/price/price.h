@@ -10,7 +10,7 @@ struct price_options {
 	const char *source, *out; /* out: a folder, made if it is missing; NULL: tables on standard output alone */
 	uint32_t n_views;         /* 1..PRICE_MOST_VIEWS */
 	uint32_t size[2];         /* pixels, 32..4096 */
-	uint32_t resolution;      /* of the usual model, 16..4096 */
+	uint32_t resolution;      /* of the usual model, 32..4096 */
 	uint32_t n_rounds;
 	uint64_t seed;
 };
@@ -38,6 +38,9 @@ struct price_set {
 	struct psr_model *model[PRICE_MOST_MODELS]; /* the first one is the usual one */
 	struct ladder_coder coder[PRICE_MOST_CODERS];
 };
+
+/* Tells people on standard error how far it is. */
+void price_tell(const char *what, uint32_t done, uint32_t total);
 
 /* Builds the models, and lists the settings. Call price_set_fini() in any case. Errors as of psr_model_build(). */
 int price_set_make(struct price_set *set, const struct psr_mesh *mesh, const struct price_options *options,

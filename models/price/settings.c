@@ -4,6 +4,8 @@
 #include "price.h"
 #include "simd/simd.h"
 
+#define N_BUILT 4 /* models: the usual one, and of a quarter, half and twice its resolution */
+
 /* A rung like the usual one, to change. */
 __attribute__((format(printf, 3, 4))) static struct ladder_rung *add(struct price_set *set, const char *knob,
                                                                      const char *format, ...)
@@ -63,6 +65,7 @@ static int build(struct price_set *set, const struct psr_mesh *mesh, uint32_t re
 	struct psr_build_options options;
 	int rc;
 
+	price_tell("models", set->n_models + 1, N_BUILT);
 	psr_build_options_default(&options);
 	options.resolution = resolution;
 	rc = psr_model_build(&set->model[set->n_models], mesh, &options, NULL, err);
@@ -72,12 +75,10 @@ static int build(struct price_set *set, const struct psr_mesh *mesh, uint32_t re
 
 static int add_resolutions(struct price_set *set, const struct psr_mesh *mesh, uint32_t usual, struct psr_error *err)
 {
-	const uint32_t resolution[] = { usual / 4, usual / 2, 2 * usual };
+	const uint32_t resolution[N_BUILT - 1] = { usual / 4, usual / 2, 2 * usual };
 	int rc = PSR_OK;
 
-	for (int i = 0; i < 3 && rc == PSR_OK; i++) {
-		if (resolution[i] < 8)
-			continue;
+	for (int i = 0; i < N_BUILT - 1 && rc == PSR_OK; i++) {
 		rc = build(set, mesh, resolution[i], err);
 		if (rc != PSR_OK)
 			break;

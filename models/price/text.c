@@ -51,7 +51,8 @@ void price_print(FILE *to, const struct price *price)
 	fprintf(to, "%u views of %ux%u pixels, a model of %u; one light, one thread, %u rounds\n", options->n_views,
 	        options->size[0], options->size[1], options->resolution, options->n_rounds);
 	fputs("ms: mean over the views of the median frame; ratio: to usual, with quartiles; dB: to the truth\n"
-	      "*: no other choice is as fast and as good; =: the usual picture, byte by byte\n\n", to);
+	      "*: no other choice is as fast and as good; =: the usual picture, byte by byte\n"
+	      "normals and depths of fewer bits are made in memory: files have one width of each\n\n", to);
 	fprintf(to, "   %-22s %9s %6s %-14s%7s", "setting", "ms", "ratio", "  quartiles", "dB");
 	for (int k = 0; k < LADDER_N_KINDS; k++)
 		fprintf(to, "%7.7s", ladder_kind_name((enum ladder_kind)k));

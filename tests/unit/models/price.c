@@ -255,7 +255,8 @@ static void jpeg_loses_less_with_quality_and_with_full_chroma(void **state)
 		rgb[3 * i + 1] = (uint8_t)(i % 40 * 6);
 		rgb[3 * i + 2] = i % 2 == 0 ? 30 : 180;
 	}
-	const double low = loss_of(50, 2, rgb, &n_low), high = loss_of(95, 2, rgb, &n_high), full = loss_of(95, 1, rgb, &n_full);
+	const double low = loss_of(50, 2, rgb, &n_low), high = loss_of(95, 2, rgb, &n_high);
+	const double full = loss_of(95, 1, rgb, &n_full);
 
 	assert_true(low > high && high > full && full > 0);
 	assert_true(n_low < n_high && n_high < n_full);
