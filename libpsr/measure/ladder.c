@@ -124,8 +124,9 @@ static int draw(struct drawn *drawn, const struct call *call, const struct ladde
 	uint64_t start = clock_of(pool);
 	if (rc == PSR_OK)
 		rc = render(call, rung, &scene, renderer, pool, &frame);
-	if (rc == PSR_OK && frame.report.n_shadow_maps_drawn > 0) { /* once more: now they stand */
-		drawn->shadow_ns = frame.report.ns[PSR_STAGE_SHADOW];
+	if (rc == PSR_OK && (frame.report.n_shadow_maps_drawn > 0 || rung->no_shadows)) {
+		/* Once more: now the maps stand, or those of other rungs are gone. */
+		drawn->shadow_ns = frame.report.n_shadow_maps_drawn > 0 ? frame.report.ns[PSR_STAGE_SHADOW] : 0;
 		start = clock_of(pool);
 		rc = render(call, rung, &scene, renderer, pool, &frame);
 	}

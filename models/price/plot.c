@@ -13,12 +13,27 @@ static const struct {
 	{ "passes", "passes", "#d55e00" },         { "resolution", "resolution of the model", "#009e73" },
 	{ "gaps", "gaps", "#cc79a7" },             { "shadows", "shadows", "#56b4e9" },
 };
-#define LABEL_LOG 0.05 /* a name needs so much room above the next */
+#define LABEL_LOG 0.1 /* a name needs so much room above the next */
 #define N_GROUPS (sizeof groups / sizeof groups[0])
 
 static int is_in(const struct price *price, uint32_t setting, size_t group)
 {
 	return strcmp(price->set.setting[setting].knob, groups[group].knob) == 0;
+}
+
+/* Room around all choices, and for names on the right. */
+static void write_ranges(FILE *to, const struct price *price)
+{
+	struct ladder_point least = { INFINITY, INFINITY }, most = { 0, 0 };
+
+	for (uint32_t i = 0; i < price->n_choices; i++) {
+		const struct ladder_point *point = &price->point[price->choice[i]];
+
+		least = (struct ladder_point){ fmin(least.ms, point->ms), fmin(least.rmse, point->rmse) };
+		most = (struct ladder_point){ fmax(most.ms, point->ms), fmax(most.rmse, point->rmse) };
+	}
+	fprintf(to, "set xrange [%.6g:%.6g]\nset yrange [%.6g:%.6g]\n", least.ms / 1.3, most.ms * 2.5,
+	        fmax(least.rmse, 0.01) / 1.2, fmax(most.rmse, 0.01) * 1.2);
 }
 
 static void write_points(FILE *to, const struct price *price)
@@ -74,6 +89,7 @@ int price_write_plots(struct price *price, struct psr_error *err)
 		snprintf(title, sizeof title, "What accuracy costs: %s", price->title);
 		gnuplot_quote(to, title);
 		fputs(" noenhanced\n", to);
+		write_ranges(to, price);
 		write_points(to, price);
 		write_plot(to, price, "svg size 900,560 background 'white' font 'sans,12'", "plot.svg");
 		write_plot(to, price, "png size 900,560 font 'sans,10'", "plot.png");
