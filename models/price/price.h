@@ -49,13 +49,14 @@ void price_set_fini(struct price_set *set);
 
 /* ---- bits.c: models of coarser words, made in memory: files have none ---- */
 
-/* Copies a model with normals of so many of 15 bits, odd, or depths of so many of 16. The caller owns it. */
+/* Copy a model with normals of n_bits of 15, odd, or depths of n_bits of 16. The caller owns it. Errors as of
+ * psr_model_create(). */
 int price_normal_bits(struct psr_model **out, const struct psr_model *model, unsigned n_bits, struct psr_error *err);
 int price_depth_bits(struct psr_model **out, const struct psr_model *model, unsigned n_bits, struct psr_error *err);
 
 /* ---- jpeg.c ---- */
 
-/* A coder as psrd's, but of the whole picture as one file. chroma: 1 full, 2 half of the width and height. IO. */
+/* A coder as psrd's, but of the whole picture as one file. chroma: 1 full, 2 half of the width and height. MEMORY. */
 int price_jpeg_open(struct ladder_coder *coder, int quality, int chroma, struct psr_error *err);
 void price_jpeg_close(struct ladder_coder *coder); /* a zeroed one is fine */
 
@@ -110,7 +111,7 @@ void price_print(FILE *to, const struct price *price);                   /* text
 void price_print_db(FILE *to, double rmse);                              /* seven letters */
 int price_write_csv(const struct price *price, struct psr_error *err);   /* record.c: a line a view and setting */
 int price_write_json(const struct price *price, struct psr_error *err);
-int price_write_plots(struct price *price, struct psr_error *err);       /* plot.c: plot.svg, plot.png, or no_plot */
+int price_write_plots(struct price *price, struct psr_error *err);       /* plot.c; without gnuplot has_plot is 0 */
 
 /* pictures.c: a row for the first view of each kind, a column for the fastest unbeaten choice, the usual setting, some
  * between, and the best. */
