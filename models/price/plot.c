@@ -66,7 +66,7 @@ static void write_plot(FILE *to, const struct price *price, const char *terminal
 	snprintf(path, sizeof path, "%s/%s", price->options->out, name);
 	fprintf(to, "set terminal %s\nset output ", terminal);
 	gnuplot_quote(to, path);
-	fputs("\nplot $unbeaten using 1:2 with fsteps lw 2 lc rgb '#888888' title 'no choice beats these'", to);
+	fputs("\nplot $unbeaten using 1:2 with steps lw 2 lc rgb '#888888' title 'no choice beats these'", to);
 	for (size_t g = 0; g < N_GROUPS; g++)
 		fprintf(to, ", $group%zu using 1:2 with points pt 7 ps 0.8 lc rgb '%s' title '%s'", g, groups[g].color,
 		        groups[g].title);
