@@ -10,7 +10,7 @@ page=docs/accuracy.md
 
 mkdir -p "$out" docs/accuracy
 declare -A source=([bunny]=$fetched/bunny.obj [engine]=$fetched/engine.glb [clearcoat]=$fetched/clearcoat/ClearCoatTest.gltf)
-[ $# -gt 0 ] || set -- bunny engine clearcoat table pinetree
+[ $# -gt 0 ] || set -- bunny engine clearcoat table
 for name in "$@"; do
 	file=${source[$name]:-$out/$name.glb}
 	[ -n "${source[$name]:-}" ] || [ -s "$file" ] || "$build/bin/psr-model" make "$name" -o "$file" >/dev/null
@@ -19,7 +19,7 @@ for name in "$@"; do
 		continue
 	fi
 	echo "accuracy: $name" >&2
-	"$build/bin/psr-model" accuracy "$file" --views 8 --size 128x128 -r 256 --out "$out/$name" >"$out/$name.txt"
+	"$build/bin/psr-model" accuracy "$file" --views 8 --size 128x128 -r 256 --out "$out/$name" >"$out/$name.txt" || [ $? -eq 7 ] # a byte changed: told above, and all is written
 	docs/put-table.sh $page "$name" "$out/$name.txt"
 	cp "$out/$name/plot.svg" "docs/accuracy/$name.svg"
 	[ "$name" != engine ] || cp "$out/$name/strip.png" docs/accuracy/engine.png
