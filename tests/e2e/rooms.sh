@@ -9,6 +9,7 @@ libpsr/include
 libpsr/base
 libpsr/compare
 libpsr/model
+libpsr/octree
 libpsr/simd
 libpsr/render
 libpsr/import/import.h

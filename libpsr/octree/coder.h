@@ -1,0 +1,136 @@
+/* An adaptive binary arithmetic coder: integers alone, the same bytes on every machine. One function codes a bit in both
+ * directions, so a model is written once. Probabilities have 16 bits: of a 1. */
+#ifndef PSR_OCTREE_CODER_H
+#define PSR_OCTREE_CODER_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+
+struct coder {
+	uint8_t *bytes;       /* coding: of malloc(), which the caller frees; decoding: the caller's, only read */
+	size_t n, room;       /* bytes written or read; room, or all bytes that there are to read */
+	uint64_t low;
+	uint32_t range, code;
+	uint64_t held;        /* bytes that a carry may still change: the first, then 255s */
+	uint8_t first;
+	int has_failed;       /* coding: no memory; decoding: read behind the end */
+};
+
+static inline void coder_begin(struct coder *c)
+{
+	*c = (struct coder){ .range = UINT32_MAX };
+}
+
+static inline void coder_put_byte(struct coder *c, uint8_t byte)
+{
+	if (c->n == c->room) {
+		const size_t room = c->room + c->room / 2 + 4096;
+		uint8_t *grown = c->has_failed ? NULL : realloc(c->bytes, room);
+
+		if (grown == NULL) {
+			c->has_failed = 1;
+			return;
+		}
+		c->bytes = grown;
+		c->room = room;
+	}
+	c->bytes[c->n++] = byte;
+}
+
+static inline void coder_shift(struct coder *c)
+{
+	if (c->low < 0xff000000u || c->low >> 32 != 0) {
+		const uint8_t carry = (uint8_t)(c->low >> 32);
+
+		if (c->held > 0)
+			coder_put_byte(c, (uint8_t)(c->first + carry));
+		for (; c->held > 1; c->held--)
+			coder_put_byte(c, (uint8_t)(0xff + carry));
+		c->first = (uint8_t)(c->low >> 24);
+		c->held = 0;
+	}
+	c->held++;
+	c->low = (c->low & 0x00ffffff) << 8;
+}
+
+static inline void coder_end(struct coder *c)
+{
+	for (int i = 0; i < 5; i++)
+		coder_shift(c);
+}
+
+static inline uint8_t coder_get_byte(struct coder *c)
+{
+	if (c->n < c->room)
+		return c->bytes[c->n++];
+	c->has_failed = 1;
+	return 0;
+}
+
+static inline void coder_open(struct coder *c, const uint8_t *bytes, size_t n)
+{
+	*c = (struct coder){ .bytes = (uint8_t *)(uintptr_t)bytes, .room = n, .range = UINT32_MAX };
+	for (int i = 0; i < 4; i++)
+		c->code = c->code << 8 | coder_get_byte(c);
+}
+
+/* Returns whether the stream ended where it should. */
+static inline int coder_is_at_end(const struct coder *c)
+{
+	return !c->has_failed && c->n == c->room;
+}
+
+/* Codes a bit whose probability to be 1 is p / 65536, 1..65535. Decoding ignores `bit`. Returns the bit. is_decoding is
+ * a constant of the caller. */
+static inline __attribute__((always_inline)) unsigned coder_bit(struct coder *c, int is_decoding, uint32_t p,
+                                                                unsigned bit)
+{
+	const uint32_t bound = (uint32_t)((uint64_t)c->range * p >> 16);
+
+	if (is_decoding)
+		bit = c->code < bound;
+	if (bit) {
+		c->range = bound;
+	} else {
+		if (is_decoding)
+			c->code -= bound;
+		else
+			c->low += bound;
+		c->range -= bound;
+	}
+	while (c->range < 1u << 24) {
+		c->range <<= 8;
+		if (is_decoding)
+			c->code = c->code << 8 | coder_get_byte(c);
+		else
+			coder_shift(c);
+	}
+	return bit;
+}
+
+/* A probability that learns: the mean of its first bits, later of the last 2^limit or so. The low bits count. */
+#define CODER_COUNTS 63
+static inline __attribute__((always_inline)) uint32_t coder_learn(uint16_t *p, unsigned rate, unsigned bit)
+{
+	const uint32_t old = *p;
+
+	*p = (uint16_t)(bit ? old + ((65535 - old) >> rate) : old - (old >> rate));
+	return old;
+}
+
+static inline __attribute__((always_inline)) uint32_t coder_clamp(uint32_t p)
+{
+	return p < 32 ? 32 : p > 65504 ? 65504 : p;
+}
+
+/* Codes a bit by a probability of this rate, which learns from it. */
+static inline __attribute__((always_inline)) unsigned coder_adaptive(struct coder *c, int is_decoding, uint16_t *p,
+                                                                     unsigned rate, unsigned bit)
+{
+	bit = coder_bit(c, is_decoding, coder_clamp(*p), bit);
+	coder_learn(p, rate, bit);
+	return bit;
+}
+
+#endif

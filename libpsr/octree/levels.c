@@ -1,0 +1,138 @@
+#include <stdlib.h>
+#include "levels.h"
+
+/* The bits of c below bit j, counted; rows of 256 by the preprocessor. */
+#define BIT(c, b) ((c) >> (b) & 1)
+#define COUNT(c) (BIT(c, 0) + BIT(c, 1) + BIT(c, 2) + BIT(c, 3) + BIT(c, 4) + BIT(c, 5) + BIT(c, 6) + BIT(c, 7))
+#define RANK(j, c) COUNT((c) & ((1 << (j)) - 1))
+#define RANK4(j, c) RANK(j, c), RANK(j, (c) + 1), RANK(j, (c) + 2), RANK(j, (c) + 3)
+#define RANK16(j, c) RANK4(j, c), RANK4(j, (c) + 4), RANK4(j, (c) + 8), RANK4(j, (c) + 12)
+#define RANK64(j, c) RANK16(j, c), RANK16(j, (c) + 16), RANK16(j, (c) + 32), RANK16(j, (c) + 48)
+#define RANK256(j) { RANK64(j, 0), RANK64(j, 64), RANK64(j, 128), RANK64(j, 192) }
+
+const uint8_t octree_rank[8][256] = { RANK256(0), RANK256(1), RANK256(2), RANK256(3),
+	                                  RANK256(4), RANK256(5), RANK256(6), RANK256(7) };
+
+void octree_levels_fini(struct octree_levels *levels)
+{
+	for (int l = 0; l < OCTREE_MOST_LEVELS; l++) {
+		free(levels->at[l].code);
+		free(levels->at[l].first);
+		levels->at[l] = (struct octree_level){ 0 };
+	}
+}
+
+int octree_level_put(struct octree_level *level, uint8_t code)
+{
+	const uint32_t n = level->n;
+
+	if (n == level->room) {
+		const uint32_t room = n + n / 2 + 64;
+		uint8_t *codes = realloc(level->code, room);
+		uint32_t *first;
+
+		if (codes == NULL)
+			return 0;
+		level->code = codes;
+		first = realloc(level->first, (size_t)room * sizeof *first);
+		if (first == NULL)
+			return 0;
+		level->first = first;
+		level->room = room;
+	}
+	level->first[n] = n == 0 ? 0 : level->first[n - 1] + octree_count(level->code[n - 1]);
+	level->code[n] = code;
+	level->n = n + 1;
+	return 1;
+}
+
+/* ---- walking with neighbours ---- */
+
+struct walk {
+	const struct octree_levels *levels;
+	int level;
+	void (*visit)(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata);
+	void *userdata;
+	/* Of the neighbours of an octant: which of the parent's neighbours holds each, as which octant. */
+	uint8_t from[8][OCTREE_NEAR], octant[8][OCTREE_NEAR];
+};
+
+static void find_families(struct walk *walk)
+{
+	for (int j = 0; j < 8; j++)
+		for (int k = 0; k < OCTREE_NEAR; k++) {
+			const int place[3] = { (j & 1) + k % 3 + 1, (j >> 1 & 1) + k / 3 % 3 + 1, (j >> 2) + k / 9 + 1 };
+
+			walk->from[j][k] = (uint8_t)(place[0] / 2 + 3 * (place[1] / 2) + 9 * (place[2] / 2));
+			walk->octant[j][k] = (uint8_t)((place[0] & 1) | (place[1] & 1) << 1 | (place[2] & 1) << 2);
+		}
+}
+
+static void descend(const struct walk *walk, int depth, uint32_t node, uint64_t path, const struct octree_near *near)
+{
+	const struct octree_level *level = &walk->levels->at[depth];
+	uint32_t child, first[OCTREE_NEAR];
+	uint8_t code[OCTREE_NEAR];
+
+	if (depth == walk->level) {
+		walk->visit(node, path, near, walk->userdata);
+		return;
+	}
+	for (int k = 0; k < OCTREE_NEAR; k++) {
+		const uint32_t at = near->at[k];
+
+		code[k] = at != OCTREE_NONE ? level->code[at] : 0;
+		first[k] = at != OCTREE_NONE ? level->first[at] : 0;
+	}
+	child = first[OCTREE_SELF];
+	for (unsigned j = 0; j < 8; j++) {
+		struct octree_near around;
+
+		if (!(code[OCTREE_SELF] >> j & 1))
+			continue;
+		for (int k = 0; k < OCTREE_NEAR; k++) {
+			const unsigned from = walk->from[j][k], octant = walk->octant[j][k];
+
+			around.at[k] = code[from] >> octant & 1 ? first[from] + octree_rank[octant][code[from]] : OCTREE_NONE;
+		}
+		descend(walk, depth + 1, child++, path << 3 | j, &around);
+	}
+}
+
+static uint32_t find_root(const struct octree_levels *levels, uint64_t path)
+{
+	uint32_t low = 0, high = levels->n_roots;
+
+	while (low < high) {
+		const uint32_t middle = low + (high - low) / 2;
+
+		if (levels->root[middle] < path)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low < levels->n_roots && levels->root[low] == path ? low : OCTREE_NONE;
+}
+
+void octree_levels_walk(const struct octree_levels *levels, int level,
+                        void (*visit)(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata),
+                        void *userdata)
+{
+	struct walk walk = { .levels = levels, .level = level, .visit = visit, .userdata = userdata };
+
+	find_families(&walk);
+	for (uint32_t i = 0; i < levels->n_roots; i++) {
+		struct octree_near near;
+		uint32_t at[3];
+
+		octree_place(levels->root[i], at);
+		for (uint32_t k = 0; k < OCTREE_NEAR; k++) {
+			/* One below 0 wraps to what no root has. */
+			const uint32_t place[3] = { at[0] + k % 3 - 1, at[1] + k / 3 % 3 - 1, at[2] + k / 9 - 1 };
+			const int is_inside = (place[0] | place[1] | place[2]) >> 21 == 0;
+
+			near.at[k] = is_inside ? find_root(levels, octree_path(place)) : OCTREE_NONE;
+		}
+		descend(&walk, 0, i, levels->root[i], &near);
+	}
+}

@@ -1,0 +1,119 @@
+/* Octrees of byte codes ([B] 2): a cube, split `levels` times into octants, and which of its smallest cells, the leaves,
+ * hold points. A byte code is a node: bit j says that octant j is not empty; j is x + 2y + 4z, where x is 1 for the
+ * upper half. So no code is 0. A path names a node: the octants from the root, three bits each, the last one lowest.
+ * Paths of one depth, sorted, are in Morton order. */
+#ifndef PSR_OCTREE_OCTREE_H
+#define PSR_OCTREE_OCTREE_H
+
+#include <stdint.h>
+#include "psr/error.h"
+
+#define OCTREE_LEAST_LEVELS 2
+#define OCTREE_MOST_LEVELS 20
+#define OCTREE_SKIP_LEVELS 6 /* from a node of the skip index to its leaves: some 4,000 leaves of a surface */
+#define OCTREE_OFFSETS 4     /* steps of a leaf's offset */
+
+/* Where the subtree of a node OCTREE_SKIP_LEVELS above the leaves begins; the root's in a tree of fewer levels. */
+struct octree_skip {
+	uint64_t path, code, leaf; /* of the node; of its code; of its first leaf */
+};
+
+struct octree {
+	int levels;
+	double low[3], edge;       /* the cube, in units of the source: its low corner, its edge */
+	uint64_t n_codes, n_leaves, n_skips;
+	uint8_t *code;             /* depth first: a node's code, then its children with all that is below them. So the
+	                            * code of a cell of 4x4x4 leaves stands right before its children's. */
+	struct octree_skip *skip;  /* in Morton order */
+	uint16_t *normal;          /* of each leaf in Morton order: base/direction.h; NULL: none */
+	uint8_t (*color)[3];       /* sRGB; NULL: none */
+	uint8_t *offset;           /* [B] 5.1: 0..OCTREE_OFFSETS - 1, octree_offset(); NULL: none */
+};
+
+void octree_destroy(struct octree *tree); /* NULL is fine */
+
+/* ---- making one from leaves in Morton order ---- */
+
+struct octree_maker {
+	struct octree *tree;
+	uint64_t codes_room, skips_room, last; /* last: the path of the newest leaf */
+	uint64_t at[OCTREE_MOST_LEVELS];       /* the newest code of each depth */
+};
+
+/* Begins a tree without attributes. ARG: levels out of range; MEMORY. */
+int octree_maker_init(struct octree_maker *maker, int levels, struct psr_error *err);
+void octree_maker_fini(struct octree_maker *maker); /* destroys the tree unless octree_maker_take() took it */
+
+/* Adds a leaf. ARG: its path is not above the last one's, or longer than the tree is deep; MEMORY. */
+int octree_maker_put(struct octree_maker *maker, uint64_t path, struct psr_error *err);
+
+/* Returns the tree, of the cube from 0 to 1, to the caller. NULL if there is no leaf. */
+struct octree *octree_maker_take(struct octree_maker *maker);
+
+/* ---- reading ---- */
+
+struct octree_node {
+	uint64_t path, code, leaf; /* code: its place, undefined for a leaf; leaf: the first one below, or itself */
+};
+
+/* Visits the nodes of a depth, 0 (the root) to `levels` (the leaves), in Morton order. A visitor that returns something
+ * else than 0 ends the walk, which returns it. */
+int octree_walk(const struct octree *tree, int depth, int (*visit)(const struct octree_node *node, void *userdata),
+                void *userdata);
+
+/* Returns which leaves of a node of depth levels - 2 there are: bit 8 i + j stands for octant j of its octant i. code:
+ * the place of its code. */
+uint64_t octree_mask(const struct octree *tree, uint64_t code);
+
+/* Computes the middle of a node of this depth, in units of the source. */
+void octree_center(const struct octree *tree, uint64_t path, int depth, double center[3]);
+
+/* Returns how far along its normal a leaf's point is from the leaf's middle, in edges of a leaf: the middles of
+ * OCTREE_OFFSETS equal parts of -sqrt(3)/2..sqrt(3)/2. */
+double octree_offset(unsigned step);
+/* Returns the nearest step. */
+unsigned octree_offset_step(double offset);
+
+/* Checks codes and skip index, whatever bytes they are, against each other and the counts. FORMAT. */
+int octree_check(const struct octree *tree, struct psr_error *err);
+
+/* Computes normals and colours of the nodes of a depth, in Morton order, each the mean of its leaves', colours in the
+ * codes' scale. Arrays of as many elements as octree_walk() visits; NULL: not wanted, and else the tree has them. */
+void octree_average(const struct octree *tree, int depth, uint16_t *normal, uint8_t (*color)[3]);
+
+/* ---- paths ---- */
+
+/* Spreads 21 bits to every third one. */
+static inline uint64_t octree_spread(uint32_t x)
+{
+	uint64_t v = x & 0x1fffff;
+
+	v = (v | v << 32) & 0x001f00000000ffffu;
+	v = (v | v << 16) & 0x001f0000ff0000ffu;
+	v = (v | v << 8) & 0x100f00f00f00f00fu;
+	v = (v | v << 4) & 0x10c30c30c30c30c3u;
+	return (v | v << 2) & 0x1249249249249249u;
+}
+
+static inline uint32_t octree_gather(uint64_t v)
+{
+	v &= 0x1249249249249249u;
+	v = (v | v >> 2) & 0x10c30c30c30c30c3u;
+	v = (v | v >> 4) & 0x100f00f00f00f00fu;
+	v = (v | v >> 8) & 0x001f0000ff0000ffu;
+	v = (v | v >> 16) & 0x001f00000000ffffu;
+	return (uint32_t)((v | v >> 32) & 0x1fffff);
+}
+
+static inline uint64_t octree_path(const uint32_t at[3])
+{
+	return octree_spread(at[0]) | octree_spread(at[1]) << 1 | octree_spread(at[2]) << 2;
+}
+
+static inline void octree_place(uint64_t path, uint32_t at[3])
+{
+	for (int c = 0; c < 3; c++)
+		at[c] = octree_gather(path >> c);
+}
+
+#endif

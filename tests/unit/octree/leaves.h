@@ -1,0 +1,77 @@
+/* Leaves of surfaces and of dust, for tests of octrees. */
+#ifndef TESTS_UNIT_OCTREE_LEAVES_H
+#define TESTS_UNIT_OCTREE_LEAVES_H
+
+#include <stdlib.h>
+#include "base/random.h"
+#include "octree/octree.h"
+
+struct leaves {
+	uint64_t *path; /* in Morton order, each once */
+	size_t n;
+};
+
+static inline int leaves_compare(const void *a, const void *b)
+{
+	const uint64_t x = *(const uint64_t *)a, y = *(const uint64_t *)b;
+
+	return x < y ? -1 : x > y;
+}
+
+static inline void leaves_sort(struct leaves *leaves)
+{
+	size_t n = 0;
+
+	qsort(leaves->path, leaves->n, sizeof *leaves->path, leaves_compare);
+	for (size_t i = 0; i < leaves->n; i++)
+		if (n == 0 || leaves->path[i] != leaves->path[n - 1])
+			leaves->path[n++] = leaves->path[i];
+	leaves->n = n;
+}
+
+/* All leaves of a cube of this many levels whose middles are within half a diagonal of a sphere. */
+static inline struct leaves leaves_of_sphere(int levels)
+{
+	const uint32_t side = 1u << levels;
+	const double radius = 0.4 * side;
+	struct leaves leaves = { malloc(((size_t)16 * side * side + 64) * sizeof *leaves.path), 0 };
+
+	for (uint32_t x = 0; x < side && leaves.path != NULL; x++)
+		for (uint32_t y = 0; y < side; y++)
+			for (uint32_t z = 0; z < side; z++) {
+				const double dx = x + 0.5 - side * 0.5, dy = y + 0.5 - side * 0.5, dz = z + 0.5 - side * 0.5;
+				const double squared = dx * dx + dy * dy + dz * dz;
+
+				if (squared > (radius - 0.7) * (radius - 0.7) && squared < (radius + 0.7) * (radius + 0.7))
+					leaves.path[leaves.n++] = octree_path((const uint32_t[3]){ x, y, z });
+			}
+	leaves_sort(&leaves);
+	return leaves;
+}
+
+static inline struct leaves leaves_at_random(int levels, size_t n)
+{
+	struct leaves leaves = { malloc(n * sizeof *leaves.path), n };
+	uint64_t random = 1;
+
+	for (size_t i = 0; i < n && leaves.path != NULL; i++)
+		leaves.path[i] = random_next(&random) >> (64 - 3 * levels);
+	leaves_sort(&leaves);
+	return leaves;
+}
+
+static inline struct octree *leaves_to_tree(const struct leaves *leaves, int levels)
+{
+	struct octree_maker maker;
+	struct octree *tree = NULL;
+	int rc = octree_maker_init(&maker, levels, NULL);
+
+	for (size_t i = 0; i < leaves->n && rc == PSR_OK; i++)
+		rc = octree_maker_put(&maker, leaves->path[i], NULL);
+	if (rc == PSR_OK)
+		tree = octree_maker_take(&maker);
+	octree_maker_fini(&maker);
+	return tree;
+}
+
+#endif
