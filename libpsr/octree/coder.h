@@ -109,27 +109,14 @@ static inline __attribute__((always_inline)) unsigned coder_bit(struct coder *c,
 	return bit;
 }
 
-/* A probability that learns: the mean of its first bits, later of the last 2^limit or so. The low bits count. */
-#define CODER_COUNTS 63
-static inline __attribute__((always_inline)) uint32_t coder_learn(uint16_t *p, unsigned rate, unsigned bit)
-{
-	const uint32_t old = *p;
-
-	*p = (uint16_t)(bit ? old + ((65535 - old) >> rate) : old - (old >> rate));
-	return old;
-}
-
-static inline __attribute__((always_inline)) uint32_t coder_clamp(uint32_t p)
-{
-	return p < 32 ? 32 : p > 65504 ? 65504 : p;
-}
-
-/* Codes a bit by a probability of this rate, which learns from it. */
+/* Codes a bit by a probability that learns from it: by a part of 2^-rate of what it was wrong, rate 4 or 5. It starts as
+ * CODER_EVEN, and stays above 14 and below 65521 by itself. */
+#define CODER_EVEN 32768
 static inline __attribute__((always_inline)) unsigned coder_adaptive(struct coder *c, int is_decoding, uint16_t *p,
                                                                      unsigned rate, unsigned bit)
 {
-	bit = coder_bit(c, is_decoding, coder_clamp(*p), bit);
-	coder_learn(p, rate, bit);
+	bit = coder_bit(c, is_decoding, *p, bit);
+	*p = (uint16_t)(bit ? *p + ((65535 - *p) >> rate) : *p - (*p >> rate));
 	return bit;
 }
 

@@ -1,0 +1,224 @@
+#include "codes.h"
+
+/* Each bit of a code by five contexts. Each context has a probability of its own; their logits are weighed, and the
+ * weights learn, too. Integers alone. */
+#define CONTEXTS 5
+#define A_BITS 14
+#define B_BITS 16
+#define C_BITS 15
+#define D_BITS 15
+#define E_BITS 18
+#define COUNTS 127     /* a probability's speed of learning goes down to 1 in this many */
+#define WEIGHT_SETS 64
+#define LEARN 10       /* of weights */
+
+struct model {
+	/* Probabilities of 22 bits above counts of 10. */
+	uint32_t a[1 << A_BITS], b[1 << B_BITS], c[1 << C_BITS], d[1 << D_BITS], e[1 << E_BITS];
+	int32_t weight[WEIGHT_SETS][CONTEXTS + 1];
+	int16_t logit[4096];       /* ln(p / (1 - p)) * 256, p in 4096ths */
+	uint16_t share[4096];      /* the inverse, of logits + 2048, in 65536ths */
+	uint32_t part[COUNTS + 1]; /* 1 / (count + 1.5), in 65536ths */
+	/* A node's neighbourhood is a cube of 4x4x4 children, bit x + 4 y + 16 z: its own are in the middle. */
+	uint64_t spread[256];      /* a code's bits at 0 and 1 of each axis */
+	uint8_t side[OCTREE_NEAR], turn[OCTREE_NEAR]; /* of a neighbour: the octants that touch; how far up to shift */
+	uint8_t touch[8][7];       /* of an octant: the neighbours of its parent that it touches, faces first */
+};
+
+/* exp(-x / 256) in units of 2^-30, x 0..2048, by repeated multiplication with exp(-1/256) = 1069556082 * 2^-30. */
+static void make_shares(struct model *model)
+{
+	uint64_t power = (uint64_t)1 << 30;
+
+	for (int x = 0; x <= 2047; x++) {
+		/* 1 / (1 + exp(-x)) */
+		const uint64_t share = ((uint64_t)65536 << 30) / (((uint64_t)1 << 30) + power);
+
+		model->share[2048 + x] = (uint16_t)(share > 65504 ? 65504 : share);
+		model->share[2048 - x] = (uint16_t)(65536 - model->share[2048 + x]);
+		power = power * 1069556082 >> 30;
+	}
+	model->share[0] = model->share[1];
+	for (int p = 0, x = 1; p < 4096; p++) {
+		while (x < 4095 && model->share[x] < 16 * p + 8)
+			x++;
+		model->logit[p] = (int16_t)(x - 2048);
+	}
+}
+
+static void make_places(struct model *model)
+{
+	for (unsigned code = 0; code < 256; code++) {
+		model->spread[code] = 0;
+		for (unsigned j = 0; j < 8; j++)
+			if (code >> j & 1)
+				model->spread[code] |= (uint64_t)1 << ((j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2));
+	}
+	for (int k = 0; k < OCTREE_NEAR; k++) {
+		const int step[3] = { k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1 };
+		int turn = 21;
+
+		model->side[k] = 0;
+		for (int j = 0; j < 8; j++) {
+			int touches = 1;
+
+			for (int c = 0; c < 3; c++)
+				touches &= step[c] == 0 || step[c] == ((j >> c & 1) ? -1 : 1);
+			model->side[k] |= (uint8_t)(touches << j);
+		}
+		for (int c = 0, width = 1; c < 3; c++, width *= 4)
+			turn += 2 * width * step[c];
+		model->turn[k] = (uint8_t)(turn & 63);
+	}
+	for (int j = 0; j < 8; j++) {
+		const int x = (j & 1) ? 1 : -1, y = (j & 2) ? 3 : -3, z = (j & 4) ? 9 : -9;
+		const int to[7] = { x, y, z, x + y, y + z, z + x, x + y + z };
+
+		for (int i = 0; i < 7; i++)
+			model->touch[j][i] = (uint8_t)(OCTREE_SELF + to[i]);
+	}
+}
+
+static void fill(uint32_t *p, size_t n)
+{
+	for (size_t i = 0; i < n; i++)
+		p[i] = (uint32_t)1 << 31;
+}
+
+void *codes_mixed_model(void)
+{
+	struct model *model = malloc(sizeof *model);
+
+	if (model == NULL)
+		return NULL;
+	fill(model->a, 1 << A_BITS);
+	fill(model->b, 1 << B_BITS);
+	fill(model->c, 1 << C_BITS);
+	fill(model->d, 1 << D_BITS);
+	fill(model->e, 1 << E_BITS);
+	for (int s = 0; s < WEIGHT_SETS; s++)
+		for (int i = 0; i <= CONTEXTS; i++)
+			model->weight[s][i] = i < CONTEXTS ? 20000 : 0;
+	for (uint32_t n = 0; n <= COUNTS; n++)
+		model->part[n] = 131072 / (2 * n + 3);
+	make_shares(model);
+	make_places(model);
+	return model;
+}
+
+static inline __attribute__((always_inline)) void learn(const struct model *model, uint32_t *p, unsigned bit)
+{
+	const uint32_t count = *p & 1023;
+	const int64_t wrong = (int64_t)(bit << 22) - (int64_t)(*p >> 10);
+	const int64_t next = (int64_t)(*p >> 10) + (wrong * model->part[count] >> 16);
+	const uint32_t kept = next > (1 << 22) - 1 ? (1 << 22) - 1 : (uint32_t)next;
+
+	*p = kept << 10 | (count + (count < COUNTS));
+}
+
+static inline __attribute__((always_inline)) unsigned mix_bit(struct model *model, struct coder *coder,
+                                                              int is_decoding, uint32_t *const p[CONTEXTS],
+                                                              unsigned set, unsigned bit)
+{
+	int32_t *weight = model->weight[set], logit[CONTEXTS + 1], wrong;
+	int64_t sum = 0;
+	uint32_t share;
+
+	for (int i = 0; i < CONTEXTS; i++)
+		logit[i] = model->logit[*p[i] >> 20];
+	logit[CONTEXTS] = 256;
+	for (int i = 0; i <= CONTEXTS; i++)
+		sum += (int64_t)logit[i] * weight[i];
+	sum >>= 16;
+	sum = sum < -2047 ? -2047 : sum > 2047 ? 2047 : sum;
+	share = model->share[2048 + sum];
+	bit = coder_bit(coder, is_decoding, share, bit);
+	wrong = (int32_t)(bit << 16) - (int32_t)share;
+	for (int i = 0; i <= CONTEXTS; i++) {
+		const int64_t to = weight[i] + (((int64_t)logit[i] * wrong * LEARN + (1 << 17)) >> 18);
+
+		weight[i] = (int32_t)(to < -(1 << 20) ? -(1 << 20) : to > 1 << 20 ? 1 << 20 : to);
+	}
+	for (int i = 0; i < CONTEXTS; i++)
+		learn(model, p[i], bit);
+	return bit;
+}
+
+static inline uint32_t scatter(uint64_t x, int bits)
+{
+	return (uint32_t)(x * 0x9e3779b97f4a7c15u >> (64 - bits));
+}
+
+/* All children around an octant, itself in the middle: 3x3x3 of the neighbourhood's 4x4x4. */
+#define WINDOW 0x77707770777u
+
+static inline __attribute__((always_inline)) void code_node(struct codes_job *job, uint32_t node,
+                                                            const struct octree_near *near, int is_decoding)
+{
+	struct model *model = job->model;
+	const struct octree_level *level = &job->levels->at[job->level];
+	const unsigned code = is_decoding ? 0 : level->code[node];
+	const int up = job->levels->height - 1 - job->level, row = up < 3 ? up : 3;
+	uint32_t there = 0, faces, many;
+	uint64_t known = 0; /* children of neighbours that come earlier, and own ones so far */
+	unsigned so_far = 0;
+
+	for (unsigned k = 0; k < OCTREE_NEAR; k++) {
+		const uint32_t at = near->at[k];
+
+		there |= (uint32_t)(at != OCTREE_NONE) << k;
+		if (at < node) {
+			const uint64_t spread = model->spread[level->code[at] & model->side[k]];
+
+			known |= spread << model->turn[k] | spread >> (-model->turn[k] & 63);
+		}
+	}
+	faces = (there >> 4 & 1) | (there >> 10 & 1) << 1 | (there >> 12 & 1) << 2 | (there >> 14 & 1) << 3 |
+	        (there >> 16 & 1) << 4 | (there >> 22 & 1) << 5;
+	many = (uint32_t)__builtin_popcount(there) - 1;
+	for (unsigned j = 0; j < 8; j++) {
+		const unsigned corner = (j & 1) + 4 * (j >> 1 & 1) + 16 * (j >> 2), begun = 1u << j | so_far;
+		const uint64_t window = known >> corner & WINDOW;
+		uint32_t touched = 0, near_known = (uint32_t)__builtin_popcountll(window), most, *p[CONTEXTS];
+		unsigned bit;
+
+		if (j == 7 && so_far == 0) { /* no code is 0 */
+			so_far = 128;
+			break;
+		}
+		for (int i = 0; i < 7; i++)
+			touched |= (there >> model->touch[j][i] & 1) << i;
+		most = near_known < 15 ? near_known : 15;
+		p[0] = &model->a[begun << 6 | faces];
+		p[1] = &model->b[scatter(window << 3 | j, B_BITS)];
+		p[2] = &model->c[begun << 7 | touched];
+		p[3] = &model->d[j << 12 | most << 8 | (uint32_t)__builtin_popcount(touched) << 5 | many];
+		p[4] = &model->e[scatter((window << 3 | j) * 0x100000001b3u ^ (uint64_t)touched << 57 ^ (uint64_t)row << 55,
+		                         E_BITS)];
+		bit = mix_bit(model, job->coder, is_decoding, p, (unsigned)row << 4 | j << 1 | (so_far != 0), code >> j & 1);
+		so_far |= bit << j;
+		known |= (uint64_t)bit << (corner + 21);
+	}
+	if (is_decoding)
+		codes_keep(job, job->coder, (uint8_t)so_far);
+}
+
+static void pack_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	(void)path;
+	code_node(userdata, node, near, 0);
+}
+
+static void unpack_node(uint32_t node, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	struct codes_job *job = userdata;
+
+	(void)path;
+	if (job->rc == PSR_OK)
+		code_node(job, node, near, 1);
+}
+
+void codes_mixed_level(struct codes_job *job, int is_decoding)
+{
+	octree_levels_walk(job->levels, job->level, is_decoding ? unpack_node : pack_node, job);
+}

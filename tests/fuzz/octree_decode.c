@@ -1,0 +1,33 @@
+/* Packed octrees. What is accepted is a tree that fits its own counts, and unpacks again from what it packs to. */
+#include <stdlib.h>
+#include <string.h>
+#include "octree/pack.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
+
+#define REQUIRE(x) ((x) ? (void)0 : abort())
+#define MOST 200000
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
+{
+	struct psr_error err = { 0, "" };
+	struct octree *tree, *again;
+	uint8_t *bytes;
+	size_t n_bytes;
+	int rc = octree_unpack(&tree, data, n, MOST, NULL, &err);
+
+	REQUIRE(rc == err.code && (rc == PSR_OK) == (err.text[0] == '\0'));
+	REQUIRE(rc == PSR_OK || rc == PSR_ERR_FORMAT || rc == PSR_ERR_LIMIT);
+	if (rc != PSR_OK)
+		return 0;
+	REQUIRE(tree->n_leaves <= MOST && octree_check(tree, NULL) == PSR_OK);
+	for (enum octree_packing packing = OCTREE_FAST; packing <= OCTREE_SMALL; packing++) {
+		REQUIRE(octree_pack(&bytes, &n_bytes, tree, packing, NULL, NULL) == PSR_OK);
+		REQUIRE(octree_unpack(&again, bytes, n_bytes, tree->n_leaves, NULL, NULL) == PSR_OK);
+		REQUIRE(again->n_codes == tree->n_codes && memcmp(again->code, tree->code, tree->n_codes) == 0);
+		octree_destroy(again);
+		free(bytes);
+	}
+	octree_destroy(tree);
+	return 0;
+}
