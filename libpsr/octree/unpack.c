@@ -51,6 +51,9 @@ static int read_header(struct unpacking *u, uint64_t max_leaves, struct psr_erro
 	if (u->n_leaves > max_leaves)
 		return psr_fail(err, PSR_ERR_LIMIT, "a packed octree of %llu leaves; the limit is %llu",
 		                (unsigned long long)u->n_leaves, (unsigned long long)max_leaves);
+	if (u->n_codes / (uint64_t)u->levels > u->n_leaves)
+		return psr_fail(err, PSR_ERR_FORMAT, "a packed octree of %llu leaves has %llu codes",
+		                (unsigned long long)u->n_leaves, (unsigned long long)u->n_codes);
 	u->at += CHUNKS_HEADER;
 	return PSR_OK;
 }

@@ -1,5 +1,6 @@
 #include <math.h>
 #include <string.h>
+#include "base/axes.h"
 #include "base/vec.h"
 #include "cloud.h"
 
@@ -8,50 +9,6 @@
 #define OVERLAP 1.05 /* of radii: discs of neighbours lie in different planes */
 #define MAX_RATIO 2.0f /* ratio of a radius to the median of the radii around it */
 #define WIRE 0.01    /* least ratio of second to first extent, squared, of points that are not on a line */
-
-/* Rotates rows p and q of the symmetric m (and v) so that m[p][q] becomes 0 (Jacobi). */
-static void rotate(double m[3][3], double v[3][3], int p, int q)
-{
-	double theta, t, c, s;
-	if (m[p][q] == 0.0)
-		return;
-	theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-	t = (theta >= 0.0 ? 1.0 : -1.0) / (fabs(theta) + sqrt(theta * theta + 1.0));
-	c = 1.0 / sqrt(t * t + 1.0);
-	s = t * c;
-	for (int i = 0; i < 3; i++) {
-		double a = m[i][p], b = m[i][q];
-		m[i][p] = c * a - s * b;
-		m[i][q] = s * a + c * b;
-	}
-	for (int i = 0; i < 3; i++) {
-		double a = m[p][i], b = m[q][i];
-		m[p][i] = c * a - s * b;
-		m[q][i] = s * a + c * b;
-		a = v[p][i];
-		b = v[q][i];
-		v[p][i] = c * a - s * b;
-		v[q][i] = s * a + c * b;
-	}
-}
-
-/* Sets the rows of v to the axes of m, and leaves their values on its diagonal. Off-diagonal elements shrink
- * quadratically: three sweeps nearly always suffice, and below 1e-12 of the trace they turn no axis by a float's
- * precision. */
-static void diagonalise(double m[3][3], double v[3][3])
-{
-	const double least = 1e-12 * (m[0][0] + m[1][1] + m[2][2]);
-	for (int i = 0; i < 3; i++)
-		for (int j = 0; j < 3; j++)
-			v[i][j] = i == j;
-	for (int sweep = 0; sweep < 8; sweep++) {
-		if (fabs(m[0][1]) <= least && fabs(m[0][2]) <= least && fabs(m[1][2]) <= least)
-			return;
-		rotate(m, v, 0, 1);
-		rotate(m, v, 0, 2);
-		rotate(m, v, 1, 2);
-	}
-}
 
 /* Gathers the neighbours relative to the point, in units of the farthest one's distance, so that no later step
  * overflows or underflows. Returns that distance. */
@@ -93,7 +50,7 @@ static int fit_plane(float normal[3], double offset[CLOUD_NEIGHBOURS][3], uint32
 			for (int b = 0; b < 3; b++)
 				m[a][b] += d[a] * d[b];
 	}
-	diagonalise(m, v);
+	axes_find(m, v);
 	for (int c = 0; c < 3; c++)
 		value[c] = m[c][c];
 	for (int c = 1; c < 3; c++) {

@@ -1,0 +1,241 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "leaves.h"
+#include "runs.h"
+
+#define BATCH 4096
+
+struct building {
+	const struct octree_source *source;
+	const struct octree_build_options *options;
+	struct psr_error *err;
+	uint64_t n_points;
+	double low[3], high[3], edge; /* of the points; of the cube around them */
+	int levels;
+	struct runs runs;
+	struct octree_maker maker;
+	struct built built;
+};
+
+void octree_build_options_default(struct octree_build_options *options)
+{
+	const char *folder = getenv("TMPDIR");
+
+	*options = (struct octree_build_options){ .levels = 10, .memory = (uint64_t)2 << 30 };
+	options->folder = folder != NULL && folder[0] != '\0' ? folder : "/tmp";
+}
+
+/* Reads all points, and gives them to fn. */
+static int read_points(struct building *b, const char *stage,
+                       int (*fn)(struct building *b, const struct octree_point *point))
+{
+	const struct octree_source *source = b->source;
+	struct octree_point *points = malloc(BATCH * sizeof *points);
+	size_t n = 0;
+	int rc = points != NULL ? source->rewind(source->userdata, b->err)
+	                        : psr_fail(b->err, PSR_ERR_MEMORY, "no memory for points");
+
+	b->n_points = 0;
+	while (rc == PSR_OK) {
+		if (psr_is_cancelled(b->options->cancel)) {
+			rc = psr_fail(b->err, PSR_ERR_CANCELLED, "%s: cancelled", source->name);
+			break;
+		}
+		rc = source->read(&n, points, BATCH, source->userdata, b->err);
+		if (rc != PSR_OK || n == 0)
+			break;
+		for (size_t i = 0; i < n && rc == PSR_OK; i++, b->n_points++)
+			rc = fn(b, &points[i]);
+		built_progress(b->options, stage, b->n_points, source->n_points);
+	}
+	free(points);
+	return rc;
+}
+
+static int bound_point(struct building *b, const struct octree_point *point)
+{
+	for (int c = 0; c < 3; c++) {
+		if (!isfinite(point->at[c]))
+			return psr_fail(b->err, PSR_ERR_FORMAT, "%s: point %llu (counted from 0) has no finite %c", b->source->name,
+			                (unsigned long long)b->n_points, "xyz"[c]);
+		b->low[c] = fmin(b->low[c], point->at[c]);
+		b->high[c] = fmax(b->high[c], point->at[c]);
+	}
+	return PSR_OK;
+}
+
+/* Finds the cube and its levels. */
+static int find_cube(struct building *b)
+{
+	double largest = 0.0;
+
+	for (int c = 0; c < 3; c++) {
+		b->low[c] = INFINITY;
+		b->high[c] = -INFINITY;
+	}
+	if (read_points(b, "bounds", bound_point) != PSR_OK)
+		return b->err->code;
+	if (b->n_points == 0)
+		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: there are no points", b->source->name);
+	for (int c = 0; c < 3; c++) {
+		b->edge = fmax(b->edge, b->high[c] - b->low[c]);
+		largest = fmax(largest, fmax(fabs(b->high[c]), fabs(b->low[c])));
+	}
+	if (b->edge == 0.0)
+		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: all %llu points are at %g %g %g", b->source->name,
+		                (unsigned long long)b->n_points, b->low[0], b->low[1], b->low[2]);
+	if (!isfinite(b->edge) || b->edge < ldexp(largest, -50))
+		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: points that extend over %g at coordinates of %g cannot be told apart",
+		                b->source->name, b->edge, largest);
+	b->levels = b->options->levels;
+	for (b->levels = b->levels > 0 ? b->levels : OCTREE_LEAST_LEVELS;
+	     b->options->levels == 0 && ldexp(b->edge, -b->levels) > b->options->spacing; b->levels++)
+		if (b->levels == OCTREE_MOST_LEVELS)
+			return psr_fail(b->err, PSR_ERR_ARG, "%s: leaves of %g in a cube of %g are more than %d levels; %g is possible",
+			                b->source->name, b->options->spacing, b->edge, OCTREE_MOST_LEVELS,
+			                ldexp(b->edge, -OCTREE_MOST_LEVELS));
+	return PSR_OK;
+}
+
+static int sort_point(struct building *b, const struct octree_point *point)
+{
+	struct record record = { .color = { point->color[0], point->color[1], point->color[2] } };
+	uint32_t at[3];
+
+	for (int c = 0; c < 3; c++) {
+		/* The highest places, and those of a source that changes, go to the last leaf. */
+		const double place = ldexp(fmax(point->at[c] - b->low[c], 0.0) / b->edge, b->levels);
+		const double most = (double)((uint32_t)1 << b->levels) - 1.0;
+		const double inside = fmin(floor(place), most);
+
+		at[c] = (uint32_t)inside;
+		record.part[c] = (uint8_t)fmin(256.0 * (place - inside), 255.0);
+	}
+	record.path = octree_path(at);
+	return runs_put(&b->runs, &record, b->err);
+}
+
+/* The points of one leaf. */
+struct sum {
+	uint64_t n, path, color[3], part[3];
+};
+
+static void add_record(struct sum *sum, const struct record *record)
+{
+	sum->path = record->path;
+	sum->n++;
+	for (int c = 0; c < 3; c++) {
+		sum->color[c] += record->color[c];
+		sum->part[c] += record->part[c];
+	}
+}
+
+/* Makes sure that leaf n has places for its attributes. */
+static int leaf_room(struct building *b, uint64_t n, uint64_t *room)
+{
+	const uint64_t more = n + n / 4 + 4096;
+	void *part, *color;
+
+	if (n < *room)
+		return 1;
+	part = realloc(b->built.part, more * 3);
+	if (part == NULL)
+		return 0;
+	b->built.part = part;
+	if (b->source->has_color) {
+		color = realloc(b->maker.tree->color, more * 3);
+		if (color == NULL)
+			return 0;
+		b->maker.tree->color = color;
+	}
+	*room = more;
+	return 1;
+}
+
+static int end_leaf(struct building *b, const struct sum *sum, uint64_t *room)
+{
+	struct octree *tree = b->maker.tree;
+	const uint64_t leaf = tree->n_leaves;
+
+	if (!leaf_room(b, leaf, room))
+		return psr_fail(b->err, PSR_ERR_MEMORY, "no memory for an octree of %llu leaves", (unsigned long long)leaf);
+	for (int c = 0; c < 3; c++) {
+		b->built.part[leaf][c] = (uint8_t)((sum->part[c] + sum->n / 2) / sum->n);
+		if (tree->color != NULL)
+			tree->color[leaf][c] = (uint8_t)((sum->color[c] + sum->n / 2) / sum->n);
+	}
+	return octree_maker_put(&b->maker, sum->path, b->err);
+}
+
+static int merge(struct building *b)
+{
+	const struct record *record;
+	struct sum sum = { 0 };
+	uint64_t room = 0, done = 0;
+	int rc = octree_maker_init(&b->maker, b->levels, b->err), end;
+
+	while (rc == PSR_OK && (record = runs_next(&b->runs, &rc, b->err)) != NULL) {
+		if (sum.n > 0 && record->path != sum.path) {
+			rc = end_leaf(b, &sum, &room);
+			sum = (struct sum){ 0 };
+		}
+		add_record(&sum, record);
+		if (++done % 65536 == 0) {
+			built_progress(b->options, "merge", done, b->n_points);
+			if (psr_is_cancelled(b->options->cancel))
+				rc = psr_fail(b->err, PSR_ERR_CANCELLED, "%s: cancelled", b->source->name);
+		}
+	}
+	end = rc == PSR_OK ? end_leaf(b, &sum, &room) : rc;
+	if (end == PSR_OK)
+		b->built.tree = octree_maker_take(&b->maker);
+	octree_maker_fini(&b->maker);
+	return end;
+}
+
+static int build(struct building *b)
+{
+	int rc = find_cube(b);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = runs_init(&b->runs, b->options->folder, 3 * b->levels, b->options->memory, b->err);
+	if (rc == PSR_OK)
+		rc = read_points(b, "points", sort_point);
+	if (rc == PSR_OK && b->n_points == 0)
+		rc = psr_fail(b->err, PSR_ERR_FORMAT, "%s: the points are gone on second reading", b->source->name);
+	if (rc == PSR_OK)
+		rc = runs_end(&b->runs, b->err);
+	if (rc == PSR_OK)
+		rc = merge(b);
+	runs_fini(&b->runs);
+	if (rc != PSR_OK)
+		return rc;
+	memcpy(b->built.tree->low, b->low, sizeof b->low);
+	b->built.tree->edge = b->edge;
+	rc = built_normals(&b->built, b->options);
+	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "%s: %s", b->source->name, rc == PSR_ERR_CANCELLED ? "cancelled" :
+	                                                                     "no memory for the normals of its leaves");
+}
+
+int octree_build(struct octree **out, const struct octree_source *source, const struct octree_build_options *options,
+                 struct psr_error *err)
+{
+	struct psr_error own;
+	struct building b = { .source = source, .options = options, .err = err != NULL ? err : &own };
+	int rc;
+
+	if ((options->levels == 0 && !(options->spacing > 0.0)) ||
+	    (options->levels != 0 && (options->levels < OCTREE_LEAST_LEVELS || options->levels > OCTREE_MOST_LEVELS)) ||
+	    options->memory < OCTREE_LEAST_MEMORY)
+		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels, leaves of %g, sorted in %llu bytes, cannot be built",
+		                options->levels, options->spacing, (unsigned long long)options->memory);
+	rc = build(&b);
+	free(b.built.part);
+	if (rc == PSR_OK)
+		*out = b.built.tree;
+	else
+		octree_destroy(b.built.tree);
+	return rc;
+}

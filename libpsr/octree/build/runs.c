@@ -1,0 +1,218 @@
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "runs.h"
+#include "base/array.h"
+#include "base/mem.h"
+
+#define DIGIT 11
+#define LEAST_ROOM 64
+
+int runs_init(struct runs *runs, const char *folder, int bits, uint64_t memory, struct psr_error *err)
+{
+	*runs = (struct runs){ .folder = folder, .bits = bits, .fd = -1, .room = memory / (2 * sizeof(struct record)) };
+	runs->room = runs->room > LEAST_ROOM ? runs->room : LEAST_ROOM;
+	runs->record = psr_alloc_array(runs->room, sizeof *runs->record);
+	runs->spare = psr_alloc_array(runs->room, sizeof *runs->spare);
+	if (runs->record == NULL || runs->spare == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory to sort %zu points at a time", runs->room);
+	return PSR_OK;
+}
+
+void runs_fini(struct runs *runs)
+{
+	psr_free(runs->record);
+	psr_free(runs->spare);
+	free(runs->run);
+	free(runs->heap);
+	if (runs->fd >= 0)
+		close(runs->fd);
+}
+
+/* Sorts by digits from the lowest on, which keeps the order of equal paths. */
+static void sort(struct runs *runs)
+{
+	size_t place[1 << DIGIT];
+
+	for (int shift = 0; shift < runs->bits; shift += DIGIT) {
+		struct record *swap = runs->record;
+		size_t sum = 0;
+
+		memset(place, 0, sizeof place);
+		for (size_t i = 0; i < runs->n; i++)
+			place[runs->record[i].path >> shift & ((1 << DIGIT) - 1)]++;
+		for (size_t d = 0; d < sizeof place / sizeof *place; d++) {
+			const size_t count = place[d];
+
+			place[d] = sum;
+			sum += count;
+		}
+		for (size_t i = 0; i < runs->n; i++)
+			runs->spare[place[runs->record[i].path >> shift & ((1 << DIGIT) - 1)]++] = runs->record[i];
+		runs->record = runs->spare;
+		runs->spare = swap;
+	}
+}
+
+/* Opens a file that has no name, or loses it at once. */
+static int open_file(struct runs *runs, struct psr_error *err)
+{
+	char path[PATH_MAX];
+
+	runs->fd = open(runs->folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+	if (runs->fd >= 0)
+		return PSR_OK;
+	if (snprintf(path, sizeof path, "%s/psr-runs-XXXXXX", runs->folder) < (int)sizeof path)
+		runs->fd = mkostemp(path, O_CLOEXEC);
+	if (runs->fd < 0)
+		return psr_fail(err, PSR_ERR_IO, "%s: a temporary file cannot be made: %s; set TMPDIR to another folder",
+		                runs->folder, strerror(errno));
+	unlink(path);
+	return PSR_OK;
+}
+
+static int write_run(struct runs *runs, struct psr_error *err)
+{
+	const uint8_t *bytes = (const uint8_t *)runs->record;
+	size_t left = runs->n * sizeof *runs->record;
+	int rc = runs->fd < 0 ? open_file(runs, err) : PSR_OK;
+
+	if (rc != PSR_OK)
+		return rc;
+	if (!ARRAY_ROOM(runs->run, runs->n_runs, runs->runs_room))
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory for runs of points");
+	runs->run[runs->n_runs++] = (struct run){ runs->written, runs->written + left, NULL, 0, 0 };
+	while (left > 0) {
+		const ssize_t n = pwrite(runs->fd, bytes, left, (off_t)runs->written);
+
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return psr_fail(err, PSR_ERR_IO,
+			                "%s: sorted points cannot be written, after %llu MB: %s; set TMPDIR to a folder with more "
+			                "room, or allow more memory",
+			                runs->folder, (unsigned long long)(runs->written >> 20), strerror(errno));
+		bytes += n;
+		left -= (size_t)n;
+		runs->written += (uint64_t)n;
+	}
+	runs->n = 0;
+	return PSR_OK;
+}
+
+int runs_put(struct runs *runs, const struct record *record, struct psr_error *err)
+{
+	if (runs->n == runs->room) {
+		int rc;
+
+		sort(runs);
+		rc = write_run(runs, err);
+		if (rc != PSR_OK)
+			return rc;
+	}
+	runs->record[runs->n++] = *record;
+	return PSR_OK;
+}
+
+static int refill(struct runs *runs, struct run *run, struct psr_error *err)
+{
+	size_t want = runs->run_room * sizeof *run->record, got = 0;
+
+	want = want < run->end - run->at ? want : run->end - run->at;
+	while (got < want) {
+		const ssize_t n = pread(runs->fd, (uint8_t *)run->record + got, want - got, (off_t)(run->at + got));
+
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return psr_fail(err, PSR_ERR_IO, "%s: sorted points cannot be read again: %s", runs->folder,
+			                n < 0 ? strerror(errno) : "the file is shorter");
+		got += (size_t)n;
+	}
+	run->at += want;
+	run->next = 0;
+	run->n = want / sizeof *run->record;
+	return PSR_OK;
+}
+
+/* Returns whether run a comes before run b: by path, then by the order in which they were written. */
+static int is_before(const struct runs *runs, uint32_t a, uint32_t b)
+{
+	const uint64_t x = runs->run[a].record[runs->run[a].next].path, y = runs->run[b].record[runs->run[b].next].path;
+
+	return x < y || (x == y && a < b);
+}
+
+static void sink(struct runs *runs, size_t i)
+{
+	const uint32_t run = runs->heap[i];
+	size_t child;
+
+	while ((child = 2 * i + 1) < runs->n_heap) {
+		child += child + 1 < runs->n_heap && is_before(runs, runs->heap[child + 1], runs->heap[child]);
+		if (!is_before(runs, runs->heap[child], run))
+			break;
+		runs->heap[i] = runs->heap[child];
+		i = child;
+	}
+	runs->heap[i] = run;
+}
+
+int runs_end(struct runs *runs, struct psr_error *err)
+{
+	int rc = PSR_OK;
+
+	sort(runs);
+	if (runs->fd < 0) { /* what is in memory is the one run */
+		psr_free(runs->spare);
+		runs->spare = NULL;
+		return PSR_OK;
+	}
+	rc = write_run(runs, err);
+	if (rc != PSR_OK)
+		return rc;
+	psr_free(runs->spare);
+	runs->spare = NULL;
+	runs->run_room = runs->room / runs->n_runs;
+	runs->heap = calloc(runs->n_runs, sizeof *runs->heap);
+	if (runs->heap == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "no memory to merge %zu runs of points", runs->n_runs);
+	if (runs->run_room == 0)
+		return psr_fail(err, PSR_ERR_LIMIT, "%zu runs of points, of %zu points each, are too many to merge; allow more memory",
+		                runs->n_runs, runs->room);
+	for (size_t i = 0; i < runs->n_runs && rc == PSR_OK; i++) {
+		runs->run[i].record = runs->record + i * runs->run_room;
+		rc = refill(runs, &runs->run[i], err);
+		runs->heap[runs->n_heap++] = (uint32_t)i;
+	}
+	for (size_t i = runs->n_heap / 2; rc == PSR_OK && i-- > 0;)
+		sink(runs, i);
+	return rc;
+}
+
+const struct record *runs_next(struct runs *runs, int *rc, struct psr_error *err)
+{
+	struct run *run;
+
+	*rc = PSR_OK;
+	if (runs->fd < 0) /* `written` counts what was given out */
+		return runs->written < runs->n ? &runs->record[runs->written++] : NULL;
+	if (runs->n_heap == 0)
+		return NULL;
+	run = &runs->run[runs->heap[0]];
+	runs->taken = run->record[run->next++];
+	if (run->next == run->n && run->at < run->end)
+		*rc = refill(runs, run, err);
+	if (*rc != PSR_OK)
+		return NULL;
+	if (run->next == run->n)
+		runs->heap[0] = runs->heap[--runs->n_heap];
+	if (runs->n_heap > 0)
+		sink(runs, 0);
+	return &runs->taken;
+}

@@ -1,0 +1,47 @@
+/* Records in the order of their paths, more than memory holds. */
+#ifndef PSR_OCTREE_BUILD_RUNS_H
+#define PSR_OCTREE_BUILD_RUNS_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "psr/error.h"
+
+struct record {
+	uint64_t path;
+	uint8_t color[3], part[3]; /* part: the place within the leaf, in 256ths */
+	uint16_t unused;
+};
+
+struct run {
+	uint64_t at, end;   /* of the next bytes in the file, and behind the last ones */
+	struct record *record; /* what has been read: */
+	size_t next, n;
+};
+
+struct runs {
+	const char *folder;
+	struct record *record, *spare; /* room for a run each */
+	size_t n, room;
+	int bits;          /* of a path */
+	int fd;            /* of a file without a name; -1: all records are in memory */
+	uint64_t written;  /* bytes of the file; without one, the records that runs_next() has returned */
+	struct run *run;
+	uint32_t *heap;    /* of runs that have records left, the least path first */
+	size_t n_runs, n_heap, runs_room, run_room; /* run_room: records of a run that are in memory while merging */
+	struct record taken;
+};
+
+/* Takes `memory` bytes for records. MEMORY. */
+int runs_init(struct runs *runs, const char *folder, int bits, uint64_t memory, struct psr_error *err);
+void runs_fini(struct runs *runs);
+
+int runs_put(struct runs *runs, const struct record *record, struct psr_error *err); /* IO, MEMORY */
+
+/* Ends the putting. IO, MEMORY. */
+int runs_end(struct runs *runs, struct psr_error *err);
+
+/* Returns the next record in the order of paths, valid until the next call; NULL behind the last one, or with *rc
+ * other than PSR_OK. Records of one path come in a fixed order. */
+const struct record *runs_next(struct runs *runs, int *rc, struct psr_error *err);
+
+#endif

@@ -1,0 +1,321 @@
+#define _GNU_SOURCE
+#include <dirent.h>
+#include <math.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <cmocka.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include "octree/build/build.h"
+#include "base/direction.h"
+#include "leaves.h"
+
+#define PI 3.14159265358979323846
+
+static char folder[] = "/tmp/psr-octree-XXXXXX";
+
+/* A number of points, made again on each reading. */
+struct cloud {
+	uint64_t n, next;
+	void (*make)(struct octree_point *point, uint64_t i);
+};
+
+static int go_back(void *userdata, struct psr_error *err)
+{
+	(void)err;
+	((struct cloud *)userdata)->next = 0;
+	return PSR_OK;
+}
+
+static int read_cloud(size_t *n, struct octree_point *points, size_t room, void *userdata, struct psr_error *err)
+{
+	struct cloud *cloud = userdata;
+
+	(void)err;
+	for (*n = 0; *n < room && cloud->next < cloud->n; ++*n)
+		cloud->make(&points[*n], cloud->next++);
+	return PSR_OK;
+}
+
+static const double middle[3] = { 500000.0, 4000000.0, 100.0 };
+#define RADIUS 30.0
+
+/* On a sphere at survey coordinates; red grows with z. */
+static void on_sphere(struct octree_point *point, uint64_t i)
+{
+	uint64_t random = i;
+	const double z = random_in(&random, -1.0, 1.0), r = sqrt(1.0 - z * z), a = random_in(&random, 0.0, 2.0 * PI);
+
+	*point = (struct octree_point){ { middle[0] + RADIUS * r * cos(a), middle[1] + RADIUS * r * sin(a),
+		                              middle[2] + RADIUS * z },
+		                            { (uint8_t)(127.0 + 127.0 * z), 10, 20 } };
+}
+
+static int build(struct octree **tree, struct cloud *cloud, int levels, uint64_t memory, struct psr_error *err)
+{
+	const struct octree_source source = { "cloud", 1, cloud->n, go_back, read_cloud, cloud };
+	struct octree_build_options options;
+
+	octree_build_options_default(&options);
+	options.levels = levels;
+	options.memory = memory;
+	options.folder = folder;
+	*tree = NULL;
+	return octree_build(tree, &source, &options, err);
+}
+
+static struct octree *sphere(uint64_t n, int levels, uint64_t memory)
+{
+	struct cloud cloud = { n, 0, on_sphere };
+	struct octree *tree;
+
+	assert_int_equal(build(&tree, &cloud, levels, memory, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	return tree;
+}
+
+static int n_files(void)
+{
+	DIR *dir = opendir(folder);
+	int n = -2; /* . and .. */
+
+	assert_non_null(dir);
+	while (readdir(dir) != NULL)
+		n++;
+	closedir(dir);
+	return n;
+}
+
+#define POINTS 200000
+#define LEVELS 7
+
+struct sphere_leaves {
+	const struct octree *tree;
+	uint8_t *is_there; /* by place */
+	double worst_cosine, worst_place;
+};
+
+static int look(const struct octree_node *node, void *userdata)
+{
+	struct sphere_leaves *s = userdata;
+	const float *normal = psr_direction_table()[s->tree->normal[node->leaf]];
+	const double edge = ldexp(s->tree->edge, -LEVELS), offset = octree_offset(s->tree->offset[node->leaf]);
+	double center[3], out[3], cosine = 0.0, length = 0.0, place = 0.0;
+	uint32_t at[3];
+
+	octree_place(node->path, at);
+	s->is_there[at[0] + (at[1] << LEVELS) + (at[2] << 2 * LEVELS)] = 1;
+	octree_center(s->tree, node->path, LEVELS, center);
+	for (int c = 0; c < 3; c++) {
+		out[c] = center[c] - middle[c];
+		length += out[c] * out[c];
+		cosine += out[c] * (double)normal[c];
+		place += pow(out[c] + offset * edge * (double)normal[c], 2.0);
+	}
+	s->worst_cosine = fmin(s->worst_cosine, cosine / sqrt(length));
+	s->worst_place = fmax(s->worst_place, fabs(sqrt(place) - RADIUS) / edge);
+	return 0;
+}
+
+/* Normals of a sphere: a leaf's middle is at most 0.87 leaves from the sphere, and shares the normal of a cell some three
+ * leaves wide, whose middle is up to 2.6 leaves away: 3.5 of the radius' 64 leaves are 3.1 degrees, and points at random
+ * add the slope of a plane through 27 cells of six leaves, with an error of one leaf each (1 in 6 / sqrt(162)). 15 degrees
+ * are what no leaf of a wrong side or of no plane keeps. Places: half an offset's step, 0.22 leaves, and the sphere's own
+ * points that a mean is of are up to 0.87 leaves beside it along the surface, where the surface leaves the normal by
+ * the sine of the same 15 degrees. */
+static void every_point_is_within_its_leaf_and_normals_look_out(void **state)
+{
+	struct octree *tree = sphere(POINTS, LEVELS, OCTREE_LEAST_MEMORY);
+	struct sphere_leaves s = { tree, calloc(1u << 3 * LEVELS, 1), 1.0, 0.0 };
+
+	(void)state;
+	assert_non_null(s.is_there);
+	octree_walk(tree, LEVELS, look, &s);
+	for (uint64_t i = 0; i < POINTS; i++) {
+		struct octree_point point;
+		uint32_t at = 0;
+
+		on_sphere(&point, i);
+		for (int c = 0; c < 3; c++) {
+			const double place = floor(ldexp((point.at[c] - tree->low[c]) / tree->edge, LEVELS));
+
+			at |= (uint32_t)fmin(place, (1 << LEVELS) - 1) << c * LEVELS;
+		}
+		assert_true(s.is_there[at]);
+	}
+	print_message("worst normal %.1f degrees, worst place %.2f leaves\n", acos(s.worst_cosine) * 180.0 / PI,
+	              s.worst_place);
+	assert_true(s.worst_cosine > cos(15.0 * PI / 180.0));
+	assert_true(s.worst_place < 0.22 + 0.87 * sin(15.0 * PI / 180.0));
+	free(s.is_there);
+	octree_destroy(tree);
+}
+
+static void runs_on_disk_give_the_tree_of_memory(void **state)
+{
+	struct octree *small = sphere(POINTS, 9, OCTREE_LEAST_MEMORY), *large = sphere(POINTS, 9, (uint64_t)64 << 20);
+	const uint64_t n = small->n_leaves;
+
+	(void)state;
+	assert_int_equal(small->n_codes, large->n_codes);
+	assert_memory_equal(small->code, large->code, small->n_codes);
+	assert_memory_equal(small->normal, large->normal, n * sizeof *small->normal);
+	assert_memory_equal(small->color, large->color, n * sizeof *small->color);
+	assert_memory_equal(small->offset, large->offset, n);
+	assert_int_equal(n_files(), 0);
+	octree_destroy(small);
+	octree_destroy(large);
+}
+
+static void twice(struct octree_point *point, uint64_t i)
+{
+	*point = (struct octree_point){ { i < 100 ? 0.1 : 1.0, 0.0, 0.0 }, { i < 50 ? 0 : 100, 0, 7 } };
+}
+
+static void colors_of_a_leaf_are_averaged(void **state)
+{
+	struct cloud cloud = { 101, 0, twice };
+	struct octree *tree;
+
+	(void)state;
+	assert_int_equal(build(&tree, &cloud, 3, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	assert_int_equal(tree->n_leaves, 2);
+	assert_true(tree->color[0][0] == 50 && tree->color[0][2] == 7 && tree->color[1][0] == 100);
+	octree_destroy(tree);
+}
+
+static void at_one_place(struct octree_point *point, uint64_t i)
+{
+	(void)i;
+	*point = (struct octree_point){ { 1.0, 2.0, 3.0 }, { 0, 0, 0 } };
+}
+
+static void no_number(struct octree_point *point, uint64_t i)
+{
+	*point = (struct octree_point){ { (double)i, i == 9 ? NAN : 1.0, 3.0 }, { 0, 0, 0 } };
+}
+
+static void very_far(struct octree_point *point, uint64_t i)
+{
+	*point = (struct octree_point){ { i == 0 ? -1.7e308 : 1.7e308, 0.0, 0.0 }, { 0, 0, 0 } };
+}
+
+static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
+{
+	static const struct {
+		struct cloud cloud;
+		int levels, code;
+		const char *text;
+	} bad[] = {
+		{ { 0, 0, at_one_place }, 5, PSR_ERR_FORMAT, "no points" },
+		{ { 10000, 0, at_one_place }, 5, PSR_ERR_FORMAT, "all 10000 points are at 1 2 3" },
+		{ { 20, 0, no_number }, 5, PSR_ERR_FORMAT, "point 9 (counted from 0) has no finite y" },
+		{ { 2, 0, very_far }, 5, PSR_ERR_FORMAT, "cannot be told apart" },
+		{ { 9, 0, on_sphere }, 1, PSR_ERR_ARG, "1 levels" },
+		{ { 9, 0, on_sphere }, 21, PSR_ERR_ARG, "21 levels" },
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+		struct cloud cloud = bad[i].cloud;
+		struct psr_error err;
+		struct octree *tree;
+
+		assert_int_equal(build(&tree, &cloud, bad[i].levels, OCTREE_LEAST_MEMORY, &err), bad[i].code);
+		assert_null(tree);
+		assert_non_null(strstr(err.text, bad[i].text));
+		assert_int_equal(n_files(), 0);
+	}
+}
+
+static void a_full_disk_leaves_no_file(void **state)
+{
+	struct rlimit was, full;
+	struct cloud cloud = { POINTS, 0, on_sphere };
+	struct psr_error err;
+	struct octree *tree;
+
+	(void)state;
+	assert_int_equal(getrlimit(RLIMIT_FSIZE, &was), 0);
+	full = was;
+	full.rlim_cur = 1000000; /* within the second run */
+	signal(SIGXFSZ, SIG_IGN);
+	assert_int_equal(setrlimit(RLIMIT_FSIZE, &full), 0);
+	assert_int_equal(build(&tree, &cloud, 9, OCTREE_LEAST_MEMORY, &err), PSR_ERR_IO);
+	assert_int_equal(setrlimit(RLIMIT_FSIZE, &was), 0);
+	assert_null(tree);
+	assert_non_null(strstr(err.text, "TMPDIR"));
+	assert_int_equal(n_files(), 0);
+}
+
+static int is_called_often(void *userdata)
+{
+	return --*(int *)userdata < 0;
+}
+
+static void a_build_can_be_cancelled_at_any_time(void **state)
+{
+	(void)state;
+	for (int after = 0, rc = PSR_ERR_CANCELLED; rc != PSR_OK; after = 2 * after + 1) {
+		struct cloud cloud = { POINTS, 0, on_sphere };
+		const struct octree_source source = { "cloud", 0, POINTS, go_back, read_cloud, &cloud };
+		int left = after;
+		const struct psr_cancel cancel = { is_called_often, &left };
+		struct octree_build_options options;
+		struct octree *tree = NULL;
+
+		octree_build_options_default(&options);
+		options.memory = OCTREE_LEAST_MEMORY;
+		options.folder = folder;
+		options.cancel = &cancel;
+		rc = octree_build(&tree, &source, &options, NULL);
+		assert_true((rc == PSR_OK && left >= 0) || (rc == PSR_ERR_CANCELLED && tree == NULL));
+		octree_destroy(tree);
+		assert_int_equal(n_files(), 0);
+	}
+}
+
+static void spacing_chooses_the_levels(void **state)
+{
+	struct cloud cloud = { 1000, 0, on_sphere };
+	const struct octree_source source = { "cloud", 0, 1000, go_back, read_cloud, &cloud };
+	struct octree_build_options options;
+	struct octree *tree = NULL;
+
+	(void)state;
+	octree_build_options_default(&options);
+	options.folder = folder;
+	options.levels = 0;
+	options.spacing = 1.0;
+	assert_int_equal(octree_build(&tree, &source, &options, NULL), PSR_OK);
+	assert_int_equal(tree->levels, 6); /* 60 in 64 */
+	assert_null(tree->color);
+	octree_destroy(tree);
+	options.spacing = 1e-9;
+	assert_int_equal(octree_build(&tree, &source, &options, NULL), PSR_ERR_ARG);
+	options.spacing = 0.0;
+	assert_int_equal(octree_build(&tree, &source, &options, NULL), PSR_ERR_ARG);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(every_point_is_within_its_leaf_and_normals_look_out),
+		cmocka_unit_test(runs_on_disk_give_the_tree_of_memory),
+		cmocka_unit_test(colors_of_a_leaf_are_averaged),
+		cmocka_unit_test(bad_clouds_get_an_error_that_names_what_is_wrong),
+		cmocka_unit_test(a_full_disk_leaves_no_file),
+		cmocka_unit_test(a_build_can_be_cancelled_at_any_time),
+		cmocka_unit_test(spacing_chooses_the_levels),
+	};
+	int failed;
+
+	if (mkdtemp(folder) == NULL)
+		return 1;
+	failed = cmocka_run_group_tests(tests, NULL, NULL);
+	rmdir(folder);
+	return failed;
+}
