@@ -5,6 +5,8 @@
 #include <cmocka.h>
 #include <math.h>
 #include "base/srgb.h"
+#include <unistd.h>
+#include "import/cloud/las_source.h"
 #include "scan.h"
 
 #define MAX_FILE 8192
@@ -291,6 +293,73 @@ static void coordinates_that_overflow_are_left_out(void **state)
 	psr_mesh_destroy(m);
 }
 
+/* Opens the first n bytes of the file as a source. */
+static int open_source(struct octree_source *source, const struct file *f, size_t n, struct psr_error *err)
+{
+	char path[] = "/tmp/psr-las-XXXXXX";
+	const int fd = mkstemp(path);
+	int rc;
+
+	assert_true(fd >= 0 && write(fd, f->at, n) == (ssize_t)n);
+	close(fd);
+	rc = las_source_open(source, path, err);
+	source->name = "x.las";
+	unlink(path);
+	return rc;
+}
+
+static void a_source_gives_the_points_of_the_mesh_and_gives_them_again(void **state)
+{
+	(void)state;
+	for (unsigned minor = 0; minor <= 4; minor++)
+		for (unsigned format = 0; format < (minor >= 4 ? 11 : minor == 3 ? 6 : minor == 2 ? 4 : 2); format++)
+			for (int gray = 0; gray < 2; gray++) {
+				struct octree_source source;
+				struct octree_point point[10];
+				struct psr_mesh *m;
+				struct file f;
+				size_t n;
+
+				make(&f, minor, format, 9);
+				for (unsigned i = 0; i < 9 && color_of[format] > 0 && !gray; i++)
+					color(&f, i, 1000 * i, 65535 - i, 300);
+				put(&f, point_at(&f, 3) + (format >= 6 ? 16 : 15), 1, 7); /* noise */
+				m = accept_las(&f);
+				assert_int_equal(open_source(&source, &f, f.n, NULL), PSR_OK);
+				assert_int_equal(source.n_points, 9);
+				for (int time = 0; time < 2; time++) {
+					assert_int_equal(source.rewind(source.userdata, NULL), PSR_OK);
+					assert_int_equal(source.read(&n, point, 10, source.userdata, NULL), PSR_OK);
+					assert_int_equal(n, m->n_points);
+					for (size_t i = 0; i < n; i++)
+						for (int c = 0; c < 3; c++) {
+							assert_true(point[i].at[c] == m->point[i][c]);
+							assert_int_equal(point[i].color[c], psr_linear_to_srgb(m->point_color[i][c]));
+						}
+					assert_int_equal(source.read(&n, point, 10, source.userdata, NULL), PSR_OK);
+					assert_int_equal(n, 0);
+				}
+				las_source_close(&source);
+				psr_mesh_destroy(m);
+			}
+}
+
+static void a_source_that_is_cut_short_is_refused(void **state)
+{
+	struct octree_source source;
+	struct psr_error err;
+	struct file f;
+
+	(void)state;
+	make(&f, 4, 7, 3);
+	for (size_t n = 0; n < f.n - 3; n += 5) {
+		assert_int_equal(open_source(&source, &f, n, &err), PSR_ERR_FORMAT);
+		assert_int_equal(err.code, PSR_ERR_FORMAT);
+	}
+	assert_int_equal(las_source_open(&source, "/nowhere/x.las", &err), PSR_ERR_NOT_FOUND);
+	assert_int_equal(las_source_open(&source, "/tmp", &err), PSR_ERR_IO);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -302,7 +371,8 @@ int main(void)
 		cmocka_unit_test(compressed_files_name_the_tool_to_unpack_them),
 		cmocka_unit_test(headers_that_lie_are_refused),
 		cmocka_unit_test(cut_files_are_refused_at_every_length),
-		cmocka_unit_test(coordinates_that_overflow_are_left_out),
+		cmocka_unit_test(coordinates_that_overflow_are_left_out),		cmocka_unit_test(a_source_gives_the_points_of_the_mesh_and_gives_them_again),
+		cmocka_unit_test(a_source_that_is_cut_short_is_refused),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);
