@@ -244,6 +244,7 @@ FRAMES     := $(BUILD)/tests/bench/frames
 EFFECTS    := $(BUILD)/tests/bench/effects
 CANCEL     := $(BUILD)/tests/bench/cancel
 POOL_BENCH := $(BUILD)/tests/bench/pool
+OCTREE_BENCH := $(BUILD)/tests/bench/octree
 CODEC_BENCH := $(BUILD)/tests/bench/codec
 DAEMON_BENCH := $(BUILD)/tests/bench/daemon
 REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
@@ -312,6 +313,8 @@ $(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr
 CODEC_O := $(addprefix $(BUILD)/server/,$(addsuffix .c.o,frames/codec frames/codec_parts frames/codec_rect frames/pixels net/outq))
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
+$(OCTREE_BENCH): $(BUILD)/tests/bench/octree.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) $(L_BUILD_HERE) $(L_PSR)
 $(POOL_BENCH): $(BUILD)/tests/bench/pool.c.o $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(CODEC_BENCH): $(BUILD)/tests/bench/codec.c.o $(CODEC_O) $(LIB)/libpsrproto.a $(LIB)/libpsr.a
@@ -349,7 +352,7 @@ $(LARGE): $(BUILD)/tests/bench/large.c.o $(HARD_O) $(LIB)/libpsr.a
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-pool
+.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
@@ -434,6 +437,8 @@ hard-large: $(LARGE) ## hard-large: a model of 100 million samples: memory and t
 bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock beside stamps of a relay and psrd's reports, of the same runs
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
 
+bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates
+	$(Q)$(OCTREE_BENCH)
 bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares
 	$(Q)$(POOL_BENCH)
 

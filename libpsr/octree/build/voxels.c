@@ -1,0 +1,128 @@
+#include <math.h>
+#include "voxels.h"
+#include "runs.h"
+#include "base/vec.h"
+
+struct meeting {
+	struct runs runs;
+	int levels;
+	double corner[3][3], side[3][3], normal[3]; /* of a triangle, in leaves */
+	int first[3], last[3];                      /* leaves that its bounds meet */
+	struct psr_error *err;
+};
+
+/* Returns whether the triangle's shadow on an axis and the cube's are apart. `half`: the cube's edge, halved. */
+static int is_apart(const struct meeting *m, const double axis[3], const double middle[3], double half)
+{
+	const double reach = half * (fabs(axis[0]) + fabs(axis[1]) + fabs(axis[2])), at = v3d_dot(axis, middle);
+	const double a = v3d_dot(axis, m->corner[0]) - at, b = v3d_dot(axis, m->corner[1]) - at;
+	const double c = v3d_dot(axis, m->corner[2]) - at;
+
+	return fmin(a, fmin(b, c)) > reach || fmax(a, fmax(b, c)) < -reach;
+}
+
+/* Separating axes: the triangle's normal, and the products of its sides with the cube's. Those of the cube itself are
+ * the bounds. */
+static int meets(const struct meeting *m, const double middle[3], double half)
+{
+	if (is_apart(m, m->normal, middle, half))
+		return 0;
+	for (int i = 0; i < 3; i++) {
+		const double *s = m->side[i];
+
+		if (is_apart(m, (const double[3]){ 0.0, s[2], -s[1] }, middle, half) ||
+		    is_apart(m, (const double[3]){ -s[2], 0.0, s[0] }, middle, half) ||
+		    is_apart(m, (const double[3]){ s[1], -s[0], 0.0 }, middle, half))
+			return 0;
+	}
+	return 1;
+}
+
+/* at: of the node, in nodes of its size; up: levels above the leaves. */
+static int put_leaves(struct meeting *m, const uint32_t at[3], int up)
+{
+	const double edge = ldexp(1.0, up), middle[3] = { (at[0] + 0.5) * edge, (at[1] + 0.5) * edge, (at[2] + 0.5) * edge };
+	int rc = PSR_OK;
+
+	for (int c = 0; c < 3; c++)
+		if ((int)(at[c] << up) > m->last[c] || (int)((at[c] + 1) << up) - 1 < m->first[c])
+			return PSR_OK;
+	if (!meets(m, middle, 0.5 * edge))
+		return PSR_OK;
+	if (up == 0) {
+		const struct record record = { .path = octree_path(at) };
+
+		return runs_put(&m->runs, &record, m->err);
+	}
+	for (uint32_t j = 0; j < 8 && rc == PSR_OK; j++)
+		rc = put_leaves(m, (const uint32_t[3]){ 2 * at[0] + (j & 1), 2 * at[1] + (j >> 1 & 1), 2 * at[2] + (j >> 2) },
+		                up - 1);
+	return rc;
+}
+
+static int put_triangle(struct meeting *m, const struct octree_surface *s, const uint32_t triangle[3])
+{
+	const int most = (1 << m->levels) - 1;
+	const double scale = ldexp(1.0, m->levels) / s->edge;
+	uint32_t at[3];
+	int up = 0;
+
+	for (int i = 0; i < 3; i++)
+		for (int c = 0; c < 3; c++)
+			m->corner[i][c] = (s->position[triangle[i]][c] - s->low[c]) * scale;
+	for (int i = 0; i < 3; i++)
+		v3d_sub(m->side[i], m->corner[(i + 1) % 3], m->corner[i]);
+	v3d_cross(m->normal, m->side[0], m->side[1]);
+	for (int c = 0; c < 3; c++) {
+		const double low = fmin(m->corner[0][c], fmin(m->corner[1][c], m->corner[2][c]));
+		const double high = fmax(m->corner[0][c], fmax(m->corner[1][c], m->corner[2][c]));
+
+		/* A cell is closed: one that ends where the triangle begins is met. */
+		m->first[c] = (int)fmin(fmax(ceil(low) - 1.0, 0.0), most);
+		m->last[c] = (int)fmin(fmax(floor(high), 0.0), most);
+	}
+	while (m->first[0] >> up != m->last[0] >> up || m->first[1] >> up != m->last[1] >> up ||
+	       m->first[2] >> up != m->last[2] >> up)
+		up++;
+	for (int c = 0; c < 3; c++)
+		at[c] = (uint32_t)m->first[c] >> up;
+	return put_leaves(m, at, up);
+}
+
+static int merge(struct octree **out, struct meeting *m)
+{
+	struct octree_maker maker;
+	const struct record *record;
+	uint64_t last = UINT64_MAX;
+	int rc = octree_maker_init(&maker, m->levels, m->err);
+
+	while (rc == PSR_OK && (record = runs_next(&m->runs, &rc, m->err)) != NULL) {
+		if (record->path != last)
+			rc = octree_maker_put(&maker, record->path, m->err);
+		last = record->path;
+	}
+	if (rc == PSR_OK)
+		*out = octree_maker_take(&maker);
+	octree_maker_fini(&maker);
+	return rc;
+}
+
+int octree_from_surface(struct octree **out, const struct octree_surface *surface, int levels, uint64_t memory,
+                        const char *folder, struct psr_error *err)
+{
+	struct meeting m = { .levels = levels, .err = err };
+	int rc;
+
+	if (levels < OCTREE_LEAST_LEVELS || levels > OCTREE_MOST_LEVELS)
+		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels; %d to %d are possible", levels, OCTREE_LEAST_LEVELS,
+		                OCTREE_MOST_LEVELS);
+	rc = runs_init(&m.runs, folder, 3 * levels, memory, err);
+	for (uint32_t i = 0; i < surface->n_triangles && rc == PSR_OK; i++)
+		rc = put_triangle(&m, surface, surface->triangle[i]);
+	if (rc == PSR_OK)
+		rc = runs_end(&m.runs, err);
+	if (rc == PSR_OK)
+		rc = merge(out, &m);
+	runs_fini(&m.runs);
+	return rc;
+}

@@ -1,0 +1,225 @@
+/* Octrees from clouds and meshes: octree [-n MILLIONS] [-m MB] [-l LEVELS] [-w FILE.las] [FILE]
+ *
+ * Without a file it makes one: a terrain of hills and trees at survey coordinates, in the random order of no scanner.
+ * -w keeps that file. Prints time and peak of memory of building, bits a leaf, and rates of packing. Times are of the
+ * processor. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <unistd.h>
+#include "base/clock.h"
+#include "base/random.h"
+#include "import/cloud/las_source.h"
+#include "octree/build/voxels.h"
+#include "octree/pack.h"
+#include "psr/mesh.h"
+
+#define HEADER 227
+#define RECORD 26 /* point format 2 */
+
+static void put(uint8_t *p, uint64_t x, int n)
+{
+	for (int i = 0; i < n; i++)
+		p[i] = (uint8_t)(x >> 8 * i);
+}
+
+static void put_double(uint8_t *p, double x)
+{
+	uint64_t bits;
+
+	memcpy(&bits, &x, sizeof bits);
+	put(p, bits, 8);
+}
+
+/* A place of a square kilometre in millimetres, with 3 cm of noise; one of four is in a tree. */
+static void make_point(uint8_t p[RECORD], uint64_t *random)
+{
+	const double x = random_in(random, 0.0, 1000.0), y = random_in(random, 0.0, 1000.0);
+	const double ground = 40.0 * sin(x / 170.0) * cos(y / 130.0) + 6.0 * sin(x / 19.0 + y / 23.0);
+	const int is_tree = random_below(random, 4) == 0 && sin(x / 7.0) * sin(y / 9.0) > 0.3;
+	const double z = ground + (is_tree ? random_in(random, 2.0, 15.0) : random_in(random, -0.03, 0.03));
+
+	memset(p, 0, RECORD);
+	put(p, (uint64_t)(int64_t)(x * 1000.0), 4);
+	put(p + 4, (uint64_t)(int64_t)(y * 1000.0), 4);
+	put(p + 8, (uint64_t)(int64_t)floor(z * 1000.0), 4);
+	p[15] = is_tree ? 5 : 2;
+	put(p + 20, is_tree ? 9000 : 30000, 2);
+	put(p + 22, is_tree ? 30000 : 26000, 2);
+	put(p + 24, 8000 + (uint64_t)random_below(random, 2000), 2);
+}
+
+static int make_file(const char *path, uint64_t n)
+{
+	uint8_t header[HEADER] = "LASF", point[RECORD];
+	uint64_t random = 1;
+	FILE *file = fopen(path, "wb");
+
+	if (file == NULL)
+		return 0;
+	header[24] = 1;
+	header[25] = 2;
+	put(header + 94, HEADER, 2);
+	put(header + 96, HEADER, 4);
+	header[104] = 2;
+	put(header + 105, RECORD, 2);
+	put(header + 107, n, 4);
+	for (int c = 0; c < 3; c++) {
+		put_double(header + 131 + 8 * c, 0.001);
+		put_double(header + 155 + 8 * c, c == 0 ? 412000.0 : c == 1 ? 5312000.0 : 120.0);
+	}
+	fwrite(header, 1, sizeof header, file);
+	for (uint64_t i = 0; i < n; i++) {
+		make_point(point, &random);
+		fwrite(point, 1, sizeof point, file);
+	}
+	return fclose(file) == 0;
+}
+
+static double used_seconds(void)
+{
+	return (double)clock_read(CLOCK_PROCESS_CPUTIME_ID) * 1e-9;
+}
+
+static double peak_mb(void)
+{
+	struct rusage usage;
+
+	getrusage(RUSAGE_SELF, &usage);
+	return (double)usage.ru_maxrss / 1024.0;
+}
+
+static int print_packing(const struct octree *tree, enum octree_packing packing, struct psr_error *err)
+{
+	const double begin = used_seconds(), n = (double)tree->n_leaves;
+	double middle;
+	struct octree *again;
+	uint8_t *bytes;
+	size_t n_bytes;
+	int rc = octree_pack(&bytes, &n_bytes, tree, packing, NULL, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	middle = used_seconds();
+	rc = octree_unpack(&again, bytes, n_bytes, tree->n_leaves, NULL, err);
+	if (rc == PSR_OK)
+		printf("%-8s %6.2f bits a leaf, coded %5.1f and decoded %5.1f M leaves/s on one thread\n",
+		       packing == OCTREE_FAST ? "fast" : "packed", 8.0 * (double)n_bytes / n, n / (middle - begin) * 1e-6,
+		       n / (used_seconds() - middle) * 1e-6);
+	free(bytes);
+	if (rc == PSR_OK)
+		octree_destroy(again);
+	return rc;
+}
+
+static int print_packings(const struct octree *tree, struct psr_error *err)
+{
+	int rc;
+
+	printf("%-8s %6.2f bits a leaf\n", "in core", 8.0 * (double)tree->n_codes / (double)tree->n_leaves);
+	rc = print_packing(tree, OCTREE_SMALL, err);
+	return rc == PSR_OK ? print_packing(tree, OCTREE_FAST, err) : rc;
+}
+
+static int measure_cloud(const char *path, const struct octree_build_options *options, struct psr_error *err)
+{
+	struct octree_source source;
+	struct octree *tree;
+	const double begin = used_seconds();
+	int rc = las_source_open(&source, path, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = octree_build(&tree, &source, options, err);
+	if (rc == PSR_OK)
+		printf("%.1f M points, %d levels: built in %.1f s, peak %.0f MB; %.2f M leaves (%.0f %% of the points)\n",
+		       (double)source.n_points * 1e-6, tree->levels, used_seconds() - begin, peak_mb(),
+		       (double)tree->n_leaves * 1e-6, 100.0 * (double)tree->n_leaves / (double)source.n_points);
+	las_source_close(&source);
+	if (rc != PSR_OK)
+		return rc;
+	rc = print_packings(tree, err);
+	octree_destroy(tree);
+	return rc;
+}
+
+static int measure_mesh(const char *path, const struct octree_build_options *options, struct psr_error *err)
+{
+	struct octree_surface surface = { .edge = 0.0 };
+	struct psr_mesh *mesh;
+	struct octree *tree;
+	double begin;
+	int rc = psr_mesh_import(&mesh, path, NULL, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	surface.position = (const double (*)[3])mesh->position;
+	surface.triangle = (const uint32_t (*)[3])mesh->triangle;
+	surface.n_triangles = mesh->n_triangles;
+	for (int c = 0; c < 3; c++) {
+		double high = mesh->position[0][c];
+
+		surface.low[c] = high;
+		for (uint32_t i = 1; i < mesh->n_vertices; i++) {
+			surface.low[c] = fmin(surface.low[c], mesh->position[i][c]);
+			high = fmax(high, mesh->position[i][c]);
+		}
+		surface.edge = fmax(surface.edge, high - surface.low[c]);
+	}
+	begin = used_seconds();
+	rc = octree_from_surface(&tree, &surface, options->levels, options->memory, options->folder, err);
+	if (rc == PSR_OK) {
+		printf("%.2f M triangles, %d levels: built in %.1f s; %.2f M leaves\n", (double)mesh->n_triangles * 1e-6,
+		       tree->levels, used_seconds() - begin, (double)tree->n_leaves * 1e-6);
+		rc = print_packings(tree, err);
+		octree_destroy(tree);
+	}
+	psr_mesh_destroy(mesh);
+	return rc;
+}
+
+int main(int argc, char **argv)
+{
+	char made[] = "/tmp/psr-bench-octree-XXXXXX";
+	const char *path = NULL;
+	uint64_t n = 20, memory = 1024;
+	int levels = 12, option, rc, is_kept = 0;
+	struct octree_build_options options;
+	struct psr_error err;
+
+	while ((option = getopt(argc, argv, "n:m:l:w:")) != -1) {
+		if (option == '?')
+			return 2;
+		n = option == 'n' ? strtoull(optarg, NULL, 10) : n;
+		memory = option == 'm' ? strtoull(optarg, NULL, 10) : memory;
+		levels = option == 'l' ? atoi(optarg) : levels;
+		path = option == 'w' ? optarg : path;
+	}
+	is_kept = path != NULL;
+	if (optind < argc) {
+		path = argv[optind];
+		is_kept = 1;
+	} else {
+		const int fd = path == NULL ? mkstemp(made) : -1;
+
+		if (fd >= 0)
+			close(fd);
+		path = path != NULL ? path : made;
+		if (!make_file(path, n * 1000000)) {
+			fprintf(stderr, "octree: %s cannot be written\n", path);
+			return 3;
+		}
+	}
+	octree_build_options_default(&options);
+	options.levels = levels;
+	options.memory = memory << 20;
+	rc = optind < argc && strstr(path, ".las") == NULL ? measure_mesh(path, &options, &err)
+	                                                   : measure_cloud(path, &options, &err);
+	if (!is_kept)
+		unlink(path);
+	if (rc != PSR_OK)
+		fprintf(stderr, "octree: %s\n", err.text);
+	return psr_exit_status(rc);
+}
