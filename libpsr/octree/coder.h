@@ -1,5 +1,5 @@
-/* An adaptive binary arithmetic coder: integers alone, the same bytes on every machine. One function codes a bit in both
- * directions, so a model is written once. Probabilities have 16 bits: of a 1. */
+/* An adaptive binary arithmetic coder: integers alone, the same bytes on every machine. One function codes a bit in
+ * both directions, so a model is written once. Probabilities have 16 bits: of a 1. */
 #ifndef PSR_OCTREE_CODER_H
 #define PSR_OCTREE_CODER_H
 
@@ -109,8 +109,8 @@ static inline __attribute__((always_inline)) unsigned coder_bit(struct coder *c,
 	return bit;
 }
 
-/* Codes a bit by a probability that learns from it: by a part of 2^-rate of what it was wrong, rate 4 or 5. It starts as
- * CODER_EVEN, and stays above 14 and below 65521 by itself. */
+/* Codes a bit by a probability that learns from it: by a part of 2^-rate of what it was wrong, rate 4 or 5. It starts
+ * as CODER_EVEN, and stays above 14 and below 65521 by itself. */
 #define CODER_EVEN 32768
 static inline __attribute__((always_inline)) unsigned coder_adaptive(struct coder *c, int is_decoding, uint16_t *p,
                                                                      unsigned rate, unsigned bit)

@@ -1,7 +1,7 @@
-/* Octrees of byte codes ([B] 2): a cube, split `levels` times into octants, and which of its smallest cells, the leaves,
- * hold points. A byte code is a node: bit j says that octant j is not empty; j is x + 2y + 4z, where x is 1 for the
- * upper half. So no code is 0. A path names a node: the octants from the root, three bits each, the last one lowest.
- * Paths of one depth, sorted, are in Morton order. */
+/* Octrees of byte codes ([B] 2): a cube, split `levels` times into octants, and which of its smallest cells, the
+ * leaves, hold points. A byte code is a node: bit j says that octant j is not empty; j is x + 2y + 4z, where x is 1 for
+ * the upper half. So no code is 0. A path names a node: the octants from the root, three bits each, the last one
+ * lowest. Paths of one depth, sorted, are in Morton order. */
 #ifndef PSR_OCTREE_OCTREE_H
 #define PSR_OCTREE_OCTREE_H
 

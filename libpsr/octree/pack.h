@@ -25,9 +25,9 @@
 int octree_pack(uint8_t **bytes, size_t *n_bytes, const struct octree *tree, enum octree_packing packing,
                 struct psr_pool *pool, struct psr_error *err);
 
-/* Unpacks a tree without attributes, of the cube from 0 to 1. FORMAT for whatever octree_pack() does not write; LIMIT: it
- * promises more than max_leaves; MEMORY. Takes memory for what the bytes hold, some 10 KB a byte at worst, and never for
- * what they promise. */
+/* Unpacks a tree without attributes, of the cube from 0 to 1. FORMAT for what octree_pack() does not write; LIMIT: it
+ * promises more than max_leaves; MEMORY. Takes memory for what the bytes hold, some 10 KB a byte at worst, and never
+ * for what they promise. */
 int octree_unpack(struct octree **out, const uint8_t *bytes, size_t n_bytes, uint64_t max_leaves,
                   struct psr_pool *pool, struct psr_error *err);
 

@@ -1,4 +1,4 @@
-/* The points of a LAS file as they come: without those that las_is_left_out() names, in the file's coordinates, z up. */
+/* The points of a LAS file as they come, in its coordinates, z up; without those that las_is_left_out() names. */
 #ifndef PSR_IMPORT_CLOUD_LAS_SOURCE_H
 #define PSR_IMPORT_CLOUD_LAS_SOURCE_H
 

@@ -41,12 +41,12 @@ struct octree_build_options {
 void octree_build_options_default(struct octree_build_options *options);
 
 /* Builds a tree with normals, offsets, and colours if the source has any. Colours and places of a leaf's points are
- * averaged. Normals are least squares over a leaf's surroundings of some six leaves a cell in 27 cells; neighbours agree
+ * averaged. Normals are least squares over 27 cells around, of some six leaves each; neighbours agree
  * about their sides, and the highest place of what hangs together looks up.
  *
  * FORMAT: no points, a place that is not finite, all points at one place; ARG: options out of range, a spacing finer
- * than OCTREE_MOST_LEVELS levels; IO: the disk is full; MEMORY, CANCELLED; and errors of the source. Runs have no names:
- * no file is left, whatever happens. */
+ * than OCTREE_MOST_LEVELS levels; IO: the disk is full; MEMORY, CANCELLED; and errors of the source. Runs have no
+ * names: no file is left, whatever happens. */
 int octree_build(struct octree **out, const struct octree_source *source, const struct octree_build_options *options,
                  struct psr_error *err);
 

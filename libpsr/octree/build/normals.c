@@ -23,7 +23,7 @@ struct normals {
 	struct moments *moments;
 	float (*normal)[3];
 	uint32_t *root;               /* a forest of cells whose sides agree: the one above, twice, and 1 if it is turned */
-	uint32_t *highest;            /* of the cells of a tree, at its root */
+	uint32_t *highest;            /* of the cells of a tree of the forest, at its root */
 	float *height;                /* of each cell's leaves, in cells */
 	uint8_t *is_turned;           /* cells whose normals have to look the other way */
 	float least;                  /* joining cells: agreement of their normals */
@@ -255,7 +255,8 @@ static int allocate(struct normals *s)
 	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->offset = malloc(tree->n_leaves);
 	return filling.has_failed || s->first == NULL || s->moments == NULL || s->normal == NULL || s->root == NULL ||
-	               s->highest == NULL || s->height == NULL || s->is_turned == NULL || tree->normal == NULL || tree->offset == NULL
+	               s->highest == NULL || s->height == NULL || s->is_turned == NULL || tree->normal == NULL ||
+	               tree->offset == NULL
 	           ? PSR_ERR_MEMORY
 	           : PSR_OK;
 }

@@ -183,7 +183,7 @@ int runs_end(struct runs *runs, struct psr_error *err)
 	if (runs->heap == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory to merge %zu runs of points", runs->n_runs);
 	if (runs->run_room == 0)
-		return psr_fail(err, PSR_ERR_LIMIT, "%zu runs of points, of %zu points each, are too many to merge; allow more memory",
+		return psr_fail(err, PSR_ERR_LIMIT, "%zu runs, of %zu points each, are too many to merge; allow more memory",
 		                runs->n_runs, runs->room);
 	for (size_t i = 0; i < runs->n_runs && rc == PSR_OK; i++) {
 		runs->run[i].record = runs->record + i * runs->run_room;

@@ -120,12 +120,10 @@ static int look(const struct octree_node *node, void *userdata)
 	return 0;
 }
 
-/* Normals of a sphere: a leaf's middle is at most 0.87 leaves from the sphere, and shares the normal of a cell some three
- * leaves wide, whose middle is up to 2.6 leaves away: 3.5 of the radius' 64 leaves are 3.1 degrees, and points at random
- * add the slope of a plane through 27 cells of six leaves, with an error of one leaf each (1 in 6 / sqrt(162)). 15 degrees
- * are what no leaf of a wrong side or of no plane keeps. Places: half an offset's step, 0.22 leaves, and the sphere's own
- * points that a mean is of are up to 0.87 leaves beside it along the surface, where the surface leaves the normal by
- * the sine of the same 15 degrees. */
+/* Bounds. A leaf shares the normal of a cell of some three leaves, so its middle is up to 2.6 leaves from the
+ * cell's, and 0.9 from the sphere: 3.1 degrees of a radius of 64 leaves. The plane of 27 cells is of 162 leaves, each off by one at
+ * most, within 4 leaves of it: that tilts it by less than 12 degrees. Half a step of an offset is 0.22 leaves, and a
+ * mean of points is up to 0.87 leaves beside the middle, where the sphere rises by the sine of these 15 degrees. */
 static void every_point_is_within_its_leaf_and_normals_look_out(void **state)
 {
 	struct octree *tree = sphere(POINTS, LEVELS, OCTREE_LEAST_MEMORY);

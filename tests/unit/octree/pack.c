@@ -74,8 +74,7 @@ static void threads_pack_the_same_bytes_and_unpack_the_same_tree(void **state)
 	octree_destroy(again);
 }
 
-/* A surface costs less than [B] table 1's best, 0.9 bits a leaf, though this one is small; dust costs less than its codes
- * do. */
+/* A surface costs less than the best of [B] table 1, 0.9 bits a leaf, though this one is small. */
 static void surfaces_pack_well(void **state)
 {
 	struct octree *tree = make(8, 0);
