@@ -529,7 +529,7 @@ static void report_says_which_effects_ran_and_why_others_did_not(void **state)
 	(void)state;
 	assert_int_equal(psr("shot --model cube --size 20x10 --spacing 0.5 --smooth --report r.json --effects"), 0);
 	assert_string_equal(out, "levels     ran: 3 depth buffers in addition to the picture's\n"
-	                         "specular   left out: no sample in view is specular, or no light shines\n");
+	                         "specular   left out: no sample in view mirrors light\n");
 	read_back("r.json", text, sizeof text);
 	report = cJSON_Parse(text);
 	assert_true(cJSON_GetObjectItem(report, "spacing_px")->valuedouble == 0.5);
@@ -540,7 +540,7 @@ static void report_says_which_effects_ran_and_why_others_did_not(void **state)
 	assert_int_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "levels"), "count")->valueint, 3);
 	assert_true(cJSON_IsFalse(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "specular"), "ran")));
 	assert_string_equal(cJSON_GetObjectItem(cJSON_GetObjectItem(effects, "specular"), "why")->valuestring,
-	                    "no sample in view is specular, or no light shines");
+	                    "no sample in view mirrors light");
 	cJSON_Delete(report);
 }
 

@@ -244,7 +244,7 @@ static void versions_are_refused_by_major_and_section(void **state)
 	bytes = copy_original();
 	file_put(bytes + HEADER_MAJOR, 2, 3);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);
-	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 5.x"));
+	assert_non_null(strstr(err.text, "the file has format 3.0, and this build reads 6.x"));
 	bytes = copy_original();
 	file_put(entry_of(bytes, "DPTH") + ENTRY_VERSION, 2, 9);
 	assert_int_equal(parse_sealed(bytes, n_bytes, &err), PSR_ERR_VERSION);

@@ -424,7 +424,7 @@ static void stats_count_what_happened(void **state)
 	peer_send(&p);
 	peer_expect(&p, &message, PSR_MSG_STATS_REPLY, p.id);
 	assert_int_equal(psr_msg_stats_reply_decode(&reply, message.payload, message.n, NULL), PSR_OK);
-	assert_int_equal(reply.n_stats, 31);
+	assert_int_equal(reply.n_stats, 35);
 	assert_int_equal(reply.stat[3].id, PSR_STAT_MODELS);
 	assert_int_equal(reply.stat[3].value, 1);
 	assert_true(reply.stat[5].value >= 1);
