@@ -1,4 +1,5 @@
 /* What a link tells of the surface at a place: the plane *normal* of a frame, and the instance. */
+#define _GNU_SOURCE
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -108,6 +109,7 @@ static void the_instance_is_the_one_in_front(void **state)
 	assert_int_equal(surface.instance, 1);
 	instance[1].translation[2] = -5;
 	say_wish(&wish);
+	link_release(wait_sharp()); /* a probe asks about what was drawn last */
 	ask(&surface, 160.5, 120.5);
 	assert_int_equal(surface.instance, 0);
 	link_close(link_);
