@@ -182,8 +182,9 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 static void put_color(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit, uint8_t rgb[3])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
-	const float *normal = ray_scene_normal(truth->scene, hit->prim);
-	const uint64_t attr = surface_attr(&truth->surface, &place, 0, normal);
+	float side[3];
+	v3f_scale(side, ray_scene_normal(truth->scene, hit->prim), hit->is_back ? -1.0f : 1.0f);
+	const uint64_t attr = surface_attr(&truth->surface, &place, 0, side);
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 	double light[3], to_eye[3];
 	struct look look;
