@@ -31,7 +31,8 @@ struct psr_truth_shot {
 
 /* Traces one ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in
  * world units, +inf where the ray meets nothing; normal: unit, towards the eye, world; both width * side by height *
- * side; normal and rgb may be NULL. rgb: the colour in ambient light 1, sRGB, 3 bytes. */
+ * side; normal and rgb may be NULL. rgb: the colour in ambient light 1, seen from the eye,
+ * sRGB, 3 bytes. */
 int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
                    struct psr_error *err);
 

@@ -148,9 +148,9 @@ static void colors_are_compared_within_a_pixel(void **state)
 	assert_int_equal(psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, rgb, NULL), PSR_OK);
 	assert_int_equal(psr_accuracy_measure_color(&color, &SHOT(f, 1), rgb, NULL), PSR_OK);
 	assert_true(color.n_compared > 0 && color.n_wrong == 0 && color.mean == 0);
-	/* White is 255: what is as far off as is allowed, what is further, and what is outside and does not count. */
-	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2) + 1] = 255 - PSR_COLOR_WRONG;
-	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2 + 5) + 2] = 255 - PSR_COLOR_WRONG - 1;
+	/* What is as far off as is allowed, what is further, and what is outside and does not count. */
+	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2) + 1] -= PSR_COLOR_WRONG;
+	rgb[3 * (SIDE / 2 * SIDE + SIDE / 2 + 5) + 2] -= PSR_COLOR_WRONG + 1;
 	rgb[0] = 77;
 	assert_int_equal(psr_accuracy_measure_color(&color, &SHOT(f, 1), rgb, NULL), PSR_OK);
 	assert_int_equal(color.n_wrong, 1);
