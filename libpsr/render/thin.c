@@ -8,10 +8,11 @@
  * Measured: a pine tree and a tree in passes 0 to 4, at magnifications 0.25 to 1. */
 #define POINT_SHARE 0.32f
 #define DISC_SHARE 0.5f
-/* Pixels between samples that are points; those further apart are discs. Gaps of a pixel in a needle let the light
- * through that the points beside them keep back too much. */
+/* Pixels between samples that are points. Those further apart are wider: discs in refinement, squares in pass 0, where
+ * discs would take twenty times as long. Gaps of a pixel in a needle let the light through that the points beside them
+ * keep back too much. */
 #define MOST_APART 2
-#define DISC_LEVEL 2
+#define WIDE_LEVEL 2
 
 uint32_t thin_end(const struct plan *plan, const struct bins *bins, uint32_t begin, uint32_t end)
 {
@@ -62,24 +63,61 @@ static float through_veil(uint32_t veil)
 	return part * psr_float_from_bits((127 - (veil >> 16)) << 23);
 }
 
-/* Returns the square of the distance between a block's samples, in pixels, where they are points. */
-static float pixels_apart2(const struct sheer_drawing *d, const struct bin_entry *entry)
+/* Returns the distance between a block's samples, in pixels, where they are nearest to the eye. */
+static float pixels_apart(const struct sheer_drawing *d, const struct bin_entry *entry)
 {
 	const struct plan_instance *in = &d->plan->instance[entry->instance];
 	const float step = splat_rim(in, entry->slot - in->first_slot) * d->plan->focal;
-	const float apart = d->plan->perspective ? step / d->bins->hit[entry->hit].near : step, apart2 = apart * apart;
 
-	return apart2 < MOST_APART * MOST_APART ? apart2 : MOST_APART * MOST_APART;
+	return d->plan->perspective ? step / d->bins->hit[entry->hit].near : step;
 }
 
-static void add_points(const struct thin_layer *layer, const struct sheer_drawing *d, const struct bin_entry *entry,
-                       const struct warp_target *target)
+/* The square of pixels that a block's samples stand for. */
+struct spot {
+	int32_t side;
+	float area; /* the veil of each of its pixels, in those of a point or disc a pixel wide */
+};
+
+static void find_spot(struct spot *spot, const struct sheer_drawing *d, const struct bin_entry *entry)
+{
+	const float apart = pixels_apart(d, entry);
+	const int32_t most = (1 << entry->level) + 2; /* blocks are binned for that reach */
+
+	if (entry->level < WIDE_LEVEL) {
+		*spot = (struct spot){ 1, apart < MOST_APART ? apart * apart : MOST_APART * MOST_APART };
+		return;
+	}
+	const int32_t side = apart < (float)most ? (int32_t)(apart + 0.5f) : most;
+	*spot = (struct spot){ side > 1 ? side : 1, 1 };
+}
+
+/* Hangs a veil before the pixels x .. x + side - 1 and y .. y + side - 1, as far as they are in the tile. */
+static inline void add_spot(const struct thin_layer *layer, const struct warp_target *t, int32_t x, int32_t y,
+                            int32_t side, uint64_t word, uint32_t veil)
+{
+	const int32_t x0 = x > t->x0 ? x : t->x0, x1 = x + side < t->x1 ? x + side : t->x1;
+	const int32_t y0 = y > t->y0 ? y : t->y0, y1 = y + side < t->y1 ? y + side : t->y1;
+
+	for (int32_t row = y0; row < y1; row++)
+		for (int32_t column = x0; column < x1; column++)
+			thin_add(layer, (uint32_t)(row - t->y0) * t->stride + (uint32_t)(column - t->x0), word, veil);
+}
+
+static void add_spots(const struct thin_layer *layer, const struct sheer_drawing *d, const struct bin_entry *entry,
+                      const struct warp_target *target)
 {
 	const struct plan *plan = d->plan;
 	const struct warp_instance *in = &plan->warp[entry->instance];
-	const float area = pixels_apart2(d, entry);
 	struct warp_terms terms;
 	struct warp_block b;
+	struct spot spot;
+
+	find_spot(&spot, d, entry);
+	/* Of the square's corner from its sample, and of the tile's pixels from the corners that reach it. */
+	const float half = 0.5f * (float)(spot.side - 1), area = spot.area, near_z = plan->near_z;
+	const float x0 = (float)(target->x0 - spot.side + 1), x1 = (float)target->x1;
+	const float y0 = (float)(target->y0 - spot.side + 1), y1 = (float)target->y1;
+	const int perspective = plan->perspective;
 
 	warp_block_make(&b, in, entry->slot);
 	warp_terms_make(&terms, &b);
@@ -87,16 +125,15 @@ static void add_points(const struct thin_layer *layer, const struct sheer_drawin
 	for (uint64_t left = b.mask; left; left &= left - 1, b.depth++, opacity++) {
 		const uint32_t sample = (uint32_t)__builtin_ctzll(left), r = sample >> 3, c = sample & 7;
 		const float depth = (float)*b.depth, z = warp_axis(&terms, &b, 2, r, c, depth);
-		const float inverse = plan->perspective ? 1 / z : 1;
-		const float u = warp_axis(&terms, &b, 0, r, c, depth) * inverse;
-		const float v = warp_axis(&terms, &b, 1, r, c, depth) * inverse;
+		const float inverse = perspective ? 1 / z : 1;
+		const float x = warp_axis(&terms, &b, 0, r, c, depth) * inverse - half;
+		const float y = warp_axis(&terms, &b, 1, r, c, depth) * inverse - half;
 
-		if (!(z > plan->near_z && u >= (float)target->x0 && u < (float)target->x1 && v >= (float)target->y0
-		      && v < (float)target->y1))
+		if (!(z > near_z && x >= x0 && x < x1 && y >= y0 && y < y1))
 			continue;
-		const uint32_t x = (uint32_t)((int32_t)u - target->x0), y = (uint32_t)((int32_t)v - target->y0);
 		const uint64_t word = (uint64_t)psr_bits_from_float(z) << 32 | (b.id + sample);
-		thin_add(layer, y * target->stride + x, word, (uint32_t)(layer->bits[*opacity] * area));
+		const uint32_t veil = (uint32_t)(layer->bits[*opacity] * area);
+		add_spot(layer, target, psr_floor_int(x), psr_floor_int(y), spot.side, word, veil);
 	}
 }
 
@@ -139,13 +176,13 @@ void thin_draw(struct sheer_tile *l, const struct sheer_drawing *d, const struct
 		}
 	for (uint32_t e = entries->begin; e < entries->end && !(e % 8 == 0 && plan_is_cancelled(d->plan)); e++) {
 		const struct bin_entry *entry = &d->bins->entry[e];
-		const int is_disc = entry->level >= DISC_LEVEL;
+		const int is_wide = entry->level >= WIDE_LEVEL;
 
-		layer.bits = bits[is_disc];
-		if (is_disc)
+		layer.bits = bits[is_wide];
+		if (is_wide && d->plan->with_splats)
 			splat_veil(d->plan, entry, target, &layer);
 		else
-			add_points(&layer, d, entry, target);
+			add_spots(&layer, d, entry, target);
 	}
 	for (uint32_t y = area->low_y; y < area->high_y; y++)
 		for (uint32_t x = 0; x < area->width && !plan_is_cancelled(d->plan); x += STRIP)
