@@ -285,6 +285,9 @@ static int check_offered(const struct psr_client *client, uint16_t view, const s
 		{ asked->pass_limit > 0, PSR_CAP_REFINE, "refine frames" },
 		{ asked->budget == PSR_WIRE_BUDGET_SETTINGS && asked->settings.scale != 1, PSR_CAP_SETTINGS,
 		  "draw at other scales" },
+		{ asked->budget == PSR_WIRE_BUDGET_TIME, PSR_CAP_TIME_BUDGET, "keep budgets of time" },
+		{ asked->budget == PSR_WIRE_BUDGET_ERROR, PSR_CAP_ERROR_BOUND, "keep bounds on the error" },
+		{ asked->settings.pass > 0, PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND, "draw a pass at once" },
 		{ asked->depth_format > PSR_WIRE_DEPTH_F32, PSR_CAP_DEPTH_U16, "send depth as u16" },
 		{ asked->flags & PSR_WIRE_FRAME_SHARP, PSR_CAP_SHARP, "send sharp frames" },
 	};
@@ -312,10 +315,8 @@ int psr_client_frame_in(struct psr_client *client, uint16_t view, const struct p
 	if (frame == NULL)
 		return psr_fail(err, PSR_ERR_BUSY, "%s takes %u requests at a time", client->address,
 		                view > 0 ? PSR_WIRE_MAX_OPEN : client->welcome.max_open);
-	if (asked->color_codec > PSR_CODEC_ZSTD
-	    || (asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS))
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this client asks for frames without PNG, and without budgets of time "
-		                                          "or error");
+	if (asked->color_codec > PSR_CODEC_ZSTD)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this client asks for frames without PNG");
 	if (asked->base != 0 && asked->base != psr_client_base(client, view))
 		return psr_fail(err, PSR_ERR_ARG, "frame %" PRIu32 " is no base: the last one acknowledged in view %u is %" PRIu32,
 		                asked->base, view, psr_client_base(client, view));

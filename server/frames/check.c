@@ -6,6 +6,8 @@
 int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, int64_t max_pixels,
                 struct psr_error *err)
 {
+	const int is_chosen = frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR
+	                      || frame->settings.pass > 0;
 	uint64_t n_pixels = (uint64_t)frame->width * frame->height;
 
 	if (view >= SCHEDULE_VIEWS)
@@ -29,8 +31,13 @@ int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, i
 	if (frame->pass_limit > PSR_MAX_PASS)
 		return psr_fail(err, PSR_ERR_LIMIT, "this server refines a picture in %d passes at most, not in %u", PSR_MAX_PASS,
 		                frame->pass_limit);
-	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "this server keeps no %s; ask with budget 0",
-		                frame->budget == PSR_WIRE_BUDGET_TIME ? "time budgets" : "error bounds");
+	if (frame->settings.pass > 0 && frame->planes & ~(1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "this server refines colour and depth; other planes take settings of pass 0, not %u",
+		                frame->settings.pass);
+	if (is_chosen && (frame->pass_limit > 0 || frame->flags & PSR_WIRE_FRAME_SHARP))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "a budget of time or error, and settings of a pass, say how the only picture is drawn: they go "
+		                "with pass_limit 0 and without sharp (flag 2)");
 	return PSR_OK;
 }

@@ -1,8 +1,10 @@
 #include <assert.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
+#include "model/blocks.h"
 #include "draw.h"
 #include "render/need.h"
 
@@ -39,18 +41,40 @@ uint64_t draw_worker_bytes(const struct draw_worker *worker)
 	return psr_renderer_bytes(worker->renderer) + worker->capacity;
 }
 
-/* Resolved. */
-static struct psr_msg_settings settings_of(const struct psr_msg_frame *request, int is_sharp)
+/* Of budgets 0 and 3. */
+static struct psr_msg_settings settings_of(const struct psr_msg_frame *request)
 {
-	struct psr_msg_settings settings = { .scale = 1, .spacing_px = 1 };
+	const struct psr_msg_settings settings = { .scale = 1, .spacing_px = 1 };
 
-	if (request->budget == PSR_WIRE_BUDGET_SETTINGS)
-		settings = request->settings;
-	if (is_sharp) {
-		settings.scale = 1;
-		settings.is_smooth = 1;
+	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings : settings;
+}
+
+/* A long frame ends by the limit on its time on cores: the budget stays below it with all of them at work. */
+static double time_limit(const struct drawing *d)
+{
+	return fmin((double)d->request.time_budget_us * 1e3, (double)d->limit_ns / psr_pool_threads(d->pool));
+}
+
+void draw_resolve(struct drawing *d, const struct budget_learnt *learnt)
+{
+	const struct psr_msg_frame *request = &d->request;
+
+	d->seen = (struct budget_view){
+		.width = request->width, .height = request->height, .planes = request->planes,
+		.area = scene_area(d->scene, &request->camera, request->width, request->height),
+		.n_samples = (double)scene_blocks(d->scene) * PSR_BLOCK_SAMPLES,
+	};
+	if (request->budget == PSR_WIRE_BUDGET_TIME)
+		budget_choose_time(&d->choice, learnt, &d->seen, time_limit(d));
+	else if (request->budget == PSR_WIRE_BUDGET_ERROR)
+		budget_choose_error(&d->choice, learnt, &d->seen, request->error_bound_px);
+	else
+		d->choice.chosen.settings = settings_of(request);
+	d->settings = d->choice.chosen.settings;
+	if (d->is_sharp) {
+		d->settings.scale = 1;
+		d->settings.is_smooth = 1;
 	}
-	return settings;
 }
 
 /* The codecs of a sharp frame lose nothing. */
@@ -64,7 +88,7 @@ static void sharpen(struct psr_msg_frame *request)
 
 int draw_is_sharp(const struct psr_msg_frame *request)
 {
-	const struct psr_msg_settings settings = settings_of(request, 0);
+	const struct psr_msg_settings settings = settings_of(request);
 	const int is_lossless = request->color_codec == PSR_CODEC_RAW || request->color_codec == PSR_CODEC_ZSTD;
 
 	return settings.scale == 1 && settings.is_smooth && is_lossless;
@@ -73,6 +97,13 @@ int draw_is_sharp(const struct psr_msg_frame *request)
 static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
 {
 	end->entry[end->n_entries++] = (struct psr_msg_report_entry){ .id = (uint16_t)id, .ns = ns, .count = count };
+}
+
+/* Frames without a budget of time or error have none. */
+static void add_price(struct psr_msg_frame_end *end, unsigned id, const struct budget_price *price)
+{
+	if (price->ns > 0)
+		add_entry(end, id, (uint64_t)price->ns, psr_settings_pack(&price->settings));
 }
 
 struct times { /* clock_ns() */
@@ -98,6 +129,9 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_SHADOW, report->ns[PSR_STAGE_SHADOW], report->count[PSR_STAGE_SHADOW]);
 	add_entry(end, PSR_WIRE_REPORT_SMOOTH, report->ns[PSR_STAGE_SMOOTH], report->count[PSR_STAGE_SMOOTH]);
 	add_entry(end, PSR_WIRE_REPORT_CORES, pool_job_used_ns(), 0);
+	add_price(end, PSR_WIRE_REPORT_CHOSEN, &d->choice.chosen);
+	add_price(end, PSR_WIRE_REPORT_CHEAPER, &d->choice.cheaper);
+	add_price(end, PSR_WIRE_REPORT_BETTER, &d->choice.better);
 	add_entry(end, PSR_WIRE_REPORT_SAMPLES_WARPED, 0, report->n_samples_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS_DRAWN, 0, report->n_blocks_drawn);
 	add_entry(end, PSR_WIRE_REPORT_BLOCKS, 0, report->n_blocks);
@@ -112,6 +146,22 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }
 
+static void fill_spent(struct budget_spent *spent, const struct psr_report *report, unsigned scale)
+{
+	const uint64_t *ns = report->ns;
+
+	*spent = (struct budget_spent){
+		.ns = {
+			[BUDGET_SAMPLES] = (double)(ns[PSR_STAGE_PLAN] + ns[PSR_STAGE_CULL] + ns[PSR_STAGE_WARP]),
+			[BUDGET_PIXELS] = (double)(ns[PSR_STAGE_GAPS] + ns[PSR_STAGE_RESOLVE] + ns[PSR_STAGE_SHADE]
+			                           + ns[PSR_STAGE_FILL]),
+			[BUDGET_SMOOTH] = (double)ns[PSR_STAGE_SMOOTH],
+			[BUDGET_SHADOWS] = (double)ns[PSR_STAGE_SHADOW],
+		},
+		.error_px = report->error_px * scale,
+	};
+}
+
 static int emit_begin(const struct drawing *d, const struct psr_msg_frame *shown, struct psr_error *err)
 {
 	const struct psr_msg_frame *request = &d->request;
@@ -122,7 +172,7 @@ static int emit_begin(const struct drawing *d, const struct psr_msg_frame *shown
 		.depth_format = request->depth_format, .depth_codec = request->depth_codec, .data_codec = request->data_codec,
 		.background = { d->scene->background[0], d->scene->background[1], d->scene->background[2] },
 		.base = d->base != NULL ? d->base->id : 0, .base_pass = d->base != NULL ? (uint16_t)d->base->frame : 0,
-		.settings = settings_of(request, d->is_sharp),
+		.settings = d->settings,
 		.depth_min = request->depth_min, .depth_max = request->depth_max, .camera = request->camera,
 	};
 	struct outq_chunk *chunk = outq_chunk_create(CONTROL_BYTES);
@@ -141,11 +191,23 @@ static int emit_begin(const struct drawing *d, const struct psr_msg_frame *shown
 	return code;
 }
 
+static uint8_t status_of(const struct drawing *d)
+{
+	const struct psr_msg_frame *request = &d->request;
+
+	if (request->budget == PSR_WIRE_BUDGET_TIME && d->spent.total_ns > (double)request->time_budget_us * 1e3)
+		return PSR_WIRE_FRAME_LATE;
+	if (request->budget == PSR_WIRE_BUDGET_ERROR && d->spent.error_px > request->error_bound_px)
+		return PSR_WIRE_FRAME_COARSE;
+	return PSR_WIRE_FRAME_OK;
+}
+
 struct outq_chunk *draw_take_end(struct drawing *d)
 {
 	struct outq_chunk *chunk = d->end_chunk;
 	struct psr_buf buf = { .data = chunk->data, .capacity = chunk->capacity };
 
+	d->end.status = status_of(d);
 	if (psr_msg_frame_end_encode(&buf, d->id, d->view, &d->end, NULL) != PSR_OK)
 		assert(!"a frame's end can be written");
 	chunk->size = buf.size;
@@ -160,7 +222,7 @@ struct codec_parts *draw_parts(const struct drawing *d)
 
 int draw_fits(const struct drawing *d, const struct base *base)
 {
-	return codec_parts_fit(base->parts, &d->request, settings_of(&d->request, d->is_sharp).scale);
+	return codec_parts_fit(base->parts, &d->request, d->settings.scale);
 }
 
 static uint64_t planes_bytes(uint32_t planes, uint64_t n_pixels, unsigned depth_format)
@@ -236,16 +298,15 @@ static int is_cancelled_or_yields(void *userdata)
 
 static int draw_picture(struct drawing *d, struct draw_worker *worker, struct psr_frame *picture, struct psr_error *err)
 {
-	const struct psr_msg_settings asked = settings_of(&d->request, d->is_sharp);
 	struct psr_scene scene = d->scene->scene;
 	struct psr_settings settings;
 	int code;
 
 	scene.camera = d->request.camera;
 	psr_settings_default(&settings, picture->width, picture->height);
-	settings.spacing_px = asked.spacing_px;
-	settings.is_smooth = asked.is_smooth;
-	settings.pass = d->refine;
+	settings.spacing_px = d->settings.spacing_px;
+	settings.is_smooth = d->settings.is_smooth;
+	settings.pass = d->settings.pass > 0 ? d->settings.pass : d->refine;
 	settings.cancel = (struct psr_cancel){ is_cancelled_or_yields, d };
 	code = psr_render(worker->renderer, &scene, &settings, d->pool, picture, err);
 	if (code == PSR_ERR_CANCELLED && atomic_load(&d->must_yield) && !atomic_load(&d->is_stopped))
@@ -259,12 +320,12 @@ static int draw_and_encode(struct drawing *d, struct draw_worker *worker, struct
 	struct psr_frame picture = { 0 };
 	const struct psr_cancel cancel = { is_cancelled, d };
 	struct codec_answer answer = {
-		.id = d->id, .view = d->view, .request = &shown, .scale = settings_of(&d->request, d->is_sharp).scale,
+		.id = d->id, .view = d->view, .request = &shown, .scale = d->settings.scale,
 		.background = d->scene->background, .base = d->base != NULL ? d->base->parts : NULL, .parts = d->parts,
 		.emit = d->emit, .userdata = d->userdata, .cancel = &cancel,
 	};
 	struct codec_result coded;
-	struct times times = { .start_ns = clock_ns() };
+	struct times times = { .start_ns = d->start_ns };
 	int code;
 
 	if (d->is_sharp)
@@ -292,13 +353,16 @@ static int draw_and_encode(struct drawing *d, struct draw_worker *worker, struct
 	};
 	memcpy(d->end.hash, coded.hash, sizeof d->end.hash);
 	fill_report(&d->end, d, &picture.report, &times, coded.rect_bytes);
+	fill_spent(&d->spent, &picture.report, d->settings.scale);
 	return PSR_OK;
 }
 
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err)
 {
-	int code = draw_and_encode(d, worker, err);
+	int code;
 
+	d->start_ns = clock_ns();
+	code = draw_and_encode(d, worker, err);
 	atomic_store_explicit(&d->used_ns, pool_job_used_ns(), memory_order_relaxed);
 	if (code == PSR_ERR_CANCELLED && is_over(d) && !atomic_load(&d->is_stopped))
 		return psr_fail(err, PSR_ERR_LIMIT,
@@ -315,8 +379,10 @@ uint64_t draw_answer_bytes(const struct psr_msg_frame *request)
 
 uint64_t draw_bytes(const struct psr_msg_frame *request, const struct scene *scene, int n_threads)
 {
+	const unsigned pass = budget_most_pass(request);
 	const struct renderer_need need = {
-		.width = request->width, .height = request->height, .pass = request->pass_limit, .n_threads = n_threads,
+		.width = request->width, .height = request->height, .n_threads = n_threads,
+		.pass = pass > request->pass_limit ? pass : request->pass_limit,
 		.n_shadow_lights = scene_shadow_lights(scene), .has_sheer = scene_has_sheer(scene),
 		.n_blocks = scene_blocks(scene),
 	};

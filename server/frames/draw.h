@@ -5,6 +5,7 @@
 #include <stdatomic.h>
 #include <stdint.h>
 #include "bases.h"
+#include "budget.h"
 #include "codec.h"
 #include "server/net/outq.h"
 #include "psr/error.h"
@@ -26,6 +27,9 @@ struct drawing {
 	struct psr_msg_frame request; /* checked */
 	unsigned frame, refine;       /* number within the answer; level of refinement */
 	int is_sharp;                 /* scale 1, smooth, lossless, whatever was asked */
+	struct psr_msg_settings settings; /* resolved, once a frame: draw_resolve() */
+	struct budget_view seen;      /* what settings are chosen for, and learnt from */
+	struct budget_choice choice;  /* of a budget of time or error */
 	const struct base *base;      /* what the client holds, and fits; or NULL */
 	struct codec_parts *parts;    /* of this frame; NULL in view 0 */
 	struct scene *scene;
@@ -38,13 +42,19 @@ struct drawing {
 	/* Takes parts of the answer in order, FRAME_BEGIN first, from any thread. */
 	void (*emit)(struct outq_chunk *chunks, void *userdata);
 	void *userdata;
-	struct psr_msg_frame_end end;  /* out: is_final is the caller's */
+	struct psr_msg_frame_end end;  /* out: is_final is the caller's; status is that of draw_take_end() */
+	uint64_t start_ns;            /* out: clock_ns() when work on the frame started */
+	struct budget_spent spent;    /* out: total_ns is the caller's */
 	struct outq_chunk *end_chunk; /* room for it */
 };
 
 int draw_is_sharp(const struct psr_msg_frame *request); /* what it asks for is sharp by itself */
 
-/* For frame, refine and is_sharp as they are set: parts to be filled in, NULL without memory; whether `base` fits. */
+/* Sets the settings for frame, refine and is_sharp as they are set; a budget of time or error chooses them by what was
+ * learnt. The scene is bound. */
+void draw_resolve(struct drawing *d, const struct budget_learnt *learnt);
+
+/* For the settings as they are resolved: parts to be filled in, NULL without memory; whether `base` fits. */
 struct codec_parts *draw_parts(const struct drawing *d);
 int draw_fits(const struct drawing *d, const struct base *base);
 
@@ -56,6 +66,7 @@ uint64_t draw_answer_bytes(const struct psr_msg_frame *request);
  * encoder. */
 int draw_frame(struct drawing *d, struct draw_worker *worker, struct psr_error *err);
 
-struct outq_chunk *draw_take_end(struct drawing *d); /* FRAME_END, once d->end.is_final is set */
+/* FRAME_END, once d->end.is_final and d->spent.total_ns are set. */
+struct outq_chunk *draw_take_end(struct drawing *d);
 
 #endif

@@ -129,7 +129,7 @@ static struct base *find_base(const struct frame *frame)
 }
 
 /* Without memory for its parts the frame is no base of later ones, and stands on none: its parts are compared. */
-void frame_set_bases(struct frame *frame)
+static void set_bases(struct frame *frame)
 {
 	struct drawing *d = &frame->drawing;
 	struct codec_parts *parts = draw_parts(d);
@@ -142,12 +142,40 @@ void frame_set_bases(struct frame *frame)
 	d->parts = frame->made != NULL ? parts : NULL;
 }
 
+void frame_prepare(struct frame *frame)
+{
+	const struct schedule_request *request = &frame->request;
+	struct drawing *d = &frame->drawing;
+
+	d->frame = request->frame;
+	d->is_sharp = request->has_sharp && request->frame > 0;
+	d->refine = request->frame - (unsigned)d->is_sharp;
+	atomic_store(&d->used_ns, 0);
+	atomic_store(&d->must_yield, 0);
+	scene_bind(d->scene);
+	draw_resolve(d, &frame_flow(frame)->learnt);
+	if (d->view > 0)
+		set_bases(frame);
+}
+
+void frame_learn(struct frame *frame, struct budget_learnt *of_all)
+{
+	struct drawing *d = &frame->drawing;
+
+	d->spent.total_ns = (double)(clock_ns() - d->start_ns);
+	if (d->refine > 0)
+		return;
+	budget_learn(&frame_flow(frame)->learnt, &d->seen, &d->settings, &d->spent);
+	budget_learn(of_all, &d->seen, &d->settings, &d->spent);
+}
+
 int frame_is_slight(const struct frame *frame)
 {
 	const struct psr_msg_frame *request = &frame->drawing.request;
 	const struct scene *scene = frame->drawing.scene;
 
-	return frame->request.n_frames == 1 && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
+	return frame->request.n_frames == 1 && frame->drawing.settings.pass == 0
+	       && (uint64_t)request->width * request->height <= SLIGHT_PIXELS
 	       && scene->scene.n_instances <= SLIGHT_INSTANCES && scene_blocks(scene) <= SLIGHT_BLOCKS
 	       && scene_shadow_lights(scene) == 0 && !scene_has_sheer(scene);
 }

@@ -41,7 +41,10 @@ static inline struct flow *frame_flow(const struct frame *frame)
 }
 
 void frame_put_models(struct frame *frame); /* unpins them, or stops their coming */
-void frame_set_bases(struct frame *frame); /* of the frame that comes next */
+void frame_prepare(struct frame *frame); /* what its drawing needs to know of the frame that comes next */
+
+/* It was drawn to its end: its flow, which is there, and all later flows learn what it took. */
+void frame_learn(struct frame *frame, struct budget_learnt *of_all);
 
 /* Whether each part between two places where cores change is short by what the frame consists of: the thread of the
  * event loop may draw it. */

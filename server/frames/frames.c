@@ -15,6 +15,7 @@ struct frames {
 	struct schedule_user user;
 	struct workers workers;
 	uint64_t n_flows, bases_bytes;
+	struct budget_learnt learnt; /* of all flows: where new ones start */
 	int is_pumping, must_pump_again;
 };
 
@@ -66,6 +67,7 @@ static void on_done(void *userdata)
 	next = (frame->code == PSR_OK ? schedule_done : frame->code == PSR_ERR_BUSY ? schedule_put_back : schedule_fail)(
 		&frames->schedule, &frame->request, used_ns);
 	if (next != SCHEDULE_DROPPED && frame->code == PSR_OK) {
+		frame_learn(frame, &frames->learnt);
 		if (conn->state == CONN_OPEN)
 			frame_send_end(frame, next == SCHEDULE_FINAL);
 		frames->stats.drawn++;
@@ -134,18 +136,11 @@ static void on_begin(struct schedule_request *request, enum pool_class class, vo
 {
 	struct frames *frames = userdata;
 	struct frame *frame = frame_of(request);
-	struct drawing *d = &frame->drawing;
-	const struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame, frame_is_slight(frame) };
+	struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame, 0 };
 
-	d->frame = request->frame;
-	d->is_sharp = request->has_sharp && request->frame > 0;
-	d->refine = request->frame - (unsigned)d->is_sharp;
-	d->n_waiting = frames->schedule.n_waiting;
-	atomic_store(&d->used_ns, 0);
-	atomic_store(&d->must_yield, 0);
-	scene_bind(d->scene);
-	if (d->view > 0)
-		frame_set_bases(frame);
+	frame->drawing.n_waiting = frames->schedule.n_waiting;
+	frame_prepare(frame);
+	job.is_lent_to = frame_is_slight(frame);
 	frame->worker = workers_take(&frames->workers, &frame->use, request->bytes);
 	if (frame->worker != NULL && psr_pool_submit(frames->parts.pool, &job) == PSR_OK)
 		return;
@@ -324,6 +319,7 @@ void frames_pause(struct frames *frames, struct flow *flow, uint16_t view, int i
 int flow_init(struct flow *flow, struct frames *frames, struct conn *conn)
 {
 	*flow = (struct flow){ .conn = conn, .bases.bytes = &frames->bases_bytes, .number = ++frames->n_flows };
+	budget_inherit(&flow->learnt, &frames->learnt);
 	return pool_flow_create(&flow->share, frames->parts.pool);
 }
 
@@ -347,6 +343,7 @@ int frames_create(struct frames **out, const struct frames_parts *parts)
 	if (frames == NULL)
 		return PSR_ERR_MEMORY;
 	frames->parts = *parts;
+	budget_init(&frames->learnt);
 	frames->user = (struct schedule_user){ on_prepare, on_let_go, on_begin, on_stop, on_yield, on_end, on_need,
 	                                        frames };
 	schedule_init(&frames->schedule, &limits, &frames->user);

@@ -4,6 +4,7 @@
 #define PSRD_FRAMES_H
 
 #include "bases.h"
+#include "budget.h"
 #include "codec.h"
 #include "scene.h"
 #include "schedule.h"
@@ -21,6 +22,7 @@ struct flow {
 	struct pool_flow *share; /* of the pool's threads */
 	struct bases bases;
 	uint64_t number;         /* over all flows that ever were */
+	struct budget_learnt learnt;
 };
 
 enum frames_outcome {

@@ -4,6 +4,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/srgb.h"
+#include "base/vec.h"
+#include "render/plan.h"
 #include "scene.h"
 
 struct scene *scene_ref(struct scene *scene)
@@ -43,6 +45,30 @@ uint64_t scene_blocks(const struct scene *scene)
 	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
 		n += scene->model[scene->of_instance[i]]->card.n_blocks;
 	return n;
+}
+
+/* The spheres' widths are those of their outlines as if they stood in the middle of the picture. */
+double scene_area(const struct scene *scene, const struct psr_camera *camera, uint32_t width, uint32_t height)
+{
+	const double all = (double)width * height;
+	double forward[3], sum = 0;
+
+	v3d_sub(forward, camera->target, camera->eye);
+	v3d_normalize(forward, forward);
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++) {
+		double center[3], rotation[3][3], pixels;
+		const double radius = plan_place(center, rotation, &scene->scene.instance[i], camera->eye);
+		const double apart = v3d_dot(center, center) - radius * radius;
+
+		if (v3d_dot(center, forward) + radius <= 0)
+			continue;
+		if (camera->kind == PSR_CAMERA_ORTHOGRAPHIC)
+			pixels = radius * height / camera->ortho_height;
+		else
+			pixels = apart > 0 ? radius / sqrt(apart) * height / (2 * tan(camera->fov_y / 2)) : height;
+		sum += fmin(M_PI * pixels * pixels, all);
+	}
+	return sum;
 }
 
 int scene_has_sheer(const struct scene *scene)

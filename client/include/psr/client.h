@@ -108,10 +108,11 @@ int psr_client_ping(struct psr_client *client, struct psr_error *err);
 int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scene, uint32_t *id,
                      struct psr_error *err);
 
-/* Queues a FRAME in view 0, where every request is drawn. UNSUPPORTED: the request has a base, a budget of time or
- * error, or anything else that the server does not offer. BUSY: WELCOME's max_open frames are under way. Exactly one
- * event ends *id: FRAME with end->is_final, or FAILED; a pass_limit above 0 brings FRAMEs of the earlier passes before
- * it. Depth requested as u16 arrives as float, off by at most half a step. */
+/* Queues a FRAME in view 0, where every request is drawn. UNSUPPORTED: the request has a base, or anything that the
+ * server does not offer. BUSY: WELCOME's max_open frames are under way. Exactly one event ends *id: FRAME with
+ * end->is_final, or FAILED; a pass_limit above 0 brings FRAMEs of the earlier passes before it. With a budget of time or
+ * error begin->settings are those that the server chose. Depth requested as u16 arrives as float, off by at most half a
+ * step. */
 int psr_client_frame(struct psr_client *client, const struct psr_msg_frame *frame, uint32_t *id,
                      struct psr_error *err);
 

@@ -17,6 +17,7 @@ extern "C" {
 #define PSR_WIRE_MAX_INSTANCES 1024
 #define PSR_WIRE_MAX_LIGHTS 32
 #define PSR_WIRE_MAX_SCENES 16         /* slots 0..15 */
+#define PSR_WIRE_MAX_PASS 4           /* of settings */
 #define PSR_WIRE_MAX_OPEN 64           /* open ids of view 0 */
 #define PSR_WIRE_MAX_REPORT 64
 #define PSR_WIRE_MAX_STATS 64
@@ -172,9 +173,15 @@ struct psr_msg_settings { /* resolved settings: with them a frame is a pure func
 	uint8_t scale;       /* drawn at 1/scale of the size in each direction and enlarged: 1, 2 or 4 */
 	uint8_t is_smooth;   /* 1: blends edges with the surface behind, and pixels with others of their surface; else
 	                      * 0 */
+	uint8_t pass;        /* level of refinement that frame 0 has at once, 0..4; above 0 for servers that offer a budget
+	                      * of time or error */
 	double spacing_px;   /* greatest distance of neighbouring samples, pixels; 1 is [G]'s adequate sampling;
 	                      * 2^-6..2^6 */
 };
+
+/* Settings in the count of a report's entry. Spacings are rounded to 2^-16 pixels. */
+uint64_t psr_settings_pack(const struct psr_msg_settings *settings);
+void psr_settings_unpack(struct psr_msg_settings *settings, uint64_t packed);
 
 /* NO_HASHES: FRAME_END has none. SHARP (PSR_CAP_SHARP, view > 0): once the view is at rest, frame 1 has scale 1, smooth
  * edges and lossless codecs; refined frames follow it. */
@@ -219,7 +226,7 @@ struct psr_msg_frame_begin { /* server -> client */
 enum psr_wire_frame_status {
 	PSR_WIRE_FRAME_OK = 0,          /* drawn as asked */
 	PSR_WIRE_FRAME_LATE = 1,        /* the time budget was not kept */
-	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound could not be reached with these models */
+	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound was not kept */
 };
 
 enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts */
@@ -236,6 +243,10 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
 	PSR_WIRE_REPORT_SMOOTH = 12, /* pixels at edges */
 	PSR_WIRE_REPORT_CORES = 13,  /* that cores worked for the frame, summed over all of them; 0 */
+	/* of a budget of time or error: the time foreseen, and the settings as of psr_settings_pack() */
+	PSR_WIRE_REPORT_CHOSEN = 14,
+	PSR_WIRE_REPORT_CHEAPER = 15, /* the next cheaper settings; left out if there are none */
+	PSR_WIRE_REPORT_BETTER = 16,  /* the next better ones */
 	/* values only, ns is 0: */
 	PSR_WIRE_REPORT_SAMPLES_WARPED = 32, /* all samples of the blocks drawn */
 	PSR_WIRE_REPORT_BLOCKS_DRAWN = 33,   /* after culling */

@@ -42,7 +42,8 @@ static void welcome_tells_the_limits(void **state)
 	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_RESOLUTION | PSR_CAP_PRESETS |
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
-	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP);
+	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
+	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
@@ -553,8 +554,9 @@ static void what_is_not_offered_is_refused_by_name(void **state)
 	frame = frame_default(64, 64);
 	frame.budget = PSR_WIRE_BUDGET_TIME;
 	frame.time_budget_us = 1000;
+	frame.pass_limit = 1;
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
-	assert_non_null(strstr(text, "time budgets"));
+	assert_non_null(strstr(text, "pass_limit 0"));
 	frame = frame_default(64, 64);
 	frame.flags = PSR_WIRE_FRAME_SHARP;
 	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_ARG, text);

@@ -1,0 +1,242 @@
+/* Settings by a budget, with simulated times: no clock, no frames. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <math.h>
+#include <string.h>
+#include "base/random.h"
+#include "server/frames/budget.h"
+
+#define MS 1e6
+
+static const struct budget_view whole = { .width = 640, .height = 480, .planes = 1 << PSR_PLANE_COLOR,
+	                                      .area = 150000, .n_samples = 4e6 };
+
+/* A machine: what a unit of work takes, and how much a frame's time spreads. */
+struct machine {
+	double sample, pixel, smooth, answer; /* ns */
+	double load, spread;                  /* factor on all; a frame takes up to 1 + spread times as long */
+	uint64_t random;
+};
+
+static double density(const struct psr_msg_settings *s)
+{
+	return ldexp(1, s->pass) / s->scale;
+}
+
+/* Coarse models: a sample counts as of the next power of two of the spacing, which the model of time does not know. */
+static void draw(struct budget_spent *spent, struct machine *m, const struct budget_view *view,
+                 const struct psr_msg_settings *s)
+{
+	const double step = exp2(floor(log2(s->spacing_px / density(s))));
+	const double n = (double)view->width * view->height, drawn = n * density(s) * density(s);
+	const double factor = m->load * (1 + m->spread * random_in(&m->random, 0, 1));
+
+	memset(spent, 0, sizeof *spent);
+	spent->ns[BUDGET_SAMPLES] = factor * m->sample * fmin(view->area / (step * step), view->n_samples);
+	spent->ns[BUDGET_PIXELS] = factor * m->pixel * drawn;
+	spent->ns[BUDGET_SMOOTH] = s->is_smooth && s->pass == 0 ? factor * m->smooth * drawn : 0;
+	for (int i = 0; i < BUDGET_N_WORK; i++)
+		spent->total_ns += spent->ns[i];
+	spent->total_ns += factor * m->answer * n / (s->scale * s->scale);
+	spent->error_px = 2.5 / density(s);
+}
+
+static const struct machine usual = { .sample = 12, .pixel = 9, .smooth = 4, .answer = 5, .load = 1, .spread = 0.2,
+	                                  .random = 7 };
+
+/* Asks for n frames of a budget. Returns how many took longer; *mean_ns: the mean time of a frame. */
+static int run(struct budget_learnt *learnt, struct machine *m, double limit_ns, int n, double *mean_ns)
+{
+	int n_late = 0;
+
+	*mean_ns = 0;
+	for (int i = 0; i < n; i++) {
+		struct budget_choice choice;
+		struct budget_spent spent;
+
+		budget_choose_time(&choice, learnt, &whole, limit_ns);
+		draw(&spent, m, &whole, &choice.chosen.settings);
+		budget_learn(learnt, &whole, &choice.chosen.settings, &spent);
+		n_late += spent.total_ns > limit_ns;
+		*mean_ns += spent.total_ns / n;
+	}
+	return n_late;
+}
+
+static double time_of(const struct machine *m, const struct psr_msg_settings *s)
+{
+	struct machine slowest = *m;
+	struct budget_spent spent;
+
+	slowest.load *= 1 + m->spread;
+	slowest.spread = 0;
+	draw(&spent, &slowest, &whole, s);
+	return spent.total_ns;
+}
+
+/* From the fastest setting's time up: of 2000 frames at most 5 % are late once the first 100 have taught. Half of these
+ * budgets lie between the times of two settings, half just above one. */
+static void frames_of_all_budgets_stay_within_their_time(void **state)
+{
+	static const double limits[] = { 1, 1.5, 2.5, 4, 6, 8, 12, 20, 33, 50, 100, 300, 1000 };
+
+	(void)state;
+	for (size_t i = 0; i < sizeof limits / sizeof limits[0]; i++) {
+		struct machine m = usual;
+		struct budget_learnt learnt;
+		double mean_ns;
+		int n_late;
+
+		budget_init(&learnt);
+		assert_true(limits[i] * MS >= time_of(&m, &(struct psr_msg_settings){ .scale = 4, .spacing_px = 1 }));
+		run(&learnt, &m, limits[i] * MS, 100, &mean_ns);
+		n_late = run(&learnt, &m, limits[i] * MS, 2000, &mean_ns);
+		if (n_late > 100)
+			fail_msg("%d of 2000 frames are over %g ms", n_late, limits[i]);
+	}
+}
+
+/* A budget of 1.25 times what a setting takes at most gets that setting or a better one, nine times out of ten. */
+static void a_budget_that_a_setting_meets_is_used(void **state)
+{
+	static const struct psr_msg_settings rungs[] = {
+		{ .scale = 2, .spacing_px = 1 }, { .scale = 1, .spacing_px = 1, .is_smooth = 1 },
+		{ .scale = 1, .spacing_px = 1, .is_smooth = 1, .pass = 2 },
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof rungs / sizeof rungs[0]; i++) {
+		struct machine m = usual;
+		const double limit_ns = 1.25 * time_of(&m, &rungs[i]);
+		struct budget_learnt learnt;
+		double mean_ns;
+		int n_used = 0;
+
+		budget_init(&learnt);
+		run(&learnt, &m, limit_ns, 200, &mean_ns);
+		for (int k = 0; k < 1000; k++) {
+			struct budget_choice choice;
+
+			budget_choose_time(&choice, &learnt, &whole, limit_ns);
+			n_used += time_of(&m, &choice.chosen.settings) >= time_of(&m, &rungs[i]);
+			run(&learnt, &m, limit_ns, 1, &mean_ns);
+		}
+		if (n_used < 900)
+			fail_msg("%d of 1000 frames are as good as budget %zu allows", n_used, i);
+	}
+}
+
+/* Another client halves the machine: few frames are late before the flow has learnt it, and quality comes back after. */
+static void load_is_learnt_and_forgotten(void **state)
+{
+	struct machine m = usual;
+	struct budget_learnt learnt;
+	double idle_ns, loaded_ns, again_ns;
+
+	(void)state;
+	budget_init(&learnt);
+	run(&learnt, &m, 12 * MS, 300, &idle_ns);
+	m.load = 2;
+	assert_true(run(&learnt, &m, 12 * MS, 40, &loaded_ns) <= 12);
+	assert_true(run(&learnt, &m, 12 * MS, 1000, &loaded_ns) <= 60);
+	m.load = 1;
+	run(&learnt, &m, 12 * MS, 300, &again_ns);
+	run(&learnt, &m, 12 * MS, 300, &again_ns);
+	assert_true(again_ns > 0.8 * idle_ns);
+}
+
+static void what_cannot_be_met_gets_the_nearest_and_says_so(void **state)
+{
+	struct budget_view view = whole;
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+
+	(void)state;
+	budget_init(&learnt);
+	budget_choose_time(&choice, &learnt, &view, 1);
+	assert_true(!choice.is_met && choice.chosen.settings.scale == 4 && choice.cheaper.settings.scale == 0);
+	assert_true(choice.better.settings.scale == 2 && choice.better.ns > choice.chosen.ns);
+	budget_choose_time(&choice, &learnt, &view, INFINITY);
+	assert_true(choice.is_met && choice.chosen.settings.pass == 4 && choice.better.settings.scale == 0);
+	assert_true(choice.cheaper.settings.pass == 3 && choice.cheaper.ns < choice.chosen.ns);
+	budget_choose_error(&choice, &learnt, &view, 1e-6);
+	assert_true(!choice.is_met && choice.chosen.settings.pass == 4);
+	budget_choose_error(&choice, &learnt, &view, 1e6);
+	assert_true(choice.is_met && choice.chosen.settings.scale == 4);
+}
+
+static void only_settings_that_the_picture_takes_are_chosen(void **state)
+{
+	struct budget_view view = whole;
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+
+	(void)state;
+	budget_init(&learnt);
+	view.width = 642; /* a multiple of 2, not of 4 */
+	budget_choose_time(&choice, &learnt, &view, 1);
+	assert_int_equal(choice.chosen.settings.scale, 2);
+	view.width = 641;
+	budget_choose_time(&choice, &learnt, &view, 1);
+	assert_true(choice.chosen.settings.scale == 1 && choice.chosen.settings.spacing_px == 2);
+	view.planes = 1 << PSR_PLANE_COLOR | 1 << PSR_PLANE_ID; /* not refined */
+	budget_choose_time(&choice, &learnt, &view, INFINITY);
+	assert_true(choice.chosen.settings.pass == 0 && choice.chosen.settings.is_smooth);
+	view.planes = 1 << PSR_PLANE_ID;
+	budget_choose_time(&choice, &learnt, &view, INFINITY);
+	assert_true(choice.chosen.settings.scale == 1 && !choice.chosen.settings.is_smooth);
+}
+
+/* The bound of a rung is that of its last frame; coarse models have the same one whatever is drawn. */
+static void an_error_is_foreseen_from_frames(void **state)
+{
+	const struct psr_msg_settings plain = { .scale = 1, .spacing_px = 1 };
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+	struct machine m = usual;
+	struct budget_spent spent;
+
+	(void)state;
+	budget_init(&learnt);
+	draw(&spent, &m, &whole, &plain);
+	spent.error_px = 0.6;
+	budget_learn(&learnt, &whole, &plain, &spent);
+	budget_choose_error(&choice, &learnt, &whole, 0.61);
+	assert_true(choice.is_met && choice.chosen.settings.scale == 1 && choice.chosen.settings.pass == 0);
+	budget_choose_error(&choice, &learnt, &whole, 1.21);
+	assert_true(choice.is_met && choice.chosen.settings.scale == 2);
+	budget_choose_error(&choice, &learnt, &whole, 0.31);
+	assert_true(choice.is_met && choice.chosen.settings.pass == 1);
+}
+
+static void a_pass_is_foreseen_where_it_may_be_chosen(void **state)
+{
+	struct psr_msg_frame frame = { .planes = 1 << PSR_PLANE_COLOR, .budget = PSR_WIRE_BUDGET_TIME };
+
+	(void)state;
+	assert_int_equal(budget_most_pass(&frame), PSR_WIRE_MAX_PASS);
+	frame.planes |= 1 << PSR_PLANE_WORDS;
+	assert_int_equal(budget_most_pass(&frame), 0);
+	frame = (struct psr_msg_frame){ .planes = 1, .budget = PSR_WIRE_BUDGET_SETTINGS, .settings.pass = 2 };
+	assert_int_equal(budget_most_pass(&frame), 2);
+	frame = (struct psr_msg_frame){ .planes = 1 };
+	assert_int_equal(budget_most_pass(&frame), 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(frames_of_all_budgets_stay_within_their_time),
+		cmocka_unit_test(a_budget_that_a_setting_meets_is_used),
+		cmocka_unit_test(load_is_learnt_and_forgotten),
+		cmocka_unit_test(what_cannot_be_met_gets_the_nearest_and_says_so),
+		cmocka_unit_test(only_settings_that_the_picture_takes_are_chosen),
+		cmocka_unit_test(an_error_is_foreseen_from_frames),
+		cmocka_unit_test(a_pass_is_foreseen_where_it_may_be_chosen),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
