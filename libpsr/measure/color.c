@@ -17,8 +17,8 @@ static int largest_difference(const uint8_t *a, const uint8_t *b)
 	return most;
 }
 
-/* Returns the difference from the most similar truth of the 3x3 neighbourhood; -1 unless the object fills all nine
- * pixels. */
+/* Returns the difference from the most similar truth of the 3x3 neighbourhood; -1 unless all nine pixels have a
+ * depth. */
 static int difference_at(const uint8_t *rgb, const uint8_t *truth, const float *depth, uint32_t width, uint32_t x,
                          uint32_t y)
 {
@@ -53,18 +53,22 @@ static void add_up(struct psr_color_accuracy *out, const uint8_t *rgb, const uin
 	out->mean = out->n_compared ? (double)sum / (double)out->n_compared : 0;
 }
 
-/* Averages the rays of each pixel in linear light; takes the depth of one of them, infinite if any meets nothing. */
-static void average(const float *ray_depth, const uint8_t *ray_rgb, float *depth, uint8_t *rgb, uint32_t width,
-                    uint32_t height)
+/* Averages the rays of each pixel in linear light; takes the depth of one of them, infinite if any meets nothing,
+ * or a colour that is not steady. */
+static void average(const float *ray_depth, const uint8_t (*ray_color)[4], float *depth, uint8_t *rgb,
+                    uint32_t width, uint32_t height)
 {
 	for (size_t i = 0; i < (size_t)width * height; i++) {
 		size_t first = (i / width * width * RAYS + i % width) * RAYS;
 		float sum[3] = { 0 };
 		for (size_t k = 0; k < RAYS * RAYS; k++) {
 			size_t at = first + k / RAYS * RAYS * width + k % RAYS;
-			depth[i] = k == 0 || !isfinite(ray_depth[at]) ? ray_depth[at] : depth[i];
+			if (k == 0 || !isfinite(ray_depth[at]))
+				depth[i] = ray_depth[at];
+			if (ray_color[at][3] > PSR_COLOR_WRONG)
+				depth[i] = INFINITY;
 			for (int c = 0; c < 3; c++)
-				sum[c] += psr_srgb_to_linear[ray_rgb[3 * at + (size_t)c]];
+				sum[c] += psr_srgb_to_linear[ray_color[at][c]];
 		}
 		for (int c = 0; c < 3; c++)
 			rgb[3 * i + (size_t)c] = psr_linear_to_srgb(sum[c] / (RAYS * RAYS));
@@ -77,7 +81,7 @@ int psr_accuracy_measure_color(struct psr_color_accuracy *out, const struct psr_
 	const uint32_t width = shot->width, height = shot->height;
 	size_t n = (size_t)width * height;
 	float *depth = psr_alloc_array(n, sizeof *depth), *ray_depth = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_depth);
-	uint8_t *color = psr_alloc_array(n, 3), *ray_color = psr_alloc_array(n, RAYS * RAYS * 3);
+	uint8_t *color = psr_alloc_array(n, 3), (*ray_color)[4] = psr_alloc_array(n, RAYS * RAYS * sizeof *ray_color);
 	int rc;
 	if (depth == NULL || color == NULL || ray_depth == NULL || ray_color == NULL)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "no memory to measure %ux%u pixels", width, height);

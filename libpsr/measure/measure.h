@@ -31,10 +31,10 @@ struct psr_truth_shot {
 
 /* Traces one ray through each of side * side positions of every pixel (position i at (i + 0.5) / side). depth: z' in
  * world units, +inf where the ray meets nothing; normal: unit, towards the eye, world; both width * side by height *
- * side; normal and rgb may be NULL. rgb: the colour in ambient light 1, seen from the eye,
- * sRGB, 3 bytes. */
-int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
-                   struct psr_error *err);
+ * side; normal and color may be NULL. color: in ambient light 1, seen from the eye, sRGB, 3
+ * bytes; then by how many codes it would change if the normal leaned 10 degrees further from the eye. */
+int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3],
+                   uint8_t (*color)[4], struct psr_error *err);
 
 /* How far a frame's depth is from the truth; `spacing` is the distance of the samples on the surface in world units. */
 struct psr_accuracy {
@@ -56,8 +56,10 @@ int psr_accuracy_measure(struct psr_accuracy *out, const struct psr_truth_shot *
                          double spacing, struct psr_error *err);
 
 /* How far the colours of a frame drawn with --ambient 1 and no light are from the truth, the mean of 4x4 rays a pixel
- * in linear light. Counts pixels where all rays of the 3x3 neighbourhood meet the object, each with the most similar of
- * the nine, since a sample may be anywhere in its pixel. */
+ * in linear light. Counts pixels where all rays of the 3x3 neighbourhood meet the object where its colour is steady,
+ * each with the most similar of the nine, since a sample may be anywhere in its pixel. What reflects is brighter aslant,
+ * and half a pixel is many degrees at the rim of what is round: a colour is steady if it changes by at most
+ * PSR_COLOR_WRONG where the normal leans by 10 degrees. */
 #define PSR_COLOR_WRONG 16 /* codes of sRGB, in any channel */
 struct psr_color_accuracy {
 	uint64_t n_compared;

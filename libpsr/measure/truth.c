@@ -24,13 +24,15 @@ struct psr_truth {
 	double origin[3], scale;
 };
 
+#define LEANING (M_PI / 18) /* 10 degrees */
+
 struct job {
 	const struct psr_truth *truth;
 	struct view view;
 	uint32_t side, n_columns;
 	float *depth;
 	float (*normal)[3];
-	uint8_t *rgb;
+	uint8_t (*color)[4];
 };
 
 void psr_truth_stipple(struct psr_truth *truth, double spacing)
@@ -178,22 +180,37 @@ static void put_normal(const struct job *job, const struct ray *ray, const struc
 	v3f_scale(normal, n, facing > 0 ? -1.0f : 1.0f);
 }
 
+static void shade_ambient(uint8_t rgb[3], const struct look *look, double facing)
+{
+	double light[3];
+	lobe_ambient(light, look, (const double[3]){ 0, 0, 1 }, (const double[3]){ sqrt(1 - facing * facing), 0, facing });
+	for (int c = 0; c < 3; c++)
+		rgb[c] = psr_linear_to_srgb(look->unlit ? look->base[c] : (float)light[c]);
+}
+
 /* Unfiltered color in ambient light: the rays of a pixel are its filter. */
-static void put_color(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit, uint8_t rgb[3])
+static void put_color(const struct psr_truth *truth, const struct ray *ray, const struct ray_hit *hit,
+                      uint8_t color[4])
 {
 	const struct surface_place place = { hit->prim, hit->is_back, hit->u, hit->v };
 	float side[3];
 	v3f_scale(side, ray_scene_normal(truth->scene, hit->prim), hit->is_back ? -1.0f : 1.0f);
 	const uint64_t attr = surface_attr(&truth->surface, &place, 0, side);
 	const float *n = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
-	double light[3], to_eye[3];
+	double to_eye[3], facing;
 	struct look look;
+	uint8_t leaning[3];
 	material_decode(&look, attr);
 	v3d_normalize(to_eye, ray->direction);
-	v3d_scale(to_eye, to_eye, -1);
-	lobe_ambient(light, &look, (const double[3]){ (double)n[0], (double)n[1], (double)n[2] }, to_eye);
-	for (int c = 0; c < 3; c++)
-		rgb[c] = psr_linear_to_srgb(look.unlit ? look.base[c] : (float)light[c]);
+	facing = -v3d_dot((const double[3]){ (double)n[0], (double)n[1], (double)n[2] }, to_eye);
+	facing = fmin(fmax(facing, 0), 1);
+	shade_ambient(color, &look, facing);
+	shade_ambient(leaning, &look, cos(fmin(acos(facing) + LEANING, M_PI / 2)));
+	color[3] = 0;
+	for (int c = 0; c < 3; c++) {
+		const int change = abs(leaning[c] - color[c]);
+		color[3] = change > color[3] ? (uint8_t)change : color[3];
+	}
 }
 
 static void draw_row(int row, void *userdata)
@@ -215,19 +232,19 @@ static void draw_row(int row, void *userdata)
 				if (is_met)
 					put_normal(job, &ray[i], &hit[i], job->normal[at + i]);
 			}
-			if (job->rgb != NULL) {
-				memset(job->rgb + 3 * (at + i), 0, 3);
+			if (job->color != NULL) {
+				memset(job->color[at + i], 0, 4);
 				if (is_met)
-					put_color(job->truth, &ray[i], &hit[i], job->rgb + 3 * (at + i));
+					put_color(job->truth, &ray[i], &hit[i], job->color[at + i]);
 			}
 		}
 	}
 }
 
-int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3], uint8_t *rgb,
-                   struct psr_error *err)
+int psr_truth_draw(const struct psr_truth_shot *shot, uint32_t side, float *depth, float (*normal)[3],
+                   uint8_t (*color)[4], struct psr_error *err)
 {
-	struct job job = { .truth = shot->truth, .side = side, .depth = depth, .normal = normal, .rgb = rgb };
+	struct job job = { .truth = shot->truth, .side = side, .depth = depth, .normal = normal, .color = color };
 	struct psr_pool *pool;
 	int rc = view_init(&job.view, shot->camera, shot->width, shot->height, err);
 	if (rc != PSR_OK)

@@ -43,7 +43,7 @@ static void truth_make(struct truth *truth, const char *source, int n_threads)
 {
 	const size_t n = (size_t)SIDE * SIDE * RAYS * RAYS;
 	float *depth = report_alloc(n, sizeof *depth), (*normal)[3] = report_alloc(n, sizeof *normal);
-	uint8_t *rgb = report_alloc(n, 3);
+	uint8_t (*color)[4] = report_alloc(n, sizeof *color);
 	struct psr_scene drawn;
 	struct psr_error err;
 
@@ -51,7 +51,7 @@ static void truth_make(struct truth *truth, const char *source, int n_threads)
 	truth->n_threads = n_threads;
 	if (psr_mesh_import(&truth->mesh, source, NULL, &err) != PSR_OK || psr_truth_create(&truth->rays, truth->mesh, &err) != PSR_OK
 	    || psr_truth_draw(&(struct psr_truth_shot){ truth->rays, &drawn.camera, SIDE, SIDE, n_threads }, RAYS, depth,
-	                      normal, rgb, &err) != PSR_OK)
+	                      normal, color, &err) != PSR_OK)
 		report_die(source, err.text);
 	truth->light = report_alloc((size_t)SIDE * SIDE, sizeof *truth->light);
 	for (size_t i = 0; i < n; i++) {
@@ -59,11 +59,11 @@ static void truth_make(struct truth *truth, const char *source, int n_threads)
 		float *pixel = truth->light[y * SIDE + x], lit = isinf(depth[i]) ? NAN : lit_by(&truth->film, normal[i]);
 
 		for (int c = 0; c < 3; c++)
-			pixel[c] += fminf(lit * psr_srgb_to_linear[rgb[3 * i + c]], 1) / (RAYS * RAYS) + 0 * lit;
+			pixel[c] += fminf(lit * psr_srgb_to_linear[color[i][c]], 1) / (RAYS * RAYS) + 0 * lit;
 	}
 	free(depth);
 	free(normal);
-	free(rgb);
+	free(color);
 }
 
 static void truth_free(struct truth *truth)

@@ -143,9 +143,11 @@ static void colors_are_compared_within_a_pixel(void **state)
 {
 	struct fixture *f = *state;
 	struct psr_color_accuracy color;
-	uint8_t *rgb = malloc(3 * SIDE * SIDE);
+	uint8_t *rgb = malloc(3 * SIDE * SIDE), (*drawn)[4] = malloc(4 * SIDE * SIDE);
 
-	assert_int_equal(psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, rgb, NULL), PSR_OK);
+	assert_int_equal(psr_truth_draw(&SHOT(f, 1), 1, f->depth, NULL, drawn, NULL), PSR_OK);
+	for (size_t i = 0; i < SIDE * SIDE; i++)
+		memcpy(rgb + 3 * i, drawn[i], 3);
 	assert_int_equal(psr_accuracy_measure_color(&color, &SHOT(f, 1), rgb, NULL), PSR_OK);
 	assert_true(color.n_compared > 0 && color.n_wrong == 0 && color.mean == 0);
 	/* What is as far off as is allowed, what is further, and what is outside and does not count. */
@@ -156,6 +158,7 @@ static void colors_are_compared_within_a_pixel(void **state)
 	assert_int_equal(color.n_wrong, 1);
 	assert_true(fabs(color.mean * (double)color.n_compared - (2 * PSR_COLOR_WRONG + 1)) < 1e-9);
 	free(rgb);
+	free(drawn);
 }
 
 int main(void)
