@@ -53,7 +53,7 @@ void brdf_reflect(const struct brdf *brdf, const double n[3], const double v[3],
 	for (int c = 0; c < 3; c++) {
 		const double f = brdf->f0[c] + (1 - brdf->f0[c]) * schlick;
 
-		out[c] = (1 - f) * brdf->diffuse[c] * nl + f * shine;
+		out[c] = (1 - brdf->layer[c]) * (1 - schlick) * brdf->diffuse[c] * nl + f * shine;
 	}
 }
 
@@ -161,6 +161,6 @@ void brdf_ambient(const struct brdf_albedo *albedo, const struct brdf *brdf, dou
 	for (int c = 0; c < 3; c++) {
 		out[c] = brdf->diffuse[c];
 		if (!brdf->is_phong)
-			out[c] = out[c] * (1 - brdf->f0[c]) * (1 - beneath) + brdf->f0[c] * part[0] + part[1];
+			out[c] = out[c] * (1 - brdf->layer[c]) * (1 - beneath) + brdf->f0[c] * part[0] + part[1];
 	}
 }

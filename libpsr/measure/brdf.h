@@ -1,4 +1,6 @@
-/* How surfaces of the source reflect light: glTF 2.0's model (its appendix B), with the masking of microfacets
+/* How surfaces of the source reflect light: glTF 2.0's model (section 3.9.2 and appendix B.2: a mix of a metal and of a
+ * diffuse surface under a dielectric layer; the code of B.3 dims that surface by the metal's Fresnel term too, which
+ * Khronos calls a mistake, KhronosGroup/glTF#2386), with the masking of microfacets
  * correlated by height (Heitz 2014), and the highlight of OBJ's materials (illum 2). */
 #ifndef PSR_MEASURE_BRDF_H
 #define PSR_MEASURE_BRDF_H
@@ -8,6 +10,7 @@
 struct brdf {
 	double diffuse[3]; /* albedo under the specular layer */
 	double f0[3];      /* reflectance at 0 degrees; that at 90 is 1 */
+	double layer[3];   /* the same, of the layer over the diffuse surface alone */
 	double alpha;      /* of GGX: the square of the roughness */
 	int is_phong;      /* diffuse + phong * (N.H)^exponent, without a Fresnel term, instead */
 	double phong[3], exponent;

@@ -349,6 +349,7 @@ static void set_reflection(const struct place *place, const double base[3], stru
 	}
 	for (int c = 0; c < 3; c++) {
 		brdf->diffuse[c] = base[c] * (1 - (m->is_specular_glossiness ? most : metallic));
+		brdf->layer[c] = m->is_specular_glossiness ? specular[c] : DIELECTRIC;
 		brdf->f0[c] = m->is_specular_glossiness ? specular[c] : DIELECTRIC + (base[c] - DIELECTRIC) * metallic;
 	}
 	brdf->alpha = roughness * roughness;

@@ -57,7 +57,8 @@ static void planes_at_all_angles_follow_the_closed_formula(void **state)
 		v3d_add(h, to_light, eye);
 		v3d_normalize(h, h);
 		const double f = schlick(0.04 + 0.25 * ((double)0.7f - 0.04), v3d_dot(h, eye));
-		const double expected = (1 - f) * 0.75 * (double)0.7f * cos(a) + f * ggx(alpha, h[2], cos(a), cos(b));
+		const double beneath = 1 - schlick(0.04, v3d_dot(h, eye));
+		const double expected = beneath * 0.75 * (double)0.7f * cos(a) + f * ggx(alpha, h[2], cos(a), cos(b));
 		assert_near((double)got[0], expected, expected * FLOATS);
 	}
 	meshes_free(mesh);
@@ -140,7 +141,8 @@ static void surroundings_give_what_their_lights_give(void **state)
 	brdf_albedo_init(&albedo);
 	for (int i = 0; i < 4 * 4 * 2; i++) {
 		const double roughness = 0.25 + 0.25 * (i % 4), nv = 0.25 + 0.25 * (i / 4 % 4), f0 = i < 16 ? 1 : 0.04;
-		const struct brdf brdf = { { 1 - f0, 1 - f0, 1 - f0 }, { f0, f0, f0 }, roughness * roughness, 0, { 0 }, 0 };
+		const struct brdf brdf = { { 1 - f0, 1 - f0, 1 - f0 }, { f0, f0, f0 }, { f0, f0, f0 },
+			                      roughness * roughness, 0, { 0 }, 0 };
 		const double n[3] = { 0, 0, 1 }, v[3] = { sqrt(1 - nv * nv), 0, nv };
 		double ambient[3], sum = 0;
 
