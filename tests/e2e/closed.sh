@@ -1,8 +1,9 @@
 #!/bin/bash
 # needs: psr-model
 # Stills show no background through a surface: no pixel four or more inside of what pass 0 covers depends on the
-# background, in any pass, unless a ray of it, or as near as samples can tell, misses the mesh. Of scans, CAD parts,
-# textured models, and the standard set, in five views, samples about a pixel apart; some models' two, four, and eight.
+# background, in any pass, unless a ray of it, or as near as samples can tell, misses the mesh, or a thin thing hangs a
+# veil there, as nearly everywhere in the pine tree. Of scans, CAD parts, textured models, and the standard set, in five
+# views, samples about a pixel apart; some models' two, four, and eight.
 . "$(dirname "$0")/lib.sh"
 resolution=96
 testmodels=${PSR_TESTMODELS:-/usr/share/assimp/models}
@@ -15,11 +16,11 @@ closed() { # model source resolution [side of the picture [zoom]]
 		return
 	fi
 	check "$1 is closed" "$BUILD/tests/tools/closed" "$work/$1.psr" "$2" "${4:-$3}" 16 "${5:-1}"
-	sed -n "s/.* pass \([0-9]\): \([0-9]*\) depend.*, \([0-9]*\) of them.*/\1 \2 \3/p" "$work/out" | awk -v model="$1" '
-		{ n[$1] += $2; torn[$1] += $3 }
+	sed -n "s/.* pass \([0-9]\): \([0-9]*\) depend[^,]*, \([0-9]*\) of them veiled, \([0-9]*\) torn.*/\1 \2 \3 \4/p" "$work/out" | awk -v model="$1" '
+		{ n[$1] += $2; veiled[$1] += $3; torn[$1] += $4 }
 		END {
-			printf "# %-16s torn of those that depend on the background, by pass:", model
-			for (p = 0; p < 5; p++) printf " %d/%d", torn[p], n[p]
+			printf "# %-16s torn and veiled of those that depend on the background, by pass:", model
+			for (p = 0; p < 5; p++) printf " %d, %d of %d;", torn[p], veiled[p], n[p]
 			print ""
 		}'
 	rm -f "$work/$1.psr"
@@ -59,7 +60,5 @@ done
 check "the standard set is made" psr-model make all -o "$work/source"
 for source in "$work"/source/*.glb; do
 	model=$(basename "$source" .glb)
-	case $model in
-	*) closed "$model" "$source" $resolution ;;
-	esac
+	closed "$model" "$source" $resolution
 done
