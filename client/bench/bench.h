@@ -28,6 +28,7 @@ struct bench_kept { /* an answer */
 	enum conn_outcome outcome;
 	int code; /* FAILED: enum psr_err */
 	uint16_t pass;
+	struct psr_msg_settings settings; /* it was drawn with */
 	uint8_t has_hash;
 };
 

@@ -12,6 +12,7 @@ struct conn_request {
 	uint32_t id, kind; /* id 0: this place is free */
 	uint64_t k;        /* its number; see bench_plan_camera() */
 	uint64_t intended_ns, first_ns; /* first_ns 0: no byte of the answer has come */
+	struct psr_msg_settings settings; /* of the frame that began last */
 	uint64_t bytes, decode_ns;        /* decode_ns 0: the picture was not decoded */
 	struct client_assembly *assembly; /* NULL: the picture is not decoded */
 };

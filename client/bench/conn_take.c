@@ -213,7 +213,9 @@ static void on_frame(struct conn *conn, struct conn_request *request, const stru
 	case PSR_MSG_FRAME_BEGIN:
 		if (psr_msg_frame_begin_decode(&conn->shared->begin, message->payload, message->n, &err) != PSR_OK)
 			conn_fail(conn, PSR_ERR_PROTOCOL, "%.300s", err.text);
-		else if (request->assembly != NULL)
+		else
+			request->settings = conn->shared->begin.settings;
+		if (conn->state != CONN_OVER && request->assembly != NULL)
 			decode(conn, request, message, &is_spoilt);
 		break;
 	case PSR_MSG_RECT:

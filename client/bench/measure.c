@@ -42,6 +42,10 @@ void measure_add(struct measure *measure, const struct conn_request *request, co
 			histogram_add(&measure->stage[entry->id], entry->ns);
 		if (entry->id == PSR_WIRE_REPORT_QUEUE || entry->id == PSR_WIRE_REPORT_TOTAL)
 			server_ns += entry->ns;
+		if (entry->id == PSR_WIRE_REPORT_CHOSEN) {
+			measure->n_budgets++;
+			measure->n_within += answer->end->status == PSR_WIRE_FRAME_OK;
+		}
 	}
 	histogram_add(&measure->server, server_ns);
 }
@@ -57,6 +61,8 @@ void measure_merge(struct measure *to, const struct measure *from)
 	histogram_merge(&to->server, &from->server);
 	if (to->first_failure[0] == '\0')
 		memcpy(to->first_failure, from->first_failure, sizeof to->first_failure);
+	to->n_budgets += from->n_budgets;
+	to->n_within += from->n_within;
 	to->n_bytes += from->n_bytes;
 	to->n_superseded += from->n_superseded;
 	to->n_unfinished += from->n_unfinished;

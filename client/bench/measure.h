@@ -15,6 +15,7 @@ struct measure {
 	struct histogram decode;
 	struct histogram stage[MEASURE_STAGES]; /* as the server reports them */
 	struct histogram server; /* queue and total of a frame together: latency by the server's clock */
+	uint64_t n_budgets, n_within; /* pictures with a budget of time or error; of these: kept */
 	uint64_t n_bytes, n_superseded, n_unfinished, n_failed[MEASURE_CODES];
 	char first_failure[256]; /* what the server said of a failed request, the first of a thread; "": nothing */
 };

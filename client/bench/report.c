@@ -40,6 +40,11 @@ static double server_s(const struct bench_result *result)
 	return result->measure.stage[PSR_WIRE_REPORT_CORES].sum / 1e9;
 }
 
+static double within(const struct measure *measure)
+{
+	return 100 * (double)measure->n_within / (double)measure->n_budgets;
+}
+
 static void print_ends(const struct bench_result *result)
 {
 	const struct measure *measure = &result->measure;
@@ -91,6 +96,8 @@ void report_print(const struct bench_result *result, const char *what)
 		if (measure->stage[i].max > 0)
 			print_histogram(measure_stage_name(i), &measure->stage[i]);
 	print_histogram("psrd", &measure->server);
+	if (measure->n_budgets > 0)
+		printf("within the budget: %.2f %% of %" PRIu64 "\n", within(measure), measure->n_budgets);
 	print_ends(result);
 	printf("fairness (Jain) %.3f; processor time: this program %.2f s, psrd's frames %.2f s\n", result->fairness,
 	       result->processor_s, server_s(result));
@@ -172,6 +179,8 @@ cJSON *report_json(const struct bench_result *result, const char *what)
 	cJSON_AddNumberToObject(json, "processor_s", result->processor_s);
 	cJSON_AddNumberToObject(json, "server_processor_s", server_s(result));
 	cJSON_AddNumberToObject(json, "percentile_error", HISTOGRAM_ERROR);
+	if (measure->n_budgets > 0)
+		json_add_number(json, "within_budget_percent", within(measure));
 	add_failures(json, measure);
 	if (measure->first_failure[0] != '\0')
 		cJSON_AddStringToObject(json, "first_failure", measure->first_failure);

@@ -118,10 +118,24 @@ static void make_scene(struct psr_scene *scene, struct artist *artist, const str
 	}
 }
 
+/* In place: the whole picture's pixels follow in the order of memory, so it begins at the last one. */
+static void enlarge(struct psr_frame *frame, uint32_t scale)
+{
+	const uint32_t width = frame->width * scale;
+
+	for (uint32_t y = frame->height * scale; y-- > 0;)
+		for (uint32_t x = width; x-- > 0;)
+			memmove(frame->rgb + 3 * ((size_t)y * width + x),
+			        frame->rgb + 3 * ((size_t)(y / scale) * frame->width + x / scale), 3);
+	frame->width *= scale;
+	frame->height *= scale;
+}
+
 static int draw(uint64_t *hash, struct artist *artist, const struct bench_kept *kept, uint32_t n_clients,
                 struct psr_error *err)
 {
 	const struct bench_kind *kind = &artist->plan->kind[kept->kind];
+	const struct psr_msg_settings *drawn = &kept->settings;
 	struct psr_settings settings;
 	struct psr_scene scene;
 	struct psr_frame frame;
@@ -129,14 +143,17 @@ static int draw(uint64_t *hash, struct artist *artist, const struct bench_kept *
 
 	make_scene(&scene, artist, kind);
 	bench_plan_camera(&scene.camera, artist->plan, kept->client, n_clients, kept->k);
-	psr_settings_default(&settings, kind->frame.width, kind->frame.height);
-	settings.spacing_px = kind->frame.settings.spacing_px;
-	settings.is_smooth = kind->frame.settings.is_smooth;
-	settings.pass = kept->pass;
+	psr_settings_default(&settings, kind->frame.width / drawn->scale, kind->frame.height / drawn->scale);
+	settings.spacing_px = drawn->spacing_px;
+	settings.is_smooth = drawn->is_smooth;
+	settings.pass = drawn->pass > 0 ? drawn->pass : kept->pass;
 	code = psr_frame_alloc(&frame, kind->frame.width, kind->frame.height, 1 << PSR_PLANE_COLOR, err);
 	if (code != PSR_OK)
 		return code;
+	frame.width = settings.width;
+	frame.height = settings.height;
 	code = psr_render(artist->renderer, &scene, &settings, artist->pool, &frame, err);
+	enlarge(&frame, drawn->scale);
 	if (code == PSR_OK)
 		*hash = psr_frame_hash(&frame, PSR_PLANE_COLOR);
 	psr_frame_free(&frame);

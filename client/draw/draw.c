@@ -23,6 +23,7 @@ void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct
 	scene_add_light_options(list, &wish->scene);
 	optlist_heading(list, "Quality", NULL);
 	quality_add_options(list, &wish->quality);
+	quality_add_budget_option(list, &wish->quality);
 	quality_add_codec_option(list, &wish->quality);
 	optlist_heading(list, "For developers", NULL);
 	sink_add_developer_options(list, &wish->sink);
@@ -47,7 +48,8 @@ static int check_replay(struct job *job, struct psr_error *err)
 	int code;
 
 	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
-	    || quality->n_said || quality->has_spacing || quality->has_passes || wish->sink.has_sheet)
+	    || quality->n_said || quality->has_name || quality->has_spacing || quality->has_passes
+	    || quality->budget != NULL || wish->sink.has_sheet)
 		return psr_fail(err, PSR_ERR_ARG,
 		                "--replay repeats a whole picture; it excludes all options that say what is in "
 		                "it");

@@ -133,6 +133,7 @@ void notes_add(struct notes *notes, const struct scene *scene, const struct psr_
 	const struct psr_camera *camera = &event->begin->camera;
 
 	notes->n_pictures++;
+	notes->n_over += event->end->status != PSR_WIRE_FRAME_OK;
 	if (is_empty(event->end)) {
 		notes->n_empty++;
 		notes->why_empty = why_empty(scene, camera);
@@ -169,6 +170,8 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 	if (notes->n_fewer_passes > 0)
 		fprintf(stderr, "%s: the server stopped at pass %u of %u: the picture is less smooth than asked for\n", program,
 		        notes->least_pass, asked->pass_limit);
+	if (notes->n_over > 0 && notes->n_pictures > 1)
+		fprintf(stderr, "%s: %u of %u pictures are over the budget\n", program, notes->n_over, notes->n_pictures);
 	if (model != NULL && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 

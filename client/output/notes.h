@@ -6,7 +6,7 @@
 
 /* Collects warnings over all pictures of a command, and prints each once. */
 struct notes {
-	uint32_t n_pictures, n_empty, n_fewer_passes;
+	uint32_t n_pictures, n_empty, n_fewer_passes, n_over;
 	unsigned least_pass;
 	const char *why_empty;   /* of the last picture */
 	double coarsest;         /* pixels between samples of the most magnified model */

@@ -8,6 +8,7 @@
 #include "base/outfile.h"
 #include "base/view.h"
 #include "client/replay/replay.h"
+#include "budget.h"
 #include "effects.h"
 #include "report.h"
 
@@ -101,6 +102,18 @@ static double server_ms(const struct psr_msg_frame_end *end)
 	return 0;
 }
 
+/* What was chosen for a budget draws the same frame again. */
+static void add_replay(cJSON *report, const struct shot_facts *facts)
+{
+	struct psr_msg_frame frame = *facts->frame;
+
+	if (budget_is_said(&frame)) {
+		frame.budget = PSR_WIRE_BUDGET_SETTINGS;
+		frame.settings = facts->event->begin->settings;
+	}
+	replay_add(report, facts->scene, &frame);
+}
+
 static cJSON *make_report(const struct shot_facts *facts)
 {
 	static const char *const status[] = { "ok", "late", "coarse" };
@@ -112,6 +125,7 @@ static cJSON *make_report(const struct shot_facts *facts)
 	add_model(report, facts);
 	cJSON_AddItemToObject(report, "size", cJSON_CreateDoubleArray(size, 2));
 	add_camera(report, &event->begin->camera);
+	cJSON_AddNumberToObject(report, "scale", event->begin->settings.scale);
 	cJSON_AddNumberToObject(report, "spacing_px", event->begin->settings.spacing_px);
 	cJSON_AddBoolToObject(report, "smooth", event->begin->settings.is_smooth);
 	cJSON_AddNumberToObject(report, "pass", event->begin->pass);
@@ -130,7 +144,8 @@ static cJSON *make_report(const struct shot_facts *facts)
 
 		cJSON_AddItemToObject(report, "depth_range", cJSON_CreateDoubleArray(range, 2));
 	}
-	replay_add(report, facts->scene, facts->frame);
+	budget_add(report, facts->frame, event);
+	add_replay(report, facts);
 	return report;
 }
 

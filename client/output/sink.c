@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "budget.h"
 #include "effects.h"
 #include "report.h"
 
@@ -146,6 +147,8 @@ static int print_facts(const struct sink *sink, struct psr_error *err)
 	}
 	if (sink->wish->effects)
 		effects_print(&sink->end);
+	if (sink->n == 1 && budget_is_said(sink->frame))
+		budget_print(sink->wish->program, sink->frame, &sink->end);
 	return outfile_flush_stdout(err);
 }
 

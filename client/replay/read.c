@@ -6,6 +6,7 @@
 #include "base/json.h"
 #include "base/view.h"
 #include "replay.h"
+#include "client/scene/quality.h"
 #include "client/lib/camera.h"
 
 #define MAX_BYTES (16 << 20)
@@ -210,6 +211,27 @@ static void read_planes(struct reader *reader, struct psr_msg_frame *frame, cons
 				frame->planes |= 1u << plane;
 }
 
+/* A report of psr 0.2 and before has neither scale nor pass. */
+static void read_detail(struct reader *reader, struct psr_msg_frame *frame, const cJSON *request)
+{
+	struct psr_msg_settings *settings = &frame->settings;
+
+	if (cJSON_HasObjectItem(request, "budget")) {
+		if (quality_parse_budget(frame, get_string(reader, request, "budget"), NULL) != PSR_OK && reader->missing == NULL)
+			reader->missing = "budget";
+		return;
+	}
+	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
+	settings->scale = 1;
+	if (cJSON_HasObjectItem(request, "scale"))
+		settings->scale = (uint8_t)get_number(reader, request, "scale", 1, 4);
+	if (cJSON_HasObjectItem(request, "pass"))
+		settings->pass = (uint8_t)get_number(reader, request, "pass", 0, PSR_WIRE_MAX_PASS);
+	settings->spacing_px = get_number(reader, request, "spacing_px", 1.0 / 64, 64);
+	settings->is_smooth = (uint8_t)get_flag(reader, request, "smooth");
+	frame->pass_limit = (uint16_t)get_number(reader, request, "passes", 0, 16);
+}
+
 int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_error *err)
 {
 	struct reader reader = { NULL };
@@ -229,11 +251,7 @@ int replay_frame(struct psr_msg_frame *frame, const cJSON *report, struct psr_er
 	*(frame->camera.kind == PSR_CAMERA_PERSPECTIVE ? &frame->camera.fov_y : &frame->camera.ortho_height) =
 		get_number(&reader, camera, "extent", 1 / PSR_WIRE_MAX_LENGTH, PSR_WIRE_MAX_LENGTH);
 	frame->camera.near_z = get_number(&reader, camera, "near", 0, PSR_WIRE_MAX_LENGTH);
-	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
-	frame->settings.scale = 1;
-	frame->settings.spacing_px = get_number(&reader, request, "spacing_px", 1.0 / 64, 64);
-	frame->settings.is_smooth = (uint8_t)get_flag(&reader, request, "smooth");
-	frame->pass_limit = (uint16_t)get_number(&reader, request, "passes", 0, 16);
+	read_detail(&reader, frame, request);
 	read_planes(&reader, frame, request);
 	if (psr_codec_parse(&frame->color_codec, &frame->color_quality, get_string(&reader, request, "codec"), err)
 	    != PSR_OK)

@@ -3,6 +3,7 @@
 #include "base/json.h"
 #include "base/view.h"
 #include "replay.h"
+#include "client/scene/quality.h"
 
 static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 {
@@ -68,6 +69,21 @@ static void add_codec(cJSON *to, const struct psr_msg_frame *frame)
 	cJSON_AddStringToObject(to, "codec", codec);
 }
 
+static void add_detail(cJSON *to, const struct psr_msg_frame *frame)
+{
+	char budget[QUALITY_BUDGET_TEXT];
+
+	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR) {
+		cJSON_AddStringToObject(to, "budget", quality_budget_text(budget, frame));
+		return;
+	}
+	cJSON_AddNumberToObject(to, "scale", frame->settings.scale);
+	json_add_number(to, "spacing_px", frame->settings.spacing_px);
+	cJSON_AddBoolToObject(to, "smooth", frame->settings.is_smooth);
+	cJSON_AddNumberToObject(to, "pass", frame->settings.pass);
+	cJSON_AddNumberToObject(to, "passes", frame->pass_limit);
+}
+
 void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_frame *frame)
 {
 	cJSON *request = cJSON_AddObjectToObject(report, "request"), *camera, *planes;
@@ -83,9 +99,7 @@ void replay_add(cJSON *report, const struct scene *scene, const struct psr_msg_f
 	                frame->camera.kind == PSR_CAMERA_PERSPECTIVE ? frame->camera.fov_y : frame->camera.ortho_height);
 	json_add_number(camera, "near", frame->camera.near_z);
 	json_add_numbers(request, "size", size, 2);
-	json_add_number(request, "spacing_px", frame->settings.spacing_px);
-	cJSON_AddBoolToObject(request, "smooth", frame->settings.is_smooth);
-	cJSON_AddNumberToObject(request, "passes", frame->pass_limit);
+	add_detail(request, frame);
 	planes = cJSON_AddArrayToObject(request, "planes");
 	for (unsigned plane = 0; plane < PSR_N_PLANES; plane++)
 		if (frame->planes >> plane & 1)

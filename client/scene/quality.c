@@ -1,7 +1,15 @@
 #include "quality.h"
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "client/lib/camera.h"
 #include "psr/render.h"
+
+#define LEAST_MS 0.001
+#define MOST_MS 3.6e6
+#define LEAST_PX 1e-6
+#define MOST_PX 1e6
 
 static const struct {
 	const char *name;
@@ -29,7 +37,7 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		{ .name = "size", .type = PSR_OPT_SIZE, .value = wish->size, .arg = "WxH", .seen = &wish->n_said,
 		  .help = "Width and height of the picture in pixels." },
 		{ .name = "quality", .letter = 'q', .type = PSR_OPT_STRING, .value = &wish->name, .arg = "NAME",
-		  .seen = &wish->n_said,
+		  .seen = &wish->has_name,
 		  .words = "draft good best",
 		  .help = "draft: coarse and fastest, for finding a view. good: full detail and smooth edges. best: as smooth "
 		          "as print, for a picture to keep; it takes about a hundred times as long." },
@@ -44,6 +52,18 @@ void quality_add_options(struct optlist *list, struct quality_wish *wish)
 		  .help = "Final smoothing, instead of the quality's: 1 draws 4 points a pixel and takes about ten times "
 		          "as long; 2 draws 16, 3 draws 64, 4 draws 256, and each takes four times as long as the one "
 		          "before." },
+	};
+
+	OPTLIST_ADD(list, opts);
+}
+
+void quality_add_budget_option(struct optlist *list, struct quality_wish *wish)
+{
+	const struct psr_opt opts[] = {
+		{ .name = "budget", .type = PSR_OPT_STRING, .value = &wish->budget, .arg = "BUDGET",
+		  .words = "12ms 1px",
+		  .help = "Instead of a quality what a picture may cost: 12ms, the best that psrd foresees to draw in that time; "
+		          "or 1px, the quickest whose surfaces it foresees to lie within so many pixels of their places." },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -70,6 +90,42 @@ static int check_size(uint32_t w, uint32_t h, struct psr_error *err)
 	return PSR_OK;
 }
 
+int quality_parse_budget(struct psr_msg_frame *frame, const char *text, struct psr_error *err)
+{
+	char *unit;
+	const double value = strtod(text, &unit);
+
+	if (unit != text && strcmp(unit, "ms") == 0 && value >= LEAST_MS && value <= MOST_MS) {
+		frame->budget = PSR_WIRE_BUDGET_TIME;
+		frame->time_budget_us = (uint64_t)llround(value * 1e3);
+		return PSR_OK;
+	}
+	if (unit != text && strcmp(unit, "px") == 0 && value >= LEAST_PX && value <= MOST_PX) {
+		frame->budget = PSR_WIRE_BUDGET_ERROR;
+		frame->error_bound_px = value;
+		return PSR_OK;
+	}
+	return psr_fail(err, PSR_ERR_ARG, "--budget takes a time such as 12ms, %g to %g, or an error such as 1px, %g to %g; "
+	                "not '%.40s'", LEAST_MS, MOST_MS, LEAST_PX, MOST_PX, text);
+}
+
+const char *quality_budget_text(char text[QUALITY_BUDGET_TEXT], const struct psr_msg_frame *frame)
+{
+	if (frame->budget == PSR_WIRE_BUDGET_TIME)
+		snprintf(text, QUALITY_BUDGET_TEXT, "%.10gms", (double)frame->time_budget_us / 1e3);
+	else
+		snprintf(text, QUALITY_BUDGET_TEXT, "%.15gpx", frame->error_bound_px);
+	return text;
+}
+
+static int apply_budget(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err)
+{
+	if (wish->has_name || wish->has_spacing || wish->has_passes || wish->is_smooth || wish->is_plain)
+		return psr_fail(err, PSR_ERR_ARG, "--budget chooses the detail; it excludes --quality, --spacing, --smooth, "
+		                "--no-smooth and --passes");
+	return quality_parse_budget(frame, wish->budget, err);
+}
+
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err)
 {
 	size_t i = 0, n = sizeof qualities / sizeof qualities[0];
@@ -87,11 +143,17 @@ int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, 
 		return psr_fail(err, PSR_ERR_ARG, "--spacing: %g is out of range; it takes 1/64 to 64", wish->spacing);
 	frame->width = wish->size[0];
 	frame->height = wish->size[1];
-	frame->budget = PSR_WIRE_BUDGET_SETTINGS;
-	frame->settings.scale = 1;
-	frame->settings.spacing_px = wish->has_spacing ? wish->spacing : qualities[i].spacing;
-	frame->settings.is_smooth = (uint8_t)(wish->is_smooth || (qualities[i].is_smooth && !wish->is_plain));
-	frame->pass_limit = (uint16_t)(wish->has_passes ? wish->passes : qualities[i].passes);
+	if (wish->budget != NULL) {
+		code = apply_budget(frame, wish, err);
+	} else {
+		frame->budget = PSR_WIRE_BUDGET_SETTINGS;
+		frame->settings.scale = 1;
+		frame->settings.spacing_px = wish->has_spacing ? wish->spacing : qualities[i].spacing;
+		frame->settings.is_smooth = (uint8_t)(wish->is_smooth || (qualities[i].is_smooth && !wish->is_plain));
+		frame->pass_limit = (uint16_t)(wish->has_passes ? wish->passes : qualities[i].passes);
+	}
+	if (code != PSR_OK)
+		return code;
 	return psr_codec_parse(&frame->color_codec, &frame->color_quality, wish->codec, err);
 }
 

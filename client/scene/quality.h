@@ -10,7 +10,8 @@ struct quality_wish {
 	const char *name; /* draft, good, best */
 	double spacing;
 	int64_t passes;
-	int is_smooth, is_plain, has_spacing, has_passes;
+	int is_smooth, is_plain, has_name, has_spacing, has_passes;
+	const char *budget; /* instead of name, spacing, smoothing and passes; NULL: none */
 	const char *codec;
 	int n_said; /* how many of these options were given */
 };
@@ -19,8 +20,16 @@ void quality_wish_init(struct quality_wish *wish, uint32_t width, uint32_t heigh
 void quality_add_options(struct optlist *list, struct quality_wish *wish);
 void quality_add_codec_option(struct optlist *list, struct quality_wish *wish); /* of still pictures */
 
-/* Sets size, settings, passes and colour codec of the request. ARG, LIMIT. */
+void quality_add_budget_option(struct optlist *list, struct quality_wish *wish); /* where each picture stands alone */
+
+/* Sets size, settings or budget, passes and colour codec of the request. ARG, LIMIT. */
 int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, struct psr_error *err);
+
+#define QUALITY_BUDGET_TEXT 40
+
+/* A budget of time or error as --budget takes it: "12ms", "0.5px". ARG. */
+int quality_parse_budget(struct psr_msg_frame *frame, const char *text, struct psr_error *err);
+const char *quality_budget_text(char text[QUALITY_BUDGET_TEXT], const struct psr_msg_frame *frame);
 
 /* Chooses how the planes of the request travel, all but colour without loss. */
 void quality_choose_codecs(struct psr_msg_frame *frame);
