@@ -158,7 +158,7 @@ static int check_pictures(struct command *command, struct psr_error *err)
 	if (command->replay == NULL)
 		return PSR_OK;
 	if (command->mix_file != NULL || line->scene.n_said > 0 || line->scene.has_ambient || view_is_said(&line->view)
-	    || line->quality.n_said > 0)
+	    || quality_is_said(&line->quality))
 		return psr_fail(err, PSR_ERR_ARG, "--replay: the recording says what is drawn, not --mix and options of models, "
 		                "lights, cameras and quality");
 	if (command->has_rate || command->has_inflight || command->has_seconds || command->has_frames

@@ -29,7 +29,8 @@ static void keep(struct worker *worker, const struct conn *conn, const struct co
 		.due_ns = request->intended_ns - worker->gate->begin_ns, .k = request->k, .bytes = request->bytes,
 		.latency_ns = worker->shared.now_ns - request->intended_ns, .client = conn->index, .kind = request->kind,
 		.outcome = answer->outcome, .code = answer->code, .pass = end != NULL ? end->pass : 0,
-		.settings = request->settings, .hash = end != NULL ? end->hash[PSR_PLANE_COLOR] : 0, .has_hash = end != NULL && end->has_hashes,
+		.hash = end != NULL ? end->hash[PSR_PLANE_COLOR] : 0, .has_hash = end != NULL && end->has_hashes,
+		.settings = request->settings,
 	};
 }
 

@@ -44,12 +44,10 @@ struct job {
 static int check_replay(struct job *job, struct psr_error *err)
 {
 	const struct draw_wish *wish = job->wish;
-	const struct quality_wish *quality = &wish->quality;
 	int code;
 
 	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
-	    || quality->n_said || quality->has_name || quality->has_spacing || quality->has_passes
-	    || quality->budget != NULL || wish->sink.has_sheet)
+	    || quality_is_said(&wish->quality) || wish->sink.has_sheet)
 		return psr_fail(err, PSR_ERR_ARG,
 		                "--replay repeats a whole picture; it excludes all options that say what is in "
 		                "it");

@@ -5,9 +5,9 @@
 #include "base/infile.h"
 #include "base/json.h"
 #include "base/view.h"
-#include "replay.h"
-#include "client/scene/quality.h"
 #include "client/lib/camera.h"
+#include "client/scene/quality.h"
+#include "replay.h"
 
 #define MAX_BYTES (16 << 20)
 

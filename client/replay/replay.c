@@ -2,8 +2,8 @@
 #include <string.h>
 #include "base/json.h"
 #include "base/view.h"
-#include "replay.h"
 #include "client/scene/quality.h"
+#include "replay.h"
 
 static void add_color(cJSON *to, const char *name, const uint8_t rgb[3])
 {

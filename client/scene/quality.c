@@ -80,6 +80,11 @@ void quality_add_codec_option(struct optlist *list, struct quality_wish *wish)
 	OPTLIST_ADD(list, opts);
 }
 
+int quality_is_said(const struct quality_wish *wish)
+{
+	return wish->n_said || wish->has_name || wish->has_spacing || wish->has_passes || wish->budget != NULL;
+}
+
 static int check_size(uint32_t w, uint32_t h, struct psr_error *err)
 {
 	if (w == 0 || h == 0)
