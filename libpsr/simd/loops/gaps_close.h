@@ -5,7 +5,9 @@
 #include "gaps_tile.h"
 
 /* Samples of level k are at most 2^k pixels apart, so that a square of 3 pixels on their surface holds one of level 1,
- * and a square of 5 one of level 2. */
+ * and a square of 5 one of level 2. Where samples of level 2 happen to be nearer to each other, squares of 3 hold one,
+ * too, and close with the lower threshold; so they act near both levels. Else a surface of level 2 would let through
+ * what is near behind it, or not, by whether blocks of level 1 are drawn there, which nobody sees. */
 #define CLOSED_LEVELS 2
 
 _Static_assert(2 * CLOSED_LEVELS <= GAPS_MARGIN, "two squares reach so far");
@@ -36,6 +38,24 @@ static int find_near(float *near, const struct gaps_target *t, const struct gaps
 	return has_any;
 }
 
+/* The same for level k and coarser ones. */
+static int find_near_from(float *near, const struct gaps_target *t, const struct gaps_tile *tile, int k, uint32_t y)
+{
+	float own[GAPS_WIDTH + 2 * SPREAD_RUN];
+	int has_any = 0;
+
+	for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+		near[x] = INFINITY;
+	for (; k <= CLOSED_LEVELS; k++) {
+		if (!(t->stack->levels >> k & 1) || !find_near(own, t, tile, k, y))
+			continue;
+		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
+			near[x] = own[x] < near[x] ? own[x] : near[x];
+		has_any = 1;
+	}
+	return has_any;
+}
+
 static int is_near_any(const struct gaps_target *t, const struct gaps_tile *tile, int k)
 {
 	float near[GAPS_WIDTH + 2 * SPREAD_RUN];
@@ -61,14 +81,21 @@ static struct close_span span_of(const struct gaps_target *t, const struct gaps_
 		                        right < GAPS_WIDTH + GAPS_MARGIN ? (int32_t)right : GAPS_WIDTH + GAPS_MARGIN };
 }
 
-/* Beyond the picture the guard band tells what is there. */
+/* Beyond the picture the guard band tells what is there, of level k and coarser ones. */
 static float depth_beyond(const struct gaps_target *t, const struct gaps_tile *tile, int k, int32_t x, int32_t y)
 {
-	const int64_t i = (((int64_t)tile->x0 + x) >> k) + 1, j = (((int64_t)tile->y0 + y) >> k) + 1;
+	float least = INFINITY;
 
-	if (i < 0 || j < 0 || i >= t->stack->level[k].width || j >= t->stack->level[k].height)
-		return INFINITY;
-	return t->stack->level[k].z[(size_t)j * t->stack->level[k].width + (size_t)i];
+	for (; k <= CLOSED_LEVELS; k++) {
+		const int64_t i = (((int64_t)tile->x0 + x) >> k) + 1, j = (((int64_t)tile->y0 + y) >> k) + 1;
+		const int64_t width = t->stack->level[k].width, height = t->stack->level[k].height;
+
+		if (!(t->stack->levels >> k & 1) || i < 0 || j < 0 || i >= width || j >= height)
+			continue;
+		const float z = t->stack->level[k].z[j * width + i];
+		least = z < least ? z : least;
+	}
+	return least;
 }
 
 /* Returns the depths of a row with its margin, in `copy` where some lie beyond the picture. */
@@ -183,7 +210,7 @@ static inline __attribute__((always_inline)) void close_level(float (*limit)[GAP
 		if (own < 0)
 			continue;
 		if (own % (1 << k) == 0)
-			has_near = find_near(near, t, tile, k, (uint32_t)own);
+			has_near = find_near_from(near, t, tile, k, (uint32_t)own);
 		if (!has_near)
 			continue;
 		greatest_of_rows(greatest, &greater, 0, GAPS_WIDTH, reach);
@@ -207,8 +234,7 @@ static int close_piece(float (*limit)[GAPS_WIDTH], const struct gaps_target *t, 
 	for (uint32_t y = 0; y < GAPS_BRICK; y++)
 		for (uint32_t x = 0; x < GAPS_WIDTH; x++)
 			limit[y][x] = INFINITY;
-	if (is_near[1])
-		close_level(limit, t, tile, 1, 1);
+	close_level(limit, t, tile, 1, 1);
 	if (is_near[2])
 		close_level(limit, t, tile, 2, 2);
 	return 1;
