@@ -19,7 +19,7 @@ struct sheer_tile {
 	uint64_t front[WARP_OWN_WORDS]; /* its word; of frames with planes */
 	float through[WARP_OWN_WORDS]; /* share of the light behind that the layers let through */
 	float light[3][WARP_OWN_WORDS];
-	uint32_t veil[WARP_OWN_WORDS]; /* of thin things, see thin.h */
+	uint32_t veil[WARP_OWN_WORDS]; /* of thin things, see simd/veil.h */
 	uint8_t is_done[TILE_HEIGHT][TILE_WIDTH / STRIP]; /* strips without words beyond their layers */
 	struct strip_pixels pixels;
 	struct strip strip;
@@ -32,6 +32,7 @@ struct sheer_drawing {
 	const struct sheer_picture *picture;
 	struct sheer *sheer;
 	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
+	float bits[PSR_OPAQUE + 1];       /* of thin things, see thin_tabulate() */
 	_Atomic uint64_t n_pixels;
 	atomic_int failed;
 };

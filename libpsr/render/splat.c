@@ -6,7 +6,6 @@
 #include "block.h"
 #include "sheer.h"
 #include "splat.h"
-#include "thin.h"
 #include "simd/block.h"
 
 /* Steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
@@ -32,7 +31,8 @@ struct splat_target {
 	uint32_t stride;
 	int32_t x0, y0, x1, y1;
 	struct sheer_list *list; /* takes the discs instead of words, or NULL */
-	const struct thin_layer *thin; /* does, or NULL */
+	const struct veil_layer *veils; /* does, or NULL, */
+	float area;                     /* with so many times an opacity's veil */
 };
 
 /* Where a picture's discs go. */
@@ -108,7 +108,7 @@ static inline __attribute__((always_inline)) void draw_splat(const struct splat_
 			if (way == LIST)
 				list_place(t, s, x, y, z, square);
 			else if (way == VEILS)
-				thin_add(t->thin, (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0),
+				veil_add(t->veils, (uint32_t)(y - t->y0) * t->stride + (uint32_t)(x - t->x0),
 				         (uint64_t)psr_bits_from_float(z) << 32 | s->id, s->veil);
 			else
 				lower(t, x, y, z, s->id);
@@ -258,7 +258,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		}
 		s.id = b.id + sample;
 		if (way == VEILS)
-			s.veil = (uint32_t)t->thin->bits[in->blocks->opacity[b.attr - in->blocks->attr]];
+			s.veil = (uint32_t)(t->veils->bits[in->blocks->opacity[b.attr - in->blocks->attr]] * t->area);
 		limit_reach(&s);
 		draw_splat(t, &s, way);
 	}
@@ -297,7 +297,7 @@ struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, 
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
-		                            target.x1, target.y1,   NULL,         NULL };
+		                            target.x1, target.y1,   NULL,         NULL,          0 };
 	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++)
 		draw_block(&t, &bins->entry[e], WORDS);
 	return counts;
@@ -307,16 +307,16 @@ void splat_list(const struct plan *plan, const struct bin_entry *entry, const st
                 struct sheer_list *list)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, list,       NULL };
+		                            target->x1, target->y1, list,       NULL,           0 };
 
 	draw_block(&t, entry, LIST);
 }
 
 void splat_veil(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                const struct thin_layer *layer)
+                const struct veil_layer *layer, float area)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, NULL,           layer };
+		                            target->x1, target->y1, NULL,           layer, area };
 
 	draw_block(&t, entry, VEILS);
 }

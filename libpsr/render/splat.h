@@ -15,10 +15,10 @@ struct sheer_list;
 void splat_list(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
                 struct sheer_list *list);
 
-/* Adds the veils of the discs of a block inside the tile. */
-struct thin_layer;
+/* Adds the veils of the discs of a block inside the tile, each `area` times its opacity's. */
+struct veil_layer;
 void splat_veil(const struct plan *plan, const struct bin_entry *entry, const struct warp_target *target,
-                const struct thin_layer *layer);
+                const struct veil_layer *layer, float area);
 
 /* Returns the depth in z' added at the rims of a block's discs: a step of its lattice. */
 float splat_rim(const struct plan_instance *in, uint32_t block);

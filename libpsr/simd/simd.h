@@ -14,6 +14,7 @@
 #include "shadow.h"
 #include "smooth.h"
 #include "strip.h"
+#include "veil.h"
 #include "warp.h"
 
 struct simd {
@@ -22,6 +23,7 @@ struct simd {
 	warp_clear_fn *warp_clear;
 	warp_cells_fn *warp_cells;
 	warp_fn *warp;
+	veil_fn *veil;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;
 	strip_read_fn *strip_read;

@@ -5,6 +5,7 @@
 #define PSR_SIMD_WARP_LIST_H
 
 #include "block.h"
+#include "veil.h"
 
 #define LIST 512
 struct words {
@@ -16,6 +17,14 @@ struct cells {
 	_Alignas(64) uint32_t z[LIST + 16];
 	_Alignas(64) uint32_t at[LIST + 16];
 	uint32_t n, level;
+};
+
+/* The veils of the words, and how a block's samples become both. */
+struct veils {
+	_Alignas(64) uint32_t veil[LIST + 16];
+	const float *bits;
+	const uint8_t *opacity; /* of its first sample */
+	float area, half;       /* half: from the corner of a square to its sample */
 };
 
 #define LOWER(type, base, value, i)                     \
@@ -72,7 +81,8 @@ static inline void make_blocks(struct warp_block *blocks, const struct warp_targ
 	}
 }
 
-typedef void list_block_fn(struct words *words, struct cells *cells, const struct warp_target *t,
+/* Lists a block's words, and either cells or, if `veils` is not NULL, veils. */
+typedef void list_block_fn(struct words *words, struct cells *cells, struct veils *veils, const struct warp_target *t,
                            const struct bin_entry *entry, const struct warp_block *block);
 
 /* The warp, given a function that lists a block; both lists have room for a block at each call. */
@@ -97,7 +107,7 @@ static inline __attribute__((always_inline)) uint64_t warp_by(list_block_fn *lis
 			lower_cells(target, &cells);
 			cells.level = entry[e].level;
 		}
-		list_block(&words, &cells, target, &entry[e], &blocks[e % BLOCKS]);
+		list_block(&words, &cells, NULL, target, &entry[e], &blocks[e % BLOCKS]);
 	}
 	n_inside += words.n;
 	lower_words(target->word, &words);

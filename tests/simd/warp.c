@@ -1,5 +1,5 @@
-/* warp, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every level
- * of the depth buffer. */
+/* warp, veil, warp_clear, warp_cells and warp_far: tiles of pictures of all sizes, blocks of 1 to 64 samples, every
+ * level of the depth buffer. */
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
@@ -149,14 +149,14 @@ static void random_sight(struct check *c, struct warp_instance *in, const struct
 	}
 }
 
-static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step,
-                        enum numbers numbers)
+static const struct bin_entry *make_entries(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples,
+                                            double step, enum numbers numbers)
 {
 	struct warp_target *t = &p->target;
 	const uint32_t n_instances = 1 + check_below(c, MAX_INSTANCES);
 	struct warp_instance *instance = check_in(c, n_instances, sizeof *instance);
 	struct bin_entry *entry = check_in(c, n_entries, sizeof *entry);
-	struct psr_blocks blocks;
+	static struct psr_blocks blocks;
 
 	t->instance = instance;
 	t->perspective = check_one_in(c, 4) ? 0 : 1;
@@ -192,8 +192,54 @@ static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, 
 			                           .is_mixed = (uint8_t)check_below(c, 2) };
 	}
 	check_units(c, (uint64_t)n_entries * n_samples);
+	return entry;
+}
+
+static void warp_blocks(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples, double step,
+                        enum numbers numbers)
+{
+	const struct bin_entry *entry = make_entries(c, p, n_entries, n_samples, step, numbers);
+
 	while (check_next(c))
-		check_result(c, c->simd->warp(t, entry, n_entries));
+		check_result(c, c->simd->warp(&p->target, entry, n_entries));
+}
+
+/* The blocks as points, or as squares of up to `most_side` pixels. */
+static void veil_blocks(struct check *c, struct picture *p, const struct bin_entry *bin, uint32_t n, uint32_t most_side)
+{
+	struct warp_target *t = &p->target;
+	const size_t n_pixels = (size_t)t->stride * (size_t)(t->y1 - t->y0);
+	struct veil_entry *entry = check_in(c, n, sizeof *entry);
+	float *before = check_in(c, n_pixels, sizeof *before), *bits = check_in(c, PSR_OPAQUE + 1, sizeof *bits);
+	uint32_t *veil = check_out(c, n_pixels, sizeof *veil);
+	uint64_t *word = check_out(c, n_pixels, sizeof *word);
+	const struct veil_layer layer = { before, word, veil, bits };
+
+	for (uint32_t e = 0; e < n; e++)
+		entry[e] = (struct veil_entry){ .slot = bin[e].slot, .instance = bin[e].instance,
+			                            .side = (uint16_t)(1 + (check_one_in(c, 2) ? check_below(c, most_side) : 0)),
+			                            .area = (float)check_real(c, 0, 4) };
+	for (int i = 0; i <= PSR_OPAQUE; i++)
+		bits[i] = check_one_in(c, 20) ? 0x1p28f : (float)check_real(c, 0, VEIL_MOST / 8);
+	for (size_t i = 0; i < n_pixels; i++) {
+		before[i] = random_depth(c);
+		word[i] = check_one_in(c, 2) ? PSR_WORD_EMPTY : (uint64_t)psr_bits_from_float(random_depth(c)) << 32;
+		veil[i] = check_one_in(c, 3) ? VEIL_MOST - check_below(c, 9999) : check_below(c, VEIL_MOST + 1);
+	}
+	while (check_next(c))
+		c->simd->veil(t, &layer, entry, n);
+}
+
+static void random_veils(struct check *c)
+{
+	static const enum numbers kinds[] = { PLAIN, PLAIN, SPOILT, EDGES };
+	const enum numbers numbers = kinds[check_below(c, sizeof kinds / sizeof kinds[0])];
+	const uint32_t n = check_below(c, 30);
+	struct picture p;
+
+	random_picture(c, &p);
+	const struct bin_entry *entry = make_entries(c, &p, n, 0, exp2(check_real(c, -8, 6)), numbers);
+	veil_blocks(c, &p, entry, n, check_one_in(c, 4) ? VEIL_MOST_SIDE : 5);
 }
 
 static void random_blocks(struct check *c)
@@ -277,6 +323,13 @@ static void bench_thirds(struct check *c)
 	warp_blocks(c, &p, 1200, 21, 0.7, PLAIN);
 }
 
+static void bench_veils(struct check *c)
+{
+	struct picture p;
+	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	veil_blocks(c, &p, make_entries(c, &p, 1200, 21, 0.7, PLAIN), 1200, 1);
+}
+
 static void bench_levels(struct check *c)
 {
 	struct picture p;
@@ -320,11 +373,13 @@ int main(int argc, char **argv)
 		{ "warp: infinite, huge, denormal and no numbers", spoilt_numbers, 1500, NULL },
 		{ "warp: samples on the edges of pixels and tiles, and at near_z", edges, 500, NULL },
 		{ "warp: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "veil: points and squares in random tiles", random_veils, 1500, NULL },
 		{ "warp_clear: random tiles, clean parts and levels", random_clear, 400, NULL },
 		{ "warp_cells: random tiles, bare parts and levels", random_cells, 400, NULL },
 		{ "warp_far: random tiles", random_far, 400, NULL },
 		{ "warp, full blocks", bench_full_blocks, 0, "sample" },
 		{ "warp, blocks a third full", bench_thirds, 0, "sample" },
+		{ "veil, points of blocks a third full", bench_veils, 0, "sample" },
 		{ "warp, full blocks, depth levels 1 and 2", bench_levels, 0, "sample" },
 		{ "warp_clear, a tile", bench_clear, 0, "pixel" },
 		{ "warp_cells, a tile", bench_cells, 0, "pixel" },

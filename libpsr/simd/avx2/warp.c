@@ -1,7 +1,7 @@
 #include <immintrin.h>
 #include <string.h>
 #include "simd/kernels.h"
-#include "simd/warp_list.h"
+#include "simd/veil_list.h"
 
 static inline __m256 rows_of(const struct warp_block *b, int a)
 {
@@ -112,14 +112,34 @@ static inline void list_cells(struct cells *list, const struct warp_target *t, _
 	list->n += (uint32_t)__builtin_popcount(bits);
 }
 
-static inline void list_words(struct words *list, __m256i k, __m256i at, __m256i id, __m256 z)
+/* Samples under way: their places, ids, depths and veils. */
+struct warped {
+	__m256i at, id, z, veil;
+};
+
+/* The veils of a block's next samples, n or 8. */
+static inline __m256i veils_of(const struct veils *veils, int first, int n)
+{
+	uint64_t opacity = 0;
+
+	if (n < 8)
+		memcpy(&opacity, veils->opacity + first, (size_t)n);
+	else
+		memcpy(&opacity, veils->opacity + first, sizeof opacity);
+	const __m256i at = _mm256_cvtepu8_epi32(_mm_cvtsi64_si128((long long)opacity));
+	return _mm256_cvttps_epi32(_mm256_mul_ps(_mm256_i32gather_ps(veils->bits, at, 4), _mm256_set1_ps(veils->area)));
+}
+
+static inline void list_words(struct words *list, struct veils *veils, __m256i k, const struct warped *s)
 {
 	const uint32_t bits = bits_of(k);
-	const __m256i front = front_of(bits), own = _mm256_permutevar8x32_epi32(id, front);
-	const __m256i depth = _mm256_permutevar8x32_epi32(_mm256_castps_si256(z), front);
+	const __m256i front = front_of(bits), own = _mm256_permutevar8x32_epi32(s->id, front);
+	const __m256i depth = _mm256_permutevar8x32_epi32(s->z, front);
 	const __m256i low = _mm256_unpacklo_epi32(own, depth), high = _mm256_unpackhi_epi32(own, depth);
 
-	store(list->at + list->n, _mm256_permutevar8x32_epi32(at, front));
+	store(list->at + list->n, _mm256_permutevar8x32_epi32(s->at, front));
+	if (veils != NULL)
+		store(veils->veil + list->n, _mm256_permutevar8x32_epi32(s->veil, front));
 	store(list->word + list->n, _mm256_permute2x128_si256(low, high, 0x20));
 	store(list->word + list->n + 4, _mm256_permute2x128_si256(low, high, 0x31));
 	list->n += (uint32_t)__builtin_popcount(bits);
@@ -141,8 +161,10 @@ static inline void list_samples(uint8_t sample[64 + 8], uint64_t mask)
 	}
 }
 
-static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
-                              const struct bin_entry *entry, const struct warp_block *block)
+static inline __attribute__((always_inline)) void list_block(struct words *words, struct cells *cells,
+                                                             struct veils *veils, const struct warp_target *t,
+                                                             const struct bin_entry *entry,
+                                                             const struct warp_block *block)
 {
 	const __m256i lane = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
 	const struct warp_instance *in = &t->instance[entry->instance];
@@ -163,7 +185,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		const __m256 z1 = axis_of(row_z, col_z, r, c, depth, block->unit[2]);
 		const __m256 one = _mm256_set1_ps(1), inverse = t->perspective ? _mm256_div_ps(one, z1) : one;
 		const __m256 u = _mm256_mul_ps(x1, inverse), v = _mm256_mul_ps(y1, inverse);
-		const __m256i pixel_u = floor_int(u), pixel_v = floor_int(v);
+		const __m256 half = _mm256_set1_ps(veils != NULL ? veils->half : 0);
+		const __m256i pixel_u = floor_int(_mm256_sub_ps(u, half)), pixel_v = floor_int(_mm256_sub_ps(v, half));
 
 		const __m256i valid = _mm256_cmpgt_epi32(_mm256_set1_epi32(n - 8 * g), lane);
 		__m256i k =
@@ -175,12 +198,22 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		k = _mm256_and_si256(k, _mm256_and_si256(within(pixel_u, t->x0, t->x1), within(pixel_v, t->y0, t->y1)));
 		const __m256i x = _mm256_sub_epi32(pixel_u, _mm256_set1_epi32(t->x0));
 		const __m256i y = _mm256_sub_epi32(pixel_v, _mm256_set1_epi32(t->y0));
-		const __m256i at = _mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x);
-		list_words(words, k, at, _mm256_add_epi32(s, _mm256_set1_epi32((int)block->id)), z1);
+		const struct warped samples = {
+			_mm256_add_epi32(_mm256_mullo_epi32(y, _mm256_set1_epi32((int)t->stride)), x),
+			_mm256_add_epi32(s, _mm256_set1_epi32((int)block->id)), _mm256_castps_si256(z1),
+			veils != NULL ? veils_of(veils, 8 * g, n - 8 * g) : _mm256_setzero_si256()
+		};
+		list_words(words, veils, k, &samples);
 	}
 }
 
 uint64_t warp_avx2(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
 	return warp_by(list_block, target, entry, n);
+}
+
+void veil_avx2(const struct warp_target *target, const struct veil_layer *layer, const struct veil_entry *entry,
+               uint32_t n)
+{
+	veil_by(list_block, target, layer, entry, n);
 }

@@ -1,6 +1,6 @@
 #include <immintrin.h>
 #include "simd/kernels.h"
-#include "simd/warp_list.h"
+#include "simd/veil_list.h"
 
 static inline __m512 rows_of(const struct warp_block *b, int a)
 {
@@ -85,14 +85,24 @@ static inline void list_cells(struct cells *list, const struct warp_target *t, _
 	list->n += (uint32_t)__builtin_popcount(k);
 }
 
-/* Samples under way: their places, ids and depths. */
+/* Samples under way: their places, ids, depths and veils. */
 struct warped {
-	__m512i at, id, z;
+	__m512i at, id, z, veil;
 };
+
+/* The veils of the lanes of k: first .. first + 15 of a block. */
+static inline __m512i veils_of(const struct veils *veils, int first, __mmask16 k)
+{
+	const __m512i opacity = _mm512_cvtepu8_epi32(_mm_maskz_loadu_epi8(k, veils->opacity + first));
+	const __m512 bits = _mm512_i32gather_ps(opacity, veils->bits, 4);
+
+	return _mm512_cvttps_epi32(_mm512_mul_ps(bits, _mm512_set1_ps(veils->area)));
+}
 
 /* Lists the words of the lanes of k from element n on; returns the end of the list. A block that is not mixed most
  * often lists all samples, which then need no compression. */
-static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, __mmask16 k, struct warped s)
+static inline uint32_t list_words(struct words *list, uint32_t n, struct veils *veils, int is_mixed, __mmask16 k,
+                                  struct warped s)
 {
 	const __m512i low = _mm512_setr_epi32(0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
 	const __m512i high = _mm512_setr_epi32(8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15, 31);
@@ -101,7 +111,10 @@ static inline uint32_t list_words(struct words *list, uint32_t n, int is_mixed, 
 		s.at = _mm512_maskz_compress_epi32(k, s.at);
 		s.id = _mm512_maskz_compress_epi32(k, s.id);
 		s.z = _mm512_maskz_compress_epi32(k, s.z);
+		s.veil = _mm512_maskz_compress_epi32(k, s.veil);
 	}
+	if (veils != NULL)
+		_mm512_storeu_si512(veils->veil + n, s.veil);
 	_mm512_storeu_si512(list->at + n, s.at);
 	_mm512_storeu_si512(list->word + n, _mm512_permutex2var_epi32(s.id, low, s.z));
 	_mm512_storeu_si512(list->word + n + 8, _mm512_permutex2var_epi32(s.id, high, s.z));
@@ -114,8 +127,10 @@ static const uint8_t ordinals[64] = {
 	44, 45, 46, 47, 48, 49, 50, 51, 52, 53, 54, 55, 56, 57, 58, 59, 60, 61, 62, 63,
 };
 
-static inline void list_block(struct words *words, struct cells *cells, const struct warp_target *t,
-                              const struct bin_entry *entry, const struct warp_block *block)
+static inline __attribute__((always_inline)) void list_block(struct words *words, struct cells *cells,
+                                                             struct veils *veils, const struct warp_target *t,
+                                                             const struct bin_entry *entry,
+                                                             const struct warp_block *block)
 {
 	const struct warp_instance *in = &t->instance[entry->instance];
 	const int level = entry->level, is_mixed = entry->is_mixed, perspective = t->perspective;
@@ -143,7 +158,8 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		const __m512 z1 = axis_of(row_z, col_z, r, c, depth, block->unit[2]);
 		const __m512 one = _mm512_set1_ps(1), inverse = perspective ? _mm512_div_ps(one, z1) : one;
 		const __m512 u = _mm512_mul_ps(x1, inverse), v = _mm512_mul_ps(y1, inverse);
-		const __m512i pixel_u = floor_int(u), pixel_v = floor_int(v);
+		const __m512 half = _mm512_set1_ps(veils != NULL ? veils->half : 0);
+		const __m512i pixel_u = floor_int(_mm512_sub_ps(u, half)), pixel_v = floor_int(_mm512_sub_ps(v, half));
 
 		__mmask16 k = (__mmask16)_bzhi_u32(0xffff, (uint32_t)(n - i));
 		k = _mm512_mask_cmp_ps_mask(k, z1, near_z, _CMP_GT_OQ);
@@ -152,11 +168,12 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 		if (level)
 			list_cells(cells, t, k, pixel_u, pixel_v, z1);
 		const __m512i x = _mm512_sub_epi32(pixel_u, x0), y = _mm512_sub_epi32(pixel_v, y0);
-		const struct warped samples = { _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x), _mm512_add_epi32(s, id),
-			                            _mm512_castps_si512(z1) };
 		k = _mm512_mask_cmplt_epu32_mask(k, x, width);
 		k = _mm512_mask_cmplt_epu32_mask(k, y, height);
-		n_words = list_words(words, n_words, is_mixed, k, samples);
+		const struct warped samples = { _mm512_add_epi32(_mm512_mullo_epi32(y, stride), x), _mm512_add_epi32(s, id),
+			                            _mm512_castps_si512(z1),
+			                            veils != NULL ? veils_of(veils, i, k) : _mm512_setzero_si512() };
+		n_words = list_words(words, n_words, veils, is_mixed, k, samples);
 	}
 	words->n = n_words;
 }
@@ -164,4 +181,10 @@ static inline void list_block(struct words *words, struct cells *cells, const st
 uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *entry, uint32_t n)
 {
 	return warp_by(list_block, target, entry, n);
+}
+
+void veil_avx512(const struct warp_target *target, const struct veil_layer *layer, const struct veil_entry *entry,
+                 uint32_t n)
+{
+	veil_by(list_block, target, layer, entry, n);
 }

@@ -65,5 +65,6 @@ void check_blocks(struct check *c, struct psr_blocks *blocks, uint32_t n_blocks,
 		.attr_offset = offset,
 		.depth = check_in(c, n + DEPTH_PADDING, 2),
 		.attr = check_in(c, n, 8),
+		.opacity = check_in(c, n, 1),
 	};
 }

@@ -21,7 +21,7 @@
 #include <stdint.h>
 #include "simd/simd.h"
 
-#define CHECK_BUFFERS 32
+#define CHECK_BUFFERS 40
 
 struct check_buffer {
 	uint8_t *data, *map, *before, *expected; /* before, expected: of outputs */
