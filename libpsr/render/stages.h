@@ -6,7 +6,7 @@
 #include "simd/gaps.h"
 
 /* What may leave out blocks that cannot show, beside the frustum. All are conservative: without any of them a frame has
- * the same bytes. */
+ * the same colours. Its words may tell of other hidden samples, between those of a surface. */
 enum psr_cull_test {
 	PSR_CULL_CONES = 1,     /* [G] 6.4 */
 	PSR_CULL_MASKS = 2,     /* [G] 6.3: from outside of a model's unit sphere, if it was measured to lose nothing by
