@@ -26,6 +26,9 @@ static const struct {
 	[PSR_EFFECT_SHEER] = { "sheer",
 	                       { "", "the frame has neither colour nor depth", "no block in view lets light through", "",
 	                         "" } },
+	[PSR_EFFECT_VEILS] = { "veils",
+	                       { "", "the frame has neither colour nor depth", "no block in view is of thin things", "",
+	                         "" } },
 };
 
 const char *psr_effect_name(enum psr_effect effect)
@@ -49,6 +52,7 @@ const char *psr_effect_counts(enum psr_effect effect)
 		[PSR_EFFECT_TABLE] = "normals whose light was tabulated",
 		[PSR_EFFECT_SMOOTH] = "pixels at edges",
 		[PSR_EFFECT_SHEER] = "pixels with surfaces that let a part of the light through",
+		[PSR_EFFECT_VEILS] = "pixels with things that are narrower than a sample's cell",
 	};
 
 	return (unsigned)effect < PSR_N_EFFECTS && counts[effect] != NULL ? counts[effect] : "?";

@@ -247,10 +247,14 @@ static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_r
 	const struct psr_frame *planes = r->has_planes ? r->frame : NULL;
 	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, planes, r->buffers.stack.exponent };
 	const int is_wanted = r->frame->rgb != NULL || r->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
-	const enum psr_why why = is_drawn ? PSR_WHY_RAN : is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	const enum psr_why none = is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
+	const struct sheer *sheer = &r->sheer;
 	const int rc = is_drawn ? sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool) : PSR_OK;
 
-	effect_note(report, PSR_EFFECT_SHEER, why, r->sheer.n_pixels);
+	effect_note(report, PSR_EFFECT_SHEER, is_drawn && sheer->glass.any_blocks ? PSR_WHY_RAN : none,
+	            sheer->glass.n_pixels);
+	effect_note(report, PSR_EFFECT_VEILS, is_drawn && sheer->thin.any_blocks ? PSR_WHY_RAN : none,
+	            sheer->thin.n_pixels);
 	return rc;
 }
 

@@ -336,6 +336,8 @@ int refiner_draw(struct refiner *r, const struct psr_scene *scene, const struct 
 	const uint32_t n_x = n_windows(settings->width << pass, WINDOW_WIDTH, STEP_X);
 	const uint32_t n_y = n_windows(settings->height << pass, WINDOW_HEIGHT, STEP_Y);
 	memset(&frame->report, 0, sizeof frame->report);
+	for (int e = 0; e < PSR_N_EFFECTS; e++)
+		frame->report.effect[e].why = PSR_WHY_NOTHING; /* until a window says otherwise */
 	rc = find_inside(&still);
 	for (uint32_t j = 0; j < n_y; j++)
 		for (uint32_t i = 0; i < n_x && rc == PSR_OK; i++)

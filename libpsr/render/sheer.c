@@ -90,22 +90,29 @@ static void find_area(struct sheer_area *area, const struct sheer_drawing *d, ui
 	area->high_y = area->high_y < end_y ? area->high_y : end_y;
 }
 
-static void begin_layers(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
+static void begin_tile(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
-	memset(l->is_done, 0, sizeof l->is_done);
 	for (uint32_t y = area->low_y; y < area->high_y; y++) {
 		const float *depth = d->picture->depth + (size_t)y * d->plan->width + area->x0;
 
 		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++) {
+			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
+			l->first[at] = INFINITY;
+		}
+	}
+}
+
+static void begin_layers(struct sheer_tile *l, const struct sheer_area *area)
+{
+	memset(l->is_done, 0, sizeof l->is_done);
+	for (uint32_t y = area->low_y; y < area->high_y; y++)
+		for (size_t at = sheer_place(area, y), x = 0; x < area->width; at++, x++) {
 			l->last[at] = SHEER_END;
 			l->n_words[at] = 0;
-			l->before[at] = depth[x] * d->to_stack[0] * d->to_stack[1];
 			l->beyond[at] = 0;
-			l->first[at] = INFINITY;
 			l->through[at] = 1;
 			l->light[0][at] = l->light[1][at] = l->light[2][at] = 0;
 		}
-	}
 }
 
 /* Returns the thickness in z' of a layer whose sample shows at pixel (x, y). */
@@ -241,9 +248,11 @@ static void put_planes(struct sheer_tile *l, const struct sheer_drawing *d, cons
 }
 
 /* Mixes what was drawn with the picture. */
-static void end_tile(struct sheer_tile *l, struct sheer_drawing *d, const struct sheer_area *area)
+static void end_tile(struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area,
+                     struct sheer_sum *sum)
 {
-	atomic_fetch_add(&d->n_pixels, end_layers(l, d, area));
+	atomic_store(&sum->any_blocks, 1);
+	atomic_fetch_add(&sum->n_pixels, end_layers(l, d, area));
 	if (d->picture->planes != NULL)
 		put_planes(l, d, area);
 }
@@ -254,7 +263,8 @@ static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const stru
 {
 	const size_t first = sheer_place(area, area->low_y);
 
-	begin_layers(l, d, area);
+	begin_tile(l, d, area);
+	begin_layers(l, area);
 	l->list.before = l->before + first;
 	l->list.last = l->last + first;
 	l->list.n_words = l->n_words + first;
@@ -270,7 +280,7 @@ static void draw_glass(struct sheer_tile *l, struct sheer_drawing *d, const stru
 		if (!add_layer(l, d, area))
 			break;
 	}
-	end_tile(l, d, area);
+	end_tile(l, d, area, &d->glass);
 }
 
 static void draw_tile(struct sheer_drawing *d, uint32_t tile, struct sheer_tile *l)
@@ -289,9 +299,9 @@ static void draw_tile(struct sheer_drawing *d, uint32_t tile, struct sheer_tile 
 	target.y0 = (int32_t)area.low_y;
 	target.y1 = (int32_t)area.high_y;
 	if (begin < middle) {
-		begin_layers(l, d, &area);
+		begin_tile(l, d, &area);
 		thin_draw(l, d, &area, &target, &thin);
-		end_tile(l, d, &area);
+		end_tile(l, d, &area, &d->thin);
 	}
 	if (middle < end)
 		draw_glass(l, d, &area, &target, &glass);
@@ -340,7 +350,8 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
 	const int rc = psr_pool_for_until(pool, &plan->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);
-	sheer->n_pixels = d.n_pixels;
+	sheer->thin = (struct sheer_counts){ d.thin.any_blocks, d.thin.n_pixels };
+	sheer->glass = (struct sheer_counts){ d.glass.any_blocks, d.glass.n_pixels };
 	return d.failed ? PSR_ERR_MEMORY : rc;
 }
 

@@ -5,13 +5,19 @@
 #include "bins.h"
 #include "slots.h"
 
+/* What was drawn of thin things, or of other sheer surfaces. */
+struct sheer_counts {
+	int any_blocks;
+	uint64_t n_pixels;
+};
+
 struct sheer {
 	struct sheer_tile *tile; /* scratch, by slot */
 	int n_tiles;
 	struct slots slots;
 	float *depth;
 	size_t depth_size;
-	uint64_t n_pixels; /* of the last picture */
+	struct sheer_counts thin, glass; /* of the last picture */
 };
 
 #define SHEER_MOST 64 /* words of a pixel: eight layers of eight samples, so that a crowd of panes costs no more */
@@ -78,8 +84,8 @@ float *sheer_depths(struct sheer *sheer, const struct plan *plan);
 
 /* Draws thin things, then the eight nearest other sheer surfaces of each pixel over the picture. Each hides its
  * opacity's share of the light behind it. Where they hide at least half of the light, depth and planes become those of
- * the nearest. Sets sheer->n_pixels to how many pixels have sheer surfaces, twice those that have both kinds. A pure
- * function of picture, plan and bins. MEMORY, CANCELLED. */
+ * the nearest. Sets the counts of thin things and glass. A pure function of picture, plan and bins. MEMORY,
+ * CANCELLED. */
 int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *plan, const struct bins *bins,
                const struct sheer_picture *picture, struct psr_pool *pool);
 void sheer_clear(struct sheer *sheer);

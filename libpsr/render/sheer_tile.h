@@ -33,7 +33,10 @@ struct sheer_drawing {
 	struct sheer *sheer;
 	float to_world[2], to_stack[2]; /* two factors each: their product may be beyond a float */
 	float bits[PSR_OPAQUE + 1];       /* of thin things, see thin_tabulate() */
-	_Atomic uint64_t n_pixels;
+	struct sheer_sum {
+		atomic_int any_blocks;
+		_Atomic uint64_t n_pixels;
+	} thin, glass;
 	atomic_int failed;
 };
 

@@ -25,6 +25,7 @@ struct veils {
 	const float *bits;
 	const uint8_t *opacity; /* of its first sample */
 	float area, half;       /* half: from the corner of a square to its sample */
+	int32_t side;           /* of all squares in the list */
 };
 
 #define LOWER(type, base, value, i)                     \

@@ -36,7 +36,8 @@ enum psr_effect {
 	PSR_EFFECT_SHADOWS,   /* count: shadow maps in use */
 	PSR_EFFECT_TABLE,     /* count: normals whose diffuse light is tabulated ([B] 4.1) */
 	PSR_EFFECT_SMOOTH,    /* count: pixels at edges, blended with the surface behind */
-	PSR_EFFECT_SHEER,     /* count: pixels with translucent surfaces */
+	PSR_EFFECT_SHEER,     /* count: pixels with translucent surfaces, veils left out */
+	PSR_EFFECT_VEILS,     /* count: pixels with things narrower than a sample's cell */
 	PSR_N_EFFECTS
 };
 enum psr_why {

@@ -215,5 +215,5 @@ uint64_t warp_avx2(const struct warp_target *target, const struct bin_entry *ent
 void veil_avx2(const struct warp_target *target, const struct veil_layer *layer, const struct veil_entry *entry,
                uint32_t n)
 {
-	veil_by(list_block, target, layer, entry, n);
+	veil_by(list_block, hang_squares, target, layer, entry, n);
 }

@@ -183,7 +183,7 @@ static void tests_of_blocks_change_no_byte(void **state)
 /* ---- kernels that count how often they are called ---- */
 
 static struct {
-	uint64_t light, lit, warp_far, depth_row, fill_push;
+	uint64_t light, lit, warp_far, veil, depth_row, fill_push;
 } calls;
 
 static void count_light(struct strip *strip, const struct strip_light *light, const float *reaches)
@@ -205,12 +205,20 @@ static void count_far(const struct warp_target *target, uint32_t far[TILE_HEIGHT
 	simd_c.warp_far(target, far);
 }
 
+static void count_veil(const struct warp_target *target, const struct veil_layer *layer,
+                       const struct veil_entry *entry, uint32_t n)
+{
+	calls.veil++;
+	simd_c.veil(target, layer, entry, n);
+}
+
 static struct simd counting(void)
 {
 	struct simd simd = simd_c;
 	simd.strip_light = count_light;
 	simd.strip_lit = count_lit;
 	simd.warp_far = count_far;
+	simd.veil = count_veil;
 	memset(&calls, 0, sizeof calls);
 	return simd;
 }
@@ -255,6 +263,21 @@ static void many_lights_are_tabulated_and_few_are_not(void **state)
 	assert_int_equal(calls.lit, 0);
 	assert_int_equal(d.frame.report.effect[PSR_EFFECT_TABLE].why, PSR_WHY_COST);
 	release(&d);
+}
+
+static void no_veil_is_hung_where_nothing_is_thin(void **state)
+{
+	(void)state;
+	for (uint32_t which = 0; which < CASES; which++) {
+		struct case_of c;
+		struct drawn d;
+		struct simd simd = counting();
+		case_make(&c, which);
+		draw(&d, &c, &c.settings, &simd);
+		assert_int_equal(calls.veil, 0);
+		assert_int_equal(d.frame.report.effect[PSR_EFFECT_VEILS].why, PSR_WHY_NOTHING);
+		release(&d);
+	}
 }
 
 static void every_effect_says_why_it_was_left_out(void **state)
@@ -362,6 +385,7 @@ int main(void)
 		cmocka_unit_test(tests_of_blocks_change_no_byte),
 		cmocka_unit_test(a_light_without_color_is_not_asked),
 		cmocka_unit_test(many_lights_are_tabulated_and_few_are_not),
+		cmocka_unit_test(no_veil_is_hung_where_nothing_is_thin),
 		cmocka_unit_test(every_effect_says_why_it_was_left_out),
 		cmocka_unit_test(frames_do_not_depend_on_the_frame_before),
 		cmocka_unit_test(a_moving_camera_takes_no_more_memory),

@@ -122,7 +122,9 @@ static void draw(uint8_t rgb[3 * SIDE * SIDE], const struct psr_model *model, co
 	if (shot->simd != NULL)
 		renderer_use(renderer, shot->simd);
 	assert_int_equal(refiner_draw(refiner, &scene, &settings, pool, &frame, NULL), PSR_OK);
-	assert_int_equal(frame.report.effect[PSR_EFFECT_SHEER].why, PSR_WHY_RAN);
+	assert_int_equal(frame.report.effect[PSR_EFFECT_VEILS].why, PSR_WHY_RAN);
+	assert_true(frame.report.effect[PSR_EFFECT_VEILS].count > 0);
+	assert_int_equal(frame.report.effect[PSR_EFFECT_SHEER].why, PSR_WHY_NOTHING);
 	refiner_destroy(refiner);
 	psr_renderer_destroy(renderer);
 	psr_pool_destroy(pool);
