@@ -183,8 +183,40 @@ uint64_t warp_avx512(const struct warp_target *target, const struct bin_entry *e
 	return warp_by(list_block, target, entry, n);
 }
 
+/* Adds a veil to n pixels of a row. */
+static inline void hang_row(const struct veil_layer *layer, uint32_t at, int32_t n, uint64_t word, uint32_t veil)
+{
+	const __m256 z = _mm256_set1_ps(psr_float_from_bits((uint32_t)(word >> 32)));
+
+	for (; n > 0; n -= 8, at += 8) {
+		const __mmask8 in = (__mmask8)_bzhi_u32(0xff, n < 8 ? (uint32_t)n : 8);
+		const __m256 before = _mm256_maskz_loadu_ps(in, layer->before + at);
+		const __mmask8 k = _mm256_mask_cmp_ps_mask(in, z, before, _CMP_LT_OQ);
+		const __m512i there = _mm512_maskz_loadu_epi64(k, layer->word + at);
+		const __m256i sum = _mm256_add_epi32(_mm256_maskz_loadu_epi32(k, layer->veil + at), _mm256_set1_epi32((int)veil));
+
+		_mm512_mask_storeu_epi64(layer->word + at, k, _mm512_min_epu64(there, _mm512_set1_epi64((long long)word)));
+		_mm256_mask_storeu_epi32(layer->veil + at, k, _mm256_min_epu32(sum, _mm256_set1_epi32(VEIL_MOST)));
+	}
+}
+
+static void hang_rows(const struct warp_target *t, const struct veil_layer *layer, const struct words *words,
+                      const struct veils *veils)
+{
+	const int32_t side = veils->side, width = t->x1 - t->x0, height = t->y1 - t->y0;
+
+	for (uint32_t i = 0; i < words->n; i++) {
+		const int32_t x = square_x(words->at[i], side), y = square_y(words->at[i], side);
+		const int32_t x0 = x > 0 ? x : 0, n = (x + side < width ? x + side : width) - x0;
+		const int32_t y0 = y > 0 ? y : 0, y1 = y + side < height ? y + side : height;
+
+		for (int32_t row = y0; row < y1; row++)
+			hang_row(layer, (uint32_t)row * t->stride + (uint32_t)x0, n, words->word[i], veils->veil[i]);
+	}
+}
+
 void veil_avx512(const struct warp_target *target, const struct veil_layer *layer, const struct veil_entry *entry,
                  uint32_t n)
 {
-	veil_by(list_block, hang_squares, target, layer, entry, n);
+	veil_by(list_block, hang_rows, target, layer, entry, n);
 }
