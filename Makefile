@@ -252,6 +252,7 @@ VIEW_BENCH := $(BUILD)/tests/bench/view
 LATENCY    := $(BUILD)/tests/bench/latency
 FIRST      := $(BUILD)/tests/bench/first
 TRUTH      := $(BUILD)/tests/bench/truth
+BUDGET     := $(BUILD)/tests/bench/budget
 LARGE      := $(BUILD)/tests/bench/large
 
 SERVER_PARTS := $(filter-out $(BUILD)/server/main.c.o,$(PSRD_O))
@@ -347,12 +348,15 @@ $(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o)
 TRUTH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child report truth truth_build truth_rows truth_table))
 $(TRUTH): $(TRUTH_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lcjson $(L_BUILD_HERE) $(L_PSR)
+BUDGET_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,budget budget_bound budget_link budget_times child report truth_build))
+$(BUDGET): $(BUDGET_O) $(CODEC_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+	$(link) -lcjson $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 $(LARGE): $(BUILD)/tests/bench/large.c.o $(HARD_O) $(LIB)/libpsr.a
 	$(link) -lcmocka $(L_PSR)
 # A peer's shading is to be as fast as a compiler makes it; no frame of ours goes through this file.
 $(BUILD)/tests/bench/embree.c.o: CFLAGS += -O3 -march=native -ffast-math
 
-.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
+.PHONY: fuzz fuzz-bin hard-large soak test-bin check bench bench-budget bench-cancel bench-codec bench-daemon bench-effects bench-model bench-octree bench-pool
 .PHONY: bench-first bench-load bench-reproject bench-simd bench-truth bench-view
 test-bin: $(TEST_BIN) $(PROGRAMS)
 check: test-bin ## check: run the tests of this config without looking for missing packages
@@ -400,6 +404,9 @@ bench: deps ## bench: install what is missing, build, time frames beside llvmpip
 	$(Q).ci/deps $(DEPS_BENCH)
 	$(Q)$(MAKE) --no-print-directory compile $(FRAMES)
 	$(Q)$(FRAMES) $(BIN)/psr-model $(BUILD)/bench-models $(BUILD)/bench $(fetched) $(only)
+
+bench-budget: compile $(BUDGET) ## bench-budget: whether budgets of time are kept, what they give, and the geometric bound (args="--only dragon")
+	$(Q)$(BUDGET) $(args) --programs $(BIN) $(BUILD)/bench-budget $(fetched)
 
 bench-cancel: compile $(CANCEL) ## bench-cancel: how long a frame goes on once it is cancelled, by scene (seconds=10 for each)
 	$(Q)$(CANCEL) $(BIN)/psr-model $(BUILD)/bench-models $(fetched) $(seconds)

@@ -36,14 +36,16 @@ check "0.001 px are not" shot --model teapot --size 160x120 --budget 0.001px --r
 check "and the program says so" grep -q 'the budget of 0.001.*px was not kept' "$work/said"
 is "and the report, whose frame is the best there is" "False coarse 4" \
 	"$(of_report "' '.join(map(str, (r['budget']['kept'], r['status'], r['budget']['chosen']['pass'])))")"
-check "a microsecond is too short" shot --model teapot --size 160x120 --budget 0.001ms --report "$work/r.json" -o "$work/a.ppm"
+check "a microsecond is too short" \
+	shot --model teapot --size 160x120 --budget 0.001ms --report "$work/r.json" -o "$work/a.ppm"
 is "a frame comes, and says so" "False late" "$(of_report "' '.join(map(str, (r['budget']['kept'], r['status'])))")"
-check "a turntable has budgets" keep psr turntable --server "$server" --model teapot --size 80x60 --frames 5 --budget 0.001ms \
-	-o "$work/t%d.ppm"
+check "a turntable has budgets" \
+	keep psr turntable --server "$server" --model teapot --size 80x60 --frames 5 --budget 0.001ms -o "$work/t%d.ppm"
 check "and counts what is over" grep -q '^psr turntable: 5 of 5 pictures are over the budget$' "$work/said"
 
 for bad in 12 ms 0ms -1ms nanms 12s 1e9ms 0px infpx 1mpx ""; do
-	refuses "a budget of '$bad'" 2 "--budget takes a time such as 12ms" shot --model teapot --budget "$bad" -o "$work/a.ppm"
+	refuses "a budget of '$bad'" 2 "--budget takes a time such as 12ms" \
+		shot --model teapot --budget "$bad" -o "$work/a.ppm"
 done
 for other in "--quality good" "--spacing 1" "--smooth" "--no-smooth" "--passes 0"; do
 	# shellcheck disable=SC2086
