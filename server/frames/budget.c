@@ -6,6 +6,8 @@
 #define TAIL_STEP 0.1      /* how far the tail moves in 19 frames that keep it, and in one that does not: logarithm */
 #define TAIL_PART 0.95
 #define FIRST_TAIL 1.5
+#define TAIL_FRAMES 20     /* of a rung, before its own tail counts */
+#define EMPTY_PIXEL 0.1    /* of the work of one that the object covers */
 #define HOPE_STEP 0.995    /* a frame */
 #define LEAST_HOPE 0.5     /* what is foreseen to take over twice the budget is not tried */
 #define LEAST_TAIL 0.5
@@ -64,10 +66,10 @@ static void work_of(double work[BUDGET_N_WORK], const struct budget_view *view, 
 	const double squares = view->area * density * density / (settings->spacing_px * settings->spacing_px);
 
 	work[BUDGET_SAMPLES] = fmin(squares, view->n_samples);
-	work[BUDGET_PIXELS] = n_pixels * density * density;
+	work[BUDGET_PIXELS] = (EMPTY_PIXEL * n_pixels + (1 - EMPTY_PIXEL) * fmin(view->area, n_pixels)) * density * density;
 	work[BUDGET_SMOOTH] = settings->is_smooth && settings->pass == 0 ? work[BUDGET_PIXELS] : 0;
 	work[BUDGET_ANSWER] = n_pixels / (settings->scale * settings->scale);
-	work[BUDGET_SHADOWS] = 1;
+	work[BUDGET_SHADOWS] = view->n_shadow_lights;
 }
 
 static double time_of(const struct budget_learnt *learnt, const double work[BUDGET_N_WORK])
@@ -79,20 +81,30 @@ static double time_of(const struct budget_learnt *learnt, const double work[BUDG
 	return ns;
 }
 
+/* A rung that was seldom drawn has the tail of all, at most the one that flows begin with. */
+static double tail_of(const struct budget_learnt *learnt, int rung)
+{
+	if (learnt->n_drawn[rung] >= TAIL_FRAMES)
+		return learnt->tail_of[rung];
+	return fmin(learnt->tail, FIRST_TAIL);
+}
+
 static double foresee(const struct budget_learnt *learnt, const struct budget_view *view, int rung)
 {
 	double work[BUDGET_N_WORK];
 
 	work_of(work, view, &ladder[rung]);
-	return time_of(learnt, work) * learnt->bias[rung] * learnt->tail;
+	return time_of(learnt, work) * learnt->bias[rung] * tail_of(learnt, rung);
 }
 
 void budget_init(struct budget_learnt *learnt)
 {
 	/* Of one slow core; the first frames correct them. */
 	*learnt = (struct budget_learnt){ .ns = { 40, 80, 30, 30, 0 }, .tail = FIRST_TAIL };
-	for (int i = 0; i < BUDGET_RUNGS; i++)
+	for (int i = 0; i < BUDGET_RUNGS; i++) {
 		learnt->bias[i] = learnt->hope[i] = 1;
+		learnt->tail_of[i] = FIRST_TAIL;
+	}
 }
 
 void budget_inherit(struct budget_learnt *learnt, const struct budget_learnt *from)
@@ -102,11 +114,11 @@ void budget_inherit(struct budget_learnt *learnt, const struct budget_learnt *fr
 }
 
 /* A step up outweighs 19 steps down, so that the tail rests where one frame of 20 exceeds it. */
-static void learn_tail(struct budget_learnt *learnt, double ratio)
+static void learn_tail(double *tail, double ratio)
 {
-	const double step = ratio > learnt->tail ? TAIL_PART * TAIL_STEP : (TAIL_PART - 1) * TAIL_STEP;
+	const double step = ratio > *tail ? TAIL_PART * TAIL_STEP : (TAIL_PART - 1) * TAIL_STEP;
 
-	learnt->tail = fmin(fmax(learnt->tail * exp(step), LEAST_TAIL), MOST_TAIL);
+	*tail = fmin(fmax(*tail * exp(step), LEAST_TAIL), MOST_TAIL);
 }
 
 /* A rung that is never drawn is never learnt: its price may be foreseen far too high, as models have few levels. So the
@@ -126,8 +138,11 @@ void budget_learn(struct budget_learnt *learnt, const struct budget_view *view,
 
 	work_of(work, view, settings);
 	before = time_of(learnt, work);
-	if (rung >= 0 && before > 0 && learnt->n_frames > 0)
-		learn_tail(learnt, spent->total_ns / (before * learnt->bias[rung]));
+	if (rung >= 0 && before > 0 && learnt->n_frames > 0) {
+		learn_tail(&learnt->tail, spent->total_ns / (before * learnt->bias[rung]));
+		learn_tail(&learnt->tail_of[rung], spent->total_ns / (before * learnt->bias[rung]));
+		learnt->n_drawn[rung]++;
+	}
 	for (int i = 0; i < BUDGET_N_WORK; i++)
 		rest -= i != BUDGET_ANSWER ? spent->ns[i] : 0;
 	for (int i = 0; i < BUDGET_N_WORK; i++) {

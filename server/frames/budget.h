@@ -12,10 +12,10 @@
 
 enum budget_work {
 	BUDGET_SAMPLES, /* plan, cull, warp: of squares of the spacing in the area that models cover */
-	BUDGET_PIXELS,  /* gaps, resolve, shade, fill: of pixels drawn, sub-pixels in passes above 0 */
+	BUDGET_PIXELS,  /* gaps, resolve, shade, fill: of pixels drawn, sub-pixels in passes above 0; empty ones count less */
 	BUDGET_SMOOTH,  /* of pixels drawn, where they are smoothed */
 	BUDGET_ANSWER,  /* of pixels coded; and all time that no other kind has */
-	BUDGET_SHADOWS, /* of frames: maps that are kept take none */
+	BUDGET_SHADOWS, /* of lights that cast shadows: maps that are kept take none */
 	BUDGET_N_WORK,
 };
 
@@ -24,6 +24,7 @@ struct budget_view {
 	uint32_t width, height, planes;
 	double area;      /* pixels that the instances' spheres cover, each within the picture, summed */
 	double n_samples; /* of all instances */
+	unsigned n_shadow_lights;
 };
 
 /* What the frames of a flow took, as the machine was loaded then. */
@@ -33,6 +34,8 @@ struct budget_learnt {
 	double hope[BUDGET_RUNGS]; /* of rungs better than those drawn: they are tried at so much of their price */
 	unsigned drawn_at[BUDGET_RUNGS]; /* n_frames when the rung was drawn last */
 	double tail;               /* 95 of 100 frames take at most so many times what bias and work say */
+	double tail_of[BUDGET_RUNGS]; /* of the rung's frames: short ones vary more */
+	unsigned n_drawn[BUDGET_RUNGS];
 	double error[BUDGET_RUNGS]; /* the bound of the last frame of a rung, pixels of the whole picture; 0: unknown */
 	unsigned n_frames;
 };

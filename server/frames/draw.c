@@ -63,6 +63,7 @@ void draw_resolve(struct drawing *d, const struct budget_learnt *learnt)
 		.width = request->width, .height = request->height, .planes = request->planes,
 		.area = scene_area(d->scene, &request->camera, request->width, request->height),
 		.n_samples = (double)scene_blocks(d->scene) * PSR_BLOCK_SAMPLES,
+		.n_shadow_lights = scene_shadow_lights(d->scene),
 	};
 	if (request->budget == PSR_WIRE_BUDGET_TIME)
 		budget_choose_time(&d->choice, learnt, &d->seen, time_limit(d));
