@@ -69,7 +69,7 @@ static void work_of(double work[BUDGET_N_WORK], const struct budget_view *view, 
 	work[BUDGET_PIXELS] = (EMPTY_PIXEL * n_pixels + (1 - EMPTY_PIXEL) * fmin(view->area, n_pixels)) * density * density;
 	work[BUDGET_SMOOTH] = settings->is_smooth && settings->pass == 0 ? work[BUDGET_PIXELS] : 0;
 	work[BUDGET_ANSWER] = n_pixels / (settings->scale * settings->scale);
-	work[BUDGET_SHADOWS] = view->n_shadow_lights;
+	work[BUDGET_SHADOWS] = (double)view->n_shadow_lights / settings->scale; /* maps are as fine as the picture */
 }
 
 static double time_of(const struct budget_learnt *learnt, const double work[BUDGET_N_WORK])

@@ -15,7 +15,7 @@ enum budget_work {
 	BUDGET_PIXELS,  /* gaps, resolve, shade, fill: of pixels drawn, sub-pixels in passes above 0; empty ones count less */
 	BUDGET_SMOOTH,  /* of pixels drawn, where they are smoothed */
 	BUDGET_ANSWER,  /* of pixels coded; and all time that no other kind has */
-	BUDGET_SHADOWS, /* of lights that cast shadows: maps that are kept take none */
+	BUDGET_SHADOWS, /* of lights that cast shadows, over the scale: maps that are kept take none */
 	BUDGET_N_WORK,
 };
 
