@@ -57,7 +57,7 @@ struct budget_bounds {
 	size_t n;
 };
 
-/* Draws each view with each rung but the last by a parallel projection, and compares depths with those of rays. */
+/* Draws each view with each rung that has no pass by a parallel projection, and compares depths with those of rays. */
 void budget_bound(struct budget_bounds *bounds, const char *address, const char *model, const struct ladder_view *view,
                   struct psr_truth *truth);
 void budget_bound_print(struct budget_bounds *bounds);

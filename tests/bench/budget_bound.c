@@ -6,7 +6,7 @@
 #include "budget.h"
 #include "report.h"
 
-#define BOUND_RUNGS (BUDGET_RUNGS - 1) /* pass 4 takes long, and pass 3 has the same depths but for sub-pixels */
+#define BOUND_RUNGS 6 /* those without passes: the depth of a refined pixel is that of any of its sub-pixels */
 #define TARGET_RATIO 2
 #define AWAY 20 /* pictures high: the object is before the eye, and floats still tell depths apart */
 
