@@ -110,26 +110,45 @@ static float cell_at(const struct psr_zstack *stack, int k, int64_t i, int64_t j
 	return stack->level[k].z[(size_t)j * stack->level[k].width + (size_t)i];
 }
 
+/* What the guard band knows of levels k to 2. */
+static float depth_beyond(const struct psr_zstack *stack, int k, int64_t x, int64_t y)
+{
+	float least = INFINITY;
+	for (; k <= 2; k++)
+		if (stack->levels >> k & 1)
+			least = fminf(least, cell_at(stack, k, (x >> k) + 1, (y >> k) + 1));
+	return least;
+}
+
 static float least_around(const struct psr_zstack *stack, int k, int64_t x, int64_t y)
 {
 	float least = INFINITY;
 	for (int64_t v = y - k; v <= y + k; v++)
 		for (int64_t u = x - k; u <= x + k; u++)
-			least = fminf(least, is_in_picture(stack, u, v) ? depth_at(stack, u, v)
-			                                                : cell_at(stack, k, (u >> k) + 1, (v >> k) + 1));
+			least = fminf(least, is_in_picture(stack, u, v) ? depth_at(stack, u, v) : depth_beyond(stack, k, u, v));
 	return least == INFINITY && !is_in_picture(stack, x, y) ? 0 : least;
+}
+
+/* Whether a sample of levels k to 2 is near. */
+static int is_near(const struct psr_zstack *stack, uint32_t x, uint32_t y, int k)
+{
+	for (; k <= 2; k++)
+		for (int64_t j = y >> k; (stack->levels >> k & 1) && j <= (y >> k) + 2; j++)
+			for (int64_t i = x >> k; i <= (x >> k) + 2; i++)
+				if (cell_at(stack, k, i, j) < INFINITY)
+					return 1;
+	return 0;
 }
 
 static int is_closed(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z)
 {
-	float near = INFINITY, greatest = 0;
-	for (int64_t j = y >> k; j <= (y >> k) + 2; j++)
-		for (int64_t i = x >> k; i <= (x >> k) + 2; i++)
-			near = fminf(near, cell_at(stack, k, i, j));
-	for (int64_t v = (int64_t)y - k; near < INFINITY && v <= (int64_t)y + k; v++)
+	float greatest = 0;
+	if (!is_near(stack, x, y, k))
+		return 0;
+	for (int64_t v = (int64_t)y - k; v <= (int64_t)y + k; v++)
 		for (int64_t u = (int64_t)x - k; u <= (int64_t)x + k; u++)
 			greatest = fmaxf(greatest, least_around(stack, k, u, v));
-	return near < INFINITY && greatest * plan->gap_scale[k - 1] + plan->gap_offset[k - 1] < z;
+	return greatest * plan->gap_scale[k - 1] + plan->gap_offset[k - 1] < z;
 }
 
 static int32_t cover_of(const struct plan *plan, const struct psr_zstack *stack, uint32_t x, uint32_t y, int k, float z)
@@ -149,7 +168,9 @@ static uint16_t weight_of(const struct plan *plan, const struct psr_zstack *stac
 	const float z = depth_at(stack, x, y);
 	int32_t most = 0;
 	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		if (!(stack->levels >> k & 1))
+		/* squares of level 1 act near samples of level 2, too */
+		const int is_finer = plan->gap_method == PSR_GAPS_CLOSED && k == 1 && (stack->levels >> 2 & 1);
+		if (!(stack->levels >> k & 1) && !is_finer)
 			continue;
 		const int32_t cover = cover_of(plan, stack, x, y, k, z);
 		most = cover > most ? cover : most;
