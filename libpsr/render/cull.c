@@ -323,8 +323,9 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		report->levels |= chunk->levels;
 		if (chunk->flags & PSR_BLOCK_TWO_SIDED)
 			plan->view.needs |= STRIP_TWO_SIDED;
-		plan->has_sheer |=
-			plan->instance[chunk->instance].cull.blocks->opacity != NULL && chunk->traits & PSR_BLOCK_SHEER;
+		const int has_opacity = plan->instance[chunk->instance].cull.blocks->opacity != NULL;
+		plan->has_sheer |= has_opacity && chunk->traits & PSR_BLOCK_SHEER;
+		plan->has_thin |= has_opacity && chunk->traits & PSR_BLOCK_THIN;
 		if (chunk->traits & PSR_BLOCK_BENT)
 			plan->view.needs |= STRIP_BENT;
 		report->n_clamped += chunk->n_clamped;

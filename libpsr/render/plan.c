@@ -270,7 +270,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->finer = (float)ldexp(1 / settings->spacing_px, -settings->cell_bias); /* levels of models know no bias */
 	plan->cell_bias = settings->cell_bias;
 	plan->is_quiet = NULL;
-	plan->has_sheer = 0;
+	plan->has_sheer = plan->has_thin = 0;
 	plan->caster = NO_CASTER;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;

@@ -346,7 +346,8 @@ int sheer_draw(struct sheer *sheer, const struct simd *simd, const struct plan *
 
 	if (n_slots > sheer->n_tiles && make_tiles(sheer, n_slots))
 		return PSR_ERR_MEMORY;
-	thin_tabulate(d.bits);
+	if (plan->has_thin)
+		thin_tabulate(d.bits);
 	find_factors(d.to_world, picture->exponent);
 	find_factors(d.to_stack, -picture->exponent);
 	const int rc = psr_pool_for_until(pool, &plan->cancel, (int)(plan->tiles_x * plan->tiles_y), draw_one, &d);
