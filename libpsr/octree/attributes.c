@@ -1,0 +1,318 @@
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "attributes.h"
+#include "base/direction.h"
+
+#define DEPTHS 7     /* of a normal: the octant, then six times one of four */
+#define SPREADS 16
+#define COUNTS 4     /* of earlier neighbours: 0, 1, 2, more */
+#define UNIT 32767
+#define STEP 14188   /* of offsets, in UNITs of a leaf's edge: sqrt(3) / OCTREE_OFFSETS */
+#define BINS 24      /* of foretold offsets */
+
+_Static_assert(OCTREE_OFFSETS == 4, "two bits an offset");
+
+struct near_leaf {
+	uint32_t at;
+	int weight, place[3];
+};
+
+struct job {
+	struct coder *coder;
+	struct octree_attributes attributes;
+	struct model *model;
+	uint64_t last_path;
+	struct near_leaf near[OCTREE_NEAR]; /* earlier ones around the leaf */
+	unsigned n;
+	int weight, is_decoding, was_same;
+};
+
+/* Probabilities, as coder_adaptive() has them. */
+struct odds {
+	uint16_t same[8][2][2];
+	uint16_t normal[DEPTHS][SPREADS][COUNTS][2][8];
+	uint16_t offset[BINS][COUNTS][4];
+	uint16_t color[3][8][256];
+};
+
+struct model {
+	struct odds odds;
+	int16_t center[DEPTHS][PSR_DIRECTIONS][3]; /* of the triangles of each depth */
+};
+
+static struct model *model_make(enum octree_stream stream)
+{
+	struct model *model = malloc(sizeof *model);
+
+	if (model == NULL)
+		return NULL;
+	for (size_t i = 0; i < sizeof model->odds / sizeof(uint16_t); i++)
+		((uint16_t *)&model->odds)[i] = CODER_EVEN;
+	for (int depth = 0; depth < DEPTHS && stream == OCTREE_NORMAL_STREAM; depth++)
+		for (unsigned i = 0; i < 8u << 2 * depth; i++) {
+			double v[3];
+
+			psr_direction_center(depth, i, v);
+			for (int c = 0; c < 3; c++)
+				model->center[depth][i][c] = (int16_t)lrint(v[c] * UNIT);
+		}
+	return model;
+}
+
+/* Codes a value of n_bits, the highest bit first. */
+static unsigned code_bits(struct job *job, uint16_t *p, int n_bits, unsigned value)
+{
+	unsigned node = 1;
+
+	for (int i = n_bits - 1; i >= 0; i--) {
+		const unsigned bit = value >> i & 1;
+
+		node = node << 1 | (job->is_decoding ? coder_adaptive(job->coder, 1, &p[node], 4, 0)
+		                                     : coder_adaptive(job->coder, 0, &p[node], 4, bit));
+	}
+	return node - (1u << n_bits);
+}
+
+static int log2_floor(uint64_t x)
+{
+	return x == 0 ? 0 : 63 - __builtin_clzll(x);
+}
+
+static unsigned count_of(const struct job *job)
+{
+	return job->n < COUNTS - 1 ? job->n : COUNTS - 1;
+}
+
+static void find_near(struct job *job, uint32_t leaf, const struct octree_near *near)
+{
+	job->n = 0;
+	job->weight = 0;
+	for (int k = 0; k < OCTREE_NEAR; k++) {
+		const int x = k % 3 - 1, y = k / 3 % 3 - 1, z = k / 9 - 1, weight = 4 - x * x - y * y - z * z;
+
+		if (near->at[k] >= leaf) /* as OCTREE_NONE is */
+			continue;
+		job->near[job->n++] = (struct near_leaf){ near->at[k], weight, { x, y, z } };
+		job->weight += weight;
+	}
+}
+
+/* ---- normals ---- */
+
+static void unit_of(uint16_t normal, int v[3])
+{
+	const uint64_t word = psr_direction_words()[normal];
+
+	for (int c = 0; c < 3; c++)
+		v[c] = (int16_t)(word >> 16 * c);
+}
+
+/* Sorts the children of a triangle, or the octants, by how near they are to a direction. */
+static void rank_children(unsigned order[8], const struct job *job, int depth, unsigned parent, const int64_t sum[3])
+{
+	const unsigned n = depth == 0 ? 8 : 4;
+	int64_t score[8];
+
+	for (unsigned j = 0; j < n; j++) {
+		const int16_t *center = job->model->center[depth][parent * 4 * (depth > 0) + j];
+		const int64_t s = sum[0] * center[0] + sum[1] * center[1] + sum[2] * center[2];
+		unsigned at = j;
+
+		for (; at > 0 && score[at - 1] < s; at--) {
+			score[at] = score[at - 1];
+			order[at] = order[at - 1];
+		}
+		score[at] = s;
+		order[at] = j;
+	}
+}
+
+static unsigned rank_of(const unsigned order[8], unsigned child)
+{
+	unsigned rank = 0;
+
+	while (order[rank] != child)
+		rank++;
+	return rank;
+}
+
+static uint16_t code_nested(struct job *job, uint16_t normal, const int64_t sum[3])
+{
+	const uint64_t full = (uint64_t)job->weight * UNIT * (uint64_t)job->weight * UNIT;
+	const uint64_t square = (uint64_t)(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+	const uint64_t lost = full > square ? full - square : 1;
+	const int log = log2_floor(full / lost), spread = log < SPREADS ? log : SPREADS - 1;
+	unsigned index = 0, is_first = 1;
+
+	for (int depth = 0; depth < DEPTHS; depth++) {
+		const int n_bits = depth == 0 ? 3 : 2;
+		const unsigned child = normal >> 2 * (DEPTHS - 1 - depth) & ((1u << n_bits) - 1);
+		unsigned order[8], rank;
+
+		rank_children(order, job, depth, index, sum);
+		rank = code_bits(job, job->model->odds.normal[depth][spread][count_of(job)][is_first], n_bits,
+		                 job->is_decoding ? 0 : rank_of(order, child));
+		index = index << n_bits | order[rank];
+		is_first &= rank == 0;
+	}
+	return (uint16_t)index;
+}
+
+static void code_normal(struct job *job, uint32_t leaf, uint64_t path)
+{
+	uint16_t *const normal = job->attributes.normal;
+	const uint16_t before = leaf > 0 ? normal[leaf - 1] : 0;
+	const int parting = log2_floor(path ^ job->last_path) / 3;
+	int64_t sum[3] = { 0, 0, 0 };
+	int is_agreed = 1;
+	uint16_t *p;
+
+	for (unsigned i = 0; i < job->n; i++) {
+		int v[3];
+
+		unit_of(normal[job->near[i].at], v);
+		is_agreed &= normal[job->near[i].at] == before;
+		for (int c = 0; c < 3; c++)
+			sum[c] += (int64_t)job->near[i].weight * v[c];
+	}
+	/* All leaves of a cell of a cloud have one normal. */
+	p = &job->model->odds.same[parting < 7 ? parting : 7][job->was_same][is_agreed];
+	if (!job->is_decoding) {
+		job->was_same = (int)coder_adaptive(job->coder, 0, p, 5, normal[leaf] == before);
+		if (!job->was_same)
+			code_nested(job, normal[leaf], sum);
+		return;
+	}
+	job->was_same = (int)coder_adaptive(job->coder, 1, p, 5, 0);
+	normal[leaf] = job->was_same ? before : code_nested(job, 0, sum);
+}
+
+/* ---- offsets ---- */
+
+/* The plane through a neighbour's point, across the leaf's normal, tells where the leaf's point is. */
+static void code_offset(struct job *job, uint32_t leaf)
+{
+	const uint16_t *const normal = job->attributes.normal;
+	uint8_t *const offset = job->attributes.offset;
+	int64_t sum = 0;
+	int v[3] = { 0, 0, 0 }, bin = BINS / 2;
+
+	if (normal != NULL)
+		unit_of(normal[leaf], v);
+	for (unsigned i = 0; i < job->n; i++) {
+		const struct near_leaf *near = &job->near[i];
+		int64_t along = UNIT, up = (2 * offset[near->at] - (OCTREE_OFFSETS - 1)) * (STEP / 2);
+
+		if (normal != NULL) {
+			int of[3];
+
+			unit_of(normal[near->at], of);
+			along = ((int64_t)of[0] * v[0] + (int64_t)of[1] * v[1] + (int64_t)of[2] * v[2]) / UNIT;
+		}
+		up = up * along / UNIT + near->place[0] * v[0] + near->place[1] * v[1] + near->place[2] * v[2];
+		sum += near->weight * up;
+	}
+	if (job->n > 0)
+		bin += (int)(sum * 4 / ((int64_t)job->weight * STEP));
+	bin = bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
+	const unsigned step = code_bits(job, job->model->odds.offset[bin][count_of(job)], 2,
+	                                job->is_decoding ? 0 : offset[leaf]);
+	if (job->is_decoding)
+		offset[leaf] = (uint8_t)step;
+}
+
+/* ---- colours ---- */
+
+static void code_color(struct job *job, uint32_t leaf)
+{
+	static const int order[3] = { 1, 0, 2 }; /* green tells most of the others */
+	uint8_t(*const color)[3] = job->attributes.color;
+	int foretold[3] = { 128, 128, 128 }, error = 0, least = 255, most = 0, spread;
+
+	for (int c = 0; c < 3; c++) {
+		int sum = 0;
+
+		for (unsigned i = 0; i < job->n; i++)
+			sum += job->near[i].weight * color[job->near[i].at][c];
+		if (job->n > 0)
+			foretold[c] = (sum + job->weight / 2) / job->weight;
+		else if (leaf > 0)
+			foretold[c] = color[leaf - 1][c];
+	}
+	for (unsigned i = 0; i < job->n; i++) {
+		const int green = color[job->near[i].at][1];
+
+		least = green < least ? green : least;
+		most = green > most ? green : most;
+	}
+	spread = job->n < 2 ? 7 : log2_floor((uint64_t)(most - least + 1));
+	for (int k = 0; k < 3; k++) {
+		const int c = order[k], middle = foretold[c] + error;
+		const uint8_t from = (uint8_t)(middle < 0 ? 0 : middle > 255 ? 255 : middle);
+		const uint8_t step = job->is_decoding ? 0 : (uint8_t)(color[leaf][c] - from + 128);
+		const unsigned coded = code_bits(job, job->model->odds.color[k][spread < 8 ? spread : 7], 8, step);
+
+		if (job->is_decoding)
+			color[leaf][c] = (uint8_t)(coded + from - 128);
+		if (k == 0)
+			error = color[leaf][1] - foretold[1];
+	}
+}
+
+/* ---- all ---- */
+
+static void visit_normal(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	struct job *job = userdata;
+
+	find_near(job, leaf, near);
+	code_normal(job, leaf, path);
+	job->last_path = path;
+}
+
+static void visit_offset(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	(void)path;
+	find_near(userdata, leaf, near);
+	code_offset(userdata, leaf);
+}
+
+static void visit_color(uint32_t leaf, uint64_t path, const struct octree_near *near, void *userdata)
+{
+	(void)path;
+	find_near(userdata, leaf, near);
+	code_color(userdata, leaf);
+}
+
+static int code_stream(struct job *job, const struct octree_levels *levels, enum octree_stream stream)
+{
+	static void (*const visits[OCTREE_STREAMS])(uint32_t, uint64_t, const struct octree_near *, void *) = {
+		[OCTREE_NORMAL_STREAM] = visit_normal,
+		[OCTREE_OFFSET_STREAM] = visit_offset,
+		[OCTREE_COLOR_STREAM] = visit_color,
+	};
+
+	job->model = model_make(stream);
+	if (job->model == NULL)
+		return PSR_ERR_MEMORY;
+	octree_levels_walk(levels, levels->height, visits[stream], job);
+	free(job->model);
+	return PSR_OK;
+}
+
+int octree_attributes_pack(struct coder *coder, const struct octree_levels *levels,
+                           const struct octree_attributes *attributes, enum octree_stream stream)
+{
+	struct job job = { .coder = coder, .attributes = *attributes };
+
+	return code_stream(&job, levels, stream);
+}
+
+int octree_attributes_unpack(struct octree_attributes *attributes, struct coder *coder,
+                             const struct octree_levels *levels, enum octree_stream stream)
+{
+	struct job job = { .coder = coder, .attributes = *attributes, .is_decoding = 1 };
+
+	return code_stream(&job, levels, stream);
+}
