@@ -1,6 +1,4 @@
-#include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "attributes.h"
 #include "base/direction.h"
 
@@ -18,16 +16,6 @@ struct near_leaf {
 	int weight, place[3];
 };
 
-struct job {
-	struct coder *coder;
-	struct octree_attributes attributes;
-	struct model *model;
-	uint64_t last_path;
-	struct near_leaf near[OCTREE_NEAR]; /* earlier ones around the leaf */
-	unsigned n;
-	int weight, is_decoding, was_same;
-};
-
 /* Probabilities, as coder_adaptive() has them. */
 struct odds {
 	uint16_t same[8][2][2];
@@ -36,28 +24,25 @@ struct odds {
 	uint16_t color[3][8][256];
 };
 
-struct model {
-	struct odds odds;
-	int16_t center[DEPTHS][PSR_DIRECTIONS][3]; /* of the triangles of each depth */
+struct job {
+	struct coder *coder;
+	struct octree_attributes attributes;
+	struct odds *odds;
+	const uint64_t *unit; /* psr_direction_words() */
+	uint64_t last_path;
+	struct near_leaf near[OCTREE_NEAR]; /* earlier ones around the leaf */
+	unsigned n;
+	int weight, is_decoding, was_same;
 };
 
-static struct model *model_make(enum octree_stream stream)
+
+static struct odds *odds_make(void)
 {
-	struct model *model = malloc(sizeof *model);
+	struct odds *odds = malloc(sizeof *odds);
 
-	if (model == NULL)
-		return NULL;
-	for (size_t i = 0; i < sizeof model->odds / sizeof(uint16_t); i++)
-		((uint16_t *)&model->odds)[i] = CODER_EVEN;
-	for (int depth = 0; depth < DEPTHS && stream == OCTREE_NORMAL_STREAM; depth++)
-		for (unsigned i = 0; i < 8u << 2 * depth; i++) {
-			double v[3];
-
-			psr_direction_center(depth, i, v);
-			for (int c = 0; c < 3; c++)
-				model->center[depth][i][c] = (int16_t)lrint(v[c] * UNIT);
-		}
-	return model;
+	for (size_t i = 0; odds != NULL && i < sizeof *odds / sizeof(uint16_t); i++)
+		((uint16_t *)odds)[i] = CODER_EVEN;
+	return odds;
 }
 
 /* Codes a value of n_bits, the highest bit first. */
@@ -100,25 +85,28 @@ static void find_near(struct job *job, uint32_t leaf, const struct octree_near *
 
 /* ---- normals ---- */
 
-static void unit_of(uint16_t normal, int v[3])
+static void unit_of(const struct job *job, uint16_t normal, int v[3])
 {
-	const uint64_t word = psr_direction_words()[normal];
+	const uint64_t word = job->unit[normal];
 
 	for (int c = 0; c < 3; c++)
 		v[c] = (int16_t)(word >> 16 * c);
 }
 
-/* Sorts the children of a triangle, or the octants, by how near they are to a direction. */
+/* Sorts the children of a triangle, or the octants, by how near they are to a direction. The middle of a child is that
+ * of its innermost triangle, almost. */
 static void rank_children(unsigned order[8], const struct job *job, int depth, unsigned parent, const int64_t sum[3])
 {
 	const unsigned n = depth == 0 ? 8 : 4;
 	int64_t score[8];
 
 	for (unsigned j = 0; j < n; j++) {
-		const int16_t *center = job->model->center[depth][parent * 4 * (depth > 0) + j];
-		const int64_t s = sum[0] * center[0] + sum[1] * center[1] + sum[2] * center[2];
 		unsigned at = j;
+		int64_t s;
+		int v[3];
 
+		unit_of(job, (uint16_t)((parent * 4 + j) << 2 * (DEPTHS - 1 - depth)), v);
+		s = sum[0] * v[0] + sum[1] * v[1] + sum[2] * v[2];
 		for (; at > 0 && score[at - 1] < s; at--) {
 			score[at] = score[at - 1];
 			order[at] = order[at - 1];
@@ -151,7 +139,7 @@ static uint16_t code_nested(struct job *job, uint16_t normal, const int64_t sum[
 		unsigned order[8], rank;
 
 		rank_children(order, job, depth, index, sum);
-		rank = code_bits(job, job->model->odds.normal[depth][spread][count_of(job)][is_first], n_bits,
+		rank = code_bits(job, job->odds->normal[depth][spread][count_of(job)][is_first], n_bits,
 		                 job->is_decoding ? 0 : rank_of(order, child));
 		index = index << n_bits | order[rank];
 		is_first &= rank == 0;
@@ -171,13 +159,13 @@ static void code_normal(struct job *job, uint32_t leaf, uint64_t path)
 	for (unsigned i = 0; i < job->n; i++) {
 		int v[3];
 
-		unit_of(normal[job->near[i].at], v);
+		unit_of(job, normal[job->near[i].at], v);
 		is_agreed &= normal[job->near[i].at] == before;
 		for (int c = 0; c < 3; c++)
 			sum[c] += (int64_t)job->near[i].weight * v[c];
 	}
 	/* All leaves of a cell of a cloud have one normal. */
-	p = &job->model->odds.same[parting < 7 ? parting : 7][job->was_same][is_agreed];
+	p = &job->odds->same[parting < 7 ? parting : 7][job->was_same][is_agreed];
 	if (!job->is_decoding) {
 		job->was_same = (int)coder_adaptive(job->coder, 0, p, 5, normal[leaf] == before);
 		if (!job->was_same)
@@ -199,7 +187,7 @@ static void code_offset(struct job *job, uint32_t leaf)
 	int v[3] = { 0, 0, 0 }, bin = BINS / 2;
 
 	if (normal != NULL)
-		unit_of(normal[leaf], v);
+		unit_of(job, normal[leaf], v);
 	for (unsigned i = 0; i < job->n; i++) {
 		const struct near_leaf *near = &job->near[i];
 		int64_t along = UNIT, up = (2 * offset[near->at] - (OCTREE_OFFSETS - 1)) * (STEP / 2);
@@ -207,7 +195,7 @@ static void code_offset(struct job *job, uint32_t leaf)
 		if (normal != NULL) {
 			int of[3];
 
-			unit_of(normal[near->at], of);
+			unit_of(job, normal[near->at], of);
 			along = ((int64_t)of[0] * v[0] + (int64_t)of[1] * v[1] + (int64_t)of[2] * v[2]) / UNIT;
 		}
 		up = up * along / UNIT + near->place[0] * v[0] + near->place[1] * v[1] + near->place[2] * v[2];
@@ -216,7 +204,7 @@ static void code_offset(struct job *job, uint32_t leaf)
 	if (job->n > 0)
 		bin += (int)(sum * 4 / ((int64_t)job->weight * STEP));
 	bin = bin < 0 ? 0 : bin >= BINS ? BINS - 1 : bin;
-	const unsigned step = code_bits(job, job->model->odds.offset[bin][count_of(job)], 2,
+	const unsigned step = code_bits(job, job->odds->offset[bin][count_of(job)], 2,
 	                                job->is_decoding ? 0 : offset[leaf]);
 	if (job->is_decoding)
 		offset[leaf] = (uint8_t)step;
@@ -251,7 +239,7 @@ static void code_color(struct job *job, uint32_t leaf)
 		const int c = order[k], middle = foretold[c] + error;
 		const uint8_t from = (uint8_t)(middle < 0 ? 0 : middle > 255 ? 255 : middle);
 		const uint8_t step = job->is_decoding ? 0 : (uint8_t)(color[leaf][c] - from + 128);
-		const unsigned coded = code_bits(job, job->model->odds.color[k][spread < 8 ? spread : 7], 8, step);
+		const unsigned coded = code_bits(job, job->odds->color[k][spread < 8 ? spread : 7], 8, step);
 
 		if (job->is_decoding)
 			color[leaf][c] = (uint8_t)(coded + from - 128);
@@ -293,11 +281,12 @@ static int code_stream(struct job *job, const struct octree_levels *levels, enum
 		[OCTREE_COLOR_STREAM] = visit_color,
 	};
 
-	job->model = model_make(stream);
-	if (job->model == NULL)
+	job->unit = psr_direction_words();
+	job->odds = odds_make();
+	if (job->odds == NULL)
 		return PSR_ERR_MEMORY;
 	octree_levels_walk(levels, levels->height, visits[stream], job);
-	free(job->model);
+	free(job->odds);
 	return PSR_OK;
 }
 
