@@ -7,12 +7,14 @@
 #include <stdint.h>
 #include <string.h>
 #include "model/blocks.h"
+#include "model/tree.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
 
 #define FILE_MAGIC "\x89PSR\r\n\x1a\n"
 #define FILE_MAJOR 6
-#define FILE_MINOR 0
+#define FILE_MINOR 0 /* of files without octrees, which are as before these */
+#define FILE_MINOR_OCTREE 1
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64
@@ -24,6 +26,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define MODEL_MAX_PROJECTIONS ((uint32_t)1 << 8)
 #define MODEL_LEAST_SPACING 0x1p-14f  /* finer lattices would exceed the precision of spheres */
 #define MODEL_MAX_COORDINATE 1024.0f /* magnitude of any length or coordinate inside of a model */
+#define MODEL_MAX_LEAVES ((uint64_t)1 << 32)
 
 /* Byte offsets in the header, and in an entry of the table. */
 enum { HEADER_MAJOR = 8, HEADER_MINOR = 10, HEADER_N_SECTIONS = 12, HEADER_FILE_SIZE = 16, HEADER_N_CHUNKS = 24,
@@ -34,24 +37,25 @@ enum { ENTRY_REQUIRED = 1 };
 /* The unit of a section's length. */
 enum section_count {
 	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
-	COUNT_SAMPLES
+	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES
 };
 
-enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY };
+enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
+	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, N_KNOWN_SECTIONS = 31 };
 
 struct section_spec {
 	char type[5];
 	uint16_t version, flags;
 	enum section_count count;
 	uint32_t item_bytes;
-	size_t pointer; /* offset of the array's pointer in struct psr_blocks, from SECTION_FIRST_ARRAY on */
+	size_t pointer; /* offset of the array's pointer in struct content; 0: not an array */
 };
 
 #define INFO_BYTES 184
 #define BLOCKS_BYTES 32
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
-#define N_KNOWN_SECTIONS 25
+#define OCTREE_BYTES 64
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 
@@ -101,16 +105,31 @@ static inline uint64_t file_chunks(uint64_t length)
 /* The contents of a model: structures by value, arrays by pointer. */
 struct content {
 	struct psr_model_info info;
-	struct psr_blocks blocks;
 	struct psr_presets presets;
+	int has_blocks, has_octree; /* one at least; the other representation is all zeros */
+	struct psr_blocks blocks;
+	struct octree octree;
 };
 
-/* The number of items of a known section in this model. section_array() is for sections from SECTION_FIRST_ARRAY on. */
+/* The number of items of a known section in this model. section_array(): NULL for what is not an array, too. */
 uint64_t section_items(const struct section_spec *spec, const struct content *content);
-const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks);
+const void *section_array(const struct section_spec *spec, const struct content *content);
+
+/* Returns whether its representation is not without this section. */
+static inline int section_is_needed(const struct section_spec *spec)
+{
+	return (spec->flags & ENTRY_REQUIRED) != 0 || spec->count == COUNT_SKIPS || spec->count == COUNT_CODES;
+}
+
+/* Returns whether a section belongs to the representation that the model has not. */
+int section_is_foreign(const struct section_spec *spec, const struct content *content);
 
 /* Reads the counts of BLKS from its BLOCKS_BYTES, unchecked. */
 void file_get_counts(struct psr_blocks *blocks, const uint8_t *at);
+
+/* OCTR: to and from its OCTREE_BYTES, unchecked. */
+void file_put_octree(uint8_t *at, const struct octree *tree);
+void file_get_octree(struct octree *tree, const uint8_t *at);
 
 /* Makes the file image of a model, in memory of psr_alloc_huge(), with hashes. Counts must be within the limits and all
  * but optional pointers set; the reader checks the rest. NULL without memory. */
@@ -139,11 +158,20 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 /* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
 
+/* Check a tree for psr_model_create() and model_validate(): what its arrays are, and what is in them. */
+int model_check_octree_counts(const struct octree *tree, const char *name, struct psr_error *err);
+int model_validate_octree(const struct octree *tree, const char *name, struct psr_error *err);
+
 /* Copy presets, with zeros after names, in padding and in unused fields, as in files. */
 void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);
 void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_light *from, uint32_t n);
 
-/* Returns the image of a model, for the writer. */
+/* Makes a model of an image, which it takes, on failure too. Errors of file_parse(). */
+int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
+                struct psr_error *err);
+
+/* Returns the image of a model, for the writer; and what it contains. */
 const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes);
+const struct content *model_content(const struct psr_model *model);
 
 #endif

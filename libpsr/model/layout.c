@@ -11,8 +11,12 @@ _Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(stru
                && offsetof(struct psr_camera, kind) == 72 && offsetof(struct psr_camera, fov_y) == 80, "section CAMS");
 _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
                && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
+_Static_assert(sizeof(struct octree_skip) == 24 && offsetof(struct octree_skip, leaf) == 16, "section OSKP");
 
-#define ARRAY(type, flags, count, item, field) { type, 1, flags, count, item, offsetof(struct psr_blocks, field) }
+#define ARRAY(type, flags, count, item, field) \
+	{ type, 1, flags, count, item, offsetof(struct content, blocks) + offsetof(struct psr_blocks, field) }
+#define TREE(type, count, item, field) \
+	{ type, 1, 0, count, item, offsetof(struct content, octree) + offsetof(struct octree, field) }
 
 const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	[SECTION_INFO] = { "INFO", 1, ENTRY_REQUIRED, COUNT_ONE, INFO_BYTES, 0 },
@@ -40,6 +44,12 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	ARRAY("DPTH", ENTRY_REQUIRED, COUNT_SAMPLES, 2, depth),
 	ARRAY("ATTR", ENTRY_REQUIRED, COUNT_SAMPLES, 8, attr),
 	ARRAY("OPAC", 0, COUNT_SAMPLES, 1, opacity),
+	[SECTION_OCTREE] = { "OCTR", 1, 0, COUNT_ONE, OCTREE_BYTES, 0 },
+	TREE("OSKP", COUNT_SKIPS, 24, skip),
+	TREE("OCOD", COUNT_CODES, 1, code),
+	TREE("ONRM", COUNT_LEAVES, 2, normal),
+	TREE("OOFF", COUNT_LEAVES, 1, offset),
+	TREE("OCOL", COUNT_LEAVES, 3, color),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -63,18 +73,35 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 		return blocks->n_blocks;
 	case COUNT_SAMPLES:
 		return blocks->n_samples;
+	case COUNT_SKIPS:
+		return content->octree.n_skips;
+	case COUNT_CODES:
+		return content->octree.n_codes;
+	case COUNT_LEAVES:
+		return content->octree.n_leaves;
 	case COUNT_ONE:
 		break;
 	}
 	return 1;
 }
 
-const void *section_array(const struct section_spec *spec, const struct psr_blocks *blocks)
+const void *section_array(const struct section_spec *spec, const struct content *content)
 {
 	const void *array;
 
-	memcpy(&array, (const char *)blocks + spec->pointer, sizeof array);
+	if (spec->pointer == 0)
+		return NULL;
+	memcpy(&array, (const char *)content + spec->pointer, sizeof array);
 	return array;
+}
+
+int section_is_foreign(const struct section_spec *spec, const struct content *content)
+{
+	const ptrdiff_t k = spec - section_table;
+
+	if (k >= SECTION_OCTREE)
+		return !content->has_octree;
+	return (k == SECTION_BLOCKS || k >= SECTION_FIRST_ARRAY) && !content->has_blocks;
 }
 
 uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_t *chunks)
@@ -187,13 +214,16 @@ static int is_present(int section, const struct content *content)
 {
 	switch (section) {
 	case SECTION_INFO:
-	case SECTION_BLOCKS:
 		return 1;
+	case SECTION_BLOCKS:
+		return content->has_blocks;
+	case SECTION_OCTREE:
+		return content->has_octree;
 	case SECTION_CAMERAS:
 	case SECTION_LIGHTS:
 		return section_items(&section_table[section], content) > 0;
 	default:
-		return section_array(&section_table[section], &content->blocks) != NULL;
+		return section_array(&section_table[section], content) != NULL;
 	}
 }
 
@@ -206,6 +236,9 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 	case SECTION_BLOCKS:
 		put_blocks(at, &content->blocks);
 		break;
+	case SECTION_OCTREE:
+		file_put_octree(at, &content->octree);
+		break;
 	case SECTION_CAMERAS:
 		preset_put_cameras((struct psr_preset_camera *)(void *)at, content->presets.camera, content->presets.n_cameras);
 		break;
@@ -213,7 +246,7 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 		preset_put_lights((struct psr_preset_light *)(void *)at, content->presets.light, content->presets.n_lights);
 		break;
 	default:
-		memcpy(at, section_array(&section_table[section], &content->blocks), length);
+		memcpy(at, section_array(&section_table[section], content), length);
 	}
 }
 
@@ -238,7 +271,7 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 		return NULL;
 	memcpy(bytes, FILE_MAGIC, 8);
 	file_put(bytes + HEADER_MAJOR, 2, FILE_MAJOR);
-	file_put(bytes + HEADER_MINOR, 2, FILE_MINOR);
+	file_put(bytes + HEADER_MINOR, 2, content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR);
 	file_put(bytes + HEADER_N_SECTIONS, 4, n_sections);
 	file_put(bytes + HEADER_FILE_SIZE, 8, *n_bytes);
 	file_put(bytes + HEADER_N_CHUNKS, 4, n_chunks);

@@ -30,9 +30,8 @@ static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
 		psr_free_huge((void *)bytes, n_bytes);
 }
 
-/* Takes ownership of the image, on failure too. */
-static int adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
-                 struct psr_error *err)
+int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
+                struct psr_error *err)
 {
 	struct psr_model *model = calloc(1, sizeof *model);
 	int code;
@@ -75,7 +74,7 @@ static int adopt_packed(struct psr_model **out, const struct pack_source *source
 	int code = pack_open(&image, &n_image, source, err);
 
 	if (code == PSR_OK)
-		code = adopt(out, image, n_image, 0, source->name, err);
+		code = model_adopt(out, image, n_image, 0, source->name, err);
 	if (code == PSR_OK) {
 		(*out)->is_packed = 1;
 		(*out)->file_bytes = source->n_bytes;
@@ -177,7 +176,7 @@ static int open_model(struct psr_model **out, const char *path, int mapped, stru
 	close(f.fd);
 	if (f.is_packed || code != PSR_OK)
 		return code;
-	code = adopt(out, bytes, f.n_bytes, mapped, name, err);
+	code = model_adopt(out, bytes, f.n_bytes, mapped, name, err);
 	if (code == PSR_OK)
 		(*out)->file_bytes = f.n_bytes;
 	return code;
@@ -222,66 +221,7 @@ int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, s
 	if (copy == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %zu bytes", n_bytes);
 	memcpy(copy, bytes, n_bytes);
-	return adopt(out, copy, n_bytes, 0, "the model", err);
-}
-
-static int check_arguments(const struct psr_model_info *info, const struct psr_blocks *blocks,
-                           const struct psr_presets *presets, struct psr_error *err)
-{
-	int n_cones;
-
-	if (info == NULL || blocks == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "a model needs info and blocks; one is NULL");
-	if (memchr(info->builder, 0, sizeof info->builder) == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "the builder's name is longer than %zu bytes", sizeof info->builder - 1);
-	/* The validator bounds the other counts by these, once the image exists. */
-	if (blocks->n_blocks > MODEL_MAX_BLOCKS || blocks->n_projections > MODEL_MAX_PROJECTIONS
-	    || blocks->n_clusters > blocks->n_blocks || blocks->n_masks > blocks->n_blocks
-	    || blocks->n_samples > (uint64_t)PSR_BLOCK_SAMPLES * blocks->n_blocks)
-		return psr_fail(err, PSR_ERR_LIMIT, "a model of %" PRIu32 " blocks, %" PRIu32 " projections, %" PRIu32
-		                " clusters and %" PRIu64 " samples is over the limits", blocks->n_blocks, blocks->n_projections,
-		                blocks->n_clusters, blocks->n_samples);
-	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++)
-		if (section_table[k].flags & ENTRY_REQUIRED && section_array(&section_table[k], blocks) == NULL)
-			return psr_fail(err, PSR_ERR_ARG, "the model's array for section %s is missing", section_table[k].type);
-	n_cones = !!blocks->cone_x + !!blocks->cone_y + !!blocks->cone_z + !!blocks->cone_sine;
-	if (n_cones % 4 != 0)
-		return psr_fail(err, PSR_ERR_ARG, "%d of the four arrays of cones are set; set all or none", n_cones);
-	if (blocks->traits != NULL && n_cones == 0)
-		return psr_fail(err, PSR_ERR_ARG, "the model's blocks have traits, but no cones, which bent blocks need");
-	if (blocks->opacity != NULL && blocks->traits == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "the model's samples have opacities, but its blocks have no traits");
-	if (!blocks->visibility_index != !blocks->visibility_mask || !blocks->visibility_mask != (blocks->n_masks == 0))
-		return psr_fail(err, PSR_ERR_ARG, "set visibility masks, their number and their indices together, or none");
-	if (presets == NULL)
-		return PSR_OK;
-	if (presets->n_cameras > PSR_MAX_PRESETS || presets->n_lights > PSR_MAX_PRESETS)
-		return psr_fail(err, PSR_ERR_LIMIT, "%" PRIu32 " cameras and %" PRIu32 " lights; the limit is %d of each",
-		                presets->n_cameras, presets->n_lights, PSR_MAX_PRESETS);
-	if ((presets->n_cameras != 0 && presets->camera == NULL) || (presets->n_lights != 0 && presets->light == NULL))
-		return psr_fail(err, PSR_ERR_ARG, "the model's array of cameras or lights is missing");
-	return PSR_OK;
-}
-
-int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
-                     const struct psr_presets *presets, struct psr_error *err)
-{
-	struct content content;
-	uint64_t n_bytes;
-	uint8_t *bytes;
-	int code = check_arguments(info, blocks, presets, err);
-
-	if (code != PSR_OK)
-		return code;
-	content = (struct content){ .info = *info, .blocks = *blocks };
-	if (info->up[0] == 0 && info->up[1] == 0 && info->up[2] == 0)
-		content.info.up[1] = 1;
-	if (presets != NULL)
-		content.presets = *presets;
-	bytes = file_image_make(&content, &n_bytes);
-	if (bytes == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %" PRIu64 " bytes", n_bytes);
-	return adopt(out, bytes, n_bytes, 0, "the model", err);
+	return model_adopt(out, copy, n_bytes, 0, "the model", err);
 }
 
 struct psr_model *psr_model_ref(struct psr_model *model)
@@ -305,7 +245,12 @@ const struct psr_model_info *psr_model_info(const struct psr_model *model)
 
 const struct psr_blocks *psr_model_blocks(const struct psr_model *model)
 {
-	return &model->content.blocks;
+	return model->content.has_blocks ? &model->content.blocks : NULL;
+}
+
+const struct octree *psr_model_octree(const struct psr_model *model)
+{
+	return model->content.has_octree ? &model->content.octree : NULL;
 }
 
 const struct psr_presets *psr_model_presets(const struct psr_model *model)
@@ -333,4 +278,9 @@ const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes)
 {
 	*n_bytes = model->n_bytes;
 	return model->bytes;
+}
+
+const struct content *model_content(const struct psr_model *model)
+{
+	return &model->content;
 }

@@ -262,6 +262,34 @@ static int get_presets(const struct reader *r, int known, uint32_t *n, const voi
 	return PSR_OK;
 }
 
+static int get_octree(const struct reader *r, struct octree *tree)
+{
+	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_OCTREE]).offset;
+	int code = check_length(r, SECTION_OCTREE, OCTREE_BYTES);
+
+	if (code != PSR_OK)
+		return code;
+	file_get_octree(tree, at);
+	if (file_get(at + 4, 4) != 0)
+		return bad(r, "section OCTR: reserved bytes are not zero");
+	return model_check_octree_counts(tree, r->name, r->err);
+}
+
+/* Of each representation that the file has, all sections that it needs; none of another one. */
+static int check_set(const struct reader *r, const struct content *content)
+{
+	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
+		const struct section_spec *spec = &section_table[k];
+		const char *first = k < SECTION_OCTREE ? "BLKS" : "OCTR";
+
+		if (section_is_foreign(spec, content) && r->entry[k] >= 0)
+			return bad(r, "section %s is there, and %s, which tells its length, is missing", spec->type, first);
+		if (!section_is_foreign(spec, content) && section_is_needed(spec) && r->entry[k] < 0)
+			return bad(r, "section %s is missing", spec->type);
+	}
+	return PSR_OK;
+}
+
 static int get_arrays(const struct reader *r, struct content *content)
 {
 	struct psr_blocks *blocks = &content->blocks;
@@ -271,13 +299,13 @@ static int get_arrays(const struct reader *r, struct content *content)
 
 		const void *array;
 		int code;
-		if (r->entry[k] < 0)
+		if (r->entry[k] < 0 || spec->pointer == 0)
 			continue;
 		code = check_length(r, k, spec->item_bytes * section_items(spec, content));
 		if (code != PSR_OK)
 			return code;
 		array = r->bytes + get_section(r, (uint32_t)r->entry[k]).offset;
-		memcpy((char *)blocks + spec->pointer, &array, sizeof array);
+		memcpy((char *)content + spec->pointer, &array, sizeof array);
 	}
 	if ((!blocks->cone_x + !blocks->cone_y + !blocks->cone_z + !blocks->cone_sine) % 4 != 0)
 		return bad(r, "some of the sections CONX, CONY, CONZ and CONS are missing");
@@ -314,17 +342,19 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 		code = sort_sections(&r);
 	if (code != PSR_OK)
 		return code;
-	if (r.entry[SECTION_BLOCKS] < 0)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "%s: the file has no section BLKS, the only kind of samples that this build draws",
-		                name);
-	for (int k = 0; k < N_KNOWN_SECTIONS; k++)
-		if (section_table[k].flags & ENTRY_REQUIRED && r.entry[k] < 0)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: section %s is missing", name, section_table[k].type);
 	memset(content, 0, sizeof *content);
-	code = get_info(&r, &content->info);
+	content->has_blocks = r.entry[SECTION_BLOCKS] >= 0;
+	content->has_octree = r.entry[SECTION_OCTREE] >= 0;
+	if (!content->has_blocks && !content->has_octree)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "%s: the file has neither section BLKS nor OCTR, the kinds of samples that this build knows", name);
+	code = check_set(&r, content);
 	if (code == PSR_OK)
+		code = get_info(&r, &content->info);
+	if (code == PSR_OK && content->has_blocks)
 		code = get_blocks(&r, &content->blocks);
+	if (code == PSR_OK && content->has_octree)
+		code = get_octree(&r, &content->octree);
 	if (code == PSR_OK)
 		code = get_presets(&r, SECTION_CAMERAS, &content->presets.n_cameras, &camera);
 	if (code == PSR_OK)

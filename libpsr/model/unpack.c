@@ -173,14 +173,33 @@ static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, co
 	return PSR_OK;
 }
 
-static int is_blocks(const uint8_t *entry)
+/* The sections that say how long the others are. */
+struct counts {
+	uint8_t blocks[BLOCKS_BYTES], octree[OCTREE_BYTES];
+	int has_blocks, has_octree;
+};
+
+static int is_section(const uint8_t *entry, enum section_id id, uint64_t length)
 {
-	return memcmp(entry + ENTRY_TYPE, section_table[SECTION_BLOCKS].type, 4) == 0
-	       && file_get(entry + ENTRY_LENGTH, 8) == BLOCKS_BYTES;
+	return memcmp(entry + ENTRY_TYPE, section_table[id].type, 4) == 0 && file_get(entry + ENTRY_LENGTH, 8) == length;
 }
 
-/* Unpacks all chunks into the image; or, if that is NULL, the chunk of BLKS alone into `blocks`. */
-static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t blocks[BLOCKS_BYTES])
+/* Returns where a section goes that is one of these, or NULL. */
+static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
+{
+	if (is_section(entry, SECTION_BLOCKS, BLOCKS_BYTES)) {
+		counts->has_blocks = 1;
+		return counts->blocks;
+	}
+	if (is_section(entry, SECTION_OCTREE, OCTREE_BYTES)) {
+		counts->has_octree = 1;
+		return counts->octree;
+	}
+	return NULL;
+}
+
+/* Unpacks all chunks into the image; or, if that is NULL, the counts alone. */
+static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts *counts)
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t at = u->head_end, n = 0;
@@ -191,7 +210,7 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t block
 
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
-			uint8_t *to = image != NULL ? image + offset + first : is_blocks(entry) ? blocks : NULL;
+			uint8_t *to = image != NULL ? image + offset + first : counts_place(counts, entry);
 			int code = to != NULL ? unpack_chunk(u, to, size, next, at, n) : PSR_OK;
 
 			if (code != PSR_OK)
@@ -202,39 +221,40 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, uint8_t block
 	return PSR_OK;
 }
 
-/* Compares lengths of known sections with the counts in BLKS before allocating; file_parse() reports other errors
- * better. */
+/* Compares lengths of known sections with the counts in BLKS and OCTR before allocating; file_parse() reports other
+ * errors better. */
 static int check_lengths(const struct unpacker *u)
 {
-	uint8_t at[BLOCKS_BYTES] = { 0 };
-	struct content content = { .blocks = { 0 } };
-	uint32_t n_found = 0;
-	int code;
+	struct counts counts = { .has_blocks = 0 };
+	struct content content = { .has_blocks = 0 };
+	int code = unpack_chunks(u, NULL, &counts);
 
-	for (uint32_t i = 0; i < u->n_sections; i++)
-		n_found += (uint32_t)is_blocks(entry_at(u, i));
-	if (n_found == 0)
-		return PSR_OK;
-	code = unpack_chunks(u, NULL, at);
-	if (code != PSR_OK)
-		return code;
-	file_get_counts(&content.blocks, at);
-	if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
-		return bad(u, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", content.blocks.n_samples,
-		           content.blocks.n_blocks);
-	for (uint32_t i = 0; i < u->n_sections; i++) {
-		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
+	content.has_blocks = counts.has_blocks;
+	content.has_octree = counts.has_octree;
+	if (code == PSR_OK && counts.has_blocks) {
+		file_get_counts(&content.blocks, counts.blocks);
+		if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
+			code = bad(u, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", content.blocks.n_samples,
+			           content.blocks.n_blocks);
+	}
+	if (code == PSR_OK && counts.has_octree) {
+		file_get_octree(&content.octree, counts.octree);
+		code = model_check_octree_counts(&content.octree, u->source->name, u->err);
+	}
+	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
+		const uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
+
+		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS && code == PSR_OK; k++) {
 			const struct section_spec *spec = &section_table[k];
-			uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
 
-			if (memcmp(entry_at(u, i), spec->type, 4) == 0
+			if (spec->pointer != 0 && !section_is_foreign(spec, &content) && memcmp(entry_at(u, i), spec->type, 4) == 0
 			    && file_get(entry_at(u, i) + ENTRY_VERSION, 2) == spec->version
 			    && length != spec->item_bytes * section_items(spec, &content))
-				return bad(u, "section %s has %" PRIu64 " bytes and should have %" PRIu64, spec->type, length,
+				code = bad(u, "section %s has %" PRIu64 " bytes and should have %" PRIu64, spec->type, length,
 				           spec->item_bytes * section_items(spec, &content));
 		}
 	}
-	return PSR_OK;
+	return code;
 }
 
 static int make_image(struct unpacker *u, uint8_t **out)

@@ -241,13 +241,16 @@ static int check_presets(const struct checker *c)
 int model_validate(const struct content *content, const char *name, struct psr_error *err)
 {
 	static int (*const checks[])(const struct checker *) = {
-		check_info, check_counts, check_presets, check_projections, check_clusters, check_heads, check_cones,
-		check_traits, check_visibility,
+		check_info, check_presets, /* from here on, of blocks: */ check_counts, check_projections, check_clusters,
+		check_heads, check_cones, check_traits, check_visibility,
 	};
+	const size_t n_checks = content->has_blocks ? sizeof checks / sizeof checks[0] : 2;
 	const struct checker c = { &content->info, &content->blocks, &content->presets, name, err };
 	int code = PSR_OK;
 
-	for (size_t i = 0; i < sizeof checks / sizeof checks[0] && code == PSR_OK; i++)
+	for (size_t i = 0; i < n_checks && code == PSR_OK; i++)
 		code = checks[i](&c);
+	if (code == PSR_OK && content->has_octree)
+		code = model_validate_octree(&content->octree, name, err);
 	return code;
 }

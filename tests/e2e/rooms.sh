@@ -8,8 +8,8 @@ cat >"$work/rooms" <<'END'
 libpsr/include
 libpsr/base
 libpsr/compare
-libpsr/model
 libpsr/octree
+libpsr/model
 libpsr/simd
 libpsr/render
 libpsr/import/import.h

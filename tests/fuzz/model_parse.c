@@ -8,7 +8,24 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 
 #define REQUIRE(x) ((x) ? (void)0 : abort())
 
-static void check_rules(const struct psr_blocks *b)
+static int take_leaf(const struct octree_node *node, void *userdata)
+{
+	REQUIRE(node->leaf == (*(uint64_t *)userdata)++);
+	return 0;
+}
+
+static void check_octree(const struct octree *tree)
+{
+	uint64_t n_leaves = 0;
+
+	octree_walk(tree, tree->levels, take_leaf, &n_leaves);
+	REQUIRE(n_leaves == tree->n_leaves);
+	for (uint64_t i = 0; i < n_leaves; i++)
+		REQUIRE((tree->normal == NULL || tree->normal[i] < 32768) &&
+		        (tree->offset == NULL || tree->offset[i] < OCTREE_OFFSETS));
+}
+
+static void check_blocks(const struct psr_blocks *b)
 {
 	uint64_t n_samples = 0;
 	uint32_t n_in_clusters = 0;
@@ -35,6 +52,15 @@ static void check_rules(const struct psr_blocks *b)
 	(void)beyond;
 }
 
+static void check_rules(const struct content *content)
+{
+	REQUIRE(content->has_blocks || content->has_octree);
+	if (content->has_blocks)
+		check_blocks(&content->blocks);
+	if (content->has_octree)
+		check_octree(&content->octree);
+}
+
 static void check_presets(const struct psr_presets *a, const struct psr_presets *b)
 {
 	REQUIRE(a->n_cameras == b->n_cameras && a->n_lights == b->n_lights);
@@ -45,14 +71,14 @@ static void check_presets(const struct psr_presets *a, const struct psr_presets 
 static void check_again(const struct content *content)
 {
 	const struct psr_model_info *info = &content->info;
-	const struct psr_blocks *blocks = &content->blocks;
 	struct psr_model *model = NULL;
 
-	REQUIRE(psr_model_create(&model, info, blocks, &content->presets, NULL) == PSR_OK);
+	REQUIRE(psr_model_create_both(&model, info, content->has_blocks ? &content->blocks : NULL,
+	                              content->has_octree ? &content->octree : NULL, &content->presets, NULL) == PSR_OK);
 	check_presets(&content->presets, psr_model_presets(model));
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
-		const void *a = section_array(spec, blocks), *b = section_array(spec, psr_model_blocks(model));
+		const void *a = section_array(spec, content), *b = section_array(spec, model_content(model));
 
 		REQUIRE((a == NULL) == (b == NULL));
 		REQUIRE(a == NULL || memcmp(a, b, spec->item_bytes * section_items(spec, content)) == 0);
@@ -82,7 +108,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 		model = NULL;
 		pack_seal(copy, n);
 		if (psr_model_parse(&model, copy, n, NULL) == PSR_OK)
-			check_rules(psr_model_blocks(model));
+			check_rules(model_content(model));
 		psr_model_unref(model);
 		free(copy);
 		return 0;
@@ -92,7 +118,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 	code = file_parse(copy, n, "input", &content, &err);
 	REQUIRE(code == err.code && (code == PSR_OK) == (err.text[0] == 0));
 	if (code == PSR_OK) {
-		check_rules(&content.blocks);
+		check_rules(&content);
 		check_again(&content);
 	}
 	free(copy);

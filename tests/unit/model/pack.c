@@ -90,13 +90,13 @@ static struct psr_model *many_blocks(uint32_t n, int noise)
 	f.blocks.n_samples = n;
 	f.blocks.n_clusters = f.blocks.n_levels = 1;
 	f.blocks.cluster = &cluster;
-	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
+	for (int k = SECTION_FIRST_ARRAY; k < SECTION_OCTREE; k++) {
 		const struct section_spec *spec = &section_table[k];
 
 		if (spec->count < COUNT_BLOCKS || spec->flags == 0)
 			continue;
 		arrays[k] = calloc(n, spec->item_bytes);
-		memcpy((char *)&f.blocks + spec->pointer, &arrays[k], sizeof arrays[k]);
+		memcpy((char *)&f.blocks + spec->pointer - offsetof(struct content, blocks), &arrays[k], sizeof arrays[k]);
 		for (uint32_t i = 0; i < n; i++) {
 			if (memcmp(spec->type, "MASK", 4) == 0)
 				((uint64_t *)arrays[k])[i] = 1;

@@ -322,7 +322,7 @@ static void masks_need_their_indices_and_their_number(void **state)
 static void every_required_section_is_missed(void **state)
 {
 	(void)state;
-	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
+	for (int k = 0; k < SECTION_OCTREE; k++) {
 		uint8_t *bytes = copy_original();
 		struct psr_error err = { .text = "" };
 		int expected = k == SECTION_BLOCKS ? PSR_ERR_UNSUPPORTED : PSR_ERR_FORMAT;

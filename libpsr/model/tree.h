@@ -1,0 +1,23 @@
+/* The octree of a model, and models made of one. */
+#ifndef PSR_MODEL_TREE_H
+#define PSR_MODEL_TREE_H
+
+#include "octree/octree.h"
+#include "psr/model.h"
+
+struct psr_blocks;
+
+/* Returns NULL if the model has no octree. The tree's cube is in inner coordinates. Checked wherever a model is made or
+ * opened (docs/format.md has every rule): what octree_check() says, all attributes in their ranges, the cube within 1024
+ * of the origin, at most 2^32 leaves. It is only read, and the model owns it: the arrays are not octree_destroy()'s. */
+const struct octree *psr_model_octree(const struct psr_model *model);
+
+/* As psr_model_create(), of an octree whose cube is in inner coordinates. Copies the tree. */
+int psr_model_create_octree(struct psr_model **out, const struct psr_model_info *info, const struct octree *tree,
+                            const struct psr_presets *presets, struct psr_error *err);
+
+/* The same of blocks and an octree of one object; either may be NULL, but not both. */
+int psr_model_create_both(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
+                          const struct octree *tree, const struct psr_presets *presets, struct psr_error *err);
+
+#endif
