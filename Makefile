@@ -80,7 +80,7 @@ SIMD_O         := $(call objs,libpsr/simd/*.c libpsr/simd/c/*.c)
 ifneq ($(filter x86_64%,$(shell $(CC) -dumpmachine)),)
 SIMD_O         += $(call objs,libpsr/simd/avx2/*.c libpsr/simd/avx512/*.c)
 endif
-LIBPSR_O       := $(call tree,libpsr/base libpsr/compare libpsr/model libpsr/octree libpsr/render) $(SIMD_O)
+LIBPSR_O       := $(call tree,libpsr/base libpsr/compare libpsr/dpoint libpsr/model libpsr/octree libpsr/render) $(SIMD_O)
 LIBPSR_BUILD_O := $(call tree,libpsr/import libpsr/surface libpsr/ray libpsr/sample libpsr/measure)
 IMAGE_O        := $(call tree,libpsr/image)
 PROTO_O        := $(call tree,proto)

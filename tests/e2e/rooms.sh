@@ -7,6 +7,7 @@
 cat >"$work/rooms" <<'END'
 libpsr/include
 libpsr/base
+libpsr/dpoint
 libpsr/compare
 libpsr/octree
 libpsr/model
