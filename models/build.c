@@ -2,17 +2,22 @@
 
 #include <fcntl.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
 #include <unistd.h>
+#include "base/clock.h"
 #include "base/maths.h"
 #include "base/outfile.h"
+#include "base/vec.h"
 #include "psr/build.h"
 #include "base/cli.h"
 #include "psr/mesh.h"
 #include "model/blocks.h"
+#include "model/tree.h"
+#include "octree.h"
 
 #define PROGRAM "psr-model build"
 #define BAR_WIDTH 32
@@ -93,53 +98,143 @@ static void warn_of_sheer(const struct psr_model *model)
 		        "materials); each pixel shows the nearest eight, without refraction\n", n, blocks->n_blocks);
 }
 
-static void summarize(const char *out, const struct psr_mesh *mesh, const struct psr_model *model,
-                      const struct psr_build_report *report)
-{
-	const struct psr_blocks *blocks = psr_model_blocks(model);
-	struct stat st;
-	uint64_t file_bytes = stat(out, &st) == 0 ? (uint64_t)st.st_size : 0;
-
-	printf("%s: %" PRIu64 " samples in %" PRIu32 " blocks, %.1f MB, from %" PRIu32
-	       " %s in %.1f s (rays %.1f, selection %.1f)\n",
-	       out, blocks->n_samples, blocks->n_blocks, (double)file_bytes / 1e6,
-	       mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points, mesh->n_triangles > 0 ? "triangles" : "points",
-	       report->seconds_total, report->seconds_rays, report->seconds_select);
-}
-
 /* The wishes of the command line. */
 struct wish {
 	struct psr_import_options import;
 	struct psr_build_options build;
-	int is_packed, quiet;
+	struct octree_wish octree;
+	int is_blocks, is_octree, is_packed, quiet;
 };
+
+/* What was made on the way to a model. */
+struct made {
+	struct psr_mesh *mesh; /* NULL where nothing needed one */
+	struct octree *tree;   /* in units of the file */
+	struct psr_model *blocks, *model; /* of blocks alone, and the result */
+	struct octree_input input;
+	struct psr_build_report report;
+	double seconds_octree;
+};
+
+static void summarize(const char *out, const struct made *made)
+{
+	const struct psr_blocks *blocks = psr_model_blocks(made->model);
+	const struct octree *tree = psr_model_octree(made->model);
+	const struct psr_mesh *mesh = made->mesh;
+	struct stat st;
+	const uint64_t file_bytes = stat(out, &st) == 0 ? (uint64_t)st.st_size : 0;
+
+	if (blocks != NULL)
+		printf("%s: %" PRIu64 " samples in %" PRIu32 " blocks, %.1f MB, from %" PRIu32
+		       " %s in %.1f s (rays %.1f, selection %.1f)\n",
+		       out, blocks->n_samples, blocks->n_blocks, (double)file_bytes / 1e6,
+		       mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points, mesh->n_triangles > 0 ? "triangles" : "points",
+		       made->report.seconds_total, made->report.seconds_rays, made->report.seconds_select);
+	if (tree != NULL)
+		printf("%s: %" PRIu64 " leaves of %.3g in an octree of %d levels, %.1f MB, from %" PRIu64 " %s in %.1f s\n", out,
+		       tree->n_leaves, ldexp(made->tree->edge, -tree->levels), tree->levels, (double)file_bytes / 1e6,
+		       made->input.n_points > 0 ? made->input.n_points : mesh->n_triangles,
+		       made->input.n_points > 0 ? "points" : "triangles", made->seconds_octree);
+}
+
+static int make_octree(struct made *made, const struct wish *wish, struct psr_error *err)
+{
+	const double begin = clock_seconds();
+	const int code = octree_make(&made->tree, &made->input, &wish->octree, err);
+
+	made->seconds_octree = clock_seconds() - begin;
+	return code;
+}
+
+/* Makes the model of a tree, and of blocks if there are any. */
+static int join(struct made *made, const struct wish *wish, struct psr_error *err)
+{
+	static const double z_up[3] = { 0, 0, 1 };
+	const double *up = wish->build.up;
+	struct psr_model_info info;
+	struct octree inner;
+
+	if (made->blocks != NULL) {
+		info = *psr_model_info(made->blocks);
+	} else {
+		psr_octree_info(&info, made->tree);
+		if (up[0] == 0 && up[1] == 0 && up[2] == 0)
+			up = made->mesh != NULL ? made->mesh->up : z_up;
+		v3d_normalize(info.up, up);
+		snprintf(info.builder, sizeof info.builder, "psr %s", PSR_VERSION);
+	}
+	psr_octree_to_inner(&inner, made->tree, &info);
+	return psr_model_create_both(&made->model, &info, made->blocks != NULL ? psr_model_blocks(made->blocks) : NULL, &inner,
+	                             made->blocks != NULL ? psr_model_presets(made->blocks) : NULL, err);
+}
+
+static int make(struct made *made, const struct wish *wish, struct psr_error *err)
+{
+	int code = PSR_OK;
+
+	made->input.is_direct = wish->is_octree && octree_is_direct(made->input.path);
+	if (wish->is_blocks || !made->input.is_direct) {
+		on_progress("import", 0, 1, wish->build.userdata);
+		code = psr_mesh_import(&made->mesh, made->input.path, &wish->import, err);
+		made->input.mesh = made->mesh;
+	}
+	if (code == PSR_OK && wish->is_blocks)
+		code = psr_model_build(&made->blocks, made->mesh, &wish->build, &made->report, err);
+	if (code == PSR_OK && wish->is_octree)
+		code = make_octree(made, wish, err);
+	if (code == PSR_OK && wish->is_octree)
+		code = join(made, wish, err);
+	else if (code == PSR_OK)
+		made->model = psr_model_ref(made->blocks);
+	return code;
+}
 
 static int build(const char *in, const char *out, const struct wish *wish, struct psr_error *err)
 {
 	struct progress *progress = wish->build.userdata;
-	struct psr_mesh *mesh = NULL;
-	struct psr_model *model = NULL;
-	struct psr_build_report report;
-	int code;
+	struct made made = { .input.path = in };
+	int code = make(&made, wish, err);
 
-	on_progress("import", 0, 1, progress);
-	code = psr_mesh_import(&mesh, in, &wish->import, err);
-	if (code == PSR_OK)
-		code = psr_model_build(&model, mesh, &wish->build, &report, err);
 	if (code == PSR_OK) {
 		on_progress("write", 0, 1, progress);
-		code = wish->is_packed ? psr_model_write_packed(model, out, err) : psr_model_write(model, out, err);
+		code = wish->is_packed ? psr_model_write_packed(made.model, out, err) : psr_model_write(made.model, out, err);
 	}
 	if (progress->has_bar)
 		clear_bar();
 	if (code == PSR_OK && !wish->quiet) {
-		warn(mesh);
-		warn_of_sheer(model);
-		summarize(out, mesh, model, &report);
+		if (made.mesh != NULL)
+			warn(made.mesh);
+		if (made.blocks != NULL)
+			warn_of_sheer(made.blocks);
+		summarize(out, &made);
 	}
-	psr_model_unref(model);
-	psr_mesh_destroy(mesh);
+	psr_model_unref(made.model);
+	psr_model_unref(made.blocks);
+	octree_destroy(made.tree);
+	psr_mesh_destroy(made.mesh);
 	return code;
+}
+
+static int take_representation(const char *text, void *userdata, struct psr_error *err)
+{
+	struct wish *wish = userdata;
+
+	if (strcmp(text, "blocks") != 0 && strcmp(text, "octree") != 0 && strcmp(text, "both") != 0)
+		return psr_fail(err, PSR_ERR_ARG, "%s is not known; it is blocks, octree or both", text);
+	wish->is_blocks = text[0] == 'b';
+	wish->is_octree = strcmp(text, "blocks") != 0;
+	return PSR_OK;
+}
+
+static int check_octree(const struct wish *wish, struct psr_error *err)
+{
+	if (wish->octree.levels == 1)
+		return psr_fail(err, PSR_ERR_ARG, "--levels 1: an octree has 2 levels at least");
+	if (wish->octree.levels > 0 && wish->octree.spacing > 0)
+		return psr_fail(err, PSR_ERR_ARG, "--levels and --spacing both say how fine the octree is; give one of them");
+	if (!wish->is_octree && (wish->octree.levels > 0 || wish->octree.spacing > 0))
+		return psr_fail(err, PSR_ERR_ARG, "--levels and --spacing are for octrees; add --representation octree");
+	return PSR_OK;
 }
 
 static int check_progress_fd(int64_t fd, struct psr_error *err)
@@ -151,13 +246,13 @@ static int check_progress_fd(int64_t fd, struct psr_error *err)
 
 int cmd_build(int argc, char **argv)
 {
-	struct wish wish = { .quiet = 0 };
+	struct wish wish = { .is_blocks = 1 };
 	struct progress progress = { .fd = -1 };
 	struct psr_error err;
 	const char *out = NULL;
 	char *made = NULL;
 	int n_operands, code;
-	int64_t resolution, n_threads, fd = -1;
+	int64_t resolution, n_threads, fd = -1, levels = 0, memory = (int64_t)2 << 30;
 	double tolerance, crease;
 	const struct psr_opt opts[] = {
 		{ .name = "The model", .type = PSR_OPT_HEADING },
@@ -177,6 +272,19 @@ int cmd_build(int argc, char **argv)
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &wish.is_packed,
 		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
 		          " memory for all of it." },
+		{ .name = "Octrees, for large clouds", .type = PSR_OPT_HEADING },
+		{ .name = "representation", .type = PSR_OPT_CALL, .call = take_representation, .value = &wish, .arg = "KIND",
+		  .help = "What the model holds: blocks, octree or both. Octrees hold the points of a cloud as they are, in a tenth"
+		          " of the size and the time; blocks are of a resampled surface. Default: blocks.",
+		  .words = "blocks octree both" },
+		{ .name = "levels", .type = PSR_OPT_INT, .value = &levels, .arg = "K",
+		  .help = "Points within a leaf become one; a leaf is 1 / 2^K of the longest side, K 2 to 20. 0: by --spacing or by"
+		          " the number of points.", .min = 0, .max = OCTREE_MOST_LEVELS },
+		{ .name = "spacing", .type = PSR_OPT_REAL, .value = &wish.octree.spacing, .arg = "X",
+		  .help = "In place of --levels, the widest that a leaf may be, in units of the file.", .min = 0, .max = 1e30 },
+		{ .name = "memory", .type = PSR_OPT_INT, .value = &memory, .arg = "SIZE",
+		  .help = "Memory to sort points in; more of them are sorted on disk, in TMPDIR. The octree comes on top.",
+		  .min = OCTREE_LEAST_MEMORY, .max = 0x1p50 },
 		{ .name = "While it is built", .type = PSR_OPT_HEADING },
 		{ .name = "threads", .type = PSR_OPT_INT, .value = &n_threads, .arg = "N",
 		  .help = "Processor cores to use. Fewer take longer; the model is the same.", .min = 1, .max = 256 },
@@ -192,7 +300,7 @@ int cmd_build(int argc, char **argv)
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
-		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [options]",
+		.usage = "psr-model build IN [-o OUT.psr] [-r RES] [--representation octree] [options]",
 		.summary = "Turns a mesh or a scan into a .psr model, which psrd draws. psrd builds models itself when they are first"
 		           " asked for; build one here to choose how fine it is.",
 		.opts = opts,
@@ -210,6 +318,9 @@ int cmd_build(int argc, char **argv)
 		return 0;
 	if (code == PSR_OK && n_operands != 1)
 		code = psr_fail(&err, PSR_ERR_ARG, "one input file is needed");
+	wish.octree.levels = (int)levels;
+	if (code == PSR_OK)
+		code = check_octree(&wish, &err);
 	if (code == PSR_OK)
 		code = check_progress_fd(fd, &err);
 	if (code != PSR_OK)
@@ -219,7 +330,10 @@ int cmd_build(int argc, char **argv)
 	wish.build.n_threads = wish.import.n_threads = (int)n_threads;
 	wish.import.crease = crease * PSR_DEGREE;
 	wish.import.is_preview = resolution <= PSR_PREVIEW_RESOLUTION;
-	wish.build.on_progress = on_progress;
+	wish.octree.resolution = (uint32_t)resolution;
+	wish.octree.memory = (uint64_t)memory;
+	wish.build.on_progress = wish.octree.on_progress = on_progress;
+	wish.octree.userdata = &progress;
 	wish.build.userdata = &progress;
 	progress.fd = (int)fd;
 	progress.has_bar = !wish.quiet && isatty(STDERR_FILENO);

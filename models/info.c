@@ -1,6 +1,7 @@
 #include "commands.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "base/cli.h"
@@ -8,6 +9,7 @@
 #include "base/outfile.h"
 #include "base/view.h"
 #include "model/blocks.h"
+#include "model/tree.h"
 
 #define DEGREES (180 / 3.14159265358979323846)
 
@@ -17,6 +19,7 @@ struct summary {
 	char id[JSON_ID_TEXT];
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
+	const struct octree *tree;       /* likewise */
 	uint64_t bytes, file_bytes;
 	int is_packed;
 	const struct psr_presets *presets;
@@ -45,6 +48,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	json_id(summary->id, id);
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
+	summary->tree = psr_model_octree(model);
 	summary->bytes = psr_model_bytes(model);
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->presets = psr_model_presets(model);
@@ -98,6 +102,55 @@ static void print_presets(const struct psr_presets *p)
 		printf("  %-12s    %s\n", view_light_kinds[p->light[i].light.kind], p->light[i].name);
 }
 
+/* Bits a leaf of the arrays of a tree. */
+struct stream {
+	const char *name, *key;
+	double bits;
+};
+#define N_STREAMS 5
+
+static void take_streams(struct stream streams[N_STREAMS], const struct octree *tree)
+{
+	const double n = (double)tree->n_leaves;
+
+	streams[0] = (struct stream){ "codes", "codes", 8.0 * (double)tree->n_codes / n };
+	streams[1] = (struct stream){ "skip index", "skip", 8.0 * (double)tree->n_skips * sizeof *tree->skip / n };
+	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0 };
+	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0 };
+	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0 };
+}
+
+static void print_octree(const struct summary *s)
+{
+	struct stream streams[N_STREAMS];
+	double bits = 0;
+
+	take_streams(streams, s->tree);
+	printf("octree            %d levels, %" PRIu64 " leaves of %.4g, %" PRIu64 " byte codes\n", s->tree->levels,
+	       s->tree->n_leaves, ldexp(s->tree->edge * s->info->scale, -s->tree->levels), s->tree->n_codes);
+	for (int i = 0; i < N_STREAMS; i++) {
+		printf("  %-12s    %.2f bits a leaf\n", streams[i].name, streams[i].bits);
+		bits += streams[i].bits;
+	}
+	printf("  %-12s    %.2f\n", "all", bits);
+}
+
+static cJSON *octree_json(const struct summary *s)
+{
+	struct stream streams[N_STREAMS];
+	cJSON *root = cJSON_CreateObject(), *bits;
+
+	take_streams(streams, s->tree);
+	cJSON_AddNumberToObject(root, "levels", s->tree->levels);
+	cJSON_AddNumberToObject(root, "leaves", (double)s->tree->n_leaves);
+	cJSON_AddNumberToObject(root, "codes", (double)s->tree->n_codes);
+	cJSON_AddNumberToObject(root, "leaf_edge", ldexp(s->tree->edge * s->info->scale, -s->tree->levels));
+	bits = cJSON_AddObjectToObject(root, "bits_per_leaf");
+	for (int i = 0; i < N_STREAMS; i++)
+		cJSON_AddNumberToObject(bits, streams[i].key, streams[i].bits);
+	return root;
+}
+
 static void print_text(const struct summary *s)
 {
 	const struct psr_model_info *info = s->info;
@@ -118,6 +171,8 @@ static void print_text(const struct summary *s)
 	print_presets(s->presets);
 	printf("file              %.2f MB, %s\n", (double)s->file_bytes / 1e6, s->is_packed ? "packed" : "not packed");
 	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
+	if (s->tree != NULL)
+		print_octree(s);
 	if (blocks == NULL)
 		return;
 	printf("samples           %" PRIu64 "\n", blocks->n_samples);
@@ -208,6 +263,8 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		for (uint32_t l = 0; l < blocks->n_levels; l++)
 			cJSON_AddItemToArray(counts, cJSON_CreateNumber((double)s->level_samples[l]));
 	}
+	if (s->tree != NULL)
+		cJSON_AddItemToObject(root, "octree", octree_json(s));
 	return json_print(root, err);
 }
 

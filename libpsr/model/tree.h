@@ -20,4 +20,11 @@ int psr_model_create_octree(struct psr_model **out, const struct psr_model_info 
 int psr_model_create_both(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                           const struct octree *tree, const struct psr_presets *presets, struct psr_error *err);
 
+/* Fills in what a tree in units of its source says of a model: origin, scale, box, spacing (the greatest distance of
+ * leaves that touch), resolution; up is +y, the rest 0 and "". All leaves are in the unit sphere. */
+void psr_octree_info(struct psr_model_info *info, const struct octree *tree);
+
+/* Makes a copy with the cube in inner coordinates; its arrays stay the tree's. */
+void psr_octree_to_inner(struct octree *inner, const struct octree *tree, const struct psr_model_info *info);
+
 #endif
