@@ -328,7 +328,7 @@ void fill_pull(struct fill *fill, uint32_t row)
 			level = wants[b] > level ? wants[b] : level;
 		for (int l = 1; l <= level; l++) {
 			complete_weights(fill, bx, end, row, l);
-			if (fill->picture.rgb != NULL)
+			if (fill_has_colors(fill))
 				fill_pull_colors(fill, bx, end, row, l);
 		}
 	}
@@ -362,7 +362,7 @@ static void run_coarse(struct fill *fill)
 
 			fill->simd->fill_pull_weights(&row, &upper, &lower, to->width, fill_scale(fill->plan, l + 1),
 			                              fill_offset(fill->plan, l + 1));
-			if (fill->picture.rgb != NULL)
+			if (fill_has_colors(fill))
 				fill->simd->fill_pull_colors(&row, &upper, &lower, to->width, 0);
 		}
 	}

@@ -24,7 +24,7 @@ struct fill_picture {
 	const uint8_t *bricks; /* as gaps_rows marks them */
 	uint16_t *r, *g, *b;
 	const uint8_t *srgb;   /* 8 bits of 16-bit linear light */
-	uint8_t *rgb;          /* 3 * width * height, or NULL */
+	uint8_t *rgb;          /* 3 * width * height, or NULL: then r, g and b take the colours of a wide plan */
 	float *depth;          /* world units, or NULL */
 };
 

@@ -156,17 +156,23 @@ void fill_push_level(struct fill *fill, uint32_t bx0, uint32_t bx1, uint32_t by,
 }
 
 /* Writes the colours and depths of listed pixels of a row that begins at `first`. */
-static void write_pixels(const struct fill_picture *p, size_t first, const struct fill_places *places, uint32_t n)
+static void write_pixels(const struct fill *fill, size_t first, const struct fill_places *places, uint32_t n)
 {
+	const struct fill_picture *p = &fill->picture;
 	const uint8_t *srgb = p->srgb;
-	uint8_t *rgb = p->rgb + 3 * first;
+	uint8_t *rgb = p->rgb != NULL ? p->rgb + 3 * first : NULL;
 
-	for (uint32_t i = 0; i < n && p->rgb != NULL; i++) {
+	for (uint32_t i = 0; i < n && rgb != NULL; i++) {
 		const uint32_t at = places->at[i];
 
 		rgb[3 * at] = srgb[places->r[i]];
 		rgb[3 * at + 1] = srgb[places->g[i]];
 		rgb[3 * at + 2] = srgb[places->b[i]];
+	}
+	for (uint32_t i = 0; i < n && fill->plan->is_wide; i++) {
+		p->r[first + places->at[i]] = places->r[i];
+		p->g[first + places->at[i]] = places->g[i];
+		p->b[first + places->at[i]] = places->b[i];
 	}
 	for (uint32_t i = 0; i < n && p->depth != NULL; i++)
 		if (places->weight[i] < WEIGHT_ONE / 2)
@@ -200,7 +206,7 @@ void fill_push_bricks(struct fill *fill, struct fill_counts *counts, uint32_t bx
 				continue;
 			if (was.weight == pixels.weight)
 				memcpy(fill->picture.weight + first, was.weight, n_pixels * sizeof *was.weight);
-			write_pixels(&fill->picture, first, &places, n);
+			write_pixels(fill, first, &places, n);
 			counts->n_changed += n;
 			counts->n_filled += places.n_filled;
 			counts->n_moved += places.n_moved;

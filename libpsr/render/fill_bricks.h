@@ -25,6 +25,11 @@ static inline float fill_offset(const struct plan *plan, int level)
 	return plan->gap_offset[level < PSR_MAX_DEPTH_LEVEL ? level : PSR_MAX_DEPTH_LEVEL];
 }
 
+static inline int fill_has_colors(const struct fill *fill)
+{
+	return fill->picture.rgb != NULL || fill->plan->is_wide;
+}
+
 static inline void fill_note_depth(struct fill *fill, int level)
 {
 	int seen = atomic_load(&fill->deepest);

@@ -226,9 +226,14 @@ static int find_gaps(uint32_t *n_marked, struct psr_renderer *r, struct psr_pool
 	return rc;
 }
 
+static int has_colors(const struct psr_renderer *r)
+{
+	return r->frame->rgb != NULL || r->plan.is_wide;
+}
+
 static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
-	const enum psr_why why = r->plan.is_full || r->frame->rgb == NULL ? PSR_WHY_OFF : shade_wants_table(&r->plan);
+	const enum psr_why why = r->plan.is_full || !has_colors(r) ? PSR_WHY_OFF : shade_wants_table(&r->plan);
 
 	effect_note(report, PSR_EFFECT_TABLE, why, PSR_DIRECTIONS);
 	if (why != PSR_WHY_RAN)
@@ -245,8 +250,11 @@ static int tabulate(struct psr_renderer *r, struct psr_pool *pool, struct psr_re
 static int add_sheer(struct psr_renderer *r, struct psr_pool *pool, struct psr_report *report)
 {
 	const struct psr_frame *planes = r->has_planes ? r->frame : NULL;
-	const struct sheer_picture picture = { r->frame->rgb, r->srgb, r->depth, planes, r->buffers.stack.exponent };
-	const int is_wanted = r->frame->rgb != NULL || r->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
+	uint16_t *const *wide = r->buffers.rgb;
+	const struct sheer_picture picture = {
+		r->frame->rgb, { wide[0], wide[1], wide[2] }, r->srgb, r->depth, planes, r->buffers.stack.exponent,
+	};
+	const int is_wanted = has_colors(r) || r->depth != NULL, is_drawn = is_wanted && r->plan.has_sheer;
 	const enum psr_why none = is_wanted ? PSR_WHY_NOTHING : PSR_WHY_OFF;
 	const struct sheer *sheer = &r->sheer;
 	const int rc = is_drawn ? sheer_draw(&r->sheer, r->simd, &r->plan, &r->bins, &picture, pool) : PSR_OK;
@@ -279,7 +287,7 @@ static int begin_finish(struct psr_renderer *r, enum psr_why smooth, struct psr_
 		rgb = r->smooth.rgb;
 		r->depth = r->smooth.depth;
 	}
-	if (r->plan.has_sheer && (rgb != NULL || r->has_planes) && r->depth == NULL) {
+	if (r->plan.has_sheer && (has_colors(r) || r->has_planes) && r->depth == NULL) {
 		r->depth = sheer_depths(&r->sheer, &r->plan);
 		if (r->depth == NULL)
 			return explain(PSR_ERR_MEMORY, r, "the depths of", err);
@@ -311,7 +319,7 @@ static int shade_picture(struct psr_renderer *r, struct psr_pool *pool, struct p
 	if (rc)
 		return explain(rc, r, "the light of", err);
 	const uint64_t shaded = clock_ns();
-	shade_report(&r->plan, r->buffers.shade, shaded - start, r->frame->rgb != NULL, report);
+	shade_report(&r->plan, r->buffers.shade, shaded - start, has_colors(r), report);
 	start = shaded;
 	if (n_marked && fill_push(&r->fill, pool, report))
 		return render_cancelled(err);
@@ -372,7 +380,7 @@ int renderer_draw(struct psr_renderer *r, const struct psr_scene *scene, const s
 	fenv_t callers;
 
 	set_environment(&callers);
-	int rc = make_stack(r, &call, frame->rgb != NULL);
+	int rc = make_stack(r, &call, frame->rgb != NULL || settings->is_wide);
 	if (rc == PSR_OK)
 		rc = finish_stack(r, &r->buffers.stack, pool, frame, err);
 	fesetenv(&callers);

@@ -2,6 +2,7 @@
 #include <string.h>
 #include "base/maths.h"
 #include "base/mem.h"
+#include "base/root.h"
 #include "base/vec.h"
 #include "base/direction.h"
 #include "plan.h"
@@ -230,9 +231,9 @@ static int storage_make(struct plan *plan, const struct psr_scene *scene)
 	return PSR_OK;
 }
 
-static uint16_t light16(double linear)
+static uint16_t light16(double linear, int is_wide)
 {
-	return (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
+	return is_wide ? psr_root_of_light((float)linear) : (uint16_t)(fmin(linear, 1) * 65535 + 0.5);
 }
 
 int plan_make(struct plan *plan, const struct psr_scene *scene, const struct render_settings *settings,
@@ -274,6 +275,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->caster = NO_CASTER;
 	plan->with_splats = settings->with_splats;
 	plan->is_smooth = settings->is_smooth;
+	plan->is_wide = settings->is_wide;
 	plan->cancel = settings->cancel;
 	plan->exponent = scene_exponent(scene);
 	view.scale = ldexp(1, -plan->exponent);
@@ -298,7 +300,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->n_lights = 0;
 	for (int i = 0; i < 3; i++) {
 		plan->ambient[i] = (float)scene->ambient[i];
-		plan->background[i] = light16(scene->background[i]);
+		plan->background[i] = light16(scene->background[i], settings->is_wide);
 	}
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
 		if (plan_is_cancelled(plan))

@@ -23,6 +23,7 @@ struct plan {
 	int perspective;
 	int with_splats;
 	int is_smooth;
+	int is_wide;
 	unsigned cull_tests;
 	int is_full;
 	enum psr_gap_method gap_method;
@@ -50,7 +51,7 @@ struct plan {
 	const float *shadow_share;
 	double axes[3][3], eye[3];         /* the camera's right, down and forward in the world, and its position */
 	float ambient[3];
-	uint16_t background[3];            /* linear, 16 bits */
+	uint16_t background[3];            /* linear, 16 bits; if is_wide, see base/root.h */
 	/* Map of the picture's parts, parts_x in a row, or NULL: 1 where all words are empty and all weights whole, since
 	 * no block draws there, nor do cells reach there. */
 	const uint8_t *is_quiet;

@@ -3,6 +3,7 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
+#include "base/root.h"
 #include "base/srgb.h"
 #include "placed.h"
 #include "refine.h"
@@ -24,8 +25,7 @@ _Static_assert(MARGIN % (1 << PSR_MAX_PASS) == 0, "a pixel is in one window");
 
 struct refiner {
 	struct psr_renderer *renderer;
-	uint8_t *rgb; /* of a window, behind its depths in memory */
-	float *depth;
+	float *depth; /* of a window */
 	uint8_t *is_inside; /* by pixel of the plain frame, then as much scratch */
 	size_t inside_size;
 	/* What is_inside was found for: the passes of a still share it. */
@@ -34,13 +34,13 @@ struct refiner {
 	struct psr_camera camera;
 	struct render_settings settings;
 	const uint8_t *srgb;   /* of 16-bit linear light */
-	uint16_t linear[256];
 };
 
 /* A window's part of the frame: its pixels, and the first sub-pixel of the first one in the window. */
 struct part {
 	const struct refiner *refiner;
 	struct psr_frame *frame;
+	struct wide_light light; /* of sub-pixels */
 	uint32_t x0, x1, y0, left, top, stride;
 	unsigned pass;
 };
@@ -62,21 +62,17 @@ struct erosion {
 
 int refiner_create(struct refiner **out, struct psr_renderer *renderer, struct psr_error *err)
 {
-	const size_t area = (size_t)WINDOW_WIDTH * WINDOW_HEIGHT;
 	struct refiner *r = calloc(1, sizeof *r);
 
 	if (r == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	r->renderer = renderer;
-	r->depth = psr_alloc_array(area, sizeof *r->depth + 3);
+	r->depth = psr_alloc_array((size_t)WINDOW_WIDTH * WINDOW_HEIGHT, sizeof *r->depth);
 	if (r->depth == NULL) {
 		free(r);
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for refining a frame");
 	}
-	r->rgb = (uint8_t *)(r->depth + area);
 	r->srgb = psr_srgb_of_16_bits();
-	for (int i = 0; i < 256; i++)
-		r->linear[i] = (uint16_t)(psr_srgb_to_linear[i] * 65535.0f + 0.5f);
 	*out = r;
 	return PSR_OK;
 }
@@ -93,13 +89,13 @@ void refiner_destroy(struct refiner *r)
 
 uint64_t refiner_bytes(const struct refiner *r)
 {
-	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof *r->depth + 3) + r->inside_size
+	return sizeof *r + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * sizeof *r->depth + r->inside_size
 	       + placed_bytes(&r->placed);
 }
 
 uint64_t refiner_most_bytes(uint64_t n_pixels)
 {
-	return sizeof(struct refiner) + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * (sizeof(float) + 3) + 2 * n_pixels;
+	return sizeof(struct refiner) + (uint64_t)WINDOW_WIDTH * WINDOW_HEIGHT * sizeof(float) + 2 * n_pixels;
 }
 
 uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
@@ -109,21 +105,24 @@ uint64_t refiner_window(uint32_t width, uint32_t height, unsigned pass)
 	return (w < WINDOW_WIDTH ? w : WINDOW_WIDTH) * (h < WINDOW_HEIGHT ? h : WINDOW_HEIGHT);
 }
 
+/* The mean of light, clamped at the end: highlights smaller than a pixel keep what they send. Squares are below 2^32, so
+ * sums of 256 take 40 bits, and 16 more on the way to 16-bit linear light. */
 static void average_color(const struct part *part, size_t first, size_t at)
 {
-	const struct refiner *r = part->refiner;
-	const uint32_t side = 1u << part->pass, half = 1u << (2 * part->pass - 1);
-	uint32_t sum[3] = { half, half, half };
+	const uint32_t side = 1u << part->pass, bits = PSR_ROOT_BITS + 2 * part->pass;
 
-	for (uint32_t j = 0; j < side; j++) {
-		const uint8_t *rgb = r->rgb + 3 * (first + (size_t)j * part->stride);
+	for (size_t c = 0; c < 3; c++) {
+		uint64_t sum = 0;
 
-		for (uint32_t i = 0; i < side; i++)
-			for (int c = 0; c < 3; c++)
-				sum[c] += r->linear[rgb[3 * i + (uint32_t)c]];
+		for (uint32_t j = 0; j < side; j++) {
+			const uint16_t *root = part->light.channel[c] + first + (size_t)j * part->stride;
+
+			for (uint32_t i = 0; i < side; i++)
+				sum += (uint64_t)root[i] * root[i];
+		}
+		const uint64_t mean = (sum * 65535 + (UINT64_C(1) << (bits - 1))) >> bits;
+		part->frame->rgb[3 * at + c] = part->refiner->srgb[mean < 65535 ? mean : 65535];
 	}
-	for (int c = 0; c < 3; c++)
-		part->frame->rgb[3 * at + (size_t)c] = r->srgb[sum[c] >> 2 * part->pass];
 }
 
 static void find_nearest(const struct part *part, size_t first, size_t at)
@@ -201,13 +200,13 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 
 	window.with_splats = 1;
 	window.is_smooth = 0;
+	window.is_wide = frame->rgb != NULL;
 	window.window = (struct psr_window){ width, height, (int32_t)left, (int32_t)top };
 	window.width = is_last_x ? width - left : WINDOW_WIDTH;
 	window.height = is_last_y ? height - top : WINDOW_HEIGHT;
 
 	fine = (struct psr_frame){ .width = window.width,
 		                       .height = window.height,
-		                       .rgb = frame->rgb != NULL ? r->rgb : NULL,
 		                       .depth = frame->depth != NULL ? r->depth : NULL };
 	const struct inside inside = { r->is_inside, settings->width, left, top, pass };
 	renderer_set_inside(r->renderer, &inside);
@@ -218,7 +217,7 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	const uint32_t from_x = i ? MARGIN : 0, to_x = is_last_x ? window.width : WINDOW_WIDTH - MARGIN;
 	const uint32_t from_y = j ? MARGIN : 0, to_y = is_last_y ? window.height : WINDOW_HEIGHT - MARGIN;
 	struct part part = {
-		.refiner = r, .frame = frame, .pass = pass, .stride = window.width, .left = from_x, .top = from_y,
+		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .pass = pass, .stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
 	add_report(&frame->report, &fine.report, pass);

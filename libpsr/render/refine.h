@@ -13,4 +13,11 @@ int renderer_outline(struct psr_renderer *renderer, const struct psr_scene *scen
 /* Sets which pixels of frames with splats are inside the object; NULL: unknown. The caller keeps them alive. */
 void renderer_set_inside(struct psr_renderer *renderer, const struct inside *inside);
 
+/* The colours of the last frame, if it was wide: three planes of base/root.h, as wide as the frame. The renderer's, until
+ * its next call. */
+struct wide_light {
+	const uint16_t *channel[3];
+};
+struct wide_light renderer_light(const struct psr_renderer *renderer);
+
 #endif

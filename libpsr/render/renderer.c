@@ -55,3 +55,10 @@ void renderer_set_inside(struct psr_renderer *r, const struct inside *inside)
 {
 	r->inside = inside;
 }
+
+struct wide_light renderer_light(const struct psr_renderer *r)
+{
+	const struct buffers *b = &r->buffers;
+
+	return (struct wide_light){ { b->rgb[0], b->rgb[1], b->rgb[2] } };
+}

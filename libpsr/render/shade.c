@@ -104,17 +104,20 @@ static void light_strip(struct strip *strip, const struct shading *s)
 
 	for (uint32_t l = 0; l < plan->n_lights && (plan->view.lit == NULL || strip->is_specular); l++)
 		add_light(s->simd, plan, strip, l);
-	s->simd->strip_color(strip, plan->ambient);
+	s->simd->strip_color(strip, plan->ambient, plan->is_wide);
 }
 
 static void write_strip(const struct strip *strip, const struct shading *s)
 {
+	static const uint8_t all[STRIP / STRIP_BRICK] = { 1, 1, 1, 1 };
 	const struct plan *plan = s->plan;
 	const struct shade_picture *to = s->picture;
 	const uint32_t x = strip->pixels->x0, y = strip->pixels->y, left = plan->width - x;
 	const uint8_t *wants = to->wants;
 
-	if (wants != NULL)
+	if (plan->is_wide)
+		wants = all;
+	else if (wants != NULL)
 		wants += (size_t)(y / BRICK) * ((plan->width + BRICK - 1) / BRICK) + x / BRICK;
 	const struct strip_target target = { plan->width, to->rgb, to->srgb, wants, to->r, to->g, to->b,
 		                                 { plan->background[0], plan->background[1], plan->background[2] } };
@@ -145,7 +148,7 @@ void shade_rows(const struct simd *simd, const struct plan *plan, const struct s
 	struct strip_pixels pixels[2]; /* of this strip and the next */
 	struct strip strip;
 
-	if (picture->rgb == NULL) {
+	if (picture->rgb == NULL && !plan->is_wide) {
 		for (uint32_t i = 0; i < n; i++)
 			counts->n_pixels += list_strip(&pixels[0], &shading, i % per_row * STRIP, y0 + i / per_row);
 		return;

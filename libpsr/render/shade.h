@@ -1,4 +1,4 @@
-/* Shade: words to linear colours ([G] 7.3). */
+/* Shade: words to linear colours ([G] 7.3). Wide plans: to those of base/root.h. */
 #ifndef PSR_RENDER_SHADE_H
 #define PSR_RENDER_SHADE_H
 
@@ -22,12 +22,12 @@ struct shade_picture {
 	const uint16_t *weight;
 	uint8_t *rgb;         /* sRGB, 3 * width * height, or NULL */
 	const uint8_t *srgb;  /* 8 bits of 16-bit linear light */
-	uint16_t *r, *g, *b;  /* linear light, width * height: written in bricks that are wanted */
+	uint16_t *r, *g, *b;  /* 16 bits, width * height: written in bricks that are wanted, all if the plan is wide */
 	const uint8_t *wants; /* a flag a brick, from fill_wants; NULL: none */
 };
 
 /* Colours the pixels of rows y0..y1-1, at least one: lit samples of weight above 0, and the background elsewhere.
- * Without rgb, counts samples alone. Adds to the counts. */
+ * Without rgb, and not wide, counts samples alone. Adds to the counts. */
 void shade_rows(const struct simd *simd, const struct plan *plan, const struct shade_picture *picture, uint32_t y0,
                 uint32_t y1, struct shade_counts *counts);
 

@@ -142,7 +142,7 @@ static void add_pixel(struct sheer_tile *l, const struct plan *plan, size_t firs
 	const float share = l->through[at] * back;
 
 	for (int c = 0; c < 3; c++)
-		l->light[c][at] += share * ((float)color[c] * (1.0f / 65535));
+		l->light[c][at] += share * sheer_light(plan, color[c]);
 	l->through[at] = opacity == PSR_OPAQUE ? 0 : l->through[at] - share;
 	if (z < l->first[at]) {
 		l->first[at] = z;
@@ -213,6 +213,14 @@ static uint8_t mix(const uint8_t *srgb, float light, float through, uint8_t code
 	return srgb[(int32_t)((mixed < 1 ? mixed : 1) * 65535 + 0.5f)];
 }
 
+static void mix_pixel(const struct sheer_tile *l, const struct sheer_picture *p, size_t from, size_t to, int is_wide)
+{
+	for (size_t c = 0; p->rgb != NULL && c < 3; c++)
+		p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
+	for (size_t c = 0; is_wide && c < 3; c++)
+		p->wide[c][to] = psr_root_of_light(l->light[c][from] + l->through[from] * psr_light_of_root(p->wide[c][to]));
+}
+
 static uint64_t end_layers(const struct sheer_tile *l, const struct sheer_drawing *d, const struct sheer_area *area)
 {
 	const struct sheer_picture *p = d->picture;
@@ -224,8 +232,7 @@ static uint64_t end_layers(const struct sheer_tile *l, const struct sheer_drawin
 
 			if (!(l->first[from] < INFINITY))
 				continue;
-			for (size_t c = 0; p->rgb != NULL && c < 3; c++)
-				p->rgb[3 * to + c] = mix(p->srgb, l->light[c][from], l->through[from], p->rgb[3 * to + c]);
+			mix_pixel(l, p, from, to, d->plan->is_wide);
 			if (l->through[from] <= HALF)
 				p->depth[to] = l->first[from] * d->to_world[0] * d->to_world[1];
 			n_pixels++;

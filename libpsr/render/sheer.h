@@ -70,9 +70,11 @@ uint32_t sheer_begin(const struct plan *plan, const struct bins *bins, uint32_t 
 void sheer_list_blocks(struct sheer_list *list, const struct plan *plan, const struct bin_entry *entry, uint32_t n,
                        const struct warp_target *target);
 
-/* The picture to draw over: sRGB or NULL, depths in world units, and the frame if it has other planes, or NULL. */
+/* The picture to draw over: sRGB or NULL, 16 bits a channel if the plan is wide, depths in world units, and the frame if
+ * it has other planes, or NULL. */
 struct sheer_picture {
 	uint8_t *rgb;
+	uint16_t *wide[3];
 	const uint8_t *srgb; /* 8 bits of 16-bit linear light */
 	float *depth;
 	const struct psr_frame *planes;

@@ -3,6 +3,7 @@
 #define PSR_RENDER_SHEER_TILE_H
 
 #include <stdatomic.h>
+#include "base/root.h"
 #include "shade.h"
 #include "sheer.h"
 #include "zbuffer.h"
@@ -49,6 +50,12 @@ struct sheer_area {
 struct sheer_entries {
 	uint32_t begin, end;
 };
+
+/* The light of a strip's 16 bits. */
+static inline float sheer_light(const struct plan *plan, uint16_t color)
+{
+	return plan->is_wide ? psr_light_of_root(color) : (float)color * (1.0f / 65535);
+}
 
 static inline size_t sheer_place(const struct sheer_area *area, uint32_t y)
 {

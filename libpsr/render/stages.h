@@ -36,6 +36,8 @@ struct render_settings {
 	int is_full;            /* debug: disables every shortcut that does not change the output */
 	int with_splats; /* 0: samples fill pixels, and depth buffers tell where gaps are ([G] 4). 1: samples are discs on
 	                  * the surface that close the gaps themselves: for pixels finer than samples */
+	int is_wide;     /* 1: colours are not clamped at 1, and stay in the renderer, see renderer_light(); the frame has no
+	                  * rgb, and is not smoothed */
 	double gap_threshold;   /* in pixel widths at the sample's depth ([G] 7.2 found three); 0..64 */
 	enum psr_gap_method gap_method; /* PSR_GAPS_CLOSED by default */
 	int cell_bias;          /* depth buffers whose cells are 2^cell_bias times as wide as samples ask for; -4..4, 0 by

@@ -104,7 +104,7 @@ static void light_strip(struct sheer_tile *l, const struct sheer_drawing *d, con
 		const float through = through_veil(l->veil[at]);
 
 		for (int c = 0; c < 3; c++)
-			l->light[c][at] = (1 - through) * ((float)color[c] * (1.0f / 65535));
+			l->light[c][at] = (1 - through) * sheer_light(d->plan, color[c]);
 		l->through[at] = through;
 		l->front[at] = l->word[at];
 		l->first[at] = psr_float_from_bits((uint32_t)(l->word[at] >> 32));

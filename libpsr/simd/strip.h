@@ -94,9 +94,9 @@ typedef void strip_light_fn(struct strip *strip, const struct strip_light *light
 /* Tabulates light by normal, as strip_light gives it, for normals first .. first + n - 1; n at most STRIP. */
 typedef void strip_lit_fn(float (*lit)[4], const struct strip_view *view, const struct strip_lights *lights,
                           uint32_t first, uint32_t n);
-/* Multiplies light and colours into 16 bits; adds ambient light where !is_specular. Unlit samples keep their base
- * colour. */
-typedef void strip_color_fn(struct strip *strip, const float ambient[3]);
+/* Multiplies light and colours into 16 bits: linear up to 1, or if is_wide those of base/root.h. Adds ambient light where
+ * !is_specular. Unlit samples keep their base colour. */
+typedef void strip_color_fn(struct strip *strip, const float ambient[3], int is_wide);
 
 #define STRIP_BRICK 32 /* pixels of a row that share one flag in `wants` */
 
@@ -104,9 +104,9 @@ struct strip_target {
 	uint32_t width;
 	uint8_t *rgb;           /* sRGB, 3 bytes a pixel, or NULL */
 	const uint8_t *srgb;    /* 8 bits of 16-bit linear light */
-	const uint8_t *wants;   /* a flag for each STRIP_BRICK pixels of the piece: write linear light; NULL: none */
-	uint16_t *r, *g, *b;    /* linear light; written where wanted */
-	uint16_t background[3]; /* linear */
+	const uint8_t *wants;   /* a flag for each STRIP_BRICK pixels of the piece: write 16 bits; NULL: none */
+	uint16_t *r, *g, *b;    /* the strip's 16 bits; written where wanted */
+	uint16_t background[3]; /* the same of the background */
 };
 
 /* Writes the n pixels of the piece: the colours of strip->pixels, and the background elsewhere. */

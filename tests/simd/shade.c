@@ -118,7 +118,7 @@ static void bench_lit(struct check *c)
 	lit(c, 0, STRIP, 2, 0);
 }
 
-static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
+static void color(struct check *c, uint32_t n, int is_specular, int is_wide, int is_spoilt)
 {
 	struct strip *strip = check_out(c, 1, sizeof *strip);
 	float *ambient = check_in(c, 3, sizeof *ambient);
@@ -127,17 +127,22 @@ static void color(struct check *c, uint32_t n, int is_specular, int is_spoilt)
 		ambient[k] = check_plain_or_any(c, is_spoilt, 0, 1);
 	check_units(c, n);
 	while (check_next(c))
-		c->simd->strip_color(strip, ambient);
+		c->simd->strip_color(strip, ambient, is_wide);
 }
 
 static void random_color(struct check *c)
 {
-	color(c, 1 + check_below(c, STRIP), (int)check_below(c, 2), (int)check_below(c, 2));
+	color(c, 1 + check_below(c, STRIP), (int)check_below(c, 2), (int)check_below(c, 2), (int)check_below(c, 2));
 }
 
 static void bench_color(struct check *c)
 {
-	color(c, STRIP, 1, 0);
+	color(c, STRIP, 1, 0, 0);
+}
+
+static void bench_wide(struct check *c)
+{
+	color(c, STRIP, 1, 1, 0);
 }
 
 /* ---- write and depths ---- */
@@ -227,6 +232,7 @@ int main(int argc, char **argv)
 		{ "strip_light, spot, highlights", bench_spot_specular, 0, "sample" },
 		{ "strip_lit, two lights", bench_lit, 0, "normal" },
 		{ "strip_color, highlights", bench_color, 0, "sample" },
+		{ "strip_color, highlights, wide", bench_wide, 0, "sample" },
 		{ "strip_write, 8 bits", bench_write, 0, "pixel" },
 		{ "depth_row", bench_depths, 0, "pixel" },
 	};

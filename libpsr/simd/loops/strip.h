@@ -1,6 +1,7 @@
 /* Samples of strips and their pixels. */
 #include <string.h>
 #include "base/maths.h"
+#include "base/root.h"
 #include "base/srgb.h"
 #include "strip_parts.h"
 
@@ -238,7 +239,12 @@ static inline uint16_t light16(float linear)
 	return (uint16_t)(int32_t)(linear * 65535.0f + 0.5f);
 }
 
-static CONSTANT_FLAGS void strip_color_by(struct strip *s, const float ambient[3], int is_specular)
+static CONSTANT_FLAGS uint16_t code16(float linear, int is_wide)
+{
+	return is_wide ? psr_root_of_light(linear) : light16(linear);
+}
+
+static CONSTANT_FLAGS void strip_color_by(struct strip *s, const float ambient[3], int is_specular, int is_wide)
 {
 	const float ambient_r = ambient[0], ambient_g = ambient[1], ambient_b = ambient[2];
 
@@ -249,18 +255,22 @@ static CONSTANT_FLAGS void strip_color_by(struct strip *s, const float ambient[3
 		r += is_specular ? s->hr[i] : s->dr[i] * ambient_r;
 		g += is_specular ? s->hg[i] : s->dg[i] * ambient_g;
 		b += is_specular ? s->hb[i] : s->db[i] * ambient_b;
-		s->r[i] = light16(is_unlit ? s->dr[i] : r);
-		s->g[i] = light16(is_unlit ? s->dg[i] : g);
-		s->b[i] = light16(is_unlit ? s->db[i] : b);
+		s->r[i] = code16(is_unlit ? s->dr[i] : r, is_wide);
+		s->g[i] = code16(is_unlit ? s->dg[i] : g, is_wide);
+		s->b[i] = code16(is_unlit ? s->db[i] : b, is_wide);
 	}
 }
 
-static void strip_color(struct strip *strip, const float ambient[3])
+static void strip_color(struct strip *strip, const float ambient[3], int is_wide)
 {
-	if (strip->is_specular)
-		strip_color_by(strip, ambient, 1);
+	if (strip->is_specular && is_wide)
+		strip_color_by(strip, ambient, 1, 1);
+	else if (strip->is_specular)
+		strip_color_by(strip, ambient, 1, 0);
+	else if (is_wide)
+		strip_color_by(strip, ambient, 0, 1);
 	else
-		strip_color_by(strip, ambient, 0);
+		strip_color_by(strip, ambient, 0, 0);
 }
 
 static inline void write_linear(const struct strip *strip, const struct strip_target *target, uint32_t n)
