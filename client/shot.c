@@ -8,6 +8,7 @@ static const char footer[] =
 	SHOW_HELP
 	"\n"
 	"examples:\n"
+	"  psr shot scan.ply -o scan.png\n"
 	"  psr shot --model teapot --size 1280x720 --shadows -o teapot.png\n"
 	"  psr shot --model dragon --azimuth 60 --elevation 10 --zoom 2 --quality best -o dragon.png\n"
 	"  psr shot --model plate --view front,left,top,iso --ortho fit --sheet 2x2 -o sheet.png\n"
@@ -30,15 +31,16 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		  .help = "The picture that wrote this report, with the same bytes; only files are to be named." },
 	};
 	const struct psr_cli cli = {
-		.usage = "psr shot --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",
+		.usage = "psr shot FILE | --model NAME [--server ADDR] [--size WxH] [models, camera, light, quality] -o FILE",
 		.summary = "Asks a server for a picture of a model, or of several, and writes it to a file. --view "
-		           "front,left,... and --cameras draw several pictures.",
+		           "front,left,... and --cameras draw several pictures. A FILE (a mesh, a scan or a .psr) needs no "
+		           "server: it is served by a psrd of this command's own, and built models stay in the cache.",
 		.opts = list.opt,
 		.footer = footer,
 	};
 
 	draw_add_options(&list, wish, files, sizeof files / sizeof files[0]);
-	return psr_command_parse("shot", &cli, argc, argv, NULL, err);
+	return draw_parse_command(wish, "shot", &cli, argc, argv, err);
 }
 
 int psr_shot_main(int argc, char **argv)

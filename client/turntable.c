@@ -10,6 +10,7 @@ static const char footer[] =
 	SCENE_LIGHT_HELP
 	"\n"
 	"examples:\n"
+	"  psr turntable scan.ply -o scan.gif\n"
 	"  psr turntable --model dragon --frames 48 -o dragon.png\n"
 	"  psr turntable --model dragon --elevation 30 --shadows -o 'dragon_%02d.png'\n"
 	"  psr turntable --model dragon --size 320x240 --sheet 4x3 -o sheet.png\n"
@@ -32,10 +33,10 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 		  .help = "How long a turn of an animation takes." },
 	};
 	const struct psr_cli cli = {
-		.usage = "psr turntable --model NAME [--server ADDR] [--frames N] [models, camera, light, quality] -o FILE",
+		.usage = "psr turntable FILE | --model NAME [--server ADDR] [--frames N] [camera, light, quality] -o FILE",
 		.summary = "Draws a model from all sides: the camera goes once around it, to its right at first, and the "
 		           "model stays in the picture. The camera's options say where it begins. Lights of --light stay with "
-		           "the model; the one that is there without stays with the camera.",
+		           "the model; the one that is there without stays with the camera. A FILE needs no server, as with psr shot.",
 		.opts = list.opt,
 		.footer = footer,
 	};
@@ -43,7 +44,7 @@ static int parse(struct draw_wish *wish, int argc, char **argv, struct psr_error
 	sink->n_turn = DEFAULT_FRAMES;
 	sink->seconds = 4;
 	draw_add_options(&list, wish, files, sizeof files / sizeof files[0]);
-	code = psr_command_parse("turntable", &cli, argc, argv, NULL, err);
+	code = draw_parse_command(wish, "turntable", &cli, argc, argv, err);
 	if (code != PSR_OK)
 		return code;
 	if (sink->has_sheet && !has_frames && (uint64_t)sink->sheet[0] * sink->sheet[1] <= MAX_FRAMES)

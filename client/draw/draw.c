@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "client/cli/cli.h"
+#include "client/home/home.h"
 #include "client/replay/replay.h"
 #include "draw.h"
 #include "series.h"
@@ -30,8 +31,20 @@ void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct
 	OPTLIST_ADD(list, timeout);
 }
 
+int draw_parse_command(struct draw_wish *wish, const char *command, const struct psr_cli *cli, int argc, char **argv,
+                       struct psr_error *err)
+{
+	int n_files = 0, code = psr_command_parse(command, cli, argc, argv, &n_files, err);
+
+	if (code == PSR_OK && n_files > 1)
+		code = psr_fail(err, PSR_ERR_ARG, "one file at a time, not %d; psrd --models serves folders", n_files);
+	wish->file = n_files == 1 ? argv[1] : NULL;
+	return code;
+}
+
 struct job {
 	struct draw_wish *wish;
+	struct home *home; /* of wish->file */
 	struct views views;
 	cJSON *replay;
 	struct psr_msg_frame frame;
@@ -46,7 +59,7 @@ static int check_replay(struct job *job, struct psr_error *err)
 	const struct draw_wish *wish = job->wish;
 	int code;
 
-	if (wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
+	if (wish->file != NULL || wish->scene.n_said || wish->scene.has_ambient || view_is_said(&wish->view) || wish->cameras != NULL
 	    || quality_is_said(&wish->quality) || wish->sink.has_sheet)
 		return psr_fail(err, PSR_ERR_ARG,
 		                "--replay repeats a whole picture; it excludes all options that say what is in "
@@ -57,6 +70,20 @@ static int check_replay(struct job *job, struct psr_error *err)
 	return code == PSR_OK ? replay_frame(&job->frame, job->replay, err) : code;
 }
 
+/* A file alone is the model; beside other options it is there for them. */
+static int check_file(struct job *job, struct psr_error *err)
+{
+	struct scene_wish *scene = &job->wish->scene;
+	int code;
+
+	if (job->wish->file == NULL)
+		return PSR_OK;
+	code = home_create(&job->home, job->wish->file, err);
+	if (code == PSR_OK && scene->n_instances == 0 && scene->file == NULL)
+		code = scene_add_model(scene, home_model(job->home), err);
+	return code;
+}
+
 static int check(struct job *job, struct psr_error *err)
 {
 	struct draw_wish *wish = job->wish;
@@ -65,7 +92,9 @@ static int check(struct job *job, struct psr_error *err)
 	if (wish->replay != NULL) {
 		code = check_replay(job, err);
 	} else {
-		code = scene_check(&wish->scene, err);
+		code = check_file(job, err);
+		if (code == PSR_OK)
+			code = scene_check(&wish->scene, err);
 		if (code == PSR_OK)
 			code = views_make(&job->views, &wish->view, wish->cameras, err);
 		if (code == PSR_OK)
@@ -101,6 +130,12 @@ static int run(struct job *job, struct psr_error *err)
 	uint64_t start_ns = clock_ns();
 	struct series series;
 
+	if (job->home != NULL) {
+		code = home_start(job->home, err);
+		if (code != PSR_OK)
+			return code;
+		wish->server = home_address(job->home);
+	}
 	wish->scene.pixels = job->frame.width > job->frame.height ? job->frame.width : job->frame.height;
 	code = psr_client_connect(&job->client, wish->server, PSR_PROGRAM, wish->scene.instance[0].model, timeout_ms, err);
 	if (code == PSR_OK)
@@ -139,6 +174,7 @@ static int draw(struct draw_wish *wish, struct psr_error *err)
 	psr_client_close(job->client);
 	scene_close(job->scene);
 	views_fini(&job->views);
+	home_close(job->home);
 	cJSON_Delete(job->replay);
 	free(job->camera);
 	free(job);

@@ -14,10 +14,15 @@ struct draw_wish {
 	struct quality_wish quality;
 	struct sink_wish sink;
 	const char *cameras, *replay;
+	const char *file; /* served by a psrd of the program's own; NULL: none */
 };
 
 /* Lists the options of both commands, group by group; `files` are the command's own in the group Files. */
 void draw_add_options(struct optlist *list, struct draw_wish *wish, const struct psr_opt *files, int n_files);
+
+/* Parses the command line: options, and the one file that may stand among them. As psr_cli_parse(). */
+int draw_parse_command(struct draw_wish *wish, const char *command, const struct psr_cli *cli, int argc, char **argv,
+                       struct psr_error *err);
 
 /* Fills the wish, which must hold its defaults. Returns 1 if it printed --help. */
 typedef int draw_parse(struct draw_wish *wish, int argc, char **argv, struct psr_error *err);

@@ -32,6 +32,9 @@ void scene_wish_fini(struct scene_wish *wish);
 /* Makes a wish of the same options, before scene_check(); their strings are the first one's. MEMORY. */
 int scene_wish_copy(struct scene_wish *to, const struct scene_wish *from, struct psr_error *err);
 
+/* Adds a model where its file puts it, as --model does. ARG: its name is too long; LIMIT, MEMORY. */
+int scene_add_model(struct scene_wish *wish, const char *name, struct psr_error *err);
+
 /* Lists --model, --instance, --scene. The options point into *wish. */
 void scene_add_model_options(struct optlist *list, struct scene_wish *wish);
 void scene_add_light_options(struct optlist *list, struct scene_wish *wish);

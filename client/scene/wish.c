@@ -44,14 +44,19 @@ static int add_instance(struct scene_wish *wish, const struct instance_wish *ins
 	return PSR_OK;
 }
 
-static int on_model(const char *text, void *userdata, struct psr_error *err)
+int scene_add_model(struct scene_wish *wish, const char *name, struct psr_error *err)
 {
 	struct instance_wish instance = { .place = { .rotation = { 0, 0, 0, 1 }, .scale = 1 } };
 
-	if (text[0] == '\0' || strlen(text) > PSR_WIRE_MAX_NAME)
+	if (name[0] == '\0' || strlen(name) > PSR_WIRE_MAX_NAME)
 		return psr_fail(err, PSR_ERR_ARG, "a model's name has 1 to %d bytes", PSR_WIRE_MAX_NAME);
-	strcpy(instance.model, text);
-	return add_instance(userdata, &instance, err);
+	strcpy(instance.model, name);
+	return add_instance(wish, &instance, err);
+}
+
+static int on_model(const char *text, void *userdata, struct psr_error *err)
+{
+	return scene_add_model(userdata, text, err);
 }
 
 static int on_instance(const char *text, void *userdata, struct psr_error *err)
@@ -148,7 +153,7 @@ int scene_check(struct scene_wish *wish, struct psr_error *err)
 		return code;
 	if (wish->n_instances == 0)
 		return psr_fail(err, PSR_ERR_ARG, "%s; `psr list` shows the names",
-		                wish->file != NULL ? "the scene file names no model" : "--model NAME is missing");
+		                wish->file != NULL ? "the scene file names no model" : "--model NAME is missing, or a file");
 	if (wish->lights_of != NULL && strcmp(wish->lights_of, "model") != 0)
 		return psr_fail(err, PSR_ERR_ARG, "--lights takes 'model', not '%.40s'; --light is for one light",
 		                wish->lights_of);

@@ -59,7 +59,8 @@ struct link_picture {
 	uint64_t wish;               /* number of the wish that it shows, as link_wish() returned it */
 	int is_sharp;                /* the wish itself: its size and camera, full scale, without loss, and smooth if the
 	                              * wish is. Nothing better comes, but finer refinement */
-	int is_final;                /* and nothing at all comes until the wish changes */
+	int is_final;                /* and nothing at all comes until the wish changes, or finer models are there */
+	int is_coarse;               /* they are to come, or models that are missing in it */
 	struct psr_msg_frame_begin begin; /* codec, settings, level of refinement */
 	struct psr_msg_frame_end end;     /* what ran, times, error bound */
 	uint64_t bytes;              /* of its messages */

@@ -91,6 +91,7 @@ struct link_request {        /* one that was sent */
 	uint32_t width, height;  /* of the wish */
 	int is_rest, is_direct;  /* is_direct: without loss from its first frame on */
 	int is_smooth;           /* as wished */
+	int is_coarse;           /* as in struct link_content */
 	int is_cancelled;        /* by link_view_cancel() */
 };
 
@@ -152,6 +153,8 @@ struct link_open_model *link_models_find(const struct link_models *models, const
  * were opened for other sizes than wish->pixels. The list is the caller's; *n 0: none, and NULL. MEMORY. */
 int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct link_models *models,
                      const struct link_wish *wish, int is_fine);
+/* Returns whether each model of the wish is open for pictures of its size. */
+int link_models_are_fine(const struct link_models *models, const struct link_wish *wish);
 /* Opens it on the connection, in the place of an open one of its name. */
 int link_models_open(struct link_models *models, const struct link_errand_model *wanted, struct psr_error *err);
 /* The places of the instances whose models are open, their number in *n; NULL and 0: none is, or there is no memory. */
@@ -198,6 +201,7 @@ struct link_content { /* what is drawn now */
 	const struct link_place *place;
 	uint32_t n_places;
 	const double *box_min, *box_max;
+	int is_coarse;           /* models of the wish, or finer ones, are still to come */
 };
 /* The wish, or the scene, is another one. */
 void link_view_changed(struct link_view *view, const struct link_wish *wish, uint64_t now_ns);

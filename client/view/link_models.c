@@ -64,6 +64,17 @@ int link_models_lack(struct link_errand_model **out, uint32_t *n, const struct l
 	return PSR_OK;
 }
 
+int link_models_are_fine(const struct link_models *models, const struct link_wish *wish)
+{
+	for (uint32_t i = 0; i < wish->n_instances; i++) {
+		const struct link_open_model *model = link_models_find(models, wish->instance[i].model);
+
+		if (model == NULL || model->pixels != wish->pixels)
+			return 0;
+	}
+	return 1;
+}
+
 /* A place for a model of this name. NULL: no memory. */
 static struct link_open_model *add(struct link_models *models, const char *name)
 {

@@ -322,8 +322,10 @@ static int is_refusal(int code)
 
 static int step(struct serve *serve, struct psr_error *err)
 {
-	const struct link_content content = { &serve->wish.wish, serve->wish.number, serve->place, serve->n_places,
-		                                  serve->box_min, serve->box_max };
+	const struct link_content content = {
+		&serve->wish.wish, serve->wish.number, serve->place, serve->n_places, serve->box_min, serve->box_max,
+		serve->beside.code == PSR_OK && !link_models_are_fine(&serve->models, &serve->wish.wish)
+	};
 	uint64_t again_ns = PACE_NEVER;
 	const uint64_t now_ns = clock_ns();
 	int code = link_view_ask(&serve->view, &content, now_ns, &again_ns, err);

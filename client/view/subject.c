@@ -330,7 +330,7 @@ static void put_lights(FILE *to, const struct subject *subject, const struct psr
 		fprintf(to, " --shadows");
 }
 
-char *subject_command(const struct subject *subject, const struct hand *hand, const char *server)
+char *subject_command(const struct subject *subject, const struct hand *hand, const char *server, const char *file)
 {
 	const struct hand_pose *pose = &hand->pose;
 	char *text = NULL;
@@ -342,6 +342,8 @@ char *subject_command(const struct subject *subject, const struct hand *hand, co
 	fprintf(to, "psr shot");
 	if (server != NULL)
 		put_option(to, "server", server);
+	if (file != NULL)
+		put_word(to, file);
 	for (uint32_t i = 0; i < subject->n_instances; i++)
 		put_option(to, subject->instance[i].is_plain ? "model" : "instance", subject->instance[i].text);
 	fprintf(to, " --size %ux%u", hand->width, hand->height);

@@ -91,8 +91,8 @@ int subject_resolve(struct subject *subject, const struct link_scene *scene, str
 /* Sets all but camera and size. `instance` has room for SUBJECT_INSTANCES and lives until link_wish(). */
 void subject_wish(const struct subject *subject, struct link_wish *wish, struct link_instance *instance);
 
-/* The command line that draws this picture, for a shell; without -o FILE. server NULL: none is named. The caller's
- * (free). NULL: no memory. */
-char *subject_command(const struct subject *subject, const struct hand *hand, const char *server);
+/* The command line that draws this picture, for a shell; without -o FILE. Of server and file one is NULL: a file is
+ * served by a psrd of the command's own. The caller's (free). NULL: no memory. */
+char *subject_command(const struct subject *subject, const struct hand *hand, const char *server, const char *file);
 
 #endif

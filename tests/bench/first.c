@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "base/clock.h"
 #include "client/view/hand.h"
-#include "client/view/home.h"
+#include "client/home/home.h"
 #include "client/view/link.h"
 #include "first_mesh.h"
 #include "report.h"

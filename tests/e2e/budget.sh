@@ -3,7 +3,7 @@
 # are told. No claim depends on how long a frame takes.
 . "$(dirname "$0")/lib.sh"
 
-start_psrd --models tests/golden --threads 2
+start_psrd --models tests/golden --threads 2 --frame-timeout 600
 keep() { # command...: keeps what it prints, as check prints of its own
 	"$@" >"$work/said.out" 2>"$work/said"
 	local status=$?

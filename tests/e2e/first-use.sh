@@ -180,6 +180,23 @@ is "no child is left" "" "$(children)"
 is "nothing temporary is left in the cache" "" "$(find "$cache" -name '*.tmp*')"
 check "the socket is removed" [ ! -e "$work/socket" ]
 
+# --- a file, without a psrd ---
+export XDG_CACHE_HOME=$work/home
+needle 0.3 >"$work/alone.obj"
+check "a file is drawn without a server" psr shot "$work/alone.obj" --size 160x120 --hash -o "$work/alone.png"
+PSR_SERVER=unix:/nowhere psr turntable "$work/alone.obj" --size 80x60 --sheet 2x2 -o "$work/sheet.png" 2>"$work/err"
+is "a turntable of a file asks no server" "0 " "$? $(cat "$work/err")"
+psr shot "$work/alone.obj" --instance alone,rotate=Y:90 --size 160x120 -o "$work/moved.png"
+differ() { ! cmp -s "$1" "$2"; }
+check "an instance of the file is turned" differ "$work/alone.png" "$work/moved.png"
+refuses "a file that is not there" 3 "No such file" psr shot "$work/nowhere.ply" -o "$work/a.png"
+refuses "a file of no format" 4 "psr reads no files of this kind" psr shot tests/e2e/lib.sh -o "$work/a.png"
+refuses "two files" 2 "one file at a time" psr shot "$work/alone.obj" "$work/alone.obj" -o "$work/a.png"
+refuses "a file and --replay" 2 "it excludes" psr shot "$work/alone.obj" --replay "$work/r.json" -o "$work/a.png"
+is_over() { ! pgrep -f "psrd --models $work --listen" >/dev/null; }
+check "no psrd is left" wait_for 10 is_over
+unset XDG_CACHE_HOME
+
 # --- a psrd that was killed ---
 start --listen "unix:$work/socket"
 shot --model wheel --hash >"$work/wheel" 2>&1 &

@@ -53,7 +53,7 @@ client/view/hand
 client/view/path
 client/bench/
 client/test/
-client/view/link client/view/home
+client/view/link
 client/view/
 client/view/window
 client

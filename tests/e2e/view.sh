@@ -38,7 +38,8 @@ within() { # seconds command...: tries it until it succeeds
 }
 within 10 test -s "$work/display"
 DISPLAY=:$(cat "$work/display")
-export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software
+# Mesa, where it is installed, leaks from a library that it unloads.
+export DISPLAY SDL_VIDEODRIVER=x11 SDL_RENDER_DRIVER=software SDL_FRAMEBUFFER_ACCELERATION=0
 
 # --- a hand ---
 view() { # psr-view's options
@@ -164,19 +165,9 @@ if type -P psr-model >/dev/null && [ -x "$BUILD/tests/tools/drop" ]; then
 		'f 5 6 7 8' 'f 1 2 6 5' 'f 2 3 7 6' 'f 3 4 8 7' 'f 4 1 5 8' >"$work/tower.obj"
 	check "a window takes a file" "$BUILD/tests/tools/drop" "$window" "$work/tower.obj"
 	check "and shows it" within 20 sh -c "xdotool getwindowname $window | grep -q '^tower'"
-	shot
-	check "the command names no psrd of its own, but the folder" \
-		grep -q "^psr shot --model tower .* # beside: psrd --models $work\$" <<<"$command"
-	mkdir "$work/others"
-	cp "$work/tower.obj" "$work/others"
-	psrd --listen "unix:$work/others/socket" --models "$work/others" --cache "$work/others/cache" >"$work/others.ready" \
-		2>/dev/null &
-	others_pid=$!
-	within 20 grep -q READY "$work/others.ready"
-	check "beside another psrd it draws" env PSR_SERVER="unix:$work/others/socket" \
-		sh -c "${command% -o *} -o '$work/true.png'" # of a model as fine as that psrd builds
-	kill $others_pid
-	wait $others_pid 2>/dev/null
+	is_true "a file that was dropped"
+	check "the command names the file, and no psrd" \
+		grep -q "^psr shot $work/tower.obj --model tower --size" <<<"$command"
 fi
 xdotool key Escape
 check "Escape ends it" wait $view_pid

@@ -1,5 +1,5 @@
 #include <string.h>
-#include "client/view/home.h"
+#include "client/home/home.h"
 #include "client/view/wishes.h"
 #include "viewer.h"
 

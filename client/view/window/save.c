@@ -21,8 +21,9 @@ static int free_name(char name[32], const char *ending)
 void save_shot(struct viewer *viewer)
 {
 	/* A psrd of the window's own is there for nobody else. */
-	const char *server = viewer->home == NULL ? viewer->address : NULL;
-	char *command = subject_command(&viewer->subject, &viewer->hand, server);
+	char *command = viewer->home != NULL
+	                        ? subject_command(&viewer->subject, &viewer->hand, NULL, home_file(viewer->home))
+	                        : subject_command(&viewer->subject, &viewer->hand, viewer->address, NULL);
 	struct psr_error err;
 	char name[32];
 
@@ -35,8 +36,7 @@ void save_shot(struct viewer *viewer)
 		viewer_note(viewer, "%s", err.text);
 	else {
 		viewer_note(viewer, "%s is written; the command that draws it stands on the terminal", name);
-		printf("%s -o %s%s%s\n", command, name, viewer->home != NULL ? " # beside: psrd --models " : "",
-		       viewer->home != NULL ? home_folder(viewer->home) : "");
+		printf("%s -o %s\n", command, name);
 		fflush(stdout);
 	}
 	free(command);

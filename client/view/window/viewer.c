@@ -27,8 +27,8 @@ int viewer_is_sharp(const struct viewer *viewer)
 	const struct link_picture *picture = view_show_picture(viewer->show);
 
 	return picture != NULL && picture->wish == viewer->wish && picture->is_final && viewer->shown.is_exact
+	       && (!picture->is_coarse || viewer->state.error.code != PSR_OK)
 	       && !viewer->is_playing && !hand_is_moving(&viewer->hand) && viewer->state.phase == LINK_LIVE
-	       && !viewer->state.is_refining
 	       && viewer->model_pixels == news_greater_side(viewer);
 }
 

@@ -8,7 +8,7 @@
 #include <SDL.h>
 #include "client/scene/view.h"
 #include "client/view/hand.h"
-#include "client/view/home.h"
+#include "client/home/home.h"
 #include "client/view/link.h"
 #include "client/view/path.h"
 #include "client/view/show.h"

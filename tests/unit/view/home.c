@@ -5,7 +5,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <cmocka.h>
-#include "client/view/home.h"
+#include "client/home/home.h"
 #include "daemon.h"
 
 static char own[PATH_MAX]; /* for the cache */

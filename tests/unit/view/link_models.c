@@ -116,7 +116,7 @@ static void a_coarse_model_is_shown_until_the_fine_one_is_built(void **state)
 		                   "--max-resolution", "1024", NULL };
 	struct link_picture *picture;
 	struct link_state at;
-	int was, green;
+	int was, green, is_coarse = 1;
 
 	(void)state;
 	builder_make(bin, script);
@@ -137,6 +137,7 @@ static void a_coarse_model_is_shown_until_the_fine_one_is_built(void **state)
 	picture = wait_sharp();
 	was = middle_green(picture);
 	assert_true(was > 0x24 + 8);
+	assert_true(picture->is_coarse);
 	link_release(picture);
 	for (int i = 0; i < 500; i++) {
 		link_state(link_, &at);
@@ -150,17 +151,21 @@ static void a_coarse_model_is_shown_until_the_fine_one_is_built(void **state)
 	say_wish(&wish);
 	picture = wait_sharp();
 	assert_int_equal(middle_green(picture), was);
+	assert_true(picture->is_coarse);
 	link_release(picture);
 	green = was;
 	file_write(bin, "go", "", 0);
 	for (int64_t end = clock_ms() + PATIENCE_MS; green == was && clock_ms() < end;) {
 		wait_news(20);
 		picture = link_take(link_);
-		if (picture != NULL)
+		if (picture != NULL) {
 			green = middle_green(picture);
+			is_coarse = picture->is_coarse;
+			assert_true(is_coarse == (green == was));
+		}
 		link_release(picture);
 	}
-	assert_true(green > was + 8);
+	assert_true(green > was + 8 && !is_coarse);
 	link_close(link_);
 	daemon_stop(&psrd);
 	psrd = other;

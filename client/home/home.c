@@ -6,7 +6,8 @@
 #include <strings.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "client/home/daemon.h"
+#include "client/cli/cli.h"
+#include "daemon.h"
 #include "home.h"
 #include "psr/client.h"
 
@@ -17,7 +18,7 @@
 
 struct home {
 	struct daemon *daemon;
-	char file_folder[PATH_MAX];
+	char file[PATH_MAX];
 	char model[PSR_WIRE_MAX_NAME + 1];
 };
 
@@ -33,20 +34,28 @@ static int is_alone(const char *name)
 	return 0;
 }
 
-/* The folder that psrd is to serve: of the file alone, or the file's own. file: its whole path. */
-static int choose_models(char models[PATH_MAX], struct home *home, const char *file, struct psr_error *err)
+/* The name that psrd gives the file. file: its whole path. */
+static int name_model(char model[PSR_WIRE_MAX_NAME + 1], const char *file, struct psr_error *err)
 {
 	const char *name = strrchr(file, '/') + 1;
 	const char *dot = strrchr(name, '.');
 	const size_t n_stem = dot != NULL && dot != name ? (size_t)(dot - name) : strlen(name);
-	char at[PATH_MAX];
 
-	snprintf(home->file_folder, sizeof home->file_folder, "%.*s", name - 1 == file ? 1 : (int)(name - 1 - file), file);
 	if (n_stem > PSR_WIRE_MAX_NAME)
 		return psr_fail(err, PSR_ERR_ARG, "%s: its name has more than %d bytes", file, PSR_WIRE_MAX_NAME);
-	memcpy(home->model, name, n_stem);
+	memcpy(model, name, n_stem);
+	model[n_stem] = '\0';
+	return PSR_OK;
+}
+
+/* The folder that psrd is to serve: of the file alone, or the file's own. */
+static int choose_models(char models[PATH_MAX], struct home *home, struct psr_error *err)
+{
+	const char *file = home->file, *name = strrchr(file, '/') + 1;
+	char at[PATH_MAX];
+
 	if (!is_alone(name)) {
-		snprintf(models, PATH_MAX, "%s", home->file_folder);
+		snprintf(models, PATH_MAX, "%.*s", name - 1 == file ? 1 : (int)(name - 1 - file), file);
 		snprintf(at, sizeof at, "%.3000s/%s.psr", models, home->model);
 		if (access(at, F_OK) == 0) /* psrd would serve it, and not tell of the other one */
 			return psr_fail(err, PSR_ERR_ARG, "%s has the same name; view it, or move one of the two", at);
@@ -62,13 +71,13 @@ static int choose_models(char models[PATH_MAX], struct home *home, const char *f
 }
 
 /* Whether psrd's list has the file, and not another one of its name. */
-static int check_list(struct home *home, const char *file, struct psr_error *err)
+static int check_list(struct home *home, struct psr_error *err)
 {
-	const char *name = strrchr(file, '/') + 1;
+	const char *file = home->file, *name = strrchr(file, '/') + 1;
 	struct psr_msg_list_entry *entry = NULL;
 	struct psr_client *client;
 	uint32_t n = 0;
-	int code = psr_client_connect(&client, daemon_address(home->daemon), "psr-view " PSR_VERSION, NULL, ANSWER_MS, err), has_it = 0;
+	int code = psr_client_connect(&client, daemon_address(home->daemon), PSR_PROGRAM, NULL, ANSWER_MS, err), has_it = 0;
 
 	if (code != PSR_OK)
 		return code;
@@ -90,21 +99,7 @@ static int check_list(struct home *home, const char *file, struct psr_error *err
 	return code;
 }
 
-static int begin(struct home *home, const char *file, struct psr_error *err)
-{
-	const char *const options[] = { "--resolution", TEXT(HOME_COARSE_PIXELS), "--max-resolution", MOST_RESOLUTION,
-		                            NULL };
-	char models[PATH_MAX];
-	int code = daemon_create(&home->daemon, err);
-
-	if (code == PSR_OK)
-		code = choose_models(models, home, file, err);
-	if (code == PSR_OK)
-		code = daemon_start(home->daemon, models, options, err);
-	return code == PSR_OK ? check_list(home, file, err) : code;
-}
-
-int home_open(struct home **out, const char *path, struct psr_error *err)
+int home_create(struct home **out, const char *path, struct psr_error *err)
 {
 	char *file = realpath(path, NULL);
 	struct home *home = calloc(1, sizeof *home);
@@ -113,13 +108,43 @@ int home_open(struct home **out, const char *path, struct psr_error *err)
 
 	if (home == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "no memory for a private psrd");
-	if (code == PSR_OK && (file == NULL || stat(file, &status) != 0))
+	else if (file == NULL || stat(file, &status) != 0)
 		code = psr_fail(err, errno == ENOENT ? PSR_ERR_NOT_FOUND : PSR_ERR_IO, "%s: %s", path, strerror(errno));
-	else if (code == PSR_OK && !S_ISREG(status.st_mode))
+	else if (!S_ISREG(status.st_mode))
 		code = psr_fail(err, PSR_ERR_ARG, "%s is no file; psrd --models serves a folder", path);
-	if (code == PSR_OK)
-		code = begin(home, file, err);
+	else
+		code = name_model(home->model, file, err);
+	if (code == PSR_OK) {
+		snprintf(home->file, sizeof home->file, "%s", file);
+		*out = home;
+	} else {
+		free(home);
+	}
 	free(file);
+	return code;
+}
+
+int home_start(struct home *home, struct psr_error *err)
+{
+	const char *const options[] = { "--resolution", TEXT(HOME_COARSE_PIXELS), "--max-resolution", MOST_RESOLUTION,
+		                            NULL };
+	char models[PATH_MAX];
+	int code = daemon_create(&home->daemon, err);
+
+	if (code == PSR_OK)
+		code = choose_models(models, home, err);
+	if (code == PSR_OK)
+		code = daemon_start(home->daemon, models, options, err);
+	return code == PSR_OK ? check_list(home, err) : code;
+}
+
+int home_open(struct home **out, const char *path, struct psr_error *err)
+{
+	struct home *home = NULL;
+	int code = home_create(&home, path, err);
+
+	if (code == PSR_OK)
+		code = home_start(home, err);
 	if (code == PSR_OK)
 		*out = home;
 	else
@@ -151,7 +176,7 @@ const char *home_model(const struct home *home)
 	return home->model;
 }
 
-const char *home_folder(const struct home *home)
+const char *home_file(const struct home *home)
 {
-	return home->file_folder;
+	return home->file;
 }
