@@ -18,6 +18,10 @@ struct psr_projection {
 
 #define PSR_MAX_LEVELS 8
 
+/* How far a sample may be from the surface that it shows, before its depth is rounded, in spacings of its level
+ * (psr_model_info): the modeller moves some to lattice points. */
+#define PSR_SAMPLE_OFF 0.55
+
 /* A byte a block. */
 enum psr_block_flag {
 	PSR_BLOCK_LEVEL = 7,       /* these bits are the level, 0 the finest */

@@ -3,6 +3,7 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
+#include "splat.h"
 
 /* Two passes over chunks of blocks: the first tests each block and counts entries by tile; the second writes the bins
  * at places that follow from the counts, in the same order for any number of threads. */
@@ -17,7 +18,7 @@ struct cull_chunk {
 	uint32_t levels, n_tested, n_clamped, n_masked, n_mixed;
 	uint8_t flags, traits; /* of all hits, OR-ed */
 	uint64_t n_samples;
-	float depth_error; /* greatest half step of depth, in pixels */
+	float place_error; /* greatest of its blocks, in pixels */
 };
 
 struct cull {
@@ -80,6 +81,20 @@ struct counting {
 	struct cull_hit *hit;
 };
 
+/* How far what a block draws may be from the surface, in pixels: a sample from the surface, and what it draws from the
+ * sample. This is half a pixel along both axes; the square of a veil two pixels apart or more; the disc of a splat. */
+static float place_error(const struct plan *plan, unsigned traits, float apart, float depth_error)
+{
+	const float half = 0.70710678f;
+	float drawn = half;
+
+	if (plan->with_splats)
+		drawn = SPLAT_RADIUS * apart > half ? SPLAT_RADIUS * apart : half;
+	else if (traits & PSR_BLOCK_THIN && apart >= 2)
+		drawn = half * (apart + 1);
+	return drawn + (float)PSR_SAMPLE_OFF * apart + depth_error;
+}
+
 /* Takes the results of a batch, blocks first .. first + n - 1. */
 static void take_batch(struct counting *to, const struct cull_batch *batch, uint32_t first, uint32_t n)
 {
@@ -119,8 +134,8 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
 		chunk->n_samples += count_bits(b->mask[block]);
-		if (batch->depth_error[i] > chunk->depth_error)
-			chunk->depth_error = batch->depth_error[i];
+		const float error = place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
+		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
 	}
 	to->hit = hit;
@@ -309,7 +324,7 @@ static int make_room(struct bins *bins, const struct cull *cull)
 /* Adds up the chunks in the report, and notes in the plan what shading needs. */
 static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report *report)
 {
-	float depth_error = 0;
+	float place_error = 0;
 	uint64_t n_masked = 0, n_mixed = 0;
 
 	report->n_blocks = plan->n_slots;
@@ -331,12 +346,12 @@ static void sum_up(const struct cull *cull, struct plan *plan, struct psr_report
 		report->n_clamped += chunk->n_clamped;
 		n_masked += chunk->n_masked;
 		n_mixed += chunk->n_mixed;
-		if (chunk->depth_error > depth_error)
-			depth_error = chunk->depth_error;
+		if (chunk->place_error > place_error)
+			place_error = chunk->place_error;
 	}
-	/* Where the eye is within a step of depth of a block, a sample may be anywhere in the picture. */
+	/* Near the eye a sample may be anywhere in the picture. */
 	const float extent = (float)plan->window.picture_width + (float)plan->window.picture_height;
-	report->error_px = 0.5 + (double)(depth_error < extent ? depth_error : extent);
+	report->error_px = (double)(place_error < extent ? place_error : extent);
 	if (plan->with_splats)
 		report->levels |= report->levels & 1 ? 2 : 0;
 	else if (plan->is_full)

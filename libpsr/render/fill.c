@@ -394,6 +394,6 @@ int fill_push(struct fill *fill, struct psr_pool *pool, struct psr_report *repor
 	report->count[PSR_STAGE_FILL] += fill->n_changed;
 	report->n_filled += fill->n_filled;
 	if (fill->n_moved)
-		report->error_px += (double)(2 << fill->deepest);
+		report->error_px += M_SQRT2 * (double)(2 << fill->deepest); /* along both axes */
 	return rc;
 }

@@ -8,8 +8,6 @@
 #include "splat.h"
 #include "simd/block.h"
 
-/* Steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
-#define RADIUS 0.6f
 /* The greatest slope of a tangent plane in its projection, where a sample lacks neighbours. Projections own surfaces
  * that they see at less than 50 degrees; steeper normals mostly belong to a texture or to detail smaller than the disc.
  * Measured. */
@@ -221,9 +219,9 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 	/* Radii in the projection's plane, along x and y, and along z for a slope of 1. */
 	float radius[2][3], along[3];
 	for (int a = 0; a < 3; a++) {
-		radius[0][a] = RADIUS * scale * (float)b.lattice->step[a];
-		radius[1][a] = RADIUS * scale * (float)b.lattice->down[a] / 0.866025404f;
-		along[a] = RADIUS * step * (float)b.lattice->along[a];
+		radius[0][a] = SPLAT_RADIUS * scale * (float)b.lattice->step[a];
+		radius[1][a] = SPLAT_RADIUS * scale * (float)b.lattice->down[a] / 0.866025404f;
+		along[a] = SPLAT_RADIUS * step * (float)b.lattice->along[a];
 	}
 	place_depths(&at, &b, b.rise / (projection->spacing * (float)b.scale));
 	s = (struct splat){ .rim = RIM_DEPTH * step * t->plan->instance[entry->instance].cull.scale,

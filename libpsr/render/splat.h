@@ -5,6 +5,9 @@
 #include "gaps.h"
 #include "warp.h"
 
+/* Of a disc, in steps of the lattice: no point of an equilateral lattice is further than 1/sqrt(3) from a sample. */
+#define SPLAT_RADIUS 0.6f
+
 /* Draws a tile like warp_tile, with a disc around each sample. A disc lies on the surface and meets those of its
  * neighbours. Cells are those of the samples, for splat_close; blocks of level 0 get cells of two pixels. */
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,

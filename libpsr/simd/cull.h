@@ -60,6 +60,7 @@ struct cull_batch {
 	int32_t tile_x0[CULL_BATCH], tile_x1[CULL_BATCH], tile_y0[CULL_BATCH], tile_y1[CULL_BATCH];
 	int32_t range[CULL_BATCH];     /* of regions: screen_range of x, times SCREEN_RANGES, plus that of y */
 	float near[CULL_BATCH];        /* a lower bound of its samples' z' */
+	float apart[CULL_BATCH];       /* how far neighbouring samples are from each other, in pixels, at most */
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels */
 };
 

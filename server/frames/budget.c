@@ -168,7 +168,7 @@ void budget_learn(struct budget_learnt *learnt, const struct budget_view *view,
  * pixel, and a cell of the first level that is as wide as the spacing. */
 static double error_of(const struct budget_learnt *learnt, int rung)
 {
-	const double density = density_of(&ladder[rung]);
+	const double density = density_of(&ladder[rung]), spacing = ladder[rung].spacing_px;
 
 	for (int apart = 0; apart < BUDGET_RUNGS; apart++)
 		for (int sign = -1; sign <= 1; sign += 2) {
@@ -177,7 +177,7 @@ static double error_of(const struct budget_learnt *learnt, int rung)
 			if (i >= 0 && i < BUDGET_RUNGS && learnt->error[i] > 0)
 				return learnt->error[i] * density_of(&ladder[i]) / density;
 		}
-	return (0.5 + 2 * fmax(ladder[rung].spacing_px, 1)) / density;
+	return (M_SQRT1_2 + 0.55 * spacing + 2 * M_SQRT2 * fmax(spacing, 1)) / density;
 }
 
 static void set_price(struct budget_price *price, const struct budget_learnt *learnt, const struct budget_view *view,

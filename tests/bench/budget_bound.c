@@ -24,11 +24,10 @@ static double flatten(struct psr_camera *camera, uint32_t height)
 	return camera->ortho_height / height;
 }
 
-/* The bound is along the picture's axes; distances are those of points. */
 static void measure(struct budget_bounds *bounds, const struct psr_event *event, const struct psr_truth_shot *shot,
                     double pixel)
 {
-	const double bound = M_SQRT2 * event->end->error_px;
+	const double bound = event->end->error_px;
 	struct psr_accuracy accuracy;
 	struct psr_error err;
 

@@ -39,9 +39,10 @@ static void settle(struct cull_batch *out, uint32_t n)
 		out->is_mixed[i] = out->level[i] = 0;
 		out->x0[i] = out->x1[i] = out->y0[i] = out->y1[i] = out->range[i] = 0;
 		out->tile_x0[i] = out->tile_x1[i] = out->tile_y0[i] = out->tile_y1[i] = 0;
-		out->near[i] = out->depth_error[i] = 0;
+		out->near[i] = out->apart[i] = out->depth_error[i] = 0;
 	}
 	check_settle(out->near, CULL_BATCH);
+	check_settle(out->apart, CULL_BATCH);
 	check_settle(out->depth_error, CULL_BATCH);
 }
 

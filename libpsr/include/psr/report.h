@@ -71,7 +71,8 @@ struct psr_report {
 		uint64_t count;
 		enum psr_why why;
 	} effect[PSR_N_EFFECTS];
-	double error_px;           /* pixels: half a pixel + depth step + largest cell that gave a pixel its depth */
+	double error_px;           /* how far a drawn pixel's centre, at its depth, may be from the surface, in pixels. A bound,
+	                            * for models whose samples keep PSR_SAMPLE_OFF; proto/PROTOCOL.md has its parts */
 };
 
 #ifdef __cplusplus

@@ -17,7 +17,7 @@
  * half a pixel. */
 #define HIT 1.5f
 #define MOVE 3
-#define MOST_MOVE 0.55
+#define MOST_MOVE PSR_SAMPLE_OFF
 
 /* A new block costs so much. A moved sample costs more in a projection that faces the place worse than three others:
  * many of these would show in colors and distances. At coarser levels moving comes before new blocks. */

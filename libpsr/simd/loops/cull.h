@@ -77,6 +77,7 @@ static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_v
 		out->is_left[i] = (z1 > v.near_z) & (x1 >= 0) & (y1 >= 0) & (x0 < v.width) & (y0 < v.height);
 		out->is_mixed[i] = !(flags & PSR_BLOCK_TWO_SIDED) & !v.both_sides;
 		out->level[i] = level;
+		out->apart[i] = stretch * spacing;
 		const int32_t px0 = pixel_within(x0, most_x), px1 = pixel_within(x1, most_x);
 		const int32_t py0 = pixel_within(y0, most_y), py1 = pixel_within(y1, most_y);
 		out->x0[i] = px0;

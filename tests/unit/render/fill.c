@@ -261,7 +261,7 @@ static void compare(uint32_t width, uint32_t height, uint32_t holes, uint32_t pa
 	free(weights);
 	assert_int_equal(report.count[PSR_STAGE_FILL], n_changed);
 	assert_int_equal(report.n_filled, n_filled);
-	assert_true(report.error_px == (n_moved ? (double)(2 << d.deepest) : 0));
+	assert_true(report.error_px == (n_moved ? M_SQRT2 * (double)(2 << d.deepest) : 0));
 	for (int l = 0; l <= d.top; l++)
 		free(d.cell[l]);
 	picture_free(&p);
