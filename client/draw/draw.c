@@ -79,6 +79,9 @@ static int check_file(struct job *job, struct psr_error *err)
 	if (job->wish->file == NULL)
 		return PSR_OK;
 	code = home_create(&job->home, job->wish->file, err);
+	if (code == PSR_ERR_NOT_FOUND)
+		return psr_fail(err, code, "%s: no such file; --model %s names a model of a server", job->wish->file,
+		                job->wish->file);
 	if (code == PSR_OK && scene->n_instances == 0 && scene->file == NULL)
 		code = scene_add_model(scene, home_model(job->home), err);
 	return code;

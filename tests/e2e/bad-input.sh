@@ -115,7 +115,7 @@ echo 'const unsigned psr_image_module[64] = { 99 };' >"$work/other.c"
 refuses "an image module of another version" 4 "$work/other.so is image module version 99, and this program needs version" \
 	env PSR_IMAGE_MODULE="$work/other.so" psr shot --server "$server" --model dice -o "$work/a.exr"
 refuses "nothing that was asked for" 2 "nothing was asked for" shot
-refuses "an operand" 2 "unexpected argument 'operand'" shot --hash operand
+refuses "a file that is not there" 3 "operand: no such file; --model operand names a model" shot --hash operand
 refuses "an unknown option" 2 "unknown option --colour" shot --hash --colour 3
 refuses "an option without its value" 2 "--size" shot --hash --size
 refuses "an unknown command" 2 "'draw' is no command" psr draw

@@ -189,7 +189,7 @@ is "a turntable of a file asks no server" "0 " "$? $(cat "$work/err")"
 psr shot "$work/alone.obj" --instance alone,rotate=Y:90 --size 160x120 -o "$work/moved.png"
 differ() { ! cmp -s "$1" "$2"; }
 check "an instance of the file is turned" differ "$work/alone.png" "$work/moved.png"
-refuses "a file that is not there" 3 "No such file" psr shot "$work/nowhere.ply" -o "$work/a.png"
+refuses "a file that is not there" 3 "no such file" psr shot "$work/nowhere.ply" -o "$work/a.png"
 refuses "a file of no format" 4 "psr reads no files of this kind" psr shot tests/e2e/lib.sh -o "$work/a.png"
 refuses "two files" 2 "one file at a time" psr shot "$work/alone.obj" "$work/alone.obj" -o "$work/a.png"
 refuses "a file and --replay" 2 "it excludes" psr shot "$work/alone.obj" --replay "$work/r.json" -o "$work/a.png"
