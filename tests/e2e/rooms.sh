@@ -17,6 +17,7 @@ libpsr/import/import.h
 libpsr/import/image
 libpsr/import/cloud
 libpsr/import/ply
+libpsr/import/points
 libpsr/import/gltf
 libpsr/import/assimp
 libpsr/import

@@ -1,183 +1,29 @@
 #include <assert.h>
-#include <liblzf/lzf.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "pcd.h"
-
-#define SIZES 8        /* bytes of compressed points before them: sizes */
-#define MOST_GROWTH 88 /* three bytes of LZF become at most 264 */
-
-enum role { X, Y, Z, NORMAL_X, NORMAL_Y, NORMAL_Z, RGB, INTENSITY, ROLES };
+#include "pcd_point.h"
 
 struct points {
 	const struct pcd *pcd;
-	const struct pcd_field *field[ROLES]; /* NULL: none */
+	struct pcd_roles roles;
 	const uint8_t *at, *end; /* binary: of all points; text: of the values left */
 	uint8_t *owned;          /* unpacked points, or NULL */
 	locale_t locale;
 };
 
-/* A point's values; `rgb` has red in bits 16 to 23. */
-struct point {
-	double value[ROLES];
-	uint32_t rgb;
-};
-
-static uint64_t get(const uint8_t *p, unsigned n)
-{
-	uint64_t x = 0;
-
-	for (unsigned i = 0; i < n; i++)
-		x |= (uint64_t)p[i] << 8 * i;
-	return x;
-}
-
-static uint32_t bits_of(float x)
-{
-	uint32_t bits;
-
-	memcpy(&bits, &x, sizeof bits);
-	return bits;
-}
-
-static double number_of(uint64_t bits, const struct pcd_field *f)
-{
-	const uint32_t low = (uint32_t)bits;
-	float single;
-	double x;
-
-	if (f->type == 'U')
-		return (double)bits;
-	if (f->type == 'I')
-		return (double)((int64_t)(bits << (64 - 8 * f->size)) >> (64 - 8 * f->size));
-	memcpy(&single, &low, sizeof single);
-	memcpy(&x, &bits, sizeof x);
-	return f->size == 4 ? (double)single : x;
-}
-
-/* The bits that stand for a colour in text: of a float, or of an integer of either sign. */
-static uint32_t bits_of_text(double x, const struct pcd_field *f)
-{
-	if (f->type == 'F')
-		return bits_of((float)x);
-	return x > -0x1p31 && x < 0x1p32 ? (uint32_t)(int64_t)x : 0;
-}
-
-static const struct pcd_field *find_single(const struct pcd *pcd, const char *name)
-{
-	const struct pcd_field *f = pcd_find(pcd, name);
-
-	return f != NULL && f->count == 1 ? f : NULL;
-}
-
-static int find_fields(struct points *points, struct psr_error *err)
-{
-	static const char *const names[ROLES] = { "x", "y", "z", "normal_x", "normal_y", "normal_z", "rgb", "intensity" };
-	const struct pcd_field **f = points->field;
-
-	for (int i = 0; i < ROLES; i++)
-		f[i] = find_single(points->pcd, names[i]);
-	for (int i = X; i <= Z; i++)
-		if (f[i] == NULL)
-			return psr_fail(err, PSR_ERR_FORMAT, "%s: no field %s of one value a point", points->pcd->path, names[i]);
-	if (f[NORMAL_X] == NULL || f[NORMAL_Y] == NULL || f[NORMAL_Z] == NULL)
-		f[NORMAL_X] = f[NORMAL_Y] = f[NORMAL_Z] = NULL;
-	if (f[RGB] == NULL)
-		f[RGB] = find_single(points->pcd, "rgba");
-	if (f[RGB] != NULL && f[RGB]->size != 4)
-		f[RGB] = NULL;
-	if (f[RGB] != NULL)
-		f[INTENSITY] = NULL;
-	return PSR_OK;
-}
-
-/* Unpacks LZF: the values of a field for all points, then those of the next field. */
-static int unpack(struct points *points, struct psr_error *err)
-{
-	const struct pcd *pcd = points->pcd;
-	const uint64_t left = pcd->n_bytes - pcd->body, size = pcd->n_points * pcd->record;
-	const uint8_t *from = pcd->bytes + pcd->body;
-
-	if (left < SIZES || get(from, 4) > left - SIZES)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the compressed points are cut short", pcd->path);
-	const uint64_t packed = get(from, 4);
-	if (get(from + 4, 4) != size || size > MOST_GROWTH * packed)
-		return psr_fail(err, PSR_ERR_FORMAT,
-		                "%s: %llu points take %llu bytes, but %llu compressed bytes promise %llu", pcd->path,
-		                (unsigned long long)pcd->n_points, (unsigned long long)size, (unsigned long long)packed,
-		                (unsigned long long)get(from + 4, 4));
-	points->owned = malloc(size);
-	if (points->owned == NULL)
-		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for %llu points", pcd->path,
-		                (unsigned long long)pcd->n_points);
-	if (lzf_decompress(from + SIZES, (unsigned)packed, points->owned, (unsigned)size) != size)
-		return psr_fail(err, PSR_ERR_FORMAT, "%s: the compressed points are damaged", pcd->path);
-	points->at = points->owned;
-	points->end = points->owned + size;
-	return PSR_OK;
-}
-
-static void get_point(struct point *to, const struct points *points, uint64_t i)
-{
-	const struct pcd *pcd = points->pcd;
-
-	for (int r = 0; r < ROLES; r++) {
-		const struct pcd_field *f = points->field[r];
-
-		if (f == NULL)
-			continue;
-		const uint8_t *at = points->at + (pcd->data == PCD_COMPRESSED ? f->offset * pcd->n_points + i * f->size
-		                                                              : i * pcd->record + f->offset);
-		const uint64_t bits = get(at, f->size);
-		to->value[r] = number_of(bits, f);
-		if (r == RGB)
-			to->rgb = (uint32_t)bits;
-	}
-}
-
-static int is_space(uint8_t c)
-{
-	return c == ' ' || (c >= '\t' && c <= '\r');
-}
-
-/* Reads the next point's words. Returns 0 if one is missing, or is not a number where one is needed. */
-static int parse_point(struct point *to, struct points *points)
-{
-	for (uint64_t column = 0; column < points->pcd->columns; column++) {
-		while (points->at < points->end && is_space(*points->at))
-			points->at++;
-		const uint8_t *word = points->at;
-
-		while (points->at < points->end && !is_space(*points->at))
-			points->at++;
-		if (points->at == word)
-			return 0;
-		for (int r = 0; r < ROLES; r++) {
-			const struct pcd_field *f = points->field[r];
-
-			if (f == NULL || f->column != column)
-				continue;
-			if (!import_number(&to->value[r], word, (size_t)(points->at - word), points->locale))
-				return 0;
-			if (r == RGB)
-				to->rgb = bits_of_text(to->value[r], f);
-		}
-	}
-	return 1;
-}
-
 /* Leaves intensities as they are. */
-static void put_point(struct psr_mesh *mesh, uint32_t at, const struct point *point, const struct points *points)
+static void put_point(struct psr_mesh *mesh, uint32_t at, const struct pcd_point *point,
+                      const struct pcd_roles *roles)
 {
 	for (int c = 0; c < 3; c++)
 		mesh->point[at][c] = point->value[c];
-	for (int c = 0; points->field[NORMAL_X] != NULL && c < 3; c++)
-		mesh->point_normal[at][c] = (float)point->value[NORMAL_X + c];
-	for (int c = 0; points->field[RGB] != NULL && c < 3; c++)
+	for (int c = 0; roles->field[PCD_NORMAL_X] != NULL && c < 3; c++)
+		mesh->point_normal[at][c] = (float)point->value[PCD_NORMAL_X + c];
+	for (int c = 0; roles->field[PCD_RGB] != NULL && c < 3; c++)
 		mesh->point_color[at][c] = cloud_linear((double)(point->rgb >> (16 - 8 * c) & 255));
-	if (points->field[INTENSITY] != NULL)
-		mesh->point_color[at][0] = (float)point->value[INTENSITY];
+	if (roles->field[PCD_INTENSITY] != NULL)
+		mesh->point_color[at][0] = (float)point->value[PCD_INTENSITY];
 }
 
 /* Turns intensities into grey. */
@@ -214,7 +60,7 @@ static int make_gray(struct psr_mesh *mesh, uint32_t first, const char *path, st
 static int add_points(struct import_mesh *im, struct points *points, struct psr_error *err)
 {
 	const struct pcd *pcd = points->pcd;
-	const int has_color = points->field[RGB] != NULL || points->field[INTENSITY] != NULL;
+	const int has_color = points->roles.field[PCD_RGB] != NULL || points->roles.field[PCD_INTENSITY] != NULL;
 	struct psr_mesh *mesh = im->mesh;
 	const uint32_t first = mesh->n_points;
 	struct psr_material material;
@@ -232,24 +78,40 @@ static int add_points(struct import_mesh *im, struct points *points, struct psr_
 	if (rc != PSR_OK)
 		return rc;
 	for (uint64_t i = 0; i < pcd->n_points; i++) {
-		struct point point = { .rgb = 0 };
+		struct pcd_point point;
 
 		if (pcd->data != PCD_ASCII)
-			get_point(&point, points, i);
-		else if (!parse_point(&point, points))
+			pcd_point_get(&point, &points->roles, pcd, points->at, i);
+		else if (!pcd_point_parse(&point, &points->roles, pcd, &points->at, points->end, points->locale))
 			return psr_fail(err, PSR_ERR_FORMAT,
 			                "%s: point %llu of %llu, below line %u: expected %llu numbers; is the file cut short?",
 			                pcd->path, (unsigned long long)i + 1, (unsigned long long)pcd->n_points, pcd->data_line,
 			                (unsigned long long)pcd->columns);
-		put_point(mesh, first + (uint32_t)i, &point, points);
+		put_point(mesh, first + (uint32_t)i, &point, &points->roles);
 	}
-	return points->field[INTENSITY] != NULL ? make_gray(mesh, first, pcd->path, err) : PSR_OK;
+	return points->roles.field[PCD_INTENSITY] != NULL ? make_gray(mesh, first, pcd->path, err) : PSR_OK;
+}
+
+static int unpack(struct points *points, struct psr_error *err)
+{
+	const struct pcd *pcd = points->pcd;
+	const uint64_t left = pcd->n_bytes - pcd->body;
+	uint64_t packed;
+	int rc;
+
+	if (left < PCD_SIZES)
+		return psr_fail(err, PSR_ERR_FORMAT, "%s: the compressed points are cut short", pcd->path);
+	rc = pcd_check_sizes(&packed, pcd, pcd->bytes + pcd->body, err);
+	if (rc == PSR_OK)
+		rc = pcd_unpack(&points->owned, pcd, pcd->bytes + pcd->body + PCD_SIZES, packed, err);
+	points->at = points->owned;
+	return rc;
 }
 
 static int read_points(struct import_mesh *im, const struct pcd *pcd, struct psr_error *err)
 {
 	struct points points = { .pcd = pcd, .at = pcd->bytes + pcd->body, .end = pcd->bytes + pcd->n_bytes };
-	int rc = find_fields(&points, err);
+	int rc = pcd_roles_find(&points.roles, pcd, err);
 
 	if (rc == PSR_OK && pcd->data == PCD_COMPRESSED)
 		rc = unpack(&points, err);
@@ -275,7 +137,8 @@ int import_pcd(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a header", im->path);
 	pcd->path = im->path;
 	pcd->bytes = bytes;
-	pcd->n_bytes = n_bytes;
+	pcd->n_bytes = pcd->n_there = n_bytes;
+	pcd->most = IMPORT_MAX_POINTS;
 	rc = pcd_header_read(pcd, err);
 	if (rc == PSR_OK)
 		rc = read_points(im, pcd, err);

@@ -20,8 +20,9 @@ struct pcd_field {
 
 struct pcd {
 	const char *path;
-	const uint8_t *bytes;
-	uint64_t n_bytes, body, n_points; /* body: where the points begin */
+	const uint8_t *bytes;             /* n_there of the file's n_bytes: the header at least */
+	uint64_t n_there, n_bytes, most;  /* most: a limit of points */
+	uint64_t body, n_points;          /* body: where the points begin */
 	uint64_t columns, record;         /* values and bytes of a point */
 	unsigned n_fields, data_line;     /* data_line: of the header, which is its last one */
 	enum pcd_data data;
@@ -29,7 +30,7 @@ struct pcd {
 	struct pcd_field field[PCD_MAX_FIELDS];
 };
 
-/* Reads the header; path, bytes and n_bytes are set. Ensures that there is a point, and room for all points in the file
+/* Reads the header; path, bytes, n_there, n_bytes and most are set. Ensures that there is a point, and room for all points in the file
  * unless they are compressed. FORMAT with the line, LIMIT, MEMORY. */
 int pcd_header_read(struct pcd *pcd, struct psr_error *err);
 

@@ -41,7 +41,7 @@ static int is_word(const struct line *line, unsigned i, const char *text)
 static int next_line(struct reading *r)
 {
 	const uint8_t *b = r->pcd->bytes;
-	const uint64_t n_bytes = r->pcd->n_bytes;
+	const uint64_t n_bytes = r->pcd->n_there;
 	struct line *line = &r->line;
 
 	line->n = 0;
@@ -223,17 +223,17 @@ static int check_points(struct reading *r)
 			return psr_fail(r->err, PSR_ERR_FORMAT, "%s: the PCD header promises %llu points, but a width of %llu and a "
 			                "height of %llu", pcd->path, (unsigned long long)r->points, (unsigned long long)r->width,
 			                (unsigned long long)height);
-		if (height != 0 && r->width > IMPORT_MAX_POINTS / height)
+		if (height != 0 && r->width > pcd->most / height)
 			return psr_fail(r->err, PSR_ERR_LIMIT, "%s: more than %llu points", pcd->path,
-			                (unsigned long long)IMPORT_MAX_POINTS);
+			                (unsigned long long)pcd->most);
 		r->points = r->width * height;
 	}
 	pcd->n_points = r->points;
 	if (pcd->n_points == 0)
 		return psr_fail(r->err, PSR_ERR_FORMAT, "%s: the PCD header promises no points", pcd->path);
-	if (pcd->n_points > IMPORT_MAX_POINTS)
+	if (pcd->n_points > pcd->most)
 		return psr_fail(r->err, PSR_ERR_LIMIT, "%s: more than %llu points", pcd->path,
-		                (unsigned long long)IMPORT_MAX_POINTS);
+		                (unsigned long long)pcd->most);
 	if (pcd->data != PCD_COMPRESSED && pcd->n_points > room)
 		return psr_fail(r->err, PSR_ERR_FORMAT,
 		                "%s: the PCD header promises %llu points, but the file has room for only %llu; is it cut short?",

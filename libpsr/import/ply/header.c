@@ -187,7 +187,7 @@ static uint64_t least_row(const struct ply_header *h, const struct ply_element *
 }
 
 /* Divides, so that no product overflows. Adds a byte for text that ends without a newline. */
-static int check_counts(const struct ply_header *h, const char *path, size_t n_bytes, struct psr_error *err)
+static int check_counts(const struct ply_header *h, const char *path, uint64_t n_bytes, struct psr_error *err)
 {
 	uint64_t left = n_bytes - h->body + (h->format == PLY_ASCII);
 
@@ -231,7 +231,8 @@ static int read_line(struct ply_header *h, const struct text *t, const struct li
 	return PSR_OK;
 }
 
-int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
+int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes, size_t n_bytes, uint64_t n_file,
+                    struct psr_error *err)
 {
 	struct text t = { path, bytes, bytes + n_bytes, 0, 0 };
 	struct line l;
@@ -250,7 +251,9 @@ int ply_header_read(struct ply_header *h, const char *path, const uint8_t *bytes
 		if (h->format == PLY_NO_FORMAT)
 			return psr_fail(err, PSR_ERR_FORMAT, "%s: line %u: the header ends without a format", path, t.line);
 		h->body = (size_t)(t.at - bytes);
-		return check_counts(h, path, n_bytes, err);
+		h->n_lines = t.line;
+		return check_counts(h, path, n_file, err);
 	}
-	return psr_fail(err, PSR_ERR_FORMAT, "%s: the PLY header has no end_header; is the file cut short?", path);
+	return psr_fail(err, PSR_ERR_FORMAT, "%s: the PLY header has no end_header%s; is the file cut short?", path,
+	                n_bytes < n_file ? " in the first megabyte" : "");
 }

@@ -181,7 +181,7 @@ int import_ply(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, str
 	if (header == NULL || rows == NULL) {
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a header", im->path);
 	} else {
-		rc = ply_header_read(header, im->path, bytes, n_bytes, err);
+		rc = ply_header_read(header, im->path, bytes, n_bytes, n_bytes, err);
 		if (rc == PSR_OK) {
 			rc = ply_rows_init(rows, im->path, header, bytes, n_bytes, err);
 			if (rc == PSR_OK)

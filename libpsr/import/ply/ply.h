@@ -39,12 +39,14 @@ struct ply_header {
 	struct ply_property property[PLY_MAX_PROPERTIES];
 	struct ply_name texture;            /* of "comment TextureFile NAME"; n is 0 if there is none */
 	size_t body;                        /* where the rows begin */
+	unsigned n_lines;
 	unsigned odd_line;                  /* the first line with an unknown first word, or 0; skipped */
 };
 
-/* Ensures that names of elements, and of an element's properties, are unique, and that the file has room for all rows
- * if every list is empty. FORMAT with the line, UNSUPPORTED for another version, LIMIT. */
-int ply_header_read(struct ply_header *header, const char *path, const uint8_t *bytes, size_t n_bytes,
+/* Reads the header from the first n_bytes of a file of n_file. Ensures that names of elements, and of an element's
+ * properties, are unique, and that the file has room for all rows if every list is empty. FORMAT with the line,
+ * UNSUPPORTED for another version, LIMIT. */
+int ply_header_read(struct ply_header *header, const char *path, const uint8_t *bytes, size_t n_bytes, uint64_t n_file,
                     struct psr_error *err);
 
 int ply_name_is(const struct ply_name *name, const char *text);
@@ -53,6 +55,7 @@ size_t ply_type_size(enum ply_type type);
 /* value.c: values. */
 struct ply_cursor {
 	const uint8_t *start, *at, *end;
+	uint64_t bytes_before, lines_before; /* of the file, before `start` */
 	enum ply_format format;
 	locale_t locale; /* "C" */
 };
@@ -91,6 +94,9 @@ void ply_rows_fini(struct ply_rows *rows);
 void ply_rows_begin(struct ply_rows *rows, const struct ply_element *element);
 int ply_rows_next(struct ply_rows *rows, struct psr_error *err);
 int ply_rows_skip(struct ply_rows *rows, struct psr_error *err); /* the remaining rows */
+
+/* Returns the line ends from `start` to `at`. */
+uint64_t ply_count_lines(const struct ply_cursor *cursor);
 
 /* FORMAT, with the place of the last row: "PATH: line 12: face 3 ...". */
 int ply_rows_fail(const struct ply_rows *rows, struct psr_error *err, const char *format, ...)

@@ -10,7 +10,8 @@ int ply_rows_init(struct ply_rows *rows, const char *path, const struct ply_head
 	memset(rows, 0, sizeof *rows);
 	rows->path = path;
 	rows->header = header;
-	rows->cursor = (struct ply_cursor){ bytes, bytes + header->body, bytes + n_bytes, header->format, (locale_t)0 };
+	rows->cursor = (struct ply_cursor){ .start = bytes, .at = bytes + header->body, .end = bytes + n_bytes,
+		                                .format = header->format };
 	rows->cursor.locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
 	return rows->cursor.locale == (locale_t)0 ? psr_fail(err, PSR_ERR_MEMORY, "%s: no memory", path)
 	                                          : PSR_OK;
@@ -32,23 +33,29 @@ void ply_rows_begin(struct ply_rows *rows, const struct ply_element *element)
 		rows->list[i].property = -1;
 }
 
+uint64_t ply_count_lines(const struct ply_cursor *c)
+{
+	uint64_t n = 0;
+
+	for (const uint8_t *p = c->start; p < c->at; p++)
+		n += *p == '\n' || (*p == '\r' && p + 1 < c->end && p[1] != '\n');
+	return n;
+}
+
 int ply_rows_fail(const struct ply_rows *rows, struct psr_error *err, const char *format, ...)
 {
 	const struct ply_cursor *c = &rows->cursor;
 	const struct ply_name *name = &rows->element->name;
 	char text[PSR_ERROR_TEXT], place[64];
-	uint64_t line = 1;
 	va_list args;
 
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
-	for (const uint8_t *p = c->start; c->format == PLY_ASCII && p < c->at; p++)
-		line += *p == '\n' || (*p == '\r' && p + 1 < c->end && p[1] != '\n');
 	if (c->format == PLY_ASCII)
-		snprintf(place, sizeof place, "line %llu", (unsigned long long)line);
+		snprintf(place, sizeof place, "line %llu", (unsigned long long)(c->lines_before + ply_count_lines(c) + 1));
 	else
-		snprintf(place, sizeof place, "byte %llu", (unsigned long long)(c->at - c->start));
+		snprintf(place, sizeof place, "byte %llu", (unsigned long long)(c->bytes_before + (uint64_t)(c->at - c->start)));
 	return psr_fail(err, PSR_ERR_FORMAT, "%.300s: %s: %.*s %llu %.100s", rows->path, place,
 	                (int)(name->n < 40 ? name->n : 40), name->at, (unsigned long long)(rows->at > 0 ? rows->at - 1 : 0),
 	                text);

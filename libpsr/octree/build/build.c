@@ -3,6 +3,7 @@
 #include <string.h>
 #include "leaves.h"
 #include "runs.h"
+#include "base/direction.h"
 
 #define BATCH 4096
 
@@ -98,9 +99,18 @@ static int find_cube(struct building *b)
 	return PSR_OK;
 }
 
+static uint16_t normal_code(const float normal[3])
+{
+	if (!isfinite(normal[0]) || !isfinite(normal[1]) || !isfinite(normal[2]) ||
+	    (normal[0] == 0.0f && normal[1] == 0.0f && normal[2] == 0.0f))
+		return RECORD_NO_NORMAL;
+	return psr_direction_encode(normal);
+}
+
 static int sort_point(struct building *b, const struct octree_point *point)
 {
-	struct record record = { .color = { point->color[0], point->color[1], point->color[2] } };
+	struct record record = { .color = { point->color[0], point->color[1], point->color[2] },
+		                     .normal = b->source->has_normal ? normal_code(point->normal) : RECORD_NO_NORMAL };
 	uint32_t at[3];
 
 	for (int c = 0; c < 3; c++) {
@@ -119,6 +129,8 @@ static int sort_point(struct building *b, const struct octree_point *point)
 /* The points of one leaf. */
 struct sum {
 	uint64_t n, path, color[3], part[3];
+	int64_t normal[3];
+	uint16_t first; /* of the normals */
 };
 
 static void add_record(struct sum *sum, const struct record *record)
@@ -128,14 +140,18 @@ static void add_record(struct sum *sum, const struct record *record)
 	for (int c = 0; c < 3; c++) {
 		sum->color[c] += record->color[c];
 		sum->part[c] += record->part[c];
+		if (record->normal != RECORD_NO_NORMAL)
+			sum->normal[c] += (int16_t)(psr_direction_words()[record->normal] >> 16 * c & 0xffff);
 	}
+	if (sum->first == RECORD_NO_NORMAL)
+		sum->first = record->normal;
 }
 
 /* Makes sure that leaf n has places for its attributes. */
 static int leaf_room(struct building *b, uint64_t n, uint64_t *room)
 {
 	const uint64_t more = n + n / 4 + 4096;
-	void *part, *color;
+	void *part, *color, *normal;
 
 	if (n < *room)
 		return 1;
@@ -149,8 +165,24 @@ static int leaf_room(struct building *b, uint64_t n, uint64_t *room)
 			return 0;
 		b->maker.tree->color = color;
 	}
+	if (b->source->has_normal) {
+		normal = realloc(b->maker.tree->normal, more * sizeof *b->maker.tree->normal);
+		if (normal == NULL)
+			return 0;
+		b->maker.tree->normal = normal;
+	}
 	*room = more;
 	return 1;
+}
+
+/* Opposite normals have no mean: the first of them stands for all. */
+static uint16_t mean_normal(const struct sum *sum)
+{
+	const float mean[3] = { (float)sum->normal[0], (float)sum->normal[1], (float)sum->normal[2] };
+
+	if (sum->first == RECORD_NO_NORMAL || (mean[0] == 0.0f && mean[1] == 0.0f && mean[2] == 0.0f))
+		return sum->first;
+	return psr_direction_encode(mean);
 }
 
 static int end_leaf(struct building *b, const struct sum *sum, uint64_t *room)
@@ -165,20 +197,24 @@ static int end_leaf(struct building *b, const struct sum *sum, uint64_t *room)
 		if (tree->color != NULL)
 			tree->color[leaf][c] = (uint8_t)((sum->color[c] + sum->n / 2) / sum->n);
 	}
+	if (tree->normal != NULL) {
+		tree->normal[leaf] = mean_normal(sum);
+		b->built.n_without += tree->normal[leaf] == RECORD_NO_NORMAL;
+	}
 	return octree_maker_put(&b->maker, sum->path, b->err);
 }
 
 static int merge(struct building *b)
 {
 	const struct record *record;
-	struct sum sum = { 0 };
+	struct sum sum = { .first = RECORD_NO_NORMAL };
 	uint64_t room = 0, done = 0;
 	int rc = octree_maker_init(&b->maker, b->levels, b->err), end;
 
 	while (rc == PSR_OK && (record = runs_next(&b->runs, &rc, b->err)) != NULL) {
 		if (sum.n > 0 && record->path != sum.path) {
 			rc = end_leaf(b, &sum, &room);
-			sum = (struct sum){ 0 };
+			sum = (struct sum){ .first = RECORD_NO_NORMAL };
 		}
 		add_record(&sum, record);
 		if (++done % 65536 == 0) {

@@ -9,13 +9,14 @@
 struct octree_point {
 	double at[3];
 	uint8_t color[3]; /* sRGB */
+	float normal[3];  /* of any length; 0,0,0: none, as anything that is not finite */
 };
 
 /* Where points come from; they are read twice, and have to be the same both times. Functions return PSR_OK or an error
  * with its text. */
 struct octree_source {
 	const char *name;   /* for errors: the file's */
-	int has_color;
+	int has_color, has_normal;
 	uint64_t n_points;  /* for progress alone */
 	/* Goes to the first point. */
 	int (*rewind)(void *userdata, struct psr_error *err);
@@ -41,8 +42,8 @@ struct octree_build_options {
 void octree_build_options_default(struct octree_build_options *options);
 
 /* Builds a tree with normals, offsets, and colours if the source has any. Colours and places of a leaf's points are
- * averaged. Normals are least squares over 27 cells around, of some six leaves each; neighbours agree
- * about their sides, and the highest place of what hangs together looks up.
+ * averaged, and so are normals of the source. Leaves whose points have none get least squares over 27 cells around, of
+ * some six leaves each; neighbours agree about their sides, and the highest place of what hangs together looks up.
  *
  * FORMAT: no points, a place that is not finite, all points at one place; ARG: options out of range, a spacing finer
  * than OCTREE_MOST_LEVELS levels; IO: the disk is full; MEMORY, CANCELLED; and errors of the source. Runs have no

@@ -1,6 +1,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "leaves.h"
+#include "runs.h"
 #include "octree/levels.h"
 #include "base/axes.h"
 #include "base/direction.h"
@@ -27,7 +28,7 @@ struct normals {
 	float *height;                /* of each cell's leaves, in cells */
 	uint8_t *is_turned;           /* cells whose normals have to look the other way */
 	float least;                  /* joining cells: agreement of their normals */
-	int is_cancelled;
+	int is_cancelled, has_own; /* has_own: some leaves have normals of the source's */
 };
 
 static void add_place(struct moments *m, const float p[3])
@@ -175,20 +176,43 @@ static void orient(struct normals *s)
 			s->normal[i][c] = -s->normal[i][c];
 }
 
+static uint8_t offset_of(const struct built *built, uint64_t leaf, const float normal[3])
+{
+	double offset = 0.0;
+
+	for (int c = 0; c < 3; c++)
+		offset += (((double)built->part[leaf][c] + 0.5) / 256.0 - 0.5) * (double)normal[c];
+	return (uint8_t)octree_offset_step(offset);
+}
+
 static int set_leaf(const struct octree_node *node, void *userdata)
 {
 	struct normals *s = userdata;
 	struct octree *tree = s->built->tree;
-	const float *normal = s->normal[s->cell];
-	double offset = 0.0;
+	const float *normal;
 
 	while (node->leaf >= s->first[s->cell + 1])
-		normal = s->normal[++s->cell];
-	for (int c = 0; c < 3; c++)
-		offset += (((double)s->built->part[node->leaf][c] + 0.5) / 256.0 - 0.5) * (double)normal[c];
-	tree->normal[node->leaf] = psr_direction_encode(normal);
-	tree->offset[node->leaf] = (uint8_t)octree_offset_step(offset);
+		s->cell++;
+	normal = s->normal[s->cell];
+	if (s->has_own && tree->normal[node->leaf] != RECORD_NO_NORMAL)
+		normal = psr_direction_table()[tree->normal[node->leaf]];
+	else
+		tree->normal[node->leaf] = psr_direction_encode(normal);
+	tree->offset[node->leaf] = offset_of(s->built, node->leaf, normal);
 	return 0;
+}
+
+/* All leaves have normals of the source's. */
+static int set_offsets(const struct built *built)
+{
+	struct octree *tree = built->tree;
+
+	tree->offset = malloc(tree->n_leaves);
+	if (tree->offset == NULL)
+		return PSR_ERR_MEMORY;
+	for (uint64_t i = 0; i < tree->n_leaves; i++)
+		tree->offset[i] = offset_of(built, i, psr_direction_table()[tree->normal[i]]);
+	return PSR_OK;
 }
 
 static int count_node(const struct octree_node *node, void *userdata)
@@ -252,7 +276,8 @@ static int allocate(struct normals *s)
 	s->highest = malloc(s->n_cells * sizeof *s->highest);
 	s->height = malloc(s->n_cells * sizeof *s->height);
 	s->is_turned = malloc(s->n_cells);
-	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
+	if (!s->has_own)
+		tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->offset = malloc(tree->n_leaves);
 	return filling.has_failed || s->first == NULL || s->moments == NULL || s->normal == NULL || s->root == NULL ||
 	               s->highest == NULL || s->height == NULL || s->is_turned == NULL || tree->normal == NULL ||
@@ -264,8 +289,11 @@ static int allocate(struct normals *s)
 int built_normals(const struct built *built, const struct octree_build_options *options)
 {
 	const struct octree *tree = built->tree;
-	struct normals s = { .built = built, .options = options };
+	struct normals s = { .built = built, .options = options, .has_own = tree->normal != NULL };
 	int rc;
+
+	if (s.has_own && built->n_without == 0)
+		return set_offsets(built);
 
 	find_depth(&s);
 	rc = allocate(&s);

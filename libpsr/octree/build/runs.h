@@ -6,10 +6,12 @@
 #include <stdint.h>
 #include "psr/error.h"
 
+#define RECORD_NO_NORMAL UINT16_MAX
+
 struct record {
 	uint64_t path;
 	uint8_t color[3], part[3]; /* part: the place within the leaf, in 256ths */
-	uint16_t unused;
+	uint16_t normal; /* base/direction.h; RECORD_NO_NORMAL */
 };
 
 struct run {

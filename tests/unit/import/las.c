@@ -371,7 +371,8 @@ int main(void)
 		cmocka_unit_test(compressed_files_name_the_tool_to_unpack_them),
 		cmocka_unit_test(headers_that_lie_are_refused),
 		cmocka_unit_test(cut_files_are_refused_at_every_length),
-		cmocka_unit_test(coordinates_that_overflow_are_left_out),		cmocka_unit_test(a_source_gives_the_points_of_the_mesh_and_gives_them_again),
+		cmocka_unit_test(coordinates_that_overflow_are_left_out),
+		cmocka_unit_test(a_source_gives_the_points_of_the_mesh_and_gives_them_again),
 		cmocka_unit_test(a_source_that_is_cut_short_is_refused),
 	};
 

@@ -21,6 +21,7 @@ static char folder[] = "/tmp/psr-octree-XXXXXX";
 struct cloud {
 	uint64_t n, next;
 	void (*make)(struct octree_point *point, uint64_t i);
+	int has_normal;
 };
 
 static int go_back(void *userdata, struct psr_error *err)
@@ -51,12 +52,14 @@ static void on_sphere(struct octree_point *point, uint64_t i)
 
 	*point = (struct octree_point){ { middle[0] + RADIUS * r * cos(a), middle[1] + RADIUS * r * sin(a),
 		                              middle[2] + RADIUS * z },
-		                            { (uint8_t)(127.0 + 127.0 * z), 10, 20 } };
+		                            { (uint8_t)(127.0 + 127.0 * z), 10, 20 },
+		                            { (float)(r * cos(a)), (float)(r * sin(a)), (float)z } };
 }
 
 static int build(struct octree **tree, struct cloud *cloud, int levels, uint64_t memory, struct psr_error *err)
 {
-	const struct octree_source source = { "cloud", 1, cloud->n, go_back, read_cloud, cloud };
+	const struct octree_source source = { .name = "cloud", .has_color = 1, .has_normal = cloud->has_normal, .n_points = cloud->n,
+		                               .rewind = go_back, .read = read_cloud, .userdata = cloud };
 	struct octree_build_options options;
 
 	octree_build_options_default(&options);
@@ -69,7 +72,7 @@ static int build(struct octree **tree, struct cloud *cloud, int levels, uint64_t
 
 static struct octree *sphere(uint64_t n, int levels, uint64_t memory)
 {
-	struct cloud cloud = { n, 0, on_sphere };
+	struct cloud cloud = { n, 0, on_sphere, 0 };
 	struct octree *tree;
 
 	assert_int_equal(build(&tree, &cloud, levels, memory, NULL), PSR_OK);
@@ -152,6 +155,64 @@ static void every_point_is_within_its_leaf_and_normals_look_out(void **state)
 	octree_destroy(tree);
 }
 
+/* A leaf's middle is up to 0.87 leaves from its points, 0.8 degrees of a radius of 64 leaves; quantising twice adds 1.27
+ * degrees each. */
+static void normals_of_the_source_are_averaged(void **state)
+{
+	struct cloud cloud = { POINTS, 0, on_sphere, 1 };
+	struct octree *tree;
+	struct sphere_leaves s = { NULL, calloc(1u << 3 * LEVELS, 1), 1.0, 0.0 };
+
+	(void)state;
+	assert_non_null(s.is_there);
+	assert_int_equal(build(&tree, &cloud, LEVELS, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	s.tree = tree;
+	octree_walk(tree, LEVELS, look, &s);
+	print_message("worst normal %.1f degrees, worst place %.2f leaves\n", acos(s.worst_cosine) * 180.0 / PI,
+	              s.worst_place);
+	assert_true(s.worst_cosine > cos((sqrt(3.0) / 2.0 / 64.0) + 2.0 * 1.27 * PI / 180.0));
+	assert_true(s.worst_place < 0.22 + 0.87 * sin(4.0 * PI / 180.0));
+	free(s.is_there);
+	octree_destroy(tree);
+}
+
+/* Only the upper half has normals, and they look in. */
+static void half_with_normals(struct octree_point *point, uint64_t i)
+{
+	on_sphere(point, i);
+	for (int c = 0; c < 3; c++)
+		point->normal[c] = point->normal[2] > 0.1f ? -point->normal[c] : c == 0 ? NAN : point->normal[c];
+}
+
+static int count_inward(const struct octree_node *node, void *userdata)
+{
+	struct sphere_leaves *s = userdata;
+	const float *normal = psr_direction_table()[s->tree->normal[node->leaf]];
+	double center[3], cosine = 0.0;
+
+	octree_center(s->tree, node->path, LEVELS, center);
+	for (int c = 0; c < 3; c++)
+		cosine += (center[c] - middle[c]) / RADIUS * (double)normal[c];
+	if (center[2] - middle[2] > 0.15 * RADIUS)
+		assert_true(cosine < -0.9);
+	else if (center[2] - middle[2] < 0.05 * RADIUS)
+		assert_true(cosine > 0.9);
+	return 0;
+}
+
+static void leaves_without_normals_get_theirs_from_their_neighbours(void **state)
+{
+	struct cloud cloud = { POINTS, 0, half_with_normals, 1 };
+	struct octree *tree;
+	struct sphere_leaves s = { .worst_cosine = 1.0 };
+
+	(void)state;
+	assert_int_equal(build(&tree, &cloud, LEVELS, OCTREE_LEAST_MEMORY, NULL), PSR_OK);
+	s.tree = tree;
+	octree_walk(tree, LEVELS, count_inward, &s);
+	octree_destroy(tree);
+}
+
 static void runs_on_disk_give_the_tree_of_memory(void **state)
 {
 	struct octree *small = sphere(POINTS, 9, OCTREE_LEAST_MEMORY), *large = sphere(POINTS, 9, (uint64_t)64 << 20);
@@ -170,12 +231,12 @@ static void runs_on_disk_give_the_tree_of_memory(void **state)
 
 static void twice(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { i < 100 ? 0.1 : 1.0, 0.0, 0.0 }, { i < 50 ? 0 : 100, 0, 7 } };
+	*point = (struct octree_point){ { i < 100 ? 0.1 : 1.0, 0.0, 0.0 }, { i < 50 ? 0 : 100, 0, 7 }, { 0 } };
 }
 
 static void colors_of_a_leaf_are_averaged(void **state)
 {
-	struct cloud cloud = { 101, 0, twice };
+	struct cloud cloud = { .n = 101, .make = twice };
 	struct octree *tree;
 
 	(void)state;
@@ -188,17 +249,17 @@ static void colors_of_a_leaf_are_averaged(void **state)
 static void at_one_place(struct octree_point *point, uint64_t i)
 {
 	(void)i;
-	*point = (struct octree_point){ { 1.0, 2.0, 3.0 }, { 0, 0, 0 } };
+	*point = (struct octree_point){ { 1.0, 2.0, 3.0 }, { 0, 0, 0 }, { 0 } };
 }
 
 static void no_number(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { (double)i, i == 9 ? NAN : 1.0, 3.0 }, { 0, 0, 0 } };
+	*point = (struct octree_point){ { (double)i, i == 9 ? NAN : 1.0, 3.0 }, { 0, 0, 0 }, { 0 } };
 }
 
 static void very_far(struct octree_point *point, uint64_t i)
 {
-	*point = (struct octree_point){ { i == 0 ? -1.7e308 : 1.7e308, 0.0, 0.0 }, { 0, 0, 0 } };
+	*point = (struct octree_point){ { i == 0 ? -1.7e308 : 1.7e308, 0.0, 0.0 }, { 0, 0, 0 }, { 0 } };
 }
 
 static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
@@ -208,12 +269,12 @@ static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
 		int levels, code;
 		const char *text;
 	} bad[] = {
-		{ { 0, 0, at_one_place }, 5, PSR_ERR_FORMAT, "no points" },
-		{ { 10000, 0, at_one_place }, 5, PSR_ERR_FORMAT, "all 10000 points are at 1 2 3" },
-		{ { 20, 0, no_number }, 5, PSR_ERR_FORMAT, "point 9 (counted from 0) has no finite y" },
-		{ { 2, 0, very_far }, 5, PSR_ERR_FORMAT, "cannot be told apart" },
-		{ { 9, 0, on_sphere }, 1, PSR_ERR_ARG, "1 levels" },
-		{ { 9, 0, on_sphere }, 21, PSR_ERR_ARG, "21 levels" },
+		{ { .n = 0, .make = at_one_place }, 5, PSR_ERR_FORMAT, "no points" },
+		{ { .n = 10000, .make = at_one_place }, 5, PSR_ERR_FORMAT, "all 10000 points are at 1 2 3" },
+		{ { .n = 20, .make = no_number }, 5, PSR_ERR_FORMAT, "point 9 (counted from 0) has no finite y" },
+		{ { .n = 2, .make = very_far }, 5, PSR_ERR_FORMAT, "cannot be told apart" },
+		{ { .n = 9, .make = on_sphere }, 1, PSR_ERR_ARG, "1 levels" },
+		{ { .n = 9, .make = on_sphere }, 21, PSR_ERR_ARG, "21 levels" },
 	};
 
 	(void)state;
@@ -232,7 +293,7 @@ static void bad_clouds_get_an_error_that_names_what_is_wrong(void **state)
 static void a_full_disk_leaves_no_file(void **state)
 {
 	struct rlimit was, full;
-	struct cloud cloud = { POINTS, 0, on_sphere };
+	struct cloud cloud = { .n = POINTS, .make = on_sphere };
 	struct psr_error err;
 	struct octree *tree;
 
@@ -258,8 +319,9 @@ static void a_build_can_be_cancelled_at_any_time(void **state)
 {
 	(void)state;
 	for (int after = 0, rc = PSR_ERR_CANCELLED; rc != PSR_OK; after = 2 * after + 1) {
-		struct cloud cloud = { POINTS, 0, on_sphere };
-		const struct octree_source source = { "cloud", 0, POINTS, go_back, read_cloud, &cloud };
+		struct cloud cloud = { .n = POINTS, .make = on_sphere };
+		const struct octree_source source = { .name = "cloud", .n_points = POINTS, .rewind = go_back, .read = read_cloud,
+			                               .userdata = &cloud };
 		int left = after;
 		const struct psr_cancel cancel = { is_called_often, &left };
 		struct octree_build_options options;
@@ -278,8 +340,9 @@ static void a_build_can_be_cancelled_at_any_time(void **state)
 
 static void spacing_chooses_the_levels(void **state)
 {
-	struct cloud cloud = { 1000, 0, on_sphere };
-	const struct octree_source source = { "cloud", 0, 1000, go_back, read_cloud, &cloud };
+	struct cloud cloud = { .n = 1000, .make = on_sphere };
+	const struct octree_source source = { .name = "cloud", .n_points = 1000, .rewind = go_back, .read = read_cloud,
+		                               .userdata = &cloud };
 	struct octree_build_options options;
 	struct octree *tree = NULL;
 
@@ -302,6 +365,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(every_point_is_within_its_leaf_and_normals_look_out),
+		cmocka_unit_test(normals_of_the_source_are_averaged),
+		cmocka_unit_test(leaves_without_normals_get_theirs_from_their_neighbours),
 		cmocka_unit_test(runs_on_disk_give_the_tree_of_memory),
 		cmocka_unit_test(colors_of_a_leaf_are_averaged),
 		cmocka_unit_test(bad_clouds_get_an_error_that_names_what_is_wrong),

@@ -1,0 +1,10 @@
+/* The vertices of a PLY file as they come, in its coordinates. */
+#ifndef PSR_IMPORT_POINTS_PLY_POINTS_H
+#define PSR_IMPORT_POINTS_PLY_POINTS_H
+
+#include "octree/build/build.h"
+
+int ply_points_open(struct octree_source *out, const char *path, struct psr_error *err);
+void ply_points_close(struct octree_source *source);
+
+#endif

@@ -1,0 +1,27 @@
+/* Points of files as they come, whatever the format: sources of octrees (octree/build/build.h). */
+#ifndef PSR_IMPORT_POINTS_POINTS_H
+#define PSR_IMPORT_POINTS_POINTS_H
+
+#include "octree/build/build.h"
+
+/* Opens a file of points, told by its first bytes, or else by its ending:
+ *
+ *   LAS 1.0 to 1.4, point formats 0 to 10: without noise and withheld points
+ *   PLY, text or binary: the vertices, with colours and normals; faces are passed over
+ *   PCD, text, binary, or compressed (of at most POINTS_MOST_UNPACKED bytes: these are held in memory)
+ *   PTS and PTX: all scans of a file; PTX in its common coordinates, without what no ray met
+ *   XYZ and other tables of text (text.h)
+ *
+ * Colours are sRGB. Where there are intensities alone they are a linear grey, black to white. Points without a finite
+ * place are left out and counted. Takes some two megabytes and what stands before the points; the path must outlive
+ * the source. Reads the file once where a colour's scale asks for it. NOT_FOUND, IO, FORMAT with the place, LIMIT,
+ * MEMORY; UNSUPPORTED for LAZ, E57 and anything else, with a sentence that says how to convert it. */
+int octree_source_open(struct octree_source *out, const char *path, struct psr_error *err);
+void octree_source_close(struct octree_source *source);
+
+#define POINTS_MOST_UNPACKED ((uint64_t)1 << 30)
+
+/* Returns how many points the latest reading, or what there was of it, left out since they have no finite place. */
+uint64_t octree_source_left_out(const struct octree_source *source);
+
+#endif
