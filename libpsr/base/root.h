@@ -1,8 +1,8 @@
 /* Light without a clamp in 16 bits, for means: 4096 times its root.
  *
  * The square of a code is the light in units of 2^-24, so a sum of squares is exact in integers. A code is off by half,
- * the light of one by 1/20 of a code of 8-bit sRGB at most. Codes end just below 256, 4^PSR_MAX_PASS: as one of so many sub-pixels
- * that much alone makes a pixel white. */
+ * the light of one by 1/20 of a code of 8-bit sRGB at most. Codes end just below 256, 4^PSR_MAX_PASS: as one of so many
+ * sub-pixels that much alone makes a pixel white. */
 #ifndef PSR_BASE_ROOT_H
 #define PSR_BASE_ROOT_H
 

@@ -217,7 +217,8 @@ static int draw_window(const struct still *still, uint32_t i, uint32_t j)
 	const uint32_t from_x = i ? MARGIN : 0, to_x = is_last_x ? window.width : WINDOW_WIDTH - MARGIN;
 	const uint32_t from_y = j ? MARGIN : 0, to_y = is_last_y ? window.height : WINDOW_HEIGHT - MARGIN;
 	struct part part = {
-		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .pass = pass, .stride = window.width, .left = from_x, .top = from_y,
+		.refiner = r, .frame = frame, .light = renderer_light(r->renderer), .pass = pass,
+		.stride = window.width, .left = from_x, .top = from_y,
 		.x0 = (left + from_x) >> pass, .x1 = (left + to_x) >> pass, .y0 = (top + from_y) >> pass,
 	};
 	add_report(&frame->report, &fine.report, pass);
