@@ -8,6 +8,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "base/mem.h"
+#include "cubes.h"
 #include "file.h"
 #include "pack.h"
 
@@ -20,6 +21,7 @@ struct psr_model {
 	size_t n_bytes;
 	const uint8_t *bytes; /* the image */
 	struct content content;
+	struct psr_cubes *cubes; /* of its octree, or NULL */
 };
 
 static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
@@ -40,6 +42,8 @@ int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, in
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
 		code = file_parse(bytes, n_bytes, name, &model->content, err);
+	if (code == PSR_OK && model->content.has_octree)
+		code = psr_cubes_create(&model->cubes, &model->content.octree, err);
 	if (code != PSR_OK) {
 		free(model);
 		release_image(bytes, n_bytes, is_mapped);
@@ -235,6 +239,7 @@ void psr_model_unref(struct psr_model *model)
 	if (model == NULL || atomic_fetch_sub_explicit(&model->n_refs, 1, memory_order_acq_rel) != 1)
 		return;
 	release_image(model->bytes, model->n_bytes, model->is_mapped);
+	psr_cubes_destroy(model->cubes);
 	free(model);
 }
 
@@ -271,7 +276,12 @@ uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed)
 
 uint64_t psr_model_bytes(const struct psr_model *model)
 {
-	return model->n_bytes + sizeof *model;
+	return model->n_bytes + sizeof *model + (model->cubes != NULL ? model->cubes->n_bytes : 0);
+}
+
+const struct psr_cubes *psr_model_cubes(const struct psr_model *model)
+{
+	return model->cubes;
 }
 
 const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes)

@@ -73,6 +73,19 @@ static inline uint32_t count_bits(uint64_t word)
 	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
 }
 
+static uint64_t mask_of(const struct plan_instance *in, uint32_t block)
+{
+	const struct psr_cubes *cubes = in->cull.cubes;
+
+	if (cubes == NULL)
+		return in->cull.blocks->mask[block];
+	const struct psr_cube_level *level = psr_cubes_level(cubes, block);
+	const uint32_t code = psr_cubes_code(cubes, level, block);
+	const unsigned n = (unsigned)__builtin_popcount(level->tree->code[code]);
+	const uint64_t children = psr_cubes_children(level->tree, code);
+	return n < 8 ? children & ((UINT64_C(1) << 8 * n) - 1) : children; /* in other places; their number is the same */
+}
+
 /* A chunk whose blocks are being tested, and where its results go. */
 struct counting {
 	const struct cull *cull;
@@ -124,6 +137,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 			.tile_x0 = (uint8_t)batch->tile_x0[i], .tile_x1 = (uint8_t)batch->tile_x1[i],
 			.tile_y0 = (uint8_t)batch->tile_y0[i], .tile_y1 = (uint8_t)batch->tile_y1[i],
 		};
+		hit->is_wide = in->cull.cubes != NULL && (hit->level > 0 || plan->with_splats);
 		hit->at_border = (hit->x0 == 0) | (hit->y0 == 0) | (hit->x1 == most_x) | (hit->y1 == most_y);
 		for (uint32_t y = hit->tile_y0; y <= hit->tile_y1; y++)
 			for (uint32_t x = hit->tile_x0; x <= hit->tile_x1; x++)
@@ -133,7 +147,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
-		chunk->n_samples += count_bits(b->mask[block]);
+		chunk->n_samples += count_bits(mask_of(in, block));
 		const float error = place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
@@ -220,7 +234,7 @@ static void fill_chunk(int i, void *userdata)
 		const struct cull_hit *hit = &cull->bins->hit[chunk->first_hit + h];
 		const struct bin_entry entry = {
 			.slot = hit->slot, .instance = hit->instance, .level = hit->level, .is_mixed = hit->is_mixed,
-			.at_border = hit->at_border, .hit = chunk->first_hit + h,
+			.at_border = hit->at_border, .is_wide = hit->is_wide, .hit = chunk->first_hit + h,
 		};
 
 		if (h % CULL_BATCH == 0 && plan_is_cancelled(cull->plan))

@@ -23,9 +23,27 @@ struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struc
 	return v;
 }
 
+static float nearest_cube_of(const struct plan_instance *in, const struct psr_cluster *k)
+{
+	const struct psr_cube_level *level = &in->cull.cubes->level[k->level];
+	float nearest = INFINITY;
+
+	for (uint32_t i = 0; i < k->n_blocks; i++) {
+		double c[3];
+
+		psr_cubes_center(in->cull.cubes, level, k->first_block + i, c);
+		const float z = to_camera(in->cull.center_m[2], (float)c[0], (float)c[1], (float)c[2]);
+		nearest = z < nearest ? z : nearest;
+	}
+	return nearest - (float)(CUBES_RADIUS * level->edge) * in->cull.scale;
+}
+
 /* The least z' of the spheres of a cluster's blocks. */
 static float nearest_of(const struct plan_instance *in, const struct psr_cluster *k)
 {
+	if (in->cull.cubes != NULL)
+		return nearest_cube_of(in, k);
+
 	const struct psr_blocks *b = in->cull.blocks;
 	const int16_t *x = b->sphere_x + k->first_block, *y = b->sphere_y + k->first_block;
 	const int16_t *z = b->sphere_z + k->first_block;

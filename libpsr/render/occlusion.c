@@ -93,7 +93,7 @@ struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *
 		some[n++] = *entry;
 		if (n < 64)
 			continue;
-		counts.n_inside += simd->warp(target, some, n);
+		counts.n_inside += warp_entries(simd, plan, target, some, n);
 		n_drawn += n;
 		n = 0;
 		if (n_drawn >= LOOK_EVERY && !is_over) {
@@ -105,7 +105,7 @@ struct warp_counts warp_near_to_far(const struct simd *simd, const struct plan *
 			n_drawn = n_left_out = 0;
 		}
 	}
-	counts.n_inside += simd->warp(target, some, n);
+	counts.n_inside += warp_entries(simd, plan, target, some, n);
 	counts.n_occluded += n_left_out;
 	return counts;
 }

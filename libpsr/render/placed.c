@@ -6,6 +6,7 @@
 struct placed_instance {
 	uint8_t content_id[16];
 	double rotation[4], translation[3], scale;
+	uint64_t representation;
 };
 
 int placed_note(struct placed *placed, const struct psr_scene *scene, int *has_changed)
@@ -22,7 +23,7 @@ int placed_note(struct placed *placed, const struct psr_scene *scene, int *has_c
 	}
 	for (uint32_t i = 0; i < n; i++) {
 		const struct psr_instance *from = &scene->instance[i];
-		struct placed_instance to = { .scale = from->scale };
+		struct placed_instance to = { .scale = from->scale, .representation = from->representation };
 
 		psr_model_content_id(from->model, to.content_id);
 		memcpy(to.rotation, from->rotation, sizeof to.rotation);

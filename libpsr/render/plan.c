@@ -5,6 +5,7 @@
 #include "base/root.h"
 #include "base/vec.h"
 #include "base/direction.h"
+#include "groups.h"
 #include "plan.h"
 
 /* The near distance, as a part of the scene's extent, if the request sets none. */
@@ -124,6 +125,37 @@ static void lattice_make(struct warp_lattice *out, const struct psr_projection *
 	}
 }
 
+/* As lattice_make(), for the places of cubes. to_camera: to camera space, of an inner unit's length there. */
+static void cubes_make(struct warp_cubes *out, double to_camera[3][3], const double center[3], const struct plan *plan,
+                       double focal)
+{
+	const double half[3] = { plan->center[0], plan->center[1], 0 };
+
+	for (int a = 0; a < 3; a++) {
+		for (int k = 0; k < 3; k++)
+			out->axis[a][k] = (a < 2 ? focal : 1) * to_camera[a][k] + (plan->perspective ? half[a] * to_camera[2][k] : 0);
+		out->origin[a] = (a < 2 ? focal : 1) * center[a] + (plan->perspective ? half[a] * center[2] : half[a]);
+	}
+	for (uint32_t l = 0; l < out->model->groups.n_levels; l++) {
+		struct warp_octants *to = &out->level[l];
+		const double edge = out->model->level[l].edge, offset = edge * (CUBES_DIAGONAL / (2 * OCTREE_OFFSETS) / 511);
+
+		for (int a = 0; a < 3; a++) {
+			const double *axis = out->axis[a];
+
+			for (int j = 0; j < 8; j++) {
+				const double sum = ((j & 1 ? axis[0] : -axis[0]) + (j & 2 ? axis[1] : -axis[1]))
+				                   + (j & 4 ? axis[2] : -axis[2]);
+
+				to->row[a][j] = edge * sum;
+				to->col[a][j] = (float)(0.5 * edge * sum);
+			}
+			for (int k = 0; k < 3; k++)
+				to->along[a][k] = (float)(offset * axis[k]);
+		}
+	}
+}
+
 /* A pixel's line of sight in inner coordinates, of length 1 along the view axis. */
 static void sight_make(struct warp_instance *out, double turn[3][3], const struct plan *plan, double focal)
 {
@@ -141,11 +173,13 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 {
 	double center[3], rotation[3][3], camera_center[3], to_camera[3][3], eye[3];
 	double world = plan_place(center, rotation, instance, view->eye), scale = world * view->scale;
+	const double blocks_spacing = psr_model_info(instance->model)->spacing * instance->scale * view->scale;
+	const struct psr_cubes *cubes = instance_cubes(instance);
 	struct cull_view *cull = &out->cull;
 
 	*cull = (struct cull_view){
-		.blocks = warp->blocks, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
-		.spacing = (float)ldexp(psr_model_info(instance->model)->spacing * instance->scale * view->scale, plan->cell_bias),
+		.blocks = warp->blocks, .cubes = cubes, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
+		.spacing = (float)ldexp(cubes != NULL ? cubes->spacing * scale : blocks_spacing, plan->cell_bias),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
@@ -180,6 +214,8 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	             : !is_outside || info->n_trials == 0 || info->n_lost > 0 ? PSR_WHY_VOID
 	                                                                      : PSR_WHY_RAN;
 
+	if (cubes != NULL)
+		cubes_make((struct warp_cubes *)warp->cubes, to_camera, camera_center, plan, focal);
 	struct warp_lattice *const lattice = (struct warp_lattice *)warp->lattice;
 	for (uint32_t p = 0; p < warp->blocks->n_projections; p++)
 		lattice_make(&lattice[p], &warp->blocks->projection[p], to_camera, camera_center, plan, focal);
@@ -200,24 +236,33 @@ static void threshold_make(struct plan *plan, double gap_threshold)
 static int storage_make(struct plan *plan, const struct psr_scene *scene)
 {
 	struct warp_lattice *lattice;
-	size_t n_projections = 0;
+	struct warp_cubes *to;
+	size_t n_projections = 0, n_octrees = 0;
 
-	for (uint32_t i = 0; i < scene->n_instances; i++)
-		n_projections += psr_model_blocks(scene->instance[i].model)->n_projections;
-	const size_t size = n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light)
+	for (uint32_t i = 0; i < scene->n_instances; i++) {
+		n_projections += instance_groups(&scene->instance[i])->n_projections;
+		n_octrees += instance_cubes(&scene->instance[i]) != NULL;
+	}
+	const size_t size = n_octrees * sizeof *to + n_projections * sizeof(struct warp_lattice) + scene->n_lights * sizeof(struct strip_light)
 	                    + scene->n_instances * (sizeof(struct plan_instance) + sizeof(struct warp_instance));
 	plan->storage = psr_grow_huge(plan->storage, &plan->storage_size, size + 1);
 	if (plan->storage == NULL)
 		return PSR_ERR_MEMORY;
-	lattice = plan->storage;
+	to = plan->storage;
+	lattice = (struct warp_lattice *)(to + n_octrees);
 	plan->instance = (struct plan_instance *)(lattice + n_projections);
 	plan->warp = (struct warp_instance *)(plan->instance + scene->n_instances);
 	plan->light = (struct strip_light *)(plan->warp + scene->n_instances);
 	plan->n_slots = plan->n_groups = 0;
 	plan->n_samples = 0;
+	plan->has_octrees = n_octrees > 0;
 	for (uint32_t i = 0; i < scene->n_instances; i++) {
-		const struct psr_blocks *blocks = psr_model_blocks(scene->instance[i].model);
+		const struct psr_blocks *blocks = instance_groups(&scene->instance[i]);
+		const struct psr_cubes *cubes = instance_cubes(&scene->instance[i]);
 
+		if (cubes != NULL)
+			to->model = cubes;
+		plan->warp[i].cubes = cubes != NULL ? to++ : NULL;
 		plan->instance[i].first_slot = plan->n_slots;
 		plan->warp[i].blocks = blocks;
 		plan->warp[i].lattice = lattice;

@@ -2,15 +2,20 @@
 #include "base/maths.h"
 #include "base/vec.h"
 #include "base/view.h"
-#include "model/blocks.h"
+#include "groups.h"
 #include "psr/scene.h"
 
 #define MAX_LENGTH 1e30
 
 static int validate_instance(const struct psr_instance *instance, unsigned i, struct psr_error *err)
 {
-	if (instance->model == NULL || psr_model_blocks(instance->model) == NULL)
-		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no blocks", i);
+	if (instance->model == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "instance %u has no model", i);
+	if ((unsigned)instance->representation > PSR_OCTREE)
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: there is no representation %d", i, instance->representation);
+	if (instance_groups(instance) == NULL)
+		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no %s", i,
+		                instance->representation == PSR_OCTREE ? "octree" : "blocks");
 	double q = 0;
 	for (int k = 0; k < 4; k++)
 		q += instance->rotation[k] * instance->rotation[k];
@@ -40,7 +45,7 @@ int psr_scene_validate(const struct psr_scene *scene, struct psr_error *err)
 	for (unsigned i = 0; !rc && i < scene->n_instances; i++) {
 		rc = validate_instance(&scene->instance[i], i, err);
 		if (!rc)
-			n_blocks += psr_model_blocks(scene->instance[i].model)->n_blocks;
+			n_blocks += instance_groups(&scene->instance[i])->n_blocks;
 	}
 	for (unsigned i = 0; !rc && i < scene->n_lights; i++) {
 		rc = view_check_light(&scene->light[i], &what);

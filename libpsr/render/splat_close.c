@@ -4,6 +4,7 @@
 #include "base/maths.h"
 #include "base/direction.h"
 #include "base/vec.h"
+#include "block.h"
 #include "splat.h"
 
 #define REACH 8 /* pixels, a power of two: how far from a hole its enclosing surface may be */
@@ -67,8 +68,9 @@ static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y
 {
 	const struct shown shown = find_shown(s, x, y);
 	const struct psr_blocks *b = shown.in->cull.blocks;
-	const uint64_t before = b->mask[shown.block] & ((UINT64_C(1) << shown.sample) - 1);
-	const uint64_t attr = b->attr[psr_blocks_attr_first(b, shown.block) + (uint32_t)__builtin_popcountll(before)];
+	const struct psr_cubes *cubes = shown.in->cull.cubes;
+	const uint64_t attr = cubes != NULL ? psr_cubes_sample(cubes, shown.block, shown.sample)
+	                                    : block_attr(b, shown.block, shown.sample);
 	const float *inner = psr_direction_table()[PSR_ATTR_NORMAL(attr)];
 
 	for (int a = 0; a < 3; a++)

@@ -19,13 +19,30 @@ static int most_frequent_level(const struct plan *plan, const struct bin_entry *
 	return most;
 }
 
+uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                      const struct bin_entry *entry, uint32_t n)
+{
+	uint64_t n_inside = 0;
+
+	if (!plan->has_octrees)
+		return simd->warp(target, entry, n);
+	for (uint32_t first = 0, end = 0; first < n; first = end) {
+		const int is_octree = plan->warp[entry[first].instance].cubes != NULL;
+
+		while (end < n && (plan->warp[entry[end].instance].cubes != NULL) == is_octree)
+			end++;
+		n_inside += (is_octree ? simd->warp_leaves : simd->warp)(target, entry + first, end - first);
+	}
+	return n_inside;
+}
+
 static uint64_t warp_runs(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
                           const struct bin_entry *entry, uint32_t n)
 {
 	uint64_t n_inside = 0;
 
 	for (uint32_t first = 0; first < n && !plan_is_cancelled(plan); first += RUN)
-		n_inside += simd->warp(target, entry + first, n - first < RUN ? n - first : RUN);
+		n_inside += warp_entries(simd, plan, target, entry + first, n - first < RUN ? n - first : RUN);
 	return n_inside;
 }
 
@@ -53,11 +70,11 @@ static uint64_t warp_in_turn(const struct simd *simd, const struct plan *plan, c
 			some[n_some] = entry[e];
 			some[n_some].level = turn ? entry[e].level : 0;
 			if (++n_some == sizeof some / sizeof some[0]) {
-				n_inside += simd->warp(target, some, n_some);
+				n_inside += warp_entries(simd, plan, target, some, n_some);
 				n_some = 0;
 			}
 		}
-		n_inside += simd->warp(target, some, n_some);
+		n_inside += warp_entries(simd, plan, target, some, n_some);
 		if (turn == 0)
 			simd->warp_cells(target, first);
 	}

@@ -18,6 +18,10 @@ struct warp_into {
 	uint64_t *own;                  /* WARP_OWN_WORDS, or NULL */
 };
 
+/* Warps entries of any representations: each run of one by its kernel. */
+uint64_t warp_entries(const struct simd *simd, const struct plan *plan, const struct warp_target *target,
+                      const struct bin_entry *entry, uint32_t n);
+
 /* Clears a tile, and draws its blocks; some of them if the frame is cancelled. */
 struct warp_counts warp_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
                              const struct warp_into *into, uint32_t tile);

@@ -5,6 +5,7 @@
 #include "simd.h"
 
 warp_fn warp_c, warp_avx2, warp_avx512;
+warp_fn warp_leaves_c, warp_leaves_avx2, warp_leaves_avx512;
 veil_fn veil_c, veil_avx2, veil_avx512;
 reproject_look_fn reproject_look_avx2;
 strip_list_fn strip_list_avx512;

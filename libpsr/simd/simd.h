@@ -23,6 +23,7 @@ struct simd {
 	warp_clear_fn *warp_clear;
 	warp_cells_fn *warp_cells;
 	warp_fn *warp;
+	warp_fn *warp_leaves; /* of entries that are cubes; the former's are blocks */
 	veil_fn *veil;
 	strip_list_fn *strip_list;
 	strip_find_fn *strip_find;

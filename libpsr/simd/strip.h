@@ -23,6 +23,7 @@ struct strip_pixels {
 	uint16_t x[STRIP + STRIP_PADDING];
 	uint32_t id[STRIP + STRIP_PADDING]; /* slot * 64 + sample */
 	const uint64_t *at[STRIP];          /* attributes */
+	uint64_t leaf[STRIP];               /* those of leaves, in the form of attributes */
 	uint8_t two_sided[STRIP];           /* with STRIP_TWO_SIDED */
 	uint32_t has_cones;   /* a sample's block is bent; with STRIP_BENT, where the surface's normal is needed */
 	uint32_t cone[STRIP]; /* then, of bent blocks: x, y, z and sine, from the lowest byte on; else STRIP_NO_CONE */

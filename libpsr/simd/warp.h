@@ -2,7 +2,7 @@
 #ifndef PSR_SIMD_WARP_H
 #define PSR_SIMD_WARP_H
 
-#include "model/blocks.h"
+#include "model/cubes.h"
 #include "tile.h"
 #include "zstack.h"
 
@@ -26,8 +26,25 @@ struct warp_lattice {
 	struct psr_placing placing;
 };
 
+/* Cubes in a picture, at one level: what lies between their middles and those of octants, of these and leaves of each
+ * octant, and a leaf's offset, a third of which is a vector of `along` for each component of its normal of 511ths.
+ * [B] (1) adds one of the former to another. */
+struct warp_octants {
+	double row[3][8];
+	float col[3][8];
+	float along[3][3];
+};
+
+/* Axis a of a point p of inner coordinates is origin[a] + axis[a] . p, as that of a lattice. */
+struct warp_cubes {
+	const struct psr_cubes *model;
+	double origin[3], axis[3][3];
+	struct warp_octants level[CUBES_MOST_LEVELS];
+};
+
 struct warp_instance {
-	const struct psr_blocks *blocks;
+	const struct psr_blocks *blocks;    /* an octree's groups: those of `cubes` */
+	const struct warp_cubes *cubes;     /* NULL: blocks */
 	const struct warp_lattice *lattice; /* one a projection */
 	uint32_t first_slot;
 	/* The direction of sight through (u, v), in inner coordinates: u du + v dv + d0, of any length. */
@@ -42,6 +59,7 @@ struct bin_entry {
 	uint8_t level;         /* of the depth buffer that fits the block */
 	uint8_t is_mixed : 1;  /* some of its samples may face away */
 	uint8_t at_border : 1; /* it may reach beyond the picture */
+	uint8_t is_wide : 1;   /* a cube's leaves: wider than pixels, so that their offsets count */
 	uint32_t hit;          /* index in bins->hit */
 };
 

@@ -6,6 +6,7 @@
 static void random_view(struct check *c, struct cull_view *view, const struct psr_blocks *blocks, int is_spoilt)
 {
 	view->blocks = blocks;
+	view->cubes = NULL;
 	view->scale = check_plain_or_any(c, is_spoilt, 0, 1);
 	view->spacing = check_plain_or_any(c, is_spoilt, 0, 0.01);
 	view->perspective = (int)check_below(c, 2);

@@ -18,12 +18,16 @@ extern "C" {
 #define PSR_MAX_INSTANCES 1024
 #define PSR_MAX_LIGHTS 32
 
+/* How a model is drawn. Automatic: as blocks if it has any. */
+enum psr_representation { PSR_AUTOMATIC, PSR_BLOCKS, PSR_OCTREE };
+
 /* world = translation + scale * rotate(rotation, object) */
 struct psr_instance {
 	const struct psr_model *model;
 	double rotation[4];  /* unit quaternion x, y, z, w */
 	double translation[3];
 	double scale;        /* > 0 */
+	enum psr_representation representation;
 };
 
 struct psr_scene {

@@ -40,6 +40,28 @@ static void widen(struct widened *restrict to, const struct psr_blocks *b, uint3
 		to->flags[i] = flags[i];
 }
 
+static void widen_cubes(struct widened *restrict to, const struct psr_cubes *cubes, uint32_t first, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		const struct psr_cube_level *level = psr_cubes_level(cubes, first + i);
+		double center[3];
+
+		psr_cubes_center(cubes, level, first + i, center);
+		to->x[i] = (float)center[0];
+		to->y[i] = (float)center[1];
+		to->z[i] = (float)center[2];
+		to->r[i] = (float)(CUBES_RADIUS * level->edge);
+		to->flags[i] = cubes->groups.flags[first + i];
+	}
+}
+
+/* From half of a block's step of depth, 2^-15. */
+static void scale_errors(struct cull_batch *out, const struct psr_cubes *cubes, uint32_t first, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++)
+		out->depth_error[i] *= (float)(psr_cubes_level(cubes, first + i)->edge * (CUBES_DIAGONAL * 0x1p14));
+}
+
 static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view,
                             const struct widened *restrict b, uint32_t n)
 {
@@ -106,8 +128,13 @@ static void cull(struct cull_batch *out, const struct cull_view *view, uint32_t 
 	struct widened blocks;
 
 	memset(&blocks, 0, sizeof blocks);
-	widen(&blocks, view->blocks, first, n);
+	if (view->cubes)
+		widen_cubes(&blocks, view->cubes, first, n);
+	else
+		widen(&blocks, view->blocks, first, n);
 	cull_by_frustum(out, view, &blocks, whole);
+	if (view->cubes)
+		scale_errors(out, view->cubes, first, n);
 	if (view->blocks->cone_sine && (view->with_cones || view->blocks->traits)) {
 		widen_cones(&blocks, view->blocks, first, n);
 		cull_by_cones(out, view, &blocks, whole);

@@ -43,6 +43,32 @@ static void find_cones(struct strip_pixels *p, const struct strip_view *view)
 	}
 }
 
+/* Finds leaves first, so that reading them overlaps the latencies of memory. */
+static void find_leaves(struct strip_pixels *p, const struct warp_instance *in, uint32_t first, uint32_t end)
+{
+	const struct psr_cubes *cubes = in->cubes->model;
+	const struct octree *tree[STRIP];
+	uint32_t leaf[STRIP];
+
+	for (uint32_t i = first; i < end; i++) {
+		const uint32_t cube = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot;
+		const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
+		const uint32_t rank = psr_cubes_rank(level->tree, psr_cubes_code(cubes, level, cube), p->id[i] % PSR_BLOCK_SAMPLES);
+
+		tree[i] = level->tree;
+		leaf[i] = psr_cubes_leaf(cubes, level, cube) + rank;
+		p->two_sided[i] = cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED;
+		if (tree[i]->normal != NULL)
+			__builtin_prefetch(tree[i]->normal + leaf[i]);
+		if (tree[i]->color != NULL)
+			__builtin_prefetch(tree[i]->color + leaf[i]);
+	}
+	for (uint32_t i = first; i < end; i++) {
+		p->leaf[i] = psr_cubes_attr(tree[i], leaf[i]);
+		p->at[i] = &p->leaf[i];
+	}
+}
+
 static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 {
 	const uint32_t n = p->n;
@@ -51,6 +77,11 @@ static void strip_find(struct strip_pixels *p, const struct strip_view *view)
 		const struct warp_instance *in = instance_run(&end, p, view, i, n);
 		const struct psr_blocks b = *in->blocks;
 
+		if (in->cubes) {
+			find_leaves(p, in, i, end);
+			i = end;
+			continue;
+		}
 		for (; i < end; i++) {
 			const uint32_t block = p->id[i] / PSR_BLOCK_SAMPLES - in->first_slot, sample = p->id[i] % PSR_BLOCK_SAMPLES;
 			const uint64_t below = b.mask[block] & ((UINT64_C(1) << sample) - 1);

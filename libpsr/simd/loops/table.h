@@ -1,5 +1,5 @@
 /* The loops and the table of one instruction set; c/, avx2/ and avx512/ include this file, each compiled for its own
- * instructions. Arguments: the kernels of warp, veil and reproject_look, and a macro that names a kernel's variant where one is
+ * instructions. Arguments: the kernels of warp, leaves, veil and reproject_look, and a macro that names a kernel's variant where one is
  * written by hand. */
 #include "cull.h"
 #include "fill_pull.h"
@@ -14,12 +14,13 @@
 #include "strip.h"
 #include "zbuffer.h"
 
-#define SIMD_TABLE(warp_kernel, veil_kernel, look_kernel, KERNEL) { \
+#define SIMD_TABLE(warp_kernel, leaves_kernel, veil_kernel, look_kernel, KERNEL) { \
 	.cull = cull,                                  \
 	.warp_far = warp_far,                          \
 	.warp_clear = warp_clear,                      \
 	.warp_cells = warp_cells,                      \
 	.warp = warp_kernel,                           \
+	.warp_leaves = leaves_kernel,                  \
 	.veil = veil_kernel,                           \
 	.strip_list = KERNEL(strip_list),              \
 	.strip_find = strip_find,                      \

@@ -61,8 +61,9 @@ static void stage_init(struct stage *s, const struct shape_options *square, cons
 	memset(s, 0, sizeof *s);
 	s->floor = square_of(&FINE);
 	s->square = square_of(square);
-	s->instance[0] = (struct psr_instance){ s->floor, { 0, 0, 0, 1 }, { 0, 0, 0 }, 2 };
-	s->instance[1] = (struct psr_instance){ s->square, { 0, 1, 0, 0 }, { 0, 0, HEIGHT }, 0.4 };
+	s->instance[0] = (struct psr_instance){ .model = s->floor, .rotation = { 0, 0, 0, 1 }, .scale = 2 };
+	s->instance[1] = (struct psr_instance){ .model = s->square, .rotation = { 0, 1, 0, 0 },
+		                                .translation = { 0, 0, HEIGHT }, .scale = 0.4 };
 	s->light[0] = *light;
 	s->scene = (struct psr_scene){ .instance = s->instance, .n_instances = 2, .light = s->light, .n_lights = 1,
 		                           .ambient = { 0.1, 0.1, 0.1 } };
@@ -257,7 +258,7 @@ static void a_plane_does_not_shadow_itself(void **state)
 		}
 		stage_init(&s, i & 1 ? &FINE : &COARSE, &light);
 		s.scene.instance = &s.instance[i & 1];
-		s.instance[1] = (struct psr_instance){ s.square, { 0, 0, 0, 1 }, { 0, 0, 0 }, 1.5 };
+		s.instance[1] = (struct psr_instance){ .model = s.square, .rotation = { 0, 0, 0, 1 }, .scale = 1.5 };
 		s.scene.n_instances = 1;
 		uint8_t *lit = draw_unshadowed(&s), *got = draw(&s, NULL);
 		assert_int_equal(s.report.n_shadow_maps_drawn, s.report.n_shadow_maps);
@@ -313,7 +314,8 @@ static void faces_that_meet_do_not_shadow_each_other(void **state)
 		light.direction[0] = -0.05 - 0.05 * i;
 		light.direction[1] = 0.05;
 		stage_init(&s, &FINE, &light);
-		s.instance[1] = (struct psr_instance){ s.square, { 0, turn, 0, turn }, { wall, 0, HALF_SQUARE }, 0.4 };
+		s.instance[1] = (struct psr_instance){ .model = s.square, .rotation = { 0, turn, 0, turn },
+			                                   .translation = { wall, 0, HALF_SQUARE }, .scale = 0.4 };
 		s.scene.camera.eye[0] = s.scene.camera.target[0] = wall;
 		s.scene.camera.ortho_height = view;
 		uint8_t *lit = draw_unshadowed(&s), *got = draw(&s, NULL);

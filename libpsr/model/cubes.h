@@ -1,0 +1,123 @@
+/* An octree as what is drawn: cubes of 4x4x4 leaves, of the tree and of coarser ones that end higher. */
+#ifndef PSR_MODEL_CUBES_H
+#define PSR_MODEL_CUBES_H
+
+#include <string.h>
+#include "model/blocks.h"
+#include "octree/octree.h"
+
+#define CUBES_MOST_LEVELS 5 /* those of a cluster: one cube of the coarsest covers 64x64x64 leaves */
+#define CUBES_RUN 64        /* cubes that store their codes' and leaves' places relative to those of the first one */
+#define CUBES_DIAGONAL 1.7320508075688772 /* a leaf's, in edges */
+/* From a cube's middle to its farthest leaf's, that leaf's offset, and half the distance of neighbours; in edges. */
+#define CUBES_RADIUS (CUBES_DIAGONAL * (1.5 + 0.375 + 0.5))
+#define CUBES_PLACE_BITS 18 /* of a coordinate, in edges of a cube */
+
+struct psr_cube_run {
+	uint32_t code, leaf;
+};
+
+struct psr_cube_level {
+	const struct octree *tree; /* of level 0 the model's; each further one has a level less, and averaged attributes */
+	uint32_t first, n;         /* its cubes */
+	double edge;               /* of a leaf, inner units */
+	const struct psr_cube_run *run;
+};
+
+/* Cubes are numbered by level, the finest first, then in Morton order. Cubes of one cluster follow each other. A
+ * cluster is a node of at most 64x64x64 leaves of level 0; it has a cluster at each level, which are a group. */
+struct psr_cubes {
+	/* What culling reads. Has clusters, flags, and where the tree has normals of one side, cones; levels are those of
+	 * blocks. Has no projections, spheres, masks, depths or attributes. */
+	struct psr_blocks groups;
+	struct psr_cube_level level[CUBES_MOST_LEVELS];
+	const uint64_t *place;  /* CUBES_PLACE_BITS a coordinate, x lowest */
+	const uint16_t *code, *leaf;
+	double spacing;         /* greatest distance of neighbouring leaves of level 0, inner units: a leaf's diagonal */
+	uint64_t n_bytes;
+};
+
+/* Makes the cubes of a valid tree, which must outlive them. LIMIT: more than 2^26 cubes, or 2^32 codes or leaves;
+ * MEMORY. */
+int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct psr_error *err);
+void psr_cubes_destroy(struct psr_cubes *cubes); /* NULL is fine */
+
+/* Returns NULL if the model has no octree. */
+const struct psr_cubes *psr_model_cubes(const struct psr_model *model);
+
+/* Returns whether leaves are seen from where their normals point only. */
+static inline int psr_octree_is_one_sided(const struct octree *tree)
+{
+	return tree->is_one_sided && tree->normal != NULL;
+}
+
+static inline const struct psr_cube_level *psr_cubes_level(const struct psr_cubes *cubes, uint32_t cube)
+{
+	return &cubes->level[cubes->groups.flags[cube] & PSR_BLOCK_LEVEL];
+}
+
+/* Returns the place of a cube's code in its level's tree, and its first leaf. */
+static inline uint32_t psr_cubes_code(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
+{
+	return level->run[(cube - level->first) / CUBES_RUN].code + cubes->code[cube];
+}
+
+static inline uint32_t psr_cubes_leaf(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
+{
+	return level->run[(cube - level->first) / CUBES_RUN].leaf + cubes->leaf[cube];
+}
+
+/* Computes the middle of a cube, in inner units. */
+static inline void psr_cubes_center(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube,
+                                    double center[3])
+{
+	const uint64_t place = cubes->place[cube], most = (1u << CUBES_PLACE_BITS) - 1;
+
+	for (int a = 0; a < 3; a++)
+		center[a] = level->tree->low[a]
+		            + (double)(int32_t)(4 * (place >> CUBES_PLACE_BITS * a & most) + 2) * level->edge;
+}
+
+/* Reads the codes of a cube's children, the first one lowest; those behind it are undefined. code: the cube's. */
+static inline uint64_t psr_cubes_children(const struct octree *tree, uint32_t code)
+{
+	const uint64_t left = tree->n_codes - 1 - code;
+	uint64_t children = 0;
+
+	if (left >= sizeof children)
+		memcpy(&children, tree->code + code + 1, sizeof children);
+	else
+		memcpy(&children, tree->code + code + 1, left);
+	return children;
+}
+
+/* Returns how many leaves of a cube come before this lane: lane 8 i + j is octant j of its octant i. */
+static inline uint32_t psr_cubes_rank(const struct octree *tree, uint32_t code, uint32_t lane)
+{
+	const unsigned before = (unsigned)__builtin_popcount(tree->code[code] & ((1u << (lane >> 3)) - 1));
+	const uint64_t below = psr_cubes_children(tree, code) & ((UINT64_C(1) << (8 * before + (lane & 7))) - 1);
+
+	return (uint32_t)__builtin_popcountll(below);
+}
+
+/* Builds a leaf's attributes in the form of a block's sample. Without a normal it is unlit. */
+static inline uint64_t psr_cubes_attr(const struct octree *tree, uint32_t leaf)
+{
+	uint64_t attr = tree->normal != NULL ? tree->normal[leaf] | UINT64_C(255) << 56 : 1u << 15;
+	const uint8_t *color = tree->color != NULL ? tree->color[leaf] : NULL;
+
+	attr |= color != NULL ? (uint64_t)color[0] << 16 | (uint64_t)color[1] << 24 | (uint64_t)color[2] << 32
+	                      : UINT64_C(0xffffff) << 16;
+	return attr;
+}
+
+/* The same of a lane of a cube that has it. */
+static inline uint64_t psr_cubes_sample(const struct psr_cubes *cubes, uint32_t cube, uint32_t lane)
+{
+	const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
+	const uint32_t code = psr_cubes_code(cubes, level, cube);
+
+	return psr_cubes_attr(level->tree, psr_cubes_leaf(cubes, level, cube) + psr_cubes_rank(level->tree, code, lane));
+}
+
+#endif

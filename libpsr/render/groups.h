@@ -1,0 +1,28 @@
+/* Which representation of its model an instance is drawn from. */
+#ifndef PSR_RENDER_GROUPS_H
+#define PSR_RENDER_GROUPS_H
+
+#include "model/cubes.h"
+#include "psr/scene.h"
+
+/* Returns the cubes of an instance that is drawn as an octree, or NULL: it names that representation, or its model has
+ * no blocks. */
+static inline const struct psr_cubes *instance_cubes(const struct psr_instance *instance)
+{
+	const int is_octree = instance->representation == PSR_OCTREE
+	                      || (instance->representation == PSR_AUTOMATIC && psr_model_blocks(instance->model) == NULL);
+
+	return is_octree ? psr_model_cubes(instance->model) : NULL;
+}
+
+/* Returns what culling reads; NULL if the model has not what the instance names. */
+static inline const struct psr_blocks *instance_groups(const struct psr_instance *instance)
+{
+	const struct psr_cubes *cubes = instance_cubes(instance);
+
+	if (cubes != NULL)
+		return &cubes->groups;
+	return instance->representation != PSR_OCTREE ? psr_model_blocks(instance->model) : NULL;
+}
+
+#endif
