@@ -25,6 +25,7 @@ libpsr/image
 libpsr/surface
 libpsr/ray
 libpsr/measure
+libpsr/sample/octree
 libpsr/sample/project
 libpsr/sample/visible
 libpsr/sample/own

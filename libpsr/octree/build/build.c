@@ -66,6 +66,29 @@ static int bound_point(struct building *b, const struct octree_point *point)
 	return PSR_OK;
 }
 
+static int check_options(const struct octree_build_options *options, struct psr_error *err)
+{
+	if ((options->levels == 0 && !(options->spacing > 0.0)) ||
+	    (options->levels != 0 && (options->levels < OCTREE_LEAST_LEVELS || options->levels > OCTREE_MOST_LEVELS)) ||
+	    options->memory < OCTREE_LEAST_MEMORY)
+		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels, leaves of %g, sorted in %llu bytes, cannot be built",
+		                options->levels, options->spacing, (unsigned long long)options->memory);
+	return PSR_OK;
+}
+
+int octree_build_levels(int *levels, const struct octree_build_options *options, const char *name, double edge,
+                        struct psr_error *err)
+{
+	int rc = check_options(options, err);
+
+	*levels = options->levels > 0 ? options->levels : OCTREE_LEAST_LEVELS;
+	for (; rc == PSR_OK && options->levels == 0 && ldexp(edge, -*levels) > options->spacing; ++*levels)
+		if (*levels == OCTREE_MOST_LEVELS)
+			return psr_fail(err, PSR_ERR_ARG, "%s: leaves of %g in a cube of %g are more than %d levels; %g is possible",
+			                name, options->spacing, edge, OCTREE_MOST_LEVELS, ldexp(edge, -OCTREE_MOST_LEVELS));
+	return rc;
+}
+
 /* Finds the cube and its levels. */
 static int find_cube(struct building *b)
 {
@@ -89,14 +112,7 @@ static int find_cube(struct building *b)
 	if (!isfinite(b->edge) || b->edge < ldexp(largest, -50))
 		return psr_fail(b->err, PSR_ERR_FORMAT, "%s: points that extend over %g at coordinates of %g cannot be told apart",
 		                b->source->name, b->edge, largest);
-	b->levels = b->options->levels;
-	for (b->levels = b->levels > 0 ? b->levels : OCTREE_LEAST_LEVELS;
-	     b->options->levels == 0 && ldexp(b->edge, -b->levels) > b->options->spacing; b->levels++)
-		if (b->levels == OCTREE_MOST_LEVELS)
-			return psr_fail(b->err, PSR_ERR_ARG, "%s: leaves of %g in a cube of %g are more than %d levels; %g is possible",
-			                b->source->name, b->options->spacing, b->edge, OCTREE_MOST_LEVELS,
-			                ldexp(b->edge, -OCTREE_MOST_LEVELS));
-	return PSR_OK;
+	return octree_build_levels(&b->levels, b->options, b->source->name, b->edge, b->err);
 }
 
 static uint16_t normal_code(const float normal[3])
@@ -260,13 +276,10 @@ int octree_build(struct octree **out, const struct octree_source *source, const 
 {
 	struct psr_error own;
 	struct building b = { .source = source, .options = options, .err = err != NULL ? err : &own };
-	int rc;
+	int rc = check_options(options, b.err);
 
-	if ((options->levels == 0 && !(options->spacing > 0.0)) ||
-	    (options->levels != 0 && (options->levels < OCTREE_LEAST_LEVELS || options->levels > OCTREE_MOST_LEVELS)) ||
-	    options->memory < OCTREE_LEAST_MEMORY)
-		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels, leaves of %g, sorted in %llu bytes, cannot be built",
-		                options->levels, options->spacing, (unsigned long long)options->memory);
+	if (rc != PSR_OK)
+		return rc;
 	rc = build(&b);
 	free(b.built.part);
 	if (rc == PSR_OK)

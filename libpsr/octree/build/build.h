@@ -31,7 +31,7 @@ struct octree_build_options {
 	uint64_t memory;     /* bytes to sort in, OCTREE_LEAST_MEMORY at least; the tree itself comes on top */
 	const char *folder;  /* for the runs */
 	const struct psr_cancel *cancel; /* may be NULL */
-	/* stage: "bounds", "points", "merge" or "normals". May be NULL. */
+	/* stage: "bounds", "points", "merge" or "normals"; "leaves" of a mesh. May be NULL. */
 	void (*on_progress)(const char *stage, uint64_t done, uint64_t total, void *userdata);
 	void *userdata;
 };
@@ -40,6 +40,11 @@ struct octree_build_options {
 
 /* 10 levels, 2 GB, the folder of the environment's TMPDIR or /tmp. */
 void octree_build_options_default(struct octree_build_options *options);
+
+/* Checks the ranges of options, and finds how many levels they ask for in a cube of this edge. ARG: a spacing finer than
+ * OCTREE_MOST_LEVELS levels, too. */
+int octree_build_levels(int *levels, const struct octree_build_options *options, const char *name, double edge,
+                        struct psr_error *err);
 
 /* Builds a tree with normals, offsets, and colours if the source has any. Colours and places of a leaf's points are
  * averaged, and so are normals of the source. Leaves whose points have none get least squares over 27 cells around, of

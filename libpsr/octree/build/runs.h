@@ -10,8 +10,13 @@
 
 struct record {
 	uint64_t path;
-	uint8_t color[3], part[3]; /* part: the place within the leaf, in 256ths */
-	uint16_t normal; /* base/direction.h; RECORD_NO_NORMAL */
+	union {
+		struct { /* a point */
+			uint8_t color[3], part[3]; /* part: the place within the leaf, in 256ths */
+			uint16_t normal;           /* base/direction.h; RECORD_NO_NORMAL */
+		};
+		uint32_t triangle;
+	};
 };
 
 struct run {

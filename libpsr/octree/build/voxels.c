@@ -1,11 +1,13 @@
 #include <math.h>
 #include "voxels.h"
 #include "runs.h"
+#include "base/array.h"
 #include "base/vec.h"
 
 struct meeting {
 	struct runs runs;
 	int levels;
+	uint32_t triangle;
 	double corner[3][3], side[3][3], normal[3]; /* of a triangle, in leaves */
 	int first[3], last[3];                      /* leaves that its bounds meet */
 	struct psr_error *err;
@@ -50,7 +52,7 @@ static int put_leaves(struct meeting *m, const uint32_t at[3], int up)
 	if (!meets(m, middle, 0.5 * edge))
 		return PSR_OK;
 	if (up == 0) {
-		const struct record record = { .path = octree_path(at) };
+		const struct record record = { .path = octree_path(at), .triangle = m->triangle };
 
 		return runs_put(&m->runs, &record, m->err);
 	}
@@ -89,26 +91,40 @@ static int put_triangle(struct meeting *m, const struct octree_surface *s, const
 	return put_leaves(m, at, up);
 }
 
-static int merge(struct octree **out, struct meeting *m)
+/* The triangles of one leaf. */
+struct group {
+	uint64_t path;
+	uint32_t *triangle;
+	size_t n, room;
+};
+
+static int merge(struct meeting *m, int (*visit)(uint64_t path, const uint32_t *triangle, size_t n, void *userdata),
+                 void *userdata)
 {
-	struct octree_maker maker;
+	struct group group = { 0 };
 	const struct record *record;
-	uint64_t last = UINT64_MAX;
-	int rc = octree_maker_init(&maker, m->levels, m->err);
+	int rc = PSR_OK;
 
 	while (rc == PSR_OK && (record = runs_next(&m->runs, &rc, m->err)) != NULL) {
-		if (record->path != last)
-			rc = octree_maker_put(&maker, record->path, m->err);
-		last = record->path;
+		if (group.n > 0 && record->path != group.path) {
+			rc = visit(group.path, group.triangle, group.n, userdata);
+			group.n = 0;
+		}
+		group.path = record->path;
+		if (!ARRAY_ROOM(group.triangle, group.n, group.room))
+			rc = psr_fail(m->err, PSR_ERR_MEMORY, "no memory for the triangles of a leaf");
+		else
+			group.triangle[group.n++] = record->triangle;
 	}
-	if (rc == PSR_OK)
-		*out = octree_maker_take(&maker);
-	octree_maker_fini(&maker);
+	if (rc == PSR_OK && group.n > 0)
+		rc = visit(group.path, group.triangle, group.n, userdata);
+	free(group.triangle);
 	return rc;
 }
 
-int octree_from_surface(struct octree **out, const struct octree_surface *surface, int levels, uint64_t memory,
-                        const char *folder, struct psr_error *err)
+int octree_surface_walk(const struct octree_surface *surface, int levels, const struct octree_room *room,
+                        int (*visit)(uint64_t path, const uint32_t *triangle, size_t n, void *userdata), void *userdata,
+                        struct psr_error *err)
 {
 	struct meeting m = { .levels = levels, .err = err };
 	int rc;
@@ -116,13 +132,44 @@ int octree_from_surface(struct octree **out, const struct octree_surface *surfac
 	if (levels < OCTREE_LEAST_LEVELS || levels > OCTREE_MOST_LEVELS)
 		return psr_fail(err, PSR_ERR_ARG, "an octree of %d levels; %d to %d are possible", levels, OCTREE_LEAST_LEVELS,
 		                OCTREE_MOST_LEVELS);
-	rc = runs_init(&m.runs, folder, 3 * levels, memory, err);
-	for (uint32_t i = 0; i < surface->n_triangles && rc == PSR_OK; i++)
-		rc = put_triangle(&m, surface, surface->triangle[i]);
+	rc = runs_init(&m.runs, room->folder, 3 * levels, room->memory, err);
+	for (uint32_t i = 0; i < surface->n_triangles && rc == PSR_OK; i++) {
+		m.triangle = i;
+		rc = i % 1024 == 0 && psr_is_cancelled(surface->cancel) ? psr_fail(err, PSR_ERR_CANCELLED, "cancelled")
+		                                                        : put_triangle(&m, surface, surface->triangle[i]);
+	}
 	if (rc == PSR_OK)
 		rc = runs_end(&m.runs, err);
 	if (rc == PSR_OK)
-		rc = merge(out, &m);
+		rc = merge(&m, visit, userdata);
 	runs_fini(&m.runs);
+	return rc;
+}
+
+struct making {
+	struct octree_maker maker;
+	struct psr_error *err;
+};
+
+static int put_leaf(uint64_t path, const uint32_t *triangle, size_t n, void *userdata)
+{
+	struct making *making = userdata;
+
+	(void)triangle, (void)n;
+	return octree_maker_put(&making->maker, path, making->err);
+}
+
+int octree_from_surface(struct octree **out, const struct octree_surface *surface, int levels, uint64_t memory,
+                        const char *folder, struct psr_error *err)
+{
+	const struct octree_room room = { memory, folder };
+	struct making making = { .err = err };
+	int rc = octree_maker_init(&making.maker, levels, err);
+
+	if (rc == PSR_OK)
+		rc = octree_surface_walk(surface, levels, &room, put_leaf, &making, err);
+	if (rc == PSR_OK)
+		*out = octree_maker_take(&making.maker);
+	octree_maker_fini(&making.maker);
 	return rc;
 }

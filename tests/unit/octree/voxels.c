@@ -12,7 +12,7 @@
 
 static struct octree *voxels(const double (*position)[3], const uint32_t (*triangle)[3], uint32_t n)
 {
-	const struct octree_surface surface = { position, triangle, n, { 0.0, 0.0, 0.0 }, SIDE };
+	const struct octree_surface surface = { .position = position, .triangle = triangle, .n_triangles = n, .edge = SIDE };
 	struct octree *tree = NULL;
 
 	assert_int_equal(octree_from_surface(&tree, &surface, LEVELS, OCTREE_LEAST_MEMORY, "/tmp", NULL), PSR_OK);

@@ -1,0 +1,326 @@
+#include <math.h>
+#include <stdlib.h>
+#include "of_mesh.h"
+#include "octree/build/voxels.h"
+#include "surface/surface.h"
+#include "surface/texture.h"
+#include "base/array.h"
+#include "base/direction.h"
+#include "base/srgb.h"
+#include "base/vec.h"
+#include "model/blocks.h"
+
+#define DIAGONAL 1.4142135623730951 /* of a face of a leaf: the diameter of filters, as for samples of a lattice */
+#define ROUNDING 1e-6               /* of normals: no line goes between two triangles */
+#define REACH (0.8660254037844386 + ROUNDING) /* of offsets: half of a leaf's own diagonal */
+#define OPPOSITE (-0.5f)            /* cosines: another side of a thing; */
+#define ASIDE (-0.1f)               /* the same one, or one around an edge */
+
+/* The surface of one triangle within a leaf. */
+struct facet {
+	uint32_t triangle;
+	double corner[3][3]; /* of the whole triangle, in leaves from the leaf's low corner */
+	double area, middle[3];
+	float normal[3], color[3]; /* linear */
+};
+
+struct leaf_maker {
+	const struct psr_mesh *mesh;
+	const struct octree_build_options *options;
+	struct psr_error *err;
+	struct octree_surface surface;
+	struct surface look;
+	uint8_t *is_turned;
+	int levels;
+	double scale;              /* leaves a unit of the mesh */
+	struct octree_maker maker;
+	uint64_t room;
+	struct facet *facet;       /* of the leaf that is made */
+	size_t n_facets, facets_room;
+	struct octree_mesh_report report;
+};
+
+/* ---- facets ---- */
+
+static void find_place(struct surface_place *place, const struct facet *facet, const double at[3])
+{
+	double e1[3], e2[3], d[3], n[3], a[3], b[3], nn;
+
+	v3d_sub(e1, facet->corner[1], facet->corner[0]);
+	v3d_sub(e2, facet->corner[2], facet->corner[0]);
+	v3d_sub(d, at, facet->corner[0]);
+	v3d_cross(n, e1, e2);
+	nn = v3d_dot(n, n);
+	v3d_cross(a, d, e2);
+	v3d_cross(b, e1, d);
+	place->u = nn > 0.0 ? fmin(fmax(v3d_dot(a, n) / nn, 0.0), 1.0) : 0.0;
+	place->v = nn > 0.0 ? fmin(fmax(v3d_dot(b, n) / nn, 0.0), 1.0 - place->u) : 0.0;
+}
+
+/* Adds up what is opaque of the facet, by triangles of its fan. */
+static void add_up(const struct leaf_maker *m, struct facet *facet, const struct clip *clip)
+{
+	const int may_miss = m->mesh->material[m->mesh->triangle_material[facet->triangle]].alpha != PSR_ALPHA_OPAQUE;
+	struct surface_place place = { .prim = facet->triangle };
+
+	facet->area = 0.0;
+	v3d_set(facet->middle, 0.0, 0.0, 0.0);
+	for (int i = 0; i + 2 < clip->n; i++) {
+		double centroid[3];
+		const double area = clip_fan(clip, i, centroid);
+
+		if (may_miss) {
+			find_place(&place, facet, centroid);
+			if (texture_is_absent(m->mesh, facet->triangle, place.u, place.v))
+				continue;
+		}
+		facet->area += area;
+		v3d_add_scaled(facet->middle, facet->middle, area, centroid);
+	}
+	if (facet->area > 0.0)
+		v3d_scale(facet->middle, facet->middle, 1.0 / facet->area);
+}
+
+static void look_at(const struct leaf_maker *m, struct facet *facet)
+{
+	struct surface_place place = { .prim = facet->triangle };
+	uint64_t word;
+
+	find_place(&place, facet, facet->middle);
+	word = surface_look(&m->look, &place, DIAGONAL, facet->normal);
+	for (int c = 0; c < 3; c++) {
+		facet->normal[c] = m->is_turned[facet->triangle] ? -facet->normal[c] : facet->normal[c];
+		facet->color[c] = psr_srgb_to_linear[PSR_ATTR_BASE(word) >> 8 * c & 255];
+	}
+}
+
+/* Returns 0 without memory. */
+static int find_facets(struct leaf_maker *m, const uint32_t at[3], const uint32_t *triangle, size_t n)
+{
+	unsigned is_last = 0;
+
+	for (int c = 0; c < 3; c++)
+		is_last |= (unsigned)(at[c] == ((uint32_t)1 << m->levels) - 1) << c;
+	m->n_facets = 0;
+	for (size_t i = 0; i < n; i++) {
+		struct facet *facet;
+		struct clip clip;
+
+		if (!ARRAY_ROOM(m->facet, m->n_facets, m->facets_room))
+			return 0;
+		facet = &m->facet[m->n_facets];
+		facet->triangle = triangle[i];
+		for (int k = 0; k < 3; k++)
+			for (int c = 0; c < 3; c++)
+				facet->corner[k][c] =
+					(m->mesh->position[m->mesh->triangle[triangle[i]][k]][c] - m->surface.low[c]) * m->scale - at[c];
+		clip_triangle(&clip, (const double(*)[3])facet->corner);
+		if (clip.n == 0 || clip_is_next_ones(&clip, is_last))
+			continue;
+		add_up(m, facet, &clip);
+		if (!(facet->area > 0.0))
+			continue;
+		look_at(m, facet);
+		m->n_facets++;
+	}
+	return 1;
+}
+
+/* ---- a leaf ---- */
+
+/* Returns how far along the normal the line through the leaf's middle meets a triangle, in leaves; INFINITY: nowhere. */
+static double meet(const struct facet *facet, const float normal[3])
+{
+	const double middle[3] = { 0.5, 0.5, 0.5 }, dir[3] = { normal[0], normal[1], normal[2] };
+	double e1[3], e2[3], p[3], q[3], d[3], det, u, v;
+
+	v3d_sub(e1, facet->corner[1], facet->corner[0]);
+	v3d_sub(e2, facet->corner[2], facet->corner[0]);
+	v3d_cross(p, dir, e2);
+	det = v3d_dot(e1, p);
+	if (det == 0.0)
+		return INFINITY;
+	v3d_sub(d, middle, facet->corner[0]);
+	u = v3d_dot(d, p) / det;
+	v3d_cross(q, d, e1);
+	v = v3d_dot(dir, q) / det;
+	return u >= -ROUNDING && v >= -ROUNDING && u + v <= 1.0 + ROUNDING ? v3d_dot(e2, q) / det : INFINITY;
+}
+
+static int is_on_side(const struct facet *facet, const float side[3])
+{
+	return v3f_dot(facet->normal, side) > ASIDE;
+}
+
+/* Sums up the facets on the side of the greatest one; returns their area. */
+static double add_facets(struct leaf_maker *m, const float side[3], double normal[3], double color[3], double middle[3])
+{
+	double area = 0.0;
+	int is_both = 0;
+
+	for (size_t i = 0; i < m->n_facets; i++) {
+		const struct facet *f = &m->facet[i];
+
+		is_both |= v3f_dot(f->normal, side) < OPPOSITE;
+		if (!is_on_side(f, side))
+			continue;
+		area += f->area;
+		for (int c = 0; c < 3; c++) {
+			normal[c] += f->area * (double)f->normal[c];
+			color[c] += f->area * (double)f->color[c];
+			middle[c] += f->area * f->middle[c];
+		}
+	}
+	m->report.n_both += (uint64_t)is_both;
+	return area;
+}
+
+static double find_offset(const struct leaf_maker *m, const float side[3], const float normal[3], const double middle[3])
+{
+	double nearest = INFINITY;
+
+	for (size_t i = 0; i < m->n_facets; i++) {
+		const double t = is_on_side(&m->facet[i], side) ? meet(&m->facet[i], normal) : INFINITY;
+
+		nearest = fabs(t) < fabs(nearest) ? t : nearest;
+	}
+	if (fabs(nearest) <= REACH)
+		return nearest;
+	nearest = 0.0;
+	for (int c = 0; c < 3; c++)
+		nearest += (middle[c] - 0.5) * (double)normal[c];
+	return nearest;
+}
+
+static void set_leaf(struct leaf_maker *m, uint64_t leaf)
+{
+	struct octree *tree = m->maker.tree;
+	const struct facet *greatest = m->facet;
+	double normal[3] = { 0 }, color[3] = { 0 }, middle[3] = { 0 }, area;
+	float mean[3];
+
+	for (size_t i = 1; i < m->n_facets; i++)
+		greatest = m->facet[i].area > greatest->area ? &m->facet[i] : greatest;
+	area = add_facets(m, greatest->normal, normal, color, middle);
+	for (int c = 0; c < 3; c++) {
+		mean[c] = (float)(normal[c] / area);
+		middle[c] /= area;
+		tree->color[leaf][c] = psr_linear_to_srgb((float)(color[c] / area));
+	}
+	tree->normal[leaf] = psr_direction_encode(mean);
+	tree->offset[leaf] = (uint8_t)octree_offset_step(
+		find_offset(m, greatest->normal, psr_direction_table()[tree->normal[leaf]], middle));
+}
+
+static int leaf_room(struct leaf_maker *m, uint64_t leaf)
+{
+	struct octree *tree = m->maker.tree;
+	const uint64_t more = leaf + leaf / 4 + 4096;
+	void *normal, *color, *offset;
+
+	if (leaf < m->room)
+		return 1;
+	if ((normal = realloc(tree->normal, more * sizeof *tree->normal)) != NULL)
+		tree->normal = normal;
+	if ((color = realloc(tree->color, more * sizeof *tree->color)) != NULL)
+		tree->color = color;
+	if ((offset = realloc(tree->offset, more)) != NULL)
+		tree->offset = offset;
+	if (normal == NULL || color == NULL || offset == NULL)
+		return 0;
+	m->room = more;
+	return 1;
+}
+
+static int make_leaf(uint64_t path, const uint32_t *triangle, size_t n, void *userdata)
+{
+	struct leaf_maker *m = userdata;
+	const uint64_t leaf = m->maker.tree->n_leaves;
+	uint32_t at[3];
+
+	octree_place(path, at);
+	if (!leaf_room(m, leaf) || !find_facets(m, at, triangle, n))
+		return psr_fail(m->err, PSR_ERR_MEMORY, "no memory for an octree of %llu leaves", (unsigned long long)leaf);
+	if (leaf % 1024 == 0) {
+		if (psr_is_cancelled(m->options->cancel))
+			return psr_fail(m->err, PSR_ERR_CANCELLED, "cancelled");
+		if (m->options->on_progress != NULL)
+			m->options->on_progress("leaves", leaf, 0, m->options->userdata);
+	}
+	if (m->n_facets == 0)
+		return PSR_OK;
+	set_leaf(m, leaf);
+	return octree_maker_put(&m->maker, path, m->err);
+}
+
+/* ---- the whole ---- */
+
+static void find_cube(struct octree_surface *surface, const struct psr_mesh *mesh)
+{
+	double high[3];
+
+	for (int c = 0; c < 3; c++) {
+		surface->low[c] = INFINITY;
+		high[c] = -INFINITY;
+	}
+	for (uint32_t t = 0; t < mesh->n_triangles; t++)
+		for (int i = 0; i < 3; i++)
+			for (int c = 0; c < 3; c++) {
+				const double x = mesh->position[mesh->triangle[t][i]][c];
+
+				surface->low[c] = fmin(surface->low[c], x);
+				high[c] = fmax(high[c], x);
+			}
+	for (int c = 0; c < 3; c++)
+		surface->edge = fmax(surface->edge, high[c] - surface->low[c]);
+}
+
+static int build(struct leaf_maker *m)
+{
+	const struct octree_room room = { m->options->memory, m->options->folder };
+	int rc = octree_mesh_sides(&m->is_turned, &m->report.is_closed, m->mesh);
+
+	if (rc == PSR_OK)
+		rc = surface_init(&m->look, m->mesh, ldexp(m->surface.edge, -m->levels));
+	if (rc != PSR_OK)
+		return psr_fail(m->err, rc, "no memory for a surface of %u triangles", m->mesh->n_triangles);
+	m->scale = ldexp(1.0, m->levels) / m->surface.edge;
+	rc = octree_maker_init(&m->maker, m->levels, m->err);
+	if (rc == PSR_OK)
+		rc = octree_surface_walk(&m->surface, m->levels, &room, make_leaf, m, m->err);
+	if (rc == PSR_OK && m->maker.tree->n_leaves == 0)
+		rc = psr_fail(m->err, PSR_ERR_FORMAT, "nothing of the surface of %u triangles is opaque", m->mesh->n_triangles);
+	return rc;
+}
+
+int octree_of_mesh(struct octree **out, struct octree_mesh_report *report, const struct psr_mesh *mesh,
+                   const struct octree_build_options *options, struct psr_error *err)
+{
+	struct psr_error own;
+	struct leaf_maker m = { .mesh = mesh, .options = options, .err = err != NULL ? err : &own };
+	int rc;
+
+	if (mesh->n_triangles == 0)
+		return psr_fail(err, PSR_ERR_ARG, "an octree of a mesh without triangles");
+	m.surface = (struct octree_surface){ .position = (const double(*)[3])mesh->position,
+		                                 .triangle = (const uint32_t(*)[3])mesh->triangle,
+		                                 .n_triangles = mesh->n_triangles,
+		                                 .cancel = options->cancel };
+	find_cube(&m.surface, mesh);
+	rc = octree_build_levels(&m.levels, options, "mesh", m.surface.edge, m.err);
+	if (rc == PSR_OK)
+		rc = build(&m);
+	if (rc == PSR_OK) {
+		*out = octree_maker_take(&m.maker);
+		for (int c = 0; c < 3; c++)
+			(*out)->low[c] = m.surface.low[c];
+		(*out)->edge = m.surface.edge;
+		if (report != NULL)
+			*report = m.report;
+	}
+	octree_maker_fini(&m.maker);
+	surface_fini(&m.look);
+	free(m.is_turned);
+	free(m.facet);
+	return rc;
+}
