@@ -3,79 +3,13 @@
 #include <math.h>
 #include <string.h>
 #include "base/maths.h"
-#include "base/direction.h"
 #include "tests/simd/lib/blocks.h"
+#include "tests/simd/lib/picture.h"
 
 #define MAX_INSTANCES 3
 #define MAX_PROJECTIONS 4
 
 enum numbers { PLAIN, SPOILT, EDGES };
-
-struct picture {
-	uint32_t width, height, levels;
-	struct warp_target target;
-};
-
-static uint32_t random_side(struct check *c, uint32_t tile)
-{
-	static const uint32_t odd[] = { 1, 2, 3, 15, 16, 17, 31, 33, 64, 127 };
-	if (check_one_in(c, 2))
-		return odd[check_below(c, sizeof odd / sizeof odd[0])] + (check_one_in(c, 3) ? tile : 0);
-	return 1 + check_below(c, 2 * tile);
-}
-
-/* Depths as they are while a tile is drawn: nothing, or something nearer. */
-static float random_depth(struct check *c)
-{
-	if (check_one_in(c, 3))
-		return INFINITY;
-	return (float)check_real(c, 0, 2);
-}
-
-/* Any tile of a picture, as render/warp.c makes it. */
-static void make_picture(struct check *c, struct picture *p, uint32_t width, uint32_t height, uint32_t levels)
-{
-	struct warp_target *t = &p->target;
-	const uint32_t tiles_x = (width + TILE_WIDTH - 1) / TILE_WIDTH, tiles_y = (height + TILE_HEIGHT - 1) / TILE_HEIGHT;
-	const uint32_t tx = check_below(c, tiles_x), ty = check_below(c, tiles_y);
-	const int is_last_x = tx + 1 == tiles_x, is_last_y = ty + 1 == tiles_y;
-
-	memset(p, 0, sizeof *p);
-	p->width = width;
-	p->height = height;
-	p->levels = levels & 0xfe;
-	t->direction = psr_direction_tens();
-	t->stride = width + (check_one_in(c, 2) ? check_below(c, 20) : 0);
-	t->x0 = (int32_t)(tx * TILE_WIDTH);
-	t->y0 = (int32_t)(ty * TILE_HEIGHT);
-	t->x1 = is_last_x ? (int32_t)width : t->x0 + TILE_WIDTH;
-	t->y1 = is_last_y ? (int32_t)height : t->y0 + TILE_HEIGHT;
-	uint64_t *word = check_out(c, (size_t)t->stride * height, sizeof *word);
-	for (size_t i = 0; i < (size_t)t->stride * height; i++)
-		word[i] = (uint64_t)psr_bits_from_float(random_depth(c)) << 32 | check_u32(c);
-	t->word = word + (size_t)t->y0 * t->stride + (size_t)t->x0;
-	for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++) {
-		if (!(p->levels >> k & 1))
-			continue;
-		struct warp_cells *cells = &t->cells[k];
-		const uint32_t side = 1u << k, cells_x = (width + side - 1) / side + 2,
-					   cells_y = (height + side - 1) / side + 2;
-		cells->stride = cells_x;
-		cells->x0 = tx ? t->x0 : -(1 << k);
-		cells->y0 = ty ? t->y0 : -(1 << k);
-		cells->x1 = is_last_x ? (int32_t)(cells_x - 1) << k : t->x1;
-		cells->y1 = is_last_y ? (int32_t)(cells_y - 1) << k : t->y1;
-		cells->first = (uint32_t)((cells->y0 >> k) + 1) * cells_x + (uint32_t)((cells->x0 >> k) + 1);
-		cells->z = check_out(c, (size_t)cells_x * cells_y, sizeof *cells->z);
-		for (size_t i = 0; i < (size_t)cells_x * cells_y; i++)
-			cells->z[i] = random_depth(c);
-	}
-}
-
-static void random_picture(struct check *c, struct picture *p)
-{
-	make_picture(c, p, random_side(c, TILE_WIDTH), random_side(c, TILE_HEIGHT), check_u32(c) & check_u32(c));
-}
 
 static void complete_lattice(struct warp_lattice *lattice, const struct psr_projection *projection)
 {
@@ -136,19 +70,6 @@ static void edge_lattice(struct check *c, struct warp_lattice *lattice, const st
 	complete_lattice(lattice, projection);
 }
 
-static void random_sight(struct check *c, struct warp_instance *in, const struct warp_target *t, int is_spoilt)
-{
-	for (int k = 0; k < 3; k++) {
-		in->du[k] = t->perspective ? (float)check_real(c, -0.01, 0.01) : 0;
-		in->dv[k] = t->perspective ? (float)check_real(c, -0.01, 0.01) : 0;
-		in->d0[k] = (float)check_real(c, -1, 1);
-		if (is_spoilt && check_one_in(c, 6))
-			in->du[k] = check_float(c);
-		if (is_spoilt && check_one_in(c, 6))
-			in->d0[k] = check_float(c);
-	}
-}
-
 static const struct bin_entry *make_entries(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_samples,
                                             double step, enum numbers numbers)
 {
@@ -179,7 +100,7 @@ static const struct bin_entry *make_entries(struct check *c, struct picture *p, 
 		instance[i].blocks = &blocks;
 		instance[i].lattice = lattice;
 		instance[i].first_slot = first_slot + i * blocks.n_blocks;
-		random_sight(c, &instance[i], t, numbers == SPOILT);
+		picture_sight(c, &instance[i], t, numbers == SPOILT);
 	}
 	for (uint32_t e = 0; e < n_entries; e++) {
 		const uint32_t i = check_below(c, n_instances);
@@ -222,8 +143,8 @@ static void veil_blocks(struct check *c, struct picture *p, const struct bin_ent
 	for (int i = 0; i <= PSR_OPAQUE; i++)
 		bits[i] = check_one_in(c, 20) ? 0x1p28f : (float)check_real(c, 0, VEIL_MOST / 8);
 	for (size_t i = 0; i < n_pixels; i++) {
-		before[i] = random_depth(c);
-		word[i] = check_one_in(c, 2) ? PSR_WORD_EMPTY : (uint64_t)psr_bits_from_float(random_depth(c)) << 32;
+		before[i] = picture_depth(c);
+		word[i] = check_one_in(c, 2) ? PSR_WORD_EMPTY : (uint64_t)psr_bits_from_float(picture_depth(c)) << 32;
 		veil[i] = check_one_in(c, 3) ? VEIL_MOST - check_below(c, 9999) : check_below(c, VEIL_MOST + 1);
 	}
 	while (check_next(c))
@@ -237,7 +158,7 @@ static void random_veils(struct check *c)
 	const uint32_t n = check_below(c, 30);
 	struct picture p;
 
-	random_picture(c, &p);
+	picture_random(c, &p);
 	const struct bin_entry *entry = make_entries(c, &p, n, 0, exp2(check_real(c, -8, 6)), numbers);
 	veil_blocks(c, &p, entry, n, check_one_in(c, 4) ? VEIL_MOST_SIDE : 5);
 }
@@ -245,28 +166,28 @@ static void random_veils(struct check *c)
 static void random_blocks(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	warp_blocks(c, &p, check_below(c, 30), 0, exp2(check_real(c, -8, 6)), PLAIN);
 }
 
 static void blocks_of_each_count(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	warp_blocks(c, &p, 1, 1 + (uint32_t)c->trial / 2 % 64, exp2(check_real(c, -3, 2)), PLAIN);
 }
 
 static void spoilt_numbers(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	warp_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -8, 6)), SPOILT);
 }
 
 static void edges(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	warp_blocks(c, &p, 1 + check_below(c, 12), 0, 1, EDGES);
 }
 
@@ -275,14 +196,14 @@ static void narrow_tiles(struct check *c)
 {
 	struct picture p;
 	const uint32_t w = check_one_in(c, 2) ? 1 + check_below(c, 17) : TILE_WIDTH + 1 + check_below(c, 17);
-	make_picture(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
+	picture_make(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
 	warp_blocks(c, &p, 1 + check_below(c, 12), 0, exp2(check_real(c, -3, 3)), PLAIN);
 }
 
 static void random_clear(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	p.target.clean = check_u32(c) & ALL_PARTS;
 	while (check_next(c))
 		c->simd->warp_clear(&p.target, p.levels);
@@ -291,7 +212,7 @@ static void random_clear(struct check *c)
 static void random_cells(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	p.target.bare = check_u32(c) & ALL_PARTS;
 	while (check_next(c))
 		for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
@@ -302,7 +223,7 @@ static void random_cells(struct check *c)
 static void random_far(struct check *c)
 {
 	struct picture p;
-	random_picture(c, &p);
+	picture_random(c, &p);
 	const uint32_t rows = (uint32_t)(p.target.y1 - p.target.y0 + FAR_SIDE - 1) / FAR_SIDE;
 	uint32_t *far = check_out(c, rows * (TILE_WIDTH / FAR_SIDE), sizeof *far);
 	while (check_next(c))
@@ -312,35 +233,35 @@ static void random_far(struct check *c)
 static void bench_full_blocks(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
 	warp_blocks(c, &p, 400, 64, 0.7, PLAIN);
 }
 
 static void bench_thirds(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
 	warp_blocks(c, &p, 1200, 21, 0.7, PLAIN);
 }
 
 static void bench_veils(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
 	veil_blocks(c, &p, make_entries(c, &p, 1200, 21, 0.7, PLAIN), 1200, 1);
 }
 
 static void bench_levels(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1 | 1 << 2);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1 | 1 << 2);
 	warp_blocks(c, &p, 400, 64, 2, PLAIN);
 }
 
 static void bench_far(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
 	uint32_t *far = check_out(c, TILE_HEIGHT / FAR_SIDE * (TILE_WIDTH / FAR_SIDE), sizeof *far);
 	check_units(c, TILE_WIDTH * TILE_HEIGHT);
 	while (check_next(c))
@@ -350,7 +271,7 @@ static void bench_far(struct check *c)
 static void bench_cells(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
 	check_units(c, TILE_WIDTH * TILE_HEIGHT);
 	while (check_next(c))
 		c->simd->warp_cells(&p.target, 1);
@@ -359,7 +280,7 @@ static void bench_cells(struct check *c)
 static void bench_clear(struct check *c)
 {
 	struct picture p;
-	make_picture(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
 	check_units(c, TILE_WIDTH * TILE_HEIGHT);
 	while (check_next(c))
 		c->simd->warp_clear(&p.target, p.levels);

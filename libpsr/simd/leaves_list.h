@@ -1,0 +1,57 @@
+/* The warp of leaves by lists, as warp_list.h has it of blocks. */
+#ifndef PSR_SIMD_LEAVES_LIST_H
+#define PSR_SIMD_LEAVES_LIST_H
+
+#include "cube.h"
+#include "warp_list.h"
+
+/* Prepares cubes, and prefetches their normals and offsets where these are needed. */
+static inline void make_cubes(struct warp_cube *cubes, const struct warp_target *t, const struct bin_entry *entry,
+                              uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		struct warp_cube *c = &cubes[i];
+
+		warp_cube_make(c, &t->instance[entry[i].instance], entry[i].slot);
+		if (entry[i].is_mixed || (entry[i].is_wide && c->offset != NULL))
+			__builtin_prefetch(c->normal);
+		if (entry[i].is_wide && c->offset != NULL)
+			__builtin_prefetch(c->offset);
+	}
+}
+
+/* Lists the words of a cube's leaves, and their cells. */
+typedef void list_cube_fn(struct words *words, struct cells *cells, const struct warp_target *t,
+                          const struct bin_entry *entry, const struct warp_cube *cube);
+
+/* The warp, given a function that lists a cube; both lists have room for a cube at each call. */
+static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *list_cube,
+                                                                const struct warp_target *target,
+                                                                const struct bin_entry *entry, uint32_t n)
+{
+	struct words words;
+	struct cells cells;
+	struct warp_cube cubes[BLOCKS];
+	uint64_t n_inside = 0;
+
+	words.n = cells.n = cells.level = 0;
+	for (uint32_t e = 0; e < n; e++) {
+		if (e % BLOCKS == 0)
+			make_cubes(cubes, target, entry + e, n - e < BLOCKS ? n - e : BLOCKS);
+		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
+			n_inside += words.n;
+			lower_words(target->word, &words);
+		}
+		if (entry[e].level && (entry[e].level != cells.level || cells.n > LIST - PSR_BLOCK_SAMPLES)) {
+			lower_cells(target, &cells);
+			cells.level = entry[e].level;
+		}
+		list_cube(&words, &cells, target, &entry[e], &cubes[e % BLOCKS]);
+	}
+	n_inside += words.n;
+	lower_words(target->word, &words);
+	lower_cells(target, &cells);
+	return n_inside;
+}
+
+#endif

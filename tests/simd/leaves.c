@@ -1,0 +1,206 @@
+/* warp_leaves: cubes of 1 to 64 leaves at several levels, with and without normals and offsets, in tiles of pictures of
+ * all sizes. */
+#include <math.h>
+#include <string.h>
+#include "base/maths.h"
+#include "tests/simd/lib/picture.h"
+
+#define MAX_LEVELS 3
+
+enum numbers { PLAIN, SPOILT };
+
+/* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0: any. */
+static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, uint16_t *code, uint16_t *leaf,
+                        const uint32_t n[2])
+{
+	uint8_t some[64 * 9];
+	uint32_t n_codes = 0, n_leaves = 0;
+
+	for (uint32_t i = 0; i < n[0]; i++) {
+		const uint32_t at = n_codes;
+
+		if (i % CUBES_RUN == 0)
+			run[i / CUBES_RUN] = (struct psr_cube_run){ n_codes, n_leaves };
+		code[i] = (uint16_t)(n_codes - run[i / CUBES_RUN].code);
+		leaf[i] = (uint16_t)(n_leaves - run[i / CUBES_RUN].leaf);
+		some[at] = n[1] == 0 ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x69;
+		n_codes++;
+		for (int j = 0; j < __builtin_popcount(some[at]); j++) {
+			some[n_codes] = n[1] == 0 ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x4d;
+			n_leaves += (uint32_t)__builtin_popcount(some[n_codes++]);
+		}
+	}
+	uint8_t *codes = check_in(c, n_codes, 1);
+	memcpy(codes, some, n_codes);
+	*tree = (struct octree){ .levels = 4 + (int)check_below(c, 17), .low = { -1, -1, -1 }, .edge = 2, .code = codes,
+		                     .n_codes = n_codes, .n_leaves = n_leaves };
+	if (check_one_in(c, 4))
+		return;
+	tree->normal = check_in(c, n_leaves, sizeof *tree->normal);
+	for (uint32_t i = 0; i < n_leaves; i++)
+		tree->normal[i] &= 0x7fff;
+	if (check_one_in(c, 4))
+		return;
+	tree->offset = check_in(c, n_leaves, 1);
+	for (uint32_t i = 0; i < n_leaves; i++)
+		tree->offset[i] %= OCTREE_OFFSETS;
+}
+
+/* n_cubes of each level, 64 at most; n_leaves of each, 64, 16, or 0 for any. */
+static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_t n_leaves, struct octree *tree)
+{
+	struct psr_cubes *cubes = check_in(c, 1, sizeof *cubes);
+	const uint32_t n_levels = n_leaves > 0 ? 1 : 1 + check_below(c, MAX_LEVELS), n = n_levels * n_cubes;
+	uint64_t *place = check_in(c, n, sizeof *place);
+	uint16_t *code = check_in(c, n, sizeof *code), *leaf = check_in(c, n, sizeof *leaf);
+	uint8_t *flags = check_in(c, n, 1);
+
+	memset(cubes, 0, sizeof *cubes);
+	for (uint32_t l = 0; l < n_levels; l++) {
+		struct psr_cube_run *run = check_in(c, 1, sizeof *run);
+		struct psr_cube_level *level = &cubes->level[l];
+
+		random_tree(c, &tree[l], run, code + l * n_cubes, leaf + l * n_cubes, (const uint32_t[2]){ n_cubes, n_leaves });
+		*level = (struct psr_cube_level){ &tree[l], l * n_cubes, n_cubes, ldexp(2, -tree[l].levels), run };
+		for (uint32_t i = l * n_cubes; i < (l + 1) * n_cubes; i++) {
+			const uint32_t most = 1u << (tree[l].levels - 2);
+
+			place[i] = check_below(c, most) | (uint64_t)check_below(c, most) << CUBES_PLACE_BITS
+			           | (uint64_t)check_below(c, most) << 2 * CUBES_PLACE_BITS;
+			flags[i] = (uint8_t)(l | (tree[l].normal == NULL || check_one_in(c, 2) ? PSR_BLOCK_TWO_SIDED : 0));
+		}
+	}
+	cubes->groups = (struct psr_blocks){ .n_blocks = n, .n_levels = n_levels, .flags = flags };
+	cubes->place = place;
+	cubes->code = code;
+	cubes->leaf = leaf;
+	return cubes;
+}
+
+static double plain_or_spoilt(struct check *c, enum numbers numbers, double low, double high)
+{
+	return numbers == SPOILT && check_one_in(c, 6) ? (double)check_float(c) * (check_one_in(c, 8) ? 0x1p1000 : 1)
+	                                               : check_real(c, low, high);
+}
+
+/* The model's cube is about as large as the tile, and before the eye or on both sides of it. */
+static void random_placing(struct check *c, struct warp_cubes *to, const struct psr_cubes *cubes,
+                           const struct warp_target *t, enum numbers numbers)
+{
+	const double z = check_real(c, check_one_in(c, 4) ? -0.1 : 0.3, 1), scale = t->perspective ? z : 1;
+	const double reach = (t->x1 - t->x0 + t->y1 - t->y0) * 0.3 + 4;
+
+	to->model = cubes;
+	to->origin[0] = scale * plain_or_spoilt(c, numbers, t->x0, t->x1);
+	to->origin[1] = scale * plain_or_spoilt(c, numbers, t->y0, t->y1);
+	to->origin[2] = plain_or_spoilt(c, numbers, z, z + 0.01);
+	for (int a = 0; a < 3; a++)
+		for (int k = 0; k < 3; k++)
+			to->axis[a][k] = a < 2 ? plain_or_spoilt(c, numbers, -reach, reach) : plain_or_spoilt(c, numbers, -0.2, 0.2);
+	for (uint32_t l = 0; l < cubes->groups.n_levels; l++)
+		for (int a = 0; a < 3; a++) {
+			struct warp_octants *octants = &to->level[l];
+			const double edge = cubes->level[l].edge * (a < 2 ? reach : 0.1);
+
+			for (int i = 0; i < 8; i++) {
+				octants->row[a][i] = plain_or_spoilt(c, numbers, -edge, edge);
+				octants->col[a][i] = (float)plain_or_spoilt(c, numbers, -edge / 2, edge / 2);
+			}
+			for (int k = 0; k < 3; k++)
+				octants->along[a][k] = (float)(plain_or_spoilt(c, numbers, -edge, edge) / 1000);
+		}
+}
+
+static void leaves(struct check *c, struct picture *p, uint32_t n_entries, uint32_t n_leaves, enum numbers numbers)
+{
+	struct warp_target *t = &p->target;
+	struct octree tree[MAX_LEVELS];
+	struct psr_cubes *cubes = random_cubes(c, 1 + check_below(c, n_leaves > 0 ? 64 : 20), n_leaves, tree);
+	struct warp_instance *in = check_in(c, 1, sizeof *in);
+	struct warp_cubes *to = check_in(c, 1, sizeof *to);
+	struct bin_entry *entry = check_in(c, n_entries, sizeof *entry);
+
+	t->instance = in;
+	t->perspective = check_one_in(c, 4) ? 0 : 1;
+	t->near_z = 0x1p-14f;
+	random_placing(c, to, cubes, t, numbers);
+	in->blocks = &cubes->groups;
+	in->cubes = to;
+	in->first_slot = check_below(c, (1u << 26) - 1 - cubes->groups.n_blocks);
+	picture_sight(c, in, t, numbers == SPOILT);
+	for (uint32_t e = 0; e < n_entries; e++) {
+		const uint32_t cube = check_below(c, cubes->groups.n_blocks);
+		int level = (int)check_below(c, PSR_MAX_DEPTH_LEVEL + 1);
+
+		while (level && !(p->levels >> level & 1))
+			level--;
+		entry[e] = (struct bin_entry){ .slot = in->first_slot + cube, .level = (uint8_t)level,
+			                           .is_wide = (uint8_t)(n_leaves == 0 ? check_below(c, 2) : p->levels != 0) };
+		entry[e].is_mixed = !(cubes->groups.flags[cube] & PSR_BLOCK_TWO_SIDED) && n_leaves == 0;
+	}
+	check_units(c, (uint64_t)n_entries * n_leaves);
+	while (check_next(c))
+		check_result(c, c->simd->warp_leaves(t, entry, n_entries));
+}
+
+static void random_leaves(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	leaves(c, &p, check_below(c, 40), 0, PLAIN);
+}
+
+static void spoilt_numbers(struct check *c)
+{
+	struct picture p;
+
+	picture_random(c, &p);
+	leaves(c, &p, 1 + check_below(c, 12), 0, SPOILT);
+}
+
+static void narrow_tiles(struct check *c)
+{
+	struct picture p;
+	const uint32_t w = check_one_in(c, 2) ? 1 + check_below(c, 17) : TILE_WIDTH + 1 + check_below(c, 17);
+
+	picture_make(c, &p, w, check_one_in(c, 2) ? 1 : TILE_HEIGHT + 1, check_u32(c));
+	leaves(c, &p, 1 + check_below(c, 12), 0, PLAIN);
+}
+
+static void bench_full(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	leaves(c, &p, 400, 64, PLAIN);
+}
+
+static void bench_fourths(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 0);
+	leaves(c, &p, 1600, 16, PLAIN);
+}
+
+static void bench_offsets(struct check *c)
+{
+	struct picture p;
+
+	picture_make(c, &p, TILE_WIDTH, TILE_HEIGHT, 1 << 1);
+	leaves(c, &p, 1600, 16, PLAIN);
+}
+
+int main(int argc, char **argv)
+{
+	static const struct check_test tests[] = {
+		{ "warp_leaves: random cubes, tiles and levels", random_leaves, 2000, NULL },
+		{ "warp_leaves: infinite, huge, denormal and no numbers", spoilt_numbers, 2000, NULL },
+		{ "warp_leaves: tiles narrower than a vector", narrow_tiles, 500, NULL },
+		{ "warp_leaves, full cubes", bench_full, 0, "leaf" },
+		{ "warp_leaves, cubes a fourth full", bench_fourths, 0, "leaf" },
+		{ "warp_leaves, these with offsets and depth level 1", bench_offsets, 0, "leaf" },
+	};
+	return check_main(argc, argv, tests, sizeof tests / sizeof tests[0]);
+}
