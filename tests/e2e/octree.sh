@@ -1,5 +1,5 @@
 #!/bin/bash
-# not for threads
+# needs: psr-model
 # Octrees from clouds by psr-model: leaves, memory, what info says, and options that do not go together.
 . "$(dirname "$0")/lib.sh"
 
