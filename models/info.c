@@ -20,6 +20,7 @@ struct summary {
 	const struct psr_model_info *info;
 	const struct psr_blocks *blocks; /* NULL if there are none */
 	const struct octree *tree;       /* likewise */
+	struct octree_shares shares;     /* zeros where the file has no packed octree */
 	uint64_t bytes, file_bytes;
 	int is_packed;
 	const struct psr_presets *presets;
@@ -49,6 +50,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->info = psr_model_info(model);
 	summary->blocks = psr_model_blocks(model);
 	summary->tree = psr_model_octree(model);
+	psr_model_octree_shares(model, &summary->shares);
 	summary->bytes = psr_model_bytes(model);
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->presets = psr_model_presets(model);
@@ -105,34 +107,41 @@ static void print_presets(const struct psr_presets *p)
 /* Bits a leaf of the arrays of a tree. */
 struct stream {
 	const char *name, *key;
-	double bits;
+	double bits, packed; /* packed: in the file, 0 where that is not packed as an octree */
 };
 #define N_STREAMS 5
 
-static void take_streams(struct stream streams[N_STREAMS], const struct octree *tree)
+static void take_streams(struct stream streams[N_STREAMS], const struct summary *s)
 {
+	const struct octree *tree = s->tree;
 	const double n = (double)tree->n_leaves;
 
-	streams[0] = (struct stream){ "codes", "codes", 8.0 * (double)tree->n_codes / n };
-	streams[1] = (struct stream){ "skip index", "skip", 8.0 * (double)tree->n_skips * sizeof *tree->skip / n };
-	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0 };
-	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0 };
-	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0 };
+	streams[0] = (struct stream){ "codes", "codes", 8.0 * (double)tree->n_codes / n, 0 };
+	streams[1] = (struct stream){ "skip index", "skip", 8.0 * (double)tree->n_skips * sizeof *tree->skip / n, 0 };
+	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0, 0 };
+	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0, 0 };
+	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0, 0 };
+	streams[0].packed = 8.0 * (double)s->shares.codes / n;
+	for (int i = 0; i < OCTREE_STREAMS; i++)
+		streams[2 + i].packed = 8.0 * (double)s->shares.stream[i] / n;
 }
 
 static void print_octree(const struct summary *s)
 {
 	struct stream streams[N_STREAMS];
-	double bits = 0;
+	double bits = 0, packed = 0;
 
-	take_streams(streams, s->tree);
+	take_streams(streams, s);
 	printf("octree            %d levels, %" PRIu64 " leaves of %.4g, %" PRIu64 " byte codes\n", s->tree->levels,
 	       s->tree->n_leaves, ldexp(s->tree->edge * s->info->scale, -s->tree->levels), s->tree->n_codes);
 	for (int i = 0; i < N_STREAMS; i++) {
-		printf("  %-12s    %.2f bits a leaf\n", streams[i].name, streams[i].bits);
+		printf("  %-12s    %.2f bits a leaf", streams[i].name, streams[i].bits);
+		printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", streams[i].packed);
 		bits += streams[i].bits;
+		packed += streams[i].packed;
 	}
-	printf("  %-12s    %.2f\n", "all", bits);
+	printf("  %-12s    %.2f bits a leaf", "all", bits);
+	printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", packed);
 }
 
 static cJSON *octree_json(const struct summary *s)
@@ -140,7 +149,7 @@ static cJSON *octree_json(const struct summary *s)
 	struct stream streams[N_STREAMS];
 	cJSON *root = cJSON_CreateObject(), *bits;
 
-	take_streams(streams, s->tree);
+	take_streams(streams, s);
 	cJSON_AddNumberToObject(root, "levels", s->tree->levels);
 	cJSON_AddNumberToObject(root, "leaves", (double)s->tree->n_leaves);
 	cJSON_AddNumberToObject(root, "codes", (double)s->tree->n_codes);
@@ -148,6 +157,11 @@ static cJSON *octree_json(const struct summary *s)
 	bits = cJSON_AddObjectToObject(root, "bits_per_leaf");
 	for (int i = 0; i < N_STREAMS; i++)
 		cJSON_AddNumberToObject(bits, streams[i].key, streams[i].bits);
+	if (s->shares.codes > 0) {
+		bits = cJSON_AddObjectToObject(root, "packed_bits_per_leaf");
+		for (int i = 0; i < N_STREAMS; i++)
+			cJSON_AddNumberToObject(bits, streams[i].key, streams[i].packed);
+	}
 	return root;
 }
 

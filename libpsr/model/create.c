@@ -42,6 +42,9 @@ static int check_arguments(const struct content *content, struct psr_error *err)
 	}
 	if (content->has_blocks)
 		code = check_blocks(content, err);
+	if (code == PSR_OK && content->has_octree && content->octree.n_leaves > MODEL_MAX_LEAVES)
+		return psr_fail(err, PSR_ERR_LIMIT, "an octree of %" PRIu64 " leaves is over the limit of %" PRIu64,
+		                content->octree.n_leaves, MODEL_MAX_LEAVES);
 	if (code == PSR_OK && content->has_octree)
 		code = model_check_octree_counts(&content->octree, "the model", err);
 	if (code != PSR_OK)

@@ -124,6 +124,13 @@ static inline int section_is_needed(const struct section_spec *spec)
 /* Returns whether a section belongs to the representation that the model has not. */
 int section_is_foreign(const struct section_spec *spec, const struct content *content);
 
+/* Returns whether an entry of the table is of this known section, in the version that is known. */
+static inline int file_is_section(const uint8_t *entry, int section)
+{
+	return memcmp(entry + ENTRY_TYPE, section_table[section].type, 4) == 0
+	       && file_get(entry + ENTRY_VERSION, 2) == section_table[section].version;
+}
+
 /* Reads the counts of BLKS from its BLOCKS_BYTES, unchecked. */
 void file_get_counts(struct psr_blocks *blocks, const uint8_t *at);
 

@@ -22,6 +22,7 @@ struct psr_model {
 	const uint8_t *bytes; /* the image */
 	struct content content;
 	struct psr_cubes *cubes; /* of its octree, or NULL */
+	struct octree_shares shares; /* of a packed octree, in the file */
 };
 
 static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
@@ -74,13 +75,15 @@ struct found {
 static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
 {
 	uint8_t *image = NULL;
+	struct octree_shares shares;
 	size_t n_image = 0;
-	int code = pack_open(&image, &n_image, source, err);
+	int code = pack_open(&image, &n_image, &shares, source, err);
 
 	if (code == PSR_OK)
 		code = model_adopt(out, image, n_image, 0, source->name, err);
 	if (code == PSR_OK) {
 		(*out)->is_packed = 1;
+		(*out)->shares = shares;
 		(*out)->file_bytes = source->n_bytes;
 	}
 	return code;
@@ -256,6 +259,12 @@ const struct psr_blocks *psr_model_blocks(const struct psr_model *model)
 const struct octree *psr_model_octree(const struct psr_model *model)
 {
 	return model->content.has_octree ? &model->content.octree : NULL;
+}
+
+int psr_model_octree_shares(const struct psr_model *model, struct octree_shares *shares)
+{
+	*shares = model->shares;
+	return shares->codes > 0;
 }
 
 const struct psr_presets *psr_model_presets(const struct psr_model *model)

@@ -64,8 +64,50 @@ static uint32_t stride_of(const uint8_t *type)
 	return 1;
 }
 
+int pack_is_of_octree(uint64_t packing, const uint8_t *entry)
+{
+	for (int k = SECTION_FIRST_OF_OCTREE; k < N_KNOWN_SECTIONS && packing == PACKING_OCTREE; k++)
+		if (file_is_section(entry, k))
+			return 1;
+	return 0;
+}
+
+int pack_find_octree(struct octree *tree, const uint8_t *image)
+{
+	struct content content = { .has_octree = 0 };
+	const uint64_t n_sections = file_get(image + HEADER_N_SECTIONS, 4);
+
+	for (uint64_t i = 0; i < n_sections; i++) {
+		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+
+		if (file_is_section(entry, SECTION_OCTREE) && file_get(entry + ENTRY_LENGTH, 8) == OCTREE_BYTES)
+			file_get_octree(&content.octree, image + file_get(entry + ENTRY_OFFSET, 8));
+	}
+	if (model_check_octree_counts(&content.octree, "", NULL) != PSR_OK)
+		return 0;
+	for (uint64_t i = 0; i < n_sections; i++) {
+		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+		const uint8_t *at = image + file_get(entry + ENTRY_OFFSET, 8);
+
+		for (int k = SECTION_FIRST_OF_OCTREE; k < N_KNOWN_SECTIONS; k++) {
+			const struct section_spec *spec = &section_table[k];
+
+			if (!file_is_section(entry, k))
+				continue;
+			if (file_get(entry + ENTRY_LENGTH, 8) != spec->item_bytes * section_items(spec, &content))
+				return 0;
+			memcpy((char *)&content + spec->pointer, &at, sizeof at);
+		}
+	}
+	*tree = content.octree;
+	return tree->code != NULL && tree->skip != NULL;
+}
+
 struct packer {
 	ZSTD_CCtx *context;
+	uint64_t packing;
+	uint8_t *octree; /* packed, in way 2 */
+	size_t n_octree;
 	uint8_t *split, *packed; /* a chunk, and its largest packed form */
 	size_t packed_capacity;
 };
@@ -114,78 +156,137 @@ static int packer_init(struct packer *p)
 static void packer_fini(struct packer *p)
 {
 	ZSTD_freeCCtx(p->context);
+	free(p->octree);
 	psr_free(p->split);
 	psr_free(p->packed);
 }
 
-/* Returns the end of the directory, and its beginning in *directory. */
-static uint64_t directory_end(const uint8_t *image, uint64_t *directory)
+/* Returns the end of the directory, and its beginning in *directory; *n: how many chunks are packed by zstd. */
+static uint64_t directory_end(const struct packer *p, const uint8_t *image, uint64_t *directory, uint64_t *n)
 {
 	uint64_t n_chunks = 0, n_sections = file_get(image + HEADER_N_SECTIONS, 4);
 
 	*directory = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(image + HEADER_N_CHUNKS, 4);
-	for (uint64_t i = 0; i < n_sections; i++)
-		n_chunks += pack_chunks(file_get(image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8));
+	for (uint64_t i = 0; i < n_sections; i++) {
+		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+
+		if (!pack_is_of_octree(p->packing, entry))
+			n_chunks += pack_chunks(file_get(entry + ENTRY_LENGTH, 8));
+	}
+	*n = n_chunks;
+	if (p->packing == PACKING_OCTREE)
+		n_chunks += 1 + pack_chunks(p->n_octree);
 	return *directory + PACK_ENTRY_BYTES * n_chunks;
+}
+
+/* Returns the end of the chunk, which begins at `at`. */
+static uint64_t store_chunk(uint8_t *out, uint64_t at, uint8_t *entry, const uint8_t *bytes, uint64_t n)
+{
+	memcpy(out + at, bytes, n);
+	file_put(entry + PACK_LENGTH, 4, n);
+	entry[PACK_METHOD] = PACK_STORED;
+	entry[PACK_STRIDE] = 1;
+	file_put(entry + PACK_HASH, 8, XXH64(bytes, n, 0));
+	return at + n;
 }
 
 /* Writes directory and chunks, stored from chunk `n_packed` on. Returns the size of the file. */
 static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8_t *image, uint64_t n_packed)
 {
-	uint64_t directory, at = directory_end(image, &directory), n = 0;
+	uint64_t directory, n_chunks, at = directory_end(p, image, &directory, &n_chunks), n = 0;
 	uint8_t *next = out + directory;
 
 	for (uint64_t i = 0; i < file_get(image + HEADER_N_SECTIONS, 4); i++) {
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
 
+		if (pack_is_of_octree(p->packing, entry))
+			continue;
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 
-			if (n < n_packed) {
+			if (n < n_packed)
 				at += pack_chunk(p, out + at, next, image + offset + first, size, stride_of(entry + ENTRY_TYPE));
-			} else {
-				memcpy(out + at, image + offset + first, size);
-				file_put(next + PACK_LENGTH, 4, size);
-				next[PACK_METHOD] = PACK_STORED;
-				next[PACK_STRIDE] = 1;
-				file_put(next + PACK_HASH, 8, XXH64(out + at, size, 0));
-				at += size;
-			}
+			else
+				at = store_chunk(out, at, next, image + offset + first, size);
 			next += PACK_ENTRY_BYTES;
 		}
 	}
+	if (p->packing != PACKING_OCTREE)
+		return at;
+	file_put(next, 8, p->n_octree);
+	for (uint64_t first = 0; first < p->n_octree; first += FILE_CHUNK_BYTES) {
+		uint64_t size = p->n_octree - first < FILE_CHUNK_BYTES ? p->n_octree - first : FILE_CHUNK_BYTES;
+
+		next += PACK_ENTRY_BYTES;
+		at = store_chunk(out, at, next, p->octree + first, size);
+	}
 	return at;
+}
+
+/* Packs the octree, if there is one. */
+static int pack_octree(struct packer *p, const uint8_t *image, struct psr_error *err)
+{
+	struct psr_pool *pool = NULL;
+	struct octree tree;
+	int code;
+
+	p->packing = PACKING_ZSTD;
+	if (!pack_find_octree(&tree, image))
+		return PSR_OK;
+	if (tree.n_leaves > OCTREE_CHUNK && (code = psr_pool_create(&pool, psr_pool_all_cores(), err)) != PSR_OK)
+		return code;
+	code = octree_pack(&p->octree, &p->n_octree, &tree, OCTREE_SMALL, pool, err);
+	psr_pool_destroy(pool);
+	if (code == PSR_OK)
+		p->packing = PACKING_OCTREE;
+	return code;
+}
+
+/* Packs all but the octree, which is packed or not by now. */
+static int pack_all(struct packer *p, uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image,
+                    size_t n_image)
+{
+	uint64_t directory, n_packed, end = directory_end(p, image, &directory, &n_packed), size;
+	uint8_t *bytes;
+
+	*capacity = n_image + (end - directory) + p->n_octree;
+	bytes = psr_alloc_huge(*capacity);
+	if (bytes == NULL)
+		return PSR_ERR_MEMORY;
+	memcpy(bytes, image, directory);
+	size = pack_chunks_of(p, bytes, image, n_packed);
+	/* Beyond the ratio that the reader accepts, stores the last chunks unpacked. */
+	while (pack_max_image(size) < n_image && n_packed > 0) {
+		n_packed -= n_packed / 16 + 1;
+		size = pack_chunks_of(p, bytes, image, n_packed);
+	}
+	file_put(bytes + HEADER_PACKING, 4, p->packing);
+	file_put(bytes + HEADER_PACKED_SIZE, 8, size);
+	file_put(bytes + HEADER_HASH, 8, file_header_hash(bytes, end));
+	*out = bytes;
+	*n_bytes = size;
+	return PSR_OK;
 }
 
 int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,
                struct psr_error *err)
 {
 	struct packer packer = { 0 };
-	uint64_t directory, end = directory_end(image, &directory), n_packed = (end - directory) / PACK_ENTRY_BYTES;
-	uint64_t size;
-	uint8_t *bytes;
+	int code = packer_init(&packer);
 
-	*capacity = n_image + (end - directory);
-	bytes = psr_alloc_huge(*capacity);
-	if (bytes == NULL || packer_init(&packer) != PSR_OK) {
-		packer_fini(&packer);
-		psr_free_huge(bytes, *capacity);
-		return psr_fail(err, PSR_ERR_MEMORY, "no memory to pack a model of %zu bytes", n_image);
+	if (code == PSR_OK)
+		code = pack_octree(&packer, image, NULL);
+	if (code == PSR_OK)
+		code = pack_all(&packer, out, n_bytes, capacity, image, n_image);
+	/* An octree that packs too well for the ratio is packed like all else. */
+	if (code == PSR_OK && pack_max_image(*n_bytes) < n_image) {
+		assert(packer.packing == PACKING_OCTREE);
+		psr_free_huge(*out, *capacity);
+		packer.packing = PACKING_ZSTD;
+		packer.n_octree = 0;
+		code = pack_all(&packer, out, n_bytes, capacity, image, n_image);
 	}
-	memcpy(bytes, image, directory);
-	size = pack_chunks_of(&packer, bytes, image, n_packed);
-	/* Beyond the ratio that the reader accepts, stores the last chunks unpacked. */
-	while (pack_max_image(size) < n_image) {
-		assert(n_packed > 0);
-		n_packed -= n_packed / 16 + 1;
-		size = pack_chunks_of(&packer, bytes, image, n_packed);
-	}
-	file_put(bytes + HEADER_PACKING, 4, PACKING_ZSTD);
-	file_put(bytes + HEADER_PACKED_SIZE, 8, size);
-	file_put(bytes + HEADER_HASH, 8, file_header_hash(bytes, end));
 	packer_fini(&packer);
-	*out = bytes;
-	*n_bytes = size;
-	return PSR_OK;
+	return code == PSR_OK ? code : psr_fail(err, code, "no memory to pack a model of %zu bytes", n_image);
 }

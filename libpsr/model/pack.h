@@ -4,9 +4,11 @@
 #define PSR_MODEL_PACK_H
 
 #include "file.h"
+#include "octree/pack.h"
 
 enum { HEADER_PACKING = 28, HEADER_PACKED_SIZE = 48 }; /* zeros in a plain file */
 #define PACKING_ZSTD 1
+#define PACKING_OCTREE 2 /* the same, and the sections of an octree as one piece that octree_pack() makes */
 
 /* An entry of the directory. */
 #define PACK_ENTRY_BYTES 16
@@ -43,6 +45,14 @@ static inline int pack_is_stride(uint32_t stride)
 void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t stride, enum pack_method method);
 void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t stride, enum pack_method method);
 
+/* Way 2: behind the directory's entries of other sections are the length of the packed octree and 8 zeros, then an entry
+ * for each of its pieces of FILE_CHUNK_BYTES, all stored. */
+int pack_is_of_octree(uint64_t packing, const uint8_t *entry); /* of the table */
+
+/* Finds the octree of an image whose sections are inside of it; arrays point there, and have the lengths that its counts
+ * ask for. Returns 0 if it has none, or not so. Nothing else is checked. */
+int pack_find_octree(struct octree *tree, const uint8_t *image);
+
 /* The source of a packed file: a descriptor, or memory if that is -1. */
 struct pack_source {
 	int fd;
@@ -53,8 +63,10 @@ struct pack_source {
 
 int pack_is_packed(const uint8_t *header); /* FILE_HEADER_BYTES of them */
 
-/* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). FORMAT, VERSION, IO, MEMORY. */
-int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source, struct psr_error *err);
+/* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). *shares: of its octree, zeros if
+ * that was not packed as one. FORMAT, VERSION, IO, MEMORY. */
+int pack_open(uint8_t **image, size_t *n_image, struct octree_shares *shares, const struct pack_source *source,
+              struct psr_error *err);
 
 /* Packs an image: *n_bytes in memory of psr_alloc_huge() of *capacity bytes. */
 int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,

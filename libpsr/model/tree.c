@@ -40,9 +40,7 @@ int model_check_octree_counts(const struct octree *tree, const char *name, struc
 		return fail("OCTR", "it says %s than %d levels", tree->levels < OCTREE_LEAST_LEVELS ? "less" : "more",
 		            tree->levels < OCTREE_LEAST_LEVELS ? OCTREE_LEAST_LEVELS : OCTREE_MOST_LEVELS);
 	if (tree->n_leaves == 0 || tree->n_leaves > MODEL_MAX_LEAVES)
-		return psr_fail(err, tree->n_leaves == 0 ? PSR_ERR_FORMAT : PSR_ERR_LIMIT,
-		                "%s: section OCTR: %" PRIu64 " leaves; it must be 1 to %" PRIu64, name, tree->n_leaves,
-		                MODEL_MAX_LEAVES);
+		return fail("OCTR", "%" PRIu64 " leaves; it must be 1 to %" PRIu64, tree->n_leaves, MODEL_MAX_LEAVES);
 	/* With these, no product of a count and an item's size overflows. */
 	if (tree->n_codes == 0 || tree->n_codes / (uint64_t)tree->levels > tree->n_leaves)
 		return fail("OCTR", "%" PRIu64 " codes do not fit %" PRIu64 " leaves of %d levels", tree->n_codes,

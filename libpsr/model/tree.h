@@ -2,7 +2,7 @@
 #ifndef PSR_MODEL_TREE_H
 #define PSR_MODEL_TREE_H
 
-#include "octree/octree.h"
+#include "octree/pack.h"
 #include "psr/model.h"
 
 struct psr_blocks;
@@ -11,6 +11,9 @@ struct psr_blocks;
  * opened (docs/format.md has every rule): what octree_check() says, all attributes in their ranges, the cube within 1024
  * of the origin, at most 2^32 leaves. It is only read, and the model owns it: the arrays are not octree_destroy()'s. */
 const struct octree *psr_model_octree(const struct psr_model *model);
+
+/* Returns whether the file that the model was opened from has a packed octree; *shares: of how many bytes. */
+int psr_model_octree_shares(const struct psr_model *model, struct octree_shares *shares);
 
 /* As psr_model_create(), of an octree whose cube is in inner coordinates. Copies the tree. */
 int psr_model_create_octree(struct psr_model **out, const struct psr_model_info *info, const struct octree *tree,

@@ -3,30 +3,15 @@
 #include <stdio.h>
 #include <unistd.h>
 #include <xxhash.h>
-#include <zstd.h>
 #include "base/mem.h"
-#include "pack.h"
-
-/* A packed file during reading. `head`: header, table, hashes of chunks, directory. */
-struct unpacker {
-	const struct pack_source *source;
-	struct psr_error *err;
-	uint8_t header[FILE_HEADER_BYTES];
-	uint8_t *head;
-	uint64_t table_end, head_end, n_image;
-	uint32_t n_sections;
-	ZSTD_DCtx *context;
-	uint8_t *packed, *split; /* a chunk each */
-};
-
-#define bad(u, format, ...) psr_fail((u)->err, PSR_ERR_FORMAT, "%s: " format, (u)->source->name, ##__VA_ARGS__)
+#include "unpack.h"
 
 int pack_is_packed(const uint8_t *header)
 {
 	return file_get(header + HEADER_PACKING, 4) != 0;
 }
 
-static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
+int unpack_fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 {
 	const struct pack_source *s = u->source;
 
@@ -53,21 +38,33 @@ static int fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 	return PSR_OK;
 }
 
-static const uint8_t *entry_at(const struct unpacker *u, uint64_t i)
+/* Adds the octree's entry and those of its pieces. */
+static int read_octree_entry(struct unpacker *u, uint64_t size, uint64_t *n_chunks)
 {
-	return u->head + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+	uint8_t entry[PACK_ENTRY_BYTES];
+	int code;
+
+	u->octree_entry = u->table_end + PACK_ENTRY_BYTES * *n_chunks;
+	code = unpack_fetch(u, entry, u->octree_entry, PACK_ENTRY_BYTES);
+	if (code != PSR_OK)
+		return code;
+	u->n_octree = file_get(entry, 8);
+	if (u->n_octree == 0 || u->n_octree > size || file_get(entry + 8, 8) != 0)
+		return bad(u, "the packed octree has %" PRIu64 " bytes, and the file %" PRIu64, u->n_octree, size);
+	*n_chunks += 1 + pack_chunks(u->n_octree);
+	return PSR_OK;
 }
 
-/* Reads everything before the first chunk and checks its hash, before it follows any of it. */
-static int read_head(struct unpacker *u)
+int unpack_read_head(struct unpacker *u)
 {
 	uint64_t n_chunks = 0, size, packing = file_get(u->header + HEADER_PACKING, 4);
 	int code;
 
-	if (packing != PACKING_ZSTD)
+	u->packing = packing;
+	if (packing != PACKING_ZSTD && packing != PACKING_OCTREE)
 		return psr_fail(u->err, PSR_ERR_VERSION,
-		                "%s: the file is packed in way %" PRIu64 ", and this build knows way %d; "
-		                "a newer psr may read it", u->source->name, packing, PACKING_ZSTD);
+		                "%s: the file is packed in way %" PRIu64 ", and this build knows ways %d "
+		                "and %d; a newer psr may read it", u->source->name, packing, PACKING_ZSTD, PACKING_OCTREE);
 	size = file_get(u->header + HEADER_PACKED_SIZE, 8);
 	u->n_image = file_get(u->header + HEADER_FILE_SIZE, 8);
 	u->n_sections = (uint32_t)file_get(u->header + HEADER_N_SECTIONS, 4);
@@ -89,14 +86,17 @@ static int read_head(struct unpacker *u)
 	u->head = psr_alloc_array(u->table_end, 1);
 	if (u->head == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for its section table", u->source->name);
-	code = fetch(u, u->head, 0, u->table_end);
+	code = unpack_fetch(u, u->head, 0, u->table_end);
 	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
-		uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
+		uint64_t length = file_get(unpack_entry(u, i) + ENTRY_LENGTH, 8);
 
 		if (length > u->n_image)
 			return bad(u, "section %" PRIu32 " has %" PRIu64 " of %" PRIu64 " bytes", i, length, u->n_image);
-		n_chunks += pack_chunks(length);
+		if (!pack_is_of_octree(packing, unpack_entry(u, i)))
+			n_chunks += pack_chunks(length);
 	}
+	if (code == PSR_OK && packing == PACKING_OCTREE)
+		code = read_octree_entry(u, size, &n_chunks);
 	/* At most 256 sections of 64 times the file: no product overflows. */
 	u->head_end = u->table_end + PACK_ENTRY_BYTES * n_chunks;
 	if (code == PSR_OK && u->head_end > size)
@@ -107,7 +107,7 @@ static int read_head(struct unpacker *u)
 	if (u->head == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for its directory of chunks", u->source->name);
 	if (code == PSR_OK)
-		code = fetch(u, u->head, 0, u->head_end);
+		code = unpack_fetch(u, u->head, 0, u->head_end);
 	if (code == PSR_OK && (memcmp(u->head, u->header, FILE_HEADER_BYTES) != 0
 	                       || file_header_hash(u->head, u->head_end) != file_get(u->head + HEADER_HASH, 8)))
 		return bad(u, "the header, the section table or the directory of chunks (bytes 0 to %" PRIu64
@@ -115,19 +115,20 @@ static int read_head(struct unpacker *u)
 	return code;
 }
 
-/* Checks the offsets of sections in the image and the sizes of chunks in the file. */
-static int check_head(const struct unpacker *u)
+int unpack_check_head(const struct unpacker *u)
 {
 	const uint8_t *next = u->head + u->table_end;
 	uint64_t image_at = file_align(u->table_end), file_at = u->head_end, n = 0;
 
 	for (uint32_t i = 0; i < u->n_sections; i++) {
-		const uint8_t *entry = entry_at(u, i);
+		const uint8_t *entry = unpack_entry(u, i);
 		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
 
 		if (offset != image_at)
 			return bad(u, "section %" PRIu32 " begins at byte %" PRIu64 " instead of %" PRIu64, i, offset, image_at);
 		image_at = file_align(image_at + length);
+		if (pack_is_of_octree(u->packing, entry))
+			continue;
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint64_t packed = file_get(next + PACK_LENGTH, 4);
@@ -141,6 +142,14 @@ static int check_head(const struct unpacker *u)
 			file_at += packed;
 		}
 	}
+	for (uint64_t first = 0; first < u->n_octree; first += FILE_CHUNK_BYTES, n++) {
+		const uint64_t size = u->n_octree - first < FILE_CHUNK_BYTES ? u->n_octree - first : FILE_CHUNK_BYTES;
+
+		next += PACK_ENTRY_BYTES;
+		if (file_get(next, 8) != (size | (uint64_t)PACK_STORED << 32 | (uint64_t)1 << 40))
+			return bad(u, "chunk %" PRIu64 ", of the packed octree, is not one of %" PRIu64 " bytes as they are", n, size);
+		file_at += size;
+	}
 	if (image_at + FILE_TAIL_BYTES != u->n_image)
 		return bad(u, "the header says %" PRIu64 " bytes, and the sections have %" PRIu64, u->n_image,
 		           image_at + FILE_TAIL_BYTES);
@@ -149,167 +158,11 @@ static int check_head(const struct unpacker *u)
 	return PSR_OK;
 }
 
-static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, const uint8_t *entry, uint64_t at,
-                        uint64_t number)
-{
-	uint64_t packed = file_get(entry + PACK_LENGTH, 4);
-	enum pack_method method = entry[PACK_METHOD];
-	size_t got;
-	int code = fetch(u, u->packed, at, packed);
-
-	if (code != PSR_OK)
-		return code;
-	if (XXH64(u->packed, packed, 0) != file_get(entry + PACK_HASH, 8))
-		return bad(u, "chunk %" PRIu64 " at byte %" PRIu64 " is damaged: its hash differs", number, at);
-	if (method == PACK_STORED) {
-		memcpy(to, u->packed, size);
-		return PSR_OK;
-	}
-	got = ZSTD_decompressDCtx(u->context, method == PACK_PLAIN ? to : u->split, size, u->packed, packed);
-	if (ZSTD_isError(got) || got != size)
-		return bad(u, "chunk %" PRIu64 " at byte %" PRIu64 " does not unpack to %" PRIu64 " bytes", number, at, size);
-	if (method != PACK_PLAIN)
-		pack_join(to, u->split, size, entry[PACK_STRIDE], method);
-	return PSR_OK;
-}
-
-/* The sections that say how long the others are. */
-struct counts {
-	uint8_t blocks[BLOCKS_BYTES], octree[OCTREE_BYTES];
-	int has_blocks, has_octree;
-};
-
-static int is_section(const uint8_t *entry, enum section_id id, uint64_t length)
-{
-	return memcmp(entry + ENTRY_TYPE, section_table[id].type, 4) == 0 && file_get(entry + ENTRY_LENGTH, 8) == length;
-}
-
-/* Returns where a section goes that is one of these, or NULL. */
-static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
-{
-	if (is_section(entry, SECTION_BLOCKS, BLOCKS_BYTES)) {
-		counts->has_blocks = 1;
-		return counts->blocks;
-	}
-	if (is_section(entry, SECTION_OCTREE, OCTREE_BYTES)) {
-		counts->has_octree = 1;
-		return counts->octree;
-	}
-	return NULL;
-}
-
-/* Unpacks all chunks into the image; or, if that is NULL, the counts alone. */
-static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts *counts)
-{
-	const uint8_t *next = u->head + u->table_end;
-	uint64_t at = u->head_end, n = 0;
-
-	for (uint32_t i = 0; i < u->n_sections; i++) {
-		const uint8_t *entry = entry_at(u, i);
-		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
-
-		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
-			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
-			uint8_t *to = image != NULL ? image + offset + first : counts_place(counts, entry);
-			int code = to != NULL ? unpack_chunk(u, to, size, next, at, n) : PSR_OK;
-
-			if (code != PSR_OK)
-				return code;
-			at += file_get(next + PACK_LENGTH, 4);
-		}
-	}
-	return PSR_OK;
-}
-
-/* Compares lengths of known sections with the counts in BLKS and OCTR before allocating; file_parse() reports other
- * errors better. */
-static int check_lengths(const struct unpacker *u)
-{
-	struct counts counts = { .has_blocks = 0 };
-	struct content content = { .has_blocks = 0 };
-	int code = unpack_chunks(u, NULL, &counts);
-
-	content.has_blocks = counts.has_blocks;
-	content.has_octree = counts.has_octree;
-	if (code == PSR_OK && counts.has_blocks) {
-		file_get_counts(&content.blocks, counts.blocks);
-		if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
-			code = bad(u, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", content.blocks.n_samples,
-			           content.blocks.n_blocks);
-	}
-	if (code == PSR_OK && counts.has_octree) {
-		file_get_octree(&content.octree, counts.octree);
-		code = model_check_octree_counts(&content.octree, u->source->name, u->err);
-	}
-	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
-		const uint64_t length = file_get(entry_at(u, i) + ENTRY_LENGTH, 8);
-
-		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS && code == PSR_OK; k++) {
-			const struct section_spec *spec = &section_table[k];
-
-			if (spec->pointer != 0 && !section_is_foreign(spec, &content) && memcmp(entry_at(u, i), spec->type, 4) == 0
-			    && file_get(entry_at(u, i) + ENTRY_VERSION, 2) == spec->version
-			    && length != spec->item_bytes * section_items(spec, &content))
-				code = bad(u, "section %s has %" PRIu64 " bytes and should have %" PRIu64, spec->type, length,
-				           spec->item_bytes * section_items(spec, &content));
-		}
-	}
-	return code;
-}
-
-static int make_image(struct unpacker *u, uint8_t **out)
-{
-	uint8_t *image = psr_alloc_huge(u->n_image);
-	int code;
-
-	if (image == NULL)
-		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a model of %" PRIu64 " bytes", u->source->name,
-		                u->n_image);
-	memcpy(image, u->head, u->table_end);
-	file_put(image + HEADER_PACKING, 4, 0);
-	file_put(image + HEADER_PACKED_SIZE, 8, 0);
-	file_put(image + HEADER_HASH, 8, file_header_hash(image, u->table_end));
-	code = unpack_chunks(u, image, NULL);
-	if (code != PSR_OK) {
-		psr_free_huge(image, u->n_image);
-		return code;
-	}
-	*out = image;
-	return PSR_OK;
-}
-
-int pack_open(uint8_t **image, size_t *n_image, const struct pack_source *source, struct psr_error *err)
-{
-	struct unpacker u = { .source = source, .err = err };
-	int code = fetch(&u, u.header, 0, FILE_HEADER_BYTES);
-
-	if (code == PSR_OK)
-		code = read_head(&u);
-	if (code == PSR_OK)
-		code = check_head(&u);
-	if (code == PSR_OK) {
-		u.context = ZSTD_createDCtx();
-		u.packed = psr_alloc_array(FILE_CHUNK_BYTES, 1);
-		u.split = psr_alloc_array(FILE_CHUNK_BYTES, 1);
-		if (u.context == NULL || u.packed == NULL || u.split == NULL)
-			code = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to unpack it", source->name);
-	}
-	if (code == PSR_OK)
-		code = check_lengths(&u);
-	if (code == PSR_OK)
-		code = make_image(&u, image);
-	if (code == PSR_OK)
-		*n_image = u.n_image;
-	ZSTD_freeDCtx(u.context);
-	psr_free(u.head);
-	psr_free(u.packed);
-	psr_free(u.split);
-	return code;
-}
-
 void pack_seal(uint8_t *bytes, size_t n_bytes)
 {
 	uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4), n_chunks = 0, at, head_end, table_end;
+	uint64_t octree = UINT64_MAX; /* its entry */
+	const uint64_t packing = file_get(bytes + HEADER_PACKING, 4);
 
 	table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4);
 	if (n_sections > FILE_MAX_SECTIONS || table_end > n_bytes)
@@ -317,12 +170,22 @@ void pack_seal(uint8_t *bytes, size_t n_bytes)
 	for (uint64_t i = 0; i < n_sections; i++) {
 		uint64_t length = file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i + ENTRY_LENGTH, 8);
 
-		n_chunks += length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
+		if (!pack_is_of_octree(packing, bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i))
+			n_chunks += length / FILE_CHUNK_BYTES + (length % FILE_CHUNK_BYTES != 0);
+	}
+	if (packing == PACKING_OCTREE) {
+		octree = n_chunks++;
+		if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
+			return;
+		n_chunks += file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8) / FILE_CHUNK_BYTES
+		            + (file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8) % FILE_CHUNK_BYTES != 0);
 	}
 	if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
 		return;
 	at = head_end = table_end + PACK_ENTRY_BYTES * n_chunks;
 	for (uint64_t i = 0; i < n_chunks; i++) {
+		if (i == octree)
+			continue;
 		uint8_t *entry = bytes + table_end + PACK_ENTRY_BYTES * i;
 		uint64_t length = file_get(entry + PACK_LENGTH, 4);
 

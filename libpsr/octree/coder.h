@@ -40,7 +40,8 @@ static inline void coder_put_byte(struct coder *c, uint8_t byte)
 
 static inline void coder_shift(struct coder *c)
 {
-	if (c->low < 0xff000000u || c->low >> 32 != 0) {
+	/* No carry reaches the first byte of all, so that may be 255 by itself. */
+	if (c->held == 0 || c->low < 0xff000000u || c->low >> 32 != 0) {
 		const uint8_t carry = (uint8_t)(c->low >> 32);
 
 		if (c->held > 0)

@@ -66,6 +66,25 @@ static int add_subtree(struct chunk *chunk, const struct octree *tree, uint64_t 
 	return is_done;
 }
 
+/* Packs the leaves of a chunk whose levels are there. */
+static void pack_leaves(struct chunk *chunk, const struct octree *tree)
+{
+	const struct octree_attributes leaf = chunk_attributes(chunk, tree);
+	const unsigned streams = chunk_streams(tree);
+
+	for (enum octree_stream s = 0; s < OCTREE_STREAMS && chunk->rc == PSR_OK; s++) {
+		struct coder *coder = &chunk->attribute[s];
+
+		if (!(streams >> s & 1))
+			continue;
+		coder_begin(coder);
+		chunk->rc = octree_attributes_pack(coder, &chunk->levels, &leaf, s);
+		coder_end(coder);
+		if (coder->has_failed)
+			chunk->rc = PSR_ERR_MEMORY;
+	}
+}
+
 static void pack_chunk(int i, void *userdata)
 {
 	const struct packing *p = userdata;
@@ -86,6 +105,8 @@ static void pack_chunk(int i, void *userdata)
 	coder_end(&chunk->coder);
 	if (chunk->coder.has_failed)
 		chunk->rc = PSR_ERR_MEMORY;
+	if (chunk->rc == PSR_OK)
+		pack_leaves(chunk, p->tree);
 	octree_levels_fini(&chunk->levels);
 }
 
@@ -99,6 +120,7 @@ static void cut_chunks(struct packing *p)
 		if (chunk == NULL || chunk->n_leaves + leaves > OCTREE_CHUNK) {
 			chunk = &p->chunk[p->n_chunks++];
 			chunk->root = r;
+			chunk->leaf = p->leaf[r];
 			chunk->levels.root = &p->path[r];
 			chunk->levels.height = p->tree->levels - p->cut;
 		}
@@ -133,19 +155,23 @@ static int put_top(const struct octree_node *node, void *userdata)
 static int join(uint8_t **bytes, size_t *n_bytes, const struct packing *p)
 {
 	struct top top = { p->tree, NULL, 0 };
-	size_t n = CHUNKS_HEADER + (size_t)p->n_chunks * CHUNKS_ENTRY;
+	const unsigned streams = chunk_streams(p->tree);
+	size_t n = CHUNKS_HEADER + (size_t)p->n_chunks * chunk_entry_bytes(streams);
 	uint8_t *at;
 
 	for (int depth = 0; depth < p->cut; depth++)
 		octree_walk(p->tree, depth, put_top, &top);
 	n += top.n;
-	for (uint32_t i = 0; i < p->n_chunks; i++)
+	for (uint32_t i = 0; i < p->n_chunks; i++) {
 		n += p->chunk[i].coder.n;
+		for (int s = 0; s < OCTREE_STREAMS; s++)
+			n += p->chunk[i].attribute[s].n;
+	}
 	at = *bytes = malloc(n);
 	if (at == NULL)
 		return PSR_ERR_MEMORY;
 	*n_bytes = n;
-	at = put(at, (uint64_t)p->tree->levels | (uint64_t)p->packing << 8 | (uint64_t)p->cut << 16, 4);
+	at = put(at, (uint64_t)p->tree->levels | (uint64_t)p->packing << 8 | (uint64_t)p->cut << 16 | (uint64_t)streams << 24, 4);
 	at = put(at, p->n_chunks, 4);
 	at = put(at, p->tree->n_codes, 8);
 	top.at = put(at, p->tree->n_leaves, 8);
@@ -157,11 +183,18 @@ static int join(uint8_t **bytes, size_t *n_bytes, const struct packing *p)
 
 		at = put(at, chunk->n_roots | (uint64_t)chunk->n_codes << 32, 8);
 		at = put(at, chunk->n_leaves | (uint64_t)chunk->coder.n << 32, 8);
+		for (int s = 0; s < OCTREE_STREAMS; s++)
+			if (streams >> s & 1)
+				at = put(at, chunk->attribute[s].n, 4);
 	}
-	for (uint32_t i = 0; i < p->n_chunks; i++) {
-		memcpy(at, p->chunk[i].coder.bytes, p->chunk[i].coder.n);
-		at += p->chunk[i].coder.n;
-	}
+	for (int s = -1; s < OCTREE_STREAMS; s++)
+		for (uint32_t i = 0; i < p->n_chunks; i++) {
+			const struct coder *coder = s < 0 ? &p->chunk[i].coder : &p->chunk[i].attribute[s];
+
+			if (coder->n > 0)
+				memcpy(at, coder->bytes, coder->n);
+			at += coder->n;
+		}
 	return PSR_OK;
 }
 
@@ -188,8 +221,11 @@ int octree_pack(uint8_t **bytes, size_t *n_bytes, const struct octree *tree, enu
 		rc = p.chunk[i].rc;
 	if (rc == PSR_OK)
 		rc = join(bytes, n_bytes, &p);
-	for (uint32_t i = 0; i < p.n_chunks; i++)
+	for (uint32_t i = 0; i < p.n_chunks; i++) {
 		free(p.chunk[i].coder.bytes);
+		for (int s = 0; s < OCTREE_STREAMS; s++)
+			free(p.chunk[i].attribute[s].bytes);
+	}
 	chunks_destroy(p.chunk, p.n_chunks);
 	free(p.path);
 	free(p.code);

@@ -21,10 +21,17 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 	if (rc != PSR_OK)
 		return 0;
 	REQUIRE(tree->n_leaves <= MOST && octree_check(tree, NULL) == PSR_OK);
+	for (uint64_t i = 0; i < tree->n_leaves; i++)
+		REQUIRE((tree->normal == NULL || tree->normal[i] < 32768) &&
+		        (tree->offset == NULL || tree->offset[i] < OCTREE_OFFSETS));
 	for (enum octree_packing packing = OCTREE_FAST; packing <= OCTREE_SMALL; packing++) {
 		REQUIRE(octree_pack(&bytes, &n_bytes, tree, packing, NULL, NULL) == PSR_OK);
 		REQUIRE(octree_unpack(&again, bytes, n_bytes, tree->n_leaves, NULL, NULL) == PSR_OK);
 		REQUIRE(again->n_codes == tree->n_codes && memcmp(again->code, tree->code, tree->n_codes) == 0);
+		REQUIRE(!again->normal == !tree->normal && !again->offset == !tree->offset && !again->color == !tree->color);
+		REQUIRE(tree->normal == NULL || memcmp(again->normal, tree->normal, 2 * tree->n_leaves) == 0);
+		REQUIRE(tree->offset == NULL || memcmp(again->offset, tree->offset, tree->n_leaves) == 0);
+		REQUIRE(tree->color == NULL || memcmp(again->color, tree->color, 3 * tree->n_leaves) == 0);
 		octree_destroy(again);
 		free(bytes);
 	}

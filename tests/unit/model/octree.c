@@ -200,7 +200,7 @@ static void lies_in_sections_of_octrees_are_refused(void **state)
 		{ "OCTR", 40, 8, UINT64_MAX, PSR_ERR_FORMAT, "codes do not fit" },
 		{ "OCTR", 40, 8, 1, PSR_ERR_FORMAT, "a skip index of" },
 		{ "OCTR", 48, 8, 0, PSR_ERR_FORMAT, "section OCTR: 0 leaves" },
-		{ "OCTR", 48, 8, UINT64_MAX, PSR_ERR_LIMIT, "leaves; it must be 1 to 4294967296" },
+		{ "OCTR", 48, 8, UINT64_MAX, PSR_ERR_FORMAT, "leaves; it must be 1 to 4294967296" },
 		{ "OCTR", 48, 8, 40000, PSR_ERR_FORMAT, "section ONRM at byte" },
 		{ "OCTR", 56, 8, 0, PSR_ERR_FORMAT, "a skip index of 0 entries" },
 		{ "OCTR", 56, 8, 1, PSR_ERR_FORMAT, "section OSKP at byte" },

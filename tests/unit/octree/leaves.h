@@ -74,4 +74,30 @@ static inline struct octree *leaves_to_tree(const struct leaves *leaves, int lev
 	return tree;
 }
 
+/* Gives leaves attributes that are partly noise; streams: bit 0 normals, 1 offsets, 2 colours. Returns 0 without
+ * memory. */
+static inline int leaves_dress(struct octree *tree, unsigned streams)
+{
+	const size_t n = tree->n_leaves;
+	uint64_t random = 3;
+
+	if (streams & 1)
+		tree->normal = malloc(n * sizeof *tree->normal);
+	if (streams & 2)
+		tree->offset = malloc(n);
+	if (streams & 4)
+		tree->color = malloc(n * sizeof *tree->color);
+	for (size_t i = 0; i < n; i++) {
+		const uint64_t r = random_next(&random);
+
+		if (tree->normal != NULL)
+			tree->normal[i] = (uint16_t)((i / 64 * 32 + (r & 31)) & 0x7fff);
+		if (tree->offset != NULL)
+			tree->offset[i] = (uint8_t)(r >> 8 & 3);
+		for (int c = 0; c < 3 && tree->color != NULL; c++)
+			tree->color[i][c] = (uint8_t)(i / 256 + (r >> (16 + 4 * c) & 15));
+	}
+	return !tree->normal == !(streams & 1) && !tree->offset == !(streams & 2) && !tree->color == !(streams & 4);
+}
+
 #endif

@@ -1,0 +1,38 @@
+/* Packed files during reading: unpack.c reads what comes before the chunks, unpack_chunks.c the chunks. */
+#ifndef PSR_MODEL_UNPACK_H
+#define PSR_MODEL_UNPACK_H
+
+#include <zstd.h>
+#include "pack.h"
+
+/* A packed file during reading. `head`: header, table, hashes of chunks, directory. */
+struct unpacker {
+	const struct pack_source *source;
+	struct psr_error *err;
+	uint8_t header[FILE_HEADER_BYTES];
+	uint8_t *head;
+	uint64_t table_end, head_end, n_image, packing;
+	uint64_t octree_entry, n_octree; /* in way 2: where in `head` its entry is, its length */
+	uint32_t n_sections;
+	ZSTD_DCtx *context;
+	uint8_t *packed, *split; /* a chunk each */
+};
+
+/* Text for errors; FORMAT. */
+#define bad(u, format, ...) psr_fail((u)->err, PSR_ERR_FORMAT, "%s: " format, (u)->source->name, ##__VA_ARGS__)
+
+static inline const uint8_t *unpack_entry(const struct unpacker *u, uint64_t i)
+{
+	return u->head + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+}
+
+/* Reads n bytes of the file. FORMAT: they are not there; IO. */
+int unpack_fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n);
+
+/* Reads everything before the first chunk and checks its hash, before it follows any of it. */
+int unpack_read_head(struct unpacker *u);
+
+/* Checks the offsets of sections in the image and the sizes of chunks in the file. */
+int unpack_check_head(const struct unpacker *u);
+
+#endif

@@ -1,0 +1,203 @@
+#include <inttypes.h>
+#include <xxhash.h>
+#include "base/mem.h"
+#include "unpack.h"
+
+static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, const uint8_t *entry, uint64_t at,
+                        uint64_t number)
+{
+	uint64_t packed = file_get(entry + PACK_LENGTH, 4);
+	enum pack_method method = entry[PACK_METHOD];
+	size_t got;
+	int code = unpack_fetch(u, u->packed, at, packed);
+
+	if (code != PSR_OK)
+		return code;
+	if (XXH64(u->packed, packed, 0) != file_get(entry + PACK_HASH, 8))
+		return bad(u, "chunk %" PRIu64 " at byte %" PRIu64 " is damaged: its hash differs", number, at);
+	if (method == PACK_STORED) {
+		memcpy(to, u->packed, size);
+		return PSR_OK;
+	}
+	got = ZSTD_decompressDCtx(u->context, method == PACK_PLAIN ? to : u->split, size, u->packed, packed);
+	if (ZSTD_isError(got) || got != size)
+		return bad(u, "chunk %" PRIu64 " at byte %" PRIu64 " does not unpack to %" PRIu64 " bytes", number, at, size);
+	if (method != PACK_PLAIN)
+		pack_join(to, u->split, size, entry[PACK_STRIDE], method);
+	return PSR_OK;
+}
+
+/* The sections that say how long the others are. */
+struct counts {
+	uint8_t blocks[BLOCKS_BYTES], octree[OCTREE_BYTES];
+	int has_blocks, has_octree;
+};
+
+static int is_section(const uint8_t *entry, enum section_id id, uint64_t length)
+{
+	return file_is_section(entry, (int)id) && file_get(entry + ENTRY_LENGTH, 8) == length;
+}
+
+/* Returns where a section goes that is one of these, or NULL. */
+static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
+{
+	if (is_section(entry, SECTION_BLOCKS, BLOCKS_BYTES)) {
+		counts->has_blocks = 1;
+		return counts->blocks;
+	}
+	if (is_section(entry, SECTION_OCTREE, OCTREE_BYTES)) {
+		counts->has_octree = 1;
+		return counts->octree;
+	}
+	return NULL;
+}
+
+/* Unpacks all chunks into the image; or, if that is NULL, the counts alone. */
+static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts *counts)
+{
+	const uint8_t *next = u->head + u->table_end;
+	uint64_t at = u->head_end, n = 0;
+
+	for (uint32_t i = 0; i < u->n_sections; i++) {
+		const uint8_t *entry = unpack_entry(u, i);
+		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+
+		if (pack_is_of_octree(u->packing, entry))
+			continue;
+		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
+			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
+			uint8_t *to = image != NULL ? image + offset + first : counts_place(counts, entry);
+			int code = to != NULL ? unpack_chunk(u, to, size, next, at, n) : PSR_OK;
+
+			if (code != PSR_OK)
+				return code;
+			at += file_get(next + PACK_LENGTH, 4);
+		}
+	}
+	return PSR_OK;
+}
+
+/* Compares lengths of known sections with the counts in BLKS and OCTR before allocating; file_parse() reports other
+ * errors better. */
+static int check_lengths(const struct unpacker *u)
+{
+	struct counts counts = { .has_blocks = 0 };
+	struct content content = { .has_blocks = 0 };
+	int code = unpack_chunks(u, NULL, &counts);
+
+	content.has_blocks = counts.has_blocks;
+	content.has_octree = counts.has_octree;
+	if (code == PSR_OK && counts.has_blocks) {
+		file_get_counts(&content.blocks, counts.blocks);
+		if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
+			code = bad(u, "section BLKS: %" PRIu64 " samples do not fit %" PRIu32 " blocks", content.blocks.n_samples,
+			           content.blocks.n_blocks);
+	}
+	if (code == PSR_OK && counts.has_octree) {
+		file_get_octree(&content.octree, counts.octree);
+		code = model_check_octree_counts(&content.octree, u->source->name, u->err);
+	}
+	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
+		const uint64_t length = file_get(unpack_entry(u, i) + ENTRY_LENGTH, 8);
+
+		for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS && code == PSR_OK; k++) {
+			const struct section_spec *spec = &section_table[k];
+
+			if (spec->pointer != 0 && !section_is_foreign(spec, &content) && memcmp(unpack_entry(u, i), spec->type, 4) == 0
+			    && file_get(unpack_entry(u, i) + ENTRY_VERSION, 2) == spec->version
+			    && length != spec->item_bytes * section_items(spec, &content))
+				code = bad(u, "section %s has %" PRIu64 " bytes and should have %" PRIu64, spec->type, length,
+				           spec->item_bytes * section_items(spec, &content));
+		}
+	}
+	return code;
+}
+
+/* Reads the packed octree and unpacks it into its sections. Chunks before it are in the image. */
+static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_shares *shares)
+{
+	const uint64_t file_at = u->source->n_bytes - u->n_octree;
+	const uint8_t *entry = u->head + u->octree_entry;
+	struct psr_error what = { 0 };
+	struct psr_pool *pool = NULL;
+	struct octree tree;
+	uint8_t *bytes;
+	int code = PSR_OK;
+
+	if (!pack_find_octree(&tree, image))
+		return bad(u, "an octree is packed, and its sections OCTR, OSKP or OCOD are missing");
+	bytes = psr_alloc_huge(u->n_octree);
+	if (bytes == NULL)
+		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a packed octree", u->source->name);
+	for (uint64_t first = 0; first < u->n_octree && code == PSR_OK; first += FILE_CHUNK_BYTES) {
+		entry += PACK_ENTRY_BYTES;
+		code = unpack_fetch(u, bytes + first, file_at + first, file_get(entry + PACK_LENGTH, 4));
+		if (code == PSR_OK && XXH64(bytes + first, file_get(entry + PACK_LENGTH, 4), 0) != file_get(entry + PACK_HASH, 8))
+			code = bad(u, "the packed octree is damaged at byte %" PRIu64 ": its hash differs", file_at + first);
+	}
+	if (code == PSR_OK && tree.n_leaves > OCTREE_CHUNK)
+		code = psr_pool_create(&pool, psr_pool_all_cores(), u->err);
+	if (code == PSR_OK) {
+		code = octree_unpack_into(&tree, bytes, u->n_octree, pool, &what);
+		if (code != PSR_OK)
+			psr_fail(u->err, code, "%s: %s", u->source->name, what.text);
+		octree_packed_shares(shares, bytes, u->n_octree);
+	}
+	psr_pool_destroy(pool);
+	psr_free_huge(bytes, u->n_octree);
+	return code;
+}
+
+static int make_image(struct unpacker *u, uint8_t **out, struct octree_shares *shares)
+{
+	uint8_t *image = psr_alloc_huge(u->n_image);
+	int code;
+
+	if (image == NULL)
+		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a model of %" PRIu64 " bytes", u->source->name,
+		                u->n_image);
+	memcpy(image, u->head, u->table_end);
+	file_put(image + HEADER_PACKING, 4, 0);
+	file_put(image + HEADER_PACKED_SIZE, 8, 0);
+	file_put(image + HEADER_HASH, 8, file_header_hash(image, u->table_end));
+	code = unpack_chunks(u, image, NULL);
+	if (code == PSR_OK && u->packing == PACKING_OCTREE)
+		code = unpack_octree(u, image, shares);
+	if (code != PSR_OK) {
+		psr_free_huge(image, u->n_image);
+		return code;
+	}
+	*out = image;
+	return PSR_OK;
+}
+
+int pack_open(uint8_t **image, size_t *n_image, struct octree_shares *shares, const struct pack_source *source,
+              struct psr_error *err)
+{
+	struct unpacker u = { .source = source, .err = err };
+	int code = unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES);
+
+	*shares = (struct octree_shares){ .codes = 0 };
+	if (code == PSR_OK)
+		code = unpack_read_head(&u);
+	if (code == PSR_OK)
+		code = unpack_check_head(&u);
+	if (code == PSR_OK) {
+		u.context = ZSTD_createDCtx();
+		u.packed = psr_alloc_array(FILE_CHUNK_BYTES, 1);
+		u.split = psr_alloc_array(FILE_CHUNK_BYTES, 1);
+		if (u.context == NULL || u.packed == NULL || u.split == NULL)
+			code = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to unpack it", source->name);
+	}
+	if (code == PSR_OK)
+		code = check_lengths(&u);
+	if (code == PSR_OK)
+		code = make_image(&u, image, shares);
+	if (code == PSR_OK)
+		*n_image = u.n_image;
+	ZSTD_freeDCtx(u.context);
+	psr_free(u.head);
+	psr_free(u.packed);
+	psr_free(u.split);
+	return code;
+}
