@@ -4,9 +4,9 @@
 #include <string.h>
 #include "base/clock.h"
 #include "base/mem.h"
-#include "model/blocks.h"
 #include "draw.h"
 #include "render/need.h"
+#include "resolve.h"
 
 #define CONTROL_BYTES 2048 /* room for FRAME_BEGIN, and for FRAME_END */
 
@@ -41,43 +41,6 @@ uint64_t draw_worker_bytes(const struct draw_worker *worker)
 	return psr_renderer_bytes(worker->renderer) + worker->capacity;
 }
 
-/* Of budgets 0 and 3. */
-static struct psr_msg_settings settings_of(const struct psr_msg_frame *request)
-{
-	const struct psr_msg_settings settings = { .scale = 1, .spacing_px = 1 };
-
-	return request->budget == PSR_WIRE_BUDGET_SETTINGS ? request->settings : settings;
-}
-
-/* A long frame ends by the limit on its time on cores: the budget stays below it with all of them at work. */
-static double time_limit(const struct drawing *d)
-{
-	return fmin((double)d->request.time_budget_us * 1e3, (double)d->limit_ns / psr_pool_threads(d->pool));
-}
-
-void draw_resolve(struct drawing *d, const struct budget_learnt *learnt)
-{
-	const struct psr_msg_frame *request = &d->request;
-
-	d->seen = (struct budget_view){
-		.width = request->width, .height = request->height, .planes = request->planes,
-		.area = scene_area(d->scene, &request->camera, request->width, request->height),
-		.n_samples = (double)scene_blocks(d->scene) * PSR_BLOCK_SAMPLES,
-		.n_shadow_lights = scene_shadow_lights(d->scene),
-	};
-	if (request->budget == PSR_WIRE_BUDGET_TIME)
-		budget_choose_time(&d->choice, learnt, &d->seen, time_limit(d));
-	else if (request->budget == PSR_WIRE_BUDGET_ERROR)
-		budget_choose_error(&d->choice, learnt, &d->seen, request->error_bound_px);
-	else
-		d->choice.chosen.settings = settings_of(request);
-	d->settings = d->choice.chosen.settings;
-	if (d->is_sharp) {
-		d->settings.scale = 1;
-		d->settings.is_smooth = 1;
-	}
-}
-
 /* The codecs of a sharp frame lose nothing. */
 static void sharpen(struct psr_msg_frame *request)
 {
@@ -85,14 +48,6 @@ static void sharpen(struct psr_msg_frame *request)
 		return;
 	request->color_codec = PSR_CODEC_ZSTD;
 	request->color_quality = 0;
-}
-
-int draw_is_sharp(const struct psr_msg_frame *request)
-{
-	const struct psr_msg_settings settings = settings_of(request);
-	const int is_lossless = request->color_codec == PSR_CODEC_RAW || request->color_codec == PSR_CODEC_ZSTD;
-
-	return settings.scale == 1 && settings.is_smooth && is_lossless;
 }
 
 static void add_entry(struct psr_msg_frame_end *end, unsigned id, uint64_t ns, uint64_t count)
@@ -145,22 +100,6 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN, 0, report->n_shadow_maps_drawn);
 	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
-}
-
-static void fill_spent(struct budget_spent *spent, const struct psr_report *report, unsigned scale)
-{
-	const uint64_t *ns = report->ns;
-
-	*spent = (struct budget_spent){
-		.ns = {
-			[BUDGET_SAMPLES] = (double)(ns[PSR_STAGE_PLAN] + ns[PSR_STAGE_CULL] + ns[PSR_STAGE_WARP]),
-			[BUDGET_PIXELS] = (double)(ns[PSR_STAGE_GAPS] + ns[PSR_STAGE_RESOLVE] + ns[PSR_STAGE_SHADE]
-			                           + ns[PSR_STAGE_FILL]),
-			[BUDGET_SMOOTH] = (double)ns[PSR_STAGE_SMOOTH],
-			[BUDGET_SHADOWS] = (double)ns[PSR_STAGE_SHADOW],
-		},
-		.error_px = report->error_px * scale,
-	};
 }
 
 static int emit_begin(const struct drawing *d, const struct psr_msg_frame *shown, struct psr_error *err)
@@ -354,7 +293,7 @@ static int draw_and_encode(struct drawing *d, struct draw_worker *worker, struct
 	};
 	memcpy(d->end.hash, coded.hash, sizeof d->end.hash);
 	fill_report(&d->end, d, &picture.report, &times, coded.rect_bytes);
-	fill_spent(&d->spent, &picture.report, d->settings.scale);
+	resolve_spent(&d->spent, &picture.report, &d->settings);
 	return PSR_OK;
 }
 

@@ -27,8 +27,10 @@ struct drawing {
 	struct psr_msg_frame request; /* checked */
 	unsigned frame, refine;       /* number within the answer; level of refinement */
 	int is_sharp;                 /* scale 1, smooth, lossless, whatever was asked */
-	struct psr_msg_settings settings; /* resolved, once a frame: draw_resolve() */
+	struct psr_msg_settings settings; /* resolved, once a frame: resolve.h */
 	struct budget_view seen;      /* what settings are chosen for, and learnt from */
+	struct psr_msg_settings kept; /* of the flow's last frame, if it drew the same scene; or scale 0 */
+	int is_seen;                  /* `seen` has counts, not lights and sizes alone */
 	struct budget_choice choice;  /* of a budget of time or error */
 	const struct base *base;      /* what the client holds, and fits; or NULL */
 	struct codec_parts *parts;    /* of this frame; NULL in view 0 */
@@ -49,10 +51,6 @@ struct drawing {
 };
 
 int draw_is_sharp(const struct psr_msg_frame *request); /* what it asks for is sharp by itself */
-
-/* Sets the settings for frame, refine and is_sharp as they are set; a budget of time or error chooses them by what was
- * learnt. The scene is bound. */
-void draw_resolve(struct drawing *d, const struct budget_learnt *learnt);
 
 /* For the settings as they are resolved: parts to be filled in, NULL without memory; whether `base` fits. */
 struct codec_parts *draw_parts(const struct drawing *d);

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include "base/clock.h"
 #include "frame.h"
+#include "resolve.h"
 
 #define SLIGHT_PIXELS 16384
 #define SLIGHT_INSTANCES 16
@@ -142,10 +143,11 @@ static void set_bases(struct frame *frame)
 	d->parts = frame->made != NULL ? parts : NULL;
 }
 
-void frame_prepare(struct frame *frame)
+void frame_prepare(struct frame *frame, struct surveyor *surveyor)
 {
 	const struct schedule_request *request = &frame->request;
 	struct drawing *d = &frame->drawing;
+	struct flow *flow = frame_flow(frame);
 
 	d->frame = request->frame;
 	d->is_sharp = request->has_sharp && request->frame > 0;
@@ -153,7 +155,10 @@ void frame_prepare(struct frame *frame)
 	atomic_store(&d->used_ns, 0);
 	atomic_store(&d->must_yield, 0);
 	scene_bind(d->scene);
-	draw_resolve(d, &frame_flow(frame)->learnt);
+	d->kept = flow->drawn == d->scene ? flow->drawn_with : (struct psr_msg_settings){ .scale = 0 };
+	resolve_settings(d, &flow->learnt, surveyor);
+	flow->drawn = d->scene;
+	flow->drawn_with = d->settings;
 	if (d->view > 0)
 		set_bases(frame);
 }
@@ -165,8 +170,8 @@ void frame_learn(struct frame *frame, struct budget_learnt *of_all)
 	d->spent.total_ns = (double)(clock_ns() - d->start_ns);
 	if (d->refine > 0)
 		return;
-	budget_learn(&frame_flow(frame)->learnt, &d->seen, &d->settings, &d->spent);
-	budget_learn(of_all, &d->seen, &d->settings, &d->spent);
+	budget_learn(&frame_flow(frame)->learnt, &d->seen, d->is_seen, &d->settings, &d->spent);
+	budget_learn(of_all, &d->seen, d->is_seen, &d->settings, &d->spent);
 }
 
 int frame_is_slight(const struct frame *frame)

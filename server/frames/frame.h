@@ -7,6 +7,8 @@
 #include "frames.h"
 #include "workers.h"
 
+struct surveyor;
+
 struct frame {
 	struct schedule_request request; /* first: the schedule knows a frame by it */
 	struct frames *frames;
@@ -41,7 +43,7 @@ static inline struct flow *frame_flow(const struct frame *frame)
 }
 
 void frame_put_models(struct frame *frame); /* unpins them, or stops their coming */
-void frame_prepare(struct frame *frame); /* what its drawing needs to know of the frame that comes next */
+void frame_prepare(struct frame *frame, struct surveyor *surveyor); /* for the frame that comes next: resolve.h */
 
 /* It was drawn to its end: its flow, which is there, and all later flows learn what it took. */
 void frame_learn(struct frame *frame, struct budget_learnt *of_all);

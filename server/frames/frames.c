@@ -2,6 +2,7 @@
 #include "base/clock.h"
 #include "check.h"
 #include "frame.h"
+#include "render/survey.h"
 #include "workers.h"
 
 #define MAX_RUNNING 128           /* frames, each with a thread of its own */
@@ -16,6 +17,7 @@ struct frames {
 	struct workers workers;
 	uint64_t n_flows, bases_bytes;
 	struct budget_learnt learnt; /* of all flows: where new ones start */
+	struct surveyor *surveyor;   /* NULL: there was no memory */
 	int is_pumping, must_pump_again;
 };
 
@@ -139,7 +141,7 @@ static void on_begin(struct schedule_request *request, enum pool_class class, vo
 	struct pool_job job = { frame_flow(frame)->share, class, frame_run, frame, 0 };
 
 	frame->drawing.n_waiting = frames->schedule.n_waiting;
-	frame_prepare(frame);
+	frame_prepare(frame, frames->surveyor);
 	job.is_lent_to = frame_is_slight(frame);
 	frame->worker = workers_take(&frames->workers, &frame->use, request->bytes);
 	if (frame->worker != NULL && psr_pool_submit(frames->parts.pool, &job) == PSR_OK)
@@ -343,6 +345,7 @@ int frames_create(struct frames **out, const struct frames_parts *parts)
 	if (frames == NULL)
 		return PSR_ERR_MEMORY;
 	frames->parts = *parts;
+	frames->surveyor = surveyor_create();
 	budget_init(&frames->learnt);
 	frames->user = (struct schedule_user){ on_prepare, on_let_go, on_begin, on_stop, on_yield, on_end, on_need,
 	                                        frames };
@@ -357,6 +360,7 @@ void frames_destroy(struct frames *frames)
 	if (frames == NULL)
 		return;
 	workers_fini(&frames->workers);
+	surveyor_destroy(frames->surveyor);
 	free(frames);
 }
 

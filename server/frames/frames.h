@@ -23,6 +23,8 @@ struct flow {
 	struct bases bases;
 	uint64_t number;         /* over all flows that ever were */
 	struct budget_learnt learnt;
+	const struct scene *drawn; /* last: to be compared, not to be read; and how */
+	struct psr_msg_settings drawn_with;
 };
 
 enum frames_outcome {

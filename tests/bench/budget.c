@@ -28,7 +28,7 @@ static const struct {
 struct bench {
 	const char *work, *cache, *only;
 	int64_t seed;
-	int no_times, no_bounds;
+	int no_times, no_beside, no_bounds;
 	struct truth_build build;
 	struct budget_sums alone, beside;
 	struct budget_bounds bounds;
@@ -106,7 +106,8 @@ static void run_model(struct bench *bench, size_t m)
 	snprintf(address, sizeof address, "unix:%s", bench->build.socket);
 	if (!bench->no_times) {
 		budget_times(&bench->alone, address, name, view, 0);
-		budget_times(&bench->beside, address, name, view, 1);
+		if (!bench->no_beside)
+			budget_times(&bench->beside, address, name, view, 1);
 	}
 	if (!bench->no_bounds)
 		budget_bound(&bench->bounds, address, name, view, look.truth);
@@ -128,6 +129,8 @@ int main(int argc, char **argv)
 		{ .name = "only", .type = PSR_OPT_STRING, .value = &bench.only, .arg = "NAME", .help = "This model." },
 		{ .name = "seed", .type = PSR_OPT_INT, .value = &bench.seed, .arg = "N", .help = "Of the views.", .max = 1e15 },
 		{ .name = "no-times", .type = PSR_OPT_FLAG, .value = &bench.no_times, .help = "Leaves budgets of time out." },
+		{ .name = "no-beside", .type = PSR_OPT_FLAG, .value = &bench.no_beside,
+		  .help = "Leaves budgets beside another client out." },
 		{ .name = "no-bounds", .type = PSR_OPT_FLAG, .value = &bench.no_bounds,
 		  .help = "Leaves the geometric bound out." },
 		{ .name = NULL },
