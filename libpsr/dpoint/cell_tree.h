@@ -1,0 +1,31 @@
+/* A balanced tree of cells, by their middles: each leaf is one cell. Node i has the children 2 i + 1 and 2 i + 2, halves
+ * of its cells; a node is named by its index. */
+#ifndef PSR_DPOINT_CELL_TREE_H
+#define PSR_DPOINT_CELL_TREE_H
+
+#include "surface.h"
+
+#define CELL_NO_PART UINT32_MAX /* cells of several parts */
+
+struct cell_node {
+	float middle[3], radius;   /* of a sphere that holds the corners */
+	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has no normal */
+	uint32_t begin, end;       /* of order */
+	uint32_t part;
+};
+
+struct cell_tree {
+	struct cell_node *node;
+	uint32_t *order;
+	size_t n_nodes;            /* places for nodes; not all are there */
+};
+
+int cell_tree_init(struct cell_tree *tree, const struct dpoint_cell *cell, size_t n); /* MEMORY; n > 0 */
+void cell_tree_fini(struct cell_tree *tree);
+
+static inline int cell_node_is_leaf(const struct cell_node *node)
+{
+	return node->end - node->begin == 1;
+}
+
+#endif

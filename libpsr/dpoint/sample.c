@@ -1,0 +1,95 @@
+#include "sample.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include "base/vec.h"
+
+struct sampling {
+	struct dpoint_surface *surface;
+	const struct dpoint_patch *patch;
+	const struct dpoint_uniform *uniform;
+	struct dpoint_span span;
+};
+
+/* Local shape in inner units. */
+static int local_at(struct dpoint_local *local, const struct sampling *s, double u, double v)
+{
+	const double scale = s->uniform->scale;
+	int is_good = dpoint_patch_local(local, s->patch, &s->span, (const double[2]){ u, v });
+
+	for (int k = 0; k < 3; k++) {
+		local->at[k] = (local->at[k] - s->uniform->origin[k]) * scale;
+		local->shape[k] /= scale;
+	}
+	return is_good;
+}
+
+static int put_candidates(const struct sampling *s)
+{
+	const uint32_t n = s->uniform->n;
+	const float delta[2] = { s->uniform->delta, s->uniform->delta };
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; i < n && rc == PSR_OK; i++)
+		for (uint32_t j = 0; j < n && rc == PSR_OK; j++) {
+			struct dpoint_local local;
+			int is_good = local_at(&local, s, (i + 0.5) / n, (j + 0.5) / n);
+
+			rc = dpoint_surface_put(s->surface, &local, is_good, delta, s->uniform->part);
+		}
+	return rc;
+}
+
+/* Two rows of corners at a time. */
+static int put_cells(const struct sampling *s)
+{
+	const uint32_t n = s->uniform->n * s->uniform->cells;
+	float (*corner)[3] = malloc(2 * ((size_t)n + 1) * sizeof *corner);
+	int rc = corner != NULL ? PSR_OK : PSR_ERR_MEMORY;
+
+	for (uint32_t i = 0; i <= n && rc == PSR_OK; i++) {
+		float (*row)[3] = corner + (i & 1) * ((size_t)n + 1), (*before)[3] = corner + (~i & 1) * ((size_t)n + 1);
+
+		for (uint32_t j = 0; j <= n; j++) {
+			double at[3];
+
+			dpoint_patch_place(at, s->patch, &s->span, (const double[2]){ (double)i / n, (double)j / n });
+			for (int k = 0; k < 3; k++)
+				row[j][k] = (float)((at[k] - s->uniform->origin[k]) * s->uniform->scale);
+		}
+		for (uint32_t j = 0; j < n && i > 0 && rc == PSR_OK; j++) {
+			struct dpoint_cell *cell = dpoint_surface_cell(s->surface);
+			struct dpoint_local local;
+
+			if (cell == NULL) {
+				rc = PSR_ERR_MEMORY;
+				break;
+			}
+			memcpy(cell->corner[0], before[j], sizeof *row);
+			memcpy(cell->corner[1], row[j], sizeof *row);
+			memcpy(cell->corner[2], row[j + 1], sizeof *row);
+			memcpy(cell->corner[3], before[j + 1], sizeof *row);
+			cell->part = s->uniform->part;
+			memset(cell->normal, 0, sizeof cell->normal);
+			if (local_at(&local, s, (i - 0.5) / n, (j + 0.5) / n))
+				for (int k = 0; k < 3; k++)
+					cell->normal[k] = (float)local.axis[2][k];
+		}
+	}
+	free(corner);
+	return rc;
+}
+
+int dpoint_sample_uniform(struct dpoint_surface *surface, const struct dpoint_patch *patch,
+                          const struct dpoint_uniform *uniform)
+{
+	struct sampling s = { surface, patch, uniform, { { 0, 0 } } };
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; rc == PSR_OK && dpoint_patch_span(&s.span, patch, i); i++) {
+		rc = put_candidates(&s);
+		if (rc == PSR_OK)
+			rc = put_cells(&s);
+	}
+	return rc;
+}

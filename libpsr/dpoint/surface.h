@@ -1,0 +1,103 @@
+/* What differential points are chosen from, and what they have to cover: the surface in small cells. */
+#ifndef PSR_DPOINT_SURFACE_H
+#define PSR_DPOINT_SURFACE_H
+
+#include <stddef.h>
+#include <stdint.h>
+#include "base/pool.h"
+#include "dpoint.h"
+#include "psr/error.h"
+
+/* A piece of the surface: a convex quadrilateral, or a triangle, whose last corners are one. */
+struct dpoint_cell {
+	float corner[4][3];
+	float normal[3];   /* in its middle, of unit length; 0,0,0 where there is none, at poles */
+	uint32_t part;     /* of the source: a patch */
+};
+
+struct dpoint_candidate {
+	struct dpoint point;
+	float delta[2];    /* as in struct dpoint_limit */
+	uint32_t part;
+};
+
+struct dpoint_surface {
+	struct dpoint_cell *cell;
+	struct dpoint_candidate *candidate;
+	size_t n_cells, n_candidates, cells_room, candidates_room;
+	uint64_t n_bad, n_clamped;  /* candidates that were left out; whose curvature was brought to the bound */
+};
+
+void dpoint_surface_init(struct dpoint_surface *surface); /* empty */
+void dpoint_surface_fini(struct dpoint_surface *surface);
+
+/* Add one element. Return NULL without memory. */
+struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
+struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);
+
+/* Adds the candidate of a local shape, rounded to what a word holds but for its place; counts what is left out. is_good:
+ * 0 if there is no shape. MEMORY. */
+int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local, int is_good,
+                       const float delta[2], uint32_t part);
+
+/* ---- coverage ---- */
+
+struct dpoint_cover_options {
+	float sine;        /* of epsilon: dpoint_sine() */
+	float slack;       /* what rounding of places may take from an extent */
+	float angle;       /* radians: the normal of [K] (6) may be off by so much in the middle of a cell; pi: by anything
+	                    * below a right angle */
+	float height;      /* S_p may be off by so much there; and by half of the shorter extent at most */
+	int is_within_parts; /* points cover cells of their own part alone, as in [K] 6 */
+};
+
+/* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
+ * its normal, where the rectangle is shortened by the cosine of its sine: the tangent planes of two points on a circle
+ * meet at r tan a, above a place that is r sin a from both. So rectangles that cover neighbouring places cross, and
+ * leave no gap from any side. */
+struct cell_tree;
+struct dpoint_cover {
+	size_t n_candidates, n_cells;
+	const uint32_t **list;   /* of a candidate: nodes of the tree, all of whose cells it covers; none is below another */
+	uint32_t *n;
+	struct cell_tree *tree;  /* cell_tree.h; NULL without cells or candidates */
+	void **chunk;            /* what the lists are in */
+	size_t n_chunks;
+};
+
+/* Returns how many cells a candidate covers. */
+size_t dpoint_cover_size(const struct dpoint_cover *cover, uint32_t candidate);
+
+/* MEMORY, CANCELLED; dpoint_cover_fini() even then. pool and cancel may be NULL. */
+int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *surface,
+                      const struct dpoint_cover_options *options, struct psr_pool *pool,
+                      const struct psr_cancel *cancel);
+void dpoint_cover_fini(struct dpoint_cover *cover);
+
+/* ---- simplification ([K] 4.2) ---- */
+
+struct dpoint_choice {
+	uint8_t *is_kept;        /* of each candidate */
+	size_t n_kept, n_holes;  /* n_holes: cells that no candidate covers, kept or not */
+};
+
+/* Chooses few candidates that cover every cell that any of them covers. A front sweeps along the longest side: the first
+ * cell that is not covered yet gets, of the candidates that cover it, the one that covers most that is not. Those that
+ * others made superfluous are pruned. The same for any pool. MEMORY; dpoint_choice_fini() even then. */
+int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover);
+
+void dpoint_choice_fini(struct dpoint_choice *choice);
+
+/* ---- how good a choice is ---- */
+
+/* Normals are compared in the middle of each cell, by [K] (6), with those of the cells; heights are S_p's. Each kept
+ * point counts for each cell that it covers: any of them may be seen. Cells of no point, and poles, do not count. */
+struct dpoint_errors {
+	double normal_rms, normal_worst; /* radians */
+	double height_rms, height_worst; /* inner units */
+	double overlap;                  /* kept points a covered cell */
+};
+void dpoint_measure(struct dpoint_errors *errors, const struct dpoint_surface *surface,
+                    const struct dpoint_cover *cover, const struct dpoint_choice *choice);
+
+#endif
