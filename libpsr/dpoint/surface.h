@@ -74,6 +74,17 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
                       const struct psr_cancel *cancel);
 void dpoint_cover_fini(struct dpoint_cover *cover);
 
+/* Shortens each candidate's delta, along u and along v, until its rectangle is over no cell that S_p does not suit: one
+ * of the surface that goes on beside it, where the normal or the height is further off than the options say. So a
+ * rectangle ends at a crease, and where curvatures change. delta becomes one of dpoint_delta_class(), unless it is as it
+ * was. overhang: how far a rectangle may reach over such a cell. Cells that look the other way, and those of other sheets above or below, shorten nothing. MEMORY, CANCELLED. */
+int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, float overhang,
+               struct psr_pool *pool, const struct psr_cancel *cancel);
+
+/* Returns 2^(-class / 4), class 0 to 63; and the class of the greatest one that is at most delta, or 63. */
+float dpoint_delta_of_class(unsigned class);
+unsigned dpoint_delta_class(float delta);
+
 /* ---- simplification ([K] 4.2) ---- */
 
 struct dpoint_choice {

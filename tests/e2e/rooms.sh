@@ -66,6 +66,8 @@ models/price
 models/studies/lib
 models/studies/greedy
 models/studies/cull
+models/studies/tables/tables.h
+models/studies/dpoint
 models/studies
 models
 END

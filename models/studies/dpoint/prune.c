@@ -2,7 +2,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include "base/vec.h"
-#include "dpoint/choice.h"
 #include "study_dpoint.h"
 
 /* 1 for points of equal curvatures and directions, towards 0 for others. */

@@ -1,0 +1,108 @@
+#include "rectangle.h"
+
+#include <math.h>
+#include <string.h>
+#include "base/vec.h"
+
+/* Of unit vectors so near to each other the angle's tangent is at most 1.2 times their distance. */
+#define MOST_CHORD 0.6f
+
+void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
+                  const struct dpoint_cover_options *options)
+{
+	double s, c;
+
+	psr_sincos(fmin(options->angle, 3.14159), &s, &c);
+	*l = (struct looking){ surface, options, tree, c > 0 ? (float)c : 0, MOST_CHORD };
+	if (c > 0.82)
+		l->chord = (float)sqrt(2 - 2 * c);
+}
+
+void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options)
+{
+	const struct dpoint_limit limit = { options->sine, { c->delta[0], c->delta[1] } };
+	const float lambda[2] = { c->point.lambda_u, c->point.lambda_u * c->point.rho };
+	float rise = 0;
+
+	memcpy(r->at, c->point.at, sizeof r->at);
+	memcpy(r->axis[0], c->point.u, sizeof r->axis[0]);
+	memcpy(r->axis[2], c->point.normal, sizeof r->axis[2]);
+	v3f_cross(r->axis[1], r->axis[2], r->axis[0]);
+	r->lambda_u = c->point.lambda_u;
+	r->rho = c->point.rho;
+	r->part = c->part;
+	dpoint_extent(r->extent, &c->point, &limit);
+	r->height = fminf(options->height, 0.5f * fminf(r->extent[0], r->extent[1]));
+	for (int k = 0; k < 2; k++)
+		rise = fmaxf(rise, 2 * fabsf(lambda[k]) * r->extent[k] * r->extent[k]);
+	r->deep = rise + r->height;
+}
+
+void rectangle_shorten(struct rectangle *r, float slack)
+{
+	const float lambda[2] = { r->lambda_u, r->lambda_u * r->rho };
+
+	for (int k = 0; k < 2; k++) {
+		const float w = lambda[k] * r->extent[k];
+
+		r->extent[k] = r->extent[k] * sqrtf(fmaxf(0, 1 - w * w)) - slack;
+	}
+}
+
+void rectangle_sees(float at[3], const struct rectangle *r, const float p[3])
+{
+	float away[3];
+
+	v3f_sub(away, p, r->at);
+	m3f_apply(at, (const float (*)[3])r->axis, away);
+}
+
+int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
+                    const float at[3])
+{
+	float n[3], cell_normal[3], dot;
+
+	if (!(fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])) <= r->height))
+		return 0;
+	if (cell->normal[0] == 0 && cell->normal[1] == 0 && cell->normal[2] == 0)
+		return 1;
+	dpoint_normal_at(n, r->lambda_u, r->rho, at[0], at[1]);
+	m3f_apply(cell_normal, (const float (*)[3])r->axis, cell->normal);
+	dot = v3f_dot(n, cell_normal);
+	return dot > 0 && dot * dot >= l->cosine * l->cosine * v3f_dot(n, n);
+}
+
+int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell)
+{
+	float middle[3] = { 0, 0, 0 }, p[3];
+
+	if (l->options->is_within_parts && cell->part != r->part)
+		return 0;
+	for (int c = 0; c < 4; c++) {
+		rectangle_sees(p, r, cell->corner[c]);
+		if (!(fabsf(p[0]) <= r->extent[0] && fabsf(p[1]) <= r->extent[1]))
+			return 0;
+		v3f_add_scaled(middle, middle, 0.25f, p);
+	}
+	return rectangle_suits(l, r, cell, middle);
+}
+
+/* Within the sphere S_p's normal
+ * turns by radius |lambda_u| at most, and heights part by the tangent of the normals' difference. */
+int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
+                          const float p[3])
+{
+	float n[3], normal[3], chord;
+
+	if (!(fabsf(p[0]) + node->radius <= r->extent[0] && fabsf(p[1]) + node->radius <= r->extent[1]) ||
+	    node->spread >= MOST_CHORD || (l->options->is_within_parts && node->part != r->part))
+		return 0;
+	dpoint_normal_at(n, r->lambda_u, r->rho, p[0], p[1]);
+	v3f_normalize(n, n);
+	m3f_apply(normal, (const float (*)[3])r->axis, node->normal);
+	v3f_sub(n, n, normal);
+	chord = v3f_length(n) + node->spread + 1.6f * node->radius * fabsf(r->lambda_u);
+	return chord <= l->chord && fabsf(p[2] - dpoint_height_at(r->lambda_u, r->rho, p[0], p[1])) +
+	                            1.2f * chord * node->radius <= r->height;
+}
+

@@ -1,0 +1,45 @@
+/* A candidate's rectangle, as cells see it. */
+#ifndef PSR_DPOINT_RECTANGLE_H
+#define PSR_DPOINT_RECTANGLE_H
+
+#include "cell_tree.h"
+
+struct looking {
+	const struct dpoint_surface *surface;
+	const struct dpoint_cover_options *options;
+	const struct cell_tree *tree;
+	float cosine, chord; /* of options->angle; chord: 2 sin(angle / 2), at most 0.6 */
+};
+void looking_init(struct looking *l, const struct dpoint_surface *surface, const struct cell_tree *tree,
+                  const struct dpoint_cover_options *options);
+
+struct rectangle {
+	float at[3], axis[3][3]; /* u, v, normal */
+	float extent[2];
+	float deep;              /* how far from the tangent plane any of its cells may be */
+	float height;            /* how far from S_p */
+	float lambda_u, rho;
+	uint32_t part;
+};
+
+void rectangle_of(struct rectangle *r, const struct dpoint_candidate *c, const struct dpoint_cover_options *options);
+
+/* Shortens the extents to what may count as covered (struct dpoint_cover). */
+void rectangle_shorten(struct rectangle *r, float slack);
+
+/* A place in the frame of the rectangle. */
+void rectangle_sees(float at[3], const struct rectangle *r, const float p[3]);
+
+/* Whether in the cell's middle, `at` in the rectangle's frame, height and normal are S_p's as the options say. */
+int rectangle_suits(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell,
+                    const float at[3]);
+
+/* Whether all corners are within the extents, and the cell suits. */
+int rectangle_covers(const struct looking *l, const struct rectangle *r, const struct dpoint_cell *cell);
+
+/* Whether it covers all cells of a node, told by its sphere, at p in the rectangle's frame, and by its normals alone:
+ * 0 may be wrong. */
+int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
+                          const float p[3]);
+
+#endif

@@ -1,0 +1,152 @@
+/* Table 1 of [K]: the teapot's patches, before and after simplification. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "base/clock.h"
+#include "dpoint/sample.h"
+#include "models/shapes/teapot.h"
+#include "models/studies/tables/tables.h"
+#include "study_dpoint.h"
+
+#define SIDE 70        /* candidates along a side of a patch: 156,800, as [K] has */
+#define CELLS 2        /* along a side of a candidate's part */
+#define EPSILON 0.004
+#define SLACK 2e-5f    /* half a step of a group's box of 0.6 */
+#define OVERHANG 5e-4f
+
+/* [K] does not say its epsilon and delta. These are the least epsilon, of two digits, whose rectangles leave less than
+ * a thousandth of the patches uncovered, and the delta at which [K]'s order keeps as much as [K] does, 16.4 %. */
+#define DELTA_THERE 0.0132f
+#define DELTA_FREE 0.1f
+
+enum { POINTS, KEPT, BYTES, SECONDS, NORMAL_RMS, NORMAL_WORST, HEIGHT_WORST, OVERLAP, HOLES, N_COLUMNS };
+
+static const struct study_column columns[N_COLUMNS] = {
+	{ "points", "points", 0 }, { "kept %", "kept_percent", 2 }, { "kB", "kilobytes", 0 }, { "s", "seconds", 1 },
+	{ "normal rms", "normal_rms_degrees", 2 }, { "worst", "normal_worst_degrees", 1 },
+	{ "height worst", "height_worst", 4 }, { "overlap", "overlap", 2 }, { "holes %", "holes_percent", 2 },
+};
+
+enum way { ALL, THEIRS, OURS };
+
+struct row {
+	const char *label;
+	enum way way;
+	float delta, degrees, height;
+	int is_within_parts, bytes;
+};
+
+static const struct row rows[] = {
+	{ "all points, 62 bytes", ALL, DELTA_THERE, 170, 1, 1, 62 },
+	{ "[K] 4.2, within patches", THEIRS, DELTA_THERE, 170, 1, 1, 62 },
+	{ "front, across", OURS, DELTA_THERE, 170, 1, 0, 16 },
+	{ "fitted: 1 degree, 0.002", OURS, DELTA_FREE, 1, 0.002f, 0, 16 },
+	{ "fitted: 2 degrees, 0.002", OURS, DELTA_FREE, 2, 0.002f, 0, 16 },
+};
+#define N_ROWS (int)(sizeof rows / sizeof *rows)
+
+static int sample_teapot(struct dpoint_surface *surface, float delta)
+{
+	static const double bezier[8] = { 0, 0, 0, 0, 1, 1, 1, 1 };
+	struct dpoint_uniform uniform = { SIDE, CELLS, { 0.2, 1.575, 0 }, 1 / 3.75, delta, 0 };
+	int rc = PSR_OK;
+
+	for (uint32_t i = 0; i < TEAPOT_PATCHES && rc == PSR_OK; i++) {
+		double place[4][4][3], control[16][4];
+		const struct dpoint_patch patch = { { 3, 3 }, { 4, 4 }, { bezier, bezier }, (const double (*)[4])control };
+
+		teapot_patch(i, place);
+		for (int k = 0; k < 16; k++) {
+			memcpy(control[k], place[k / 4][k % 4], sizeof place[0][0]);
+			control[k][3] = 1;
+		}
+		uniform.part = i;
+		rc = dpoint_sample_uniform(surface, &patch, &uniform);
+	}
+	return rc;
+}
+
+static int keep_all(struct dpoint_choice *choice, const struct dpoint_cover *cover)
+{
+	struct heap heap;
+	struct tally tally;
+	int rc = choice_init(choice, &heap, &tally, cover);
+
+	if (rc == PSR_OK) {
+		for (uint32_t i = 0; i < cover->n_candidates; i++) {
+			choice->is_kept[i] = 1;
+			tally_add(&tally, i, 1);
+		}
+		choice_finish(choice, &tally);
+	}
+	choice_fini(&heap, &tally);
+	return rc;
+}
+
+static int choose(struct dpoint_choice *choice, enum way way, const struct dpoint_surface *surface,
+                  const struct dpoint_cover *cover)
+{
+	return way == ALL ? keep_all(choice, cover) : way == THEIRS ? study_dpoint_prune(choice, surface, cover)
+	                                                            : dpoint_choose(choice, cover);
+}
+
+static void put(double value[N_COLUMNS], const struct row *row, const struct dpoint_surface *surface,
+                const struct dpoint_choice *choice, const struct dpoint_errors *errors)
+{
+	value[POINTS] = (double)choice->n_kept;
+	value[KEPT] = 100 * (double)choice->n_kept / (double)surface->n_candidates;
+	value[BYTES] = (double)choice->n_kept * row->bytes / 1e3;
+	value[NORMAL_RMS] = errors->normal_rms / PSR_DEGREE;
+	value[NORMAL_WORST] = errors->normal_worst / PSR_DEGREE;
+	value[HEIGHT_WORST] = errors->height_worst;
+	value[OVERLAP] = errors->overlap;
+	value[HOLES] = 100 * (double)choice->n_holes / (double)surface->n_cells;
+}
+
+static int measure(double value[N_COLUMNS], const struct row *row, struct study *study)
+{
+	const struct dpoint_cover_options options = {
+		dpoint_sine(EPSILON), SLACK, (float)(row->degrees * PSR_DEGREE), row->height, row->is_within_parts,
+	};
+	struct dpoint_surface surface;
+	struct dpoint_cover cover = { 0 };
+	struct dpoint_choice choice = { 0 };
+	struct dpoint_errors errors;
+	double start = clock_seconds();
+	int rc;
+
+	dpoint_surface_init(&surface);
+	rc = sample_teapot(&surface, row->delta);
+	if (rc == PSR_OK && row->delta == DELTA_FREE)
+		rc = dpoint_fit(&surface, &options, OVERHANG, study->pool, NULL);
+	if (rc == PSR_OK)
+		rc = dpoint_cover_init(&cover, &surface, &options, study->pool, NULL);
+	if (rc == PSR_OK)
+		rc = choose(&choice, row->way, &surface, &cover);
+	if (rc == PSR_OK) {
+		value[SECONDS] = clock_seconds() - start;
+		dpoint_measure(&errors, &surface, &cover, &choice);
+		put(value, row, &surface, &choice, &errors);
+	}
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+	return rc == PSR_OK ? rc : psr_fail(study->err, rc, "no memory for the teapot's points");
+}
+
+int table_dpoint(struct study *study)
+{
+	const struct study_form form = { "way", columns, N_COLUMNS };
+	int rc;
+
+	if (study->n_models != 1 || strcmp(study->model[0].name, "teapot") != 0)
+		return psr_fail(study->err, PSR_ERR_ARG, "this table is of the teapot's own patches; leave --models out");
+	rc = study_table_init(&study->table, form, N_ROWS, 1, study->err);
+	study->total = N_ROWS;
+	for (int i = 0; i < N_ROWS && rc == PSR_OK; i++) {
+		study_label(&study->table, i, "%s", rows[i].label);
+		rc = measure(study_at(&study->table, i, 0, 0), &rows[i], study);
+		study_step(study, rows[i].label);
+	}
+	return rc;
+}
