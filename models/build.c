@@ -130,6 +130,9 @@ static void summarize(const char *out, const struct made *made)
 		       out, blocks->n_samples, blocks->n_blocks, (double)file_bytes / 1e6,
 		       mesh->n_triangles > 0 ? mesh->n_triangles : mesh->n_points, mesh->n_triangles > 0 ? "triangles" : "points",
 		       made->report.seconds_total, made->report.seconds_rays, made->report.seconds_select);
+	if (made->input.n_left_out > 0)
+		fprintf(stderr, PROGRAM ": warning: %s: points without a finite place were left out: %" PRIu64 "\n",
+		        made->input.path, made->input.n_left_out);
 	if (tree != NULL)
 		printf("%s: %" PRIu64 " leaves of %.3g in an octree of %d levels, %.1f MB, from %" PRIu64 " %s in %.1f s\n", out,
 		       tree->n_leaves, ldexp(made->tree->edge, -tree->levels), tree->levels, (double)file_bytes / 1e6,
@@ -149,7 +152,6 @@ static int make_octree(struct made *made, const struct wish *wish, struct psr_er
 /* Makes the model of a tree, and of blocks if there are any. */
 static int join(struct made *made, const struct wish *wish, struct psr_error *err)
 {
-	static const double z_up[3] = { 0, 0, 1 };
 	const double *up = wish->build.up;
 	struct psr_model_info info;
 	struct octree inner;
@@ -159,7 +161,7 @@ static int join(struct made *made, const struct wish *wish, struct psr_error *er
 	} else {
 		psr_octree_info(&info, made->tree);
 		if (up[0] == 0 && up[1] == 0 && up[2] == 0)
-			up = made->mesh != NULL ? made->mesh->up : z_up;
+			up = made->input.up;
 		v3d_normalize(info.up, up);
 		snprintf(info.builder, sizeof info.builder, "psr %s", PSR_VERSION);
 	}

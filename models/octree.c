@@ -1,28 +1,16 @@
 #include "octree.h"
 
-#include <fcntl.h>
 #include <math.h>
 #include <string.h>
-#include <strings.h>
-#include <unistd.h>
 #include "base/srgb.h"
-#include "import/cloud/las_source.h"
+#include "import/points/points.h"
+#include "sample/octree/of_mesh.h"
 
 #define FEWEST_LEVELS 4
 
 int octree_is_direct(const char *path)
 {
-	const size_t n = strlen(path);
-	const int fd = open(path, O_RDONLY | O_CLOEXEC | O_NONBLOCK);
-	char magic[4] = "";
-	ssize_t got = 0;
-
-	if (fd >= 0) {
-		got = read(fd, magic, sizeof magic);
-		close(fd);
-	}
-	return (got == 4 && memcmp(magic, "LASF", 4) == 0)
-	       || (n > 4 && (strcasecmp(path + n - 4, ".las") == 0 || strcasecmp(path + n - 4, ".laz") == 0));
+	return octree_source_suits(path);
 }
 
 /* ---- points of a mesh ---- */
@@ -52,6 +40,7 @@ static int read_points(size_t *n, struct octree_point *points, size_t room, void
 		const float *base = mesh->material[mesh->point_material[from->next]].base_color;
 
 		memcpy(point->at, mesh->point[from->next], sizeof point->at);
+		memcpy(point->normal, mesh->point_normal[from->next], sizeof point->normal);
 		for (int c = 0; c < 3; c++)
 			point->color[c] =
 				psr_linear_to_srgb(base[c] * (mesh->point_color != NULL ? mesh->point_color[from->next][c] : 1.0f));
@@ -69,47 +58,63 @@ static int levels_for(double across)
 	return levels < FEWEST_LEVELS ? FEWEST_LEVELS : levels > OCTREE_MOST_LEVELS ? OCTREE_MOST_LEVELS : levels;
 }
 
+static void set_options(struct octree_build_options *options, const struct octree_wish *wish, double across)
+{
+	octree_build_options_default(options);
+	if (wish->levels > 0)
+		options->levels = wish->levels;
+	else if (wish->spacing > 0)
+		options->levels = 0;
+	else
+		options->levels = levels_for(across);
+	options->spacing = wish->spacing;
+	options->memory = wish->memory;
+	options->on_progress = wish->on_progress;
+	options->userdata = wish->userdata;
+}
+
 static int build(struct octree **out, const struct octree_source *source, const struct octree_wish *wish,
                  struct psr_error *err)
 {
 	struct octree_build_options options;
 
-	octree_build_options_default(&options);
-	if (wish->levels > 0)
-		options.levels = wish->levels;
-	else if (wish->spacing > 0)
-		options.levels = 0;
-	else if (source->n_points > 0)
-		options.levels = levels_for(sqrt((double)source->n_points));
-	options.spacing = wish->spacing;
-	options.memory = wish->memory;
-	options.on_progress = wish->on_progress;
-	options.userdata = wish->userdata;
+	set_options(&options, wish, sqrt((double)source->n_points));
 	return octree_build(out, source, &options, err);
+}
+
+static int of_file(struct octree **out, struct octree_input *input, const struct octree_wish *wish, struct psr_error *err)
+{
+	struct octree_source source;
+	struct octree_source_count count;
+	int rc = octree_source_open(&source, input->path, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = build(out, &source, wish, err);
+	count = octree_source_count(&source);
+	input->n_points = count.n_read;
+	input->n_left_out = count.n_left_out;
+	if (rc == PSR_OK)
+		input->up[octree_source_up(&source, (*out)->low, (*out)->edge)] = 1.0;
+	octree_source_close(&source);
+	return rc;
 }
 
 int octree_make(struct octree **out, struct octree_input *input, const struct octree_wish *wish, struct psr_error *err)
 {
-	struct octree_source source = { .name = input->path };
+	struct octree_source source = { .name = input->path, .has_color = 1, .has_normal = 1, .rewind = go_back,
+		                            .read = read_points };
 	struct mesh_points points = { .mesh = input->mesh };
-	int rc;
+	struct octree_build_options options;
 
-	if (input->is_direct) {
-		rc = las_source_open(&source, input->path, err);
-		if (rc != PSR_OK)
-			return rc;
-		rc = build(out, &source, wish, err);
-		input->n_points = source.n_points;
-		las_source_close(&source);
-		return rc;
+	if (input->is_direct)
+		return of_file(out, input, wish, err);
+	memcpy(input->up, input->mesh->up, sizeof input->up);
+	if (input->mesh->n_triangles > 0) {
+		set_options(&options, wish, wish->resolution);
+		return octree_of_mesh(out, NULL, input->mesh, &options, err);
 	}
-	if (input->mesh->n_triangles > 0)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: it is a mesh, and octrees are built from clouds of points alone; "
-		                "build blocks of it (--representation blocks)", input->path);
-	source.has_color = 1;
 	source.n_points = input->n_points = input->mesh->n_points;
-	source.rewind = go_back;
-	source.read = read_points;
 	source.userdata = &points;
 	return build(out, &source, wish, err);
 }

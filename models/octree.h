@@ -19,7 +19,9 @@ struct octree_input {
 	const char *path;
 	int is_direct;        /* points are read from the file as they are needed; else `mesh` has them, or triangles */
 	const struct psr_mesh *mesh;
-	uint64_t n_points;    /* that were read, by octree_make(); 0 of triangles */
+	/* Set by octree_make(): */
+	uint64_t n_points, n_left_out; /* 0 of triangles; n_left_out: those without a finite place, not among n_points */
+	double up[3];
 };
 
 /* Tells by its first bytes and its ending whether a file's points are read as they are needed. */

@@ -62,15 +62,21 @@ static int is_pcd(const char *path, const uint8_t *bytes, size_t n_bytes)
 	return import_path_ends_with(path, ".pcd") || (n_bytes >= 6 && memcmp(bytes, "# .PCD", 6) == 0);
 }
 
-/* Survey coordinates have a far origin, and their z is height. */
-static int is_surveyed(const struct psr_mesh *mesh)
+int import_is_survey(const double low[3], const double high[3])
 {
-	double low[3], high[3], size = 0;
+	double size = 0;
 
-	import_mesh_bounds(low, high, mesh);
 	for (int k = 0; k < 3; k++)
 		size = fmax(size, high[k] - low[k]);
 	return fabs(low[0] / 2 + high[0] / 2) > SURVEY_SIZES * size || fabs(low[1] / 2 + high[1] / 2) > SURVEY_SIZES * size;
+}
+
+static int is_surveyed(const struct psr_mesh *mesh)
+{
+	double low[3], high[3];
+
+	import_mesh_bounds(low, high, mesh);
+	return import_is_survey(low, high);
 }
 
 /* Sets `up` (psr/mesh.h) by the convention of the format; files do not tell. */

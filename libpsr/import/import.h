@@ -159,6 +159,9 @@ int import_image_decode(struct psr_image *out, const uint8_t *bytes, size_t n_by
  * or broken images, and leaves *out alone; the module then reports the error. */
 int import_image_plain_png(struct psr_image *out, const uint8_t *bytes, size_t n_bytes, uint64_t max_pixels);
 
+/* Survey coordinates have a far origin, and their z is height. */
+int import_is_survey(const double low[3], const double high[3]);
+
 /* The readers append the contents of a source file, `bytes`, to the mesh. */
 int import_gltf(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);
 int import_assimp(struct import_mesh *im, const uint8_t *bytes, size_t n_bytes, struct psr_error *err);

@@ -57,6 +57,29 @@ check "blocks and an octree in one model" psr-model build "$work/ball.las" --rep
 psr-model info "$work/both.psr" --json >"$work/both.json"
 is "with both of them" "7 64" "$(value "$work/both.json" octree.levels) $(value "$work/both.json" resolution)"
 
+# Other files of points, and meshes.
+python3 - "$work/ball.las" "$work/ball.xyz" <<'END'
+import struct, sys
+data = open(sys.argv[1], "rb").read()
+with open(sys.argv[2], "w") as f:
+    f.write("// x y z r g b\nnan nan nan 0 0 0\n")
+    for at in range(227, len(data), 26):
+        x, y, z = struct.unpack_from("<3i", data, at)
+        r, g, b = struct.unpack_from("<3H", data, at + 20)
+        f.write("%.3f %.3f %.3f %d %d %d\n" % (x / 1000 + 412000, y / 1000 + 5312000, z / 1000 + 120, r, g, b))
+END
+psr-model build "$work/ball.xyz" --representation octree --levels 7 -o "$work/text.psr" >"$work/said" 2>"$work/warned"
+check "a point without a place is left out, with a warning" grep -q "points without a finite place were left out: 1" "$work/warned"
+check "and not counted" grep -q "from 60000 points" "$work/said"
+psr-model info "$work/text.psr" --json >"$work/text.json"
+is "a cloud of text has the leaves of the same cloud of LAS" "$(value "$work/ball.json" octree.leaves)" \
+	"$(value "$work/text.json" octree.leaves)"
+is "and stands upright" "[0, 0, 1]" "$(value "$work/text.json" up)"
+psr-model make pencil -o "$work/mesh.glb" >/dev/null
+check "a mesh becomes an octree" psr-model build "$work/mesh.glb" --representation octree --levels 7 -o "$work/mesh.psr"
+psr-model info "$work/mesh.psr" --json >"$work/mesh.json"
+is "of as many levels" 7 "$(value "$work/mesh.json" octree.levels)"
+
 refuses "levels and a spacing together" 2 "give one of them" \
 	psr-model build "$work/ball.las" --representation octree --levels 7 --spacing 1 -o "$work/none.psr"
 refuses "levels for blocks" 2 "add --representation octree" psr-model build "$work/ball.las" --levels 7 -o "$work/none.psr"

@@ -188,6 +188,15 @@ int ply_points_open(struct octree_source *out, const char *path, struct psr_erro
 	return PSR_OK;
 }
 
+int ply_points_have_faces(const struct octree_source *source)
+{
+	const struct ply_points *p = source->userdata;
+	const struct ply_element *faces = ply_find_element(&p->header, "face");
+	const struct ply_element *strips = ply_find_element(&p->header, "tristrips");
+
+	return (faces != NULL && faces->n_rows > 0) || (strips != NULL && strips->n_rows > 0);
+}
+
 void ply_points_close(struct octree_source *source)
 {
 	struct ply_points *p = source->userdata;

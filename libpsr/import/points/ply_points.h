@@ -5,6 +5,7 @@
 #include "octree/build/build.h"
 
 int ply_points_open(struct octree_source *out, const char *path, struct psr_error *err);
+int ply_points_have_faces(const struct octree_source *source); /* or triangle strips */
 void ply_points_close(struct octree_source *source);
 
 #endif

@@ -26,6 +26,18 @@ static int begins_with(const uint8_t *bytes, size_t n, const char *text)
 	return n >= strlen(text) && strncasecmp((const char *)bytes, text, strlen(text)) == 0;
 }
 
+/* Meshes are lines of numbers, too. */
+static int may_be_text(const char *path)
+{
+	static const char *const endings[] = { ".txt", ".csv", ".tsv", ".asc", ".dat", ".xyzrgb", ".xyzi", ".xyzn" };
+	const char *name = strrchr(path, '/');
+
+	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
+		if (import_path_ends_with(path, endings[i]))
+			return 1;
+	return strchr(name != NULL ? name : path, '.') == NULL;
+}
+
 static enum format format_of(const char *path, const uint8_t *bytes, size_t n)
 {
 	static const struct {
@@ -45,7 +57,7 @@ static enum format format_of(const char *path, const uint8_t *bytes, size_t n)
 	for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)
 		if (import_path_ends_with(path, endings[i].ending))
 			return endings[i].format;
-	return text_looks_like_points(bytes, n) ? XYZ : OTHER;
+	return may_be_text(path) && text_looks_like_points(bytes, n) ? XYZ : OTHER;
 }
 
 static int find_format(enum format *format, const char *path, struct psr_error *err)
@@ -180,7 +192,32 @@ void octree_source_close(struct octree_source *source)
 	source->userdata = NULL;
 }
 
-uint64_t octree_source_left_out(const struct octree_source *source)
+struct octree_source_count octree_source_count(const struct octree_source *source)
 {
-	return ((const struct points *)source->userdata)->left_out;
+	const struct points *p = source->userdata;
+
+	return (struct octree_source_count){ p->n_read, p->left_out };
+}
+
+int octree_source_suits(const char *path)
+{
+	struct octree_source ply;
+	enum format format;
+	int has_faces;
+
+	if (find_format(&format, path, NULL) != PSR_OK || format == OTHER)
+		return 0;
+	if (format != PLY || ply_points_open(&ply, path, NULL) != PSR_OK)
+		return format != PLY;
+	has_faces = ply_points_have_faces(&ply);
+	ply_points_close(&ply);
+	return !has_faces;
+}
+
+int octree_source_up(const struct octree_source *source, const double low[3], double edge)
+{
+	const struct points *p = source->userdata;
+	const double high[3] = { low[0] + edge, low[1] + edge, low[2] + edge };
+
+	return p->format != PLY || import_is_survey(low, high) ? 2 : 1;
 }

@@ -10,7 +10,8 @@
  *   PLY, text or binary: the vertices, with colours and normals; faces are passed over
  *   PCD, text, binary, or compressed (of at most POINTS_MOST_UNPACKED bytes: these are held in memory)
  *   PTS and PTX: all scans of a file; PTX in its common coordinates, without what no ray met
- *   XYZ and other tables of text (text.h)
+ *   XYZ and other tables of text (text.h): .xyz, and .txt .csv .tsv .asc .dat .xyzrgb .xyzi .xyzn or names without an
+ *   ending if the first line of points has three numbers
  *
  * Colours are sRGB. Where there are intensities alone they are a linear grey, black to white. Points without a finite
  * place are left out and counted. Takes some two megabytes and what stands before the points; the path must outlive
@@ -21,7 +22,18 @@ void octree_source_close(struct octree_source *source);
 
 #define POINTS_MOST_UNPACKED ((uint64_t)1 << 30)
 
-/* Returns how many points the latest reading, or what there was of it, left out since they have no finite place. */
-uint64_t octree_source_left_out(const struct octree_source *source);
+/* Points of the latest reading, or of what there was of it. */
+struct octree_source_count {
+	uint64_t n_read, n_left_out; /* n_left_out: not among n_read, since they have no finite place */
+};
+
+struct octree_source_count octree_source_count(const struct octree_source *source);
+
+/* Returns whether octree_source_open() is the way to read a file: it knows the format, or how to convert it, and the
+ * file has no faces. Looks at its beginning alone. */
+int octree_source_suits(const char *path);
+
+/* Returns the axis that is up, 1 or 2, by psr/mesh.h's rule; low and edge: of the cube that holds the points. */
+int octree_source_up(const struct octree_source *source, const double low[3], double edge);
 
 #endif

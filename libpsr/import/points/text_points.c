@@ -220,10 +220,17 @@ static int read_points(size_t *n, struct octree_point *points, size_t room, void
 	return rc;
 }
 
-/* How many points a text has is known behind its end alone. */
-static uint64_t estimate(const struct text_points *t)
+/* How many points a text has is known behind its end alone; its first window tells how long lines are. */
+static uint64_t estimate(struct text_points *t)
 {
-	return (t->feed.n_bytes - t->first) / (8 * (uint64_t)t->n_columns) + 1;
+	uint64_t n = 0;
+
+	text_rewind(t);
+	if (feed_need(&t->feed, FEED_WINDOW, NULL) != PSR_OK || t->feed.n == 0)
+		return 1;
+	for (size_t i = 0; i < t->feed.n; i++)
+		n += t->feed.bytes[i] == '\n';
+	return (uint64_t)((double)(n + 1) * (double)(t->feed.n_bytes - t->first) / (double)t->feed.n);
 }
 
 int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, struct psr_error *err)

@@ -397,6 +397,8 @@ static void what_is_no_file_of_points_is_refused_with_advice(void **state)
 	refuse_points("a.e57", PSR_ERR_UNSUPPORTED, "pdal translate IN.e57 OUT.las");
 	write_text("a.laz", "?");
 	refuse_points("a.laz", PSR_ERR_UNSUPPORTED, "laszip -i IN.laz");
+	write_text("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+	refuse_points("a.off", PSR_ERR_UNSUPPORTED, "not a file of points");
 	write_text("a.bin", "no points at all\n");
 	refuse_points("a.bin", PSR_ERR_UNSUPPORTED, "LAS, PLY, PCD, PTS, PTX, or lines of numbers");
 	write_text("a.ply", "");
@@ -409,6 +411,46 @@ static void what_is_no_file_of_points_is_refused_with_advice(void **state)
 	write_text("c.ply", "ply\nformat ascii 1.0\nelement vertex 9\nproperty float x\nproperty float y\nend_header\n"
 	                    "1 2 3 4 5 6 7 8 9 1 2 3 4 5 6 7 8 9");
 	refuse_points("c.ply", PSR_ERR_FORMAT, "no property z");
+}
+
+static void only_files_of_points_alone_suit(void **state)
+{
+	static const char *const head = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+	                                "property float z\n";
+	char text[512];
+
+	(void)state;
+	snprintf(text, sizeof text, "%send_header\n1 2 3\n", head);
+	write_text("s.ply", text);
+	assert_true(octree_source_suits(path_of("s.ply")));
+	snprintf(text, sizeof text, "%selement face 1\nproperty list uchar int vertex_indices\nend_header\n1 2 3\n1 0\n", head);
+	write_text("s.ply", text);
+	assert_false(octree_source_suits(path_of("s.ply")));
+	write_text("s.txt", "1 2 3\n");
+	assert_true(octree_source_suits(path_of("s.txt")));
+	write_text("s.obj", "v 1 2 3\n");
+	assert_false(octree_source_suits(path_of("s.obj")));
+	write_text("s.e57", "ASTM-E57");
+	assert_true(octree_source_suits(path_of("s.e57"))); /* to be told how to convert it */
+	assert_false(octree_source_suits(path_of("nowhere.las")));
+}
+
+static void clouds_stand_upright(void **state)
+{
+	static const double near[3] = { -1.0, -1.0, -1.0 }, far[3] = { 500000.0, 0.0, 0.0 };
+	struct octree_source source;
+
+	(void)state;
+	write_text("u.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+	                    "property float z\nend_header\n1 2 3\n");
+	assert_int_equal(octree_source_open(&source, path_of("u.ply"), NULL), PSR_OK);
+	assert_int_equal(octree_source_up(&source, near, 2.0), 1);
+	assert_int_equal(octree_source_up(&source, far, 2.0), 2);
+	octree_source_close(&source);
+	write_text("u.xyz", "1 2 3\n");
+	assert_int_equal(octree_source_open(&source, path_of("u.xyz"), NULL), PSR_OK);
+	assert_int_equal(octree_source_up(&source, near, 2.0), 2);
+	octree_source_close(&source);
 }
 
 static void a_file_of_noise_alone_says_so(void **state)
@@ -447,6 +489,8 @@ int main(void)
 		cmocka_unit_test(a_file_that_becomes_shorter_is_an_error),
 		cmocka_unit_test(normals_and_points_without_a_place_come_as_they_are),
 		cmocka_unit_test(what_is_no_file_of_points_is_refused_with_advice),
+		cmocka_unit_test(only_files_of_points_alone_suit),
+		cmocka_unit_test(clouds_stand_upright),
 		cmocka_unit_test(a_file_of_noise_alone_says_so),
 		cmocka_unit_test(compressed_points_beyond_the_limit_are_refused),
 	};

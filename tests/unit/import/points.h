@@ -33,7 +33,8 @@ static inline int try_points(struct read *r, const char *name, struct psr_error 
 		rc = source.read(&n, r->point + r->n, MOST_READ - r->n, source.userdata, err);
 		n = rc == PSR_OK ? n : 0;
 	}
-	r->left_out = octree_source_left_out(&source);
+	r->left_out = octree_source_count(&source).n_left_out;
+	assert_true(rc != PSR_OK || octree_source_count(&source).n_read == r->n);
 	if (rc == PSR_OK) {
 		size_t at = 0;
 
