@@ -16,11 +16,13 @@
 #include "base/cli.h"
 #include "psr/mesh.h"
 #include "model/blocks.h"
+#include "measure/calibrate.h"
 #include "model/tree.h"
 #include "octree.h"
 
 #define PROGRAM "psr-model build"
 #define BAR_WIDTH 32
+#define CALIBRATION_SEED 31 /* views that evaluations have are others */
 #define FORMATS \
 	"IN is told by its first bytes and its ending:\n" \
 	"  glTF 2.0    .gltf, .glb; with KHR_draco_mesh_compression, KHR_lights_punctual,\n" \
@@ -103,7 +105,7 @@ struct wish {
 	struct psr_import_options import;
 	struct psr_build_options build;
 	struct octree_wish octree;
-	int is_blocks, is_octree, is_packed, quiet;
+	int is_blocks, is_octree, is_packed, is_calibrated, quiet;
 };
 
 /* What was made on the way to a model. */
@@ -170,6 +172,27 @@ static int join(struct made *made, const struct wish *wish, struct psr_error *er
 	                             made->blocks != NULL ? psr_model_presets(made->blocks) : NULL, err);
 }
 
+/* Measures the ladder of settings on the model, and puts the result into it. */
+static int measure_ladder(struct made *made, const struct wish *wish, struct psr_error *err)
+{
+	static struct psr_calibrated view[CALIBRATE_VIEWS];
+	const struct calibrate_options options = {
+		.n_views = CALIBRATE_VIEWS, .seed = CALIBRATION_SEED, .n_threads = wish->build.n_threads,
+		.on_progress = on_progress, .userdata = wish->build.userdata,
+	};
+	const struct psr_calibration calibration = { CALIBRATE_VIEWS, view };
+	struct psr_model *calibrated;
+	int code = calibrate(view, made->model, made->mesh, &options, err);
+
+	if (code == PSR_OK)
+		code = psr_model_calibrate(&calibrated, made->model, &calibration, err);
+	if (code != PSR_OK)
+		return code;
+	psr_model_unref(made->model);
+	made->model = calibrated;
+	return PSR_OK;
+}
+
 static int make(struct made *made, const struct wish *wish, struct psr_error *err)
 {
 	int code = PSR_OK;
@@ -188,6 +211,8 @@ static int make(struct made *made, const struct wish *wish, struct psr_error *er
 		code = join(made, wish, err);
 	else if (code == PSR_OK)
 		made->model = psr_model_ref(made->blocks);
+	if (code == PSR_OK && wish->is_calibrated)
+		code = measure_ladder(made, wish, err);
 	return code;
 }
 
@@ -225,6 +250,13 @@ static int take_representation(const char *text, void *userdata, struct psr_erro
 		return psr_fail(err, PSR_ERR_ARG, "%s is not known; it is blocks, octree or both", text);
 	wish->is_blocks = text[0] == 'b';
 	wish->is_octree = strcmp(text, "blocks") != 0;
+	return PSR_OK;
+}
+
+static int check_calibration(const struct wish *wish, struct psr_error *err)
+{
+	if (wish->is_calibrated && !wish->is_blocks)
+		return psr_fail(err, PSR_ERR_ARG, "--calibrate measures pictures of blocks; add --representation blocks or both");
 	return PSR_OK;
 }
 
@@ -274,6 +306,9 @@ int cmd_build(int argc, char **argv)
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &wish.is_packed,
 		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
 		          " memory for all of it." },
+		{ .name = "calibrate", .type = PSR_OPT_FLAG, .value = &wish.is_calibrated,
+		  .help = "Measures in 32 views what settings cost and how far their pictures are from the source, and stores it in the"
+		          " file. Then psrd keeps budgets by figures of this model. Takes some minutes." },
 		{ .name = "Octrees, for large clouds", .type = PSR_OPT_HEADING },
 		{ .name = "representation", .type = PSR_OPT_CALL, .call = take_representation, .value = &wish, .arg = "KIND",
 		  .help = "What the model holds: blocks, octree or both. Octrees hold the points of a cloud as they are, in a tenth"
@@ -323,6 +358,8 @@ int cmd_build(int argc, char **argv)
 	wish.octree.levels = (int)levels;
 	if (code == PSR_OK)
 		code = check_octree(&wish, &err);
+	if (code == PSR_OK)
+		code = check_calibration(&wish, &err);
 	if (code == PSR_OK)
 		code = check_progress_fd(fd, &err);
 	if (code != PSR_OK)

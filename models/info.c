@@ -1,3 +1,5 @@
+#include "base/stats.h"
+#include "model/calibration.h"
 #include "commands.h"
 
 #include <inttypes.h>
@@ -24,6 +26,7 @@ struct summary {
 	uint64_t bytes, file_bytes;
 	int is_packed;
 	const struct psr_presets *presets;
+	const struct psr_calibration *calibration;
 	uint32_t level_blocks[PSR_MAX_LEVELS], n_bent, n_sheer;
 	uint64_t level_samples[PSR_MAX_LEVELS];
 };
@@ -54,6 +57,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->bytes = psr_model_bytes(model);
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->presets = psr_model_presets(model);
+	summary->calibration = psr_model_calibration(model);
 	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++) {
 		unsigned level = psr_blocks_level(summary->blocks, b);
 
@@ -102,6 +106,67 @@ static void print_presets(const struct psr_presets *p)
 	printf("lights            %" PRIu32 "\n", p->n_lights);
 	for (uint32_t i = 0; i < p->n_lights; i++)
 		printf("  %-12s    %s\n", view_light_kinds[p->light[i].light.kind], p->light[i].name);
+}
+
+/* Medians over the views; times as multiples of that of the plain picture. */
+struct rung_figures {
+	double rmse, times;
+};
+
+static void take_rung(struct rung_figures *figures, const struct psr_calibration *c, int rung)
+{
+	const int plain = 4; /* scale 1, spacing 1 */
+	double rmse[PSR_MAX_CALIBRATED], times[PSR_MAX_CALIBRATED];
+
+	for (uint32_t i = 0; i < c->n; i++) {
+		rmse[i] = (double)c->view[i].rmse[rung];
+		times[i] = (double)c->view[i].ms[rung] / (double)c->view[i].ms[plain];
+	}
+	*figures = (struct rung_figures){ stats_median(rmse, c->n), stats_median(times, c->n) };
+}
+
+static void print_calibration(const struct psr_calibration *c)
+{
+	if (c->n == 0)
+		return;
+	printf("calibration       %" PRIu32 " views; medians of error (codes of 8 bits) and time (of the plain picture's)\n",
+	       c->n);
+	for (int r = 0; r < PSR_RUNGS; r++) {
+		const struct psr_rung *rung = &psr_ladder[r];
+		struct rung_figures figures;
+
+		take_rung(&figures, c, r);
+		if (rung->pass > 0)
+			printf("  pass %u                 ", rung->pass);
+		else
+			printf("  scale %u, spacing %-4g%s", rung->scale, rung->spacing_px,
+			       rung->is_smooth ? ", smooth" : "        ");
+		printf("  %6.2f  %8.2f\n", figures.rmse, figures.times);
+	}
+}
+
+static void add_calibration(cJSON *root, const struct psr_calibration *c)
+{
+	cJSON *part, *rungs;
+
+	if (c->n == 0)
+		return;
+	part = cJSON_AddObjectToObject(root, "calibration");
+	cJSON_AddNumberToObject(part, "views", c->n);
+	rungs = cJSON_AddArrayToObject(part, "rungs");
+	for (int r = 0; r < PSR_RUNGS; r++) {
+		cJSON *rung = cJSON_CreateObject();
+		struct rung_figures figures;
+
+		take_rung(&figures, c, r);
+		cJSON_AddNumberToObject(rung, "scale", psr_ladder[r].scale);
+		cJSON_AddNumberToObject(rung, "spacing_px", psr_ladder[r].spacing_px);
+		cJSON_AddBoolToObject(rung, "smooth", psr_ladder[r].is_smooth);
+		cJSON_AddNumberToObject(rung, "pass", psr_ladder[r].pass);
+		cJSON_AddNumberToObject(rung, "rmse", figures.rmse);
+		cJSON_AddNumberToObject(rung, "time", figures.times);
+		cJSON_AddItemToArray(rungs, rung);
+	}
 }
 
 /* Bits a leaf of the arrays of a tree. */
@@ -183,6 +248,7 @@ static void print_text(const struct summary *s)
 	print_share("adequacy         ", info->n_missing, info->n_trials, "miss");
 	print_share("culling loss     ", info->n_lost, info->n_trials, "are lost");
 	print_presets(s->presets);
+	print_calibration(s->calibration);
 	printf("file              %.2f MB, %s\n", (double)s->file_bytes / 1e6, s->is_packed ? "packed" : "not packed");
 	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
 	if (s->tree != NULL)
@@ -255,6 +321,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	part = cJSON_AddArrayToObject(root, "lights");
 	for (uint32_t i = 0; i < s->presets->n_lights; i++)
 		add_preset(part, s->presets->light[i].name, view_light_kinds[s->presets->light[i].light.kind]);
+	add_calibration(root, s->calibration);
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
 	cJSON_AddNumberToObject(root, "file_bytes", (double)s->file_bytes);
 	cJSON_AddBoolToObject(root, "is_packed", s->is_packed);

@@ -7,6 +7,7 @@
 #include <stdint.h>
 #include <string.h>
 #include "model/blocks.h"
+#include "model/calibration.h"
 #include "model/tree.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
@@ -37,11 +38,11 @@ enum { ENTRY_REQUIRED = 1 };
 /* The unit of a section's length. */
 enum section_count {
 	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
-	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES
+	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES, COUNT_CALIBRATED
 };
 
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
-	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, N_KNOWN_SECTIONS = 31 };
+	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, SECTION_CALIBRATION = 31, N_KNOWN_SECTIONS };
 
 struct section_spec {
 	char type[5];
@@ -56,6 +57,7 @@ struct section_spec {
 #define CAMERA_BYTES 168
 #define LIGHT_BYTES 168
 #define OCTREE_BYTES 64
+#define CALIBRATED_BYTES 96
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 
@@ -109,6 +111,7 @@ struct content {
 	int has_blocks, has_octree; /* one at least; the other representation is all zeros */
 	struct psr_blocks blocks;
 	struct octree octree;
+	struct psr_calibration calibration;
 };
 
 /* The number of items of a known section in this model. section_array(): NULL for what is not an array, too. */
@@ -164,6 +167,8 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 
 /* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
+
+int calibration_validate(const struct psr_calibration *calibration, struct psr_error *err); /* the values of CALB */
 
 /* Check a tree for psr_model_create() and model_validate(): what its arrays are, and what is in them. */
 int model_check_octree_counts(const struct octree *tree, const char *name, struct psr_error *err);

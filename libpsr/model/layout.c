@@ -50,6 +50,7 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	TREE("ONRM", COUNT_LEAVES, 2, normal),
 	TREE("OOFF", COUNT_LEAVES, 1, offset),
 	TREE("OCOL", COUNT_LEAVES, 3, color),
+	[SECTION_CALIBRATION] = { "CALB", 1, 0, COUNT_CALIBRATED, CALIBRATED_BYTES, 0 },
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -79,6 +80,8 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 		return content->octree.n_codes;
 	case COUNT_LEAVES:
 		return content->octree.n_leaves;
+	case COUNT_CALIBRATED:
+		return content->calibration.n;
 	case COUNT_ONE:
 		break;
 	}
@@ -99,7 +102,7 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 {
 	const ptrdiff_t k = spec - section_table;
 
-	if (k >= SECTION_OCTREE)
+	if (k >= SECTION_OCTREE && k != SECTION_CALIBRATION)
 		return !content->has_octree;
 	return (k == SECTION_BLOCKS || k >= SECTION_FIRST_ARRAY) && !content->has_blocks;
 }
@@ -221,6 +224,7 @@ static int is_present(int section, const struct content *content)
 		return content->has_octree;
 	case SECTION_CAMERAS:
 	case SECTION_LIGHTS:
+	case SECTION_CALIBRATION:
 		return section_items(&section_table[section], content) > 0;
 	default:
 		return section_array(&section_table[section], content) != NULL;
@@ -238,6 +242,9 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 		break;
 	case SECTION_OCTREE:
 		file_put_octree(at, &content->octree);
+		break;
+	case SECTION_CALIBRATION:
+		memcpy(at, content->calibration.view, length);
 		break;
 	case SECTION_CAMERAS:
 		preset_put_cameras((struct psr_preset_camera *)(void *)at, content->presets.camera, content->presets.n_cameras);

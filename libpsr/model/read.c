@@ -243,7 +243,8 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 	return PSR_OK;
 }
 
-/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS, or 0 if it is missing. */
+/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS == PSR_MAX_CALIBRATED, or 0 if it is missing.
+ * */
 static int get_presets(const struct reader *r, int known, uint32_t *n, const void **array)
 {
 	struct section s;
@@ -320,7 +321,7 @@ static int get_arrays(const struct reader *r, struct content *content)
 
 int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err)
 {
-	const void *camera = NULL, *light = NULL;
+	const void *camera = NULL, *light = NULL, *calibrated = NULL;
 	struct reader r = { .bytes = bytes, .n_bytes = n_bytes, .name = name, .err = err };
 	int code;
 
@@ -360,8 +361,11 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	if (code == PSR_OK)
 		code = get_presets(&r, SECTION_LIGHTS, &content->presets.n_lights, &light);
 	if (code == PSR_OK)
+		code = get_presets(&r, SECTION_CALIBRATION, &content->calibration.n, &calibrated);
+	if (code == PSR_OK)
 		code = get_arrays(&r, content);
 	content->presets.camera = camera;
 	content->presets.light = light;
+	content->calibration.view = calibrated;
 	return code == PSR_OK ? model_validate(content, name, err) : code;
 }

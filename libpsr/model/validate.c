@@ -250,6 +250,9 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 
 	for (size_t i = 0; i < n_checks && code == PSR_OK; i++)
 		code = checks[i](&c);
+	struct psr_error broken = { 0 };
+	if (code == PSR_OK && calibration_validate(&content->calibration, &broken) != PSR_OK)
+		code = fail(&c, "CALB", "%s", broken.text);
 	if (code == PSR_OK && content->has_octree)
 		code = model_validate_octree(&content->octree, name, err);
 	return code;

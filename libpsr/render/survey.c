@@ -28,6 +28,7 @@ struct surveyor {
 	struct bins bins;
 	struct seen *seen; /* by group, of all instances */
 	size_t n_seen;
+	double n_left, apart2, spread; /* sums over tested samples in view: 1, squares for level 0 and their own */
 	uint32_t n_spots;
 	struct spot spot[2 * MOST_BLOCKS];
 	uint8_t covered[GRID][GRID];
@@ -161,6 +162,9 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
 			add_spot(s, &batch, i, n_samples, grow);
 		}
 	}
+	s->n_left += (double)n_left;
+	s->apart2 += (double)apart2;
+	s->spread += (double)apart2 * (1 << 2 * k->level);
 	seen->share = n_all > 0 ? (float)n_left / (float)n_all : 0;
 	seen->apart2 = n_left > 0 ? apart2 / (float)n_left : 0;
 }
@@ -200,12 +204,15 @@ static void count(struct survey *survey, struct surveyor *s, const double *densi
 	uint32_t stride = 1;
 
 	s->n_spots = 0;
+	s->n_left = s->apart2 = s->spread = 0;
 	s->plan.finer = 1;
 	cull_choose_levels(&s->bins, &s->plan);
 	for (uint64_t left = each_drawn(s, NULL, 0, 1); left > MOST_BLOCKS; left /= 2)
 		stride *= 2;
 	each_drawn(s, NULL, stride, 1);
 	survey->area = s->n_spots > 0 ? cover(s) : 0;
+	survey->apart = s->n_left > 0 ? sqrt(s->apart2 / s->n_left) : 0;
+	survey->layers = survey->area > 0 ? (double)SLANTED * stride * s->spread / survey->area : 0;
 	for (int i = 0; i < n; i++) {
 		struct survey_counts *counts = &survey->at[i];
 

@@ -15,7 +15,9 @@ struct survey_counts {
 };
 
 struct survey {
-	double area; /* pixels of the picture that blocks cover; estimates, as all counts */
+	double area;   /* pixels of the picture that blocks cover; estimates, as all counts */
+	double apart;  /* pixels between samples of level 0, the root of the mean square; 0: none in view */
+	double layers; /* how many times samples cover the area */
 	struct survey_counts at[SURVEY_MOST];
 };
 
