@@ -89,7 +89,7 @@ struct study {
 };
 
 struct study_kind {
-	const char *name, *figure, *what; /* "figure 5.5" */
+	const char *name, *figure, *what; /* "figure 5.5"; of other papers "[B] table 1" */
 	int (*run)(struct study *study);  /* fills the table; a figure prints its own, and writes pictures */
 	/* A table's: */
 	const char *models; /* default of --models: a list with commas; NULL: the standard set */

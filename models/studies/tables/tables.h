@@ -65,5 +65,6 @@ int table_models(struct study *study);
 int table_masks(struct study *study);
 int table_subdivision(struct study *study);
 int table_culling(struct study *study);
+int table_octree(struct study *study);
 
 #endif
