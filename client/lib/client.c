@@ -250,6 +250,11 @@ int psr_client_scene(struct psr_client *client, const struct psr_msg_scene *scen
 		if (scene->light[i].flags & PSR_WIRE_LIGHT_SHADOW && !(client->welcome.capabilities & PSR_CAP_SHADOWS))
 			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no shadows (%s); leave `shadow` out", client->address,
 			                client->welcome.server);
+	for (unsigned i = 0; code == PSR_OK && i < scene->n_instances && i < PSR_WIRE_MAX_INSTANCES; i++)
+		if (scene->instance[i].representation == PSR_WIRE_REP_OCTREE
+		    && !(client->welcome.capabilities & PSR_CAP_OCTREE))
+			code = psr_fail(err, PSR_ERR_UNSUPPORTED, "%s draws no octrees (%s)", client->address,
+			                client->welcome.server);
 	if (code != PSR_OK)
 		return code;
 	if (id != NULL)

@@ -175,7 +175,10 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 	if (model != NULL && notes->coarsest > ROUGH && asked->settings.spacing_px < DRAFT) {
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
-		if (resolution <= MOST)
+		if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))
+			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; build it with %.0f more --levels\n",
+			        program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
+		else if (resolution <= MOST)
 			fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n",
 			        program, model->name, model->opened.resolution, resolution);
 		else

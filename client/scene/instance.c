@@ -5,7 +5,7 @@
 #include "base/vec.h"
 #include "base/cli.h"
 
-#define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S]"
+#define FORM "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S][,as=blocks|octree]"
 
 /* Rotation a, then b: the quaternion b a. */
 static void compose(double out[4], const double a[4], const double b[4])
@@ -44,6 +44,21 @@ static int parse_rotation(struct psr_msg_instance *place, const char *text, cons
 	return PSR_OK;
 }
 
+static int parse_representation(struct psr_msg_instance *place, const char *text, const char **end,
+                                struct psr_error *err)
+{
+	const size_t n = strcspn(text, ",");
+
+	*end = text + n;
+	if (n == 6 && memcmp(text, "blocks", 6) == 0)
+		place->representation = PSR_WIRE_REP_BLOCKS;
+	else if (n == 6 && memcmp(text, "octree", 6) == 0)
+		place->representation = PSR_WIRE_REP_OCTREE;
+	else
+		return psr_fail(err, PSR_ERR_ARG, "as is blocks or octree, not '%.40s'; without it the server chooses", text);
+	return PSR_OK;
+}
+
 static int parse_part(struct psr_msg_instance *place, const char *text, const char **end, struct psr_error *err)
 {
 	if (strncmp(text, "rotate=", 7) == 0)
@@ -62,6 +77,8 @@ static int parse_part(struct psr_msg_instance *place, const char *text, const ch
 			return psr_fail(err, PSR_ERR_ARG, "scale is a number above 0, not '%.40s'", text + 6);
 		return PSR_OK;
 	}
+	if (strncmp(text, "as=", 3) == 0)
+		return parse_representation(place, text + 3, end, err);
 	return psr_fail(err, PSR_ERR_ARG, "unknown part '%.40s'; an instance is " FORM, text);
 }
 

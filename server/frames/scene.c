@@ -43,7 +43,7 @@ uint64_t scene_blocks(const struct scene *scene)
 	uint64_t n = 0;
 
 	for (uint32_t i = 0; i < scene->scene.n_instances; i++)
-		n += scene->model[scene->of_instance[i]]->card.n_blocks;
+		n += card_groups(&scene->model[scene->of_instance[i]]->card, scene->instance[i].representation);
 	return n;
 }
 
@@ -107,16 +107,25 @@ static int add_instance(struct scene *scene, const struct handles *handles, cons
 	struct catalogue_model *model = handles_find(handles, msg->handle);
 	uint32_t number = scene->scene.n_instances;
 	struct psr_instance *instance = &scene->instance[number];
+	static const char *const names[] = { "", "blocks", "an octree" };
+	static const enum psr_representation representations[] = {
+		[PSR_WIRE_REP_AUTO] = PSR_AUTOMATIC, [PSR_WIRE_REP_BLOCKS] = PSR_BLOCKS, [PSR_WIRE_REP_OCTREE] = PSR_OCTREE,
+	};
 	double norm = 0;
 
-	if (msg->representation != PSR_WIRE_REP_AUTO && msg->representation != PSR_WIRE_REP_BLOCKS)
+	if (msg->representation > PSR_WIRE_REP_OCTREE)
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "instance %" PRIu32 " asks for representation %u; this server draws blocks "
-		                "(1, or 0 for automatic)",
+		                "instance %" PRIu32 " asks for representation %u; this server draws blocks and octrees "
+		                "(1 and 2, or 0 for automatic)",
 		                number, msg->representation);
 	if (model == NULL)
 		return psr_fail(err, PSR_ERR_NOT_FOUND,
 		                "instance %" PRIu32 " names handle %" PRIu32 ", and no open model has it", number, msg->handle);
+	if (msg->representation != PSR_WIRE_REP_AUTO && !(model->card.representations >> msg->representation & 1))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED,
+		                "instance %" PRIu32 " asks for representation %u (%s), and its model has %s alone", number,
+		                msg->representation, names[msg->representation], names[3 - msg->representation]);
+	instance->representation = representations[msg->representation];
 	for (int k = 0; k < 4; k++)
 		norm += msg->rotation[k] * msg->rotation[k];
 	norm = sqrt(norm);

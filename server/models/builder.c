@@ -70,7 +70,7 @@ static enum psr_progress_stage stage_of(const char *name, enum psr_progress_stag
 		{ "import", PSR_PROGRESS_IMPORT }, { "read", PSR_PROGRESS_IMPORT }, { "load", PSR_PROGRESS_IMPORT },
 		{ "bounds", PSR_PROGRESS_IMPORT }, { "points", PSR_PROGRESS_IMPORT },
 		{ "rays", PSR_PROGRESS_SAMPLE }, { "sample", PSR_PROGRESS_SAMPLE },
-		{ "merge", PSR_PROGRESS_SAMPLE }, { "normals", PSR_PROGRESS_SELECT },
+		{ "merge", PSR_PROGRESS_SAMPLE }, { "leaves", PSR_PROGRESS_SAMPLE }, { "normals", PSR_PROGRESS_SELECT },
 		{ "select", PSR_PROGRESS_SELECT }, { "write", PSR_PROGRESS_WRITE },
 	};
 

@@ -1,7 +1,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "card.h"
-#include "model/blocks.h"
+#include "model/cubes.h"
+#include "psr/message.h"
 
 /* Returns NULL for no presets, or without memory. */
 static void *copy(const void *from, size_t n, size_t bytes)
@@ -15,12 +16,22 @@ static void *copy(const void *from, size_t n, size_t bytes)
 
 int card_init(struct card *card, const struct psr_model *model)
 {
-	const struct psr_blocks *blocks = psr_model_blocks(model);
+	const struct psr_blocks *blocks = psr_model_blocks(model), *drawn = blocks;
+	const struct psr_cubes *cubes = psr_model_cubes(model);
 	const struct psr_presets *presets = psr_model_presets(model);
 
-	*card = (struct card){ .info = *psr_model_info(model), .presets = *presets, .n_levels = blocks->n_levels,
-		                   .n_blocks = blocks->n_blocks, .n_samples = blocks->n_samples,
-		                   .has_sheer = blocks->opacity != NULL };
+	if (blocks == NULL)
+		drawn = &cubes->groups;
+	*card = (struct card){ .info = *psr_model_info(model), .presets = *presets, .n_levels = drawn->n_levels,
+		                   .n_samples = drawn->n_samples, .has_sheer = blocks != NULL && blocks->opacity != NULL };
+	if (blocks != NULL) {
+		card->representations |= 1u << PSR_WIRE_REP_BLOCKS;
+		card->n_blocks = blocks->n_blocks;
+	}
+	if (cubes != NULL) {
+		card->representations |= 1u << PSR_WIRE_REP_OCTREE;
+		card->n_cubes = cubes->groups.n_blocks;
+	}
 	psr_model_content_id(model, card->content_id);
 	card->presets.camera = copy(presets->camera, presets->n_cameras, sizeof *presets->camera);
 	card->presets.light = copy(presets->light, presets->n_lights, sizeof *presets->light);

@@ -4,18 +4,29 @@
 
 #include <stdint.h>
 #include "psr/model.h"
+#include "psr/scene.h"
 
 struct card {
 	uint8_t content_id[16];
 	struct psr_model_info info;
 	struct psr_presets presets; /* freed by the card */
-	uint32_t n_levels, n_blocks;
+	uint32_t representations; /* bit r: enum psr_wire_rep r */
+	uint32_t n_levels;        /* these of what is drawn where nobody names a representation */
+	uint32_t n_blocks, n_cubes; /* of blocks, of the octree; 0 without */
 	uint64_t n_samples;
 	int has_sheer; /* some samples let a part of the light through */
 };
 
-/* Fills the card of a model that has blocks. MEMORY: the card then holds nothing. */
+/* Fills the card of a model. MEMORY: the card then holds nothing. */
 int card_init(struct card *card, const struct psr_model *model);
 void card_fini(struct card *card);
+
+/* Returns how many blocks or cubes of this representation a model has, at all levels. */
+static inline uint32_t card_groups(const struct card *card, enum psr_representation representation)
+{
+	const int is_octree = representation == PSR_OCTREE || (representation == PSR_AUTOMATIC && card->n_blocks == 0);
+
+	return is_octree ? card->n_cubes : card->n_blocks;
+}
 
 #endif

@@ -10,7 +10,6 @@
 #include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
-#include "model/blocks.h"
 
 static void post(struct opening *o)
 {
@@ -30,9 +29,6 @@ void opening_load(void *userdata)
 		cache_touch(o->cached);
 	if (o->code == PSR_OK)
 		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
-	if (o->code == PSR_OK && psr_model_blocks(o->model) == NULL)
-		o->code =
-			psr_fail(&o->error, PSR_ERR_UNSUPPORTED, "the file has no blocks, and this server draws nothing else");
 	post(o);
 }
 

@@ -12,9 +12,9 @@ int answer_opened(struct session *session, uint32_t id, struct catalogue_model *
 	const struct card *card = &model->card;
 	const struct psr_model_info *info = &card->info;
 	struct psr_msg_opened msg = {
-		.handle = handles_next(&session->handles), .representations = 1u << PSR_WIRE_REP_BLOCKS,
+		.handle = handles_next(&session->handles), .representations = card->representations,
 		.scale = info->scale, .spacing = info->spacing, .resolution = info->resolution, .n_levels = card->n_levels,
-		.n_samples = card->n_samples, .n_blocks = card->n_blocks, .bytes = model->bytes,
+		.n_samples = card->n_samples, .n_blocks = card_groups(card, PSR_AUTOMATIC), .bytes = model->bytes,
 	};
 	uint8_t bytes[512];
 	struct psr_buf buf = { .data = bytes, .capacity = sizeof bytes };

@@ -87,6 +87,20 @@ static void a_name_alone_stands_where_its_file_puts_it_to_the_bit(void **state)
 	assert_true(p[0] == point[0] && p[1] == point[1] && p[2] == point[2]);
 }
 
+static void an_instance_may_name_its_representation(void **state)
+{
+	struct instance_wish wish;
+
+	(void)state;
+	assert_int_equal(instance_parse(&wish, "a", NULL), PSR_OK);
+	assert_int_equal(wish.place.representation, PSR_WIRE_REP_AUTO);
+	assert_int_equal(instance_parse(&wish, "a,as=octree,scale=2", NULL), PSR_OK);
+	assert_int_equal(wish.place.representation, PSR_WIRE_REP_OCTREE);
+	assert_string_equal(wish.model, "a");
+	assert_int_equal(instance_parse(&wish, "a,scale=2,as=blocks", NULL), PSR_OK);
+	assert_int_equal(wish.place.representation, PSR_WIRE_REP_BLOCKS);
+}
+
 static void bad_instances_are_refused_with_a_sentence(void **state)
 {
 	static const struct {
@@ -99,6 +113,8 @@ static void bad_instances_are_refused_with_a_sentence(void **state)
 		{ "a,scale=0", "scale is a number above 0, not '0'" },
 		{ "a,scale=-1", "scale is a number above 0" },
 		{ "a,scal=2", "unknown part 'scal=2'" },
+		{ "a,as=octrees", "as is blocks or octree, not 'octrees'" },
+		{ "a,as=,scale=2", "as is blocks or octree" },
 		{ "a,rotate=Y", "behind the axis" },
 		{ "a,rotate=Y:", "behind the axis" },
 		{ "a,rotate=W:90", "rotate is AXIS:DEG" },
@@ -343,6 +359,7 @@ int main(void)
 		cmocka_unit_test(an_instance_is_turned_scaled_and_put_somewhere),
 		cmocka_unit_test(rotations_happen_in_their_order_about_any_axis),
 		cmocka_unit_test(a_name_alone_stands_where_its_file_puts_it_to_the_bit),
+		cmocka_unit_test(an_instance_may_name_its_representation),
 		cmocka_unit_test(bad_instances_are_refused_with_a_sentence),
 		cmocka_unit_test(a_misspelt_name_finds_its_like),
 		cmocka_unit_test(files_are_numbered),
