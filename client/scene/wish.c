@@ -91,7 +91,8 @@ static void add_instances(struct optlist *list, struct scene_wish *wish)
 		  .words = "@models",
 		  .help = "A model, by its name in `psr list`, where its file puts it. Repeat it to see several models in one "
 		          "picture." },
-		{ .name = "instance", .type = PSR_OPT_CALL, .value = wish, .arg = "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S][,as=KIND]",
+		{ .name = "instance", .type = PSR_OPT_CALL, .value = wish,
+		  .arg = "NAME[,at=X,Y,Z][,rotate=AXIS:DEG][,scale=S][,as=KIND]",
 		  .call = on_instance, .seen = &wish->n_said,
 		  .words = "@models",
 		  .help = "A model somewhere else: turned by DEG degrees about an axis (X, Y, Z or x,y,z) through the 0,0,0 of "
