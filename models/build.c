@@ -32,6 +32,8 @@
 	"  PLY         meshes and clouds; text and binary\n" \
 	"  LAS         clouds of versions 1.0 to 1.4; not compressed ones (LAZ)\n" \
 	"  PCD         clouds of the Point Cloud Library; text, binary and compressed\n" \
+	"  PTS, PTX, XYZ\n" \
+	"              clouds as text, for octrees alone\n" \
 	"  the others  OBJ, STL, OFF, 3DS, Collada and other formats that Assimp reads"
 
 struct progress {

@@ -7,6 +7,7 @@
 #include "sample/octree/of_mesh.h"
 
 #define FEWEST_LEVELS 4
+#define ACROSS_UNKNOWN 4096 /* of a file that does not tell how many points it has */
 
 int octree_is_direct(const char *path)
 {
@@ -78,7 +79,7 @@ static int build(struct octree **out, const struct octree_source *source, const 
 {
 	struct octree_build_options options;
 
-	set_options(&options, wish, sqrt((double)source->n_points));
+	set_options(&options, wish, source->n_points > 0 ? sqrt((double)source->n_points) : ACROSS_UNKNOWN);
 	return octree_build(out, source, &options, err);
 }
 
@@ -106,13 +107,18 @@ int octree_make(struct octree **out, struct octree_input *input, const struct oc
 		                            .read = read_points };
 	struct mesh_points points = { .mesh = input->mesh };
 	struct octree_build_options options;
+	struct octree_mesh_report report;
+	int rc;
 
 	if (input->is_direct)
 		return of_file(out, input, wish, err);
 	memcpy(input->up, input->mesh->up, sizeof input->up);
 	if (input->mesh->n_triangles > 0) {
 		set_options(&options, wish, wish->resolution);
-		return octree_of_mesh(out, NULL, input->mesh, &options, err);
+		rc = octree_of_mesh(out, &report, input->mesh, &options, err);
+		if (rc == PSR_OK)
+			(*out)->is_one_sided = report.is_closed && report.n_both == 0;
+		return rc;
 	}
 	source.n_points = input->n_points = input->mesh->n_points;
 	source.userdata = &points;
