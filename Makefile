@@ -244,7 +244,7 @@ FRAMES     := $(BUILD)/tests/bench/frames
 EFFECTS    := $(BUILD)/tests/bench/effects
 CANCEL     := $(BUILD)/tests/bench/cancel
 POOL_BENCH := $(BUILD)/tests/bench/pool
-OCTREE_BENCH := $(BUILD)/tests/bench/octree
+OCTREE_BENCH := $(BUILD)/tests/bench/octree $(BUILD)/tests/bench/octree_draws
 CODEC_BENCH := $(BUILD)/tests/bench/codec
 DAEMON_BENCH := $(BUILD)/tests/bench/daemon
 REPROJECT_BENCH := $(BUILD)/tests/bench/reproject
@@ -314,7 +314,7 @@ $(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr
 CODEC_O := $(addprefix $(BUILD)/server/,$(addsuffix .c.o,frames/codec frames/codec_parts frames/codec_rect frames/pixels net/outq))
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
-$(OCTREE_BENCH): $(BUILD)/tests/bench/octree.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
+$(OCTREE_BENCH): %: %.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 $(POOL_BENCH): $(BUILD)/tests/bench/pool.c.o $(LIB)/libpsr.a
 	$(link) $(L_PSR)
@@ -445,7 +445,7 @@ bench-load: compile $(BUILD)/tests/tools/relay ## bench-load: psr bench's clock 
 	$(Q)BUILD=$(BUILD) tests/bench/load.sh
 
 bench-octree: $(OCTREE_BENCH) ## bench-octree: octrees from 20 M points of LAS: time, memory, bits, rates
-	$(Q)$(OCTREE_BENCH)
+	$(Q)$(BUILD)/tests/bench/octree
 bench-pool: $(POOL_BENCH) ## bench-pool: what loops and hand-overs between flows cost; a small frame beside large ones; shares
 	$(Q)$(POOL_BENCH)
 

@@ -13,8 +13,7 @@ struct making {
 	struct psr_cubes *cubes;
 	struct psr_cluster *cluster;
 	struct psr_cube_run *run; /* of the level */
-	uint64_t *place;
-	uint16_t *code, *leaf;
+	struct psr_cube *cube;
 	uint8_t *flags, *sine;
 	int8_t *axis[3];
 	int level, depth;         /* depth: of clusters' nodes */
@@ -196,9 +195,10 @@ static int put_cube(const struct octree_node *node, void *userdata)
 	if (in_level % CUBES_RUN == 0)
 		*run = (struct psr_cube_run){ (uint32_t)node->code, (uint32_t)node->leaf };
 	octree_place(node->path, at);
-	m->place[m->n] = at[0] | (uint64_t)at[1] << CUBES_PLACE_BITS | (uint64_t)at[2] << 2 * CUBES_PLACE_BITS;
-	m->code[m->n] = (uint16_t)(node->code - run->code);
-	m->leaf[m->n] = (uint16_t)(node->leaf - run->leaf);
+	const uint64_t place = at[0] | (uint64_t)at[1] << CUBES_PLACE_BITS | (uint64_t)at[2] << 2 * CUBES_PLACE_BITS
+	                       | (uint64_t)m->level << 3 * CUBES_PLACE_BITS;
+	m->cube[m->n] = (struct psr_cube){ { (uint32_t)place, (uint32_t)(place >> 32) },
+		                               (uint16_t)(node->code - run->code), (uint16_t)(node->leaf - run->leaf) };
 	m->flags[m->n] = (uint8_t)(m->level | (psr_octree_is_one_sided(tree) ? 0 : PSR_BLOCK_TWO_SIDED));
 	if (m->sine != NULL)
 		make_cone(m, tree, node->leaf, node->leaf + n_leaves);
@@ -257,19 +257,17 @@ static void *make_arrays(struct making *m, uint32_t n_cubes, uint32_t n_runs, ui
 	struct psr_cubes *cubes = m->cubes;
 	const struct octree *tree = cubes->level[0].tree;
 	const int has_cones = psr_octree_is_one_sided(tree);
-	const size_t cube = sizeof *m->place + sizeof *m->code + sizeof *m->leaf + sizeof *m->flags + (has_cones ? 4 : 0);
+	const size_t cube = sizeof *m->cube + sizeof *m->flags + (has_cones ? 4 : 0);
 	const size_t n = n_cubes * cube + n_runs * sizeof *m->run + n_clusters * sizeof *m->cluster;
 	char *const memory = psr_alloc_array(n, 1);
 
 	if (memory == NULL)
 		return NULL;
 	cubes->n_bytes += sizeof *cubes + n;
-	m->place = (uint64_t *)(void *)memory;
-	m->run = (struct psr_cube_run *)(m->place + n_cubes);
+	m->cube = (struct psr_cube *)(void *)memory;
+	m->run = (struct psr_cube_run *)(m->cube + n_cubes);
 	m->cluster = (struct psr_cluster *)(m->run + n_runs);
-	m->code = (uint16_t *)(m->cluster + n_clusters);
-	m->leaf = m->code + n_cubes;
-	m->flags = (uint8_t *)(m->leaf + n_cubes);
+	m->flags = (uint8_t *)(m->cluster + n_clusters);
 	if (has_cones) {
 		for (int a = 0; a < 3; a++)
 			m->axis[a] = (int8_t *)m->flags + (size_t)(a + 1) * n_cubes;
@@ -297,14 +295,12 @@ int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct p
 		psr_cubes_destroy(cubes);
 		return rc;
 	}
-	cubes->place = m.place;
-	cubes->code = m.code;
-	cubes->leaf = m.leaf;
+	cubes->cube = m.cube;
 	for (uint32_t l = 0; l < cubes->groups.n_levels; l++) {
 		cubes->level[l].run = m.run;
 		make_level(&m, (int)l);
 	}
-	cubes->spacing = CUBES_DIAGONAL * cubes->level[0].edge;
+	cubes->spacing = CUBES_SPACING * cubes->level[0].edge;
 	cubes->groups.n_blocks = n_cubes;
 	cubes->groups.n_clusters = m.n_clusters;
 	cubes->groups.cluster = m.cluster;
@@ -323,6 +319,6 @@ void psr_cubes_destroy(struct psr_cubes *cubes)
 		return;
 	for (int l = 1; l < CUBES_MOST_LEVELS; l++)
 		octree_destroy((struct octree *)(uintptr_t)cubes->level[l].tree);
-	psr_free((void *)(uintptr_t)cubes->place);
+	psr_free((void *)(uintptr_t)cubes->cube);
 	free(cubes);
 }

@@ -11,6 +11,10 @@
 #define CUBES_DIAGONAL 1.7320508075688772 /* a leaf's, in edges */
 /* From a cube's middle to its farthest leaf's, that leaf's offset, and half the distance of neighbours; in edges. */
 #define CUBES_RADIUS (CUBES_DIAGONAL * (1.5 + 0.375 + 0.5))
+/* Where a pixel is at least so many edges of leaves wide, each pixel of a surface has the middle of one that the surface
+ * meets: at 45 degrees to the picture's rows they need so many, and no other planes and views need more (decision 0106).
+ */
+#define CUBES_SPACING 1.4142135623730951
 #define CUBES_PLACE_BITS 18 /* of a coordinate, in edges of a cube */
 
 struct psr_cube_run {
@@ -24,6 +28,12 @@ struct psr_cube_level {
 	const struct psr_cube_run *run;
 };
 
+/* Read together: in one line of the cache, most often. */
+struct psr_cube {
+	uint32_t place[2];   /* as 64 bits: CUBES_PLACE_BITS a coordinate, x lowest; then the level */
+	uint16_t code, leaf; /* less those of the cube's run */
+};
+
 /* Cubes are numbered by level, the finest first, then in Morton order. Cubes of one cluster follow each other. A
  * cluster is a node of at most 64x64x64 leaves of level 0; it has a cluster at each level, which are a group. */
 struct psr_cubes {
@@ -31,9 +41,8 @@ struct psr_cubes {
 	 * blocks. Has no projections, spheres, masks, depths or attributes. */
 	struct psr_blocks groups;
 	struct psr_cube_level level[CUBES_MOST_LEVELS];
-	const uint64_t *place;  /* CUBES_PLACE_BITS a coordinate, x lowest */
-	const uint16_t *code, *leaf;
-	double spacing;         /* greatest distance of neighbouring leaves of level 0, inner units: a leaf's diagonal */
+	const struct psr_cube *cube;
+	double spacing;         /* of level 0, inner units: CUBES_SPACING */
 	uint64_t n_bytes;
 };
 
@@ -53,25 +62,26 @@ static inline int psr_octree_is_one_sided(const struct octree *tree)
 
 static inline const struct psr_cube_level *psr_cubes_level(const struct psr_cubes *cubes, uint32_t cube)
 {
-	return &cubes->level[cubes->groups.flags[cube] & PSR_BLOCK_LEVEL];
+	return &cubes->level[cubes->cube[cube].place[1] >> (3 * CUBES_PLACE_BITS - 32)];
 }
 
 /* Returns the place of a cube's code in its level's tree, and its first leaf. */
 static inline uint32_t psr_cubes_code(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
 {
-	return level->run[(cube - level->first) / CUBES_RUN].code + cubes->code[cube];
+	return level->run[(cube - level->first) / CUBES_RUN].code + cubes->cube[cube].code;
 }
 
 static inline uint32_t psr_cubes_leaf(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
 {
-	return level->run[(cube - level->first) / CUBES_RUN].leaf + cubes->leaf[cube];
+	return level->run[(cube - level->first) / CUBES_RUN].leaf + cubes->cube[cube].leaf;
 }
 
 /* Computes the middle of a cube, in inner units. */
 static inline void psr_cubes_center(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube,
                                     double center[3])
 {
-	const uint64_t place = cubes->place[cube], most = (1u << CUBES_PLACE_BITS) - 1;
+	const uint32_t *words = cubes->cube[cube].place;
+	const uint64_t place = words[0] | (uint64_t)words[1] << 32, most = (1u << CUBES_PLACE_BITS) - 1;
 
 	for (int a = 0; a < 3; a++)
 		center[a] = level->tree->low[a]

@@ -20,6 +20,33 @@ static inline void make_cubes(struct warp_cube *cubes, const struct warp_target 
 	}
 }
 
+/* Cubes come in any order of memory: the lines of later ones are fetched in two steps, since one tells of the next. */
+static inline void fetch_cubes(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		const struct warp_instance *in = &t->instance[entry[i].instance];
+
+		__builtin_prefetch(&in->cubes->model->cube[entry[i].slot - in->first_slot]);
+	}
+}
+
+static inline void fetch_codes(const struct warp_target *t, const struct bin_entry *entry, uint32_t n)
+{
+	for (uint32_t i = 0; i < n; i++) {
+		const struct warp_instance *in = &t->instance[entry[i].instance];
+		const uint32_t cube = entry[i].slot - in->first_slot;
+		const struct psr_cube_level *level = psr_cubes_level(in->cubes->model, cube);
+
+		__builtin_prefetch(level->tree->code + psr_cubes_code(in->cubes->model, level, cube));
+	}
+}
+
+/* The entries of a batch from `first` on, BLOCKS or what is left of n. */
+static inline uint32_t batch_of(uint32_t first, uint32_t n)
+{
+	return first >= n ? 0 : n - first < BLOCKS ? n - first : BLOCKS;
+}
+
 /* Lists the words of a cube's leaves, and their cells. */
 typedef void list_cube_fn(struct words *words, struct cells *cells, const struct warp_target *t,
                           const struct bin_entry *entry, const struct warp_cube *cube);
@@ -36,8 +63,11 @@ static inline __attribute__((always_inline)) uint64_t leaves_by(list_cube_fn *li
 
 	words.n = cells.n = cells.level = 0;
 	for (uint32_t e = 0; e < n; e++) {
-		if (e % BLOCKS == 0)
-			make_cubes(cubes, target, entry + e, n - e < BLOCKS ? n - e : BLOCKS);
+		if (e % BLOCKS == 0) {
+			fetch_cubes(target, entry + e + 2 * BLOCKS, batch_of(e + 2 * BLOCKS, n));
+			fetch_codes(target, entry + e + BLOCKS, batch_of(e + BLOCKS, n));
+			make_cubes(cubes, target, entry + e, batch_of(e, n));
+		}
 		if (words.n > LIST - PSR_BLOCK_SAMPLES) {
 			n_inside += words.n;
 			lower_words(target->word, &words);

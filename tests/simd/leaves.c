@@ -10,7 +10,7 @@
 enum numbers { PLAIN, SPOILT };
 
 /* A tree of which the codes of n cubes are there alone: each cube's, then its children's. n_leaves of each; 0: any. */
-static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, uint16_t *code, uint16_t *leaf,
+static void random_tree(struct check *c, struct octree *tree, struct psr_cube_run *run, struct psr_cube *cube,
                         const uint32_t n[2])
 {
 	uint8_t some[64 * 9];
@@ -21,8 +21,8 @@ static void random_tree(struct check *c, struct octree *tree, struct psr_cube_ru
 
 		if (i % CUBES_RUN == 0)
 			run[i / CUBES_RUN] = (struct psr_cube_run){ n_codes, n_leaves };
-		code[i] = (uint16_t)(n_codes - run[i / CUBES_RUN].code);
-		leaf[i] = (uint16_t)(n_leaves - run[i / CUBES_RUN].leaf);
+		cube[i].code = (uint16_t)(n_codes - run[i / CUBES_RUN].code);
+		cube[i].leaf = (uint16_t)(n_leaves - run[i / CUBES_RUN].leaf);
 		some[at] = n[1] == 0 ? (uint8_t)(1 + check_below(c, 255)) : n[1] == 64 ? 255 : 0x69;
 		n_codes++;
 		for (int j = 0; j < __builtin_popcount(some[at]); j++) {
@@ -51,8 +51,7 @@ static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_
 {
 	struct psr_cubes *cubes = check_in(c, 1, sizeof *cubes);
 	const uint32_t n_levels = n_leaves > 0 ? 1 : 1 + check_below(c, MAX_LEVELS), n = n_levels * n_cubes;
-	uint64_t *place = check_in(c, n, sizeof *place);
-	uint16_t *code = check_in(c, n, sizeof *code), *leaf = check_in(c, n, sizeof *leaf);
+	struct psr_cube *cube = check_in(c, n, sizeof *cube);
 	uint8_t *flags = check_in(c, n, 1);
 
 	memset(cubes, 0, sizeof *cubes);
@@ -60,20 +59,22 @@ static struct psr_cubes *random_cubes(struct check *c, uint32_t n_cubes, uint32_
 		struct psr_cube_run *run = check_in(c, 1, sizeof *run);
 		struct psr_cube_level *level = &cubes->level[l];
 
-		random_tree(c, &tree[l], run, code + l * n_cubes, leaf + l * n_cubes, (const uint32_t[2]){ n_cubes, n_leaves });
+		random_tree(c, &tree[l], run, cube + l * n_cubes, (const uint32_t[2]){ n_cubes, n_leaves });
 		*level = (struct psr_cube_level){ &tree[l], l * n_cubes, n_cubes, ldexp(2, -tree[l].levels), run };
 		for (uint32_t i = l * n_cubes; i < (l + 1) * n_cubes; i++) {
 			const uint32_t most = 1u << (tree[l].levels - 2);
 
-			place[i] = check_below(c, most) | (uint64_t)check_below(c, most) << CUBES_PLACE_BITS
-			           | (uint64_t)check_below(c, most) << 2 * CUBES_PLACE_BITS;
+			const uint64_t place = check_below(c, most) | (uint64_t)check_below(c, most) << CUBES_PLACE_BITS
+			                       | (uint64_t)check_below(c, most) << 2 * CUBES_PLACE_BITS
+			                       | (uint64_t)l << 3 * CUBES_PLACE_BITS;
+
+			cube[i].place[0] = (uint32_t)place;
+			cube[i].place[1] = (uint32_t)(place >> 32);
 			flags[i] = (uint8_t)(l | (tree[l].normal == NULL || check_one_in(c, 2) ? PSR_BLOCK_TWO_SIDED : 0));
 		}
 	}
 	cubes->groups = (struct psr_blocks){ .n_blocks = n, .n_levels = n_levels, .flags = flags };
-	cubes->place = place;
-	cubes->code = code;
-	cubes->leaf = leaf;
+	cubes->cube = cube;
 	return cubes;
 }
 

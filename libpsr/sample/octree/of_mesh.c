@@ -10,6 +10,7 @@
 #include "base/vec.h"
 #include "model/blocks.h"
 
+#define SIDES 100 /* a tree is one-sided if one leaf of so many holds two sides, at most: gaps of one are filled */
 #define DIAGONAL 1.4142135623730951 /* of a face of a leaf: the diameter of filters, as for samples of a lattice */
 #define ROUNDING 1e-6               /* of normals: no line goes between two triangles */
 #define REACH (0.8660254037844386 + ROUNDING) /* of offsets: half of a leaf's own diagonal */
@@ -315,6 +316,7 @@ int octree_of_mesh(struct octree **out, struct octree_mesh_report *report, const
 		for (int c = 0; c < 3; c++)
 			(*out)->low[c] = m.surface.low[c];
 		(*out)->edge = m.surface.edge;
+		(*out)->is_one_sided = m.report.is_closed && m.report.n_both * SIDES <= (*out)->n_leaves;
 		if (report != NULL)
 			*report = m.report;
 	}

@@ -138,9 +138,8 @@ static void check_sphere(const struct psr_scene *scene, double reach, double sla
 	free(p);
 }
 
-/* Leaves are as wide as pixels where the picture is 160 pixels high and level l has h = 2^(l - 7): a sample is at most
- * half a diagonal from where the surface meets its leaf, and a level is chosen by which that is half a pixel at most.
- * Where no level is fine enough samples are magnified, and cells of 2^k pixels fill between them. */
+/* Level l's leaves have edges of h = 2^(l - 7): a sample is at most half a diagonal from where the surface meets its
+ * leaf, and the coarsest level is drawn whose h is 1 / sqrt(2) pixel at most. Where no level is fine enough samples are magnified, and cells of 2^k pixels fill between them. */
 static void spheres_have_no_holes_and_the_right_depths_and_colours(void **state)
 {
 	static const double heights[] = { 2, 2.9, 3.8, 8, 15 }, magnified[] = { 0.5, 1 };
@@ -156,13 +155,11 @@ static void spheres_have_no_holes_and_the_right_depths_and_colours(void **state)
 
 		for (unsigned i = 0; i < sizeof heights / sizeof *heights; i++) {
 			scene.camera = orthographic(heights[i]);
-			/* sqrt(3) times a leaf's edge is a pixel at most, so half of it is half a pixel; or the finest level's is
-			 * below sqrt(3) pixels. */
-			const double pixel = heights[i] / SIDE, leaf = sqrt(3) * h < pixel ? pixel / sqrt(3) : h;
+			const double pixel = heights[i] / SIDE, leaf = sqrt(2) * h < pixel ? pixel / sqrt(2) : h;
 			check_sphere(&scene, fmax(HALF_DIAGONAL * leaf / pixel, 0.5), HALF_DIAGONAL * leaf);
 		}
 		for (unsigned i = 0; i < sizeof magnified / sizeof *magnified; i++) {
-			const double pixels = sqrt(3) * h * SIDE / magnified[i];
+			const double pixels = sqrt(2) * h * SIDE / magnified[i];
 
 			/* Cells are less than twice as wide as samples are apart; what fills is within two of them. */
 			scene.camera = orthographic(magnified[i]);
@@ -181,7 +178,7 @@ static void fewer_samples_are_drawn_of_what_is_small(void **state)
 
 	(void)state;
 	assert_int_equal(psr_model_cubes(model)->groups.n_levels, CUBES_MOST_LEVELS);
-	for (double height = 4; height <= 64; height *= 2) {
+	for (double height = 4; height <= 32; height *= 2) {
 		scene.camera = orthographic(height);
 		struct drawn *p = draw(&scene, 1, 0);
 

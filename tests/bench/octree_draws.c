@@ -1,0 +1,231 @@
+/* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] MESH|CLOUD.las [BLOCKS.psr]
+ *
+ * Draws frames of two threads from four directions: as they fit the picture, and nearer. With blocks of the same object,
+ * frames of both take turns, and their times are medians. Points a second are those of cull and warp together. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "base/stats.h"
+#include "base/vec.h"
+#include "import/cloud/las_source.h"
+#include "model/blocks.h"
+#include "model/cubes.h"
+#include "model/tree.h"
+#include "psr/mesh.h"
+#include "psr/render.h"
+#include "sample/octree/of_mesh.h"
+
+#define N_THREADS 2
+#define MOST_FRAMES 400
+#define DIRECTIONS 4
+
+static const double nearer[] = { 1, 0.5, 0.25 }; /* of the distance at which all fits the picture */
+#define N_DISTANCES 3
+
+struct subject {
+	const char *name;
+	struct psr_model *model;
+	enum psr_representation representation;
+};
+
+struct times {
+	double frame[MOST_FRAMES], points[MOST_FRAMES], samples, covered;
+	int n;
+};
+
+static int read_cloud(struct octree **tree, const char *path, const struct octree_build_options *options,
+                      struct psr_error *err)
+{
+	struct octree_source source;
+	int rc = las_source_open(&source, path, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = octree_build(tree, &source, options, err);
+	las_source_close(&source);
+	return rc;
+}
+
+static int read_mesh(struct octree **tree, const char *path, const struct octree_build_options *options,
+                     struct psr_error *err)
+{
+	struct octree_mesh_report report;
+	struct psr_mesh *mesh;
+	int rc = psr_mesh_import(&mesh, path, NULL, err);
+
+	if (rc != PSR_OK)
+		return rc;
+	rc = octree_of_mesh(tree, &report, mesh, options, err);
+	if (rc == PSR_OK)
+		printf("%.2f %% of the leaves hold two sides, and the surface is %s\n",
+		       100.0 * (double)report.n_both / (double)(*tree)->n_leaves, report.is_closed ? "closed" : "open");
+	psr_mesh_destroy(mesh);
+	return rc;
+}
+
+/* In the inner coordinates of the blocks, or its own. */
+static int make_model(struct psr_model **out, struct octree *tree, const struct psr_model *blocks, struct psr_error *err)
+{
+	struct psr_model_info info = { .up = { 0, 1, 0 }, .resolution = 1u << (tree->levels < 16 ? tree->levels : 16) };
+
+	info.scale = tree->edge * 0.87;
+	for (int a = 0; a < 3; a++) {
+		info.origin[a] = tree->low[a] + tree->edge / 2;
+		info.box_min[a] = tree->low[a];
+		info.box_max[a] = tree->low[a] + tree->edge;
+	}
+	info.spacing = sqrt(3) * ldexp(tree->edge, -tree->levels);
+	if (blocks != NULL) {
+		const double spacing = info.spacing;
+
+		info = *psr_model_info(blocks);
+		info.spacing = spacing;
+	}
+	for (int a = 0; a < 3; a++)
+		tree->low[a] = (tree->low[a] - info.origin[a]) / info.scale;
+	tree->edge /= info.scale;
+	return psr_model_create_octree(out, &info, tree, NULL, err);
+}
+
+struct bench {
+	struct psr_renderer *renderer;
+	struct psr_pool *pool;
+	struct psr_frame frame;
+	uint32_t side;
+};
+
+/* Looks from one of the directions around the object. */
+static void place_camera(struct psr_scene *scene, const struct psr_model_info *info, int direction, double distance)
+{
+	struct psr_camera *camera = &scene->camera;
+	double away[3];
+
+	psr_camera_frame(camera, info->box_min, info->box_max, info->up, 0.7, 1);
+	v3d_sub(away, camera->eye, camera->target);
+	for (int i = 0; i < direction; i++) { /* a quarter around the way up, if that is y */
+		const double x = away[0];
+
+		away[0] = away[2];
+		away[2] = -x;
+	}
+	v3d_add_scaled(camera->eye, camera->target, distance, away);
+}
+
+static int draw(struct times *times, const struct bench *bench, const struct subject *subject, int direction,
+                double distance, struct psr_error *err)
+{
+	const struct psr_model_info *info = psr_model_info(subject->model);
+	struct psr_instance instance = { .model = subject->model, .rotation = { 0, 0, 0, 1 }, .scale = 1,
+		                             .representation = subject->representation };
+	struct psr_light light;
+	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .light = &light, .n_lights = 1,
+		                       .ambient = { 0.1, 0.1, 0.1 } };
+	struct psr_frame frame = bench->frame;
+	struct psr_settings settings;
+	int rc;
+
+	place_camera(&scene, info, direction, distance);
+	psr_light_key(&light, &scene.camera);
+	light.casts_shadow = 0;
+	psr_settings_default(&settings, bench->side, bench->side);
+	rc = psr_render(bench->renderer, &scene, &settings, bench->pool, &frame, err);
+	if (rc != PSR_OK || times == NULL || times->n == MOST_FRAMES)
+		return rc;
+	const struct psr_report *report = &frame.report;
+	double ns = 0;
+	for (int s = 0; s < PSR_N_STAGES; s++)
+		ns += (double)report->ns[s];
+	times->frame[times->n] = ns * 1e-6;
+	times->points[times->n++] = (double)report->n_samples_drawn * 1e3
+	                            / (double)(report->ns[PSR_STAGE_CULL] + report->ns[PSR_STAGE_WARP]);
+	times->samples += (double)report->n_samples_drawn;
+	times->covered += (double)report->n_covered;
+	return rc;
+}
+
+static int measure(const struct bench *bench, const struct subject *subject, int n_subjects, int n_rounds,
+                   struct psr_error *err)
+{
+	static struct times times[2];
+
+	printf("%-10s %10s %12s %14s %14s\n", "nearer by", "", "frame, ms", "M points/s", "samples/pixel");
+	for (int d = 0; d < N_DISTANCES; d++) {
+		memset(times, 0, sizeof times);
+		for (int round = -1; round < n_rounds; round++)
+			for (int direction = 0; direction < DIRECTIONS; direction++)
+				for (int s = 0; s < n_subjects; s++) {
+					const int rc = draw(round < 0 ? NULL : &times[s], bench, &subject[s], direction, nearer[d], err);
+
+					if (rc != PSR_OK)
+						return rc;
+				}
+		for (int s = 0; s < n_subjects; s++)
+			printf("%-10g %10s %12.2f %14.0f %14.1f\n", 1 / nearer[d], subject[s].name,
+			       stats_median(times[s].frame, (size_t)times[s].n), stats_median(times[s].points, (size_t)times[s].n),
+			       times[s].samples / times[s].covered);
+		if (n_subjects == 2)
+			printf("%-10g %10s %12.2f\n", 1 / nearer[d], "ratio",
+			       stats_median(times[0].frame, (size_t)times[0].n) / stats_median(times[1].frame, (size_t)times[1].n));
+	}
+	return PSR_OK;
+}
+
+static int run(const char *path, const char *blocks, const struct octree_build_options *options, uint32_t side,
+               int n_rounds, struct psr_error *err)
+{
+	struct subject subject[2] = { { "octree", NULL, PSR_OCTREE }, { "blocks", NULL, PSR_BLOCKS } };
+	struct bench bench = { .frame = { .width = side, .height = side }, .side = side };
+	struct octree *tree = NULL;
+	int rc = blocks != NULL ? psr_model_read(&subject[1].model, blocks, err) : PSR_OK;
+
+	if (rc == PSR_OK)
+		rc = strstr(path, ".las") != NULL ? read_cloud(&tree, path, options, err) : read_mesh(&tree, path, options, err);
+	if (rc == PSR_OK)
+		rc = make_model(&subject[0].model, tree, subject[1].model, err);
+	if (rc != PSR_OK)
+		return rc;
+	const struct psr_cubes *cubes = psr_model_cubes(subject[0].model);
+	printf("%.2f M leaves, %.1f a cube; %.2f bits a leaf of codes, %.2f more of cubes and coarser levels\n",
+	       (double)tree->n_leaves * 1e-6, (double)tree->n_leaves / cubes->level[0].n,
+	       8.0 * (double)tree->n_codes / (double)tree->n_leaves, 8.0 * (double)cubes->n_bytes / (double)tree->n_leaves);
+	octree_destroy(tree);
+	bench.frame.rgb = malloc((size_t)3 * side * side);
+	bench.frame.depth = malloc((size_t)side * side * sizeof *bench.frame.depth);
+	rc = psr_renderer_create(&bench.renderer, err);
+	if (rc == PSR_OK)
+		rc = psr_pool_create(&bench.pool, N_THREADS, err);
+	if (rc == PSR_OK)
+		rc = measure(&bench, subject, blocks != NULL ? 2 : 1, n_rounds, err);
+	psr_pool_destroy(bench.pool);
+	psr_renderer_destroy(bench.renderer);
+	for (int s = 0; s < 2; s++)
+		psr_model_unref(subject[s].model);
+	return rc;
+}
+
+int main(int argc, char **argv)
+{
+	struct octree_build_options options;
+	struct psr_error err;
+	uint32_t side = 1024;
+	int option, n_rounds = 10, rc;
+
+	octree_build_options_default(&options);
+	while ((option = getopt(argc, argv, "l:s:n:")) != -1) {
+		if (option == '?')
+			return 2;
+		options.levels = option == 'l' ? atoi(optarg) : options.levels;
+		side = option == 's' ? (uint32_t)atoi(optarg) : side;
+		n_rounds = option == 'n' ? atoi(optarg) : n_rounds;
+	}
+	if (optind >= argc || side == 0 || n_rounds * DIRECTIONS > MOST_FRAMES) {
+		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] MESH|CLOUD.las [BLOCKS.psr]\n");
+		return 2;
+	}
+	rc = run(argv[optind], optind + 1 < argc ? argv[optind + 1] : NULL, &options, side, n_rounds, &err);
+	if (rc != PSR_OK)
+		fprintf(stderr, "octree_draws: %s\n", err.text);
+	return psr_exit_status(rc);
+}
