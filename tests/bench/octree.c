@@ -11,10 +11,10 @@
 #include <unistd.h>
 #include "base/clock.h"
 #include "base/random.h"
-#include "import/cloud/las_source.h"
-#include "octree/build/voxels.h"
+#include "import/points/points.h"
 #include "octree/attributes.h"
 #include "octree/pack.h"
+#include "sample/octree/of_mesh.h"
 #include "psr/mesh.h"
 
 #define HEADER 227
@@ -178,7 +178,7 @@ static int measure_cloud(const char *path, const struct octree_build_options *op
 	struct octree_source source;
 	struct octree *tree;
 	const double begin = used_seconds();
-	int rc = las_source_open(&source, path, err);
+	int rc = octree_source_open(&source, path, err);
 
 	if (rc != PSR_OK)
 		return rc;
@@ -187,7 +187,7 @@ static int measure_cloud(const char *path, const struct octree_build_options *op
 		printf("%.1f M points, %d levels: built in %.1f s, peak %.0f MB; %.2f M leaves (%.0f %% of the points)\n",
 		       (double)source.n_points * 1e-6, tree->levels, used_seconds() - begin, peak_mb(),
 		       (double)tree->n_leaves * 1e-6, 100.0 * (double)tree->n_leaves / (double)source.n_points);
-	las_source_close(&source);
+	octree_source_close(&source);
 	if (rc != PSR_OK)
 		return rc;
 	rc = print_packings(tree, err);
@@ -199,7 +199,7 @@ static int measure_cloud(const char *path, const struct octree_build_options *op
 
 static int measure_mesh(const char *path, const struct octree_build_options *options, struct psr_error *err)
 {
-	struct octree_surface surface = { .edge = 0.0 };
+	struct octree_mesh_report report;
 	struct psr_mesh *mesh;
 	struct octree *tree;
 	double begin;
@@ -207,25 +207,15 @@ static int measure_mesh(const char *path, const struct octree_build_options *opt
 
 	if (rc != PSR_OK)
 		return rc;
-	surface.position = (const double (*)[3])mesh->position;
-	surface.triangle = (const uint32_t (*)[3])mesh->triangle;
-	surface.n_triangles = mesh->n_triangles;
-	for (int c = 0; c < 3; c++) {
-		double high = mesh->position[0][c];
-
-		surface.low[c] = high;
-		for (uint32_t i = 1; i < mesh->n_vertices; i++) {
-			surface.low[c] = fmin(surface.low[c], mesh->position[i][c]);
-			high = fmax(high, mesh->position[i][c]);
-		}
-		surface.edge = fmax(surface.edge, high - surface.low[c]);
-	}
 	begin = used_seconds();
-	rc = octree_from_surface(&tree, &surface, options->levels, options->memory, options->folder, err);
+	rc = octree_of_mesh(&tree, &report, mesh, options, err);
 	if (rc == PSR_OK) {
-		printf("%.2f M triangles, %d levels: built in %.1f s; %.2f M leaves\n", (double)mesh->n_triangles * 1e-6,
-		       tree->levels, used_seconds() - begin, (double)tree->n_leaves * 1e-6);
+		printf("%.2f M triangles, %d levels: built in %.1f s; %.2f M leaves, %.2f %% with both sides, %s\n",
+		       (double)mesh->n_triangles * 1e-6, tree->levels, used_seconds() - begin, (double)tree->n_leaves * 1e-6,
+		       100.0 * (double)report.n_both / (double)tree->n_leaves, report.is_closed ? "closed" : "open");
 		rc = print_packings(tree, err);
+		if (rc == PSR_OK)
+			rc = print_attributes(tree, err);
 		octree_destroy(tree);
 	}
 	psr_mesh_destroy(mesh);
@@ -267,8 +257,7 @@ int main(int argc, char **argv)
 	octree_build_options_default(&options);
 	options.levels = levels;
 	options.memory = memory << 20;
-	rc = optind < argc && strstr(path, ".las") == NULL ? measure_mesh(path, &options, &err)
-	                                                   : measure_cloud(path, &options, &err);
+	rc = octree_source_suits(path) ? measure_cloud(path, &options, &err) : measure_mesh(path, &options, &err);
 	if (!is_kept)
 		unlink(path);
 	if (rc != PSR_OK)
