@@ -8,6 +8,7 @@
 
 #define FEWEST_LEVELS 4
 #define ACROSS_UNKNOWN 4096 /* of a file that does not tell how many points it has */
+#define PREVIEW_POINTS 500000
 
 int octree_is_direct(const char *path)
 {
@@ -87,7 +88,8 @@ static int of_file(struct octree **out, struct octree_input *input, const struct
 {
 	struct octree_source source;
 	struct octree_source_count count;
-	int rc = octree_source_open(&source, input->path, err);
+	const int is_preview = wish->levels == 0 && !(wish->spacing > 0) && wish->resolution <= PSR_PREVIEW_RESOLUTION;
+	int rc = octree_source_open_part(&source, input->path, is_preview ? PREVIEW_POINTS : 0, err);
 
 	if (rc != PSR_OK)
 		return rc;

@@ -16,6 +16,7 @@ struct las_source {
 	struct las las;
 	struct las_tint tint;
 	int fd;
+	uint64_t step;                 /* of so many runs of LAS_RUN points, one is read; 1: all */
 	uint64_t next;                 /* the next point, */
 	uint8_t *before, *slab;        /* the file's bytes before the points; points read: */
 	size_t n_slab, slab_next;      /* points, and the next of them */
@@ -44,7 +45,8 @@ static const uint8_t *next_point(struct las_source *s, int *rc, struct psr_error
 
 	*rc = PSR_OK;
 	if (s->slab_next == s->n_slab) {
-		const uint64_t left = las->n_points - s->next, most = SLAB / las->record;
+		const uint64_t left = las->n_points > s->next ? las->n_points - s->next : 0;
+		const uint64_t most = s->step > 1 ? LAS_RUN : SLAB / las->record;
 
 		s->n_slab = (size_t)(left < most ? left : most);
 		s->slab_next = 0;
@@ -53,7 +55,7 @@ static const uint8_t *next_point(struct las_source *s, int *rc, struct psr_error
 		*rc = read_at(s, s->slab, s->n_slab * las->record, las->first + s->next * las->record, err);
 		if (*rc != PSR_OK)
 			return NULL;
-		s->next += s->n_slab;
+		s->next += s->n_slab * s->step;
 	}
 	return s->slab + s->slab_next++ * las->record;
 }
@@ -140,6 +142,12 @@ static int find_tint(struct las_source *s, struct psr_error *err)
 	return rc;
 }
 
+/* A point may take 64 KB. */
+static size_t slab_bytes(const struct las *las)
+{
+	return (size_t)LAS_RUN * las->record > SLAB ? (size_t)LAS_RUN * las->record : SLAB;
+}
+
 static int open_file(struct las_source *s, struct psr_error *err)
 {
 	struct stat st;
@@ -154,13 +162,19 @@ static int open_file(struct las_source *s, struct psr_error *err)
 	rc = read_before(s, err);
 	if (rc != PSR_OK)
 		return rc;
-	s->slab = malloc(SLAB);
+	s->slab = malloc(slab_bytes(&s->las));
 	if (s->slab == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for points", s->las.path);
+	s->step = s->step == 0 ? 1 : (s->las.n_points + s->step - 1) / s->step;
 	return find_tint(s, err);
 }
 
 int las_source_open(struct octree_source *out, const char *path, struct psr_error *err)
+{
+	return las_source_open_part(out, path, 0, err);
+}
+
+int las_source_open_part(struct octree_source *out, const char *path, uint64_t most, struct psr_error *err)
 {
 	struct las_source *s = calloc(1, sizeof *s);
 	int rc;
@@ -169,6 +183,7 @@ int las_source_open(struct octree_source *out, const char *path, struct psr_erro
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path);
 	s->fd = -1;
 	s->las.path = path;
+	s->step = most;
 	*out = (struct octree_source){ .name = path, .rewind = go_back, .read = read_points, .userdata = s };
 	rc = open_file(s, err);
 	if (rc != PSR_OK) {
@@ -176,7 +191,7 @@ int las_source_open(struct octree_source *out, const char *path, struct psr_erro
 		return rc;
 	}
 	out->has_color = !s->tint.is_none;
-	out->n_points = s->las.n_points;
+	out->n_points = (s->las.n_points + s->step - 1) / s->step;
 	return PSR_OK;
 }
 

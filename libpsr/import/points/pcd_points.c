@@ -4,6 +4,7 @@
 #include "feed.h"
 #include "gray.h"
 #include "pcd_points.h"
+#include "spread.h"
 #include "import/cloud/pcd_point.h"
 
 #define MOST_POINTS ((uint64_t)1 << 40)
@@ -15,7 +16,7 @@ struct pcd_points {
 	struct pcd_roles roles;
 	uint8_t *head;            /* the file's first bytes: names of fields point there */
 	uint8_t *unpacked;        /* all points, of a compressed file */
-	uint64_t next;
+	uint64_t next, step;      /* step: spread.h */
 	size_t words;             /* bytes that the next point of text may take */
 	struct gray gray;
 	locale_t locale;
@@ -117,7 +118,9 @@ static int next_point(struct pcd_points *p, struct pcd_point *point, struct psr_
 			pcd_point_get(point, &p->roles, &p->pcd, p->feed.bytes + p->feed.next, 0);
 		p->feed.next += (size_t)record;
 	}
-	p->next++;
+	p->next = spread_next(p->step, p->next + 1);
+	if (p->step > 1 && p->next % SPREAD_RUN == 0 && p->next < p->pcd.n_points && p->pcd.data == PCD_BINARY)
+		feed_seek(&p->feed, p->pcd.body + p->next * record);
 	return rc;
 }
 
@@ -175,7 +178,15 @@ static int find_gray(struct pcd_points *p, struct psr_error *err)
 	return rc;
 }
 
-int pcd_points_open(struct octree_source *out, const char *path, uint64_t most, struct psr_error *err)
+/* A run has a window of its own. */
+static void set_part(struct pcd_points *p, uint64_t part)
+{
+	p->step = p->pcd.data == PCD_ASCII ? 1 : spread_step(p->pcd.n_points, part);
+	if (p->step > 1 && SPREAD_RUN * p->pcd.record < FEED_WINDOW)
+		p->feed.room = (size_t)(SPREAD_RUN * p->pcd.record);
+}
+
+int pcd_points_open(struct octree_source *out, const char *path, uint64_t most, uint64_t part, struct psr_error *err)
 {
 	struct pcd_points *p = calloc(1, sizeof *p);
 	int rc;
@@ -193,15 +204,17 @@ int pcd_points_open(struct octree_source *out, const char *path, uint64_t most, 
 		if (p->locale == (locale_t)0)
 			rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a locale", path);
 	}
-	if (rc == PSR_OK)
+	if (rc == PSR_OK) {
+		set_part(p, part);
 		rc = find_gray(p, err);
+	}
 	if (rc != PSR_OK) {
 		pcd_points_close(out);
 		return rc;
 	}
 	out->has_color = p->roles.field[PCD_RGB] != NULL || p->roles.field[PCD_INTENSITY] != NULL;
 	out->has_normal = p->roles.field[PCD_NORMAL_X] != NULL;
-	out->n_points = p->pcd.n_points;
+	out->n_points = (p->pcd.n_points + p->step - 1) / p->step;
 	return PSR_OK;
 }
 

@@ -4,8 +4,9 @@
 
 #include "octree/build/build.h"
 
-/* Compressed points are unpacked in memory, at most `most` bytes of them: LIMIT. */
-int pcd_points_open(struct octree_source *out, const char *path, uint64_t most, struct psr_error *err);
+/* Compressed points are unpacked in memory, at most `most` bytes of them: LIMIT. part: points of a reading (spread.h),
+ * 0: all; text is read whole. */
+int pcd_points_open(struct octree_source *out, const char *path, uint64_t most, uint64_t part, struct psr_error *err);
 void pcd_points_close(struct octree_source *source);
 
 #endif

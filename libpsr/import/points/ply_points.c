@@ -3,6 +3,7 @@
 #include <string.h>
 #include "feed.h"
 #include "ply_points.h"
+#include "spread.h"
 #include "base/srgb.h"
 #include "import/ply/ply.h"
 
@@ -17,6 +18,7 @@ struct ply_points {
 	int position[3], normal[3];
 	struct ply_colors colors;
 	int has_color, has_normal;
+	uint64_t first, row, step; /* first: the first vertex's byte; row: bytes of one; step: spread.h */
 };
 
 static int is_whole(const struct ply_points *p)
@@ -47,7 +49,8 @@ static int next_row(struct ply_points *p, struct psr_error *err)
 	struct ply_cursor *c = &p->rows.cursor;
 	const uint64_t row = p->rows.at;
 
-	for (size_t need = FEED_LINE;; need *= 2) {
+	/* Rows of a run are of one size, and the cursor may stand behind the last one. */
+	for (size_t need = p->step > 1 ? (size_t)p->row + 1 : FEED_LINE;; need *= 2) {
 		struct psr_error own;
 		size_t at;
 		int rc = PSR_OK;
@@ -83,6 +86,7 @@ static int go_to_first(struct ply_points *p, struct psr_error *err)
 			rc = next_row(p, err);
 	}
 	ply_rows_begin(&p->rows, p->vertex);
+	p->first = c->bytes_before + (uint64_t)(c->at - c->start);
 	return rc;
 }
 
@@ -152,6 +156,33 @@ static int go_back(void *userdata, struct psr_error *err)
 	return go_to_first(userdata, err);
 }
 
+static void skip_runs(struct ply_points *p)
+{
+	struct ply_cursor *c = &p->rows.cursor;
+
+	p->rows.at = spread_next(p->step, p->rows.at);
+	if (p->rows.at >= p->vertex->n_rows)
+		return;
+	feed_seek(&p->feed, p->first + p->rows.at * p->row);
+	c->start = c->at = c->end = p->feed.bytes;
+	c->bytes_before = p->feed.at;
+}
+
+/* Rows of one size can be skipped; a run has a window of its own. */
+static void set_part(struct ply_points *p, uint64_t part)
+{
+	p->step = p->header.format == PLY_ASCII ? 1 : spread_step(p->vertex->n_rows, part);
+	for (unsigned i = 0; i < p->vertex->n_properties; i++) {
+		const struct ply_property *property = &p->header.property[p->vertex->first_property + i];
+
+		p->row += ply_type_size(property->type);
+		if (property->count_type != PLY_NO_TYPE)
+			p->step = 1;
+	}
+	if (p->step > 1 && SPREAD_RUN * p->row < FEED_WINDOW)
+		p->feed.room = SPREAD_RUN * p->row > FEED_LINE ? (size_t)(SPREAD_RUN * p->row) : FEED_LINE;
+}
+
 static int read_points(size_t *n, struct octree_point *points, size_t room, void *userdata, struct psr_error *err)
 {
 	struct ply_points *p = userdata;
@@ -161,11 +192,13 @@ static int read_points(size_t *n, struct octree_point *points, size_t room, void
 		rc = next_row(p, err);
 		if (rc == PSR_OK)
 			put_point(&points[(*n)++], p);
+		if (p->step > 1 && p->rows.at % SPREAD_RUN == 0)
+			skip_runs(p);
 	}
 	return rc;
 }
 
-int ply_points_open(struct octree_source *out, const char *path, struct psr_error *err)
+int ply_points_open(struct octree_source *out, const char *path, uint64_t part, struct psr_error *err)
 {
 	struct ply_points *p = calloc(1, sizeof *p);
 	int rc;
@@ -184,7 +217,8 @@ int ply_points_open(struct octree_source *out, const char *path, struct psr_erro
 	}
 	out->has_color = p->has_color;
 	out->has_normal = p->has_normal;
-	out->n_points = p->vertex->n_rows;
+	set_part(p, part);
+	out->n_points = (p->vertex->n_rows + p->step - 1) / p->step;
 	return PSR_OK;
 }
 

@@ -4,7 +4,8 @@
 
 #include "octree/build/build.h"
 
-int ply_points_open(struct octree_source *out, const char *path, struct psr_error *err);
+/* part: points of a reading (spread.h), 0: all; text, and vertices with lists, are read whole. */
+int ply_points_open(struct octree_source *out, const char *path, uint64_t part, struct psr_error *err);
 int ply_points_have_faces(const struct octree_source *source); /* or triangle strips */
 void ply_points_close(struct octree_source *source);
 

@@ -73,21 +73,22 @@ static int find_format(enum format *format, const char *path, struct psr_error *
 	return rc;
 }
 
-static int open_format(struct octree_source *out, const char *path, enum format format, struct psr_error *err)
+static int open_format(struct octree_source *out, const char *path, enum format format, uint64_t part,
+                       struct psr_error *err)
 {
 	switch (format) {
 	case LAS:
-		return las_source_open(out, path, err);
+		return las_source_open_part(out, path, part, err);
 	case PLY:
-		return ply_points_open(out, path, err);
+		return ply_points_open(out, path, part, err);
 	case PCD:
-		return pcd_points_open(out, path, POINTS_MOST_UNPACKED, err);
+		return pcd_points_open(out, path, POINTS_MOST_UNPACKED, part, err);
 	case PTS:
-		return text_points_open(out, path, TEXT_PTS, err);
+		return text_points_open(out, path, TEXT_PTS, part, err);
 	case PTX:
-		return text_points_open(out, path, TEXT_PTX, err);
+		return text_points_open(out, path, TEXT_PTX, part, err);
 	case XYZ:
-		return text_points_open(out, path, TEXT_XYZ, err);
+		return text_points_open(out, path, TEXT_XYZ, part, err);
 	case E57:
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "%s: E57 is not supported; convert it with \"pdal translate IN.e57 OUT.las\", or with CloudCompare",
@@ -161,6 +162,11 @@ static void close_format(struct points *p)
 
 int octree_source_open(struct octree_source *out, const char *path, struct psr_error *err)
 {
+	return octree_source_open_part(out, path, 0, err);
+}
+
+int octree_source_open_part(struct octree_source *out, const char *path, uint64_t part, struct psr_error *err)
+{
 	struct points *p = calloc(1, sizeof *p);
 	int rc;
 
@@ -169,7 +175,7 @@ int octree_source_open(struct octree_source *out, const char *path, struct psr_e
 		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to read it", path);
 	rc = find_format(&p->format, path, err);
 	if (rc == PSR_OK)
-		rc = open_format(&p->inner, path, p->format, err);
+		rc = open_format(&p->inner, path, p->format, part, err);
 	if (rc != PSR_OK) {
 		free(p);
 		return rc;
@@ -207,7 +213,7 @@ int octree_source_suits(const char *path)
 
 	if (find_format(&format, path, NULL) != PSR_OK || format == OTHER)
 		return 0;
-	if (format != PLY || ply_points_open(&ply, path, NULL) != PSR_OK)
+	if (format != PLY || ply_points_open(&ply, path, 0, NULL) != PSR_OK)
 		return format != PLY;
 	has_faces = ply_points_have_faces(&ply);
 	ply_points_close(&ply);

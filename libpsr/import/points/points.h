@@ -18,6 +18,11 @@
  * the source. Reads the file once where a colour's scale asks for it. NOT_FOUND, IO, FORMAT with the place, LIMIT,
  * MEMORY; UNSUPPORTED for LAZ, E57 and anything else, with a sentence that says how to convert it. */
 int octree_source_open(struct octree_source *out, const char *path, struct psr_error *err);
+
+/* The same, of about `part` points alone, and scales of colours that these tell: for a first picture, in a time that
+ * does not grow with the file. They come in runs that are evenly spread over it. Text of other formats than XYZ, and
+ * PLY with lists among a vertex's properties, are read whole; part 0: all points. */
+int octree_source_open_part(struct octree_source *out, const char *path, uint64_t part, struct psr_error *err);
 void octree_source_close(struct octree_source *source);
 
 #define POINTS_MOST_UNPACKED ((uint64_t)1 << 30)

@@ -22,7 +22,10 @@
 
 enum text_kind { TEXT_XYZ, TEXT_PTS, TEXT_PTX };
 
-int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, struct psr_error *err);
+/* part: points of a reading, more or less, in runs of lines that are evenly spread over the file; 0: all. PTS and PTX
+ * are read whole. */
+int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, uint64_t part,
+                     struct psr_error *err);
 void text_points_close(struct octree_source *source);
 
 /* Returns whether a file begins like a table of points: its first line of points has three numbers. n_bytes of it. */
@@ -47,6 +50,7 @@ struct text_points {
 	locale_t locale;
 	uint64_t line, n_read;              /* the last line's number, points read since the beginning */
 	uint64_t first, first_line;         /* of the first line of points, or of a scan: its byte, lines before it */
+	uint64_t step, run;                 /* of so many runs of bytes, one is read, 1: all; the run that is read */
 	uint64_t left, promised, promised_line; /* PTS, PTX: points of this scan */
 	double matrix[3][4];                /* PTX: rows give x, y, z */
 	unsigned n_columns, n_needed;       /* of the first row; numbers that every row has at least */

@@ -15,7 +15,8 @@ int text_fail(const struct text_points *t, struct psr_error *err, const char *fo
 	va_start(args, format);
 	vsnprintf(text, sizeof text, format, args);
 	va_end(args);
-	return psr_fail(err, PSR_ERR_FORMAT, "%.300s: line %llu: %.160s", t->feed.path, (unsigned long long)t->line, text);
+	return psr_fail(err, PSR_ERR_FORMAT, "%.300s: %s %llu: %.160s", t->feed.path, t->step > 1 ? "before byte" : "line",
+	                (unsigned long long)(t->step > 1 ? t->feed.at + t->feed.next : t->line), text);
 }
 
 static int is_between(uint8_t c)

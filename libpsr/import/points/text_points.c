@@ -4,11 +4,13 @@
 #include <string.h>
 #include "text.h"
 
+#define RUN ((uint64_t)16384) /* bytes */
+
 void text_rewind(struct text_points *t)
 {
 	feed_seek(&t->feed, t->first);
 	t->line = t->first_line;
-	t->n_read = t->left = 0;
+	t->n_read = t->left = t->run = 0;
 }
 
 static int fail_end(const struct text_points *t, struct psr_error *err)
@@ -132,6 +134,20 @@ static void move(const struct text_points *t, double at[3])
 		at[c] = p[0] * t->matrix[c][0] + p[1] * t->matrix[c][1] + p[2] * t->matrix[c][2] + t->matrix[c][3];
 }
 
+/* A run begins behind the first end of a line in it. */
+static int skip_runs(struct text_points *t, struct psr_error *err)
+{
+	const uint64_t at = t->feed.at + t->feed.next;
+	const uint8_t *line;
+	size_t n;
+
+	if (at < t->first + (t->run + 1) * RUN)
+		return PSR_OK;
+	t->run += t->step;
+	feed_seek(&t->feed, t->first + t->run * RUN < t->feed.n_bytes ? t->first + t->run * RUN : t->feed.n_bytes);
+	return feed_line(&t->feed, &line, &n, err);
+}
+
 static int next_row(struct text_points *t, struct text_row *row, int *is_there, struct psr_error *err)
 {
 	const uint8_t *line;
@@ -144,7 +160,10 @@ static int next_row(struct text_points *t, struct text_row *row, int *is_there, 
 		if (rc != PSR_OK || !*is_there)
 			return rc;
 	}
-	rc = text_next_line(t, &line, &n, err);
+	if (t->step > 1)
+		rc = skip_runs(t, err);
+	if (rc == PSR_OK)
+		rc = text_next_line(t, &line, &n, err);
 	if (rc != PSR_OK)
 		return rc;
 	if (line == NULL) {
@@ -233,7 +252,8 @@ static uint64_t estimate(struct text_points *t)
 	return (uint64_t)((double)(n + 1) * (double)(t->feed.n_bytes - t->first) / (double)t->feed.n);
 }
 
-int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, struct psr_error *err)
+int text_points_open(struct octree_source *out, const char *path, enum text_kind kind, uint64_t part,
+                     struct psr_error *err)
 {
 	struct text_points *t = calloc(1, sizeof *t);
 	int rc;
@@ -243,12 +263,19 @@ int text_points_open(struct octree_source *out, const char *path, enum text_kind
 	*out = (struct octree_source){ .name = path, .rewind = go_back, .read = read_points, .userdata = t };
 	t->kind = kind;
 	t->color_scale = 1.0;
+	t->step = 1;
 	t->locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
 	rc = feed_open(&t->feed, path, err);
 	if (rc == PSR_OK && t->locale == (locale_t)0)
 		rc = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory for a locale", path);
 	if (rc == PSR_OK)
 		rc = text_find_columns(t, err);
+	if (rc == PSR_OK)
+		out->n_points = estimate(t);
+	if (rc == PSR_OK && part > 0 && kind == TEXT_XYZ) {
+		t->step = (out->n_points + part - 1) / part;
+		t->feed.room = t->step > 1 ? FEED_LINE : t->feed.room;
+	}
 	if (rc == PSR_OK)
 		rc = text_find_colors(t, err);
 	if (rc != PSR_OK) {
@@ -257,7 +284,7 @@ int text_points_open(struct octree_source *out, const char *path, enum text_kind
 	}
 	out->has_color = t->column[TEXT_RED] >= 0 || t->column[TEXT_INTENSITY] >= 0;
 	out->has_normal = t->column[TEXT_NX] >= 0;
-	out->n_points = out->has_color ? t->n_read : estimate(t);
+	out->n_points = out->has_color ? t->n_read : out->n_points / t->step + 1;
 	text_rewind(t);
 	return PSR_OK;
 }

@@ -326,6 +326,103 @@ static void points_behind_the_first_window_are_the_same(void **state)
 	}
 }
 
+/* Point i is at i, i, i. */
+static void make_counted(FILE *file, const char *head, int is_binary)
+{
+	fputs(head, file);
+	for (int i = 0; i < MANY; i++) {
+		const double at[3] = { i, i, i };
+
+		if (is_binary)
+			assert_int_equal(fwrite(at, sizeof at, 1, file), 1);
+		else
+			fprintf(file, "%d %d %d\n", i, i, i);
+	}
+	assert_int_equal(fclose(file), 0);
+}
+
+/* A part of 10,000 of 200,000 points: runs of 512 points or of 16 KB, some 800 lines, of which one in 20 is read: 1,700 of
+ * these are longer than a run of either kind. A text's lines grow from 6 to 21 characters, so that its first window
+ * promises up to a third more of them than there are. */
+static void a_part_of_a_file_is_spread_over_all_of_it(void **state)
+{
+	static const struct {
+		const char *name, *head;
+		int is_binary;
+	} files[] = {
+		{ "part.xyz", "", 0 },
+		{ "part.ply", "ply\nformat binary_little_endian 1.0\nelement vertex 200000\nproperty double x\nproperty double y\n"
+		              "property double z\nend_header\n", 1 },
+		{ "part.pcd", "# .PCD v0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nWIDTH 200000\nDATA binary\n", 1 },
+	};
+	static struct octree_point point[1000], again[1000];
+
+	(void)state;
+	for (size_t k = 0; k < 3; k++) {
+		struct octree_source source;
+		double last = -1.0, widest = 0.0;
+		uint64_t n_points = 0;
+
+		make_counted(fopen(path_of(files[k].name), "wb"), files[k].head, files[k].is_binary);
+		assert_int_equal(octree_source_open_part(&source, path_of(files[k].name), 10000, NULL), PSR_OK);
+		assert_int_equal(source.rewind(source.userdata, NULL), PSR_OK);
+		for (size_t n = 1; n > 0; n_points += n) {
+			assert_int_equal(source.read(&n, point, 1000, source.userdata, NULL), PSR_OK);
+			for (size_t i = 0; i < n; i++) {
+				assert_true(point[i].at[0] > last && point[i].at[0] == floor(point[i].at[0]) &&
+				            point[i].at[1] == point[i].at[0] && point[i].at[2] == point[i].at[0]);
+				widest = fmax(widest, point[i].at[0] - last);
+				last = point[i].at[0];
+			}
+		}
+		assert_true(widest < 20 * 1700 && last > MANY - 20 * 1700);
+		assert_true(n_points >= 7000 && n_points <= 13000);
+		assert_true(source.n_points >= 7000 && source.n_points <= 13000);
+		assert_int_equal(source.rewind(source.userdata, NULL), PSR_OK);
+		for (uint64_t at = 0, n = 1; n > 0; at += n) {
+			size_t got;
+
+			assert_int_equal(source.read(&got, again, 1000, source.userdata, NULL), PSR_OK);
+			n = got;
+			assert_true(n > 0 || at == n_points);
+		}
+		octree_source_close(&source);
+		assert_int_equal(octree_source_open_part(&source, path_of(files[k].name), MANY + MANY / 2, NULL), PSR_OK);
+		octree_source_close(&source);
+	}
+}
+
+static void a_part_of_a_las_file_is_spread_over_it(void **state)
+{
+	struct octree_source source;
+	static struct octree_point point[4096];
+	struct file f = { .n = 0 };
+	size_t n;
+
+	(void)state;
+	make_las(&f);
+	FILE *file = fopen(path_of("part.las"), "wb");
+
+	assert_non_null(file);
+	f.at[107] = (uint8_t)(40960 & 255);
+	f.at[108] = (uint8_t)(40960 >> 8);
+	assert_int_equal(fwrite(f.at, 227, 1, file), 1);
+	for (uint32_t i = 0; i < 40960; i++) {
+		uint8_t p[26] = { (uint8_t)i, (uint8_t)(i >> 8) };
+
+		assert_int_equal(fwrite(p, sizeof p, 1, file), 1);
+	}
+	assert_int_equal(fclose(file), 0);
+	assert_int_equal(octree_source_open_part(&source, path_of("part.las"), 4096, NULL), PSR_OK);
+	assert_int_equal(source.n_points, 4096);
+	assert_int_equal(source.rewind(source.userdata, NULL), PSR_OK);
+	assert_int_equal(source.read(&n, point, 4096, source.userdata, NULL), PSR_OK);
+	assert_int_equal(n, 4096);
+	for (size_t i = 0; i < n; i++) /* runs of 512, one of ten */
+		assert_int_equal((int)round(1000.0 * point[i].at[0]), (int)(i / 512 * 5120 + i % 512));
+	octree_source_close(&source);
+}
+
 static void an_error_far_in_a_file_names_its_line(void **state)
 {
 	FILE *file = fopen(path_of("far.ply"), "wb");
@@ -485,6 +582,8 @@ int main(void)
 		cmocka_unit_test(every_format_gives_the_same_points),
 		cmocka_unit_test(files_cut_at_any_byte_are_refused),
 		cmocka_unit_test(points_behind_the_first_window_are_the_same),
+		cmocka_unit_test(a_part_of_a_file_is_spread_over_all_of_it),
+		cmocka_unit_test(a_part_of_a_las_file_is_spread_over_it),
 		cmocka_unit_test(an_error_far_in_a_file_names_its_line),
 		cmocka_unit_test(a_file_that_becomes_shorter_is_an_error),
 		cmocka_unit_test(normals_and_points_without_a_place_come_as_they_are),
