@@ -93,11 +93,12 @@ static void bound_normals(struct cell_node *node, const struct making *m)
 	}
 	v3f_normalize(node->normal, node->normal);
 	for (uint32_t e = node->begin; e < node->end; e++) {
-		const float *normal = m->cell[m->entry[e].cell].normal;
+		const struct dpoint_cell *cell = &m->cell[m->entry[e].cell];
+		const float *normal = cell->normal;
 		float away[3];
 
 		v3f_sub(away, normal, node->normal);
-		spread2 = v3f_dot(normal, normal) > 0 ? fmaxf(spread2, v3f_dot(away, away)) : INFINITY;
+		spread2 = v3f_dot(normal, normal) > 0 && cell->part != DPOINT_BEYOND ? fmaxf(spread2, v3f_dot(away, away)) : INFINITY;
 	}
 	node->spread = sqrtf(spread2);
 }

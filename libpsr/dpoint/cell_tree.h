@@ -9,7 +9,7 @@
 
 struct cell_node {
 	float middle[3], radius;   /* of a sphere that holds the corners */
-	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has no normal */
+	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has no normal, or is beyond */
 	uint32_t begin, end;       /* of order */
 	uint32_t part;
 };

@@ -12,6 +12,7 @@
 /* A cell that does not suit: the rectangle has to end at `at` along u, or along v. */
 struct bar {
 	float at[2];
+	float side[2]; /* 1 or -1: which side it is on */
 };
 
 struct bars {
@@ -44,19 +45,24 @@ unsigned dpoint_delta_class(float delta)
 	return class;
 }
 
-/* Where a cell's corners begin, from the middle of the rectangle on. */
-static struct bar bar_of(const float corner[4][3])
+/* Where a cell begins, and on which side, told by those of its corners that are nearest to S_p: the others of a face
+ * that falls away lean over or under the rectangle, and do not touch it. */
+static struct bar bar_of(const float corner[4][3], const float above[4], float height)
 {
+	const float nearest = fminf(fminf(above[0], above[1]), fminf(above[2], above[3]));
 	struct bar bar;
 
 	for (int k = 0; k < 2; k++) {
-		float low = corner[0][k], high = corner[0][k];
+		float low = INFINITY, high = -INFINITY;
 
-		for (int c = 1; c < 4; c++) {
+		for (int c = 0; c < 4; c++) {
+			if (above[c] > nearest + height)
+				continue;
 			low = fminf(low, corner[c][k]);
 			high = fmaxf(high, corner[c][k]);
 		}
 		bar.at[k] = low > 0 ? low : high < 0 ? -high : 0;
+		bar.side[k] = low + high < 0 ? -1 : 1;
 	}
 	return bar;
 }
@@ -66,14 +72,15 @@ static struct bar bar_of(const float corner[4][3])
 static void look_at(struct bars *bars, const struct fitting *f, const struct rectangle *r,
                     const struct dpoint_cell *cell, float radius)
 {
-	float corner[4][3], middle[3] = { 0, 0, 0 };
+	float corner[4][3], above[4], middle[3] = { 0, 0, 0 };
 	struct bar bar;
 
 	for (int c = 0; c < 4; c++) {
 		rectangle_sees(corner[c], r, cell->corner[c]);
+		above[c] = fabsf(corner[c][2] - dpoint_height_at(r->lambda_u, r->rho, corner[c][0], corner[c][1]));
 		v3f_add_scaled(middle, middle, 0.25f, corner[c]);
 	}
-	bar = bar_of((const float (*)[3])corner);
+	bar = bar_of((const float (*)[3])corner, above, r->height);
 	if (bar.at[0] + f->overhang >= r->extent[0] || bar.at[1] + f->overhang >= r->extent[1] ||
 	    v3f_dot(cell->normal, r->axis[2]) < -0.5f || rectangle_suits(&f->look, r, cell, middle) ||
 	    fabsf(middle[2] - dpoint_height_at(r->lambda_u, r->rho, middle[0], middle[1])) > 2 * radius + 4 * r->height)
@@ -130,40 +137,98 @@ static void largest_without(float extent[2], struct bars *bars)
 	extent[1] = best[1];
 }
 
-/* Grows along u and along v until bars are in the way, or the extents are those of epsilon and delta. */
-static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitting *f)
+static void look_around(struct rectangle *r, struct bars *bars, const struct fitting *f)
 {
-	struct rectangle r;
-	float most[2], now[2];
+	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
+	bars->n = 0;
+	search(bars, f, r, 0);
+	largest_without(r->extent, bars);
+}
+
+/* Which side the bar is on that ends an extent; 0: none does. */
+static float side_of(const struct bars *bars, const float extent[2], int k)
+{
+	for (size_t i = 0; i < bars->n; i++)
+		if (bars->bar[i].at[k] == extent[k] && bars->bar[i].at[1 - k] < extent[1 - k] * 1.01f)
+			return bars->bar[i].side[k];
+	return 0;
+}
+
+/* Grows along u and along v until bars are in the way, or the extents are those of epsilon and delta. side: of the
+ * bars. */
+static void grow(float now[2], float side[2], struct rectangle *r, struct bars *bars, const struct fitting *f)
+{
+	const float most[2] = { r->extent[0], r->extent[1] };
 	int is_growing[2] = { 1, 1 }, is_first = 1;
 
-	rectangle_of(&r, c, f->look.options);
 	for (int k = 0; k < 2; k++) {
-		most[k] = r.extent[k];
 		now[k] = FIRST * most[k];
+		side[k] = 0;
 	}
 	while ((is_growing[0] || is_growing[1]) && !bars->is_failed) {
 		float grown[2];
 
-		for (int k = 0; k < 2; k++) {
-			r.extent[k] = grown[k] = is_growing[k] && !is_first ? fminf(2 * now[k], most[k]) : now[k];
-			r.deep = 2 * fabsf(r.lambda_u) * fmaxf(r.extent[0] * r.extent[0], r.extent[1] * r.extent[1]) + r.height;
-		}
+		for (int k = 0; k < 2; k++)
+			r->extent[k] = grown[k] = is_growing[k] && !is_first ? fminf(2 * now[k], most[k]) : now[k];
 		is_first = 0;
-		bars->n = 0;
-		search(bars, f, &r, 0);
-		largest_without(r.extent, bars);
+		look_around(r, bars, f);
 		for (int k = 0; k < 2; k++) {
-			is_growing[k] &= r.extent[k] == grown[k] && grown[k] < most[k];
-			now[k] = r.extent[k];
+			if (r->extent[k] < grown[k])
+				side[k] = side_of(bars, r->extent, k);
+			is_growing[k] &= r->extent[k] == grown[k] && grown[k] < most[k];
+			now[k] = r->extent[k];
 		}
-		/* What was free stays free: the largest one may be another. */
-		if (now[0] == 0 || now[1] == 0)
+		if (!(now[0] > 0 && now[1] > 0))
 			break;
 	}
-	for (int k = 0; k < 2; k++)
-		if (now[k] < most[k])
+}
+
+/* Moves a point along S_p, which bends on as it does. */
+static void move(struct dpoint *p, const float by[2])
+{
+	static const struct dpoint_box box = { { 0, 0, 0 }, { 1, 1, 1 } };
+	const float height = dpoint_height_at(p->lambda_u, p->rho, by[0], by[1]);
+	float v[3], n[3], normal[3], at[3];
+	struct dpoint_word word;
+
+	v3f_cross(v, p->normal, p->u);
+	dpoint_normal_at(n, p->lambda_u, p->rho, by[0], by[1]);
+	for (int k = 0; k < 3; k++) {
+		at[k] = p->at[k] + by[0] * p->u[k] + by[1] * v[k] + height * p->normal[k];
+		normal[k] = n[0] * p->u[k] + n[1] * v[k] + n[2] * p->normal[k];
+	}
+	v3f_normalize(p->normal, normal);
+	dpoint_pack(&word, p, &box);
+	dpoint_unpack(p, &word, &box);
+	memcpy(p->at, at, sizeof at);
+}
+
+/* An extent that bars end becomes that of the class below, and the point moves as much towards the bar: so its
+ * rectangle still ends there. What then is in the way makes it shorter, without another move. */
+static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitting *f)
+{
+	struct rectangle r;
+	float most[2], now[2], side[2], by[2] = { 0, 0 };
+
+	rectangle_of(&r, c, f->look.options);
+	memcpy(most, r.extent, sizeof most);
+	grow(now, side, &r, bars, f);
+	if (now[0] >= most[0] && now[1] >= most[1])
+		return;
+	for (int k = 0; k < 2; k++) {
+		if (now[k] < most[k]) {
 			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(now[k]));
+			by[k] = side[k] * fmaxf(0, now[k] - c->delta[k]);
+		}
+	}
+	if (by[0] != 0 || by[1] != 0)
+		move(&c->point, by);
+	rectangle_of(&r, c, f->look.options);
+	memcpy(most, r.extent, sizeof most);
+	look_around(&r, bars, f);
+	for (int k = 0; k < 2; k++)
+		if (r.extent[k] < most[k] - f->overhang)
+			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(r.extent[k]));
 }
 
 static void fit_chunk(int chunk, void *userdata)

@@ -62,6 +62,8 @@ int rectangle_suits(const struct looking *l, const struct rectangle *r, const st
 {
 	float n[3], cell_normal[3], dot;
 
+	if (cell->part == DPOINT_BEYOND)
+		return 0;
 	if (!(fabsf(at[2] - dpoint_height_at(r->lambda_u, r->rho, at[0], at[1])) <= r->height))
 		return 0;
 	if (cell->normal[0] == 0 && cell->normal[1] == 0 && cell->normal[2] == 0)

@@ -12,8 +12,12 @@
 struct dpoint_cell {
 	float corner[4][3];
 	float normal[3];   /* in its middle, of unit length; 0,0,0 where there is none, at poles */
-	uint32_t part;     /* of the source: a patch */
+	uint32_t part;     /* of the source: a patch, a material; or DPOINT_BEYOND */
 };
+
+/* The part of a cell that is no surface: the strip beside a border, which no rectangle may be over (dpoint_fit()), and
+ * none covers. */
+#define DPOINT_BEYOND (UINT32_MAX - 1)
 
 struct dpoint_candidate {
 	struct dpoint point;
@@ -74,9 +78,16 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
                       const struct psr_cancel *cancel);
 void dpoint_cover_fini(struct dpoint_cover *cover);
 
+/* Adds a flat candidate over each cell that none covers, and to the cover. It reaches over the cell's sides by a fifth
+ * of its size, or to the sides of a rectangle around a triangle: so there is no hole where samples are too far apart for
+ * the options, or where a crease is finer than a cell, and what is wrong there is as small as a cell. Left open are
+ * cells without an area, and some that are as bent as their sides are long. */
+int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
+                const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel);
+
 /* Shortens each candidate's delta, along u and along v, until its rectangle is over no cell that S_p does not suit: one
  * of the surface that goes on beside it, where the normal or the height is further off than the options say. So a
- * rectangle ends at a crease, and where curvatures change. delta becomes one of dpoint_delta_class(), unless it is as it
+ * rectangle ends at a crease, and where curvatures change; its point may move along S_p for that. delta becomes one of dpoint_delta_class(), unless it is as it
  * was. overhang: how far a rectangle may reach over such a cell. Cells that look the other way, and those of other sheets above or below, shorten nothing. MEMORY, CANCELLED. */
 int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, float overhang,
                struct psr_pool *pool, const struct psr_cancel *cancel);

@@ -1,0 +1,22 @@
+/* Meshes and clouds to candidates and cells. */
+#ifndef PSR_DPOINT_MESH_H
+#define PSR_DPOINT_MESH_H
+
+#include "psr/mesh.h"
+#include "surface.h"
+
+struct dpoint_mesh_options {
+	double origin[3], scale; /* inner units are (place - origin) * scale */
+	double cell;             /* triangles are cut into cells of sides of at most this, in inner units */
+	float delta;             /* the most that a rectangle may reach: 0 < delta <= 1 */
+};
+
+/* Adds a candidate and a cell for each piece of a triangle, with the shape of its corners' curvatures between them.
+ * Corners that share place and normal are one: so creases, where a mesh has several normals at a place or none, and
+ * borders part the surface, and a strip beyond them keeps rectangles from reaching over. Parts are materials. Corners
+ * without curvatures (of slivers) count as bad, and flat. MEMORY; LIMIT: more than 2^28 pieces, or more than 4096 along
+ * a side. */
+int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *mesh,
+                       const struct dpoint_mesh_options *options, struct psr_error *err);
+
+#endif

@@ -1,0 +1,273 @@
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+#include "base/vec.h"
+#include "dpoint/mesh.h"
+#include "dpoint/sample.h"
+#include "patches.h"
+
+#define OVERHANG 0.001f
+
+/* A mesh of arrays of the test's: nothing of it is freed. */
+struct grid_mesh {
+	struct psr_mesh mesh;
+	double position[2500][3];
+	float normal[2500][3];
+	uint32_t triangle[5000][3], material[5000];
+};
+
+static void use(struct grid_mesh *m, uint32_t n_vertices, uint32_t n_triangles)
+{
+	memset(&m->mesh, 0, sizeof m->mesh);
+	memset(m->material, 0, sizeof m->material);
+	m->mesh.n_vertices = n_vertices;
+	m->mesh.n_triangles = n_triangles;
+	m->mesh.position = m->position;
+	m->mesh.normal = m->normal;
+	m->mesh.triangle = m->triangle;
+	m->mesh.triangle_material = m->material;
+}
+
+/* A sphere of radius 1 by longitudes and latitudes, without its caps, or a torus. */
+static void round_mesh(struct grid_mesh *m, int is_torus, int n)
+{
+	uint32_t n_triangles = 0;
+
+	for (int i = 0; i <= n; i++)
+		for (int j = 0; j <= n; j++) {
+			const double a = i == n ? 0 : 6.283185307179586 * i / n;
+			const double b = is_torus ? (j == n ? 0 : 6.283185307179586 * j / n) : -1 + 2.0 * j / n;
+			const double out = is_torus ? 1 : 0, r = is_torus ? 0.4 : 1;
+			const uint32_t v = (uint32_t)(i * (n + 1) + j);
+			const double normal[3] = { cos(a) * cos(b), sin(a) * cos(b), sin(b) };
+
+			for (int k = 0; k < 3; k++)
+				m->normal[v][k] = (float)normal[k];
+			v3d_set(m->position[v], cos(a) * (out + r * cos(b)), sin(a) * (out + r * cos(b)), r * sin(b));
+			if (i == n || j == n)
+				continue;
+			memcpy(m->triangle[n_triangles++], ((uint32_t[]){ v, v + (uint32_t)n + 1, v + 1 }), 12);
+			memcpy(m->triangle[n_triangles++], ((uint32_t[]){ v + 1, v + (uint32_t)n + 1, v + (uint32_t)n + 2 }), 12);
+		}
+	use(m, (uint32_t)((n + 1) * (n + 1)), n_triangles);
+}
+
+static void cube_mesh(struct grid_mesh *m)
+{
+	static const uint32_t triangle[12][3] = {
+		{ 0, 2, 1 }, { 1, 2, 3 }, { 4, 5, 6 }, { 5, 7, 6 }, { 0, 1, 4 }, { 1, 5, 4 },
+		{ 2, 6, 3 }, { 3, 6, 7 }, { 0, 4, 2 }, { 2, 4, 6 }, { 1, 3, 5 }, { 3, 7, 5 },
+	};
+
+	for (int i = 0; i < 8; i++) {
+		v3d_set(m->position[i], i & 1 ? 0.5 : -0.5, i & 2 ? 0.5 : -0.5, i & 4 ? 0.5 : -0.5);
+		v3f_set(m->normal[i], 0, 0, 0);
+	}
+	memcpy(m->triangle, triangle, sizeof triangle);
+	use(m, 8, 12);
+}
+
+static void sample(struct dpoint_surface *surface, const struct grid_mesh *m, double cell, float delta)
+{
+	const struct dpoint_mesh_options options = { { 0, 0, 0 }, 1, cell, delta };
+
+	dpoint_surface_init(surface);
+	assert_int_equal(dpoint_sample_mesh(surface, &m->mesh, &options, NULL), PSR_OK);
+}
+
+/* Corners have the exact shape within the ring's first order; pieces lie on chords, and their normals between. */
+static void pieces_of_round_meshes_have_their_curvatures(void **state)
+{
+	struct grid_mesh *m = malloc(sizeof *m);
+
+	(void)state;
+	assert_non_null(m);
+	for (int is_torus = 0; is_torus < 2; is_torus++) {
+		struct dpoint_surface surface;
+		double sum = 0;
+
+		round_mesh(m, is_torus, 48);
+		sample(&surface, m, 1, 1);
+		assert_int_equal(surface.n_bad, 0);
+		assert_int_equal(surface.n_candidates, 2 * 48 * 48);
+		for (size_t i = 0; i < surface.n_candidates; i++) {
+			const struct dpoint *p = &surface.candidate[i].point;
+			const double away = hypot(p->at[0], p->at[1]);
+			const double exact[2] = { is_torus ? -2.5 : -1, is_torus ? -(away - 1) / 0.4 / away : -1 };
+
+			sum += pow(p->lambda_u - exact[0], 2) + pow(p->lambda_u * p->rho - exact[1], 2);
+		}
+		/* A word has 5.9 % of lambda_u, and 1/126 of that of rho. Triangles of h = 0.13 at most have the error of the
+		 * ring's order at most: (h / r)^2 = 0.02 to 0.1 of the curvature where all is symmetric. */
+		sum = sqrt(sum / (2 * (double)surface.n_candidates));
+		assert_true(sum < (is_torus ? 2.5 : 1) * (0.059 + 1.0 / 126 + 0.05));
+		dpoint_surface_fini(&surface);
+	}
+	free(m);
+}
+
+static void choose_all(struct dpoint_surface *surface, struct dpoint_cover *cover, struct dpoint_choice *choice,
+                       const struct dpoint_cover_options *options)
+{
+	assert_int_equal(dpoint_fit(surface, options, OVERHANG, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_cover_init(cover, surface, options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_mend(surface, cover, options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(choice, cover), PSR_OK);
+	assert_int_equal(choice->n_holes, 0);
+}
+
+/* A rectangle ends at the edges: nothing of it is outside of the cube by more than it may reach over twice, once as it
+ * grows and once as its point moves, but for its tilt. A candidate that mends a hole reaches over by its cell. */
+static void no_extent_crosses_an_edge(void **state)
+{
+	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0 };
+	struct grid_mesh *m = malloc(sizeof *m);
+
+	(void)state;
+	assert_non_null(m);
+	for (int is_square = 0; is_square < 2; is_square++) {
+		struct dpoint_surface surface;
+		struct dpoint_cover cover;
+		struct dpoint_choice choice;
+		size_t n_before;
+		double largest = 0;
+
+		cube_mesh(m);
+		m->mesh.n_triangles = is_square ? 2 : 12; /* the face at z = -0.5, with borders */
+		sample(&surface, m, 0.05, 0.25f);
+		n_before = surface.n_candidates;
+		choose_all(&surface, &cover, &choice, &options);
+		for (size_t i = 0; i < surface.n_candidates; i++) {
+			const struct dpoint_candidate *c = &surface.candidate[i];
+			const double over = i < n_before ? 2 * OVERHANG + 0.25 * 0.012 : 0.05;
+			float v[3];
+
+			if (!choice.is_kept[i])
+				continue;
+			v3f_cross(v, c->point.normal, c->point.u);
+			assert_true(c->point.lambda_u == 0);
+			largest = fmax(largest, c->delta[0] * c->delta[1]);
+			for (int corner = 0; corner < 4; corner++) {
+				float at[3];
+
+				v3f_add_scaled(at, c->point.at, corner & 1 ? c->delta[0] : -c->delta[0], c->point.u);
+				v3f_add_scaled(at, at, corner & 2 ? c->delta[1] : -c->delta[1], v);
+				for (int k = 0; k < 3; k++)
+					assert_true(fabsf(at[k]) <= 0.5 + over);
+			}
+		}
+		/* And inside of the faces rectangles are as large as they may be. */
+		assert_true(largest == 0.25 * 0.25);
+		assert_true(choice.n_kept * 4 < n_before);
+		dpoint_choice_fini(&choice);
+		dpoint_cover_fini(&cover);
+		dpoint_surface_fini(&surface);
+	}
+	free(m);
+}
+
+/* After the fit, what is under a rectangle suits it: normals are within the angle wherever the surface goes on. */
+static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
+{
+	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0 };
+	struct dpoint_surface surface;
+	struct revolved torus;
+	size_t n = 0;
+	const struct dpoint_uniform uniform = { 10, 2, { 0, 0, 0 }, 1, 0.5f, 0 };
+
+	(void)state;
+	revolve(&torus, 1, 0.4, 0, 9);
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_uniform(&surface, &torus.patch, &uniform), PSR_OK);
+	assert_int_equal(dpoint_fit(&surface, &options, OVERHANG, NULL, NULL), PSR_OK);
+	for (size_t i = 0; i < surface.n_candidates; i += 5) {
+		const struct dpoint_candidate *c = &surface.candidate[i];
+		const struct dpoint_limit limit = { options.sine, { c->delta[0], c->delta[1] } };
+		float extent[2], v[3];
+
+		dpoint_extent(extent, &c->point, &limit);
+		v3f_cross(v, c->point.normal, c->point.u);
+		for (size_t k = 0; k < surface.n_cells; k++) {
+			const struct dpoint_cell *cell = &surface.cell[k];
+			float middle[3] = { 0, 0, 0 }, inside = INFINITY, n_here[3], normal[3];
+
+			for (int corner = 0; corner < 4; corner++) {
+				float away[3];
+
+				v3f_sub(away, cell->corner[corner], c->point.at);
+				const float p[3] = { v3f_dot(away, c->point.u), v3f_dot(away, v), v3f_dot(away, c->point.normal) };
+				v3f_add_scaled(middle, middle, 0.25f, p);
+				inside = fminf(inside, fminf(extent[0] - fabsf(p[0]), extent[1] - fabsf(p[1])));
+			}
+			v3f_set(normal, v3f_dot(cell->normal, c->point.u), v3f_dot(cell->normal, v),
+			        v3f_dot(cell->normal, c->point.normal));
+			if (inside < 2 * OVERHANG || normal[2] < 0 || fabsf(middle[2]) > 0.2f)
+				continue;
+			dpoint_normal_at(n_here, c->point.lambda_u, c->point.rho, middle[0], middle[1]);
+			v3f_normalize(n_here, n_here);
+			assert_true(v3f_dot(n_here, normal) >= cosf(options.angle) - 1e-6f);
+			n++;
+		}
+	}
+	assert_true(n > surface.n_candidates);
+	dpoint_surface_fini(&surface);
+}
+
+static void mending_leaves_no_hole(void **state)
+{
+	/* Extents of 0.02 r where candidates are 0.1 r apart. */
+	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0 };
+	struct grid_mesh *m = malloc(sizeof *m);
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+
+	(void)state;
+	assert_non_null(m);
+	round_mesh(m, 1, 40);
+	sample(&surface, m, 1, 1);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	assert_true(choice.n_holes > surface.n_cells / 2);
+	dpoint_choice_fini(&choice);
+	assert_int_equal(dpoint_mend(&surface, &cover, &options, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	assert_int_equal(choice.n_holes, 0);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+	free(m);
+}
+
+static void too_many_pieces_are_refused(void **state)
+{
+	const struct dpoint_mesh_options options = { { 0, 0, 0 }, 1, 1e-5, 1 };
+	struct grid_mesh *m = malloc(sizeof *m);
+	struct dpoint_surface surface;
+	struct psr_error err;
+
+	(void)state;
+	assert_non_null(m);
+	cube_mesh(m);
+	dpoint_surface_init(&surface);
+	assert_int_equal(dpoint_sample_mesh(&surface, &m->mesh, &options, &err), PSR_ERR_LIMIT);
+	assert_non_null(strstr(err.text, "pieces"));
+	dpoint_surface_fini(&surface);
+	free(m);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(pieces_of_round_meshes_have_their_curvatures),
+		cmocka_unit_test(no_extent_crosses_an_edge),
+		cmocka_unit_test(under_a_fitted_rectangle_normals_are_within_the_angle),
+		cmocka_unit_test(mending_leaves_no_hole),
+		cmocka_unit_test(too_many_pieces_are_refused),
+	};
+
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
