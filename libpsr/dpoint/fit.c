@@ -117,16 +117,24 @@ static int compare(const void *a, const void *b)
 	return x->at[0] < y->at[0] ? -1 : x->at[0] > y->at[0];
 }
 
-/* The greatest rectangle that no bar is in: along u it ends at a bar, along v at the least of those before. */
-static void largest_without(float extent[2], struct bars *bars)
+/* What a rectangle is worth: its area without a margin, so that slivers, which cover no cell, are worth nothing. */
+static float worth(float u, float v, const float margin[2])
 {
-	float v = extent[1], best[2] = { 0, 0 };
+	return fmaxf(u - margin[0], 0) * fmaxf(v - margin[1], 0);
+}
+
+/* The best rectangle that no bar is in, and that holds the one of half-sides `least`, which is known to have none: along
+ * u it ends at a bar, along v at the least of those before. */
+static void best_without(float extent[2], const float least[2], struct bars *bars, float overhang)
+{
+	const float margin[2] = { fminf(2 * overhang, extent[0] / 4), fminf(2 * overhang, extent[1] / 4) };
+	float v = extent[1], best[2] = { least[0], least[1] };
 
 	qsort(bars->bar, bars->n, sizeof *bars->bar, compare);
 	for (size_t i = 0; i <= bars->n; i++) {
 		const float u = i < bars->n ? bars->bar[i].at[0] : extent[0];
 
-		if (u * v > best[0] * best[1]) {
+		if (u >= least[0] && v >= least[1] && worth(u, v, margin) > worth(best[0], best[1], margin)) {
 			best[0] = u;
 			best[1] = v;
 		}
@@ -137,12 +145,12 @@ static void largest_without(float extent[2], struct bars *bars)
 	extent[1] = best[1];
 }
 
-static void look_around(struct rectangle *r, struct bars *bars, const struct fitting *f)
+static void look_around(struct rectangle *r, const float least[2], struct bars *bars, const struct fitting *f)
 {
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
 	bars->n = 0;
 	search(bars, f, r, 0);
-	largest_without(r->extent, bars);
+	best_without(r->extent, least, bars, f->overhang);
 }
 
 /* Which side the bar is on that ends an extent; 0: none does. */
@@ -159,10 +167,12 @@ static float side_of(const struct bars *bars, const float extent[2], int k)
 static void grow(float now[2], float side[2], struct rectangle *r, struct bars *bars, const struct fitting *f)
 {
 	const float most[2] = { r->extent[0], r->extent[1] };
+	/* From a square on: what a curvature makes short must not become shorter for the sake of the other side. */
+	const float first = fminf(fminf(most[0], most[1]), FIRST * fmaxf(most[0], most[1]));
 	int is_growing[2] = { 1, 1 }, is_first = 1;
 
 	for (int k = 0; k < 2; k++) {
-		now[k] = FIRST * most[k];
+		now[k] = first;
 		side[k] = 0;
 	}
 	while ((is_growing[0] || is_growing[1]) && !bars->is_failed) {
@@ -170,8 +180,8 @@ static void grow(float now[2], float side[2], struct rectangle *r, struct bars *
 
 		for (int k = 0; k < 2; k++)
 			r->extent[k] = grown[k] = is_growing[k] && !is_first ? fminf(2 * now[k], most[k]) : now[k];
+		look_around(r, is_first ? (const float[2]){ 0, 0 } : now, bars, f);
 		is_first = 0;
-		look_around(r, bars, f);
 		for (int k = 0; k < 2; k++) {
 			if (r->extent[k] < grown[k])
 				side[k] = side_of(bars, r->extent, k);
@@ -225,7 +235,7 @@ static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitt
 		move(&c->point, by);
 	rectangle_of(&r, c, f->look.options);
 	memcpy(most, r.extent, sizeof most);
-	look_around(&r, bars, f);
+	look_around(&r, (const float[2]){ 0, 0 }, bars, f);
 	for (int k = 0; k < 2; k++)
 		if (r.extent[k] < most[k] - f->overhang)
 			c->delta[k] = dpoint_delta_of_class(dpoint_delta_class(r.extent[k]));
