@@ -42,6 +42,7 @@ static const struct row rows[] = {
 	{ "front, across", OURS, DELTA_THERE, 170, 1, 0, 16 },
 	{ "fitted: 1 degree, 0.002", OURS, DELTA_FREE, 1, 0.002f, 0, 16 },
 	{ "fitted: 2 degrees, 0.002", OURS, DELTA_FREE, 2, 0.002f, 0, 16 },
+	{ "fitted: 4 degrees, 0.002", OURS, DELTA_FREE, 4, 0.002f, 0, 16 },
 };
 #define N_ROWS (int)(sizeof rows / sizeof *rows)
 
