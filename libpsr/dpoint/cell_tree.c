@@ -98,7 +98,9 @@ static void bound_normals(struct cell_node *node, const struct making *m)
 		float away[3];
 
 		v3f_sub(away, normal, node->normal);
-		spread2 = v3f_dot(normal, normal) > 0 && cell->part != DPOINT_BEYOND ? fmaxf(spread2, v3f_dot(away, away)) : INFINITY;
+		if (cell->part == DPOINT_BEYOND || v3f_dot(normal, normal) == 0)
+			spread2 = INFINITY;
+		spread2 = fmaxf(spread2, v3f_dot(away, away));
 	}
 	node->spread = sqrtf(spread2);
 }

@@ -1,5 +1,5 @@
-/* A balanced tree of cells, by their middles: each leaf is one cell. Node i has the children 2 i + 1 and 2 i + 2, halves
- * of its cells; a node is named by its index. */
+/* A balanced tree of cells, by their middles: each leaf is one cell. Node i has the children 2 i + 1 and 2 i + 2,
+ * halves of its cells; a node is named by its index. */
 #ifndef PSR_DPOINT_CELL_TREE_H
 #define PSR_DPOINT_CELL_TREE_H
 
@@ -9,7 +9,8 @@
 
 struct cell_node {
 	float middle[3], radius;   /* of a sphere that holds the corners */
-	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has no normal, or is beyond */
+	float normal[3], spread;   /* normals are no further from this one than `spread`; infinite: one has none, or is
+	                            * beyond */
 	uint32_t begin, end;       /* of order */
 	uint32_t part;
 };

@@ -99,7 +99,9 @@ static size_t holes_below(const struct tally *tally, size_t i)
 
 	if (tally->least[i] > 0 || tally->own[i] > 0)
 		return 0;
-	return cell_node_is_leaf(node) ? node->part != DPOINT_BEYOND : holes_below(tally, 2 * i + 1) + holes_below(tally, 2 * i + 2);
+	if (cell_node_is_leaf(node))
+		return node->part != DPOINT_BEYOND;
+	return holes_below(tally, 2 * i + 1) + holes_below(tally, 2 * i + 2);
 }
 
 size_t tally_holes(const struct tally *tally)

@@ -4,7 +4,6 @@
 #include <string.h>
 #include "base/array.h"
 #include "base/vec.h"
-#include "choice.h"
 #include "rectangle.h"
 
 #define CHUNK 256 /* candidates */
@@ -34,11 +33,11 @@ static void search(struct found *found, const struct looking *l, const struct re
 	if (!(fabsf(p[0]) <= r->extent[0] + node->radius && fabsf(p[1]) <= r->extent[1] + node->radius &&
 	      fabsf(p[2]) <= r->deep + node->radius))
 		return;
-	if (is_leaf ? !rectangle_covers(l, r, &l->surface->cell[l->tree->order[node->begin]]) : !rectangle_covers_node(l, r, node, p)) {
-		if (!is_leaf) {
-			search(found, l, r, 2 * i + 1);
-			search(found, l, r, 2 * i + 2);
-		}
+	if (is_leaf && !rectangle_covers(l, r, &l->surface->cell[l->tree->order[node->begin]]))
+		return;
+	if (!is_leaf && !rectangle_covers_node(l, r, node, p)) {
+		search(found, l, r, 2 * i + 1);
+		search(found, l, r, 2 * i + 2);
 		return;
 	}
 	if (!ARRAY_ROOM(found->node, found->n, found->room)) {
@@ -89,10 +88,8 @@ static void look(int chunk, void *userdata)
 		__atomic_store_n(&covering->is_failed, 1, __ATOMIC_RELAXED);
 }
 
-/* Makes the lists of the surface's candidates from cover->n_candidates on. */
-static int look_at_more(struct dpoint_cover *cover, const struct dpoint_surface *surface,
-                        const struct dpoint_cover_options *options, struct psr_pool *pool,
-                        const struct psr_cancel *cancel)
+int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *surface,
+                     const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
 	struct covering covering = { .cover = cover, .first = cover->n_candidates, .first_chunk = cover->n_chunks };
 	const size_t n = surface->n_candidates, n_chunks = (n - cover->n_candidates + CHUNK - 1) / CHUNK;
@@ -116,7 +113,7 @@ static int look_at_more(struct dpoint_cover *cover, const struct dpoint_surface 
 	cover->n_candidates = n;
 	cover->n_chunks += n_chunks;
 	looking_init(&covering.look, surface, cover->tree, options);
-	rc = psr_pool_for_until(pool, cancel, (int)n_chunks, look, &covering);
+	rc = psr_pool_for_until(work->pool, work->cancel, (int)n_chunks, look, &covering);
 	return rc == PSR_OK && covering.is_failed ? PSR_ERR_MEMORY : rc;
 }
 
@@ -124,6 +121,7 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
                       const struct dpoint_cover_options *options, struct psr_pool *pool,
                       const struct psr_cancel *cancel)
 {
+	const struct dpoint_work work = { pool, cancel };
 	int rc;
 
 	memset(cover, 0, sizeof *cover);
@@ -134,99 +132,7 @@ int dpoint_cover_init(struct dpoint_cover *cover, const struct dpoint_surface *s
 	if (cover->tree == NULL)
 		return PSR_ERR_MEMORY;
 	rc = cell_tree_init(cover->tree, surface->cell, surface->n_cells);
-	return rc == PSR_OK ? look_at_more(cover, surface, options, pool, cancel) : rc;
-}
-
-/* The longest side of a cell, and across it: half of what the cell takes of both, from its middle on. */
-static int local_of_cell(struct dpoint_local *local, double extent[2], const struct dpoint_cell *cell)
-{
-	double side[4][3], diagonal[2][3], most = 0;
-	int longest = 0;
-
-	memset(local, 0, sizeof *local);
-	memset(extent, 0, 2 * sizeof *extent);
-	for (int c = 0; c < 4; c++)
-		for (int k = 0; k < 3; k++) {
-			local->at[k] += 0.25 * cell->corner[c][k];
-			local->axis[2][k] = cell->normal[k];
-			side[c][k] = (double)cell->corner[(c + 1) % 4][k] - cell->corner[c][k];
-			diagonal[c % 2][k] = (double)cell->corner[c % 2 + 2][k] - cell->corner[c % 2][k];
-		}
-	for (int c = 0; c < 4; c++)
-		if (v3d_dot(side[c], side[c]) > most) {
-			most = v3d_dot(side[c], side[c]);
-			longest = c;
-		}
-	if (v3d_dot(local->axis[2], local->axis[2]) == 0)
-		v3d_cross(local->axis[2], diagonal[0], diagonal[1]);
-	if (v3d_normalize(local->axis[2], local->axis[2]) == 0)
-		return 0;
-	v3d_add_scaled(local->axis[0], side[longest], -v3d_dot(side[longest], local->axis[2]), local->axis[2]);
-	if (v3d_normalize(local->axis[0], local->axis[0]) == 0)
-		return 0;
-	v3d_cross(local->axis[1], local->axis[2], local->axis[0]);
-	for (int c = 0; c < 4; c++)
-		for (int k = 0; k < 2; k++) {
-			double away[3];
-
-			for (int i = 0; i < 3; i++)
-				away[i] = cell->corner[c][i] - local->at[i];
-			extent[k] = fmax(extent[k], fabs(v3d_dot(away, local->axis[k])));
-		}
-	return 1;
-}
-
-/* Rounding turns the sides of a rectangle by pi / 256, and tilts it by a triangle of normals: 0.015 at most. */
-static int put_patch(struct dpoint_surface *surface, const struct dpoint_cell *cell,
-                     const struct dpoint_cover_options *options)
-{
-	struct dpoint_local local;
-	double extent[2];
-	float delta[2];
-	int is_good = local_of_cell(&local, extent, cell);
-
-	for (int k = 0; k < 2; k++) {
-		const double reach = extent[k] + 0.015 * (extent[0] + extent[1]) + 1.01 * options->slack;
-		const unsigned class = dpoint_delta_class((float)fmin(reach, 0.8));
-
-		delta[k] = dpoint_delta_of_class(class > 0 ? class - 1 : 0);
-	}
-	return dpoint_surface_put(surface, &local, is_good, delta, cell->part);
-}
-
-static int patch_below(struct dpoint_surface *surface, const struct tally *tally, size_t i,
-                       const struct dpoint_cover_options *options)
-{
-	const struct cell_tree *tree = tally->cover->tree;
-	struct dpoint_cell cell;
-	int rc;
-
-	if (tally->least[i] > 0 || tally->own[i] > 0)
-		return PSR_OK;
-	if (cell_node_is_leaf(&tree->node[i])) {
-		cell = surface->cell[tree->order[tree->node[i].begin]];
-		return cell.part != DPOINT_BEYOND ? put_patch(surface, &cell, options) : PSR_OK;
-	}
-	rc = patch_below(surface, tally, 2 * i + 1, options);
-	return rc == PSR_OK ? patch_below(surface, tally, 2 * i + 2, options) : rc;
-}
-
-int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
-                const struct dpoint_cover_options *options, struct psr_pool *pool, const struct psr_cancel *cancel)
-{
-	const struct dpoint_cover_options any = { options->sine, options->slack, 1, 1, options->is_within_parts };
-	struct tally tally;
-	int rc;
-
-	if (cover->tree == NULL)
-		return PSR_OK;
-	rc = tally_init(&tally, cover);
-	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
-		tally_add(&tally, i, 1);
-	if (rc == PSR_OK)
-		rc = patch_below(surface, &tally, 0, options);
-	tally_fini(&tally);
-	return rc == PSR_OK ? look_at_more(cover, surface, &any, pool, cancel) : rc;
+	return rc == PSR_OK ? cover_candidates(cover, surface, options, &work) : rc;
 }
 
 void dpoint_cover_fini(struct dpoint_cover *cover)

@@ -18,6 +18,7 @@ struct bar {
 struct bars {
 	struct bar *bar;
 	size_t n, room;
+	float free[2]; /* half-sides of a rectangle that is known to have none */
 	int is_failed;
 };
 
@@ -67,6 +68,31 @@ static struct bar bar_of(const float corner[4][3], const float above[4], float h
 	return bar;
 }
 
+/* Whether a bar is nearer along both sides: what is behind it ends nothing. */
+static int is_behind(const struct bars *bars, float u, float v)
+{
+	for (size_t i = 0; i < bars->n; i++)
+		if (bars->bar[i].at[0] <= u && bars->bar[i].at[1] <= v)
+			return 1;
+	return 0;
+}
+
+static void put(struct bars *bars, const struct bar *bar)
+{
+	size_t n = 0;
+
+	if (is_behind(bars, bar->at[0], bar->at[1]))
+		return;
+	for (size_t i = 0; i < bars->n; i++)
+		if (!(bar->at[0] <= bars->bar[i].at[0] && bar->at[1] <= bars->bar[i].at[1]))
+			bars->bar[n++] = bars->bar[i];
+	bars->n = n;
+	if (ARRAY_ROOM(bars->bar, bars->n, bars->room))
+		bars->bar[bars->n++] = *bar;
+	else
+		bars->is_failed = 1;
+}
+
 /* The surface that goes on beside the rectangle leaves S_p gradually: a cell that S_p runs through, or that is within
  * some heights of it, is of that surface. One that looks back is of another. */
 static void look_at(struct bars *bars, const struct fitting *f, const struct rectangle *r,
@@ -87,26 +113,31 @@ static void look_at(struct bars *bars, const struct fitting *f, const struct rec
 		return;
 	for (int k = 0; k < 2; k++)
 		bar.at[k] += f->overhang;
-	if (ARRAY_ROOM(bars->bar, bars->n, bars->room))
-		bars->bar[bars->n++] = bar;
-	else
-		bars->is_failed = 1;
+	put(bars, &bar);
 }
 
 static void search(struct bars *bars, const struct fitting *f, const struct rectangle *r, size_t i)
 {
 	const struct cell_node *node = &f->look.tree->node[i];
-	float p[3];
+	float p[3], a[3], b[3];
+	size_t near;
 
 	rectangle_sees(p, r, node->middle);
-	if (!(fabsf(p[0]) <= r->extent[0] + node->radius && fabsf(p[1]) <= r->extent[1] + node->radius &&
-	      fabsf(p[2]) <= r->deep + 4 * r->height + 2 * node->radius))
+	if ((fabsf(p[0]) + node->radius <= bars->free[0] && fabsf(p[1]) + node->radius <= bars->free[1]) ||
+	    !(fabsf(p[0]) <= r->extent[0] + node->radius && fabsf(p[1]) <= r->extent[1] + node->radius &&
+	      fabsf(p[2]) <= r->deep + 4 * r->height + 2 * node->radius) ||
+	    is_behind(bars, fmaxf(fabsf(p[0]) - node->radius, 0) + f->overhang,
+	              fmaxf(fabsf(p[1]) - node->radius, 0) + f->overhang))
 		return;
 	if (cell_node_is_leaf(node)) {
 		look_at(bars, f, r, &f->look.surface->cell[f->look.tree->order[node->begin]], node->radius);
 	} else if (!rectangle_covers_node(&f->look, r, node, p)) {
-		search(bars, f, r, 2 * i + 1);
-		search(bars, f, r, 2 * i + 2);
+		/* The nearer half first: its bars are before most of the other's. */
+		v3f_sub(a, node[i + 1].middle, r->at);
+		v3f_sub(b, node[i + 2].middle, r->at);
+		near = v3f_dot(b, b) < v3f_dot(a, a) ? 2 * i + 2 : 2 * i + 1;
+		search(bars, f, r, near);
+		search(bars, f, r, 4 * i + 3 - near);
 	}
 }
 
@@ -123,18 +154,19 @@ static float worth(float u, float v, const float margin[2])
 	return fmaxf(u - margin[0], 0) * fmaxf(v - margin[1], 0);
 }
 
-/* The best rectangle that no bar is in, and that holds the one of half-sides `least`, which is known to have none: along
- * u it ends at a bar, along v at the least of those before. */
-static void best_without(float extent[2], const float least[2], struct bars *bars, float overhang)
+/* The best rectangle that no bar is in, and that holds the free one: along u it ends at a bar, along v at the least of
+ * those before. */
+static void best_without(float extent[2], struct bars *bars, float overhang)
 {
 	const float margin[2] = { fminf(2 * overhang, extent[0] / 4), fminf(2 * overhang, extent[1] / 4) };
-	float v = extent[1], best[2] = { least[0], least[1] };
+	float v = extent[1], best[2] = { bars->free[0], bars->free[1] };
 
-	qsort(bars->bar, bars->n, sizeof *bars->bar, compare);
+	if (bars->n > 1)
+		qsort(bars->bar, bars->n, sizeof *bars->bar, compare);
 	for (size_t i = 0; i <= bars->n; i++) {
 		const float u = i < bars->n ? bars->bar[i].at[0] : extent[0];
 
-		if (u >= least[0] && v >= least[1] && worth(u, v, margin) > worth(best[0], best[1], margin)) {
+		if (u >= bars->free[0] && v >= bars->free[1] && worth(u, v, margin) > worth(best[0], best[1], margin)) {
 			best[0] = u;
 			best[1] = v;
 		}
@@ -145,12 +177,13 @@ static void best_without(float extent[2], const float least[2], struct bars *bar
 	extent[1] = best[1];
 }
 
-static void look_around(struct rectangle *r, const float least[2], struct bars *bars, const struct fitting *f)
+static void look_around(struct rectangle *r, const float free_one[2], struct bars *bars, const struct fitting *f)
 {
+	memcpy(bars->free, free_one, sizeof bars->free);
 	r->deep = 2 * fabsf(r->lambda_u) * fmaxf(r->extent[0] * r->extent[0], r->extent[1] * r->extent[1]) + r->height;
 	bars->n = 0;
 	search(bars, f, r, 0);
-	best_without(r->extent, least, bars, f->overhang);
+	best_without(r->extent, bars, f->overhang);
 }
 
 /* Which side the bar is on that ends an extent; 0: none does. */
@@ -231,8 +264,9 @@ static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitt
 			by[k] = side[k] * fmaxf(0, now[k] - c->delta[k]);
 		}
 	}
-	if (by[0] != 0 || by[1] != 0)
-		move(&c->point, by);
+	if (by[0] == 0 && by[1] == 0)
+		return;
+	move(&c->point, by);
 	rectangle_of(&r, c, f->look.options);
 	memcpy(most, r.extent, sizeof most);
 	look_around(&r, (const float[2]){ 0, 0 }, bars, f);
@@ -244,7 +278,7 @@ static void fit(struct dpoint_candidate *c, struct bars *bars, const struct fitt
 static void fit_chunk(int chunk, void *userdata)
 {
 	struct fitting *f = userdata;
-	struct bars bars = { NULL, 0, 0, 0 };
+	struct bars bars = { NULL, 0, 0, { 0, 0 }, 0 };
 
 	for (size_t i = (size_t)chunk * CHUNK; i < f->n && i < (size_t)(chunk + 1) * CHUNK; i++)
 		fit(&f->candidate[i], &bars, f);
@@ -253,19 +287,30 @@ static void fit_chunk(int chunk, void *userdata)
 		__atomic_store_n(&f->is_failed, 1, __ATOMIC_RELAXED);
 }
 
-int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, float overhang,
-               struct psr_pool *pool, const struct psr_cancel *cancel)
+int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree, size_t first,
+                   const struct dpoint_cover_options *options, const struct dpoint_work *work)
 {
-	struct fitting f = { .candidate = surface->candidate, .n = surface->n_candidates, .overhang = overhang };
+	struct fitting f = { .candidate = surface->candidate + first, .n = surface->n_candidates - first };
+	int rc;
+
+	f.overhang = options->overhang;
+	looking_init(&f.look, surface, tree, options);
+	rc = psr_pool_for_until(work->pool, work->cancel, (int)((f.n + CHUNK - 1) / CHUNK), fit_chunk, &f);
+	return rc == PSR_OK && f.is_failed ? PSR_ERR_MEMORY : rc;
+}
+
+int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, struct psr_pool *pool,
+               const struct psr_cancel *cancel)
+{
+	const struct dpoint_work work = { pool, cancel };
 	struct cell_tree tree;
 	int rc;
 
 	if (surface->n_cells == 0 || surface->n_candidates == 0)
 		return PSR_OK;
 	rc = cell_tree_init(&tree, surface->cell, surface->n_cells);
-	looking_init(&f.look, surface, &tree, options);
 	if (rc == PSR_OK)
-		rc = psr_pool_for_until(pool, cancel, (int)((f.n + CHUNK - 1) / CHUNK), fit_chunk, &f);
+		rc = fit_candidates(surface, &tree, 0, options, &work);
 	cell_tree_fini(&tree);
-	return rc == PSR_OK && f.is_failed ? PSR_ERR_MEMORY : rc;
+	return rc;
 }

@@ -16,7 +16,6 @@ struct cutting {
 	const struct corner *corner[3];
 	uint32_t material, n; /* parts of each side */
 	int side;             /* the one that directions follow where any would do */
-	float delta[2];
 };
 
 static void place_at(double at[3], const struct cutting *c, const double weight[3])
@@ -71,6 +70,7 @@ static int local_at(struct dpoint_local *local, const struct cutting *c, const d
 static int put_piece(const struct cutting *c, const int at[3][2])
 {
 	struct dpoint_cell *cell = dpoint_surface_cell(c->surface);
+	struct dpoint_candidate like = { .delta = { c->options->delta, c->options->delta }, .part = c->material };
 	double middle[3] = { 0, 0, 0 };
 	struct dpoint_local local;
 	int is_good;
@@ -94,7 +94,8 @@ static int put_piece(const struct cutting *c, const int at[3][2])
 	is_good = local_at(&local, c, middle);
 	for (int k = 0; k < 3 && is_good; k++)
 		cell->normal[k] = (float)local.axis[2][k];
-	return dpoint_surface_put(c->surface, &local, is_good, c->delta, c->material);
+	like.cell = (uint32_t)c->surface->n_cells - 1;
+	return dpoint_surface_put(c->surface, is_good ? &local : NULL, &like);
 }
 
 static int cut(const struct cutting *c)
@@ -163,7 +164,7 @@ static double measure_sides(struct cutting *c, unsigned is_open)
 int dpoint_sample_mesh(struct dpoint_surface *surface, const struct psr_mesh *mesh,
                        const struct dpoint_mesh_options *options, struct psr_error *err)
 {
-	struct cutting c = { .surface = surface, .options = options, .delta = { options->delta, options->delta } };
+	struct cutting c = { .surface = surface, .options = options };
 	struct corners corners;
 	uint64_t n_pieces = 0;
 	double n_parts;

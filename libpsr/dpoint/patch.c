@@ -26,8 +26,8 @@ int dpoint_patch_check(const struct dpoint_patch *patch, struct psr_error *err)
 			return psr_fail(err, PSR_ERR_FORMAT, "a NURBS patch has degree %d; 1 to %d are read", degree,
 			                DPOINT_MOST_DEGREE);
 		if (patch->n[k] <= (uint32_t)degree || patch->n[k] > 1u << 20)
-			return psr_fail(err, PSR_ERR_FORMAT, "a NURBS patch of degree %d has %u control points along a side", degree,
-			                patch->n[k]);
+			return psr_fail(err, PSR_ERR_FORMAT, "a NURBS patch of degree %d has %u control points along a side",
+			                degree, patch->n[k]);
 		n_knots = (uint64_t)patch->n[k] + (unsigned)degree + 1;
 		for (uint64_t i = 0; i < n_knots; i++) {
 			if (!isfinite(patch->knot[k][i]))

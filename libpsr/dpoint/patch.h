@@ -21,7 +21,7 @@ struct dpoint_patch {
  * finite, weights that are not positive. */
 int dpoint_patch_check(const struct dpoint_patch *patch, struct psr_error *err);
 
-/* A part between two knots along u and v that follow each other, where the patch is smooth: index of the lower knots. */
+/* A part between two knots along u and v that follow each other, where the patch is smooth: the lower knots. */
 struct dpoint_span {
 	uint32_t at[2];
 };

@@ -42,4 +42,19 @@ int rectangle_covers(const struct looking *l, const struct rectangle *r, const s
 int rectangle_covers_node(const struct looking *l, const struct rectangle *r, const struct cell_node *node,
                           const float p[3]);
 
+/* ---- steps of dpoint_simplify() ---- */
+
+struct dpoint_work {
+	struct psr_pool *pool;
+	const struct psr_cancel *cancel;
+};
+
+/* dpoint_fit() of the candidates from `first` on. */
+int fit_candidates(struct dpoint_surface *surface, const struct cell_tree *tree, size_t first,
+                   const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
+/* Makes the lists of the surface's candidates that the cover lacks: its last ones. */
+int cover_candidates(struct dpoint_cover *cover, const struct dpoint_surface *surface,
+                     const struct dpoint_cover_options *options, const struct dpoint_work *work);
+
 #endif

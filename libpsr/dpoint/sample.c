@@ -26,8 +26,8 @@ static int local_at(struct dpoint_local *local, const struct sampling *s, double
 
 static int put_candidates(const struct sampling *s)
 {
-	const uint32_t n = s->uniform->n;
-	const float delta[2] = { s->uniform->delta, s->uniform->delta };
+	const uint32_t n = s->uniform->n, cells = s->uniform->cells, first = (uint32_t)s->surface->n_cells;
+	struct dpoint_candidate like = { .delta = { s->uniform->delta, s->uniform->delta }, .part = s->uniform->part };
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < n && rc == PSR_OK; i++)
@@ -35,7 +35,8 @@ static int put_candidates(const struct sampling *s)
 			struct dpoint_local local;
 			int is_good = local_at(&local, s, (i + 0.5) / n, (j + 0.5) / n);
 
-			rc = dpoint_surface_put(s->surface, &local, is_good, delta, s->uniform->part);
+			like.cell = first + (i * cells + cells / 2) * n * cells + j * cells + cells / 2;
+			rc = dpoint_surface_put(s->surface, is_good ? &local : NULL, &like);
 		}
 	return rc;
 }

@@ -31,14 +31,14 @@ struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface
 	return &surface->candidate[surface->n_candidates++];
 }
 
-int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local, int is_good,
-                       const float delta[2], uint32_t part)
+int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local,
+                       const struct dpoint_candidate *like)
 {
 	static const struct dpoint_box box = { { 0, 0, 0 }, { 1, 1, 1 } };
 	struct dpoint_candidate *candidate;
 	struct dpoint_word word;
 	struct dpoint point;
-	enum dpoint_made made = is_good ? dpoint_make(&point, local) : DPOINT_BAD;
+	enum dpoint_made made = local != NULL ? dpoint_make(&point, local) : DPOINT_BAD;
 
 	surface->n_bad += made == DPOINT_BAD;
 	surface->n_clamped += made == DPOINT_CLAMPED;
@@ -47,10 +47,9 @@ int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local
 	candidate = dpoint_surface_candidate(surface);
 	if (candidate == NULL)
 		return PSR_ERR_MEMORY;
+	*candidate = *like;
 	dpoint_pack(&word, &point, &box);
 	dpoint_unpack(&candidate->point, &word, &box);
 	memcpy(candidate->point.at, point.at, sizeof point.at);
-	memcpy(candidate->delta, delta, sizeof candidate->delta);
-	candidate->part = part;
 	return PSR_OK;
 }

@@ -23,6 +23,7 @@ struct dpoint_candidate {
 	struct dpoint point;
 	float delta[2];    /* as in struct dpoint_limit */
 	uint32_t part;
+	uint32_t cell;     /* that its place is in */
 };
 
 struct dpoint_surface {
@@ -39,10 +40,10 @@ void dpoint_surface_fini(struct dpoint_surface *surface);
 struct dpoint_cell *dpoint_surface_cell(struct dpoint_surface *surface);
 struct dpoint_candidate *dpoint_surface_candidate(struct dpoint_surface *surface);
 
-/* Adds the candidate of a local shape, rounded to what a word holds but for its place; counts what is left out. is_good:
- * 0 if there is no shape. MEMORY. */
-int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local, int is_good,
-                       const float delta[2], uint32_t part);
+/* Adds the candidate of a local shape, rounded to what a word holds but for its place; counts what is left out. NULL:
+ * there is no shape. like: its delta, part and cell. MEMORY. */
+int dpoint_surface_put(struct dpoint_surface *surface, const struct dpoint_local *local,
+                       const struct dpoint_candidate *like);
 
 /* ---- coverage ---- */
 
@@ -53,6 +54,7 @@ struct dpoint_cover_options {
 	                    * below a right angle */
 	float height;      /* S_p may be off by so much there; and by half of the shorter extent at most */
 	int is_within_parts; /* points cover cells of their own part alone, as in [K] 6 */
+	float overhang;    /* dpoint_fit(): how far a rectangle may reach over what it does not suit */
 };
 
 /* Which cells each candidate covers. A candidate covers a cell whose corners all are within its rectangle, seen along
@@ -62,7 +64,7 @@ struct dpoint_cover_options {
 struct cell_tree;
 struct dpoint_cover {
 	size_t n_candidates, n_cells;
-	const uint32_t **list;   /* of a candidate: nodes of the tree, all of whose cells it covers; none is below another */
+	const uint32_t **list;   /* of a candidate: nodes of the tree, all of whose cells it covers, each once */
 	uint32_t *n;
 	struct cell_tree *tree;  /* cell_tree.h; NULL without cells or candidates */
 	void **chunk;            /* what the lists are in */
@@ -87,10 +89,10 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 
 /* Shortens each candidate's delta, along u and along v, until its rectangle is over no cell that S_p does not suit: one
  * of the surface that goes on beside it, where the normal or the height is further off than the options say. So a
- * rectangle ends at a crease, and where curvatures change; its point may move along S_p for that. delta becomes one of dpoint_delta_class(), unless it is as it
- * was. overhang: how far a rectangle may reach over such a cell. Cells that look the other way, and those of other sheets above or below, shorten nothing. MEMORY, CANCELLED. */
-int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, float overhang,
-               struct psr_pool *pool, const struct psr_cancel *cancel);
+ * rectangle ends at a crease, and where curvatures change; its point may move along S_p for that. delta becomes one of
+ * dpoint_delta_class(), unless it is as it was. Cells that look the other way, and those of other sheets above or below, shorten nothing. MEMORY, CANCELLED. */
+int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, struct psr_pool *pool,
+               const struct psr_cancel *cancel);
 
 /* Returns 2^(-class / 4), class 0 to 63; and the class of the greatest one that is at most delta, or 63. */
 float dpoint_delta_of_class(unsigned class);
@@ -109,6 +111,13 @@ struct dpoint_choice {
 int dpoint_choose(struct dpoint_choice *choice, const struct dpoint_cover *cover);
 
 void dpoint_choice_fini(struct dpoint_choice *choice);
+
+/* All of it: fits candidates, mends holes, and chooses. Candidates come in two turns: of the first, every `sparse`-th at
+ * random (1: all), and then those in cells that none of these covers; others are dropped. For candidates that are
+ * much closer than their rectangles are wide, which takes so much less time. MEMORY, CANCELLED; the caller ends cover and
+ * choice even then. */
+int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
+                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool);
 
 /* ---- how good a choice is ---- */
 

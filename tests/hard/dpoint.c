@@ -39,7 +39,8 @@ static void beyond_the_semicircle_the_arc_stays_at_a_quarter(void **state)
 	(void)state;
 	assert_true(fabs(dpoint_asin_ratio(1.0f) - 1.5707963267948966) < 1e-7);
 	for (float w = 1.0f; w < 1e30f; w *= 1.7f)
-		assert_true(dpoint_asin_ratio(w) == dpoint_asin_ratio(1.0f) && dpoint_asin_ratio(-w) == dpoint_asin_ratio(1.0f));
+		assert_true(dpoint_asin_ratio(w) == dpoint_asin_ratio(1.0f) &&
+		            dpoint_asin_ratio(-w) == dpoint_asin_ratio(1.0f));
 	assert_true(dpoint_asin_ratio(INFINITY) == dpoint_asin_ratio(1.0f));
 }
 

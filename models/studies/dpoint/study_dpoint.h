@@ -4,8 +4,8 @@
 
 #include "dpoint/choice.h"
 
-/* Prunes the most redundant candidate whose cells are all covered by others, until none is left. A candidate is the more
- * redundant, the more its neighbours are like it in curvatures and directions. MEMORY; dpoint_choice_fini() even
+/* Prunes the most redundant candidate whose cells are all covered by others, until none is left. A candidate is
+ * the more redundant, the more its neighbours are like it in curvatures and directions. MEMORY; dpoint_choice_fini() even
  * then. */
 int study_dpoint_prune(struct dpoint_choice *choice, const struct dpoint_surface *surface,
                        const struct dpoint_cover *cover);

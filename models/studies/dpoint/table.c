@@ -8,8 +8,6 @@
 #include "models/studies/tables/tables.h"
 #include "study_dpoint.h"
 
-#define SIDE 70        /* candidates along a side of a patch: 156,800, as [K] has */
-#define CELLS 2        /* along a side of a candidate's part */
 #define EPSILON 0.004
 #define SLACK 2e-5f    /* half a step of a group's box of 0.6 */
 #define OVERHANG 5e-4f
@@ -27,29 +25,32 @@ static const struct study_column columns[N_COLUMNS] = {
 	{ "height worst", "height_worst", 4 }, { "overlap", "overlap", 2 }, { "holes %", "holes_percent", 2 },
 };
 
-enum way { ALL, THEIRS, OURS };
+enum way { ALL, THEIRS, OURS, FITTED };
 
+/* side: candidates along a side of a patch: 70 make 156,800, as [K] has. cells: along a side of a candidate's part. */
 struct row {
 	const char *label;
 	enum way way;
 	float delta, degrees, height;
 	int is_within_parts, bytes;
+	uint32_t side, cells, sparse;
 };
 
 static const struct row rows[] = {
-	{ "all points, 62 bytes", ALL, DELTA_THERE, 170, 1, 1, 62 },
-	{ "[K] 4.2, within patches", THEIRS, DELTA_THERE, 170, 1, 1, 62 },
-	{ "front, across", OURS, DELTA_THERE, 170, 1, 0, 16 },
-	{ "fitted: 1 degree, 0.002", OURS, DELTA_FREE, 1, 0.002f, 0, 16 },
-	{ "fitted: 2 degrees, 0.002", OURS, DELTA_FREE, 2, 0.002f, 0, 16 },
-	{ "fitted: 4 degrees, 0.002", OURS, DELTA_FREE, 4, 0.002f, 0, 16 },
+	{ "all points, 62 bytes", ALL, DELTA_THERE, 170, 1, 1, 62, 70, 2, 1 },
+	{ "[K] 4.2, within patches", THEIRS, DELTA_THERE, 170, 1, 1, 62, 70, 2, 1 },
+	{ "front, across", OURS, DELTA_THERE, 170, 1, 0, 16, 70, 2, 1 },
+	{ "fitted, 2 degrees", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 1 },
+	{ "the same in two turns", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 70, 2, 6 },
+	{ "fitted, 4 degrees", FITTED, DELTA_FREE, 4, 0.002f, 0, 16, 70, 2, 1 },
+	{ "380,192: 2 degrees, two turns", FITTED, DELTA_FREE, 2, 0.002f, 0, 16, 109, 1, 12 },
 };
 #define N_ROWS (int)(sizeof rows / sizeof *rows)
 
-static int sample_teapot(struct dpoint_surface *surface, float delta)
+static int sample_teapot(struct dpoint_surface *surface, const struct row *row)
 {
 	static const double bezier[8] = { 0, 0, 0, 0, 1, 1, 1, 1 };
-	struct dpoint_uniform uniform = { SIDE, CELLS, { 0.2, 1.575, 0 }, 1 / 3.75, delta, 0 };
+	struct dpoint_uniform uniform = { row->side, row->cells, { 0.2, 1.575, 0 }, 1 / 3.75, row->delta, 0 };
 	int rc = PSR_OK;
 
 	for (uint32_t i = 0; i < TEAPOT_PATCHES && rc == PSR_OK; i++) {
@@ -95,7 +96,7 @@ static void put(double value[N_COLUMNS], const struct row *row, const struct dpo
                 const struct dpoint_choice *choice, const struct dpoint_errors *errors)
 {
 	value[POINTS] = (double)choice->n_kept;
-	value[KEPT] = 100 * (double)choice->n_kept / (SIDE * SIDE * TEAPOT_PATCHES);
+	value[KEPT] = 100 * (double)choice->n_kept / (row->side * row->side * TEAPOT_PATCHES);
 	value[BYTES] = (double)choice->n_kept * row->bytes / 1e3;
 	value[NORMAL_RMS] = errors->normal_rms / PSR_DEGREE;
 	value[NORMAL_WORST] = errors->normal_worst / PSR_DEGREE;
@@ -107,7 +108,7 @@ static void put(double value[N_COLUMNS], const struct row *row, const struct dpo
 static int measure(double value[N_COLUMNS], const struct row *row, struct study *study)
 {
 	const struct dpoint_cover_options options = {
-		dpoint_sine(EPSILON), SLACK, (float)(row->degrees * PSR_DEGREE), row->height, row->is_within_parts,
+		dpoint_sine(EPSILON), SLACK, (float)(row->degrees * PSR_DEGREE), row->height, row->is_within_parts, OVERHANG,
 	};
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };
@@ -117,14 +118,12 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	int rc;
 
 	dpoint_surface_init(&surface);
-	rc = sample_teapot(&surface, row->delta);
-	if (rc == PSR_OK && row->delta == DELTA_FREE)
-		rc = dpoint_fit(&surface, &options, OVERHANG, study->pool, NULL);
-	if (rc == PSR_OK)
+	rc = sample_teapot(&surface, row);
+	if (rc == PSR_OK && row->way == FITTED)
+		rc = dpoint_simplify(&choice, &cover, &surface, &options, row->sparse, study->pool);
+	else if (rc == PSR_OK)
 		rc = dpoint_cover_init(&cover, &surface, &options, study->pool, NULL);
-	if (rc == PSR_OK && row->delta == DELTA_FREE)
-		rc = dpoint_mend(&surface, &cover, &options, study->pool, NULL);
-	if (rc == PSR_OK)
+	if (rc == PSR_OK && row->way != FITTED)
 		rc = choose(&choice, row->way, &surface, &cover);
 	if (rc == PSR_OK) {
 		value[SECONDS] = clock_seconds() - start;

@@ -112,7 +112,7 @@ static void pieces_of_round_meshes_have_their_curvatures(void **state)
 static void choose_all(struct dpoint_surface *surface, struct dpoint_cover *cover, struct dpoint_choice *choice,
                        const struct dpoint_cover_options *options)
 {
-	assert_int_equal(dpoint_fit(surface, options, OVERHANG, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_fit(surface, options, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_cover_init(cover, surface, options, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_mend(surface, cover, options, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_choose(choice, cover), PSR_OK);
@@ -123,7 +123,7 @@ static void choose_all(struct dpoint_surface *surface, struct dpoint_cover *cove
  * grows and once as its point moves, but for its tilt. A candidate that mends a hole reaches over by its cell. */
 static void no_extent_crosses_an_edge(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0 };
+	const struct dpoint_cover_options options = { dpoint_sine(0.01), 1e-5f, 0.05f, 0.005f, 0, OVERHANG };
 	struct grid_mesh *m = malloc(sizeof *m);
 
 	(void)state;
@@ -172,7 +172,7 @@ static void no_extent_crosses_an_edge(void **state)
 /* After the fit, what is under a rectangle suits it: normals are within the angle wherever the surface goes on. */
 static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 {
-	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0 };
+	const struct dpoint_cover_options options = { dpoint_sine(0.2), 1e-5f, 0.06f, 0.01f, 0, OVERHANG };
 	struct dpoint_surface surface;
 	struct revolved torus;
 	size_t n = 0;
@@ -182,7 +182,7 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 	revolve(&torus, 1, 0.4, 0, 9);
 	dpoint_surface_init(&surface);
 	assert_int_equal(dpoint_sample_uniform(&surface, &torus.patch, &uniform), PSR_OK);
-	assert_int_equal(dpoint_fit(&surface, &options, OVERHANG, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_fit(&surface, &options, NULL, NULL), PSR_OK);
 	for (size_t i = 0; i < surface.n_candidates; i += 5) {
 		const struct dpoint_candidate *c = &surface.candidate[i];
 		const struct dpoint_limit limit = { options.sine, { c->delta[0], c->delta[1] } };
@@ -216,10 +216,37 @@ static void under_a_fitted_rectangle_normals_are_within_the_angle(void **state)
 	dpoint_surface_fini(&surface);
 }
 
+static void two_turns_cover_all_with_little_more(void **state)
+{
+	const struct dpoint_cover_options options = { dpoint_sine(0.03), 1e-5f, 0.06f, 0.01f, 0, OVERHANG };
+	const struct dpoint_uniform uniform = { 16, 1, { 0, 0, 0 }, 1, 0.5f, 0 };
+	struct revolved torus;
+	size_t n_kept[2];
+
+	(void)state;
+	revolve(&torus, 1, 0.4, 0, 9);
+	for (int i = 0; i < 2; i++) {
+		struct dpoint_surface surface;
+		struct dpoint_cover cover;
+		struct dpoint_choice choice;
+
+		dpoint_surface_init(&surface);
+		assert_int_equal(dpoint_sample_uniform(&surface, &torus.patch, &uniform), PSR_OK);
+		assert_int_equal(dpoint_simplify(&choice, &cover, &surface, &options, i == 0 ? 1 : 4, NULL), PSR_OK);
+		assert_int_equal(choice.n_holes, 0);
+		n_kept[i] = choice.n_kept;
+		assert_true(i == 0 ? surface.n_candidates >= 4096 : surface.n_candidates < 2048);
+		dpoint_choice_fini(&choice);
+		dpoint_cover_fini(&cover);
+		dpoint_surface_fini(&surface);
+	}
+	assert_true(n_kept[1] < n_kept[0] * 3 / 2);
+}
+
 static void mending_leaves_no_hole(void **state)
 {
 	/* Extents of 0.02 r where candidates are 0.1 r apart. */
-	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0 };
+	const struct dpoint_cover_options options = { 0.02f, 1e-5f, 0.05f, 0.001f, 0, 0 };
 	struct grid_mesh *m = malloc(sizeof *m);
 	struct dpoint_surface surface;
 	struct dpoint_cover cover;
@@ -265,6 +292,7 @@ int main(void)
 		cmocka_unit_test(pieces_of_round_meshes_have_their_curvatures),
 		cmocka_unit_test(no_extent_crosses_an_edge),
 		cmocka_unit_test(under_a_fitted_rectangle_normals_are_within_the_angle),
+		cmocka_unit_test(two_turns_cover_all_with_little_more),
 		cmocka_unit_test(mending_leaves_no_hole),
 		cmocka_unit_test(too_many_pieces_are_refused),
 	};

@@ -175,7 +175,8 @@ static void forms_are_those_of_differences(void **state)
 			assert_true(dpoint_patch_local(&local, &patch, &span, uv));
 			for (int a = 0; a < 3; a++)
 				for (int b = 0; b < 3; b++)
-					dpoint_patch_place(p[a][b], &patch, &span, (const double[2]){ uv[0] + (a - 1) * h, uv[1] + (b - 1) * h });
+					dpoint_patch_place(p[a][b], &patch, &span,
+					                   (const double[2]){ uv[0] + (a - 1) * h, uv[1] + (b - 1) * h });
 			/* The height of neighbours above the tangent plane is that of the shape. */
 			for (int a = 0; a < 9; a += 2) {
 				double away[3], x, y;

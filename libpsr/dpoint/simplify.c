@@ -1,0 +1,109 @@
+/* The order of the steps. */
+#include <stdlib.h>
+#include <string.h>
+#include "base/random.h"
+#include "choice.h"
+#include "rectangle.h"
+
+/* Brings the candidates that `is_first` is set for to the front, from `first` on, in their order. Returns their end. */
+static size_t bring_forward(struct dpoint_surface *surface, size_t first, size_t n, const uint8_t *is_first,
+                            struct dpoint_candidate *rest)
+{
+	size_t end = first, n_rest = 0;
+
+	for (size_t i = first; i < n; i++) {
+		if (is_first[i])
+			surface->candidate[end++] = surface->candidate[i];
+		else
+			rest[n_rest++] = surface->candidate[i];
+	}
+	memcpy(surface->candidate + end, rest, n_rest * sizeof *rest);
+	return end;
+}
+
+static void mark_below(uint8_t *is_open, const struct tally *tally, size_t i)
+{
+	const struct cell_tree *tree = tally->cover->tree;
+
+	if (tally->least[i] > 0 || tally->own[i] > 0)
+		return;
+	if (cell_node_is_leaf(&tree->node[i])) {
+		is_open[tree->order[tree->node[i].begin]] = 1;
+		return;
+	}
+	mark_below(is_open, tally, 2 * i + 1);
+	mark_below(is_open, tally, 2 * i + 2);
+}
+
+/* The cells that the cover's candidates leave open. */
+static int find_open(uint8_t *is_open, const struct dpoint_cover *cover)
+{
+	struct tally tally;
+	int rc = tally_init(&tally, cover);
+
+	memset(is_open, 0, cover->n_cells);
+	for (uint32_t i = 0; i < cover->n_candidates && rc == PSR_OK; i++)
+		tally_add(&tally, i, 1);
+	if (rc == PSR_OK)
+		mark_below(is_open, &tally, 0);
+	tally_fini(&tally);
+	return rc;
+}
+
+static int turn(struct dpoint_surface *surface, struct dpoint_cover *cover, size_t n,
+                const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	const size_t first = surface->n_candidates;
+	int rc;
+
+	surface->n_candidates = n;
+	rc = fit_candidates(surface, cover->tree, first, options, work);
+	return rc == PSR_OK ? cover_candidates(cover, surface, options, work) : rc;
+}
+
+static int two_turns(struct dpoint_surface *surface, struct dpoint_cover *cover, uint32_t sparse,
+                     const struct dpoint_cover_options *options, const struct dpoint_work *work)
+{
+	const size_t n = surface->n_candidates;
+	struct dpoint_candidate *rest = malloc((n + 1) * sizeof *rest);
+	uint8_t *is_first = malloc(n + 1), *is_open = malloc(cover->n_cells + 1);
+	uint64_t seed = 1;
+	size_t end;
+	int rc = rest != NULL && is_first != NULL && is_open != NULL ? PSR_OK : PSR_ERR_MEMORY;
+
+	for (size_t i = 0; i < n && rc == PSR_OK; i++)
+		is_first[i] = random_below(&seed, sparse) == 0;
+	surface->n_candidates = 0;
+	if (rc == PSR_OK)
+		rc = turn(surface, cover, bring_forward(surface, 0, n, is_first, rest), options, work);
+	if (rc == PSR_OK && surface->n_candidates < n)
+		rc = find_open(is_open, cover);
+	if (rc == PSR_OK && surface->n_candidates < n) {
+		for (size_t i = surface->n_candidates; i < n; i++)
+			is_first[i] = is_open[surface->candidate[i].cell];
+		end = bring_forward(surface, surface->n_candidates, n, is_first, rest);
+		rc = turn(surface, cover, end, options, work);
+	}
+	free(rest);
+	free(is_first);
+	free(is_open);
+	return rc;
+}
+
+int dpoint_simplify(struct dpoint_choice *choice, struct dpoint_cover *cover, struct dpoint_surface *surface,
+                    const struct dpoint_cover_options *options, uint32_t sparse, struct psr_pool *pool)
+{
+	const struct dpoint_work work = { pool, NULL };
+	const size_t n = surface->n_candidates;
+	int rc;
+
+	memset(choice, 0, sizeof *choice);
+	surface->n_candidates = 0;
+	rc = dpoint_cover_init(cover, surface, options, pool, NULL);
+	surface->n_candidates = n;
+	if (rc == PSR_OK && cover->tree != NULL)
+		rc = two_turns(surface, cover, sparse, options, &work);
+	if (rc == PSR_OK)
+		rc = dpoint_mend(surface, cover, options, pool, NULL);
+	return rc == PSR_OK ? dpoint_choose(choice, cover) : rc;
+}
