@@ -90,7 +90,8 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 /* Shortens each candidate's delta, along u and along v, until its rectangle is over no cell that S_p does not suit: one
  * of the surface that goes on beside it, where the normal or the height is further off than the options say. So a
  * rectangle ends at a crease, and where curvatures change; its point may move along S_p for that. delta becomes one of
- * dpoint_delta_class(), unless it is as it was. Cells that look the other way, and those of other sheets above or below, shorten nothing. MEMORY, CANCELLED. */
+ * dpoint_delta_class(), unless it is as it was. Cells that look the other way, and those of other sheets above or
+ * below, shorten nothing. MEMORY, CANCELLED. */
 int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, struct psr_pool *pool,
                const struct psr_cancel *cancel);
 

@@ -78,6 +78,9 @@ static const struct study_kind tables[] = {
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
 	  "kB: [K]'s points have 62 bytes, ours 16. Errors, in degrees and in radii of the model, are those of\n"
 	  "each kept point at each place that it covers; holes: what no point covers, kept or not.", NULL },
+	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",
+	  "Rectangles are fitted to 4 degrees and 0.002 radii; pieces: of triangles, no longer than 0.02 radii;\n"
+	  "bad: corners without a curvature, and pieces without a normal. No place is left uncovered.", NULL },
 	{ "octree", "[B] table 1", "octrees, beside blocks of the same models", table_octree, "teapot,kittyhawk,pinetree",
 	  NOTE_OCTREE, NULL },
 };
