@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "base/clock.h"
+#include "dpoint/group.h"
 #include "dpoint/sample.h"
 #include "models/shapes/teapot.h"
 #include "models/studies/tables/tables.h"
@@ -113,6 +114,7 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
+	struct dpoint_groups groups = { 0 };
 	struct dpoint_errors errors;
 	double start = clock_seconds();
 	int rc;
@@ -125,11 +127,16 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 		rc = dpoint_cover_init(&cover, &surface, &options, study->pool, NULL);
 	if (rc == PSR_OK && row->way != FITTED)
 		rc = choose(&choice, row->way, &surface, &cover);
+	if (rc == PSR_OK && row->way == FITTED)
+		rc = dpoint_groups_make(&groups, &surface, &choice, options.sine);
 	if (rc == PSR_OK) {
 		value[SECONDS] = clock_seconds() - start;
 		dpoint_measure(&errors, &surface, &cover, &choice);
 		put(value, row, &surface, &choice, &errors);
 	}
+	if (rc == PSR_OK && row->way == FITTED)
+		value[BYTES] = (double)(groups.n_words * sizeof *groups.word + groups.n_groups * sizeof *groups.group) / 1e3;
+	dpoint_groups_fini(&groups);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
 	dpoint_surface_fini(&surface);

@@ -7,6 +7,7 @@
 #include "base/random.h"
 #include "base/vec.h"
 #include "dpoint/cell_tree.h"
+#include "dpoint/group.h"
 #include "dpoint/sample.h"
 #include "patches.h"
 
@@ -288,6 +289,77 @@ static void threads_choose_the_same(void **state)
 	dpoint_surface_fini(&surface);
 }
 
+static void groups_hold_all_points_and_what_they_draw(void **state)
+{
+	const struct dpoint_cover_options o = options(0.02, 3);
+	struct dpoint_surface surface;
+	struct dpoint_cover cover;
+	struct dpoint_choice choice;
+	struct dpoint_groups groups;
+	struct revolved torus;
+	size_t n = 0;
+	uint64_t seed = 3;
+
+	(void)state;
+	revolve(&torus, 0.6, 0.3, 0, 9);
+	sample(&surface, &torus.patch, 20, 0.2f);
+	assert_int_equal(dpoint_cover_init(&cover, &surface, &o, NULL, NULL), PSR_OK);
+	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
+	assert_int_equal(dpoint_groups_make(&groups, &surface, &choice, o.sine), PSR_OK);
+	assert_int_equal(groups.n_words, choice.n_kept);
+	for (size_t i = 0; i < groups.n_groups; i++) {
+		const struct dpoint_group *g = &groups.group[i];
+		const struct dpoint_limit limit = { o.sine, { g->delta[0], g->delta[1] } };
+
+		assert_int_equal(g->first, n);
+		assert_true(g->n > 0 && g->n <= DPOINT_GROUP);
+		n += g->n;
+		for (uint32_t k = 0; k < g->n; k++) {
+			struct dpoint p;
+			float extent[2], v[3];
+
+			dpoint_unpack(&p, &groups.word[g->first + k], &g->box);
+			dpoint_extent(extent, &p, &limit);
+			v3f_cross(v, p.normal, p.u);
+			for (int place = 0; place < 20; place++) {
+				const float x = extent[0] * (float)random_in(&seed, -1, 1);
+				const float y = extent[1] * (float)random_in(&seed, -1, 1);
+				const float height = dpoint_height_at(p.lambda_u, p.rho, x, y);
+				float at[3], normal[3], local[3];
+
+				dpoint_normal_at(local, p.lambda_u, p.rho, x, y);
+				for (int c = 0; c < 3; c++) {
+					at[c] = p.at[c] + x * p.u[c] + y * v[c] + height * p.normal[c] - g->middle[c];
+					normal[c] = local[0] * p.u[c] + local[1] * v[c] + local[2] * p.normal[c];
+				}
+				assert_true(v3f_length(at) <= g->radius);
+				v3f_normalize(normal, normal);
+				v3f_sub(normal, normal, g->axis);
+				assert_true(v3f_length(normal) <= g->chord);
+			}
+		}
+	}
+	assert_int_equal(n, groups.n_words);
+	/* A group ends where it is full, or where the next point would make its box too wide. */
+	for (size_t i = 0; i + 1 < groups.n_groups; i++) {
+		const struct dpoint_group *g = &groups.group[i];
+		struct dpoint next;
+		float most = 0;
+
+		dpoint_unpack(&next, &groups.word[g[1].first], &g[1].box);
+		for (int k = 0; k < 3; k++) {
+			const float high = g->box.low[k] + DPOINT_PLACE_STEPS * g->box.step[k];
+
+			most = fmaxf(most, fmaxf(high, next.at[k]) - fminf(g->box.low[k], next.at[k]));
+		}
+		assert_true(g->n == DPOINT_GROUP || most > DPOINT_MOST_BOX - 1e-4f);
+	}
+	dpoint_groups_fini(&groups);
+	dpoint_choice_fini(&choice);
+	dpoint_cover_fini(&cover);
+	dpoint_surface_fini(&surface);
+}
+
 static void of_nothing_nothing_is_chosen(void **state)
 {
 	const struct dpoint_cover_options o = options(0.02, 3);
@@ -318,6 +390,7 @@ int main(void)
 		cmocka_unit_test(a_choice_covers_what_can_be_covered_and_has_none_too_much),
 		cmocka_unit_test(no_ray_slips_between_the_chosen_rectangles),
 		cmocka_unit_test(threads_choose_the_same),
+		cmocka_unit_test(groups_hold_all_points_and_what_they_draw),
 		cmocka_unit_test(of_nothing_nothing_is_chosen),
 	};
 
