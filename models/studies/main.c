@@ -76,8 +76,8 @@ static const struct study_kind tables[] = {
 	{ "culling", "table 8.3", "% of blocks culled by cones and masks", table_culling, NULL,
 	  NOTE_HIDDEN ". frustum and after it: the same\nviews zoomed in, a quarter of the picture wide.", NULL },
 	{ "dpoint", "[K] table 1", "differential points: simplification", table_dpoint, "teapot",
-	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and in radii of the model, are those of\n"
-	  "each kept point at each place that it covers; holes: what no point covers, kept or not.", NULL },
+	  "kB: [K]'s points have 62 bytes, ours 16, and fitted ones are in groups. Errors, in degrees and radii\n"
+	  "of the model, are those of each kept point at each place that it covers; holes: what no point covers.", NULL },
 	{ "dpoint-meshes", "[K] 4.1", "differential points of meshes", table_dpoint_meshes, "top,teapot,toybird,gavel",
 	  "Rectangles are fitted to 4 degrees and 0.002 radii; pieces: of triangles, no longer than 0.02 radii;\n"
 	  "bad: corners without a curvature, and pieces without a normal. No place is left uncovered.", NULL },
