@@ -82,6 +82,11 @@ int octree_check(const struct octree *tree, struct psr_error *err);
  * codes' scale. Arrays of as many elements as octree_walk() visits; NULL: not wanted, and else the tree has them. */
 void octree_average(const struct octree *tree, int depth, uint16_t *normal, uint8_t (*color)[3]);
 
+/* Makes the tree whose leaves are the nodes right above those of `finer`, of more than OCTREE_LEAST_LEVELS levels: with
+ * the means of their normals and colours, and, where leaves have normals and offsets, the offsets of their mean places.
+ * NULL without memory. */
+struct octree *octree_coarser(const struct octree *finer);
+
 /* ---- paths ---- */
 
 /* Spreads 21 bits to every third one. */
