@@ -73,19 +73,6 @@ static inline uint32_t count_bits(uint64_t word)
 	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
 }
 
-static uint64_t mask_of(const struct plan_instance *in, uint32_t block)
-{
-	const struct psr_cubes *cubes = in->cull.cubes;
-
-	if (cubes == NULL)
-		return in->cull.blocks->mask[block];
-	const struct psr_cube_level *level = psr_cubes_level(cubes, block);
-	const uint32_t code = psr_cubes_code(cubes, level, block);
-	const unsigned n = (unsigned)__builtin_popcount(level->tree->code[code]);
-	const uint64_t children = psr_cubes_children(level->tree, code);
-	return n < 8 ? children & ((UINT64_C(1) << 8 * n) - 1) : children; /* in other places; their number is the same */
-}
-
 /* A chunk whose blocks are being tested, and where its results go. */
 struct counting {
 	const struct cull *cull;
@@ -147,7 +134,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
-		chunk->n_samples += count_bits(mask_of(in, block));
+		chunk->n_samples += count_bits(cull_lanes(in, block));
 		const float error = place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;

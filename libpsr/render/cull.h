@@ -20,6 +20,20 @@ static inline int cull_is_chosen(const struct bins *bins, const struct plan_inst
 	return bins->group[in->first_group + k->group].level == k->level;
 }
 
+/* As many bits as a block or cube has samples: a block's mask, the codes of a cube's octants. */
+static inline uint64_t cull_lanes(const struct plan_instance *in, uint32_t block)
+{
+	const struct psr_cubes *cubes = in->cull.cubes;
+
+	if (cubes == NULL)
+		return in->cull.blocks->mask[block];
+	const struct psr_cube_level *level = psr_cubes_level(cubes, block);
+	const uint32_t code = psr_cubes_code(cubes, level, block);
+	const unsigned n = (unsigned)__builtin_popcount(level->tree->code[code]);
+	const uint64_t children = psr_cubes_children(level->tree, code);
+	return n < 8 ? children & ((UINT64_C(1) << 8 * n) - 1) : children;
+}
+
 /* A cluster's sphere in camera space. */
 struct cull_sphere {
 	float c[3], r;

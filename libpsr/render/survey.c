@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "cull.h"
+#include "groups.h"
 #include "renderer.h"
 #include "survey.h"
 
@@ -66,10 +67,22 @@ static uint32_t count_bits(uint64_t mask)
 	return (uint32_t)__builtin_popcountll(mask);
 }
 
-static uint64_t samples_of(const struct psr_blocks *b, const struct psr_cluster *k)
+static uint64_t leaves_of(const struct psr_cubes *cubes, const struct psr_cluster *k)
 {
+	const struct psr_cube_level *level = &cubes->level[k->level];
 	const uint32_t end = k->first_block + k->n_blocks;
 
+	return (end < level->first + level->n ? psr_cubes_leaf(cubes, level, end) : level->tree->n_leaves)
+	       - psr_cubes_leaf(cubes, level, k->first_block);
+}
+
+static uint64_t samples_of(const struct plan_instance *in, const struct psr_cluster *k)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t end = k->first_block + k->n_blocks;
+
+	if (in->cull.cubes != NULL)
+		return leaves_of(in->cull.cubes, k);
 	return (end < b->n_blocks ? psr_blocks_attr_first(b, end) : b->n_samples)
 	       - psr_blocks_attr_first(b, k->first_block);
 }
@@ -140,7 +153,6 @@ static double cover(struct surveyor *s)
 static void see_cluster(struct surveyor *s, const struct plan_instance *in, const struct psr_cluster *k,
                         uint32_t stride)
 {
-	const struct psr_blocks *b = in->cull.blocks;
 	struct seen *seen = &s->seen[in->first_group + k->group];
 	const float grow = sqrtf((float)stride);
 	uint64_t n_all = 0, n_left = 0;
@@ -152,7 +164,7 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
 
 		simd_get()->cull(&batch, &in->cull, first, n);
 		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t n_samples = count_bits(b->mask[first + i]);
+			const uint32_t n_samples = count_bits(cull_lanes(in, first + i));
 
 			n_all += n_samples;
 			if (!batch.is_left[i])
@@ -189,7 +201,7 @@ static uint64_t each_drawn(struct surveyor *s, struct survey_counts *counts, uin
 				see_cluster(s, in, k, stride);
 			if (counts == NULL)
 				continue;
-			const double n = (double)samples_of(b, k) * (double)seen->share;
+			const double n = (double)samples_of(in, k) * (double)seen->share;
 
 			counts->n_blocks += k->n_blocks;
 			counts->n_samples += n;
@@ -232,7 +244,7 @@ int survey_scene(struct survey *survey, struct surveyor *surveyor, const struct 
 	fenv_t callers;
 
 	for (uint32_t i = 0; i < scene->n_instances && i <= MOST_INSTANCES; i++)
-		n_clusters += psr_model_blocks(scene->instance[i].model)->n_clusters;
+		n_clusters += instance_groups(&scene->instance[i])->n_clusters;
 	if (scene->n_instances > MOST_INSTANCES || n_clusters > MOST_CLUSTERS)
 		return 0;
 	unlit.n_lights = 0;

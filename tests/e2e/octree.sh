@@ -156,6 +156,15 @@ check "a flat cloud is seen from both sides" python3 - "$(hashes --model square 
 import sys
 assert sys.argv[1] and sys.argv[2]
 END
+for budget in 0.001ms 60000ms 2px; do
+	check "an octree is drawn within a budget of $budget" \
+		shot --model ball --budget $budget --report "$work/budget.json" -o "$work/budget.ppm"
+	check "and its report draws the same bits again" \
+		psr shot --server "$server" --replay "$work/budget.json" -o "$work/again.ppm"
+	check "which they are" cmp "$work/budget.ppm" "$work/again.ppm"
+done
+check "so are an octree and blocks in one scene" \
+	shot --model teapot --instance both,as=octree,at=1,0,0 --budget 60000ms -o "$work/budget.ppm"
 psr list --server "$server" --json >"$work/list.json" 2>/dev/null
 shot --model both --report "$work/report.json" -o "$work/both.png" 2>/dev/null
 is "a report names what the model has" "blocks octree" "$(python3 -c 'import json, sys

@@ -11,6 +11,7 @@
 #include "psr/model.h"
 #include "render/render.h"
 #include "render/survey.h"
+#include "tests/unit/lib/trees.h"
 
 #define WIDTH 320
 #define HEIGHT 240
@@ -19,13 +20,18 @@
 static const double densities[] = { 0.25, 0.5, 1, 2, 4 };
 #define N (int)(sizeof densities / sizeof *densities)
 
-static struct psr_model *teapot;
+static struct psr_model *teapot, *closed, *cloud; /* the latter two octrees alone */
 static struct psr_renderer *renderer;
 static struct surveyor *surveyor;
 
 static int set_up(void **state)
 {
+	static const struct tree_options solid = { .levels = 7, .radius = 0.9, .is_one_sided = 1, .with_offsets = 1, .keep = 1 };
+	static const struct tree_options sparse = { .levels = 7, .radius = 0.7, .keep = 0.7 };
+
 	(void)state;
+	closed = tree_build(&solid);
+	cloud = tree_build(&sparse);
 	surveyor = surveyor_create();
 	return surveyor == NULL || psr_renderer_create(&renderer, NULL)
 	       || psr_model_read(&teapot, "tests/golden/teapot.psr", NULL);
@@ -37,13 +43,15 @@ static int tear_down(void **state)
 	surveyor_destroy(surveyor);
 	psr_renderer_destroy(renderer);
 	psr_model_unref(teapot);
+	psr_model_unref(closed);
+	psr_model_unref(cloud);
 	return 0;
 }
 
 /* From outside, some of them so near that the picture cuts much of the model off. */
 static void look(struct psr_scene *scene, const struct psr_instance *instance, uint64_t *random)
 {
-	const struct psr_model_info *info = psr_model_info(teapot);
+	const struct psr_model_info *info = psr_model_info(instance->model);
 	const double away = info->scale * random_in(random, 1.2, 6);
 	double toward[3];
 
@@ -74,12 +82,11 @@ static void draw(struct psr_report *report, const struct psr_scene *scene, doubl
 /* All blocks of a small model are tested. Without masks, which a survey does not ask, it counts at density 1 what the
  * frame does, and the share in view of other levels is nearly that of this one: their blocks are as large as two or
  * four, and reach as far out of the picture, where the model has some ten blocks across. */
-static void samples_are_those_of_the_frame(void **state)
+static void check_samples(const struct psr_model *model)
 {
-	const struct psr_instance instance = { .model = teapot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	const struct psr_instance instance = { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	uint64_t random = 3;
 
-	(void)state;
 	for (int v = 0; v < N_VIEWS; v++) {
 		struct survey survey;
 		struct psr_scene scene;
@@ -100,13 +107,25 @@ static void samples_are_those_of_the_frame(void **state)
 	}
 }
 
-/* Squares stand for what blocks cover, slanted alike, and cells of a grid for these: half as much, or twice. */
-static void the_area_is_about_that_of_the_frame(void **state)
+static void samples_are_those_of_the_frame(void **state)
 {
-	const struct psr_instance instance = { .model = teapot, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	(void)state;
+	check_samples(teapot);
+}
+
+static void samples_of_octrees_are_those_of_the_frame(void **state)
+{
+	(void)state;
+	check_samples(closed);
+	check_samples(cloud);
+}
+
+/* Squares stand for what blocks cover, slanted alike, and cells of a grid for these: half as much, or twice. */
+static void check_area(const struct psr_model *model)
+{
+	const struct psr_instance instance = { .model = model, .rotation = { 0, 0, 0, 1 }, .scale = 1 };
 	uint64_t random = 4;
 
-	(void)state;
 	for (int v = 0; v < N_VIEWS; v++) {
 		struct survey survey;
 		struct psr_scene scene;
@@ -119,6 +138,19 @@ static void the_area_is_about_that_of_the_frame(void **state)
 		if (!(survey.area > covered / 2 && survey.area < 2 * covered))
 			fail_msg("view %d: %g pixels, and the frame covers %g", v, survey.area, covered);
 	}
+}
+
+static void the_area_is_about_that_of_the_frame(void **state)
+{
+	(void)state;
+	check_area(teapot);
+}
+
+static void the_area_of_octrees_is_about_that_of_the_frame(void **state)
+{
+	(void)state;
+	check_area(closed);
+	check_area(cloud);
 }
 
 static void nothing_in_view_is_nothing(void **state)
@@ -161,7 +193,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(samples_are_those_of_the_frame),
+		cmocka_unit_test(samples_of_octrees_are_those_of_the_frame),
 		cmocka_unit_test(the_area_is_about_that_of_the_frame),
+		cmocka_unit_test(the_area_of_octrees_is_about_that_of_the_frame),
 		cmocka_unit_test(nothing_in_view_is_nothing),
 		cmocka_unit_test(large_scenes_are_left_alone),
 	};
