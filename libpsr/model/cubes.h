@@ -16,6 +16,7 @@
  */
 #define CUBES_SPACING 1.4142135623730951
 #define CUBES_PLACE_BITS 18 /* of a coordinate, in edges of a cube */
+#define CUBES_GRAY UINT64_C(0xcbcbcb) /* of leaves without colour, as of all such surfaces: 0.6 in linear light */
 
 struct psr_cube_run {
 	uint32_t code, leaf;
@@ -117,7 +118,7 @@ static inline uint64_t psr_cubes_attr(const struct octree *tree, uint32_t leaf)
 	const uint8_t *color = tree->color != NULL ? tree->color[leaf] : NULL;
 
 	attr |= color != NULL ? (uint64_t)color[0] << 16 | (uint64_t)color[1] << 24 | (uint64_t)color[2] << 32
-	                      : UINT64_C(0xffffff) << 16;
+	                      : CUBES_GRAY << 16;
 	return attr;
 }
 

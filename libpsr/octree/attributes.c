@@ -164,7 +164,7 @@ static void code_normal(struct job *job, uint32_t leaf, uint64_t path)
 		for (int c = 0; c < 3; c++)
 			sum[c] += (int64_t)job->near[i].weight * v[c];
 	}
-	/* All leaves of a cell of a cloud have one normal. */
+	/* Leaves of a flat face have one normal. */
 	p = &job->odds->same[parting < 7 ? parting : 7][job->was_same][is_agreed];
 	if (!job->is_decoding) {
 		job->was_same = (int)coder_adaptive(job->coder, 0, p, 5, normal[leaf] == before);

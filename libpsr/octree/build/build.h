@@ -47,8 +47,8 @@ int octree_build_levels(int *levels, const struct octree_build_options *options,
                         struct psr_error *err);
 
 /* Builds a tree with normals, offsets, and colours if the source has any. Colours and places of a leaf's points are
- * averaged, and so are normals of the source. Leaves whose points have none get least squares over 27 cells around, of
- * some six leaves each; neighbours agree about their sides, and the highest place of what hangs together looks up.
+ * averaged, and so are normals of the source. Leaves whose points have none blend those of the cells around them: least
+ * squares over 27 cells of some ten leaves, whose sides agree; the highest place of what hangs together looks up.
  *
  * FORMAT: no points, a place that is not finite, all points at one place; ARG: options out of range, a spacing finer
  * than OCTREE_MOST_LEVELS levels; IO: the disk is full; MEMORY, CANCELLED; and errors of the source. Runs have no

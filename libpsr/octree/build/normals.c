@@ -6,8 +6,13 @@
 #include "base/axes.h"
 #include "base/direction.h"
 
-#define CELL_LEAVES 6 /* in the mean, at least */
+#define CELL_LEAVES 3 /* in the mean, at least; on surfaces up to four times as many */
 #define STEPS 8
+
+/* Where a cell's codes and leaves begin. */
+struct cell {
+	uint64_t code, leaf;
+};
 
 /* Places of a cell's leaves, in its edges from its middle. */
 struct moments {
@@ -20,7 +25,7 @@ struct normals {
 	struct octree_levels levels;  /* of the tree down to the cells' depth */
 	int depth;                    /* of the cells */
 	uint32_t n_cells, cell;       /* cell: the one that leaves belong to now */
-	uint64_t *first;              /* of each cell: its first leaf; one more than cells */
+	struct cell *first;           /* of each cell; one more than cells */
 	struct moments *moments;
 	float (*normal)[3];
 	uint32_t *root;               /* a forest of cells whose sides agree: the one above, twice, and 1 if it is turned */
@@ -41,37 +46,45 @@ static void add_place(struct moments *m, const float p[3])
 	}
 }
 
-static int add_leaf(const struct octree_node *node, void *userdata)
+/* Computes the place of a leaf's points in its cell, in the cell's edges from its middle. */
+static void find_place(float p[3], const struct normals *s, uint64_t path, uint64_t leaf)
 {
-	struct normals *s = userdata;
 	const int up = s->built->tree->levels - s->depth;
 	const float edge = 1.0f / (float)(1u << up);
 	uint32_t at[3];
+
+	octree_place(path & (((uint64_t)1 << 3 * up) - 1), at);
+	for (int c = 0; c < 3; c++)
+		p[c] = ((float)at[c] + ((float)s->built->part[leaf][c] + 0.5f) / 256.0f) * edge - 0.5f;
+}
+
+static int add_leaf(const struct octree_node *node, void *userdata)
+{
+	struct normals *s = userdata;
 	float p[3];
 
-	while (node->leaf >= s->first[s->cell + 1])
+	while (node->leaf >= s->first[s->cell + 1].leaf)
 		s->cell++;
-	octree_place(node->path & (((uint64_t)1 << 3 * up) - 1), at);
-	for (int c = 0; c < 3; c++)
-		p[c] = ((float)at[c] + ((float)s->built->part[node->leaf][c] + 0.5f) / 256.0f) * edge - 0.5f;
+	find_place(p, s, node->path, node->leaf);
 	add_place(&s->moments[s->cell], p);
 	return 0;
 }
 
-/* Adds moments of a cell that is `step` cells away. */
+/* Adds moments of a cell that is `step` cells away, by half for each axis along which it is. */
 static void add_moments(double sum[10], const struct moments *m, const int step[3])
 {
+	const double weight = ldexp(1.0, -abs(step[0]) - abs(step[1]) - abs(step[2]));
 	double moved[3];
 
-	sum[0] += (double)m->n;
+	sum[0] += weight * (double)m->n;
 	for (int c = 0; c < 3; c++) {
 		moved[c] = (double)m->sum[c] + (double)m->n * step[c];
-		sum[1 + c] += moved[c];
+		sum[1 + c] += weight * moved[c];
 	}
 	/* (p + a)(q + b) = pq + a q + b p + ab */
 	for (int c = 0, k = 0; c < 3; c++)
 		for (int d = c; d < 3; d++, k++)
-			sum[4 + k] += (double)m->product[k] + step[c] * (double)m->sum[d] + step[d] * moved[c];
+			sum[4 + k] += weight * ((double)m->product[k] + step[c] * (double)m->sum[d] + step[d] * moved[c]);
 }
 
 /* The direction in which a cell's surroundings extend least. */
@@ -185,21 +198,82 @@ static uint8_t offset_of(const struct built *built, uint64_t leaf, const float n
 	return (uint8_t)octree_offset_step(offset);
 }
 
-static int set_leaf(const struct octree_node *node, void *userdata)
+/* A cell whose leaves get normals; the next code and leaf. */
+struct setting {
+	struct normals *normals;
+	const struct octree_near *near;
+	struct cell next;
+};
+
+/* Blends the normals of the eight cells whose middles are around a place of the first one. One that faces away, as the
+ * other side of a wall does, has no part in it, and one beyond an edge less. */
+static void blend(float normal[3], const struct setting *set, const float place[3])
+{
+	static const int step[3] = { 1, 3, 9 };
+	const struct normals *s = set->normals;
+	const float *own = s->normal[set->near->at[OCTREE_SELF]];
+
+	for (int c = 0; c < 3; c++)
+		normal[c] = 0.0f;
+	for (int k = 0; k < 8; k++) {
+		int near = OCTREE_SELF;
+		float weight = 1.0f, agreement = 0.0f;
+
+		for (int c = 0; c < 3; c++) {
+			const float away = fabsf(place[c]);
+
+			near += !(k >> c & 1) ? 0 : place[c] < 0.0f ? -step[c] : step[c];
+			weight *= k >> c & 1 ? away : 1.0f - away;
+		}
+		if (set->near->at[near] == OCTREE_NONE)
+			continue;
+		const float *other = s->normal[set->near->at[near]];
+
+		for (int c = 0; c < 3; c++)
+			agreement += own[c] * other[c];
+		for (int c = 0; c < 3 && agreement > 0.0f; c++)
+			normal[c] += weight * agreement * other[c];
+	}
+}
+
+static void set_leaf(const struct setting *set, uint64_t path)
+{
+	const struct normals *s = set->normals;
+	struct octree *tree = s->built->tree;
+	const uint64_t leaf = set->next.leaf;
+	float blended[3], place[3];
+	const float *normal = blended;
+
+	if (s->has_own && tree->normal[leaf] != RECORD_NO_NORMAL) {
+		normal = psr_direction_table()[tree->normal[leaf]];
+	} else {
+		find_place(place, s, path, leaf);
+		blend(blended, set, place);
+		tree->normal[leaf] = psr_direction_encode(blended);
+		normal = psr_direction_table()[tree->normal[leaf]];
+	}
+	tree->offset[leaf] = offset_of(s->built, leaf, normal);
+}
+
+static void set_leaves(struct setting *set, uint64_t path, int depth)
+{
+	const struct octree *tree = set->normals->built->tree;
+
+	if (depth == tree->levels) {
+		set_leaf(set, path);
+		set->next.leaf++;
+		return;
+	}
+	for (unsigned left = tree->code[set->next.code++]; left != 0; left &= left - 1)
+		set_leaves(set, path << 3 | (unsigned)__builtin_ctz(left), depth + 1);
+}
+
+static void set_cell(uint32_t cell, uint64_t path, const struct octree_near *near, void *userdata)
 {
 	struct normals *s = userdata;
-	struct octree *tree = s->built->tree;
-	const float *normal;
+	struct setting set = { s, near, s->first[cell] };
 
-	while (node->leaf >= s->first[s->cell + 1])
-		s->cell++;
-	normal = s->normal[s->cell];
-	if (s->has_own && tree->normal[node->leaf] != RECORD_NO_NORMAL)
-		normal = psr_direction_table()[tree->normal[node->leaf]];
-	else
-		tree->normal[node->leaf] = psr_direction_encode(normal);
-	tree->offset[node->leaf] = offset_of(s->built, node->leaf, normal);
-	return 0;
+	set_leaves(&set, path, s->depth);
 }
 
 /* All leaves have normals of the source's. */
@@ -240,7 +314,7 @@ static int note_first(const struct octree_node *node, void *userdata)
 {
 	struct normals *s = userdata;
 
-	s->first[s->cell++] = node->leaf;
+	s->first[s->cell++] = (struct cell){ node->code, node->leaf };
 	return 0;
 }
 
@@ -299,15 +373,14 @@ int built_normals(const struct built *built, const struct octree_build_options *
 	rc = allocate(&s);
 	if (rc == PSR_OK) {
 		octree_walk(tree, s.depth, note_first, &s);
-		s.first[s.n_cells] = tree->n_leaves;
+		s.first[s.n_cells].leaf = tree->n_leaves;
 		s.cell = 0;
 		octree_walk(tree, tree->levels, add_leaf, &s);
 		built_progress(options, "normals", 1, 3 + STEPS);
 		octree_levels_walk(&s.levels, s.depth, find_normal, &s);
 		built_progress(options, "normals", 2, 3 + STEPS);
 		orient(&s);
-		s.cell = 0;
-		octree_walk(tree, tree->levels, set_leaf, &s);
+		octree_levels_walk(&s.levels, s.depth, set_cell, &s);
 		built_progress(options, "normals", 3 + STEPS, 3 + STEPS);
 		rc = s.is_cancelled ? PSR_ERR_CANCELLED : PSR_OK;
 	}

@@ -123,10 +123,10 @@ static int look(const struct octree_node *node, void *userdata)
 	return 0;
 }
 
-/* Bounds. A leaf shares the normal of a cell of some three leaves, so its middle is up to 2.6 leaves from the
- * cell's, and 0.9 from the sphere: 3.1 degrees of a radius of 64 leaves. The plane of 27 cells is of 162 leaves, each off by one at
- * most, within 4 leaves of it: that tilts it by less than 12 degrees. Half a step of an offset is 0.22 leaves, and a
- * mean of points is up to 0.87 leaves beside the middle, where the sphere rises by the sine of these 15 degrees. */
+/* Bounds. The planes whose normals a leaf blends are of 27 cells of some four leaves, each off by one at most, within 4
+ * leaves of a plane: that tilts it by less than 12 degrees. Its middle is up to 0.87 leaves from its points, 0.8
+ * degrees of a radius of 64 leaves; the code adds 1.27. Half a step of an offset is 0.22 leaves, and a mean of points
+ * is up to 0.87 leaves beside the middle, where the sphere rises by the sine of these 15 degrees. */
 static void every_point_is_within_its_leaf_and_normals_look_out(void **state)
 {
 	struct octree *tree = sphere(POINTS, LEVELS, OCTREE_LEAST_MEMORY);
@@ -151,6 +151,22 @@ static void every_point_is_within_its_leaf_and_normals_look_out(void **state)
 	              s.worst_place);
 	assert_true(s.worst_cosine > cos(15.0 * PI / 180.0));
 	assert_true(s.worst_place < 0.22 + 0.87 * sin(15.0 * PI / 180.0));
+	free(s.is_there);
+	octree_destroy(tree);
+}
+
+/* Cells of this sparse sphere are 16 leaves wide: a normal for all of a cell would be 12.4 degrees off at its corners.
+ * Blended ones are off by what the planes are. */
+static void normals_turn_from_cell_to_cell(void **state)
+{
+	struct octree *tree = sphere(2000, LEVELS, OCTREE_LEAST_MEMORY);
+	struct sphere_leaves s = { tree, calloc(1u << 3 * LEVELS, 1), 1.0, 0.0 };
+
+	(void)state;
+	assert_non_null(s.is_there);
+	octree_walk(tree, LEVELS, look, &s);
+	print_message("worst normal %.1f degrees\n", acos(s.worst_cosine) * 180.0 / PI);
+	assert_true(s.worst_cosine > cos(6.0 * PI / 180.0));
 	free(s.is_there);
 	octree_destroy(tree);
 }
@@ -365,6 +381,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(every_point_is_within_its_leaf_and_normals_look_out),
+		cmocka_unit_test(normals_turn_from_cell_to_cell),
 		cmocka_unit_test(normals_of_the_source_are_averaged),
 		cmocka_unit_test(leaves_without_normals_get_theirs_from_their_neighbours),
 		cmocka_unit_test(runs_on_disk_give_the_tree_of_memory),
