@@ -82,6 +82,15 @@ struct dpoint_limit {
 	float sine, delta[2];
 };
 
+/* Deltas of a group are among these: 2^(-class / 4). */
+#define DPOINT_DELTA_CLASSES 64
+static inline float dpoint_delta_of_class(unsigned class)
+{
+	static const float quarter[4] = { 1.0f, 0.84089641525f, 0.70710678119f, 0.59460355750f };
+
+	return quarter[class % 4] * psr_float_from_bits((127 - class / 4) << 23);
+}
+
 /* epsilon: 0..1 */
 static inline float dpoint_sine(double epsilon)
 {

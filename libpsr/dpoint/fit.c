@@ -30,18 +30,11 @@ struct fitting {
 	int is_failed;
 };
 
-float dpoint_delta_of_class(unsigned class)
-{
-	static const float quarter[4] = { 1.0f, 0.84089641525f, 0.70710678119f, 0.59460355750f };
-
-	return ldexpf(quarter[class % 4], -(int)(class / 4));
-}
-
 unsigned dpoint_delta_class(float delta)
 {
 	unsigned class = 0;
 
-	while (class < 63 && dpoint_delta_of_class(class) > delta)
+	while (class + 1 < DPOINT_DELTA_CLASSES && dpoint_delta_of_class(class) > delta)
 		class++;
 	return class;
 }

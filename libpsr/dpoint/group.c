@@ -5,19 +5,17 @@
 #include <string.h>
 #include "base/vec.h"
 
-/* Deltas first, then the place. */
+/* Sides and deltas first, then the place. */
 struct key {
-	float delta[2];
-	uint32_t morton, candidate;
+	uint32_t kind, morton, candidate;
 };
 
 static int compare(const void *a, const void *b)
 {
 	const struct key *x = a, *y = b;
 
-	for (int k = 0; k < 2; k++)
-		if (x->delta[k] != y->delta[k])
-			return x->delta[k] < y->delta[k] ? -1 : 1;
+	if (x->kind != y->kind)
+		return x->kind < y->kind ? -1 : 1;
 	if (x->morton != y->morton)
 		return x->morton < y->morton ? -1 : 1;
 	return x->candidate < y->candidate ? -1 : x->candidate > y->candidate;
@@ -46,7 +44,7 @@ static uint32_t cut(float low[3], float high[3], const struct key *key, size_t n
 		const float *at = surface->candidate[key[count].candidate].point.at;
 		float lower[3], higher[3], most = 0;
 
-		if (key[count].delta[0] != key->delta[0] || key[count].delta[1] != key->delta[1])
+		if (key[count].kind != key->kind)
 			break;
 		for (int k = 0; k < 3; k++) {
 			lower[k] = count > 0 ? fminf(low[k], at[k]) : at[k];
@@ -61,102 +59,181 @@ static uint32_t cut(float low[3], float high[3], const struct key *key, size_t n
 	return count;
 }
 
-/* A corner of a point's rectangle, its normal by (6), and the most that S_p is above it. */
-struct corner {
-	float at[3], normal[3], height;
+static uint32_t kind_of(const struct dpoint_candidate *c, const struct dpoint_grouping *grouping)
+{
+	const uint8_t *two_sided = grouping->is_two_sided;
+
+	return (uint32_t)(two_sided != NULL && two_sided[c->part]) << 16 | dpoint_delta_class(c->delta[0]) << 8 |
+	       dpoint_delta_class(c->delta[1]);
+}
+
+/* Groups before they are in their order: the first key of each. */
+struct cut_group {
+	struct dpoint_group group;
+	struct key key; /* kind 0, of its middle; candidate: the first of its keys */
 };
 
-static void corner_of(struct corner *c, const struct dpoint *p, const float extent[2], int which)
+static int compare_groups(const void *a, const void *b)
 {
-	const float u = which & 1 ? extent[0] : -extent[0], v = which & 2 ? extent[1] : -extent[1];
-	float across[3], n[3];
-
-	v3f_cross(across, p->normal, p->u);
-	dpoint_normal_at(n, p->lambda_u, p->rho, u, v);
-	for (int k = 0; k < 3; k++) {
-		c->at[k] = p->at[k] + u * p->u[k] + v * across[k];
-		c->normal[k] = n[0] * p->u[k] + n[1] * across[k] + n[2] * p->normal[k];
-	}
-	v3f_normalize(c->normal, c->normal);
-	c->height = sqrtf(u * u + v * v);
+	return compare(&((const struct cut_group *)a)->key, &((const struct cut_group *)b)->key);
 }
 
-/* The sphere is about the box's middle. S_p is no higher above a rectangle than its corner is from the point, and its
- * normals turn least in the middle: corners have the extremes of both components. */
-static void bound(struct dpoint_group *g, const struct dpoint_groups *groups, float sine)
+static size_t cut_all(struct cut_group *to, const struct key *key, size_t n, const struct dpoint_surface *surface)
 {
-	const struct dpoint_limit limit = { sine, { g->delta[0], g->delta[1] } };
+	size_t n_groups = 0;
 
-	v3f_set(g->axis, 0, 0, 0);
-	for (int k = 0; k < 3; k++)
-		g->middle[k] = g->box.low[k] + 0.5f * DPOINT_PLACE_STEPS * g->box.step[k];
-	for (int pass = 0; pass < 2; pass++) {
-		for (uint32_t i = 0; i < g->n; i++) {
-			struct dpoint p;
-			float extent[2];
+	for (size_t i = 0; i < n; i += to[n_groups - 1].group.n) {
+		struct cut_group *cut_group = &to[n_groups++];
+		struct dpoint_group *g = &cut_group->group;
+		float low[3], high[3], middle[3];
 
-			dpoint_unpack(&p, &groups->word[g->first + i], &g->box);
-			dpoint_extent(extent, &p, &limit);
-			if (pass == 0)
-				v3f_add(g->axis, g->axis, p.normal);
-			for (int which = 0; which < 4 && pass == 1; which++) {
-				struct corner c;
-				float away[3];
-
-				corner_of(&c, &p, extent, which);
-				v3f_sub(away, c.at, g->middle);
-				g->radius = fmaxf(g->radius, v3f_length(away) + c.height);
-				v3f_sub(away, c.normal, g->axis);
-				g->chord = fmaxf(g->chord, v3f_length(away));
-			}
-		}
-		if (pass == 0)
-			v3f_normalize(g->axis, g->axis);
+		memset(cut_group, 0, sizeof *cut_group);
+		g->n = (uint8_t)cut(low, high, &key[i], n - i, surface);
+		g->delta[0] = (uint8_t)(key[i].kind >> 8);
+		g->delta[1] = (uint8_t)key[i].kind;
+		g->flags = key[i].kind >> 16 ? DPOINT_TWO_SIDED : 0;
+		dpoint_box_make(&g->box, low, high);
+		for (int k = 0; k < 3; k++)
+			middle[k] = 0.5f * (low[k] + high[k]);
+		cut_group->key = (struct key){ 0, morton_of(middle), (uint32_t)i };
 	}
-	g->radius *= 1.00001f;
-	g->chord = fminf(g->chord * 1.00001f + 1e-6f, 2);
+	qsort(to, n_groups, sizeof *to, compare_groups);
+	return n_groups;
 }
 
-int dpoint_groups_make(struct dpoint_groups *groups, const struct dpoint_surface *surface,
-                       const struct dpoint_choice *choice, float sine)
+int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping)
 {
-	struct key *key = malloc((choice->n_kept + 1) * sizeof *key);
+	const struct dpoint_surface *surface = grouping->surface;
+	const size_t room = grouping->choice->n_kept + 1;
+	struct key *key = malloc(room * sizeof *key);
+	struct cut_group *cut_group = malloc(room * sizeof *cut_group);
+	struct dpoint_group *group = malloc(room * sizeof *group);
+	struct dpoint_word *word = malloc(room * sizeof *word);
 	size_t n = 0;
 
-	memset(groups, 0, sizeof *groups);
-	groups->word = malloc((choice->n_kept + 1) * sizeof *groups->word);
-	groups->group = calloc(choice->n_kept + 1, sizeof *groups->group);
-	if (key == NULL || groups->word == NULL || groups->group == NULL) {
+	*set = (struct dpoint_set){ .sine = grouping->sine, .group = group, .word = word };
+	if (key == NULL || cut_group == NULL || group == NULL || word == NULL || room > UINT32_MAX) {
 		free(key);
-		return PSR_ERR_MEMORY;
+		free(cut_group);
+		return room > UINT32_MAX ? PSR_ERR_LIMIT : PSR_ERR_MEMORY;
 	}
 	for (uint32_t i = 0; i < surface->n_candidates; i++) {
 		const struct dpoint_candidate *c = &surface->candidate[i];
 
-		if (choice->is_kept[i])
-			key[n++] = (struct key){ { c->delta[0], c->delta[1] }, morton_of(c->point.at), i };
+		if (grouping->choice->is_kept[i])
+			key[n++] = (struct key){ kind_of(c, grouping), morton_of(c->point.at), i };
 	}
 	qsort(key, n, sizeof *key, compare);
-	for (size_t i = 0; i < n; i += groups->group[groups->n_groups - 1].n) {
-		struct dpoint_group *g = &groups->group[groups->n_groups++];
-		float low[3], high[3];
+	set->n_groups = (uint32_t)cut_all(cut_group, key, n, surface);
+	for (uint32_t i = 0; i < set->n_groups; i++) {
+		const struct key *first = &key[cut_group[i].key.candidate];
 
-		g->first = (uint32_t)i;
-		g->n = cut(low, high, &key[i], n - i, surface);
-		memcpy(g->delta, key[i].delta, sizeof g->delta);
-		dpoint_box_make(&g->box, low, high);
-		for (uint32_t k = 0; k < g->n; k++)
-			dpoint_pack(&groups->word[i + k], &surface->candidate[key[i + k].candidate].point, &g->box);
-		bound(g, groups, sine);
+		group[i] = cut_group[i].group;
+		group[i].first = set->n_points;
+		for (uint32_t k = 0; k < group[i].n; k++)
+			dpoint_pack(&word[set->n_points++], &surface->candidate[first[k].candidate].point, &group[i].box);
 	}
-	groups->n_words = n;
 	free(key);
+	free(cut_group);
 	return PSR_OK;
 }
 
-void dpoint_groups_fini(struct dpoint_groups *groups)
+void dpoint_set_fini(struct dpoint_set *set)
 {
-	free(groups->group);
-	free(groups->word);
-	memset(groups, 0, sizeof *groups);
+	free((void *)(uintptr_t)set->group);
+	free((void *)(uintptr_t)set->word);
+	memset(set, 0, sizeof *set);
+}
+
+/* ---- bounds ---- */
+
+/* A corner of a point's rectangle: its place, how far the quadric is from it at most, and both normals there. Along
+ * each side normals' components grow with the distance from the middle, so that corners have the extremes. */
+struct corner {
+	float at[3], height, normal[2][3];
+};
+
+static void turn(float out[3], const struct dpoint *p, const float across[3], const float local[3])
+{
+	for (int k = 0; k < 3; k++)
+		out[k] = local[0] * p->u[k] + local[1] * across[k] + local[2] * p->normal[k];
+	v3f_normalize(out, out);
+}
+
+static void corner_of(struct corner *c, const struct dpoint *p, const float extent[2], int which)
+{
+	const float u = which & 1 ? extent[0] : -extent[0], v = which & 2 ? extent[1] : -extent[1];
+	float across[3], local[3];
+
+	v3f_cross(across, p->normal, p->u);
+	dpoint_normal_at(local, p->lambda_u, p->rho, u, v);
+	turn(c->normal[0], p, across, local);
+	v3f_set(local, -p->lambda_u * u, -p->lambda_u * p->rho * v, 1);
+	turn(c->normal[1], p, across, local);
+	for (int k = 0; k < 3; k++)
+		c->at[k] = p->at[k] + u * p->u[k] + v * across[k];
+	c->height = 0.5f * fabsf(p->lambda_u) * (u * u + fabsf(p->rho) * (v * v));
+}
+
+static void point_of(struct dpoint *p, float extent[2], const struct dpoint_set *set, const struct dpoint_group *g,
+                     uint32_t k)
+{
+	const struct dpoint_limit limit = dpoint_group_limit(set, g);
+
+	dpoint_unpack(p, &set->word[g->first + k], &g->box);
+	dpoint_extent(extent, p, &limit);
+}
+
+void dpoint_group_sphere(struct dpoint_sphere *sphere, const struct dpoint_set *set, uint32_t group)
+{
+	const struct dpoint_group *g = &set->group[group];
+
+	for (int k = 0; k < 3; k++)
+		sphere->middle[k] = g->box.low[k] + 0.5f * DPOINT_PLACE_STEPS * g->box.step[k];
+	sphere->radius = 0;
+	for (uint32_t i = 0; i < g->n; i++) {
+		struct dpoint p;
+		struct corner c;
+		float extent[2], away[3];
+
+		point_of(&p, extent, set, g, i);
+		for (int which = 0; which < 4; which++) {
+			corner_of(&c, &p, extent, which);
+			v3f_sub(away, c.at, sphere->middle);
+			sphere->radius = fmaxf(sphere->radius, v3f_length(away) + c.height);
+		}
+	}
+	sphere->radius *= 1.00001f;
+}
+
+float dpoint_group_cosine(float mean[3], const float axis[3], const struct dpoint_set *set, uint32_t group)
+{
+	const struct dpoint_group *g = &set->group[group];
+	float least = 1;
+
+	if (axis == NULL) {
+		v3f_set(mean, 0, 0, 0);
+		for (uint32_t i = 0; i < g->n; i++) {
+			struct dpoint p;
+			float extent[2];
+
+			point_of(&p, extent, set, g, i);
+			v3f_add(mean, mean, p.normal);
+		}
+		v3f_normalize(mean, mean);
+		axis = mean;
+	}
+	for (uint32_t i = 0; i < g->n; i++) {
+		struct dpoint p;
+		float extent[2];
+
+		point_of(&p, extent, set, g, i);
+		for (int which = 0; which < 4; which++) {
+			struct corner c;
+
+			corner_of(&c, &p, extent, which);
+			least = fminf(least, fminf(v3f_dot(c.normal[0], axis), v3f_dot(c.normal[1], axis)));
+		}
+	}
+	return least - 1e-6f;
 }

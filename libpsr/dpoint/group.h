@@ -1,4 +1,5 @@
-/* A model in memory: points in groups of up to 64, each with a box that its words count in, and one delta a side. */
+/* Points in groups of up to 64, as a file has them: each group has a box that its words count in, and one delta a
+ * side. */
 #ifndef PSR_DPOINT_GROUP_H
 #define PSR_DPOINT_GROUP_H
 
@@ -7,24 +8,63 @@
 #define DPOINT_GROUP 64
 #define DPOINT_MOST_BOX 0.6f /* of a side: half a step is below 2e-5, the slack of coverage */
 
+enum dpoint_group_flag {
+	DPOINT_TWO_SIDED = 1, /* seen from the back it is shaded with its normals turned; else it is not seen */
+};
+
 struct dpoint_group {
 	struct dpoint_box box;
-	float delta[2];
-	float middle[3], radius;  /* of a sphere that holds all rectangles, and S_p above them */
-	float axis[3], chord;     /* all normals by (6), of unit length, are within this distance of the axis */
-	uint32_t first, n;        /* words; 1..DPOINT_GROUP */
+	uint32_t first;      /* word */
+	uint8_t n;           /* words, 1..DPOINT_GROUP */
+	uint8_t delta[2];    /* classes, 0 to DPOINT_DELTA_CLASSES - 1 */
+	uint8_t flags;
+};
+_Static_assert(sizeof(struct dpoint_group) == 32, "groups are used as they are in files");
+
+/* What a model has: read only. Words of groups follow each other, in their order. */
+struct dpoint_set {
+	uint32_t n_groups, n_points;
+	float sine;          /* of epsilon: dpoint_sine() */
+	float height;        /* how far what is drawn is from the surface, at most; inner units */
+	const struct dpoint_group *group;
+	const struct dpoint_word *word;
 };
 
-struct dpoint_groups {
-	struct dpoint_group *group;
-	struct dpoint_word *word;
-	size_t n_groups, n_words;
+static inline struct dpoint_limit dpoint_group_limit(const struct dpoint_set *set, const struct dpoint_group *group)
+{
+	return (struct dpoint_limit){ set->sine,
+		                          { dpoint_delta_of_class(group->delta[0]), dpoint_delta_of_class(group->delta[1]) } };
+}
+
+/* The quadric that is drawn for a point: its height over the tangent plane at u, v. It is S_p's up to the fourth
+ * order. */
+static inline float dpoint_quadric_at(float lambda_u, float rho, float u, float v)
+{
+	return 0.5f * lambda_u * (u * u + rho * (v * v));
+}
+
+/* Bounds of a group: a sphere that holds its points' quadrics over their rectangles. */
+struct dpoint_sphere {
+	float middle[3], radius;
+};
+void dpoint_group_sphere(struct dpoint_sphere *sphere, const struct dpoint_set *set, uint32_t group);
+
+/* Returns the least cosine between an axis and the normals of a group's points, those by [K] (6) and those of the
+ * quadrics alike. axis NULL: fills `mean`, of unit length, or 0,0,0, and returns the cosine to that. */
+float dpoint_group_cosine(float mean[3], const float axis[3], const struct dpoint_set *set, uint32_t group);
+
+/* Points to be grouped. */
+struct dpoint_grouping {
+	const struct dpoint_surface *surface;
+	const struct dpoint_choice *choice;
+	float sine;
+	const uint8_t *is_two_sided; /* by part; NULL: none is */
 };
 
-/* Makes groups of the kept candidates, by their deltas, then along a Morton curve. sine: of epsilon. MEMORY;
- * dpoint_groups_fini() even then. */
-int dpoint_groups_make(struct dpoint_groups *groups, const struct dpoint_surface *surface,
-                       const struct dpoint_choice *choice, float sine);
-void dpoint_groups_fini(struct dpoint_groups *groups);
+/* Makes groups of the kept candidates: those of one part's sides and deltas along a Morton curve, and groups along
+ * another one. A delta that is no class becomes the next smaller one. The caller frees set->group and set->word by
+ * dpoint_set_fini(). set->height is 0. MEMORY; LIMIT: 2^32 points. */
+int dpoint_set_make(struct dpoint_set *set, const struct dpoint_grouping *grouping);
+void dpoint_set_fini(struct dpoint_set *set);
 
 #endif

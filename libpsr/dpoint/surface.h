@@ -95,8 +95,7 @@ int dpoint_mend(struct dpoint_surface *surface, struct dpoint_cover *cover,
 int dpoint_fit(struct dpoint_surface *surface, const struct dpoint_cover_options *options, struct psr_pool *pool,
                const struct psr_cancel *cancel);
 
-/* Returns 2^(-class / 4), class 0 to 63; and the class of the greatest one that is at most delta, or 63. */
-float dpoint_delta_of_class(unsigned class);
+/* Returns the class of the greatest delta that is at most this one, or the last class. */
 unsigned dpoint_delta_class(float delta);
 
 /* ---- simplification ([K] 4.2) ---- */

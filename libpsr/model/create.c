@@ -47,6 +47,8 @@ static int check_arguments(const struct content *content, struct psr_error *err)
 		                content->octree.n_leaves, MODEL_MAX_LEAVES);
 	if (code == PSR_OK && content->has_octree)
 		code = model_check_octree_counts(&content->octree, "the model", err);
+	if (code == PSR_OK && content->has_points)
+		code = model_check_point_counts(&content->points, "the model", err);
 	if (code != PSR_OK)
 		return code;
 	if (presets->n_cameras > PSR_MAX_PRESETS || presets->n_lights > PSR_MAX_PRESETS)
@@ -57,16 +59,19 @@ static int check_arguments(const struct content *content, struct psr_error *err)
 	return PSR_OK;
 }
 
-int psr_model_create_both(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
-                          const struct octree *tree, const struct psr_presets *presets, struct psr_error *err)
+int psr_model_create_of(struct psr_model **out, const struct psr_model_info *info, const struct psr_model_parts *parts,
+                        const struct psr_presets *presets, struct psr_error *err)
 {
-	struct content content = { .has_blocks = blocks != NULL, .has_octree = tree != NULL };
+	const struct psr_blocks *blocks = parts->blocks;
+	const struct octree *tree = parts->tree;
+	struct content content = { .has_blocks = blocks != NULL, .has_octree = tree != NULL,
+		                       .has_points = parts->points != NULL };
 	uint64_t n_bytes;
 	uint8_t *bytes;
 	int code;
 
-	if (info == NULL || (blocks == NULL && tree == NULL))
-		return psr_fail(err, PSR_ERR_ARG, "a model needs info, and blocks or an octree; one is NULL");
+	if (info == NULL || (blocks == NULL && tree == NULL && parts->points == NULL))
+		return psr_fail(err, PSR_ERR_ARG, "a model needs info, and blocks, an octree or differential points; one is NULL");
 	content.info = *info;
 	if (info->up[0] == 0 && info->up[1] == 0 && info->up[2] == 0)
 		content.info.up[1] = 1;
@@ -74,6 +79,8 @@ int psr_model_create_both(struct psr_model **out, const struct psr_model_info *i
 		content.blocks = *blocks;
 	if (tree != NULL)
 		content.octree = *tree;
+	if (parts->points != NULL)
+		content.points = *parts->points;
 	if (presets != NULL)
 		content.presets = *presets;
 	code = check_arguments(&content, err);
@@ -83,6 +90,12 @@ int psr_model_create_both(struct psr_model **out, const struct psr_model_info *i
 	if (bytes == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for a model of %" PRIu64 " bytes", n_bytes);
 	return model_adopt(out, bytes, n_bytes, 0, "the model", err);
+}
+
+int psr_model_create_both(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
+                          const struct octree *tree, const struct psr_presets *presets, struct psr_error *err)
+{
+	return psr_model_create_of(out, info, &(struct psr_model_parts){ blocks, tree, NULL }, presets, err);
 }
 
 int psr_model_create(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,

@@ -8,6 +8,7 @@
 #include <string.h>
 #include "model/blocks.h"
 #include "model/calibration.h"
+#include "model/points.h"
 #include "model/tree.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in place, and they are little-endian");
@@ -16,6 +17,7 @@ _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "sections are used in 
 #define FILE_MAJOR 6
 #define FILE_MINOR 0 /* of files without octrees, which are as before these */
 #define FILE_MINOR_OCTREE 1
+#define FILE_MINOR_POINTS 2
 #define FILE_ALIGNMENT 64
 #define FILE_TAIL_BYTES 128 /* zeros at the end: kernels read up to 64 depths beyond a section */
 #define FILE_HEADER_BYTES 64
@@ -38,11 +40,12 @@ enum { ENTRY_REQUIRED = 1 };
 /* The unit of a section's length. */
 enum section_count {
 	COUNT_ONE, COUNT_CAMERAS, COUNT_LIGHTS, COUNT_PROJECTIONS, COUNT_CLUSTERS, COUNT_RUNS, COUNT_MASKS, COUNT_BLOCKS,
-	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES, COUNT_CALIBRATED
+	COUNT_SAMPLES, COUNT_SKIPS, COUNT_CODES, COUNT_LEAVES, COUNT_CALIBRATED, COUNT_GROUPS, COUNT_POINTS
 };
 
 enum section_id { SECTION_INFO, SECTION_BLOCKS, SECTION_CAMERAS, SECTION_LIGHTS, SECTION_FIRST_ARRAY,
-	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, SECTION_CALIBRATION = 31, N_KNOWN_SECTIONS };
+	              SECTION_OCTREE = 25, SECTION_FIRST_OF_OCTREE, SECTION_END_OF_OCTREE = 31,
+	              SECTION_CALIBRATION = 31, SECTION_POINTS, SECTION_FIRST_OF_POINTS, N_KNOWN_SECTIONS = 35 };
 
 struct section_spec {
 	char type[5];
@@ -58,6 +61,7 @@ struct section_spec {
 #define LIGHT_BYTES 168
 #define OCTREE_BYTES 64
 #define CALIBRATED_BYTES 96
+#define POINTS_BYTES 16
 
 extern const struct section_spec section_table[N_KNOWN_SECTIONS];
 
@@ -108,9 +112,10 @@ static inline uint64_t file_chunks(uint64_t length)
 struct content {
 	struct psr_model_info info;
 	struct psr_presets presets;
-	int has_blocks, has_octree; /* one at least; the other representation is all zeros */
+	int has_blocks, has_octree, has_points; /* one at least; the other representations are all zeros */
 	struct psr_blocks blocks;
 	struct octree octree;
+	struct dpoint_set points;
 	struct psr_calibration calibration;
 };
 
@@ -121,10 +126,11 @@ const void *section_array(const struct section_spec *spec, const struct content 
 /* Returns whether its representation is not without this section. */
 static inline int section_is_needed(const struct section_spec *spec)
 {
-	return (spec->flags & ENTRY_REQUIRED) != 0 || spec->count == COUNT_SKIPS || spec->count == COUNT_CODES;
+	return (spec->flags & ENTRY_REQUIRED) != 0 || spec->count == COUNT_SKIPS || spec->count == COUNT_CODES
+	       || spec->count == COUNT_GROUPS || spec->count == COUNT_POINTS;
 }
 
-/* Returns whether a section belongs to the representation that the model has not. */
+/* Returns whether a section belongs to a representation that the model has not. */
 int section_is_foreign(const struct section_spec *spec, const struct content *content);
 
 /* Returns whether an entry of the table is of this known section, in the version that is known. */
@@ -155,6 +161,10 @@ uint64_t file_section_hash(const uint8_t *section, uint64_t length, const uint8_
 uint64_t file_header_hash(const uint8_t *bytes, uint64_t table_end);
 void file_content_id(const uint8_t *bytes, uint32_t n_sections, uint8_t id[16]);
 
+/* DPNT: to and from its POINTS_BYTES, unchecked. */
+void file_put_points(uint8_t *at, const struct dpoint_set *set);
+void file_get_points(struct dpoint_set *set, const uint8_t *at);
+
 /* Checks the fixed part of a header of FILE_HEADER_BYTES; `name` begins the error text. */
 int file_check_header(const uint8_t *header, const char *name, struct psr_error *err);
 
@@ -173,6 +183,10 @@ int calibration_validate(const struct psr_calibration *calibration, struct psr_e
 /* Check a tree for psr_model_create() and model_validate(): what its arrays are, and what is in them. */
 int model_check_octree_counts(const struct octree *tree, const char *name, struct psr_error *err);
 int model_validate_octree(const struct octree *tree, const char *name, struct psr_error *err);
+
+/* The same of differential points. */
+int model_check_point_counts(const struct dpoint_set *set, const char *name, struct psr_error *err);
+int model_validate_points(const struct dpoint_set *set, const char *name, struct psr_error *err);
 
 /* Copy presets, with zeros after names, in padding and in unused fields, as in files. */
 void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);

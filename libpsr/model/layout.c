@@ -11,8 +11,13 @@ _Static_assert(sizeof(struct psr_preset_camera) == CAMERA_BYTES && offsetof(stru
                && offsetof(struct psr_camera, kind) == 72 && offsetof(struct psr_camera, fov_y) == 80, "section CAMS");
 _Static_assert(sizeof(struct psr_preset_light) == LIGHT_BYTES && offsetof(struct psr_preset_light, light) == 64
                && offsetof(struct psr_light, position) == 8 && offsetof(struct psr_light, inner) == 80, "section LGTS");
+_Static_assert(sizeof(struct dpoint_group) == 32 && offsetof(struct dpoint_group, first) == 24
+               && offsetof(struct dpoint_group, flags) == 31, "section DGRP");
+_Static_assert(sizeof(struct dpoint_word) == 16 && offsetof(struct dpoint_word, attr) == 8, "section DWRD");
 _Static_assert(sizeof(struct octree_skip) == 24 && offsetof(struct octree_skip, leaf) == 16, "section OSKP");
 
+#define SET(type, count, item, field) \
+	{ type, 1, 0, count, item, offsetof(struct content, points) + offsetof(struct dpoint_set, field) }
 #define ARRAY(type, flags, count, item, field) \
 	{ type, 1, flags, count, item, offsetof(struct content, blocks) + offsetof(struct psr_blocks, field) }
 #define TREE(type, count, item, field) \
@@ -51,6 +56,9 @@ const struct section_spec section_table[N_KNOWN_SECTIONS] = {
 	TREE("OOFF", COUNT_LEAVES, 1, offset),
 	TREE("OCOL", COUNT_LEAVES, 3, color),
 	[SECTION_CALIBRATION] = { "CALB", 1, 0, COUNT_CALIBRATED, CALIBRATED_BYTES, 0 },
+	[SECTION_POINTS] = { "DPNT", 1, 0, COUNT_ONE, POINTS_BYTES, 0 },
+	SET("DGRP", COUNT_GROUPS, 32, group),
+	SET("DWRD", COUNT_POINTS, 16, word),
 };
 
 uint64_t section_items(const struct section_spec *spec, const struct content *content)
@@ -82,6 +90,10 @@ uint64_t section_items(const struct section_spec *spec, const struct content *co
 		return content->octree.n_leaves;
 	case COUNT_CALIBRATED:
 		return content->calibration.n;
+	case COUNT_GROUPS:
+		return content->points.n_groups;
+	case COUNT_POINTS:
+		return content->points.n_points;
 	case COUNT_ONE:
 		break;
 	}
@@ -102,7 +114,9 @@ int section_is_foreign(const struct section_spec *spec, const struct content *co
 {
 	const ptrdiff_t k = spec - section_table;
 
-	if (k >= SECTION_OCTREE && k != SECTION_CALIBRATION)
+	if (k >= SECTION_POINTS)
+		return !content->has_points;
+	if (k >= SECTION_OCTREE && k < SECTION_END_OF_OCTREE)
 		return !content->has_octree;
 	return (k == SECTION_BLOCKS || k >= SECTION_FIRST_ARRAY) && !content->has_blocks;
 }
@@ -222,6 +236,8 @@ static int is_present(int section, const struct content *content)
 		return content->has_blocks;
 	case SECTION_OCTREE:
 		return content->has_octree;
+	case SECTION_POINTS:
+		return content->has_points;
 	case SECTION_CAMERAS:
 	case SECTION_LIGHTS:
 	case SECTION_CALIBRATION:
@@ -242,6 +258,9 @@ static void put_section(uint8_t *at, int section, const struct content *content,
 		break;
 	case SECTION_OCTREE:
 		file_put_octree(at, &content->octree);
+		break;
+	case SECTION_POINTS:
+		file_put_points(at, &content->points);
 		break;
 	case SECTION_CALIBRATION:
 		memcpy(at, content->calibration.view, length);
@@ -278,7 +297,8 @@ uint8_t *file_image_make(const struct content *content, uint64_t *n_bytes)
 		return NULL;
 	memcpy(bytes, FILE_MAGIC, 8);
 	file_put(bytes + HEADER_MAJOR, 2, FILE_MAJOR);
-	file_put(bytes + HEADER_MINOR, 2, content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR);
+	file_put(bytes + HEADER_MINOR, 2, content->has_points ? FILE_MINOR_POINTS
+	                                  : content->has_octree ? FILE_MINOR_OCTREE : FILE_MINOR);
 	file_put(bytes + HEADER_N_SECTIONS, 4, n_sections);
 	file_put(bytes + HEADER_FILE_SIZE, 8, *n_bytes);
 	file_put(bytes + HEADER_N_CHUNKS, 4, n_chunks);

@@ -22,6 +22,7 @@ struct psr_model {
 	const uint8_t *bytes; /* the image */
 	struct content content;
 	struct psr_cubes *cubes; /* of its octree, or NULL */
+	struct psr_points *points; /* of its differential points, or NULL */
 	struct octree_shares shares; /* of a packed octree, in the file */
 };
 
@@ -45,7 +46,11 @@ int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, in
 		code = file_parse(bytes, n_bytes, name, &model->content, err);
 	if (code == PSR_OK && model->content.has_octree)
 		code = psr_cubes_create(&model->cubes, &model->content.octree, err);
+	if (code == PSR_OK && model->content.has_points)
+		code = psr_points_create(&model->points, &model->content.points, name, err);
 	if (code != PSR_OK) {
+		if (model != NULL)
+			psr_cubes_destroy(model->cubes);
 		free(model);
 		release_image(bytes, n_bytes, is_mapped);
 		return code;
@@ -243,6 +248,7 @@ void psr_model_unref(struct psr_model *model)
 		return;
 	release_image(model->bytes, model->n_bytes, model->is_mapped);
 	psr_cubes_destroy(model->cubes);
+	psr_points_destroy(model->points);
 	free(model);
 }
 
@@ -285,12 +291,23 @@ uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed)
 
 uint64_t psr_model_bytes(const struct psr_model *model)
 {
-	return model->n_bytes + sizeof *model + (model->cubes != NULL ? model->cubes->n_bytes : 0);
+	return model->n_bytes + sizeof *model + (model->cubes != NULL ? model->cubes->n_bytes : 0)
+	       + (model->points != NULL ? model->points->n_bytes : 0);
 }
 
 const struct psr_cubes *psr_model_cubes(const struct psr_model *model)
 {
 	return model->cubes;
+}
+
+const struct psr_points *psr_model_points(const struct psr_model *model)
+{
+	return model->points;
+}
+
+const struct dpoint_set *psr_model_point_set(const struct psr_model *model)
+{
+	return model->content.has_points ? &model->content.points : NULL;
 }
 
 const uint8_t *model_image(const struct psr_model *model, size_t *n_bytes)

@@ -59,14 +59,16 @@ static uint32_t stride_of(const uint8_t *type)
 		uint32_t item = section_table[k].item_bytes;
 
 		if (memcmp(type, section_table[k].type, 4) == 0)
-			return pack_is_stride(item) ? item : section_table[k].count == COUNT_MASKS ? 8 : 4;
+			return pack_is_stride(item)                                                               ? item
+			       : section_table[k].count == COUNT_MASKS || section_table[k].count == COUNT_POINTS ? 8
+			                                                                                         : 4;
 	}
 	return 1;
 }
 
 int pack_is_of_octree(uint64_t packing, const uint8_t *entry)
 {
-	for (int k = SECTION_FIRST_OF_OCTREE; k < N_KNOWN_SECTIONS && packing == PACKING_OCTREE; k++)
+	for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE && packing == PACKING_OCTREE; k++)
 		if (file_is_section(entry, k))
 			return 1;
 	return 0;
@@ -89,7 +91,7 @@ int pack_find_octree(struct octree *tree, const uint8_t *image)
 		const uint8_t *entry = image + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
 		const uint8_t *at = image + file_get(entry + ENTRY_OFFSET, 8);
 
-		for (int k = SECTION_FIRST_OF_OCTREE; k < N_KNOWN_SECTIONS; k++) {
+		for (int k = SECTION_FIRST_OF_OCTREE; k < SECTION_END_OF_OCTREE; k++) {
 			const struct section_spec *spec = &section_table[k];
 
 			if (!file_is_section(entry, k))

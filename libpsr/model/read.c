@@ -276,12 +276,23 @@ static int get_octree(const struct reader *r, struct octree *tree)
 	return model_check_octree_counts(tree, r->name, r->err);
 }
 
+static int get_points(const struct reader *r, struct dpoint_set *set)
+{
+	const uint8_t *at = r->bytes + get_section(r, (uint32_t)r->entry[SECTION_POINTS]).offset;
+	int code = check_length(r, SECTION_POINTS, POINTS_BYTES);
+
+	if (code != PSR_OK)
+		return code;
+	file_get_points(set, at);
+	return model_check_point_counts(set, r->name, r->err);
+}
+
 /* Of each representation that the file has, all sections that it needs; none of another one. */
 static int check_set(const struct reader *r, const struct content *content)
 {
 	for (int k = 0; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
-		const char *first = k < SECTION_OCTREE ? "BLKS" : "OCTR";
+		const char *first = k >= SECTION_POINTS ? "DPNT" : k < SECTION_OCTREE ? "BLKS" : "OCTR";
 
 		if (section_is_foreign(spec, content) && r->entry[k] >= 0)
 			return bad(r, "section %s is there, and %s, which tells its length, is missing", spec->type, first);
@@ -346,9 +357,10 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	memset(content, 0, sizeof *content);
 	content->has_blocks = r.entry[SECTION_BLOCKS] >= 0;
 	content->has_octree = r.entry[SECTION_OCTREE] >= 0;
-	if (!content->has_blocks && !content->has_octree)
-		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "%s: the file has neither section BLKS nor OCTR, the kinds of samples that this build knows", name);
+	content->has_points = r.entry[SECTION_POINTS] >= 0;
+	if (!content->has_blocks && !content->has_octree && !content->has_points)
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: the file has none of the sections BLKS, OCTR and DPNT, the kinds of"
+		                " samples that this build knows", name);
 	code = check_set(&r, content);
 	if (code == PSR_OK)
 		code = get_info(&r, &content->info);
@@ -356,6 +368,8 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 		code = get_blocks(&r, &content->blocks);
 	if (code == PSR_OK && content->has_octree)
 		code = get_octree(&r, &content->octree);
+	if (code == PSR_OK && content->has_points)
+		code = get_points(&r, &content->points);
 	if (code == PSR_OK)
 		code = get_presets(&r, SECTION_CAMERAS, &content->presets.n_cameras, &camera);
 	if (code == PSR_OK)

@@ -19,7 +19,18 @@ int psr_model_octree_shares(const struct psr_model *model, struct octree_shares 
 int psr_model_create_octree(struct psr_model **out, const struct psr_model_info *info, const struct octree *tree,
                             const struct psr_presets *presets, struct psr_error *err);
 
-/* The same of blocks and an octree of one object; either may be NULL, but not both. */
+/* The same of all that a model can have, of one object; one part at least is not NULL. Points are in inner
+ * coordinates. */
+struct dpoint_set;
+struct psr_model_parts {
+	const struct psr_blocks *blocks;
+	const struct octree *tree;
+	const struct dpoint_set *points;
+};
+int psr_model_create_of(struct psr_model **out, const struct psr_model_info *info, const struct psr_model_parts *parts,
+                        const struct psr_presets *presets, struct psr_error *err);
+
+/* The same of blocks and an octree; either may be NULL, but not both. */
 int psr_model_create_both(struct psr_model **out, const struct psr_model_info *info, const struct psr_blocks *blocks,
                           const struct octree *tree, const struct psr_presets *presets, struct psr_error *err);
 

@@ -29,8 +29,8 @@ static int unpack_chunk(const struct unpacker *u, uint8_t *to, uint64_t size, co
 
 /* The sections that say how long the others are. */
 struct counts {
-	uint8_t blocks[BLOCKS_BYTES], octree[OCTREE_BYTES];
-	int has_blocks, has_octree;
+	uint8_t blocks[BLOCKS_BYTES], octree[OCTREE_BYTES], points[POINTS_BYTES];
+	int has_blocks, has_octree, has_points;
 };
 
 static int is_section(const uint8_t *entry, enum section_id id, uint64_t length)
@@ -48,6 +48,10 @@ static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
 	if (is_section(entry, SECTION_OCTREE, OCTREE_BYTES)) {
 		counts->has_octree = 1;
 		return counts->octree;
+	}
+	if (is_section(entry, SECTION_POINTS, POINTS_BYTES)) {
+		counts->has_points = 1;
+		return counts->points;
 	}
 	return NULL;
 }
@@ -77,7 +81,7 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts
 	return PSR_OK;
 }
 
-/* Compares lengths of known sections with the counts in BLKS and OCTR before allocating; file_parse() reports other
+/* Compares lengths of known sections with the counts in BLKS, OCTR and DPNT before allocating; file_parse() reports other
  * errors better. */
 static int check_lengths(const struct unpacker *u)
 {
@@ -87,6 +91,7 @@ static int check_lengths(const struct unpacker *u)
 
 	content.has_blocks = counts.has_blocks;
 	content.has_octree = counts.has_octree;
+	content.has_points = counts.has_points;
 	if (code == PSR_OK && counts.has_blocks) {
 		file_get_counts(&content.blocks, counts.blocks);
 		if (content.blocks.n_samples > (uint64_t)PSR_BLOCK_SAMPLES * content.blocks.n_blocks)
@@ -96,6 +101,10 @@ static int check_lengths(const struct unpacker *u)
 	if (code == PSR_OK && counts.has_octree) {
 		file_get_octree(&content.octree, counts.octree);
 		code = model_check_octree_counts(&content.octree, u->source->name, u->err);
+	}
+	if (code == PSR_OK && counts.has_points) {
+		file_get_points(&content.points, counts.points);
+		code = model_check_point_counts(&content.points, u->source->name, u->err);
 	}
 	for (uint32_t i = 0; i < u->n_sections && code == PSR_OK; i++) {
 		const uint64_t length = file_get(unpack_entry(u, i) + ENTRY_LENGTH, 8);

@@ -255,5 +255,7 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 		code = fail(&c, "CALB", "%s", broken.text);
 	if (code == PSR_OK && content->has_octree)
 		code = model_validate_octree(&content->octree, name, err);
+	if (code == PSR_OK && content->has_points)
+		code = model_validate_points(&content->points, name, err);
 	return code;
 }

@@ -45,7 +45,8 @@ int psr_model_map(struct psr_model **out, const char *path, struct psr_error *er
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
 /* Reads from the header how much memory psr_model_read() takes for this file; a packed file takes more than its size. An
- * octree takes a part more in memory, for its coarser levels (psr_model_bytes()).
+ * octree takes a part more in memory, for its coarser levels, and so do differential points, for their bounds
+ * (psr_model_bytes()).
  * Errors as of psr_model_read(), as far as the header shows them. */
 int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
 

@@ -114,7 +114,7 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	struct dpoint_surface surface;
 	struct dpoint_cover cover = { 0 };
 	struct dpoint_choice choice = { 0 };
-	struct dpoint_groups groups = { 0 };
+	struct dpoint_set set = { 0 };
 	struct dpoint_errors errors;
 	double start = clock_seconds();
 	int rc;
@@ -128,15 +128,15 @@ static int measure(double value[N_COLUMNS], const struct row *row, struct study 
 	if (rc == PSR_OK && row->way != FITTED)
 		rc = choose(&choice, row->way, &surface, &cover);
 	if (rc == PSR_OK && row->way == FITTED)
-		rc = dpoint_groups_make(&groups, &surface, &choice, options.sine);
+		rc = dpoint_set_make(&set, &(struct dpoint_grouping){ &surface, &choice, options.sine, NULL });
 	if (rc == PSR_OK) {
 		value[SECONDS] = clock_seconds() - start;
 		dpoint_measure(&errors, &surface, &cover, &choice);
 		put(value, row, &surface, &choice, &errors);
 	}
 	if (rc == PSR_OK && row->way == FITTED)
-		value[BYTES] = (double)(groups.n_words * sizeof *groups.word + groups.n_groups * sizeof *groups.group) / 1e3;
-	dpoint_groups_fini(&groups);
+		value[BYTES] = (double)(set.n_points * sizeof *set.word + set.n_groups * sizeof *set.group) / 1e3;
+	dpoint_set_fini(&set);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
 	dpoint_surface_fini(&surface);

@@ -295,7 +295,7 @@ static void groups_hold_all_points_and_what_they_draw(void **state)
 	struct dpoint_surface surface;
 	struct dpoint_cover cover;
 	struct dpoint_choice choice;
-	struct dpoint_groups groups;
+	struct dpoint_set set;
 	struct revolved torus;
 	size_t n = 0;
 	uint64_t seed = 3;
@@ -305,56 +305,53 @@ static void groups_hold_all_points_and_what_they_draw(void **state)
 	sample(&surface, &torus.patch, 20, 0.2f);
 	assert_int_equal(dpoint_cover_init(&cover, &surface, &o, NULL, NULL), PSR_OK);
 	assert_int_equal(dpoint_choose(&choice, &cover), PSR_OK);
-	assert_int_equal(dpoint_groups_make(&groups, &surface, &choice, o.sine), PSR_OK);
-	assert_int_equal(groups.n_words, choice.n_kept);
-	for (size_t i = 0; i < groups.n_groups; i++) {
-		const struct dpoint_group *g = &groups.group[i];
-		const struct dpoint_limit limit = { o.sine, { g->delta[0], g->delta[1] } };
+	assert_int_equal(dpoint_set_make(&set, &(struct dpoint_grouping){ &surface, &choice, o.sine, NULL }), PSR_OK);
+	assert_int_equal(set.n_points, choice.n_kept);
+	for (uint32_t i = 0; i < set.n_groups; i++) {
+		const struct dpoint_group *g = &set.group[i];
+		const struct dpoint_limit limit = dpoint_group_limit(&set, g);
+		struct dpoint_sphere sphere;
+		float axis[3], cosine;
 
 		assert_int_equal(g->first, n);
 		assert_true(g->n > 0 && g->n <= DPOINT_GROUP);
+		assert_true(limit.delta[0] <= 0.2f && limit.delta[0] > 0.2f * 0.84f && limit.delta[1] == limit.delta[0]);
 		n += g->n;
+		dpoint_group_sphere(&sphere, &set, i);
+		cosine = dpoint_group_cosine(axis, NULL, &set, i);
+		assert_true(v3f_dot(axis, axis) > 0.9999f && dpoint_group_cosine(NULL, axis, &set, i) == cosine);
 		for (uint32_t k = 0; k < g->n; k++) {
 			struct dpoint p;
 			float extent[2], v[3];
 
-			dpoint_unpack(&p, &groups.word[g->first + k], &g->box);
+			dpoint_unpack(&p, &set.word[g->first + k], &g->box);
 			dpoint_extent(extent, &p, &limit);
 			v3f_cross(v, p.normal, p.u);
 			for (int place = 0; place < 20; place++) {
 				const float x = extent[0] * (float)random_in(&seed, -1, 1);
 				const float y = extent[1] * (float)random_in(&seed, -1, 1);
-				const float height = dpoint_height_at(p.lambda_u, p.rho, x, y);
-				float at[3], normal[3], local[3];
+				const float height = dpoint_quadric_at(p.lambda_u, p.rho, x, y);
+				const float slope[3] = { -p.lambda_u * x, -p.lambda_u * p.rho * y, 1 };
+				float at[3], normal[2][3] = { { 0 } }, local[3];
 
 				dpoint_normal_at(local, p.lambda_u, p.rho, x, y);
 				for (int c = 0; c < 3; c++) {
-					at[c] = p.at[c] + x * p.u[c] + y * v[c] + height * p.normal[c] - g->middle[c];
-					normal[c] = local[0] * p.u[c] + local[1] * v[c] + local[2] * p.normal[c];
+					at[c] = p.at[c] + x * p.u[c] + y * v[c] + height * p.normal[c] - sphere.middle[c];
+					normal[0][c] = local[0] * p.u[c] + local[1] * v[c] + local[2] * p.normal[c];
+					normal[1][c] = slope[0] * p.u[c] + slope[1] * v[c] + slope[2] * p.normal[c];
 				}
-				assert_true(v3f_length(at) <= g->radius);
-				v3f_normalize(normal, normal);
-				v3f_sub(normal, normal, g->axis);
-				assert_true(v3f_length(normal) <= g->chord);
+				assert_true(v3f_length(at) <= sphere.radius);
+				for (int way = 0; way < 2; way++)
+					assert_true(v3f_dot(normal[way], axis) >= cosine * v3f_length(normal[way]));
 			}
 		}
 	}
-	assert_int_equal(n, groups.n_words);
-	/* A group ends where it is full, or where the next point would make its box too wide. */
-	for (size_t i = 0; i + 1 < groups.n_groups; i++) {
-		const struct dpoint_group *g = &groups.group[i];
-		struct dpoint next;
-		float most = 0;
-
-		dpoint_unpack(&next, &groups.word[g[1].first], &g[1].box);
-		for (int k = 0; k < 3; k++) {
-			const float high = g->box.low[k] + DPOINT_PLACE_STEPS * g->box.step[k];
-
-			most = fmaxf(most, fmaxf(high, next.at[k]) - fminf(g->box.low[k], next.at[k]));
-		}
-		assert_true(g->n == DPOINT_GROUP || most > DPOINT_MOST_BOX - 1e-4f);
-	}
-	dpoint_groups_fini(&groups);
+	assert_int_equal(n, set.n_points);
+	for (uint32_t i = 0; i < set.n_groups; i++)
+		for (int k = 0; k < 3; k++)
+			assert_true(set.group[i].box.step[k] * DPOINT_PLACE_STEPS <= DPOINT_MOST_BOX);
+	assert_true(set.n_groups * 8 < set.n_points); /* some ten boxes of 0.6 hold the torus, and a curve ends some */
+	dpoint_set_fini(&set);
 	dpoint_choice_fini(&choice);
 	dpoint_cover_fini(&cover);
 	dpoint_surface_fini(&surface);

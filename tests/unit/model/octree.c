@@ -249,7 +249,7 @@ static void a_set_of_sections_is_whole(void **state)
 			if (i > 0 && i <= 2)
 				assert_non_null(strstr(err.text, types[i]));
 			else if (i == 0)
-				assert_non_null(strstr(err.text, with_blocks ? "OCTR, which tells its length, is missing" : "neither"));
+				assert_non_null(strstr(err.text, with_blocks ? "OCTR, which tells its length, is missing" : "none of the sections"));
 			psr_model_unref(model);
 			free(copy);
 		}
