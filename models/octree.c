@@ -109,18 +109,13 @@ int octree_make(struct octree **out, struct octree_input *input, const struct oc
 		                            .read = read_points };
 	struct mesh_points points = { .mesh = input->mesh };
 	struct octree_build_options options;
-	struct octree_mesh_report report;
-	int rc;
 
 	if (input->is_direct)
 		return of_file(out, input, wish, err);
 	memcpy(input->up, input->mesh->up, sizeof input->up);
 	if (input->mesh->n_triangles > 0) {
 		set_options(&options, wish, wish->resolution);
-		rc = octree_of_mesh(out, &report, input->mesh, &options, err);
-		if (rc == PSR_OK)
-			(*out)->is_one_sided = report.is_closed && report.n_both == 0;
-		return rc;
+		return octree_of_mesh(out, NULL, input->mesh, &options, err);
 	}
 	source.n_points = input->n_points = input->mesh->n_points;
 	source.userdata = &points;

@@ -224,7 +224,6 @@ int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct p
 		cubes->level[l].run = m.run;
 		make_level(&m, (int)l);
 	}
-	cubes->spacing = CUBES_SPACING * cubes->level[0].edge;
 	cubes->groups.n_blocks = n_cubes;
 	cubes->groups.n_clusters = m.n_clusters;
 	cubes->groups.cluster = m.cluster;

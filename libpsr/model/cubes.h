@@ -15,6 +15,10 @@
  * meets: at 45 degrees to the picture's rows they need so many, and no other planes and views need more (decision 0106).
  */
 #define CUBES_SPACING 1.4142135623730951
+/* The same for choosing levels, where depth buffers close what stays open between samples: a plane along an axis meets
+ * one leaf an edge squared, every other plane more, and so dense is a block's lattice of this spacing. sqrt(2/sqrt(3)).
+ */
+#define CUBES_LEVEL_SPACING 1.0745699318235418
 #define CUBES_PLACE_BITS 18 /* of a coordinate, in edges of a cube */
 #define CUBES_GRAY UINT64_C(0xcbcbcb) /* of leaves without colour, as of all such surfaces: 0.6 in linear light */
 
@@ -43,7 +47,6 @@ struct psr_cubes {
 	struct psr_blocks groups;
 	struct psr_cube_level level[CUBES_MOST_LEVELS];
 	const struct psr_cube *cube;
-	double spacing;         /* of level 0, inner units: CUBES_SPACING */
 	uint64_t n_bytes;
 };
 

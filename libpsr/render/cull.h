@@ -40,8 +40,9 @@ struct cull_sphere {
 };
 struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k);
 
-/* Chooses of each group of clusters the coarsest level whose spacing is at most a pixel, or the settings' spacing,
- * where its blocks are nearest; such blocks need no depth buffer but the picture's. The finest level if none fits.
+/* Chooses of each group of clusters the coarsest level whose level_spacing is at most a pixel, or the settings'
+ * spacing, where its blocks are nearest. Blocks of such a level need no depth buffer but the picture's, cubes one of
+ * 2x2 pixels at most. The finest level if none fits.
  * Returns early if the frame is cancelled. */
 void cull_choose_levels(struct bins *bins, const struct plan *plan);
 

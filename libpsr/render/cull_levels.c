@@ -59,12 +59,12 @@ static float nearest_of(const struct plan_instance *in, const struct psr_cluster
 	return nearest * (1.0f / 16384) + m[3];
 }
 
-/* Whether samples are at most a pixel apart, or the settings' spacing, all over the cluster. Tests its sphere first;
+/* Whether samples are dense enough for pixels, or the settings' spacing, all over the cluster. Tests its sphere first;
  * that reaches nearer than its blocks do, by half of its radius where it holds a whole model. */
 static int fits_cluster(const struct plan *plan, const struct plan_instance *in, const struct psr_cluster *k)
 {
 	const struct cull_sphere v = cull_view_cluster(in, k);
-	const float spacing = in->cull.spacing * (float)(1u << k->level) * plan->finer;
+	const float spacing = in->level_spacing * (float)(1u << k->level) * plan->finer;
 
 	if (fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, v.c[2] - v.r) * spacing))
 		return 1;

@@ -175,11 +175,12 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 	double world = plan_place(center, rotation, instance, view->eye), scale = world * view->scale;
 	const double blocks_spacing = psr_model_info(instance->model)->spacing * instance->scale * view->scale;
 	const struct psr_cubes *cubes = instance_cubes(instance);
+	const double edge = cubes != NULL ? cubes->level[0].edge * scale : 0;
 	struct cull_view *cull = &out->cull;
 
 	*cull = (struct cull_view){
 		.blocks = warp->blocks, .cubes = cubes, .scale = (float)scale, .perspective = plan->perspective, .focal = plan->focal,
-		.spacing = (float)ldexp(cubes != NULL ? cubes->spacing * scale : blocks_spacing, plan->cell_bias),
+		.spacing = (float)ldexp(cubes != NULL ? CUBES_SPACING * edge : blocks_spacing, plan->cell_bias),
 		.near_z = plan->near_z, .width = (float)plan->width, .height = (float)plan->height,
 		.center_x = (float)plan->center[0], .center_y = (float)plan->center[1],
 		.with_cones = (plan->cull_tests & PSR_CULL_CONES) != 0,
@@ -188,6 +189,7 @@ static void instance_make(struct plan_instance *out, struct warp_instance *warp,
 		.region_scale = { (float)SCREEN_SIDE / (float)plan->window.picture_width,
 		                  (float)SCREEN_SIDE / (float)plan->window.picture_height },
 	};
+	out->level_spacing = (float)(cubes != NULL ? CUBES_LEVEL_SPACING * edge : blocks_spacing);
 	m3d_multiply(to_camera, (const double(*)[3])view->axis, (const double(*)[3])rotation);
 	m3d_apply(camera_center, view->axis, center);
 	v3d_scale(camera_center, camera_center, view->scale);
@@ -313,7 +315,7 @@ int plan_make(struct plan *plan, const struct psr_scene *scene, const struct ren
 	plan->gap_method = settings->gap_method;
 	plan->no_fill = settings->no_fill;
 	plan->shadow_side = settings->shadow_side;
-	plan->finer = (float)ldexp(1 / settings->spacing_px, -settings->cell_bias); /* levels of models know no bias */
+	plan->finer = (float)(1 / settings->spacing_px);
 	plan->cell_bias = settings->cell_bias;
 	plan->is_quiet = NULL;
 	plan->has_sheer = plan->has_thin = 0;

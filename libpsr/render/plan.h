@@ -12,6 +12,7 @@ struct plan_instance {
 	uint32_t first_slot;  /* slot of block b is first_slot + b */
 	uint32_t first_group; /* number of the model's group 0; each model has n_clusters numbers */
 	struct cull_view cull;
+	float level_spacing;  /* of level 0, camera space: a level is fine enough where this is a pixel */
 	double turn[3][3];    /* inner coordinates to camera space, a rotation */
 	enum psr_why masks;   /* PSR_WHY_RAN: test visibility masks */
 };

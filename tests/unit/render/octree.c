@@ -139,7 +139,8 @@ static void check_sphere(const struct psr_scene *scene, double reach, double sla
 }
 
 /* Level l's leaves have edges of h = 2^(l - 7): a sample is at most half a diagonal from where the surface meets its
- * leaf, and the coarsest level is drawn whose h is 1 / sqrt(2) pixel at most. Where no level is fine enough samples are magnified, and cells of 2^k pixels fill between them. */
+ * leaf, and the coarsest level is drawn whose h is 1 / CUBES_LEVEL_SPACING pixels at most. Where no level is fine enough
+ * samples are magnified. Cells of 2^k pixels fill between samples that are further apart than pixels. */
 static void spheres_have_no_holes_and_the_right_depths_and_colours(void **state)
 {
 	static const double heights[] = { 2, 2.9, 3.8, 8, 15 }, magnified[] = { 0.5, 1 };
@@ -155,7 +156,7 @@ static void spheres_have_no_holes_and_the_right_depths_and_colours(void **state)
 
 		for (unsigned i = 0; i < sizeof heights / sizeof *heights; i++) {
 			scene.camera = orthographic(heights[i]);
-			const double pixel = heights[i] / SIDE, leaf = sqrt(2) * h < pixel ? pixel / sqrt(2) : h;
+			const double pixel = heights[i] / SIDE, leaf = fmax(pixel / CUBES_LEVEL_SPACING, h);
 			check_sphere(&scene, fmax(HALF_DIAGONAL * leaf / pixel, 0.5), HALF_DIAGONAL * leaf);
 		}
 		for (unsigned i = 0; i < sizeof magnified / sizeof *magnified; i++) {
@@ -184,6 +185,30 @@ static void fewer_samples_are_drawn_of_what_is_small(void **state)
 
 		assert_true(p->frame.report.n_samples_drawn < last / 3); /* a fourth of a surface */
 		last = p->frame.report.n_samples_drawn;
+		free(p);
+	}
+	psr_model_unref(model);
+}
+
+/* Leaves as dense as a block's samples are: up to 1 / CUBES_LEVEL_SPACING pixels wide. */
+static void the_coarsest_level_that_is_dense_enough_is_drawn(void **state)
+{
+	static const struct {
+		double pixels; /* a leaf of level 0 is wide */
+		uint8_t level;
+	} cases[] = { { 1.2, 0 }, { 0.92, 0 }, { 0.48, 0 }, { 0.46, 1 }, { 0.24, 1 }, { 0.23, 2 } };
+	struct psr_model *model = tree_build(&SOLID);
+	struct psr_instance instance = place(model);
+	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
+
+	(void)state;
+	for (unsigned i = 0; i < sizeof cases / sizeof *cases; i++) {
+		scene.camera = orthographic(SIDE * ldexp(2, -SOLID.levels) / cases[i].pixels);
+		struct drawn *p = draw(&scene, 1, 0);
+		const size_t middle = (size_t)SIDE / 2 * SIDE + SIDE / 2;
+
+		assert_int_not_equal(p->id[middle], UINT32_MAX);
+		assert_int_equal(p->block[3 * middle], cases[i].level);
 		free(p);
 	}
 	psr_model_unref(model);
@@ -354,6 +379,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(spheres_have_no_holes_and_the_right_depths_and_colours),
 		cmocka_unit_test(fewer_samples_are_drawn_of_what_is_small),
+		cmocka_unit_test(the_coarsest_level_that_is_dense_enough_is_drawn),
 		cmocka_unit_test(frames_are_the_same_with_any_threads),
 		cmocka_unit_test(shortcuts_change_nothing),
 		cmocka_unit_test(refinement_smooths_edges_and_keeps_the_inside),
