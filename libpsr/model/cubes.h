@@ -50,9 +50,9 @@ struct psr_cubes {
 	uint64_t n_bytes;
 };
 
-/* Makes the cubes of a valid tree, which must outlive them. LIMIT: more than 2^26 cubes, or 2^32 codes or leaves;
- * MEMORY. */
-int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct psr_error *err);
+/* Makes the cubes of a valid tree, which must outlive them. Threads of the pool, which may be NULL, share the work.
+ * LIMIT: more than 2^26 cubes, or 2^32 codes or leaves; MEMORY. */
+int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct psr_pool *pool, struct psr_error *err);
 void psr_cubes_destroy(struct psr_cubes *cubes); /* NULL is fine */
 
 /* Returns NULL if the model has no octree. */

@@ -170,10 +170,11 @@ int file_check_header(const uint8_t *header, const char *name, struct psr_error 
 
 /* Checks everything; fills `content` with the values of the image and pointers into it. The image must be aligned to
  * FILE_ALIGNMENT and outlive them. FORMAT, VERSION, UNSUPPORTED, MEMORY. */
-int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err);
+int file_parse(const uint8_t *bytes, size_t n_bytes, struct psr_pool *pool, const char *name, struct content *content,
+               struct psr_error *err);
 
 /* Checks all values by the rules of docs/format.md; lengths of arrays must be right. */
-int model_validate(const struct content *content, const char *name, struct psr_error *err);
+int model_validate(const struct content *content, struct psr_pool *pool, const char *name, struct psr_error *err);
 
 /* Checks CAMS and LGTS for model_validate(); *section: the broken one on failure. */
 int presets_validate(const struct psr_presets *presets, const char **section, struct psr_error *err);
@@ -182,7 +183,7 @@ int calibration_validate(const struct psr_calibration *calibration, struct psr_e
 
 /* Check a tree for psr_model_create() and model_validate(): what its arrays are, and what is in them. */
 int model_check_octree_counts(const struct octree *tree, const char *name, struct psr_error *err);
-int model_validate_octree(const struct octree *tree, const char *name, struct psr_error *err);
+int model_validate_octree(const struct octree *tree, struct psr_pool *pool, const char *name, struct psr_error *err);
 
 /* The same of differential points. */
 int model_check_point_counts(const struct dpoint_set *set, const char *name, struct psr_error *err);

@@ -14,6 +14,8 @@
 
 #define MAX_NAME 200 /* of a path in an error text, to leave room for the sentence */
 
+#define LEAST_SHARED ((size_t)8 << 20) /* bytes of an image whose checks threads share */
+
 struct psr_model {
 	atomic_uint n_refs;
 	int is_mapped, is_packed;
@@ -34,20 +36,30 @@ static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
 		psr_free_huge((void *)bytes, n_bytes);
 }
 
+/* Returns threads for what is large; NULL otherwise, and where the system has none: the caller then works alone. */
+static struct psr_pool *pool_for(size_t n_bytes)
+{
+	struct psr_pool *pool = NULL;
+
+	return n_bytes >= LEAST_SHARED && psr_pool_create(&pool, psr_pool_all_cores(), NULL) == PSR_OK ? pool : NULL;
+}
+
 int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
                 struct psr_error *err)
 {
 	struct psr_model *model = calloc(1, sizeof *model);
+	struct psr_pool *pool = pool_for(n_bytes);
 	int code;
 
 	if (model == NULL)
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
-		code = file_parse(bytes, n_bytes, name, &model->content, err);
+		code = file_parse(bytes, n_bytes, pool, name, &model->content, err);
 	if (code == PSR_OK && model->content.has_octree)
-		code = psr_cubes_create(&model->cubes, &model->content.octree, err);
+		code = psr_cubes_create(&model->cubes, &model->content.octree, pool, err);
 	if (code == PSR_OK && model->content.has_points)
 		code = psr_points_create(&model->points, &model->content.points, name, err);
+	psr_pool_destroy(pool);
 	if (code != PSR_OK) {
 		if (model != NULL)
 			psr_cubes_destroy(model->cubes);

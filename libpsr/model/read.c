@@ -1,5 +1,6 @@
 #include <assert.h>
 #include <inttypes.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <xxhash.h>
 #include "file.h"
@@ -126,7 +127,26 @@ static int check_places(const struct reader *r)
 	return PSR_OK;
 }
 
-static int check_hashes(const struct reader *r)
+/* The chunks of a section, and the first whose hash differs; their number if none does. */
+struct hashing {
+	const uint8_t *section, *hashes;
+	uint64_t length;
+	_Atomic uint64_t first_bad;
+};
+
+static void hash_chunk(int i, void *userdata)
+{
+	struct hashing *h = userdata;
+	const uint64_t k = (uint64_t)i, first = k * FILE_CHUNK_BYTES, left = h->length - first;
+	const uint64_t hash = XXH64(h->section + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0);
+	uint64_t bad = atomic_load(&h->first_bad);
+
+	if (hash != file_get(h->hashes + 8 * k, 8))
+		while (k < bad && !atomic_compare_exchange_weak(&h->first_bad, &bad, k))
+			;
+}
+
+static int check_hashes(const struct reader *r, struct psr_pool *pool)
 {
 	const uint8_t *chunks = r->bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * r->n_sections;
 	uint8_t id[16];
@@ -134,15 +154,12 @@ static int check_hashes(const struct reader *r)
 	for (uint32_t i = 0; i < r->n_sections; i++) {
 		struct section s = get_section(r, i);
 		uint64_t n_chunks = file_chunks(s.length);
+		struct hashing h = { .section = r->bytes + s.offset, .hashes = chunks, .length = s.length, .first_bad = n_chunks };
 
-		for (uint64_t k = 0; k < n_chunks; k++) {
-			uint64_t first = k * FILE_CHUNK_BYTES, left = s.length - first;
-
-			if (XXH64(r->bytes + s.offset + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0)
-			    != file_get(chunks + 8 * k, 8))
-				return bad(r, "section %s at byte %" PRIu64 " is damaged: the hash of its chunk %" PRIu64 " differs",
-				           s.type, s.offset, k);
-		}
+		psr_pool_for(pool, (int)n_chunks, hash_chunk, &h);
+		if (h.first_bad < n_chunks)
+			return bad(r, "section %s at byte %" PRIu64 " is damaged: the hash of its chunk %" PRIu64 " differs", s.type,
+			           s.offset, h.first_bad);
 		if (file_section_hash(r->bytes + s.offset, s.length, chunks) != s.hash)
 			return bad(r, "section %s at byte %" PRIu64 " is damaged: its hash differs", s.type, s.offset);
 		chunks += 8 * n_chunks;
@@ -330,7 +347,8 @@ static int get_arrays(const struct reader *r, struct content *content)
 	return PSR_OK;
 }
 
-int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct content *content, struct psr_error *err)
+int file_parse(const uint8_t *bytes, size_t n_bytes, struct psr_pool *pool, const char *name, struct content *content,
+               struct psr_error *err)
 {
 	const void *camera = NULL, *light = NULL, *calibrated = NULL;
 	struct reader r = { .bytes = bytes, .n_bytes = n_bytes, .name = name, .err = err };
@@ -349,7 +367,7 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	if (code == PSR_OK)
 		code = check_places(&r);
 	if (code == PSR_OK)
-		code = check_hashes(&r);
+		code = check_hashes(&r, pool);
 	if (code == PSR_OK)
 		code = sort_sections(&r);
 	if (code != PSR_OK)
@@ -381,5 +399,5 @@ int file_parse(const uint8_t *bytes, size_t n_bytes, const char *name, struct co
 	content->presets.camera = camera;
 	content->presets.light = light;
 	content->calibration.view = calibrated;
-	return code == PSR_OK ? model_validate(content, name, err) : code;
+	return code == PSR_OK ? model_validate(content, pool, name, err) : code;
 }

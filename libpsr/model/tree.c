@@ -51,7 +51,51 @@ int model_check_octree_counts(const struct octree *tree, const char *name, struc
 	return PSR_OK;
 }
 
-int model_validate_octree(const struct octree *tree, const char *name, struct psr_error *err)
+#define STRETCH 4096 /* leaves whose attributes are looked at together */
+
+_Static_assert((PSR_DIRECTIONS & (PSR_DIRECTIONS - 1)) == 0 && (OCTREE_OFFSETS & (OCTREE_OFFSETS - 1)) == 0,
+               "one bit too many shows in the union of all");
+
+static uint64_t stretch_end(const struct octree *tree, uint64_t first)
+{
+	return tree->n_leaves - first < STRETCH ? tree->n_leaves : first + STRETCH;
+}
+
+static unsigned any_normal(const struct octree *tree, uint64_t first)
+{
+	const uint64_t end = stretch_end(tree, first);
+	unsigned any = 0;
+
+	for (uint64_t i = first; i < end; i++)
+		any |= tree->normal[i];
+	return any;
+}
+
+static unsigned any_offset(const struct octree *tree, uint64_t first)
+{
+	const uint64_t end = stretch_end(tree, first);
+	unsigned any = 0;
+
+	for (uint64_t i = first; i < end; i++)
+		any |= tree->offset[i];
+	return any;
+}
+
+static int fail_normal(const struct octree *tree, uint64_t i, const char *name, struct psr_error *err)
+{
+	while (tree->normal[i] < PSR_DIRECTIONS)
+		i++;
+	return fail("ONRM", "the normal of leaf %" PRIu64 " is %d; normals are below %d", i, tree->normal[i], PSR_DIRECTIONS);
+}
+
+static int fail_offset(const struct octree *tree, uint64_t i, const char *name, struct psr_error *err)
+{
+	while (tree->offset[i] < OCTREE_OFFSETS)
+		i++;
+	return fail("OOFF", "the offset of leaf %" PRIu64 " is %d; offsets are below %d", i, tree->offset[i], OCTREE_OFFSETS);
+}
+
+int model_validate_octree(const struct octree *tree, struct psr_pool *pool, const char *name, struct psr_error *err)
 {
 	struct psr_error what = { 0 };
 
@@ -62,15 +106,13 @@ int model_validate_octree(const struct octree *tree, const char *name, struct ps
 			            tree->low[2], tree->edge, (double)MODEL_MAX_COORDINATE);
 	if (!(tree->edge >= (double)MODEL_LEAST_SPACING))
 		return fail("OCTR", "the cube's edge is %g; it must be %g at least", tree->edge, (double)MODEL_LEAST_SPACING);
-	if (octree_check(tree, &what) != PSR_OK)
+	if (octree_check(tree, pool, &what) != PSR_OK)
 		return fail("OCOD", "%s", what.text);
-	for (uint64_t i = 0; tree->normal != NULL && i < tree->n_leaves; i++)
-		if (tree->normal[i] >= PSR_DIRECTIONS)
-			return fail("ONRM", "the normal of leaf %" PRIu64 " is %d; normals are below %d", i, tree->normal[i],
-			            PSR_DIRECTIONS);
-	for (uint64_t i = 0; tree->offset != NULL && i < tree->n_leaves; i++)
-		if (tree->offset[i] >= OCTREE_OFFSETS)
-			return fail("OOFF", "the offset of leaf %" PRIu64 " is %d; offsets are below %d", i, tree->offset[i],
-			            OCTREE_OFFSETS);
+	for (uint64_t i = 0; tree->normal != NULL && i < tree->n_leaves; i += STRETCH)
+		if ((any_normal(tree, i) & ~(PSR_DIRECTIONS - 1)) != 0)
+			return fail_normal(tree, i, name, err);
+	for (uint64_t i = 0; tree->offset != NULL && i < tree->n_leaves; i += STRETCH)
+		if ((any_offset(tree, i) & ~(OCTREE_OFFSETS - 1)) != 0)
+			return fail_offset(tree, i, name, err);
 	return PSR_OK;
 }

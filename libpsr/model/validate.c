@@ -238,7 +238,7 @@ static int check_presets(const struct checker *c)
 	return presets_validate(c->presets, &section, &err) == PSR_OK ? PSR_OK : fail(c, section, "%s", err.text);
 }
 
-int model_validate(const struct content *content, const char *name, struct psr_error *err)
+int model_validate(const struct content *content, struct psr_pool *pool, const char *name, struct psr_error *err)
 {
 	static int (*const checks[])(const struct checker *) = {
 		check_info, check_presets, /* from here on, of blocks: */ check_counts, check_projections, check_clusters,
@@ -254,7 +254,7 @@ int model_validate(const struct content *content, const char *name, struct psr_e
 	if (code == PSR_OK && calibration_validate(&content->calibration, &broken) != PSR_OK)
 		code = fail(&c, "CALB", "%s", broken.text);
 	if (code == PSR_OK && content->has_octree)
-		code = model_validate_octree(&content->octree, name, err);
+		code = model_validate_octree(&content->octree, pool, name, err);
 	if (code == PSR_OK && content->has_points)
 		code = model_validate_points(&content->points, name, err);
 	return code;

@@ -1,60 +1,47 @@
 #include <stdlib.h>
 #include <string.h>
-#include "octree.h"
-#include "base/direction.h"
+#include "subtree.h"
 
 static int put_leaf(const struct octree_node *node, void *userdata)
 {
 	return octree_maker_put(userdata, node->path, NULL);
 }
 
-/* Where the leaves of a coarser tree take their offsets from. */
-struct offsetting {
+struct averaging {
 	const struct octree *finer;
 	struct octree *tree;
 	uint64_t n;
 };
 
-/* The mean place of a node's leaves tells its offset. Its code lists them. */
-static int put_offset(const struct octree_node *node, void *userdata)
+/* A node's children are leaves of the finer tree. */
+static int put_means(const struct octree_node *node, void *userdata)
 {
-	struct offsetting *o = userdata;
-	const float(*direction)[3] = psr_direction_table(), *normal = direction[o->tree->normal[o->n]];
-	const unsigned code = o->finer->code[node->code];
-	uint64_t leaf = node->leaf;
-	double sum = 0.0;
-	int count = 0;
+	struct averaging *a = userdata;
+	const struct octree *finer = a->finer, *tree = a->tree;
+	const unsigned code = finer->code[node->code], n = octree_popcount(code);
+	const uint64_t leaf = a->n++;
 
-	for (unsigned j = 0; j < 8; j++) {
-		if (!(code >> j & 1))
-			continue;
-		const float *own = direction[o->finer->normal[leaf]];
-		const double offset = octree_offset(o->finer->offset[leaf++]);
-
-		for (int a = 0; a < 3; a++)
-			sum += (double)normal[a] * ((j >> a & 1 ? 0.5 : -0.5) + offset * (double)own[a]);
-		count++;
-	}
-	o->tree->offset[o->n++] = (uint8_t)octree_offset_step(sum / (2 * count));
+	if (tree->normal != NULL)
+		tree->normal[leaf] = octree_mean_normal(finer->normal + node->leaf, n);
+	if (tree->color != NULL)
+		octree_mean_color(tree->color[leaf], (const uint8_t(*)[3])finer->color + node->leaf, n);
+	if (tree->offset != NULL)
+		tree->offset[leaf] = (uint8_t)octree_mean_offset(code, tree->normal[leaf], finer->normal + node->leaf,
+		                                                 finer->offset + node->leaf);
 	return 0;
 }
 
 static int make_attributes(struct octree *tree, const struct octree *finer)
 {
-	struct offsetting offsetting = { finer, tree, 0 };
+	struct averaging averaging = { finer, tree, 0 };
 
 	if (finer->normal != NULL && (tree->normal = malloc(tree->n_leaves * sizeof *tree->normal)) == NULL)
 		return 0;
 	if (finer->color != NULL && (tree->color = malloc(tree->n_leaves * sizeof *tree->color)) == NULL)
 		return 0;
-	if (tree->normal != NULL || tree->color != NULL)
-		octree_average(finer, tree->levels, tree->normal, tree->color);
-	if (finer->normal == NULL || finer->offset == NULL)
-		return 1;
-	tree->offset = malloc(tree->n_leaves);
-	if (tree->offset == NULL)
+	if (finer->normal != NULL && finer->offset != NULL && (tree->offset = malloc(tree->n_leaves)) == NULL)
 		return 0;
-	octree_walk(finer, tree->levels, put_offset, &offsetting);
+	octree_walk(finer, tree->levels, put_means, &averaging);
 	return 1;
 }
 

@@ -6,6 +6,7 @@
 #define PSR_OCTREE_OCTREE_H
 
 #include <stdint.h>
+#include "base/pool.h"
 #include "psr/error.h"
 
 #define OCTREE_LEAST_LEVELS 2
@@ -75,12 +76,18 @@ double octree_offset(unsigned step);
 /* Returns the nearest step. */
 unsigned octree_offset_step(double offset);
 
-/* Checks codes and skip index, whatever bytes they are, against each other and the counts. FORMAT. */
-int octree_check(const struct octree *tree, struct psr_error *err);
+/* Checks codes and skip index, whatever bytes they are, against each other and the counts. Threads of the pool, which may
+ * be NULL, share the work. FORMAT. */
+int octree_check(const struct octree *tree, struct psr_pool *pool, struct psr_error *err);
 
-/* Computes normals and colours of the nodes of a depth, in Morton order, each the mean of its leaves', colours in the
- * codes' scale. Arrays of as many elements as octree_walk() visits; NULL: not wanted, and else the tree has them. */
-void octree_average(const struct octree *tree, int depth, uint16_t *normal, uint8_t (*color)[3]);
+/* ---- attributes of inner nodes, from those of their 1 to 8 children, in the order of these ---- */
+
+uint16_t octree_mean_normal(const uint16_t *normal, unsigned n);
+void octree_mean_color(uint8_t mean[3], const uint8_t (*color)[3], unsigned n); /* in the codes' scale */
+
+/* Returns where the mean of the children's points is along the mean normal, as a step of a leaf of the node's size.
+ * code: the node's, which lists its children. */
+unsigned octree_mean_offset(unsigned code, uint16_t mean, const uint16_t *normal, const uint8_t *offset);
 
 /* Makes the tree whose leaves are the nodes right above those of `finer`, of more than OCTREE_LEAST_LEVELS levels: with
  * the means of their normals and colours, and, where leaves have normals and offsets, the offsets of their mean places.

@@ -1,8 +1,6 @@
 #include <assert.h>
 #include <math.h>
-#include <stddef.h>
 #include "octree.h"
-#include "base/direction.h"
 
 struct walk {
 	const struct octree *tree;
@@ -84,69 +82,4 @@ void octree_center(const struct octree *tree, uint64_t path, int depth, double c
 	octree_place(path, at);
 	for (int c = 0; c < 3; c++)
 		center[c] = tree->low[c] + tree->edge * ldexp((double)at[c] + 0.5, -depth);
-}
-
-/* sqrt(3): from corner to corner of a cube of edge 1. */
-#define DIAGONAL 1.7320508075688772
-
-double octree_offset(unsigned step)
-{
-	assert(step < OCTREE_OFFSETS);
-	return DIAGONAL * (((double)step + 0.5) / OCTREE_OFFSETS - 0.5);
-}
-
-unsigned octree_offset_step(double offset)
-{
-	const double step = (offset / DIAGONAL + 0.5) * OCTREE_OFFSETS;
-
-	return step >= OCTREE_OFFSETS - 1 ? OCTREE_OFFSETS - 1 : step > 0.0 ? (unsigned)step : 0; /* NaN: 0 */
-}
-
-/* ---- averages ---- */
-
-struct average {
-	const struct octree *tree;
-	uint16_t *normal;
-	uint8_t (*color)[3];
-	uint64_t n, from; /* nodes whose first leaf is known; the first leaf of the last one */
-};
-
-/* Ends the last node before leaf `to`. */
-static void end_node(const struct average *a, uint64_t to)
-{
-	double sum[3] = { 0.0, 0.0, 0.0 };
-	uint64_t color[3] = { 0, 0, 0 };
-	const uint64_t count = to - a->from;
-
-	for (uint64_t i = a->from; i < to; i++)
-		for (int c = 0; c < 3; c++) {
-			sum[c] += a->normal != NULL ? (double)psr_direction_table()[a->tree->normal[i]][c] : 0.0;
-			color[c] += a->color != NULL ? a->tree->color[i][c] : 0;
-		}
-	if (a->normal != NULL) {
-		const float mean[3] = { (float)sum[0], (float)sum[1], (float)sum[2] };
-
-		a->normal[a->n - 1] = psr_direction_encode(mean);
-	}
-	for (int c = 0; c < 3 && a->color != NULL; c++)
-		a->color[a->n - 1][c] = (uint8_t)((color[c] + count / 2) / count);
-}
-
-static int begin_node(const struct octree_node *node, void *userdata)
-{
-	struct average *a = userdata;
-
-	if (a->n > 0)
-		end_node(a, node->leaf);
-	a->n++;
-	a->from = node->leaf;
-	return 0;
-}
-
-void octree_average(const struct octree *tree, int depth, uint16_t *normal, uint8_t (*color)[3])
-{
-	struct average a = { tree, normal, color, 0, 0 };
-
-	octree_walk(tree, depth, begin_node, &a);
-	end_node(&a, tree->n_leaves);
 }

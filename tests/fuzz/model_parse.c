@@ -138,7 +138,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 	}
 	file_seal(copy, n);
 	err = (struct psr_error){ 0, "" };
-	code = file_parse(copy, n, "input", &content, &err);
+	code = file_parse(copy, n, NULL, "input", &content, &err);
 	REQUIRE(code == err.code && (code == PSR_OK) == (err.text[0] == 0));
 	if (code == PSR_OK) {
 		check_rules(&content);

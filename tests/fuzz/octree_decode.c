@@ -20,7 +20,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n)
 	REQUIRE(rc == PSR_OK || rc == PSR_ERR_FORMAT || rc == PSR_ERR_LIMIT);
 	if (rc != PSR_OK)
 		return 0;
-	REQUIRE(tree->n_leaves <= MOST && octree_check(tree, NULL) == PSR_OK);
+	REQUIRE(tree->n_leaves <= MOST && octree_check(tree, NULL, NULL) == PSR_OK);
 	for (uint64_t i = 0; i < tree->n_leaves; i++)
 		REQUIRE((tree->normal == NULL || tree->normal[i] < 32768) &&
 		        (tree->offset == NULL || tree->offset[i] < OCTREE_OFFSETS));

@@ -48,7 +48,7 @@ static int parse(const uint8_t *bytes, size_t n_bytes, struct psr_error *err)
 
 	assert_int_equal(posix_memalign(&exact, FILE_ALIGNMENT, n_bytes), 0);
 	memcpy(exact, bytes, n_bytes);
-	code = file_parse(exact, n_bytes, "m.psr", &content, err);
+	code = file_parse(exact, n_bytes, NULL, "m.psr", &content, err);
 	free(exact);
 	return code;
 }

@@ -66,7 +66,7 @@ static void assert_tree(const struct octree *t)
 	assert_memory_equal(t->normal, tree->normal, tree->n_leaves * sizeof *tree->normal);
 	assert_memory_equal(t->offset, tree->offset, tree->n_leaves);
 	assert_memory_equal(t->color, tree->color, tree->n_leaves * sizeof *tree->color);
-	assert_int_equal(octree_check(t, NULL), PSR_OK);
+	assert_int_equal(octree_check(t, NULL, NULL), PSR_OK);
 }
 
 static void a_model_holds_blocks_or_an_octree_or_both(void **state)

@@ -76,7 +76,7 @@ static struct octree *sphere(uint64_t n, int levels, uint64_t memory)
 	struct octree *tree;
 
 	assert_int_equal(build(&tree, &cloud, levels, memory, NULL), PSR_OK);
-	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	return tree;
 }
 

@@ -51,7 +51,7 @@ static void an_unpacked_tree_is_the_packed_one(void **state)
 			assert_int_equal(octree_pack(&bytes, &n, tree, packing, NULL, NULL), PSR_OK);
 			assert_int_equal(octree_unpack(&again, bytes, n, tree->n_leaves, NULL, NULL), PSR_OK);
 			assert_same(tree, again);
-			assert_int_equal(octree_check(again, NULL), PSR_OK);
+			assert_int_equal(octree_check(again, NULL, NULL), PSR_OK);
 			free(bytes);
 			octree_destroy(tree);
 			octree_destroy(again);
@@ -122,7 +122,7 @@ static int unpack(const uint8_t *bytes, size_t n, uint64_t max_leaves)
 	rc = octree_unpack(&tree, exact, n, max_leaves, NULL, &err);
 	assert_true((rc == PSR_OK) == (tree != NULL) && rc == err.code && (rc == PSR_OK) == (err.text[0] == '\0'));
 	if (tree != NULL)
-		assert_int_equal(octree_check(tree, NULL), PSR_OK);
+		assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	octree_destroy(tree);
 	free(exact);
 	return rc;
@@ -216,7 +216,7 @@ static void a_tree_takes_only_its_own_bytes(void **state)
 	memset(tree->code, 0, tree->n_codes);
 	memset(tree->normal, 0, tree->n_leaves * sizeof *tree->normal);
 	assert_int_equal(octree_unpack_into(tree, bytes, n, NULL, NULL), PSR_OK);
-	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	octree_destroy(other);
 	assert_int_equal(octree_unpack(&other, bytes, n, UINT64_MAX, NULL, NULL), PSR_OK);
 	assert_same(tree, other);

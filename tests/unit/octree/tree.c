@@ -48,7 +48,7 @@ static void the_walk_of_each_depth_finds_the_leaves_and_what_is_above_them(void 
 		struct octree *tree = leaves_to_tree(&leaves, forms[f].levels);
 
 		assert_non_null(tree);
-		assert_int_equal(octree_check(tree, NULL), PSR_OK);
+		assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 		assert_int_equal(tree->n_leaves, leaves.n);
 		for (int depth = 0; depth <= tree->levels; depth++) {
 			struct expected e = { &leaves, tree->levels - depth, 0 };
@@ -158,11 +158,11 @@ static void a_spoilt_tree_is_refused(void **state)
 		tree->skip[1].code += spoil == 5;
 		tree->skip[1].leaf += spoil == 6;
 		spoilt.n_skips -= spoil == 7;
-		assert_int_equal(octree_check(&spoilt, &err), PSR_ERR_FORMAT);
+		assert_int_equal(octree_check(&spoilt, NULL, &err), PSR_ERR_FORMAT);
 		tree->code[100] = code;
 		tree->skip[1] = skip;
 	}
-	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	octree_destroy(tree);
 	free(leaves.path);
 }
@@ -178,30 +178,82 @@ static void offsets_are_within_half_a_step(void **state)
 	assert_int_equal(octree_offset_step(9.0), OCTREE_OFFSETS - 1);
 }
 
-static void an_average_is_of_the_leaves_below(void **state)
+static void means_are_of_the_children(void **state)
 {
-	const struct leaves leaves = { (uint64_t[]){ 0, 1, 8, 63 }, 4 };
-	const float up[3] = { 0.0f, 0.0f, 1.0f }, right[3] = { 1.0f, 0.0f, 0.0f };
-	struct octree *tree = leaves_to_tree(&leaves, 2);
-	uint16_t normal[3];
-	uint8_t color[3][3];
+	const float up[3] = { 0.0f, 0.0f, 1.0f }, right[3] = { 1.0f, 0.0f, 0.0f }, between[3] = { 1.0f, 0.0f, 2.0f };
+	const uint16_t normal[] = { psr_direction_encode(up), psr_direction_encode(up), psr_direction_encode(right) };
+	const float(*unit)[3] = psr_direction_table();
+	const uint8_t color[][3] = { { 0, 255, 7 }, { 10, 255, 7 }, { 21, 254, 8 } };
+	const uint8_t low[] = { 0, 0, 0, 0 }, high[] = { 3, 3, 3, 3 };
+	const uint16_t same[] = { normal[0], normal[0], normal[0], normal[0] };
+	uint8_t mean[3];
 
 	(void)state;
-	assert_non_null(tree);
-	tree->normal = calloc(4, sizeof *tree->normal);
-	tree->color = calloc(4, sizeof *tree->color);
-	assert_true(tree->normal != NULL && tree->color != NULL);
-	for (int i = 0; i < 4; i++) {
-		tree->normal[i] = psr_direction_encode(i < 3 ? up : right);
-		memset(tree->color[i], 10 * i, 3);
+	const float *at = unit[octree_mean_normal(normal, 3)];
+	assert_true(at[0] * between[0] + at[2] * between[2] > 0.998f * sqrtf(5.0f));
+	for (unsigned n = 1; n <= 8; n++)
+		for (unsigned sum = 0; sum <= 255 * n; sum++) {
+			uint8_t of[8][3];
+
+			for (unsigned i = 0; i < n; i++)
+				memset(of[i], (int)((sum + i) / n), 3);
+			octree_mean_color(mean, (const uint8_t(*)[3])of, n);
+			assert_int_equal(mean[2], (sum + n / 2) / n);
+		}
+	octree_mean_color(mean, color, 3);
+	assert_true(mean[0] == 10 && mean[1] == 255 && mean[2] == 7);
+	/* Four lower leaves with low points; four upper ones with high points. Offsets of 3 sqrt(3) / 8 and half an edge. */
+	assert_int_equal(octree_mean_offset(0x0f, normal[0], same, low), octree_offset_step((-0.5 - 0.6495) / 2));
+	assert_int_equal(octree_mean_offset(0xf0, normal[0], same, high), octree_offset_step((0.5 + 0.6495) / 2));
+	assert_int_equal(octree_mean_offset(0x0f, normal[0], same, high), octree_offset_step((-0.5 + 0.6495) / 2));
+}
+
+/* Which octree_mean_normal() takes for granted where all children have one. */
+static void the_mean_of_equal_normals_is_theirs(void **state)
+{
+	const float(*of)[3] = psr_direction_table();
+
+	(void)state;
+	for (unsigned i = 0; i < PSR_DIRECTIONS; i++) {
+		double sum[3] = { 0, 0, 0 };
+
+		for (int n = 1; n <= 8; n++) {
+			for (int c = 0; c < 3; c++)
+				sum[c] += (double)of[i][c];
+			assert_int_equal(psr_direction_encode((const float[3]){ (float)sum[0], (float)sum[1], (float)sum[2] }), i);
+		}
 	}
-	octree_average(tree, 1, normal, color);
-	assert_int_equal(normal[0], tree->normal[0]);
-	assert_int_equal(normal[2], tree->normal[3]);
-	assert_true(color[0][0] == 5 && color[1][1] == 20 && color[2][2] == 30);
-	octree_average(tree, 0, NULL, color);
-	assert_int_equal(color[0][0], 15);
+}
+
+/* Whatever is wrong, and wherever: threads find the same fault as one. */
+static void threads_find_the_first_fault(void **state)
+{
+	struct leaves leaves = leaves_of_sphere(9);
+	struct octree *tree = leaves_to_tree(&leaves, 9);
+	uint64_t random = 11;
+	struct psr_pool *pool;
+
+	(void)state;
+	assert_int_equal(psr_pool_create(&pool, 3, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, pool, NULL), PSR_OK);
+	for (int i = 0; i < 300; i++) {
+		struct psr_error alone, shared;
+		const uint64_t at = random_below(&random, (uint32_t)tree->n_codes);
+		const uint64_t more = random_below(&random, (uint32_t)tree->n_codes);
+		const uint8_t code[2] = { tree->code[at], tree->code[more] };
+
+		tree->code[at] = (uint8_t)random_below(&random, 256);
+		tree->code[more] = i % 2 ? 0 : code[1];
+		const int rc = octree_check(tree, NULL, &alone);
+		assert_int_equal(octree_check(tree, pool, &shared), rc);
+		if (rc != PSR_OK)
+			assert_string_equal(alone.text, shared.text);
+		tree->code[more] = code[1];
+		tree->code[at] = code[0];
+	}
+	psr_pool_destroy(pool);
 	octree_destroy(tree);
+	free(leaves.path);
 }
 
 int main(void)
@@ -214,7 +266,9 @@ int main(void)
 		cmocka_unit_test(leaves_out_of_order_are_refused),
 		cmocka_unit_test(a_spoilt_tree_is_refused),
 		cmocka_unit_test(offsets_are_within_half_a_step),
-		cmocka_unit_test(an_average_is_of_the_leaves_below),
+		cmocka_unit_test(means_are_of_the_children),
+		cmocka_unit_test(the_mean_of_equal_normals_is_theirs),
+		cmocka_unit_test(threads_find_the_first_fault),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -16,7 +16,7 @@ static struct octree *voxels(const double (*position)[3], const uint32_t (*trian
 	struct octree *tree = NULL;
 
 	assert_int_equal(octree_from_surface(&tree, &surface, LEVELS, OCTREE_LEAST_MEMORY, "/tmp", NULL), PSR_OK);
-	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	return tree;
 }
 

@@ -38,7 +38,7 @@ static struct octree *tree_of(const struct psr_mesh *mesh)
 
 	if (try_tree(&tree, mesh, LEVELS, &err) != PSR_OK)
 		fail_msg("%s", err.text);
-	assert_int_equal(octree_check(tree, NULL), PSR_OK);
+	assert_int_equal(octree_check(tree, NULL, NULL), PSR_OK);
 	return tree;
 }
 

@@ -1,0 +1,32 @@
+/* Cubes in the making: cubes.c knows the order, cubes_make.c reads subtrees. */
+#ifndef PSR_MODEL_CUBES_MAKE_H
+#define PSR_MODEL_CUBES_MAKE_H
+
+#include "cubes.h"
+#include "octree/subtree.h"
+
+/* Elements of each level: how many, or the next ones. */
+struct cubes_count {
+	uint64_t cube[CUBES_MOST_LEVELS], code[CUBES_MOST_LEVELS], leaf[CUBES_MOST_LEVELS], skip[CUBES_MOST_LEVELS];
+};
+
+struct cubes_making {
+	struct psr_cubes *cubes;
+	const struct octree *tree;
+	int height, n_levels;      /* height: of subtrees, which are clusters */
+	struct octree *coarse[CUBES_MOST_LEVELS]; /* the trees of levels above 0 */
+	struct cubes_count task[OCTREE_TASKS + 1]; /* elements of each task; then of all before it, and of all */
+	/* Arrays to fill; levels follow each other in all but `run`. */
+	struct psr_cluster *cluster;
+	struct psr_cube *cube;
+	struct psr_cube_run *run[CUBES_MOST_LEVELS];
+	uint8_t *flags, *sine;     /* sine, axis: NULL without cones */
+	int8_t *axis[3];
+};
+
+/* Loops of a pool over OCTREE_TASKS; userdata is the struct cubes_making. */
+void cubes_count_task(int task, void *userdata);
+/* Fills the trees and arrays of a task; in cubes, `code` and `leaf` are the low bits of their places in the level. */
+void cubes_fill_task(int task, void *userdata);
+
+#endif
