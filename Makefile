@@ -348,7 +348,7 @@ $(FIRST): $(addprefix $(BUILD)/tests/bench/,first.c.o first_mesh.c.o report.c.o)
 TRUTH_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,child report truth truth_build truth_rows truth_table))
 $(TRUTH): $(TRUTH_O) $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lcjson $(L_BUILD_HERE) $(L_PSR)
-BUDGET_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,budget budget_bound budget_link budget_times child report truth_build))
+BUDGET_O := $(addprefix $(BUILD)/tests/bench/,$(addsuffix .c.o,budget budget_bound budget_link budget_rmse budget_times child report truth_build))
 $(BUDGET): $(BUDGET_O) $(CODEC_O) $(LIB)/libpsrclient.a $(LIB)/libpsrproto.a $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) -lcjson $(L_CODEC) $(L_BUILD_HERE) $(L_PSR)
 $(LARGE): $(BUILD)/tests/bench/large.c.o $(HARD_O) $(LIB)/libpsr.a

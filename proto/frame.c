@@ -175,7 +175,7 @@ static void layout_frame(struct wire *w, void *p)
 	wire_u8(w, &m->budget);
 	wire_u16(w, &m->flags);
 	wire_u64(w, &m->time_budget_us);
-	wire_f64(w, &m->error_bound_px, 1);
+	wire_f64(w, &m->error_bound, 1);
 	layout_settings(w, &m->settings);
 	wire_u32(w, &m->base);
 	wire_reserved(w, 4);
@@ -187,17 +187,18 @@ static void layout_frame(struct wire *w, void *p)
 static int check_budget(const struct psr_msg_frame *m, struct psr_error *err)
 {
 	const struct psr_msg_settings *settings = &m->settings;
+	const int has_bound = m->budget == PSR_WIRE_BUDGET_ERROR || m->budget == PSR_WIRE_BUDGET_RMSE;
 	const int no_settings = !settings->scale && !settings->is_smooth && !settings->pass && settings->spacing_px == 0;
 
-	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_SETTINGS, err) ||
+	if (check_integer("the kind of budget", m->budget, PSR_WIRE_BUDGET_NONE, PSR_WIRE_BUDGET_RMSE, err) ||
 	    (m->budget != PSR_WIRE_BUDGET_TIME && check_zero("a time budget", m->time_budget_us == 0, err)) ||
-	    (m->budget != PSR_WIRE_BUDGET_ERROR && check_zero("an error bound", m->error_bound_px == 0, err)) ||
+	    (!has_bound && check_zero("an error bound", m->error_bound == 0, err)) ||
 	    (m->budget != PSR_WIRE_BUDGET_SETTINGS && check_zero("settings", no_settings, err)))
 		return PSR_ERR_ARG;
 	if (m->budget == PSR_WIRE_BUDGET_TIME)
 		return check_integer("the time budget", m->time_budget_us, 1, PSR_WIRE_MAX_INTEGER, err);
-	if (m->budget == PSR_WIRE_BUDGET_ERROR)
-		return check_positive("the error bound (pixels)", m->error_bound_px, err);
+	if (has_bound)
+		return check_positive("the error bound", m->error_bound, err);
 	return m->budget == PSR_WIRE_BUDGET_SETTINGS ? check_settings(&m->settings, err) : PSR_OK;
 }
 

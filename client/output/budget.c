@@ -1,11 +1,12 @@
 #include "budget.h"
+#include <math.h>
 #include <stdio.h>
 #include "base/json.h"
 #include "client/scene/quality.h"
 
 int budget_is_said(const struct psr_msg_frame *asked)
 {
-	return asked->budget == PSR_WIRE_BUDGET_TIME || asked->budget == PSR_WIRE_BUDGET_ERROR;
+	return asked->budget != PSR_WIRE_BUDGET_NONE && asked->budget != PSR_WIRE_BUDGET_SETTINGS;
 }
 
 static const struct psr_msg_report_entry *find(const struct psr_msg_frame_end *end, unsigned id)
@@ -21,20 +22,42 @@ static double ms_of(const struct psr_msg_report_entry *entry)
 	return entry != NULL ? (double)entry->ns / 1e6 : 0;
 }
 
-static void add_price(cJSON *to, const char *name, const struct psr_msg_report_entry *entry)
-{
+/* Settings, and what they are foreseen to take and to be worth. */
+struct price {
 	struct psr_msg_settings settings;
-	cJSON *price;
+	double ms;
+	double db; /* NAN: unknown */
+};
+
+/* Returns 0 if the server does not tell. */
+static int find_price(struct price *price, const struct psr_msg_frame_end *end, unsigned id)
+{
+	const struct psr_msg_report_entry *entry = find(end, id);
+	const struct psr_msg_report_entry *rmse = find(end, PSR_WIRE_REPORT_RMSE_CHOSEN + id - PSR_WIRE_REPORT_CHOSEN);
 
 	if (entry == NULL)
+		return 0;
+	psr_settings_unpack(&price->settings, entry->count);
+	price->ms = ms_of(entry);
+	price->db = rmse != NULL && rmse->count > 0 ? quality_db((double)rmse->count / PSR_WIRE_RMSE_ONE) : NAN;
+	return 1;
+}
+
+static void add_price(cJSON *to, const char *name, const struct psr_msg_frame_end *end, unsigned id)
+{
+	struct price price;
+	cJSON *json;
+
+	if (!find_price(&price, end, id))
 		return;
-	psr_settings_unpack(&settings, entry->count);
-	price = cJSON_AddObjectToObject(to, name);
-	cJSON_AddNumberToObject(price, "ms", ms_of(entry));
-	cJSON_AddNumberToObject(price, "scale", settings.scale);
-	json_add_number(price, "spacing_px", settings.spacing_px);
-	cJSON_AddBoolToObject(price, "smooth", settings.is_smooth);
-	cJSON_AddNumberToObject(price, "pass", settings.pass);
+	json = cJSON_AddObjectToObject(to, name);
+	cJSON_AddNumberToObject(json, "ms", price.ms);
+	if (!isnan(price.db))
+		cJSON_AddNumberToObject(json, "db", price.db);
+	cJSON_AddNumberToObject(json, "scale", price.settings.scale);
+	json_add_number(json, "spacing_px", price.settings.spacing_px);
+	cJSON_AddBoolToObject(json, "smooth", price.settings.is_smooth);
+	cJSON_AddNumberToObject(json, "pass", price.settings.pass);
 }
 
 void budget_add(cJSON *report, const struct psr_msg_frame *asked, const struct psr_event *event)
@@ -49,41 +72,41 @@ void budget_add(cJSON *report, const struct psr_msg_frame *asked, const struct p
 	cJSON_AddStringToObject(budget, "asked", quality_budget_text(text, asked));
 	cJSON_AddBoolToObject(budget, "kept", end->status == PSR_WIRE_FRAME_OK);
 	cJSON_AddNumberToObject(budget, "error_px", end->error_px * event->begin->settings.scale);
-	add_price(budget, "chosen", find(end, PSR_WIRE_REPORT_CHOSEN));
-	add_price(budget, "cheaper", find(end, PSR_WIRE_REPORT_CHEAPER));
-	add_price(budget, "better", find(end, PSR_WIRE_REPORT_BETTER));
+	add_price(budget, "chosen", end, PSR_WIRE_REPORT_CHOSEN);
+	add_price(budget, "cheaper", end, PSR_WIRE_REPORT_CHEAPER);
+	add_price(budget, "better", end, PSR_WIRE_REPORT_BETTER);
 }
 
 /* As options of psr say it, where they can. */
-static void print_price(const char *what, const struct psr_msg_report_entry *entry)
+static void print_price(const char *what, const struct psr_msg_frame_end *end, unsigned id)
 {
-	struct psr_msg_settings settings;
+	struct price price;
 
-	if (entry == NULL)
+	if (!find_price(&price, end, id))
 		return;
-	psr_settings_unpack(&settings, entry->count);
 	fprintf(stderr, "%s ", what);
-	if (settings.pass > 0)
-		fprintf(stderr, "pass %u", settings.pass);
-	else if (settings.scale > 1)
-		fprintf(stderr, "scale %u", settings.scale);
+	if (price.settings.pass > 0)
+		fprintf(stderr, "pass %u", price.settings.pass);
+	else if (price.settings.scale > 1)
+		fprintf(stderr, "scale %u", price.settings.scale);
 	else
-		fprintf(stderr, "spacing %g%s", settings.spacing_px, settings.is_smooth ? ", smooth" : "");
-	fprintf(stderr, " for %.3g ms", ms_of(entry));
+		fprintf(stderr, "spacing %g%s", price.settings.spacing_px, price.settings.is_smooth ? ", smooth" : "");
+	fprintf(stderr, " for %.3g ms", price.ms);
+	if (!isnan(price.db))
+		fprintf(stderr, " and %.1f dB", price.db);
 }
 
 void budget_print(const char *program, const struct psr_msg_frame *asked, const struct psr_msg_frame_end *end)
 {
-	const struct psr_msg_report_entry *chosen = find(end, PSR_WIRE_REPORT_CHOSEN);
 	char text[QUALITY_BUDGET_TEXT];
 
-	if (chosen == NULL) /* of a server that does not tell */
+	if (find(end, PSR_WIRE_REPORT_CHOSEN) == NULL) /* of a server that does not tell */
 		return;
 	fprintf(stderr, "%s:", program);
-	print_price(" chose", chosen);
+	print_price(" chose", end, PSR_WIRE_REPORT_CHOSEN);
 	fprintf(stderr, ", took %.3g ms", ms_of(find(end, PSR_WIRE_REPORT_TOTAL)));
-	print_price("; cheaper:", find(end, PSR_WIRE_REPORT_CHEAPER));
-	print_price("; better:", find(end, PSR_WIRE_REPORT_BETTER));
+	print_price("; cheaper:", end, PSR_WIRE_REPORT_CHEAPER);
+	print_price("; better:", end, PSR_WIRE_REPORT_BETTER);
 	if (end->status != PSR_WIRE_FRAME_OK)
 		fprintf(stderr, "; the budget of %s was not kept", quality_budget_text(text, asked));
 	fprintf(stderr, "\n");

@@ -1,5 +1,5 @@
-/* What psrd chose for a budget of time or error, what it foresaw and what it took. Frames without such a budget have
- * none of this. */
+/* What psrd chose for a budget of time, error or likeness, what it foresaw and what it took. Frames without such a
+ * budget have none of this. */
 #ifndef PSR_CLIENT_OUTPUT_BUDGET_H
 #define PSR_CLIENT_OUTPUT_BUDGET_H
 

@@ -73,7 +73,7 @@ static void add_detail(cJSON *to, const struct psr_msg_frame *frame)
 {
 	char budget[QUALITY_BUDGET_TEXT];
 
-	if (frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR) {
+	if (frame->budget != PSR_WIRE_BUDGET_NONE && frame->budget != PSR_WIRE_BUDGET_SETTINGS) {
 		cJSON_AddStringToObject(to, "budget", quality_budget_text(budget, frame));
 		return;
 	}

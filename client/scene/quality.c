@@ -10,6 +10,8 @@
 #define MOST_MS 3.6e6
 #define LEAST_PX 1e-6
 #define MOST_PX 1e6
+#define LEAST_DB 1.0
+#define MOST_DB 99.0
 
 static const struct {
 	const char *name;
@@ -61,9 +63,11 @@ void quality_add_budget_option(struct optlist *list, struct quality_wish *wish)
 {
 	const struct psr_opt opts[] = {
 		{ .name = "budget", .type = PSR_OPT_STRING, .value = &wish->budget, .arg = "BUDGET",
-		  .words = "12ms 1px",
+		  .words = "12ms 1px 30dB",
 		  .help = "Instead of a quality what a picture may cost: 12ms, the best that psrd foresees to draw in that time; "
-		          "or 1px, the quickest whose surfaces it foresees to lie within so many pixels of their places." },
+		          "1px, the quickest whose surfaces it foresees to lie within so many pixels of their places; or 30dB, "
+		          "the quickest that it foresees to be so like the source, of models that psr-model build --calibrate "
+		          "made." },
 	};
 
 	OPTLIST_ADD(list, opts);
@@ -95,6 +99,16 @@ static int check_size(uint32_t w, uint32_t h, struct psr_error *err)
 	return PSR_OK;
 }
 
+static double rmse_of(double db)
+{
+	return 255 * pow(10, -db / 20);
+}
+
+double quality_db(double rmse)
+{
+	return 20 * log10(255 / rmse);
+}
+
 int quality_parse_budget(struct psr_msg_frame *frame, const char *text, struct psr_error *err)
 {
 	char *unit;
@@ -107,19 +121,27 @@ int quality_parse_budget(struct psr_msg_frame *frame, const char *text, struct p
 	}
 	if (unit != text && strcmp(unit, "px") == 0 && value >= LEAST_PX && value <= MOST_PX) {
 		frame->budget = PSR_WIRE_BUDGET_ERROR;
-		frame->error_bound_px = value;
+		frame->error_bound = value;
 		return PSR_OK;
 	}
-	return psr_fail(err, PSR_ERR_ARG, "--budget takes a time such as 12ms, %g to %g, or an error such as 1px, %g to %g; "
-	                "not '%.40s'", LEAST_MS, MOST_MS, LEAST_PX, MOST_PX, text);
+	if (unit != text && strcmp(unit, "dB") == 0 && value >= LEAST_DB && value <= MOST_DB) {
+		frame->budget = PSR_WIRE_BUDGET_RMSE;
+		frame->error_bound = rmse_of(value);
+		return PSR_OK;
+	}
+	return psr_fail(err, PSR_ERR_ARG, "--budget takes a time such as 12ms, %g to %g, an error such as 1px, %g to %g, or"
+	                " a likeness such as 30dB, %g to %g; not '%.40s'", LEAST_MS, MOST_MS, LEAST_PX, MOST_PX, LEAST_DB,
+	                MOST_DB, text);
 }
 
 const char *quality_budget_text(char text[QUALITY_BUDGET_TEXT], const struct psr_msg_frame *frame)
 {
 	if (frame->budget == PSR_WIRE_BUDGET_TIME)
 		snprintf(text, QUALITY_BUDGET_TEXT, "%.10gms", (double)frame->time_budget_us / 1e3);
+	else if (frame->budget == PSR_WIRE_BUDGET_RMSE)
+		snprintf(text, QUALITY_BUDGET_TEXT, "%.10gdB", quality_db(frame->error_bound));
 	else
-		snprintf(text, QUALITY_BUDGET_TEXT, "%.15gpx", frame->error_bound_px);
+		snprintf(text, QUALITY_BUDGET_TEXT, "%.15gpx", frame->error_bound);
 	return text;
 }
 

@@ -27,8 +27,10 @@ int quality_apply(struct psr_msg_frame *frame, const struct quality_wish *wish, 
 
 #define QUALITY_BUDGET_TEXT 40
 
-/* A budget of time or error as --budget takes it: "12ms", "0.5px". ARG. */
+/* A budget as --budget takes it: "12ms", "0.5px", "30dB". ARG. */
 int quality_parse_budget(struct psr_msg_frame *frame, const char *text, struct psr_error *err);
+/* Decibels of an RMSE in codes of sRGB. */
+double quality_db(double rmse);
 const char *quality_budget_text(char text[QUALITY_BUDGET_TEXT], const struct psr_msg_frame *frame);
 
 /* Chooses how the planes of the request travel, all but colour without loss. */

@@ -32,9 +32,13 @@ static void check_hashes(struct result *result, const struct judge *judge, const
 }
 
 /* Lateness depends on the machine: it is for `time` to judge. */
-static void check_budget(struct result *result, const struct psr_event *event)
+static void check_budget(struct result *result, const struct psr_msg_frame *asked, const struct psr_event *event)
 {
-	if (event->end->status == PSR_WIRE_FRAME_COARSE)
+	if (event->end->status != PSR_WIRE_FRAME_COARSE)
+		return;
+	if (asked->budget == PSR_WIRE_BUDGET_RMSE)
+		result_fail(result, "no settings are foreseen to be as like the source as --budget says");
+	else
 		result_fail(result, "the error bound is %.4g px, over the budget",
 		            event->end->error_px * event->begin->settings.scale);
 }
@@ -239,7 +243,7 @@ int judge_frame(struct result *result, const struct judge *judge, const struct p
 	if (judge->test->expect.error != PSR_OK)
 		result_fail(result, "a picture came instead of the error `%s`", psr_strerror(judge->test->expect.error));
 	check_hashes(result, judge, event);
-	check_budget(result, event);
+	check_budget(result, &judge->test->frame, event);
 	code = compare(result, compared, judge, event->picture, err);
 	if (code == PSR_OK && result->outcome == OUTCOME_FAILED)
 		code = end_failed(result, judge, event->picture, compared, err);

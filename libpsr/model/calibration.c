@@ -59,6 +59,9 @@ static int compare_values(const void *a, const void *b)
 
 static double weight_of(const struct psr_calibrated *view, const struct psr_calibrated *like)
 {
+	if (like == NULL)
+		return 1;
+
 	const double apart = log2((double)view->apart / (double)like->apart) / ALIKE_APART;
 	const double layers = log(((double)view->layers + 0.1) / ((double)like->layers + 0.1)) / ALIKE_LAYERS;
 	const double light = !view->n_shadow_lights == !like->n_shadow_lights ? 1 : UNLIKE_LIGHT;

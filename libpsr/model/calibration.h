@@ -39,7 +39,7 @@ int psr_model_calibrate(struct psr_model **out, const struct psr_model *model,
                         const struct psr_calibration *calibration, struct psr_error *err);
 
 /* Foresees for a view, of which `like` has what is seen and no results, from similar views: the error that 9 of 10
- * views do not exceed, and the median time. n > 0. */
+ * views do not exceed, and the median time. like NULL: from all views alike. n > 0. */
 double psr_calibration_rmse(const struct psr_calibration *calibration, const struct psr_calibrated *like, int rung);
 double psr_calibration_ms(const struct psr_calibration *calibration, const struct psr_calibrated *like, int rung);
 

@@ -75,6 +75,8 @@ static void set_price(struct budget_price *price, const struct budget_learnt *le
 {
 	price->settings = budget_ladder[rung];
 	price->ns = budget_foresee(learnt, view, rung);
+	price->has_rmse = view->is_calibrated;
+	price->rmse = view->rmse[rung];
 }
 
 static void set_choice(struct budget_choice *choice, const struct budget_learnt *learnt, const struct budget_view *view,
@@ -111,27 +113,49 @@ void budget_choose_time(struct budget_choice *choice, const struct budget_learnt
 	choice->is_met = fitting >= 0;
 }
 
-void budget_choose_error(struct budget_choice *choice, const struct budget_learnt *learnt,
-                         const struct budget_view *view, double limit_px)
+/* The cheapest rung whose error is within the limit, or the one of the least error. */
+static void choose_by_error(struct budget_choice *choice, const struct budget_learnt *learnt,
+                            const struct budget_view *view, const double error[BUDGET_RUNGS], double limit)
 {
 	int fitting = -1, least = -1;
 
 	for (int i = 0; i < BUDGET_RUNGS; i++) {
 		if (!is_offered(&budget_ladder[i], view))
 			continue;
-		if (error_of(learnt, i) <= limit_px
+		if (error[i] <= limit
 		    && (fitting < 0 || budget_foresee(learnt, view, i) < budget_foresee(learnt, view, fitting)))
 			fitting = i;
-		if (least < 0 || error_of(learnt, i) < error_of(learnt, least))
+		if (least < 0 || error[i] < error[least])
 			least = i;
 	}
 	set_choice(choice, learnt, view, fitting >= 0 ? fitting : least);
 	choice->is_met = fitting >= 0;
 }
 
+void budget_choose_error(struct budget_choice *choice, const struct budget_learnt *learnt,
+                         const struct budget_view *view, double limit_px)
+{
+	double error[BUDGET_RUNGS];
+
+	for (int i = 0; i < BUDGET_RUNGS; i++)
+		error[i] = error_of(learnt, i);
+	choose_by_error(choice, learnt, view, error, limit_px);
+}
+
+void budget_choose_rmse(struct budget_choice *choice, const struct budget_learnt *learnt,
+                        const struct budget_view *view, double limit)
+{
+	choose_by_error(choice, learnt, view, view->rmse, limit);
+}
+
+int budget_is_asked(const struct psr_msg_frame *request)
+{
+	return request->budget != PSR_WIRE_BUDGET_NONE && request->budget != PSR_WIRE_BUDGET_SETTINGS;
+}
+
 unsigned budget_most_pass(const struct psr_msg_frame *request)
 {
 	if (request->budget == PSR_WIRE_BUDGET_SETTINGS)
 		return request->settings.pass;
-	return request->budget != PSR_WIRE_BUDGET_NONE && can_refine(request->planes) ? PSR_WIRE_MAX_PASS : 0;
+	return budget_is_asked(request) && can_refine(request->planes) ? PSR_WIRE_MAX_PASS : 0;
 }

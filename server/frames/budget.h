@@ -1,4 +1,4 @@
-/* Which settings a request gets that has a budget of time or error, and what they will take.
+/* Which settings a request gets that has a budget of time, error or RMSE, and what they will take.
  *
  * A model without clock and I/O: work, foreseen by a survey, times what a unit of it took in the frames before. The
  * ladder is generic; it rises from the cheapest settings to the best. */
@@ -32,6 +32,9 @@ struct budget_view {
 	double area; /* pixels of the picture that models cover */
 	struct budget_counts at[BUDGET_RUNGS];
 	unsigned n_shadow_lights;
+	int is_calibrated; /* rmse and ms have what calibrations of the scene's models foresee: */
+	double rmse[BUDGET_RUNGS]; /* codes of sRGB */
+	double ms[BUDGET_RUNGS];   /* of some machine: to be compared with each other; 0: unknown */
 	struct psr_msg_settings kept; /* of the flow's last frame if it drew this scene: its maps stand; or scale 0 */
 };
 
@@ -80,6 +83,8 @@ void budget_learn(struct budget_learnt *learnt, const struct budget_view *view, 
 struct budget_price {
 	struct psr_msg_settings settings; /* scale 0: there are none such */
 	double ns;                        /* foreseen: 95 of 100 frames take at most so long */
+	int has_rmse;
+	double rmse;                      /* foreseen: 9 of 10 views have at most so much; codes of sRGB */
 };
 
 struct budget_choice {
@@ -95,6 +100,12 @@ void budget_choose_time(struct budget_choice *choice, const struct budget_learnt
 void budget_choose_error(struct budget_choice *choice, const struct budget_learnt *learnt,
                          const struct budget_view *view, double limit_px);
 
+/* RMSE: the cheapest rung that is foreseen to have at most limit codes; else the one of the least. The view is
+ * calibrated. */
+void budget_choose_rmse(struct budget_choice *choice, const struct budget_learnt *learnt,
+                        const struct budget_view *view, double limit);
+
+int budget_is_asked(const struct psr_msg_frame *request); /* of time, error or RMSE: settings are chosen */
 unsigned budget_most_pass(const struct psr_msg_frame *request); /* that may be chosen for it, or is asked for */
 
 /* ---- for the files of budgets ---- */

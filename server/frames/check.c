@@ -1,13 +1,14 @@
 #include <inttypes.h>
+#include "budget.h"
 #include "check.h"
+#include "scene.h"
 #include "schedule.h"
 #include "psr/render.h"
 
 int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, int64_t max_pixels,
                 struct psr_error *err)
 {
-	const int is_chosen = frame->budget == PSR_WIRE_BUDGET_TIME || frame->budget == PSR_WIRE_BUDGET_ERROR
-	                      || frame->settings.pass > 0;
+	const int is_chosen = budget_is_asked(frame) || frame->settings.pass > 0;
 	uint64_t n_pixels = (uint64_t)frame->width * frame->height;
 
 	if (view >= SCHEDULE_VIEWS)
@@ -35,9 +36,18 @@ int frame_check(const struct psr_msg_frame *frame, uint32_t id, uint16_t view, i
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
 		                "this server refines colour and depth; other planes take settings of pass 0, not %u",
 		                frame->settings.pass);
+	if (frame->budget == PSR_WIRE_BUDGET_RMSE && !(frame->planes & 1u << PSR_PLANE_COLOR))
+		return psr_fail(err, PSR_ERR_ARG, "a budget of RMSE (4) is one of colour; ask for that plane");
 	if (is_chosen && (frame->pass_limit > 0 || frame->flags & PSR_WIRE_FRAME_SHARP))
 		return psr_fail(err, PSR_ERR_UNSUPPORTED,
-		                "a budget of time or error, and settings of a pass, say how the only picture is drawn: they go "
-		                "with pass_limit 0 and without sharp (flag 2)");
+		                "a budget of time, error or RMSE, and settings of a pass, say how the only picture is drawn: "
+		                "they go with pass_limit 0 and without sharp (flag 2)");
 	return PSR_OK;
+}
+
+int frame_check_scene(const struct psr_msg_frame *frame, const struct scene *scene, struct psr_error *err)
+{
+	if (scene == NULL)
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "slot %u holds no scene: send SCENE first", frame->slot);
+	return frame->budget == PSR_WIRE_BUDGET_RMSE ? scene_check_calibrated(scene, err) : PSR_OK;
 }

@@ -62,6 +62,12 @@ static void add_price(struct psr_msg_frame_end *end, unsigned id, const struct b
 		add_entry(end, id, (uint64_t)price->ns, psr_settings_pack(&price->settings));
 }
 
+static void add_rmse(struct psr_msg_frame_end *end, unsigned id, const struct budget_price *price)
+{
+	if (price->ns > 0 && price->has_rmse)
+		add_entry(end, id, 0, (uint64_t)llround(price->rmse * PSR_WIRE_RMSE_ONE));
+}
+
 struct times { /* clock_ns() */
 	uint64_t start_ns, drawn_ns, end_ns;
 };
@@ -98,6 +104,9 @@ static void fill_report(struct psr_msg_frame_end *end, const struct drawing *d, 
 	add_entry(end, PSR_WIRE_REPORT_LIGHTS, 0, d->scene->scene.n_lights);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS, 0, report->n_shadow_maps);
 	add_entry(end, PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN, 0, report->n_shadow_maps_drawn);
+	add_rmse(end, PSR_WIRE_REPORT_RMSE_CHOSEN, &d->choice.chosen);
+	add_rmse(end, PSR_WIRE_REPORT_RMSE_CHEAPER, &d->choice.cheaper);
+	add_rmse(end, PSR_WIRE_REPORT_RMSE_BETTER, &d->choice.better);
 	for (unsigned i = 0; i < PSR_N_EFFECTS; i++)
 		add_entry(end, PSR_WIRE_REPORT_EFFECTS + i, report->effect[i].why, report->effect[i].count);
 }
@@ -137,7 +146,9 @@ static uint8_t status_of(const struct drawing *d)
 
 	if (request->budget == PSR_WIRE_BUDGET_TIME && d->spent.total_ns > (double)request->time_budget_us * 1e3)
 		return PSR_WIRE_FRAME_LATE;
-	if (request->budget == PSR_WIRE_BUDGET_ERROR && d->spent.error_px > request->error_bound_px)
+	if (request->budget == PSR_WIRE_BUDGET_ERROR && d->spent.error_px > request->error_bound)
+		return PSR_WIRE_FRAME_COARSE;
+	if (request->budget == PSR_WIRE_BUDGET_RMSE && !d->choice.is_met)
 		return PSR_WIRE_FRAME_COARSE;
 	return PSR_WIRE_FRAME_OK;
 }

@@ -270,8 +270,8 @@ void frames_ask(struct frames *frames, struct flow *flow, const struct psr_messa
 	struct psr_error error;
 	int code = frame_check(request, message->id, message->view, frames->parts.max_pixels, &error);
 
-	if (code == PSR_OK && scene == NULL)
-		code = psr_fail(&error, PSR_ERR_NOT_FOUND, "slot %u holds no scene: send SCENE first", request->slot);
+	if (code == PSR_OK)
+		code = frame_check_scene(request, scene, &error);
 	if (code == PSR_OK) {
 		frame = frame_create(&frames->parts, flow, message, request, scene);
 		if (frame == NULL)

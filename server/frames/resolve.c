@@ -1,7 +1,10 @@
 #include <math.h>
 #include "model/blocks.h"
+#include "model/calibration.h"
 #include "render/survey.h"
 #include "resolve.h"
+
+#define LEAST_APART 1e-6 /* as the modeller has it */
 
 /* Of budgets 0 and 3. */
 static struct psr_msg_settings settings_of(const struct psr_msg_frame *request)
@@ -39,6 +42,29 @@ static void guess(struct budget_view *view, const struct scene *scene, const dou
 	}
 }
 
+/* What calibrations of the scene's models foresee for what is seen: the greatest error of a model, and the times of all
+ * instances together. sight NULL: nothing is known of the view. */
+static void foresee(struct budget_view *view, const struct scene *scene, const struct survey *sight)
+{
+	const struct psr_calibrated like = {
+		.apart = sight != NULL ? (float)fmax(sight->apart, LEAST_APART) : 1,
+		.layers = sight != NULL ? (float)sight->layers : 0,
+		.n_shadow_lights = view->n_shadow_lights,
+	};
+
+	view->is_calibrated = scene_check_calibrated(scene, NULL) == PSR_OK;
+	if (!view->is_calibrated || (sight != NULL && sight->apart == 0)) /* nothing in view has no error */
+		return;
+	for (uint32_t m = 0; m < scene->n_models; m++) {
+		const struct psr_calibration *calibration = psr_model_calibration(scene->model[m]->model);
+
+		for (int i = 0; i < BUDGET_RUNGS; i++) {
+			view->rmse[i] = fmax(view->rmse[i], psr_calibration_rmse(calibration, sight != NULL ? &like : NULL, i));
+			view->ms[i] += psr_calibration_ms(calibration, sight != NULL ? &like : NULL, i);
+		}
+	}
+}
+
 static void see(struct budget_view *view, const struct drawing *d, struct surveyor *surveyor)
 {
 	const struct psr_msg_frame *request = &d->request;
@@ -46,17 +72,19 @@ static void see(struct budget_view *view, const struct drawing *d, struct survey
 	double density[BUDGET_RUNGS];
 	struct survey survey;
 
-	_Static_assert(BUDGET_RUNGS <= SURVEY_MOST, "a survey counts for each rung");
+	_Static_assert(BUDGET_RUNGS <= SURVEY_MOST && BUDGET_RUNGS == PSR_RUNGS, "surveys and calibrations have each rung");
 	budget_densities(density);
 	scene.camera = request->camera;
 	if (surveyor == NULL
 	    || !survey_scene(&survey, surveyor, &scene, request->width, request->height, density, BUDGET_RUNGS)) {
 		guess(view, d->scene, density, &request->camera);
+		foresee(view, d->scene, NULL);
 		return;
 	}
 	view->area = survey.area;
 	for (int i = 0; i < BUDGET_RUNGS; i++)
 		view->at[i] = (struct budget_counts){ survey.at[i].n_blocks, survey.at[i].n_samples, survey.at[i].spread };
+	foresee(view, d->scene, &survey);
 }
 
 void resolve_settings(struct drawing *d, const struct budget_learnt *learnt, struct surveyor *surveyor)
@@ -67,13 +95,15 @@ void resolve_settings(struct drawing *d, const struct budget_learnt *learnt, str
 		.width = request->width, .height = request->height, .planes = request->planes,
 		.n_shadow_lights = scene_shadow_lights(d->scene), .kept = d->kept,
 	};
-	d->is_seen = request->budget == PSR_WIRE_BUDGET_TIME || request->budget == PSR_WIRE_BUDGET_ERROR;
+	d->is_seen = budget_is_asked(request);
 	if (d->is_seen)
 		see(&d->seen, d, surveyor);
 	if (request->budget == PSR_WIRE_BUDGET_TIME)
 		budget_choose_time(&d->choice, learnt, &d->seen, time_limit(d));
 	else if (request->budget == PSR_WIRE_BUDGET_ERROR)
-		budget_choose_error(&d->choice, learnt, &d->seen, request->error_bound_px);
+		budget_choose_error(&d->choice, learnt, &d->seen, request->error_bound);
+	else if (request->budget == PSR_WIRE_BUDGET_RMSE)
+		budget_choose_rmse(&d->choice, learnt, &d->seen, request->error_bound);
 	else
 		d->choice.chosen.settings = settings_of(request);
 	d->settings = d->choice.chosen.settings;

@@ -79,6 +79,25 @@ int scene_has_sheer(const struct scene *scene)
 	return 0;
 }
 
+int scene_check_calibrated(const struct scene *scene, struct psr_error *err)
+{
+	for (uint32_t i = 0; i < scene->scene.n_instances; i++) {
+		const struct card *card = &scene->model[scene->of_instance[i]]->card;
+
+		if (scene->instance[i].representation == PSR_OCTREE || card->n_blocks == 0)
+			return psr_fail(err, PSR_ERR_UNSUPPORTED,
+			                "instance %" PRIu32 " is drawn as an octree: the RMSE of its pictures is not known; ask "
+			                "for a budget of time or of the geometric error",
+			                i);
+		if (!card->is_calibrated)
+			return psr_fail(err, PSR_ERR_UNSUPPORTED,
+			                "the model of instance %" PRIu32 " is not calibrated, so the RMSE of its pictures is not "
+			                "known: build it with psr-model build --calibrate, or ask for another budget",
+			                i);
+	}
+	return PSR_OK;
+}
+
 /* While one frame of the scene is drawn, its models stay where they are: another one finds nothing to change. */
 void scene_bind(struct scene *scene)
 {

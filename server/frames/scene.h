@@ -29,6 +29,8 @@ uint64_t scene_blocks(const struct scene *scene);        /* of all instances */
 
 /* After scene_bind(): how many pixels the spheres around the instances cover, each at most the picture's, summed. */
 double scene_area(const struct scene *scene, const struct psr_camera *camera, uint32_t width, uint32_t height);
+/* UNSUPPORTED: an instance's model has no calibration, or it is drawn as an octree, which has none. */
+int scene_check_calibrated(const struct scene *scene, struct psr_error *err);
 int scene_has_sheer(const struct scene *scene);          /* a model has samples that let light through */
 
 /* Gives the instances their models, all of which are in memory and pinned: before a frame is drawn. */

@@ -1,6 +1,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "card.h"
+#include "model/calibration.h"
 #include "model/cubes.h"
 #include "psr/message.h"
 
@@ -23,7 +24,8 @@ int card_init(struct card *card, const struct psr_model *model)
 	if (blocks == NULL)
 		drawn = &cubes->groups;
 	*card = (struct card){ .info = *psr_model_info(model), .presets = *presets, .n_levels = drawn->n_levels,
-		                   .n_samples = drawn->n_samples, .has_sheer = blocks != NULL && blocks->opacity != NULL };
+		                   .n_samples = drawn->n_samples, .has_sheer = blocks != NULL && blocks->opacity != NULL,
+		                   .is_calibrated = psr_model_calibration(model)->n > 0 };
 	if (blocks != NULL) {
 		card->representations |= 1u << PSR_WIRE_REP_BLOCKS;
 		card->n_blocks = blocks->n_blocks;

@@ -15,6 +15,7 @@ struct card {
 	uint32_t n_blocks, n_cubes; /* of blocks, of the octree; 0 without */
 	uint64_t n_samples;
 	int has_sheer; /* some samples let a part of the light through */
+	int is_calibrated; /* its blocks' ladder is measured (model/calibration.h) */
 };
 
 /* Fills the card of a model. MEMORY: the card then holds nothing. */

@@ -1,5 +1,5 @@
-/* budget [options] WORK CACHE: whether budgets of time are kept, how good the pictures are, and whether the geometric
- * bound is one. */
+/* budget [options] WORK CACHE: whether budgets of time are kept, how good the pictures are, whether these are as like
+ * the source as was foreseen, and whether the geometric bound is one. */
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
@@ -28,10 +28,11 @@ static const struct {
 struct bench {
 	const char *work, *cache, *only;
 	int64_t seed;
-	int no_times, no_beside, no_bounds;
+	int no_times, no_beside, no_bounds, no_rmse;
 	struct truth_build build;
 	struct budget_sums alone, beside;
 	struct budget_bounds bounds;
+	struct budget_likes likes;
 };
 
 static void path_of(char path[PATH_MAX], const char *folder, const char *name, const char *ending)
@@ -97,7 +98,7 @@ static void run_model(struct bench *bench, size_t m)
 	}
 	snprintf(name, sizeof name, "%s-%d", models[m].name, BUDGET_RESOLUTION);
 	path_of(file, bench->build.folder, name, ".psr");
-	truth_build_model(&bench->build, models[m].name, source, BUDGET_RESOLUTION);
+	truth_build_model(&bench->build, models[m].name, source, BUDGET_RESOLUTION, 1);
 	must(psr_mesh_import(&mesh, source, NULL, &err), source, &err);
 	must(psr_truth_create(&look.truth, mesh, &err), source, &err);
 	must(psr_source_create(&look.source, mesh, &err), source, &err);
@@ -109,6 +110,8 @@ static void run_model(struct bench *bench, size_t m)
 		if (!bench->no_beside)
 			budget_times(&bench->beside, address, name, view, 1);
 	}
+	if (!bench->no_rmse)
+		budget_rmse(&bench->likes, address, name, view);
 	if (!bench->no_bounds)
 		budget_bound(&bench->bounds, address, name, view, look.truth);
 	truth_build_stop(&bench->build);
@@ -133,6 +136,7 @@ int main(int argc, char **argv)
 		  .help = "Leaves budgets beside another client out." },
 		{ .name = "no-bounds", .type = PSR_OPT_FLAG, .value = &bench.no_bounds,
 		  .help = "Leaves the geometric bound out." },
+		{ .name = "no-rmse", .type = PSR_OPT_FLAG, .value = &bench.no_rmse, .help = "Leaves budgets of RMSE out." },
 		{ .name = NULL },
 	};
 	const struct psr_cli cli = {
@@ -159,6 +163,7 @@ int main(int argc, char **argv)
 			run_model(&bench, m);
 	budget_times_print(&bench.alone, "alone");
 	budget_times_print(&bench.beside, "beside another client");
+	budget_rmse_print(&bench.likes);
 	budget_bound_print(&bench.bounds);
 	report_print_targets();
 	return 0;

@@ -27,6 +27,9 @@ void budget_link_request(struct psr_msg_frame *frame, const struct budget_link *
 /* Asks and waits. The event's pointers hold until the next call. */
 void budget_link_draw(struct psr_event *event, struct budget_link *link, const struct psr_msg_frame *frame);
 
+/* How far the picture is from the truth: codes of sRGB, by the pixels that the object covers. */
+double budget_rmse_of(const struct psr_frame *picture, const struct ladder_view *view);
+
 /* Of a report: 0 if it has no such entry. */
 double budget_entry_ms(const struct psr_msg_frame_end *end, unsigned id);
 
@@ -48,6 +51,18 @@ struct budget_sums {
 void budget_times(struct budget_sums *sums, const char *address, const char *model, const struct ladder_view *view,
                   int has_other);
 void budget_times_print(struct budget_sums *sums, const char *what); /* beside the targets; frees */
+
+/* ---- budget_rmse.c ---- */
+
+struct budget_likes {
+	uint64_t n_frames, n_above;
+	double *ratio; /* foreseen over measured: by frame */
+	size_t n;
+};
+
+/* Draws each view with budgets of RMSE from coarse to fine; calibrations have seen other views. */
+void budget_rmse(struct budget_likes *likes, const char *address, const char *model, const struct ladder_view *view);
+void budget_rmse_print(struct budget_likes *likes); /* beside the targets; frees */
 
 /* ---- budget_bound.c ---- */
 

@@ -1,3 +1,4 @@
+#include <math.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
@@ -79,6 +80,19 @@ void budget_link_draw(struct psr_event *event, struct budget_link *link, const s
 	must(psr_client_wait(link->client, TIMEOUT_MS, event, &err) == 1 ? PSR_OK : PSR_ERR_CONNECTION, "a picture", &err);
 	if (event->type != PSR_EVENT_FRAME)
 		report_die("a picture", event->error.text);
+}
+
+double budget_rmse_of(const struct psr_frame *picture, const struct ladder_view *view)
+{
+	const size_t n = (size_t)view->width * view->height * 3;
+	uint64_t sum = 0;
+
+	for (size_t i = 0; i < n; i++) {
+		const int d = picture->rgb[i] - view->truth[i];
+
+		sum += (uint64_t)(d * d);
+	}
+	return sqrt((double)sum / (3.0 * (double)(view->n_covered > 0 ? view->n_covered : 1)));
 }
 
 double budget_entry_ms(const struct psr_msg_frame_end *end, unsigned id)

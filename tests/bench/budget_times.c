@@ -24,15 +24,7 @@ struct cell {
 
 static double psnr_of(const struct psr_frame *picture, const struct ladder_view *view)
 {
-	const size_t n = (size_t)view->width * view->height * 3;
-	uint64_t sum = 0;
-
-	for (size_t i = 0; i < n; i++) {
-		const int d = picture->rgb[i] - view->truth[i];
-
-		sum += (uint64_t)(d * d);
-	}
-	return ladder_psnr(sqrt((double)sum / (3.0 * (double)(view->n_covered > 0 ? view->n_covered : 1))));
+	return ladder_psnr(budget_rmse_of(picture, view));
 }
 
 static void request_rung(struct psr_msg_frame *frame, const struct budget_link *link, uint32_t rung, uint32_t view)

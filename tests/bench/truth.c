@@ -104,7 +104,7 @@ static void run_row(struct bench *bench, const struct truth_row *row, struct tru
 			open_subject(subject, m, path);
 		for (unsigned b = 0; b < bench->n_builds; b++)
 			if (!result[b].is_known) {
-				truth_build_model(&bench->build[b], models[m].name, path, row->resolution);
+				truth_build_model(&bench->build[b], models[m].name, path, row->resolution, 0);
 				truth_build_start(&bench->build[b]);
 			}
 		truth_row_run(row, subject, bench->build, bench->n_builds, result);

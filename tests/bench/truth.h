@@ -23,8 +23,10 @@ struct truth_build {
 
 void truth_build_init(struct truth_build *build, const char *programs, const char *work);
 
-/* Makes FOLDER/NAME-RESOLUTION.psr unless there is one that is newer than the modeller. */
-void truth_build_model(const struct truth_build *build, const char *name, const char *source, uint32_t resolution);
+/* Makes FOLDER/NAME-RESOLUTION.psr unless there is one that is newer than the modeller. is_calibrated: with the ladder
+ * of its settings. */
+void truth_build_model(const struct truth_build *build, const char *name, const char *source, uint32_t resolution,
+                       int is_calibrated);
 
 void truth_build_start(struct truth_build *build); /* a daemon for its folder */
 void truth_build_stop(struct truth_build *build);

@@ -57,7 +57,8 @@ void truth_build_init(struct truth_build *build, const char *programs, const cha
 		report_die(build->folder, strerror(errno));
 }
 
-void truth_build_model(const struct truth_build *build, const char *name, const char *source, uint32_t resolution)
+void truth_build_model(const struct truth_build *build, const char *name, const char *source, uint32_t resolution,
+                       int is_calibrated)
 {
 	char file[128], path[PATH_MAX], program[PATH_MAX], pixels[16];
 	struct child_use use;
@@ -73,7 +74,8 @@ void truth_build_model(const struct truth_build *build, const char *name, const 
 	const struct timespec made = changed(build->folder, file);
 	if (made.tv_sec > modeller.tv_sec)
 		return;
-	const char *const argv[] = { program, "build", source, "-o", path, "-r", pixels, "-q", NULL };
+	const char *const argv[] = { program, "build",  source, "-o", path,
+		                         "-r",    pixels, "-q",   is_calibrated ? "--calibrate" : NULL, NULL };
 	if (child_run(&use, argv) != 0)
 		report_die(source, "cannot be built");
 }

@@ -43,10 +43,12 @@ check "a turntable has budgets" \
 	keep psr turntable --server "$server" --model teapot --size 80x60 --frames 5 --budget 0.001ms -o "$work/t%d.ppm"
 check "and counts what is over" grep -q '^psr turntable: 5 of 5 pictures are over the budget$' "$work/said"
 
-for bad in 12 ms 0ms -1ms nanms 12s 1e9ms 0px infpx 1mpx ""; do
+for bad in 12 ms 0ms -1ms nanms 12s 1e9ms 0px infpx 1mpx 0dB 100dB 30db ""; do
 	refuses "a budget of '$bad'" 2 "--budget takes a time such as 12ms" \
 		shot --model teapot --budget "$bad" -o "$work/a.ppm"
 done
+refuses "a likeness to the source of a model that nobody measured" 4 "psr-model build --calibrate" \
+	shot --model teapot --budget 30dB -o "$work/a.ppm"
 for other in "--quality good" "--spacing 1" "--smooth" "--no-smooth" "--passes 0"; do
 	# shellcheck disable=SC2086
 	refuses "a budget with $other" 2 "it excludes" shot --model teapot --budget 3ms $other -o "$work/a.ppm"

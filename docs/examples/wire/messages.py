@@ -23,7 +23,7 @@ MESSAGES = {
     "OPENED": (21, "handle:I representations:I content_id:16s box_min:3d box_max:3d origin:3d scale:d spacing:d "
                    "resolution:I n_levels:I n_samples:Q n_blocks:Q bytes:Q up:3d"),
     "SCENE": (32, "slot:H flags:H n_instances:H n_lights:H ambient:d background:3B 5x"),  # INSTANCEs and LIGHTs follow
-    "FRAME": (33, f"slot:H pass_limit:H {FORMAT} budget:B flags:H time_budget_us:Q error_bound_px:d {SETTINGS} "
+    "FRAME": (33, f"slot:H pass_limit:H {FORMAT} budget:B flags:H time_budget_us:Q error_bound:d {SETTINGS} "
                   f"base:I 4x {CAMERA} depth_min:d depth_max:d"),
     "FRAME_BEGIN": (34, f"pass_:H base_pass:H {FORMAT} background:3B base:I refine:H 2x {SETTINGS} "
                         f"depth_min:d depth_max:d {CAMERA}"),

@@ -50,6 +50,7 @@ enum psr_cap {
 	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN tells the size of the pictures */
 	PSR_CAP_BLOCK = 1 << 20,
 	PSR_CAP_SHARP = 1 << 22,       /* FRAME with PSR_WIRE_FRAME_SHARP; needs VIEWS */
+	PSR_CAP_RMSE_BOUND = 1 << 23,
 };
 
 /* ---- the session ---- */
@@ -167,6 +168,7 @@ enum psr_codec { PSR_CODEC_RAW = 0, PSR_CODEC_JPEG = 1, PSR_CODEC_ZSTD = 2, PSR_
 enum psr_wire_depth_format { PSR_WIRE_DEPTH_F32 = 1, PSR_WIRE_DEPTH_U16 = 2, PSR_WIRE_DEPTH_U16_HALF = 3 };
 enum psr_wire_budget {
 	PSR_WIRE_BUDGET_NONE = 0, PSR_WIRE_BUDGET_TIME = 1, PSR_WIRE_BUDGET_ERROR = 2, PSR_WIRE_BUDGET_SETTINGS = 3,
+	PSR_WIRE_BUDGET_RMSE = 4,
 };
 
 struct psr_msg_settings { /* resolved settings: with them a frame is a pure function of models and request */
@@ -197,11 +199,11 @@ struct psr_msg_frame { /* client -> server */
 	uint8_t depth_format;
 	uint8_t depth_codec;     /* raw or zstd */
 	uint8_t data_codec;      /* of normal, id, weight, words, block: raw or zstd */
-	uint8_t budget;          /* enum psr_wire_budget: it tells which one of the next three is set; the other two are
-	                          * 0 */
+	uint8_t budget;          /* enum psr_wire_budget: it tells which one of the next three is set, RMSE the second;
+	                          * the other two are 0 */
 	uint16_t flags;          /* enum psr_wire_frame_flag; the receiver checks that SHARP is not in view 0 */
 	uint64_t time_budget_us; /* TIME: 1..2^53-1, from the start of work on the frame to its END in the output queue */
-	double error_bound_px;   /* ERROR: of the geometric error, > 0 */
+	double error_bound;      /* > 0. ERROR: of the geometric error, pixels; RMSE: of colour, codes of sRGB */
 	struct psr_msg_settings settings; /* SETTINGS; width and height are multiples of the scale */
 	uint32_t base;           /* id of an acknowledged frame of this view that the client still holds, or 0; the
 	                          * receiver checks that it is below the request's id, and 0 in view 0 */
@@ -226,7 +228,7 @@ struct psr_msg_frame_begin { /* server -> client */
 enum psr_wire_frame_status {
 	PSR_WIRE_FRAME_OK = 0,          /* drawn as asked */
 	PSR_WIRE_FRAME_LATE = 1,        /* the time budget was not kept */
-	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound was not kept */
+	PSR_WIRE_FRAME_COARSE = 2,      /* the error bound was not kept; of RMSE: no settings are foreseen to keep it */
 };
 
 enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts */
@@ -243,7 +245,7 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	PSR_WIRE_REPORT_SHADOW = 11, /* samples drawn into the shadow maps made for this frame */
 	PSR_WIRE_REPORT_SMOOTH = 12, /* pixels at edges */
 	PSR_WIRE_REPORT_CORES = 13,  /* that cores worked for the frame, summed over all of them; 0 */
-	/* of a budget of time or error: the time foreseen, and the settings as of psr_settings_pack() */
+	/* of a budget of time, error or RMSE: the time foreseen, and the settings as of psr_settings_pack() */
 	PSR_WIRE_REPORT_CHOSEN = 14,
 	PSR_WIRE_REPORT_CHEAPER = 15, /* the next cheaper settings; left out if there are none */
 	PSR_WIRE_REPORT_BETTER = 16,  /* the next better ones */
@@ -258,8 +260,13 @@ enum psr_wire_report_id { /* ns is a time; the comment tells what `count` counts
 	PSR_WIRE_REPORT_LIGHTS = 39,
 	PSR_WIRE_REPORT_SHADOW_MAPS = 40,       /* in use */
 	PSR_WIRE_REPORT_SHADOW_MAPS_DRAWN = 41, /* of these made for this frame, not kept */
+	PSR_WIRE_REPORT_RMSE_CHOSEN = 42, /* foreseen for the settings of CHOSEN: codes of sRGB, times
+	                                   * PSR_WIRE_RMSE_ONE; left out where nobody can foresee it */
+	PSR_WIRE_REPORT_RMSE_CHEAPER = 43,
+	PSR_WIRE_REPORT_RMSE_BETTER = 44,
 	PSR_WIRE_REPORT_EFFECTS = 64, /* plus the effect's number, see PROTOCOL.md; ns is the reason's number */
 };
+#define PSR_WIRE_RMSE_ONE 65536
 struct psr_msg_report_entry { uint16_t id; uint64_t ns, count; };
 
 struct psr_msg_frame_end { /* server -> client */

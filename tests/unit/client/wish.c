@@ -295,9 +295,10 @@ static void what_is_said_wins_over_the_quality(void **state)
 	assert_non_null(strstr(err.text, "draft, good or best, not 'worst'"));
 }
 
-static void a_budget_is_a_time_or_an_error_and_says_all_detail(void **state)
+static void a_budget_is_a_time_an_error_or_a_likeness_and_says_all_detail(void **state)
 {
-	static const char *const bad[] = { "", "12", "ms", "0ms", "-1ms", "nanms", "12s", "1e9ms", "12ms ", "0px", "infpx" };
+	static const char *const bad[] = { "", "12", "ms", "0ms", "-1ms", "nanms", "12s", "1e9ms", "12ms ", "0px", "infpx",
+		                               "0dB", "100dB", "30db", "nandB" };
 	struct psr_msg_frame frame;
 	struct quality_wish wish;
 	struct psr_error err;
@@ -318,9 +319,15 @@ static void a_budget_is_a_time_or_an_error_and_says_all_detail(void **state)
 	frame = (struct psr_msg_frame){ 0 };
 	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
 	assert_int_equal(frame.budget, PSR_WIRE_BUDGET_ERROR);
-	assert_true(frame.error_bound_px == 0.5);
+	assert_true(frame.error_bound == 0.5);
 	assert_int_equal(frame.pass_limit, 0);
 	assert_string_equal(quality_budget_text(text, &frame), "0.5px");
+	wish.budget = "40dB"; /* 255 / 100 */
+	frame = (struct psr_msg_frame){ 0 };
+	assert_int_equal(quality_apply(&frame, &wish, NULL), PSR_OK);
+	assert_int_equal(frame.budget, PSR_WIRE_BUDGET_RMSE);
+	assert_true(fabs(frame.error_bound - 2.55) < 1e-12);
+	assert_string_equal(quality_budget_text(text, &frame), "40dB");
 	for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++)
 		assert_int_equal(quality_parse_budget(&frame, bad[i], &err), PSR_ERR_ARG);
 	wish.is_plain = 1;
@@ -368,7 +375,7 @@ int main(void)
 		cmocka_unit_test(errors_of_files_name_line_and_column),
 		cmocka_unit_test(a_list_of_views_is_a_picture_each),
 		cmocka_unit_test(what_is_said_wins_over_the_quality),
-		cmocka_unit_test(a_budget_is_a_time_or_an_error_and_says_all_detail),
+		cmocka_unit_test(a_budget_is_a_time_an_error_or_a_likeness_and_says_all_detail),
 		cmocka_unit_test(samples_are_as_far_apart_as_the_nearest_part_of_the_box_in_the_picture_shows_them),
 	};
 

@@ -145,11 +145,11 @@ static void make_frame(struct psr_msg_frame *m)
 	}
 	if (m->planes & ~3u)
 		m->data_codec = (uint8_t)(2 * below(2));
-	m->budget = (uint8_t)below(4);
+	m->budget = (uint8_t)below(5);
 	if (m->budget == PSR_WIRE_BUDGET_TIME)
 		m->time_budget_us = 1 + below(1000000);
-	if (m->budget == PSR_WIRE_BUDGET_ERROR)
-		m->error_bound_px = 1e-3 + unit();
+	if (m->budget == PSR_WIRE_BUDGET_ERROR || m->budget == PSR_WIRE_BUDGET_RMSE)
+		m->error_bound = 1e-3 + unit();
 	if (m->budget == PSR_WIRE_BUDGET_SETTINGS) {
 		m->settings.scale = (uint8_t)(1u << below(3));
 		m->settings.is_smooth = (uint8_t)below(2);

@@ -148,7 +148,7 @@ static const struct proto_field fields_presets_end[] = { AT(presets_end, n_camer
 	AT(presets_end, n_lights, F_U32), END };
 static const struct proto_field fields_frame[] = { AT(frame, slot, F_U16), AT(frame, pass_limit, F_U16),
 	PICTURE(frame), AT(frame, budget, F_U8), AT(frame, flags, F_U16), AT(frame, time_budget_us, F_U64),
-	AT(frame, error_bound_px, F_F64), AT(frame, depth_min, F_F64), AT(frame, depth_max, F_F64), CAMERA(frame), END };
+	AT(frame, error_bound, F_F64), AT(frame, depth_min, F_F64), AT(frame, depth_max, F_F64), CAMERA(frame), END };
 static const struct proto_field fields_frame_begin[] = { AT(frame_begin, pass, F_U16),
 	AT(frame_begin, base_pass, F_U16), AT(frame_begin, refine, F_U16),
 	PICTURE(frame_begin), ARRAY(frame_begin, background, F_U8, 3), AT(frame_begin, depth_min, F_F64),

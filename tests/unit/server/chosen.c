@@ -6,16 +6,39 @@
 #include <stdint.h>
 #include <cmocka.h>
 #include "fixture.h"
+#include "model/calibration.h"
 
 static char folder[PATH_MAX];
 static struct daemon psrd;
 static struct peer p;
+
+/* The plate, measured: each rung has half of the error of the one before. */
+static void calibrated_write(void)
+{
+	struct psr_calibrated view = { .apart = 1, .layers = 1 };
+	const struct psr_calibration calibration = { 1, &view };
+	struct psr_model *plain, *calibrated;
+	char path[2 * PATH_MAX];
+
+	for (int i = 0; i < PSR_RUNGS; i++) {
+		view.rmse[i] = (float)ldexp(64, -i);
+		view.ms[i] = (float)(i + 1);
+	}
+	snprintf(path, sizeof path, "%s/plate.psr", folder);
+	assert_int_equal(psr_model_read(&plain, path, NULL), PSR_OK);
+	assert_int_equal(psr_model_calibrate(&calibrated, plain, &calibration, NULL), PSR_OK);
+	snprintf(path, sizeof path, "%s/measured.psr", folder);
+	assert_int_equal(psr_model_write(calibrated, path, NULL), PSR_OK);
+	psr_model_unref(plain);
+	psr_model_unref(calibrated);
+}
 
 static int set_up(void **state)
 {
 	(void)state;
 	folder_make(folder);
 	plate_write(folder, "plate.psr", 0x2040c0);
+	calibrated_write();
 	daemon_start(&psrd, folder, NULL);
 	return 0;
 }
@@ -68,7 +91,16 @@ static struct psr_msg_frame ask_error(double px)
 	struct psr_msg_frame frame = frame_default(96, 64);
 
 	frame.budget = PSR_WIRE_BUDGET_ERROR;
-	frame.error_bound_px = px;
+	frame.error_bound = px;
+	return frame;
+}
+
+static struct psr_msg_frame ask_rmse(double codes)
+{
+	struct psr_msg_frame frame = frame_default(96, 64);
+
+	frame.budget = PSR_WIRE_BUDGET_RMSE;
+	frame.error_bound = codes;
 	return frame;
 }
 
@@ -88,7 +120,7 @@ static void expect_again(const struct psr_msg_frame *asked, const struct answer 
 
 	frame.budget = PSR_WIRE_BUDGET_SETTINGS;
 	frame.time_budget_us = 0;
-	frame.error_bound_px = 0;
+	frame.error_bound = 0;
 	frame.settings = answer->begin.settings;
 	take(&again, &frame);
 	expect_same(&again.begin.settings, &answer->begin.settings);
@@ -195,6 +227,74 @@ static void a_pass_of_the_settings_is_the_refined_frame(void **state)
 	peer_close(&p);
 }
 
+static double rmse_of(const struct answer *answer, unsigned id)
+{
+	const struct psr_msg_report_entry *entry = find(answer, id);
+
+	return entry != NULL ? (double)entry->count / PSR_WIRE_RMSE_ONE : 0;
+}
+
+static int rung_of(const struct psr_msg_settings *settings)
+{
+	int r = 0;
+
+	while (psr_ladder[r].scale != settings->scale || psr_ladder[r].pass != settings->pass
+	       || psr_ladder[r].is_smooth != settings->is_smooth || psr_ladder[r].spacing_px != settings->spacing_px)
+		assert_true(++r < PSR_RUNGS);
+	return r;
+}
+
+/* Of the rungs that are within it the clock says which is the cheapest. */
+static void an_rmse_is_foreseen_by_the_models_calibration(void **state)
+{
+	struct psr_msg_frame frame;
+	struct answer answer;
+
+	(void)state;
+	peer_begin(&p, &psrd, "measured");
+	for (int i = 0; i < PSR_RUNGS; i++) {
+		frame = ask_rmse(1.01 * ldexp(64, -i));
+		take(&answer, &frame);
+		const int rung = rung_of(&answer.begin.settings);
+		const double rmse = ldexp(64, -rung);
+
+		assert_int_equal(answer.end.status, PSR_WIRE_FRAME_OK);
+		assert_true(rung >= i);
+		assert_true(rmse_of(&answer, PSR_WIRE_REPORT_RMSE_CHOSEN) == rmse);
+		assert_true(rmse_of(&answer, PSR_WIRE_REPORT_RMSE_CHEAPER) == (rung > 0 ? 2 * rmse : 0));
+		assert_true(rmse_of(&answer, PSR_WIRE_REPORT_RMSE_BETTER) == (rung < PSR_RUNGS - 1 ? rmse / 2 : 0));
+		expect_again(&frame, &answer);
+	}
+	frame = ask_rmse(0.01);
+	take(&answer, &frame);
+	assert_true(answer.end.status == PSR_WIRE_FRAME_COARSE && answer.begin.settings.pass == PSR_WIRE_MAX_PASS);
+	frame = ask_time(UINT64_C(60000000)); /* a budget of time tells it, too */
+	take(&answer, &frame);
+	assert_true(rmse_of(&answer, PSR_WIRE_REPORT_RMSE_CHOSEN) > 0);
+	peer_close(&p);
+}
+
+static void an_rmse_that_nobody_can_foresee_is_refused(void **state)
+{
+	struct psr_msg_frame frame = ask_rmse(8);
+	struct answer answer;
+	char text[PSR_ERROR_TEXT];
+
+	(void)state;
+	peer_begin(&p, &psrd, "plate");
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_UNSUPPORTED, text);
+	assert_non_null(strstr(text, "psr-model build --calibrate"));
+	frame.planes = 1 << PSR_PLANE_ID;
+	frame.color_codec = frame.color_quality = 0;
+	frame.data_codec = PSR_CODEC_ZSTD;
+	peer_expect_error(&p, peer_ask_frame(&p, &frame), PSR_WIRE_ARG, text);
+	assert_non_null(strstr(text, "ask for that plane"));
+	frame = ask_time(UINT64_C(60000000));
+	take(&answer, &frame);
+	assert_null(find(&answer, PSR_WIRE_REPORT_RMSE_CHOSEN));
+	peer_close(&p);
+}
+
 /* A scale that another budget chose is no base for this one; the client holds what the server thinks it does. */
 static void in_a_view_frames_of_other_scales_are_sent_whole(void **state)
 {
@@ -251,6 +351,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(what_was_chosen_comes_back_and_draws_the_same_again),
 		cmocka_unit_test(what_cannot_be_met_is_drawn_and_said),
+		cmocka_unit_test(an_rmse_is_foreseen_by_the_models_calibration),
+		cmocka_unit_test(an_rmse_that_nobody_can_foresee_is_refused),
 		cmocka_unit_test(planes_that_are_not_refined_have_no_passes),
 		cmocka_unit_test(a_pass_of_the_settings_is_the_refined_frame),
 		cmocka_unit_test(in_a_view_frames_of_other_scales_are_sent_whole),

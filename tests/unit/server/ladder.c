@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 #include "base/random.h"
+#include "model/calibration.h"
 #include "server/frames/budget.h"
 
 #define MS 1e6
@@ -257,6 +258,50 @@ static void an_error_is_foreseen_from_frames(void **state)
 	assert_true(choice.is_met && choice.chosen.settings.pass == 1);
 }
 
+/* The cheapest rung within the limit; the best one where none is. */
+static void a_likeness_is_that_of_the_calibration(void **state)
+{
+	struct budget_view view = whole;
+	struct budget_learnt learnt;
+	struct budget_choice choice;
+
+	(void)state;
+	budget_init(&learnt);
+	view.is_calibrated = 1;
+	for (int i = 0; i < BUDGET_RUNGS; i++)
+		view.rmse[i] = ldexp(64, -i);
+	for (int i = 0; i < BUDGET_RUNGS; i++) {
+		budget_choose_rmse(&choice, &learnt, &view, view.rmse[i]);
+		const int rung = budget_rung_of(&choice.chosen.settings);
+
+		assert_true(choice.is_met && rung >= i && choice.chosen.has_rmse && choice.chosen.rmse == view.rmse[rung]);
+		assert_true(rung == 0 || choice.cheaper.rmse == view.rmse[rung - 1]);
+		for (int better = i; better < BUDGET_RUNGS; better++)
+			assert_true(choice.chosen.ns <= budget_foresee(&learnt, &view, better));
+	}
+	budget_choose_rmse(&choice, &learnt, &view, 0.01);
+	assert_true(!choice.is_met && budget_rung_of(&choice.chosen.settings) == BUDGET_RUNGS - 1);
+	view.planes |= 1 << PSR_PLANE_ID; /* not refined */
+	budget_choose_rmse(&choice, &learnt, &view, 0.01);
+	assert_true(!choice.is_met && choice.chosen.settings.pass == 0);
+	view.is_calibrated = 0;
+	budget_choose_time(&choice, &learnt, &view, 1);
+	assert_false(choice.chosen.has_rmse);
+}
+
+/* Calibrations number settings as psrd does. */
+static void the_ladder_is_that_of_calibrations(void **state)
+{
+	(void)state;
+	for (int i = 0; i < BUDGET_RUNGS; i++) {
+		const struct psr_msg_settings *a = &budget_ladder[i];
+		const struct psr_rung *b = &psr_ladder[i];
+
+		assert_true(a->scale == b->scale && a->is_smooth == b->is_smooth && a->pass == b->pass);
+		assert_true(a->spacing_px == b->spacing_px);
+	}
+}
+
 static void a_pass_is_foreseen_where_it_may_be_chosen(void **state)
 {
 	struct psr_msg_frame frame = { .planes = 1 << PSR_PLANE_COLOR, .budget = PSR_WIRE_BUDGET_TIME };
@@ -281,6 +326,8 @@ int main(void)
 		cmocka_unit_test(what_cannot_be_met_gets_the_nearest_and_says_so),
 		cmocka_unit_test(only_settings_that_the_picture_takes_are_chosen),
 		cmocka_unit_test(an_error_is_foreseen_from_frames),
+		cmocka_unit_test(a_likeness_is_that_of_the_calibration),
+		cmocka_unit_test(the_ladder_is_that_of_calibrations),
 		cmocka_unit_test(a_pass_is_foreseen_where_it_may_be_chosen),
 	};
 
