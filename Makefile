@@ -300,7 +300,7 @@ $(FUZZ_BUILD): $(BUILD)/tests/fuzz/%: $(BUILD)/tests/fuzz/%.c.o $(FUZZ_MAIN) $(L
 	$(link) $(L_TEST) $(L_BUILD_HERE)
 $(SIMD_TESTS): $(BUILD)/tests/simd/%: $(BUILD)/tests/simd/%.c.o $(SIMD_TEST_O) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
-$(GOLDEN): $(call objs,tests/golden/*.c client/cli/wordfile.c client/lib/camera.c client/lib/light.c proto/light.c) $(LIB)/libpsr.a
+$(GOLDEN): $(call objs,tests/golden/*.c client/cli/wordfile.c client/scene/instance.c client/lib/camera.c client/lib/light.c proto/light.c) $(LIB)/libpsr.a
 	$(link) $(L_PSR)
 $(TOOLS): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(A)
 	$(link) $(L_CODEC) -lcjson $(L_PSR)

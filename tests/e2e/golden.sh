@@ -3,8 +3,8 @@
 # The golden frames through psrd, with all instructions that the machine has, by one thread and by two: what
 # tests/golden/frames draws without sockets.
 . "$(dirname "$0")/lib.sh"
-suite=tests/golden/frames.suite
-n=$(grep -c '^test=' $suite)
+suites="tests/golden/frames.suite tests/golden/octrees.suite"
+n=$(cat $suites | grep -c '^test=')
 
 isas=c
 for isa in avx2 avx512; do
@@ -13,7 +13,8 @@ done
 for isa in $isas; do
 	for threads in 1 2; do
 		start_psrd --models tests/golden --verbose --threads $threads --isa "$isa"
-		psr test --server "$server" $suite >"$work/sum"
+		# shellcheck disable=SC2086
+		psr test --server "$server" $suites >"$work/sum"
 		check "$n golden frames with $isa by $threads threads" grep -qx "$n passed, 0 failed" "$work/sum"
 		check "psrd stops cleanly" stop_psrd
 		check "it drew with $isa by $threads threads" grep -q "with $threads threads and $isa$" "$work/psrd.log"

@@ -6,6 +6,7 @@
 #include "base/srgb.h"
 #include "client/cli/optlist.h"
 #include "client/lib/camera.h"
+#include "client/scene/instance.h"
 #include "psr/client.h"
 #include "proto/proto.h"
 #include "shot.h"
@@ -14,7 +15,9 @@
 
 /* As they stand in the suite, with the defaults of `psr shot`. */
 struct words {
-	const char *name, *model, *color, *depth;
+	const char *name, *model, *hash[PSR_N_PLANES];
+	struct instance_wish instance[SHOT_MAX_INSTANCES]; /* besides the model */
+	uint32_t n_instances;
 	uint32_t size[2];
 	int is_smooth, is_plain;
 	int64_t n_passes;
@@ -33,11 +36,43 @@ struct reader {
 	void (*on_shot)(struct shot *shot);
 };
 
+static int place_instance(struct shot *shot, const struct psr_model *(*open)(const char *name), const char *name,
+                          const struct psr_msg_instance *place, struct psr_error *err)
+{
+	struct psr_instance *instance = &shot->instance[shot->scene.n_instances];
+
+	*instance = (struct psr_instance){ .model = open(name), .rotation = { 0, 0, 0, 1 }, .scale = 1 };
+	if (!instance->model)
+		return psr_fail(err, PSR_ERR_NOT_FOUND, "there is no model '%s'", name);
+	shot->scene.n_instances++;
+	if (!place)
+		return PSR_OK;
+	memcpy(instance->rotation, place->rotation, sizeof instance->rotation);
+	memcpy(instance->translation, place->translation, sizeof instance->translation);
+	instance->scale = place->scale;
+	instance->representation = (enum psr_representation)place->representation;
+	return PSR_OK;
+}
+
+/* The model comes first. */
+static int place_instances(struct shot *shot, const struct reader *reader, struct psr_error *err)
+{
+	const struct words *words = &reader->now;
+	int rc = place_instance(shot, reader->open, words->model ? words->model : "", NULL, err);
+
+	shot->scene.instance = shot->instance;
+	for (uint32_t i = 0; !rc && i < words->n_instances; i++)
+		rc = place_instance(shot, reader->open, words->instance[i].model, &words->instance[i].place, err);
+	return rc;
+}
+
+/* Without a target the camera looks at the model alone. */
 static int make_scene(struct shot *shot, struct words *words, struct psr_error *err)
 {
-	const struct psr_model_info *info = psr_model_info(shot->instance.model);
+	const struct psr_model_info *info = psr_model_info(shot->instance[0].model);
 	struct psr_camera camera;
 
+	memcpy(words->wish.natural_up, info->up, sizeof words->wish.natural_up);
 	words->wish.fov_y = words->has_ortho ? 0 : words->fov * DEGREE;
 	words->wish.ortho_height = words->has_ortho ? words->ortho : 0;
 	int rc = psr_camera_complete(&camera, &words->wish, info->box_min, info->box_max,
@@ -49,8 +84,6 @@ static int make_scene(struct shot *shot, struct words *words, struct psr_error *
 	shot->scene.camera = camera;
 	for (uint32_t i = 0; i < words->n_lights; i++)
 		psr_msg_light_get(&shot->light[i], &words->light[i]);
-	shot->scene.instance = &shot->instance;
-	shot->scene.n_instances = 1;
 	shot->scene.light = shot->light;
 	shot->scene.n_lights = words->n_lights;
 	for (int k = 0; k < 3; k++) {
@@ -64,8 +97,6 @@ static int parse_hash(uint64_t *hash, const char *text, struct psr_error *err)
 {
 	char *end;
 
-	if (!text)
-		return psr_fail(err, PSR_ERR_ARG, "a hash of color or depth is missing");
 	*hash = strtoull(text, &end, 16);
 	return end == text + 16 && !*end ? PSR_OK : psr_fail(err, PSR_ERR_ARG, "'%.40s' is no hash", text);
 }
@@ -79,16 +110,17 @@ static int end_shot(struct reader *reader, struct psr_error *err)
 		return PSR_OK;
 	memset(&shot, 0, sizeof shot);
 	snprintf(shot.name, sizeof shot.name, "%s", now->name);
-	snprintf(shot.model, sizeof shot.model, "%s", now->model ? now->model : "");
 	memcpy(shot.size, now->size, sizeof shot.size);
 	shot.is_smooth = !now->is_plain;
 	shot.n_passes = (unsigned)now->n_passes;
-	shot.instance = (struct psr_instance){ .model = reader->open(shot.model), .rotation = { 0, 0, 0, 1 }, .scale = 1 };
-	if (!shot.instance.model)
-		return psr_fail(err, PSR_ERR_NOT_FOUND, "there is no model '%s'", shot.model);
-	int rc = parse_hash(&shot.color, now->color, err);
-	if (!rc)
-		rc = parse_hash(&shot.depth, now->depth, err);
+	int rc = place_instances(&shot, reader, err);
+	for (unsigned plane = 0; !rc && plane < PSR_N_PLANES; plane++)
+		if (now->hash[plane]) {
+			shot.planes |= 1u << plane;
+			rc = parse_hash(&shot.hash[plane], now->hash[plane], err);
+		}
+	if (!rc && !shot.planes)
+		return psr_fail(err, PSR_ERR_ARG, "'%s' has no hash", shot.name);
 	if (!rc)
 		rc = make_scene(&shot, now, err);
 	if (!rc)
@@ -105,16 +137,27 @@ static int on_light(const char *text, void *userdata, struct psr_error *err)
 	return psr_light_parse(&words->light[words->n_lights++], text, err);
 }
 
-static int on_hash(const char *text, void *userdata, struct psr_error *err)
+static int on_instance(const char *text, void *userdata, struct psr_error *err)
 {
-	static const char prefix[] = "depth:";
 	struct words *words = userdata;
 
-	(void)err;
-	if (strncmp(text, prefix, sizeof prefix - 1) == 0)
-		words->depth = text + sizeof prefix - 1;
-	else
-		words->color = text;
+	if (words->n_instances == SHOT_MAX_INSTANCES - 1)
+		return psr_fail(err, PSR_ERR_LIMIT, "more than %d instances", SHOT_MAX_INSTANCES);
+	return instance_parse(&words->instance[words->n_instances++], text, err);
+}
+
+static int on_hash(const char *text, void *userdata, struct psr_error *err)
+{
+	const char *colon = strchr(text, ':');
+	struct words *words = userdata;
+	unsigned plane = PSR_PLANE_COLOR;
+
+	if (colon)
+		while (plane < PSR_N_PLANES && strncmp(text, psr_plane_name(plane), (size_t)(colon - text)) != 0)
+			plane++;
+	if (plane == PSR_N_PLANES)
+		return psr_fail(err, PSR_ERR_ARG, "'%.40s' is of no plane", text);
+	words->hash[plane] = colon ? colon + 1 : text;
 	return PSR_OK;
 }
 
@@ -144,6 +187,7 @@ int shots_read(const char *path, const struct psr_model *(*open)(const char *nam
 		{ .name = "hash", .type = PSR_OPT_CALL, .value = now, .call = on_hash },
 		{ .name = "models", .type = PSR_OPT_STRING, .value = &models },
 		{ .name = "model", .type = PSR_OPT_STRING, .value = &now->model },
+		{ .name = "instance", .type = PSR_OPT_CALL, .value = now, .call = on_instance },
 		{ .name = "size", .type = PSR_OPT_SIZE, .value = now->size },
 		{ .name = "eye", .type = PSR_OPT_VEC3, .value = now->wish.eye, .seen = &now->wish.has_eye },
 		{ .name = "target", .type = PSR_OPT_VEC3, .value = now->wish.target, .seen = &now->wish.has_target },

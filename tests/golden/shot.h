@@ -6,20 +6,22 @@
 
 #define SHOT_NAME_BYTES 64
 #define SHOT_MAX_LIGHTS 8
+#define SHOT_MAX_INSTANCES 4
 
 struct shot {
-	char name[SHOT_NAME_BYTES], model[SHOT_NAME_BYTES];
+	char name[SHOT_NAME_BYTES];
 	uint32_t size[2];
 	int is_smooth;
 	unsigned n_passes;
-	struct psr_scene scene; /* of instance and light below: the shot must stay where it is */
-	struct psr_instance instance;
+	struct psr_scene scene; /* of instances and lights below: the shot must stay where it is */
+	struct psr_instance instance[SHOT_MAX_INSTANCES];
 	struct psr_light light[SHOT_MAX_LIGHTS];
-	uint64_t color, depth; /* the hashes that are expected */
+	unsigned planes;              /* 1 << enum psr_plane, OR-ed: those that have a hash */
+	uint64_t hash[PSR_N_PLANES];  /* the hashes that are expected */
 };
 
 /* Gives every shot of the file to on_shot, in order. Knows the words that the golden frames need; each shot has a hash
- * of colour and one of depth. open: gives the model of a name, or NULL. ARG, NOT_FOUND, and the errors of
+ * of a plane, or several. open: gives the model of a name, or NULL. ARG, NOT_FOUND, and the errors of
  * wordfile_read(). */
 int shots_read(const char *path, const struct psr_model *(*open)(const char *name), void (*on_shot)(struct shot *shot),
                struct psr_error *err);
