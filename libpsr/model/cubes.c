@@ -53,6 +53,7 @@ static struct octree *make_tree(const struct cubes_making *m, int level)
 	if (tree == NULL)
 		return NULL;
 	*tree = (struct octree){ .levels = finest->levels - level, .is_one_sided = finest->is_one_sided,
+		                     .is_cloud = finest->is_cloud,
 		                     .low = { finest->low[0], finest->low[1], finest->low[2] }, .edge = finest->edge,
 		                     .n_codes = n->code[level], .n_leaves = n->leaf[level], .n_skips = n->skip[level] };
 	tree->code = malloc(tree->n_codes);

@@ -43,7 +43,8 @@ struct psr_cube {
  * cluster is a node of at most 64x64x64 leaves of level 0; it has a cluster at each level, which are a group. */
 struct psr_cubes {
 	/* What culling reads. Has clusters, flags, and where the tree has normals of one side, cones; levels are those of
-	 * blocks. Has no projections, spheres, masks, depths or attributes. */
+	 * blocks. Has no projections, spheres, masks, depths or attributes. The level in a cube's flags says how wide its
+	 * leaves are drawn; where a cloud is sparse, it is above that of the cube. */
 	struct psr_blocks groups;
 	struct psr_cube_level level[CUBES_MOST_LEVELS];
 	const struct psr_cube *cube;

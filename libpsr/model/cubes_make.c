@@ -3,6 +3,10 @@
 #include "cubes_make.h"
 
 #define LEAST_COSINE 0.05
+/* Leaves for each cell of 2x2x2 that holds any: 4 of a surface in the mean. Where points have n in the mean for a place
+ * of a leaf, there are 4 (1 - exp(-n)) / (1 - exp(-4 n)). */
+#define CLOSED 3.8 /* n = 3: a twentieth of all places are empty */
+#define ALONE 1.06 /* n = 0.04: the next level has as many leaves */
 
 /* ---- counting ---- */
 
@@ -196,6 +200,25 @@ static void make_cluster(const struct subtree *s, int level, uint64_t i, uint64_
 	k->radius = (float)((sqrt(square) + CUBES_RADIUS * of->edge) * (1 + 1e-6));
 }
 
+/* Leaves of a sparse cloud are drawn as wide as those of the next level, so that no background shows between them; and
+ * leaves that stand alone, as wide as the next level's are. first: of the subtree; root: its code. */
+static void widen(const struct subtree *s, const struct cubes_count *first, uint8_t root)
+{
+	const struct cubes_making *m = s->m;
+	uint64_t n_cells = octree_popcount(root);
+	unsigned wider = 0;
+
+	for (int l = m->n_levels; l-- > 0;) {
+		const uint64_t n_leaves = s->next.leaf[l] - first->leaf[l], begin = m->cubes->level[l].first;
+		const double filled = (double)n_leaves / (double)n_cells;
+
+		wider = filled >= CLOSED ? 0 : filled >= ALONE ? 1 : wider + 1;
+		for (uint64_t cube = begin + first->cube[l]; cube < begin + s->next.cube[l]; cube++)
+			m->flags[cube] = (uint8_t)(m->flags[cube] + wider);
+		n_cells = n_leaves;
+	}
+}
+
 /* Puts the codes of nodes above subtree i, and its entries of skip indices. */
 static void put_above(struct subtree *s, uint64_t i)
 {
@@ -221,9 +244,11 @@ static void put_subtree(struct subtree *s, uint64_t i)
 	const struct cubes_making *m = s->m;
 	struct cubes_count first;
 	uint32_t at[3];
+	uint8_t root;
 
 	put_above(s, i);
 	first = s->next;
+	root = *s->code;
 	memset(s->n_parents, 0, sizeof s->n_parents);
 	octree_place(m->tree->skip[i].path, at);
 	put_node(s, m->height, at[0] | (uint64_t)at[1] << CUBES_PLACE_BITS | (uint64_t)at[2] << 2 * CUBES_PLACE_BITS);
@@ -234,6 +259,8 @@ static void put_subtree(struct subtree *s, uint64_t i)
 			make_cones(s, l, first.cube[l], first.leaf[l]);
 		make_cluster(s, l, i, first.cube[l]);
 	}
+	if (m->tree->is_cloud)
+		widen(s, &first, root);
 }
 
 void cubes_fill_task(int task, void *userdata)

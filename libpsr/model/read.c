@@ -288,8 +288,8 @@ static int get_octree(const struct reader *r, struct octree *tree)
 	if (code != PSR_OK)
 		return code;
 	file_get_octree(tree, at);
-	if (file_get(at + 4, 4) > 1)
-		return bad(r, "section OCTR: its leaves are seen from one side (1) or all (0), not %" PRIu64, file_get(at + 4, 4));
+	if (file_get(at + 4, 4) > 3)
+		return bad(r, "section OCTR: its flags are %" PRIu64 "; only bits 0 and 1 are known", file_get(at + 4, 4));
 	return model_check_octree_counts(tree, r->name, r->err);
 }
 

@@ -3,7 +3,9 @@
 #include "base/direction.h"
 #include "file.h"
 
-enum { TREE_LEVELS = 0, TREE_SIDES = 4, TREE_LOW = 8, TREE_EDGE = 32, TREE_CODES = 40, TREE_LEAVES = 48, TREE_SKIPS = 56 };
+enum { TREE_LEVELS = 0, TREE_FLAGS = 4, TREE_LOW = 8, TREE_EDGE = 32, TREE_CODES = 40, TREE_LEAVES = 48, TREE_SKIPS = 56 };
+
+enum { ONE_SIDED = 1, CLOUD = 2 };
 
 #define fail(section, format, ...) \
 	psr_fail(err, PSR_ERR_FORMAT, "%s: section %s: " format, name, section, ##__VA_ARGS__)
@@ -11,7 +13,7 @@ enum { TREE_LEVELS = 0, TREE_SIDES = 4, TREE_LOW = 8, TREE_EDGE = 32, TREE_CODES
 void file_put_octree(uint8_t *at, const struct octree *tree)
 {
 	file_put(at + TREE_LEVELS, 4, (uint64_t)tree->levels);
-	file_put(at + TREE_SIDES, 4, tree->is_one_sided != 0);
+	file_put(at + TREE_FLAGS, 4, (tree->is_one_sided ? ONE_SIDED : 0) | (tree->is_cloud ? CLOUD : 0));
 	for (int c = 0; c < 3; c++)
 		file_put_double(at + TREE_LOW + 8 * c, tree->low[c]);
 	file_put_double(at + TREE_EDGE, tree->edge);
@@ -22,10 +24,11 @@ void file_put_octree(uint8_t *at, const struct octree *tree)
 
 void file_get_octree(struct octree *tree, const uint8_t *at)
 {
-	const uint64_t levels = file_get(at + TREE_LEVELS, 4);
+	const uint64_t levels = file_get(at + TREE_LEVELS, 4), flags = file_get(at + TREE_FLAGS, 4);
 
 	tree->levels = levels <= OCTREE_MOST_LEVELS ? (int)levels : OCTREE_MOST_LEVELS + 1;
-	tree->is_one_sided = file_get(at + TREE_SIDES, 4) == 1;
+	tree->is_one_sided = (flags & ONE_SIDED) != 0;
+	tree->is_cloud = (flags & CLOUD) != 0;
 	for (int c = 0; c < 3; c++)
 		tree->low[c] = file_get_double(at + TREE_LOW + 8 * c);
 	tree->edge = file_get_double(at + TREE_EDGE);

@@ -59,6 +59,7 @@ struct octree *octree_coarser(const struct octree *finer)
 	memcpy(tree->low, finer->low, sizeof tree->low);
 	tree->edge = finer->edge;
 	tree->is_one_sided = finer->is_one_sided;
+	tree->is_cloud = finer->is_cloud;
 	if (make_attributes(tree, finer))
 		return tree;
 	octree_destroy(tree);

@@ -22,6 +22,7 @@ struct octree_skip {
 struct octree {
 	int levels;
 	int is_one_sided;          /* 1: normals point out of a solid, and leaves are not seen from their backs */
+	int is_cloud;              /* 1: leaves are where points are; a surface may pass between them */
 	double low[3], edge;       /* the cube, in units of the source: its low corner, its edge */
 	uint64_t n_codes, n_leaves, n_skips;
 	uint8_t *code;             /* depth first: a node's code, then its children with all that is below them. So the

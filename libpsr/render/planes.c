@@ -65,7 +65,8 @@ static void describe(uint8_t to[3], const struct simd *simd, const struct plan *
 	struct cull_batch batch;
 
 	simd->cull(&batch, &in->cull, block, 1);
-	to[0] = (uint8_t)psr_blocks_level(b, block);
+	to[0] = in->cull.cubes != NULL ? (uint8_t)(psr_cubes_level(in->cull.cubes, block) - in->cull.cubes->level)
+	                               : (uint8_t)psr_blocks_level(b, block);
 	to[1] = batch.level[0] > PSR_MAX_DEPTH_LEVEL ? PSR_MAX_DEPTH_LEVEL : batch.level[0];
 	to[2] = b->flags[block] & PSR_BLOCK_TWO_SIDED ? PSR_FACING_TWO_SIDED
 	        : batch.is_mixed[0] ? PSR_FACING_MIXED : PSR_FACING_EYE;

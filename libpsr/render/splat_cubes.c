@@ -48,7 +48,9 @@ void splat_cube(const struct splat_target *t, const struct bin_entry *entry)
 
 	warp_cube_make(&cube, in, entry->slot);
 	const struct warp_octants *octants = cube.octants;
-	const float edge = (float)in->cubes->model->level[octants - in->cubes->level].edge;
+	const struct psr_cubes *cubes = in->cubes->model;
+	const unsigned width = psr_blocks_level(&cubes->groups, entry->slot - in->first_slot);
+	const float edge = (float)(cubes->level[0].edge * (double)(1u << width));
 	float axis[3][3]; /* of a disc's radius */
 	for (int a = 0; a < 3; a++)
 		for (int c = 0; c < 3; c++)

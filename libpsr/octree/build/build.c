@@ -266,6 +266,7 @@ static int build(struct building *b)
 		return rc;
 	memcpy(b->built.tree->low, b->low, sizeof b->low);
 	b->built.tree->edge = b->edge;
+	b->built.tree->is_cloud = 1;
 	rc = built_normals(&b->built, b->options);
 	return rc == PSR_OK ? rc : psr_fail(b->err, rc, "%s: %s", b->source->name, rc == PSR_ERR_CANCELLED ? "cancelled" :
 	                                                                     "no memory for the normals of its leaves");

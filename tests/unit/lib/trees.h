@@ -97,6 +97,7 @@ static inline struct psr_model *tree_build(const struct tree_options *options)
 	}
 	tree->edge = 2;
 	tree->is_one_sided = options->is_one_sided;
+	tree->is_cloud = options->keep < 1;
 	tree->normal = malloc(tree->n_leaves * sizeof *tree->normal);
 	tree->color = malloc(tree->n_leaves * sizeof *tree->color);
 	tree->offset = malloc(tree->n_leaves);

@@ -191,7 +191,7 @@ static void lies_in_sections_of_octrees_are_refused(void **state)
 		{ "OCTR", 0, 4, 1, PSR_ERR_FORMAT, "section OCTR: it says less than 2 levels" },
 		{ "OCTR", 0, 4, UINT32_MAX, PSR_ERR_FORMAT, "section OCTR: it says more than 20 levels" },
 		{ "OCTR", 0, 4, LEVELS + 1, PSR_ERR_FORMAT, "section OCOD: an octree's" },
-		{ "OCTR", 4, 4, 2, PSR_ERR_FORMAT, "section OCTR: its leaves" },
+		{ "OCTR", 4, 4, 4, PSR_ERR_FORMAT, "section OCTR: its flags" },
 		{ "OCTR", 8, 8, 0x7ff8000000000000u, PSR_ERR_FORMAT, "section OCTR: the cube at nan" },
 		{ "OCTR", 24, 8, 0xc0a0000000000000u, PSR_ERR_FORMAT, "section OCTR: the cube at -1,-1,-2048" },
 		{ "OCTR", 32, 8, 0, PSR_ERR_FORMAT, "section OCTR: the cube's edge is 0" },

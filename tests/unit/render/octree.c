@@ -215,6 +215,34 @@ static void the_coarsest_level_that_is_dense_enough_is_drawn(void **state)
 }
 
 /* Three instances in a line, one behind the other, lit by lights that cast shadows. */
+/* Of a sphere all around the picture of which this share of leaves is there: the pixels that show its back, or nothing. */
+static int seen_through(double keep, unsigned pass)
+{
+	const struct tree_options options = { .levels = 7, .radius = RADIUS, .keep = keep };
+	struct psr_model *model = tree_build(&options);
+	struct psr_instance instance = place(model);
+	const struct psr_scene scene = { .instance = &instance, .n_instances = 1, .camera = orthographic(0.8) };
+	struct drawn *p = draw(&scene, 2, pass);
+	int n = 0;
+
+	for (int i = 0; i < SIDE * SIDE; i++)
+		n += !(p->depth[i] < 4);
+	free(p);
+	psr_model_unref(model);
+	return n;
+}
+
+/* In the area of a leaf's face are 0.45 leaves: exp(-0.9) of cells of their own size would be empty, exp(-3.6) of those
+ * twice as wide, which are filled from around. */
+static void sparse_clouds_are_drawn_wider(void **state)
+{
+	(void)state;
+	for (unsigned pass = 0; pass < 3; pass++) {
+		assert_int_equal(seen_through(0.3, pass), 0);
+		assert_int_equal(seen_through(1, pass), 0);
+	}
+}
+
 struct scenery {
 	struct psr_model *solid, *cloud;
 	struct psr_instance instance[3];
@@ -380,6 +408,7 @@ int main(void)
 		cmocka_unit_test(spheres_have_no_holes_and_the_right_depths_and_colours),
 		cmocka_unit_test(fewer_samples_are_drawn_of_what_is_small),
 		cmocka_unit_test(the_coarsest_level_that_is_dense_enough_is_drawn),
+		cmocka_unit_test(sparse_clouds_are_drawn_wider),
 		cmocka_unit_test(frames_are_the_same_with_any_threads),
 		cmocka_unit_test(shortcuts_change_nothing),
 		cmocka_unit_test(refinement_smooths_edges_and_keeps_the_inside),
