@@ -174,7 +174,7 @@ struct stream {
 	const char *name, *key;
 	double bits, packed; /* packed: in the file, 0 where that is not packed as an octree */
 };
-#define N_STREAMS 5
+#define N_STREAMS 6
 
 static void take_streams(struct stream streams[N_STREAMS], const struct summary *s)
 {
@@ -186,6 +186,7 @@ static void take_streams(struct stream streams[N_STREAMS], const struct summary 
 	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0, 0 };
 	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0, 0 };
 	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0, 0 };
+	streams[5] = (struct stream){ "coarser levels", "coarser", 0.0, 8.0 * (double)s->shares.coarser / n };
 	streams[0].packed = 8.0 * (double)s->shares.codes / n;
 	for (int i = 0; i < OCTREE_STREAMS; i++)
 		streams[2 + i].packed = 8.0 * (double)s->shares.stream[i] / n;
@@ -199,13 +200,13 @@ static void print_octree(const struct summary *s)
 	take_streams(streams, s);
 	printf("octree            %d levels, %" PRIu64 " leaves of %.4g, %" PRIu64 " byte codes\n", s->tree->levels,
 	       s->tree->n_leaves, ldexp(s->tree->edge * s->info->scale, -s->tree->levels), s->tree->n_codes);
-	for (int i = 0; i < N_STREAMS; i++) {
-		printf("  %-12s    %.2f bits a leaf", streams[i].name, streams[i].bits);
+	for (int i = 0; i < (s->shares.codes > 0 ? N_STREAMS : N_STREAMS - 1); i++) {
+		printf("  %-14s  %.2f bits a leaf", streams[i].name, streams[i].bits);
 		printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", streams[i].packed);
 		bits += streams[i].bits;
 		packed += streams[i].packed;
 	}
-	printf("  %-12s    %.2f bits a leaf", "all", bits);
+	printf("  %-14s  %.2f bits a leaf", "all", bits);
 	printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", packed);
 }
 

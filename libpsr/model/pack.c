@@ -108,7 +108,7 @@ int pack_find_octree(struct octree *tree, const uint8_t *image)
 struct packer {
 	ZSTD_CCtx *context;
 	uint64_t packing;
-	uint8_t *octree; /* packed, in way 2 */
+	uint8_t *octree; /* packed, in way 3 */
 	size_t n_octree;
 	uint8_t *split, *packed; /* a chunk, and its largest packed form */
 	size_t packed_capacity;
@@ -177,7 +177,7 @@ static uint64_t directory_end(const struct packer *p, const uint8_t *image, uint
 	}
 	*n = n_chunks;
 	if (p->packing == PACKING_OCTREE)
-		n_chunks += 1 + pack_chunks(p->n_octree);
+		n_chunks += 1 + pack_pieces(p->n_octree);
 	return *directory + PACK_ENTRY_BYTES * n_chunks;
 }
 
@@ -217,8 +217,8 @@ static uint64_t pack_chunks_of(const struct packer *p, uint8_t *out, const uint8
 	if (p->packing != PACKING_OCTREE)
 		return at;
 	file_put(next, 8, p->n_octree);
-	for (uint64_t first = 0; first < p->n_octree; first += FILE_CHUNK_BYTES) {
-		uint64_t size = p->n_octree - first < FILE_CHUNK_BYTES ? p->n_octree - first : FILE_CHUNK_BYTES;
+	for (uint64_t first = 0; first < p->n_octree; first += PACK_PIECE_BYTES) {
+		uint64_t size = p->n_octree - first < PACK_PIECE_BYTES ? p->n_octree - first : PACK_PIECE_BYTES;
 
 		next += PACK_ENTRY_BYTES;
 		at = store_chunk(out, at, next, p->octree + first, size);
@@ -238,7 +238,7 @@ static int pack_octree(struct packer *p, const uint8_t *image, struct psr_error 
 		return PSR_OK;
 	if (tree.n_leaves > OCTREE_CHUNK && (code = psr_pool_create(&pool, psr_pool_all_cores(), err)) != PSR_OK)
 		return code;
-	code = octree_pack(&p->octree, &p->n_octree, &tree, OCTREE_SMALL, pool, err);
+	code = octree_pack(&p->octree, &p->n_octree, &tree, OCTREE_SMALL | OCTREE_STEPS, pool, err);
 	psr_pool_destroy(pool);
 	if (code == PSR_OK)
 		p->packing = PACKING_OCTREE;

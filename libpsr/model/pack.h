@@ -8,7 +8,7 @@
 
 enum { HEADER_PACKING = 28, HEADER_PACKED_SIZE = 48 }; /* zeros in a plain file */
 #define PACKING_ZSTD 1
-#define PACKING_OCTREE 2 /* the same, and the sections of an octree as one piece that octree_pack() makes */
+#define PACKING_OCTREE 3 /* the same, and the sections of an octree as octree_pack() makes them, in steps */
 
 /* An entry of the directory. */
 #define PACK_ENTRY_BYTES 16
@@ -36,6 +36,13 @@ static inline uint64_t pack_chunks(uint64_t length)
 	return (length + FILE_CHUNK_BYTES - 1) / FILE_CHUNK_BYTES;
 }
 
+/* The packed octree is hashed in pieces: a file that ends early is used up to the last whole one. */
+#define PACK_PIECE_BYTES ((uint64_t)1 << 16)
+static inline uint64_t pack_pieces(uint64_t length)
+{
+	return length / PACK_PIECE_BYTES + (length % PACK_PIECE_BYTES != 0);
+}
+
 /* Words of a chunk: 1, 2, 4 or 8 bytes; no method moves bytes beyond the last whole word. Differences are to the word
  * before, modulo 2^(8 stride), the first word's to 0. */
 static inline int pack_is_stride(uint32_t stride)
@@ -45,8 +52,8 @@ static inline int pack_is_stride(uint32_t stride)
 void pack_split(uint8_t *out, const uint8_t *chunk, size_t n_bytes, uint32_t stride, enum pack_method method);
 void pack_join(uint8_t *chunk, const uint8_t *in, size_t n_bytes, uint32_t stride, enum pack_method method);
 
-/* Way 2: behind the directory's entries of other sections are the length of the packed octree and 8 zeros, then an entry
- * for each of its pieces of FILE_CHUNK_BYTES, all stored. */
+/* Way 3: behind the directory's entries of other sections are the length of the packed octree and 8 zeros, then an
+ * entry for each of its pieces of PACK_PIECE_BYTES, all stored. */
 int pack_is_of_octree(uint64_t packing, const uint8_t *entry); /* of the table */
 
 /* Finds the octree of an image whose sections are inside of it; arrays point there, and have the lengths that its counts

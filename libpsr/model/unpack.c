@@ -51,7 +51,7 @@ static int read_octree_entry(struct unpacker *u, uint64_t size, uint64_t *n_chun
 	u->n_octree = file_get(entry, 8);
 	if (u->n_octree == 0 || u->n_octree > size || file_get(entry + 8, 8) != 0)
 		return bad(u, "the packed octree has %" PRIu64 " bytes, and the file %" PRIu64, u->n_octree, size);
-	*n_chunks += 1 + pack_chunks(u->n_octree);
+	*n_chunks += 1 + pack_pieces(u->n_octree);
 	return PSR_OK;
 }
 
@@ -63,8 +63,8 @@ int unpack_read_head(struct unpacker *u)
 	u->packing = packing;
 	if (packing != PACKING_ZSTD && packing != PACKING_OCTREE)
 		return psr_fail(u->err, PSR_ERR_VERSION,
-		                "%s: the file is packed in way %" PRIu64 ", and this build knows ways %d "
-		                "and %d; a newer psr may read it", u->source->name, packing, PACKING_ZSTD, PACKING_OCTREE);
+		                "%s: the file is packed in way %" PRIu64 ", and this build knows ways %d and %d; take the psr "
+		                "that packed it, or build it again", u->source->name, packing, PACKING_ZSTD, PACKING_OCTREE);
 	size = file_get(u->header + HEADER_PACKED_SIZE, 8);
 	u->n_image = file_get(u->header + HEADER_FILE_SIZE, 8);
 	u->n_sections = (uint32_t)file_get(u->header + HEADER_N_SECTIONS, 4);
@@ -142,8 +142,8 @@ int unpack_check_head(const struct unpacker *u)
 			file_at += packed;
 		}
 	}
-	for (uint64_t first = 0; first < u->n_octree; first += FILE_CHUNK_BYTES, n++) {
-		const uint64_t size = u->n_octree - first < FILE_CHUNK_BYTES ? u->n_octree - first : FILE_CHUNK_BYTES;
+	for (uint64_t first = 0; first < u->n_octree; first += PACK_PIECE_BYTES, n++) {
+		const uint64_t size = u->n_octree - first < PACK_PIECE_BYTES ? u->n_octree - first : PACK_PIECE_BYTES;
 
 		next += PACK_ENTRY_BYTES;
 		if (file_get(next, 8) != (size | (uint64_t)PACK_STORED << 32 | (uint64_t)1 << 40))
@@ -177,8 +177,7 @@ void pack_seal(uint8_t *bytes, size_t n_bytes)
 		octree = n_chunks++;
 		if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
 			return;
-		n_chunks += file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8) / FILE_CHUNK_BYTES
-		            + (file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8) % FILE_CHUNK_BYTES != 0);
+		n_chunks += pack_pieces(file_get(bytes + table_end + PACK_ENTRY_BYTES * octree, 8));
 	}
 	if (n_chunks > (n_bytes - table_end) / PACK_ENTRY_BYTES)
 		return;

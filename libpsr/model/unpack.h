@@ -12,7 +12,7 @@ struct unpacker {
 	uint8_t header[FILE_HEADER_BYTES];
 	uint8_t *head;
 	uint64_t table_end, head_end, n_image, packing;
-	uint64_t octree_entry, n_octree; /* in way 2: where in `head` its entry is, its length */
+	uint64_t octree_entry, n_octree; /* in way 3: where in `head` its entry is, its length */
 	uint32_t n_sections;
 	ZSTD_DCtx *context;
 	uint8_t *packed, *split; /* a chunk each */

@@ -138,7 +138,7 @@ static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_share
 	bytes = psr_alloc_huge(u->n_octree);
 	if (bytes == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a packed octree", u->source->name);
-	for (uint64_t first = 0; first < u->n_octree && code == PSR_OK; first += FILE_CHUNK_BYTES) {
+	for (uint64_t first = 0; first < u->n_octree && code == PSR_OK; first += PACK_PIECE_BYTES) {
 		entry += PACK_ENTRY_BYTES;
 		code = unpack_fetch(u, bytes + first, file_at + first, file_get(entry + PACK_LENGTH, 4));
 		if (code == PSR_OK && XXH64(bytes + first, file_get(entry + PACK_LENGTH, 4), 0) != file_get(entry + PACK_HASH, 8))
