@@ -307,7 +307,7 @@ int cmd_build(int argc, char **argv)
 		  .min = 0, .max = 180 },
 		{ .name = "pack", .type = PSR_OPT_FLAG, .value = &wish.is_packed,
 		  .help = "A file of a third to a half of the size, for archives and slow networks. Opening it takes longer, and"
-		          " memory for all of it." },
+		          " memory for all of it. The beginning of a packed octree is a coarser model." },
 		{ .name = "calibrate", .type = PSR_OPT_FLAG, .value = &wish.is_calibrated,
 		  .help = "Measures in 32 views what settings cost and how far their pictures are from the source, and stores it in the"
 		          " file. Then psrd keeps budgets by figures of this model. Takes some minutes." },

@@ -24,7 +24,8 @@ struct summary {
 	const struct octree *tree;       /* likewise */
 	struct octree_shares shares;     /* zeros where the file has no packed octree */
 	uint64_t bytes, file_bytes;
-	int is_packed;
+	int is_packed, is_prefix;
+	struct psr_model_prefix prefix;
 	const struct psr_presets *presets;
 	const struct psr_calibration *calibration;
 	uint32_t level_blocks[PSR_MAX_LEVELS], n_bent, n_sheer;
@@ -56,6 +57,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	psr_model_octree_shares(model, &summary->shares);
 	summary->bytes = psr_model_bytes(model);
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
+	summary->is_prefix = psr_model_is_prefix(model, &summary->prefix);
 	summary->presets = psr_model_presets(model);
 	summary->calibration = psr_model_calibration(model);
 	for (uint32_t b = 0; summary->blocks != NULL && b < summary->blocks->n_blocks; b++) {
@@ -251,6 +253,9 @@ static void print_text(const struct summary *s)
 	print_presets(s->presets);
 	print_calibration(s->calibration);
 	printf("file              %.2f MB, %s\n", (double)s->file_bytes / 1e6, s->is_packed ? "packed" : "not packed");
+	if (s->is_prefix)
+		printf("                  the beginning of %.2f MB: %" PRIu32 " of %" PRIu32 " levels of its octree\n",
+		       (double)s->prefix.of_bytes / 1e6, s->prefix.levels, s->prefix.of_levels);
 	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
 	if (s->tree != NULL)
 		print_octree(s);
@@ -326,6 +331,12 @@ static int print_json(const struct summary *s, struct psr_error *err)
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
 	cJSON_AddNumberToObject(root, "file_bytes", (double)s->file_bytes);
 	cJSON_AddBoolToObject(root, "is_packed", s->is_packed);
+	if (s->is_prefix) {
+		part = cJSON_AddObjectToObject(root, "prefix");
+		cJSON_AddNumberToObject(part, "levels", s->prefix.levels);
+		cJSON_AddNumberToObject(part, "of_levels", s->prefix.of_levels);
+		cJSON_AddNumberToObject(part, "of_bytes", (double)s->prefix.of_bytes);
+	}
 	if (blocks != NULL) {
 		part = cJSON_AddObjectToObject(root, "blocks");
 		cJSON_AddNumberToObject(part, "samples", (double)blocks->n_samples);

@@ -25,7 +25,7 @@ struct psr_model {
 	struct content content;
 	struct psr_cubes *cubes; /* of its octree, or NULL */
 	struct psr_points *points; /* of its differential points, or NULL */
-	struct octree_shares shares; /* of a packed octree, in the file */
+	struct pack_facts facts; /* of the packed file */
 };
 
 static void release_image(const uint8_t *bytes, size_t n_bytes, int is_mapped)
@@ -87,20 +87,21 @@ struct found {
 	int fd, is_packed;
 	size_t n_bytes;   /* of the file */
 	uint64_t n_image; /* its unpacked size by the header, if packed */
+	uint64_t n_whole; /* its own size by the header, if packed */
 };
 
 static int adopt_packed(struct psr_model **out, const struct pack_source *source, struct psr_error *err)
 {
 	uint8_t *image = NULL;
-	struct octree_shares shares;
+	struct pack_facts facts;
 	size_t n_image = 0;
-	int code = pack_open(&image, &n_image, &shares, source, err);
+	int code = pack_open(&image, &n_image, &facts, source, err);
 
 	if (code == PSR_OK)
 		code = model_adopt(out, image, n_image, 0, source->name, err);
 	if (code == PSR_OK) {
 		(*out)->is_packed = 1;
-		(*out)->shares = shares;
+		(*out)->facts = facts;
 		(*out)->file_bytes = source->n_bytes;
 	}
 	return code;
@@ -137,6 +138,7 @@ static int open_file(struct found *found, const char *path, const char *name, st
 	found->n_bytes = (size_t)st.st_size;
 	found->is_packed = pack_is_packed(header);
 	found->n_image = file_get(header + HEADER_FILE_SIZE, 8);
+	found->n_whole = file_get(header + HEADER_PACKED_SIZE, 8);
 	return PSR_OK;
 }
 
@@ -215,6 +217,8 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 	if (code != PSR_OK)
 		return code;
 	close(f.fd);
+	if (f.is_packed && f.n_whole > f.n_bytes && f.n_image > pack_max_image(f.n_bytes))
+		f.n_image = pack_max_image(f.n_bytes); /* a beginning of the file becomes no more */
 	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes))
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; the limit is "
 		                "%d to 1", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
@@ -281,13 +285,19 @@ const struct octree *psr_model_octree(const struct psr_model *model)
 
 int psr_model_octree_shares(const struct psr_model *model, struct octree_shares *shares)
 {
-	*shares = model->shares;
+	*shares = model->facts.shares;
 	return shares->codes > 0;
 }
 
 const struct psr_presets *psr_model_presets(const struct psr_model *model)
 {
 	return &model->content.presets;
+}
+
+int psr_model_is_prefix(const struct psr_model *model, struct psr_model_prefix *prefix)
+{
+	*prefix = model->facts.prefix;
+	return prefix->levels > 0;
 }
 
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16])

@@ -37,7 +37,7 @@ static inline uint64_t pack_chunks(uint64_t length)
 }
 
 /* The packed octree is hashed in pieces: a file that ends early is used up to the last whole one. */
-#define PACK_PIECE_BYTES ((uint64_t)1 << 16)
+#define PACK_PIECE_BYTES ((uint64_t)1 << 14)
 static inline uint64_t pack_pieces(uint64_t length)
 {
 	return length / PACK_PIECE_BYTES + (length % PACK_PIECE_BYTES != 0);
@@ -70,9 +70,15 @@ struct pack_source {
 
 int pack_is_packed(const uint8_t *header); /* FILE_HEADER_BYTES of them */
 
-/* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). *shares: of its octree, zeros if
- * that was not packed as one. FORMAT, VERSION, IO, MEMORY. */
-int pack_open(uint8_t **image, size_t *n_image, struct octree_shares *shares, const struct pack_source *source,
+/* What a packed file tells beside its image. */
+struct pack_facts {
+	struct octree_shares shares;    /* of its octree; zeros if that was not packed as one */
+	struct psr_model_prefix prefix; /* zeros if the file is whole */
+};
+
+/* Unpacks to the plain image, in memory of psr_alloc_huge(), unchecked by file_parse(). A file of an octree that ends
+ * early becomes the image of the model of its last whole step. FORMAT, VERSION, IO, MEMORY. */
+int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const struct pack_source *source,
               struct psr_error *err);
 
 /* Packs an image: *n_bytes in memory of psr_alloc_huge() of *capacity bytes. */

@@ -71,7 +71,8 @@ int unpack_read_head(struct unpacker *u)
 	if (u->n_sections > FILE_MAX_SECTIONS)
 		return bad(u, "the header lists %" PRIu32 " sections, more than the %d there can be", u->n_sections,
 		           FILE_MAX_SECTIONS);
-	if (size > u->source->n_bytes)
+	u->n_file = size;
+	if (size > u->source->n_bytes && packing != PACKING_OCTREE)
 		return bad(u, "the file ends at byte %" PRIu64 " of %" PRIu64 "; it was cut short", u->source->n_bytes, size);
 	if (size < u->source->n_bytes)
 		return bad(u, "%" PRIu64 " bytes follow the end of the file's last chunk", u->source->n_bytes - size);
@@ -80,6 +81,9 @@ int unpack_read_head(struct unpacker *u)
 		           size, u->n_image, PACK_MAX_RATIO);
 	u->table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * (uint64_t)u->n_sections
 	               + 8 * file_get(u->header + HEADER_N_CHUNKS, 4);
+	if (u->table_end > u->source->n_bytes && u->table_end <= size)
+		return bad(u, "the file ends at byte %" PRIu64 ", within its section table (bytes %d to %" PRIu64
+		           "); it was cut short", u->source->n_bytes, FILE_HEADER_BYTES, u->table_end);
 	if (u->table_end > size)
 		return bad(u, "the section table ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->table_end, size);
 	u->head_end = u->table_end;
@@ -102,6 +106,9 @@ int unpack_read_head(struct unpacker *u)
 	if (code == PSR_OK && u->head_end > size)
 		return bad(u, "the directory of chunks ends at byte %" PRIu64 ", and the file at byte %" PRIu64, u->head_end,
 		           size);
+	if (code == PSR_OK && u->head_end > u->source->n_bytes)
+		return bad(u, "the file ends at byte %" PRIu64 ", within its directory of chunks (up to byte %" PRIu64
+		           "); it was cut short", u->source->n_bytes, u->head_end);
 	psr_free(u->head);
 	u->head = psr_alloc_array(u->head_end, 1);
 	if (u->head == NULL)
@@ -153,8 +160,8 @@ int unpack_check_head(const struct unpacker *u)
 	if (image_at + FILE_TAIL_BYTES != u->n_image)
 		return bad(u, "the header says %" PRIu64 " bytes, and the sections have %" PRIu64, u->n_image,
 		           image_at + FILE_TAIL_BYTES);
-	if (file_at != u->source->n_bytes)
-		return bad(u, "the chunks end at byte %" PRIu64 ", and the file at byte %" PRIu64, file_at, u->source->n_bytes);
+	if (file_at != u->n_file)
+		return bad(u, "the chunks end at byte %" PRIu64 ", and the file at byte %" PRIu64, file_at, u->n_file);
 	return PSR_OK;
 }
 

@@ -1,4 +1,5 @@
-/* Packed files during reading: unpack.c reads what comes before the chunks, unpack_chunks.c the chunks. */
+/* Packed files during reading: unpack.c reads what comes before the chunks, unpack_chunks.c the chunks, and prefix.c
+ * those of a file that ends early. */
 #ifndef PSR_MODEL_UNPACK_H
 #define PSR_MODEL_UNPACK_H
 
@@ -12,6 +13,9 @@ struct unpacker {
 	uint8_t header[FILE_HEADER_BYTES];
 	uint8_t *head;
 	uint64_t table_end, head_end, n_image, packing;
+	uint64_t n_file;           /* what the whole file has */
+	struct octree octree;      /* what OCTR says, checked; zeros without it */
+	int is_octree_alone;       /* INFO speaks of it */
 	uint64_t octree_entry, n_octree; /* in way 3: where in `head` its entry is, its length */
 	uint32_t n_sections;
 	ZSTD_DCtx *context;
@@ -31,6 +35,15 @@ int unpack_fetch(const struct unpacker *u, uint8_t *to, uint64_t at, uint64_t n)
 
 /* Reads everything before the first chunk and checks its hash, before it follows any of it. */
 int unpack_read_head(struct unpacker *u);
+
+/* Unpacks all chunks of other sections than the packed octree's into an image with its table. */
+int unpack_sections(const struct unpacker *u, uint8_t *image);
+
+/* Reads the first n bytes of the packed octree: whole pieces, or all. */
+int unpack_read_octree(const struct unpacker *u, uint8_t *bytes, uint64_t n);
+
+/* Makes the image of a file that ends within its packed octree. */
+int unpack_prefix(struct unpacker *u, uint8_t **image, struct pack_facts *facts);
 
 /* Checks the offsets of sections in the image and the sizes of chunks in the file. */
 int unpack_check_head(const struct unpacker *u);

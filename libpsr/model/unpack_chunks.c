@@ -56,7 +56,7 @@ static uint8_t *counts_place(struct counts *counts, const uint8_t *entry)
 	return NULL;
 }
 
-/* Unpacks all chunks into the image; or, if that is NULL, the counts alone. */
+/* Unpacks all chunks into the image, where its table says; or, if that is NULL, the counts alone. */
 static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts *counts)
 {
 	const uint8_t *next = u->head + u->table_end;
@@ -64,10 +64,12 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts
 
 	for (uint32_t i = 0; i < u->n_sections; i++) {
 		const uint8_t *entry = unpack_entry(u, i);
-		uint64_t offset = file_get(entry + ENTRY_OFFSET, 8), length = file_get(entry + ENTRY_LENGTH, 8);
+		uint64_t length = file_get(entry + ENTRY_LENGTH, 8), offset = 0;
 
 		if (pack_is_of_octree(u->packing, entry))
 			continue;
+		if (image != NULL)
+			offset = file_get(image + (entry - u->head) + ENTRY_OFFSET, 8);
 		for (uint64_t first = 0; first < length; first += FILE_CHUNK_BYTES, next += PACK_ENTRY_BYTES, n++) {
 			uint64_t size = length - first < FILE_CHUNK_BYTES ? length - first : FILE_CHUNK_BYTES;
 			uint8_t *to = image != NULL ? image + offset + first : counts_place(counts, entry);
@@ -81,9 +83,29 @@ static int unpack_chunks(const struct unpacker *u, uint8_t *image, struct counts
 	return PSR_OK;
 }
 
+int unpack_sections(const struct unpacker *u, uint8_t *image)
+{
+	return unpack_chunks(u, image, NULL);
+}
+
+int unpack_read_octree(const struct unpacker *u, uint8_t *bytes, uint64_t n)
+{
+	const uint64_t file_at = u->n_file - u->n_octree;
+	const uint8_t *entry = u->head + u->octree_entry;
+	int code = PSR_OK;
+
+	for (uint64_t first = 0; first < n && code == PSR_OK; first += PACK_PIECE_BYTES) {
+		entry += PACK_ENTRY_BYTES;
+		code = unpack_fetch(u, bytes + first, file_at + first, file_get(entry + PACK_LENGTH, 4));
+		if (code == PSR_OK && XXH64(bytes + first, file_get(entry + PACK_LENGTH, 4), 0) != file_get(entry + PACK_HASH, 8))
+			code = bad(u, "the packed octree is damaged at byte %" PRIu64 ": its hash differs", file_at + first);
+	}
+	return code;
+}
+
 /* Compares lengths of known sections with the counts in BLKS, OCTR and DPNT before allocating; file_parse() reports other
  * errors better. */
-static int check_lengths(const struct unpacker *u)
+static int check_lengths(struct unpacker *u)
 {
 	struct counts counts = { .has_blocks = 0 };
 	struct content content = { .has_blocks = 0 };
@@ -101,6 +123,8 @@ static int check_lengths(const struct unpacker *u)
 	if (code == PSR_OK && counts.has_octree) {
 		file_get_octree(&content.octree, counts.octree);
 		code = model_check_octree_counts(&content.octree, u->source->name, u->err);
+		u->octree = content.octree;
+		u->is_octree_alone = !counts.has_blocks && !counts.has_points;
 	}
 	if (code == PSR_OK && counts.has_points) {
 		file_get_points(&content.points, counts.points);
@@ -125,8 +149,6 @@ static int check_lengths(const struct unpacker *u)
 /* Reads the packed octree and unpacks it into its sections. Chunks before it are in the image. */
 static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_shares *shares)
 {
-	const uint64_t file_at = u->source->n_bytes - u->n_octree;
-	const uint8_t *entry = u->head + u->octree_entry;
 	struct psr_error what = { 0 };
 	struct psr_pool *pool = NULL;
 	struct octree tree;
@@ -138,12 +160,7 @@ static int unpack_octree(struct unpacker *u, uint8_t *image, struct octree_share
 	bytes = psr_alloc_huge(u->n_octree);
 	if (bytes == NULL)
 		return psr_fail(u->err, PSR_ERR_MEMORY, "%s: no memory for a packed octree", u->source->name);
-	for (uint64_t first = 0; first < u->n_octree && code == PSR_OK; first += PACK_PIECE_BYTES) {
-		entry += PACK_ENTRY_BYTES;
-		code = unpack_fetch(u, bytes + first, file_at + first, file_get(entry + PACK_LENGTH, 4));
-		if (code == PSR_OK && XXH64(bytes + first, file_get(entry + PACK_LENGTH, 4), 0) != file_get(entry + PACK_HASH, 8))
-			code = bad(u, "the packed octree is damaged at byte %" PRIu64 ": its hash differs", file_at + first);
-	}
+	code = unpack_read_octree(u, bytes, u->n_octree);
 	if (code == PSR_OK && tree.n_leaves > OCTREE_CHUNK)
 		code = psr_pool_create(&pool, psr_pool_all_cores(), u->err);
 	if (code == PSR_OK) {
@@ -180,13 +197,13 @@ static int make_image(struct unpacker *u, uint8_t **out, struct octree_shares *s
 	return PSR_OK;
 }
 
-int pack_open(uint8_t **image, size_t *n_image, struct octree_shares *shares, const struct pack_source *source,
+int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const struct pack_source *source,
               struct psr_error *err)
 {
 	struct unpacker u = { .source = source, .err = err };
 	int code = unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES);
 
-	*shares = (struct octree_shares){ .codes = 0 };
+	*facts = (struct pack_facts){ .prefix = { .levels = 0 } };
 	if (code == PSR_OK)
 		code = unpack_read_head(&u);
 	if (code == PSR_OK)
@@ -201,7 +218,7 @@ int pack_open(uint8_t **image, size_t *n_image, struct octree_shares *shares, co
 	if (code == PSR_OK)
 		code = check_lengths(&u);
 	if (code == PSR_OK)
-		code = make_image(&u, image, shares);
+		code = u.n_file > source->n_bytes ? unpack_prefix(&u, image, facts) : make_image(&u, image, &facts->shares);
 	if (code == PSR_OK)
 		*n_image = u.n_image;
 	ZSTD_freeDCtx(u.context);

@@ -102,6 +102,13 @@ check "in a third of the bits" python3 -c 'import json, sys
 o = json.load(open(sys.argv[1]))["octree"]
 packed, plain = (sum(o[k].values()) for k in ("packed_bits_per_leaf", "bits_per_leaf"))
 assert 0 < 3 * packed < plain, (packed, plain)' "$work/packed.json"
+check "all but its last bytes are a coarser model" bash -c 'head -c -20000 "$1" >"$2"' - "$work/packed.psr" "$work/part.psr"
+psr-model info "$work/part.psr" --json >"$work/part.json"
+is "of five of its seven levels" "5 7" "$(value "$work/part.json" prefix.levels) $(value "$work/part.json" prefix.of_levels)"
+is "whose leaves are four times as wide" "$(python3 -c "print(4 * $(value "$work/ball.json" octree.leaf_edge))")" \
+	"$(value "$work/part.json" octree.leaf_edge)"
+head -c 3000 "$work/packed.psr" >"$work/less.psr"
+refuses "less than its first step" 4 "it was cut short" psr-model info "$work/less.psr"
 psr-model make teapot -o "$work/teapot.glb"
 check "a mesh becomes an octree and blocks" psr-model build "$work/teapot.glb" --representation both -r 128 -o "$work/teapot.psr"
 is "of leaves as wide as a pixel" 7 "$(psr-model info "$work/teapot.psr" --json >"$work/teapot.json"; value "$work/teapot.json" octree.levels)"
@@ -110,13 +117,14 @@ check "lines of numbers become an octree" psr-model build "$work/square.xyz" --r
 
 # --- pictures ---
 mkdir "$work/models"
-cp "$work/ball.psr" "$work/packed.psr" "$work/both.psr" "$work/teapot.psr" "$work/square.psr" "$work/models"
+cp "$work/ball.psr" "$work/part.psr" "$work/packed.psr" "$work/both.psr" "$work/teapot.psr" "$work/square.psr" "$work/models"
 start_psrd --models "$work/models" --threads 2
 shot() { psr shot --server "$server" --size 200x200 "$@"; }
 hashes() { shot "$@" --hash 2>/dev/null; }
 
 ball=$(hashes --model ball)
 is "a packed octree looks as the plain one" "$ball" "$(hashes --model packed)"
+check "a part of it, coarser" [ -n "$(hashes --model part)" -a "$(hashes --model part)" != "$ball" ]
 is "where nobody names one, blocks are drawn" "$(hashes --model both)" "$(hashes --instance both,as=blocks)"
 check "and an octree where it is named" [ "$(hashes --instance both,as=octree)" != "$(hashes --model both)" ]
 refuses "blocks of an octree" 4 "asks for representation 1 \\(blocks\\), and its model has an octree alone" \

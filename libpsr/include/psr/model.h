@@ -39,7 +39,8 @@ struct psr_model;
 
 /* Opens a .psr file; psr_model_unref() lets go of the model. `map` reads the file in place, which must not shrink
  * meanwhile; `read` copies it into memory first (huge pages where the system has them), as a daemon needs it. Both
- * check every count, offset, index and hash before they follow any. NOT_FOUND, IO, FORMAT, VERSION, UNSUPPORTED (a
+ * check every count, offset, index and hash before they follow any. Of a file that ends early they open what is there,
+ * if that is a model: psr_model_is_prefix(). NOT_FOUND, IO, FORMAT, VERSION, UNSUPPORTED (a
  * required section that this build does not know, or no representation that it does), MEMORY. */
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
@@ -70,6 +71,14 @@ void psr_model_unref(struct psr_model *model); /* NULL is fine */
 
 const struct psr_model_info *psr_model_info(const struct psr_model *model);
 const struct psr_presets *psr_model_presets(const struct psr_model *model); /* never NULL */
+
+/* A packed octree's file that ends early, as a download that broke, opens as a coarser model: that of the levels that
+ * are there. Its content id is that of this model. */
+struct psr_model_prefix {
+	uint32_t levels, of_levels; /* of the octree: there, in the whole file */
+	uint64_t of_bytes;          /* of the whole file */
+};
+int psr_model_is_prefix(const struct psr_model *model, struct psr_model_prefix *prefix); /* whether it is one */
 
 /* XXH128 of the section table (types, versions, lengths, hashes): models of equal content have equal ids. */
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);

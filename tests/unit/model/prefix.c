@@ -1,0 +1,299 @@
+/* Packed files of octrees that end early. */
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdint.h>
+#include <cmocka.h>
+#include <stdio.h>
+#include <unistd.h>
+#include "base/mem.h"
+#include "model/pack.h"
+#include "../octree/leaves.h"
+#include "fixture.h"
+
+#define LEVELS 7
+
+static struct fixture fixture;
+static struct psr_model *models[2]; /* of an octree, and of both */
+static uint8_t *packed[2];
+static size_t n_packed[2];
+static uint64_t octree_at[2];       /* where the packed octree begins */
+static struct octree_step step[OCTREE_MOST_STEPS];
+static int n_steps;
+static struct octree *coarser[OCTREE_MOST_STEPS]; /* the trees of the steps but the last */
+
+static uint64_t octree_bytes(const uint8_t *bytes)
+{
+	const uint64_t n_sections = file_get(bytes + HEADER_N_SECTIONS, 4);
+	uint64_t n = 0;
+
+	for (uint64_t i = 0; i < n_sections; i++) {
+		const uint8_t *entry = bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * i;
+
+		if (!pack_is_of_octree(PACKING_OCTREE, entry))
+			n += pack_chunks(file_get(entry + ENTRY_LENGTH, 8));
+	}
+	return file_get(bytes + FILE_HEADER_BYTES + FILE_ENTRY_BYTES * n_sections + 8 * file_get(bytes + HEADER_N_CHUNKS, 4)
+	                + PACK_ENTRY_BYTES * n, 8);
+}
+
+static int setup(void **state)
+{
+	struct leaves leaves = leaves_of_sphere(LEVELS);
+	struct octree *tree = leaves_to_tree(&leaves, LEVELS);
+	const struct octree *at = tree;
+
+	(void)state;
+	free(leaves.path);
+	fixture_init(&fixture, 1);
+	assert_true(tree != NULL && leaves_dress(tree, 7));
+	tree->is_one_sided = 1;
+	assert_int_equal(psr_model_create_octree(&models[0], &fixture.info, tree, &fixture.presets, NULL), PSR_OK);
+	assert_int_equal(psr_model_create_both(&models[1], &fixture.info, &fixture.blocks, tree, NULL, NULL), PSR_OK);
+	for (int i = 0; i < 2; i++) {
+		size_t n_image, capacity;
+		const uint8_t *image = model_image(models[i], &n_image);
+		uint8_t *bytes;
+
+		assert_int_equal(pack_image(&bytes, &n_packed[i], &capacity, image, n_image, NULL), PSR_OK);
+		packed[i] = malloc(n_packed[i]);
+		memcpy(packed[i], bytes, n_packed[i]);
+		psr_free_huge(bytes, capacity);
+		octree_at[i] = n_packed[i] - octree_bytes(packed[i]);
+	}
+	n_steps = octree_packed_steps(step, packed[0] + octree_at[0], n_packed[0] - octree_at[0], NULL);
+	assert_true(n_steps >= 2 && step[n_steps - 1].end > 2 * PACK_PIECE_BYTES);
+	for (int s = n_steps - 2; s >= 0; s--) {
+		struct octree *between = octree_coarser(at);
+
+		at = coarser[s] = octree_coarser(between);
+		octree_destroy(between);
+	}
+	octree_destroy(tree);
+	return 0;
+}
+
+static int teardown(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		psr_model_unref(models[i]);
+		free(packed[i]);
+	}
+	for (int s = 0; s < n_steps; s++)
+		octree_destroy(coarser[s]);
+	return 0;
+}
+
+/* From an allocation of exactly that size, so that the address sanitizer sees every step beyond it. */
+static int parse(struct psr_model **model, const uint8_t *bytes, size_t n, struct psr_error *err)
+{
+	uint8_t *exact = malloc(n > 0 ? n : 1);
+	int code;
+
+	memcpy(exact, bytes, n);
+	*model = NULL;
+	code = psr_model_parse(model, exact, n, err);
+	assert_true((code == PSR_OK) == (*model != NULL));
+	free(exact);
+	return code;
+}
+
+static void assert_tree(const struct octree *a, const struct octree *b)
+{
+	assert_int_equal(a->levels, b->levels);
+	assert_int_equal(a->is_one_sided, 1);
+	assert_int_equal(a->n_codes, b->n_codes);
+	assert_int_equal(a->n_leaves, b->n_leaves);
+	assert_memory_equal(a->code, b->code, a->n_codes);
+	assert_memory_equal(a->normal, b->normal, a->n_leaves * sizeof *a->normal);
+	assert_memory_equal(a->offset, b->offset, a->n_leaves);
+	assert_memory_equal(a->color, b->color, a->n_leaves * sizeof *a->color);
+}
+
+/* Returns how many steps a file of n bytes has whole. */
+static int steps_in(size_t n, int model)
+{
+	const uint64_t there = n > octree_at[model] ? n - octree_at[model] : 0;
+	int s = 0;
+
+	while (s < n_steps && step[s].end <= (n < n_packed[model] ? there / PACK_PIECE_BYTES * PACK_PIECE_BYTES : there))
+		s++;
+	return s;
+}
+
+static void a_file_cut_at_any_length_is_its_coarser_model_or_refused(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 2; i++)
+		for (size_t n = 1; n < n_packed[i]; n += n < 200 || (n + 2) % PACK_PIECE_BYTES < octree_at[i] % 7 + 4 ? 1 : 4999) {
+			struct psr_error err = { .text = "" };
+			struct psr_model_prefix prefix;
+			struct psr_model *model;
+			const int n_whole = steps_in(n, i), code = parse(&model, packed[i], n, &err);
+
+			if (code != (n_whole > 0 ? PSR_OK : PSR_ERR_FORMAT))
+				fail_msg("%zu of %zu bytes, %d steps: %d, %s", n, n_packed[i], n_whole, code, err.text);
+			assert_true((code == PSR_OK) == (err.text[0] == 0));
+			if (n_whole == 0)
+				continue;
+			assert_true(psr_model_is_prefix(model, &prefix));
+			assert_int_equal(prefix.levels, step[n_whole - 1].depth);
+			assert_int_equal(prefix.of_levels, LEVELS);
+			assert_int_equal(prefix.of_bytes, n_packed[i]);
+			assert_tree(psr_model_octree(model), coarser[n_whole - 1]);
+			psr_model_unref(model);
+		}
+}
+
+static void its_model_is_that_of_the_coarser_tree(void **state)
+{
+	(void)state;
+	for (int i = 0; i < 2; i++) {
+		const size_t n = octree_at[i] + pack_pieces(step[n_steps - 2].end) * PACK_PIECE_BYTES;
+		struct psr_model_info info = fixture.info;
+		struct psr_model *model, *made;
+		struct octree tree = *coarser[n_steps - 2];
+		struct psr_model_prefix prefix;
+		const int missing = LEVELS - tree.levels;
+		uint8_t id[16], other[16];
+
+		assert_true(n < n_packed[i]);
+		assert_int_equal(parse(&model, packed[i], n, NULL), PSR_OK);
+		if (i == 0) {
+			info.spacing *= 1 << missing;
+			info.resolution = info.resolution >> missing > 0 ? info.resolution >> missing : 1;
+		}
+		assert_int_equal(psr_model_create_both(&made, &info, i == 1 ? &fixture.blocks : NULL, &tree,
+		                                       i == 0 ? &fixture.presets : NULL, NULL), PSR_OK);
+		psr_model_content_id(model, id);
+		psr_model_content_id(made, other);
+		assert_memory_equal(id, other, sizeof id);
+		assert_false(psr_model_is_prefix(made, &prefix));
+		assert_int_equal(psr_model_blocks(model) != NULL, i == 1);
+		psr_model_unref(model);
+		psr_model_unref(made);
+		assert_int_equal(parse(&model, packed[i], n_packed[i], NULL), PSR_OK);
+		assert_false(psr_model_is_prefix(model, &prefix));
+		psr_model_unref(model);
+	}
+}
+
+static void a_cut_file_on_disk_needs_no_more_memory_than_it_says(void **state)
+{
+	char folder[] = "/tmp/psr-model-XXXXXX", path[64];
+	const size_t n = octree_at[0] + PACK_PIECE_BYTES;
+	struct psr_model *model;
+	uint64_t need;
+	FILE *file;
+
+	(void)state;
+	assert_non_null(mkdtemp(folder));
+	snprintf(path, sizeof path, "%s/a.psr", folder);
+	file = fopen(path, "wb");
+	assert_non_null(file);
+	assert_int_equal(fwrite(packed[0], 1, n, file), n);
+	fclose(file);
+	assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
+	assert_int_equal(psr_model_read(&model, path, NULL), PSR_OK);
+	size_t n_image;
+	model_image(model, &n_image);
+	assert_true(n_image <= need);
+	psr_model_unref(model);
+	unlink(path);
+	rmdir(folder);
+}
+
+static void a_piece_that_is_damaged_is_named(void **state)
+{
+	const size_t n = octree_at[0] + 2 * PACK_PIECE_BYTES;
+	struct psr_error err = { .text = "" };
+	struct psr_model *model;
+
+	(void)state;
+	packed[0][n - 5] ^= 16;
+	assert_int_equal(parse(&model, packed[0], n, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "the packed octree is damaged at byte"));
+	/* One byte less, and that piece is not there. */
+	assert_int_equal(parse(&model, packed[0], n - 1, &err), PSR_OK);
+	psr_model_unref(model);
+	packed[0][n - 5] ^= 16;
+}
+
+static void lies_are_refused_even_under_right_hashes(void **state)
+{
+	const uint64_t last = octree_at[0] + 16 + 32 * (uint64_t)(n_steps - 1), first = octree_at[0] + 16;
+	const struct {
+		uint64_t at;
+		int size;
+		uint64_t value;
+		const char *text;
+	} lies[] = {
+		{ last + 8, 8, step[n_steps - 1].n_codes + 1, "it should be 7," },
+		{ last + 16, 8, step[n_steps - 1].n_leaves + 1, "it should be 7," },
+		{ last + 24, 8, step[n_steps - 1].end + 1, "it should be 7," },
+		{ last, 8, 8, "goes from depth" },
+		{ first, 8, 200, "goes from depth" },
+		{ first + 8, 8, step[0].n_codes + 1, "do not add up" },
+		{ first + 24, 8, 20, "is cut short" },
+		{ first + 24, 8, 10 * PACK_PIECE_BYTES, "up to byte" },
+		{ octree_at[0] + 8, 8, 0, "in 0 steps, is not known" },
+		{ octree_at[0] + 3, 1, 2, "of streams 0x2" },
+	};
+
+	(void)state;
+	for (size_t i = 0; i < sizeof lies / sizeof lies[0]; i++) {
+		const size_t n = octree_at[0] + pack_pieces(step[n_steps - 2].end) * PACK_PIECE_BYTES;
+		uint8_t *bytes = malloc(n_packed[0]);
+		struct psr_error err = { .text = "" };
+		struct psr_model *model;
+
+		memcpy(bytes, packed[0], n_packed[0]);
+		file_put(bytes + lies[i].at, lies[i].size, lies[i].value);
+		pack_seal(bytes, n_packed[0]);
+		assert_int_equal(parse(&model, bytes, n, &err), PSR_ERR_FORMAT);
+		if (strstr(err.text, lies[i].text) == NULL)
+			fail_msg("lie %zu: '%s' instead of '%s'", i, err.text, lies[i].text);
+		free(bytes);
+	}
+}
+
+/* A header of a small file that says it is the beginning of a huge one takes no memory. */
+static void a_huge_rest_is_not_believed(void **state)
+{
+	uint8_t *bytes = malloc(n_packed[0]);
+	struct psr_error err = { .text = "" };
+	struct psr_model *model;
+
+	(void)state;
+	memcpy(bytes, packed[0], n_packed[0]);
+	file_put(bytes + HEADER_PACKED_SIZE, 8, UINT64_MAX / 128);
+	file_put(bytes + HEADER_N_CHUNKS, 4, UINT32_MAX);
+	pack_seal(bytes, n_packed[0]);
+	assert_int_equal(parse(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "within its section table"));
+	memcpy(bytes, packed[0], n_packed[0]);
+	file_put(bytes + HEADER_PACKED_SIZE, 8, UINT64_MAX / 128);
+	uint64_t table_end = FILE_HEADER_BYTES + FILE_ENTRY_BYTES * file_get(bytes + HEADER_N_SECTIONS, 4)
+	                     + 8 * file_get(bytes + HEADER_N_CHUNKS, 4);
+	while (file_get(bytes + table_end, 8) != n_packed[0] - octree_at[0])
+		table_end += PACK_ENTRY_BYTES;
+	file_put(bytes + table_end, 8, UINT64_MAX / 256);
+	assert_int_equal(parse(&model, bytes, n_packed[0] - 1, &err), PSR_ERR_FORMAT);
+	assert_non_null(strstr(err.text, "within its directory of chunks"));
+	free(bytes);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_file_cut_at_any_length_is_its_coarser_model_or_refused),
+		cmocka_unit_test(its_model_is_that_of_the_coarser_tree),
+		cmocka_unit_test(a_cut_file_on_disk_needs_no_more_memory_than_it_says),
+		cmocka_unit_test(a_piece_that_is_damaged_is_named),
+		cmocka_unit_test(lies_are_refused_even_under_right_hashes),
+		cmocka_unit_test(a_huge_rest_is_not_believed),
+	};
+
+	return cmocka_run_group_tests(tests, setup, teardown);
+}
