@@ -20,7 +20,7 @@ static void check_beginnings(const uint8_t *bytes, size_t n_bytes)
 
 		REQUIRE(octree_unpack(&tree, bytes, step[s].end, MOST, NULL, NULL) == PSR_OK);
 		REQUIRE(tree->levels == step[s].depth && tree->n_leaves == step[s].n_leaves);
-		REQUIRE(octree_check(tree, NULL) == PSR_OK);
+		REQUIRE(octree_check(tree, NULL, NULL) == PSR_OK);
 		octree_destroy(tree);
 	}
 }

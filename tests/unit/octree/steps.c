@@ -215,7 +215,7 @@ static void a_damaged_step_is_refused_or_another_tree(void **state)
 
 		p.bytes[i] ^= 1 << i % 8;
 		rc = unpack(&tree, p.bytes, p.n);
-		assert_true(rc == PSR_ERR_FORMAT || octree_check(tree, NULL) == PSR_OK);
+		assert_true(rc == PSR_ERR_FORMAT || octree_check(tree, NULL, NULL) == PSR_OK);
 		octree_destroy(tree);
 		p.bytes[i] ^= 1 << i % 8;
 	}
