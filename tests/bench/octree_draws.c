@@ -1,7 +1,8 @@
-/* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] MESH|CLOUD.las [BLOCKS.psr]
+/* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]
  *
- * Draws frames of two threads from four directions: as they fit the picture, and nearer. With blocks of the same object,
- * frames of both take turns, and their times are medians. Points a second are those of cull and warp together. */
+ * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. With blocks of the same object,
+ * frames of both take turns, and their times are medians; then those of stages. Points a second are those of cull and warp
+ * together. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,7 +32,7 @@ struct subject {
 };
 
 struct times {
-	double frame[MOST_FRAMES], points[MOST_FRAMES], samples, covered;
+	double frame[MOST_FRAMES], points[MOST_FRAMES], stage[PSR_N_STAGES][MOST_FRAMES], samples, covered;
 	int n;
 };
 
@@ -135,8 +136,10 @@ static int draw(struct times *times, const struct bench *bench, const struct sub
 		return rc;
 	const struct psr_report *report = &frame.report;
 	double ns = 0;
-	for (int s = 0; s < PSR_N_STAGES; s++)
+	for (int s = 0; s < PSR_N_STAGES; s++) {
+		times->stage[s][times->n] = (double)report->ns[s] * 1e-6;
 		ns += (double)report->ns[s];
+	}
 	times->frame[times->n] = ns * 1e-6;
 	times->points[times->n++] = (double)report->n_samples_drawn * 1e3
 	                            / (double)(report->ns[PSR_STAGE_CULL] + report->ns[PSR_STAGE_WARP]);
@@ -145,12 +148,31 @@ static int draw(struct times *times, const struct bench *bench, const struct sub
 	return rc;
 }
 
+static void print_head(void)
+{
+	printf("%-10s %7s %9s %8s %9s ", "nearer by", "", "frame, ms", "M pts/s", "pts/pixel");
+	for (int s = PSR_STAGE_CULL; s < PSR_N_STAGES; s++)
+		printf(" %7s", psr_stage_name((enum psr_stage)s));
+	printf("\n");
+}
+
+static void print_times(double nearer_by, const char *name, struct times *times)
+{
+	const size_t n = (size_t)times->n;
+	const double frame = stats_median(times->frame, n), points = stats_median(times->points, n);
+
+	printf("%-10g %7s %9.2f %8.0f %9.1f ", nearer_by, name, frame, points, times->samples / times->covered);
+	for (int s = PSR_STAGE_CULL; s < PSR_N_STAGES; s++)
+		printf(" %7.2f", stats_median(times->stage[s], n));
+	printf("\n");
+}
+
 static int measure(const struct bench *bench, const struct subject *subject, int n_subjects, int n_rounds,
                    struct psr_error *err)
 {
 	static struct times times[2];
 
-	printf("%-10s %10s %12s %14s %14s\n", "nearer by", "", "frame, ms", "M points/s", "samples/pixel");
+	print_head();
 	for (int d = 0; d < N_DISTANCES; d++) {
 		memset(times, 0, sizeof times);
 		for (int round = -1; round < n_rounds; round++)
@@ -162,26 +184,31 @@ static int measure(const struct bench *bench, const struct subject *subject, int
 						return rc;
 				}
 		for (int s = 0; s < n_subjects; s++)
-			printf("%-10g %10s %12.2f %14.0f %14.1f\n", 1 / nearer[d], subject[s].name,
-			       stats_median(times[s].frame, (size_t)times[s].n), stats_median(times[s].points, (size_t)times[s].n),
-			       times[s].samples / times[s].covered);
+			print_times(1 / nearer[d], subject[s].name, &times[s]);
 		if (n_subjects == 2)
-			printf("%-10g %10s %12.2f\n", 1 / nearer[d], "ratio",
+			printf("%-10g %7s %9.2f\n", 1 / nearer[d], "ratio",
 			       stats_median(times[0].frame, (size_t)times[0].n) / stats_median(times[1].frame, (size_t)times[1].n));
 	}
 	return PSR_OK;
 }
 
-static int run(const char *path, const char *blocks, const struct octree_build_options *options, uint32_t side,
-               int n_rounds, struct psr_error *err)
+/* What options ask for. */
+struct wish {
+	struct octree_build_options options;
+	uint32_t side;
+	int n_rounds, n_threads;
+};
+
+static int run(const char *path, const char *blocks, const struct wish *wish, struct psr_error *err)
 {
+	const uint32_t side = wish->side;
 	struct subject subject[2] = { { "octree", NULL, PSR_OCTREE }, { "blocks", NULL, PSR_BLOCKS } };
 	struct bench bench = { .frame = { .width = side, .height = side }, .side = side };
 	struct octree *tree = NULL;
 	int rc = blocks != NULL ? psr_model_read(&subject[1].model, blocks, err) : PSR_OK;
 
 	if (rc == PSR_OK)
-		rc = strstr(path, ".las") != NULL ? read_cloud(&tree, path, options, err) : read_mesh(&tree, path, options, err);
+		rc = strstr(path, ".las") != NULL ? read_cloud(&tree, path, &wish->options, err) : read_mesh(&tree, path, &wish->options, err);
 	if (rc == PSR_OK)
 		rc = make_model(&subject[0].model, tree, subject[1].model, err);
 	if (rc != PSR_OK)
@@ -195,9 +222,9 @@ static int run(const char *path, const char *blocks, const struct octree_build_o
 	bench.frame.depth = malloc((size_t)side * side * sizeof *bench.frame.depth);
 	rc = psr_renderer_create(&bench.renderer, err);
 	if (rc == PSR_OK)
-		rc = psr_pool_create(&bench.pool, N_THREADS, err);
+		rc = psr_pool_create(&bench.pool, wish->n_threads, err);
 	if (rc == PSR_OK)
-		rc = measure(&bench, subject, blocks != NULL ? 2 : 1, n_rounds, err);
+		rc = measure(&bench, subject, blocks != NULL ? 2 : 1, wish->n_rounds, err);
 	psr_pool_destroy(bench.pool);
 	psr_renderer_destroy(bench.renderer);
 	for (int s = 0; s < 2; s++)
@@ -207,24 +234,24 @@ static int run(const char *path, const char *blocks, const struct octree_build_o
 
 int main(int argc, char **argv)
 {
-	struct octree_build_options options;
+	struct wish wish = { .side = 1024, .n_rounds = 10, .n_threads = N_THREADS };
 	struct psr_error err;
-	uint32_t side = 1024;
-	int option, n_rounds = 10, rc;
+	int option, rc;
 
-	octree_build_options_default(&options);
-	while ((option = getopt(argc, argv, "l:s:n:")) != -1) {
+	octree_build_options_default(&wish.options);
+	while ((option = getopt(argc, argv, "l:s:n:t:")) != -1) {
 		if (option == '?')
 			return 2;
-		options.levels = option == 'l' ? atoi(optarg) : options.levels;
-		side = option == 's' ? (uint32_t)atoi(optarg) : side;
-		n_rounds = option == 'n' ? atoi(optarg) : n_rounds;
+		wish.options.levels = option == 'l' ? atoi(optarg) : wish.options.levels;
+		wish.side = option == 's' ? (uint32_t)atoi(optarg) : wish.side;
+		wish.n_rounds = option == 'n' ? atoi(optarg) : wish.n_rounds;
+		wish.n_threads = option == 't' ? atoi(optarg) : wish.n_threads;
 	}
-	if (optind >= argc || side == 0 || n_rounds * DIRECTIONS > MOST_FRAMES) {
-		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] MESH|CLOUD.las [BLOCKS.psr]\n");
+	if (optind >= argc || wish.side == 0 || wish.n_rounds * DIRECTIONS > MOST_FRAMES) {
+		fprintf(stderr, "octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]\n");
 		return 2;
 	}
-	rc = run(argv[optind], optind + 1 < argc ? argv[optind + 1] : NULL, &options, side, n_rounds, &err);
+	rc = run(argv[optind], optind + 1 < argc ? argv[optind + 1] : NULL, &wish, &err);
 	if (rc != PSR_OK)
 		fprintf(stderr, "octree_draws: %s\n", err.text);
 	return psr_exit_status(rc);
