@@ -101,11 +101,6 @@ static int make_trees(struct cubes_making *m, struct psr_error *err)
 	return PSR_OK;
 }
 
-static uint32_t n_runs(const struct psr_cube_level *level)
-{
-	return (level->n + CUBES_RUN - 1) / CUBES_RUN;
-}
-
 /* All arrays in one piece of memory, the widest elements first. */
 static int make_arrays(struct cubes_making *m, struct psr_error *err)
 {
@@ -113,11 +108,12 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 	const size_t n_cubes = cubes->groups.n_blocks, n_clusters = m->tree->n_skips * (uint64_t)m->n_levels;
 	const int has_cones = psr_octree_is_one_sided(m->tree);
 	size_t n = n_cubes * (sizeof *m->cube + sizeof *m->flags + (has_cones ? 4 : 0)) + n_clusters * sizeof *m->cluster;
+	struct psr_cube_bound *bound;
 	struct psr_cube_run *run;
 	char *memory;
 
 	for (int l = 0; l < m->n_levels; l++)
-		n += n_runs(&cubes->level[l]) * sizeof *run;
+		n += cubes_n_runs(&cubes->level[l]) * (sizeof *run + sizeof *bound);
 	memory = psr_alloc_array(n, 1);
 	if (memory == NULL)
 		return psr_fail(err, PSR_ERR_MEMORY, "no memory for %zu cubes of an octree", n_cubes);
@@ -126,9 +122,14 @@ static int make_arrays(struct cubes_making *m, struct psr_error *err)
 	run = (struct psr_cube_run *)(m->cube + n_cubes);
 	for (int l = 0; l < m->n_levels; l++) {
 		cubes->level[l].run = m->run[l] = run;
-		run += n_runs(&cubes->level[l]);
+		run += cubes_n_runs(&cubes->level[l]);
 	}
-	m->cluster = (struct psr_cluster *)run;
+	bound = (struct psr_cube_bound *)run;
+	for (int l = 0; l < m->n_levels; l++) {
+		cubes->level[l].bound = m->bound[l] = bound;
+		bound += cubes_n_runs(&cubes->level[l]);
+	}
+	m->cluster = (struct psr_cluster *)bound;
 	m->flags = (uint8_t *)(m->cluster + n_clusters);
 	if (has_cones) {
 		for (int a = 0; a < 3; a++)
@@ -152,7 +153,7 @@ static void relate(int task, void *userdata)
 
 	for (int l = 0; l < m->n_levels; l++) {
 		const struct psr_cube_level *level = &m->cubes->level[l];
-		const uint64_t runs = n_runs(level), end = runs * ((uint64_t)task + 1) / OCTREE_TASKS;
+		const uint64_t runs = cubes_n_runs(level), end = runs * ((uint64_t)task + 1) / OCTREE_TASKS;
 
 		for (uint64_t r = runs * (uint64_t)task / OCTREE_TASKS; r < end; r++)
 			for (uint64_t i = r * CUBES_RUN; i < level->n && i < (r + 1) * CUBES_RUN; i++) {
@@ -198,6 +199,7 @@ int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct p
 	if (rc == PSR_OK) {
 		psr_pool_for(pool, OCTREE_TASKS, cubes_fill_task, m);
 		psr_pool_for(pool, OCTREE_TASKS, relate, m);
+		psr_pool_for(pool, OCTREE_TASKS, cubes_bound_task, m);
 		*out = cubes;
 	} else {
 		psr_cubes_destroy(cubes);

@@ -26,11 +26,19 @@ struct psr_cube_run {
 	uint32_t code, leaf;
 };
 
+/* Of a run's cubes: a sphere around their leaves, inner units; a cone that holds their cones, as a block's. */
+struct psr_cube_bound {
+	float center[3], radius;
+	int8_t axis[3];
+	uint8_t sine; /* PSR_CONE_ANY without cones */
+};
+
 struct psr_cube_level {
 	const struct octree *tree; /* of level 0 the model's; each further one has a level less, and averaged attributes */
 	uint32_t first, n;         /* its cubes */
 	double edge;               /* of a leaf, inner units */
 	const struct psr_cube_run *run;
+	const struct psr_cube_bound *bound; /* one a run */
 };
 
 /* Read together: in one line of the cache, most often. */
@@ -79,6 +87,15 @@ static inline uint32_t psr_cubes_code(const struct psr_cubes *cubes, const struc
 static inline uint32_t psr_cubes_leaf(const struct psr_cubes *cubes, const struct psr_cube_level *level, uint32_t cube)
 {
 	return level->run[(cube - level->first) / CUBES_RUN].leaf + cubes->cube[cube].leaf;
+}
+
+static inline uint32_t psr_cubes_n_leaves(const struct psr_cubes *cubes, uint32_t cube)
+{
+	const struct psr_cube_level *level = psr_cubes_level(cubes, cube);
+	const uint32_t first = psr_cubes_leaf(cubes, level, cube);
+
+	return (cube + 1 < level->first + level->n ? psr_cubes_leaf(cubes, level, cube + 1) : (uint32_t)level->tree->n_leaves)
+	       - first;
 }
 
 /* Computes the middle of a cube, in inner units. */

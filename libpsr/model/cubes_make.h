@@ -1,4 +1,4 @@
-/* Cubes in the making: cubes.c knows the order, cubes_make.c reads subtrees. */
+/* Cubes in the making: cubes.c knows the order, cubes_make.c reads subtrees, cubes_bounds.c bounds runs. */
 #ifndef PSR_MODEL_CUBES_MAKE_H
 #define PSR_MODEL_CUBES_MAKE_H
 
@@ -20,6 +20,7 @@ struct cubes_making {
 	struct psr_cluster *cluster;
 	struct psr_cube *cube;
 	struct psr_cube_run *run[CUBES_MOST_LEVELS];
+	struct psr_cube_bound *bound[CUBES_MOST_LEVELS];
 	uint8_t *flags, *sine;     /* sine, axis: NULL without cones */
 	int8_t *axis[3];
 };
@@ -28,5 +29,12 @@ struct cubes_making {
 void cubes_count_task(int task, void *userdata);
 /* Fills the trees and arrays of a task; in cubes, `code` and `leaf` are the low bits of their places in the level. */
 void cubes_fill_task(int task, void *userdata);
+/* Bounds the runs of a task. After all tasks have filled. */
+void cubes_bound_task(int task, void *userdata);
+
+static inline uint32_t cubes_n_runs(const struct psr_cube_level *level)
+{
+	return (level->n + CUBES_RUN - 1) / CUBES_RUN;
+}
 
 #endif

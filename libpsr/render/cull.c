@@ -30,49 +30,6 @@ struct cull {
 	atomic_uint n_hits; /* that chunks have appended */
 };
 
-/* The pixels that a sphere can touch. */
-struct extent {
-	float x0, x1, y0, y1;
-};
-
-/* Interval of c / z for c within c +- r and z within z0..z1, both positive. */
-static inline void interval(float c, float r, float z0, float z1, float *low, float *high)
-{
-	*low = (c - r) / (c - r < 0 ? z0 : z1);
-	*high = (c + r) / (c + r < 0 ? z1 : z0);
-}
-
-/* Returns 0 if the sphere is outside of the picture grown by `guard` pixels. Two more pixels cover rounding. */
-static int sphere_extent(const struct plan *plan, const float c[3], float r, float guard, struct extent *out)
-{
-	r *= 1.0001f;
-	if (!(c[2] + r > plan->near_z))
-		return 0;
-	float x0 = c[0] - r, x1 = c[0] + r, y0 = c[1] - r, y1 = c[1] + r;
-	if (plan->perspective) {
-		float z0 = c[2] - r > plan->near_z ? c[2] - r : plan->near_z, z1 = c[2] + r;
-
-		interval(c[0], r, z0, z1, &x0, &x1);
-		interval(c[1], r, z0, z1, &y0, &y1);
-	}
-	const float half_w = (float)plan->center[0], half_h = (float)plan->center[1];
-	guard += 2;
-	out->x0 = x0 * plan->focal + half_w - guard;
-	out->x1 = x1 * plan->focal + half_w + guard;
-	out->y0 = y0 * plan->focal + half_h - guard;
-	out->y1 = y1 * plan->focal + half_h + guard;
-	return out->x1 >= 0 && out->y1 >= 0 && out->x0 < (float)plan->width && out->y0 < (float)plan->height;
-}
-
-/* Counts ones; __builtin_popcountll is a library call where the compiler cannot assume the instruction. */
-static inline uint32_t count_bits(uint64_t word)
-{
-	word -= word >> 1 & UINT64_C(0x5555555555555555);
-	word = (word & UINT64_C(0x3333333333333333)) + (word >> 2 & UINT64_C(0x3333333333333333));
-	word = (word + (word >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
-	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
-}
-
 /* A chunk whose blocks are being tested, and where its results go. */
 struct counting {
 	const struct cull *cull;
@@ -134,7 +91,7 @@ static void take_batch(struct counting *to, const struct cull_batch *batch, uint
 		chunk->n_clamped += (uint32_t)is_clamped;
 		chunk->flags |= b->flags[block];
 		chunk->traits |= (uint8_t)psr_blocks_traits(b, block);
-		chunk->n_samples += count_bits(cull_lanes(in, block));
+		chunk->n_samples += cull_n_samples(in, block);
 		const float error = place_error(plan, psr_blocks_traits(b, block), batch->apart[i], batch->depth_error[i]);
 		chunk->place_error = error > chunk->place_error ? error : chunk->place_error;
 		hit++;
@@ -152,9 +109,6 @@ static void count_chunk(int i, void *userdata)
 	struct cull_hit hit[MOST_CHUNK];
 	struct counting to = { cull, &chunk, count, hit };
 
-	/* The guard band of the coarsest level, the widest that a block can get. */
-	const float guard = (float)(1 << PSR_MAX_DEPTH_LEVEL);
-
 	memset(count, 0, cull->n_tiles * sizeof *count);
 	const struct psr_blocks *b = in->cull.blocks;
 	const uint32_t chunk_end = chunk.first_block + chunk.n_blocks;
@@ -164,15 +118,16 @@ static void count_chunk(int i, void *userdata)
 		const uint32_t end = cluster_end < chunk_end ? cluster_end : chunk_end;
 		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
 		const struct cull_sphere v = cull_view_cluster(in, cluster);
-		struct extent e;
 
-		if (!cull_is_chosen(cull->bins, in, cluster) || !sphere_extent(plan, v.c, v.r, guard, &e))
+		if (!cull_is_chosen(cull->bins, in, cluster) || !cull_sees_sphere(plan, &v))
 			continue;
-		chunk.n_tested += end - first;
 		for (uint32_t n; first < end && !plan_is_cancelled(plan); first += n) {
 			struct cull_batch batch;
 
-			n = end - first < CULL_BATCH ? end - first : CULL_BATCH;
+			n = cull_next_batch(in, first, end);
+			if (in->cull.cubes != NULL && !cull_sees_run(plan, in, first))
+				continue;
+			chunk.n_tested += n;
 			cull->simd->cull(&batch, &in->cull, first, n);
 			take_batch(&to, &batch, first, n);
 		}

@@ -20,25 +20,45 @@ static inline int cull_is_chosen(const struct bins *bins, const struct plan_inst
 	return bins->group[in->first_group + k->group].level == k->level;
 }
 
-/* As many bits as a block or cube has samples: a block's mask, the codes of a cube's octants. */
-static inline uint64_t cull_lanes(const struct plan_instance *in, uint32_t block)
+/* Counts ones; __builtin_popcountll is a library call where the compiler cannot assume the instruction. */
+static inline uint32_t cull_count_bits(uint64_t word)
 {
-	const struct psr_cubes *cubes = in->cull.cubes;
-
-	if (cubes == NULL)
-		return in->cull.blocks->mask[block];
-	const struct psr_cube_level *level = psr_cubes_level(cubes, block);
-	const uint32_t code = psr_cubes_code(cubes, level, block);
-	const unsigned n = (unsigned)__builtin_popcount(level->tree->code[code]);
-	const uint64_t children = psr_cubes_children(level->tree, code);
-	return n < 8 ? children & ((UINT64_C(1) << 8 * n) - 1) : children;
+	word -= word >> 1 & UINT64_C(0x5555555555555555);
+	word = (word & UINT64_C(0x3333333333333333)) + (word >> 2 & UINT64_C(0x3333333333333333));
+	word = (word + (word >> 4)) & UINT64_C(0x0f0f0f0f0f0f0f0f);
+	return (uint32_t)(word * UINT64_C(0x0101010101010101) >> 56);
 }
 
-/* A cluster's sphere in camera space. */
+/* Of a block or cube. */
+static inline uint32_t cull_n_samples(const struct plan_instance *in, uint32_t block)
+{
+	return in->cull.cubes != NULL ? psr_cubes_n_leaves(in->cull.cubes, block)
+	                              : cull_count_bits(in->cull.blocks->mask[block]);
+}
+
+/* How many of the blocks first .. end - 1 of a cluster the kernel takes next: of cubes, those of one run. */
+static inline uint32_t cull_next_batch(const struct plan_instance *in, uint32_t first, uint32_t end)
+{
+	const struct psr_cubes *cubes = in->cull.cubes;
+	uint32_t most = CULL_BATCH;
+
+	if (cubes != NULL)
+		most = CUBES_RUN - (first - psr_cubes_level(cubes, first)->first) % CUBES_RUN;
+	return end - first < most ? end - first : most;
+}
+
+/* A sphere of inner coordinates, or a cluster's, in camera space. */
 struct cull_sphere {
 	float c[3], r;
 };
+struct cull_sphere cull_view_sphere(const struct plan_instance *in, const float center[3], float radius);
 struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k);
+
+/* Returns 0 if nothing within the sphere can draw: it is outside of the picture, grown by the guard band of the coarsest
+ * depth buffer. */
+int cull_sees_sphere(const struct plan *plan, const struct cull_sphere *sphere);
+/* Returns 0 if nothing of the run that holds this cube can draw: it is outside of the picture, or faces away. */
+int cull_sees_run(const struct plan *plan, const struct plan_instance *in, uint32_t cube);
 
 /* Chooses of each group of clusters the coarsest level whose level_spacing is at most a pixel, or the settings'
  * spacing, where its blocks are nearest. Blocks of such a level need no depth buffer but the picture's, cubes one of

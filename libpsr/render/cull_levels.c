@@ -13,14 +13,19 @@ static inline int fits_pixel(float pixels)
 	return pixels * (1 - 0x1p-12f) <= 1;
 }
 
-struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k)
+struct cull_sphere cull_view_sphere(const struct plan_instance *in, const float center[3], float radius)
 {
 	struct cull_sphere v;
 
 	for (int a = 0; a < 3; a++)
-		v.c[a] = to_camera(in->cull.center_m[a], k->center[0], k->center[1], k->center[2]);
-	v.r = k->radius * in->cull.scale;
+		v.c[a] = to_camera(in->cull.center_m[a], center[0], center[1], center[2]);
+	v.r = radius * in->cull.scale;
 	return v;
+}
+
+struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k)
+{
+	return cull_view_sphere(in, k->center, k->radius);
 }
 
 static float nearest_cube_of(const struct plan_instance *in, const struct psr_cluster *k)

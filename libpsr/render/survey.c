@@ -62,11 +62,6 @@ static int make_room(struct surveyor *s)
 	return s->seen != NULL && bins_room(&s->bins, group, s->plan.n_groups);
 }
 
-static uint32_t count_bits(uint64_t mask)
-{
-	return (uint32_t)__builtin_popcountll(mask);
-}
-
 static uint64_t leaves_of(const struct psr_cubes *cubes, const struct psr_cluster *k)
 {
 	const struct psr_cube_level *level = &cubes->level[k->level];
@@ -164,7 +159,7 @@ static void see_cluster(struct surveyor *s, const struct plan_instance *in, cons
 
 		simd_get()->cull(&batch, &in->cull, first, n);
 		for (uint32_t i = 0; i < n; i++) {
-			const uint32_t n_samples = count_bits(cull_lanes(in, first + i));
+			const uint32_t n_samples = cull_n_samples(in, first + i);
 
 			n_all += n_samples;
 			if (!batch.is_left[i])

@@ -50,6 +50,12 @@ static inline int32_t screen_range(int32_t first, int32_t last)
 	return last * (last + 1) / 2 + first;
 }
 
+/* Let d go from the eye to the centre of a sphere of radius r, at the angle theta from a cone's axis, n be a normal
+ * within alpha of the axis, and x a sample in the sphere. Then n . (x - eye) is between |d| cos(theta + alpha) - r and
+ * |d| cos(theta - alpha) + r, and |x - eye| within r of |d|. The slack covers rounding, and normals of 10 bits, which
+ * are off by sqrt(3) / 1022 at most. */
+#define CONE_SLACK 0.0027f
+
 #define CULL_BATCH 64
 struct cull_batch {
 	int32_t is_left[CULL_BATCH];  /* 1: the block may show; 0: it cannot, and its other values mean nothing */
@@ -65,7 +71,7 @@ struct cull_batch {
 	float depth_error[CULL_BATCH]; /* half a step of depth, in pixels; of a leaf, half its diagonal */
 };
 
-/* Culls blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. */
+/* Culls blocks first .. first + n - 1, n at most CULL_BATCH, by frustum and cone. Cubes are of one level. */
 typedef void cull_fn(struct cull_batch *out, const struct cull_view *view, uint32_t first, uint32_t n);
 
 #endif

@@ -40,26 +40,38 @@ static void widen(struct widened *restrict to, const struct psr_blocks *b, uint3
 		to->flags[i] = flags[i];
 }
 
+_Static_assert(CUBES_PLACE_BITS == 18, "as widen_cubes() takes places apart");
+
 static void widen_cubes(struct widened *restrict to, const struct psr_cubes *cubes, uint32_t first, uint32_t n)
 {
-	for (uint32_t i = 0; i < n; i++) {
-		const struct psr_cube_level *level = psr_cubes_level(cubes, first + i);
-		double center[3];
+	const struct psr_cube_level *level = psr_cubes_level(cubes, first);
+	const double edge = level->edge, low[3] = { level->tree->low[0], level->tree->low[1], level->tree->low[2] };
+	const uint32_t most = (1u << CUBES_PLACE_BITS) - 1;
+	const uint8_t *flags = cubes->groups.flags + first;
+	uint32_t place[CULL_BATCH][2];
 
-		psr_cubes_center(cubes, level, first + i, center);
-		to->x[i] = (float)center[0];
-		to->y[i] = (float)center[1];
-		to->z[i] = (float)center[2];
-		to->r[i] = (float)(CUBES_RADIUS * level->edge);
-		to->flags[i] = cubes->groups.flags[first + i];
+	for (uint32_t i = 0; i < n; i++)
+		memcpy(place[i], cubes->cube[first + i].place, sizeof place[i]);
+	for (uint32_t i = 0; i < n; i++) {
+		const uint32_t x = place[i][0] & most, y = (place[i][0] >> 18 | place[i][1] << 14) & most;
+		const uint32_t z = place[i][1] >> 4 & most;
+
+		to->x[i] = (float)(low[0] + (double)(int32_t)(4 * x + 2) * edge);
+		to->y[i] = (float)(low[1] + (double)(int32_t)(4 * y + 2) * edge);
+		to->z[i] = (float)(low[2] + (double)(int32_t)(4 * z + 2) * edge);
+		to->r[i] = (float)(CUBES_RADIUS * edge);
 	}
+	for (uint32_t i = 0; i < n; i++)
+		to->flags[i] = flags[i];
 }
 
 /* From half of a block's step of depth, 2^-15. */
 static void scale_errors(struct cull_batch *out, const struct psr_cubes *cubes, uint32_t first, uint32_t n)
 {
+	const float scale = (float)(psr_cubes_level(cubes, first)->edge * (CUBES_DIAGONAL * 0x1p14));
+
 	for (uint32_t i = 0; i < n; i++)
-		out->depth_error[i] *= (float)(psr_cubes_level(cubes, first + i)->edge * (CUBES_DIAGONAL * 0x1p14));
+		out->depth_error[i] *= scale;
 }
 
 static void cull_by_frustum(struct cull_batch *restrict out, const struct cull_view *view,

@@ -12,12 +12,6 @@ struct widened {
 	int32_t flags[CULL_BATCH], cone_sine[CULL_BATCH], is_bent[CULL_BATCH];
 };
 
-/* Let d go from the eye to the sphere's centre, at the angle theta from the cone's axis, n be a normal within alpha of
- * the axis, and x a sample within r of the centre. Then n . (x - eye) is between |d| cos(theta + alpha) - r and
- * |d| cos(theta - alpha) + r, and |x - eye| within r of |d|. The slack covers rounding, and normals of 10 bits, which
- * are off by sqrt(3) / 1022 at most. */
-#define CONE_SLACK 0.0027f
-
 static void widen_cones(struct widened *restrict to, const struct psr_blocks *b, uint32_t first, uint32_t n)
 {
 	const int8_t *x = b->cone_x + first, *y = b->cone_y + first, *z = b->cone_z + first;

@@ -129,19 +129,28 @@ struct expected {
 	uint64_t path;                 /* of the cluster */
 };
 
-static void assert_cone(const struct psr_cubes *cubes, uint32_t cube, const uint16_t *normal, unsigned n)
+static void assert_cone(const int8_t at[3], uint8_t cone_sine, const uint16_t *normal, unsigned n)
 {
-	const struct psr_blocks *g = &cubes->groups;
-	const double axis[3] = { g->cone_x[cube], g->cone_y[cube], g->cone_z[cube] };
+	const double axis[3] = { at[0], at[1], at[2] };
 	const double length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]);
-	const double sine = g->cone_sine[cube] / 255.0;
+	const double sine = cone_sine / 255.0;
 
-	for (unsigned i = 0; i < n && g->cone_sine[cube] != PSR_CONE_ANY; i++) {
+	for (unsigned i = 0; i < n && cone_sine != PSR_CONE_ANY; i++) {
 		const float *v = psr_direction_table()[normal[i]];
 		const double cosine = (axis[0] * (double)v[0] + axis[1] * (double)v[1] + axis[2] * (double)v[2]) / length;
 
 		assert_true(cosine > 0 && sqrt(1 - fmin(cosine * cosine, 1)) <= sine + 1e-9);
 	}
+}
+
+/* Returns the distance of two points. */
+static double apart(const double a[3], const float b[3])
+{
+	double square = 0;
+
+	for (int k = 0; k < 3; k++)
+		square += (a[k] - (double)b[k]) * (a[k] - (double)b[k]);
+	return sqrt(square);
 }
 
 static int is_next_cube(const struct octree_node *node, void *userdata)
@@ -151,7 +160,10 @@ static int is_next_cube(const struct octree_node *node, void *userdata)
 	const struct psr_cube_level *level = &cubes->level[e->level];
 	const struct octree *tree = level->tree;
 	const uint64_t path = node->path >> 3 * (tree->levels - 2 - (int)e->depth);
-	double center[3], found[3], distance = 0;
+	const struct psr_cube_bound *bound = &level->bound[(e->cube - level->first) / CUBES_RUN];
+	const struct psr_blocks *g = &cubes->groups;
+	const unsigned n = (unsigned)__builtin_popcountll(octree_mask(tree, node->code));
+	double center[3], found[3];
 
 	assert_true(psr_cubes_level(cubes, e->cube) == level);
 	assert_int_equal(psr_cubes_code(cubes, level, e->cube), node->code);
@@ -168,12 +180,18 @@ static int is_next_cube(const struct octree_node *node, void *userdata)
 	const struct psr_cluster *cluster = &cubes->groups.cluster[e->cluster];
 	assert_int_equal(cluster->level, e->level);
 	assert_true(e->cube < cluster->first_block + cluster->n_blocks);
-	for (int a = 0; a < 3; a++)
-		distance += (center[a] - (double)cluster->center[a]) * (center[a] - (double)cluster->center[a]);
-	assert_true(sqrt(distance) + CUBES_RADIUS * level->edge <= (double)cluster->radius);
-	assert_int_equal(cubes->groups.cone_x != NULL, psr_octree_is_one_sided(tree));
-	if (cubes->groups.cone_x != NULL)
-		assert_cone(cubes, e->cube, tree->normal + node->leaf, (unsigned)__builtin_popcountll(octree_mask(tree, node->code)));
+	assert_true(apart(center, cluster->center) + CUBES_RADIUS * level->edge <= (double)cluster->radius);
+	assert_true(apart(center, bound->center) + CUBES_RADIUS * level->edge <= (double)bound->radius);
+	assert_int_equal(psr_cubes_n_leaves(cubes, e->cube), n);
+	assert_int_equal(g->cone_x != NULL, psr_octree_is_one_sided(tree));
+	if (g->cone_x != NULL) {
+		const int8_t axis[3] = { g->cone_x[e->cube], g->cone_y[e->cube], g->cone_z[e->cube] };
+
+		assert_cone(axis, g->cone_sine[e->cube], tree->normal + node->leaf, n);
+		assert_cone(bound->axis, bound->sine, tree->normal + node->leaf, n);
+	} else {
+		assert_int_equal(bound->sine, PSR_CONE_ANY);
+	}
 	e->cube++;
 	return 0;
 }
@@ -238,6 +256,11 @@ static void threads_make_the_same_cubes(void **state)
 		assert_memory_equal(alone->cube, shared->cube, a->n_blocks * sizeof *alone->cube);
 		assert_memory_equal(a->cluster, b->cluster, a->n_clusters * sizeof *a->cluster);
 		assert_memory_equal(a->flags, b->flags, a->n_blocks);
+		for (uint32_t l = 0; l < a->n_levels; l++) {
+			const size_t n_runs = (alone->level[l].n + CUBES_RUN - 1) / CUBES_RUN;
+
+			assert_memory_equal(alone->level[l].bound, shared->level[l].bound, n_runs * sizeof *alone->level[l].bound);
+		}
 		if (a->cone_sine != NULL)
 			assert_memory_equal(a->cone_sine, b->cone_sine, a->n_blocks);
 		for (uint32_t l = 1; l < a->n_levels; l++) {

@@ -170,50 +170,6 @@ static void spheres_have_no_holes_and_the_right_depths_and_colours(void **state)
 	}
 }
 
-static void fewer_samples_are_drawn_of_what_is_small(void **state)
-{
-	struct psr_model *model = tree_build(&SOLID);
-	struct psr_instance instance = place(model);
-	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
-	uint64_t last = UINT64_MAX;
-
-	(void)state;
-	assert_int_equal(psr_model_cubes(model)->groups.n_levels, CUBES_MOST_LEVELS);
-	for (double height = 4; height <= 32; height *= 2) {
-		scene.camera = orthographic(height);
-		struct drawn *p = draw(&scene, 1, 0);
-
-		assert_true(p->frame.report.n_samples_drawn < last / 3); /* a fourth of a surface */
-		last = p->frame.report.n_samples_drawn;
-		free(p);
-	}
-	psr_model_unref(model);
-}
-
-/* Leaves as dense as a block's samples are: up to 1 / CUBES_LEVEL_SPACING pixels wide. */
-static void the_coarsest_level_that_is_dense_enough_is_drawn(void **state)
-{
-	static const struct {
-		double pixels; /* a leaf of level 0 is wide */
-		uint8_t level;
-	} cases[] = { { 1.2, 0 }, { 0.92, 0 }, { 0.48, 0 }, { 0.46, 1 }, { 0.24, 1 }, { 0.23, 2 } };
-	struct psr_model *model = tree_build(&SOLID);
-	struct psr_instance instance = place(model);
-	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
-
-	(void)state;
-	for (unsigned i = 0; i < sizeof cases / sizeof *cases; i++) {
-		scene.camera = orthographic(SIDE * ldexp(2, -SOLID.levels) / cases[i].pixels);
-		struct drawn *p = draw(&scene, 1, 0);
-		const size_t middle = (size_t)SIDE / 2 * SIDE + SIDE / 2;
-
-		assert_int_not_equal(p->id[middle], UINT32_MAX);
-		assert_int_equal(p->block[3 * middle], cases[i].level);
-		free(p);
-	}
-	psr_model_unref(model);
-}
-
 /* Three instances in a line, one behind the other, lit by lights that cast shadows. */
 /* Of a sphere all around the picture of which this share of leaves is there: the pixels that show its back, or nothing. */
 static int seen_through(double keep, unsigned pass)
@@ -406,8 +362,6 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(spheres_have_no_holes_and_the_right_depths_and_colours),
-		cmocka_unit_test(fewer_samples_are_drawn_of_what_is_small),
-		cmocka_unit_test(the_coarsest_level_that_is_dense_enough_is_drawn),
 		cmocka_unit_test(sparse_clouds_are_drawn_wider),
 		cmocka_unit_test(frames_are_the_same_with_any_threads),
 		cmocka_unit_test(shortcuts_change_nothing),
