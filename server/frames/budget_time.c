@@ -6,6 +6,7 @@
 #define PART 0.95          /* of frames take at most what is foreseen */
 #define FIRST_TAIL 1.5     /* before a rung has frames */
 #define MARGIN 0.5         /* more is foreseen after one frame, half of that after two */
+#define SCALED_MARGIN 1.2  /* of a rung that is foreseen by another one's frames and a calibration */
 #define FIRST_FRAMES 5     /* teach rates alone: they start from other machines' */
 #define ALIKE 0.2          /* views whose areas and samples differ by such a factor, logarithm, teach most */
 #define LEAST_ALIKE 0.03   /* what other views count */
@@ -134,29 +135,35 @@ static double ratio_of(const struct budget_past *past, const struct budget_ratio
 	return sorted[i].ratio * (1 + MARGIN / n);
 }
 
-/* A rung without frames is as slow as its nearest neighbour of its kind. */
-static double tail_of(const struct budget_learnt *learnt, const struct budget_view *view, int rung)
+/* The nearest rung that has frames; -1: none. */
+static int known_near(const struct budget_learnt *learnt, int rung, int is_any_kind)
 {
 	for (int apart = 0; apart < BUDGET_RUNGS; apart++)
 		for (int sign = -1; sign <= 1; sign += 2) {
 			const int i = rung + sign * apart;
 
 			if (i >= 0 && i < BUDGET_RUNGS && learnt->past[i].n > 0
-			    && !budget_ladder[i].pass == !budget_ladder[rung].pass) {
-				const struct budget_ratio like = seen_as(view, i);
-
-				return ratio_of(&learnt->past[i], &like);
-			}
+			    && (is_any_kind || !budget_ladder[i].pass == !budget_ladder[rung].pass))
+				return i;
 		}
-	return FIRST_TAIL;
+	return -1;
 }
 
+/* A rung without frames takes as many times its neighbour's time as the model's calibration says; without one it is as
+ * slow as the neighbour of its kind, by its own work. */
 double budget_foresee(const struct budget_learnt *learnt, const struct budget_view *view, int rung)
 {
-	double work[BUDGET_N_WORK];
+	const int is_calibrated = view->ms[rung] > 0, known = known_near(learnt, rung, is_calibrated);
+	const int is_scaled = is_calibrated && known >= 0 && known != rung;
+	double work[BUDGET_N_WORK], ns;
 
-	foresee_work(work, view, rung);
-	return time_of(learnt, work) * tail_of(learnt, view, rung);
+	foresee_work(work, view, is_scaled ? known : rung);
+	ns = time_of(learnt, work);
+	if (known < 0)
+		return ns * FIRST_TAIL;
+	const struct budget_ratio like = seen_as(view, known);
+	ns *= ratio_of(&learnt->past[known], &like);
+	return is_scaled ? ns * SCALED_MARGIN * view->ms[rung] / view->ms[known] : ns;
 }
 
 void budget_init(struct budget_learnt *learnt)

@@ -194,6 +194,57 @@ static void a_slow_first_frame_is_forgotten(void **state)
 	assert_true(budget_foresee(&learnt, &whole, budget_rung_of(&plain)) < 1.5 * time_of(&usual, &plain));
 }
 
+/* In one of two views pieces hide each other: the survey counts six times what frames meet. Neither has the other's
+ * ratio of time to work. */
+static void views_have_prices_of_their_own(void **state)
+{
+	const struct psr_msg_settings plain = { .scale = 1, .spacing_px = 1 };
+	const int rung = budget_rung_of(&plain);
+	struct machine m = usual;
+	struct budget_view deep = whole;
+	struct budget_learnt learnt;
+	struct budget_spent spent;
+
+	(void)state;
+	budget_init(&learnt);
+	deep.at[rung].n_samples *= 6;
+	for (int i = 0; i < 60; i++) {
+		const struct budget_view *view = i % 2 != 0 ? &deep : &whole;
+
+		draw(&spent, &m, view, &plain);
+		budget_learn(&learnt, view, 1, &plain, &spent);
+	}
+	for (int i = 0; i < 2; i++) {
+		const double ns = budget_foresee(&learnt, i > 0 ? &deep : &whole, rung);
+
+		assert_true(ns < 1.3 * time_of(&m, &plain) && ns > time_of(&m, &plain) / (1 + m.spread));
+	}
+}
+
+/* Passes that were never drawn: their rates are another machine's guess, a calibration has what they cost beside others.
+ */
+static void a_rung_that_was_never_drawn_begins_with_the_calibration(void **state)
+{
+	const struct psr_msg_settings plain = { .scale = 1, .spacing_px = 1 }, *pass = &budget_ladder[7];
+	struct budget_view view = whole;
+	struct machine m = usual;
+	struct budget_learnt learnt;
+	struct budget_spent spent;
+
+	(void)state;
+	budget_init(&learnt);
+	for (int i = 0; i < 40; i++) {
+		draw(&spent, &m, &whole, &plain);
+		budget_learn(&learnt, &whole, 1, &plain, &spent);
+	}
+	assert_true(budget_foresee(&learnt, &view, 7) > 4 * time_of(&m, pass));
+	view.is_calibrated = 1;
+	for (int i = 0; i < BUDGET_RUNGS; i++)
+		view.ms[i] = time_of(&m, &budget_ladder[i]) * 17 / MS; /* of a slower machine */
+	assert_true(budget_foresee(&learnt, &view, 7) < 2 * time_of(&m, pass));
+	assert_true(budget_foresee(&learnt, &view, 7) > time_of(&m, pass) / (1 + m.spread));
+}
+
 static void what_cannot_be_met_gets_the_nearest_and_says_so(void **state)
 {
 	struct budget_view view = whole;
@@ -323,6 +374,8 @@ int main(void)
 		cmocka_unit_test(a_budget_that_a_setting_meets_is_used),
 		cmocka_unit_test(load_is_learnt_and_forgotten),
 		cmocka_unit_test(a_slow_first_frame_is_forgotten),
+		cmocka_unit_test(views_have_prices_of_their_own),
+		cmocka_unit_test(a_rung_that_was_never_drawn_begins_with_the_calibration),
 		cmocka_unit_test(what_cannot_be_met_gets_the_nearest_and_says_so),
 		cmocka_unit_test(only_settings_that_the_picture_takes_are_chosen),
 		cmocka_unit_test(an_error_is_foreseen_from_frames),
