@@ -48,7 +48,8 @@ struct psr_cube {
 };
 
 /* Cubes are numbered by level, the finest first, then in Morton order. Cubes of one cluster follow each other. A
- * cluster is a node of at most 64x64x64 leaves of level 0; it has a cluster at each level, which are a group. */
+ * cluster is a node of at most 64x64x64 leaves of level 0; it has a cluster at each level, which are a group. Clusters
+ * are numbered by level, then by group. */
 struct psr_cubes {
 	/* What culling reads. Has clusters, flags, and where the tree has normals of one side, cones; levels are those of
 	 * blocks. Has no projections, spheres, masks, depths or attributes. The level in a cube's flags says how wide its

@@ -117,9 +117,11 @@ static void count_chunk(int i, void *userdata)
 		const uint32_t cluster_end = cluster->first_block + cluster->n_blocks;
 		const uint32_t end = cluster_end < chunk_end ? cluster_end : chunk_end;
 		uint32_t first = cluster->first_block > chunk.first_block ? cluster->first_block : chunk.first_block;
-		const struct cull_sphere v = cull_view_cluster(in, cluster);
 
-		if (!cull_is_chosen(cull->bins, in, cluster) || !cull_sees_sphere(plan, &v))
+		if (!cull_is_chosen(cull->bins, in, cluster))
+			continue;
+		const struct cull_sphere v = cull_view_cluster(in, cluster);
+		if (!cull_sees_sphere(plan, &v))
 			continue;
 		for (uint32_t n; first < end && !plan_is_cancelled(plan); first += n) {
 			struct cull_batch batch;

@@ -78,25 +78,50 @@ static int fits_cluster(const struct plan *plan, const struct plan_instance *in,
 	return fits_pixel(cull_stretch(&in->cull, v.c[0], v.c[1], v.c[2], v.r, nearest_of(in, k)) * spacing);
 }
 
-/* From coarse to fine. Serial, since most clusters take some nanoseconds. */
+/* From coarse to fine. */
+static void choose_of_blocks(struct cull_group *group, const struct plan *plan, const struct plan_instance *in)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+
+	memset(group, 0, b->n_clusters * sizeof *group);
+	for (unsigned level = b->n_levels; level-- > 0;)
+		for (uint32_t k = 0; k < b->n_clusters; k++) {
+			struct cull_group *g = &group[b->cluster[k].group];
+
+			if (plan_is_cancelled_at(plan, k))
+				return;
+			if (b->cluster[k].level != level || g->fits)
+				continue;
+			g->level = (uint8_t)level;
+			g->fits = level > 0 && fits_cluster(plan, in, &b->cluster[k]);
+		}
+}
+
+/* As of blocks, where each level has a cluster of each group, in their order. Of a group out of view any level will do. */
+static void choose_of_cubes(struct cull_group *group, const struct plan *plan, const struct plan_instance *in)
+{
+	const struct psr_blocks *b = in->cull.blocks;
+	const uint32_t n_groups = b->n_clusters / b->n_levels;
+
+	for (uint32_t i = 0; i < n_groups && !plan_is_cancelled_at(plan, i); i++) {
+		const struct psr_cluster *own = &b->cluster[i];
+		unsigned level = b->n_levels - 1;
+		const struct cull_sphere v = cull_view_cluster(in, &own[level * n_groups]);
+
+		if (!cull_sees_sphere(plan, &v))
+			level = 0;
+		while (level > 0 && !fits_cluster(plan, in, &own[level * n_groups]))
+			level--;
+		group[i] = (struct cull_group){ .level = (uint8_t)level, .fits = level > 0 };
+	}
+}
+
+/* Serial, since most clusters take some nanoseconds. */
 void cull_choose_levels(struct bins *bins, const struct plan *plan)
 {
 	for (uint32_t i = 0; i < plan->n_instances; i++) {
 		const struct plan_instance *in = &plan->instance[i];
-		const struct psr_blocks *b = in->cull.blocks;
-		struct cull_group *group = bins->group + in->first_group;
 
-		memset(group, 0, b->n_clusters * sizeof *group);
-		for (unsigned level = b->n_levels; level-- > 0;)
-			for (uint32_t k = 0; k < b->n_clusters; k++) {
-				struct cull_group *g = &group[b->cluster[k].group];
-
-				if (plan_is_cancelled_at(plan, k))
-					return;
-				if (b->cluster[k].level != level || g->fits)
-					continue;
-				g->level = (uint8_t)level;
-				g->fits = level > 0 && fits_cluster(plan, in, &b->cluster[k]);
-			}
+		(in->cull.cubes != NULL ? choose_of_cubes : choose_of_blocks)(bins->group + in->first_group, plan, in);
 	}
 }
