@@ -255,6 +255,15 @@ static int take_representation(const char *text, void *userdata, struct psr_erro
 	return PSR_OK;
 }
 
+/* Whoever names no representation gets what suits the file. One that cannot be read has its error when it is built. */
+static void choose_representation(struct wish *wish, const char *in)
+{
+	if (wish->is_blocks || wish->is_octree)
+		return;
+	wish->is_octree = octree_is_direct(in);
+	wish->is_blocks = !wish->is_octree;
+}
+
 static int check_calibration(const struct wish *wish, struct psr_error *err)
 {
 	if (wish->is_calibrated && !wish->is_blocks)
@@ -282,7 +291,7 @@ static int check_progress_fd(int64_t fd, struct psr_error *err)
 
 int cmd_build(int argc, char **argv)
 {
-	struct wish wish = { .is_blocks = 1 };
+	struct wish wish = { 0 };
 	struct progress progress = { .fd = -1 };
 	struct psr_error err;
 	const char *out = NULL;
@@ -297,7 +306,7 @@ int cmd_build(int argc, char **argv)
 		{ .name = "resolution", .letter = 'r', .type = PSR_OPT_INT, .value = &resolution, .arg = "PIXELS",
 		  .help = "Use about twice the height of the pictures that you want. Larger pictures show rough edges; twice the figure"
 		          " takes four times the memory. Up to 64, meshes of more than 131,072 triangles are merged to few: a model"
-		          " for a first look, fast.", .min = 8, .max = 8192 },
+		          " for a first look, fast. An octree of points is as fine as these are.", .min = 8, .max = 8192 },
 		{ .name = "up", .type = PSR_OPT_VEC3, .value = wish.build.up, .arg = "X,Y,Z",
 		  .help = "What is up in the file. Give it when pictures without a camera show the object on its side. 0,0,0: as is"
 		          " usual for the format, +z for LAS, PCD, STL and survey coordinates, +y for the others." },
@@ -311,10 +320,11 @@ int cmd_build(int argc, char **argv)
 		{ .name = "calibrate", .type = PSR_OPT_FLAG, .value = &wish.is_calibrated,
 		  .help = "Measures in 32 views what settings cost and how far their pictures are from the source, and stores it in the"
 		          " file. Then psrd keeps budgets by figures of this model. Takes some minutes." },
-		{ .name = "Octrees, for large clouds", .type = PSR_OPT_HEADING },
+		{ .name = "Octrees, for clouds of points", .type = PSR_OPT_HEADING },
 		{ .name = "representation", .type = PSR_OPT_CALL, .call = take_representation, .value = &wish, .arg = "KIND",
 		  .help = "What the model holds: blocks, octree or both. Octrees hold the points of a cloud as they are, in a tenth"
-		          " of the size and the time; blocks are of a resampled surface. Default: blocks.",
+		          " of the size and the time; blocks are of a resampled surface. Default: an octree of a file of points"
+		          " alone, blocks of a mesh.",
 		  .words = "blocks octree both" },
 		{ .name = "levels", .type = PSR_OPT_INT, .value = &levels, .arg = "K",
 		  .help = "Points within a leaf become one; a leaf is 1 / 2^K of the longest side, K 2 to 20. 0: by --spacing or by"
@@ -358,6 +368,8 @@ int cmd_build(int argc, char **argv)
 	if (code == PSR_OK && n_operands != 1)
 		code = psr_fail(&err, PSR_ERR_ARG, "one input file is needed");
 	wish.octree.levels = (int)levels;
+	if (code == PSR_OK)
+		choose_representation(&wish, argv[1]);
 	if (code == PSR_OK)
 		code = check_octree(&wish, &err);
 	if (code == PSR_OK)

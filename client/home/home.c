@@ -25,7 +25,8 @@ struct home {
 /* Files that name no others can stand alone in a folder of links; the others need theirs. */
 static int is_alone(const char *name)
 {
-	static const char *const endings[] = { ".psr", ".ply", ".glb", ".las", ".off", ".stl", ".3mf", ".amf" };
+	static const char *const endings[] = { ".psr", ".ply", ".glb", ".las", ".off", ".stl", ".3mf", ".amf",
+		                                   ".pcd", ".pts", ".ptx", ".xyz" };
 	const char *dot = strrchr(name, '.');
 
 	for (size_t i = 0; dot != NULL && i < sizeof endings / sizeof endings[0]; i++)

@@ -176,8 +176,8 @@ void notes_print(const struct notes *notes, const char *program, const struct ps
 		double resolution = ceil(notes->coarsest * model->opened.resolution / STEP) * STEP;
 
 		if (!(model->opened.representations >> PSR_WIRE_REP_BLOCKS & 1))
-			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; build it with %.0f more --levels\n",
-			        program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
+			fprintf(stderr, "%s: %s is an octree for %u pixels; edges will look rough here; %.0f more --levels help if its "
+			        "file is finer\n", program, model->name, model->opened.resolution, ceil(log2(notes->coarsest)));
 		else if (resolution <= MOST)
 			fprintf(stderr, "%s: %s is sampled for %u pixels; edges will look rough here; build it with -r %.0f\n",
 			        program, model->name, model->opened.resolution, resolution);

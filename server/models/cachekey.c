@@ -42,11 +42,12 @@ static int hash_file(XXH3_state_t *state, const char *path, struct psr_error *er
 	return code;
 }
 
-/* Files of the first four formats never name other files, and the others seldom do. */
+/* Files of the first formats never name other files, and the others seldom do. */
 static int is_alone(const char *source)
 {
-	static const char *const endings[] = { ".stl", ".off", ".las", ".pcd", ".glb", ".ply" };
+	static const char *const endings[] = { ".stl", ".off", ".las", ".pcd", ".pts", ".ptx", ".xyz", ".glb", ".ply" };
 	const char *dot = strrchr(source, '.');
+	enum { NEVER = 7 };
 	struct parts parts;
 	size_t i = 0;
 
@@ -54,7 +55,7 @@ static int is_alone(const char *source)
 		i++;
 	if (dot == NULL || i == sizeof endings / sizeof endings[0])
 		return 0;
-	if (i < 4)
+	if (i < NEVER)
 		return 1;
 	parts_find(&parts, source);
 	return parts.n_named == 0;

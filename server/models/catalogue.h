@@ -58,6 +58,8 @@ void catalogue_file_fini(struct catalogue_file *file);
 
 /* Returns whether a file of this name is a source that psr-model can read; only the ending counts. */
 int catalogue_is_source(const char *file_name);
+/* Returns whether it holds points alone, whatever is in it. */
+int catalogue_is_cloud(const char *file_name);
 
 /* A model that has been in memory. Its users (handles and scenes) keep its name and its card; its pins (frames) keep it
  * in memory. A model without pins leaves memory when another needs the room, the longest unused first, and comes back

@@ -14,7 +14,8 @@
 
 /* In order of preference. */
 static const char *const endings[] = {
-	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "pcd", "ply", "stl", "x",
+	"psr", "glb", "gltf", "3ds", "3mf", "ac", "amf", "dae", "fbx", "las", "lwo", "obj", "off", "pcd", "ply", "pts", "ptx",
+	"stl", "x", "xyz",
 };
 #define N_ENDINGS (sizeof endings / sizeof endings[0])
 
@@ -48,6 +49,17 @@ int catalogue_is_source(const char *file_name)
 	size_t i = find_ending(file_name);
 
 	return i > 0 && i < N_ENDINGS;
+}
+
+int catalogue_is_cloud(const char *file_name)
+{
+	static const char *const clouds[] = { "las", "pcd", "pts", "ptx", "xyz" };
+	const size_t ending = find_ending(file_name);
+	int is_cloud = 0;
+
+	for (size_t i = 0; i < sizeof clouds / sizeof clouds[0] && ending < N_ENDINGS; i++)
+		is_cloud |= strcmp(endings[ending], clouds[i]) == 0;
+	return is_cloud;
 }
 
 /* A valid name is one that LIST_ENTRY can carry. */

@@ -4,6 +4,7 @@
 #include <string.h>
 #include "hide.h"
 #include "opening.h"
+#include "psr/mesh.h"
 #include "server/log.h"
 
 #define GRACE_US 1000000 /* time for a client to reconnect and ask again before psrd drops its build */
@@ -145,15 +146,15 @@ static struct opening *start(struct opener *opener, const struct catalogue_entry
 
 /* Chooses the resolution of a model for pictures of so many pixels (0: unknown): the first of --resolution, its
  * doubles, and --max-resolution that has nine tenths of these pixels. So the cache holds few models of a source, and
- * nothing else decides which one a client gets. */
-static uint32_t find_resolution(const struct opener_parts *parts, uint32_t pixels)
+ * nothing else decides which one a client gets. Clouds are octrees, as fine as their points, above a first look. */
+static uint32_t find_resolution(const struct opener_parts *parts, uint32_t pixels, int is_cloud)
 {
 	const uint32_t most = parts->max_resolution;
 	uint32_t step = parts->resolution;
 
-	while (step < most && 10 * step < 9 * pixels)
+	while (step < most && 10 * step < 9 * pixels && !(is_cloud && step > PSR_PREVIEW_RESOLUTION))
 		step *= 2;
-	return step < most && pixels != most ? step : most;
+	return step < most && (pixels != most || is_cloud) ? step : most;
 }
 
 /* Has `who` wait for the entry's model of this resolution. MEMORY. */
@@ -201,7 +202,8 @@ void opener_open(struct opener *opener, void *client, uint32_t id, const struct 
 		user->on_refused(client, id, PSR_ERR_UNSUPPORTED, entry->file.reason);
 		return;
 	}
-	resolution = entry->file.is_source ? find_resolution(&opener->parts, msg->resolution) : 0;
+	resolution = entry->file.is_source
+	             ? find_resolution(&opener->parts, msg->resolution, catalogue_is_cloud(entry->file.path)) : 0;
 	model = catalogue_model(entry, resolution);
 	if (model != NULL && !model->is_stale)
 		user->on_opened(client, id, model);

@@ -51,6 +51,8 @@ check "text says the same, with the bits of each array" \
 
 psr-model build "$work/ball.las" --representation octree --levels 7 --memory 1m -q -o "$work/runs.psr"
 is "sorting on disk makes the same file" "$(sha256sum <"$work/ball.psr")" "$(sha256sum <"$work/runs.psr")"
+check "a cloud becomes an octree without being asked" psr-model build "$work/ball.las" --levels 7 -q -o "$work/runs.psr"
+is "which is the same file" "$(sha256sum <"$work/ball.psr")" "$(sha256sum <"$work/runs.psr")"
 check "a spacing in place of levels" psr-model build "$work/ball.las" --representation octree --spacing 0.16 -q -o "$work/runs.psr"
 is "makes the same file" "$(sha256sum <"$work/ball.psr")" "$(sha256sum <"$work/runs.psr")"
 check "blocks and an octree in one model" psr-model build "$work/ball.las" --representation both -r 64 --levels 7 \
@@ -83,7 +85,10 @@ is "of as many levels" 7 "$(value "$work/mesh.json" octree.levels)"
 
 refuses "levels and a spacing together" 2 "give one of them" \
 	psr-model build "$work/ball.las" --representation octree --levels 7 --spacing 1 -o "$work/none.psr"
-refuses "levels for blocks" 2 "add --representation octree" psr-model build "$work/ball.las" --levels 7 -o "$work/none.psr"
+refuses "levels for blocks of a mesh" 2 "add --representation octree" \
+	psr-model build "$work/mesh.glb" --levels 7 -o "$work/none.psr"
+refuses "levels for blocks of a cloud" 2 "add --representation octree" \
+	psr-model build "$work/ball.las" --representation blocks --levels 7 -o "$work/none.psr"
 refuses "another representation" 2 "it is blocks, octree or both" \
 	psr-model build "$work/ball.las" --representation trees -o "$work/none.psr"
 refuses "a spacing that takes too many levels" 2 "more than 20 levels" \
@@ -118,6 +123,7 @@ check "lines of numbers become an octree" psr-model build "$work/square.xyz" --r
 # --- pictures ---
 mkdir "$work/models"
 cp "$work/ball.psr" "$work/part.psr" "$work/packed.psr" "$work/both.psr" "$work/teapot.psr" "$work/square.psr" "$work/models"
+cp "$work/square.xyz" "$work/models/lines.xyz"
 start_psrd --models "$work/models" --threads 2
 shot() { psr shot --server "$server" --size 200x200 "$@"; }
 hashes() { shot "$@" --hash 2>/dev/null; }
@@ -125,6 +131,8 @@ hashes() { shot "$@" --hash 2>/dev/null; }
 ball=$(hashes --model ball)
 is "a packed octree looks as the plain one" "$ball" "$(hashes --model packed)"
 check "a part of it, coarser" [ -n "$(hashes --model part)" -a "$(hashes --model part)" != "$ball" ]
+check "psrd makes an octree of lines of numbers" shot --model lines --report "$work/lines.json" -o "$work/lines.png"
+is "and of nothing else" "['octree']" "$(value "$work/lines.json" model.representations)"
 is "where nobody names one, blocks are drawn" "$(hashes --model both)" "$(hashes --instance both,as=blocks)"
 check "and an octree where it is named" [ "$(hashes --instance both,as=octree)" != "$(hashes --model both)" ]
 refuses "blocks of an octree" 4 "asks for representation 1 \\(blocks\\), and its model has an octree alone" \

@@ -10,7 +10,7 @@ mkdir "$models"
 for entry in armadillo:armadillo.off elephant:elephant.off b9_training:b9_training.ply; do
 	model=${entry%%:*} source=$PSR_MODELS/${entry#*:}
 	if [ -f "$source" ]; then
-		check "$model is built" psr-model build "$source" -r $size -o "$models/$model.psr" --quiet
+		check "$model is built" psr-model build "$source" --representation blocks -r $size -o "$models/$model.psr" --quiet
 		available="${available:-} $entry"
 	elif [ "${CI:-}" = true ]; then
 		# A run that claims to have tested everything must have had the models.
