@@ -314,6 +314,7 @@ $(TOOLS_BUILD): $(BUILD)/tests/tools/%: $(BUILD)/tests/tools/%.c.o $(LIB)/libpsr
 CODEC_O := $(addprefix $(BUILD)/server/,$(addsuffix .c.o,frames/codec frames/codec_parts frames/codec_rect frames/pixels net/outq))
 $(BENCH): $(BUILD)/tests/bench/model.c.o $(BUILD)/tests/bench/child.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
+$(BUILD)/tests/bench/octree: $(BUILD)/tests/bench/octree_draco.cc.o
 $(OCTREE_BENCH): %: %.c.o $(LIB)/libpsr-build.a $(LIB)/libpsr.a
 	$(link) $(L_BUILD_HERE) $(L_PSR)
 $(POOL_BENCH): $(BUILD)/tests/bench/pool.c.o $(LIB)/libpsr.a
