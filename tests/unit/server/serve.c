@@ -40,7 +40,7 @@ static void welcome_tells_the_limits(void **state)
 	(void)state;
 	peer_hello(&p, &psrd, &welcome);
 	assert_int_equal(welcome.capabilities, PSR_CAP_REFINE | PSR_CAP_SHADOWS | PSR_CAP_BUILD | PSR_CAP_RESOLUTION |
-	                                           PSR_CAP_PRESETS | PSR_CAP_OCTREE |
+	                                           PSR_CAP_PRESETS | PSR_CAP_OCTREE | PSR_CAP_RMSE_BOUND |
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
