@@ -9,5 +9,6 @@ int psr_view_main(int argc, char **argv);
 int psr_test_main(int argc, char **argv);
 int psr_bench_main(int argc, char **argv);
 int psr_stats_main(int argc, char **argv);
+int psr_fetch_main(int argc, char **argv);
 
 #endif

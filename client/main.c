@@ -16,6 +16,7 @@ static const struct {
 	{ "test", psr_test_main, "pictures of test suites, compared with what is expected" },
 	{ "bench", psr_bench_main, "load a server with many clients, and measure" },
 	{ "stats", psr_stats_main, "what a server counts: connections, frames, bytes, memory" },
+	{ "fetch", psr_fetch_main, "the file of a model, coarse first; goes on where it broke off" },
 };
 
 #define N_COMMANDS (sizeof commands / sizeof commands[0])

@@ -29,6 +29,7 @@
 #define PSR_WIRE_GROWTH 256            /* bytes behind the fields of this version that a receiver skips */
 #define PSR_WIRE_MAX_RECT_PIXELS 2097152u /* 128 rows of 16384 */
 #define PSR_WIRE_MAX_RECT_DATA (PSR_WIRE_MAX_PAYLOAD - 24) /* bytes of data in one RECT */
+#define PSR_WIRE_MAX_PART (PSR_WIRE_MAX_PAYLOAD - 16) /* bytes of a file in one FETCH_PART */
 #define PSR_WIRE_MAX_UNACKED 2         /* frames of a view > 0 that are sent and not acknowledged */
 #define PSR_WIRE_PART_WIDTH 128        /* a frame on a base sends the parts of this grid that changed */
 #define PSR_WIRE_PART_HEIGHT 32
@@ -43,6 +44,7 @@ enum psr_msg_type {
 	PSR_MSG_SUPERSEDED = 37, PSR_MSG_CANCELLED = 38, PSR_MSG_ACK = 39, PSR_MSG_CANCEL = 40, PSR_MSG_PAUSE = 41,
 	PSR_MSG_RESUME = 42,
 	PSR_MSG_STATS = 48, PSR_MSG_STATS_REPLY = 49,
+	PSR_MSG_FETCH = 64, PSR_MSG_FETCH_PART = 65, PSR_MSG_FETCH_END = 66,
 };
 
 enum psr_msg_flag { PSR_FLAG_SKIP = 1 }; /* a receiver that does not know the type skips the message */
@@ -181,6 +183,7 @@ struct psr_msg_ack { uint16_t pass; }; /* client -> server: END of frame (id, pa
 PROTO_PLAIN(hello) PROTO_PLAIN(welcome) PROTO_PLAIN(goodbye) PROTO_PLAIN(ping)
 PROTO_ID(list_entry) PROTO_ID(list_end) PROTO_ID(open) PROTO_ID(progress) PROTO_ID(opened) PROTO_ID(close)
 PROTO_ID(presets) PROTO_ID(preset) PROTO_ID(presets_end) PROTO_ID(scene) PROTO_ID(stats_reply)
+PROTO_ID(fetch) PROTO_ID(fetch_part) PROTO_ID(fetch_end)
 PROTO_VIEW(error) PROTO_VIEW(frame) PROTO_VIEW(frame_begin) PROTO_VIEW(rect) PROTO_VIEW(frame_end)
 PROTO_VIEW(superseded) PROTO_VIEW(ack)
 

@@ -125,13 +125,13 @@ static void start_draining(struct server *server)
 			conn_close(conn);
 			continue;
 		}
-		sessions_refuse_lists(session, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
+		sessions_refuse(session, PSR_ERR_CANCELLED, CONN_SHUTDOWN);
 	}
 }
 
 static int is_reading(const struct server *server)
 {
-	return opener_is_working(server->opener) || residence_is_working(server->residence);
+	return opener_is_working(server->opener) || residence_is_working(server->residence) || server->sessions.reads != NULL;
 }
 
 /* Sends GOODBYE to clients without a running frame; the loop ends with the last client. */
@@ -211,6 +211,7 @@ static void destroy(struct server *server)
 	conns_end_batch(&server->conns); /* stops frames under way */
 	psr_pool_destroy(server->pool);  /* waits for them before their data goes */
 	psr_pool_destroy(server->io);
+	fetches_fini(&server->sessions);
 	server->catalogue.io = NULL;
 	opener_destroy(server->opener);
 	residence_destroy(server->residence);
@@ -290,7 +291,7 @@ static int create_parts(struct server *server)
 		return PSR_ERR_MEMORY;
 	server->sessions = (struct sessions){
 		.options = options, .conns = &server->conns, .catalogue = &server->catalogue, .opener = server->opener,
-		.builder = server->builder, .frames = server->frames, .pool = server->pool, .start_us = server->loop.now_us,
+		.builder = server->builder, .frames = server->frames, .pool = server->pool, .io = server->io, .start_us = server->loop.now_us,
 	};
 	return PSR_OK;
 }

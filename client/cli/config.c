@@ -6,7 +6,7 @@
 #include "cli.h"
 #include "optlist.h"
 
-const char *const psr_commands[] = { "list", "shot", "turntable", "view", "test", "bench", "stats", NULL };
+const char *const psr_commands[] = { "list", "shot", "turntable", "view", "test", "bench", "stats", "fetch", NULL };
 
 static char *text; /* options point into it until the program ends */
 

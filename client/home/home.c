@@ -22,6 +22,15 @@ struct home {
 	char model[PSR_WIRE_MAX_NAME + 1];
 };
 
+/* Returns the length of a file's name without the ending of what psr fetch has not yet brought whole. */
+static size_t whole_name(const char *name)
+{
+	static const char ending[] = ".psr.part";
+	const size_t n = strlen(name), n_ending = sizeof ending - 1;
+
+	return n > n_ending && strcmp(name + n - n_ending, ending) == 0 ? n - strlen(".part") : n;
+}
+
 /* Files that name no others can stand alone in a folder of links; the others need theirs. */
 static int is_alone(const char *name)
 {
@@ -29,6 +38,8 @@ static int is_alone(const char *name)
 		                                   ".pcd", ".pts", ".ptx", ".xyz" };
 	const char *dot = strrchr(name, '.');
 
+	if (name[whole_name(name)] != '\0')
+		return 1;
 	for (size_t i = 0; dot != NULL && i < sizeof endings / sizeof endings[0]; i++)
 		if (strcasecmp(dot, endings[i]) == 0)
 			return 1;
@@ -39,7 +50,7 @@ static int is_alone(const char *name)
 static int name_model(char model[PSR_WIRE_MAX_NAME + 1], const char *file, struct psr_error *err)
 {
 	const char *name = strrchr(file, '/') + 1;
-	const char *dot = strrchr(name, '.');
+	const char *dot = name[whole_name(name)] == '\0' ? strrchr(name, '.') : name + whole_name(name) - strlen(".psr");
 	const size_t n_stem = dot != NULL && dot != name ? (size_t)(dot - name) : strlen(name);
 
 	if (n_stem > PSR_WIRE_MAX_NAME)
@@ -65,7 +76,7 @@ static int choose_models(char models[PATH_MAX], struct home *home, struct psr_er
 	snprintf(models, PATH_MAX, "%s/models", daemon_folder(home->daemon));
 	if (mkdir(models, 0700) != 0)
 		return psr_fail(err, PSR_ERR_IO, "%s: %s", models, strerror(errno));
-	snprintf(at, sizeof at, "%s/models/%s", daemon_folder(home->daemon), name);
+	snprintf(at, sizeof at, "%s/models/%.*s", daemon_folder(home->daemon), (int)whole_name(name), name);
 	if (symlink(file, at) != 0)
 		return psr_fail(err, PSR_ERR_IO, "%s: %s", at, strerror(errno));
 	return PSR_OK;

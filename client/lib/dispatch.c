@@ -25,7 +25,7 @@ static int is_answer_to(const struct psr_client *client, const struct psr_messag
 static int answered(struct psr_client *client, enum client_answer answer)
 {
 	client->answer = answer;
-	if (answer != CLIENT_ANSWER_PROGRESS && answer != CLIENT_ANSWER_PONG)
+	if (answer != CLIENT_ANSWER_PROGRESS && answer != CLIENT_ANSWER_PONG && answer != CLIENT_ANSWER_PART)
 		client->control_id = 0;
 	return 1;
 }
@@ -170,6 +170,42 @@ static int on_control(struct psr_client *client, const struct psr_message *messa
 	return code == PSR_OK ? answered(client, answer) : client_broke(client, &why);
 }
 
+static int on_fetch_part(struct psr_client *client, const struct psr_message *message)
+{
+	struct client_fetch *fetch = &client->fetch;
+	struct psr_msg_fetch_part part;
+	struct psr_error why;
+	int code;
+
+	if (!is_answer_to(client, message, PSR_MSG_FETCH))
+		return client_unexpected(client, message);
+	if (psr_msg_fetch_part_decode(&part, message->payload, message->n, &why) != PSR_OK)
+		return client_broke(client, &why);
+	if (part.offset != fetch->next || part.bytes > fetch->end - fetch->next)
+		return client_break(client, PSR_ERR_PROTOCOL, "the server sent bytes %" PRIu64 " to %" PRIu64 " of a file, where %"
+		                    PRIu64 " follows", part.offset, part.offset + part.bytes, fetch->next);
+	fetch->next += part.bytes;
+	code = fetch->on_part(part.data, part.bytes, fetch->userdata, &why);
+	return code == PSR_OK ? answered(client, CLIENT_ANSWER_PART) : client_break(client, code, "%.400s", why.text);
+}
+
+static int on_fetch_end(struct psr_client *client, const struct psr_message *message)
+{
+	const struct client_fetch *fetch = &client->fetch;
+	struct psr_msg_fetch_end end;
+	struct psr_error why;
+
+	if (!is_answer_to(client, message, PSR_MSG_FETCH))
+		return client_unexpected(client, message);
+	if (psr_msg_fetch_end_decode(&end, message->payload, message->n, &why) != PSR_OK)
+		return client_broke(client, &why);
+	if (fetch->next < (end.file_bytes < fetch->end ? end.file_bytes : fetch->end))
+		return client_break(client, PSR_ERR_PROTOCOL, "the server ends at byte %" PRIu64 " of a file of %" PRIu64,
+		                    fetch->next, end.file_bytes);
+	client->fetch.last = end;
+	return answered(client, CLIENT_ANSWER_FETCH_END);
+}
+
 static int on_cancelled(struct psr_client *client, const struct psr_message *message, struct psr_event *event)
 {
 	struct client_frame *frame = client_find_frame(client, message->id);
@@ -262,6 +298,10 @@ int client_dispatch(struct psr_client *client, const struct psr_message *message
 	case PSR_MSG_FRAME_END:
 	case PSR_MSG_SUPERSEDED:
 		return client_on_frame(client, message, event);
+	case PSR_MSG_FETCH_PART:
+		return on_fetch_part(client, message);
+	case PSR_MSG_FETCH_END:
+		return on_fetch_end(client, message);
 	case PSR_MSG_CANCELLED:
 		return on_cancelled(client, message, event);
 	default:

@@ -89,7 +89,7 @@ int client_assembly_end(struct client_assembly *assembly, const struct psr_msg_f
 
 enum client_answer { /* how the one control request that may be open was answered */
 	CLIENT_ANSWER_NONE, CLIENT_ANSWER_WELCOME, CLIENT_ANSWER_LIST_END, CLIENT_ANSWER_PROGRESS, CLIENT_ANSWER_OPENED,
-	CLIENT_ANSWER_PRESETS_END, CLIENT_ANSWER_STATS, CLIENT_ANSWER_PONG, CLIENT_ANSWER_ERROR,
+	CLIENT_ANSWER_PRESETS_END, CLIENT_ANSWER_STATS, CLIENT_ANSWER_PART, CLIENT_ANSWER_FETCH_END, CLIENT_ANSWER_PONG, CLIENT_ANSWER_ERROR,
 };
 
 struct client_frame {
@@ -139,7 +139,7 @@ struct psr_client {
 	struct client_held *held;
 	struct psr_msg_frame_end end;
 	struct psr_msg_rect rect;
-	/* the control request: LIST, OPEN, PRESETS, STATS or PING */
+	/* the control request: LIST, OPEN, PRESETS, STATS, FETCH or PING */
 	uint32_t control_id;
 	uint16_t control_type;
 	enum client_answer answer;
@@ -149,6 +149,12 @@ struct psr_client {
 	struct psr_msg_progress progress;
 	struct psr_msg_opened opened;
 	struct psr_msg_stats_reply stats;
+	struct client_fetch {
+		uint64_t next, end;       /* byte of the file; behind the last one asked for */
+		int (*on_part)(const uint8_t *bytes, size_t n, void *userdata, struct psr_error *err);
+		void *userdata;
+		struct psr_msg_fetch_end last;
+	} fetch;
 };
 
 int client_create(struct psr_client **out, int fd, const char *address, struct psr_error *err);

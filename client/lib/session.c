@@ -202,3 +202,30 @@ int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stat
 		*stats = client->stats;
 	return code;
 }
+
+int psr_client_fetch(struct psr_client *client, const struct psr_msg_fetch *fetch,
+                     const struct psr_fetch_user *user, struct psr_msg_fetch_end *end, int timeout_ms,
+                     struct psr_error *err)
+{
+	int code;
+
+	if (!(client->welcome.capabilities & PSR_CAP_FETCH))
+		return psr_fail(err, PSR_ERR_UNSUPPORTED, "%s: this server gives no model files away (capability bit 17)",
+		                client->address);
+	code = start_control(client, PSR_MSG_FETCH, err);
+	if (code != PSR_OK)
+		return code;
+	client->fetch = (struct client_fetch){ .next = fetch->offset, .end = UINT64_MAX, .on_part = user->on_part,
+		                                   .userdata = user->userdata };
+	if (fetch->length > 0)
+		client->fetch.end = fetch->offset + fetch->length;
+	code = psr_msg_fetch_encode(&client->out, client->control_id, fetch, err);
+	if (code != PSR_OK)
+		return withdraw(client, code);
+	do
+		code = next_answer(client, timeout_ms, err);
+	while (code == PSR_OK && client->answer == CLIENT_ANSWER_PART);
+	if (code == PSR_OK)
+		*end = client->fetch.last;
+	return code;
+}

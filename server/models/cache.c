@@ -92,6 +92,13 @@ char *cache_path(const char *folder, const char *key, uint32_t resolution)
 	return asprintf(&path, "%s/%s-%" PRIu32 ".psr", folder, key, resolution) < 0 ? NULL : path;
 }
 
+char *cache_model_path(const char *folder, const struct catalogue_model *model)
+{
+	if (model->key[0] != '\0')
+		return cache_path(folder, model->key, model->resolution);
+	return model->entry != NULL ? strdup(model->entry->file.path) : NULL;
+}
+
 int cache_find(uint64_t *bytes, const char *path)
 {
 	struct stat status;

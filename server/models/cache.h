@@ -15,6 +15,10 @@ int cache_check(const char *folder, struct psr_error *err);
 
 char *cache_path(const char *folder, const char *key, uint32_t resolution); /* the caller frees it; NULL: no memory */
 
+/* Returns the path of the file that a model comes from: of this folder, or its own; NULL: that has changed or is gone, or
+ * no memory. The caller frees it. */
+char *cache_model_path(const char *folder, const struct catalogue_model *model);
+
 /* Returns whether a built model of ours lies there, and its size. */
 int cache_find(uint64_t *bytes, const char *path);
 

@@ -100,14 +100,6 @@ static void read_job(void *userdata)
 
 static void on_read(void *userdata);
 
-/* Returns NULL without memory, or if the file is gone. */
-static char *find_path(const struct residence *residence, const struct catalogue_model *model)
-{
-	if (model->key[0] != '\0')
-		return cache_path(residence->parts.cache, model->key, model->resolution);
-	return model->entry != NULL ? strdup(model->entry->file.path) : NULL;
-}
-
 /* Loads it, after its bytes have been reserved. */
 static void start_coming(struct residence *residence, struct catalogue_model *model)
 {
@@ -116,7 +108,7 @@ static void start_coming(struct residence *residence, struct catalogue_model *mo
 
 	if (coming != NULL) {
 		*coming = (struct coming){ .residence = residence, .model = model, .reserved = model->bytes,
-			                       .path = find_path(residence, model) };
+			                       .path = cache_model_path(residence->parts.cache, model) };
 		coming->note = (struct loop_note){ .fn = on_read, .userdata = coming };
 	}
 	if (coming == NULL || coming->path == NULL || psr_pool_submit(residence->parts.io, &job) != PSR_OK) {

@@ -20,7 +20,7 @@ static void welcome(struct conn *conn, const struct options *options)
 		                PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS | PSR_CAP_BLOCK | PSR_CAP_RESOLUTION |
 		                PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS | PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
 		                PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
-		                PSR_CAP_OCTREE,
+		                PSR_CAP_OCTREE | PSR_CAP_FETCH,
 		.max_message = PSR_WIRE_MAX_MESSAGE,
 		.max_side = PSR_WIRE_MAX_SIDE,
 		.max_pixels = (uint32_t)options->max_pixels,
@@ -78,6 +78,7 @@ static void on_end(struct conn *conn)
 		return;
 	frames_forget(session->all->frames, &session->flow);
 	opener_forget(session->all->opener, session);
+	fetches_forget(session);
 	for (size_t i = 0; i < PSR_WIRE_MAX_SCENES; i++)
 		scene_unref(session->slot[i]);
 	handles_fini(&session->handles);
@@ -159,12 +160,13 @@ static void on_refused(void *client, uint32_t id, int code, const char *text)
 
 const struct opener_user sessions_opener_user = { on_progress, on_opened, on_refused };
 
-void sessions_refuse_lists(struct session *session, int code, const char *text)
+void sessions_refuse(struct session *session, int code, const char *text)
 {
 	uint32_t id;
 
 	while ((id = lists_end(&session->lists)) != 0)
 		refuse_open(session, id, code, text);
+	fetches_refuse(session, code, text);
 }
 
 /* ---- messages ---- */
@@ -178,6 +180,8 @@ static int cancel(struct session *session, uint32_t id, uint16_t view, struct ps
 	if (code == 0 && opener_cancel(session->all->opener, session, id)) {
 		session->n_open--;
 		send_cancelled(session, id, 0);
+	} else if (code == 0 && fetches_cancel(session, id)) {
+		send_cancelled(session, id, 0);
 	}
 	return PSR_OK;
 }
@@ -186,7 +190,7 @@ static int is_request(unsigned type)
 {
 	return type == PSR_MSG_LIST || type == PSR_MSG_OPEN || type == PSR_MSG_CLOSE || type == PSR_MSG_SCENE
 	       || type == PSR_MSG_FRAME || type == PSR_MSG_STATS || type == PSR_MSG_PRESETS || type == PSR_MSG_PAUSE
-	       || type == PSR_MSG_RESUME;
+	       || type == PSR_MSG_RESUME || type == PSR_MSG_FETCH;
 }
 
 /* A bad value ends only the request; a message that breaks the protocol is an error, and ends the connection. */
@@ -201,13 +205,14 @@ static int refuse_or_break(struct session *session, const struct psr_message *me
 	return PSR_OK;
 }
 
-/* LIST, OPEN, PRESETS, FRAME, STATS: their ids stay open until they are answered. */
+/* LIST, OPEN, PRESETS, FRAME, STATS, FETCH: their ids stay open until they are answered. */
 static int take_open_id(struct session *session, const struct psr_message *message, struct psr_error *err)
 {
 	union {
 		struct psr_msg_open open;
 		struct psr_msg_presets presets;
 		struct psr_msg_frame frame;
+		struct psr_msg_fetch fetch;
 	} msg;
 	struct psr_error error;
 	char text[PSR_ERROR_TEXT];
@@ -219,6 +224,8 @@ static int take_open_id(struct session *session, const struct psr_message *messa
 		code = psr_msg_presets_decode(&msg.presets, message->payload, message->n, &error);
 	else if (message->type == PSR_MSG_FRAME)
 		code = psr_msg_frame_decode(&msg.frame, message->payload, message->n, &error);
+	else if (message->type == PSR_MSG_FETCH)
+		code = psr_msg_fetch_decode(&msg.fetch, message->payload, message->n, &error);
 	if (code != PSR_OK)
 		return refuse_or_break(session, message, code, &error, err);
 	if (message->view == 0 && session->n_open >= (uint32_t)session->all->options->max_open) {
@@ -230,6 +237,8 @@ static int take_open_id(struct session *session, const struct psr_message *messa
 	session->n_open += message->view == 0;
 	if (message->type == PSR_MSG_OPEN) {
 		opener_open(session->all->opener, session, message->id, &msg.open);
+	} else if (message->type == PSR_MSG_FETCH) {
+		fetches_ask(session, message->id, &msg.fetch);
 	} else if (message->type == PSR_MSG_FRAME) {
 		frames_ask(session->all->frames, &session->flow, message, &msg.frame, session->slot[msg.frame.slot]);
 	} else if (message->type == PSR_MSG_LIST) {
@@ -299,6 +308,7 @@ static int on_message(struct conn *conn, const struct psr_message *message, stru
 	case PSR_MSG_PRESETS:
 	case PSR_MSG_FRAME:
 	case PSR_MSG_STATS:
+	case PSR_MSG_FETCH:
 		return take_open_id(session, message, err);
 	case PSR_MSG_SCENE:
 		return take_scene(session, message, err);
@@ -355,6 +365,7 @@ static void on_room(void *userdata)
 	struct sessions *all = userdata;
 
 	frames_pump(all->frames);
+	fetches_pump(all);
 }
 
 static void on_sent(const struct outq_chunk *chunk, void *userdata)

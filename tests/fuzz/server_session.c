@@ -28,13 +28,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t n);
 #define MOST_ACTS 200
 
 enum act { HELLO, OPEN, SCENE, FRAME, ACK, CANCEL, PAUSE, RESUME, LIST, PRESETS, STATS, CLOSE, PING, GOODBYE, READ,
-	       WAIT, HALF_CLOSE, END, RESET, BYTES, CUT, CHANGE, LENGTH, OTHER, N_ACTS };
+	       WAIT, HALF_CLOSE, END, RESET, BYTES, CUT, CHANGE, LENGTH, OTHER, FETCH, N_ACTS };
 enum spoil { SOUND, SPOIL_CUT, SPOIL_CHANGE, SPOIL_LENGTH };
 
 struct id {
 	uint8_t type;     /* of our request; 0: none */
 	uint8_t is_ended, has_begun, is_final_wanted;
 	uint16_t view, pass;
+	uint64_t next;    /* byte of a file that a FETCH waits for */
 };
 
 struct peer {
@@ -164,6 +165,7 @@ static void take(struct peer *p, const struct psr_message *message)
 	struct psr_msg_rect rect;
 	struct psr_msg_error error;
 	struct psr_msg_opened opened;
+	struct psr_msg_fetch_part part;
 
 	REQUIRE(!p->has_ended);
 	if (message->type == PSR_MSG_GOODBYE || (message->type == PSR_MSG_ERROR && message->id == 0)) {
@@ -196,6 +198,12 @@ static void take(struct peer *p, const struct psr_message *message)
 		REQUIRE(psr_msg_error_decode(&error, message->payload, message->n, NULL) == PSR_OK);
 		end_id(p, id);
 		break;
+	case PSR_MSG_FETCH_PART:
+		REQUIRE(psr_msg_fetch_part_decode(&part, message->payload, message->n, NULL) == PSR_OK);
+		REQUIRE(p->is_unsound || (id->type == PSR_MSG_FETCH && part.offset == id->next));
+		id->next = part.offset + part.bytes;
+		break;
+	case PSR_MSG_FETCH_END:
 	case PSR_MSG_LIST_END:
 	case PSR_MSG_PRESETS_END:
 	case PSR_MSG_STATS_REPLY:
@@ -367,6 +375,17 @@ static void encode_open(struct peer *p, struct psr_buf *out, unsigned which)
 	psr_msg_open_encode(out, p->last, &open, NULL);
 }
 
+static void encode_fetch(struct peer *p, struct psr_buf *out, unsigned which)
+{
+	struct psr_msg_fetch fetch = { .handle = which & 64 ? which & 3 : p->handle,
+		                                 .offset = (uint64_t)(which >> 2 & 7) * 30000,
+		                                 .length = which & 32 ? 70000 : 0, .file_hash = which & 128 ? which : 0 };
+
+	strcpy(fetch.name, fetch.handle != 0 ? "" : which & 1 ? "wheel" : "dice");
+	p->id[++p->last] = (struct id){ .type = PSR_MSG_FETCH, .next = fetch.offset };
+	psr_msg_fetch_encode(out, p->last, &fetch, NULL);
+}
+
 /* The message of an act; none for acts without one. */
 static void encode(struct peer *p, struct psr_buf *out, enum act act, struct input *in)
 {
@@ -415,6 +434,9 @@ static void encode(struct peer *p, struct psr_buf *out, enum act act, struct inp
 	case CLOSE:
 		p->id[++p->last].type = PSR_MSG_CLOSE;
 		psr_msg_close_encode(out, p->last, &(struct psr_msg_close){ 1 + k % 4 }, NULL);
+		break;
+	case FETCH:
+		encode_fetch(p, out, next_byte(in));
 		break;
 	case PING:
 		psr_msg_ping_encode(out, &(struct psr_msg_ping){ k }, NULL);

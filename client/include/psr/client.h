@@ -7,6 +7,7 @@
 #ifndef PSR_CLIENT_H
 #define PSR_CLIENT_H
 
+#include <stddef.h>
 #include <stdint.h>
 #include "psr/error.h"
 #include "psr/message.h"
@@ -94,6 +95,19 @@ int psr_client_close_model(struct psr_client *client, uint32_t handle, struct ps
  * none. UNSUPPORTED by an older server. */
 int psr_client_presets(struct psr_client *client, uint32_t handle, struct psr_msg_preset **presets, uint32_t *n_presets,
                        int timeout_ms, struct psr_error *err);
+
+/* Who takes parts of a file. An error of on_part ends the connection with it. */
+struct psr_fetch_user {
+	int (*on_part)(const uint8_t *bytes, size_t n, void *userdata, struct psr_error *err);
+	void *userdata;
+};
+
+/* Gets a part of the file that an open model comes from: on_part takes its bytes in their order, without gaps. They are
+ * those of the server's disk, not checked (docs/format.md has the hashes). NOT_FOUND: the file is gone, or is not that of
+ * fetch->file_hash; UNSUPPORTED by an older server. */
+int psr_client_fetch(struct psr_client *client, const struct psr_msg_fetch *fetch,
+                     const struct psr_fetch_user *user, struct psr_msg_fetch_end *end, int timeout_ms,
+                     struct psr_error *err);
 
 int psr_client_stats(struct psr_client *client, struct psr_msg_stats_reply *stats, int timeout_ms,
                      struct psr_error *err);

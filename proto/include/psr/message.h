@@ -44,7 +44,7 @@ enum psr_cap {
 	PSR_CAP_DPOINT = 1 << 14,
 	PSR_CAP_APPEND = 1 << 15,      /* SCENE with PSR_WIRE_SCENE_APPEND */
 	PSR_CAP_BUILD = 1 << 16,       /* OPEN builds source files */
-	PSR_CAP_CHUNKS = 1 << 17,      /* the reserved model chunks */
+	PSR_CAP_FETCH = 1 << 17,       /* parts of model files */
 	PSR_CAP_PAUSE = 1 << 18,
 	PSR_CAP_PRESETS = 1 << 19,
 	PSR_CAP_RESOLUTION = 1 << 21,  /* OPEN tells the size of the pictures */
@@ -109,6 +109,22 @@ struct psr_msg_opened {
 	uint32_t n_levels;        /* >= 1 */
 	uint64_t n_samples, n_blocks, bytes; /* bytes: in the server's memory */
 	double up[3];             /* the model's natural way up, object coordinates; | |up|^2 - 1 | <= 1e-6 */
+};
+
+/* Parts of the file of a model, as it is on the server's disk. */
+struct psr_msg_fetch { /* client -> server */
+	uint32_t handle;          /* of an open model; 0: of the model file of this name, which need not be open */
+	uint64_t offset, length;  /* of the part, bytes; what lies behind the file's end is left out; length 0: up to there */
+	uint64_t file_hash;       /* of the file that the client has a part of, or 0: any */
+	char name[PSR_WIRE_MAX_NAME + 1]; /* "" with a handle */
+};
+struct psr_msg_fetch_part { /* server -> client; in the order of the file, without gaps */
+	uint64_t offset;
+	uint32_t bytes;           /* >= 1 */
+	const uint8_t *data;      /* encode: the caller's; decode: within the payload */
+};
+struct psr_msg_fetch_end { /* server -> client, when all has been sent */
+	uint64_t file_bytes, file_hash; /* file_hash: the 8 bytes at 56 of the file, which stand for all of it */
 };
 
 /* ---- scenes ---- */

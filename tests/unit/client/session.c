@@ -114,7 +114,7 @@ static void stop(struct psr_client *client)
 	close(peer.listener);
 }
 
-static uint64_t capabilities = PSR_CAP_PRESETS;
+static uint64_t capabilities = PSR_CAP_PRESETS | PSR_CAP_FETCH;
 
 static void welcome(struct peer *p)
 {
@@ -557,7 +557,7 @@ static void resolutions_go_to_servers_that_take_them(void **state)
 
 	(void)state;
 	for (int takes = 0; takes <= 1; takes++) {
-		capabilities = takes ? PSR_CAP_PRESETS | PSR_CAP_RESOLUTION : PSR_CAP_PRESETS;
+		capabilities = PSR_CAP_PRESETS | PSR_CAP_FETCH | (takes ? PSR_CAP_RESOLUTION : 0);
 		start(note_resolutions, 65536);
 		client = connected();
 		for (int i = 0; i < 3; i++) {
@@ -569,7 +569,7 @@ static void resolutions_go_to_servers_that_take_them(void **state)
 		for (int i = 0; i < 3; i++)
 			assert_int_equal(resolution[i], takes ? sent[i] : 0);
 	}
-	capabilities = PSR_CAP_PRESETS;
+	capabilities = PSR_CAP_PRESETS | PSR_CAP_FETCH;
 }
 
 static void (*between_pieces)(struct peer *);
@@ -707,6 +707,63 @@ static void wrong_presets_end_the_connection(void **state)
 		client = connected();
 		assert_int_equal(psr_client_presets(client, 1, &presets, &n, TIMEOUT, NULL), PSR_ERR_PROTOCOL);
 		assert_null(presets);
+		stop(client);
+	}
+}
+
+/* Of a fetch of bytes 10 to 14: a gap, a byte that was not asked for, another id, an end too early, none at all. */
+static int parts_lie;
+
+static void serve_wrong_parts(struct peer *p)
+{
+	const struct psr_msg_fetch_part part = { .offset = parts_lie == 0 ? 11 : 10, .bytes = parts_lie == 1 ? 6 : 3,
+		                                     .data = (const uint8_t *)"abcdef" };
+	const struct psr_msg_fetch_end end = { .file_bytes = parts_lie == 4 ? 13 : 100, .file_hash = 7 };
+	struct psr_message message;
+	uint32_t id;
+
+	welcome(p);
+	id = expect(p, PSR_MSG_FETCH, &message);
+	psr_msg_fetch_part_encode(&p->buf, parts_lie == 2 ? id + 1 : id, &part, NULL);
+	psr_msg_fetch_end_encode(&p->buf, id, &end, NULL);
+	flush(p);
+	expect(p, PSR_MSG_GOODBYE, &message);
+}
+
+struct taken {
+	char bytes[16];
+	size_t n;
+};
+
+static int take_part(const uint8_t *bytes, size_t n, void *userdata, struct psr_error *err)
+{
+	struct taken *taken = userdata;
+
+	assert_true(n <= sizeof taken->bytes - taken->n);
+	memcpy(taken->bytes + taken->n, bytes, n);
+	taken->n += n;
+	return parts_lie == 5 ? psr_fail(err, PSR_ERR_IO, "no room") : PSR_OK;
+}
+
+static void wrong_parts_of_a_file_end_the_connection(void **state)
+{
+	(void)state;
+	for (parts_lie = 0; parts_lie < 6; parts_lie++) {
+		const struct psr_msg_fetch fetch = { .handle = 1, .offset = 10, .length = 5 };
+		struct taken taken = { "", 0 };
+		struct psr_msg_fetch_end end;
+		struct psr_client *client;
+		int code;
+
+		start(serve_wrong_parts, 65536);
+		client = connected();
+		code = psr_client_fetch(client, &fetch, &(struct psr_fetch_user){ take_part, &taken }, &end, TIMEOUT, NULL);
+		/* 4: the file ends there. */
+		assert_int_equal(code, parts_lie == 4 ? PSR_OK : parts_lie == 5 ? PSR_ERR_IO : PSR_ERR_PROTOCOL);
+		if (parts_lie == 4)
+			assert_true(end.file_bytes == 13 && end.file_hash == 7);
+		assert_int_equal(taken.n, parts_lie >= 3 ? 3 : 0);
+		assert_memory_equal(taken.bytes, "abc", taken.n);
 		stop(client);
 	}
 }
@@ -893,6 +950,7 @@ int main(void)
 		cmocka_unit_test(nobody_there_is_a_connection_error),
 		cmocka_unit_test(silent_server_is_given_up_and_a_busy_one_is_not),
 		cmocka_unit_test(wrong_presets_end_the_connection),
+		cmocka_unit_test(wrong_parts_of_a_file_end_the_connection),
 		cmocka_unit_test(violations_end_the_connection),
 		cmocka_unit_test(wrong_hash_fails_the_frame_only),
 		cmocka_unit_test(closing_at_any_byte_is_an_error_and_no_hang),

@@ -237,6 +237,16 @@ static void make_end(struct psr_msg_frame_end *m)
 	}
 }
 
+static void make_part(struct psr_msg_fetch_part *m)
+{
+	static uint8_t data[PSR_WIRE_MAX_PART];
+
+	m->offset = random64() >> 12;
+	m->bytes = below(9) == 0 ? PSR_WIRE_MAX_PART : 1 + below(3000);
+	data[m->bytes - 1] = (uint8_t)below(256);
+	m->data = data;
+}
+
 static void make(unsigned type, union proto_any *m)
 {
 	struct psr_msg_frame frame = { .slot = 0 };
@@ -294,6 +304,15 @@ static void make(unsigned type, union proto_any *m)
 	case PSR_MSG_FRAME_BEGIN: make_begin(&m->frame_begin); break;
 	case PSR_MSG_RECT: make_rect(&m->rect); break;
 	case PSR_MSG_FRAME_END: make_end(&m->frame_end); break;
+	case PSR_MSG_FETCH:
+		m->fetch = (struct psr_msg_fetch){ .handle = below(2), .offset = random64() >> 11, .length = random64() >> 11,
+			                               .file_hash = random64() };
+		if (m->fetch.handle == 0) {
+			m->fetch.name[0] = 'x';
+			make_text(m->fetch.name + 1, 254);
+		}
+		break;
+	case PSR_MSG_FETCH_PART: make_part(&m->fetch_part); break;
 	default: fail_msg("no random message of type %u", type);
 	}
 }
@@ -301,14 +320,17 @@ static void make(unsigned type, union proto_any *m)
 static void random_messages_come_back(void **state)
 {
 	static const unsigned types[] = { PSR_MSG_HELLO, PSR_MSG_ERROR, PSR_MSG_OPEN, PSR_MSG_OPENED, PSR_MSG_SCENE,
-		PSR_MSG_FRAME, PSR_MSG_FRAME_BEGIN, PSR_MSG_RECT, PSR_MSG_FRAME_END, PSR_MSG_PRESET };
+		PSR_MSG_FRAME, PSR_MSG_FRAME_BEGIN, PSR_MSG_RECT, PSR_MSG_FRAME_END, PSR_MSG_PRESET, PSR_MSG_FETCH,
+		PSR_MSG_FETCH_PART };
 
 	(void)state;
 	random_state = 11;
 	for (int round = 0; round < 2000; round++) {
-		const struct proto_case *kind = proto_case_of(types[round % 10]);
+		const struct proto_case *kind = proto_case_of(types[(size_t)round % (sizeof types / sizeof types[0])]);
 		struct psr_buf out = { bytes, 0, sizeof bytes };
 		struct psr_error err = { 0, "" };
+		const uint8_t **data;
+		uint32_t n_data;
 		uint8_t *exact;
 
 		make(kind->type, &in);
@@ -320,9 +342,12 @@ static void random_messages_come_back(void **state)
 		memcpy(exact, bytes + 16, out.size - 16);
 		if (kind->decode(&back, exact, out.size - 16, &err) != PSR_OK)
 			fail_msg("%s", err.text);
-		if (kind->type == PSR_MSG_RECT) {
-			assert_memory_equal(back.rect.data, in.rect.data, in.rect.bytes);
-			back.rect.data = in.rect.data;
+		data = proto_data(kind->type, &in, &n_data);
+		if (data != NULL) {
+			const uint8_t **got = proto_data(kind->type, &back, &n_data);
+
+			assert_memory_equal(*got, *data, n_data);
+			*got = *data;
 		}
 		free(exact);
 		assert_memory_equal(&in, &back, sizeof in);

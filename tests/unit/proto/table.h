@@ -28,6 +28,9 @@ union proto_any {
 	struct psr_msg_superseded superseded;
 	struct psr_msg_ack ack;
 	struct psr_msg_stats_reply stats_reply;
+	struct psr_msg_fetch fetch;
+	struct psr_msg_fetch_part fetch_part;
+	struct psr_msg_fetch_end fetch_end;
 };
 
 /* F_KIND and F_EXTENT are of a struct psr_camera: its kind, counted from 1, and the angle or height that goes with it. */
@@ -83,6 +86,7 @@ struct proto_case {
 PLAIN_ENCODE(hello) PLAIN_ENCODE(welcome) PLAIN_ENCODE(goodbye) PLAIN_ENCODE(ping) PLAIN_ENCODE(pong)
 ID_ENCODE(list_entry) ID_ENCODE(list_end) ID_ENCODE(open) ID_ENCODE(progress) ID_ENCODE(opened) ID_ENCODE(close)
 ID_ENCODE(presets) ID_ENCODE(preset) ID_ENCODE(presets_end) ID_ENCODE(scene) ID_ENCODE(stats_reply)
+ID_ENCODE(fetch) ID_ENCODE(fetch_part) ID_ENCODE(fetch_end)
 VIEW_ENCODE(error) VIEW_ENCODE(frame) VIEW_ENCODE(frame_begin) VIEW_ENCODE(rect) VIEW_ENCODE(frame_end)
 VIEW_ENCODE(superseded) VIEW_ENCODE(ack)
 EMPTY(list, id) EMPTY(cancelled, id, view) EMPTY(cancel, id, view) EMPTY(pause, id, view) EMPTY(resume, id, view)
@@ -90,6 +94,7 @@ EMPTY(stats, id)
 DECODE(hello) DECODE(welcome) DECODE(goodbye) DECODE(ping) DECODE(error) DECODE(list_entry) DECODE(list_end)
 DECODE(open) DECODE(progress) DECODE(opened) DECODE(close) DECODE(scene) DECODE(frame) DECODE(frame_begin) DECODE(rect)
 DECODE(presets) DECODE(preset) DECODE(presets_end) DECODE(frame_end) DECODE(superseded) DECODE(ack) DECODE(stats_reply)
+DECODE(fetch) DECODE(fetch_part) DECODE(fetch_end)
 
 #define AT(type, name, kind) { #name, kind, offsetof(struct psr_msg_##type, name), 1, NULL, 0 }
 #define ARRAY(type, name, kind, n) { #name, kind, offsetof(struct psr_msg_##type, name), n, NULL, 0 }
@@ -169,6 +174,12 @@ static const struct proto_field fields_ack[] = { AT(ack, pass, F_U16), END };
 static const struct proto_field fields_stat[] = { AT(stat, id, F_U16), AT(stat, value, F_U64), END };
 static const struct proto_field fields_stats_reply[] = { AT(stats_reply, n_stats, F_U16),
 	LIST(stats_reply, stat, PSR_WIRE_MAX_STATS, fields_stat, stat), END };
+static const struct proto_field fields_fetch[] = { AT(fetch, handle, F_U32), AT(fetch, offset, F_U64),
+	AT(fetch, length, F_U64), AT(fetch, file_hash, F_U64), AT(fetch, name, F_TEXT), END };
+static const struct proto_field fields_fetch_part[] = { AT(fetch_part, offset, F_U64), AT(fetch_part, bytes, F_U32),
+	AT(fetch_part, data, F_DATA), END };
+static const struct proto_field fields_fetch_end[] = { AT(fetch_end, file_bytes, F_U64), AT(fetch_end, file_hash, F_U64),
+	END };
 static const struct proto_field fields_none[] = { END };
 
 #define CASE(TYPE, name) { PSR_MSG_##TYPE, encode_##name, decode_##name, fields_##name }
@@ -181,7 +192,7 @@ static const struct proto_case proto_cases[] = {
 	CASE(PRESETS_END, presets_end), CASE(SCENE, scene), CASE(FRAME, frame), CASE(FRAME_BEGIN, frame_begin),
 	CASE(RECT, rect), CASE(FRAME_END, frame_end), CASE(SUPERSEDED, superseded), BARE(CANCELLED, cancelled),
 	CASE(ACK, ack), BARE(CANCEL, cancel), BARE(PAUSE, pause), BARE(RESUME, resume), BARE(STATS, stats),
-	CASE(STATS_REPLY, stats_reply),
+	CASE(STATS_REPLY, stats_reply), CASE(FETCH, fetch), CASE(FETCH_PART, fetch_part), CASE(FETCH_END, fetch_end),
 };
 #define N_PROTO_CASES (sizeof proto_cases / sizeof proto_cases[0])
 
@@ -191,6 +202,15 @@ static inline const struct proto_case *proto_case_of(unsigned type)
 		if (proto_cases[i].type == type)
 			return &proto_cases[i];
 	return NULL;
+}
+
+/* Returns where a message has the pointer to its data, and how many bytes these are; NULL if it has none. */
+static inline const uint8_t **proto_data(unsigned type, union proto_any *msg, uint32_t *n)
+{
+	if (type != PSR_MSG_RECT && type != PSR_MSG_FETCH_PART)
+		return NULL;
+	*n = type == PSR_MSG_RECT ? msg->rect.bytes : msg->fetch_part.bytes;
+	return type == PSR_MSG_RECT ? &msg->rect.data : &msg->fetch_part.data;
 }
 
 /* Unknown values of these bytes of a payload are decoded as another value. */

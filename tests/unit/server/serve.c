@@ -44,7 +44,8 @@ static void welcome_tells_the_limits(void **state)
 	                                           PSR_CAP_NORMAL | PSR_CAP_ID | PSR_CAP_WEIGHT | PSR_CAP_WORDS |
 	                                           PSR_CAP_BLOCK | PSR_CAP_VIEWS | PSR_CAP_BASE | PSR_CAP_SETTINGS |
 	                                           PSR_CAP_DEPTH_U16 | PSR_CAP_PAUSE | PSR_CAP_SHARP |
-	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND);
+	                                           PSR_CAP_TIME_BUDGET | PSR_CAP_ERROR_BOUND | PSR_CAP_RMSE_BOUND |
+	                                           PSR_CAP_FETCH);
 	assert_int_equal(welcome.max_pixels, 16 << 20);
 	assert_int_equal(welcome.max_open, 64);
 	assert_int_equal(welcome.idle_timeout_ms, 600000);
