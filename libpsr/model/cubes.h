@@ -11,9 +11,9 @@
 #define CUBES_DIAGONAL 1.7320508075688772 /* a leaf's, in edges */
 /* From a cube's middle to its farthest leaf's, that leaf's offset, and half the distance of neighbours; in edges. */
 #define CUBES_RADIUS (CUBES_DIAGONAL * (1.5 + 0.375 + 0.5))
-/* Where a pixel is at least so many edges of leaves wide, each pixel of a surface has the middle of one that the surface
- * meets: at 45 degrees to the picture's rows they need so many, and no other planes and views need more (decision 0106).
- */
+/* Where a pixel is at least so many edges of leaves wide, each pixel of a surface has the middle of one that the
+ * surface meets: a plane's leaves at 45 degrees to the picture's rows need so many, and no plane or view has been found
+ * that needs more (decision 0106). */
 #define CUBES_SPACING 1.4142135623730951
 /* The same for choosing levels, where depth buffers close what stays open between samples: a plane along an axis meets
  * one leaf an edge squared, every other plane more, and so dense is a block's lattice of this spacing. sqrt(2/sqrt(3)).

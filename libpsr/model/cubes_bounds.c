@@ -4,8 +4,8 @@
 
 #define LEAST_COSINE 0.05 /* as of cubes' own cones */
 
-static void bound_sphere(struct psr_cube_bound *bound, const struct psr_cubes *cubes, const struct psr_cube_level *level,
-                         uint32_t first, uint32_t end)
+static void bound_sphere(struct psr_cube_bound *bound, const struct psr_cubes *cubes,
+                         const struct psr_cube_level *level, uint32_t first, uint32_t end)
 {
 	double low[3] = { INFINITY, INFINITY, INFINITY }, high[3] = { -INFINITY, -INFINITY, -INFINITY }, square = 0;
 

@@ -97,7 +97,7 @@ static void choose_of_blocks(struct cull_group *group, const struct plan *plan, 
 		}
 }
 
-/* As of blocks, where each level has a cluster of each group, in their order. Of a group out of view any level will do. */
+/* Each level has a cluster of each group, in the order of groups. Out of view any level will do. */
 static void choose_of_cubes(struct cull_group *group, const struct plan *plan, const struct plan_instance *in)
 {
 	const struct psr_blocks *b = in->cull.blocks;
