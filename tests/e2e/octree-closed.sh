@@ -1,7 +1,7 @@
 #!/bin/bash
 # needs: psr-model
-# Pictures of octrees of meshes have no holes, and show nothing from behind a surface: from twelve sides, where leaves are
-# half a pixel wide to four, compared with rays. Of generated models, and of a scan.
+# Pictures of octrees of meshes have no holes, and show nothing from behind a surface: from fifteen sides, where leaves
+# are half a pixel wide to four, compared with rays. Of generated models, and of a scan.
 . "$(dirname "$0")/lib.sh"
 
 closed() { # name source levels

@@ -1,7 +1,7 @@
-/* octree_closed MODEL.psr SOURCE: whether pictures of an octree have holes, or show what lies behind a surface. Draws the
- * middle of the model from the twelve corners of an icosahedron, so that its leaves are half a pixel to four wide, in
- * turns in perspective and without, and compares with rays through SOURCE. Prints a line for each width; exits with 1
- * if any pixel inside is a hole or a leak. */
+/* octree_closed MODEL.psr SOURCE: whether pictures of an octree have holes, or show what lies behind a surface. Draws
+ * the middle of the model from the twelve corners of an icosahedron, and along its axes, turned by 45 degrees, so that
+ * its leaves are half a pixel to four wide, with perspective and without, and compares with rays through SOURCE. Prints
+ * a line for each width; exits with 1 if any pixel inside is a hole or a leak. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
