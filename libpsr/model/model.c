@@ -186,7 +186,8 @@ static int read_image(const uint8_t **out, int fd, size_t n_bytes, const char *n
 	return PSR_OK;
 }
 
-static int open_model(struct psr_model **out, const char *path, int mapped, struct psr_error *err)
+/* pixels: of a first picture; 0: reads all. */
+static int open_model(struct psr_model **out, const char *path, int mapped, uint32_t pixels, struct psr_error *err)
 {
 	const char *name = short_name(path);
 	const uint8_t *bytes = NULL;
@@ -195,10 +196,15 @@ static int open_model(struct psr_model **out, const char *path, int mapped, stru
 
 	if (code != PSR_OK)
 		return code;
-	if (f.is_packed)
-		code = adopt_packed(out, &(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, err);
-	else
+	if (f.is_packed) {
+		struct pack_source source = { .fd = f.fd, .n_bytes = f.n_bytes, .name = name };
+
+		if (pixels > 0)
+			source.n_bytes = pack_coarse_end(&source, pixels);
+		code = adopt_packed(out, &source, err);
+	} else {
 		code = mapped ? map_image(&bytes, f.fd, f.n_bytes, name, err) : read_image(&bytes, f.fd, f.n_bytes, name, err);
+	}
 	close(f.fd);
 	if (f.is_packed || code != PSR_OK)
 		return code;
@@ -228,12 +234,29 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err)
 {
-	return open_model(out, path, 1, err);
+	return open_model(out, path, 1, 0, err);
 }
 
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err)
 {
-	return open_model(out, path, 0, err);
+	return open_model(out, path, 0, 0, err);
+}
+
+int psr_model_read_coarse(struct psr_model **out, const char *path, uint32_t pixels, struct psr_error *err)
+{
+	return open_model(out, path, 0, pixels, err);
+}
+
+int psr_model_has_coarse(const char *path, uint32_t pixels)
+{
+	struct found f;
+	uint64_t end;
+
+	if (open_file(&f, path, path, NULL) != PSR_OK)
+		return 0;
+	end = pack_coarse_end(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = path }, pixels);
+	close(f.fd);
+	return end < f.n_bytes;
 }
 
 int psr_model_parse(struct psr_model **out, const void *bytes, size_t n_bytes, struct psr_error *err)

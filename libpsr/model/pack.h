@@ -81,6 +81,10 @@ struct pack_facts {
 int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const struct pack_source *source,
               struct psr_error *err);
 
+/* Finds where the first step ends whose leaves are at most 1 / (2 * pixels) of the cube: so much of the file is enough
+ * for a picture of so many pixels. The file's own size if that is no whole packed octree, or is damaged before. */
+uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels);
+
 /* Packs an image: *n_bytes in memory of psr_alloc_huge() of *capacity bytes. */
 int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,
                struct psr_error *err);

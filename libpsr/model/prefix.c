@@ -204,6 +204,34 @@ static int make_image(struct unpacker *u, uint8_t **out, const struct part *part
 	return PSR_OK;
 }
 
+uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels)
+{
+	struct psr_error ignored;
+	struct unpacker u = { .source = source, .err = &ignored };
+	struct pack_source start = *source;
+	struct part part = { .bytes = NULL };
+	uint64_t end = source->n_bytes;
+
+	if (unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES) == PSR_OK
+	    && file_get(u.header + HEADER_PACKING, 4) == PACKING_OCTREE && unpack_read_head(&u) == PSR_OK
+	    && unpack_check_head(&u) == PSR_OK && u.n_file == source->n_bytes && u.n_octree > PACK_PIECE_BYTES) {
+		const uint64_t begin = u.n_file - u.n_octree;
+
+		start.n_bytes = begin + PACK_PIECE_BYTES;
+		u.source = &start;
+		read_part(&u, &part); /* fails where the first step takes more than a piece, and has read the steps */
+		for (int s = part.n_steps - 2; s >= 0; s--) {
+			const uint64_t pieces = pack_pieces(part.step[s].end) * PACK_PIECE_BYTES;
+
+			if ((uint64_t)1 << part.step[s].depth >= 2 * (uint64_t)pixels && pieces < u.n_octree)
+				end = begin + pieces;
+		}
+	}
+	part_fini(&part);
+	psr_free(u.head);
+	return end;
+}
+
 int unpack_prefix(struct unpacker *u, uint8_t **image, struct pack_facts *facts)
 {
 	struct part part = { .bytes = NULL };

@@ -23,6 +23,7 @@
 #include "base/pool.h"
 
 #define CATALOGUE_MAX_FILES 65536
+#define CATALOGUE_FIRST_LOOK 64
 #define CATALOGUE_KEY 33 /* 32 hexadecimal digits and the NUL */
 
 struct catalogue_file {
@@ -31,6 +32,7 @@ struct catalogue_file {
 	int is_source;           /* psrd must build a model of it first */
 	int is_nested;           /* in a subfolder */
 	int is_broken;           /* a .psr with a bad header; opening it says why */
+	int has_coarse;          /* a .psr whose beginning is enough for pictures of CATALOGUE_FIRST_LOOK pixels */
 	char *reason;            /* why psrd cannot serve it, for people; NULL: it can */
 	uint64_t bytes;          /* including the files that a source names */
 	uint64_t device, inode;
@@ -70,7 +72,8 @@ struct catalogue_model {
 	struct catalogue_entry *entry; /* NULL: its file has changed or is gone */
 	struct catalogue_model *of_entry; /* next model of the same entry */
 	char key[CATALOGUE_KEY];       /* of a built model, else "" */
-	uint32_t resolution;           /* of its build; 0: it came from a .psr file */
+	uint32_t resolution;           /* of its build; 0: it came from a .psr file; CATALOGUE_FIRST_LOOK without a key: of the
+	                                * beginning of that */
 	int is_stale;                  /* its source may have changed since it was built */
 	uint64_t bytes;                /* memory that it takes, or took before it left */
 	uint32_t n_users, n_pins;

@@ -161,6 +161,7 @@ static int consider(struct list *list, const char *file_name, char *path, const 
 		free(path);
 		return PSR_ERR_MEMORY;
 	}
+	file.has_coarse = ending == 0 && advice == NULL && psr_model_has_coarse(path, CATALOGUE_FIRST_LOOK);
 	file.is_broken = ending == 0 && advice == NULL && psr_model_need(&need, path, NULL) != PSR_OK;
 	return add(list, &file);
 }

@@ -202,8 +202,12 @@ void opener_open(struct opener *opener, void *client, uint32_t id, const struct 
 		user->on_refused(client, id, PSR_ERR_UNSUPPORTED, entry->file.reason);
 		return;
 	}
-	resolution = entry->file.is_source
-	             ? find_resolution(&opener->parts, msg->resolution, catalogue_is_cloud(entry->file.path)) : 0;
+	resolution = 0;
+	if (entry->file.is_source)
+		resolution = find_resolution(&opener->parts, msg->resolution, catalogue_is_cloud(entry->file.path));
+	else if (entry->file.has_coarse && msg->resolution > 0 && msg->resolution <= CATALOGUE_FIRST_LOOK
+	         && opener->parts.resolution <= CATALOGUE_FIRST_LOOK)
+		resolution = CATALOGUE_FIRST_LOOK;
 	model = catalogue_model(entry, resolution);
 	if (model != NULL && !model->is_stale)
 		user->on_opened(client, id, model);

@@ -27,8 +27,10 @@ void opening_load(void *userdata)
 		cache_trim(o->cache, o->max_cache, (const char(*)[CATALOGUE_KEY])o->in_use, o->n_in_use);
 	else if (o->file.is_source)
 		cache_touch(o->cached);
-	if (o->code == PSR_OK)
-		o->code = psr_model_read(&o->model, o->file.is_source ? o->cached : o->file.path, &o->error);
+	if (o->code == PSR_OK && o->file.is_source)
+		o->code = psr_model_read(&o->model, o->cached, &o->error);
+	else if (o->code == PSR_OK)
+		o->code = psr_model_read_coarse(&o->model, o->file.path, o->resolution, &o->error);
 	post(o);
 }
 

@@ -28,7 +28,7 @@ struct opening {
 	const char *cache;          /* folder */
 	uint64_t max_cache;
 	struct catalogue_file file; /* its path is a copy */
-	uint32_t resolution;        /* at which a source is built; else 0 */
+	uint32_t resolution;        /* at which a source is built; of a .psr file 0, or CATALOGUE_FIRST_LOOK: its beginning */
 	struct waiter *waiters;
 	struct psr_msg_progress progress;
 	struct loop_note note;

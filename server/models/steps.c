@@ -57,6 +57,17 @@ static int is_lost(int code)
 	return code == PSR_ERR_FORMAT || code == PSR_ERR_VERSION || code == PSR_ERR_NOT_FOUND;
 }
 
+static void log_loaded(const struct opening *o, const struct catalogue_model *model)
+{
+	struct psr_model_prefix prefix;
+
+	if (psr_model_is_prefix(model->model, &prefix))
+		log_info("model %s: loaded, %u of the %u levels of its octree, %.1f MB", o->file.name, prefix.levels,
+		         prefix.of_levels, (double)model->bytes * 1e-6);
+	else
+		log_info("model %s: loaded, %.1f MB", o->file.name, (double)model->bytes * 1e-6);
+}
+
 static void on_loaded(void *userdata)
 {
 	struct opening *o = userdata;
@@ -84,7 +95,7 @@ static void on_loaded(void *userdata)
 		fail(o, PSR_ERR_MEMORY, "no memory to open a model");
 		return;
 	}
-	log_info("model %s: loaded, %.1f MB", o->file.name, (double)added->bytes * 1e-6);
+	log_loaded(o, added);
 	opener_end(o, added, NULL);
 	catalogue_unref(catalogue, added);
 }

@@ -45,6 +45,12 @@ struct psr_model;
 int psr_model_map(struct psr_model **out, const char *path, struct psr_error *err);
 int psr_model_read(struct psr_model **out, const char *path, struct psr_error *err);
 
+/* psr_model_read() for a first picture of so many pixels: of a packed octree it reads the first levels, as many as that
+ * picture needs, and makes the model that these are, as of a file that ends there (psr_model_is_prefix()). */
+int psr_model_read_coarse(struct psr_model **out, const char *path, uint32_t pixels, struct psr_error *err);
+/* Returns whether it would read less than all. */
+int psr_model_has_coarse(const char *path, uint32_t pixels);
+
 /* Reads from the header how much memory psr_model_read() takes for this file; a packed file takes more than its size. An
  * octree takes a part more in memory, for its coarser levels, and so do differential points, for their bounds
  * (psr_model_bytes()).
