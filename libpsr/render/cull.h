@@ -54,8 +54,8 @@ struct cull_sphere {
 struct cull_sphere cull_view_sphere(const struct plan_instance *in, const float center[3], float radius);
 struct cull_sphere cull_view_cluster(const struct plan_instance *in, const struct psr_cluster *k);
 
-/* Returns 0 if nothing within the sphere can draw: it is outside of the picture, grown by the guard band of the coarsest
- * depth buffer. */
+/* Returns 0 if nothing within the sphere can draw: it is outside of the picture, grown by the guard band of the
+ * coarsest depth buffer. */
 int cull_sees_sphere(const struct plan *plan, const struct cull_sphere *sphere);
 /* Returns 0 if nothing of the run that holds this cube can draw: it is outside of the picture, or faces away. */
 int cull_sees_run(const struct plan *plan, const struct plan_instance *in, uint32_t cube);

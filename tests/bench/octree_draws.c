@@ -1,8 +1,8 @@
 /* What drawing an octree costs: octree_draws [-l LEVELS] [-s SIDE] [-n ROUNDS] [-t THREADS] MESH|CLOUD.las [BLOCKS.psr]
  *
- * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. With blocks of the same object,
- * frames of both take turns, and their times are medians; then those of stages. Points a second are those of cull and warp
- * together. */
+ * Draws frames of two threads, or as many as -t says, from four directions: as they fit the picture, and nearer. With
+ * blocks of the same object, frames of both take turns, and their times are medians; then those of stages. Points a
+ * second are those of cull and warp together. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -208,7 +208,7 @@ static int run(const char *path, const char *blocks, const struct wish *wish, st
 	int rc = blocks != NULL ? psr_model_read(&subject[1].model, blocks, err) : PSR_OK;
 
 	if (rc == PSR_OK)
-		rc = strstr(path, ".las") != NULL ? read_cloud(&tree, path, &wish->options, err) : read_mesh(&tree, path, &wish->options, err);
+		rc = (strstr(path, ".las") != NULL ? read_cloud : read_mesh)(&tree, path, &wish->options, err);
 	if (rc == PSR_OK)
 		rc = make_model(&subject[0].model, tree, subject[1].model, err);
 	if (rc != PSR_OK)

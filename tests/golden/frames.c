@@ -1,5 +1,5 @@
-/* Draws the shots of tests/golden/frames.suite and octrees.suite with every instruction set that the machine has, by one
- * thread and by two: each frame has the hashes that the suite names, whatever the machine. */
+/* Draws the shots of tests/golden/frames.suite and octrees.suite with every instruction set that the machine has, by
+ * one thread and by two: each frame has the hashes that the suite names, whatever the machine. */
 #define _GNU_SOURCE
 #include <inttypes.h>
 #include <stdio.h>
