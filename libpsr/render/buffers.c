@@ -4,6 +4,17 @@
 #include "base/mem.h"
 #include "zbuffer.h"
 
+static uint32_t bricks_x(const struct plan *plan)
+{
+	return (plan->width + BRICK - 1) / BRICK;
+}
+
+/* Bytes of a row of offcuts. */
+static uint32_t offcut_stride(const struct plan *plan)
+{
+	return plan->with_splats ? (plan->width + 7) / 8 : 0;
+}
+
 /* Points the arrays into their two pieces of memory. */
 static void place(struct buffers *b, const struct plan *plan, size_t n_words)
 {
@@ -19,12 +30,14 @@ static void place(struct buffers *b, const struct plan *plan, size_t n_words)
 	for (int k = 0; k < 3; k++)
 		b->rgb[k] = b->weight + (size_t)(k + 1) * area;
 	b->bricks = (uint8_t *)(b->rgb[2] + area);
+	b->offcuts.bits = b->bricks + rows * bricks_x(plan);
+	b->offcuts.stride = offcut_stride(plan);
 }
 
 int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 {
 	const uint32_t w = plan->width, h = plan->height;
-	const size_t area = (size_t)w * h, rows = n_brick_rows(plan), n_bricks = rows * ((w + BRICK - 1) / BRICK);
+	const size_t area = (size_t)w * h, rows = n_brick_rows(plan), n_bricks = rows * bricks_x(plan);
 	const size_t n_tiles = (size_t)plan->tiles_x * plan->tiles_y, n_parts = (size_t)plan->parts_x * plan->parts_y;
 	struct psr_zstack *stack = &b->stack;
 	const size_t n_cells = zbuffer_measure(stack, w, h, levels & ~1u);
@@ -34,7 +47,7 @@ int buffers_prepare(struct buffers *b, const struct plan *plan, uint32_t levels)
 	const size_t n_words = (size_t)(w + stack->gap) * h;
 	b->pixels = psr_grow_huge(b->pixels, &b->pixels_size,
 	                          n_words * sizeof *stack->word + area * 4 * sizeof *b->weight + n_cells * sizeof(float)
-	                              + n_bricks);
+	                              + n_bricks + (size_t)offcut_stride(plan) * h);
 	b->counters = psr_grow_huge(b->counters, &b->counters_size,
 	                            n_tiles * sizeof *b->tile + n_parts + rows * (sizeof *b->gaps + sizeof *b->shade));
 	if (b->pixels == NULL || b->counters == NULL)

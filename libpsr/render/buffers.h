@@ -5,12 +5,14 @@
 #include "gaps.h"
 #include "plan.h"
 #include "shade.h"
+#include "splat.h"
 #include "warp.h"
 
 struct buffers {
 	struct psr_zstack stack;
 	uint16_t *rgb[3], *weight; /* linear colours by channel, and weights, of each pixel */
 	uint8_t *bricks;           /* 1: gaps marked the brick */
+	struct splat_offcuts offcuts; /* of plans with splats */
 	struct warp_counts *tile;
 	struct gaps_counts *gaps;   /* by row of bricks, */
 	struct shade_counts *shade; /* like this */
@@ -20,7 +22,7 @@ struct buffers {
 	/* The layout that is_clean belongs to. */
 	const void *clean_pixels;
 	uint32_t clean_width, clean_height, clean_levels;
-	void *pixels; /* words, levels, colours, weights and bricks */
+	void *pixels; /* words, levels, colours, weights, bricks and offcuts */
 	size_t pixels_size;
 	void *counters; /* the others */
 	size_t counters_size;

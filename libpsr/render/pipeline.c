@@ -13,11 +13,15 @@ static void warp_one(int i, void *userdata)
 	const int is_empty = r->bins.tile_begin[tile + 1] == r->bins.tile_begin[tile];
 	const uint32_t clean = warp_parts(&r->plan, b->is_clean, tile);
 	const struct warp_into into = { &b->stack, clean, NULL };
+	/* Where two samples are not in a pixel of the plain frame, cuts would show as corners. */
+	const unsigned cut_below = r->inside != NULL ? r->inside->pass : 0;
+	const struct splat_into discs = { &b->stack, clean, b->offcuts, cut_below };
 
 	b->tile[tile] = (struct warp_counts){ 0, 0, 0 };
-	if (!is_empty || clean != ALL_PARTS)
-		b->tile[tile] = r->plan.with_splats ? splat_tile(r->simd, &r->plan, &r->bins, &b->stack, tile, clean)
-		                                    : warp_tile(r->simd, &r->plan, &r->bins, &into, tile);
+	if (r->plan.with_splats)
+		b->tile[tile] = splat_tile(r->simd, &r->plan, &r->bins, &discs, tile);
+	else if (!is_empty || clean != ALL_PARTS)
+		b->tile[tile] = warp_tile(r->simd, &r->plan, &r->bins, &into, tile);
 }
 
 /* Draws the words and cells of all tiles. */
@@ -144,13 +148,14 @@ static void gaps_one(int row, void *userdata)
 	struct buffers *b = &r->buffers;
 	const struct gaps_map map = map_of(r);
 	const uint32_t y0 = (uint32_t)row * BRICK, y1 = brick_row_end(&r->plan, (uint32_t)row);
+	const struct splat_picture splats = { &r->plan, &b->stack, r->inside, b->offcuts };
 	struct psr_zstack stack = b->stack;
 
 	if (r->plan.with_splats)
 		stack.levels = 0; /* discs, not cells, cover what is behind them */
 	b->gaps[row] = find_row_gaps(r, &stack, row);
 	if (r->plan.with_splats)
-		b->gaps[row].n_marked += splat_close(&r->plan, &b->stack, r->inside, y0, y1, &map);
+		b->gaps[row].n_marked += splat_close(&splats, y0, y1, &map);
 	fill_look(&r->fill, (uint32_t)row);
 }
 

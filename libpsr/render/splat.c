@@ -18,6 +18,8 @@
 #define NARROW 0.5f
 /* Levels from which a block's discs cover so many pixels that each disc asks whether the frame is to end. */
 #define LONG_LISTED 2
+/* The finest level whose discs are cut: of finer ones, what is cut off is a pixel, and so are the seams. Measured. */
+#define LEAST_CUT 2
 
 /* Depths of a block's samples by place in the lattice. */
 struct lattice_depths {
@@ -117,10 +119,12 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 	const float (*normals)[3] = psr_direction_table();
 	const int perspective = t->plan->perspective;
 	struct lattice_depths at;
+	struct splat_ends ends;
 	struct warp_block b;
 	struct splat s;
 
 	warp_block_make(&b, in, entry->slot);
+	splat_find_ends(&ends, way == WORDS && entry->level >= LEAST_CUT && entry->level < t->cut_below ? b.mask : 0);
 	const float scale = (float)b.scale, step = projection->spacing * scale;
 	/* Radii in the projection's plane, along x and y, and along z for a slope of 1. */
 	float radius[2][3], along[3];
@@ -137,6 +141,7 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 		const float *n = normals[PSR_ATTR_NORMAL(*b.attr)], depth = (float)*b.depth;
 		float p[3], d[3], slope[2], share[2];
 
+		s.is_cut = way == WORDS && (ends.any >> sample & 1);
 		for (int a = 0; a < 3; a++)
 			p[a] = ((float)(b.origin[a] + b.scale * b.lattice->row[a][r]) + scale * b.lattice->col[a][c])
 			       + depth * b.unit[a];
@@ -160,6 +165,9 @@ static inline __attribute__((always_inline)) void draw_block(const struct splat_
 			s.radius[i][1] = perspective ? (h[1] - s.at[1] * h[2]) * inverse : h[1];
 			s.radius[i][2] = h[2];
 		}
+		if (s.is_cut)
+			splat_cut_make(&s.cut, &ends, sample,
+			               (const float[2]){ share[0] * SPLAT_RADIUS, share[1] * SPLAT_RADIUS });
 		s.id = b.id + sample;
 		if (way == VEILS)
 			s.veil = (uint32_t)(t->veils->bits[in->blocks->opacity[b.attr - in->blocks->attr]] * t->area);
@@ -188,20 +196,32 @@ static uint64_t draw_cells(const struct simd *simd, const struct plan *plan, con
 	return n_inside;
 }
 
+static void clear_offcuts(const struct splat_target *t)
+{
+	const size_t n_bytes = ((size_t)(t->x1 - t->x0) + 7) / 8;
+
+	for (int32_t y = t->y0; y < t->y1; y++)
+		memset(t->offcuts->bits + (size_t)y * t->offcuts->stride + t->x0 / 8, 0, n_bytes);
+}
+
+_Static_assert(TILE_WIDTH % 8 == 0, "a byte of offcuts is in one tile");
+
 struct warp_counts splat_tile(const struct simd *simd, const struct plan *plan, const struct bins *bins,
-                              struct psr_zstack *stack, uint32_t tile, uint32_t clean)
+                              const struct splat_into *into, uint32_t tile)
 {
 	const uint32_t begin = bins->tile_begin[tile], end = sheer_begin(plan, bins, tile);
 	struct warp_counts counts = { 0, 0, 0 };
 	struct warp_target target;
 
-	warp_target_make(&target, plan, stack, tile, NULL);
-	target.clean = clean;
-	counts.n_inside = draw_cells(simd, plan, &target, stack->levels, bins->entry + begin, end - begin);
+	warp_target_make(&target, plan, into->stack, tile, NULL);
+	target.clean = into->clean;
+	counts.n_inside = draw_cells(simd, plan, &target, into->stack->levels, bins->entry + begin, end - begin);
 	target.clean = warp_parts(plan, bins->is_quiet, tile);
 	simd->warp_clear(&target, 0);
 	const struct splat_target t = { plan,      target.word, target.stride, target.x0, target.y0,
-		                            target.x1, target.y1,   NULL,         NULL,          0 };
+		                            target.x1, target.y1,   NULL,          NULL,      0,
+		                            &into->offcuts, into->cut_below };
+	clear_offcuts(&t);
 	for (uint32_t e = begin; e < end && !(e % 8 == 0 && plan_is_cancelled(plan)); e++) {
 		if (plan->warp[bins->entry[e].instance].cubes != NULL)
 			splat_cube(&t, &bins->entry[e]);
@@ -215,7 +235,7 @@ void splat_list(const struct plan *plan, const struct bin_entry *entry, const st
                 struct sheer_list *list)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, list,       NULL,           0 };
+		                            target->x1, target->y1, list,       NULL,           0, NULL, 0 };
 
 	draw_block(&t, entry, LIST);
 }
@@ -224,7 +244,7 @@ void splat_veil(const struct plan *plan, const struct bin_entry *entry, const st
                 const struct veil_layer *layer, float area)
 {
 	const struct splat_target t = { plan,       NULL,       target->stride, target->x0, target->y0,
-		                            target->x1, target->y1, NULL,           layer, area };
+		                            target->x1, target->y1, NULL,           layer, area, NULL, 0 };
 
 	draw_block(&t, entry, VEILS);
 }

@@ -12,19 +12,14 @@
 #define GAP 1
 /* Pixels to look at on each side of an empty one between magnified samples: a window's margin has as many. */
 #define MOST_ACROSS 64
+/* Sine of the angle below which a surface is seen steeply from the side. Measured. */
+#define STEEP 0.2f
 #define CELLS (TILE_WIDTH / 2)
 #define CELLS_AROUND (CELLS + 2 * GAP)
 
 /* Eight directions: each, then its opposite. */
 static const int8_t way[8][2] = {
 	{ -1, 0 }, { 1, 0 }, { 0, -1 }, { 0, 1 }, { -1, -1 }, { 1, 1 }, { 1, -1 }, { -1, 1 },
-};
-
-/* A picture of splats. */
-struct splats {
-	const struct plan *plan;
-	const struct psr_zstack *stack;
-	const struct inside *inside; /* NULL: unknown */
 };
 
 static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
@@ -35,7 +30,8 @@ static float depth_at(const struct psr_zstack *stack, int64_t x, int64_t y)
 }
 
 /* Returns how many pixels away, at most `reach`, something is nearer than z by more than level 1's threshold, or 0. */
-static inline int steps_to(const struct splats *s, uint32_t x, uint32_t y, float z, const int8_t *step, int reach)
+static inline int steps_to(const struct splat_picture *s, uint32_t x, uint32_t y, float z, const int8_t *step,
+                           int reach)
 {
 	const float scale = s->plan->gap_scale[1], offset = s->plan->gap_offset[1];
 	int64_t u = x, v = y;
@@ -55,7 +51,7 @@ struct shown {
 	uint32_t block, sample;
 };
 
-static struct shown find_shown(const struct splats *s, int64_t x, int64_t y)
+static struct shown find_shown(const struct splat_picture *s, int64_t x, int64_t y)
 {
 	const uint32_t id = (uint32_t)psr_zstack_row(s->stack, (uint32_t)y)[x], slot = id / PSR_BLOCK_SAMPLES;
 	const struct plan_instance *in = &s->plan->instance[plan_find_instance(s->plan, slot)];
@@ -64,7 +60,7 @@ static struct shown find_shown(const struct splats *s, int64_t x, int64_t y)
 }
 
 /* Finds the normal of the sample that a pixel shows, in camera space. */
-static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y)
+static void find_normal(float n[3], const struct splat_picture *s, int64_t x, int64_t y)
 {
 	const struct shown shown = find_shown(s, x, y);
 	const struct psr_blocks *b = shown.in->cull.blocks;
@@ -79,7 +75,7 @@ static void find_normal(float n[3], const struct splats *s, int64_t x, int64_t y
 }
 
 /* Whether one surface, nearer than the pixel, is within `reach` pixels of it in all eight directions. */
-static int is_enclosed(const struct splats *s, uint32_t x, uint32_t y, int reach)
+static int is_enclosed(const struct splat_picture *s, uint32_t x, uint32_t y, int reach)
 {
 	const float z = depth_at(s->stack, x, y);
 	float nearest = INFINITY, farthest = 0;
@@ -98,7 +94,7 @@ static int is_enclosed(const struct splats *s, uint32_t x, uint32_t y, int reach
 }
 
 /* Whether the pixel is empty and between samples in two opposite directions, at most `reach` pixels away. */
-static int is_crossed(const struct splats *s, uint32_t x, uint32_t y, int reach)
+static int is_crossed(const struct splat_picture *s, uint32_t x, uint32_t y, int reach)
 {
 	if (depth_at(s->stack, x, y) < INFINITY)
 		return 0;
@@ -110,7 +106,7 @@ static int is_crossed(const struct splats *s, uint32_t x, uint32_t y, int reach)
 
 /* Whether one surface may continue from pixel a to pixel b: their depths differ by at most the level's threshold, and
  * the angle between their normals is less than 90 degrees. Two surfaces that end at a gap turn away from each other. */
-static int is_continued(const struct splats *s, int level, const int64_t a[2], const int64_t b[2])
+static int is_continued(const struct splat_picture *s, int level, const int64_t a[2], const int64_t b[2])
 {
 	const float z[2] = { depth_at(s->stack, a[0], a[1]), depth_at(s->stack, b[0], b[1]) };
 	const float nearer = z[0] < z[1] ? z[0] : z[1], farther = z[0] < z[1] ? z[1] : z[0];
@@ -127,7 +123,7 @@ static int is_continued(const struct splats *s, int level, const int64_t a[2], c
  * crack is at most half a cell wide where one surface continues across it, five eighths if it is so narrow in every
  * direction, and three sixteenths, or a pixel, anywhere. Measured: with three cells in any case, a chair whose samples
  * are half a pixel apart loses 6 dB, since the gaps between its spindles close. */
-static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
+static int is_narrow(const struct splat_picture *s, uint32_t x, uint32_t y, int level)
 {
 	const float z = depth_at(s->stack, x, y);
 	const int cell = 1 << level, least = cell < 16 ? 1 : cell * 3 / 16;
@@ -148,8 +144,55 @@ static int is_narrow(const struct splats *s, uint32_t x, uint32_t y, int level)
 	return 0;
 }
 
+static int is_inside(const struct splat_picture *s, uint32_t x, uint32_t y)
+{
+	const struct inside *inside = s->inside;
+
+	if (inside == NULL)
+		return 0;
+	const uint32_t u = (inside->left + x) >> inside->pass, v = (inside->top + y) >> inside->pass;
+	return inside->is_inside[(size_t)v * inside->width + u];
+}
+
+static int is_offcut(const struct splat_picture *s, uint32_t x, uint32_t y)
+{
+	return s->offcuts.bits != NULL && s->offcuts.bits[(size_t)y * s->offcuts.stride + x / 8] >> x % 8 & 1;
+}
+
+/* Whether a pixel's surface is seen so much from the side that the object's outline is near. */
+static int is_steep(const struct splat_picture *s, const int64_t at[2])
+{
+	float n[3];
+
+	find_normal(n, s, at[0], at[1]);
+	return __builtin_fabsf(n[2]) < STEEP;
+}
+
+/* Whether an offcut's pixel lies in a seam, where another block continues the surface: it is between two places of the
+ * surface, at most a cell apart, along two lines. Along one line so is a notch of an edge that samples draw as zigzag.
+ * One line is enough at a steep place, where the surface goes on out of sight, and of an empty pixel well inside of the
+ * object. */
+static int is_seam(const struct splat_picture *s, uint32_t x, uint32_t y, int level)
+{
+	const float z = depth_at(s->stack, x, y);
+	const int cell = 1 << level, is_solid = !(z < INFINITY) && is_inside(s, x, y);
+	int n_left = is_solid ? 1 : 2; /* lines to find */
+
+	for (int w = 0; w < 8 && n_left > 0; w += 2) {
+		const int before = steps_to(s, x, y, z, way[w], cell);
+		const int after = before ? steps_to(s, x, y, z, way[w + 1], cell) : 0;
+		const int halves = (before + after - 1) * (w < 4 ? 2 : 3);
+		const int64_t a[2] = { (int64_t)x + before * way[w][0], (int64_t)y + before * way[w][1] };
+		const int64_t b[2] = { (int64_t)x + after * way[w + 1][0], (int64_t)y + after * way[w + 1][1] };
+
+		if (after && halves <= 2 * cell && (is_solid || is_continued(s, level, a, b)))
+			n_left -= 1 + (is_steep(s, a) || is_steep(s, b));
+	}
+	return n_left <= 0;
+}
+
 /* Finds for n pixels from x on whether something nearer is within REACH on the left and on the right. */
-static void find_between(uint8_t *is_between, const struct splats *s, uint32_t x, uint32_t y, uint32_t n)
+static void find_between(uint8_t *is_between, const struct splat_picture *s, uint32_t x, uint32_t y, uint32_t n)
 {
 	float z[TILE_WIDTH + 2 * REACH], nearest[TILE_WIDTH + 2 * REACH]; /* of REACH pixels from this one on */
 	const uint32_t first = x ? 0 : REACH, beyond = s->stack->width - x;
@@ -233,7 +276,7 @@ static void find_own(uint8_t *is_near, const struct psr_zstack *stack, int k, ui
 }
 
 /* Fills in n cells from (i, j) on, which lie inside the guard band. */
-static void find_cells(struct cell_row *to, const struct splats *s, int k, uint32_t i, uint32_t j, uint32_t n)
+static void find_cells(struct cell_row *to, const struct splat_picture *s, int k, uint32_t i, uint32_t j, uint32_t n)
 {
 	float nearest[CELLS_AROUND], farthest[CELLS_AROUND];
 	const uint32_t n_around = n + 2 * GAP;
@@ -284,15 +327,8 @@ static void find_holes(struct row_holes *to, const struct cell_row *cells, const
 	}
 }
 
-static int is_inside(const struct inside *inside, uint32_t x, uint32_t y)
-{
-	const uint32_t u = (inside->left + x) >> inside->pass, v = (inside->top + y) >> inside->pass;
-
-	return inside->is_inside[(size_t)v * inside->width + u];
-}
-
 /* Whether a pixel well inside the plain frame's object lies in a crack. */
-static int is_crack(const struct splats *s, int is_covered, int level, uint32_t x, uint32_t y)
+static int is_crack(const struct splat_picture *s, int is_covered, int level, uint32_t x, uint32_t y)
 {
 	const int is_magnified = level > (int)s->inside->pass + 1; /* cells are wider than two plain pixels */
 
@@ -301,11 +337,10 @@ static int is_crack(const struct splats *s, int is_covered, int level, uint32_t 
 	return is_covered && is_narrow(s, x, y, level);
 }
 
-static uint32_t close_row(const struct splats *s, const struct cell_row *cells, uint32_t x0, uint32_t y, uint32_t n,
-                          const struct gaps_map *map)
+static uint32_t close_row(const struct splat_picture *s, const struct cell_row *cells, uint32_t x0, uint32_t y,
+                          uint32_t n, const struct gaps_map *map)
 {
 	const uint32_t width = s->stack->width, bricks_x = (width + BRICK - 1) / BRICK;
-	const struct inside *inside = s->inside;
 	uint16_t *weight = map->weight + (size_t)y * width + x0;
 	uint8_t *bricks = map->bricks + (size_t)(y / BRICK) * bricks_x;
 	struct row_holes holes;
@@ -318,8 +353,9 @@ static uint32_t close_row(const struct splats *s, const struct cell_row *cells, 
 		const int level = holes.level[c], reach = 1 << level < REACH ? 1 << level : REACH;
 
 		if (weight[c] && level
-		    && ((inside != NULL && is_inside(inside, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
-		        || (holes.is_between[c] && is_enclosed(s, x, y, reach)))) {
+		    && ((is_inside(s, x, y) && is_crack(s, holes.is_covered[c], level, x, y))
+		        || (holes.is_between[c] && is_enclosed(s, x, y, reach))
+		        || (is_offcut(s, x, y) && is_seam(s, x, y, level)))) {
 			weight[c] = 0;
 			bricks[x / BRICK] = 1;
 			n_closed++;
@@ -330,21 +366,20 @@ static uint32_t close_row(const struct splats *s, const struct cell_row *cells, 
 
 _Static_assert(TILE_WIDTH % (1 << PSR_MAX_DEPTH_LEVEL) == 0, "a tile's row has whole cells");
 
-uint32_t splat_close(const struct plan *plan, const struct psr_zstack *stack, const struct inside *inside, uint32_t y0,
-                     uint32_t y1, const struct gaps_map *map)
+uint32_t splat_close(const struct splat_picture *s, uint32_t y0, uint32_t y1, const struct gaps_map *map)
 {
-	const struct splats s = { plan, stack, inside };
+	const struct psr_zstack *stack = s->stack;
 	struct cell_row cells[PSR_MAX_DEPTH_LEVEL + 1];
 	uint32_t n_closed = 0;
 
 	for (uint32_t x = 0; x < stack->width; x += TILE_WIDTH) {
 		const uint32_t n = stack->width - x < TILE_WIDTH ? stack->width - x : TILE_WIDTH;
 
-		for (uint32_t y = y0; y < y1 && !plan_is_cancelled(plan); y++) {
+		for (uint32_t y = y0; y < y1 && !plan_is_cancelled(s->plan); y++) {
 			for (int k = 1; k <= PSR_MAX_DEPTH_LEVEL; k++)
 				if (stack->levels >> k & 1 && (y == y0 || y % (1u << k) == 0))
-					find_cells(&cells[k], &s, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);
-			n_closed += close_row(&s, cells, x, y, n, map);
+					find_cells(&cells[k], s, k, (x >> k) + 1, (y >> k) + 1, ((n - 1) >> k) + 1);
+			n_closed += close_row(s, cells, x, y, n, map);
 		}
 	}
 	return n_closed;

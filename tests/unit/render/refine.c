@@ -431,6 +431,7 @@ static void holes_between_discs_are_closed_and_slots_and_notches_are_not(void **
 	uint8_t bricks[WIDTH / BRICK * HEIGHT / BRICK] = { 0 };
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << LEVEL };
+	const struct splat_picture picture = { .plan = &plan, .stack = &stack };
 
 	(void)state;
 	assert_true(word && weight && cell);
@@ -452,7 +453,7 @@ static void holes_between_discs_are_closed_and_slots_and_notches_are_not(void **
 	}
 	uint32_t n_closed = 0;
 	for (uint32_t y = 0; y < HEIGHT; y += BRICK)
-		n_closed += splat_close(&plan, &stack, NULL, y, y + BRICK, &map);
+		n_closed += splat_close(&picture, y, y + BRICK, &map);
 	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++) {
 		const uint32_t x = i % WIDTH, y = i / WIDTH;
 		int is_closed = 0;
@@ -521,6 +522,7 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
 	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
+	const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
 
 	(void)state;
 	stack.level[3].z = cell;
@@ -537,7 +539,7 @@ static void cracks_are_closed_inside_of_the_plain_frame(void **state)
 	}
 	for (uint32_t i = 0; i < sizeof is_inside; i++)
 		is_inside[i] = i % (WIDTH / 8) < 4;
-	assert_int_equal(splat_close(&plan, &stack, &inside, 0, HEIGHT, &map), WIDTH / 2);
+	assert_int_equal(splat_close(&picture, 0, HEIGHT, &map), WIDTH / 2);
 	for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
 		assert_int_equal(weight[i], i / WIDTH == 12 && i % WIDTH < WIDTH / 2 ? 0 : WEIGHT_ONE);
 }
@@ -563,6 +565,7 @@ static uint32_t n_rows_closed(uint32_t n_rows, float beyond, const float normal[
 	const struct gaps_map map = { weight, bricks };
 	struct psr_zstack stack = { .width = WIDTH, .height = HEIGHT, .word = word, .levels = 1 << 3 };
 	const struct inside inside = { is_inside, WIDTH / 8, 0, 0, 3 };
+	const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
 
 	stack.level[3].z = cell;
 	stack.level[3].width = CELLS_X;
@@ -578,7 +581,7 @@ static uint32_t n_rows_closed(uint32_t n_rows, float beyond, const float normal[
 		word[i] = y - FIRST < n_rows ? PSR_WORD_EMPTY : (uint64_t)bits << 32 | (y >= FIRST);
 		weight[i] = WEIGHT_ONE;
 	}
-	const uint32_t n_closed = splat_close(&plan, &stack, &inside, 0, HEIGHT, &map);
+	const uint32_t n_closed = splat_close(&picture, 0, HEIGHT, &map);
 	assert_int_equal(n_closed % WIDTH, 0);
 	return n_closed / WIDTH;
 }
@@ -634,10 +637,11 @@ static void cracks_of_magnified_samples_are_closed_beside_empty_cells(void **sta
 		uint8_t bricks[2], is_inside[WIDTH / 2 * HEIGHT / 2];
 		const struct gaps_map map = { weight, bricks };
 		const struct inside inside = { is_inside, WIDTH >> pass, 0, 0, pass };
+		const struct splat_picture picture = { .plan = &plan, .stack = &stack, .inside = &inside };
 		memset(is_inside, 1, sizeof is_inside);
 		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
 			weight[i] = WEIGHT_ONE;
-		splat_close(&plan, &stack, &inside, 0, HEIGHT, &map);
+		splat_close(&picture, 0, HEIGHT, &map);
 		for (uint32_t i = 0; i < WIDTH * HEIGHT; i++)
 			assert_int_equal(weight[i], pass == 1 && i / WIDTH == 12 && i % WIDTH < END ? 0 : WEIGHT_ONE);
 	}
