@@ -1,6 +1,7 @@
 #include "base/stats.h"
 #include "model/calibration.h"
 #include "commands.h"
+#include "info_octree.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -23,7 +24,7 @@ struct summary {
 	const struct psr_blocks *blocks; /* NULL if there are none */
 	const struct octree *tree;       /* likewise */
 	struct octree_shares shares;     /* zeros where the file has no packed octree */
-	uint64_t bytes, file_bytes;
+	uint64_t bytes, file_bytes, drawn_bytes; /* drawn_bytes: with what is made of an octree to draw it */
 	int is_packed, is_prefix;
 	struct psr_model_prefix prefix;
 	const struct psr_presets *presets;
@@ -56,6 +57,7 @@ static void summarize(struct summary *summary, const struct psr_model *model, co
 	summary->tree = psr_model_octree(model);
 	psr_model_octree_shares(model, &summary->shares);
 	summary->bytes = psr_model_bytes(model);
+	summary->drawn_bytes = summary->bytes + (summary->tree != NULL ? info_octree_drawn(summary->tree) : 0);
 	summary->file_bytes = psr_model_file_bytes(model, &summary->is_packed);
 	summary->is_prefix = psr_model_is_prefix(model, &summary->prefix);
 	summary->presets = psr_model_presets(model);
@@ -171,68 +173,6 @@ static void add_calibration(cJSON *root, const struct psr_calibration *c)
 	}
 }
 
-/* Bits a leaf of the arrays of a tree. */
-struct stream {
-	const char *name, *key;
-	double bits, packed; /* packed: in the file, 0 where that is not packed as an octree */
-};
-#define N_STREAMS 6
-
-static void take_streams(struct stream streams[N_STREAMS], const struct summary *s)
-{
-	const struct octree *tree = s->tree;
-	const double n = (double)tree->n_leaves;
-
-	streams[0] = (struct stream){ "codes", "codes", 8.0 * (double)tree->n_codes / n, 0 };
-	streams[1] = (struct stream){ "skip index", "skip", 8.0 * (double)tree->n_skips * sizeof *tree->skip / n, 0 };
-	streams[2] = (struct stream){ "normals", "normals", tree->normal != NULL ? 16.0 : 0.0, 0 };
-	streams[3] = (struct stream){ "offsets", "offsets", tree->offset != NULL ? 8.0 : 0.0, 0 };
-	streams[4] = (struct stream){ "colours", "colors", tree->color != NULL ? 24.0 : 0.0, 0 };
-	streams[5] = (struct stream){ "coarser levels", "coarser", 0.0, 8.0 * (double)s->shares.coarser / n };
-	streams[0].packed = 8.0 * (double)s->shares.codes / n;
-	for (int i = 0; i < OCTREE_STREAMS; i++)
-		streams[2 + i].packed = 8.0 * (double)s->shares.stream[i] / n;
-}
-
-static void print_octree(const struct summary *s)
-{
-	struct stream streams[N_STREAMS];
-	double bits = 0, packed = 0;
-
-	take_streams(streams, s);
-	printf("octree            %d levels, %" PRIu64 " leaves of %.4g, %" PRIu64 " byte codes\n", s->tree->levels,
-	       s->tree->n_leaves, ldexp(s->tree->edge * s->info->scale, -s->tree->levels), s->tree->n_codes);
-	for (int i = 0; i < (s->shares.codes > 0 ? N_STREAMS : N_STREAMS - 1); i++) {
-		printf("  %-14s  %.2f bits a leaf", streams[i].name, streams[i].bits);
-		printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", streams[i].packed);
-		bits += streams[i].bits;
-		packed += streams[i].packed;
-	}
-	printf("  %-14s  %.2f bits a leaf", "all", bits);
-	printf(s->shares.codes > 0 ? ", %.2f packed\n" : "\n", packed);
-}
-
-static cJSON *octree_json(const struct summary *s)
-{
-	struct stream streams[N_STREAMS];
-	cJSON *root = cJSON_CreateObject(), *bits;
-
-	take_streams(streams, s);
-	cJSON_AddNumberToObject(root, "levels", s->tree->levels);
-	cJSON_AddNumberToObject(root, "leaves", (double)s->tree->n_leaves);
-	cJSON_AddNumberToObject(root, "codes", (double)s->tree->n_codes);
-	cJSON_AddNumberToObject(root, "leaf_edge", ldexp(s->tree->edge * s->info->scale, -s->tree->levels));
-	bits = cJSON_AddObjectToObject(root, "bits_per_leaf");
-	for (int i = 0; i < N_STREAMS; i++)
-		cJSON_AddNumberToObject(bits, streams[i].key, streams[i].bits);
-	if (s->shares.codes > 0) {
-		bits = cJSON_AddObjectToObject(root, "packed_bits_per_leaf");
-		for (int i = 0; i < N_STREAMS; i++)
-			cJSON_AddNumberToObject(bits, streams[i].key, streams[i].packed);
-	}
-	return root;
-}
-
 static void print_text(const struct summary *s)
 {
 	const struct psr_model_info *info = s->info;
@@ -256,9 +196,12 @@ static void print_text(const struct summary *s)
 	if (s->is_prefix)
 		printf("                  the beginning of %.2f MB: %" PRIu32 " of %" PRIu32 " levels of its octree\n",
 		       (double)s->prefix.of_bytes / 1e6, s->prefix.levels, s->prefix.of_levels);
-	printf("memory            %.2f MB\n", (double)s->bytes / 1e6);
+	printf("memory            %.2f MB", (double)s->bytes / 1e6);
+	if (s->drawn_bytes != s->bytes)
+		printf(", some %.2f MB once the octree is drawn", (double)s->drawn_bytes / 1e6);
+	printf("\n");
 	if (s->tree != NULL)
-		print_octree(s);
+		info_print_octree(s->tree, &s->shares, s->info->scale);
 	if (blocks == NULL)
 		return;
 	printf("samples           %" PRIu64 "\n", blocks->n_samples);
@@ -329,6 +272,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 		add_preset(part, s->presets->light[i].name, view_light_kinds[s->presets->light[i].light.kind]);
 	add_calibration(root, s->calibration);
 	cJSON_AddNumberToObject(root, "bytes", (double)s->bytes);
+	cJSON_AddNumberToObject(root, "drawn_bytes", (double)s->drawn_bytes);
 	cJSON_AddNumberToObject(root, "file_bytes", (double)s->file_bytes);
 	cJSON_AddBoolToObject(root, "is_packed", s->is_packed);
 	if (s->is_prefix) {
@@ -357,7 +301,7 @@ static int print_json(const struct summary *s, struct psr_error *err)
 			cJSON_AddItemToArray(counts, cJSON_CreateNumber((double)s->level_samples[l]));
 	}
 	if (s->tree != NULL)
-		cJSON_AddItemToObject(root, "octree", octree_json(s));
+		cJSON_AddItemToObject(root, "octree", info_octree_json(s->tree, &s->shares, s->info->scale));
 	return json_print(root, err);
 }
 

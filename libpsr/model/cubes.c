@@ -208,6 +208,28 @@ int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct p
 	return rc;
 }
 
+uint64_t psr_cubes_guess(const struct octree *tree, unsigned leaf)
+{
+	const int height = octree_subtree_height(tree), n_levels = height - 1;
+	/* A level has a part of the nodes of the one below it, the same everywhere: so leaves and codes tell it. Of the
+	 * subtrees' roots the number is known. */
+	const double part = 1 / (1 + (double)tree->n_leaves / (double)tree->n_codes), n_skips = (double)tree->n_skips;
+	const double run = sizeof(struct psr_cube_run) + sizeof(struct psr_cube_bound);
+	const double bytes_cube = sizeof(struct psr_cube) + run / CUBES_RUN + 1 + (psr_octree_is_one_sided(tree) ? 4 : 0);
+	double nodes = (double)tree->n_leaves, codes = (double)tree->n_codes, skips = n_skips, bytes = sizeof(struct psr_cubes);
+
+	for (int h = 1; h <= height; h++) {
+		nodes = fmax(nodes * part, n_skips);
+		skips *= part;
+		codes = fmax(codes - nodes, 0);
+		if (h < n_levels)
+			bytes += nodes * leaf + codes + skips * sizeof(struct octree_skip);
+		if (h >= 2)
+			bytes += nodes * bytes_cube + n_skips * sizeof(struct psr_cluster);
+	}
+	return (uint64_t)bytes;
+}
+
 void psr_cubes_destroy(struct psr_cubes *cubes)
 {
 	if (cubes == NULL)

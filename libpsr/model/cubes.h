@@ -65,7 +65,16 @@ struct psr_cubes {
 int psr_cubes_create(struct psr_cubes **out, const struct octree *tree, struct psr_pool *pool, struct psr_error *err);
 void psr_cubes_destroy(struct psr_cubes *cubes); /* NULL is fine */
 
-/* Returns NULL if the model has no octree. */
+/* Estimates psr_cubes' n_bytes by a tree's counts alone, an eighth off at most on surfaces, clouds and dust. leaf: bytes of
+ * the attributes of one. */
+uint64_t psr_cubes_guess(const struct octree *tree, unsigned leaf);
+
+/* Makes the cubes of a model's octree, if it has one and they are not there yet: programs that draw nothing have no use for
+ * them. psr_scene_validate(), and so a frame, does it; who does it before does not wait there. Any number of threads may
+ * call it. LIMIT, MEMORY. */
+int psr_model_make_cubes(const struct psr_model *model, struct psr_error *err);
+
+/* Returns NULL if the model has no octree, or its cubes are not made yet. */
 const struct psr_cubes *psr_model_cubes(const struct psr_model *model);
 
 /* Returns whether leaves are seen from where their normals point only. */

@@ -193,6 +193,10 @@ int model_validate_points(const struct dpoint_set *set, const char *name, struct
 void preset_put_cameras(struct psr_preset_camera *to, const struct psr_preset_camera *from, uint32_t n);
 void preset_put_lights(struct psr_preset_light *to, const struct psr_preset_light *from, uint32_t n);
 
+/* Estimates the bytes of cubes that the model of a file will have; 0: none, or the file does not tell. */
+struct pack_source;
+uint64_t model_cubes_need(const struct pack_source *source, int is_packed);
+
 /* Makes a model of an image, which it takes, on failure too. Errors of file_parse(). */
 int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, int is_mapped, const char *name,
                 struct psr_error *err);

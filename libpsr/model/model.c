@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -23,7 +24,8 @@ struct psr_model {
 	size_t n_bytes;
 	const uint8_t *bytes; /* the image */
 	struct content content;
-	struct psr_cubes *cubes; /* of its octree, or NULL */
+	pthread_mutex_t making;  /* held by the one who makes the cubes */
+	_Atomic(struct psr_cubes *) cubes; /* of its octree, once somebody has asked for them; or NULL */
 	struct psr_points *points; /* of its differential points, or NULL */
 	struct pack_facts facts; /* of the packed file */
 };
@@ -55,19 +57,17 @@ int model_adopt(struct psr_model **out, const uint8_t *bytes, size_t n_bytes, in
 		code = psr_fail(err, PSR_ERR_MEMORY, "%s: out of memory", name);
 	else
 		code = file_parse(bytes, n_bytes, pool, name, &model->content, err);
-	if (code == PSR_OK && model->content.has_octree)
-		code = psr_cubes_create(&model->cubes, &model->content.octree, pool, err);
 	if (code == PSR_OK && model->content.has_points)
 		code = psr_points_create(&model->points, &model->content.points, name, err);
 	psr_pool_destroy(pool);
 	if (code != PSR_OK) {
-		if (model != NULL)
-			psr_cubes_destroy(model->cubes);
 		free(model);
 		release_image(bytes, n_bytes, is_mapped);
 		return code;
 	}
 	atomic_init(&model->n_refs, 1);
+	atomic_init(&model->cubes, NULL);
+	pthread_mutex_init(&model->making, NULL);
 	model->is_mapped = is_mapped;
 	model->bytes = bytes;
 	model->n_bytes = n_bytes;
@@ -222,13 +222,16 @@ int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err)
 
 	if (code != PSR_OK)
 		return code;
-	close(f.fd);
 	if (f.is_packed && f.n_whole > f.n_bytes && f.n_image > pack_max_image(f.n_bytes))
 		f.n_image = pack_max_image(f.n_bytes); /* a beginning of the file becomes no more */
-	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes))
+	if (f.is_packed && f.n_image > pack_max_image(f.n_bytes)) {
+		close(f.fd);
 		return psr_fail(err, PSR_ERR_FORMAT, "%s: the header says that %zu bytes unpack to %" PRIu64 "; the limit is "
 		                "%d to 1", name, f.n_bytes, f.n_image, PACK_MAX_RATIO);
-	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model);
+	}
+	*n_bytes = (f.is_packed ? f.n_image : f.n_bytes) + sizeof(struct psr_model)
+	           + model_cubes_need(&(struct pack_source){ .fd = f.fd, .n_bytes = f.n_bytes, .name = name }, f.is_packed);
+	close(f.fd);
 	return PSR_OK;
 }
 
@@ -286,7 +289,8 @@ void psr_model_unref(struct psr_model *model)
 	if (model == NULL || atomic_fetch_sub_explicit(&model->n_refs, 1, memory_order_acq_rel) != 1)
 		return;
 	release_image(model->bytes, model->n_bytes, model->is_mapped);
-	psr_cubes_destroy(model->cubes);
+	psr_cubes_destroy(atomic_load_explicit(&model->cubes, memory_order_acquire));
+	pthread_mutex_destroy(&model->making);
 	psr_points_destroy(model->points);
 	free(model);
 }
@@ -336,13 +340,36 @@ uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed)
 
 uint64_t psr_model_bytes(const struct psr_model *model)
 {
-	return model->n_bytes + sizeof *model + (model->cubes != NULL ? model->cubes->n_bytes : 0)
+	const struct psr_cubes *cubes = psr_model_cubes(model);
+
+	return model->n_bytes + sizeof *model + (cubes != NULL ? cubes->n_bytes : 0)
 	       + (model->points != NULL ? model->points->n_bytes : 0);
+}
+
+int psr_model_make_cubes(const struct psr_model *model, struct psr_error *err)
+{
+	/* Cubes are a cache: whoever reads the model sees no change. */
+	struct psr_model *own = (struct psr_model *)(uintptr_t)model;
+	int code = PSR_OK;
+
+	if (!model->content.has_octree || psr_model_cubes(model) != NULL)
+		return PSR_OK;
+	pthread_mutex_lock(&own->making);
+	if (psr_model_cubes(model) == NULL) {
+		struct psr_pool *pool = pool_for(model->n_bytes);
+		struct psr_cubes *cubes = NULL;
+
+		code = psr_cubes_create(&cubes, &model->content.octree, pool, err);
+		psr_pool_destroy(pool);
+		atomic_store_explicit(&own->cubes, cubes, memory_order_release);
+	}
+	pthread_mutex_unlock(&own->making);
+	return code;
 }
 
 const struct psr_cubes *psr_model_cubes(const struct psr_model *model)
 {
-	return model->cubes;
+	return atomic_load_explicit(&model->cubes, memory_order_acquire);
 }
 
 const struct psr_points *psr_model_points(const struct psr_model *model)

@@ -85,6 +85,9 @@ int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const 
  * for a picture of so many pixels. The file's own size if that is no whole packed octree, or is damaged before. */
 uint64_t pack_coarse_end(const struct pack_source *source, uint32_t pixels);
 
+/* Reads OCTR of a packed file. Returns 0 if there is none, or anything is wrong with the file. */
+int pack_read_octree(uint8_t octree[OCTREE_BYTES], const struct pack_source *source);
+
 /* Packs an image: *n_bytes in memory of psr_alloc_huge() of *capacity bytes. */
 int pack_image(uint8_t **out, size_t *n_bytes, size_t *capacity, const uint8_t *image, size_t n_image,
                struct psr_error *err);

@@ -139,11 +139,10 @@ static void hash_chunk(int i, void *userdata)
 	struct hashing *h = userdata;
 	const uint64_t k = (uint64_t)i, first = k * FILE_CHUNK_BYTES, left = h->length - first;
 	const uint64_t hash = XXH64(h->section + first, left < FILE_CHUNK_BYTES ? left : FILE_CHUNK_BYTES, 0);
-	uint64_t bad = atomic_load(&h->first_bad);
+	uint64_t first_bad = atomic_load(&h->first_bad);
 
-	if (hash != file_get(h->hashes + 8 * k, 8))
-		while (k < bad && !atomic_compare_exchange_weak(&h->first_bad, &bad, k))
-			;
+	while (hash != file_get(h->hashes + 8 * k, 8) && k < first_bad && !atomic_compare_exchange_weak(&h->first_bad, &first_bad, k))
+		;
 }
 
 static int check_hashes(const struct reader *r, struct psr_pool *pool)
@@ -165,9 +164,8 @@ static int check_hashes(const struct reader *r, struct psr_pool *pool)
 		chunks += 8 * n_chunks;
 	}
 	file_content_id(r->bytes, r->n_sections, id);
-	if (memcmp(id, r->bytes + HEADER_CONTENT_ID, sizeof id) != 0)
-		return bad(r, "the content id in the header does not match the sections");
-	return PSR_OK;
+	return memcmp(id, r->bytes + HEADER_CONTENT_ID, sizeof id) == 0
+	       ? PSR_OK : bad(r, "the content id in the header does not match the sections");
 }
 
 static int known_index(const uint8_t *type)
@@ -260,12 +258,11 @@ static int get_blocks(const struct reader *r, struct psr_blocks *blocks)
 	return PSR_OK;
 }
 
-/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS == PSR_MAX_CALIBRATED, or 0 if it is missing.
- * */
+/* *n: the items of an optional section, 1 to PSR_MAX_PRESETS == PSR_MAX_CALIBRATED, or 0 if it is missing. */
 static int get_presets(const struct reader *r, int known, uint32_t *n, const void **array)
 {
+	const uint32_t item_bytes = section_table[known].item_bytes;
 	struct section s;
-	uint32_t item_bytes = section_table[known].item_bytes;
 
 	*n = 0;
 	*array = NULL;
@@ -325,9 +322,9 @@ static int get_arrays(const struct reader *r, struct content *content)
 
 	for (int k = SECTION_FIRST_ARRAY; k < N_KNOWN_SECTIONS; k++) {
 		const struct section_spec *spec = &section_table[k];
-
 		const void *array;
 		int code;
+
 		if (r->entry[k] < 0 || spec->pointer == 0)
 			continue;
 		code = check_length(r, k, spec->item_bytes * section_items(spec, content));

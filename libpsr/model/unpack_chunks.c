@@ -197,33 +197,61 @@ static int make_image(struct unpacker *u, uint8_t **out, struct octree_shares *s
 	return PSR_OK;
 }
 
+/* Reads and checks all before the chunks, and takes the memory to unpack these. unpacker_fini() is due even on failure. */
+static int unpacker_init(struct unpacker *u, const struct pack_source *source, struct psr_error *err)
+{
+	int code;
+
+	*u = (struct unpacker){ .source = source, .err = err };
+	code = unpack_fetch(u, u->header, 0, FILE_HEADER_BYTES);
+	if (code == PSR_OK)
+		code = unpack_read_head(u);
+	if (code == PSR_OK)
+		code = unpack_check_head(u);
+	if (code != PSR_OK)
+		return code;
+	u->context = ZSTD_createDCtx();
+	u->packed = psr_alloc_array(FILE_CHUNK_BYTES, 1);
+	u->split = psr_alloc_array(FILE_CHUNK_BYTES, 1);
+	if (u->context == NULL || u->packed == NULL || u->split == NULL)
+		return psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to unpack it", source->name);
+	return PSR_OK;
+}
+
+static void unpacker_fini(struct unpacker *u)
+{
+	ZSTD_freeDCtx(u->context);
+	psr_free(u->head);
+	psr_free(u->packed);
+	psr_free(u->split);
+}
+
+int pack_read_octree(uint8_t octree[OCTREE_BYTES], const struct pack_source *source)
+{
+	struct counts counts = { .has_blocks = 0 };
+	struct unpacker u;
+	int code = unpacker_init(&u, source, NULL);
+
+	if (code == PSR_OK)
+		code = unpack_chunks(&u, NULL, &counts);
+	unpacker_fini(&u);
+	memcpy(octree, counts.octree, OCTREE_BYTES);
+	return code == PSR_OK && counts.has_octree;
+}
+
 int pack_open(uint8_t **image, size_t *n_image, struct pack_facts *facts, const struct pack_source *source,
               struct psr_error *err)
 {
-	struct unpacker u = { .source = source, .err = err };
-	int code = unpack_fetch(&u, u.header, 0, FILE_HEADER_BYTES);
+	struct unpacker u;
+	int code = unpacker_init(&u, source, err);
 
 	*facts = (struct pack_facts){ .prefix = { .levels = 0 } };
-	if (code == PSR_OK)
-		code = unpack_read_head(&u);
-	if (code == PSR_OK)
-		code = unpack_check_head(&u);
-	if (code == PSR_OK) {
-		u.context = ZSTD_createDCtx();
-		u.packed = psr_alloc_array(FILE_CHUNK_BYTES, 1);
-		u.split = psr_alloc_array(FILE_CHUNK_BYTES, 1);
-		if (u.context == NULL || u.packed == NULL || u.split == NULL)
-			code = psr_fail(err, PSR_ERR_MEMORY, "%s: no memory to unpack it", source->name);
-	}
 	if (code == PSR_OK)
 		code = check_lengths(&u);
 	if (code == PSR_OK)
 		code = u.n_file > source->n_bytes ? unpack_prefix(&u, image, facts) : make_image(&u, image, &facts->shares);
 	if (code == PSR_OK)
 		*n_image = u.n_image;
-	ZSTD_freeDCtx(u.context);
-	psr_free(u.head);
-	psr_free(u.packed);
-	psr_free(u.split);
+	unpacker_fini(&u);
 	return code;
 }

@@ -5,14 +5,17 @@
 #include "model/cubes.h"
 #include "psr/scene.h"
 
-/* Returns the cubes of an instance that is drawn as an octree, or NULL: it names that representation, or its model has
- * no blocks. */
+/* Returns whether an instance is drawn as an octree: it names that representation, or its model has no blocks. */
+static inline int is_octree(const struct psr_instance *instance)
+{
+	return instance->representation == PSR_OCTREE
+	       || (instance->representation == PSR_AUTOMATIC && psr_model_blocks(instance->model) == NULL);
+}
+
+/* Returns the cubes of an instance that is drawn as an octree, or NULL. psr_scene_validate() has made them. */
 static inline const struct psr_cubes *instance_cubes(const struct psr_instance *instance)
 {
-	const int is_octree = instance->representation == PSR_OCTREE
-	                      || (instance->representation == PSR_AUTOMATIC && psr_model_blocks(instance->model) == NULL);
-
-	return is_octree ? psr_model_cubes(instance->model) : NULL;
+	return is_octree(instance) ? psr_model_cubes(instance->model) : NULL;
 }
 
 /* Returns what culling reads; NULL if the model has not what the instance names. */

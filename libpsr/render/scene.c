@@ -13,6 +13,12 @@ static int validate_instance(const struct psr_instance *instance, unsigned i, st
 		return psr_fail(err, PSR_ERR_ARG, "instance %u has no model", i);
 	if ((unsigned)instance->representation > PSR_OCTREE)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: there is no representation %d", i, instance->representation);
+	if (is_octree(instance)) {
+		const int rc = psr_model_make_cubes(instance->model, err);
+
+		if (rc != PSR_OK)
+			return rc;
+	}
 	if (instance_groups(instance) == NULL)
 		return psr_fail(err, PSR_ERR_ARG, "instance %u: the model has no %s", i,
 		                instance->representation == PSR_OCTREE ? "octree" : "blocks");

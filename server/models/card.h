@@ -18,7 +18,7 @@ struct card {
 	int is_calibrated; /* its blocks' ladder is measured (model/calibration.h) */
 };
 
-/* Fills the card of a model. MEMORY: the card then holds nothing. */
+/* Fills the card of a model, whose cubes are made. MEMORY: the card then holds nothing. */
 int card_init(struct card *card, const struct psr_model *model);
 void card_fini(struct card *card);
 

@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 #include "base/clock.h"
+#include "model/cubes.h"
 #include "cache.h"
 #include "cachekey.h"
 #include "opening.h"
@@ -31,6 +32,11 @@ void opening_load(void *userdata)
 		o->code = psr_model_read(&o->model, o->cached, &o->error);
 	else if (o->code == PSR_OK)
 		o->code = psr_model_read_coarse(&o->model, o->file.path, o->resolution, &o->error);
+	/* Here, and not with the first frame: the catalogue counts them. */
+	if (o->code == PSR_OK && (o->code = psr_model_make_cubes(o->model, &o->error)) != PSR_OK) {
+		psr_model_unref(o->model);
+		o->model = NULL;
+	}
 	post(o);
 }
 

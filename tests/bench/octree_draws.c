@@ -211,6 +211,8 @@ static int run(const char *path, const char *blocks, const struct wish *wish, st
 		rc = (strstr(path, ".las") != NULL ? read_cloud : read_mesh)(&tree, path, &wish->options, err);
 	if (rc == PSR_OK)
 		rc = make_model(&subject[0].model, tree, subject[1].model, err);
+	if (rc == PSR_OK)
+		rc = psr_model_make_cubes(subject[0].model, err);
 	if (rc != PSR_OK)
 		return rc;
 	const struct psr_cubes *cubes = psr_model_cubes(subject[0].model);

@@ -106,6 +106,8 @@ int main(int argc, char **argv)
 	    || psr_pool_create(&c.pool, N_THREADS, &err) != PSR_OK
 	    || psr_frame_alloc(&c.frame, SIDE, SIDE, 1u << PSR_PLANE_COLOR | 1u << PSR_PLANE_DEPTH, &err) != PSR_OK)
 		stop(err.text);
+	if (psr_model_make_cubes(model, &err) != PSR_OK)
+		stop(err.text);
 	if (psr_model_cubes(model) == NULL)
 		stop("the model has no octree");
 	c.instance.model = model;

@@ -51,9 +51,8 @@ int psr_model_read_coarse(struct psr_model **out, const char *path, uint32_t pix
 /* Returns whether it would read less than all. */
 int psr_model_has_coarse(const char *path, uint32_t pixels);
 
-/* Reads from the header how much memory psr_model_read() takes for this file; a packed file takes more than its size. An
- * octree takes a part more in memory, for its coarser levels, and so do differential points, for their bounds
- * (psr_model_bytes()).
+/* Reads from the header how much memory this file's model takes once it is drawn; a packed file takes more than its size.
+ * What is drawn of an octree beside its file's sections is an estimate; bounds of differential points are not in it.
  * Errors as of psr_model_read(), as far as the header shows them. */
 int psr_model_need(uint64_t *n_bytes, const char *path, struct psr_error *err);
 
@@ -90,7 +89,7 @@ int psr_model_is_prefix(const struct psr_model *model, struct psr_model_prefix *
 void psr_model_content_id(const struct psr_model *model, uint8_t id[16]);
 /* Size of the file that the model was opened from, 0 without one; *is_packed tells whether the file is packed. */
 uint64_t psr_model_file_bytes(const struct psr_model *model, int *is_packed);
-uint64_t psr_model_bytes(const struct psr_model *model); /* memory that the model holds, in all */
+uint64_t psr_model_bytes(const struct psr_model *model); /* memory that the model holds by now, in all */
 
 #ifdef __cplusplus
 }

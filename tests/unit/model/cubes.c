@@ -278,11 +278,30 @@ static void threads_make_the_same_cubes(void **state)
 	psr_pool_destroy(pool);
 }
 
+/* Leaves of a sphere, of a cloud of it, and dust. */
+static void counts_tell_the_memory_of_cubes(void **state)
+{
+	(void)state;
+	for (size_t form = 0; form < N_FORMS; form++) {
+		struct octree *tree = make_tree(form);
+		struct psr_cubes *cubes;
+		uint64_t guess;
+
+		assert_int_equal(psr_cubes_create(&cubes, tree, NULL, NULL), PSR_OK);
+		guess = psr_cubes_guess(tree, tree->normal != NULL ? 6 : 0);
+		if (tree->n_leaves > 1000)
+			assert_true(guess > cubes->n_bytes * 7 / 8 && guess < cubes->n_bytes * 9 / 8);
+		psr_cubes_destroy(cubes);
+		octree_destroy(tree);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(cubes_and_their_trees_are_what_they_should_be),
 		cmocka_unit_test(threads_make_the_same_cubes),
+		cmocka_unit_test(counts_tell_the_memory_of_cubes),
 	};
 
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -111,11 +111,44 @@ static void octrees_survive_file_map_and_packing(void **state)
 			psr_model_content_id(model, other);
 			assert_memory_equal(id, other, sizeof id);
 			assert_int_equal(psr_model_need(&need, path, NULL), PSR_OK);
-			assert_int_equal(need + psr_model_cubes(model)->n_bytes, psr_model_bytes(model));
+			/* Nobody has drawn it yet. */
+			assert_null(psr_model_cubes(model));
+			const uint64_t opened = psr_model_bytes(model);
+			assert_true(opened < need);
+			assert_int_equal(psr_model_make_cubes(model, NULL), PSR_OK);
+			assert_int_equal(psr_model_bytes(model), opened + psr_model_cubes(model)->n_bytes);
+			assert_true(need > psr_model_bytes(model) * 9 / 10 && need < psr_model_bytes(model) * 11 / 10);
 			psr_model_unref(model);
 			unlink(path);
 		}
 	rmdir(folder);
+}
+
+static void ask_for_cubes(int i, void *userdata)
+{
+	const struct psr_cubes **found = userdata;
+
+	assert_int_equal(psr_model_make_cubes(alone, NULL), PSR_OK);
+	found[i] = psr_model_cubes(alone);
+}
+
+static void threads_that_ask_for_cubes_get_the_same(void **state)
+{
+	const struct psr_cubes *found[16] = { NULL };
+	struct psr_pool *pool;
+
+	(void)state;
+	assert_int_equal(psr_pool_create(&pool, 4, NULL), PSR_OK);
+	psr_pool_for(pool, 16, ask_for_cubes, found);
+	for (int i = 0; i < 16; i++)
+		assert_true(found[i] != NULL && found[i] == found[0]);
+	psr_pool_destroy(pool);
+	/* A model without an octree has none. */
+	struct psr_model *blocks = NULL;
+	assert_int_equal(psr_model_create(&blocks, &fixture.info, &fixture.blocks, NULL, NULL), PSR_OK);
+	assert_int_equal(psr_model_make_cubes(blocks, NULL), PSR_OK);
+	assert_null(psr_model_cubes(blocks));
+	psr_model_unref(blocks);
 }
 
 static void attributes_may_be_missing(void **state)
@@ -294,6 +327,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_model_holds_blocks_or_an_octree_or_both),
 		cmocka_unit_test(octrees_survive_file_map_and_packing),
+		cmocka_unit_test(threads_that_ask_for_cubes_get_the_same),
 		cmocka_unit_test(attributes_may_be_missing),
 		cmocka_unit_test(what_is_no_octree_makes_no_model),
 		cmocka_unit_test(lies_in_sections_of_octrees_are_refused),

@@ -66,6 +66,7 @@ static void fewer_samples_are_drawn_of_what_is_small(void **state)
 	uint64_t last = UINT64_MAX;
 
 	(void)state;
+	assert_int_equal(psr_model_make_cubes(model, NULL), PSR_OK);
 	assert_int_equal(psr_model_cubes(model)->groups.n_levels, CUBES_MOST_LEVELS);
 	for (double height = 4; height <= 32; height *= 2) {
 		scene.camera = orthographic(height);
@@ -105,7 +106,8 @@ static void the_coarsest_level_that_is_dense_enough_is_drawn(void **state)
 static void runs_that_face_away_are_left_out_at_once(void **state)
 {
 	struct psr_model *model = tree_build(&SOLID);
-	const uint32_t n_cubes = psr_model_cubes(model)->level[0].n;
+	const int rc = psr_model_make_cubes(model, NULL);
+	const uint32_t n_cubes = rc == PSR_OK ? psr_model_cubes(model)->level[0].n : 0;
 	struct psr_instance instance = place(model);
 	struct psr_scene scene = { .instance = &instance, .n_instances = 1, .ambient = { 1, 1, 1 } };
 	static uint64_t words[SIDE * SIDE];
